@@ -1,0 +1,144 @@
+//! Cameras and views.
+//!
+//! In: where a camera stands and its lens. Out: a [`View`], a camera at one time with the numbers that the passes read, in the
+//! original rasterizer's conventions (camera space x right, y down, z forward; pixel centres at integers).
+
+use glam::{DMat4, Mat4, UVec2, Vec2, Vec3, Vec4};
+
+/// A camera of a capture: pose, lens and picture size.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    /// World to camera, OpenCV axes (x right, y down, z forward).
+    pub world_to_camera: Mat4,
+    /// Picture size in pixels.
+    pub size: UVec2,
+    /// The lens.
+    pub lens: Lens,
+}
+
+/// How a camera's lens was described, which matters: the original treats the two differently ([`RasterFov`]).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Lens {
+    /// A *FoV camera*: tangents of half the horizontal and vertical field of view, centred.
+    Fov {
+        /// `tan(FovX / 2)`, `tan(FovY / 2)`.
+        tan: Vec2,
+    },
+    /// An *intrinsics camera*: focal lengths and principal point in pixels (pixel centres at half-integers, as in COLMAP).
+    Intrinsics {
+        /// `fl_x`, `fl_y` in pixels.
+        focal: Vec2,
+        /// `cx`, `cy` in pixels.
+        center: Vec2,
+    },
+}
+
+/// Which field of view shapes the footprints of splats seen by an intrinsics camera.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RasterFov {
+    /// The original's placeholder of −1 rad on both axes, with which its N3V-type captures were trained (section 3.2 of the
+    /// 4DGS model: the *sentinel*). FoV cameras are not affected.
+    #[default]
+    Reference,
+    /// The camera's true field of view.
+    Corrected,
+}
+
+/// The original's near limit in capture units: what is not farther away is not drawn.
+const NEAR: f32 = 0.2;
+
+/// One camera at one time: what the passes read. Also carries a model transform, when the capture is placed in a world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// Picture size in pixels.
+    pub size: UVec2,
+    /// Timestamp, in the capture's unit.
+    pub time: f32,
+    /// Capture space to camera space (OpenCV axes); may scale and shear when a model transform is included.
+    pub world_to_camera: Mat4,
+    /// Rows x and y of the projection: `P00, P11, P02, P12` in `ndc = (P00 x + P02 z, P11 y + P12 z) / z`.
+    pub projection: Vec4,
+    /// Camera centre in capture space.
+    pub camera_position: Vec3,
+    /// Tangents of half the field of view that shapes footprints (negative for the sentinel).
+    pub tan_fov: Vec2,
+    /// Near limit in camera units: 0.2 capture units.
+    pub near: f32,
+}
+
+impl Camera {
+    /// Half-angle tangents of a FoV camera from its horizontal angle (radians) and picture size: square pixels.
+    pub fn fov_lens(fov_x: f64, size: UVec2) -> Lens {
+        let tan_x = (fov_x / 2.0).tan();
+        Lens::Fov { tan: Vec2::new(tan_x as f32, (tan_x * f64::from(size.y) / f64::from(size.x)) as f32) }
+    }
+
+    /// A camera at `eye` looking at `target`, with the horizontal field of view given (radians).
+    pub fn look_at(eye: Vec3, target: Vec3, up: Vec3, fov_x: f32, size: UVec2) -> Self {
+        // OpenGL axes to OpenCV axes: y and z turn round.
+        let flip = Mat4::from_diagonal(Vec4::new(1.0, -1.0, -1.0, 1.0));
+        let world_to_camera = flip * Mat4::look_at_rh(eye, target, up);
+        Self { world_to_camera, size, lens: Self::fov_lens(f64::from(fov_x), size) }
+    }
+
+    /// This camera at `time`.
+    pub fn view(&self, time: f32, raster_fov: RasterFov) -> View {
+        let size = self.size.as_vec2();
+        let (projection, tan_fov) = match self.lens {
+            Lens::Fov { tan } => (Vec4::new(tan.x.recip(), tan.y.recip(), 0.0, 0.0), tan),
+            Lens::Intrinsics { focal, center } => {
+                let scale = 2.0 * focal / size;
+                let offset = (2.0 * center - size) / size;
+                let tan = match raster_fov {
+                    RasterFov::Reference => Vec2::splat((-0.5f64).tan() as f32),
+                    RasterFov::Corrected => size / (2.0 * focal),
+                };
+                (Vec4::new(scale.x, scale.y, offset.x, offset.y), tan)
+            }
+        };
+        View::new(self.size, time, self.world_to_camera, projection, tan_fov)
+    }
+}
+
+impl View {
+    /// A view from its parts; `world_to_camera` may include a model transform (rotation, translation, any scale).
+    pub fn new(size: UVec2, time: f32, world_to_camera: Mat4, projection: Vec4, tan_fov: Vec2) -> Self {
+        let inverse = world_to_camera.as_dmat4().inverse();
+        Self {
+            size,
+            time,
+            world_to_camera,
+            projection,
+            camera_position: inverse.w_axis.truncate().as_vec3(),
+            tan_fov,
+            // Depth grows by |row z| camera units for each capture unit along the viewing direction.
+            near: NEAR * world_to_camera.row(2).truncate().length(),
+        }
+    }
+
+    /// Footprint focal lengths in pixels (negative for the sentinel).
+    pub fn focal(&self) -> Vec2 {
+        self.size.as_vec2() / (2.0 * self.tan_fov)
+    }
+
+    /// Rows x and y of projection times world-to-camera.
+    pub fn clip_rows(&self) -> [Vec4; 2] {
+        let m: DMat4 = self.world_to_camera.as_dmat4();
+        let p = self.projection.as_dvec4();
+        [(m.row(0) * p.x + m.row(2) * p.z).as_vec4(), (m.row(1) * p.y + m.row(2) * p.w).as_vec4()]
+    }
+
+    /// World-space direction of the ray through pixel `(x, y)`, unit length.
+    pub fn ray(&self, x: u32, y: u32) -> Vec3 {
+        let ndc = (Vec2::new(x as f32, y as f32) + 0.5) / self.size.as_vec2() * 2.0 - 1.0;
+        let p = self.projection;
+        let camera = Vec3::new((ndc.x - p.z) / p.x, (ndc.y - p.w) / p.y, 1.0);
+        self.world_to_camera.inverse().transform_vector3(camera).normalize()
+    }
+
+    /// Number of 16 × 16 tiles across and down.
+    pub fn tiles(&self) -> UVec2 {
+        (self.size + (super::projection::TILE_SIZE - 1)) / super::projection::TILE_SIZE
+    }
+}

@@ -1,0 +1,27 @@
+//! The maths of a native 4D Gaussian, on glam alone.
+//!
+//! In comes what a trainer stores ([`Parameters`], raw) and a camera in time ([`View`]); out come the runtime form ([`Gaussian`],
+//! sliced once) and, per view, the numbers of a splat: [`projection`] and [`harmonics`].
+//!
+//! A native 4D Gaussian is exactly a 3D Gaussian in straight-line motion under a Gaussian opacity envelope. With the 4D
+//! covariance `Σ = [[A, c], [cᵀ, v]]`:
+//!
+//! ```text
+//! mean(t)     = μ + (c/v)(t − μ_t)          a constant velocity c/v
+//! covariance  = A − c cᵀ/v                  independent of t
+//! marginal(t) = exp(−½ (t − μ_t)²/v)        opacity is multiplied by it
+//! ```
+
+mod camera;
+pub mod harmonics;
+mod parameters;
+pub mod projection;
+mod slice;
+
+pub use camera::{Camera, Lens, RasterFov, View};
+pub use harmonics::{Harmonics, ShDirection};
+pub use parameters::{Model, Parameters};
+pub use slice::{Gaussian, InvalidGaussian, SliceSettings, rotation_4d};
+
+/// A Gaussian whose marginal is not above this is not drawn at that time (strict, as in the original).
+pub const MARGINAL_CUTOFF: f32 = 0.05;

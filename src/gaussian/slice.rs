@@ -1,0 +1,217 @@
+//! The slice: from the trained form to the runtime form, once, when a scene is loaded or packed.
+//!
+//! In: raw [`Parameters`]. Out: one [`Gaussian`] each, activated, in world space, computed in double precision.
+
+use super::{Model, Parameters};
+use glam::{DMat3, DMat4, DQuat, DVec3, DVec4, Vec3};
+
+/// One Gaussian in the runtime form: activated, sliced, world space. 64 bytes, the record the GPU reads too.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Gaussian {
+    /// Mean at time `mean_t`, world units.
+    pub mean: [f32; 3],
+    /// Temporal mean μ_t, timestamp units.
+    pub mean_t: f32,
+    /// Velocity c/v, world units per timestamp unit.
+    pub velocity: [f32; 3],
+    /// Temporal standard deviation σ_t of the marginal, timestamp units; infinite for a Gaussian that is always there.
+    pub sigma_t: f32,
+    /// Conditional covariance, upper triangle xx, xy, xz, yy, yz, zz, world units squared.
+    pub covariance: [f32; 6],
+    /// Peak opacity in (0, 1).
+    pub opacity: f32,
+    /// Unused; zero.
+    pub padding: f32,
+}
+
+impl Gaussian {
+    /// How present the Gaussian is at `time`: the unnormalised marginal in (0, 1].
+    pub fn marginal(&self, time: f32) -> f32 {
+        let z = (time - self.mean_t) * self.sigma_t.recip();
+        (-0.5 * z * z).exp()
+    }
+
+    /// The conditional mean at `time`, world units.
+    pub fn mean_at(&self, time: f32) -> Vec3 {
+        Vec3::from(self.mean) + Vec3::from(self.velocity) * (time - self.mean_t)
+    }
+}
+
+/// What the slice needs beside the parameters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SliceSettings {
+    /// Multiplies all four scales (1 in training).
+    pub scale_modifier: f32,
+    /// Added to the temporal variance in the marginal alone, if positive (the original's `prefilter_var`).
+    pub prefilter_var: f32,
+}
+
+impl Default for SliceSettings {
+    fn default() -> Self {
+        Self { scale_modifier: 1.0, prefilter_var: -1.0 }
+    }
+}
+
+/// A Gaussian that cannot be drawn: the file is damaged or was not meant for this reader.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("Gaussian {index}: {reason}")]
+pub struct InvalidGaussian {
+    /// Its place in the file, from 0.
+    pub index: usize,
+    /// What is wrong with it.
+    pub reason: &'static str,
+}
+
+impl Parameters {
+    /// Slices every Gaussian: section 2 of the 4DGS model (`cov3 = A − c cᵀ/v`, velocity `c/v`, `v' = v + prefilter_var`).
+    ///
+    /// # Errors
+    /// The first Gaussian with a value that is not finite, a quaternion of length zero, or scales so extreme that the result
+    /// is not finite.
+    pub fn slice(&self, settings: &SliceSettings) -> Result<Vec<Gaussian>, InvalidGaussian> {
+        let model = self.model();
+        (0..self.len()).map(|i| self.slice_one(i, model, settings)).collect()
+    }
+
+    fn slice_one(&self, index: usize, model: Model, settings: &SliceSettings) -> Result<Gaussian, InvalidGaussian> {
+        let invalid = |reason| InvalidGaussian { index, reason };
+        let modifier = f64::from(settings.scale_modifier);
+        let scale = DVec3::from(self.log_scale[index].map(|s| f64::from(s).exp())) * modifier;
+        let rotation_l = unit(self.rotation_l[index]).ok_or(invalid("a rotation of length zero or not finite"))?;
+        let prefilter = f64::from(settings.prefilter_var.max(0.0));
+        let (covariance, velocity, variance_t) = match model {
+            Model::Rotated4d => {
+                let rotation_r =
+                    unit(self.rotation_r[index]).ok_or(invalid("a right rotation of length zero or not finite"))?;
+                let q = rotation_4d(rotation_l, rotation_r);
+                let scale_t = f64::from(self.log_scale_t[index]).exp() * modifier;
+                let s = scale.extend(scale_t);
+                let m = q * DMat4::from_diagonal(s);
+                let sigma = m * m.transpose();
+                let (a, c, v) = (DMat3::from_mat4(sigma), sigma.w_axis.truncate(), sigma.w_axis.w);
+                let outer = DMat3::from_cols(c * c.x, c * c.y, c * c.z);
+                (a - outer * v.recip(), c / v, v + prefilter)
+            }
+            Model::Unrotated4d => {
+                // The original uses the temporal scale as the variance here, not squared.
+                let v = f64::from(self.log_scale_t[index]).exp() * modifier;
+                (covariance_3d(rotation_l, scale), DVec3::ZERO, v + prefilter)
+            }
+            Model::Static3d => (covariance_3d(rotation_l, scale), DVec3::ZERO, f64::INFINITY),
+        };
+        let gaussian = Gaussian {
+            mean: self.mean[index],
+            mean_t: if model == Model::Static3d { 0.0 } else { self.mean_t[index] },
+            velocity: velocity.as_vec3().to_array(),
+            sigma_t: variance_t.sqrt() as f32,
+            covariance: [
+                covariance.x_axis.x,
+                covariance.x_axis.y,
+                covariance.x_axis.z,
+                covariance.y_axis.y,
+                covariance.y_axis.z,
+                covariance.z_axis.z,
+            ]
+            .map(|c| c as f32),
+            opacity: (1.0 / (1.0 + (-f64::from(self.opacity_logit[index])).exp())) as f32,
+            padding: 0.0,
+        };
+        gaussian.check().map_err(invalid)?;
+        Ok(gaussian)
+    }
+}
+
+impl Gaussian {
+    /// Whether every value is finite (σ_t may be infinite) and the temporal deviation positive.
+    ///
+    /// # Errors
+    /// What is wrong, in words.
+    pub fn check(&self) -> Result<(), &'static str> {
+        let finite = |values: &[f32]| values.iter().all(|v| v.is_finite());
+        if !finite(&self.mean) {
+            Err("a mean that is not finite")
+        } else if !self.mean_t.is_finite() {
+            Err("a temporal mean that is not finite")
+        } else if self.sigma_t.is_nan() || self.sigma_t <= 0.0 {
+            Err("a temporal scale that is zero or not a number")
+        } else if !finite(&self.velocity) {
+            Err("a velocity that is not finite (temporal scale too small)")
+        } else if !finite(&self.covariance) {
+            Err("a scale that is not finite or too large")
+        } else if !(0.0..=1.0).contains(&self.opacity) {
+            Err("an opacity that is not a number between 0 and 1")
+        } else {
+            Ok(())
+        }
+    }
+}
+
+/// The unit quaternion (w, x, y, z), or nothing where the length is zero or not finite.
+fn unit(q: [f32; 4]) -> Option<DVec4> {
+    let q = DVec4::from(q.map(f64::from));
+    let length = q.length();
+    (length.is_finite() && length > 1e-12).then(|| q / length)
+}
+
+/// `R diag(s)² Rᵀ` with the ordinary rotation matrix of the quaternion (w, x, y, z).
+fn covariance_3d(q: DVec4, scale: DVec3) -> DMat3 {
+    let m = DMat3::from_quat(DQuat::from_xyzw(q.y, q.z, q.w, q.x)) * DMat3::from_diagonal(scale);
+    m * m.transpose()
+}
+
+/// The 4D rotation `Q = L(l) R(r)` of a pair of unit quaternions (a, b, c, d) and (p, q, r, s), acting on column vectors
+/// (x, y, z, t); section 2.1 of the 4DGS model, flipped convention.
+pub fn rotation_4d(l: DVec4, r: DVec4) -> DMat4 {
+    let [a, b, c, d] = l.to_array();
+    let [p, q, r, s] = r.to_array();
+    let left = DMat4::from_cols_array(&[a, -b, c, -d, b, a, -d, -c, -c, d, a, -b, d, c, b, a]);
+    let right = DMat4::from_cols_array(&[p, -q, r, s, q, p, -s, r, -r, s, p, q, -s, -r, -q, p]);
+    left * right
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn one(l: [f32; 4], r: [f32; 4]) -> Parameters {
+        Parameters {
+            mean: vec![[0.1, 0.2, 0.3]],
+            mean_t: vec![0.5],
+            log_scale: vec![[-1.0, -2.0, -3.0]],
+            log_scale_t: vec![-1.5],
+            rotation_l: vec![l],
+            rotation_r: vec![r],
+            opacity_logit: vec![0.3],
+        }
+    }
+
+    #[test]
+    fn rotation_is_orthogonal() {
+        let q = rotation_4d(DVec4::new(0.1, 0.7, -0.3, 0.2).normalize(), DVec4::new(-0.4, 0.2, 0.6, 0.9).normalize());
+        assert!((q * q.transpose()).abs_diff_eq(DMat4::IDENTITY, 1e-12), "Q Qᵀ is the identity");
+        assert!((q.determinant() - 1.0).abs() < 1e-12, "Q is a proper rotation");
+    }
+
+    #[test]
+    fn equal_quaternions_do_not_move() {
+        let q = [0.3, -0.5, 0.2, 0.8];
+        let still = one(q, q).slice(&SliceSettings::default()).expect("valid")[0];
+        assert!(Vec3::from(still.velocity).length() < 1e-6, "no space-time coupling");
+        let spun = Parameters { rotation_l: vec![[q[0], -q[3], -q[2], -q[1]]], rotation_r: vec![], ..one(q, q) };
+        let plain = spun.slice(&SliceSettings::default()).expect("valid")[0];
+        for (a, b) in still.covariance.iter().zip(plain.covariance) {
+            assert!((a - b).abs() < 1e-6, "the 3D block is the rotation of (a, -d, -c, -b)");
+        }
+    }
+
+    #[test]
+    fn poison_is_named() {
+        let good = one([1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]);
+        let reason = |p: Parameters| p.slice(&SliceSettings::default()).expect_err("must be refused").reason;
+        assert!(reason(Parameters { mean: vec![[f32::NAN, 0.0, 0.0]], ..good.clone() }).contains("mean"), "NaN mean");
+        assert!(reason(Parameters { rotation_l: vec![[0.0; 4]], ..good.clone() }).contains("length zero"), "zero quaternion");
+        assert!(reason(Parameters { log_scale: vec![[200.0, 0.0, 0.0]], ..good.clone() }).contains("scale"), "huge scale");
+        assert!(reason(Parameters { opacity_logit: vec![f32::NAN], ..good }).contains("opacity"), "NaN opacity");
+    }
+}
