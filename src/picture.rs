@@ -1,0 +1,48 @@
+//! Pictures in floating point: what training views are compared with and what rendering gives.
+//!
+//! In and out: RGB values in the blend space (sRGB-encoded), usually 0 to 1; files as 8-bit PNG/JPEG or raw float32.
+
+use glam::{UVec2, Vec3};
+
+/// An RGB picture, rows from the top.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Width and height in pixels.
+    pub size: UVec2,
+    /// `width × height` pixels, row by row. Unclamped.
+    pub pixels: Vec<Vec3>,
+}
+
+impl Picture {
+    /// A picture of one colour.
+    pub fn filled(size: UVec2, color: Vec3) -> Self {
+        Self { size, pixels: vec![color; size.x as usize * size.y as usize] }
+    }
+
+    /// The pixel at column `x`, row `y`.
+    pub fn pixel(&self, x: u32, y: u32) -> Vec3 {
+        self.pixels[y as usize * self.size.x as usize + x as usize]
+    }
+
+    /// Every value clamped to 0..1, as the original evaluates.
+    pub fn clamped(&self) -> Self {
+        Self { size: self.size, pixels: self.pixels.iter().map(|p| p.clamp(Vec3::ZERO, Vec3::ONE)).collect() }
+    }
+
+    /// 8-bit RGB: clamped, times 255, rounded.
+    pub fn to_rgb8(&self) -> image::RgbImage {
+        let bytes = self.pixels.iter().flat_map(|p| p.to_array()).map(|v| (v.clamp(0.0, 1.0) * 255.0).round() as u8);
+        image::RgbImage::from_raw(self.size.x, self.size.y, bytes.collect()).unwrap_or_default()
+    }
+
+    /// From 8-bit RGB.
+    pub fn from_rgb8(image: &image::RgbImage) -> Self {
+        let pixels = image.pixels().map(|p| Vec3::from(p.0.map(f32::from)) / 255.0).collect();
+        Self { size: UVec2::new(image.width(), image.height()), pixels }
+    }
+
+    /// The raw form: height × width × 3 little-endian float32, unclamped.
+    pub fn to_raw(&self) -> Vec<u8> {
+        self.pixels.iter().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes).collect()
+    }
+}

@@ -1,0 +1,50 @@
+//! The environment map: what stands behind all Gaussians, on a sphere of radius 60 about the world origin.
+//!
+//! In: a lat-long texture from slot 17 of a checkpoint, a camera position and a ray. Out: the colour behind that pixel.
+//! Section 3.7 of the 4DGS model.
+
+use glam::Vec3;
+use std::f32::consts::{PI, TAU};
+
+/// Radius of the sphere, world units.
+pub const RADIUS: f32 = 60.0;
+
+/// A lat-long texture of raw, unclamped RGB in the capture's blend space.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Environment {
+    /// Texels across.
+    pub width: u32,
+    /// Texels down.
+    pub height: u32,
+    /// Planar: 3 × height × width.
+    pub texels: Vec<f32>,
+}
+
+impl Environment {
+    /// Colour where the ray from `origin` along the unit vector `direction` leaves the sphere. Bilinear, black outside the
+    /// texture: the seam at the ends of `u` fades, as in the original.
+    pub fn sample(&self, origin: Vec3, direction: Vec3) -> Vec3 {
+        let along = origin.dot(direction);
+        let reach = -along + (along * along - (origin.length_squared() - RADIUS * RADIUS)).sqrt();
+        let hit = origin + direction * reach;
+        let u = hit.y.atan2(hit.x) / TAU + 0.5;
+        let v = (hit.z / RADIUS).clamp(-1.0, 1.0).acos() / PI;
+        let (x, y) = (u * self.width as f32 - 0.5, v * self.height as f32 - 0.5);
+        let (x0, y0) = (x.floor(), y.floor());
+        let mut color = Vec3::ZERO;
+        for (i, j) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+            let weight = (1.0 - (x - (x0 + i)).abs()) * (1.0 - (y - (y0 + j)).abs());
+            color += weight * self.texel(x0 + i, y0 + j);
+        }
+        color
+    }
+
+    fn texel(&self, x: f32, y: f32) -> Vec3 {
+        if x < 0.0 || y < 0.0 || x >= self.width as f32 || y >= self.height as f32 {
+            return Vec3::ZERO;
+        }
+        let plane = (self.width * self.height) as usize;
+        let at = y as usize * self.width as usize + x as usize;
+        Vec3::new(self.texels[at], self.texels[plane + at], self.texels[2 * plane + at])
+    }
+}

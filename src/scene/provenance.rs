@@ -1,0 +1,133 @@
+//! How a capture was trained and is meant to be played: the scalars that no tensor holds.
+//!
+//! In: options of a command, `cfg_args`, or a package's header. Out: [`TrainedWith`] and [`PlaybackHints`], stored in every
+//! package so that drawing needs no options.
+
+use crate::gaussian::{RasterFov, ShDirection};
+use serde::{Deserialize, Serialize};
+
+/// The switches a capture was trained with. Drawing must repeat them to match.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct TrainedWith {
+    /// First and last timestamp of training, `[T0, T1]`.
+    pub time_interval: [f32; 2],
+    /// Background colour, in the blend space.
+    pub background: [f32; 3],
+    /// Convention of the rotations *in the source file*; in memory they are always flipped.
+    pub rotation_convention: RotationConvention,
+    /// Which field of view shaped the footprints.
+    pub raster_fov: RasterFov,
+    /// What kind of cameras took the training views.
+    pub cameras: TrainedCameras,
+    /// Which mean gives the viewing direction of colour.
+    pub sh_direction: ShDirection,
+    /// Only the first 16 coefficients count, whatever is stored.
+    pub force_sh_3d: bool,
+    /// Added to the temporal variance in the marginal, if positive.
+    pub prefilter_var: f32,
+    /// Iteration of the checkpoint.
+    pub iteration: u64,
+    /// Extent of the training cameras, the factor of positional learning rates.
+    pub spatial_lr_scale: f64,
+}
+
+impl Default for TrainedWith {
+    fn default() -> Self {
+        Self {
+            time_interval: [0.0, 1.0],
+            background: [0.0; 3],
+            rotation_convention: RotationConvention::Flipped,
+            raster_fov: RasterFov::Reference,
+            cameras: TrainedCameras::Fov,
+            sh_direction: ShDirection::Canonical,
+            force_sh_3d: false,
+            prefilter_var: -1.0,
+            iteration: 0,
+            spatial_lr_scale: 1.0,
+        }
+    }
+}
+
+impl TrainedWith {
+    /// Full length of the time interval.
+    pub fn time_span(&self) -> f32 {
+        self.time_interval[1] - self.time_interval[0]
+    }
+
+    /// Whether footprints were shaped by the field-of-view sentinel of intrinsics cameras.
+    pub fn uses_fov_sentinel(&self) -> bool {
+        self.raster_fov == RasterFov::Reference && self.cameras == TrainedCameras::Intrinsics
+    }
+}
+
+/// The order in which the 4D vector was read when the rotations were trained.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RotationConvention {
+    /// (x, y, z, t): code since 2024-09-15.
+    #[default]
+    Flipped,
+    /// The order before that.
+    Unflipped,
+}
+
+/// The kind of cameras that took the training views.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TrainedCameras {
+    /// Described by a field of view (D-NeRF).
+    #[default]
+    Fov,
+    /// Described by focal lengths and a principal point (N3V).
+    Intrinsics,
+}
+
+/// How a capture is meant to be shown.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct PlaybackHints {
+    /// The axis that points up in the capture's own space.
+    pub up: UpAxis,
+    /// Seconds that one pass through the time interval takes at speed 1.
+    pub duration_seconds: f32,
+}
+
+impl Default for PlaybackHints {
+    fn default() -> Self {
+        Self { up: UpAxis::PosZ, duration_seconds: 1.0 }
+    }
+}
+
+/// A signed axis.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum UpAxis {
+    /// +X.
+    PosX,
+    /// −X.
+    NegX,
+    /// +Y, as in Bevy.
+    PosY,
+    /// −Y.
+    NegY,
+    /// +Z, as in Blender and in D-NeRF and N3V data.
+    #[default]
+    PosZ,
+    /// −Z.
+    NegZ,
+}
+
+impl UpAxis {
+    /// The unit vector.
+    pub fn vector(self) -> glam::Vec3 {
+        match self {
+            Self::PosX => glam::Vec3::X,
+            Self::NegX => glam::Vec3::NEG_X,
+            Self::PosY => glam::Vec3::Y,
+            Self::NegY => glam::Vec3::NEG_Y,
+            Self::PosZ => glam::Vec3::Z,
+            Self::NegZ => glam::Vec3::NEG_Z,
+        }
+    }
+}
