@@ -1,0 +1,34 @@
+//! `bin` and `ranges`: splat–tile pairs and where each tile's begin, twins of `shaders/bin_*.wgsl` and `shaders/ranges.wgsl`.
+//!
+//! In: splats and their order by depth. Out: [`Pair`]s in that order; and, from sorted pairs, one range for each tile.
+
+use super::Splat;
+use glam::UVec2;
+use std::ops::Range;
+
+/// One overlap of a splat with a tile.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pair {
+    /// Tile, row by row.
+    pub tile: u32,
+    /// Index of the splat.
+    pub splat: u32,
+}
+
+/// Makes the pairs of every visible splat, in the order given; the tiles of a splat row by row.
+pub fn bin(splats: &[Splat], order: &[u32], tiles: UVec2) -> Vec<Pair> {
+    let mut pairs = Vec::with_capacity(order.iter().map(|&i| splats[i as usize].tile_count() as usize).sum());
+    for &splat in order {
+        let bounds = splats[splat as usize].tiles;
+        for y in bounds.y..bounds.w {
+            pairs.extend((bounds.x..bounds.z).map(|x| Pair { tile: y * tiles.x + x, splat }));
+        }
+    }
+    pairs
+}
+
+/// The range of every tile in pairs sorted by tile.
+pub fn ranges(pairs: &[Pair], tiles: UVec2) -> Vec<Range<usize>> {
+    let first = |tile: u32| pairs.partition_point(|pair| pair.tile < tile);
+    (0..tiles.x * tiles.y).map(|tile| first(tile)..first(tile + 1)).collect()
+}

@@ -1,0 +1,8 @@
+//! `sort`: a stable sort by an unsigned key, twin of `shaders/sort_*.wgsl`.
+//!
+//! In: items and their key. Out: the items in order; equal keys keep theirs, so that equal depths stay in Gaussian order.
+
+/// Sorts in place.
+pub fn sort<T>(items: &mut [T], key: impl Fn(&T) -> u32) {
+    items.sort_by_key(key);
+}
