@@ -1,0 +1,14 @@
+// The environment map: a lat-long texture on a sphere of radius 60; twin of src/scene/environment.rs.
+#define_import_path gs4d::environment
+
+const RADIUS: f32 = 60.0;
+
+// Texel coordinates where the ray from `origin` along the unit vector `direction` leaves the sphere.
+fn environment_texel(origin: vec3<f32>, direction: vec3<f32>, size: vec2<u32>) -> vec2<f32> {
+    let along = dot(origin, direction);
+    let reach = -along + sqrt(along * along - (dot(origin, origin) - RADIUS * RADIUS));
+    let hit = origin + direction * reach;
+    let u = atan2(hit.y, hit.x) / 6.2831853 + 0.5;
+    let v = acos(clamp(hit.z / RADIUS, -1.0, 1.0)) / 3.1415927;
+    return vec2(u, v) * vec2<f32>(size) - 0.5;
+}

@@ -1,0 +1,106 @@
+// Structures that the host writes or reads; kept in step with src/gpu/layout.rs (a test compares every offset).
+#define_import_path gs4d::types
+
+// One Gaussian in the runtime form. `inverse_sigma_t` is 0 for a Gaussian that is always there.
+struct Gaussian {
+    mean: vec3<f32>,
+    mean_t: f32,
+    velocity: vec3<f32>,
+    inverse_sigma_t: f32,
+    // Conditional covariance: xx, xy, xz, yy.
+    covariance_a: vec4<f32>,
+    // yz, zz.
+    covariance_b: vec2<f32>,
+    opacity: f32,
+    padding: f32,
+}
+
+// One part of a capture in one view: where its camera is and which slots its splats take.
+struct Instance {
+    // Rows of capture-to-camera.
+    camera_x: vec4<f32>,
+    camera_y: vec4<f32>,
+    camera_z: vec4<f32>,
+    // Rows x and y of projection times capture-to-camera.
+    clip_x: vec4<f32>,
+    clip_y: vec4<f32>,
+    camera_position: vec3<f32>,
+    time: f32,
+    tan_fov: vec2<f32>,
+    focal: vec2<f32>,
+    size: vec2<u32>,
+    tiles: vec2<u32>,
+    first_slot: u32,
+    count: u32,
+    degree: u32,
+    degree_t: u32,
+    // vec4s of colour coefficients per Gaussian.
+    stride: u32,
+    // 1: colour looks along the displaced mean.
+    displaced: u32,
+    near: f32,
+    time_span: f32,
+}
+
+// What all instances of a view share.
+struct Frame {
+    size: vec2<u32>,
+    tiles: vec2<u32>,
+    // Splat slots in use, drawn or not.
+    slots: u32,
+    pair_capacity: u32,
+    // BACKGROUND_*
+    background_mode: u32,
+    // Near plane of the reverse-z opaque depth; 0 where there is none.
+    opaque_near: f32,
+    background: vec4<f32>,
+    // P00, P11, P02, P12.
+    projection: vec4<f32>,
+    // Columns of camera-to-world of the instance with the environment; w: its camera position.
+    world_x: vec4<f32>,
+    world_y: vec4<f32>,
+    world_z: vec4<f32>,
+    environment_size: vec2<u32>,
+    // Corner of the view in the opaque depth texture.
+    opaque_origin: vec2<u32>,
+}
+
+const BACKGROUND_NONE: u32 = 0u;
+const BACKGROUND_COLOR: u32 = 1u;
+const BACKGROUND_ENVIRONMENT: u32 = 2u;
+
+// A Gaussian on the screen. Tiles x0, y0, x1, y1 (ends excluded) take 16 bits each.
+struct Splat {
+    center: vec2<f32>,
+    opacity: f32,
+    depth: f32,
+    // xx, xy, yy
+    conic: vec3<f32>,
+    tiles_low: u32,
+    color: vec3<f32>,
+    tiles_high: u32,
+}
+
+struct Counters {
+    visible: u32,
+    // Pairs made: never above the capacity.
+    pairs: u32,
+    // Pairs that there would be.
+    pairs_wanted: u32,
+    padding: u32,
+}
+
+// One step of a radix sort.
+struct SortStep {
+    shift: u32,
+    // SORT_*
+    source: u32,
+    // Blocks the histogram has room for, per digit.
+    stride: u32,
+    padding: u32,
+}
+
+// All slots, leaving out the invisible; the value of a key is its index.
+const SORT_SLOTS: u32 = 0u;
+const SORT_VISIBLE: u32 = 1u;
+const SORT_PAIRS: u32 = 2u;

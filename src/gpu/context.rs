@@ -1,0 +1,83 @@
+//! A device of our own, for commands and tests.
+//!
+//! In: the adapter wanted, if any. Out: a [`GpuContext`]. Inside Bevy the renderer uses Bevy's device instead.
+
+use super::GpuError;
+use pollster::block_on;
+
+/// A device, its queue, and what it can do.
+#[derive(Debug)]
+pub struct GpuContext {
+    /// The device.
+    pub device: wgpu::Device,
+    /// Its queue.
+    pub queue: wgpu::Queue,
+    /// Which adapter it is.
+    pub info: wgpu::AdapterInfo,
+}
+
+impl GpuContext {
+    /// Opens the adapter whose index or part of whose name is `wanted`, or the fastest one.
+    ///
+    /// # Errors
+    /// When there is no such adapter (the message says what to install) or it gives no device.
+    pub fn headless(wanted: Option<&str>) -> Result<Self, GpuError> {
+        let adapter = match wanted {
+            Some(wanted) => choose(wanted)?,
+            None => block_on(instance().request_adapter(&wgpu::RequestAdapterOptions {
+                power_preference: wgpu::PowerPreference::HighPerformance,
+                ..Default::default()
+            }))
+            .map_err(|error| GpuError::NoAdapter { reason: error.to_string() })?,
+        };
+        let info = adapter.get_info();
+        // Timestamps are for benchmarks; nothing else is needed.
+        let wanted_features = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES;
+        let (device, queue) = block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("gs4d"),
+            required_features: adapter.features() & wanted_features,
+            required_limits: adapter.limits(),
+            ..Default::default()
+        }))
+        .map_err(|error| GpuError::NoDevice { adapter: info.name.clone(), reason: error.to_string() })?;
+        Ok(Self { device, queue, info })
+    }
+
+    /// All adapters of this machine.
+    pub fn adapters() -> Vec<wgpu::AdapterInfo> {
+        all().iter().map(wgpu::Adapter::get_info).collect()
+    }
+}
+
+fn backends() -> wgpu::Backends {
+    // Without DX12 among them, wgpu does not validate indirect dispatches with a hidden dispatch each.
+    if cfg!(windows) { wgpu::Backends::DX12 | wgpu::Backends::VULKAN } else { wgpu::Backends::VULKAN | wgpu::Backends::METAL }
+}
+
+fn instance() -> wgpu::Instance {
+    wgpu::Instance::new(wgpu::InstanceDescriptor {
+        backends: backends(),
+        ..wgpu::InstanceDescriptor::new_without_display_handle()
+    })
+}
+
+fn all() -> Vec<wgpu::Adapter> {
+    block_on(instance().enumerate_adapters(backends()))
+}
+
+fn choose(wanted: &str) -> Result<wgpu::Adapter, GpuError> {
+    let adapters = all();
+    if adapters.is_empty() {
+        return Err(GpuError::NoAdapter { reason: "the list of adapters is empty".into() });
+    }
+    let names: Vec<String> = adapters.iter().map(|a| a.get_info().name).collect();
+    let by_name = || names.iter().position(|name| name.to_lowercase().contains(&wanted.to_lowercase()));
+    let index = wanted.parse::<usize>().ok().filter(|&i| i < adapters.len()).or_else(by_name);
+    match index.and_then(|i| adapters.into_iter().nth(i)) {
+        Some(adapter) => Ok(adapter),
+        None => {
+            let found = names.iter().enumerate().map(|(i, name)| format!("{i}: {name}")).collect::<Vec<_>>().join(", ");
+            Err(GpuError::AdapterNotFound { wanted: wanted.into(), found })
+        }
+    }
+}

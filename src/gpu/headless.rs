@@ -1,0 +1,241 @@
+//! Drawing without a window: for commands, scoring and tests.
+//!
+//! In: scenes and views. Out: [`Frame`]s on the host, or [`Timings`]. Each call waits for the GPU; inside a frame nothing does.
+
+use super::timing::{PassTime, PassTimer, STRETCHES, Timings, median};
+use super::view::max_pairs;
+use super::{GpuCapture, GpuContext, GpuError, Instance, OpaqueDepth, Renderer, ShaderChecks, ViewRenderer, layout::Counters};
+use crate::frame::{Background, Counts, Frame};
+use crate::gaussian::View;
+use crate::picture::Picture;
+use crate::scene::RuntimeScene;
+use glam::{UVec2, Vec3};
+use std::time::Instant;
+
+/// A renderer with a device of its own and one view.
+#[derive(Debug)]
+pub struct Headless {
+    context: GpuContext,
+    renderer: Renderer,
+    view: ViewRenderer,
+}
+
+impl Headless {
+    /// Compiles the passes on that device.
+    ///
+    /// # Errors
+    /// When the device cannot run them.
+    pub fn new(context: GpuContext, checks: ShaderChecks) -> Result<Self, GpuError> {
+        let renderer = Renderer::new(&context.device, checks)?;
+        let view = ViewRenderer::new(&context.device);
+        Ok(Self { context, renderer, view })
+    }
+
+    /// The device and its name.
+    pub fn context(&self) -> &GpuContext {
+        &self.context
+    }
+
+    /// Puts a scene on the GPU.
+    ///
+    /// # Errors
+    /// When it does not fit.
+    pub fn upload(&self, scene: &RuntimeScene) -> Result<GpuCapture, GpuError> {
+        GpuCapture::upload(&self.context.device, &self.context.queue, &self.renderer, scene)
+    }
+
+    /// Draws one capture.
+    ///
+    /// # Errors
+    /// When the picture does not fit the device or the device is lost.
+    pub fn render(&mut self, capture: &GpuCapture, view: &View, background: Background) -> Result<Frame, GpuError> {
+        self.render_all(&[Instance { capture, view: *view }], background, None)
+    }
+
+    /// Draws several captures into one picture, in order of depth, cut by opaque surfaces if given.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render).
+    pub fn render_all(
+        &mut self,
+        instances: &[Instance<'_>],
+        background: Background,
+        opaque: Option<OpaqueDepth<'_>>,
+    ) -> Result<Frame, GpuError> {
+        let counters = loop {
+            let counters = self.submit(instances, background, opaque, None)?;
+            let capacity = self.view.pair_capacity();
+            if counters.pairs_wanted <= capacity {
+                break counters;
+            }
+            let limit = max_pairs(&self.context.device);
+            if capacity == limit {
+                let (needed, limit) = (u64::from(counters.pairs_wanted) * 4, u64::from(limit) * 4);
+                return Err(GpuError::TooLarge { what: "the pairs of splats and tiles", needed, limit });
+            }
+            self.view.make_room(counters.pairs_wanted);
+        };
+        let size = instances.first().map_or(UVec2::ONE, |instance| instance.view.size);
+        let (color, depth) = self.read_targets(size)?;
+        let color: &[[f32; 4]] = bytemuck::cast_slice(&color);
+        Ok(Frame {
+            picture: Picture { size, pixels: color.iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect() },
+            transmittance: color.iter().map(|p| p[3]).collect(),
+            depth,
+            counts: Counts { visible: counters.visible, pairs: counters.pairs },
+        })
+    }
+
+    /// Measures frames over the views given, in turn, `frames` of each kind after a warm-up.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render).
+    pub fn time(&mut self, capture: &GpuCapture, views: &[View], frames: usize) -> Result<Timings, GpuError> {
+        let background = Background::Color([0.0; 3]);
+        let instance = |i: usize| [Instance { capture, view: views[i % views.len()] }];
+        let mut counts = Vec::new();
+        // The warm-up also finds room for the pairs of every view.
+        for i in 0..views.len() {
+            counts.push(self.render_all(&instance(i), background, None)?.counts);
+        }
+        let around = PassTimer::new(&self.context.device, &self.context.queue, false);
+        let inside = PassTimer::new(&self.context.device, &self.context.queue, true);
+        let (mut frame, mut wall) = (Vec::new(), Vec::new());
+        for i in 0..frames {
+            let start = Instant::now();
+            self.submit(&instance(i), background, None, around.as_ref())?;
+            wall.push(start.elapsed().as_secs_f64() * 1e3);
+            if let Some(timer) = &around {
+                frame.push(timer.stretches(&self.read(timer.readback())?)[0]);
+            }
+        }
+        let mut passes = vec![Vec::new(); STRETCHES.len()];
+        if let Some(timer) = &inside {
+            for i in 0..frames {
+                self.submit(&instance(i), background, None, Some(timer))?;
+                for (pass, time) in passes.iter_mut().zip(timer.stretches(&self.read(timer.readback())?)) {
+                    pass.push(time);
+                }
+            }
+        }
+        let start = Instant::now();
+        for i in 0..frames {
+            self.submit_without_waiting(&instance(i), background, None, None)?;
+        }
+        self.wait()?;
+        let pipelined = start.elapsed().as_secs_f64() * 1e3 / frames.max(1) as f64;
+        let middle = |value: fn(&Counts) -> u32| median(counts.iter().map(|c| f64::from(value(c))).collect()) as u32;
+        Ok(Timings {
+            passes: STRETCHES
+                .into_iter()
+                .zip(passes)
+                .filter(|(_, times)| !times.is_empty())
+                .map(|(name, times)| PassTime { name, milliseconds: median(times) })
+                .collect(),
+            frame_milliseconds: around.map(|_| median(frame)),
+            wall_milliseconds: median(wall),
+            pipelined_milliseconds: pipelined,
+            counts: Counts { visible: middle(|c| c.visible), pairs: middle(|c| c.pairs) },
+            frames,
+        })
+    }
+
+    /// One frame, waited for. Returns what it counted.
+    fn submit(
+        &mut self,
+        instances: &[Instance<'_>],
+        background: Background,
+        opaque: Option<OpaqueDepth<'_>>,
+        timer: Option<&PassTimer>,
+    ) -> Result<Counters, GpuError> {
+        self.submit_without_waiting(instances, background, opaque, timer)?;
+        self.wait()?;
+        let counters = self.copy_out(self.view.counters(), size_of::<Counters>() as u64)?;
+        Ok(bytemuck::pod_read_unaligned(&counters))
+    }
+
+    fn submit_without_waiting(
+        &mut self,
+        instances: &[Instance<'_>],
+        background: Background,
+        opaque: Option<OpaqueDepth<'_>>,
+        timer: Option<&PassTimer>,
+    ) -> Result<(), GpuError> {
+        let GpuContext { device, queue, .. } = &self.context;
+        self.view.prepare(device, queue, &self.renderer, instances, background, opaque)?;
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gs4d") });
+        self.view.record_timed(&self.renderer, &mut encoder, instances, timer);
+        if let Some(timer) = timer {
+            timer.resolve(&mut encoder);
+        }
+        queue.submit([encoder.finish()]);
+        Ok(())
+    }
+
+    fn wait(&self) -> Result<(), GpuError> {
+        let wait = wgpu::PollType::wait_indefinitely();
+        self.context.device.poll(wait).map(|_| ()).map_err(|error| GpuError::Device(error.to_string()))
+    }
+
+    /// Colour (four floats each) and depth of every pixel, without the padding of rows.
+    fn read_targets(&self, size: UVec2) -> Result<(Vec<f32>, Vec<f32>), GpuError> {
+        let Some((color, depth)) = self.view.textures() else { return Ok(Default::default()) };
+        Ok((self.read_texture(color, size, 16)?, self.read_texture(depth, size, 4)?))
+    }
+
+    fn read_texture(&self, texture: &wgpu::Texture, size: UVec2, pixel: u32) -> Result<Vec<f32>, GpuError> {
+        let GpuContext { device, queue, .. } = &self.context;
+        let row = size.x * pixel;
+        let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let buffer = readback_buffer(device, u64::from(padded) * u64::from(size.y));
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &buffer,
+                layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded), rows_per_image: None },
+            },
+            wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
+        );
+        queue.submit([encoder.finish()]);
+        let bytes = self.read(&buffer)?;
+        let rows = bytes.chunks_exact(padded as usize).flat_map(|r| r[..row as usize].chunks_exact(4));
+        Ok(rows.map(bytemuck::pod_read_unaligned).collect())
+    }
+
+    fn copy_out(&self, source: &wgpu::Buffer, size: u64) -> Result<Vec<u8>, GpuError> {
+        let GpuContext { device, queue, .. } = &self.context;
+        let buffer = readback_buffer(device, size);
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(source, 0, &buffer, 0, size);
+        queue.submit([encoder.finish()]);
+        self.read(&buffer)
+    }
+
+    /// Waits for a buffer that can be mapped and copies it.
+    fn read(&self, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
+        let (sender, receiver) = std::sync::mpsc::channel();
+        buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
+            // The receiver waits below; if it is gone, nobody wants the result.
+            let _ = sender.send(result);
+        });
+        self.wait()?;
+        match receiver.try_recv() {
+            Ok(Ok(())) => {
+                let bytes = buffer.slice(..).get_mapped_range().to_vec();
+                buffer.unmap();
+                Ok(bytes)
+            }
+            _ => Err(GpuError::Device("a buffer could not be read back".into())),
+        }
+    }
+}
+
+fn readback_buffer(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
+    device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("gs4d readback"),
+        size,
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}

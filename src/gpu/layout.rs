@@ -1,0 +1,179 @@
+//! Mirrors of the structures in `shaders/shared/types.wgsl`, byte for byte (a test compares every offset).
+//!
+//! In: views and settings. Out: plain data for uniform and storage buffers.
+
+use crate::gaussian::View;
+use bytemuck::{Pod, Zeroable};
+
+/// Side of a tile in pixels.
+pub use crate::gaussian::projection::TILE_SIZE;
+
+/// Keys or pairs that one workgroup of `sort` and `bin` takes.
+pub const BLOCK: u32 = 2048;
+/// Bits that one step of `sort` orders by.
+pub const DIGIT_BITS: u32 = 4;
+/// Values of a digit.
+pub const DIGITS: u32 = 1 << DIGIT_BITS;
+/// Steps that order 32-bit depths.
+pub const DEPTH_STEPS: u32 = 32 / DIGIT_BITS;
+
+/// One part of a capture in one view.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Instance {
+    /// Rows of capture-to-camera: x.
+    pub camera_x: [f32; 4],
+    /// Row y.
+    pub camera_y: [f32; 4],
+    /// Row z.
+    pub camera_z: [f32; 4],
+    /// Row x of projection times capture-to-camera.
+    pub clip_x: [f32; 4],
+    /// Row y of it.
+    pub clip_y: [f32; 4],
+    /// Camera centre in capture space.
+    pub camera_position: [f32; 3],
+    /// Timestamp.
+    pub time: f32,
+    /// Half-angle tangents that shape footprints.
+    pub tan_fov: [f32; 2],
+    /// Focal lengths that shape footprints, pixels.
+    pub focal: [f32; 2],
+    /// Picture size, pixels.
+    pub size: [u32; 2],
+    /// Tiles across and down.
+    pub tiles: [u32; 2],
+    /// First splat slot.
+    pub first_slot: u32,
+    /// Gaussians in this part.
+    pub count: u32,
+    /// Spatial degree of colour.
+    pub degree: u32,
+    /// Time degree of colour.
+    pub degree_t: u32,
+    /// Four-vectors of colour coefficients per Gaussian.
+    pub stride: u32,
+    /// 1: colour looks along the displaced mean.
+    pub displaced: u32,
+    /// Near limit, camera units.
+    pub near: f32,
+    /// Length of the capture's time interval.
+    pub time_span: f32,
+}
+
+impl Instance {
+    /// The part that a view decides; slots and colour are zero.
+    pub fn of_view(view: &View) -> Self {
+        let m = view.world_to_camera;
+        let [clip_x, clip_y] = view.clip_rows();
+        Self {
+            camera_x: m.row(0).to_array(),
+            camera_y: m.row(1).to_array(),
+            camera_z: m.row(2).to_array(),
+            clip_x: clip_x.to_array(),
+            clip_y: clip_y.to_array(),
+            camera_position: view.camera_position.to_array(),
+            time: view.time,
+            tan_fov: view.tan_fov.to_array(),
+            focal: view.focal().to_array(),
+            size: view.size.to_array(),
+            tiles: view.tiles().to_array(),
+            near: view.near,
+            ..Self::zeroed()
+        }
+    }
+}
+
+/// What all instances of a view share.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Frame {
+    /// Picture size, pixels.
+    pub size: [u32; 2],
+    /// Tiles across and down.
+    pub tiles: [u32; 2],
+    /// Splat slots in use.
+    pub slots: u32,
+    /// Pairs there is room for.
+    pub pair_capacity: u32,
+    /// `BACKGROUND_*`.
+    pub background_mode: u32,
+    /// Near plane of the opaque depth; 0 where there is none.
+    pub opaque_near: f32,
+    /// Colour; w: what is left of the transmittance behind an environment map.
+    pub background: [f32; 4],
+    /// `P00, P11, P02, P12`.
+    pub projection: [f32; 4],
+    /// Column x of camera-to-world; w: x of the camera position.
+    pub world_x: [f32; 4],
+    /// Column y; w: y of the camera position.
+    pub world_y: [f32; 4],
+    /// Column z; w: z of the camera position.
+    pub world_z: [f32; 4],
+    /// Texels of the environment map.
+    pub environment_size: [u32; 2],
+    /// Corner of the view in the opaque depth texture.
+    pub opaque_origin: [u32; 2],
+}
+
+/// No background: a compositor follows.
+pub const BACKGROUND_NONE: u32 = 0;
+/// One colour.
+pub const BACKGROUND_COLOR: u32 = 1;
+/// The environment map.
+pub const BACKGROUND_ENVIRONMENT: u32 = 2;
+
+/// A Gaussian on the screen.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Splat {
+    /// Centre in pixels.
+    pub center: [f32; 2],
+    /// Opacity times marginal.
+    pub opacity: f32,
+    /// Depth, camera units.
+    pub depth: f32,
+    /// Inverse covariance: xx, xy, yy.
+    pub conic: [f32; 3],
+    /// Tiles x0 and y0, 16 bits each.
+    pub tiles_low: u32,
+    /// Colour.
+    pub color: [f32; 3],
+    /// Tiles x1 and y1 (excluded), 16 bits each.
+    pub tiles_high: u32,
+}
+
+/// Numbers the GPU counts.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+pub struct Counters {
+    /// Visible splats.
+    pub visible: u32,
+    /// Pairs made.
+    pub pairs: u32,
+    /// Pairs that there would be with room for all.
+    pub pairs_wanted: u32,
+    /// Unused.
+    pub padding: u32,
+}
+
+/// One step of a radix sort.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct SortStep {
+    /// First bit of the digit.
+    pub shift: u32,
+    /// `SORT_*`.
+    pub source: u32,
+    /// Blocks the histogram has room for, per digit.
+    pub stride: u32,
+    /// Unused.
+    pub padding: u32,
+}
+
+/// All slots, leaving out the invisible.
+pub const SORT_SLOTS: u32 = 0;
+/// The visible splats.
+pub const SORT_VISIBLE: u32 = 1;
+/// The pairs.
+pub const SORT_PAIRS: u32 = 2;

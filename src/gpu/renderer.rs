@@ -1,0 +1,205 @@
+//! The pipelines: one [`Renderer`] for each device.
+//!
+//! In: a device. Out: compiled passes and the bind group layouts that they share with the buffers of views and captures.
+
+use super::shaders::{ShaderChecks, module};
+use super::{GpuError, layout};
+use std::num::NonZeroU64;
+
+/// All pipelines and layouts.
+#[derive(Debug)]
+pub struct Renderer {
+    pub(super) layouts: Layouts,
+    pub(super) project: wgpu::ComputePipeline,
+    pub(super) sort_count: wgpu::ComputePipeline,
+    pub(super) sort_scan: wgpu::ComputePipeline,
+    pub(super) sort_visible: wgpu::ComputePipeline,
+    pub(super) sort_scatter: wgpu::ComputePipeline,
+    pub(super) bin_count: wgpu::ComputePipeline,
+    pub(super) bin_scan: wgpu::ComputePipeline,
+    pub(super) bin_offset: wgpu::ComputePipeline,
+    pub(super) bin_emit: wgpu::ComputePipeline,
+    pub(super) ranges: wgpu::ComputePipeline,
+    pub(super) blend: wgpu::ComputePipeline,
+}
+
+/// Bind group layouts, in the order of the shaders' bindings.
+#[derive(Debug)]
+pub(super) struct Layouts {
+    pub project: wgpu::BindGroupLayout,
+    pub capture: wgpu::BindGroupLayout,
+    pub sort: wgpu::BindGroupLayout,
+    pub arguments: wgpu::BindGroupLayout,
+    pub bin: wgpu::BindGroupLayout,
+    pub ranges: wgpu::BindGroupLayout,
+    pub blend: wgpu::BindGroupLayout,
+}
+
+/// Kinds of bindings, to write layouts in one line each.
+#[derive(Clone, Copy)]
+enum Bind {
+    /// Uniform buffer of this many bytes.
+    Uniform(usize),
+    /// The same, at an offset given with the dispatch.
+    UniformAt(usize),
+    Read,
+    Write,
+    Depth,
+    Target(wgpu::TextureFormat),
+}
+
+impl Renderer {
+    /// Compiles every pass.
+    ///
+    /// # Errors
+    /// When the device lacks a limit that the passes need, or a shader does not compile.
+    pub fn new(device: &wgpu::Device, checks: ShaderChecks) -> Result<Self, GpuError> {
+        check_limits(&device.limits())?;
+        let layouts = Layouts::new(device);
+        let shader = |name| module(device, name, checks);
+        let (project, sort, bin) = (shader("project")?, shader("sort")?, shader("bin")?);
+        let (ranges, blend) = (shader("ranges")?, shader("blend")?);
+        let pipeline = |module: &wgpu::ShaderModule, entry: &str, groups: &[&wgpu::BindGroupLayout]| {
+            let groups: Vec<_> = groups.iter().map(|group| Some(*group)).collect();
+            let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some("gs4d"),
+                bind_group_layouts: &groups,
+                immediate_size: 0,
+            });
+            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(entry),
+                layout: Some(&layout),
+                module,
+                entry_point: Some(entry),
+                // Every pass writes its workgroup memory before it reads it.
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    zero_initialize_workgroup_memory: false,
+                    ..Default::default()
+                },
+                cache: None,
+            })
+        };
+        Ok(Self {
+            project: pipeline(&project, "project", &[&layouts.project, &layouts.capture]),
+            sort_count: pipeline(&sort, "count", &[&layouts.sort]),
+            sort_scan: pipeline(&sort, "scan", &[&layouts.sort]),
+            sort_visible: pipeline(&sort, "visible", &[&layouts.sort, &layouts.arguments]),
+            sort_scatter: pipeline(&sort, "scatter", &[&layouts.sort]),
+            bin_count: pipeline(&bin, "count", &[&layouts.bin]),
+            bin_scan: pipeline(&bin, "scan", &[&layouts.bin, &layouts.arguments]),
+            bin_offset: pipeline(&bin, "offset", &[&layouts.bin]),
+            bin_emit: pipeline(&bin, "emit", &[&layouts.bin]),
+            ranges: pipeline(&ranges, "ranges", &[&layouts.ranges]),
+            blend: pipeline(&blend, "blend", &[&layouts.blend]),
+            layouts,
+        })
+    }
+
+    /// The bind group of one part of a capture.
+    pub(super) fn capture_bind_group(
+        &self,
+        device: &wgpu::Device,
+        gaussians: &wgpu::Buffer,
+        harmonics: &wgpu::Buffer,
+    ) -> wgpu::BindGroup {
+        bind_group(
+            device,
+            "gs4d capture",
+            &self.layouts.capture,
+            &[gaussians.as_entire_binding(), harmonics.as_entire_binding()],
+        )
+    }
+}
+
+impl Layouts {
+    fn new(device: &wgpu::Device) -> Self {
+        use Bind::{Depth, Read, Target, Uniform, UniformAt, Write};
+        const FRAME: usize = size_of::<layout::Frame>();
+        let new = |label, bindings: &[Bind]| {
+            let entries: Vec<_> = bindings.iter().enumerate().map(|(i, bind)| bind.entry(i as u32)).collect();
+            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+        };
+        Self {
+            project: new("gs4d project", &[UniformAt(size_of::<layout::Instance>()), Write, Write]),
+            capture: new("gs4d capture", &[Read, Read]),
+            sort: new(
+                "gs4d sort",
+                &[UniformAt(size_of::<layout::SortStep>()), Uniform(FRAME), Write, Read, Read, Write, Write, Write],
+            ),
+            arguments: new("gs4d arguments", &[Write]),
+            bin: new("gs4d bin", &[Uniform(FRAME), Write, Read, Read, Write, Write, Write]),
+            ranges: new("gs4d ranges", &[Uniform(FRAME), Read, Read, Write]),
+            blend: new(
+                "gs4d blend",
+                &[
+                    Uniform(FRAME),
+                    Read,
+                    Read,
+                    Read,
+                    Read,
+                    Depth,
+                    Target(wgpu::TextureFormat::Rgba32Float),
+                    Target(wgpu::TextureFormat::R32Float),
+                ],
+            ),
+        }
+    }
+}
+
+impl Bind {
+    fn entry(self, binding: u32) -> wgpu::BindGroupLayoutEntry {
+        let buffer = |ty, has_dynamic_offset, size: usize| wgpu::BindingType::Buffer {
+            ty,
+            has_dynamic_offset,
+            min_binding_size: NonZeroU64::new(size as u64),
+        };
+        let ty = match self {
+            Self::Uniform(size) => buffer(wgpu::BufferBindingType::Uniform, false, size),
+            Self::UniformAt(size) => buffer(wgpu::BufferBindingType::Uniform, true, size),
+            Self::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }, false, 0),
+            Self::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }, false, 0),
+            Self::Depth => wgpu::BindingType::Texture {
+                sample_type: wgpu::TextureSampleType::Depth,
+                view_dimension: wgpu::TextureViewDimension::D2,
+                multisampled: false,
+            },
+            Self::Target(format) => wgpu::BindingType::StorageTexture {
+                access: wgpu::StorageTextureAccess::WriteOnly,
+                format,
+                view_dimension: wgpu::TextureViewDimension::D2,
+            },
+        };
+        wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None }
+    }
+}
+
+/// A bind group whose bindings are numbered in order.
+pub(super) fn bind_group(
+    device: &wgpu::Device,
+    label: &str,
+    layout: &wgpu::BindGroupLayout,
+    resources: &[wgpu::BindingResource<'_>],
+) -> wgpu::BindGroup {
+    let entries: Vec<_> = resources
+        .iter()
+        .enumerate()
+        .map(|(i, resource)| wgpu::BindGroupEntry { binding: i as u32, resource: resource.clone() })
+        .collect();
+    device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
+}
+
+fn check_limits(limits: &wgpu::Limits) -> Result<(), GpuError> {
+    let needs = [
+        ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, 256),
+        ("max_compute_workgroup_size_x", limits.max_compute_workgroup_size_x, 256),
+        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 7),
+        // Three arrays of `blend`.
+        ("max_compute_workgroup_storage_size", limits.max_compute_workgroup_storage_size, 16 * 256 * 3 + 16),
+    ];
+    for (what, found, needed) in needs {
+        if found < needed {
+            return Err(GpuError::Limit { what, found: found.into(), needed: needed.into() });
+        }
+    }
+    Ok(())
+}
