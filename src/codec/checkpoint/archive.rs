@@ -1,0 +1,231 @@
+//! The zip archive of a checkpoint.
+//!
+//! In: a seekable reader, and [`Tensor`]s whose values are wanted. Out: the small entries as bytes, and the values of one tensor
+//! at a time, read in one pass to where they belong and checked against the entry's checksum. What is not asked for is not read.
+
+use super::error::CheckpointError;
+use super::tensor::Tensor;
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
+use zip::read::{ArchiveOffset, Config};
+use zip::{CompressionMethod, ZipArchive};
+
+/// Most bytes of `data.pkl`. Real ones have some 5,000, however many Gaussians there are.
+const PICKLE_LIMIT: u64 = 1 << 20;
+/// Bytes read at once.
+const BUFFER: usize = 1 << 16;
+
+/// An archive with one `<root>/data.pkl`, all of whose entries are stored as they are.
+pub(super) struct Archive<R> {
+    zip: ZipArchive<R>,
+    root: Vec<u8>,
+    length: u64,
+}
+
+/// A tensor of the state tuple.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slot<'p> {
+    /// Place in the state tuple.
+    pub index: usize,
+    /// Name of the attribute in the trainer.
+    pub name: &'static str,
+    /// What a row is, for messages: a Gaussian, a channel.
+    pub row: &'static str,
+    /// The tensor.
+    pub tensor: &'p Tensor<'p>,
+}
+
+/// A tensor that has been checked: its shape, its storage, and the entry that holds it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Located<'p> {
+    slot: Slot<'p>,
+    entry: usize,
+    /// Number of values.
+    count: usize,
+    /// Number of values of the storage.
+    storage: usize,
+}
+
+/// Where the rows of a tensor go: `width` values from `start` in each stretch of `pitch` values.
+pub(super) struct Rows<'v> {
+    /// All stretches.
+    pub values: &'v mut [f32],
+    /// Length of a stretch.
+    pub pitch: usize,
+    /// First value in each stretch.
+    pub start: usize,
+    /// Length of a row.
+    pub width: usize,
+}
+
+impl Slot<'_> {
+    fn error(&self, reason: impl Into<String>) -> CheckpointError {
+        CheckpointError::Tensor { index: self.index, name: self.name, reason: reason.into() }
+    }
+
+    /// That the shape is not `expected`.
+    pub(super) fn shape_error(&self, expected: impl Into<String>) -> CheckpointError {
+        let found = self.tensor.size.clone();
+        CheckpointError::Shape { index: self.index, name: self.name, found, expected: expected.into() }
+    }
+}
+
+impl<R: Read + Seek> Archive<R> {
+    /// Opens the archive and looks at its directory.
+    ///
+    /// # Errors
+    /// No zip archive, a packed entry, an entry longer than the file, another byte order, none or several `data.pkl`.
+    pub(super) fn open(mut reader: R) -> Result<Self, CheckpointError> {
+        let length = reader.seek(SeekFrom::End(0)).map_err(CheckpointError::Io)?;
+        // Nothing stands before the archive; guessing where it begins goes wrong with some of them.
+        let config = Config { archive_offset: ArchiveOffset::Known(0) };
+        let zip = ZipArchive::with_config(config, reader).map_err(CheckpointError::Archive)?;
+        let mut roots = Vec::new();
+        for index in 0..zip.len() {
+            let entry = zip.by_index_data(index).map_err(CheckpointError::Archive)?;
+            if entry.compression() != CompressionMethod::Stored || entry.encrypted() {
+                return Err(CheckpointError::Packed(printable(entry.name_raw())));
+            }
+            if entry.compressed_size() != entry.size() || entry.size() > length {
+                return Err(CheckpointError::EntrySize { entry: printable(entry.name_raw()), size: entry.size() });
+            }
+            roots.extend(
+                entry.name_raw().strip_suffix(b"/data.pkl").filter(|root| !root.contains(&b'/')).map(<[u8]>::to_vec),
+            );
+        }
+        let count = roots.len();
+        let root = roots.pop().filter(|_| count == 1).ok_or(CheckpointError::Root(count))?;
+        let mut archive = Self { zip, root, length };
+        match archive.small("byteorder", 64)? {
+            Some(order) if order.trim_ascii() != b"little" => Err(CheckpointError::ByteOrder(printable(&order))),
+            _ => Ok(archive),
+        }
+    }
+
+    /// The bytes of `data.pkl`.
+    ///
+    /// # Errors
+    /// An entry that cannot be read, is damaged or too large.
+    pub(super) fn pickle(&mut self) -> Result<Vec<u8>, CheckpointError> {
+        self.small("data.pkl", PICKLE_LIMIT)?.ok_or(CheckpointError::Root(0))
+    }
+
+    /// An entry of at most `limit` bytes, if there is one of that name.
+    fn small(&mut self, name: &'static str, limit: u64) -> Result<Option<Vec<u8>>, CheckpointError> {
+        let Some(index) = self.index_of(name) else { return Ok(None) };
+        let mut entry = self.zip.by_index(index).map_err(CheckpointError::Archive)?;
+        let size = entry.size();
+        if size > limit {
+            return Err(CheckpointError::TooLarge { entry: name, size, limit });
+        }
+        let mut bytes = Vec::new();
+        entry.read_to_end(&mut bytes).map_err(CheckpointError::Io)?;
+        Ok(Some(bytes))
+    }
+
+    fn index_of(&self, name: &str) -> Option<usize> {
+        self.zip.index_for_name_raw(&[&self.root[..], b"/", name.as_bytes()].concat())
+    }
+
+    /// Checks that a tensor has the shape given and that all its values are in the file.
+    ///
+    /// # Errors
+    /// Another shape, a tensor outside its storage, a storage that is not there or too short.
+    pub(super) fn locate<'p>(&mut self, slot: Slot<'p>, shape: &[usize]) -> Result<Located<'p>, CheckpointError> {
+        if !slot.tensor.size.iter().copied().eq(shape.iter().map(|&size| size as u64)) {
+            return Err(slot.shape_error(format!("{shape:?}")));
+        }
+        let count = slot.tensor.check().map_err(|reason| slot.error(format!("the tensor {reason}")))?;
+        let storage = slot.tensor.storage;
+        let name = format!("data/{}", storage.key);
+        let missing = || slot.error(format!("entry {} is missing; copy the file again", printable(name.as_bytes())));
+        let index = self.index_of(&name).ok_or_else(missing)?;
+        let entry = self.zip.by_index(index).map_err(CheckpointError::Archive)?;
+        let size = entry.size();
+        let end = entry.data_start().and_then(|start| start.checked_add(size));
+        if end.is_none_or(|end| end > self.length) {
+            return Err(CheckpointError::EntrySize { entry: printable(name.as_bytes()), size });
+        }
+        let too_short = || slot.error(format!("a storage of {} values in an entry of {size} bytes", storage.count));
+        if storage.count.checked_mul(4).is_none_or(|bytes| bytes > size) {
+            return Err(too_short());
+        }
+        let (Ok(count), Ok(storage)) = (usize::try_from(count), usize::try_from(storage.count)) else {
+            return Err(too_short());
+        };
+        Ok(Located { slot, entry: index, count, storage })
+    }
+
+    /// Reads a tensor to where its rows belong.
+    ///
+    /// # Errors
+    /// Values that cannot be read, do not match their checksum, or are not finite.
+    pub(super) fn fill(&mut self, from: &Located, mut rows: Rows) -> Result<(), CheckpointError> {
+        if from.count == 0 {
+            return Ok(());
+        }
+        let Slot { index, name, row, tensor } = from.slot;
+        let entry = self.zip.by_index(from.entry).map_err(CheckpointError::Archive)?;
+        let mut reader = BufReader::with_capacity(BUFFER, entry);
+        let read = if tensor.is_contiguous() {
+            read_contiguous(&mut reader, tensor.offset, &mut rows)
+        } else {
+            read_strided(&mut reader, tensor, from.storage, &mut rows)
+        };
+        // The checksum is compared at the end of the entry.
+        read.and_then(|()| io::copy(&mut reader, &mut io::sink())).map_err(|reason| CheckpointError::Read {
+            index,
+            name,
+            reason,
+        })?;
+        match rows.iter_mut().position(|row| row.iter().any(|value| !value.is_finite())) {
+            Some(at) => Err(CheckpointError::NotFinite { name, row, at }),
+            None => Ok(()),
+        }
+    }
+
+    /// A tensor of shape `count` × W.
+    ///
+    /// # Errors
+    /// As [`locate`](Self::locate) and [`fill`](Self::fill).
+    pub(super) fn rows<const W: usize>(&mut self, slot: Slot, count: usize) -> Result<Vec<[f32; W]>, CheckpointError> {
+        let located = self.locate(slot, &[count, W])?;
+        let mut values = vec![[0.0; W]; count];
+        self.fill(&located, Rows { values: values.as_flattened_mut(), pitch: W, start: 0, width: W })?;
+        Ok(values)
+    }
+}
+
+impl Rows<'_> {
+    fn iter_mut(&mut self) -> impl Iterator<Item = &mut [f32]> {
+        let (start, end) = (self.start, self.start + self.width);
+        self.values.chunks_exact_mut(self.pitch).map(move |stretch| &mut stretch[start..end])
+    }
+}
+
+fn read_contiguous(reader: &mut impl BufRead, offset: u64, rows: &mut Rows) -> io::Result<()> {
+    io::copy(&mut reader.by_ref().take(offset * 4), &mut io::sink())?;
+    rows.iter_mut().try_for_each(|row| read_values(reader, row))
+}
+
+fn read_strided(reader: &mut impl BufRead, tensor: &Tensor, count: usize, rows: &mut Rows) -> io::Result<()> {
+    let mut storage = vec![0.0; count];
+    read_values(reader, &mut storage)?;
+    // Every place was found to be inside the storage by `locate`.
+    for (at, value) in rows.iter_mut().flatten().enumerate() {
+        *value = storage[tensor.place(at as u64) as usize];
+    }
+    Ok(())
+}
+
+fn read_values(reader: &mut impl BufRead, values: &mut [f32]) -> io::Result<()> {
+    reader.read_exact(bytemuck::cast_slice_mut(values))?;
+    for value in values {
+        *value = f32::from_bits(u32::from_le(value.to_bits()));
+    }
+    Ok(())
+}
+
+/// A name from the file in a form that can be shown: short, without control characters.
+fn printable(name: &[u8]) -> String {
+    String::from_utf8_lossy(name).chars().take(120).flat_map(char::escape_debug).collect()
+}

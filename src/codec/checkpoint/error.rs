@@ -1,0 +1,149 @@
+//! What can be wrong with a checkpoint.
+//!
+//! In: a reader's finding. Out: one line that says what is wrong and, where there is one, the remedy. The path is added by
+//! [`CodecError`](crate::codec::CodecError).
+
+use std::io;
+
+/// Why a checkpoint was not read.
+#[derive(Debug, thiserror::Error)]
+pub enum CheckpointError {
+    /// The zip archive around everything is damaged or incomplete.
+    #[error("not a complete zip archive, which a checkpoint is ({0}); copy the file again")]
+    Archive(zip::result::ZipError),
+    /// The file could not be read.
+    #[error("cannot be read ({0})")]
+    Io(io::Error),
+    /// Not exactly one `<folder>/data.pkl` in the archive.
+    #[error(
+        "{0} entries named <folder>/data.pkl where a checkpoint has one; only files of torch.save (1.6 and later) can be read"
+    )]
+    Root(usize),
+    /// An entry that is compressed or encrypted; torch never does that, zip bombs do.
+    #[error(
+        "entry {0} is compressed or encrypted, and torch stores entries as they are; save the checkpoint again with torch.save"
+    )]
+    Packed(String),
+    /// An entry that would reach beyond the end of the file.
+    #[error("entry {entry} claims {size} bytes and the file has no room for them; copy the file again")]
+    EntrySize {
+        /// Name of the entry.
+        entry: String,
+        /// Bytes claimed.
+        size: u64,
+    },
+    /// An entry larger than anything it could hold.
+    #[error("entry {entry} is {size} bytes long, which is more than the {limit} that a checkpoint can need there")]
+    TooLarge {
+        /// Name of the entry.
+        entry: &'static str,
+        /// Its size in bytes.
+        size: u64,
+        /// The most that is accepted.
+        limit: u64,
+    },
+    /// Values stored with the most significant byte first.
+    #[error(
+        "byte order {0:?}, and only little-endian checkpoints can be read; save it again on a little-endian machine"
+    )]
+    ByteOrder(String),
+    /// `data.pkl` is malformed.
+    #[error("data.pkl, byte {offset}: {reason}")]
+    Pickle {
+        /// Where, in bytes from the start of `data.pkl`.
+        offset: usize,
+        /// What is wrong there.
+        reason: String,
+    },
+    /// An opcode that no checkpoint of the trainer contains.
+    #[error("data.pkl, byte {offset}: pickle opcode {code:#04x} is not one that 4DGS checkpoints use; refused")]
+    Opcode {
+        /// Where, in bytes from the start of `data.pkl`.
+        offset: usize,
+        /// The opcode.
+        code: u8,
+    },
+    /// A Python object that no checkpoint of the trainer contains. Nothing was run.
+    #[error(
+        "data.pkl, byte {offset}: the file asks for the Python object `{name}`, which no 4DGS checkpoint needs; refused"
+    )]
+    Global {
+        /// Where, in bytes from the start of `data.pkl`.
+        offset: usize,
+        /// Module and name, as in the pickle.
+        name: String,
+    },
+    /// The objects in the file are not those of the 4DGS trainer.
+    #[error("{0}")]
+    Layout(String),
+    /// A slot of the state tuple holds the wrong kind of value.
+    #[error("slot {index} ({name}) holds {found}, expected {expected}")]
+    Slot {
+        /// Place in the state tuple, from 0.
+        index: usize,
+        /// Name of the attribute in the trainer.
+        name: &'static str,
+        /// What is there.
+        found: &'static str,
+        /// What belongs there.
+        expected: &'static str,
+    },
+    /// A tensor does not have the shape that the others ask for.
+    #[error("slot {index} ({name}) has shape {found:?}, expected {expected}")]
+    Shape {
+        /// Place in the state tuple, from 0.
+        index: usize,
+        /// Name of the attribute in the trainer.
+        name: &'static str,
+        /// Its shape.
+        found: Vec<u64>,
+        /// The shape it must have.
+        expected: String,
+    },
+    /// A tensor lies outside its storage, or the storage is not there.
+    #[error("slot {index} ({name}): {reason}")]
+    Tensor {
+        /// Place in the state tuple, from 0.
+        index: usize,
+        /// Name of the attribute in the trainer.
+        name: &'static str,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The values of a tensor could not be read, or do not match their checksum.
+    #[error("slot {index} ({name}) cannot be read ({reason}); the file is damaged, copy it again")]
+    Read {
+        /// Place in the state tuple, from 0.
+        index: usize,
+        /// Name of the attribute in the trainer.
+        name: &'static str,
+        /// What the system says.
+        reason: io::Error,
+    },
+    /// A value is infinite or not a number.
+    #[error("{row} {at}: a value of {name} that is not finite; training diverged or the file is damaged")]
+    NotFinite {
+        /// Name of the attribute in the trainer.
+        name: &'static str,
+        /// What a row of that attribute is.
+        row: &'static str,
+        /// Which row, from 0.
+        at: usize,
+    },
+    /// A quaternion without a direction.
+    #[error("Gaussian {at}: a quaternion of length zero in {name}; training diverged or the file is damaged")]
+    ZeroRotation {
+        /// Name of the attribute in the trainer.
+        name: &'static str,
+        /// Which Gaussian, from 0.
+        at: usize,
+    },
+    /// An option that makes no sense.
+    #[error("option {name}: {reason}")]
+    Option {
+        /// Which option.
+        name: &'static str,
+        /// What is wrong with it.
+        reason: String,
+    },
+}

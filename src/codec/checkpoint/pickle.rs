@@ -1,0 +1,533 @@
+//! A restricted unpickler for `data.pkl`.
+//!
+//! In: the bytes of a protocol 2 pickle. Out: a [`Pickle`], a flat arena of values in which tensors are lazy: they say where
+//! their values lie, nothing else.
+//!
+//! Only the opcodes and objects of section 4.3 of the 4DGS model are known; everything else is refused by name and nothing is
+//! ever run. Every step adds at most one value, values refer to each other by index (so nothing recurses), and no
+//! value is copied: time and memory are bounded by the length of the input.
+
+use super::error::CheckpointError;
+use super::tensor::{Storage, Tensor};
+use std::collections::HashMap;
+
+/// Place of a value in a [`Pickle`].
+pub(super) type Id = u32;
+
+/// A value of a pickle. Lists and dictionaries hold optimiser state only, so what is put into them is dropped.
+#[derive(Debug)]
+pub(super) enum Value<'a> {
+    None,
+    Bool(bool),
+    Int(i64),
+    Float(f64),
+    Text(&'a str),
+    Bytes(Vec<u8>),
+    Tuple(Vec<Id>),
+    List,
+    Dict,
+    Global(Global),
+    Storage(Storage<'a>),
+    Tensor(Box<Tensor<'a>>),
+    /// A numpy floating-point type of so many bytes.
+    Dtype(usize),
+}
+
+impl Value<'_> {
+    /// What it is, for messages.
+    pub(super) fn kind(&self) -> &'static str {
+        match self {
+            Self::None => "None",
+            Self::Bool(_) => "a bool",
+            Self::Int(_) => "an int",
+            Self::Float(_) => "a float",
+            Self::Text(_) => "a text",
+            Self::Bytes(_) => "bytes",
+            Self::Tuple(_) => "a tuple",
+            Self::List => "a list",
+            Self::Dict => "a dictionary",
+            Self::Global(_) | Self::Dtype(_) => "a Python object",
+            Self::Storage(_) => "a storage without a tensor",
+            Self::Tensor(_) => "a tensor",
+        }
+    }
+}
+
+/// The Python objects that a checkpoint may name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Global {
+    RebuildParameter,
+    RebuildTensor,
+    FloatStorage,
+    OrderedDict,
+    NumpyScalar,
+    NumpyDtype,
+    Encode,
+}
+
+impl Global {
+    fn of(module: &[u8], name: &[u8]) -> Option<Self> {
+        Some(match (module, name) {
+            (b"torch._utils", b"_rebuild_parameter") => Self::RebuildParameter,
+            (b"torch._utils", b"_rebuild_tensor_v2") => Self::RebuildTensor,
+            (b"torch", b"FloatStorage") => Self::FloatStorage,
+            (b"collections", b"OrderedDict") => Self::OrderedDict,
+            (b"numpy.core.multiarray" | b"numpy._core.multiarray", b"scalar") => Self::NumpyScalar,
+            (b"numpy", b"dtype") => Self::NumpyDtype,
+            (b"_codecs", b"encode") => Self::Encode,
+            _ => return None,
+        })
+    }
+}
+
+/// What a pickle holds.
+#[derive(Debug)]
+pub(super) struct Pickle<'a> {
+    values: Vec<Value<'a>>,
+    root: Id,
+}
+
+impl<'a> Pickle<'a> {
+    /// Unpickles.
+    ///
+    /// # Errors
+    /// The first opcode, object or argument that is not one of a checkpoint.
+    pub(super) fn parse(bytes: &'a [u8]) -> Result<Self, CheckpointError> {
+        let mut machine = Machine { bytes, ..Machine::default() };
+        if !bytes.starts_with(&[op::PROTO, 2]) {
+            return Err(machine.error("not a pickle of protocol 2"));
+        }
+        loop {
+            if let Some(root) = machine.step()? {
+                return Ok(Self { values: machine.values, root });
+            }
+        }
+    }
+
+    /// The outermost value.
+    pub(super) fn root(&self) -> &Value<'a> {
+        self.get(self.root)
+    }
+
+    /// The value that a tuple of this pickle refers to.
+    pub(super) fn get(&self, id: Id) -> &Value<'a> {
+        &self.values[id as usize]
+    }
+}
+
+/// The opcodes of section 4.3, by their names in Python's `pickletools`.
+mod op {
+    pub const PROTO: u8 = 0x80;
+    pub const MARK: u8 = b'(';
+    pub const STOP: u8 = b'.';
+    pub const NONE: u8 = b'N';
+    pub const NEWTRUE: u8 = 0x88;
+    pub const NEWFALSE: u8 = 0x89;
+    pub const BININT: u8 = b'J';
+    pub const BININT1: u8 = b'K';
+    pub const BININT2: u8 = b'M';
+    pub const BINFLOAT: u8 = b'G';
+    pub const BINUNICODE: u8 = b'X';
+    pub const EMPTY_TUPLE: u8 = b')';
+    pub const TUPLE: u8 = b't';
+    pub const TUPLE1: u8 = 0x85;
+    pub const TUPLE3: u8 = 0x87;
+    pub const EMPTY_LIST: u8 = b']';
+    pub const APPEND: u8 = b'a';
+    pub const APPENDS: u8 = b'e';
+    pub const EMPTY_DICT: u8 = b'}';
+    pub const SETITEMS: u8 = b'u';
+    pub const GLOBAL: u8 = b'c';
+    pub const REDUCE: u8 = b'R';
+    pub const BUILD: u8 = b'b';
+    pub const BINPERSID: u8 = b'Q';
+    pub const BINPUT: u8 = b'q';
+    pub const LONG_BINPUT: u8 = b'r';
+    pub const BINGET: u8 = b'h';
+    pub const LONG_BINGET: u8 = b'j';
+}
+
+/// Most axes a tensor may have; those that are read have three.
+const AXES: usize = 8;
+/// Most bytes of a numpy scalar in its text form, where a byte takes one or two.
+const SCALAR_TEXT: usize = 16;
+
+/// The stack machine that a pickle is a program for.
+#[derive(Default)]
+struct Machine<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    /// Where the present opcode stands, for messages.
+    opcode_at: usize,
+    values: Vec<Value<'a>>,
+    stack: Vec<Id>,
+    /// Lengths of the stack where a MARK was set.
+    marks: Vec<usize>,
+    memo: HashMap<u32, Id>,
+}
+
+impl<'a> Machine<'a> {
+    /// One opcode; the outermost value at the last one.
+    fn step(&mut self) -> Result<Option<Id>, CheckpointError> {
+        self.opcode_at = self.at;
+        let code = self.byte()?;
+        match code {
+            op::PROTO if self.byte()? == 2 => {}
+            op::MARK => self.marks.push(self.stack.len()),
+            op::STOP => return self.pop().map(Some),
+            op::NONE => self.push(Value::None),
+            op::NEWTRUE => self.push(Value::Bool(true)),
+            op::NEWFALSE => self.push(Value::Bool(false)),
+            op::BININT => {
+                let value = i32::from_le_bytes(self.array()?);
+                self.push(Value::Int(value.into()));
+            }
+            op::BININT1 => {
+                let value = self.byte()?;
+                self.push(Value::Int(value.into()));
+            }
+            op::BININT2 => {
+                let value = u16::from_le_bytes(self.array()?);
+                self.push(Value::Int(value.into()));
+            }
+            op::BINFLOAT => {
+                let value = f64::from_be_bytes(self.array()?);
+                self.push(Value::Float(value));
+            }
+            op::BINUNICODE => {
+                let text = self.text()?;
+                self.push(Value::Text(text));
+            }
+            op::EMPTY_TUPLE => self.push(Value::Tuple(Vec::new())),
+            op::TUPLE => {
+                let items = self.pop_to_mark()?;
+                self.push(Value::Tuple(items));
+            }
+            op::TUPLE1..=op::TUPLE3 => {
+                let items = self.pop_many(usize::from(code - op::TUPLE1) + 1)?;
+                self.push(Value::Tuple(items));
+            }
+            op::EMPTY_LIST => self.push(Value::List),
+            op::APPEND => {
+                self.pop()?;
+                self.expect_list()?;
+            }
+            op::APPENDS => {
+                self.pop_to_mark()?;
+                self.expect_list()?;
+            }
+            op::EMPTY_DICT => self.push(Value::Dict),
+            op::SETITEMS => {
+                let items = self.pop_to_mark()?;
+                if items.len() % 2 != 0 || !matches!(self.value(self.top()?), Value::Dict) {
+                    return Err(self.error("items that do not go into a dictionary"));
+                }
+            }
+            op::GLOBAL => {
+                let global = self.global()?;
+                self.push(Value::Global(global));
+            }
+            op::REDUCE => {
+                let (arguments, callable) = (self.pop()?, self.pop()?);
+                self.reduce(callable, arguments)?;
+            }
+            op::BUILD => {
+                let state = self.pop()?;
+                self.expect_little_endian(state)?;
+            }
+            op::BINPERSID => {
+                let id = self.pop()?;
+                let storage = self.storage(id)?;
+                self.push(Value::Storage(storage));
+            }
+            op::BINPUT => {
+                let index = self.byte()?;
+                self.memoize(index.into())?;
+            }
+            op::LONG_BINPUT => {
+                let index = u32::from_le_bytes(self.array()?);
+                self.memoize(index)?;
+            }
+            op::BINGET => {
+                let index = self.byte()?;
+                self.recall(index.into())?;
+            }
+            op::LONG_BINGET => {
+                let index = u32::from_le_bytes(self.array()?);
+                self.recall(index)?;
+            }
+            _ => return Err(CheckpointError::Opcode { offset: self.opcode_at, code }),
+        }
+        Ok(None)
+    }
+
+    fn error(&self, reason: impl Into<String>) -> CheckpointError {
+        CheckpointError::Pickle { offset: self.opcode_at, reason: reason.into() }
+    }
+
+    // Input.
+
+    fn take(&mut self, count: usize) -> Result<&'a [u8], CheckpointError> {
+        let rest = self.bytes.get(self.at..).unwrap_or_default();
+        let taken = rest.get(..count).ok_or_else(|| self.error("the pickle ends too early"))?;
+        self.at += count;
+        Ok(taken)
+    }
+
+    fn array<const N: usize>(&mut self) -> Result<[u8; N], CheckpointError> {
+        let mut array = [0; N];
+        array.copy_from_slice(self.take(N)?);
+        Ok(array)
+    }
+
+    fn byte(&mut self) -> Result<u8, CheckpointError> {
+        self.array::<1>().map(|[byte]| byte)
+    }
+
+    fn text(&mut self) -> Result<&'a str, CheckpointError> {
+        let length = u32::from_le_bytes(self.array()?);
+        let bytes = self.take(length as usize)?;
+        std::str::from_utf8(bytes).map_err(|_| self.error("a text that is not UTF-8"))
+    }
+
+    fn line(&mut self) -> Result<&'a [u8], CheckpointError> {
+        let rest = self.bytes.get(self.at..).unwrap_or_default();
+        let length =
+            rest.iter().position(|&byte| byte == b'\n').ok_or_else(|| self.error("the pickle ends too early"))?;
+        let line = self.take(length)?;
+        self.take(1)?;
+        Ok(line)
+    }
+
+    fn global(&mut self) -> Result<Global, CheckpointError> {
+        let (module, name) = (self.line()?, self.line()?);
+        Global::of(module, name).ok_or_else(|| {
+            // The name comes from the file: nothing in it may reach a terminal as it is.
+            let name = format!("{} {}", String::from_utf8_lossy(module), String::from_utf8_lossy(name));
+            let name = name.chars().take(120).flat_map(char::escape_debug).collect();
+            CheckpointError::Global { offset: self.opcode_at, name }
+        })
+    }
+
+    // The stack.
+
+    fn value(&self, id: Id) -> &Value<'a> {
+        &self.values[id as usize]
+    }
+
+    fn push(&mut self, value: Value<'a>) {
+        // At most one value for each byte of a pickle of limited size: the cast is lossless.
+        self.stack.push(self.values.len() as Id);
+        self.values.push(value);
+    }
+
+    /// The part of the stack above the last mark: what an opcode may take away.
+    fn available(&self) -> usize {
+        self.stack.len() - self.marks.last().copied().unwrap_or(0)
+    }
+
+    fn top(&self) -> Result<Id, CheckpointError> {
+        match self.stack.last() {
+            Some(&id) if self.available() > 0 => Ok(id),
+            _ => Err(self.error("a value is missing")),
+        }
+    }
+
+    fn pop(&mut self) -> Result<Id, CheckpointError> {
+        let id = self.top()?;
+        self.stack.pop();
+        Ok(id)
+    }
+
+    fn pop_many(&mut self, count: usize) -> Result<Vec<Id>, CheckpointError> {
+        if self.available() < count {
+            return Err(self.error("a value is missing"));
+        }
+        Ok(self.stack.split_off(self.stack.len() - count))
+    }
+
+    fn pop_to_mark(&mut self) -> Result<Vec<Id>, CheckpointError> {
+        let mark = self.marks.pop().ok_or_else(|| self.error("a mark is missing"))?;
+        Ok(self.stack.split_off(mark))
+    }
+
+    fn memoize(&mut self, index: u32) -> Result<(), CheckpointError> {
+        let id = self.top()?;
+        self.memo.insert(index, id);
+        Ok(())
+    }
+
+    fn recall(&mut self, index: u32) -> Result<(), CheckpointError> {
+        let id = *self.memo.get(&index).ok_or_else(|| self.error(format!("nothing was remembered as {index}")))?;
+        self.stack.push(id);
+        Ok(())
+    }
+
+    fn expect_list(&self) -> Result<(), CheckpointError> {
+        match self.value(self.top()?) {
+            Value::List => Ok(()),
+            other => Err(self.error(format!("items that go into {}, not a list", other.kind()))),
+        }
+    }
+
+    // The objects.
+
+    /// BUILD: only numpy's types have a state, whose second item is the byte order.
+    fn expect_little_endian(&self, state: Id) -> Result<(), CheckpointError> {
+        if let (Value::Dtype(_), Value::Tuple(items)) = (self.value(self.top()?), self.value(state))
+            && let Some(&order) = items.get(1)
+            && matches!(self.value(order), Value::Text("<"))
+        {
+            return Ok(());
+        }
+        Err(self.error("a state other than that of a little-endian numpy type"))
+    }
+
+    /// A persistent id: `("storage", FloatStorage, key, location, element count)`.
+    fn storage(&self, id: Id) -> Result<Storage<'a>, CheckpointError> {
+        if let Value::Tuple(items) = self.value(id)
+            && let &[tag, class, key, _, count] = items.as_slice()
+            && let (Value::Text("storage"), Value::Global(Global::FloatStorage)) = (self.value(tag), self.value(class))
+            && let (&Value::Text(key), Some(count)) = (self.value(key), self.count(count))
+        {
+            return Ok(Storage { key, count });
+        }
+        Err(self.error("a persistent id that is not that of a float storage"))
+    }
+
+    fn count(&self, id: Id) -> Option<u64> {
+        match *self.value(id) {
+            Value::Int(value) => value.try_into().ok(),
+            _ => None,
+        }
+    }
+
+    /// Calls `callable` and pushes what it gives.
+    fn reduce(&mut self, callable: Id, arguments: Id) -> Result<(), CheckpointError> {
+        let (&Value::Global(global), Value::Tuple(arguments)) = (self.value(callable), self.value(arguments)) else {
+            return Err(self.error("a call of something that cannot be called"));
+        };
+        let result = match (global, arguments.as_slice()) {
+            (Global::RebuildParameter, &[data, _, _]) if matches!(self.value(data), Value::Tensor(_)) => {
+                self.stack.push(data);
+                return Ok(());
+            }
+            // Newer versions of torch may add a seventh argument, metadata.
+            (
+                Global::RebuildTensor,
+                &[storage, offset, size, stride, _, _] | &[storage, offset, size, stride, _, _, _],
+            ) => self.tensor(storage, offset, size, stride),
+            (Global::OrderedDict, []) => Some(Value::Dict),
+            (Global::NumpyDtype, &[name, _, _]) => match self.value(name) {
+                Value::Text("f8") => Some(Value::Dtype(8)),
+                Value::Text("f4") => Some(Value::Dtype(4)),
+                _ => None,
+            },
+            (Global::NumpyScalar, &[dtype, bytes]) => self.scalar(dtype, bytes),
+            (Global::Encode, &[text, encoding]) => self.encode(text, encoding),
+            _ => None,
+        };
+        let value =
+            result.ok_or_else(|| self.error(format!("{global:?} is called with arguments that no checkpoint has")))?;
+        self.push(value);
+        Ok(())
+    }
+
+    fn tensor(&self, storage: Id, offset: Id, size: Id, stride: Id) -> Option<Value<'a>> {
+        let &Value::Storage(storage) = self.value(storage) else { return None };
+        let (size, stride) = (self.counts(size)?, self.counts(stride)?);
+        let offset = self.count(offset)?;
+        (size.len() == stride.len()).then(|| Value::Tensor(Box::new(Tensor { storage, offset, size, stride })))
+    }
+
+    fn counts(&self, id: Id) -> Option<Vec<u64>> {
+        match self.value(id) {
+            Value::Tuple(items) if items.len() <= AXES => items.iter().map(|&item| self.count(item)).collect(),
+            _ => None,
+        }
+    }
+
+    fn scalar(&self, dtype: Id, bytes: Id) -> Option<Value<'a>> {
+        let (&Value::Dtype(size), Value::Bytes(bytes)) = (self.value(dtype), self.value(bytes)) else { return None };
+        let value = match size {
+            8 => f64::from_le_bytes(bytes.as_slice().try_into().ok()?),
+            _ => f32::from_le_bytes(bytes.as_slice().try_into().ok()?).into(),
+        };
+        Some(Value::Float(value))
+    }
+
+    /// Bytes, which protocol 2 writes as a text of the first 256 characters.
+    fn encode(&self, text: Id, encoding: Id) -> Option<Value<'a>> {
+        match (self.value(text), self.value(encoding)) {
+            (&Value::Text(text), Value::Text("latin1")) if text.len() <= SCALAR_TEXT => {
+                let bytes = text.chars().map(|c| u8::try_from(u32::from(c))).collect::<Result<_, _>>();
+                bytes.ok().map(Value::Bytes)
+            }
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(bytes: &[u8]) -> String {
+        Pickle::parse(bytes).expect_err("must be refused").to_string()
+    }
+
+    #[test]
+    fn foreign_objects_are_refused_by_name() {
+        let message = refusal(b"\x80\x02cos\nsystem\n(X\x02\x00\x00\x00lstR.");
+        assert!(message.contains("`os system`"), "{message}");
+        let message = refusal(b"\x80\x02cos\n\x1b[2Jsystem\n.");
+        assert!(!message.contains('\x1b'), "control characters are escaped: {message}");
+    }
+
+    #[test]
+    fn foreign_opcodes_are_refused_by_name() {
+        let message = refusal(b"\x80\x02(S'ls'\nios\nsystem\n.");
+        assert!(message.contains("0x53") && message.contains("byte 3"), "{message}");
+    }
+
+    #[test]
+    fn the_stack_does_not_run_dry() {
+        for bytes in [
+            &b"\x80\x02."[..],
+            b"\x80\x02t.",
+            b"\x80\x02(.",
+            b"\x80\x02\x87.",
+            b"\x80\x02NR.",
+            b"\x80\x02q\x00.",
+            b"\x80\x02h\x07.",
+        ] {
+            assert!(Pickle::parse(bytes).is_err(), "{bytes:?} takes what is not there");
+        }
+    }
+
+    #[test]
+    fn deep_nesting_does_not_recurse() {
+        let mut bytes = b"\x80\x02N".to_vec();
+        bytes.extend(std::iter::repeat_n(op::TUPLE1, 500_000));
+        bytes.push(op::STOP);
+        let pickle = Pickle::parse(&bytes).expect("valid");
+        assert_eq!(pickle.root().kind(), "a tuple", "the outermost of half a million tuples");
+    }
+
+    #[test]
+    fn numpy_scalars_of_both_sizes_are_floats() {
+        for (module, dtype, text) in
+            [("numpy.core.multiarray", "f8", "\0\0\0\0\0\0\u{f8}?"), ("numpy._core.multiarray", "f4", "\0\0\u{c0}?")]
+        {
+            let mut bytes = format!("\x02c{module}\nscalar\ncnumpy\ndtype\nX\x02\0\0\0{dtype}").into_bytes();
+            bytes.insert(0, op::PROTO);
+            bytes.extend([op::NEWFALSE, op::NEWTRUE, op::TUPLE3, op::REDUCE]);
+            bytes.extend(b"(K\x03X\x01\0\0\0<NNNJ\xff\xff\xff\xffJ\xff\xff\xff\xffK\0tbc_codecs\nencode\nX");
+            bytes.extend((text.len() as u32).to_le_bytes());
+            bytes.extend(text.as_bytes());
+            bytes.extend(b"X\x06\0\0\0latin1\x86R\x86R.");
+            let pickle = Pickle::parse(&bytes).expect("valid");
+            assert!(matches!(pickle.root(), Value::Float(1.5)), "{dtype}: {:?}", pickle.root());
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! What can go wrong with a file, with the file's name.
+//!
+//! In: a codec's own error. Out: a [`CodecError`], displayed as `PATH: reason`.
+
+use super::{checkpoint::CheckpointError, package::PackageError};
+use std::{io, path::PathBuf};
+
+/// Why a file was not read or written.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {kind}", .path.display())]
+pub struct CodecError {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong with it.
+    pub kind: CodecErrorKind,
+}
+
+/// The reasons of a [`CodecError`].
+#[derive(Debug, thiserror::Error)]
+pub enum CodecErrorKind {
+    /// The system could not open, read or write the file.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// The file starts like none of the formats that can be read.
+    #[error("neither a checkpoint of the 4DGS trainer (.pth, a zip archive) nor a package (.gs4d)")]
+    UnknownFormat,
+    /// A checkpoint that cannot be read.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// A package that cannot be read or written.
+    #[error(transparent)]
+    Package(#[from] PackageError),
+}
