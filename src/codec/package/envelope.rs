@@ -1,0 +1,81 @@
+//! The fixed start of a package, and its header as bytes.
+//!
+//! In: a [`Header`]. Out: magic, version, length, checksum and RON text; and back, checked against the real length of the file.
+
+use super::{Header, MAGIC, PackageError, VERSION};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+
+/// Bytes before the header: magic, version, header length, checksum.
+const FIXED: u64 = 20;
+
+/// Longest header read, bytes. A million Gaussians need a tenth of a megabyte.
+const HEADER_LIMIT: u64 = 16 << 20;
+
+/// Writes the fixed start and the header, having checked that [`read`] will take both.
+pub(super) fn write(writer: &mut impl Write, header: &Header) -> Result<(), PackageError> {
+    let text = header.to_text()?;
+    let length = text.len() as u64;
+    check_length(length)?;
+    header.check(FIXED + length, header.end(FIXED + length))?;
+    writer.write_all(&MAGIC)?;
+    writer.write_all(&VERSION.to_le_bytes())?;
+    writer.write_all(&length.to_le_bytes())?;
+    writer.write_all(&checksum(text.as_bytes()).to_le_bytes())?;
+    Ok(writer.write_all(text.as_bytes())?)
+}
+
+/// Reads the fixed start and the header, checked. Also gives the length of the whole file; the reader is left at the first section.
+pub(super) fn read(reader: &mut (impl Read + Seek)) -> Result<(Header, u64), PackageError> {
+    let file_length = reader.seek(SeekFrom::End(0))?;
+    reader.rewind()?;
+    if file_length < MAGIC.len() as u64 || bytes::<4>(reader)? != MAGIC {
+        return Err(PackageError::NotAPackage);
+    }
+    check_room(FIXED, file_length)?;
+    let version = u32::from_le_bytes(bytes(reader)?);
+    if version != VERSION {
+        return Err(PackageError::UnsupportedVersion { found: version, known: VERSION });
+    }
+    let length = u64::from_le_bytes(bytes(reader)?);
+    let stored = u32::from_le_bytes(bytes(reader)?);
+    check_length(length)?;
+    check_room(FIXED + length, file_length)?;
+    let mut text = vec![0; length as usize];
+    reader.read_exact(&mut text)?;
+    if checksum(&text) != stored {
+        return Err(PackageError::HeaderChecksum);
+    }
+    let header = Header::parse(&text)?;
+    header.check(FIXED + length, file_length)?;
+    Ok((header, file_length))
+}
+
+/// CRC-32 of everything before the first section but the checksum itself.
+fn checksum(text: &[u8]) -> u32 {
+    let mut hasher = crc32fast::Hasher::new();
+    hasher.update(&MAGIC);
+    hasher.update(&VERSION.to_le_bytes());
+    hasher.update(&(text.len() as u64).to_le_bytes());
+    hasher.update(text);
+    hasher.finalize()
+}
+
+fn check_length(length: u64) -> Result<(), PackageError> {
+    if length > HEADER_LIMIT {
+        return Err(PackageError::HeaderTooLong { length, limit: HEADER_LIMIT });
+    }
+    Ok(())
+}
+
+fn check_room(expected: u64, found: u64) -> Result<(), PackageError> {
+    if expected > found {
+        return Err(PackageError::Truncated { expected, found });
+    }
+    Ok(())
+}
+
+fn bytes<const N: usize>(reader: &mut impl Read) -> io::Result<[u8; N]> {
+    let mut bytes = [0; N];
+    reader.read_exact(&mut bytes)?;
+    Ok(bytes)
+}

@@ -1,0 +1,118 @@
+//! What can be wrong with a package.
+//!
+//! In: a finding of the reader or writer. Out: a [`PackageError`] that says in plain words what it is and what helps.
+
+/// Why a package cannot be read or written. The path is added by whoever opened the file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PackageError {
+    /// The file does not start with the magic bytes.
+    #[error("not a .gs4d package (it does not start with \"GS4D\")")]
+    NotAPackage,
+    /// A format version that this reader does not know.
+    #[error("format version {found}, known here is {known}: made by a newer gs4d (update this one), or damaged")]
+    UnsupportedVersion {
+        /// Version in the file.
+        found: u32,
+        /// Version this reader knows.
+        known: u32,
+    },
+    /// The file is shorter than it says.
+    #[error("the package is cut off: it should have {expected} bytes and has {found}; copy or download it again")]
+    Truncated {
+        /// Bytes that the fixed start or the section table ask for.
+        expected: u64,
+        /// Bytes there are.
+        found: u64,
+    },
+    /// Bytes behind the last section.
+    #[error("{count} bytes too many after the last section; copy or download the package again")]
+    TrailingBytes {
+        /// How many.
+        count: u64,
+    },
+    /// A header longer than any package needs.
+    #[error("a header of {length} bytes is longer than the {limit} allowed: the package is damaged")]
+    HeaderTooLong {
+        /// Length in the file.
+        length: u64,
+        /// Length allowed.
+        limit: u64,
+    },
+    /// The header's checksum does not hold.
+    #[error("the header is damaged (its checksum does not hold); copy or download the package again")]
+    HeaderChecksum,
+    /// The header is whole but cannot be understood.
+    #[error("the header cannot be understood: {0}")]
+    Header(String),
+    /// The package cannot be read without something this reader does not know.
+    #[error("made by a newer gs4d: it needs the feature `{name}`; update this one")]
+    UnknownFeature {
+        /// Name in the header's list of requirements.
+        name: String,
+    },
+    /// Numbers of the header, or parts of a scene to be written, that contradict each other or make no sense.
+    #[error("{0}")]
+    Inconsistent(&'static str),
+    /// The scene is far larger than the file could hold.
+    #[error("{raw} bytes of scene in a package that may hold {limit}: damaged, or a decompression bomb")]
+    TooLarge {
+        /// Bytes of the scene that the header describes.
+        raw: u64,
+        /// Bytes allowed for a file of this length.
+        limit: u64,
+    },
+    /// An attribute is not there for every Gaussian.
+    #[error("section `{name}` is missing, or ends early")]
+    MissingSection {
+        /// Name of the attribute.
+        name: String,
+    },
+    /// A section does not continue where the one before it ended.
+    #[error("section `{name}` starts at {found} and holds {count}, which does not follow on the {expected} before it")]
+    SectionRange {
+        /// Name of the attribute.
+        name: String,
+        /// First row that the section claims.
+        found: usize,
+        /// Rows that the section claims.
+        count: usize,
+        /// Rows there are before it.
+        expected: usize,
+    },
+    /// A section is encoded in a way that this reader does not know.
+    #[error("section `{name}` is encoded as `{encoding}`, which is not known here: update this gs4d")]
+    UnknownEncoding {
+        /// Name of the attribute.
+        name: String,
+        /// Encoding in the section table.
+        encoding: String,
+    },
+    /// A length of a section is not what it must be.
+    #[error("section `{name}` is damaged: a length of {found} bytes is given where it must be {expected}")]
+    SectionLength {
+        /// Name of the section.
+        name: String,
+        /// Length that is right.
+        expected: u64,
+        /// Length found.
+        found: u64,
+    },
+    /// The checksum of a section does not hold.
+    #[error("section `{name}` is damaged (its checksum does not hold); copy or download the package again")]
+    SectionChecksum {
+        /// Name of the section.
+        name: String,
+    },
+    /// A section arrived whole, yet does not decompress to what it should.
+    #[error("section `{name}` does not decompress: {reason}")]
+    SectionBody {
+        /// Name of the section.
+        name: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// The file could not be read or written.
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+}

@@ -1,0 +1,175 @@
+//! The header: what a package holds and where.
+//!
+//! In: a scene, or the RON text of a file. Out: a [`Header`] whose numbers have been checked against each other and against the
+//! length of the file, so that everything after it may rely on them.
+
+use super::{PackageError, Section};
+use crate::gaussian::{Harmonics, Model};
+use crate::scene::{Form, GaussianScene, PlaybackHints, TrainedWith};
+use serde::{Deserialize, Serialize};
+
+/// Uncompressed bytes that any package may hold, however short it is.
+const RAW_FLOOR: u64 = 64 << 20;
+
+/// Uncompressed bytes allowed beyond that for each byte of the file. Trained captures reach 1.2.
+const RAW_PER_BYTE: u64 = 256;
+
+/// The header of a package. Fields that a reader does not know are ignored.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// What wrote the package, for people.
+    #[serde(default)]
+    pub generator: String,
+    /// Features without which the package cannot be read rightly. A reader refuses those it does not know.
+    #[serde(default)]
+    pub requires: Vec<String>,
+    /// The form of the Gaussians.
+    pub form: StoredForm,
+    /// Number of Gaussians.
+    pub gaussians: usize,
+    /// Colour coefficients stored per Gaussian and channel, K.
+    pub coefficients: usize,
+    /// Spatial degree of the colour, 0 to 3.
+    pub degree: u32,
+    /// Time degree of the colour, 0 to 2.
+    pub degree_t: u32,
+    /// Size of the environment map, if there is one.
+    #[serde(default)]
+    pub environment: Option<EnvironmentSize>,
+    /// The switches the capture was trained with.
+    pub trained_with: TrainedWith,
+    /// How the capture is meant to be played.
+    pub playback: PlaybackHints,
+    /// The section table, in the order of the file.
+    pub sections: Vec<Section>,
+}
+
+/// The form in which the Gaussians are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StoredForm {
+    /// As an optimiser stores them: raw parameters.
+    Trained {
+        /// The model they belong to.
+        model: Model,
+    },
+    /// Sliced, ready to draw.
+    Runtime,
+}
+
+/// Size of an environment map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct EnvironmentSize {
+    /// Texels across.
+    pub width: u32,
+    /// Texels down.
+    pub height: u32,
+}
+
+/// The one field that is understood before all others.
+#[derive(Deserialize)]
+struct Requirements {
+    #[serde(default)]
+    requires: Vec<String>,
+}
+
+impl Header {
+    /// The header of a scene, with no sections yet.
+    pub(super) fn of(scene: &GaussianScene) -> Result<Self, PackageError> {
+        let form = match &scene.form {
+            Form::Trained(parameters) => StoredForm::Trained { model: parameters.model() },
+            Form::Runtime(_) => StoredForm::Runtime,
+        };
+        let header = Self {
+            generator: concat!("bevy_gs4d ", env!("CARGO_PKG_VERSION")).to_owned(),
+            requires: Vec::new(),
+            form,
+            gaussians: scene.len(),
+            coefficients: scene.harmonics.coefficients,
+            degree: scene.harmonics.degree,
+            degree_t: scene.harmonics.degree_t,
+            environment: scene.environment.as_ref().map(|e| EnvironmentSize { width: e.width, height: e.height }),
+            trained_with: scene.trained_with.clone(),
+            playback: scene.playback,
+            sections: Vec::new(),
+        };
+        header.check_numbers()?;
+        header.check_scene(scene)?;
+        Ok(header)
+    }
+
+    /// The RON text: one line for each field and each section.
+    pub(super) fn to_text(&self) -> Result<String, PackageError> {
+        let config = ron::ser::PrettyConfig::new().depth_limit(2).new_line("\n");
+        ron::ser::to_string_pretty(self, config).map_err(|e| PackageError::Header(e.to_string()))
+    }
+
+    /// The header that the text describes. Requirements come first, so that a newer package is refused for the right reason.
+    pub(super) fn parse(text: &[u8]) -> Result<Self, PackageError> {
+        let unclear = |e: ron::error::SpannedError| PackageError::Header(e.to_string());
+        let requirements: Requirements = ron::de::from_bytes(text).map_err(unclear)?;
+        match requirements.requires.into_iter().next() {
+            // This version has no optional features: any that is listed is beyond this reader.
+            Some(name) => Err(PackageError::UnknownFeature { name }),
+            None => ron::de::from_bytes(text).map_err(unclear),
+        }
+    }
+
+    /// Where the last section ends, in bytes, when the first starts at `start`.
+    pub(super) fn end(&self, start: u64) -> u64 {
+        // Each body stands behind its own length.
+        self.sections.iter().fold(start, |end, s| end.saturating_add(8).saturating_add(s.length as u64))
+    }
+
+    /// Whether the sections, from `start` on, fill a file of `file_length` bytes and hold every attribute once, and whether all
+    /// numbers make sense. Afterwards the sizes of [`attributes`](Self::attributes) can be allocated.
+    pub(super) fn check(&self, start: u64, file_length: u64) -> Result<(), PackageError> {
+        let expected = self.end(start);
+        if expected > file_length {
+            return Err(PackageError::Truncated { expected, found: file_length });
+        }
+        if expected < file_length {
+            return Err(PackageError::TrailingBytes { count: file_length - expected });
+        }
+        self.check_numbers()?;
+        let attributes = self.attributes();
+        let raw = attributes.iter().fold(0u64, |sum, a| sum.saturating_add(a.raw_length(a.rows)));
+        let limit = RAW_PER_BYTE.saturating_mul(file_length).saturating_add(RAW_FLOOR).min(isize::MAX as u64);
+        if raw > limit {
+            return Err(PackageError::TooLarge { raw, limit });
+        }
+        attributes.iter().try_for_each(|attribute| attribute.check_sections(&self.sections))
+    }
+
+    /// Whether the numbers make sense, sections aside.
+    fn check_numbers(&self) -> Result<(), PackageError> {
+        let trained = &self.trained_with;
+        let [first, last] = trained.time_interval;
+        let sane = |condition: bool, otherwise: &'static str| {
+            if condition { Ok(()) } else { Err(PackageError::Inconsistent(otherwise)) }
+        };
+        // Of no Gaussians, the harmonics are consistent if their degrees are.
+        let colour = Harmonics {
+            coefficients: self.coefficients,
+            degree: self.degree,
+            degree_t: self.degree_t,
+            values: Vec::new(),
+        };
+        sane(colour.is_consistent(0), "the degrees of the colour do not fit its number of coefficients")?;
+        sane(
+            self.environment.is_none_or(|e| e.width.checked_mul(e.height).is_some_and(|texels| texels > 0)),
+            "an environment map with no texels, or far too many",
+        )?;
+        sane(
+            first.is_finite() && last.is_finite() && first < last,
+            "the time interval must be two finite numbers, the first below the second",
+        )?;
+        sane(trained.background.iter().all(|c| c.is_finite()), "a background colour that is not finite")?;
+        sane(
+            trained.prefilter_var.is_finite() && trained.spatial_lr_scale.is_finite(),
+            "a switch of training (prefilter_var or spatial_lr_scale) that is not finite",
+        )?;
+        let duration = self.playback.duration_seconds;
+        sane(duration.is_finite() && duration > 0.0, "the playback duration must be a finite number above zero")
+    }
+}

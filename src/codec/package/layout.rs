@@ -1,0 +1,195 @@
+//! Attributes: which sections a scene consists of, and where their values lie in memory.
+//!
+//! In: a [`Header`]. Out: its [`Attribute`]s in the order of the file, a blank scene of its size, and the 32-bit words behind
+//! each attribute's name.
+
+use super::{FLOAT_PLANES, Header, PackageError, Section, StoredForm};
+use crate::gaussian::{Gaussian, Harmonics, Model, Parameters};
+use crate::scene::{Environment, Form, GaussianScene};
+use bytemuck::{Zeroable, cast_slice, cast_slice_mut};
+use std::ops::Range;
+
+/// One attribute of all Gaussians: a column of a table of words.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Attribute {
+    /// Name of its sections.
+    pub name: &'static str,
+    /// Rows of the table: Gaussians, or values of the environment map.
+    pub rows: usize,
+    /// Words from one row to the next in memory.
+    pub stride: usize,
+    /// First word of the attribute within a row.
+    pub offset: usize,
+    /// Words of the attribute in a row.
+    pub width: usize,
+}
+
+impl Attribute {
+    /// Uncompressed bytes of so many rows.
+    pub fn raw_length(&self, rows: usize) -> u64 {
+        (rows as u64).saturating_mul(self.width as u64 * 4)
+    }
+
+    /// Its rows in runs of at most `length`.
+    pub fn runs(self, length: usize) -> impl Iterator<Item = (Self, Range<usize>)> {
+        (0..self.rows).step_by(length).map(move |first| (self, first..self.rows.min(first.saturating_add(length))))
+    }
+
+    /// Whether the sections of this name hold every row once, in order.
+    pub fn check_sections(&self, sections: &[Section]) -> Result<(), PackageError> {
+        let mut next = 0;
+        for section in sections.iter().filter(|section| section.name == self.name) {
+            let name = section.name.clone();
+            if section.encoding != FLOAT_PLANES {
+                return Err(PackageError::UnknownEncoding { name, encoding: section.encoding.clone() });
+            }
+            if section.first != next || section.count > self.rows - next {
+                let (found, count) = (section.first, section.count);
+                return Err(PackageError::SectionRange { name, found, count, expected: next });
+            }
+            let (expected, found) = (self.raw_length(section.count), section.raw_length as u64);
+            if expected != found {
+                return Err(PackageError::SectionLength { name, expected, found });
+            }
+            next += section.count;
+        }
+        if next < self.rows {
+            return Err(PackageError::MissingSection { name: self.name.to_owned() });
+        }
+        Ok(())
+    }
+}
+
+impl Header {
+    /// The attributes of a scene with these numbers, in the order in which their sections are written.
+    pub(super) fn attributes(&self) -> Vec<Attribute> {
+        let rows = self.gaussians;
+        let alone = |name, width| Attribute { name, rows, stride: width, offset: 0, width };
+        let record = size_of::<Gaussian>() / 4;
+        let within = |name, offset, width| Attribute { name, rows, stride: record, offset, width };
+        let mut attributes: Vec<Attribute> = match self.form {
+            StoredForm::Trained { model } => {
+                let timed = model != Model::Static3d;
+                let pairs = model == Model::Rotated4d;
+                [
+                    Some(alone("mean", 3)),
+                    timed.then(|| alone("mean_t", 1)),
+                    Some(alone("log_scale", 3)),
+                    timed.then(|| alone("log_scale_t", 1)),
+                    Some(alone("rotation_l", 4)),
+                    pairs.then(|| alone("rotation_r", 4)),
+                    Some(alone("opacity_logit", 1)),
+                ]
+                .into_iter()
+                .flatten()
+                .collect()
+            }
+            StoredForm::Runtime => vec![
+                within("mean", 0, 3),
+                within("mean_t", 3, 1),
+                within("velocity", 4, 3),
+                within("sigma_t", 7, 1),
+                within("covariance", 8, 6),
+                within("opacity", 14, 1),
+            ],
+        };
+        let stride = self.coefficients.saturating_mul(3);
+        let colour = |name, offset, width| Attribute { name, rows, stride, offset, width };
+        attributes.push(colour("sh_dc", 0, 3));
+        if stride > 3 {
+            attributes.push(colour("sh_rest", 3, stride - 3));
+        }
+        if let Some(size) = self.environment {
+            let texels = (size.width as usize).saturating_mul(size.height as usize);
+            let rows = texels.saturating_mul(3);
+            attributes.push(Attribute { name: "environment", rows, stride: 1, offset: 0, width: 1 });
+        }
+        attributes
+    }
+
+    /// Whether the scene has exactly the values that these numbers ask for.
+    pub(super) fn check_scene(&self, scene: &GaussianScene) -> Result<(), PackageError> {
+        let fits = |a: &Attribute| a.rows.checked_mul(a.stride) == Some(words(scene, a.name).len());
+        if !self.attributes().iter().all(fits) {
+            return Err(PackageError::Inconsistent("the attributes of the scene differ in length"));
+        }
+        match &scene.form {
+            Form::Trained(p) if p.mean_t.is_empty() && !(p.log_scale_t.is_empty() && p.rotation_r.is_empty()) => {
+                Err(PackageError::Inconsistent("the scene has attributes of a 4D model but no temporal means"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A scene of the header's size with all values zero. The header must have been checked.
+pub(super) fn blank(header: &Header) -> GaussianScene {
+    let count = header.gaussians;
+    let form = match header.form {
+        StoredForm::Trained { model } => {
+            let timed = if model == Model::Static3d { 0 } else { count };
+            let pairs = if model == Model::Rotated4d { count } else { 0 };
+            Form::Trained(Parameters {
+                mean: vec![[0.0; 3]; count],
+                mean_t: vec![0.0; timed],
+                log_scale: vec![[0.0; 3]; count],
+                log_scale_t: vec![0.0; timed],
+                rotation_l: vec![[0.0; 4]; count],
+                rotation_r: vec![[0.0; 4]; pairs],
+                opacity_logit: vec![0.0; count],
+            })
+        }
+        StoredForm::Runtime => Form::Runtime(vec![Gaussian::zeroed(); count]),
+    };
+    GaussianScene {
+        form,
+        harmonics: Harmonics {
+            coefficients: header.coefficients,
+            degree: header.degree,
+            degree_t: header.degree_t,
+            values: vec![0.0; count * header.coefficients * 3],
+        },
+        environment: header.environment.map(|size| Environment {
+            width: size.width,
+            height: size.height,
+            texels: vec![0.0; 3 * size.width as usize * size.height as usize],
+        }),
+        trained_with: header.trained_with.clone(),
+        playback: header.playback,
+    }
+}
+
+/// The table of words in which the attribute of this name lies; empty if the scene has no such attribute.
+/// Words rather than floats, so that the payload of a NaN survives everywhere.
+pub(super) fn words<'a>(scene: &'a GaussianScene, name: &str) -> &'a [u32] {
+    match (&scene.form, name) {
+        (_, "sh_dc" | "sh_rest") => cast_slice(&scene.harmonics.values),
+        (_, "environment") => scene.environment.as_ref().map(|e| cast_slice(&e.texels)).unwrap_or_default(),
+        (Form::Runtime(gaussians), _) => cast_slice(gaussians),
+        (Form::Trained(p), "mean") => cast_slice(&p.mean),
+        (Form::Trained(p), "mean_t") => cast_slice(&p.mean_t),
+        (Form::Trained(p), "log_scale") => cast_slice(&p.log_scale),
+        (Form::Trained(p), "log_scale_t") => cast_slice(&p.log_scale_t),
+        (Form::Trained(p), "rotation_l") => cast_slice(&p.rotation_l),
+        (Form::Trained(p), "rotation_r") => cast_slice(&p.rotation_r),
+        (Form::Trained(p), "opacity_logit") => cast_slice(&p.opacity_logit),
+        (Form::Trained(_), _) => &[],
+    }
+}
+
+/// As [`words`], for filling in.
+pub(super) fn words_mut<'a>(scene: &'a mut GaussianScene, name: &str) -> &'a mut [u32] {
+    match (&mut scene.form, name) {
+        (_, "sh_dc" | "sh_rest") => cast_slice_mut(&mut scene.harmonics.values),
+        (_, "environment") => scene.environment.as_mut().map(|e| cast_slice_mut(&mut e.texels)).unwrap_or_default(),
+        (Form::Runtime(gaussians), _) => cast_slice_mut(gaussians),
+        (Form::Trained(p), "mean") => cast_slice_mut(&mut p.mean),
+        (Form::Trained(p), "mean_t") => cast_slice_mut(&mut p.mean_t),
+        (Form::Trained(p), "log_scale") => cast_slice_mut(&mut p.log_scale),
+        (Form::Trained(p), "log_scale_t") => cast_slice_mut(&mut p.log_scale_t),
+        (Form::Trained(p), "rotation_l") => cast_slice_mut(&mut p.rotation_l),
+        (Form::Trained(p), "rotation_r") => cast_slice_mut(&mut p.rotation_r),
+        (Form::Trained(p), "opacity_logit") => cast_slice_mut(&mut p.opacity_logit),
+        (Form::Trained(_), _) => &mut [],
+    }
+}

@@ -1,0 +1,129 @@
+//! Our own format, `.gs4d`: written once, loaded often, every byte of it checked.
+//!
+//! In: a [`GaussianScene`]. Out: a file, and back, bit for bit. `docs/format.md` describes the layout byte by byte.
+//!
+//! A package is a fixed start ([`MAGIC`], [`VERSION`], length and checksum of the header), a [`Header`] in RON, and the sections
+//! that the header lists. A section holds one attribute of a run of Gaussians: the four bytes of its floats apart from
+//! each other (`planes`), compressed on their own and checksummed. What a scene needs first comes first: geometry, plain colour, the
+//! rest of the colour, surroundings. Whatever a reader does not know is skipped, unless the header lists it as required.
+
+mod envelope;
+mod error;
+mod header;
+mod layout;
+mod planes;
+mod section;
+
+pub use error::PackageError;
+pub use header::{EnvironmentSize, Header, StoredForm};
+pub use section::{FLOAT_PLANES, Section};
+
+use crate::scene::GaussianScene;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::io::{BufReader, Read, Seek, Write};
+
+/// The first bytes of every package.
+pub const MAGIC: [u8; 4] = *b"GS4D";
+
+/// The format version written, and the only one read. It rises when an old reader could no longer make sense of the fixed start
+/// or the header; smaller steps are listed in [`Header::requires`].
+pub const VERSION: u32 = 1;
+
+/// Gaussians per section at most: small enough to decode one at a time in little memory, large enough to compress well.
+const ROWS_PER_SECTION: usize = 1 << 15;
+
+/// How a package is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WriteSettings {
+    /// zstd level, 1 (fast) to 19 (small); what is outside is clamped.
+    pub level: i32,
+}
+
+impl Default for WriteSettings {
+    fn default() -> Self {
+        Self { level: 9 }
+    }
+}
+
+/// What a package says about itself, and whether it arrived whole.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PackageInfo {
+    /// Format version.
+    pub version: u32,
+    /// Bytes of the whole package.
+    pub file_length: u64,
+    /// The header, whose checksum held.
+    pub header: Header,
+    /// Places in `header.sections` of the sections whose checksum or length does not hold.
+    pub damaged: Vec<usize>,
+}
+
+impl PackageInfo {
+    /// Whether every checksum holds.
+    pub fn is_intact(&self) -> bool {
+        self.damaged.is_empty()
+    }
+}
+
+/// Writes a scene without loss. The same scene and settings give the same bytes.
+///
+/// # Errors
+/// [`PackageError::Inconsistent`] for a scene whose parts do not fit together, [`PackageError::TooLarge`] for one that compresses
+/// so well that a reader would take it for a decompression bomb, and what the writer reports.
+pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), PackageError> {
+    let mut header = Header::of(scene)?;
+    let level = settings.level.clamp(1, 19);
+    let runs: Vec<_> = header.attributes().into_iter().flat_map(|a| a.runs(ROWS_PER_SECTION)).collect();
+    let encoded = runs
+        .into_par_iter()
+        .map(|(attribute, rows)| section::encode(layout::words(scene, attribute.name), &attribute, rows, level))
+        .collect::<Result<Vec<_>, _>>()?;
+    let (sections, bodies): (Vec<_>, Vec<_>) = encoded.into_iter().unzip();
+    header.sections = sections;
+    envelope::write(&mut writer, &header)?;
+    for body in bodies {
+        section::write_body(&mut writer, &body)?;
+    }
+    Ok(writer.flush()?)
+}
+
+/// Reads a scene from a reader that holds a package and nothing else. All checksums are verified, those of unknown sections too.
+///
+/// Memory beside the scene: one section, compressed and not. Values are taken as they are: whether a Gaussian can be drawn is
+/// found out by [`GaussianScene::into_runtime`].
+///
+/// # Errors
+/// Whatever is wrong with the package, one [`PackageError`] for each kind of damage.
+pub fn read<R: Read + Seek>(reader: R) -> Result<GaussianScene, PackageError> {
+    let mut reader = BufReader::new(reader);
+    let (header, _) = envelope::read(&mut reader)?;
+    let attributes = header.attributes();
+    let mut scene = layout::blank(&header);
+    let (mut body, mut planes) = (Vec::new(), Vec::new());
+    for section in &header.sections {
+        section.read_body(&mut reader, &mut body)?;
+        if let Some(attribute) = attributes.iter().find(|a| a.name == section.name) {
+            section.decode(&body, attribute, &mut planes, layout::words_mut(&mut scene, attribute.name))?;
+        }
+    }
+    Ok(scene)
+}
+
+/// Reads the header and verifies every checksum, without building the scene.
+///
+/// # Errors
+/// As [`read`], but damaged sections are listed in the result instead.
+pub fn inspect<R: Read + Seek>(reader: R) -> Result<PackageInfo, PackageError> {
+    let mut reader = BufReader::new(reader);
+    let (header, file_length) = envelope::read(&mut reader)?;
+    let (mut body, mut damaged) = (Vec::new(), Vec::new());
+    for (index, section) in header.sections.iter().enumerate() {
+        match section.read_body(&mut reader, &mut body) {
+            Ok(()) => {}
+            Err(PackageError::SectionChecksum { .. } | PackageError::SectionLength { .. }) => damaged.push(index),
+            Err(other) => return Err(other),
+        }
+    }
+    Ok(PackageInfo { version: VERSION, file_length, header, damaged })
+}

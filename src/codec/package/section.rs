@@ -1,0 +1,101 @@
+//! Sections: one attribute of a run of Gaussians, as bytes.
+//!
+//! In: words of a scene. Out: a zstd frame of their byte planes and its entry in the section table; and back, checked.
+
+use super::layout::Attribute;
+use super::{PackageError, planes};
+use serde::{Deserialize, Serialize};
+use std::io::{Read, Write};
+use std::ops::Range;
+
+/// The encoding of lossless sections: byte planes of little-endian float32, compressed by zstd.
+pub const FLOAT_PLANES: &str = "f32-planes-zstd";
+
+/// One entry of the section table.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Section {
+    /// The attribute it holds. Sections of unknown names are skipped.
+    pub name: String,
+    /// How the body is to be read: [`FLOAT_PLANES`].
+    pub encoding: String,
+    /// First Gaussian (of the environment map: first value).
+    pub first: usize,
+    /// Number of Gaussians (of the environment map: values).
+    pub count: usize,
+    /// Bytes in the file.
+    pub length: usize,
+    /// Bytes when decompressed.
+    pub raw_length: usize,
+    /// CRC-32 (IEEE) of the bytes in the file.
+    pub crc32: u32,
+}
+
+/// Some rows of an attribute within the table `words`, and their entry in the section table.
+pub(super) fn encode(
+    words: &[u32],
+    attribute: &Attribute,
+    rows: Range<usize>,
+    level: i32,
+) -> Result<(Section, Vec<u8>), PackageError> {
+    let planes = planes::split(words, attribute, rows.clone());
+    let mut body = zstd::bulk::compress(&planes, level)?;
+    // All bodies wait in memory until the table is complete.
+    body.shrink_to_fit();
+    let section = Section {
+        name: attribute.name.to_owned(),
+        encoding: FLOAT_PLANES.to_owned(),
+        first: rows.start,
+        count: rows.len(),
+        length: body.len(),
+        raw_length: planes.len(),
+        crc32: crc32fast::hash(&body),
+    };
+    Ok((section, body))
+}
+
+/// Writes a body behind its length.
+pub(super) fn write_body(writer: &mut impl Write, body: &[u8]) -> Result<(), PackageError> {
+    writer.write_all(&(body.len() as u64).to_le_bytes())?;
+    Ok(writer.write_all(body)?)
+}
+
+impl Section {
+    /// Reads the body with the length before it, and checks both. Damage leaves the reader behind the body all the same.
+    pub(super) fn read_body(&self, reader: &mut impl Read, body: &mut Vec<u8>) -> Result<(), PackageError> {
+        let mut prefix = [0; 8];
+        reader.read_exact(&mut prefix)?;
+        // The table has been checked against the length of the file.
+        body.clear();
+        body.resize(self.length, 0);
+        reader.read_exact(body)?;
+        let (expected, found) = (self.length as u64, u64::from_le_bytes(prefix));
+        if expected != found {
+            return Err(PackageError::SectionLength { name: self.name.clone(), expected, found });
+        }
+        if crc32fast::hash(body) != self.crc32 {
+            return Err(PackageError::SectionChecksum { name: self.name.clone() });
+        }
+        Ok(())
+    }
+
+    /// Decompresses a body into the table `words`; `planes` is memory to work in. The section must have been checked against
+    /// the attribute.
+    pub(super) fn decode(
+        &self,
+        body: &[u8],
+        attribute: &Attribute,
+        planes: &mut Vec<u8>,
+        words: &mut [u32],
+    ) -> Result<(), PackageError> {
+        let damaged = |reason| PackageError::SectionBody { name: self.name.clone(), reason };
+        planes.clear();
+        planes.resize(self.raw_length, 0);
+        // Never writes past the end of the buffer: a frame that holds more is refused.
+        let length = zstd::bulk::decompress_to_buffer(body, planes).map_err(|e| damaged(e.to_string()))?;
+        if length != self.raw_length {
+            return Err(damaged(format!("it holds {length} bytes instead of {}", self.raw_length)));
+        }
+        planes::join(planes, attribute, self.first..self.first + self.count, words);
+        Ok(())
+    }
+}
