@@ -1,0 +1,48 @@
+//! The GPU: which one, and with which checks.
+//!
+//! In: `--adapter` and `--checks`. Out: a headless renderer.
+
+use crate::failure::Failure;
+use bevy_gs4d::gpu::{GpuContext, Headless, ShaderChecks};
+use serde_json::{Value, json};
+
+/// Which GPU draws, and how carefully.
+#[derive(clap::Args)]
+#[command(next_help_heading = "GPU")]
+pub struct GpuArgs {
+    /// The adapter: part of its name in any case, or its index. A wrong one lists those there are [default: the fastest].
+    #[arg(long, value_name = "NAME|INDEX")]
+    adapter: Option<String>,
+    /// Have shaders check every array index (slower; to look for defects).
+    #[arg(long)]
+    checks: bool,
+}
+
+impl GpuArgs {
+    /// Opens the adapter and compiles the passes.
+    ///
+    /// # Errors
+    /// No such adapter, or one that cannot run the passes.
+    pub fn open(&self) -> Result<Headless, Failure> {
+        let context = GpuContext::headless(self.adapter.as_deref())?;
+        let checks = if self.checks { ShaderChecks::On } else { ShaderChecks::Off };
+        Ok(Headless::new(context, checks)?)
+    }
+}
+
+/// Name of the adapter, for people.
+pub fn adapter_name(headless: &Headless) -> String {
+    let info = &headless.context().info;
+    format!("{} ({}, {} {})", info.name, info.backend, info.driver, info.driver_info)
+}
+
+/// The adapter, for programs.
+pub fn adapter_json(headless: &Headless) -> Value {
+    let info = &headless.context().info;
+    json!({
+        "name": info.name,
+        "backend": info.backend.to_string(),
+        "driver": info.driver,
+        "driver_info": info.driver_info,
+    })
+}
