@@ -1,4 +1,89 @@
 //! Dynamic captures in Bevy games: native 4D Gaussian Splatting, played to the pixel.
+//!
+//! In: a trained capture, as a trainer's checkpoint (`.pth`) or as a package (`.gs4d`). Out: what it looks like at any moment from
+//! any camera, in a Bevy app or in pictures on disk. A game needs the [`prelude`] and nothing else; the rest of this page is the
+//! architecture, in the order in which the data travels.
+//!
+//! # From a file to the GPU: once for each capture
+//!
+//! ```text
+//!  chkpnt30000.pth      capture.gs4d ◀────────┐
+//!         │                   │               │
+//!         ▼                   ▼               │
+//!  codec::checkpoint    codec::package ───────┤ codec::save
+//!         └─────────┬─────────┘               │
+//!                   ▼                         │
+//!         scene::GaussianScene ───────────────┘
+//!                   │ into_runtime: gaussian slices every Gaussian
+//!                   ▼
+//!         scene::RuntimeScene ──────▶ asset::GaussianCapture   (Bevy: shared by entities)
+//!                   │                           │ render: upload
+//!                   ▼                           ▼
+//!            gpu::GpuCapture             gpu::GpuCapture
+//! ```
+//!
+//! 1. [`codec`] reads a file into a scene, or refuses it in plain words: [`codec::checkpoint`] through a restricted unpickler,
+//!    [`codec::package`] with a checksum on every byte. [`codec::load`] tells the two apart; [`codec::save`] writes a package.
+//! 2. [`scene`] is what a capture is: its Gaussians in the trained or the runtime form, their colour, an environment map, the
+//!    switches it was trained with, and how it is meant to be played.
+//! 3. [`gaussian`] is the maths. [`Parameters::slice`](gaussian::Parameters::slice) makes the runtime form, once: a 3D Gaussian in
+//!    straight-line motion under an opacity envelope ([`Gaussian`](gaussian::Gaussian), 64 bytes, the record that shaders read too).
+//! 4. [`gpu::GpuCapture`] holds that form in buffers. In Bevy, [`asset`] loads the file in the background and [`render`] uploads it.
+//!
+//! # From the GPU to pixels: once for each frame and camera
+//!
+//! ```text
+//!      Bevy                                                   without Bevy
+//!
+//!      Time                                                   dataset::CameraFile, an orbit
+//!        ▼                                                             │
+//!  playback::Playback    camera, transforms                            │
+//!        └───────┬────────────┘                                        │
+//!                ▼                                                     ▼
+//!  render: extract, prepare ───────▶  gaussian::View  ◀───── gaussian::Camera
+//!                                           │
+//!          gpu: one compute pass            ▼
+//!          ┌────────────────────────────────────────────────────────────┐
+//!          │ project ─▶ sort ─▶ bin ─▶ sort ─▶ ranges ─▶ blend          │
+//!          │ splats     depth   pairs  tile    of tiles  colour, depth  │
+//!          └────────────────────────────────────────────────────────────┘
+//!                                           │
+//!                ┌──────────────────────────┴──────────────────────────┐
+//!                ▼                                                     ▼
+//!  render: composite into the camera's target              gpu::Headless: frame::Frame
+//! ```
+//!
+//! 1. [`playback`] moves each entity's clock on; a [`View`](gaussian::View) is one camera at one time. In Bevy [`render`] makes
+//!    it from cameras and transforms, elsewhere a [`Camera`](gaussian::Camera) does.
+//! 2. [`gpu`] draws views with plain wgpu, on whatever device it is given; it knows nothing of Bevy. All captures in a view share
+//!    one compute pass, so that they interleave by depth. Its size is decided on the GPU: nothing is read back inside a frame.
+//! 3. Inside `blend` the depth of opaque meshes cuts the splats, pixel by pixel. The composite, the only pass in Bevy's pipeline
+//!    cache, lays the result over what the camera has drawn so far.
+//! 4. [`gpu::Headless`] hands the result over as a [`Frame`](frame::Frame) instead. The `gs4d` command and the tests use it.
+//!
+//! A pass has one name everywhere: `shaders/project.wgsl`, the functions in [`reference`], the timestamp span, the test.
+//!
+//! # How it is known to be right
+//!
+//! * [`reference`] is the CPU twin of every pass, plain functions over slices. The tests hold it against the original code's numbers,
+//!   and the GPU against both.
+//! * [`dataset`] reads training views as the trainer does; [`metrics`] are PSNR and SSIM as the original evaluates them, over
+//!   [`picture`]s.
+//!
+//! # Features
+//!
+//! | feature | adds |
+//! |---|---|
+//! | none | `gaussian`, `scene`, `codec`, `dataset`, `metrics`, `reference`: no GPU, no Bevy |
+//! | `gpu` | [`gpu`]: the renderer, on wgpu |
+//! | `bevy` (default) | [`asset`], [`playback`], [`render`], [`prelude`]; implies `gpu` |
+//! | `cli` | the `gs4d` command; implies `gpu`, never compiles Bevy |
+//! | `viewer` | the window, lit meshes and panel of the interactive examples; implies `bevy` |
+#![cfg_attr(
+    not(feature = "bevy"),
+    expect(rustdoc::broken_intra_doc_links, reason = "the architecture names the Bevy side, which this build leaves out")
+)]
+
 #[cfg(feature = "bevy")]
 pub mod asset;
 pub mod codec;
@@ -11,7 +96,14 @@ pub mod metrics;
 pub mod picture;
 #[cfg(feature = "bevy")]
 pub mod playback;
+#[cfg(feature = "bevy")]
+pub mod prelude;
 pub mod reference;
 #[cfg(feature = "bevy")]
 pub mod render;
 pub mod scene;
+
+/// The README, whose code must compile.
+#[cfg(all(doctest, feature = "bevy"))]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -71,6 +71,7 @@ fn scene(shape: &Shape, seed: u64) -> GaussianScene {
             degree_t: shape.degrees.1,
             values: bits.values(n * shape.coefficients * 3),
         },
+        filter: None,
         environment: shape.environment.map(|(width, height)| Environment {
             width,
             height,

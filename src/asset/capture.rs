@@ -73,6 +73,7 @@ mod tests {
             gaussians: Vec::new(),
             harmonics: Harmonics::default(),
             environment: None,
+            filter: None,
             trained_with: TrainedWith { time_interval, ..TrainedWith::default() },
             playback: PlaybackHints { up: UpAxis::PosZ, duration_seconds },
         })

@@ -30,6 +30,7 @@ pub enum ShDirection {
 }
 
 /// π as the original rasterizer spells it.
+#[expect(clippy::approx_constant, reason = "the original's literal, digit for digit")]
 const PI: f64 = 3.14159265;
 
 impl Harmonics {

@@ -105,7 +105,8 @@ impl Projected {
     /// `opacity · exp(−½ dᵀ conic d) ≥ 1/255` needs `dᵀ conic d ≤ 2 ln(255 opacity) = e`, and the box about that ellipse is
     /// `|dx| ≤ sqrt(e · xx)`, `|dy| ≤ sqrt(e · yy)`. Leaving out the rest changes no pixel: `blend` would skip it.
     pub fn contributing_tiles(&self) -> UVec4 {
-        if Mat2::from_cols_array(&[self.covariance.x, self.covariance.y, self.covariance.y, self.covariance.z]).determinant()
+        if Mat2::from_cols_array(&[self.covariance.x, self.covariance.y, self.covariance.y, self.covariance.z])
+            .determinant()
             <= 0.0
         {
             return self.tiles;

@@ -210,8 +210,14 @@ mod tests {
         let good = one([1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]);
         let reason = |p: Parameters| p.slice(&SliceSettings::default()).expect_err("must be refused").reason;
         assert!(reason(Parameters { mean: vec![[f32::NAN, 0.0, 0.0]], ..good.clone() }).contains("mean"), "NaN mean");
-        assert!(reason(Parameters { rotation_l: vec![[0.0; 4]], ..good.clone() }).contains("length zero"), "zero quaternion");
-        assert!(reason(Parameters { log_scale: vec![[200.0, 0.0, 0.0]], ..good.clone() }).contains("scale"), "huge scale");
+        assert!(
+            reason(Parameters { rotation_l: vec![[0.0; 4]], ..good.clone() }).contains("length zero"),
+            "zero quaternion"
+        );
+        assert!(
+            reason(Parameters { log_scale: vec![[200.0, 0.0, 0.0]], ..good.clone() }).contains("scale"),
+            "huge scale"
+        );
         assert!(reason(Parameters { opacity_logit: vec![f32::NAN], ..good }).contains("opacity"), "NaN opacity");
     }
 }

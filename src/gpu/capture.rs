@@ -117,7 +117,7 @@ pub(super) fn binding_limit(limits: &wgpu::Limits) -> u64 {
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
 }
 
-/// The records as they are, but for 1/σ_t in the place of σ_t: zero, not infinity, for what is always there.
+/// The records as they are, but for `1/σ_t` in the place of `σ_t`: zero, not infinity, for what is always there.
 fn gaussian_buffer(device: &wgpu::Device, gaussians: &[Gaussian]) -> wgpu::Buffer {
     mapped_buffer(device, "gs4d gaussians", gaussians.len(), size_of::<Gaussian>(), |index, record| {
         let gaussian = gaussians[index];

@@ -51,7 +51,11 @@ impl GpuContext {
 
 fn backends() -> wgpu::Backends {
     // Without DX12 among them, wgpu does not validate indirect dispatches with a hidden dispatch each.
-    if cfg!(windows) { wgpu::Backends::DX12 | wgpu::Backends::VULKAN } else { wgpu::Backends::VULKAN | wgpu::Backends::METAL }
+    if cfg!(windows) {
+        wgpu::Backends::DX12 | wgpu::Backends::VULKAN
+    } else {
+        wgpu::Backends::VULKAN | wgpu::Backends::METAL
+    }
 }
 
 fn instance() -> wgpu::Instance {

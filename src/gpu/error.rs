@@ -49,7 +49,9 @@ pub enum GpuError {
         reason: String,
     },
     /// A buffer would be larger than the device binds.
-    #[error("{what} need a buffer of {needed} bytes and this GPU binds at most {limit}: draw fewer Gaussians or a smaller picture")]
+    #[error(
+        "{what} need a buffer of {needed} bytes and this GPU binds at most {limit}: draw fewer Gaussians or a smaller picture"
+    )]
     TooLarge {
         /// What it is for.
         what: &'static str,

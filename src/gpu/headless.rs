@@ -4,7 +4,9 @@
 
 use super::timing::{PassTime, PassTimer, STRETCHES, Timings, median};
 use super::view::max_pairs;
-use super::{GpuCapture, GpuContext, GpuError, Instance, OpaqueDepth, Renderer, ShaderChecks, ViewRenderer, layout::Counters};
+use super::{
+    GpuCapture, GpuContext, GpuError, Instance, OpaqueDepth, Renderer, ShaderChecks, ViewRenderer, layout::Counters,
+};
 use crate::frame::{Background, Counts, Frame};
 use crate::gaussian::View;
 use crate::picture::Picture;

@@ -54,7 +54,9 @@ pub fn compose(name: &str) -> Result<wgpu::naga::Module, GpuError> {
         }
     }
     let descriptor = NagaModuleDescriptor { source, file_path: name, ..Default::default() };
-    composer.make_naga_module(descriptor).map_err(|error| GpuError::Shader { name, reason: error.emit_to_string(&composer) })
+    composer
+        .make_naga_module(descriptor)
+        .map_err(|error| GpuError::Shader { name, reason: error.emit_to_string(&composer) })
 }
 
 /// The shader module of a pass.
@@ -63,8 +65,10 @@ pub(super) fn module(
     name: &'static str,
     checks: ShaderChecks,
 ) -> Result<wgpu::ShaderModule, GpuError> {
-    let descriptor =
-        wgpu::ShaderModuleDescriptor { label: Some(name), source: wgpu::ShaderSource::Naga(Cow::Owned(compose(name)?)) };
+    let descriptor = wgpu::ShaderModuleDescriptor {
+        label: Some(name),
+        source: wgpu::ShaderSource::Naga(Cow::Owned(compose(name)?)),
+    };
     Ok(match checks {
         ShaderChecks::On => device.create_shader_module(descriptor),
         ShaderChecks::Off => trusted(device, descriptor),

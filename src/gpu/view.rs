@@ -8,10 +8,10 @@ use super::timing::PassTimer;
 use super::{GpuCapture, GpuError, capture::binding_limit, layout};
 use crate::frame::Background;
 use crate::gaussian::View;
-use glam::{UVec2, Vec3};
+use glam::UVec2;
 use layout::{BLOCK, Counters, DEPTH_STEPS, DIGIT_BITS, DIGITS, SortStep};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use wgpu::{BufferUsages, TextureFormat};
 
 /// A capture in a view. The view includes the transform of the capture and the capture's own time.
@@ -370,19 +370,20 @@ impl ViewRenderer {
             offset: 0,
             size: std::num::NonZeroU64::new(size_of::<SortStep>() as u64),
         });
-        let sort = |keys_in: &wgpu::Buffer, values_in: &wgpu::Buffer, keys_out: &wgpu::Buffer, values_out: &wgpu::Buffer| {
-            let resources = [
-                step.clone(),
-                frame.clone(),
-                counters.clone(),
-                keys_in.as_entire_binding(),
-                values_in.as_entire_binding(),
-                keys_out.as_entire_binding(),
-                values_out.as_entire_binding(),
-                histogram.as_entire_binding(),
-            ];
-            bind_group(device, "gs4d sort", &layouts.sort, &resources)
-        };
+        let sort =
+            |keys_in: &wgpu::Buffer, values_in: &wgpu::Buffer, keys_out: &wgpu::Buffer, values_out: &wgpu::Buffer| {
+                let resources = [
+                    step.clone(),
+                    frame.clone(),
+                    counters.clone(),
+                    keys_in.as_entire_binding(),
+                    values_in.as_entire_binding(),
+                    keys_out.as_entire_binding(),
+                    values_out.as_entire_binding(),
+                    histogram.as_entire_binding(),
+                ];
+                bind_group(device, "gs4d sort", &layouts.sort, &resources)
+            };
         let instance = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
             buffer: &instances,
             offset: 0,
@@ -405,12 +406,7 @@ impl ViewRenderer {
                 sort(&keys[1], &order[1], &keys[0], &order[0]),
             ],
             sort_tiles: [0, 1].map(|i| sort(&pair_tiles[i], &pair_splats[i], &pair_tiles[1 - i], &pair_splats[1 - i])),
-            arguments: bind_group(
-                device,
-                "gs4d arguments",
-                &layouts.arguments,
-                &[self.arguments.as_entire_binding()],
-            ),
+            arguments: bind_group(device, "gs4d arguments", &layouts.arguments, &[self.arguments.as_entire_binding()]),
             bin: bind_group(
                 device,
                 "gs4d bin",
@@ -504,7 +500,7 @@ impl ViewRenderer {
             (instances.first().map_or(view, |instance| instance.view), [0; 2])
         });
         let to_world = view.world_to_camera.inverse();
-        let column = |axis: usize| Vec3::from(to_world.col(axis).truncate()).extend(view.camera_position[axis]).to_array();
+        let column = |axis: usize| to_world.col(axis).truncate().extend(view.camera_position[axis]).to_array();
         let frame = layout::Frame {
             size: made.sizes.picture.to_array(),
             tiles: tiles(made.sizes.picture).to_array(),
@@ -533,7 +529,9 @@ impl CounterReadback {
             ReadbackState::Recorded => {
                 let ready = Arc::new(AtomicBool::new(false));
                 let flag = ready.clone();
-                self.buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| flag.store(result.is_ok(), Ordering::Release));
+                self.buffer
+                    .slice(..)
+                    .map_async(wgpu::MapMode::Read, move |result| flag.store(result.is_ok(), Ordering::Release));
                 self.state = ReadbackState::Mapping(ready);
                 None
             }

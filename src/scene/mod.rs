@@ -5,11 +5,13 @@
 
 mod bounds;
 mod environment;
+mod filter;
 mod provenance;
 pub mod synth;
 
 pub use bounds::Bounds;
 pub use environment::Environment;
+pub use filter::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter};
 pub use provenance::{PlaybackHints, RotationConvention, TrainedCameras, TrainedWith, UpAxis};
 
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Model, Parameters, SliceSettings};
@@ -23,6 +25,8 @@ pub struct GaussianScene {
     pub harmonics: Harmonics,
     /// The surroundings, if the capture has them.
     pub environment: Option<Environment>,
+    /// Which Gaussians are active when; without one, all are.
+    pub filter: Option<TemporalFilter>,
     /// The switches it was trained with, which drawing must repeat.
     pub trained_with: TrainedWith,
     /// How it is meant to be played.
@@ -47,6 +51,8 @@ pub struct RuntimeScene {
     pub harmonics: Harmonics,
     /// The surroundings, if the capture has them.
     pub environment: Option<Environment>,
+    /// Which Gaussians are active when; without one, all are.
+    pub filter: Option<TemporalFilter>,
     /// The switches it was trained with.
     pub trained_with: TrainedWith,
     /// How it is meant to be played.
@@ -106,6 +112,7 @@ impl GaussianScene {
             gaussians,
             harmonics: self.harmonics,
             environment: self.environment,
+            filter: self.filter,
             trained_with: self.trained_with,
             playback: self.playback,
         })
@@ -118,6 +125,7 @@ impl From<RuntimeScene> for GaussianScene {
             form: Form::Runtime(scene.gaussians),
             harmonics: scene.harmonics,
             environment: scene.environment,
+            filter: scene.filter,
             trained_with: scene.trained_with,
             playback: scene.playback,
         }

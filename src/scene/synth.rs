@@ -68,6 +68,7 @@ pub fn synthesize(settings: &SynthSettings) -> GaussianScene {
         form: Form::Trained(parameters),
         harmonics,
         environment: None,
+        filter: None,
         trained_with: TrainedWith::default(),
         playback: PlaybackHints { duration_seconds: settings.duration_seconds, ..PlaybackHints::default() },
     }

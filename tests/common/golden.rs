@@ -10,8 +10,7 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-pub const SCENES: [&str; 5] =
-    ["rot4d_sh3_t2", "nonrot4d_sh3_t1", "static_l_eq_r", "static_as_3d", "intrinsics_env"];
+pub const SCENES: [&str; 5] = ["rot4d_sh3_t2", "nonrot4d_sh3_t1", "static_l_eq_r", "static_as_3d", "intrinsics_env"];
 
 /// One view of a golden scene.
 pub struct GoldenView {
@@ -94,10 +93,16 @@ fn load_view(folder: &Path, scene_name: &str, json: &Value, view: &Value) -> Gol
         scale_modifier: number("scale_modifier", 1.0) as f32,
         prefilter_var: trained_with.prefilter_var,
     };
-    let scene =
-        GaussianScene { form: Form::Trained(parameters), harmonics, environment, trained_with, playback: PlaybackHints::default() }
-            .into_runtime_with(&settings)
-            .expect("golden scenes are valid");
+    let scene = GaussianScene {
+        form: Form::Trained(parameters),
+        harmonics,
+        environment,
+        filter: None,
+        trained_with,
+        playback: PlaybackHints::default(),
+    }
+    .into_runtime_with(&settings)
+    .expect("golden scenes are valid");
     let camera: CameraEntry = serde_json::from_value(view["camera"].clone()).expect("camera");
     let file = |key: &str| folder.join(view[key].as_str().expect("file"));
     GoldenView {
@@ -166,7 +171,8 @@ pub fn differences(golden: &GoldenView, frame: &Frame) -> ([f32; 3], f32) {
     let count = golden.alpha.len();
     let (mut clear, mut ambiguous) = ([0.0f32; 3], 0.0f32);
     for i in 0..count {
-        let color = (0..3).map(|c| (golden.color[c * count + i] - frame.picture.pixels[i][c]).abs()).fold(0.0, f32::max);
+        let color =
+            (0..3).map(|c| (golden.color[c * count + i] - frame.picture.pixels[i][c]).abs()).fold(0.0, f32::max);
         let depth = (golden.depth[i] - frame.depth[i]).abs();
         let alpha = (golden.alpha[i] - (1.0 - frame.transmittance[i])).abs();
         if golden.ambiguous[i] == 0 {

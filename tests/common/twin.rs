@@ -43,6 +43,7 @@ pub fn scene(gaussians: &[(Gaussian, Vec3)]) -> RuntimeScene {
         gaussians: gaussians.iter().map(|(gaussian, _)| *gaussian).collect(),
         harmonics: Harmonics { coefficients: 1, degree: 0, degree_t: 0, values },
         environment: None,
+        filter: None,
         trained_with: TrainedWith::default(),
         playback: PlaybackHints { duration_seconds: DURATION, ..PlaybackHints::default() },
     }

@@ -60,7 +60,7 @@ pub fn read<R: Read + Seek>(
     };
     let trained_with = options.trained_with(cfg_args, &file);
     let playback = options.playback(&trained_with);
-    Ok(GaussianScene { form: Form::Trained(parameters), harmonics, environment, trained_with, playback })
+    Ok(GaussianScene { form: Form::Trained(parameters), harmonics, environment, filter: None, trained_with, playback })
 }
 
 /// The convention of a file that nothing is said about. Code whose backward pass never wrote the time blocks is older than the

@@ -149,6 +149,7 @@ pub(super) fn blank(header: &Header) -> GaussianScene {
             degree_t: header.degree_t,
             values: vec![0.0; count * header.coefficients * 3],
         },
+        filter: None,
         environment: header.environment.map(|size| Environment {
             width: size.width,
             height: size.height,

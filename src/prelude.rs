@@ -1,0 +1,28 @@
+//! What a game needs: the plugin, the asset, the component, the clock.
+//!
+//! In: nothing. Out: names to import with `use bevy_gs4d::prelude::*;`, beside Bevy's own.
+//!
+//! ```no_run
+//! use bevy::prelude::*;
+//! use bevy_gs4d::prelude::*;
+//!
+//! fn setup(mut commands: Commands, assets: Res<AssetServer>) {
+//!     let once = Playback { repeat: Repeat::Once, ..default() };
+//!     commands.spawn((GaussianCapture3d(assets.load("toybox.gs4d")), once));
+//!     commands.spawn((Camera3d::default(), Msaa::Off, Transform::from_xyz(0.0, 1.0, 4.0)));
+//! }
+//!
+//! fn pause_on_space(keys: Res<ButtonInput<KeyCode>>, mut playback: Single<&mut Playback>) {
+//!     if keys.just_pressed(KeyCode::Space) {
+//!         playback.toggle();
+//!     }
+//! }
+//!
+//! let mut app = App::new();
+//! app.add_plugins((DefaultPlugins, GaussianCapturePlugin));
+//! app.add_systems(Startup, setup).add_systems(Update, pause_on_space).run();
+//! ```
+
+pub use crate::asset::GaussianCapture;
+pub use crate::playback::{Playback, Repeat};
+pub use crate::render::{GaussianCapture3d, GaussianCapturePlugin};

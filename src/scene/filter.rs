@@ -1,0 +1,215 @@
+//! The temporal filter: which Gaussians are active in each segment of time.
+//!
+//! In: key-frames at even spacing over the time interval and, for each segment between two of them, a set of Gaussians. Out:
+//! [`TemporalFilter`], stored as bits or as intervals, whichever is smaller; drawing skips what is not active.
+
+use crate::gaussian::{Gaussian, MARGINAL_CUTOFF};
+use serde::{Deserialize, Serialize};
+
+/// How the sets of a filter were found.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FilterKind {
+    /// The paper's: the union of what training cameras see at the two key-frames around a segment. Loses what comes and goes
+    /// between them.
+    KeyFrame,
+    /// The key-frame filter and whatever any training view inside the segment blends.
+    Interval,
+    /// Whatever has a marginal above the cut-off somewhere in the segment: exact by construction, needs no views.
+    #[default]
+    Support,
+}
+
+/// Sets of active Gaussians, one for each segment of time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TemporalFilter {
+    /// How it was made.
+    pub kind: FilterKind,
+    /// Number of segments: key-frames less one.
+    pub segments: u32,
+    /// Number of Gaussians.
+    pub count: usize,
+    /// The sets.
+    pub sets: ActiveSets,
+}
+
+/// The two ways to store the sets.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ActiveSets {
+    /// Segment by segment, `words_per_segment` words each, Gaussian `i` at bit `i % 32` of word `i / 32`.
+    Bits(Vec<u32>),
+    /// The first and last segment of each Gaussian; first after last where it is never active.
+    Intervals(Vec<[u16; 2]>),
+}
+
+/// Most segments a filter can have.
+pub const MAX_SEGMENTS: u32 = u16::MAX as u32;
+
+impl TemporalFilter {
+    /// Makes a filter from one set of bits for each segment, and stores it the smaller way.
+    pub fn from_bits(kind: FilterKind, segments: u32, count: usize, bits: Vec<u32>) -> Self {
+        let words = Self::words(count);
+        assert_eq!(bits.len(), words * segments as usize, "one set of bits for each segment");
+        let filter = Self { kind, segments, count, sets: ActiveSets::Bits(bits) };
+        match filter.intervals() {
+            Some(intervals) if intervals.len() < words * segments as usize => {
+                Self { sets: ActiveSets::Intervals(intervals), ..filter }
+            }
+            _ => filter,
+        }
+    }
+
+    /// The support filter: Gaussian `i` is active in a segment if its marginal exceeds the cut-off anywhere within. The marginal
+    /// has one peak, so that this is one interval. A little slack stands above rounding: too much active changes no pixel.
+    pub fn support(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2], segments: u32) -> Self {
+        let reach = f64::from(-2.0 * MARGINAL_CUTOFF.ln()).sqrt() * 1.0001;
+        let span = f64::from(interval[1]) - f64::from(interval[0]);
+        let intervals: Vec<[u16; 2]> = gaussians
+            .map(|gaussian| {
+                let half = reach * f64::from(gaussian.sigma_t) + span * 1e-6;
+                let unit = |time: f64| (time - f64::from(interval[0])) / span * f64::from(segments);
+                let mean = f64::from(gaussian.mean_t);
+                let (first, last) = (unit(mean - half).floor(), unit(mean + half).floor());
+                // Times outside the interval belong to its end segments.
+                let end = f64::from(segments - 1);
+                [first.clamp(0.0, end) as u16, last.clamp(0.0, end) as u16]
+            })
+            .collect();
+        let count = intervals.len();
+        let filter = Self { kind: FilterKind::Support, segments, count, sets: ActiveSets::Intervals(intervals) };
+        if Self::words(count) * (segments as usize) < count {
+            let sets = ActiveSets::Bits(filter.to_bits());
+            return Self { sets, ..filter };
+        }
+        filter
+    }
+
+    /// Words of bits for one set.
+    pub fn words(count: usize) -> usize {
+        count.div_ceil(32)
+    }
+
+    /// The segment of a time: `min(floor(t' (K − 1)), K − 2)` with `t'` the place in the interval, clamped to it.
+    pub fn segment_of(&self, time: f32, interval: [f32; 2]) -> u32 {
+        let place = ((time - interval[0]) / (interval[1] - interval[0])).clamp(0.0, 1.0);
+        ((place * self.segments as f32) as u32).min(self.segments - 1)
+    }
+
+    /// Whether Gaussian `index` is active in `segment`.
+    pub fn is_active(&self, segment: u32, index: usize) -> bool {
+        match &self.sets {
+            ActiveSets::Bits(bits) => {
+                bits[segment as usize * Self::words(self.count) + index / 32] >> (index % 32) & 1 == 1
+            }
+            ActiveSets::Intervals(intervals) => {
+                let [first, last] = intervals[index];
+                (u32::from(first)..=u32::from(last)).contains(&segment)
+            }
+        }
+    }
+
+    /// Share of active Gaussians, the mean over all segments; 1 for an empty scene.
+    pub fn active_share(&self) -> f64 {
+        let active: usize = (0..self.segments).map(|s| (0..self.count).filter(|&i| self.is_active(s, i)).count()).sum();
+        let all = self.count * self.segments as usize;
+        if all == 0 { 1.0 } else { active as f64 / all as f64 }
+    }
+
+    /// The filter of the Gaussians kept, in their new order.
+    pub fn select(&self, keep: &[u32]) -> Self {
+        let sets = match &self.sets {
+            ActiveSets::Intervals(intervals) => {
+                ActiveSets::Intervals(keep.iter().map(|&i| intervals[i as usize]).collect())
+            }
+            ActiveSets::Bits(_) => {
+                let words = Self::words(keep.len());
+                let mut bits = vec![0; words * self.segments as usize];
+                for segment in 0..self.segments {
+                    for (to, &from) in keep.iter().enumerate() {
+                        let bit = u32::from(self.is_active(segment, from as usize));
+                        bits[segment as usize * words + to / 32] |= bit << (to % 32);
+                    }
+                }
+                ActiveSets::Bits(bits)
+            }
+        };
+        Self { count: keep.len(), sets, ..self.clone() }
+    }
+
+    /// One set of bits for each segment.
+    pub fn to_bits(&self) -> Vec<u32> {
+        let words = Self::words(self.count);
+        let mut bits = vec![0; words * self.segments as usize];
+        for segment in 0..self.segments {
+            for index in 0..self.count {
+                if self.is_active(segment, index) {
+                    bits[segment as usize * words + index / 32] |= 1 << (index % 32);
+                }
+            }
+        }
+        bits
+    }
+
+    /// The sets as intervals, if no Gaussian pauses.
+    fn intervals(&self) -> Option<Vec<[u16; 2]>> {
+        (0..self.count)
+            .map(|index| {
+                let mut interval = [1, 0];
+                for segment in (0..self.segments).filter(|&s| self.is_active(s, index)) {
+                    if interval[0] > interval[1] {
+                        interval = [segment as u16; 2];
+                    } else if segment as u16 == interval[1] + 1 {
+                        interval[1] = segment as u16;
+                    } else {
+                        return None;
+                    }
+                }
+                Some(interval)
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gaussian(mean_t: f32, sigma_t: f32) -> Gaussian {
+        Gaussian { mean_t, sigma_t, opacity: 0.5, ..bytemuck::Zeroable::zeroed() }
+    }
+
+    #[test]
+    fn support_is_active_wherever_the_marginal_is_above_the_cutoff() {
+        let gaussians: Vec<_> =
+            (0..200).map(|i| gaussian(i as f32 / 150.0 - 0.1, 0.003 * (1 + i % 40) as f32)).collect();
+        for segments in [1, 5, 10, 40] {
+            let filter = TemporalFilter::support(gaussians.iter().copied(), [0.0, 1.0], segments);
+            for step in 0..=500 {
+                let time = step as f32 / 500.0;
+                let segment = filter.segment_of(time, [0.0, 1.0]);
+                for (index, gaussian) in gaussians.iter().enumerate() {
+                    let drawn = gaussian.marginal(time) > MARGINAL_CUTOFF;
+                    assert!(
+                        !drawn || filter.is_active(segment, index),
+                        "{index} is drawn at {time} and must be active"
+                    );
+                }
+            }
+            assert_eq!(filter.active_share() < 1.0, segments > 1, "with several segments, something rests in each");
+        }
+    }
+
+    #[test]
+    fn both_ways_to_store_say_the_same() {
+        let gaussians: Vec<_> = (0..70).map(|i| gaussian(i as f32 / 70.0, 0.05)).collect();
+        let filter = TemporalFilter::support(gaussians.into_iter(), [0.0, 1.0], 40);
+        assert!(matches!(filter.sets, ActiveSets::Intervals(_)), "forty segments are smaller as intervals");
+        let bits = TemporalFilter { sets: ActiveSets::Bits(filter.to_bits()), ..filter.clone() };
+        assert_eq!(bits.to_bits(), filter.to_bits(), "the same sets");
+        let back = TemporalFilter::from_bits(FilterKind::Support, 40, 70, filter.to_bits());
+        assert_eq!(back, filter, "intervals are found again");
+        let keep: Vec<u32> = (0..70).step_by(3).collect();
+        let (a, b) = (filter.select(&keep), bits.select(&keep));
+        assert_eq!(a.to_bits(), b.to_bits(), "selected alike");
+    }
+}
