@@ -10,7 +10,7 @@ use crate::picture::Picture;
 pub struct Frame {
     /// Colour `C + T · background`, unclamped, in the blend space.
     pub picture: Picture,
-    /// Transmittance T left after the last Gaussian blended, per pixel, row by row.
+    /// Transmittance T left after the last splat blended, per pixel, row by row.
     pub transmittance: Vec<f32>,
     /// Expected depth `Σ z α T` in camera units, not divided by `1 − T`, per pixel.
     pub depth: Vec<f32>,

@@ -61,12 +61,12 @@
 //!    cache, lays the result over what the camera has drawn so far.
 //! 4. [`gpu::Headless`] hands the result over as a [`Frame`](frame::Frame) instead. The `gs4d` command and the tests use it.
 //!
-//! A pass has one name everywhere: `shaders/project.wgsl`, the functions in [`reference`], the timestamp span, the test.
+//! A pass has one name everywhere: `shaders/project.wgsl`, the functions in [`mod@reference`], the timestamp span, the test.
 //!
 //! # How it is known to be right
 //!
-//! * [`reference`] is the CPU twin of every pass, plain functions over slices. The tests hold it against the original code's numbers,
-//!   and the GPU against both.
+//! * [`mod@reference`] is the CPU twin of every pass, plain functions over slices. The tests hold it against the original code's
+//!   numbers, and the GPU against both.
 //! * [`dataset`] reads training views as the trainer does; [`metrics`] are PSNR and SSIM as the original evaluates them, over
 //!   [`picture`]s.
 //!
@@ -81,7 +81,7 @@
 //! | `viewer` | the window, lit meshes and panel of the interactive examples; implies `bevy` |
 #![cfg_attr(
     not(feature = "bevy"),
-    expect(rustdoc::broken_intra_doc_links, reason = "the architecture names the Bevy side, which this build leaves out")
+    expect(rustdoc::broken_intra_doc_links, reason = "the Bevy side is not part of this build")
 )]
 
 #[cfg(feature = "bevy")]

@@ -12,15 +12,13 @@
 //!     commands.spawn((Camera3d::default(), Msaa::Off, Transform::from_xyz(0.0, 1.0, 4.0)));
 //! }
 //!
-//! fn pause_on_space(keys: Res<ButtonInput<KeyCode>>, mut playback: Single<&mut Playback>) {
-//!     if keys.just_pressed(KeyCode::Space) {
-//!         playback.toggle();
-//!     }
+//! fn slow_motion(mut playback: Single<&mut Playback>) {
+//!     playback.speed = 0.5;
 //! }
 //!
 //! let mut app = App::new();
 //! app.add_plugins((DefaultPlugins, GaussianCapturePlugin));
-//! app.add_systems(Startup, setup).add_systems(Update, pause_on_space).run();
+//! app.add_systems(Startup, (setup, slow_motion).chain()).run();
 //! ```
 
 pub use crate::asset::GaussianCapture;

@@ -55,7 +55,7 @@ pub struct View {
     pub size: UVec2,
     /// Timestamp, in the capture's unit.
     pub time: f32,
-    /// Capture space to camera space (OpenCV axes); may scale and shear when a model transform is included.
+    /// Capture space (the capture's own world) to camera space (OpenCV axes); may scale and shear when a model transform is included.
     pub world_to_camera: Mat4,
     /// Rows x and y of the projection: `P00, P11, P02, P12` in `ndc = (P00 x + P02 z, P11 y + P12 z) / z`.
     pub projection: Vec4,
@@ -129,7 +129,7 @@ impl View {
         [(m.row(0) * p.x + m.row(2) * p.z).as_vec4(), (m.row(1) * p.y + m.row(2) * p.w).as_vec4()]
     }
 
-    /// World-space direction of the ray through pixel `(x, y)`, unit length.
+    /// Capture-space direction of the ray through pixel `(x, y)`, unit length.
     pub fn ray(&self, x: u32, y: u32) -> Vec3 {
         let ndc = (Vec2::new(x as f32, y as f32) + 0.5) / self.size.as_vec2() * 2.0 - 1.0;
         let p = self.projection;

@@ -2,18 +2,18 @@
 //!
 //! In: tensors of a checkpoint. Out: [`Parameters`], which [`slice`](Parameters::slice) turns into the runtime form.
 
-/// Raw parameters of `N` Gaussians, one entry per Gaussian and attribute, in world space.
+/// Raw parameters of `N` Gaussians, one entry per Gaussian and attribute, in capture space.
 ///
 /// *Raw* means before activation: scales are logarithms, opacity is a logit, quaternions need not be unit length.
 /// Colour coefficients live beside them in [`Harmonics`](super::Harmonics). Rotations are in the *flipped* convention
 /// (the axis order of the 4D vector is x, y, z, t; loaders convert).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Parameters {
-    /// Mean μ, world units.
+    /// Mean μ, capture units.
     pub mean: Vec<[f32; 3]>,
     /// Temporal mean μ_t in the unit of the camera timestamps. Empty for a static (3D) model.
     pub mean_t: Vec<f32>,
-    /// Logarithm of the scale, a standard deviation along each unrotated axis, world units.
+    /// Logarithm of the scale, a standard deviation along each unrotated axis, capture units.
     pub log_scale: Vec<[f32; 3]>,
     /// Logarithm of the temporal scale. Empty for a static (3D) model.
     pub log_scale_t: Vec<f32>,

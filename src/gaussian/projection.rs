@@ -19,7 +19,7 @@ pub const TRANSMITTANCE_MIN: f32 = 1e-4;
 /// Rays are clamped to this multiple of the field of view before the Jacobian is taken.
 const FRUSTUM_CLAMP: f32 = 1.3;
 
-/// A Gaussian on the screen.
+/// The geometry of a splat: a Gaussian sliced at a time and projected to a view, without its colour.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Projected {
     /// Centre in pixels (pixel centres at integers).

@@ -1,23 +1,23 @@
 //! The slice: from the trained form to the runtime form, once, when a scene is loaded or packed.
 //!
-//! In: raw [`Parameters`]. Out: one [`Gaussian`] each, activated, in world space, computed in double precision.
+//! In: raw [`Parameters`]. Out: one [`Gaussian`] each, activated, in capture space, computed in double precision.
 
 use super::{Model, Parameters};
 use glam::{DMat3, DMat4, DQuat, DVec3, DVec4, Vec3};
 
-/// One Gaussian in the runtime form: activated, sliced, world space. 64 bytes, the record the GPU reads too.
+/// One Gaussian in the runtime form: activated, sliced, capture space. 64 bytes, the record the GPU reads too.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Gaussian {
-    /// Mean at time `mean_t`, world units.
+    /// Mean at time `mean_t`, capture units.
     pub mean: [f32; 3],
     /// Temporal mean μ_t, timestamp units.
     pub mean_t: f32,
-    /// Velocity c/v, world units per timestamp unit.
+    /// Velocity c/v, capture units per timestamp unit.
     pub velocity: [f32; 3],
     /// Temporal standard deviation σ_t of the marginal, timestamp units; infinite for a Gaussian that is always there.
     pub sigma_t: f32,
-    /// Conditional covariance, upper triangle xx, xy, xz, yy, yz, zz, world units squared.
+    /// Conditional covariance, upper triangle xx, xy, xz, yy, yz, zz, capture units squared.
     pub covariance: [f32; 6],
     /// Peak opacity in (0, 1).
     pub opacity: f32,
@@ -32,7 +32,7 @@ impl Gaussian {
         (-0.5 * z * z).exp()
     }
 
-    /// The conditional mean at `time`, world units.
+    /// The conditional mean at `time`, capture units.
     pub fn mean_at(&self, time: f32) -> Vec3 {
         Vec3::from(self.mean) + Vec3::from(self.velocity) * (time - self.mean_t)
     }

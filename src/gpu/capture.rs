@@ -8,7 +8,7 @@ use crate::gaussian::{Gaussian, ShDirection};
 use crate::scene::RuntimeScene;
 use wgpu::util::DeviceExt;
 
-/// Scene buffers on the GPU.
+/// A capture on the GPU: its Gaussians, colour and environment map in buffers, in as many parts as bindings ask for.
 #[derive(Debug)]
 pub struct GpuCapture {
     pub(super) parts: Vec<Part>,

@@ -17,7 +17,7 @@ pub const DIGITS: u32 = 1 << DIGIT_BITS;
 /// Steps that order 32-bit depths.
 pub const DEPTH_STEPS: u32 = 32 / DIGIT_BITS;
 
-/// One part of a capture in one view.
+/// What `project` needs of one part of a capture in one view; not [`gpu::Instance`](super::Instance), which may have several parts.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Instance {
@@ -84,7 +84,7 @@ impl Instance {
     }
 }
 
-/// What all instances of a view share.
+/// The uniforms that all passes of a view share; not the finished [`Frame`](crate::frame::Frame).
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Frame {
@@ -123,7 +123,7 @@ pub const BACKGROUND_COLOR: u32 = 1;
 /// The environment map.
 pub const BACKGROUND_ENVIRONMENT: u32 = 2;
 
-/// A Gaussian on the screen.
+/// A splat: a Gaussian sliced at a time and projected to a view, with its colour.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Splat {

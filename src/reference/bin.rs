@@ -1,4 +1,4 @@
-//! `bin` and `ranges`: splat–tile pairs and where each tile's begin, twins of `shaders/bin_*.wgsl` and `shaders/ranges.wgsl`.
+//! `bin` and `ranges`: splat–tile pairs and where each tile's begin, twins of `shaders/bin.wgsl` and `shaders/ranges.wgsl`.
 //!
 //! In: splats and their order by depth. Out: [`Pair`]s in that order; and, from sorted pairs, one range for each tile.
 

@@ -38,7 +38,8 @@ impl Bounds {
         bounds
     }
 
-    /// The box about the middle nine tenths of the means at rest along each axis: where to look, without stray Gaussians.
+    /// The box about the middle nine tenths of the means, each at its own temporal mean, along each axis: where to look, without
+    /// stray Gaussians.
     pub fn core(gaussians: &[Gaussian]) -> Option<Self> {
         if gaussians.is_empty() {
             return None;

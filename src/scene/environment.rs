@@ -1,4 +1,4 @@
-//! The environment map: what stands behind all Gaussians, on a sphere of radius 60 about the world origin.
+//! The environment map: what stands behind all Gaussians, on a sphere of radius 60 about the capture's origin.
 //!
 //! In: a lat-long texture from slot 17 of a checkpoint, a camera position and a ray. Out: the colour behind that pixel.
 //! Section 3.7 of the 4DGS model.
@@ -6,7 +6,7 @@
 use glam::Vec3;
 use std::f32::consts::{PI, TAU};
 
-/// Radius of the sphere, world units.
+/// Radius of the sphere, capture units.
 pub const RADIUS: f32 = 60.0;
 
 /// A lat-long texture of raw, unclamped RGB in the capture's blend space.

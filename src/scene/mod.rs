@@ -1,4 +1,4 @@
-//! What a capture is: Gaussians in one of two forms, colour, surroundings, and how it was trained and is played.
+//! What a capture is: Gaussians in one of two forms, colour, environment map, and how it was trained and is played.
 //!
 //! In: a codec's result. Out: a [`GaussianScene`] that can be stored, or taken apart with
 //! [`into_runtime`](GaussianScene::into_runtime) for drawing.
@@ -23,7 +23,7 @@ pub struct GaussianScene {
     pub form: Form,
     /// Their colour.
     pub harmonics: Harmonics,
-    /// The surroundings, if the capture has them.
+    /// The environment map, if the capture has one.
     pub environment: Option<Environment>,
     /// Which Gaussians are active when; without one, all are.
     pub filter: Option<TemporalFilter>,
@@ -36,9 +36,9 @@ pub struct GaussianScene {
 /// The two forms of the Gaussians of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Form {
-    /// As an optimiser stores them: can be scored, pruned and fine-tuned. Raw, world space.
+    /// As an optimiser stores them: can be scored, pruned and fine-tuned. Raw, capture space.
     Trained(Parameters),
-    /// Sliced: smaller, ready to draw. Activated, world space.
+    /// Sliced: smaller, ready to draw. Activated, capture space.
     Runtime(Vec<Gaussian>),
 }
 
@@ -49,7 +49,7 @@ pub struct RuntimeScene {
     pub gaussians: Vec<Gaussian>,
     /// Their colour.
     pub harmonics: Harmonics,
-    /// The surroundings, if the capture has them.
+    /// The environment map, if the capture has one.
     pub environment: Option<Environment>,
     /// Which Gaussians are active when; without one, all are.
     pub filter: Option<TemporalFilter>,
