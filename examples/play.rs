@@ -80,8 +80,8 @@ fn arguments() -> Result<Arguments> {
 }
 
 fn has_display() -> bool {
-    let set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
-    !cfg!(target_os = "linux") || set("DISPLAY") || set("WAYLAND_DISPLAY")
+    // The feature `viewer` opens X11 windows on Linux.
+    !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some_and(|display| !display.is_empty())
 }
 
 /// What is shown with and without a window.
@@ -105,7 +105,7 @@ fn setup(
     commands.spawn((
         Ball,
         Mesh3d(meshes.add(Sphere::new(1.0).mesh().uv(48, 24))),
-        MeshMaterial3d(materials.add(StandardMaterial::from(Color::srgb(0.9, 0.5, 0.2)))),
+        MeshMaterial3d(materials.add(StandardMaterial::from(Color::srgb(0.45, 0.25, 0.8)))),
         Visibility::Hidden,
     ));
     commands.spawn((

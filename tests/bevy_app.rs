@@ -175,8 +175,7 @@ fn two_captures_interleave_as_one() {
     let whole = crowd();
     let part = |keep: fn(usize) -> bool| {
         let mut part = whole.clone();
-        let kept = |items: Vec<_>| items.into_iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, g)| g).collect();
-        part.gaussians = kept(part.gaussians);
+        part.gaussians = whole.gaussians.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, g)| *g).collect();
         part.harmonics.values = whole
             .harmonics
             .values

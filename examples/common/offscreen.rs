@@ -6,6 +6,7 @@
 use bevy::app::PluginsState;
 use bevy::asset::{LoadState, UnapprovedPathMode};
 use bevy::camera::RenderTarget;
+use bevy::log::{DEFAULT_FILTER, LogPlugin};
 use bevy::prelude::*;
 use bevy::render::gpu_readback::{Readback, ReadbackComplete};
 use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
@@ -47,6 +48,8 @@ pub fn app(size: UVec2) -> App {
     let settings = WgpuSettings { backends: Some(backends()), ..default() };
     let plugins = DefaultPlugins
         .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
+        // A read-back that nobody waits for any more is no news.
+        .set(LogPlugin { filter: format!("{DEFAULT_FILTER},bevy_render::gpu_readback=error"), ..default() })
         .set(AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..default() })
         .set(RenderPlugin {
             render_creation: RenderCreation::Automatic(Box::new(settings)),
