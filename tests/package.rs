@@ -272,14 +272,14 @@ proptest! {
 
 #[test]
 fn long_scenes_survive_in_several_sections() {
-    for (model, count) in [(None, 70_000), (Some(Model::Rotated4d), 32_768), (Some(Model::Static3d), 32_769)] {
+    for (model, count) in [(None, 70_000), (Some(Model::Rotated4d), 16_384), (Some(Model::Static3d), 16_385)] {
         let shape = Shape { model, count, coefficients: 5, degrees: (1, 0), environment: Some((151, 77)) };
         let scene = scene(&shape, 3);
         let file = pack(&scene);
         assert_same(&scene, &read(&file).expect("readable"));
         let info = inspect(&file).expect("readable");
         let means = info.header.sections.iter().filter(|s| s.name == "mean").count();
-        assert_eq!(means, count.div_ceil(32_768), "runs of at most 32768 Gaussians");
+        assert_eq!(means, count.div_ceil(16_384), "runs of at most 16384 Gaussians");
     }
 }
 

@@ -31,7 +31,7 @@ pub const MAGIC: [u8; 4] = *b"GS4D";
 pub const VERSION: u32 = 1;
 
 /// Gaussians per section at most: small enough to decode one at a time in little memory, large enough to compress well.
-const ROWS_PER_SECTION: usize = 1 << 15;
+const ROWS_PER_SECTION: usize = 1 << 14;
 
 /// How a package is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
