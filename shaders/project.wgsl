@@ -1,7 +1,7 @@
 // project: slices each Gaussian at the view's time and projects it.
 // In: Gaussians, colour coefficients, an instance. Out: one splat and one depth key for each; the key of an invisible splat is
 // INVISIBLE. Section 3.3 of the 4DGS model, in its order; twin of src/gaussian/projection.rs and src/reference/project.rs.
-#import gs4d::types::{Gaussian, Instance, Splat}
+#import gs4d::types::{Gaussian, Instance, Splat, FILTER_NONE, INVISIBLE}
 #import gs4d::harmonics::{basis_first, basis_second, basis_third, basis_fourth, time_cosine}
 
 const TILE_SIZE: f32 = 16.0;
@@ -10,24 +10,35 @@ const LOW_PASS: f32 = 0.3;
 const FRUSTUM_CLAMP: f32 = 1.3;
 // 255 = 1 / ALPHA_MIN.
 const INVERSE_ALPHA_MIN: f32 = 255.0;
-const INVISIBLE: u32 = 0xffffffffu;
 
 @group(0) @binding(0) var<uniform> instance: Instance;
 @group(0) @binding(1) var<storage, read_write> splats: array<Splat>;
 @group(0) @binding(2) var<storage, read_write> depth_keys: array<u32>;
+// The list of `activate`; not read without a filter.
+@group(0) @binding(3) var<storage, read> active_list: array<u32>;
+@group(0) @binding(4) var<storage, read> active_counts: array<u32>;
 @group(1) @binding(0) var<storage, read> gaussians: array<Gaussian>;
 @group(1) @binding(1) var<storage, read> harmonics: array<vec4<f32>>;
 
 @compute @workgroup_size(256)
 fn project(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x >= instance.count {
-        return;
+    let slot = instance.first_slot + id.x;
+    var index = id.x;
+    if instance.filter_mode == FILTER_NONE {
+        if id.x >= instance.count {
+            return;
+        }
+    } else {
+        if id.x >= active_counts[instance.part] {
+            return;
+        }
+        index = active_list[slot];
     }
-    depth_keys[instance.first_slot + id.x] = project_one(id.x);
+    depth_keys[slot] = project_one(index, slot);
 }
 
-// Writes the splat and returns its depth key.
-fn project_one(index: u32) -> u32 {
+// Writes the splat of a Gaussian into its slot and returns its depth key.
+fn project_one(index: u32, slot: u32) -> u32 {
     let g = gaussians[index];
     let dt = instance.time - g.mean_t;
     let z = dt * g.inverse_sigma_t;
@@ -63,6 +74,10 @@ fn project_one(index: u32) -> u32 {
     }
     let mid = 0.5 * (a + c);
     let radius = ceil(3.0 * sqrt(mid + sqrt(max(0.1, mid * mid - det))));
+    // Neither infinite nor not a number.
+    if !(radius <= 3.4e38) {
+        return INVISIBLE;
+    }
     let grid = vec2<f32>(instance.tiles);
     var low = clamp(trunc((center - radius) / TILE_SIZE), vec2(0.0), grid);
     var high = clamp(trunc((center + radius + (TILE_SIZE - 1.0)) / TILE_SIZE), vec2(0.0), grid);
@@ -95,7 +110,7 @@ fn project_one(index: u32) -> u32 {
     splat.color = color(index, normalize(seen - instance.camera_position), -dt);
     splat.tiles_low = u32(low.x) | (u32(low.y) << 16u);
     splat.tiles_high = u32(high.x) | (u32(high.y) << 16u);
-    splats[instance.first_slot + index] = splat;
+    splats[slot] = splat;
     return bitcast<u32>(q.z);
 }
 

@@ -2,12 +2,11 @@
 // In: keys and values. Out: both, ordered by the digit at `sort_step.shift`; equal digits keep their order. A block of 2048 keys is
 // counted by `count`, the counts of all blocks are summed by `scan`, and `scatter` ranks the block again and moves it.
 // `visible` writes how many keys the first step kept. Twin of src/reference/sort.rs.
-#import gs4d::types::{Counters, Frame, SortStep, SORT_SLOTS, SORT_VISIBLE}
+#import gs4d::types::{Counters, Frame, SortStep, INVISIBLE, SORT_SLOTS, SORT_VISIBLE}
 #import gs4d::scan::{exclusive_scan, scan_total}
 
 const KEYS_PER_THREAD: u32 = 8u;
 const BLOCK: u32 = 2048u;
-const INVISIBLE: u32 = 0xffffffffu;
 const NO_DIGIT: u32 = 16u;
 
 @group(0) @binding(0) var<uniform> sort_step: SortStep;

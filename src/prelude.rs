@@ -23,4 +23,4 @@
 
 pub use crate::asset::GaussianCapture;
 pub use crate::playback::{Playback, Repeat};
-pub use crate::render::{GaussianCapture3d, GaussianCapturePlugin};
+pub use crate::render::{CaptureSettings, GaussianCapture3d, GaussianCapturePlugin};

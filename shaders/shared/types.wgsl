@@ -40,7 +40,21 @@ struct Instance {
     displaced: u32,
     near: f32,
     time_span: f32,
+    // FILTER_*
+    filter_mode: u32,
+    // Segment of time that is drawn.
+    segment: u32,
+    // Place of this part among all of the view.
+    part: u32,
+    padding: u32,
 }
+
+const FILTER_NONE: u32 = 0u;
+const FILTER_BITS: u32 = 1u;
+const FILTER_INTERVALS: u32 = 2u;
+
+// Depth key of a slot without a splat.
+const INVISIBLE: u32 = 0xffffffffu;
 
 // What all instances of a view share.
 struct Frame {

@@ -3,9 +3,12 @@
 //! In: a [`RuntimeScene`]. Out: buffers that stay as long as the capture does. Large captures are split into parts, so that no
 //! binding grows over what the device allows; a part is drawn by one dispatch of `project`.
 
+use super::renderer::bind_group as bind_group_of;
 use super::{GpuError, Renderer, layout};
 use crate::gaussian::{Gaussian, ShDirection};
-use crate::scene::RuntimeScene;
+use crate::scene::{ActiveSets, RuntimeScene, TemporalFilter, segment_of};
+use layout::BLOCK;
+use std::sync::atomic::{AtomicU64, Ordering};
 use wgpu::util::DeviceExt;
 
 /// A capture on the GPU: its Gaussians, colour and environment map in buffers, in as many parts as bindings ask for.
@@ -13,6 +16,9 @@ use wgpu::util::DeviceExt;
 pub struct GpuCapture {
     pub(super) parts: Vec<Part>,
     pub(super) environment: Option<EnvironmentBuffer>,
+    /// Tells captures apart, as long as the program runs.
+    pub(super) id: u64,
+    filter: Option<Filter>,
     /// Colour and time settings of an [`layout::Instance`]; the rest is zero.
     settings: layout::Instance,
     len: usize,
@@ -23,6 +29,16 @@ pub struct GpuCapture {
 pub(super) struct Part {
     pub count: u32,
     pub bind_group: wgpu::BindGroup,
+    /// Its share of the filter, if there is one.
+    pub filter: Option<wgpu::BindGroup>,
+}
+
+/// What the host needs to know of a filter.
+#[derive(Debug)]
+struct Filter {
+    mode: u32,
+    segments: u32,
+    interval: [f32; 2],
 }
 
 #[derive(Debug)]
@@ -48,14 +64,23 @@ impl GpuCapture {
         let limits = device.limits();
         let record = size_of::<Gaussian>().max(stride * 16) as u64;
         let threads = u64::from(limits.max_compute_workgroups_per_dimension) * 256;
-        let per_part = (binding_limit(&limits) / record).min(threads) as usize;
+        // A multiple of what one block of `activate` takes.
+        let per_part = ((binding_limit(&limits) / record).min(threads) as usize / BLOCK as usize) * BLOCK as usize;
+        if per_part == 0 {
+            let (needed, limit) = (record * u64::from(BLOCK), binding_limit(&limits));
+            return Err(GpuError::TooLarge { what: "the Gaussians", needed, limit });
+        }
         let mut parts = Vec::new();
         for first in (0..scene.gaussians.len()).step_by(per_part) {
             let count = per_part.min(scene.gaussians.len() - first);
             let gaussians = gaussian_buffer(device, &scene.gaussians[first..first + count]);
             let colors = harmonics_buffer(device, scene, first, count, stride);
             let bind_group = renderer.capture_bind_group(device, &gaussians, &colors);
-            parts.push(Part { count: count as u32, bind_group });
+            let filter = scene.filter.as_ref().map(|filter| {
+                let sets = filter_buffer(device, filter, first, count);
+                bind_group_of(device, "gs4d filter", &renderer.layouts.filter, &[sets.as_entire_binding()])
+            });
+            parts.push(Part { count: count as u32, bind_group, filter });
         }
         let environment = scene.environment.as_ref().map(|map| EnvironmentBuffer {
             buffer: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -79,7 +104,16 @@ impl GpuCapture {
             time_span: scene.trained_with.time_span(),
             ..bytemuck::Zeroable::zeroed()
         };
-        Ok(Self { parts, environment, settings, len: scene.gaussians.len() })
+        let filter = scene.filter.as_ref().map(|filter| Filter {
+            mode: match filter.sets {
+                ActiveSets::Bits(_) => layout::FILTER_BITS,
+                ActiveSets::Intervals(_) => layout::FILTER_INTERVALS,
+            },
+            segments: filter.segments,
+            interval: scene.trained_with.time_interval,
+        });
+        let id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
+        Ok(Self { parts, environment, id, filter, settings, len: scene.gaussians.len() })
     }
 
     /// Number of Gaussians.
@@ -97,9 +131,31 @@ impl GpuCapture {
         self.environment.is_some()
     }
 
-    /// The uniform of part `index`, whose splats begin at `first_slot`.
-    pub(super) fn instance(&self, index: usize, first_slot: u32, view: &layout::Instance) -> layout::Instance {
+    /// Whether it has a temporal filter.
+    pub fn has_filter(&self) -> bool {
+        self.filter.is_some()
+    }
+
+    /// The segment of a time, if there is a filter.
+    pub(super) fn segment(&self, time: f32) -> Option<u32> {
+        self.filter.as_ref().map(|filter| segment_of(time, filter.interval, filter.segments))
+    }
+
+    /// The uniform of part `index`, whose splats begin at `first_slot`; all of it is drawn without a segment.
+    pub(super) fn instance(
+        &self,
+        index: usize,
+        first_slot: u32,
+        segment: Option<u32>,
+        view: &layout::Instance,
+    ) -> layout::Instance {
+        let filter_mode = match (&self.filter, segment) {
+            (Some(filter), Some(_)) => filter.mode,
+            _ => layout::FILTER_NONE,
+        };
         layout::Instance {
+            filter_mode,
+            segment: segment.unwrap_or_default(),
             first_slot,
             count: self.parts[index].count,
             degree: self.settings.degree,
@@ -110,6 +166,29 @@ impl GpuCapture {
             ..*view
         }
     }
+}
+
+static NEXT_ID: AtomicU64 = AtomicU64::new(0);
+
+/// The sets of Gaussians `first..first + count`: the words of each segment in turn, or one word of interval for each.
+fn filter_buffer(device: &wgpu::Device, filter: &TemporalFilter, first: usize, count: usize) -> wgpu::Buffer {
+    let words = match &filter.sets {
+        ActiveSets::Bits(bits) => {
+            // Parts begin at multiples of 32.
+            let all = TemporalFilter::words(filter.count);
+            let own = first / 32..(first + count).div_ceil(32);
+            bits.chunks_exact(all).flat_map(|segment| &segment[own.clone()]).copied().collect()
+        }
+        ActiveSets::Intervals(intervals) => {
+            let own = &intervals[first..first + count];
+            own.iter().map(|[first, last]| u32::from(*first) | u32::from(*last) << 16).collect::<Vec<u32>>()
+        }
+    };
+    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some("gs4d filter"),
+        contents: bytemuck::cast_slice(&words),
+        usage: wgpu::BufferUsages::STORAGE,
+    })
 }
 
 /// Largest storage buffer that can be made and bound whole.

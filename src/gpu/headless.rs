@@ -3,7 +3,7 @@
 //! In: scenes and views. Out: [`Frame`]s on the host, or [`Timings`]. Each call waits for the GPU; inside a frame nothing does.
 
 use super::timing::{PassTime, PassTimer, STRETCHES, Timings, median};
-use super::view::max_pairs;
+use super::view::{Finished, max_pairs};
 use super::{
     GpuCapture, GpuContext, GpuError, Instance, OpaqueDepth, Renderer, ShaderChecks, ViewRenderer, layout::Counters,
 };
@@ -20,6 +20,7 @@ pub struct Headless {
     context: GpuContext,
     renderer: Renderer,
     view: ViewRenderer,
+    filtered: bool,
 }
 
 impl Headless {
@@ -30,12 +31,17 @@ impl Headless {
     pub fn new(context: GpuContext, checks: ShaderChecks) -> Result<Self, GpuError> {
         let renderer = Renderer::new(&context.device, checks)?;
         let view = ViewRenderer::new(&context.device);
-        Ok(Self { context, renderer, view })
+        Ok(Self { context, renderer, view, filtered: true })
     }
 
     /// The device and its name.
     pub fn context(&self) -> &GpuContext {
         &self.context
+    }
+
+    /// Whether temporal filters are used (they are at first).
+    pub fn use_filters(&mut self, filtered: bool) {
+        self.filtered = filtered;
     }
 
     /// Puts a scene on the GPU.
@@ -51,7 +57,8 @@ impl Headless {
     /// # Errors
     /// When the picture does not fit the device or the device is lost.
     pub fn render(&mut self, capture: &GpuCapture, view: &View, background: Background) -> Result<Frame, GpuError> {
-        self.render_all(&[Instance { capture, view: *view }], background, None)
+        let instance = self.instance(capture, view);
+        self.render_all(&[instance], background, None)
     }
 
     /// Draws several captures into one picture, in order of depth, cut by opaque surfaces if given.
@@ -64,19 +71,7 @@ impl Headless {
         background: Background,
         opaque: Option<OpaqueDepth<'_>>,
     ) -> Result<Frame, GpuError> {
-        let counters = loop {
-            let counters = self.submit(instances, background, opaque, None)?;
-            let capacity = self.view.pair_capacity();
-            if counters.pairs_wanted <= capacity {
-                break counters;
-            }
-            let limit = max_pairs(&self.context.device);
-            if capacity == limit {
-                let (needed, limit) = (u64::from(counters.pairs_wanted) * 4, u64::from(limit) * 4);
-                return Err(GpuError::TooLarge { what: "the pairs of splats and tiles", needed, limit });
-            }
-            self.view.make_room(counters.pairs_wanted);
-        };
+        let counters = self.submit_whole(instances, background, opaque)?;
         let size = instances.first().map_or(UVec2::ONE, |instance| instance.view.size);
         let (color, depth) = self.read_targets(size)?;
         let color: &[[f32; 4]] = bytemuck::cast_slice(&color);
@@ -94,7 +89,8 @@ impl Headless {
     /// As [`render`](Self::render).
     pub fn time(&mut self, capture: &GpuCapture, views: &[View], frames: usize) -> Result<Timings, GpuError> {
         let background = Background::Color([0.0; 3]);
-        let instance = |i: usize| [Instance { capture, view: views[i % views.len()] }];
+        let filtered = self.filtered;
+        let instance = |i: usize| [Instance { capture, view: views[i % views.len()], filtered }];
         let mut counts = Vec::new();
         // The warm-up also finds room for the pairs of every view.
         for i in 0..views.len() {
@@ -140,6 +136,43 @@ impl Headless {
             counts: Counts { visible: middle(|c| c.visible), pairs: middle(|c| c.pairs) },
             frames,
         })
+    }
+
+    fn instance<'a>(&self, capture: &'a GpuCapture, view: &View) -> Instance<'a> {
+        Instance { capture, view: *view, filtered: self.filtered }
+    }
+
+    /// Draws one capture and leaves everything on the GPU.
+    pub(super) fn draw(&mut self, capture: &GpuCapture, view: &View, background: Background) -> Result<(), GpuError> {
+        let instance = self.instance(capture, view);
+        self.submit_whole(&[instance], background, None).map(|_| ())
+    }
+
+    /// What the last frame left there.
+    pub(super) fn finished(&self) -> Option<Finished<'_>> {
+        self.view.finished()
+    }
+
+    /// One frame, drawn again with more room until all pairs fit.
+    fn submit_whole(
+        &mut self,
+        instances: &[Instance<'_>],
+        background: Background,
+        opaque: Option<OpaqueDepth<'_>>,
+    ) -> Result<Counters, GpuError> {
+        loop {
+            let counters = self.submit(instances, background, opaque, None)?;
+            let capacity = self.view.pair_capacity();
+            if counters.pairs_wanted <= capacity {
+                return Ok(counters);
+            }
+            let limit = max_pairs(&self.context.device);
+            if capacity == limit {
+                let (needed, limit) = (u64::from(counters.pairs_wanted) * 4, u64::from(limit) * 4);
+                return Err(GpuError::TooLarge { what: "the pairs of splats and tiles", needed, limit });
+            }
+            self.view.make_room(counters.pairs_wanted);
+        }
     }
 
     /// One frame, waited for. Returns what it counted.
@@ -205,7 +238,8 @@ impl Headless {
         Ok(rows.map(bytemuck::pod_read_unaligned).collect())
     }
 
-    fn copy_out(&self, source: &wgpu::Buffer, size: u64) -> Result<Vec<u8>, GpuError> {
+    /// The first `size` bytes of a buffer, waited for.
+    pub(super) fn copy_out(&self, source: &wgpu::Buffer, size: u64) -> Result<Vec<u8>, GpuError> {
         let GpuContext { device, queue, .. } = &self.context;
         let buffer = readback_buffer(device, size);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());

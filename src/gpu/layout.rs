@@ -59,6 +59,14 @@ pub struct Instance {
     pub near: f32,
     /// Length of the capture's time interval.
     pub time_span: f32,
+    /// `FILTER_*`.
+    pub filter_mode: u32,
+    /// Segment of time that is drawn.
+    pub segment: u32,
+    /// Place of this part among all of the view.
+    pub part: u32,
+    /// Unused.
+    pub padding: u32,
 }
 
 impl Instance {
@@ -115,6 +123,15 @@ pub struct Frame {
     /// Corner of the view in the opaque depth texture.
     pub opaque_origin: [u32; 2],
 }
+
+/// Every Gaussian is active.
+pub const FILTER_NONE: u32 = 0;
+/// Sets of bits.
+pub const FILTER_BITS: u32 = 1;
+/// Intervals of segments.
+pub const FILTER_INTERVALS: u32 = 2;
+/// Depth key of a slot without a splat.
+pub const INVISIBLE: u32 = u32::MAX;
 
 /// No background: a compositor follows.
 pub const BACKGROUND_NONE: u32 = 0;

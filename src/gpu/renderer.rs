@@ -10,6 +10,9 @@ use std::num::NonZeroU64;
 #[derive(Debug)]
 pub struct Renderer {
     pub(super) layouts: Layouts,
+    pub(super) activate_count: wgpu::ComputePipeline,
+    pub(super) activate_scan: wgpu::ComputePipeline,
+    pub(super) activate_write: wgpu::ComputePipeline,
     pub(super) project: wgpu::ComputePipeline,
     pub(super) sort_count: wgpu::ComputePipeline,
     pub(super) sort_scan: wgpu::ComputePipeline,
@@ -26,6 +29,8 @@ pub struct Renderer {
 /// Bind group layouts, in the order of the shaders' bindings.
 #[derive(Debug)]
 pub(super) struct Layouts {
+    pub activate: wgpu::BindGroupLayout,
+    pub filter: wgpu::BindGroupLayout,
     pub project: wgpu::BindGroupLayout,
     pub capture: wgpu::BindGroupLayout,
     pub sort: wgpu::BindGroupLayout,
@@ -37,7 +42,7 @@ pub(super) struct Layouts {
 
 /// Kinds of bindings, to write layouts in one line each.
 #[derive(Clone, Copy)]
-enum Bind {
+pub(super) enum Bind {
     /// Uniform buffer of this many bytes.
     Uniform(usize),
     /// The same, at an offset given with the dispatch.
@@ -45,6 +50,8 @@ enum Bind {
     Read,
     Write,
     Depth,
+    /// A texture that is read as it is.
+    Texture,
     Target(wgpu::TextureFormat),
 }
 
@@ -57,29 +64,16 @@ impl Renderer {
         check_limits(&device.limits())?;
         let layouts = Layouts::new(device);
         let shader = |name| module(device, name, checks);
+        let activate = shader("activate")?;
         let (project, sort, bin) = (shader("project")?, shader("sort")?, shader("bin")?);
         let (ranges, blend) = (shader("ranges")?, shader("blend")?);
         let pipeline = |module: &wgpu::ShaderModule, entry: &str, groups: &[&wgpu::BindGroupLayout]| {
-            let groups: Vec<_> = groups.iter().map(|group| Some(*group)).collect();
-            let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-                label: Some("gs4d"),
-                bind_group_layouts: &groups,
-                immediate_size: 0,
-            });
-            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(entry),
-                layout: Some(&layout),
-                module,
-                entry_point: Some(entry),
-                // Every pass writes its workgroup memory before it reads it.
-                compilation_options: wgpu::PipelineCompilationOptions {
-                    zero_initialize_workgroup_memory: false,
-                    ..Default::default()
-                },
-                cache: None,
-            })
+            pipeline(device, module, entry, groups)
         };
         Ok(Self {
+            activate_count: pipeline(&activate, "count", &[&layouts.activate, &layouts.filter]),
+            activate_scan: pipeline(&activate, "scan", &[&layouts.activate, &layouts.filter, &layouts.arguments]),
+            activate_write: pipeline(&activate, "write", &[&layouts.activate, &layouts.filter]),
             project: pipeline(&project, "project", &[&layouts.project, &layouts.capture]),
             sort_count: pipeline(&sort, "count", &[&layouts.sort]),
             sort_scan: pipeline(&sort, "scan", &[&layouts.sort]),
@@ -115,12 +109,12 @@ impl Layouts {
     fn new(device: &wgpu::Device) -> Self {
         use Bind::{Depth, Read, Target, Uniform, UniformAt, Write};
         const FRAME: usize = size_of::<layout::Frame>();
-        let new = |label, bindings: &[Bind]| {
-            let entries: Vec<_> = bindings.iter().enumerate().map(|(i, bind)| bind.entry(i as u32)).collect();
-            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
-        };
+        const INSTANCE: Bind = UniformAt(size_of::<layout::Instance>());
+        let new = |label, bindings: &[Bind]| group_layout(device, label, bindings);
         Self {
-            project: new("gs4d project", &[UniformAt(size_of::<layout::Instance>()), Write, Write]),
+            activate: new("gs4d activate", &[INSTANCE, Write, Write, Write, Write]),
+            filter: new("gs4d filter", &[Read]),
+            project: new("gs4d project", &[INSTANCE, Write, Write, Read, Read]),
             capture: new("gs4d capture", &[Read, Read]),
             sort: new(
                 "gs4d sort",
@@ -163,6 +157,11 @@ impl Bind {
                 view_dimension: wgpu::TextureViewDimension::D2,
                 multisampled: false,
             },
+            Self::Texture => wgpu::BindingType::Texture {
+                sample_type: wgpu::TextureSampleType::Float { filterable: false },
+                view_dimension: wgpu::TextureViewDimension::D2,
+                multisampled: false,
+            },
             Self::Target(format) => wgpu::BindingType::StorageTexture {
                 access: wgpu::StorageTextureAccess::WriteOnly,
                 format,
@@ -171,6 +170,39 @@ impl Bind {
         };
         wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None }
     }
+}
+
+/// A compute pipeline over these groups.
+pub(super) fn pipeline(
+    device: &wgpu::Device,
+    module: &wgpu::ShaderModule,
+    entry: &str,
+    groups: &[&wgpu::BindGroupLayout],
+) -> wgpu::ComputePipeline {
+    let groups: Vec<_> = groups.iter().map(|group| Some(*group)).collect();
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("gs4d"),
+        bind_group_layouts: &groups,
+        immediate_size: 0,
+    });
+    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(entry),
+        layout: Some(&layout),
+        module,
+        entry_point: Some(entry),
+        // Every pass writes its workgroup memory before it reads it.
+        compilation_options: wgpu::PipelineCompilationOptions {
+            zero_initialize_workgroup_memory: false,
+            ..Default::default()
+        },
+        cache: None,
+    })
+}
+
+/// A bind group layout whose bindings are numbered in order.
+pub(super) fn group_layout(device: &wgpu::Device, label: &str, bindings: &[Bind]) -> wgpu::BindGroupLayout {
+    let entries: Vec<_> = bindings.iter().enumerate().map(|(i, bind)| bind.entry(i as u32)).collect();
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
 }
 
 /// A bind group whose bindings are numbered in order.

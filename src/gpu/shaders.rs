@@ -15,12 +15,14 @@ const LIBRARIES: [(&str, &str); 4] = [
 ];
 
 /// Passes by name.
-const PASSES: [(&str, &str); 5] = [
+const PASSES: [(&str, &str); 7] = [
+    ("activate", include_str!("../../shaders/activate.wgsl")),
     ("project", include_str!("../../shaders/project.wgsl")),
     ("sort", include_str!("../../shaders/sort.wgsl")),
     ("bin", include_str!("../../shaders/bin.wgsl")),
     ("ranges", include_str!("../../shaders/ranges.wgsl")),
     ("blend", include_str!("../../shaders/blend.wgsl")),
+    ("score", include_str!("../../shaders/score.wgsl")),
 ];
 
 /// Whether shaders check their array indices and loops, which can cost much.

@@ -6,7 +6,8 @@ use crate::frame::Counts;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// The timed stretches of a frame, in order.
-pub(super) const STRETCHES: [&str; 6] = ["project", "sort (depth)", "bin", "sort (tile)", "ranges", "blend"];
+pub(super) const STRETCHES: [&str; 7] =
+    ["activate", "project", "sort (depth)", "bin", "sort (tile)", "ranges", "blend"];
 
 /// Medians over the frames of a benchmark.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

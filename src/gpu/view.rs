@@ -3,9 +3,10 @@
 //! In: captures with a [`View`](crate::gaussian::View) each, a background, the depth of opaque surfaces. Out: a texture of colour
 //! and transmittance and one of expected depth. [`ViewRenderer::prepare`] sizes and fills, [`ViewRenderer::record`] is the frame.
 
+use super::capture::{Part, binding_limit};
 use super::renderer::{Renderer, bind_group};
 use super::timing::PassTimer;
-use super::{GpuCapture, GpuError, capture::binding_limit, layout};
+use super::{GpuCapture, GpuError, layout};
 use crate::frame::Background;
 use crate::gaussian::View;
 use glam::UVec2;
@@ -21,6 +22,14 @@ pub struct Instance<'a> {
     pub capture: &'a GpuCapture,
     /// Where it is seen from, and when.
     pub view: View,
+    /// Whether its temporal filter is used, if it has one.
+    pub filtered: bool,
+}
+
+impl Instance<'_> {
+    fn segment(&self) -> Option<u32> {
+        if self.filtered { self.capture.segment(self.view.time) } else { None }
+    }
 }
 
 /// The depth of opaque surfaces that cut the splats, pixel by pixel.
@@ -50,8 +59,21 @@ pub struct ViewRenderer {
     no_depth: wgpu::TextureView,
     no_environment: wgpu::Buffer,
     readback: CounterReadback,
+    /// What each part of the frame prepared last wants to be active; nothing without a filter.
+    wanted: Vec<Option<Active>>,
+    /// What the lists of active Gaussians hold.
+    activated: Vec<Option<Active>>,
     /// Everything whose size depends on the view or the captures.
     resources: Option<Resources>,
+}
+
+/// What a list of active Gaussians was made for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Active {
+    capture: u64,
+    part: usize,
+    segment: u32,
+    first_slot: u32,
 }
 
 /// Sized resources and the bind groups over them.
@@ -59,6 +81,8 @@ pub struct ViewRenderer {
 struct Resources {
     sizes: Sizes,
     instances: wgpu::Buffer,
+    /// What `score` reads beside the frame.
+    kept: Kept,
     color: wgpu::Texture,
     color_view: wgpu::TextureView,
     depth: wgpu::Texture,
@@ -66,6 +90,10 @@ struct Resources {
     /// What the bind groups were made for, apart from sizes.
     opaque: wgpu::TextureView,
     environment: wgpu::Buffer,
+    /// Dispatches of `project` over the active, by part.
+    project_arguments: wgpu::Buffer,
+    project_arguments_group: wgpu::BindGroup,
+    activate: wgpu::BindGroup,
     project: wgpu::BindGroup,
     /// From the projected keys into the first pair of buffers, from there into the second, and back.
     sort_depth: [wgpu::BindGroup; 3],
@@ -74,6 +102,31 @@ struct Resources {
     bin: wgpu::BindGroup,
     ranges: wgpu::BindGroup,
     blend: wgpu::BindGroup,
+}
+
+/// Buffers of a frame that a later pass can read.
+#[derive(Debug)]
+pub(super) struct Kept {
+    pub tile_ranges: wgpu::Buffer,
+    /// Ordered by tile, then depth.
+    pub pair_splats: wgpu::Buffer,
+    pub splats: wgpu::Buffer,
+    /// Visible splats by depth.
+    pub order: wgpu::Buffer,
+    pub offsets: wgpu::Buffer,
+    pub depth_keys: wgpu::Buffer,
+}
+
+/// What a finished frame leaves behind.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Finished<'a> {
+    pub frame: &'a wgpu::Buffer,
+    pub counters: &'a wgpu::Buffer,
+    pub kept: &'a Kept,
+    pub color: &'a wgpu::TextureView,
+    /// Room there is for splats and pairs.
+    pub slots: u32,
+    pub pairs: u32,
 }
 
 /// What [`Resources`] have room for.
@@ -125,6 +178,8 @@ impl ViewRenderer {
                 buffer: buffer(device, "gs4d counter readback", counters, BufferUsages::MAP_READ),
                 state: ReadbackState::Idle,
             },
+            wanted: Vec::new(),
+            activated: Vec::new(),
             resources: None,
         }
     }
@@ -179,8 +234,10 @@ impl ViewRenderer {
         });
         if stale {
             self.resources = Some(self.make(device, queue, renderer, sizes, opaque_view, environment_buffer));
+            self.activated.clear();
         }
         self.slots = slots;
+        self.want_active(instances);
         self.write_uniforms(queue, instances, background, opaque.as_ref(), environment.map(|(i, m)| (i.view, m.size)));
         Ok(())
     }
@@ -204,6 +261,18 @@ impl ViewRenderer {
     /// The textures behind [`color`](Self::color) and [`depth`](Self::depth).
     pub(super) fn textures(&self) -> Option<(&wgpu::Texture, &wgpu::Texture)> {
         self.resources.as_ref().map(|made| (&made.color, &made.depth))
+    }
+
+    /// What the frame recorded last leaves behind.
+    pub(super) fn finished(&self) -> Option<Finished<'_>> {
+        self.resources.as_ref().map(|made| Finished {
+            frame: &self.frame,
+            counters: &self.counters,
+            kept: &made.kept,
+            color: &made.color_view,
+            slots: made.sizes.slots,
+            pairs: made.sizes.pairs,
+        })
     }
 
     /// The counters of the frame recorded last, on the GPU.
@@ -232,6 +301,7 @@ impl ViewRenderer {
         timer: Option<&PassTimer>,
     ) {
         let Some(made) = &self.resources else { return };
+        self.activated.resize(self.wanted.len(), None);
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                 label: Some("gs4d"),
@@ -243,13 +313,36 @@ impl ViewRenderer {
                 }
             };
 
+            // activate, where the segment is another than before
+            let parts = || instances.iter().flat_map(|instance| &instance.capture.parts).enumerate();
+            for (index, part) in parts() {
+                if self.wanted[index] == self.activated[index] {
+                    continue;
+                }
+                self.activated[index] = self.wanted[index];
+                let (Some(_), Some(filter)) = (self.wanted[index], &part.filter) else { continue };
+                let blocks = part.count.div_ceil(BLOCK);
+                pass.set_bind_group(0, &made.activate, &[index as u32 * self.alignment]);
+                pass.set_bind_group(1, filter, &[]);
+                pass.set_pipeline(&renderer.activate_count);
+                pass.dispatch_workgroups(blocks, 1, 1);
+                pass.set_pipeline(&renderer.activate_scan);
+                pass.set_bind_group(2, &made.project_arguments_group, &[]);
+                pass.dispatch_workgroups(1, 1, 1);
+                pass.set_pipeline(&renderer.activate_write);
+                pass.dispatch_workgroups(blocks, 1, 1);
+            }
+            mark(&mut pass);
+
             // project
             pass.set_pipeline(&renderer.project);
-            let parts = instances.iter().flat_map(|instance| &instance.capture.parts);
-            for (index, part) in parts.enumerate() {
+            for (index, part) in parts() {
                 pass.set_bind_group(0, &made.project, &[index as u32 * self.alignment]);
                 pass.set_bind_group(1, &part.bind_group, &[]);
-                pass.dispatch_workgroups(part.count.div_ceil(256), 1, 1);
+                match self.wanted[index] {
+                    Some(_) => pass.dispatch_workgroups_indirect(&made.project_arguments, index as u64 * 12),
+                    None => pass.dispatch_workgroups(part.count.div_ceil(256), 1, 1),
+                }
             }
             mark(&mut pass);
 
@@ -329,6 +422,20 @@ impl ViewRenderer {
         dispatch(pass);
     }
 
+    /// Notes what each part of the frame wants to be active.
+    fn want_active(&mut self, instances: &[Instance<'_>]) {
+        self.wanted.clear();
+        let mut first_slot = 0;
+        for instance in instances {
+            let segment = instance.segment();
+            for (part, Part { count, .. }) in instance.capture.parts.iter().enumerate() {
+                let capture = instance.capture.id;
+                self.wanted.push(segment.map(|segment| Active { capture, part, segment, first_slot }));
+                first_slot += count;
+            }
+        }
+    }
+
     fn make(
         &self,
         device: &wgpu::Device,
@@ -347,6 +454,15 @@ impl ViewRenderer {
         let tiles = tiles(size);
         let instances =
             buffer(device, "gs4d instances", u64::from(parts) * u64::from(self.alignment), BufferUsages::UNIFORM);
+        let active_list = storage("gs4d active list", slots, 4);
+        let active_counts = storage("gs4d active counts", parts, 4);
+        let active_blocks = storage("gs4d active blocks", slot_blocks, 4);
+        let project_arguments = buffer(
+            device,
+            "gs4d project arguments",
+            u64::from(parts) * 12,
+            BufferUsages::STORAGE | BufferUsages::INDIRECT,
+        );
         let splats = storage("gs4d splats", slots, size_of::<layout::Splat>());
         let depth_keys = storage("gs4d depth keys", slots, 4);
         let keys = [(); 2].map(|()| storage("gs4d sort keys", slots, 4));
@@ -393,11 +509,36 @@ impl ViewRenderer {
         let sorted = tile_steps(size) as usize % 2;
         Resources {
             sizes,
+            project_arguments_group: bind_group(
+                device,
+                "gs4d project arguments",
+                &layouts.arguments,
+                &[project_arguments.as_entire_binding()],
+            ),
+            project_arguments,
+            activate: bind_group(
+                device,
+                "gs4d activate",
+                &layouts.activate,
+                &[
+                    instance.clone(),
+                    active_list.as_entire_binding(),
+                    active_counts.as_entire_binding(),
+                    active_blocks.as_entire_binding(),
+                    depth_keys.as_entire_binding(),
+                ],
+            ),
             project: bind_group(
                 device,
                 "gs4d project",
                 &layouts.project,
-                &[instance, splats.as_entire_binding(), depth_keys.as_entire_binding()],
+                &[
+                    instance,
+                    splats.as_entire_binding(),
+                    depth_keys.as_entire_binding(),
+                    active_list.as_entire_binding(),
+                    active_counts.as_entire_binding(),
+                ],
             ),
             sort_depth: [
                 // The values of the first step are the indices: what is bound for them is not read.
@@ -444,6 +585,14 @@ impl ViewRenderer {
                 ],
             ),
             instances,
+            kept: Kept {
+                tile_ranges,
+                pair_splats: pair_splats[sorted].clone(),
+                splats,
+                order: order[1].clone(),
+                offsets,
+                depth_keys,
+            },
             color,
             color_view,
             depth,
@@ -483,7 +632,9 @@ impl ViewRenderer {
         for instance in instances {
             let view = layout::Instance::of_view(&instance.view);
             for (part_index, part) in instance.capture.parts.iter().enumerate() {
-                let uniform = instance.capture.instance(part_index, slot, &view);
+                let segment = instance.segment();
+                let uniform =
+                    layout::Instance { part: index, ..instance.capture.instance(part_index, slot, segment, &view) };
                 let at = u64::from(index * self.alignment);
                 queue.write_buffer(&made.instances, at, bytemuck::bytes_of(&uniform));
                 slot += part.count;

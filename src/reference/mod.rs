@@ -6,11 +6,13 @@
 mod bin;
 mod blend;
 mod project;
+mod score;
 mod sort;
 
 pub use bin::{Pair, bin, ranges};
 pub use blend::blend;
 pub use project::{Splat, project};
+pub use score::ViewScore;
 pub use sort::sort;
 
 use crate::frame::{Background, Counts, Frame};

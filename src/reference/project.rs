@@ -45,9 +45,13 @@ impl Splat {
     }
 }
 
-/// Projects every Gaussian of the scene.
+/// Projects every Gaussian of the scene that its filter, if it has one, leaves active.
 pub fn project(scene: &RuntimeScene, view: &View) -> Vec<Splat> {
-    (0..scene.gaussians.len()).into_par_iter().map(|i| project_one(scene, i, view)).collect()
+    let active =
+        scene.filter.as_ref().map(|filter| (filter, filter.segment_of(view.time, scene.trained_with.time_interval)));
+    let is_active = |i| active.is_none_or(|(filter, segment)| filter.is_active(segment, i));
+    let one = |i| if is_active(i) { project_one(scene, i, view) } else { Splat::INVISIBLE };
+    (0..scene.gaussians.len()).into_par_iter().map(one).collect()
 }
 
 fn project_one(scene: &RuntimeScene, index: usize, view: &View) -> Splat {

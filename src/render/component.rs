@@ -18,8 +18,22 @@ use bevy::transform::components::Transform;
 /// 0.2 units *of the capture* is not drawn, as in training.
 #[derive(Component, Reflect, Debug, Default, Clone, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
-#[require(Transform, Visibility, Playback)]
+#[require(Transform, Visibility, Playback, CaptureSettings)]
 pub struct GaussianCapture3d(pub Handle<GaussianCapture>);
+
+/// How a capture is drawn.
+#[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
+#[reflect(Component, Default, Debug, Clone, PartialEq)]
+pub struct CaptureSettings {
+    /// Whether the capture's temporal filter is used, if it has one: what is not active at a time is then not even looked at.
+    pub filter: bool,
+}
+
+impl Default for CaptureSettings {
+    fn default() -> Self {
+        Self { filter: true }
+    }
+}
 
 impl From<Handle<GaussianCapture>> for GaussianCapture3d {
     fn from(handle: Handle<GaussianCapture>) -> Self {

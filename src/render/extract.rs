@@ -2,7 +2,7 @@
 //!
 //! In (main world): visible entities with a capture, their transform and playback. Out (render world): [`ExtractedCaptures`].
 
-use super::GaussianCapture3d;
+use super::{CaptureSettings, GaussianCapture3d};
 use crate::asset::GaussianCapture;
 use crate::playback::Playback;
 use bevy::asset::{AssetId, Assets};
@@ -23,15 +23,17 @@ pub(super) struct ExtractedCapture {
     pub(super) world_from_capture: Affine3A,
     /// In the capture's own unit.
     pub(super) time: f32,
+    /// Whether its temporal filter is used.
+    pub(super) filtered: bool,
 }
 
 pub(super) fn extract_captures(
     mut extracted: ResMut<ExtractedCaptures>,
     assets: Extract<Res<Assets<GaussianCapture>>>,
-    captures: Extract<Query<(&GaussianCapture3d, &Playback, &GlobalTransform, &InheritedVisibility)>>,
+    captures: Extract<Query<(&GaussianCapture3d, &CaptureSettings, &Playback, &GlobalTransform, &InheritedVisibility)>>,
 ) {
     extracted.0.clear();
-    for (capture, playback, transform, visibility) in &captures {
+    for (capture, settings, playback, transform, visibility) in &captures {
         if !visibility.get() {
             continue;
         }
@@ -40,6 +42,7 @@ pub(super) fn extract_captures(
                 asset: capture.0.id(),
                 world_from_capture: transform.affine(),
                 time: loaded.time_at(playback.time),
+                filtered: settings.filter,
             });
         }
     }

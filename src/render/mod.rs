@@ -22,7 +22,7 @@ mod prepare;
 mod upload;
 mod view;
 
-pub use component::GaussianCapture3d;
+pub use component::{CaptureSettings, GaussianCapture3d};
 pub use draw::CaptureSystems;
 pub use plugin::GaussianCapturePlugin;
 pub use upload::GpuGaussianCapture;

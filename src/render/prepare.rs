@@ -41,14 +41,22 @@ pub(super) struct CaptureView {
     /// The composite pipeline for the camera's target.
     pub(super) pipeline: CachedRenderPipelineId,
     /// What it sees this frame; nothing is drawn where this is empty.
-    drawn: Vec<(AssetId<GaussianCapture>, View)>,
+    drawn: Vec<Drawn>,
+}
+
+/// One capture, seen by one camera.
+struct Drawn {
+    asset: AssetId<GaussianCapture>,
+    view: View,
+    filtered: bool,
 }
 
 impl CaptureView {
     /// What is drawn this frame, in the renderer's terms.
     pub(super) fn instances<'a>(&self, captures: &'a RenderAssets<GpuGaussianCapture>) -> Vec<Instance<'a>> {
-        let instance = |&(asset, view): &(AssetId<GaussianCapture>, View)| {
-            Some(Instance { capture: captures.get(asset)?.capture()?, view })
+        let instance = |drawn: &Drawn| {
+            let capture = captures.get(drawn.asset)?.capture()?;
+            Some(Instance { capture, view: drawn.view, filtered: drawn.filtered })
         };
         self.drawn.iter().filter_map(instance).collect()
     }
@@ -67,7 +75,7 @@ impl CaptureView {
             |asset: AssetId<GaussianCapture>| captures.get(asset).is_some_and(|capture| capture.capture().is_some());
         self.drawn.extend(extracted.0.iter().filter(|capture| is_uploaded(capture.asset)).filter_map(|capture| {
             let view = lens.view(size, capture.time, camera, capture.world_from_capture)?;
-            Some((capture.asset, view))
+            Some(Drawn { asset: capture.asset, view, filtered: capture.filtered })
         }));
     }
 }

@@ -89,10 +89,9 @@ impl TemporalFilter {
         count.div_ceil(32)
     }
 
-    /// The segment of a time: `min(floor(t' (K − 1)), K − 2)` with `t'` the place in the interval, clamped to it.
+    /// The segment that a time belongs to, see [`segment_of`].
     pub fn segment_of(&self, time: f32, interval: [f32; 2]) -> u32 {
-        let place = ((time - interval[0]) / (interval[1] - interval[0])).clamp(0.0, 1.0);
-        ((place * self.segments as f32) as u32).min(self.segments - 1)
+        segment_of(time, interval, self.segments)
     }
 
     /// Whether Gaussian `index` is active in `segment`.
@@ -168,6 +167,12 @@ impl TemporalFilter {
             })
             .collect()
     }
+}
+
+/// The segment of a time: `min(floor(t' (K − 1)), K − 2)` with `t'` the place in the interval, clamped to it, and `K − 1` segments.
+pub fn segment_of(time: f32, interval: [f32; 2], segments: u32) -> u32 {
+    let place = ((time - interval[0]) / (interval[1] - interval[0])).clamp(0.0, 1.0);
+    ((place * segments as f32) as u32).min(segments.saturating_sub(1))
 }
 
 #[cfg(test)]

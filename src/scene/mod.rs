@@ -11,7 +11,7 @@ pub mod synth;
 
 pub use bounds::Bounds;
 pub use environment::Environment;
-pub use filter::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter};
+pub use filter::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter, segment_of};
 pub use provenance::{PlaybackHints, RotationConvention, TrainedCameras, TrainedWith, UpAxis};
 
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Model, Parameters, SliceSettings};

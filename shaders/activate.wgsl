@@ -1,0 +1,87 @@
+// activate: the index list of the Gaussians that are active in a segment of time, in ascending order.
+// In: the filter of one part of a capture, as bits or intervals. Out: the list, its length, and the size of the dispatch of
+// `project` over it; the keys of the slots that stay empty become INVISIBLE. Runs only when the segment changes. `count` counts
+// blocks, `scan` sums them, `write` fills the list.
+#import gs4d::types::{Instance, FILTER_BITS, INVISIBLE}
+#import gs4d::scan::{exclusive_scan, scan_total}
+
+const PER_THREAD: u32 = 8u;
+const BLOCK: u32 = 2048u;
+
+@group(0) @binding(0) var<uniform> instance: Instance;
+@group(0) @binding(1) var<storage, read_write> active_list: array<u32>;
+@group(0) @binding(2) var<storage, read_write> active_counts: array<u32>;
+@group(0) @binding(3) var<storage, read_write> blocks: array<u32>;
+@group(0) @binding(4) var<storage, read_write> depth_keys: array<u32>;
+// Bits: the words of each segment in turn. Intervals: first and last segment of each Gaussian, 16 bits each.
+@group(1) @binding(0) var<storage, read> sets: array<u32>;
+@group(2) @binding(0) var<storage, read_write> arguments: array<u32>;
+
+fn is_active(index: u32) -> bool {
+    if index >= instance.count {
+        return false;
+    }
+    if instance.filter_mode == FILTER_BITS {
+        let words = (instance.count + 31u) / 32u;
+        return ((sets[instance.segment * words + index / 32u] >> (index % 32u)) & 1u) == 1u;
+    }
+    let interval = sets[index];
+    return (interval & 0xffffu) <= instance.segment && instance.segment <= (interval >> 16u);
+}
+
+fn thread_count(first: u32) -> u32 {
+    var sum = 0u;
+    for (var i = first; i < first + PER_THREAD; i++) {
+        sum += select(0u, 1u, is_active(i));
+    }
+    return sum;
+}
+
+@compute @workgroup_size(256)
+fn count(@builtin(workgroup_id) block: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    exclusive_scan(thread_count(block.x * BLOCK + thread * PER_THREAD), thread);
+    if thread == 0u {
+        blocks[block.x] = scan_total();
+    }
+}
+
+// One workgroup.
+@compute @workgroup_size(256)
+fn scan(@builtin(local_invocation_index) thread: u32) {
+    let total = (instance.count + BLOCK - 1u) / BLOCK;
+    let each = (total + 255u) / 256u;
+    let first = min(thread * each, total);
+    let last = min((thread + 1u) * each, total);
+    var sum = 0u;
+    for (var i = first; i < last; i++) {
+        sum += blocks[i];
+    }
+    sum = exclusive_scan(sum, thread);
+    for (var i = first; i < last; i++) {
+        let item = blocks[i];
+        blocks[i] = sum;
+        sum += item;
+    }
+    if thread == 0u {
+        let active_count = scan_total();
+        active_counts[instance.part] = active_count;
+        arguments[3u * instance.part] = (active_count + 255u) / 256u;
+        arguments[3u * instance.part + 1u] = 1u;
+        arguments[3u * instance.part + 2u] = 1u;
+    }
+}
+
+@compute @workgroup_size(256)
+fn write(@builtin(workgroup_id) block: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let first = block.x * BLOCK + thread * PER_THREAD;
+    var at = blocks[block.x] + exclusive_scan(thread_count(first), thread);
+    for (var i = first; i < first + PER_THREAD; i++) {
+        if is_active(i) {
+            active_list[instance.first_slot + at] = i;
+            at++;
+        }
+        if i >= active_counts[instance.part] && i < instance.count {
+            depth_keys[instance.first_slot + i] = INVISIBLE;
+        }
+    }
+}

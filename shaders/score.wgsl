@@ -1,0 +1,162 @@
+// score: what each Gaussian contributes to a view, without float atomics.
+// In: what `blend` reads. Out: for each slot, sums over pixels of c = alpha T (contribution), c^2 (energy), and over pixels and
+// channels of (c (color - behind))^2 (removal). `place` gives each splat its first pair; `pairs` sums every pair over its tile,
+// one workgroup each; `gather` sums the pairs of each slot, in their order: the same on every run. Twin of
+// src/reference/score.rs.
+#import gs4d::types::{Counters, Frame, Splat, INVISIBLE}
+
+const TILE_SIZE: u32 = 16u;
+const PIXELS: u32 = 256u;
+// Splats whose terms are summed at once.
+const BATCH: u32 = 8u;
+const ALPHA_MIN: f32 = 1.0 / 255.0;
+const ALPHA_MAX: f32 = 0.99;
+const TRANSMITTANCE_MIN: f32 = 1e-4;
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> counters: Counters;
+@group(0) @binding(2) var<storage, read> tile_ranges: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read> pair_splats: array<u32>;
+@group(0) @binding(4) var<storage, read> splats: array<Splat>;
+@group(0) @binding(5) var<storage, read> order: array<u32>;
+@group(0) @binding(6) var<storage, read> offsets: array<u32>;
+@group(0) @binding(7) var<storage, read> depth_keys: array<u32>;
+// What blend made, with the background.
+@group(0) @binding(8) var color: texture_2d<f32>;
+// First pair of each slot.
+@group(1) @binding(0) var<storage, read_write> first_pairs: array<u32>;
+@group(1) @binding(1) var<storage, read_write> pair_scores: array<vec4<f32>>;
+@group(1) @binding(2) var<storage, read_write> scores: array<vec4<f32>>;
+
+// Of the batch: c and the squared removal of each pixel, splat by splat; then sums over eight pixels.
+var<workgroup> contribution: array<f32, 2048>;
+var<workgroup> removal: array<f32, 2048>;
+var<workgroup> partial: array<vec3<f32>, 256>;
+// Pixels of this tile that need no more splats.
+var<workgroup> finished: atomic<u32>;
+
+@compute @workgroup_size(256)
+fn place(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x < counters.visible {
+        first_pairs[order[id.x]] = offsets[id.x];
+    }
+}
+
+// What one pixel has seen so far.
+struct Pixel {
+    color: vec3<f32>,
+    transmittance: f32,
+    done: bool,
+}
+
+// Weight of a splat at a pixel; 0 where it is skipped. Moves the pixel on, as blend does.
+fn advance(pixel: ptr<function, Pixel>, splat: Splat, position: vec2<f32>) -> f32 {
+    if (*pixel).done {
+        return 0.0;
+    }
+    let d = splat.center - position;
+    let conic = splat.conic;
+    let power = -0.5 * (conic.x * d.x * d.x + conic.z * d.y * d.y) - conic.y * d.x * d.y;
+    let alpha = min(ALPHA_MAX, splat.opacity * exp(power));
+    if power > 0.0 || alpha < ALPHA_MIN {
+        return 0.0;
+    }
+    let left = (*pixel).transmittance * (1.0 - alpha);
+    if left < TRANSMITTANCE_MIN {
+        (*pixel).done = true;
+        return 0.0;
+    }
+    let weight = alpha * (*pixel).transmittance;
+    (*pixel).color += splat.color * weight;
+    (*pixel).transmittance = left;
+    return weight;
+}
+
+@compute @workgroup_size(256)
+fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let at = tile.xy * TILE_SIZE + vec2(thread % TILE_SIZE, thread / TILE_SIZE);
+    let position = vec2<f32>(at);
+    let range = tile_ranges[tile.y * frame.tiles.x + tile.x];
+    let inside = all(at < frame.size);
+
+    // The finished pixel says what lies behind each splat.
+    var total = vec3(0.0);
+    if inside {
+        total = textureLoad(color, at, 0).xyz;
+    }
+    if thread == 0u {
+        atomicStore(&finished, 0u);
+    }
+    workgroupBarrier();
+    var pixel = Pixel(vec3(0.0), 1.0, !inside);
+    if !inside {
+        atomicAdd(&finished, 1u);
+    }
+    for (var first = range.x; first < range.y; first += BATCH) {
+        let count = min(BATCH, range.y - first);
+        workgroupBarrier();
+        let over = atomicLoad(&finished) == PIXELS;
+        let was_done = pixel.done;
+        for (var i = 0u; i < count; i++) {
+            let splat = splats[pair_splats[first + i]];
+            let weight = advance(&pixel, splat, position);
+            let behind = (total - pixel.color) / pixel.transmittance;
+            let change = weight * (splat.color - behind);
+            contribution[i * PIXELS + thread] = weight;
+            removal[i * PIXELS + thread] = dot(change, change);
+        }
+        workgroupBarrier();
+        if pixel.done && !was_done {
+            atomicAdd(&finished, 1u);
+        }
+        let splat_index = thread / 32u;
+        if splat_index < count {
+            var sum = vec3(0.0);
+            for (var i = 0u; i < 8u; i++) {
+                let item = splat_index * PIXELS + (thread % 32u) + 32u * i;
+                let c = contribution[item];
+                sum += vec3(c, c * c, removal[item]);
+            }
+            partial[thread] = sum;
+        }
+        workgroupBarrier();
+        if thread < count {
+            var sum = vec3(0.0);
+            for (var i = 0u; i < 32u; i++) {
+                sum += partial[thread * 32u + i];
+            }
+            pair_scores[pair_of(pair_splats[first + thread], tile.xy)] = vec4(sum, 0.0);
+        }
+        // All that follow contribute nothing; their sums must say so.
+        if over {
+            for (var i = first + BATCH + thread; i < range.y; i += PIXELS) {
+                pair_scores[pair_of(pair_splats[i], tile.xy)] = vec4(0.0);
+            }
+            break;
+        }
+    }
+}
+
+// Where `bin` made the pair of this splat and tile.
+fn pair_of(splat: u32, tile: vec2<u32>) -> u32 {
+    let low = splats[splat].tiles_low;
+    let width = (splats[splat].tiles_high & 0xffffu) - (low & 0xffffu);
+    return first_pairs[splat] + (tile.y - (low >> 16u)) * width + tile.x - (low & 0xffffu);
+}
+
+@compute @workgroup_size(256)
+fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= frame.slots {
+        return;
+    }
+    var sum = vec4(0.0);
+    if depth_keys[id.x] != INVISIBLE {
+        let low = splats[id.x].tiles_low;
+        let high = splats[id.x].tiles_high;
+        let count = ((high & 0xffffu) - (low & 0xffffu)) * ((high >> 16u) - (low >> 16u));
+        for (var i = 0u; i < count; i++) {
+            sum += pair_scores[first_pairs[id.x] + i];
+        }
+    }
+    scores[id.x] = sum;
+}
