@@ -5,6 +5,8 @@
 
 #[path = "common/app.rs"]
 mod common;
+#[path = "common/skip.rs"]
+mod skip;
 #[path = "common/twin.rs"]
 mod twin;
 

@@ -5,6 +5,10 @@
 
 #[path = "common/app.rs"]
 mod common;
+#[path = "common/data.rs"]
+mod data;
+#[path = "common/skip.rs"]
+mod skip;
 
 use bevy::camera::RenderTarget;
 use bevy::prelude::*;
@@ -15,7 +19,7 @@ use bevy_gs4d::render::GaussianCapture3d;
 use image::RgbaImage;
 use std::fs::File;
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// A camera of a golden file.
 #[derive(serde::Deserialize)]
@@ -54,10 +58,7 @@ fn standup_looks_as_the_original_renders_it() {
 }
 
 fn check(checkpoint: &str, golden: &str) {
-    let Some(folder) = std::env::var_os("GS4D_DATA").map(PathBuf::from) else {
-        eprintln!("skipped: GS4D_DATA does not name the folder of the trained captures");
-        return;
-    };
+    let Some(folder) = data::data() else { return };
     let json = File::open(folder.join(golden).with_extension("json")).expect("the golden cameras are there");
     let Golden { background, views } = serde_json::from_reader(json).expect("golden cameras");
     let expected = pictures(&folder.join(golden).with_extension("npz"));

@@ -1,7 +1,11 @@
 //! Checkpoints of the original trainer become the scenes they were written from.
 
+#[path = "common/data.rs"]
+mod data;
 #[path = "common/pth.rs"]
 mod pth;
+#[path = "common/skip.rs"]
+mod skip;
 
 use bevy_gs4d::codec;
 use bevy_gs4d::codec::checkpoint::{self, CheckpointError, CheckpointOptions, describe};
@@ -264,12 +268,9 @@ fn cfg_args_beside_the_file_counts() {
 
 #[test]
 fn real_captures_load() {
-    let Some(data) = std::env::var_os("GS4D_DATA") else {
-        eprintln!("skipped: GS4D_DATA does not name a folder with toybox/ and standup/");
-        return;
-    };
+    let Some(data) = data::data() else { return };
     for file in ["toybox/toybox_chkpnt.pth", "standup/standup_chkpnt.pth"] {
-        let scene = codec::load(&Path::new(&data).join(file), &CheckpointOptions::default()).expect("a real capture");
+        let scene = codec::load(&data.join(file), &CheckpointOptions::default()).expect("a real capture");
         assert_eq!((scene.len(), scene.harmonics.coefficients), (90_000, 48), "{file}");
         assert_eq!(scene.model(), Some(Model::Rotated4d), "{file}");
         assert_eq!((scene.harmonics.degree, scene.harmonics.degree_t), (3, 2), "{file}");

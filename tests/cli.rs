@@ -4,8 +4,12 @@
 //! renders match the original's.
 #![cfg(feature = "cli")]
 
+#[path = "common/data.rs"]
+mod data;
 #[path = "common/npz.rs"]
 mod npz;
+#[path = "common/skip.rs"]
+mod skip;
 
 use bevy_gs4d::gpu::GpuContext;
 use bevy_gs4d::metrics;
@@ -74,7 +78,7 @@ fn scene(folder: &TempDir, count: &str) -> PathBuf {
 fn no_gpu() -> bool {
     let none = GpuContext::adapters().is_empty();
     if none {
-        eprintln!("skipped: no GPU adapter");
+        skip::skip("no GPU adapter");
     }
     none
 }
@@ -320,10 +324,7 @@ fn raw_picture(path: &Path, size: UVec2) -> Picture {
 
 #[test]
 fn real_captures_match_the_original() {
-    let Some(data) = std::env::var_os("GS4D_DATA").map(PathBuf::from) else {
-        eprintln!("skipped: GS4D_DATA is not set");
-        return;
-    };
+    let Some(data) = data::data() else { return };
     if no_gpu() {
         return;
     }

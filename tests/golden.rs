@@ -3,6 +3,8 @@
 mod golden;
 #[path = "common/gpu.rs"]
 mod gpu;
+#[path = "common/skip.rs"]
+mod skip;
 
 use bevy_gs4d::gaussian::projection;
 use bevy_gs4d::reference;

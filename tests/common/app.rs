@@ -5,6 +5,7 @@
 #[path = "../../examples/common/offscreen.rs"]
 pub mod offscreen;
 
+use crate::skip::skip;
 use bevy::core_pipeline::tonemapping::{DebandDither, Tonemapping};
 use bevy::prelude::*;
 use bevy_gs4d::gpu::GpuContext;
@@ -18,7 +19,7 @@ pub const FOV_Y: f32 = 0.8;
 /// An app without a window, or nothing (and a line that says so) where there is no GPU to draw with.
 pub fn app(size: UVec2) -> Option<App> {
     if GpuContext::adapters().is_empty() {
-        eprintln!("skipped: no GPU adapter: install a Vulkan driver (mesa-vulkan-drivers has one in software)");
+        skip("no GPU adapter: install a Vulkan driver (mesa-vulkan-drivers has one in software)");
         return None;
     }
     let mut app = offscreen::app(size);

@@ -9,13 +9,10 @@ use bevy_gs4d::{
 use glam::{UVec2, Vec3};
 
 use super::resolution_option;
+use crate::data::data;
 
 fn capture(name: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("GS4D_DATA").map(|folder| Path::new(&folder).join(name));
-    if folder.is_none() {
-        eprintln!("skipped: GS4D_DATA is not set to the folder of the real captures (toybox, standup)");
-    }
-    folder
+    Some(data()?.join(name))
 }
 
 /// Every golden view has the camera that the transforms file gives for the same image.

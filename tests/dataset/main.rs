@@ -4,7 +4,11 @@
 //! form and their sizes; beside it [`images`], what is [`wrong`], and [`captures`].
 
 mod captures;
+#[path = "../common/data.rs"]
+mod data;
 mod images;
+#[path = "../common/skip.rs"]
+mod skip;
 mod wrong;
 
 use std::{

@@ -1,0 +1,239 @@
+//! Structures and constants that stand in the shaders and in the host's code.
+//!
+//! In: the composed passes, as naga lays them out. Out: proof that every structure and shared constant is the same on both sides.
+#![cfg(feature = "gpu")]
+
+use bevy_gs4d::gaussian::projection::{ALPHA_MAX, ALPHA_MIN, LOW_PASS, TRANSMITTANCE_MIN};
+use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF};
+use bevy_gs4d::gpu::layout::{self, BLOCK, Counters, DIGITS, Frame, Instance, SortStep, Splat, TILE_SIZE};
+use bevy_gs4d::gpu::shaders::{compose, pass_names};
+use std::collections::{BTreeMap, BTreeSet};
+use std::mem::offset_of;
+use wgpu::naga::front::wgsl::parse_str;
+use wgpu::naga::{Expression, GlobalVariable, Literal, Module, StructMember, TypeInner};
+
+/// A member: its name, where it begins, how many bytes it has.
+type Member = (String, usize, usize);
+
+/// A structure of the host.
+struct Mirror {
+    name: &'static str,
+    size: usize,
+    members: Vec<Member>,
+}
+
+fn member_size<T, M>(_: impl Fn(&T) -> &M) -> usize {
+    size_of::<M>()
+}
+
+macro_rules! mirror {
+    ($type:ident { $($member:ident),* $(,)? }) => {
+        Mirror {
+            name: stringify!($type),
+            size: size_of::<$type>(),
+            members: vec![$((
+                stringify!($member).to_owned(),
+                offset_of!($type, $member),
+                member_size(|value: &$type| &value.$member),
+            )),*],
+        }
+    };
+}
+
+/// The Gaussian on the GPU holds the reciprocal of the temporal deviation, and its covariance in two pieces.
+fn gaussian() -> Mirror {
+    let mut mirror = mirror!(Gaussian { mean, mean_t, velocity, sigma_t, covariance, opacity, padding });
+    let covariance = offset_of!(Gaussian, covariance);
+    mirror.members[3].0 = "inverse_sigma_t".to_owned();
+    mirror.members[4] = ("covariance_a".to_owned(), covariance, 16);
+    mirror.members.insert(5, ("covariance_b".to_owned(), covariance + 16, 8));
+    mirror
+}
+
+fn mirrors() -> [Mirror; 6] {
+    [
+        gaussian(),
+        mirror!(Instance {
+            camera_x,
+            camera_y,
+            camera_z,
+            clip_x,
+            clip_y,
+            camera_position,
+            time,
+            tan_fov,
+            focal,
+            size,
+            tiles,
+            first_slot,
+            count,
+            degree,
+            degree_t,
+            stride,
+            displaced,
+            near,
+            time_span,
+            filter_mode,
+            segment,
+            part,
+            padding,
+        }),
+        mirror!(Frame {
+            size,
+            tiles,
+            slots,
+            pair_capacity,
+            background_mode,
+            opaque_near,
+            background,
+            projection,
+            world_x,
+            world_y,
+            world_z,
+            environment_size,
+            opaque_origin,
+        }),
+        mirror!(Splat { center, opacity, depth, conic, tiles_low, color, tiles_high }),
+        mirror!(Counters { visible, pairs, pairs_wanted, padding }),
+        mirror!(SortStep { shift, source, stride, padding }),
+    ]
+}
+
+/// The name without what naga_oil appends to imported ones.
+fn plain(name: &str) -> &str {
+    name.split("X_naga_oil").next().unwrap_or(name)
+}
+
+/// All passes, composed.
+fn modules() -> BTreeMap<&'static str, Module> {
+    pass_names().map(|name| (name, compose(name).expect("the pass composes"))).collect()
+}
+
+/// A structure that the host fills or reads, as a pass lays it out.
+struct Shared {
+    name: String,
+    size: usize,
+    members: Vec<Member>,
+    /// Distance from one to the next, where they come in an array.
+    stride: Option<usize>,
+}
+
+/// The structures behind the bindings of a pass.
+fn shared(module: &Module) -> Vec<Shared> {
+    let member = |member: &StructMember| {
+        let size = module.types[member.ty].inner.size(module.to_ctx()) as usize;
+        (member.name.clone().unwrap_or_default(), member.offset as usize, size)
+    };
+    let structure = |variable: &GlobalVariable| {
+        variable.binding?;
+        let (ty, stride) = match module.types[variable.ty].inner {
+            TypeInner::Array { base, stride, .. } => (base, Some(stride as usize)),
+            _ => (variable.ty, None),
+        };
+        let TypeInner::Struct { members, span } = &module.types[ty].inner else { return None };
+        let name = plain(module.types[ty].name.as_deref().unwrap_or_default()).to_owned();
+        Some(Shared { name, size: *span as usize, members: members.iter().map(member).collect(), stride })
+    };
+    module.global_variables.iter().filter_map(|(_, variable)| structure(variable)).collect()
+}
+
+#[test]
+fn every_structure_has_the_same_members_in_the_same_places() {
+    let mirrors = mirrors();
+    let mut seen = BTreeSet::new();
+    let mut wrong = Vec::new();
+    for (pass, module) in modules() {
+        for Shared { name, size, members, stride } in shared(&module) {
+            let Some(mirror) = mirrors.iter().find(|mirror| mirror.name == name) else {
+                wrong.push(format!("{pass}: the host has no `{name}`"));
+                continue;
+            };
+            seen.insert(mirror.name);
+            if mirror.size != size || stride.is_some_and(|stride| stride != size) {
+                wrong.push(format!("{pass}: `{name}` has {size} bytes, apart {stride:?}, the host's {}", mirror.size));
+            }
+            if mirror.members != members {
+                wrong.push(format!("{pass}: `{name}` is\n  {members:?}, the host's\n  {:?}", mirror.members));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert_eq!(seen.len(), mirrors.len(), "every structure of the host is bound by some pass: {seen:?}");
+}
+
+#[test]
+fn members_of_the_host_leave_no_gap() {
+    for mirror in mirrors() {
+        let bytes: usize = mirror.members.iter().map(|(_, _, size)| size).sum();
+        assert_eq!(bytes, mirror.size, "`{}` is compared whole", mirror.name);
+    }
+}
+
+/// The value of a constant, in double precision, which holds every u32 and f32.
+fn constant(module: &Module, name: &str) -> f64 {
+    let found = module.constants.iter().find(|(_, constant)| constant.name.as_deref() == Some(name));
+    let (_, constant) = found.unwrap_or_else(|| panic!("there is no constant `{name}`"));
+    match module.global_expressions[constant.init] {
+        Expression::Literal(Literal::F32(value)) => value.into(),
+        Expression::Literal(Literal::U32(value)) => value.into(),
+        ref other => panic!("`{name}` is not a plain number: {other:?}"),
+    }
+}
+
+#[test]
+fn constants_of_the_passes_are_those_of_the_host() {
+    let modules = modules();
+    let threads = 256;
+    let expected: [(&str, &str, f64); 21] = [
+        ("activate", "BLOCK", BLOCK.into()),
+        ("activate", "PER_THREAD", (BLOCK / threads).into()),
+        ("project", "TILE_SIZE", TILE_SIZE.into()),
+        ("project", "MARGINAL_CUTOFF", MARGINAL_CUTOFF.into()),
+        ("project", "LOW_PASS", LOW_PASS.into()),
+        ("project", "INVERSE_ALPHA_MIN", ALPHA_MIN.recip().round().into()),
+        ("sort", "BLOCK", BLOCK.into()),
+        ("sort", "KEYS_PER_THREAD", (BLOCK / threads).into()),
+        ("sort", "NO_DIGIT", DIGITS.into()),
+        ("bin", "BLOCK", BLOCK.into()),
+        ("bin", "SPLATS_PER_THREAD", (BLOCK / threads).into()),
+        ("blend", "TILE_SIZE", TILE_SIZE.into()),
+        ("blend", "BATCH", (TILE_SIZE * TILE_SIZE).into()),
+        ("blend", "ALPHA_MIN", ALPHA_MIN.into()),
+        ("blend", "ALPHA_MAX", ALPHA_MAX.into()),
+        ("blend", "TRANSMITTANCE_MIN", TRANSMITTANCE_MIN.into()),
+        ("score", "TILE_SIZE", TILE_SIZE.into()),
+        ("score", "PIXELS", (TILE_SIZE * TILE_SIZE).into()),
+        ("score", "ALPHA_MIN", ALPHA_MIN.into()),
+        ("score", "ALPHA_MAX", ALPHA_MAX.into()),
+        ("score", "TRANSMITTANCE_MIN", TRANSMITTANCE_MIN.into()),
+    ];
+    for (pass, name, value) in expected {
+        let found = constant(&modules[pass], name);
+        assert!(found == value, "{name} of {pass} is {found}, the host's {value}");
+    }
+}
+
+#[test]
+fn constants_of_the_types_are_those_of_the_host() {
+    // The library of types imports nothing: without its one directive it is plain WGSL.
+    let source = include_str!("../shaders/shared/types.wgsl");
+    let lines: Vec<&str> = source.lines().filter(|line| !line.starts_with('#')).collect();
+    let types = parse_str(&lines.join("\n")).expect("the library is WGSL");
+    let expected = [
+        ("FILTER_NONE", layout::FILTER_NONE),
+        ("FILTER_BITS", layout::FILTER_BITS),
+        ("FILTER_INTERVALS", layout::FILTER_INTERVALS),
+        ("INVISIBLE", layout::INVISIBLE),
+        ("BACKGROUND_NONE", layout::BACKGROUND_NONE),
+        ("BACKGROUND_COLOR", layout::BACKGROUND_COLOR),
+        ("BACKGROUND_ENVIRONMENT", layout::BACKGROUND_ENVIRONMENT),
+        ("SORT_SLOTS", layout::SORT_SLOTS),
+        ("SORT_VISIBLE", layout::SORT_VISIBLE),
+        ("SORT_PAIRS", layout::SORT_PAIRS),
+    ];
+    assert_eq!(types.constants.len(), expected.len(), "every constant of the library is compared");
+    for (name, value) in expected {
+        let found = constant(&types, name);
+        assert!(found == f64::from(value), "{name} is {found}, the host's {value}");
+    }
+}

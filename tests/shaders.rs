@@ -1,0 +1,64 @@
+//! Every shader on its own, without a device.
+//!
+//! In: the files of `shaders/`. Out: proof that each is known to the renderer and is valid WGSL that needs no optional capability.
+#![cfg(feature = "gpu")]
+
+use bevy_gs4d::gpu::shaders::{compose, pass_names};
+use naga_oil::compose::{Composer, NagaModuleDescriptor, ShaderDefValue};
+use std::collections::BTreeSet;
+use std::path::Path;
+use wgpu::naga::Module;
+use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
+
+/// What is wrong with a module, if anything. No capability is allowed, so that subgroups would be noticed.
+fn validate(name: &str, module: &Module) -> Result<(), String> {
+    Validator::new(ValidationFlags::all(), Capabilities::empty())
+        .validate(module)
+        .map(|_| ())
+        .map_err(|error| format!("{name}: {error:?}"))
+}
+
+/// Fails once, with everything that is wrong.
+fn report(failures: Vec<String>) {
+    assert!(failures.is_empty(), "{} shaders are wrong:\n{}", failures.len(), failures.join("\n"));
+}
+
+#[test]
+fn every_shader_file_is_a_pass_or_the_composite() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
+    let files = std::fs::read_dir(folder).expect("the folder of shaders").map(|entry| entry.expect("an entry").path());
+    let shaders = files.filter(|path| path.extension().is_some_and(|ending| ending == "wgsl"));
+    let mut names: BTreeSet<String> =
+        shaders.filter_map(|path| Some(path.file_stem()?.to_string_lossy().into_owned())).collect();
+    assert!(names.remove("composite"), "the composite is there");
+    let passes: BTreeSet<String> = pass_names().map(str::to_owned).collect();
+    assert!(!passes.is_empty(), "there are passes");
+    assert_eq!(passes, names, "the passes are the files");
+    assert_eq!(passes.len(), pass_names().count(), "no pass has the name of another");
+}
+
+#[test]
+fn every_pass_composes_and_is_valid() {
+    let check = |name: &str| validate(name, &compose(name).map_err(|error| error.to_string())?);
+    report(pass_names().filter_map(|name| check(name).err()).collect());
+}
+
+#[test]
+fn an_unknown_pass_is_named() {
+    let message = compose("no such pass").expect_err("there is none").to_string();
+    assert!(message.contains("no such pass"), "{message}");
+}
+
+#[test]
+fn the_composite_is_valid_for_linear_and_encoded_targets() {
+    let source = include_str!("../shaders/composite.wgsl");
+    let check = |encoded: bool| {
+        let define = encoded.then(|| ("ENCODED_TARGET".to_owned(), ShaderDefValue::Bool(true)));
+        let shader_defs = define.into_iter().collect();
+        let mut composer = Composer::default();
+        let descriptor = NagaModuleDescriptor { source, file_path: "composite", shader_defs, ..Default::default() };
+        let module = composer.make_naga_module(descriptor).map_err(|error| error.emit_to_string(&composer))?;
+        validate("composite", &module)
+    };
+    report([false, true].into_iter().filter_map(|encoded| check(encoded).err()).collect());
+}
