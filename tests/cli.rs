@@ -135,7 +135,7 @@ fn people_get_text() {
     for expected in ["Gaussians", "time interval", "bounds", "sh_rest", "hold"] {
         assert!(text.contains(expected), "{expected} in {text}");
     }
-    for verb in ["info", "convert", "render", "compare", "synth", "bench"] {
+    for verb in ["info", "convert", "render", "compare", "synth", "bench", "score", "prune", "mask"] {
         assert!(gs4d(&[verb, "--help"]).text().contains("Examples:"), "{verb} explains itself");
     }
 }

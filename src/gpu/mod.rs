@@ -32,7 +32,7 @@ pub use context::GpuContext;
 pub use error::GpuError;
 pub use headless::Headless;
 pub use renderer::Renderer;
-pub use score::Scorer;
+pub use score::{GpuEngine, Scorer};
 pub use shaders::ShaderChecks;
 pub use timing::{PassTime, Timings};
 pub use view::{Instance, OpaqueDepth, ViewRenderer};

@@ -6,9 +6,11 @@
 use super::renderer::{Bind, bind_group, group_layout, pipeline};
 use super::shaders::module;
 use super::{GpuCapture, GpuContext, GpuError, Headless, ShaderChecks, layout};
+use crate::compress::score::{ScoreEngine, ScoreError};
 use crate::frame::Background;
 use crate::gaussian::View;
-use crate::reference::ViewScore;
+use crate::reference::{ViewScore, Want};
+use crate::scene::RuntimeScene;
 
 /// Pipelines and buffers of `score`, on the device of a [`Headless`].
 #[derive(Debug)]
@@ -79,11 +81,12 @@ impl Scorer {
     ) -> Result<ViewScore, GpuError> {
         headless.draw(capture, view, background)?;
         let GpuContext { device, queue, .. } = headless.context();
-        let Some(frame) = headless.finished() else { return Ok(ViewScore::zeros(capture.len())) };
-        if self.buffers.as_ref().is_none_or(|made| (made.slots, made.pairs) != (frame.slots, frame.pairs)) {
-            self.buffers = Some(self.make(device, frame.slots, frame.pairs)?);
-        }
-        let Some(buffers) = &self.buffers else { return Ok(ViewScore::zeros(capture.len())) };
+        let Some(frame) = headless.finished() else { return Err(GpuError::Device("nothing was drawn".into())) };
+        let buffers = match self.buffers.take() {
+            Some(made) if (made.slots, made.pairs) == (frame.slots, frame.pairs) => made,
+            _ => self.make(device, frame.slots, frame.pairs)?,
+        };
+        let buffers = self.buffers.insert(buffers);
         let inputs = [
             frame.frame,
             frame.counters,
@@ -118,6 +121,7 @@ impl Scorer {
         Ok(ViewScore { contribution: column(0), energy: column(1), removal: column(2) })
     }
 
+    /// Makes the buffers of that many slots and pairs.
     fn make(&self, device: &wgpu::Device, slots: u32, pairs: u32) -> Result<Buffers, GpuError> {
         let limit = super::capture::binding_limit(&device.limits());
         let needed = u64::from(pairs) * 16;
@@ -138,5 +142,40 @@ impl Scorer {
         let resources = [&first_pairs, &pair_scores, &scores].map(|b| b.as_entire_binding());
         let outputs = bind_group(device, "gs4d score outputs", &self.outputs, &resources);
         Ok(Buffers { slots, pairs, scores, outputs })
+    }
+}
+
+/// A scene on the GPU, ready to be scored: takes the place of the CPU twin.
+#[derive(Debug)]
+pub struct GpuEngine<'a> {
+    headless: &'a mut Headless,
+    scorer: Scorer,
+    capture: GpuCapture,
+    background: Background,
+}
+
+impl<'a> GpuEngine<'a> {
+    /// Uploads the scene and compiles the pass.
+    ///
+    /// # Errors
+    /// When either does not fit the device.
+    pub fn new(
+        headless: &'a mut Headless,
+        scene: &RuntimeScene,
+        background: Background,
+        checks: ShaderChecks,
+    ) -> Result<Self, GpuError> {
+        let scorer = Scorer::new(headless, checks)?;
+        let capture = headless.upload(scene)?;
+        Ok(Self { headless, scorer, capture, background })
+    }
+}
+
+impl ScoreEngine for GpuEngine<'_> {
+    /// Everything is found out at once; `want` changes nothing.
+    fn score(&mut self, view: &View, _want: Want) -> Result<ViewScore, ScoreError> {
+        self.scorer
+            .score(self.headless, &self.capture, view, self.background)
+            .map_err(|error| ScoreError::Engine(Box::new(error)))
     }
 }

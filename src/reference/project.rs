@@ -4,7 +4,7 @@
 
 use crate::gaussian::{ShDirection, View, projection};
 use crate::scene::RuntimeScene;
-use glam::{UVec4, Vec2, Vec3};
+use glam::{UVec4, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 /// A Gaussian sliced at a time and projected to a view.
@@ -47,16 +47,17 @@ impl Splat {
 
 /// Projects every Gaussian of the scene that its filter, if it has one, leaves active.
 pub fn project(scene: &RuntimeScene, view: &View) -> Vec<Splat> {
+    let clip = view.clip_rows();
     let active =
         scene.filter.as_ref().map(|filter| (filter, filter.segment_of(view.time, scene.trained_with.time_interval)));
     let is_active = |i| active.is_none_or(|(filter, segment)| filter.is_active(segment, i));
-    let one = |i| if is_active(i) { project_one(scene, i, view) } else { Splat::INVISIBLE };
+    let one = |i| if is_active(i) { project_one(scene, i, view, &clip) } else { Splat::INVISIBLE };
     (0..scene.gaussians.len()).into_par_iter().map(one).collect()
 }
 
-fn project_one(scene: &RuntimeScene, index: usize, view: &View) -> Splat {
+fn project_one(scene: &RuntimeScene, index: usize, view: &View, clip: &[Vec4; 2]) -> Splat {
     let gaussian = &scene.gaussians[index];
-    let Some(projected) = projection::project(gaussian, view) else { return Splat::INVISIBLE };
+    let Some(projected) = projection::project_with(gaussian, view, clip) else { return Splat::INVISIBLE };
     let seen = match scene.trained_with.sh_direction {
         ShDirection::Canonical => Vec3::from(gaussian.mean),
         ShDirection::Displaced => projected.mean,

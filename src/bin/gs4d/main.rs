@@ -1,19 +1,25 @@
-//! The `gs4d` command: looks into captures, converts, renders, compares and times them.
+//! The `gs4d` command: looks into captures, converts, renders, compares and times them, and makes them smaller.
 //!
 //! In: the command line. Out: one report on standard output (text, or one JSON document with `--json`); progress, notes and
 //! errors on standard error; exit code 0, 2 for any failure, 130 when interrupted.
 
 mod bench;
 mod compare;
+mod contest;
 mod convert;
+mod engine;
 mod failure;
 mod gpu;
 mod info;
 mod interrupt;
+mod mask;
 mod opening;
+mod prune;
 mod render;
 mod report;
+mod score;
 mod synth;
+mod training;
 mod values;
 mod views;
 
@@ -22,7 +28,7 @@ use failure::Failure;
 use report::Report;
 use std::process::ExitCode;
 
-/// Dynamic captures (native 4D Gaussian Splatting): look into them, convert, render, compare, time.
+/// Dynamic captures (native 4D Gaussian Splatting): look into them, convert, render, compare, time, make smaller.
 #[derive(Parser)]
 #[command(name = "gs4d", version, propagate_version = true, after_help = EXAMPLES)]
 struct Cli {
@@ -49,6 +55,9 @@ enum Verb {
     Compare(compare::Compare),
     Synth(synth::Synth),
     Bench(bench::Bench),
+    Score(score::Score),
+    Prune(prune::Prune),
+    Mask(mask::Mask),
 }
 
 impl Verb {
@@ -60,6 +69,9 @@ impl Verb {
             Self::Compare(verb) => verb.run(),
             Self::Synth(verb) => verb.run(),
             Self::Bench(verb) => verb.run(),
+            Self::Score(verb) => verb.run(),
+            Self::Prune(verb) => verb.run(),
+            Self::Mask(verb) => verb.run(),
         }
     }
 }
