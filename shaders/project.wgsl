@@ -2,6 +2,9 @@
 // In: Gaussians, colour coefficients, an instance. Out: one splat and one depth key for each; the key of an invisible splat is
 // INVISIBLE. Section 3.3 of the 4DGS model, in its order; twin of src/gaussian/projection.rs and src/reference/project.rs.
 #import gs4d::types::{Gaussian, Instance, Splat, FILTER_NONE, INVISIBLE}
+#ifdef PACKED_GEOMETRY
+#import gs4d::packed::{unpack_base, unpack_gaussian, BLOCK_RANGES, PACKED_BLOCK, SHARED_RANGES}
+#endif
 #import gs4d::harmonics::{basis_first, basis_second, basis_third, basis_fourth, time_cosine}
 
 const TILE_SIZE: f32 = 16.0;
@@ -17,8 +20,22 @@ const INVERSE_ALPHA_MIN: f32 = 255.0;
 // The list of `activate`; not read without a filter.
 @group(0) @binding(3) var<storage, read> active_list: array<u32>;
 @group(0) @binding(4) var<storage, read> active_counts: array<u32>;
+#ifdef PACKED_GEOMETRY
+// Two four-vectors for each Gaussian.
+@group(1) @binding(0) var<storage, read> records: array<vec4<u32>>;
+@group(1) @binding(1) var<storage, read> ranges: array<vec4<f32>>;
+#ifdef CODED_COLORS
+// Three words for each Gaussian.
+@group(1) @binding(2) var<storage, read> color_records: array<u32>;
+@group(1) @binding(3) var<storage, read> codebooks: array<u32>;
+@group(1) @binding(4) var<storage, read> codebook_scales: array<vec4<f32>>;
+#else
+@group(1) @binding(2) var<storage, read> harmonics: array<vec4<f32>>;
+#endif
+#else
 @group(1) @binding(0) var<storage, read> gaussians: array<Gaussian>;
 @group(1) @binding(1) var<storage, read> harmonics: array<vec4<f32>>;
+#endif
 
 @compute @workgroup_size(256)
 fn project(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -37,9 +54,20 @@ fn project(@builtin(global_invocation_id) id: vec3<u32>) {
     depth_keys[slot] = project_one(index, slot);
 }
 
+fn load_gaussian(index: u32) -> Gaussian {
+#ifdef PACKED_GEOMETRY
+    let block = SHARED_RANGES + index / PACKED_BLOCK * BLOCK_RANGES;
+    let low = records[2u * index];
+    let high = records[2u * index + 1u];
+    return unpack_gaussian(low, high, ranges[0], ranges[1], ranges[block], ranges[block + 1u]);
+#else
+    return gaussians[index];
+#endif
+}
+
 // Writes the splat of a Gaussian into its slot and returns its depth key.
 fn project_one(index: u32, slot: u32) -> u32 {
-    let g = gaussians[index];
+    let g = load_gaussian(index);
     let dt = instance.time - g.mean_t;
     let z = dt * g.inverse_sigma_t;
     let marginal = exp(-0.5 * z * z);
@@ -114,35 +142,67 @@ fn project_one(index: u32, slot: u32) -> u32 {
     return bitcast<u32>(q.z);
 }
 
+#ifdef CODED_COLORS
+// First word of this Gaussian's entry in each codebook.
+var<private> entries: vec4<u32>;
+#else
+// First four-vector of this Gaussian's coefficients.
+var<private> first_coefficient: u32;
+#endif
+
+// Four values of this Gaussian's coefficients, RGB innermost.
+fn coefficients(at: u32) -> vec4<f32> {
+#ifdef CODED_COLORS
+    var sum = vec4(0.0);
+    for (var stage = 0u; stage < instance.stages; stage++) {
+        sum += unpack4x8snorm(codebooks[entries[stage] + at]) * codebook_scales[stage * instance.stride + at];
+    }
+    return sum;
+#else
+    return harmonics[first_coefficient + at];
+#endif
+}
+
 fn color(index: u32, direction: vec3<f32>, tau: f32) -> vec3<f32> {
-    let at = index * instance.stride;
+#ifdef CODED_COLORS
+    // The first coefficient is not in the codebooks.
+    let start = unpack_base(color_records[3u * index], ranges[2]) * 0.28209479 + 0.5;
+    let a = color_records[3u * index + 1u];
+    let b = color_records[3u * index + 2u];
+    entries = (instance.first_entries + vec4(a & 0xffffu, a >> 16u, b & 0xffffu, b >> 16u)) * instance.stride;
+    if instance.stages == 0u {
+        return max(start, vec3(0.0));
+    }
+#else
+    let start = vec3(0.5);
+    first_coefficient = index * instance.stride;
+#endif
     if instance.degree == 0u {
-        return max(harmonics[at].xyz * 0.28209479 + 0.5, vec3(0.0));
+        return max(start + coefficients(0u).xyz * 0.28209479, vec3(0.0));
     }
     let b0 = basis_first(direction);
     if instance.degree == 1u {
-        return max(four(at, b0) + 0.5, vec3(0.0));
+        return max(start + four(0u, b0), vec3(0.0));
     }
     let b1 = basis_second(direction);
     let b2 = basis_third(direction);
     if instance.degree == 2u {
-        let ninth = harmonics[at + 6u].xyz * b2.x;
-        return max(four(at, b0) + four(at + 3u, b1) + ninth + 0.5, vec3(0.0));
+        return max(start + four(0u, b0) + four(3u, b1) + coefficients(6u).xyz * b2.x, vec3(0.0));
     }
     let b3 = basis_fourth(direction);
-    var sum = four(at, b0) + four(at + 3u, b1) + four(at + 6u, b2) + four(at + 9u, b3);
+    var sum = start + four(0u, b0) + four(3u, b1) + four(6u, b2) + four(9u, b3);
     for (var n = 1u; n <= instance.degree_t; n++) {
-        let block = at + 12u * n;
+        let block = 12u * n;
         let value = four(block, b0) + four(block + 3u, b1) + four(block + 6u, b2) + four(block + 9u, b3);
         sum += time_cosine(f32(n), tau, instance.time_span) * value;
     }
-    return max(sum + 0.5, vec3(0.0));
+    return max(sum, vec3(0.0));
 }
 
-// Sum of four coefficients (three vec4s from `at`) times their basis values.
+// Sum of four coefficients (three four-vectors from `at`) times their basis values.
 fn four(at: u32, basis: vec4<f32>) -> vec3<f32> {
-    let u = harmonics[at];
-    let v = harmonics[at + 1u];
-    let w = harmonics[at + 2u];
+    let u = coefficients(at);
+    let v = coefficients(at + 1u);
+    let w = coefficients(at + 2u);
     return u.xyz * basis.x + vec3(u.w, v.xy) * basis.y + vec3(v.zw, w.x) * basis.z + w.yzw * basis.w;
 }

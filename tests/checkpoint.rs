@@ -31,7 +31,7 @@ fn read(pth: &Pth) -> GaussianScene {
 fn parameters(scene: &GaussianScene) -> &Parameters {
     match &scene.form {
         Form::Trained(parameters) => parameters,
-        Form::Runtime(_) => panic!("a checkpoint holds the trained form"),
+        Form::Runtime(_) | Form::Packed(_) => panic!("a checkpoint holds the trained form"),
     }
 }
 

@@ -6,7 +6,7 @@
 use bevy_gs4d::gaussian::projection::{ALPHA_MAX, ALPHA_MIN, LOW_PASS, TRANSMITTANCE_MIN};
 use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF};
 use bevy_gs4d::gpu::layout::{self, BLOCK, Counters, DIGITS, Frame, Instance, SortStep, Splat, TILE_SIZE};
-use bevy_gs4d::gpu::shaders::{compose, pass_names};
+use bevy_gs4d::gpu::shaders::{Storage, compose, pass_names};
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;
 use wgpu::naga::front::wgsl::parse_str;
@@ -76,7 +76,8 @@ fn mirrors() -> [Mirror; 6] {
             filter_mode,
             segment,
             part,
-            padding,
+            stages,
+            first_entries,
         }),
         mirror!(Frame {
             size,
@@ -106,7 +107,7 @@ fn plain(name: &str) -> &str {
 
 /// All passes, composed.
 fn modules() -> BTreeMap<&'static str, Module> {
-    pass_names().map(|name| (name, compose(name).expect("the pass composes"))).collect()
+    pass_names().map(|name| (name, compose(name, Storage::Full).expect("the pass composes"))).collect()
 }
 
 /// A structure that the host fills or reads, as a pass lays it out.

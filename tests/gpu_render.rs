@@ -172,7 +172,7 @@ fn frames_repeat_to_the_bit() {
 fn a_filter_holds_whatever_was_drawn_before() {
     let Some(mut headless) = gpu::headless() else { return };
     let (all, view) = (scene(3_000), look_from(EYE, SIZE, 0.5));
-    let every_other = (0..3_000).map(|i| if i % 2 == 0 { [0, 0] } else { [1, 0] }).collect();
+    let every_other = (0..3_000).map(|i| if i % 2 == 0 { 0 } else { 1 }).collect();
     let sets = ActiveSets::Intervals(every_other);
     let filter = TemporalFilter { kind: FilterKind::Support, segments: 1, count: 3_000, sets };
     let mut thinned = all.clone();

@@ -105,6 +105,7 @@ fn gaussian(bits: &mut Bits) -> Gaussian {
 fn bits(scene: &GaussianScene) -> Vec<Vec<u32>> {
     let mut all = match &scene.form {
         Form::Runtime(gaussians) => vec![cast_slice(gaussians).to_vec()],
+        Form::Packed(_) => panic!("packed scenes are tested with compression"),
         Form::Trained(p) => vec![
             cast_slice(&p.mean).to_vec(),
             cast_slice(&p.mean_t).to_vec(),

@@ -3,7 +3,7 @@
 //! In: the files of `shaders/`. Out: proof that each is known to the renderer and is valid WGSL that needs no optional capability.
 #![cfg(feature = "gpu")]
 
-use bevy_gs4d::gpu::shaders::{compose, pass_names};
+use bevy_gs4d::gpu::shaders::{Storage, compose, pass_names};
 use naga_oil::compose::{Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -39,13 +39,14 @@ fn every_shader_file_is_a_pass_or_the_composite() {
 
 #[test]
 fn every_pass_composes_and_is_valid() {
-    let check = |name: &str| validate(name, &compose(name).map_err(|error| error.to_string())?);
-    report(pass_names().filter_map(|name| check(name).err()).collect());
+    let check = |name: &str, storage| validate(name, &compose(name, storage).map_err(|error| error.to_string())?);
+    let all = pass_names().flat_map(|name| Storage::ALL.map(|storage| (name, storage)));
+    report(all.filter_map(|(name, storage)| check(name, storage).err()).collect());
 }
 
 #[test]
 fn an_unknown_pass_is_named() {
-    let message = compose("no such pass").expect_err("there is none").to_string();
+    let message = compose("no such pass", Storage::Full).expect_err("there is none").to_string();
     assert!(message.contains("no such pass"), "{message}");
 }
 

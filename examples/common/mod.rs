@@ -23,7 +23,7 @@ pub struct Orbit {
 impl Orbit {
     /// Shows the whole of a capture that stands upright at the origin.
     pub fn around(capture: &GaussianCapture) -> Self {
-        let core = Bounds::core(&capture.scene().gaussians);
+        let core = Bounds::core(capture.scene().iter());
         let (center, radius) = core.map_or((Vec3::ZERO, 1.0), |core| (core.center(), core.radius().max(0.1)));
         Self { center: capture.upright() * center, distance: 2.2 * radius, yaw: 0.6, pitch: 0.3 }
     }

@@ -46,7 +46,10 @@ struct Instance {
     segment: u32,
     // Place of this part among all of the view.
     part: u32,
-    padding: u32,
+    // Codebooks of colour; 0 where the coefficients are whole.
+    stages: u32,
+    // First entry of each codebook.
+    first_entries: vec4<u32>,
 }
 
 const FILTER_NONE: u32 = 0u;

@@ -19,7 +19,7 @@ pub struct GaussianCapture {
 impl GaussianCapture {
     /// A capture from a scene made in memory: `assets.add(GaussianCapture::new(scene))`.
     pub fn new(scene: RuntimeScene) -> Self {
-        let bounds = Bounds::of(&scene.gaussians, scene.trained_with.time_interval);
+        let bounds = Bounds::of(scene.iter(), scene.trained_with.time_interval);
         Self { scene: Arc::new(scene), bounds }
     }
 
@@ -71,6 +71,7 @@ mod tests {
     fn capture(time_interval: [f32; 2], duration_seconds: f32) -> GaussianCapture {
         GaussianCapture::new(RuntimeScene {
             gaussians: Vec::new(),
+            packed: None,
             harmonics: Harmonics::default(),
             environment: None,
             filter: None,

@@ -8,10 +8,15 @@
 //! 2. [`score`] sums what every Gaussian does to them; [`variant`] names the scores that come of it.
 //! 3. [`prune`] keeps the Gaussians that score highest; [`loss`] tells what that costs, and how many a given loss takes.
 //! 4. [`masks`] makes the temporal filter.
+//! 5. [`pack`] compresses: [`order`], [`quantize`], [`codebook`].
 
+pub mod codebook;
 pub mod loss;
 pub mod masks;
+pub mod order;
+pub mod pack;
 pub mod prune;
+pub mod quantize;
 pub mod score;
 pub mod variant;
 pub mod views;
@@ -31,5 +36,6 @@ pub fn sliced(scene: &GaussianScene) -> Result<Cow<'_, [Gaussian]>, InvalidGauss
             Ok(Cow::Owned(parameters.slice(&SliceSettings { prefilter_var, ..SliceSettings::default() })?))
         }
         Form::Runtime(gaussians) => Ok(Cow::Borrowed(gaussians)),
+        Form::Packed(packed) => Ok(Cow::Owned((0..packed.len()).map(|index| packed.gaussian(index)).collect())),
     }
 }

@@ -21,9 +21,11 @@ pub fn highest(scores: &[f32], count: usize) -> Vec<u32> {
     order
 }
 
-/// The scene with only the Gaussians at these indices, in this order. The indices must be below the scene's length.
+/// The scene with only the Gaussians at these indices, in this order; a packed one comes back in the runtime form. The indices must
+/// be below the scene's length.
 pub fn select(scene: &GaussianScene, keep: &[u32]) -> GaussianScene {
     let form = match &scene.form {
+        Form::Packed(_) => return select(&scene.clone().unpacked(), keep),
         Form::Trained(parameters) => Form::Trained(select_parameters(parameters, keep)),
         Form::Runtime(gaussians) => Form::Runtime(rows(gaussians, keep)),
     };
@@ -49,7 +51,7 @@ fn select_parameters(parameters: &Parameters, keep: &[u32]) -> Parameters {
     }
 }
 
-fn select_harmonics(harmonics: &Harmonics, keep: &[u32]) -> Harmonics {
+pub(super) fn select_harmonics(harmonics: &Harmonics, keep: &[u32]) -> Harmonics {
     let mut values = Vec::with_capacity(keep.len() * harmonics.coefficients * 3);
     for &index in keep {
         values.extend_from_slice(harmonics.of(index as usize));

@@ -104,7 +104,7 @@ impl Traits {
             .collect();
         let log_volume = match &scene.form {
             Form::Trained(parameters) => Some(log_volumes(parameters)),
-            Form::Runtime(_) => None,
+            Form::Runtime(_) | Form::Packed(_) => None,
         };
         Ok(Self { moments, log_volume })
     }

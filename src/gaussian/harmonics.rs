@@ -36,8 +36,7 @@ const PI: f64 = 3.14159265;
 impl Harmonics {
     /// Coefficients per Gaussian and channel that are evaluated: 1, 4, 9, 16, 32 or 48.
     pub fn evaluated(&self) -> usize {
-        let spatial = (self.degree as usize + 1).pow(2);
-        if self.degree == 3 { spatial * (1 + self.degree_t as usize) } else { spatial }
+        evaluated(self.degree, self.degree_t)
     }
 
     /// The K × 3 values of one Gaussian.
@@ -82,12 +81,22 @@ impl Harmonics {
         let mut color = block(0, (self.degree as usize + 1).pow(2));
         if self.degree == 3 {
             for n in 1..=self.degree_t as usize {
-                let cosine = (2.0 * PI * n as f64 * f64::from(tau) / f64::from(time_span)).cos() as f32;
-                color += cosine * block(16 * n, 16);
+                color += time_cosine(n, tau, time_span) * block(16 * n, 16);
             }
         }
         (color + 0.5).max(Vec3::ZERO)
     }
+}
+
+/// Coefficients per Gaussian and channel of these degrees.
+pub fn evaluated(degree: u32, degree_t: u32) -> usize {
+    let spatial = (degree as usize + 1).pow(2);
+    if degree == 3 { spatial * (1 + degree_t as usize) } else { spatial }
+}
+
+/// Factor of harmonic `n` in time: `cos(2π n tau / T)`.
+pub fn time_cosine(n: usize, tau: f32, time_span: f32) -> f32 {
+    (2.0 * PI * n as f64 * f64::from(tau) / f64::from(time_span)).cos() as f32
 }
 
 /// The 16 real spherical harmonics up to degree 3 in the direction given, in coefficient order, with the signs of 3DGS.

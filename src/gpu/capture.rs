@@ -4,9 +4,10 @@
 //! binding grows over what the device allows; a part is drawn by one dispatch of `project`.
 
 use super::renderer::bind_group as bind_group_of;
-use super::{GpuError, Renderer, layout};
-use crate::gaussian::{Gaussian, ShDirection};
-use crate::scene::{ActiveSets, RuntimeScene, TemporalFilter, segment_of};
+use super::{GpuError, Renderer, Storage, buffers, layout};
+use crate::gaussian::{ShDirection, harmonics::evaluated};
+use crate::scene::packed::MAX_STAGES;
+use crate::scene::{ActiveSets, CodedColors, RuntimeScene, segment_of};
 use layout::BLOCK;
 use std::sync::atomic::{AtomicU64, Ordering};
 use wgpu::util::DeviceExt;
@@ -16,6 +17,8 @@ use wgpu::util::DeviceExt;
 pub struct GpuCapture {
     pub(super) parts: Vec<Part>,
     pub(super) environment: Option<EnvironmentBuffer>,
+    /// How its Gaussians and colours are stored.
+    pub(super) storage: Storage,
     /// Tells captures apart, as long as the program runs.
     pub(super) id: u64,
     filter: Option<Filter>,
@@ -58,11 +61,14 @@ impl GpuCapture {
         renderer: &Renderer,
         scene: &RuntimeScene,
     ) -> Result<Self, GpuError> {
-        let harmonics = &scene.harmonics;
-        let evaluated = harmonics.evaluated();
-        let stride = (evaluated * 3).div_ceil(4);
+        let storage = buffers::storage_of(scene);
+        let (degree, degree_t) = match scene.coded_colors() {
+            Some(colors) => (colors.degree, colors.degree_t),
+            None => (scene.harmonics.degree, scene.harmonics.degree_t),
+        };
+        let stride = (evaluated(degree, degree_t) * 3).div_ceil(4);
         let limits = device.limits();
-        let record = size_of::<Gaussian>().max(stride * 16) as u64;
+        let record = buffers::largest_record(storage, stride);
         let threads = u64::from(limits.max_compute_workgroups_per_dimension) * 256;
         // A multiple of what one block of `activate` takes.
         let per_part = ((binding_limit(&limits) / record).min(threads) as usize / BLOCK as usize) * BLOCK as usize;
@@ -71,13 +77,14 @@ impl GpuCapture {
             return Err(GpuError::TooLarge { what: "the Gaussians", needed, limit });
         }
         let mut parts = Vec::new();
-        for first in (0..scene.gaussians.len()).step_by(per_part) {
-            let count = per_part.min(scene.gaussians.len() - first);
-            let gaussians = gaussian_buffer(device, &scene.gaussians[first..first + count]);
-            let colors = harmonics_buffer(device, scene, first, count, stride);
-            let bind_group = renderer.capture_bind_group(device, &gaussians, &colors);
+        let codebooks = scene.coded_colors().map(|colors| buffers::codebooks(device, colors));
+        for first in (0..scene.len()).step_by(per_part) {
+            let count = per_part.min(scene.len() - first);
+            let own = buffers::part(device, scene, first..first + count, stride);
+            let all: Vec<_> = own.iter().chain(codebooks.iter().flatten()).collect();
+            let bind_group = renderer.capture_bind_group(device, storage, &all);
             let filter = scene.filter.as_ref().map(|filter| {
-                let sets = filter_buffer(device, filter, first, count);
+                let sets = buffers::filter(device, filter, first..first + count);
                 bind_group_of(device, "gs4d filter", &renderer.layouts.filter, &[sets.as_entire_binding()])
             });
             parts.push(Part { count: count as u32, bind_group, filter });
@@ -97,9 +104,11 @@ impl GpuCapture {
             return Err(GpuError::TooLarge { what: "the environment map", needed, limit });
         }
         let settings = layout::Instance {
-            degree: harmonics.degree,
-            degree_t: if harmonics.degree == 3 { harmonics.degree_t } else { 0 },
+            degree,
+            degree_t: if degree == 3 { degree_t } else { 0 },
             stride: stride as u32,
+            stages: scene.coded_colors().map_or(0, |colors| colors.entries.len() as u32),
+            first_entries: scene.coded_colors().map(first_entries).unwrap_or_default(),
             displaced: u32::from(scene.trained_with.sh_direction == ShDirection::Displaced),
             time_span: scene.trained_with.time_span(),
             ..bytemuck::Zeroable::zeroed()
@@ -113,7 +122,7 @@ impl GpuCapture {
             interval: scene.trained_with.time_interval,
         });
         let id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
-        Ok(Self { parts, environment, id, filter, settings, len: scene.gaussians.len() })
+        Ok(Self { parts, environment, storage, id, filter, settings, len: scene.len() })
     }
 
     /// Number of Gaussians.
@@ -162,6 +171,8 @@ impl GpuCapture {
             degree_t: self.settings.degree_t,
             stride: self.settings.stride,
             displaced: self.settings.displaced,
+            stages: self.settings.stages,
+            first_entries: self.settings.first_entries,
             time_span: self.settings.time_span,
             ..*view
         }
@@ -170,76 +181,12 @@ impl GpuCapture {
 
 static NEXT_ID: AtomicU64 = AtomicU64::new(0);
 
-/// The sets of Gaussians `first..first + count`: the words of each segment in turn, or one word of interval for each.
-fn filter_buffer(device: &wgpu::Device, filter: &TemporalFilter, first: usize, count: usize) -> wgpu::Buffer {
-    let words = match &filter.sets {
-        ActiveSets::Bits(bits) => {
-            // Parts begin at multiples of 32.
-            let all = TemporalFilter::words(filter.count);
-            let own = first / 32..(first + count).div_ceil(32);
-            bits.chunks_exact(all).flat_map(|segment| &segment[own.clone()]).copied().collect()
-        }
-        ActiveSets::Intervals(intervals) => {
-            let own = &intervals[first..first + count];
-            own.iter().map(|[first, last]| u32::from(*first) | u32::from(*last) << 16).collect::<Vec<u32>>()
-        }
-    };
-    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some("gs4d filter"),
-        contents: bytemuck::cast_slice(&words),
-        usage: wgpu::BufferUsages::STORAGE,
-    })
+/// Where each codebook begins among all entries.
+fn first_entries(colors: &CodedColors) -> [u32; MAX_STAGES] {
+    std::array::from_fn(|stage| colors.entries.iter().take(stage).sum())
 }
 
 /// Largest storage buffer that can be made and bound whole.
 pub(super) fn binding_limit(limits: &wgpu::Limits) -> u64 {
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
-}
-
-/// The records as they are, but for `1/σ_t` in the place of `σ_t`: zero, not infinity, for what is always there.
-fn gaussian_buffer(device: &wgpu::Device, gaussians: &[Gaussian]) -> wgpu::Buffer {
-    mapped_buffer(device, "gs4d gaussians", gaussians.len(), size_of::<Gaussian>(), |index, record| {
-        let gaussian = gaussians[index];
-        record.copy_from_slice(bytemuck::bytes_of(&Gaussian { sigma_t: gaussian.sigma_t.recip(), ..gaussian }));
-    })
-}
-
-/// The coefficients that are evaluated, padded to whole four-vectors per Gaussian.
-fn harmonics_buffer(
-    device: &wgpu::Device,
-    scene: &RuntimeScene,
-    first: usize,
-    count: usize,
-    stride: usize,
-) -> wgpu::Buffer {
-    let used = scene.harmonics.evaluated() * 3;
-    mapped_buffer(device, "gs4d harmonics", count, stride * 16, |index, record| {
-        record[..used * 4].copy_from_slice(bytemuck::cast_slice(&scene.harmonics.of(first + index)[..used]));
-    })
-}
-
-/// A storage buffer of records, written straight into mapped memory: no second copy on the host.
-fn mapped_buffer(
-    device: &wgpu::Device,
-    label: &'static str,
-    count: usize,
-    record_size: usize,
-    fill: impl Fn(usize, &mut [u8]),
-) -> wgpu::Buffer {
-    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(label),
-        size: (count * record_size) as u64,
-        usage: wgpu::BufferUsages::STORAGE,
-        mapped_at_creation: true,
-    });
-    let mut record = vec![0; record_size];
-    {
-        let mut mapped = buffer.slice(..).get_mapped_range_mut();
-        for index in 0..count {
-            fill(index, &mut record);
-            mapped.slice(index * record_size..(index + 1) * record_size).copy_from_slice(&record);
-        }
-    }
-    buffer.unmap();
-    buffer
 }

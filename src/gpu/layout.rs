@@ -65,8 +65,10 @@ pub struct Instance {
     pub segment: u32,
     /// Place of this part among all of the view.
     pub part: u32,
-    /// Unused.
-    pub padding: u32,
+    /// Codebooks of colour; 0 where the coefficients are whole.
+    pub stages: u32,
+    /// First entry of each codebook.
+    pub first_entries: [u32; 4],
 }
 
 impl Instance {

@@ -16,6 +16,7 @@
 //! Sorting by depth first and by tile after, both stably, gives the original's order by (tile, depth, index) with far less to
 //! move than its 64-bit keys. No pass needs subgroups, and the results do not depend on their size.
 
+mod buffers;
 mod capture;
 mod context;
 mod error;
@@ -33,6 +34,6 @@ pub use error::GpuError;
 pub use headless::Headless;
 pub use renderer::Renderer;
 pub use score::{GpuEngine, Scorer};
-pub use shaders::ShaderChecks;
+pub use shaders::{ShaderChecks, Storage};
 pub use timing::{PassTime, Timings};
 pub use view::{Instance, OpaqueDepth, ViewRenderer};

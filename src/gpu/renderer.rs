@@ -2,7 +2,7 @@
 //!
 //! In: a device. Out: compiled passes and the bind group layouts that they share with the buffers of views and captures.
 
-use super::shaders::{ShaderChecks, module};
+use super::shaders::{ShaderChecks, Storage, module};
 use super::{GpuError, layout};
 use std::num::NonZeroU64;
 
@@ -13,7 +13,8 @@ pub struct Renderer {
     pub(super) activate_count: wgpu::ComputePipeline,
     pub(super) activate_scan: wgpu::ComputePipeline,
     pub(super) activate_write: wgpu::ComputePipeline,
-    pub(super) project: wgpu::ComputePipeline,
+    /// By how a capture is stored, in the order of [`Storage::ALL`].
+    project: [wgpu::ComputePipeline; 3],
     pub(super) sort_count: wgpu::ComputePipeline,
     pub(super) sort_scan: wgpu::ComputePipeline,
     pub(super) sort_visible: wgpu::ComputePipeline,
@@ -32,7 +33,8 @@ pub(super) struct Layouts {
     pub activate: wgpu::BindGroupLayout,
     pub filter: wgpu::BindGroupLayout,
     pub project: wgpu::BindGroupLayout,
-    pub capture: wgpu::BindGroupLayout,
+    /// By how a capture is stored, in the order of [`Storage::ALL`].
+    pub captures: [wgpu::BindGroupLayout; 3],
     pub sort: wgpu::BindGroupLayout,
     pub arguments: wgpu::BindGroupLayout,
     pub bin: wgpu::BindGroupLayout,
@@ -63,9 +65,9 @@ impl Renderer {
     pub fn new(device: &wgpu::Device, checks: ShaderChecks) -> Result<Self, GpuError> {
         check_limits(&device.limits())?;
         let layouts = Layouts::new(device);
-        let shader = |name| module(device, name, checks);
+        let shader = |name| module(device, name, Storage::Full, checks);
         let activate = shader("activate")?;
-        let (project, sort, bin) = (shader("project")?, shader("sort")?, shader("bin")?);
+        let (sort, bin) = (shader("sort")?, shader("bin")?);
         let (ranges, blend) = (shader("ranges")?, shader("blend")?);
         let pipeline = |module: &wgpu::ShaderModule, entry: &str, groups: &[&wgpu::BindGroupLayout]| {
             pipeline(device, module, entry, groups)
@@ -74,7 +76,14 @@ impl Renderer {
             activate_count: pipeline(&activate, "count", &[&layouts.activate, &layouts.filter]),
             activate_scan: pipeline(&activate, "scan", &[&layouts.activate, &layouts.filter, &layouts.arguments]),
             activate_write: pipeline(&activate, "write", &[&layouts.activate, &layouts.filter]),
-            project: pipeline(&project, "project", &[&layouts.project, &layouts.capture]),
+            project: {
+                let mut all = Vec::new();
+                for (storage, capture) in Storage::ALL.into_iter().zip(&layouts.captures) {
+                    let shader = module(device, "project", storage, checks)?;
+                    all.push(pipeline(&shader, "project", &[&layouts.project, capture]));
+                }
+                all.try_into().map_err(|_| GpuError::Device("a pipeline is missing".into()))?
+            },
             sort_count: pipeline(&sort, "count", &[&layouts.sort]),
             sort_scan: pipeline(&sort, "scan", &[&layouts.sort]),
             sort_visible: pipeline(&sort, "visible", &[&layouts.sort, &layouts.arguments]),
@@ -89,19 +98,20 @@ impl Renderer {
         })
     }
 
-    /// The bind group of one part of a capture.
+    /// `project` for captures stored this way.
+    pub(super) fn project(&self, storage: Storage) -> &wgpu::ComputePipeline {
+        &self.project[storage as usize]
+    }
+
+    /// The bind group of one part of a capture, its buffers in the order of the shader's bindings.
     pub(super) fn capture_bind_group(
         &self,
         device: &wgpu::Device,
-        gaussians: &wgpu::Buffer,
-        harmonics: &wgpu::Buffer,
+        storage: Storage,
+        buffers: &[&wgpu::Buffer],
     ) -> wgpu::BindGroup {
-        bind_group(
-            device,
-            "gs4d capture",
-            &self.layouts.capture,
-            &[gaussians.as_entire_binding(), harmonics.as_entire_binding()],
-        )
+        let resources: Vec<_> = buffers.iter().map(|buffer| buffer.as_entire_binding()).collect();
+        bind_group(device, "gs4d capture", &self.layouts.captures[storage as usize], &resources)
     }
 }
 
@@ -115,7 +125,7 @@ impl Layouts {
             activate: new("gs4d activate", &[INSTANCE, Write, Write, Write, Write]),
             filter: new("gs4d filter", &[Read]),
             project: new("gs4d project", &[INSTANCE, Write, Write, Read, Read]),
-            capture: new("gs4d capture", &[Read, Read]),
+            captures: [2, 3, 5].map(|count| new("gs4d capture", &vec![Read; count])),
             sort: new(
                 "gs4d sort",
                 &[UniformAt(size_of::<layout::SortStep>()), Uniform(FRAME), Write, Read, Read, Write, Write, Write],
@@ -224,7 +234,7 @@ fn check_limits(limits: &wgpu::Limits) -> Result<(), GpuError> {
     let needs = [
         ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, 256),
         ("max_compute_workgroup_size_x", limits.max_compute_workgroup_size_x, 256),
-        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 7),
+        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 9),
         // Three arrays of `blend`.
         ("max_compute_workgroup_storage_size", limits.max_compute_workgroup_storage_size, 16 * 256 * 3 + 16),
     ];

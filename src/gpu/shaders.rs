@@ -3,13 +3,14 @@
 //! In: the name of a pass. Out: a naga module, or a wgpu shader module. The files are part of the binary.
 
 use super::GpuError;
-use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor};
+use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::borrow::Cow;
 
 /// Libraries, each before those that import it.
-const LIBRARIES: [(&str, &str); 4] = [
+const LIBRARIES: [(&str, &str); 5] = [
     ("types", include_str!("../../shaders/shared/types.wgsl")),
     ("harmonics", include_str!("../../shaders/shared/harmonics.wgsl")),
+    ("packed", include_str!("../../shaders/shared/packed.wgsl")),
     ("scan", include_str!("../../shaders/shared/scan.wgsl")),
     ("environment", include_str!("../../shaders/shared/environment.wgsl")),
 ];
@@ -40,11 +41,37 @@ pub fn pass_names() -> impl Iterator<Item = &'static str> {
     PASSES.iter().map(|(name, _)| *name)
 }
 
-/// The naga module of a pass, imports resolved, validated.
+/// How a capture's Gaussians and colours are stored, and so how `project` reads them.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum Storage {
+    /// Single precision.
+    #[default]
+    Full,
+    /// Packed records, whole colours.
+    Packed,
+    /// Packed records, colours by codebook.
+    Coded,
+}
+
+impl Storage {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Full, Self::Packed, Self::Coded];
+
+    /// What the shader is told.
+    fn definitions(self) -> &'static [&'static str] {
+        match self {
+            Self::Full => &[],
+            Self::Packed => &["PACKED_GEOMETRY"],
+            Self::Coded => &["PACKED_GEOMETRY", "CODED_COLORS"],
+        }
+    }
+}
+
+/// The naga module of a pass, imports resolved, validated. Only `project` depends on the storage.
 ///
 /// # Errors
 /// When there is no such pass or it does not compile.
-pub fn compose(name: &str) -> Result<wgpu::naga::Module, GpuError> {
+pub fn compose(name: &str, storage: Storage) -> Result<wgpu::naga::Module, GpuError> {
     let Some(&(name, source)) = PASSES.iter().find(|(pass, _)| *pass == name) else {
         return Err(GpuError::Shader { name: "unknown", reason: format!("there is no pass `{name}`") });
     };
@@ -55,7 +82,9 @@ pub fn compose(name: &str) -> Result<wgpu::naga::Module, GpuError> {
             return Err(GpuError::Shader { name: library, reason: error.emit_to_string(&composer) });
         }
     }
-    let descriptor = NagaModuleDescriptor { source, file_path: name, ..Default::default() };
+    let shader_defs =
+        storage.definitions().iter().map(|name| ((*name).to_owned(), ShaderDefValue::Bool(true))).collect();
+    let descriptor = NagaModuleDescriptor { source, file_path: name, shader_defs, ..Default::default() };
     composer
         .make_naga_module(descriptor)
         .map_err(|error| GpuError::Shader { name, reason: error.emit_to_string(&composer) })
@@ -65,11 +94,12 @@ pub fn compose(name: &str) -> Result<wgpu::naga::Module, GpuError> {
 pub(super) fn module(
     device: &wgpu::Device,
     name: &'static str,
+    storage: Storage,
     checks: ShaderChecks,
 ) -> Result<wgpu::ShaderModule, GpuError> {
     let descriptor = wgpu::ShaderModuleDescriptor {
         label: Some(name),
-        source: wgpu::ShaderSource::Naga(Cow::Owned(compose(name)?)),
+        source: wgpu::ShaderSource::Naga(Cow::Owned(compose(name, storage)?)),
     };
     Ok(match checks {
         ShaderChecks::On => device.create_shader_module(descriptor),

@@ -335,8 +335,9 @@ impl ViewRenderer {
             mark(&mut pass);
 
             // project
-            pass.set_pipeline(&renderer.project);
-            for (index, part) in parts() {
+            let stored = instances.iter().flat_map(|i| i.capture.parts.iter().map(|_| i.capture.storage));
+            for ((index, part), storage) in parts().zip(stored) {
+                pass.set_pipeline(renderer.project(storage));
                 pass.set_bind_group(0, &made.project, &[index as u32 * self.alignment]);
                 pass.set_bind_group(1, &part.bind_group, &[]);
                 match self.wanted[index] {

@@ -52,11 +52,11 @@ pub fn project(scene: &RuntimeScene, view: &View) -> Vec<Splat> {
         scene.filter.as_ref().map(|filter| (filter, filter.segment_of(view.time, scene.trained_with.time_interval)));
     let is_active = |i| active.is_none_or(|(filter, segment)| filter.is_active(segment, i));
     let one = |i| if is_active(i) { project_one(scene, i, view, &clip) } else { Splat::INVISIBLE };
-    (0..scene.gaussians.len()).into_par_iter().map(one).collect()
+    (0..scene.len()).into_par_iter().map(one).collect()
 }
 
 fn project_one(scene: &RuntimeScene, index: usize, view: &View, clip: &[Vec4; 2]) -> Splat {
-    let gaussian = &scene.gaussians[index];
+    let gaussian = &scene.gaussian(index);
     let Some(projected) = projection::project_with(gaussian, view, clip) else { return Splat::INVISIBLE };
     let seen = match scene.trained_with.sh_direction {
         ShDirection::Canonical => Vec3::from(gaussian.mean),
@@ -68,7 +68,7 @@ fn project_one(scene: &RuntimeScene, index: usize, view: &View, clip: &[Vec4; 2]
         center: projected.center,
         conic: projected.conic,
         opacity: projected.opacity,
-        color: scene.harmonics.color(index, direction, tau, scene.trained_with.time_span()),
+        color: scene.color(index, direction, tau),
         depth: projected.depth,
         tiles: projected.contributing_tiles(),
     }

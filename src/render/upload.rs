@@ -27,7 +27,7 @@ impl RenderAsset for GpuGaussianCapture {
 
     fn byte_len(source: &GaussianCapture) -> Option<usize> {
         let scene = source.scene();
-        Some(size_of_val(scene.gaussians.as_slice()) + size_of_val(scene.harmonics.values.as_slice()))
+        Some(scene.size())
     }
 
     fn prepare_asset(

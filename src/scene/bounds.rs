@@ -17,7 +17,7 @@ pub struct Bounds {
 impl Bounds {
     /// The box that holds three standard deviations of every Gaussian wherever it is drawn within `interval`; nothing for an
     /// empty scene.
-    pub fn of(gaussians: &[Gaussian], interval: [f32; 2]) -> Option<Self> {
+    pub fn of(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2]) -> Option<Self> {
         // The marginal falls to its cut-off of 0.05 at sqrt(−2 ln 0.05) = 2.4477 σ_t.
         const LIFESPAN: f32 = 2.4478;
         let mut bounds: Option<Self> = None;
@@ -40,13 +40,14 @@ impl Bounds {
 
     /// The box about the middle nine tenths of the means, each at its own temporal mean, along each axis: where to look, without
     /// stray Gaussians.
-    pub fn core(gaussians: &[Gaussian]) -> Option<Self> {
-        if gaussians.is_empty() {
+    pub fn core(gaussians: impl Iterator<Item = Gaussian>) -> Option<Self> {
+        let means: Vec<[f32; 3]> = gaussians.map(|gaussian| gaussian.mean).collect();
+        if means.is_empty() {
             return None;
         }
         let (mut min, mut max) = (Vec3::ZERO, Vec3::ZERO);
         for axis in 0..3 {
-            let mut values: Vec<f32> = gaussians.iter().map(|g| g.mean[axis]).collect();
+            let mut values: Vec<f32> = means.iter().map(|mean| mean[axis]).collect();
             values.sort_unstable_by(f32::total_cmp);
             min[axis] = values[values.len() / 20];
             max[axis] = values[values.len() - 1 - values.len() / 20];

@@ -38,8 +38,8 @@ pub struct TemporalFilter {
 pub enum ActiveSets {
     /// Segment by segment, `words_per_segment` words each, Gaussian `i` at bit `i % 32` of word `i / 32`.
     Bits(Vec<u32>),
-    /// The first and last segment of each Gaussian; first after last where it is never active.
-    Intervals(Vec<[u16; 2]>),
+    /// The first (low half) and last segment of each Gaussian; first after last where it is never active.
+    Intervals(Vec<u32>),
 }
 
 /// Most segments a filter can have.
@@ -64,7 +64,7 @@ impl TemporalFilter {
     pub fn support(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2], segments: u32) -> Self {
         let reach = f64::from(-2.0 * MARGINAL_CUTOFF.ln()).sqrt() * 1.0001;
         let span = f64::from(interval[1]) - f64::from(interval[0]);
-        let intervals: Vec<[u16; 2]> = gaussians
+        let intervals: Vec<u32> = gaussians
             .map(|gaussian| {
                 let half = reach * f64::from(gaussian.sigma_t) + span * 1e-6;
                 let unit = |time: f64| (time - f64::from(interval[0])) / span * f64::from(segments);
@@ -72,7 +72,7 @@ impl TemporalFilter {
                 let (first, last) = (unit(mean - half).floor(), unit(mean + half).floor());
                 // Times outside the interval belong to its end segments.
                 let end = f64::from(segments - 1);
-                [first.clamp(0.0, end) as u16, last.clamp(0.0, end) as u16]
+                interval_word(first.clamp(0.0, end) as u32, last.clamp(0.0, end) as u32)
             })
             .collect();
         let count = intervals.len();
@@ -101,8 +101,8 @@ impl TemporalFilter {
                 bits[segment as usize * Self::words(self.count) + index / 32] >> (index % 32) & 1 == 1
             }
             ActiveSets::Intervals(intervals) => {
-                let [first, last] = intervals[index];
-                (u32::from(first)..=u32::from(last)).contains(&segment)
+                let word = intervals[index];
+                (word & 0xffff..=word >> 16).contains(&segment)
             }
         }
     }
@@ -150,23 +150,27 @@ impl TemporalFilter {
     }
 
     /// The sets as intervals, if no Gaussian pauses.
-    fn intervals(&self) -> Option<Vec<[u16; 2]>> {
+    fn intervals(&self) -> Option<Vec<u32>> {
         (0..self.count)
             .map(|index| {
-                let mut interval = [1, 0];
+                let [mut first, mut last] = [1, 0];
                 for segment in (0..self.segments).filter(|&s| self.is_active(s, index)) {
-                    if interval[0] > interval[1] {
-                        interval = [segment as u16; 2];
-                    } else if segment as u16 == interval[1] + 1 {
-                        interval[1] = segment as u16;
+                    if first > last {
+                        [first, last] = [segment; 2];
+                    } else if segment == last + 1 {
+                        last = segment;
                     } else {
                         return None;
                     }
                 }
-                Some(interval)
+                Some(interval_word(first, last))
             })
             .collect()
     }
+}
+
+fn interval_word(first: u32, last: u32) -> u32 {
+    first | last << 16
 }
 
 /// The segment of a time: `min(floor(t' (K − 1)), K − 2)` with `t'` the place in the interval, clamped to it, and `K − 1` segments.

@@ -6,22 +6,25 @@
 mod bounds;
 mod environment;
 mod filter;
+pub mod packed;
 mod provenance;
 pub mod synth;
 
 pub use bounds::Bounds;
 pub use environment::Environment;
 pub use filter::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter, segment_of};
+pub use packed::{CodedColors, PackedScene};
 pub use provenance::{PlaybackHints, RotationConvention, TrainedCameras, TrainedWith, UpAxis};
 
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Model, Parameters, SliceSettings};
+use glam::Vec3;
 
 /// A capture in memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GaussianScene {
     /// The Gaussians, colour aside.
     pub form: Form,
-    /// Their colour.
+    /// Their colour; empty where the packed form holds it.
     pub harmonics: Harmonics,
     /// The environment map, if the capture has one.
     pub environment: Option<Environment>,
@@ -40,14 +43,18 @@ pub enum Form {
     Trained(Parameters),
     /// Sliced: smaller, ready to draw. Activated, capture space.
     Runtime(Vec<Gaussian>),
+    /// Sliced and quantized: smallest, drawn as it is.
+    Packed(PackedScene),
 }
 
 /// A scene ready to draw: the runtime form and what drawing needs beside it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RuntimeScene {
-    /// The Gaussians, sliced.
+    /// The Gaussians, sliced; empty where they are packed.
     pub gaussians: Vec<Gaussian>,
-    /// Their colour.
+    /// The Gaussians, packed.
+    pub packed: Option<PackedScene>,
+    /// Their colour; empty where the packed form holds it.
     pub harmonics: Harmonics,
     /// The environment map, if the capture has one.
     pub environment: Option<Environment>,
@@ -65,6 +72,7 @@ impl GaussianScene {
         match &self.form {
             Form::Trained(parameters) => parameters.len(),
             Form::Runtime(gaussians) => gaussians.len(),
+            Form::Packed(packed) => packed.len(),
         }
     }
 
@@ -73,12 +81,22 @@ impl GaussianScene {
         self.len() == 0
     }
 
-    /// The model of the trained form; a runtime form no longer tells.
+    /// The model of the trained form; the others no longer tell.
     pub fn model(&self) -> Option<Model> {
         match &self.form {
             Form::Trained(parameters) => Some(parameters.model()),
-            Form::Runtime(_) => None,
+            Form::Runtime(_) | Form::Packed(_) => None,
         }
+    }
+
+    /// The scene with its Gaussians in the runtime form if they were packed; as it is otherwise. What packing lost stays lost.
+    pub fn unpacked(mut self) -> Self {
+        if let Form::Packed(packed) = &self.form {
+            let (gaussians, harmonics) = packed.unpack();
+            self.harmonics = harmonics.unwrap_or(self.harmonics);
+            self.form = Form::Runtime(gaussians);
+        }
+        self
     }
 
     /// Slices the Gaussians (if they are not yet) and hands everything over for drawing. Colour is moved, not copied.
@@ -95,8 +113,14 @@ impl GaussianScene {
     /// # Errors
     /// The first Gaussian that cannot be drawn.
     pub fn into_runtime_with(self, settings: &SliceSettings) -> Result<RuntimeScene, InvalidGaussian> {
+        let mut packed = None;
         let gaussians = match self.form {
             Form::Trained(parameters) => parameters.slice(settings)?,
+            Form::Packed(scene) => {
+                scene.check().map_err(|reason| InvalidGaussian { index: 0, reason })?;
+                packed = Some(scene);
+                Vec::new()
+            }
             Form::Runtime(gaussians) => {
                 for (index, gaussian) in gaussians.iter().enumerate() {
                     gaussian.check().map_err(|reason| InvalidGaussian { index, reason })?;
@@ -110,6 +134,7 @@ impl GaussianScene {
         }
         Ok(RuntimeScene {
             gaussians,
+            packed,
             harmonics: self.harmonics,
             environment: self.environment,
             filter: self.filter,
@@ -119,10 +144,52 @@ impl GaussianScene {
     }
 }
 
+impl RuntimeScene {
+    /// Number of Gaussians.
+    pub fn len(&self) -> usize {
+        self.packed.as_ref().map_or(self.gaussians.len(), PackedScene::len)
+    }
+
+    /// Whether there is no Gaussian.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// One Gaussian, decoded if need be; panics beyond the end, as a slice does.
+    pub fn gaussian(&self, index: usize) -> Gaussian {
+        self.packed.as_ref().map_or_else(|| self.gaussians[index], |packed| packed.gaussian(index))
+    }
+
+    /// All Gaussians in order.
+    pub fn iter(&self) -> impl Iterator<Item = Gaussian> + '_ {
+        (0..self.len()).map(|index| self.gaussian(index))
+    }
+
+    /// Colours by codebook, if it has them.
+    pub fn coded_colors(&self) -> Option<&CodedColors> {
+        self.packed.as_ref().and_then(|packed| packed.colors.as_ref())
+    }
+
+    /// Colour of one Gaussian in the unit vector `direction` from the camera, with `tau = mean_t − time`; see [`Harmonics::color`].
+    pub fn color(&self, index: usize, direction: Vec3, tau: f32) -> Vec3 {
+        let span = self.trained_with.time_span();
+        match &self.packed {
+            Some(packed) if packed.colors.is_some() => packed.color(index, direction, tau, span),
+            _ => self.harmonics.color(index, direction, tau, span),
+        }
+    }
+
+    /// Bytes of Gaussians and colours in memory.
+    pub fn size(&self) -> usize {
+        let packed = self.packed.as_ref().map_or(0, PackedScene::size);
+        size_of_val(self.gaussians.as_slice()) + size_of_val(self.harmonics.values.as_slice()) + packed
+    }
+}
+
 impl From<RuntimeScene> for GaussianScene {
     fn from(scene: RuntimeScene) -> Self {
         Self {
-            form: Form::Runtime(scene.gaussians),
+            form: scene.packed.map_or(Form::Runtime(scene.gaussians), Form::Packed),
             harmonics: scene.harmonics,
             environment: scene.environment,
             filter: scene.filter,

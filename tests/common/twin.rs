@@ -40,6 +40,7 @@ pub fn scene(gaussians: &[(Gaussian, Vec3)]) -> RuntimeScene {
     // The first harmonic is 0.282; one half is added to colours.
     let values = gaussians.iter().flat_map(|(_, color)| ((*color - 0.5) / 0.282_094_79).to_array()).collect();
     RuntimeScene {
+        packed: None,
         gaussians: gaussians.iter().map(|(gaussian, _)| *gaussian).collect(),
         harmonics: Harmonics { coefficients: 1, degree: 0, degree_t: 0, values },
         environment: None,

@@ -59,7 +59,7 @@ impl Bench {
         let text = format!(
             "{}: {} Gaussians, {} views of {}x{}\n{}\n{}",
             self.scene.display(),
-            scene.gaussians.len(),
+            scene.len(),
             views.len(),
             size[0],
             size[1],
@@ -69,7 +69,7 @@ impl Bench {
         let json = json!({
             "scene": self.scene.display().to_string(),
             "adapter": gpu::adapter_json(&headless),
-            "gaussians": scene.gaussians.len(),
+            "gaussians": scene.len(),
             "views": views.len(),
             "size": size,
             "timings": timings,

@@ -83,12 +83,15 @@ impl Convert {
 
     /// The scene in the form and with the colour degrees asked for.
     fn prepared(&self, mut scene: GaussianScene) -> Result<GaussianScene, Failure> {
+        if matches!(self.form, Some(FormName::Runtime)) {
+            scene = scene.unpacked();
+        }
         let kept = &mut scene.harmonics;
         kept.truncate(self.sh_degree.unwrap_or(kept.degree), self.sh_degree_t.unwrap_or(kept.degree_t));
         match (self.form, &scene.form) {
-            (Some(FormName::Trained), Form::Runtime(_)) => Err(Failure::about(
+            (Some(FormName::Trained), Form::Runtime(_) | Form::Packed(_)) => Err(Failure::about(
                 &self.input,
-                "holds the runtime form, which cannot be turned back: convert the checkpoint with --form trained",
+                "holds a sliced form, which cannot be turned back: convert the checkpoint with --form trained",
             )),
             (Some(FormName::Runtime), Form::Trained(_)) => {
                 let sliced = scene.into_runtime().map_err(|error| Failure::at(&self.input, &error))?;
@@ -104,9 +107,11 @@ pub fn form_name(form: &Form) -> &'static str {
     match form {
         Form::Trained(_) => "trained",
         Form::Runtime(_) => "runtime",
+        Form::Packed(_) => "packed",
     }
 }
 
-fn is_same_file(a: &Path, b: &Path) -> bool {
+/// Whether both paths lead to the same file.
+pub fn is_same_file(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }

@@ -66,8 +66,8 @@ impl Info {
         let facts = Facts::of_scene(&scene);
         let (extent, failure) = match scene.into_runtime() {
             Ok(scene) => {
-                let all = Bounds::of(&scene.gaussians, facts.trained_with.time_interval);
-                let core = Bounds::core(&scene.gaussians);
+                let all = Bounds::of(scene.iter(), facts.trained_with.time_interval);
+                let core = Bounds::core(scene.iter());
                 (all.zip(core).map(|(all, core)| Extent { all, core }), None)
             }
             Err(error) => (None, Some(Failure::at(&self.file, &error))),
@@ -139,6 +139,7 @@ impl Facts {
         let (form, model) = match header.form {
             StoredForm::Trained { model } => ("trained", Some(model)),
             StoredForm::Runtime => ("runtime", None),
+            StoredForm::Packed { .. } => ("packed", None),
         };
         Self {
             gaussians: header.gaussians,

@@ -5,6 +5,7 @@
 
 mod bench;
 mod compare;
+mod compress;
 mod contest;
 mod convert;
 mod engine;
@@ -52,6 +53,7 @@ enum Verb {
     Info(info::Info),
     Convert(convert::Convert),
     Render(render::Render),
+    Compress(compress::Compress),
     Compare(compare::Compare),
     Synth(synth::Synth),
     Bench(bench::Bench),
@@ -66,6 +68,7 @@ impl Verb {
             Self::Info(verb) => verb.run(),
             Self::Convert(verb) => verb.run(),
             Self::Render(verb) => verb.run(),
+            Self::Compress(verb) => verb.run(),
             Self::Compare(verb) => verb.run(),
             Self::Synth(verb) => verb.run(),
             Self::Bench(verb) => verb.run(),

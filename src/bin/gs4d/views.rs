@@ -103,7 +103,7 @@ fn point_out(scene: &RuntimeScene, shots: &[Shot]) {
 
 /// A circle around the middle of the scene, from which all of it is seen.
 fn around(scene: &RuntimeScene, count: usize, size: UVec2) -> Result<Vec<Shot>, Failure> {
-    let core = Bounds::core(&scene.gaussians).ok_or_else(|| Failure::new("the scene has no Gaussians to go around"))?;
+    let core = Bounds::core(scene.iter()).ok_or_else(|| Failure::new("the scene has no Gaussians to go around"))?;
     let tan_x = (ORBIT_FOV / 2.0).tan();
     let tan = tan_x.min(tan_x * size.y as f32 / size.x as f32);
     // The sphere about the core touches the sides of the picture; with the near limit to spare.

@@ -5,7 +5,8 @@
 
 use super::{PackageError, Section};
 use crate::gaussian::{Harmonics, Model};
-use crate::scene::{Form, GaussianScene, PlaybackHints, TrainedWith};
+use crate::scene::packed::MAX_STAGES;
+use crate::scene::{ActiveSets, FilterKind, Form, GaussianScene, MAX_SEGMENTS, PlaybackHints, TrainedWith};
 use serde::{Deserialize, Serialize};
 
 /// Uncompressed bytes that any package may hold, however short it is.
@@ -36,6 +37,9 @@ pub struct Header {
     /// Size of the environment map, if there is one.
     #[serde(default)]
     pub environment: Option<EnvironmentSize>,
+    /// The temporal filter, if there is one.
+    #[serde(default)]
+    pub filter: Option<StoredFilter>,
     /// The switches the capture was trained with.
     pub trained_with: TrainedWith,
     /// How the capture is meant to be played.
@@ -55,7 +59,26 @@ pub enum StoredForm {
     },
     /// Sliced, ready to draw.
     Runtime,
+    /// Sliced and quantized.
+    Packed {
+        /// Entries of each codebook of colour; nothing where the coefficients are whole.
+        codebooks: Option<[u32; MAX_STAGES]>,
+    },
 }
+
+/// The temporal filter, sets aside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredFilter {
+    /// How it was made.
+    pub kind: FilterKind,
+    /// Segments of time.
+    pub segments: u32,
+    /// How the sets are stored: as bits, or else as intervals.
+    pub bits: bool,
+}
+
+/// Features of this version that older readers do not know, by name.
+const FEATURES: [&str; 2] = ["packed", "filter"];
 
 /// Size of an environment map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -79,16 +102,36 @@ impl Header {
         let form = match &scene.form {
             Form::Trained(parameters) => StoredForm::Trained { model: parameters.model() },
             Form::Runtime(_) => StoredForm::Runtime,
+            Form::Packed(packed) => StoredForm::Packed {
+                codebooks: packed.colors.as_ref().map(|colors| {
+                    let entries = |stage| colors.entries.get(stage).copied().unwrap_or_default();
+                    std::array::from_fn(entries)
+                }),
+            },
         };
+        let coded = match &scene.form {
+            Form::Packed(packed) => packed.colors.as_ref(),
+            _ => None,
+        };
+        let whole = &scene.harmonics;
+        let (coefficients, degree, degree_t) = coded
+            .map_or((whole.coefficients, whole.degree, whole.degree_t), |c| (c.coefficients(), c.degree, c.degree_t));
+        let used = [matches!(form, StoredForm::Packed { .. }), scene.filter.is_some()];
+        let requires = FEATURES.iter().zip(used).filter(|(_, used)| *used).map(|(name, _)| (*name).to_owned());
         let header = Self {
             generator: concat!("bevy_gs4d ", env!("CARGO_PKG_VERSION")).to_owned(),
-            requires: Vec::new(),
+            requires: requires.collect(),
             form,
             gaussians: scene.len(),
-            coefficients: scene.harmonics.coefficients,
-            degree: scene.harmonics.degree,
-            degree_t: scene.harmonics.degree_t,
+            coefficients,
+            degree,
+            degree_t,
             environment: scene.environment.as_ref().map(|e| EnvironmentSize { width: e.width, height: e.height }),
+            filter: scene.filter.as_ref().map(|filter| StoredFilter {
+                kind: filter.kind,
+                segments: filter.segments,
+                bits: matches!(filter.sets, ActiveSets::Bits(_)),
+            }),
             trained_with: scene.trained_with.clone(),
             playback: scene.playback,
             sections: Vec::new(),
@@ -108,8 +151,7 @@ impl Header {
     pub(super) fn parse(text: &[u8]) -> Result<Self, PackageError> {
         let unclear = |e: ron::error::SpannedError| PackageError::Header(e.to_string());
         let requirements: Requirements = ron::de::from_bytes(text).map_err(unclear)?;
-        match requirements.requires.into_iter().next() {
-            // This version has no optional features: any that is listed is beyond this reader.
+        match requirements.requires.into_iter().find(|name| !FEATURES.contains(&name.as_str())) {
             Some(name) => Err(PackageError::UnknownFeature { name }),
             None => ron::de::from_bytes(text).map_err(unclear),
         }
@@ -168,6 +210,10 @@ impl Header {
         sane(
             trained.prefilter_var.is_finite() && trained.spatial_lr_scale.is_finite(),
             "a switch of training (prefilter_var or spatial_lr_scale) that is not finite",
+        )?;
+        sane(
+            self.filter.is_none_or(|filter| (1..=MAX_SEGMENTS).contains(&filter.segments)),
+            "a temporal filter of no segments, or far too many",
         )?;
         let duration = self.playback.duration_seconds;
         sane(duration.is_finite() && duration > 0.0, "the playback duration must be a finite number above zero")

@@ -5,7 +5,7 @@
 
 use super::{FLOAT_PLANES, Header, PackageError, Section, StoredForm};
 use crate::gaussian::{Gaussian, Harmonics, Model, Parameters};
-use crate::scene::{Environment, Form, GaussianScene};
+use crate::scene::{ActiveSets, CodedColors, Environment, Form, GaussianScene, PackedScene, TemporalFilter};
 use bytemuck::{Zeroable, cast_slice, cast_slice_mut};
 use std::ops::Range;
 
@@ -92,12 +92,41 @@ impl Header {
                 within("covariance", 8, 6),
                 within("opacity", 14, 1),
             ],
+            StoredForm::Packed { .. } => {
+                let lanes = |name, offset, width| Attribute { name, rows, stride: 8, offset, width };
+                let ranges = PackedScene::range_count(rows);
+                vec![
+                    lanes("packed_mean", 0, 2),
+                    lanes("packed_motion", 2, 2),
+                    lanes("packed_shape", 4, 4),
+                    Attribute { name: "packed_ranges", rows: ranges, stride: 4, offset: 0, width: 4 },
+                ]
+            }
         };
         let stride = self.coefficients.saturating_mul(3);
         let colour = |name, offset, width| Attribute { name, rows, stride, offset, width };
-        attributes.push(colour("sh_dc", 0, 3));
-        if stride > 3 {
-            attributes.push(colour("sh_rest", 3, stride - 3));
+        if let StoredForm::Packed { codebooks: Some(entries) } = self.form {
+            let stages = entries.iter().filter(|&&entries| entries > 0).count();
+            let total = entries.iter().fold(0usize, |sum, &entries| sum.saturating_add(entries as usize));
+            let words = stride.div_ceil(4);
+            let record = |name, offset, width| Attribute { name, rows, stride: 3, offset, width };
+            attributes.push(record("color_base", 0, 1));
+            if stages > 0 {
+                attributes.push(record("color_codes", 1, stages.div_ceil(2)));
+                attributes.push(Attribute { name: "codebooks", rows: total, stride: words, offset: 0, width: words });
+                let scales = stages * words;
+                attributes.push(Attribute { name: "codebook_scales", rows: scales, stride: 4, offset: 0, width: 4 });
+            }
+        } else {
+            attributes.push(colour("sh_dc", 0, 3));
+            if stride > 3 {
+                attributes.push(colour("sh_rest", 3, stride - 3));
+            }
+        }
+        if let Some(filter) = self.filter {
+            let words = TemporalFilter::words(rows).saturating_mul(filter.segments as usize);
+            let rows = if filter.bits { words } else { rows };
+            attributes.push(Attribute { name: "filter", rows, stride: 1, offset: 0, width: 1 });
         }
         if let Some(size) = self.environment {
             let texels = (size.width as usize).saturating_mul(size.height as usize);
@@ -140,16 +169,30 @@ pub(super) fn blank(header: &Header) -> GaussianScene {
             })
         }
         StoredForm::Runtime => Form::Runtime(vec![Gaussian::zeroed(); count]),
+        StoredForm::Packed { codebooks } => Form::Packed(PackedScene {
+            records: vec![[0; 8]; count],
+            ranges: vec![[0.0; 4]; PackedScene::range_count(count)],
+            colors: codebooks.map(|entries| blank_colors(header, &entries)),
+        }),
     };
-    GaussianScene {
-        form,
-        harmonics: Harmonics {
+    let harmonics = match header.form {
+        StoredForm::Packed { codebooks: Some(_) } => Harmonics { coefficients: 1, ..Harmonics::default() },
+        _ => Harmonics {
             coefficients: header.coefficients,
             degree: header.degree,
             degree_t: header.degree_t,
             values: vec![0.0; count * header.coefficients * 3],
         },
-        filter: None,
+    };
+    GaussianScene {
+        form,
+        harmonics,
+        filter: header.filter.map(|filter| {
+            let words = TemporalFilter::words(count) * filter.segments as usize;
+            let bits = || ActiveSets::Bits(vec![0; words]);
+            let sets = if filter.bits { bits() } else { ActiveSets::Intervals(vec![0; count]) };
+            TemporalFilter { kind: filter.kind, segments: filter.segments, count, sets }
+        }),
         environment: header.environment.map(|size| Environment {
             width: size.width,
             height: size.height,
@@ -160,10 +203,31 @@ pub(super) fn blank(header: &Header) -> GaussianScene {
     }
 }
 
+fn blank_colors(header: &Header, entries: &[u32]) -> CodedColors {
+    let entries: Vec<u32> = entries.iter().copied().filter(|&entries| entries > 0).collect();
+    let total: usize = entries.iter().map(|&entries| entries as usize).sum();
+    let mut colors = CodedColors { degree: header.degree, degree_t: header.degree_t, ..CodedColors::default() };
+    let words = colors.words_per_entry();
+    colors.records = vec![[0; 3]; header.gaussians];
+    colors.codebooks = vec![0; total * words];
+    colors.scales = vec![[0.0; 4]; entries.len() * words];
+    colors.entries = entries;
+    colors
+}
+
 /// The table of words in which the attribute of this name lies; empty if the scene has no such attribute.
 /// Words rather than floats, so that the payload of a NaN survives everywhere.
 pub(super) fn words<'a>(scene: &'a GaussianScene, name: &str) -> &'a [u32] {
     match (&scene.form, name) {
+        (_, "filter") => match scene.filter.as_ref().map(|filter| &filter.sets) {
+            Some(ActiveSets::Bits(words) | ActiveSets::Intervals(words)) => words,
+            None => &[],
+        },
+        (Form::Packed(p), "packed_mean" | "packed_motion" | "packed_shape") => cast_slice(&p.records),
+        (Form::Packed(p), "packed_ranges") => cast_slice(&p.ranges),
+        (Form::Packed(PackedScene { colors: Some(c), .. }), "color_base" | "color_codes") => cast_slice(&c.records),
+        (Form::Packed(PackedScene { colors: Some(c), .. }), "codebooks") => &c.codebooks,
+        (Form::Packed(PackedScene { colors: Some(c), .. }), "codebook_scales") => cast_slice(&c.scales),
         (_, "sh_dc" | "sh_rest") => cast_slice(&scene.harmonics.values),
         (_, "environment") => scene.environment.as_ref().map(|e| cast_slice(&e.texels)).unwrap_or_default(),
         (Form::Runtime(gaussians), _) => cast_slice(gaussians),
@@ -174,13 +238,24 @@ pub(super) fn words<'a>(scene: &'a GaussianScene, name: &str) -> &'a [u32] {
         (Form::Trained(p), "rotation_l") => cast_slice(&p.rotation_l),
         (Form::Trained(p), "rotation_r") => cast_slice(&p.rotation_r),
         (Form::Trained(p), "opacity_logit") => cast_slice(&p.opacity_logit),
-        (Form::Trained(_), _) => &[],
+        (Form::Trained(_) | Form::Packed(_), _) => &[],
     }
 }
 
 /// As [`words`], for filling in.
 pub(super) fn words_mut<'a>(scene: &'a mut GaussianScene, name: &str) -> &'a mut [u32] {
     match (&mut scene.form, name) {
+        (_, "filter") => match scene.filter.as_mut().map(|filter| &mut filter.sets) {
+            Some(ActiveSets::Bits(words) | ActiveSets::Intervals(words)) => words,
+            None => &mut [],
+        },
+        (Form::Packed(p), "packed_mean" | "packed_motion" | "packed_shape") => cast_slice_mut(&mut p.records),
+        (Form::Packed(p), "packed_ranges") => cast_slice_mut(&mut p.ranges),
+        (Form::Packed(PackedScene { colors: Some(c), .. }), "color_base" | "color_codes") => {
+            cast_slice_mut(&mut c.records)
+        }
+        (Form::Packed(PackedScene { colors: Some(c), .. }), "codebooks") => &mut c.codebooks,
+        (Form::Packed(PackedScene { colors: Some(c), .. }), "codebook_scales") => cast_slice_mut(&mut c.scales),
         (_, "sh_dc" | "sh_rest") => cast_slice_mut(&mut scene.harmonics.values),
         (_, "environment") => scene.environment.as_mut().map(|e| cast_slice_mut(&mut e.texels)).unwrap_or_default(),
         (Form::Runtime(gaussians), _) => cast_slice_mut(gaussians),
@@ -191,6 +266,6 @@ pub(super) fn words_mut<'a>(scene: &'a mut GaussianScene, name: &str) -> &'a mut
         (Form::Trained(p), "rotation_l") => cast_slice_mut(&mut p.rotation_l),
         (Form::Trained(p), "rotation_r") => cast_slice_mut(&mut p.rotation_r),
         (Form::Trained(p), "opacity_logit") => cast_slice_mut(&mut p.opacity_logit),
-        (Form::Trained(_), _) => &mut [],
+        (Form::Trained(_) | Form::Packed(_), _) => &mut [],
     }
 }

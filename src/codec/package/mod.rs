@@ -15,10 +15,10 @@ mod planes;
 mod section;
 
 pub use error::PackageError;
-pub use header::{EnvironmentSize, Header, StoredForm};
+pub use header::{EnvironmentSize, Header, StoredFilter, StoredForm};
 pub use section::{FLOAT_PLANES, Section};
 
-use crate::scene::GaussianScene;
+use crate::scene::{Form, GaussianScene};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::io::{BufReader, Read, Seek, Write};
@@ -32,6 +32,12 @@ pub const VERSION: u32 = 1;
 
 /// Gaussians per section at most: small enough to decode one at a time in little memory, large enough to compress well.
 const ROWS_PER_SECTION: usize = 1 << 14;
+
+/// The same for records of the packed form, whose columns compress best in one piece.
+const PACKED_ROWS_PER_SECTION: usize = 1 << 20;
+
+/// Words of the widest attribute of those.
+const PACKED_WORDS: usize = 8;
 
 /// How a package is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,7 +80,11 @@ impl PackageInfo {
 pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), PackageError> {
     let mut header = Header::of(scene)?;
     let level = settings.level.clamp(1, 19);
-    let runs: Vec<_> = header.attributes().into_iter().flat_map(|a| a.runs(ROWS_PER_SECTION)).collect();
+    let is_packed = matches!(header.form, StoredForm::Packed { .. });
+    let rows = |attribute: &layout::Attribute| {
+        if is_packed && attribute.width <= PACKED_WORDS { PACKED_ROWS_PER_SECTION } else { ROWS_PER_SECTION }
+    };
+    let runs: Vec<_> = header.attributes().into_iter().flat_map(|a| a.runs(rows(&a))).collect();
     let encoded = runs
         .into_par_iter()
         .map(|(attribute, rows)| section::encode(layout::words(scene, attribute.name), &attribute, rows, level))
@@ -106,6 +116,9 @@ pub fn read<R: Read + Seek>(reader: R) -> Result<GaussianScene, PackageError> {
         if let Some(attribute) = attributes.iter().find(|a| a.name == section.name) {
             section.decode(&body, attribute, &mut planes, layout::words_mut(&mut scene, attribute.name))?;
         }
+    }
+    if let Form::Packed(packed) = &scene.form {
+        packed.check().map_err(PackageError::Inconsistent)?;
     }
     Ok(scene)
 }

@@ -1,0 +1,225 @@
+//! Codebooks: vector quantisation of colour, one codebook after another over what the ones before left.
+//!
+//! In: rows of coefficients and how much each counts. Out: [`Codebooks`] of signed bytes, and a code into each for every row. Seeds
+//! are k-means++, refined by Lloyd's steps on a sample; the same input gives the same result, whatever the number of threads.
+
+use ndarray::{Array1, Array2, ArrayView2, Axis, s};
+use rayon::prelude::*;
+
+/// Rows that codebooks are trained on at most.
+const SAMPLE: usize = 24_576;
+/// Lloyd's steps.
+const STEPS: usize = 8;
+/// Rows assigned at a time.
+const BLOCK: usize = 512;
+
+/// Codebooks whose entries add up.
+#[derive(Debug, Clone, Default)]
+pub struct Codebooks {
+    /// Each one's entries: rows of signed bytes.
+    pub entries: Vec<Array2<i8>>,
+    /// What a byte of 127 stands for, for each column of each codebook.
+    pub scales: Vec<Array1<f32>>,
+    /// For each codebook the entry of every row of the input.
+    pub codes: Vec<Vec<u16>>,
+}
+
+impl Codebooks {
+    /// Trains one codebook after another, of these many entries (at most 65,536 each), over `data`, rows × columns. Rows count by
+    /// `weights`, none of which may be negative.
+    pub fn train(mut data: Array2<f32>, weights: &[f32], entries: &[usize], mut done: impl FnMut()) -> Self {
+        let mut books = Self::default();
+        for (stage, &count) in entries.iter().enumerate() {
+            let count = count.min(data.nrows()).clamp(1, 1 << 16);
+            if data.nrows() == 0 {
+                break;
+            }
+            let centers = centers(&data, weights, count, 0x9E37_79B9 + stage as u64);
+            let scales = centers.fold_axis(Axis(0), 0.0f32, |most, value| most.max(value.abs()));
+            let scaled = |value: f32, scale: f32| if scale > 0.0 { (value / scale * 127.0).round() as i8 } else { 0 };
+            let mut bytes = Array2::zeros(centers.raw_dim());
+            for (mut to, from) in bytes.rows_mut().into_iter().zip(centers.rows()) {
+                ndarray::Zip::from(&mut to).and(from).and(&scales).for_each(|to, &v, &scale| *to = scaled(v, scale));
+            }
+            let centers = &bytes.mapv(f32::from) * &scales.mapv(|scale| scale / 127.0);
+            let codes = assign(data.view(), &centers);
+            data.axis_iter_mut(Axis(0)).into_par_iter().zip(&codes).for_each(|(mut row, &code)| {
+                row -= &centers.row(code as usize);
+            });
+            books.entries.push(bytes);
+            books.scales.push(scales);
+            books.codes.push(codes.into_iter().map(|code| code as u16).collect());
+            done();
+        }
+        books
+    }
+}
+
+/// The nearest centre of every row.
+fn assign(data: ArrayView2<'_, f32>, centers: &Array2<f32>) -> Vec<u32> {
+    let half_norms: Vec<f32> = centers.rows().into_iter().map(|center| 0.5 * center.dot(&center)).collect();
+    let transposed = centers.t().as_standard_layout().into_owned();
+    data.axis_chunks_iter(Axis(0), BLOCK)
+        .into_par_iter()
+        .flat_map_iter(|block| {
+            // |x − c|² is smallest where x·c − |c|²/2 is largest.
+            let products = block.dot(&transposed);
+            products.rows().into_iter().map(|row| nearest(row.iter().copied(), &half_norms)).collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+fn nearest(products: impl Iterator<Item = f32>, half_norms: &[f32]) -> u32 {
+    let (mut best, mut most) = (0, f32::NEG_INFINITY);
+    for (index, (product, half_norm)) in products.zip(half_norms).enumerate() {
+        if product - half_norm > most {
+            (best, most) = (index as u32, product - half_norm);
+        }
+    }
+    best
+}
+
+/// k-means over a sample of the rows.
+fn centers(data: &Array2<f32>, weights: &[f32], count: usize, seed: u64) -> Array2<f32> {
+    let mut random = Random(seed);
+    let (sample, weights) = sample(data, weights, &mut random);
+    let mut centers = seeds(&sample, &weights, count, &mut random);
+    for _ in 0..STEPS {
+        let codes = assign(sample.view(), &centers);
+        let mut sums = Array2::<f64>::zeros(centers.raw_dim());
+        let mut totals = vec![0.0f64; count];
+        for ((row, &code), &weight) in sample.rows().into_iter().zip(&codes).zip(&weights) {
+            let weight = f64::from(weight);
+            totals[code as usize] += weight;
+            let mut sum = sums.row_mut(code as usize);
+            ndarray::Zip::from(&mut sum).and(row).for_each(|sum, &value| *sum += weight * f64::from(value));
+        }
+        for (index, total) in totals.into_iter().enumerate() {
+            // A centre that nothing is near to stays where it is.
+            if total > 0.0 {
+                centers.row_mut(index).assign(&sums.row(index).mapv(|sum| (sum / total) as f32));
+            }
+        }
+    }
+    centers
+}
+
+/// Rows to train on: all of them, or evenly many at random places.
+fn sample(data: &Array2<f32>, weights: &[f32], random: &mut Random) -> (Array2<f32>, Vec<f32>) {
+    let rows = data.nrows();
+    if rows <= SAMPLE {
+        return (data.clone(), weights.to_vec());
+    }
+    let chosen: Vec<usize> = (0..SAMPLE)
+        .map(|i| {
+            let (first, last) = (i * rows / SAMPLE, (i + 1) * rows / SAMPLE);
+            first + (random.unit() * (last - first) as f64) as usize
+        })
+        .collect();
+    (data.select(Axis(0), &chosen), chosen.iter().map(|&row| weights[row]).collect())
+}
+
+/// k-means++: each seed drawn by weight times squared distance to the seeds before it.
+fn seeds(sample: &Array2<f32>, weights: &[f32], count: usize, random: &mut Random) -> Array2<f32> {
+    let mut seeds = Array2::zeros((count, sample.ncols()));
+    let mut distances = vec![f32::INFINITY; sample.nrows()];
+    let mut chosen = draw(weights.iter().copied(), random);
+    for index in 0..count {
+        seeds.row_mut(index).assign(&sample.row(chosen));
+        let seed = seeds.slice(s![index, ..]);
+        distances.par_iter_mut().with_min_len(1024).enumerate().for_each(|(row, distance)| {
+            let apart: f32 = sample.row(row).iter().zip(seed).map(|(a, b)| (a - b) * (a - b)).sum();
+            *distance = distance.min(apart);
+        });
+        chosen = draw(distances.iter().zip(weights).map(|(distance, weight)| distance * weight), random);
+    }
+    seeds
+}
+
+/// A place, drawn by weight; the first where all weights are zero.
+fn draw(weights: impl Iterator<Item = f32> + Clone, random: &mut Random) -> usize {
+    let total: f64 = weights.clone().map(f64::from).sum();
+    let mut left = random.unit() * total;
+    for (index, weight) in weights.enumerate() {
+        left -= f64::from(weight);
+        if left < 0.0 {
+            return index;
+        }
+    }
+    0
+}
+
+/// SplitMix64.
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn data(rows: usize, columns: usize) -> Array2<f32> {
+        let mut random = Random(7);
+        Array2::from_shape_fn((rows, columns), |(row, _)| (row % 13) as f32 + random.unit() as f32 * 0.3)
+    }
+
+    fn error(data: &Array2<f32>, books: &Codebooks) -> f64 {
+        let mut left = data.clone();
+        for stage in 0..books.codes.len() {
+            for (mut row, &code) in left.rows_mut().into_iter().zip(&books.codes[stage]) {
+                let entry = books.entries[stage].row(code as usize).mapv(f32::from) * &books.scales[stage] / 127.0;
+                row -= &entry;
+            }
+        }
+        left.iter().map(|v| f64::from(v * v)).sum::<f64>() / left.len() as f64
+    }
+
+    #[test]
+    fn each_codebook_leaves_less() {
+        let data = data(3_000, 9);
+        let weights = vec![1.0; 3_000];
+        let errors: Vec<f64> =
+            (1..=3).map(|n| error(&data, &Codebooks::train(data.clone(), &weights, &vec![16; n], || {}))).collect();
+        assert!(errors[0] < 0.02, "sixteen entries find thirteen clusters: {errors:?}");
+        assert!(errors[1] < 0.9 * errors[0] && errors[2] < 0.9 * errors[1], "the rest is coded too: {errors:?}");
+    }
+
+    #[test]
+    fn training_is_the_same_on_every_run() {
+        let weights: Vec<f32> = (0..2_000).map(|i| (i % 5) as f32).collect();
+        let train = || Codebooks::train(data(2_000, 12), &weights, &[32, 32], || {});
+        let (a, b) = (train(), train());
+        assert!(a.codes == b.codes && a.entries == b.entries && a.scales == b.scales, "deterministic");
+    }
+
+    #[test]
+    fn rows_that_count_more_fit_better() {
+        let data = data(2_600, 6);
+        let heavy = |row: usize| row % 13 == 4;
+        let weights: Vec<f32> = (0..2_600).map(|row| if heavy(row) { 100.0 } else { 0.01 }).collect();
+        let books = Codebooks::train(data.clone(), &weights, &[4], || {});
+        let mut errors = [0.0, 0.0];
+        for (row, &code) in books.codes[0].iter().enumerate() {
+            let entry = books.entries[0].row(code as usize).mapv(f32::from) * &books.scales[0] / 127.0;
+            let apart = &data.row(row) - &entry;
+            errors[usize::from(heavy(row))] += f64::from(apart.dot(&apart)) / if heavy(row) { 200.0 } else { 2_400.0 };
+        }
+        assert!(errors[1] < 0.2 * errors[0], "the heavy cluster has an entry of its own: {errors:?}");
+    }
+
+    #[test]
+    fn few_or_equal_rows_are_no_trouble() {
+        let none = Codebooks::train(Array2::zeros((0, 5)), &[], &[8, 8], || {});
+        assert!(none.codes.is_empty(), "nothing to code");
+        let equal = Codebooks::train(Array2::zeros((3, 5)), &[0.0; 3], &[8], || {});
+        assert!(equal.codes[0].len() == 3 && equal.entries[0].nrows() == 3, "no more entries than rows");
+    }
+}

@@ -1,0 +1,245 @@
+//! Compression: from a scene ready to draw to the packed form.
+//!
+//! In: a [`RuntimeScene`] and [`CompressSettings`] (or a [`Quality`] that chooses them). Out: a scene in the packed form, its
+//! Gaussians in Morton order, and a [`CompressReport`]. The original is not touched.
+
+use super::codebook::Codebooks;
+use super::order::morton_order;
+use super::quantize::{Bits, quantize};
+use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian};
+use crate::scene::packed::MAX_STAGES;
+use crate::scene::{CodedColors, Form, GaussianScene, PackedScene, RuntimeScene};
+use ndarray::Array2;
+use serde::{Deserialize, Serialize};
+
+/// How much may be lost.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Quality {
+    /// The smallest that still looks right.
+    Small,
+    /// About 23 bytes per Gaussian and a codebook; 48 dB and more to the original's pictures.
+    #[default]
+    Balanced,
+    /// Colour whole, geometry with every bit there is.
+    VisuallyLossless,
+    /// The runtime form in single precision.
+    Lossless,
+}
+
+impl Quality {
+    /// All of them, by name.
+    pub const NAMES: [(&'static str, Self); 4] = [
+        ("small", Self::Small),
+        ("balanced", Self::Balanced),
+        ("visually-lossless", Self::VisuallyLossless),
+        ("lossless", Self::Lossless),
+    ];
+}
+
+/// Every knob of compression.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CompressSettings {
+    /// Bits of geometry; nothing keeps single precision (and the order of the Gaussians).
+    pub geometry: Option<Bits>,
+    /// Entries of each codebook of colour, up to four; none keeps every coefficient.
+    pub codebooks: Vec<usize>,
+    /// How much each Gaussian's colour counts, in the order of the scene; by opacity and size unless given.
+    #[serde(skip)]
+    pub weights: Option<Vec<f32>>,
+}
+
+impl From<Quality> for CompressSettings {
+    fn from(quality: Quality) -> Self {
+        let balanced =
+            Bits { mean: 12, mean_t: 10, velocity: 9, sigma_t: 8, scale: 9, rotation: 9, opacity: 8, escape: 0.03 };
+        let (geometry, codebooks) = match quality {
+            Quality::Small => (
+                Some(Bits {
+                    mean: 11,
+                    mean_t: 9,
+                    velocity: 8,
+                    sigma_t: 7,
+                    scale: 8,
+                    rotation: 8,
+                    opacity: 7,
+                    escape: 0.02,
+                }),
+                vec![1024, 1024],
+            ),
+            Quality::Balanced => (Some(balanced), vec![2048, 2048, 2048]),
+            Quality::VisuallyLossless => (
+                Some(Bits {
+                    mean: 16,
+                    mean_t: 14,
+                    velocity: 13,
+                    sigma_t: 12,
+                    scale: 13,
+                    rotation: 14,
+                    opacity: 12,
+                    escape: 0.05,
+                }),
+                Vec::new(),
+            ),
+            Quality::Lossless => (None, Vec::new()),
+        };
+        Self { geometry, codebooks, weights: None }
+    }
+}
+
+/// What compression did.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct CompressReport {
+    /// Gaussians.
+    pub gaussians: usize,
+    /// Bytes of Gaussians and colours in memory, before and after.
+    pub memory_before: usize,
+    /// The same, packed: what the GPU holds.
+    pub memory_after: usize,
+    /// Entries of each codebook.
+    pub codebooks: Vec<u32>,
+}
+
+/// Why a scene is not compressed.
+#[derive(Debug, thiserror::Error)]
+pub enum CompressError {
+    /// It is already.
+    #[error("the scene is packed already: compress the checkpoint or the lossless package it was made from")]
+    AlreadyPacked,
+    /// Codebooks cannot go without quantised geometry.
+    #[error("codebooks need quantised geometry: choose a quality other than lossless, or no codebooks")]
+    CodebooksAlone,
+    /// Too many codebooks, or of no entries, or too many.
+    #[error("at most {MAX_STAGES} codebooks of 1 to 65536 entries each, not {0:?}")]
+    Codebooks(Vec<usize>),
+    /// A Gaussian cannot be drawn.
+    #[error(transparent)]
+    Invalid(#[from] InvalidGaussian),
+}
+
+/// Compresses a scene. `done` is told each time a codebook is finished.
+///
+/// # Errors
+/// When the scene is packed already or the settings do not fit together.
+pub fn compress(
+    scene: RuntimeScene,
+    settings: &CompressSettings,
+) -> Result<(GaussianScene, CompressReport), CompressError> {
+    compress_with(scene, settings, || {})
+}
+
+/// As [`compress`]; `done` is called after each codebook.
+///
+/// # Errors
+/// As [`compress`].
+pub fn compress_with(
+    scene: RuntimeScene,
+    settings: &CompressSettings,
+    done: impl FnMut(),
+) -> Result<(GaussianScene, CompressReport), CompressError> {
+    if scene.packed.is_some() {
+        return Err(CompressError::AlreadyPacked);
+    }
+    let books = &settings.codebooks;
+    if books.len() > MAX_STAGES || books.iter().any(|&entries| !(1..=1 << 16).contains(&entries)) {
+        return Err(CompressError::Codebooks(books.clone()));
+    }
+    let mut report = CompressReport { gaussians: scene.len(), memory_before: scene.size(), ..Default::default() };
+    let Some(bits) = &settings.geometry else {
+        if !books.is_empty() {
+            return Err(CompressError::CodebooksAlone);
+        }
+        report.memory_after = report.memory_before;
+        return Ok((scene.into(), report));
+    };
+    let order = morton_order(&scene.gaussians);
+    let gaussians: Vec<Gaussian> = order.iter().map(|&index| scene.gaussians[index as usize]).collect();
+    let coded = (!books.is_empty()).then(|| {
+        let weights = match &settings.weights {
+            Some(weights) => order.iter().map(|&index| weights[index as usize]).collect(),
+            None => gaussians.iter().map(prominence).collect::<Vec<_>>(),
+        };
+        code(&scene.harmonics, &order, &weights, books, done)
+    });
+    let (colors, base) = coded.map_or((None, [0.0; 2]), |(colors, base)| (Some(colors), base));
+    let (records, ranges) = quantize(&gaussians, bits, base);
+    report.codebooks = colors.as_ref().map(|colors| colors.entries.clone()).unwrap_or_default();
+    let harmonics = match &colors {
+        Some(_) => Harmonics { coefficients: 1, ..Harmonics::default() },
+        None => super::prune::select_harmonics(&scene.harmonics, &order),
+    };
+    let packed = PackedScene { records, ranges, colors };
+    report.memory_after = packed.size() + size_of_val(harmonics.values.as_slice());
+    let scene = GaussianScene {
+        form: Form::Packed(packed),
+        harmonics,
+        filter: scene.filter.map(|filter| filter.select(&order)),
+        environment: scene.environment,
+        trained_with: scene.trained_with,
+        playback: scene.playback,
+    };
+    Ok((scene, report))
+}
+
+/// How much the colour of a Gaussian matters: how opaque it is, over how large a surface.
+fn prominence(gaussian: &Gaussian) -> f32 {
+    let [xx, _, _, yy, _, zz] = gaussian.covariance;
+    gaussian.opacity * (xx + yy + zz).max(0.0)
+}
+
+/// Codes of all colours in the order given, and the ends of their first coefficients.
+fn code(
+    harmonics: &Harmonics,
+    order: &[u32],
+    weights: &[f32],
+    entries: &[usize],
+    done: impl FnMut(),
+) -> (CodedColors, [f32; 2]) {
+    let mut colors = CodedColors { degree: harmonics.degree, degree_t: harmonics.degree_t, ..Default::default() };
+    let coefficients = colors.coefficients();
+    let of = |index: u32| &harmonics.of(index as usize)[..coefficients * 3];
+    let ends = order
+        .iter()
+        .flat_map(|&index| &of(index)[..3])
+        .fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+    let (low, size) = if ends.0 > ends.1 { (0.0, 0.0) } else { (ends.0, ends.1 - ends.0) };
+    // Nine bits are enough; the tenth stays 0 and costs nothing on disk.
+    let place = |value: f32| if size > 0.0 { ((value - low) / size * 511.0).round() as u32 * 2 } else { 0 };
+    let columns = coefficients * 3 - 3;
+    let books = if columns == 0 {
+        Codebooks::default()
+    } else {
+        let mut rest = Array2::zeros((order.len(), columns));
+        for (mut row, &index) in rest.rows_mut().into_iter().zip(order) {
+            row.iter_mut().zip(&of(index)[3..]).for_each(|(to, from)| *to = *from);
+        }
+        Codebooks::train(rest, weights, entries, done)
+    };
+    let code = |stage: usize, row: usize| books.codes.get(stage).map_or(0, |codes| u32::from(codes[row]));
+    colors.records = order
+        .iter()
+        .enumerate()
+        .map(|(row, &index)| {
+            let base = of(index)[..3].iter().zip([0, 10, 20]).fold(0, |word, (v, shift)| word | place(*v) << shift);
+            [base, code(0, row) | code(1, row) << 16, code(2, row) | code(3, row) << 16]
+        })
+        .collect();
+    let words = colors.words_per_entry();
+    for (book, scales) in books.entries.iter().zip(&books.scales) {
+        colors.entries.push(book.nrows() as u32);
+        // The first coefficient stays 0 here, and the end is padded to whole words.
+        let padded = |of: &mut dyn Iterator<Item = f32>| {
+            let mut row = vec![0.0; words * 4];
+            row[3..].iter_mut().zip(of).for_each(|(to, from)| *to = from);
+            row
+        };
+        for entry in book.rows() {
+            let row = padded(&mut entry.iter().map(|&byte| f32::from(byte)));
+            let word = |four: &[f32]| u32::from_le_bytes(std::array::from_fn(|i| four[i] as i8 as u8));
+            colors.codebooks.extend(row.chunks_exact(4).map(word));
+        }
+        let row = padded(&mut scales.iter().copied());
+        colors.scales.extend(row.chunks_exact(4).map(|four| [four[0], four[1], four[2], four[3]]));
+    }
+    (colors, [low, low + size * (1023.0 / 1022.0)])
+}

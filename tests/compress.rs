@@ -1,0 +1,245 @@
+//! Compression: what the packed form keeps, that the GPU reads it as the CPU does, and that packages hold it whole.
+//!
+//! In: synthetic scenes; with `GS4D_DATA` set, trained captures.
+
+#[path = "common/data.rs"]
+mod data;
+#[cfg(feature = "gpu")]
+#[path = "common/gpu.rs"]
+mod gpu;
+#[path = "common/skip.rs"]
+mod skip;
+
+use bevy_gs4d::codec::{self, checkpoint::CheckpointOptions, package};
+use bevy_gs4d::compress::pack::{CompressError, CompressSettings, Quality, compress};
+use bevy_gs4d::compress::quantize::Bits;
+use bevy_gs4d::dataset::{CameraFile, CameraOptions};
+use bevy_gs4d::frame::Background;
+use bevy_gs4d::gaussian::{Camera, Gaussian, RasterFov, View};
+use bevy_gs4d::metrics::psnr_pooled;
+use bevy_gs4d::reference;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{Form, GaussianScene, RuntimeScene, TemporalFilter};
+use glam::{UVec2, Vec3};
+use std::io::Cursor;
+
+const BLACK: Background = Background::Color([0.0; 3]);
+
+fn scene(count: usize, degree: u32, degree_t: u32) -> RuntimeScene {
+    let settings = SynthSettings { count, degree, degree_t, ..SynthSettings::default() };
+    let mut scene = synthesize(&settings).into_runtime().expect("synthetic scenes are valid");
+    // Some that are always there, at rest.
+    for gaussian in scene.gaussians.iter_mut().step_by(17) {
+        gaussian.sigma_t = f32::INFINITY;
+        gaussian.velocity = [0.0; 3];
+    }
+    let filter = TemporalFilter::support(scene.iter(), scene.trained_with.time_interval, 9);
+    scene.filter = Some(filter);
+    scene
+}
+
+fn view(time: f32) -> View {
+    let eye = Vec3::new(1.9, -1.2, 1.1);
+    Camera::look_at(eye, Vec3::ZERO, Vec3::Z, 0.9, UVec2::new(120, 90)).view(time, RasterFov::Reference)
+}
+
+fn settings(codebooks: &[usize]) -> CompressSettings {
+    CompressSettings { codebooks: codebooks.to_vec(), ..CompressSettings::from(Quality::Balanced) }
+}
+
+fn pack(scene: &GaussianScene) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    package::write(&mut bytes, scene, &package::WriteSettings { level: 3 }).expect("it can be written");
+    bytes
+}
+
+fn psnr(a: &RuntimeScene, b: &RuntimeScene, view: &View) -> f64 {
+    let [a, b] = [a, b].map(|scene| reference::render(scene, view, BLACK).picture.clamped());
+    psnr_pooled(&a, &b).expect("the same size")
+}
+
+/// Each Gaussian of the scene beside its packed self. Morton order is found again by the means.
+fn beside(scene: &RuntimeScene, packed: &RuntimeScene) -> Vec<(Gaussian, Gaussian)> {
+    let order = bevy_gs4d::compress::order::morton_order(&scene.gaussians);
+    order.iter().enumerate().map(|(to, &from)| (scene.gaussians[from as usize], packed.gaussian(to))).collect()
+}
+
+#[test]
+fn every_attribute_stays_within_its_step() {
+    let scene = scene(3_000, 0, 0);
+    let fine =
+        Bits { mean: 16, mean_t: 16, velocity: 16, sigma_t: 15, scale: 16, rotation: 16, opacity: 16, escape: 0.0 };
+    let coarse = Bits { mean: 12, mean_t: 10, velocity: 9, sigma_t: 8, scale: 9, rotation: 9, opacity: 8, escape: 0.0 };
+    for (bits, slack) in [(fine, 1.0), (coarse, 1.0)] {
+        let settings = CompressSettings { geometry: Some(bits), codebooks: Vec::new(), weights: None };
+        let (packed, _) = compress(scene.clone(), &settings).expect("it is compressed");
+        let packed = packed.into_runtime().expect("it can be drawn");
+        let step = |bits: u32, range: f32| slack * (0.51 * range / ((1u32 << bits) - 1) as f32 + 2e-6 * range.max(1.0));
+        for (a, b) in beside(&scene, &packed) {
+            for axis in 0..3 {
+                assert!((a.mean[axis] - b.mean[axis]).abs() <= step(bits.mean, 2.4), "mean {a:?} {b:?}");
+            }
+            assert!((a.mean_t - b.mean_t).abs() <= step(bits.mean_t, 1.2), "temporal mean {a:?} {b:?}");
+            assert!((a.opacity - b.opacity).abs() <= step(bits.opacity, 1.0), "opacity {a:?} {b:?}");
+            assert_eq!(a.sigma_t.is_finite(), b.sigma_t.is_finite(), "always there or not");
+            if a.sigma_t.is_finite() {
+                assert!((a.sigma_t.ln() - b.sigma_t.ln()).abs() <= step(bits.sigma_t, 5.0), "deviation {a:?} {b:?}");
+            } else {
+                assert_eq!(b.velocity, [0.0; 3], "at rest");
+            }
+            let size = a.covariance[0] + a.covariance[3] + a.covariance[5];
+            let apart = a.covariance.iter().zip(b.covariance).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            let allowed = if bits.scale == 16 { 2e-3 } else { 0.08 };
+            assert!(apart <= allowed * size, "covariance {a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn pictures_survive() {
+    let scene = scene(20_000, 1, 0);
+    let lowest = |settings: &CompressSettings| {
+        let (packed, _) = compress(scene.clone(), settings).expect("it is compressed");
+        let packed = packed.into_runtime().expect("it can be drawn");
+        [0.05, 0.4, 0.9].map(|time| psnr(&scene, &packed, &view(time))).into_iter().fold(f64::INFINITY, f64::min)
+    };
+    let balanced = lowest(&settings(&[]));
+    assert!(balanced >= 47.0, "balanced geometry, whole colours: {balanced:.1} dB");
+    let exact = lowest(&CompressSettings::from(Quality::VisuallyLossless));
+    assert!(exact >= 55.0, "visually lossless: {exact:.1} dB");
+    let coded = [&[256][..], &[256, 256], &[256, 256, 256]].map(|codebooks| lowest(&settings(codebooks)));
+    assert!(coded.is_sorted(), "each codebook brings colours closer, random ones too: {coded:.1?} dB");
+    let (_, report) = compress(scene.clone(), &settings(&[256, 256])).expect("it is compressed");
+    assert!(report.memory_after < report.memory_before / 2, "half the memory or less: {report:?}");
+}
+
+#[test]
+fn the_filter_moves_with_its_gaussians() {
+    let scene = scene(2_000, 0, 0);
+    let (packed, _) = compress(scene.clone(), &settings(&[])).expect("it is compressed");
+    let order = bevy_gs4d::compress::order::morton_order(&scene.gaussians);
+    let (before, after) = (scene.filter.expect("a filter"), packed.filter.expect("the filter is kept"));
+    for segment in 0..before.segments {
+        for (to, &from) in order.iter().enumerate() {
+            assert_eq!(after.is_active(segment, to), before.is_active(segment, from as usize), "{to} was {from}");
+        }
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let small = scene(100, 1, 0);
+    let (packed, _) = compress(small.clone(), &settings(&[8])).expect("it is compressed");
+    let again = compress(packed.into_runtime().expect("drawable"), &settings(&[8]));
+    assert!(matches!(again, Err(CompressError::AlreadyPacked)), "packed twice");
+    for codebooks in [vec![0], vec![70_000], vec![4; 5]] {
+        let refused = compress(small.clone(), &settings(&codebooks));
+        assert!(matches!(refused, Err(CompressError::Codebooks(_))), "{codebooks:?}");
+    }
+    let alone = CompressSettings { geometry: None, ..settings(&[8]) };
+    assert!(matches!(compress(small, &alone), Err(CompressError::CodebooksAlone)), "codebooks without geometry");
+}
+
+#[test]
+fn few_gaussians_are_no_trouble() {
+    for count in [0, 1, 2, 255, 256, 257] {
+        let scene = scene(count, 3, 2);
+        for codebooks in [&[][..], &[16, 16, 16, 16]] {
+            let (packed, _) = compress(scene.clone(), &settings(codebooks)).expect("it is compressed");
+            let read = package::read(Cursor::new(pack(&packed))).expect("it can be read");
+            assert_eq!(read, packed, "{count} Gaussians, bit for bit");
+            assert_eq!(read.into_runtime().expect("drawable").len(), count, "none is lost");
+        }
+    }
+}
+
+#[test]
+fn packages_hold_the_packed_form_bit_for_bit() {
+    for (degree, degree_t, codebooks) in
+        [(3, 2, &[32, 16, 8][..]), (2, 0, &[16]), (1, 0, &[]), (0, 0, &[4]), (3, 1, &[9, 9, 9, 9])]
+    {
+        let (packed, _) = compress(scene(700, degree, degree_t), &settings(codebooks)).expect("it is compressed");
+        let bytes = pack(&packed);
+        let read = package::read(Cursor::new(&bytes)).expect("it can be read");
+        assert_eq!(read, packed, "degree {degree} and {degree_t}");
+        let info = package::inspect(Cursor::new(&bytes)).expect("it can be looked into");
+        assert_eq!(info.header.requires, ["packed", "filter"], "older readers must refuse it");
+        let back = read.unpacked();
+        assert!(matches!(back.form, Form::Runtime(_)) && back.len() == 700, "it can be unpacked");
+        assert!(back.harmonics.is_consistent(700), "with all its colours");
+    }
+}
+
+#[test]
+fn unpacking_changes_no_picture() {
+    let (packed, _) = compress(scene(1_500, 3, 2), &settings(&[64, 32])).expect("it is compressed");
+    let unpacked = packed.clone().unpacked().into_runtime().expect("drawable");
+    let packed = packed.into_runtime().expect("drawable");
+    for time in [0.1, 0.7] {
+        let seen = psnr(&packed, &unpacked, &view(time));
+        assert!(seen >= 100.0, "at {time}: {seen:.1} dB");
+    }
+}
+
+#[test]
+fn every_flipped_bit_of_a_packed_package_is_noticed() {
+    let (packed, _) = compress(scene(40, 1, 0), &settings(&[4, 2])).expect("it is compressed");
+    let bytes = pack(&packed);
+    for bit in 0..bytes.len() * 8 {
+        let mut damaged = bytes.clone();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        assert!(package::read(Cursor::new(damaged)).is_err(), "bit {bit}");
+    }
+}
+
+#[cfg(feature = "gpu")]
+#[test]
+fn the_gpu_reads_the_packed_form_as_the_cpu_does() {
+    let Some(mut headless) = gpu::headless() else { return };
+    for (degree, degree_t, codebooks) in
+        [(3, 2, &[64, 32, 16, 8][..]), (3, 2, &[]), (3, 1, &[50]), (2, 0, &[16, 16]), (1, 0, &[8]), (0, 0, &[2])]
+    {
+        let (packed, _) = compress(scene(5_000, degree, degree_t), &settings(codebooks)).expect("it is compressed");
+        let packed = packed.into_runtime().expect("drawable");
+        let capture = headless.upload(&packed).expect("it fits");
+        for time in [0.0, 0.33, 0.8] {
+            let found = headless.render(&capture, &view(time), BLACK).expect("it is drawn");
+            let expected = reference::render(&packed, &view(time), BLACK);
+            let pixels = found.picture.pixels.iter().zip(&expected.picture.pixels);
+            let far = pixels.filter(|(a, b)| (**a - **b).abs().max_element() > 1e-3).count();
+            // Where float rounding decides whether a splat counts, a pixel may differ by more.
+            assert!(far <= 20, "degree {degree} and {degree_t}, {codebooks:?}, at {time}: {far} pixels differ");
+            assert!(found.counts.visible > 500, "something is seen");
+        }
+    }
+}
+
+#[test]
+fn real_captures_reach_the_balanced_targets() {
+    let Some(data) = data::data() else { return };
+    // As in the demo: 45,000 Gaussians; the larger captures take minutes in a build without optimisation.
+    let scene =
+        codec::load(&data.join("toybox/toybox_45k.pth"), &CheckpointOptions::default()).expect("the checkpoint");
+    let scene = scene.into_runtime().expect("drawable");
+    let (packed, _) = compress(scene.clone(), &settings(&[1024, 1024, 1024])).expect("it is compressed");
+    let mut bytes = Vec::new();
+    package::write(&mut bytes, &packed, &package::WriteSettings { level: 19 }).expect("it can be written");
+    let info = package::inspect(Cursor::new(&bytes)).expect("it can be looked into");
+    let books = |name: &str| name.starts_with("codebook");
+    let (codebooks, rest): (Vec<_>, Vec<_>) = info.header.sections.iter().partition(|section| books(&section.name));
+    let size = |sections: &[&package::Section]| sections.iter().map(|section| section.length).sum::<usize>();
+    let each = size(&rest) as f64 / 45_000.0;
+    assert!(each <= 24.0, "{each:.2} bytes per Gaussian");
+    assert!(size(&codebooks) <= 1_500_000, "{} bytes of codebooks", size(&codebooks));
+    let packed = packed.into_runtime().expect("drawable");
+    assert_eq!(
+        packed.packed.as_ref().map(|packed| size_of_val(&packed.records[..])),
+        Some(45_000 * 32),
+        "32 bytes each"
+    );
+    let views = CameraFile::load(&data.join("toybox/golden_45k.json"), &CameraOptions::default()).expect("cameras");
+    for shot in views {
+        let seen = psnr(&scene, &packed, &shot.camera.view(shot.time, RasterFov::Reference));
+        assert!(seen >= 44.0, "{}: {seen:.2} dB with codebooks of 1024", shot.name);
+    }
+}
