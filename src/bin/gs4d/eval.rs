@@ -4,17 +4,19 @@
 //! reference, render, amplified difference.
 
 use crate::drawing::Drawing;
+use crate::engine::EngineArgs;
 use crate::failure::Failure;
-use crate::gpu::GpuArgs;
 use crate::interrupt;
 use crate::opening::{self, CheckpointArgs};
 use crate::report::{Report, Table, lines, progress};
-use crate::splits::{self, DataArgs};
+use crate::splits::{self, SplitArgs};
 use crate::values;
 use bevy_gs4d::codec;
 use bevy_gs4d::dataset::Split;
-use bevy_gs4d::metrics::{Evaluation, Likeness, MetricSet, ViewLikeness, evaluate, side_by_side};
+use bevy_gs4d::frame::Background;
+use bevy_gs4d::metrics::{Evaluation, EvaluationSettings, Likeness, MetricSet, ViewLikeness, evaluate, side_by_side};
 use bevy_gs4d::picture::Picture;
+use bevy_gs4d::scene::TemporalFilter;
 use clap::ValueEnum;
 use image::codecs::png::PngEncoder;
 use serde_json::json;
@@ -40,7 +42,7 @@ pub struct Eval {
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     #[command(flatten)]
-    data: DataArgs,
+    data: SplitArgs,
     /// The views: train, test or val (the test views of a folder named lego are those of val, as in the original).
     #[arg(long, value_name = "SPLIT", default_value = "test", value_parser = values::one_of(&splits::SPLITS))]
     split: Split,
@@ -60,14 +62,14 @@ pub struct Eval {
     #[arg(long, value_name = "FACTOR", default_value = "5", value_parser = values::positive)]
     gain: f32,
     #[command(flatten)]
-    gpu: GpuArgs,
+    engine: EngineArgs,
     #[command(flatten)]
     checkpoint: CheckpointArgs,
 }
 
 /// A metric by name.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Metric {
+enum Metric {
     /// Peak signal-to-noise ratio.
     Psnr,
     /// Structural similarity.
@@ -79,7 +81,7 @@ pub enum Metric {
 }
 
 /// The metrics of a list.
-pub fn metric_set(list: &[Metric]) -> MetricSet {
+fn metric_set(list: &[Metric]) -> MetricSet {
     let has = |metric| list.contains(&metric);
     MetricSet { ssim: has(Metric::Ssim), ms_ssim: has(Metric::MsSsim), flip: has(Metric::Flip) }
 }
@@ -93,28 +95,26 @@ impl Eval {
             scene.filter = None;
         }
         let mut dataset = self.data.open(self.split, &scene.trained_with)?;
-        dataset.views = splits::even(dataset.views, self.views);
+        dataset.views = splits::share(dataset.views, self.views);
         dataset.require_images()?;
         if let Some(out) = &self.out {
             fs::create_dir_all(out).map_err(|error| Failure::at(out, &error))?;
         }
-        let mut settings = self.data.settings(&scene.trained_with, metric_set(&self.metrics));
+        let mut settings = EvaluationSettings::of(&scene.trained_with, metric_set(&self.metrics));
         settings.background = self.checkpoint.background.unwrap_or(settings.background);
-        let filtered = scene.filter.as_ref().map(|filter| filter.active_share());
-        let switches = opening::switches_json(&scene.trained_with, &scene.playback);
-        let mut drawing = Drawing::open(&self.gpu)?;
-        drawing.take(&scene, self.checkpoint.background)?;
-        drop(scene);
+        let background = self.checkpoint.background.map_or(Background::trained(&scene), Background::Color);
+        let mut engine = self.engine.open()?;
+        let engine_name = engine.name();
+        let mut drawing = Drawing::of(&mut engine, &scene, background)?;
 
         let start = Instant::now();
         let bar = progress(dataset.views.len(), "comparing");
         let seen = |view: &ViewLikeness, reference: &Picture, render: &Picture| {
             bar.inc(1);
             match &self.out {
-                Some(out) => write_png(
-                    &out.join(format!("{}.png", view.name)),
-                    &side_by_side(reference, render, self.gain),
-                ),
+                Some(out) => {
+                    write_png(&out.join(format!("{}.png", view.name)), &side_by_side(reference, render, self.gain))
+                }
                 None => Ok(()),
             }
         };
@@ -123,12 +123,13 @@ impl Eval {
         let seconds = start.elapsed().as_secs_f64();
 
         let split = splits::split_name(dataset.split);
+        let filtered = scene.filter.as_ref().map(TemporalFilter::active_share);
         let active = filtered.map_or("none".to_owned(), |share| format!("{:.1} % active", share * 100.0));
         let mut text = format!("{}\n", table(&evaluation));
         text += &lines(&[
             ("split", format!("{split} of {}", self.data.data.display())),
             ("filter", active),
-            ("time", format!("{seconds:.1} s on {}", drawing.adapter())),
+            ("time", format!("{seconds:.1} s on {engine_name}")),
         ]);
         let json = json!({
             "scene": self.scene.display().to_string(),
@@ -138,9 +139,9 @@ impl Eval {
             "views": evaluation.views,
             "mean": evaluation.mean,
             "out": self.out.as_ref().map(|out| out.display().to_string()),
-            "adapter": drawing.adapter_json(),
+            "engine": engine_name,
             "seconds": seconds,
-            "switches": switches,
+            "switches": opening::switches_json(&scene.trained_with, &scene.playback),
         });
         Ok(Report::new(json, text))
     }
@@ -152,7 +153,8 @@ fn table(evaluation: &Evaluation) -> Table {
     let optional: [(&str, fn(&Likeness) -> Option<f64>); 3] =
         [("SSIM", |l| l.ssim), ("MS-SSIM", |l| l.ms_ssim), ("FLIP", |l| l.flip)];
     let optional: Vec<_> = optional.into_iter().filter(|(_, of)| likenesses().any(|l| of(l).is_some())).collect();
-    let heads: Vec<&str> = ["view", "PSNR", "pooled"].into_iter().chain(optional.iter().map(|(name, _)| *name)).collect();
+    let heads: Vec<&str> =
+        ["view", "PSNR", "pooled"].into_iter().chain(optional.iter().map(|(name, _)| *name)).collect();
     let mut table = Table::new(&heads);
     let mut row = |name: String, likeness: &Likeness| {
         let fixed = [name, format!("{:.3}", likeness.psnr), format!("{:.3}", likeness.psnr_pooled)];
@@ -167,7 +169,7 @@ fn table(evaluation: &Evaluation) -> Table {
 }
 
 /// Writes a picture whole or not at all.
-pub fn write_png(path: &Path, picture: &Picture) -> Result<(), Failure> {
+fn write_png(path: &Path, picture: &Picture) -> Result<(), Failure> {
     let write = |file: &mut dyn io::Write| {
         picture.to_rgb8().write_with_encoder(PngEncoder::new(file)).map_err(io::Error::other)
     };

@@ -3,16 +3,22 @@
 //! In: the command line. Out: one report on standard output (text, or one JSON document with `--json`); progress, notes and
 //! errors on standard error; exit code 0, 2 for any failure, 130 when interrupted.
 
+mod ablate;
+mod bake;
 mod bench;
 mod compare;
 mod convert;
+mod drawing;
+mod eval;
 mod failure;
+mod filters;
 mod gpu;
 mod info;
 mod interrupt;
 mod opening;
 mod render;
 mod report;
+mod splits;
 mod synth;
 mod values;
 mod views;
@@ -49,6 +55,9 @@ enum Verb {
     Compare(compare::Compare),
     Synth(synth::Synth),
     Bench(bench::Bench),
+    Eval(eval::Eval),
+    Ablate(ablate::Ablate),
+    Bake(bake::Bake),
 }
 
 impl Verb {
@@ -60,6 +69,9 @@ impl Verb {
             Self::Compare(verb) => verb.run(),
             Self::Synth(verb) => verb.run(),
             Self::Bench(verb) => verb.run(),
+            Self::Eval(verb) => verb.run(),
+            Self::Ablate(verb) => verb.run(),
+            Self::Bake(verb) => verb.run(),
         }
     }
 }
