@@ -87,6 +87,7 @@
 #[cfg(feature = "bevy")]
 pub mod asset;
 pub mod codec;
+pub mod compress;
 pub mod dataset;
 pub mod frame;
 pub mod gaussian;

@@ -66,13 +66,6 @@ fn a_scene_matches_its_own_pictures() {
 }
 
 #[test]
-fn the_verbs_explain_themselves() {
-    for verb in ["eval", "ablate", "bake"] {
-        assert!(gs4d(&arguments![verb, "--help"]).text().contains("Examples:"), "{verb} has examples");
-    }
-}
-
-#[test]
 fn what_is_missing_is_named() {
     let (folder, scene, data) = capture(UVec2::splat(32));
     gs4d(&arguments!["eval", &scene, "--data", folder.path().join("nowhere")]).must_fail("transforms_test.json");

@@ -4,7 +4,7 @@
 //! model, step by step in its order; laid beside `shaders/project.wgsl`.
 
 use super::{Gaussian, MARGINAL_CUTOFF, View};
-use glam::{Mat2, Mat3, UVec4, Vec2, Vec3, Vec3Swizzles};
+use glam::{Mat2, Mat3, UVec4, Vec2, Vec3, Vec3Swizzles, Vec4};
 
 /// Side of a tile in pixels.
 pub const TILE_SIZE: u32 = 16;
@@ -42,6 +42,11 @@ pub struct Projected {
 
 /// Projects one Gaussian.
 pub fn project(gaussian: &Gaussian, view: &View) -> Option<Projected> {
+    project_with(gaussian, view, &view.clip_rows())
+}
+
+/// Projects one of many Gaussians: `clip` are the view's [`clip_rows`](View::clip_rows), worked out once for all.
+pub fn project_with(gaussian: &Gaussian, view: &View, clip: &[Vec4; 2]) -> Option<Projected> {
     let marginal = gaussian.marginal(view.time);
     if marginal <= MARGINAL_CUTOFF {
         return None;
@@ -52,7 +57,7 @@ pub fn project(gaussian: &Gaussian, view: &View) -> Option<Projected> {
         return None;
     }
     let size = view.size.as_vec2();
-    let [clip_x, clip_y] = view.clip_rows();
+    let [clip_x, clip_y] = clip;
     let ndc = Vec2::new(clip_x.dot(mean.extend(1.0)), clip_y.dot(mean.extend(1.0))) / (q.z + 1e-7);
     let center = ((ndc + 1.0) * size - 1.0) * 0.5;
 

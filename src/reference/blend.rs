@@ -30,12 +30,7 @@ pub fn blend(
             let (x, y) = (i % size.x, i / size.x);
             let tile = (y / TILE_SIZE) * tiles.x + x / TILE_SIZE;
             let (color, transmittance, depth) = blend_pixel(splats, &pairs[ranges[tile as usize].clone()], x, y);
-            let behind = match (background, environment) {
-                (Background::Color(color), _) => Vec3::from(color),
-                (Background::Environment, Some(map)) => map.sample(view.camera_position, view.ray(x, y)),
-                _ => Vec3::ZERO,
-            };
-            (color + transmittance * behind, transmittance, depth)
+            (color + transmittance * behind(view, background, environment, x, y), transmittance, depth)
         })
         .collect();
     Frame {
@@ -43,6 +38,15 @@ pub fn blend(
         transmittance: pixels.iter().map(|p| p.1).collect(),
         depth: pixels.iter().map(|p| p.2).collect(),
         counts,
+    }
+}
+
+/// What stands behind all Gaussians at pixel `(x, y)`.
+pub(super) fn behind(view: &View, background: Background, environment: Option<&Environment>, x: u32, y: u32) -> Vec3 {
+    match (background, environment) {
+        (Background::Color(color), _) => Vec3::from(color),
+        (Background::Environment, Some(map)) => map.sample(view.camera_position, view.ray(x, y)),
+        _ => Vec3::ZERO,
     }
 }
 

@@ -4,7 +4,7 @@
 
 use crate::gaussian::{ShDirection, View, projection};
 use crate::scene::RuntimeScene;
-use glam::{UVec4, Vec2, Vec3};
+use glam::{UVec4, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 /// A Gaussian sliced at a time and projected to a view.
@@ -47,12 +47,13 @@ impl Splat {
 
 /// Projects every Gaussian of the scene.
 pub fn project(scene: &RuntimeScene, view: &View) -> Vec<Splat> {
-    (0..scene.gaussians.len()).into_par_iter().map(|i| project_one(scene, i, view)).collect()
+    let clip = view.clip_rows();
+    (0..scene.gaussians.len()).into_par_iter().map(|i| project_one(scene, i, view, &clip)).collect()
 }
 
-fn project_one(scene: &RuntimeScene, index: usize, view: &View) -> Splat {
+fn project_one(scene: &RuntimeScene, index: usize, view: &View, clip: &[Vec4; 2]) -> Splat {
     let gaussian = &scene.gaussians[index];
-    let Some(projected) = projection::project(gaussian, view) else { return Splat::INVISIBLE };
+    let Some(projected) = projection::project_with(gaussian, view, clip) else { return Splat::INVISIBLE };
     let seen = match scene.trained_with.sh_direction {
         ShDirection::Canonical => Vec3::from(gaussian.mean),
         ShDirection::Displaced => projected.mean,

@@ -19,14 +19,29 @@ pub struct GpuArgs {
 }
 
 impl GpuArgs {
+    /// Whether a certain adapter was asked for.
+    pub fn is_chosen(&self) -> bool {
+        self.adapter.is_some()
+    }
+
     /// Opens the adapter and compiles the passes.
     ///
     /// # Errors
     /// No such adapter, or one that cannot run the passes.
     pub fn open(&self) -> Result<Headless, Failure> {
         let context = GpuContext::headless(self.adapter.as_deref())?;
-        let checks = if self.checks { ShaderChecks::On } else { ShaderChecks::Off };
-        Ok(Headless::new(context, checks)?)
+        Ok(Headless::new(context, self.shader_checks())?)
+    }
+
+    /// Opens the fastest adapter if that is a real GPU. A driver in software is slower than the CPU twins.
+    pub fn open_hardware(&self) -> Option<Headless> {
+        let context = GpuContext::headless(None).ok()?;
+        let software = context.info.device_type == wgpu::DeviceType::Cpu;
+        if software { None } else { Headless::new(context, self.shader_checks()).ok() }
+    }
+
+    fn shader_checks(&self) -> ShaderChecks {
+        if self.checks { ShaderChecks::On } else { ShaderChecks::Off }
     }
 }
 

@@ -1,4 +1,4 @@
-//! The `gs4d` command: looks into captures, converts, renders, compares and times them.
+//! The `gs4d` command: looks into captures, converts, renders, compares and times them, and makes them smaller.
 //!
 //! In: the command line. Out: one report on standard output (text, or one JSON document with `--json`); progress, notes and
 //! errors on standard error; exit code 0, 2 for any failure, 130 when interrupted.
@@ -7,19 +7,25 @@ mod ablate;
 mod bake;
 mod bench;
 mod compare;
+mod contest;
 mod convert;
 mod drawing;
+mod engine;
 mod eval;
 mod failure;
 mod filters;
 mod gpu;
 mod info;
 mod interrupt;
+mod mask;
 mod opening;
+mod prune;
 mod render;
 mod report;
+mod score;
 mod splits;
 mod synth;
+mod training;
 mod values;
 mod views;
 
@@ -28,7 +34,7 @@ use failure::Failure;
 use report::Report;
 use std::process::ExitCode;
 
-/// Dynamic captures (native 4D Gaussian Splatting): look into them, convert, render, compare, time.
+/// Dynamic captures (native 4D Gaussian Splatting): look into them, convert, render, compare, time, make smaller.
 #[derive(Parser)]
 #[command(name = "gs4d", version, propagate_version = true, after_help = EXAMPLES)]
 struct Cli {
@@ -55,6 +61,9 @@ enum Verb {
     Compare(compare::Compare),
     Synth(synth::Synth),
     Bench(bench::Bench),
+    Score(score::Score),
+    Prune(prune::Prune),
+    Mask(mask::Mask),
     Eval(eval::Eval),
     Ablate(ablate::Ablate),
     Bake(bake::Bake),
@@ -69,6 +78,9 @@ impl Verb {
             Self::Compare(verb) => verb.run(),
             Self::Synth(verb) => verb.run(),
             Self::Bench(verb) => verb.run(),
+            Self::Score(verb) => verb.run(),
+            Self::Prune(verb) => verb.run(),
+            Self::Mask(verb) => verb.run(),
             Self::Eval(verb) => verb.run(),
             Self::Ablate(verb) => verb.run(),
             Self::Bake(verb) => verb.run(),

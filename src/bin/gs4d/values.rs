@@ -35,6 +35,18 @@ pub fn positive(text: &str) -> Result<f32, String> {
     number(text).ok().filter(|v| *v > 0.0).ok_or_else(|| "expected a number above zero".to_owned())
 }
 
+/// A share, 0 to 1.
+pub fn share(text: &str) -> Result<f64, String> {
+    let share = text.trim().parse::<f64>().ok().filter(|share| (0.0..=1.0).contains(share));
+    share.ok_or_else(|| "expected a number from 0 to 1".to_owned())
+}
+
+/// A finite number, not below zero, in double precision.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    let value = text.trim().parse::<f64>().ok().filter(|value| value.is_finite() && *value >= 0.0);
+    value.ok_or_else(|| "expected a number, zero or above".to_owned())
+}
+
 /// `WxH` in pixels.
 pub fn size(text: &str) -> Result<UVec2, String> {
     let side = |text: &str| text.parse::<u32>().ok().filter(|side| (1..=MAX_SIDE).contains(side));
@@ -76,6 +88,10 @@ mod tests {
         for text in ["", "400", "0x4", "4x0", "-4x4", "99999x4", "4x4x4"] {
             assert!(size(text).is_err(), "{text:?} is no size");
         }
+        for text in ["", "-0.1", "1.1", "nan", "80%"] {
+            assert!(share(text).is_err(), "{text:?} is no share");
+        }
+        assert!(not_negative("-1").is_err() && not_negative("inf").is_err(), "finite and not below zero");
         assert!(interval("1,1").is_err(), "an interval has a length");
         assert!(positive("0").is_err(), "zero is not above zero");
     }

@@ -10,7 +10,7 @@ mod summary;
 use crate::convert::is_same_file;
 use crate::engine::{Engine, EngineArgs};
 use crate::failure::Failure;
-use crate::filters::{FILTERS, filter, filter_name};
+use crate::filters::{FILTERS, KEYS, filter, filter_name};
 use crate::interrupt;
 use crate::opening::{CheckpointArgs, PackageArgs};
 use crate::report::Report;
@@ -32,8 +32,6 @@ use steps::Steps;
 
 /// Stages of a bake, without the fine-tuning that is to come.
 const STAGES: usize = 6;
-/// Key-frames unless said otherwise.
-const KEYS: u32 = 11;
 
 /// Turn a trained checkpoint into a small, fast package: score, prune, mask, compress, evaluate, report.
 ///

@@ -1,0 +1,63 @@
+//! Pruning: the scene with the Gaussians that score highest.
+//!
+//! In: a scene of either form and a score for each Gaussian. Out: the scene with some of them, in their old order, with their colour
+//! and their part of the temporal filter.
+
+use crate::gaussian::{Harmonics, Parameters};
+use crate::scene::{Form, GaussianScene};
+
+/// How many of `count` Gaussians are left when this share of them (0 to 1) is removed: `round((1 − ratio) count)`.
+pub fn kept_count(count: usize, ratio: f64) -> usize {
+    (((1.0 - ratio) * count as f64).round() as usize).min(count)
+}
+
+/// Indices of the `count` highest scores, ascending; of equal scores the earlier Gaussians.
+pub fn highest(scores: &[f32], count: usize) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..scores.len() as u32).collect();
+    // Stable: equal scores stay in the order of the scene.
+    order.sort_by(|&a, &b| scores[b as usize].total_cmp(&scores[a as usize]));
+    order.truncate(count);
+    order.sort_unstable();
+    order
+}
+
+/// The scene with only the Gaussians at these indices, in this order. The indices must be below the scene's length.
+pub fn select(scene: &GaussianScene, keep: &[u32]) -> GaussianScene {
+    let form = match &scene.form {
+        Form::Trained(parameters) => Form::Trained(select_parameters(parameters, keep)),
+        Form::Runtime(gaussians) => Form::Runtime(rows(gaussians, keep)),
+    };
+    GaussianScene {
+        form,
+        harmonics: select_harmonics(&scene.harmonics, keep),
+        environment: scene.environment.clone(),
+        filter: scene.filter.as_ref().map(|filter| filter.select(keep)),
+        trained_with: scene.trained_with.clone(),
+        playback: scene.playback,
+    }
+}
+
+fn select_parameters(parameters: &Parameters, keep: &[u32]) -> Parameters {
+    Parameters {
+        mean: rows(&parameters.mean, keep),
+        mean_t: rows(&parameters.mean_t, keep),
+        log_scale: rows(&parameters.log_scale, keep),
+        log_scale_t: rows(&parameters.log_scale_t, keep),
+        rotation_l: rows(&parameters.rotation_l, keep),
+        rotation_r: rows(&parameters.rotation_r, keep),
+        opacity_logit: rows(&parameters.opacity_logit, keep),
+    }
+}
+
+fn select_harmonics(harmonics: &Harmonics, keep: &[u32]) -> Harmonics {
+    let mut values = Vec::with_capacity(keep.len() * harmonics.coefficients * 3);
+    for &index in keep {
+        values.extend_from_slice(harmonics.of(index as usize));
+    }
+    Harmonics { values, ..*harmonics }
+}
+
+/// Those rows of an attribute; an attribute that the model does not have stays empty.
+fn rows<T: Copy>(values: &[T], keep: &[u32]) -> Vec<T> {
+    if values.is_empty() { Vec::new() } else { keep.iter().map(|&index| values[index as usize]).collect() }
+}
