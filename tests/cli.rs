@@ -129,13 +129,15 @@ fn a_package_knows_how_it_was_trained() {
 
 #[test]
 fn people_get_text() {
+    const VERBS: [&str; 12] =
+        ["info", "convert", "render", "compare", "synth", "bench", "score", "prune", "mask", "eval", "ablate", "bake"];
     let folder = folder();
     let path = scene(&folder, "50");
     let text = gs4d(&args("info", &[&path])).text();
     for expected in ["Gaussians", "time interval", "bounds", "sh_rest", "hold"] {
         assert!(text.contains(expected), "{expected} in {text}");
     }
-    for verb in ["info", "convert", "render", "compare", "synth", "bench", "score", "prune", "mask"] {
+    for verb in VERBS {
         assert!(gs4d(&[verb, "--help"]).text().contains("Examples:"), "{verb} explains itself");
     }
 }

@@ -1,7 +1,7 @@
 //! Picture metrics against values worked out by hand and by an independent float64 implementation.
 
 use bevy_gs4d::{
-    metrics::{SizeMismatch, psnr, psnr_pooled, ssim},
+    metrics::{MS_SSIM_MIN_SIDE, SizeMismatch, flip, ms_ssim, psnr, psnr_pooled, ssim},
     picture::Picture,
 };
 use glam::{UVec2, Vec3};
@@ -10,6 +10,13 @@ use proptest::prelude::*;
 /// A deterministic pattern; `k` changes it.
 fn pattern(width: u32, height: u32, k: u32) -> Picture {
     let value = |x: u32, y: u32, c: u32| ((x * (7 + k) + y * (13 - k) + c * 29 + k * x * y) % 32) as f32 / 31.0;
+    let pixel = |i: u32| Vec3::from([0, 1, 2].map(|c| value(i % width, i / width, c)));
+    Picture { size: UVec2::new(width, height), pixels: (0..width * height).map(pixel).collect() }
+}
+
+/// Flat blocks with sharp borders.
+fn blocks(width: u32, height: u32) -> Picture {
+    let value = |x: u32, y: u32, c: u32| ((x / 9 * 5 + y / 7 * 3 + c * 7) % 16) as f32 / 15.0;
     let pixel = |i: u32| Vec3::from([0, 1, 2].map(|c| value(i % width, i / width, c)));
     Picture { size: UVec2::new(width, height), pixels: (0..width * height).map(pixel).collect() }
 }
@@ -86,12 +93,59 @@ fn pictures_smaller_than_the_window_are_padded_with_zeros() {
 }
 
 #[test]
+fn similarity_at_five_scales_equals_an_independent_implementation() {
+    let (a, n) = (blocks(192, 180), pattern(192, 180, 3));
+    let value = |a: &Picture, b: &Picture| ms_ssim(a, b).expect("same size").expect("large enough");
+    for (other, expected) in [(mixed(&a, &n, 0.25), 0.9453459110134244), (n, 0.020016371180708016)] {
+        let value = value(&a, &other);
+        assert!(close(value, expected, 1e-5), "{value} instead of {expected}");
+    }
+    let least = blocks(MS_SSIM_MIN_SIDE, MS_SSIM_MIN_SIDE);
+    let least_value = value(&least, &mixed(&least, &pattern(MS_SSIM_MIN_SIDE, MS_SSIM_MIN_SIDE, 3), 0.25));
+    assert!(close(least_value, 0.9455034368401481, 1e-5), "one window at the coarsest scale: {least_value}");
+    assert!(close(value(&a, &a), 1.0, 1e-12), "identical");
+    let negative = Picture { size: a.size, pixels: a.pixels.iter().map(|p| Vec3::ONE - *p).collect() };
+    assert_eq!(value(&a, &negative), 0.0, "what is opposite counts as nothing");
+    let small = blocks(MS_SSIM_MIN_SIDE, MS_SSIM_MIN_SIDE - 1);
+    assert_eq!(ms_ssim(&small, &small), Ok(None), "too few pixels for five scales");
+}
+
+#[test]
+fn flip_equals_an_independent_implementation() {
+    let (a, n, b) = (pattern(40, 30, 0), pattern(40, 30, 3), blocks(40, 30));
+    let (large, fine) = (blocks(192, 180), pattern(192, 180, 3));
+    // The published evaluator gives 0.40389833, 0.22517820, 0.86294371, 0.22081998 and 0.39843717.
+    for (reference, test, expected) in [
+        (&a, &n, 0.4038979749482898),
+        (&a, &mixed(&a, &n, 0.25), 0.22517817701350548),
+        (&b, &a, 0.8629436623796588),
+        (&b, &mixed(&b, &a, 0.1), 0.2208201521865226),
+        (&large, &mixed(&large, &fine, 0.25), 0.39843508483739337),
+    ] {
+        let value = flip(reference, test).expect("same size");
+        assert!(close(value, expected, 1e-5), "{value} instead of {expected}");
+    }
+}
+
+#[test]
+fn flip_of_flat_pictures_is_the_difference_of_colour_alone() {
+    let flat = |color| Picture::filled(UVec2::new(12, 9), color);
+    let value = |a, b| flip(&flat(a), &flat(b)).expect("same size");
+    assert_eq!(value(Vec3::splat(0.3), Vec3::splat(0.3)), 0.0, "identical");
+    assert!(close(value(Vec3::Y, Vec3::Z), 1.0, 1e-9), "green and blue are farthest apart");
+    assert!(close(value(Vec3::ZERO, Vec3::ONE), 0.9673797618501423, 1e-6), "black and white");
+    assert!(close(value(Vec3::splat(0.5), Vec3::splat(0.6)), 0.2850130525308668, 1e-5), "two greys");
+}
+
+#[test]
 fn pictures_of_other_sizes_are_refused() {
     let (a, b) = (pattern(4, 6, 0), pattern(6, 4, 0));
     let mismatch = SizeMismatch { first: UVec2::new(4, 6), second: UVec2::new(6, 4) };
     assert_eq!(psnr(&a, &b), Err(mismatch), "as many pixels, other shape");
     assert_eq!(psnr_pooled(&a, &b), Err(mismatch), "pooled");
     assert_eq!(ssim(&a, &b), Err(mismatch), "similarity");
+    assert_eq!(ms_ssim(&a, &b), Err(mismatch), "similarity at five scales");
+    assert_eq!(flip(&a, &b), Err(mismatch), "flip");
     assert!(mismatch.to_string().contains("4x6") && mismatch.to_string().contains("6x4"), "{mismatch}");
     let empty = Picture { size: UVec2::ZERO, pixels: Vec::new() };
     assert!(psnr(&empty, &empty).is_err() && ssim(&empty, &empty).is_err(), "no pixels, no number");
@@ -122,5 +176,8 @@ proptest! {
         prop_assert!((-1.0..=1.0 + 1e-12).contains(&similarity), "{}", similarity);
         let (mean, pooled) = (psnr(&a, &b).expect("same size"), psnr_pooled(&a, &b).expect("same size"));
         prop_assert!(mean >= pooled - 1e-9, "{} below {}", mean, pooled);
+        let (there, back) = (flip(&a, &b).expect("same size"), flip(&b, &a).expect("same size"));
+        prop_assert!((there - back).abs() < 1e-12, "{} and {}", there, back);
+        prop_assert!((0.0..=1.0 + 1e-9).contains(&there), "{}", there);
     }
 }

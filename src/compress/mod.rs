@@ -9,7 +9,9 @@
 //! 3. [`prune`] keeps the Gaussians that score highest; [`loss`] tells what that costs, and how many a given loss takes.
 //! 4. [`masks`] makes the temporal filter.
 //! 5. [`pack`] compresses: [`order`], [`quantize`], [`codebook`].
+//! 6. [`bake`] lets these stages take up where they left off; [`report`] says what they cost.
 
+pub mod bake;
 pub mod codebook;
 pub mod loss;
 pub mod masks;
@@ -17,6 +19,7 @@ pub mod order;
 pub mod pack;
 pub mod prune;
 pub mod quantize;
+pub mod report;
 pub mod score;
 pub mod variant;
 pub mod views;

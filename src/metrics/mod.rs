@@ -1,11 +1,18 @@
-//! How close two pictures are: PSNR and SSIM.
+//! How close two pictures are: PSNR, SSIM, MS-SSIM and FLIP; and how close a scene is to a dataset.
 //!
 //! In: two [`Picture`]s of the same size, values 0 to 1 (nothing is clamped here: clamp a rendering with [`Picture::clamped`] first,
 //! as the original evaluation does). Out: one number. Pixels that are not finite make the number not finite too.
+//! [`evaluate()`] does this for every view of a dataset.
 
+mod evaluate;
+mod flip;
+mod ms_ssim;
 mod psnr;
 mod ssim;
 
+pub use evaluate::{Evaluation, EvaluationSettings, Likeness, MetricSet, ViewLikeness, evaluate, side_by_side};
+pub use flip::flip;
+pub use ms_ssim::{MS_SSIM_MIN_SIDE, ms_ssim};
 pub use psnr::{psnr, psnr_pooled};
 pub use ssim::ssim;
 

@@ -12,14 +12,14 @@ use rayon::prelude::*;
 use super::{SizeMismatch, check_sizes};
 use crate::picture::Picture;
 
-const WINDOW: usize = 11;
-const RADIUS: usize = WINDOW / 2;
+pub(super) const WINDOW: usize = 11;
+pub(super) const RADIUS: usize = WINDOW / 2;
 const SIGMA: f64 = 1.5;
 const C1: f64 = 0.01 * 0.01;
 const C2: f64 = 0.03 * 0.03;
 
 /// Window-weighted means of `a`, `b`, `a²`, `b²`, `ab`, each per channel.
-type Moments = [DVec3; 5];
+pub(super) type Moments = [DVec3; 5];
 
 /// SSIM, at most 1, which identical pictures reach.
 ///
@@ -33,7 +33,8 @@ pub fn ssim(a: &Picture, b: &Picture) -> Result<f64, SizeMismatch> {
     Ok(rows.into_iter().sum::<DVec3>().element_sum() / (3.0 * a.pixels.len() as f64))
 }
 
-fn gaussian_window() -> [f64; WINDOW] {
+/// The weights of the window along one axis; they sum to one.
+pub(super) fn gaussian_window() -> [f64; WINDOW] {
     let weights: [f64; WINDOW] = std::array::from_fn(|i| {
         let distance = i as f64 - RADIUS as f64;
         (-distance * distance / (2.0 * SIGMA * SIGMA)).exp()
@@ -51,6 +52,12 @@ fn inside(window: &[f64; WINDOW], center: usize, length: usize) -> impl Iterator
 
 /// SSIM summed over row `y`, per channel.
 fn row_sum(a: &Picture, b: &Picture, y: usize, window: &[f64; WINDOW]) -> DVec3 {
+    let columns = column_moments(a, b, y, window);
+    (0..columns.len()).map(|x| similarity(&moments_at(&columns, x, window))).sum()
+}
+
+/// The window about row `y`, applied down each column.
+pub(super) fn column_moments(a: &Picture, b: &Picture, y: usize, window: &[f64; WINDOW]) -> Vec<Moments> {
     let (width, height) = (a.size.x as usize, a.size.y as usize);
     let mut columns = vec![Moments::default(); width];
     for (row, weight) in inside(window, y, height) {
@@ -61,14 +68,16 @@ fn row_sum(a: &Picture, b: &Picture, y: usize, window: &[f64; WINDOW]) -> DVec3 
             accumulate(column, weight, &[p, q, p * p, q * q, p * q]);
         }
     }
-    let at = |x: usize| {
-        let mut moments = Moments::default();
-        for (column, weight) in inside(window, x, width) {
-            accumulate(&mut moments, weight, &columns[column]);
-        }
-        similarity(&moments)
-    };
-    (0..width).map(at).sum()
+    columns
+}
+
+/// The window about column `x`, applied along the row that [`column_moments`] gave.
+pub(super) fn moments_at(columns: &[Moments], x: usize, window: &[f64; WINDOW]) -> Moments {
+    let mut moments = Moments::default();
+    for (column, weight) in inside(window, x, columns.len()) {
+        accumulate(&mut moments, weight, &columns[column]);
+    }
+    moments
 }
 
 fn accumulate(sum: &mut Moments, weight: f64, values: &Moments) {
@@ -77,11 +86,16 @@ fn accumulate(sum: &mut Moments, weight: f64, values: &Moments) {
     }
 }
 
-fn similarity(&[mean_a, mean_b, square_a, square_b, product]: &Moments) -> DVec3 {
+fn similarity(moments: &Moments) -> DVec3 {
+    let (luminance, contrast) = factors(moments);
+    luminance * contrast
+}
+
+/// The two factors of SSIM: of the means, and of contrast and structure together.
+pub(super) fn factors(&[mean_a, mean_b, square_a, square_b, product]: &Moments) -> (DVec3, DVec3) {
     let (mean_aa, mean_bb, mean_ab) = (mean_a * mean_a, mean_b * mean_b, mean_a * mean_b);
     let (variance_a, variance_b, covariance) = (square_a - mean_aa, square_b - mean_bb, product - mean_ab);
-    let similar = (2.0 * mean_ab + C1) * (2.0 * covariance + C2);
-    similar / ((mean_aa + mean_bb + C1) * (variance_a + variance_b + C2))
+    ((2.0 * mean_ab + C1) / (mean_aa + mean_bb + C1), (2.0 * covariance + C2) / (variance_a + variance_b + C2))
 }
 
 #[cfg(test)]

@@ -224,6 +224,6 @@ fn draw(engine: &mut Engine, scene: &RuntimeScene, views: &[View]) -> Result<Vec
         pictures.push(picture);
     });
     bar.finish_and_clear();
-    drawn.map_err(|error| Failure::new(&error.to_string()))?;
+    drawn.map_err(|error| Failure::new(error.to_string()))?;
     Ok(pictures)
 }

@@ -3,13 +3,18 @@
 //! In: the command line. Out: one report on standard output (text, or one JSON document with `--json`); progress, notes and
 //! errors on standard error; exit code 0, 2 for any failure, 130 when interrupted.
 
+mod ablate;
+mod bake;
 mod bench;
 mod compare;
 mod compress;
 mod contest;
 mod convert;
+mod drawing;
 mod engine;
+mod eval;
 mod failure;
+mod filters;
 mod gpu;
 mod info;
 mod interrupt;
@@ -19,6 +24,7 @@ mod prune;
 mod render;
 mod report;
 mod score;
+mod splits;
 mod synth;
 mod training;
 mod values;
@@ -60,6 +66,9 @@ enum Verb {
     Score(score::Score),
     Prune(prune::Prune),
     Mask(mask::Mask),
+    Eval(eval::Eval),
+    Ablate(ablate::Ablate),
+    Bake(bake::Bake),
 }
 
 impl Verb {
@@ -75,6 +84,9 @@ impl Verb {
             Self::Score(verb) => verb.run(),
             Self::Prune(verb) => verb.run(),
             Self::Mask(verb) => verb.run(),
+            Self::Eval(verb) => verb.run(),
+            Self::Ablate(verb) => verb.run(),
+            Self::Bake(verb) => verb.run(),
         }
     }
 }

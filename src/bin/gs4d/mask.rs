@@ -5,23 +5,17 @@
 
 use crate::engine::EngineArgs;
 use crate::failure::Failure;
+use crate::filters::{FILTERS, KEYS, by_views, filter_name, support};
 use crate::opening::{CheckpointArgs, PackageArgs};
-use crate::report::{Report, bytes, lines, progress};
+use crate::report::{Report, bytes, lines};
 use crate::training::DataArgs;
 use crate::values;
-use bevy_gs4d::compress::masks::{
-    interval_filter, key_frame_filter, key_frame_masks, key_times, keys_every, neighbour_overlap,
-};
-use bevy_gs4d::compress::sliced;
-use bevy_gs4d::compress::views::{distinct_cameras, distinct_times, to_draw};
+use bevy_gs4d::compress::masks::{keys_every, neighbour_overlap};
+use bevy_gs4d::compress::views::distinct_times;
 use bevy_gs4d::dataset::TrainingView;
-use bevy_gs4d::frame::Background;
-use bevy_gs4d::scene::{ActiveSets, FilterKind, GaussianScene, MAX_SEGMENTS, TemporalFilter};
+use bevy_gs4d::scene::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter};
 use serde_json::json;
 use std::path::PathBuf;
-
-/// Key-frames unless said otherwise.
-const KEYS: u32 = 11;
 
 /// Tell a scene which of its Gaussians are active when, so that drawing can skip the others.
 #[derive(clap::Args)]
@@ -58,9 +52,6 @@ pub struct Mask {
     checkpoint: CheckpointArgs,
 }
 
-const FILTERS: [(&str, FilterKind); 3] =
-    [("support", FilterKind::Support), ("interval", FilterKind::Interval), ("key-frame", FilterKind::KeyFrame)];
-
 impl Mask {
     /// Makes the filter and writes the scene with it.
     pub fn run(&self) -> Result<Report, Failure> {
@@ -71,9 +62,10 @@ impl Mask {
         let views = if needs_views { self.data.open(&scene.trained_with)? } else { Vec::new() };
         let keys = self.keys(&views)?;
         let filter = match self.filter {
-            FilterKind::Support => self.support(&scene, keys)?,
-            kind => self.by_views(&scene, keys, &views, kind)?,
+            FilterKind::Support => support(&scene, keys),
+            kind => by_views(&mut self.engine.open()?, &scene, kind, keys, &views),
         };
+        let filter = filter.map_err(|failure| Failure::about(&self.input, failure.message()))?;
         let (share, overlap) = (filter.active_share(), neighbour_overlap(&filter));
         let least = overlap.iter().copied().fold(1.0, f64::min);
         let mean = if overlap.is_empty() { 1.0 } else { overlap.iter().sum::<f64>() / overlap.len() as f64 };
@@ -81,7 +73,7 @@ impl Mask {
         let (count, segments) = (scene.len(), filter.segments);
         scene.filter = Some(filter);
         let written = self.package.save(&scene)?;
-        let name = FILTERS.iter().find(|(_, kind)| *kind == self.filter).map_or("", |(name, _)| *name);
+        let name = filter_name(self.filter);
         let text = lines(&[
             ("filter", format!("{name}, {keys} key-frames, {segments} segments")),
             ("active", format!("{:.1} % of {count} Gaussians, mean over segments", share * 100.0)),
@@ -110,37 +102,6 @@ impl Mask {
         let keys = keys_every(distinct_times(views), frames);
         let fits = u32::try_from(keys).ok().filter(|keys| *keys <= MAX_SEGMENTS + 1);
         fits.ok_or_else(|| Failure::new(format!("{keys} key-frames are too many: raise --every")))
-    }
-
-    fn support(&self, scene: &GaussianScene, keys: u32) -> Result<TemporalFilter, Failure> {
-        let gaussians = sliced(scene).map_err(|error| Failure::at(&self.input, &error))?;
-        Ok(TemporalFilter::support(gaussians.iter().copied(), scene.trained_with.time_interval, keys - 1))
-    }
-
-    fn by_views(
-        &self,
-        scene: &GaussianScene,
-        keys: u32,
-        views: &[TrainingView],
-        kind: FilterKind,
-    ) -> Result<TemporalFilter, Failure> {
-        let runtime = scene.clone().into_runtime().map_err(|error| Failure::at(&self.input, &error))?;
-        let background = Background::trained(&runtime);
-        let (interval, raster_fov) = (runtime.trained_with.time_interval, runtime.trained_with.raster_fov);
-        let (times, cameras, count) = (key_times(interval, keys), distinct_cameras(views), scene.len());
-        let mut engine = self.engine.open()?;
-        let mut scorer = engine.scorer(&runtime, background)?;
-        let inside = if kind == FilterKind::Interval { views.len() } else { 0 };
-        let bar = progress(times.len() * cameras.len() + inside, "looking");
-        let masks = key_frame_masks(scorer.as_mut(), &cameras, raster_fov, &times, count, || bar.inc(1))?;
-        let filter = if kind == FilterKind::Interval {
-            let views = to_draw(views, raster_fov);
-            interval_filter(scorer.as_mut(), &masks, &views, interval, count, || bar.inc(1))?
-        } else {
-            key_frame_filter(&masks, count)
-        };
-        bar.finish_and_clear();
-        Ok(filter)
     }
 }
 

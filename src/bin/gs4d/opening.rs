@@ -147,7 +147,7 @@ pub struct PackageArgs {
     out_option: Option<PathBuf>,
     /// zstd level, 1 (fast) to 19 (small).
     #[arg(long, value_name = "LEVEL", default_value_t = package::WriteSettings::default().level, value_parser = clap::value_parser!(i32).range(1..=19))]
-    level: i32,
+    pub level: i32,
 }
 
 impl PackageArgs {

@@ -3,9 +3,10 @@
 //! In: what a verb found out. Out: one document on standard output; progress bars and errors on standard error.
 
 use crate::failure::Failure;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::{Value, json};
 use std::io::{ErrorKind, Write, stderr, stdout};
+use std::sync::LazyLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What a verb has to say in the end.
@@ -51,8 +52,11 @@ impl Report {
 
 /// Writes a line to standard error, or nowhere if that is closed.
 pub fn note(line: &str) {
-    let _ = writeln!(stderr(), "{line}");
+    let _ = BARS.suspend(|| writeln!(stderr(), "{line}"));
 }
+
+/// All progress bars on the screen, one below the other.
+static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
 
 /// Whether progress bars stay away.
 static SILENT: AtomicBool = AtomicBool::new(false);
@@ -62,13 +66,13 @@ pub fn silence_progress(silent: bool) {
     SILENT.store(silent, Ordering::Relaxed);
 }
 
-/// A progress bar on standard error; hidden with `--json` and where that is no terminal.
+/// A progress bar on standard error, below those that are there; hidden with `--json` and where that is no terminal.
 pub fn progress(length: usize, doing: &'static str) -> ProgressBar {
-    let target =
-        if SILENT.load(Ordering::Relaxed) { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
     let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::with_draw_target(Some(length as u64), target).with_style(style).with_message(doing)
+    let bar = ProgressBar::with_draw_target(Some(length as u64), ProgressDrawTarget::hidden());
+    let bar = bar.with_style(style).with_message(doing);
+    if SILENT.load(Ordering::Relaxed) { bar } else { BARS.add(bar) }
 }
 
 /// A table: the first column to the left, the others to the right.

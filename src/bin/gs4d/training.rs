@@ -73,7 +73,7 @@ pub fn choice(with_all: bool) -> impl TypedValueParser<Value = Choice> {
 }
 
 /// From which views scores come, and how.
-#[derive(clap::Args)]
+#[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Scoring")]
 pub struct ScoringArgs {
     /// Score with an even share of N views [default: all].

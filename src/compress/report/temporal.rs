@@ -1,0 +1,119 @@
+//! How Gaussians share the time: the three plots of the paper's Figure 2.
+//!
+//! In: runtime Gaussians before and after. Out: the distribution of their temporal variances, the share that is active at each time,
+//! and how far that set agrees with the first one.
+
+use crate::gaussian::{Gaussian, MARGINAL_CUTOFF};
+use crate::scene::TemporalFilter;
+use serde::Serialize;
+
+/// Number of bins of the histogram.
+const BINS: usize = 40;
+
+/// Shares of the Gaussians by temporal variance Σ_t, in bins of equal width on a logarithmic scale.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VarianceHistogram {
+    /// Borders of the bins, timestamp units squared; one more than there are bins.
+    pub borders: Vec<f64>,
+    /// Share of the Gaussians in each bin before.
+    pub before: Vec<f64>,
+    /// Share of the Gaussians in each bin after.
+    pub after: Vec<f64>,
+}
+
+impl VarianceHistogram {
+    /// Counts. Gaussians that are always there have no finite variance and are in no bin.
+    pub fn of(before: &[Gaussian], after: &[Gaussian]) -> Self {
+        let variance = |g: &Gaussian| f64::from(g.sigma_t).powi(2).log10();
+        let all = before.iter().chain(after).map(variance).filter(|v| v.is_finite());
+        let [low, high] = all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
+        let (low, high) = if low < high { (low, high) } else { (-4.0, 1.0) };
+        let width = (high - low) / BINS as f64;
+        let shares = |gaussians: &[Gaussian]| {
+            let mut bins = vec![0.0; BINS];
+            for value in gaussians.iter().map(variance).filter(|v| v.is_finite()) {
+                let bin = (((value - low) / width) as usize).min(BINS - 1);
+                bins[bin] += 1.0 / gaussians.len() as f64;
+            }
+            bins
+        };
+        Self {
+            borders: (0..=BINS).map(|i| 10f64.powf(low + width * i as f64)).collect(),
+            before: shares(before),
+            after: shares(after),
+        }
+    }
+}
+
+/// Which share of the Gaussians is active when, and how far the sets agree.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Activity {
+    /// Share of the Gaussians whose marginal exceeds the cut-off, at each time.
+    pub share: Vec<f64>,
+    /// Intersection over union of that set with the one at the first time.
+    pub overlap: Vec<f64>,
+}
+
+impl Activity {
+    /// Looks at every time.
+    pub fn of(gaussians: &[Gaussian], times: &[f32]) -> Self {
+        let active = |time: f32| gaussians.iter().map(move |g| g.marginal(time) > MARGINAL_CUTOFF);
+        let first: Vec<bool> = times.first().map(|&time| active(time).collect()).unwrap_or_default();
+        let (mut share, mut overlap) = (Vec::new(), Vec::new());
+        for &time in times {
+            let (mut count, mut both, mut either) = (0usize, 0usize, 0usize);
+            for (now, then) in active(time).zip(&first) {
+                count += usize::from(now);
+                both += usize::from(now && *then);
+                either += usize::from(now || *then);
+            }
+            share.push(count as f64 / gaussians.len().max(1) as f64);
+            overlap.push(if either == 0 { 1.0 } else { both as f64 / either as f64 });
+        }
+        Self { share, overlap }
+    }
+}
+
+/// Share of the Gaussians that a filter lets through, at each time.
+pub fn filter_shares(filter: &TemporalFilter, interval: [f32; 2], times: &[f32]) -> Vec<f64> {
+    let share = |segment: u32| {
+        let active = (0..filter.count).filter(|&index| filter.is_active(segment, index)).count();
+        active as f64 / filter.count.max(1) as f64
+    };
+    let shares: Vec<f64> = (0..filter.segments).map(share).collect();
+    times.iter().map(|&time| shares[filter.segment_of(time, interval) as usize]).collect()
+}
+
+/// Times at even spacing, both ends of the interval included.
+pub fn even_times(interval: [f32; 2], count: usize) -> Vec<f32> {
+    let step = (interval[1] - interval[0]) / (count.max(2) - 1) as f32;
+    (0..count).map(|i| interval[0] + step * i as f32).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gaussian(mean_t: f32, sigma_t: f32) -> Gaussian {
+        Gaussian { mean_t, sigma_t, opacity: 0.5, ..bytemuck::Zeroable::zeroed() }
+    }
+
+    #[test]
+    fn shares_sum_to_one_without_the_static_ones() {
+        let before = [gaussian(0.0, 0.1), gaussian(0.0, 0.01), gaussian(0.0, 1.0), gaussian(0.0, f32::INFINITY)];
+        let histogram = VarianceHistogram::of(&before, &before[..1]);
+        assert_eq!(histogram.borders.len(), BINS + 1, "borders of the bins");
+        assert!((histogram.before.iter().sum::<f64>() - 0.75).abs() < 1e-12, "three of four have a variance");
+        assert!((histogram.after.iter().sum::<f64>() - 1.0).abs() < 1e-12, "one of one");
+        assert!((histogram.borders[0] - 1e-4).abs() < 1e-7, "the smallest variance: {}", histogram.borders[0]);
+    }
+
+    #[test]
+    fn overlap_starts_at_one_and_ends_with_the_first_set() {
+        let gaussians = [gaussian(0.0, 0.1), gaussian(1.0, 0.1), gaussian(0.5, 10.0)];
+        let activity = Activity::of(&gaussians, &even_times([0.0, 1.0], 3));
+        assert_eq!(activity.overlap, [1.0, 0.5, 1.0 / 3.0], "the long-lived one alone stays");
+        assert!((activity.share[1] - 1.0 / 3.0).abs() < 1e-12, "only that one in the middle: {:?}", activity.share);
+        assert!((activity.share[0] - 2.0 / 3.0).abs() < 1e-12, "two at the start: {:?}", activity.share);
+    }
+}
