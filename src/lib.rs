@@ -63,6 +63,11 @@
 //!
 //! A pass has one name everywhere: `shaders/project.wgsl`, the functions in [`mod@reference`], the timestamp span, the test.
 //!
+//! # From a checkpoint to a small capture
+//!
+//! [`compress`] is the offline half: what each Gaussian is worth ([`compress::score`]), which stay ([`compress::prune`]), which are
+//! active when ([`compress::masks`]), how few bytes they need ([`compress::pack`]). `gs4d bake` calls them in order and reports.
+//!
 //! # How it is known to be right
 //!
 //! * [`mod@reference`] is the CPU twin of every pass, plain functions over slices. The tests hold it against the original code's

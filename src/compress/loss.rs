@@ -11,7 +11,7 @@ use crate::gaussian::{InvalidGaussian, View};
 use crate::metrics::{self, SizeMismatch};
 use crate::picture::Picture;
 use crate::reference;
-use crate::scene::{GaussianScene, RuntimeScene, TrainedCameras, TrainedWith};
+use crate::scene::{GaussianScene, RuntimeScene, TrainedWith};
 use rayon::prelude::*;
 use std::error::Error;
 
@@ -84,15 +84,11 @@ impl Judge {
         trained_with: &TrainedWith,
         background: Background,
     ) -> Result<Self, LossError> {
-        let mode = match trained_with.cameras {
-            TrainedCameras::Fov => ImageMode::InMemory,
-            TrainedCameras::Intrinsics => ImageMode::Dataloader,
-        };
         let behind = match background {
             Background::Color(color) => color,
             Background::None | Background::Environment => trained_with.background,
         };
-        let load = |view: &TrainingView| view.load_image(behind, mode).map(|image| image.picture);
+        let load = |view: &TrainingView| view.load_image(behind, ImageMode::Dataloader).map(|image| image.picture);
         let truth = views.par_iter().map(load).collect::<Result<Vec<_>, _>>()?;
         Ok(Self { views: to_draw(views, trained_with.raster_fov), truth, background })
     }

@@ -10,7 +10,7 @@ use super::{SizeMismatch, flip, ms_ssim, psnr, psnr_pooled, ssim};
 use crate::dataset::{DatasetError, ImageMode, TrainingView};
 use crate::gaussian::{RasterFov, View};
 use crate::picture::Picture;
-use crate::scene::{TrainedCameras, TrainedWith};
+use crate::scene::TrainedWith;
 
 /// Which metrics to compute beside PSNR. Each costs more than the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,13 +112,10 @@ pub struct EvaluationSettings {
 }
 
 impl EvaluationSettings {
-    /// As the capture was trained: its background and field of view; images in the original's `dataloader` mode for captures of
-    /// intrinsics cameras, in its in-memory mode for others.
+    /// As the capture was trained: its background and field of view. Transparent images are composited once, as the figures that
+    /// captures are held against were measured; the in-memory mode of training multiplies them by alpha twice.
     pub fn of(trained: &TrainedWith, metrics: MetricSet) -> Self {
-        let images = match trained.cameras {
-            TrainedCameras::Fov => ImageMode::InMemory,
-            TrainedCameras::Intrinsics => ImageMode::Dataloader,
-        };
+        let images = ImageMode::Dataloader;
         Self { background: trained.background, images, raster_fov: trained.raster_fov, metrics }
     }
 }
