@@ -19,7 +19,7 @@ use bevy_gs4d::gaussian::{Camera, Gaussian, RasterFov, View};
 use bevy_gs4d::metrics::psnr_pooled;
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{Form, GaussianScene, RuntimeScene, TemporalFilter};
+use bevy_gs4d::scene::{FilterKind, Form, GaussianScene, RuntimeScene, TemporalFilter};
 use glam::{UVec2, Vec3};
 use std::io::Cursor;
 
@@ -67,11 +67,21 @@ fn beside(scene: &RuntimeScene, packed: &RuntimeScene) -> Vec<(Gaussian, Gaussia
 #[test]
 fn every_attribute_stays_within_its_step() {
     let scene = scene(3_000, 0, 0);
-    let fine =
-        Bits { mean: 16, mean_t: 16, velocity: 16, sigma_t: 15, scale: 16, rotation: 16, opacity: 16, escape: 0.0 };
-    let coarse = Bits { mean: 12, mean_t: 10, velocity: 9, sigma_t: 8, scale: 9, rotation: 9, opacity: 8, escape: 0.0 };
+    let fine = Bits {
+        mean: 16,
+        mean_t: 16,
+        velocity: 16,
+        sigma_t: 15,
+        scale: 16,
+        rotation: 16,
+        opacity: 16,
+        base: 10,
+        escape: 0.0,
+    };
+    let coarse =
+        Bits { mean: 12, mean_t: 10, velocity: 9, sigma_t: 8, scale: 9, rotation: 9, opacity: 8, base: 8, escape: 0.0 };
     for (bits, slack) in [(fine, 1.0), (coarse, 1.0)] {
-        let settings = CompressSettings { geometry: Some(bits), codebooks: Vec::new(), weights: None };
+        let settings = CompressSettings { geometry: Some(bits), ..settings(&[]) };
         let (packed, _) = compress(scene.clone(), &settings).expect("it is compressed");
         let packed = packed.into_runtime().expect("it can be drawn");
         let step = |bits: u32, range: f32| slack * (0.51 * range / ((1u32 << bits) - 1) as f32 + 2e-6 * range.max(1.0));
@@ -115,7 +125,9 @@ fn pictures_survive() {
 
 #[test]
 fn the_filter_moves_with_its_gaussians() {
-    let scene = scene(2_000, 0, 0);
+    let mut scene = scene(2_000, 0, 0);
+    // A support filter is made anew.
+    scene.filter = scene.filter.map(|filter| TemporalFilter { kind: FilterKind::KeyFrame, ..filter });
     let (packed, _) = compress(scene.clone(), &settings(&[])).expect("it is compressed");
     let order = bevy_gs4d::compress::order::morton_order(&scene.gaussians);
     let (before, after) = (scene.filter.expect("a filter"), packed.filter.expect("the filter is kept"));
@@ -123,6 +135,44 @@ fn the_filter_moves_with_its_gaussians() {
         for (to, &from) in order.iter().enumerate() {
             assert_eq!(after.is_active(segment, to), before.is_active(segment, from as usize), "{to} was {from}");
         }
+    }
+}
+
+#[test]
+fn a_support_filter_still_changes_no_picture() {
+    let (packed, _) = compress(scene(3_000, 0, 0), &settings(&[])).expect("it is compressed");
+    let filtered = packed.into_runtime().expect("it can be drawn");
+    let share = filtered.filter.as_ref().map_or(1.0, TemporalFilter::active_share);
+    assert!(share < 0.95, "some rest: {share}");
+    let free = RuntimeScene { filter: None, ..filtered.clone() };
+    for step in 0..=27 {
+        let view = view(step as f32 / 27.0);
+        let [with, without] = [&filtered, &free].map(|scene| reference::render(scene, &view, BLACK).picture);
+        assert!(with == without, "at {}: nothing that is seen rests", view.time);
+    }
+}
+
+#[test]
+fn velocities_outlast_the_rounding_of_lifespans() {
+    let scene = scene(3_000, 0, 0);
+    let coarse = Bits {
+        mean: 16,
+        mean_t: 16,
+        velocity: 16,
+        sigma_t: 4,
+        scale: 8,
+        rotation: 8,
+        opacity: 8,
+        base: 8,
+        escape: 0.0,
+    };
+    let settings = CompressSettings { geometry: Some(coarse), ..settings(&[]) };
+    let (packed, _) = compress(scene.clone(), &settings).expect("it is compressed");
+    let packed = packed.into_runtime().expect("it can be drawn");
+    let fastest = scene.gaussians.iter().map(|g| Vec3::from(g.velocity).length()).fold(0.0, f32::max);
+    for (a, b) in beside(&scene, &packed).into_iter().filter(|(a, _)| a.sigma_t.is_finite()) {
+        let apart = (Vec3::from(a.velocity) - Vec3::from(b.velocity)).length();
+        assert!(apart <= 2e-3 * fastest, "{a:?} {b:?}");
     }
 }
 

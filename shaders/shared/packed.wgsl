@@ -37,7 +37,7 @@ fn unpack_gaussian(
         let inverse = exp(-(time.z + d.y / LANE_MAX * time.w));
         let signed = (vec3(c, d.x) - 32768.0) / 32767.0;
         g.inverse_sigma_t = inverse;
-        g.velocity = signed * abs(signed) * box_low.w * inverse;
+        g.velocity = signed * abs(signed) * box_low.w * max(inverse, box_size.w);
     }
     let e = lanes(high.x);
     let f = lanes(high.y);

@@ -8,7 +8,7 @@ use super::order::morton_order;
 use super::quantize::{Bits, quantize};
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian};
 use crate::scene::packed::MAX_STAGES;
-use crate::scene::{CodedColors, Form, GaussianScene, PackedScene, RuntimeScene};
+use crate::scene::{CodedColors, FilterKind, Form, GaussianScene, PackedScene, RuntimeScene, TemporalFilter};
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
@@ -18,10 +18,10 @@ use serde::{Deserialize, Serialize};
 pub enum Quality {
     /// The smallest that still looks right.
     Small,
-    /// About 23 bytes per Gaussian and a codebook; 48 dB and more to the original's pictures.
+    /// At most 24 bytes per Gaussian and 1 MB of codebooks; 48 dB and more to the original's pictures.
     #[default]
     Balanced,
-    /// Colour whole, geometry with every bit there is.
+    /// Colour rounded but not coded, geometry with more bits: about 60 dB.
     VisuallyLossless,
     /// The runtime form in single precision.
     Lossless,
@@ -44,46 +44,62 @@ pub struct CompressSettings {
     pub geometry: Option<Bits>,
     /// Entries of each codebook of colour, up to four; none keeps every coefficient.
     pub codebooks: Vec<usize>,
-    /// How much each Gaussian's colour counts, in the order of the scene; by opacity and size unless given.
+    /// Whole coefficients are rounded to multiples of this, so that they compress; 0 keeps them as they are.
+    pub color_step: f32,
+    /// How much each Gaussian's colour counts, in the order of the scene; by opacity unless given.
     #[serde(skip)]
     pub weights: Option<Vec<f32>>,
 }
 
 impl From<Quality> for CompressSettings {
     fn from(quality: Quality) -> Self {
-        let balanced =
-            Bits { mean: 12, mean_t: 10, velocity: 9, sigma_t: 8, scale: 9, rotation: 9, opacity: 8, escape: 0.03 };
         let (geometry, codebooks) = match quality {
             Quality::Small => (
                 Some(Bits {
-                    mean: 11,
-                    mean_t: 9,
-                    velocity: 8,
+                    mean: 10,
+                    mean_t: 10,
+                    velocity: 7,
                     sigma_t: 7,
+                    scale: 7,
+                    rotation: 7,
+                    opacity: 7,
+                    base: 7,
+                    escape: 0.02,
+                }),
+                vec![1024; 3],
+            ),
+            Quality::Balanced => (
+                Some(Bits {
+                    mean: 11,
+                    mean_t: 11,
+                    velocity: 8,
+                    sigma_t: 8,
                     scale: 8,
                     rotation: 8,
                     opacity: 7,
+                    base: 8,
                     escape: 0.02,
                 }),
-                vec![1024, 1024],
+                vec![2048, 2048, 2048, 1024],
             ),
-            Quality::Balanced => (Some(balanced), vec![2048, 2048, 2048]),
             Quality::VisuallyLossless => (
                 Some(Bits {
-                    mean: 16,
+                    mean: 14,
                     mean_t: 14,
-                    velocity: 13,
-                    sigma_t: 12,
-                    scale: 13,
-                    rotation: 14,
-                    opacity: 12,
-                    escape: 0.05,
+                    velocity: 12,
+                    sigma_t: 10,
+                    scale: 11,
+                    rotation: 11,
+                    opacity: 10,
+                    base: 10,
+                    escape: 0.03,
                 }),
                 Vec::new(),
             ),
             Quality::Lossless => (None, Vec::new()),
         };
-        Self { geometry, codebooks, weights: None }
+        let color_step = if quality == Quality::VisuallyLossless { 1.0 / 256.0 } else { 0.0 };
+        Self { geometry, codebooks, color_step, weights: None }
     }
 }
 
@@ -157,23 +173,31 @@ pub fn compress_with(
     let coded = (!books.is_empty()).then(|| {
         let weights = match &settings.weights {
             Some(weights) => order.iter().map(|&index| weights[index as usize]).collect(),
-            None => gaussians.iter().map(prominence).collect::<Vec<_>>(),
+            None => gaussians.iter().map(|gaussian| gaussian.opacity).collect::<Vec<_>>(),
         };
-        code(&scene.harmonics, &order, &weights, books, done)
+        code(&scene.harmonics, &order, &weights, books, bits.base, done)
     });
     let (colors, base) = coded.map_or((None, [0.0; 2]), |(colors, base)| (Some(colors), base));
-    let (records, ranges) = quantize(&gaussians, bits, base);
+    let (records, ranges) = quantize(&gaussians, bits, base, scene.trained_with.time_span());
     report.codebooks = colors.as_ref().map(|colors| colors.entries.clone()).unwrap_or_default();
     let harmonics = match &colors {
         Some(_) => Harmonics { coefficients: 1, ..Harmonics::default() },
-        None => super::prune::select_harmonics(&scene.harmonics, &order),
+        None => rounded(super::prune::select_harmonics(&scene.harmonics, &order), settings.color_step),
     };
     let packed = PackedScene { records, ranges, colors };
+    let filter = scene.filter.map(|filter| match filter.kind {
+        // Lifespans are rounded too: what the filter promises must hold for those that are drawn.
+        FilterKind::Support => {
+            let gaussians = (0..packed.len()).map(|index| packed.gaussian(index));
+            TemporalFilter::support(gaussians, scene.trained_with.time_interval, filter.segments)
+        }
+        FilterKind::KeyFrame | FilterKind::Interval => filter.select(&order),
+    });
     report.memory_after = packed.size() + size_of_val(harmonics.values.as_slice());
     let scene = GaussianScene {
         form: Form::Packed(packed),
         harmonics,
-        filter: scene.filter.map(|filter| filter.select(&order)),
+        filter,
         environment: scene.environment,
         trained_with: scene.trained_with,
         playback: scene.playback,
@@ -181,10 +205,12 @@ pub fn compress_with(
     Ok((scene, report))
 }
 
-/// How much the colour of a Gaussian matters: how opaque it is, over how large a surface.
-fn prominence(gaussian: &Gaussian) -> f32 {
-    let [xx, _, _, yy, _, zz] = gaussian.covariance;
-    gaussian.opacity * (xx + yy + zz).max(0.0)
+/// Coefficients as multiples of a step, if it is one.
+fn rounded(mut harmonics: Harmonics, step: f32) -> Harmonics {
+    if step > 0.0 {
+        harmonics.values.iter_mut().for_each(|value| *value = (*value / step).round() * step);
+    }
+    harmonics
 }
 
 /// Codes of all colours in the order given, and the ends of their first coefficients.
@@ -193,6 +219,7 @@ fn code(
     order: &[u32],
     weights: &[f32],
     entries: &[usize],
+    base_bits: u32,
     done: impl FnMut(),
 ) -> (CodedColors, [f32; 2]) {
     let mut colors = CodedColors { degree: harmonics.degree, degree_t: harmonics.degree_t, ..Default::default() };
@@ -203,8 +230,12 @@ fn code(
         .flat_map(|&index| &of(index)[..3])
         .fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
     let (low, size) = if ends.0 > ends.1 { (0.0, 0.0) } else { (ends.0, ends.1 - ends.0) };
-    // Nine bits are enough; the tenth stays 0 and costs nothing on disk.
-    let place = |value: f32| if size > 0.0 { ((value - low) / size * 511.0).round() as u32 * 2 } else { 0 };
+    // A base of fewer bits takes so many of the 1024 values, the first and last among them.
+    let levels = ((1u32 << base_bits.clamp(1, 10)) - 1) as f32;
+    let place = |value: f32| {
+        let level = if size > 0.0 { ((value - low) / size * levels).round() } else { 0.0 };
+        (level * (1023.0 / levels)).round() as u32
+    };
     let columns = coefficients * 3 - 3;
     let books = if columns == 0 {
         Codebooks::default()

@@ -5,10 +5,15 @@
 //! costs nothing on disk; the largest splats keep all 16, since the picture shows their errors first.
 
 use crate::gaussian::Gaussian;
+use crate::scene::Bounds;
 use crate::scene::packed::{ALWAYS, BLOCK, LANE_MAX};
 use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_1_SQRT_2;
+
+/// The smallest scale that is told from none, as a part of the radius of the middle of the scene. Trained captures have scales a
+/// thousand times smaller yet, which no picture shows and which would waste half the range; this floor costs nothing up to 100 dB.
+const FLATTEST: f32 = 1.0 / 16_384.0;
 
 /// Bits of each attribute, and who gets more.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -17,7 +22,7 @@ pub struct Bits {
     pub mean: u32,
     /// Temporal mean; 1 to 16.
     pub mean_t: u32,
-    /// Displacement within one σ_t, per axis; 2 to 16.
+    /// Displacement within one σ_t or the time interval, whichever is shorter, per axis; 2 to 16.
     pub velocity: u32,
     /// Logarithm of σ_t; 1 to 15.
     pub sigma_t: u32,
@@ -27,6 +32,8 @@ pub struct Bits {
     pub rotation: u32,
     /// Opacity; 1 to 16.
     pub opacity: u32,
+    /// Base colour, per channel, where colours are coded; 1 to 10.
+    pub base: u32,
     /// Share of the Gaussians, those with the largest splats, that keep 16 bits for scale, rotation and mean.
     pub escape: f32,
 }
@@ -86,9 +93,12 @@ struct Shape {
     rotation: DQuat,
 }
 
-/// Records and ranges of these Gaussians, in their order. `base` are the ends of the base colours, which share a range.
-pub fn quantize(gaussians: &[Gaussian], bits: &Bits, base: [f32; 2]) -> (Vec<[u32; 8]>, Vec<[f32; 4]>) {
-    let shapes: Vec<Shape> = gaussians.iter().map(Shape::of).collect();
+/// Records and ranges of these Gaussians, in their order. `base` are the ends of the base colours, which share a range; `reach` is the
+/// longest time over which motion matters, the length of the time interval.
+pub fn quantize(gaussians: &[Gaussian], bits: &Bits, base: [f32; 2], reach: f32) -> (Vec<[u32; 8]>, Vec<[f32; 4]>) {
+    let radius = Bounds::core(gaussians.iter().copied()).map_or(0.0, Bounds::radius);
+    let flattest = f64::from(radius * FLATTEST);
+    let shapes: Vec<Shape> = gaussians.iter().map(|gaussian| Shape::of(gaussian, flattest)).collect();
     let finite = |gaussian: &&Gaussian| gaussian.sigma_t.is_finite();
     let time = Span::of(gaussians.iter().map(|g| f64::from(g.mean_t)));
     let sigma = Span::of(gaussians.iter().filter(finite).map(|g| f64::from(g.sigma_t).ln()));
@@ -102,15 +112,22 @@ pub fn quantize(gaussians: &[Gaussian], bits: &Bits, base: [f32; 2]) -> (Vec<[u3
         [base[0], base[1] - base[0], 0.0, 0.0],
     ];
     let fine = largest(gaussians, &shapes, bits.escape);
+    let [_, _, sigma_low, sigma_size] = ranges[0].map(f64::from);
+    let deviation = |gaussian: &Gaussian| lanes.sigma_t.encode(sigma.place(f64::from(gaussian.sigma_t).ln()), false);
+    // Within one σ_t as it will be decoded, so that its error does not change the velocity.
+    let displacement = |gaussian: &Gaussian| {
+        let sigma_t = (sigma_low + f64::from(deviation(gaussian)) / f64::from(LANE_MAX) * sigma_size).exp();
+        gaussian.velocity.map(|velocity| f64::from(velocity) * sigma_t.min(f64::from(reach)))
+    };
     let mut records = Vec::with_capacity(gaussians.len());
     for (block, chunk) in gaussians.chunks(BLOCK).enumerate() {
         let mean = [0, 1, 2].map(|axis| Span::of(chunk.iter().map(|g| f64::from(g.mean[axis]))));
-        let reach = chunk.iter().filter(finite).flat_map(displacement).fold(0.0f64, |most, d| most.max(d.abs()));
+        let most = chunk.iter().filter(finite).flat_map(displacement).fold(0.0f64, |most, d| most.max(d.abs()));
         let stretch = lanes.mean.stretch();
         let [low, size] = [mean.map(|span| span.low as f32), mean.map(|span| (span.size * stretch) as f32)];
-        let velocity = (reach * (32767.0 / lanes.velocity_top()).powi(2)) as f32;
+        let velocity = (most * (32767.0 / lanes.velocity_top()).powi(2)) as f32;
         ranges.push([low[0], low[1], low[2], velocity]);
-        ranges.push([size[0], size[1], size[2], 0.0]);
+        ranges.push([size[0], size[1], size[2], reach.max(f32::MIN_POSITIVE).recip()]);
         for (index, gaussian) in (block * BLOCK..).zip(chunk) {
             let shape = &shapes[index];
             let mut record = [0u16; 16];
@@ -121,9 +138,9 @@ pub fn quantize(gaussians: &[Gaussian], bits: &Bits, base: [f32; 2]) -> (Vec<[u3
             record[3] = lanes.mean_t.encode(time.place(f64::from(gaussian.mean_t)), false);
             record[7] = ALWAYS;
             if gaussian.sigma_t.is_finite() {
-                record[7] = lanes.sigma_t.encode(sigma.place(f64::from(gaussian.sigma_t).ln()), false);
+                record[7] = deviation(gaussian);
                 for (lane, along) in record[4..7].iter_mut().zip(displacement(gaussian)) {
-                    *lane = lanes.encode_velocity(if reach > 0.0 { along / reach } else { 0.0 });
+                    *lane = lanes.encode_velocity(if most > 0.0 { along / most } else { 0.0 });
                 }
             }
             let (three, left_out) = smallest_three(shape.rotation);
@@ -178,11 +195,6 @@ impl Lanes {
     }
 }
 
-/// How far a Gaussian moves within one σ_t.
-fn displacement(gaussian: &Gaussian) -> [f64; 3] {
-    gaussian.velocity.map(|velocity| f64::from(velocity) * f64::from(gaussian.sigma_t))
-}
-
 /// The Gaussians whose splats are largest and most opaque.
 fn largest(gaussians: &[Gaussian], shapes: &[Shape], share: f32) -> Vec<bool> {
     let count = ((gaussians.len() as f32 * share.clamp(0.0, 1.0)).round() as usize).min(gaussians.len());
@@ -196,8 +208,8 @@ fn largest(gaussians: &[Gaussian], shapes: &[Shape], share: f32) -> Vec<bool> {
 }
 
 impl Shape {
-    /// Scales and rotation of the conditional covariance.
-    fn of(gaussian: &Gaussian) -> Self {
+    /// Scales, none below the `flattest`, and rotation of the conditional covariance.
+    fn of(gaussian: &Gaussian, flattest: f64) -> Self {
         let [xx, xy, xz, yy, yz, zz] = gaussian.covariance.map(f64::from);
         let covariance = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
         let (values, mut vectors) = eigen(covariance);
@@ -205,7 +217,7 @@ impl Shape {
             vectors.z_axis = -vectors.z_axis;
         }
         // Rounding can leave a flat Gaussian a variance below zero.
-        let floor = (values.max_element() * 1e-12).max(1e-30);
+        let floor = (flattest * flattest).max(values.max_element() * 1e-12).max(1e-30);
         Self {
             log_scale: values.max(DVec3::splat(floor)).map(|v| 0.5 * v.ln()),
             rotation: DQuat::from_mat3(&vectors).normalize(),

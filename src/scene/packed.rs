@@ -9,7 +9,7 @@
 //! |---|---|---|
 //! | 0-2 | mean, capture units | box of the block of 256 Gaussians |
 //! | 3 | temporal mean, timestamp units | all Gaussians |
-//! | 4-6 | displacement within one σ_t (velocity · σ_t), square root with sign, about 32768 | largest of the block |
+//! | 4-6 | displacement (velocity · σ_t, or less: see `ranges`), square root with sign, about 32768 | largest of the block |
 //! | 7 | logarithm of σ_t; 65535: always there, at rest | all Gaussians |
 //! | 8-10 | logarithm of the scale along the rotated axes | all Gaussians |
 //! | 11-13 | the three smaller components of the rotation | ±1/√2 |
@@ -39,7 +39,8 @@ pub struct PackedScene {
     /// One record each, two lanes to a word, the first in the lower half.
     pub records: Vec<[u32; 8]>,
     /// Ends of the lanes. Shared: `[mean_t low, size, log σ_t low, size]`, `[log scale low, size, stretch of rotation, of
-    /// opacity]`, `[base colour low, size, -, -]`. A lane of fewer bits never reaches 65535: sizes and stretches make up for it. Then for each block `[mean low xyz, displacement]`, `[mean size xyz, -]`.
+    /// opacity]`, `[base colour low, size, -, -]`. A lane of fewer bits never reaches 65535: sizes and stretches make up for it. Then for each block `[mean low xyz, displacement]`, `[mean size xyz, r]`.
+    /// `r` is 1 over the time interval: velocity = displacement · max(1 / σ_t, r), since nothing is seen to move for longer.
     pub ranges: Vec<[f32; 4]>,
     /// Colours by codebook; without them the scene's harmonics are whole.
     pub colors: Option<CodedColors>,
@@ -116,7 +117,7 @@ impl PackedScene {
             _ => {
                 let sigma_t = (sigma_low + part(7) * sigma_size).exp();
                 let signed = Vec3::from([4, 5, 6].map(|lane| (f32::from(self.lane(index, lane)) - 32768.0) / 32767.0));
-                (sigma_t, signed * signed.abs() * low.w / sigma_t)
+                (sigma_t, signed * signed.abs() * low.w * sigma_t.recip().max(size.w))
             }
         };
         let scale = (parts(8) * scale_size + scale_low).map(f32::exp);

@@ -46,7 +46,7 @@ pub struct Compress {
     #[command(flatten)]
     knobs: Knobs,
     /// How much the colour of each Gaussian counts: scores by `gs4d score`, little-endian float32 in the order of IN
-    /// [default: by opacity and size].
+    /// [default: by opacity].
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// Views to compare with the original: of --cameras, or of an orbit; 0 for none.
@@ -88,6 +88,12 @@ struct Knobs {
     /// Bits of the opacity (1 to 16).
     #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(1..=16))]
     opacity_bits: Option<u32>,
+    /// Bits of the base colour, per channel, where colours are coded (1 to 10).
+    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(1..=10))]
+    base_bits: Option<u32>,
+    /// Without codebooks: round every coefficient to a multiple of this; 0 keeps them as they are.
+    #[arg(long, value_name = "STEP", value_parser = values::not_negative)]
+    color_step: Option<f64>,
     /// Share of the Gaussians, those with the largest splats, that keep 16 bits for mean, scale and rotation.
     #[arg(long, value_name = "SHARE", value_parser = values::share)]
     escape: Option<f64>,
@@ -104,9 +110,15 @@ impl Knobs {
             scale: self.scale_bits.unwrap_or(bits.scale),
             rotation: self.rotation_bits.unwrap_or(bits.rotation),
             opacity: self.opacity_bits.unwrap_or(bits.opacity),
+            base: self.base_bits.unwrap_or(bits.base),
             escape: self.escape.map_or(bits.escape, |share| share as f32),
         });
-        CompressSettings { geometry, codebooks: self.codebooks.clone().unwrap_or(settings.codebooks), weights: None }
+        CompressSettings {
+            geometry,
+            codebooks: self.codebooks.clone().unwrap_or(settings.codebooks),
+            color_step: self.color_step.map_or(settings.color_step, |step| step as f32),
+            weights: None,
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use crate::interrupt;
 use crate::values;
 use bevy_gs4d::codec::{self, checkpoint::CheckpointOptions, package};
 use bevy_gs4d::gaussian::{RasterFov, ShDirection};
-use bevy_gs4d::scene::{GaussianScene, PlaybackHints, RotationConvention, TrainedCameras, TrainedWith, UpAxis};
+use bevy_gs4d::scene::{Form, GaussianScene, PlaybackHints, RotationConvention, TrainedCameras, TrainedWith, UpAxis};
 use serde_json::{Value, json};
 use std::fs::{self, File};
 use std::io::Read;
@@ -145,9 +145,9 @@ pub struct PackageArgs {
     /// The package to write, said the other way.
     #[arg(short = 'o', long = "out", value_name = "OUT", conflicts_with = "out")]
     out_option: Option<PathBuf>,
-    /// zstd level, 1 (fast) to 19 (small).
-    #[arg(long, value_name = "LEVEL", default_value_t = package::WriteSettings::default().level, value_parser = clap::value_parser!(i32).range(1..=19))]
-    pub level: i32,
+    /// zstd level, 1 (fast) to 19 (small) [default: 9; of packed captures 19].
+    #[arg(long, value_name = "LEVEL", value_parser = clap::value_parser!(i32).range(1..=19))]
+    pub level: Option<i32>,
 }
 
 impl PackageArgs {
@@ -171,7 +171,12 @@ impl PackageArgs {
     /// What the codec reports.
     pub fn save(&self, scene: &GaussianScene) -> Result<u64, Failure> {
         let out = self.out()?;
-        let settings = package::WriteSettings { level: self.level };
+        let usual = match scene.form {
+            // A tenth of the bytes for seconds of time.
+            Form::Packed(_) => 19,
+            Form::Trained(_) | Form::Runtime(_) => package::WriteSettings::default().level,
+        };
+        let settings = package::WriteSettings { level: self.level.unwrap_or(usual) };
         interrupt::whole(|| codec::save(out, scene, &settings))?;
         file_size(out)
     }

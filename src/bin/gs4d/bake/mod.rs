@@ -219,7 +219,7 @@ impl Bake {
         out: &Path,
     ) -> Result<(), Failure> {
         const FILE: &str = "package.crc32";
-        let fingerprint = before.and(&format!("{:?} {}", self.quality, self.package.level));
+        let fingerprint = before.and(&format!("{:?} {:?}", self.quality, self.package.level));
         let checksum = || Some(Fingerprint::of_files(&[out]).ok()?.0.to_le_bytes().to_vec());
         let stored = inputs.work.load(FILE, fingerprint).filter(|stored| checksum().as_ref() == Some(stored));
         steps.run(Stage::Compress, stored.map(|_| ()), || {
