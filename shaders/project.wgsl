@@ -28,7 +28,8 @@ const INVERSE_ALPHA_MIN: f32 = 255.0;
 // Three words for each Gaussian.
 @group(1) @binding(2) var<storage, read> color_records: array<u32>;
 @group(1) @binding(3) var<storage, read> codebooks: array<u32>;
-@group(1) @binding(4) var<storage, read> codebook_scales: array<vec4<f32>>;
+// Four codebooks of 36 words; a uniform, since few storage buffers are left and all threads read the same.
+@group(1) @binding(4) var<uniform> codebook_scales: array<vec4<f32>, 144>;
 #else
 @group(1) @binding(2) var<storage, read> harmonics: array<vec4<f32>>;
 #endif

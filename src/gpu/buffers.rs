@@ -5,10 +5,13 @@
 
 use super::Storage;
 use crate::gaussian::Gaussian;
-use crate::scene::packed::{BLOCK, BLOCK_RANGES, SHARED_RANGES};
+use crate::scene::packed::{BLOCK, BLOCK_RANGES, MAX_STAGES, SHARED_RANGES};
 use crate::scene::{ActiveSets, CodedColors, RuntimeScene, TemporalFilter};
 use std::ops::Range;
 use wgpu::util::DeviceExt;
+
+/// Four-vectors of the uniform of codebook scales: 36 for each codebook of 48 coefficients.
+pub(super) const CODEBOOK_SCALES: usize = MAX_STAGES * 36;
 
 /// How this scene is stored.
 pub(super) fn storage_of(scene: &RuntimeScene) -> Storage {
@@ -52,11 +55,17 @@ pub(super) fn part(device: &wgpu::Device, scene: &RuntimeScene, own: Range<usize
 
 /// All codebooks, and their scales.
 pub(super) fn codebooks(device: &wgpu::Device, colors: &CodedColors) -> [wgpu::Buffer; 2] {
+    let mut scales = colors.scales.clone();
+    scales.resize(CODEBOOK_SCALES, [0.0; 4]);
     // A binding of no bytes is not allowed.
     let or_zero = |bytes: &[u8]| if bytes.is_empty() { vec![0; 16] } else { bytes.to_vec() };
     [
         plain(device, "gs4d codebooks", &or_zero(bytemuck::cast_slice(&colors.codebooks))),
-        plain(device, "gs4d codebook scales", &or_zero(bytemuck::cast_slice(&colors.scales))),
+        device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("gs4d codebook scales"),
+            contents: bytemuck::cast_slice(&scales),
+            usage: wgpu::BufferUsages::UNIFORM,
+        }),
     ]
 }
 

@@ -2,6 +2,7 @@
 //!
 //! In: a device. Out: compiled passes and the bind group layouts that they share with the buffers of views and captures.
 
+use super::buffers::CODEBOOK_SCALES;
 use super::shaders::{ShaderChecks, Storage, module};
 use super::{GpuError, layout};
 use std::num::NonZeroU64;
@@ -125,7 +126,11 @@ impl Layouts {
             activate: new("gs4d activate", &[INSTANCE, Write, Write, Write, Write]),
             filter: new("gs4d filter", &[Read]),
             project: new("gs4d project", &[INSTANCE, Write, Write, Read, Read]),
-            captures: [2, 3, 5].map(|count| new("gs4d capture", &vec![Read; count])),
+            captures: [
+                new("gs4d capture", &[Read, Read]),
+                new("gs4d capture", &[Read, Read, Read]),
+                new("gs4d capture", &[Read, Read, Read, Read, Uniform(16 * CODEBOOK_SCALES)]),
+            ],
             sort: new(
                 "gs4d sort",
                 &[UniformAt(size_of::<layout::SortStep>()), Uniform(FRAME), Write, Read, Read, Write, Write, Write],
@@ -234,7 +239,7 @@ fn check_limits(limits: &wgpu::Limits) -> Result<(), GpuError> {
     let needs = [
         ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, 256),
         ("max_compute_workgroup_size_x", limits.max_compute_workgroup_size_x, 256),
-        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 9),
+        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 8),
         // Three arrays of `blend`.
         ("max_compute_workgroup_storage_size", limits.max_compute_workgroup_storage_size, 16 * 256 * 3 + 16),
     ];
