@@ -1,6 +1,6 @@
 //! The offline half: from a trained checkpoint and its training views to a small, fast capture.
 //!
-//! In: a [`GaussianScene`](crate::scene::GaussianScene), the views it was trained on, something that scores a view
+//! In: a [`GaussianScene`], the views it was trained on, something that scores a view
 //! ([`ScoreEngine`](score::ScoreEngine)) and something that draws one ([`Draw`](loss::Draw)): the CPU twins here, or the GPU. Out: scores
 //! of the Gaussians, the scene with the best of them, and which of them are active when.
 //!
