@@ -9,7 +9,7 @@ mod stage;
 use bevy::animation::{AnimatedBy, AnimationTargetId, animated_field};
 use bevy::prelude::*;
 use bevy_gs4d::prelude::*;
-use stage::{app, capture, get, pass};
+use stage::{app, capture, change, get, pass, said};
 
 /// A capture of four seconds whose playback an animation of two seconds moves.
 fn spawn(app: &mut App, playback: Playback, curve: impl AnimationCurve) -> Entity {
@@ -44,6 +44,15 @@ fn an_animation_can_scrub_a_capture() {
         pass(&mut app, 0.25);
         assert_eq!(get::<Playback>(&app, entity).time, expected, "the curve's value, in the same frame");
     }
+    change(&mut app, entity, |player: &mut AnimationPlayer| {
+        player.pause_all();
+    });
+    pass(&mut app, 0.25);
+    pass(&mut app, 0.25);
+    assert_eq!(get::<Playback>(&app, entity).time, 2.0, "with the animation paused it stands");
+    let said = said(&mut app);
+    assert_eq!(said.len(), 5, "to 3 and four times on: {said:?}");
+    assert!(said.iter().all(|message| message.starts_with("PlaybackSeeked")), "all are seeks: {said:?}");
 }
 
 #[test]

@@ -4,7 +4,6 @@
 
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
-use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::prelude::*;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{FilterKind, GaussianScene, TemporalFilter};
@@ -41,7 +40,7 @@ pub fn app(folder: &str) -> App {
 fn listen<E: Message + EntityEvent + Debug>(app: &mut App) {
     app.add_observer(|event: On<E>, mut observed: ResMut<Observed>| observed.0.push(debug(event.event())));
     app.add_systems(Last, |mut reader: MessageReader<E>, mut read: ResMut<Read>| {
-        read.0.extend(reader.read().map(|message| debug(message)));
+        read.0.extend(reader.read().map(debug));
     });
 }
 
