@@ -11,10 +11,11 @@
 //! With `--headless FOLDER`, or where there is no display, it writes N (8) pictures to FOLDER (`out`) instead.
 
 mod common;
+#[path = "common/controls.rs"]
+mod controls;
 
 use bevy::asset::UnapprovedPathMode;
 use bevy::core_pipeline::tonemapping::Tonemapping;
-use bevy::input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll, MouseScrollUnit};
 use bevy::prelude::*;
 use bevy_egui::input::{egui_wants_any_keyboard_input, egui_wants_any_pointer_input};
 use bevy_egui::{EguiContexts, EguiPlugin, EguiPrimaryContextPass, egui};
@@ -22,14 +23,9 @@ use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::render::{GaussianCapture3d, GaussianCapturePlugin};
 use common::{Orbit, offscreen};
+use controls::{follow, mouse};
 use std::path::PathBuf;
 use std::time::Duration;
-
-struct Arguments {
-    capture: String,
-    headless: Option<PathBuf>,
-    frames: u32,
-}
 
 #[derive(Resource)]
 struct Capture(PathBuf);
@@ -38,8 +34,8 @@ struct Capture(PathBuf);
 struct Ball;
 
 fn main() -> Result {
-    let arguments = arguments()?;
-    let capture = Capture(common::asset_path(&arguments.capture));
+    let arguments = controls::arguments("toybox.gs4d")?;
+    let capture = Capture(common::asset_path(&arguments.file));
     match arguments.headless {
         Some(folder) => {
             let mut app = offscreen::app(UVec2::new(960, 540));
@@ -59,29 +55,6 @@ fn main() -> Result {
             Ok(())
         }
     }
-}
-
-fn arguments() -> Result<Arguments> {
-    let mut parsed = Arguments { capture: "toybox.gs4d".into(), headless: None, frames: 8 };
-    let mut arguments = std::env::args().skip(1);
-    while let Some(argument) = arguments.next() {
-        match argument.as_str() {
-            "--headless" => parsed.headless = Some(arguments.next().ok_or("--headless: which folder?")?.into()),
-            "--frames" => parsed.frames = arguments.next().ok_or("--frames: how many?")?.parse()?,
-            option if option.starts_with('-') => return Err(format!("{option}: no such option").into()),
-            _ => parsed.capture = argument,
-        }
-    }
-    if parsed.headless.is_none() && !has_display() {
-        eprintln!("no display: writing pictures instead");
-        parsed.headless = Some("out".into());
-    }
-    Ok(parsed)
-}
-
-fn has_display() -> bool {
-    // The feature `viewer` opens X11 windows on Linux.
-    !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some_and(|display| !display.is_empty())
 }
 
 /// What is shown with and without a window.
@@ -143,26 +116,6 @@ fn frame_capture(
     *visibility = Visibility::Visible;
 }
 
-fn follow(mut cameras: Query<(&Orbit, &mut Transform)>) {
-    for (orbit, mut transform) in &mut cameras {
-        *transform = orbit.transform();
-    }
-}
-
-fn mouse(
-    buttons: Res<ButtonInput<MouseButton>>,
-    motion: Res<AccumulatedMouseMotion>,
-    scroll: Res<AccumulatedMouseScroll>,
-    mut orbit: Single<&mut Orbit>,
-) {
-    if buttons.pressed(MouseButton::Left) {
-        orbit.yaw -= motion.delta.x * 0.006;
-        orbit.pitch = (orbit.pitch + motion.delta.y * 0.006).clamp(-1.5, 1.5);
-    }
-    let notches = scroll.delta.y * if scroll.unit == MouseScrollUnit::Pixel { 0.01 } else { 1.0 };
-    orbit.distance = (orbit.distance * 0.9f32.powf(notches)).clamp(0.05, 1e4);
-}
-
 fn keys(
     keys: Res<ButtonInput<KeyCode>>,
     captures: Res<Assets<GaussianCapture>>,
@@ -176,9 +129,7 @@ fn keys(
     if steps != 0
         && let Some(capture) = captures.get(&handle.0)
     {
-        let time = (playback.time + steps as f32 / 30.0).clamp(0.0, capture.duration_seconds());
-        playback.pause();
-        playback.seek(time);
+        playback.step(steps, 30.0, capture.duration_seconds());
     }
 }
 

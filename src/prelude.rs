@@ -1,4 +1,4 @@
-//! What a game needs: the plugin, the asset, the component, the clock.
+//! What a game needs: the plugin, the assets, the components, the messages.
 //!
 //! In: nothing. Out: names to import with `use bevy_gs4d::prelude::*;`, beside Bevy's own.
 //!
@@ -22,5 +22,8 @@
 //! ```
 
 pub use crate::asset::GaussianCapture;
-pub use crate::playback::{Playback, Repeat};
+pub use crate::playback::{
+    FollowsClock, KeyFrameCrossed, MarkerReached, Playback, PlaybackClock, PlaybackEnded, PlaybackLooped,
+    PlaybackPaused, PlaybackSeeked, PlaybackStarted, Repeat, Timeline, TimelinePlayer, TimelineTrack,
+};
 pub use crate::render::{CaptureSettings, GaussianCapture3d, GaussianCapturePlugin};

@@ -3,6 +3,7 @@
 //! In: a [`RuntimeScene`]. Out: a [`GaussianCapture`], cheap to clone, with what a game asks of it: where it is, how long it
 //! plays, which way is up.
 
+use super::KeyFrames;
 use crate::scene::{Bounds, RuntimeScene};
 use bevy::asset::Asset;
 use bevy::reflect::TypePath;
@@ -54,6 +55,11 @@ impl GaussianCapture {
     pub fn seconds_at(&self, time: f32) -> f32 {
         let [first, last] = self.scene.trained_with.time_interval;
         if last == first { 0.0 } else { (time - first) / (last - first) * self.duration_seconds() }
+    }
+
+    /// When the key-frames of its temporal filter are; nothing without a filter, and for a still.
+    pub fn key_frames(&self) -> Option<KeyFrames> {
+        KeyFrames::new(self.scene.filter.as_ref()?.segments, self.duration_seconds())
     }
 
     /// The shortest rotation that stands the capture upright in Bevy's world, where +Y is up.

@@ -4,7 +4,9 @@
 //! the asset task pool and ready to be shared by any number of entities.
 
 mod capture;
+mod key_frames;
 mod loader;
 
 pub use capture::GaussianCapture;
+pub use key_frames::KeyFrames;
 pub use loader::{CaptureLoadError, CheckpointLoader, PackageLoader};

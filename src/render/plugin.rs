@@ -9,8 +9,8 @@ use super::extract::{ExtractedCaptures, extract_captures};
 use super::prepare::{CaptureViews, init_renderer, make_depth_readable, prepare_views};
 use super::upload::GpuGaussianCapture;
 use crate::asset::{CheckpointLoader, GaussianCapture, PackageLoader};
-use crate::playback::{PlaybackSystems, advance_playback};
-use bevy::app::{App, Plugin, Update};
+use crate::playback::PlaybackPlugin;
+use bevy::app::{App, Plugin};
 use bevy::asset::{AssetApp, Assets};
 use bevy::core_pipeline::core_3d::{main_opaque_pass_3d, main_transparent_pass_3d};
 use bevy::core_pipeline::schedule::{Core3d, Core3dSystems};
@@ -30,8 +30,7 @@ impl Plugin for GaussianCapturePlugin {
         app.init_asset::<GaussianCapture>()
             .init_asset_loader::<PackageLoader>()
             .init_asset_loader::<CheckpointLoader>()
-            .add_plugins(RenderAssetPlugin::<GpuGaussianCapture>::default())
-            .add_systems(Update, advance_playback.in_set(PlaybackSystems::Advance));
+            .add_plugins((PlaybackPlugin, RenderAssetPlugin::<GpuGaussianCapture>::default()));
 
         let Some(mut shaders) = app.world_mut().get_resource_mut::<Assets<Shader>>() else { return };
         let source = include_str!("../../shaders/composite.wgsl");

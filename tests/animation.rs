@@ -1,0 +1,70 @@
+//! Playback animated by Bevy's own animations.
+//!
+//! In: an `AnimationClip` with curves over fields of a `Playback`. Out: proof that what it says is played. Needs neither a GPU nor a
+//! window.
+
+#[path = "common/stage.rs"]
+mod stage;
+
+use bevy::animation::{AnimatedBy, AnimationTargetId, animated_field};
+use bevy::prelude::*;
+use bevy_gs4d::prelude::*;
+use stage::{app, capture, change, get, pass, said};
+
+/// A capture of four seconds whose playback an animation of two seconds moves.
+fn spawn(app: &mut App, playback: Playback, curve: impl AnimationCurve) -> Entity {
+    let capture = capture(app, 4.0, 4);
+    let target = AnimationTargetId::from_name(&Name::new("capture"));
+    let mut clip = AnimationClip::default();
+    clip.add_curve_to_target(target, curve);
+    let clip = app.world_mut().resource_mut::<Assets<AnimationClip>>().add(clip);
+    let (graph, node) = AnimationGraph::from_clip(clip);
+    let graph = app.world_mut().resource_mut::<Assets<AnimationGraph>>().add(graph);
+    let mut player = AnimationPlayer::default();
+    player.play(node);
+    let entity = app.world_mut().spawn((GaussianCapture3d(capture), playback, target)).id();
+    app.world_mut().entity_mut(entity).insert((AnimatedBy(entity), player, AnimationGraphHandle(graph)));
+    // Bevy prepares the graph.
+    pass(app, 0.0);
+    pass(app, 0.0);
+    entity
+}
+
+fn ramp(from: f32, to: f32) -> AnimatableKeyframeCurve<f32> {
+    AnimatableKeyframeCurve::new([(0.0, from), (2.0, to)]).expect("two samples")
+}
+
+#[test]
+fn an_animation_can_scrub_a_capture() {
+    let mut app = app("assets");
+    app.add_plugins(AnimationPlugin);
+    let curve = AnimatableCurve::new(animated_field!(Playback::time), ramp(3.0, 1.0));
+    let entity = spawn(&mut app, Playback::paused_at(0.0), curve);
+    for expected in [2.75, 2.5, 2.25, 2.0] {
+        pass(&mut app, 0.25);
+        assert_eq!(get::<Playback>(&app, entity).time, expected, "the curve's value, in the same frame");
+    }
+    change(&mut app, entity, |player: &mut AnimationPlayer| {
+        player.pause_all();
+    });
+    pass(&mut app, 0.25);
+    pass(&mut app, 0.25);
+    assert_eq!(get::<Playback>(&app, entity).time, 2.0, "with the animation paused it stands");
+    let said = said(&mut app);
+    assert_eq!(said.len(), 5, "to 3 and four times on: {said:?}");
+    assert!(said.iter().all(|message| message.starts_with("PlaybackSeeked")), "all are seeks: {said:?}");
+}
+
+#[test]
+fn an_animation_can_slow_a_capture_down() {
+    let mut app = app("assets");
+    app.add_plugins(AnimationPlugin);
+    let curve = AnimatableCurve::new(animated_field!(Playback::speed), ramp(1.0, 0.0));
+    let entity = spawn(&mut app, Playback::default(), curve);
+    for _ in 0..64 {
+        pass(&mut app, 1.0 / 32.0);
+    }
+    let playback = get::<Playback>(&app, entity);
+    assert!((playback.time - 1.0).abs() < 0.05, "a speed from 1 to 0 in two seconds plays one, not {}", playback.time);
+    assert!(playback.speed < 0.05, "and ends slow, not at {}", playback.speed);
+}
