@@ -57,7 +57,7 @@ fn bevy_s_passes_are_valid_with_all_their_definitions() {
     let composite = ("composite", include_str!("../shaders/composite.wgsl"), ["ENCODED_TARGET", "LINEAR_BLEND"]);
     let write_depth = ("write_depth", include_str!("../shaders/write_depth.wgsl"), ["MEDIAN", "UNUSED"]);
     let check = |(name, source, defines): (&str, &str, [&str; 2]), chosen: usize| {
-        let chosen = defines.iter().enumerate().filter(|(index, _)| chosen >> index & 1 == 1);
+        let chosen = defines.iter().enumerate().filter(|(index, _)| (chosen >> index) & 1 == 1);
         let shader_defs = chosen.map(|(_, define)| ((*define).to_owned(), ShaderDefValue::Bool(true))).collect();
         let mut composer = Composer::default();
         let descriptor = NagaModuleDescriptor { source, file_path: name, shader_defs, ..Default::default() };
