@@ -3,7 +3,7 @@
 //! In: the files of `shaders/`. Out: proof that each is known to the renderer and is valid WGSL that needs no optional capability.
 #![cfg(feature = "gpu")]
 
-use bevy_gs4d::gpu::shaders::{Storage, compose, pass_names};
+use bevy_gs4d::gpu::shaders::{MULTISAMPLED, Storage, compose, pass_names};
 use naga_oil::compose::{Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -41,14 +41,16 @@ fn every_shader_file_is_a_pass_or_one_of_bevy_s() {
 
 #[test]
 fn every_pass_composes_and_is_valid() {
-    let check = |name: &str, storage| validate(name, &compose(name, storage).map_err(|error| error.to_string())?);
-    let all = pass_names().flat_map(|name| Storage::ALL.map(|storage| (name, storage)));
-    report(all.filter_map(|(name, storage)| check(name, storage).err()).collect());
+    let check =
+        |name: &str, definitions| validate(name, &compose(name, definitions).map_err(|error| error.to_string())?);
+    let definitions = Storage::ALL.map(Storage::definitions).into_iter().chain([MULTISAMPLED]);
+    let all = definitions.flat_map(|definitions| pass_names().map(move |name| (name, definitions)));
+    report(all.filter_map(|(name, definitions)| check(name, definitions).err()).collect());
 }
 
 #[test]
 fn an_unknown_pass_is_named() {
-    let message = compose("no such pass", Storage::Full).expect_err("there is none").to_string();
+    let message = compose("no such pass", &[]).expect_err("there is none").to_string();
     assert!(message.contains("no such pass"), "{message}");
 }
 
