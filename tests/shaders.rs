@@ -24,13 +24,15 @@ fn report(failures: Vec<String>) {
 }
 
 #[test]
-fn every_shader_file_is_a_pass_or_the_composite() {
+fn every_shader_file_is_a_pass_or_one_of_bevy_s() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
     let files = std::fs::read_dir(folder).expect("the folder of shaders").map(|entry| entry.expect("an entry").path());
     let shaders = files.filter(|path| path.extension().is_some_and(|ending| ending == "wgsl"));
     let mut names: BTreeSet<String> =
         shaders.filter_map(|path| Some(path.file_stem()?.to_string_lossy().into_owned())).collect();
-    assert!(names.remove("composite"), "the composite is there");
+    for name in ["composite", "write_depth"] {
+        assert!(names.remove(name), "{name} is there");
+    }
     let passes: BTreeSet<String> = pass_names().map(str::to_owned).collect();
     assert!(!passes.is_empty(), "there are passes");
     assert_eq!(passes, names, "the passes are the files");
@@ -53,15 +55,17 @@ fn an_unknown_pass_is_named() {
 }
 
 #[test]
-fn the_composite_is_valid_for_linear_and_encoded_targets() {
-    let source = include_str!("../shaders/composite.wgsl");
-    let check = |encoded: bool| {
-        let define = encoded.then(|| ("ENCODED_TARGET".to_owned(), ShaderDefValue::Bool(true)));
-        let shader_defs = define.into_iter().collect();
+fn bevy_s_passes_are_valid_with_all_their_definitions() {
+    let composite = ("composite", include_str!("../shaders/composite.wgsl"), ["ENCODED_TARGET", "LINEAR_BLEND"]);
+    let write_depth = ("write_depth", include_str!("../shaders/write_depth.wgsl"), ["MEDIAN", "UNUSED"]);
+    let check = |(name, source, defines): (&str, &str, [&str; 2]), chosen: usize| {
+        let chosen = defines.iter().enumerate().filter(|(index, _)| (chosen >> index) & 1 == 1);
+        let shader_defs = chosen.map(|(_, define)| ((*define).to_owned(), ShaderDefValue::Bool(true))).collect();
         let mut composer = Composer::default();
-        let descriptor = NagaModuleDescriptor { source, file_path: "composite", shader_defs, ..Default::default() };
+        let descriptor = NagaModuleDescriptor { source, file_path: name, shader_defs, ..Default::default() };
         let module = composer.make_naga_module(descriptor).map_err(|error| error.emit_to_string(&composer))?;
-        validate("composite", &module)
+        validate(name, &module)
     };
-    report([false, true].into_iter().filter_map(|encoded| check(encoded).err()).collect());
+    let all = [composite, write_depth].into_iter().flat_map(|pass| (0..4).map(move |chosen| (pass, chosen)));
+    report(all.filter_map(|(pass, chosen)| check(pass, chosen).err()).collect());
 }
