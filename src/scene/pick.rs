@@ -41,7 +41,7 @@ pub struct PickSettings {
     pub use_filter: bool,
     /// Opacity that has to add up along the ray, 0 to 1, for something to be hit.
     pub threshold: f32,
-    /// Factor on the opacity of every Gaussian, 0 to 1.
+    /// Factor on the opacity of every Gaussian.
     pub opacity: f32,
     /// Capture space to the cube from −1 to 1: Gaussians whose mean lies outside are not there.
     pub crop: Option<Affine3A>,
@@ -126,7 +126,7 @@ impl Ray {
     fn cross(&self, gaussian: &Gaussian, settings: &PickSettings) -> Option<Crossing> {
         let marginal = gaussian.marginal(settings.time);
         let mean = gaussian.mean_at(settings.time);
-        let peak = gaussian.opacity * marginal * settings.opacity.clamp(0.0, 1.0);
+        let peak = gaussian.opacity * marginal * settings.opacity;
         let is_inside = |crop: Affine3A| crop.transform_point3(mean).abs().cmple(Vec3::ONE).all();
         let is_there = marginal > MARGINAL_CUTOFF && peak >= ALPHA_MIN && settings.crop.is_none_or(is_inside);
         if !is_there {
@@ -154,8 +154,9 @@ impl Ray {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gaussian::{Camera, Harmonics, RasterFov};
-    use crate::reference;
+    use crate::frame::{Background, BlendSpace};
+    use crate::gaussian::{Camera, Harmonics, Look, RasterFov};
+    use crate::reference::{self, Layer, Splat};
     use crate::scene::{FilterKind, PlaybackHints, TemporalFilter, TrainedWith};
     use glam::{Mat4, Quat, UVec2};
     use proptest::array::uniform3;
@@ -388,6 +389,18 @@ mod tests {
             .collect()
     }
 
+    /// Whether a transmittance at the pixel is within 0.04 of one half; splats are in order of depth.
+    fn is_close(splats: &[Splat], x: u32, y: u32) -> bool {
+        let mut transmittance = 1.0f32;
+        splats.iter().filter(|splat| splat.is_visible()).any(|splat| {
+            let (dx, dy) = (splat.center.x - x as f32, splat.center.y - y as f32);
+            let power = -0.5 * (splat.conic.x * dx * dx + splat.conic.z * dy * dy) - splat.conic.y * dx * dy;
+            let alpha = (splat.opacity * power.exp()).min(ALPHA_MAX);
+            transmittance *= if alpha < ALPHA_MIN { 1.0 } else { 1.0 - alpha };
+            (transmittance - 0.5).abs() < 0.04
+        })
+    }
+
     /// Splats are affine approximations and have a low-pass, so that their alphas are not exactly those along the ray: for this scene,
     /// transmittances are up to 0.032 apart. Pixels where one of them is within 0.04 of one half could go either way and do not count;
     /// everywhere else both must say the same. Depths are those of different points (the splat's mean, the densest point).
@@ -397,30 +410,19 @@ mod tests {
         let size = UVec2::new(48, 32);
         let camera = Camera { world_to_camera: Mat4::IDENTITY, size, lens: Camera::fov_lens(0.5, size) };
         let view = camera.view(0.5, RasterFov::Corrected);
-        let splats = reference::project(&scene, &view);
+        let layer = Layer { scene: &scene, view, look: Look::default() };
+        let splats = reference::project(&layer, BlendSpace::Encoded);
+        let medians = reference::render(&scene, &view, Background::None).median_depth;
+        let pixels = (0..size.y).flat_map(|y| (0..size.x).map(move |x| (x, y)));
         let (mut compared, mut hits) = (0, 0);
-        for (x, y) in (0..size.y).flat_map(|y| (0..size.x).map(move |x| (x, y))) {
-            let (mut transmittance, mut median, mut close) = (1.0, None, false);
-            // The scene is in order of depth.
-            for (index, splat) in splats.iter().enumerate().filter(|(_, splat)| splat.is_visible()) {
-                let (dx, dy) = (splat.center.x - x as f32, splat.center.y - y as f32);
-                let power = -0.5 * (splat.conic.x * dx * dx + splat.conic.z * dy * dy) - splat.conic.y * dx * dy;
-                let alpha = (splat.opacity * power.exp()).min(ALPHA_MAX);
-                transmittance *= if alpha < ALPHA_MIN { 1.0 } else { 1.0 - alpha };
-                close |= (transmittance - 0.5f32).abs() < 0.04;
-                if median.is_none() && transmittance <= 0.5 {
-                    median = Some((index, splat.depth));
-                }
-            }
-            if close {
-                continue;
-            }
+        for ((x, y), median) in pixels.zip(medians).filter(|&((x, y), _)| !is_close(&splats, x, y)) {
             let settings = PickSettings { time: 0.5, ..PickSettings::default() };
             let pick = scene.pick(view.camera_position, view.ray(x, y), &settings);
-            assert_eq!(pick.map(|pick| pick.gaussian), median.map(|(index, _)| index), "at pixel {x}, {y}");
-            if let (Some(pick), Some((_, depth))) = (pick, median) {
-                let apart = (pick.point.z - depth).abs() / depth;
-                assert!(apart < 0.05, "at pixel {x}, {y} the depth {} is about {depth}", pick.point.z);
+            let expected = splats.iter().position(|splat| splat.depth == median);
+            assert_eq!(pick.map(|pick| pick.gaussian), expected, "at pixel {x}, {y}");
+            if let Some(pick) = pick {
+                let apart = (pick.point.z - median).abs() / median;
+                assert!(apart < 0.05, "at pixel {x}, {y} the depth {} is about {median}", pick.point.z);
                 hits += 1;
             }
             compared += 1;
