@@ -82,7 +82,7 @@ impl Default for CropBox {
 
 impl CaptureSettings {
     /// For the renderer, with a further factor on opacity. What is not a number counts as 0.
-    pub(super) fn look(&self, fade: f32) -> Look {
+    pub(crate) fn look(&self, fade: f32) -> Look {
         let stops = self.exposure.exp2();
         let light = [self.tint.red, self.tint.green, self.tint.blue].map(|channel| number(channel * stops));
         Look {
