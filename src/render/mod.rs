@@ -61,3 +61,4 @@ pub use plugin::GaussianCapturePlugin;
 pub use settings::{CaptureSettings, CaptureViewSettings, CropBox, DepthWrite};
 pub use statistics::CaptureStatistics;
 pub use upload::GpuGaussianCapture;
+pub(crate) use upload::UploadFailures;
