@@ -37,8 +37,9 @@
 //! # Colour
 //!
 //! Blending happens in the space captures were trained in, sRGB-encoded values, unless the camera's [`CaptureViewSettings`] say
-//! otherwise. A camera's tonemapping comes afterwards and applies to captures as to everything else; `Tonemapping::None` shows them as
-//! they were trained.
+//! otherwise. On cameras with `Hdr` tonemapping comes afterwards and applies to captures as to everything else; with
+//! `Tonemapping::None` they show as they were trained. Without `Hdr` Bevy tonemaps meshes in their own shaders and nothing else:
+//! captures show as they were trained, whatever the tonemapping.
 
 mod active;
 mod component;
