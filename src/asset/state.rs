@@ -8,7 +8,7 @@
 
 use super::messages::Announcer;
 use super::{CaptureLoadError, GaussianCapture};
-use crate::render::GaussianCapture3d;
+use crate::render::{GaussianCapture3d, UploadFailures};
 use bevy::asset::io::AssetReaderError;
 use bevy::asset::{AssetEvent, AssetId, AssetLoadError, AssetLoadFailedEvent, AssetServer, Assets, LoadState};
 use bevy::ecs::change_detection::{DetectChanges, DetectChangesMut, Ref};
@@ -46,6 +46,7 @@ pub(super) fn keep_states(
     loaded: Res<Assets<GaussianCapture>>,
     mut changes: MessageReader<AssetEvent<GaussianCapture>>,
     mut failures: MessageReader<AssetLoadFailedEvent<GaussianCapture>>,
+    rejected: Res<UploadFailures>,
     mut captures: Query<(Entity, Ref<GaussianCapture3d>, &mut CaptureState)>,
     mut announcer: Announcer,
 ) {
@@ -54,6 +55,10 @@ pub(super) fn keep_states(
         failures.read().map(|failure| (failure.id, describe(&failure.path, &failure.error))).collect();
     for (entity, capture, mut state) in &mut captures {
         let id = capture.0.id();
+        // Rendering has said so.
+        if rejected.contains(id) {
+            continue;
+        }
         if loaded.contains(id) {
             if *state != CaptureState::Ready || changed.contains(&id) || capture.is_changed() {
                 state.set_if_neq(CaptureState::Ready);

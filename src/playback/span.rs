@@ -83,15 +83,19 @@ impl Span {
         if speed < 0.0 { self.length - offset + speed * seconds } else { offset + speed * seconds }
     }
 
-    /// The moment at a phase of the first pass (or two): seconds since the capture's start, unrounded.
+    /// The moment at a phase of the first pass (or two): seconds since the capture's start, unrounded. The end of a loop is its
+    /// beginning.
     pub(super) fn exact(&self, phase: f64) -> f64 {
+        if self.is_loop() && phase >= self.length {
+            return self.start;
+        }
         self.start + if phase > self.length { (2.0 * self.length - phase).max(0.0) } else { phase.max(0.0) }
     }
 
     /// The moment at a phase of the first pass (or two), and whether it is on the way back.
     pub(super) fn moment(&self, phase: f64) -> (f32, bool) {
         let time = self.exact(phase) as f32;
-        // Rounding may reach the end, which for a loop is the beginning.
+        // Rounding may reach the end of a loop, too.
         let wrapped = self.is_loop() && f64::from(time) >= self.start + self.length;
         (if wrapped { self.start() } else { time }, self.is_ping_pong() && phase >= self.length)
     }

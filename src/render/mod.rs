@@ -20,14 +20,14 @@
 //! | 1 | opaque and alpha-masked meshes, skybox | opaque and alpha-masked meshes, skybox |
 //! | 2 | **captures**, cut by the depth of 1 | transmissive and transparent meshes, cut by the depth of 1 |
 //! | 3 | **captures' depth**, if asked for | **captures**, cut by the depth of 1 |
-//! | 4 | transmissive and transparent meshes, gizmos, cut by the depth of 1 (and of 3) | **captures' depth**, if asked for |
+//! | 4 | transparent meshes and gizmos, cut by the depth of 1 (and of 3) | **captures' depth**, if asked for |
 //! | 5 | post-processing, tonemapping | post-processing, tonemapping |
 //!
 //! So without multisampling everything in Bevy's transparent phase (blended materials, gizmos) is drawn over captures, in front of
 //! them or behind; with [`DepthWrite`] what is behind captures is cut by them, pixel by pixel. A multisampled target can only be
 //! read once all meshes are in it: captures are then drawn over everything in the transparent phase, in front of them or behind,
-//! and only opaque and alpha-masked meshes hide them, sample by sample. Where transparent meshes matter use `Msaa::Off`, which
-//! captures do not need.
+//! and only opaque and alpha-masked meshes hide them, sample by sample. Where transparent meshes matter use `Msaa::Off`: captures
+//! need no multisampling.
 //!
 //! Bevy orders its transmissive meshes (`main_transmissive_pass_3d`) and its atmosphere only between opaque and transparent meshes;
 //! order [`CaptureSystems::Draw`] against them, in the render world's `Core3d` schedule, to see captures through glass. Prepasses come
@@ -37,8 +37,9 @@
 //! # Colour
 //!
 //! Blending happens in the space captures were trained in, sRGB-encoded values, unless the camera's [`CaptureViewSettings`] say
-//! otherwise. A camera's tonemapping comes afterwards and applies to captures as to everything else; `Tonemapping::None` shows them as
-//! they were trained.
+//! otherwise. On cameras with `Hdr` tonemapping comes afterwards and applies to captures as to everything else; with
+//! `Tonemapping::None` they show as they were trained. Without `Hdr` Bevy tonemaps meshes in their own shaders and nothing else:
+//! captures show as they were trained, whatever the tonemapping.
 
 mod active;
 mod component;
@@ -61,3 +62,4 @@ pub use plugin::GaussianCapturePlugin;
 pub use settings::{CaptureSettings, CaptureViewSettings, CropBox, DepthWrite};
 pub use statistics::CaptureStatistics;
 pub use upload::GpuGaussianCapture;
+pub(crate) use upload::UploadFailures;

@@ -12,10 +12,10 @@ use super::statistics::{CaptureStatistics, publish_statistics};
 use super::upload::{GpuGaussianCapture, UploadFailures, report_upload_failures};
 use super::visibility::update_bounds;
 use super::write_depth::WriteDepthPipeline;
-use crate::asset::{CaptureFailed, CheckpointLoader, GaussianCapture, PackageLoader};
+use crate::asset::{CaptureAssetPlugin, CaptureAssetSystems};
 use crate::playback::PlaybackPlugin;
 use bevy::app::{App, Plugin, PostUpdate, PreUpdate};
-use bevy::asset::{AssetApp, Assets};
+use bevy::asset::Assets;
 use bevy::camera::visibility::VisibilitySystems;
 use bevy::core_pipeline::core_3d::{main_opaque_pass_3d, main_transparent_pass_3d};
 use bevy::core_pipeline::schedule::{Core3d, Core3dSystems, camera_driver};
@@ -33,14 +33,10 @@ pub struct GaussianCapturePlugin;
 
 impl Plugin for GaussianCapturePlugin {
     fn build(&self, app: &mut App) {
-        app.init_asset::<GaussianCapture>()
-            .init_asset_loader::<PackageLoader>()
-            .init_asset_loader::<CheckpointLoader>()
-            .add_message::<CaptureFailed>()
-            .init_resource::<CaptureStatistics>()
+        app.init_resource::<CaptureStatistics>()
             .init_resource::<UploadFailures>()
-            .add_plugins((PlaybackPlugin, RenderAssetPlugin::<GpuGaussianCapture>::default()))
-            .add_systems(PreUpdate, report_upload_failures)
+            .add_plugins((CaptureAssetPlugin, PlaybackPlugin, RenderAssetPlugin::<GpuGaussianCapture>::default()))
+            .add_systems(PreUpdate, report_upload_failures.after(CaptureAssetSystems))
             .add_systems(PostUpdate, update_bounds.in_set(VisibilitySystems::CalculateBounds));
         build_rendering(app);
     }

@@ -7,6 +7,7 @@ use super::prepare::CaptureRenderer;
 use crate::asset::{CaptureFailed, CaptureState, GaussianCapture};
 use crate::gpu::GpuCapture;
 use bevy::asset::{AssetId, AssetServer};
+use bevy::ecs::change_detection::DetectChangesMut;
 use bevy::ecs::entity::Entity;
 use bevy::ecs::message::MessageWriter;
 use bevy::ecs::resource::Resource;
@@ -14,7 +15,8 @@ use bevy::ecs::system::{Commands, Query, Res, SystemParamItem, lifetimeless::SRe
 use bevy::log::{error, warn};
 use bevy::render::render_asset::{PrepareAssetError, RenderAsset};
 use bevy::render::renderer::{RenderDevice, RenderQueue};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A capture on the GPU; empty where it could not be uploaded, which has been logged and told.
 pub struct GpuGaussianCapture(Option<GpuCapture>);
@@ -26,17 +28,18 @@ impl GpuGaussianCapture {
     }
 }
 
-/// Uploads that failed, on their way to the main world. Both worlds share it.
+/// Captures that have been loaded but could not be uploaded, and why. Both worlds share it.
 #[derive(Resource, Debug, Clone, Default)]
-pub struct UploadFailures(Arc<Mutex<Vec<(AssetId<GaussianCapture>, String)>>>);
+pub struct UploadFailures(Arc<Mutex<HashMap<AssetId<GaussianCapture>, String>>>);
 
 impl UploadFailures {
-    fn push(&self, capture: AssetId<GaussianCapture>, error: String) {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).push((capture, error));
+    /// Whether a capture is among them: its entities have then failed, although it has been loaded.
+    pub(crate) fn contains(&self, capture: AssetId<GaussianCapture>) -> bool {
+        self.lock().contains_key(&capture)
     }
 
-    fn take(&self) -> Vec<(AssetId<GaussianCapture>, String)> {
-        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    fn lock(&self) -> MutexGuard<'_, HashMap<AssetId<GaussianCapture>, String>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -47,13 +50,16 @@ pub(super) fn report_upload_failures(
     mut messages: MessageWriter<CaptureFailed>,
     mut commands: Commands,
 ) {
-    for (failed, error) in failures.take() {
-        for (entity, capture, mut state) in &mut captures {
-            if capture.0.id() == failed {
-                *state = CaptureState::Failed(error.clone());
-                messages.write(CaptureFailed { entity, error: error.clone() });
-                commands.trigger(CaptureFailed { entity, error: error.clone() });
-            }
+    let failures = failures.lock();
+    if failures.is_empty() {
+        return;
+    }
+    for (entity, capture, mut state) in &mut captures {
+        let Some(error) = failures.get(&capture.0.id()) else { continue };
+        if state.set_if_neq(CaptureState::Failed(error.clone())) {
+            let failed = CaptureFailed { entity, error: error.clone() };
+            messages.write(failed.clone());
+            commands.trigger(failed);
         }
     }
 }
@@ -85,12 +91,20 @@ impl RenderAsset for GpuGaussianCapture {
             );
         }
         match GpuCapture::upload(device.wgpu_device(), queue, &renderer.0, source.scene()) {
-            Ok(capture) => Ok(Self(Some(capture))),
+            Ok(capture) => {
+                failures.lock().remove(&id);
+                Ok(Self(Some(capture)))
+            }
             Err(failure) => {
-                error!("{}: not drawn: {failure}", name());
-                failures.push(id, failure.to_string());
+                let failure = format!("{}: not drawn: {failure}", name());
+                error!("{failure}");
+                failures.lock().insert(id, failure);
                 Ok(Self(None))
             }
         }
+    }
+
+    fn unload_asset(id: AssetId<GaussianCapture>, (_, _, _, failures, _): &mut SystemParamItem<Self::Param>) {
+        failures.lock().remove(&id);
     }
 }

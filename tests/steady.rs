@@ -1,0 +1,259 @@
+//! Captures over many frames: nothing is made that is not needed, nothing stays that is not needed any more.
+//!
+//! In: synthetic captures in headless apps. Out: proof that the GPU's memory stands still while time advances, that captures come and
+//! go without a trace, are exchanged without a gap, and survive a new start of the renderer; and that a GPU that is too small says so.
+//! The tests take turns, for what is counted is counted for the whole process. Skipped where there is no GPU.
+
+#[path = "common/app.rs"]
+mod common;
+#[path = "common/skip.rs"]
+mod skip;
+
+use bevy::asset::AssetId;
+use bevy::prelude::*;
+use bevy::render::gpu_readback::{Readback, ReadbackComplete};
+use bevy::render::render_resource::{CachedPipelineState, PipelineCache};
+use bevy::render::renderer::RenderDevice;
+use bevy::render::settings::{Backends, RenderCreation, WgpuLimits, WgpuSettings};
+use bevy::render::{RenderApp, RenderPlugin, RenderStartup};
+use bevy::time::TimeUpdateStrategy;
+use bevy_gs4d::asset::GaussianCapture;
+use bevy_gs4d::gaussian::{Gaussian, Harmonics};
+use bevy_gs4d::gpu;
+use bevy_gs4d::playback::Playback;
+use bevy_gs4d::render::{CaptureStatistics, CaptureViewSettings, DepthWrite, GaussianCapture3d, GaussianCapturePlugin};
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{PlaybackHints, RuntimeScene, TemporalFilter, TrainedWith};
+use bevy_gs4d::testing::{self, Offscreen};
+use common::{app, picture, spawn_camera};
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// Rows of this width need no padding when they are read back.
+const SIZE: UVec2 = UVec2::new(64, 48);
+const STEP: Duration = Duration::from_millis(10);
+
+/// A test's turn.
+fn turn() -> MutexGuard<'static, ()> {
+    static TURN: Mutex<()> = Mutex::new(());
+    TURN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Two seconds of a moving scene with +z up, with a filter of half-second segments if wanted.
+fn synthetic(count: usize, seed: u64, filtered: bool) -> RuntimeScene {
+    let settings = SynthSettings { count, seed, degree: 0, degree_t: 0, duration_seconds: 2.0 };
+    let mut scene = synthesize(&settings).into_runtime().expect("synthetic scenes can be drawn");
+    if filtered {
+        let interval = scene.trained_with.time_interval;
+        scene.filter = Some(TemporalFilter::support(scene.iter(), interval, 4));
+    }
+    scene
+}
+
+/// Still Gaussians of one colour at the origin.
+fn heap(count: usize, color: Vec3) -> RuntimeScene {
+    let gaussian = Gaussian {
+        mean: [0.0; 3],
+        mean_t: 0.5,
+        velocity: [0.0; 3],
+        sigma_t: f32::INFINITY,
+        covariance: [0.2, 0.0, 0.0, 0.2, 0.0, 0.2],
+        opacity: 0.98,
+        padding: 0.0,
+    };
+    // The first harmonic is 0.282; one half is added to colours.
+    let values = ((color - 0.5) / 0.282_094_79).to_array().repeat(count);
+    RuntimeScene {
+        packed: None,
+        gaussians: vec![gaussian; count],
+        harmonics: Harmonics { coefficients: 1, degree: 0, degree_t: 0, values },
+        environment: None,
+        filter: None,
+        trained_with: TrainedWith::default(),
+        playback: PlaybackHints { duration_seconds: 2.0, ..PlaybackHints::default() },
+    }
+}
+
+/// Looks at a synthetic scene.
+fn eye() -> Transform {
+    Transform::from_xyz(0.5, -3.0, 1.5).looking_at(Vec3::ZERO, Vec3::Z)
+}
+
+fn spawn(app: &mut App, scene: RuntimeScene, playback: Playback) -> Entity {
+    let handle = app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(scene));
+    app.world_mut().spawn((GaussianCapture3d(handle), playback)).id()
+}
+
+/// Frames of [`STEP`] each.
+fn run(app: &mut App, frames: usize) {
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(STEP));
+    for _ in 0..frames {
+        app.update();
+        assert!(app.should_exit().is_none(), "rendering stopped; the log says why");
+    }
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
+}
+
+fn statistics(app: &App) -> CaptureStatistics {
+    app.world().resource::<CaptureStatistics>().clone()
+}
+
+fn check_pipelines(app: &App) {
+    for pipeline in app.sub_app(RenderApp).world().resource::<PipelineCache>().pipelines() {
+        if let CachedPipelineState::Err(failure) = &pipeline.state {
+            panic!("a pipeline failed: {failure}");
+        }
+    }
+}
+
+#[test]
+fn nothing_is_made_while_time_advances_inside_a_segment() {
+    let _turn = turn();
+    let Some(mut app) = app(SIZE) else { return };
+    let entity = spawn(&mut app, synthetic(2000, 1, true), Playback::default());
+    spawn_camera(&mut app, Msaa::Off, eye());
+    // Two eyes of one size.
+    let second = Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), SIZE);
+    let camera = spawn_camera(&mut app, Msaa::Off, eye().with_translation(Vec3::new(-0.5, -3.0, 1.5)));
+    let depth = CaptureViewSettings { depth: DepthWrite::Median, ..default() };
+    app.world_mut().entity_mut(camera).insert((second.target(), depth));
+    testing::settle(&mut app).expect("the app draws without an error");
+    run(&mut app, 10);
+    let before = (gpu::created(), gpu::uploaded());
+    assert!(before.0 > 0 && before.1 > 0, "something has been made and uploaded: {before:?}");
+    run(&mut app, 30);
+    let time = app.world().get::<Playback>(entity).expect("still there").time;
+    assert!((0.39..0.5).contains(&time), "time has advanced inside the first segment, to {time}");
+    assert_eq!((gpu::created(), gpu::uploaded()), before, "made and uploaded since");
+    assert_eq!(statistics(&app).views().len(), 2, "both cameras draw");
+    run(&mut app, 60);
+    assert_eq!(gpu::uploaded(), before.1, "another segment needs no upload, either");
+}
+
+#[test]
+fn captures_come_and_go_without_a_trace() {
+    let _turn = turn();
+    let Some(mut app) = app(SIZE) else { return };
+    spawn_camera(&mut app, Msaa::Off, eye());
+    testing::settle(&mut app).expect("the app draws without an error");
+    let statistics = statistics(&app);
+    let mut living = VecDeque::new();
+    for frame in 0..300 {
+        if frame < 100 && frame % 10 == 0 {
+            let scene = synthetic(50_000, frame, frame % 20 == 0);
+            living.push_back(spawn(&mut app, scene, Playback::default()));
+        }
+        // Each shows for some frames, then all do.
+        let show = match frame % 10 {
+            _ if frame == 105 => Some(Visibility::Inherited),
+            4 | 7 => Some(Visibility::Hidden),
+            _ => None,
+        };
+        if let Some(show) = show {
+            for &entity in &living {
+                app.world_mut().entity_mut(entity).insert(show);
+            }
+        }
+        if (120..270).contains(&frame) && frame % 15 == 0 {
+            let oldest = living.pop_front().expect("ten have been spawned");
+            assert!(app.world_mut().despawn(oldest), "it is still there");
+        }
+        run(&mut app, 1);
+        if frame == 2 || frame == 106 {
+            let count = if frame == 2 { 1 } else { 10 };
+            assert_eq!(statistics.uploaded_captures(), count, "captures on the GPU in frame {frame}");
+            let bytes = statistics.capture_bytes();
+            assert!(bytes >= count as u64 * 50_000 * 64, "{count} captures of 64 bytes a Gaussian, not {bytes}");
+            let total: u32 = statistics.views().iter().map(|(_, view)| view.total).sum();
+            assert_eq!(total, count as u32 * 50_000, "Gaussians drawn in frame {frame}");
+        }
+    }
+    assert!(living.is_empty(), "all have gone");
+    run(&mut app, 5);
+    assert_eq!((statistics.uploaded_captures(), statistics.capture_bytes()), (0, 0), "and their memory, too");
+    assert!(statistics.views().is_empty(), "nothing is drawn");
+    assert_eq!(app.world().resource::<Assets<GaussianCapture>>().len(), 0, "no asset is left");
+    check_pipelines(&app);
+}
+
+#[test]
+fn another_scene_under_the_same_name_shows_without_a_gap() {
+    let _turn = turn();
+    let Some(mut app) = app(SIZE) else { return };
+    let entity = spawn(&mut app, heap(1, Vec3::X), Playback::paused_at(0.0));
+    spawn_camera(&mut app, Msaa::Off, eye());
+    testing::settle(&mut app).expect("the app draws without an error");
+    // The pixel in the middle, frame by frame.
+    let seen = Arc::new(Mutex::new(Vec::new()));
+    let sink = seen.clone();
+    let middle = (SIZE.y / 2 * SIZE.x + SIZE.x / 2) as usize * 4;
+    let watch = move |event: On<ReadbackComplete>| {
+        let pixel = [0, 1, 2].map(|channel| event.data[middle + channel]);
+        sink.lock().unwrap_or_else(PoisonError::into_inner).push(pixel);
+    };
+    let image = app.world().resource::<Offscreen>().image.clone();
+    app.world_mut().spawn(Readback::texture(image)).observe(watch);
+    run(&mut app, 5);
+    let id: AssetId<GaussianCapture> = app.world().get::<GaussianCapture3d>(entity).expect("still there").into();
+    let other = GaussianCapture::new(heap(700, Vec3::Z));
+    app.world_mut().resource_mut::<Assets<GaussianCapture>>().insert(id, other).expect("its handle is alive");
+    run(&mut app, 12);
+    let seen = seen.lock().unwrap_or_else(PoisonError::into_inner).clone();
+    let [red, blue]: [fn(&[u8; 3]) -> bool; 2] = [|p| p[0] > 200 && p[2] < 60, |p| p[2] > 200 && p[0] < 60];
+    let changed = seen.iter().position(blue).expect("the other scene shows in the end");
+    assert!(changed > 0 && seen[..changed].iter().all(red), "the first one until then: {seen:?}");
+    assert!(seen[changed..].iter().all(blue), "the other one from then on: {seen:?}");
+}
+
+#[test]
+fn a_new_start_of_the_renderer_makes_everything_again() {
+    let _turn = turn();
+    let Some(mut app) = app(SIZE) else { return };
+    spawn(&mut app, synthetic(2000, 3, true), Playback::paused_at(0.7));
+    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    let depth = CaptureViewSettings { depth: DepthWrite::Expected, ..default() };
+    app.world_mut().entity_mut(camera).insert(depth);
+    let before = picture(&mut app, 0.0);
+    assert!(before.pixels().any(|pixel| pixel.0[..3] != [0, 0, 0]), "something shows");
+    let (created, uploaded) = (gpu::created(), gpu::uploaded());
+    // What Bevy does once it has another device.
+    app.sub_app_mut(RenderApp).world_mut().run_schedule(RenderStartup);
+    let after = picture(&mut app, 0.0);
+    assert!(gpu::uploaded() > uploaded, "the capture has been uploaded again");
+    assert!(gpu::created() > created, "and working buffers made");
+    assert!(before == after, "to the same picture");
+    assert_eq!(statistics(&app).renderer_missing(), None, "nothing is missing");
+    assert_eq!(statistics(&app).uploaded_captures(), 1, "nor is anything there twice");
+    check_pipelines(&app);
+}
+
+#[test]
+fn a_gpu_that_is_too_small_says_so_and_the_game_goes_on() {
+    let _turn = turn();
+    let Some(mut large) = app(SIZE) else { return };
+    testing::settle(&mut large).expect("the app draws without an error");
+    let limits = large.sub_app(RenderApp).world().resource::<RenderDevice>().limits();
+    drop(large);
+    // Enough for Bevy.
+    let limits = WgpuLimits { max_compute_workgroup_storage_size: 8192, ..limits };
+    let backends = if cfg!(target_os = "linux") { Backends::VULKAN } else { Backends::PRIMARY };
+    let settings = WgpuSettings { backends: Some(backends), constrained_limits: Some(limits), ..default() };
+    let mut app = testing::app_with(SIZE, |plugins| {
+        plugins.set(RenderPlugin {
+            render_creation: RenderCreation::Automatic(Box::new(settings)),
+            synchronous_pipeline_compilation: true,
+            ..default()
+        })
+    });
+    app.add_plugins(GaussianCapturePlugin).insert_resource(ClearColor(Color::BLACK));
+    let entity = spawn(&mut app, heap(1, Vec3::X), Playback::default());
+    spawn_camera(&mut app, Msaa::Off, eye());
+    let picture = picture(&mut app, 0.25);
+    assert!(picture.pixels().all(|pixel| pixel.0[..3] == [0, 0, 0]), "no capture is drawn");
+    let why = statistics(&app).renderer_missing().expect("a reason");
+    assert!(why.contains("max_compute_workgroup_storage_size"), "it names the limit: {why}");
+    assert_eq!(statistics(&app).uploaded_captures(), 0, "and nothing is uploaded for nothing");
+    let time = app.world().get::<Playback>(entity).expect("still there").time;
+    assert_eq!(time, 0.25, "captures play all the same");
+}
