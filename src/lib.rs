@@ -81,7 +81,7 @@
 //! |---|---|
 //! | none | `gaussian`, `scene`, `codec`, `dataset`, `metrics`, `reference`: no GPU, no Bevy |
 //! | `gpu` | [`gpu`]: the renderer, on wgpu |
-//! | `bevy` (default) | [`asset`], [`playback`], [`render`], [`prelude`]; implies `gpu` |
+//! | `bevy` (default) | [`asset`], [`playback`], [`render`], [`stereo`], [`prelude`]; implies `gpu` |
 //! | `cli` | the `gs4d` command; implies `gpu`, never compiles Bevy |
 //! | `testing` | `testing`: Bevy apps without a window, drawn into pictures; implies `bevy` |
 //! | `viewer` | the window, lit meshes and panel of the interactive examples; implies `testing` |
@@ -109,6 +109,8 @@ pub mod reference;
 #[cfg(feature = "bevy")]
 pub mod render;
 pub mod scene;
+#[cfg(feature = "bevy")]
+pub mod stereo;
 #[cfg(feature = "testing")]
 pub mod testing;
 
