@@ -5,7 +5,6 @@
 pub mod arguments;
 
 pub use arguments::{asset_path, save_pictures};
-pub use bevy_gs4d::testing as offscreen;
 
 use bevy::prelude::*;
 use bevy_gs4d::asset::GaussianCapture;
