@@ -4,9 +4,9 @@
 //! `gs4d bench`.
 
 use bevy_gs4d::codec::package::{self, WriteSettings};
-use bevy_gs4d::frame::Background;
-use bevy_gs4d::gaussian::{Camera, RasterFov, SliceSettings, View};
-use bevy_gs4d::reference;
+use bevy_gs4d::frame::{Background, BlendSpace};
+use bevy_gs4d::gaussian::{Camera, Look, RasterFov, SliceSettings, View};
+use bevy_gs4d::reference::{self, Layer};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Form, GaussianScene};
 use criterion::{Criterion, Throughput};
@@ -54,9 +54,12 @@ fn bench_package(criterion: &mut Criterion) {
 fn bench_reference(criterion: &mut Criterion) {
     let scene = scene().into_runtime().expect("a synthetic scene can be drawn");
     let (view, background) = (view(), Background::Color([0.0; 3]));
+    let layer = Layer { scene: &scene, view, look: Look::default() };
     let mut group = criterion.benchmark_group("reference");
     group.throughput(Throughput::Elements(COUNT as u64));
-    group.bench_function("project", |bencher| bencher.iter(|| reference::project(black_box(&scene), &view)));
+    group.bench_function("project", |bencher| {
+        bencher.iter(|| reference::project(black_box(&layer), BlendSpace::Encoded))
+    });
     group.bench_function("render", |bencher| bencher.iter(|| reference::render(black_box(&scene), &view, background)));
     group.finish();
 }

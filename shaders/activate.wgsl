@@ -1,32 +1,28 @@
 // activate: the index list of the Gaussians that are active in a segment of time, in ascending order.
-// In: the filter of one part of a capture, as bits or intervals. Out: the list, its length, and the size of the dispatch of
-// `project` over it; the keys of the slots that stay empty become INVISIBLE. Runs only when the segment changes. `count` counts
-// blocks, `scan` sums them, `write` fills the list.
-#import gs4d::types::{Instance, FILTER_BITS, INVISIBLE}
+// In: the filter of one part of a capture, as bits or intervals. Out: the list. Its length the host knows. Runs once for all views,
+// and only when the segment changes. `count` counts blocks, `scan` sums them, `write` fills the list.
+#import gs4d::types::{Activation, FILTER_BITS}
 #import gs4d::scan::{exclusive_scan, scan_total}
 
 const PER_THREAD: u32 = 8u;
 const BLOCK: u32 = 2048u;
 
-@group(0) @binding(0) var<uniform> instance: Instance;
+@group(0) @binding(0) var<uniform> activation: Activation;
 @group(0) @binding(1) var<storage, read_write> active_list: array<u32>;
-@group(0) @binding(2) var<storage, read_write> active_counts: array<u32>;
-@group(0) @binding(3) var<storage, read_write> blocks: array<u32>;
-@group(0) @binding(4) var<storage, read_write> depth_keys: array<u32>;
+@group(0) @binding(2) var<storage, read_write> blocks: array<u32>;
 // Bits: the words of each segment in turn. Intervals: first and last segment of each Gaussian, 16 bits each.
 @group(1) @binding(0) var<storage, read> sets: array<u32>;
-@group(2) @binding(0) var<storage, read_write> arguments: array<u32>;
 
 fn is_active(index: u32) -> bool {
-    if index >= instance.count {
+    if index >= activation.count {
         return false;
     }
-    if instance.filter_mode == FILTER_BITS {
-        let words = (instance.count + 31u) / 32u;
-        return ((sets[instance.segment * words + index / 32u] >> (index % 32u)) & 1u) == 1u;
+    if activation.filter_mode == FILTER_BITS {
+        let words = (activation.count + 31u) / 32u;
+        return ((sets[activation.segment * words + index / 32u] >> (index % 32u)) & 1u) == 1u;
     }
     let interval = sets[index];
-    return (interval & 0xffffu) <= instance.segment && instance.segment <= (interval >> 16u);
+    return (interval & 0xffffu) <= activation.segment && activation.segment <= (interval >> 16u);
 }
 
 fn thread_count(first: u32) -> u32 {
@@ -48,7 +44,7 @@ fn count(@builtin(workgroup_id) block: vec3<u32>, @builtin(local_invocation_inde
 // One workgroup.
 @compute @workgroup_size(256)
 fn scan(@builtin(local_invocation_index) thread: u32) {
-    let total = (instance.count + BLOCK - 1u) / BLOCK;
+    let total = (activation.count + BLOCK - 1u) / BLOCK;
     let each = (total + 255u) / 256u;
     let first = min(thread * each, total);
     let last = min((thread + 1u) * each, total);
@@ -62,13 +58,6 @@ fn scan(@builtin(local_invocation_index) thread: u32) {
         blocks[i] = sum;
         sum += item;
     }
-    if thread == 0u {
-        let active_count = scan_total();
-        active_counts[instance.part] = active_count;
-        arguments[3u * instance.part] = (active_count + 255u) / 256u;
-        arguments[3u * instance.part + 1u] = 1u;
-        arguments[3u * instance.part + 2u] = 1u;
-    }
 }
 
 @compute @workgroup_size(256)
@@ -77,11 +66,8 @@ fn write(@builtin(workgroup_id) block: vec3<u32>, @builtin(local_invocation_inde
     var at = blocks[block.x] + exclusive_scan(thread_count(first), thread);
     for (var i = first; i < first + PER_THREAD; i++) {
         if is_active(i) {
-            active_list[instance.first_slot + at] = i;
+            active_list[activation.first + at] = i;
             at++;
-        }
-        if i >= active_counts[instance.part] && i < instance.count {
-            depth_keys[instance.first_slot + i] = INVISIBLE;
         }
     }
 }

@@ -1,7 +1,8 @@
 // blend: front to back over each tile of 16 x 16 pixels, one workgroup each.
-// In: tile ranges, pairs, splats, the depth of opaque surfaces, the background. Out: colour and transmittance, expected depth.
-// Section 3.4 of the 4DGS model; twin of src/reference/blend.rs.
-#import gs4d::types::{Frame, Splat, BACKGROUND_COLOR, BACKGROUND_ENVIRONMENT}
+// In: tile ranges, pairs, splats, the depth of opaque surfaces, the background. Out: colour and transmittance, expected and median
+// depth. Each sample of a multisampled depth hides what is behind it from its share of the pixel. Section 3.4 of the 4DGS model; twin of src/reference/blend.rs.
+#import gs4d::types::{Frame, Splat, BACKGROUND_COLOR, BACKGROUND_ENVIRONMENT, DEBUG_DEPTH, DEBUG_OVERDRAW}
+#import gs4d::look::{decode, heat}
 #import gs4d::environment::environment_texel
 
 const TILE_SIZE: u32 = 16u;
@@ -10,6 +11,11 @@ const ALPHA_MIN: f32 = 1.0 / 255.0;
 const ALPHA_MAX: f32 = 0.99;
 const TRANSMITTANCE_MIN: f32 = 1e-4;
 const FAR: f32 = 3.4e38;
+// Blended splats that show at the end of the scale of overdraw.
+const OVERDRAW_MAX: f32 = 64.0;
+#ifdef MULTISAMPLED
+const SAMPLES_MAX: u32 = 8u;
+#endif
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> tile_ranges: array<vec2<u32>>;
@@ -17,14 +23,26 @@ const FAR: f32 = 3.4e38;
 @group(0) @binding(3) var<storage, read> splats: array<Splat>;
 // Planar: 3 x height x width.
 @group(0) @binding(4) var<storage, read> environment: array<f32>;
+#ifdef MULTISAMPLED
+@group(0) @binding(5) var opaque_depth: texture_depth_multisampled_2d;
+#else
 @group(0) @binding(5) var opaque_depth: texture_depth_2d;
+#endif
 @group(0) @binding(6) var color_out: texture_storage_2d<rgba32float, write>;
-@group(0) @binding(7) var depth_out: texture_storage_2d<r32float, write>;
+@group(0) @binding(7) var depth_out: texture_storage_2d<rg32float, write>;
 
 // Centre, opacity, depth; conic; colour.
 var<workgroup> batch_a: array<vec4<f32>, 256>;
 var<workgroup> batch_b: array<vec3<f32>, 256>;
 var<workgroup> batch_c: array<vec3<f32>, 256>;
+// Camera-space depth of the opaque surface of each sample, and how many samples there are.
+#ifdef MULTISAMPLED
+var<private> limits: array<f32, 8>;
+#else
+var<private> limits: array<f32, 1>;
+#endif
+var<private> samples: u32;
+
 // Pixels of this tile that need no more splats.
 var<workgroup> finished: atomic<u32>;
 
@@ -34,11 +52,18 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
     let position = vec2<f32>(pixel);
     let range = tile_ranges[tile.y * frame.tiles.x + tile.x];
     let inside = all(pixel < frame.size);
-    let limit = opaque_limit(pixel, inside);
+    find_limits(pixel, inside);
+    let open = open_share();
 
     var color = vec3(0.0);
     var transmittance = 1.0;
     var depth = 0.0;
+    var median = 0.0;
+    var blended = 0u;
+    // Samples whose surface has been passed, their summed transmittance, and where the next surface is.
+    var hidden = 0u;
+    var hidden_transmittance = 0.0;
+    var limit = next_limit(-FAR);
     var done = !inside;
     if thread == 0u {
         atomicStore(&finished, 0u);
@@ -66,10 +91,16 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
         }
         for (var i = 0u; i < min(BATCH, range.y - first); i++) {
             let a = batch_a[i];
-            // Sorted by depth: all that follow are hidden too.
+            // Sorted by depth: all that follow are hidden from these samples too.
             if a.w > limit {
-                done = true;
-                break;
+                let passed = passed_limits(a.w);
+                hidden_transmittance += f32(passed - hidden) * transmittance;
+                hidden = passed;
+                if hidden == samples {
+                    done = true;
+                    break;
+                }
+                limit = next_limit(a.w);
             }
             let d = a.xy - position;
             let conic = batch_b[i];
@@ -86,35 +117,96 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
                 done = true;
                 break;
             }
-            let weight = alpha * transmittance;
+            let weight = alpha * transmittance * (f32(samples - hidden) / f32(samples));
             color += batch_c[i] * weight;
             depth += a.w * weight;
+            if transmittance > 0.5 && left <= 0.5 {
+                median = a.w;
+            }
             transmittance = left;
+            blended++;
         }
         if done {
             atomicAdd(&finished, 1u);
         }
     }
     if inside {
-        if frame.background_mode == BACKGROUND_COLOR {
+        // What is left behind all splats where there is no surface, and over all samples.
+        let behind = transmittance * open;
+        transmittance = (hidden_transmittance + f32(samples - hidden) * transmittance) / f32(samples);
+        if frame.debug == DEBUG_DEPTH {
+            color = vec3(debug_depth(depth, 1.0 - transmittance));
+        } else if frame.debug == DEBUG_OVERDRAW {
+            color = heat(f32(blended) / OVERDRAW_MAX);
+            transmittance = select(0.0, 1.0, blended == 0u);
+        } else if frame.background_mode == BACKGROUND_COLOR {
             color += transmittance * frame.background.xyz;
-        } else if frame.background_mode == BACKGROUND_ENVIRONMENT && limit == FAR {
-            color += transmittance * environment_color(position);
+        } else if frame.background_mode == BACKGROUND_ENVIRONMENT && open > 0.0 {
+            color += behind * environment_color(position);
             // background.w: whether what is behind the map is hidden by it.
-            transmittance *= frame.background.w;
+            transmittance -= behind * (1.0 - frame.background.w);
         }
         textureStore(color_out, pixel, vec4(color, transmittance));
-        textureStore(depth_out, pixel, vec4(depth, 0.0, 0.0, 0.0));
+        textureStore(depth_out, pixel, vec4(depth, median, 0.0, 0.0));
     }
 }
 
-// Camera-space depth of the opaque surface at this pixel: z = near / depth with an infinite reverse-z projection.
-fn opaque_limit(pixel: vec2<u32>, inside: bool) -> f32 {
-    if frame.opaque_near == 0.0 || !inside {
-        return FAR;
+// Premultiplied: near is bright.
+fn debug_depth(depth: f32, opacity: f32) -> f32 {
+    if opacity <= 0.0 {
+        return 0.0;
     }
-    let depth = textureLoad(opaque_depth, pixel + frame.opaque_origin, 0);
-    return select(FAR, frame.opaque_near / depth, depth > 0.0);
+    return opacity * frame.debug_depth / (frame.debug_depth + depth / opacity);
+}
+
+// Camera-space depth of the opaque surface of each sample of this pixel.
+fn find_limits(pixel: vec2<u32>, inside: bool) {
+    samples = 1u;
+    limits[0] = FAR;
+    if frame.opaque_samples == 0u || !inside {
+        return;
+    }
+#ifdef MULTISAMPLED
+    samples = min(frame.opaque_samples, SAMPLES_MAX);
+    for (var i = 0u; i < samples; i++) {
+        limits[i] = distance_of(textureLoad(opaque_depth, pixel + frame.opaque_origin, i));
+    }
+#else
+    limits[0] = distance_of(textureLoad(opaque_depth, pixel + frame.opaque_origin, 0));
+#endif
+}
+
+// Depth 0 is where nothing is: the far plane.
+fn distance_of(depth: f32) -> f32 {
+    let d = frame.opaque_distance;
+    return select(FAR, (d.x + d.y * depth) / (d.z + d.w * depth), depth > 0.0);
+}
+
+// Share of the samples without a surface.
+fn open_share() -> f32 {
+    var open = 0u;
+    for (var i = 0u; i < samples; i++) {
+        open += select(0u, 1u, limits[i] == FAR);
+    }
+    return f32(open) / f32(samples);
+}
+
+// The nearest surface that is not before `depth`.
+fn next_limit(depth: f32) -> f32 {
+    var nearest = FAR;
+    for (var i = 0u; i < samples; i++) {
+        nearest = select(nearest, min(nearest, limits[i]), limits[i] >= depth);
+    }
+    return nearest;
+}
+
+// How many surfaces are before `depth`.
+fn passed_limits(depth: f32) -> u32 {
+    var passed = 0u;
+    for (var i = 0u; i < samples; i++) {
+        passed += select(0u, 1u, limits[i] < depth);
+    }
+    return passed;
 }
 
 fn environment_color(position: vec2<f32>) -> vec3<f32> {
@@ -130,7 +222,7 @@ fn environment_color(position: vec2<f32>) -> vec3<f32> {
         let weight = (1.0 - abs(at.x - texel.x)) * (1.0 - abs(at.y - texel.y));
         color += weight * environment_at(texel);
     }
-    return color;
+    return select(color, decode(max(color, vec3(0.0))), frame.linear != 0u);
 }
 
 // Black outside the texture: the seam fades, as in the original.

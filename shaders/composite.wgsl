@@ -1,7 +1,8 @@
 // composite: lays the captures of a view over what the game has drawn.
 //
-// In: the view target so far (linear; sRGB-encoded with ENCODED_TARGET), the captures' colour and transmittance (sRGB-encoded
-// values, premultiplied) for the pixels of the viewport. Out: the view target. Blending happens in the captures' space, as trained.
+// In: the view target so far (linear; sRGB-encoded with ENCODED_TARGET), the captures' colour and transmittance (premultiplied, in
+// the space they were blended in: sRGB-encoded values; linear light with LINEAR_BLEND) for the pixels of the viewport. Out: the view
+// target. Blending with what is behind happens in the captures' space, too.
 
 @group(0) @binding(0) var source: texture_2d<f32>;
 @group(0) @binding(1) var captures: texture_2d<f32>;
@@ -21,6 +22,39 @@ fn decode(encoded: vec3<f32>) -> vec3<f32> {
     return sign(encoded) * select(curve, x / 12.92, x <= vec3(0.04045));
 }
 
+// From the target's space to that of the captures, and back.
+fn to_blend_space(color: vec3<f32>) -> vec3<f32> {
+#ifdef ENCODED_TARGET
+#ifdef LINEAR_BLEND
+    return decode(color);
+#else
+    return color;
+#endif
+#else
+#ifdef LINEAR_BLEND
+    return color;
+#else
+    return encode(color);
+#endif
+#endif
+}
+
+fn from_blend_space(color: vec3<f32>) -> vec3<f32> {
+#ifdef ENCODED_TARGET
+#ifdef LINEAR_BLEND
+    return encode(color);
+#else
+    return color;
+#endif
+#else
+#ifdef LINEAR_BLEND
+    return color;
+#else
+    return decode(color);
+#endif
+#endif
+}
+
 @fragment
 fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
     let pixel = vec2<u32>(position.xy);
@@ -35,9 +69,5 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
         return behind;
     }
     let alpha = 1.0 - transmittance * (1.0 - behind.a);
-#ifdef ENCODED_TARGET
-    return vec4(front.rgb + transmittance * behind.rgb, alpha);
-#else
-    return vec4(decode(front.rgb + transmittance * encode(behind.rgb)), alpha);
-#endif
+    return vec4(from_blend_space(front.rgb + transmittance * to_blend_space(behind.rgb)), alpha);
 }

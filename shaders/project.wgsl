@@ -1,7 +1,9 @@
 // project: slices each Gaussian at the view's time and projects it.
-// In: Gaussians, colour coefficients, an instance. Out: one splat and one depth key for each; the key of an invisible splat is
-// INVISIBLE. Section 3.3 of the 4DGS model, in its order; twin of src/gaussian/projection.rs and src/reference/project.rs.
-#import gs4d::types::{Gaussian, Instance, Splat, FILTER_NONE, INVISIBLE}
+// In: Gaussians, colour coefficients, an instance, a list of the active. Out: one splat and one depth key for each active Gaussian;
+// the key of an invisible splat is INVISIBLE. Section 3.3 of the 4DGS model, in its order; twin of src/gaussian/projection.rs and src/reference/project.rs.
+#import gs4d::types::{Gaussian, Instance, Splat, INVISIBLE}
+#import gs4d::types::{LIGHTING_AS_TRAINED, LIGHTING_ENCODED, DEBUG_ACTIVE, DEBUG_LIFESPAN, DEBUG_VELOCITY}
+#import gs4d::look::{decode, encode, heat}
 #ifdef PACKED_GEOMETRY
 #import gs4d::packed::{unpack_base, unpack_gaussian, BLOCK_RANGES, PACKED_BLOCK, SHARED_RANGES}
 #endif
@@ -17,9 +19,6 @@ const INVERSE_ALPHA_MIN: f32 = 255.0;
 @group(0) @binding(0) var<uniform> instance: Instance;
 @group(0) @binding(1) var<storage, read_write> splats: array<Splat>;
 @group(0) @binding(2) var<storage, read_write> depth_keys: array<u32>;
-// The list of `activate`; not read without a filter.
-@group(0) @binding(3) var<storage, read> active_list: array<u32>;
-@group(0) @binding(4) var<storage, read> active_counts: array<u32>;
 #ifdef PACKED_GEOMETRY
 // Two four-vectors for each Gaussian.
 @group(1) @binding(0) var<storage, read> records: array<vec4<u32>>;
@@ -38,19 +37,18 @@ const INVERSE_ALPHA_MIN: f32 = 255.0;
 @group(1) @binding(1) var<storage, read> harmonics: array<vec4<f32>>;
 #endif
 
+// The list of `activate`; not read without a filter.
+@group(2) @binding(0) var<storage, read> active_list: array<u32>;
+
 @compute @workgroup_size(256)
 fn project(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x >= instance.count {
+        return;
+    }
     let slot = instance.first_slot + id.x;
     var index = id.x;
-    if instance.filter_mode == FILTER_NONE {
-        if id.x >= instance.count {
-            return;
-        }
-    } else {
-        if id.x >= active_counts[instance.part] {
-            return;
-        }
-        index = active_list[slot];
+    if instance.listed != 0u {
+        index = active_list[instance.first_listed + id.x];
     }
     depth_keys[slot] = project_one(index, slot);
 }
@@ -71,23 +69,35 @@ fn project_one(index: u32, slot: u32) -> u32 {
     let g = load_gaussian(index);
     let dt = instance.time - g.mean_t;
     let z = dt * g.inverse_sigma_t;
-    let marginal = exp(-0.5 * z * z);
-    if marginal <= MARGINAL_CUTOFF {
-        return INVISIBLE;
+    var marginal = exp(-0.5 * z * z);
+    let absent = marginal <= MARGINAL_CUTOFF;
+    if absent {
+        if instance.debug != DEBUG_ACTIVE {
+            return INVISIBLE;
+        }
+        marginal = MARGINAL_CUTOFF;
     }
     let mean = vec4(g.mean + g.velocity * dt, 1.0);
+    if instance.cropped != 0u {
+        let place = vec3(dot(instance.crop_x, mean), dot(instance.crop_y, mean), dot(instance.crop_z, mean));
+        // Written so that what is not a number is outside.
+        if !all(abs(place) <= vec3(1.0)) {
+            return INVISIBLE;
+        }
+    }
     let q = vec3(dot(instance.camera_x, mean), dot(instance.camera_y, mean), dot(instance.camera_z, mean));
     if q.z <= instance.near {
         return INVISIBLE;
     }
     let size = vec2<f32>(instance.size);
-    let ndc = vec2(dot(instance.clip_x, mean), dot(instance.clip_y, mean)) / (q.z + 1e-7);
+    let parallel = instance.orthographic != 0u;
+    let ndc = vec2(dot(instance.clip_x, mean), dot(instance.clip_y, mean)) / select(q.z + 1e-7, 1.0, parallel);
     let center = ((ndc + 1.0) * size - 1.0) * 0.5;
 
     // The nesting of min and max matters: with the field-of-view sentinel the limits are negative.
     let limit = FRUSTUM_CLAMP * instance.tan_fov;
-    let ray = min(limit, max(-limit, q.xy / q.z));
-    let j = instance.focal / q.z;
+    let ray = select(min(limit, max(-limit, q.xy / q.z)), vec2(0.0), parallel);
+    let j = instance.focal / select(q.z, 1.0, parallel);
     let mx = j.x * (instance.camera_x.xyz - ray.x * instance.camera_z.xyz);
     let my = j.y * (instance.camera_y.xyz - ray.y * instance.camera_z.xyz);
     let ca = g.covariance_a;
@@ -112,7 +122,7 @@ fn project_one(index: u32, slot: u32) -> u32 {
     var high = clamp(trunc((center + radius + (TILE_SIZE - 1.0)) / TILE_SIZE), vec2(0.0), grid);
 
     // Tiles where alpha never reaches 1/255 are left out; blend would skip them. See Projected::contributing_tiles.
-    let opacity = g.opacity * marginal;
+    let opacity = g.opacity * marginal * instance.opacity;
     if det > 0.0 {
         let energy = 2.0 * log(opacity * INVERSE_ALPHA_MIN);
         if energy < -1e-3 {
@@ -136,11 +146,45 @@ fn project_one(index: u32, slot: u32) -> u32 {
     splat.opacity = opacity;
     splat.depth = q.z;
     splat.conic = vec3(c, -b, a) / det;
-    splat.color = color(index, normalize(seen - instance.camera_position), -dt);
+    if instance.debug >= DEBUG_ACTIVE {
+        splat.color = debug_color(g, absent);
+    } else {
+        var direction = instance.camera_position;
+        if !parallel {
+            direction = normalize(seen - instance.camera_position);
+        }
+        splat.color = lit(color(index, direction, -dt));
+    }
     splat.tiles_low = u32(low.x) | (u32(low.y) << 16u);
     splat.tiles_high = u32(high.x) | (u32(high.y) << 16u);
     splats[slot] = splat;
-    return bitcast<u32>(q.z);
+    // Positive numbers sort as their bits do; the near plane of an orthographic camera may be behind it.
+    return bitcast<u32>(select(q.z, q.z - instance.near, parallel));
+}
+
+// A trained colour in the blend space, in the light that the capture is given.
+fn lit(color: vec3<f32>) -> vec3<f32> {
+    if instance.lighting == LIGHTING_AS_TRAINED {
+        return color;
+    }
+    let linear = decode(color) * instance.light;
+    if instance.lighting == LIGHTING_ENCODED {
+        return encode(linear);
+    }
+    return linear;
+}
+
+fn debug_color(g: Gaussian, absent: bool) -> vec3<f32> {
+    if instance.debug == DEBUG_VELOCITY {
+        // Units over the whole time interval; one unit is halfway to full colour.
+        let distance = g.velocity * instance.time_span;
+        return 0.5 + 0.5 * distance / (1.0 + length(distance));
+    }
+    if instance.debug == DEBUG_LIFESPAN {
+        // A tenth of the time interval is in the middle.
+        return heat(0.25 + 0.75 / (1.0 + 0.1 * instance.time_span * g.inverse_sigma_t));
+    }
+    return select(vec3(0.1, 0.8, 0.2), vec3(0.9, 0.1, 0.1), absent);
 }
 
 #ifdef CODED_COLORS

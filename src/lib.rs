@@ -100,6 +100,8 @@ pub mod gaussian;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod metrics;
+#[cfg(feature = "bevy")]
+pub mod picking;
 pub mod picture;
 #[cfg(feature = "bevy")]
 pub mod playback;

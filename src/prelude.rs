@@ -21,9 +21,14 @@
 //! app.add_systems(Startup, (setup, slow_motion).chain()).run();
 //! ```
 
-pub use crate::asset::GaussianCapture;
+pub use crate::asset::{CaptureFailed, CaptureReady, CaptureState, GaussianCapture};
+pub use crate::frame::{BlendSpace, DebugView};
+pub use crate::picking::{CaptureHit, CapturePicker};
 pub use crate::playback::{
     FollowsClock, KeyFrameCrossed, MarkerReached, Playback, PlaybackClock, PlaybackEnded, PlaybackLooped,
     PlaybackPaused, PlaybackSeeked, PlaybackStarted, Repeat, Timeline, TimelinePlayer, TimelineTrack,
 };
-pub use crate::render::{CaptureSettings, GaussianCapture3d, GaussianCapturePlugin};
+pub use crate::render::{
+    CaptureSettings, CaptureStatistics, CaptureViewSettings, CropBox, DepthWrite, GaussianCapture3d,
+    GaussianCapturePlugin,
+};

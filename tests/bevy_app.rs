@@ -242,16 +242,6 @@ fn hidden_and_flattened_captures_are_not_drawn() {
 }
 
 #[test]
-fn an_orthographic_camera_draws_no_capture_and_no_error() {
-    let Some(mut app) = app(SIZE) else { return };
-    spawn(&mut app, &red(), Transform::default());
-    let camera = spawn_camera(&mut app, Msaa::Off, eye());
-    app.world_mut().entity_mut(camera).insert(Projection::Orthographic(OrthographicProjection::default_3d()));
-    let picture = picture(&mut app, 0.0);
-    assert!(picture.pixels().all(|pixel| pixel.0[..3] == [0, 0, 0]), "the clear colour and nothing else");
-}
-
-#[test]
 fn playback_follows_the_clock() {
     let Some(mut app) = app(SIZE) else { return };
     let scene = crowd();

@@ -9,8 +9,8 @@ mod gpu;
 mod skip;
 
 use bevy_gs4d::frame::{Background, Frame};
-use bevy_gs4d::gaussian::{Camera, RasterFov, View};
-use bevy_gs4d::gpu::{Headless, Instance};
+use bevy_gs4d::gaussian::{Camera, Look, RasterFov, View};
+use bevy_gs4d::gpu::{Headless, Instance, Surroundings};
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{ActiveSets, FilterKind, RuntimeScene, TemporalFilter};
@@ -117,12 +117,18 @@ fn captures_with_and_without_a_filter_share_a_view() {
     let [plain, other, filtered] = [&a, &b, &filtered].map(|scene| headless.upload(scene).expect("it fits"));
     let mut previous = None;
     for (time, late) in times().zip(times().skip(3)) {
-        let instance = |capture, time| Instance { capture, view: view(time), filtered: true };
-        let expected = [instance(&plain, time), instance(&other, late), instance(&plain, late)];
-        let expected = headless.render_all(&expected, BLACK, None).expect("it is drawn");
+        let surroundings = Surroundings { background: BLACK, ..Surroundings::default() };
+        let instance = |capture, active, time| Instance { capture, active, view: view(time), look: Look::default() };
+        let expected = [instance(&plain, None, time), instance(&other, None, late), instance(&plain, None, late)];
+        let expected = headless.render_all(&expected, &surroundings).expect("it is drawn");
         // The same capture twice, at different times: each place has a list of its own.
-        let mixed = [instance(&filtered, time), instance(&other, late), instance(&filtered, late)];
-        let mixed = headless.render_all(&mixed, BLACK, None).expect("it is drawn");
+        let [now, then] = [time, late].map(|time| headless.active(&filtered, time));
+        let mixed = [
+            instance(&filtered, now.as_ref(), time),
+            instance(&other, None, late),
+            instance(&filtered, then.as_ref(), late),
+        ];
+        let mixed = headless.render_all(&mixed, &surroundings).expect("it is drawn");
         assert!(bits_of(&mixed) == bits_of(&expected), "at {time} and {late}: bit for bit the same");
         assert!(previous != Some(bits_of(&mixed)), "time moves the picture");
         previous = Some(bits_of(&mixed));

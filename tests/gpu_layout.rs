@@ -5,8 +5,8 @@
 
 use bevy_gs4d::gaussian::projection::{ALPHA_MAX, ALPHA_MIN, LOW_PASS, TRANSMITTANCE_MIN};
 use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF};
-use bevy_gs4d::gpu::layout::{self, BLOCK, Counters, DIGITS, Frame, Instance, SortStep, Splat, TILE_SIZE};
-use bevy_gs4d::gpu::shaders::{Storage, compose, pass_names};
+use bevy_gs4d::gpu::layout::{self, Activation, BLOCK, Counters, DIGITS, Frame, Instance, SortStep, Splat, TILE_SIZE};
+use bevy_gs4d::gpu::shaders::{compose, pass_names};
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;
 use wgpu::naga::front::wgsl::parse_str;
@@ -50,7 +50,7 @@ fn gaussian() -> Mirror {
     mirror
 }
 
-fn mirrors() -> [Mirror; 6] {
+fn mirrors() -> [Mirror; 7] {
     [
         gaussian(),
         mirror!(Instance {
@@ -73,19 +73,29 @@ fn mirrors() -> [Mirror; 6] {
             displaced,
             near,
             time_span,
-            filter_mode,
-            segment,
-            part,
+            listed,
+            first_listed,
             stages,
+            orthographic,
             first_entries,
+            light,
+            opacity,
+            lighting,
+            debug,
+            cropped,
+            padding,
+            crop_x,
+            crop_y,
+            crop_z,
         }),
+        mirror!(Activation { count, first, filter_mode, segment }),
         mirror!(Frame {
             size,
             tiles,
             slots,
             pair_capacity,
             background_mode,
-            opaque_near,
+            opaque_samples,
             background,
             projection,
             world_x,
@@ -93,6 +103,11 @@ fn mirrors() -> [Mirror; 6] {
             world_z,
             environment_size,
             opaque_origin,
+            opaque_distance,
+            linear,
+            debug,
+            debug_depth,
+            padding,
         }),
         mirror!(Splat { center, opacity, depth, conic, tiles_low, color, tiles_high }),
         mirror!(Counters { visible, pairs, pairs_wanted, padding }),
@@ -107,7 +122,7 @@ fn plain(name: &str) -> &str {
 
 /// All passes, composed.
 fn modules() -> BTreeMap<&'static str, Module> {
-    pass_names().map(|name| (name, compose(name, Storage::Full).expect("the pass composes"))).collect()
+    pass_names().map(|name| (name, compose(name, &[]).expect("the pass composes"))).collect()
 }
 
 /// A structure that the host fills or reads, as a pass lays it out.
@@ -221,7 +236,15 @@ fn constants_of_the_types_are_those_of_the_host() {
     let lines: Vec<&str> = source.lines().filter(|line| !line.starts_with('#')).collect();
     let types = parse_str(&lines.join("\n")).expect("the library is WGSL");
     let expected = [
-        ("FILTER_NONE", layout::FILTER_NONE),
+        ("LIGHTING_AS_TRAINED", layout::LIGHTING_AS_TRAINED),
+        ("LIGHTING_ENCODED", layout::LIGHTING_ENCODED),
+        ("LIGHTING_LINEAR", layout::LIGHTING_LINEAR),
+        ("DEBUG_COLOR", layout::DEBUG_COLOR),
+        ("DEBUG_DEPTH", layout::DEBUG_DEPTH),
+        ("DEBUG_OVERDRAW", layout::DEBUG_OVERDRAW),
+        ("DEBUG_ACTIVE", layout::DEBUG_ACTIVE),
+        ("DEBUG_LIFESPAN", layout::DEBUG_LIFESPAN),
+        ("DEBUG_VELOCITY", layout::DEBUG_VELOCITY),
         ("FILTER_BITS", layout::FILTER_BITS),
         ("FILTER_INTERVALS", layout::FILTER_INTERVALS),
         ("INVISIBLE", layout::INVISIBLE),

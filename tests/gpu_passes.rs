@@ -9,11 +9,12 @@ mod passes;
 #[path = "common/skip.rs"]
 mod skip;
 
-use bevy_gs4d::gaussian::{Camera, Gaussian, RasterFov};
+use bevy_gs4d::frame::{BlendSpace, DebugView};
+use bevy_gs4d::gaussian::{Camera, Gaussian, Look, RasterFov};
 use bevy_gs4d::gpu::layout::{
     self, BLOCK, Counters, DEPTH_STEPS, DIGIT_BITS, DIGITS, Frame, INVISIBLE, Instance, SortStep,
 };
-use bevy_gs4d::reference::{self, Pair, Splat};
+use bevy_gs4d::reference::{self, Layer, Pair, Splat};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bytemuck::Zeroable;
 use glam::{UVec2, UVec4, Vec2, Vec3};
@@ -360,7 +361,7 @@ fn project_makes_the_splats_of_the_twin() {
         degree_t: 2,
         stride: 3 * 48 / 4,
         time_span: scene.trained_with.time_span(),
-        ..Instance::of_view(&view)
+        ..Instance::new(&view, &Look::default(), BlendSpace::Encoded, DebugView::Color)
     };
     let record = |gaussian: &Gaussian| Gaussian { sigma_t: gaussian.sigma_t.recip(), ..*gaussian };
     let slots = (first_slot + count) as usize;
@@ -372,7 +373,6 @@ fn project_makes_the_splats_of_the_twin() {
         ("harmonics", &gpu.buffer(&scene.harmonics.values)),
         // Without a filter these are not read.
         ("active_list", &gpu.buffer(&[RUBBISH])),
-        ("active_counts", &gpu.buffer(&[RUBBISH])),
     ];
     gpu.pass("project").dispatch("project", count.div_ceil(256), &buffers);
 
@@ -380,7 +380,7 @@ fn project_makes_the_splats_of_the_twin() {
     let keys: Vec<u32> = gpu.read(buffers[2].1);
     let (unused, keys) = keys.split_at(first_slot as usize);
     assert!(unused.iter().all(|key| *key == RUBBISH), "slots of others are left alone");
-    let expected = reference::project(&scene, &view);
+    let expected = reference::project(&Layer { scene: &scene, view, look: Look::default() }, BlendSpace::Encoded);
     let (mut both, mut on_the_edge) = (0, 0);
     for (i, (twin, splat)) in expected.iter().zip(&splats[first_slot as usize..]).enumerate() {
         if keys[i] == INVISIBLE || !twin.is_visible() {

@@ -11,12 +11,13 @@ mod gpu;
 #[path = "common/skip.rs"]
 mod skip;
 
-use bevy_gs4d::frame::{Background, Counts, Frame};
-use bevy_gs4d::gaussian::{Camera, Gaussian, Parameters, RasterFov, View};
+use bevy_gs4d::frame::{Background, BlendSpace, Counts, Frame};
+use bevy_gs4d::gaussian::{Camera, Gaussian, Look, Parameters, RasterFov, View};
 use bevy_gs4d::gpu::{
-    GpuCapture, GpuContext, GpuError, Headless, Instance, OpaqueDepth, Renderer, ShaderChecks, ViewRenderer,
+    GpuCapture, GpuContext, GpuError, Headless, Instance, OpaqueDepth, Renderer, ShaderChecks, Surroundings,
+    ViewRenderer,
 };
-use bevy_gs4d::reference::{self, Splat};
+use bevy_gs4d::reference::{self, Layer, Splat};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{ActiveSets, FilterKind, Form, GaussianScene, RuntimeScene, TemporalFilter};
 use glam::{Mat4, Quat, UVec2, Vec3};
@@ -68,9 +69,23 @@ fn look_from(eye: Vec3, size: UVec2, time: f32) -> View {
     Camera::look_at(eye, Vec3::new(0.0, 0.0, 0.2), Vec3::Z, 0.8, size).view(time, RasterFov::default())
 }
 
+fn project(scene: &RuntimeScene, view: &View) -> Vec<Splat> {
+    reference::project(&Layer { scene, view: *view, look: Look::default() }, BlendSpace::Encoded)
+}
+
+/// A capture as trained, all of it.
+fn instance<'a>(capture: &'a GpuCapture, view: &View) -> Instance<'a> {
+    Instance { capture, active: None, view: *view, look: Look::default() }
+}
+
+/// Over the background, cut by nothing.
+fn surroundings() -> Surroundings<'static> {
+    Surroundings { background: BACKGROUND, ..Surroundings::default() }
+}
+
 /// Several captures on the CPU, cut behind a depth.
 fn twin(instances: &[(&RuntimeScene, View)], limit: f32) -> Frame {
-    let splats: Vec<Splat> = instances.iter().flat_map(|(scene, view)| reference::project(scene, view)).collect();
+    let splats: Vec<Splat> = instances.iter().flat_map(|(scene, view)| project(scene, view)).collect();
     let drawn = |splat: &Splat| splat.is_visible() && splat.depth <= limit;
     let mut order: Vec<u32> = (0..splats.len() as u32).filter(|&i| drawn(&splats[i as usize])).collect();
     reference::sort(&mut order, |&i| splats[i as usize].depth.to_bits());
@@ -79,7 +94,7 @@ fn twin(instances: &[(&RuntimeScene, View)], limit: f32) -> Frame {
     reference::sort(&mut pairs, |pair| pair.tile);
     let ranges = reference::ranges(&pairs, view.tiles());
     let counts = Counts { visible: order.len() as u32, pairs: pairs.len() as u32 };
-    reference::blend(&splats, &pairs, &ranges, view, BACKGROUND, None, counts)
+    reference::blend(&splats, &pairs, &ranges, view, BACKGROUND, None, BlendSpace::Encoded, counts)
 }
 
 fn assert_finite(frame: &Frame, what: &str) {
@@ -254,8 +269,8 @@ fn two_captures_are_one_scene() {
     // An empty one between them takes no slots.
     let cuts = [(0, 1_234), (1_234, 1_234), (1_234, 3_000)];
     let parts = cuts.map(|(first, last)| headless.upload(&part(&scene, first..last)).expect("upload"));
-    let instances = parts.each_ref().map(|capture| Instance { capture, view, filtered: false });
-    let frame = headless.render_all(&instances, BACKGROUND, None).expect("render");
+    let instances = parts.each_ref().map(|capture| instance(capture, &view));
+    let frame = headless.render_all(&instances, &surroundings()).expect("render");
     assert!(frame == whole, "captures interleave as if they were one");
 }
 
@@ -271,11 +286,8 @@ fn captures_in_one_view_have_their_own_time_and_place() {
     );
     let moved = View::new(SIZE, 0.9, view.world_to_camera * model, view.projection, view.tan_fov);
     let captures = [&first, &second].map(|scene| headless.upload(scene).expect("upload"));
-    let instances = [
-        Instance { capture: &captures[0], view, filtered: false },
-        Instance { capture: &captures[1], view: moved, filtered: false },
-    ];
-    let frame = headless.render_all(&instances, BACKGROUND, None).expect("render");
+    let instances = [instance(&captures[0], &view), instance(&captures[1], &moved)];
+    let frame = headless.render_all(&instances, &surroundings()).expect("render");
     let expected = twin(&[(&first, view), (&second, moved)], f32::INFINITY);
     assert_equivalent(&frame, &expected, "two captures");
 }
@@ -345,10 +357,10 @@ fn a_view_makes_room_without_anybody_waiting() {
     let renderer = Renderer::new(device, ShaderChecks::On).expect("the passes compile");
     let capture = GpuCapture::upload(device, queue, &renderer, &scene).expect("upload");
     let mut view = ViewRenderer::new(device);
-    let instances = [Instance { capture: &capture, view: close, filtered: false }];
+    let instances = [instance(&capture, &close)];
     // The first frame counts, the second asks for the count, the third has it.
     for frame in 0..3 {
-        view.prepare(device, queue, &renderer, &instances, BACKGROUND, None).expect("prepare");
+        view.prepare(device, queue, &renderer, &instances, &surroundings()).expect("prepare");
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         view.record(&renderer, &mut encoder, &instances);
         queue.submit([encoder.finish()]);
@@ -417,14 +429,14 @@ fn opaque_surfaces_hide_what_is_behind_them() {
     let Some(mut headless) = gpu::headless() else { return };
     let (scene, view) = (scene(3_000), look_from(EYE, SIZE, 0.5));
     let capture = headless.upload(&scene).expect("upload");
-    let instances = [Instance { capture: &capture, view, filtered: false }];
-    let all = headless.render_all(&instances, BACKGROUND, None).expect("render");
+    let instances = [instance(&capture, &view)];
+    let all = headless.render_all(&instances, &surroundings()).expect("render");
     let near = 0.1;
     let origin = UVec2::new(5, 7);
     let mut cut_at = |depth: f32| {
         let texture = depth_texture(headless.context(), SIZE + origin, depth);
-        let opaque = OpaqueDepth { texture: &texture, origin, near };
-        headless.render_all(&instances, BACKGROUND, Some(opaque)).expect("render")
+        let opaque = OpaqueDepth { texture: &texture, samples: 1, origin, distance: [near, 0.0, 0.0, 1.0] };
+        headless.render_all(&instances, &Surroundings { opaque: Some(opaque), ..surroundings() }).expect("render")
     };
     // Reverse z: the surface is `near / depth` away.
     for distance in [2.3, 2.7, 3.1] {
@@ -440,7 +452,7 @@ fn opaque_surfaces_hide_what_is_behind_them() {
     assert!(cut_at(0.0) == all, "infinitely far away is no surface");
     let hidden = cut_at(1.0);
     assert!(hidden.transmittance.iter().all(|left| *left == 1.0), "a surface at the near plane hides everything");
-    let again = headless.render_all(&instances, BACKGROUND, None).expect("render");
+    let again = headless.render_all(&instances, &surroundings()).expect("render");
     assert!(again == all, "without the surface everything is back");
 }
 

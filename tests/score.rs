@@ -13,10 +13,10 @@ use bevy_gs4d::compress::score::{CpuEngine, ScoreEngine, ScoreError, ScoreSettin
 use bevy_gs4d::compress::variant::Variant;
 use bevy_gs4d::compress::views::{distinct_cameras, even_share, to_draw};
 use bevy_gs4d::dataset::{CameraOptions, Dataset, Split};
-use bevy_gs4d::frame::Background;
+use bevy_gs4d::frame::{Background, BlendSpace};
 use bevy_gs4d::gaussian::projection::{ALPHA_MAX, ALPHA_MIN, TILE_SIZE, TRANSMITTANCE_MIN};
-use bevy_gs4d::gaussian::{Camera, RasterFov, View};
-use bevy_gs4d::reference::{self, Want, render, score};
+use bevy_gs4d::gaussian::{Camera, Look, RasterFov, View};
+use bevy_gs4d::reference::{self, Layer, Want, render, score};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene, TemporalFilter};
 use glam::{UVec2, Vec3};
@@ -75,7 +75,7 @@ fn contributions_are_what_the_background_loses() {
 
 /// Every pixel against every splat of its tile, without any shortcut.
 fn brute_force(scene: &RuntimeScene, view: &View) -> Vec<[f64; 2]> {
-    let splats = reference::project(scene, view);
+    let splats = reference::project(&Layer { scene, view: *view, look: Look::default() }, BlendSpace::Encoded);
     let mut order: Vec<usize> = (0..splats.len()).filter(|&i| splats[i].is_visible()).collect();
     reference::sort(&mut order, |&i| splats[i].depth.to_bits());
     let mut sums = vec![[0.0; 2]; splats.len()];

@@ -3,7 +3,7 @@
 //! In: the files of `shaders/`. Out: proof that each is known to the renderer and is valid WGSL that needs no optional capability.
 #![cfg(feature = "gpu")]
 
-use bevy_gs4d::gpu::shaders::{Storage, compose, pass_names};
+use bevy_gs4d::gpu::shaders::{MULTISAMPLED, Storage, compose, pass_names};
 use naga_oil::compose::{Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -24,13 +24,15 @@ fn report(failures: Vec<String>) {
 }
 
 #[test]
-fn every_shader_file_is_a_pass_or_the_composite() {
+fn every_shader_file_is_a_pass_or_one_of_bevy_s() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
     let files = std::fs::read_dir(folder).expect("the folder of shaders").map(|entry| entry.expect("an entry").path());
     let shaders = files.filter(|path| path.extension().is_some_and(|ending| ending == "wgsl"));
     let mut names: BTreeSet<String> =
         shaders.filter_map(|path| Some(path.file_stem()?.to_string_lossy().into_owned())).collect();
-    assert!(names.remove("composite"), "the composite is there");
+    for name in ["composite", "write_depth"] {
+        assert!(names.remove(name), "{name} is there");
+    }
     let passes: BTreeSet<String> = pass_names().map(str::to_owned).collect();
     assert!(!passes.is_empty(), "there are passes");
     assert_eq!(passes, names, "the passes are the files");
@@ -39,27 +41,31 @@ fn every_shader_file_is_a_pass_or_the_composite() {
 
 #[test]
 fn every_pass_composes_and_is_valid() {
-    let check = |name: &str, storage| validate(name, &compose(name, storage).map_err(|error| error.to_string())?);
-    let all = pass_names().flat_map(|name| Storage::ALL.map(|storage| (name, storage)));
-    report(all.filter_map(|(name, storage)| check(name, storage).err()).collect());
+    let check =
+        |name: &str, definitions| validate(name, &compose(name, definitions).map_err(|error| error.to_string())?);
+    let definitions = Storage::ALL.map(Storage::definitions).into_iter().chain([MULTISAMPLED]);
+    let all = definitions.flat_map(|definitions| pass_names().map(move |name| (name, definitions)));
+    report(all.filter_map(|(name, definitions)| check(name, definitions).err()).collect());
 }
 
 #[test]
 fn an_unknown_pass_is_named() {
-    let message = compose("no such pass", Storage::Full).expect_err("there is none").to_string();
+    let message = compose("no such pass", &[]).expect_err("there is none").to_string();
     assert!(message.contains("no such pass"), "{message}");
 }
 
 #[test]
-fn the_composite_is_valid_for_linear_and_encoded_targets() {
-    let source = include_str!("../shaders/composite.wgsl");
-    let check = |encoded: bool| {
-        let define = encoded.then(|| ("ENCODED_TARGET".to_owned(), ShaderDefValue::Bool(true)));
-        let shader_defs = define.into_iter().collect();
+fn bevy_s_passes_are_valid_with_all_their_definitions() {
+    let composite = ("composite", include_str!("../shaders/composite.wgsl"), ["ENCODED_TARGET", "LINEAR_BLEND"]);
+    let write_depth = ("write_depth", include_str!("../shaders/write_depth.wgsl"), ["MEDIAN", "UNUSED"]);
+    let check = |(name, source, defines): (&str, &str, [&str; 2]), chosen: usize| {
+        let chosen = defines.iter().enumerate().filter(|(index, _)| (chosen >> index) & 1 == 1);
+        let shader_defs = chosen.map(|(_, define)| ((*define).to_owned(), ShaderDefValue::Bool(true))).collect();
         let mut composer = Composer::default();
-        let descriptor = NagaModuleDescriptor { source, file_path: "composite", shader_defs, ..Default::default() };
+        let descriptor = NagaModuleDescriptor { source, file_path: name, shader_defs, ..Default::default() };
         let module = composer.make_naga_module(descriptor).map_err(|error| error.emit_to_string(&composer))?;
-        validate("composite", &module)
+        validate(name, &module)
     };
-    report([false, true].into_iter().filter_map(|encoded| check(encoded).err()).collect());
+    let all = [composite, write_depth].into_iter().flat_map(|pass| (0..4).map(move |chosen| (pass, chosen)));
+    report(all.filter_map(|(pass, chosen)| check(pass, chosen).err()).collect());
 }

@@ -24,6 +24,7 @@ struct Instance {
     // Rows x and y of projection times capture-to-camera.
     clip_x: vec4<f32>,
     clip_y: vec4<f32>,
+    // Of an orthographic camera the direction in which it looks.
     camera_position: vec3<f32>,
     time: f32,
     tan_fov: vec2<f32>,
@@ -40,19 +41,51 @@ struct Instance {
     displaced: u32,
     near: f32,
     time_span: f32,
-    // FILTER_*
-    filter_mode: u32,
-    // Segment of time that is drawn.
-    segment: u32,
-    // Place of this part among all of the view.
-    part: u32,
+    // 1: drawn are the Gaussians of the active list from `first_listed` on; 0: all.
+    listed: u32,
+    first_listed: u32,
     // Codebooks of colour; 0 where the coefficients are whole.
     stages: u32,
+    orthographic: u32,
     // First entry of each codebook.
     first_entries: vec4<u32>,
+    // Factor on linear light.
+    light: vec3<f32>,
+    opacity: f32,
+    // LIGHTING_*
+    lighting: u32,
+    // DEBUG_*
+    debug: u32,
+    // 1: only means inside the crop box are drawn.
+    cropped: u32,
+    padding: u32,
+    // Rows of capture to crop box, which goes from -1 to 1.
+    crop_x: vec4<f32>,
+    crop_y: vec4<f32>,
+    crop_z: vec4<f32>,
 }
 
-const FILTER_NONE: u32 = 0u;
+const LIGHTING_AS_TRAINED: u32 = 0u;
+const LIGHTING_ENCODED: u32 = 1u;
+const LIGHTING_LINEAR: u32 = 2u;
+
+const DEBUG_COLOR: u32 = 0u;
+const DEBUG_DEPTH: u32 = 1u;
+const DEBUG_OVERDRAW: u32 = 2u;
+const DEBUG_ACTIVE: u32 = 3u;
+const DEBUG_LIFESPAN: u32 = 4u;
+const DEBUG_VELOCITY: u32 = 5u;
+
+// What `activate` needs of one part of a capture.
+struct Activation {
+    // Gaussians in this part, and the first of them in the list.
+    count: u32,
+    first: u32,
+    // FILTER_*
+    filter_mode: u32,
+    segment: u32,
+}
+
 const FILTER_BITS: u32 = 1u;
 const FILTER_INTERVALS: u32 = 2u;
 
@@ -68,8 +101,8 @@ struct Frame {
     pair_capacity: u32,
     // BACKGROUND_*
     background_mode: u32,
-    // Near plane of the reverse-z opaque depth; 0 where there is none.
-    opaque_near: f32,
+    // Samples of the opaque depth; 0 where there is none.
+    opaque_samples: u32,
     background: vec4<f32>,
     // P00, P11, P02, P12.
     projection: vec4<f32>,
@@ -80,6 +113,15 @@ struct Frame {
     environment_size: vec2<u32>,
     // Corner of the view in the opaque depth texture.
     opaque_origin: vec2<u32>,
+    // From opaque depth d to camera space: z = (x + y d) / (z + w d).
+    opaque_distance: vec4<f32>,
+    // 1: blended in linear light.
+    linear: u32,
+    // DEBUG_*
+    debug: u32,
+    // Depth that shows half as bright as the nearest.
+    debug_depth: f32,
+    padding: u32,
 }
 
 const BACKGROUND_NONE: u32 = 0u;

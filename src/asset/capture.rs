@@ -4,7 +4,7 @@
 //! plays, which way is up.
 
 use super::KeyFrames;
-use crate::scene::{Bounds, RuntimeScene};
+use crate::scene::{Bounds, BoundsOverTime, RuntimeScene};
 use bevy::asset::Asset;
 use bevy::reflect::TypePath;
 use glam::{Quat, Vec3};
@@ -14,14 +14,17 @@ use std::sync::Arc;
 #[derive(Asset, TypePath, Debug, Clone)]
 pub struct GaussianCapture {
     scene: Arc<RuntimeScene>,
-    bounds: Option<Bounds>,
+    bounds: Option<Arc<BoundsOverTime>>,
 }
 
 impl GaussianCapture {
     /// A capture from a scene made in memory: `assets.add(GaussianCapture::new(scene))`.
     pub fn new(scene: RuntimeScene) -> Self {
-        let bounds = Bounds::of(scene.iter(), scene.trained_with.time_interval);
-        Self { scene: Arc::new(scene), bounds }
+        let mut capture = Self { scene: Arc::new(scene), bounds: None };
+        // A still never leaves its first moment.
+        let shown = [0.0, f32::INFINITY].map(|seconds| capture.time_at(seconds));
+        capture.bounds = BoundsOverTime::of(capture.scene.iter(), shown).map(Arc::new);
+        capture
     }
 
     /// The scene.
@@ -31,7 +34,13 @@ impl GaussianCapture {
 
     /// The box about everything that is drawn at any time, in capture space; nothing for an empty capture.
     pub fn bounds(&self) -> Option<Bounds> {
-        self.bounds
+        self.bounds.as_ref().map(|bounds| bounds.whole())
+    }
+
+    /// The box about everything that is drawn at `seconds` since the start, and somewhat earlier and later (a 32nd of the duration),
+    /// in capture space; nothing where nothing is drawn.
+    pub fn bounds_at(&self, seconds: f32) -> Option<Bounds> {
+        self.bounds.as_ref()?.at(self.time_at(seconds))
     }
 
     /// Seconds that one pass takes at speed 1; 0 for a still.
@@ -71,12 +80,16 @@ impl GaussianCapture {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gaussian::Harmonics;
+    use crate::gaussian::{Gaussian, Harmonics};
     use crate::scene::{PlaybackHints, TrainedWith, UpAxis};
 
     fn capture(time_interval: [f32; 2], duration_seconds: f32) -> GaussianCapture {
+        with(Vec::new(), time_interval, duration_seconds)
+    }
+
+    fn with(gaussians: Vec<Gaussian>, time_interval: [f32; 2], duration_seconds: f32) -> GaussianCapture {
         GaussianCapture::new(RuntimeScene {
-            gaussians: Vec::new(),
+            gaussians,
             packed: None,
             harmonics: Harmonics::default(),
             environment: None,
@@ -100,6 +113,28 @@ mod tests {
     fn a_still_stays_at_its_first_moment() {
         assert_eq!(capture([0.25, 1.0], 0.0).time_at(3.0), 0.25, "no duration, no motion");
         assert_eq!(capture([0.25, 1.0], f32::INFINITY).duration_seconds(), 0.0, "an endless capture is a still");
+    }
+
+    #[test]
+    fn bounds_follow_playback() {
+        let runner = Gaussian {
+            mean: [0.0; 3],
+            mean_t: 0.0,
+            velocity: [1.0, 0.0, 0.0],
+            sigma_t: f32::INFINITY,
+            covariance: [1e-4, 0.0, 0.0, 1e-4, 0.0, 1e-4],
+            opacity: 0.5,
+            padding: 0.0,
+        };
+        let empty = capture([0.0, 1.0], 1.0);
+        let capture = with(vec![runner], [0.0, 8.0], 2.0);
+        let x = |seconds| capture.bounds_at(seconds).expect("always there").center().x;
+        assert!(x(0.0) < 0.2 && x(2.0) > 7.8, "from {} to {} in two seconds", x(0.0), x(2.0));
+        assert!(capture.bounds().is_some_and(|all| all.min.x < 0.0 && all.max.x > 8.0), "the whole way");
+        let still = with(vec![runner], [3.0, 8.0], 0.0);
+        assert_eq!(still.bounds_at(1.0), still.bounds(), "a still does not move");
+        assert!(still.bounds().is_some_and(|all| all.min.x > 2.9 && all.max.x < 3.1), "and stays at its first moment");
+        assert_eq!(empty.bounds_at(0.0), None, "an empty capture is nowhere");
     }
 
     #[test]

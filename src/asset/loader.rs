@@ -1,14 +1,14 @@
 //! Loaders: from files of an asset source to captures.
 //!
 //! In: the bytes of a file named `*.gs4d` or `*.pth` and, for a checkpoint, the [`CheckpointOptions`] for what it does not say
-//! (`load_builder().with_settings(|options: &mut CheckpointOptions| ..)` or a `.meta` file). Out: a [`GaussianCapture`] or a
-//! [`CaptureLoadError`], to which Bevy adds the path.
+//! (`load_builder().with_settings(|options: &mut CheckpointOptions| ..)` or a `.meta` file) and `cfg_args` beside it. Out: a
+//! [`GaussianCapture`] or a [`CaptureLoadError`], to which Bevy adds the path.
 
 use super::GaussianCapture;
 use crate::codec::checkpoint::{self, CheckpointError, CheckpointOptions};
 use crate::codec::package::{self, PackageError};
 use crate::gaussian::InvalidGaussian;
-use bevy::asset::{AssetLoader, LoadContext, io::Reader};
+use bevy::asset::{AssetLoader, AssetPath, LoadContext, io::Reader};
 use bevy::reflect::TypePath;
 use std::io::Cursor;
 
@@ -53,7 +53,8 @@ impl AssetLoader for PackageLoader {
     }
 }
 
-/// Loads checkpoints of the original code, `.pth`.
+/// Loads checkpoints of the original code, `.pth`. What the options leave open is taken from `cfg_args`, the file that the trainer
+/// leaves in the same folder, if it is there. Then it belongs to the checkpoint: when it changes, both are loaded again.
 #[derive(Debug, Default, TypePath)]
 pub struct CheckpointLoader;
 
@@ -66,15 +67,25 @@ impl AssetLoader for CheckpointLoader {
         &self,
         reader: &mut dyn Reader,
         settings: &CheckpointOptions,
-        _context: &mut LoadContext<'_>,
+        context: &mut LoadContext<'_>,
     ) -> Result<GaussianCapture, CaptureLoadError> {
-        let scene = checkpoint::read(Cursor::new(bytes(reader).await?), settings, None)?;
+        let cfg_args = cfg_args_beside(context).await;
+        let scene = checkpoint::read(Cursor::new(bytes(reader).await?), settings, cfg_args.as_deref())?;
         Ok(GaussianCapture::new(scene.into_runtime()?))
     }
 
     fn extensions(&self) -> &[&str] {
         &["pth"]
     }
+}
+
+/// The text of `cfg_args` in the folder of a checkpoint. It is optional: one that cannot be read counts as absent.
+async fn cfg_args_beside(context: &mut LoadContext<'_>) -> Option<String> {
+    let checkpoint = context.path();
+    let beside = AssetPath::from(checkpoint.path().with_file_name("cfg_args"));
+    let path = beside.with_source(checkpoint.source().clone_owned());
+    let text = context.read_asset_bytes(path).await.ok()?;
+    Some(String::from_utf8_lossy(&text).into_owned())
 }
 
 /// The whole file: both formats are read out of order.

@@ -3,7 +3,7 @@
 //! In: where a camera stands and its lens. Out: a [`View`], a camera at one time with the numbers that the passes read, in the
 //! original rasterizer's conventions (camera space x right, y down, z forward; pixel centres at integers).
 
-use glam::{DMat4, Mat4, UVec2, Vec2, Vec3, Vec4};
+use glam::{DMat4, DVec4, Mat4, UVec2, Vec2, Vec3, Vec4};
 
 /// A camera of a capture: pose, lens and picture size.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,13 +57,16 @@ pub struct View {
     pub time: f32,
     /// Capture space (the capture's own world) to camera space (OpenCV axes); may scale and shear when a model transform is included.
     pub world_to_camera: Mat4,
-    /// Rows x and y of the projection: `P00, P11, P02, P12` in `ndc = (P00 x + P02 z, P11 y + P12 z) / z`.
+    /// Rows x and y of the projection: `P00, P11, P02, P12` in `ndc = (P00 x + P02 z, P11 y + P12 z) / z`; of an orthographic
+    /// camera `P00, P11, P03, P13` in `ndc = (P00 x + P03, P11 y + P13)`.
     pub projection: Vec4,
-    /// Camera centre in capture space.
+    /// Whether rays are parallel. Background maps are then not shown: there is no one point they are seen from.
+    pub orthographic: bool,
+    /// Camera centre in capture space; of an orthographic camera the unit direction in which it looks.
     pub camera_position: Vec3,
     /// Tangents of half the field of view that shapes footprints (negative for the sentinel).
     pub tan_fov: Vec2,
-    /// Near limit in camera units: 0.2 capture units.
+    /// Near limit in camera units: 0.2 capture units; the near plane of an orthographic camera.
     pub near: f32,
 }
 
@@ -110,6 +113,7 @@ impl View {
             time,
             world_to_camera,
             projection,
+            orthographic: false,
             camera_position: inverse.w_axis.truncate().as_vec3(),
             tan_fov,
             // Depth grows by |row z| camera units for each capture unit along the viewing direction.
@@ -117,7 +121,27 @@ impl View {
         }
     }
 
-    /// Footprint focal lengths in pixels (negative for the sentinel).
+    /// A view with parallel rays: `projection` is `P00, P11, P03, P13`, `near` the plane before which nothing is drawn, camera units.
+    pub fn orthographic(size: UVec2, time: f32, world_to_camera: Mat4, projection: Vec4, near: f32) -> Self {
+        let inverse = world_to_camera.as_dmat4().inverse();
+        Self {
+            size,
+            time,
+            world_to_camera,
+            projection,
+            orthographic: true,
+            camera_position: inverse.z_axis.truncate().normalize().as_vec3(),
+            tan_fov: Vec2::new(projection.x, projection.y).recip(),
+            near,
+        }
+    }
+
+    /// Unit vector in capture space along which a point is seen.
+    pub fn direction_to(&self, point: Vec3) -> Vec3 {
+        if self.orthographic { self.camera_position } else { (point - self.camera_position).normalize() }
+    }
+
+    /// Footprint focal lengths in pixels (negative for the sentinel); pixels for each camera unit where rays are parallel.
     pub fn focal(&self) -> Vec2 {
         self.size.as_vec2() / (2.0 * self.tan_fov)
     }
@@ -126,11 +150,15 @@ impl View {
     pub fn clip_rows(&self) -> [Vec4; 2] {
         let m: DMat4 = self.world_to_camera.as_dmat4();
         let p = self.projection.as_dvec4();
-        [(m.row(0) * p.x + m.row(2) * p.z).as_vec4(), (m.row(1) * p.y + m.row(2) * p.w).as_vec4()]
+        let shift = if self.orthographic { DVec4::W } else { m.row(2) };
+        [(m.row(0) * p.x + shift * p.z).as_vec4(), (m.row(1) * p.y + shift * p.w).as_vec4()]
     }
 
     /// Capture-space direction of the ray through pixel `(x, y)`, unit length.
     pub fn ray(&self, x: u32, y: u32) -> Vec3 {
+        if self.orthographic {
+            return self.camera_position;
+        }
         let ndc = (Vec2::new(x as f32, y as f32) + 0.5) / self.size.as_vec2() * 2.0 - 1.0;
         let p = self.projection;
         let camera = Vec3::new((ndc.x - p.z) / p.x, (ndc.y - p.w) / p.y, 1.0);

@@ -58,15 +58,20 @@ pub fn project_with(gaussian: &Gaussian, view: &View, clip: &[Vec4; 2]) -> Optio
     }
     let size = view.size.as_vec2();
     let [clip_x, clip_y] = clip;
-    let ndc = Vec2::new(clip_x.dot(mean.extend(1.0)), clip_y.dot(mean.extend(1.0))) / (q.z + 1e-7);
+    let divisor = if view.orthographic { 1.0 } else { q.z + 1e-7 };
+    let ndc = Vec2::new(clip_x.dot(mean.extend(1.0)), clip_y.dot(mean.extend(1.0))) / divisor;
     let center = ((ndc + 1.0) * size - 1.0) * 0.5;
 
     // The nesting of min and max matters: with the sentinel the limits are negative.
     let limit = FRUSTUM_CLAMP * view.tan_fov;
     let ray = limit.min((-limit).max(q.xy() / q.z));
     let focal = view.focal();
-    let jx = Vec3::new(focal.x / q.z, 0.0, -focal.x * ray.x / q.z);
-    let jy = Vec3::new(0.0, focal.y / q.z, -focal.y * ray.y / q.z);
+    let (jx, jy) = if view.orthographic {
+        (Vec3::X * focal.x, Vec3::Y * focal.y)
+    } else {
+        let jx = Vec3::new(focal.x / q.z, 0.0, -focal.x * ray.x / q.z);
+        (jx, Vec3::new(0.0, focal.y / q.z, -focal.y * ray.y / q.z))
+    };
     let to_world = Mat3::from_mat4(view.world_to_camera).transpose();
     let (mx, my) = (to_world * jx, to_world * jy);
     let [xx, xy, xz, yy, yz, zz] = gaussian.covariance;

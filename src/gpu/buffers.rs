@@ -3,7 +3,7 @@
 //! In: a [`RuntimeScene`] and a range of its Gaussians. Out: storage buffers in the order of the shader's bindings. Packed scenes go
 //! up as they are.
 
-use super::Storage;
+use super::{Storage, note_created};
 use crate::gaussian::Gaussian;
 use crate::scene::packed::{BLOCK, BLOCK_RANGES, MAX_STAGES, SHARED_RANGES};
 use crate::scene::{ActiveSets, CodedColors, RuntimeScene, TemporalFilter};
@@ -59,6 +59,7 @@ pub(super) fn codebooks(device: &wgpu::Device, colors: &CodedColors) -> [wgpu::B
     scales.resize(CODEBOOK_SCALES, [0.0; 4]);
     // A binding of no bytes is not allowed.
     let or_zero = |bytes: &[u8]| if bytes.is_empty() { vec![0; 16] } else { bytes.to_vec() };
+    note_created();
     [
         plain(device, "gs4d codebooks", &or_zero(bytemuck::cast_slice(&colors.codebooks))),
         device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -83,8 +84,9 @@ pub(super) fn filter(device: &wgpu::Device, filter: &TemporalFilter, own: Range<
     plain(device, "gs4d filter", bytemuck::cast_slice(&words))
 }
 
-fn plain(device: &wgpu::Device, label: &'static str, contents: &[u8]) -> wgpu::Buffer {
+pub(super) fn plain(device: &wgpu::Device, label: &'static str, contents: &[u8]) -> wgpu::Buffer {
     let usage = wgpu::BufferUsages::STORAGE;
+    note_created();
     device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage })
 }
 
@@ -112,6 +114,7 @@ fn mapped_buffer(
     record_size: usize,
     fill: impl Fn(usize, &mut [u8]),
 ) -> wgpu::Buffer {
+    note_created();
     let buffer = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
         size: (count * record_size) as u64,

@@ -4,13 +4,12 @@
 //! binding grows over what the device allows; a part is drawn by one dispatch of `project`.
 
 use super::renderer::bind_group as bind_group_of;
-use super::{GpuError, Renderer, Storage, buffers, layout};
+use super::{ActiveList, GpuError, Renderer, Storage, buffers, layout, note_uploaded};
 use crate::gaussian::{ShDirection, harmonics::evaluated};
 use crate::scene::packed::MAX_STAGES;
-use crate::scene::{ActiveSets, CodedColors, RuntimeScene, segment_of};
+use crate::scene::{ActiveSets, CodedColors, RuntimeScene, TemporalFilter, segment_of};
 use layout::BLOCK;
 use std::sync::atomic::{AtomicU64, Ordering};
-use wgpu::util::DeviceExt;
 
 /// A capture on the GPU: its Gaussians, colour and environment map in buffers, in as many parts as bindings ask for.
 #[derive(Debug)]
@@ -21,7 +20,9 @@ pub struct GpuCapture {
     pub(super) storage: Storage,
     /// Tells captures apart, as long as the program runs.
     pub(super) id: u64,
-    filter: Option<Filter>,
+    pub(super) filter: Option<Filter>,
+    /// Bytes of its buffers.
+    bytes: u64,
     /// Colour and time settings of an [`layout::Instance`]; the rest is zero.
     settings: layout::Instance,
     len: usize,
@@ -38,10 +39,40 @@ pub(super) struct Part {
 
 /// What the host needs to know of a filter.
 #[derive(Debug)]
-struct Filter {
-    mode: u32,
+pub(super) struct Filter {
+    /// `FILTER_*`.
+    pub mode: u32,
     segments: u32,
     interval: [f32; 2],
+    /// Active Gaussians, part by part and segment by segment.
+    counts: Vec<u32>,
+}
+
+impl Filter {
+    fn new(filter: &TemporalFilter, interval: [f32; 2], parts: &[Part]) -> Self {
+        let mut counts = Vec::with_capacity(parts.len() * filter.segments as usize);
+        let mut first = 0;
+        for part in parts {
+            let own = first..first + part.count as usize;
+            counts.extend(filter.active_counts(own.clone()));
+            first = own.end;
+        }
+        let mode = match filter.sets {
+            ActiveSets::Bits(_) => layout::FILTER_BITS,
+            ActiveSets::Intervals(_) => layout::FILTER_INTERVALS,
+        };
+        Self { mode, segments: filter.segments, interval, counts }
+    }
+
+    /// The segment of a time, in the capture's unit.
+    pub fn segment_of(&self, time: f32) -> u32 {
+        segment_of(time, self.interval, self.segments)
+    }
+
+    /// Active Gaussians of a part in a segment.
+    pub fn count(&self, part: usize, segment: u32) -> u32 {
+        self.counts.get(part * self.segments as usize + segment as usize).copied().unwrap_or_default()
+    }
 }
 
 #[derive(Debug)]
@@ -77,24 +108,24 @@ impl GpuCapture {
             return Err(GpuError::TooLarge { what: "the Gaussians", needed, limit });
         }
         let mut parts = Vec::new();
+        let mut bytes = 0;
         let codebooks = scene.coded_colors().map(|colors| buffers::codebooks(device, colors));
         for first in (0..scene.len()).step_by(per_part) {
             let count = per_part.min(scene.len() - first);
             let own = buffers::part(device, scene, first..first + count, stride);
             let all: Vec<_> = own.iter().chain(codebooks.iter().flatten()).collect();
+            bytes += own.iter().map(wgpu::Buffer::size).sum::<u64>();
             let bind_group = renderer.capture_bind_group(device, storage, &all);
             let filter = scene.filter.as_ref().map(|filter| {
                 let sets = buffers::filter(device, filter, first..first + count);
+                bytes += sets.size();
                 bind_group_of(device, "gs4d filter", &renderer.layouts.filter, &[sets.as_entire_binding()])
             });
             parts.push(Part { count: count as u32, bind_group, filter });
         }
+        bytes += codebooks.iter().flatten().map(wgpu::Buffer::size).sum::<u64>();
         let environment = scene.environment.as_ref().map(|map| EnvironmentBuffer {
-            buffer: device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("gs4d environment"),
-                contents: bytemuck::cast_slice(&map.texels),
-                usage: wgpu::BufferUsages::STORAGE,
-            }),
+            buffer: buffers::plain(device, "gs4d environment", bytemuck::cast_slice(&map.texels)),
             size: [map.width, map.height],
         });
         if let Some(map) = &environment
@@ -103,6 +134,7 @@ impl GpuCapture {
             let (needed, limit) = (map.buffer.size(), binding_limit(&limits));
             return Err(GpuError::TooLarge { what: "the environment map", needed, limit });
         }
+        bytes += environment.as_ref().map_or(0, |map| map.buffer.size());
         let settings = layout::Instance {
             degree,
             degree_t: if degree == 3 { degree_t } else { 0 },
@@ -113,16 +145,11 @@ impl GpuCapture {
             time_span: scene.trained_with.time_span(),
             ..bytemuck::Zeroable::zeroed()
         };
-        let filter = scene.filter.as_ref().map(|filter| Filter {
-            mode: match filter.sets {
-                ActiveSets::Bits(_) => layout::FILTER_BITS,
-                ActiveSets::Intervals(_) => layout::FILTER_INTERVALS,
-            },
-            segments: filter.segments,
-            interval: scene.trained_with.time_interval,
-        });
+        let interval = scene.trained_with.time_interval;
+        let filter = scene.filter.as_ref().map(|filter| Filter::new(filter, interval, &parts));
         let id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
-        Ok(Self { parts, environment, storage, id, filter, settings, len: scene.len() })
+        note_uploaded(bytes);
+        Ok(Self { parts, environment, storage, id, filter, bytes, settings, len: scene.len() })
     }
 
     /// Number of Gaussians.
@@ -145,28 +172,22 @@ impl GpuCapture {
         self.filter.is_some()
     }
 
-    /// The segment of a time, if there is a filter.
-    pub(super) fn segment(&self, time: f32) -> Option<u32> {
-        self.filter.as_ref().map(|filter| segment_of(time, filter.interval, filter.segments))
+    /// Bytes of its buffers on the GPU.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
     }
 
-    /// The uniform of part `index`, whose splats begin at `first_slot`; all of it is drawn without a segment.
-    pub(super) fn instance(
-        &self,
-        index: usize,
-        first_slot: u32,
-        segment: Option<u32>,
-        view: &layout::Instance,
-    ) -> layout::Instance {
-        let filter_mode = match (&self.filter, segment) {
-            (Some(filter), Some(_)) => filter.mode,
-            _ => layout::FILTER_NONE,
-        };
+    /// How many Gaussians of part `index` are drawn: those of the list if there is one, else all.
+    pub(super) fn drawn(&self, index: usize, active: Option<&ActiveList>) -> u32 {
+        match (&self.filter, active) {
+            (Some(filter), Some(active)) => active.count(filter, index),
+            _ => self.parts[index].count,
+        }
+    }
+
+    /// What is the same for all parts of a capture and in all views, filled into `view`.
+    pub(super) fn instance(&self, view: &layout::Instance) -> layout::Instance {
         layout::Instance {
-            filter_mode,
-            segment: segment.unwrap_or_default(),
-            first_slot,
-            count: self.parts[index].count,
             degree: self.settings.degree,
             degree_t: self.settings.degree_t,
             stride: self.settings.stride,

@@ -5,10 +5,11 @@
 use super::timing::{PassTime, PassTimer, STRETCHES, Timings, median};
 use super::view::{Finished, max_pairs};
 use super::{
-    GpuCapture, GpuContext, GpuError, Instance, OpaqueDepth, Renderer, ShaderChecks, ViewRenderer, layout::Counters,
+    ActiveList, GpuCapture, GpuContext, GpuError, Instance, Renderer, ShaderChecks, Surroundings, ViewRenderer,
+    layout::Counters,
 };
 use crate::frame::{Background, Counts, Frame};
-use crate::gaussian::View;
+use crate::gaussian::{Look, View};
 use crate::picture::Picture;
 use crate::scene::RuntimeScene;
 use glam::{UVec2, Vec3};
@@ -21,6 +22,8 @@ pub struct Headless {
     renderer: Renderer,
     view: ViewRenderer,
     filtered: bool,
+    /// Of the capture drawn last.
+    active: Option<ActiveList>,
 }
 
 impl Headless {
@@ -31,7 +34,7 @@ impl Headless {
     pub fn new(context: GpuContext, checks: ShaderChecks) -> Result<Self, GpuError> {
         let renderer = Renderer::new(&context.device, checks)?;
         let view = ViewRenderer::new(&context.device);
-        Ok(Self { context, renderer, view, filtered: true })
+        Ok(Self { context, renderer, view, filtered: true, active: None })
     }
 
     /// The device and its name.
@@ -52,13 +55,24 @@ impl Headless {
         GpuCapture::upload(&self.context.device, &self.context.queue, &self.renderer, scene)
     }
 
-    /// Draws one capture.
+    /// Which Gaussians of a capture its filter leaves active at a time, for [`render_all`](Self::render_all); nothing without a filter.
+    pub fn active(&self, capture: &GpuCapture, time: f32) -> Option<ActiveList> {
+        let GpuContext { device, queue, .. } = &self.context;
+        let mut active = ActiveList::new(device, &self.renderer, capture)?;
+        self.activate(&mut active, queue, capture, time);
+        Some(active)
+    }
+
+    /// Draws one capture as trained.
     ///
     /// # Errors
     /// When the picture does not fit the device or the device is lost.
     pub fn render(&mut self, capture: &GpuCapture, view: &View, background: Background) -> Result<Frame, GpuError> {
-        let instance = self.instance(capture, view);
-        self.render_all(&[instance], background, None)
+        let surroundings = Surroundings { background, ..Surroundings::default() };
+        let active = self.take_active(capture, view.time);
+        let frame = self.render_all(&[instance(capture, active.as_ref(), view)], &surroundings);
+        self.active = active;
+        frame
     }
 
     /// Draws several captures into one picture, in order of depth, cut by opaque surfaces if given.
@@ -68,17 +82,17 @@ impl Headless {
     pub fn render_all(
         &mut self,
         instances: &[Instance<'_>],
-        background: Background,
-        opaque: Option<OpaqueDepth<'_>>,
+        surroundings: &Surroundings<'_>,
     ) -> Result<Frame, GpuError> {
-        let counters = self.submit_whole(instances, background, opaque)?;
+        let counters = self.submit_whole(instances, surroundings)?;
         let size = instances.first().map_or(UVec2::ONE, |instance| instance.view.size);
         let (color, depth) = self.read_targets(size)?;
         let color: &[[f32; 4]] = bytemuck::cast_slice(&color);
         Ok(Frame {
             picture: Picture { size, pixels: color.iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect() },
             transmittance: color.iter().map(|p| p[3]).collect(),
-            depth,
+            depth: depth.iter().step_by(2).copied().collect(),
+            median_depth: depth.iter().skip(1).step_by(2).copied().collect(),
             counts: Counts { visible: counters.visible, pairs: counters.pairs },
         })
     }
@@ -88,37 +102,56 @@ impl Headless {
     /// # Errors
     /// As [`render`](Self::render).
     pub fn time(&mut self, capture: &GpuCapture, views: &[View], frames: usize) -> Result<Timings, GpuError> {
-        let background = Background::Color([0.0; 3]);
-        let filtered = self.filtered;
-        let instance = |i: usize| [Instance { capture, view: views[i % views.len()], filtered }];
+        let mut active = self.take_active(capture, views.first().map_or(0.0, |view| view.time));
+        let timings = self.time_with(capture, active.as_mut(), views, frames);
+        self.active = active;
+        timings
+    }
+
+    fn time_with(
+        &mut self,
+        capture: &GpuCapture,
+        mut active: Option<&mut ActiveList>,
+        views: &[View],
+        frames: usize,
+    ) -> Result<Timings, GpuError> {
+        let surroundings = &Surroundings { background: Background::Color([0.0; 3]), ..Surroundings::default() };
         let mut counts = Vec::new();
         // The warm-up also finds room for the pairs of every view.
-        for i in 0..views.len() {
-            counts.push(self.render_all(&instance(i), background, None)?.counts);
+        for view in views {
+            self.reactivate(active.as_deref_mut(), capture, view.time);
+            counts.push(self.render_all(&[instance(capture, active.as_deref(), view)], surroundings)?.counts);
         }
         let around = PassTimer::new(&self.context.device, &self.context.queue, false);
         let inside = PassTimer::new(&self.context.device, &self.context.queue, true);
         let (mut frame, mut wall) = (Vec::new(), Vec::new());
         for i in 0..frames {
+            let view = &views[i % views.len()];
             let start = Instant::now();
-            self.submit(&instance(i), background, None, around.as_ref())?;
+            self.reactivate(active.as_deref_mut(), capture, view.time);
+            self.submit(&[instance(capture, active.as_deref(), view)], surroundings, around.as_ref())?;
             wall.push(start.elapsed().as_secs_f64() * 1e3);
             if let Some(timer) = &around {
-                frame.push(timer.stretches(&self.read(timer.readback())?)[0]);
+                frame.push(timer.stretches(&self.copy_out(timer.resolved(), timer.resolved().size())?)[0]);
             }
         }
         let mut passes = vec![Vec::new(); STRETCHES.len()];
         if let Some(timer) = &inside {
             for i in 0..frames {
-                self.submit(&instance(i), background, None, Some(timer))?;
-                for (pass, time) in passes.iter_mut().zip(timer.stretches(&self.read(timer.readback())?)) {
+                let view = &views[i % views.len()];
+                self.reactivate(active.as_deref_mut(), capture, view.time);
+                self.submit(&[instance(capture, active.as_deref(), view)], surroundings, Some(timer))?;
+                let timestamps = self.copy_out(timer.resolved(), timer.resolved().size())?;
+                for (pass, time) in passes.iter_mut().zip(timer.stretches(&timestamps)) {
                     pass.push(time);
                 }
             }
         }
         let start = Instant::now();
         for i in 0..frames {
-            self.submit_without_waiting(&instance(i), background, None, None)?;
+            let view = &views[i % views.len()];
+            self.reactivate(active.as_deref_mut(), capture, view.time);
+            self.submit_without_waiting(&[instance(capture, active.as_deref(), view)], surroundings, None)?;
         }
         self.wait()?;
         let pipelined = start.elapsed().as_secs_f64() * 1e3 / frames.max(1) as f64;
@@ -138,14 +171,37 @@ impl Headless {
         })
     }
 
-    fn instance<'a>(&self, capture: &'a GpuCapture, view: &View) -> Instance<'a> {
-        Instance { capture, view: *view, filtered: self.filtered }
+    /// The list for this capture at that time: the one of the last call if it belongs to it. Hand it back when it has been used.
+    fn take_active(&mut self, capture: &GpuCapture, time: f32) -> Option<ActiveList> {
+        if !self.filtered {
+            return None;
+        }
+        let made = self.active.take().filter(|active| active.is_for(capture));
+        let mut active = made.or_else(|| ActiveList::new(&self.context.device, &self.renderer, capture))?;
+        self.activate(&mut active, &self.context.queue, capture, time);
+        Some(active)
     }
 
-    /// Draws one capture and leaves everything on the GPU.
+    /// Moves a list on, if there is one.
+    fn reactivate(&self, active: Option<&mut ActiveList>, capture: &GpuCapture, time: f32) {
+        if let Some(active) = active {
+            self.activate(active, &self.context.queue, capture, time);
+        }
+    }
+
+    fn activate(&self, active: &mut ActiveList, queue: &wgpu::Queue, capture: &GpuCapture, time: f32) {
+        if active.prepare(queue, capture, time) {
+            let label = wgpu::CommandEncoderDescriptor { label: Some("gs4d activate") };
+            let mut encoder = self.context.device.create_command_encoder(&label);
+            active.record(&self.renderer, &mut encoder, capture);
+            queue.submit([encoder.finish()]);
+        }
+    }
+
+    /// Draws all Gaussians of one capture, whatever its filter says, and leaves everything on the GPU.
     pub(super) fn draw(&mut self, capture: &GpuCapture, view: &View, background: Background) -> Result<(), GpuError> {
-        let instance = self.instance(capture, view);
-        self.submit_whole(&[instance], background, None).map(|_| ())
+        let surroundings = Surroundings { background, ..Surroundings::default() };
+        self.submit_whole(&[instance(capture, None, view)], &surroundings).map(|_| ())
     }
 
     /// What the last frame left there.
@@ -157,11 +213,10 @@ impl Headless {
     fn submit_whole(
         &mut self,
         instances: &[Instance<'_>],
-        background: Background,
-        opaque: Option<OpaqueDepth<'_>>,
+        surroundings: &Surroundings<'_>,
     ) -> Result<Counters, GpuError> {
         loop {
-            let counters = self.submit(instances, background, opaque, None)?;
+            let counters = self.submit(instances, surroundings, None)?;
             let capacity = self.view.pair_capacity();
             if counters.pairs_wanted <= capacity {
                 return Ok(counters);
@@ -179,11 +234,10 @@ impl Headless {
     fn submit(
         &mut self,
         instances: &[Instance<'_>],
-        background: Background,
-        opaque: Option<OpaqueDepth<'_>>,
+        surroundings: &Surroundings<'_>,
         timer: Option<&PassTimer>,
     ) -> Result<Counters, GpuError> {
-        self.submit_without_waiting(instances, background, opaque, timer)?;
+        self.submit_without_waiting(instances, surroundings, timer)?;
         self.wait()?;
         let counters = self.copy_out(self.view.counters(), size_of::<Counters>() as u64)?;
         Ok(bytemuck::pod_read_unaligned(&counters))
@@ -192,12 +246,11 @@ impl Headless {
     fn submit_without_waiting(
         &mut self,
         instances: &[Instance<'_>],
-        background: Background,
-        opaque: Option<OpaqueDepth<'_>>,
+        surroundings: &Surroundings<'_>,
         timer: Option<&PassTimer>,
     ) -> Result<(), GpuError> {
         let GpuContext { device, queue, .. } = &self.context;
-        self.view.prepare(device, queue, &self.renderer, instances, background, opaque)?;
+        self.view.prepare(device, queue, &self.renderer, instances, surroundings)?;
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gs4d") });
         self.view.record_timed(&self.renderer, &mut encoder, instances, timer);
         if let Some(timer) = timer {
@@ -215,7 +268,7 @@ impl Headless {
     /// Colour (four floats each) and depth of every pixel, without the padding of rows.
     fn read_targets(&self, size: UVec2) -> Result<(Vec<f32>, Vec<f32>), GpuError> {
         let Some((color, depth)) = self.view.textures() else { return Ok(Default::default()) };
-        Ok((self.read_texture(color, size, 16)?, self.read_texture(depth, size, 4)?))
+        Ok((self.read_texture(color, size, 16)?, self.read_texture(depth, size, 8)?))
     }
 
     fn read_texture(&self, texture: &wgpu::Texture, size: UVec2, pixel: u32) -> Result<Vec<f32>, GpuError> {
@@ -265,6 +318,11 @@ impl Headless {
             _ => Err(GpuError::Device("a buffer could not be read back".into())),
         }
     }
+}
+
+/// One capture as trained.
+fn instance<'a>(capture: &'a GpuCapture, active: Option<&'a ActiveList>, view: &View) -> Instance<'a> {
+    Instance { capture, active, view: *view, look: Look::default() }
 }
 
 fn readback_buffer(device: &wgpu::Device, size: u64) -> wgpu::Buffer {

@@ -2,7 +2,8 @@
 //!
 //! In: views and settings. Out: plain data for uniform and storage buffers.
 
-use crate::gaussian::View;
+use crate::frame::{BlendSpace, DebugView};
+use crate::gaussian::{Lighting, Look, View};
 use bytemuck::{Pod, Zeroable};
 
 /// Side of a tile in pixels.
@@ -31,7 +32,7 @@ pub struct Instance {
     pub clip_x: [f32; 4],
     /// Row y of it.
     pub clip_y: [f32; 4],
-    /// Camera centre in capture space.
+    /// Camera centre in capture space; of an orthographic camera the direction in which it looks.
     pub camera_position: [f32; 3],
     /// Timestamp.
     pub time: f32,
@@ -59,24 +60,77 @@ pub struct Instance {
     pub near: f32,
     /// Length of the capture's time interval.
     pub time_span: f32,
+    /// 1: drawn are the Gaussians of the active list; 0: all.
+    pub listed: u32,
+    /// First entry of this part in that list.
+    pub first_listed: u32,
+    /// Codebooks of colour; 0 where the coefficients are whole.
+    pub stages: u32,
+    /// 1: rays are parallel.
+    pub orthographic: u32,
+    /// First entry of each codebook.
+    pub first_entries: [u32; 4],
+    /// Factor on linear light.
+    pub light: [f32; 3],
+    /// Factor on opacity.
+    pub opacity: f32,
+    /// `LIGHTING_*`.
+    pub lighting: u32,
+    /// `DEBUG_*`.
+    pub debug: u32,
+    /// 1: only means inside the crop box are drawn.
+    pub cropped: u32,
+    /// Unused.
+    pub padding: u32,
+    /// Rows of capture-to-crop-box: x.
+    pub crop_x: [f32; 4],
+    /// Row y.
+    pub crop_y: [f32; 4],
+    /// Row z.
+    pub crop_z: [f32; 4],
+}
+
+/// Colours are blended as trained.
+pub const LIGHTING_AS_TRAINED: u32 = 0;
+/// Light changes, colours stay encoded.
+pub const LIGHTING_ENCODED: u32 = 1;
+/// Light changes, colours are linear.
+pub const LIGHTING_LINEAR: u32 = 2;
+
+/// What `activate` needs of one part of a capture.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Activation {
+    /// Gaussians in this part.
+    pub count: u32,
+    /// Where this part begins in the list.
+    pub first: u32,
     /// `FILTER_*`.
     pub filter_mode: u32,
     /// Segment of time that is drawn.
     pub segment: u32,
-    /// Place of this part among all of the view.
-    pub part: u32,
-    /// Codebooks of colour; 0 where the coefficients are whole.
-    pub stages: u32,
-    /// First entry of each codebook.
-    pub first_entries: [u32; 4],
 }
 
 impl Instance {
-    /// The part that a view decides; slots and colour are zero.
-    pub fn of_view(view: &View) -> Self {
+    /// The part that a view and a look decide; slots and colour are zero.
+    pub fn new(view: &View, look: &Look, space: BlendSpace, debug: DebugView) -> Self {
         let m = view.world_to_camera;
         let [clip_x, clip_y] = view.clip_rows();
+        let crop = glam::Mat4::from(look.crop.unwrap_or_default());
         Self {
+            orthographic: u32::from(view.orthographic),
+            light: look.light.to_array(),
+            opacity: look.opacity,
+            lighting: match look.lighting(space) {
+                Lighting::AsTrained => LIGHTING_AS_TRAINED,
+                Lighting::Encoded => LIGHTING_ENCODED,
+                Lighting::Linear => LIGHTING_LINEAR,
+            },
+            debug: debug_mode(debug),
+            cropped: u32::from(look.crop.is_some()),
+            crop_x: crop.row(0).to_array(),
+            crop_y: crop.row(1).to_array(),
+            crop_z: crop.row(2).to_array(),
             camera_x: m.row(0).to_array(),
             camera_y: m.row(1).to_array(),
             camera_z: m.row(2).to_array(),
@@ -108,8 +162,8 @@ pub struct Frame {
     pub pair_capacity: u32,
     /// `BACKGROUND_*`.
     pub background_mode: u32,
-    /// Near plane of the opaque depth; 0 where there is none.
-    pub opaque_near: f32,
+    /// Samples of the opaque depth; 0 where there is none.
+    pub opaque_samples: u32,
     /// Colour; w: what is left of the transmittance behind an environment map.
     pub background: [f32; 4],
     /// `P00, P11, P02, P12`.
@@ -124,10 +178,43 @@ pub struct Frame {
     pub environment_size: [u32; 2],
     /// Corner of the view in the opaque depth texture.
     pub opaque_origin: [u32; 2],
+    /// From opaque depth `d` to camera space: `z = (x + y d) / (z + w d)`.
+    pub opaque_distance: [f32; 4],
+    /// 1: blended in linear light.
+    pub linear: u32,
+    /// `DEBUG_*`.
+    pub debug: u32,
+    /// Depth that shows half as bright as the nearest.
+    pub debug_depth: f32,
+    /// Unused.
+    pub padding: u32,
 }
 
-/// Every Gaussian is active.
-pub const FILTER_NONE: u32 = 0;
+/// The number of a debug view in the shaders: `DEBUG_*`.
+pub fn debug_mode(debug: DebugView) -> u32 {
+    match debug {
+        DebugView::Color => DEBUG_COLOR,
+        DebugView::Depth => DEBUG_DEPTH,
+        DebugView::Overdraw => DEBUG_OVERDRAW,
+        DebugView::Active => DEBUG_ACTIVE,
+        DebugView::Lifespan => DEBUG_LIFESPAN,
+        DebugView::Velocity => DEBUG_VELOCITY,
+    }
+}
+
+/// Colours.
+pub const DEBUG_COLOR: u32 = 0;
+/// Expected depth.
+pub const DEBUG_DEPTH: u32 = 1;
+/// Splats per pixel.
+pub const DEBUG_OVERDRAW: u32 = 2;
+/// What the filter leaves active.
+pub const DEBUG_ACTIVE: u32 = 3;
+/// Deviation in time.
+pub const DEBUG_LIFESPAN: u32 = 4;
+/// Motion.
+pub const DEBUG_VELOCITY: u32 = 5;
+
 /// Sets of bits.
 pub const FILTER_BITS: u32 = 1;
 /// Intervals of segments.

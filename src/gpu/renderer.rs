@@ -3,8 +3,9 @@
 //! In: a device. Out: compiled passes and the bind group layouts that they share with the buffers of views and captures.
 
 use super::buffers::CODEBOOK_SCALES;
-use super::shaders::{ShaderChecks, Storage, module};
-use super::{GpuError, layout};
+use super::shaders::{MULTISAMPLED, ShaderChecks, Storage, module};
+use super::view::buffer;
+use super::{GpuError, layout, note_created};
 use std::num::NonZeroU64;
 
 /// All pipelines and layouts.
@@ -26,6 +27,9 @@ pub struct Renderer {
     pub(super) bin_emit: wgpu::ComputePipeline,
     pub(super) ranges: wgpu::ComputePipeline,
     pub(super) blend: wgpu::ComputePipeline,
+    pub(super) blend_multisampled: wgpu::ComputePipeline,
+    /// Stands in for a list of active Gaussians where all are drawn.
+    pub(super) no_list: wgpu::BindGroup,
 }
 
 /// Bind group layouts, in the order of the shaders' bindings.
@@ -33,6 +37,7 @@ pub struct Renderer {
 pub(super) struct Layouts {
     pub activate: wgpu::BindGroupLayout,
     pub filter: wgpu::BindGroupLayout,
+    pub active: wgpu::BindGroupLayout,
     pub project: wgpu::BindGroupLayout,
     /// By how a capture is stored, in the order of [`Storage::ALL`].
     pub captures: [wgpu::BindGroupLayout; 3],
@@ -41,6 +46,7 @@ pub(super) struct Layouts {
     pub bin: wgpu::BindGroupLayout,
     pub ranges: wgpu::BindGroupLayout,
     pub blend: wgpu::BindGroupLayout,
+    pub blend_multisampled: wgpu::BindGroupLayout,
 }
 
 /// Kinds of bindings, to write layouts in one line each.
@@ -53,6 +59,8 @@ pub(super) enum Bind {
     Read,
     Write,
     Depth,
+    /// A multisampled depth.
+    Depths,
     /// A texture that is read as it is.
     Texture,
     Target(wgpu::TextureFormat),
@@ -66,22 +74,24 @@ impl Renderer {
     pub fn new(device: &wgpu::Device, checks: ShaderChecks) -> Result<Self, GpuError> {
         check_limits(&device.limits())?;
         let layouts = Layouts::new(device);
-        let shader = |name| module(device, name, Storage::Full, checks);
+        let shader = |name| module(device, name, &[], checks);
         let activate = shader("activate")?;
         let (sort, bin) = (shader("sort")?, shader("bin")?);
         let (ranges, blend) = (shader("ranges")?, shader("blend")?);
+        let blend_multisampled = module(device, "blend", MULTISAMPLED, checks)?;
+        let no_list = buffer(device, "gs4d no active list", 4, wgpu::BufferUsages::STORAGE);
         let pipeline = |module: &wgpu::ShaderModule, entry: &str, groups: &[&wgpu::BindGroupLayout]| {
             pipeline(device, module, entry, groups)
         };
         Ok(Self {
             activate_count: pipeline(&activate, "count", &[&layouts.activate, &layouts.filter]),
-            activate_scan: pipeline(&activate, "scan", &[&layouts.activate, &layouts.filter, &layouts.arguments]),
+            activate_scan: pipeline(&activate, "scan", &[&layouts.activate, &layouts.filter]),
             activate_write: pipeline(&activate, "write", &[&layouts.activate, &layouts.filter]),
             project: {
                 let mut all = Vec::new();
                 for (storage, capture) in Storage::ALL.into_iter().zip(&layouts.captures) {
-                    let shader = module(device, "project", storage, checks)?;
-                    all.push(pipeline(&shader, "project", &[&layouts.project, capture]));
+                    let shader = module(device, "project", storage.definitions(), checks)?;
+                    all.push(pipeline(&shader, "project", &[&layouts.project, capture, &layouts.active]));
                 }
                 all.try_into().map_err(|_| GpuError::Device("a pipeline is missing".into()))?
             },
@@ -95,6 +105,8 @@ impl Renderer {
             bin_emit: pipeline(&bin, "emit", &[&layouts.bin]),
             ranges: pipeline(&ranges, "ranges", &[&layouts.ranges]),
             blend: pipeline(&blend, "blend", &[&layouts.blend]),
+            blend_multisampled: pipeline(&blend_multisampled, "blend", &[&layouts.blend_multisampled]),
+            no_list: bind_group(device, "gs4d no active list", &layouts.active, &[no_list.as_entire_binding()]),
             layouts,
         })
     }
@@ -118,14 +130,19 @@ impl Renderer {
 
 impl Layouts {
     fn new(device: &wgpu::Device) -> Self {
-        use Bind::{Depth, Read, Target, Uniform, UniformAt, Write};
+        use Bind::{Depth, Depths, Read, Target, Uniform, UniformAt, Write};
         const FRAME: usize = size_of::<layout::Frame>();
         const INSTANCE: Bind = UniformAt(size_of::<layout::Instance>());
         let new = |label, bindings: &[Bind]| group_layout(device, label, bindings);
+        let blend = |depth| {
+            let targets = [wgpu::TextureFormat::Rgba32Float, wgpu::TextureFormat::Rg32Float].map(Target);
+            [Uniform(FRAME), Read, Read, Read, Read, depth, targets[0], targets[1]]
+        };
         Self {
-            activate: new("gs4d activate", &[INSTANCE, Write, Write, Write, Write]),
+            activate: new("gs4d activate", &[UniformAt(size_of::<layout::Activation>()), Write, Write]),
             filter: new("gs4d filter", &[Read]),
-            project: new("gs4d project", &[INSTANCE, Write, Write, Read, Read]),
+            active: new("gs4d active list", &[Read]),
+            project: new("gs4d project", &[INSTANCE, Write, Write]),
             captures: [
                 new("gs4d capture", &[Read, Read]),
                 new("gs4d capture", &[Read, Read, Read]),
@@ -138,19 +155,8 @@ impl Layouts {
             arguments: new("gs4d arguments", &[Write]),
             bin: new("gs4d bin", &[Uniform(FRAME), Write, Read, Read, Write, Write, Write]),
             ranges: new("gs4d ranges", &[Uniform(FRAME), Read, Read, Write]),
-            blend: new(
-                "gs4d blend",
-                &[
-                    Uniform(FRAME),
-                    Read,
-                    Read,
-                    Read,
-                    Read,
-                    Depth,
-                    Target(wgpu::TextureFormat::Rgba32Float),
-                    Target(wgpu::TextureFormat::R32Float),
-                ],
-            ),
+            blend: new("gs4d blend", &blend(Depth)),
+            blend_multisampled: new("gs4d blend", &blend(Depths)),
         }
     }
 }
@@ -167,10 +173,10 @@ impl Bind {
             Self::UniformAt(size) => buffer(wgpu::BufferBindingType::Uniform, true, size),
             Self::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }, false, 0),
             Self::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }, false, 0),
-            Self::Depth => wgpu::BindingType::Texture {
+            Self::Depth | Self::Depths => wgpu::BindingType::Texture {
                 sample_type: wgpu::TextureSampleType::Depth,
                 view_dimension: wgpu::TextureViewDimension::D2,
-                multisampled: false,
+                multisampled: matches!(self, Self::Depths),
             },
             Self::Texture => wgpu::BindingType::Texture {
                 sample_type: wgpu::TextureSampleType::Float { filterable: false },
@@ -232,6 +238,7 @@ pub(super) fn bind_group(
         .enumerate()
         .map(|(i, resource)| wgpu::BindGroupEntry { binding: i as u32, resource: resource.clone() })
         .collect();
+    note_created();
     device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
 }
 

@@ -4,7 +4,7 @@
 //! atomics: the same on every run.
 
 use super::renderer::{Bind, bind_group, group_layout, pipeline};
-use super::shaders::{Storage, module};
+use super::shaders::module;
 use super::{GpuCapture, GpuContext, GpuError, Headless, ShaderChecks, layout};
 use crate::compress::score::{ScoreEngine, ScoreError};
 use crate::frame::Background;
@@ -56,7 +56,7 @@ impl Scorer {
             &[frame, Bind::Read, Bind::Read, Bind::Read, Bind::Read, Bind::Read, Bind::Read, Bind::Read, Bind::Texture],
         );
         let outputs = group_layout(device, "gs4d score outputs", &[Bind::Write, Bind::Write, Bind::Write]);
-        let shader = module(device, "score", Storage::Full, checks)?;
+        let shader = module(device, "score", &[], checks)?;
         let pipeline = |entry| pipeline(device, &shader, entry, &[&inputs, &outputs]);
         Ok(Self {
             place: pipeline("place"),

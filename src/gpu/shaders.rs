@@ -7,8 +7,9 @@ use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescript
 use std::borrow::Cow;
 
 /// Libraries, each before those that import it.
-const LIBRARIES: [(&str, &str); 5] = [
+const LIBRARIES: [(&str, &str); 6] = [
     ("types", include_str!("../../shaders/shared/types.wgsl")),
+    ("look", include_str!("../../shaders/shared/look.wgsl")),
     ("harmonics", include_str!("../../shaders/shared/harmonics.wgsl")),
     ("packed", include_str!("../../shaders/shared/packed.wgsl")),
     ("scan", include_str!("../../shaders/shared/scan.wgsl")),
@@ -58,7 +59,7 @@ impl Storage {
     pub const ALL: [Self; 3] = [Self::Full, Self::Packed, Self::Coded];
 
     /// What the shader is told.
-    fn definitions(self) -> &'static [&'static str] {
+    pub fn definitions(self) -> &'static [&'static str] {
         match self {
             Self::Full => &[],
             Self::Packed => &["PACKED_GEOMETRY"],
@@ -67,11 +68,15 @@ impl Storage {
     }
 }
 
-/// The naga module of a pass, imports resolved, validated. Only `project` depends on the storage.
+/// What `blend` is told where opaque surfaces are multisampled.
+pub const MULTISAMPLED: &[&str] = &["MULTISAMPLED"];
+
+/// The naga module of a pass, imports resolved, validated, with these definitions: those of a [`Storage`] for `project`, none or
+/// [`MULTISAMPLED`] for `blend`, none for the others.
 ///
 /// # Errors
 /// When there is no such pass or it does not compile.
-pub fn compose(name: &str, storage: Storage) -> Result<wgpu::naga::Module, GpuError> {
+pub fn compose(name: &str, definitions: &[&str]) -> Result<wgpu::naga::Module, GpuError> {
     let Some(&(name, source)) = PASSES.iter().find(|(pass, _)| *pass == name) else {
         return Err(GpuError::Shader { name: "unknown", reason: format!("there is no pass `{name}`") });
     };
@@ -82,8 +87,7 @@ pub fn compose(name: &str, storage: Storage) -> Result<wgpu::naga::Module, GpuEr
             return Err(GpuError::Shader { name: library, reason: error.emit_to_string(&composer) });
         }
     }
-    let shader_defs =
-        storage.definitions().iter().map(|name| ((*name).to_owned(), ShaderDefValue::Bool(true))).collect();
+    let shader_defs = definitions.iter().map(|name| ((*name).to_owned(), ShaderDefValue::Bool(true))).collect();
     let descriptor = NagaModuleDescriptor { source, file_path: name, shader_defs, ..Default::default() };
     composer
         .make_naga_module(descriptor)
@@ -94,12 +98,12 @@ pub fn compose(name: &str, storage: Storage) -> Result<wgpu::naga::Module, GpuEr
 pub(super) fn module(
     device: &wgpu::Device,
     name: &'static str,
-    storage: Storage,
+    definitions: &[&str],
     checks: ShaderChecks,
 ) -> Result<wgpu::ShaderModule, GpuError> {
     let descriptor = wgpu::ShaderModuleDescriptor {
         label: Some(name),
-        source: wgpu::ShaderSource::Naga(Cow::Owned(compose(name, storage)?)),
+        source: wgpu::ShaderSource::Naga(Cow::Owned(compose(name, definitions)?)),
     };
     Ok(match checks {
         ShaderChecks::On => device.create_shader_module(descriptor),

@@ -2,12 +2,12 @@
 //!
 //! In: a device that has timestamps. Out: [`Timings`]: medians over many frames, views and times.
 
+use super::view::buffer;
 use crate::frame::Counts;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// The timed stretches of a frame, in order.
-pub(super) const STRETCHES: [&str; 7] =
-    ["activate", "project", "sort (depth)", "bin", "sort (tile)", "ranges", "blend"];
+pub(super) const STRETCHES: [&str; 6] = ["project", "sort (depth)", "bin", "sort (tile)", "ranges", "blend"];
 
 /// Medians over the frames of a benchmark.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -41,7 +41,6 @@ pub struct PassTime {
 pub(super) struct PassTimer {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
-    readback: wgpu::Buffer,
     period: f64,
     inside: bool,
     next: AtomicU32,
@@ -56,22 +55,14 @@ impl PassTimer {
             return None;
         }
         let count = if inside { STRETCHES.len() as u32 + 1 } else { 2 };
-        let buffer = |label, usage| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size: u64::from(count) * 8,
-                usage: usage | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
-        };
+        let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
         Some(Self {
             queries: device.create_query_set(&wgpu::QuerySetDescriptor {
                 label: Some("gs4d timestamps"),
                 ty: wgpu::QueryType::Timestamp,
                 count,
             }),
-            resolved: buffer("gs4d timestamps", wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC),
-            readback: buffer("gs4d timestamp readback", wgpu::BufferUsages::MAP_READ),
+            resolved: buffer(device, "gs4d timestamps", u64::from(count) * 8, usage),
             period: f64::from(queue.get_timestamp_period()) * 1e-6,
             inside,
             next: AtomicU32::new(1),
@@ -94,17 +85,16 @@ impl PassTimer {
         }
     }
 
-    /// Copies the timestamps out, after the pass.
+    /// Writes the timestamps into the buffer, after the pass.
     pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
         let count = if self.inside { STRETCHES.len() as u32 + 1 } else { 2 };
         encoder.resolve_query_set(&self.queries, 0..count, &self.resolved, 0);
-        encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readback, 0, u64::from(count) * 8);
         self.next.store(1, Ordering::Relaxed);
     }
 
-    /// The buffer that the timestamps arrive in.
-    pub fn readback(&self) -> &wgpu::Buffer {
-        &self.readback
+    /// The buffer that the timestamps arrive in, eight bytes each.
+    pub fn resolved(&self) -> &wgpu::Buffer {
+        &self.resolved
     }
 
     /// Milliseconds between each timestamp and the next.

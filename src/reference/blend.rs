@@ -3,9 +3,9 @@
 //! In: splats, sorted pairs and tile ranges, the background. Out: the [`Frame`].
 
 use super::{Pair, Splat};
-use crate::frame::{Background, Counts, Frame};
-use crate::gaussian::View;
+use crate::frame::{Background, BlendSpace, Counts, Frame};
 use crate::gaussian::projection::{ALPHA_MAX, ALPHA_MIN, TILE_SIZE, TRANSMITTANCE_MIN};
+use crate::gaussian::{View, decode};
 use crate::picture::Picture;
 use crate::scene::Environment;
 use glam::Vec3;
@@ -20,38 +20,60 @@ pub fn blend(
     view: &View,
     background: Background,
     environment: Option<&Environment>,
+    space: BlendSpace,
     counts: Counts,
 ) -> Frame {
     let size = view.size;
     let tiles = view.tiles();
-    let pixels: Vec<(Vec3, f32, f32)> = (0..size.x * size.y)
+    let pixels: Vec<Pixel> = (0..size.x * size.y)
         .into_par_iter()
         .map(|i| {
             let (x, y) = (i % size.x, i / size.x);
             let tile = (y / TILE_SIZE) * tiles.x + x / TILE_SIZE;
-            let (color, transmittance, depth) = blend_pixel(splats, &pairs[ranges[tile as usize].clone()], x, y);
-            (color + transmittance * behind(view, background, environment, x, y), transmittance, depth)
+            let mut pixel = blend_pixel(splats, &pairs[ranges[tile as usize].clone()], x, y);
+            pixel.color += pixel.transmittance * behind(view, background, environment, space, x, y);
+            pixel
         })
         .collect();
     Frame {
-        picture: Picture { size, pixels: pixels.iter().map(|p| p.0).collect() },
-        transmittance: pixels.iter().map(|p| p.1).collect(),
-        depth: pixels.iter().map(|p| p.2).collect(),
+        picture: Picture { size, pixels: pixels.iter().map(|p| p.color).collect() },
+        transmittance: pixels.iter().map(|p| p.transmittance).collect(),
+        depth: pixels.iter().map(|p| p.depth).collect(),
+        median_depth: pixels.iter().map(|p| p.median_depth).collect(),
         counts,
     }
 }
 
-/// What stands behind all Gaussians at pixel `(x, y)`.
-pub(super) fn behind(view: &View, background: Background, environment: Option<&Environment>, x: u32, y: u32) -> Vec3 {
+/// What stands behind all Gaussians at pixel `(x, y)`, in the blend space.
+pub(super) fn behind(
+    view: &View,
+    background: Background,
+    environment: Option<&Environment>,
+    space: BlendSpace,
+    x: u32,
+    y: u32,
+) -> Vec3 {
     match (background, environment) {
         (Background::Color(color), _) => Vec3::from(color),
-        (Background::Environment, Some(map)) => map.sample(view.camera_position, view.ray(x, y)),
+        (Background::Environment, Some(map)) if !view.orthographic => {
+            let color = map.sample(view.camera_position, view.ray(x, y));
+            if space == BlendSpace::Linear { decode(color.max(Vec3::ZERO)) } else { color }
+        }
         _ => Vec3::ZERO,
     }
 }
 
-fn blend_pixel(splats: &[Splat], pairs: &[Pair], x: u32, y: u32) -> (Vec3, f32, f32) {
-    let (mut color, mut transmittance, mut depth) = (Vec3::ZERO, 1.0f32, 0.0f32);
+/// What a pixel has gathered.
+#[derive(Debug, Clone, Copy)]
+struct Pixel {
+    color: Vec3,
+    transmittance: f32,
+    depth: f32,
+    median_depth: f32,
+}
+
+fn blend_pixel(splats: &[Splat], pairs: &[Pair], x: u32, y: u32) -> Pixel {
+    let mut pixel = Pixel { color: Vec3::ZERO, transmittance: 1.0, depth: 0.0, median_depth: 0.0 };
     for pair in pairs {
         let splat = &splats[pair.splat as usize];
         let (dx, dy) = (splat.center.x - x as f32, splat.center.y - y as f32);
@@ -64,14 +86,17 @@ fn blend_pixel(splats: &[Splat], pairs: &[Pair], x: u32, y: u32) -> (Vec3, f32, 
         if alpha < ALPHA_MIN {
             continue;
         }
-        let left = transmittance * (1.0 - alpha);
+        let left = pixel.transmittance * (1.0 - alpha);
         if left < TRANSMITTANCE_MIN {
             break;
         }
-        let weight = alpha * transmittance;
-        color += splat.color * weight;
-        depth += splat.depth * weight;
-        transmittance = left;
+        let weight = alpha * pixel.transmittance;
+        pixel.color += splat.color * weight;
+        pixel.depth += splat.depth * weight;
+        if pixel.transmittance > 0.5 && left <= 0.5 {
+            pixel.median_depth = splat.depth;
+        }
+        pixel.transmittance = left;
     }
-    (color, transmittance, depth)
+    pixel
 }

@@ -1,6 +1,6 @@
 //! The CPU twin of every GPU pass, with the same names and in the same order.
 //!
-//! In: a [`RuntimeScene`], a [`View`] and a [`Background`]. Out: a [`Frame`]. Plain functions over slices, to be laid beside
+//! In: [`Layer`]s and a [`Background`]. Out: a [`Frame`]. Plain functions over slices, to be laid beside
 //! `shaders/`: [`project()`], [`sort`], [`bin`], `sort` again, [`ranges`], [`blend`]; or [`score()`] in place of the last.
 
 mod bin;
@@ -15,18 +15,40 @@ pub use project::{Splat, project};
 pub use score::{ViewScore, Want, score};
 pub use sort::sort;
 
-use crate::frame::{Background, Counts, Frame};
-use crate::gaussian::View;
+use crate::frame::{Background, BlendSpace, Counts, Frame};
+use crate::gaussian::{Look, View};
 use crate::scene::RuntimeScene;
 use std::ops::Range;
 
-/// Draws a view on the CPU.
+/// A scene in a view, with the look it has there.
+#[derive(Debug, Clone, Copy)]
+pub struct Layer<'a> {
+    /// The scene.
+    pub scene: &'a RuntimeScene,
+    /// Where it is seen from, and when.
+    pub view: View,
+    /// How it looks.
+    pub look: Look,
+}
+
+/// Draws a view of one scene on the CPU, as trained.
 pub fn render(scene: &RuntimeScene, view: &View, background: Background) -> Frame {
-    let splats = project(scene, view);
+    let layer = Layer { scene, view: *view, look: Look::default() };
+    render_layers(&[layer], background, BlendSpace::Encoded)
+}
+
+/// Draws scenes into one picture, sorted together. All views must have the same size and lens.
+///
+/// # Panics
+/// Without a layer: there is no view then.
+pub fn render_layers(layers: &[Layer<'_>], background: Background, space: BlendSpace) -> Frame {
+    let view = &layers[0].view;
+    let splats: Vec<Splat> = layers.iter().flat_map(|layer| project(layer, space)).collect();
     let Lists { pairs, ranges, visible } = lists(&splats, view);
     let counts = Counts { visible, pairs: pairs.len() as u32 };
-    let environment = scene.environment.as_ref();
-    blend(&splats, &pairs, &ranges, view, background, environment, counts)
+    let surrounded = layers.iter().find_map(|layer| Some((&layer.view, layer.scene.environment.as_ref()?)));
+    let (outside, environment) = surrounded.map_or((view, None), |(view, map)| (view, Some(map)));
+    blend(&splats, &pairs, &ranges, outside, background, environment, space, counts)
 }
 
 /// The splats of every tile, front to back.

@@ -1,9 +1,10 @@
 //! `project`: Gaussians to splats, twin of `shaders/project.wgsl`.
 //!
-//! In: a scene and a view. Out: one [`Splat`] for each Gaussian, invisible where it is not drawn.
+//! In: a [`Layer`] and the blend space. Out: one [`Splat`] for each Gaussian, invisible where it is not drawn.
 
-use crate::gaussian::{ShDirection, View, projection};
-use crate::scene::RuntimeScene;
+use super::Layer;
+use crate::frame::BlendSpace;
+use crate::gaussian::{ShDirection, projection};
 use glam::{UVec4, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
@@ -46,29 +47,34 @@ impl Splat {
 }
 
 /// Projects every Gaussian of the scene that its filter, if it has one, leaves active.
-pub fn project(scene: &RuntimeScene, view: &View) -> Vec<Splat> {
+pub fn project(layer: &Layer<'_>, space: BlendSpace) -> Vec<Splat> {
+    let Layer { scene, view, .. } = layer;
     let clip = view.clip_rows();
     let active =
         scene.filter.as_ref().map(|filter| (filter, filter.segment_of(view.time, scene.trained_with.time_interval)));
     let is_active = |i| active.is_none_or(|(filter, segment)| filter.is_active(segment, i));
-    let one = |i| if is_active(i) { project_one(scene, i, view, &clip) } else { Splat::INVISIBLE };
+    let one = |i| if is_active(i) { project_one(layer, i, space, &clip) } else { Splat::INVISIBLE };
     (0..scene.len()).into_par_iter().map(one).collect()
 }
 
-fn project_one(scene: &RuntimeScene, index: usize, view: &View, clip: &[Vec4; 2]) -> Splat {
+fn project_one(layer: &Layer<'_>, index: usize, space: BlendSpace, clip: &[Vec4; 2]) -> Splat {
+    let Layer { scene, view, look } = layer;
     let gaussian = &scene.gaussian(index);
     let Some(projected) = projection::project_with(gaussian, view, clip) else { return Splat::INVISIBLE };
+    if !look.shows(projected.mean) {
+        return Splat::INVISIBLE;
+    }
+    let projected = projection::Projected { opacity: projected.opacity * look.opacity, ..projected };
     let seen = match scene.trained_with.sh_direction {
         ShDirection::Canonical => Vec3::from(gaussian.mean),
         ShDirection::Displaced => projected.mean,
     };
-    let direction = (seen - view.camera_position).normalize();
     let tau = gaussian.mean_t - view.time;
     Splat {
         center: projected.center,
         conic: projected.conic,
         opacity: projected.opacity,
-        color: scene.color(index, direction, tau),
+        color: look.color(scene.color(index, view.direction_to(seen), tau), space),
         depth: projected.depth,
         tiles: projected.contributing_tiles(),
     }

@@ -5,10 +5,10 @@
 //! would change by if that Gaussian alone were gone.
 
 use super::blend::behind;
-use super::{Lists, Pair, Splat, lists, project};
-use crate::frame::Background;
-use crate::gaussian::View;
+use super::{Layer, Lists, Pair, Splat, lists, project};
+use crate::frame::{Background, BlendSpace};
 use crate::gaussian::projection::{ALPHA_MAX, ALPHA_MIN, TILE_SIZE, TRANSMITTANCE_MIN};
+use crate::gaussian::{Look, View};
 use crate::scene::RuntimeScene;
 use glam::{UVec2, Vec3};
 use rayon::prelude::*;
@@ -37,10 +37,11 @@ pub struct ViewScore {
 
 /// Scores one view on the CPU. The result does not depend on the number of threads.
 pub fn score(scene: &RuntimeScene, view: &View, background: Background, want: Want) -> ViewScore {
-    let splats = project(scene, view);
+    let layer = Layer { scene, view: *view, look: Look::default() };
+    let splats = project(&layer, BlendSpace::Encoded);
     let Lists { pairs, ranges, .. } = lists(&splats, view);
     let environment = scene.environment.as_ref();
-    let behind = |x, y| behind(view, background, environment, x, y);
+    let behind = |x, y| behind(view, background, environment, BlendSpace::Encoded, x, y);
     let slots: Vec<Vec<Slot>> = ranges
         .par_iter()
         .enumerate()

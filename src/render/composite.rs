@@ -1,24 +1,30 @@
-//! Composite: the one pass that goes through Bevy's pipeline cache.
+//! Composite: captures over what the camera has drawn so far, through Bevy's pipeline cache.
 //!
 //! In: a view target and a view's captures (colour and transmittance). Out: pipeline and bind group for `shaders/composite.wgsl`.
+//! Where nothing changes, nothing is made.
 
+use crate::frame::BlendSpace;
+use crate::gpu::note_created;
 use bevy::asset::Handle;
 use bevy::core_pipeline::FullscreenShader;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::world::{FromWorld, World};
 use bevy::render::render_resource::binding_types::{texture_2d, uniform_buffer};
 use bevy::render::render_resource::{
-    BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, ColorTargetState, ColorWrites,
-    FragmentState, PipelineCache, RenderPipelineDescriptor, ShaderStages, SpecializedRenderPipeline, TextureFormat,
-    TextureSampleType, TextureView, TextureViewId, UniformBuffer, VertexState,
+    BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, BindingResource, ColorTargetState,
+    ColorWrites, FragmentState, PipelineCache, RenderPipelineDescriptor, ShaderStages, SpecializedRenderPipeline,
+    TextureFormat, TextureSampleType, TextureView, TextureViewId, UniformBuffer, VertexState,
 };
 use bevy::render::renderer::{RenderDevice, RenderQueue};
-use bevy::shader::Shader;
+use bevy::shader::{Shader, ShaderDefVal};
 use glam::UVec4;
 
-/// The shader, kept alive for the render world.
+/// The shaders of this folder, kept alive for the render world.
 #[derive(Resource)]
-pub(super) struct CompositeShader(pub(super) Handle<Shader>);
+pub(super) struct CaptureShaders {
+    pub(super) composite: Handle<Shader>,
+    pub(super) write_depth: Handle<Shader>,
+}
 
 /// What pipelines for different targets are made from.
 #[derive(Resource)]
@@ -34,6 +40,16 @@ pub(super) struct CompositeKey {
     pub(super) format: TextureFormat,
     /// Whether the target holds sRGB-encoded values instead of linear ones.
     pub(super) encoded: bool,
+    /// The space in which captures have been blended, and are blended with the target.
+    pub(super) blend_space: BlendSpace,
+}
+
+impl CompositeKey {
+    fn shader_defs(self) -> Vec<ShaderDefVal> {
+        let linear = self.blend_space == BlendSpace::Linear;
+        let defines = [(self.encoded, "ENCODED_TARGET"), (linear, "LINEAR_BLEND")];
+        defines.into_iter().filter(|(set, _)| *set).map(|(_, name)| name.into()).collect()
+    }
 }
 
 impl FromWorld for CompositePipeline {
@@ -44,7 +60,7 @@ impl FromWorld for CompositePipeline {
         Self {
             layout: BindGroupLayoutDescriptor::new("gs4d composite", &entries),
             vertex: world.resource::<FullscreenShader>().to_vertex_state(),
-            shader: world.resource::<CompositeShader>().0.clone(),
+            shader: world.resource::<CaptureShaders>().composite.clone(),
         }
     }
 }
@@ -59,7 +75,7 @@ impl SpecializedRenderPipeline for CompositePipeline {
             vertex: self.vertex.clone(),
             fragment: Some(FragmentState {
                 shader: self.shader.clone(),
-                shader_defs: if key.encoded { vec!["ENCODED_TARGET".into()] } else { Vec::new() },
+                shader_defs: key.shader_defs(),
                 entry_point: Some("fragment".into()),
                 targets: vec![Some(ColorTargetState { format: key.format, blend: None, write_mask: ColorWrites::ALL })],
             }),
@@ -84,10 +100,20 @@ struct CachedGroup {
 impl CompositeBindings {
     /// Writes the corner and size of the viewport, pixels of the target, if they have changed.
     pub(super) fn set_viewport(&mut self, viewport: UVec4, device: &RenderDevice, queue: &RenderQueue) {
-        if self.viewport.buffer().is_none() || *self.viewport.get() != viewport {
+        let first = self.viewport.buffer().is_none();
+        if first || *self.viewport.get() != viewport {
             self.viewport.set(viewport);
             self.viewport.write_buffer(device, queue);
         }
+        if first {
+            note_created();
+        }
+    }
+
+    /// The viewport's uniform, for other passes over the same view; nothing before the first
+    /// [`set_viewport`](Self::set_viewport).
+    pub(super) fn viewport(&self) -> Option<BindingResource<'_>> {
+        self.viewport.binding()
     }
 
     /// The bind group that reads `source`, the target so far, and `captures`; nothing before the first
@@ -107,6 +133,7 @@ impl CompositeBindings {
                 let layout = cache.get_bind_group_layout(&pipeline.layout);
                 let entries = BindGroupEntries::sequential((source, captures, self.viewport.binding()?));
                 let group = device.create_bind_group("gs4d composite", &layout, &entries);
+                note_created();
                 if self.groups.len() >= 2 {
                     self.groups.clear();
                 }

@@ -1,17 +1,22 @@
 //! Draw: captures into a camera's target, in Bevy's `Core3d` schedule.
 //!
-//! In: what [`prepare`](super::prepare) left for the camera. Out: one compute pass and the composite, recorded.
+//! In: what [`prepare`](super::prepare) left for the camera. Out: one compute pass, the composite and, where it is wanted,
+//! `write_depth`, recorded.
 
+use super::active::ActiveLists;
 use super::composite::CompositePipeline;
-use super::prepare::{CaptureRenderer, CaptureViews};
+use super::prepare::{CaptureRenderer, CaptureView, CaptureViews};
 use super::upload::GpuGaussianCapture;
+use super::write_depth::WriteDepthPipeline;
 use bevy::ecs::schedule::SystemSet;
-use bevy::ecs::system::{Res, ResMut};
+use bevy::ecs::system::{Res, ResMut, SystemParam};
 use bevy::render::diagnostic::RecordDiagnostics;
 use bevy::render::render_asset::RenderAssets;
-use bevy::render::render_resource::{Operations, PipelineCache, RenderPassColorAttachment, RenderPassDescriptor};
+use bevy::render::render_resource::{
+    Operations, PipelineCache, RenderPassColorAttachment, RenderPassDescriptor, StoreOp,
+};
 use bevy::render::renderer::{RenderContext, RenderDevice, ViewQuery};
-use bevy::render::view::{Msaa, ViewTarget};
+use bevy::render::view::{Msaa, ViewDepthTexture, ViewTarget};
 
 /// Sets of systems in the render world's `Core3d` schedule, for ordering.
 #[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
@@ -21,56 +26,100 @@ pub enum CaptureSystems {
     Draw,
 }
 
+/// Pipelines, and what their bind groups are made with.
+#[derive(SystemParam)]
+pub(super) struct Passes<'w> {
+    device: Res<'w, RenderDevice>,
+    cache: Res<'w, PipelineCache>,
+    composite: Res<'w, CompositePipeline>,
+    write_depth: Res<'w, WriteDepthPipeline>,
+}
+
 /// Draws the captures of one camera. Registered twice: multisampled targets can only be read once they have been resolved, that
 /// is after transparent meshes.
 pub(super) fn draw_captures<const MULTISAMPLED: bool>(
-    camera: ViewQuery<(&ViewTarget, &Msaa)>,
-    device: Res<RenderDevice>,
+    camera: ViewQuery<(&ViewTarget, &ViewDepthTexture, &Msaa)>,
     renderer: Option<Res<CaptureRenderer>>,
     captures: Res<RenderAssets<GpuGaussianCapture>>,
-    composite: Res<CompositePipeline>,
-    cache: Res<PipelineCache>,
+    lists: Res<ActiveLists>,
+    passes: Passes,
     mut views: ResMut<CaptureViews>,
     mut context: RenderContext,
 ) {
     let entity = camera.entity();
-    let (target, msaa) = camera.into_inner();
+    let (target, depth, msaa) = camera.into_inner();
     if (*msaa != Msaa::Off) != MULTISAMPLED {
         return;
     }
     let (Some(renderer), Some(view)) = (renderer, views.0.get_mut(&entity)) else { return };
-    let instances = view.instances(&captures);
-    let Some(pipeline) = cache.get_render_pipeline(view.pipeline) else { return };
-    if instances.is_empty() {
+    // Without the composite there would be work that nobody sees.
+    if !view.sees_something() || passes.cache.get_render_pipeline(view.composite).is_none() {
         return;
     }
+    let instances = view.instances(&captures, &lists);
     let diagnostics = context.diagnostic_recorder();
     let diagnostics = diagnostics.as_deref();
     let span = diagnostics.time_span(context.command_encoder(), "gs4d");
     view.renderer.record(&renderer.0, context.command_encoder(), &instances);
     span.end(context.command_encoder());
+    passes.composite(view, target, &mut context);
+    passes.write_depth(view, depth, &mut context);
+}
 
-    // Fetched before the target is turned round: from then on, something must be written to the other side.
-    let Some(color) = view.renderer.color() else { return };
-    let source = target.main_texture_view();
-    let Some(group) = view.bindings.group(&device, &cache, &composite, source, color) else { return };
-    let write = target.post_process_write();
-    let mut pass = context.begin_tracked_render_pass(RenderPassDescriptor {
-        label: Some("gs4d composite"),
-        color_attachments: &[Some(RenderPassColorAttachment {
-            view: write.destination,
-            depth_slice: None,
-            resolve_target: None,
-            ops: Operations::default(),
-        })],
-        depth_stencil_attachment: None,
-        timestamp_writes: None,
-        occlusion_query_set: None,
-        multiview_mask: None,
-    });
-    let span = diagnostics.pass_span(&mut pass, "gs4d/composite");
-    pass.set_render_pipeline(pipeline);
-    pass.set_bind_group(0, group, &[]);
-    pass.draw(0..3, 0..1);
-    span.end(&mut pass);
+impl Passes<'_> {
+    /// Captures over the target.
+    fn composite(&self, view: &mut CaptureView, target: &ViewTarget, context: &mut RenderContext) {
+        // Fetched before the target is turned round: from then on, something must be written to the other side.
+        let Some(pipeline) = self.cache.get_render_pipeline(view.composite) else { return };
+        let Some(color) = view.renderer.color() else { return };
+        let source = target.main_texture_view();
+        let group = view.bindings.group(&self.device, &self.cache, &self.composite, source, color);
+        let Some(group) = group else { return };
+        let write = target.post_process_write();
+        let diagnostics = context.diagnostic_recorder();
+        let diagnostics = diagnostics.as_deref();
+        let mut pass = context.begin_tracked_render_pass(RenderPassDescriptor {
+            label: Some("gs4d composite"),
+            color_attachments: &[Some(RenderPassColorAttachment {
+                view: write.destination,
+                depth_slice: None,
+                resolve_target: None,
+                ops: Operations::default(),
+            })],
+            depth_stencil_attachment: None,
+            timestamp_writes: None,
+            occlusion_query_set: None,
+            multiview_mask: None,
+        });
+        let span = diagnostics.pass_span(&mut pass, "gs4d/composite");
+        pass.set_render_pipeline(pipeline);
+        pass.set_bind_group(0, group, &[]);
+        pass.draw(0..3, 0..1);
+        span.end(&mut pass);
+    }
+
+    /// Captures into the depth buffer, if the camera asks for it.
+    fn write_depth(&self, view: &mut CaptureView, depth: &ViewDepthTexture, context: &mut RenderContext) {
+        let Some(pipeline) = view.write_depth.and_then(|id| self.cache.get_render_pipeline(id)) else { return };
+        let (Some(color), Some(depths)) = (view.renderer.color(), view.renderer.depth()) else { return };
+        let Some(viewport) = view.bindings.viewport() else { return };
+        let targets = [color, depths];
+        let group = view.depth_bindings.group(&self.device, &self.cache, &self.write_depth, viewport, targets);
+        let Some(group) = group else { return };
+        let diagnostics = context.diagnostic_recorder();
+        let diagnostics = diagnostics.as_deref();
+        let mut pass = context.begin_tracked_render_pass(RenderPassDescriptor {
+            label: Some("gs4d write_depth"),
+            color_attachments: &[],
+            depth_stencil_attachment: Some(depth.get_attachment(StoreOp::Store)),
+            timestamp_writes: None,
+            occlusion_query_set: None,
+            multiview_mask: None,
+        });
+        let span = diagnostics.pass_span(&mut pass, "gs4d/write_depth");
+        pass.set_render_pipeline(pipeline);
+        pass.set_bind_group(0, group, &[]);
+        pass.draw(0..3, 0..1);
+        span.end(&mut pass);
+    }
 }

@@ -1,21 +1,27 @@
 //! Extract: what is to be drawn this frame.
 //!
-//! In (main world): visible entities with a capture, their transform and playback. Out (render world): [`ExtractedCaptures`].
+//! In (main world): entities with a loaded capture, their transform, playback and settings; cameras' choices. Out (render world):
+//! [`ExtractedCaptures`] and [`ExtractedViewSettings`], by entity of the main world.
 
-use super::{CaptureSettings, GaussianCapture3d};
+use super::{CaptureSettings, CaptureViewSettings, GaussianCapture3d};
 use crate::asset::GaussianCapture;
-use crate::playback::Playback;
+use crate::gaussian::Look;
+use crate::playback::{ClipFade, Playback};
 use bevy::asset::{AssetId, Assets};
-use bevy::camera::visibility::InheritedVisibility;
+use bevy::camera::Camera;
+use bevy::camera::visibility::ViewVisibility;
+use bevy::ecs::entity::Entity;
+use bevy::ecs::query::With;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Query, Res, ResMut};
 use bevy::render::Extract;
+use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
 use bevy::transform::components::GlobalTransform;
 use glam::Affine3A;
 
-/// The captures of this frame, whatever camera will see them. The memory is kept from frame to frame.
+/// The captures of this frame, seen by a camera or not. The memory is kept from frame to frame.
 #[derive(Resource, Default)]
-pub(super) struct ExtractedCaptures(pub(super) Vec<ExtractedCapture>);
+pub(super) struct ExtractedCaptures(pub(super) MainEntityHashMap<ExtractedCapture>);
 
 /// One entity with a loaded capture.
 pub(super) struct ExtractedCapture {
@@ -25,25 +31,49 @@ pub(super) struct ExtractedCapture {
     pub(super) time: f32,
     /// Whether its temporal filter is used.
     pub(super) filtered: bool,
+    pub(super) look: Look,
+    /// Whether any camera sees it.
+    pub(super) seen: bool,
 }
+
+/// How cameras draw captures, where they say so.
+#[derive(Resource, Default)]
+pub(super) struct ExtractedViewSettings(pub(super) MainEntityHashMap<CaptureViewSettings>);
+
+type Placed = (
+    Entity,
+    &'static GaussianCapture3d,
+    &'static CaptureSettings,
+    &'static Playback,
+    &'static GlobalTransform,
+    &'static ViewVisibility,
+    Option<&'static ClipFade>,
+);
 
 pub(super) fn extract_captures(
     mut extracted: ResMut<ExtractedCaptures>,
     assets: Extract<Res<Assets<GaussianCapture>>>,
-    captures: Extract<Query<(&GaussianCapture3d, &CaptureSettings, &Playback, &GlobalTransform, &InheritedVisibility)>>,
+    captures: Extract<Query<Placed>>,
 ) {
     extracted.0.clear();
-    for (capture, settings, playback, transform, visibility) in &captures {
-        if !visibility.get() {
-            continue;
-        }
-        if let Some(loaded) = assets.get(&capture.0) {
-            extracted.0.push(ExtractedCapture {
-                asset: capture.0.id(),
-                world_from_capture: transform.affine(),
-                time: loaded.time_at(playback.time),
-                filtered: settings.filter,
-            });
-        }
+    for (entity, capture, settings, playback, transform, visibility, fade) in &captures {
+        let Some(loaded) = assets.get(&capture.0) else { continue };
+        let placed = ExtractedCapture {
+            asset: capture.0.id(),
+            world_from_capture: transform.affine(),
+            time: loaded.time_at(playback.time),
+            filtered: settings.filter,
+            look: settings.look(fade.copied().unwrap_or_default().0),
+            seen: visibility.get(),
+        };
+        extracted.0.insert(entity.into(), placed);
     }
+}
+
+pub(super) fn extract_view_settings(
+    mut extracted: ResMut<ExtractedViewSettings>,
+    cameras: Extract<Query<(Entity, &CaptureViewSettings), With<Camera>>>,
+) {
+    extracted.0.clear();
+    extracted.0.extend(cameras.iter().map(|(camera, settings)| (MainEntity::from(camera), *settings)));
 }

@@ -1,28 +1,63 @@
 //! Captures in Bevy's frame.
 //!
-//! In: entities with a [`GaussianCapture3d`] and perspective `Camera3d`s. Out: pixels in every such camera's target. The drawing
-//! itself is [`crate::gpu`], which knows nothing of Bevy; what is here connects the two:
+//! In: entities with a [`GaussianCapture3d`] and `Camera3d`s, perspective or orthographic. Out: pixels in every such camera's target,
+//! of the captures that it sees. The drawing itself is [`crate::gpu`], which knows nothing of Bevy; what is here connects the two:
 //!
 //! ```text
-//! extract    what is where, at which moment                       main world -> render world
-//! upload     a loaded capture -> buffers on the GPU                once per asset
-//! prepare    a camera's lens and every capture's pose -> views     once per camera and frame
-//! draw       one compute pass, then the composite                  Core3d, between opaque and transparent meshes
+//! visibility   where a capture is now -> its Aabb                    main world
+//! extract      what is where, at which moment, with which settings   main world -> render world
+//! upload       a loaded capture -> buffers on the GPU                once per asset
+//! active       which Gaussians the filter leaves                     once per placed capture and segment, before all cameras
+//! prepare      a camera's lens and every capture's pose -> views     once per camera and frame
+//! draw         one compute pass, the composite, write_depth          Core3d, between opaque and transparent meshes
+//! statistics   counts, times, memory                                 render world -> main world
 //! ```
 //!
-//! Blending happens in the space captures were trained in, sRGB-encoded values. A camera's tonemapping comes afterwards and applies
-//! to captures as to everything else; `Tonemapping::None` shows them as they were trained.
+//! # The order of a frame
+//!
+//! | | `Msaa::Off` | multisampled |
+//! |---|---|---|
+//! | 1 | opaque and alpha-masked meshes, skybox | opaque and alpha-masked meshes, skybox |
+//! | 2 | **captures**, cut by the depth of 1 | transmissive and transparent meshes, cut by the depth of 1 |
+//! | 3 | **captures' depth**, if asked for | **captures**, cut by the depth of 1 |
+//! | 4 | transmissive and transparent meshes, gizmos, cut by the depth of 1 (and of 3) | **captures' depth**, if asked for |
+//! | 5 | post-processing, tonemapping | post-processing, tonemapping |
+//!
+//! So without multisampling everything in Bevy's transparent phase (blended materials, gizmos) is drawn over captures, in front of
+//! them or behind; with [`DepthWrite`] what is behind captures is cut by them, pixel by pixel. A multisampled target can only be
+//! read once all meshes are in it: captures are then drawn over everything in the transparent phase, in front of them or behind,
+//! and only opaque and alpha-masked meshes hide them, sample by sample. Where transparent meshes matter use `Msaa::Off`, which
+//! captures do not need.
+//!
+//! Bevy orders its transmissive meshes (`main_transmissive_pass_3d`) and its atmosphere only between opaque and transparent meshes;
+//! order [`CaptureSystems::Draw`] against them, in the render world's `Core3d` schedule, to see captures through glass. Prepasses come
+//! first and know nothing of captures: neither do effects that read the depth prepass (screen-space ambient occlusion and
+//! reflections). Those that read the depth buffer after the main pass (depth of field, volumetric fog) see what [`DepthWrite`] wrote.
+//!
+//! # Colour
+//!
+//! Blending happens in the space captures were trained in, sRGB-encoded values, unless the camera's [`CaptureViewSettings`] say
+//! otherwise. A camera's tonemapping comes afterwards and applies to captures as to everything else; `Tonemapping::None` shows them as
+//! they were trained.
 
+mod active;
 mod component;
 mod composite;
 mod draw;
 mod extract;
 mod plugin;
 mod prepare;
+mod reflect;
+mod settings;
+mod statistics;
 mod upload;
 mod view;
+mod visibility;
+mod write_depth;
 
-pub use component::{CaptureSettings, GaussianCapture3d};
+pub use component::GaussianCapture3d;
 pub use draw::CaptureSystems;
 pub use plugin::GaussianCapturePlugin;
+pub use settings::{CaptureSettings, CaptureViewSettings, CropBox, DepthWrite};
+pub use statistics::CaptureStatistics;
 pub use upload::GpuGaussianCapture;

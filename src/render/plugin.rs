@@ -3,20 +3,26 @@
 //! In: an app with Bevy's `DefaultPlugins` (or at least its `AssetPlugin`). Out: the same app, in which captures load, play and,
 //! where there is a renderer, show.
 
-use super::composite::{CompositePipeline, CompositeShader};
+use super::active::{ActiveLists, prepare_active_lists, record_active_lists};
+use super::composite::{CaptureShaders, CompositePipeline};
 use super::draw::{CaptureSystems, draw_captures};
-use super::extract::{ExtractedCaptures, extract_captures};
+use super::extract::{ExtractedCaptures, ExtractedViewSettings, extract_captures, extract_view_settings};
 use super::prepare::{CaptureViews, init_renderer, make_depth_readable, prepare_views};
-use super::upload::GpuGaussianCapture;
-use crate::asset::{CheckpointLoader, GaussianCapture, PackageLoader};
+use super::statistics::{CaptureStatistics, publish_statistics};
+use super::upload::{GpuGaussianCapture, UploadFailures, report_upload_failures};
+use super::visibility::update_bounds;
+use super::write_depth::WriteDepthPipeline;
+use crate::asset::{CaptureFailed, CheckpointLoader, GaussianCapture, PackageLoader};
 use crate::playback::PlaybackPlugin;
-use bevy::app::{App, Plugin};
+use bevy::app::{App, Plugin, PostUpdate, PreUpdate};
 use bevy::asset::{AssetApp, Assets};
+use bevy::camera::visibility::VisibilitySystems;
 use bevy::core_pipeline::core_3d::{main_opaque_pass_3d, main_transparent_pass_3d};
-use bevy::core_pipeline::schedule::{Core3d, Core3dSystems};
+use bevy::core_pipeline::schedule::{Core3d, Core3dSystems, camera_driver};
 use bevy::ecs::schedule::IntoScheduleConfigs;
 use bevy::render::render_asset::RenderAssetPlugin;
 use bevy::render::render_resource::SpecializedRenderPipelines;
+use bevy::render::renderer::{RenderGraph, RenderGraphSystems};
 use bevy::render::{ExtractSchedule, GpuResourceAppExt, Render, RenderApp, RenderStartup, RenderSystems};
 use bevy::shader::Shader;
 
@@ -30,36 +36,68 @@ impl Plugin for GaussianCapturePlugin {
         app.init_asset::<GaussianCapture>()
             .init_asset_loader::<PackageLoader>()
             .init_asset_loader::<CheckpointLoader>()
-            .add_plugins((PlaybackPlugin, RenderAssetPlugin::<GpuGaussianCapture>::default()));
-
-        let Some(mut shaders) = app.world_mut().get_resource_mut::<Assets<Shader>>() else { return };
-        let source = include_str!("../../shaders/composite.wgsl");
-        let shader = shaders.add(Shader::from_wgsl(source, "bevy_gs4d/shaders/composite.wgsl"));
-        let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
-        render_app
-            .insert_resource(CompositeShader(shader))
-            .init_resource::<ExtractedCaptures>()
-            // Made again when a lost device comes back: everything on the GPU hangs on these.
-            .init_gpu_resource::<CompositePipeline>()
-            .init_gpu_resource::<SpecializedRenderPipelines<CompositePipeline>>()
-            .init_gpu_resource::<CaptureViews>()
-            .add_systems(RenderStartup, init_renderer)
-            .add_systems(ExtractSchedule, extract_captures)
-            .add_systems(
-                Render,
-                (
-                    make_depth_readable.in_set(RenderSystems::PrepareViews),
-                    prepare_views.in_set(RenderSystems::PrepareBindGroups),
-                ),
-            )
-            .add_systems(
-                Core3d,
-                (
-                    draw_captures::<false>.after(main_opaque_pass_3d).before(main_transparent_pass_3d),
-                    draw_captures::<true>.after(main_transparent_pass_3d),
-                )
-                    .in_set(CaptureSystems::Draw)
-                    .in_set(Core3dSystems::MainPass),
-            );
+            .add_message::<CaptureFailed>()
+            .init_resource::<CaptureStatistics>()
+            .init_resource::<UploadFailures>()
+            .add_plugins((PlaybackPlugin, RenderAssetPlugin::<GpuGaussianCapture>::default()))
+            .add_systems(PreUpdate, report_upload_failures)
+            .add_systems(PostUpdate, update_bounds.in_set(VisibilitySystems::CalculateBounds));
+        build_rendering(app);
     }
+}
+
+/// What runs in the render world, if there is one.
+fn build_rendering(app: &mut App) {
+    let statistics = app.world().resource::<CaptureStatistics>().clone();
+    let failures = app.world().resource::<UploadFailures>().clone();
+    if app.get_sub_app(RenderApp).is_none() {
+        statistics.set_renderer_missing(Some("this app has no renderer: add Bevy's RenderPlugin".into()));
+        return;
+    }
+    let Some(shaders) = add_shaders(app) else { return };
+    let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
+    render_app
+        .insert_resource(shaders)
+        .insert_resource(statistics)
+        .insert_resource(failures)
+        .init_resource::<ExtractedCaptures>()
+        .init_resource::<ExtractedViewSettings>()
+        // Made again when a lost device comes back: everything on the GPU hangs on these.
+        .init_gpu_resource::<CompositePipeline>()
+        .init_gpu_resource::<SpecializedRenderPipelines<CompositePipeline>>()
+        .init_gpu_resource::<WriteDepthPipeline>()
+        .init_gpu_resource::<SpecializedRenderPipelines<WriteDepthPipeline>>()
+        .init_gpu_resource::<CaptureViews>()
+        .init_gpu_resource::<ActiveLists>()
+        .add_systems(RenderStartup, init_renderer)
+        .add_systems(ExtractSchedule, (extract_captures, extract_view_settings))
+        .add_systems(
+            Render,
+            (
+                make_depth_readable.in_set(RenderSystems::PrepareViews),
+                prepare_active_lists.in_set(RenderSystems::PrepareResources),
+                (prepare_views, publish_statistics).chain().in_set(RenderSystems::PrepareBindGroups),
+            ),
+        )
+        // Recorded before the first camera, and so submitted before it.
+        .add_systems(RenderGraph, record_active_lists.in_set(RenderGraphSystems::Render).before(camera_driver))
+        .add_systems(
+            Core3d,
+            (
+                draw_captures::<false>.after(main_opaque_pass_3d).before(main_transparent_pass_3d),
+                draw_captures::<true>.after(main_transparent_pass_3d),
+            )
+                .in_set(CaptureSystems::Draw)
+                .in_set(Core3dSystems::MainPass),
+        );
+}
+
+/// The passes that go through Bevy's pipeline cache.
+fn add_shaders(app: &mut App) -> Option<CaptureShaders> {
+    let mut shaders = app.world_mut().get_resource_mut::<Assets<Shader>>()?;
+    let mut add = |source: &'static str, path: &str| shaders.add(Shader::from_wgsl(source, path));
+    Some(CaptureShaders {
+        composite: add(include_str!("../../shaders/composite.wgsl"), "bevy_gs4d/shaders/composite.wgsl"),
+        write_depth: add(include_str!("../../shaders/write_depth.wgsl"), "bevy_gs4d/shaders/write_depth.wgsl"),
+    })
 }

@@ -1,29 +1,34 @@
 //! Prepare: for each camera, the captures it sees and the renderer's working buffers.
 //!
-//! In: [`ExtractedCaptures`], Bevy's extracted cameras and their depth textures. Out: [`CaptureViews`], with everything written that
-//! drawing needs. In the steady state nothing is created on the GPU.
+//! In: [`ExtractedCaptures`], Bevy's extracted cameras with what they see and their depth textures. Out: [`CaptureViews`], with
+//! everything written that drawing needs. In the steady state nothing is created on the GPU.
 
+use super::active::ActiveLists;
 use super::composite::{CompositeBindings, CompositeKey, CompositePipeline};
-use super::extract::ExtractedCaptures;
+use super::extract::{ExtractedCaptures, ExtractedViewSettings};
+use super::statistics::CaptureStatistics;
 use super::upload::GpuGaussianCapture;
 use super::view::Lens;
+use super::write_depth::{WriteDepthBindings, WriteDepthKey, WriteDepthPipeline};
+use super::{CaptureViewSettings, DepthWrite, GaussianCapture3d};
 use crate::asset::GaussianCapture;
-use crate::frame::Background;
-use crate::gaussian::View;
-use crate::gpu::{Instance, OpaqueDepth, Renderer, ShaderChecks, ViewRenderer};
+use crate::frame::{Background, DebugView};
+use crate::gaussian::{Look, View};
+use crate::gpu::{Instance, OpaqueDepth, Renderer, ShaderChecks, Surroundings, ViewRenderer};
 use bevy::asset::AssetId;
 use bevy::camera::{Camera3d, CompositingSpace};
 use bevy::ecs::entity::Entity;
 use bevy::ecs::query::With;
 use bevy::ecs::resource::Resource;
-use bevy::ecs::system::{Commands, Query, Res, ResMut};
+use bevy::ecs::system::{Commands, Query, Res, ResMut, SystemParam};
 use bevy::log::{error, error_once, warn_once};
 use bevy::platform::collections::HashMap;
 use bevy::render::camera::ExtractedCamera;
 use bevy::render::render_asset::RenderAssets;
 use bevy::render::render_resource::{CachedRenderPipelineId, PipelineCache, SpecializedRenderPipelines, TextureUsages};
 use bevy::render::renderer::{RenderDevice, RenderQueue};
-use bevy::render::view::{ExtractedView, Msaa, ViewDepthTexture};
+use bevy::render::sync_world::MainEntity;
+use bevy::render::view::{ExtractedView, Msaa, RenderVisibleEntities, ViewDepthTexture};
 use glam::UVec2;
 
 /// The renderer's pipelines; absent where this GPU cannot run them.
@@ -36,115 +41,200 @@ pub(super) struct CaptureViews(pub(super) HashMap<Entity, CaptureView>);
 
 /// State of one camera.
 pub(super) struct CaptureView {
+    /// The camera's entity in the main world.
+    pub(super) camera: Entity,
     pub(super) renderer: ViewRenderer,
+    /// The composite into the camera's target, and what it binds.
+    pub(super) composite: CachedRenderPipelineId,
     pub(super) bindings: CompositeBindings,
-    /// The composite pipeline for the camera's target.
-    pub(super) pipeline: CachedRenderPipelineId,
+    /// Writing to the camera's depth buffer, if it is wanted, and what that binds.
+    pub(super) write_depth: Option<CachedRenderPipelineId>,
+    pub(super) depth_bindings: WriteDepthBindings,
+    measured: bool,
     /// What it sees this frame; nothing is drawn where this is empty.
     drawn: Vec<Drawn>,
 }
 
 /// One capture, seen by one camera.
 struct Drawn {
+    entity: MainEntity,
     asset: AssetId<GaussianCapture>,
     view: View,
+    look: Look,
     filtered: bool,
 }
 
+/// What there is to be seen.
+#[derive(SystemParam)]
+pub(super) struct Scene<'w> {
+    extracted: Res<'w, ExtractedCaptures>,
+    settings: Res<'w, ExtractedViewSettings>,
+    captures: Res<'w, RenderAssets<GpuGaussianCapture>>,
+    lists: Res<'w, ActiveLists>,
+}
+
+/// The pipelines that depend on a camera's target.
+#[derive(SystemParam)]
+pub(super) struct Pipelines<'w> {
+    cache: Res<'w, PipelineCache>,
+    composite: Res<'w, CompositePipeline>,
+    composites: ResMut<'w, SpecializedRenderPipelines<CompositePipeline>>,
+    write_depth: Res<'w, WriteDepthPipeline>,
+    depth_writers: ResMut<'w, SpecializedRenderPipelines<WriteDepthPipeline>>,
+}
+
 impl CaptureView {
+    fn new(device: &RenderDevice, camera: Entity, composite: CachedRenderPipelineId) -> Self {
+        Self {
+            camera,
+            renderer: ViewRenderer::new(device.wgpu_device()),
+            composite,
+            bindings: CompositeBindings::default(),
+            write_depth: None,
+            depth_bindings: WriteDepthBindings::default(),
+            measured: false,
+            drawn: Vec::new(),
+        }
+    }
+
+    /// Whether it draws anything this frame.
+    pub(super) fn sees_something(&self) -> bool {
+        !self.drawn.is_empty()
+    }
+
     /// What is drawn this frame, in the renderer's terms.
-    pub(super) fn instances<'a>(&self, captures: &'a RenderAssets<GpuGaussianCapture>) -> Vec<Instance<'a>> {
+    pub(super) fn instances<'a>(
+        &self,
+        captures: &'a RenderAssets<GpuGaussianCapture>,
+        lists: &'a ActiveLists,
+    ) -> Vec<Instance<'a>> {
         let instance = |drawn: &Drawn| {
             let capture = captures.get(drawn.asset)?.capture()?;
-            Some(Instance { capture, view: drawn.view, filtered: drawn.filtered })
+            let list = if drawn.filtered { lists.0.get(&drawn.entity) } else { None };
+            Some(Instance { capture, active: list.map(|placed| &placed.list), view: drawn.view, look: drawn.look })
         };
         self.drawn.iter().filter_map(instance).collect()
     }
 
-    /// Collects what this camera sees.
-    fn look(
-        &mut self,
-        lens: &Lens,
-        view: &ExtractedView,
-        extracted: &ExtractedCaptures,
-        captures: &RenderAssets<GpuGaussianCapture>,
-    ) {
+    /// Collects what this camera sees, in the order of Bevy's list, which is always the same.
+    fn look(&mut self, lens: &Lens, view: &ExtractedView, visible: &RenderVisibleEntities, scene: &Scene<'_>) {
         let size = UVec2::new(view.viewport.z, view.viewport.w);
         let camera = view.world_from_view.affine();
-        let is_uploaded =
-            |asset: AssetId<GaussianCapture>| captures.get(asset).is_some_and(|capture| capture.capture().is_some());
-        self.drawn.extend(extracted.0.iter().filter(|capture| is_uploaded(capture.asset)).filter_map(|capture| {
-            let view = lens.view(size, capture.time, camera, capture.world_from_capture)?;
-            Some(Drawn { asset: capture.asset, view, filtered: capture.filtered })
+        let Some(visible) = visible.get::<GaussianCapture3d>() else { return };
+        self.drawn.extend(visible.iter_visible().filter_map(|(_, entity)| {
+            let placed = scene.extracted.0.get(entity)?;
+            scene.captures.get(placed.asset)?.capture()?;
+            let view = lens.view(size, placed.time, camera, placed.world_from_capture)?;
+            let (asset, look, filtered) = (placed.asset, placed.look, placed.filtered);
+            Some(Drawn { entity: *entity, asset, view, look, filtered })
         }));
+    }
+
+    fn measure(&mut self, on: bool, device: &RenderDevice, queue: &RenderQueue) {
+        if self.measured != on {
+            self.measured = on;
+            self.renderer.measure(device.wgpu_device(), queue, on);
+        }
+    }
+}
+
+impl Pipelines<'_> {
+    fn composite(
+        &mut self,
+        view: &ExtractedView,
+        camera: &ExtractedCamera,
+        settings: CaptureViewSettings,
+    ) -> CachedRenderPipelineId {
+        let encoded = camera.compositing_space == Some(CompositingSpace::Srgb);
+        let key = CompositeKey { format: view.target_format, encoded, blend_space: settings.blend_space };
+        self.composites.specialize(&self.cache, &self.composite, key)
+    }
+
+    fn write_depth(&mut self, msaa: Msaa, median: bool) -> CachedRenderPipelineId {
+        let key = WriteDepthKey { samples: msaa.samples(), median };
+        self.depth_writers.specialize(&self.cache, &self.write_depth, key)
     }
 }
 
 /// Compiles the renderer's pipelines; shaders check their bounds in debug builds.
-pub(super) fn init_renderer(mut commands: Commands, device: Res<RenderDevice>) {
+pub(super) fn init_renderer(mut commands: Commands, device: Res<RenderDevice>, statistics: Res<CaptureStatistics>) {
     let checks = if cfg!(debug_assertions) { ShaderChecks::On } else { ShaderChecks::Off };
     match Renderer::new(device.wgpu_device(), checks) {
-        Ok(renderer) => commands.insert_resource(CaptureRenderer(renderer)),
+        Ok(renderer) => {
+            statistics.set_renderer_missing(None);
+            commands.insert_resource(CaptureRenderer(renderer));
+        }
         Err(failure) => {
             error!("captures are not drawn: {failure}");
+            statistics.set_renderer_missing(Some(failure.to_string()));
             commands.remove_resource::<CaptureRenderer>();
         }
     }
 }
 
 /// Lets the renderer read the depth of opaque meshes.
-pub(super) fn make_depth_readable(mut cameras: Query<(&mut Camera3d, &Msaa)>) {
-    for (mut camera, msaa) in &mut cameras {
-        if *msaa == Msaa::Off {
-            camera.depth_texture_usages.0 |= TextureUsages::TEXTURE_BINDING.bits();
-        }
+pub(super) fn make_depth_readable(mut cameras: Query<&mut Camera3d>) {
+    for mut camera in &mut cameras {
+        camera.depth_texture_usages.0 |= TextureUsages::TEXTURE_BINDING.bits();
     }
 }
 
-type CameraView = (Entity, &'static ExtractedView, &'static ExtractedCamera, &'static ViewDepthTexture, &'static Msaa);
+type CameraView = (
+    Entity,
+    &'static ExtractedView,
+    &'static ExtractedCamera,
+    &'static ViewDepthTexture,
+    &'static Msaa,
+    &'static RenderVisibleEntities,
+);
 
 pub(super) fn prepare_views(
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
     renderer: Option<Res<CaptureRenderer>>,
-    extracted: Res<ExtractedCaptures>,
-    captures: Res<RenderAssets<GpuGaussianCapture>>,
-    composite: Res<CompositePipeline>,
-    pipelines: Res<PipelineCache>,
-    mut specialized: ResMut<SpecializedRenderPipelines<CompositePipeline>>,
+    scene: Scene,
+    mut pipelines: Pipelines,
+    statistics: Res<CaptureStatistics>,
     mut views: ResMut<CaptureViews>,
     cameras: Query<CameraView, With<Camera3d>>,
 ) {
     let Some(renderer) = renderer else { return };
+    let measure = statistics.is_measuring();
     views.0.retain(|&camera, _| cameras.contains(camera));
-    for (entity, view, camera, depth, &msaa) in &cameras {
-        let encoded = camera.compositing_space == Some(CompositingSpace::Srgb);
-        let key = CompositeKey { format: view.target_format, encoded };
+    for (entity, view, camera, depth, &msaa, visible) in &cameras {
+        let main = view.retained_view_entity.main_entity;
+        let settings = scene.settings.0.get(&main).copied().unwrap_or_default();
         // Before there is anything to draw: it is compiled while captures load.
-        let pipeline = specialized.specialize(&pipelines, &composite, key);
-        let state = views.0.entry(entity).or_insert_with(|| CaptureView {
-            renderer: ViewRenderer::new(device.wgpu_device()),
-            bindings: CompositeBindings::default(),
-            pipeline,
-            drawn: Vec::new(),
-        });
-        state.pipeline = pipeline;
+        let composite = pipelines.composite(view, camera, settings);
+        let state = views.0.entry(entity).or_insert_with(|| CaptureView::new(&device, main.id(), composite));
+        state.composite = composite;
+        state.measure(measure, &device, &queue);
         state.drawn.clear();
         let Some(lens) = drawable_lens(view, camera) else { continue };
-        state.look(&lens, view, &extracted, &captures);
+        state.look(&lens, view, visible, &scene);
         if state.drawn.is_empty() {
             continue;
         }
         state.bindings.set_viewport(view.viewport, &device, &queue);
-        let opaque = opaque_depth(&lens, view, depth, msaa);
-        let instances = state.instances(&captures);
+        let instances = state.instances(&scene.captures, &scene.lists);
         let surrounded = instances.iter().any(|instance| instance.capture.has_environment());
-        let background = if surrounded { Background::Environment } else { Background::None };
-        let prepared =
-            state.renderer.prepare(device.wgpu_device(), &queue, &renderer.0, &instances, background, opaque);
+        let surroundings = Surroundings {
+            background: if surrounded { Background::Environment } else { Background::None },
+            opaque: opaque_depth(&lens, view, depth, msaa),
+            blend_space: settings.blend_space,
+            debug: settings.debug,
+        };
+        let prepared = state.renderer.prepare(device.wgpu_device(), &queue, &renderer.0, &instances, &surroundings);
         if let Err(failure) = prepared {
             error_once!("captures are not drawn: {failure}");
             state.drawn.clear();
+        }
+        // Expected depths are divided by the captures' opacity, which a map around them and overdraw hide.
+        let median = settings.depth == DepthWrite::Median || surrounded || settings.debug == DebugView::Overdraw;
+        let distance = lens.distance.filter(|_| settings.depth != DepthWrite::None);
+        state.write_depth = distance.map(|_| pipelines.write_depth(msaa, median));
+        if let Some(distance) = distance {
+            state.depth_bindings.set_distance(distance, &device, &queue);
         }
     }
 }
@@ -156,8 +246,16 @@ fn drawable_lens(view: &ExtractedView, camera: &ExtractedCamera) -> Option<Lens>
         return None;
     }
     let lens = Lens::of(&view.clip_from_view);
-    if lens.is_none() {
-        warn_once!("captures are drawn for perspective cameras only, not for orthographic, skewed or mirrored ones");
+    match &lens {
+        None => warn_once!(
+            "captures are not drawn for a camera whose projection is skewed, mirrored or not reversed in depth: use Bevy's \
+             perspective or orthographic projection, or Projection::custom with a matrix like theirs"
+        ),
+        Some(lens) if lens.distance.is_none() => warn_once!(
+            "captures are drawn over meshes, not behind them, and write no depth, for a camera with its own near clip plane: \
+             leave PerspectiveProjection::near_clip_plane as it is, or draw captures with another camera"
+        ),
+        Some(_) => {}
     }
     lens
 }
@@ -169,17 +267,17 @@ fn opaque_depth<'a>(
     depth: &'a ViewDepthTexture,
     msaa: Msaa,
 ) -> Option<OpaqueDepth<'a>> {
-    if msaa != Msaa::Off {
-        warn_once!("captures are drawn over meshes, not behind them, for a multisampled camera: add Msaa::Off to it");
-        return None;
-    }
-    let Some(near) = lens.near else {
-        warn_once!("captures are drawn over meshes, not behind them, for a camera with its own near clip plane");
-        return None;
-    };
-    // Another camera on the same target may have made the texture without it.
+    // Another plugin may have made the texture.
     if !depth.texture.usage().contains(TextureUsages::TEXTURE_BINDING) {
+        warn_once!(
+            "captures are drawn over meshes: a camera's depth texture cannot be read; add TEXTURE_BINDING to it"
+        );
         return None;
     }
-    Some(OpaqueDepth { texture: depth.view(), origin: UVec2::new(view.viewport.x, view.viewport.y), near })
+    Some(OpaqueDepth {
+        texture: depth.view(),
+        samples: msaa.samples(),
+        origin: UVec2::new(view.viewport.x, view.viewport.y),
+        distance: lens.distance?.to_array(),
+    })
 }

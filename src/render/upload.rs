@@ -1,17 +1,22 @@
 //! Upload: from a loaded capture to its buffers on the GPU, once per asset (and again when it changes or the device was lost).
 //!
-//! In: [`GaussianCapture`]. Out: [`GpuGaussianCapture`] in `RenderAssets`.
+//! In: [`GaussianCapture`]. Out: [`GpuGaussianCapture`] in `RenderAssets`; what could not be uploaded is told to the game.
 
+use super::GaussianCapture3d;
 use super::prepare::CaptureRenderer;
-use crate::asset::GaussianCapture;
+use crate::asset::{CaptureFailed, CaptureState, GaussianCapture};
 use crate::gpu::GpuCapture;
 use bevy::asset::{AssetId, AssetServer};
-use bevy::ecs::system::{SystemParamItem, lifetimeless::SRes};
+use bevy::ecs::entity::Entity;
+use bevy::ecs::message::MessageWriter;
+use bevy::ecs::resource::Resource;
+use bevy::ecs::system::{Commands, Query, Res, SystemParamItem, lifetimeless::SRes};
 use bevy::log::{error, warn};
 use bevy::render::render_asset::{PrepareAssetError, RenderAsset};
 use bevy::render::renderer::{RenderDevice, RenderQueue};
+use std::sync::{Arc, Mutex, PoisonError};
 
-/// A capture on the GPU; empty where it could not be uploaded, which has been logged.
+/// A capture on the GPU; empty where it could not be uploaded, which has been logged and told.
 pub struct GpuGaussianCapture(Option<GpuCapture>);
 
 impl GpuGaussianCapture {
@@ -21,9 +26,42 @@ impl GpuGaussianCapture {
     }
 }
 
+/// Uploads that failed, on their way to the main world. Both worlds share it.
+#[derive(Resource, Debug, Clone, Default)]
+pub struct UploadFailures(Arc<Mutex<Vec<(AssetId<GaussianCapture>, String)>>>);
+
+impl UploadFailures {
+    fn push(&self, capture: AssetId<GaussianCapture>, error: String) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push((capture, error));
+    }
+
+    fn take(&self) -> Vec<(AssetId<GaussianCapture>, String)> {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+/// Tells every entity whose capture could not be uploaded.
+pub(super) fn report_upload_failures(
+    failures: Res<UploadFailures>,
+    mut captures: Query<(Entity, &GaussianCapture3d, &mut CaptureState)>,
+    mut messages: MessageWriter<CaptureFailed>,
+    mut commands: Commands,
+) {
+    for (failed, error) in failures.take() {
+        for (entity, capture, mut state) in &mut captures {
+            if capture.0.id() == failed {
+                *state = CaptureState::Failed(error.clone());
+                messages.write(CaptureFailed { entity, error: error.clone() });
+                commands.trigger(CaptureFailed { entity, error: error.clone() });
+            }
+        }
+    }
+}
+
 impl RenderAsset for GpuGaussianCapture {
     type SourceAsset = GaussianCapture;
-    type Param = (SRes<RenderDevice>, SRes<RenderQueue>, SRes<AssetServer>, Option<SRes<CaptureRenderer>>);
+    type Param =
+        (SRes<RenderDevice>, SRes<RenderQueue>, SRes<AssetServer>, SRes<UploadFailures>, Option<SRes<CaptureRenderer>>);
 
     fn byte_len(source: &GaussianCapture) -> Option<usize> {
         let scene = source.scene();
@@ -33,7 +71,7 @@ impl RenderAsset for GpuGaussianCapture {
     fn prepare_asset(
         source: GaussianCapture,
         id: AssetId<GaussianCapture>,
-        (device, queue, assets, renderer): &mut SystemParamItem<Self::Param>,
+        (device, queue, assets, failures, renderer): &mut SystemParamItem<Self::Param>,
         _previous: Option<&Self>,
     ) -> Result<Self, PrepareAssetError<GaussianCapture>> {
         // Without a renderer there is nothing to upload for; why there is none has been logged.
@@ -50,6 +88,7 @@ impl RenderAsset for GpuGaussianCapture {
             Ok(capture) => Ok(Self(Some(capture))),
             Err(failure) => {
                 error!("{}: not drawn: {failure}", name());
+                failures.push(id, failure.to_string());
                 Ok(Self(None))
             }
         }

@@ -1,9 +1,18 @@
-//! Where a capture is: a box about its Gaussians over a stretch of time.
+//! Where a capture is: boxes about its Gaussians, over all of its time and over stretches of it.
 //!
-//! In: runtime Gaussians. Out: [`Bounds`] in capture space.
+//! In: runtime Gaussians. Out: [`Bounds`] and [`BoundsOverTime`] in capture space.
 
 use crate::gaussian::Gaussian;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+
+/// Stretches of time that have a box each.
+const STRETCHES: usize = 32;
+/// The marginal falls to its cut-off of 0.05 at sqrt(−2 ln 0.05) = 2.4477 σ_t.
+const LIFESPAN: f64 = 2.4478;
+/// Part by which boxes are larger than the numbers say: more than drawing loses by computing in `f32`.
+const ROUNDING: f64 = 1e-6;
+/// What is as near as this to the border between two stretches, in stretches, belongs to both.
+const BORDER: f64 = 1e-6;
 
 /// An axis-aligned box in capture space.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,26 +25,9 @@ pub struct Bounds {
 
 impl Bounds {
     /// The box that holds three standard deviations of every Gaussian wherever it is drawn within `interval`; nothing for an
-    /// empty scene.
+    /// empty scene. A Gaussian that cannot be drawn ([`Gaussian::check`]) does not count.
     pub fn of(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2]) -> Option<Self> {
-        // The marginal falls to its cut-off of 0.05 at sqrt(−2 ln 0.05) = 2.4477 σ_t.
-        const LIFESPAN: f32 = 2.4478;
-        let mut bounds: Option<Self> = None;
-        for gaussian in gaussians {
-            let lifespan = LIFESPAN * gaussian.sigma_t;
-            let first = interval[0].max(gaussian.mean_t - lifespan);
-            let last = interval[1].min(gaussian.mean_t + lifespan);
-            if first > last {
-                continue;
-            }
-            let [xx, _, _, yy, _, zz] = gaussian.covariance;
-            let reach = 3.0 * Vec3::new(xx, yy, zz).max(Vec3::ZERO).map(f32::sqrt);
-            for end in [gaussian.mean_at(first), gaussian.mean_at(last)] {
-                let grown = Self { min: end - reach, max: end + reach };
-                bounds = Some(bounds.map_or(grown, |b| b.union(grown)));
-            }
-        }
-        bounds
+        BoundsOverTime::with_stretches(gaussians, interval, 1).map(|bounds| bounds.whole)
     }
 
     /// The box about the middle nine tenths of the means, each at its own temporal mean, along each axis: where to look, without
@@ -68,5 +60,270 @@ impl Bounds {
     /// Half its diagonal.
     pub fn radius(self) -> f32 {
         (self.max - self.min).length() * 0.5
+    }
+
+    /// The box of `factor` times the size about the same centre.
+    pub fn scaled(self, factor: f32) -> Self {
+        let (center, half) = (self.center(), (self.max - self.min) * (0.5 * factor));
+        Self { min: center - half, max: center + half }
+    }
+
+    /// Where a ray comes in, in lengths of `direction` from `origin`: 0 if it starts inside, nothing if it passes by.
+    pub fn entry(self, origin: Vec3, direction: Vec3) -> Option<f32> {
+        let (mut from, mut to) = (0.0f32, f32::INFINITY);
+        for axis in 0..3 {
+            if direction[axis] == 0.0 {
+                if origin[axis] < self.min[axis] || origin[axis] > self.max[axis] {
+                    return None;
+                }
+                continue;
+            }
+            let [a, b] = [self.min[axis], self.max[axis]].map(|side| (side - origin[axis]) / direction[axis]);
+            from = from.max(a.min(b));
+            to = to.min(a.max(b));
+        }
+        (from <= to).then_some(from)
+    }
+}
+
+/// The boxes of a capture over equal stretches of its time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BoundsOverTime {
+    interval: [f32; 2],
+    /// One box each; nothing where nothing is drawn. At least one.
+    stretches: Vec<Option<Bounds>>,
+    whole: Bounds,
+}
+
+impl BoundsOverTime {
+    /// The boxes that hold three standard deviations of every Gaussian wherever it is drawn, for 32 stretches of `interval` (one, if
+    /// the interval has no length); nothing for a scene of which nothing is drawn. A Gaussian that cannot be drawn
+    /// ([`Gaussian::check`]) does not count.
+    pub fn of(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2]) -> Option<Self> {
+        Self::with_stretches(gaussians, interval, STRETCHES)
+    }
+
+    fn with_stretches(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2], stretches: usize) -> Option<Self> {
+        let count = if interval[0] < interval[1] { stretches } else { 1 };
+        let mut extents = vec![Extent::EMPTY; count];
+        for gaussian in gaussians.filter(|gaussian| gaussian.check().is_ok()) {
+            cover(&mut extents, &gaussian, interval.map(f64::from));
+        }
+        let stretches: Vec<_> = extents.into_iter().map(Extent::bounds).collect();
+        let whole = stretches.iter().flatten().copied().reduce(Bounds::union)?;
+        Some(Self { interval, stretches, whole })
+    }
+
+    /// The box about everything that is drawn at any time.
+    pub fn whole(&self) -> Bounds {
+        self.whole
+    }
+
+    /// The box about everything that is drawn in the stretch that holds `time`, a timestamp of the capture (about both at a border);
+    /// nothing where nothing is drawn. What lies outside the interval counts as its nearer end.
+    pub fn at(&self, time: f32) -> Option<Bounds> {
+        let [start, end] = self.interval.map(f64::from);
+        let place = (f64::from(time) - start) / (end - start) * self.stretches.len() as f64;
+        // What is negative or no number becomes 0.
+        let stretch = |place: f64| (place as usize).min(self.stretches.len() - 1);
+        let near = &self.stretches[stretch(place - BORDER)..=stretch(place + BORDER)];
+        near.iter().flatten().copied().reduce(Bounds::union)
+    }
+}
+
+/// Grows the boxes of all stretches in which a Gaussian is drawn. It moves in a straight line: where it is at the ends of its stay
+/// in a stretch says where it is in between.
+fn cover(extents: &mut [Extent], gaussian: &Gaussian, [start, end]: [f64; 2]) {
+    let mean_t = f64::from(gaussian.mean_t);
+    let lifespan = LIFESPAN * f64::from(gaussian.sigma_t);
+    let (first, last) = (start.max(mean_t - lifespan), end.min(mean_t + lifespan));
+    if first > last {
+        return;
+    }
+    let [mean, velocity] = [gaussian.mean, gaussian.velocity].map(|vector| DVec3::from(vector.map(f64::from)));
+    let [xx, _, _, yy, _, zz] = gaussian.covariance.map(f64::from);
+    let reach = 3.0 * DVec3::new(xx, yy, zz).max(DVec3::ZERO).map(f64::sqrt);
+    let farthest = (first - mean_t).abs().max((last - mean_t).abs());
+    let reach = reach + ROUNDING * (mean.abs() + velocity.abs() * farthest + reach);
+    let length = (end - start) / extents.len() as f64;
+    let stretch = |time: f64| (((time - start) / length) as usize).min(extents.len() - 1);
+    let stay = stretch(first)..=stretch(last);
+    for index in stay {
+        let from = first.max(start + index as f64 * length);
+        let to = last.min(start + (index + 1) as f64 * length);
+        for time in [from, to] {
+            extents[index].add(mean + velocity * (time - mean_t), reach);
+        }
+    }
+}
+
+/// A box that grows.
+#[derive(Clone, Copy)]
+struct Extent {
+    min: DVec3,
+    max: DVec3,
+}
+
+impl Extent {
+    const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
+
+    fn add(&mut self, center: DVec3, reach: DVec3) {
+        self.min = self.min.min(center - reach);
+        self.max = self.max.max(center + reach);
+    }
+
+    /// The box, unless nothing is in it. What is farther than `f32` can say is as far as it can.
+    fn bounds(self) -> Option<Bounds> {
+        let said = |corner: DVec3| corner.clamp(DVec3::splat(f32::MIN.into()), DVec3::splat(f32::MAX.into())).as_vec3();
+        (self.min.x <= self.max.x).then(|| Bounds { min: said(self.min), max: said(self.max) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gaussian::MARGINAL_CUTOFF;
+    use proptest::array::uniform3;
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+
+    /// A round Gaussian.
+    fn gaussian(mean: Vec3, velocity: Vec3, mean_t: f32, sigma_t: f32, scale: f32) -> Gaussian {
+        let variance = scale * scale;
+        Gaussian {
+            mean: mean.to_array(),
+            mean_t,
+            velocity: velocity.to_array(),
+            sigma_t,
+            covariance: [variance, 0.0, 0.0, variance, 0.0, variance],
+            opacity: 0.5,
+            padding: 0.0,
+        }
+    }
+
+    /// Runs along x from 0 to 10 within the interval [0, 1].
+    fn runner() -> Gaussian {
+        gaussian(Vec3::new(5.0, 0.0, 0.0), Vec3::new(10.0, 0.0, 0.0), 0.5, f32::INFINITY, 0.01)
+    }
+
+    fn over_time(gaussians: &[Gaussian], interval: [f32; 2]) -> Option<BoundsOverTime> {
+        BoundsOverTime::of(gaussians.iter().copied(), interval)
+    }
+
+    fn holds(outer: Bounds, inner: Bounds) -> bool {
+        outer.min.cmple(inner.min).all() && outer.max.cmpge(inner.max).all()
+    }
+
+    /// Gaussians of all kinds: flashes and some that are always there, at rest and fast, points and large ones.
+    fn any_gaussian() -> impl Strategy<Value = Gaussian> {
+        let lifespan = prop_oneof![1e-6f32..0.01, 0.01f32..3.0, Just(f32::INFINITY)];
+        (uniform3(-50.0f32..50.0), uniform3(-30.0f32..30.0), -1.0f32..2.0, lifespan, 0.0f32..2.0).prop_map(
+            |(mean, velocity, mean_t, sigma_t, scale)| gaussian(mean.into(), velocity.into(), mean_t, sigma_t, scale),
+        )
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 512, failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn what_is_drawn_lies_within_the_box_of_its_time(
+            gaussians in vec(any_gaussian(), 1..12),
+            start in -1.0f32..1.0,
+            span in 0.01f32..4.0,
+            moments in vec(0.0f32..=1.0, 20),
+        ) {
+            let bounds = over_time(&gaussians, [start, start + span]);
+            // The borders between stretches, too.
+            let borders = (0..=STRETCHES).map(|index| index as f32 / STRETCHES as f32);
+            for time in moments.into_iter().chain(borders).map(|moment| start + moment * span) {
+                for gaussian in gaussians.iter().filter(|gaussian| gaussian.marginal(time) > MARGINAL_CUTOFF) {
+                    let (mean, reach) = (gaussian.mean_at(time), 3.0 * gaussian.covariance[0].sqrt());
+                    let drawn = Bounds { min: mean - reach, max: mean + reach };
+                    let bounds = bounds.as_ref().expect("something is drawn");
+                    let now = bounds.at(time).expect("something is drawn now");
+                    prop_assert!(holds(now, drawn), "at {time}, {drawn:?} is not within {now:?}");
+                    prop_assert!(holds(bounds.whole(), now), "nor is the whole less than a part");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_stretch_is_not_the_whole() {
+        let bounds = over_time(&[runner()], [0.0, 1.0]).expect("drawn");
+        assert!(bounds.whole().max.x - bounds.whole().min.x > 10.0, "it runs ten units");
+        for time in [0.0, 0.3, 0.5, 1.0] {
+            let now = bounds.at(time).expect("always there");
+            let [length, most] = [now.max.x - now.min.x, 2.0 * 10.0 / STRETCHES as f32 + 0.07];
+            assert!(length < most, "at {time} the box is {length} long, but two stretches are {most}");
+        }
+        assert_eq!(bounds.at(-9.0), bounds.at(0.0), "before the start is the start");
+        assert_eq!(bounds.at(f32::INFINITY), bounds.at(1.0), "after the end is the end");
+        assert_eq!(bounds.at(f32::NAN), bounds.at(0.0), "no number is the start");
+    }
+
+    #[test]
+    fn at_a_border_both_stretches_count() {
+        let bounds = over_time(&[runner()], [0.0, 1.0]).expect("drawn");
+        let step = 1.0 / STRETCHES as f32;
+        let [before, border, after] = [0.5, 1.0, 1.5].map(|place| bounds.at(place * step).expect("always there"));
+        assert_eq!(border, before.union(after), "the box about both");
+    }
+
+    #[test]
+    fn where_nothing_is_drawn_there_is_no_box() {
+        let flash = gaussian(Vec3::ZERO, Vec3::ZERO, 0.5, 0.01, 0.1);
+        let bounds = over_time(&[flash], [0.0, 1.0]).expect("drawn once");
+        assert_eq!(bounds.at(0.1), None, "before the flash");
+        assert_eq!(bounds.at(0.5), Some(bounds.whole()), "at the flash");
+        assert_eq!(over_time(&[flash], [2.0, 3.0]), None, "never within the interval");
+        assert_eq!(over_time(&[], [0.0, 1.0]), None, "an empty scene");
+    }
+
+    #[test]
+    fn a_still_has_one_stretch() {
+        let bounds = over_time(&[runner()], [0.25, 0.25]).expect("drawn");
+        assert_eq!(bounds.stretches.len(), 1, "an interval without a length");
+        for time in [0.0, 0.25, 1.0] {
+            assert_eq!(bounds.at(time), Some(bounds.whole()), "the same box at {time}");
+        }
+        let [low, high] = [bounds.whole().min.x, bounds.whole().max.x];
+        assert!(low < 2.5 && high > 2.5 && high - low < 0.1, "where it is at that moment: {low} to {high}");
+    }
+
+    #[test]
+    fn poison_does_not_spread() {
+        let good = runner();
+        let expected = over_time(&[good], [0.0, 1.0]);
+        for poison in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let poisoned = [
+                Gaussian { mean: [poison, 0.0, 0.0], ..good },
+                Gaussian { velocity: [0.0, poison, 0.0], ..good },
+                Gaussian { mean_t: poison, ..good },
+                Gaussian { covariance: [poison; 6], ..good },
+                Gaussian { sigma_t: -poison.abs(), ..good },
+            ];
+            for bad in poisoned {
+                assert_eq!(over_time(&[bad, good, bad], [0.0, 1.0]), expected, "as if {bad:?} were not there");
+                assert_eq!(over_time(&[bad], [0.0, 1.0]), None, "alone, nothing is there: {bad:?}");
+            }
+        }
+        let far = Gaussian { velocity: [f32::MAX, f32::MIN, 0.0], ..good };
+        let bounds = over_time(&[far], [0.0, 10.0]).expect("drawn");
+        assert!(bounds.whole().min.is_finite() && bounds.whole().max.is_finite(), "far away is still a number");
+    }
+
+    #[test]
+    fn a_ray_comes_in_where_the_box_begins() {
+        let unit = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
+        let entry = |origin: [f32; 3], direction: [f32; 3]| unit.entry(origin.into(), direction.into());
+        assert_eq!(entry([0.0, 0.0, -5.0], [0.0, 0.0, 2.0]), Some(2.0), "in lengths of the direction");
+        assert_eq!(entry([0.5, 0.5, 0.5], [1.0, 0.0, 0.0]), Some(0.0), "from inside");
+        assert_eq!(entry([0.0, 0.0, 5.0], [0.0, 0.0, 2.0]), None, "behind");
+        assert_eq!(entry([0.0, 1.5, -5.0], [0.0, 0.0, 1.0]), None, "beside, parallel to a side");
+        assert_eq!(entry([-3.0, 0.0, 0.0], [1.0, 1.0, 0.0]), None, "past a corner");
+        assert_eq!(entry([-2.0, -1.0, 0.0], [1.0, 1.0, 0.0]), Some(1.0), "through the next corner");
+        let grown = unit.scaled(2.0);
+        assert_eq!((grown.min, grown.max), (Vec3::splat(-2.0), Vec3::splat(2.0)), "twice the size");
     }
 }

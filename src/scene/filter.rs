@@ -107,6 +107,36 @@ impl TemporalFilter {
         }
     }
 
+    /// How many of the Gaussians `own` are active in each segment; `own` begins at a multiple of 32.
+    pub fn active_counts(&self, own: std::ops::Range<usize>) -> Vec<u32> {
+        match &self.sets {
+            ActiveSets::Bits(bits) => {
+                let words = own.start / 32..own.end.div_ceil(32);
+                let last = u32::MAX >> (own.end.next_multiple_of(32) - own.end);
+                let count = |set: &[u32]| {
+                    let Some((end, whole)) = set[words.clone()].split_last() else { return 0 };
+                    whole.iter().map(|word| word.count_ones()).sum::<u32>() + (end & last).count_ones()
+                };
+                bits.chunks_exact(Self::words(self.count).max(1)).map(count).collect()
+            }
+            ActiveSets::Intervals(intervals) => {
+                let mut steps = vec![0i64; self.segments as usize + 1];
+                for word in &intervals[own] {
+                    let (first, last) = (word & 0xffff, (word >> 16).min(self.segments.saturating_sub(1)));
+                    if first <= last {
+                        steps[first as usize] += 1;
+                        steps[last as usize + 1] -= 1;
+                    }
+                }
+                let running = steps.iter().take(self.segments as usize).scan(0, |sum, step| {
+                    *sum += step;
+                    Some(*sum as u32)
+                });
+                running.collect()
+            }
+        }
+    }
+
     /// Share of active Gaussians, the mean over all segments; 1 for an empty scene.
     pub fn active_share(&self) -> f64 {
         let active: usize = (0..self.segments).map(|s| (0..self.count).filter(|&i| self.is_active(s, i)).count()).sum();
@@ -217,6 +247,12 @@ mod tests {
         assert_eq!(bits.to_bits(), filter.to_bits(), "the same sets");
         let back = TemporalFilter::from_bits(FilterKind::Support, 40, 70, filter.to_bits());
         assert_eq!(back, filter, "intervals are found again");
+        for own in [0..70, 0..64, 64..70, 32..33] {
+            let counts = filter.active_counts(own.clone());
+            let expected = |segment| own.clone().filter(|&i| filter.is_active(segment, i)).count() as u32;
+            assert_eq!(counts, (0..40).map(expected).collect::<Vec<_>>(), "counted one by one, {own:?}");
+            assert_eq!(counts, bits.active_counts(own), "and counted alike");
+        }
         let keep: Vec<u32> = (0..70).step_by(3).collect();
         let (a, b) = (filter.select(&keep), bits.select(&keep));
         assert_eq!(a.to_bits(), b.to_bits(), "selected alike");

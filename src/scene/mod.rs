@@ -7,13 +7,15 @@ mod bounds;
 mod environment;
 mod filter;
 pub mod packed;
+pub mod pick;
 mod provenance;
 pub mod synth;
 
-pub use bounds::Bounds;
+pub use bounds::{Bounds, BoundsOverTime};
 pub use environment::Environment;
 pub use filter::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter, segment_of};
 pub use packed::{CodedColors, PackedScene};
+pub use pick::{Pick, PickSettings};
 pub use provenance::{PlaybackHints, RotationConvention, TrainedCameras, TrainedWith, UpAxis};
 
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Model, Parameters, SliceSettings};

@@ -66,7 +66,7 @@ impl Gpu {
     /// Compiles every entry point of a pass. Its bindings, buffers all of them, are what naga finds.
     pub fn pass(&self, name: &str) -> Pass<'_> {
         let device = &self.0.device;
-        let module = shaders::compose(name, shaders::Storage::Full).expect("the pass composes");
+        let module = shaders::compose(name, &[]).expect("the pass composes");
         let mut resources = Vec::new();
         let mut groups: BTreeMap<u32, Vec<wgpu::BindGroupLayoutEntry>> = BTreeMap::new();
         for (_, variable) in module.global_variables.iter() {

@@ -3,19 +3,21 @@
 //! In: captures with a [`View`](crate::gaussian::View) each, a background, the depth of opaque surfaces. Out: a texture of colour
 //! and transmittance and one of expected depth. [`ViewRenderer::prepare`] sizes and fills, [`ViewRenderer::record`] is the frame.
 
+mod readback;
 mod record;
 mod resources;
 
-use super::capture::{Part, binding_limit};
+use super::capture::binding_limit;
 use super::renderer::Renderer;
-use super::{GpuCapture, GpuError, layout};
-use crate::frame::Background;
-use crate::gaussian::View;
+use super::timing::{PassTime, PassTimer, STRETCHES};
+use super::{ActiveList, GpuCapture, GpuError, ViewStatistics, layout};
+use crate::frame::{Background, BlendSpace, DebugView};
+use crate::gaussian::{Look, View};
 use glam::UVec2;
 use layout::{BLOCK, Counters, DEPTH_STEPS};
-use resources::{Kept, Resources, Sizes, buffer, texture};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use readback::Readback;
+pub(in crate::gpu) use resources::buffer;
+use resources::{Kept, Resources, Sizes, texture};
 use wgpu::{BufferUsages, TextureFormat};
 
 /// A capture in a view. The view includes the transform of the capture and the capture's own time.
@@ -23,27 +25,46 @@ use wgpu::{BufferUsages, TextureFormat};
 pub struct Instance<'a> {
     /// The capture.
     pub capture: &'a GpuCapture,
+    /// Which of its Gaussians are drawn: prepared for the view's time and recorded before the view is; all without a list.
+    pub active: Option<&'a ActiveList>,
     /// Where it is seen from, and when.
     pub view: View,
-    /// Whether its temporal filter is used, if it has one.
-    pub filtered: bool,
+    /// Its opacity, light and crop.
+    pub look: Look,
 }
 
-impl Instance<'_> {
-    fn segment(&self) -> Option<u32> {
-        if self.filtered { self.capture.segment(self.view.time) } else { None }
+/// What is around the captures of a view, and how they are shown.
+#[derive(Debug, Clone, Copy)]
+pub struct Surroundings<'a> {
+    /// What stands behind them.
+    pub background: Background,
+    /// What cuts them. Behind an environment map nothing shows where this is given.
+    pub opaque: Option<OpaqueDepth<'a>>,
+    /// The space in which they are blended.
+    pub blend_space: BlendSpace,
+    /// What is shown of them.
+    pub debug: DebugView,
+}
+
+impl Default for Surroundings<'_> {
+    fn default() -> Self {
+        let (blend_space, debug) = Default::default();
+        Self { background: Background::None, opaque: None, blend_space, debug }
     }
 }
 
 /// The depth of opaque surfaces that cut the splats, pixel by pixel.
 #[derive(Debug, Clone, Copy)]
 pub struct OpaqueDepth<'a> {
-    /// A `Depth32Float` texture, reverse-z with an infinite far plane.
+    /// A `Depth32Float` texture, 0 where nothing is.
     pub texture: &'a wgpu::TextureView,
+    /// Its samples for each pixel. Splats are hidden from as large a share of a pixel as samples are before them.
+    pub samples: u32,
     /// Corner of the view in it, pixels.
     pub origin: UVec2,
-    /// Near plane: `z = near / depth`.
-    pub near: f32,
+    /// From its depth `d` to camera space, `[a, b, c, e]` in `z = (a + b d) / (c + e d)`. Reverse-z with an infinite far plane is
+    /// `[near, 0, 0, 1]`.
+    pub distance: [f32; 4],
 }
 
 /// Working buffers, uniforms and targets of one view.
@@ -53,6 +74,8 @@ pub struct ViewRenderer {
     alignment: u32,
     /// Slots of the frame prepared last.
     slots: u32,
+    /// Whether its opaque depth is multisampled.
+    multisampled: bool,
     /// Pairs that an earlier frame wanted room for.
     pairs_wanted: u32,
     frame: wgpu::Buffer,
@@ -61,22 +84,12 @@ pub struct ViewRenderer {
     arguments: wgpu::Buffer,
     no_depth: wgpu::TextureView,
     no_environment: wgpu::Buffer,
-    readback: CounterReadback,
-    /// What each part of the frame prepared last wants to be active; nothing without a filter.
-    wanted: Vec<Option<Active>>,
-    /// What the lists of active Gaussians hold.
-    activated: Vec<Option<Active>>,
+    readback: Readback,
+    statistics: ViewStatistics,
+    /// Timestamps, while they are wanted and the device has them.
+    timing: Option<(PassTimer, Readback)>,
     /// Everything whose size depends on the view or the captures.
     resources: Option<Resources>,
-}
-
-/// What a list of active Gaussians was made for.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Active {
-    capture: u64,
-    part: usize,
-    segment: u32,
-    first_slot: u32,
 }
 
 /// What a finished frame leaves behind.
@@ -91,28 +104,10 @@ pub(in crate::gpu) struct Finished<'a> {
     pub pairs: u32,
 }
 
-/// The counters of an earlier frame, on their way to the host without anybody waiting.
-#[derive(Debug)]
-struct CounterReadback {
-    buffer: wgpu::Buffer,
-    state: ReadbackState,
-}
-
-#[derive(Debug)]
-enum ReadbackState {
-    /// Free to be copied into.
-    Idle,
-    /// A recorded frame copies into it.
-    Recorded,
-    /// Being mapped; the flag tells when.
-    Mapping(Arc<AtomicBool>),
-}
-
 impl ViewRenderer {
     /// A view without size; [`prepare`](Self::prepare) gives it one.
     pub fn new(device: &wgpu::Device) -> Self {
-        let alignment = device.limits().min_uniform_buffer_offset_alignment.max(size_of::<layout::Instance>() as u32);
-        let alignment = alignment.next_power_of_two();
+        let alignment = alignment_of::<layout::Instance>(device);
         let counters = size_of::<Counters>() as u64;
         let depth = texture(device, "gs4d no depth", UVec2::ONE, TextureFormat::Depth32Float);
         Self {
@@ -125,12 +120,10 @@ impl ViewRenderer {
             arguments: buffer(device, "gs4d arguments", 6 * 4, BufferUsages::STORAGE | BufferUsages::INDIRECT),
             no_depth: depth.create_view(&wgpu::TextureViewDescriptor::default()),
             no_environment: buffer(device, "gs4d no environment", 16, BufferUsages::STORAGE),
-            readback: CounterReadback {
-                buffer: buffer(device, "gs4d counter readback", counters, BufferUsages::MAP_READ),
-                state: ReadbackState::Idle,
-            },
-            wanted: Vec::new(),
-            activated: Vec::new(),
+            readback: Readback::new(device, "gs4d counter readback", counters),
+            statistics: ViewStatistics::default(),
+            timing: None,
+            multisampled: false,
             resources: None,
         }
     }
@@ -138,7 +131,7 @@ impl ViewRenderer {
     /// Sizes buffers for what is to be drawn, growing them also by what earlier frames counted, and writes the uniforms. Call it
     /// before the queue is submitted. In the steady state it creates nothing.
     ///
-    /// All instances must have views of the same size. Behind an environment map nothing shows where `opaque` is given.
+    /// All instances must have views of the same size and lens.
     ///
     /// # Errors
     /// When the picture or a buffer would be larger than the device allows.
@@ -148,12 +141,9 @@ impl ViewRenderer {
         queue: &wgpu::Queue,
         renderer: &Renderer,
         instances: &[Instance<'_>],
-        background: Background,
-        opaque: Option<OpaqueDepth<'_>>,
+        surroundings: &Surroundings<'_>,
     ) -> Result<(), GpuError> {
-        if let Some(counters) = self.readback.poll() {
-            self.make_room(counters.pairs_wanted);
-        }
+        self.hear();
         let made = self.resources.as_ref().map(|resources| resources.sizes).unwrap_or_default();
         let picture = instances.first().map_or(made.picture.max(UVec2::ONE), |instance| instance.view.size);
         let limits = device.limits();
@@ -178,24 +168,26 @@ impl ViewRenderer {
             picture,
         };
         let environment = instances.iter().find_map(|i| Some((i, i.capture.environment.as_ref()?)));
+        let opaque = surroundings.opaque.filter(|opaque| opaque.samples > 0);
+        self.multisampled = opaque.is_some_and(|opaque| opaque.samples > 1);
         let opaque_view = opaque.map_or(&self.no_depth, |depth| depth.texture).clone();
         let environment_buffer = environment.map_or(&self.no_environment, |(_, map)| &map.buffer).clone();
         let stale = self.resources.as_ref().is_none_or(|made| {
-            made.sizes != sizes || made.opaque != opaque_view || made.environment != environment_buffer
+            made.sizes != sizes
+                || made.multisampled != self.multisampled
+                || made.opaque != opaque_view
+                || made.environment != environment_buffer
         });
         if stale {
             self.resources = Some(self.make(device, queue, renderer, sizes, opaque_view, environment_buffer));
-            self.activated.clear();
         }
-        self.slots = slots;
-        self.want_active(instances);
-        self.write_uniforms(queue, instances, background, opaque.as_ref(), environment.map(|(i, m)| (i.view, m.size)));
+        let active = |i: &Instance<'_>| (0..i.capture.parts.len()).map(|at| i.capture.drawn(at, i.active)).sum::<u32>();
+        self.slots = instances.iter().map(active).sum();
+        self.statistics.bytes = self.resources.as_ref().map_or(0, |made| made.bytes);
+        self.statistics.total = slots;
+        self.statistics.active = self.slots;
+        self.write_uniforms(queue, instances, surroundings, environment.map(|(i, m)| (i.view, m.size)));
         Ok(())
-    }
-
-    /// Records the frame: one compute pass, in the order of the table in [`crate::gpu`].
-    pub fn record(&mut self, renderer: &Renderer, encoder: &mut wgpu::CommandEncoder, instances: &[Instance<'_>]) {
-        self.record_timed(renderer, encoder, instances, None);
     }
 
     /// Colour `C` (premultiplied, in the blend space) and transmittance: `Rgba32Float`. Before the first
@@ -204,9 +196,29 @@ impl ViewRenderer {
         self.resources.as_ref().map(|made| &made.color_view)
     }
 
-    /// Expected depth, not divided by `1 − T`: `R32Float`, camera units.
+    /// Camera-space depth: `Rg32Float`. Red is the expected depth `Σ z α T`, not divided by `1 − T`; green the median depth, that of the
+    /// splat at which T falls to one half or below, 0 where none does.
     pub fn depth(&self) -> Option<&wgpu::TextureView> {
         self.resources.as_ref().map(|made| &made.depth_view)
+    }
+
+    /// Whether GPU time is measured from the next frame on, pass by pass. Results arrive in [`statistics`](Self::statistics) some
+    /// frames later; without timestamps inside passes there are none.
+    pub fn measure(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, on: bool) {
+        if !on {
+            self.timing = None;
+            self.statistics.passes.clear();
+        } else if self.timing.is_none() {
+            self.timing = PassTimer::new(device, queue, true).map(|timer| {
+                let size = timer.resolved().size();
+                (timer, Readback::new(device, "gs4d timestamp readback", size))
+            });
+        }
+    }
+
+    /// Work of the view.
+    pub fn statistics(&self) -> &ViewStatistics {
+        &self.statistics
     }
 
     /// The textures behind [`color`](Self::color) and [`depth`](Self::depth).
@@ -244,17 +256,19 @@ impl ViewRenderer {
         self.resources.as_ref().map_or(0, |made| made.sizes.pairs)
     }
 
-    /// Notes what each part of the frame wants to be active.
-    fn want_active(&mut self, instances: &[Instance<'_>]) {
-        self.wanted.clear();
-        let mut first_slot = 0;
-        for instance in instances {
-            let segment = instance.segment();
-            for (part, Part { count, .. }) in instance.capture.parts.iter().enumerate() {
-                let capture = instance.capture.id;
-                self.wanted.push(segment.map(|segment| Active { capture, part, segment, first_slot }));
-                first_slot += count;
-            }
+    /// Takes in what earlier frames have sent back.
+    fn hear(&mut self) {
+        if let Some(counters) = self.readback.poll() {
+            let counters: Counters = bytemuck::pod_read_unaligned(&counters);
+            self.statistics.visible = counters.visible;
+            self.statistics.pairs = counters.pairs;
+            self.make_room(counters.pairs_wanted);
+        }
+        if let Some((timer, readback)) = &mut self.timing
+            && let Some(timestamps) = readback.poll()
+        {
+            let named = STRETCHES.into_iter().zip(timer.stretches(&timestamps));
+            self.statistics.passes = named.map(|(name, milliseconds)| PassTime { name, milliseconds }).collect();
         }
     }
 
@@ -262,28 +276,33 @@ impl ViewRenderer {
         &self,
         queue: &wgpu::Queue,
         instances: &[Instance<'_>],
-        background: Background,
-        opaque: Option<&OpaqueDepth<'_>>,
+        surroundings: &Surroundings<'_>,
         environment: Option<(View, [u32; 2])>,
     ) {
         let Some(made) = &self.resources else { return };
         let mut slot = 0;
         let mut index = 0;
         for instance in instances {
-            let view = layout::Instance::of_view(&instance.view);
+            let Surroundings { blend_space, debug, .. } = *surroundings;
+            let view = layout::Instance::new(&instance.view, &instance.look, blend_space, debug);
+            let capture = instance.capture.instance(&view);
+            let mut first_listed = 0;
             for (part_index, part) in instance.capture.parts.iter().enumerate() {
-                let segment = instance.segment();
-                let uniform =
-                    layout::Instance { part: index, ..instance.capture.instance(part_index, slot, segment, &view) };
+                let count = instance.capture.drawn(part_index, instance.active);
+                let listed = u32::from(instance.active.is_some());
+                let uniform = layout::Instance { first_slot: slot, count, listed, first_listed, ..capture };
                 let at = u64::from(index * self.alignment);
                 queue.write_buffer(&made.instances, at, bytemuck::bytes_of(&uniform));
-                slot += part.count;
+                slot += count;
+                first_listed += part.count;
                 index += 1;
             }
         }
-        let (mode, color) = match (background, environment) {
+        let (mode, color) = match (surroundings.background, environment) {
             (Background::Color(color), _) => (layout::BACKGROUND_COLOR, color),
-            (Background::Environment, Some(_)) => (layout::BACKGROUND_ENVIRONMENT, [0.0; 3]),
+            (Background::Environment, Some((view, _))) if !view.orthographic => {
+                (layout::BACKGROUND_ENVIRONMENT, [0.0; 3])
+            }
             _ => (layout::BACKGROUND_NONE, [0.0; 3]),
         };
         let (view, environment_size) = environment.unwrap_or_else(|| {
@@ -292,13 +311,14 @@ impl ViewRenderer {
         });
         let to_world = view.world_to_camera.inverse();
         let column = |axis: usize| to_world.col(axis).truncate().extend(view.camera_position[axis]).to_array();
+        let opaque = surroundings.opaque.as_ref();
         let frame = layout::Frame {
             size: made.sizes.picture.to_array(),
             tiles: tiles(made.sizes.picture).to_array(),
             slots: self.slots,
             pair_capacity: made.sizes.pairs,
             background_mode: mode,
-            opaque_near: opaque.map_or(0.0, |depth| depth.near),
+            opaque_samples: opaque.map_or(0, |depth| depth.samples),
             // With opaque depth there is a compositor: it must not see anything behind the map.
             background: [color[0], color[1], color[2], if opaque.is_some() { 0.0 } else { 1.0 }],
             projection: view.projection.to_array(),
@@ -307,34 +327,21 @@ impl ViewRenderer {
             world_z: column(2),
             environment_size,
             opaque_origin: opaque.map_or([0; 2], |depth| depth.origin.to_array()),
+            opaque_distance: opaque.map_or([0.0; 4], |depth| depth.distance),
+            linear: u32::from(surroundings.blend_space == BlendSpace::Linear),
+            debug: layout::debug_mode(surroundings.debug),
+            // Ten near limits, each a fifth of a unit.
+            debug_depth: 10.0 * view.near.max(f32::MIN_POSITIVE),
+            padding: 0,
         };
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
     }
 }
 
-impl CounterReadback {
-    /// Moves on by one state; the counters when they have arrived.
-    fn poll(&mut self) -> Option<Counters> {
-        match &self.state {
-            ReadbackState::Idle => None,
-            ReadbackState::Recorded => {
-                let ready = Arc::new(AtomicBool::new(false));
-                let flag = ready.clone();
-                self.buffer
-                    .slice(..)
-                    .map_async(wgpu::MapMode::Read, move |result| flag.store(result.is_ok(), Ordering::Release));
-                self.state = ReadbackState::Mapping(ready);
-                None
-            }
-            ReadbackState::Mapping(ready) if ready.load(Ordering::Acquire) => {
-                let counters = bytemuck::pod_read_unaligned(&self.buffer.slice(..).get_mapped_range());
-                self.buffer.unmap();
-                self.state = ReadbackState::Idle;
-                Some(counters)
-            }
-            ReadbackState::Mapping(_) => None,
-        }
-    }
+/// Distance between uniforms that are bound at an offset.
+pub(in crate::gpu) fn alignment_of<T>(device: &wgpu::Device) -> u32 {
+    let least = device.limits().min_uniform_buffer_offset_alignment;
+    least.max(size_of::<T>() as u32).next_power_of_two()
 }
 
 /// Pairs that fit one binding.

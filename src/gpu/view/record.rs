@@ -3,12 +3,26 @@
 //! In: a prepared view and the instances it was prepared for. Out: commands.
 
 use super::resources::tile_steps;
-use super::{Instance, ReadbackState, ViewRenderer, tiles};
-use crate::gpu::layout::{BLOCK, Counters, DEPTH_STEPS, DIGITS};
+use super::{Instance, ViewRenderer, tiles};
+use crate::gpu::layout::{BLOCK, DEPTH_STEPS, DIGITS};
 use crate::gpu::renderer::Renderer;
 use crate::gpu::timing::PassTimer;
 
 impl ViewRenderer {
+    /// Records the frame: one compute pass, in the order of the table in [`crate::gpu`].
+    pub fn record(&mut self, renderer: &Renderer, encoder: &mut wgpu::CommandEncoder, instances: &[Instance<'_>]) {
+        let timing = self.timing.take();
+        let timer = timing.as_ref().filter(|(_, readback)| readback.is_idle()).map(|(timer, _)| timer);
+        self.record_timed(renderer, encoder, instances, timer);
+        self.timing = timing.map(|(timer, mut readback)| {
+            if readback.is_idle() {
+                timer.resolve(encoder);
+                readback.copy(encoder, timer.resolved());
+            }
+            (timer, readback)
+        });
+    }
+
     /// Records the frame, with timestamps if a timer is given.
     pub(in crate::gpu) fn record_timed(
         &mut self,
@@ -18,7 +32,6 @@ impl ViewRenderer {
         timer: Option<&PassTimer>,
     ) {
         let Some(made) = &self.resources else { return };
-        self.activated.resize(self.wanted.len(), None);
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                 label: Some("gs4d"),
@@ -30,36 +43,17 @@ impl ViewRenderer {
                 }
             };
 
-            // activate, where the segment is another than before
-            let parts = || instances.iter().flat_map(|instance| &instance.capture.parts).enumerate();
-            for (index, part) in parts() {
-                if self.wanted[index] == self.activated[index] {
-                    continue;
-                }
-                self.activated[index] = self.wanted[index];
-                let (Some(_), Some(filter)) = (self.wanted[index], &part.filter) else { continue };
-                let blocks = part.count.div_ceil(BLOCK);
-                pass.set_bind_group(0, &made.activate, &[index as u32 * self.alignment]);
-                pass.set_bind_group(1, filter, &[]);
-                pass.set_pipeline(&renderer.activate_count);
-                pass.dispatch_workgroups(blocks, 1, 1);
-                pass.set_pipeline(&renderer.activate_scan);
-                pass.set_bind_group(2, &made.project_arguments_group, &[]);
-                pass.dispatch_workgroups(1, 1, 1);
-                pass.set_pipeline(&renderer.activate_write);
-                pass.dispatch_workgroups(blocks, 1, 1);
-            }
-            mark(&mut pass);
-
             // project
-            let stored = instances.iter().flat_map(|i| i.capture.parts.iter().map(|_| i.capture.storage));
-            for ((index, part), storage) in parts().zip(stored) {
-                pass.set_pipeline(renderer.project(storage));
-                pass.set_bind_group(0, &made.project, &[index as u32 * self.alignment]);
-                pass.set_bind_group(1, &part.bind_group, &[]);
-                match self.wanted[index] {
-                    Some(_) => pass.dispatch_workgroups_indirect(&made.project_arguments, index as u64 * 12),
-                    None => pass.dispatch_workgroups(part.count.div_ceil(256), 1, 1),
+            let mut index = 0;
+            for instance in instances {
+                pass.set_pipeline(renderer.project(instance.capture.storage));
+                pass.set_bind_group(2, instance.active.map_or(&renderer.no_list, |active| &active.list), &[]);
+                for (at, part) in instance.capture.parts.iter().enumerate() {
+                    pass.set_bind_group(0, &made.project, &[index * self.alignment]);
+                    pass.set_bind_group(1, &part.bind_group, &[]);
+                    let count = instance.capture.drawn(at, instance.active);
+                    pass.dispatch_workgroups(count.div_ceil(256), 1, 1);
+                    index += 1;
                 }
             }
             mark(&mut pass);
@@ -100,15 +94,12 @@ impl ViewRenderer {
             mark(&mut pass);
 
             // blend
-            pass.set_pipeline(&renderer.blend);
+            pass.set_pipeline(if self.multisampled { &renderer.blend_multisampled } else { &renderer.blend });
             pass.set_bind_group(0, &made.blend, &[]);
             pass.dispatch_workgroups(tiles.x, tiles.y, 1);
             mark(&mut pass);
         }
-        if matches!(self.readback.state, ReadbackState::Idle) {
-            encoder.copy_buffer_to_buffer(&self.counters, 0, &self.readback.buffer, 0, size_of::<Counters>() as u64);
-            self.readback.state = ReadbackState::Recorded;
-        }
+        self.readback.copy(encoder, &self.counters);
     }
 
     /// One step of `sort`. `blocks` where the host knows them; otherwise the GPU does, at `offset` of the arguments.

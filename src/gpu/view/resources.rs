@@ -4,14 +4,18 @@
 
 use super::{ViewRenderer, tiles};
 use crate::gpu::layout::{self, BLOCK, DEPTH_STEPS, DIGIT_BITS, DIGITS, SortStep};
+use crate::gpu::note_created;
 use crate::gpu::renderer::{Renderer, bind_group};
 use glam::UVec2;
+use std::cell::Cell;
 use wgpu::{BufferUsages, TextureFormat};
 
 /// Sized resources and the bind groups over them.
 #[derive(Debug)]
 pub(super) struct Resources {
     pub sizes: Sizes,
+    /// Of storage buffers and targets.
+    pub bytes: u64,
     pub instances: wgpu::Buffer,
     /// What `score` reads beside the frame.
     pub kept: Kept,
@@ -21,11 +25,8 @@ pub(super) struct Resources {
     pub depth_view: wgpu::TextureView,
     /// What the bind groups were made for, apart from sizes.
     pub opaque: wgpu::TextureView,
+    pub multisampled: bool,
     pub environment: wgpu::Buffer,
-    /// Dispatches of `project` over the active, by part.
-    pub project_arguments: wgpu::Buffer,
-    pub project_arguments_group: wgpu::BindGroup,
-    pub activate: wgpu::BindGroup,
     pub project: wgpu::BindGroup,
     /// From the projected keys into the first pair of buffers, from there into the second, and back.
     pub sort_depth: [wgpu::BindGroup; 3],
@@ -72,23 +73,17 @@ impl ViewRenderer {
         environment: wgpu::Buffer,
     ) -> Resources {
         let Sizes { slots, pairs, parts, picture: size } = sizes;
+        let bytes = Cell::new(0);
         let storage = |label, count: u32, each: usize| {
-            buffer(device, label, u64::from(count) * each as u64, BufferUsages::STORAGE)
+            let size = u64::from(count) * each as u64;
+            bytes.set(bytes.get() + size);
+            buffer(device, label, size, BufferUsages::STORAGE)
         };
         let slot_blocks = slots.div_ceil(BLOCK);
         let stride = slot_blocks.max(pairs.div_ceil(BLOCK));
         let tiles = tiles(size);
         let instances =
             buffer(device, "gs4d instances", u64::from(parts) * u64::from(self.alignment), BufferUsages::UNIFORM);
-        let active_list = storage("gs4d active list", slots, 4);
-        let active_counts = storage("gs4d active counts", parts, 4);
-        let active_blocks = storage("gs4d active blocks", slot_blocks, 4);
-        let project_arguments = buffer(
-            device,
-            "gs4d project arguments",
-            u64::from(parts) * 12,
-            BufferUsages::STORAGE | BufferUsages::INDIRECT,
-        );
         let splats = storage("gs4d splats", slots, size_of::<layout::Splat>());
         let depth_keys = storage("gs4d depth keys", slots, 4);
         let keys = [(); 2].map(|()| storage("gs4d sort keys", slots, 4));
@@ -99,7 +94,7 @@ impl ViewRenderer {
         let histogram = storage("gs4d histogram", DIGITS * (stride + 1), 4);
         let tile_ranges = storage("gs4d tile ranges", tiles.x * tiles.y, 8);
         let color = texture(device, "gs4d color", size, TextureFormat::Rgba32Float);
-        let depth = texture(device, "gs4d depth", size, TextureFormat::R32Float);
+        let depth = texture(device, "gs4d depth", size, TextureFormat::Rg32Float);
         let color_view = color.create_view(&wgpu::TextureViewDescriptor::default());
         let depth_view = depth.create_view(&wgpu::TextureViewDescriptor::default());
         self.write_steps(queue, stride);
@@ -135,36 +130,13 @@ impl ViewRenderer {
         let sorted = tile_steps(size) as usize % 2;
         Resources {
             sizes,
-            project_arguments_group: bind_group(
-                device,
-                "gs4d project arguments",
-                &layouts.arguments,
-                &[project_arguments.as_entire_binding()],
-            ),
-            project_arguments,
-            activate: bind_group(
-                device,
-                "gs4d activate",
-                &layouts.activate,
-                &[
-                    instance.clone(),
-                    active_list.as_entire_binding(),
-                    active_counts.as_entire_binding(),
-                    active_blocks.as_entire_binding(),
-                    depth_keys.as_entire_binding(),
-                ],
-            ),
+            // 16 bytes of colour and 8 of depth for each pixel.
+            bytes: bytes.get() + u64::from(size.x) * u64::from(size.y) * 24,
             project: bind_group(
                 device,
                 "gs4d project",
                 &layouts.project,
-                &[
-                    instance,
-                    splats.as_entire_binding(),
-                    depth_keys.as_entire_binding(),
-                    active_list.as_entire_binding(),
-                    active_counts.as_entire_binding(),
-                ],
+                &[instance, splats.as_entire_binding(), depth_keys.as_entire_binding()],
             ),
             sort_depth: [
                 // The values of the first step are the indices: what is bound for them is not read.
@@ -198,7 +170,7 @@ impl ViewRenderer {
             blend: bind_group(
                 device,
                 "gs4d blend",
-                &layouts.blend,
+                if self.multisampled { &layouts.blend_multisampled } else { &layouts.blend },
                 &[
                     frame,
                     tile_ranges.as_entire_binding(),
@@ -224,6 +196,7 @@ impl ViewRenderer {
             depth,
             depth_view,
             opaque,
+            multisampled: self.multisampled,
             environment,
         }
     }
@@ -251,7 +224,8 @@ pub(super) fn tile_steps(size: UVec2) -> u32 {
     (u32::BITS - (tiles.x * tiles.y - 1).leading_zeros()).div_ceil(DIGIT_BITS)
 }
 
-pub(super) fn buffer(device: &wgpu::Device, label: &str, size: u64, usage: BufferUsages) -> wgpu::Buffer {
+pub(in crate::gpu) fn buffer(device: &wgpu::Device, label: &str, size: u64, usage: BufferUsages) -> wgpu::Buffer {
+    note_created();
     device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
         size,
@@ -266,6 +240,7 @@ pub(super) fn texture(device: &wgpu::Device, label: &str, size: UVec2, format: T
     } else {
         wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC
     };
+    note_created();
     device.create_texture(&wgpu::TextureDescriptor {
         label: Some(label),
         size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },

@@ -1,0 +1,29 @@
+// write_depth: writes captures to the camera's depth buffer, where they hide more than half of what is behind.
+//
+// In: the captures' colour and transmittance, and their depths, for the pixels of the viewport. Out: depth-buffer values, which the
+// depth test keeps where nothing nearer has been drawn; for every sample alike.
+
+@group(0) @binding(0) var colors: texture_2d<f32>;
+// Camera units: x the sum of z alpha T, not divided by 1 - T; y where T falls to one half or below, 0 where it does not.
+@group(0) @binding(1) var depths: texture_2d<f32>;
+// Corner and size of the viewport in the target, pixels.
+@group(0) @binding(2) var<uniform> viewport: vec4<u32>;
+// From depth-buffer value d to camera space: z = (x + y d) / (z + w d).
+@group(0) @binding(3) var<uniform> lens: vec4<f32>;
+
+@fragment
+fn fragment(@builtin(position) position: vec4<f32>) -> @builtin(frag_depth) f32 {
+    let pixel = vec2<u32>(position.xy);
+    let inside = all(pixel >= viewport.xy) && all(pixel < viewport.xy + viewport.zw);
+    let at = select(vec2(0u), pixel - viewport.xy, inside);
+    let depth = textureLoad(depths, at, 0).xy;
+    if !inside || depth.y == 0.0 {
+        discard;
+    }
+#ifdef MEDIAN
+    let z = depth.y;
+#else
+    let z = depth.x / max(1.0 - textureLoad(colors, at, 0).a, 1e-4);
+#endif
+    return clamp((lens.x - lens.z * z) / (lens.w * z - lens.y), 0.0, 1.0);
+}

@@ -1,0 +1,57 @@
+//! What loading tells the game.
+//!
+//! In: what became of an entity's capture. Out: each of these both as a message, to be read by a system with a `MessageReader`, and as
+//! an event on that entity, to be observed: `commands.entity(capture).observe(|failed: On<CaptureFailed>| ..)`.
+//!
+//! They are sent in [`CaptureAssetSystems`](super::CaptureAssetSystems), in `PreUpdate`: whatever runs in `Update` reads them in the
+//! same frame.
+
+use super::GaussianCapture;
+use bevy::asset::AssetId;
+use bevy::ecs::entity::Entity;
+use bevy::ecs::event::EntityEvent;
+use bevy::ecs::message::{Message, MessageWriter};
+use bevy::ecs::system::{Commands, SystemParam};
+
+/// Its capture is there, and drawn from now on: it has been loaded, loaded again after its file changed (or changed in memory), or
+/// the entity was given another one that is there already.
+#[derive(Message, EntityEvent, Debug, Clone, PartialEq)]
+pub struct CaptureReady {
+    /// The entity with the capture.
+    pub entity: Entity,
+    /// The capture.
+    pub capture: AssetId<GaussianCapture>,
+}
+
+/// Its capture could not be loaded. If it had been loaded before and its file changed, what was there is still drawn.
+///
+/// Bevy logs the same error, whether this is read or not.
+#[derive(Message, EntityEvent, Debug, Clone, PartialEq)]
+pub struct CaptureFailed {
+    /// The entity with the capture.
+    pub entity: Entity,
+    /// The file, what is wrong with it and, where there is one, the remedy.
+    pub error: String,
+}
+
+/// Tells the game.
+#[derive(SystemParam)]
+pub(super) struct Announcer<'w, 's> {
+    commands: Commands<'w, 's>,
+    ready: MessageWriter<'w, CaptureReady>,
+    failed: MessageWriter<'w, CaptureFailed>,
+}
+
+impl Announcer<'_, '_> {
+    pub(super) fn ready(&mut self, entity: Entity, capture: AssetId<GaussianCapture>) {
+        let ready = CaptureReady { entity, capture };
+        self.ready.write(ready.clone());
+        self.commands.trigger(ready);
+    }
+
+    pub(super) fn failed(&mut self, entity: Entity, error: String) {
+        let failed = CaptureFailed { entity, error };
+        self.failed.write(failed.clone());
+        self.commands.trigger(failed);
+    }
+}
