@@ -57,7 +57,7 @@ pub fn walk(
     head: Single<&GlobalTransform, With<Head>>,
 ) {
     let (mut body, mut place) = body.into_inner();
-    let pressed = |key: KeyCode| if keys.pressed(key) { 1.0 } else { 0.0 };
+    let pressed = |key: KeyCode| f32::from(u8::from(keys.pressed(key)));
     let forward = head.forward().with_y(0.0).normalize_or_zero();
     let way = forward * (pressed(KeyCode::KeyW) - pressed(KeyCode::KeyS))
         + forward.cross(Vec3::Y) * (pressed(KeyCode::KeyD) - pressed(KeyCode::KeyA));

@@ -24,13 +24,13 @@
 //! [`picture`] waits until every capture and timeline in the world has been loaded; [`wait_for`] adds what else a game loads. Where
 //! there is no GPU at all, everything that draws is [`TestingError::NoGpu`]: a test can print it and return.
 
-mod app;
 mod error;
-mod picture;
-mod settle;
+mod offscreen;
+mod readback;
+mod waiting;
 
-pub use app::{Offscreen, app, app_with, has_gpu};
 pub use error::TestingError;
 pub use image::RgbaImage;
-pub use picture::{picture, pictures, read, save};
-pub use settle::{settle, wait_for};
+pub use offscreen::{Offscreen, app, app_with, has_gpu};
+pub use readback::{picture, pictures, read, save};
+pub use waiting::{settle, wait_for};

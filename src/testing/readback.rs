@@ -2,7 +2,7 @@
 //!
 //! In: an app, and how much time is to go by. Out: what its camera sees then, in memory or as PNG files.
 
-use super::settle::{load, settle, update};
+use super::waiting::{load, settle, update};
 use super::{Offscreen, TestingError};
 use crate::codec::{CodecError, write_beside};
 use bevy::app::App;
