@@ -1,7 +1,7 @@
 //! Renders a capture into PNG files, without a window or a display: a camera goes round it once while it plays once.
 //!
 //! ```text
-//! cargo run --release --features viewer --example headless -- [CAPTURE] [FOLDER] [COUNT] [WIDTHxHEIGHT]
+//! cargo run --release --features viewer --example headless -- [CAPTURE] [--headless FOLDER] [--frames N] [--size WIDTHxHEIGHT]
 //! ```
 //!
 //! Defaults: `toybox.gs4d` from `assets/`, `out`, 8 pictures, 640x480. The capture may be a `.gs4d` or a `.pth`.
@@ -13,32 +13,38 @@ use bevy::prelude::*;
 use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::render::{GaussianCapture3d, GaussianCapturePlugin};
-use common::{Orbit, offscreen};
+use bevy_gs4d::testing;
+use common::Orbit;
+use common::arguments::{Arguments, parse, value};
 use std::f32::consts::TAU;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 #[derive(Resource)]
 struct Capture(PathBuf);
 
 fn main() -> Result {
-    let mut arguments = std::env::args().skip(1);
-    let mut argument = |default: &str| arguments.next().unwrap_or_else(|| default.into());
-    let (capture, folder, count, size) = (argument("toybox.gs4d"), argument("out"), argument("8"), argument("640x480"));
-    let count: u32 = count.parse().map_err(|_| format!("{count}: not a number of pictures"))?;
-    let size = parse_size(&size).ok_or_else(|| format!("{size}: not a size such as 640x480"))?;
+    let mut size = UVec2::new(640, 480);
+    let defaults = Arguments { file: "toybox.gs4d".into(), headless: Some("out".into()), frames: 8 };
+    let arguments = parse(defaults, |option, values| {
+        if option == "--size" {
+            let text = value(option, "a size", values)?;
+            size = parse_size(&text).ok_or_else(|| format!("--size {text}: not a size such as 640x480"))?;
+        }
+        Ok(option == "--size")
+    })?;
 
-    let mut app = offscreen::app(size);
+    let mut app = testing::app(size);
     app.add_plugins(GaussianCapturePlugin)
         .insert_resource(ClearColor(Color::BLACK))
-        .insert_resource(Capture(common::asset_path(&capture)))
+        .insert_resource(Capture(common::asset_path(&arguments.file)))
         .add_systems(Startup, setup)
         .add_systems(Update, go_round);
-    offscreen::settle(&mut app)?;
+    testing::settle(&mut app)?;
     let captures = app.world().resource::<Assets<GaussianCapture>>();
     let duration = captures.iter().next().map_or(0.0, |(_, capture)| capture.duration_seconds());
-    let step = Duration::from_secs_f32(duration / count.max(1) as f32);
-    common::save_pictures(&mut app, count, step, Path::new(&folder))
+    let step = Duration::from_secs_f32(duration / arguments.frames.max(1) as f32);
+    common::save_pictures(&mut app, arguments.frames, step, &arguments.headless.unwrap_or_default())
 }
 
 fn parse_size(text: &str) -> Option<UVec2> {
@@ -47,16 +53,10 @@ fn parse_size(text: &str) -> Option<UVec2> {
     (size.min_element() > 0).then_some(size)
 }
 
-fn setup(
-    mut commands: Commands,
-    assets: Res<AssetServer>,
-    capture: Res<Capture>,
-    offscreen: Res<offscreen::Offscreen>,
-) {
+fn setup(mut commands: Commands, assets: Res<AssetServer>, capture: Res<Capture>) {
     commands.spawn(GaussianCapture3d(assets.load(capture.0.clone())));
     commands.spawn((
         Camera3d::default(),
-        offscreen.target(),
         Msaa::Off,
         // Pixels as trained.
         Tonemapping::None,

@@ -1,18 +1,22 @@
 //! Two captures and a flying ball, cut together by a timeline: the captures come, fade, turn round and go as
-//! `assets/demo.timeline.ron` says, and the ball's own animation keeps to the same playhead. Change the file and start again to
-//! direct them otherwise.
+//! `assets/demo.timeline.ron` says, and the ball's own animation keeps to the same playhead. Change the file while it plays to direct
+//! them otherwise.
 //!
 //! ```text
 //! cargo run --release --features viewer --example timeline -- [TIMELINE] [--headless FOLDER] [--frames N]
 //! ```
 //!
-//! * drag in the panel below: scrub; its bars are clips, the short marks in them key-frames, the flags markers
-//! * space: play and pause; left and right: a 30th of a second back and on; R: turn round
+//! * click or drag in the panel below: scrub. Its bars are clips (red: backwards), their cut corners fades, the short marks
+//!   key-frames, of captures and of the ball's animation; the flags are markers
+//! * space: play and pause; left and right: a 30th of a second back and on; R: turn round; Home: to the start. The panel has buttons
+//!   for the same
 //! * drag elsewhere with the left button: go round; wheel: nearer and farther
 //!
-//! With `--headless FOLDER`, or where there is no display, it writes N (8) pictures, a quarter of a second apart, to FOLDER (`out`)
+//! With `--headless FOLDER`, or where there is no display, it writes N (8) pictures, a 30th of a second apart, to FOLDER (`out`)
 //! instead.
 
+#[path = "timeline/chart.rs"]
+mod chart;
 mod common;
 #[path = "common/controls.rs"]
 mod controls;
@@ -23,9 +27,11 @@ use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::prelude::*;
 use bevy_egui::input::{egui_wants_any_keyboard_input, egui_wants_any_pointer_input};
 use bevy_egui::{EguiContexts, EguiPlugin, EguiPrimaryContextPass, egui};
-use bevy_gs4d::playback::{Clip, PlaybackSystems};
+use bevy_gs4d::playback::PlaybackSystems;
 use bevy_gs4d::prelude::*;
-use common::{Orbit, offscreen};
+use bevy_gs4d::testing;
+use chart::Chart;
+use common::Orbit;
 use controls::{follow, mouse};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -42,17 +48,22 @@ struct LastMarker(String);
 #[derive(Component)]
 struct Flight(AnimationNodeIndex);
 
+/// Where the ball is at its key-frames.
+const WAY: [Vec3; 4] =
+    [Vec3::new(-1.5, 0.9, 0.6), Vec3::new(0.0, 0.4, -0.8), Vec3::new(1.5, 0.9, 0.6), Vec3::new(0.0, 1.2, 1.0)];
 /// Seconds after which the ball is where it began.
 const FLIGHT_SECONDS: f32 = 4.0;
+/// Pictures, and steps by hand, for each second.
+const FPS: f32 = 30.0;
 
 fn main() -> Result {
     let arguments = controls::arguments("demo.timeline.ron")?;
     let show = Show(common::asset_path(&arguments.file));
     match arguments.headless {
         Some(folder) => {
-            let mut app = offscreen::app(UVec2::new(960, 540));
+            let mut app = testing::app(UVec2::new(960, 540));
             scene(&mut app, show);
-            common::save_pictures(&mut app, arguments.frames, Duration::from_millis(250), &folder)
+            common::save_pictures(&mut app, arguments.frames, Duration::from_secs_f32(FPS.recip()), &folder)
         }
         None => {
             let mut app = App::new();
@@ -80,12 +91,7 @@ fn scene(app: &mut App, show: Show) {
         .add_systems(Update, ((fly, report).after(PlaybackSystems::Timelines), (arrange, follow).chain()));
 }
 
-fn setup(
-    mut commands: Commands,
-    assets: Res<AssetServer>,
-    show: Res<Show>,
-    offscreen: Option<Res<offscreen::Offscreen>>,
-) {
+fn setup(mut commands: Commands, assets: Res<AssetServer>, show: Res<Show>) {
     let timeline = TimelinePlayer(assets.load(show.0.clone()));
     // The tracks are spawned here so that they can be placed; without them the player would spawn its own.
     commands.spawn((timeline, children![TimelineTrack("left".into()), TimelineTrack("right".into())]));
@@ -93,7 +99,7 @@ fn setup(
         DirectionalLight { illuminance: 4000.0, ..default() },
         Transform::from_xyz(2.0, 4.0, 3.0).looking_at(Vec3::ZERO, Vec3::Y),
     ));
-    let mut camera = commands.spawn((
+    commands.spawn((
         Camera3d::default(),
         // Meshes hide what is behind them only without multisampling.
         Msaa::Off,
@@ -101,9 +107,6 @@ fn setup(
         Tonemapping::None,
         Orbit { center: Vec3::ZERO, distance: 4.0, yaw: 0.3, pitch: 0.3 },
     ));
-    if let Some(offscreen) = offscreen {
-        camera.insert(offscreen.target());
-    }
 }
 
 /// A ball whose way is one of Bevy's animations.
@@ -115,9 +118,7 @@ fn setup_ball(
     mut graphs: ResMut<Assets<AnimationGraph>>,
 ) -> Result {
     let target = AnimationTargetId::from_name(&Name::new("ball"));
-    let way =
-        [Vec3::new(-1.5, 0.9, 0.6), Vec3::new(0.0, 0.4, -0.8), Vec3::new(1.5, 0.9, 0.6), Vec3::new(0.0, 1.2, 1.0)];
-    let stops = (0..=way.len()).map(|stop| (stop as f32 / way.len() as f32 * FLIGHT_SECONDS, way[stop % way.len()]));
+    let stops = (0..=WAY.len()).map(|stop| (stop as f32 / WAY.len() as f32 * FLIGHT_SECONDS, WAY[stop % WAY.len()]));
     let mut clip = AnimationClip::default();
     let curve = AnimatableKeyframeCurve::new(stops)?;
     clip.add_curve_to_target(target, AnimatableCurve::new(animated_field!(Transform::translation), curve));
@@ -184,11 +185,14 @@ fn keys(
     if keys.just_pressed(KeyCode::KeyR) {
         playback.reverse();
     }
+    if keys.just_pressed(KeyCode::Home) {
+        playback.seek(0.0);
+    }
     let steps = i32::from(keys.just_pressed(KeyCode::ArrowRight)) - i32::from(keys.just_pressed(KeyCode::ArrowLeft));
     if steps != 0
         && let Some(timeline) = timelines.get(&handle.0)
     {
-        playback.step(steps, 30.0, timeline.duration_seconds());
+        playback.step(steps, FPS, timeline.duration_seconds());
     }
 }
 
@@ -209,8 +213,17 @@ fn panel(
             return;
         };
         ui.horizontal(|ui| {
+            if ui.button("to the start").clicked() {
+                playback.seek(0.0);
+            }
+            if ui.button("back").clicked() {
+                playback.step(-1, FPS, timeline.duration_seconds());
+            }
             if ui.button(if playback.playing { "pause" } else { "play" }).clicked() {
                 playback.toggle();
+            }
+            if ui.button("on").clicked() {
+                playback.step(1, FPS, timeline.duration_seconds());
             }
             if ui.button("turn round").clicked() {
                 playback.reverse();
@@ -218,56 +231,17 @@ fn panel(
             ui.label(format!("{:.2} s of {:.2} s", playback.time, timeline.duration_seconds()));
             ui.label(format!("last marker: {}", marker.0));
         });
-        if let Some(sought) = chart(ui, timeline, &captures, playback.time) {
+        let chart = Chart { timeline, captures: &captures, animation: ("ball", &flight_key_frames(timeline)) };
+        if let Some(sought) = chart.show(ui, playback.time) {
             playback.seek(sought);
         }
     });
     Ok(())
 }
 
-const LABELS: f32 = 56.0;
-const ROW: f32 = 26.0;
-
-/// Draws the timeline, and returns the moment that is pointed at while a button is down.
-fn chart(ui: &mut egui::Ui, timeline: &Timeline, captures: &Assets<GaussianCapture>, time: f32) -> Option<f32> {
-    let rows = timeline.tracks().len() as f32;
-    let size = egui::vec2(720.0, ROW * (rows + 1.0));
-    let (response, painter) = ui.allocate_painter(size, egui::Sense::click_and_drag());
-    let bounds = response.rect;
-    let (left, duration) = (bounds.left() + LABELS, timeline.duration_seconds().max(f32::MIN_POSITIVE));
-    let width = bounds.width() - LABELS - 4.0;
-    let x = |seconds: f32| left + width * seconds / duration;
-    let (font, ink) = (egui::FontId::proportional(12.0), ui.visuals().text_color());
-    for (row, track) in timeline.tracks().iter().enumerate() {
-        let top = bounds.top() + ROW * (row as f32 + 1.0);
-        let middle = egui::pos2(bounds.left(), top + ROW / 2.0);
-        painter.text(middle, egui::Align2::LEFT_CENTER, &track.name, font.clone(), ink);
-        for clip in &track.clips {
-            let bar = egui::Rect::from_x_y_ranges(x(clip.start)..=x(clip.end()), top + 2.0..=top + ROW - 2.0);
-            let color = if clip.speed < 0.0 { egui::Color32::DARK_RED } else { egui::Color32::DARK_BLUE };
-            painter.rect_filled(bar, 3.0, color);
-            for moment in key_frames(clip, captures) {
-                painter.vline(x(moment), bar.center().y..=bar.bottom(), (1.0, egui::Color32::LIGHT_YELLOW));
-            }
-        }
-    }
-    for marker in timeline.markers() {
-        painter.vline(x(marker.time), bounds.y_range(), (1.0, egui::Color32::GREEN));
-        let flag = egui::pos2(x(marker.time) + 3.0, bounds.top());
-        painter.text(flag, egui::Align2::LEFT_TOP, &marker.name, font.clone(), egui::Color32::GREEN);
-    }
-    painter.vline(x(time), bounds.y_range(), (2.0, egui::Color32::WHITE));
-    let pointer = response.interact_pointer_pos()?;
-    Some(((pointer.x - left) / width * duration).clamp(0.0, duration))
-}
-
-/// When a clip shows key-frames of its capture, in seconds of the timeline.
-fn key_frames(clip: &Clip, captures: &Assets<GaussianCapture>) -> Vec<f32> {
-    let [first, last] = clip.range;
-    let Some(key_frames) = captures.get(&clip.capture).and_then(|capture| capture.key_frames()) else {
-        return Vec::new();
-    };
-    let begin = if clip.speed < 0.0 { last } else { first };
-    let shown = key_frames.times().filter(|time| (first..=last).contains(time));
-    shown.map(|time| clip.start + (time - begin) / clip.speed).collect()
+/// When the ball is at its key-frames, in seconds of the timeline.
+fn flight_key_frames(timeline: &Timeline) -> Vec<f32> {
+    let spacing = FLIGHT_SECONDS / WAY.len() as f32;
+    let count = (timeline.duration_seconds() / spacing) as u32;
+    (0..=count).map(|index| index as f32 * spacing).collect()
 }

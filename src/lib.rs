@@ -81,9 +81,10 @@
 //! |---|---|
 //! | none | `gaussian`, `scene`, `codec`, `dataset`, `metrics`, `reference`: no GPU, no Bevy |
 //! | `gpu` | [`gpu`]: the renderer, on wgpu |
-//! | `bevy` (default) | [`asset`], [`playback`], [`render`], [`prelude`]; implies `gpu` |
+//! | `bevy` (default) | [`asset`], [`playback`], [`render`], [`stereo`], [`prelude`]; implies `gpu` |
 //! | `cli` | the `gs4d` command; implies `gpu`, never compiles Bevy |
-//! | `viewer` | the window, lit meshes and panel of the interactive examples; implies `bevy` |
+//! | `testing` | `testing`: Bevy apps without a window, drawn into pictures; implies `bevy` |
+//! | `viewer` | the window, lit meshes and panel of the interactive examples; implies `testing` |
 #![cfg_attr(
     not(feature = "bevy"),
     expect(rustdoc::broken_intra_doc_links, reason = "the Bevy side is not part of this build")
@@ -110,6 +111,10 @@ pub mod reference;
 #[cfg(feature = "bevy")]
 pub mod render;
 pub mod scene;
+#[cfg(feature = "bevy")]
+pub mod stereo;
+#[cfg(feature = "testing")]
+pub mod testing;
 
 /// The README, whose code must compile.
 #[cfg(all(doctest, feature = "bevy"))]

@@ -20,6 +20,7 @@ use bevy_gs4d::playback::{Playback, Repeat};
 use bevy_gs4d::reference;
 use bevy_gs4d::render::{GaussianCapture3d, GaussianCapturePlugin};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene};
+use bevy_gs4d::testing;
 use common::{app, picture, spawn_camera};
 use std::time::Duration;
 use twin::{DURATION, SIZE, add, blob, difference, difference_between, eye, rgb, scene, view, view_of};
@@ -246,7 +247,7 @@ fn playback_follows_the_clock() {
     let scene = crowd();
     let entity = spawn(&mut app, &scene, Transform::default());
     spawn_camera(&mut app, Msaa::Off, eye());
-    common::offscreen::settle(&mut app).expect("the app runs");
+    testing::settle(&mut app).expect("the app runs");
     app.world_mut().entity_mut(entity).insert(Playback::default());
     // Half a second of two is a quarter of the interval from 0 to 1.
     let expected = reference::render(&scene, &view(&eye(), SIZE, 0.25), BLACK).picture;
@@ -291,7 +292,7 @@ fn a_package_loads_from_a_folder_and_a_broken_one_is_an_error() {
 
     let handle: Handle<GaussianCapture> = app.world().resource::<AssetServer>().load(broken);
     app.world_mut().entity_mut(entity).insert(GaussianCapture3d(handle));
-    let failure = common::offscreen::settle(&mut app).expect_err("a flipped bit is noticed").to_string();
+    let failure = testing::settle(&mut app).expect_err("a flipped bit is noticed").to_string();
     assert!(failure.contains("broken.gs4d"), "the message names the file: {failure}");
 }
 

@@ -1,14 +1,14 @@
-//! What the examples share: where to look at a capture from, and writing pictures without a window.
+//! What the examples with one camera share: where to look at a capture from, beside what all share.
 //!
-//! In: a capture and, without a window, an app. Out: camera poses, PNG files.
+//! In: a capture. Out: camera poses.
 
-pub mod offscreen;
+pub mod arguments;
+
+pub use arguments::{asset_path, save_pictures};
 
 use bevy::prelude::*;
 use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::scene::Bounds;
-use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 /// A camera that circles a point.
 #[derive(Component, Debug, Clone, Copy)]
@@ -32,22 +32,4 @@ impl Orbit {
         let turn = Quat::from_euler(EulerRot::YXZ, self.yaw, -self.pitch, 0.0);
         Transform::from_translation(self.center + turn * Vec3::Z * self.distance).looking_at(self.center, Vec3::Y)
     }
-}
-
-/// A path from the command line as an asset: what is not found from the current folder is looked for in `assets/`.
-pub fn asset_path(argument: &str) -> PathBuf {
-    let path = Path::new(argument);
-    if path.exists() { std::path::absolute(path).unwrap_or_else(|_| path.into()) } else { path.into() }
-}
-
-/// Renders `count` pictures, `step` apart, into `folder` and says where they are.
-pub fn save_pictures(app: &mut App, count: u32, step: Duration, folder: &Path) -> Result {
-    std::fs::create_dir_all(folder)?;
-    offscreen::settle(app)?;
-    for index in 0..count {
-        let step = if index == 0 { Duration::ZERO } else { step };
-        offscreen::picture(app, step)?.save(folder.join(format!("{index:04}.png")))?;
-    }
-    println!("{count} pictures in {}", folder.display());
-    Ok(())
 }

@@ -2,14 +2,11 @@
 //!
 //! In: the size of a picture. Out: an app that draws into one without a window, a camera for it, and the picture.
 
-#[path = "../../examples/common/offscreen.rs"]
-pub mod offscreen;
-
 use crate::skip::skip;
 use bevy::core_pipeline::tonemapping::{DebandDither, Tonemapping};
 use bevy::prelude::*;
-use bevy_gs4d::gpu::GpuContext;
 use bevy_gs4d::render::GaussianCapturePlugin;
+use bevy_gs4d::testing::{self, Offscreen, TestingError};
 use image::RgbaImage;
 use std::time::Duration;
 
@@ -18,18 +15,18 @@ pub const FOV_Y: f32 = 0.8;
 
 /// An app without a window, or nothing (and a line that says so) where there is no GPU to draw with.
 pub fn app(size: UVec2) -> Option<App> {
-    if GpuContext::adapters().is_empty() {
-        skip("no GPU adapter: install a Vulkan driver (mesa-vulkan-drivers has one in software)");
+    if !testing::has_gpu() {
+        skip(TestingError::NoGpu);
         return None;
     }
-    let mut app = offscreen::app(size);
+    let mut app = testing::app(size);
     app.add_plugins(GaussianCapturePlugin).insert_resource(ClearColor(Color::BLACK));
     Some(app)
 }
 
 /// A camera whose pixels are compared: no tonemapping, no dithering.
 pub fn spawn_camera(app: &mut App, msaa: Msaa, transform: Transform) -> Entity {
-    let target = app.world().resource::<offscreen::Offscreen>().target();
+    let target = app.world().resource::<Offscreen>().target();
     let lens = Projection::Perspective(PerspectiveProjection { fov: FOV_Y, ..default() });
     let look = (Tonemapping::None, DebandDither::Disabled);
     app.world_mut().spawn((Camera3d::default(), target, msaa, lens, look, transform)).id()
@@ -37,5 +34,5 @@ pub fn spawn_camera(app: &mut App, msaa: Msaa, transform: Transform) -> Entity {
 
 /// The picture after `seconds` more.
 pub fn picture(app: &mut App, seconds: f32) -> RgbaImage {
-    offscreen::picture(app, Duration::from_secs_f32(seconds)).expect("the app draws without an error")
+    testing::picture(app, Duration::from_secs_f32(seconds)).expect("the app draws without an error")
 }

@@ -1,0 +1,89 @@
+//! What every example understands on its command line, and what it does without a window.
+//!
+//! In: `[FILE] [--headless FOLDER] [--frames N] [--help]` and what an example adds. Out: [`Arguments`], an asset path, pictures in a
+//! folder.
+
+use bevy::prelude::*;
+use bevy_gs4d::testing;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// The example that this is compiled into, for its first lines.
+const SOURCE: &str = include_str!(concat!("../", env!("CARGO_CRATE_NAME"), ".rs"));
+
+/// What the command line says, or what an example does if it says nothing.
+pub struct Arguments {
+    pub file: String,
+    /// Where pictures go; nothing for a window.
+    pub headless: Option<PathBuf>,
+    pub frames: u32,
+}
+
+/// Reads the command line. `more` gets the options that not all examples have, with what follows them, and returns whether it knows
+/// them. Without a display pictures are written all the same.
+pub fn parse(
+    defaults: Arguments,
+    mut more: impl FnMut(&str, &mut dyn Iterator<Item = String>) -> Result<bool>,
+) -> Result<Arguments> {
+    let mut parsed = defaults;
+    let mut arguments = std::env::args().skip(1);
+    let mut files = 0;
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--headless" => parsed.headless = Some(value(&argument, "a folder", &mut arguments)?.into()),
+            "--frames" => {
+                let count = value(&argument, "a number", &mut arguments)?;
+                parsed.frames = count.parse().map_err(|_| format!("--frames {count}: not a number of pictures"))?;
+            }
+            "--help" | "-h" => {
+                println!("{}", help());
+                std::process::exit(0);
+            }
+            option if option.starts_with('-') => {
+                if !more(option, &mut arguments)? {
+                    return Err(format!("{option}: no such option; --help names them all").into());
+                }
+            }
+            _ if files == 1 => return Err(format!("{argument}: one file is enough").into()),
+            _ => {
+                parsed.file = argument;
+                files += 1;
+            }
+        }
+    }
+    if parsed.headless.is_none() && !has_display() {
+        eprintln!("no display: writing pictures instead");
+        parsed.headless = Some("out".into());
+    }
+    Ok(parsed)
+}
+
+/// What follows an option.
+pub fn value(option: &str, what: &str, arguments: &mut dyn Iterator<Item = String>) -> Result<String> {
+    Ok(arguments.next().ok_or_else(|| format!("{option} needs {what}"))?)
+}
+
+/// The lines that the example begins with.
+fn help() -> String {
+    let lines = SOURCE.lines().map_while(|line| line.strip_prefix("//!"));
+    let lines = lines.map(|line| line.strip_prefix(' ').unwrap_or(line)).filter(|line| !line.starts_with("```"));
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+fn has_display() -> bool {
+    // The feature `viewer` opens X11 windows on Linux.
+    !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some_and(|display| !display.is_empty())
+}
+
+/// A path from the command line as an asset: what is not found from the current folder is looked for in `assets/`.
+pub fn asset_path(argument: &str) -> PathBuf {
+    let path = Path::new(argument);
+    if path.exists() { std::path::absolute(path).unwrap_or_else(|_| path.into()) } else { path.into() }
+}
+
+/// Renders `count` pictures, `step` apart, into `folder` and says where they are.
+pub fn save_pictures(app: &mut App, count: u32, step: Duration, folder: &Path) -> Result {
+    testing::pictures(app, folder, count, step)?;
+    println!("{count} pictures in {}", folder.display());
+    Ok(())
+}

@@ -1,0 +1,80 @@
+//! The body: what walks, turns and carries the head.
+//!
+//! In: mouse and keys. Out: the transforms of body and head.
+
+use bevy::input::mouse::AccumulatedMouseMotion;
+use bevy::prelude::*;
+use bevy_gs4d::stereo::StereoRig;
+use std::f32::consts::FRAC_PI_6;
+
+/// Of the head above the floor, metres.
+pub const EYE_HEIGHT: f32 = 1.6;
+/// Where the body stands at first.
+pub const START: Transform = Transform::from_xyz(0.0, 0.0, 3.3);
+/// Metres per second.
+const SPEED: f32 = 1.5;
+/// How quickly walking starts and stops, per second.
+const EAGERNESS: f32 = 8.0;
+/// Radians per pixel.
+const SENSITIVITY: f32 = 0.004;
+
+/// What is on the floor, turned about the vertical alone: the space that a headset tracks the head in, or a body in its place.
+#[derive(Component, Default)]
+pub struct Body {
+    velocity: Vec3,
+}
+
+/// Where the view is from, and where aiming begins: the middle of our eyes, or one eye of a headset.
+#[derive(Component)]
+pub struct Head;
+
+/// Everything that moves the body.
+#[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
+pub struct Moves;
+
+/// The mouse turns the body and nods our head; a headset's head nods by itself.
+pub fn look(
+    buttons: Res<ButtonInput<MouseButton>>,
+    motion: Res<AccumulatedMouseMotion>,
+    mut body: Single<&mut Transform, With<Body>>,
+    head: Option<Single<&mut Transform, (With<StereoRig>, Without<Body>)>>,
+) {
+    if !buttons.pressed(MouseButton::Left) {
+        return;
+    }
+    body.rotate_y(-motion.delta.x * SENSITIVITY);
+    if let Some(mut head) = head {
+        let (_, pitch, _) = head.rotation.to_euler(EulerRot::YXZ);
+        head.rotation = Quat::from_rotation_x((pitch - motion.delta.y * SENSITIVITY).clamp(-1.5, 1.5));
+    }
+}
+
+/// Walks where the head looks, without jerks.
+pub fn walk(
+    time: Res<Time>,
+    keys: Res<ButtonInput<KeyCode>>,
+    body: Single<(&mut Body, &mut Transform)>,
+    head: Single<&GlobalTransform, With<Head>>,
+) {
+    let (mut body, mut place) = body.into_inner();
+    let pressed = |key: KeyCode| f32::from(u8::from(keys.pressed(key)));
+    let forward = head.forward().with_y(0.0).normalize_or_zero();
+    let way = forward * (pressed(KeyCode::KeyW) - pressed(KeyCode::KeyS))
+        + forward.cross(Vec3::Y) * (pressed(KeyCode::KeyD) - pressed(KeyCode::KeyA));
+    let seconds = time.delta_secs();
+    let eased = 1.0 - (-EAGERNESS * seconds).exp();
+    body.velocity = body.velocity.lerp(way.normalize_or_zero() * SPEED, eased);
+    place.translation += body.velocity * seconds;
+}
+
+/// Turns by 30 degrees at once, about the head: what is not seen moving makes nobody sick.
+pub fn snap_turn(
+    keys: Res<ButtonInput<KeyCode>>,
+    mut body: Single<&mut Transform, With<Body>>,
+    head: Single<&GlobalTransform, With<Head>>,
+) {
+    let turns = i32::from(keys.just_pressed(KeyCode::KeyQ)) - i32::from(keys.just_pressed(KeyCode::KeyE));
+    if turns != 0 {
+        body.rotate_around(head.translation(), Quat::from_rotation_y(turns as f32 * FRAC_PI_6));
+    }
+}

@@ -1,0 +1,167 @@
+//! Comfort: black in front of the eyes, that closes in from the edges while the body moves, and all over while it teleports.
+//!
+//! In: how the body moves. Out: for each eye a ring and a curtain, meshes that only this eye sees.
+
+use crate::body::{Body, Moves};
+use crate::path::wrapped;
+use crate::teleport::Teleport;
+use bevy::asset::RenderAssetUsages;
+use bevy::camera::visibility::{NoFrustumCulling, RenderLayers};
+use bevy::mesh::{Indices, PrimitiveTopology};
+use bevy::prelude::*;
+use std::f32::consts::TAU;
+
+/// Distance from the eye, metres: behind the near plane (a headset's is at 0.1), before everything else.
+const DISTANCE: f32 = 0.15;
+/// The ring's radii as tangents of the angle from the middle, and how much they hide, while it is closed.
+const RADII: [(f32, f32); 3] = [(0.45, 0.0), (0.75, 1.0), (12.0, 1.0)];
+/// How many times as large the ring is just before it is gone.
+const OPEN: f32 = 4.0;
+const SEGMENTS: u32 = 48;
+/// Seconds until the ring is closed, and until it is open.
+const EASE: f32 = 0.25;
+/// Metres and radians per second at which it closes entirely.
+const FAST: f32 = 0.8;
+/// More than these per second is no motion but a jump: teleports and snap turns.
+const JUMP: [f32; 2] = [12.0, 10.0];
+
+/// A camera that is one of the eyes; 0 is the left one.
+#[derive(Component)]
+pub struct EyeView(pub usize);
+
+#[derive(Component)]
+struct Ring;
+
+#[derive(Component)]
+struct Curtain;
+
+/// Whether edges close, and how far they have.
+#[derive(Resource)]
+pub struct Comfort {
+    pub vignette: bool,
+    closed: f32,
+}
+
+/// What rings and curtains are made of.
+#[derive(Resource)]
+struct Cloth {
+    ring: Handle<Mesh>,
+    curtain: Handle<Mesh>,
+    edge: Handle<StandardMaterial>,
+    dark: Handle<StandardMaterial>,
+}
+
+impl FromWorld for Cloth {
+    fn from_world(world: &mut World) -> Self {
+        let mut meshes = world.resource_mut::<Assets<Mesh>>();
+        let (ring, curtain) = (meshes.add(ring()), meshes.add(Rectangle::new(24.0, 24.0)));
+        let mut materials = world.resource_mut::<Assets<StandardMaterial>>();
+        let black = StandardMaterial {
+            base_color: Color::BLACK,
+            alpha_mode: AlphaMode::Blend,
+            unlit: true,
+            cull_mode: None,
+            ..default()
+        };
+        let (edge, dark) = (materials.add(black.clone()), materials.add(black));
+        Self { ring, curtain, edge, dark }
+    }
+}
+
+/// Everything for comfort. Add it after `DefaultPlugins`.
+pub struct ComfortPlugin;
+
+impl Plugin for ComfortPlugin {
+    fn build(&self, app: &mut App) {
+        app.insert_resource(Comfort { vignette: true, closed: 0.0 })
+            .init_resource::<Cloth>()
+            .add_systems(Update, (hang, close, darken).chain().after(Moves));
+    }
+}
+
+/// A ring about the −z axis, at distance 1: clear inside, black outside.
+fn ring() -> Mesh {
+    let (mut positions, mut colors, mut indices) = (Vec::new(), Vec::new(), Vec::new());
+    for (radius, alpha) in RADII {
+        for segment in 0..SEGMENTS {
+            let (sin, cos) = (segment as f32 / SEGMENTS as f32 * TAU).sin_cos();
+            positions.push([radius * cos, radius * sin, 0.0]);
+            colors.push([1.0, 1.0, 1.0, alpha]);
+        }
+    }
+    for band in 0..RADII.len() as u32 - 1 {
+        for segment in 0..SEGMENTS {
+            let next = (segment + 1) % SEGMENTS;
+            let [a, b] = [segment, next].map(|segment| band * SEGMENTS + segment);
+            let [c, d] = [a, b].map(|inner| inner + SEGMENTS);
+            indices.extend([a, c, b, b, c, d]);
+        }
+    }
+    let normals = vec![[0.0, 0.0, 1.0]; positions.len()];
+    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
+        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_COLOR, colors)
+        .with_inserted_indices(Indices::U32(indices))
+}
+
+/// Gives every new eye its own ring and curtain, on a layer of its own.
+fn hang(mut commands: Commands, cloth: Res<Cloth>, eyes: Query<(Entity, &EyeView), Added<EyeView>>) {
+    for (eye, view) in &eyes {
+        let layer = 1 + view.0;
+        commands.entity(eye).insert(RenderLayers::layer(0).with(layer));
+        let place = Transform::from_xyz(0.0, 0.0, -DISTANCE).with_scale(Vec3::splat(DISTANCE));
+        let hidden = (place, RenderLayers::layer(layer), NoFrustumCulling, Visibility::Hidden);
+        let (ring, edge) = (Mesh3d(cloth.ring.clone()), MeshMaterial3d(cloth.edge.clone()));
+        commands.spawn((Ring, ring, edge, hidden.clone(), ChildOf(eye)));
+        let (curtain, dark) = (Mesh3d(cloth.curtain.clone()), MeshMaterial3d(cloth.dark.clone()));
+        commands.spawn((Curtain, curtain, dark, hidden, ChildOf(eye)));
+    }
+}
+
+/// Closes the rings while the body moves or turns, and opens them while it stands.
+fn close(
+    time: Res<Time>,
+    body: Option<Single<&Transform, With<Body>>>,
+    mut before: Local<Option<(Vec3, f32)>>,
+    mut comfort: ResMut<Comfort>,
+    mut rings: Query<(&mut Transform, &mut Visibility), (With<Ring>, Without<Body>)>,
+) {
+    let seconds = time.delta_secs();
+    let Some(body) = body.filter(|_| seconds > 0.0) else { return };
+    let now = (body.translation, body.rotation.to_euler(EulerRot::YXZ).0);
+    let motion = before.replace(now).map_or(0.0, |before| motion(before, now, seconds));
+    let wanted = if comfort.vignette { motion } else { 0.0 };
+    let step = seconds / EASE;
+    comfort.closed += (wanted - comfort.closed).clamp(-step, step);
+    let size = (OPEN + (1.0 - OPEN) * comfort.closed) * DISTANCE;
+    for (mut transform, mut visibility) in &mut rings {
+        transform.scale = Vec3::new(size, size, DISTANCE);
+        visibility.set_if_neq(if comfort.closed > 0.0 { Visibility::Inherited } else { Visibility::Hidden });
+    }
+}
+
+/// How much of a motion it was from one place and direction to another, 0 to 1.
+fn motion(before: (Vec3, f32), now: (Vec3, f32), seconds: f32) -> f32 {
+    let (speed, turn) = (before.0.distance(now.0) / seconds, wrapped(now.1 - before.1).abs() / seconds);
+    if speed > JUMP[0] || turn > JUMP[1] { 0.0 } else { (speed.max(turn) / FAST).min(1.0) }
+}
+
+/// Draws the curtains while teleporting.
+fn darken(
+    teleport: Res<Teleport>,
+    cloth: Res<Cloth>,
+    mut materials: ResMut<Assets<StandardMaterial>>,
+    mut curtains: Query<&mut Visibility, With<Curtain>>,
+) {
+    if !teleport.is_changed() {
+        return;
+    }
+    let dark = teleport.dark();
+    if let Some(mut material) = materials.get_mut(&cloth.dark) {
+        material.base_color = Color::BLACK.with_alpha(dark);
+    }
+    for mut visibility in &mut curtains {
+        visibility.set_if_neq(if dark > 0.0 { Visibility::Inherited } else { Visibility::Hidden });
+    }
+}

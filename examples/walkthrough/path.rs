@@ -1,0 +1,185 @@
+//! A recorded way of the head: going it, and recording it.
+//!
+//! In: a RON file of poses, or the head as it moves. Out: the transforms of body and head at any time, or a file.
+
+use crate::body::{Body, EYE_HEIGHT, Head};
+use bevy::prelude::*;
+use bevy_gs4d::stereo::StereoRig;
+use serde::{Deserialize, Serialize};
+use std::array::from_fn;
+use std::f32::consts::{PI, TAU};
+use std::path::Path;
+
+/// Seconds between recorded poses.
+const SPACING: f32 = 0.1;
+/// Where recordings are written.
+const RECORDING: &str = "recorded.path.ron";
+
+/// Where the head is at a time.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pose {
+    /// Seconds.
+    time: f32,
+    /// Metres, y up.
+    position: [f32; 3],
+    /// Radians about the vertical, to the left.
+    yaw: f32,
+    /// Radians upwards.
+    pitch: f32,
+}
+
+impl Pose {
+    fn of(time: f32, head: &GlobalTransform) -> Self {
+        let (yaw, pitch, _) = head.rotation().to_euler(EulerRot::YXZ);
+        Self { time, position: head.translation().to_array(), yaw, pitch }
+    }
+
+    fn values(&self) -> [f32; 5] {
+        let [x, y, z] = self.position;
+        [x, y, z, self.yaw, self.pitch]
+    }
+}
+
+/// Poses in the order of time, at least one.
+#[derive(Resource)]
+pub struct HeadPath(Vec<Pose>);
+
+impl HeadPath {
+    /// Of a file, or the bundled one.
+    pub fn load(path: Option<&Path>) -> Result<Self> {
+        let read = match path {
+            Some(path) => {
+                let text = std::fs::read_to_string(path).map_err(|error| error.to_string());
+                text.and_then(|text| Self::read(&text)).map_err(|error| format!("{}: {error}", path.display()))
+            }
+            None => Self::read(include_str!("../../assets/walkthrough.path.ron")),
+        };
+        Ok(read?)
+    }
+
+    fn read(text: &str) -> Result<Self, String> {
+        let mut poses: Vec<Pose> = ron::from_str(text).map_err(|error| error.to_string())?;
+        if poses.is_empty() {
+            return Err("a path needs at least one pose".into());
+        }
+        let mut before: Option<Pose> = None;
+        for (number, pose) in (1..).zip(&mut poses) {
+            if !pose.time.is_finite() || !pose.values().iter().all(|value| value.is_finite()) {
+                return Err(format!("pose {number}: everything must be a finite number"));
+            }
+            if let Some(before) = before {
+                if pose.time <= before.time {
+                    return Err(format!("pose {number}: {} s is not after {} s", pose.time, before.time));
+                }
+                pose.yaw = before.yaw + wrapped(pose.yaw - before.yaw);
+            }
+            before = Some(*pose);
+        }
+        Ok(Self(poses))
+    }
+
+    fn duration(&self) -> f32 {
+        self.0.last().map_or(0.0, |pose| pose.time)
+    }
+
+    /// Between the poses along a smooth curve that starts and ends at rest; before and after them it stands.
+    fn at(&self, seconds: f32) -> Pose {
+        let Some(last) = self.0.len().checked_sub(1).filter(|last| *last > 0) else { return self.0[0] };
+        let next = self.0.partition_point(|pose| pose.time <= seconds).clamp(1, last);
+        let (a, b) = (self.0[next - 1], self.0[next]);
+        let (span, [from, to]) = (b.time - a.time, [self.slopes(next - 1), self.slopes(next)]);
+        let s = ((seconds - a.time) / span).clamp(0.0, 1.0);
+        let (before, after) = (a.values(), b.values());
+        let [x, y, z, yaw, pitch] = from_fn(|i| hermite(s, [before[i], after[i]], [from[i] * span, to[i] * span]));
+        Pose { time: seconds, position: [x, y, z], yaw, pitch }
+    }
+
+    /// Of the curve at a pose, per second.
+    fn slopes(&self, index: usize) -> [f32; 5] {
+        let (Some(before), Some(after)) = (index.checked_sub(1).map(|i| self.0[i]), self.0.get(index + 1)) else {
+            return [0.0; 5];
+        };
+        let (from, to) = (before.values(), after.values());
+        from_fn(|i| (to[i] - from[i]) / (after.time - before.time))
+    }
+}
+
+/// The cubic from one value to another with given slopes at both ends; `s` from 0 to 1.
+fn hermite(s: f32, [a, b]: [f32; 2], [from, to]: [f32; 2]) -> f32 {
+    let (s2, s3) = (s * s, s * s * s);
+    let rise = 3.0 * s2 - 2.0 * s3;
+    a * (1.0 - rise) + b * rise + from * (s3 - 2.0 * s2 + s) + to * (s3 - s2)
+}
+
+/// An angle as one from −π to π.
+pub fn wrapped(angle: f32) -> f32 {
+    (angle + PI).rem_euclid(TAU) - PI
+}
+
+/// How far along the path the head is.
+#[derive(Resource)]
+pub struct PathPlayer {
+    pub playing: bool,
+    pub seconds: f32,
+}
+
+/// Puts body and head where they are on the path.
+pub fn follow(
+    time: Res<Time>,
+    path: Res<HeadPath>,
+    mut player: ResMut<PathPlayer>,
+    body: Option<Single<&mut Transform, With<Body>>>,
+    head: Option<Single<&mut Transform, (With<StereoRig>, Without<Body>)>>,
+) {
+    let Some(mut body) = body.filter(|_| player.playing) else { return };
+    player.seconds += time.delta_secs();
+    player.playing = player.seconds <= path.duration();
+    let pose = path.at(player.seconds);
+    body.translation = Vec3::from(pose.position) - Vec3::Y * EYE_HEIGHT;
+    body.rotation = Quat::from_rotation_y(pose.yaw);
+    if let Some(mut head) = head {
+        head.rotation = Quat::from_rotation_x(pose.pitch);
+    }
+}
+
+/// What has been recorded so far, if anything is being recorded.
+#[derive(Resource, Default)]
+pub struct Recorder {
+    poses: Option<Vec<Pose>>,
+    seconds: f32,
+}
+
+/// R starts and ends a recording.
+pub fn record(
+    time: Res<Time>,
+    keys: Res<ButtonInput<KeyCode>>,
+    mut recorder: ResMut<Recorder>,
+    head: Single<&GlobalTransform, With<Head>>,
+) {
+    if keys.just_pressed(KeyCode::KeyR) {
+        match recorder.poses.take() {
+            Some(poses) => save(&poses),
+            None => {
+                info!("recording; R ends it");
+                *recorder = Recorder { poses: Some(Vec::new()), seconds: 0.0 };
+            }
+        }
+    }
+    recorder.seconds += time.delta_secs();
+    let now = recorder.seconds;
+    let Some(poses) = &mut recorder.poses else { return };
+    if poses.last().is_none_or(|last| now - last.time >= SPACING) {
+        poses.push(Pose::of(now, &head));
+    }
+}
+
+fn save(poses: &[Pose]) {
+    let written = ron::ser::to_string_pretty(poses, ron::ser::PrettyConfig::default().depth_limit(1))
+        .map_err(|error| error.to_string())
+        .and_then(|text| std::fs::write(RECORDING, text).map_err(|error| error.to_string()));
+    match written {
+        Ok(()) => info!("{} poses in {RECORDING}: --path {RECORDING} goes that way", poses.len()),
+        Err(error) => error!("{RECORDING}: {error}"),
+    }
+}

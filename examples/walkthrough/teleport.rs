@@ -1,0 +1,154 @@
+//! Teleporting: aim at the floor along the way of something thrown, let go, and be there after a moment of darkness.
+//!
+//! In: where the head is, keys and buttons. Out: another place of the body, how dark the view is, and dots that show the aim.
+
+use crate::body::{Body, Head};
+use bevy::prelude::*;
+
+/// How far from the middle there is floor to stand on, metres.
+pub const FLOOR_RADIUS: f32 = 8.0;
+/// Metres per second of what is thrown.
+const THROW: f32 = 6.0;
+/// Metres per second squared.
+const GRAVITY: f32 = 9.8;
+/// From the head to the hand that throws, metres.
+const HAND: Vec3 = Vec3::new(0.15, -0.3, -0.1);
+/// Seconds until the view is dark, and until it is not.
+const FADE: f32 = 0.12;
+const DOTS: u32 = 12;
+
+/// What is going on.
+#[derive(Resource, Debug, Default, Clone, Copy, PartialEq)]
+pub enum Teleport {
+    #[default]
+    Idle,
+    /// At a place, if what is aimed at is one.
+    Aiming(Option<Vec3>),
+    Leaving {
+        to: Vec3,
+        dark: f32,
+    },
+    Arriving {
+        dark: f32,
+    },
+}
+
+impl Teleport {
+    /// How dark the view is, 0 to 1.
+    pub fn dark(&self) -> f32 {
+        match self {
+            Self::Idle | Self::Aiming(_) => 0.0,
+            Self::Leaving { dark, .. } | Self::Arriving { dark } => dark.clamp(0.0, 1.0),
+        }
+    }
+}
+
+/// Something thrown.
+struct Throw {
+    from: Vec3,
+    velocity: Vec3,
+}
+
+impl Throw {
+    fn by(head: &GlobalTransform) -> Self {
+        Self { from: head.transform_point(HAND), velocity: head.forward() * THROW }
+    }
+
+    fn at(&self, seconds: f32) -> Vec3 {
+        self.from + self.velocity * seconds - Vec3::Y * (GRAVITY / 2.0 * seconds * seconds)
+    }
+
+    /// Seconds until it meets the height of the floor.
+    fn flight(&self) -> f32 {
+        let up = self.velocity.y;
+        (up + (up * up + 2.0 * GRAVITY * self.from.y.max(0.0)).sqrt()) / GRAVITY
+    }
+
+    /// Where it meets the floor, if there is floor.
+    fn landing(&self) -> Option<Vec3> {
+        let place = self.at(self.flight()).with_y(0.0);
+        (place.length() < FLOOR_RADIUS).then_some(place)
+    }
+}
+
+/// Shows where the aim is.
+#[derive(Component)]
+pub struct Marker;
+
+/// A dot at this share of the flight.
+#[derive(Component)]
+pub struct Dot(f32);
+
+pub fn setup(
+    mut commands: Commands,
+    mut meshes: ResMut<Assets<Mesh>>,
+    mut materials: ResMut<Assets<StandardMaterial>>,
+) {
+    let bright = StandardMaterial { base_color: Color::srgb(0.2, 0.8, 1.0), unlit: true, ..default() };
+    let material = MeshMaterial3d(materials.add(bright));
+    commands.spawn((Marker, Mesh3d(meshes.add(Cylinder::new(0.25, 0.02))), material.clone(), Visibility::Hidden));
+    let dot = meshes.add(Sphere::new(0.02));
+    for index in 1..=DOTS {
+        let share = Dot(index as f32 / DOTS as f32);
+        commands.spawn((share, Mesh3d(dot.clone()), material.clone(), Visibility::Hidden));
+    }
+}
+
+/// Holding T or the right button aims, letting go leaves.
+pub fn aim(
+    keys: Res<ButtonInput<KeyCode>>,
+    buttons: Res<ButtonInput<MouseButton>>,
+    head: Single<&GlobalTransform, With<Head>>,
+    mut teleport: ResMut<Teleport>,
+) {
+    let held = keys.pressed(KeyCode::KeyT) || buttons.pressed(MouseButton::Right);
+    let next = match (*teleport, held) {
+        (Teleport::Idle | Teleport::Aiming(_), true) => Teleport::Aiming(Throw::by(&head).landing()),
+        (Teleport::Aiming(Some(to)), false) => Teleport::Leaving { to, dark: 0.0 },
+        (Teleport::Aiming(None), false) => Teleport::Idle,
+        (under_way, _) => under_way,
+    };
+    teleport.set_if_neq(next);
+}
+
+/// Goes dark, puts the head above the place, and goes bright again.
+pub fn travel(
+    time: Res<Time>,
+    head: Single<&GlobalTransform, With<Head>>,
+    mut body: Single<&mut Transform, With<Body>>,
+    mut teleport: ResMut<Teleport>,
+) {
+    let step = time.delta_secs() / FADE;
+    let next = match *teleport {
+        Teleport::Leaving { to, dark } if dark + step < 1.0 => Teleport::Leaving { to, dark: dark + step },
+        Teleport::Leaving { to, .. } => {
+            body.translation += (to - head.translation()).with_y(0.0);
+            Teleport::Arriving { dark: 1.0 }
+        }
+        Teleport::Arriving { dark } if dark > step => Teleport::Arriving { dark: dark - step },
+        Teleport::Arriving { .. } => Teleport::Idle,
+        resting => resting,
+    };
+    teleport.set_if_neq(next);
+}
+
+/// Puts marker and dots where the aim is.
+pub fn show(
+    teleport: Res<Teleport>,
+    head: Single<&GlobalTransform, With<Head>>,
+    marker: Single<(&mut Transform, &mut Visibility), With<Marker>>,
+    mut dots: Query<(&Dot, &mut Transform, &mut Visibility), Without<Marker>>,
+) {
+    let shown = |shown: bool| if shown { Visibility::Visible } else { Visibility::Hidden };
+    let (mut place, mut visibility) = marker.into_inner();
+    let landing = if let Teleport::Aiming(landing) = *teleport { landing } else { None };
+    visibility.set_if_neq(shown(landing.is_some()));
+    if let Some(landing) = landing {
+        place.translation = landing;
+    }
+    let throw = Throw::by(&head);
+    for (dot, mut place, mut visibility) in &mut dots {
+        visibility.set_if_neq(shown(matches!(*teleport, Teleport::Aiming(_))));
+        place.translation = throw.at(throw.flight() * dot.0);
+    }
+}
