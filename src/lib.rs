@@ -83,7 +83,7 @@
 //! | `gpu` | [`gpu`]: the renderer, on wgpu |
 //! | `bevy` (default) | [`asset`], [`playback`], [`render`], [`prelude`]; implies `gpu` |
 //! | `cli` | the `gs4d` command; implies `gpu`, never compiles Bevy |
-//! | `viewer` | the window, lit meshes and panel of the interactive examples; implies `bevy` |
+//! | `viewer` | `viewer`: a panel to watch and steer captures with, and a window and lit meshes for the examples; implies `bevy` |
 #![cfg_attr(
     not(feature = "bevy"),
     expect(rustdoc::broken_intra_doc_links, reason = "the Bevy side is not part of this build")
@@ -108,6 +108,8 @@ pub mod reference;
 #[cfg(feature = "bevy")]
 pub mod render;
 pub mod scene;
+#[cfg(feature = "viewer")]
+pub mod viewer;
 
 /// The README, whose code must compile.
 #[cfg(all(doctest, feature = "bevy"))]
