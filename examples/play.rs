@@ -1,14 +1,17 @@
-//! Plays a capture in a window, with a lit ball standing in it: what is behind the ball is hidden, what is before it hides it.
+//! Plays a capture in a window, with a lit ball standing in it: what is behind the ball is hidden, what is before it hides it. The
+//! panel on the right plays, cuts and colours the capture, counts and times what is drawn, and shows it in false colours.
 //!
 //! ```text
 //! cargo run --release --features viewer --example play -- [CAPTURE] [--headless FOLDER] [--frames N]
 //! ```
 //!
 //! * drag with the left button: go round; wheel: nearer and farther
-//! * space: play and pause; left and right: a 30th of a second back and on
-//! * drop a `.gs4d` or `.pth` on the window: play that
+//! * click: mark what is there; the panel says which Gaussian it is
+//! * space: play and pause; left and right: a frame back and on, as long as the panel says
+//! * F1: close and open the panel
+//! * drop a `.gs4d` or `.pth` on the window: play that; if it cannot be read, the panel says why
 //!
-//! With `--headless FOLDER`, or where there is no display, it writes N (8) pictures to FOLDER (`out`) instead.
+//! With `--headless FOLDER`, or where there is no display, it writes N (8) pictures to FOLDER (`out`) instead, without the panel.
 
 mod common;
 #[path = "common/controls.rs"]
@@ -16,13 +19,17 @@ mod controls;
 
 use bevy::asset::UnapprovedPathMode;
 use bevy::core_pipeline::tonemapping::Tonemapping;
+use bevy::input::mouse::AccumulatedMouseMotion;
 use bevy::prelude::*;
+use bevy::window::PrimaryWindow;
 use bevy_egui::input::{egui_wants_any_keyboard_input, egui_wants_any_pointer_input};
-use bevy_egui::{EguiContexts, EguiPlugin, EguiPrimaryContextPass, egui};
 use bevy_gs4d::asset::GaussianCapture;
+use bevy_gs4d::picking::CapturePicker;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::render::{GaussianCapture3d, GaussianCapturePlugin};
-use common::{Orbit, offscreen};
+use bevy_gs4d::testing::{self, Offscreen};
+use bevy_gs4d::viewer::{Inspector, InspectorPlugin};
+use common::Orbit;
 use controls::{follow, mouse};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -33,12 +40,19 @@ struct Capture(PathBuf);
 #[derive(Component)]
 struct Ball;
 
+/// Where a click has hit.
+#[derive(Component)]
+struct Marker;
+
+/// Pixels that the mouse may move while a button is down for it to be a click.
+const CLICK: f32 = 4.0;
+
 fn main() -> Result {
     let arguments = controls::arguments("toybox.gs4d")?;
     let capture = Capture(common::asset_path(&arguments.file));
     match arguments.headless {
         Some(folder) => {
-            let mut app = offscreen::app(UVec2::new(960, 540));
+            let mut app = testing::app(UVec2::new(960, 540));
             scene(&mut app, capture);
             common::save_pictures(&mut app, arguments.frames, Duration::from_secs_f64(1.0 / 30.0), &folder)
         }
@@ -46,12 +60,11 @@ fn main() -> Result {
             let mut app = App::new();
             // Captures may be dropped from any folder.
             let files = AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..default() };
-            app.add_plugins((DefaultPlugins.set(files), EguiPlugin::default()));
+            app.add_plugins(DefaultPlugins.set(files));
             scene(&mut app, capture);
             let keys = keys.run_if(not(egui_wants_any_keyboard_input));
-            let mouse = mouse.run_if(not(egui_wants_any_pointer_input));
-            app.add_systems(Update, (drop_file, keys, mouse).before(follow)).add_systems(EguiPrimaryContextPass, panel);
-            app.run();
+            let mouse = (mouse, pick).run_if(not(egui_wants_any_pointer_input));
+            app.add_plugins(InspectorPlugin).add_systems(Update, (drop_file, keys, mouse).before(follow)).run();
             Ok(())
         }
     }
@@ -70,24 +83,23 @@ fn setup(
     mut commands: Commands,
     assets: Res<AssetServer>,
     capture: Res<Capture>,
-    offscreen: Option<Res<offscreen::Offscreen>>,
+    offscreen: Option<Res<Offscreen>>,
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
 ) {
     commands.spawn(GaussianCapture3d(assets.load(capture.0.clone())));
-    commands.spawn((
-        Ball,
-        Mesh3d(meshes.add(Sphere::new(1.0).mesh().uv(48, 24))),
-        MeshMaterial3d(materials.add(StandardMaterial::from(Color::srgb(0.45, 0.25, 0.8)))),
-        Visibility::Hidden,
-    ));
+    let sphere = Mesh3d(meshes.add(Sphere::new(1.0).mesh().uv(48, 24)));
+    let violet = materials.add(StandardMaterial::from(Color::srgb(0.45, 0.25, 0.8)));
+    commands.spawn((Ball, sphere.clone(), MeshMaterial3d(violet), Visibility::Hidden));
+    let yellow = StandardMaterial { unlit: true, ..StandardMaterial::from(Color::srgb(1.0, 0.85, 0.1)) };
+    commands.spawn((Marker, sphere, MeshMaterial3d(materials.add(yellow)), Visibility::Hidden));
     commands.spawn((
         DirectionalLight { illuminance: 4000.0, ..default() },
         Transform::from_xyz(2.0, 4.0, 3.0).looking_at(Vec3::ZERO, Vec3::Y),
     ));
     let mut camera = commands.spawn((
         Camera3d::default(),
-        // Meshes hide what is behind them only without multisampling.
+        // Captures are no smoother for multisampling.
         Msaa::Off,
         // Colours of the capture as trained.
         Tonemapping::None,
@@ -119,6 +131,7 @@ fn frame_capture(
 fn keys(
     keys: Res<ButtonInput<KeyCode>>,
     captures: Res<Assets<GaussianCapture>>,
+    inspector: Res<Inspector>,
     player: Single<(&GaussianCapture3d, &mut Playback)>,
 ) {
     let (handle, mut playback) = player.into_inner();
@@ -129,8 +142,39 @@ fn keys(
     if steps != 0
         && let Some(capture) = captures.get(&handle.0)
     {
-        playback.step(steps, 30.0, capture.duration_seconds());
+        playback.step(steps, inspector.fps, capture.duration_seconds());
     }
+}
+
+/// Marks what a click hits, and says so in the panel.
+fn pick(
+    buttons: Res<ButtonInput<MouseButton>>,
+    motion: Res<AccumulatedMouseMotion>,
+    mut dragged: Local<f32>,
+    window: Single<&Window, With<PrimaryWindow>>,
+    camera: Single<(&Camera, &GlobalTransform)>,
+    picker: CapturePicker,
+    marker: Single<(&mut Transform, &mut Visibility), (With<Marker>, Without<GaussianCapture3d>)>,
+    mut inspector: ResMut<Inspector>,
+) {
+    if buttons.just_pressed(MouseButton::Left) {
+        *dragged = 0.0;
+    }
+    *dragged += motion.delta.length();
+    if !buttons.just_released(MouseButton::Left) || *dragged > CLICK {
+        return;
+    }
+    let (camera, pose) = camera.into_inner();
+    let ray = window.cursor_position().and_then(|cursor| camera.viewport_to_world(pose, cursor).ok());
+    let (mut place, mut visibility) = marker.into_inner();
+    let Some(hit) = ray.and_then(|ray| picker.cast(ray)) else {
+        *visibility = Visibility::Hidden;
+        inspector.note = "nothing is there".into();
+        return;
+    };
+    *visibility = Visibility::Visible;
+    *place = Transform::from_translation(hit.point).with_scale(Vec3::splat(hit.distance * 0.008));
+    inspector.note = format!("Gaussian {}, {:.2} away", hit.gaussian, hit.distance);
 }
 
 fn drop_file(
@@ -145,31 +189,4 @@ fn drop_file(
             **playback = Playback::default();
         }
     }
-}
-
-fn panel(
-    mut contexts: EguiContexts,
-    assets: Res<AssetServer>,
-    captures: Res<Assets<GaussianCapture>>,
-    player: Single<(&GaussianCapture3d, &mut Playback)>,
-) -> Result {
-    let (handle, mut playback) = player.into_inner();
-    let window = egui::Window::new("playback").title_bar(false).resizable(false);
-    window.anchor(egui::Align2::CENTER_BOTTOM, [0.0, -12.0]).show(contexts.ctx_mut()?, |ui| {
-        let Some(capture) = captures.get(&handle.0) else {
-            let failed = assets.load_state(&handle.0).is_failed();
-            ui.label(if failed { "not a capture that can be read; the log says why" } else { "loading ..." });
-            return;
-        };
-        ui.horizontal(|ui| {
-            if ui.button(if playback.playing { "pause" } else { "play" }).clicked() {
-                playback.toggle();
-            }
-            ui.spacing_mut().slider_width = 320.0;
-            ui.add(egui::Slider::new(&mut playback.time, 0.0..=capture.duration_seconds()).suffix(" s"));
-            ui.spacing_mut().slider_width = 80.0;
-            ui.add(egui::Slider::new(&mut playback.speed, -2.0..=2.0).text("speed"));
-        });
-    });
-    Ok(())
 }

@@ -84,7 +84,7 @@
 //! | `bevy` (default) | [`asset`], [`playback`], [`render`], [`stereo`], [`prelude`]; implies `gpu` |
 //! | `cli` | the `gs4d` command; implies `gpu`, never compiles Bevy |
 //! | `testing` | `testing`: Bevy apps without a window, drawn into pictures; implies `bevy` |
-//! | `viewer` | the window, lit meshes and panel of the interactive examples; implies `testing` |
+//! | `viewer` | `viewer`: a panel to watch and steer captures with, and a window and lit meshes for the examples; implies `testing` |
 #![cfg_attr(
     not(feature = "bevy"),
     expect(rustdoc::broken_intra_doc_links, reason = "the Bevy side is not part of this build")
@@ -115,6 +115,8 @@ pub mod scene;
 pub mod stereo;
 #[cfg(feature = "testing")]
 pub mod testing;
+#[cfg(feature = "viewer")]
+pub mod viewer;
 
 /// The README, whose code must compile.
 #[cfg(all(doctest, feature = "bevy"))]

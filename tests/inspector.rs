@@ -1,0 +1,168 @@
+//! The panel, in Bevy apps without a window.
+//!
+//! In: captures that have been loaded, failed to load, or are missing. Out: proof that the panel draws itself over its edge of the
+//! picture only, touches nothing by itself, and sets views that change pixels. Skipped where there is no GPU, not even a software
+//! one.
+
+#[path = "common/app.rs"]
+mod common;
+#[path = "common/skip.rs"]
+mod skip;
+
+use bevy::core_pipeline::tonemapping::Tonemapping;
+use bevy::prelude::*;
+use bevy::time::TimeUpdateStrategy;
+use bevy_gs4d::asset::{CaptureState, GaussianCapture};
+use bevy_gs4d::frame::DebugView;
+use bevy_gs4d::playback::{Playback, PlaybackSeeked};
+use bevy_gs4d::render::{CaptureSettings, CaptureViewSettings, GaussianCapture3d};
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::testing;
+use bevy_gs4d::viewer::{Inspector, InspectorPlugin};
+use common::{app, picture, spawn_camera};
+use image::RgbaImage;
+use std::ops::Range;
+use std::time::Duration;
+
+/// The panel is 300 points wide and stands 8 from the right edge.
+const SIZE: UVec2 = UVec2::new(420, 200);
+/// Columns that neither the panel nor its shadow reaches.
+const BESIDE: Range<u32> = 0..64;
+/// Columns that the panel covers.
+const PANEL: Range<u32> = 114..410;
+
+/// How often something was told, or marked as changed.
+#[derive(Resource, Default)]
+struct Seen {
+    seeks: usize,
+    changes: usize,
+}
+
+/// An app with a camera and the panel, or nothing where there is no GPU.
+fn inspected() -> Option<(App, Entity)> {
+    let mut app = app(SIZE)?;
+    app.add_plugins(InspectorPlugin).init_resource::<Seen>();
+    app.add_observer(|_: On<PlaybackSeeked>, mut seen: ResMut<Seen>| seen.seeks += 1);
+    let place = Transform::from_xyz(2.5, 2.0, 1.5).looking_at(Vec3::ZERO, Vec3::Z);
+    let camera = spawn_camera(&mut app, Msaa::Off, place);
+    Some((app, camera))
+}
+
+fn spawn_capture(app: &mut App, playback: Playback) -> Entity {
+    let settings = SynthSettings { count: 300, degree: 0, duration_seconds: 2.0, ..SynthSettings::default() };
+    let scene = synthesize(&settings).into_runtime().expect("a synthetic scene can be drawn");
+    let handle = app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(scene));
+    app.world_mut().spawn((GaussianCapture3d(handle), playback)).id()
+}
+
+fn set_open(app: &mut App, open: bool) {
+    app.world_mut().resource_mut::<Inspector>().open = open;
+}
+
+/// Updates `seconds` apart, none of which may fail.
+fn run(app: &mut App, updates: usize, seconds: f32) {
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f32(seconds)));
+    for _ in 0..updates {
+        app.update();
+        assert_eq!(app.should_exit(), None, "drawing goes on");
+    }
+}
+
+/// The share of pixels of some columns that are not the same.
+fn changed(a: &RgbaImage, b: &RgbaImage, columns: Range<u32>) -> f64 {
+    let all = f64::from(columns.end - columns.start) * f64::from(SIZE.y);
+    let differs = |&(x, y): &(u32, u32)| a.get_pixel(x, y) != b.get_pixel(x, y);
+    columns.flat_map(|x| (0..SIZE.y).map(move |y| (x, y))).filter(differs).count() as f64 / all
+}
+
+#[test]
+fn the_panel_covers_its_edge_of_the_picture_and_nothing_else() {
+    let Some((mut app, _)) = inspected() else { return };
+    spawn_capture(&mut app, Playback::paused_at(0.5));
+    let open = picture(&mut app, 0.0);
+    set_open(&mut app, false);
+    let closed = picture(&mut app, 0.0);
+    let covered = changed(&open, &closed, PANEL);
+    assert!(covered > 0.5, "the panel changes most of what it covers, not {covered}");
+    assert_eq!(changed(&open, &closed, BESIDE), 0.0, "and nothing beside it");
+    set_open(&mut app, true);
+    assert_eq!(changed(&open, &picture(&mut app, 0.0), 0..SIZE.x), 0.0, "open again, it is the same");
+}
+
+#[test]
+fn the_panel_runs_without_a_capture_with_one_and_with_a_failed_one() {
+    let Some((mut app, _)) = inspected() else { return };
+    testing::settle(&mut app).expect("the app runs without a capture");
+    run(&mut app, 5, 0.1);
+    let good = spawn_capture(&mut app, Playback::default());
+    testing::settle(&mut app).expect("the capture shows");
+    run(&mut app, 5, 0.1);
+    let state = |app: &App, entity| format!("{:?}", app.world().get::<CaptureState>(entity));
+    assert!(state(&app, good).contains("Ready"), "it has been loaded: {}", state(&app, good));
+
+    let handle = app.world().resource::<AssetServer>().load("there-is-none.gs4d");
+    let bad = app.world_mut().spawn(GaussianCapture3d(handle)).id();
+    app.world_mut().resource_mut::<Inspector>().selected = Some(bad);
+    for _ in 0..1000 {
+        if state(&app, bad).contains("Failed") {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+        run(&mut app, 1, 0.0);
+    }
+    assert!(state(&app, bad).contains("there-is-none.gs4d"), "the failure names the file: {}", state(&app, bad));
+    run(&mut app, 5, 0.1);
+    app.world_mut().despawn(bad);
+    run(&mut app, 5, 0.1);
+    assert_eq!(app.world().resource::<Inspector>().selected, Some(bad), "what is shown instead was not selected");
+}
+
+#[test]
+fn an_open_panel_that_nobody_touches_seeks_and_changes_nothing() {
+    let Some((mut app, _)) = inspected() else { return };
+    let odd = Playback { time: 0.123_45, speed: 3.5, start: 0.1, end: 7.0, ..Playback::default() };
+    let entity = spawn_capture(&mut app, odd);
+    app.add_systems(Last, count_changes);
+    testing::settle(&mut app).expect("the capture shows");
+    run(&mut app, 5, 0.1);
+    assert_eq!(app.world().resource::<Seen>().seeks, 0, "playing on is no seek");
+
+    app.world_mut().get_mut::<Playback>(entity).expect("a required component").pause();
+    run(&mut app, 1, 0.1);
+    app.world_mut().resource_mut::<Seen>().changes = 0;
+    run(&mut app, 5, 0.1);
+    let seen = app.world().resource::<Seen>();
+    assert_eq!((seen.seeks, seen.changes), (0, 0), "paused, everything stays as it is");
+
+    app.world_mut().get_mut::<Playback>(entity).expect("a required component").seek(1.5);
+    run(&mut app, 1, 0.1);
+    let seen = app.world().resource::<Seen>();
+    assert_eq!((seen.seeks, seen.changes), (1, 1), "what the game does is noticed");
+}
+
+type Changes = Or<(
+    Changed<Playback>,
+    Changed<CaptureSettings>,
+    Changed<CaptureViewSettings>,
+    Changed<Msaa>,
+    Changed<Tonemapping>,
+)>;
+
+fn count_changes(changed: Query<(), Changes>, inspector: Res<Inspector>, mut seen: ResMut<Seen>) {
+    seen.changes += changed.iter().count() + usize::from(inspector.is_changed());
+}
+
+#[test]
+fn a_debug_view_changes_what_a_camera_shows() {
+    let Some((mut app, camera)) = inspected() else { return };
+    spawn_capture(&mut app, Playback::paused_at(0.5));
+    set_open(&mut app, false);
+    let as_trained = picture(&mut app, 0.0);
+    app.world_mut().entity_mut(camera).insert(CaptureViewSettings::default());
+    assert_eq!(changed(&as_trained, &picture(&mut app, 0.0), 0..SIZE.x), 0.0, "the default is what is shown without");
+    for debug in [DebugView::Depth, DebugView::Overdraw, DebugView::Lifespan, DebugView::Velocity] {
+        app.world_mut().entity_mut(camera).insert(CaptureViewSettings { debug, ..default() });
+        let share = changed(&as_trained, &picture(&mut app, 0.0), 0..SIZE.x);
+        assert!(share > 0.01, "{debug:?} must not look like colour: {share} of the picture differs");
+    }
+}
