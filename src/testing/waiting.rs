@@ -13,6 +13,7 @@ use bevy::ecs::resource::Resource;
 use bevy::ecs::world::World;
 use bevy::render::RenderApp;
 use bevy::render::render_resource::{CachedPipelineState, PipelineCache};
+use bevy::shader::ShaderCacheError;
 use std::time::{Duration, Instant};
 
 /// How long everything may take to load and compile.
@@ -155,8 +156,13 @@ fn pipelines_are_ready(app: &App) -> Result<bool, TestingError> {
     let renderer = app.get_sub_app(RenderApp).ok_or(TestingError::NoGpu)?;
     let Some(cache) = renderer.world().get_resource::<PipelineCache>() else { return Ok(false) };
     for pipeline in cache.pipelines() {
-        if let CachedPipelineState::Err(failure) = &pipeline.state {
-            return Err(TestingError::Pipeline(failure.to_string()));
+        match &pipeline.state {
+            // Bevy tries these again: the shader is still on its way.
+            CachedPipelineState::Err(
+                ShaderCacheError::ShaderNotLoaded(_) | ShaderCacheError::ShaderImportNotYetAvailable,
+            ) => return Ok(false),
+            CachedPipelineState::Err(failure) => return Err(TestingError::Pipeline(failure.to_string())),
+            _ => {}
         }
     }
     Ok(cache.waiting_pipelines().count() == 0)
