@@ -35,14 +35,17 @@
 //! ```text
 //!      Bevy                                                   without Bevy
 //!
-//!      Time                                                   dataset::CameraFile, an orbit
+//!      Time, a Timeline                                       dataset::CameraFile, an orbit
 //!        ▼                                                             │
-//!  playback::Playback    camera, transforms                            │
+//!  playback::Playback    cameras, transforms                           │
 //!        └───────┬────────────┘                                        │
 //!                ▼                                                     ▼
 //!  render: extract, prepare ───────▶  gaussian::View  ◀───── gaussian::Camera
-//!                                           │
-//!          gpu: one compute pass            ▼
+//!                │                          │
+//!                ▼ once for all cameras     │
+//!          gpu: activate ──▶ gpu::ActiveList│
+//!                                           ▼
+//!          gpu: one compute pass
 //!          ┌────────────────────────────────────────────────────────────┐
 //!          │ project ─▶ sort ─▶ bin ─▶ sort ─▶ ranges ─▶ blend          │
 //!          │ splats     depth   pairs  tile    of tiles  colour, depth  │
@@ -53,15 +56,21 @@
 //!  render: composite into the camera's target              gpu::Headless: frame::Frame
 //! ```
 //!
-//! 1. [`playback`] moves each entity's clock on; a [`View`](gaussian::View) is one camera at one time. In Bevy [`render`] makes
+//! 1. [`playback`] moves each entity's clock on, or a timeline or a shared clock does; a [`View`](gaussian::View) is one camera at one time. In Bevy [`render`] makes
 //!    it from cameras and transforms, elsewhere a [`Camera`](gaussian::Camera) does.
-//! 2. [`gpu`] draws views with plain wgpu, on whatever device it is given; it knows nothing of Bevy. All captures in a view share
-//!    one compute pass, so that they interleave by depth. Its size is decided on the GPU: nothing is read back inside a frame.
+//! 2. [`gpu`] draws views with plain wgpu, on whatever device it is given; it knows nothing of Bevy. `activate` lists what the temporal
+//!    filter leaves, only when a capture enters another segment of time. All captures in a view share one compute pass, so that they interleave by depth. Its size is decided on the GPU: nothing is read back inside a frame.
 //! 3. Inside `blend` the depth of opaque meshes cuts the splats, pixel by pixel. The composite, the only pass in Bevy's pipeline
 //!    cache, lays the result over what the camera has drawn so far.
 //! 4. [`gpu::Headless`] hands the result over as a [`Frame`](frame::Frame) instead. The `gs4d` command and the tests use it.
 //!
 //! A pass has one name everywhere: `shaders/project.wgsl`, the functions in [`mod@reference`], the timestamp span, the test.
+//!
+//! # Around it, for games
+//!
+//! [`asset`] tells what became of loading, also of hot reloads. [`picking`] finds the Gaussian under a ray. [`stereo`] gives a head
+//! two eyes. `viewer` is a panel that shows and changes all of this, `testing` renders an app to pictures without a window.
+//! The guide, `docs/guide.md`, goes through them in the order in which a game meets them.
 //!
 //! # From a checkpoint to a small capture
 //!
@@ -81,7 +90,7 @@
 //! |---|---|
 //! | none | `gaussian`, `scene`, `codec`, `dataset`, `metrics`, `reference`: no GPU, no Bevy |
 //! | `gpu` | [`gpu`]: the renderer, on wgpu |
-//! | `bevy` (default) | [`asset`], [`playback`], [`render`], [`stereo`], [`prelude`]; implies `gpu` |
+//! | `bevy` (default) | [`asset`], [`playback`], [`render`], [`picking`], [`stereo`], [`prelude`]; implies `gpu` |
 //! | `cli` | the `gs4d` command; implies `gpu`, never compiles Bevy |
 //! | `testing` | `testing`: Bevy apps without a window, drawn into pictures; implies `bevy` |
 //! | `viewer` | `viewer`: a panel to watch and steer captures with, and a window and lit meshes for the examples; implies `testing` |
@@ -122,3 +131,8 @@ pub mod viewer;
 #[cfg(all(doctest, feature = "bevy"))]
 #[doc = include_str!("../README.md")]
 struct Readme;
+
+/// The guide, likewise.
+#[cfg(all(doctest, feature = "bevy"))]
+#[doc = include_str!("../docs/guide.md")]
+struct Guide;

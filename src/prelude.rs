@@ -9,7 +9,7 @@
 //! fn setup(mut commands: Commands, assets: Res<AssetServer>) {
 //!     let once = Playback { repeat: Repeat::Once, ..default() };
 //!     commands.spawn((GaussianCapture3d(assets.load("toybox.gs4d")), once));
-//!     commands.spawn((Camera3d::default(), Msaa::Off, Transform::from_xyz(0.0, 1.0, 4.0)));
+//!     commands.spawn((Camera3d::default(), Transform::from_xyz(0.0, 1.0, 4.0)));
 //! }
 //!
 //! fn slow_motion(mut playback: Single<&mut Playback>) {
@@ -32,3 +32,4 @@ pub use crate::render::{
     CaptureSettings, CaptureStatistics, CaptureViewSettings, CropBox, DepthWrite, GaussianCapture3d,
     GaussianCapturePlugin,
 };
+pub use crate::stereo::{Eye, EyeTargets, StereoPlugin, StereoRig, spawn_stereo};

@@ -15,9 +15,10 @@ use bevy::math::DVec3;
 use bevy::prelude::*;
 use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
+use bevy_gs4d::gpu::activated;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::render::GaussianCapture3d;
-use bevy_gs4d::scene::{PlaybackHints, RuntimeScene, TrainedWith};
+use bevy_gs4d::scene::{PlaybackHints, RuntimeScene, TemporalFilter, TrainedWith};
 use bevy_gs4d::stereo::{EyeTargets, StereoPlugin, StereoRig, spawn_stereo};
 use bevy_gs4d::testing::{self, Offscreen};
 use common::{FOV_Y, app, picture, spawn_camera};
@@ -218,4 +219,23 @@ fn two_halves_and_two_targets_show_the_same() {
         assert_eq!(apart(&halves[index], &pair[index]), 0, "the {name} eye's pictures are the same");
     }
     assert!(apart(&halves[0], &halves[1]) > 50, "while the two eyes' differ");
+}
+
+#[test]
+fn both_eyes_share_one_list_of_the_active() {
+    let mut filtered = crowd();
+    let interval = filtered.trained_with.time_interval;
+    filtered.filter = Some(TemporalFilter::support(filtered.gaussians.iter().copied(), interval, 4));
+    let Some(mut stage) = Stage::new(&filtered, Transform::from_xyz(0.0, 0.0, 4.0), false) else { return };
+    stage.eyes(0.0);
+    let made = activated();
+    stage.eyes(0.2 * DURATION);
+    assert_eq!(activated(), made, "within a segment of time the list stays");
+    let eyes = stage.eyes(0.1 * DURATION);
+    assert_eq!(activated(), made + 1, "in the next one it is made once, not for each eye");
+    let Some(mut plain) = Stage::new(&crowd(), Transform::from_xyz(0.0, 0.0, 4.0), false) else { return };
+    let expected = plain.eyes(0.3 * DURATION);
+    for (eye, expected) in eyes.iter().zip(&expected) {
+        assert_eq!(apart(eye, expected), 0, "and both see what they see without a filter");
+    }
 }

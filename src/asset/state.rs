@@ -18,6 +18,7 @@ use bevy::ecs::message::MessageReader;
 use bevy::ecs::reflect::ReflectComponent;
 use bevy::ecs::schedule::SystemSet;
 use bevy::ecs::system::{Query, Res};
+use bevy::log::debug_span;
 use bevy::reflect::{Reflect, std_traits::ReflectDefault};
 use std::collections::{HashMap, HashSet};
 use std::fmt::Display;
@@ -50,6 +51,7 @@ pub(super) fn keep_states(
     mut captures: Query<(Entity, Ref<GaussianCapture3d>, &mut CaptureState)>,
     mut announcer: Announcer,
 ) {
+    let _span = debug_span!("gs4d/states").entered();
     let changed: HashSet<AssetId<GaussianCapture>> = changes.read().filter_map(modified).collect();
     let failed: HashMap<AssetId<GaussianCapture>, String> =
         failures.read().map(|failure| (failure.id, describe(&failure.path, &failure.error))).collect();

@@ -6,6 +6,7 @@
 use super::capture::{Filter, GpuCapture};
 use super::layout::{Activation, BLOCK};
 use super::renderer::{Renderer, bind_group};
+use super::statistics::note_activated;
 use super::view::{alignment_of, buffer};
 use wgpu::BufferUsages;
 
@@ -73,6 +74,7 @@ impl ActiveList {
             return;
         }
         self.recorded = true;
+        note_activated();
         let mut pass = encoder
             .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("gs4d activate"), timestamp_writes: None });
         for (index, part) in capture.parts.iter().enumerate() {

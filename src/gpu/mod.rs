@@ -40,7 +40,7 @@ pub use headless::Headless;
 pub use renderer::Renderer;
 pub use score::{GpuEngine, Scorer};
 pub use shaders::{ShaderChecks, Storage};
-pub use statistics::{ViewStatistics, created, uploaded};
+pub use statistics::{ViewStatistics, activated, created, uploaded};
 pub(crate) use statistics::{note_created, note_uploaded};
 pub use timing::{PassTime, Timings};
 pub use view::{Instance, OpaqueDepth, Surroundings, ViewRenderer};

@@ -15,6 +15,7 @@ use bevy::ecs::entity::Entity;
 use bevy::ecs::query::{QueryFilter, Without};
 use bevy::ecs::schedule::SystemSet;
 use bevy::ecs::system::{Query, Res};
+use bevy::log::debug_span;
 use bevy::time::Time;
 
 /// Sets of playback systems in `Update`, in this order.
@@ -31,6 +32,7 @@ pub enum PlaybackSystems {
 
 /// Runs the clocks that the game's time moves.
 pub(super) fn run_clocks(time: Res<Time>, mut clocks: Query<&mut PlaybackClock>) {
+    let _span = debug_span!("gs4d/clocks").entered();
     for mut clock in &mut clocks {
         let mut next = *clock;
         next.advance(time.delta_secs_f64());
@@ -49,6 +51,7 @@ pub(super) fn advance_captures(
     >,
     mut announcer: Announcer,
 ) {
+    let _span = debug_span!("gs4d/playback").entered();
     for (entity, handle, mut playback, mut state, follows) in &mut players {
         let Some(capture) = captures.get(&handle.0) else { continue };
         let drive = drive(follows, &clocks, &time);

@@ -11,6 +11,7 @@ use crate::gpu::ActiveList;
 use bevy::asset::AssetId;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Res, ResMut};
+use bevy::log::debug_span;
 use bevy::render::diagnostic::RecordDiagnostics;
 use bevy::render::render_asset::RenderAssets;
 use bevy::render::renderer::{RenderContext, RenderDevice, RenderQueue};
@@ -37,6 +38,7 @@ pub(super) fn prepare_active_lists(
     captures: Res<RenderAssets<GpuGaussianCapture>>,
     mut lists: ResMut<ActiveLists>,
 ) {
+    let _span = debug_span!("gs4d/lists").entered();
     let Some(renderer) = renderer else { return };
     let uploaded = |asset: AssetId<GaussianCapture>| captures.get(asset)?.capture();
     lists.0.retain(|entity, placed| {
@@ -65,6 +67,7 @@ pub(super) fn record_active_lists(
     mut lists: ResMut<ActiveLists>,
     mut context: RenderContext,
 ) {
+    let _span = debug_span!("gs4d/activate").entered();
     let Some(renderer) = renderer else { return };
     // Most frames begin no encoder.
     if !lists.0.values().any(|placed| placed.stale) {

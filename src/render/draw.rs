@@ -10,6 +10,7 @@ use super::upload::GpuGaussianCapture;
 use super::write_depth::WriteDepthPipeline;
 use bevy::ecs::schedule::SystemSet;
 use bevy::ecs::system::{Res, ResMut, SystemParam};
+use bevy::log::debug_span;
 use bevy::render::diagnostic::RecordDiagnostics;
 use bevy::render::render_asset::RenderAssets;
 use bevy::render::render_resource::{
@@ -46,6 +47,7 @@ pub(super) fn draw_captures<const MULTISAMPLED: bool>(
     mut views: ResMut<CaptureViews>,
     mut context: RenderContext,
 ) {
+    let _span = debug_span!("gs4d/draw").entered();
     let entity = camera.entity();
     let (target, depth, msaa) = camera.into_inner();
     if (*msaa != Msaa::Off) != MULTISAMPLED {

@@ -14,6 +14,7 @@ use bevy::ecs::entity::Entity;
 use bevy::ecs::query::With;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Query, Res, ResMut};
+use bevy::log::debug_span;
 use bevy::render::Extract;
 use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
 use bevy::transform::components::GlobalTransform;
@@ -55,6 +56,7 @@ pub(super) fn extract_captures(
     assets: Extract<Res<Assets<GaussianCapture>>>,
     captures: Extract<Query<Placed>>,
 ) {
+    let _span = debug_span!("gs4d/extract").entered();
     extracted.0.clear();
     for (entity, capture, settings, playback, transform, visibility, fade) in &captures {
         let Some(loaded) = assets.get(&capture.0) else { continue };

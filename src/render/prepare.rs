@@ -21,7 +21,7 @@ use bevy::ecs::entity::Entity;
 use bevy::ecs::query::With;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Commands, Query, Res, ResMut, SystemParam};
-use bevy::log::{error, error_once, warn_once};
+use bevy::log::{debug_span, error, error_once, warn_once};
 use bevy::platform::collections::HashMap;
 use bevy::render::camera::ExtractedCamera;
 use bevy::render::render_asset::RenderAssets;
@@ -198,6 +198,7 @@ pub(super) fn prepare_views(
     mut views: ResMut<CaptureViews>,
     cameras: Query<CameraView, With<Camera3d>>,
 ) {
+    let _span = debug_span!("gs4d/prepare").entered();
     let Some(renderer) = renderer else { return };
     let measure = statistics.is_measuring();
     views.0.retain(|&camera, _| cameras.contains(camera));

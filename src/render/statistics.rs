@@ -8,6 +8,7 @@ use crate::gpu::{GpuCapture, ViewStatistics};
 use bevy::ecs::entity::Entity;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::Res;
+use bevy::log::debug_span;
 use bevy::render::render_asset::RenderAssets;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -76,6 +77,7 @@ pub(super) fn publish_statistics(
     views: Res<CaptureViews>,
     captures: Res<RenderAssets<GpuGaussianCapture>>,
 ) {
+    let _span = debug_span!("gs4d/statistics").entered();
     let mut shared = statistics.lock();
     let seen = || views.0.values().filter(|view| view.sees_something());
     shared.views.retain(|(camera, _)| seen().any(|view| view.camera == *camera));

@@ -10,6 +10,7 @@ use bevy::camera::primitives::Aabb;
 use bevy::ecs::change_detection::DetectChangesMut;
 use bevy::ecs::entity::Entity;
 use bevy::ecs::system::{Commands, Query, Res};
+use bevy::log::debug_span;
 
 /// Keeps the boxes up with time. After whatever moves playback on, before Bevy asks which entities a camera sees.
 pub(super) fn update_bounds(
@@ -17,6 +18,7 @@ pub(super) fn update_bounds(
     mut placed: Query<(Entity, &GaussianCapture3d, &Playback, Option<&mut Aabb>)>,
     mut commands: Commands,
 ) {
+    let _span = debug_span!("gs4d/bounds").entered();
     for (entity, handle, playback, known) in &mut placed {
         let Some(capture) = captures.get(&handle.0) else { continue };
         match (aabb_at(capture, playback.time), known) {

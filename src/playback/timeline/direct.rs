@@ -17,6 +17,7 @@ use bevy::ecs::entity::Entity;
 use bevy::ecs::hierarchy::{ChildOf, Children};
 use bevy::ecs::query::Without;
 use bevy::ecs::system::{Commands, Query, Res};
+use bevy::log::debug_span;
 use bevy::time::Time;
 
 /// Gives every track an entity, and every such entity the player's clock.
@@ -59,6 +60,7 @@ pub(in crate::playback) fn advance_timelines(
     )>,
     mut announcer: Announcer,
 ) {
+    let _span = debug_span!("gs4d/timelines").entered();
     for (entity, handle, mut playback, mut state, mut clock, follows) in &mut players {
         let Some(timeline) = timelines.get(&handle.0) else { continue };
         let drive = drive(follows, &clocks, &time);
@@ -96,6 +98,7 @@ pub(in crate::playback) fn direct_tracks(
     players: Query<(&TimelinePlayer, &PlaybackClock, &Children)>,
     mut stages: Query<(&TimelineTrack, &mut Visibility, &mut ClipFade, Actor<'static>), Without<TimelinePlayer>>,
 ) {
+    let _span = debug_span!("gs4d/tracks").entered();
     for (handle, clock, children) in &players {
         let Some(timeline) = timelines.get(&handle.0) else { continue };
         let time = clock.seconds;
