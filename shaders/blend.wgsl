@@ -2,7 +2,7 @@
 // In: tile ranges, pairs, splats, the depth of opaque surfaces, the background. Out: colour and transmittance, expected and median
 // depth. Each sample of a multisampled depth hides what is behind it from its share of the pixel. Section 3.4 of the 4DGS model; twin of src/reference/blend.rs.
 #import gs4d::types::{Frame, Splat, BACKGROUND_COLOR, BACKGROUND_ENVIRONMENT, DEBUG_DEPTH, DEBUG_OVERDRAW}
-#import gs4d::look::{decode, heat}
+#import gs4d::look::{heat, lit}
 #import gs4d::environment::environment_texel
 
 const TILE_SIZE: u32 = 16u;
@@ -142,9 +142,10 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
         } else if frame.background_mode == BACKGROUND_COLOR {
             color += transmittance * frame.background.xyz;
         } else if frame.background_mode == BACKGROUND_ENVIRONMENT && open > 0.0 {
-            color += behind * environment_color(position);
+            let shown = behind * frame.environment_opacity;
+            color += shown * environment_color(position);
             // background.w: whether what is behind the map is hidden by it.
-            transmittance -= behind * (1.0 - frame.background.w);
+            transmittance -= shown * (1.0 - frame.background.w);
         }
         textureStore(color_out, pixel, vec4(color, transmittance));
         textureStore(depth_out, pixel, vec4(depth, median, 0.0, 0.0));
@@ -156,7 +157,7 @@ fn debug_depth(depth: f32, opacity: f32) -> f32 {
     if opacity <= 0.0 {
         return 0.0;
     }
-    return opacity * frame.debug_depth / (frame.debug_depth + depth / opacity);
+    return opacity * frame.debug_depth / (frame.debug_depth + max(depth / opacity, 0.0));
 }
 
 // Camera-space depth of the opaque surface of each sample of this pixel.
@@ -222,7 +223,7 @@ fn environment_color(position: vec2<f32>) -> vec3<f32> {
         let weight = (1.0 - abs(at.x - texel.x)) * (1.0 - abs(at.y - texel.y));
         color += weight * environment_at(texel);
     }
-    return select(color, decode(max(color, vec3(0.0))), frame.linear != 0u);
+    return lit(color, frame.environment_lighting, frame.background.xyz);
 }
 
 // Black outside the texture: the seam fades, as in the original.

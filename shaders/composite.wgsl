@@ -4,6 +4,9 @@
 // the space they were blended in: sRGB-encoded values; linear light with LINEAR_BLEND) for the pixels of the viewport. Out: the view
 // target. Blending with what is behind happens in the captures' space, too.
 
+// The largest half float: an infinite pixel would spread through bloom.
+const BRIGHTEST: f32 = 65504.0;
+
 @group(0) @binding(0) var source: texture_2d<f32>;
 @group(0) @binding(1) var captures: texture_2d<f32>;
 // Corner and size of the viewport in the target, pixels.
@@ -69,5 +72,6 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
         return behind;
     }
     let alpha = 1.0 - transmittance * (1.0 - behind.a);
-    return vec4(from_blend_space(front.rgb + transmittance * to_blend_space(behind.rgb)), alpha);
+    let color = from_blend_space(front.rgb + transmittance * to_blend_space(behind.rgb));
+    return vec4(min(color, vec3(BRIGHTEST)), alpha);
 }

@@ -2,8 +2,8 @@
 // In: Gaussians, colour coefficients, an instance, a list of the active. Out: one splat and one depth key for each active Gaussian;
 // the key of an invisible splat is INVISIBLE. Section 3.3 of the 4DGS model, in its order; twin of src/gaussian/projection.rs and src/reference/project.rs.
 #import gs4d::types::{Gaussian, Instance, Splat, INVISIBLE}
-#import gs4d::types::{LIGHTING_AS_TRAINED, LIGHTING_ENCODED, DEBUG_ACTIVE, DEBUG_LIFESPAN, DEBUG_VELOCITY}
-#import gs4d::look::{decode, encode, heat}
+#import gs4d::types::{DEBUG_ACTIVE, DEBUG_LIFESPAN, DEBUG_VELOCITY}
+#import gs4d::look::{heat, lit}
 #ifdef PACKED_GEOMETRY
 #import gs4d::packed::{unpack_base, unpack_gaussian, BLOCK_RANGES, PACKED_BLOCK, SHARED_RANGES}
 #endif
@@ -95,7 +95,7 @@ fn project_one(index: u32, slot: u32) -> u32 {
     let center = ((ndc + 1.0) * size - 1.0) * 0.5;
 
     // The nesting of min and max matters: with the field-of-view sentinel the limits are negative.
-    let limit = FRUSTUM_CLAMP * instance.tan_fov;
+    let limit = FRUSTUM_CLAMP * instance.reach;
     let ray = select(min(limit, max(-limit, q.xy / q.z)), vec2(0.0), parallel);
     let j = instance.focal / select(q.z, 1.0, parallel);
     let mx = j.x * (instance.camera_x.xyz - ray.x * instance.camera_z.xyz);
@@ -153,25 +153,13 @@ fn project_one(index: u32, slot: u32) -> u32 {
         if !parallel {
             direction = normalize(seen - instance.camera_position);
         }
-        splat.color = lit(color(index, direction, -dt));
+        splat.color = lit(color(index, direction, -dt), instance.lighting, instance.light);
     }
     splat.tiles_low = u32(low.x) | (u32(low.y) << 16u);
     splat.tiles_high = u32(high.x) | (u32(high.y) << 16u);
     splats[slot] = splat;
     // Positive numbers sort as their bits do; the near plane of an orthographic camera may be behind it.
     return bitcast<u32>(select(q.z, q.z - instance.near, parallel));
-}
-
-// A trained colour in the blend space, in the light that the capture is given.
-fn lit(color: vec3<f32>) -> vec3<f32> {
-    if instance.lighting == LIGHTING_AS_TRAINED {
-        return color;
-    }
-    let linear = decode(color) * instance.light;
-    if instance.lighting == LIGHTING_ENCODED {
-        return encode(linear);
-    }
-    return linear;
 }
 
 fn debug_color(g: Gaussian, absent: bool) -> vec3<f32> {

@@ -6,7 +6,8 @@ const RADIUS: f32 = 60.0;
 // Texel coordinates where the ray from `origin` along the unit vector `direction` leaves the sphere.
 fn environment_texel(origin: vec3<f32>, direction: vec3<f32>, size: vec2<u32>) -> vec2<f32> {
     let along = dot(origin, direction);
-    let reach = -along + sqrt(along * along - (dot(origin, origin) - RADIUS * RADIUS));
+    // Rays from outside may miss the sphere: they see where they come nearest to it.
+    let reach = -along + sqrt(max(along * along - (dot(origin, origin) - RADIUS * RADIUS), 0.0));
     let hit = origin + direction * reach;
     let u = atan2(hit.y, hit.x) / 6.2831853 + 0.5;
     let v = acos(clamp(hit.z / RADIUS, -1.0, 1.0)) / 3.1415927;

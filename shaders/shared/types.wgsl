@@ -27,7 +27,8 @@ struct Instance {
     // Of an orthographic camera the direction in which it looks.
     camera_position: vec3<f32>,
     time: f32,
-    tan_fov: vec2<f32>,
+    // Half-angle tangents that rays are clamped to.
+    reach: vec2<f32>,
     focal: vec2<f32>,
     size: vec2<u32>,
     tiles: vec2<u32>,
@@ -103,6 +104,7 @@ struct Frame {
     background_mode: u32,
     // Samples of the opaque depth; 0 where there is none.
     opaque_samples: u32,
+    // Colour, or the factor on the light of an environment map; w: what is left of the transmittance behind one.
     background: vec4<f32>,
     // P00, P11, P02, P12.
     projection: vec4<f32>,
@@ -115,13 +117,13 @@ struct Frame {
     opaque_origin: vec2<u32>,
     // From opaque depth d to camera space: z = (x + y d) / (z + w d).
     opaque_distance: vec4<f32>,
-    // 1: blended in linear light.
-    linear: u32,
+    // LIGHTING_* of the environment map.
+    environment_lighting: u32,
     // DEBUG_*
     debug: u32,
     // Depth that shows half as bright as the nearest.
     debug_depth: f32,
-    padding: u32,
+    environment_opacity: f32,
 }
 
 const BACKGROUND_NONE: u32 = 0u;

@@ -141,6 +141,15 @@ impl View {
         if self.orthographic { self.camera_position } else { (point - self.camera_position).normalize() }
     }
 
+    /// Half-angle tangents beyond which the rays that shape footprints are clamped (times 1.3): [`tan_fov`](Self::tan_fov), or enough
+    /// for the wider side of an off-centre lens. Off-centre cameras of the original have the sentinel, which stays as it is.
+    pub fn reach(&self) -> Vec2 {
+        if self.orthographic || self.tan_fov.min_element() <= 0.0 {
+            return self.tan_fov;
+        }
+        self.tan_fov * (1.0 + Vec2::new(self.projection.z, self.projection.w).abs())
+    }
+
     /// Footprint focal lengths in pixels (negative for the sentinel); pixels for each camera unit where rays are parallel.
     pub fn focal(&self) -> Vec2 {
         self.size.as_vec2() / (2.0 * self.tan_fov)

@@ -43,12 +43,12 @@ impl Look {
         }
     }
 
-    /// A trained colour (sRGB-encoded, not below 0) in the blend space.
+    /// A trained colour (sRGB-encoded) in the blend space.
     pub fn color(&self, color: Vec3, space: BlendSpace) -> Vec3 {
         match self.lighting(space) {
             Lighting::AsTrained => color,
-            Lighting::Encoded => encode(decode(color) * self.light),
-            Lighting::Linear => decode(color) * self.light,
+            Lighting::Encoded => encode(decode(color.max(Vec3::ZERO)) * self.light),
+            Lighting::Linear => decode(color.max(Vec3::ZERO)) * self.light,
         }
     }
 

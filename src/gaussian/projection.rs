@@ -63,7 +63,7 @@ pub fn project_with(gaussian: &Gaussian, view: &View, clip: &[Vec4; 2]) -> Optio
     let center = ((ndc + 1.0) * size - 1.0) * 0.5;
 
     // The nesting of min and max matters: with the sentinel the limits are negative.
-    let limit = FRUSTUM_CLAMP * view.tan_fov;
+    let limit = FRUSTUM_CLAMP * view.reach();
     let ray = limit.min((-limit).max(q.xy() / q.z));
     let focal = view.focal();
     let (jx, jy) = if view.orthographic {

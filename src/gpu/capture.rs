@@ -85,13 +85,15 @@ impl GpuCapture {
     /// Uploads a scene.
     ///
     /// # Errors
-    /// When the environment map is larger than the device binds.
+    /// When the environment map is larger than the device binds, or the parts of the scene do not fit together.
     pub fn upload(
         device: &wgpu::Device,
-        _queue: &wgpu::Queue,
+        queue: &wgpu::Queue,
         renderer: &Renderer,
         scene: &RuntimeScene,
     ) -> Result<Self, GpuError> {
+        scene.check().map_err(GpuError::Scene)?;
+        let gpu = buffers::Gpu { device, queue };
         let storage = buffers::storage_of(scene);
         let (degree, degree_t) = match scene.coded_colors() {
             Some(colors) => (colors.degree, colors.degree_t),
@@ -99,7 +101,14 @@ impl GpuCapture {
         };
         let stride = (evaluated(degree, degree_t) * 3).div_ceil(4);
         let limits = device.limits();
-        let record = buffers::largest_record(storage, stride);
+        if let Some(map) = &scene.environment {
+            let (needed, limit) = (size_of_val(map.texels.as_slice()) as u64, binding_limit(&limits));
+            if needed > limit {
+                return Err(GpuError::TooLarge { what: "the environment map", needed, limit });
+            }
+        }
+        let bits = scene.filter.as_ref().map_or(0, |filter| u64::from(filter.segments).div_ceil(8));
+        let record = buffers::largest_record(storage, stride).max(bits);
         let threads = u64::from(limits.max_compute_workgroups_per_dimension) * 256;
         // A multiple of what one block of `activate` takes.
         let per_part = ((binding_limit(&limits) / record).min(threads) as usize / BLOCK as usize) * BLOCK as usize;
@@ -109,15 +118,15 @@ impl GpuCapture {
         }
         let mut parts = Vec::new();
         let mut bytes = 0;
-        let codebooks = scene.coded_colors().map(|colors| buffers::codebooks(device, colors));
+        let codebooks = scene.coded_colors().map(|colors| buffers::codebooks(gpu, colors));
         for first in (0..scene.len()).step_by(per_part) {
             let count = per_part.min(scene.len() - first);
-            let own = buffers::part(device, scene, first..first + count, stride);
+            let own = buffers::part(gpu, scene, first..first + count, stride);
             let all: Vec<_> = own.iter().chain(codebooks.iter().flatten()).collect();
             bytes += own.iter().map(wgpu::Buffer::size).sum::<u64>();
             let bind_group = renderer.capture_bind_group(device, storage, &all);
             let filter = scene.filter.as_ref().map(|filter| {
-                let sets = buffers::filter(device, filter, first..first + count);
+                let sets = buffers::filter(gpu, filter, first..first + count);
                 bytes += sets.size();
                 bind_group_of(device, "gs4d filter", &renderer.layouts.filter, &[sets.as_entire_binding()])
             });
@@ -125,15 +134,9 @@ impl GpuCapture {
         }
         bytes += codebooks.iter().flatten().map(wgpu::Buffer::size).sum::<u64>();
         let environment = scene.environment.as_ref().map(|map| EnvironmentBuffer {
-            buffer: buffers::plain(device, "gs4d environment", bytemuck::cast_slice(&map.texels)),
+            buffer: buffers::plain(gpu, "gs4d environment", bytemuck::cast_slice(&map.texels)),
             size: [map.width, map.height],
         });
-        if let Some(map) = &environment
-            && map.buffer.size() > binding_limit(&limits)
-        {
-            let (needed, limit) = (map.buffer.size(), binding_limit(&limits));
-            return Err(GpuError::TooLarge { what: "the environment map", needed, limit });
-        }
         bytes += environment.as_ref().map_or(0, |map| map.buffer.size());
         let settings = layout::Instance {
             degree,

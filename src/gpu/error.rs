@@ -70,6 +70,9 @@ pub enum GpuError {
         /// Largest side.
         limit: u32,
     },
+    /// A scene whose parts do not fit together.
+    #[error("{0}: such a scene was not loaded from a file but put together wrongly")]
+    Scene(&'static str),
     /// The device was lost or a read-back failed.
     #[error("the GPU did not finish: {0}")]
     Device(String),

@@ -36,8 +36,8 @@ pub struct Instance {
     pub camera_position: [f32; 3],
     /// Timestamp.
     pub time: f32,
-    /// Half-angle tangents that shape footprints.
-    pub tan_fov: [f32; 2],
+    /// Half-angle tangents that rays are clamped to.
+    pub reach: [f32; 2],
     /// Focal lengths that shape footprints, pixels.
     pub focal: [f32; 2],
     /// Picture size, pixels.
@@ -121,11 +121,7 @@ impl Instance {
             orthographic: u32::from(view.orthographic),
             light: look.light.to_array(),
             opacity: look.opacity,
-            lighting: match look.lighting(space) {
-                Lighting::AsTrained => LIGHTING_AS_TRAINED,
-                Lighting::Encoded => LIGHTING_ENCODED,
-                Lighting::Linear => LIGHTING_LINEAR,
-            },
+            lighting: lighting_mode(look, space),
             debug: debug_mode(debug),
             cropped: u32::from(look.crop.is_some()),
             crop_x: crop.row(0).to_array(),
@@ -138,7 +134,7 @@ impl Instance {
             clip_y: clip_y.to_array(),
             camera_position: view.camera_position.to_array(),
             time: view.time,
-            tan_fov: view.tan_fov.to_array(),
+            reach: view.reach().to_array(),
             focal: view.focal().to_array(),
             size: view.size.to_array(),
             tiles: view.tiles().to_array(),
@@ -164,7 +160,7 @@ pub struct Frame {
     pub background_mode: u32,
     /// Samples of the opaque depth; 0 where there is none.
     pub opaque_samples: u32,
-    /// Colour; w: what is left of the transmittance behind an environment map.
+    /// Colour, or the factor on the light of an environment map; w: what is left of the transmittance behind one.
     pub background: [f32; 4],
     /// `P00, P11, P02, P12`.
     pub projection: [f32; 4],
@@ -180,14 +176,23 @@ pub struct Frame {
     pub opaque_origin: [u32; 2],
     /// From opaque depth `d` to camera space: `z = (x + y d) / (z + w d)`.
     pub opaque_distance: [f32; 4],
-    /// 1: blended in linear light.
-    pub linear: u32,
+    /// What is done to the colours of the environment map: `LIGHTING_*`.
+    pub environment_lighting: u32,
     /// `DEBUG_*`.
     pub debug: u32,
     /// Depth that shows half as bright as the nearest.
     pub debug_depth: f32,
-    /// Unused.
-    pub padding: u32,
+    /// How much of the environment map shows, from 0 to 1.
+    pub environment_opacity: f32,
+}
+
+/// The number of what a look does to colours in the shaders: `LIGHTING_*`.
+pub fn lighting_mode(look: &Look, space: BlendSpace) -> u32 {
+    match look.lighting(space) {
+        Lighting::AsTrained => LIGHTING_AS_TRAINED,
+        Lighting::Encoded => LIGHTING_ENCODED,
+        Lighting::Linear => LIGHTING_LINEAR,
+    }
 }
 
 /// The number of a debug view in the shaders: `DEBUG_*`.

@@ -5,7 +5,7 @@
 use super::{Pair, Splat};
 use crate::frame::{Background, BlendSpace, Counts, Frame};
 use crate::gaussian::projection::{ALPHA_MAX, ALPHA_MIN, TILE_SIZE, TRANSMITTANCE_MIN};
-use crate::gaussian::{View, decode};
+use crate::gaussian::{Look, View};
 use crate::picture::Picture;
 use crate::scene::Environment;
 use glam::Vec3;
@@ -19,7 +19,7 @@ pub fn blend(
     ranges: &[Range<usize>],
     view: &View,
     background: Background,
-    environment: Option<&Environment>,
+    environment: Option<(&Environment, Look)>,
     space: BlendSpace,
     counts: Counts,
 ) -> Frame {
@@ -48,16 +48,15 @@ pub fn blend(
 pub(super) fn behind(
     view: &View,
     background: Background,
-    environment: Option<&Environment>,
+    environment: Option<(&Environment, Look)>,
     space: BlendSpace,
     x: u32,
     y: u32,
 ) -> Vec3 {
     match (background, environment) {
         (Background::Color(color), _) => Vec3::from(color),
-        (Background::Environment, Some(map)) if !view.orthographic => {
-            let color = map.sample(view.camera_position, view.ray(x, y));
-            if space == BlendSpace::Linear { decode(color.max(Vec3::ZERO)) } else { color }
+        (Background::Environment, Some((map, look))) if !view.orthographic => {
+            look.color(map.sample(view.camera_position, view.ray(x, y)), space) * look.opacity.clamp(0.0, 1.0)
         }
         _ => Vec3::ZERO,
     }

@@ -46,8 +46,9 @@ pub fn render_layers(layers: &[Layer<'_>], background: Background, space: BlendS
     let splats: Vec<Splat> = layers.iter().flat_map(|layer| project(layer, space)).collect();
     let Lists { pairs, ranges, visible } = lists(&splats, view);
     let counts = Counts { visible, pairs: pairs.len() as u32 };
-    let surrounded = layers.iter().find_map(|layer| Some((&layer.view, layer.scene.environment.as_ref()?)));
-    let (outside, environment) = surrounded.map_or((view, None), |(view, map)| (view, Some(map)));
+    let surrounded = layers.iter().find_map(|layer| Some((layer, layer.scene.environment.as_ref()?)));
+    let outside = surrounded.map_or(view, |(layer, _)| &layer.view);
+    let environment = surrounded.map(|(layer, map)| (map, layer.look));
     blend(&splats, &pairs, &ranges, outside, background, environment, space, counts)
 }
 
@@ -61,7 +62,9 @@ struct Lists {
 /// Everything between `project` and the last pass.
 fn lists(splats: &[Splat], view: &View) -> Lists {
     let mut order: Vec<u32> = (0..splats.len() as u32).filter(|&i| splats[i as usize].is_visible()).collect();
-    sort(&mut order, |&i| splats[i as usize].depth.to_bits());
+    // Positive numbers sort as their bits do; the near plane of an orthographic camera may be behind it.
+    let nearest = if view.orthographic { view.near } else { 0.0 };
+    sort(&mut order, |&i| (splats[i as usize].depth - nearest).to_bits());
     let mut pairs = bin(splats, &order, view.tiles());
     sort(&mut pairs, |pair| pair.tile);
     let ranges = ranges(&pairs, view.tiles());

@@ -41,7 +41,8 @@ pub fn score(scene: &RuntimeScene, view: &View, background: Background, want: Wa
     let splats = project(&layer, BlendSpace::Encoded);
     let Lists { pairs, ranges, .. } = lists(&splats, view);
     let environment = scene.environment.as_ref();
-    let behind = |x, y| behind(view, background, environment, BlendSpace::Encoded, x, y);
+    let behind =
+        |x, y| behind(view, background, environment.map(|map| (map, Look::default())), BlendSpace::Encoded, x, y);
     let slots: Vec<Vec<Slot>> = ranges
         .par_iter()
         .enumerate()

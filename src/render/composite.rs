@@ -98,6 +98,11 @@ struct CachedGroup {
 }
 
 impl CompositeBindings {
+    /// Lets go of the targets that were bound.
+    pub(super) fn forget(&mut self) {
+        self.groups.clear();
+    }
+
     /// Writes the corner and size of the viewport, pixels of the target, if they have changed.
     pub(super) fn set_viewport(&mut self, viewport: UVec4, device: &RenderDevice, queue: &RenderQueue) {
         let first = self.viewport.buffer().is_none();
@@ -134,7 +139,8 @@ impl CompositeBindings {
                 let entries = BindGroupEntries::sequential((source, captures, self.viewport.binding()?));
                 let group = device.create_bind_group("gs4d composite", &layout, &entries);
                 note_created();
-                if self.groups.len() >= 2 {
+                // Both sides of the target are made together: where one is new, the other is.
+                if self.groups.len() >= 2 || self.groups.iter().any(|known| known.captures != *captures) {
                     self.groups.clear();
                 }
                 self.groups.push(CachedGroup { source: source.id(), captures: captures.clone(), group });

@@ -22,9 +22,12 @@ use bevy::render::view::{Msaa, ViewDepthTexture, ViewTarget};
 /// Sets of systems in the render world's `Core3d` schedule, for ordering.
 #[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
 pub enum CaptureSystems {
-    /// Captures are drawn: after opaque meshes and before transparent ones; for multisampled cameras after both. Passes of others
-    /// between opaque and transparent meshes (transmission, an atmosphere) should be ordered against it.
+    /// Captures are drawn after opaque meshes and before transparent ones. Passes of others between the two (transmission) should be
+    /// ordered against it.
     Draw,
+    /// Captures of multisampled cameras, and of those whose [settings](super::CaptureViewSettings::late) ask for it, are drawn after
+    /// transparent meshes.
+    DrawLate,
 }
 
 /// Pipelines, and what their bind groups are made with.
@@ -38,7 +41,7 @@ pub(super) struct Passes<'w> {
 
 /// Draws the captures of one camera. Registered twice: multisampled targets can only be read once they have been resolved, that
 /// is after transparent meshes.
-pub(super) fn draw_captures<const MULTISAMPLED: bool>(
+pub(super) fn draw_captures<const LATE: bool>(
     camera: ViewQuery<(&ViewTarget, &ViewDepthTexture, &Msaa)>,
     renderer: Option<Res<CaptureRenderer>>,
     captures: Res<RenderAssets<GpuGaussianCapture>>,
@@ -50,10 +53,10 @@ pub(super) fn draw_captures<const MULTISAMPLED: bool>(
     let _span = debug_span!("gs4d/draw").entered();
     let entity = camera.entity();
     let (target, depth, msaa) = camera.into_inner();
-    if (*msaa != Msaa::Off) != MULTISAMPLED {
+    let (Some(renderer), Some(view)) = (renderer, views.0.get_mut(&entity)) else { return };
+    if (*msaa != Msaa::Off || view.late) != LATE {
         return;
     }
-    let (Some(renderer), Some(view)) = (renderer, views.0.get_mut(&entity)) else { return };
     // Without the composite there would be work that nobody sees.
     if !view.sees_something() || passes.cache.get_render_pipeline(view.composite).is_none() {
         return;

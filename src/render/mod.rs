@@ -26,13 +26,19 @@
 //! So without multisampling everything in Bevy's transparent phase (blended materials, gizmos) is drawn over captures, in front of
 //! them or behind; with [`DepthWrite`] what is behind captures is cut by them, pixel by pixel. A multisampled target can only be
 //! read once all meshes are in it: captures are then drawn over everything in the transparent phase, in front of them or behind,
-//! and only opaque and alpha-masked meshes hide them, sample by sample. Where transparent meshes matter use `Msaa::Off`: captures
-//! need no multisampling.
+//! and only opaque and alpha-masked meshes hide them, each by as many samples of a pixel as it covers. What shows through a capture
+//! at such an edge is the mean of the pixel's samples, and wireframes, which come later and resolve the samples again, wipe captures
+//! away. Where that matters use `Msaa::Off`: captures need no multisampling.
 //!
-//! Bevy orders its transmissive meshes (`main_transmissive_pass_3d`) and its atmosphere only between opaque and transparent meshes;
-//! order [`CaptureSystems::Draw`] against them, in the render world's `Core3d` schedule, to see captures through glass. Prepasses come
-//! first and know nothing of captures: neither do effects that read the depth prepass (screen-space ambient occlusion and
-//! reflections). Those that read the depth buffer after the main pass (depth of field, volumetric fog) see what [`DepthWrite`] wrote.
+//! Bevy orders its transmissive meshes only between opaque and transparent ones: order [`CaptureSystems::Draw`] against
+//! `main_transmissive_pass_3d`, in the render world's `Core3d` schedule, to see captures through glass. Its atmosphere cannot be ordered
+//! against: cameras with one need [`CaptureViewSettings::late`], which draws captures in the order of multisampled cameras.
+//! Prepasses come first and know nothing of captures: neither do effects that read the depth prepass (screen-space ambient
+//! occlusion and reflections). Those that read the depth buffer after the main pass (depth of field, volumetric fog) see what
+//! [`DepthWrite`] wrote.
+//!
+//! A capture with an environment map shows it behind everything, through perspective cameras whose depth can be read; of several
+//! maps in one view, that of one capture. Entities with `NoCpuCulling` are not drawn: captures are culled on the CPU.
 //!
 //! # Colour
 //!

@@ -80,10 +80,12 @@ fn build_rendering(app: &mut App) {
         .add_systems(
             Core3d,
             (
-                draw_captures::<false>.after(main_opaque_pass_3d).before(main_transparent_pass_3d),
-                draw_captures::<true>.after(main_transparent_pass_3d),
+                draw_captures::<false>
+                    .after(main_opaque_pass_3d)
+                    .before(main_transparent_pass_3d)
+                    .in_set(CaptureSystems::Draw),
+                draw_captures::<true>.after(main_transparent_pass_3d).in_set(CaptureSystems::DrawLate),
             )
-                .in_set(CaptureSystems::Draw)
                 .in_set(Core3dSystems::MainPass),
         );
 }

@@ -16,7 +16,7 @@ use crate::frame::{Background, DebugView};
 use crate::gaussian::{Look, View};
 use crate::gpu::{Instance, OpaqueDepth, Renderer, ShaderChecks, Surroundings, ViewRenderer};
 use bevy::asset::AssetId;
-use bevy::camera::{Camera3d, CompositingSpace};
+use bevy::camera::{Camera3d, CompositingSpace, MainPassResolutionOverride};
 use bevy::ecs::entity::Entity;
 use bevy::ecs::query::With;
 use bevy::ecs::resource::Resource;
@@ -29,7 +29,7 @@ use bevy::render::render_resource::{CachedRenderPipelineId, PipelineCache, Speci
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 use bevy::render::sync_world::MainEntity;
 use bevy::render::view::{ExtractedView, Msaa, RenderVisibleEntities, ViewDepthTexture};
-use glam::UVec2;
+use glam::{UVec2, UVec4};
 
 /// The renderer's pipelines; absent where this GPU cannot run them.
 #[derive(Resource)]
@@ -51,6 +51,10 @@ pub(super) struct CaptureView {
     pub(super) write_depth: Option<CachedRenderPipelineId>,
     pub(super) depth_bindings: WriteDepthBindings,
     measured: bool,
+    /// Whether it is drawn after transparent meshes even without multisampling.
+    pub(super) late: bool,
+    /// Frames since it last saw something.
+    idle: u32,
     /// What it sees this frame; nothing is drawn where this is empty.
     drawn: Vec<Drawn>,
 }
@@ -63,6 +67,9 @@ struct Drawn {
     look: Look,
     filtered: bool,
 }
+
+/// Frames without anything to be seen until a camera gives memory back.
+const PATIENCE: u32 = 120;
 
 /// What there is to be seen.
 #[derive(SystemParam)]
@@ -93,6 +100,8 @@ impl CaptureView {
             write_depth: None,
             depth_bindings: WriteDepthBindings::default(),
             measured: false,
+            late: false,
+            idle: 0,
             drawn: Vec::new(),
         }
     }
@@ -117,8 +126,14 @@ impl CaptureView {
     }
 
     /// Collects what this camera sees, in the order of Bevy's list, which is always the same.
-    fn look(&mut self, lens: &Lens, view: &ExtractedView, visible: &RenderVisibleEntities, scene: &Scene<'_>) {
-        let size = UVec2::new(view.viewport.z, view.viewport.w);
+    fn look(
+        &mut self,
+        lens: &Lens,
+        view: &ExtractedView,
+        size: UVec2,
+        visible: &RenderVisibleEntities,
+        scene: &Scene<'_>,
+    ) {
         let camera = view.world_from_view.affine();
         let Some(visible) = visible.get::<GaussianCapture3d>() else { return };
         self.drawn.extend(visible.iter_visible().filter_map(|(_, entity)| {
@@ -128,6 +143,16 @@ impl CaptureView {
             let (asset, look, filtered) = (placed.asset, placed.look, placed.filtered);
             Some(Drawn { entity: *entity, asset, view, look, filtered })
         }));
+    }
+
+    /// Counts a frame in which it sees nothing. After many its memory is given back.
+    fn rest(&mut self) {
+        self.idle = self.idle.saturating_add(1);
+        if self.idle == PATIENCE {
+            self.renderer.release();
+            self.bindings.forget();
+            self.depth_bindings.forget();
+        }
     }
 
     fn measure(&mut self, on: bool, device: &RenderDevice, queue: &RenderQueue) {
@@ -186,6 +211,7 @@ type CameraView = (
     &'static ViewDepthTexture,
     &'static Msaa,
     &'static RenderVisibleEntities,
+    Option<&'static MainPassResolutionOverride>,
 );
 
 pub(super) fn prepare_views(
@@ -202,26 +228,34 @@ pub(super) fn prepare_views(
     let Some(renderer) = renderer else { return };
     let measure = statistics.is_measuring();
     views.0.retain(|&camera, _| cameras.contains(camera));
-    for (entity, view, camera, depth, &msaa, visible) in &cameras {
+    for (entity, view, camera, depth, &msaa, visible, resolution) in &cameras {
+        // Meshes may be drawn smaller than the camera says, to be scaled up later.
+        let size = resolution.map_or(UVec2::new(view.viewport.z, view.viewport.w), |smaller| smaller.0);
         let main = view.retained_view_entity.main_entity;
         let settings = scene.settings.0.get(&main).copied().unwrap_or_default();
         // Before there is anything to draw: it is compiled while captures load.
         let composite = pipelines.composite(view, camera, settings);
         let state = views.0.entry(entity).or_insert_with(|| CaptureView::new(&device, main.id(), composite));
         state.composite = composite;
+        state.late = settings.late;
         state.measure(measure, &device, &queue);
         state.drawn.clear();
         let Some(lens) = drawable_lens(view, camera) else { continue };
-        state.look(&lens, view, visible, &scene);
+        state.look(&lens, view, size, visible, &scene);
         if state.drawn.is_empty() {
+            state.rest();
             continue;
         }
-        state.bindings.set_viewport(view.viewport, &device, &queue);
+        state.idle = 0;
+        let viewport = UVec4::new(view.viewport.x, view.viewport.y, size.x, size.y);
+        state.bindings.set_viewport(viewport, &device, &queue);
         let instances = state.instances(&scene.captures, &scene.lists);
         let surrounded = instances.iter().any(|instance| instance.capture.has_environment());
+        let opaque = opaque_depth(&lens, view, depth, msaa);
         let surroundings = Surroundings {
-            background: if surrounded { Background::Environment } else { Background::None },
-            opaque: opaque_depth(&lens, view, depth, msaa),
+            // Without depth a map would hide every mesh.
+            background: if surrounded && opaque.is_some() { Background::Environment } else { Background::None },
+            opaque,
             blend_space: settings.blend_space,
             debug: settings.debug,
         };

@@ -48,6 +48,9 @@ pub struct CaptureViewSettings {
     pub depth: DepthWrite,
     /// What is shown of captures in place of their colour.
     pub debug: DebugView,
+    /// Whether captures are drawn after transparent meshes without multisampling, too. Needed where something is drawn between
+    /// opaque and transparent meshes that cannot be ordered against captures: Bevy's atmosphere.
+    pub late: bool,
 }
 
 /// Which depth of a capture is written to the camera's depth buffer, at pixels where captures hide more than half of what is behind.

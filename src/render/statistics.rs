@@ -10,6 +10,7 @@ use bevy::ecs::resource::Resource;
 use bevy::ecs::system::Res;
 use bevy::log::debug_span;
 use bevy::render::render_asset::RenderAssets;
+use std::borrow::Cow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// What drawing captures costs, as of the newest frame that the render world has prepared.
@@ -79,14 +80,19 @@ pub(super) fn publish_statistics(
 ) {
     let _span = debug_span!("gs4d/statistics").entered();
     let mut shared = statistics.lock();
-    let seen = || views.0.values().filter(|view| view.sees_something());
+    // A view that sees nothing any more may still hold memory.
+    let seen = || views.0.values().filter(|view| view.sees_something() || view.renderer.statistics().bytes > 0);
     shared.views.retain(|(camera, _)| seen().any(|view| view.camera == *camera));
     for view in seen() {
-        let fresh = view.renderer.statistics();
+        let all = view.renderer.statistics();
+        let fresh = match view.sees_something() {
+            true => Cow::Borrowed(all),
+            false => Cow::Owned(ViewStatistics { bytes: all.bytes, ..ViewStatistics::default() }),
+        };
         match shared.views.iter_mut().find(|(camera, _)| *camera == view.camera) {
-            Some((_, known)) if known == fresh => {}
-            Some((_, known)) => *known = fresh.clone(),
-            None => shared.views.push((view.camera, fresh.clone())),
+            Some((_, known)) if known == fresh.as_ref() => {}
+            Some((_, known)) => *known = fresh.into_owned(),
+            None => shared.views.push((view.camera, fresh.into_owned())),
         }
     }
     let uploaded = || captures.iter().filter_map(|(_, capture)| capture.capture());

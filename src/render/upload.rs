@@ -4,6 +4,7 @@
 
 use super::GaussianCapture3d;
 use super::prepare::CaptureRenderer;
+use super::statistics::CaptureStatistics;
 use crate::asset::{CaptureFailed, CaptureState, GaussianCapture};
 use crate::gpu::GpuCapture;
 use bevy::asset::{AssetId, AssetServer};
@@ -66,23 +67,29 @@ pub(super) fn report_upload_failures(
 
 impl RenderAsset for GpuGaussianCapture {
     type SourceAsset = GaussianCapture;
-    type Param =
-        (SRes<RenderDevice>, SRes<RenderQueue>, SRes<AssetServer>, SRes<UploadFailures>, Option<SRes<CaptureRenderer>>);
-
-    fn byte_len(source: &GaussianCapture) -> Option<usize> {
-        let scene = source.scene();
-        Some(scene.size())
-    }
+    // No `byte_len`: under a limit of bytes for each frame Bevy takes the old upload away before it makes the new one.
+    type Param = (
+        SRes<RenderDevice>,
+        SRes<RenderQueue>,
+        SRes<AssetServer>,
+        SRes<UploadFailures>,
+        SRes<CaptureStatistics>,
+        Option<SRes<CaptureRenderer>>,
+    );
 
     fn prepare_asset(
         source: GaussianCapture,
         id: AssetId<GaussianCapture>,
-        (device, queue, assets, failures, renderer): &mut SystemParamItem<Self::Param>,
+        (device, queue, assets, failures, statistics, renderer): &mut SystemParamItem<Self::Param>,
         _previous: Option<&Self>,
     ) -> Result<Self, PrepareAssetError<GaussianCapture>> {
-        // Without a renderer there is nothing to upload for; why there is none has been logged.
-        let Some(renderer) = renderer else { return Ok(Self(None)) };
         let name = || assets.get_path(id).map_or_else(|| format!("{id}"), |path| path.to_string());
+        let Some(renderer) = renderer else {
+            // It has been logged, once for all captures.
+            let why = statistics.renderer_missing().unwrap_or_else(|| "there is no renderer".into());
+            failures.lock().insert(id, format!("{}: not drawn: {why}", name()));
+            return Ok(Self(None));
+        };
         if source.scene().trained_with.uses_fov_sentinel() {
             warn!(
                 "{}: trained with the field-of-view sentinel of intrinsics cameras; drawn with each camera's true field of \
@@ -104,7 +111,7 @@ impl RenderAsset for GpuGaussianCapture {
         }
     }
 
-    fn unload_asset(id: AssetId<GaussianCapture>, (_, _, _, failures, _): &mut SystemParamItem<Self::Param>) {
+    fn unload_asset(id: AssetId<GaussianCapture>, (_, _, _, failures, ..): &mut SystemParamItem<Self::Param>) {
         failures.lock().remove(&id);
     }
 }

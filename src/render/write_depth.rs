@@ -104,6 +104,11 @@ impl WriteDepthBindings {
         }
     }
 
+    /// Lets go of the targets that were bound.
+    pub(super) fn forget(&mut self) {
+        self.group = None;
+    }
+
     /// The bind group for the targets of a view; nothing before the first [`set_distance`](Self::set_distance).
     pub(super) fn group(
         &mut self,

@@ -25,7 +25,8 @@ impl Environment {
     /// texture: the seam at the ends of `u` fades, as in the original.
     pub fn sample(&self, origin: Vec3, direction: Vec3) -> Vec3 {
         let along = origin.dot(direction);
-        let reach = -along + (along * along - (origin.length_squared() - RADIUS * RADIUS)).sqrt();
+        // Rays from outside may miss the sphere: they see where they come nearest to it.
+        let reach = -along + (along * along - (origin.length_squared() - RADIUS * RADIUS)).max(0.0).sqrt();
         let hit = origin + direction * reach;
         let u = hit.y.atan2(hit.x) / TAU + 0.5;
         let v = (hit.z / RADIUS).clamp(-1.0, 1.0).acos() / PI;

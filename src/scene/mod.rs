@@ -181,6 +181,37 @@ impl RuntimeScene {
         }
     }
 
+    /// Whether its parts fit together, as those of every scene that was loaded do.
+    ///
+    /// # Errors
+    /// What does not fit.
+    pub fn check(&self) -> Result<(), &'static str> {
+        let fits = |filter: &TemporalFilter| {
+            filter.count == self.len()
+                && (1..=MAX_SEGMENTS).contains(&filter.segments)
+                && match &filter.sets {
+                    ActiveSets::Bits(bits) => {
+                        bits.len() == TemporalFilter::words(filter.count) * filter.segments as usize
+                    }
+                    ActiveSets::Intervals(intervals) => intervals.len() == filter.count,
+                }
+        };
+        if !self.filter.as_ref().is_none_or(fits) {
+            return Err("its temporal filter is that of another number of Gaussians");
+        }
+        if self.coded_colors().is_none() && !self.harmonics.is_consistent(self.len()) {
+            return Err("its colours are those of another number of Gaussians");
+        }
+        let covers = |map: &Environment| {
+            let texels = (map.width as usize).checked_mul(map.height as usize).and_then(|texels| texels.checked_mul(3));
+            map.width > 0 && map.height > 0 && texels == Some(map.texels.len())
+        };
+        if !self.environment.as_ref().is_none_or(covers) {
+            return Err("its environment map has another number of texels");
+        }
+        Ok(())
+    }
+
     /// Bytes of Gaussians and colours in memory.
     pub fn size(&self) -> usize {
         let packed = self.packed.as_ref().map_or(0, PackedScene::size);

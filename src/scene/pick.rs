@@ -23,7 +23,7 @@
 //! small as it can be: the rounding of covariances to `f32` can make a variance of 0 appear as −¾ of that. It makes a disc about
 //! 1/2000 as thick as it is wide. A Gaussian without any extent is never hit.
 
-use super::RuntimeScene;
+use super::{RuntimeScene, TemporalFilter};
 use crate::gaussian::projection::{ALPHA_MAX, ALPHA_MIN};
 use crate::gaussian::{Gaussian, MARGINAL_CUTOFF};
 use glam::{Affine3A, DMat3, DVec2, DVec3, Vec3};
@@ -74,7 +74,8 @@ impl RuntimeScene {
     /// A Gaussian whose densest point on the ray lies behind the origin is not hit.
     pub fn pick(&self, origin: Vec3, direction: Vec3, settings: &PickSettings) -> Option<Pick> {
         let ray = Ray::new(origin, direction)?;
-        let filter = self.filter.as_ref().filter(|_| settings.use_filter);
+        let fits = |filter: &&TemporalFilter| settings.use_filter && filter.count == self.len();
+        let filter = self.filter.as_ref().filter(fits);
         let active = filter.map(|f| (f, f.segment_of(settings.time, self.trained_with.time_interval)));
         let is_active = |index| active.is_none_or(|(filter, segment)| filter.is_active(segment, index));
         let mut crossed: Vec<(Crossing, usize)> = (0..self.len())

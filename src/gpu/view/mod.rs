@@ -78,6 +78,8 @@ pub struct ViewRenderer {
     multisampled: bool,
     /// Pairs that an earlier frame wanted room for.
     pairs_wanted: u32,
+    /// Frames for which there has been far too much room.
+    roomy_frames: u32,
     frame: wgpu::Buffer,
     steps: wgpu::Buffer,
     counters: wgpu::Buffer,
@@ -91,6 +93,10 @@ pub struct ViewRenderer {
     /// Everything whose size depends on the view or the captures.
     resources: Option<Resources>,
 }
+
+/// How many times too large buffers may be, and for how many frames, before they are made anew.
+const ROOMY: u32 = 4;
+const PATIENCE: u32 = 120;
 
 /// What a finished frame leaves behind.
 #[derive(Debug, Clone, Copy)]
@@ -114,6 +120,7 @@ impl ViewRenderer {
             alignment,
             slots: 0,
             pairs_wanted: 0,
+            roomy_frames: 0,
             frame: buffer(device, "gs4d frame", size_of::<layout::Frame>() as u64, BufferUsages::UNIFORM),
             steps: buffer(device, "gs4d steps", u64::from(alignment * 2 * DEPTH_STEPS), BufferUsages::UNIFORM),
             counters: buffer(device, "gs4d counters", counters, BufferUsages::STORAGE | BufferUsages::COPY_SRC),
@@ -161,12 +168,9 @@ impl ViewRenderer {
         let slots = slots as u32;
         // Two pairs for each Gaussian are a first guess; counters correct it.
         let pairs = self.pairs_wanted.max(slots.saturating_mul(2)).max(1 << 16).min(max_pairs(device));
-        let sizes = Sizes {
-            slots: made.slots.max(slots.next_multiple_of(BLOCK)).max(BLOCK),
-            pairs: made.pairs.max(pairs),
-            parts: made.parts.max(parts as u32).max(1),
-            picture,
-        };
+        let needed =
+            Sizes { slots: slots.next_multiple_of(BLOCK).max(BLOCK), pairs, parts: (parts as u32).max(1), picture };
+        let sizes = self.kept_sizes(made, needed);
         let environment = instances.iter().find_map(|i| Some((i, i.capture.environment.as_ref()?)));
         let opaque = surroundings.opaque.filter(|opaque| opaque.samples > 0);
         self.multisampled = opaque.is_some_and(|opaque| opaque.samples > 1);
@@ -186,7 +190,7 @@ impl ViewRenderer {
         self.statistics.bytes = self.resources.as_ref().map_or(0, |made| made.bytes);
         self.statistics.total = slots;
         self.statistics.active = self.slots;
-        self.write_uniforms(queue, instances, surroundings, environment.map(|(i, m)| (i.view, m.size)));
+        self.write_uniforms(queue, instances, surroundings, environment.map(|(i, m)| (i.view, i.look, m.size)));
         Ok(())
     }
 
@@ -243,17 +247,44 @@ impl ViewRenderer {
         &self.counters
     }
 
-    /// Lets the next [`prepare`](Self::prepare) make room for that many pairs and a quarter more, if there is not yet and the
-    /// device allows it.
+    /// Lets the next [`prepare`](Self::prepare) make room for that many pairs and half as many more, if there is hardly enough and
+    /// the device allows it.
     pub(in crate::gpu) fn make_room(&mut self, pairs: u32) {
-        if pairs > self.pair_capacity() {
-            self.pairs_wanted = pairs.saturating_add(pairs / 4);
+        // Before there is too little: counts arrive some frames late.
+        if pairs > self.pair_capacity() / 4 * 3 {
+            self.pairs_wanted = pairs.saturating_add(pairs / 2);
         }
     }
 
     /// Pairs there is room for.
     pub(in crate::gpu) fn pair_capacity(&self) -> u32 {
         self.resources.as_ref().map_or(0, |made| made.sizes.pairs)
+    }
+
+    /// Gives the memory of working buffers and targets back; the next [`prepare`](Self::prepare) makes them anew.
+    pub fn release(&mut self) {
+        self.resources = None;
+        self.pairs_wanted = 0;
+        self.statistics = ViewStatistics::default();
+    }
+
+    /// Sizes only grow from frame to frame, but what has been far too large for a while is given back.
+    fn kept_sizes(&mut self, made: Sizes, needed: Sizes) -> Sizes {
+        let counted = self.statistics.pairs.saturating_add(self.statistics.pairs / 2).max(1 << 16);
+        let roomy =
+            made.slots / ROOMY > needed.slots || made.pairs / ROOMY > needed.slots.saturating_mul(2).max(counted);
+        self.roomy_frames = if roomy { self.roomy_frames + 1 } else { 0 };
+        if self.roomy_frames > PATIENCE {
+            self.roomy_frames = 0;
+            self.pairs_wanted = counted;
+            return Sizes { pairs: needed.slots.saturating_mul(2).max(counted), ..needed };
+        }
+        Sizes {
+            slots: made.slots.max(needed.slots),
+            pairs: made.pairs.max(needed.pairs),
+            parts: made.parts.max(needed.parts),
+            picture: needed.picture,
+        }
     }
 
     /// Takes in what earlier frames have sent back.
@@ -277,7 +308,7 @@ impl ViewRenderer {
         queue: &wgpu::Queue,
         instances: &[Instance<'_>],
         surroundings: &Surroundings<'_>,
-        environment: Option<(View, [u32; 2])>,
+        environment: Option<(View, Look, [u32; 2])>,
     ) {
         let Some(made) = &self.resources else { return };
         let mut slot = 0;
@@ -300,15 +331,16 @@ impl ViewRenderer {
         }
         let (mode, color) = match (surroundings.background, environment) {
             (Background::Color(color), _) => (layout::BACKGROUND_COLOR, color),
-            (Background::Environment, Some((view, _))) if !view.orthographic => {
+            (Background::Environment, Some((view, ..))) if !view.orthographic => {
                 (layout::BACKGROUND_ENVIRONMENT, [0.0; 3])
             }
             _ => (layout::BACKGROUND_NONE, [0.0; 3]),
         };
-        let (view, environment_size) = environment.unwrap_or_else(|| {
+        let (view, look, environment_size) = environment.unwrap_or_else(|| {
             let view = View::new(made.sizes.picture, 0.0, glam::Mat4::IDENTITY, glam::Vec4::ONE, glam::Vec2::ONE);
-            (instances.first().map_or(view, |instance| instance.view), [0; 2])
+            (instances.first().map_or(view, |instance| instance.view), Look::default(), [0; 2])
         });
+        let color = if mode == layout::BACKGROUND_ENVIRONMENT { look.light.to_array() } else { color };
         let to_world = view.world_to_camera.inverse();
         let column = |axis: usize| to_world.col(axis).truncate().extend(view.camera_position[axis]).to_array();
         let opaque = surroundings.opaque.as_ref();
@@ -328,11 +360,11 @@ impl ViewRenderer {
             environment_size,
             opaque_origin: opaque.map_or([0; 2], |depth| depth.origin.to_array()),
             opaque_distance: opaque.map_or([0.0; 4], |depth| depth.distance),
-            linear: u32::from(surroundings.blend_space == BlendSpace::Linear),
+            environment_lighting: layout::lighting_mode(&look, surroundings.blend_space),
             debug: layout::debug_mode(surroundings.debug),
-            // Ten near limits, each a fifth of a unit.
-            debug_depth: 10.0 * view.near.max(f32::MIN_POSITIVE),
-            padding: 0,
+            // Two capture units.
+            debug_depth: 2.0 * view.world_to_camera.row(2).truncate().length(),
+            environment_opacity: look.opacity.clamp(0.0, 1.0),
         };
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
     }
@@ -344,9 +376,12 @@ pub(in crate::gpu) fn alignment_of<T>(device: &wgpu::Device) -> u32 {
     least.max(size_of::<T>() as u32).next_power_of_two()
 }
 
-/// Pairs that fit one binding.
+/// Pairs that fit one binding and one dispatch.
 pub(in crate::gpu) fn max_pairs(device: &wgpu::Device) -> u32 {
-    u32::try_from(binding_limit(&device.limits()) / 4).unwrap_or(u32::MAX)
+    let limits = device.limits();
+    let bound = u32::try_from(binding_limit(&limits) / 4).unwrap_or(u32::MAX);
+    // One workgroup takes a block of them.
+    bound.min(limits.max_compute_workgroups_per_dimension.saturating_mul(BLOCK))
 }
 
 /// Tiles across and down.
