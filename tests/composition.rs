@@ -6,6 +6,8 @@
 
 #[path = "common/app.rs"]
 mod common;
+#[path = "common/placed.rs"]
+mod placed;
 #[path = "common/skip.rs"]
 mod skip;
 #[path = "common/twin.rs"]
@@ -13,84 +15,23 @@ mod twin;
 
 use bevy::camera::primitives::Aabb;
 use bevy::camera::visibility::{NoFrustumCulling, RenderLayers};
-use bevy::camera::{CameraProjection, Hdr, ScalingMode, SubCameraView};
+use bevy::camera::{CameraProjection, Hdr, SubCameraView};
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::math::{Affine3A, Vec3A};
 use bevy::prelude::*;
 use bevy_gs4d::frame::{Background, BlendSpace, DebugView};
 use bevy_gs4d::gaussian::{Gaussian, Look, View, decode, encode};
-use bevy_gs4d::picture::Picture;
 use bevy_gs4d::playback::{ClipFade, Playback};
 use bevy_gs4d::reference::{self, Layer};
-use bevy_gs4d::render::{
-    CaptureSettings, CaptureStatistics, CaptureViewSettings, CropBox, DepthWrite, GaussianCapture3d,
-};
+use bevy_gs4d::render::{CaptureSettings, CaptureStatistics, CaptureViewSettings, CropBox, DepthWrite};
 use bevy_gs4d::scene::{Environment, RuntimeScene};
 use bevy_gs4d::testing::{self, Offscreen};
 use common::{app, picture, spawn_camera};
-use twin::{DURATION, SIZE, add, blob, difference, difference_between, eye, rgb, scene, view, view_of};
-
-const BLACK: Background = Background::Color([0.0; 3]);
-const MIDDLE: UVec2 = UVec2::new(SIZE.x / 2, SIZE.y / 2);
-
-/// Overlapping Gaussians; two of them move.
-fn crowd() -> RuntimeScene {
-    let moving = |gaussian: Gaussian, velocity: [f32; 3]| Gaussian { velocity, sigma_t: 0.4, ..gaussian };
-    scene(&[
-        (blob(Vec3::new(0.4, -0.1, 0.0), Vec3::new(0.3, 0.1, 0.2), 0.9), Vec3::new(0.9, 0.2, 0.1)),
-        (blob(Vec3::new(-0.3, 0.2, 0.1), Vec3::new(0.3, 0.2, 0.1), 0.8), Vec3::new(0.1, 0.7, 0.3)),
-        (moving(blob(Vec3::new(0.0, 0.3, 0.5), Vec3::splat(0.15), 0.7), [0.9, -0.3, 0.2]), Vec3::new(0.2, 0.3, 1.0)),
-        (moving(blob(Vec3::new(0.2, -0.4, -0.6), Vec3::splat(0.3), 0.95), [-0.5, 0.4, 0.0]), Vec3::new(0.8, 0.8, 0.2)),
-        (blob(Vec3::new(-0.7, -0.5, -0.2), Vec3::new(0.05, 0.3, 0.05), 0.6), Vec3::splat(0.9)),
-    ])
-}
-
-/// One Gaussian at the origin.
-fn lone(color: Vec3) -> RuntimeScene {
-    scene(&[(blob(Vec3::ZERO, Vec3::splat(0.4), 0.98), color)])
-}
+use placed::{BLACK, MIDDLE, check, crowd, front, insert, lone, orthographic, spawn, spawn_box, twin_of};
+use twin::{DURATION, SIZE, blob, difference, difference_between, eye, rgb, scene, view, view_of};
 
 fn red() -> RuntimeScene {
     lone(Vec3::X)
-}
-
-fn spawn(app: &mut App, scene: &RuntimeScene, bundle: impl Bundle) -> Entity {
-    let handle = add(app, scene);
-    app.world_mut().spawn((GaussianCapture3d(handle), Playback::paused_at(0.0), bundle)).id()
-}
-
-fn insert(app: &mut App, entity: Entity, bundle: impl Bundle) {
-    app.world_mut().entity_mut(entity).insert(bundle);
-}
-
-/// The app's picture must be this one, but for rounding to 8 bits and the GPU's arithmetic.
-fn check(app: &mut App, expected: &Picture, what: &str) {
-    let apart = difference(&picture(app, 0.0), expected);
-    assert!(apart <= 2.0, "{what}: Bevy and the CPU twin are {apart} / 255 apart");
-}
-
-/// The CPU twin's picture of one capture over black.
-fn twin_of(scene: &RuntimeScene, view: View, look: Look) -> Picture {
-    reference::render_layers(&[Layer { scene, view, look }], BLACK, BlendSpace::Encoded).picture
-}
-
-/// Straight ahead at the origin from four units away.
-fn front() -> Transform {
-    Transform::from_xyz(0.0, 0.0, 4.0)
-}
-
-/// A picture three units high.
-fn orthographic() -> OrthographicProjection {
-    let scaling_mode = ScalingMode::FixedVertical { viewport_height: 3.0 };
-    OrthographicProjection { scaling_mode, ..OrthographicProjection::default_3d() }
-}
-
-/// An unlit mesh of one colour.
-fn spawn_box(app: &mut App, size: Vec3, center: Vec3, color: Color, alpha_mode: AlphaMode) -> Entity {
-    let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(Cuboid::from_size(size));
-    let material = StandardMaterial { base_color: color, unlit: true, alpha_mode, ..default() };
-    let material = app.world_mut().resource_mut::<Assets<StandardMaterial>>().add(material);
-    app.world_mut().spawn((Mesh3d(mesh), MeshMaterial3d(material), Transform::from_translation(center))).id()
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! Captures over many frames: nothing is made that is not needed, nothing stays that is not needed any more.
 //!
-//! In: synthetic captures in headless apps. Out: proof that the GPU's memory stands still while time advances, that captures come and
-//! go without a trace, are exchanged without a gap, and survive a new start of the renderer; and that a GPU that is too small says so.
-//! The tests take turns, for what is counted is counted for the whole process. Skipped where there is no GPU.
+//! In: synthetic captures in headless apps. Out: proof that the GPU's memory stands still while time advances, that captures and cameras
+//! come and go without a trace and views give back what they need no longer, that captures are exchanged without a gap and survive a
+//! new start of the renderer; and that a GPU that is too small, and a capture that cannot be right, are named. The tests take turns,
+//! for what is counted is counted for the whole process. Skipped where there is no GPU.
 
 #[path = "common/app.rs"]
 mod common;
@@ -17,13 +18,13 @@ use bevy::render::renderer::RenderDevice;
 use bevy::render::settings::{Backends, RenderCreation, WgpuLimits, WgpuSettings};
 use bevy::render::{RenderApp, RenderPlugin, RenderStartup};
 use bevy::time::TimeUpdateStrategy;
-use bevy_gs4d::asset::GaussianCapture;
+use bevy_gs4d::asset::{CaptureFailed, CaptureState, GaussianCapture};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::gpu;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::render::{CaptureStatistics, CaptureViewSettings, DepthWrite, GaussianCapture3d, GaussianCapturePlugin};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{PlaybackHints, RuntimeScene, TemporalFilter, TrainedWith};
+use bevy_gs4d::scene::{Environment, PlaybackHints, RuntimeScene, TemporalFilter, TrainedWith};
 use bevy_gs4d::testing::{self, Offscreen};
 use common::{app, picture, spawn_camera};
 use std::collections::VecDeque;
@@ -85,9 +86,22 @@ fn spawn(app: &mut App, scene: RuntimeScene, playback: Playback) -> Entity {
     app.world_mut().spawn((GaussianCapture3d(handle), playback)).id()
 }
 
+/// Two eyes of one size, of which the second writes depth.
+fn spawn_eyes(app: &mut App) {
+    spawn_camera(app, Msaa::Off, eye());
+    let second = Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), SIZE);
+    let camera = spawn_camera(app, Msaa::Off, eye().with_translation(Vec3::new(-0.5, -3.0, 1.5)));
+    let depth = CaptureViewSettings { depth: DepthWrite::Median, ..default() };
+    app.world_mut().entity_mut(camera).insert((second.target(), depth));
+}
+
 /// Frames of [`STEP`] each.
 fn run(app: &mut App, frames: usize) {
-    app.insert_resource(TimeUpdateStrategy::ManualDuration(STEP));
+    run_in_steps(app, frames, STEP);
+}
+
+fn run_in_steps(app: &mut App, frames: usize, step: Duration) {
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(step));
     for _ in 0..frames {
         app.update();
         assert!(app.should_exit().is_none(), "rendering stopped; the log says why");
@@ -95,8 +109,27 @@ fn run(app: &mut App, frames: usize) {
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
 }
 
+/// What is said of captures that fail, from now on.
+fn failures_of(app: &mut App) -> Arc<Mutex<Vec<CaptureFailed>>> {
+    let failures = Arc::new(Mutex::new(Vec::new()));
+    let sink = failures.clone();
+    app.add_observer(move |failure: On<CaptureFailed>| {
+        sink.lock().unwrap_or_else(PoisonError::into_inner).push(failure.event().clone());
+    });
+    failures
+}
+
 fn statistics(app: &App) -> CaptureStatistics {
     app.world().resource::<CaptureStatistics>().clone()
+}
+
+/// Bytes of a view's buffers and targets.
+fn view_bytes(app: &App, camera: Entity) -> u64 {
+    statistics(app).view(camera).map_or(0, |view| view.bytes)
+}
+
+fn show(app: &mut App, entity: Entity, visibility: Visibility) {
+    app.world_mut().entity_mut(entity).insert(visibility);
 }
 
 fn check_pipelines(app: &App) {
@@ -112,12 +145,7 @@ fn nothing_is_made_while_time_advances_inside_a_segment() {
     let _turn = turn();
     let Some(mut app) = app(SIZE) else { return };
     let entity = spawn(&mut app, synthetic(2000, 1, true), Playback::default());
-    spawn_camera(&mut app, Msaa::Off, eye());
-    // Two eyes of one size.
-    let second = Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), SIZE);
-    let camera = spawn_camera(&mut app, Msaa::Off, eye().with_translation(Vec3::new(-0.5, -3.0, 1.5)));
-    let depth = CaptureViewSettings { depth: DepthWrite::Median, ..default() };
-    app.world_mut().entity_mut(camera).insert((second.target(), depth));
+    spawn_eyes(&mut app);
     testing::settle(&mut app).expect("the app draws without an error");
     run(&mut app, 10);
     let before = (gpu::created(), gpu::uploaded());
@@ -129,6 +157,95 @@ fn nothing_is_made_while_time_advances_inside_a_segment() {
     assert_eq!(statistics(&app).views().len(), 2, "both cameras draw");
     run(&mut app, 60);
     assert_eq!(gpu::uploaded(), before.1, "another segment needs no upload, either");
+}
+
+#[test]
+fn nothing_but_lists_is_made_anew_from_segment_to_segment() {
+    let _turn = turn();
+    let Some(mut app) = app(SIZE) else { return };
+    spawn(&mut app, synthetic(2000, 1, true), Playback::default());
+    spawn_eyes(&mut app);
+    testing::settle(&mut app).expect("the app draws without an error");
+    // Twice through all four segments, and into the middle of the first.
+    let step = Duration::from_millis(50);
+    run_in_steps(&mut app, 2 * 40 + 3, step);
+    let (before, lists) = ((gpu::created(), gpu::uploaded()), gpu::activated());
+    run_in_steps(&mut app, 2 * 40, step);
+    assert_eq!((gpu::created(), gpu::uploaded()), before, "made and uploaded on the way through all segments, twice");
+    assert_eq!(gpu::activated() - lists, 2 * 4, "one list for both eyes in each segment");
+}
+
+#[test]
+fn a_view_that_sees_nothing_gives_its_memory_back() {
+    let _turn = turn();
+    let Some(mut app) = app(SIZE) else { return };
+    let entity = spawn(&mut app, synthetic(2000, 4, true), Playback::paused_at(0.7));
+    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    let before = picture(&mut app, 0.0);
+    assert!(before.pixels().any(|pixel| pixel.0[..3] != [0, 0, 0]), "something shows");
+    assert!(view_bytes(&app, camera) > 0, "and takes memory");
+    let created = gpu::created();
+    show(&mut app, entity, Visibility::Hidden);
+    run(&mut app, 30);
+    show(&mut app, entity, Visibility::Inherited);
+    run(&mut app, 5);
+    assert_eq!(gpu::created(), created, "what is hidden for a moment keeps what it has");
+    show(&mut app, entity, Visibility::Hidden);
+    run(&mut app, 130);
+    assert_eq!(view_bytes(&app, camera), 0, "what is hidden for longer needs nothing");
+    let created = gpu::created();
+    run(&mut app, 130);
+    assert_eq!((view_bytes(&app, camera), gpu::created()), (0, created), "and stays so");
+    show(&mut app, entity, Visibility::Inherited);
+    assert!(picture(&mut app, 0.0) == before, "it shows again as it was");
+    assert!(gpu::created() > created, "in buffers made anew, for the old ones have gone");
+}
+
+#[test]
+fn a_view_shrinks_when_a_large_capture_has_gone() {
+    let _turn = turn();
+    let Some(mut app) = app(SIZE) else { return };
+    let large = spawn(&mut app, synthetic(100_000, 5, false), Playback::paused_at(0.7));
+    spawn(&mut app, heap(1, Vec3::X), Playback::paused_at(0.7));
+    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    testing::settle(&mut app).expect("the app draws without an error");
+    let (before, created) = (view_bytes(&app, camera), gpu::created());
+    assert!(app.world_mut().despawn(large), "it was there");
+    run(&mut app, 60);
+    assert_eq!(view_bytes(&app, camera), before, "it might come back soon");
+    assert_eq!(gpu::created(), created, "so nothing is made for what is left");
+    run(&mut app, 140);
+    let after = view_bytes(&app, camera);
+    assert!(0 < after && 4 * after < before, "then {after} bytes are enough, not {before}");
+    let created = gpu::created();
+    let picture = picture(&mut app, 0.0);
+    let [r, g, b, _] = picture.get_pixel(SIZE.x / 2, SIZE.y / 2).0;
+    assert!(r > 200 && g < 60 && b < 60, "the small one shows all the while: {r}, {g}, {b}");
+    assert_eq!(gpu::created(), created, "and all stands still again");
+}
+
+#[test]
+fn cameras_come_and_go_without_a_trace() {
+    let _turn = turn();
+    let Some(mut app) = app(SIZE) else { return };
+    spawn(&mut app, synthetic(500, 6, true), Playback::paused_at(0.7));
+    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    let before = picture(&mut app, 0.0);
+    let other = Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), SIZE);
+    let seeing = |app: &App| statistics(app).views().iter().map(|(camera, _)| *camera).collect::<Vec<_>>();
+    for round in 0..20 {
+        let msaa = if round % 2 == 0 { Msaa::Off } else { Msaa::Sample4 };
+        let passing = spawn_camera(&mut app, msaa, eye());
+        app.world_mut().entity_mut(passing).insert(other.target());
+        run(&mut app, 2);
+        let both = seeing(&app);
+        assert!(both.len() == 2 && both.contains(&passing), "round {round}: both cameras draw, not {both:?}");
+        assert!(app.world_mut().despawn(passing), "it is still there");
+        run(&mut app, 2);
+        assert_eq!(seeing(&app), [camera], "round {round}: one is left");
+    }
+    assert!(picture(&mut app, 0.0) == before, "which sees what it saw");
+    check_pipelines(&app);
 }
 
 #[test]
@@ -249,6 +366,7 @@ fn a_gpu_that_is_too_small_says_so_and_the_game_goes_on() {
     app.add_plugins(GaussianCapturePlugin).insert_resource(ClearColor(Color::BLACK));
     let entity = spawn(&mut app, heap(1, Vec3::X), Playback::default());
     spawn_camera(&mut app, Msaa::Off, eye());
+    let failures = failures_of(&mut app);
     let picture = picture(&mut app, 0.25);
     assert!(picture.pixels().all(|pixel| pixel.0[..3] == [0, 0, 0]), "no capture is drawn");
     let why = statistics(&app).renderer_missing().expect("a reason");
@@ -256,4 +374,32 @@ fn a_gpu_that_is_too_small_says_so_and_the_game_goes_on() {
     assert_eq!(statistics(&app).uploaded_captures(), 0, "and nothing is uploaded for nothing");
     let time = app.world().get::<Playback>(entity).expect("still there").time;
     assert_eq!(time, 0.25, "captures play all the same");
+    let state = app.world().get::<CaptureState>(entity).expect("a required component");
+    assert!(matches!(state, CaptureState::Failed(said) if said.contains(&why)), "its entity has failed: {state:?}");
+    let failures = failures.lock().unwrap_or_else(PoisonError::into_inner);
+    assert!(matches!(&failures[..], [said] if said.entity == entity), "which is said once: {failures:?}");
+}
+
+#[test]
+fn a_capture_that_contradicts_itself_is_refused() {
+    let _turn = turn();
+    let Some(mut app) = app(SIZE) else { return };
+    let failures = failures_of(&mut app);
+    // The filter of a smaller scene, and a map with too few texels.
+    let filtered = RuntimeScene { filter: synthetic(90, 7, true).filter, ..synthetic(100, 7, false) };
+    let map = Environment { width: 8, height: 4, texels: vec![0.5; 10] };
+    let mapped = RuntimeScene { environment: Some(map), ..heap(1, Vec3::Z) };
+    let wrong = [filtered, mapped].map(|scene| spawn(&mut app, scene, Playback::paused_at(0.0)));
+    spawn(&mut app, heap(1, Vec3::X), Playback::paused_at(0.0));
+    spawn_camera(&mut app, Msaa::Off, eye());
+    let picture = picture(&mut app, 0.0);
+    let [r, g, b, _] = picture.get_pixel(SIZE.x / 2, SIZE.y / 2).0;
+    assert!(r > 200 && g < 60 && b < 60, "the one that is right shows: {r}, {g}, {b}");
+    assert_eq!(statistics(&app).uploaded_captures(), 1, "and it alone is uploaded");
+    let failures = failures.lock().unwrap_or_else(PoisonError::into_inner);
+    for entity in wrong {
+        let state = app.world().get::<CaptureState>(entity).expect("a required component");
+        assert!(matches!(state, CaptureState::Failed(_)), "the wrong ones have failed: {state:?}");
+        assert!(failures.iter().any(|failure| failure.entity == entity), "and that is said: {failures:?}");
+    }
 }
