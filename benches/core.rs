@@ -58,7 +58,7 @@ fn bench_reference(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("reference");
     group.throughput(Throughput::Elements(COUNT as u64));
     group.bench_function("project", |bencher| {
-        bencher.iter(|| reference::project(black_box(&layer), BlendSpace::Encoded))
+        bencher.iter(|| reference::project(black_box(&layer), BlendSpace::Encoded));
     });
     group.bench_function("render", |bencher| bencher.iter(|| reference::render(black_box(&scene), &view, background)));
     group.finish();

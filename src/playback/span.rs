@@ -138,7 +138,7 @@ impl Span {
 impl Travel {
     /// The phase that is reached, as one of the first pass (or two).
     pub(super) fn phase(&self) -> f64 {
-        let into = self.into_pass(self.to, self.last);
+        let into = self.within_pass(self.to, self.last);
         if self.is_returning(self.last) { self.span.length + into } else { into }
     }
 
@@ -149,7 +149,7 @@ impl Travel {
         (0..=count).map(move |index| {
             let pass = self.first + direction * f64::from(index);
             let place = |phase| {
-                let into = self.into_pass(phase, pass);
+                let into = self.within_pass(phase, pass);
                 self.span.start + if self.is_returning(pass) { self.span.length - into } else { into }
             };
             let inclusive = if index == 0 { self.inclusive } else { self.span.is_loop() };
@@ -162,7 +162,7 @@ impl Travel {
         self.span.is_loop() && self.turns > 0
     }
 
-    fn into_pass(&self, phase: f64, pass: f64) -> f64 {
+    fn within_pass(&self, phase: f64, pass: f64) -> f64 {
         (phase - pass * self.span.length).clamp(0.0, self.span.length)
     }
 
