@@ -43,7 +43,8 @@ fn main() -> Result {
     testing::settle(&mut app)?;
     let captures = app.world().resource::<Assets<GaussianCapture>>();
     let duration = captures.iter().next().map_or(0.0, |(_, capture)| capture.duration_seconds());
-    let step = Duration::from_secs_f32(duration / arguments.frames.max(1) as f32);
+    let step = Duration::try_from_secs_f32(duration / arguments.frames.max(1) as f32)
+        .map_err(|error| format!("a capture of {duration} s cannot be cut into pictures: {error}"))?;
     common::save_pictures(&mut app, arguments.frames, step, &arguments.headless.unwrap_or_default())
 }
 

@@ -133,14 +133,10 @@ fn stand(app: &mut App, two_targets: bool) -> Option<Offscreen> {
 
 /// What keys and mouse do.
 fn interact(app: &mut App) {
-    let moves = (body::look, body::walk, body::snap_turn, (teleport::aim, teleport::travel).chain());
     app.init_resource::<Recorder>()
-        .add_systems(Update, moves.in_set(Moves).run_if(walking))
-        .add_systems(Update, (switches, path::record, teleport::show).after(Moves));
-}
-
-fn walking(player: Res<PathPlayer>) -> bool {
-    !player.playing
+        .add_plugins(teleport::plugin)
+        .add_systems(Update, (body::look, body::walk, body::snap_turn).in_set(Moves).run_if(path::walking))
+        .add_systems(Update, (switches, path::start, path::record).after(Moves));
 }
 
 fn setup(
@@ -174,7 +170,8 @@ fn spawn_body(mut commands: Commands, targets: Res<Targets>) {
 
 /// What every eye has, ours and a headset's.
 fn eye_look() -> impl Bundle {
-    // Meshes hide what is behind them without multisampling; colours of the capture as trained.
+    // What closes before the eyes is transparent, and drawn over captures only without multisampling; the floor would cut them with
+    // it, too. Colours of the capture as trained.
     (Msaa::Off, Tonemapping::None)
 }
 
@@ -195,17 +192,10 @@ fn arrange(
     *transform = Transform { translation: place, rotation: turn, scale: Vec3::splat(scale) };
 }
 
-fn switches(
-    keys: Res<ButtonInput<KeyCode>>,
-    mut comfort: ResMut<Comfort>,
-    mut player: ResMut<PathPlayer>,
-    rig: Option<Single<&mut StereoRig>>,
-) {
+/// What V and I do.
+fn switches(keys: Res<ButtonInput<KeyCode>>, mut comfort: ResMut<Comfort>, rig: Option<Single<&mut StereoRig>>) {
     if keys.just_pressed(KeyCode::KeyV) {
         comfort.vignette = !comfort.vignette;
-    }
-    if keys.just_pressed(KeyCode::KeyP) {
-        *player = PathPlayer { playing: !player.playing, seconds: 0.0 };
     }
     if let Some(mut rig) = rig.filter(|_| keys.just_pressed(KeyCode::KeyI)) {
         let known = DISTANCES.iter().position(|distance| *distance == rig.ipd).unwrap_or(0);

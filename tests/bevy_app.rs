@@ -20,7 +20,7 @@ use bevy_gs4d::playback::{Playback, Repeat};
 use bevy_gs4d::reference;
 use bevy_gs4d::render::{GaussianCapture3d, GaussianCapturePlugin};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene};
-use bevy_gs4d::testing;
+use bevy_gs4d::testing::{self, Offscreen, TestingError};
 use common::{app, picture, spawn_camera};
 use std::time::Duration;
 use twin::{DURATION, SIZE, add, blob, difference, difference_between, eye, rgb, scene, view, view_of};
@@ -308,4 +308,45 @@ fn the_plugin_does_without_a_renderer() {
     }
     let time = app.world().get::<Playback>(entity).expect("a required component").time;
     assert!((0.29..0.41).contains(&time), "captures play without being drawn: {time}");
+}
+
+#[test]
+fn pictures_are_taken_at_even_steps_from_the_start() {
+    let Some(mut app) = app(SIZE) else { return };
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let entity = spawn(&mut app, &crowd(), Transform::default());
+    app.world_mut().entity_mut(entity).insert(Playback::default());
+    spawn_camera(&mut app, Msaa::Off, eye());
+    let paths = testing::pictures(&mut app, folder.path(), 3, Duration::from_millis(250)).expect("the app draws");
+    let taken: Vec<_> = paths.iter().map(|path| image::open(path).expect("a whole picture").into_rgba8()).collect();
+    assert_eq!(taken.len(), 3, "as many as asked for");
+    for (index, taken) in (0u8..).zip(&taken) {
+        let time = 0.25 * f32::from(index);
+        app.world_mut().entity_mut(entity).insert(Playback::paused_at(time));
+        let apart = difference_between(taken, &picture(&mut app, 0.0));
+        assert_eq!(apart, 0, "picture {index} and that of {time} s are {apart} / 255 apart");
+    }
+    assert!(difference_between(&taken[0], &taken[2]) > 10, "while something moves");
+}
+
+#[test]
+fn what_is_waited_for_and_cannot_be_loaded_is_named() {
+    #[derive(Resource)]
+    struct Poster(Handle<Image>);
+
+    let Some(mut app) = app(SIZE) else { return };
+    let poster = Poster(app.world().resource::<AssetServer>().load("there-is-none.png"));
+    app.insert_resource(poster);
+    testing::wait_for(&mut app, |world| vec![world.resource::<Poster>().0.id().untyped()]);
+    let failure = testing::settle(&mut app).expect_err("there is no such file");
+    assert!(matches!(failure, TestingError::Asset(_)), "it cannot be loaded: {failure}");
+    assert!(failure.to_string().contains("there-is-none.png"), "{failure} names the file");
+}
+
+#[test]
+fn without_something_to_draw_into_there_is_no_picture() {
+    let Some(mut app) = app(SIZE) else { return };
+    app.world_mut().remove_resource::<Offscreen>();
+    let refused = testing::picture(&mut app, Duration::ZERO);
+    assert!(matches!(refused, Err(TestingError::NotOffscreen)), "{:?} says so", refused.err());
 }

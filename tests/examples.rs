@@ -1,16 +1,20 @@
 //! The examples as programs: what they write without a window, and how they take wrong arguments.
 //!
 //! In: the examples that `cargo test` has built beside the tests. Out: proof that each writes as many pictures as it is asked for and
-//! ends well, that there is something on them, and that it moves. Drawing is skipped where there is no GPU, not even a software one.
+//! ends well, that there is something on them, captures among it, and that it moves. Drawing is skipped where there is no GPU, not
+//! even a software one.
 
 #[path = "common/skip.rs"]
 mod skip;
 
+use bevy_gs4d::codec::{self, checkpoint::CheckpointOptions, package::WriteSettings};
+use bevy_gs4d::scene::{Form, GaussianScene};
 use bevy_gs4d::testing::{TestingError, has_gpu};
 use image::RgbaImage;
 use skip::skip;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use tempfile::TempDir;
 
 const EXAMPLES: [&str; 5] = ["minimal", "play", "timeline", "walkthrough", "headless"];
 
@@ -28,15 +32,21 @@ fn program(example: &str) -> PathBuf {
     program
 }
 
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
 fn run(example: &str, arguments: &[&str]) -> Output {
-    let root = env!("CARGO_MANIFEST_DIR");
+    run_with(Path::new(ROOT), example, arguments)
+}
+
+/// With the folder `assets` that is in `root`.
+fn run_with(root: &Path, example: &str, arguments: &[&str]) -> Output {
     let mut command = Command::new(program(example));
     command.args(arguments).current_dir(root).env("BEVY_ASSET_ROOT", root);
     command.output().unwrap_or_else(|error| panic!("{example} can be started: {error}"))
 }
 
 /// What an example writes without a window, in the order of the names, `frames` moments.
-fn pictures(example: &str, options: &[&str], frames: usize) -> Option<Vec<RgbaImage>> {
+fn pictures(root: &Path, example: &str, options: &[&str], frames: usize) -> Option<Vec<RgbaImage>> {
     if !has_gpu() {
         skip(TestingError::NoGpu);
         return None;
@@ -44,7 +54,7 @@ fn pictures(example: &str, options: &[&str], frames: usize) -> Option<Vec<RgbaIm
     let folder = tempfile::tempdir().expect("a temporary folder");
     let target = folder.path().join("pictures");
     let (target_name, count) = (target.to_str().expect("temporary folders have plain names"), frames.to_string());
-    let output = run(example, &[&["--headless", target_name, "--frames", &count][..], options].concat());
+    let output = run_with(root, example, &[&["--headless", target_name, "--frames", &count][..], options].concat());
     let said = [&output.stdout, &output.stderr].map(|said| String::from_utf8_lossy(said).into_owned()).concat();
     assert!(output.status.success(), "{example} ended with {}:\n{said}", output.status);
     assert!(said.contains(target_name), "{example} says where the pictures are:\n{said}");
@@ -64,7 +74,7 @@ fn read(folder: &Path) -> Vec<RgbaImage> {
 
 /// Draws two moments and looks at them.
 fn check(example: &str, options: &[&str], expected: usize) {
-    let Some(pictures) = pictures(example, options, 2) else { return };
+    let Some(pictures) = pictures(Path::new(ROOT), example, options, 2) else { return };
     assert_eq!(pictures.len(), expected, "{example} writes as many pictures as it is asked for");
     for picture in &pictures {
         let first = picture.get_pixel(0, 0);
@@ -103,6 +113,62 @@ fn walkthrough_writes_pairs_of_pictures() {
 #[test]
 fn headless_writes_pictures() {
     check("headless", &["--size", "200x120"], 2);
+}
+
+/// A folder whose assets are those of the crate, but that the capture has gone entirely transparent: it is as long and as large as
+/// it was, so that everything else is as it was, too.
+fn invisible() -> TempDir {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (from, to) = (Path::new(ROOT).join("assets"), folder.path().join("assets"));
+    std::fs::create_dir(&to).expect("the folder can be written to");
+    std::fs::copy(from.join("demo.timeline.ron"), to.join("demo.timeline.ron")).expect("the timeline can be copied");
+    let scene = codec::load(&from.join("toybox.gs4d"), &CheckpointOptions::default()).expect("the bundled capture");
+    let scene = GaussianScene::from(scene.into_runtime().expect("it can be drawn"));
+    let mut scene = scene.unpacked();
+    let Form::Runtime(gaussians) = &mut scene.form else { panic!("what can be drawn is in the runtime form") };
+    for gaussian in gaussians {
+        gaussian.opacity = 0.0;
+    }
+    codec::save(&to.join("toybox.gs4d"), &scene, &WriteSettings { level: 1 }).expect("the folder can be written to");
+    folder
+}
+
+#[test]
+fn captures_are_to_be_seen() {
+    let invisible = invisible();
+    for example in ["timeline", "walkthrough"] {
+        let roots = [Path::new(ROOT), invisible.path()];
+        // In the first picture the timeline's capture has not faded in.
+        let [Some(seen), Some(unseen)] = roots.map(|root| pictures(root, example, &[], 4)) else { return };
+        let (seen, unseen) = (&seen[3], &unseen[3]);
+        let differ = seen.pixels().zip(unseen.pixels()).filter(|(a, b)| a != b).count();
+        let share = differ as f64 / f64::from(seen.width() * seen.height());
+        assert!(share > 0.01, "{example} shows its captures: without them {share} of the picture differs");
+        assert!(share < 0.9, "and other things, too, which stay: {share} of the picture differs");
+    }
+}
+
+#[test]
+fn a_file_that_is_missing_is_named() {
+    if !has_gpu() {
+        skip(TestingError::NoGpu);
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let target = folder.path().join("pictures");
+    let target_name = target.to_str().expect("temporary folders have plain names");
+    for example in EXAMPLES {
+        let file = if example == "timeline" { "there-is-none.timeline.ron" } else { "there-is-none.gs4d" };
+        let output = run(example, &["--headless", target_name, "--frames", "1", file]);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success(), "{example} without its file is an error");
+        assert!(
+            said.lines().any(|line| line.starts_with("Error") && line.contains(file)),
+            "{example} names it:\n{said}"
+        );
+        assert!(!said.contains("panicked"), "{example} does not panic:\n{said}");
+        assert!(!target.exists(), "{example} writes nothing");
+    }
 }
 
 #[test]

@@ -10,12 +10,18 @@ mod common;
 mod skip;
 
 use bevy::core_pipeline::tonemapping::Tonemapping;
+use bevy::input::ButtonState;
+use bevy::input::keyboard::{Key, KeyboardInput};
 use bevy::prelude::*;
+use bevy::render::RenderApp;
+use bevy::render::render_resource::WgpuFeatures;
+use bevy::render::renderer::RenderDevice;
 use bevy::time::TimeUpdateStrategy;
+use bevy_egui::EguiContext;
 use bevy_gs4d::asset::{CaptureState, GaussianCapture};
 use bevy_gs4d::frame::DebugView;
 use bevy_gs4d::playback::{Playback, PlaybackSeeked};
-use bevy_gs4d::render::{CaptureSettings, CaptureViewSettings, GaussianCapture3d};
+use bevy_gs4d::render::{CaptureSettings, CaptureStatistics, CaptureViewSettings, GaussianCapture3d};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::testing;
 use bevy_gs4d::viewer::{Inspector, InspectorPlugin};
@@ -43,9 +49,12 @@ fn inspected() -> Option<(App, Entity)> {
     let mut app = app(SIZE)?;
     app.add_plugins(InspectorPlugin).init_resource::<Seen>();
     app.add_observer(|_: On<PlaybackSeeked>, mut seen: ResMut<Seen>| seen.seeks += 1);
-    let place = Transform::from_xyz(2.5, 2.0, 1.5).looking_at(Vec3::ZERO, Vec3::Z);
-    let camera = spawn_camera(&mut app, Msaa::Off, place);
+    let camera = spawn_camera(&mut app, Msaa::Off, place());
     Some((app, camera))
+}
+
+fn place() -> Transform {
+    Transform::from_xyz(2.5, 2.0, 1.5).looking_at(Vec3::ZERO, Vec3::Z)
 }
 
 fn spawn_capture(app: &mut App, playback: Playback) -> Entity {
@@ -165,4 +174,86 @@ fn a_debug_view_changes_what_a_camera_shows() {
         let share = changed(&as_trained, &picture(&mut app, 0.0), 0..SIZE.x);
         assert!(share > 0.01, "{debug:?} must not look like colour: {share} of the picture differs");
     }
+}
+
+#[test]
+fn the_panel_outlives_its_camera() {
+    let Some((mut app, first)) = inspected() else { return };
+    let with_first = picture(&mut app, 0.0);
+    app.world_mut().despawn(first);
+    run(&mut app, 3, 0.0);
+    let second = spawn_camera(&mut app, Msaa::Off, place());
+    let with_second = picture(&mut app, 0.0);
+    assert_eq!(changed(&with_first, &with_second, 0..SIZE.x), 0.0, "the next camera has the same panel");
+    let contexts = app.world_mut().query::<&EguiContext>().iter(app.world()).count();
+    assert!(contexts == 1 && app.world().get::<EguiContext>(second).is_some(), "which is the only one of {contexts}");
+    let third = spawn_camera(&mut app, Msaa::Off, place());
+    app.world_mut().despawn(second);
+    assert_eq!(changed(&with_first, &picture(&mut app, 0.0), 0..SIZE.x), 0.0, "one that is there already gets it, too");
+    assert!(app.world().get::<EguiContext>(third).is_some(), "at once");
+    set_open(&mut app, false);
+    let covered = changed(&with_first, &picture(&mut app, 0.0), PANEL);
+    assert!(covered > 0.5, "and that is what was seen: closed, {covered} of its place looks otherwise");
+}
+
+fn key(state: ButtonState) -> KeyboardInput {
+    let window = Entity::PLACEHOLDER;
+    KeyboardInput { key_code: KeyCode::F1, logical_key: Key::F1, state, text: None, repeat: false, window }
+}
+
+#[test]
+fn f1_toggles_once_however_long_it_is_held() {
+    let Some((mut app, _)) = inspected() else { return };
+    testing::settle(&mut app).expect("the app runs");
+    let is_open = |app: &App| app.world().resource::<Inspector>().open;
+    assert!(is_open(&app), "open from the start");
+    for expected in [false, true] {
+        for _ in 0..5 {
+            // Held keys are repeated.
+            app.world_mut().write_message(key(ButtonState::Pressed));
+            run(&mut app, 1, 0.1);
+            assert_eq!(is_open(&app), expected, "toggled by the first of five");
+        }
+        app.world_mut().write_message(key(ButtonState::Released));
+        run(&mut app, 2, 0.1);
+        assert_eq!(is_open(&app), expected, "letting go does nothing");
+    }
+}
+
+#[test]
+fn gpu_time_is_measured_only_while_its_section_is_open() {
+    let Some((mut app, camera)) = inspected() else { return };
+    spawn_capture(&mut app, Playback::paused_at(0.5));
+    testing::settle(&mut app).expect("the capture shows");
+    let renderer = app.get_sub_app(RenderApp).expect("it has drawn");
+    let features = renderer.world().resource::<RenderDevice>().features();
+    if !features.contains(WgpuFeatures::TIMESTAMP_QUERY_INSIDE_PASSES) {
+        skip::skip("this GPU has no timestamps inside passes");
+        return;
+    }
+    let measured = |app: &App| {
+        let view = app.world().resource::<CaptureStatistics>().view(camera).expect("it draws the capture");
+        !view.passes.is_empty()
+    };
+    // Opens all sections, or leaves each as it was.
+    let unfold = |app: &mut App, all: bool| {
+        let mut context = app.world_mut().get_mut::<EguiContext>(camera).expect("the panel's");
+        context.get_mut().memory_mut(|memory| memory.set_everything_is_visible(all));
+    };
+    run(&mut app, 20, 0.0);
+    assert!(!measured(&app), "the section is closed at first");
+    unfold(&mut app, true);
+    let mut updates = 0;
+    while !measured(&app) && updates < 500 {
+        run(&mut app, 1, 0.0);
+        updates += 1;
+    }
+    assert!(measured(&app), "open, it shows times");
+    unfold(&mut app, false);
+    run(&mut app, 20, 0.0);
+    assert!(!measured(&app), "closed again, there are none");
+    unfold(&mut app, true);
+    set_open(&mut app, false);
+    run(&mut app, 20, 0.0);
+    assert!(!measured(&app), "nor while the whole panel is closed");
 }

@@ -1,4 +1,4 @@
-//! Playback in Bevy apps: what is said and when, shared clocks, and the game's time.
+//! Playback in Bevy apps: what is said and when, shared clocks, the game's time, and what tools see of the components.
 //!
 //! In: captures of two seconds with key-frames every half second. Out: proof that time goes where it is sent and that everybody
 //! hears of it. Needs neither a GPU nor a window.
@@ -7,9 +7,11 @@
 mod stage;
 
 use bevy::prelude::*;
-use bevy_gs4d::playback::ClockSource;
+use bevy_gs4d::playback::{ClipFade, ClockSource};
 use bevy_gs4d::prelude::*;
+use bevy_gs4d::stereo::SideBySide;
 use stage::{app, capture, change, debug, get, pass, said};
+use std::any::{TypeId, type_name};
 
 /// A capture of two seconds with five key-frames.
 fn spawn(app: &mut App, bundle: impl Bundle) -> Entity {
@@ -225,4 +227,59 @@ fn frames_are_stepped_through_exactly() {
         shown.push(time(&app, entity));
     }
     assert_eq!(shown, [16.0, 17.0, 16.0, 15.0].map(|frame: f32| frame / 30.0), "whole frames from the nearest one");
+}
+
+#[test]
+fn whoever_hears_of_an_end_may_despawn() {
+    let mut app = app("assets");
+    let [first, second] = [1.5, 0.0].map(|time| spawn(&mut app, Playback { time, repeat: Repeat::Once, ..default() }));
+    app.add_observer(|ended: On<PlaybackEnded>, mut commands: Commands| commands.entity(ended.entity).despawn());
+    pass(&mut app, 1.0);
+    assert!(app.world().get_entity(first).is_err(), "the one that has ended is gone");
+    assert_eq!(time(&app, second), 1.0, "the other one plays on");
+    let ended = |entity| debug(&PlaybackEnded { entity });
+    assert!(said(&mut app).contains(&ended(first)), "the end was said");
+    pass(&mut app, 1.0);
+    assert!(app.world().get_entity(second).is_err(), "until it ends, too");
+    assert!(said(&mut app).contains(&ended(second)), "which is said, too");
+}
+
+/// What is missing of a component for scenes, animations and inspectors.
+fn unknown<C: Component>(app: &App) -> Option<&'static str> {
+    let registry = app.world().resource::<AppTypeRegistry>().read();
+    registry.get_type_data::<ReflectComponent>(TypeId::of::<C>()).is_none().then(type_name::<C>)
+}
+
+#[test]
+fn components_are_known_to_reflection() {
+    let app = app("assets");
+    let unknown = [
+        unknown::<Playback>(&app),
+        unknown::<PlaybackClock>(&app),
+        unknown::<FollowsClock>(&app),
+        unknown::<TimelinePlayer>(&app),
+        unknown::<TimelineTrack>(&app),
+        unknown::<ClipFade>(&app),
+        unknown::<GaussianCapture3d>(&app),
+        unknown::<CaptureSettings>(&app),
+        unknown::<CaptureViewSettings>(&app),
+        unknown::<CaptureState>(&app),
+        unknown::<StereoRig>(&app),
+        unknown::<Eye>(&app),
+        unknown::<SideBySide>(&app),
+    ];
+    let unknown: Vec<_> = unknown.into_iter().flatten().collect();
+    assert_eq!(unknown, [""; 0], "all are registered as components");
+}
+
+#[test]
+fn a_follower_finds_its_clock_in_another_world() {
+    let mut app = app("assets");
+    let clocks = [(); 2].map(|()| app.world_mut().spawn(PlaybackClock::manual()).id());
+    let mut follows = FollowsClock(clocks[0]);
+    let registry = app.world().resource::<AppTypeRegistry>().read();
+    let component = registry.get_type_data::<ReflectComponent>(TypeId::of::<FollowsClock>()).expect("registered");
+    // What a scene does with every component that it spawns.
+    component.map_entities(&mut follows, &mut (clocks[0], clocks[1]));
+    assert_eq!(follows, FollowsClock(clocks[1]), "the entity that stands for its clock there");
 }

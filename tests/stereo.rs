@@ -13,6 +13,7 @@ use bevy::camera::RenderTarget;
 use bevy::core_pipeline::tonemapping::{DebandDither, Tonemapping};
 use bevy::math::DVec3;
 use bevy::prelude::*;
+use bevy::render::render_resource::Extent3d;
 use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::gpu::activated;
@@ -91,12 +92,17 @@ struct Stage {
 
 impl Stage {
     fn new(scene: &RuntimeScene, head: Transform, separate: bool) -> Option<Self> {
-        let size = if separate { SIZE } else { SIZE * UVec2::new(2, 1) };
+        Self::of_size(SIZE, scene, head, separate)
+    }
+
+    /// The same with so many pixels for each eye.
+    fn of_size(eye: UVec2, scene: &RuntimeScene, head: Transform, separate: bool) -> Option<Self> {
+        let size = if separate { eye } else { eye * UVec2::new(2, 1) };
         let mut app = app(size)?;
         app.add_plugins(StereoPlugin);
         spawn(&mut app, scene, Playback::default());
         let target = RenderTarget::default();
-        let right = separate.then(|| Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), SIZE));
+        let right = separate.then(|| Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), eye));
         let targets = match &right {
             Some(right) => EyeTargets::Separate([target, right.target()]),
             None => EyeTargets::SideBySide(target),
@@ -219,6 +225,23 @@ fn two_halves_and_two_targets_show_the_same() {
         assert_eq!(apart(&halves[index], &pair[index]), 0, "the {name} eye's pictures are the same");
     }
     assert!(apart(&halves[0], &halves[1]) > 50, "while the two eyes' differ");
+}
+
+#[test]
+fn halves_grow_with_their_target() {
+    let head = Transform::from_xyz(-0.3, 0.2, 2.5).looking_at(Vec3::ZERO, Vec3::Y);
+    let larger = SIZE + UVec2::new(50, 30);
+    let stages = [SIZE, larger].map(|eye| Stage::of_size(eye, &crowd(), head, false));
+    let [Some(mut stage), Some(mut expected)] = stages else { return };
+    stage.eyes(0.0);
+    let mut offscreen = stage.app.world_mut().resource_mut::<Offscreen>();
+    offscreen.size = larger * UVec2::new(2, 1);
+    let (image, size) = (offscreen.image.clone(), offscreen.size);
+    let size = Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 };
+    let mut images = stage.app.world_mut().resource_mut::<Assets<Image>>();
+    images.get_mut(&image).expect("the app's own picture").resize(size);
+    let pictures = [&mut stage, &mut expected].map(|stage| picture(&mut stage.app, 0.0));
+    assert_eq!(apart(&pictures[0], &pictures[1]), 0, "both eyes fill it as if it had always been that large");
 }
 
 #[test]

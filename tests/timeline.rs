@@ -11,7 +11,7 @@ use bevy::prelude::*;
 use bevy_gs4d::codec::{self, package::WriteSettings};
 use bevy_gs4d::playback::{Clip, ClipFade, Marker, Track};
 use bevy_gs4d::prelude::*;
-use stage::{app, capture, change, debug, get, pass, said};
+use stage::{app, app_with, capture, change, debug, get, pass, said};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -116,6 +116,59 @@ fn a_moment_looks_the_same_however_it_is_reached() {
 }
 
 #[test]
+fn the_end_of_a_looping_timeline_can_be_sought() {
+    let mut app = app("assets");
+    let capture = capture(&mut app, 2.0, 4);
+    let clip = Clip { capture, start: 0.0, range: [0.0, 2.0], speed: 1.0, fade: [0.0; 2] };
+    let tracks = vec![Track { name: "left".into(), clips: vec![clip] }];
+    let timeline = Timeline::new(tracks, Vec::new(), None).expect("makes sense");
+    let player = spawn(&mut app, timeline, Playback::paused_at(0.5));
+    pass(&mut app, 0.25);
+    for sought in [2.0f32, 0.5, 9.0] {
+        change(&mut app, player, |playback: &mut Playback| playback.seek(sought));
+        pass(&mut app, 0.25);
+        assert_eq!(shown(&mut app, "left"), (true, sought.min(2.0), 1.0), "scrubbed to {sought} s");
+    }
+    said(&mut app);
+    change(&mut app, player, Playback::play);
+    pass(&mut app, 0.25);
+    assert_eq!(shown(&mut app, "left"), (true, 0.25, 1.0), "played on, it starts over");
+    let left = track(&mut app, "left");
+    let seeked = debug(&PlaybackSeeked { entity: left, from: 2.0, to: 0.25 });
+    assert_eq!(said_by(&mut app, left), [seeked], "and nothing is played backwards to get there");
+}
+
+#[test]
+fn a_clip_that_reaches_beyond_its_capture_stands_at_its_end() {
+    let mut app = app("assets");
+    let late = capture(&mut app, 4.0, 4);
+    let loading = app.world().resource::<Assets<GaussianCapture>>().reserve_handle();
+    let clip = |capture: &Handle<GaussianCapture>, range, speed| Clip {
+        capture: capture.clone(),
+        start: 0.0,
+        range,
+        speed,
+        fade: [0.0; 2],
+    };
+    let tracks = [("beyond", clip(&late, [5.0, 6.0], 1.0)), ("back", clip(&loading, [0.0, 5.0], -1.0))];
+    let tracks = tracks.map(|(name, clip)| Track { name: name.into(), clips: vec![clip] });
+    let timeline = Timeline::new(tracks.to_vec(), Vec::new(), None).expect("makes sense");
+    spawn(&mut app, timeline, Playback { repeat: Repeat::Once, ..default() });
+    pass(&mut app, 0.5);
+    let beyond = shown(&mut app, "beyond").1;
+    assert!(beyond >= 4.0, "all beyond its capture, a clip stands at the end of it, not at {beyond} s");
+    // The other track's capture arrives only now.
+    let scene = stage::scene(4.0, 4).into_runtime().expect("a synthetic scene can be drawn");
+    let mut captures = app.world_mut().resource_mut::<Assets<GaussianCapture>>();
+    captures.insert(&loading, GaussianCapture::new(scene)).expect("a reserved place");
+    for (step, expected) in [(0.25, 4.0), (0.25, 4.0), (1.0, 3.0), (3.0, 0.0)] {
+        pass(&mut app, step);
+        let expected = (true, expected, 1.0);
+        assert_eq!(shown(&mut app, "back"), expected, "backwards it waits at the end, and then plays all there is");
+    }
+}
+
+#[test]
 fn markers_are_said_in_the_order_of_play() {
     let mut app = app("assets");
     let (timeline, _) = timeline(&mut app);
@@ -215,12 +268,39 @@ fn load(app: &App, name: &'static str) -> Handle<Timeline> {
     app.world().resource::<AssetServer>().load(name)
 }
 
+/// A timeline of one clip.
+fn text(range: &str) -> String {
+    format!("(tracks: [(name: \"left\", clips: [(capture: \"two.gs4d\", start: 0, {range})])])")
+}
+
+#[test]
+fn a_file_that_bevy_watches_is_played_as_it_becomes() {
+    let folder = folder();
+    let file = folder.path().join("show.timeline.ron");
+    std::fs::write(&file, text("in: 0.5, out: 1.5")).expect("a file");
+    let file_path = folder.path().to_str().expect("temporary folders have plain names").into();
+    let mut app = app_with(AssetPlugin { file_path, watch_for_changes_override: Some(true), ..default() });
+    let handle = load(&app, "show.timeline.ron");
+    app.world_mut().spawn((TimelinePlayer(handle.clone()), Playback::paused_at(0.25)));
+    let loaded = handle.clone();
+    wait(&mut app, "timeline and capture", move |app| {
+        app.world().resource::<AssetServer>().is_loaded_with_dependencies(loaded.id())
+    });
+    pass(&mut app, 0.0);
+    assert_eq!(shown(&mut app, "left"), (true, 0.75, 1.0), "what the file says");
+    std::fs::write(&file, text("in: 1.0, out: 2.0, speed: -1")).expect("the file");
+    wait(&mut app, "the change, which nobody told of", move |app| {
+        let timeline = app.world().resource::<Assets<Timeline>>().get(&handle);
+        timeline.is_some_and(|timeline| timeline.tracks()[0].clips[0].speed < 0.0)
+    });
+    pass(&mut app, 0.0);
+    assert_eq!(shown(&mut app, "left"), (true, 1.75, 1.0), "what it says now");
+}
+
 #[test]
 fn a_file_loads_with_its_captures_and_reloads_when_it_changes() {
     let folder = folder();
     let file = folder.path().join("show.timeline.ron");
-    let text =
-        |range: &str| format!("(tracks: [(name: \"left\", clips: [(capture: \"two.gs4d\", start: 0, {range})])])");
     std::fs::write(&file, text("in: 0.5, out: 1.5")).expect("a file");
     let mut app = app_in(folder.path());
     let handle = load(&app, "show.timeline.ron");

@@ -78,3 +78,28 @@ pub fn snap_turn(
         body.rotate_around(head.translation(), Quat::from_rotation_y(turns as f32 * FRAC_PI_6));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_snap_turn_keeps_the_head_in_place() {
+        let body = Transform::from_xyz(1.0, 0.0, 2.0).with_rotation(Quat::from_rotation_y(0.4));
+        let head = Transform::from_xyz(0.3, EYE_HEIGHT, -0.2);
+        for (key, angle) in [(KeyCode::KeyQ, FRAC_PI_6), (KeyCode::KeyE, -FRAC_PI_6)] {
+            let mut keys = ButtonInput::default();
+            keys.press(key);
+            let mut app = App::new();
+            app.insert_resource(keys).add_systems(Update, snap_turn);
+            let entity = app.world_mut().spawn((Body::default(), body)).id();
+            app.world_mut().spawn((Head, GlobalTransform::from(body * head)));
+            app.update();
+            let turned = *app.world().get::<Transform>(entity).expect("a body");
+            let [before, after] = [body, turned].map(|body| (body * head).translation);
+            assert!(before.abs_diff_eq(after, 1e-5), "the head stays at {before} and is at {after}");
+            let turn = turned.rotation * body.rotation.inverse();
+            assert!(turn.abs_diff_eq(Quat::from_rotation_y(angle), 1e-5), "by 30 degrees, and not by {turn}");
+        }
+    }
+}

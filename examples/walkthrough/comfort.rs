@@ -42,6 +42,12 @@ pub struct Comfort {
     closed: f32,
 }
 
+impl Default for Comfort {
+    fn default() -> Self {
+        Self { vignette: true, closed: 0.0 }
+    }
+}
+
 /// What rings and curtains are made of.
 #[derive(Resource)]
 struct Cloth {
@@ -73,7 +79,7 @@ pub struct ComfortPlugin;
 
 impl Plugin for ComfortPlugin {
     fn build(&self, app: &mut App) {
-        app.insert_resource(Comfort { vignette: true, closed: 0.0 })
+        app.init_resource::<Comfort>()
             .init_resource::<Cloth>()
             .add_systems(Update, (hang, close, darken).chain().after(Moves));
     }
@@ -163,5 +169,32 @@ fn darken(
     }
     for mut visibility in &mut curtains {
         visibility.set_if_neq(if dark > 0.0 { Visibility::Inherited } else { Visibility::Hidden });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f32::consts::{FRAC_PI_6, PI};
+
+    const FRAME: f32 = 1.0 / 60.0;
+
+    #[test]
+    fn walking_and_turning_are_motion() {
+        let still = (Vec3::new(1.0, 0.0, 2.0), 0.5);
+        assert_eq!(motion(still, still, FRAME), 0.0, "who stands does not move");
+        let walked = (still.0 + Vec3::X * 1.5 * FRAME, still.1);
+        assert_eq!(motion(still, walked, FRAME), 1.0, "walking closes the edges");
+        let slow = motion(still, (still.0 + Vec3::X * 0.4 * FRAME, still.1), FRAME);
+        assert!((slow - 0.5).abs() < 1e-3, "half as fast as what closes them, {slow}");
+        let turned = motion((still.0, PI - 0.01), (still.0, 0.01 - PI), FRAME);
+        assert_eq!(turned, 1.0, "turning does, too, also past half a turn");
+    }
+
+    #[test]
+    fn a_jump_is_no_motion() {
+        let before = (Vec3::ZERO, 0.0);
+        assert_eq!(motion(before, (Vec3::new(2.0, 0.0, -1.0), 0.0), FRAME), 0.0, "a teleport");
+        assert_eq!(motion(before, (Vec3::ZERO, FRAC_PI_6), FRAME), 0.0, "a snap turn");
     }
 }

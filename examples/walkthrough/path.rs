@@ -3,6 +3,7 @@
 //! In: a RON file of poses, or the head as it moves. Out: the transforms of body and head at any time, or a file.
 
 use crate::body::{Body, EYE_HEIGHT, Head};
+use crate::teleport::Teleport;
 use bevy::prelude::*;
 use bevy_gs4d::stereo::StereoRig;
 use serde::{Deserialize, Serialize};
@@ -124,6 +125,19 @@ pub struct PathPlayer {
     pub seconds: f32,
 }
 
+/// Whether the body goes its own way.
+pub fn walking(player: Res<PathPlayer>) -> bool {
+    !player.playing
+}
+
+/// P goes the path from its beginning, or stops.
+pub fn start(keys: Res<ButtonInput<KeyCode>>, mut player: ResMut<PathPlayer>, mut teleport: ResMut<Teleport>) {
+    if keys.just_pressed(KeyCode::KeyP) {
+        *player = PathPlayer { playing: !player.playing, seconds: 0.0 };
+        teleport.stop_aiming();
+    }
+}
+
 /// Puts body and head where they are on the path.
 pub fn follow(
     time: Res<Time>,
@@ -174,12 +188,56 @@ pub fn record(
     }
 }
 
+/// What [`HeadPath::read`] reads.
+fn text(poses: &[Pose]) -> Result<String, String> {
+    let lines = ron::ser::PrettyConfig::default().depth_limit(1);
+    ron::ser::to_string_pretty(poses, lines).map_err(|error| error.to_string())
+}
+
 fn save(poses: &[Pose]) {
-    let written = ron::ser::to_string_pretty(poses, ron::ser::PrettyConfig::default().depth_limit(1))
-        .map_err(|error| error.to_string())
-        .and_then(|text| std::fs::write(RECORDING, text).map_err(|error| error.to_string()));
+    let written = text(poses).and_then(|text| std::fs::write(RECORDING, text).map_err(|error| error.to_string()));
     match written {
         Ok(()) => info!("{} poses in {RECORDING}: --path {RECORDING} goes that way", poses.len()),
         Err(error) => error!("{RECORDING}: {error}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn head(position: Vec3, yaw: f32, pitch: f32) -> GlobalTransform {
+        let turn = Quat::from_euler(EulerRot::YXZ, yaw, pitch, 0.0);
+        Transform::from_translation(position).with_rotation(turn).into()
+    }
+
+    #[test]
+    fn a_recorded_path_reads_back() {
+        let ways = [(Vec3::new(0.5, 1.6, 3.0), 0.7, -0.3), (Vec3::new(1.5, 1.5, -2.0), -1.2, 0.4), (Vec3::Y, 0.0, 0.0)];
+        let poses: Vec<Pose> = (0u8..)
+            .zip(ways)
+            .map(|(step, (place, yaw, pitch))| Pose::of(f32::from(step), &head(place, yaw, pitch)))
+            .collect();
+        let path = HeadPath::read(&text(&poses).expect("poses can be written")).expect("and read");
+        assert_eq!(path.duration(), 2.0, "as long as it took");
+        for (pose, (place, yaw, pitch)) in poses.iter().zip(ways) {
+            let read = path.at(pose.time);
+            let [x, y, z, read_yaw, read_pitch] = read.values();
+            assert!(place.abs_diff_eq(Vec3::new(x, y, z), 1e-5), "at {} s the head is at {place}", pose.time);
+            let off = (read_yaw - yaw).abs().max((read_pitch - pitch).abs());
+            assert!(off < 1e-5, "and looks where it looked: {off} radians off");
+        }
+    }
+
+    #[test]
+    fn a_path_that_makes_no_sense_names_its_pose() {
+        let pose = |time: &str| format!("(time: {time}, position: (0.0, 1.6, 0.0), yaw: 0.0, pitch: 0.0)");
+        let refused = |second: &str| HeadPath::read(&format!("[{}, {}]", pose("0.0"), pose(second))).err();
+        assert!(refused("1.0").is_none(), "in the order of time");
+        for time in ["0.0", "-1.0", "NaN", "inf"] {
+            let message = refused(time).unwrap_or_default();
+            assert!(message.contains("pose 2"), "{time} s for the second pose: {message:?}");
+        }
+        assert!(HeadPath::read("[]").is_err(), "no pose is no path");
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! In: where the head is, keys and buttons. Out: another place of the body, how dark the view is, and dots that show the aim.
 
-use crate::body::{Body, Head};
+use crate::body::{Body, Head, Moves};
+use crate::path::{follow, walking};
 use bevy::prelude::*;
 
 /// How far from the middle there is floor to stand on, metres.
@@ -39,6 +40,13 @@ impl Teleport {
         match self {
             Self::Idle | Self::Aiming(_) => 0.0,
             Self::Leaving { dark, .. } | Self::Arriving { dark } => dark.clamp(0.0, 1.0),
+        }
+    }
+
+    /// Forgets what is aimed at; who is under way already arrives.
+    pub fn stop_aiming(&mut self) {
+        if matches!(self, Self::Aiming(_)) {
+            *self = Self::Idle;
         }
     }
 }
@@ -94,8 +102,15 @@ pub fn setup(
     }
 }
 
+/// What keys do: aiming, and what follows from it. While a recorded way is gone nobody aims, but who is under way arrives, or it
+/// would stay dark.
+pub fn plugin(app: &mut App) {
+    app.add_systems(Update, (aim.run_if(walking), travel).chain().before(follow).in_set(Moves))
+        .add_systems(Update, show.after(Moves));
+}
+
 /// Holding T or the right button aims, letting go leaves.
-pub fn aim(
+fn aim(
     keys: Res<ButtonInput<KeyCode>>,
     buttons: Res<ButtonInput<MouseButton>>,
     head: Single<&GlobalTransform, With<Head>>,
@@ -112,7 +127,7 @@ pub fn aim(
 }
 
 /// Goes dark, puts the head above the place, and goes bright again.
-pub fn travel(
+fn travel(
     time: Res<Time>,
     head: Single<&GlobalTransform, With<Head>>,
     mut body: Single<&mut Transform, With<Body>>,
@@ -133,7 +148,7 @@ pub fn travel(
 }
 
 /// Puts marker and dots where the aim is.
-pub fn show(
+fn show(
     teleport: Res<Teleport>,
     head: Single<&GlobalTransform, With<Head>>,
     marker: Single<(&mut Transform, &mut Visibility), With<Marker>>,
@@ -150,5 +165,85 @@ pub fn show(
     for (dot, mut place, mut visibility) in &mut dots {
         visibility.set_if_neq(shown(matches!(*teleport, Teleport::Aiming(_))));
         place.translation = throw.at(throw.flight() * dot.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::path::{HeadPath, PathPlayer, start};
+    use std::time::Duration;
+
+    /// Where the body is at first, the head above a place beside it, and where it is sent.
+    const BODY: Vec3 = Vec3::new(1.0, 0.0, 0.0);
+    const HEAD: Vec3 = Vec3::new(1.5, 1.6, 0.5);
+    const TARGET: Vec3 = Vec3::new(3.0, 0.0, -1.0);
+
+    fn app(teleport: Teleport) -> App {
+        let mut app = App::new();
+        app.init_resource::<Time>()
+            .init_resource::<ButtonInput<KeyCode>>()
+            .init_resource::<ButtonInput<MouseButton>>()
+            .insert_resource(HeadPath::load(None).expect("the bundled path"))
+            .insert_resource(PathPlayer { playing: false, seconds: 0.0 })
+            .insert_resource(teleport)
+            .add_plugins(plugin)
+            .add_systems(Update, (follow.in_set(Moves), start.after(Moves)));
+        app.world_mut().spawn((Body::default(), Transform::from_translation(BODY)));
+        app.world_mut().spawn((Head, GlobalTransform::from_translation(HEAD)));
+        app
+    }
+
+    /// One update, so many times the length of a fade later.
+    fn pass(app: &mut App, fades: f32) -> Teleport {
+        app.world_mut().resource_mut::<Time>().advance_by(Duration::from_secs_f32(fades * FADE));
+        app.update();
+        app.world_mut().resource_mut::<ButtonInput<KeyCode>>().clear();
+        *app.world().resource::<Teleport>()
+    }
+
+    fn press(app: &mut App, key: KeyCode) {
+        app.world_mut().resource_mut::<ButtonInput<KeyCode>>().press(key);
+    }
+
+    fn body(app: &mut App) -> Vec3 {
+        let mut bodies = app.world_mut().query_filtered::<&Transform, With<Body>>();
+        bodies.single(app.world()).expect("one body").translation
+    }
+
+    #[test]
+    fn travel_goes_dark_arrives_and_clears() {
+        let mut app = app(Teleport::Leaving { to: TARGET, dark: 0.0 });
+        let half = pass(&mut app, 0.5).dark();
+        assert!((half - 0.5).abs() < 1e-3 && body(&mut app) == BODY, "half dark, {half}, and still there");
+        assert_eq!(pass(&mut app, 0.6).dark(), 1.0, "all dark");
+        let expected = BODY + (TARGET - HEAD).with_y(0.0);
+        assert!(body(&mut app).abs_diff_eq(expected, 1e-6), "the head is above the place, the body at {expected}");
+        let brighter = pass(&mut app, 0.25).dark();
+        assert!((brighter - 0.75).abs() < 1e-3, "it gets brighter: {brighter}");
+        assert_eq!(pass(&mut app, 0.8), Teleport::Idle, "until all is seen");
+        assert!(body(&mut app).abs_diff_eq(expected, 1e-6), "from the new place");
+    }
+
+    #[test]
+    fn a_recorded_way_that_begins_meanwhile_does_not_stay_dark() {
+        let mut app = app(Teleport::Leaving { to: TARGET, dark: 0.5 });
+        press(&mut app, KeyCode::KeyP);
+        pass(&mut app, 0.25);
+        assert!(app.world().resource::<PathPlayer>().playing, "the way has begun");
+        for _ in 0..8 {
+            pass(&mut app, 0.25);
+        }
+        assert_eq!(*app.world().resource::<Teleport>(), Teleport::Idle, "and is seen");
+    }
+
+    #[test]
+    fn aiming_ends_when_a_recorded_way_begins() {
+        let mut app = app(Teleport::Idle);
+        press(&mut app, KeyCode::KeyT);
+        assert!(matches!(pass(&mut app, 0.25), Teleport::Aiming(_)), "T aims");
+        press(&mut app, KeyCode::KeyP);
+        assert_eq!(pass(&mut app, 0.25), Teleport::Idle, "P ends it");
+        assert_eq!(pass(&mut app, 0.25), Teleport::Idle, "though T is still held");
     }
 }

@@ -13,8 +13,8 @@ use bevy::ecs::event::EntityEvent;
 use bevy::ecs::message::{Message, MessageWriter};
 use bevy::ecs::system::{Commands, SystemParam};
 
-/// Its capture is there, and drawn from now on: it has been loaded, loaded again after its file changed (or changed in memory), or
-/// the entity was given another one that is there already.
+/// Its capture is there and drawn: it has been loaded, loaded again after its file changed (or changed in memory), or the entity was
+/// given another one that is there already. Said at the latest one frame after the capture first shows.
 #[derive(Message, EntityEvent, Debug, Clone, PartialEq)]
 pub struct CaptureReady {
     /// The entity with the capture.

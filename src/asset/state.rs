@@ -57,8 +57,11 @@ pub(super) fn keep_states(
         failures.read().map(|failure| (failure.id, describe(&failure.path, &failure.error))).collect();
     for (entity, capture, mut state) in &mut captures {
         let id = capture.0.id();
-        // Rendering has said so.
         if rejected.contains(id) {
+            // Rendering has said so, but not that loading another one in its place failed.
+            if let Some(error) = failed.get(&id) {
+                announcer.failed(entity, error.clone());
+            }
             continue;
         }
         if loaded.contains(id) {

@@ -56,6 +56,7 @@ pub enum ClockSource {
 ///
 /// Its time is then the clock's, multiplied by its own speed, `offset` into its range, repeated as it says; `time` cannot be set.
 /// A follower that is paused stands, and falls in with the clock again when it plays. Where the entity has no clock, time stands.
+/// A [`TimelinePlayer`](super::TimelinePlayer) cannot follow the clock of another one: let both follow a clock of their own.
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component, Debug, Clone, PartialEq)]
 pub struct FollowsClock(#[entities] pub Entity);
@@ -83,10 +84,11 @@ impl PlaybackClock {
         self.jumps = self.jumps.wrapping_add(1);
     }
 
-    /// Moves on by `delta` seconds of the game, if it does so.
+    /// Moves on by `delta` seconds of the game, if it does so. A speed that is no finite number holds it.
     pub fn advance(&mut self, delta: f64) {
-        if self.running && self.source == ClockSource::Game {
-            self.seconds += delta * f64::from(self.speed);
+        let next = self.seconds + delta * f64::from(self.speed);
+        if self.running && self.source == ClockSource::Game && next.is_finite() {
+            self.seconds = next;
         }
     }
 }
@@ -94,6 +96,20 @@ impl PlaybackClock {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_clock_recovers_from_a_speed_that_is_no_number() {
+        let mut clock = PlaybackClock { seconds: 1.0, ..PlaybackClock::default() };
+        for speed in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            clock.speed = speed;
+            clock.advance(0.5);
+            clock.advance(0.0);
+            assert_eq!(clock.seconds, 1.0, "at speed {speed} it stands");
+        }
+        clock.speed = 2.0;
+        clock.advance(0.5);
+        assert_eq!(clock.seconds, 2.0, "and then it runs");
+    }
 
     #[test]
     fn a_clock_of_the_game_runs_and_one_set_by_hand_does_not() {

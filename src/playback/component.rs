@@ -9,14 +9,14 @@ use bevy::ecs::component::Component;
 use bevy::ecs::reflect::ReflectComponent;
 use bevy::reflect::{Reflect, std_traits::ReflectDefault};
 
-/// How a capture is played. Every field may be set at any time, by code or by an animation.
+/// How a capture is played. Every field may be set at any time by code, and every one but `repeat` by an animation.
 ///
 /// Setting `time` is a seek, whoever does it: what lies between is skipped. To slow down or to turn round, set `speed`.
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[require(PlaybackState)]
 pub struct Playback {
-    /// Seconds since the capture's start. Drawing clamps it to the capture's duration.
+    /// Seconds since the capture's start. Drawing clamps it to the capture's duration. An infinite one becomes an end of the range.
     pub time: f32,
     /// Seconds of the capture per second of the clock; negative plays backwards.
     pub speed: f32,
@@ -30,8 +30,9 @@ pub struct Playback {
     /// The out point: the last moment that is played. Beyond the capture's end, as by default, it is the end. A range that is
     /// empty stands still.
     pub end: f32,
-    /// How far into the range (of seconds of the capture, in the direction of play) the 0 of a [shared clock](super::FollowsClock)
-    /// is, and where [`replay`](Self::replay) begins. Negative begins later.
+    /// How far into the range, in seconds of the capture in the direction of play, it is when a
+    /// [shared clock](super::FollowsClock) shows 0, and where [`replay`](Self::replay) begins. With a negative one, what follows a
+    /// clock and is played once waits at its beginning until the clock has caught up; `replay` begins at the beginning.
     pub offset: f32,
     /// Whether [`Repeat::PingPong`] is on its way back; otherwise always false.
     pub returning: bool,
@@ -96,7 +97,8 @@ impl Playback {
         self.speed = -self.speed;
     }
 
-    /// Plays from the beginning: from the in point and `offset`, or backwards from the out point if `speed` is negative.
+    /// Plays from the beginning: from the in point and `offset`, or backwards from the out point if `speed` is negative. From an out
+    /// point beyond the capture's end, as by default, `offset` leads to no moment before that end.
     pub fn replay(&mut self) {
         self.time = if self.speed < 0.0 { self.end - self.offset } else { self.start + self.offset };
         self.returning = false;

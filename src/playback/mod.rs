@@ -14,8 +14,9 @@
 //!  Time ──────────────────────▶ Playback::time         Advance
 //! ```
 //!
-//! Bevy's own animations may animate any field of a [`Playback`] through `animated_field!(Playback::speed)`. They run in
-//! `PostUpdate`: what they set is drawn in the same frame.
+//! Bevy's own animations may animate any field of a [`Playback`] but `repeat` through `animated_field!(Playback::speed)`. They run in
+//! `PostUpdate`: the `time` that they set on a capture is drawn in the same frame; everything else, and all that they set on a
+//! [`TimelinePlayer`], counts from the next frame on.
 
 mod clock;
 mod component;

@@ -62,13 +62,19 @@ impl Span {
         self.repeat == Repeat::PingPong
     }
 
-    fn is_loop(&self) -> bool {
+    /// Whether it starts over at its end.
+    pub(super) fn is_loop(&self) -> bool {
         self.repeat == Repeat::Loop
     }
 
     /// Where the range begins.
     pub(super) fn start(&self) -> f32 {
         self.start as f32
+    }
+
+    /// Where it ends, unrounded.
+    pub(super) fn end(&self) -> f64 {
+        self.start + self.length
     }
 
     /// The phase, in the first pass (or the first two, to and fro), that shows a moment; what lies outside counts as the nearer end.
@@ -96,7 +102,7 @@ impl Span {
     pub(super) fn moment(&self, phase: f64) -> (f32, bool) {
         let time = self.exact(phase) as f32;
         // Rounding may reach the end of a loop, too.
-        let wrapped = self.is_loop() && f64::from(time) >= self.start + self.length;
+        let wrapped = self.is_loop() && f64::from(time) >= self.end();
         (if wrapped { self.start() } else { time }, self.is_ping_pong() && phase >= self.length)
     }
 
@@ -162,6 +168,11 @@ impl Travel {
         self.span.is_loop() && self.turns > 0
     }
 
+    /// Whether it was played in the direction of time.
+    pub(super) fn is_forward(&self) -> bool {
+        self.from < self.to
+    }
+
     fn within_pass(&self, phase: f64, pass: f64) -> f64 {
         (phase - pass * self.span.length).clamp(0.0, self.span.length)
     }
@@ -191,7 +202,7 @@ const MOST_FRAMES: f64 = 1e12;
 /// The frame `frames` after the one nearest to `time`, as [`Playback::step`] describes; none where the range holds no frame.
 pub(super) fn frame_after(span: &Span, time: f32, returning: bool, frames: i32, fps: f32) -> Option<(f32, bool)> {
     let fps = f64::from(fps);
-    let (low, high) = (span.start * fps, (span.start + span.length) * fps);
+    let (low, high) = (span.start * fps, span.end() * fps);
     if !(fps > 0.0 && high <= MOST_FRAMES) {
         return None;
     }
@@ -202,7 +213,7 @@ pub(super) fn frame_after(span: &Span, time: f32, returning: bool, frames: i32, 
     if last < first {
         return None;
     }
-    let now = (f64::from(time).clamp(span.start, span.start + span.length) * fps).round() as i64;
+    let now = (f64::from(time).clamp(span.start, span.end()) * fps).round() as i64;
     let now = now.clamp(first, last) - first;
     let (count, frames) = (last - first, i64::from(frames));
     let (frame, returning) = match span.repeat {
@@ -215,8 +226,7 @@ pub(super) fn frame_after(span: &Span, time: f32, returning: bool, frames: i32, 
             if place < count { (place, false) } else { (2 * count - place, true) }
         }
     };
-    let bounds = [span.start, span.start + span.length];
-    let time = ((first + frame) as f64 / fps).clamp(bounds[0], bounds[1]) as f32;
+    let time = ((first + frame) as f64 / fps).clamp(span.start, span.end()) as f32;
     Some((time, returning))
 }
 

@@ -63,7 +63,21 @@ pub(super) struct Progress {
 impl PlaybackState {
     /// Where it is, in seconds since the capture's start, without the rounding of [`Playback::time`].
     pub(super) fn seconds(&self) -> f64 {
-        self.span.map_or(0.0, |span| span.exact(self.phase))
+        match self.span {
+            // Sought: what is played never stands at the end of a loop.
+            Some(span) if self.is_at_end(&span) => span.end(),
+            Some(span) => span.exact(self.phase),
+            None => 0.0,
+        }
+    }
+
+    /// Whether it stands at the end of a loop, from where playing on starts over.
+    pub(super) fn is_at_end_of_loop(&self) -> bool {
+        self.span.is_some_and(|span| span.is_loop() && self.is_at_end(&span))
+    }
+
+    fn is_at_end(&self, span: &Span) -> bool {
+        self.time >= span.end() as f32
     }
 
     /// One step of a playback of what lasts `duration` seconds.
@@ -92,8 +106,8 @@ impl PlaybackState {
 
     /// Takes over what the game has set since the last step.
     fn notice(&mut self, now: &mut Playback, span: &Span, following: bool) -> Progress {
-        if now.time.is_nan() {
-            now.time = span.start();
+        if !now.time.is_finite() {
+            now.time = if now.time == f32::INFINITY { span.end() as f32 } else { span.start() };
         }
         let first = self.span.is_none();
         let moved = now.time != self.time || span.is_ping_pong() && now.returning != self.returning;
@@ -274,6 +288,36 @@ mod tests {
         assert!(!passes(&player.step(Drive::By(0.25)), 0.25), "not while paused");
         player.0.play();
         assert!(passes(&player.step(Drive::By(0.25)), 0.25), "but then");
+    }
+
+    #[test]
+    fn the_end_of_a_loop_can_be_sought_but_not_played_to() {
+        let mut player = Player::new(Playback { start: 0.1, end: 1.9, ..Playback::default() });
+        player.step(Drive::By(1.8));
+        assert!((player.1.seconds() - 0.1).abs() < 1e-6, "played to its end, it is at {}", player.1.seconds());
+        player.0.pause();
+        player.0.seek(1.9);
+        player.step(Drive::By(1.0));
+        assert!((player.1.seconds() - 1.9).abs() < 1e-6, "sought, it is at its end, not at {}", player.1.seconds());
+        assert!(player.1.is_at_end_of_loop(), "and knows it");
+        player.0.play();
+        player.step(Drive::By(0.25));
+        assert!((player.1.seconds() - 0.35).abs() < 1e-6, "from there it starts over: {}", player.1.seconds());
+        assert!(!player.1.is_at_end_of_loop(), "no longer at the end");
+    }
+
+    #[test]
+    fn infinite_times_are_the_ends() {
+        for drive in [Drive::By(0.0), Drive::Hold] {
+            let mut player = Player::new(Playback { speed: -1.0, ..Playback::default() });
+            player.step(drive);
+            player.0.replay();
+            assert_eq!(player.step(drive).seeked, Some([0.0, 2.0]), "backwards it is replayed from the end");
+            assert_eq!(player.0.time, 2.0, "and stands there until time goes by, {drive:?}");
+            player.0.seek(f32::NEG_INFINITY);
+            player.step(drive);
+            assert_eq!(player.0.time, 0.0, "the other end");
+        }
     }
 
     #[test]

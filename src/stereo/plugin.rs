@@ -75,7 +75,7 @@ fn half(eye: Eye, target: UVec2) -> Option<(UVec2, UVec2)> {
 mod tests {
     use super::super::{EyeTargets, Stereo, spawn_stereo};
     use super::*;
-    use bevy::camera::RenderTarget;
+    use bevy::camera::{RenderTarget, RenderTargetInfo};
     use bevy::transform::TransformPlugin;
     use bevy::transform::components::GlobalTransform;
     use glam::{Quat, Vec3};
@@ -117,6 +117,31 @@ mod tests {
             app.world_mut().entity_mut(stereo.head).insert(StereoRig { ipd });
             app.update();
             assert!((place(&app, 1).z - expected).abs() < 1e-6, "at {ipd} the right eye is at {}", place(&app, 1));
+        }
+    }
+
+    #[test]
+    fn halves_follow_the_size_of_their_target() {
+        let mut app = App::new();
+        app.add_plugins((TransformPlugin, StereoPlugin));
+        let stereo = spawn(&mut app, StereoRig::default());
+        for size in [UVec2::new(200, 100), UVec2::new(301, 50), UVec2::new(64, 400)] {
+            for eye in stereo.eyes {
+                let mut camera = app.world_mut().get_mut::<Camera>(eye).expect("an eye is a camera");
+                // As Bevy learns it, and in the same frame.
+                camera.computed.target_info = Some(RenderTargetInfo { physical_size: size, scale_factor: 1.0 });
+            }
+            app.update();
+            for (entity, eye) in stereo.eyes.into_iter().zip(Eye::BOTH) {
+                let camera = app.world().get::<Camera>(entity).expect("an eye is a camera");
+                let viewport = camera.viewport.as_ref().expect("half of the target");
+                let found = (viewport.physical_position, viewport.physical_size);
+                assert_eq!(Some(found), half(eye, size), "{eye:?} of {size}");
+                let projection = app.world().get::<Projection>(entity).expect("an eye has a lens");
+                let Projection::Perspective(lens) = projection else { panic!("a perspective one") };
+                assert_eq!(lens.aspect_ratio, found.1.x as f32 / found.1.y as f32, "{eye:?} of {size}");
+                assert_eq!(camera.computed.clip_from_view, projection.get_clip_from_view(), "{eye:?} of {size}");
+            }
         }
     }
 }

@@ -10,6 +10,7 @@ use bevy::camera::{CameraUpdateSystems, RenderTarget};
 use bevy::ecs::query::Changed;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::schedule::IntoScheduleConfigs;
+use bevy::ecs::schedule::common_conditions::resource_exists;
 use bevy::ecs::system::{Query, Res};
 use bevy::image::Image;
 use bevy::log::{DEFAULT_FILTER, LogPlugin};
@@ -85,7 +86,8 @@ pub fn app_with(size: UVec2, adjust: impl FnOnce(PluginGroupBuilder) -> PluginGr
     // Steps longer than Bevy's quarter of a second are wanted, too.
     app.world_mut().get_resource_or_init::<Time<Virtual>>().set_max_delta(Duration::MAX);
     let offscreen = Offscreen::new(&mut app.world_mut().get_resource_or_init::<Assets<Image>>(), size);
-    app.insert_resource(offscreen).add_systems(PostUpdate, draw_offscreen.before(CameraUpdateSystems));
+    app.insert_resource(offscreen)
+        .add_systems(PostUpdate, draw_offscreen.run_if(resource_exists::<Offscreen>).before(CameraUpdateSystems));
     app
 }
 

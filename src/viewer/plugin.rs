@@ -9,14 +9,14 @@ use super::{camera, counts, look, memory, playback, timing};
 use crate::asset::{CaptureState, GaussianCapture};
 use crate::playback::Playback;
 use crate::render::{CaptureSettings, CaptureStatistics, CaptureViewSettings, GaussianCapture3d};
-use bevy::app::{App, Plugin, Update};
+use bevy::app::{App, Plugin, PreUpdate, Update};
 use bevy::asset::{AssetServer, Assets};
-use bevy::camera::Camera3d;
+use bevy::camera::{Camera, Camera3d, RenderTarget};
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::ecs::change_detection::DetectChangesMut;
 use bevy::ecs::entity::Entity;
 use bevy::ecs::name::Name;
-use bevy::ecs::query::With;
+use bevy::ecs::query::{With, Without};
 use bevy::ecs::resource::Resource;
 use bevy::ecs::schedule::IntoScheduleConfigs;
 use bevy::ecs::schedule::common_conditions::not;
@@ -25,22 +25,27 @@ use bevy::input::ButtonInput;
 use bevy::input::keyboard::KeyCode;
 use bevy::render::view::Msaa;
 use bevy::time::{Real, Time};
-use bevy_egui::input::egui_wants_any_keyboard_input;
-use bevy_egui::{EguiContexts, EguiPlugin, EguiPrimaryContextPass, egui};
+use bevy_egui::input::{WindowToEguiContextMap, egui_wants_any_keyboard_input};
+use bevy_egui::{
+    EguiContext, EguiContexts, EguiGlobalSettings, EguiPlugin, EguiPreUpdateSet, EguiPrimaryContextPass,
+    PrimaryEguiContext, egui, setup_primary_egui_context_system,
+};
 
-/// Draws the panel that [the module](crate::viewer) describes at the right edge of the first camera's picture. F1 opens and closes it.
+/// Draws the panel that [the module](crate::viewer) describes at the right edge of the first camera's picture. It is open from the
+/// start; F1 closes and opens it.
 ///
 /// Add it after `DefaultPlugins` and [`GaussianCapturePlugin`](crate::render::GaussianCapturePlugin). It brings `EguiPlugin` along
-/// if that has not been added before. It works without a window, too.
+/// if that has not been added before. It works without a window, too. When the panel's camera goes, another one gets it, unless
+/// [`EguiGlobalSettings::auto_create_primary_context`] is off.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct InspectorPlugin;
 
 /// What a game sets of the panel. Any field may be set at any time.
 #[derive(Resource, Debug, Clone, PartialEq)]
 pub struct Inspector {
-    /// Whether the panel shows. While it does not, it costs nothing.
+    /// Whether the panel shows, as it does at first. While it does not, it costs nothing.
     pub open: bool,
-    /// The key that opens and closes it; F1 unless set.
+    /// The key that closes and opens it; F1 unless set.
     pub key: KeyCode,
     /// The entity with the capture that the panel is about; while it is none, or one without a capture, the first capture.
     pub selected: Option<Entity>,
@@ -64,6 +69,14 @@ impl Plugin for InspectorPlugin {
             app.add_plugins(EguiPlugin::default());
         }
         app.init_resource::<Inspector>()
+            .add_systems(
+                PreUpdate,
+                move_context
+                    .in_set(EguiPreUpdateSet::InitContexts)
+                    // The context that bevy_egui has just made must be seen, or there would be two.
+                    .after(setup_primary_egui_context_system)
+                    .before(WindowToEguiContextMap::on_egui_context_added_system),
+            )
             .add_systems(Update, toggle.run_if(not(egui_wants_any_keyboard_input)))
             .add_systems(EguiPrimaryContextPass, show_panel);
     }
@@ -72,6 +85,23 @@ impl Plugin for InspectorPlugin {
 fn toggle(keys: Res<ButtonInput<KeyCode>>, mut inspector: ResMut<Inspector>) {
     if keys.just_pressed(inspector.key) {
         inspector.open = !inspector.open;
+    }
+}
+
+/// Gives the panel another camera when its own is gone, which `bevy_egui` does not: one that draws into a window, if there is one.
+fn move_context(
+    settings: Res<EguiGlobalSettings>,
+    contexts: Query<(), With<PrimaryEguiContext>>,
+    cameras: Query<(Entity, &Camera, Option<&RenderTarget>), Without<EguiContext>>,
+    mut commands: Commands,
+) {
+    if !settings.auto_create_primary_context || !contexts.is_empty() {
+        return;
+    }
+    let in_window = |target: Option<&RenderTarget>| matches!(target, Some(RenderTarget::Window(_)));
+    let next = cameras.iter().min_by_key(|(entity, camera, target)| (!camera.is_active, !in_window(*target), *entity));
+    if let Some((camera, ..)) = next {
+        commands.entity(camera).insert(PrimaryEguiContext);
     }
 }
 

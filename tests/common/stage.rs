@@ -20,8 +20,13 @@ struct Read(Vec<String>);
 
 /// An app whose time stands still but for [`pass`]. Its assets are in `folder`.
 pub fn app(folder: &str) -> App {
+    app_with(AssetPlugin { file_path: folder.into(), ..default() })
+}
+
+/// The same with any assets.
+pub fn app_with(assets: AssetPlugin) -> App {
     let mut app = App::new();
-    app.add_plugins((MinimalPlugins, AssetPlugin { file_path: folder.into(), ..default() }, GaussianCapturePlugin));
+    app.add_plugins((MinimalPlugins, assets, GaussianCapturePlugin));
     // Steps longer than Bevy's quarter of a second are wanted, too.
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
     app.init_resource::<Observed>().init_resource::<Read>();

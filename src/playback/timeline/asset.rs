@@ -36,7 +36,8 @@ pub struct Clip {
     pub capture: Handle<GaussianCapture>,
     /// When it begins, in seconds of the timeline.
     pub start: f32,
-    /// The first and the last moment of the capture that are played, in its seconds. Beyond its end it stands still.
+    /// The first and the last moment of the capture that are played, in its seconds. Beyond its end it stands still at its last
+    /// moment: backwards, that is where it begins.
     pub range: [f32; 2],
     /// Seconds of the capture per second of the timeline; negative plays from the last moment to the first.
     pub speed: f32,
@@ -126,7 +127,8 @@ pub enum InvalidTimeline {
     },
 }
 
-/// Clips that follow each other may overlap by this much, in seconds: rounding of speeds and ends.
+/// Clips that follow each other may overlap by this much, in seconds, or leave this much between them: rounding of speeds and
+/// ends. So that nothing is seen of it, a clip is taken on this much early.
 const TOUCH: f32 = 1e-4;
 
 impl Timeline {
@@ -191,7 +193,7 @@ impl Timeline {
 impl Track {
     /// The clip that plays at a time or has played last before it; before the first, the first.
     pub fn clip_at(&self, time: f64) -> Option<&Clip> {
-        self.clips.iter().rev().find(|clip| f64::from(clip.start) <= time).or(self.clips.first())
+        self.clips.iter().rev().find(|clip| clip.has_begun(time)).or(self.clips.first())
     }
 
     /// Checks the clips, puts them in order, and says when the last one ends.
@@ -233,7 +235,11 @@ impl Clip {
     /// seconds, ends there, too.
     pub fn shows(&self, time: f64, duration: f32) -> bool {
         let end = f64::from(self.end());
-        f64::from(self.start) <= time && (time < end || self.end() >= duration - TOUCH && time <= f64::from(duration))
+        self.has_begun(time) && (time < end || self.end() >= duration - TOUCH && time <= f64::from(duration))
+    }
+
+    fn has_begun(&self, time: f64) -> bool {
+        f64::from(self.start) - f64::from(TOUCH) <= time
     }
 
     /// How much of it shows at a time, 0 to 1.
@@ -245,11 +251,22 @@ impl Clip {
         share(time - start, self.fade[0]).min(share(end - time, self.fade[1]))
     }
 
-    /// The playback that shows the right moment while it follows the timeline's clock.
-    pub(super) fn playback(&self) -> Playback {
-        let [start, end] = self.range;
-        let offset = -self.start * self.speed.abs();
-        Playback { start, end, speed: self.speed, offset, repeat: Repeat::Once, ..Playback::default() }
+    /// The playback that shows the right moment while it follows the timeline's clock. `duration` is that of the capture, once it
+    /// is known.
+    pub(super) fn playback(&self, duration: Option<f32>) -> Playback {
+        let ([start, end], backwards) = (self.range, self.speed < 0.0);
+        // Playback would begin at the capture's end at once.
+        let beyond = duration.filter(|_| backwards).map_or(0.0, |duration| (end - duration).max(0.0));
+        Playback {
+            // Stays where the clip is all beyond the capture, and its end is drawn.
+            time: if backwards { end } else { start },
+            start,
+            end,
+            speed: self.speed,
+            offset: -self.start * self.speed.abs() - beyond,
+            repeat: Repeat::Once,
+            ..Playback::default()
+        }
     }
 
     fn check(&self, track: &str, clip: usize) -> Result<(), InvalidTimeline> {
@@ -334,6 +351,27 @@ mod tests {
         assert_eq!(at(3.5), Some((3.0, true)), "the second");
         assert_eq!(at(4.0), Some((3.0, true)), "what ends with the timeline stays");
         assert!(timeline.track("right").is_none(), "no such track");
+    }
+
+    #[test]
+    fn a_gap_that_is_rounding_does_not_flash() {
+        let clips = vec![clip(0.0, [0.0, 2.0], 1.0), clip(2.000_05, [0.0, 1.0], 1.0), clip(3.01, [0.0, 1.0], 1.0)];
+        let timeline = Timeline::new(vec![track("left", clips)], Vec::new(), None).expect("makes sense");
+        let track = timeline.track("left").expect("there it is");
+        let shown = |time| track.clip_at(time).is_some_and(|clip| clip.shows(time, 9.0));
+        for time in [1.999_99, 2.0, 2.000_02, 2.000_06, 3.0] {
+            assert!(shown(time), "something is seen at {time} s");
+        }
+        assert!(!shown(3.005), "but in a gap that is meant nothing is");
+    }
+
+    #[test]
+    fn a_clip_that_reaches_beyond_its_capture_waits_at_its_end() {
+        let backwards = clip(2.0, [0.0, 5.0], -2.0);
+        assert_eq!(backwards.playback(Some(4.0)).offset, -5.0, "a second of the capture that is not there");
+        assert_eq!(backwards.playback(Some(9.0)).offset, -4.0, "within its capture it begins at once");
+        assert_eq!(backwards.playback(None).offset, -4.0, "as long as nobody knows");
+        assert_eq!(clip(2.0, [0.0, 5.0], 2.0).playback(Some(4.0)).offset, -4.0, "forwards, the end comes last");
     }
 
     #[test]

@@ -4,6 +4,7 @@
 
 use super::player::Directed;
 use super::{Clip, ClipFade, Marker, Timeline, TimelinePlayer, TimelineTrack};
+use crate::asset::GaussianCapture;
 use crate::playback::messages::Announcer;
 use crate::playback::span::Leg;
 use crate::playback::state::PlaybackState;
@@ -64,10 +65,11 @@ pub(in crate::playback) fn advance_timelines(
     for (entity, handle, mut playback, mut state, mut clock, follows) in &mut players {
         let Some(timeline) = timelines.get(&handle.0) else { continue };
         let drive = drive(follows, &clocks, &time);
+        let was_at_end = state.is_at_end_of_loop();
         let (next, progress) = state.advance(*playback, drive, timeline.duration_seconds());
         playback.set_if_neq(next);
         // What starts over does not play its tracks backwards to the start.
-        let wrapped = progress.travel.is_some_and(|travel| travel.wraps());
+        let wrapped = progress.travel.is_some_and(|travel| travel.wraps() || was_at_end && travel.is_forward());
         let mut shown = *clock;
         if progress.jumped || wrapped {
             shown.seek(state.seconds());
@@ -95,6 +97,7 @@ fn crossed<'a>(timeline: &'a Timeline, leg: &Leg) -> impl Iterator<Item = &'a Ma
 /// Gives every track's entity its clip, fade and visibility for this moment.
 pub(in crate::playback) fn direct_tracks(
     timelines: Res<Assets<Timeline>>,
+    captures: Res<Assets<GaussianCapture>>,
     players: Query<(&TimelinePlayer, &PlaybackClock, &Children)>,
     mut stages: Query<(&TimelineTrack, &mut Visibility, &mut ClipFade, Actor<'static>), Without<TimelinePlayer>>,
 ) {
@@ -112,7 +115,7 @@ pub(in crate::playback) fn direct_tracks(
             let visible = clip.shows(time, timeline.duration_seconds());
             visibility.set_if_neq(if visible { Visibility::Inherited } else { Visibility::Hidden });
             fade.set_if_neq(ClipFade(clip.fade_at(time)));
-            cast(actor, clip);
+            cast(actor, clip, captures.get(&clip.capture));
         }
     }
 }
@@ -120,7 +123,7 @@ pub(in crate::playback) fn direct_tracks(
 /// What changes with the clip.
 type Actor<'a> = (&'a mut Directed, &'a mut GaussianCapture3d, &'a mut Playback, &'a mut PlaybackState);
 
-/// Gives an entity another clip, if it is another one.
+/// Gives an entity another clip, if it is another one. Its capture may still be on its way.
 fn cast(
     (mut directed, mut capture, mut playback, mut state): (
         Mut<Directed>,
@@ -129,12 +132,17 @@ fn cast(
         Mut<PlaybackState>,
     ),
     clip: &Clip,
+    loaded: Option<&GaussianCapture>,
 ) {
+    let wanted = clip.playback(loaded.map(GaussianCapture::duration_seconds));
     if directed.0.as_ref() != Some(clip) {
         capture.set_if_neq(GaussianCapture3d(clip.capture.clone()));
-        playback.set_if_neq(clip.playback());
+        playback.set_if_neq(wanted);
         // Not where the last clip ended, sought elsewhere, but a new beginning.
         *state = PlaybackState::default();
         directed.0 = Some(clip.clone());
+    } else if playback.offset != wanted.offset {
+        // Only the loaded capture says how far the clip reaches beyond it.
+        playback.offset = wanted.offset;
     }
 }

@@ -16,7 +16,7 @@ use bevy::transform::components::Transform;
 ///
 /// Its [`Playback`] is the playhead: play, pause, seek, reverse and loop it like that of a capture, or let it
 /// [follow a clock](crate::playback::FollowsClock). Its own [`PlaybackClock`] shows the same time to the tracks, so that anything
-/// else can follow it, too.
+/// else can follow it, too, except other timelines: of two that are to keep together, both follow a third clock.
 ///
 /// Each track is played by the child that has the [`TimelineTrack`] of its name; for a track without one, a child is spawned.
 #[derive(Component, Reflect, Debug, Default, Clone, PartialEq, Eq)]
