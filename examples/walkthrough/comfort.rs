@@ -175,7 +175,9 @@ fn darken(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bevy::time::TimeUpdateStrategy;
     use std::f32::consts::{FRAC_PI_6, PI};
+    use std::time::Duration;
 
     const FRAME: f32 = 1.0 / 60.0;
 
@@ -196,5 +198,34 @@ mod tests {
         let before = (Vec3::ZERO, 0.0);
         assert_eq!(motion(before, (Vec3::new(2.0, 0.0, -1.0), 0.0), FRAME), 0.0, "a teleport");
         assert_eq!(motion(before, (Vec3::ZERO, FRAC_PI_6), FRAME), 0.0, "a snap turn");
+    }
+
+    /// Whether the ring shows, and how large it is for its distance, after the body has gone `step` metres in each of `frames` frames.
+    fn walk(app: &mut App, step: f32, frames: usize) -> (bool, f32) {
+        for _ in 0..frames {
+            let mut body = app.world_mut().query_filtered::<&mut Transform, With<Body>>();
+            body.single_mut(app.world_mut()).expect("one body").translation.z += step;
+            app.update();
+        }
+        let mut rings = app.world_mut().query_filtered::<(&Transform, &Visibility), With<Ring>>();
+        let (transform, visibility) = rings.single(app.world()).expect("one ring for one eye");
+        (*visibility != Visibility::Hidden, transform.scale.x / DISTANCE)
+    }
+
+    #[test]
+    fn the_edges_close_while_the_body_walks_and_open_when_it_stands() {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, AssetPlugin::default()));
+        app.init_asset::<Mesh>().init_asset::<StandardMaterial>().init_resource::<Teleport>();
+        app.add_plugins(ComfortPlugin);
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(50)));
+        app.world_mut().spawn((Body::default(), Transform::default()));
+        app.world_mut().spawn((EyeView(0), Transform::default()));
+        assert!(!walk(&mut app, 0.0, 3).0, "at rest nothing is in the way");
+        let (shows, size) = walk(&mut app, 0.05, 10);
+        assert!(shows && (size - 1.0).abs() < 1e-3, "half a second of walking closes them, to {size}");
+        assert!(!walk(&mut app, 0.0, 10).0, "half a second of rest opens them");
+        app.world_mut().resource_mut::<Comfort>().vignette = false;
+        assert!(!walk(&mut app, 0.05, 10).0, "unless it is switched off");
     }
 }

@@ -3,8 +3,8 @@
 //! In: what became of an entity's capture. Out: each of these both as a message, to be read by a system with a `MessageReader`, and as
 //! an event on that entity, to be observed: `commands.entity(capture).observe(|failed: On<CaptureFailed>| ..)`.
 //!
-//! They are sent in [`CaptureAssetSystems`](super::CaptureAssetSystems), in `PreUpdate`: whatever runs in `Update` reads them in the
-//! same frame.
+//! They are sent in `PreUpdate`, in [`CaptureAssetSystems`](super::CaptureAssetSystems) and, for what the GPU refuses, after it: whatever
+//! runs in `Update` reads them in the same frame.
 
 use super::GaussianCapture;
 use bevy::asset::AssetId;
@@ -23,7 +23,7 @@ pub struct CaptureReady {
     pub capture: AssetId<GaussianCapture>,
 }
 
-/// Its capture could not be loaded. If it had been loaded before and its file changed, what was there is still drawn.
+/// Its capture could not be loaded, or this GPU cannot draw it. If it had been loaded before and its file changed, what was there is still drawn.
 ///
 /// Bevy logs the same error, whether this is read or not.
 #[derive(Message, EntityEvent, Debug, Clone, PartialEq)]
@@ -36,20 +36,20 @@ pub struct CaptureFailed {
 
 /// Tells the game.
 #[derive(SystemParam)]
-pub(super) struct Announcer<'w, 's> {
+pub(crate) struct Announcer<'w, 's> {
     commands: Commands<'w, 's>,
     ready: MessageWriter<'w, CaptureReady>,
     failed: MessageWriter<'w, CaptureFailed>,
 }
 
 impl Announcer<'_, '_> {
-    pub(super) fn ready(&mut self, entity: Entity, capture: AssetId<GaussianCapture>) {
+    pub(crate) fn ready(&mut self, entity: Entity, capture: AssetId<GaussianCapture>) {
         let ready = CaptureReady { entity, capture };
         self.ready.write(ready.clone());
         self.commands.trigger(ready);
     }
 
-    pub(super) fn failed(&mut self, entity: Entity, error: String) {
+    pub(crate) fn failed(&mut self, entity: Entity, error: String) {
         let failed = CaptureFailed { entity, error };
         self.failed.write(failed.clone());
         self.commands.trigger(failed);

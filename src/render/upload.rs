@@ -5,14 +5,13 @@
 use super::GaussianCapture3d;
 use super::prepare::CaptureRenderer;
 use super::statistics::CaptureStatistics;
-use crate::asset::{CaptureFailed, CaptureState, GaussianCapture};
+use crate::asset::{Announcer, CaptureState, GaussianCapture};
 use crate::gpu::GpuCapture;
 use bevy::asset::{AssetId, AssetServer};
 use bevy::ecs::change_detection::DetectChangesMut;
 use bevy::ecs::entity::Entity;
-use bevy::ecs::message::MessageWriter;
 use bevy::ecs::resource::Resource;
-use bevy::ecs::system::{Commands, Query, Res, SystemParamItem, lifetimeless::SRes};
+use bevy::ecs::system::{Query, Res, SystemParamItem, lifetimeless::SRes};
 use bevy::log::{error, warn};
 use bevy::render::render_asset::{PrepareAssetError, RenderAsset};
 use bevy::render::renderer::{RenderDevice, RenderQueue};
@@ -29,9 +28,17 @@ impl GpuGaussianCapture {
     }
 }
 
-/// Captures that have been loaded but could not be uploaded, and why. Both worlds share it.
+/// Captures that have been loaded but could not be uploaded. Both worlds share it.
 #[derive(Resource, Debug, Clone, Default)]
-pub struct UploadFailures(Arc<Mutex<HashMap<AssetId<GaussianCapture>, String>>>);
+pub struct UploadFailures(Arc<Mutex<HashMap<AssetId<GaussianCapture>, Failure>>>);
+
+/// Why a capture could not be uploaded.
+#[derive(Debug)]
+struct Failure {
+    error: String,
+    /// Whether its entities have been told of this attempt.
+    told: bool,
+}
 
 impl UploadFailures {
     /// Whether a capture is among them: its entities have then failed, although it has been loaded.
@@ -39,30 +46,36 @@ impl UploadFailures {
         self.lock().contains_key(&capture)
     }
 
-    fn lock(&self) -> MutexGuard<'_, HashMap<AssetId<GaussianCapture>, String>> {
+    fn insert(&self, capture: AssetId<GaussianCapture>, error: String) {
+        self.lock().insert(capture, Failure { error, told: false });
+    }
+
+    fn remove(&self, capture: AssetId<GaussianCapture>) {
+        self.lock().remove(&capture);
+    }
+
+    fn lock(&self) -> MutexGuard<'_, HashMap<AssetId<GaussianCapture>, Failure>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// Tells every entity whose capture could not be uploaded.
+/// Tells every entity whose capture could not be uploaded, once for each attempt.
 pub(super) fn report_upload_failures(
     failures: Res<UploadFailures>,
     mut captures: Query<(Entity, &GaussianCapture3d, &mut CaptureState)>,
-    mut messages: MessageWriter<CaptureFailed>,
-    mut commands: Commands,
+    mut announcer: Announcer,
 ) {
-    let failures = failures.lock();
+    let mut failures = failures.lock();
     if failures.is_empty() {
         return;
     }
     for (entity, capture, mut state) in &mut captures {
-        let Some(error) = failures.get(&capture.0.id()) else { continue };
-        if state.set_if_neq(CaptureState::Failed(error.clone())) {
-            let failed = CaptureFailed { entity, error: error.clone() };
-            messages.write(failed.clone());
-            commands.trigger(failed);
+        let Some(Failure { error, told }) = failures.get(&capture.0.id()) else { continue };
+        if state.set_if_neq(CaptureState::Failed(error.clone())) || !told {
+            announcer.failed(entity, error.clone());
         }
     }
+    failures.values_mut().for_each(|failure| failure.told = true);
 }
 
 impl RenderAsset for GpuGaussianCapture {
@@ -87,7 +100,7 @@ impl RenderAsset for GpuGaussianCapture {
         let Some(renderer) = renderer else {
             // It has been logged, once for all captures.
             let why = statistics.renderer_missing().unwrap_or_else(|| "there is no renderer".into());
-            failures.lock().insert(id, format!("{}: not drawn: {why}", name()));
+            failures.insert(id, format!("{}: not drawn: {why}", name()));
             return Ok(Self(None));
         };
         if source.scene().trained_with.uses_fov_sentinel() {
@@ -99,19 +112,19 @@ impl RenderAsset for GpuGaussianCapture {
         }
         match GpuCapture::upload(device.wgpu_device(), queue, &renderer.0, source.scene()) {
             Ok(capture) => {
-                failures.lock().remove(&id);
+                failures.remove(id);
                 Ok(Self(Some(capture)))
             }
             Err(failure) => {
                 let failure = format!("{}: not drawn: {failure}", name());
                 error!("{failure}");
-                failures.lock().insert(id, failure);
+                failures.insert(id, failure);
                 Ok(Self(None))
             }
         }
     }
 
     fn unload_asset(id: AssetId<GaussianCapture>, (_, _, _, failures, ..): &mut SystemParamItem<Self::Param>) {
-        failures.lock().remove(&id);
+        failures.remove(id);
     }
 }
