@@ -1,4 +1,4 @@
-//! Two captures and a flying ball, cut together by a timeline: the captures come, fade, turn round and go as
+//! One capture twice and a flying ball, cut together by a timeline: captures come, fade, turn round and go as
 //! `assets/demo.timeline.ron` says, and the ball's own animation keeps to the same playhead. Change the file while it plays to direct
 //! them otherwise.
 //!

@@ -17,7 +17,7 @@
 //! With `--headless FOLDER`, or where there is no display, it goes the recorded way and writes N (8) pictures, a 30th of a second
 //! apart, to FOLDER (`out`) instead: both eyes in one, or with `--two-targets` two for each moment.
 //!
-//! Built with the feature `openxr`, it runs on a headset: the head is the wearer's, keys and mouse do the rest. Without one it says so
+//! Built with the feature `openxr`, it is meant for a headset, on which it has not been tried: the head is the wearer's, keys and mouse do the rest. Without one it says so
 //! and shows the window.
 
 #[path = "common/arguments.rs"]

@@ -24,11 +24,11 @@
 //!
 //! 1. [`codec`] reads a file into a scene, or refuses it in plain words: [`codec::checkpoint`] through a restricted unpickler,
 //!    [`codec::package`] with a checksum on every byte. [`codec::load`] tells the two apart; [`codec::save`] writes a package.
-//! 2. [`scene`] is what a capture is: its Gaussians in the trained or the runtime form, their colour, an environment map, the
+//! 2. [`scene`] is what a capture is: its Gaussians in the trained, the runtime or the packed form, their colour, an environment map, the
 //!    switches it was trained with, and how it is meant to be played.
 //! 3. [`gaussian`] is the maths. [`Parameters::slice`](gaussian::Parameters::slice) makes the runtime form, once: a 3D Gaussian in
 //!    straight-line motion under an opacity envelope ([`Gaussian`](gaussian::Gaussian), 64 bytes, the record that shaders read too).
-//! 4. [`gpu::GpuCapture`] holds that form in buffers. In Bevy, [`asset`] loads the file in the background and [`render`] uploads it.
+//! 4. [`gpu::GpuCapture`] holds that form, or the packed one, in buffers. In Bevy, [`asset`] loads the file in the background and [`render`] uploads it.
 //!
 //! # From the GPU to pixels: once for each frame and camera
 //!
@@ -59,12 +59,14 @@
 //! 1. [`playback`] moves each entity's clock on, or a timeline or a shared clock does; a [`View`](gaussian::View) is one camera at one time. In Bevy [`render`] makes
 //!    it from cameras and transforms, elsewhere a [`Camera`](gaussian::Camera) does.
 //! 2. [`gpu`] draws views with plain wgpu, on whatever device it is given; it knows nothing of Bevy. `activate` lists what the temporal
-//!    filter leaves, only when a capture enters another segment of time. All captures in a view share one compute pass, so that they interleave by depth. Its size is decided on the GPU: nothing is read back inside a frame.
-//! 3. Inside `blend` the depth of opaque meshes cuts the splats, pixel by pixel. The composite, the only pass in Bevy's pipeline
-//!    cache, lays the result over what the camera has drawn so far.
+//!    filter leaves, only when a capture enters another segment of time. All captures in a view share one compute pass, so that
+//!    they interleave by depth. Its size is decided on the GPU: nothing is read back inside a frame.
+//! 3. Inside `blend` the depth of opaque meshes cuts the splats, pixel by pixel. The composite lays the result over what the
+//!    camera has drawn so far; it and `write_depth` are the passes in Bevy's pipeline cache.
 //! 4. [`gpu::Headless`] hands the result over as a [`Frame`](frame::Frame) instead. The `gs4d` command and the tests use it.
 //!
-//! A pass has one name everywhere: `shaders/project.wgsl`, the functions in [`mod@reference`], the timestamp span, the test.
+//! Each pass from `project` to `blend` has one name everywhere: `shaders/project.wgsl`, the function in [`mod@reference`], the timestamp
+//! span (`sort` has two: by depth, by tile), the tests.
 //!
 //! # Around it, for games
 //!
@@ -79,21 +81,22 @@
 //!
 //! # How it is known to be right
 //!
-//! * [`mod@reference`] is the CPU twin of every pass, plain functions over slices. The tests hold it against the original code's
-//!   numbers, and the GPU against both.
-//! * [`dataset`] reads training views as the trainer does; [`metrics`] are PSNR and SSIM as the original evaluates them, over
-//!   [`picture`]s.
+//! * [`mod@reference`] is the CPU twin of the passes from `project` to `blend`, and of `score`: plain functions over slices. The tests
+//!   hold it against the original code's numbers, and the GPU against both.
+//! * [`dataset`] reads training views as the trainer does; [`metrics`] are PSNR and SSIM as the original evaluates them, MS-SSIM and
+//!   FLIP, over [`picture`]s.
 //!
 //! # Features
 //!
 //! | feature | adds |
 //! |---|---|
-//! | none | `gaussian`, `scene`, `codec`, `dataset`, `metrics`, `reference`: no GPU, no Bevy |
+//! | none | `gaussian`, `scene`, `codec`, `compress`, `dataset`, `metrics`, `reference`, `frame`, `picture`: no GPU, no Bevy |
 //! | `gpu` | [`gpu`]: the renderer, on wgpu |
 //! | `bevy` (default) | [`asset`], [`playback`], [`render`], [`picking`], [`stereo`], [`prelude`]; implies `gpu` |
 //! | `cli` | the `gs4d` command; implies `gpu`, never compiles Bevy |
 //! | `testing` | `testing`: Bevy apps without a window, drawn into pictures; implies `bevy` |
 //! | `viewer` | `viewer`: a panel to watch and steer captures with, and a window and lit meshes for the examples; implies `testing` |
+//! | `openxr` | the example `walkthrough` for a headset; implies `viewer` |
 #![cfg_attr(
     not(feature = "bevy"),
     expect(rustdoc::broken_intra_doc_links, reason = "the Bevy side is not part of this build")

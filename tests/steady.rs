@@ -11,9 +11,11 @@ mod common;
 mod skip;
 
 use bevy::asset::AssetId;
+use bevy::pbr::PbrPlugin;
 use bevy::prelude::*;
+use bevy::render::error_handler::{ErrorType, RenderErrorHandler, RenderErrorPolicy};
 use bevy::render::gpu_readback::{Readback, ReadbackComplete};
-use bevy::render::render_resource::{CachedPipelineState, PipelineCache};
+use bevy::render::render_resource::{CachedPipelineState, PipelineCache, PollType};
 use bevy::render::renderer::RenderDevice;
 use bevy::render::settings::{Backends, RenderCreation, WgpuLimits, WgpuSettings};
 use bevy::render::{RenderApp, RenderPlugin, RenderStartup};
@@ -29,7 +31,7 @@ use bevy_gs4d::testing::{self, Offscreen};
 use common::{app, picture, spawn_camera};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Rows of this width need no padding when they are read back.
 const SIZE: UVec2 = UVec2::new(64, 48);
@@ -39,6 +41,11 @@ const STEP: Duration = Duration::from_millis(10);
 fn turn() -> MutexGuard<'static, ()> {
     static TURN: Mutex<()> = Mutex::new(());
     TURN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn settings() -> WgpuSettings {
+    let backends = if cfg!(target_os = "linux") { Backends::VULKAN } else { Backends::PRIMARY };
+    WgpuSettings { backends: Some(backends), ..default() }
 }
 
 /// Two seconds of a moving scene with +z up, with a filter of half-second segments if wanted.
@@ -346,6 +353,43 @@ fn a_new_start_of_the_renderer_makes_everything_again() {
 }
 
 #[test]
+fn captures_come_back_after_a_lost_device() {
+    let _turn = turn();
+    if !testing::has_gpu() {
+        return skip::skip(testing::TestingError::NoGpu);
+    }
+    // Bevy's lit meshes read a buffer of the lost device back and panic.
+    let mut app = testing::app_with(SIZE, |plugins| plugins.disable::<PbrPlugin>());
+    app.add_plugins(GaussianCapturePlugin).insert_resource(ClearColor(Color::BLACK));
+    app.insert_resource(RenderErrorHandler(|error, _, _| match error.ty {
+        ErrorType::DeviceLost => RenderErrorPolicy::Recover(RenderCreation::Automatic(Box::new(settings()))),
+        // What was under way when it was lost.
+        _ => RenderErrorPolicy::Ignore,
+    }));
+    spawn(&mut app, synthetic(2000, 3, true), Playback::paused_at(0.7));
+    spawn_camera(&mut app, Msaa::Off, eye());
+    let before = picture(&mut app, 0.0);
+    assert!(before.pixels().any(|pixel| pixel.0[..3] != [0, 0, 0]), "something shows");
+    // Until Bevy's own read-backs have ended: they do not outlive a device.
+    for _ in 0..10 {
+        app.update();
+    }
+    let lost = app.sub_app(RenderApp).world().resource::<RenderDevice>().wgpu_device().clone();
+    let uploaded = gpu::uploaded();
+    lost.destroy();
+    // Says so to Bevy.
+    lost.poll(PollType::wait_indefinitely()).expect("all work has been done");
+    let start = Instant::now();
+    while gpu::uploaded() == uploaded {
+        assert!(start.elapsed() < Duration::from_secs(60), "the capture is uploaded to another device in time");
+        app.update();
+    }
+    let after = picture(&mut app, 0.0);
+    assert!(before == after, "it shows as before");
+    check_pipelines(&app);
+}
+
+#[test]
 fn a_gpu_that_is_too_small_says_so_and_the_game_goes_on() {
     let _turn = turn();
     let Some(mut large) = app(SIZE) else { return };
@@ -354,8 +398,7 @@ fn a_gpu_that_is_too_small_says_so_and_the_game_goes_on() {
     drop(large);
     // Enough for Bevy.
     let limits = WgpuLimits { max_compute_workgroup_storage_size: 8192, ..limits };
-    let backends = if cfg!(target_os = "linux") { Backends::VULKAN } else { Backends::PRIMARY };
-    let settings = WgpuSettings { backends: Some(backends), constrained_limits: Some(limits), ..default() };
+    let settings = WgpuSettings { constrained_limits: Some(limits), ..settings() };
     let mut app = testing::app_with(SIZE, |plugins| {
         plugins.set(RenderPlugin {
             render_creation: RenderCreation::Automatic(Box::new(settings)),

@@ -9,7 +9,7 @@
 //! upload       a loaded capture -> buffers on the GPU                once per asset
 //! active       which Gaussians the filter leaves                     once per placed capture and segment, before all cameras
 //! prepare      a camera's lens and every capture's pose -> views     once per camera and frame
-//! draw         one compute pass, the composite, write_depth          Core3d, between opaque and transparent meshes
+//! draw         one compute pass, the composite, write_depth          Core3d, after opaque meshes, before or after transparent ones
 //! statistics   counts, times, memory                                 render world -> main world
 //! ```
 //!

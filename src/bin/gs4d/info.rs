@@ -159,7 +159,7 @@ impl Facts {
             Some(Model::Static3d) => "trained form, static 3D",
             Some(Model::Unrotated4d) => "trained form, 4D without 4D rotation",
             Some(Model::Rotated4d) => "trained form, native 4D",
-            None => "runtime form",
+            None => self.form,
         };
         let (degree, degree_t, stored) = (self.degree, self.degree_t, self.coefficients);
         let environment = self.environment.map_or("none".to_owned(), |[width, height]| format!("{width} x {height}"));

@@ -3,8 +3,7 @@
 //! In: copies recorded into a frame. Out: their bytes, some frames later. While one copy is under way no other is begun.
 
 use super::buffer;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// A buffer that is copied into, mapped and read, in turn.
 #[derive(Debug)]
@@ -19,8 +18,17 @@ enum State {
     Idle,
     /// A recorded frame copies into it.
     Recorded,
-    /// Being mapped; the flag tells when.
-    Mapping(Arc<AtomicBool>),
+    /// Being mapped.
+    Mapping(Arc<Mutex<Arrival>>),
+}
+
+#[derive(Debug, Default)]
+enum Arrival {
+    #[default]
+    Expected,
+    Bytes(Vec<u8>),
+    /// The device was lost.
+    Lost,
 }
 
 impl Readback {
@@ -43,24 +51,41 @@ impl Readback {
 
     /// Moves on by one state; the bytes when they have arrived. Call it once a frame, before the next is recorded.
     pub fn poll(&mut self) -> Option<Vec<u8>> {
-        match &self.state {
-            State::Idle => None,
+        let arrival = match &self.state {
+            State::Idle => return None,
             State::Recorded => {
-                let ready = Arc::new(AtomicBool::new(false));
-                let flag = ready.clone();
-                self.buffer
-                    .slice(..)
-                    .map_async(wgpu::MapMode::Read, move |result| flag.store(result.is_ok(), Ordering::Release));
-                self.state = State::Mapping(ready);
-                None
+                self.state = State::Mapping(self.map());
+                return None;
             }
-            State::Mapping(ready) if ready.load(Ordering::Acquire) => {
-                let bytes = self.buffer.slice(..).get_mapped_range().to_vec();
-                self.buffer.unmap();
+            State::Mapping(arrival) => std::mem::take(&mut *arrival.lock().unwrap_or_else(PoisonError::into_inner)),
+        };
+        match arrival {
+            Arrival::Expected => None,
+            Arrival::Bytes(bytes) => {
                 self.state = State::Idle;
                 Some(bytes)
             }
-            State::Mapping(_) => None,
+            // It will not be used again: views are made anew on the next device.
+            Arrival::Lost => None,
         }
+    }
+
+    /// Begins to map. Bytes are taken where it is said that they are there: later the device may have been lost, and a look into the
+    /// buffer would panic.
+    fn map(&self) -> Arc<Mutex<Arrival>> {
+        let arrival = Arc::new(Mutex::new(Arrival::Expected));
+        let (buffer, to) = (self.buffer.clone(), arrival.clone());
+        self.buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
+            let arrived = match result {
+                Ok(()) => {
+                    let bytes = buffer.slice(..).get_mapped_range().to_vec();
+                    buffer.unmap();
+                    Arrival::Bytes(bytes)
+                }
+                Err(_) => Arrival::Lost,
+            };
+            *to.lock().unwrap_or_else(PoisonError::into_inner) = arrived;
+        });
+        arrival
     }
 }

@@ -19,7 +19,7 @@
 //!
 //! Paths are those of `AssetServer::load`. `in` and `out` are seconds of the capture, `start` and `time` of the timeline. A clip
 //! lasts `(out - in) / |speed|`; the clips of a track may touch but not overlap: to cross-fade, use two tracks. The timeline lasts
-//! until the last clip ends, or longer: `duration: 10.0`.
+//! until the last clip or marker, or longer: `duration: 10.0`.
 
 mod asset;
 mod direct;
