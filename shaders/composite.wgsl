@@ -1,8 +1,8 @@
 // composite: lays the captures of a view over what the game has drawn.
 //
-// In: the view target so far (linear; sRGB-encoded with ENCODED_TARGET), the captures' colour and transmittance (premultiplied, in
-// the space they were blended in: sRGB-encoded values; linear light with LINEAR_BLEND) for the pixels of the viewport. Out: the view
-// target. Blending with what is behind happens in the captures' space, too.
+// In: the view target so far, linear or sRGB-encoded, the captures' colour and transmittance (premultiplied, in the space they were
+// blended in, linear or sRGB-encoded, too) for the pixels of the viewport. Out: the view target. Blending with what is behind happens
+// in the captures' space: ENCODE_TARGET and DECODE_TARGET lead there from a target in the other one.
 
 // The largest half float: an infinite pixel would spread through bloom.
 const BRIGHTEST: f32 = 65504.0;
@@ -27,34 +27,22 @@ fn decode(encoded: vec3<f32>) -> vec3<f32> {
 
 // From the target's space to that of the captures, and back.
 fn to_blend_space(color: vec3<f32>) -> vec3<f32> {
-#ifdef ENCODED_TARGET
-#ifdef LINEAR_BLEND
+#ifdef ENCODE_TARGET
+    return encode(color);
+#else ifdef DECODE_TARGET
     return decode(color);
 #else
     return color;
-#endif
-#else
-#ifdef LINEAR_BLEND
-    return color;
-#else
-    return encode(color);
-#endif
 #endif
 }
 
 fn from_blend_space(color: vec3<f32>) -> vec3<f32> {
-#ifdef ENCODED_TARGET
-#ifdef LINEAR_BLEND
+#ifdef ENCODE_TARGET
+    return decode(color);
+#else ifdef DECODE_TARGET
     return encode(color);
 #else
     return color;
-#endif
-#else
-#ifdef LINEAR_BLEND
-    return color;
-#else
-    return decode(color);
-#endif
 #endif
 }
 

@@ -4,6 +4,8 @@
 //! In: packages and checkpoints written to a folder. Out: proof that states and messages say what happened. Needs neither a GPU nor a
 //! window.
 
+#[path = "common/hearing.rs"]
+mod hearing;
 #[path = "common/pth.rs"]
 mod pth;
 
@@ -20,8 +22,8 @@ use bevy_gs4d::codec::{self, package::WriteSettings};
 use bevy_gs4d::render::{GaussianCapture3d, GaussianCapturePlugin};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene, TemporalFilter};
+use hearing::{Observed, listen, said};
 use pth::Pth;
-use std::fmt::Debug;
 use std::fs;
 use std::path::Path;
 use std::sync::mpsc::{self, Receiver};
@@ -32,14 +34,6 @@ use tempfile::TempDir;
 /// How long files may take to load.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// What observers have heard, in order.
-#[derive(Resource, Default)]
-struct Observed(Vec<String>);
-
-/// What readers have heard, type by type.
-#[derive(Resource, Default)]
-struct Read(Vec<String>);
-
 /// An app whose assets are in `folder`. It watches them only if it is told to, so that every reload is one that was asked for.
 fn app(folder: &Path, watch: bool) -> App {
     let assets = AssetPlugin {
@@ -49,28 +43,9 @@ fn app(folder: &Path, watch: bool) -> App {
     };
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, assets, GaussianCapturePlugin));
-    app.init_resource::<Observed>().init_resource::<Read>();
-    listen::<CaptureReady>(&mut app);
-    listen::<CaptureFailed>(&mut app);
+    listen::<CaptureReady>(&mut app, Update);
+    listen::<CaptureFailed>(&mut app, Update);
     app
-}
-
-fn listen<E: Message + EntityEvent + Debug>(app: &mut App) {
-    app.add_observer(|event: On<E>, mut observed: ResMut<Observed>| observed.0.push(format!("{:?}", event.event())));
-    app.add_systems(Update, |mut reader: MessageReader<E>, mut read: ResMut<Read>| {
-        read.0.extend(reader.read().map(|event| format!("{event:?}")));
-    });
-}
-
-/// What has been said since this was last asked: observers and readers must have heard the same.
-fn said(app: &mut App) -> Vec<String> {
-    let observed = std::mem::take(&mut app.world_mut().resource_mut::<Observed>().0);
-    let mut read = std::mem::take(&mut app.world_mut().resource_mut::<Read>().0);
-    let mut sorted = observed.clone();
-    sorted.sort();
-    read.sort();
-    assert_eq!(sorted, read, "observers and readers hear the same");
-    observed
 }
 
 fn ready(entity: Entity, capture: &Handle<GaussianCapture>) -> String {

@@ -56,7 +56,7 @@ fn an_unknown_pass_is_named() {
 
 #[test]
 fn bevy_s_passes_are_valid_with_all_their_definitions() {
-    let composite = ("composite", include_str!("../shaders/composite.wgsl"), ["ENCODED_TARGET", "LINEAR_BLEND"]);
+    let composite = ("composite", include_str!("../shaders/composite.wgsl"), ["ENCODE_TARGET", "DECODE_TARGET"]);
     let write_depth = ("write_depth", include_str!("../shaders/write_depth.wgsl"), ["MEDIAN", "UNUSED"]);
     let check = |(name, source, defines): (&str, &str, [&str; 2]), chosen: usize| {
         let chosen = defines.iter().enumerate().filter(|(index, _)| (chosen >> index) & 1 == 1);

@@ -44,14 +44,19 @@ pub(crate) struct Announcer<'w, 's> {
 
 impl Announcer<'_, '_> {
     pub(crate) fn ready(&mut self, entity: Entity, capture: AssetId<GaussianCapture>) {
-        let ready = CaptureReady { entity, capture };
-        self.ready.write(ready.clone());
-        self.commands.trigger(ready);
+        send(&mut self.commands, &mut self.ready, CaptureReady { entity, capture });
     }
 
     pub(crate) fn failed(&mut self, entity: Entity, error: String) {
-        let failed = CaptureFailed { entity, error };
-        self.failed.write(failed.clone());
-        self.commands.trigger(failed);
+        send(&mut self.commands, &mut self.failed, CaptureFailed { entity, error });
     }
+}
+
+/// Says something both ways.
+pub(crate) fn send<'t, E>(commands: &mut Commands, writer: &mut MessageWriter<E>, event: E)
+where
+    E: Message + EntityEvent<Trigger<'t>: Default> + Clone,
+{
+    writer.write(event.clone());
+    commands.trigger(event);
 }

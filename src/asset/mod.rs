@@ -27,7 +27,7 @@ mod state;
 pub use capture::GaussianCapture;
 pub use key_frames::KeyFrames;
 pub use loader::{CaptureLoadError, CheckpointLoader, PackageLoader};
-pub(crate) use messages::Announcer;
+pub(crate) use messages::{Announcer, send};
 pub use messages::{CaptureFailed, CaptureReady};
 pub(crate) use plugin::CaptureAssetPlugin;
 pub use saver::{CaptureSaveError, PackageSaver, PackageSaverSettings};

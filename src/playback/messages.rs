@@ -8,7 +8,7 @@
 
 use super::span::Leg;
 use super::state::Progress;
-use crate::asset::KeyFrames;
+use crate::asset::{KeyFrames, send};
 use bevy::ecs::entity::Entity;
 use bevy::ecs::event::EntityEvent;
 use bevy::ecs::message::{Message, MessageWriter};
@@ -127,12 +127,4 @@ impl Announcer<'_, '_> {
     pub(super) fn marker(&mut self, entity: Entity, name: &str, time: f32) {
         send(&mut self.commands, &mut self.markers, MarkerReached { entity, name: name.to_owned(), time });
     }
-}
-
-fn send<'t, E>(commands: &mut Commands, writer: &mut MessageWriter<E>, event: E)
-where
-    E: Message + EntityEvent<Trigger<'t>: Default> + Clone,
-{
-    writer.write(event.clone());
-    commands.trigger(event);
 }

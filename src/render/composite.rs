@@ -46,9 +46,11 @@ pub(super) struct CompositeKey {
 
 impl CompositeKey {
     fn shader_defs(self) -> Vec<ShaderDefVal> {
-        let linear = self.blend_space == BlendSpace::Linear;
-        let defines = [(self.encoded, "ENCODED_TARGET"), (linear, "LINEAR_BLEND")];
-        defines.into_iter().filter(|(set, _)| *set).map(|(_, name)| name.into()).collect()
+        match (self.encoded, self.blend_space) {
+            (false, BlendSpace::Encoded) => vec!["ENCODE_TARGET".into()],
+            (true, BlendSpace::Linear) => vec!["DECODE_TARGET".into()],
+            _ => Vec::new(),
+        }
     }
 }
 

@@ -2,21 +2,17 @@
 //!
 //! In: captures of a given length with key-frames, steps of time. Out: what observers and readers of messages have heard.
 
+#[path = "hearing.rs"]
+mod hearing;
+
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use bevy_gs4d::prelude::*;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{FilterKind, GaussianScene, TemporalFilter};
-use std::fmt::Debug;
+use hearing::listen;
+pub use hearing::{debug, said};
 use std::time::Duration;
-
-/// What observers have heard, in order.
-#[derive(Resource, Default)]
-struct Observed(Vec<String>);
-
-/// What readers have heard, type by type.
-#[derive(Resource, Default)]
-struct Read(Vec<String>);
 
 /// An app whose time stands still but for [`pass`]. Its assets are in `folder`.
 pub fn app(folder: &str) -> App {
@@ -29,46 +25,22 @@ pub fn app_with(assets: AssetPlugin) -> App {
     app.add_plugins((MinimalPlugins, assets, GaussianCapturePlugin));
     // Steps longer than Bevy's quarter of a second are wanted, too.
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
-    app.init_resource::<Observed>().init_resource::<Read>();
-    listen::<PlaybackStarted>(&mut app);
-    listen::<PlaybackPaused>(&mut app);
-    listen::<PlaybackSeeked>(&mut app);
-    listen::<KeyFrameCrossed>(&mut app);
-    listen::<MarkerReached>(&mut app);
-    listen::<PlaybackLooped>(&mut app);
-    listen::<PlaybackEnded>(&mut app);
+    listen::<PlaybackStarted>(&mut app, Last);
+    listen::<PlaybackPaused>(&mut app, Last);
+    listen::<PlaybackSeeked>(&mut app, Last);
+    listen::<KeyFrameCrossed>(&mut app, Last);
+    listen::<MarkerReached>(&mut app, Last);
+    listen::<PlaybackLooped>(&mut app, Last);
+    listen::<PlaybackEnded>(&mut app, Last);
     // The first update has no length whatever it is told.
     pass(&mut app, 0.0);
     app
-}
-
-fn listen<E: Message + EntityEvent + Debug>(app: &mut App) {
-    app.add_observer(|event: On<E>, mut observed: ResMut<Observed>| observed.0.push(debug(event.event())));
-    app.add_systems(Last, |mut reader: MessageReader<E>, mut read: ResMut<Read>| {
-        read.0.extend(reader.read().map(debug));
-    });
-}
-
-/// A message as text.
-pub fn debug(message: &impl Debug) -> String {
-    format!("{message:?}")
 }
 
 /// One update, `seconds` after the last.
 pub fn pass(app: &mut App, seconds: f64) {
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(seconds)));
     app.update();
-}
-
-/// What has been said since this was last asked: observers and readers must have heard the same.
-pub fn said(app: &mut App) -> Vec<String> {
-    let observed = std::mem::take(&mut app.world_mut().resource_mut::<Observed>().0);
-    let mut read = std::mem::take(&mut app.world_mut().resource_mut::<Read>().0);
-    let mut sorted = observed.clone();
-    sorted.sort();
-    read.sort();
-    assert_eq!(sorted, read, "observers and readers hear the same");
-    observed
 }
 
 /// A scene of some seconds whose filter has so many segments.
