@@ -4,11 +4,11 @@
 //! `gs4d bench`.
 
 use bevy_gs4d::codec::package::{self, WriteSettings};
-use bevy_gs4d::frame::{Background, BlendSpace};
-use bevy_gs4d::gaussian::{Camera, Look, RasterFov, SliceSettings, View};
+use bevy_gs4d::gaussian::SliceSettings;
 use bevy_gs4d::reference::{self, Layer};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Form, GaussianScene};
+use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, RasterFov, View};
 use criterion::{Criterion, Throughput};
 use glam::{UVec2, Vec3};
 use std::hint::black_box;
@@ -54,7 +54,7 @@ fn bench_package(criterion: &mut Criterion) {
 fn bench_reference(criterion: &mut Criterion) {
     let scene = scene().into_runtime().expect("a synthetic scene can be drawn");
     let (view, background) = (view(), Background::Color([0.0; 3]));
-    let layer = Layer { scene: &scene, view, look: Look::default() };
+    let layer = Layer { scene: &scene, view, appearance: Appearance::default() };
     let mut group = criterion.benchmark_group("reference");
     group.throughput(Throughput::Elements(COUNT as u64));
     group.bench_function("project", |bencher| {

@@ -8,7 +8,8 @@
 //! median, and its 95th percentile, microseconds; then the sum over a frame. What Bevy does by itself, and the GPU, are not in it.
 
 use bevy::log::tracing::span::Id;
-use bevy::log::tracing::{Metadata, Subscriber, subscriber::Interest};
+use bevy::log::tracing::subscriber::Interest;
+use bevy::log::tracing::{Metadata, Subscriber};
 use bevy::log::tracing_subscriber::Layer;
 use bevy::log::tracing_subscriber::layer::Context;
 use bevy::log::tracing_subscriber::registry::LookupSpan;

@@ -39,10 +39,10 @@ use bevy::camera::RenderTarget;
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::prelude::*;
 use bevy_gs4d::asset::GaussianCapture;
-use bevy_gs4d::render::{GaussianCapture3d, GaussianCapturePlugin};
 use bevy_gs4d::scene::Bounds;
 use bevy_gs4d::stereo::{EyeTargets, StereoPlugin, StereoRig, spawn_stereo};
 use bevy_gs4d::testing::{self, Offscreen};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
 use body::{Body, EYE_HEIGHT, Head, Moves, START};
 use comfort::{Comfort, ComfortPlugin, EyeView};
 use path::{HeadPath, PathPlayer, Recorder};
@@ -135,7 +135,7 @@ fn stand(app: &mut App, two_targets: bool) -> Option<Offscreen> {
 fn interact(app: &mut App) {
     app.init_resource::<Recorder>()
         .add_plugins(teleport::plugin)
-        .add_systems(Update, (body::look, body::walk, body::snap_turn).in_set(Moves).run_if(path::walking))
+        .add_systems(Update, (body::appearance, body::walk, body::snap_turn).in_set(Moves).run_if(path::walking))
         .add_systems(Update, (switches, path::start, path::record).after(Moves));
 }
 

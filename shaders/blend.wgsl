@@ -2,7 +2,7 @@
 // In: tile ranges, pairs, splats, the depth of opaque surfaces, the background. Out: colour and transmittance, expected and median
 // depth. Each sample of a multisampled depth hides what is behind it from its share of the pixel. Section 3.4 of the 4DGS model; twin of src/reference/blend.rs.
 #import gs4d::types::{Frame, Splat, BACKGROUND_COLOR, BACKGROUND_ENVIRONMENT, DEBUG_DEPTH, DEBUG_OVERDRAW}
-#import gs4d::look::{heat, lit}
+#import gs4d::appearance::{heat, lit}
 #import gs4d::environment::environment_texel
 
 const TILE_SIZE: u32 = 16u;

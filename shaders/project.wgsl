@@ -3,7 +3,7 @@
 // the key of an invisible splat is INVISIBLE. Section 3.3 of the 4DGS model, in its order; twin of src/gaussian/projection.rs and src/reference/project.rs.
 #import gs4d::types::{Gaussian, Instance, Splat, INVISIBLE}
 #import gs4d::types::{DEBUG_ACTIVE, DEBUG_LIFESPAN, DEBUG_VELOCITY}
-#import gs4d::look::{heat, lit}
+#import gs4d::appearance::{heat, lit}
 #ifdef PACKED_GEOMETRY
 #import gs4d::packed::{unpack_base, unpack_gaussian, BLOCK_RANGES, PACKED_BLOCK, SHARED_RANGES}
 #endif

@@ -102,33 +102,25 @@
     expect(rustdoc::broken_intra_doc_links, reason = "the Bevy side is not part of this build")
 )]
 
-#[cfg(feature = "bevy")]
-pub mod asset;
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod codec;
-pub mod compress;
-pub mod dataset;
-pub mod frame;
 pub mod gaussian;
-#[cfg(feature = "gpu")]
-pub mod gpu;
-pub mod metrics;
+#[cfg(feature = "offline")]
+pub mod offline;
 #[cfg(feature = "bevy")]
-pub mod picking;
-pub mod picture;
-#[cfg(feature = "bevy")]
-pub mod playback;
+pub mod plugin;
 #[cfg(feature = "bevy")]
 pub mod prelude;
 pub mod reference;
-#[cfg(feature = "bevy")]
-pub mod render;
+#[cfg(feature = "renderer")]
+pub mod renderer;
 pub mod scene;
+pub mod view;
+
 #[cfg(feature = "bevy")]
-pub mod stereo;
-#[cfg(feature = "testing")]
-pub mod testing;
-#[cfg(feature = "viewer")]
-pub mod viewer;
+#[doc(no_inline)]
+pub use plugin::*;
 
 /// The README, whose code must compile.
 #[cfg(all(doctest, feature = "bevy"))]

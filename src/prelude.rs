@@ -21,15 +21,14 @@
 //! app.add_systems(Startup, (setup, slow_motion).chain()).run();
 //! ```
 
-pub use crate::asset::{CaptureFailed, CaptureReady, CaptureState, GaussianCapture};
-pub use crate::frame::{BlendSpace, DebugView};
-pub use crate::picking::{CaptureHit, CapturePicker};
-pub use crate::playback::{
+pub use crate::plugin::GaussianCapturePlugin;
+pub use crate::plugin::asset::{CaptureFailed, CaptureReady, CaptureState, GaussianCapture};
+pub use crate::plugin::component::GaussianCapture3d;
+pub use crate::plugin::picking::{CaptureHit, CapturePicker};
+pub use crate::plugin::playback::{
     FollowsClock, KeyFrameCrossed, MarkerReached, Playback, PlaybackClock, PlaybackEnded, PlaybackLooped,
     PlaybackPaused, PlaybackSeeked, PlaybackStarted, Repeat, Timeline, TimelinePlayer, TimelineTrack,
 };
-pub use crate::render::{
-    CaptureSettings, CaptureStatistics, CaptureViewSettings, CropBox, DepthWrite, GaussianCapture3d,
-    GaussianCapturePlugin,
-};
-pub use crate::stereo::{Eye, EyeTargets, StereoPlugin, StereoRig, spawn_stereo};
+pub use crate::plugin::render::{CaptureSettings, CaptureStatistics, CaptureViewSettings, CropBox, DepthWrite};
+pub use crate::plugin::stereo::{Eye, EyeTargets, StereoPlugin, StereoRig, spawn_stereo};
+pub use crate::view::{BlendSpace, DebugView};

@@ -18,10 +18,11 @@ use bevy_gs4d::asset::{
     CaptureFailed, CaptureReady, CaptureSaveError, CaptureState, GaussianCapture, PackageSaver, PackageSaverSettings,
 };
 use bevy_gs4d::codec::checkpoint::CheckpointOptions;
-use bevy_gs4d::codec::{self, package::WriteSettings};
-use bevy_gs4d::render::{GaussianCapture3d, GaussianCapturePlugin};
+use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::offline;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene, TemporalFilter};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
 use hearing::{Observed, listen, said};
 use pth::Pth;
 use std::fs;
@@ -32,7 +33,7 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 /// How long files may take to load.
-const PATIENCE: Duration = Duration::from_secs(60);
+const RELEASE_AFTER_IDLE_FRAMES: Duration = Duration::from_secs(60);
 
 /// An app whose assets are in `folder`. It watches them only if it is told to, so that every reload is one that was asked for.
 fn app(folder: &Path, watch: bool) -> App {
@@ -56,7 +57,7 @@ fn ready(entity: Entity, capture: &Handle<GaussianCapture>) -> String {
 fn wait(app: &mut App, what: &str, so: impl Fn(&App) -> bool) {
     let start = Instant::now();
     while !so(app) {
-        assert!(start.elapsed() < PATIENCE, "{what}: waited in vain");
+        assert!(start.elapsed() < RELEASE_AFTER_IDLE_FRAMES, "{what}: waited in vain");
         std::thread::sleep(Duration::from_millis(2));
         app.update();
     }
@@ -106,7 +107,7 @@ fn folder() -> TempDir {
 }
 
 fn write(folder: &Path, name: &str, count: usize) {
-    codec::save(&folder.join(name), &synthetic(count), &WriteSettings { level: 1 })
+    offline::save(&folder.join(name), &synthetic(count), &WriteSettings { level: 1 })
         .expect("the folder can be written to");
 }
 
@@ -145,7 +146,7 @@ struct Gated {
 impl AssetReader for Gated {
     async fn read<'a>(&'a self, path: &'a Path) -> Result<impl Reader + 'a, AssetReaderError> {
         // Who reads on the main thread waits for nothing, and the test fails. A test that has failed lets everything go.
-        let _ = self.gate.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(PATIENCE);
+        let _ = self.gate.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(RELEASE_AFTER_IDLE_FRAMES);
         self.files.read(path).await
     }
 

@@ -13,14 +13,13 @@ mod twin;
 use bevy::camera::Viewport;
 use bevy::prelude::*;
 use bevy_gs4d::asset::GaussianCapture;
-use bevy_gs4d::codec;
-use bevy_gs4d::frame::Background;
 use bevy_gs4d::gaussian::Gaussian;
+use bevy_gs4d::offline;
 use bevy_gs4d::playback::{Playback, Repeat};
-use bevy_gs4d::reference;
-use bevy_gs4d::render::{GaussianCapture3d, GaussianCapturePlugin};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene};
 use bevy_gs4d::testing::{self, Offscreen, TestingError};
+use bevy_gs4d::view::Background;
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin, codec, reference};
 use common::{app, picture, spawn_camera};
 use std::time::Duration;
 use twin::{DURATION, SIZE, add, blob, difference, difference_between, eye, rgb, scene, view, view_of};
@@ -277,7 +276,8 @@ fn a_package_loads_from_a_folder_and_a_broken_one_is_an_error() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (good, broken) = (folder.path().join("crowd.gs4d"), folder.path().join("broken.gs4d"));
     let scene = crowd();
-    codec::save(&good, &GaussianScene::from(scene.clone()), &codec::package::WriteSettings::default()).expect("saved");
+    offline::save(&good, &GaussianScene::from(scene.clone()), &codec::package::WriteSettings::default())
+        .expect("saved");
     let mut bytes = std::fs::read(&good).expect("just written");
     let last = bytes.len() - 1;
     bytes[last] ^= 1;

@@ -11,9 +11,9 @@ mod npz;
 #[path = "common/skip.rs"]
 mod skip;
 
-use bevy_gs4d::gpu::GpuContext;
-use bevy_gs4d::metrics;
-use bevy_gs4d::picture::Picture;
+use bevy_gs4d::offline::metrics;
+use bevy_gs4d::renderer::GpuContext;
+use bevy_gs4d::view::Picture;
 use glam::{UVec2, Vec3};
 use serde_json::Value;
 use std::ffi::OsStr;

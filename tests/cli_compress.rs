@@ -3,10 +3,9 @@
 //! In: a synthetic scene with training views of it. Checked: what is written and reported, and what is said of data that cannot do.
 #![cfg(feature = "cli")]
 
-use bevy_gs4d::frame::Background;
-use bevy_gs4d::gaussian::{Camera, RasterFov};
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::view::{Background, Camera, RasterFov};
 use glam::{UVec2, Vec3, Vec4};
 use serde_json::{Value, json};
 use std::fs;

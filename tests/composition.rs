@@ -19,13 +19,14 @@ use bevy::camera::{CameraProjection, Hdr, SubCameraView};
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::math::{Affine3A, Vec3A};
 use bevy::prelude::*;
-use bevy_gs4d::frame::{Background, BlendSpace, DebugView};
-use bevy_gs4d::gaussian::{Gaussian, Look, View, decode, encode};
+use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::playback::{ClipFade, Playback};
 use bevy_gs4d::reference::{self, Layer};
 use bevy_gs4d::render::{CaptureSettings, CaptureStatistics, CaptureViewSettings, CropBox, DepthWrite};
 use bevy_gs4d::scene::{Environment, RuntimeScene};
 use bevy_gs4d::testing::{self, Offscreen};
+use bevy_gs4d::view::srgb::{decode, encode};
+use bevy_gs4d::view::{Appearance, Background, BlendSpace, DebugView, View};
 use common::{app, picture, spawn_camera};
 use placed::{BLACK, MIDDLE, check, crowd, front, insert, lone, orthographic, spawn, spawn_box, twin_of};
 use twin::{DURATION, SIZE, blob, difference, difference_between, eye, rgb, scene, view, view_of};
@@ -46,18 +47,22 @@ fn opacity_light_and_crop_are_those_of_the_twin() {
         rotation: Quat::from_rotation_z(0.5),
     };
     let cube = Affine3A::from_scale_rotation_translation(crop.half_size, crop.rotation, crop.center).inverse();
-    let (settings, look) = (CaptureSettings::default(), Look::default());
+    let (settings, appearance) = (CaptureSettings::default(), Appearance::default());
     let tint = LinearRgba::rgb(0.2, 1.0, 3.0);
     let cases = [
-        ("opacity", CaptureSettings { opacity: 0.4, ..settings }, Look { opacity: 0.4, ..look }),
-        ("tint", CaptureSettings { tint, ..settings }, Look { light: Vec3::new(0.2, 1.0, 3.0), ..look }),
-        ("exposure", CaptureSettings { exposure: -1.0, ..settings }, Look { light: Vec3::splat(0.5), ..look }),
-        ("crop", CaptureSettings { crop: Some(crop), ..settings }, Look { crop: Some(cube), ..look }),
+        ("opacity", CaptureSettings { opacity: 0.4, ..settings }, Appearance { opacity: 0.4, ..appearance }),
+        ("tint", CaptureSettings { tint, ..settings }, Appearance { light: Vec3::new(0.2, 1.0, 3.0), ..appearance }),
+        (
+            "exposure",
+            CaptureSettings { exposure: -1.0, ..settings },
+            Appearance { light: Vec3::splat(0.5), ..appearance },
+        ),
+        ("crop", CaptureSettings { crop: Some(crop), ..settings }, Appearance { crop: Some(cube), ..appearance }),
     ];
-    let plain = twin_of(&scene, view(&eye(), SIZE, 0.0), look);
-    for (what, settings, look) in cases {
+    let plain = twin_of(&scene, view(&eye(), SIZE, 0.0), appearance);
+    for (what, settings, appearance) in cases {
         insert(&mut app, entity, settings);
-        let expected = twin_of(&scene, view(&eye(), SIZE, 0.0), look);
+        let expected = twin_of(&scene, view(&eye(), SIZE, 0.0), appearance);
         assert!(expected != plain, "{what} changes something");
         check(&mut app, &expected, what);
     }
@@ -70,7 +75,7 @@ fn a_timeline_s_fade_is_a_factor_on_opacity() {
     let half = CaptureSettings { opacity: 0.5, ..default() };
     spawn(&mut app, &scene, (half, ClipFade(0.5)));
     spawn_camera(&mut app, Msaa::Off, eye());
-    let expected = twin_of(&scene, view(&eye(), SIZE, 0.0), Look { opacity: 0.25, ..Look::default() });
+    let expected = twin_of(&scene, view(&eye(), SIZE, 0.0), Appearance { opacity: 0.25, ..Appearance::default() });
     check(&mut app, &expected, "half of a half");
 }
 
@@ -114,7 +119,11 @@ fn a_crop_box_hides_exactly_what_is_outside() {
     kept.gaussians = whole.gaussians.iter().zip(&inside).filter(|(_, inside)| **inside).map(|(g, _)| *g).collect();
     let colors = whole.harmonics.values.chunks(3).zip(&inside).filter(|(_, inside)| **inside);
     kept.harmonics.values = colors.flat_map(|(color, _)| color.to_vec()).collect();
-    check(&mut app, &twin_of(&kept, view(&eye(), SIZE, 0.0), Look::default()), "the scene without what is outside");
+    check(
+        &mut app,
+        &twin_of(&kept, view(&eye(), SIZE, 0.0), Appearance::default()),
+        "the scene without what is outside",
+    );
 }
 
 #[test]
@@ -131,9 +140,13 @@ fn captures_in_one_view_keep_their_own_looks() {
         Layer {
             scene: &near,
             view: view_of(&eye(), &place, SIZE, 0.0),
-            look: Look { opacity: 0.5, ..Look::default() },
+            appearance: Appearance { opacity: 0.5, ..Appearance::default() },
         },
-        Layer { scene: &far, view: view(&eye(), SIZE, 0.0), look: Look { light: Vec3::splat(2.0), ..Look::default() } },
+        Layer {
+            scene: &far,
+            view: view(&eye(), SIZE, 0.0),
+            appearance: Appearance { light: Vec3::splat(2.0), ..Appearance::default() },
+        },
     ];
     check(&mut app, &reference::render_layers(&layers, BLACK, BlendSpace::Encoded).picture, "two captures");
 }
@@ -155,7 +168,7 @@ fn blend_spaces_are_those_of_the_twin_on_every_kind_of_target() {
         if let Some(space) = space {
             insert(&mut app, camera, space);
         }
-        let layer = Layer { scene: &scene, view: view(&eye(), SIZE, 0.0), look: Look::default() };
+        let layer = Layer { scene: &scene, view: view(&eye(), SIZE, 0.0), appearance: Appearance::default() };
         let expected = |background: Vec3, space| {
             reference::render_layers(&[layer], Background::Color(background.to_array()), space).picture
         };
@@ -210,10 +223,10 @@ fn every_camera_sees_the_captures_of_its_layers() {
     let second = Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), SIZE);
     let camera = spawn_camera(&mut app, Msaa::Off, eye());
     insert(&mut app, camera, (second.target(), RenderLayers::layer(1)));
-    let look = Look::default();
-    check(&mut app, &twin_of(&red(), view(&eye(), SIZE, 0.0), look), "layer 0");
+    let appearance = Appearance::default();
+    check(&mut app, &twin_of(&red(), view(&eye(), SIZE, 0.0), appearance), "layer 0");
     let seen = testing::read(&mut app, &second).expect("the second camera's picture");
-    let apart = difference(&seen, &twin_of(&blue, view(&eye(), SIZE, 0.0), look));
+    let apart = difference(&seen, &twin_of(&blue, view(&eye(), SIZE, 0.0), appearance));
     assert!(apart <= 2.0, "layer 1: Bevy and the CPU twin are {apart} / 255 apart");
 }
 
@@ -227,10 +240,10 @@ fn a_second_camera_sorts_for_itself() {
     let second = Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), SIZE);
     let camera = spawn_camera(&mut app, Msaa::Off, behind);
     insert(&mut app, camera, second.target());
-    check(&mut app, &twin_of(&scene, view(&eye(), SIZE, 0.0), Look::default()), "from the front");
+    check(&mut app, &twin_of(&scene, view(&eye(), SIZE, 0.0), Appearance::default()), "from the front");
     // The app stands still: the same frame, seen by the other camera.
     let seen = testing::read(&mut app, &second).expect("the second camera's picture");
-    let apart = difference(&seen, &twin_of(&scene, view(&behind, SIZE, 0.0), Look::default()));
+    let apart = difference(&seen, &twin_of(&scene, view(&behind, SIZE, 0.0), Appearance::default()));
     assert!(apart <= 2.0, "from behind: Bevy and the CPU twin are {apart} / 255 apart");
 }
 
@@ -290,7 +303,7 @@ fn an_orthographic_camera_is_that_of_the_twin() {
     let projection = Vec4::new(2.0 / 4.0, 2.0 / 3.0, -0.2, -0.2);
     let world_to_camera = view(&eye(), SIZE, 0.0).world_to_camera;
     let view = View::orthographic(SIZE, 0.0, world_to_camera, projection, 0.0);
-    check(&mut app, &twin_of(&scene, view, Look::default()), "parallel rays");
+    check(&mut app, &twin_of(&scene, view, Appearance::default()), "parallel rays");
 }
 
 /// A perspective with a finite far plane, as games with their own projections have.
@@ -331,7 +344,7 @@ fn a_finite_far_plane_changes_nothing_in_a_capture() {
     spawn(&mut app, &scene, ());
     let camera = spawn_camera(&mut app, Msaa::Off, eye());
     insert(&mut app, camera, finite_far());
-    check(&mut app, &twin_of(&scene, view(&eye(), SIZE, 0.0), Look::default()), "a finite far plane");
+    check(&mut app, &twin_of(&scene, view(&eye(), SIZE, 0.0), Appearance::default()), "a finite far plane");
 }
 
 #[test]

@@ -4,22 +4,23 @@
 
 #[path = "common/data.rs"]
 mod data;
-#[cfg(feature = "gpu")]
+#[cfg(feature = "renderer")]
 #[path = "common/gpu.rs"]
 mod gpu;
 #[path = "common/skip.rs"]
 mod skip;
 
-use bevy_gs4d::codec::{self, checkpoint::CheckpointOptions, package};
-use bevy_gs4d::compress::pack::{CompressError, CompressSettings, Quality, compress};
-use bevy_gs4d::compress::quantize::Bits;
-use bevy_gs4d::dataset::{CameraFile, CameraOptions};
-use bevy_gs4d::frame::Background;
-use bevy_gs4d::gaussian::{Camera, Gaussian, RasterFov, View};
-use bevy_gs4d::metrics::psnr_pooled;
+use bevy_gs4d::codec::checkpoint::CheckpointOptions;
+use bevy_gs4d::codec::{self, package};
+use bevy_gs4d::gaussian::Gaussian;
+use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions};
+use bevy_gs4d::offline::metrics::psnr_pooled;
+use bevy_gs4d::offline::quantize::{CompressError, CompressSettings, Quality, compress};
 use bevy_gs4d::reference;
+use bevy_gs4d::scene::packed::encode::Bits;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{FilterKind, Form, GaussianScene, RuntimeScene, TemporalFilter};
+use bevy_gs4d::view::{Background, Camera, RasterFov, View};
 use glam::{UVec2, Vec3};
 use std::io::Cursor;
 
@@ -60,7 +61,7 @@ fn psnr(a: &RuntimeScene, b: &RuntimeScene, view: &View) -> f64 {
 
 /// Each Gaussian of the scene beside its packed self. Morton order is found again by the means.
 fn beside(scene: &RuntimeScene, packed: &RuntimeScene) -> Vec<(Gaussian, Gaussian)> {
-    let order = bevy_gs4d::compress::order::morton_order(&scene.gaussians);
+    let order = bevy_gs4d::offline::quantize::order::morton_order(&scene.gaussians);
     order.iter().enumerate().map(|(to, &from)| (scene.gaussians[from as usize], packed.gaussian(to))).collect()
 }
 
@@ -129,7 +130,7 @@ fn the_filter_moves_with_its_gaussians() {
     // A support filter is made anew.
     scene.filter = scene.filter.map(|filter| TemporalFilter { kind: FilterKind::KeyFrame, ..filter });
     let (packed, _) = compress(scene.clone(), &settings(&[])).expect("it is compressed");
-    let order = bevy_gs4d::compress::order::morton_order(&scene.gaussians);
+    let order = bevy_gs4d::offline::quantize::order::morton_order(&scene.gaussians);
     let (before, after) = (scene.filter.expect("a filter"), packed.filter.expect("the filter is kept"));
     for segment in 0..before.segments {
         for (to, &from) in order.iter().enumerate() {
@@ -242,7 +243,7 @@ fn every_flipped_bit_of_a_packed_package_is_noticed() {
     }
 }
 
-#[cfg(feature = "gpu")]
+#[cfg(feature = "renderer")]
 #[test]
 fn the_gpu_reads_the_packed_form_as_the_cpu_does() {
     let Some(mut headless) = gpu::headless() else { return };

@@ -10,7 +10,8 @@ mod command;
 #[path = "common/dataset.rs"]
 mod dataset;
 
-use bevy_gs4d::codec::{self, package::WriteSettings};
+use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::offline;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use command::gs4d;
 use glam::{UVec2, Vec3};
@@ -23,7 +24,7 @@ fn capture(size: UVec2) -> (TempDir, PathBuf, PathBuf) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (scene, data) = (folder.path().join("scene.gs4d"), folder.path().join("data"));
     let trained = synthesize(&SynthSettings { count: 1500, ..SynthSettings::default() });
-    codec::save(&scene, &trained, &WriteSettings::default()).expect("the folder can be written to");
+    offline::save(&scene, &trained, &WriteSettings::default()).expect("the folder can be written to");
     let runtime = trained.into_runtime().expect("a synthetic scene can be drawn");
     dataset::write(&data, &runtime, Vec3::ZERO, 3, 3, size, true);
     (folder, scene, data)

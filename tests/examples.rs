@@ -7,7 +7,10 @@
 #[path = "common/skip.rs"]
 mod skip;
 
-use bevy_gs4d::codec::{self, checkpoint::CheckpointOptions, package::WriteSettings};
+use bevy_gs4d::codec;
+use bevy_gs4d::codec::checkpoint::CheckpointOptions;
+use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::offline;
 use bevy_gs4d::scene::{Form, GaussianScene};
 use bevy_gs4d::testing::{TestingError, has_gpu};
 use image::RgbaImage;
@@ -129,7 +132,7 @@ fn invisible() -> TempDir {
     for gaussian in gaussians {
         gaussian.opacity = 0.0;
     }
-    codec::save(&to.join("toybox.gs4d"), &scene, &WriteSettings { level: 1 }).expect("the folder can be written to");
+    offline::save(&to.join("toybox.gs4d"), &scene, &WriteSettings { level: 1 }).expect("the folder can be written to");
     folder
 }
 

@@ -1,19 +1,18 @@
 //! The temporal filter on the GPU: what it leaves out, and that nothing else changes.
 //!
 //! In: synthetic scenes with filters of both kinds of storage. Skipped where there is no GPU.
-#![cfg(feature = "gpu")]
+#![cfg(feature = "renderer")]
 
 #[path = "common/gpu.rs"]
 mod gpu;
 #[path = "common/skip.rs"]
 mod skip;
 
-use bevy_gs4d::frame::{Background, Frame};
-use bevy_gs4d::gaussian::{Camera, Look, RasterFov, View};
-use bevy_gs4d::gpu::{Headless, Instance, Surroundings};
 use bevy_gs4d::reference;
+use bevy_gs4d::renderer::{Headless, Instance, ViewParameters};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{ActiveSets, FilterKind, RuntimeScene, TemporalFilter};
+use bevy_gs4d::view::{Appearance, Background, Camera, Frame, RasterFov, View};
 use glam::{UVec2, Vec3};
 
 const SEGMENTS: u32 = 9;
@@ -117,10 +116,11 @@ fn captures_with_and_without_a_filter_share_a_view() {
     let [plain, other, filtered] = [&a, &b, &filtered].map(|scene| headless.upload(scene).expect("it fits"));
     let mut previous = None;
     for (time, late) in times().zip(times().skip(3)) {
-        let surroundings = Surroundings { background: BLACK, ..Surroundings::default() };
-        let instance = |capture, active, time| Instance { capture, active, view: view(time), look: Look::default() };
+        let parameters = ViewParameters { background: BLACK, ..ViewParameters::default() };
+        let instance =
+            |capture, active, time| Instance { capture, active, view: view(time), appearance: Appearance::default() };
         let expected = [instance(&plain, None, time), instance(&other, None, late), instance(&plain, None, late)];
-        let expected = headless.render_all(&expected, &surroundings).expect("it is drawn");
+        let expected = headless.render_all(&expected, &parameters).expect("it is drawn");
         // The same capture twice, at different times: each place has a list of its own.
         let [now, then] = [time, late].map(|time| headless.active(&filtered, time));
         let mixed = [
@@ -128,7 +128,7 @@ fn captures_with_and_without_a_filter_share_a_view() {
             instance(&other, None, late),
             instance(&filtered, then.as_ref(), late),
         ];
-        let mixed = headless.render_all(&mixed, &surroundings).expect("it is drawn");
+        let mixed = headless.render_all(&mixed, &parameters).expect("it is drawn");
         assert!(bits_of(&mixed) == bits_of(&expected), "at {time} and {late}: bit for bit the same");
         assert!(previous != Some(bits_of(&mixed)), "time moves the picture");
         previous = Some(bits_of(&mixed));

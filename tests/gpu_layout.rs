@@ -1,12 +1,13 @@
 //! Structures and constants that stand in the shaders and in the host's code.
 //!
 //! In: the composed passes, as naga lays them out. Out: proof that every structure and shared constant is the same on both sides.
-#![cfg(feature = "gpu")]
+#![cfg(feature = "renderer")]
 
 use bevy_gs4d::gaussian::projection::{ALPHA_MAX, ALPHA_MIN, LOW_PASS, TRANSMITTANCE_MIN};
 use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF};
-use bevy_gs4d::gpu::layout::{self, Activation, BLOCK, Counters, DIGITS, Frame, Instance, SortStep, Splat, TILE_SIZE};
-use bevy_gs4d::gpu::shaders::{compose, pass_names};
+use bevy_gs4d::renderer::layout::{self, Activation, BLOCK, Counters, DIGITS, Frame, Instance, SortStep, Splat};
+use bevy_gs4d::renderer::shaders::{compose, pass_names};
+use bevy_gs4d::view::TILE_SIZE;
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;
 use wgpu::naga::front::wgsl::parse_str;

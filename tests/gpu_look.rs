@@ -1,19 +1,20 @@
 //! Captures that do not look as trained: placed light, opacity and crop, linear blending, parallel rays, multisampled surfaces.
 //!
 //! In: synthetic scenes, the same for GPU and CPU. Out: proof that both draw the same, or that a number is what it must be.
-#![cfg(feature = "gpu")]
+#![cfg(feature = "renderer")]
 
 #[path = "common/gpu.rs"]
 mod gpu;
 #[path = "common/skip.rs"]
 mod skip;
 
-use bevy_gs4d::frame::{Background, BlendSpace, DebugView, Frame};
-use bevy_gs4d::gaussian::{Camera, Gaussian, Harmonics, Look, RasterFov, View, decode};
-use bevy_gs4d::gpu::{GpuContext, Headless, Instance, OpaqueDepth, Surroundings};
+use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::reference::{Layer, render_layers};
+use bevy_gs4d::renderer::{GpuContext, Headless, Instance, OpaqueDepth, ViewParameters};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{PlaybackHints, RuntimeScene, TrainedWith};
+use bevy_gs4d::view::srgb::decode;
+use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, DebugView, Frame, RasterFov, View};
 use glam::{Affine3A, Mat4, Quat, UVec2, Vec2, Vec3, Vec4};
 
 const SIZE: UVec2 = UVec2::new(192, 128);
@@ -58,12 +59,18 @@ fn blobs(blobs: &[(Vec3, f32, f32)]) -> RuntimeScene {
 }
 
 /// One scene with that look, on the GPU and on the CPU.
-fn both(headless: &mut Headless, scene: &RuntimeScene, view: View, look: Look, space: BlendSpace) -> [Frame; 2] {
+fn both(
+    headless: &mut Headless,
+    scene: &RuntimeScene,
+    view: View,
+    appearance: Appearance,
+    space: BlendSpace,
+) -> [Frame; 2] {
     let capture = headless.upload(scene).expect("it fits");
-    let instance = Instance { capture: &capture, active: None, view, look };
-    let surroundings = Surroundings { background: BACKGROUND, blend_space: space, ..Surroundings::default() };
-    let drawn = headless.render_all(&[instance], &surroundings).expect("it is drawn");
-    [drawn, render_layers(&[Layer { scene, view, look }], BACKGROUND, space)]
+    let instance = Instance { capture: &capture, active: None, view, appearance };
+    let parameters = ViewParameters { background: BACKGROUND, blend_space: space, ..ViewParameters::default() };
+    let drawn = headless.render_all(&[instance], &parameters).expect("it is drawn");
+    [drawn, render_layers(&[Layer { scene, view, appearance }], BACKGROUND, space)]
 }
 
 fn assert_same([drawn, twin]: &[Frame; 2], what: &str) {
@@ -82,18 +89,18 @@ fn assert_same([drawn, twin]: &[Frame; 2], what: &str) {
 fn look_is_what_the_twin_shows() {
     let Some(mut headless) = gpu::headless() else { return };
     let scene = scene();
-    let plain = both(&mut headless, &scene, view(), Look::default(), BlendSpace::Encoded);
+    let plain = both(&mut headless, &scene, view(), Appearance::default(), BlendSpace::Encoded);
     assert_same(&plain, "as trained");
     let crop = Affine3A::from_scale(Vec3::new(2.0, 1.5, 3.0)) * Affine3A::from_quat(Quat::from_rotation_y(0.4));
     let looks = [
-        ("half as opaque", Look { opacity: 0.5, ..Look::default() }),
-        ("tinted and brighter", Look { light: Vec3::new(2.5, 1.0, 0.1), ..Look::default() }),
-        ("cropped", Look { crop: Some(crop), ..Look::default() }),
-        ("all at once", Look { opacity: 0.7, light: Vec3::new(0.3, 1.4, 0.9), crop: Some(crop) }),
+        ("half as opaque", Appearance { opacity: 0.5, ..Appearance::default() }),
+        ("tinted and brighter", Appearance { light: Vec3::new(2.5, 1.0, 0.1), ..Appearance::default() }),
+        ("cropped", Appearance { crop: Some(crop), ..Appearance::default() }),
+        ("all at once", Appearance { opacity: 0.7, light: Vec3::new(0.3, 1.4, 0.9), crop: Some(crop) }),
     ];
-    for (what, look) in looks {
+    for (what, appearance) in looks {
         for space in [BlendSpace::Encoded, BlendSpace::Linear] {
-            let pictures = both(&mut headless, &scene, view(), look, space);
+            let pictures = both(&mut headless, &scene, view(), appearance, space);
             assert_same(&pictures, &format!("{what}, {space:?}"));
             assert!(pictures[0].picture != plain[0].picture, "{what}: the look shows");
         }
@@ -106,9 +113,9 @@ fn a_crop_leaves_what_a_scene_of_the_means_inside_shows() {
     let inside = [(Vec3::ZERO, 0.2, 0.9), (Vec3::new(0.3, 0.2, -0.3), 0.1, 0.7)];
     let outside = [(Vec3::new(0.7, 0.0, 0.0), 0.3, 0.8), (Vec3::new(0.0, 0.0, -0.9), 0.3, 0.8)];
     let all = blobs(&[inside[0], outside[0], inside[1], outside[1]]);
-    let look = Look { crop: Some(Affine3A::from_scale(Vec3::splat(2.0))), ..Look::default() };
-    let [cropped, _] = both(&mut headless, &all, view(), look, BlendSpace::Encoded);
-    let [expected, _] = both(&mut headless, &blobs(&inside), view(), Look::default(), BlendSpace::Encoded);
+    let appearance = Appearance { crop: Some(Affine3A::from_scale(Vec3::splat(2.0))), ..Appearance::default() };
+    let [cropped, _] = both(&mut headless, &all, view(), appearance, BlendSpace::Encoded);
+    let [expected, _] = both(&mut headless, &blobs(&inside), view(), Appearance::default(), BlendSpace::Encoded);
     assert!(cropped == expected, "half a unit about the origin: bit for bit the scene without the others");
 }
 
@@ -117,7 +124,7 @@ fn linear_blending_averages_light() {
     let Some(mut headless) = gpu::headless() else { return };
     // Wide and half opaque: the middle pixel is half of it and half of the background, in linear light.
     let scene = blobs(&[(Vec3::ZERO, 4.0, 0.5)]);
-    let [frame, _] = both(&mut headless, &scene, view(), Look::default(), BlendSpace::Linear);
+    let [frame, _] = both(&mut headless, &scene, view(), Appearance::default(), BlendSpace::Linear);
     let middle = frame.picture.pixels[(SIZE.y / 2 * SIZE.x + SIZE.x / 2) as usize];
     let expected = 0.5 * decode(Vec3::splat(0.5)) + 0.5 * Vec3::new(0.2, 0.3, 0.4);
     assert!(middle.abs_diff_eq(expected, 2e-3), "{middle} is half and half, {expected}");
@@ -130,7 +137,7 @@ fn parallel_rays_are_what_the_twin_shows() {
     for (near, shift) in [(0.0, Vec2::ZERO), (-5.0, Vec2::new(0.2, -0.1))] {
         let projection = Vec4::new(0.8, 1.2, shift.x, shift.y);
         let view = View::orthographic(SIZE, 0.4, camera().world_to_camera, projection, near);
-        let pictures = both(&mut headless, &scene, view, Look::default(), BlendSpace::Encoded);
+        let pictures = both(&mut headless, &scene, view, Appearance::default(), BlendSpace::Encoded);
         assert!(pictures[1].counts.visible > 500, "the scene is in view");
         assert_same(&pictures, &format!("near {near}, shifted by {shift}"));
     }
@@ -143,7 +150,7 @@ fn parallel_rays_show_far_and_near_at_one_size() {
     let scene = blobs(&[(Vec3::new(-1.0, 0.0, 3.0), 0.3, 0.9), (Vec3::new(1.0, 0.0, 9.0), 0.3, 0.9)]);
     let scale = 2.0 * 20.0 / SIZE.as_vec2();
     let view = View::orthographic(SIZE, 0.0, Mat4::IDENTITY, Vec4::new(scale.x, scale.y, 0.0, 0.0), 0.0);
-    let [frame, _] = both(&mut headless, &scene, view, Look::default(), BlendSpace::Encoded);
+    let [frame, _] = both(&mut headless, &scene, view, Appearance::default(), BlendSpace::Encoded);
     let left = |x: u32, y: u32| 1.0 - frame.transmittance[(y * SIZE.x + x) as usize];
     let middle = SIZE / 2;
     for (dx, dy) in [(0, 0), (4, 0), (3, 7), (9, 2)] {
@@ -233,14 +240,14 @@ fn multisampled_surfaces_hide_a_share_of_a_pixel() {
     let scene = blobs(&[(Vec3::Z * 2.0, 3.0, 0.5), (Vec3::Z * 4.0, 6.0, 0.6)]);
     let view = View::new(SIZE, 0.0, Mat4::IDENTITY, Vec4::new(1.0, 1.5, 0.0, 0.0), Vec2::new(1.0, 1.0 / 1.5));
     let capture = headless.upload(&scene).expect("it fits");
-    let instance = Instance { capture: &capture, active: None, view, look: Look::default() };
+    let instance = Instance { capture: &capture, active: None, view, appearance: Appearance::default() };
     let depth = texture.create_view(&wgpu::TextureViewDescriptor::default());
     let opaque = OpaqueDepth { texture: &depth, samples: 4, origin: UVec2::ZERO, distance: [near, 0.0, 0.0, 1.0] };
-    let surroundings = Surroundings { opaque: Some(opaque), ..Surroundings::default() };
-    let frame = headless.render_all(&[instance], &surroundings).expect("it is drawn");
-    let free = headless.render_all(&[instance], &Surroundings::default()).expect("it is drawn");
+    let parameters = ViewParameters { opaque: Some(opaque), ..ViewParameters::default() };
+    let frame = headless.render_all(&[instance], &parameters).expect("it is drawn");
+    let free = headless.render_all(&[instance], &ViewParameters::default()).expect("it is drawn");
     let front = headless.upload(&blobs(&[(Vec3::Z * 2.0, 3.0, 0.5)])).expect("it fits");
-    let cut = headless.render_all(&[Instance { capture: &front, ..instance }], &Surroundings::default());
+    let cut = headless.render_all(&[Instance { capture: &front, ..instance }], &ViewParameters::default());
     let cut = cut.expect("it is drawn");
     let row = SIZE.y / 2 * SIZE.x;
     let at = |frame: &Frame, x: u32| {
@@ -267,12 +274,12 @@ fn a_surface_has_its_distance_from_any_projection() {
     let capture = headless.upload(&scene).expect("it fits");
     let (texture, _) = edge(headless.context(), 0.25, 1.0);
     let view = View::new(SIZE, 0.0, Mat4::IDENTITY, Vec4::new(1.0, 1.5, 0.0, 0.0), Vec2::new(1.0, 1.0 / 1.5));
-    let instance = Instance { capture: &capture, active: None, view, look: Look::default() };
+    let instance = Instance { capture: &capture, active: None, view, appearance: Appearance::default() };
     let depth = texture.create_view(&wgpu::TextureViewDescriptor::default());
     let mut left = |distance: [f32; 4]| {
         let opaque = OpaqueDepth { texture: &depth, samples: 4, origin: UVec2::ZERO, distance };
-        let surroundings = Surroundings { opaque: Some(opaque), ..Surroundings::default() };
-        let frame = headless.render_all(&[instance], &surroundings).expect("it is drawn");
+        let parameters = ViewParameters { opaque: Some(opaque), ..ViewParameters::default() };
+        let frame = headless.render_all(&[instance], &parameters).expect("it is drawn");
         frame.transmittance[(SIZE.y / 2 * SIZE.x) as usize + 20]
     };
     // The depth is 0.25. Of a pinhole with near 0.75, an infinite far plane: 3 away, between the two.
@@ -294,9 +301,10 @@ fn debug_views_show_what_they_say() {
     let view = |time| View::new(SIZE, time, Mat4::IDENTITY, Vec4::new(1.0, 1.5, 0.0, 0.0), Vec2::new(1.0, 1.0 / 1.5));
     let capture = headless.upload(&scene).expect("it fits");
     let mut pixels = |debug, time| {
-        let instance = Instance { capture: &capture, active: None, view: view(time), look: Look::default() };
-        let surroundings = Surroundings { debug, ..Surroundings::default() };
-        let frame = headless.render_all(&[instance], &surroundings).expect("it is drawn");
+        let instance =
+            Instance { capture: &capture, active: None, view: view(time), appearance: Appearance::default() };
+        let parameters = ViewParameters { debug, ..ViewParameters::default() };
+        let frame = headless.render_all(&[instance], &parameters).expect("it is drawn");
         let at = |ndc: f32| {
             let index = (SIZE.y / 2 * SIZE.x) as usize + ((ndc + 1.0) / 2.0 * SIZE.x as f32) as usize;
             // Not premultiplied.
@@ -329,9 +337,9 @@ fn what_is_active_in_vain_is_red() {
     let mut middle = |debug| {
         let projection = Vec4::new(1.0, 1.5, 0.0, 0.0);
         let view = View::new(SIZE, 0.9, Mat4::IDENTITY, projection, Vec2::new(1.0, 1.0 / 1.5));
-        let instance = Instance { capture: &capture, active: None, view, look: Look::default() };
-        let surroundings = Surroundings { debug, ..Surroundings::default() };
-        let frame = headless.render_all(&[instance], &surroundings).expect("it is drawn");
+        let instance = Instance { capture: &capture, active: None, view, appearance: Appearance::default() };
+        let parameters = ViewParameters { debug, ..ViewParameters::default() };
+        let frame = headless.render_all(&[instance], &parameters).expect("it is drawn");
         let index = (SIZE.y / 2 * SIZE.x + SIZE.x / 2) as usize;
         (frame.picture.pixels[index], frame.transmittance[index])
     };

@@ -2,20 +2,20 @@
 //!
 //! In: buffers filled by hand, what a pass writes filled with rubbish. Out: proof that the GPU leaves in them what the functions of
 //! [`reference`] return. `blend`, which needs textures, is compared as part of whole frames.
-#![cfg(feature = "gpu")]
+#![cfg(feature = "renderer")]
 
 #[path = "common/passes.rs"]
 mod passes;
 #[path = "common/skip.rs"]
 mod skip;
 
-use bevy_gs4d::frame::{BlendSpace, DebugView};
-use bevy_gs4d::gaussian::{Camera, Gaussian, Look, RasterFov};
-use bevy_gs4d::gpu::layout::{
+use bevy_gs4d::gaussian::Gaussian;
+use bevy_gs4d::reference::{self, Layer, Pair, Splat};
+use bevy_gs4d::renderer::layout::{
     self, BLOCK, Counters, DEPTH_STEPS, DIGIT_BITS, DIGITS, Frame, INVISIBLE, Instance, SortStep,
 };
-use bevy_gs4d::reference::{self, Layer, Pair, Splat};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::view::{Appearance, BlendSpace, Camera, DebugView, RasterFov};
 use bytemuck::Zeroable;
 use glam::{UVec2, UVec4, Vec2, Vec3};
 use passes::{Gpu, Pass};
@@ -361,7 +361,7 @@ fn project_makes_the_splats_of_the_twin() {
         degree_t: 2,
         stride: 3 * 48 / 4,
         time_span: scene.trained_with.time_span(),
-        ..Instance::new(&view, &Look::default(), BlendSpace::Encoded, DebugView::Color)
+        ..Instance::new(&view, &Appearance::default(), BlendSpace::Encoded, DebugView::Color)
     };
     let record = |gaussian: &Gaussian| Gaussian { sigma_t: gaussian.sigma_t.recip(), ..*gaussian };
     let slots = (first_slot + count) as usize;
@@ -380,7 +380,8 @@ fn project_makes_the_splats_of_the_twin() {
     let keys: Vec<u32> = gpu.read(buffers[2].1);
     let (unused, keys) = keys.split_at(first_slot as usize);
     assert!(unused.iter().all(|key| *key == RUBBISH), "slots of others are left alone");
-    let expected = reference::project(&Layer { scene: &scene, view, look: Look::default() }, BlendSpace::Encoded);
+    let expected =
+        reference::project(&Layer { scene: &scene, view, appearance: Appearance::default() }, BlendSpace::Encoded);
     let (mut both, mut on_the_edge) = (0, 0);
     for (i, (twin, splat)) in expected.iter().zip(&splats[first_slot as usize..]).enumerate() {
         if keys[i] == INVISIBLE || !twin.is_visible() {

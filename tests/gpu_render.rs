@@ -2,7 +2,7 @@
 //!
 //! In: synthetic scenes. Out: proof that the GPU draws what the CPU twin draws, however the scene is cut up, however many pairs it
 //! makes, and whatever stands in front of it.
-#![cfg(feature = "gpu")]
+#![cfg(feature = "renderer")]
 
 #[path = "common/cramped.rs"]
 mod cramped;
@@ -11,15 +11,15 @@ mod gpu;
 #[path = "common/skip.rs"]
 mod skip;
 
-use bevy_gs4d::frame::{Background, BlendSpace, Counts, Frame};
-use bevy_gs4d::gaussian::{Camera, Gaussian, Look, Parameters, RasterFov, View};
-use bevy_gs4d::gpu::{
-    GpuCapture, GpuContext, GpuError, Headless, Instance, OpaqueDepth, Renderer, ShaderChecks, Surroundings,
+use bevy_gs4d::gaussian::{Gaussian, Parameters};
+use bevy_gs4d::reference::{self, Layer, Splat};
+use bevy_gs4d::renderer::{
+    GpuCapture, GpuContext, GpuError, Headless, Instance, OpaqueDepth, Renderer, ShaderChecks, ViewParameters,
     ViewRenderer,
 };
-use bevy_gs4d::reference::{self, Layer, Splat};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{ActiveSets, FilterKind, Form, GaussianScene, RuntimeScene, TemporalFilter};
+use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, Counts, Frame, RasterFov, View};
 use glam::{Mat4, Quat, UVec2, Vec3};
 use std::ops::Range;
 
@@ -70,17 +70,17 @@ fn look_from(eye: Vec3, size: UVec2, time: f32) -> View {
 }
 
 fn project(scene: &RuntimeScene, view: &View) -> Vec<Splat> {
-    reference::project(&Layer { scene, view: *view, look: Look::default() }, BlendSpace::Encoded)
+    reference::project(&Layer { scene, view: *view, appearance: Appearance::default() }, BlendSpace::Encoded)
 }
 
 /// A capture as trained, all of it.
 fn instance<'a>(capture: &'a GpuCapture, view: &View) -> Instance<'a> {
-    Instance { capture, active: None, view: *view, look: Look::default() }
+    Instance { capture, active: None, view: *view, appearance: Appearance::default() }
 }
 
 /// Over the background, cut by nothing.
-fn surroundings() -> Surroundings<'static> {
-    Surroundings { background: BACKGROUND, ..Surroundings::default() }
+fn parameters() -> ViewParameters<'static> {
+    ViewParameters { background: BACKGROUND, ..ViewParameters::default() }
 }
 
 /// Several captures on the CPU, cut behind a depth.
@@ -270,7 +270,7 @@ fn two_captures_are_one_scene() {
     let cuts = [(0, 1_234), (1_234, 1_234), (1_234, 3_000)];
     let parts = cuts.map(|(first, last)| headless.upload(&part(&scene, first..last)).expect("upload"));
     let instances = parts.each_ref().map(|capture| instance(capture, &view));
-    let frame = headless.render_all(&instances, &surroundings()).expect("render");
+    let frame = headless.render_all(&instances, &parameters()).expect("render");
     assert!(frame == whole, "captures interleave as if they were one");
 }
 
@@ -287,7 +287,7 @@ fn captures_in_one_view_have_their_own_time_and_place() {
     let moved = View::new(SIZE, 0.9, view.world_to_camera * model, view.projection, view.tan_fov);
     let captures = [&first, &second].map(|scene| headless.upload(scene).expect("upload"));
     let instances = [instance(&captures[0], &view), instance(&captures[1], &moved)];
-    let frame = headless.render_all(&instances, &surroundings()).expect("render");
+    let frame = headless.render_all(&instances, &parameters()).expect("render");
     let expected = twin(&[(&first, view), (&second, moved)], f32::INFINITY);
     assert_equivalent(&frame, &expected, "two captures");
 }
@@ -360,7 +360,7 @@ fn a_view_makes_room_without_anybody_waiting() {
     let instances = [instance(&capture, &close)];
     // The first frame counts, the second asks for the count, the third has it.
     for frame in 0..3 {
-        view.prepare(device, queue, &renderer, &instances, &surroundings()).expect("prepare");
+        view.prepare(device, queue, &renderer, &instances, &parameters()).expect("prepare");
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         view.record(&renderer, &mut encoder, &instances);
         queue.submit([encoder.finish()]);
@@ -430,13 +430,13 @@ fn opaque_surfaces_hide_what_is_behind_them() {
     let (scene, view) = (scene(3_000), look_from(EYE, SIZE, 0.5));
     let capture = headless.upload(&scene).expect("upload");
     let instances = [instance(&capture, &view)];
-    let all = headless.render_all(&instances, &surroundings()).expect("render");
+    let all = headless.render_all(&instances, &parameters()).expect("render");
     let near = 0.1;
     let origin = UVec2::new(5, 7);
     let mut cut_at = |depth: f32| {
         let texture = depth_texture(headless.context(), SIZE + origin, depth);
         let opaque = OpaqueDepth { texture: &texture, samples: 1, origin, distance: [near, 0.0, 0.0, 1.0] };
-        headless.render_all(&instances, &Surroundings { opaque: Some(opaque), ..surroundings() }).expect("render")
+        headless.render_all(&instances, &ViewParameters { opaque: Some(opaque), ..parameters() }).expect("render")
     };
     // Reverse z: the surface is `near / depth` away.
     for distance in [2.3, 2.7, 3.1] {
@@ -452,7 +452,7 @@ fn opaque_surfaces_hide_what_is_behind_them() {
     assert!(cut_at(0.0) == all, "infinitely far away is no surface");
     let hidden = cut_at(1.0);
     assert!(hidden.transmittance.iter().all(|left| *left == 1.0), "a surface at the near plane hides everything");
-    let again = headless.render_all(&instances, &surroundings()).expect("render");
+    let again = headless.render_all(&instances, &parameters()).expect("render");
     assert!(again == all, "without the surface everything is back");
 }
 

@@ -1,17 +1,16 @@
 //! `score` on the GPU against its CPU twin. Skipped where there is no GPU.
-#![cfg(feature = "gpu")]
+#![cfg(feature = "renderer")]
 
 #[path = "common/gpu.rs"]
 mod gpu;
 #[path = "common/skip.rs"]
 mod skip;
 
-use bevy_gs4d::compress::score::ScoreEngine;
-use bevy_gs4d::frame::Background;
-use bevy_gs4d::gaussian::{Camera, RasterFov};
-use bevy_gs4d::gpu::{GpuEngine, ShaderChecks};
-use bevy_gs4d::reference::{self, Want};
+use bevy_gs4d::offline::score::score;
+use bevy_gs4d::offline::score::{GpuEngine, ScoreEngine, Want};
+use bevy_gs4d::renderer::ShaderChecks;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::view::{Background, Camera, RasterFov};
 use glam::{UVec2, Vec3};
 
 #[test]
@@ -25,7 +24,7 @@ fn score_matches_reference() {
         let camera = Camera::look_at(Vec3::new(2.0, 0.6, 1.0), Vec3::ZERO, Vec3::Z, 0.8, size);
         let view = camera.view(time, RasterFov::Reference);
         let found = engine.score(&view, Want::Removal).expect("it is scored");
-        let expected = reference::score(&scene, &view, background, Want::Removal);
+        let expected = score(&scene, &view, background, Want::Removal);
         let columns = [
             ("contribution", &found.contribution, &expected.contribution),
             ("energy", &found.energy, &expected.energy),

@@ -8,8 +8,10 @@ mod data;
 #[path = "common/skip.rs"]
 mod skip;
 
+use bevy_gs4d::codec;
 use bevy_gs4d::codec::checkpoint::CheckpointOptions;
-use bevy_gs4d::codec::{self, package::WriteSettings};
+use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::offline;
 use bevy_gs4d::scene::GaussianScene;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -63,7 +65,7 @@ fn check(path: &Path) {
 fn check_package(scene: &GaussianScene) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("scene.gs4d");
-    codec::save(&path, scene, &WriteSettings::default()).expect("the folder can be written to");
+    offline::save(&path, scene, &WriteSettings::default()).expect("the folder can be written to");
     check(&path);
 }
 

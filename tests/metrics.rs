@@ -1,9 +1,7 @@
 //! Picture metrics against values worked out by hand and by an independent float64 implementation.
 
-use bevy_gs4d::{
-    metrics::{MS_SSIM_MIN_SIDE, SizeMismatch, flip, ms_ssim, psnr, psnr_pooled, ssim},
-    picture::Picture,
-};
+use bevy_gs4d::offline::metrics::{MS_SSIM_MIN_SIDE, SizeMismatch, flip, ms_ssim, psnr, psnr_pooled, ssim};
+use bevy_gs4d::view::Picture;
 use glam::{UVec2, Vec3};
 use proptest::prelude::*;
 

@@ -290,7 +290,7 @@ fn geometry_comes_before_colour_and_surroundings() {
     let names: Vec<_> = info.header.sections.iter().map(|s| s.name.as_str()).collect();
     let geometry = ["mean", "mean_t", "log_scale", "log_scale_t", "rotation_l", "rotation_r", "opacity_logit"];
     assert_eq!(names[..7], geometry, "geometry first");
-    assert_eq!(names[7..], ["sh_dc", "sh_rest", "environment"], "then colour, then surroundings");
+    assert_eq!(names[7..], ["sh_dc", "sh_rest", "environment"], "then colour, then parameters");
 }
 
 #[test]

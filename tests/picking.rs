@@ -9,8 +9,9 @@ use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::picking::{CaptureHit, CapturePicker};
 use bevy_gs4d::playback::{ClipFade, Playback};
-use bevy_gs4d::render::{CaptureSettings, CropBox, GaussianCapture3d, GaussianCapturePlugin};
+use bevy_gs4d::render::{CaptureSettings, CropBox};
 use bevy_gs4d::scene::{FilterKind, PlaybackHints, RuntimeScene, TemporalFilter, TrainedWith};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
 use std::f32::consts::FRAC_PI_2;
 
 /// A round Gaussian with a standard deviation of a tenth, at `mean` at the start.

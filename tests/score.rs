@@ -6,19 +6,19 @@
 #[path = "common/npy.rs"]
 mod npy;
 
-use bevy_gs4d::codec::{self, checkpoint::CheckpointOptions};
-use bevy_gs4d::compress::masks::{interval_filter, key_frame_filter, key_frame_masks, key_times};
-use bevy_gs4d::compress::prune::{highest, kept_count, select};
-use bevy_gs4d::compress::score::{CpuEngine, ScoreEngine, ScoreError, ScoreSettings, Scores, Traits};
-use bevy_gs4d::compress::variant::Variant;
-use bevy_gs4d::compress::views::{distinct_cameras, even_share, to_draw};
-use bevy_gs4d::dataset::{CameraOptions, Dataset, Split};
-use bevy_gs4d::frame::{Background, BlendSpace};
-use bevy_gs4d::gaussian::projection::{ALPHA_MAX, ALPHA_MIN, TILE_SIZE, TRANSMITTANCE_MIN};
-use bevy_gs4d::gaussian::{Camera, Look, RasterFov, View};
-use bevy_gs4d::reference::{self, Layer, Want, render, score};
+use bevy_gs4d::codec;
+use bevy_gs4d::codec::checkpoint::CheckpointOptions;
+use bevy_gs4d::gaussian::projection::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
+use bevy_gs4d::offline::dataset::selection::{distinct_cameras, even_share, to_draw};
+use bevy_gs4d::offline::dataset::{CameraOptions, Dataset, Split};
+use bevy_gs4d::offline::prune::{highest, kept_count, select};
+use bevy_gs4d::offline::score::variant::Variant;
+use bevy_gs4d::offline::score::{CpuEngine, ScoreEngine, ScoreError, ScoreSettings, Scores, Traits, Want, score};
+use bevy_gs4d::offline::temporal_filter::{interval_filter, key_frame_filter, key_frame_masks, key_times};
+use bevy_gs4d::reference::{self, Layer, render};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene, TemporalFilter};
+use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, RasterFov, TILE_SIZE, View};
 use glam::{UVec2, Vec3};
 use std::path::PathBuf;
 
@@ -75,7 +75,8 @@ fn contributions_are_what_the_background_loses() {
 
 /// Every pixel against every splat of its tile, without any shortcut.
 fn brute_force(scene: &RuntimeScene, view: &View) -> Vec<[f64; 2]> {
-    let splats = reference::project(&Layer { scene, view: *view, look: Look::default() }, BlendSpace::Encoded);
+    let splats =
+        reference::project(&Layer { scene, view: *view, appearance: Appearance::default() }, BlendSpace::Encoded);
     let mut order: Vec<usize> = (0..splats.len()).filter(|&i| splats[i].is_visible()).collect();
     reference::sort(&mut order, |&i| splats[i].depth.to_bits());
     let mut sums = vec![[0.0; 2]; splats.len()];

@@ -1,9 +1,9 @@
 //! Every shader on its own, without a device.
 //!
 //! In: the files of `shaders/`. Out: proof that each is known to the renderer and is valid WGSL that needs no optional capability.
-#![cfg(feature = "gpu")]
+#![cfg(feature = "renderer")]
 
-use bevy_gs4d::gpu::shaders::{MULTISAMPLED, Storage, compose, pass_names};
+use bevy_gs4d::renderer::shaders::{MULTISAMPLED, Storage, compose, pass_names};
 use naga_oil::compose::{Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -22,12 +22,12 @@ use bevy::render::{RenderApp, RenderPlugin, RenderStartup};
 use bevy::time::TimeUpdateStrategy;
 use bevy_gs4d::asset::{CaptureFailed, CaptureState, GaussianCapture};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
-use bevy_gs4d::gpu;
 use bevy_gs4d::playback::Playback;
-use bevy_gs4d::render::{CaptureStatistics, CaptureViewSettings, DepthWrite, GaussianCapture3d, GaussianCapturePlugin};
+use bevy_gs4d::render::{CaptureStatistics, CaptureViewSettings, DepthWrite};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Environment, PlaybackHints, RuntimeScene, TemporalFilter, TrainedWith};
 use bevy_gs4d::testing::{self, Offscreen};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin, renderer};
 use common::{app, picture, spawn_camera};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -155,15 +155,15 @@ fn nothing_is_made_while_time_advances_inside_a_segment() {
     spawn_eyes(&mut app);
     testing::settle(&mut app).expect("the app draws without an error");
     run(&mut app, 10);
-    let before = (gpu::created(), gpu::uploaded());
+    let before = (renderer::created(), renderer::uploaded());
     assert!(before.0 > 0 && before.1 > 0, "something has been made and uploaded: {before:?}");
     run(&mut app, 30);
     let time = app.world().get::<Playback>(entity).expect("still there").time;
     assert!((0.39..0.5).contains(&time), "time has advanced inside the first segment, to {time}");
-    assert_eq!((gpu::created(), gpu::uploaded()), before, "made and uploaded since");
+    assert_eq!((renderer::created(), renderer::uploaded()), before, "made and uploaded since");
     assert_eq!(statistics(&app).views().len(), 2, "both cameras draw");
     run(&mut app, 60);
-    assert_eq!(gpu::uploaded(), before.1, "another segment needs no upload, either");
+    assert_eq!(renderer::uploaded(), before.1, "another segment needs no upload, either");
 }
 
 #[test]
@@ -176,10 +176,14 @@ fn nothing_but_lists_is_made_anew_from_segment_to_segment() {
     // Twice through all four segments, and into the middle of the first.
     let step = Duration::from_millis(50);
     run_in_steps(&mut app, 2 * 40 + 3, step);
-    let (before, lists) = ((gpu::created(), gpu::uploaded()), gpu::activated());
+    let (before, lists) = ((renderer::created(), renderer::uploaded()), renderer::activated());
     run_in_steps(&mut app, 2 * 40, step);
-    assert_eq!((gpu::created(), gpu::uploaded()), before, "made and uploaded on the way through all segments, twice");
-    assert_eq!(gpu::activated() - lists, 2 * 4, "one list for both eyes in each segment");
+    assert_eq!(
+        (renderer::created(), renderer::uploaded()),
+        before,
+        "made and uploaded on the way through all segments, twice"
+    );
+    assert_eq!(renderer::activated() - lists, 2 * 4, "one list for both eyes in each segment");
 }
 
 #[test]
@@ -191,21 +195,21 @@ fn a_view_that_sees_nothing_gives_its_memory_back() {
     let before = picture(&mut app, 0.0);
     assert!(before.pixels().any(|pixel| pixel.0[..3] != [0, 0, 0]), "something shows");
     assert!(view_bytes(&app, camera) > 0, "and takes memory");
-    let created = gpu::created();
+    let created = renderer::created();
     show(&mut app, entity, Visibility::Hidden);
     run(&mut app, 30);
     show(&mut app, entity, Visibility::Inherited);
     run(&mut app, 5);
-    assert_eq!(gpu::created(), created, "what is hidden for a moment keeps what it has");
+    assert_eq!(renderer::created(), created, "what is hidden for a moment keeps what it has");
     show(&mut app, entity, Visibility::Hidden);
     run(&mut app, 130);
     assert_eq!(view_bytes(&app, camera), 0, "what is hidden for longer needs nothing");
-    let created = gpu::created();
+    let created = renderer::created();
     run(&mut app, 130);
-    assert_eq!((view_bytes(&app, camera), gpu::created()), (0, created), "and stays so");
+    assert_eq!((view_bytes(&app, camera), renderer::created()), (0, created), "and stays so");
     show(&mut app, entity, Visibility::Inherited);
     assert!(picture(&mut app, 0.0) == before, "it shows again as it was");
-    assert!(gpu::created() > created, "in buffers made anew, for the old ones have gone");
+    assert!(renderer::created() > created, "in buffers made anew, for the old ones have gone");
 }
 
 #[test]
@@ -216,19 +220,19 @@ fn a_view_shrinks_when_a_large_capture_has_gone() {
     spawn(&mut app, heap(1, Vec3::X), Playback::paused_at(0.7));
     let camera = spawn_camera(&mut app, Msaa::Off, eye());
     testing::settle(&mut app).expect("the app draws without an error");
-    let (before, created) = (view_bytes(&app, camera), gpu::created());
+    let (before, created) = (view_bytes(&app, camera), renderer::created());
     assert!(app.world_mut().despawn(large), "it was there");
     run(&mut app, 60);
     assert_eq!(view_bytes(&app, camera), before, "it might come back soon");
-    assert_eq!(gpu::created(), created, "so nothing is made for what is left");
+    assert_eq!(renderer::created(), created, "so nothing is made for what is left");
     run(&mut app, 140);
     let after = view_bytes(&app, camera);
     assert!(0 < after && 4 * after < before, "then {after} bytes are enough, not {before}");
-    let created = gpu::created();
+    let created = renderer::created();
     let picture = picture(&mut app, 0.0);
     let [r, g, b, _] = picture.get_pixel(SIZE.x / 2, SIZE.y / 2).0;
     assert!(r > 200 && g < 60 && b < 60, "the small one shows all the while: {r}, {g}, {b}");
-    assert_eq!(gpu::created(), created, "and all stands still again");
+    assert_eq!(renderer::created(), created, "and all stands still again");
 }
 
 #[test]
@@ -340,12 +344,12 @@ fn a_new_start_of_the_renderer_makes_everything_again() {
     app.world_mut().entity_mut(camera).insert(depth);
     let before = picture(&mut app, 0.0);
     assert!(before.pixels().any(|pixel| pixel.0[..3] != [0, 0, 0]), "something shows");
-    let (created, uploaded) = (gpu::created(), gpu::uploaded());
+    let (created, uploaded) = (renderer::created(), renderer::uploaded());
     // What Bevy does once it has another device.
     app.sub_app_mut(RenderApp).world_mut().run_schedule(RenderStartup);
     let after = picture(&mut app, 0.0);
-    assert!(gpu::uploaded() > uploaded, "the capture has been uploaded again");
-    assert!(gpu::created() > created, "and working buffers made");
+    assert!(renderer::uploaded() > uploaded, "the capture has been uploaded again");
+    assert!(renderer::created() > created, "and working buffers made");
     assert!(before == after, "to the same picture");
     assert_eq!(statistics(&app).renderer_missing(), None, "nothing is missing");
     assert_eq!(statistics(&app).uploaded_captures(), 1, "nor is anything there twice");
@@ -375,12 +379,12 @@ fn captures_come_back_after_a_lost_device() {
         app.update();
     }
     let lost = app.sub_app(RenderApp).world().resource::<RenderDevice>().wgpu_device().clone();
-    let uploaded = gpu::uploaded();
+    let uploaded = renderer::uploaded();
     lost.destroy();
     // Says so to Bevy.
     lost.poll(PollType::wait_indefinitely()).expect("all work has been done");
     let start = Instant::now();
-    while gpu::uploaded() == uploaded {
+    while renderer::uploaded() == uploaded {
         assert!(start.elapsed() < Duration::from_secs(60), "the capture is uploaded to another device in time");
         app.update();
     }

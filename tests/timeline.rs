@@ -8,7 +8,8 @@ mod stage;
 
 use bevy::asset::{AssetLoadFailedEvent, LoadState};
 use bevy::prelude::*;
-use bevy_gs4d::codec::{self, package::WriteSettings};
+use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::offline;
 use bevy_gs4d::playback::{Clip, ClipFade, Marker, Track};
 use bevy_gs4d::prelude::*;
 use stage::{app, app_with, capture, change, debug, get, pass, said};
@@ -16,7 +17,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// How long files may take to load.
-const PATIENCE: Duration = Duration::from_secs(60);
+const RELEASE_AFTER_IDLE_FRAMES: Duration = Duration::from_secs(60);
 
 /// Two tracks and three markers in six seconds, of captures of two and four seconds.
 fn timeline(app: &mut App) -> (Timeline, [Handle<GaussianCapture>; 2]) {
@@ -94,24 +95,24 @@ fn a_moment_looks_the_same_however_it_is_reached() {
     let mut app = app("assets");
     let (timeline, _) = timeline(&mut app);
     let player = spawn(&mut app, timeline, Playback::default());
-    let look = |app: &mut App| [shown(app, "left"), shown(app, "right")];
+    let appearance = |app: &mut App| [shown(app, "left"), shown(app, "right")];
     let mut played = Vec::new();
     pass(&mut app, 0.0);
     for _ in 0..24 {
-        played.push(look(&mut app));
+        played.push(appearance(&mut app));
         pass(&mut app, 0.25);
     }
-    assert_eq!(look(&mut app), played[0], "a loop shows its beginning again");
+    assert_eq!(appearance(&mut app), played[0], "a loop shows its beginning again");
     change(&mut app, player, Playback::reverse);
     for expected in played.iter().rev() {
         pass(&mut app, 0.25);
-        assert_eq!(&look(&mut app), expected, "backwards");
+        assert_eq!(&appearance(&mut app), expected, "backwards");
     }
     change(&mut app, player, Playback::pause);
     for index in [7, 23, 0, 8, 16, 4, 5] {
         change(&mut app, player, |playback: &mut Playback| playback.seek(index as f32 / 4.0));
         pass(&mut app, 0.25);
-        assert_eq!(look(&mut app), played[index], "scrubbed to frame {index}, while paused");
+        assert_eq!(appearance(&mut app), played[index], "scrubbed to frame {index}, while paused");
     }
 }
 
@@ -246,7 +247,7 @@ fn a_timeline_follows_a_shared_clock() {
 /// A folder with a capture `two.gs4d` of two seconds.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    codec::save(&folder.path().join("two.gs4d"), &stage::scene(2.0, 4), &WriteSettings::default()).expect("saved");
+    offline::save(&folder.path().join("two.gs4d"), &stage::scene(2.0, 4), &WriteSettings::default()).expect("saved");
     folder
 }
 
@@ -258,7 +259,7 @@ fn app_in(folder: &Path) -> App {
 fn wait(app: &mut App, what: &str, so: impl Fn(&App) -> bool) {
     let start = Instant::now();
     while !so(app) {
-        assert!(start.elapsed() < PATIENCE, "{what}: waited in vain");
+        assert!(start.elapsed() < RELEASE_AFTER_IDLE_FRAMES, "{what}: waited in vain");
         std::thread::sleep(Duration::from_millis(2));
         pass(app, 0.0);
     }

@@ -27,15 +27,15 @@ use bevy::render::render_resource::{Extent3d, TextureFormat, TextureUsages};
 use bevy::render::renderer::{RenderAdapter, RenderDevice};
 use bevy::render::settings::WgpuFeatures;
 use bevy_gs4d::asset::GaussianCapture;
-use bevy_gs4d::codec::{self, checkpoint::CheckpointOptions};
-use bevy_gs4d::frame::{Background, DebugView};
-use bevy_gs4d::gaussian::{Camera as PinholeCamera, Lens, Look, RasterFov, decode, encode};
-use bevy_gs4d::picture::Picture;
+use bevy_gs4d::codec::checkpoint::CheckpointOptions;
 use bevy_gs4d::playback::{ClipFade, Playback, Repeat};
-use bevy_gs4d::render::{CaptureSettings, CaptureStatistics, CaptureSystems, CaptureViewSettings, GaussianCapture3d};
+use bevy_gs4d::render::{CaptureSettings, CaptureStatistics, CaptureSystems, CaptureViewSettings};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Environment, RuntimeScene, TemporalFilter};
 use bevy_gs4d::testing::{self, Offscreen};
+use bevy_gs4d::view::srgb::{decode, encode};
+use bevy_gs4d::view::{Appearance, Background, Camera as PinholeCamera, DebugView, Lens, Picture, RasterFov};
+use bevy_gs4d::{GaussianCapture3d, codec};
 use common::{app, picture, spawn_camera};
 use image::RgbaImage;
 use image::imageops::crop_imm;
@@ -204,14 +204,14 @@ fn a_sub_view_is_that_part_of_the_whole() {
         (blob(Vec3::new(0.9, -0.3, 0.4), Vec3::new(0.2, 0.1, 0.3), 0.8), Vec3::new(0.1, 0.6, 0.9)),
     ]);
     let whole = view(&front(), SIZE, 0.0);
-    let expected = part(&twin_of(&scene, whole, Look::default()), offset, size);
+    let expected = part(&twin_of(&scene, whole, Appearance::default()), offset, size);
     assert!(expected.pixel(72, 20).x > 0.3, "the long splat is in view: {}", expected.pixel(72, 20));
 
     // The same pixels behind a lens that is off-centre.
     let lens = Lens::Intrinsics { focal: whole.focal(), center: SIZE.as_vec2() / 2.0 - offset.as_vec2() };
     let pinhole = PinholeCamera { world_to_camera: whole.world_to_camera, size, lens };
     let sub = pinhole.view(0.0, RasterFov::Corrected);
-    let difference = apart(&twin_of(&scene, sub, Look::default()), &expected);
+    let difference = apart(&twin_of(&scene, sub, Appearance::default()), &expected);
     assert!(difference <= 2.0, "the CPU twin's part and its whole are {difference} / 255 apart");
     let capture = headless.upload(&scene).expect("it fits");
     let drawn = headless.render(&capture, &sub, BLACK).expect("it is drawn").picture;
@@ -387,7 +387,7 @@ fn a_resized_target_shows_captures_at_its_new_size() {
         let extent = Extent3d { width: size.x, height: size.y, ..default() };
         app.world_mut().resource_mut::<Assets<Image>>().get_mut(&image).expect("it is the app's").resize(extent);
         app.insert_resource(Offscreen { image: image.clone(), size });
-        let expected = twin_of(&scene, view(&eye(), size, 0.0), Look::default());
+        let expected = twin_of(&scene, view(&eye(), size, 0.0), Appearance::default());
         check(&mut app, &expected, &format!("{} x {}", size.x, size.y));
     }
 }
@@ -410,7 +410,7 @@ fn two_cameras_share_a_target_and_each_half_is_its_own() {
     let picture = picture(&mut app, 0.0);
     for (order, pose, _) in halves {
         let seen = crop_imm(&picture, order * half.x, 0, half.x, half.y).to_image();
-        let expected = twin_of(&scene, view_of(&pose, &place, half, 0.0), Look::default());
+        let expected = twin_of(&scene, view_of(&pose, &place, half, 0.0), Appearance::default());
         let apart = difference(&seen, &expected);
         assert!(apart <= 2.0, "half {order}: Bevy and the CPU twin are {apart} / 255 apart");
     }

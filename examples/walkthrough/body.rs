@@ -33,7 +33,7 @@ pub struct Head;
 pub struct Moves;
 
 /// The mouse turns the body and nods our head; a headset's head nods by itself.
-pub fn look(
+pub fn appearance(
     buttons: Res<ButtonInput<MouseButton>>,
     motion: Res<AccumulatedMouseMotion>,
     mut body: Single<&mut Transform, With<Body>>,

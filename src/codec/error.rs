@@ -2,8 +2,10 @@
 //!
 //! In: a codec's own error. Out: a [`CodecError`], displayed as `PATH: reason`.
 
-use super::{checkpoint::CheckpointError, package::PackageError};
-use std::{io, path::PathBuf};
+use super::checkpoint::CheckpointError;
+use super::package::PackageError;
+use std::io;
+use std::path::PathBuf;
 
 /// Why a file was not read or written.
 #[derive(Debug, thiserror::Error)]

@@ -12,16 +12,12 @@
 //! marginal(t) = exp(−½ (t − μ_t)²/v)        opacity is multiplied by it
 //! ```
 
-mod camera;
 pub mod harmonics;
-mod look;
 mod parameters;
 pub mod projection;
 mod slice;
 
-pub use camera::{Camera, Lens, RasterFov, View};
 pub use harmonics::{Harmonics, ShDirection};
-pub use look::{Lighting, Look, decode, encode};
 pub use parameters::{Model, Parameters};
 pub use slice::{Gaussian, InvalidGaussian, SliceSettings, rotation_4d};
 

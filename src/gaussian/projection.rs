@@ -3,7 +3,8 @@
 //! In: a [`Gaussian`] and a [`View`]. Out: [`Projected`], or nothing where the Gaussian is not drawn. Section 3.3 of the 4DGS
 //! model, step by step in its order; laid beside `shaders/project.wgsl`.
 
-use super::{Gaussian, MARGINAL_CUTOFF, View};
+use super::{Gaussian, MARGINAL_CUTOFF};
+use crate::view::View;
 use glam::{Mat2, Mat3, UVec4, Vec2, Vec3, Vec3Swizzles, Vec4};
 
 /// Side of a tile in pixels.

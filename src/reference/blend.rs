@@ -3,11 +3,9 @@
 //! In: splats, sorted pairs and tile ranges, the background. Out: the [`Frame`].
 
 use super::{Pair, Splat};
-use crate::frame::{Background, BlendSpace, Counts, Frame};
-use crate::gaussian::projection::{ALPHA_MAX, ALPHA_MIN, TILE_SIZE, TRANSMITTANCE_MIN};
-use crate::gaussian::{Look, View};
-use crate::picture::Picture;
+use crate::gaussian::projection::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
 use crate::scene::Environment;
+use crate::view::{Appearance, Background, BlendSpace, Counts, Frame, Picture, TILE_SIZE, View};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -19,7 +17,7 @@ pub fn blend(
     ranges: &[Range<usize>],
     view: &View,
     background: Background,
-    environment: Option<(&Environment, Look)>,
+    environment: Option<(&Environment, Appearance)>,
     space: BlendSpace,
     counts: Counts,
 ) -> Frame {
@@ -45,18 +43,19 @@ pub fn blend(
 }
 
 /// What stands behind all Gaussians at pixel `(x, y)`, in the blend space.
-pub(super) fn behind(
+pub fn behind(
     view: &View,
     background: Background,
-    environment: Option<(&Environment, Look)>,
+    environment: Option<(&Environment, Appearance)>,
     space: BlendSpace,
     x: u32,
     y: u32,
 ) -> Vec3 {
     match (background, environment) {
         (Background::Color(color), _) => Vec3::from(color),
-        (Background::Environment, Some((map, look))) if !view.orthographic => {
-            look.color(map.sample(view.camera_position, view.ray(x, y)), space) * look.opacity.clamp(0.0, 1.0)
+        (Background::Environment, Some((map, appearance))) if !view.orthographic => {
+            appearance.color(map.sample(view.camera_position, view.ray(x, y)), space)
+                * appearance.opacity.clamp(0.0, 1.0)
         }
         _ => Vec3::ZERO,
     }

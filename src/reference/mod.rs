@@ -6,18 +6,15 @@
 mod bin;
 mod blend;
 mod project;
-mod score;
 mod sort;
 
 pub use bin::{Pair, bin, ranges};
-pub use blend::blend;
+pub use blend::{behind, blend};
 pub use project::{Splat, project};
-pub use score::{ViewScore, Want, score};
 pub use sort::sort;
 
-use crate::frame::{Background, BlendSpace, Counts, Frame};
-use crate::gaussian::{Look, View};
 use crate::scene::RuntimeScene;
+use crate::view::{Appearance, Background, BlendSpace, Counts, Frame, View};
 use std::ops::Range;
 
 /// A scene in a view, with the look it has there.
@@ -28,12 +25,12 @@ pub struct Layer<'a> {
     /// Where it is seen from, and when.
     pub view: View,
     /// How it looks.
-    pub look: Look,
+    pub appearance: Appearance,
 }
 
 /// Draws a view of one scene on the CPU, as trained.
 pub fn render(scene: &RuntimeScene, view: &View, background: Background) -> Frame {
-    let layer = Layer { scene, view: *view, look: Look::default() };
+    let layer = Layer { scene, view: *view, appearance: Appearance::default() };
     render_layers(&[layer], background, BlendSpace::Encoded)
 }
 
@@ -44,23 +41,27 @@ pub fn render(scene: &RuntimeScene, view: &View, background: Background) -> Fram
 pub fn render_layers(layers: &[Layer<'_>], background: Background, space: BlendSpace) -> Frame {
     let view = &layers[0].view;
     let splats: Vec<Splat> = layers.iter().flat_map(|layer| project(layer, space)).collect();
-    let Lists { pairs, ranges, visible } = lists(&splats, view);
+    let TileLists { pairs, ranges, visible } = tile_lists(&splats, view);
     let counts = Counts { visible, pairs: pairs.len() as u32 };
     let surrounded = layers.iter().find_map(|layer| Some((layer, layer.scene.environment.as_ref()?)));
     let outside = surrounded.map_or(view, |(layer, _)| &layer.view);
-    let environment = surrounded.map(|(layer, map)| (map, layer.look));
+    let environment = surrounded.map(|(layer, map)| (map, layer.appearance));
     blend(&splats, &pairs, &ranges, outside, background, environment, space, counts)
 }
 
-/// The splats of every tile, front to back.
-struct Lists {
-    pairs: Vec<Pair>,
-    ranges: Vec<Range<usize>>,
-    visible: u32,
+/// The splats of every tile of a view, front to back.
+#[derive(Debug)]
+pub struct TileLists {
+    /// All pairs, ordered by tile, then depth, then index.
+    pub pairs: Vec<Pair>,
+    /// The range of each tile in `pairs`.
+    pub ranges: Vec<Range<usize>>,
+    /// Number of splats that touch a tile.
+    pub visible: u32,
 }
 
-/// Everything between `project` and the last pass.
-fn lists(splats: &[Splat], view: &View) -> Lists {
+/// Everything between `project` and the last pass: `sort` by depth, `bin`, `sort` by tile, `ranges`.
+pub fn tile_lists(splats: &[Splat], view: &View) -> TileLists {
     let mut order: Vec<u32> = (0..splats.len() as u32).filter(|&i| splats[i as usize].is_visible()).collect();
     // Positive numbers sort as their bits do; the near plane of an orthographic camera may be behind it.
     let nearest = if view.orthographic { view.near } else { 0.0 };
@@ -68,5 +69,5 @@ fn lists(splats: &[Splat], view: &View) -> Lists {
     let mut pairs = bin(splats, &order, view.tiles());
     sort(&mut pairs, |pair| pair.tile);
     let ranges = ranges(&pairs, view.tiles());
-    Lists { pairs, ranges, visible: order.len() as u32 }
+    TileLists { pairs, ranges, visible: order.len() as u32 }
 }

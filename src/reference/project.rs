@@ -3,8 +3,8 @@
 //! In: a [`Layer`] and the blend space. Out: one [`Splat`] for each Gaussian, invisible where it is not drawn.
 
 use super::Layer;
-use crate::frame::BlendSpace;
 use crate::gaussian::{ShDirection, projection};
+use crate::view::BlendSpace;
 use glam::{UVec4, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
@@ -58,13 +58,13 @@ pub fn project(layer: &Layer<'_>, space: BlendSpace) -> Vec<Splat> {
 }
 
 fn project_one(layer: &Layer<'_>, index: usize, space: BlendSpace, clip: &[Vec4; 2]) -> Splat {
-    let Layer { scene, view, look } = layer;
+    let Layer { scene, view, appearance } = layer;
     let gaussian = &scene.gaussian(index);
     let Some(projected) = projection::project_with(gaussian, view, clip) else { return Splat::INVISIBLE };
-    if !look.shows(projected.mean) {
+    if !appearance.shows(projected.mean) {
         return Splat::INVISIBLE;
     }
-    let projected = projection::Projected { opacity: projected.opacity * look.opacity, ..projected };
+    let projected = projection::Projected { opacity: projected.opacity * appearance.opacity, ..projected };
     let seen = match scene.trained_with.sh_direction {
         ShDirection::Canonical => Vec3::from(gaussian.mean),
         ShDirection::Displaced => projected.mean,
@@ -74,7 +74,7 @@ fn project_one(layer: &Layer<'_>, index: usize, space: BlendSpace, clip: &[Vec4;
         center: projected.center,
         conic: projected.conic,
         opacity: projected.opacity,
-        color: look.color(scene.color(index, view.direction_to(seen), tau), space),
+        color: appearance.color(scene.color(index, view.direction_to(seen), tau), space),
         depth: projected.depth,
         tiles: projected.contributing_tiles(),
     }

@@ -6,7 +6,7 @@ use crate::gaussian::Gaussian;
 use glam::{DVec3, Vec3};
 
 /// Stretches of time that have a box each.
-const STRETCHES: usize = 32;
+const TIMED_PASSES: usize = 32;
 /// The marginal falls to its cut-off of 0.05 at sqrt(−2 ln 0.05) = 2.4477 σ_t.
 const LIFESPAN: f64 = 2.4478;
 /// Part by which boxes are larger than the numbers say: more than drawing loses by computing in `f32`.
@@ -100,7 +100,7 @@ impl BoundsOverTime {
     /// the interval has no length); nothing for a scene of which nothing is drawn. A Gaussian that cannot be drawn
     /// ([`Gaussian::check`]) does not count.
     pub fn of(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2]) -> Option<Self> {
-        Self::with_stretches(gaussians, interval, STRETCHES)
+        Self::with_stretches(gaussians, interval, TIMED_PASSES)
     }
 
     fn with_stretches(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2], stretches: usize) -> Option<Self> {
@@ -234,7 +234,7 @@ mod tests {
         ) {
             let bounds = over_time(&gaussians, [start, start + span]);
             // The borders between stretches, too.
-            let borders = (0..=STRETCHES).map(|index| index as f32 / STRETCHES as f32);
+            let borders = (0..=TIMED_PASSES).map(|index| index as f32 / TIMED_PASSES as f32);
             for time in moments.into_iter().chain(borders).map(|moment| start + moment * span) {
                 for gaussian in gaussians.iter().filter(|gaussian| gaussian.marginal(time) > MARGINAL_CUTOFF) {
                     let (mean, reach) = (gaussian.mean_at(time), 3.0 * gaussian.covariance[0].sqrt());
@@ -254,7 +254,7 @@ mod tests {
         assert!(bounds.whole().max.x - bounds.whole().min.x > 10.0, "it runs ten units");
         for time in [0.0, 0.3, 0.5, 1.0] {
             let now = bounds.at(time).expect("always there");
-            let [length, most] = [now.max.x - now.min.x, 2.0 * 10.0 / STRETCHES as f32 + 0.07];
+            let [length, most] = [now.max.x - now.min.x, 2.0 * 10.0 / TIMED_PASSES as f32 + 0.07];
             assert!(length < most, "at {time} the box is {length} long, but two stretches are {most}");
         }
         assert_eq!(bounds.at(-9.0), bounds.at(0.0), "before the start is the start");
@@ -265,7 +265,7 @@ mod tests {
     #[test]
     fn at_a_border_both_stretches_count() {
         let bounds = over_time(&[runner()], [0.0, 1.0]).expect("drawn");
-        let step = 1.0 / STRETCHES as f32;
+        let step = 1.0 / TIMED_PASSES as f32;
         let [before, border, after] = [0.5, 1.0, 1.5].map(|place| bounds.at(place * step).expect("always there"));
         assert_eq!(border, before.union(after), "the box about both");
     }

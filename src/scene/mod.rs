@@ -19,6 +19,7 @@ pub use pick::{Pick, PickSettings};
 pub use provenance::{PlaybackHints, RotationConvention, TrainedCameras, TrainedWith, UpAxis};
 
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Model, Parameters, SliceSettings};
+use crate::view::Background;
 use glam::Vec3;
 
 /// A capture in memory.
@@ -210,6 +211,14 @@ impl RuntimeScene {
             return Err("its environment map has another number of texels");
         }
         Ok(())
+    }
+
+    /// The background that the capture was trained with: its environment map if it has one, else its colour.
+    pub fn trained_background(&self) -> Background {
+        match self.environment {
+            Some(_) => Background::Environment,
+            None => Background::Color(self.trained_with.background),
+        }
     }
 
     /// Bytes of Gaussians and colours in memory.

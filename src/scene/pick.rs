@@ -155,10 +155,10 @@ impl Ray {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::{Background, BlendSpace};
-    use crate::gaussian::{Camera, Harmonics, Look, RasterFov};
+    use crate::gaussian::Harmonics;
     use crate::reference::{self, Layer, Splat};
     use crate::scene::{FilterKind, PlaybackHints, TemporalFilter, TrainedWith};
+    use crate::view::{Appearance, Background, BlendSpace, Camera, RasterFov};
     use glam::{Mat4, Quat, UVec2};
     use proptest::array::uniform3;
     use proptest::prelude::*;
@@ -411,7 +411,7 @@ mod tests {
         let size = UVec2::new(48, 32);
         let camera = Camera { world_to_camera: Mat4::IDENTITY, size, lens: Camera::fov_lens(0.5, size) };
         let view = camera.view(0.5, RasterFov::Corrected);
-        let layer = Layer { scene: &scene, view, look: Look::default() };
+        let layer = Layer { scene: &scene, view, appearance: Appearance::default() };
         let splats = reference::project(&layer, BlendSpace::Encoded);
         let medians = reference::render(&scene, &view, Background::None).median_depth;
         let pixels = (0..size.y).flat_map(|y| (0..size.x).map(move |x| (x, y)));

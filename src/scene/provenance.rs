@@ -3,7 +3,8 @@
 //! In: options of a command, `cfg_args`, or a package's header. Out: [`TrainedWith`] and [`PlaybackHints`], stored in every
 //! package so that drawing needs no options.
 
-use crate::gaussian::{RasterFov, ShDirection};
+use crate::gaussian::ShDirection;
+use crate::view::RasterFov;
 use serde::{Deserialize, Serialize};
 
 /// The switches a capture was trained with. Drawing must repeat them to match.

@@ -5,7 +5,7 @@
 use crate::skip::skip;
 use bevy::core_pipeline::tonemapping::{DebandDither, Tonemapping};
 use bevy::prelude::*;
-use bevy_gs4d::render::GaussianCapturePlugin;
+use bevy_gs4d::GaussianCapturePlugin;
 use bevy_gs4d::testing::{self, Offscreen, TestingError};
 use image::RgbaImage;
 use std::time::Duration;
@@ -28,8 +28,8 @@ pub fn app(size: UVec2) -> Option<App> {
 pub fn spawn_camera(app: &mut App, msaa: Msaa, transform: Transform) -> Entity {
     let target = app.world().resource::<Offscreen>().target();
     let lens = Projection::Perspective(PerspectiveProjection { fov: FOV_Y, ..default() });
-    let look = (Tonemapping::None, DebandDither::Disabled);
-    app.world_mut().spawn((Camera3d::default(), target, msaa, lens, look, transform)).id()
+    let appearance = (Tonemapping::None, DebandDither::Disabled);
+    app.world_mut().spawn((Camera3d::default(), target, msaa, lens, appearance, transform)).id()
 }
 
 /// The picture after `seconds` more.

@@ -3,7 +3,7 @@
 //! In: nothing. Out: a renderer on the usual adapter whose storage buffers end at [`BINDING`] bytes.
 
 use crate::skip::skip;
-use bevy_gs4d::gpu::{GpuContext, Headless, ShaderChecks};
+use bevy_gs4d::renderer::{GpuContext, Headless, ShaderChecks};
 use pollster::block_on;
 
 /// Most bytes that can be bound.

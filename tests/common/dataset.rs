@@ -3,10 +3,9 @@
 //! In: a scene and a folder. Out: `transforms_train.json` and `transforms_test.json` in that folder and the images they name, drawn by the
 //! CPU twin and rounded to 8 bits.
 
-use bevy_gs4d::frame::Background;
-use bevy_gs4d::gaussian::Camera;
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::RuntimeScene;
+use bevy_gs4d::view::Camera;
 use glam::{UVec2, Vec3, Vec4};
 use serde_json::{Value, json};
 use std::f32::consts::TAU;
@@ -41,7 +40,7 @@ pub fn write(
                 fs::create_dir_all(path.parent().expect("inside a folder")).expect("the folder can be written to");
                 if images {
                     let view = camera_at.view(time, scene.trained_with.raster_fov);
-                    let picture = reference::render(scene, &view, Background::trained(scene)).picture;
+                    let picture = reference::render(scene, &view, scene.trained_background()).picture;
                     picture.to_rgb8().save(&path).expect("the folder can be written to");
                 }
             }

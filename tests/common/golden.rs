@@ -2,9 +2,9 @@
 //!
 //! In: `tests/golden/<scene>/`. Out: [`GoldenView`]s, each a runtime scene, a view and the expected frame.
 
-use bevy_gs4d::frame::{Background, Frame};
-use bevy_gs4d::gaussian::{Camera, Harmonics, Lens, Parameters, RasterFov, ShDirection, SliceSettings, View};
+use bevy_gs4d::gaussian::{Harmonics, Parameters, ShDirection, SliceSettings};
 use bevy_gs4d::scene::{Environment, Form, GaussianScene, PlaybackHints, RuntimeScene, TrainedWith};
+use bevy_gs4d::view::{Background, Camera, Frame, Lens, RasterFov, View};
 use glam::{Mat4, UVec2, Vec2};
 use serde::Deserialize;
 use serde_json::Value;
@@ -107,7 +107,7 @@ fn load_view(folder: &Path, scene_name: &str, json: &Value, view: &Value) -> Gol
     let file = |key: &str| folder.join(view[key].as_str().expect("file"));
     GoldenView {
         name: format!("{scene_name}/{}", view["name"].as_str().expect("name")),
-        background: Background::trained(&scene),
+        background: scene.trained_background(),
         scene,
         view: make_view(&camera),
         color: floats(&file("color_file")),

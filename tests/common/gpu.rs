@@ -1,7 +1,7 @@
 //! A GPU for tests, or the word that there is none.
 
 use crate::skip::skip;
-use bevy_gs4d::gpu::{GpuContext, Headless, ShaderChecks};
+use bevy_gs4d::renderer::{GpuContext, Headless, ShaderChecks};
 
 /// A renderer with shader checks on; nothing, said aloud, where there is no adapter.
 pub fn headless() -> Option<Headless> {

@@ -2,7 +2,7 @@
 //!
 //! In: an archive and the name of an array of views × 3 × height × width (float32 or float16). Out: one picture per view.
 
-use bevy_gs4d::picture::Picture;
+use bevy_gs4d::view::Picture;
 use glam::{UVec2, Vec3};
 use std::fs::File;
 use std::io::Read;

@@ -3,7 +3,7 @@
 //! In: the name of a pass, and buffers under the names that its shader gives them. Out: what a dispatch leaves in those buffers.
 
 use crate::skip::skip;
-use bevy_gs4d::gpu::{GpuContext, shaders};
+use bevy_gs4d::renderer::{GpuContext, shaders};
 use bytemuck::Pod;
 use std::borrow::Cow;
 use std::collections::BTreeMap;

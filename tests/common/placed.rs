@@ -7,13 +7,12 @@ use crate::common::picture;
 use crate::twin::{SIZE, add, blob, difference, scene};
 use bevy::camera::ScalingMode;
 use bevy::prelude::*;
-use bevy_gs4d::frame::{Background, BlendSpace};
-use bevy_gs4d::gaussian::{Gaussian, Look, View};
-use bevy_gs4d::picture::Picture;
+use bevy_gs4d::GaussianCapture3d;
+use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::reference::{self, Layer};
-use bevy_gs4d::render::GaussianCapture3d;
 use bevy_gs4d::scene::RuntimeScene;
+use bevy_gs4d::view::{Appearance, Background, BlendSpace, Picture, View};
 
 /// Nothing behind captures.
 pub const BLACK: Background = Background::Color([0.0; 3]);
@@ -55,8 +54,8 @@ pub fn check(app: &mut App, expected: &Picture, what: &str) {
 }
 
 /// The CPU twin's picture of one capture over black.
-pub fn twin_of(scene: &RuntimeScene, view: View, look: Look) -> Picture {
-    reference::render_layers(&[Layer { scene, view, look }], BLACK, BlendSpace::Encoded).picture
+pub fn twin_of(scene: &RuntimeScene, view: View, appearance: Appearance) -> Picture {
+    reference::render_layers(&[Layer { scene, view, appearance }], BLACK, BlendSpace::Encoded).picture
 }
 
 /// Straight ahead at the origin from four units away.

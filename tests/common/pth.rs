@@ -4,7 +4,8 @@
 //! joined in any order.
 
 use std::io::{Cursor, Write};
-use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
 
 /// `None`.
 pub const NONE: &[u8] = b"N";

@@ -6,9 +6,9 @@
 use crate::common::FOV_Y;
 use bevy::prelude::*;
 use bevy_gs4d::asset::GaussianCapture;
-use bevy_gs4d::gaussian::{Camera as PinholeCamera, Gaussian, Harmonics, Lens, RasterFov, View};
-use bevy_gs4d::picture::Picture;
+use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::scene::{PlaybackHints, RuntimeScene, TrainedWith};
+use bevy_gs4d::view::{Camera as PinholeCamera, Lens, Picture, RasterFov, View};
 use image::RgbaImage;
 
 /// Rows of this width are padded when they are read back.

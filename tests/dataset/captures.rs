@@ -2,10 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use bevy_gs4d::{
-    dataset::{CameraFile, CameraOptions, Dataset, ImageMode, Split},
-    gaussian::Lens,
-};
+use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, Dataset, ImageMode, Split};
+use bevy_gs4d::view::Lens;
 use glam::{UVec2, Vec3};
 
 use super::resolution_option;

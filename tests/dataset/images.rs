@@ -2,10 +2,10 @@
 
 use std::fs;
 
-use bevy_gs4d::{
-    dataset::{CameraFile, CameraOptions, Dataset, DatasetError, ImageMode, MAX_SIDE, Split, TrainingView},
-    gaussian::Camera,
+use bevy_gs4d::offline::dataset::{
+    CameraFile, CameraOptions, Dataset, DatasetError, ImageMode, MAX_SIDE, Split, TrainingView,
 };
+use bevy_gs4d::view::Camera;
 use glam::{UVec2, Vec3};
 use image::{GrayImage, RgbaImage};
 use serde_json::json;

@@ -11,15 +11,11 @@ mod images;
 mod skip;
 mod wrong;
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::fs;
+use std::path::{Path, PathBuf};
 
-use bevy_gs4d::{
-    dataset::{CameraFile, CameraOptions, Dataset, DatasetError, Split, TrainingView},
-    gaussian::Lens,
-};
+use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, Dataset, DatasetError, Split, TrainingView};
+use bevy_gs4d::view::Lens;
 use glam::{Mat4, UVec2, Vec3, Vec4};
 use image::RgbImage;
 use serde_json::{Value, json};

@@ -1,8 +1,9 @@
 //! Camera files and options that are wrong: a clear error, never a panic.
 
-use std::{ffi::OsStr, path::Path};
+use std::ffi::OsStr;
+use std::path::Path;
 
-use bevy_gs4d::dataset::{CameraFile, CameraOptions, Dataset, DatasetError, MAX_SIDE, Split, TrainingView};
+use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, Dataset, DatasetError, MAX_SIDE, Split, TrainingView};
 use glam::UVec2;
 use proptest::prelude::*;
 use serde_json::{Value, json};

@@ -5,8 +5,9 @@
 
 use super::cfg_args::CfgArgs;
 use super::error::CheckpointError;
-use crate::gaussian::{RasterFov, ShDirection};
+use crate::gaussian::ShDirection;
 use crate::scene::{GaussianScene, PlaybackHints, RotationConvention, TrainedCameras, TrainedWith, UpAxis};
+use crate::view::RasterFov;
 use serde::{Deserialize, Serialize};
 
 /// How a checkpoint was trained and is meant to be played, as far as one wants to say so. `None`: look into `cfg_args` beside the

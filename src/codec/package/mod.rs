@@ -5,7 +5,7 @@
 //! A package is a fixed start ([`MAGIC`], [`VERSION`], length and checksum of the header), a [`Header`] in RON, and the sections
 //! that the header lists. A section holds one attribute of a run of Gaussians: the four bytes of its floats apart from
 //! each other (`planes`), compressed on their own and checksummed. What a scene needs first comes first: geometry, plain colour, the
-//! rest of the colour, surroundings. Whatever a reader does not know is skipped, unless the header lists it as required.
+//! rest of the colour, parameters. Whatever a reader does not know is skipped, unless the header lists it as required.
 
 mod envelope;
 mod error;

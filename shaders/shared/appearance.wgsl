@@ -1,0 +1,33 @@
+// How a placed capture looks: light and debug colours; twin of src/gaussian/look.rs.
+#define_import_path gs4d::appearance
+
+#import gs4d::types::{LIGHTING_AS_TRAINED, LIGHTING_ENCODED}
+
+// The sRGB transfer functions for values not below 0; the power curve goes on above 1.
+fn encode(linear: vec3<f32>) -> vec3<f32> {
+    let curve = 1.055 * pow(linear, vec3(1.0 / 2.4)) - 0.055;
+    return select(curve, 12.92 * linear, linear <= vec3(0.0031308));
+}
+
+fn decode(encoded: vec3<f32>) -> vec3<f32> {
+    let curve = pow((encoded + 0.055) / 1.055, vec3(2.4));
+    return select(curve, encoded / 12.92, encoded <= vec3(0.04045));
+}
+
+// A trained colour in the blend space, in the light that the capture is given.
+fn lit(color: vec3<f32>, lighting: u32, light: vec3<f32>) -> vec3<f32> {
+    if lighting == LIGHTING_AS_TRAINED {
+        return color;
+    }
+    let linear = decode(max(color, vec3(0.0))) * light;
+    if lighting == LIGHTING_ENCODED {
+        return encode(linear);
+    }
+    return linear;
+}
+
+// From 0 to 1: black, blue, green, yellow, red.
+fn heat(value: f32) -> vec3<f32> {
+    let x = clamp(value, 0.0, 1.0) * 4.0;
+    return clamp(vec3(x - 2.0, min(x - 1.0, 4.0 - x), min(x, 2.0 - x)), vec3(0.0), vec3(1.0));
+}

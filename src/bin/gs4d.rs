@@ -1,0 +1,7 @@
+//! The `gs4d` command. All of it is in [`bevy_gs4d::cli`].
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    bevy_gs4d::cli::run()
+}

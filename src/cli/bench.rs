@@ -1,0 +1,116 @@
+//! `gs4d bench SCENE`: how fast a scene is drawn.
+//!
+//! In: a scene and views of it. Out: medians of GPU milliseconds per pass and per frame, and of wall-clock time.
+
+use super::failure::Failure;
+use super::gpu::{self, GpuArgs};
+use super::opening::{self, CheckpointArgs};
+use super::report::{Report, Table, note};
+use super::values;
+use super::views::{Shot, ViewArgs};
+use crate::renderer::Timings;
+use crate::view::View;
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Measure how fast a scene is drawn.
+///
+/// Medians over frames that take the views in turn. GPU times are timestamps around each frame and, in other frames, between its
+/// passes; wall-clock time is that of one frame at a time, and that per frame with many in flight.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  gs4d bench capture.gs4d
+  gs4d bench chkpnt30000.pth --cameras data/transforms_test.json --resolution 2 --times 5
+  gs4d bench capture.gs4d --orbit 24 --size 1352x1014 --frames 1000 --json")]
+pub struct Bench {
+    /// The package or checkpoint to draw.
+    #[arg(value_name = "SCENE")]
+    scene: PathBuf,
+    /// Frames of each kind to measure.
+    #[arg(long, value_name = "N", default_value = "240", value_parser = values::count(1_000_000))]
+    frames: usize,
+    /// Views to take from a camera file, evenly; also the number of views of the orbit unless --orbit says it.
+    #[arg(long = "views", value_name = "N", default_value = "12", value_parser = values::count(100_000))]
+    count: usize,
+    /// See every view at K times, evenly over the interval [default: each at its own time].
+    #[arg(long, value_name = "K", conflicts_with = "time", value_parser = values::count(10_000))]
+    times: Option<usize>,
+    #[command(flatten)]
+    views: ViewArgs,
+    #[command(flatten)]
+    gpu: GpuArgs,
+    #[command(flatten)]
+    checkpoint: CheckpointArgs,
+}
+
+impl Bench {
+    /// Measures.
+    pub fn run(&self) -> Result<Report, Failure> {
+        let scene = self.checkpoint.load(&self.scene)?;
+        let scene = scene.into_runtime().map_err(|error| Failure::at(&self.scene, &error))?;
+        let shots = self.at_times(self.views.shots(&scene, self.count)?, scene.trained_with.time_interval);
+        let views: Vec<View> = shots.iter().map(|shot| shot.view(&scene)).collect();
+        let size = views.first().map_or([0, 0], |view| view.size.to_array());
+        let mut headless = self.gpu.open()?;
+        let capture = headless.upload(&scene)?;
+        note(&format!("measuring {} frames over {} views", self.frames, views.len()));
+        let timings = headless.time(&capture, &views, self.frames)?;
+        let text = format!(
+            "{}: {} Gaussians, {} views of {}x{}\n{}\n{}",
+            self.scene.display(),
+            scene.len(),
+            views.len(),
+            size[0],
+            size[1],
+            gpu::adapter_name(&headless),
+            table(&timings),
+        );
+        let json = json!({
+            "scene": self.scene.display().to_string(),
+            "adapter": gpu::adapter_json(&headless),
+            "gaussians": scene.len(),
+            "views": views.len(),
+            "size": size,
+            "timings": timings,
+            "fps": { "gpu": timings.frame_milliseconds.map(fps), "pipelined": fps(timings.pipelined_milliseconds) },
+            "switches": opening::switches_json(&scene.trained_with, &scene.playback),
+        });
+        Ok(Report::new(json, text))
+    }
+
+    /// An even share of the shots, each at the times asked for.
+    fn at_times(&self, shots: Vec<Shot>, [first, last]: [f32; 2]) -> Vec<Shot> {
+        let all = shots.len();
+        let count = self.views.limit(self.count).min(all);
+        let chosen = shots.into_iter().enumerate().filter(|(i, _)| i * count / all != (i + 1) * count / all);
+        let chosen = chosen.map(|(_, shot)| shot);
+        let Some(times) = self.times else { return chosen.collect() };
+        let time = |k: usize| first + (last - first) * (k as f32 + 0.5) / times as f32;
+        let seen =
+            |shot: Shot| (0..times).map(move |k| Shot { name: shot.name.clone(), camera: shot.camera, time: time(k) });
+        chosen.flat_map(seen).collect()
+    }
+}
+
+fn fps(milliseconds: f64) -> f64 {
+    1e3 / milliseconds
+}
+
+fn table(timings: &Timings) -> String {
+    let mut table = Table::new(&["", "ms", "FPS"]);
+    let mut row = |name: &str, milliseconds: f64, rate: bool| {
+        let rate = if rate { format!("{:.0}", fps(milliseconds)) } else { String::new() };
+        table.row([name.to_owned(), format!("{milliseconds:.4}"), rate]);
+    };
+    for pass in &timings.passes {
+        row(pass.name, pass.milliseconds, false);
+    }
+    if let Some(milliseconds) = timings.frame_milliseconds {
+        row("frame on the GPU", milliseconds, true);
+    }
+    row("frame, many in flight", timings.pipelined_milliseconds, true);
+    row("frame, one at a time", timings.wall_milliseconds, true);
+    let counts = timings.counts;
+    format!("{table}{} splats visible, {} pairs of splat and tile (medians)\n", counts.visible, counts.pairs)
+}

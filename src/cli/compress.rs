@@ -1,0 +1,239 @@
+//! `gs4d compress IN OUT`: quantised geometry and colours by codebook, as small as the quality asked for allows.
+//!
+//! In: a scene, a quality or every knob. Out: a package in the packed form, bytes by section, and how close its pictures are to those
+//! of the scene it was made from.
+
+use super::convert::is_same_file;
+use super::engine::{Engine, EngineArgs};
+use super::failure::Failure;
+use super::opening::{self, CheckpointArgs, PackageArgs};
+use super::report::{Report, Table, bytes, progress};
+use super::values;
+use super::views::ViewArgs;
+use crate::codec::package;
+use crate::offline::metrics::psnr_pooled;
+use crate::offline::quality::Draw;
+use crate::offline::quantize::{CompressSettings, Quality, compress_with};
+use crate::scene::RuntimeScene;
+use crate::scene::packed::encode::Bits;
+use crate::view::{Picture, View};
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::PathBuf;
+
+/// Compress a capture: quantise its geometry, code its colour, keep its temporal filter.
+///
+/// OUT draws through the same passes; the GPU reads it as it is. Prune and mask first: a packed capture can no longer be scored.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  gs4d compress masked.gs4d capture.gs4d
+  gs4d compress chkpnt30000.pth small.gs4d --quality small --cameras transforms_test.json
+  gs4d compress chkpnt30000.pth exact.gs4d --quality visually-lossless
+  gs4d compress chkpnt30000.pth own.gs4d --codebooks 4096,4096 --scale-bits 10 --escape 0.05")]
+pub struct Compress {
+    /// The checkpoint or package to read.
+    #[arg(value_name = "IN")]
+    input: PathBuf,
+    #[command(flatten)]
+    package: PackageArgs,
+    /// How much may be lost: small, balanced, visually-lossless or lossless.
+    #[arg(long, value_name = "QUALITY", default_value = "balanced", value_parser = values::one_of(&Quality::NAMES))]
+    quality: Quality,
+    #[command(flatten)]
+    knobs: Knobs,
+    /// How much the colour of each Gaussian counts: scores by `gs4d score`, little-endian float32 in the order of IN
+    /// [default: by opacity].
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
+    /// Views to compare with the original: of --cameras, or of an orbit; 0 for none.
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    verify: usize,
+    #[command(flatten)]
+    views: ViewArgs,
+    #[command(flatten)]
+    engine: EngineArgs,
+    #[command(flatten)]
+    checkpoint: CheckpointArgs,
+}
+
+/// Every knob; what is not said comes from the quality.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Knobs (default: by --quality)")]
+struct Knobs {
+    /// Entries of each codebook of colour, up to four: each codes what the ones before left over.
+    #[arg(long, value_name = "N,..", value_delimiter = ',')]
+    codebooks: Option<Vec<usize>>,
+    /// Bits of the mean, per axis, within a block of 256 Gaussians (1 to 16).
+    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(1..=16))]
+    mean_bits: Option<u32>,
+    /// Bits of the temporal mean (1 to 16).
+    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(1..=16))]
+    mean_t_bits: Option<u32>,
+    /// Bits of the velocity, per axis (2 to 16).
+    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(2..=16))]
+    velocity_bits: Option<u32>,
+    /// Bits of the temporal deviation (1 to 15).
+    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(1..=15))]
+    sigma_t_bits: Option<u32>,
+    /// Bits of the scale, per axis (1 to 16).
+    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(1..=16))]
+    scale_bits: Option<u32>,
+    /// Bits of each of the rotation's three components (1 to 16).
+    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(1..=16))]
+    rotation_bits: Option<u32>,
+    /// Bits of the opacity (1 to 16).
+    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(1..=16))]
+    opacity_bits: Option<u32>,
+    /// Bits of the base colour, per channel, where colours are coded (1 to 10).
+    #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(1..=10))]
+    base_bits: Option<u32>,
+    /// Without codebooks: round every coefficient to a multiple of this; 0 keeps them as they are.
+    #[arg(long, value_name = "STEP", value_parser = values::not_negative)]
+    color_step: Option<f64>,
+    /// Share of the Gaussians, those with the largest splats, that keep 16 bits for mean, scale and rotation.
+    #[arg(long, value_name = "SHARE", value_parser = values::share)]
+    escape: Option<f64>,
+}
+
+impl Knobs {
+    fn settings(&self, quality: Quality) -> CompressSettings {
+        let settings = CompressSettings::from(quality);
+        let geometry = settings.geometry.map(|bits| Bits {
+            mean: self.mean_bits.unwrap_or(bits.mean),
+            mean_t: self.mean_t_bits.unwrap_or(bits.mean_t),
+            velocity: self.velocity_bits.unwrap_or(bits.velocity),
+            sigma_t: self.sigma_t_bits.unwrap_or(bits.sigma_t),
+            scale: self.scale_bits.unwrap_or(bits.scale),
+            rotation: self.rotation_bits.unwrap_or(bits.rotation),
+            opacity: self.opacity_bits.unwrap_or(bits.opacity),
+            base: self.base_bits.unwrap_or(bits.base),
+            escape: self.escape.map_or(bits.escape, |share| share as f32),
+        });
+        CompressSettings {
+            geometry,
+            codebooks: self.codebooks.clone().unwrap_or(settings.codebooks),
+            color_step: self.color_step.map_or(settings.color_step, |step| step as f32),
+            weights: None,
+        }
+    }
+}
+
+impl Compress {
+    /// Compresses.
+    ///
+    /// # Errors
+    /// The scene cannot be read, is packed already, or the package cannot be written.
+    pub fn run(&self) -> Result<Report, Failure> {
+        let out = self.package.out()?;
+        if is_same_file(&self.input, out) {
+            return Err(Failure::about(out, "is the input itself: write to another file"));
+        }
+        let before = opening::file_size(&self.input)?;
+        let scene = self.checkpoint.load(&self.input)?;
+        let scene = scene.into_runtime().map_err(|error| Failure::at(&self.input, &error))?;
+        let (views, expected) = self.pictures(&scene)?;
+        let weights = self.weights(scene.len())?;
+        let settings = CompressSettings { weights, ..self.knobs.settings(self.quality) };
+        let bar = progress(settings.codebooks.len(), "codebooks");
+        let compressed = compress_with(scene, &settings, || bar.inc(1));
+        bar.finish_and_clear();
+        let (scene, report) = compressed.map_err(|error| Failure::at(&self.input, &error))?;
+        let after = self.package.save(&scene)?;
+        let file = File::open(out).map_err(|error| Failure::at(out, &error))?;
+        let info = package::inspect(file).map_err(|error| Failure::at(out, &error))?;
+        let mut sections = BTreeMap::<&str, u64>::new();
+        for section in &info.header.sections {
+            *sections.entry(&section.name).or_default() += section.length as u64;
+        }
+        let scene = scene.into_runtime().map_err(|error| Failure::at(out, &error))?;
+        let likeness = self.likeness(&scene, &views, &expected)?;
+
+        let mut table = Table::new(&["section", "bytes", "per Gaussian"]);
+        let each = |size: u64| size as f64 / report.gaussians.max(1) as f64;
+        for (name, size) in &sections {
+            table.row([(*name).to_owned(), size.to_string(), format!("{:.2}", each(*size))]);
+        }
+        table.row(["whole package".to_owned(), after.to_string(), format!("{:.2}", each(after))]);
+        let mut text = format!(
+            "{} ({}) -> {} ({}): {} Gaussians\n{table}in memory {} -> {}\n",
+            self.input.display(),
+            bytes(before),
+            out.display(),
+            bytes(after),
+            report.gaussians,
+            bytes(report.memory_before as u64),
+            bytes(report.memory_after as u64),
+        );
+        if let Some(lowest) = likeness.iter().copied().reduce(f64::min) {
+            let mean = likeness.iter().sum::<f64>() / likeness.len() as f64;
+            text += &format!(
+                "PSNR to the original over {} views: mean {mean:.2} dB, lowest {lowest:.2} dB\n",
+                likeness.len()
+            );
+        }
+        let finite = |value: &f64| if value.is_finite() { json!(value) } else { Value::Null };
+        let json = json!({
+            "in": self.input.display().to_string(),
+            "out": out.display().to_string(),
+            "bytes_in": before,
+            "bytes_out": after,
+            "gaussians": report.gaussians,
+            "bytes_per_gaussian": each(after),
+            "sections": sections,
+            "settings": settings,
+            "report": report,
+            "psnr_to_original": likeness.iter().map(finite).collect::<Vec<_>>(),
+        });
+        Ok(Report::new(json, text))
+    }
+
+    /// The scores to weigh colours by.
+    fn weights(&self, count: usize) -> Result<Option<Vec<f32>>, Failure> {
+        let Some(path) = &self.weights else { return Ok(None) };
+        let data = std::fs::read(path).map_err(|error| Failure::at(path, &error))?;
+        let weights: Vec<f32> = data.as_chunks().0.iter().map(|&four| f32::from_le_bytes(four)).collect();
+        if data.len() != count * 4 {
+            let reason = format!("holds {} scores for a scene of {count} Gaussians", weights.len());
+            return Err(Failure::about(path, &reason));
+        }
+        if !weights.iter().all(|weight| weight.is_finite() && *weight >= 0.0) {
+            return Err(Failure::about(path, "holds a score that is negative or not finite"));
+        }
+        Ok(Some(weights))
+    }
+
+    /// The views to compare, and the original's pictures of them.
+    fn pictures(&self, scene: &RuntimeScene) -> Result<(Vec<View>, Vec<Picture>), Failure> {
+        if self.verify == 0 || scene.is_empty() {
+            return Ok((Vec::new(), Vec::new()));
+        }
+        let shots = self.views.shots(scene, self.verify)?;
+        let step = shots.len().div_ceil(self.verify).max(1);
+        let views: Vec<_> = shots.iter().step_by(step).map(|shot| shot.view(scene)).collect();
+        let pictures = draw(&mut self.engine.open()?, scene, &views)?;
+        Ok((views, pictures))
+    }
+
+    fn likeness(&self, scene: &RuntimeScene, views: &[View], expected: &[Picture]) -> Result<Vec<f64>, Failure> {
+        if views.is_empty() {
+            return Ok(Vec::new());
+        }
+        let found = draw(&mut self.engine.open()?, scene, views)?;
+        let psnr = |(a, b): (&Picture, &Picture)| psnr_pooled(&a.clamped(), &b.clamped()).map_err(Failure::from);
+        found.iter().zip(expected).map(psnr).collect()
+    }
+}
+
+fn draw(engine: &mut Engine, scene: &RuntimeScene, views: &[View]) -> Result<Vec<Picture>, Failure> {
+    let mut pictures = Vec::new();
+    let bar = progress(views.len(), "comparing");
+    let drawn = engine.draw(scene, views, scene.trained_background(), &mut |_, picture| {
+        bar.inc(1);
+        pictures.push(picture);
+    });
+    bar.finish_and_clear();
+    drawn.map_err(|error| Failure::new(error.to_string()))?;
+    Ok(pictures)
+}

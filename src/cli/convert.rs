@@ -1,0 +1,117 @@
+//! `gs4d convert IN OUT`: a checkpoint or package becomes a package.
+//!
+//! In: a scene, the form wanted, colour degrees. Out: a package, the switches that were chosen, sizes before and after.
+
+use super::failure::Failure;
+use super::opening::{self, CheckpointArgs, PackageArgs};
+use super::report::{Report, bytes, lines};
+use super::values;
+use crate::scene::{Form, GaussianScene};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Convert a checkpoint (.pth) or a package to a package (.gs4d).
+///
+/// Nothing is lost unless --form runtime or a colour degree asks for it. OUT is written beside its place and then renamed: an
+/// existing OUT is replaced by the whole new file or stays as it was. OUT must not be IN.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  gs4d convert chkpnt30000.pth capture.gs4d
+  gs4d convert chkpnt30000.pth small.gs4d --form runtime --sh-degree 0
+  gs4d convert n3v/chkpnt30000.pth -o n3v.gs4d --time-interval 0,10 --trained-cameras intrinsics --duration 10")]
+pub struct Convert {
+    /// The checkpoint or package to read.
+    #[arg(value_name = "IN")]
+    input: PathBuf,
+    #[command(flatten)]
+    package: PackageArgs,
+    /// Form of the Gaussians: trained (can be pruned and fine-tuned) or runtime (smaller, draws the same) [default: as in IN].
+    #[arg(long, value_name = "FORM", value_parser = values::one_of(&FORMS))]
+    form: Option<FormName>,
+    /// Keep colour up to this spatial degree, 0 to 3 [default: all].
+    #[arg(long, value_name = "D", value_parser = clap::value_parser!(u32).range(0..=3))]
+    sh_degree: Option<u32>,
+    /// Keep colour up to this time degree, 0 to 2 [default: all].
+    #[arg(long, value_name = "D", value_parser = clap::value_parser!(u32).range(0..=2))]
+    sh_degree_t: Option<u32>,
+    #[command(flatten)]
+    checkpoint: CheckpointArgs,
+}
+
+#[derive(Clone, Copy)]
+enum FormName {
+    Trained,
+    Runtime,
+}
+
+const FORMS: [(&str, FormName); 2] = [("trained", FormName::Trained), ("runtime", FormName::Runtime)];
+
+impl Convert {
+    /// Converts.
+    pub fn run(&self) -> Result<Report, Failure> {
+        let out = self.package.out()?;
+        if is_same_file(&self.input, out) {
+            return Err(Failure::about(out, "is the input itself: write to another file"));
+        }
+        let before = opening::file_size(&self.input)?;
+        let scene = self.prepared(self.checkpoint.load(&self.input)?)?;
+        let after = self.package.save(&scene)?;
+        let per_gaussian = after as f64 / scene.len().max(1) as f64;
+        let mut text = lines(&opening::switches(&scene.trained_with, &scene.playback));
+        text += &format!(
+            "\n{} ({}) -> {} ({}): {} Gaussians in the {} form, {per_gaussian:.1} bytes each\n",
+            self.input.display(),
+            bytes(before),
+            out.display(),
+            bytes(after),
+            scene.len(),
+            form_name(&scene.form),
+        );
+        let json = json!({
+            "in": self.input.display().to_string(),
+            "out": out.display().to_string(),
+            "bytes_in": before,
+            "bytes_out": after,
+            "gaussians": scene.len(),
+            "bytes_per_gaussian": per_gaussian,
+            "form": form_name(&scene.form),
+            "switches": opening::switches_json(&scene.trained_with, &scene.playback),
+        });
+        Ok(Report::new(json, text))
+    }
+
+    /// The scene in the form and with the colour degrees asked for.
+    fn prepared(&self, mut scene: GaussianScene) -> Result<GaussianScene, Failure> {
+        if matches!(self.form, Some(FormName::Runtime)) {
+            scene = scene.unpacked();
+        }
+        let kept = &mut scene.harmonics;
+        kept.truncate(self.sh_degree.unwrap_or(kept.degree), self.sh_degree_t.unwrap_or(kept.degree_t));
+        match (self.form, &scene.form) {
+            (Some(FormName::Trained), Form::Runtime(_) | Form::Packed(_)) => Err(Failure::about(
+                &self.input,
+                "holds a sliced form, which cannot be turned back: convert the checkpoint with --form trained",
+            )),
+            (Some(FormName::Runtime), Form::Trained(_)) => {
+                let sliced = scene.into_runtime().map_err(|error| Failure::at(&self.input, &error))?;
+                Ok(sliced.into())
+            }
+            _ => Ok(scene),
+        }
+    }
+}
+
+/// Name of a form.
+pub fn form_name(form: &Form) -> &'static str {
+    match form {
+        Form::Trained(_) => "trained",
+        Form::Runtime(_) => "runtime",
+        Form::Packed(_) => "packed",
+    }
+}
+
+/// Whether both paths lead to the same file.
+pub fn is_same_file(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}

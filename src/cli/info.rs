@@ -1,0 +1,213 @@
+//! `gs4d info FILE`: what a checkpoint or package holds.
+//!
+//! In: a file. Out: its facts, its bounds, and for packages every section and whether its checksum holds.
+
+use super::convert::form_name;
+use super::failure::Failure;
+use super::opening::{self, CheckpointArgs};
+use super::report::{Report, Table, bytes, lines};
+use crate::codec::package::{self, PackageInfo, StoredForm};
+use crate::gaussian::Model;
+use crate::scene::{Bounds, GaussianScene, PlaybackHints, TrainedWith};
+use glam::Vec3;
+use serde_json::{Value, json};
+use std::fs::File;
+use std::path::PathBuf;
+
+/// Show what a checkpoint (.pth) or package (.gs4d) holds, and verify every checksum of a package.
+///
+/// Exit code 2 if a checksum does not hold or a Gaussian cannot be drawn.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  gs4d info capture.gs4d
+  gs4d info chkpnt30000.pth --time-interval 0,10 --json")]
+pub struct Info {
+    /// The checkpoint or package.
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    #[command(flatten)]
+    checkpoint: CheckpointArgs,
+}
+
+/// What a file says, without its Gaussians.
+struct Facts {
+    gaussians: usize,
+    form: &'static str,
+    model: Option<Model>,
+    coefficients: usize,
+    degree: u32,
+    degree_t: u32,
+    environment: Option<[u32; 2]>,
+    trained_with: TrainedWith,
+    playback: PlaybackHints,
+}
+
+/// Where the Gaussians are.
+struct Extent {
+    /// All of them, over the whole time interval.
+    all: Bounds,
+    /// The middle of them.
+    core: Bounds,
+}
+
+impl Info {
+    /// Looks into the file.
+    pub fn run(&self) -> Result<Report, Failure> {
+        let size = opening::file_size(&self.file)?;
+        let package = if opening::is_package(&self.file) { Some(self.inspect()?) } else { None };
+        if let Some(info) = package.as_ref().filter(|info| !info.is_intact()) {
+            let (damaged, all) = (info.damaged.len(), info.header.sections.len());
+            let message = format!("{damaged} of {all} sections are damaged; copy or download the package again");
+            let failure = Failure::about(&self.file, &message);
+            return Ok(self.report(size, &Facts::of_package(info), package.as_ref(), None, Some(failure)));
+        }
+        let scene = self.checkpoint.load(&self.file)?;
+        let facts = Facts::of_scene(&scene);
+        let (extent, failure) = match scene.into_runtime() {
+            Ok(scene) => {
+                let all = Bounds::of(scene.iter(), facts.trained_with.time_interval);
+                let core = Bounds::core(scene.iter());
+                (all.zip(core).map(|(all, core)| Extent { all, core }), None)
+            }
+            Err(error) => (None, Some(Failure::at(&self.file, &error))),
+        };
+        Ok(self.report(size, &facts, package.as_ref(), extent, failure))
+    }
+
+    fn inspect(&self) -> Result<PackageInfo, Failure> {
+        let file = File::open(&self.file).map_err(|error| Failure::at(&self.file, &error))?;
+        package::inspect(file).map_err(|error| Failure::at(&self.file, &error))
+    }
+
+    fn report(
+        &self,
+        size: u64,
+        facts: &Facts,
+        package: Option<&PackageInfo>,
+        extent: Option<Extent>,
+        failure: Option<Failure>,
+    ) -> Report {
+        let format = package.map_or("checkpoint".to_owned(), |info| format!("package, version {}", info.version));
+        let mut pairs = vec![("file", self.file.display().to_string()), ("format", format), ("size", bytes(size))];
+        pairs.extend(facts.pairs());
+        if let Some(Extent { all, core }) = &extent {
+            pairs.extend([("bounds", corners(all)), ("middle", corners(core))]);
+        }
+        let mut text = lines(&pairs);
+        if let Some(info) = package {
+            text += &format!("\n{}", section_table(info));
+        }
+        let json = json!({
+            "file": self.file.display().to_string(),
+            "format": if package.is_some() { "package" } else { "checkpoint" },
+            "bytes": size,
+            "gaussians": facts.gaussians,
+            "form": facts.form,
+            "model": facts.model,
+            "coefficients": facts.coefficients,
+            "degree": facts.degree,
+            "degree_t": facts.degree_t,
+            "environment": facts.environment,
+            "switches": opening::switches_json(&facts.trained_with, &facts.playback),
+            "bounds": extent.as_ref().map(|extent| box_json(&extent.all)),
+            "core": extent.as_ref().map(|extent| box_json(&extent.core)),
+            "package": package.map(package_json),
+            "error": failure.as_ref().map(Failure::message),
+        });
+        Report { failure, ..Report::new(json, text) }
+    }
+}
+
+impl Facts {
+    fn of_scene(scene: &GaussianScene) -> Self {
+        Self {
+            gaussians: scene.len(),
+            form: form_name(&scene.form),
+            model: scene.model(),
+            coefficients: scene.harmonics.coefficients,
+            degree: scene.harmonics.degree,
+            degree_t: scene.harmonics.degree_t,
+            environment: scene.environment.as_ref().map(|map| [map.width, map.height]),
+            trained_with: scene.trained_with.clone(),
+            playback: scene.playback,
+        }
+    }
+
+    fn of_package(info: &PackageInfo) -> Self {
+        let header = &info.header;
+        let (form, model) = match header.form {
+            StoredForm::Trained { model } => ("trained", Some(model)),
+            StoredForm::Runtime => ("runtime", None),
+            StoredForm::Packed { .. } => ("packed", None),
+        };
+        Self {
+            gaussians: header.gaussians,
+            form,
+            model,
+            coefficients: header.coefficients,
+            degree: header.degree,
+            degree_t: header.degree_t,
+            environment: header.environment.map(|map| [map.width, map.height]),
+            trained_with: header.trained_with.clone(),
+            playback: header.playback,
+        }
+    }
+
+    fn pairs(&self) -> Vec<(&'static str, String)> {
+        let model = match self.model {
+            Some(Model::Static3d) => "trained form, static 3D",
+            Some(Model::Unrotated4d) => "trained form, 4D without 4D rotation",
+            Some(Model::Rotated4d) => "trained form, native 4D",
+            None => self.form,
+        };
+        let (degree, degree_t, stored) = (self.degree, self.degree_t, self.coefficients);
+        let environment = self.environment.map_or("none".to_owned(), |[width, height]| format!("{width} x {height}"));
+        let mut pairs = vec![
+            ("Gaussians", format!("{} ({model})", self.gaussians)),
+            ("colour", format!("degree {degree}, time degree {degree_t}, {stored} coefficients stored")),
+            ("environment", environment),
+        ];
+        pairs.extend(opening::switches(&self.trained_with, &self.playback));
+        pairs
+    }
+}
+
+/// Sections of the same name in one row.
+fn section_table(info: &PackageInfo) -> Table {
+    let sections = &info.header.sections;
+    let mut names: Vec<&str> = sections.iter().map(|section| section.name.as_str()).collect();
+    names.dedup();
+    let mut table = Table::new(&["section", "parts", "bytes", "unpacked", "checksums"]);
+    for name in names {
+        let of_name = || sections.iter().enumerate().filter(|(_, section)| section.name == name);
+        let damaged = of_name().filter(|(index, _)| info.damaged.contains(index)).count();
+        table.row([
+            name.to_owned(),
+            of_name().count().to_string(),
+            of_name().map(|(_, section)| section.length as u64).sum::<u64>().to_string(),
+            of_name().map(|(_, section)| section.raw_length as u64).sum::<u64>().to_string(),
+            if damaged == 0 { "hold".to_owned() } else { format!("{damaged} BROKEN") },
+        ]);
+    }
+    table
+}
+
+fn package_json(info: &PackageInfo) -> Value {
+    json!({
+        "version": info.version,
+        "generator": info.header.generator,
+        "intact": info.is_intact(),
+        "damaged": info.damaged,
+        "sections": info.header.sections,
+    })
+}
+
+fn corners(bounds: &Bounds) -> String {
+    let corner = |Vec3 { x, y, z }: Vec3| format!("({x:.3}, {y:.3}, {z:.3})");
+    format!("{} to {}", corner(bounds.min), corner(bounds.max))
+}
+
+fn box_json(bounds: &Bounds) -> Value {
+    json!({ "min": bounds.min.to_array(), "max": bounds.max.to_array() })
+}

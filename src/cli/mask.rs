@@ -1,0 +1,114 @@
+//! `gs4d mask IN -o OUT`: adds a temporal filter to a scene.
+//!
+//! In: a scene, how many key-frames, training views where the filter needs them. Out: a package that knows which of its Gaussians are
+//! active when, and how many those are.
+
+use super::engine::EngineArgs;
+use super::failure::Failure;
+use super::filters::{FILTERS, KEYS, by_views, filter_name, support};
+use super::opening::{CheckpointArgs, PackageArgs};
+use super::report::{Report, bytes, lines};
+use super::training::DataArgs;
+use super::values;
+use crate::offline::dataset::TrainingView;
+use crate::offline::dataset::selection::distinct_times;
+use crate::offline::temporal_filter::{keys_every, neighbour_overlap};
+use crate::scene::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Tell a scene which of its Gaussians are active when, so that drawing can skip the others.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  gs4d mask chkpnt30000.pth -o filtered.gs4d
+  gs4d mask chkpnt30000.pth --filter interval --data data/toybox --key-frames 11 -o filtered.gs4d
+  gs4d mask n3v.pth --filter key-frame --data data/n3v --every 20 -o filtered.gs4d
+
+Filters:
+  support    active wherever its opacity can show; changes no pixel and needs no views
+  interval   support, narrowed to what some training view between two key-frames, or any camera at them, sees
+  key-frame  the paper's: what any camera sees at the two key-frames around; loses what comes and goes between them")]
+pub struct Mask {
+    /// The checkpoint or package to filter. A filter that it has is replaced.
+    #[arg(value_name = "IN")]
+    input: PathBuf,
+    #[command(flatten)]
+    package: PackageArgs,
+    /// Which filter.
+    #[arg(long, value_name = "FILTER", default_value = "support", value_parser = values::one_of(&FILTERS))]
+    filter: FilterKind,
+    /// Number of key-frames, evenly over the time interval, both ends included [default: 11].
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(2..=i64::from(MAX_SEGMENTS) + 1))]
+    key_frames: Option<u32>,
+    /// A key-frame every so many of the training data's timestamps, instead.
+    #[arg(long, value_name = "FRAMES", conflicts_with = "key_frames", value_parser = values::count(1_000_000))]
+    every: Option<usize>,
+    #[command(flatten)]
+    data: DataArgs,
+    #[command(flatten)]
+    engine: EngineArgs,
+    #[command(flatten)]
+    checkpoint: CheckpointArgs,
+}
+
+impl Mask {
+    /// Makes the filter and writes the scene with it.
+    pub fn run(&self) -> Result<Report, Failure> {
+        let out = self.package.out()?;
+        let mut scene = self.checkpoint.load(&self.input)?;
+        scene.filter = None;
+        let needs_views = self.filter != FilterKind::Support || self.every.is_some();
+        let views = if needs_views { self.data.open(&scene.trained_with)? } else { Vec::new() };
+        let keys = self.keys(&views)?;
+        let filter = match self.filter {
+            FilterKind::Support => support(&scene, keys),
+            kind => by_views(&mut self.engine.open()?, &scene, kind, keys, &views),
+        };
+        let filter = filter.map_err(|failure| Failure::about(&self.input, failure.message()))?;
+        let (share, overlap) = (filter.active_share(), neighbour_overlap(&filter));
+        let least = overlap.iter().copied().fold(1.0, f64::min);
+        let mean = if overlap.is_empty() { 1.0 } else { overlap.iter().sum::<f64>() / overlap.len() as f64 };
+        let (form, size) = stored(&filter);
+        let (count, segments) = (scene.len(), filter.segments);
+        scene.filter = Some(filter);
+        let written = self.package.save(&scene)?;
+        let name = filter_name(self.filter);
+        let text = lines(&[
+            ("filter", format!("{name}, {keys} key-frames, {segments} segments")),
+            ("active", format!("{:.1} % of {count} Gaussians, mean over segments", share * 100.0)),
+            ("overlap", format!("{mean:.3} (IoU of neighbouring segments; {least:.3} at least)")),
+            ("size", format!("{} as {form}, before compression", bytes(size))),
+            ("wrote", format!("{}, {}", out.display(), bytes(written))),
+        ]);
+        let json = json!({
+            "in": self.input.display().to_string(),
+            "out": out.display().to_string(),
+            "bytes_out": written,
+            "filter": self.filter,
+            "key_frames": keys,
+            "segments": segments,
+            "gaussians": count,
+            "active_share": share,
+            "overlap": overlap,
+            "stored_as": form,
+            "filter_bytes": size,
+        });
+        Ok(Report::new(json, text))
+    }
+
+    fn keys(&self, views: &[TrainingView]) -> Result<u32, Failure> {
+        let Some(frames) = self.every else { return Ok(self.key_frames.unwrap_or(KEYS)) };
+        let keys = keys_every(distinct_times(views), frames);
+        let fits = u32::try_from(keys).ok().filter(|keys| *keys <= MAX_SEGMENTS + 1);
+        fits.ok_or_else(|| Failure::new(format!("{keys} key-frames are too many: raise --every")))
+    }
+}
+
+/// How the sets are stored, and in how many bytes.
+fn stored(filter: &TemporalFilter) -> (&'static str, u64) {
+    match &filter.sets {
+        ActiveSets::Bits(words) => ("bits", size_of_val(words.as_slice()) as u64),
+        ActiveSets::Intervals(intervals) => ("intervals", size_of_val(intervals.as_slice()) as u64),
+    }
+}

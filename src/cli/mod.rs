@@ -1,0 +1,104 @@
+//! The `gs4d` command: looks into captures, converts, renders, compares and times them, and makes them smaller.
+//!
+//! In: the command line. Out: one report on standard output (text, or one JSON document with `--json`); progress, notes and
+//! errors on standard error; exit code 0, 2 for any failure, 130 when interrupted.
+
+mod ablate;
+mod bake;
+mod bench;
+mod compare;
+mod compress;
+mod contest;
+mod convert;
+mod drawing;
+mod engine;
+mod eval;
+mod failure;
+mod filters;
+mod gpu;
+mod info;
+mod interrupt;
+mod mask;
+mod opening;
+mod prune;
+mod render;
+mod report;
+mod score;
+mod splits;
+mod synth;
+mod training;
+mod values;
+mod views;
+
+use clap::{Parser, Subcommand};
+use failure::Failure;
+use report::Report;
+use std::process::ExitCode;
+
+/// Dynamic captures (native 4D Gaussian Splatting): look into them, convert, render, compare, time, make smaller.
+#[derive(Parser)]
+#[command(name = "gs4d", version, propagate_version = true, after_help = EXAMPLES)]
+struct Cli {
+    #[command(subcommand)]
+    verb: Verb,
+    /// Print exactly one JSON document on standard output instead of text.
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  gs4d info chkpnt30000.pth
+  gs4d convert chkpnt30000.pth capture.gs4d --form runtime
+  gs4d render capture.gs4d --orbit 60 --out frames
+
+Every verb explains itself: gs4d VERB --help. Exit codes: 0 done, 2 failed, 130 interrupted.";
+
+#[derive(Subcommand)]
+enum Verb {
+    Info(info::Info),
+    Convert(convert::Convert),
+    Render(render::Render),
+    Compress(compress::Compress),
+    Compare(compare::Compare),
+    Synth(synth::Synth),
+    Bench(bench::Bench),
+    Score(score::Score),
+    Prune(prune::Prune),
+    Mask(mask::Mask),
+    Eval(eval::Eval),
+    Ablate(ablate::Ablate),
+    Bake(bake::Bake),
+}
+
+impl Verb {
+    fn run(&self) -> Result<Report, Failure> {
+        match self {
+            Self::Info(verb) => verb.run(),
+            Self::Convert(verb) => verb.run(),
+            Self::Render(verb) => verb.run(),
+            Self::Compress(verb) => verb.run(),
+            Self::Compare(verb) => verb.run(),
+            Self::Synth(verb) => verb.run(),
+            Self::Bench(verb) => verb.run(),
+            Self::Score(verb) => verb.run(),
+            Self::Prune(verb) => verb.run(),
+            Self::Mask(verb) => verb.run(),
+            Self::Eval(verb) => verb.run(),
+            Self::Ablate(verb) => verb.run(),
+            Self::Bake(verb) => verb.run(),
+        }
+    }
+}
+
+/// Runs the command that the process was started with. Returns its exit code.
+pub fn run() -> ExitCode {
+    let cli = Cli::parse();
+    report::silence_progress(cli.json);
+    let outcome = interrupt::install().map_err(Failure::from).and_then(|()| cli.verb.run());
+    let report = outcome.unwrap_or_else(Report::of_failure);
+    match report.print(cli.json) {
+        Ok(()) if report.failure.is_none() => ExitCode::SUCCESS,
+        _ => ExitCode::from(2),
+    }
+}

@@ -1,0 +1,176 @@
+//! What can be wrong with a dataset.
+//!
+//! Every message names the file, the frame where there is one, the reason and what to do about it.
+
+use std::path::PathBuf;
+use std::{fmt, io};
+
+use glam::UVec2;
+
+use super::MAX_SIDE;
+
+/// A dataset, a camera file or an image that cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum DatasetError {
+    /// The folder holds no camera file of the split asked for.
+    #[error(
+        "{}: no {file} in it: a dataset folder holds transforms_train.json and transforms_test.json (the Blender form; COLMAP folders \
+         must be converted first)",
+        .folder.display()
+    )]
+    NotADataset {
+        /// The folder.
+        folder: PathBuf,
+        /// Name of the missing file.
+        file: &'static str,
+    },
+    /// A camera file cannot be read.
+    #[error("{}: cannot be read: {reason}", .path.display())]
+    Read {
+        /// The camera file.
+        path: PathBuf,
+        /// What the system says.
+        reason: io::Error,
+    },
+    /// A camera file is not JSON, or a file-level entry has the wrong type.
+    #[error("{}: not a valid camera file: {reason}", .path.display())]
+    Json {
+        /// The camera file.
+        path: PathBuf,
+        /// Where and why.
+        reason: serde_json::Error,
+    },
+    /// The JSON has neither `frames` nor `views`.
+    #[error(
+        "{}: neither a transforms file (no list \"frames\") nor a file of golden views (no list \"views\")",
+        .path.display()
+    )]
+    UnknownForm {
+        /// The camera file.
+        path: PathBuf,
+    },
+    /// The list of frames is empty.
+    #[error("{}: its list of frames is empty: there is nothing to render or to train on", .path.display())]
+    NoFrames {
+        /// The camera file.
+        path: PathBuf,
+    },
+    /// Every frame lies outside the time interval.
+    #[error(
+        "{}: all frames lie outside the time interval {},{}: theirs are {} to {}; pass the interval the capture was trained with",
+        .path.display(), .interval[0], .interval[1], .times[0], .times[1]
+    )]
+    NoFramesInInterval {
+        /// The camera file.
+        path: PathBuf,
+        /// The interval asked for.
+        interval: [f32; 2],
+        /// First and last time found.
+        times: [f32; 2],
+    },
+    /// One frame cannot be used.
+    #[error("{}: frame {frame}: {problem}", .path.display())]
+    Frame {
+        /// The camera file.
+        path: PathBuf,
+        /// Index of the frame in its list, from 0.
+        frame: usize,
+        /// What is wrong with it.
+        problem: FrameProblem,
+    },
+    /// Nothing says how large the pictures are.
+    #[error(
+        "{}: the picture size is unknown: no \"w\" and \"h\" in it, and none of its images is on disk; pass --size WIDTHxHEIGHT",
+        .path.display()
+    )]
+    SizeUnknown {
+        /// The camera file.
+        path: PathBuf,
+    },
+    /// The size asked for is not one that a picture can have.
+    #[error("pictures of {}x{} pixels cannot be made: each side must be 1 to {MAX_SIDE}", .size.x, .size.y)]
+    Size {
+        /// Width and height asked for.
+        size: UVec2,
+    },
+    /// The resolution asked for does not lead to a size that a picture can have.
+    #[error(
+        "resolution {resolution} cannot be used on {}x{} pixels: it is a divisor (1, 2, 3, 4 or 8), -1 (at most 1600 wide) or a target \
+         width up to {MAX_SIDE}",
+        .original.x, .original.y
+    )]
+    Resolution {
+        /// The value asked for.
+        resolution: i32,
+        /// Size of the pictures before it.
+        original: UVec2,
+    },
+    /// Images named by the camera file are not on disk.
+    #[error("{missing} of {total} images are missing: {}; put them beside the camera file", Listing(.first, *.missing))]
+    MissingImages {
+        /// The first few of them.
+        first: Vec<PathBuf>,
+        /// How many are missing.
+        missing: usize,
+        /// How many were looked for.
+        total: usize,
+    },
+    /// An image cannot be decoded.
+    #[error("{}: not a readable PNG or JPEG image: {reason}", .path.display())]
+    Image {
+        /// The image.
+        path: PathBuf,
+        /// What the decoder says.
+        reason: image::ImageError,
+    },
+}
+
+/// What is wrong with one frame of a camera file.
+#[derive(Debug, thiserror::Error)]
+pub enum FrameProblem {
+    /// An entry is missing or has the wrong type.
+    #[error("{0}")]
+    Malformed(serde_json::Error),
+    /// The image path names no file.
+    #[error("the image path {0:?} names no file")]
+    FileName(String),
+    /// The time does not fit a float32.
+    #[error("the time {0:?} is not a usable number")]
+    Time(f64),
+    /// The camera's matrix is not a pose.
+    #[error("the camera matrix {0}")]
+    Matrix(&'static str),
+    /// Neither intrinsics nor a field of view.
+    #[error("no lens: give camera_angle_x, or all of fl_x, fl_y, cx and cy, for the frame or the whole file")]
+    NoLens,
+    /// The horizontal field of view is out of range.
+    #[error("camera_angle_x is {0}: it must lie between 0 and π (radians)")]
+    FieldOfView(f64),
+    /// The lens values do not give a camera.
+    #[error("the lens cannot be used: focal lengths must be above 0 and every value finite (in float32)")]
+    Lens,
+    /// The picture size is not one that a picture can have.
+    #[error("pictures of {width}x{height} pixels cannot be made: each side must be a whole number, 1 to {MAX_SIDE}")]
+    Size {
+        /// Width in the file.
+        width: f64,
+        /// Height in the file.
+        height: f64,
+    },
+}
+
+/// Prints some of `total` paths.
+struct Listing<'a>(&'a [PathBuf], usize);
+
+impl fmt::Display for Listing<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, path) in self.0.iter().enumerate() {
+            let separator = if i == 0 { "" } else { ", " };
+            write!(f, "{separator}{}", path.display())?;
+        }
+        match self.1.saturating_sub(self.0.len()) {
+            0 => Ok(()),
+            more => write!(f, " and {more} more"),
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! Picture sizes and lenses of training views.
+//!
+//! In: sizes, focal lengths and angles as a camera file gives them, in pixels of the original pictures, and the size or resolution
+//! asked for. Out: the size to render at and the [`Lens`] for it.
+
+use glam::{DVec2, UVec2};
+use serde::Deserialize;
+
+use super::{DatasetError, FrameProblem, MAX_SIDE};
+use crate::view::{Camera, Lens};
+
+/// The width that `--resolution -1` allows.
+const AUTOMATIC_WIDTH: f64 = 1600.0;
+
+/// The camera entries of a file or of one of its frames.
+#[derive(Debug, Clone, Copy, Default, Deserialize)]
+#[serde(default, expecting = "an object")]
+pub(super) struct LensEntries {
+    w: Option<f64>,
+    h: Option<f64>,
+    fl_x: Option<f64>,
+    fl_y: Option<f64>,
+    cx: Option<f64>,
+    cy: Option<f64>,
+    camera_angle_x: Option<f64>,
+}
+
+/// A lens in pixels of the original pictures, whose size may not be known yet.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum OriginalLens {
+    /// Horizontal field of view in radians.
+    Angle(f64),
+    /// Tangents of the half-angles.
+    Tangents(DVec2),
+    /// Focal lengths and principal point.
+    Intrinsics { focal: DVec2, center: DVec2 },
+}
+
+impl LensEntries {
+    /// These entries, and where there is none that of the whole file.
+    pub fn or(self, file: &Self) -> Self {
+        Self {
+            w: self.w.or(file.w),
+            h: self.h.or(file.h),
+            fl_x: self.fl_x.or(file.fl_x),
+            fl_y: self.fl_y.or(file.fl_y),
+            cx: self.cx.or(file.cx),
+            cy: self.cy.or(file.cy),
+            camera_angle_x: self.camera_angle_x.or(file.camera_angle_x),
+        }
+    }
+
+    /// The picture size, if both sides are given.
+    pub fn size(&self) -> Result<Option<UVec2>, FrameProblem> {
+        self.w.zip(self.h).map(|(width, height)| checked_size(width, height)).transpose()
+    }
+
+    /// The lens: intrinsics when all four are given, as in the original, else the field of view.
+    pub fn lens(&self) -> Result<OriginalLens, FrameProblem> {
+        if let Self { fl_x: Some(fl_x), fl_y: Some(fl_y), cx: Some(cx), cy: Some(cy), .. } = *self {
+            return Ok(OriginalLens::Intrinsics { focal: DVec2::new(fl_x, fl_y), center: DVec2::new(cx, cy) });
+        }
+        let angle = self.camera_angle_x.ok_or(FrameProblem::NoLens)?;
+        if angle > 0.0 && angle < std::f64::consts::PI {
+            Ok(OriginalLens::Angle(angle))
+        } else {
+            Err(FrameProblem::FieldOfView(angle))
+        }
+    }
+}
+
+impl OriginalLens {
+    /// The lens for pictures made smaller by `divisor` than the original ones. The field of view stays.
+    pub fn scaled(self, original: UVec2, divisor: DVec2) -> Result<Lens, FrameProblem> {
+        let lens = match self {
+            Self::Angle(angle) => Camera::fov_lens(angle, original),
+            Self::Tangents(tan) => Lens::Fov { tan: tan.as_vec2() },
+            Self::Intrinsics { focal, center } => {
+                Lens::Intrinsics { focal: (focal / divisor).as_vec2(), center: (center / divisor).as_vec2() }
+            }
+        };
+        let (positive, offset) = match lens {
+            Lens::Fov { tan } => (tan, glam::Vec2::ZERO),
+            Lens::Intrinsics { focal, center } => (focal, center),
+        };
+        let usable = positive.is_finite() && positive.min_element() > 0.0 && offset.is_finite();
+        if usable { Ok(lens) } else { Err(FrameProblem::Lens) }
+    }
+}
+
+/// A size from a file: whole numbers, possibly written as `400.0`.
+pub(super) fn checked_size(width: f64, height: f64) -> Result<UVec2, FrameProblem> {
+    let side =
+        |value: f64| (value.fract() == 0.0 && (1.0..=f64::from(MAX_SIDE)).contains(&value)).then_some(value as u32);
+    side(width).zip(side(height)).map(UVec2::from).ok_or(FrameProblem::Size { width, height })
+}
+
+/// The size after `--resolution`, with the divisor for focal lengths (the original divides them by the factor asked for, not by the
+/// ratio of the rounded sizes).
+pub(super) fn reduced(original: UVec2, resolution: Option<i32>) -> Result<(UVec2, f64), DatasetError> {
+    let full = original.as_dvec2();
+    let (size, divisor) = match resolution {
+        None => (full, 1.0),
+        // Python's round: halves go to the even number.
+        Some(divisor @ (1 | 2 | 3 | 4 | 8)) => (full / f64::from(divisor), f64::from(divisor)),
+        Some(-1) => rounded_down(full, (full.x / AUTOMATIC_WIDTH).max(1.0)),
+        Some(width) => rounded_down(full, full.x / f64::from(width)),
+    };
+    let size = DVec2::new(size.x.round_ties_even(), size.y.round_ties_even());
+    let usable = size.min_element() >= 1.0 && size.max_element() <= f64::from(MAX_SIDE);
+    match resolution {
+        Some(resolution) if !usable => Err(DatasetError::Resolution { resolution, original }),
+        _ => Ok((size.as_uvec2(), divisor)),
+    }
+}
+
+/// Rounds down where the divisor comes from a width, as the original does, but keeps the width itself: there 1601 pixels capped at
+/// 1600 become 1599, lost to the last bit of a division.
+fn rounded_down(full: DVec2, divisor: f64) -> (DVec2, f64) {
+    ((full / divisor + 1e-6).floor(), divisor)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn size_at(width: u32, height: u32, resolution: i32) -> Option<(u32, u32)> {
+        reduced(UVec2::new(width, height), Some(resolution)).ok().map(|(size, _)| (size.x, size.y))
+    }
+
+    #[test]
+    fn resolution_follows_the_original() {
+        assert_eq!(size_at(800, 800, 2), Some((400, 400)), "D-NeRF");
+        assert_eq!(size_at(2704, 2028, 2), Some((1352, 1014)), "N3V");
+        assert_eq!(size_at(13, 9, 2), Some((6, 4)), "6.5 and 4.5 round to even");
+        assert_eq!(size_at(10, 14, 4), Some((2, 4)), "2.5 and 3.5 round to even");
+        assert_eq!(size_at(800, 600, -1), Some((800, 600)), "below the cap");
+        assert_eq!(size_at(3200, 2000, -1), Some((1600, 1000)), "above the cap");
+        assert_eq!(size_at(1601, 1000, -1), Some((1600, 999)), "999.4 rounds down, 1600 stays");
+        assert_eq!(size_at(800, 600, 200), Some((200, 150)), "a target width");
+    }
+
+    #[test]
+    fn unusable_resolutions_are_refused() {
+        for resolution in [0, -2, i32::MIN, i32::MAX, MAX_SIDE as i32 + 1] {
+            assert_eq!(size_at(800, 600, resolution), None, "resolution {resolution}");
+        }
+        assert_eq!(size_at(3, 3, 8), None, "nothing left");
+    }
+
+    #[test]
+    fn focal_lengths_are_divided_by_the_factor_not_by_the_size_ratio() {
+        let (size, divisor) = reduced(UVec2::new(13, 9), Some(2)).expect("a valid resolution");
+        assert_eq!((size, divisor), (UVec2::new(6, 4), 2.0), "13 / 6 is not 2");
+    }
+
+    #[test]
+    fn sizes_from_files_are_checked() {
+        assert_eq!(checked_size(400.0, 300.0).ok(), Some(UVec2::new(400, 300)), "whole numbers");
+        for bad in [0.0, -1.0, 0.5, 1e9, f64::NAN, f64::INFINITY] {
+            assert!(checked_size(bad, 10.0).is_err() && checked_size(10.0, bad).is_err(), "{bad}");
+        }
+    }
+}

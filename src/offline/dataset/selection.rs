@@ -1,0 +1,126 @@
+//! Which training views are used for what.
+//!
+//! In: the training views of a dataset. Out: an even share of them, some held out, their distinct cameras, their distinct times.
+
+use super::TrainingView;
+use crate::view::{Camera, Lens, RasterFov, View};
+use std::collections::HashSet;
+
+/// The golden ratio's fraction, whose multiples fall evenly between 0 and 1.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// Indices of an even share of the views, ascending: one from each of `wanted` stretches of time, from changing places within it, so
+/// that neither times nor cameras are favoured. All of them if there are no more than `wanted`.
+pub fn even_share(views: &[TrainingView], wanted: usize) -> Vec<usize> {
+    let count = views.len();
+    let mut by_time: Vec<usize> = (0..count).collect();
+    if wanted >= count {
+        return by_time;
+    }
+    by_time.sort_by(|&a, &b| views[a].time.total_cmp(&views[b].time));
+    let mut share: Vec<usize> = (0..wanted)
+        .map(|k| {
+            let (first, end) = (k * count / wanted, (k + 1) * count / wanted);
+            let place = ((k as f64 + 0.5) * GOLDEN).fract() * (end - first) as f64;
+            by_time[first + (place as usize).min(end - first - 1)]
+        })
+        .collect();
+    share.sort_unstable();
+    share
+}
+
+/// Takes an even share of the views out: the rest first, then the share. At most a quarter is taken; of fewer than four views, nothing
+/// can be spared and both parts are all of them.
+pub fn hold_out(views: &[TrainingView], wanted: usize) -> (Vec<TrainingView>, Vec<TrainingView>) {
+    let wanted = wanted.min(views.len() / 4);
+    if wanted == 0 {
+        return (views.to_vec(), views.to_vec());
+    }
+    let held: HashSet<usize> = even_share(views, wanted).into_iter().collect();
+    let part = |taken: bool| {
+        let chosen = views.iter().enumerate().filter(|(i, _)| held.contains(i) == taken);
+        chosen.map(|(_, view)| view.clone()).collect()
+    };
+    (part(false), part(true))
+}
+
+/// Every camera once, in order of appearance: those with the same pose, size and lens are one.
+pub fn distinct_cameras(views: &[TrainingView]) -> Vec<Camera> {
+    let mut seen = HashSet::new();
+    views.iter().map(|view| view.camera).filter(|camera| seen.insert(identity(camera))).collect()
+}
+
+fn identity(camera: &Camera) -> ([u32; 16], [u32; 2], [u32; 5]) {
+    let (kind, a, b) = match camera.lens {
+        Lens::Fov { tan } => (0.0, tan, glam::Vec2::ZERO),
+        Lens::Intrinsics { focal, center } => (1.0, focal, center),
+    };
+    let pose = camera.world_to_camera.to_cols_array().map(f32::to_bits);
+    (pose, camera.size.to_array(), [kind, a.x, a.y, b.x, b.y].map(f32::to_bits))
+}
+
+/// How many different times the views have.
+pub fn distinct_times(views: &[TrainingView]) -> usize {
+    views.iter().map(|view| view.time.to_bits()).collect::<HashSet<_>>().len()
+}
+
+/// What the passes read, for each of the views.
+pub fn to_draw(views: &[TrainingView], raster_fov: RasterFov) -> Vec<View> {
+    views.iter().map(|view| view.camera.view(view.time, raster_fov)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{Mat4, UVec2, Vec3};
+
+    /// Twenty cameras of thirty frames, camera by camera.
+    fn views() -> Vec<TrainingView> {
+        let camera = |index: usize| Camera {
+            world_to_camera: Mat4::from_translation(Vec3::X * index as f32),
+            size: UVec2::splat(8),
+            lens: Camera::fov_lens(0.7, UVec2::splat(8)),
+        };
+        let view = |index: usize| TrainingView {
+            name: index.to_string(),
+            camera: camera(index / 30),
+            time: (index % 30) as f32 / 29.0,
+            image: "none.png".into(),
+            mask: None,
+        };
+        (0..600).map(view).collect()
+    }
+
+    #[test]
+    fn a_share_is_even_in_time_and_among_cameras() {
+        let views = views();
+        for wanted in [15, 24, 30, 40, 60, 100] {
+            let share = even_share(&views, wanted);
+            assert_eq!(share.len(), wanted, "as many as wanted");
+            assert!(share.is_sorted_by(|a, b| a < b), "ascending, none twice");
+            let times: HashSet<u32> = share.iter().map(|&i| views[i].time.to_bits()).collect();
+            let cameras: HashSet<usize> = share.iter().map(|i| i / 30).collect();
+            assert!(times.len() >= wanted.min(30) * 4 / 5, "{wanted} views have {} times", times.len());
+            assert!(cameras.len() >= wanted.min(20) / 2, "{wanted} views have {} cameras", cameras.len());
+        }
+        assert_eq!(even_share(&views, 600).len(), 600, "all");
+        assert_eq!(even_share(&views, 9000).len(), 600, "no more than there are");
+    }
+
+    #[test]
+    fn held_out_views_are_kept_apart() {
+        let views = views();
+        let (rest, held) = hold_out(&views, 24);
+        assert_eq!((rest.len(), held.len()), (576, 24), "two parts");
+        assert!(held.iter().all(|view| !rest.contains(view)), "no view in both");
+        let (rest, held) = hold_out(&views[..3], 24);
+        assert_eq!((rest.len(), held.len()), (3, 3), "nothing to spare");
+    }
+
+    #[test]
+    fn a_camera_that_takes_many_views_is_one() {
+        let views = views();
+        assert_eq!(distinct_cameras(&views).len(), 20, "cameras");
+        assert_eq!(distinct_times(&views), 30, "times");
+    }
+}

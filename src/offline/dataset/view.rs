@@ -1,0 +1,138 @@
+//! One training view and its image.
+//!
+//! In: a camera at a time with the path of a PNG or JPEG. Out: float RGB of the camera's size, equal to what the original trains on
+//! and evaluates against (section 5.3 of the 4DGS model).
+
+use std::path::{Path, PathBuf};
+
+use glam::{UVec2, Vec3};
+use image::{DynamicImage, ImageReader, Limits, RgbaImage};
+
+use super::{DatasetError, MAX_SIDE, require_files, resample};
+use crate::view::{Camera, Picture};
+
+/// A camera at one time, and the image that was seen there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrainingView {
+    /// Name for output files: the stem of the image path, without folders; unique within its camera file (a repeated stem has the
+    /// index of the frame appended, `-17`).
+    pub name: String,
+    /// The camera, at the size to render.
+    pub camera: Camera,
+    /// Timestamp, in the capture's unit.
+    pub time: f32,
+    /// The image. It may not be on disk.
+    pub image: PathBuf,
+    /// Coverage as an 8-bit grey image, already multiplied into the image.
+    pub mask: Option<PathBuf>,
+}
+
+/// Which of the original's two ways of loading images is reproduced.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum ImageMode {
+    /// Its in-memory mode, used for D-NeRF: transparent images keep alpha through resampling and are multiplied by it once more.
+    #[default]
+    InMemory,
+    /// Its `dataloader` mode, used for N3V: composited once, no alpha.
+    Dataloader,
+}
+
+/// The image of a training view, at its camera's size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrainingImage {
+    /// RGB, 0 to 1.
+    pub picture: Picture,
+    /// Coverage per pixel, 0 to 1: the mask where the view has one, else the image's own alpha ([`ImageMode::InMemory`] only). `None`
+    /// where everything is covered.
+    pub alpha: Option<Vec<f32>>,
+}
+
+impl TrainingView {
+    /// Loads the image as the original does: composited over `background` (RGB, 0 to 1), truncated to 8 bits, resampled to the camera's
+    /// size (Pillow's bicubic), and multiplied by alpha again where `mode` says so. A mask is only reported as coverage: the image is
+    /// already multiplied by it.
+    ///
+    /// # Errors
+    /// [`DatasetError::MissingImages`] when the image or the mask is not on disk, [`DatasetError::Image`] when one cannot be decoded,
+    /// [`DatasetError::Size`] when the camera's size is not usable.
+    pub fn load_image(&self, background: [f32; 3], mode: ImageMode) -> Result<TrainingImage, DatasetError> {
+        let size = self.camera.size;
+        if size.min_element() == 0 || size.max_element() > MAX_SIDE {
+            return Err(DatasetError::Size { size });
+        }
+        require_files([Some(&self.image), self.mask.as_ref()].into_iter().flatten())?;
+        let mut image = resampled(&decode(&self.image)?.into_rgba8(), background, mode, size);
+        if let Some(mask) = &self.mask {
+            image.alpha = Some(load_mask(mask, size)?);
+        }
+        Ok(image)
+    }
+}
+
+/// Width and height of an image, from its header.
+pub(super) fn image_size(path: &Path) -> Result<UVec2, DatasetError> {
+    let size = reader(path).and_then(ImageReader::into_dimensions);
+    size.map(UVec2::from).map_err(|reason| DatasetError::Image { path: path.to_owned(), reason })
+}
+
+fn decode(path: &Path) -> Result<DynamicImage, DatasetError> {
+    let image = reader(path).and_then(ImageReader::decode);
+    image.map_err(|reason| DatasetError::Image { path: path.to_owned(), reason })
+}
+
+/// A reader that goes by the contents of the file rather than by its name, and refuses huge images.
+fn reader(path: &Path) -> image::ImageResult<ImageReader<std::io::BufReader<std::fs::File>>> {
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(MAX_SIDE);
+    limits.max_image_height = Some(MAX_SIDE);
+    let mut reader = ImageReader::open(path)?.with_guessed_format()?;
+    reader.limits(limits);
+    Ok(reader)
+}
+
+fn resampled(image: &RgbaImage, background: [f32; 3], mode: ImageMode, size: UVec2) -> TrainingImage {
+    let from = UVec2::new(image.width(), image.height());
+    let transparent = mode == ImageMode::InMemory && image.pixels().any(|pixel| pixel.0[3] < u8::MAX);
+    let bytes = composited(image, background, transparent);
+    if !transparent {
+        let pixels = resample::resize(bytes, 3, from, size).chunks_exact(3).map(unit_rgb).collect();
+        return TrainingImage { picture: Picture { size, pixels }, alpha: None };
+    }
+    let bytes = resample::resize_rgba(bytes, from, size);
+    let alpha: Vec<f32> = bytes.chunks_exact(4).map(|pixel| unit(pixel[3])).collect();
+    let pixels = bytes.chunks_exact(4).zip(&alpha).map(|(pixel, &alpha)| unit_rgb(pixel) * alpha).collect();
+    TrainingImage { picture: Picture { size, pixels }, alpha: Some(alpha) }
+}
+
+/// RGB over the background in double precision, times 255, truncated; alpha follows each pixel where it is kept.
+fn composited(image: &RgbaImage, background: [f32; 3], keep_alpha: bool) -> Vec<u8> {
+    let channels = if keep_alpha { 4 } else { 3 };
+    let mut bytes = Vec::with_capacity(image.pixels().len() * channels);
+    for pixel in image.pixels() {
+        let [color @ .., alpha] = pixel.0;
+        let covered = f64::from(alpha) / 255.0;
+        for (value, background) in color.into_iter().zip(background) {
+            let over = f64::from(value) / 255.0 * covered + f64::from(background) * (1.0 - covered);
+            bytes.push((over * 255.0) as u8);
+        }
+        if keep_alpha {
+            bytes.push(alpha);
+        }
+    }
+    bytes
+}
+
+fn load_mask(path: &Path, size: UVec2) -> Result<Vec<f32>, DatasetError> {
+    let mask = decode(path)?.into_luma8();
+    let from = UVec2::new(mask.width(), mask.height());
+    Ok(resample::resize(mask.into_raw(), 1, from, size).into_iter().map(unit).collect())
+}
+
+fn unit(byte: u8) -> f32 {
+    f32::from(byte) / 255.0
+}
+
+/// The first three bytes as RGB.
+fn unit_rgb(bytes: &[u8]) -> Vec3 {
+    Vec3::new(unit(bytes[0]), unit(bytes[1]), unit(bytes[2]))
+}

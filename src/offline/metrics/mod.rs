@@ -1,0 +1,44 @@
+//! How close two pictures are: PSNR, SSIM, MS-SSIM and FLIP; and how close a scene is to a dataset.
+//!
+//! In: two [`Picture`]s of the same size, values 0 to 1 (nothing is clamped here: clamp a rendering with [`Picture::clamped`] first,
+//! as the original evaluation does). Out: one number. Pixels that are not finite make the number not finite too.
+//! [`evaluate()`] does this for every view of a dataset.
+
+mod evaluate;
+mod flip;
+mod ms_ssim;
+mod psnr;
+mod ssim;
+
+pub use evaluate::{Evaluation, EvaluationSettings, ImageMetrics, MetricSet, ViewMetrics, evaluate, side_by_side};
+pub use flip::flip;
+pub use ms_ssim::{MS_SSIM_MIN_SIDE, ms_ssim};
+pub use psnr::{psnr, psnr_pooled};
+pub use ssim::ssim;
+
+use glam::UVec2;
+
+use crate::view::Picture;
+
+/// Two pictures cannot be compared because they do not have the same pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "pictures of {}x{} and {}x{} pixels cannot be compared: both must have the same size and at least one pixel",
+    .first.x, .first.y, .second.x, .second.y
+)]
+pub struct SizeMismatch {
+    /// Width and height of the first picture.
+    pub first: UVec2,
+    /// Width and height of the second picture.
+    pub second: UVec2,
+}
+
+/// Passes pictures of one size, with as many pixels as it says.
+fn check_sizes(a: &Picture, b: &Picture) -> Result<(), SizeMismatch> {
+    let count = a.size.x as usize * a.size.y as usize;
+    if a.size == b.size && count > 0 && a.pixels.len() == count && b.pixels.len() == count {
+        Ok(())
+    } else {
+        Err(SizeMismatch { first: a.size, second: b.size })
+    }
+}

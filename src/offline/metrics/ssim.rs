@@ -1,0 +1,122 @@
+//! Structural similarity.
+//!
+//! In: two pictures, values 0 to 1. Out: their SSIM as the original computes it: per channel, 11 × 11 Gaussian window of σ = 1.5,
+//! zeros beyond the border, averaged over all pixels and channels.
+//!
+//! The window is separable, so each row of the result needs one vertical pass over eleven rows and one horizontal pass; rows are
+//! independent and nothing picture-sized is stored.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{SizeMismatch, check_sizes};
+use crate::view::Picture;
+
+pub(super) const WINDOW: usize = 11;
+pub(super) const RADIUS: usize = WINDOW / 2;
+const SIGMA: f64 = 1.5;
+const C1: f64 = 0.01 * 0.01;
+const C2: f64 = 0.03 * 0.03;
+
+/// Window-weighted means of `a`, `b`, `a²`, `b²`, `ab`, each per channel.
+pub(super) type Moments = [DVec3; 5];
+
+/// SSIM, at most 1, which identical pictures reach.
+///
+/// # Errors
+/// [`SizeMismatch`] when the pictures do not have the same size, or are empty.
+pub fn ssim(a: &Picture, b: &Picture) -> Result<f64, SizeMismatch> {
+    check_sizes(a, b)?;
+    let window = gaussian_window();
+    // Rows are summed in order, so that the result does not depend on the number of threads.
+    let rows: Vec<DVec3> = (0..a.size.y as usize).into_par_iter().map(|y| row_sum(a, b, y, &window)).collect();
+    Ok(rows.into_iter().sum::<DVec3>().element_sum() / (3.0 * a.pixels.len() as f64))
+}
+
+/// The weights of the window along one axis; they sum to one.
+pub(super) fn gaussian_window() -> [f64; WINDOW] {
+    let weights: [f64; WINDOW] = std::array::from_fn(|i| {
+        let distance = i as f64 - RADIUS as f64;
+        (-distance * distance / (2.0 * SIGMA * SIGMA)).exp()
+    });
+    let sum: f64 = weights.iter().sum();
+    weights.map(|weight| weight / sum)
+}
+
+/// The window's weights over positions `0..length`, centred on `center`; what lies beyond counts as zero.
+fn inside(window: &[f64; WINDOW], center: usize, length: usize) -> impl Iterator<Item = (usize, f64)> {
+    let taps = window.iter().enumerate();
+    taps.filter_map(move |(i, &weight)| Some(((center + i).checked_sub(RADIUS)?, weight)))
+        .filter(move |&(position, _)| position < length)
+}
+
+/// SSIM summed over row `y`, per channel.
+fn row_sum(a: &Picture, b: &Picture, y: usize, window: &[f64; WINDOW]) -> DVec3 {
+    let columns = column_moments(a, b, y, window);
+    (0..columns.len()).map(|x| similarity(&moments_at(&columns, x, window))).sum()
+}
+
+/// The window about row `y`, applied down each column.
+pub(super) fn column_moments(a: &Picture, b: &Picture, y: usize, window: &[f64; WINDOW]) -> Vec<Moments> {
+    let (width, height) = (a.size.x as usize, a.size.y as usize);
+    let mut columns = vec![Moments::default(); width];
+    for (row, weight) in inside(window, y, height) {
+        let span = row * width..(row + 1) * width;
+        let pixels = a.pixels[span.clone()].iter().zip(&b.pixels[span]);
+        for (column, (p, q)) in columns.iter_mut().zip(pixels) {
+            let (p, q) = (p.as_dvec3(), q.as_dvec3());
+            accumulate(column, weight, &[p, q, p * p, q * q, p * q]);
+        }
+    }
+    columns
+}
+
+/// The window about column `x`, applied along the row that [`column_moments`] gave.
+pub(super) fn moments_at(columns: &[Moments], x: usize, window: &[f64; WINDOW]) -> Moments {
+    let mut moments = Moments::default();
+    for (column, weight) in inside(window, x, columns.len()) {
+        accumulate(&mut moments, weight, &columns[column]);
+    }
+    moments
+}
+
+fn accumulate(sum: &mut Moments, weight: f64, values: &Moments) {
+    for (sum, value) in sum.iter_mut().zip(values) {
+        *sum += weight * *value;
+    }
+}
+
+fn similarity(moments: &Moments) -> DVec3 {
+    let (luminance, contrast) = factors(moments);
+    luminance * contrast
+}
+
+/// The two factors of SSIM: of the means, and of contrast and structure together.
+pub(super) fn factors(&[mean_a, mean_b, square_a, square_b, product]: &Moments) -> (DVec3, DVec3) {
+    let (mean_aa, mean_bb, mean_ab) = (mean_a * mean_a, mean_b * mean_b, mean_a * mean_b);
+    let (variance_a, variance_b, covariance) = (square_a - mean_aa, square_b - mean_bb, product - mean_ab);
+    ((2.0 * mean_ab + C1) / (mean_aa + mean_bb + C1), (2.0 * covariance + C2) / (variance_a + variance_b + C2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn window_sums_to_one_and_is_symmetric() {
+        let window = gaussian_window();
+        assert!((window.iter().sum::<f64>() - 1.0).abs() < 1e-15, "sum of {window:?}");
+        assert!((0..WINDOW).all(|i| window[i] == window[WINDOW - 1 - i]), "asymmetric: {window:?}");
+        // exp(-1/4.5) / sum, the published value of the window beside its center.
+        assert!((window[RADIUS + 1] / window[RADIUS] - (-1.0f64 / 4.5).exp()).abs() < 1e-15, "shape of {window:?}");
+    }
+
+    #[test]
+    fn taps_beyond_the_border_are_left_out() {
+        let window = gaussian_window();
+        let at_start: Vec<_> = inside(&window, 0, 3).map(|(position, _)| position).collect();
+        assert_eq!(at_start, [0, 1, 2], "a picture narrower than the window");
+        assert_eq!(inside(&window, 10, 40).count(), WINDOW, "far from the border");
+        assert_eq!(inside(&window, 39, 40).map(|(position, _)| position).min(), Some(34), "at the far border");
+    }
+}

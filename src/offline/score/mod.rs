@@ -1,0 +1,282 @@
+//! Scores: what each Gaussian is worth, over all training views.
+//!
+//! In: a [`ScoreEngine`], the [`Traits`] of the Gaussians, the views. Out: [`Scores`], every [`Variant`] from a single pass over the
+//! views, summed in double precision.
+
+mod gpu;
+mod reference;
+pub mod variant;
+
+pub use gpu::{GpuEngine, Scorer};
+pub use reference::{ViewScore, Want, score};
+
+use super::sliced;
+use crate::gaussian::{InvalidGaussian, Model, Parameters};
+use crate::scene::{Form, GaussianScene, RuntimeScene};
+use crate::view::{Background, View};
+use rayon::prelude::*;
+use std::error::Error;
+use variant::Variant;
+
+/// Something that scores one view of a scene: the CPU twin or the GPU.
+pub trait ScoreEngine {
+    /// Scores one view. Vectors are indexed as the scene.
+    ///
+    /// # Errors
+    /// [`ScoreError::Engine`].
+    fn score(&mut self, view: &View, want: Want) -> Result<ViewScore, ScoreError>;
+}
+
+/// The CPU twin.
+#[derive(Debug)]
+pub struct CpuEngine<'a> {
+    /// What is scored.
+    pub scene: &'a RuntimeScene,
+    /// What stands behind it.
+    pub background: Background,
+}
+
+impl ScoreEngine for CpuEngine<'_> {
+    fn score(&mut self, view: &View, want: Want) -> Result<ViewScore, ScoreError> {
+        Ok(score(self.scene, view, self.background, want))
+    }
+}
+
+/// Why there are no scores.
+#[derive(Debug, thiserror::Error)]
+pub enum ScoreError {
+    /// No view was given.
+    #[error("there are no training views to score with: pass a dataset whose transforms_train.json lists some")]
+    NoViews,
+    /// Views and scene have nothing to do with one another.
+    #[error(
+        "no Gaussian contributes to any training view: does this data belong to the checkpoint? (its cameras appearance elsewhere, or its \
+         times lie outside the time interval)"
+    )]
+    NothingContributes,
+    /// The variant needs scales that a sliced scene no longer has.
+    #[error(
+        "the score `{variant}` needs the volume of the Gaussians, which the runtime form no longer tells: score the checkpoint, or choose \
+         one of {}",
+        Variant::ALL.into_iter().filter(|v| !v.needs_volume()).map(Variant::name).collect::<Vec<_>>().join(", ")
+    )]
+    NoVolume {
+        /// What was asked for.
+        variant: Variant,
+    },
+    /// The engine failed.
+    #[error("{0}")]
+    Engine(#[source] Box<dyn Error + Send + Sync>),
+}
+
+/// Readings of the paper that it leaves open.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
+pub struct ScoreSettings {
+    /// Power of the volume in `γ = (V / V_ref)^power`; 0 leaves the volume out.
+    pub volume_power: f64,
+    /// `V_ref` is the volume at this share of all volumes sorted from the largest down, 0 to 1.
+    pub volume_rank: f64,
+}
+
+impl Default for ScoreSettings {
+    fn default() -> Self {
+        Self { volume_power: 0.1, volume_rank: 0.9 }
+    }
+}
+
+/// Largest variance that counts, timestamp units squared.
+const LONGEST: f64 = 1e24;
+
+/// What scores need to know of the Gaussians beside their contributions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Traits {
+    /// Temporal mean and variance of each, timestamp units.
+    moments: Vec<[f64; 2]>,
+    /// Logarithm of the product of the activated scales; nothing for the runtime form.
+    log_volume: Option<Vec<f64>>,
+}
+
+impl Traits {
+    /// Reads them off a scene of either form.
+    ///
+    /// # Errors
+    /// The first Gaussian that cannot be drawn.
+    pub fn of(scene: &GaussianScene) -> Result<Self, InvalidGaussian> {
+        // Where nothing ever fades, the variance is the same for all and any number will do that stays finite in the sums.
+        let moments = sliced(scene)?
+            .iter()
+            .map(|gaussian| [f64::from(gaussian.mean_t), f64::from(gaussian.sigma_t).powi(2).min(LONGEST)])
+            .collect();
+        let log_volume = match &scene.form {
+            Form::Trained(parameters) => Some(log_volumes(parameters)),
+            Form::Runtime(_) | Form::Packed(_) => None,
+        };
+        Ok(Self { moments, log_volume })
+    }
+
+    /// γ of each Gaussian, or nothing where the volume is not known.
+    fn volume_factors(&self, settings: &ScoreSettings) -> Option<Vec<f64>> {
+        let volumes = self.log_volume.as_ref()?;
+        let mut sorted = volumes.clone();
+        sorted.sort_unstable_by(|a, b| b.total_cmp(a));
+        let rank = (settings.volume_rank * sorted.len() as f64) as usize;
+        let reference = sorted.get(rank.min(sorted.len().saturating_sub(1))).copied().unwrap_or_default();
+        Some(volumes.iter().map(|volume| (settings.volume_power * (volume - reference)).exp()).collect())
+    }
+}
+
+fn log_volumes(parameters: &Parameters) -> Vec<f64> {
+    let space = parameters.log_scale.iter().map(|scale| scale.iter().map(|&s| f64::from(s)).sum::<f64>());
+    if parameters.model() == Model::Static3d {
+        return space.collect();
+    }
+    space.zip(&parameters.log_scale_t).map(|(space, &time)| space + f64::from(time)).collect()
+}
+
+/// Every score of every Gaussian.
+///
+/// With `c` the contribution `α T` to a pixel, `C_t` its sum over the pixels of all views at time `t`, p the marginal and v its variance:
+///
+/// ```text
+/// change(t)  = 1 / (½ tanh |p''(t)| + ½)      p'' = ((t − μ_t)²/v² − 1/v) p        in (1, 2]: 2 where opacity does not change
+/// γ          = (V / V_ref)^0.1                V: product of the activated scales
+///
+/// spatial    = Σ_t C_t                        norm2      = sqrt Σ_t C_t²                    peak      = max_t C_t
+/// full       = Σ_t change γ C_t               full-norm2 = sqrt Σ_t (change γ C_t)²         full-peak = max_t change γ C_t
+/// temporal   = Σ_views change γ               first-derivative: full with p' = −(t − μ_t)/v p in place of p''
+/// sigma      = Σ_t v γ C_t
+/// energy     = sqrt Σ_views Σ_pixels c²       removal    = sqrt Σ_views Σ_pixels |c (colour − behind)|²
+/// energy-removal = sqrt(energy · removal)
+/// ```
+#[derive(Debug, Clone)]
+pub struct Scores {
+    sums: Vec<Sums>,
+    has_volume: bool,
+}
+
+impl Scores {
+    /// Goes over the views once, those of one time together; `scored` is called after each.
+    ///
+    /// # Errors
+    /// No views, nothing in any of them, a failure of the engine.
+    pub fn accumulate(
+        engine: &mut dyn ScoreEngine,
+        traits: &Traits,
+        views: &[View],
+        settings: &ScoreSettings,
+        mut scored: impl FnMut(),
+    ) -> Result<Self, ScoreError> {
+        if views.is_empty() {
+            return Err(ScoreError::NoViews);
+        }
+        let factors = traits.volume_factors(settings);
+        let weights = |index: usize| factors.as_ref().map_or(1.0, |factors| factors[index]);
+        let mut sums = vec![Sums::default(); traits.moments.len()];
+        let mut views = views.to_vec();
+        views.sort_by(|a, b| a.time.total_cmp(&b.time));
+        for moment in views.chunk_by(|a, b| a.time == b.time) {
+            let mut contribution = vec![0.0; sums.len()];
+            for view in moment {
+                let score = engine.score(view, Want::Removal)?;
+                add(&mut contribution, &score.contribution);
+                for ((sum, &energy), &removal) in sums.iter_mut().zip(&score.energy).zip(&score.removal) {
+                    sum.energy += f64::from(energy);
+                    sum.removal += f64::from(removal);
+                }
+                scored();
+            }
+            let (time, count) = (f64::from(moment[0].time), moment.len() as f64);
+            sums.par_iter_mut().enumerate().for_each(|(index, sum)| {
+                sum.add_moment(time, count, traits.moments[index], weights(index), contribution[index]);
+            });
+        }
+        if sums.iter().all(|sum| sum.spatial == 0.0) {
+            return Err(ScoreError::NothingContributes);
+        }
+        Ok(Self { sums, has_volume: factors.is_some() })
+    }
+
+    /// One score, in the order of the scene.
+    ///
+    /// # Errors
+    /// [`ScoreError::NoVolume`] for one that needs the volume, of a scene in the runtime form.
+    pub fn of(&self, variant: Variant) -> Result<Vec<f32>, ScoreError> {
+        if variant.needs_volume() && !self.has_volume {
+            return Err(ScoreError::NoVolume { variant });
+        }
+        Ok(self.sums.iter().map(|sum| sum.value(variant) as f32).collect())
+    }
+
+    /// The variants there are.
+    pub fn variants(&self) -> impl Iterator<Item = Variant> {
+        let has_volume = self.has_volume;
+        Variant::ALL.into_iter().filter(move |variant| has_volume || !variant.needs_volume())
+    }
+
+    /// How many Gaussians contribute to any view at all.
+    pub fn contributing(&self) -> usize {
+        self.sums.iter().filter(|sum| sum.spatial > 0.0).count()
+    }
+}
+
+fn add(sums: &mut [f64], values: &[f32]) {
+    for (sum, &value) in sums.iter_mut().zip(values) {
+        *sum += f64::from(value);
+    }
+}
+
+/// What is summed for each Gaussian.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    spatial: f64,
+    temporal: f64,
+    full: f64,
+    first_derivative: f64,
+    sigma: f64,
+    squares: f64,
+    peak: f64,
+    full_squares: f64,
+    full_peak: f64,
+    energy: f64,
+    removal: f64,
+}
+
+impl Sums {
+    /// Adds the views of one time: how many, and what the Gaussian contributes to them together.
+    fn add_moment(&mut self, time: f64, views: f64, [mean, variance]: [f64; 2], volume: f64, contribution: f64) {
+        let distance = time - mean;
+        let marginal = (-0.5 * distance * distance / variance).exp();
+        let first = -distance / variance * marginal;
+        let second = (distance / variance * (distance / variance) - variance.recip()) * marginal;
+        let steadiness = |derivative: f64| (0.5 * derivative.abs().tanh() + 0.5).recip();
+        let weight = steadiness(second) * volume;
+        let full = weight * contribution;
+        self.spatial += contribution;
+        self.temporal += views * weight;
+        self.full += full;
+        self.first_derivative += steadiness(first) * volume * contribution;
+        self.sigma += variance * volume * contribution;
+        self.squares += contribution * contribution;
+        self.peak = self.peak.max(contribution);
+        self.full_squares += full * full;
+        self.full_peak = self.full_peak.max(full);
+    }
+
+    fn value(&self, variant: Variant) -> f64 {
+        match variant {
+            Variant::Spatial => self.spatial,
+            Variant::Temporal => self.temporal,
+            Variant::Full => self.full,
+            Variant::FirstDerivative => self.first_derivative,
+            Variant::Sigma => self.sigma,
+            Variant::Norm2 => self.squares.sqrt(),
+            Variant::Peak => self.peak,
+            Variant::FullNorm2 => self.full_squares.sqrt(),
+            Variant::FullPeak => self.full_peak,
+            Variant::Energy => self.energy.sqrt(),
+            Variant::Removal => self.removal.sqrt(),
+            Variant::EnergyRemoval => (self.energy.sqrt() * self.removal.sqrt()).sqrt(),
+        }
+    }
+}

@@ -1,0 +1,257 @@
+//! `score`: what each Gaussian does to a picture, twin of `shaders/score.wgsl`.
+//!
+//! In: a scene, a view, the background. Out: [`ViewScore`], sums over the picture's pixels for each Gaussian. With `c = α T` where a
+//! Gaussian was blended into a pixel (after the tests of [`blend`](crate::reference::blend())), these are Σ c, Σ c², and what the squared picture
+//! would change by if that Gaussian alone were gone.
+
+use crate::gaussian::projection::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
+use crate::reference::{Layer, Pair, Splat, TileLists, behind, project, tile_lists};
+use crate::scene::RuntimeScene;
+use crate::view::{Appearance, Background, BlendSpace, TILE_SIZE, View};
+use glam::{UVec2, Vec3};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// How much to find out about a view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Want {
+    /// `contribution` and `energy`: one pass front to back. `removal` stays empty.
+    Contribution,
+    /// `removal` too: a second pass, once the final picture is known.
+    Removal,
+}
+
+/// What every Gaussian of a scene does to one picture. Indexed as the scene; 0 for whatever is not blended anywhere.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ViewScore {
+    /// Σ c over pixels. Above 0 exactly if the Gaussian was blended into some pixel.
+    pub contribution: Vec<f32>,
+    /// Σ c² over pixels.
+    pub energy: Vec<f32>,
+    /// Σ (c (colour − B))² over pixels and channels, B the colour behind the Gaussian at that pixel, background included: the squared
+    /// change of the picture if it were gone. Exact wherever the pixel does not stop early. Empty unless wanted.
+    pub removal: Vec<f32>,
+}
+
+/// Scores one view on the CPU. The result does not depend on the number of threads.
+pub fn score(scene: &RuntimeScene, view: &View, background: Background, want: Want) -> ViewScore {
+    let layer = Layer { scene, view: *view, appearance: Appearance::default() };
+    let splats = project(&layer, BlendSpace::Encoded);
+    let TileLists { pairs, ranges, .. } = tile_lists(&splats, view);
+    let environment = scene.environment.as_ref();
+    let behind =
+        |x, y| behind(view, background, environment.map(|map| (map, Appearance::default())), BlendSpace::Encoded, x, y);
+    let slots: Vec<Vec<Slot>> = ranges
+        .par_iter()
+        .enumerate()
+        .map(|(tile, range)| score_tile(Tile::new(tile as u32, view), &splats, &pairs[range.clone()], want, &behind))
+        .collect();
+    let mut sums = vec![Slot::default(); splats.len()];
+    for (pair, slot) in pairs.iter().zip(slots.iter().flatten()) {
+        sums[pair.splat as usize].add(slot);
+    }
+    let column = |of: fn(&Slot) -> f64| sums.iter().map(|slot| of(slot) as f32).collect();
+    ViewScore {
+        contribution: column(|slot| slot.contribution),
+        energy: column(|slot| slot.energy),
+        removal: if want >= Want::Removal { column(|slot| slot.removal) } else { Vec::new() },
+    }
+}
+
+/// Sums of one Gaussian over a tile, then over the picture.
+#[derive(Debug, Clone, Copy, Default)]
+struct Slot {
+    contribution: f64,
+    energy: f64,
+    removal: f64,
+}
+
+impl Slot {
+    fn add(&mut self, other: &Self) {
+        self.contribution += other.contribution;
+        self.energy += other.energy;
+        self.removal += other.removal;
+    }
+
+    fn contribute(&mut self, weight: f32) {
+        let weight = f64::from(weight);
+        self.contribution += weight;
+        self.energy += weight * weight;
+    }
+}
+
+/// One slot for each pair of the tile.
+fn score_tile(
+    tile: Tile,
+    splats: &[Splat],
+    pairs: &[Pair],
+    want: Want,
+    behind: &impl Fn(u32, u32) -> Vec3,
+) -> Vec<Slot> {
+    let mut slots = vec![Slot::default(); pairs.len()];
+    if want < Want::Removal {
+        tile.blend(splats, pairs, |slot, _, step| slots[slot].contribute(step.weight));
+        return slots;
+    }
+    let last = tile.clone().blend(splats, pairs, |_, _, _| {}).over(behind);
+    tile.blend(splats, pairs, |slot, splat, step| {
+        let slot = &mut slots[slot];
+        slot.contribute(step.weight);
+        let behind = (last[step.pixel] - step.color) / step.left;
+        let change = step.weight * (splat.color - behind);
+        slot.removal += f64::from(change.length_squared());
+    });
+    slots
+}
+
+const SIDE: usize = TILE_SIZE as usize;
+const PIXELS: usize = SIDE * SIDE;
+
+/// The pixels of a tile on their way from front to back.
+#[derive(Clone)]
+struct Tile {
+    origin: UVec2,
+    width: usize,
+    height: usize,
+    /// Transmittance; with the sign turned where the pixel has stopped.
+    transmittance: [f32; PIXELS],
+    color: [Vec3; PIXELS],
+    /// Pixels of each row that have not stopped.
+    live: [usize; SIDE],
+}
+
+/// A splat blended into a pixel.
+struct Step {
+    pixel: usize,
+    /// α T.
+    weight: f32,
+    /// Transmittance after it.
+    left: f32,
+    /// Colour of the pixel after it, without what is behind.
+    color: Vec3,
+}
+
+impl Tile {
+    fn new(index: u32, view: &View) -> Self {
+        let across = view.tiles().x;
+        let origin = UVec2::new(index % across, index / across) * TILE_SIZE;
+        let size = (view.size - origin).min(UVec2::splat(TILE_SIZE));
+        Self {
+            origin,
+            width: size.x as usize,
+            height: size.y as usize,
+            transmittance: [1.0; PIXELS],
+            color: [Vec3::ZERO; PIXELS],
+            live: std::array::from_fn(|row| if row < size.y as usize { size.x as usize } else { 0 }),
+        }
+    }
+
+    /// Blends the splats of the tile in order, each into all pixels that it reaches; `each` sees the number of its pair.
+    fn blend(mut self, splats: &[Splat], pairs: &[Pair], mut each: impl FnMut(usize, &Splat, &Step)) -> Self {
+        for (number, pair) in pairs.iter().enumerate() {
+            if self.live.iter().all(|&live| live == 0) {
+                break;
+            }
+            let splat = &splats[pair.splat as usize];
+            let reach = Reach::of(splat);
+            for row in 0..self.height {
+                if self.live[row] > 0 {
+                    self.blend_row(row, splat, &reach, |step| each(number, splat, step));
+                }
+            }
+        }
+        self
+    }
+
+    fn blend_row(&mut self, row: usize, splat: &Splat, reach: &Reach, mut each: impl FnMut(&Step)) {
+        let dy = splat.center.y - (self.origin.y + row as u32) as f32;
+        let conic = splat.conic;
+        for column in reach.columns(dy, self.origin.x, self.width) {
+            let pixel = row * SIDE + column;
+            let before = self.transmittance[pixel];
+            if before < 0.0 {
+                continue;
+            }
+            let dx = splat.center.x - (self.origin.x + column as u32) as f32;
+            let power = -0.5 * (conic.x * dx * dx + conic.z * dy * dy) - conic.y * dx * dy;
+            if power > 0.0 || power < reach.cutoff {
+                continue;
+            }
+            let alpha = (splat.opacity * power.exp()).min(ALPHA_MAX);
+            if alpha < ALPHA_MIN {
+                continue;
+            }
+            let left = before * (1.0 - alpha);
+            if left < TRANSMITTANCE_MIN {
+                self.transmittance[pixel] = -before;
+                self.live[row] -= 1;
+                continue;
+            }
+            let weight = alpha * before;
+            self.transmittance[pixel] = left;
+            self.color[pixel] += splat.color * weight;
+            each(&Step { pixel, weight, left, color: self.color[pixel] });
+        }
+    }
+
+    /// The final colours, over what stands behind.
+    fn over(self, behind: &impl Fn(u32, u32) -> Vec3) -> [Vec3; PIXELS] {
+        let mut color = self.color;
+        for row in 0..self.height {
+            for column in 0..self.width {
+                let pixel = row * SIDE + column;
+                let back = behind(self.origin.x + column as u32, self.origin.y + row as u32);
+                color[pixel] += self.transmittance[pixel].abs() * back;
+            }
+        }
+        color
+    }
+}
+
+/// Where the alpha of a splat can reach 1/255: the inside of an ellipse. What lies outside is skipped; what lies inside is tested.
+struct Reach {
+    center: f64,
+    conic: [f64; 3],
+    /// Bound of `dᵀ conic d`.
+    energy: f64,
+    /// Whether the conic is that of an ellipse.
+    bounded: bool,
+    /// A power below this gives too little alpha, with room for rounding.
+    cutoff: f32,
+}
+
+impl Reach {
+    fn of(splat: &Splat) -> Self {
+        let conic = splat.conic.to_array().map(f64::from);
+        let [xx, xy, yy] = conic;
+        let cutoff = (ALPHA_MIN / splat.opacity).ln() - 1e-3;
+        Self {
+            center: f64::from(splat.center.x),
+            conic,
+            energy: -2.0 * f64::from(cutoff) + 0.01,
+            bounded: xx > 0.0 && yy > 0.0 && xx * yy > xy * xy,
+            cutoff,
+        }
+    }
+
+    /// The columns of a row at height `dy` below the centre, of a tile that begins at pixel `first`.
+    fn columns(&self, dy: f32, first: u32, width: usize) -> Range<usize> {
+        if !self.bounded {
+            return 0..width;
+        }
+        let (dy, center, end) = (f64::from(dy), self.center - f64::from(first), width as f64);
+        let [xx, xy, yy] = self.conic;
+        let (cross, rest) = (xy * dy, yy * dy * dy);
+        // The power is computed in f32, from terms that may be much larger than their sum.
+        let far = center.abs().max((center - end).abs());
+        let energy = self.energy + 1e-5 * (xx * far * far + rest + 2.0 * cross.abs() * far);
+        let root = cross * cross - xx * (rest - energy);
+        if root < 0.0 {
+            return 0..0;
+        }
+        let (middle, half) = (center + cross / xx, root.sqrt() / xx);
+        let low = (middle - half).ceil().clamp(0.0, end);
+        let high = ((middle + half).floor() + 1.0).clamp(0.0, end);
+        low as usize..high as usize
+    }
+}

@@ -1,0 +1,137 @@
+//! Masks: which Gaussians are seen when, and the temporal filters made of them.
+//!
+//! In: a [`ScoreEngine`], training cameras and views. Out: sets of Gaussians at key-frames, 32 to a word, and a [`TemporalFilter`]. The
+//! third kind, `support`, needs no views: [`TemporalFilter::support`].
+
+use super::score::{ScoreEngine, ScoreError, Want};
+use crate::scene::{FilterKind, TemporalFilter};
+use crate::view::{Camera, RasterFov, View};
+
+/// A set of Gaussians: Gaussian `i` at bit `i % 32` of word `i / 32`.
+pub type Mask = Vec<u32>;
+
+/// `keys` times at even spacing over the interval, both ends included; at least two.
+pub fn key_times(interval: [f32; 2], keys: u32) -> Vec<f32> {
+    let [first, last] = interval.map(f64::from);
+    let segments = keys.max(2) - 1;
+    (0..=segments).map(|j| (first + (last - first) * f64::from(j) / f64::from(segments)) as f32).collect()
+}
+
+/// How many key-frames there are, both ends included, if one comes every `frames` of `times` timestamps; at least two.
+pub fn keys_every(times: usize, frames: usize) -> usize {
+    times.saturating_sub(1).div_ceil(frames.max(1)).max(1) + 1
+}
+
+/// Adds to a set whatever the view blends into at least one pixel.
+///
+/// # Errors
+/// The engine's.
+pub fn add_blended(engine: &mut dyn ScoreEngine, view: &View, mask: &mut [u32]) -> Result<(), ScoreError> {
+    let score = engine.score(view, Want::Contribution)?;
+    for (word, values) in mask.iter_mut().zip(score.contribution.chunks(32)) {
+        for (bit, &contribution) in values.iter().enumerate() {
+            *word |= u32::from(contribution > 0.0) << bit;
+        }
+    }
+    Ok(())
+}
+
+/// One mask for each key-frame: what any of the cameras blends at that time. `count` is the number of Gaussians; `drawn` is called after
+/// each view.
+///
+/// # Errors
+/// No cameras, nothing seen by any of them at any time, a failure of the engine.
+pub fn key_frame_masks(
+    engine: &mut dyn ScoreEngine,
+    cameras: &[Camera],
+    raster_fov: RasterFov,
+    times: &[f32],
+    count: usize,
+    mut drawn: impl FnMut(),
+) -> Result<Vec<Mask>, ScoreError> {
+    if cameras.is_empty() {
+        return Err(ScoreError::NoViews);
+    }
+    let mut masks = vec![vec![0; TemporalFilter::words(count)]; times.len()];
+    for (mask, &time) in masks.iter_mut().zip(times) {
+        for camera in cameras {
+            add_blended(engine, &camera.view(time, raster_fov), mask)?;
+            drawn();
+        }
+    }
+    if masks.iter().flatten().all(|&word| word == 0) {
+        return Err(ScoreError::NothingContributes);
+    }
+    Ok(masks)
+}
+
+/// The paper's filter: in each segment, what is in the masks at its two ends. At least two masks of `count` Gaussians.
+pub fn key_frame_filter(masks: &[Mask], count: usize) -> TemporalFilter {
+    from_segments(FilterKind::KeyFrame, &unions(masks), count)
+}
+
+/// The key-frame filter, and in each segment what any of the views whose time lies in it blends. `drawn` is called after each view.
+///
+/// # Errors
+/// The engine's.
+pub fn interval_filter(
+    engine: &mut dyn ScoreEngine,
+    masks: &[Mask],
+    views: &[View],
+    interval: [f32; 2],
+    count: usize,
+    mut drawn: impl FnMut(),
+) -> Result<TemporalFilter, ScoreError> {
+    let mut segments = unions(masks);
+    let ends = from_segments(FilterKind::Interval, &segments, count);
+    for view in views {
+        let segment = ends.segment_of(view.time, interval) as usize;
+        add_blended(engine, view, &mut segments[segment])?;
+        drawn();
+    }
+    Ok(from_segments(FilterKind::Interval, &segments, count))
+}
+
+/// Intersection over union of the sets of each pair of neighbouring segments; 1 where both are empty.
+pub fn neighbour_overlap(filter: &TemporalFilter) -> Vec<f64> {
+    let bits = filter.to_bits();
+    let sets: Vec<&[u32]> = bits.chunks(TemporalFilter::words(filter.count).max(1)).collect();
+    let overlap = |pair: &[&[u32]]| {
+        let words = || pair[0].iter().zip(pair[1]);
+        let both: u32 = words().map(|(a, b)| (a & b).count_ones()).sum();
+        let any: u32 = words().map(|(a, b)| (a | b).count_ones()).sum();
+        if any == 0 { 1.0 } else { f64::from(both) / f64::from(any) }
+    };
+    sets.windows(2).map(overlap).collect()
+}
+
+fn unions(masks: &[Mask]) -> Vec<Mask> {
+    masks.windows(2).map(|pair| pair[0].iter().zip(&pair[1]).map(|(a, b)| a | b).collect()).collect()
+}
+
+fn from_segments(kind: FilterKind, segments: &[Mask], count: usize) -> TemporalFilter {
+    TemporalFilter::from_bits(kind, segments.len() as u32, count, segments.concat())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn key_frames_are_even_and_include_both_ends() {
+        assert_eq!(key_times([0.0, 1.0], 6), [0.0, 0.2, 0.4, 0.6, 0.8, 1.0], "the paper's on D-NeRF");
+        assert_eq!(key_times([2.0, 10.0], 3), [2.0, 6.0, 10.0], "another interval");
+        assert_eq!(key_times([0.0, 1.0], 0), [0.0, 1.0], "never fewer than two");
+        assert_eq!(keys_every(300, 20), 16, "the paper's on N3V");
+        assert_eq!(keys_every(31, 10), 4, "a whole number of steps");
+        assert_eq!((keys_every(1, 20), keys_every(0, 0)), (2, 2), "never fewer than two");
+    }
+
+    #[test]
+    fn a_segment_has_what_its_ends_have() {
+        let filter = key_frame_filter(&[vec![0b0001], vec![0b0110], vec![0b0100]], 4);
+        assert_eq!(filter.segments, 2, "one less than masks");
+        assert_eq!(filter.to_bits(), [0b0111, 0b0110], "unions of neighbours");
+        assert_eq!(neighbour_overlap(&filter), [2.0 / 3.0], "two of three");
+    }
+}

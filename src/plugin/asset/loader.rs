@@ -1,0 +1,97 @@
+//! Loaders: from files of an asset source to captures.
+//!
+//! In: the bytes of a file named `*.gs4d` or `*.pth` and, for a checkpoint, the [`CheckpointOptions`] for what it does not say
+//! (`load_builder().with_settings(|options: &mut CheckpointOptions| ..)` or a `.meta` file) and `cfg_args` beside it. Out: a
+//! [`GaussianCapture`] or a [`CaptureLoadError`], to which Bevy adds the path.
+
+use super::GaussianCapture;
+use crate::codec::checkpoint::{self, CheckpointError, CheckpointOptions};
+use crate::codec::package::{self, PackageError};
+use crate::gaussian::InvalidGaussian;
+use bevy::asset::io::Reader;
+use bevy::asset::{AssetLoader, AssetPath, LoadContext};
+use bevy::reflect::TypePath;
+use std::io::Cursor;
+
+/// Why a capture could not be loaded.
+#[derive(Debug, thiserror::Error)]
+pub enum CaptureLoadError {
+    /// The asset source could not deliver the bytes.
+    #[error("the file could not be read: {0}")]
+    Read(#[from] std::io::Error),
+    /// The bytes are no intact package.
+    #[error(transparent)]
+    Package(#[from] PackageError),
+    /// The bytes are no checkpoint that can be read.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// The file is intact but holds a Gaussian that cannot be drawn.
+    #[error(transparent)]
+    Gaussian(#[from] InvalidGaussian),
+}
+
+/// Loads packages, `.gs4d`.
+#[derive(Debug, Default, TypePath)]
+pub struct PackageLoader;
+
+impl AssetLoader for PackageLoader {
+    type Asset = GaussianCapture;
+    type Settings = ();
+    type Error = CaptureLoadError;
+
+    async fn load(
+        &self,
+        reader: &mut dyn Reader,
+        _settings: &(),
+        _context: &mut LoadContext<'_>,
+    ) -> Result<GaussianCapture, CaptureLoadError> {
+        let scene = package::read(Cursor::new(bytes(reader).await?))?;
+        Ok(GaussianCapture::new(scene.into_runtime()?))
+    }
+
+    fn extensions(&self) -> &[&str] {
+        &["gs4d"]
+    }
+}
+
+/// Loads checkpoints of the original code, `.pth`. What the options leave open is taken from `cfg_args`, the file that the trainer
+/// leaves in the same folder, if it is there. Then it belongs to the checkpoint: when it changes, both are loaded again.
+#[derive(Debug, Default, TypePath)]
+pub struct CheckpointLoader;
+
+impl AssetLoader for CheckpointLoader {
+    type Asset = GaussianCapture;
+    type Settings = CheckpointOptions;
+    type Error = CaptureLoadError;
+
+    async fn load(
+        &self,
+        reader: &mut dyn Reader,
+        settings: &CheckpointOptions,
+        context: &mut LoadContext<'_>,
+    ) -> Result<GaussianCapture, CaptureLoadError> {
+        let cfg_args = cfg_args_beside(context).await;
+        let scene = checkpoint::read(Cursor::new(bytes(reader).await?), settings, cfg_args.as_deref())?;
+        Ok(GaussianCapture::new(scene.into_runtime()?))
+    }
+
+    fn extensions(&self) -> &[&str] {
+        &["pth"]
+    }
+}
+
+/// The text of `cfg_args` in the folder of a checkpoint. It is optional: one that cannot be read counts as absent.
+async fn cfg_args_beside(context: &mut LoadContext<'_>) -> Option<String> {
+    let checkpoint = context.path();
+    let beside = AssetPath::from(checkpoint.path().with_file_name("cfg_args"));
+    let path = beside.with_source(checkpoint.source().clone_owned());
+    let text = context.read_asset_bytes(path).await.ok()?;
+    Some(String::from_utf8_lossy(&text).into_owned())
+}
+
+/// The whole file: both formats are read out of order.
+async fn bytes(reader: &mut dyn Reader) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    reader.read_to_end(&mut bytes).await?;
+    Ok(bytes)
+}

@@ -1,0 +1,72 @@
+//! The saver: from a capture in memory to a package.
+//!
+//! In: a [`GaussianCapture`] and [`PackageSaverSettings`]. Out: the bytes of a `.gs4d` file that [`PackageLoader`] loads as the same
+//! capture, wherever Bevy writes assets.
+
+use super::{GaussianCapture, PackageLoader};
+use crate::codec::package::{self, PackageError, WriteSettings};
+use crate::scene::GaussianScene;
+use bevy::asset::io::Writer;
+use bevy::asset::saver::{AssetSaver, SavedAsset};
+use bevy::asset::{AssetPath, AsyncWriteExt};
+use bevy::reflect::TypePath;
+use serde::{Deserialize, Serialize};
+
+/// Saves captures as packages, `.gs4d`, without loss. While it does, the scene is twice in memory.
+///
+/// ```no_run
+/// # use bevy::asset::saver::{SaveAssetError, SavedAsset, save_using_saver};
+/// # use bevy::prelude::*;
+/// # use bevy_gs4d::asset::{GaussianCapture, PackageSaver, PackageSaverSettings};
+/// # async fn save(server: AssetServer, capture: GaussianCapture) -> Result<(), SaveAssetError> {
+/// let saved = SavedAsset::from_asset(&capture);
+/// save_using_saver(server, &PackageSaver, &"made.gs4d".into(), saved, &PackageSaverSettings::default()).await
+/// # }
+/// ```
+#[derive(Debug, Default, Clone, Copy, TypePath)]
+pub struct PackageSaver;
+
+/// How a package is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PackageSaverSettings {
+    /// zstd level, 1 (fast) to 19 (small); what is outside is clamped.
+    pub level: i32,
+}
+
+impl Default for PackageSaverSettings {
+    fn default() -> Self {
+        Self { level: WriteSettings::default().level }
+    }
+}
+
+/// Why a capture could not be saved.
+#[derive(Debug, thiserror::Error)]
+pub enum CaptureSaveError {
+    /// The format cannot hold the scene.
+    #[error(transparent)]
+    Package(#[from] PackageError),
+    /// The asset source did not take the bytes.
+    #[error("the file could not be written: {0}")]
+    Write(#[from] std::io::Error),
+}
+
+impl AssetSaver for PackageSaver {
+    type Asset = GaussianCapture;
+    type Settings = PackageSaverSettings;
+    type OutputLoader = PackageLoader;
+    type Error = CaptureSaveError;
+
+    async fn save(
+        &self,
+        writer: &mut Writer,
+        capture: SavedAsset<'_, '_, GaussianCapture>,
+        settings: &PackageSaverSettings,
+        _path: AssetPath<'_>,
+    ) -> Result<(), CaptureSaveError> {
+        let mut bytes = Vec::new();
+        let scene = GaussianScene::from(capture.scene().clone());
+        package::write(&mut bytes, &scene, &WriteSettings { level: settings.level })?;
+        Ok(writer.write_all(&bytes).await?)
+    }
+}

@@ -1,0 +1,27 @@
+//! The plugin that a game adds.
+//!
+//! In: an app with Bevy's `DefaultPlugins` (or at least its `AssetPlugin`). Out: the same app, in which captures load, play and, where
+//! there is a renderer, are drawn.
+
+use super::asset::CaptureAssetPlugin;
+use super::playback::PlaybackPlugin;
+use super::render::CaptureRenderPlugin;
+use bevy::app::{App, Plugin};
+
+/// Loads, plays and draws captures. Add it after `DefaultPlugins`; spawn
+/// [`GaussianCapture3d`](super::component::GaussianCapture3d)s; there is nothing to set on cameras.
+///
+/// ```no_run
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// App::new().add_plugins((DefaultPlugins, GaussianCapturePlugin)).run();
+/// ```
+#[derive(Debug, Default, Clone, Copy)]
+pub struct GaussianCapturePlugin;
+
+impl Plugin for GaussianCapturePlugin {
+    fn build(&self, app: &mut App) {
+        app.add_plugins((CaptureAssetPlugin, PlaybackPlugin, CaptureRenderPlugin));
+    }
+}

@@ -1,0 +1,145 @@
+//! The asset type: a scene ready to draw, shared.
+//!
+//! In: a [`RuntimeScene`]. Out: a [`GaussianCapture`], cheap to clone, with what a game asks of it: where it is, how long it
+//! plays, which way is up.
+
+use super::KeyFrames;
+use crate::scene::{Bounds, BoundsOverTime, RuntimeScene};
+use bevy::asset::Asset;
+use bevy::reflect::TypePath;
+use glam::{Quat, Vec3};
+use std::sync::Arc;
+
+/// A capture as an asset. Spawn it with [`GaussianCapture3d`](crate::plugin::component::GaussianCapture3d).
+#[derive(Asset, TypePath, Debug, Clone)]
+pub struct GaussianCapture {
+    scene: Arc<RuntimeScene>,
+    bounds: Option<Arc<BoundsOverTime>>,
+}
+
+impl GaussianCapture {
+    /// A capture from a scene made in memory: `assets.add(GaussianCapture::new(scene))`.
+    pub fn new(scene: RuntimeScene) -> Self {
+        let mut capture = Self { scene: Arc::new(scene), bounds: None };
+        // A still never leaves its first moment.
+        let shown = [0.0, f32::INFINITY].map(|seconds| capture.time_at(seconds));
+        capture.bounds = BoundsOverTime::of(capture.scene.iter(), shown).map(Arc::new);
+        capture
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &RuntimeScene {
+        &self.scene
+    }
+
+    /// The box about everything that is drawn at any time, in capture space; nothing for an empty capture.
+    pub fn bounds(&self) -> Option<Bounds> {
+        self.bounds.as_ref().map(|bounds| bounds.whole())
+    }
+
+    /// The box about everything that is drawn at `seconds` since the start, and somewhat earlier and later (a 32nd of the duration),
+    /// in capture space; nothing where nothing is drawn.
+    pub fn bounds_at(&self, seconds: f32) -> Option<Bounds> {
+        self.bounds.as_ref()?.at(self.time_at(seconds))
+    }
+
+    /// Seconds that one pass takes at speed 1; 0 for a still.
+    pub fn duration_seconds(&self) -> f32 {
+        let seconds = self.scene.playback.duration_seconds;
+        if seconds.is_finite() { seconds.max(0.0) } else { 0.0 }
+    }
+
+    /// The capture's own timestamp at `seconds` since its start; what lies outside is clamped.
+    pub fn time_at(&self, seconds: f32) -> f32 {
+        let [first, last] = self.scene.trained_with.time_interval;
+        let duration = self.duration_seconds();
+        if duration == 0.0 {
+            return first;
+        }
+        let fraction = if seconds.is_nan() { 0.0 } else { (seconds / duration).clamp(0.0, 1.0) };
+        first + fraction * (last - first)
+    }
+
+    /// Seconds since the start at the capture's own timestamp `time`: the reverse of [`time_at`](Self::time_at).
+    pub fn seconds_at(&self, time: f32) -> f32 {
+        let [first, last] = self.scene.trained_with.time_interval;
+        if last == first { 0.0 } else { (time - first) / (last - first) * self.duration_seconds() }
+    }
+
+    /// When the key-frames of its temporal filter are; nothing without a filter, and for a still.
+    pub fn key_frames(&self) -> Option<KeyFrames> {
+        KeyFrames::new(self.scene.filter.as_ref()?.segments, self.duration_seconds())
+    }
+
+    /// The shortest rotation that stands the capture upright in Bevy's world, where +Y is up.
+    pub fn upright(&self) -> Quat {
+        Quat::from_rotation_arc(self.scene.playback.up.vector(), Vec3::Y)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gaussian::{Gaussian, Harmonics};
+    use crate::scene::{PlaybackHints, TrainedWith, UpAxis};
+
+    fn capture(time_interval: [f32; 2], duration_seconds: f32) -> GaussianCapture {
+        with(Vec::new(), time_interval, duration_seconds)
+    }
+
+    fn with(gaussians: Vec<Gaussian>, time_interval: [f32; 2], duration_seconds: f32) -> GaussianCapture {
+        GaussianCapture::new(RuntimeScene {
+            gaussians,
+            packed: None,
+            harmonics: Harmonics::default(),
+            environment: None,
+            filter: None,
+            trained_with: TrainedWith { time_interval, ..TrainedWith::default() },
+            playback: PlaybackHints { up: UpAxis::PosZ, duration_seconds },
+        })
+    }
+
+    #[test]
+    fn seconds_map_onto_the_time_interval() {
+        let capture = capture([-0.5, 1.5], 4.0);
+        assert_eq!(capture.time_at(0.0), -0.5, "the start is T0");
+        assert_eq!(capture.time_at(4.0), 1.5, "the end is T1");
+        assert_eq!(capture.time_at(9.0), 1.5, "beyond the end is the end");
+        assert_eq!(capture.time_at(f32::NAN), -0.5, "no number is the start");
+        assert_eq!(capture.seconds_at(capture.time_at(1.0)), 1.0, "and back");
+    }
+
+    #[test]
+    fn a_still_stays_at_its_first_moment() {
+        assert_eq!(capture([0.25, 1.0], 0.0).time_at(3.0), 0.25, "no duration, no motion");
+        assert_eq!(capture([0.25, 1.0], f32::INFINITY).duration_seconds(), 0.0, "an endless capture is a still");
+    }
+
+    #[test]
+    fn bounds_follow_playback() {
+        let runner = Gaussian {
+            mean: [0.0; 3],
+            mean_t: 0.0,
+            velocity: [1.0, 0.0, 0.0],
+            sigma_t: f32::INFINITY,
+            covariance: [1e-4, 0.0, 0.0, 1e-4, 0.0, 1e-4],
+            opacity: 0.5,
+            padding: 0.0,
+        };
+        let empty = capture([0.0, 1.0], 1.0);
+        let capture = with(vec![runner], [0.0, 8.0], 2.0);
+        let x = |seconds| capture.bounds_at(seconds).expect("always there").center().x;
+        assert!(x(0.0) < 0.2 && x(2.0) > 7.8, "from {} to {} in two seconds", x(0.0), x(2.0));
+        assert!(capture.bounds().is_some_and(|all| all.min.x < 0.0 && all.max.x > 8.0), "the whole way");
+        let still = with(vec![runner], [3.0, 8.0], 0.0);
+        assert_eq!(still.bounds_at(1.0), still.bounds(), "a still does not move");
+        assert!(still.bounds().is_some_and(|all| all.min.x > 2.9 && all.max.x < 3.1), "and stays at its first moment");
+        assert_eq!(empty.bounds_at(0.0), None, "an empty capture is nowhere");
+    }
+
+    #[test]
+    fn upright_turns_the_up_axis_to_y() {
+        let up = capture([0.0, 1.0], 1.0).upright() * Vec3::Z;
+        assert!(up.abs_diff_eq(Vec3::Y, 1e-6), "+z of the capture points up, not to {up}");
+    }
+}

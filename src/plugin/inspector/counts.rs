@@ -1,0 +1,28 @@
+//! Counts: how much of a capture a view draws.
+//!
+//! In: the statistics of a view, the time between frames. Out: bars.
+
+use super::presentation::{count, frame_rate, share};
+use crate::renderer::ViewStatistics;
+use bevy_egui::egui;
+
+/// Draws the section. `view` is the camera that is shown, once it has drawn something; `frame_seconds` the mean time of a frame.
+pub(super) fn show(ui: &mut egui::Ui, view: Option<&ViewStatistics>, frame_seconds: f32) {
+    ui.label(frame_rate(frame_seconds));
+    let Some(view) = view else {
+        ui.weak("this view has drawn nothing yet");
+        return;
+    };
+    for (name, part) in [("total", view.total), ("active", view.active), ("visible", view.visible)] {
+        let share = share(part.into(), view.total.into());
+        bar(ui, share, format!("{name}: {} ({:.0} %)", count(part.into()), share * 100.0));
+    }
+    let each = if view.visible > 0 { f64::from(view.pairs) / f64::from(view.visible) } else { 0.0 };
+    ui.label(format!("pairs: {}, {each:.1} for each that is visible", count(view.pairs.into())))
+        .on_hover_text("a pair is one Gaussian in one tile of the picture");
+}
+
+/// A bar with its meaning on it; `share` from 0 to 1.
+pub(super) fn bar(ui: &mut egui::Ui, share: f32, text: String) {
+    ui.add(egui::ProgressBar::new(share).corner_radius(2.0).text(text));
+}

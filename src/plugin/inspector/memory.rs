@@ -1,0 +1,16 @@
+//! Memory: what is on the GPU.
+//!
+//! In: [`CaptureStatistics`] and those of a view. Out: lines of text.
+
+use super::presentation;
+use crate::plugin::render::CaptureStatistics;
+use crate::renderer::ViewStatistics;
+use bevy_egui::egui;
+
+/// Draws the section. `view` is the camera that is shown, once it has drawn something.
+pub(super) fn show(ui: &mut egui::Ui, statistics: &CaptureStatistics, view: Option<&ViewStatistics>) {
+    let (captures, scenes) = (statistics.uploaded_captures(), statistics.capture_bytes());
+    ui.label(format!("captures: {} in {captures}", presentation::bytes(scenes)));
+    let working = view.map_or(0, |view| view.bytes);
+    ui.label(format!("working memory of this view: {}", presentation::bytes(working)));
+}

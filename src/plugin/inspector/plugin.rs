@@ -1,0 +1,303 @@
+//! The plugin and the panel itself.
+//!
+//! In: captures, cameras, [`CaptureStatistics`]. Out: the panel; what somebody touches in it is written back, and nothing else.
+
+use super::chooser::{self, Choice};
+use super::presentation::smoothed;
+use super::timing::Measuring;
+use super::{appearance, camera, counts, memory, playback, timing};
+use crate::plugin::asset::{CaptureState, GaussianCapture};
+use crate::plugin::component::GaussianCapture3d;
+use crate::plugin::playback::Playback;
+use crate::plugin::render::{CaptureSettings, CaptureStatistics, CaptureViewSettings};
+use bevy::app::{App, Plugin, PreUpdate, Update};
+use bevy::asset::{AssetServer, Assets};
+use bevy::camera::{Camera, Camera3d, RenderTarget};
+use bevy::core_pipeline::tonemapping::Tonemapping;
+use bevy::ecs::change_detection::DetectChangesMut;
+use bevy::ecs::entity::Entity;
+use bevy::ecs::name::Name;
+use bevy::ecs::query::{With, Without};
+use bevy::ecs::resource::Resource;
+use bevy::ecs::schedule::IntoScheduleConfigs;
+use bevy::ecs::schedule::common_conditions::not;
+use bevy::ecs::system::{Commands, Local, Query, Res, ResMut, SystemParam};
+use bevy::input::ButtonInput;
+use bevy::input::keyboard::KeyCode;
+use bevy::render::view::Msaa;
+use bevy::time::{Real, Time};
+use bevy_egui::input::{WindowToEguiContextMap, egui_wants_any_keyboard_input};
+use bevy_egui::{
+    EguiContext, EguiContexts, EguiGlobalSettings, EguiPlugin, EguiPreUpdateSet, EguiPrimaryContextPass,
+    PrimaryEguiContext, egui, setup_primary_egui_context_system,
+};
+
+/// Draws the panel that [the module](crate::plugin::inspector) describes at the right edge of the first camera's picture. It is open from the
+/// start; F1 closes and opens it.
+///
+/// Add it after `DefaultPlugins` and [`GaussianCapturePlugin`](crate::GaussianCapturePlugin). It brings `EguiPlugin` along
+/// if that has not been added before. It works without a window, too. When the panel's camera goes, another one gets it, unless
+/// [`EguiGlobalSettings::auto_create_primary_context`] is off.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct InspectorPlugin;
+
+/// What a game sets of the panel. Any field may be set at any time.
+#[derive(Resource, Debug, Clone, PartialEq)]
+pub struct Inspector {
+    /// Whether the panel shows, as it does at first. While it does not, it costs nothing.
+    pub open: bool,
+    /// The key that closes and opens it; F1 unless set.
+    pub key: KeyCode,
+    /// The entity with the capture that the panel is about; while it is none, or one without a capture, the first capture.
+    pub selected: Option<Entity>,
+    /// The camera whose view the panel is about; while it is none, or no `Camera3d`, the first one.
+    pub camera: Option<Entity>,
+    /// How many frames a second the buttons step by.
+    pub fps: f32,
+    /// A line of the game's own at the end of the panel.
+    pub note: String,
+}
+
+impl Default for Inspector {
+    fn default() -> Self {
+        Self { open: true, key: KeyCode::F1, selected: None, camera: None, fps: 30.0, note: String::new() }
+    }
+}
+
+impl Plugin for InspectorPlugin {
+    fn build(&self, app: &mut App) {
+        if !app.is_plugin_added::<EguiPlugin>() {
+            app.add_plugins(EguiPlugin::default());
+        }
+        app.init_resource::<Inspector>()
+            .add_systems(
+                PreUpdate,
+                move_context
+                    .in_set(EguiPreUpdateSet::InitContexts)
+                    // The context that bevy_egui has just made must be seen, or there would be two.
+                    .after(setup_primary_egui_context_system)
+                    .before(WindowToEguiContextMap::on_egui_context_added_system),
+            )
+            .add_systems(Update, toggle.run_if(not(egui_wants_any_keyboard_input)))
+            .add_systems(EguiPrimaryContextPass, show_panel);
+    }
+}
+
+fn toggle(keys: Res<ButtonInput<KeyCode>>, mut inspector: ResMut<Inspector>) {
+    if keys.just_pressed(inspector.key) {
+        inspector.open = !inspector.open;
+    }
+}
+
+/// Gives the panel another camera when its own is gone, which `bevy_egui` does not: one that draws into a window, if there is one.
+fn move_context(
+    settings: Res<EguiGlobalSettings>,
+    contexts: Query<(), With<PrimaryEguiContext>>,
+    cameras: Query<(Entity, &Camera, Option<&RenderTarget>), Without<EguiContext>>,
+    mut commands: Commands,
+) {
+    if !settings.auto_create_primary_context || !contexts.is_empty() {
+        return;
+    }
+    let in_window = |target: Option<&RenderTarget>| matches!(target, Some(RenderTarget::Window(_)));
+    let next = cameras.iter().min_by_key(|(entity, camera, target)| (!camera.is_active, !in_window(*target), *entity));
+    if let Some((camera, ..)) = next {
+        commands.entity(camera).insert(PrimaryEguiContext);
+    }
+}
+
+/// Width of the panel, points.
+const WIDTH: f32 = 300.0;
+/// Distance from the edges, points.
+const MARGIN: f32 = 8.0;
+
+fn show_panel(
+    mut contexts: EguiContexts,
+    mut inspector: ResMut<Inspector>,
+    mut subject: Subject,
+    mut measuring: Local<Measuring>,
+    mut frame_seconds: Local<f32>,
+) {
+    *frame_seconds = smoothed(*frame_seconds, subject.time.delta_secs());
+    let mut edited = inspector.clone();
+    let mut measures = false;
+    if let Ok(context) = contexts.ctx_mut()
+        && inspector.open
+    {
+        let height = (context.content_rect().height() - 2.0 * MARGIN).max(MARGIN);
+        let mut open = true;
+        egui::Window::new("inspector")
+            .open(&mut open)
+            // Time may stand still, and a fading panel with it.
+            .fade_in(false)
+            .fixed_size([WIDTH, height])
+            .anchor(egui::Align2::RIGHT_TOP, [-MARGIN, MARGIN])
+            .show(context, |ui| {
+                egui::ScrollArea::vertical().auto_shrink([false, true]).show(ui, |ui| {
+                    subject.show_capture(ui, &mut edited);
+                    measures = subject.show_camera(ui, &mut edited, &mut measuring, *frame_seconds);
+                    if !edited.note.is_empty() {
+                        ui.separator();
+                        ui.label(edited.note.as_str());
+                    }
+                });
+            });
+        edited.open = open;
+    }
+    measuring.follow(measures, &subject.statistics);
+    inspector.set_if_neq(edited);
+}
+
+type CaptureParts = (
+    Entity,
+    Option<&'static Name>,
+    &'static GaussianCapture3d,
+    &'static CaptureState,
+    &'static mut Playback,
+    &'static mut CaptureSettings,
+);
+
+type CameraParts = (
+    Entity,
+    Option<&'static Name>,
+    Option<&'static mut CaptureViewSettings>,
+    Option<&'static mut Msaa>,
+    Option<&'static mut Tonemapping>,
+);
+
+/// What the panel is about.
+#[derive(SystemParam)]
+struct Subject<'w, 's> {
+    commands: Commands<'w, 's>,
+    captures: Query<'w, 's, CaptureParts>,
+    cameras: Query<'w, 's, CameraParts, With<Camera3d>>,
+    loaded: Res<'w, Assets<GaussianCapture>>,
+    server: Res<'w, AssetServer>,
+    statistics: Res<'w, CaptureStatistics>,
+    time: Res<'w, Time<Real>>,
+}
+
+impl Subject<'_, '_> {
+    /// The sections about one capture.
+    fn show_capture(&mut self, ui: &mut egui::Ui, inspector: &mut Inspector) {
+        if let Some(reason) = self.statistics.renderer_missing() {
+            ui.colored_label(ui.visuals().error_fg_color, format!("captures are not drawn: {reason}"));
+        }
+        let choices = self.capture_choices();
+        let Some(shown) = chooser::shown(inspector.selected, &choices) else {
+            ui.weak("no capture");
+            return;
+        };
+        inspector.selected = chooser::show(ui, "capture", &choices, shown).or(inspector.selected);
+        let Ok((_, _, handle, state, mut player, mut settings)) = self.captures.get_mut(shown) else { return };
+        chooser::show_state(ui, state);
+        let Some(capture) = self.loaded.get(&handle.0) else { return };
+        section(ui, "playback", true, |ui| {
+            let edited = playback::show(ui, *player, capture, &mut inspector.fps);
+            player.set_if_neq(edited);
+        });
+        section(ui, "appearance", false, |ui| {
+            let edited = appearance::show(ui, *settings, capture.bounds());
+            settings.set_if_neq(edited);
+        });
+    }
+
+    /// The sections about one camera. Whether GPU time is to be measured.
+    fn show_camera(
+        &mut self,
+        ui: &mut egui::Ui,
+        inspector: &mut Inspector,
+        measuring: &mut Measuring,
+        frame_seconds: f32,
+    ) -> bool {
+        let choices = self.camera_choices();
+        let Some(shown) = chooser::shown(inspector.camera, &choices) else { return false };
+        let view = self.statistics.view(shown);
+        section(ui, "view", true, |ui| {
+            if choices.len() > 1 {
+                inspector.camera = chooser::show(ui, "camera", &choices, shown).or(inspector.camera);
+            }
+            self.show_view(ui, shown);
+        });
+        section(ui, "counts", true, |ui| counts::show(ui, view.as_ref(), frame_seconds));
+        section(ui, "memory", false, |ui| memory::show(ui, &self.statistics, view.as_ref()));
+        section(ui, "GPU time", false, |ui| match &view {
+            Some(view) if view.total > 0 => timing::show(ui, &view.passes, measuring),
+            _ => {
+                ui.weak("this view draws no capture");
+            }
+        })
+    }
+
+    fn show_view(&mut self, ui: &mut egui::Ui, shown: Entity) {
+        let Ok((_, _, settings, msaa, tonemapping)) = self.cameras.get_mut(shown) else { return };
+        let current = settings.as_deref().copied().unwrap_or_default();
+        let edited = camera::show(ui, current);
+        match settings {
+            Some(mut settings) => {
+                settings.set_if_neq(edited);
+            }
+            None if edited != current => {
+                self.commands.entity(shown).insert(edited);
+            }
+            None => {}
+        }
+        if let Some(mut msaa) = msaa {
+            let edited = camera::show_msaa(ui, *msaa);
+            msaa.set_if_neq(edited);
+        }
+        if let Some(mut tonemapping) = tonemapping {
+            let edited = camera::show_tonemapping(ui, *tonemapping);
+            tonemapping.set_if_neq(edited);
+        }
+    }
+
+    fn capture_choices(&self) -> Vec<Choice> {
+        let choices = self.captures.iter().map(|(entity, name, handle, ..)| {
+            let path = self.server.get_path(handle.0.id()).map(|path| path.to_string());
+            Choice::new(entity, name.map(Name::as_str), path, "capture")
+        });
+        in_order(choices.collect())
+    }
+
+    fn camera_choices(&self) -> Vec<Choice> {
+        let cameras = self.cameras.iter();
+        in_order(
+            cameras.map(|(entity, name, ..)| Choice::new(entity, name.map(Name::as_str), None, "camera")).collect(),
+        )
+    }
+}
+
+/// Queries come in another order whenever an entity gets another component.
+fn in_order(mut choices: Vec<Choice>) -> Vec<Choice> {
+    choices.sort_by_key(|choice| choice.entity);
+    choices
+}
+
+/// Draws a section that can be folded, and returns whether it is open.
+fn section(ui: &mut egui::Ui, title: &str, open: bool, contents: impl FnOnce(&mut egui::Ui)) -> bool {
+    egui::CollapsingHeader::new(title).default_open(open).show(ui, contents).body_returned.is_some()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_key_opens_and_closes_the_panel() {
+        let mut app = App::new();
+        app.init_resource::<ButtonInput<KeyCode>>().init_resource::<Inspector>().add_systems(Update, toggle);
+        let press = |app: &mut App, key| {
+            let mut keys = app.world_mut().resource_mut::<ButtonInput<KeyCode>>();
+            keys.reset_all();
+            keys.press(key);
+            app.update();
+            app.world().resource::<Inspector>().open
+        };
+        assert!(!press(&mut app, KeyCode::F1), "F1 closes the panel");
+        assert!(press(&mut app, KeyCode::F1), "and opens it");
+        app.world_mut().resource_mut::<Inspector>().key = KeyCode::KeyI;
+        assert!(press(&mut app, KeyCode::F1), "another key was set");
+        assert!(!press(&mut app, KeyCode::KeyI), "which closes it");
+    }
+}

@@ -1,0 +1,45 @@
+//! GPU time: how long each pass takes.
+//!
+//! In: whether the section is open, the passes that have been measured. Out: bars, and the wish to measure, which costs some time
+//! itself.
+
+use super::counts::bar;
+use super::presentation::share;
+use crate::plugin::render::CaptureStatistics;
+use crate::renderer::PassTime;
+use bevy_egui::egui;
+
+/// Frames after which what has not been measured cannot be measured.
+const RELEASE_AFTER_IDLE_FRAMES: u32 = 60;
+
+/// Whether the panel measures, and for how many frames nothing has come of it.
+#[derive(Debug, Default)]
+pub(super) struct Measuring {
+    on: bool,
+    waited: u32,
+}
+
+impl Measuring {
+    /// Measures from when the section is opened until it is closed. A game that measures for itself is left alone in between.
+    pub(super) fn follow(&mut self, open: bool, statistics: &CaptureStatistics) {
+        if self.on != open {
+            *self = Self { on: open, waited: 0 };
+            statistics.measure(open);
+        }
+    }
+}
+
+/// Draws the section for a view that draws captures.
+pub(super) fn show(ui: &mut egui::Ui, passes: &[PassTime], measuring: &mut Measuring) {
+    if passes.is_empty() {
+        measuring.waited = measuring.waited.saturating_add(1);
+        let waits = measuring.waited <= RELEASE_AFTER_IDLE_FRAMES;
+        ui.weak(if waits { "measuring ..." } else { "not measured: this GPU has no timestamps" });
+        return;
+    }
+    let sum: f64 = passes.iter().map(|pass| pass.milliseconds).sum();
+    for pass in passes {
+        bar(ui, share(pass.milliseconds, sum), format!("{}: {:.3} ms", pass.name, pass.milliseconds));
+    }
+    ui.label(format!("sum: {sum:.3} ms"));
+}

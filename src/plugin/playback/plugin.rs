@@ -1,0 +1,44 @@
+//! The plugin of playback: what runs when.
+//!
+//! In: an app with Bevy's `AssetPlugin` and `TimePlugin`. Out: the same app, in which clocks run, timelines direct and captures
+//! advance.
+
+use super::systems::{advance_captures, run_clocks};
+use super::timeline::{Timeline, TimelineLoader, advance_timelines, bind_tracks, direct_tracks};
+use super::{
+    KeyFrameCrossed, MarkerReached, Playback, PlaybackEnded, PlaybackLooped, PlaybackPaused, PlaybackSeeked,
+    PlaybackStarted, PlaybackSystems,
+};
+use crate::plugin::component::GaussianCapture3d;
+use bevy::app::{App, Plugin, Update};
+use bevy::asset::AssetApp;
+use bevy::ecs::schedule::IntoScheduleConfigs;
+
+/// Plays captures and timelines. Part of [`GaussianCapturePlugin`](crate::GaussianCapturePlugin).
+#[derive(Debug, Default, Clone, Copy)]
+pub(crate) struct PlaybackPlugin;
+
+impl Plugin for PlaybackPlugin {
+    fn build(&self, app: &mut App) {
+        use PlaybackSystems::{Advance, Clocks, Timelines};
+        app.init_asset::<Timeline>()
+            .register_required_components::<GaussianCapture3d, Playback>()
+            .init_asset_loader::<TimelineLoader>()
+            .add_message::<PlaybackStarted>()
+            .add_message::<PlaybackPaused>()
+            .add_message::<PlaybackSeeked>()
+            .add_message::<KeyFrameCrossed>()
+            .add_message::<MarkerReached>()
+            .add_message::<PlaybackLooped>()
+            .add_message::<PlaybackEnded>()
+            .configure_sets(Update, (Clocks, Timelines, Advance).chain())
+            .add_systems(
+                Update,
+                (
+                    run_clocks.in_set(Clocks),
+                    (bind_tracks, advance_timelines, direct_tracks).chain().in_set(Timelines),
+                    advance_captures.in_set(Advance),
+                ),
+            );
+    }
+}

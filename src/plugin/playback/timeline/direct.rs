@@ -1,0 +1,148 @@
+//! The systems that play timelines.
+//!
+//! In: loaded timelines and their players. Out: an entity for each track, and on it what its clip says for this moment.
+
+use super::player::Directed;
+use super::{Clip, ClipFade, Marker, Timeline, TimelinePlayer, TimelineTrack};
+use crate::plugin::asset::GaussianCapture;
+use crate::plugin::component::GaussianCapture3d;
+use crate::plugin::playback::messages::Announcer;
+use crate::plugin::playback::span::Leg;
+use crate::plugin::playback::state::PlaybackState;
+use crate::plugin::playback::systems::drive;
+use crate::plugin::playback::{FollowsClock, Playback, PlaybackClock};
+use bevy::asset::Assets;
+use bevy::camera::visibility::Visibility;
+use bevy::ecs::change_detection::{DetectChangesMut, Mut};
+use bevy::ecs::entity::Entity;
+use bevy::ecs::hierarchy::{ChildOf, Children};
+use bevy::ecs::query::Without;
+use bevy::ecs::system::{Commands, Query, Res};
+use bevy::log::debug_span;
+use bevy::time::Time;
+
+/// Gives every track an entity, and every such entity the player's clock.
+pub(in crate::plugin::playback) fn bind_tracks(
+    timelines: Res<Assets<Timeline>>,
+    players: Query<(Entity, &TimelinePlayer, Option<&Children>)>,
+    tracks: Query<(&TimelineTrack, Option<&FollowsClock>)>,
+    mut commands: Commands,
+) {
+    for (player, handle, children) in &players {
+        let Some(timeline) = timelines.get(&handle.0) else { continue };
+        let follows = FollowsClock(player);
+        let children = children.map_or(&[][..], |children| &children[..]);
+        for &child in children {
+            if tracks.get(child).is_ok_and(|(_, followed)| followed != Some(&follows)) {
+                commands.entity(child).try_insert(follows);
+            }
+        }
+        for track in timeline.tracks() {
+            let plays = |child: &Entity| tracks.get(*child).is_ok_and(|(name, _)| name.0 == track.name);
+            if !children.iter().any(plays) {
+                commands.spawn((TimelineTrack(track.name.clone()), follows, ChildOf(player)));
+            }
+        }
+    }
+}
+
+/// Moves the playheads on.
+pub(in crate::plugin::playback) fn advance_timelines(
+    time: Res<Time>,
+    timelines: Res<Assets<Timeline>>,
+    clocks: Query<&PlaybackClock, Without<TimelinePlayer>>,
+    mut players: Query<(
+        Entity,
+        &TimelinePlayer,
+        &mut Playback,
+        &mut PlaybackState,
+        &mut PlaybackClock,
+        Option<&FollowsClock>,
+    )>,
+    mut announcer: Announcer,
+) {
+    let _span = debug_span!("gs4d/timelines").entered();
+    for (entity, handle, mut playback, mut state, mut clock, follows) in &mut players {
+        let Some(timeline) = timelines.get(&handle.0) else { continue };
+        let drive = drive(follows, &clocks, &time);
+        let was_at_end = state.is_at_end_of_loop();
+        let (next, progress) = state.advance(*playback, drive, timeline.duration_seconds());
+        playback.set_if_neq(next);
+        // What starts over does not play its tracks backwards to the start.
+        let wrapped = progress.travel.is_some_and(|travel| travel.wraps() || was_at_end && travel.is_forward());
+        let mut shown = *clock;
+        if progress.jumped || wrapped {
+            shown.seek(state.seconds());
+        } else {
+            shown.set(state.seconds());
+        }
+        clock.set_if_neq(shown);
+        announcer.tell(entity, &progress, |announcer, leg| {
+            for marker in crossed(timeline, leg) {
+                announcer.marker(entity, &marker.name, marker.time);
+            }
+        });
+    }
+}
+
+/// The markers on a stretch, in the order in which it is played.
+fn crossed<'a>(timeline: &'a Timeline, leg: &Leg) -> impl Iterator<Item = &'a Marker> {
+    let (markers, leg) = (timeline.markers(), *leg);
+    (0..markers.len())
+        .map(move |index| if leg.from <= leg.to { index } else { markers.len() - 1 - index })
+        .map(move |index| &markers[index])
+        .filter(move |marker| leg.passes(marker.time.into()))
+}
+
+/// Gives every track's entity its clip, fade and visibility for this moment.
+pub(in crate::plugin::playback) fn direct_tracks(
+    timelines: Res<Assets<Timeline>>,
+    captures: Res<Assets<GaussianCapture>>,
+    players: Query<(&TimelinePlayer, &PlaybackClock, &Children)>,
+    mut stages: Query<(&TimelineTrack, &mut Visibility, &mut ClipFade, Actor<'static>), Without<TimelinePlayer>>,
+) {
+    let _span = debug_span!("gs4d/tracks").entered();
+    for (handle, clock, children) in &players {
+        let Some(timeline) = timelines.get(&handle.0) else { continue };
+        let time = clock.seconds;
+        for &child in children {
+            let Ok((track, mut visibility, mut fade, actor)) = stages.get_mut(child) else { continue };
+            // After a reload a track may be gone.
+            let Some(clip) = timeline.track(&track.0).and_then(|track| track.clip_at(time)) else {
+                visibility.set_if_neq(Visibility::Hidden);
+                continue;
+            };
+            let visible = clip.shows(time, timeline.duration_seconds());
+            visibility.set_if_neq(if visible { Visibility::Inherited } else { Visibility::Hidden });
+            fade.set_if_neq(ClipFade(clip.fade_at(time)));
+            cast(actor, clip, captures.get(&clip.capture));
+        }
+    }
+}
+
+/// What changes with the clip.
+type Actor<'a> = (&'a mut Directed, &'a mut GaussianCapture3d, &'a mut Playback, &'a mut PlaybackState);
+
+/// Gives an entity another clip, if it is another one. Its capture may still be on its way.
+fn cast(
+    (mut directed, mut capture, mut playback, mut state): (
+        Mut<Directed>,
+        Mut<GaussianCapture3d>,
+        Mut<Playback>,
+        Mut<PlaybackState>,
+    ),
+    clip: &Clip,
+    loaded: Option<&GaussianCapture>,
+) {
+    let wanted = clip.playback(loaded.map(GaussianCapture::duration_seconds));
+    if directed.0.as_ref() != Some(clip) {
+        capture.set_if_neq(GaussianCapture3d(clip.capture.clone()));
+        playback.set_if_neq(wanted);
+        // Not where the last clip ended, sought elsewhere, but a new beginning.
+        *state = PlaybackState::default();
+        directed.0 = Some(clip.clone());
+    } else if playback.offset != wanted.offset {
+        // Only the loaded capture says how far the clip reaches beyond it.
+        playback.offset = wanted.offset;
+    }
+}

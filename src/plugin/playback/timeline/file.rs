@@ -1,0 +1,214 @@
+//! The timeline as a file.
+//!
+//! In: the text of a `*.timeline.ron`, as the [module](super) describes. Out: a [`Timeline`], with the loading of its captures
+//! begun, or a [`TimelineError`], to which Bevy adds the path.
+
+use super::{Clip, InvalidTimeline, Marker, Timeline, Track};
+use crate::plugin::asset::GaussianCapture;
+use bevy::asset::io::Reader;
+use bevy::asset::{AssetLoader, AssetPath, Handle, LoadContext, ParseAssetPathError};
+use bevy::reflect::TypePath;
+use ron::extensions::Extensions;
+use serde::Deserialize;
+
+/// Why a timeline could not be loaded.
+#[derive(Debug, thiserror::Error)]
+pub enum TimelineError {
+    /// The asset source could not deliver the bytes.
+    #[error("the file could not be read: {0}")]
+    Read(#[from] std::io::Error),
+    /// The text is not what a timeline looks like. Says the line and the column.
+    #[error("not a timeline, at line and column {0}")]
+    Syntax(#[from] ron::error::SpannedError),
+    /// A capture's path cannot be read.
+    #[error("capture {path:?}: {reason}")]
+    Path {
+        /// As it is written.
+        path: String,
+        /// What is wrong.
+        reason: ParseAssetPathError,
+    },
+    /// A capture's path is empty, absolute, or leads out of the asset folder.
+    #[error(
+        "capture {path:?} is not in the asset folder; write a path relative to that folder, such as \"toybox.gs4d\""
+    )]
+    Outside {
+        /// As it is written.
+        path: String,
+    },
+    /// What it says makes no sense.
+    #[error(transparent)]
+    Invalid(#[from] InvalidTimeline),
+}
+
+/// Loads timelines, `.timeline.ron`.
+#[derive(Debug, Default, TypePath)]
+pub struct TimelineLoader;
+
+impl AssetLoader for TimelineLoader {
+    type Asset = Timeline;
+    type Settings = ();
+    type Error = TimelineError;
+
+    async fn load(
+        &self,
+        reader: &mut dyn Reader,
+        _settings: &(),
+        context: &mut LoadContext<'_>,
+    ) -> Result<Timeline, TimelineError> {
+        let mut bytes = Vec::new();
+        reader.read_to_end(&mut bytes).await?;
+        read(&bytes, |path| context.load(path))
+    }
+
+    fn extensions(&self) -> &[&str] {
+        &["timeline.ron"]
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(rename = "Timeline", deny_unknown_fields)]
+struct TimelineFile {
+    #[serde(default)]
+    tracks: Vec<TrackFile>,
+    #[serde(default)]
+    markers: Vec<MarkerFile>,
+    #[serde(default)]
+    duration: Option<f32>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename = "Track", deny_unknown_fields)]
+struct TrackFile {
+    name: String,
+    clips: Vec<ClipFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename = "Clip", deny_unknown_fields)]
+struct ClipFile {
+    capture: String,
+    start: f32,
+    #[serde(rename = "in", default)]
+    first: f32,
+    #[serde(rename = "out")]
+    last: f32,
+    #[serde(default = "normal_speed")]
+    speed: f32,
+    #[serde(default)]
+    fade_in: f32,
+    #[serde(default)]
+    fade_out: f32,
+}
+
+#[derive(Deserialize)]
+#[serde(rename = "Marker", deny_unknown_fields)]
+struct MarkerFile {
+    time: f32,
+    name: String,
+}
+
+fn normal_speed() -> f32 {
+    1.0
+}
+
+/// Reads the text of a file; `load` gives the handle of a capture.
+fn read(
+    bytes: &[u8],
+    mut load: impl FnMut(AssetPath<'static>) -> Handle<GaussianCapture>,
+) -> Result<Timeline, TimelineError> {
+    let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME);
+    let file: TimelineFile = options.from_bytes(bytes)?;
+    let mut tracks = Vec::new();
+    for TrackFile { name, clips } in file.tracks {
+        let mut track = Track { name, clips: Vec::new() };
+        for clip in clips {
+            track.clips.push(Clip {
+                capture: load(asset_path(&clip.capture)?),
+                start: clip.start,
+                range: [clip.first, clip.last],
+                speed: clip.speed,
+                fade: [clip.fade_in, clip.fade_out],
+            });
+        }
+        tracks.push(track);
+    }
+    let markers = file.markers.into_iter().map(|MarkerFile { time, name }| Marker { time, name }).collect();
+    Ok(Timeline::new(tracks, markers, file.duration)?)
+}
+
+/// The path of a capture. Bevy would panic at one that leads out of the asset folder.
+fn asset_path(path: &str) -> Result<AssetPath<'static>, TimelineError> {
+    let parsed = AssetPath::try_parse(path).map_err(|reason| TimelineError::Path { path: path.to_owned(), reason })?;
+    if parsed.path().as_os_str().is_empty() || parsed.is_unapproved() {
+        return Err(TimelineError::Outside { path: path.to_owned() });
+    }
+    Ok(parsed.into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read_text(text: &str) -> Result<Timeline, TimelineError> {
+        read(text.as_bytes(), |_| Handle::default())
+    }
+
+    #[test]
+    fn a_file_says_what_a_timeline_is() {
+        let text = r#"(
+            tracks: [
+                (name: "left", clips: [
+                    (capture: "toybox.gs4d", start: 0, in: 0.5, out: 2.5),
+                    (capture: "more/toybox.gs4d", start: 2, out: 1, speed: -0.5, fade_in: 0.5, fade_out: 0.25),
+                ]),
+            ],
+            markers: [(time: 2.0, name: "cut")],
+            duration: 10.0,
+        )"#;
+        let mut loaded = Vec::new();
+        let timeline = read(text.as_bytes(), |path| {
+            loaded.push(path.to_string());
+            Handle::default()
+        })
+        .expect("a timeline");
+        assert_eq!(loaded, ["toybox.gs4d", "more/toybox.gs4d"], "both captures are loaded");
+        let clips = &timeline.tracks()[0].clips;
+        assert_eq!((clips[0].range, clips[0].speed, clips[0].fade), ([0.5, 2.5], 1.0, [0.0; 2]), "what is left out");
+        assert_eq!((clips[1].range, clips[1].speed, clips[1].fade), ([0.0, 1.0], -0.5, [0.5, 0.25]), "what is not");
+        assert_eq!(timeline.markers(), [Marker { time: 2.0, name: "cut".into() }], "a marker");
+        assert_eq!(timeline.duration_seconds(), 10.0, "a duration");
+    }
+
+    #[test]
+    fn broken_text_is_refused_with_its_place() {
+        for text in
+            ["", "(", "(tracks: 3)", "(trakcs: [])", "\u{1f4a5}", "(tracks: [(name: \"a\", clips: [(start: 0)])])"]
+        {
+            let message = read_text(text).expect_err("no timeline").to_string();
+            assert!(message.contains("line and column 1:"), "{text:?}: {message}");
+        }
+        let message = read_text("(tracks: [(name: \"a\", clips: [(capture: \"x\", start: 0, out: 1, sped: 2)])])");
+        let message = message.expect_err("a field too many").to_string();
+        assert!(message.contains("sped") && message.contains("speed"), "the field and those there are: {message}");
+        assert!(read(&[0xff, 0xfe, b'('], |_| Handle::default()).is_err(), "not even text");
+    }
+
+    #[test]
+    fn captures_outside_the_asset_folder_are_refused() {
+        for path in ["", "/etc/toybox.gs4d", "../toybox.gs4d", "a/../../toybox.gs4d", "toybox.gs4d#", "://toybox.gs4d"]
+        {
+            let clip = format!("(capture: {path:?}, start: 0, out: 1)");
+            let refused = read_text(&format!("(tracks: [(name: \"a\", clips: [{clip}])])"));
+            let message = refused.expect_err("no path of a capture").to_string();
+            assert!(message.contains(&format!("{path:?}")), "{message} names {path:?}");
+        }
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_refused() {
+        let refused = read_text("(tracks: [(name: \"a\", clips: [(capture: \"x.gs4d\", start: 0, in: 2, out: 1)])])");
+        assert!(matches!(refused, Err(TimelineError::Invalid(InvalidTimeline::Number { .. }))), "{refused:?}");
+        assert!(matches!(read_text("()"), Err(TimelineError::Invalid(InvalidTimeline::Empty))), "an empty timeline");
+    }
+}

@@ -1,0 +1,86 @@
+//! Active lists: which Gaussians the temporal filters leave, once for each placed capture and frame.
+//!
+//! In: [`ExtractedCaptures`]. Out: [`ActiveLists`], shared by all cameras and made on the GPU before any of them draws, only when a
+//! capture has entered another segment of time.
+
+use super::extract::ExtractedCaptures;
+use super::prepare::CaptureRenderer;
+use super::upload::GpuGaussianCapture;
+use crate::plugin::asset::GaussianCapture;
+use crate::renderer::ActiveList;
+use bevy::asset::AssetId;
+use bevy::ecs::resource::Resource;
+use bevy::ecs::system::{Res, ResMut};
+use bevy::log::debug_span;
+use bevy::render::diagnostic::RecordDiagnostics;
+use bevy::render::render_asset::RenderAssets;
+use bevy::render::renderer::{RenderContext, RenderDevice, RenderQueue};
+use bevy::render::sync_world::MainEntityHashMap;
+
+/// The lists of captures with a filter, by entity of the main world. One lasts as long as its entity shows the same capture.
+#[derive(Resource, Default)]
+pub(super) struct ActiveLists(pub(super) MainEntityHashMap<PlacedList>);
+
+/// The list of one entity.
+pub(super) struct PlacedList {
+    pub(super) list: ActiveList,
+    asset: AssetId<GaussianCapture>,
+    /// Whether it holds another segment than it should.
+    stale: bool,
+}
+
+/// Makes lists for what has appeared, drops those of what has gone, and moves the others on in time.
+pub(super) fn prepare_active_lists(
+    device: Res<RenderDevice>,
+    queue: Res<RenderQueue>,
+    renderer: Option<Res<CaptureRenderer>>,
+    extracted: Res<ExtractedCaptures>,
+    captures: Res<RenderAssets<GpuGaussianCapture>>,
+    mut lists: ResMut<ActiveLists>,
+) {
+    let _span = debug_span!("gs4d/lists").entered();
+    let Some(renderer) = renderer else { return };
+    let uploaded = |asset: AssetId<GaussianCapture>| captures.get(asset)?.capture();
+    lists.0.retain(|entity, placed| {
+        let shown = extracted.0.get(entity).filter(|shown| shown.filtered && shown.asset == placed.asset);
+        shown.and_then(|shown| uploaded(shown.asset)).is_some_and(|capture| placed.list.is_for(capture))
+    });
+    for (entity, shown) in &extracted.0 {
+        if !(shown.seen && shown.filtered) {
+            continue;
+        }
+        let Some(capture) = uploaded(shown.asset) else { continue };
+        if !lists.0.contains_key(entity) {
+            let Some(list) = ActiveList::new(device.wgpu_device(), &renderer.0, capture) else { continue };
+            lists.0.insert(*entity, PlacedList { list, asset: shown.asset, stale: false });
+        }
+        if let Some(placed) = lists.0.get_mut(entity) {
+            placed.stale = placed.list.prepare(&queue, capture, shown.time);
+        }
+    }
+}
+
+/// Records `activate` where it is due, before the cameras.
+pub(super) fn record_active_lists(
+    renderer: Option<Res<CaptureRenderer>>,
+    captures: Res<RenderAssets<GpuGaussianCapture>>,
+    mut lists: ResMut<ActiveLists>,
+    mut context: RenderContext,
+) {
+    let _span = debug_span!("gs4d/activate").entered();
+    let Some(renderer) = renderer else { return };
+    // Most frames begin no encoder.
+    if !lists.0.values().any(|placed| placed.stale) {
+        return;
+    }
+    let diagnostics = context.diagnostic_recorder();
+    let diagnostics = diagnostics.as_deref();
+    let span = diagnostics.time_span(context.command_encoder(), "gs4d/activate");
+    for placed in lists.0.values_mut().filter(|placed| placed.stale) {
+        if let Some(capture) = captures.get(placed.asset).and_then(|uploaded| uploaded.capture()) {
+            placed.list.record(&renderer.0, context.command_encoder(), capture);
+            placed.stale = false;
+        }
+    }
+    span.end(context.command_encoder());
+}

@@ -1,0 +1,100 @@
+//! The plugin: what runs where.
+//!
+//! In: an app with Bevy's `DefaultPlugins` (or at least its `AssetPlugin`). Out: the same app, in which captures load, play and,
+//! where there is a renderer, show.
+
+use super::CaptureSettings;
+use super::active::{ActiveLists, prepare_active_lists, record_active_lists};
+use super::composite::{CaptureShaders, CompositePipeline};
+use super::draw::{CaptureSystems, draw_captures};
+use super::extract::{ExtractedCaptures, ExtractedViewSettings, extract_captures, extract_view_settings};
+use super::prepare::{CaptureViews, init_renderer, make_depth_readable, prepare_views};
+use super::statistics::{CaptureStatistics, publish_statistics};
+use super::upload::GpuGaussianCapture;
+use super::visibility::update_bounds;
+use super::write_depth::WriteDepthPipeline;
+use crate::plugin::asset::UploadFailures;
+use crate::plugin::component::GaussianCapture3d;
+use bevy::app::{App, Plugin, PostUpdate};
+use bevy::asset::Assets;
+use bevy::camera::visibility::VisibilitySystems;
+use bevy::core_pipeline::core_3d::{main_opaque_pass_3d, main_transparent_pass_3d};
+use bevy::core_pipeline::schedule::{Core3d, Core3dSystems, camera_driver};
+use bevy::ecs::schedule::IntoScheduleConfigs;
+use bevy::render::render_asset::RenderAssetPlugin;
+use bevy::render::render_resource::SpecializedRenderPipelines;
+use bevy::render::renderer::{RenderGraph, RenderGraphSystems};
+use bevy::render::{ExtractSchedule, GpuResourceAppExt, Render, RenderApp, RenderStartup, RenderSystems};
+use bevy::shader::Shader;
+
+/// Draws captures. Part of [`GaussianCapturePlugin`](crate::GaussianCapturePlugin).
+#[derive(Debug, Default, Clone, Copy)]
+pub(crate) struct CaptureRenderPlugin;
+
+impl Plugin for CaptureRenderPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<CaptureStatistics>()
+            .register_required_components::<GaussianCapture3d, CaptureSettings>()
+            .add_plugins(RenderAssetPlugin::<GpuGaussianCapture>::default())
+            .add_systems(PostUpdate, update_bounds.in_set(VisibilitySystems::CalculateBounds));
+        build_rendering(app);
+    }
+}
+
+/// What runs in the render world, if there is one.
+fn build_rendering(app: &mut App) {
+    let statistics = app.world().resource::<CaptureStatistics>().clone();
+    let failures = app.world().resource::<UploadFailures>().clone();
+    if app.get_sub_app(RenderApp).is_none() {
+        statistics.set_renderer_missing(Some("this app has no renderer: add Bevy's RenderPlugin".into()));
+        return;
+    }
+    let Some(shaders) = add_shaders(app) else { return };
+    let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
+    render_app
+        .insert_resource(shaders)
+        .insert_resource(statistics)
+        .insert_resource(failures)
+        .init_resource::<ExtractedCaptures>()
+        .init_resource::<ExtractedViewSettings>()
+        // Made again when a lost device comes back: everything on the GPU hangs on these.
+        .init_gpu_resource::<CompositePipeline>()
+        .init_gpu_resource::<SpecializedRenderPipelines<CompositePipeline>>()
+        .init_gpu_resource::<WriteDepthPipeline>()
+        .init_gpu_resource::<SpecializedRenderPipelines<WriteDepthPipeline>>()
+        .init_gpu_resource::<CaptureViews>()
+        .init_gpu_resource::<ActiveLists>()
+        .add_systems(RenderStartup, init_renderer)
+        .add_systems(ExtractSchedule, (extract_captures, extract_view_settings))
+        .add_systems(
+            Render,
+            (
+                make_depth_readable.in_set(RenderSystems::PrepareViews),
+                prepare_active_lists.in_set(RenderSystems::PrepareResources),
+                (prepare_views, publish_statistics).chain().in_set(RenderSystems::PrepareBindGroups),
+            ),
+        )
+        // Recorded before the first camera, and so submitted before it.
+        .add_systems(RenderGraph, record_active_lists.in_set(RenderGraphSystems::Render).before(camera_driver))
+        .add_systems(
+            Core3d,
+            (
+                draw_captures::<false>
+                    .after(main_opaque_pass_3d)
+                    .before(main_transparent_pass_3d)
+                    .in_set(CaptureSystems::Draw),
+                draw_captures::<true>.after(main_transparent_pass_3d).in_set(CaptureSystems::DrawLate),
+            )
+                .in_set(Core3dSystems::MainPass),
+        );
+}
+
+/// The passes that go through Bevy's pipeline cache.
+fn add_shaders(app: &mut App) -> Option<CaptureShaders> {
+    let mut shaders = app.world_mut().get_resource_mut::<Assets<Shader>>()?;
+    let mut add = |source: &'static str, path: &str| shaders.add(Shader::from_wgsl(source, path));
+    Some(CaptureShaders {
+        composite: add(include_str!("../../../shaders/composite.wgsl"), "bevy_gs4d/shaders/composite.wgsl"),
+        write_depth: add(include_str!("../../../shaders/write_depth.wgsl"), "bevy_gs4d/shaders/write_depth.wgsl"),
+    })
+}

@@ -1,0 +1,53 @@
+//! Reflection for the choices that the core defines without knowing Bevy.
+//!
+//! In: enums of [`crate::view`]. Out: the same, reflected, so that components that hold them can be saved, inspected and animated.
+
+use crate::view::{BlendSpace, DebugView};
+use bevy::reflect::impl_reflect;
+use bevy::reflect::std_traits::ReflectDefault;
+
+impl_reflect!(
+    #[reflect(Default, Debug, Clone, PartialEq, Hash)]
+    #[type_path = "bevy_gs4d::view"]
+    enum BlendSpace {
+        Encoded,
+        Linear,
+    }
+);
+
+impl_reflect!(
+    #[reflect(Default, Debug, Clone, PartialEq, Hash)]
+    #[type_path = "bevy_gs4d::view"]
+    enum DebugView {
+        Color,
+        Depth,
+        Overdraw,
+        Active,
+        Lifespan,
+        Velocity,
+    }
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plugin::render::CaptureViewSettings;
+    use bevy::reflect::enums::Enum;
+    use bevy::reflect::{FromReflect, GetPath, PartialReflect, TypePath};
+
+    #[test]
+    fn a_camera_s_choices_can_be_read_and_set_by_path() {
+        let mut settings = CaptureViewSettings::default();
+        *settings.path_mut::<DebugView>("debug").expect("a field") = DebugView::Velocity;
+        assert_eq!(settings.debug, DebugView::Velocity, "set through reflection");
+        assert_eq!(BlendSpace::Linear.variant_name(), "Linear", "variants have their names");
+        assert_eq!(BlendSpace::type_path(), "bevy_gs4d::view::BlendSpace", "and the type its own");
+    }
+
+    #[test]
+    fn choices_survive_a_round_trip_through_reflection() {
+        let settings = CaptureViewSettings { blend_space: BlendSpace::Linear, ..CaptureViewSettings::default() };
+        let copy = CaptureViewSettings::from_reflect(settings.to_dynamic().as_ref());
+        assert_eq!(copy, Some(settings), "as it was");
+    }
+}

@@ -1,0 +1,130 @@
+//! `write_depth`: lets what is drawn after captures see them in the camera's depth buffer.
+//!
+//! In: a view's captures (colour, transmittance, depths) and its lens. Out: pipeline and bind group for `shaders/write_depth.wgsl`,
+//! for cameras that ask for it with [`DepthWrite`](super::DepthWrite).
+
+use super::composite::CaptureShaders;
+use crate::renderer::note_created;
+use bevy::asset::Handle;
+use bevy::core_pipeline::FullscreenShader;
+use bevy::core_pipeline::core_3d::CORE_3D_DEPTH_FORMAT;
+use bevy::ecs::resource::Resource;
+use bevy::ecs::world::{FromWorld, World};
+use bevy::render::render_resource::binding_types::{texture_2d, uniform_buffer};
+use bevy::render::render_resource::{
+    BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, BindingResource, CompareFunction,
+    DepthBiasState, DepthStencilState, FragmentState, MultisampleState, PipelineCache, RenderPipelineDescriptor,
+    ShaderStages, SpecializedRenderPipeline, StencilState, TextureSampleType, UniformBuffer, VertexState,
+};
+use bevy::render::renderer::{RenderDevice, RenderQueue};
+use bevy::shader::Shader;
+use glam::{UVec4, Vec4};
+
+/// What pipelines for different depth buffers are made from.
+#[derive(Resource)]
+pub(super) struct WriteDepthPipeline {
+    layout: BindGroupLayoutDescriptor,
+    vertex: VertexState,
+    shader: Handle<Shader>,
+}
+
+/// What tells them apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) struct WriteDepthKey {
+    /// Samples of the depth buffer.
+    pub(super) samples: u32,
+    /// The median in place of the expected depth.
+    pub(super) median: bool,
+}
+
+impl FromWorld for WriteDepthPipeline {
+    fn from_world(world: &mut World) -> Self {
+        let texture = || texture_2d(TextureSampleType::Float { filterable: false });
+        let entries = (texture(), texture(), uniform_buffer::<UVec4>(false), uniform_buffer::<Vec4>(false));
+        let entries = BindGroupLayoutEntries::sequential(ShaderStages::FRAGMENT, entries);
+        Self {
+            layout: BindGroupLayoutDescriptor::new("gs4d write_depth", &entries),
+            vertex: world.resource::<FullscreenShader>().to_vertex_state(),
+            shader: world.resource::<CaptureShaders>().write_depth.clone(),
+        }
+    }
+}
+
+impl SpecializedRenderPipeline for WriteDepthPipeline {
+    type Key = WriteDepthKey;
+
+    fn specialize(&self, key: WriteDepthKey) -> RenderPipelineDescriptor {
+        RenderPipelineDescriptor {
+            label: Some("gs4d write_depth".into()),
+            layout: vec![self.layout.clone()],
+            vertex: self.vertex.clone(),
+            depth_stencil: Some(DepthStencilState {
+                format: CORE_3D_DEPTH_FORMAT,
+                depth_write_enabled: Some(true),
+                // Reverse-z: nearer is greater.
+                depth_compare: Some(CompareFunction::GreaterEqual),
+                stencil: StencilState::default(),
+                bias: DepthBiasState::default(),
+            }),
+            multisample: MultisampleState { count: key.samples, ..MultisampleState::default() },
+            fragment: Some(FragmentState {
+                shader: self.shader.clone(),
+                shader_defs: if key.median { vec!["MEDIAN".into()] } else { Vec::new() },
+                entry_point: Some("fragment".into()),
+                targets: Vec::new(),
+            }),
+            ..RenderPipelineDescriptor::default()
+        }
+    }
+}
+
+/// What one view binds.
+#[derive(Default)]
+pub(super) struct WriteDepthBindings {
+    distance: UniformBuffer<Vec4>,
+    group: Option<CachedGroup>,
+}
+
+struct CachedGroup {
+    colors: wgpu::TextureView,
+    depths: wgpu::TextureView,
+    group: BindGroup,
+}
+
+impl WriteDepthBindings {
+    /// Writes how the lens maps depth, `n0 n1 m0 m1` as in [`OpaqueDepth`](crate::renderer::OpaqueDepth), if it has changed.
+    pub(super) fn set_distance(&mut self, distance: Vec4, device: &RenderDevice, queue: &RenderQueue) {
+        let first = self.distance.buffer().is_none();
+        if first || *self.distance.get() != distance {
+            self.distance.set(distance);
+            self.distance.write_buffer(device, queue);
+        }
+        if first {
+            note_created();
+        }
+    }
+
+    /// Lets go of the targets that were bound.
+    pub(super) fn forget(&mut self) {
+        self.group = None;
+    }
+
+    /// The bind group for the targets of a view; nothing before the first [`set_distance`](Self::set_distance).
+    pub(super) fn group(
+        &mut self,
+        device: &RenderDevice,
+        cache: &PipelineCache,
+        pipeline: &WriteDepthPipeline,
+        viewport: BindingResource<'_>,
+        [colors, depths]: [&wgpu::TextureView; 2],
+    ) -> Option<&BindGroup> {
+        if self.group.as_ref().is_none_or(|known| known.colors != *colors || known.depths != *depths) {
+            let layout = cache.get_bind_group_layout(&pipeline.layout);
+            let entries = BindGroupEntries::sequential((colors, depths, viewport, self.distance.binding()?));
+            let group = device.create_bind_group("gs4d write_depth", &layout, &entries);
+            note_created();
+            self.group = Some(CachedGroup { colors: colors.clone(), depths: depths.clone(), group });
+        }
+        self.group.as_ref().map(|known| &known.group)
+    }
+}

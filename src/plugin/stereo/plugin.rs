@@ -1,0 +1,147 @@
+//! What keeps eyes in their places.
+//!
+//! In: rigs, and the size of what their eyes draw into. Out: the eyes' transforms, viewports and aspect ratios, right in the frame in
+//! which anything has changed.
+
+use super::{Eye, SideBySide, StereoRig};
+use bevy::app::{App, Plugin, PostUpdate};
+use bevy::camera::visibility::VisibilitySystems;
+use bevy::camera::{Camera, CameraUpdateSystems, Projection, Viewport};
+use bevy::ecs::change_detection::DetectChangesMut;
+use bevy::ecs::hierarchy::Children;
+use bevy::ecs::query::With;
+use bevy::ecs::schedule::IntoScheduleConfigs;
+use bevy::ecs::system::Query;
+use bevy::transform::TransformSystems;
+use bevy::transform::components::Transform;
+use glam::UVec2;
+
+/// Keeps the eyes of every [`StereoRig`] at their distance, and those that draw [side by side](SideBySide) in their halves.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct StereoPlugin;
+
+impl Plugin for StereoPlugin {
+    fn build(&self, app: &mut App) {
+        app.add_systems(
+            PostUpdate,
+            (
+                place_eyes.before(TransformSystems::Propagate),
+                fit_eyes.after(CameraUpdateSystems).before(VisibilitySystems::UpdateFrusta),
+            ),
+        );
+    }
+}
+
+fn place_eyes(rigs: Query<(&StereoRig, &Children)>, mut eyes: Query<(&Eye, &mut Transform)>) {
+    for (rig, children) in rigs.iter().filter(|(rig, _)| rig.ipd.is_finite()) {
+        for &child in children {
+            if let Ok((eye, mut transform)) = eyes.get_mut(child) {
+                transform.set_if_neq(Transform::from_xyz(eye.side() * rig.ipd / 2.0, 0.0, 0.0));
+            }
+        }
+    }
+}
+
+/// Runs after Bevy has learnt the target's size, and then has to do for a changed viewport what Bevy would do a frame later.
+fn fit_eyes(mut eyes: Query<(&Eye, &mut Camera, &mut Projection), With<SideBySide>>) {
+    for (eye, mut camera, mut projection) in &mut eyes {
+        let Some((corner, size)) = camera.physical_target_size().and_then(|target| half(*eye, target)) else {
+            continue;
+        };
+        let fits = |viewport: &Viewport| viewport.physical_position == corner && viewport.physical_size == size;
+        if camera.viewport.as_ref().is_some_and(fits) {
+            continue;
+        }
+        camera.viewport = Some(Viewport { physical_position: corner, physical_size: size, ..Viewport::default() });
+        let logical = camera.logical_viewport_size().filter(|logical| logical.min_element() > 0.0);
+        if let Some(logical) = logical {
+            projection.update(logical.x, logical.y);
+            camera.computed.clip_from_view = projection.get_clip_from_view();
+        }
+    }
+}
+
+/// Corner and size of an eye's half, in pixels; nothing where it has none.
+fn half(eye: Eye, target: UVec2) -> Option<(UVec2, UVec2)> {
+    let size = UVec2::new(target.x / 2, target.y);
+    let left = match eye {
+        Eye::Left => 0,
+        Eye::Right => target.x - size.x,
+    };
+    (size.min_element() > 0).then_some((UVec2::new(left, 0), size))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plugin::stereo::{EyeTargets, Stereo, spawn_stereo};
+    use bevy::camera::{RenderTarget, RenderTargetInfo};
+    use bevy::transform::TransformPlugin;
+    use bevy::transform::components::GlobalTransform;
+    use glam::{Quat, Vec3};
+    use std::f32::consts::FRAC_PI_2;
+
+    #[test]
+    fn halves_are_alike_and_do_not_overlap() {
+        for (width, right) in [(200, 100), (201, 101), (2, 1)] {
+            let halves = Eye::BOTH.map(|eye| half(eye, UVec2::new(width, 50)).expect("there are two halves"));
+            let size = UVec2::new(width / 2, 50);
+            assert_eq!(halves, [(UVec2::ZERO, size), (UVec2::new(right, 0), size)], "of {width} columns");
+        }
+        assert_eq!(half(Eye::Right, UVec2::new(1, 50)), None, "one column cannot be halved");
+        assert_eq!(half(Eye::Left, UVec2::ZERO), None, "nor can a window that is not shown");
+    }
+
+    fn spawn(app: &mut App, rig: StereoRig) -> Stereo {
+        let targets = EyeTargets::SideBySide(RenderTarget::default());
+        let stereo = spawn_stereo(&mut app.world_mut().commands(), rig, targets);
+        app.world_mut().flush();
+        stereo
+    }
+
+    #[test]
+    fn eyes_stand_half_the_distance_beside_the_head() {
+        let mut app = App::new();
+        app.add_plugins((TransformPlugin, StereoPlugin));
+        let stereo = spawn(&mut app, StereoRig { ipd: 0.5 });
+        let turned = Transform::from_xyz(1.0, 2.0, 3.0).with_rotation(Quat::from_rotation_y(FRAC_PI_2));
+        app.world_mut().entity_mut(stereo.head).insert(turned);
+        let place = |app: &App, eye: usize| {
+            app.world().get::<GlobalTransform>(stereo.eyes[eye]).expect("an eye has a place").translation()
+        };
+        app.update();
+        // Turned to the left by a right angle, the head's +x axis is the world's −z.
+        assert!(place(&app, 0).abs_diff_eq(Vec3::new(1.0, 2.0, 3.25), 1e-6), "the left eye is at {}", place(&app, 0));
+        assert!(place(&app, 1).abs_diff_eq(Vec3::new(1.0, 2.0, 2.75), 1e-6), "the right eye is at {}", place(&app, 1));
+        for (ipd, expected) in [(0.1, 2.95), (f32::NAN, 2.95), (0.0, 3.0)] {
+            app.world_mut().entity_mut(stereo.head).insert(StereoRig { ipd });
+            app.update();
+            assert!((place(&app, 1).z - expected).abs() < 1e-6, "at {ipd} the right eye is at {}", place(&app, 1));
+        }
+    }
+
+    #[test]
+    fn halves_follow_the_size_of_their_target() {
+        let mut app = App::new();
+        app.add_plugins((TransformPlugin, StereoPlugin));
+        let stereo = spawn(&mut app, StereoRig::default());
+        for size in [UVec2::new(200, 100), UVec2::new(301, 50), UVec2::new(64, 400)] {
+            for eye in stereo.eyes {
+                let mut camera = app.world_mut().get_mut::<Camera>(eye).expect("an eye is a camera");
+                // As Bevy learns it, and in the same frame.
+                camera.computed.target_info = Some(RenderTargetInfo { physical_size: size, scale_factor: 1.0 });
+            }
+            app.update();
+            for (entity, eye) in stereo.eyes.into_iter().zip(Eye::BOTH) {
+                let camera = app.world().get::<Camera>(entity).expect("an eye is a camera");
+                let viewport = camera.viewport.as_ref().expect("half of the target");
+                let found = (viewport.physical_position, viewport.physical_size);
+                assert_eq!(Some(found), half(eye, size), "{eye:?} of {size}");
+                let projection = app.world().get::<Projection>(entity).expect("an eye has a lens");
+                let Projection::Perspective(lens) = projection else { panic!("a perspective one") };
+                assert_eq!(lens.aspect_ratio, found.1.x as f32 / found.1.y as f32, "{eye:?} of {size}");
+                assert_eq!(camera.computed.clip_from_view, projection.get_clip_from_view(), "{eye:?} of {size}");
+            }
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! The app without a window.
+//!
+//! In: the size of a picture. Out: an app with Bevy's default plugins that draws into one, and in which time stands still.
+
+use crate::renderer::GpuContext;
+use bevy::DefaultPlugins;
+use bevy::app::{App, PluginGroup, PluginGroupBuilder, PostUpdate};
+use bevy::asset::{AssetPlugin, Assets, Handle, UnapprovedPathMode};
+use bevy::camera::{CameraUpdateSystems, RenderTarget};
+use bevy::ecs::query::Changed;
+use bevy::ecs::resource::Resource;
+use bevy::ecs::schedule::IntoScheduleConfigs;
+use bevy::ecs::schedule::common_conditions::resource_exists;
+use bevy::ecs::system::{Query, Res};
+use bevy::image::Image;
+use bevy::log::{DEFAULT_FILTER, LogPlugin};
+use bevy::render::RenderPlugin;
+use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
+use bevy::render::render_resource::{TextureFormat, TextureUsages};
+use bevy::render::settings::{Backends, RenderCreation, WgpuSettings};
+use bevy::time::{Time, TimeUpdateStrategy, Virtual};
+use bevy::window::{ExitCondition, WindowPlugin, WindowRef};
+use bevy::winit::WinitPlugin;
+use glam::UVec2;
+use std::sync::OnceLock;
+use std::time::Duration;
+
+/// A picture that cameras draw into. [`app`] inserts one as a resource, for all cameras that would draw into the primary window.
+#[derive(Resource, Debug, Clone)]
+pub struct Offscreen {
+    /// The picture on the GPU: 8 bits for each of RGBA, sRGB-encoded.
+    pub image: Handle<Image>,
+    /// Its width and height in pixels.
+    pub size: UVec2,
+}
+
+impl Offscreen {
+    /// A picture of its own, for apps that draw into more than one: [`read`](super::read) reads it.
+    ///
+    /// A size of 0 counts as 1.
+    pub fn new(images: &mut Assets<Image>, size: UVec2) -> Self {
+        let size = size.max(UVec2::ONE);
+        let mut image = Image::new_target_texture(size.x, size.y, TextureFormat::Rgba8UnormSrgb, None);
+        image.texture_descriptor.usage |= TextureUsages::COPY_SRC;
+        Self { image: images.add(image), size }
+    }
+
+    /// For cameras, beside their `Camera3d`. Those of the primary window get that of the app's own picture by themselves.
+    pub fn target(&self) -> RenderTarget {
+        RenderTarget::Image(self.image.clone().into())
+    }
+}
+
+/// Whether this machine has anything to draw with, be it a driver in software.
+pub fn has_gpu() -> bool {
+    static FOUND: OnceLock<bool> = OnceLock::new();
+    *FOUND.get_or_init(|| !GpuContext::adapters().is_empty())
+}
+
+/// Bevy's `DefaultPlugins` without a window, with time standing still, and with an [`Offscreen`] of `size` pixels.
+///
+/// Add plugins, resources and systems to it as to any app; [`picture`](super::picture) runs it. Cameras that would draw into the
+/// primary window draw into the picture. Where there is no GPU, nothing is drawn and everything else works.
+pub fn app(size: UVec2) -> App {
+    app_with(size, |plugins| plugins)
+}
+
+/// Like [`app`], for games that set or disable some of the `DefaultPlugins`: `adjust` gets the group as [`app`] would add it.
+pub fn app_with(size: UVec2, adjust: impl FnOnce(PluginGroupBuilder) -> PluginGroupBuilder) -> App {
+    let settings = WgpuSettings { backends: has_gpu().then(backends), ..WgpuSettings::default() };
+    let plugins = DefaultPlugins
+        .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..WindowPlugin::default() })
+        // A read-back that nobody waits for any more is no news.
+        .set(LogPlugin { filter: format!("{DEFAULT_FILTER},bevy_render::gpu_readback=error"), ..LogPlugin::default() })
+        .set(AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..AssetPlugin::default() })
+        .set(RenderPlugin {
+            render_creation: RenderCreation::Automatic(Box::new(settings)),
+            synchronous_pipeline_compilation: true,
+            ..RenderPlugin::default()
+        })
+        .disable::<WinitPlugin>()
+        // Main and render world take turns, so that a picture belongs to the update that made it.
+        .disable::<PipelinedRenderingPlugin>();
+    let mut app = App::new();
+    app.add_plugins(adjust(plugins)).insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
+    // Steps longer than Bevy's quarter of a second are wanted, too.
+    app.world_mut().get_resource_or_init::<Time<Virtual>>().set_max_delta(Duration::MAX);
+    let offscreen = Offscreen::new(&mut app.world_mut().get_resource_or_init::<Assets<Image>>(), size);
+    app.insert_resource(offscreen)
+        .add_systems(PostUpdate, draw_offscreen.run_if(resource_exists::<Offscreen>).before(CameraUpdateSystems));
+    app
+}
+
+/// There is no primary window: cameras that would draw into it draw into the picture.
+fn draw_offscreen(offscreen: Res<Offscreen>, mut targets: Query<&mut RenderTarget, Changed<RenderTarget>>) {
+    for mut target in &mut targets {
+        if matches!(*target, RenderTarget::Window(WindowRef::Primary)) {
+            *target = offscreen.target();
+        }
+    }
+}
+
+/// Without DX12 among them wgpu needs no extra dispatch to validate each indirect one.
+fn backends() -> Backends {
+    if cfg!(target_os = "linux") { Backends::VULKAN } else { Backends::PRIMARY }
+}

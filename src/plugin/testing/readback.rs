@@ -1,0 +1,116 @@
+//! Taking pictures.
+//!
+//! In: an app, and how much time is to go by. Out: what its camera sees then, in memory or as PNG files.
+
+use super::waiting::{load, settle, update};
+use super::{Offscreen, TestingError};
+use crate::codec::CodecError;
+use crate::offline::write_beside;
+use bevy::app::App;
+use bevy::ecs::observer::On;
+use bevy::render::gpu_readback::{Readback, ReadbackComplete};
+use bevy::time::TimeUpdateStrategy;
+use glam::UVec2;
+use image::RgbaImage;
+use image::codecs::png::PngEncoder;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// Updates that a read-back may take.
+const READBACK: usize = 100;
+
+/// Waits until everything is there, lets `step` go by, and takes the picture of that moment: of the app's own [`Offscreen`].
+///
+/// # Errors
+/// Those of [`settle`], and a picture that does not come back from the GPU.
+pub fn picture(app: &mut App, step: Duration) -> Result<RgbaImage, TestingError> {
+    load(app)?;
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(step));
+    let stepped = update(app);
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
+    stepped?;
+    settle(app)?;
+    let offscreen = app.world().get_resource::<Offscreen>().cloned().ok_or(TestingError::NotOffscreen)?;
+    read(app, &offscreen)
+}
+
+/// The picture as it was last drawn: for a second one of the moment of [`picture`].
+///
+/// # Errors
+/// What went wrong in drawing, and a picture that does not come back from the GPU.
+pub fn read(app: &mut App, offscreen: &Offscreen) -> Result<RgbaImage, TestingError> {
+    let arrived = Arc::new(Mutex::new(None));
+    let sink = arrived.clone();
+    let store = move |event: On<ReadbackComplete>| {
+        *sink.lock().unwrap_or_else(PoisonError::into_inner) = Some(event.data.clone());
+    };
+    let readback = app.world_mut().spawn(Readback::texture(offscreen.image.clone())).observe(store).id();
+    let data = wait(app, &arrived);
+    app.world_mut().despawn(readback);
+    let size = offscreen.size;
+    RgbaImage::from_raw(size.x, size.y, unpadded(&data?, size)).ok_or(TestingError::Readback)
+}
+
+fn wait(app: &mut App, arrived: &Mutex<Option<Vec<u8>>>) -> Result<Vec<u8>, TestingError> {
+    for _ in 0..READBACK {
+        update(app)?;
+        if let Some(data) = arrived.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            return Ok(data);
+        }
+    }
+    Err(TestingError::Readback)
+}
+
+/// A texture is read back in rows padded to a multiple of 256 bytes.
+fn unpadded(data: &[u8], size: UVec2) -> Vec<u8> {
+    let row = size.x as usize * 4;
+    data.chunks(row.next_multiple_of(256)).flat_map(|padded| padded.iter().take(row).copied()).collect()
+}
+
+/// Takes `frames` pictures, `step` apart and the first at once, and writes them into `folder` as `0000.png`, `0001.png` and so on.
+/// Returns where they are.
+///
+/// # Errors
+/// Those of [`picture`] and [`save`].
+pub fn pictures(app: &mut App, folder: &Path, frames: u32, step: Duration) -> Result<Vec<PathBuf>, TestingError> {
+    let digits = frames.to_string().len().max(4);
+    let mut paths = Vec::new();
+    for index in 0..frames {
+        let step = if index == 0 { Duration::ZERO } else { step };
+        let path = folder.join(format!("{index:0digits$}.png"));
+        save(&picture(app, step)?, &path)?;
+        paths.push(path);
+    }
+    Ok(paths)
+}
+
+/// Writes a picture as PNG, whole or not at all, and makes the folder if there is none.
+///
+/// # Errors
+/// A folder that cannot be made or written to, a full disk.
+pub fn save(picture: &RgbaImage, path: &Path) -> Result<(), TestingError> {
+    if let Some(folder) = path.parent() {
+        let failed = |error: io::Error| CodecError { path: folder.to_owned(), kind: error.into() };
+        std::fs::create_dir_all(folder).map_err(failed)?;
+    }
+    write_beside(path, |file| picture.write_with_encoder(PngEncoder::new(file)).map_err(io::Error::other))?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_lose_their_padding_and_nothing_else() {
+        let size = UVec2::new(3, 2);
+        let mut padded = vec![0; 512];
+        padded[..12].copy_from_slice(&[1; 12]);
+        padded[256..268].copy_from_slice(&[2; 12]);
+        let expected: Vec<u8> = [[1; 12], [2; 12]].concat();
+        assert_eq!(unpadded(&padded, size), expected, "the rows, one after the other");
+        assert_eq!(unpadded(&[7; 512], UVec2::new(64, 2)), [7; 512], "rows of 256 bytes have none");
+    }
+}

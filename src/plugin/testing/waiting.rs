@@ -1,0 +1,169 @@
+//! Running an app until everything shows.
+//!
+//! In: an app, and hooks that name the assets it still needs. Out: the same app with those loaded and uploaded, every pipeline
+//! compiled, and no time gone by.
+
+use super::TestingError;
+use crate::plugin::asset::GaussianCapture;
+use crate::plugin::component::GaussianCapture3d;
+use crate::plugin::playback::{Timeline, TimelinePlayer};
+use bevy::app::{App, PluginsState};
+use bevy::asset::{AssetId, AssetServer, Assets, LoadState, UntypedAssetId};
+use bevy::ecs::resource::Resource;
+use bevy::ecs::world::World;
+use bevy::render::RenderApp;
+use bevy::render::render_resource::{CachedPipelineState, PipelineCache};
+use bevy::shader::ShaderCacheError;
+use std::time::{Duration, Instant};
+
+/// How long everything may take to load and compile.
+const RELEASE_AFTER_IDLE_FRAMES: Duration = Duration::from_secs(120);
+/// Updates until everything that has been loaded shows: uploads, and buffers that grow by what a frame before counted.
+const SETTLING: usize = 3;
+
+/// Names the assets that are needed and not there yet.
+type Hook = fn(&mut World) -> Vec<UntypedAssetId>;
+
+/// What is waited for.
+#[derive(Resource, Clone)]
+struct Awaited(Vec<Hook>);
+
+impl Default for Awaited {
+    fn default() -> Self {
+        Self(vec![captures, timelines])
+    }
+}
+
+/// Makes [`settle`] and everything that takes pictures wait for more than captures and timelines: for the assets that `missing`
+/// names until it names them no longer, or until the asset server knows nothing of them. One that cannot be loaded is an error.
+///
+/// ```no_run
+/// # use bevy::prelude::*;
+/// # use bevy_gs4d::testing;
+/// #[derive(Resource)]
+/// struct Poster(Handle<Image>);
+///
+/// let mut app = testing::app(UVec2::new(320, 240));
+/// testing::wait_for(&mut app, |world| {
+///     let images = world.resource::<Assets<Image>>();
+///     let poster = world.get_resource::<Poster>().filter(|poster| !images.contains(&poster.0));
+///     poster.map(|poster| poster.0.id().untyped()).into_iter().collect()
+/// });
+/// ```
+pub fn wait_for(app: &mut App, missing: fn(&mut World) -> Vec<UntypedAssetId>) {
+    app.world_mut().get_resource_or_init::<Awaited>().0.push(missing);
+}
+
+/// Runs the app until every capture and timeline in its world has been loaded and everything shows.
+///
+/// # Errors
+/// [`TestingError::NoGpu`]; an asset that cannot be loaded, or not within two minutes; what went wrong in drawing.
+pub fn settle(app: &mut App) -> Result<(), TestingError> {
+    load(app)?;
+    for _ in 0..SETTLING {
+        update(app)?;
+    }
+    pipelines_are_ready(app)?;
+    Ok(())
+}
+
+/// Runs the app, at least once, until everything is there.
+pub(super) fn load(app: &mut App) -> Result<(), TestingError> {
+    start(app)?;
+    let began = Instant::now();
+    loop {
+        update(app)?;
+        let missing = missing(app.world_mut())?;
+        let compiled = pipelines_are_ready(app)?;
+        if missing.is_empty() && compiled {
+            return Ok(());
+        }
+        if began.elapsed() > RELEASE_AFTER_IDLE_FRAMES {
+            let what = if compiled { missing.join(", ") } else { "shaders".into() };
+            return Err(TestingError::Slow { seconds: RELEASE_AFTER_IDLE_FRAMES.as_secs(), what });
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// What a runner does before the first update.
+fn start(app: &mut App) -> Result<(), TestingError> {
+    if app.get_sub_app(RenderApp).is_none() {
+        return Err(TestingError::NoGpu);
+    }
+    while app.plugins_state() == PluginsState::Adding {
+        bevy::tasks::tick_global_task_pools_on_main_thread();
+    }
+    if app.plugins_state() != PluginsState::Cleaned {
+        app.finish();
+        app.cleanup();
+    }
+    Ok(())
+}
+
+/// One update; what went wrong in drawing is an error.
+pub(super) fn update(app: &mut App) -> Result<(), TestingError> {
+    app.update();
+    match app.should_exit() {
+        Some(_) => Err(TestingError::Stopped),
+        None => Ok(()),
+    }
+}
+
+/// The names of what is still being loaded.
+fn missing(world: &mut World) -> Result<Vec<String>, TestingError> {
+    let hooks = world.get_resource_or_init::<Awaited>().clone();
+    let wanted: Vec<UntypedAssetId> = hooks.0.iter().flat_map(|hook| hook(world)).collect();
+    let Some(server) = world.get_resource::<AssetServer>() else { return Ok(Vec::new()) };
+    let mut missing = Vec::new();
+    for id in wanted {
+        match server.get_load_state(id) {
+            Some(LoadState::Failed(failure)) => return Err(TestingError::Asset(failure)),
+            Some(LoadState::NotLoaded | LoadState::Loading) => {
+                missing.push(server.get_path(id).map_or_else(|| id.to_string(), |path| path.to_string()));
+            }
+            // Removed by the game, or never loaded by the server: it will not come.
+            Some(LoadState::Loaded) | None => {}
+        }
+    }
+    Ok(missing)
+}
+
+fn captures(world: &mut World) -> Vec<UntypedAssetId> {
+    let mut spawned = world.query::<&GaussianCapture3d>();
+    absent(world, spawned.iter(world).map(|capture| capture.0.id()))
+}
+
+/// Timelines, and the captures of those that have been loaded.
+fn timelines(world: &mut World) -> Vec<UntypedAssetId> {
+    let mut players = world.query::<&TimelinePlayer>();
+    let players: Vec<AssetId<Timeline>> = players.iter(world).map(|player| player.0.id()).collect();
+    let Some(timelines) = world.get_resource::<Assets<Timeline>>() else { return Vec::new() };
+    let loaded = players.iter().filter_map(|player| timelines.get(*player));
+    let clips = loaded.flat_map(|timeline| timeline.tracks()).flat_map(|track| &track.clips);
+    let mut absent = absent(world, clips.map(|clip| clip.capture.id()));
+    absent.extend(players.iter().filter(|player| !timelines.contains(**player)).map(|player| player.untyped()));
+    absent
+}
+
+/// Those that are not among the assets.
+fn absent(world: &World, captures: impl Iterator<Item = AssetId<GaussianCapture>>) -> Vec<UntypedAssetId> {
+    let Some(loaded) = world.get_resource::<Assets<GaussianCapture>>() else { return Vec::new() };
+    captures.filter(|capture| !loaded.contains(*capture)).map(AssetId::untyped).collect()
+}
+
+fn pipelines_are_ready(app: &App) -> Result<bool, TestingError> {
+    let renderer = app.get_sub_app(RenderApp).ok_or(TestingError::NoGpu)?;
+    let Some(cache) = renderer.world().get_resource::<PipelineCache>() else { return Ok(false) };
+    for pipeline in cache.pipelines() {
+        match &pipeline.state {
+            // Bevy tries these again: the shader is still on its way.
+            CachedPipelineState::Err(
+                ShaderCacheError::ShaderNotLoaded(_) | ShaderCacheError::ShaderImportNotYetAvailable,
+            ) => return Ok(false),
+            CachedPipelineState::Err(failure) => return Err(TestingError::Pipeline(failure.to_string())),
+            _ => {}
+        }
+    }
+    Ok(cache.waiting_pipelines().count() == 0)
+}

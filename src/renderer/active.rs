@@ -1,0 +1,99 @@
+//! The list of active Gaussians of a capture where it is placed, shared by all views that see it.
+//!
+//! In: a capture with a temporal filter and a time. Out: the indices that are active in that time's segment, ascending, part by
+//! part: made by `activate`, and only when the segment has changed.
+
+use super::capture::{Filter, GpuCapture};
+use super::layout::{Activation, BLOCK};
+use super::pipelines::Renderer;
+use super::statistics::note_activated;
+use crate::renderer::bind::bind_group;
+use crate::renderer::memory::{alignment_of, buffer};
+use wgpu::BufferUsages;
+
+/// Which Gaussians of a capture are drawn.
+#[derive(Debug)]
+pub struct ActiveList {
+    capture: u64,
+    /// Segment of the time prepared last, and whether the list holds it.
+    segment: Option<u32>,
+    recorded: bool,
+    alignment: u32,
+    uniforms: wgpu::Buffer,
+    activate: wgpu::BindGroup,
+    /// What `project` reads.
+    pub(super) list: wgpu::BindGroup,
+}
+
+impl ActiveList {
+    /// An empty list; nothing for a capture without a filter.
+    pub fn new(device: &wgpu::Device, renderer: &Renderer, capture: &GpuCapture) -> Option<Self> {
+        capture.filter.as_ref()?;
+        let alignment = alignment_of::<Activation>(device);
+        let count = (capture.len().max(1) as u64).next_multiple_of(u64::from(BLOCK));
+        let parts = capture.parts.len().max(1) as u64;
+        let uniforms = buffer(device, "gs4d activations", parts * u64::from(alignment), BufferUsages::UNIFORM);
+        let list = buffer(device, "gs4d active list", count * 4, BufferUsages::STORAGE);
+        let blocks = buffer(device, "gs4d active blocks", count / u64::from(BLOCK) * 4, BufferUsages::STORAGE);
+        let uniform = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+            buffer: &uniforms,
+            offset: 0,
+            size: std::num::NonZeroU64::new(size_of::<Activation>() as u64),
+        });
+        let resources = [uniform, list.as_entire_binding(), blocks.as_entire_binding()];
+        let activate = bind_group(device, "gs4d activate", &renderer.layouts.activate, &resources);
+        let list = bind_group(device, "gs4d active list", &renderer.layouts.active, &[list.as_entire_binding()]);
+        Some(Self { capture: capture.id, segment: None, recorded: false, alignment, uniforms, activate, list })
+    }
+
+    /// Whether it belongs to this upload of a capture; after another, make a new one.
+    pub fn is_for(&self, capture: &GpuCapture) -> bool {
+        self.capture == capture.id
+    }
+
+    /// Moves on to `time`, in the capture's unit. Returns whether the list must be [recorded](Self::record) before it is drawn.
+    pub fn prepare(&mut self, queue: &wgpu::Queue, capture: &GpuCapture, time: f32) -> bool {
+        let Some(filter) = &capture.filter else { return false };
+        let segment = filter.segment_of(time);
+        if self.segment != Some(segment) {
+            self.segment = Some(segment);
+            self.recorded = false;
+            let mut first = 0;
+            for (index, part) in capture.parts.iter().enumerate() {
+                let activation = Activation { count: part.count, first, filter_mode: filter.mode, segment };
+                let at = index as u64 * u64::from(self.alignment);
+                queue.write_buffer(&self.uniforms, at, bytemuck::bytes_of(&activation));
+                first += part.count;
+            }
+        }
+        !self.recorded
+    }
+
+    /// Records `activate`, if the list is not the wanted one yet.
+    pub fn record(&mut self, renderer: &Renderer, encoder: &mut wgpu::CommandEncoder, capture: &GpuCapture) {
+        if self.recorded {
+            return;
+        }
+        self.recorded = true;
+        note_activated();
+        let mut pass = encoder
+            .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("gs4d activate"), timestamp_writes: None });
+        for (index, part) in capture.parts.iter().enumerate() {
+            let Some(filter) = &part.filter else { continue };
+            let blocks = part.count.div_ceil(BLOCK);
+            pass.set_bind_group(0, &self.activate, &[index as u32 * self.alignment]);
+            pass.set_bind_group(1, filter, &[]);
+            pass.set_pipeline(&renderer.activate_count);
+            pass.dispatch_workgroups(blocks, 1, 1);
+            pass.set_pipeline(&renderer.activate_scan);
+            pass.dispatch_workgroups(1, 1, 1);
+            pass.set_pipeline(&renderer.activate_write);
+            pass.dispatch_workgroups(blocks, 1, 1);
+        }
+    }
+
+    /// How many Gaussians of a part are active.
+    pub(super) fn count(&self, filter: &Filter, part: usize) -> u32 {
+        self.segment.map_or(0, |segment| filter.count(part, segment))
+    }
+}

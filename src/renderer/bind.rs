@@ -1,0 +1,104 @@
+//! Bind group layouts, bind groups and compute pipelines, each in one line.
+//!
+//! In: kinds of bindings in the order of a shader's `@binding` numbers, resources in the same order. Out: what wgpu makes of them.
+
+use super::note_created;
+use std::num::NonZeroU64;
+
+/// Kinds of bindings, to write layouts in one line each.
+#[derive(Clone, Copy)]
+pub(crate) enum Bind {
+    /// Uniform buffer of this many bytes.
+    Uniform(usize),
+    /// The same, at an offset given with the dispatch.
+    UniformAt(usize),
+    Read,
+    Write,
+    Depth,
+    /// A multisampled depth.
+    Depths,
+    /// A texture that is read as it is.
+    Texture,
+    Target(wgpu::TextureFormat),
+}
+
+impl Bind {
+    fn entry(self, binding: u32) -> wgpu::BindGroupLayoutEntry {
+        let buffer = |ty, has_dynamic_offset, size: usize| wgpu::BindingType::Buffer {
+            ty,
+            has_dynamic_offset,
+            min_binding_size: NonZeroU64::new(size as u64),
+        };
+        let ty = match self {
+            Self::Uniform(size) => buffer(wgpu::BufferBindingType::Uniform, false, size),
+            Self::UniformAt(size) => buffer(wgpu::BufferBindingType::Uniform, true, size),
+            Self::Read => buffer(wgpu::BufferBindingType::Storage { read_only: true }, false, 0),
+            Self::Write => buffer(wgpu::BufferBindingType::Storage { read_only: false }, false, 0),
+            Self::Depth | Self::Depths => wgpu::BindingType::Texture {
+                sample_type: wgpu::TextureSampleType::Depth,
+                view_dimension: wgpu::TextureViewDimension::D2,
+                multisampled: matches!(self, Self::Depths),
+            },
+            Self::Texture => wgpu::BindingType::Texture {
+                sample_type: wgpu::TextureSampleType::Float { filterable: false },
+                view_dimension: wgpu::TextureViewDimension::D2,
+                multisampled: false,
+            },
+            Self::Target(format) => wgpu::BindingType::StorageTexture {
+                access: wgpu::StorageTextureAccess::WriteOnly,
+                format,
+                view_dimension: wgpu::TextureViewDimension::D2,
+            },
+        };
+        wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None }
+    }
+}
+
+/// A compute pipeline over these groups.
+pub(crate) fn pipeline(
+    device: &wgpu::Device,
+    module: &wgpu::ShaderModule,
+    entry: &str,
+    groups: &[&wgpu::BindGroupLayout],
+) -> wgpu::ComputePipeline {
+    let groups: Vec<_> = groups.iter().map(|group| Some(*group)).collect();
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("gs4d"),
+        bind_group_layouts: &groups,
+        immediate_size: 0,
+    });
+    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(entry),
+        layout: Some(&layout),
+        module,
+        entry_point: Some(entry),
+        // Every pass writes its workgroup memory before it reads it.
+        compilation_options: wgpu::PipelineCompilationOptions {
+            zero_initialize_workgroup_memory: false,
+            ..Default::default()
+        },
+        cache: None,
+    })
+}
+
+/// A bind group layout whose bindings are numbered in order.
+pub(crate) fn group_layout(device: &wgpu::Device, label: &str, bindings: &[Bind]) -> wgpu::BindGroupLayout {
+    let entries: Vec<_> = bindings.iter().enumerate().map(|(i, bind)| bind.entry(i as u32)).collect();
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+}
+
+/// A bind group whose bindings are numbered in order.
+pub(crate) fn bind_group(
+    device: &wgpu::Device,
+    label: &str,
+    layout: &wgpu::BindGroupLayout,
+    resources: &[wgpu::BindingResource<'_>],
+) -> wgpu::BindGroup {
+    let entries: Vec<_> = resources
+        .iter()
+        .enumerate()
+        .map(|(i, resource)| wgpu::BindGroupEntry { binding: i as u32, resource: resource.clone() })
+        .collect();
+    note_created();
+    device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
+}

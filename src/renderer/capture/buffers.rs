@@ -1,0 +1,138 @@
+//! The buffers of a capture: what `project` and `activate` read.
+//!
+//! In: a [`RuntimeScene`] and a range of its Gaussians. Out: storage buffers in the order of the shader's bindings. Packed scenes go
+//! up as they are.
+
+use crate::gaussian::Gaussian;
+use crate::renderer::Storage;
+use crate::renderer::layout::CODEBOOK_SCALES;
+use crate::renderer::memory::buffer;
+use crate::scene::packed::{BLOCK, BLOCK_RANGES, SHARED_RANGES};
+use crate::scene::{ActiveSets, CodedColors, RuntimeScene, TemporalFilter};
+use std::ops::Range;
+
+/// Records that are written together.
+const RECORDS_AT_ONCE: usize = 1 << 14;
+
+/// Where buffers are made.
+#[derive(Clone, Copy)]
+pub(super) struct Gpu<'a> {
+    pub device: &'a wgpu::Device,
+    pub queue: &'a wgpu::Queue,
+}
+
+/// How this scene is stored.
+pub(super) fn storage_of(scene: &RuntimeScene) -> Storage {
+    match (&scene.packed, scene.coded_colors()) {
+        (None, _) => Storage::Full,
+        (Some(_), None) => Storage::Packed,
+        (Some(_), Some(_)) => Storage::Coded,
+    }
+}
+
+/// Bytes that one Gaussian takes in the largest buffer.
+pub(super) fn largest_record(storage: Storage, stride: usize) -> u64 {
+    let (geometry, color) = match storage {
+        Storage::Full => (size_of::<Gaussian>(), stride * 16),
+        Storage::Packed => (32, stride * 16),
+        Storage::Coded => (32, 12),
+    };
+    geometry.max(color) as u64
+}
+
+/// Geometry and colour of some Gaussians, the first at a multiple of a block; codebooks aside. `stride` are the four-vectors of whole
+/// coefficients per Gaussian.
+pub(super) fn part(gpu: Gpu<'_>, scene: &RuntimeScene, own: Range<usize>, stride: usize) -> Vec<wgpu::Buffer> {
+    let mut buffers = match &scene.packed {
+        None => vec![gaussians(gpu, &scene.gaussians[own.clone()])],
+        Some(packed) => {
+            let blocks = own.start / BLOCK * BLOCK_RANGES..own.end.div_ceil(BLOCK) * BLOCK_RANGES;
+            let (shared, blocks) = (&packed.ranges[..SHARED_RANGES], &packed.ranges[SHARED_RANGES..][blocks]);
+            vec![
+                plain(gpu, "gs4d records", bytemuck::cast_slice(&packed.records[own.clone()])),
+                plain(gpu, "gs4d ranges", bytemuck::cast_slice(&[shared, blocks].concat())),
+            ]
+        }
+    };
+    buffers.push(match scene.coded_colors() {
+        Some(colors) => plain(gpu, "gs4d color records", bytemuck::cast_slice(&colors.records[own])),
+        None => harmonics(gpu, scene, own, stride),
+    });
+    buffers
+}
+
+/// All codebooks, and their scales.
+pub(super) fn codebooks(gpu: Gpu<'_>, colors: &CodedColors) -> [wgpu::Buffer; 2] {
+    let mut scales = colors.scales.clone();
+    scales.resize(CODEBOOK_SCALES, [0.0; 4]);
+    // A binding of no bytes is not allowed.
+    let or_zero = |bytes: &[u8]| if bytes.is_empty() { vec![0; 16] } else { bytes.to_vec() };
+    [
+        plain(gpu, "gs4d codebooks", &or_zero(bytemuck::cast_slice(&colors.codebooks))),
+        filled(gpu, "gs4d codebook scales", bytemuck::cast_slice(&scales), wgpu::BufferUsages::UNIFORM),
+    ]
+}
+
+/// The sets of some Gaussians: the words of each segment in turn, or one word of interval for each.
+pub(super) fn filter(gpu: Gpu<'_>, filter: &TemporalFilter, own: Range<usize>) -> wgpu::Buffer {
+    let words = match &filter.sets {
+        ActiveSets::Bits(bits) => {
+            // Parts begin at multiples of 32.
+            let all = TemporalFilter::words(filter.count);
+            let own = own.start / 32..own.end.div_ceil(32);
+            bits.chunks_exact(all).flat_map(|segment| &segment[own.clone()]).copied().collect()
+        }
+        ActiveSets::Intervals(intervals) => intervals[own].to_vec(),
+    };
+    plain(gpu, "gs4d filter", bytemuck::cast_slice(&words))
+}
+
+pub(super) fn plain(gpu: Gpu<'_>, label: &'static str, contents: &[u8]) -> wgpu::Buffer {
+    filled(gpu, label, contents, wgpu::BufferUsages::STORAGE)
+}
+
+/// Written through the queue: on a device that has just been lost, mapping would panic.
+fn filled(gpu: Gpu<'_>, label: &'static str, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
+    let made = buffer(gpu.device, label, contents.len() as u64, usage);
+    gpu.queue.write_buffer(&made, 0, contents);
+    made
+}
+
+/// The records as they are, but for `1/σ_t` in the place of `σ_t`: zero, not infinity, for what is always there.
+fn gaussians(gpu: Gpu<'_>, gaussians: &[Gaussian]) -> wgpu::Buffer {
+    records(gpu, "gs4d gaussians", gaussians.len(), size_of::<Gaussian>(), |index, record| {
+        let gaussian = gaussians[index];
+        record.copy_from_slice(bytemuck::bytes_of(&Gaussian { sigma_t: gaussian.sigma_t.recip(), ..gaussian }));
+    })
+}
+
+/// The coefficients that are evaluated, padded to whole four-vectors per Gaussian.
+fn harmonics(gpu: Gpu<'_>, scene: &RuntimeScene, own: Range<usize>, stride: usize) -> wgpu::Buffer {
+    let used = scene.harmonics.evaluated() * 3;
+    records(gpu, "gs4d harmonics", own.len(), stride * 16, |index, record| {
+        record[..used * 4].copy_from_slice(bytemuck::cast_slice(&scene.harmonics.of(own.start + index)[..used]));
+    })
+}
+
+/// A storage buffer of records, written some at a time: no second copy of all on the host.
+fn records(
+    gpu: Gpu<'_>,
+    label: &'static str,
+    count: usize,
+    size: usize,
+    fill: impl Fn(usize, &mut [u8]),
+) -> wgpu::Buffer {
+    let made = buffer(gpu.device, label, (count * size) as u64, wgpu::BufferUsages::STORAGE);
+    let mut chunk = Vec::new();
+    for first in (0..count).step_by(RECORDS_AT_ONCE) {
+        let own = RECORDS_AT_ONCE.min(count - first);
+        // What is not filled is zero.
+        chunk.clear();
+        chunk.resize(own * size, 0);
+        for (index, record) in chunk.chunks_exact_mut(size).enumerate() {
+            fill(first + index, record);
+        }
+        gpu.queue.write_buffer(&made, (first * size) as u64, &chunk);
+    }
+    made
+}

@@ -1,0 +1,215 @@
+//! A capture on the GPU.
+//!
+//! In: a [`RuntimeScene`]. Out: buffers that stay as long as the capture does. Large captures are split into parts, so that no
+//! binding grows over what the device allows; a part is drawn by one dispatch of `project`.
+
+mod buffers;
+
+use super::memory::binding_limit;
+use super::{ActiveList, GpuError, Renderer, Storage, layout, note_uploaded};
+use crate::gaussian::ShDirection;
+use crate::gaussian::harmonics::evaluated;
+use crate::renderer::bind::bind_group as bind_group_of;
+use crate::scene::packed::MAX_STAGES;
+use crate::scene::{ActiveSets, CodedColors, RuntimeScene, TemporalFilter, segment_of};
+use layout::BLOCK;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A capture on the GPU: its Gaussians, colour and environment map in buffers, in as many parts as bindings ask for.
+#[derive(Debug)]
+pub struct GpuCapture {
+    pub(super) parts: Vec<Part>,
+    pub(super) environment: Option<EnvironmentBuffer>,
+    /// How its Gaussians and colours are stored.
+    pub(super) storage: Storage,
+    /// Tells captures apart, as long as the program runs.
+    pub(super) id: u64,
+    pub(super) filter: Option<Filter>,
+    /// Bytes of its buffers.
+    bytes: u64,
+    /// Colour and time settings of an [`layout::Instance`]; the rest is zero.
+    settings: layout::Instance,
+    len: usize,
+}
+
+/// As many Gaussians as fit one binding.
+#[derive(Debug)]
+pub(super) struct Part {
+    pub count: u32,
+    pub bind_group: wgpu::BindGroup,
+    /// Its share of the filter, if there is one.
+    pub filter: Option<wgpu::BindGroup>,
+}
+
+/// What the host needs to know of a filter.
+#[derive(Debug)]
+pub(super) struct Filter {
+    /// `FILTER_*`.
+    pub mode: u32,
+    segments: u32,
+    interval: [f32; 2],
+    /// Active Gaussians, part by part and segment by segment.
+    counts: Vec<u32>,
+}
+
+impl Filter {
+    fn new(filter: &TemporalFilter, interval: [f32; 2], parts: &[Part]) -> Self {
+        let mut counts = Vec::with_capacity(parts.len() * filter.segments as usize);
+        let mut first = 0;
+        for part in parts {
+            let own = first..first + part.count as usize;
+            counts.extend(filter.active_counts(own.clone()));
+            first = own.end;
+        }
+        let mode = match filter.sets {
+            ActiveSets::Bits(_) => layout::FILTER_BITS,
+            ActiveSets::Intervals(_) => layout::FILTER_INTERVALS,
+        };
+        Self { mode, segments: filter.segments, interval, counts }
+    }
+
+    /// The segment of a time, in the capture's unit.
+    pub fn segment_of(&self, time: f32) -> u32 {
+        segment_of(time, self.interval, self.segments)
+    }
+
+    /// Active Gaussians of a part in a segment.
+    pub fn count(&self, part: usize, segment: u32) -> u32 {
+        self.counts.get(part * self.segments as usize + segment as usize).copied().unwrap_or_default()
+    }
+}
+
+#[derive(Debug)]
+pub(super) struct EnvironmentBuffer {
+    pub buffer: wgpu::Buffer,
+    pub size: [u32; 2],
+}
+
+impl GpuCapture {
+    /// Uploads a scene.
+    ///
+    /// # Errors
+    /// When the environment map is larger than the device binds, or the parts of the scene do not fit together.
+    pub fn upload(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        renderer: &Renderer,
+        scene: &RuntimeScene,
+    ) -> Result<Self, GpuError> {
+        scene.check().map_err(GpuError::Scene)?;
+        let gpu = buffers::Gpu { device, queue };
+        let storage = buffers::storage_of(scene);
+        let (degree, degree_t) = match scene.coded_colors() {
+            Some(colors) => (colors.degree, colors.degree_t),
+            None => (scene.harmonics.degree, scene.harmonics.degree_t),
+        };
+        let stride = (evaluated(degree, degree_t) * 3).div_ceil(4);
+        let limits = device.limits();
+        if let Some(map) = &scene.environment {
+            let (needed, limit) = (size_of_val(map.texels.as_slice()) as u64, binding_limit(&limits));
+            if needed > limit {
+                return Err(GpuError::TooLarge { what: "the environment map", needed, limit });
+            }
+        }
+        let bits = scene.filter.as_ref().map_or(0, |filter| u64::from(filter.segments).div_ceil(8));
+        let record = buffers::largest_record(storage, stride).max(bits);
+        let threads = u64::from(limits.max_compute_workgroups_per_dimension) * 256;
+        // A multiple of what one block of `activate` takes.
+        let per_part = ((binding_limit(&limits) / record).min(threads) as usize / BLOCK as usize) * BLOCK as usize;
+        if per_part == 0 {
+            let (needed, limit) = (record * u64::from(BLOCK), binding_limit(&limits));
+            return Err(GpuError::TooLarge { what: "the Gaussians", needed, limit });
+        }
+        let mut parts = Vec::new();
+        let mut bytes = 0;
+        let codebooks = scene.coded_colors().map(|colors| buffers::codebooks(gpu, colors));
+        for first in (0..scene.len()).step_by(per_part) {
+            let count = per_part.min(scene.len() - first);
+            let own = buffers::part(gpu, scene, first..first + count, stride);
+            let all: Vec<_> = own.iter().chain(codebooks.iter().flatten()).collect();
+            bytes += own.iter().map(wgpu::Buffer::size).sum::<u64>();
+            let bind_group = renderer.capture_bind_group(device, storage, &all);
+            let filter = scene.filter.as_ref().map(|filter| {
+                let sets = buffers::filter(gpu, filter, first..first + count);
+                bytes += sets.size();
+                bind_group_of(device, "gs4d filter", &renderer.layouts.filter, &[sets.as_entire_binding()])
+            });
+            parts.push(Part { count: count as u32, bind_group, filter });
+        }
+        bytes += codebooks.iter().flatten().map(wgpu::Buffer::size).sum::<u64>();
+        let environment = scene.environment.as_ref().map(|map| EnvironmentBuffer {
+            buffer: buffers::plain(gpu, "gs4d environment", bytemuck::cast_slice(&map.texels)),
+            size: [map.width, map.height],
+        });
+        bytes += environment.as_ref().map_or(0, |map| map.buffer.size());
+        let settings = layout::Instance {
+            degree,
+            degree_t: if degree == 3 { degree_t } else { 0 },
+            stride: stride as u32,
+            stages: scene.coded_colors().map_or(0, |colors| colors.entries.len() as u32),
+            first_entries: scene.coded_colors().map(first_entries).unwrap_or_default(),
+            displaced: u32::from(scene.trained_with.sh_direction == ShDirection::Displaced),
+            time_span: scene.trained_with.time_span(),
+            ..bytemuck::Zeroable::zeroed()
+        };
+        let interval = scene.trained_with.time_interval;
+        let filter = scene.filter.as_ref().map(|filter| Filter::new(filter, interval, &parts));
+        let id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
+        note_uploaded(bytes);
+        Ok(Self { parts, environment, storage, id, filter, bytes, settings, len: scene.len() })
+    }
+
+    /// Number of Gaussians.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there is no Gaussian.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Whether it has an environment map.
+    pub fn has_environment(&self) -> bool {
+        self.environment.is_some()
+    }
+
+    /// Whether it has a temporal filter.
+    pub fn has_filter(&self) -> bool {
+        self.filter.is_some()
+    }
+
+    /// Bytes of its buffers on the GPU.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// How many Gaussians of part `index` are drawn: those of the list if there is one, else all.
+    pub(super) fn drawn(&self, index: usize, active: Option<&ActiveList>) -> u32 {
+        match (&self.filter, active) {
+            (Some(filter), Some(active)) => active.count(filter, index),
+            _ => self.parts[index].count,
+        }
+    }
+
+    /// What is the same for all parts of a capture and in all views, filled into `view`.
+    pub(super) fn instance(&self, view: &layout::Instance) -> layout::Instance {
+        layout::Instance {
+            degree: self.settings.degree,
+            degree_t: self.settings.degree_t,
+            stride: self.settings.stride,
+            displaced: self.settings.displaced,
+            stages: self.settings.stages,
+            first_entries: self.settings.first_entries,
+            time_span: self.settings.time_span,
+            ..*view
+        }
+    }
+}
+
+static NEXT_ID: AtomicU64 = AtomicU64::new(0);
+
+/// Where each codebook begins among all entries.
+fn first_entries(colors: &CodedColors) -> [u32; MAX_STAGES] {
+    std::array::from_fn(|stage| colors.entries.iter().take(stage).sum())
+}

@@ -1,0 +1,333 @@
+//! Drawing without a window: for commands, scoring and tests.
+//!
+//! In: scenes and views. Out: [`Frame`]s on the host, or [`Timings`]. Each call waits for the GPU; inside a frame nothing does.
+
+use super::layout::Counters;
+use super::timing::{PassTime, PassTimer, TIMED_PASSES, Timings, median};
+use super::view::{Finished, max_pairs};
+use super::{
+    ActiveList, GpuCapture, GpuContext, GpuError, Instance, Renderer, ShaderChecks, ViewParameters, ViewRenderer,
+};
+use crate::scene::RuntimeScene;
+use crate::view::{Appearance, Background, Counts, Frame, Picture, View};
+use glam::{UVec2, Vec3};
+use std::time::Instant;
+
+/// A renderer with a device of its own and one view.
+#[derive(Debug)]
+pub struct Headless {
+    context: GpuContext,
+    renderer: Renderer,
+    view: ViewRenderer,
+    filtered: bool,
+    /// Of the capture drawn last.
+    active: Option<ActiveList>,
+}
+
+impl Headless {
+    /// Compiles the passes on that device.
+    ///
+    /// # Errors
+    /// When the device cannot run them.
+    pub fn new(context: GpuContext, checks: ShaderChecks) -> Result<Self, GpuError> {
+        let renderer = Renderer::new(&context.device, checks)?;
+        let view = ViewRenderer::new(&context.device);
+        Ok(Self { context, renderer, view, filtered: true, active: None })
+    }
+
+    /// The device and its name.
+    pub fn context(&self) -> &GpuContext {
+        &self.context
+    }
+
+    /// Whether temporal filters are used (they are at first).
+    pub fn use_filters(&mut self, filtered: bool) {
+        self.filtered = filtered;
+    }
+
+    /// Puts a scene on the GPU.
+    ///
+    /// # Errors
+    /// When it does not fit.
+    pub fn upload(&self, scene: &RuntimeScene) -> Result<GpuCapture, GpuError> {
+        GpuCapture::upload(&self.context.device, &self.context.queue, &self.renderer, scene)
+    }
+
+    /// Which Gaussians of a capture its filter leaves active at a time, for [`render_all`](Self::render_all); nothing without a filter.
+    pub fn active(&self, capture: &GpuCapture, time: f32) -> Option<ActiveList> {
+        let GpuContext { device, queue, .. } = &self.context;
+        let mut active = ActiveList::new(device, &self.renderer, capture)?;
+        self.activate(&mut active, queue, capture, time);
+        Some(active)
+    }
+
+    /// Draws one capture as trained.
+    ///
+    /// # Errors
+    /// When the picture does not fit the device or the device is lost.
+    pub fn render(&mut self, capture: &GpuCapture, view: &View, background: Background) -> Result<Frame, GpuError> {
+        let parameters = ViewParameters { background, ..ViewParameters::default() };
+        let active = self.take_active(capture, view.time);
+        let frame = self.render_all(&[instance(capture, active.as_ref(), view)], &parameters);
+        self.active = active;
+        frame
+    }
+
+    /// Draws several captures into one picture, in order of depth, cut by opaque surfaces if given.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render).
+    pub fn render_all(
+        &mut self,
+        instances: &[Instance<'_>],
+        parameters: &ViewParameters<'_>,
+    ) -> Result<Frame, GpuError> {
+        let counters = self.submit_whole(instances, parameters)?;
+        let size = instances.first().map_or(UVec2::ONE, |instance| instance.view.size);
+        let (color, depth) = self.read_targets(size)?;
+        let color: &[[f32; 4]] = bytemuck::cast_slice(&color);
+        Ok(Frame {
+            picture: Picture { size, pixels: color.iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect() },
+            transmittance: color.iter().map(|p| p[3]).collect(),
+            depth: depth.iter().step_by(2).copied().collect(),
+            median_depth: depth.iter().skip(1).step_by(2).copied().collect(),
+            counts: Counts { visible: counters.visible, pairs: counters.pairs },
+        })
+    }
+
+    /// Measures frames over the views given, in turn, `frames` of each kind after a warm-up.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render).
+    pub fn time(&mut self, capture: &GpuCapture, views: &[View], frames: usize) -> Result<Timings, GpuError> {
+        let mut active = self.take_active(capture, views.first().map_or(0.0, |view| view.time));
+        let timings = self.time_with(capture, active.as_mut(), views, frames);
+        self.active = active;
+        timings
+    }
+
+    fn time_with(
+        &mut self,
+        capture: &GpuCapture,
+        mut active: Option<&mut ActiveList>,
+        views: &[View],
+        frames: usize,
+    ) -> Result<Timings, GpuError> {
+        let parameters = &ViewParameters { background: Background::Color([0.0; 3]), ..ViewParameters::default() };
+        let mut counts = Vec::new();
+        // The warm-up also finds room for the pairs of every view.
+        for view in views {
+            self.reactivate(active.as_deref_mut(), capture, view.time);
+            counts.push(self.render_all(&[instance(capture, active.as_deref(), view)], parameters)?.counts);
+        }
+        let around = PassTimer::new(&self.context.device, &self.context.queue, false);
+        let inside = PassTimer::new(&self.context.device, &self.context.queue, true);
+        let (mut frame, mut wall) = (Vec::new(), Vec::new());
+        for i in 0..frames {
+            let view = &views[i % views.len()];
+            let start = Instant::now();
+            self.reactivate(active.as_deref_mut(), capture, view.time);
+            self.submit(&[instance(capture, active.as_deref(), view)], parameters, around.as_ref())?;
+            wall.push(start.elapsed().as_secs_f64() * 1e3);
+            if let Some(timer) = &around {
+                frame.push(timer.intervals(&self.copy_out(timer.resolved(), timer.resolved().size())?)[0]);
+            }
+        }
+        let mut passes = vec![Vec::new(); TIMED_PASSES.len()];
+        if let Some(timer) = &inside {
+            for i in 0..frames {
+                let view = &views[i % views.len()];
+                self.reactivate(active.as_deref_mut(), capture, view.time);
+                self.submit(&[instance(capture, active.as_deref(), view)], parameters, Some(timer))?;
+                let timestamps = self.copy_out(timer.resolved(), timer.resolved().size())?;
+                for (pass, time) in passes.iter_mut().zip(timer.intervals(&timestamps)) {
+                    pass.push(time);
+                }
+            }
+        }
+        let start = Instant::now();
+        for i in 0..frames {
+            let view = &views[i % views.len()];
+            self.reactivate(active.as_deref_mut(), capture, view.time);
+            self.submit_without_waiting(&[instance(capture, active.as_deref(), view)], parameters, None)?;
+        }
+        self.wait()?;
+        let pipelined = start.elapsed().as_secs_f64() * 1e3 / frames.max(1) as f64;
+        let middle = |value: fn(&Counts) -> u32| median(counts.iter().map(|c| f64::from(value(c))).collect()) as u32;
+        Ok(Timings {
+            passes: TIMED_PASSES
+                .into_iter()
+                .zip(passes)
+                .filter(|(_, times)| !times.is_empty())
+                .map(|(name, times)| PassTime { name, milliseconds: median(times) })
+                .collect(),
+            frame_milliseconds: around.map(|_| median(frame)),
+            wall_milliseconds: median(wall),
+            pipelined_milliseconds: pipelined,
+            counts: Counts { visible: middle(|c| c.visible), pairs: middle(|c| c.pairs) },
+            frames,
+        })
+    }
+
+    /// The list for this capture at that time: the one of the last call if it belongs to it. Hand it back when it has been used.
+    fn take_active(&mut self, capture: &GpuCapture, time: f32) -> Option<ActiveList> {
+        if !self.filtered {
+            return None;
+        }
+        let made = self.active.take().filter(|active| active.is_for(capture));
+        let mut active = made.or_else(|| ActiveList::new(&self.context.device, &self.renderer, capture))?;
+        self.activate(&mut active, &self.context.queue, capture, time);
+        Some(active)
+    }
+
+    /// Moves a list on, if there is one.
+    fn reactivate(&self, active: Option<&mut ActiveList>, capture: &GpuCapture, time: f32) {
+        if let Some(active) = active {
+            self.activate(active, &self.context.queue, capture, time);
+        }
+    }
+
+    fn activate(&self, active: &mut ActiveList, queue: &wgpu::Queue, capture: &GpuCapture, time: f32) {
+        if active.prepare(queue, capture, time) {
+            let label = wgpu::CommandEncoderDescriptor { label: Some("gs4d activate") };
+            let mut encoder = self.context.device.create_command_encoder(&label);
+            active.record(&self.renderer, &mut encoder, capture);
+            queue.submit([encoder.finish()]);
+        }
+    }
+
+    /// Draws all Gaussians of one capture, whatever its filter says, and leaves everything on the GPU.
+    pub(crate) fn draw(&mut self, capture: &GpuCapture, view: &View, background: Background) -> Result<(), GpuError> {
+        let parameters = ViewParameters { background, ..ViewParameters::default() };
+        self.submit_whole(&[instance(capture, None, view)], &parameters).map(|_| ())
+    }
+
+    /// What the last frame left there.
+    pub(crate) fn finished(&self) -> Option<Finished<'_>> {
+        self.view.finished()
+    }
+
+    /// One frame, drawn again with more room until all pairs fit.
+    fn submit_whole(
+        &mut self,
+        instances: &[Instance<'_>],
+        parameters: &ViewParameters<'_>,
+    ) -> Result<Counters, GpuError> {
+        loop {
+            let counters = self.submit(instances, parameters, None)?;
+            let capacity = self.view.pair_capacity();
+            if counters.pairs_wanted <= capacity {
+                return Ok(counters);
+            }
+            let limit = max_pairs(&self.context.device);
+            if capacity == limit {
+                let (needed, limit) = (u64::from(counters.pairs_wanted) * 4, u64::from(limit) * 4);
+                return Err(GpuError::TooLarge { what: "the pairs of splats and tiles", needed, limit });
+            }
+            self.view.make_room(counters.pairs_wanted);
+        }
+    }
+
+    /// One frame, waited for. Returns what it counted.
+    fn submit(
+        &mut self,
+        instances: &[Instance<'_>],
+        parameters: &ViewParameters<'_>,
+        timer: Option<&PassTimer>,
+    ) -> Result<Counters, GpuError> {
+        self.submit_without_waiting(instances, parameters, timer)?;
+        self.wait()?;
+        let counters = self.copy_out(self.view.counters(), size_of::<Counters>() as u64)?;
+        Ok(bytemuck::pod_read_unaligned(&counters))
+    }
+
+    fn submit_without_waiting(
+        &mut self,
+        instances: &[Instance<'_>],
+        parameters: &ViewParameters<'_>,
+        timer: Option<&PassTimer>,
+    ) -> Result<(), GpuError> {
+        let GpuContext { device, queue, .. } = &self.context;
+        self.view.prepare(device, queue, &self.renderer, instances, parameters)?;
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gs4d") });
+        self.view.record_timed(&self.renderer, &mut encoder, instances, timer);
+        if let Some(timer) = timer {
+            timer.resolve(&mut encoder);
+        }
+        queue.submit([encoder.finish()]);
+        Ok(())
+    }
+
+    fn wait(&self) -> Result<(), GpuError> {
+        let wait = wgpu::PollType::wait_indefinitely();
+        self.context.device.poll(wait).map(|_| ()).map_err(|error| GpuError::Device(error.to_string()))
+    }
+
+    /// Colour (four floats each) and depth of every pixel, without the padding of rows.
+    fn read_targets(&self, size: UVec2) -> Result<(Vec<f32>, Vec<f32>), GpuError> {
+        let Some((color, depth)) = self.view.textures() else { return Ok(Default::default()) };
+        Ok((self.read_texture(color, size, 16)?, self.read_texture(depth, size, 8)?))
+    }
+
+    fn read_texture(&self, texture: &wgpu::Texture, size: UVec2, pixel: u32) -> Result<Vec<f32>, GpuError> {
+        let GpuContext { device, queue, .. } = &self.context;
+        let row = size.x * pixel;
+        let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let buffer = readback_buffer(device, u64::from(padded) * u64::from(size.y));
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &buffer,
+                layout: wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded), rows_per_image: None },
+            },
+            wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
+        );
+        queue.submit([encoder.finish()]);
+        let bytes = self.read(&buffer)?;
+        let rows = bytes.chunks_exact(padded as usize).flat_map(|r| r[..row as usize].chunks_exact(4));
+        Ok(rows.map(bytemuck::pod_read_unaligned).collect())
+    }
+
+    /// The first `size` bytes of a buffer, waited for.
+    pub(crate) fn copy_out(&self, source: &wgpu::Buffer, size: u64) -> Result<Vec<u8>, GpuError> {
+        let GpuContext { device, queue, .. } = &self.context;
+        let buffer = readback_buffer(device, size);
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(source, 0, &buffer, 0, size);
+        queue.submit([encoder.finish()]);
+        self.read(&buffer)
+    }
+
+    /// Waits for a buffer that can be mapped and copies it.
+    fn read(&self, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
+        let (sender, receiver) = std::sync::mpsc::channel();
+        buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
+            // The receiver waits below; if it is gone, nobody wants the result.
+            let _ = sender.send(result);
+        });
+        self.wait()?;
+        match receiver.try_recv() {
+            Ok(Ok(())) => {
+                let bytes = buffer.slice(..).get_mapped_range().to_vec();
+                buffer.unmap();
+                Ok(bytes)
+            }
+            _ => Err(GpuError::Device("a buffer could not be read back".into())),
+        }
+    }
+}
+
+/// One capture as trained.
+fn instance<'a>(capture: &'a GpuCapture, active: Option<&'a ActiveList>, view: &View) -> Instance<'a> {
+    Instance { capture, active, view: *view, appearance: Appearance::default() }
+}
+
+fn readback_buffer(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
+    device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("gs4d readback"),
+        size,
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    })
+}

@@ -1,0 +1,292 @@
+//! Mirrors of the structures in `shaders/shared/types.wgsl`, byte for byte (a test compares every offset).
+//!
+//! In: views and settings. Out: plain data for uniform and storage buffers.
+
+use crate::scene::packed::MAX_STAGES;
+use crate::view::{Appearance, BlendSpace, DebugView, Lighting, View};
+use bytemuck::{Pod, Zeroable};
+
+/// Side of a tile in pixels.
+pub use crate::view::TILE_SIZE;
+
+/// Keys or pairs that one workgroup of `sort` and `bin` takes.
+pub const BLOCK: u32 = 2048;
+/// Four-vectors of the uniform of codebook scales: 36 for each codebook of 48 coefficients.
+pub const CODEBOOK_SCALES: usize = MAX_STAGES * 36;
+/// Bits that one step of `sort` orders by.
+pub const DIGIT_BITS: u32 = 4;
+/// Values of a digit.
+pub const DIGITS: u32 = 1 << DIGIT_BITS;
+/// Steps that order 32-bit depths.
+pub const DEPTH_STEPS: u32 = 32 / DIGIT_BITS;
+
+/// What `project` needs of one part of a capture in one view; not [`gpu::Instance`](super::Instance), which may have several parts.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Instance {
+    /// Rows of capture-to-camera: x.
+    pub camera_x: [f32; 4],
+    /// Row y.
+    pub camera_y: [f32; 4],
+    /// Row z.
+    pub camera_z: [f32; 4],
+    /// Row x of projection times capture-to-camera.
+    pub clip_x: [f32; 4],
+    /// Row y of it.
+    pub clip_y: [f32; 4],
+    /// Camera centre in capture space; of an orthographic camera the direction in which it looks.
+    pub camera_position: [f32; 3],
+    /// Timestamp.
+    pub time: f32,
+    /// Half-angle tangents that rays are clamped to.
+    pub reach: [f32; 2],
+    /// Focal lengths that shape footprints, pixels.
+    pub focal: [f32; 2],
+    /// Picture size, pixels.
+    pub size: [u32; 2],
+    /// Tiles across and down.
+    pub tiles: [u32; 2],
+    /// First splat slot.
+    pub first_slot: u32,
+    /// Gaussians in this part.
+    pub count: u32,
+    /// Spatial degree of colour.
+    pub degree: u32,
+    /// Time degree of colour.
+    pub degree_t: u32,
+    /// Four-vectors of colour coefficients per Gaussian.
+    pub stride: u32,
+    /// 1: colour looks along the displaced mean.
+    pub displaced: u32,
+    /// Near limit, camera units.
+    pub near: f32,
+    /// Length of the capture's time interval.
+    pub time_span: f32,
+    /// 1: drawn are the Gaussians of the active list; 0: all.
+    pub listed: u32,
+    /// First entry of this part in that list.
+    pub first_listed: u32,
+    /// Codebooks of colour; 0 where the coefficients are whole.
+    pub stages: u32,
+    /// 1: rays are parallel.
+    pub orthographic: u32,
+    /// First entry of each codebook.
+    pub first_entries: [u32; 4],
+    /// Factor on linear light.
+    pub light: [f32; 3],
+    /// Factor on opacity.
+    pub opacity: f32,
+    /// `LIGHTING_*`.
+    pub lighting: u32,
+    /// `DEBUG_*`.
+    pub debug: u32,
+    /// 1: only means inside the crop box are drawn.
+    pub cropped: u32,
+    /// Unused.
+    pub padding: u32,
+    /// Rows of capture-to-crop-box: x.
+    pub crop_x: [f32; 4],
+    /// Row y.
+    pub crop_y: [f32; 4],
+    /// Row z.
+    pub crop_z: [f32; 4],
+}
+
+/// Colours are blended as trained.
+pub const LIGHTING_AS_TRAINED: u32 = 0;
+/// Light changes, colours stay encoded.
+pub const LIGHTING_ENCODED: u32 = 1;
+/// Light changes, colours are linear.
+pub const LIGHTING_LINEAR: u32 = 2;
+
+/// What `activate` needs of one part of a capture.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Activation {
+    /// Gaussians in this part.
+    pub count: u32,
+    /// Where this part begins in the list.
+    pub first: u32,
+    /// `FILTER_*`.
+    pub filter_mode: u32,
+    /// Segment of time that is drawn.
+    pub segment: u32,
+}
+
+impl Instance {
+    /// The part that a view and a look decide; slots and colour are zero.
+    pub fn new(view: &View, appearance: &Appearance, space: BlendSpace, debug: DebugView) -> Self {
+        let m = view.world_to_camera;
+        let [clip_x, clip_y] = view.clip_rows();
+        let crop = glam::Mat4::from(appearance.crop.unwrap_or_default());
+        Self {
+            orthographic: u32::from(view.orthographic),
+            light: appearance.light.to_array(),
+            opacity: appearance.opacity,
+            lighting: lighting_mode(appearance, space),
+            debug: debug_mode(debug),
+            cropped: u32::from(appearance.crop.is_some()),
+            crop_x: crop.row(0).to_array(),
+            crop_y: crop.row(1).to_array(),
+            crop_z: crop.row(2).to_array(),
+            camera_x: m.row(0).to_array(),
+            camera_y: m.row(1).to_array(),
+            camera_z: m.row(2).to_array(),
+            clip_x: clip_x.to_array(),
+            clip_y: clip_y.to_array(),
+            camera_position: view.camera_position.to_array(),
+            time: view.time,
+            reach: view.reach().to_array(),
+            focal: view.focal().to_array(),
+            size: view.size.to_array(),
+            tiles: view.tiles().to_array(),
+            near: view.near,
+            ..Self::zeroed()
+        }
+    }
+}
+
+/// The uniforms that all passes of a view share; not the finished [`Frame`](crate::view::Frame).
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Frame {
+    /// Picture size, pixels.
+    pub size: [u32; 2],
+    /// Tiles across and down.
+    pub tiles: [u32; 2],
+    /// Splat slots in use.
+    pub slots: u32,
+    /// Pairs there is room for.
+    pub pair_capacity: u32,
+    /// `BACKGROUND_*`.
+    pub background_mode: u32,
+    /// Samples of the opaque depth; 0 where there is none.
+    pub opaque_samples: u32,
+    /// Colour, or the factor on the light of an environment map; w: what is left of the transmittance behind one.
+    pub background: [f32; 4],
+    /// `P00, P11, P02, P12`.
+    pub projection: [f32; 4],
+    /// Column x of camera-to-world; w: x of the camera position.
+    pub world_x: [f32; 4],
+    /// Column y; w: y of the camera position.
+    pub world_y: [f32; 4],
+    /// Column z; w: z of the camera position.
+    pub world_z: [f32; 4],
+    /// Texels of the environment map.
+    pub environment_size: [u32; 2],
+    /// Corner of the view in the opaque depth texture.
+    pub opaque_origin: [u32; 2],
+    /// From opaque depth `d` to camera space: `z = (x + y d) / (z + w d)`.
+    pub opaque_distance: [f32; 4],
+    /// What is done to the colours of the environment map: `LIGHTING_*`.
+    pub environment_lighting: u32,
+    /// `DEBUG_*`.
+    pub debug: u32,
+    /// Depth that shows half as bright as the nearest.
+    pub debug_depth: f32,
+    /// How much of the environment map shows, from 0 to 1.
+    pub environment_opacity: f32,
+}
+
+/// The number of what a look does to colours in the shaders: `LIGHTING_*`.
+pub fn lighting_mode(appearance: &Appearance, space: BlendSpace) -> u32 {
+    match appearance.lighting(space) {
+        Lighting::AsTrained => LIGHTING_AS_TRAINED,
+        Lighting::Encoded => LIGHTING_ENCODED,
+        Lighting::Linear => LIGHTING_LINEAR,
+    }
+}
+
+/// The number of a debug view in the shaders: `DEBUG_*`.
+pub fn debug_mode(debug: DebugView) -> u32 {
+    match debug {
+        DebugView::Color => DEBUG_COLOR,
+        DebugView::Depth => DEBUG_DEPTH,
+        DebugView::Overdraw => DEBUG_OVERDRAW,
+        DebugView::Active => DEBUG_ACTIVE,
+        DebugView::Lifespan => DEBUG_LIFESPAN,
+        DebugView::Velocity => DEBUG_VELOCITY,
+    }
+}
+
+/// Colours.
+pub const DEBUG_COLOR: u32 = 0;
+/// Expected depth.
+pub const DEBUG_DEPTH: u32 = 1;
+/// Splats per pixel.
+pub const DEBUG_OVERDRAW: u32 = 2;
+/// What the filter leaves active.
+pub const DEBUG_ACTIVE: u32 = 3;
+/// Deviation in time.
+pub const DEBUG_LIFESPAN: u32 = 4;
+/// Motion.
+pub const DEBUG_VELOCITY: u32 = 5;
+
+/// Sets of bits.
+pub const FILTER_BITS: u32 = 1;
+/// Intervals of segments.
+pub const FILTER_INTERVALS: u32 = 2;
+/// Depth key of a slot without a splat.
+pub const INVISIBLE: u32 = u32::MAX;
+
+/// No background: a compositor follows.
+pub const BACKGROUND_NONE: u32 = 0;
+/// One colour.
+pub const BACKGROUND_COLOR: u32 = 1;
+/// The environment map.
+pub const BACKGROUND_ENVIRONMENT: u32 = 2;
+
+/// A splat: a Gaussian sliced at a time and projected to a view, with its colour.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct Splat {
+    /// Centre in pixels.
+    pub center: [f32; 2],
+    /// Opacity times marginal.
+    pub opacity: f32,
+    /// Depth, camera units.
+    pub depth: f32,
+    /// Inverse covariance: xx, xy, yy.
+    pub conic: [f32; 3],
+    /// Tiles x0 and y0, 16 bits each.
+    pub tiles_low: u32,
+    /// Colour.
+    pub color: [f32; 3],
+    /// Tiles x1 and y1 (excluded), 16 bits each.
+    pub tiles_high: u32,
+}
+
+/// Numbers the GPU counts.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+pub struct Counters {
+    /// Visible splats.
+    pub visible: u32,
+    /// Pairs made.
+    pub pairs: u32,
+    /// Pairs that there would be with room for all.
+    pub pairs_wanted: u32,
+    /// Unused.
+    pub padding: u32,
+}
+
+/// One step of a radix sort.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct SortStep {
+    /// First bit of the digit.
+    pub shift: u32,
+    /// `SORT_*`.
+    pub source: u32,
+    /// Blocks the histogram has room for, per digit.
+    pub stride: u32,
+    /// Unused.
+    pub padding: u32,
+}
+
+/// All slots, leaving out the invisible.
+pub const SORT_SLOTS: u32 = 0;
+/// The visible splats.
+pub const SORT_VISIBLE: u32 = 1;
+/// The pairs.
+pub const SORT_PAIRS: u32 = 2;

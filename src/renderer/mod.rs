@@ -1,0 +1,45 @@
+//! The renderer: plain wgpu, without Bevy.
+//!
+//! In: a [`RuntimeScene`](crate::scene::RuntimeScene) put on the GPU once ([`GpuCapture`]), views of it, and somebody's device and
+//! encoder. Out: colour, transmittance and depth textures ([`ViewRenderer`]), or pictures ([`Headless`]). `activate` runs once for
+//! each placed capture, when its segment of time changes ([`ActiveList`]); a frame of a view is one compute pass, sized on the GPU,
+//! without a read-back:
+//!
+//! | pass | reads | writes |
+//! |---|---|---|
+//! | `activate` | temporal filter | list of the active Gaussians |
+//! | `project` | that list, Gaussians, colour coefficients | splats, depth keys |
+//! | `sort` (8 steps of 4 bits) | depth keys | order of the visible splats |
+//! | `bin` | splats in order | pairs (tile, splat), their number |
+//! | `sort` (as many steps as tiles need) | pairs | pairs ordered by tile, then depth |
+//! | `ranges` | pairs | first and last pair of each tile |
+//! | `blend` | ranges, pairs, splats, opaque depth | colour and transmittance, expected and median depth |
+//!
+//! Sorting by depth first and by tile after, both stably, gives the original's order by (tile, depth, index) with far less to
+//! move than its 64-bit keys. No pass needs subgroups, and the results do not depend on their size.
+
+mod active;
+pub(crate) mod bind;
+mod capture;
+mod device;
+mod error;
+mod headless;
+pub mod layout;
+pub(crate) mod memory;
+mod pipelines;
+pub mod shaders;
+mod statistics;
+mod timing;
+mod view;
+
+pub use active::ActiveList;
+pub use capture::GpuCapture;
+pub use device::GpuContext;
+pub use error::GpuError;
+pub use headless::Headless;
+pub use pipelines::Renderer;
+pub use shaders::{ShaderChecks, Storage};
+pub use statistics::{ViewStatistics, activated, created, uploaded};
+pub(crate) use statistics::{note_created, note_uploaded};
+pub use timing::{PassTime, Timings};
+pub use view::{Instance, OpaqueDepth, ViewParameters, ViewRenderer};

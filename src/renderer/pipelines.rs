@@ -1,0 +1,161 @@
+//! The pipelines: one [`Renderer`] for each device.
+//!
+//! In: a device. Out: compiled passes and the bind group layouts that they share with the buffers of views and captures.
+
+use super::bind::{Bind, bind_group, group_layout, pipeline};
+use super::layout::CODEBOOK_SCALES;
+use super::shaders::{MULTISAMPLED, ShaderChecks, Storage, module};
+use super::{GpuError, layout};
+use crate::renderer::memory::buffer;
+
+/// All pipelines and layouts.
+#[derive(Debug)]
+pub struct Renderer {
+    pub(super) layouts: Layouts,
+    pub(super) activate_count: wgpu::ComputePipeline,
+    pub(super) activate_scan: wgpu::ComputePipeline,
+    pub(super) activate_write: wgpu::ComputePipeline,
+    /// By how a capture is stored, in the order of [`Storage::ALL`].
+    project: [wgpu::ComputePipeline; 3],
+    pub(super) sort_count: wgpu::ComputePipeline,
+    pub(super) sort_scan: wgpu::ComputePipeline,
+    pub(super) sort_visible: wgpu::ComputePipeline,
+    pub(super) sort_scatter: wgpu::ComputePipeline,
+    pub(super) bin_count: wgpu::ComputePipeline,
+    pub(super) bin_scan: wgpu::ComputePipeline,
+    pub(super) bin_offset: wgpu::ComputePipeline,
+    pub(super) bin_emit: wgpu::ComputePipeline,
+    pub(super) ranges: wgpu::ComputePipeline,
+    pub(super) blend: wgpu::ComputePipeline,
+    pub(super) blend_multisampled: wgpu::ComputePipeline,
+    /// Stands in for a list of active Gaussians where all are drawn.
+    pub(super) no_list: wgpu::BindGroup,
+}
+
+/// Bind group layouts, in the order of the shaders' bindings.
+#[derive(Debug)]
+pub(super) struct Layouts {
+    pub activate: wgpu::BindGroupLayout,
+    pub filter: wgpu::BindGroupLayout,
+    pub active: wgpu::BindGroupLayout,
+    pub project: wgpu::BindGroupLayout,
+    /// By how a capture is stored, in the order of [`Storage::ALL`].
+    pub captures: [wgpu::BindGroupLayout; 3],
+    pub sort: wgpu::BindGroupLayout,
+    pub arguments: wgpu::BindGroupLayout,
+    pub bin: wgpu::BindGroupLayout,
+    pub ranges: wgpu::BindGroupLayout,
+    pub blend: wgpu::BindGroupLayout,
+    pub blend_multisampled: wgpu::BindGroupLayout,
+}
+
+impl Renderer {
+    /// Compiles every pass.
+    ///
+    /// # Errors
+    /// When the device lacks a limit that the passes need, or a shader does not compile.
+    pub fn new(device: &wgpu::Device, checks: ShaderChecks) -> Result<Self, GpuError> {
+        check_limits(&device.limits())?;
+        let layouts = Layouts::new(device);
+        let shader = |name| module(device, name, &[], checks);
+        let activate = shader("activate")?;
+        let (sort, bin) = (shader("sort")?, shader("bin")?);
+        let (ranges, blend) = (shader("ranges")?, shader("blend")?);
+        let blend_multisampled = module(device, "blend", MULTISAMPLED, checks)?;
+        let no_list = buffer(device, "gs4d no active list", 4, wgpu::BufferUsages::STORAGE);
+        let pipeline = |module: &wgpu::ShaderModule, entry: &str, groups: &[&wgpu::BindGroupLayout]| {
+            pipeline(device, module, entry, groups)
+        };
+        Ok(Self {
+            activate_count: pipeline(&activate, "count", &[&layouts.activate, &layouts.filter]),
+            activate_scan: pipeline(&activate, "scan", &[&layouts.activate, &layouts.filter]),
+            activate_write: pipeline(&activate, "write", &[&layouts.activate, &layouts.filter]),
+            project: {
+                let mut all = Vec::new();
+                for (storage, capture) in Storage::ALL.into_iter().zip(&layouts.captures) {
+                    let shader = module(device, "project", storage.definitions(), checks)?;
+                    all.push(pipeline(&shader, "project", &[&layouts.project, capture, &layouts.active]));
+                }
+                all.try_into().map_err(|_| GpuError::Device("a pipeline is missing".into()))?
+            },
+            sort_count: pipeline(&sort, "count", &[&layouts.sort]),
+            sort_scan: pipeline(&sort, "scan", &[&layouts.sort]),
+            sort_visible: pipeline(&sort, "visible", &[&layouts.sort, &layouts.arguments]),
+            sort_scatter: pipeline(&sort, "scatter", &[&layouts.sort]),
+            bin_count: pipeline(&bin, "count", &[&layouts.bin]),
+            bin_scan: pipeline(&bin, "scan", &[&layouts.bin, &layouts.arguments]),
+            bin_offset: pipeline(&bin, "offset", &[&layouts.bin]),
+            bin_emit: pipeline(&bin, "emit", &[&layouts.bin]),
+            ranges: pipeline(&ranges, "ranges", &[&layouts.ranges]),
+            blend: pipeline(&blend, "blend", &[&layouts.blend]),
+            blend_multisampled: pipeline(&blend_multisampled, "blend", &[&layouts.blend_multisampled]),
+            no_list: bind_group(device, "gs4d no active list", &layouts.active, &[no_list.as_entire_binding()]),
+            layouts,
+        })
+    }
+
+    /// `project` for captures stored this way.
+    pub(super) fn project(&self, storage: Storage) -> &wgpu::ComputePipeline {
+        &self.project[storage as usize]
+    }
+
+    /// The bind group of one part of a capture, its buffers in the order of the shader's bindings.
+    pub(super) fn capture_bind_group(
+        &self,
+        device: &wgpu::Device,
+        storage: Storage,
+        buffers: &[&wgpu::Buffer],
+    ) -> wgpu::BindGroup {
+        let resources: Vec<_> = buffers.iter().map(|buffer| buffer.as_entire_binding()).collect();
+        bind_group(device, "gs4d capture", &self.layouts.captures[storage as usize], &resources)
+    }
+}
+
+impl Layouts {
+    fn new(device: &wgpu::Device) -> Self {
+        use Bind::{Depth, Depths, Read, Target, Uniform, UniformAt, Write};
+        const FRAME: usize = size_of::<layout::Frame>();
+        const INSTANCE: Bind = UniformAt(size_of::<layout::Instance>());
+        let new = |label, bindings: &[Bind]| group_layout(device, label, bindings);
+        let blend = |depth| {
+            let targets = [wgpu::TextureFormat::Rgba32Float, wgpu::TextureFormat::Rg32Float].map(Target);
+            [Uniform(FRAME), Read, Read, Read, Read, depth, targets[0], targets[1]]
+        };
+        Self {
+            activate: new("gs4d activate", &[UniformAt(size_of::<layout::Activation>()), Write, Write]),
+            filter: new("gs4d filter", &[Read]),
+            active: new("gs4d active list", &[Read]),
+            project: new("gs4d project", &[INSTANCE, Write, Write]),
+            captures: [
+                new("gs4d capture", &[Read, Read]),
+                new("gs4d capture", &[Read, Read, Read]),
+                new("gs4d capture", &[Read, Read, Read, Read, Uniform(16 * CODEBOOK_SCALES)]),
+            ],
+            sort: new(
+                "gs4d sort",
+                &[UniformAt(size_of::<layout::SortStep>()), Uniform(FRAME), Write, Read, Read, Write, Write, Write],
+            ),
+            arguments: new("gs4d arguments", &[Write]),
+            bin: new("gs4d bin", &[Uniform(FRAME), Write, Read, Read, Write, Write, Write]),
+            ranges: new("gs4d ranges", &[Uniform(FRAME), Read, Read, Write]),
+            blend: new("gs4d blend", &blend(Depth)),
+            blend_multisampled: new("gs4d blend", &blend(Depths)),
+        }
+    }
+}
+
+fn check_limits(limits: &wgpu::Limits) -> Result<(), GpuError> {
+    let needs = [
+        ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, 256),
+        ("max_compute_workgroup_size_x", limits.max_compute_workgroup_size_x, 256),
+        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 8),
+        // Three arrays of `blend`.
+        ("max_compute_workgroup_storage_size", limits.max_compute_workgroup_storage_size, 16 * 256 * 3 + 16),
+    ];
+    for (what, found, needed) in needs {
+        if found < needed {
+            return Err(GpuError::Limit { what, found: found.into(), needed: needed.into() });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,119 @@
+//! The shaders: WGSL with imports, put together by naga_oil.
+//!
+//! In: the name of a pass. Out: a naga module, or a wgpu shader module. The files are part of the binary.
+
+use super::GpuError;
+use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
+use std::borrow::Cow;
+
+/// Libraries, each before those that import it.
+const LIBRARIES: [(&str, &str); 6] = [
+    ("types", include_str!("../../shaders/shared/types.wgsl")),
+    ("appearance", include_str!("../../shaders/shared/appearance.wgsl")),
+    ("harmonics", include_str!("../../shaders/shared/harmonics.wgsl")),
+    ("packed", include_str!("../../shaders/shared/packed.wgsl")),
+    ("scan", include_str!("../../shaders/shared/scan.wgsl")),
+    ("environment", include_str!("../../shaders/shared/environment.wgsl")),
+];
+
+/// Passes by name.
+const PASSES: [(&str, &str); 7] = [
+    ("activate", include_str!("../../shaders/activate.wgsl")),
+    ("project", include_str!("../../shaders/project.wgsl")),
+    ("sort", include_str!("../../shaders/sort.wgsl")),
+    ("bin", include_str!("../../shaders/bin.wgsl")),
+    ("ranges", include_str!("../../shaders/ranges.wgsl")),
+    ("blend", include_str!("../../shaders/blend.wgsl")),
+    ("score", include_str!("../../shaders/score.wgsl")),
+];
+
+/// Whether shaders check their array indices and loops, which can cost much.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum ShaderChecks {
+    /// No checks: every index is bounded by construction.
+    #[default]
+    Off,
+    /// With checks, to look for defects.
+    On,
+}
+
+/// Names of all passes.
+pub fn pass_names() -> impl Iterator<Item = &'static str> {
+    PASSES.iter().map(|(name, _)| *name)
+}
+
+/// How a capture's Gaussians and colours are stored, and so how `project` reads them.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum Storage {
+    /// Single precision.
+    #[default]
+    Full,
+    /// Packed records, whole colours.
+    Packed,
+    /// Packed records, colours by codebook.
+    Coded,
+}
+
+impl Storage {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Full, Self::Packed, Self::Coded];
+
+    /// What the shader is told.
+    pub fn definitions(self) -> &'static [&'static str] {
+        match self {
+            Self::Full => &[],
+            Self::Packed => &["PACKED_GEOMETRY"],
+            Self::Coded => &["PACKED_GEOMETRY", "CODED_COLORS"],
+        }
+    }
+}
+
+/// What `blend` is told where opaque surfaces are multisampled.
+pub const MULTISAMPLED: &[&str] = &["MULTISAMPLED"];
+
+/// The naga module of a pass, imports resolved, validated, with these definitions: those of a [`Storage`] for `project`, none or
+/// [`MULTISAMPLED`] for `blend`, none for the others.
+///
+/// # Errors
+/// When there is no such pass or it does not compile.
+pub fn compose(name: &str, definitions: &[&str]) -> Result<wgpu::naga::Module, GpuError> {
+    let Some(&(name, source)) = PASSES.iter().find(|(pass, _)| *pass == name) else {
+        return Err(GpuError::Shader { name: "unknown", reason: format!("there is no pass `{name}`") });
+    };
+    let mut composer = Composer::default();
+    for (library, source) in LIBRARIES {
+        let descriptor = ComposableModuleDescriptor { source, file_path: library, ..Default::default() };
+        if let Err(error) = composer.add_composable_module(descriptor) {
+            return Err(GpuError::Shader { name: library, reason: error.emit_to_string(&composer) });
+        }
+    }
+    let shader_defs = definitions.iter().map(|name| ((*name).to_owned(), ShaderDefValue::Bool(true))).collect();
+    let descriptor = NagaModuleDescriptor { source, file_path: name, shader_defs, ..Default::default() };
+    composer
+        .make_naga_module(descriptor)
+        .map_err(|error| GpuError::Shader { name, reason: error.emit_to_string(&composer) })
+}
+
+/// The shader module of a pass.
+pub(crate) fn module(
+    device: &wgpu::Device,
+    name: &'static str,
+    definitions: &[&str],
+    checks: ShaderChecks,
+) -> Result<wgpu::ShaderModule, GpuError> {
+    let descriptor = wgpu::ShaderModuleDescriptor {
+        label: Some(name),
+        source: wgpu::ShaderSource::Naga(Cow::Owned(compose(name, definitions)?)),
+    };
+    Ok(match checks {
+        ShaderChecks::On => device.create_shader_module(descriptor),
+        ShaderChecks::Off => trusted(device, descriptor),
+    })
+}
+
+#[expect(unsafe_code, reason = "wgpu marks shaders without run-time checks as unsafe")]
+fn trusted(device: &wgpu::Device, descriptor: wgpu::ShaderModuleDescriptor<'_>) -> wgpu::ShaderModule {
+    // SAFETY: the shaders are ours. Each index is below a count that the host sized the buffer by (slots, pair capacity, tiles,
+    // blocks), and each loop ends at such a count.
+    unsafe { device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked()) }
+}

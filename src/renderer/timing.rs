@@ -1,0 +1,111 @@
+//! GPU time of a frame and of its passes, by timestamps.
+//!
+//! In: a device that has timestamps. Out: [`Timings`]: medians over many frames, views and times.
+
+use crate::renderer::memory::buffer;
+use crate::view::Counts;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// The timed stretches of a frame, in order.
+pub(super) const TIMED_PASSES: [&str; 6] = ["project", "sort (depth)", "bin", "sort (tile)", "ranges", "blend"];
+
+/// Medians over the frames of a benchmark.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Timings {
+    /// Each pass, in frame order. Measured in frames of their own, since timestamps between passes cost some time themselves;
+    /// empty where the device has no timestamps inside passes.
+    pub passes: Vec<PassTime>,
+    /// GPU time of the whole compute pass; nothing where the device has no timestamps.
+    pub frame_milliseconds: Option<f64>,
+    /// Wall-clock time from submitting a frame to its end, one at a time.
+    pub wall_milliseconds: f64,
+    /// Wall-clock time for each frame with many in flight.
+    pub pipelined_milliseconds: f64,
+    /// Work in a frame.
+    pub counts: Counts,
+    /// Frames measured.
+    pub frames: usize,
+}
+
+/// GPU time of one pass.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct PassTime {
+    /// Name of the pass.
+    pub name: &'static str,
+    /// Median, milliseconds.
+    pub milliseconds: f64,
+}
+
+/// Timestamps of one frame: either around it, or after each of its passes.
+#[derive(Debug)]
+pub(super) struct PassTimer {
+    queries: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+    period: f64,
+    inside: bool,
+    next: AtomicU32,
+}
+
+impl PassTimer {
+    /// A timer around frames, or between passes; nothing where the device cannot.
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, inside: bool) -> Option<Self> {
+        let needed =
+            if inside { wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES } else { wgpu::Features::TIMESTAMP_QUERY };
+        if !device.features().contains(needed | wgpu::Features::TIMESTAMP_QUERY) {
+            return None;
+        }
+        let count = if inside { TIMED_PASSES.len() as u32 + 1 } else { 2 };
+        let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
+        Some(Self {
+            queries: device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("gs4d timestamps"),
+                ty: wgpu::QueryType::Timestamp,
+                count,
+            }),
+            resolved: buffer(device, "gs4d timestamps", u64::from(count) * 8, usage),
+            period: f64::from(queue.get_timestamp_period()) * 1e-6,
+            inside,
+            next: AtomicU32::new(1),
+        })
+    }
+
+    /// What to ask of the compute pass.
+    pub fn frame_writes(&self) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
+        Some(wgpu::ComputePassTimestampWrites {
+            query_set: &self.queries,
+            beginning_of_pass_write_index: Some(0),
+            end_of_pass_write_index: (!self.inside).then_some(1),
+        })
+    }
+
+    /// Ends a stretch.
+    pub fn mark(&self, pass: &mut wgpu::ComputePass<'_>) {
+        if self.inside {
+            pass.write_timestamp(&self.queries, self.next.fetch_add(1, Ordering::Relaxed));
+        }
+    }
+
+    /// Writes the timestamps into the buffer, after the pass.
+    pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
+        let count = if self.inside { TIMED_PASSES.len() as u32 + 1 } else { 2 };
+        encoder.resolve_query_set(&self.queries, 0..count, &self.resolved, 0);
+        self.next.store(1, Ordering::Relaxed);
+    }
+
+    /// The buffer that the timestamps arrive in, eight bytes each.
+    pub fn resolved(&self) -> &wgpu::Buffer {
+        &self.resolved
+    }
+
+    /// Milliseconds between each timestamp and the next.
+    pub fn intervals(&self, timestamps: &[u8]) -> Vec<f64> {
+        let ticks: Vec<u64> = timestamps.chunks_exact(8).map(bytemuck::pod_read_unaligned).collect();
+        ticks.windows(2).map(|pair| pair[1].saturating_sub(pair[0]) as f64 * self.period).collect()
+    }
+}
+
+/// The middle value; zero of none.
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}

@@ -1,0 +1,378 @@
+//! One view on the GPU: its working buffers, its targets, and the frame.
+//!
+//! In: captures with a [`View`](crate::view::View) each, a background, the depth of opaque surfaces. Out: a texture of colour
+//! and transmittance and one of expected depth. [`ViewRenderer::prepare`] sizes and fills, [`ViewRenderer::record`] is the frame.
+
+mod readback;
+mod record;
+mod resources;
+
+use super::memory::{alignment_of, binding_limit, buffer, texture};
+use super::pipelines::Renderer;
+use super::timing::{PassTime, PassTimer, TIMED_PASSES};
+use super::{ActiveList, GpuCapture, GpuError, ViewStatistics, layout};
+use crate::view::tiles;
+use crate::view::{Appearance, Background, BlendSpace, DebugView, View};
+use glam::UVec2;
+use layout::{BLOCK, Counters, DEPTH_STEPS};
+use readback::Readback;
+use resources::{Kept, Resources, Sizes};
+use wgpu::{BufferUsages, TextureFormat};
+
+/// A capture in a view. The view includes the transform of the capture and the capture's own time.
+#[derive(Debug, Clone, Copy)]
+pub struct Instance<'a> {
+    /// The capture.
+    pub capture: &'a GpuCapture,
+    /// Which of its Gaussians are drawn: prepared for the view's time and recorded before the view is; all without a list.
+    pub active: Option<&'a ActiveList>,
+    /// Where it is seen from, and when.
+    pub view: View,
+    /// Its opacity, light and crop.
+    pub appearance: Appearance,
+}
+
+/// What is around the captures of a view, and how they are shown.
+#[derive(Debug, Clone, Copy)]
+pub struct ViewParameters<'a> {
+    /// What stands behind them.
+    pub background: Background,
+    /// What cuts them. Behind an environment map nothing shows where this is given.
+    pub opaque: Option<OpaqueDepth<'a>>,
+    /// The space in which they are blended.
+    pub blend_space: BlendSpace,
+    /// What is shown of them.
+    pub debug: DebugView,
+}
+
+impl Default for ViewParameters<'_> {
+    fn default() -> Self {
+        let (blend_space, debug) = Default::default();
+        Self { background: Background::None, opaque: None, blend_space, debug }
+    }
+}
+
+/// The depth of opaque surfaces that cut the splats, pixel by pixel.
+#[derive(Debug, Clone, Copy)]
+pub struct OpaqueDepth<'a> {
+    /// A `Depth32Float` texture, 0 where nothing is.
+    pub texture: &'a wgpu::TextureView,
+    /// Its samples for each pixel. Splats are hidden from as large a share of a pixel as samples are before them.
+    pub samples: u32,
+    /// Corner of the view in it, pixels.
+    pub origin: UVec2,
+    /// From its depth `d` to camera space, `[a, b, c, e]` in `z = (a + b d) / (c + e d)`. Reverse-z with an infinite far plane is
+    /// `[near, 0, 0, 1]`.
+    pub distance: [f32; 4],
+}
+
+/// Working buffers, uniforms and targets of one view.
+#[derive(Debug)]
+pub struct ViewRenderer {
+    /// Alignment of dynamic uniform offsets.
+    alignment: u32,
+    /// Slots of the frame prepared last.
+    slots: u32,
+    /// Whether its opaque depth is multisampled.
+    multisampled: bool,
+    /// Pairs that an earlier frame wanted room for.
+    pairs_wanted: u32,
+    /// Frames for which there has been far too much room.
+    oversized_frames: u32,
+    frame: wgpu::Buffer,
+    steps: wgpu::Buffer,
+    counters: wgpu::Buffer,
+    arguments: wgpu::Buffer,
+    no_depth: wgpu::TextureView,
+    no_environment: wgpu::Buffer,
+    readback: Readback,
+    statistics: ViewStatistics,
+    /// Timestamps, while they are wanted and the device has them.
+    timing: Option<(PassTimer, Readback)>,
+    /// Everything whose size depends on the view or the captures.
+    resources: Option<Resources>,
+}
+
+/// How many times too large buffers may be, and for how many frames, before they are made anew.
+const OVERSIZE_FACTOR: u32 = 4;
+const RELEASE_AFTER_IDLE_FRAMES: u32 = 120;
+
+/// What a finished frame leaves behind.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Finished<'a> {
+    pub frame: &'a wgpu::Buffer,
+    pub counters: &'a wgpu::Buffer,
+    pub kept: &'a Kept,
+    pub color: &'a wgpu::TextureView,
+    /// Room there is for splats and pairs.
+    pub slots: u32,
+    pub pairs: u32,
+}
+
+impl ViewRenderer {
+    /// A view without size; [`prepare`](Self::prepare) gives it one.
+    pub fn new(device: &wgpu::Device) -> Self {
+        let alignment = alignment_of::<layout::Instance>(device);
+        let counters = size_of::<Counters>() as u64;
+        let depth = texture(device, "gs4d no depth", UVec2::ONE, TextureFormat::Depth32Float);
+        Self {
+            alignment,
+            slots: 0,
+            pairs_wanted: 0,
+            oversized_frames: 0,
+            frame: buffer(device, "gs4d frame", size_of::<layout::Frame>() as u64, BufferUsages::UNIFORM),
+            steps: buffer(device, "gs4d steps", u64::from(alignment * 2 * DEPTH_STEPS), BufferUsages::UNIFORM),
+            counters: buffer(device, "gs4d counters", counters, BufferUsages::STORAGE | BufferUsages::COPY_SRC),
+            arguments: buffer(device, "gs4d arguments", 6 * 4, BufferUsages::STORAGE | BufferUsages::INDIRECT),
+            no_depth: depth.create_view(&wgpu::TextureViewDescriptor::default()),
+            no_environment: buffer(device, "gs4d no environment", 16, BufferUsages::STORAGE),
+            readback: Readback::new(device, "gs4d counter readback", counters),
+            statistics: ViewStatistics::default(),
+            timing: None,
+            multisampled: false,
+            resources: None,
+        }
+    }
+
+    /// Sizes buffers for what is to be drawn, growing them also by what earlier frames counted, and writes the uniforms. Call it
+    /// before the queue is submitted. In the steady state it creates nothing.
+    ///
+    /// All instances must have views of the same size and lens.
+    ///
+    /// # Errors
+    /// When the picture or a buffer would be larger than the device allows.
+    pub fn prepare(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        renderer: &Renderer,
+        instances: &[Instance<'_>],
+        parameters: &ViewParameters<'_>,
+    ) -> Result<(), GpuError> {
+        self.poll();
+        let made = self.resources.as_ref().map(|resources| resources.sizes).unwrap_or_default();
+        let picture = instances.first().map_or(made.picture.max(UVec2::ONE), |instance| instance.view.size);
+        let limits = device.limits();
+        if picture.min_element() == 0 || picture.max_element() > limits.max_texture_dimension_2d {
+            return Err(GpuError::Size { width: picture.x, height: picture.y, limit: limits.max_texture_dimension_2d });
+        }
+        let slots: usize = instances.iter().map(|instance| instance.capture.len()).sum();
+        let parts: usize = instances.iter().map(|instance| instance.capture.parts.len()).sum();
+        let limit = binding_limit(&limits);
+        // The largest buffer per slot holds splats.
+        let needed = (slots as u64).next_multiple_of(u64::from(BLOCK)) * size_of::<layout::Splat>() as u64;
+        if needed > limit {
+            return Err(GpuError::TooLarge { what: "the splats", needed, limit });
+        }
+        let slots = slots as u32;
+        // Two pairs for each Gaussian are a first guess; counters correct it.
+        let pairs = self.pairs_wanted.max(slots.saturating_mul(2)).max(1 << 16).min(max_pairs(device));
+        let needed =
+            Sizes { slots: slots.next_multiple_of(BLOCK).max(BLOCK), pairs, parts: (parts as u32).max(1), picture };
+        let sizes = self.kept_sizes(made, needed);
+        let environment = instances.iter().find_map(|i| Some((i, i.capture.environment.as_ref()?)));
+        let opaque = parameters.opaque.filter(|opaque| opaque.samples > 0);
+        self.multisampled = opaque.is_some_and(|opaque| opaque.samples > 1);
+        let opaque_view = opaque.map_or(&self.no_depth, |depth| depth.texture).clone();
+        let environment_buffer = environment.map_or(&self.no_environment, |(_, map)| &map.buffer).clone();
+        let stale = self.resources.as_ref().is_none_or(|made| {
+            made.sizes != sizes
+                || made.multisampled != self.multisampled
+                || made.opaque != opaque_view
+                || made.environment != environment_buffer
+        });
+        if stale {
+            self.resources = Some(self.make(device, queue, renderer, sizes, opaque_view, environment_buffer));
+        }
+        let active = |i: &Instance<'_>| (0..i.capture.parts.len()).map(|at| i.capture.drawn(at, i.active)).sum::<u32>();
+        self.slots = instances.iter().map(active).sum();
+        self.statistics.bytes = self.resources.as_ref().map_or(0, |made| made.bytes);
+        self.statistics.total = slots;
+        self.statistics.active = self.slots;
+        self.write_uniforms(queue, instances, parameters, environment.map(|(i, m)| (i.view, i.appearance, m.size)));
+        Ok(())
+    }
+
+    /// Colour `C` (premultiplied, in the blend space) and transmittance: `Rgba32Float`. Before the first
+    /// [`prepare`](Self::prepare) there is none.
+    pub fn color(&self) -> Option<&wgpu::TextureView> {
+        self.resources.as_ref().map(|made| &made.color_view)
+    }
+
+    /// Camera-space depth: `Rg32Float`. Red is the expected depth `Σ z α T`, not divided by `1 − T`; green the median depth, that of the
+    /// splat at which T falls to one half or below, 0 where none does.
+    pub fn depth(&self) -> Option<&wgpu::TextureView> {
+        self.resources.as_ref().map(|made| &made.depth_view)
+    }
+
+    /// Whether GPU time is measured from the next frame on, pass by pass. Results arrive in [`statistics`](Self::statistics) some
+    /// frames later; without timestamps inside passes there are none.
+    pub fn measure(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, on: bool) {
+        if !on {
+            self.timing = None;
+            self.statistics.passes.clear();
+        } else if self.timing.is_none() {
+            self.timing = PassTimer::new(device, queue, true).map(|timer| {
+                let size = timer.resolved().size();
+                (timer, Readback::new(device, "gs4d timestamp readback", size))
+            });
+        }
+    }
+
+    /// Work of the view.
+    pub fn statistics(&self) -> &ViewStatistics {
+        &self.statistics
+    }
+
+    /// The textures behind [`color`](Self::color) and [`depth`](Self::depth).
+    pub(crate) fn textures(&self) -> Option<(&wgpu::Texture, &wgpu::Texture)> {
+        self.resources.as_ref().map(|made| (&made.color, &made.depth))
+    }
+
+    /// What the frame recorded last leaves behind.
+    pub(crate) fn finished(&self) -> Option<Finished<'_>> {
+        self.resources.as_ref().map(|made| Finished {
+            frame: &self.frame,
+            counters: &self.counters,
+            kept: &made.kept,
+            color: &made.color_view,
+            slots: made.sizes.slots,
+            pairs: made.sizes.pairs,
+        })
+    }
+
+    /// The counters of the frame recorded last, on the GPU.
+    pub(crate) fn counters(&self) -> &wgpu::Buffer {
+        &self.counters
+    }
+
+    /// Lets the next [`prepare`](Self::prepare) make room for that many pairs and half as many more, if there is hardly enough and
+    /// the device allows it.
+    pub(crate) fn make_room(&mut self, pairs: u32) {
+        // Before there is too little: counts arrive some frames late.
+        if pairs > self.pair_capacity() / 4 * 3 {
+            self.pairs_wanted = pairs.saturating_add(pairs / 2);
+        }
+    }
+
+    /// Pairs there is room for.
+    pub(crate) fn pair_capacity(&self) -> u32 {
+        self.resources.as_ref().map_or(0, |made| made.sizes.pairs)
+    }
+
+    /// Gives the memory of working buffers and targets back; the next [`prepare`](Self::prepare) makes them anew.
+    pub fn release(&mut self) {
+        self.resources = None;
+        self.pairs_wanted = 0;
+        self.statistics = ViewStatistics::default();
+    }
+
+    /// Sizes only grow from frame to frame, but what has been far too large for a while is given back.
+    fn kept_sizes(&mut self, made: Sizes, needed: Sizes) -> Sizes {
+        let counted = self.statistics.pairs.saturating_add(self.statistics.pairs / 2).max(1 << 16);
+        let oversized = made.slots / OVERSIZE_FACTOR > needed.slots
+            || made.pairs / OVERSIZE_FACTOR > needed.slots.saturating_mul(2).max(counted);
+        self.oversized_frames = if oversized { self.oversized_frames + 1 } else { 0 };
+        if self.oversized_frames > RELEASE_AFTER_IDLE_FRAMES {
+            self.oversized_frames = 0;
+            self.pairs_wanted = counted;
+            return Sizes { pairs: needed.slots.saturating_mul(2).max(counted), ..needed };
+        }
+        Sizes {
+            slots: made.slots.max(needed.slots),
+            pairs: made.pairs.max(needed.pairs),
+            parts: made.parts.max(needed.parts),
+            picture: needed.picture,
+        }
+    }
+
+    /// Takes in what earlier frames have sent back.
+    fn poll(&mut self) {
+        if let Some(counters) = self.readback.poll() {
+            let counters: Counters = bytemuck::pod_read_unaligned(&counters);
+            self.statistics.visible = counters.visible;
+            self.statistics.pairs = counters.pairs;
+            self.make_room(counters.pairs_wanted);
+        }
+        if let Some((timer, readback)) = &mut self.timing
+            && let Some(timestamps) = readback.poll()
+        {
+            let named = TIMED_PASSES.into_iter().zip(timer.intervals(&timestamps));
+            self.statistics.passes = named.map(|(name, milliseconds)| PassTime { name, milliseconds }).collect();
+        }
+    }
+
+    fn write_uniforms(
+        &self,
+        queue: &wgpu::Queue,
+        instances: &[Instance<'_>],
+        parameters: &ViewParameters<'_>,
+        environment: Option<(View, Appearance, [u32; 2])>,
+    ) {
+        let Some(made) = &self.resources else { return };
+        let mut slot = 0;
+        let mut index = 0;
+        for instance in instances {
+            let ViewParameters { blend_space, debug, .. } = *parameters;
+            let view = layout::Instance::new(&instance.view, &instance.appearance, blend_space, debug);
+            let capture = instance.capture.instance(&view);
+            let mut first_listed = 0;
+            for (part_index, part) in instance.capture.parts.iter().enumerate() {
+                let count = instance.capture.drawn(part_index, instance.active);
+                let listed = u32::from(instance.active.is_some());
+                let uniform = layout::Instance { first_slot: slot, count, listed, first_listed, ..capture };
+                let at = u64::from(index * self.alignment);
+                queue.write_buffer(&made.instances, at, bytemuck::bytes_of(&uniform));
+                slot += count;
+                first_listed += part.count;
+                index += 1;
+            }
+        }
+        let (mode, color) = match (parameters.background, environment) {
+            (Background::Color(color), _) => (layout::BACKGROUND_COLOR, color),
+            (Background::Environment, Some((view, ..))) if !view.orthographic => {
+                (layout::BACKGROUND_ENVIRONMENT, [0.0; 3])
+            }
+            _ => (layout::BACKGROUND_NONE, [0.0; 3]),
+        };
+        let (view, appearance, environment_size) = environment.unwrap_or_else(|| {
+            let view = View::new(made.sizes.picture, 0.0, glam::Mat4::IDENTITY, glam::Vec4::ONE, glam::Vec2::ONE);
+            (instances.first().map_or(view, |instance| instance.view), Appearance::default(), [0; 2])
+        });
+        let color = if mode == layout::BACKGROUND_ENVIRONMENT { appearance.light.to_array() } else { color };
+        let to_world = view.world_to_camera.inverse();
+        let column = |axis: usize| to_world.col(axis).truncate().extend(view.camera_position[axis]).to_array();
+        let opaque = parameters.opaque.as_ref();
+        let frame = layout::Frame {
+            size: made.sizes.picture.to_array(),
+            tiles: tiles(made.sizes.picture).to_array(),
+            slots: self.slots,
+            pair_capacity: made.sizes.pairs,
+            background_mode: mode,
+            opaque_samples: opaque.map_or(0, |depth| depth.samples),
+            // With opaque depth there is a compositor: it must not see anything behind the map.
+            background: [color[0], color[1], color[2], if opaque.is_some() { 0.0 } else { 1.0 }],
+            projection: view.projection.to_array(),
+            world_x: column(0),
+            world_y: column(1),
+            world_z: column(2),
+            environment_size,
+            opaque_origin: opaque.map_or([0; 2], |depth| depth.origin.to_array()),
+            opaque_distance: opaque.map_or([0.0; 4], |depth| depth.distance),
+            environment_lighting: layout::lighting_mode(&appearance, parameters.blend_space),
+            debug: layout::debug_mode(parameters.debug),
+            // Two capture units.
+            debug_depth: 2.0 * view.world_to_camera.row(2).truncate().length(),
+            environment_opacity: appearance.opacity.clamp(0.0, 1.0),
+        };
+        queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
+    }
+}
+
+/// Pairs that fit one binding and one dispatch.
+pub(crate) fn max_pairs(device: &wgpu::Device) -> u32 {
+    let limits = device.limits();
+    let bound = u32::try_from(binding_limit(&limits) / 4).unwrap_or(u32::MAX);
+    // One workgroup takes a block of them.
+    bound.min(limits.max_compute_workgroups_per_dimension.saturating_mul(BLOCK))
+}

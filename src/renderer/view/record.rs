@@ -1,0 +1,134 @@
+//! The frame: one compute pass, recorded in the order of the table in [`crate::renderer`].
+//!
+//! In: a prepared view and the instances it was prepared for. Out: commands.
+
+use super::resources::tile_steps;
+use super::{Instance, ViewRenderer};
+use crate::renderer::layout::{BLOCK, DEPTH_STEPS, DIGITS};
+use crate::renderer::pipelines::Renderer;
+use crate::renderer::timing::PassTimer;
+use crate::view::tiles;
+
+impl ViewRenderer {
+    /// Records the frame: one compute pass, in the order of the table in [`crate::renderer`].
+    pub fn record(&mut self, renderer: &Renderer, encoder: &mut wgpu::CommandEncoder, instances: &[Instance<'_>]) {
+        let timing = self.timing.take();
+        let timer = timing.as_ref().filter(|(_, readback)| readback.is_idle()).map(|(timer, _)| timer);
+        self.record_timed(renderer, encoder, instances, timer);
+        self.timing = timing.map(|(timer, mut readback)| {
+            if readback.is_idle() {
+                timer.resolve(encoder);
+                readback.copy(encoder, timer.resolved());
+            }
+            (timer, readback)
+        });
+    }
+
+    /// Records the frame, with timestamps if a timer is given.
+    pub(in crate::renderer) fn record_timed(
+        &mut self,
+        renderer: &Renderer,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &[Instance<'_>],
+        timer: Option<&PassTimer>,
+    ) {
+        let Some(made) = &self.resources else { return };
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some("gs4d"),
+                timestamp_writes: timer.and_then(PassTimer::frame_writes),
+            });
+            let mark = |pass: &mut wgpu::ComputePass<'_>| {
+                if let Some(timer) = timer {
+                    timer.mark(pass);
+                }
+            };
+
+            // project
+            let mut index = 0;
+            for instance in instances {
+                pass.set_pipeline(renderer.project(instance.capture.storage));
+                pass.set_bind_group(2, instance.active.map_or(&renderer.no_list, |active| &active.list), &[]);
+                for (at, part) in instance.capture.parts.iter().enumerate() {
+                    pass.set_bind_group(0, &made.project, &[index * self.alignment]);
+                    pass.set_bind_group(1, &part.bind_group, &[]);
+                    let count = instance.capture.drawn(at, instance.active);
+                    pass.dispatch_workgroups(count.div_ceil(256), 1, 1);
+                    index += 1;
+                }
+            }
+            mark(&mut pass);
+
+            // sort by depth: the first step drops the invisible and counts the rest, the others are sized by that count.
+            for step in 0..DEPTH_STEPS {
+                let group = &made.sort_depth[if step == 0 { 0 } else { 2 - (step as usize % 2) }];
+                let blocks = (step == 0).then(|| self.slots.div_ceil(BLOCK));
+                self.sort_step(renderer, &mut pass, group, step, blocks, 0, Some(&made.arguments));
+            }
+            mark(&mut pass);
+
+            // bin
+            pass.set_bind_group(0, &made.bin, &[]);
+            pass.set_pipeline(&renderer.bin_count);
+            pass.dispatch_workgroups_indirect(&self.arguments, 0);
+            pass.set_pipeline(&renderer.bin_scan);
+            pass.set_bind_group(1, &made.arguments, &[]);
+            pass.dispatch_workgroups(1, 1, 1);
+            pass.set_pipeline(&renderer.bin_offset);
+            pass.dispatch_workgroups_indirect(&self.arguments, 0);
+            pass.set_pipeline(&renderer.bin_emit);
+            pass.dispatch_workgroups_indirect(&self.arguments, 12);
+            mark(&mut pass);
+
+            // sort by tile
+            for step in 0..tile_steps(made.sizes.picture) {
+                let group = &made.sort_tiles[step as usize % 2];
+                self.sort_step(renderer, &mut pass, group, DEPTH_STEPS + step, None, 12, None);
+            }
+            mark(&mut pass);
+
+            // ranges
+            let tiles = tiles(made.sizes.picture);
+            pass.set_pipeline(&renderer.ranges);
+            pass.set_bind_group(0, &made.ranges, &[]);
+            pass.dispatch_workgroups((tiles.x * tiles.y).div_ceil(256), 1, 1);
+            mark(&mut pass);
+
+            // blend
+            pass.set_pipeline(if self.multisampled { &renderer.blend_multisampled } else { &renderer.blend });
+            pass.set_bind_group(0, &made.blend, &[]);
+            pass.dispatch_workgroups(tiles.x, tiles.y, 1);
+            mark(&mut pass);
+        }
+        self.readback.copy(encoder, &self.counters);
+    }
+
+    /// One step of `sort`. `blocks` where the host knows them; otherwise the GPU does, at `offset` of the arguments.
+    fn sort_step(
+        &self,
+        renderer: &Renderer,
+        pass: &mut wgpu::ComputePass<'_>,
+        group: &wgpu::BindGroup,
+        step: u32,
+        blocks: Option<u32>,
+        offset: u64,
+        arguments: Option<&wgpu::BindGroup>,
+    ) {
+        let dispatch = |pass: &mut wgpu::ComputePass<'_>| match blocks {
+            Some(blocks) => pass.dispatch_workgroups(blocks, 1, 1),
+            None => pass.dispatch_workgroups_indirect(&self.arguments, offset),
+        };
+        pass.set_bind_group(0, group, &[step * self.alignment]);
+        pass.set_pipeline(&renderer.sort_count);
+        dispatch(pass);
+        pass.set_pipeline(&renderer.sort_scan);
+        pass.dispatch_workgroups(DIGITS, 1, 1);
+        if let (0, Some(arguments)) = (step, arguments) {
+            pass.set_pipeline(&renderer.sort_visible);
+            pass.set_bind_group(1, arguments, &[]);
+            pass.dispatch_workgroups(1, 1, 1);
+        }
+        pass.set_pipeline(&renderer.sort_scatter);
+        dispatch(pass);
+    }
+}

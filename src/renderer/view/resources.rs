@@ -1,0 +1,227 @@
+//! Everything of a view whose size depends on the view or the captures, and the bind groups over it.
+//!
+//! In: sizes, what to cut by and what stands behind. Out: [`Resources`], made anew only when one of these changes.
+
+use super::ViewRenderer;
+use crate::renderer::bind::bind_group;
+use crate::renderer::layout::{self, BLOCK, DEPTH_STEPS, DIGIT_BITS, DIGITS, SortStep};
+use crate::renderer::memory::{buffer, texture};
+use crate::renderer::pipelines::Renderer;
+use crate::view::tiles;
+use glam::UVec2;
+use std::cell::Cell;
+use wgpu::{BufferUsages, TextureFormat};
+
+/// Sized resources and the bind groups over them.
+#[derive(Debug)]
+pub(super) struct Resources {
+    pub sizes: Sizes,
+    /// Of storage buffers and targets.
+    pub bytes: u64,
+    pub instances: wgpu::Buffer,
+    /// What `score` reads beside the frame.
+    pub kept: Kept,
+    pub color: wgpu::Texture,
+    pub color_view: wgpu::TextureView,
+    pub depth: wgpu::Texture,
+    pub depth_view: wgpu::TextureView,
+    /// What the bind groups were made for, apart from sizes.
+    pub opaque: wgpu::TextureView,
+    pub multisampled: bool,
+    pub environment: wgpu::Buffer,
+    pub project: wgpu::BindGroup,
+    /// From the projected keys into the first pair of buffers, from there into the second, and back.
+    pub sort_depth: [wgpu::BindGroup; 3],
+    pub sort_tiles: [wgpu::BindGroup; 2],
+    pub arguments: wgpu::BindGroup,
+    pub bin: wgpu::BindGroup,
+    pub ranges: wgpu::BindGroup,
+    pub blend: wgpu::BindGroup,
+}
+
+/// Buffers of a frame that a later pass can read.
+#[derive(Debug)]
+pub(crate) struct Kept {
+    pub tile_ranges: wgpu::Buffer,
+    /// Ordered by tile, then depth.
+    pub pair_splats: wgpu::Buffer,
+    pub splats: wgpu::Buffer,
+    /// Visible splats by depth.
+    pub order: wgpu::Buffer,
+    pub offsets: wgpu::Buffer,
+    pub depth_keys: wgpu::Buffer,
+}
+
+/// What [`Resources`] have room for.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Sizes {
+    pub slots: u32,
+    pub pairs: u32,
+    /// Instance uniforms.
+    pub parts: u32,
+    /// Of the picture, pixels.
+    pub picture: UVec2,
+}
+
+impl ViewRenderer {
+    /// Makes them all.
+    pub(super) fn make(
+        &self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        renderer: &Renderer,
+        sizes: Sizes,
+        opaque: wgpu::TextureView,
+        environment: wgpu::Buffer,
+    ) -> Resources {
+        let Sizes { slots, pairs, parts, picture: size } = sizes;
+        let bytes = Cell::new(0);
+        let storage = |label, count: u32, each: usize| {
+            let size = u64::from(count) * each as u64;
+            bytes.set(bytes.get() + size);
+            buffer(device, label, size, BufferUsages::STORAGE)
+        };
+        let slot_blocks = slots.div_ceil(BLOCK);
+        let stride = slot_blocks.max(pairs.div_ceil(BLOCK));
+        let tiles = tiles(size);
+        let instances =
+            buffer(device, "gs4d instances", u64::from(parts) * u64::from(self.alignment), BufferUsages::UNIFORM);
+        let splats = storage("gs4d splats", slots, size_of::<layout::Splat>());
+        let depth_keys = storage("gs4d depth keys", slots, 4);
+        let keys = [(); 2].map(|()| storage("gs4d sort keys", slots, 4));
+        let order = [(); 2].map(|()| storage("gs4d sort values", slots, 4));
+        let offsets = storage("gs4d offsets", slots + slot_blocks, 4);
+        let pair_tiles = [(); 2].map(|()| storage("gs4d pair tiles", pairs, 4));
+        let pair_splats = [(); 2].map(|()| storage("gs4d pair splats", pairs, 4));
+        let histogram = storage("gs4d histogram", DIGITS * (stride + 1), 4);
+        let tile_ranges = storage("gs4d tile ranges", tiles.x * tiles.y, 8);
+        let color = texture(device, "gs4d color", size, TextureFormat::Rgba32Float);
+        let depth = texture(device, "gs4d depth", size, TextureFormat::Rg32Float);
+        let color_view = color.create_view(&wgpu::TextureViewDescriptor::default());
+        let depth_view = depth.create_view(&wgpu::TextureViewDescriptor::default());
+        self.write_steps(queue, stride);
+
+        let layouts = &renderer.layouts;
+        let frame = self.frame.as_entire_binding();
+        let counters = self.counters.as_entire_binding();
+        let step = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+            buffer: &self.steps,
+            offset: 0,
+            size: std::num::NonZeroU64::new(size_of::<SortStep>() as u64),
+        });
+        let sort =
+            |keys_in: &wgpu::Buffer, values_in: &wgpu::Buffer, keys_out: &wgpu::Buffer, values_out: &wgpu::Buffer| {
+                let resources = [
+                    step.clone(),
+                    frame.clone(),
+                    counters.clone(),
+                    keys_in.as_entire_binding(),
+                    values_in.as_entire_binding(),
+                    keys_out.as_entire_binding(),
+                    values_out.as_entire_binding(),
+                    histogram.as_entire_binding(),
+                ];
+                bind_group(device, "gs4d sort", &layouts.sort, &resources)
+            };
+        let instance = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+            buffer: &instances,
+            offset: 0,
+            size: std::num::NonZeroU64::new(size_of::<layout::Instance>() as u64),
+        });
+        // After an even number of steps the pairs are back where they were made.
+        let sorted = tile_steps(size) as usize % 2;
+        Resources {
+            sizes,
+            // 16 bytes of colour and 8 of depth for each pixel.
+            bytes: bytes.get() + u64::from(size.x) * u64::from(size.y) * 24,
+            project: bind_group(
+                device,
+                "gs4d project",
+                &layouts.project,
+                &[instance, splats.as_entire_binding(), depth_keys.as_entire_binding()],
+            ),
+            sort_depth: [
+                // The values of the first step are the indices: what is bound for them is not read.
+                sort(&depth_keys, &order[1], &keys[0], &order[0]),
+                sort(&keys[0], &order[0], &keys[1], &order[1]),
+                sort(&keys[1], &order[1], &keys[0], &order[0]),
+            ],
+            sort_tiles: [0, 1].map(|i| sort(&pair_tiles[i], &pair_splats[i], &pair_tiles[1 - i], &pair_splats[1 - i])),
+            arguments: bind_group(device, "gs4d arguments", &layouts.arguments, &[self.arguments.as_entire_binding()]),
+            bin: bind_group(
+                device,
+                "gs4d bin",
+                &layouts.bin,
+                &[
+                    frame.clone(),
+                    counters.clone(),
+                    splats.as_entire_binding(),
+                    // Eight steps end in the second buffer.
+                    order[1].as_entire_binding(),
+                    offsets.as_entire_binding(),
+                    pair_tiles[0].as_entire_binding(),
+                    pair_splats[0].as_entire_binding(),
+                ],
+            ),
+            ranges: bind_group(
+                device,
+                "gs4d ranges",
+                &layouts.ranges,
+                &[frame.clone(), counters, pair_tiles[sorted].as_entire_binding(), tile_ranges.as_entire_binding()],
+            ),
+            blend: bind_group(
+                device,
+                "gs4d blend",
+                if self.multisampled { &layouts.blend_multisampled } else { &layouts.blend },
+                &[
+                    frame,
+                    tile_ranges.as_entire_binding(),
+                    pair_splats[sorted].as_entire_binding(),
+                    splats.as_entire_binding(),
+                    environment.as_entire_binding(),
+                    wgpu::BindingResource::TextureView(&opaque),
+                    wgpu::BindingResource::TextureView(&color_view),
+                    wgpu::BindingResource::TextureView(&depth_view),
+                ],
+            ),
+            instances,
+            kept: Kept {
+                tile_ranges,
+                pair_splats: pair_splats[sorted].clone(),
+                splats,
+                order: order[1].clone(),
+                offsets,
+                depth_keys,
+            },
+            color,
+            color_view,
+            depth,
+            depth_view,
+            opaque,
+            multisampled: self.multisampled,
+            environment,
+        }
+    }
+
+    /// The steps of both sorts: by all bits of the depth, then by the bits of the tile.
+    fn write_steps(&self, queue: &wgpu::Queue, stride: u32) {
+        let mut bytes = vec![0; (self.alignment * 2 * DEPTH_STEPS) as usize];
+        for index in 0..2 * DEPTH_STEPS {
+            let source = match index {
+                0 => layout::SORT_SLOTS,
+                1..DEPTH_STEPS => layout::SORT_VISIBLE,
+                _ => layout::SORT_PAIRS,
+            };
+            let step = SortStep { shift: (index % DEPTH_STEPS) * DIGIT_BITS, source, stride, padding: 0 };
+            let at = (index * self.alignment) as usize;
+            bytes[at..at + size_of::<SortStep>()].copy_from_slice(bytemuck::bytes_of(&step));
+        }
+        queue.write_buffer(&self.steps, 0, &bytes);
+    }
+}
+
+/// Steps that order by tile.
+pub(super) fn tile_steps(size: UVec2) -> u32 {
+    let tiles = tiles(size);
+    (u32::BITS - (tiles.x * tiles.y - 1).leading_zeros()).div_ceil(DIGIT_BITS)
+}

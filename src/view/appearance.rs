@@ -1,0 +1,134 @@
+//! How captures are shown: background, blend space, debug views, and the opacity, light and crop of one placed capture.
+//!
+//! In: choices of a view and of a placed capture, the trained colour and the mean of a Gaussian. Out: whether it is drawn and in which
+//! colour. The colours are those of `shaders/shared/appearance.wgsl`.
+
+use super::srgb::{decode, encode};
+use glam::{Affine3A, Vec3};
+
+/// The space in which splats are blended.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum BlendSpace {
+    /// sRGB-encoded values: the space captures are trained in.
+    #[default]
+    Encoded,
+    /// Linear light. Edges and haze come out lighter than in training.
+    Linear,
+}
+
+/// What a view shows of its captures.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum DebugView {
+    /// Their colours.
+    #[default]
+    Color,
+    /// Expected depth: near is bright. Two units of the first capture are half as bright as its nearest.
+    Depth,
+    /// How many splats were blended at each pixel: black 0, then blue, green and yellow to red, 64 and more.
+    Overdraw,
+    /// Every Gaussian that the temporal filter leaves active: green where it shows at this moment, red where it is looked at in vain.
+    Active,
+    /// The standard deviation in time `σ_t`: blue for an instant, red for what is always there.
+    Lifespan,
+    /// The direction and speed of motion: grey rests; red, green and blue are x, y and z of the capture.
+    Velocity,
+}
+
+/// What stands behind all Gaussians.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Background {
+    /// Nothing: the picture is premultiplied, for a compositor.
+    None,
+    /// One colour, in the blend space.
+    Color([f32; 3]),
+    /// The capture's environment map.
+    Environment,
+}
+
+/// What is changed in a capture where it is placed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Appearance {
+    /// Factor on every opacity, from 0 to 1.
+    pub opacity: f32,
+    /// Factor on linear light, one for each channel.
+    pub light: Vec3,
+    /// From capture space to a box from −1 to 1: Gaussians with means outside are not drawn.
+    pub crop: Option<Affine3A>,
+}
+
+impl Default for Appearance {
+    fn default() -> Self {
+        Self { opacity: 1.0, light: Vec3::ONE, crop: None }
+    }
+}
+
+/// What is done to the colours of Gaussians.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lighting {
+    /// Nothing: blended as trained.
+    AsTrained,
+    /// Light changes; the result is encoded again.
+    Encoded,
+    /// Light changes and stays linear.
+    Linear,
+}
+
+impl Appearance {
+    /// What it does to colours that are blended in `space`.
+    pub fn lighting(&self, space: BlendSpace) -> Lighting {
+        match space {
+            BlendSpace::Linear => Lighting::Linear,
+            BlendSpace::Encoded if self.light == Vec3::ONE => Lighting::AsTrained,
+            BlendSpace::Encoded => Lighting::Encoded,
+        }
+    }
+
+    /// A trained colour (sRGB-encoded) in the blend space.
+    pub fn color(&self, color: Vec3, space: BlendSpace) -> Vec3 {
+        match self.lighting(space) {
+            Lighting::AsTrained => color,
+            Lighting::Encoded => encode(decode(color.max(Vec3::ZERO)) * self.light),
+            Lighting::Linear => decode(color.max(Vec3::ZERO)) * self.light,
+        }
+    }
+
+    /// Whether a Gaussian with this mean, in capture space, is drawn.
+    pub fn shows(&self, mean: Vec3) -> bool {
+        self.crop.is_none_or(|crop| crop.transform_point3(mean).abs().max_element() <= 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_look_changes_no_bit() {
+        let color = Vec3::new(0.1, 0.7, 1.3);
+        assert_eq!(Appearance::default().color(color, BlendSpace::Encoded), color, "as trained");
+        assert!(Appearance::default().shows(Vec3::splat(1e9)), "nothing is cropped");
+    }
+
+    #[test]
+    fn light_is_a_factor_on_linear_light() {
+        let appearance = Appearance { light: Vec3::new(2.0, 1.0, 0.0), ..Appearance::default() };
+        let color = Vec3::splat(0.5);
+        let linear = appearance.color(color, BlendSpace::Linear);
+        assert!(linear.abs_diff_eq(decode(color) * appearance.light, 1e-6), "in linear light");
+        assert!(
+            decode(appearance.color(color, BlendSpace::Encoded)).abs_diff_eq(linear, 1e-5),
+            "and encoded, the same"
+        );
+        assert!(decode(encode(Vec3::new(0.001, 0.3, 4.0))).abs_diff_eq(Vec3::new(0.001, 0.3, 4.0), 1e-5), "to and fro");
+    }
+
+    #[test]
+    fn a_crop_box_keeps_the_means_inside() {
+        // Half a unit about (1, 0, 0).
+        let crop = Affine3A::from_scale(Vec3::splat(2.0)) * Affine3A::from_translation(-Vec3::X);
+        let appearance = Appearance { crop: Some(crop), ..Appearance::default() };
+        assert!(appearance.shows(Vec3::new(1.4, 0.4, -0.4)), "inside");
+        assert!(!appearance.shows(Vec3::new(1.6, 0.0, 0.0)), "outside");
+        assert!(!appearance.shows(Vec3::NAN), "nowhere");
+    }
+}

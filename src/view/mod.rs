@@ -1,0 +1,18 @@
+//! Views of a capture and what drawing them gives, on glam alone: the innermost ring, which knows no Gaussian.
+//!
+//! In: cameras ([`Camera`]), at a time a [`View`], and how captures are shown ([`Appearance`], [`Background`], [`BlendSpace`],
+//! [`DebugView`]). Out: the types of a drawn view: [`Picture`] and [`Frame`].
+
+mod appearance;
+mod camera;
+mod frame;
+mod picture;
+pub mod srgb;
+#[expect(clippy::module_inception, reason = "the type `View` has its file, as the others have")]
+mod view;
+
+pub use appearance::{Appearance, Background, BlendSpace, DebugView, Lighting};
+pub use camera::{Camera, Lens, RasterFov};
+pub use frame::{Counts, Frame};
+pub use picture::Picture;
+pub use view::{TILE_SIZE, View, tiles};
