@@ -1,4 +1,4 @@
-//! What the CPU does with a capture: slicing, packages, the twin.
+//! What the CPU does with a capture: slicing, packages, the CPU reference.
 //!
 //! In: a synthetic scene of 10,000 Gaussians. Out: Criterion's figures, from short runs. What the GPU does is measured by
 //! `gs4d bench`.
@@ -7,7 +7,7 @@ use bevy_gs4d::codec::package::{self, WriteSettings};
 use bevy_gs4d::gaussian::SliceSettings;
 use bevy_gs4d::reference::{self, Layer};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{Form, GaussianScene};
+use bevy_gs4d::scene::{GaussianScene, SceneForm};
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, RasterFov, View};
 use criterion::{Criterion, Throughput};
 use glam::{UVec2, Vec3};
@@ -34,10 +34,12 @@ fn write(scene: &GaussianScene) -> Vec<u8> {
 
 fn bench_slice(criterion: &mut Criterion) {
     let scene = scene();
-    let Form::Trained(parameters) = &scene.form else { panic!("synthetic scenes are in the trained form") };
+    let SceneForm::Trained(trained) = &scene.form else { panic!("synthetic scenes are in the trained form") };
     let mut group = criterion.benchmark_group("gaussian");
     group.throughput(Throughput::Elements(COUNT as u64));
-    group.bench_function("slice", |bencher| bencher.iter(|| parameters.slice(black_box(&SliceSettings::default()))));
+    group.bench_function("slice", |bencher| {
+        bencher.iter(|| trained.parameters.slice(black_box(&SliceSettings::default())));
+    });
     group.finish();
 }
 

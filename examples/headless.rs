@@ -1,4 +1,4 @@
-//! Renders a capture into PNG files, without a window or a display: a camera goes round it once while it plays once.
+//! Renders a capture into PNG files, without a window or a display: a camera orbits it once while it plays once.
 //!
 //! ```text
 //! cargo run --release --features viewer --example headless -- [CAPTURE] [--headless FOLDER] [--frames N] [--size WIDTHxHEIGHT]
@@ -38,7 +38,7 @@ fn main() -> Result {
         .insert_resource(ClearColor(Color::BLACK))
         .insert_resource(Capture(common::asset_path(&arguments.file)))
         .add_systems(Startup, setup)
-        .add_systems(Update, go_round);
+        .add_systems(Update, orbit);
     testing::settle(&mut app)?;
     let captures = app.world().resource::<Assets<GaussianCapture>>();
     let duration = captures.iter().next().map_or(0.0, |(_, capture)| capture.duration_seconds());
@@ -64,7 +64,7 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>, capture: Res<Capture>
     ));
 }
 
-fn go_round(
+fn orbit(
     captures: Res<Assets<GaussianCapture>>,
     mut orbit: Local<Option<Orbit>>,
     capture: Single<(&GaussianCapture3d, &Playback, &mut Transform), Without<Camera3d>>,

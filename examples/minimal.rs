@@ -1,4 +1,4 @@
-//! A window with a capture that plays: everything that is needed, in `setup`, and nothing else.
+//! A window with a capture that plays: the least code that is needed, in `setup`.
 //!
 //! ```text
 //! cargo run --release --features viewer --example minimal -- [CAPTURE] [--headless FOLDER] [--frames N]
@@ -18,7 +18,7 @@ use std::f32::consts::FRAC_PI_2;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// What the command line asks for.
+/// The capture that the command line names.
 #[derive(Resource)]
 struct Capture(PathBuf);
 

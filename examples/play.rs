@@ -1,15 +1,15 @@
-//! Plays a capture in a window, with a lit ball standing in it: what is behind the ball is hidden, what is before it hides it. The
-//! panel on the right plays, cuts and colours the capture, counts and times what is drawn, and shows it in false colours.
+//! Plays a capture in a window, with a lit ball standing in it: the ball hides what is behind it, and is hidden by what is in front of
+//! it. The panel on the right plays, crops and tints the capture, counts and times what is drawn, and shows it in false colours.
 //!
 //! ```text
 //! cargo run --release --features viewer --example play -- [CAPTURE] [--headless FOLDER] [--frames N]
 //! ```
 //!
 //! * drag with the left button: go round; wheel: nearer and farther
-//! * click: mark what is there; the panel says which Gaussian it is
-//! * space: play and pause; left and right: a frame back and on, as long as the panel says
+//! * click: mark the Gaussian there; the panel names it
+//! * space: play and pause; left and right: a frame back and on, at the panel's frame rate
 //! * F1: close and open the panel
-//! * drop a `.gs4d` or `.pth` on the window: play that; if it cannot be read, the panel says why
+//! * drop a `.gs4d` or `.pth` on the window: play that; if it cannot be read, the panel shows the reason
 //!
 //! With `--headless FOLDER`, or where there is no display, it writes N (8) pictures to FOLDER (`out`) instead, without the panel.
 
@@ -40,11 +40,11 @@ struct Capture(PathBuf);
 #[derive(Component)]
 struct Ball;
 
-/// Where a click has hit.
+/// The ball at the point that a click has hit.
 #[derive(Component)]
 struct Marker;
 
-/// Pixels that the mouse may move while a button is down for it to be a click.
+/// Most pixels that the mouse may move while a button is down for it to count as a click.
 const CLICK: f32 = 4.0;
 
 fn main() -> Result {
@@ -70,7 +70,7 @@ fn main() -> Result {
     }
 }
 
-/// What is shown with and without a window.
+/// The scene, with and without a window.
 fn scene(app: &mut App, capture: Capture) {
     app.add_plugins(GaussianCapturePlugin)
         .insert_resource(capture)
@@ -110,7 +110,7 @@ fn setup(
     }
 }
 
-/// Stands a capture that has just been loaded upright, looks at it, and puts the ball into its middle.
+/// Stands a capture that has just been loaded upright, points the camera at it, and puts the ball into its middle.
 fn frame_capture(
     captures: Res<Assets<GaussianCapture>>,
     mut framed: Local<Option<AssetId<GaussianCapture>>>,
@@ -146,7 +146,7 @@ fn keys(
     }
 }
 
-/// Marks what a click hits, and says so in the panel.
+/// Marks the point that a click hits, and names the Gaussian in the panel.
 fn pick(
     buttons: Res<ButtonInput<MouseButton>>,
     motion: Res<AccumulatedMouseMotion>,

@@ -1,6 +1,5 @@
-//! One capture twice and a flying ball, cut together by a timeline: captures come, fade, turn round and go as
-//! `assets/demo.timeline.ron` says, and the ball's own animation keeps to the same playhead. Change the file while it plays to direct
-//! them otherwise.
+//! One capture twice and a flying ball, cut together by a timeline: `assets/demo.timeline.ron` defines when captures play, fade and
+//! reverse, and the ball's own animation follows the same playhead. The file may be changed while it plays.
 //!
 //! ```text
 //! cargo run --release --features viewer --example timeline -- [TIMELINE] [--headless FOLDER] [--frames N]
@@ -8,7 +7,7 @@
 //!
 //! * click or drag in the panel below: scrub. Its bars are clips (red: backwards), their cut corners fades, the short marks
 //!   key-frames, of captures and of the ball's animation; the flags are markers
-//! * space: play and pause; left and right: a 30th of a second back and on; R: turn round; Home: to the start. The panel has buttons
+//! * space: play and pause; left and right: a 30th of a second back and on; R: reverse; Home: to the start. The panel has buttons
 //!   for the same
 //! * drag elsewhere with the left button: go round; wheel: nearer and farther
 //!
@@ -40,7 +39,7 @@ use std::time::Duration;
 #[derive(Resource)]
 struct Show(PathBuf);
 
-/// What the panel says of markers.
+/// The last marker, for the panel.
 #[derive(Resource, Default)]
 struct LastMarker(String);
 
@@ -83,7 +82,7 @@ fn main() -> Result {
     }
 }
 
-/// What is shown with and without a window.
+/// The scene, with and without a window.
 fn scene(app: &mut App, show: Show) {
     app.add_plugins(GaussianCapturePlugin)
         .insert_resource(show)
@@ -111,7 +110,7 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>, show: Res<Show>) {
     ));
 }
 
-/// A ball whose way is one of Bevy's animations.
+/// A ball that one of Bevy's animations moves.
 fn setup_ball(
     mut commands: Commands,
     mut meshes: ResMut<Assets<Mesh>>,
@@ -140,7 +139,7 @@ fn setup_ball(
     Ok(())
 }
 
-/// Keeps the ball to the timeline's clock.
+/// Lets the ball follow the timeline's clock.
 fn fly(clock: Single<&PlaybackClock, With<TimelinePlayer>>, ball: Single<(&mut AnimationPlayer, &Flight)>) {
     let (mut player, flight) = ball.into_inner();
     if let Some(animation) = player.animation_mut(flight.0) {
@@ -155,7 +154,7 @@ fn report(mut markers: MessageReader<MarkerReached>, mut last: ResMut<LastMarker
     }
 }
 
-/// Puts the captures side by side, upright, and looks at both, as soon as one has been loaded.
+/// Puts the captures side by side, upright, and points the camera at both, as soon as one has been loaded.
 fn arrange(
     captures: Res<Assets<GaussianCapture>>,
     mut tracks: Query<(&TimelineTrack, &GaussianCapture3d, &mut Transform)>,

@@ -6,19 +6,19 @@
 //!     [CAPTURE] [--path FILE] [--two-targets] [--headless FOLDER] [--frames N]
 //! ```
 //!
-//! * drag with the left button: look round; W, A, S, D: walk; Q and E: turn by 30 degrees at once
-//! * hold T or the right button: aim at the floor; let go: be there
-//! * V: close the edges or not; I: another distance between the eyes (64, 70, 0 and 58 mm)
-//! * P: go the recorded way, or stop; R: record a way, and again R: write it to `recorded.path.ron`
+//! * drag with the left button: look around; W, A, S, D: walk; Q and E: turn by 30 degrees at once
+//! * hold T or the right button: aim at the floor; let go: teleport there
+//! * V: the closing edges on and off; I: another distance between the eyes (64, 70, 0 and 58 mm)
+//! * P: follow the recorded path, or stop; R: record a path, and again R: write it to `recorded.path.ron`
 //!
-//! `--path FILE` goes a way from a file at once; without it, P goes that of `assets/walkthrough.path.ron`. With `--two-targets` each
-//! eye draws into a target of its own, and the window shows the left one's alone.
+//! `--path FILE` follows the path of a file at once; without it, P follows that of `assets/walkthrough.path.ron`. With `--two-targets`
+//! each eye draws into its own target, and the window shows that of the left eye alone.
 //!
-//! With `--headless FOLDER`, or where there is no display, it goes the recorded way and writes N (8) pictures, a 30th of a second
+//! With `--headless FOLDER`, or where there is no display, it follows the recorded path and writes N (8) pictures, a 30th of a second
 //! apart, to FOLDER (`out`) instead: both eyes in one, or with `--two-targets` two for each moment.
 //!
-//! Built with the feature `openxr`, it is meant for a headset, on which it has not been tried: the head is the wearer's, keys and mouse do the rest. Without one it says so
-//! and shows the window.
+//! Built with the feature `openxr`, it draws for a headset, on which it has not been tried: the wearer moves the head, keys and mouse do
+//! the rest. Without a headset it prints that there is none and shows the window.
 
 #[path = "common/arguments.rs"]
 mod arguments;
@@ -53,17 +53,17 @@ use teleport::Teleport;
 
 /// Pixels of one eye where there is no window to fill.
 const EYE: UVec2 = UVec2::new(480, 480);
-/// Half the diagonal that a capture is scaled to, metres.
+/// Half the diagonal to which a capture is scaled, metres.
 const CAPTURE_RADIUS: f32 = 1.5;
 /// Time between pictures.
 const STEP: Duration = Duration::from_nanos(1_000_000_000 / 30);
-/// What the key I goes through, metres.
+/// Distances between the eyes that the key I selects in turn, metres.
 const DISTANCES: [f32; 4] = [0.064, 0.070, 0.0, 0.058];
 
 #[derive(Resource)]
 struct Capture(PathBuf);
 
-/// Where the eyes draw.
+/// The targets of the eyes.
 #[derive(Resource)]
 struct Targets(EyeTargets);
 
@@ -107,7 +107,7 @@ fn main() -> Result {
     }
 }
 
-/// What there is to see, with and without a window, and the way that is gone by itself.
+/// The scene, with and without a window, and the path that is followed automatically.
 fn scene(app: &mut App, capture: Capture, path: HeadPath, playing: bool) {
     app.add_plugins((GaussianCapturePlugin, StereoPlugin, ComfortPlugin))
         .insert_resource(capture)
@@ -119,7 +119,7 @@ fn scene(app: &mut App, capture: Capture, path: HeadPath, playing: bool) {
         .add_systems(Update, (arrange, path::follow.in_set(Moves)));
 }
 
-/// A body whose eyes are ours. Returns what the right eye draws into where that is a target of its own.
+/// Adds a body with our own eyes. Returns the target of the right eye if it has its own.
 fn stand(app: &mut App, two_targets: bool) -> Option<Offscreen> {
     let right = two_targets.then(|| Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), EYE));
     let window = RenderTarget::default();
@@ -131,11 +131,11 @@ fn stand(app: &mut App, two_targets: bool) -> Option<Offscreen> {
     right
 }
 
-/// What keys and mouse do.
+/// Adds the systems for keys and mouse.
 fn interact(app: &mut App) {
     app.init_resource::<Recorder>()
         .add_plugins(teleport::plugin)
-        .add_systems(Update, (body::appearance, body::walk, body::snap_turn).in_set(Moves).run_if(path::walking))
+        .add_systems(Update, (body::look_around, body::walk, body::snap_turn).in_set(Moves).run_if(path::walking))
         .add_systems(Update, (switches, path::start, path::record).after(Moves));
 }
 
@@ -162,20 +162,19 @@ fn spawn_body(mut commands: Commands, targets: Res<Targets>) {
     let stereo = spawn_stereo(&mut commands, StereoRig::default(), targets.0.clone());
     let lens = PerspectiveProjection { fov: FRAC_PI_2, near: 0.05, ..default() };
     for (index, eye) in stereo.eyes.into_iter().enumerate() {
-        commands.entity(eye).insert((EyeView(index), eye_look(), Projection::Perspective(lens.clone())));
+        commands.entity(eye).insert((EyeView(index), eye_settings(), Projection::Perspective(lens.clone())));
     }
     commands.entity(stereo.head).insert((Head, Transform::from_xyz(0.0, EYE_HEIGHT, 0.0)));
     commands.spawn((Body::default(), START, Visibility::default())).add_child(stereo.head);
 }
 
-/// What every eye has, ours and a headset's.
-fn eye_look() -> impl Bundle {
-    // What closes before the eyes is transparent, and drawn over captures only without multisampling; the floor would cut them with
-    // it, too. Colours of the capture as trained.
+/// The settings of every eye, ours and a headset's.
+fn eye_settings() -> impl Bundle {
+    // The closing edges are transparent, and drawn over captures only without multisampling. The colours of the capture stay as trained.
     (Msaa::Off, Tonemapping::None)
 }
 
-/// Stands a capture that has just been loaded on the floor, at a size that can be walked round.
+/// Stands a capture that has just been loaded on the floor, at a size that one can walk around.
 fn arrange(
     captures: Res<Assets<GaussianCapture>>,
     capture: Single<(&GaussianCapture3d, &mut Transform)>,
@@ -192,7 +191,7 @@ fn arrange(
     *transform = Transform { translation: place, rotation: turn, scale: Vec3::splat(scale) };
 }
 
-/// What V and I do.
+/// The keys V and I.
 fn switches(keys: Res<ButtonInput<KeyCode>>, mut comfort: ResMut<Comfort>, rig: Option<Single<&mut StereoRig>>) {
     if keys.just_pressed(KeyCode::KeyV) {
         comfort.vignette = !comfort.vignette;
@@ -204,7 +203,7 @@ fn switches(keys: Res<ButtonInput<KeyCode>>, mut comfort: ResMut<Comfort>, rig: 
     }
 }
 
-/// Renders two pictures for each moment, as [`save_pictures`] renders one.
+/// Renders two pictures for each time, as [`save_pictures`] renders one.
 fn save_pairs(app: &mut App, right: &Offscreen, count: u32, folder: &Path) -> Result {
     for index in 0..count {
         let step = if index == 0 { Duration::ZERO } else { STEP };

@@ -1,16 +1,17 @@
 // bin: makes one pair for each overlap of a splat with a tile, in order of depth.
 // In: splats and their order. Out: pairs (tile, splat), their number and the size of the dispatches over them. `count` sums the
 // tiles of blocks of splats, `scan` sums the blocks, `offset` gives each splat its first pair, and `emit` fills pairs one thread
-// each, so that a large splat holds nobody up. Twin of src/reference/bin.rs.
-#import gs4d::types::{Counters, Frame, Splat}
+// each, so that a large splat holds nobody up. CPU reference: src/reference/bin.rs.
+#import gs4d::types::{Counters, FrameUniforms, SplatRecord}
 #import gs4d::scan::{exclusive_scan, saturating_add, scan_total}
+#import gs4d::tile::{tile_count, tile_index, tile_of_pair}
 
 const SPLATS_PER_THREAD: u32 = 8u;
 const BLOCK: u32 = 2048u;
 
-@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(0) var<uniform> frame: FrameUniforms;
 @group(0) @binding(1) var<storage, read_write> counters: Counters;
-@group(0) @binding(2) var<storage, read> splats: array<Splat>;
+@group(0) @binding(2) var<storage, read> splats: array<SplatRecord>;
 @group(0) @binding(3) var<storage, read> order: array<u32>;
 // First pair of each splat in order; then one sum for each block, from `frame.slots` on.
 @group(0) @binding(4) var<storage, read_write> offsets: array<u32>;
@@ -18,17 +19,15 @@ const BLOCK: u32 = 2048u;
 @group(0) @binding(6) var<storage, read_write> pair_splats: array<u32>;
 @group(1) @binding(0) var<storage, read_write> arguments: array<u32>;
 
-fn tile_count(splat: u32) -> u32 {
-    let low = splats[splat].tiles_low;
-    let high = splats[splat].tiles_high;
-    return ((high & 0xffffu) - (low & 0xffffu)) * ((high >> 16u) - (low >> 16u));
+fn pair_count(splat: u32) -> u32 {
+    return tile_count(splats[splat].tiles_low, splats[splat].tiles_high);
 }
 
 // Pairs of this thread's splats.
 fn thread_sum(first: u32) -> u32 {
     var sum = 0u;
     for (var i = first; i < min(first + SPLATS_PER_THREAD, counters.visible); i++) {
-        sum = saturating_add(sum, tile_count(order[i]));
+        sum = saturating_add(sum, pair_count(order[i]));
     }
     return sum;
 }
@@ -75,7 +74,7 @@ fn offset(@builtin(workgroup_id) block: vec3<u32>, @builtin(local_invocation_ind
     var at = saturating_add(offsets[frame.slots + block.x], exclusive_scan(thread_sum(first), thread));
     for (var i = first; i < min(first + SPLATS_PER_THREAD, counters.visible); i++) {
         offsets[i] = at;
-        at = saturating_add(at, tile_count(order[i]));
+        at = saturating_add(at, pair_count(order[i]));
     }
 }
 
@@ -94,12 +93,8 @@ fn emit(@builtin(workgroup_id) block: vec3<u32>, @builtin(local_invocation_index
             }
         }
         let splat = order[low];
-        let within = pair - offsets[low];
-        let first = splats[splat].tiles_low;
-        let width = (splats[splat].tiles_high & 0xffffu) - (first & 0xffffu);
-        let x = (first & 0xffffu) + within % width;
-        let y = (first >> 16u) + within / width;
-        pair_tiles[pair] = y * frame.tiles.x + x;
+        let tile = tile_of_pair(splats[splat].tiles_low, splats[splat].tiles_high, pair - offsets[low]);
+        pair_tiles[pair] = tile_index(tile, frame.tiles.x);
         pair_splats[pair] = splat;
     }
 }

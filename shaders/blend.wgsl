@@ -1,15 +1,14 @@
 // blend: front to back over each tile of 16 x 16 pixels, one workgroup each.
 // In: tile ranges, pairs, splats, the depth of opaque surfaces, the background. Out: colour and transmittance, expected and median
-// depth. Each sample of a multisampled depth hides what is behind it from its share of the pixel. Section 3.4 of the 4DGS model; twin of src/reference/blend.rs.
-#import gs4d::types::{Frame, Splat, BACKGROUND_COLOR, BACKGROUND_ENVIRONMENT, DEBUG_DEPTH, DEBUG_OVERDRAW}
+// depth. Each sample of a multisampled depth hides what is behind it from its share of the pixel. Section 3.4 of the 4DGS model.
+// CPU reference: src/reference/blend.rs.
+#import gs4d::types::{FrameUniforms, SplatRecord, BACKGROUND_COLOR, BACKGROUND_ENVIRONMENT, DEBUG_DEPTH, DEBUG_OVERDRAW}
+#import gs4d::alpha::blend_step
 #import gs4d::appearance::{heat, lit}
 #import gs4d::environment::environment_texel
+#import gs4d::tile::{pixel_of, tile_index}
 
-const TILE_SIZE: u32 = 16u;
 const BATCH: u32 = 256u;
-const ALPHA_MIN: f32 = 1.0 / 255.0;
-const ALPHA_MAX: f32 = 0.99;
-const TRANSMITTANCE_MIN: f32 = 1e-4;
 const FAR: f32 = 3.4e38;
 // Blended splats that show at the end of the scale of overdraw.
 const OVERDRAW_MAX: f32 = 64.0;
@@ -17,10 +16,10 @@ const OVERDRAW_MAX: f32 = 64.0;
 const SAMPLES_MAX: u32 = 8u;
 #endif
 
-@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(0) var<uniform> frame: FrameUniforms;
 @group(0) @binding(1) var<storage, read> tile_ranges: array<vec2<u32>>;
 @group(0) @binding(2) var<storage, read> pair_splats: array<u32>;
-@group(0) @binding(3) var<storage, read> splats: array<Splat>;
+@group(0) @binding(3) var<storage, read> splats: array<SplatRecord>;
 // Planar: 3 x height x width.
 @group(0) @binding(4) var<storage, read> environment: array<f32>;
 #ifdef MULTISAMPLED
@@ -48,9 +47,9 @@ var<workgroup> finished: atomic<u32>;
 
 @compute @workgroup_size(256)
 fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
-    let pixel = tile.xy * TILE_SIZE + vec2(thread % TILE_SIZE, thread / TILE_SIZE);
+    let pixel = pixel_of(tile.xy, thread);
     let position = vec2<f32>(pixel);
-    let range = tile_ranges[tile.y * frame.tiles.x + tile.x];
+    let range = tile_ranges[tile_index(tile.xy, frame.tiles.x)];
     let inside = all(pixel < frame.size);
     find_limits(pixel, inside);
     let open = open_share();
@@ -102,28 +101,21 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
                 }
                 limit = next_limit(a.w);
             }
-            let d = a.xy - position;
-            let conic = batch_b[i];
-            let power = -0.5 * (conic.x * d.x * d.x + conic.z * d.y * d.y) - conic.y * d.x * d.y;
-            if power > 0.0 {
+            let taken = blend_step(batch_b[i], a.z, a.xy - position, transmittance);
+            if taken.weight == 0.0 {
                 continue;
             }
-            let alpha = min(ALPHA_MAX, a.z * exp(power));
-            if alpha < ALPHA_MIN {
-                continue;
-            }
-            let left = transmittance * (1.0 - alpha);
-            if left < TRANSMITTANCE_MIN {
+            if taken.weight < 0.0 {
                 done = true;
                 break;
             }
-            let weight = alpha * transmittance * (f32(samples - hidden) / f32(samples));
+            let weight = taken.weight * (f32(samples - hidden) / f32(samples));
             color += batch_c[i] * weight;
             depth += a.w * weight;
-            if transmittance > 0.5 && left <= 0.5 {
+            if transmittance > 0.5 && taken.transmittance <= 0.5 {
                 median = a.w;
             }
-            transmittance = left;
+            transmittance = taken.transmittance;
             blended++;
         }
         if done {

@@ -3,6 +3,7 @@
 // In: the view target so far, linear or sRGB-encoded, the captures' colour and transmittance (premultiplied, in the space they were
 // blended in, linear or sRGB-encoded, too) for the pixels of the viewport. Out: the view target. Blending with what is behind happens
 // in the captures' space: ENCODE_TARGET and DECODE_TARGET lead there from a target in the other one.
+#import gs4d::srgb
 
 // The largest half float: an infinite pixel would spread through bloom.
 const BRIGHTEST: f32 = 65504.0;
@@ -12,17 +13,13 @@ const BRIGHTEST: f32 = 65504.0;
 // Corner and size of the viewport in the target, pixels.
 @group(0) @binding(2) var<uniform> viewport: vec4<u32>;
 
-// The sRGB transfer functions. Above 1 the power curve goes on; below 0 both are mirrored, so that one undoes the other.
+// The transfer functions, mirrored below 0, so that one undoes the other there, too.
 fn encode(linear: vec3<f32>) -> vec3<f32> {
-    let x = abs(linear);
-    let curve = 1.055 * pow(x, vec3(1.0 / 2.4)) - 0.055;
-    return sign(linear) * select(curve, 12.92 * x, x <= vec3(0.0031308));
+    return sign(linear) * srgb::encode(abs(linear));
 }
 
 fn decode(encoded: vec3<f32>) -> vec3<f32> {
-    let x = abs(encoded);
-    let curve = pow((x + 0.055) / 1.055, vec3(2.4));
-    return sign(encoded) * select(curve, x / 12.92, x <= vec3(0.04045));
+    return sign(encoded) * srgb::decode(abs(encoded));
 }
 
 // From the target's space to that of the captures, and back.

@@ -1,23 +1,22 @@
 // project: slices each Gaussian at the view's time and projects it.
 // In: Gaussians, colour coefficients, an instance, a list of the active. Out: one splat and one depth key for each active Gaussian;
-// the key of an invisible splat is INVISIBLE. Section 3.3 of the 4DGS model, in its order; twin of src/gaussian/projection.rs and src/reference/project.rs.
-#import gs4d::types::{Gaussian, Instance, Splat, INVISIBLE}
+// the key of an invisible splat is INVISIBLE. Section 3.3 of the 4DGS model, in its order. CPU reference:
+// src/reference/project.rs over src/gaussian/projection.rs.
+#import gs4d::types::{Gaussian, InstanceUniforms, SplatRecord, INVISIBLE}
 #import gs4d::types::{DEBUG_ACTIVE, DEBUG_LIFESPAN, DEBUG_VELOCITY}
 #import gs4d::appearance::{heat, lit}
+#import gs4d::tile::{contributing_tiles, pack_tiles, tiles_of}
 #ifdef PACKED_GEOMETRY
 #import gs4d::packed::{unpack_base, unpack_gaussian, BLOCK_RANGES, PACKED_BLOCK, SHARED_RANGES}
 #endif
 #import gs4d::harmonics::{basis_first, basis_second, basis_third, basis_fourth, time_cosine}
 
-const TILE_SIZE: f32 = 16.0;
 const MARGINAL_CUTOFF: f32 = 0.05;
 const LOW_PASS: f32 = 0.3;
 const FRUSTUM_CLAMP: f32 = 1.3;
-// 255 = 1 / ALPHA_MIN.
-const INVERSE_ALPHA_MIN: f32 = 255.0;
 
-@group(0) @binding(0) var<uniform> instance: Instance;
-@group(0) @binding(1) var<storage, read_write> splats: array<Splat>;
+@group(0) @binding(0) var<uniform> instance: InstanceUniforms;
+@group(0) @binding(1) var<storage, read_write> splats: array<SplatRecord>;
 @group(0) @binding(2) var<storage, read_write> depth_keys: array<u32>;
 #ifdef PACKED_GEOMETRY
 // Two four-vectors for each Gaussian.
@@ -117,23 +116,11 @@ fn project_one(index: u32, slot: u32) -> u32 {
     if !(radius <= 3.4e38) {
         return INVISIBLE;
     }
-    let grid = vec2<f32>(instance.tiles);
-    var low = clamp(trunc((center - radius) / TILE_SIZE), vec2(0.0), grid);
-    var high = clamp(trunc((center + radius + (TILE_SIZE - 1.0)) / TILE_SIZE), vec2(0.0), grid);
-
-    // Tiles where alpha never reaches 1/255 are left out; blend would skip them. See Projected::contributing_tiles.
     let opacity = g.opacity * marginal * instance.opacity;
-    if det > 0.0 {
-        let energy = 2.0 * log(opacity * INVERSE_ALPHA_MIN);
-        if energy < -1e-3 {
-            return INVISIBLE;
-        }
-        let half = sqrt(max(energy, 0.0) * vec2(a, c)) * 1.001 + 0.01;
-        low = max(low, floor((center - half) / TILE_SIZE));
-        high = min(high, floor((center + half) / TILE_SIZE) + 1.0);
-    }
+    let square = tiles_of(center, radius, vec2<f32>(instance.tiles));
+    let tiles = contributing_tiles(square, center, vec2(a, c), det, opacity);
     // Written so that a value that is not a number is invisible.
-    if !(high.x > low.x && high.y > low.y) {
+    if !(tiles.z > tiles.x && tiles.w > tiles.y) {
         return INVISIBLE;
     }
 
@@ -141,7 +128,7 @@ fn project_one(index: u32, slot: u32) -> u32 {
     if instance.displaced != 0u {
         seen = mean.xyz;
     }
-    var splat: Splat;
+    var splat: SplatRecord;
     splat.center = center;
     splat.opacity = opacity;
     splat.depth = q.z;
@@ -155,8 +142,9 @@ fn project_one(index: u32, slot: u32) -> u32 {
         }
         splat.color = lit(color(index, direction, -dt), instance.lighting, instance.light);
     }
-    splat.tiles_low = u32(low.x) | (u32(low.y) << 16u);
-    splat.tiles_high = u32(high.x) | (u32(high.y) << 16u);
+    let words = pack_tiles(tiles);
+    splat.tiles_low = words.x;
+    splat.tiles_high = words.y;
     splats[slot] = splat;
     // Positive numbers sort as their bits do; the near plane of an orthographic camera may be behind it.
     return bitcast<u32>(select(q.z, q.z - instance.near, parallel));

@@ -1,8 +1,8 @@
 // ranges: where the pairs of each tile begin and end.
-// In: pairs sorted by tile. Out: first and last + 1 for each tile. Twin of `ranges` in src/reference/bin.rs.
-#import gs4d::types::{Counters, Frame}
+// In: pairs sorted by tile. Out: first and last + 1 for each tile. CPU reference: `ranges` in src/reference/bin.rs.
+#import gs4d::types::{Counters, FrameUniforms}
 
-@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(0) var<uniform> frame: FrameUniforms;
 @group(0) @binding(1) var<storage, read> counters: Counters;
 @group(0) @binding(2) var<storage, read> pair_tiles: array<u32>;
 @group(0) @binding(3) var<storage, read_write> tile_ranges: array<vec2<u32>>;

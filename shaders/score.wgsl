@@ -1,23 +1,21 @@
 // score: what each Gaussian contributes to a view, without float atomics.
 // In: what `blend` reads. Out: for each slot, sums over pixels of c = alpha T (contribution), c^2 (energy), and over pixels and
 // channels of (c (color - behind))^2 (removal). `place` gives each splat its first pair; `pairs` sums every pair over its tile,
-// one workgroup each; `gather` sums the pairs of each slot, in their order: the same on every run. Twin of
-// src/reference/score.rs.
-#import gs4d::types::{Counters, Frame, Splat, INVISIBLE}
+// one workgroup each; `gather` sums the pairs of each slot, in their order: the same on every run. CPU reference:
+// src/offline/score/reference.rs.
+#import gs4d::alpha::blend_step
+#import gs4d::tile::{pair_of_tile, pixel_of, tile_count, tile_index}
+#import gs4d::types::{Counters, FrameUniforms, SplatRecord, INVISIBLE}
 
-const TILE_SIZE: u32 = 16u;
 const PIXELS: u32 = 256u;
 // Splats whose terms are summed at once.
 const BATCH: u32 = 8u;
-const ALPHA_MIN: f32 = 1.0 / 255.0;
-const ALPHA_MAX: f32 = 0.99;
-const TRANSMITTANCE_MIN: f32 = 1e-4;
 
-@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(0) var<uniform> frame: FrameUniforms;
 @group(0) @binding(1) var<storage, read> counters: Counters;
 @group(0) @binding(2) var<storage, read> tile_ranges: array<vec2<u32>>;
 @group(0) @binding(3) var<storage, read> pair_splats: array<u32>;
-@group(0) @binding(4) var<storage, read> splats: array<Splat>;
+@group(0) @binding(4) var<storage, read> splats: array<SplatRecord>;
 @group(0) @binding(5) var<storage, read> order: array<u32>;
 @group(0) @binding(6) var<storage, read> offsets: array<u32>;
 @group(0) @binding(7) var<storage, read> depth_keys: array<u32>;
@@ -50,33 +48,25 @@ struct Pixel {
 }
 
 // Weight of a splat at a pixel; 0 where it is skipped. Moves the pixel on, as blend does.
-fn advance(pixel: ptr<function, Pixel>, splat: Splat, position: vec2<f32>) -> f32 {
+fn advance(pixel: ptr<function, Pixel>, splat: SplatRecord, position: vec2<f32>) -> f32 {
     if (*pixel).done {
         return 0.0;
     }
-    let d = splat.center - position;
-    let conic = splat.conic;
-    let power = -0.5 * (conic.x * d.x * d.x + conic.z * d.y * d.y) - conic.y * d.x * d.y;
-    let alpha = min(ALPHA_MAX, splat.opacity * exp(power));
-    if power > 0.0 || alpha < ALPHA_MIN {
+    let taken = blend_step(splat.conic, splat.opacity, splat.center - position, (*pixel).transmittance);
+    if taken.weight <= 0.0 {
+        (*pixel).done = taken.weight < 0.0;
         return 0.0;
     }
-    let left = (*pixel).transmittance * (1.0 - alpha);
-    if left < TRANSMITTANCE_MIN {
-        (*pixel).done = true;
-        return 0.0;
-    }
-    let weight = alpha * (*pixel).transmittance;
-    (*pixel).color += splat.color * weight;
-    (*pixel).transmittance = left;
-    return weight;
+    (*pixel).color += splat.color * taken.weight;
+    (*pixel).transmittance = taken.transmittance;
+    return taken.weight;
 }
 
 @compute @workgroup_size(256)
 fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
-    let at = tile.xy * TILE_SIZE + vec2(thread % TILE_SIZE, thread / TILE_SIZE);
+    let at = pixel_of(tile.xy, thread);
     let position = vec2<f32>(at);
-    let range = tile_ranges[tile.y * frame.tiles.x + tile.x];
+    let range = tile_ranges[tile_index(tile.xy, frame.tiles.x)];
     let inside = all(at < frame.size);
 
     // The finished pixel says what lies behind each splat.
@@ -139,9 +129,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
 
 // Where `bin` made the pair of this splat and tile.
 fn pair_of(splat: u32, tile: vec2<u32>) -> u32 {
-    let low = splats[splat].tiles_low;
-    let width = (splats[splat].tiles_high & 0xffffu) - (low & 0xffffu);
-    return first_pairs[splat] + (tile.y - (low >> 16u)) * width + tile.x - (low & 0xffffu);
+    return first_pairs[splat] + pair_of_tile(splats[splat].tiles_low, splats[splat].tiles_high, tile);
 }
 
 @compute @workgroup_size(256)
@@ -151,9 +139,7 @@ fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     var sum = vec4(0.0);
     if depth_keys[id.x] != INVISIBLE {
-        let low = splats[id.x].tiles_low;
-        let high = splats[id.x].tiles_high;
-        let count = ((high & 0xffffu) - (low & 0xffffu)) * ((high >> 16u) - (low >> 16u));
+        let count = tile_count(splats[id.x].tiles_low, splats[id.x].tiles_high);
         for (var i = 0u; i < count; i++) {
             sum += pair_scores[first_pairs[id.x] + i];
         }

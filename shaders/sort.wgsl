@@ -1,8 +1,8 @@
 // sort: one step of a stable radix sort, four bits at a time, for any subgroup size.
 // In: keys and values. Out: both, ordered by the digit at `sort_step.shift`; equal digits keep their order. A block of 2048 keys is
 // counted by `count`, the counts of all blocks are summed by `scan`, and `scatter` ranks the block again and moves it.
-// `visible` writes how many keys the first step kept. Twin of src/reference/sort.rs.
-#import gs4d::types::{Counters, Frame, SortStep, INVISIBLE, SORT_SLOTS, SORT_VISIBLE}
+// `visible` writes how many keys the first step kept. CPU reference: src/reference/sort.rs.
+#import gs4d::types::{Counters, FrameUniforms, SortStep, INVISIBLE, SORT_SLOTS, SORT_VISIBLE}
 #import gs4d::scan::{exclusive_scan, scan_total}
 
 const KEYS_PER_THREAD: u32 = 8u;
@@ -10,7 +10,7 @@ const BLOCK: u32 = 2048u;
 const NO_DIGIT: u32 = 16u;
 
 @group(0) @binding(0) var<uniform> sort_step: SortStep;
-@group(0) @binding(1) var<uniform> frame: Frame;
+@group(0) @binding(1) var<uniform> frame: FrameUniforms;
 @group(0) @binding(2) var<storage, read_write> counters: Counters;
 @group(0) @binding(3) var<storage, read> keys_in: array<u32>;
 @group(0) @binding(4) var<storage, read> values_in: array<u32>;

@@ -2,7 +2,7 @@
 //!
 //! In: a trained capture, as a trainer's checkpoint (`.pth`) or as a package (`.gs4d`). Out: what it looks like at any moment from
 //! any camera, in a Bevy app or in pictures on disk. A game needs the [`prelude`] and nothing else; the rest of this page is the
-//! architecture, in the order in which the data travels.
+//! architecture: where the data goes, and which module may use which.
 //!
 //! # From a file to the GPU: once for each capture
 //!
@@ -10,96 +10,137 @@
 //!  chkpnt30000.pth      capture.gs4d ◀────────┐
 //!         │                   │               │
 //!         ▼                   ▼               │
-//!  codec::checkpoint    codec::package ───────┤ codec::save
+//!  codec::checkpoint    codec::package ───────┤ offline::save
 //!         └─────────┬─────────┘               │
 //!                   ▼                         │
 //!         scene::GaussianScene ───────────────┘
 //!                   │ into_runtime: gaussian slices every Gaussian
 //!                   ▼
-//!         scene::RuntimeScene ──────▶ asset::GaussianCapture   (Bevy: shared by entities)
+//!         scene::RuntimeScene ──────▶ component::GaussianCapture   (Bevy: shared by entities)
 //!                   │                           │ render: upload
 //!                   ▼                           ▼
-//!            gpu::GpuCapture             gpu::GpuCapture
+//!         renderer::GpuCapture        renderer::GpuCapture
 //! ```
 //!
-//! 1. [`codec`] reads a file into a scene, or refuses it in plain words: [`codec::checkpoint`] through a restricted unpickler,
-//!    [`codec::package`] with a checksum on every byte. [`codec::load`] tells the two apart; [`codec::save`] writes a package.
-//! 2. [`scene`] is what a capture is: its Gaussians in the trained, the runtime or the packed form, their colour, an environment map, the
-//!    switches it was trained with, and how it is meant to be played.
+//! 1. [`codec`] reads a file into a scene, or refuses it with an error that names what is wrong: [`codec::checkpoint`] through a
+//!    restricted unpickler, [`codec::package`] with a checksum on every byte. [`codec::load`] tells the formats apart by their first
+//!    bytes; [`offline::save()`] writes a file whole or not at all.
+//! 2. [`scene`] is what a capture is: its Gaussians and their color in the trained, the sliced or the packed form, an environment map,
+//!    a temporal filter, the switches it was trained with, and how it is meant to be played.
 //! 3. [`gaussian`] is the maths. [`Parameters::slice`](gaussian::Parameters::slice) makes the runtime form, once: a 3D Gaussian in
 //!    straight-line motion under an opacity envelope ([`Gaussian`](gaussian::Gaussian), 64 bytes, the record that shaders read too).
-//! 4. [`gpu::GpuCapture`] holds that form, or the packed one, in buffers. In Bevy, [`asset`] loads the file in the background and [`render`] uploads it.
+//! 4. [`renderer::GpuCapture`] holds that form, or the packed one, in buffers. In Bevy, [`asset`] loads the file in the background and
+//!    [`render`] uploads it.
 //!
 //! # From the GPU to pixels: once for each frame and camera
 //!
 //! ```text
 //!      Bevy                                                   without Bevy
 //!
-//!      Time, a Timeline                                       dataset::CameraFile, an orbit
+//!      Time, a Timeline                                       offline::dataset, an orbit
 //!        ▼                                                             │
 //!  playback::Playback    cameras, transforms                           │
 //!        └───────┬────────────┘                                        │
 //!                ▼                                                     ▼
-//!  render: extract, prepare ───────▶  gaussian::View  ◀───── gaussian::Camera
+//!  render: extract, prepare ─────────▶ view::View ◀─────────── view::Camera
 //!                │                          │
 //!                ▼ once for all cameras     │
-//!          gpu: activate ──▶ gpu::ActiveList│
+//!     renderer: activate ─▶ ActiveList ────▶│
 //!                                           ▼
-//!          gpu: one compute pass
+//!          renderer: one compute pass
 //!          ┌────────────────────────────────────────────────────────────┐
 //!          │ project ─▶ sort ─▶ bin ─▶ sort ─▶ ranges ─▶ blend          │
-//!          │ splats     depth   pairs  tile    of tiles  colour, depth  │
+//!          │ splats     depth   pairs  tile    of tiles  color, depth   │
 //!          └────────────────────────────────────────────────────────────┘
 //!                                           │
 //!                ┌──────────────────────────┴──────────────────────────┐
 //!                ▼                                                     ▼
-//!  render: composite into the camera's target              gpu::Headless: frame::Frame
+//!  render: composite into the camera's target              renderer::Headless: view::Frame
 //! ```
 //!
-//! 1. [`playback`] moves each entity's clock on, or a timeline or a shared clock does; a [`View`](gaussian::View) is one camera at one time. In Bevy [`render`] makes
-//!    it from cameras and transforms, elsewhere a [`Camera`](gaussian::Camera) does.
-//! 2. [`gpu`] draws views with plain wgpu, on whatever device it is given; it knows nothing of Bevy. `activate` lists what the temporal
-//!    filter leaves, only when a capture enters another segment of time. All captures in a view share one compute pass, so that
-//!    they interleave by depth. Its size is decided on the GPU: nothing is read back inside a frame.
+//! 1. [`playback`] advances each entity's time, or a timeline or a shared clock does; a [`View`](view::View) is one camera at one time.
+//!    In Bevy [`render`] makes it from cameras and transforms, elsewhere a [`Camera`](view::Camera) does.
+//! 2. [`renderer`] draws views with plain wgpu, on whatever device it is given; it knows nothing of Bevy. `activate` lists the Gaussians
+//!    that the temporal filter leaves, only when a capture enters another segment of time. All captures in a view share one compute
+//!    pass, so that they interleave by depth. Its size is decided on the GPU: nothing is read back inside a frame.
 //! 3. Inside `blend` the depth of opaque meshes cuts the splats, pixel by pixel. The composite lays the result over what the
 //!    camera has drawn so far; it and `write_depth` are the passes in Bevy's pipeline cache.
-//! 4. [`gpu::Headless`] hands the result over as a [`Frame`](frame::Frame) instead. The `gs4d` command and the tests use it.
+//! 4. [`renderer::Headless`] returns the result as a [`Frame`](view::Frame) instead. The `gs4d` command and the tests use it.
 //!
-//! Each pass from `project` to `blend` has one name everywhere: `shaders/project.wgsl`, the function in [`mod@reference`], the timestamp
-//! span (`sort` has two: by depth, by tile), the tests.
+//! Each pass from `activate` to `blend` has one name everywhere: `shaders/project.wgsl`, the function in [`mod@reference`], the timestamp
+//! span (`sort` has two: by depth, by tile), the tests. Rules that several passes share are a file each, in `shaders/shared/` and in
+//! [`gaussian`]: which tiles a splat covers ([`gaussian::overlap`]), what it does to a pixel ([`gaussian::alpha`]).
+//!
+//! # The rings
+//!
+//! The modules lie around each other like rings. Each may use those inside it and none outside; a test reads the paths in the source
+//! and fails on one that points outwards.
+//!
+//! ```text
+//!                          ┌──▶ codec ───────┐                ┌──▶ offline ──▶ cli
+//! view ─▶ gaussian ─▶ scene                  ├──▶ renderer ───┤
+//!                          └──▶ reference ───┘                └──▶ plugin
+//! ```
+//!
+//! | ring | what it knows | feature |
+//! |---|---|---|
+//! | [`view`] | cameras, moments, how things are shown, pictures: glam, and no Gaussian | |
+//! | [`gaussian`] | one native 4D Gaussian: its slice, its projection, its color, the rules of overlap and alpha | |
+//! | [`scene`] | a capture in memory: its forms, bounds, filter, origin; picking | |
+//! | [`codec`] | files | |
+//! | [`mod@reference`] | the renderer's passes on the CPU, as plain functions over slices | |
+//! | [`renderer`] | wgpu: buffers, pipelines, one frame of a view | `renderer` |
+//! | [`offline`] | training views, metrics, scores, pruning, quantization, reports: from a checkpoint to a small capture | `offline` |
+//! | [`plugin`] | Bevy | `bevy` |
+//! | [`cli`] | the `gs4d` command: options and printing over [`offline`] | `cli` |
+//!
+//! The last four are the gates of the crate: each is behind one feature, and nothing inside them is. It is not quite a list:
+//!
+//! * [`codec`] and [`mod@reference`] lie side by side: one reads files, the other draws, and neither needs the other.
+//! * [`plugin`] lies beside [`offline`] and does not use it, so that a game compiles neither datasets nor metrics. What both need lies
+//!   further in.
+//! * [`plugin`] has rings of its own, `component ▶ asset ▶ playback ▶ render ▶ picking, stereo ▶ inspector, testing`, of which the
+//!   features `inspector` and `testing` add the last two. The crate root re-exports them: a game writes `bevy_gs4d::playback`.
+//! * A picture is a [`Picture`](view::Picture), not an `Image`: Bevy and the crate `image` have an `Image` each, and one file may need
+//!   all three.
+//! * `score` is a pass of the offline half, not of a frame: its CPU reference and its pipelines are in [`mod@offline::score`], a client of
+//!   the renderer.
 //!
 //! # Around it, for games
 //!
-//! [`asset`] tells what became of loading, also of hot reloads. [`picking`] finds the Gaussian under a ray. [`stereo`] gives a head
-//! two eyes. `viewer` is a panel that shows and changes all of this, `testing` renders an app to pictures without a window.
+//! [`asset`] reports what happens to files that are loaded and reloaded. [`picking`] finds the Gaussian under a ray. [`stereo`] gives a
+//! head two eyes. [`inspector`] is a panel that shows and changes all of this, [`testing`] renders an app to pictures without a window.
 //! The guide, `docs/guide.md`, goes through them in the order in which a game meets them.
 //!
 //! # From a checkpoint to a small capture
 //!
-//! [`compress`] is the offline half: what each Gaussian is worth ([`compress::score`]), which stay ([`compress::prune`]), which are
-//! active when ([`compress::masks`]), how few bytes they need ([`compress::pack`]). `gs4d bake` calls them in order and reports.
+//! [`offline`] finds what each Gaussian is worth to the training views ([`mod@offline::score`]), which stay ([`mod@offline::prune`]),
+//! which are active when ([`mod@offline::temporal_filter`]), and how few bytes they need ([`mod@offline::quantize`]). `gs4d bake` calls
+//! them in order and reports.
 //!
 //! # How it is known to be right
 //!
-//! * [`mod@reference`] is the CPU twin of the passes from `project` to `blend`, and of `score`: plain functions over slices. The tests
-//!   hold it against the original code's numbers, and the GPU against both.
-//! * [`dataset`] reads training views as the trainer does; [`metrics`] are PSNR and SSIM as the original evaluates them, MS-SSIM and
-//!   FLIP, over [`picture`]s.
+//! * [`mod@reference`] is the CPU reference of the passes of a frame. The tests hold it against the original code's numbers, and the GPU
+//!   against both.
+//! * [`offline::dataset`] reads training views as the trainer does; [`offline::metrics`] are PSNR and SSIM as the original evaluates
+//!   them, MS-SSIM and FLIP.
 //!
 //! # Features
 //!
-//! | feature | adds |
-//! |---|---|
-//! | none | `gaussian`, `scene`, `codec`, `compress`, `dataset`, `metrics`, `reference`, `frame`, `picture`: no GPU, no Bevy |
-//! | `gpu` | [`gpu`]: the renderer, on wgpu |
-//! | `bevy` (default) | [`asset`], [`playback`], [`render`], [`picking`], [`stereo`], [`prelude`]; implies `gpu` |
-//! | `cli` | the `gs4d` command; implies `gpu`, never compiles Bevy |
-//! | `testing` | `testing`: Bevy apps without a window, drawn into pictures; implies `bevy` |
-//! | `viewer` | `viewer`: a panel to watch and steer captures with, and a window and lit meshes for the examples; implies `testing` |
-//! | `openxr` | the example `walkthrough` for a headset; implies `viewer` |
+//! | feature | adds | implies |
+//! |---|---|---|
+//! | none | [`view`], [`gaussian`], [`scene`], [`codec`], [`mod@reference`]: no GPU, no Bevy | |
+//! | `renderer` | [`renderer`], on wgpu | |
+//! | `offline` | [`offline`] | `renderer` |
+//! | `bevy` (default) | [`plugin`]: [`asset`], [`playback`], [`render`], [`picking`], [`stereo`]; [`prelude`] | `renderer` |
+//! | `cli` | [`cli`], the `gs4d` command; never compiles Bevy | `offline` |
+//! | `inspector` | [`inspector`]: a panel to watch and control captures with | `bevy` |
+//! | `testing` | [`testing`]: Bevy apps without a window, drawn into pictures | `bevy` |
+//! | `viewer` | what the examples need: a window, lit meshes | `inspector`, `testing` |
+//! | `openxr` | the example `walkthrough` for a headset, untried | `viewer` |
 #![cfg_attr(
-    not(feature = "bevy"),
-    expect(rustdoc::broken_intra_doc_links, reason = "the Bevy side is not part of this build")
+    not(all(feature = "cli", feature = "inspector", feature = "testing")),
+    expect(rustdoc::broken_intra_doc_links, reason = "this page describes modules that are not part of this build")
 )]
 
 #[cfg(feature = "cli")]

@@ -1,6 +1,7 @@
-//! What a game needs: the plugin, the assets, the components, the messages.
+//! The names that a game needs, to be imported beside Bevy's own: `use bevy_gs4d::prelude::*;`.
 //!
-//! In: nothing. Out: names to import with `use bevy_gs4d::prelude::*;`, beside Bevy's own.
+//! In: the modules of the plugin. Out: in their order, the plugin, the capture and its component, messages, playback, settings, picking
+//! and stereo.
 //!
 //! ```no_run
 //! use bevy::prelude::*;
@@ -22,8 +23,8 @@
 //! ```
 
 pub use crate::plugin::GaussianCapturePlugin;
-pub use crate::plugin::asset::{CaptureFailed, CaptureReady, CaptureState, GaussianCapture};
-pub use crate::plugin::component::GaussianCapture3d;
+pub use crate::plugin::asset::{CaptureFailed, CaptureReady, CaptureState};
+pub use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 pub use crate::plugin::picking::{CaptureHit, CapturePicker};
 pub use crate::plugin::playback::{
     FollowsClock, KeyFrameCrossed, MarkerReached, Playback, PlaybackClock, PlaybackEnded, PlaybackLooped,

@@ -1,26 +1,26 @@
-//! What every example understands on its command line, and what it does without a window.
+//! The command line of every example, and pictures instead of a window.
 //!
-//! In: `[FILE] [--headless FOLDER] [--frames N] [--help]` and what an example adds. Out: [`Arguments`], an asset path, pictures in a
-//! folder.
+//! In: `[FILE] [--headless FOLDER] [--frames N] [--help]` and the options of one example. Out: [`Arguments`], an asset path, pictures in
+//! a folder.
 
 use bevy::prelude::*;
 use bevy_gs4d::testing;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// The example that this is compiled into, for its first lines.
+/// The source of the example that this is compiled into, whose first lines are its help.
 const SOURCE: &str = include_str!(concat!("../", env!("CARGO_CRATE_NAME"), ".rs"));
 
-/// What the command line says, or what an example does if it says nothing.
+/// The arguments of an example, or its defaults.
 pub struct Arguments {
     pub file: String,
-    /// Where pictures go; nothing for a window.
+    /// The folder for pictures; `None` for a window.
     pub headless: Option<PathBuf>,
     pub frames: u32,
 }
 
-/// Reads the command line. `more` gets the options that not all examples have, with what follows them, and returns whether it knows
-/// them. Without a display pictures are written all the same.
+/// Reads the command line. `more` gets each option that not all examples have, with the arguments after it, and returns whether it
+/// is an option of this example. Without a display, pictures are written in any case.
 pub fn parse(
     defaults: Arguments,
     mut more: impl FnMut(&str, &mut dyn Iterator<Item = String>) -> Result<bool>,
@@ -58,7 +58,7 @@ pub fn parse(
     Ok(parsed)
 }
 
-/// What follows an option.
+/// The argument after an option.
 pub fn value(option: &str, what: &str, arguments: &mut dyn Iterator<Item = String>) -> Result<String> {
     Ok(arguments.next().ok_or_else(|| format!("{option} needs {what}"))?)
 }
@@ -75,13 +75,13 @@ fn has_display() -> bool {
     !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some_and(|display| !display.is_empty())
 }
 
-/// A path from the command line as an asset: what is not found from the current folder is looked for in `assets/`.
+/// A path from the command line as an asset path: relative to the current folder if there is such a file, else to `assets/`.
 pub fn asset_path(argument: &str) -> PathBuf {
     let path = Path::new(argument);
     if path.exists() { std::path::absolute(path).unwrap_or_else(|_| path.into()) } else { path.into() }
 }
 
-/// Renders `count` pictures, `step` apart, into `folder` and says where they are.
+/// Renders `count` pictures, `step` apart, into `folder`, and prints where they are.
 pub fn save_pictures(app: &mut App, count: u32, step: Duration, folder: &Path) -> Result {
     testing::pictures(app, folder, count, step)?;
     println!("{count} pictures in {}", folder.display());

@@ -1,6 +1,6 @@
-//! What the examples with an orbiting camera share: arguments and the mouse.
+//! Shared by the examples with an orbiting camera and a window: arguments and the mouse.
 //!
-//! In: the command line, mouse input. Out: what to show and where to write pictures; cameras that circle.
+//! In: the command line, mouse input. Out: the file to show and the folder for pictures; orbiting cameras.
 
 use crate::common::Orbit;
 use crate::common::arguments::{Arguments, parse};

@@ -1,4 +1,4 @@
-//! What the examples with one camera share: where to look at a capture from, beside what all share.
+//! Shared by the examples with one camera: a camera that orbits, and the command line.
 //!
 //! In: a capture. Out: camera poses.
 
@@ -21,7 +21,7 @@ pub struct Orbit {
 }
 
 impl Orbit {
-    /// Shows the whole of a capture that stands upright at the origin.
+    /// An orbit from which the whole of a capture is visible that stands upright at the origin.
     pub fn around(capture: &GaussianCapture) -> Self {
         let core = Bounds::core(capture.scene().iter());
         let (center, radius) = core.map_or((Vec3::ZERO, 1.0), |core| (core.center(), core.radius().max(0.1)));

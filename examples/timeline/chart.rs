@@ -1,7 +1,7 @@
-//! The chart of a timeline: what plays when, and where the playhead is.
+//! The chart of a timeline: which clips play when, and the playhead.
 //!
 //! In: a timeline, its captures, the key-frames of an animation beside them. Out: bars, marks and flags in an egui panel, and the
-//! moment that is pointed at.
+//! time that is pointed at.
 
 use bevy::prelude::*;
 use bevy_egui::egui::{Align2, Color32, FontId, Painter, Rect, Sense, Shape, Stroke, Ui, pos2, vec2};
@@ -12,15 +12,15 @@ const WIDTH: f32 = 720.0;
 const LABELS: f32 = 56.0;
 const ROW: f32 = 26.0;
 
-/// What is drawn.
+/// The contents of the chart.
 pub struct Chart<'a> {
     pub timeline: &'a Timeline,
     pub captures: &'a Assets<GaussianCapture>,
-    /// The name of an animation that keeps to the timeline, and its key-frames in seconds of the timeline.
+    /// The name of an animation that follows the timeline, and its key-frames in seconds of the timeline.
     pub animation: (&'a str, &'a [f32]),
 }
 
-/// Where on the screen a row, or a moment, is.
+/// The places of rows and times on the screen.
 struct Scale {
     bounds: Rect,
     duration: f32,
@@ -35,7 +35,7 @@ impl Scale {
         ((x - self.bounds.left() - LABELS) / self.width() * self.duration).clamp(0.0, self.duration)
     }
 
-    /// The bar from one moment to another in a row; row 0 has the flags of markers.
+    /// The bar from one time to another in a row; row 0 has the flags of markers.
     fn bar(&self, row: usize, from: f32, to: f32) -> Rect {
         let top = self.bounds.top() + ROW * row as f32;
         Rect::from_x_y_ranges(self.x(from)..=self.x(to), top + 2.0..=top + ROW - 2.0)
@@ -47,7 +47,7 @@ impl Scale {
 }
 
 impl Chart<'_> {
-    /// Draws it with the playhead at `time`, and returns the moment that is pointed at while a button is down.
+    /// Draws it with the playhead at `time`. Returns the time that is pointed at while a button is down.
     pub fn show(&self, ui: &mut Ui, time: f32) -> Option<f32> {
         let tracks = self.timeline.tracks();
         let size = vec2(WIDTH, ROW * (tracks.len() as f32 + 2.0));

@@ -18,22 +18,22 @@ const EAGERNESS: f32 = 8.0;
 /// Radians per pixel.
 const SENSITIVITY: f32 = 0.004;
 
-/// What is on the floor, turned about the vertical alone: the space that a headset tracks the head in, or a body in its place.
+/// Stands on the floor and turns about the vertical only: the space in which a headset tracks the head, or a body in its place.
 #[derive(Component, Default)]
 pub struct Body {
     velocity: Vec3,
 }
 
-/// Where the view is from, and where aiming begins: the middle of our eyes, or one eye of a headset.
+/// The viewpoint, from which aiming begins: the middle of our eyes, or one eye of a headset.
 #[derive(Component)]
 pub struct Head;
 
-/// Everything that moves the body.
+/// The set of systems that move the body.
 #[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Moves;
 
-/// The mouse turns the body and nods our head; a headset's head nods by itself.
-pub fn appearance(
+/// Turns the body and nods our head with the mouse. The wearer of a headset nods.
+pub fn look_around(
     buttons: Res<ButtonInput<MouseButton>>,
     motion: Res<AccumulatedMouseMotion>,
     mut body: Single<&mut Transform, With<Body>>,
@@ -49,7 +49,7 @@ pub fn appearance(
     }
 }
 
-/// Walks where the head looks, without jerks.
+/// Walks in the direction of view, with smooth starts and stops.
 pub fn walk(
     time: Res<Time>,
     keys: Res<ButtonInput<KeyCode>>,
@@ -67,7 +67,7 @@ pub fn walk(
     place.translation += body.velocity * seconds;
 }
 
-/// Turns by 30 degrees at once, about the head: what is not seen moving makes nobody sick.
+/// Turns by 30 degrees at once, about the head, because a smooth turn may cause motion sickness.
 pub fn snap_turn(
     keys: Res<ButtonInput<KeyCode>>,
     mut body: Single<&mut Transform, With<Body>>,

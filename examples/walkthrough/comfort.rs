@@ -1,10 +1,10 @@
-//! Comfort: black in front of the eyes, that closes in from the edges while the body moves, and all over while it teleports.
+//! Comfort: black in front of the eyes, which closes in from the edges while the body moves, and covers the view while it teleports.
 //!
-//! In: how the body moves. Out: for each eye a ring and a curtain, meshes that only this eye sees.
+//! In: the motion of the body. Out: for each eye a ring and a curtain, meshes that only this eye sees.
 
-use crate::body::{Body, Moves};
-use crate::path::wrapped;
-use crate::teleport::Teleport;
+use super::body::{Body, Moves};
+use super::path::wrapped;
+use super::teleport::Teleport;
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::visibility::{NoFrustumCulling, RenderLayers};
 use bevy::mesh::{Indices, PrimitiveTopology};
@@ -15,14 +15,14 @@ use std::f32::consts::TAU;
 const DISTANCE: f32 = 0.15;
 /// The ring's radii as tangents of the angle from the middle, and how much they hide, while it is closed.
 const RADII: [(f32, f32); 3] = [(0.45, 0.0), (0.75, 1.0), (12.0, 1.0)];
-/// How many times as large the ring is just before it is gone.
+/// Factor on the ring's size just before it disappears.
 const OPEN: f32 = 4.0;
 const SEGMENTS: u32 = 48;
 /// Seconds until the ring is closed, and until it is open.
 const EASE: f32 = 0.25;
 /// Metres and radians per second at which it closes entirely.
 const FAST: f32 = 0.8;
-/// More than these per second is no motion but a jump: teleports and snap turns.
+/// Metres and radians per second above which a motion is a jump: a teleport or a snap turn.
 const JUMP: [f32; 2] = [12.0, 10.0];
 
 /// A camera that is one of the eyes; 0 is the left one.
@@ -35,7 +35,7 @@ struct Ring;
 #[derive(Component)]
 struct Curtain;
 
-/// Whether edges close, and how far they have.
+/// Whether the edges close, and how far they are closed, 0 to 1.
 #[derive(Resource)]
 pub struct Comfort {
     pub vignette: bool,
@@ -48,7 +48,7 @@ impl Default for Comfort {
     }
 }
 
-/// What rings and curtains are made of.
+/// Meshes and materials of rings and curtains.
 #[derive(Resource)]
 struct Cloth {
     ring: Handle<Mesh>,
@@ -147,7 +147,7 @@ fn close(
     }
 }
 
-/// How much of a motion it was from one place and direction to another, 0 to 1.
+/// The motion from one place and direction to another in `seconds`: 0 for none or a jump, 1 from [`FAST`] on.
 fn motion(before: (Vec3, f32), now: (Vec3, f32), seconds: f32) -> f32 {
     let (speed, turn) = (before.0.distance(now.0) / seconds, wrapped(now.1 - before.1).abs() / seconds);
     if speed > JUMP[0] || turn > JUMP[1] { 0.0 } else { (speed.max(turn) / FAST).min(1.0) }

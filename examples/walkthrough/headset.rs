@@ -22,7 +22,7 @@ pub fn add_plugins(app: &mut App, plugins: PluginGroupBuilder) -> bool {
 mod worn {
     use crate::body::{Body, Head, START};
     use crate::comfort::EyeView;
-    use crate::eye_look;
+    use crate::eye_settings;
     use bevy::app::PluginGroupBuilder;
     use bevy::prelude::*;
     use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
@@ -33,11 +33,11 @@ mod worn {
     use bevy_mod_xr::session::XrTrackingRoot;
 
     pub fn add_plugins(app: &mut App, plugins: PluginGroupBuilder) -> bool {
-        // Without pipelining the head is where it was least long ago.
+        // Without pipelining the pose of the head is the newest.
         app.add_plugins(add_xr_plugins(plugins.disable::<PipelinedRenderingPlugin>()));
         let found = app.world().contains_resource::<OxrInstance>();
         if found {
-            // The headset goes on while another window is used.
+            // The headset keeps drawing while another window has the focus.
             let always = UpdateMode::Continuous;
             app.insert_resource(WinitSettings { focused_mode: always, unfocused_mode: always })
                 .add_systems(Startup, give_body)
@@ -57,7 +57,7 @@ mod worn {
     fn give_eyes(mut commands: Commands, eyes: Query<(Entity, &XrCamera), Added<XrCamera>>) {
         for (entity, camera) in &eyes {
             let mut eye = commands.entity(entity);
-            eye.insert((EyeView(camera.0 as usize), eye_look()));
+            eye.insert((EyeView(camera.0 as usize), eye_settings()));
             if camera.0 == 0 {
                 eye.insert(Head);
             }

@@ -1,9 +1,9 @@
-//! A recorded way of the head: going it, and recording it.
+//! A recorded path of the head: following it, and recording it.
 //!
-//! In: a RON file of poses, or the head as it moves. Out: the transforms of body and head at any time, or a file.
+//! In: a RON file of poses, or the moving head. Out: the transforms of body and head at any time, or a file.
 
-use crate::body::{Body, EYE_HEIGHT, Head};
-use crate::teleport::Teleport;
+use super::body::{Body, EYE_HEIGHT, Head};
+use super::teleport::Teleport;
 use bevy::prelude::*;
 use bevy_gs4d::stereo::StereoRig;
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ const SPACING: f32 = 0.1;
 /// Where recordings are written.
 const RECORDING: &str = "recorded.path.ron";
 
-/// Where the head is at a time.
+/// The pose of the head at a time.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pose {
@@ -47,7 +47,7 @@ impl Pose {
 pub struct HeadPath(Vec<Pose>);
 
 impl HeadPath {
-    /// Of a file, or the bundled one.
+    /// Reads the path of a file, or the bundled one.
     pub fn load(path: Option<&Path>) -> Result<Self> {
         let read = match path {
             Some(path) => {
@@ -84,7 +84,7 @@ impl HeadPath {
         self.0.last().map_or(0.0, |pose| pose.time)
     }
 
-    /// Between the poses along a smooth curve that starts and ends at rest; before and after them it stands.
+    /// The pose at a time: along a smooth curve through the poses, which starts and ends at rest; constant before and after it.
     fn at(&self, seconds: f32) -> Pose {
         let Some(last) = self.0.len().checked_sub(1).filter(|last| *last > 0) else { return self.0[0] };
         let next = self.0.partition_point(|pose| pose.time <= seconds).clamp(1, last);
@@ -96,7 +96,7 @@ impl HeadPath {
         Pose { time: seconds, position: [x, y, z], yaw, pitch }
     }
 
-    /// Of the curve at a pose, per second.
+    /// The slopes of the curve at a pose, per second.
     fn slopes(&self, index: usize) -> [f32; 5] {
         let (Some(before), Some(after)) = (index.checked_sub(1).map(|i| self.0[i]), self.0.get(index + 1)) else {
             return [0.0; 5];
@@ -125,12 +125,12 @@ pub struct PathPlayer {
     pub seconds: f32,
 }
 
-/// Whether the body goes its own way.
+/// Whether the body is free: no path is followed.
 pub fn walking(player: Res<PathPlayer>) -> bool {
     !player.playing
 }
 
-/// P goes the path from its beginning, or stops.
+/// P follows the path from its beginning, or stops.
 pub fn start(keys: Res<ButtonInput<KeyCode>>, mut player: ResMut<PathPlayer>, mut teleport: ResMut<Teleport>) {
     if keys.just_pressed(KeyCode::KeyP) {
         *player = PathPlayer { playing: !player.playing, seconds: 0.0 };
@@ -138,7 +138,7 @@ pub fn start(keys: Res<ButtonInput<KeyCode>>, mut player: ResMut<PathPlayer>, mu
     }
 }
 
-/// Puts body and head where they are on the path.
+/// Places body and head on the path.
 pub fn follow(
     time: Res<Time>,
     path: Res<HeadPath>,
@@ -157,7 +157,7 @@ pub fn follow(
     }
 }
 
-/// What has been recorded so far, if anything is being recorded.
+/// The poses recorded so far; `None` while nothing is recorded.
 #[derive(Resource, Default)]
 pub struct Recorder {
     poses: Option<Vec<Pose>>,
@@ -188,7 +188,7 @@ pub fn record(
     }
 }
 
-/// What [`HeadPath::read`] reads.
+/// The text of poses, as [`HeadPath::read`] reads it.
 fn text(poses: &[Pose]) -> Result<String, String> {
     let lines = ron::ser::PrettyConfig::default().depth_limit(1);
     ron::ser::to_string_pretty(poses, lines).map_err(|error| error.to_string())
@@ -225,7 +225,7 @@ mod tests {
             let [x, y, z, read_yaw, read_pitch] = read.values();
             assert!(place.abs_diff_eq(Vec3::new(x, y, z), 1e-5), "at {} s the head is at {place}", pose.time);
             let off = (read_yaw - yaw).abs().max((read_pitch - pitch).abs());
-            assert!(off < 1e-5, "and looks where it looked: {off} radians off");
+            assert!(off < 1e-5, "in the same direction: {off} radians off");
         }
     }
 

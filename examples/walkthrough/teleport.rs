@@ -1,14 +1,14 @@
-//! Teleporting: aim at the floor along the way of something thrown, let go, and be there after a moment of darkness.
+//! Teleporting: aim at the floor along the path of a thrown object, let go, and arrive after a moment of darkness.
 //!
-//! In: where the head is, keys and buttons. Out: another place of the body, how dark the view is, and dots that show the aim.
+//! In: the pose of the head, keys and buttons. Out: another place of the body, the darkness of the view, and dots that show the aim.
 
-use crate::body::{Body, Head, Moves};
-use crate::path::{follow, walking};
+use super::body::{Body, Head, Moves};
+use super::path::{follow, walking};
 use bevy::prelude::*;
 
 /// How far from the middle there is floor to stand on, metres.
 pub const FLOOR_RADIUS: f32 = 8.0;
-/// Metres per second of what is thrown.
+/// Speed of the throw, metres per second.
 const THROW: f32 = 6.0;
 /// Metres per second squared.
 const GRAVITY: f32 = 9.8;
@@ -18,12 +18,12 @@ const HAND: Vec3 = Vec3::new(0.15, -0.3, -0.1);
 const FADE: f32 = 0.12;
 const DOTS: u32 = 12;
 
-/// What is going on.
+/// The state of teleporting.
 #[derive(Resource, Debug, Default, Clone, Copy, PartialEq)]
 pub enum Teleport {
     #[default]
     Idle,
-    /// At a place, if what is aimed at is one.
+    /// At this place; `None` if the aim misses the floor.
     Aiming(Option<Vec3>),
     Leaving {
         to: Vec3,
@@ -35,7 +35,7 @@ pub enum Teleport {
 }
 
 impl Teleport {
-    /// How dark the view is, 0 to 1.
+    /// The darkness of the view, 0 to 1.
     pub fn dark(&self) -> f32 {
         match self {
             Self::Idle | Self::Aiming(_) => 0.0,
@@ -43,7 +43,7 @@ impl Teleport {
         }
     }
 
-    /// Forgets what is aimed at; who is under way already arrives.
+    /// Stops aiming. A teleport that has begun is completed.
     pub fn stop_aiming(&mut self) {
         if matches!(self, Self::Aiming(_)) {
             *self = Self::Idle;
@@ -51,7 +51,7 @@ impl Teleport {
     }
 }
 
-/// Something thrown.
+/// A throw.
 struct Throw {
     from: Vec3,
     velocity: Vec3,
@@ -72,14 +72,14 @@ impl Throw {
         (up + (up * up + 2.0 * GRAVITY * self.from.y.max(0.0)).sqrt()) / GRAVITY
     }
 
-    /// Where it meets the floor, if there is floor.
+    /// Where it meets the floor; `None` beyond the floor's edge.
     fn landing(&self) -> Option<Vec3> {
         let place = self.at(self.flight()).with_y(0.0);
         (place.length() < FLOOR_RADIUS).then_some(place)
     }
 }
 
-/// Shows where the aim is.
+/// The mark on the floor.
 #[derive(Component)]
 pub struct Marker;
 
@@ -102,14 +102,14 @@ pub fn setup(
     }
 }
 
-/// What keys do: aiming, and what follows from it. While a recorded way is gone nobody aims, but who is under way arrives, or it
-/// would stay dark.
+/// Aiming by keys, and the teleport that follows. While a recorded path is followed there is no aiming, but a teleport that has begun is
+/// completed, or the view would stay dark.
 pub fn plugin(app: &mut App) {
     app.add_systems(Update, (aim.run_if(walking), travel).chain().before(follow).in_set(Moves))
         .add_systems(Update, show.after(Moves));
 }
 
-/// Holding T or the right button aims, letting go leaves.
+/// Aims while T or the right button is held; letting go starts the teleport.
 fn aim(
     keys: Res<ButtonInput<KeyCode>>,
     buttons: Res<ButtonInput<MouseButton>>,
@@ -126,7 +126,7 @@ fn aim(
     teleport.set_if_neq(next);
 }
 
-/// Goes dark, puts the head above the place, and goes bright again.
+/// Darkens the view, puts the head above the place, and brightens the view again.
 fn travel(
     time: Res<Time>,
     head: Single<&GlobalTransform, With<Head>>,
@@ -147,7 +147,7 @@ fn travel(
     teleport.set_if_neq(next);
 }
 
-/// Puts marker and dots where the aim is.
+/// Places marker and dots along the aim.
 fn show(
     teleport: Res<Teleport>,
     head: Single<&GlobalTransform, With<Head>>,
@@ -170,8 +170,8 @@ fn show(
 
 #[cfg(test)]
 mod tests {
+    use super::super::path::{HeadPath, PathPlayer, start};
     use super::*;
-    use crate::path::{HeadPath, PathPlayer, start};
     use std::time::Duration;
 
     /// Where the body is at first, the head above a place beside it, and where it is sent.

@@ -1,18 +1,8 @@
-// How a placed capture looks: light and debug colours; twin of src/gaussian/look.rs.
+// How a placed capture looks: light and debug colours. CPU reference of the light: src/view/appearance.rs.
 #define_import_path gs4d::appearance
 
+#import gs4d::srgb::{decode, encode}
 #import gs4d::types::{LIGHTING_AS_TRAINED, LIGHTING_ENCODED}
-
-// The sRGB transfer functions for values not below 0; the power curve goes on above 1.
-fn encode(linear: vec3<f32>) -> vec3<f32> {
-    let curve = 1.055 * pow(linear, vec3(1.0 / 2.4)) - 0.055;
-    return select(curve, 12.92 * linear, linear <= vec3(0.0031308));
-}
-
-fn decode(encoded: vec3<f32>) -> vec3<f32> {
-    let curve = pow((encoded + 0.055) / 1.055, vec3(2.4));
-    return select(curve, encoded / 12.92, encoded <= vec3(0.04045));
-}
 
 // A trained colour in the blend space, in the light that the capture is given.
 fn lit(color: vec3<f32>, lighting: u32, light: vec3<f32>) -> vec3<f32> {

@@ -1,4 +1,4 @@
-// The environment map: a lat-long texture on a sphere of radius 60; twin of src/scene/environment.rs.
+// The environment map: a lat-long texture on a sphere of radius 60. CPU reference: src/scene/environment.rs.
 #define_import_path gs4d::environment
 
 const RADIUS: f32 = 60.0;

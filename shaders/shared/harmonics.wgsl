@@ -1,4 +1,4 @@
-// Spherical harmonics up to degree 3; twin of src/gaussian/harmonics.rs.
+// Spherical harmonics up to degree 3. CPU reference: src/gaussian/harmonics.rs.
 #define_import_path gs4d::harmonics
 
 // Basis values 0-3, 4-7, 8-11, 12-15 in the unit direction `d`, with the constants and signs of 3DGS.

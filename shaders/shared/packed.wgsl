@@ -1,5 +1,5 @@
-// The packed form: records of sixteen 16-bit lanes, read with the ranges of their block; twin of src/scene/packed.rs, where the
-// lanes are listed.
+// The packed form: records of sixteen 16-bit lanes, read with the ranges of their block. CPU reference:
+// src/scene/packed/decode.rs; lanes.rs beside it lists the lanes.
 #define_import_path gs4d::packed
 
 #import gs4d::types::Gaussian

@@ -1,4 +1,4 @@
-// Structures that the host writes or reads; kept in step with src/gpu/layout.rs (a test compares every offset).
+// Structures that the host writes or reads; kept in step with src/renderer/layout.rs (a test compares every offset).
 #define_import_path gs4d::types
 
 // One Gaussian in the runtime form. `inverse_sigma_t` is 0 for a Gaussian that is always there.
@@ -16,7 +16,7 @@ struct Gaussian {
 }
 
 // One part of a capture in one view: where its camera is and which slots its splats take.
-struct Instance {
+struct InstanceUniforms {
     // Rows of capture-to-camera.
     camera_x: vec4<f32>,
     camera_y: vec4<f32>,
@@ -94,7 +94,7 @@ const FILTER_INTERVALS: u32 = 2u;
 const INVISIBLE: u32 = 0xffffffffu;
 
 // What all instances of a view share.
-struct Frame {
+struct FrameUniforms {
     size: vec2<u32>,
     tiles: vec2<u32>,
     // Splat slots in use, drawn or not.
@@ -131,7 +131,7 @@ const BACKGROUND_COLOR: u32 = 1u;
 const BACKGROUND_ENVIRONMENT: u32 = 2u;
 
 // A Gaussian on the screen. Tiles x0, y0, x1, y1 (ends excluded) take 16 bits each.
-struct Splat {
+struct SplatRecord {
     center: vec2<f32>,
     opacity: f32,
     depth: f32,

@@ -2,12 +2,13 @@
 //!
 //! In: a scene and views of it. Out: medians of GPU milliseconds per pass and per frame, and of wall-clock time.
 
+use super::args::{CheckpointArgs, GpuArgs, ViewArgs, values};
 use super::failure::Failure;
-use super::gpu::{self, GpuArgs};
-use super::opening::{self, CheckpointArgs};
-use super::report::{Report, Table, note};
-use super::values;
-use super::views::{Shot, ViewArgs};
+use super::progress::note;
+use super::report::{Report, switches_json};
+use super::table::Table;
+use crate::offline::engine::AdapterDescription;
+use crate::offline::orbit::{at_times, share};
 use crate::renderer::Timings;
 use crate::view::View;
 use serde_json::json;
@@ -49,47 +50,37 @@ impl Bench {
     pub fn run(&self) -> Result<Report, Failure> {
         let scene = self.checkpoint.load(&self.scene)?;
         let scene = scene.into_runtime().map_err(|error| Failure::at(&self.scene, &error))?;
-        let shots = self.at_times(self.views.shots(&scene, self.count)?, scene.trained_with.time_interval);
+        let mut shots = share(self.views.shots(&scene, self.count)?, self.views.limit(self.count));
+        if let Some(times) = self.times {
+            shots = at_times(shots, times, scene.trained_with.time_interval);
+        }
         let views: Vec<View> = shots.iter().map(|shot| shot.view(&scene)).collect();
         let size = views.first().map_or([0, 0], |view| view.size.to_array());
         let mut headless = self.gpu.open()?;
         let capture = headless.upload(&scene)?;
         note(&format!("measuring {} frames over {} views", self.frames, views.len()));
         let timings = headless.time(&capture, &views, self.frames)?;
+        let adapter = AdapterDescription::of(&headless);
         let text = format!(
-            "{}: {} Gaussians, {} views of {}x{}\n{}\n{}",
+            "{}: {} Gaussians, {} views of {}x{}\n{adapter}\n{}",
             self.scene.display(),
             scene.len(),
             views.len(),
             size[0],
             size[1],
-            gpu::adapter_name(&headless),
             table(&timings),
         );
         let json = json!({
             "scene": self.scene.display().to_string(),
-            "adapter": gpu::adapter_json(&headless),
+            "adapter": adapter,
             "gaussians": scene.len(),
             "views": views.len(),
             "size": size,
             "timings": timings,
             "fps": { "gpu": timings.frame_milliseconds.map(fps), "pipelined": fps(timings.pipelined_milliseconds) },
-            "switches": opening::switches_json(&scene.trained_with, &scene.playback),
+            "switches": switches_json(&scene.trained_with, &scene.playback),
         });
         Ok(Report::new(json, text))
-    }
-
-    /// An even share of the shots, each at the times asked for.
-    fn at_times(&self, shots: Vec<Shot>, [first, last]: [f32; 2]) -> Vec<Shot> {
-        let all = shots.len();
-        let count = self.views.limit(self.count).min(all);
-        let chosen = shots.into_iter().enumerate().filter(|(i, _)| i * count / all != (i + 1) * count / all);
-        let chosen = chosen.map(|(_, shot)| shot);
-        let Some(times) = self.times else { return chosen.collect() };
-        let time = |k: usize| first + (last - first) * (k as f32 + 0.5) / times as f32;
-        let seen =
-            |shot: Shot| (0..times).map(move |k| Shot { name: shot.name.clone(), camera: shot.camera, time: time(k) });
-        chosen.flat_map(seen).collect()
     }
 }
 

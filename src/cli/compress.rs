@@ -1,23 +1,21 @@
-//! `gs4d compress IN OUT`: quantised geometry and colours by codebook, as small as the quality asked for allows.
+//! `gs4d compress IN OUT`: quantized geometry and colors by codebook, as small as the quality asked for allows.
 //!
 //! In: a scene, a quality or every knob. Out: a package in the packed form, bytes by section, and how close its pictures are to those
 //! of the scene it was made from.
 
-use super::convert::is_same_file;
-use super::engine::{Engine, EngineArgs};
+use super::args::{CheckpointArgs, EngineArgs, PackageArgs, ViewArgs, file_size, values};
 use super::failure::Failure;
-use super::opening::{self, CheckpointArgs, PackageArgs};
-use super::report::{Report, Table, bytes, progress};
-use super::values;
-use super::views::ViewArgs;
+use super::progress::Bars;
+use super::report::Report;
+use super::table::{Table, bytes};
 use crate::codec::package;
-use crate::offline::metrics::psnr_pooled;
-use crate::offline::quality::Draw;
+use crate::offline::Progress;
+use crate::offline::fidelity::Originals;
 use crate::offline::quantize::{CompressSettings, Quality, compress_with};
+use crate::offline::score::read_weights;
 use crate::scene::RuntimeScene;
 use crate::scene::packed::encode::Bits;
-use crate::view::{Picture, View};
-use serde_json::{Value, json};
+use serde_json::json;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::PathBuf;
@@ -126,19 +124,17 @@ impl Compress {
     /// # Errors
     /// The scene cannot be read, is packed already, or the package cannot be written.
     pub fn run(&self) -> Result<Report, Failure> {
-        let out = self.package.out()?;
-        if is_same_file(&self.input, out) {
-            return Err(Failure::about(out, "is the input itself: write to another file"));
-        }
-        let before = opening::file_size(&self.input)?;
+        let progress = &mut Bars::default();
+        let out = self.package.out_apart_from(&self.input)?;
+        let before = file_size(&self.input)?;
         let scene = self.checkpoint.load(&self.input)?;
         let scene = scene.into_runtime().map_err(|error| Failure::at(&self.input, &error))?;
-        let (views, expected) = self.pictures(&scene)?;
-        let weights = self.weights(scene.len())?;
+        let originals = self.originals(&scene, progress)?;
+        let weights = self.weights.as_ref().map(|path| read_weights(path, scene.len())).transpose()?;
         let settings = CompressSettings { weights, ..self.knobs.settings(self.quality) };
-        let bar = progress(settings.codebooks.len(), "codebooks");
-        let compressed = compress_with(scene, &settings, || bar.inc(1));
-        bar.finish_and_clear();
+        progress.begin("codebooks", settings.codebooks.len());
+        let compressed = compress_with(scene, &settings, || progress.advance());
+        progress.finish();
         let (scene, report) = compressed.map_err(|error| Failure::at(&self.input, &error))?;
         let after = self.package.save(&scene)?;
         let file = File::open(out).map_err(|error| Failure::at(out, &error))?;
@@ -148,7 +144,10 @@ impl Compress {
             *sections.entry(&section.name).or_default() += section.length as u64;
         }
         let scene = scene.into_runtime().map_err(|error| Failure::at(out, &error))?;
-        let likeness = self.likeness(&scene, &views, &expected)?;
+        let psnr = match &originals {
+            Some(originals) => originals.psnr(&mut self.engine.open()?, &scene, progress)?,
+            None => Vec::new(),
+        };
 
         let mut table = Table::new(&["section", "bytes", "per Gaussian"]);
         let each = |size: u64| size as f64 / report.gaussians.max(1) as f64;
@@ -166,14 +165,11 @@ impl Compress {
             bytes(report.memory_before as u64),
             bytes(report.memory_after as u64),
         );
-        if let Some(lowest) = likeness.iter().copied().reduce(f64::min) {
-            let mean = likeness.iter().sum::<f64>() / likeness.len() as f64;
-            text += &format!(
-                "PSNR to the original over {} views: mean {mean:.2} dB, lowest {lowest:.2} dB\n",
-                likeness.len()
-            );
+        if let Some(lowest) = psnr.iter().copied().reduce(f64::min) {
+            let mean = psnr.iter().sum::<f64>() / psnr.len() as f64;
+            text +=
+                &format!("PSNR to the original over {} views: mean {mean:.2} dB, lowest {lowest:.2} dB\n", psnr.len());
         }
-        let finite = |value: &f64| if value.is_finite() { json!(value) } else { Value::Null };
         let json = json!({
             "in": self.input.display().to_string(),
             "out": out.display().to_string(),
@@ -184,56 +180,19 @@ impl Compress {
             "sections": sections,
             "settings": settings,
             "report": report,
-            "psnr_to_original": likeness.iter().map(finite).collect::<Vec<_>>(),
+            "psnr_to_original": psnr,
         });
         Ok(Report::new(json, text))
     }
 
-    /// The scores to weigh colours by.
-    fn weights(&self, count: usize) -> Result<Option<Vec<f32>>, Failure> {
-        let Some(path) = &self.weights else { return Ok(None) };
-        let data = std::fs::read(path).map_err(|error| Failure::at(path, &error))?;
-        let weights: Vec<f32> = data.as_chunks().0.iter().map(|&four| f32::from_le_bytes(four)).collect();
-        if data.len() != count * 4 {
-            let reason = format!("holds {} scores for a scene of {count} Gaussians", weights.len());
-            return Err(Failure::about(path, &reason));
-        }
-        if !weights.iter().all(|weight| weight.is_finite() && *weight >= 0.0) {
-            return Err(Failure::about(path, "holds a score that is negative or not finite"));
-        }
-        Ok(Some(weights))
-    }
-
-    /// The views to compare, and the original's pictures of them.
-    fn pictures(&self, scene: &RuntimeScene) -> Result<(Vec<View>, Vec<Picture>), Failure> {
+    /// The views to compare, as the original shows them.
+    fn originals(&self, scene: &RuntimeScene, progress: &mut Bars) -> Result<Option<Originals>, Failure> {
         if self.verify == 0 || scene.is_empty() {
-            return Ok((Vec::new(), Vec::new()));
+            return Ok(None);
         }
         let shots = self.views.shots(scene, self.verify)?;
         let step = shots.len().div_ceil(self.verify).max(1);
-        let views: Vec<_> = shots.iter().step_by(step).map(|shot| shot.view(scene)).collect();
-        let pictures = draw(&mut self.engine.open()?, scene, &views)?;
-        Ok((views, pictures))
+        let views = shots.iter().step_by(step).map(|shot| shot.view(scene)).collect();
+        Ok(Some(Originals::draw(&mut self.engine.open()?, scene, views, progress)?))
     }
-
-    fn likeness(&self, scene: &RuntimeScene, views: &[View], expected: &[Picture]) -> Result<Vec<f64>, Failure> {
-        if views.is_empty() {
-            return Ok(Vec::new());
-        }
-        let found = draw(&mut self.engine.open()?, scene, views)?;
-        let psnr = |(a, b): (&Picture, &Picture)| psnr_pooled(&a.clamped(), &b.clamped()).map_err(Failure::from);
-        found.iter().zip(expected).map(psnr).collect()
-    }
-}
-
-fn draw(engine: &mut Engine, scene: &RuntimeScene, views: &[View]) -> Result<Vec<Picture>, Failure> {
-    let mut pictures = Vec::new();
-    let bar = progress(views.len(), "comparing");
-    let drawn = engine.draw(scene, views, scene.trained_background(), &mut |_, picture| {
-        bar.inc(1);
-        pictures.push(picture);
-    });
-    bar.finish_and_clear();
-    drawn.map_err(|error| Failure::new(error.to_string()))?;
-    Ok(pictures)
 }

@@ -2,13 +2,13 @@
 //!
 //! In: a scene, the form wanted, colour degrees. Out: a package, the switches that were chosen, sizes before and after.
 
+use super::args::{CheckpointArgs, PackageArgs, file_size, values};
 use super::failure::Failure;
-use super::opening::{self, CheckpointArgs, PackageArgs};
-use super::report::{Report, bytes, lines};
-use super::values;
-use crate::scene::{Form, GaussianScene};
+use super::report::{Report, switches, switches_json};
+use super::table::{bytes, lines};
+use crate::offline::convert::{ConvertSettings, TargetForm, convert, form_name};
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Convert a checkpoint (.pth) or a package to a package (.gs4d).
 ///
@@ -27,8 +27,8 @@ pub struct Convert {
     #[command(flatten)]
     package: PackageArgs,
     /// Form of the Gaussians: trained (can be pruned and fine-tuned) or runtime (smaller, draws the same) [default: as in IN].
-    #[arg(long, value_name = "FORM", value_parser = values::one_of(&FORMS))]
-    form: Option<FormName>,
+    #[arg(long, value_name = "FORM", value_parser = values::one_of(&TargetForm::NAMES))]
+    form: Option<TargetForm>,
     /// Keep colour up to this spatial degree, 0 to 3 [default: all].
     #[arg(long, value_name = "D", value_parser = clap::value_parser!(u32).range(0..=3))]
     sh_degree: Option<u32>,
@@ -39,26 +39,17 @@ pub struct Convert {
     checkpoint: CheckpointArgs,
 }
 
-#[derive(Clone, Copy)]
-enum FormName {
-    Trained,
-    Runtime,
-}
-
-const FORMS: [(&str, FormName); 2] = [("trained", FormName::Trained), ("runtime", FormName::Runtime)];
-
 impl Convert {
     /// Converts.
     pub fn run(&self) -> Result<Report, Failure> {
-        let out = self.package.out()?;
-        if is_same_file(&self.input, out) {
-            return Err(Failure::about(out, "is the input itself: write to another file"));
-        }
-        let before = opening::file_size(&self.input)?;
-        let scene = self.prepared(self.checkpoint.load(&self.input)?)?;
+        let out = self.package.out_apart_from(&self.input)?;
+        let before = file_size(&self.input)?;
+        let settings = ConvertSettings { form: self.form, sh_degree: self.sh_degree, sh_degree_t: self.sh_degree_t };
+        let scene = convert(self.checkpoint.load(&self.input)?, &settings);
+        let scene = scene.map_err(|error| Failure::at(&self.input, &error))?;
         let after = self.package.save(&scene)?;
         let per_gaussian = after as f64 / scene.len().max(1) as f64;
-        let mut text = lines(&opening::switches(&scene.trained_with, &scene.playback));
+        let mut text = lines(&switches(&scene.trained_with, &scene.playback));
         text += &format!(
             "\n{} ({}) -> {} ({}): {} Gaussians in the {} form, {per_gaussian:.1} bytes each\n",
             self.input.display(),
@@ -76,42 +67,8 @@ impl Convert {
             "gaussians": scene.len(),
             "bytes_per_gaussian": per_gaussian,
             "form": form_name(&scene.form),
-            "switches": opening::switches_json(&scene.trained_with, &scene.playback),
+            "switches": switches_json(&scene.trained_with, &scene.playback),
         });
         Ok(Report::new(json, text))
     }
-
-    /// The scene in the form and with the colour degrees asked for.
-    fn prepared(&self, mut scene: GaussianScene) -> Result<GaussianScene, Failure> {
-        if matches!(self.form, Some(FormName::Runtime)) {
-            scene = scene.unpacked();
-        }
-        let kept = &mut scene.harmonics;
-        kept.truncate(self.sh_degree.unwrap_or(kept.degree), self.sh_degree_t.unwrap_or(kept.degree_t));
-        match (self.form, &scene.form) {
-            (Some(FormName::Trained), Form::Runtime(_) | Form::Packed(_)) => Err(Failure::about(
-                &self.input,
-                "holds a sliced form, which cannot be turned back: convert the checkpoint with --form trained",
-            )),
-            (Some(FormName::Runtime), Form::Trained(_)) => {
-                let sliced = scene.into_runtime().map_err(|error| Failure::at(&self.input, &error))?;
-                Ok(sliced.into())
-            }
-            _ => Ok(scene),
-        }
-    }
-}
-
-/// Name of a form.
-pub fn form_name(form: &Form) -> &'static str {
-    match form {
-        Form::Trained(_) => "trained",
-        Form::Runtime(_) => "runtime",
-        Form::Packed(_) => "packed",
-    }
-}
-
-/// Whether both paths lead to the same file.
-pub fn is_same_file(a: &Path, b: &Path) -> bool {
-    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }

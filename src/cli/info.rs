@@ -2,12 +2,13 @@
 //!
 //! In: a file. Out: its facts, its bounds, and for packages every section and whether its checksum holds.
 
-use super::convert::form_name;
+use super::args::{CheckpointArgs, file_size, is_package};
 use super::failure::Failure;
-use super::opening::{self, CheckpointArgs};
-use super::report::{Report, Table, bytes, lines};
+use super::report::{Report, switches, switches_json};
+use super::table::{Table, bytes, lines};
 use crate::codec::package::{self, PackageInfo, StoredForm};
 use crate::gaussian::Model;
+use crate::offline::convert::form_name;
 use crate::scene::{Bounds, GaussianScene, PlaybackHints, TrainedWith};
 use glam::Vec3;
 use serde_json::{Value, json};
@@ -54,8 +55,8 @@ struct Extent {
 impl Info {
     /// Looks into the file.
     pub fn run(&self) -> Result<Report, Failure> {
-        let size = opening::file_size(&self.file)?;
-        let package = if opening::is_package(&self.file) { Some(self.inspect()?) } else { None };
+        let size = file_size(&self.file)?;
+        let package = if is_package(&self.file) { Some(self.inspect()?) } else { None };
         if let Some(info) = package.as_ref().filter(|info| !info.is_intact()) {
             let (damaged, all) = (info.damaged.len(), info.header.sections.len());
             let message = format!("{damaged} of {all} sections are damaged; copy or download the package again");
@@ -109,7 +110,7 @@ impl Info {
             "degree": facts.degree,
             "degree_t": facts.degree_t,
             "environment": facts.environment,
-            "switches": opening::switches_json(&facts.trained_with, &facts.playback),
+            "switches": switches_json(&facts.trained_with, &facts.playback),
             "bounds": extent.as_ref().map(|extent| box_json(&extent.all)),
             "core": extent.as_ref().map(|extent| box_json(&extent.core)),
             "package": package.map(package_json),
@@ -121,13 +122,16 @@ impl Info {
 
 impl Facts {
     fn of_scene(scene: &GaussianScene) -> Self {
+        // Of coded colors only the first coefficient counts as stored.
+        let (coefficients, degree, degree_t) =
+            scene.form.harmonics().map_or((1, 0, 0), |whole| (whole.coefficients, whole.degree, whole.degree_t));
         Self {
             gaussians: scene.len(),
             form: form_name(&scene.form),
             model: scene.model(),
-            coefficients: scene.harmonics.coefficients,
-            degree: scene.harmonics.degree,
-            degree_t: scene.harmonics.degree_t,
+            coefficients,
+            degree,
+            degree_t,
             environment: scene.environment.as_ref().map(|map| [map.width, map.height]),
             trained_with: scene.trained_with.clone(),
             playback: scene.playback,
@@ -138,7 +142,7 @@ impl Facts {
         let header = &info.header;
         let (form, model) = match header.form {
             StoredForm::Trained { model } => ("trained", Some(model)),
-            StoredForm::Runtime => ("runtime", None),
+            StoredForm::Sliced => ("runtime", None),
             StoredForm::Packed { .. } => ("packed", None),
         };
         Self {
@@ -168,7 +172,7 @@ impl Facts {
             ("colour", format!("degree {degree}, time degree {degree_t}, {stored} coefficients stored")),
             ("environment", environment),
         ];
-        pairs.extend(opening::switches(&self.trained_with, &self.playback));
+        pairs.extend(switches(&self.trained_with, &self.playback));
         pairs
     }
 }

@@ -3,16 +3,14 @@
 //! In: a scene, how many key-frames, training views where the filter needs them. Out: a package that knows which of its Gaussians are
 //! active when, and how many those are.
 
-use super::engine::EngineArgs;
+use super::args::{CheckpointArgs, DataArgs, EngineArgs, PackageArgs, values};
 use super::failure::Failure;
-use super::filters::{FILTERS, KEYS, by_views, filter_name, support};
-use super::opening::{CheckpointArgs, PackageArgs};
-use super::report::{Report, bytes, lines};
-use super::training::DataArgs;
-use super::values;
+use super::progress::Bars;
+use super::report::Report;
+use super::table::{bytes, lines};
 use crate::offline::dataset::TrainingView;
-use crate::offline::dataset::selection::distinct_times;
-use crate::offline::temporal_filter::{keys_every, neighbour_overlap};
+use crate::offline::engine::Engine;
+use crate::offline::temporal_filter::{FILTER_NAMES, filter, filter_name, needs_views, neighbour_overlap};
 use crate::scene::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter};
 use serde_json::json;
 use std::path::PathBuf;
@@ -36,7 +34,7 @@ pub struct Mask {
     #[command(flatten)]
     package: PackageArgs,
     /// Which filter.
-    #[arg(long, value_name = "FILTER", default_value = "support", value_parser = values::one_of(&FILTERS))]
+    #[arg(long, value_name = "FILTER", default_value = "support", value_parser = values::one_of(&FILTER_NAMES))]
     filter: FilterKind,
     /// Number of key-frames, evenly over the time interval, both ends included [default: 11].
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(2..=i64::from(MAX_SEGMENTS) + 1))]
@@ -58,14 +56,12 @@ impl Mask {
         let out = self.package.out()?;
         let mut scene = self.checkpoint.load(&self.input)?;
         scene.filter = None;
-        let needs_views = self.filter != FilterKind::Support || self.every.is_some();
-        let views = if needs_views { self.data.open(&scene.trained_with)? } else { Vec::new() };
+        let by_views = needs_views(self.filter);
+        let views = if by_views || self.every.is_some() { self.data.open(&scene.trained_with)? } else { Vec::new() };
         let keys = self.keys(&views)?;
-        let filter = match self.filter {
-            FilterKind::Support => support(&scene, keys),
-            kind => by_views(&mut self.engine.open()?, &scene, kind, keys, &views),
-        };
-        let filter = filter.map_err(|failure| Failure::about(&self.input, failure.message()))?;
+        let mut engine = if by_views { self.engine.open()? } else { Engine::Cpu };
+        let filter = filter(&mut engine, &scene, self.filter, keys, &views, &mut Bars::default());
+        let filter = filter.map_err(|error| Failure::at(&self.input, &error))?;
         let (share, overlap) = (filter.active_share(), neighbour_overlap(&filter));
         let least = overlap.iter().copied().fold(1.0, f64::min);
         let mean = if overlap.is_empty() { 1.0 } else { overlap.iter().sum::<f64>() / overlap.len() as f64 };
@@ -98,8 +94,7 @@ impl Mask {
     }
 
     fn keys(&self, views: &[TrainingView]) -> Result<u32, Failure> {
-        let Some(frames) = self.every else { return Ok(self.key_frames.unwrap_or(KEYS)) };
-        let keys = keys_every(distinct_times(views), frames);
+        let keys = values::key_frames(self.key_frames, self.every).count(views);
         let fits = u32::try_from(keys).ok().filter(|keys| *keys <= MAX_SEGMENTS + 1);
         fits.ok_or_else(|| Failure::new(format!("{keys} key-frames are too many: raise --every")))
     }

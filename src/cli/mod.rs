@@ -1,34 +1,30 @@
 //! The `gs4d` command: looks into captures, converts, renders, compares and times them, and makes them smaller.
 //!
-//! In: the command line. Out: one report on standard output (text, or one JSON document with `--json`); progress, notes and
-//! errors on standard error; exit code 0, 2 for any failure, 130 when interrupted.
+//! One file for each verb: its options, one call of [`offline`](crate::offline), what it prints. `args` has the options
+//! that verbs share.
+//!
+//! In: the command line. Out: one report on standard output (text, or one JSON document with `--json`); progress, notes
+//! and errors on standard error; exit code 0, 2 for any failure, 130 when interrupted.
 
 mod ablate;
+mod args;
 mod bake;
 mod bench;
 mod compare;
 mod compress;
-mod contest;
 mod convert;
-mod drawing;
-mod engine;
 mod eval;
 mod failure;
-mod filters;
-mod gpu;
 mod info;
 mod interrupt;
 mod mask;
-mod opening;
+mod progress;
 mod prune;
 mod render;
 mod report;
 mod score;
-mod splits;
 mod synth;
-mod training;
-mod values;
-mod views;
+mod table;
 
 use clap::{Parser, Subcommand};
 use failure::Failure;
@@ -94,7 +90,7 @@ impl Verb {
 /// Runs the command that the process was started with. Returns its exit code.
 pub fn run() -> ExitCode {
     let cli = Cli::parse();
-    report::silence_progress(cli.json);
+    progress::silence_progress(cli.json);
     let outcome = interrupt::install().map_err(Failure::from).and_then(|()| cli.verb.run());
     let report = outcome.unwrap_or_else(Report::of_failure);
     match report.print(cli.json) {

@@ -3,17 +3,19 @@
 //! In: a scene, training views or a file of scores, how many to keep or how much may be lost. Out: a package of the others, in their
 //! old order.
 
-use super::contest::{Candidate, Goal, Outcome, ScoreSearch, candidates};
-use super::engine::EngineArgs;
+use super::args::{CheckpointArgs, DataArgs, EngineArgs, PackageArgs, ScoringArgs, file_size, score_choice, values};
 use super::failure::Failure;
-use super::opening::{self, CheckpointArgs, PackageArgs};
-use super::report::{Report, Table, bytes, lines};
-use super::training::{self, Choice, DataArgs, ScoringArgs, read_scores};
-use super::values;
-use crate::offline::prune::{highest, kept_count, select};
+use super::progress::Bars;
+use super::report::Report;
+use super::score::search_table;
+use super::table::{Table, bytes, lines};
+use crate::offline::prune_by_views::{PruneSettings, Pruned, prune_by_views};
+use crate::offline::quality::Trial;
+use crate::offline::score::read_scores;
+use crate::offline::search::{Candidate, Goal, ScoreChoice};
+use crate::offline::{OfflineError, Subject};
 use crate::scene::GaussianScene;
-use crate::view::Background;
-use serde_json::{Value, json};
+use serde_json::json;
 use std::path::PathBuf;
 
 /// Keep only the Gaussians that matter most to the training views.
@@ -48,8 +50,8 @@ pub struct Prune {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["variant", "views"])]
     scores: Option<PathBuf>,
     /// Prune by this score.
-    #[arg(long, value_name = "SCORE", default_value = "auto", value_parser = training::choice(false))]
-    variant: Choice,
+    #[arg(long, value_name = "SCORE", default_value = "auto", value_parser = score_choice(false))]
+    variant: ScoreChoice,
     #[command(flatten)]
     data: DataArgs,
     #[command(flatten)]
@@ -60,112 +62,72 @@ pub struct Prune {
     checkpoint: CheckpointArgs,
 }
 
-/// The best way to prune, and how it was found.
-struct Found {
-    outcome: Outcome,
-    table: String,
-    contest: Option<Value>,
-}
-
 impl Prune {
     /// Prunes and writes.
     pub fn run(&self) -> Result<Report, Failure> {
         let out = self.package.out()?;
-        let before = opening::file_size(&self.input)?;
+        let before = file_size(&self.input)?;
         let scene = self.checkpoint.load(&self.input)?;
-        let found = self.find(&scene)?;
-        let Outcome { candidate, kept, psnr, .. } = &found.outcome;
-        let pruned = select(&scene, &highest(&candidate.scores, *kept));
-        let after = self.package.save(&pruned)?;
-        let text = found.table.clone()
-            + &lines(&[
-                ("kept", format!("{kept} of {} Gaussians, by {}", scene.len(), candidate.name)),
-                ("wrote", format!("{}, {} (from {})", out.display(), bytes(after), bytes(before))),
-            ]);
+        let total = scene.len();
+        let Pruned { scene, outcome, search } = self.prune(scene)?;
+        let after = self.package.save(&scene)?;
+        let (kept, score) = (outcome.kept, &outcome.score);
+        let mut text = String::new();
+        if let Some(search) = &search {
+            text += &format!("{}{}\n", search_table(search), trials_table(&outcome.trials));
+        }
+        text += &lines(&[
+            ("kept", format!("{kept} of {total} Gaussians, by {score}")),
+            ("wrote", format!("{}, {} (from {})", out.display(), bytes(after), bytes(before))),
+        ]);
         let json = json!({
             "in": self.input.display().to_string(),
             "out": out.display().to_string(),
             "bytes_in": before,
             "bytes_out": after,
-            "gaussians_in": scene.len(),
+            "gaussians_in": total,
             "gaussians": kept,
-            "score": candidate.name,
-            "psnr": psnr,
-            "contest": found.contest,
+            "score": score,
+            "psnr": outcome.psnr,
+            "contest": search,
         });
         Ok(Report::new(json, text))
     }
 
-    /// How many of `count` Gaussians to keep.
-    fn goal(&self, count: usize) -> Goal {
+    /// How many Gaussians to keep.
+    fn goal(&self) -> Goal {
         match (self.max_loss, self.keep, self.ratio) {
             (Some(loss), ..) => Goal::MaxLoss(loss),
-            (_, Some(keep), _) => Goal::Keep(keep.min(count)),
-            (.., ratio) => Goal::Keep(kept_count(count, ratio.unwrap_or_default())),
+            (_, Some(keep), _) => Goal::Keep(keep),
+            (.., ratio) => Goal::Remove(ratio.unwrap_or_default()),
         }
     }
 
-    fn find(&self, scene: &GaussianScene) -> Result<Found, Failure> {
-        let goal = self.goal(scene.len());
-        let file = self.scores.as_ref().map(|path| {
+    fn prune(&self, scene: GaussianScene) -> Result<Pruned, Failure> {
+        let goal = self.goal();
+        let read = |path: &PathBuf| -> Result<Candidate, OfflineError> {
             let scores = read_scores(path, scene.len())?;
-            Ok::<_, Failure>(Candidate { name: path.display().to_string(), scores })
-        });
-        let file = file.transpose()?;
-        match (goal, file) {
-            (Goal::Keep(kept), Some(candidate)) => Ok(Found::unchecked(candidate, kept)),
-            (goal, file) => self.find_with_data(scene, goal, file),
-        }
-    }
-
-    /// Scores with the training views unless there is a file, and compares on those held out if there is anything to compare.
-    fn find_with_data(&self, scene: &GaussianScene, goal: Goal, file: Option<Candidate>) -> Result<Found, Failure> {
-        let needs_loss = matches!(goal, Goal::MaxLoss(_));
-        let compared = needs_loss || (file.is_none() && self.variant == Choice::Auto);
-        let (scored, held_out) = self.scoring.share(self.data.open(&scene.trained_with)?, compared);
-        let runtime = scene.clone().into_runtime().map_err(|error| Failure::at(&self.input, &error))?;
-        let background = self.checkpoint.background.map_or(runtime.trained_background(), Background::Color);
-        let mut engine = self.engine.open()?;
-        // First of all, so that missing images are told at once.
-        let contest = if compared {
-            Some(ScoreSearch::open(&mut engine, &held_out, &runtime, background, needs_loss)?)
-        } else {
-            None
+            Ok(Candidate { name: path.display().to_string(), scores })
         };
-        let mut found = match file {
-            Some(candidate) => vec![candidate],
-            None => {
-                let scores = self.scoring.scores(&mut engine, scene, &runtime, background, &scored)?;
-                candidates(self.variant, &scores)?
-            }
+        let given = match (goal.count(scene.len()), self.scores.as_ref().map(read).transpose()?) {
+            (Some(count), Some(candidate)) => return Ok(Pruned::unchecked(&scene, candidate, count)),
+            (_, given) => given,
         };
-        match (contest, goal) {
-            (Some(contest), _) => {
-                let (outcome, rows) = contest.best(&mut engine, &GaussianScene::from(runtime), found, goal)?;
-                let table = format!("{}{}\n", contest.table(&rows), trials(&outcome));
-                Ok(Found { outcome, table, contest: Some(contest.json(rows)) })
-            }
-            (None, Goal::Keep(kept)) if !found.is_empty() => Ok(Found::unchecked(found.swap_remove(0), kept)),
-            (None, _) => Err(Failure::new("there is no score to prune by")),
-        }
-    }
-}
-
-impl Found {
-    /// One score, nothing compared.
-    fn unchecked(candidate: Candidate, kept: usize) -> Self {
-        let outcome = Outcome { candidate, kept, psnr: None, trials: Vec::new() };
-        Self { outcome, table: String::new(), contest: None }
+        let views = self.data.open(&scene.trained_with)?;
+        let subject = Subject::new(&self.input, scene, self.checkpoint.background)?;
+        let settings = PruneSettings { goal, score: self.variant, scoring: self.scoring.settings() };
+        let engine = &mut self.engine.open()?;
+        Ok(prune_by_views(engine, subject, views, given, &settings, &mut Bars::default())?)
     }
 }
 
 /// Every count that was tried on the way to the best, if there were several.
-fn trials(outcome: &Outcome) -> String {
-    if outcome.trials.len() < 2 {
+fn trials_table(trials: &[Trial]) -> String {
+    if trials.len() < 2 {
         return String::new();
     }
     let mut table = Table::new(&["tried", "PSNR"]);
-    for trial in &outcome.trials {
+    for trial in trials {
         table.row([trial.count.to_string(), format!("{:.3}", trial.psnr)]);
     }
     format!("\n{table}")

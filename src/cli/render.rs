@@ -1,27 +1,23 @@
 //! `gs4d render SCENE`: pictures of a scene.
 //!
-//! In: a scene and views of it. Out: a folder of PNG files, and raw float32 ones with `--raw`. Drawing and writing overlap.
+//! In: a scene and views of it. Out: a folder of PNG files, and raw float32 ones with `--raw`.
 
+use super::args::{CheckpointArgs, GpuArgs, ViewArgs};
 use super::failure::Failure;
-use super::gpu::{self, GpuArgs};
-use super::interrupt;
-use super::opening::{self, CheckpointArgs};
-use super::report::{Report, lines, progress};
-use super::views::{Shot, ViewArgs};
-use crate::offline;
-use crate::renderer::{GpuCapture, Headless};
-use crate::view::{Background, Picture, View};
-use image::codecs::png::PngEncoder;
-use rayon::prelude::*;
+use super::interrupt::whole;
+use super::progress::Bars;
+use super::report::{Report, switches, switches_json};
+use super::table::lines;
+use crate::offline::engine::AdapterDescription;
+use crate::offline::orbit::Shot;
+use crate::offline::render::render_shots;
+use crate::offline::{OfflineError, write_beside, write_png};
+use crate::view::{Background, Counts, Picture, View};
 use serde_json::{Value, json};
-use std::io::{self, Write};
-use std::path::{Path, PathBuf};
-use std::sync::mpsc::{SyncSender, sync_channel};
+use std::fs;
+use std::io::Write;
+use std::path::PathBuf;
 use std::time::Instant;
-use std::{fs, thread};
-
-/// Pictures drawn but not yet written, at most.
-const QUEUE: usize = 4;
 
 /// Draw views of a scene as PNG files.
 ///
@@ -54,12 +50,6 @@ pub struct Render {
     checkpoint: CheckpointArgs,
 }
 
-/// What is drawn, apart from the view.
-struct Subject<'a> {
-    capture: &'a GpuCapture,
-    background: Background,
-}
-
 impl Render {
     /// Draws and writes.
     pub fn run(&self) -> Result<Report, Failure> {
@@ -70,20 +60,26 @@ impl Render {
         let mut headless = self.gpu.open()?;
         let capture = headless.upload(&scene)?;
         let background = self.checkpoint.background.map_or(scene.trained_background(), Background::Color);
-        let views: Vec<(&Shot, View)> = shots.iter().map(|shot| (shot, shot.view(&scene))).collect();
-        let mut text = lines(&opening::switches(&scene.trained_with, &scene.playback));
-        let switches = opening::switches_json(&scene.trained_with, &scene.playback);
+        let with_view = |shot: Shot| {
+            let view = shot.view(&scene);
+            (shot, view)
+        };
+        let views: Vec<(Shot, View)> = shots.into_iter().map(with_view).collect();
+        let mut text = lines(&switches(&scene.trained_with, &scene.playback));
+        let switches = switches_json(&scene.trained_with, &scene.playback);
         drop(scene);
 
         let start = Instant::now();
-        let frames = self.draw_all(&mut headless, &Subject { capture: &capture, background }, &views)?;
+        let write = |shot: &Shot, picture: &Picture| self.write(shot, picture);
+        let counts = render_shots(&mut headless, &capture, background, &views, write, &mut Bars::default())?;
         let seconds = start.elapsed().as_secs_f64();
-        let (count, adapter) = (frames.len(), gpu::adapter_name(&headless));
+        let frames: Vec<Value> = views.iter().zip(&counts).map(|(view, counts)| self.frame(view, counts)).collect();
+        let (count, adapter) = (frames.len(), AdapterDescription::of(&headless));
         text += &format!("\n{count} pictures in {}, {seconds:.1} s on {adapter}\n", self.out.display());
         let json = json!({
             "scene": self.scene.display().to_string(),
             "out": self.out.display().to_string(),
-            "adapter": gpu::adapter_json(&headless),
+            "adapter": adapter,
             "seconds": seconds,
             "switches": switches,
             "frames": frames,
@@ -91,73 +87,27 @@ impl Render {
         Ok(Report::new(json, text))
     }
 
-    /// Draws the views in order while other threads write what is drawn.
-    fn draw_all(
-        &self,
-        headless: &mut Headless,
-        subject: &Subject<'_>,
-        views: &[(&Shot, View)],
-    ) -> Result<Vec<Value>, Failure> {
-        let (queue, drawn) = sync_channel::<(&Shot, Picture)>(QUEUE);
-        // Threads of their own: they wait for pictures, which would stall rayon's shared ones.
-        let writers = rayon::ThreadPoolBuilder::new().build()?;
-        thread::scope(|scope| {
-            let written = scope.spawn(|| {
-                let write = |(shot, picture): (&Shot, Picture)| self.write(shot, &picture);
-                writers.install(|| drawn.into_iter().par_bridge().try_for_each(write))
-            });
-            let frames = self.draw(headless, subject, views, queue);
-            let written =
-                written.join().unwrap_or_else(|_| Err(Failure::new("the threads that write pictures broke down")));
-            written.and(frames)
+    fn frame(&self, (shot, view): &(Shot, View), counts: &Counts) -> Value {
+        json!({
+            "name": shot.name,
+            "picture": self.path(shot, "png").display().to_string(),
+            "raw": self.raw.then(|| self.path(shot, "f32").display().to_string()),
+            "time": shot.time,
+            "size": view.size.to_array(),
+            "visible": counts.visible,
+            "pairs": counts.pairs,
         })
-    }
-
-    fn draw<'s>(
-        &self,
-        headless: &mut Headless,
-        subject: &Subject<'_>,
-        views: &[(&'s Shot, View)],
-        queue: SyncSender<(&'s Shot, Picture)>,
-    ) -> Result<Vec<Value>, Failure> {
-        let bar = progress(views.len(), "rendering");
-        let mut frames = Vec::with_capacity(views.len());
-        for &(shot, view) in views {
-            let frame = headless.render(subject.capture, &view, subject.background)?;
-            frames.push(json!({
-                "name": shot.name,
-                "picture": self.path(shot, "png").display().to_string(),
-                "raw": self.raw.then(|| self.path(shot, "f32").display().to_string()),
-                "time": shot.time,
-                "size": view.size.to_array(),
-                "visible": frame.counts.visible,
-                "pairs": frame.counts.pairs,
-            }));
-            if queue.send((shot, frame.picture)).is_err() {
-                // The writers stopped at an error, which they report.
-                break;
-            }
-            bar.inc(1);
-        }
-        bar.finish_and_clear();
-        Ok(frames)
     }
 
     fn path(&self, shot: &Shot, extension: &str) -> PathBuf {
         self.out.join(format!("{}.{extension}", shot.name))
     }
 
-    fn write(&self, shot: &Shot, picture: &Picture) -> Result<(), Failure> {
-        write_file(&self.path(shot, "png"), |file| {
-            picture.to_rgb8().write_with_encoder(PngEncoder::new(file)).map_err(io::Error::other)
-        })?;
+    fn write(&self, shot: &Shot, picture: &Picture) -> Result<(), OfflineError> {
+        whole(|| write_png(&self.path(shot, "png"), picture))?;
         if self.raw {
-            write_file(&self.path(shot, "f32"), |file| file.write_all(&picture.to_raw()))?;
+            whole(|| write_beside(&self.path(shot, "f32"), |file| file.write_all(&picture.to_raw())))?;
         }
         Ok(())
     }
-}
-
-fn write_file(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
-    Ok(interrupt::whole(|| offline::write_beside(path, |file| write(file)))?)
 }

@@ -2,21 +2,19 @@
 //!
 //! In: a checkpoint, cameras and times. Out: one float32 for each Gaussian, or a folder of every score.
 
-use super::contest::{Candidate, Goal, ScoreSearch, candidates};
-use super::engine::EngineArgs;
+use super::args::{CheckpointArgs, DataArgs, EngineArgs, ScoringArgs, score_choice, values};
 use super::failure::Failure;
-use super::opening::CheckpointArgs;
-use super::report::{Report, lines};
-use super::training::{self, Choice, DataArgs, ScoringArgs};
-use super::{interrupt, values};
-use crate::offline;
-use crate::offline::prune::kept_count;
+use super::interrupt;
+use super::progress::Bars;
+use super::report::Report;
+use super::table::{Table, lines};
+use crate::offline::Subject;
+use crate::offline::score::write_scores;
+use crate::offline::search::{Candidate, Goal, ScoreChoice, ScoreSearch, SearchSummary, candidates};
 use crate::scene::GaussianScene;
-use crate::view::Background;
 use serde_json::json;
 use std::fs;
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Score the Gaussians of a checkpoint by what they contribute to its training views.
@@ -39,8 +37,8 @@ pub struct Score {
     #[arg(short, long, value_name = "OUT")]
     out: PathBuf,
     /// Which score.
-    #[arg(long, value_name = "SCORE", default_value = "auto", value_parser = training::choice(true))]
-    variant: Choice,
+    #[arg(long, value_name = "SCORE", default_value = "auto", value_parser = score_choice(true))]
+    variant: ScoreChoice,
     /// Share of the Gaussians that would be removed, at which `auto` compares.
     #[arg(long, value_name = "R", default_value = "0.5", value_parser = values::share)]
     ratio: f64,
@@ -57,32 +55,35 @@ pub struct Score {
 impl Score {
     /// Scores and writes.
     pub fn run(&self) -> Result<Report, Failure> {
-        if self.variant != Choice::All && self.out.is_dir() {
+        if self.variant != ScoreChoice::All && self.out.is_dir() {
             return Err(Failure::about(&self.out, "is a folder: name a file, or give --variant all"));
         }
+        let progress = &mut Bars::default();
         let scene = self.checkpoint.load(&self.input)?;
-        let auto = self.variant == Choice::Auto;
-        let (scored, held_out) = self.scoring.share(self.data.open(&scene.trained_with)?, auto);
-        let runtime = scene.clone().into_runtime().map_err(|error| Failure::at(&self.input, &error))?;
-        let background = self.checkpoint.background.map_or(runtime.trained_background(), Background::Color);
+        let (auto, scoring) = (self.variant == ScoreChoice::Auto, self.scoring.settings());
+        let (scored, held_out) = scoring.split(self.data.open(&scene.trained_with)?, auto);
+        let subject = Subject::new(&self.input, scene, self.checkpoint.background)?;
         let mut engine = self.engine.open()?;
         let start = Instant::now();
-        let scores = self.scoring.scores(&mut engine, &scene, &runtime, background, &scored)?;
+        let scores = scoring.scores(&mut engine, &subject, &scored, progress)?;
         let seconds = start.elapsed().as_secs_f64();
+        let total = subject.scene.len();
         let mut found = candidates(self.variant, &scores)?;
-        let (mut table, mut contest) = (String::new(), None);
+        let (mut table, mut summary) = (String::new(), None);
         if auto {
-            let judge = ScoreSearch::open(&mut engine, &held_out, &runtime, background, false)?;
-            let goal = Goal::Keep(kept_count(scene.len(), self.ratio));
-            let (best, rows) = judge.best(&mut engine, &GaussianScene::from(runtime), found, goal)?;
-            table = format!("\n{}best: {}\n", judge.table(&rows), best.candidate.name);
-            contest = Some(judge.json(rows));
-            found = vec![best.candidate];
+            let Subject { runtime, background, .. } = subject;
+            let search = ScoreSearch::open(&mut engine, &held_out, &runtime, background, false, progress)?;
+            let whole = GaussianScene::from(runtime);
+            let outcome = search.best(&mut engine, &whole, found, Goal::Remove(self.ratio), progress)?;
+            let in_short = search.summary(outcome.outcomes);
+            table = format!("\n{}best: {}\n", search_table(&in_short), outcome.candidate.name);
+            summary = Some(in_short);
+            found = vec![outcome.candidate];
         }
         let files = self.write(&found)?;
         let names: Vec<&str> = found.iter().map(|candidate| candidate.name.as_str()).collect();
         let text = lines(&[
-            ("scored", format!("{} Gaussians, {} of which contribute", scene.len(), scores.contributing())),
+            ("scored", format!("{total} Gaussians, {} of which contribute", scores.contributing())),
             ("views", format!("{} in {seconds:.1} s on {}", scored.len(), engine.name())),
             ("scores", names.join(", ")),
             ("written", self.out.display().to_string()),
@@ -91,33 +92,40 @@ impl Score {
             "in": self.input.display().to_string(),
             "files": files,
             "scores": names,
-            "gaussians": scene.len(),
+            "gaussians": total,
             "contributing": scores.contributing(),
             "views": scored.len(),
             "seconds": seconds,
             "engine": engine.name(),
-            "contest": contest,
+            "contest": summary,
         });
         Ok(Report::new(json, text))
     }
 
-    /// Writes one file, or one for each in a folder; tells their paths.
+    /// Writes one file, or one for each in a folder. Returns their paths.
     fn write(&self, found: &[Candidate]) -> Result<Vec<String>, Failure> {
-        let folder = self.variant == Choice::All;
+        let folder = self.variant == ScoreChoice::All;
         if folder {
             fs::create_dir_all(&self.out).map_err(|error| Failure::at(&self.out, &error))?;
         }
         let mut files = Vec::with_capacity(found.len());
         for candidate in found {
             let path = if folder { self.out.join(format!("{}.f32", candidate.name)) } else { self.out.clone() };
-            write_scores(&path, &candidate.scores)?;
+            interrupt::whole(|| write_scores(&path, &candidate.scores))?;
             files.push(path.display().to_string());
         }
         Ok(files)
     }
 }
 
-fn write_scores(path: &Path, scores: &[f32]) -> Result<(), Failure> {
-    let bytes: Vec<u8> = scores.iter().flat_map(|score| score.to_le_bytes()).collect();
-    Ok(interrupt::whole(|| offline::write_beside(path, |file| file.write_all(&bytes)))?)
+/// One row for what pruning by each candidate gives.
+pub fn search_table(search: &SearchSummary) -> String {
+    let mut table = Table::new(&["score", "kept", "PSNR", "loss"]);
+    let decibels = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));
+    for outcome in &search.candidates {
+        let psnr = outcome.psnr.filter(|psnr| psnr.is_finite());
+        let loss = psnr.zip(search.psnr_before).map(|(psnr, before)| before - psnr);
+        table.row([outcome.score.clone(), outcome.kept.to_string(), decibels(psnr), decibels(loss)]);
+    }
+    format!("{table}dB on {} held-out training views, {}\n", search.views, search.compared_with)
 }

@@ -2,10 +2,10 @@
 //!
 //! In: a count and a seed. Out: a package in the trained form, for tests and benchmarks.
 
+use super::args::{PackageArgs, values};
 use super::failure::Failure;
-use super::opening::PackageArgs;
-use super::report::{Report, bytes, lines};
-use super::values;
+use super::report::Report;
+use super::table::{bytes, lines};
 use crate::scene::synth::{SynthSettings, synthesize};
 use serde_json::json;
 

@@ -3,6 +3,7 @@
 //! In: a codec's own error. Out: a [`CodecError`], displayed as `PATH: reason`.
 
 use super::checkpoint::CheckpointError;
+use super::format;
 use super::package::PackageError;
 use std::io;
 use std::path::PathBuf;
@@ -24,7 +25,7 @@ pub enum CodecErrorKind {
     #[error(transparent)]
     Io(#[from] io::Error),
     /// The file starts like none of the formats that can be read.
-    #[error("neither a checkpoint of the 4DGS trainer (.pth, a zip archive) nor a package (.gs4d)")]
+    #[error("{}", format::none_of_them())]
     UnknownFormat,
     /// A checkpoint that cannot be read.
     #[error(transparent)]

@@ -1,24 +1,22 @@
 //! Files and scenes.
 //!
-//! In: a path and the options for what a file does not say. Out: a [`GaussianScene`].
-//! [`checkpoint`] reads what a trainer stores (`.pth`), [`package`] reads and writes our own format (`.gs4d`).
+//! In: a path and the options for what a file does not say. Out: a [`GaussianScene`]; and back. [`format`](mod@format) is the table of
+//! formats: [`checkpoint`] reads what a trainer stores (`.pth`), [`package`] reads and writes our own format (`.gs4d`).
 
 pub mod checkpoint;
 mod error;
+pub mod format;
 pub mod package;
 
 pub use error::{CodecError, CodecErrorKind};
 
 use crate::scene::GaussianScene;
 use checkpoint::CheckpointOptions;
+use format::{FORMATS, Format};
+use package::WriteSettings;
 use std::fs::File;
-use std::io::{BufReader, Read, Seek};
+use std::io::{BufReader, Read, Seek, Write};
 use std::path::Path;
-
-/// First bytes of a zip archive that is not empty.
-const ZIP_MAGIC: [u8; 4] = *b"PK\x03\x04";
-/// Most bytes read of `cfg_args`, which has some 300.
-const CFG_ARGS_LIMIT: u64 = 1 << 16;
 
 /// Reads a capture, whichever format the file is in (its first bytes tell, not its name).
 ///
@@ -33,27 +31,27 @@ pub fn load(path: &Path, options: &CheckpointOptions) -> Result<GaussianScene, C
 
 fn load_file(path: &Path, options: &CheckpointOptions) -> Result<GaussianScene, CodecErrorKind> {
     let mut file = BufReader::new(File::open(path)?);
-    let mut magic = Vec::new();
-    file.by_ref().take(4).read_to_end(&mut magic)?;
+    let mut start = Vec::new();
+    file.by_ref().take(format::longest_magic() as u64).read_to_end(&mut start)?;
     file.rewind()?;
-    if magic == ZIP_MAGIC {
-        let cfg_args = cfg_args_beside(path);
-        Ok(checkpoint::read(file, options, cfg_args.as_deref())?)
-    } else if magic == package::MAGIC {
-        options.check()?;
-        let mut scene = package::read(file)?;
-        options.override_stored(&mut scene);
-        Ok(scene)
-    } else {
-        Err(CodecErrorKind::UnknownFormat)
-    }
+    let format = Format::of_start(&start).ok_or(CodecErrorKind::UnknownFormat)?;
+    (format.read)(path, file, options)
 }
 
-/// The text of `cfg_args` in the folder of a checkpoint. It is optional: one that cannot be read counts as absent.
-fn cfg_args_beside(path: &Path) -> Option<String> {
-    let mut text = Vec::new();
-    File::open(path.with_file_name("cfg_args")).ok()?.take(CFG_ARGS_LIMIT).read_to_end(&mut text).ok()?;
-    Some(String::from_utf8_lossy(&text).into_owned())
+/// Writes a scene in the format that the name of the file asks for; as a package if that format cannot be written, or is none.
+///
+/// # Errors
+/// A scene that the format cannot hold, and what the writer reports.
+pub fn write(
+    writer: &mut dyn Write,
+    path: &Path,
+    scene: &GaussianScene,
+    settings: &WriteSettings,
+) -> Result<(), CodecErrorKind> {
+    match FORMATS.iter().filter(|format| format.is_named(path)).find_map(|format| format.write) {
+        Some(write) => write(writer, scene, settings),
+        None => Ok(package::write(writer, scene, settings)?),
+    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! The maths of a native 4D Gaussian, on glam alone.
 //!
-//! In comes what a trainer stores ([`Parameters`], raw) and a camera in time ([`View`]); out come the runtime form ([`Gaussian`],
-//! sliced once) and, per view, the numbers of a splat: [`projection`] and [`harmonics`].
+//! In: what a trainer stores ([`Parameters`], raw) and a camera in time ([`View`](crate::view::View)). Out: the runtime form
+//! ([`Gaussian`], sliced once) and, per view, the numbers of a splat: [`projection`] and [`harmonics`], the tiles that it covers
+//! ([`overlap`]) and what it does to a pixel ([`alpha`]).
 //!
 //! A native 4D Gaussian is exactly a 3D Gaussian in straight-line motion under a Gaussian opacity envelope. With the 4D
 //! covariance `Σ = [[A, c], [cᵀ, v]]`:
@@ -12,7 +13,9 @@
 //! marginal(t) = exp(−½ (t − μ_t)²/v)        opacity is multiplied by it
 //! ```
 
+pub mod alpha;
 pub mod harmonics;
+pub mod overlap;
 mod parameters;
 pub mod projection;
 mod slice;

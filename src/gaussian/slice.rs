@@ -147,7 +147,7 @@ impl Gaussian {
     }
 }
 
-/// The unit quaternion (w, x, y, z), or nothing where the length is zero or not finite.
+/// The unit quaternion (w, x, y, z); `None` where the length is zero or not finite.
 fn unit(q: [f32; 4]) -> Option<DVec4> {
     let q = DVec4::from(q.map(f64::from));
     let length = q.length();

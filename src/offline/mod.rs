@@ -1,44 +1,68 @@
-//! The offline half: from a trained checkpoint and its training views to a small, fast capture.
+//! The offline half: from a trained checkpoint and its training views to a small, fast capture, and what it costs.
 //!
-//! In: a [`GaussianScene`], the views it was trained on, something that scores a view
-//! ([`ScoreEngine`](score::ScoreEngine)) and something that draws one ([`Draw`](loss::Draw)): the CPU twins here, or the GPU. Out: scores
-//! of the Gaussians, the scene with the best of them, and which of them are active when.
+//! In: a [`GaussianScene`], the views it was trained on, an [`Engine`](engine::Engine) that scores and draws them, on
+//! the GPU or the CPU. Out: a smaller scene, packages, pictures, measurements. Every call can be made by a build script
+//! or an editor as well as by the command: it reports its [`Progress`], and its results are data.
 //!
-//! 1. [`views`] chooses among the training views.
-//! 2. [`score`] sums what every Gaussian does to them; [`variant`] names the scores that come of it.
-//! 3. [`prune`] keeps the Gaussians that score highest; [`loss`] tells what that costs, and how many a given loss takes.
-//! 4. [`masks`] makes the temporal filter.
-//! 5. [`pack`] compresses: [`order`], [`quantize`], [`codebook`].
-//! 6. [`bake`] lets these stages take up where they left off; [`report`] says what they cost.
+//! | module | what it does |
+//! |---|---|
+//! | [`dataset`], [`splits`] | reads training and test views, chooses among them |
+//! | [`engine`] | opens the GPU or the CPU reference |
+//! | [`score`] | sums what every Gaussian contributes to the training views |
+//! | [`prune`], [`prune_by_views`] | keeps the Gaussians that score highest |
+//! | [`search`], [`quality`] | finds the best score and the smallest count that a loss allows |
+//! | [`temporal_filter`] | finds which Gaussians are active when |
+//! | [`quantize`], [`convert`] | changes the form that a scene is stored in |
+//! | [`bake`](mod@bake), [`report`] | all of it in order, resumable, with a report |
+//! | [`metrics`], [`evaluation`], [`fidelity`], [`comparison`] | measures how close pictures are |
+//! | [`ablation`] | tabulates what every score, ratio and filter costs |
+//! | [`orbit`], [`render`] | draws a scene from all around, many pictures at a time |
 
+pub mod ablation;
 pub mod bake;
+pub mod comparison;
+pub mod convert;
 pub mod dataset;
+pub mod engine;
+mod error;
+pub mod evaluation;
+pub mod fidelity;
 pub mod metrics;
+pub mod orbit;
+mod progress;
 pub mod prune;
+pub mod prune_by_views;
 pub mod quality;
 pub mod quantize;
+pub mod render;
 pub mod report;
 mod save;
 pub mod score;
+pub mod search;
+pub mod splits;
+mod subject;
 pub mod temporal_filter;
 
-pub use save::{save, write_beside};
+pub use error::OfflineError;
+pub use progress::{NoProgress, Progress};
+pub use save::{require_another_file, save, write_beside, write_png, write_settings};
+pub use subject::Subject;
 
 use crate::gaussian::{Gaussian, InvalidGaussian, SliceSettings};
-use crate::scene::{Form, GaussianScene};
+use crate::scene::{Form, GaussianScene, SceneForm, Trained};
 use std::borrow::Cow;
 
-/// The Gaussians of a scene in the runtime form, without its colour.
+/// The Gaussians of a scene in the runtime form, without its color.
 ///
 /// # Errors
 /// The first Gaussian that cannot be drawn.
 pub fn sliced(scene: &GaussianScene) -> Result<Cow<'_, [Gaussian]>, InvalidGaussian> {
     match &scene.form {
-        Form::Trained(parameters) => {
+        SceneForm::Trained(Trained { parameters, .. }) => {
             let prefilter_var = scene.trained_with.prefilter_var;
             Ok(Cow::Owned(parameters.slice(&SliceSettings { prefilter_var, ..SliceSettings::default() })?))
         }
-        Form::Runtime(gaussians) => Ok(Cow::Borrowed(gaussians)),
-        Form::Packed(packed) => Ok(Cow::Owned((0..packed.len()).map(|index| packed.gaussian(index)).collect())),
+        SceneForm::Ready(Form::Sliced(sliced)) => Ok(Cow::Borrowed(&sliced.gaussians)),
+        SceneForm::Ready(packed @ Form::Packed(_)) => Ok(Cow::Owned(packed.iter().collect())),
     }
 }

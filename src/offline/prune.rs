@@ -1,10 +1,10 @@
 //! Pruning: the scene with the Gaussians that score highest.
 //!
-//! In: a scene of either form and a score for each Gaussian. Out: the scene with some of them, in their old order, with their colour
-//! and their part of the temporal filter.
+//! In: a scene of either form and a score for each Gaussian. Out: the scene with some of them, in their old order, with
+//! their colour and their part of the temporal filter.
 
 use crate::gaussian::{Harmonics, Parameters};
-use crate::scene::{Form, GaussianScene};
+use crate::scene::{Form, GaussianScene, SceneForm, Sliced, Trained};
 
 /// How many of `count` Gaussians are left when this share of them (0 to 1) is removed: `round((1 − ratio) count)`.
 pub fn kept_count(count: usize, ratio: f64) -> usize {
@@ -21,17 +21,22 @@ pub fn highest(scores: &[f32], count: usize) -> Vec<u32> {
     order
 }
 
-/// The scene with only the Gaussians at these indices, in this order; a packed one comes back in the runtime form. The indices must
-/// be below the scene's length.
+/// The scene with only the Gaussians at these indices, in this order; a packed one comes back in the runtime form. The
+/// indices must be below the scene's length.
 pub fn select(scene: &GaussianScene, keep: &[u32]) -> GaussianScene {
     let form = match &scene.form {
-        Form::Packed(_) => return select(&scene.clone().unpacked(), keep),
-        Form::Trained(parameters) => Form::Trained(select_parameters(parameters, keep)),
-        Form::Runtime(gaussians) => Form::Runtime(rows(gaussians, keep)),
+        SceneForm::Trained(Trained { parameters, harmonics }) => SceneForm::Trained(Trained {
+            parameters: select_parameters(parameters, keep),
+            harmonics: select_harmonics(harmonics, keep),
+        }),
+        SceneForm::Ready(Form::Sliced(Sliced { gaussians, harmonics })) => SceneForm::Ready(Form::Sliced(Sliced {
+            gaussians: rows(gaussians, keep),
+            harmonics: select_harmonics(harmonics, keep),
+        })),
+        SceneForm::Ready(Form::Packed(_)) => return select(&scene.clone().unpacked(), keep),
     };
     GaussianScene {
         form,
-        harmonics: select_harmonics(&scene.harmonics, keep),
         environment: scene.environment.clone(),
         filter: scene.filter.as_ref().map(|filter| filter.select(keep)),
         trained_with: scene.trained_with.clone(),

@@ -1,69 +1,18 @@
 //! What pruning costs: PSNR on training views held out from scoring, and the smallest count that a loss allows.
 //!
-//! In: views with the pictures they should show ([`Evaluator`]) and something that draws ([`Draw`]). Out: decibels of a pruned scene; the
-//! smallest count within a loss, with every count tried.
+//! In: views with the pictures they should show ([`Evaluator`]) and an [`Engine`] that draws them. Out: PSNR of a
+//! pruned scene in dB; the smallest count within a loss, with every count tried ([`Trial`]).
 
+use super::OfflineError;
 use super::dataset::selection::to_draw;
 use super::dataset::{DatasetError, ImageMode, TrainingView};
-use super::metrics::{self, SizeMismatch};
+use super::engine::Engine;
+use super::metrics;
 use super::prune::{highest, select};
-use crate::gaussian::InvalidGaussian;
-use crate::reference;
 use crate::scene::{GaussianScene, RuntimeScene, TrainedWith};
 use crate::view::{Background, Picture, View};
 use rayon::prelude::*;
-use std::error::Error;
-
-/// Something that draws views of a scene: the CPU twin or the GPU.
-pub trait Draw {
-    /// Draws the views in order and hands over each picture with its number.
-    ///
-    /// # Errors
-    /// Whatever keeps it from drawing.
-    fn draw(
-        &mut self,
-        scene: &RuntimeScene,
-        views: &[View],
-        background: Background,
-        each: &mut dyn FnMut(usize, Picture),
-    ) -> Result<(), Box<dyn Error + Send + Sync>>;
-}
-
-/// The CPU twin.
-#[derive(Debug, Clone, Copy)]
-pub struct CpuDraw;
-
-impl Draw for CpuDraw {
-    fn draw(
-        &mut self,
-        scene: &RuntimeScene,
-        views: &[View],
-        background: Background,
-        each: &mut dyn FnMut(usize, Picture),
-    ) -> Result<(), Box<dyn Error + Send + Sync>> {
-        for (number, view) in views.iter().enumerate() {
-            each(number, reference::render(scene, view, background).picture);
-        }
-        Ok(())
-    }
-}
-
-/// Why a loss cannot be told.
-#[derive(Debug, thiserror::Error)]
-pub enum LossError {
-    /// The images of the views cannot be used.
-    #[error(transparent)]
-    Dataset(#[from] DatasetError),
-    /// The scene cannot be drawn.
-    #[error(transparent)]
-    Invalid(#[from] InvalidGaussian),
-    /// The engine failed.
-    #[error("{0}")]
-    Draw(#[source] Box<dyn Error + Send + Sync>),
-    /// A picture has another size than the image it is compared with.
-    #[error(transparent)]
-    Size(#[from] SizeMismatch),
-}
+use serde::Serialize;
 
 /// Views, and what they should show.
 #[derive(Debug)]
@@ -82,7 +31,7 @@ impl Evaluator {
         views: &[TrainingView],
         trained_with: &TrainedWith,
         background: Background,
-    ) -> Result<Self, LossError> {
+    ) -> Result<Self, DatasetError> {
         let behind = match background {
             Background::Color(color) => color,
             Background::None | Background::Environment => trained_with.background,
@@ -97,15 +46,15 @@ impl Evaluator {
     /// # Errors
     /// The engine's.
     pub fn by_scene(
-        views: &[TrainingView],
+        engine: &mut Engine,
         scene: &RuntimeScene,
+        views: &[TrainingView],
         background: Background,
-        draw: &mut dyn Draw,
-    ) -> Result<Self, LossError> {
+    ) -> Result<Self, OfflineError> {
         let views = to_draw(views, scene.trained_with.raster_fov);
-        let mut truth = Vec::with_capacity(views.len());
-        let keep = &mut |_: usize, picture: Picture| truth.push(picture.clamped());
-        draw.draw(scene, &views, background, keep).map_err(LossError::Draw)?;
+        let mut drawing = engine.drawing(scene, background)?;
+        let clamped = |view: &View| drawing.draw(view).map(|picture| picture.clamped());
+        let truth = views.iter().map(clamped).collect::<Result<Vec<_>, _>>()?;
         Ok(Self { views, truth, background })
     }
 
@@ -118,33 +67,32 @@ impl Evaluator {
     ///
     /// # Errors
     /// The engine's, or a picture of the wrong size.
-    pub fn psnr(&self, draw: &mut dyn Draw, scene: &RuntimeScene) -> Result<f64, LossError> {
-        let mut results = Vec::with_capacity(self.views.len());
-        let judge = &mut |number: usize, picture: Picture| {
-            results.push(metrics::psnr(&picture.clamped(), &self.truth[number]));
-        };
-        draw.draw(scene, &self.views, self.background, judge).map_err(LossError::Draw)?;
-        let total = results.into_iter().sum::<Result<f64, SizeMismatch>>()?;
+    pub fn psnr(&self, engine: &mut Engine, scene: &RuntimeScene) -> Result<f64, OfflineError> {
+        let mut drawing = engine.drawing(scene, self.background)?;
+        let mut total = 0.0;
+        for (view, truth) in self.views.iter().zip(&self.truth) {
+            total += metrics::psnr(&drawing.draw(view)?.clamped(), truth)?;
+        }
         Ok(total / self.views.len() as f64)
     }
 
-    /// As [`psnr`](Self::psnr), of the `count` Gaussians that score highest. Slicing takes time: give the runtime form.
+    /// As [`psnr`](Self::psnr), of the `count` Gaussians that score highest. Slicing takes time: pass the runtime form.
     ///
     /// # Errors
     /// As [`psnr`](Self::psnr).
     pub fn psnr_of_highest(
         &self,
-        draw: &mut dyn Draw,
+        engine: &mut Engine,
         scene: &GaussianScene,
         scores: &[f32],
         count: usize,
-    ) -> Result<f64, LossError> {
-        self.psnr(draw, &select(scene, &highest(scores, count)).into_runtime()?)
+    ) -> Result<f64, OfflineError> {
+        self.psnr(engine, &select(scene, &highest(scores, count)).into_runtime()?)
     }
 }
 
 /// A count that was tried.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Trial {
     /// Number of Gaussians kept.
     pub count: usize,
@@ -152,11 +100,11 @@ pub struct Trial {
     pub psnr: f64,
 }
 
-/// The smallest of `total` counts whose PSNR stays at or above `floor`, and every count tried, in order. Halves the range until it is
-/// one fivehundredth of `total`; keeping everything is taken to be good enough.
+/// The smallest of `total` counts whose PSNR stays at or above `floor`, and every count tried, in order. Halves the
+/// range until it is one fivehundredth of `total`; keeping everything is taken to be good enough.
 ///
 /// # Errors
-/// Those of `measure`, which tells the PSNR of a count.
+/// Those of `measure`, which returns the PSNR of a count.
 pub fn smallest_count<E>(
     total: usize,
     floor: f64,

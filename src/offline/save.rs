@@ -1,24 +1,57 @@
 //! Writing files whole or not at all.
 //!
-//! In: a path and what to write. Out: the file, which takes the place of what was there only once it is complete.
+//! In: a path and what to write: a scene, a picture, anything else. Out: the file, which takes the place of what was
+//! there only once it is complete.
 
-use crate::codec::package::{self, WriteSettings};
-use crate::codec::{CodecError, CodecErrorKind};
-use crate::scene::GaussianScene;
+use super::OfflineError;
+use crate::codec::package::WriteSettings;
+use crate::codec::{self, CodecError, CodecErrorKind};
+use crate::scene::{Form, GaussianScene, SceneForm};
+use crate::view::Picture;
+use image::codecs::png::PngEncoder;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Writes a scene as a package, through [`write_beside`].
+/// Writes a scene in the format of the path's extension ([`codec::write`]), through [`write_beside`].
 ///
 /// # Errors
 /// A scene that the format cannot hold, a folder that cannot be written to, a full disk.
 pub fn save(path: &Path, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), CodecError> {
-    write_beside(path, |writer| package::write(writer, scene, settings))
+    write_beside(path, |writer| codec::write(writer, path, scene, settings))
 }
 
-/// Writes a file whole or not at all: `write` fills a temporary file in the same folder, which then takes the place of `path`.
-/// If anything fails, or the program ends on the way, what was at `path` before is still there.
+/// How a scene of this form is written: at the zstd level given (1 to 19), else at the usual one of the form.
+pub fn write_settings(form: &SceneForm, level: Option<i32>) -> WriteSettings {
+    let usual = match form {
+        // A tenth of the bytes for seconds of time.
+        SceneForm::Ready(Form::Packed(_)) => 19,
+        SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_)) => WriteSettings::default().level,
+    };
+    WriteSettings { level: level.unwrap_or(usual) }
+}
+
+/// Checks that two paths do not lead to the same file, which would be overwritten while it is still needed.
+///
+/// # Errors
+/// They do.
+pub fn require_another_file(input: &Path, out: &Path) -> Result<(), OfflineError> {
+    match (input.canonicalize(), out.canonicalize()) {
+        (Ok(a), Ok(b)) if a == b => Err(OfflineError::at(out, "is the input itself: write to another file")),
+        _ => Ok(()),
+    }
+}
+
+/// Writes a picture as an 8-bit PNG file, through [`write_beside`].
+///
+/// # Errors
+/// A folder that cannot be written to, a full disk.
+pub fn write_png(path: &Path, picture: &Picture) -> Result<(), CodecError> {
+    write_beside(path, |file| picture.to_rgb8().write_with_encoder(PngEncoder::new(file)).map_err(io::Error::other))
+}
+
+/// Writes a file whole or not at all: `write` fills a temporary file in the same folder, which then takes the place of
+/// `path`. If anything fails, or the program ends on the way, what was at `path` before is still there.
 ///
 /// Devices and pipes are written to directly.
 ///

@@ -1,11 +1,86 @@
-//! Masks: which Gaussians are seen when, and the temporal filters made of them.
+//! Temporal filters of any kind, and the masks they are made of: which Gaussians are seen when.
 //!
-//! In: a [`ScoreEngine`], training cameras and views. Out: sets of Gaussians at key-frames, 32 to a word, and a [`TemporalFilter`]. The
-//! third kind, `support`, needs no views: [`TemporalFilter::support`].
+//! In: a scene, a kind of filter, key-frames, training cameras and views, an [`Engine`]. Out: a [`TemporalFilter`]. On
+//! the way, masks: sets of Gaussians at key-frames, 32 to a word.
 
+use super::dataset::TrainingView;
+use super::dataset::selection::{distinct_cameras, distinct_times, to_draw};
+use super::engine::Engine;
 use super::score::{ScoreEngine, ScoreError, Want};
-use crate::scene::{FilterKind, TemporalFilter};
+use super::{OfflineError, Progress, sliced};
+use crate::scene::{FilterKind, GaussianScene, TemporalFilter};
 use crate::view::{Camera, RasterFov, View};
+
+/// Every kind of filter with its name.
+pub const FILTER_NAMES: [(&str, FilterKind); 3] =
+    [("support", FilterKind::Support), ("interval", FilterKind::Interval), ("key-frame", FilterKind::KeyFrame)];
+
+/// The name of a kind.
+pub fn filter_name(kind: FilterKind) -> &'static str {
+    FILTER_NAMES.iter().find(|(_, other)| *other == kind).map_or("support", |(name, _)| name)
+}
+
+/// Whether a kind of filter is made of what training views see; the others need the Gaussians alone.
+pub fn needs_views(kind: FilterKind) -> bool {
+    kind != FilterKind::Support
+}
+
+/// How many key-frames a filter has, evenly over the time interval, both ends included.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum KeyFrames {
+    /// This many.
+    Count(u32),
+    /// One every so many of the training data's timestamps.
+    Every(usize),
+}
+
+impl Default for KeyFrames {
+    fn default() -> Self {
+        Self::Count(11)
+    }
+}
+
+impl KeyFrames {
+    /// Their number, given the training views. It may be more than a filter can have.
+    pub fn count(self, views: &[TrainingView]) -> usize {
+        match self {
+            Self::Count(count) => count as usize,
+            Self::Every(frames) => keys_every(distinct_times(views), frames),
+        }
+    }
+}
+
+/// Makes a filter of any kind with `keys` key-frames, two at least. Kinds that need views begin the task "looking".
+///
+/// # Errors
+/// A scene that cannot be drawn; for kinds that need views also views that show nothing of it, a failure of the engine.
+pub fn filter(
+    engine: &mut Engine,
+    scene: &GaussianScene,
+    kind: FilterKind,
+    keys: u32,
+    views: &[TrainingView],
+    progress: &mut dyn Progress,
+) -> Result<TemporalFilter, OfflineError> {
+    let (interval, raster_fov) = (scene.trained_with.time_interval, scene.trained_with.raster_fov);
+    if !needs_views(kind) {
+        let gaussians = sliced(scene)?;
+        return Ok(TemporalFilter::support(gaussians.iter().copied(), interval, keys.max(2) - 1));
+    }
+    let runtime = GaussianScene { filter: None, ..scene.clone() }.into_runtime()?;
+    let (times, cameras, count) = (key_times(interval, keys), distinct_cameras(views), scene.len());
+    let inside = if kind == FilterKind::Interval { views.len() } else { 0 };
+    let mut scorer = engine.scorer(&runtime, runtime.trained_background())?;
+    progress.begin("looking", times.len() * cameras.len() + inside);
+    let masks = key_frame_masks(scorer.as_mut(), &cameras, raster_fov, &times, count, progress)?;
+    let filter = if kind == FilterKind::Interval {
+        interval_filter(scorer.as_mut(), &masks, &to_draw(views, raster_fov), interval, count, progress)?
+    } else {
+        key_frame_filter(&masks, count)
+    };
+    progress.finish();
+    Ok(filter)
+}
 
 /// A set of Gaussians: Gaussian `i` at bit `i % 32` of word `i / 32`.
 pub type Mask = Vec<u32>;
@@ -36,8 +111,8 @@ pub fn add_blended(engine: &mut dyn ScoreEngine, view: &View, mask: &mut [u32]) 
     Ok(())
 }
 
-/// One mask for each key-frame: what any of the cameras blends at that time. `count` is the number of Gaussians; `drawn` is called after
-/// each view.
+/// One mask for each key-frame: what any of the cameras blends at that time. `count` is the number of Gaussians.
+/// Advances the caller's task once for each view.
 ///
 /// # Errors
 /// No cameras, nothing seen by any of them at any time, a failure of the engine.
@@ -47,7 +122,7 @@ pub fn key_frame_masks(
     raster_fov: RasterFov,
     times: &[f32],
     count: usize,
-    mut drawn: impl FnMut(),
+    progress: &mut dyn Progress,
 ) -> Result<Vec<Mask>, ScoreError> {
     if cameras.is_empty() {
         return Err(ScoreError::NoViews);
@@ -56,7 +131,7 @@ pub fn key_frame_masks(
     for (mask, &time) in masks.iter_mut().zip(times) {
         for camera in cameras {
             add_blended(engine, &camera.view(time, raster_fov), mask)?;
-            drawn();
+            progress.advance();
         }
     }
     if masks.iter().flatten().all(|&word| word == 0) {
@@ -70,7 +145,8 @@ pub fn key_frame_filter(masks: &[Mask], count: usize) -> TemporalFilter {
     from_segments(FilterKind::KeyFrame, &unions(masks), count)
 }
 
-/// The key-frame filter, and in each segment what any of the views whose time lies in it blends. `drawn` is called after each view.
+/// The key-frame filter, and in each segment what any of the views whose time lies in it blends. Advances the caller's
+/// task once for each view.
 ///
 /// # Errors
 /// The engine's.
@@ -80,14 +156,14 @@ pub fn interval_filter(
     views: &[View],
     interval: [f32; 2],
     count: usize,
-    mut drawn: impl FnMut(),
+    progress: &mut dyn Progress,
 ) -> Result<TemporalFilter, ScoreError> {
     let mut segments = unions(masks);
     let ends = from_segments(FilterKind::Interval, &segments, count);
     for view in views {
         let segment = ends.segment_of(view.time, interval) as usize;
         add_blended(engine, view, &mut segments[segment])?;
-        drawn();
+        progress.advance();
     }
     Ok(from_segments(FilterKind::Interval, &segments, count))
 }

@@ -1,15 +1,17 @@
 //! The plugin that a game adds.
 //!
-//! In: an app with Bevy's `DefaultPlugins` (or at least its `AssetPlugin`). Out: the same app, in which captures load, play and, where
-//! there is a renderer, are drawn.
+//! In: an app with Bevy's `DefaultPlugins` (or at least its `AssetPlugin`). Out: the same app, in which captures load, play and, if it
+//! has a renderer, are drawn.
 
 use super::asset::CaptureAssetPlugin;
 use super::playback::PlaybackPlugin;
 use super::render::CaptureRenderPlugin;
 use bevy::app::{App, Plugin};
 
-/// Loads, plays and draws captures. Add it after `DefaultPlugins`; spawn
-/// [`GaussianCapture3d`](super::component::GaussianCapture3d)s; there is nothing to set on cameras.
+/// Loads, plays and draws captures. Add it after `DefaultPlugins`, and spawn [`GaussianCapture3d`](crate::GaussianCapture3d)s. Cameras
+/// need no component for captures.
+///
+/// # Examples
 ///
 /// ```no_run
 /// use bevy::prelude::*;

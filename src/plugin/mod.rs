@@ -1,12 +1,22 @@
-//! Captures in a Bevy app: everything that knows Bevy.
+//! Captures in a Bevy app: everything that uses Bevy.
 //!
-//! In: an app with Bevy's `DefaultPlugins`, or at least its `AssetPlugin`. Out: the same app, in which captures load ([`asset`]), play
-//! ([`playback`]), are drawn ([`render`]), can be picked ([`picking`]) and be seen with two eyes ([`stereo`]). The crate root re-exports
-//! each of these modules. Inside they build on each other in this order:
+//! In: an app with Bevy's `DefaultPlugins`, or at least its `AssetPlugin`. Out: the same app, in which captures load, play and are drawn.
+//! The crate root re-exports these modules. Each uses only modules before it:
 //!
 //! ```text
 //! component ──▶ asset ──▶ playback ──▶ render ──▶ picking, stereo ──▶ inspector, testing
 //! ```
+//!
+//! * [`component`]: the capture asset, and the component that places it in the world
+//! * [`asset`]: loading and saving captures, and the state of loading on each entity
+//! * [`playback`]: the time of each capture; shared clocks and timelines
+//! * [`render`]: drawing captures into the targets of cameras, and their settings
+//! * [`picking`]: the Gaussian that a ray hits
+//! * [`stereo`]: two eyes on one head
+//! * `inspector` (feature `inspector`): a panel that shows and edits captures
+//! * `testing` (feature `testing`): apps without a window, drawn into pictures
+//!
+//! [`GaussianCapturePlugin`] adds the first four to an app. Picking needs no plugin; stereo and the inspector have their own.
 
 pub mod asset;
 mod capture_plugin;

@@ -1,8 +1,9 @@
-//! `bin` and `ranges`: splat–tile pairs and where each tile's begin, twins of `shaders/bin.wgsl` and `shaders/ranges.wgsl`.
+//! `bin` and `ranges`: splat–tile pairs and where each tile's begin; CPU reference of `shaders/bin.wgsl` and `shaders/ranges.wgsl`.
 //!
 //! In: splats and their order by depth. Out: [`Pair`]s in that order; and, from sorted pairs, one range for each tile.
 
 use super::Splat;
+use crate::gaussian::overlap::tile_index;
 use glam::UVec2;
 use std::ops::Range;
 
@@ -15,20 +16,19 @@ pub struct Pair {
     pub splat: u32,
 }
 
-/// Makes the pairs of every visible splat, in the order given; the tiles of a splat row by row.
-pub fn bin(splats: &[Splat], order: &[u32], tiles: UVec2) -> Vec<Pair> {
-    let mut pairs = Vec::with_capacity(order.iter().map(|&i| splats[i as usize].tile_count() as usize).sum());
+/// Makes the pairs of every visible splat, in the order given; the tiles of a splat row by row. `grid` is the number of tiles across and
+/// down.
+pub fn bin(splats: &[Splat], order: &[u32], grid: UVec2) -> Vec<Pair> {
+    let mut pairs = Vec::with_capacity(order.iter().map(|&i| splats[i as usize].tiles.count() as usize).sum());
     for &splat in order {
-        let bounds = splats[splat as usize].tiles;
-        for y in bounds.y..bounds.w {
-            pairs.extend((bounds.x..bounds.z).map(|x| Pair { tile: y * tiles.x + x, splat }));
-        }
+        let tiles = splats[splat as usize].tiles.tiles();
+        pairs.extend(tiles.map(|tile| Pair { tile: tile_index(tile, grid), splat }));
     }
     pairs
 }
 
-/// The range of every tile in pairs sorted by tile.
-pub fn ranges(pairs: &[Pair], tiles: UVec2) -> Vec<Range<usize>> {
+/// The range of every tile of a grid in pairs sorted by tile.
+pub fn ranges(pairs: &[Pair], grid: UVec2) -> Vec<Range<usize>> {
     let first = |tile: u32| pairs.partition_point(|pair| pair.tile < tile);
-    (0..tiles.x * tiles.y).map(|tile| first(tile)..first(tile + 1)).collect()
+    (0..grid.element_product()).map(|tile| first(tile)..first(tile + 1)).collect()
 }

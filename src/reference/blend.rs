@@ -1,12 +1,13 @@
-//! `blend`: front to back over each tile, twin of `shaders/blend.wgsl`. Section 3.4 of the 4DGS model.
+//! `blend`: front to back over each tile; CPU reference of `shaders/blend.wgsl`. Section 3.4 of the 4DGS model.
 //!
 //! In: splats, sorted pairs and tile ranges, the background. Out: the [`Frame`].
 
 use super::{Pair, Splat};
-use crate::gaussian::projection::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
+use crate::gaussian::alpha::{BlendStep, blend_step};
+use crate::gaussian::overlap::tile_index;
 use crate::scene::Environment;
 use crate::view::{Appearance, Background, BlendSpace, Counts, Frame, Picture, TILE_SIZE, View};
-use glam::Vec3;
+use glam::{UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -27,7 +28,7 @@ pub fn blend(
         .into_par_iter()
         .map(|i| {
             let (x, y) = (i % size.x, i / size.x);
-            let tile = (y / TILE_SIZE) * tiles.x + x / TILE_SIZE;
+            let tile = tile_index(UVec2::new(x, y) / TILE_SIZE, tiles);
             let mut pixel = blend_pixel(splats, &pairs[ranges[tile as usize].clone()], x, y);
             pixel.color += pixel.transmittance * behind(view, background, environment, space, x, y);
             pixel
@@ -74,27 +75,19 @@ fn blend_pixel(splats: &[Splat], pairs: &[Pair], x: u32, y: u32) -> Pixel {
     let mut pixel = Pixel { color: Vec3::ZERO, transmittance: 1.0, depth: 0.0, median_depth: 0.0 };
     for pair in pairs {
         let splat = &splats[pair.splat as usize];
-        let (dx, dy) = (splat.center.x - x as f32, splat.center.y - y as f32);
-        let conic = splat.conic;
-        let power = -0.5 * (conic.x * dx * dx + conic.z * dy * dy) - conic.y * dx * dy;
-        if power > 0.0 {
-            continue;
+        let offset = splat.center - Vec2::new(x as f32, y as f32);
+        match blend_step(splat.conic, splat.opacity, offset, pixel.transmittance) {
+            BlendStep::Skip => {}
+            BlendStep::Stop => break,
+            BlendStep::Blend { weight, transmittance } => {
+                pixel.color += splat.color * weight;
+                pixel.depth += splat.depth * weight;
+                if pixel.transmittance > 0.5 && transmittance <= 0.5 {
+                    pixel.median_depth = splat.depth;
+                }
+                pixel.transmittance = transmittance;
+            }
         }
-        let alpha = (splat.opacity * power.exp()).min(ALPHA_MAX);
-        if alpha < ALPHA_MIN {
-            continue;
-        }
-        let left = pixel.transmittance * (1.0 - alpha);
-        if left < TRANSMITTANCE_MIN {
-            break;
-        }
-        let weight = alpha * pixel.transmittance;
-        pixel.color += splat.color * weight;
-        pixel.depth += splat.depth * weight;
-        if pixel.transmittance > 0.5 && left <= 0.5 {
-            pixel.median_depth = splat.depth;
-        }
-        pixel.transmittance = left;
     }
     pixel
 }

@@ -1,13 +1,15 @@
-//! The CPU twin of every GPU pass, with the same names and in the same order.
+//! The CPU reference of every GPU pass of a frame, with the same names and in the same order.
 //!
-//! In: [`Layer`]s and a [`Background`]. Out: a [`Frame`]. Plain functions over slices, to be laid beside
-//! `shaders/`: [`project()`], [`sort`], [`bin`], `sort` again, [`ranges`], [`blend`]; or [`score()`] in place of the last.
+//! In: [`Layer`]s and a [`Background`]. Out: a [`Frame`]. Plain functions over slices, to be read beside `shaders/`: [`activate()`],
+//! [`project()`], [`sort`], [`bin`], `sort` again, [`ranges`], [`blend`].
 
+mod activate;
 mod bin;
 mod blend;
 mod project;
 mod sort;
 
+pub use activate::activate;
 pub use bin::{Pair, bin, ranges};
 pub use blend::{behind, blend};
 pub use project::{Splat, project};
@@ -17,14 +19,14 @@ use crate::scene::RuntimeScene;
 use crate::view::{Appearance, Background, BlendSpace, Counts, Frame, View};
 use std::ops::Range;
 
-/// A scene in a view, with the look it has there.
+/// A scene in a view, as it is shown there.
 #[derive(Debug, Clone, Copy)]
 pub struct Layer<'a> {
     /// The scene.
     pub scene: &'a RuntimeScene,
     /// Where it is seen from, and when.
     pub view: View,
-    /// How it looks.
+    /// How it is shown.
     pub appearance: Appearance,
 }
 

@@ -1,11 +1,13 @@
-//! `project`: Gaussians to splats, twin of `shaders/project.wgsl`.
+//! `project`: Gaussians to splats; CPU reference of `shaders/project.wgsl`.
 //!
 //! In: a [`Layer`] and the blend space. Out: one [`Splat`] for each Gaussian, invisible where it is not drawn.
 
-use super::Layer;
-use crate::gaussian::{ShDirection, projection};
+use super::{Layer, activate};
+use crate::gaussian::ShDirection;
+use crate::gaussian::overlap::{TileRect, contributing_tiles};
+use crate::gaussian::projection::project_with;
 use crate::view::BlendSpace;
-use glam::{UVec4, Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 /// A Gaussian sliced at a time and projected to a view.
@@ -21,8 +23,8 @@ pub struct Splat {
     pub color: Vec3,
     /// Depth in camera units.
     pub depth: f32,
-    /// Tiles where it can contribute: x0, y0, x1, y1, ends excluded.
-    pub tiles: UVec4,
+    /// Tiles where it can contribute.
+    pub tiles: TileRect,
 }
 
 impl Splat {
@@ -32,17 +34,12 @@ impl Splat {
         opacity: 0.0,
         color: Vec3::ZERO,
         depth: f32::INFINITY,
-        tiles: UVec4::ZERO,
+        tiles: TileRect::EMPTY,
     };
 
     /// Whether it touches a tile at all.
     pub fn is_visible(&self) -> bool {
-        self.tile_count() > 0
-    }
-
-    /// Number of tiles it touches.
-    pub fn tile_count(&self) -> u32 {
-        self.tiles.z.saturating_sub(self.tiles.x) * self.tiles.w.saturating_sub(self.tiles.y)
+        !self.tiles.is_empty()
     }
 }
 
@@ -50,21 +47,25 @@ impl Splat {
 pub fn project(layer: &Layer<'_>, space: BlendSpace) -> Vec<Splat> {
     let Layer { scene, view, .. } = layer;
     let clip = view.clip_rows();
-    let active =
-        scene.filter.as_ref().map(|filter| (filter, filter.segment_of(view.time, scene.trained_with.time_interval)));
-    let is_active = |i| active.is_none_or(|(filter, segment)| filter.is_active(segment, i));
-    let one = |i| if is_active(i) { project_one(layer, i, space, &clip) } else { Splat::INVISIBLE };
-    (0..scene.len()).into_par_iter().map(one).collect()
+    let one = |index: usize| project_one(layer, index, space, &clip);
+    let Some(filter) = &scene.filter else { return (0..scene.len()).into_par_iter().map(one).collect() };
+    let list = activate(filter, filter.segment_of(view.time, scene.trained_with.time_interval));
+    let drawn: Vec<Splat> = list.par_iter().map(|&index| one(index as usize)).collect();
+    let mut splats = vec![Splat::INVISIBLE; scene.len()];
+    for (index, splat) in list.into_iter().zip(drawn) {
+        splats[index as usize] = splat;
+    }
+    splats
 }
 
 fn project_one(layer: &Layer<'_>, index: usize, space: BlendSpace, clip: &[Vec4; 2]) -> Splat {
     let Layer { scene, view, appearance } = layer;
     let gaussian = &scene.gaussian(index);
-    let Some(projected) = projection::project_with(gaussian, view, clip) else { return Splat::INVISIBLE };
+    let Some(projected) = project_with(gaussian, view, clip) else { return Splat::INVISIBLE };
     if !appearance.shows(projected.mean) {
         return Splat::INVISIBLE;
     }
-    let projected = projection::Projected { opacity: projected.opacity * appearance.opacity, ..projected };
+    let opacity = projected.opacity * appearance.opacity;
     let seen = match scene.trained_with.sh_direction {
         ShDirection::Canonical => Vec3::from(gaussian.mean),
         ShDirection::Displaced => projected.mean,
@@ -73,9 +74,9 @@ fn project_one(layer: &Layer<'_>, index: usize, space: BlendSpace, clip: &[Vec4;
     Splat {
         center: projected.center,
         conic: projected.conic,
-        opacity: projected.opacity,
+        opacity,
         color: appearance.color(scene.color(index, view.direction_to(seen), tau), space),
         depth: projected.depth,
-        tiles: projected.contributing_tiles(),
+        tiles: contributing_tiles(projected.tiles, projected.center, projected.covariance, opacity),
     }
 }

@@ -1,4 +1,4 @@
-//! `sort`: a stable sort by an unsigned key, twin of `shaders/sort.wgsl`.
+//! `sort`: a stable sort by an unsigned key; CPU reference of `shaders/sort.wgsl`.
 //!
 //! In: items and their key. Out: the items in order; equal keys keep theirs, so that equal depths stay in Gaussian order.
 

@@ -5,10 +5,8 @@
 
 use super::capture::{Filter, GpuCapture};
 use super::layout::{Activation, BLOCK};
+use super::memory::alignment_of;
 use super::pipelines::Renderer;
-use super::statistics::note_activated;
-use crate::renderer::bind::bind_group;
-use crate::renderer::memory::{alignment_of, buffer};
 use wgpu::BufferUsages;
 
 /// Which Gaussians of a capture are drawn.
@@ -29,20 +27,21 @@ impl ActiveList {
     /// An empty list; nothing for a capture without a filter.
     pub fn new(device: &wgpu::Device, renderer: &Renderer, capture: &GpuCapture) -> Option<Self> {
         capture.filter.as_ref()?;
+        let allocator = renderer.allocator(device);
         let alignment = alignment_of::<Activation>(device);
         let count = (capture.len().max(1) as u64).next_multiple_of(u64::from(BLOCK));
         let parts = capture.parts.len().max(1) as u64;
-        let uniforms = buffer(device, "gs4d activations", parts * u64::from(alignment), BufferUsages::UNIFORM);
-        let list = buffer(device, "gs4d active list", count * 4, BufferUsages::STORAGE);
-        let blocks = buffer(device, "gs4d active blocks", count / u64::from(BLOCK) * 4, BufferUsages::STORAGE);
+        let uniforms = allocator.buffer("gs4d activations", parts * u64::from(alignment), BufferUsages::UNIFORM);
+        let list = allocator.buffer("gs4d active list", count * 4, BufferUsages::STORAGE);
+        let blocks = allocator.buffer("gs4d active blocks", count / u64::from(BLOCK) * 4, BufferUsages::STORAGE);
         let uniform = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
             buffer: &uniforms,
             offset: 0,
             size: std::num::NonZeroU64::new(size_of::<Activation>() as u64),
         });
         let resources = [uniform, list.as_entire_binding(), blocks.as_entire_binding()];
-        let activate = bind_group(device, "gs4d activate", &renderer.layouts.activate, &resources);
-        let list = bind_group(device, "gs4d active list", &renderer.layouts.active, &[list.as_entire_binding()]);
+        let activate = allocator.bind_group("gs4d activate", &renderer.layouts.activate, &resources);
+        let list = allocator.bind_group("gs4d active list", &renderer.layouts.active, &[list.as_entire_binding()]);
         Some(Self { capture: capture.id, segment: None, recorded: false, alignment, uniforms, activate, list })
     }
 
@@ -75,7 +74,7 @@ impl ActiveList {
             return;
         }
         self.recorded = true;
-        note_activated();
+        renderer.work().add_activated();
         let mut pass = encoder
             .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("gs4d activate"), timestamp_writes: None });
         for (index, part) in capture.parts.iter().enumerate() {
@@ -95,5 +94,13 @@ impl ActiveList {
     /// How many Gaussians of a part are active.
     pub(super) fn count(&self, filter: &Filter, part: usize) -> u32 {
         self.segment.map_or(0, |segment| filter.count(part, segment))
+    }
+}
+
+/// How many Gaussians of a part of a capture are drawn: those of the list if there is one, else all.
+pub(super) fn drawn_count(capture: &GpuCapture, part: usize, active: Option<&ActiveList>) -> u32 {
+    match (&capture.filter, active) {
+        (Some(filter), Some(active)) => active.count(filter, part),
+        _ => capture.parts[part].count,
     }
 }

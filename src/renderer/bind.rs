@@ -1,24 +1,28 @@
-//! Bind group layouts, bind groups and compute pipelines, each in one line.
+//! Bind group layouts and compute pipelines, each in one line.
 //!
-//! In: kinds of bindings in the order of a shader's `@binding` numbers, resources in the same order. Out: what wgpu makes of them.
+//! In: kinds of bindings in the order of a shader's `@binding` numbers; a module, its entry point and its groups. Out: wgpu layouts and
+//! pipelines.
 
-use super::note_created;
 use std::num::NonZeroU64;
 
 /// Kinds of bindings, to write layouts in one line each.
-#[derive(Clone, Copy)]
-pub(crate) enum Bind {
+#[derive(Debug, Clone, Copy)]
+pub enum Bind {
     /// Uniform buffer of this many bytes.
     Uniform(usize),
     /// The same, at an offset given with the dispatch.
     UniformAt(usize),
+    /// Storage buffer that is read.
     Read,
+    /// Storage buffer that is read and written.
     Write,
+    /// Depth texture.
     Depth,
-    /// A multisampled depth.
+    /// Multisampled depth texture.
     Depths,
-    /// A texture that is read as it is.
+    /// Float texture that is read without filtering.
     Texture,
+    /// Storage texture that is written.
     Target(wgpu::TextureFormat),
 }
 
@@ -55,7 +59,7 @@ impl Bind {
 }
 
 /// A compute pipeline over these groups.
-pub(crate) fn pipeline(
+pub fn pipeline(
     device: &wgpu::Device,
     module: &wgpu::ShaderModule,
     entry: &str,
@@ -82,23 +86,7 @@ pub(crate) fn pipeline(
 }
 
 /// A bind group layout whose bindings are numbered in order.
-pub(crate) fn group_layout(device: &wgpu::Device, label: &str, bindings: &[Bind]) -> wgpu::BindGroupLayout {
+pub fn group_layout(device: &wgpu::Device, label: &str, bindings: &[Bind]) -> wgpu::BindGroupLayout {
     let entries: Vec<_> = bindings.iter().enumerate().map(|(i, bind)| bind.entry(i as u32)).collect();
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
-}
-
-/// A bind group whose bindings are numbered in order.
-pub(crate) fn bind_group(
-    device: &wgpu::Device,
-    label: &str,
-    layout: &wgpu::BindGroupLayout,
-    resources: &[wgpu::BindingResource<'_>],
-) -> wgpu::BindGroup {
-    let entries: Vec<_> = resources
-        .iter()
-        .enumerate()
-        .map(|(i, resource)| wgpu::BindGroupEntry { binding: i as u32, resource: resource.clone() })
-        .collect();
-    note_created();
-    device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
 }

@@ -20,10 +20,10 @@ pub const DIGITS: u32 = 1 << DIGIT_BITS;
 /// Steps that order 32-bit depths.
 pub const DEPTH_STEPS: u32 = 32 / DIGIT_BITS;
 
-/// What `project` needs of one part of a capture in one view; not [`gpu::Instance`](super::Instance), which may have several parts.
+/// What `project` needs of one part of a capture in one view. An [`Instance`](super::Instance) may have several parts.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct Instance {
+pub struct InstanceUniforms {
     /// Rows of capture-to-camera: x.
     pub camera_x: [f32; 4],
     /// Row y.
@@ -113,7 +113,7 @@ pub struct Activation {
     pub segment: u32,
 }
 
-impl Instance {
+impl InstanceUniforms {
     /// The part that a view and a look decide; slots and colour are zero.
     pub fn new(view: &View, appearance: &Appearance, space: BlendSpace, debug: DebugView) -> Self {
         let m = view.world_to_camera;
@@ -146,10 +146,10 @@ impl Instance {
     }
 }
 
-/// The uniforms that all passes of a view share; not the finished [`Frame`](crate::view::Frame).
+/// What all instances of a view share.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct Frame {
+pub struct FrameUniforms {
     /// Picture size, pixels.
     pub size: [u32; 2],
     /// Tiles across and down.
@@ -239,7 +239,7 @@ pub const BACKGROUND_ENVIRONMENT: u32 = 2;
 /// A splat: a Gaussian sliced at a time and projected to a view, with its colour.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub struct Splat {
+pub struct SplatRecord {
     /// Centre in pixels.
     pub center: [f32; 2],
     /// Opacity times marginal.

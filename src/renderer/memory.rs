@@ -1,49 +1,76 @@
-//! Buffers and textures, and what a device allows of them.
+//! Buffers, textures and bind groups, and what a device allows of them.
 //!
-//! In: a device, sizes, what they are for. Out: buffers and textures; the limits that sizes are held against.
+//! In: a device, sizes, what they are for. Out: buffers, textures and bind groups, each counted; the limits that sizes are held against.
 
-use super::note_created;
+use super::work::WorkCounters;
 use glam::UVec2;
 use wgpu::{BufferUsages, TextureFormat};
 
-/// Largest storage buffer that can be made and bound whole.
-pub(crate) fn binding_limit(limits: &wgpu::Limits) -> u64 {
+/// A device on which resources are created, and where they are counted.
+#[derive(Debug, Clone, Copy)]
+pub struct Allocator<'a> {
+    /// The device.
+    pub device: &'a wgpu::Device,
+    /// Counts what is created.
+    pub work: &'a WorkCounters,
+}
+
+impl Allocator<'_> {
+    /// A buffer that can also be written through the queue.
+    pub fn buffer(self, label: &str, size: u64, usage: BufferUsages) -> wgpu::Buffer {
+        self.work.add_created();
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size,
+            usage: usage | BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    }
+
+    /// A texture that passes write and later ones read; a depth texture is only read.
+    pub fn texture(self, label: &str, size: UVec2, format: TextureFormat) -> wgpu::Texture {
+        let usage = if format == TextureFormat::Depth32Float {
+            wgpu::TextureUsages::TEXTURE_BINDING
+        } else {
+            wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC
+        };
+        self.work.add_created();
+        self.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage,
+            view_formats: &[],
+        })
+    }
+
+    /// A bind group whose bindings are numbered in order.
+    pub fn bind_group(
+        self,
+        label: &str,
+        layout: &wgpu::BindGroupLayout,
+        resources: &[wgpu::BindingResource<'_>],
+    ) -> wgpu::BindGroup {
+        let entries: Vec<_> = resources
+            .iter()
+            .enumerate()
+            .map(|(i, resource)| wgpu::BindGroupEntry { binding: i as u32, resource: resource.clone() })
+            .collect();
+        self.work.add_created();
+        self.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
+    }
+}
+
+/// Largest storage buffer that can be created and bound whole, bytes.
+pub fn binding_limit(limits: &wgpu::Limits) -> u64 {
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
 }
 
-/// Distance between uniforms that are bound at an offset.
-pub(crate) fn alignment_of<T>(device: &wgpu::Device) -> u32 {
+/// Distance between uniforms of type `T` that are bound at a dynamic offset, bytes.
+pub fn alignment_of<T>(device: &wgpu::Device) -> u32 {
     let least = device.limits().min_uniform_buffer_offset_alignment;
     least.max(size_of::<T>() as u32).next_power_of_two()
-}
-
-/// A buffer that can also be written through the queue.
-pub(crate) fn buffer(device: &wgpu::Device, label: &str, size: u64, usage: BufferUsages) -> wgpu::Buffer {
-    note_created();
-    device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(label),
-        size,
-        usage: usage | BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    })
-}
-
-/// A texture that passes write and later ones read; of depth, one that is only read.
-pub(crate) fn texture(device: &wgpu::Device, label: &str, size: UVec2, format: TextureFormat) -> wgpu::Texture {
-    let usage = if format == TextureFormat::Depth32Float {
-        wgpu::TextureUsages::TEXTURE_BINDING
-    } else {
-        wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC
-    };
-    note_created();
-    device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(label),
-        size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage,
-        view_formats: &[],
-    })
 }

@@ -19,18 +19,19 @@
 //! move than its 64-bit keys. No pass needs subgroups, and the results do not depend on their size.
 
 mod active;
-pub(crate) mod bind;
+pub mod bind;
 mod capture;
 mod device;
 mod error;
 mod headless;
 pub mod layout;
-pub(crate) mod memory;
+pub mod memory;
 mod pipelines;
 pub mod shaders;
 mod statistics;
 mod timing;
 mod view;
+mod work;
 
 pub use active::ActiveList;
 pub use capture::GpuCapture;
@@ -39,7 +40,7 @@ pub use error::GpuError;
 pub use headless::Headless;
 pub use pipelines::Renderer;
 pub use shaders::{ShaderChecks, Storage};
-pub use statistics::{ViewStatistics, activated, created, uploaded};
-pub(crate) use statistics::{note_created, note_uploaded};
+pub use statistics::ViewStatistics;
 pub use timing::{PassTime, Timings};
-pub use view::{Instance, OpaqueDepth, ViewParameters, ViewRenderer};
+pub use view::{FinishedFrame, Instance, OpaqueDepth, PassBuffers, ViewParameters, ViewRenderer};
+pub use work::WorkCounters;

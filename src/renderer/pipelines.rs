@@ -2,11 +2,12 @@
 //!
 //! In: a device. Out: compiled passes and the bind group layouts that they share with the buffers of views and captures.
 
-use super::bind::{Bind, bind_group, group_layout, pipeline};
+use super::bind::{Bind, group_layout, pipeline};
 use super::layout::CODEBOOK_SCALES;
+use super::memory::Allocator;
 use super::shaders::{MULTISAMPLED, ShaderChecks, Storage, module};
+use super::work::WorkCounters;
 use super::{GpuError, layout};
-use crate::renderer::memory::buffer;
 
 /// All pipelines and layouts.
 #[derive(Debug)]
@@ -30,6 +31,7 @@ pub struct Renderer {
     pub(super) blend_multisampled: wgpu::ComputePipeline,
     /// Stands in for a list of active Gaussians where all are drawn.
     pub(super) no_list: wgpu::BindGroup,
+    work: WorkCounters,
 }
 
 /// Bind group layouts, in the order of the shaders' bindings.
@@ -62,7 +64,9 @@ impl Renderer {
         let (sort, bin) = (shader("sort")?, shader("bin")?);
         let (ranges, blend) = (shader("ranges")?, shader("blend")?);
         let blend_multisampled = module(device, "blend", MULTISAMPLED, checks)?;
-        let no_list = buffer(device, "gs4d no active list", 4, wgpu::BufferUsages::STORAGE);
+        let work = WorkCounters::default();
+        let allocator = Allocator { device, work: &work };
+        let no_list = allocator.buffer("gs4d no active list", 4, wgpu::BufferUsages::STORAGE);
         let pipeline = |module: &wgpu::ShaderModule, entry: &str, groups: &[&wgpu::BindGroupLayout]| {
             pipeline(device, module, entry, groups)
         };
@@ -89,9 +93,25 @@ impl Renderer {
             ranges: pipeline(&ranges, "ranges", &[&layouts.ranges]),
             blend: pipeline(&blend, "blend", &[&layouts.blend]),
             blend_multisampled: pipeline(&blend_multisampled, "blend", &[&layouts.blend_multisampled]),
-            no_list: bind_group(device, "gs4d no active list", &layouts.active, &[no_list.as_entire_binding()]),
+            no_list: allocator.bind_group("gs4d no active list", &layouts.active, &[no_list.as_entire_binding()]),
             layouts,
+            work,
         })
+    }
+
+    /// The renderer with these counters in place of its own: for one that is made anew after a lost device.
+    pub fn counting(self, work: WorkCounters) -> Self {
+        Self { work, ..self }
+    }
+
+    /// What has been created, uploaded and recorded for this renderer.
+    pub fn work(&self) -> &WorkCounters {
+        &self.work
+    }
+
+    /// Creates resources of its views, its captures and its clients. The device must be the one the renderer was made on.
+    pub fn allocator<'a>(&'a self, device: &'a wgpu::Device) -> Allocator<'a> {
+        Allocator { device, work: &self.work }
     }
 
     /// `project` for captures stored this way.
@@ -107,15 +127,15 @@ impl Renderer {
         buffers: &[&wgpu::Buffer],
     ) -> wgpu::BindGroup {
         let resources: Vec<_> = buffers.iter().map(|buffer| buffer.as_entire_binding()).collect();
-        bind_group(device, "gs4d capture", &self.layouts.captures[storage as usize], &resources)
+        self.allocator(device).bind_group("gs4d capture", &self.layouts.captures[storage as usize], &resources)
     }
 }
 
 impl Layouts {
     fn new(device: &wgpu::Device) -> Self {
         use Bind::{Depth, Depths, Read, Target, Uniform, UniformAt, Write};
-        const FRAME: usize = size_of::<layout::Frame>();
-        const INSTANCE: Bind = UniformAt(size_of::<layout::Instance>());
+        const FRAME: usize = size_of::<layout::FrameUniforms>();
+        const INSTANCE: Bind = UniformAt(size_of::<layout::InstanceUniforms>());
         let new = |label, bindings: &[Bind]| group_layout(device, label, bindings);
         let blend = |depth| {
             let targets = [wgpu::TextureFormat::Rgba32Float, wgpu::TextureFormat::Rg32Float].map(Target);
@@ -126,11 +146,11 @@ impl Layouts {
             filter: new("gs4d filter", &[Read]),
             active: new("gs4d active list", &[Read]),
             project: new("gs4d project", &[INSTANCE, Write, Write]),
-            captures: [
-                new("gs4d capture", &[Read, Read]),
-                new("gs4d capture", &[Read, Read, Read]),
-                new("gs4d capture", &[Read, Read, Read, Read, Uniform(16 * CODEBOOK_SCALES)]),
-            ],
+            captures: Storage::ALL.map(|storage| match storage {
+                Storage::Sliced => new("gs4d capture", &[Read, Read]),
+                Storage::Packed => new("gs4d capture", &[Read, Read, Read]),
+                Storage::Coded => new("gs4d capture", &[Read, Read, Read, Read, Uniform(16 * CODEBOOK_SCALES)]),
+            }),
             sort: new(
                 "gs4d sort",
                 &[UniformAt(size_of::<layout::SortStep>()), Uniform(FRAME), Write, Read, Read, Write, Write, Write],

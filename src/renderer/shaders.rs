@@ -3,12 +3,16 @@
 //! In: the name of a pass. Out: a naga module, or a wgpu shader module. The files are part of the binary.
 
 use super::GpuError;
+use crate::scene::{Form, PackedColors, PackedScene};
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::borrow::Cow;
 
 /// Libraries, each before those that import it.
-const LIBRARIES: [(&str, &str); 6] = [
+const LIBRARIES: [(&str, &str); 9] = [
     ("types", include_str!("../../shaders/shared/types.wgsl")),
+    ("alpha", include_str!("../../shaders/shared/alpha.wgsl")),
+    ("tile", include_str!("../../shaders/shared/tile.wgsl")),
+    ("srgb", include_str!("../../shaders/shared/srgb.wgsl")),
     ("appearance", include_str!("../../shaders/shared/appearance.wgsl")),
     ("harmonics", include_str!("../../shaders/shared/harmonics.wgsl")),
     ("packed", include_str!("../../shaders/shared/packed.wgsl")),
@@ -42,33 +46,41 @@ pub fn pass_names() -> impl Iterator<Item = &'static str> {
     PASSES.iter().map(|(name, _)| *name)
 }
 
-/// How a capture's Gaussians and colours are stored, and so how `project` reads them.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+/// How a capture is stored, and so how `project` reads it: a [`Form`] without its values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Storage {
     /// Single precision.
-    #[default]
-    Full,
-    /// Packed records, whole colours.
+    Sliced,
+    /// Packed records, whole colors.
     Packed,
-    /// Packed records, colours by codebook.
+    /// Packed records, colors by codebook.
     Coded,
 }
 
 impl Storage {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Full, Self::Packed, Self::Coded];
+    pub const ALL: [Self; 3] = [Self::Sliced, Self::Packed, Self::Coded];
+
+    /// How a form is stored.
+    pub fn of(form: &Form) -> Self {
+        match form {
+            Form::Sliced(_) => Self::Sliced,
+            Form::Packed(PackedScene { colors: PackedColors::Whole(_), .. }) => Self::Packed,
+            Form::Packed(PackedScene { colors: PackedColors::Coded(_), .. }) => Self::Coded,
+        }
+    }
 
     /// What the shader is told.
     pub fn definitions(self) -> &'static [&'static str] {
         match self {
-            Self::Full => &[],
+            Self::Sliced => &[],
             Self::Packed => &["PACKED_GEOMETRY"],
             Self::Coded => &["PACKED_GEOMETRY", "CODED_COLORS"],
         }
     }
 }
 
-/// What `blend` is told where opaque surfaces are multisampled.
+/// The definition of `blend` for multisampled opaque depth.
 pub const MULTISAMPLED: &[&str] = &["MULTISAMPLED"];
 
 /// The naga module of a pass, imports resolved, validated, with these definitions: those of a [`Storage`] for `project`, none or
@@ -94,8 +106,11 @@ pub fn compose(name: &str, definitions: &[&str]) -> Result<wgpu::naga::Module, G
         .map_err(|error| GpuError::Shader { name, reason: error.emit_to_string(&composer) })
 }
 
-/// The shader module of a pass.
-pub(crate) fn module(
+/// The shader module of a pass, as [`compose`] puts it together.
+///
+/// # Errors
+/// As [`compose`].
+pub fn module(
     device: &wgpu::Device,
     name: &'static str,
     definitions: &[&str],

@@ -2,7 +2,7 @@
 //!
 //! In: a device that has timestamps. Out: [`Timings`]: medians over many frames, views and times.
 
-use crate::renderer::memory::buffer;
+use super::memory::Allocator;
 use crate::view::Counts;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -48,7 +48,8 @@ pub(super) struct PassTimer {
 
 impl PassTimer {
     /// A timer around frames, or between passes; nothing where the device cannot.
-    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, inside: bool) -> Option<Self> {
+    pub fn new(allocator: Allocator<'_>, queue: &wgpu::Queue, inside: bool) -> Option<Self> {
+        let device = allocator.device;
         let needed =
             if inside { wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES } else { wgpu::Features::TIMESTAMP_QUERY };
         if !device.features().contains(needed | wgpu::Features::TIMESTAMP_QUERY) {
@@ -62,7 +63,7 @@ impl PassTimer {
                 ty: wgpu::QueryType::Timestamp,
                 count,
             }),
-            resolved: buffer(device, "gs4d timestamps", u64::from(count) * 8, usage),
+            resolved: allocator.buffer("gs4d timestamps", u64::from(count) * 8, usage),
             period: f64::from(queue.get_timestamp_period()) * 1e-6,
             inside,
             next: AtomicU32::new(1),

@@ -24,7 +24,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The box that holds three standard deviations of every Gaussian wherever it is drawn within `interval`; nothing for an
+    /// The box that holds three standard deviations of every Gaussian wherever it is drawn within `interval`; `None` for an
     /// empty scene. A Gaussian that cannot be drawn ([`Gaussian::check`]) does not count.
     pub fn of(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2]) -> Option<Self> {
         BoundsOverTime::with_stretches(gaussians, interval, 1).map(|bounds| bounds.whole)
@@ -52,7 +52,7 @@ impl Bounds {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// Its centre.
+    /// Its center.
     pub fn center(self) -> Vec3 {
         (self.min + self.max) * 0.5
     }
@@ -62,13 +62,13 @@ impl Bounds {
         (self.max - self.min).length() * 0.5
     }
 
-    /// The box of `factor` times the size about the same centre.
+    /// The box of `factor` times the size about the same center.
     pub fn scaled(self, factor: f32) -> Self {
         let (center, half) = (self.center(), (self.max - self.min) * (0.5 * factor));
         Self { min: center - half, max: center + half }
     }
 
-    /// Where a ray comes in, in lengths of `direction` from `origin`: 0 if it starts inside, nothing if it passes by.
+    /// Where a ray comes in, in lengths of `direction` from `origin`: 0 if it starts inside, `None` if it passes by.
     pub fn entry(self, origin: Vec3, direction: Vec3) -> Option<f32> {
         let (mut from, mut to) = (0.0f32, f32::INFINITY);
         for axis in 0..3 {
@@ -90,14 +90,14 @@ impl Bounds {
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoundsOverTime {
     interval: [f32; 2],
-    /// One box each; nothing where nothing is drawn. At least one.
+    /// One box each; `None` where nothing is drawn. At least one stretch.
     stretches: Vec<Option<Bounds>>,
     whole: Bounds,
 }
 
 impl BoundsOverTime {
     /// The boxes that hold three standard deviations of every Gaussian wherever it is drawn, for 32 stretches of `interval` (one, if
-    /// the interval has no length); nothing for a scene of which nothing is drawn. A Gaussian that cannot be drawn
+    /// the interval has no length); `None` for a scene of which nothing is drawn. A Gaussian that cannot be drawn
     /// ([`Gaussian::check`]) does not count.
     pub fn of(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2]) -> Option<Self> {
         Self::with_stretches(gaussians, interval, TIMED_PASSES)
@@ -120,7 +120,7 @@ impl BoundsOverTime {
     }
 
     /// The box about everything that is drawn in the stretch that holds `time`, a timestamp of the capture (about both at a border);
-    /// nothing where nothing is drawn. What lies outside the interval counts as its nearer end.
+    /// `None` where nothing is drawn. What lies outside the interval counts as its nearer end.
     pub fn at(&self, time: f32) -> Option<Bounds> {
         let [start, end] = self.interval.map(f64::from);
         let place = (f64::from(time) - start) / (end - start) * self.stretches.len() as f64;
@@ -172,7 +172,7 @@ impl Extent {
         self.max = self.max.max(center + reach);
     }
 
-    /// The box, unless nothing is in it. What is farther than `f32` can say is as far as it can.
+    /// The box; `None` if nothing is in it. What is farther than `f32` can say is as far as it can.
     fn bounds(self) -> Option<Bounds> {
         let said = |corner: DVec3| corner.clamp(DVec3::splat(f32::MIN.into()), DVec3::splat(f32::MAX.into())).as_vec3();
         (self.min.x <= self.max.x).then(|| Bounds { min: said(self.min), max: said(self.max) })

@@ -1,6 +1,6 @@
 //! The environment map: what stands behind all Gaussians, on a sphere of radius 60 about the capture's origin.
 //!
-//! In: a lat-long texture from slot 17 of a checkpoint, a camera position and a ray. Out: the colour behind that pixel.
+//! In: a lat-long texture from slot 17 of a checkpoint, a camera position and a ray. Out: the color behind that pixel.
 //! Section 3.7 of the 4DGS model.
 
 use glam::Vec3;
@@ -21,7 +21,7 @@ pub struct Environment {
 }
 
 impl Environment {
-    /// Colour where the ray from `origin` along the unit vector `direction` leaves the sphere. Bilinear, black outside the
+    /// Color where the ray from `origin` along the unit vector `direction` leaves the sphere. Bilinear, black outside the
     /// texture: the seam at the ends of `u` fades, as in the original.
     pub fn sample(&self, origin: Vec3, direction: Vec3) -> Vec3 {
         let along = origin.dot(direction);

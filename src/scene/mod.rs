@@ -1,11 +1,12 @@
-//! What a capture is: Gaussians in one of two forms, colour, environment map, and how it was trained and is played.
+//! What a capture is: its Gaussians and their color, an environment map, and how it was trained and is played.
 //!
-//! In: a codec's result. Out: a [`GaussianScene`] that can be stored, or taken apart with
-//! [`into_runtime`](GaussianScene::into_runtime) for drawing.
+//! In: a codec's result. Out: a [`GaussianScene`] that can be stored, or a [`RuntimeScene`] that can be drawn, which
+//! [`into_runtime`](GaussianScene::into_runtime) makes of it. They differ in the [forms](SceneForm) that their Gaussians may have.
 
 mod bounds;
 mod environment;
 mod filter;
+mod form;
 pub mod packed;
 pub mod pick;
 mod provenance;
@@ -14,21 +15,20 @@ pub mod synth;
 pub use bounds::{Bounds, BoundsOverTime};
 pub use environment::Environment;
 pub use filter::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter, segment_of};
-pub use packed::{CodedColors, PackedScene};
+pub use form::{ColorDegrees, Form, SceneForm, Sliced, Trained};
+pub use packed::{CodedColors, PackedColors, PackedScene};
 pub use pick::{Pick, PickSettings};
 pub use provenance::{PlaybackHints, RotationConvention, TrainedCameras, TrainedWith, UpAxis};
 
-use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Model, Parameters, SliceSettings};
+use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Model, SliceSettings};
 use crate::view::Background;
 use glam::Vec3;
 
 /// A capture in memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GaussianScene {
-    /// The Gaussians, colour aside.
-    pub form: Form,
-    /// Their colour; empty where the packed form holds it.
-    pub harmonics: Harmonics,
+    /// The Gaussians and their color.
+    pub form: SceneForm,
     /// The environment map, if the capture has one.
     pub environment: Option<Environment>,
     /// Which Gaussians are active when; without one, all are.
@@ -39,26 +39,11 @@ pub struct GaussianScene {
     pub playback: PlaybackHints,
 }
 
-/// The two forms of the Gaussians of a scene.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Form {
-    /// As an optimiser stores them: can be scored, pruned and fine-tuned. Raw, capture space.
-    Trained(Parameters),
-    /// Sliced: smaller, ready to draw. Activated, capture space.
-    Runtime(Vec<Gaussian>),
-    /// Sliced and quantized: smallest, drawn as it is.
-    Packed(PackedScene),
-}
-
-/// A scene ready to draw: the runtime form and what drawing needs beside it.
+/// A scene ready to draw.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RuntimeScene {
-    /// The Gaussians, sliced; empty where they are packed.
-    pub gaussians: Vec<Gaussian>,
-    /// The Gaussians, packed.
-    pub packed: Option<PackedScene>,
-    /// Their colour; empty where the packed form holds it.
-    pub harmonics: Harmonics,
+    /// The Gaussians and their color.
+    pub form: Form,
     /// The environment map, if the capture has one.
     pub environment: Option<Environment>,
     /// Which Gaussians are active when; without one, all are.
@@ -72,37 +57,29 @@ pub struct RuntimeScene {
 impl GaussianScene {
     /// Number of Gaussians.
     pub fn len(&self) -> usize {
-        match &self.form {
-            Form::Trained(parameters) => parameters.len(),
-            Form::Runtime(gaussians) => gaussians.len(),
-            Form::Packed(packed) => packed.len(),
-        }
+        self.form.len()
     }
 
     /// Whether there is no Gaussian.
     pub fn is_empty(&self) -> bool {
-        self.len() == 0
+        self.form.is_empty()
     }
 
-    /// The model of the trained form; the others no longer tell.
+    /// The model of the trained form; `None` for the others, which no longer show it.
     pub fn model(&self) -> Option<Model> {
-        match &self.form {
-            Form::Trained(parameters) => Some(parameters.model()),
-            Form::Runtime(_) | Form::Packed(_) => None,
-        }
+        self.form.model()
     }
 
-    /// The scene with its Gaussians in the runtime form if they were packed; as it is otherwise. What packing lost stays lost.
-    pub fn unpacked(mut self) -> Self {
-        if let Form::Packed(packed) = &self.form {
-            let (gaussians, harmonics) = packed.unpack();
-            self.harmonics = harmonics.unwrap_or(self.harmonics);
-            self.form = Form::Runtime(gaussians);
-        }
-        self
+    /// The scene with its Gaussians sliced if they were packed; as it is otherwise. What packing lost stays lost.
+    pub fn unpacked(self) -> Self {
+        let form = match self.form {
+            SceneForm::Ready(Form::Packed(packed)) => SceneForm::Ready(Form::Sliced(packed.unpack())),
+            form @ (SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_))) => form,
+        };
+        Self { form, ..self }
     }
 
-    /// Slices the Gaussians (if they are not yet) and hands everything over for drawing. Colour is moved, not copied.
+    /// Slices the Gaussians (if they are not yet) and hands everything over for drawing. Color is moved, not copied.
     ///
     /// # Errors
     /// The first Gaussian that cannot be drawn.
@@ -116,29 +93,8 @@ impl GaussianScene {
     /// # Errors
     /// The first Gaussian that cannot be drawn.
     pub fn into_runtime_with(self, settings: &SliceSettings) -> Result<RuntimeScene, InvalidGaussian> {
-        let mut packed = None;
-        let gaussians = match self.form {
-            Form::Trained(parameters) => parameters.slice(settings)?,
-            Form::Packed(scene) => {
-                scene.check().map_err(|reason| InvalidGaussian { index: 0, reason })?;
-                packed = Some(scene);
-                Vec::new()
-            }
-            Form::Runtime(gaussians) => {
-                for (index, gaussian) in gaussians.iter().enumerate() {
-                    gaussian.check().map_err(|reason| InvalidGaussian { index, reason })?;
-                }
-                gaussians
-            }
-        };
-        if let Some(bad) = self.harmonics.values.iter().position(|v| !v.is_finite()) {
-            let index = bad / (self.harmonics.coefficients * 3);
-            return Err(InvalidGaussian { index, reason: "a colour coefficient that is not finite" });
-        }
         Ok(RuntimeScene {
-            gaussians,
-            packed,
-            harmonics: self.harmonics,
+            form: self.form.into_ready(settings)?,
             environment: self.environment,
             filter: self.filter,
             trained_with: self.trained_with,
@@ -148,38 +104,40 @@ impl GaussianScene {
 }
 
 impl RuntimeScene {
+    /// A scene of sliced Gaussians and their color, without an environment map and a filter, trained and played by default.
+    pub fn sliced(gaussians: Vec<Gaussian>, harmonics: Harmonics) -> Self {
+        Self {
+            form: Form::Sliced(Sliced { gaussians, harmonics }),
+            environment: None,
+            filter: None,
+            trained_with: TrainedWith::default(),
+            playback: PlaybackHints::default(),
+        }
+    }
+
     /// Number of Gaussians.
     pub fn len(&self) -> usize {
-        self.packed.as_ref().map_or(self.gaussians.len(), PackedScene::len)
+        self.form.len()
     }
 
     /// Whether there is no Gaussian.
     pub fn is_empty(&self) -> bool {
-        self.len() == 0
+        self.form.is_empty()
     }
 
     /// One Gaussian, decoded if need be; panics beyond the end, as a slice does.
     pub fn gaussian(&self, index: usize) -> Gaussian {
-        self.packed.as_ref().map_or_else(|| self.gaussians[index], |packed| packed.gaussian(index))
+        self.form.gaussian(index)
     }
 
     /// All Gaussians in order.
     pub fn iter(&self) -> impl Iterator<Item = Gaussian> + '_ {
-        (0..self.len()).map(|index| self.gaussian(index))
+        self.form.iter()
     }
 
-    /// Colours by codebook, if it has them.
-    pub fn coded_colors(&self) -> Option<&CodedColors> {
-        self.packed.as_ref().and_then(|packed| packed.colors.as_ref())
-    }
-
-    /// Colour of one Gaussian in the unit vector `direction` from the camera, with `tau = mean_t − time`; see [`Harmonics::color`].
+    /// Color of one Gaussian in the unit vector `direction` from the camera, with `tau = mean_t − time`; see [`Harmonics::color`].
     pub fn color(&self, index: usize, direction: Vec3, tau: f32) -> Vec3 {
-        let span = self.trained_with.time_span();
-        match &self.packed {
-            Some(packed) if packed.colors.is_some() => packed.color(index, direction, tau, span),
-            _ => self.harmonics.color(index, direction, tau, span),
-        }
+        self.form.color(index, direction, tau, self.trained_with.time_span())
     }
 
     /// Whether its parts fit together, as those of every scene that was loaded do.
@@ -200,7 +158,7 @@ impl RuntimeScene {
         if !self.filter.as_ref().is_none_or(fits) {
             return Err("its temporal filter is that of another number of Gaussians");
         }
-        if self.coded_colors().is_none() && !self.harmonics.is_consistent(self.len()) {
+        if !self.form.harmonics().is_none_or(|harmonics| harmonics.is_consistent(self.len())) {
             return Err("its colours are those of another number of Gaussians");
         }
         let covers = |map: &Environment| {
@@ -213,7 +171,7 @@ impl RuntimeScene {
         Ok(())
     }
 
-    /// The background that the capture was trained with: its environment map if it has one, else its colour.
+    /// The background that the capture was trained with: its environment map if it has one, else its color.
     pub fn trained_background(&self) -> Background {
         match self.environment {
             Some(_) => Background::Environment,
@@ -221,18 +179,16 @@ impl RuntimeScene {
         }
     }
 
-    /// Bytes of Gaussians and colours in memory.
+    /// Bytes of Gaussians and colors in memory.
     pub fn size(&self) -> usize {
-        let packed = self.packed.as_ref().map_or(0, PackedScene::size);
-        size_of_val(self.gaussians.as_slice()) + size_of_val(self.harmonics.values.as_slice()) + packed
+        self.form.size()
     }
 }
 
 impl From<RuntimeScene> for GaussianScene {
     fn from(scene: RuntimeScene) -> Self {
         Self {
-            form: scene.packed.map_or(Form::Runtime(scene.gaussians), Form::Packed),
-            harmonics: scene.harmonics,
+            form: SceneForm::Ready(scene.form),
             environment: scene.environment,
             filter: scene.filter,
             trained_with: scene.trained_with,

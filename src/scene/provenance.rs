@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 pub struct TrainedWith {
     /// First and last timestamp of training, `[T0, T1]`.
     pub time_interval: [f32; 2],
-    /// Background colour, in the blend space.
+    /// Background color, in the blend space.
     pub background: [f32; 3],
     /// Convention of the rotations *in the source file*; in memory they are always flipped.
     pub rotation_convention: RotationConvention,
@@ -21,7 +21,7 @@ pub struct TrainedWith {
     pub raster_fov: RasterFov,
     /// What kind of cameras took the training views.
     pub cameras: TrainedCameras,
-    /// Which mean gives the viewing direction of colour.
+    /// Which mean gives the viewing direction of color.
     pub sh_direction: ShDirection,
     /// Only the first 16 coefficients count, whatever is stored.
     pub force_sh_3d: bool,

@@ -1,9 +1,9 @@
 //! A procedural moving scene of any size, for tests and benchmarks.
 //!
-//! In: a count and a seed. Out: a [`GaussianScene`] in the trained form, the same on every machine: a chequered ground at rest
-//! and coloured balls circling over it, with lifespans from a flash to the whole interval.
+//! In: a count and a seed. Out: a [`GaussianScene`] in the trained form, the same on every machine: a checkered ground at rest
+//! and colored balls circling over it, with lifespans from a flash to the whole interval.
 
-use super::{Form, GaussianScene, PlaybackHints, TrainedWith};
+use super::{GaussianScene, PlaybackHints, SceneForm, Trained, TrainedWith};
 use crate::gaussian::{Harmonics, Parameters};
 use glam::{EulerRot, Quat, Vec3};
 use std::f32::consts::TAU;
@@ -15,9 +15,9 @@ pub struct SynthSettings {
     pub count: usize,
     /// Seed of the random numbers.
     pub seed: u64,
-    /// Spatial degree of colour, 0 to 3.
+    /// Spatial degree of color, 0 to 3.
     pub degree: u32,
-    /// Time degree of colour, 0 to 2; counts only with `degree` 3.
+    /// Time degree of color, 0 to 2; counts only with `degree` 3.
     pub degree_t: u32,
     /// Seconds of playback.
     pub duration_seconds: f32,
@@ -33,7 +33,7 @@ impl Default for SynthSettings {
 const BALLS: usize = 7;
 /// Share of the Gaussians that make the ground, in percent.
 const GROUND_PERCENT: usize = 40;
-/// Value of the first harmonic, by which colours are stored.
+/// Value of the first harmonic, by which colors are stored.
 const SH_C0: f32 = 0.282_094_79;
 
 /// Makes the scene. The time interval is [0, 1], up is +z, and everything fits in a box of about two units.
@@ -65,8 +65,7 @@ pub fn synthesize(settings: &SynthSettings) -> GaussianScene {
         harmonics.values.extend((0..rest).map(|_| random.in_range(-0.05, 0.05)));
     }
     GaussianScene {
-        form: Form::Trained(parameters),
-        harmonics,
+        form: SceneForm::Trained(Trained { parameters, harmonics }),
         environment: None,
         filter: None,
         trained_with: TrainedWith::default(),

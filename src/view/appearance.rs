@@ -6,7 +6,18 @@
 use super::srgb::{decode, encode};
 use glam::{Affine3A, Vec3};
 
-/// The space in which splats are blended.
+/// The space in which splats are blended. Default: [`Encoded`](Self::Encoded).
+///
+/// # Examples
+///
+/// ```
+/// use bevy_gs4d::view::{Appearance, BlendSpace};
+/// use glam::Vec3;
+///
+/// let (trained, appearance) = (Vec3::splat(0.5), Appearance::default());
+/// assert_eq!(appearance.color(trained, BlendSpace::Encoded), trained, "blended as trained");
+/// assert!(appearance.color(trained, BlendSpace::Linear).x < 0.25, "half of the encoded range is a fifth of the light");
+/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum BlendSpace {
     /// sRGB-encoded values: the space captures are trained in.
@@ -16,7 +27,19 @@ pub enum BlendSpace {
     Linear,
 }
 
-/// What a view shows of its captures.
+/// What a view shows of its captures. Default: [`Color`](Self::Color).
+///
+/// # Examples
+///
+/// ```
+/// # #[cfg(feature = "bevy")] {
+/// use bevy_gs4d::prelude::*;
+///
+/// // On a camera: false colours for the number of splats at each pixel.
+/// let settings = CaptureViewSettings { debug: DebugView::Overdraw, ..CaptureViewSettings::default() };
+/// assert_eq!(settings.blend_space, BlendSpace::Encoded, "the rest stays as it is");
+/// # }
+/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum DebugView {
     /// Their colours.
@@ -26,11 +49,11 @@ pub enum DebugView {
     Depth,
     /// How many splats were blended at each pixel: black 0, then blue, green and yellow to red, 64 and more.
     Overdraw,
-    /// Every Gaussian that the temporal filter leaves active: green where it shows at this moment, red where it is looked at in vain.
+    /// Every Gaussian that is active in the temporal filter's current segment: green if it is visible at this time, red if it is not.
     Active,
-    /// The standard deviation in time `σ_t`: blue for an instant, red for what is always there.
+    /// The standard deviation in time `σ_t`: blue for an instant, red for the whole duration.
     Lifespan,
-    /// The direction and speed of motion: grey rests; red, green and blue are x, y and z of the capture.
+    /// The direction and speed of motion: grey for rest; red, green and blue for x, y and z of the capture.
     Velocity,
 }
 
@@ -103,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_default_look_changes_no_bit() {
+    fn the_default_appearance_changes_no_bit() {
         let color = Vec3::new(0.1, 0.7, 1.3);
         assert_eq!(Appearance::default().color(color, BlendSpace::Encoded), color, "as trained");
         assert!(Appearance::default().shows(Vec3::splat(1e9)), "nothing is cropped");
@@ -119,7 +142,10 @@ mod tests {
             decode(appearance.color(color, BlendSpace::Encoded)).abs_diff_eq(linear, 1e-5),
             "and encoded, the same"
         );
-        assert!(decode(encode(Vec3::new(0.001, 0.3, 4.0))).abs_diff_eq(Vec3::new(0.001, 0.3, 4.0), 1e-5), "to and fro");
+        assert!(
+            decode(encode(Vec3::new(0.001, 0.3, 4.0))).abs_diff_eq(Vec3::new(0.001, 0.3, 4.0), 1e-5),
+            "one undoes the other"
+        );
     }
 
     #[test]

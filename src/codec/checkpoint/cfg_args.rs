@@ -1,6 +1,21 @@
 //! `cfg_args`, the text that the trainer leaves beside its checkpoints.
 //!
-//! In: `Namespace(sh_degree=3, ..., white_background=False, prefilter_var=-1.0)`. Out: the entries that drawing depends on.
+//! In: the path of a checkpoint, and the text `Namespace(sh_degree=3, ..., white_background=False, prefilter_var=-1.0)` in the file
+//! beside it. Out: the entries that drawing depends on.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// Most bytes read of the file, which has some 300.
+const LIMIT: u64 = 1 << 16;
+
+/// The text of the file in the folder of a checkpoint. It is optional: one that cannot be read counts as absent.
+pub(super) fn beside(checkpoint: &Path) -> Option<String> {
+    let mut text = Vec::new();
+    File::open(checkpoint.with_file_name("cfg_args")).ok()?.take(LIMIT).read_to_end(&mut text).ok()?;
+    Some(String::from_utf8_lossy(&text).into_owned())
+}
 
 /// The entries of `cfg_args` that matter here; what is absent or not understood stays out.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

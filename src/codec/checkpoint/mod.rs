@@ -6,7 +6,7 @@
 //! Archive   the zip: which entries there are, and that none is packed or beyond the end of the file
 //! Pickle    data.pkl through a restricted unpickler: scalars, and tensors that only say where their values lie
 //! State     what stands in which slot of the trainer's tuple
-//! read      the tensors wanted, one pass each, straight to their final place; optimiser state is never touched
+//! read      the tensors wanted, one pass each, straight to their final place; optimizer state is never touched
 //! ```
 
 mod archive;
@@ -20,13 +20,27 @@ mod tensor;
 pub use error::CheckpointError;
 pub use options::{CheckpointOptions, describe};
 
+use super::CodecErrorKind;
+use super::format::Format;
 use crate::gaussian::{Harmonics, Model};
-use crate::scene::{Form, GaussianScene, RotationConvention};
+use crate::scene::{GaussianScene, RotationConvention, SceneForm, Trained};
 use archive::Archive;
 use options::FromFile;
 use pickle::Pickle;
 use state::State;
-use std::io::{Read, Seek};
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
+use std::path::Path;
+
+/// Checkpoints in the table of formats.
+pub const FORMAT: Format = Format {
+    name: "a checkpoint of the 4DGS trainer (.pth, a zip archive)",
+    extensions: &["pth"],
+    // A zip archive that is not empty.
+    magic: b"PK\x03\x04",
+    read: read_file,
+    write: None,
+};
 
 /// Reads a checkpoint. `cfg_args` is the text of the file of that name beside it, if there is one.
 ///
@@ -60,7 +74,13 @@ pub fn read<R: Read + Seek>(
     };
     let trained_with = options.trained_with(cfg_args, &file);
     let playback = options.playback(&trained_with);
-    Ok(GaussianScene { form: Form::Trained(parameters), harmonics, environment, filter: None, trained_with, playback })
+    let form = SceneForm::Trained(Trained { parameters, harmonics });
+    Ok(GaussianScene { form, environment, filter: None, trained_with, playback })
+}
+
+/// Reads a checkpoint with what `cfg_args` beside it says.
+fn read_file(path: &Path, file: BufReader<File>, options: &CheckpointOptions) -> Result<GaussianScene, CodecErrorKind> {
+    Ok(read(file, options, cfg_args::beside(path).as_deref())?)
 }
 
 /// The convention of a file that nothing is said about. Code whose backward pass never wrote the time blocks is older than the

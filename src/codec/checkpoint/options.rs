@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 pub struct CheckpointOptions {
     /// First and last timestamp of training. Default 0, 1.
     pub time_interval: Option<[f32; 2]>,
-    /// Background colour in the blend space. Default black, or white if `cfg_args` says so.
+    /// Background color in the blend space. Default black, or white if `cfg_args` says so.
     pub background: Option<[f32; 3]>,
     /// Convention of the rotations in the file. Default flipped, unless the file can only be unflipped (section 4.6 of the 4DGS
     /// model: all coefficients of the time blocks zero at time degree 2).
@@ -26,7 +26,7 @@ pub struct CheckpointOptions {
     pub raster_fov: Option<RasterFov>,
     /// What kind of cameras took the training views. Default intrinsics if there is an environment map, else field of view.
     pub cameras: Option<TrainedCameras>,
-    /// Which mean gives the viewing direction of colour. Default canonical.
+    /// Which mean gives the viewing direction of color. Default canonical.
     pub sh_direction: Option<ShDirection>,
     /// Whether only the first 16 coefficients count. Default false.
     pub force_sh_3d: Option<bool>,

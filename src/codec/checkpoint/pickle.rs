@@ -14,7 +14,7 @@ use std::collections::HashMap;
 /// Place of a value in a [`Pickle`].
 pub(super) type Id = u32;
 
-/// A value of a pickle. Lists and dictionaries hold optimiser state only, so what is put into them is dropped.
+/// A value of a pickle. Lists and dictionaries hold optimizer state only, so what is put into them is dropped.
 #[derive(Debug)]
 pub(super) enum Value<'a> {
     None,

@@ -167,7 +167,7 @@ impl<'p> State<'p> {
         Ok(parameters)
     }
 
-    /// Reads the colour coefficients: the first from one tensor, the rest from another, side by side.
+    /// Reads the color coefficients: the first from one tensor, the rest from another, side by side.
     ///
     /// # Errors
     /// Tensors of other shapes or that cannot be read, too few coefficients for the active degrees, a value that is not finite.

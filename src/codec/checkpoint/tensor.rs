@@ -21,7 +21,7 @@ pub(super) struct Tensor<'a> {
     pub offset: u64,
     /// Extent of each axis.
     pub size: Vec<u64>,
-    /// Distance of neighbours along each axis, in values.
+    /// Distance of neighbors along each axis, in values.
     pub stride: Vec<u64>,
 }
 

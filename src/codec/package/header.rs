@@ -6,7 +6,10 @@
 use super::{PackageError, Section};
 use crate::gaussian::{Harmonics, Model};
 use crate::scene::packed::MAX_STAGES;
-use crate::scene::{ActiveSets, FilterKind, Form, GaussianScene, MAX_SEGMENTS, PlaybackHints, TrainedWith};
+use crate::scene::{
+    ActiveSets, ColorDegrees, FilterKind, Form, GaussianScene, MAX_SEGMENTS, PackedColors, PlaybackHints, SceneForm,
+    Trained, TrainedWith,
+};
 use serde::{Deserialize, Serialize};
 
 /// Uncompressed bytes that any package may hold, however short it is.
@@ -28,11 +31,11 @@ pub struct Header {
     pub form: StoredForm,
     /// Number of Gaussians.
     pub gaussians: usize,
-    /// Colour coefficients stored per Gaussian and channel, K.
+    /// Color coefficients stored per Gaussian and channel, K.
     pub coefficients: usize,
-    /// Spatial degree of the colour, 0 to 3.
+    /// Spatial degree of the color, 0 to 3.
     pub degree: u32,
-    /// Time degree of the colour, 0 to 2.
+    /// Time degree of the color, 0 to 2.
     pub degree_t: u32,
     /// Size of the environment map, if there is one.
     #[serde(default)]
@@ -48,22 +51,42 @@ pub struct Header {
     pub sections: Vec<Section>,
 }
 
-/// The form in which the Gaussians are stored.
+/// The form in which the Gaussians are stored: a [`SceneForm`] without its values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StoredForm {
-    /// As an optimiser stores them: raw parameters.
+    /// As an optimizer stores them: raw parameters.
     Trained {
         /// The model they belong to.
         model: Model,
     },
     /// Sliced, ready to draw.
-    Runtime,
+    #[serde(rename = "runtime")]
+    Sliced,
     /// Sliced and quantized.
     Packed {
-        /// Entries of each codebook of colour; nothing where the coefficients are whole.
+        /// Entries of each codebook of color; `None` if the coefficients are whole.
         codebooks: Option<[u32; MAX_STAGES]>,
     },
+}
+
+impl StoredForm {
+    /// The form of a scene.
+    pub fn of(form: &SceneForm) -> Self {
+        match form {
+            SceneForm::Trained(Trained { parameters, .. }) => Self::Trained { model: parameters.model() },
+            SceneForm::Ready(Form::Sliced(_)) => Self::Sliced,
+            SceneForm::Ready(Form::Packed(packed)) => Self::Packed {
+                codebooks: match &packed.colors {
+                    PackedColors::Whole(_) => None,
+                    PackedColors::Coded(colors) => {
+                        let entries = |stage| colors.entries.get(stage).copied().unwrap_or_default();
+                        Some(std::array::from_fn(entries))
+                    }
+                },
+            },
+        }
+    }
 }
 
 /// The temporal filter, sets aside.
@@ -99,23 +122,8 @@ struct Requirements {
 impl Header {
     /// The header of a scene, with no sections yet.
     pub(super) fn of(scene: &GaussianScene) -> Result<Self, PackageError> {
-        let form = match &scene.form {
-            Form::Trained(parameters) => StoredForm::Trained { model: parameters.model() },
-            Form::Runtime(_) => StoredForm::Runtime,
-            Form::Packed(packed) => StoredForm::Packed {
-                codebooks: packed.colors.as_ref().map(|colors| {
-                    let entries = |stage| colors.entries.get(stage).copied().unwrap_or_default();
-                    std::array::from_fn(entries)
-                }),
-            },
-        };
-        let coded = match &scene.form {
-            Form::Packed(packed) => packed.colors.as_ref(),
-            _ => None,
-        };
-        let whole = &scene.harmonics;
-        let (coefficients, degree, degree_t) = coded
-            .map_or((whole.coefficients, whole.degree, whole.degree_t), |c| (c.coefficients(), c.degree, c.degree_t));
+        let form = StoredForm::of(&scene.form);
+        let ColorDegrees { coefficients, degree, degree_t } = scene.form.color_degrees();
         let used = [matches!(form, StoredForm::Packed { .. }), scene.filter.is_some()];
         let requires = FEATURES.iter().zip(used).filter(|(_, used)| *used).map(|(name, _)| (*name).to_owned());
         let header = Self {
@@ -191,13 +199,13 @@ impl Header {
             if condition { Ok(()) } else { Err(PackageError::Inconsistent(otherwise)) }
         };
         // Of no Gaussians, the harmonics are consistent if their degrees are.
-        let colour = Harmonics {
+        let color = Harmonics {
             coefficients: self.coefficients,
             degree: self.degree,
             degree_t: self.degree_t,
             values: Vec::new(),
         };
-        sane(colour.is_consistent(0), "the degrees of the colour do not fit its number of coefficients")?;
+        sane(color.is_consistent(0), "the degrees of the colour do not fit its number of coefficients")?;
         sane(
             self.environment.is_none_or(|e| e.width.checked_mul(e.height).is_some_and(|texels| texels > 0)),
             "an environment map with no texels, or far too many",

@@ -5,7 +5,11 @@
 
 use super::{FLOAT_PLANES, Header, PackageError, Section, StoredForm};
 use crate::gaussian::{Gaussian, Harmonics, Model, Parameters};
-use crate::scene::{ActiveSets, CodedColors, Environment, Form, GaussianScene, PackedScene, TemporalFilter};
+use crate::scene::packed::{COLOR_WORDS, RECORD_WORDS};
+use crate::scene::{
+    ActiveSets, CodedColors, Environment, Form, GaussianScene, PackedColors, PackedScene, SceneForm, Sliced,
+    TemporalFilter, Trained,
+};
 use bytemuck::{Zeroable, cast_slice, cast_slice_mut};
 use std::ops::Range;
 
@@ -84,7 +88,7 @@ impl Header {
                 .flatten()
                 .collect()
             }
-            StoredForm::Runtime => vec![
+            StoredForm::Sliced => vec![
                 within("mean", 0, 3),
                 within("mean_t", 3, 1),
                 within("velocity", 4, 3),
@@ -93,7 +97,7 @@ impl Header {
                 within("opacity", 14, 1),
             ],
             StoredForm::Packed { .. } => {
-                let lanes = |name, offset, width| Attribute { name, rows, stride: 8, offset, width };
+                let lanes = |name, offset, width| Attribute { name, rows, stride: RECORD_WORDS, offset, width };
                 let ranges = PackedScene::range_count(rows);
                 vec![
                     lanes("packed_mean", 0, 2),
@@ -104,12 +108,12 @@ impl Header {
             }
         };
         let stride = self.coefficients.saturating_mul(3);
-        let colour = |name, offset, width| Attribute { name, rows, stride, offset, width };
+        let color = |name, offset, width| Attribute { name, rows, stride, offset, width };
         if let StoredForm::Packed { codebooks: Some(entries) } = self.form {
             let stages = entries.iter().filter(|&&entries| entries > 0).count();
             let total = entries.iter().fold(0usize, |sum, &entries| sum.saturating_add(entries as usize));
             let words = stride.div_ceil(4);
-            let record = |name, offset, width| Attribute { name, rows, stride: 3, offset, width };
+            let record = |name, offset, width| Attribute { name, rows, stride: COLOR_WORDS, offset, width };
             attributes.push(record("color_base", 0, 1));
             if stages > 0 {
                 attributes.push(record("color_codes", 1, stages.div_ceil(2)));
@@ -118,9 +122,9 @@ impl Header {
                 attributes.push(Attribute { name: "codebook_scales", rows: scales, stride: 4, offset: 0, width: 4 });
             }
         } else {
-            attributes.push(colour("sh_dc", 0, 3));
+            attributes.push(color("sh_dc", 0, 3));
             if stride > 3 {
-                attributes.push(colour("sh_rest", 3, stride - 3));
+                attributes.push(color("sh_rest", 3, stride - 3));
             }
         }
         if let Some(filter) = self.filter {
@@ -143,10 +147,12 @@ impl Header {
             return Err(PackageError::Inconsistent("the attributes of the scene differ in length"));
         }
         match &scene.form {
-            Form::Trained(p) if p.mean_t.is_empty() && !(p.log_scale_t.is_empty() && p.rotation_r.is_empty()) => {
+            SceneForm::Trained(Trained { parameters: p, .. })
+                if p.mean_t.is_empty() && !(p.log_scale_t.is_empty() && p.rotation_r.is_empty()) =>
+            {
                 Err(PackageError::Inconsistent("the scene has attributes of a 4D model but no temporal means"))
             }
-            _ => Ok(()),
+            SceneForm::Trained(_) | SceneForm::Ready(_) => Ok(()),
         }
     }
 }
@@ -154,11 +160,17 @@ impl Header {
 /// A scene of the header's size with all values zero. The header must have been checked.
 pub(super) fn blank(header: &Header) -> GaussianScene {
     let count = header.gaussians;
+    let harmonics = || Harmonics {
+        coefficients: header.coefficients,
+        degree: header.degree,
+        degree_t: header.degree_t,
+        values: vec![0.0; count * header.coefficients * 3],
+    };
     let form = match header.form {
         StoredForm::Trained { model } => {
             let timed = if model == Model::Static3d { 0 } else { count };
             let pairs = if model == Model::Rotated4d { count } else { 0 };
-            Form::Trained(Parameters {
+            let parameters = Parameters {
                 mean: vec![[0.0; 3]; count],
                 mean_t: vec![0.0; timed],
                 log_scale: vec![[0.0; 3]; count],
@@ -166,27 +178,24 @@ pub(super) fn blank(header: &Header) -> GaussianScene {
                 rotation_l: vec![[0.0; 4]; count],
                 rotation_r: vec![[0.0; 4]; pairs],
                 opacity_logit: vec![0.0; count],
-            })
+            };
+            SceneForm::Trained(Trained { parameters, harmonics: harmonics() })
         }
-        StoredForm::Runtime => Form::Runtime(vec![Gaussian::zeroed(); count]),
-        StoredForm::Packed { codebooks } => Form::Packed(PackedScene {
-            records: vec![[0; 8]; count],
+        StoredForm::Sliced => SceneForm::Ready(Form::Sliced(Sliced {
+            gaussians: vec![Gaussian::zeroed(); count],
+            harmonics: harmonics(),
+        })),
+        StoredForm::Packed { codebooks } => SceneForm::Ready(Form::Packed(PackedScene {
+            records: vec![[0; RECORD_WORDS]; count],
             ranges: vec![[0.0; 4]; PackedScene::range_count(count)],
-            colors: codebooks.map(|entries| blank_colors(header, &entries)),
-        }),
-    };
-    let harmonics = match header.form {
-        StoredForm::Packed { codebooks: Some(_) } => Harmonics { coefficients: 1, ..Harmonics::default() },
-        _ => Harmonics {
-            coefficients: header.coefficients,
-            degree: header.degree,
-            degree_t: header.degree_t,
-            values: vec![0.0; count * header.coefficients * 3],
-        },
+            colors: match codebooks {
+                None => PackedColors::Whole(harmonics()),
+                Some(entries) => PackedColors::Coded(blank_colors(header, &entries)),
+            },
+        })),
     };
     GaussianScene {
         form,
-        harmonics,
         filter: header.filter.map(|filter| {
             let words = TemporalFilter::words(count) * filter.segments as usize;
             let bits = || ActiveSets::Bits(vec![0; words]);
@@ -208,7 +217,7 @@ fn blank_colors(header: &Header, entries: &[u32]) -> CodedColors {
     let total: usize = entries.iter().map(|&entries| entries as usize).sum();
     let mut colors = CodedColors { degree: header.degree, degree_t: header.degree_t, ..CodedColors::default() };
     let words = colors.words_per_entry();
-    colors.records = vec![[0; 3]; header.gaussians];
+    colors.records = vec![[0; COLOR_WORDS]; header.gaussians];
     colors.codebooks = vec![0; total * words];
     colors.scales = vec![[0.0; 4]; entries.len() * words];
     colors.entries = entries;
@@ -218,54 +227,84 @@ fn blank_colors(header: &Header, entries: &[u32]) -> CodedColors {
 /// The table of words in which the attribute of this name lies; empty if the scene has no such attribute.
 /// Words rather than floats, so that the payload of a NaN survives everywhere.
 pub(super) fn words<'a>(scene: &'a GaussianScene, name: &str) -> &'a [u32] {
-    match (&scene.form, name) {
-        (_, "filter") => match scene.filter.as_ref().map(|filter| &filter.sets) {
+    match name {
+        "filter" => match scene.filter.as_ref().map(|filter| &filter.sets) {
             Some(ActiveSets::Bits(words) | ActiveSets::Intervals(words)) => words,
             None => &[],
         },
-        (Form::Packed(p), "packed_mean" | "packed_motion" | "packed_shape") => cast_slice(&p.records),
-        (Form::Packed(p), "packed_ranges") => cast_slice(&p.ranges),
-        (Form::Packed(PackedScene { colors: Some(c), .. }), "color_base" | "color_codes") => cast_slice(&c.records),
-        (Form::Packed(PackedScene { colors: Some(c), .. }), "codebooks") => &c.codebooks,
-        (Form::Packed(PackedScene { colors: Some(c), .. }), "codebook_scales") => cast_slice(&c.scales),
-        (_, "sh_dc" | "sh_rest") => cast_slice(&scene.harmonics.values),
-        (_, "environment") => scene.environment.as_ref().map(|e| cast_slice(&e.texels)).unwrap_or_default(),
-        (Form::Runtime(gaussians), _) => cast_slice(gaussians),
-        (Form::Trained(p), "mean") => cast_slice(&p.mean),
-        (Form::Trained(p), "mean_t") => cast_slice(&p.mean_t),
-        (Form::Trained(p), "log_scale") => cast_slice(&p.log_scale),
-        (Form::Trained(p), "log_scale_t") => cast_slice(&p.log_scale_t),
-        (Form::Trained(p), "rotation_l") => cast_slice(&p.rotation_l),
-        (Form::Trained(p), "rotation_r") => cast_slice(&p.rotation_r),
-        (Form::Trained(p), "opacity_logit") => cast_slice(&p.opacity_logit),
-        (Form::Trained(_) | Form::Packed(_), _) => &[],
+        "environment" => scene.environment.as_ref().map(|map| cast_slice(&map.texels)).unwrap_or_default(),
+        "sh_dc" | "sh_rest" => scene.form.harmonics().map(|all| cast_slice(&all.values)).unwrap_or_default(),
+        _ => match &scene.form {
+            SceneForm::Trained(trained) => words_of_parameters(&trained.parameters, name),
+            SceneForm::Ready(Form::Sliced(sliced)) => cast_slice(&sliced.gaussians),
+            SceneForm::Ready(Form::Packed(packed)) => words_of_packed(packed, name),
+        },
+    }
+}
+
+fn words_of_parameters<'a>(parameters: &'a Parameters, name: &str) -> &'a [u32] {
+    match name {
+        "mean" => cast_slice(&parameters.mean),
+        "mean_t" => cast_slice(&parameters.mean_t),
+        "log_scale" => cast_slice(&parameters.log_scale),
+        "log_scale_t" => cast_slice(&parameters.log_scale_t),
+        "rotation_l" => cast_slice(&parameters.rotation_l),
+        "rotation_r" => cast_slice(&parameters.rotation_r),
+        "opacity_logit" => cast_slice(&parameters.opacity_logit),
+        _ => &[],
+    }
+}
+
+fn words_of_packed<'a>(packed: &'a PackedScene, name: &str) -> &'a [u32] {
+    match (name, &packed.colors) {
+        ("packed_mean" | "packed_motion" | "packed_shape", _) => cast_slice(&packed.records),
+        ("packed_ranges", _) => cast_slice(&packed.ranges),
+        ("color_base" | "color_codes", PackedColors::Coded(colors)) => cast_slice(&colors.records),
+        ("codebooks", PackedColors::Coded(colors)) => &colors.codebooks,
+        ("codebook_scales", PackedColors::Coded(colors)) => cast_slice(&colors.scales),
+        _ => &[],
     }
 }
 
 /// As [`words`], for filling in.
 pub(super) fn words_mut<'a>(scene: &'a mut GaussianScene, name: &str) -> &'a mut [u32] {
-    match (&mut scene.form, name) {
-        (_, "filter") => match scene.filter.as_mut().map(|filter| &mut filter.sets) {
+    match name {
+        "filter" => match scene.filter.as_mut().map(|filter| &mut filter.sets) {
             Some(ActiveSets::Bits(words) | ActiveSets::Intervals(words)) => words,
             None => &mut [],
         },
-        (Form::Packed(p), "packed_mean" | "packed_motion" | "packed_shape") => cast_slice_mut(&mut p.records),
-        (Form::Packed(p), "packed_ranges") => cast_slice_mut(&mut p.ranges),
-        (Form::Packed(PackedScene { colors: Some(c), .. }), "color_base" | "color_codes") => {
-            cast_slice_mut(&mut c.records)
+        "environment" => scene.environment.as_mut().map(|map| cast_slice_mut(&mut map.texels)).unwrap_or_default(),
+        "sh_dc" | "sh_rest" => {
+            scene.form.harmonics_mut().map(|all| cast_slice_mut(&mut all.values)).unwrap_or_default()
         }
-        (Form::Packed(PackedScene { colors: Some(c), .. }), "codebooks") => &mut c.codebooks,
-        (Form::Packed(PackedScene { colors: Some(c), .. }), "codebook_scales") => cast_slice_mut(&mut c.scales),
-        (_, "sh_dc" | "sh_rest") => cast_slice_mut(&mut scene.harmonics.values),
-        (_, "environment") => scene.environment.as_mut().map(|e| cast_slice_mut(&mut e.texels)).unwrap_or_default(),
-        (Form::Runtime(gaussians), _) => cast_slice_mut(gaussians),
-        (Form::Trained(p), "mean") => cast_slice_mut(&mut p.mean),
-        (Form::Trained(p), "mean_t") => cast_slice_mut(&mut p.mean_t),
-        (Form::Trained(p), "log_scale") => cast_slice_mut(&mut p.log_scale),
-        (Form::Trained(p), "log_scale_t") => cast_slice_mut(&mut p.log_scale_t),
-        (Form::Trained(p), "rotation_l") => cast_slice_mut(&mut p.rotation_l),
-        (Form::Trained(p), "rotation_r") => cast_slice_mut(&mut p.rotation_r),
-        (Form::Trained(p), "opacity_logit") => cast_slice_mut(&mut p.opacity_logit),
-        (Form::Trained(_) | Form::Packed(_), _) => &mut [],
+        _ => match &mut scene.form {
+            SceneForm::Trained(trained) => words_of_parameters_mut(&mut trained.parameters, name),
+            SceneForm::Ready(Form::Sliced(sliced)) => cast_slice_mut(&mut sliced.gaussians),
+            SceneForm::Ready(Form::Packed(packed)) => words_of_packed_mut(packed, name),
+        },
+    }
+}
+
+fn words_of_parameters_mut<'a>(parameters: &'a mut Parameters, name: &str) -> &'a mut [u32] {
+    match name {
+        "mean" => cast_slice_mut(&mut parameters.mean),
+        "mean_t" => cast_slice_mut(&mut parameters.mean_t),
+        "log_scale" => cast_slice_mut(&mut parameters.log_scale),
+        "log_scale_t" => cast_slice_mut(&mut parameters.log_scale_t),
+        "rotation_l" => cast_slice_mut(&mut parameters.rotation_l),
+        "rotation_r" => cast_slice_mut(&mut parameters.rotation_r),
+        "opacity_logit" => cast_slice_mut(&mut parameters.opacity_logit),
+        _ => &mut [],
+    }
+}
+
+fn words_of_packed_mut<'a>(packed: &'a mut PackedScene, name: &str) -> &'a mut [u32] {
+    match (name, &mut packed.colors) {
+        ("packed_mean" | "packed_motion" | "packed_shape", _) => cast_slice_mut(&mut packed.records),
+        ("packed_ranges", _) => cast_slice_mut(&mut packed.ranges),
+        ("color_base" | "color_codes", PackedColors::Coded(colors)) => cast_slice_mut(&mut colors.records),
+        ("codebooks", PackedColors::Coded(colors)) => &mut colors.codebooks,
+        ("codebook_scales", PackedColors::Coded(colors)) => cast_slice_mut(&mut colors.scales),
+        _ => &mut [],
     }
 }

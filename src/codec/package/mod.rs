@@ -4,8 +4,8 @@
 //!
 //! A package is a fixed start ([`MAGIC`], [`VERSION`], length and checksum of the header), a [`Header`] in RON, and the sections
 //! that the header lists. A section holds one attribute of a run of Gaussians: the four bytes of its floats apart from
-//! each other (`planes`), compressed on their own and checksummed. What a scene needs first comes first: geometry, plain colour, the
-//! rest of the colour, parameters. Whatever a reader does not know is skipped, unless the header lists it as required.
+//! each other (`planes`), compressed on their own and checksummed. What a scene needs first comes first: geometry, plain color, the
+//! rest of the color, parameters. Whatever a reader does not know is skipped, unless the header lists it as required.
 
 mod envelope;
 mod error;
@@ -18,10 +18,24 @@ pub use error::PackageError;
 pub use header::{EnvironmentSize, Header, StoredFilter, StoredForm};
 pub use section::{FLOAT_PLANES, Section};
 
-use crate::scene::{Form, GaussianScene};
+use super::CodecErrorKind;
+use super::checkpoint::CheckpointOptions;
+use super::format::Format;
+use crate::scene::{Form, GaussianScene, SceneForm};
 use rayon::prelude::*;
 use serde::Serialize;
+use std::fs::File;
 use std::io::{BufReader, Read, Seek, Write};
+use std::path::Path;
+
+/// Packages in the table of formats.
+pub const FORMAT: Format = Format {
+    name: "a package (.gs4d)",
+    extensions: &["gs4d"],
+    magic: &MAGIC,
+    read: read_file,
+    write: Some(write_scene),
+};
 
 /// The first bytes of every package.
 pub const MAGIC: [u8; 4] = *b"GS4D";
@@ -117,10 +131,22 @@ pub fn read<R: Read + Seek>(reader: R) -> Result<GaussianScene, PackageError> {
             section.decode(&body, attribute, &mut planes, layout::words_mut(&mut scene, attribute.name))?;
         }
     }
-    if let Form::Packed(packed) = &scene.form {
+    if let SceneForm::Ready(Form::Packed(packed)) = &scene.form {
         packed.check().map_err(PackageError::Inconsistent)?;
     }
     Ok(scene)
+}
+
+/// Reads a package; of the options only those count that replace what it says.
+fn read_file(_: &Path, file: BufReader<File>, options: &CheckpointOptions) -> Result<GaussianScene, CodecErrorKind> {
+    options.check()?;
+    let mut scene = read(file)?;
+    options.override_stored(&mut scene);
+    Ok(scene)
+}
+
+fn write_scene(writer: &mut dyn Write, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), CodecErrorKind> {
+    Ok(write(writer, scene, settings)?)
 }
 
 /// Reads the header and verifies every checksum, without building the scene.

@@ -1,210 +1,160 @@
-//! What makes a bake resumable: its stages and the folder where their results wait for the next ones.
+//! The whole way from a trained checkpoint to a small, fast package, and a report of what it cost.
 //!
-//! In: a fingerprint of all that a result depends on, and the result as bytes. Out: the same bytes, as long as the fingerprint is
-//! the same and not one of them has changed; else nothing, and the stage runs again.
-//!
-//! A bake scores, prunes, (fine-tunes, once there is a trainer), masks, compresses, evaluates and reports. Each fingerprint
-//! includes that of the stage before, so that a change at the beginning starts everything over.
+//! In: a checkpoint, its training views, how small it is to be ([`BakeSettings`]). Out: a package, `OUT.report.json`
+//! and `OUT.report.html` beside it ([`Baked`]). The stages score, prune, mask, compress, evaluate and report (see
+//! [`Stage`]) leave their results in the folder `OUT.bake` ([`Work`]), so that an interrupted bake goes on where it
+//! was. Nothing is trained.
 
-use crate::codec::CodecError;
-use crate::offline;
-use serde::Serialize;
-use std::fs::{self, File};
-use std::io::{self, Read, Write};
-use std::path::{Path, PathBuf};
+mod compression;
+mod evaluation;
+mod pruning;
+mod stages;
+mod summary;
+mod work;
 
-/// First bytes of every stored result.
-const MAGIC: [u8; 4] = *b"GS4W";
-/// Version of the stored results: other versions count as absent.
-const VERSION: u32 = 1;
-/// Magic, version, fingerprint, checksum of the body.
-const HEAD: usize = 16;
+pub use stages::Stage;
+pub use work::{Fingerprint, Work};
 
-/// The stages of a bake, in order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Stage {
-    /// How much each Gaussian contributes to the training views.
-    Score,
-    /// Which Gaussians stay.
-    Prune,
-    /// Training of those that stay, to make up for those that left. Not part of a bake yet.
-    FineTune,
-    /// Which of them are active when.
-    Mask,
-    /// Quantisation and the package.
-    Compress,
-    /// How close the package is to the test views.
-    Evaluate,
-    /// What it all cost.
-    Report,
+use super::dataset::{Split, TrainingView};
+use super::engine::Engine;
+use super::prune::select;
+use super::quantize::Quality;
+use super::report::BakeReport;
+use super::score::ScoringSettings;
+use super::search::{Goal, ScoreChoice};
+use super::splits::open_split;
+use super::temporal_filter::KeyFrames;
+use super::{OfflineError, Progress, Subject, require_another_file, sliced};
+use crate::scene::{FilterKind, GaussianScene};
+use stages::Stages;
+use std::path::PathBuf;
+use summary::Facts;
+
+/// What to bake, and how small against how exact.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BakeSettings {
+    /// The file that the scene was read from: results of an earlier bake count only while it is the same.
+    pub checkpoint: PathBuf,
+    /// Folder of the dataset, with `transforms_train.json`. The report compares test views if there is a
+    /// `transforms_test.json`.
+    pub data: PathBuf,
+    /// The package to write, another file than the checkpoint.
+    pub out: PathBuf,
+    /// Divisor of the picture size or target width, as in training; pictures as they are if `None`.
+    pub resolution: Option<i32>,
+    /// Background, RGB, 0 to 1, in place of the one the capture was trained with.
+    pub background: Option<[f32; 3]>,
+    /// How many Gaussians to keep.
+    pub goal: Goal,
+    /// Which score to prune by.
+    pub score: ScoreChoice,
+    /// How to score.
+    pub scoring: ScoringSettings,
+    /// Which temporal filter to make.
+    pub filter: FilterKind,
+    /// Number of its key-frames.
+    pub key_frames: KeyFrames,
+    /// How much compression may lose.
+    pub quality: Quality,
+    /// zstd level of the package, 1 (fast) to 19 (small); the usual one if `None`.
+    pub level: Option<i32>,
+    /// Whether to leave the results of the stages in `OUT.bake` when all is done.
+    pub keep_work: bool,
 }
 
-impl Stage {
-    /// Its name, as on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Score => "score",
-            Self::Prune => "prune",
-            Self::FineTune => "fine-tune",
-            Self::Mask => "mask",
-            Self::Compress => "compress",
-            Self::Evaluate => "evaluate",
-            Self::Report => "report",
-        }
-    }
+/// A finished bake.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Baked {
+    /// What was done and what it cost.
+    pub report: BakeReport,
+    /// The report as JSON on disk.
+    pub json: PathBuf,
+    /// The report as a page on disk.
+    pub html: PathBuf,
 }
 
-/// What a result depends on, in 32 bits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Fingerprint(pub u32);
-
-impl Fingerprint {
-    /// Of files, byte by byte, in this order.
-    ///
-    /// # Errors
-    /// The first file that cannot be read, by name.
-    pub fn of_files(paths: &[&Path]) -> Result<Self, CodecError> {
-        let mut hasher = crc32fast::Hasher::new();
-        for path in paths {
-            hash_file(path, &mut hasher)
-                .map_err(|error| CodecError { path: path.to_path_buf(), kind: error.into() })?;
-        }
-        Ok(Self(hasher.finalize()))
+/// Runs every stage that is not done yet, on the scene that was read from the checkpoint. Its temporal filter, if it
+/// has one, is replaced. Begins the task "bake", and in it those of the stages.
+///
+/// # Errors
+/// Training views that are missing or show nothing of the scene, images that a loss needs and that are missing, files
+/// that cannot be written, a failure of the engine.
+pub fn bake(
+    scene: GaussianScene,
+    settings: &BakeSettings,
+    engine: &mut Engine,
+    progress: &mut dyn Progress,
+) -> Result<Baked, OfflineError> {
+    require_another_file(&settings.checkpoint, &settings.out)?;
+    let mut bake = Bake::open(scene, settings, engine, progress)?;
+    let baked = bake.run(progress);
+    if baked.is_err() {
+        bake.work.remove_if_empty();
+    } else if !settings.keep_work {
+        bake.work.remove()?;
     }
-
-    /// Of this and what follows: settings, as text.
-    pub fn and(self, settings: &str) -> Self {
-        let mut hasher = crc32fast::Hasher::new();
-        hasher.update(&self.0.to_le_bytes());
-        hasher.update(settings.as_bytes());
-        Self(hasher.finalize())
-    }
+    baked
 }
 
-fn hash_file(path: &Path, hasher: &mut crc32fast::Hasher) -> io::Result<()> {
-    let mut file = File::open(path)?;
-    let mut length = 0u64;
-    let mut block = vec![0; 1 << 16];
-    loop {
-        let count = file.read(&mut block)?;
-        if count == 0 {
-            break;
-        }
-        length += count as u64;
-        hasher.update(&block[..count]);
-    }
-    // So that two files are not mistaken for one.
-    hasher.update(&length.to_le_bytes());
-    Ok(())
+/// What the stages work with.
+struct Bake<'a> {
+    settings: &'a BakeSettings,
+    engine: &'a mut Engine,
+    subject: Subject,
+    /// Every training view.
+    views: Vec<TrainingView>,
+    work: Work,
+    /// Of the files and of how the checkpoint was read.
+    fingerprint: Fingerprint,
 }
 
-/// The folder of intermediate results.
-#[derive(Debug, Clone)]
-pub struct Work {
-    folder: PathBuf,
-}
-
-impl Work {
-    /// The folder `OUT.bake` beside the package to be, made if it is not there.
-    ///
-    /// # Errors
-    /// The folder cannot be made.
-    pub fn beside(out: &Path) -> Result<Self, CodecError> {
-        let mut name = out.file_name().unwrap_or_default().to_owned();
-        name.push(".bake");
-        let folder = out.with_file_name(name);
-        fs::create_dir_all(&folder).map_err(|error| CodecError { path: folder.clone(), kind: error.into() })?;
-        Ok(Self { folder })
+impl<'a> Bake<'a> {
+    fn open(
+        mut scene: GaussianScene,
+        settings: &'a BakeSettings,
+        engine: &'a mut Engine,
+        progress: &mut dyn Progress,
+    ) -> Result<Self, OfflineError> {
+        let BakeSettings { checkpoint, data, resolution, .. } = settings;
+        scene.filter = None;
+        let views = open_split(data, Split::Train, *resolution, &scene.trained_with, progress)?.views;
+        let cameras = data.join(Split::Train.file_name());
+        let files = Fingerprint::of_files(&[checkpoint, &cameras])?;
+        let read = format!("{:?} {:?} {resolution:?}", scene.trained_with, scene.playback);
+        let fingerprint = files.and(env!("CARGO_PKG_VERSION")).and(&read);
+        let subject = Subject::new(checkpoint, scene, settings.background)?;
+        let work = Work::beside(&settings.out)?;
+        Ok(Self { settings, engine, subject, views, work, fingerprint })
     }
 
-    /// The folder.
-    pub fn folder(&self) -> &Path {
-        &self.folder
-    }
-
-    /// A result stored before, if it is whole and its fingerprint is this one.
-    pub fn load(&self, name: &str, fingerprint: Fingerprint) -> Option<Vec<u8>> {
-        let bytes = fs::read(self.folder.join(name)).ok()?;
-        let (head, body) = bytes.split_at_checked(HEAD)?;
-        (head == self::head(fingerprint, body)).then(|| body.to_vec())
-    }
-
-    /// Stores a result, whole or not at all.
-    ///
-    /// # Errors
-    /// A folder that cannot be written to, a full disk.
-    pub fn store(&self, name: &str, fingerprint: Fingerprint, body: &[u8]) -> Result<(), CodecError> {
-        offline::write_beside(&self.folder.join(name), |file| {
-            file.write_all(&head(fingerprint, body))?;
-            file.write_all(body)
-        })
-    }
-
-    /// Removes the folder if nothing was stored.
-    pub fn remove_if_empty(&self) {
-        // A folder with something in it stays, which is what is wanted.
-        let _ = fs::remove_dir(&self.folder);
-    }
-
-    /// Removes the folder and what is in it.
-    ///
-    /// # Errors
-    /// What the system reports.
-    pub fn remove(self) -> Result<(), CodecError> {
-        fs::remove_dir_all(&self.folder).map_err(|error| CodecError { path: self.folder.clone(), kind: error.into() })
-    }
-}
-
-fn head(fingerprint: Fingerprint, body: &[u8]) -> [u8; HEAD] {
-    let mut head = [0; HEAD];
-    head[..4].copy_from_slice(&MAGIC);
-    head[4..8].copy_from_slice(&VERSION.to_le_bytes());
-    head[8..12].copy_from_slice(&fingerprint.0.to_le_bytes());
-    head[12..].copy_from_slice(&crc32fast::hash(body).to_le_bytes());
-    head
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn results_come_back_for_the_same_fingerprint_alone() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let out = folder.path().join("scene.gs4d");
-        fs::write(&out, b"input").expect("the folder can be written to");
-        let inputs = Fingerprint::of_files(&[&out]).expect("the file is there");
-        let work = Work::beside(&out).expect("the folder can be made");
-        let (settings, others) = (inputs.and("ratio 0.8"), inputs.and("ratio 0.5"));
-        work.store("kept", settings, b"some bytes").expect("the folder can be written to");
-        assert_eq!(work.load("kept", settings).as_deref(), Some(b"some bytes".as_slice()), "the same inputs");
-        assert_eq!(work.load("kept", others), None, "other settings");
-        assert_eq!(work.load("filter", settings), None, "never stored");
-        let path = work.folder().join("kept");
-        let mut bytes = fs::read(&path).expect("stored");
-        bytes[HEAD + 2] ^= 1;
-        fs::write(&path, &bytes).expect("the folder can be written to");
-        assert_eq!(work.load("kept", settings), None, "a changed byte");
-        fs::write(&path, &bytes[..7]).expect("the folder can be written to");
-        assert_eq!(work.load("kept", settings), None, "cut off");
-        work.remove().expect("the folder can be removed");
-        assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 1, "nothing stays behind");
-    }
-
-    #[test]
-    fn fingerprints_depend_on_every_file() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let file = |name: &str, bytes: &[u8]| {
-            let path = folder.path().join(name);
-            fs::write(&path, bytes).expect("the folder can be written to");
-            path
-        };
-        let (ab, c, a, bc) = (file("ab", b"ab"), file("c", b"c"), file("a", b"a"), file("bc", b"bc"));
-        let of = |paths: &[&Path]| Fingerprint::of_files(paths).expect("the files are there");
-        assert_ne!(of(&[&ab, &c]), of(&[&a, &bc]), "borders between files count");
-        assert_ne!(of(&[&ab, &c]), of(&[&c, &ab]), "and so does their order");
-        let gone = Fingerprint::of_files(&[&folder.path().join("gone")]).expect_err("not there").to_string();
-        assert!(gone.contains("gone"), "the file is named: {gone}");
+    fn run(&mut self, progress: &mut dyn Progress) -> Result<Baked, OfflineError> {
+        let mut stages = Stages::begin(progress);
+        let pruning = self.prune(&mut stages)?;
+        let mut pruned = select(&self.subject.scene, &pruning.kept);
+        // Stage::FineTune has its place here: it trains what is left, and everything after goes by what it trained.
+        let (filter, masked) = self.mask(&mut stages, &pruned, pruning.fingerprint)?;
+        let after = sliced(&pruned)?.into_owned();
+        pruned.filter = Some(filter.clone());
+        self.compress(&mut stages, pruned, masked)?;
+        let compared = stages.run(Stage::Evaluate, None, |progress| self.compare(progress))?;
+        let times = stages.times();
+        let before = sliced(&self.subject.scene)?;
+        let baked = stages.run(Stage::Report, None, |progress| {
+            let facts = Facts {
+                settings: self.settings,
+                trained_with: &self.subject.scene.trained_with,
+                before: &before,
+                after: &after,
+                filter: &filter,
+                found: pruning.found,
+                stages: times,
+                compared,
+            };
+            let report = facts.report()?;
+            let [json, html] = summary::write(&report, &self.settings.out, progress)?;
+            Ok(Baked { report, json, html })
+        })?;
+        stages.finish();
+        Ok(baked)
     }
 }

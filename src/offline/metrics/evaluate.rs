@@ -85,7 +85,7 @@ pub struct ViewMetrics {
     pub time: f32,
     /// The metrics.
     #[serde(flatten)]
-    pub likeness: ImageMetrics,
+    pub metrics: ImageMetrics,
 }
 
 /// How close a scene is to a dataset.
@@ -136,13 +136,13 @@ where
     for view in views {
         let reference = view.load_image(settings.background, settings.images)?.picture;
         let render = draw(&view.camera.view(view.time, settings.raster_fov))?;
-        let likeness = ImageMetrics::of(&reference, &render, settings.metrics)?;
-        let measured = ViewMetrics { name: view.name.clone(), time: view.time, likeness };
+        let metrics = ImageMetrics::of(&reference, &render, settings.metrics)?;
+        let measured = ViewMetrics { name: view.name.clone(), time: view.time, metrics };
         seen(&measured, &reference, &render)?;
         all.push(measured);
     }
-    let likenesses: Vec<ImageMetrics> = all.iter().map(|view| view.likeness).collect();
-    let mean = ImageMetrics::mean(&likenesses).ok_or(SizeMismatch { first: UVec2::ZERO, second: UVec2::ZERO })?;
+    let metrics: Vec<ImageMetrics> = all.iter().map(|view| view.metrics).collect();
+    let mean = ImageMetrics::mean(&metrics).ok_or(SizeMismatch { first: UVec2::ZERO, second: UVec2::ZERO })?;
     Ok(Evaluation { views: all, mean })
 }
 
@@ -161,16 +161,16 @@ pub fn side_by_side(reference: &Picture, render: &Picture, gain: f32) -> Picture
 mod tests {
     use super::*;
 
-    fn likeness(psnr: f64, ssim: Option<f64>) -> ImageMetrics {
+    fn metrics(psnr: f64, ssim: Option<f64>) -> ImageMetrics {
         ImageMetrics { psnr, psnr_pooled: psnr, ssim, ms_ssim: None, flip: None }
     }
 
     #[test]
     fn means_leave_out_what_some_view_lacks() {
-        let mean = ImageMetrics::mean(&[likeness(30.0, Some(0.9)), likeness(40.0, Some(0.7))]).expect("two views");
+        let mean = ImageMetrics::mean(&[metrics(30.0, Some(0.9)), metrics(40.0, Some(0.7))]).expect("two views");
         assert_eq!((mean.psnr, mean.ms_ssim), (35.0, None), "mean of two, nothing of none");
         assert!(mean.ssim.is_some_and(|ssim| (ssim - 0.8).abs() < 1e-12), "mean of two: {mean:?}");
-        let partial = ImageMetrics::mean(&[likeness(30.0, Some(0.9)), likeness(40.0, None)]).expect("two views");
+        let partial = ImageMetrics::mean(&[metrics(30.0, Some(0.9)), metrics(40.0, None)]).expect("two views");
         assert_eq!(partial.ssim, None, "a mean over fewer views would mislead");
         assert_eq!(ImageMetrics::mean(&[]), None, "no views");
     }

@@ -1,4 +1,4 @@
-//! Codebooks: vector quantisation of colour, one codebook after another over what the ones before left.
+//! Codebooks: vector quantization of color, one codebook after another over what the ones before left.
 //!
 //! In: rows of coefficients and how much each counts. Out: [`Codebooks`] of signed bytes, and a code into each for every row. Seeds
 //! are k-means++, refined by Lloyd's steps on a sample; once every row has its codes, all entries are fitted again to all rows. The
@@ -94,12 +94,12 @@ fn means(data: ArrayView2<'_, f32>, weights: &[f32], codes: &[u32], count: usize
     (sums.mapv(|mean| mean as f32), totals)
 }
 
-/// The nearest centre of every row.
+/// The nearest center of every row.
 fn assign(data: ArrayView2<'_, f32>, centers: &Array2<f32>) -> Vec<u32> {
     nearest_centers(data, centers).into_iter().map(|(index, _)| index).collect()
 }
 
-/// The nearest centre c of every row x, and `x·c − |c|²/2`.
+/// The nearest center c of every row x, and `x·c − |c|²/2`.
 fn nearest_centers(data: ArrayView2<'_, f32>, centers: &Array2<f32>) -> Vec<(u32, f32)> {
     let half_norms: Vec<f32> = centers.rows().into_iter().map(|center| 0.5 * center.dot(&center)).collect();
     let transposed = centers.t().as_standard_layout().into_owned();
@@ -132,7 +132,7 @@ fn centers(data: &Array2<f32>, weights: &[f32], count: usize, seed: u64) -> Arra
         let codes = assign(sample.view(), &centers);
         let (means, totals) = means(sample.view(), &weights, &codes, count);
         for (index, total) in totals.into_iter().enumerate() {
-            // A centre that nothing is near to stays where it is.
+            // A center that nothing is near to stays where it is.
             if total > 0.0 {
                 centers.row_mut(index).assign(&means.row(index));
             }

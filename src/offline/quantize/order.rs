@@ -1,4 +1,4 @@
-//! The order in which packed Gaussians are stored: neighbours in space beside each other.
+//! The order in which packed Gaussians are stored: neighbors in space beside each other.
 //!
 //! In: means. Out: a permutation by Morton code (Z-order), so that blocks have small boxes and columns compress.
 

@@ -4,8 +4,8 @@
 //! atomics: the same on every run.
 
 use super::{ScoreEngine, ScoreError, ViewScore, Want};
-use crate::renderer::bind::{Bind, bind_group, group_layout, pipeline};
-use crate::renderer::memory::binding_limit;
+use crate::renderer::bind::{Bind, group_layout, pipeline};
+use crate::renderer::memory::{Allocator, binding_limit};
 use crate::renderer::shaders::module;
 use crate::renderer::{GpuCapture, GpuContext, GpuError, Headless, ShaderChecks, layout};
 use crate::scene::RuntimeScene;
@@ -48,7 +48,7 @@ impl Scorer {
                 return Err(GpuError::Limit { what, found: found.into(), needed: needed.into() });
             }
         }
-        let frame = Bind::Uniform(size_of::<layout::Frame>());
+        let frame = Bind::Uniform(size_of::<layout::FrameUniforms>());
         let inputs = group_layout(
             device,
             "gs4d score inputs",
@@ -83,22 +83,22 @@ impl Scorer {
         let Some(frame) = headless.finished() else { return Err(GpuError::Device("nothing was drawn".into())) };
         let buffers = match self.buffers.take() {
             Some(made) if (made.slots, made.pairs) == (frame.slots, frame.pairs) => made,
-            _ => self.make(device, frame.slots, frame.pairs)?,
+            _ => self.make(headless.allocator(), frame.slots, frame.pairs)?,
         };
         let buffers = self.buffers.insert(buffers);
         let inputs = [
             frame.frame,
             frame.counters,
-            &frame.kept.tile_ranges,
-            &frame.kept.pair_splats,
-            &frame.kept.splats,
-            &frame.kept.order,
-            &frame.kept.offsets,
-            &frame.kept.depth_keys,
+            &frame.buffers.tile_ranges,
+            &frame.buffers.pair_splats,
+            &frame.buffers.splats,
+            &frame.buffers.order,
+            &frame.buffers.offsets,
+            &frame.buffers.depth_keys,
         ];
         let mut inputs = inputs.map(wgpu::Buffer::as_entire_binding).to_vec();
         inputs.push(wgpu::BindingResource::TextureView(frame.color));
-        let inputs = bind_group(device, "gs4d score inputs", &self.inputs, &inputs);
+        let inputs = headless.allocator().bind_group("gs4d score inputs", &self.inputs, &inputs);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gs4d score") });
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
@@ -121,30 +121,24 @@ impl Scorer {
     }
 
     /// Makes the buffers of that many slots and pairs.
-    fn make(&self, device: &wgpu::Device, slots: u32, pairs: u32) -> Result<Buffers, GpuError> {
-        let limit = binding_limit(&device.limits());
+    fn make(&self, allocator: Allocator<'_>, slots: u32, pairs: u32) -> Result<Buffers, GpuError> {
+        let limit = binding_limit(&allocator.device.limits());
         let needed = u64::from(pairs) * 16;
         if needed > limit {
             return Err(GpuError::TooLarge { what: "the scores of pairs", needed, limit });
         }
-        let buffer = |label, count: u32, each: u64| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size: u64::from(count) * each,
-                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
-                mapped_at_creation: false,
-            })
-        };
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+        let buffer = |label, count: u32, each: u64| allocator.buffer(label, u64::from(count) * each, usage);
         let first_pairs = buffer("gs4d first pairs", slots, 4);
         let pair_scores = buffer("gs4d pair scores", pairs, 16);
         let scores = buffer("gs4d scores", slots, 16);
         let resources = [&first_pairs, &pair_scores, &scores].map(|b| b.as_entire_binding());
-        let outputs = bind_group(device, "gs4d score outputs", &self.outputs, &resources);
+        let outputs = allocator.bind_group("gs4d score outputs", &self.outputs, &resources);
         Ok(Buffers { slots, pairs, scores, outputs })
     }
 }
 
-/// A scene on the GPU, ready to be scored: takes the place of the CPU twin.
+/// A scene on the GPU, ready to be scored: takes the place of the CPU reference.
 #[derive(Debug)]
 pub struct GpuEngine<'a> {
     headless: &'a mut Headless,

@@ -1,24 +1,28 @@
 //! Scores: what each Gaussian is worth, over all training views.
 //!
-//! In: a [`ScoreEngine`], the [`Traits`] of the Gaussians, the views. Out: [`Scores`], every [`Variant`] from a single pass over the
-//! views, summed in double precision.
+//! In: a [`ScoreEngine`], the [`Traits`] of the Gaussians, the views. Out: [`Scores`], every [`Variant`] from a single
+//! pass over the views, summed in double precision.
 
+mod file;
 mod gpu;
 mod reference;
+mod scoring;
 pub mod variant;
 
+pub use file::{read_scores, read_weights, write_scores};
 pub use gpu::{GpuEngine, Scorer};
 pub use reference::{ViewScore, Want, score};
+pub use scoring::ScoringSettings;
 
-use super::sliced;
+use super::{Progress, sliced};
 use crate::gaussian::{InvalidGaussian, Model, Parameters};
-use crate::scene::{Form, GaussianScene, RuntimeScene};
+use crate::scene::{GaussianScene, RuntimeScene, SceneForm};
 use crate::view::{Background, View};
 use rayon::prelude::*;
 use std::error::Error;
 use variant::Variant;
 
-/// Something that scores one view of a scene: the CPU twin or the GPU.
+/// Something that scores one view of a scene: the CPU reference or the GPU.
 pub trait ScoreEngine {
     /// Scores one view. Vectors are indexed as the scene.
     ///
@@ -27,7 +31,7 @@ pub trait ScoreEngine {
     fn score(&mut self, view: &View, want: Want) -> Result<ViewScore, ScoreError>;
 }
 
-/// The CPU twin.
+/// The CPU reference.
 #[derive(Debug)]
 pub struct CpuEngine<'a> {
     /// What is scored.
@@ -50,7 +54,7 @@ pub enum ScoreError {
     NoViews,
     /// Views and scene have nothing to do with one another.
     #[error(
-        "no Gaussian contributes to any training view: does this data belong to the checkpoint? (its cameras appearance elsewhere, or its \
+        "no Gaussian contributes to any training view: does this data belong to the checkpoint? (its cameras look elsewhere, or its \
          times lie outside the time interval)"
     )]
     NothingContributes,
@@ -109,8 +113,8 @@ impl Traits {
             .map(|gaussian| [f64::from(gaussian.mean_t), f64::from(gaussian.sigma_t).powi(2).min(LONGEST)])
             .collect();
         let log_volume = match &scene.form {
-            Form::Trained(parameters) => Some(log_volumes(parameters)),
-            Form::Runtime(_) | Form::Packed(_) => None,
+            SceneForm::Trained(trained) => Some(log_volumes(&trained.parameters)),
+            SceneForm::Ready(_) => None,
         };
         Ok(Self { moments, log_volume })
     }
@@ -136,7 +140,8 @@ fn log_volumes(parameters: &Parameters) -> Vec<f64> {
 
 /// Every score of every Gaussian.
 ///
-/// With `c` the contribution `α T` to a pixel, `C_t` its sum over the pixels of all views at time `t`, p the marginal and v its variance:
+/// With `c` the contribution `α T` to a pixel, `C_t` its sum over the pixels of all views at time `t`, p the marginal
+/// and v its variance:
 ///
 /// ```text
 /// change(t)  = 1 / (½ tanh |p''(t)| + ½)      p'' = ((t − μ_t)²/v² − 1/v) p        in (1, 2]: 2 where opacity does not change
@@ -156,7 +161,7 @@ pub struct Scores {
 }
 
 impl Scores {
-    /// Goes over the views once, those of one time together; `scored` is called after each.
+    /// Goes over the views once, those of one time together. Advances the caller's task once for each.
     ///
     /// # Errors
     /// No views, nothing in any of them, a failure of the engine.
@@ -165,7 +170,7 @@ impl Scores {
         traits: &Traits,
         views: &[View],
         settings: &ScoreSettings,
-        mut scored: impl FnMut(),
+        progress: &mut dyn Progress,
     ) -> Result<Self, ScoreError> {
         if views.is_empty() {
             return Err(ScoreError::NoViews);
@@ -184,7 +189,7 @@ impl Scores {
                     sum.energy += f64::from(energy);
                     sum.removal += f64::from(removal);
                 }
-                scored();
+                progress.advance();
             }
             let (time, count) = (f64::from(moment[0].time), moment.len() as f64);
             sums.par_iter_mut().enumerate().for_each(|(index, sum)| {
@@ -208,10 +213,9 @@ impl Scores {
         Ok(self.sums.iter().map(|sum| sum.value(variant) as f32).collect())
     }
 
-    /// The variants there are.
-    pub fn variants(&self) -> impl Iterator<Item = Variant> {
-        let has_volume = self.has_volume;
-        Variant::ALL.into_iter().filter(move |variant| has_volume || !variant.needs_volume())
+    /// Whether the volume of the Gaussians is known, which some variants need.
+    pub fn has_volume(&self) -> bool {
+        self.has_volume
     }
 
     /// How many Gaussians contribute to any view at all.

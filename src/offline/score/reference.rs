@@ -1,14 +1,15 @@
-//! `score`: what each Gaussian does to a picture, twin of `shaders/score.wgsl`.
+//! `score`: what each Gaussian does to a picture; CPU reference of `shaders/score.wgsl`.
 //!
 //! In: a scene, a view, the background. Out: [`ViewScore`], sums over the picture's pixels for each Gaussian. With `c = α T` where a
-//! Gaussian was blended into a pixel (after the tests of [`blend`](crate::reference::blend())), these are Σ c, Σ c², and what the squared picture
-//! would change by if that Gaussian alone were gone.
+//! Gaussian was blended into a pixel (after the tests of [`blend`](crate::reference::blend())), these are Σ c, Σ c², and what the
+//! squared picture would change by if that Gaussian alone were gone.
 
-use crate::gaussian::projection::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
+use crate::gaussian::alpha::{BlendStep, blend_step, reach_squared};
+use crate::gaussian::overlap::tile_at;
 use crate::reference::{Layer, Pair, Splat, TileLists, behind, project, tile_lists};
 use crate::scene::RuntimeScene;
 use crate::view::{Appearance, Background, BlendSpace, TILE_SIZE, View};
-use glam::{UVec2, Vec3};
+use glam::{UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -90,15 +91,15 @@ fn score_tile(
 ) -> Vec<Slot> {
     let mut slots = vec![Slot::default(); pairs.len()];
     if want < Want::Removal {
-        tile.blend(splats, pairs, |slot, _, step| slots[slot].contribute(step.weight));
+        tile.blend(splats, pairs, |slot, _, blended| slots[slot].contribute(blended.weight));
         return slots;
     }
     let last = tile.clone().blend(splats, pairs, |_, _, _| {}).over(behind);
-    tile.blend(splats, pairs, |slot, splat, step| {
+    tile.blend(splats, pairs, |slot, splat, blended| {
         let slot = &mut slots[slot];
-        slot.contribute(step.weight);
-        let behind = (last[step.pixel] - step.color) / step.left;
-        let change = step.weight * (splat.color - behind);
+        slot.contribute(blended.weight);
+        let behind = (last[blended.pixel] - blended.color) / blended.transmittance;
+        let change = blended.weight * (splat.color - behind);
         slot.removal += f64::from(change.length_squared());
     });
     slots
@@ -121,20 +122,19 @@ struct Tile {
 }
 
 /// A splat blended into a pixel.
-struct Step {
+struct Blended {
     pixel: usize,
     /// α T.
     weight: f32,
     /// Transmittance after it.
-    left: f32,
+    transmittance: f32,
     /// Colour of the pixel after it, without what is behind.
     color: Vec3,
 }
 
 impl Tile {
     fn new(index: u32, view: &View) -> Self {
-        let across = view.tiles().x;
-        let origin = UVec2::new(index % across, index / across) * TILE_SIZE;
+        let origin = tile_at(index, view.tiles()) * TILE_SIZE;
         let size = (view.size - origin).min(UVec2::splat(TILE_SIZE));
         Self {
             origin,
@@ -147,7 +147,7 @@ impl Tile {
     }
 
     /// Blends the splats of the tile in order, each into all pixels that it reaches; `each` sees the number of its pair.
-    fn blend(mut self, splats: &[Splat], pairs: &[Pair], mut each: impl FnMut(usize, &Splat, &Step)) -> Self {
+    fn blend(mut self, splats: &[Splat], pairs: &[Pair], mut each: impl FnMut(usize, &Splat, &Blended)) -> Self {
         for (number, pair) in pairs.iter().enumerate() {
             if self.live.iter().all(|&live| live == 0) {
                 break;
@@ -156,16 +156,15 @@ impl Tile {
             let reach = Reach::of(splat);
             for row in 0..self.height {
                 if self.live[row] > 0 {
-                    self.blend_row(row, splat, &reach, |step| each(number, splat, step));
+                    self.blend_row(row, splat, &reach, |blended| each(number, splat, blended));
                 }
             }
         }
         self
     }
 
-    fn blend_row(&mut self, row: usize, splat: &Splat, reach: &Reach, mut each: impl FnMut(&Step)) {
+    fn blend_row(&mut self, row: usize, splat: &Splat, reach: &Reach, mut each: impl FnMut(&Blended)) {
         let dy = splat.center.y - (self.origin.y + row as u32) as f32;
-        let conic = splat.conic;
         for column in reach.columns(dy, self.origin.x, self.width) {
             let pixel = row * SIDE + column;
             let before = self.transmittance[pixel];
@@ -173,24 +172,18 @@ impl Tile {
                 continue;
             }
             let dx = splat.center.x - (self.origin.x + column as u32) as f32;
-            let power = -0.5 * (conic.x * dx * dx + conic.z * dy * dy) - conic.y * dx * dy;
-            if power > 0.0 || power < reach.cutoff {
-                continue;
+            match blend_step(splat.conic, splat.opacity, Vec2::new(dx, dy), before) {
+                BlendStep::Skip => {}
+                BlendStep::Stop => {
+                    self.transmittance[pixel] = -before;
+                    self.live[row] -= 1;
+                }
+                BlendStep::Blend { weight, transmittance } => {
+                    self.transmittance[pixel] = transmittance;
+                    self.color[pixel] += splat.color * weight;
+                    each(&Blended { pixel, weight, transmittance, color: self.color[pixel] });
+                }
             }
-            let alpha = (splat.opacity * power.exp()).min(ALPHA_MAX);
-            if alpha < ALPHA_MIN {
-                continue;
-            }
-            let left = before * (1.0 - alpha);
-            if left < TRANSMITTANCE_MIN {
-                self.transmittance[pixel] = -before;
-                self.live[row] -= 1;
-                continue;
-            }
-            let weight = alpha * before;
-            self.transmittance[pixel] = left;
-            self.color[pixel] += splat.color * weight;
-            each(&Step { pixel, weight, left, color: self.color[pixel] });
         }
     }
 
@@ -216,21 +209,18 @@ struct Reach {
     energy: f64,
     /// Whether the conic is that of an ellipse.
     bounded: bool,
-    /// A power below this gives too little alpha, with room for rounding.
-    cutoff: f32,
 }
 
 impl Reach {
     fn of(splat: &Splat) -> Self {
         let conic = splat.conic.to_array().map(f64::from);
         let [xx, xy, yy] = conic;
-        let cutoff = (ALPHA_MIN / splat.opacity).ln() - 1e-3;
         Self {
             center: f64::from(splat.center.x),
             conic,
-            energy: -2.0 * f64::from(cutoff) + 0.01,
+            // With room for rounding.
+            energy: f64::from(reach_squared(splat.opacity)) + 0.012,
             bounded: xx > 0.0 && yy > 0.0 && xx * yy > xy * xy,
-            cutoff,
         }
     }
 

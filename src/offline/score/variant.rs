@@ -1,6 +1,6 @@
 //! The scores that can be asked for, by name.
 //!
-//! In: a name. Out: a [`Variant`]. What each means is told at [`Scores`](super::score::Scores).
+//! In: a name. Out: a [`Variant`]. [`Scores`](super::Scores) defines each of them.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -74,7 +74,7 @@ impl Variant {
         }
     }
 
-    /// Whether the volume of the Gaussians is part of it, which only the trained form tells.
+    /// Whether the volume of the Gaussians is part of it, which only the trained form has.
     pub fn needs_volume(self) -> bool {
         matches!(
             self,

@@ -1,13 +1,13 @@
 //! Loaders: from files of an asset source to captures.
 //!
-//! In: the bytes of a file named `*.gs4d` or `*.pth` and, for a checkpoint, the [`CheckpointOptions`] for what it does not say
-//! (`load_builder().with_settings(|options: &mut CheckpointOptions| ..)` or a `.meta` file) and `cfg_args` beside it. Out: a
+//! In: the bytes of a file named `*.gs4d` or `*.pth` and, for a checkpoint, `cfg_args` beside it and the [`CheckpointOptions`] for what
+//! neither contains (`load_builder().with_settings(|options: &mut CheckpointOptions| ..)` or a `.meta` file). Out: a
 //! [`GaussianCapture`] or a [`CaptureLoadError`], to which Bevy adds the path.
 
-use super::GaussianCapture;
 use crate::codec::checkpoint::{self, CheckpointError, CheckpointOptions};
 use crate::codec::package::{self, PackageError};
 use crate::gaussian::InvalidGaussian;
+use crate::plugin::component::GaussianCapture;
 use bevy::asset::io::Reader;
 use bevy::asset::{AssetLoader, AssetPath, LoadContext};
 use bevy::reflect::TypePath;
@@ -19,10 +19,10 @@ pub enum CaptureLoadError {
     /// The asset source could not deliver the bytes.
     #[error("the file could not be read: {0}")]
     Read(#[from] std::io::Error),
-    /// The bytes are no intact package.
+    /// The bytes are not an intact package.
     #[error(transparent)]
     Package(#[from] PackageError),
-    /// The bytes are no checkpoint that can be read.
+    /// The bytes are not a checkpoint that can be read.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
     /// The file is intact but holds a Gaussian that cannot be drawn.
@@ -30,7 +30,7 @@ pub enum CaptureLoadError {
     Gaussian(#[from] InvalidGaussian),
 }
 
-/// Loads packages, `.gs4d`.
+/// Loads packages, `.gs4d`, as [`GaussianCapture`]s. Errors: [`CaptureLoadError`].
 #[derive(Debug, Default, TypePath)]
 pub struct PackageLoader;
 
@@ -50,12 +50,14 @@ impl AssetLoader for PackageLoader {
     }
 
     fn extensions(&self) -> &[&str] {
-        &["gs4d"]
+        package::FORMAT.extensions
     }
 }
 
-/// Loads checkpoints of the original code, `.pth`. What the options leave open is taken from `cfg_args`, the file that the trainer
-/// leaves in the same folder, if it is there. Then it belongs to the checkpoint: when it changes, both are loaded again.
+/// Loads checkpoints of the original code, `.pth`, as [`GaussianCapture`]s. Errors: [`CaptureLoadError`].
+///
+/// What the settings leave open is taken from `cfg_args`, the file that the trainer writes into the same folder, if it is there. It is then
+/// a dependency of the checkpoint: when it changes, both are loaded again.
 #[derive(Debug, Default, TypePath)]
 pub struct CheckpointLoader;
 
@@ -76,7 +78,7 @@ impl AssetLoader for CheckpointLoader {
     }
 
     fn extensions(&self) -> &[&str] {
-        &["pth"]
+        checkpoint::FORMAT.extensions
     }
 }
 

@@ -1,20 +1,36 @@
-//! What loading tells the game.
+//! The messages about loading.
 //!
-//! In: what became of an entity's capture. Out: each of these both as a message, to be read by a system with a `MessageReader`, and as
-//! an event on that entity, to be observed: `commands.entity(capture).observe(|failed: On<CaptureFailed>| ..)`.
+//! In: a change of an entity's [`CaptureState`](super::CaptureState). Out: each message twice: to be read by a system with a
+//! `MessageReader`, and as an event on that entity, to be observed: `commands.entity(capture).observe(|failed: On<CaptureFailed>| ..)`.
 //!
-//! They are sent in `PreUpdate`, in [`CaptureAssetSystems`](super::CaptureAssetSystems) and, for what the GPU refuses, after it: whatever
-//! runs in `Update` reads them in the same frame.
+//! They are sent in `PreUpdate`, in [`CaptureAssetSystems`](super::CaptureAssetSystems) and, for captures that the GPU cannot draw, after
+//! it: systems in `Update` read them in the same frame.
 
-use super::GaussianCapture;
+use crate::plugin::component::GaussianCapture;
 use bevy::asset::AssetId;
 use bevy::ecs::entity::Entity;
 use bevy::ecs::event::EntityEvent;
 use bevy::ecs::message::{Message, MessageWriter};
 use bevy::ecs::system::{Commands, SystemParam};
 
-/// Its capture is there and drawn: it has been loaded, loaded again after its file changed (or changed in memory), or the entity was
-/// given another one that is there already. Said at the latest one frame after the capture first shows.
+/// An entity's capture is loaded and drawn: for the first time, again after its file or the asset changed, or because the entity was
+/// given another capture that is already loaded. Sent at the latest one frame after the capture is first drawn.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// /// Stands every capture upright once it is loaded.
+/// fn stand_up(ready: On<CaptureReady>, captures: Res<Assets<GaussianCapture>>, mut placed: Query<&mut Transform>) {
+///     if let (Some(capture), Ok(mut transform)) = (captures.get(ready.capture), placed.get_mut(ready.entity)) {
+///         transform.rotation = capture.upright();
+///     }
+/// }
+///
+/// App::new().add_observer(stand_up);
+/// ```
 #[derive(Message, EntityEvent, Debug, Clone, PartialEq)]
 pub struct CaptureReady {
     /// The entity with the capture.
@@ -23,18 +39,33 @@ pub struct CaptureReady {
     pub capture: AssetId<GaussianCapture>,
 }
 
-/// Its capture could not be loaded, or this GPU cannot draw it. If it had been loaded before and its file changed, what was there is still drawn.
+/// An entity's capture could not be loaded, or this GPU cannot draw it. If it had been loaded before and its file changed, the old capture
+/// is still drawn.
 ///
 /// Bevy logs the same error, whether this is read or not.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn report(mut failures: MessageReader<CaptureFailed>) {
+///     for CaptureFailed { entity, error } in failures.read() {
+///         warn!("{entity}: {error}");
+///     }
+/// }
+/// # bevy::ecs::system::assert_is_system(report);
+/// ```
 #[derive(Message, EntityEvent, Debug, Clone, PartialEq)]
 pub struct CaptureFailed {
     /// The entity with the capture.
     pub entity: Entity,
-    /// The file, what is wrong with it and, where there is one, the remedy.
+    /// The file, its fault and, where there is one, the remedy.
     pub error: String,
 }
 
-/// Tells the game.
+/// Sends the messages about loading.
 #[derive(SystemParam)]
 pub(crate) struct Announcer<'w, 's> {
     commands: Commands<'w, 's>,
@@ -52,7 +83,7 @@ impl Announcer<'_, '_> {
     }
 }
 
-/// Says something both ways.
+/// Writes a message and triggers the same event.
 pub(crate) fn send<'t, E>(commands: &mut Commands, writer: &mut MessageWriter<E>, event: E)
 where
     E: Message + EntityEvent<Trigger<'t>: Default> + Clone,

@@ -1,11 +1,13 @@
-//! The plugin of assets: what can be loaded, and who is told.
+//! The plugin of assets: the loaders, the loading state of entities, and its messages.
 //!
-//! In: an app with Bevy's `AssetPlugin`. Out: the same app, in which captures load and entities know how far theirs has got.
+//! In: an app with Bevy's `AssetPlugin`. Out: the same app, in which captures load and every entity with one has a [`CaptureState`].
 
-use super::state::{CaptureAssetSystems, keep_states};
-use super::upload_failures::{UploadFailures, report_upload_failures};
-use super::{CaptureFailed, CaptureReady, CaptureState, CheckpointLoader, GaussianCapture, PackageLoader};
-use crate::plugin::component::GaussianCapture3d;
+use super::loader::{CheckpointLoader, PackageLoader};
+use super::messages::{CaptureFailed, CaptureReady};
+use super::state::{CaptureAssetSystems, CaptureState};
+use super::systems::{report_upload_failures, update_states};
+use super::upload_failures::UploadFailures;
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use bevy::app::{App, Plugin, PreUpdate};
 use bevy::asset::{AssetApp, AssetTrackingSystems};
 use bevy::ecs::schedule::IntoScheduleConfigs;
@@ -24,7 +26,7 @@ impl Plugin for CaptureAssetPlugin {
             .add_message::<CaptureReady>()
             .add_message::<CaptureFailed>()
             .configure_sets(PreUpdate, CaptureAssetSystems.after(AssetTrackingSystems))
-            .add_systems(PreUpdate, keep_states.in_set(CaptureAssetSystems))
+            .add_systems(PreUpdate, update_states.in_set(CaptureAssetSystems))
             .add_systems(PreUpdate, report_upload_failures.after(CaptureAssetSystems));
     }
 }

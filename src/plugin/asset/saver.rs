@@ -1,10 +1,11 @@
 //! The saver: from a capture in memory to a package.
 //!
-//! In: a [`GaussianCapture`] and [`PackageSaverSettings`]. Out: the bytes of a `.gs4d` file that [`PackageLoader`] loads as the same
-//! capture, wherever Bevy writes assets.
+//! In: a [`GaussianCapture`] and [`PackageSaverSettings`]. Out: the bytes of a `.gs4d` file, in any asset source that Bevy can write,
+//! which [`PackageLoader`] loads as the same capture.
 
-use super::{GaussianCapture, PackageLoader};
+use super::loader::PackageLoader;
 use crate::codec::package::{self, PackageError, WriteSettings};
+use crate::plugin::component::GaussianCapture;
 use crate::scene::GaussianScene;
 use bevy::asset::io::Writer;
 use bevy::asset::saver::{AssetSaver, SavedAsset};
@@ -12,7 +13,9 @@ use bevy::asset::{AssetPath, AsyncWriteExt};
 use bevy::reflect::TypePath;
 use serde::{Deserialize, Serialize};
 
-/// Saves captures as packages, `.gs4d`, without loss. While it does, the scene is twice in memory.
+/// Saves captures as packages, `.gs4d`, without loss. Meanwhile the scene is in memory twice. Errors: [`CaptureSaveError`].
+///
+/// # Examples
 ///
 /// ```no_run
 /// # use bevy::asset::saver::{SaveAssetError, SavedAsset, save_using_saver};
@@ -30,7 +33,7 @@ pub struct PackageSaver;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PackageSaverSettings {
-    /// zstd level, 1 (fast) to 19 (small); what is outside is clamped.
+    /// zstd level, 1 (fast) to 19 (small); clamped to that range. Default: 9, as in [`WriteSettings`].
     pub level: i32,
 }
 
@@ -46,7 +49,7 @@ pub enum CaptureSaveError {
     /// The format cannot hold the scene.
     #[error(transparent)]
     Package(#[from] PackageError),
-    /// The asset source did not take the bytes.
+    /// The asset source did not accept the bytes.
     #[error("the file could not be written: {0}")]
     Write(#[from] std::io::Error),
 }

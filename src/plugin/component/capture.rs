@@ -1,16 +1,31 @@
 //! The asset type: a scene ready to draw, shared.
 //!
-//! In: a [`RuntimeScene`]. Out: a [`GaussianCapture`], cheap to clone, with what a game asks of it: where it is, how long it
-//! plays, which way is up.
+//! In: a [`RuntimeScene`]. Out: a [`GaussianCapture`], cheap to clone, with its bounds, its duration and its up direction.
 
-use super::KeyFrames;
+use super::key_frames::KeyFrames;
 use crate::scene::{Bounds, BoundsOverTime, RuntimeScene};
 use bevy::asset::Asset;
 use bevy::reflect::TypePath;
 use glam::{Quat, Vec3};
 use std::sync::Arc;
 
-/// A capture as an asset. Spawn it with [`GaussianCapture3d`](crate::plugin::component::GaussianCapture3d).
+/// A capture as an asset. Spawn it with [`GaussianCapture3d`](crate::GaussianCapture3d).
+///
+/// Clones share the scene.
+///
+/// # Examples
+///
+/// ```
+/// use bevy_gs4d::prelude::*;
+/// use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+///
+/// let scene = synthesize(&SynthSettings { count: 100, duration_seconds: 4.0, ..SynthSettings::default() });
+/// let capture = GaussianCapture::new(scene.into_runtime()?);
+/// assert_eq!(capture.duration_seconds(), 4.0, "as long as the scene");
+/// assert!(capture.bounds().is_some(), "its Gaussians are somewhere");
+/// // `assets.add(capture)`, with `assets: ResMut<Assets<GaussianCapture>>`, makes it spawnable.
+/// # Ok::<(), bevy_gs4d::gaussian::InvalidGaussian>(())
+/// ```
 #[derive(Asset, TypePath, Debug, Clone)]
 pub struct GaussianCapture {
     scene: Arc<RuntimeScene>,
@@ -18,7 +33,7 @@ pub struct GaussianCapture {
 }
 
 impl GaussianCapture {
-    /// A capture from a scene made in memory: `assets.add(GaussianCapture::new(scene))`.
+    /// Makes a capture of a scene in memory. Its bounds over time are computed here, from every Gaussian.
     pub fn new(scene: RuntimeScene) -> Self {
         let mut capture = Self { scene: Arc::new(scene), bounds: None };
         // A still never leaves its first moment.
@@ -27,29 +42,30 @@ impl GaussianCapture {
         capture
     }
 
-    /// The scene.
+    /// Returns the scene.
     pub fn scene(&self) -> &RuntimeScene {
         &self.scene
     }
 
-    /// The box about everything that is drawn at any time, in capture space; nothing for an empty capture.
+    /// Returns the box about everything that is drawn at any time, in capture space; `None` for an empty capture.
     pub fn bounds(&self) -> Option<Bounds> {
         self.bounds.as_ref().map(|bounds| bounds.whole())
     }
 
-    /// The box about everything that is drawn at `seconds` since the start, and somewhat earlier and later (a 32nd of the duration),
-    /// in capture space; nothing where nothing is drawn.
+    /// Returns the box about everything that is drawn at `seconds` since the start, and up to a 32nd of the duration earlier and later,
+    /// in capture space; `None` if nothing is drawn then.
     pub fn bounds_at(&self, seconds: f32) -> Option<Bounds> {
         self.bounds.as_ref()?.at(self.time_at(seconds))
     }
 
-    /// Seconds that one pass takes at speed 1; 0 for a still.
+    /// Returns the duration of one pass at speed 1, in seconds; 0 for a still.
     pub fn duration_seconds(&self) -> f32 {
         let seconds = self.scene.playback.duration_seconds;
         if seconds.is_finite() { seconds.max(0.0) } else { 0.0 }
     }
 
-    /// The capture's own timestamp at `seconds` since its start; what lies outside is clamped.
+    /// Returns the timestamp, in the capture's own unit of time, at `seconds` since its start. Seconds outside the capture are clamped;
+    /// NaN counts as 0.
     pub fn time_at(&self, seconds: f32) -> f32 {
         let [first, last] = self.scene.trained_with.time_interval;
         let duration = self.duration_seconds();
@@ -60,18 +76,19 @@ impl GaussianCapture {
         first + fraction * (last - first)
     }
 
-    /// Seconds since the start at the capture's own timestamp `time`: the reverse of [`time_at`](Self::time_at).
+    /// Returns the seconds since the start at the timestamp `time`, in the capture's own unit: the inverse of
+    /// [`time_at`](Self::time_at), but not clamped. 0 for a still.
     pub fn seconds_at(&self, time: f32) -> f32 {
         let [first, last] = self.scene.trained_with.time_interval;
         if last == first { 0.0 } else { (time - first) / (last - first) * self.duration_seconds() }
     }
 
-    /// When the key-frames of its temporal filter are; nothing without a filter, and for a still.
+    /// Returns the key-frames of the capture's temporal filter; `None` without a filter, and for a still.
     pub fn key_frames(&self) -> Option<KeyFrames> {
         KeyFrames::new(self.scene.filter.as_ref()?.segments, self.duration_seconds())
     }
 
-    /// The shortest rotation that stands the capture upright in Bevy's world, where +Y is up.
+    /// Returns the shortest rotation that stands the capture upright in Bevy's world, where +Y is up.
     pub fn upright(&self) -> Quat {
         Quat::from_rotation_arc(self.scene.playback.up.vector(), Vec3::Y)
     }
@@ -89,13 +106,9 @@ mod tests {
 
     fn with(gaussians: Vec<Gaussian>, time_interval: [f32; 2], duration_seconds: f32) -> GaussianCapture {
         GaussianCapture::new(RuntimeScene {
-            gaussians,
-            packed: None,
-            harmonics: Harmonics::default(),
-            environment: None,
-            filter: None,
             trained_with: TrainedWith { time_interval, ..TrainedWith::default() },
             playback: PlaybackHints { up: UpAxis::PosZ, duration_seconds },
+            ..RuntimeScene::sliced(gaussians, Harmonics::default())
         })
     }
 
@@ -134,7 +147,7 @@ mod tests {
         let still = with(vec![runner], [3.0, 8.0], 0.0);
         assert_eq!(still.bounds_at(1.0), still.bounds(), "a still does not move");
         assert!(still.bounds().is_some_and(|all| all.min.x > 2.9 && all.max.x < 3.1), "and stays at its first moment");
-        assert_eq!(empty.bounds_at(0.0), None, "an empty capture is nowhere");
+        assert_eq!(empty.bounds_at(0.0), None, "an empty capture has no bounds");
     }
 
     #[test]

@@ -1,9 +1,9 @@
-//! The key-frames of a capture: the moments between which its temporal filter is constant.
+//! The key-frames of a capture: the times between which its temporal filter is constant.
 //!
-//! In: the filter's number of segments and the capture's duration. Out: the times of its key-frames, at even spacing from the start
-//! to the end, and those that lie on a way from one moment to another.
+//! In: the filter's number of segments and the capture's duration. Out: the times of its key-frames, evenly spaced from the start to the
+//! end, and those that lie between two times.
 
-/// When the key-frames of a capture are.
+/// The key-frames of a capture: the bounds of its temporal filter's segments, evenly spaced.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KeyFrames {
     segments: u32,
@@ -11,22 +11,22 @@ pub struct KeyFrames {
 }
 
 impl KeyFrames {
-    /// Of a filter with `segments` segments over `duration` seconds; nothing for a still.
+    /// The key-frames of a filter with `segments` segments over `duration` seconds; `None` for a still.
     pub(super) fn new(segments: u32, duration: f32) -> Option<Self> {
         (segments > 0 && duration > 0.0).then_some(Self { segments, duration })
     }
 
-    /// How many there are: one more than segments.
+    /// Returns their number: one more than the filter has segments.
     pub fn count(&self) -> u32 {
         self.segments.saturating_add(1)
     }
 
-    /// When one is, in seconds since the capture's start.
+    /// Returns the time of the key-frame with an index, counted from 0, in seconds since the capture's start.
     pub fn time(&self, index: u32) -> f32 {
         (f64::from(index) * self.spacing()) as f32
     }
 
-    /// When all are, in seconds since the capture's start.
+    /// Returns the times of all of them, rising, in seconds since the capture's start.
     pub fn times(&self) -> impl Iterator<Item = f32> {
         (0..self.count()).map(|index| self.time(index))
     }
@@ -35,8 +35,8 @@ impl KeyFrames {
         f64::from(self.duration) / f64::from(self.segments)
     }
 
-    /// Those after `from` (or at it, if `inclusive`) up to `to`, in this order, which is falling if `to` is before `from`.
-    /// Both in seconds since the capture's start.
+    /// Indices of those after `from` (or at it, if `inclusive`) up to and including `to`, in the order of play: falling if `to` is
+    /// before `from`. Both in seconds since the capture's start.
     pub(crate) fn within(&self, from: f64, to: f64, inclusive: bool) -> impl Iterator<Item = u32> + use<> {
         let last = f64::from(self.segments);
         let [from, to] = [from, to].map(|time| time / self.spacing());

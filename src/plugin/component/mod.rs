@@ -1,8 +1,8 @@
-//! The capture asset and the component that puts it into the world: what every other module of the plugin builds on.
+//! The capture asset and the component that places it in the world: every other module of the plugin builds on these.
 //!
-//! In: a scene in memory, a handle. Out: a [`GaussianCapture`] that entities share, and an entity that is drawn by every `Camera3d` that
-//! sees it, as soon as the asset has been loaded. What else such an entity carries (its state of loading, its playback, its settings)
-//! is registered as a required component by the plugin that owns it.
+//! In: a scene in memory, a handle. Out: a [`GaussianCapture`] that entities share, and an entity that every `Camera3d` that sees it
+//! draws once the asset is loaded. The other components of such an entity (loading state, playback, settings) are registered as
+//! required components by the plugins that own them.
 
 mod capture;
 mod key_frames;
@@ -18,18 +18,35 @@ use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 use bevy::transform::components::Transform;
 
-/// A capture in the world: `commands.spawn(GaussianCapture3d(asset_server.load("toybox.gs4d")))`.
+/// Places a capture in the world.
 ///
-/// The entity's transform (translation, rotation, any scale) places it. Most captures have +z up: stand them upright with
-/// `Transform::from_rotation(Quat::from_rotation_x(-FRAC_PI_2))` or [`GaussianCapture::upright`]. What is nearer to a perspective
-/// camera than 0.2 units *of the capture* is not drawn, as in training; an orthographic camera draws from its near plane on.
+/// The entity's transform (translation, rotation, any scale) maps capture space to the world. Most captures have +z up: stand them
+/// upright with `Transform::from_rotation(Quat::from_rotation_x(-FRAC_PI_2))` or [`GaussianCapture::upright`]. A perspective camera
+/// draws nothing that is nearer than 0.2 units *of the capture*, as in training; an orthographic camera draws from its near plane on.
 ///
-/// [`Visibility`], `RenderLayers` and frustum culling decide which cameras draw it, as they do for meshes. The entity's `Aabb` is
-/// kept about what shows at the moment; a capture with an environment map, which is all around, has none and is never culled.
+/// [`Visibility`], `RenderLayers` and frustum culling decide which cameras draw the capture, as they do for meshes. The entity's
+/// `Aabb` encloses what is drawn at the current time. A capture with an environment map surrounds every camera: it has no `Aabb`
+/// and is never culled.
 ///
 /// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) also requires [`CaptureState`](crate::asset::CaptureState),
-/// [`Playback`](crate::playback::Playback) and [`CaptureSettings`](crate::render::CaptureSettings): they are inserted with their defaults
-/// unless they are spawned along.
+/// [`Playback`](crate::playback::Playback) and [`CaptureSettings`](crate::render::CaptureSettings): they are inserted with their
+/// defaults unless they are spawned along.
+///
+/// Default: a handle of no asset, with which nothing is drawn.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+/// use std::f32::consts::FRAC_PI_2;
+///
+/// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
+///     let upright = Transform::from_rotation(Quat::from_rotation_x(-FRAC_PI_2));
+///     commands.spawn((GaussianCapture3d(assets.load("toybox.gs4d")), upright));
+/// }
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
 #[derive(Component, Reflect, Debug, Default, Clone, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[require(Transform, Visibility, VisibilityClass)]

@@ -1,6 +1,6 @@
 //! Appearance: how one capture is drawn.
 //!
-//! In: its [`CaptureSettings`] and its bounds. Out: the settings as somebody wants them.
+//! In: its [`CaptureSettings`] and its bounds. Out: the settings as edited.
 
 use crate::plugin::render::{CaptureSettings, CropBox};
 use crate::scene::Bounds;
@@ -9,7 +9,7 @@ use bevy_egui::egui;
 use egui::{DragValue, Slider, SliderClamping};
 use glam::{Quat, Vec3};
 
-/// Draws the section. `bounds` is where the capture is, in its own space: the size of a new crop box.
+/// Draws the section. `bounds`, in capture space, is the size of a new crop box.
 pub(super) fn show(ui: &mut egui::Ui, settings: CaptureSettings, bounds: Option<Bounds>) -> CaptureSettings {
     let mut edited = settings;
     ui.checkbox(&mut edited.filter, "temporal filter");
@@ -19,7 +19,7 @@ pub(super) fn show(ui: &mut egui::Ui, settings: CaptureSettings, bounds: Option<
     ui.add(exposure.max_decimals(2).suffix(" stops").text("exposure"));
     ui.horizontal(|ui| {
         let mut rgb = [edited.tint.red, edited.tint.green, edited.tint.blue];
-        // The picker rounds what it is shown, too.
+        // The colour picker rounds even colours that are not edited.
         if ui.color_edit_button_rgb(&mut rgb).changed() {
             let [red, green, blue] = rgb;
             edited.tint = LinearRgba { red, green, blue, ..edited.tint };
@@ -40,7 +40,7 @@ pub(super) fn show(ui: &mut egui::Ui, settings: CaptureSettings, bounds: Option<
     edited
 }
 
-/// The box that cuts nothing off yet.
+/// The box about the whole capture.
 fn crop_around(bounds: Option<Bounds>) -> CropBox {
     let (center, half_size) = bounds.map_or((Vec3::ZERO, Vec3::ONE), |b| (b.center(), (b.max - b.min) * 0.5));
     CropBox { center, half_size, rotation: Quat::IDENTITY }
@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_nobody_touches_stays_as_it_is() {
+    fn values_that_are_not_edited_stay_as_they_are() {
         let crop = CropBox { center: Vec3::splat(0.123_45), half_size: Vec3::splat(-1.0), rotation: Quat::IDENTITY };
         let odd = CaptureSettings {
             filter: false,

@@ -1,6 +1,6 @@
-//! Memory: what is on the GPU.
+//! Memory: the bytes of captures and of a view on the GPU.
 //!
-//! In: [`CaptureStatistics`] and those of a view. Out: lines of text.
+//! In: [`CaptureStatistics`] and the statistics of a view. Out: lines of text.
 
 use super::presentation;
 use crate::plugin::render::CaptureStatistics;

@@ -1,7 +1,7 @@
-//! A panel to watch and steer captures with, for the development of a game.
+//! A panel that shows and edits captures, for the development of a game.
 //!
 //! In: an app with [`GaussianCapturePlugin`](crate::GaussianCapturePlugin), captures and a `Camera3d`. Out:
-//! [`InspectorPlugin`], which draws the panel over the picture with `bevy_egui`, and [`Inspector`], what a game sets of it.
+//! [`InspectorPlugin`], which draws the panel over the picture with `bevy_egui`, and [`Inspector`], its settings.
 //!
 //! ```no_run
 //! use bevy::prelude::*;
@@ -13,24 +13,27 @@
 //!
 //! | section | shows and sets |
 //! |---|---|
-//! | capture | which capture the panel is about, whether it has been loaded, and if not, why |
-//! | playback | play and pause, steps of a frame, the time under the marks of the filter's key-frames, speed, repeat, range |
-//! | look | the capture's filter, opacity, tint, exposure and crop box |
+//! | capture | which capture is shown, and its state of loading, with the reason if that failed |
+//! | playback | play and pause, steps of a frame, the time under the marks of the key-frames, speed, repeat, range |
+//! | appearance | the capture's temporal filter, opacity, tint, exposure and crop box |
 //! | view | the camera's debug view, blend space, written depth, multisampling and tonemapping |
 //! | counts | Gaussians in total, active and visible, pairs, and the frame rate |
-//! | memory | what captures and this view take on the GPU |
+//! | memory | bytes of captures and of this view on the GPU |
 //! | GPU time | milliseconds of each pass, measured only while the section is open |
 //!
-//! What nobody touches stays as it is: an open panel marks no component as changed and seeks nothing.
+//! Values that are not edited stay as they are: an open panel marks no component as changed and does not seek.
 
 mod appearance;
 mod camera;
-mod chooser;
 mod counts;
+mod entity_selector;
+mod listed;
 mod memory;
 mod playback;
 mod plugin;
 mod presentation;
+mod settings;
 mod timing;
 
-pub use plugin::{Inspector, InspectorPlugin};
+pub use plugin::InspectorPlugin;
+pub use settings::Inspector;

@@ -1,9 +1,10 @@
 //! Playback: when a capture is shown.
 //!
-//! In: its [`Playback`], its duration and key-frames. Out: the playback as somebody wants it.
+//! In: its [`Playback`], its duration and key-frames. Out: the playback as edited.
 
+use super::listed::Listed;
 use super::presentation::mark_positions;
-use crate::plugin::asset::GaussianCapture;
+use crate::plugin::component::GaussianCapture;
 use crate::plugin::playback::{Playback, Repeat};
 use bevy_egui::egui;
 use egui::{DragValue, Slider, SliderClamping};
@@ -14,7 +15,7 @@ const NUMBER_WIDTH: f32 = 76.0;
 /// Height of the strip of key-frame marks, points.
 const STRIP_HEIGHT: f32 = 10.0;
 
-/// Draws the section. `fps` is how many frames a second steps go by.
+/// Draws the section. `fps` is the frame rate of steps, in frames per second.
 pub(super) fn show(ui: &mut egui::Ui, playback: Playback, capture: &GaussianCapture, fps: &mut f32) -> Playback {
     let mut edited = playback;
     let duration = capture.duration_seconds();
@@ -79,7 +80,7 @@ fn strip(ui: &mut egui::Ui, playback: &Playback, capture: &GaussianCapture, dura
     response.on_hover_text(format!("{} key-frames", key_frames.count()));
 }
 
-/// How far from the ends of a slider its handle stops.
+/// The distance between the end of a slider and the middle of its handle there, in points.
 fn handle_inset(ui: &egui::Ui) -> f32 {
     let height = ui.text_style_height(&egui::TextStyle::Body).max(ui.spacing().interact_size.y);
     let radius = height / 2.5;
@@ -98,8 +99,8 @@ fn pace(ui: &mut egui::Ui, playback: &mut Playback) {
         }
     });
     ui.horizontal(|ui| {
-        for (repeat, name) in [(Repeat::Once, "once"), (Repeat::Loop, "loop"), (Repeat::PingPong, "ping-pong")] {
-            ui.selectable_value(&mut playback.repeat, repeat, name);
+        for &repeat in Repeat::ALL {
+            ui.selectable_value(&mut playback.repeat, repeat, repeat.name());
         }
     });
 }
@@ -127,7 +128,7 @@ fn seconds(value: &mut f32, range: RangeInclusive<f32>) -> DragValue<'_> {
     DragValue::new(value).range(range).clamp_existing_to_range(false).speed(0.01).max_decimals(3).suffix(" s")
 }
 
-/// An end of the range as it counts: within the capture, and its own end where it is no number.
+/// An end of the range, in seconds: clamped to the capture; `own`, the capture's own end, if it is NaN.
 fn within(seconds: f32, own: f32, duration: f32) -> f32 {
     if seconds.is_nan() { own } else { seconds.clamp(0.0, duration) }
 }
@@ -159,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nobody_touches_stays_as_it_is() {
+    fn values_that_are_not_edited_stay_as_they_are() {
         let odd = Playback { time: 0.123_45, speed: 7.123_4, start: 0.1, end: 1.234_5, ..Playback::default() };
         let outside = Playback { time: 9.0, start: -1.0, end: 5.0, ..Playback::default() };
         let inverted = Playback { time: -3.0, start: 1.5, end: 0.5, ..Playback::default() };

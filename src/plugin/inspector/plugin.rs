@@ -1,13 +1,14 @@
 //! The plugin and the panel itself.
 //!
-//! In: captures, cameras, [`CaptureStatistics`]. Out: the panel; what somebody touches in it is written back, and nothing else.
+//! In: captures, cameras, [`CaptureStatistics`]. Out: the panel. Only values that are edited in it are written back.
 
-use super::chooser::{self, Choice};
+use super::entity_selector::{self, Choice};
 use super::presentation::smoothed;
+use super::settings::Inspector;
 use super::timing::Measuring;
 use super::{appearance, camera, counts, memory, playback, timing};
-use crate::plugin::asset::{CaptureState, GaussianCapture};
-use crate::plugin::component::GaussianCapture3d;
+use crate::plugin::asset::CaptureState;
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::Playback;
 use crate::plugin::render::{CaptureSettings, CaptureStatistics, CaptureViewSettings};
 use bevy::app::{App, Plugin, PreUpdate, Update};
@@ -18,7 +19,6 @@ use bevy::ecs::change_detection::DetectChangesMut;
 use bevy::ecs::entity::Entity;
 use bevy::ecs::name::Name;
 use bevy::ecs::query::{With, Without};
-use bevy::ecs::resource::Resource;
 use bevy::ecs::schedule::IntoScheduleConfigs;
 use bevy::ecs::schedule::common_conditions::not;
 use bevy::ecs::system::{Commands, Local, Query, Res, ResMut, SystemParam};
@@ -32,37 +32,14 @@ use bevy_egui::{
     PrimaryEguiContext, egui, setup_primary_egui_context_system,
 };
 
-/// Draws the panel that [the module](crate::plugin::inspector) describes at the right edge of the first camera's picture. It is open from the
-/// start; F1 closes and opens it.
+/// Draws the panel that [the module](crate::inspector) describes at the right edge of the first camera's picture. It is open at first; F1
+/// closes and opens it.
 ///
-/// Add it after `DefaultPlugins` and [`GaussianCapturePlugin`](crate::GaussianCapturePlugin). It brings `EguiPlugin` along
-/// if that has not been added before. It works without a window, too. When the panel's camera goes, another one gets it, unless
+/// Add it after `DefaultPlugins` and [`GaussianCapturePlugin`](crate::GaussianCapturePlugin). It adds `EguiPlugin` unless that has
+/// been added before. It works without a window, too. When the panel's camera is despawned, another one draws the panel, unless
 /// [`EguiGlobalSettings::auto_create_primary_context`] is off.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct InspectorPlugin;
-
-/// What a game sets of the panel. Any field may be set at any time.
-#[derive(Resource, Debug, Clone, PartialEq)]
-pub struct Inspector {
-    /// Whether the panel shows, as it does at first. While it does not, it costs nothing.
-    pub open: bool,
-    /// The key that closes and opens it; F1 unless set.
-    pub key: KeyCode,
-    /// The entity with the capture that the panel is about; while it is none, or one without a capture, the first capture.
-    pub selected: Option<Entity>,
-    /// The camera whose view the panel is about; while it is none, or no `Camera3d`, the first one.
-    pub camera: Option<Entity>,
-    /// How many frames a second the buttons step by.
-    pub fps: f32,
-    /// A line of the game's own at the end of the panel.
-    pub note: String,
-}
-
-impl Default for Inspector {
-    fn default() -> Self {
-        Self { open: true, key: KeyCode::F1, selected: None, camera: None, fps: 30.0, note: String::new() }
-    }
-}
 
 impl Plugin for InspectorPlugin {
     fn build(&self, app: &mut App) {
@@ -74,7 +51,7 @@ impl Plugin for InspectorPlugin {
                 PreUpdate,
                 move_context
                     .in_set(EguiPreUpdateSet::InitContexts)
-                    // The context that bevy_egui has just made must be seen, or there would be two.
+                    // After bevy_egui has created its context, or there would be two.
                     .after(setup_primary_egui_context_system)
                     .before(WindowToEguiContextMap::on_egui_context_added_system),
             )
@@ -89,7 +66,8 @@ fn toggle(keys: Res<ButtonInput<KeyCode>>, mut inspector: ResMut<Inspector>) {
     }
 }
 
-/// Gives the panel another camera when its own is gone, which `bevy_egui` does not: one that draws into a window, if there is one.
+/// Moves the panel to another camera when its own has been despawned, which `bevy_egui` does not do: preferably to one that draws into a
+/// window.
 fn move_context(
     settings: Res<EguiGlobalSettings>,
     contexts: Query<(), With<PrimaryEguiContext>>,
@@ -128,7 +106,7 @@ fn show_panel(
         let mut open = true;
         egui::Window::new("inspector")
             .open(&mut open)
-            // Time may stand still, and a fading panel with it.
+            // Fading would stop while time stands still.
             .fade_in(false)
             .fixed_size([WIDTH, height])
             .anchor(egui::Align2::RIGHT_TOP, [-MARGIN, MARGIN])
@@ -165,7 +143,7 @@ type CameraParts = (
     Option<&'static mut Tonemapping>,
 );
 
-/// What the panel is about.
+/// The captures and cameras that the panel shows.
 #[derive(SystemParam)]
 struct Subject<'w, 's> {
     commands: Commands<'w, 's>,
@@ -178,19 +156,19 @@ struct Subject<'w, 's> {
 }
 
 impl Subject<'_, '_> {
-    /// The sections about one capture.
+    /// Draws the sections of one capture.
     fn show_capture(&mut self, ui: &mut egui::Ui, inspector: &mut Inspector) {
         if let Some(reason) = self.statistics.renderer_missing() {
             ui.colored_label(ui.visuals().error_fg_color, format!("captures are not drawn: {reason}"));
         }
         let choices = self.capture_choices();
-        let Some(shown) = chooser::shown(inspector.selected, &choices) else {
+        let Some(shown) = entity_selector::shown(inspector.selected, &choices) else {
             ui.weak("no capture");
             return;
         };
-        inspector.selected = chooser::show(ui, "capture", &choices, shown).or(inspector.selected);
+        inspector.selected = entity_selector::show(ui, "capture", &choices, shown).or(inspector.selected);
         let Ok((_, _, handle, state, mut player, mut settings)) = self.captures.get_mut(shown) else { return };
-        chooser::show_state(ui, state);
+        entity_selector::show_state(ui, state);
         let Some(capture) = self.loaded.get(&handle.0) else { return };
         section(ui, "playback", true, |ui| {
             let edited = playback::show(ui, *player, capture, &mut inspector.fps);
@@ -202,7 +180,7 @@ impl Subject<'_, '_> {
         });
     }
 
-    /// The sections about one camera. Whether GPU time is to be measured.
+    /// Draws the sections of one camera. Returns whether GPU time is to be measured.
     fn show_camera(
         &mut self,
         ui: &mut egui::Ui,
@@ -211,11 +189,11 @@ impl Subject<'_, '_> {
         frame_seconds: f32,
     ) -> bool {
         let choices = self.camera_choices();
-        let Some(shown) = chooser::shown(inspector.camera, &choices) else { return false };
+        let Some(shown) = entity_selector::shown(inspector.camera, &choices) else { return false };
         let view = self.statistics.view(shown);
         section(ui, "view", true, |ui| {
             if choices.len() > 1 {
-                inspector.camera = chooser::show(ui, "camera", &choices, shown).or(inspector.camera);
+                inspector.camera = entity_selector::show(ui, "camera", &choices, shown).or(inspector.camera);
             }
             self.show_view(ui, shown);
         });
@@ -268,7 +246,7 @@ impl Subject<'_, '_> {
     }
 }
 
-/// Queries come in another order whenever an entity gets another component.
+/// Sorts by entity: the order of queries changes whenever an entity gets another component.
 fn in_order(mut choices: Vec<Choice>) -> Vec<Choice> {
     choices.sort_by_key(|choice| choice.entity);
     choices

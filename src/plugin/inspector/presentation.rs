@@ -1,6 +1,6 @@
-//! How the panel says numbers.
+//! Numbers as the panel presents them.
 //!
-//! In: counts, bytes, times. Out: text for people, shares for bars, places for marks.
+//! In: counts, bytes, times. Out: text for people, shares for bars, positions for marks.
 
 /// A count in groups of three digits: `1,234,567`.
 pub(super) fn count(number: u64) -> String {
@@ -23,7 +23,7 @@ pub(super) fn bytes(number: u64) -> String {
     }
     let mut value = number as f64 / 1024.0;
     let mut unit = 0;
-    // What would be rounded to 1024.0 is one of the next unit.
+    // A value that would be rounded to 1024.0 becomes 1.0 of the next unit.
     while value >= 1023.95 && unit + 1 < UNITS.len() {
         value /= 1024.0;
         unit += 1;
@@ -31,12 +31,12 @@ pub(super) fn bytes(number: u64) -> String {
     format!("{value:.1} {}", UNITS[unit])
 }
 
-/// The share of a part, from 0 to 1; 0 of nothing.
+/// The share of a part in a whole, from 0 to 1; 0 if the whole is 0.
 pub(super) fn share(part: f64, whole: f64) -> f32 {
     if whole > 0.0 { (part / whole).clamp(0.0, 1.0) as f32 } else { 0.0 }
 }
 
-/// What a frame time in seconds means: `60.0 frames/s, 16.7 ms`.
+/// A frame time in seconds as text: `60.0 frames/s, 16.7 ms`.
 pub(super) fn frame_rate(seconds: f32) -> String {
     if seconds > 0.0 {
         format!("{:.1} frames/s, {:.1} ms", 1.0 / seconds, seconds * 1e3)
@@ -45,13 +45,13 @@ pub(super) fn frame_rate(seconds: f32) -> String {
     }
 }
 
-/// A mean that follows the last twenty or so values; 0 means that there was none yet.
+/// The next mean of about the last twenty values. A `mean` of 0 stands for none yet.
 pub(super) fn smoothed(mean: f32, value: f32) -> f32 {
     if mean > 0.0 { mean + (value - mean) * 0.05 } else { value }
 }
 
-/// Where marks at rising `times` of `duration` seconds are between `left` and `right`. Of those that would touch, only the first
-/// is kept.
+/// The positions between `left` and `right` of marks at rising `times` of `duration` seconds. Of marks that would touch, only the first is
+/// kept.
 pub(super) fn mark_positions(times: impl Iterator<Item = f32>, duration: f32, left: f32, right: f32) -> Vec<f32> {
     const APART: f32 = 2.0;
     let mut positions: Vec<f32> = Vec::new();

@@ -1,7 +1,7 @@
 //! GPU time: how long each pass takes.
 //!
-//! In: whether the section is open, the passes that have been measured. Out: bars, and the wish to measure, which costs some time
-//! itself.
+//! In: whether the section is open, the passes that have been measured. Out: bars; and measuring switched on while the section is open,
+//! because it takes some time itself.
 
 use super::counts::bar;
 use super::presentation::share;
@@ -9,10 +9,10 @@ use crate::plugin::render::CaptureStatistics;
 use crate::renderer::PassTime;
 use bevy_egui::egui;
 
-/// Frames after which what has not been measured cannot be measured.
-const RELEASE_AFTER_IDLE_FRAMES: u32 = 60;
+/// Frames without a measurement after which the GPU is taken to have no timestamps.
+const MOST_FRAMES_WAITED: u32 = 60;
 
-/// Whether the panel measures, and for how many frames nothing has come of it.
+/// Whether the panel measures, and for how many frames without a result.
 #[derive(Debug, Default)]
 pub(super) struct Measuring {
     on: bool,
@@ -20,7 +20,7 @@ pub(super) struct Measuring {
 }
 
 impl Measuring {
-    /// Measures from when the section is opened until it is closed. A game that measures for itself is left alone in between.
+    /// Starts measuring when the section is opened, and stops when it is closed. Nothing is set in between, so that a game can measure, too.
     pub(super) fn follow(&mut self, open: bool, statistics: &CaptureStatistics) {
         if self.on != open {
             *self = Self { on: open, waited: 0 };
@@ -33,7 +33,7 @@ impl Measuring {
 pub(super) fn show(ui: &mut egui::Ui, passes: &[PassTime], measuring: &mut Measuring) {
     if passes.is_empty() {
         measuring.waited = measuring.waited.saturating_add(1);
-        let waits = measuring.waited <= RELEASE_AFTER_IDLE_FRAMES;
+        let waits = measuring.waited <= MOST_FRAMES_WAITED;
         ui.weak(if waits { "measuring ..." } else { "not measured: this GPU has no timestamps" });
         return;
     }

@@ -1,8 +1,8 @@
 //! Picking: which capture a ray hits, which of its Gaussians, and where.
 //!
-//! In: a ray in the world, and all captures that are visible, at the moment they show, with their filter, opacity, fade and crop.
-//! Out: a [`CaptureHit`], which [`RuntimeScene::pick`](crate::scene::RuntimeScene::pick) finds: the Gaussian at which half of the light
-//! along the ray has been held back.
+//! In: a ray in the world, and all visible captures, at their current times, with their temporal filter, opacity, fade and crop. Out: a
+//! [`CaptureHit`], found by [`RuntimeScene::pick`](crate::scene::RuntimeScene::pick): the Gaussian at which half of the light along the
+//! ray is absorbed.
 //!
 //! ```no_run
 //! # use bevy::prelude::*;
@@ -11,7 +11,7 @@
 //! #[derive(Component)]
 //! struct Marker;
 //!
-//! /// Puts the marker where the camera looks.
+//! /// Puts the marker where the camera's view direction meets a capture.
 //! fn aim(
 //!     picker: CapturePicker,
 //!     camera: Single<&GlobalTransform, With<Camera3d>>,
@@ -24,8 +24,8 @@
 //! }
 //! ```
 //!
-//! For what is under the cursor take the ray of `Camera::viewport_to_world`. A ray costs about as much as a few arithmetic operations
-//! for each Gaussian of every capture whose box it meets, on all cores: cast a few each frame, not one for each pixel.
+//! `Camera::viewport_to_world` returns the ray under the cursor. A ray costs a few arithmetic operations for each Gaussian of every
+//! capture whose box it meets, on all cores: cast a few each frame, not one for each pixel.
 
 mod picker;
 

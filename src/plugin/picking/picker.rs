@@ -1,10 +1,9 @@
-//! The picker: rays of the world against captures where they are.
+//! The picker: rays of the world against placed captures.
 //!
 //! In: the components of captures, their assets. Out: [`CapturePicker`], a system parameter.
 
-use crate::gaussian::projection::ALPHA_MIN;
-use crate::plugin::asset::GaussianCapture;
-use crate::plugin::component::GaussianCapture3d;
+use crate::gaussian::alpha::reach_squared;
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::{ClipFade, Playback};
 use crate::plugin::render::CaptureSettings;
 use crate::scene::PickSettings;
@@ -17,23 +16,53 @@ use bevy::math::Ray3d;
 use bevy::transform::components::GlobalTransform;
 use glam::Vec3;
 
-/// What a ray hits of a capture.
+/// Where a ray hits a capture.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// /// The means of Gaussians are in capture space, hits in the world.
+/// fn describe(hit: &CaptureHit, captures: &Assets<GaussianCapture>, placed: &Query<&GaussianCapture3d>) -> Option<String> {
+///     let capture = captures.get(&placed.get(hit.entity).ok()?.0)?;
+///     let gaussian = capture.scene().iter().nth(hit.gaussian)?;
+///     Some(format!("{} away at {}: mean {:?}", hit.distance, hit.point, gaussian.mean))
+/// }
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CaptureHit {
     /// The entity with the capture.
     pub entity: Entity,
     /// Index of the Gaussian in the capture's [scene](GaussianCapture::scene).
     pub gaussian: usize,
-    /// From the ray's origin, world units.
+    /// Distance from the ray's origin, in world units.
     pub distance: f32,
-    /// Where on the ray that is, in the world.
+    /// The point on the ray at that distance, in the world.
     pub point: Vec3,
 }
 
-/// Casts rays at captures: `fn system(picker: CapturePicker)`.
+/// Casts rays at captures: a system parameter.
 ///
-/// Transforms are those of [`GlobalTransform`], which Bevy brings up to date in `PostUpdate`. The parameter reads [`Playback`],
-/// [`CaptureSettings`] and transforms of captures: to change them in the same system, use a `ParamSet`.
+/// Captures are where their [`GlobalTransform`] places them, which Bevy updates in `PostUpdate`. The parameter reads [`Playback`],
+/// [`CaptureSettings`] and [`GlobalTransform`] of captures: to change them in the same system, use a `ParamSet`.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// /// Logs what is in front of the camera.
+/// fn aim(picker: CapturePicker, camera: Single<&GlobalTransform, With<Camera3d>>) {
+///     let ray = Ray3d::new(camera.translation(), camera.forward());
+///     if let Some(hit) = picker.cast(ray) {
+///         info!("Gaussian {} of {}, {} away", hit.gaussian, hit.entity, hit.distance);
+///     }
+/// }
+/// # bevy::ecs::system::assert_is_system(aim);
+/// ```
 #[derive(SystemParam)]
 pub struct CapturePicker<'w, 's> {
     assets: Res<'w, Assets<GaussianCapture>>,
@@ -51,8 +80,8 @@ type Placed = (
 );
 
 impl CapturePicker<'_, '_> {
-    /// What the ray hits first, of all captures that are loaded and not hidden (whether any camera sees them or not). Each
-    /// capture is taken alone: two that only together hold back half of the light are passed.
+    /// Returns the nearest hit of all captures that are loaded and not hidden, whether a camera sees them or not; `None` if the ray hits
+    /// none. Captures are tested one by one: the ray passes through two that absorb half of the light only together.
     pub fn cast(&self, ray: Ray3d) -> Option<CaptureHit> {
         let mut nearest: Option<CaptureHit> = None;
         for placed in self.captures.iter().filter(|(.., visibility, _)| visibility.get()) {
@@ -62,7 +91,7 @@ impl CapturePicker<'_, '_> {
         nearest
     }
 
-    /// What the ray hits of one capture, hidden or not. What has a scale of 0 is not hit.
+    /// Returns the hit of one capture, hidden or not; `None` if the ray misses it, it is not loaded, or its scale is 0.
     pub fn cast_on(&self, entity: Entity, ray: Ray3d) -> Option<CaptureHit> {
         self.cast_within(self.captures.get(entity).ok()?, ray, f32::INFINITY)
     }
@@ -79,7 +108,7 @@ impl CapturePicker<'_, '_> {
         if affine.matrix3.determinant() == 0.0 {
             return None;
         }
-        // Lengths along the ray are the same in the world and, in lengths of its direction, in the capture.
+        // Distances in the world equal distances in the capture measured in lengths of the transformed direction.
         let from_world = affine.inverse();
         let origin = from_world.transform_point3(ray.origin);
         let direction = from_world.transform_vector3(*ray.direction);
@@ -102,5 +131,5 @@ impl CapturePicker<'_, '_> {
 /// How much farther than three standard deviations, which bounds hold, an alpha can reach 1/255: to `sqrt(2 ln(255 opacity))`, 3.33 for
 /// a peak of 1. A box that holds three of every Gaussian in it, scaled by this, holds so many of each.
 fn reach(opacity: f32) -> f32 {
-    (2.0 * (opacity.max(1.0) / ALPHA_MIN).ln()).sqrt() / 3.0
+    reach_squared(opacity.max(1.0)).sqrt() / 3.0
 }

@@ -1,7 +1,7 @@
 //! Clocks that several captures share.
 //!
-//! In: the game's time, or seconds set by hand from an audio player or the network. Out: a [`PlaybackClock`], to which every
-//! [`Playback`](super::Playback) with [`FollowsClock`] keeps, whenever it was spawned or loaded.
+//! In: the game's time, or seconds set by hand from an audio player or the network. Out: a [`PlaybackClock`] that every
+//! [`Playback`](super::Playback) with [`FollowsClock`] follows, whenever it was spawned or loaded.
 
 use bevy::ecs::component::Component;
 use bevy::ecs::entity::Entity;
@@ -9,7 +9,9 @@ use bevy::ecs::reflect::ReflectComponent;
 use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 
-/// A clock on an entity of its own. Its followers show the moment it stands at, and nothing else: they cannot drift apart.
+/// A clock on an entity of its own. Its followers show exactly the time of the clock, so that they cannot drift apart.
+///
+/// # Examples
 ///
 /// ```
 /// use bevy::prelude::*;
@@ -21,7 +23,7 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// }
 ///
 /// fn keep_time(mut clock: Single<&mut PlaybackClock>) {
-///     clock.set(12.5); // where the song is now
+///     clock.set(12.5); // the position in the song, in seconds
 /// }
 /// # bevy::ecs::system::assert_is_system(setup);
 /// # bevy::ecs::system::assert_is_system(keep_time);
@@ -29,35 +31,52 @@ use bevy::reflect::std_traits::ReflectDefault;
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 pub struct PlaybackClock {
-    /// What it shows. Unrounded and never wrapped: followers do that for themselves.
+    /// The time it shows, in seconds. Neither rounded nor wrapped: its followers do that. Default: 0.
     pub seconds: f64,
-    /// Seconds that it gains per second of the game; negative runs backwards. Counts for [`ClockSource::Game`] only.
+    /// Seconds of the clock per second of the game; negative runs backwards. Used with [`ClockSource::Game`] only. Default: 1.
     pub speed: f32,
-    /// Whether it runs. Counts for [`ClockSource::Game`] only.
+    /// Whether it runs. Used with [`ClockSource::Game`] only. Default: true.
     pub running: bool,
-    /// What moves it.
+    /// What moves it. Default: [`ClockSource::Game`].
     pub source: ClockSource,
-    /// How often it has jumped. When this changes, followers [seek](super::PlaybackSeeked) to what it shows; otherwise they
-    /// play whatever lies between, which crosses key-frames and markers.
+    /// Number of its jumps. When this changes, followers [seek](super::PlaybackSeeked) to the time it shows; otherwise they play the
+    /// time between, which crosses key-frames and markers. Default: 0.
     pub jumps: u32,
 }
 
-/// What moves a clock.
+/// What moves a clock. Default: [`Game`](Self::Game).
 #[derive(Reflect, Debug, Default, Clone, Copy, PartialEq, Eq, Hash)]
 #[reflect(Default, Debug, Clone, PartialEq)]
 pub enum ClockSource {
     /// Bevy's virtual time: the clock pauses and scales with it.
     #[default]
     Game,
-    /// Nothing but [`PlaybackClock::set`] and [`PlaybackClock::seek`].
+    /// Only [`PlaybackClock::set`] and [`PlaybackClock::seek`].
     Manual,
 }
 
-/// Keeps a [`Playback`](super::Playback) to the [`PlaybackClock`] on another entity.
+/// Lets a [`Playback`](super::Playback) follow the [`PlaybackClock`] on another entity.
 ///
-/// Its time is then the clock's, multiplied by its own speed, `offset` into its range, repeated as it says; `time` cannot be set.
-/// A follower that is paused stands, and falls in with the clock again when it plays. Where the entity has no clock, time stands.
-/// A [`TimelinePlayer`](super::TimelinePlayer) cannot follow the clock of another one: let both follow a clock of their own.
+/// The playback's time is then the clock's time multiplied by the playback's own `speed`, plus its `offset`, within its range and repeated as
+/// its `repeat` specifies; setting `time` has no effect. A paused follower stands still and continues at the clock's time when it plays again. If
+/// the entity has no clock, time stands still. A [`TimelinePlayer`](super::TimelinePlayer) cannot follow the clock of another one: let
+/// both follow a third clock.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
+///     // Runs with the game's time, at half speed.
+///     let clock = commands.spawn(PlaybackClock { speed: 0.5, ..default() }).id();
+///     for file in ["left.gs4d", "right.gs4d"] {
+///         commands.spawn((GaussianCapture3d(assets.load(file)), FollowsClock(clock)));
+///     }
+/// }
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component, Debug, Clone, PartialEq)]
 pub struct FollowsClock(#[entities] pub Entity);
@@ -69,12 +88,12 @@ impl Default for PlaybackClock {
 }
 
 impl PlaybackClock {
-    /// A clock at 0 that is set by hand.
+    /// Returns a clock at 0 that only [`set`](Self::set) and [`seek`](Self::seek) move.
     pub fn manual() -> Self {
         Self { source: ClockSource::Manual, ..Self::default() }
     }
 
-    /// Shows that time has passed until `seconds`: what followers skip over counts as played.
+    /// Sets the clock to `seconds`, as time that has passed: followers play the time between.
     pub fn set(&mut self, seconds: f64) {
         self.seconds = seconds;
     }
@@ -85,10 +104,14 @@ impl PlaybackClock {
         self.jumps = self.jumps.wrapping_add(1);
     }
 
-    /// Moves on by `delta` seconds of the game, if it does so. A speed that is no finite number holds it.
+    /// Advances by `delta` seconds of the game, if the game moves the clock and it runs. A speed that is not finite holds it.
     pub fn advance(&mut self, delta: f64) {
+        let runs = match self.source {
+            ClockSource::Game => self.running,
+            ClockSource::Manual => false,
+        };
         let next = self.seconds + delta * f64::from(self.speed);
-        if self.running && self.source == ClockSource::Game && next.is_finite() {
+        if runs && next.is_finite() {
             self.seconds = next;
         }
     }

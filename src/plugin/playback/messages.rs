@@ -1,85 +1,171 @@
-//! What playback tells the game.
+//! The messages about playing.
 //!
-//! In: what happened to an entity. Out: each of these both as a message, to be read by a system with a
-//! `MessageReader`, and as an event on that entity, to be observed: `commands.entity(capture).observe(|ended: On<PlaybackEnded>| ..)`.
+//! In: what happened to an entity in a step. Out: each message twice: to be read by a system with a `MessageReader`, and as an event on
+//! that entity, to be observed: `commands.entity(capture).observe(|ended: On<PlaybackEnded>| ..)`.
 //!
-//! The entity has a [`Playback`](super::Playback): a capture or a [`TimelinePlayer`](super::TimelinePlayer). Those of one entity
-//! and frame come in the order of this file.
+//! The entity has a [`Playback`](super::Playback): a capture or a [`TimelinePlayer`](super::TimelinePlayer). The events of one entity
+//! in one frame are triggered in this order: seeked, started, paused, key-frames or markers, looped, ended.
 
+use super::advance::Progress;
 use super::span::Leg;
-use super::state::Progress;
-use crate::plugin::asset::{KeyFrames, send};
+use crate::plugin::asset::send;
+use crate::plugin::component::KeyFrames;
 use bevy::ecs::entity::Entity;
 use bevy::ecs::event::EntityEvent;
 use bevy::ecs::message::{Message, MessageWriter};
 use bevy::ecs::system::{Commands, SystemParam};
 
-/// It plays, and did not before: it has been loaded, or `playing` was set.
+/// An entity plays that did not before: it has been loaded, or [`playing`](super::Playback::playing) was set.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// App::new().add_observer(|started: On<PlaybackStarted>| info!("{} plays", started.entity));
+/// ```
 #[derive(Message, EntityEvent, Debug, Clone, PartialEq)]
 pub struct PlaybackStarted {
-    /// What plays.
+    /// The entity that plays.
     pub entity: Entity,
 }
 
-/// It no longer plays because `playing` was cleared. Coming to an end is [`PlaybackEnded`].
+/// An entity no longer plays because [`playing`](super::Playback::playing) was cleared. Reaching the end is [`PlaybackEnded`].
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// App::new().add_observer(|paused: On<PlaybackPaused>| info!("{} is paused", paused.entity));
+/// ```
 #[derive(Message, EntityEvent, Debug, Clone, PartialEq)]
 pub struct PlaybackPaused {
-    /// What was paused.
+    /// The entity that was paused.
     pub entity: Entity,
 }
 
-/// Time jumped: `time` was set, or the clock that it follows jumped.
+/// Time jumped: [`time`](super::Playback::time) was set, or the clock that the entity follows jumped.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// App::new().add_observer(|seeked: On<PlaybackSeeked>| info!("from {} s to {} s", seeked.from, seeked.to));
+/// ```
 #[derive(Message, EntityEvent, Debug, Clone, PartialEq)]
 pub struct PlaybackSeeked {
-    /// What was sent elsewhere.
+    /// The entity whose time jumped.
     pub entity: Entity,
-    /// Where it was, seconds since the start.
+    /// The time before, in seconds since the start.
     pub from: f32,
-    /// Where it went.
+    /// The time after, in seconds since the start.
     pub to: f32,
 }
 
-/// A key-frame of a capture's temporal filter was crossed, or arrived at, while playing.
+/// A key-frame of a capture's temporal filter was crossed, or reached, while playing.
 ///
-/// A moment that was sought counts when it is played from. A step that is longer than four passes of a loop tells of the last few.
+/// A key-frame at the time of a seek counts once playing continues from there. A step that is longer than four passes of a loop sends
+/// the key-frames of two to four of them.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn report(mut crossed: MessageReader<KeyFrameCrossed>) {
+///     for KeyFrameCrossed { entity, index, time } in crossed.read() {
+///         info!("{entity}: key-frame {index} at {time} s");
+///     }
+/// }
+/// # bevy::ecs::system::assert_is_system(report);
+/// ```
 #[derive(Message, EntityEvent, Debug, Clone, PartialEq)]
 pub struct KeyFrameCrossed {
     /// The capture.
     pub entity: Entity,
-    /// Which key-frame, counted from 0.
+    /// The key-frame, counted from 0.
     pub index: u32,
-    /// When it is, seconds since the capture's start.
+    /// Its time, in seconds since the capture's start.
     pub time: f32,
 }
 
-/// A marker of a timeline was crossed, or arrived at, while playing, like [`KeyFrameCrossed`].
+/// A marker of a timeline was crossed, or reached, while playing. Seeks and long steps count as for [`KeyFrameCrossed`].
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn cue(mut markers: MessageReader<MarkerReached>) {
+///     for marker in markers.read().filter(|marker| marker.name == "applause") {
+///         info!("applause at {} s", marker.time);
+///     }
+/// }
+/// # bevy::ecs::system::assert_is_system(cue);
+/// ```
 #[derive(Message, EntityEvent, Debug, Clone, PartialEq)]
 pub struct MarkerReached {
     /// The timeline's player.
     pub entity: Entity,
     /// The marker's name.
     pub name: String,
-    /// When it is, seconds since the timeline's start.
+    /// Its time, in seconds since the timeline's start.
     pub time: f32,
 }
 
-/// It came to an end of its range and starts over, or turns round.
+/// An entity reached an end of its range and starts over, or turns round.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// /// Plays every pass of a loop at another speed.
+/// fn vary(looped: On<PlaybackLooped>, mut players: Query<&mut Playback>) {
+///     if let Ok(mut playback) = players.get_mut(looped.entity) {
+///         playback.speed = if playback.speed == 1.0 { 0.5 } else { 1.0 };
+///     }
+/// }
+///
+/// App::new().add_observer(vary);
+/// ```
 #[derive(Message, EntityEvent, Debug, Clone, PartialEq)]
 pub struct PlaybackLooped {
-    /// What loops.
+    /// The entity that loops.
     pub entity: Entity,
-    /// How often within the step: 1 unless the step is longer than the range.
+    /// How often it reached an end in this step: 1 unless the step is longer than the range.
     pub turns: u32,
 }
 
-/// It has been played once and stopped, or has been carried to its end by the clock that it follows.
+/// An entity has played once and stopped, or the clock that it follows has carried it to its end.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn remove(ended: On<PlaybackEnded>, mut commands: Commands) {
+///     commands.entity(ended.entity).despawn();
+/// }
+///
+/// App::new().add_observer(remove);
+/// ```
 #[derive(Message, EntityEvent, Debug, Clone, PartialEq)]
 pub struct PlaybackEnded {
-    /// What ended.
+    /// The entity that ended.
     pub entity: Entity,
 }
 
-/// Tells the game.
+/// Sends the messages about playing.
 #[derive(SystemParam)]
 pub(super) struct Announcer<'w, 's> {
     commands: Commands<'w, 's>,
@@ -93,8 +179,8 @@ pub(super) struct Announcer<'w, 's> {
 }
 
 impl Announcer<'_, '_> {
-    /// What happened in a step; `crossed` tells what was on the way.
-    pub(super) fn tell(&mut self, entity: Entity, progress: &Progress, mut crossed: impl FnMut(&mut Self, &Leg)) {
+    /// Sends what happened in a step. `crossed` sends the key-frames or markers on a stretch that was played.
+    pub(super) fn report(&mut self, entity: Entity, progress: &Progress, mut crossed: impl FnMut(&mut Self, &Leg)) {
         if let Some([from, to]) = progress.seeked {
             send(&mut self.commands, &mut self.seeked, PlaybackSeeked { entity, from, to });
         }
@@ -115,7 +201,7 @@ impl Announcer<'_, '_> {
         }
     }
 
-    /// Key-frames that were crossed.
+    /// Sends the key-frames on a stretch that was played.
     pub(super) fn key_frames(&mut self, entity: Entity, key_frames: &KeyFrames, leg: &Leg) {
         for index in key_frames.within(leg.from, leg.to, leg.inclusive) {
             let crossed = KeyFrameCrossed { entity, index, time: key_frames.time(index) };
@@ -123,7 +209,7 @@ impl Announcer<'_, '_> {
         }
     }
 
-    /// A marker that was crossed.
+    /// Sends a marker that was crossed.
     pub(super) fn marker(&mut self, entity: Entity, name: &str, time: f32) {
         send(&mut self.commands, &mut self.markers, MarkerReached { entity, name: name.to_owned(), time });
     }

@@ -1,14 +1,13 @@
-//! The plugin of playback: what runs when.
+//! The plugin of playback: which system runs when.
 //!
-//! In: an app with Bevy's `AssetPlugin` and `TimePlugin`. Out: the same app, in which clocks run, timelines direct and captures
-//! advance.
+//! In: an app with Bevy's `AssetPlugin` and `TimePlugin`. Out: the same app, in which clocks, timelines and captures advance.
 
-use super::systems::{advance_captures, run_clocks};
-use super::timeline::{Timeline, TimelineLoader, advance_timelines, bind_tracks, direct_tracks};
-use super::{
-    KeyFrameCrossed, MarkerReached, Playback, PlaybackEnded, PlaybackLooped, PlaybackPaused, PlaybackSeeked,
-    PlaybackStarted, PlaybackSystems,
+use super::component::Playback;
+use super::messages::{
+    KeyFrameCrossed, MarkerReached, PlaybackEnded, PlaybackLooped, PlaybackPaused, PlaybackSeeked, PlaybackStarted,
 };
+use super::systems::{PlaybackSystems, advance_captures, run_clocks};
+use super::timeline::{Timeline, TimelineLoader, advance_timelines, bind_tracks, direct_tracks};
 use crate::plugin::component::GaussianCapture3d;
 use bevy::app::{App, Plugin, Update};
 use bevy::asset::AssetApp;

@@ -1,11 +1,11 @@
-//! The arithmetic of playing: a range of time that is played once, over and over, or to and fro.
+//! The arithmetic of playing: a range of time that is played once, in a loop, or ping-pong.
 //!
-//! In: a [`Playback`]'s range and two phases, that is, seconds played since the in point without ever wrapping. Out: the moment
-//! that a phase shows, and a [`Travel`]: every stretch of the capture that was passed between the two, in order.
+//! In: a range and two phases. A phase is the time played since the in point, in seconds, without wrapping; a pass is one run through the
+//! range. Out: the time that a phase shows, and a [`Travel`]: every stretch of the capture that was passed between the two, in order.
 
-use super::{Playback, Repeat};
+use super::repeat::Repeat;
 
-/// A range of time and how it is repeated.
+/// A range of time and how it is repeated. Seconds of the capture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Span {
     start: f64,
@@ -17,39 +17,39 @@ pub(super) struct Span {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Travel {
     span: Span,
-    /// The phases; of a longer way no more than four passes.
+    /// The phases, at most four passes apart: `to` is moved nearer where the step was longer.
     from: f64,
     to: f64,
-    /// Passes are numbered by the whole lengths before them.
+    /// The first and the last pass. A pass has the number of whole range lengths before it.
     first: f64,
     last: f64,
-    /// Whether what is exactly at the beginning counts as passed.
+    /// Whether the moment at `from` itself counts as passed.
     inclusive: bool,
-    /// Ends of the range that were reached.
+    /// How often an end of the range was reached.
     pub(super) turns: u32,
-    /// Whether it has been played once and is over.
+    /// Whether it was played to the end at which it stops.
     pub(super) at_end: bool,
 }
 
-/// A stretch of the capture played in one direction.
+/// A stretch of the capture played in one direction. Seconds since the capture's start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Leg {
     pub(super) from: f64,
-    /// Before `from` if played backwards. Always passed.
+    /// Less than `from` if played backwards. Always passed.
     pub(super) to: f64,
     /// Whether `from` itself is passed.
     pub(super) inclusive: bool,
 }
 
 impl Span {
-    /// The range of a playback in what lasts `duration` seconds.
-    pub(super) fn new(playback: &Playback, duration: f32) -> Self {
+    /// The range from `start` to `end` of a capture that lasts `duration` seconds. Both are clamped to it; NaN counts as its own end.
+    pub(super) fn new([start, end]: [f32; 2], repeat: Repeat, duration: f32) -> Self {
         let duration = if duration.is_finite() { f64::from(duration.max(0.0)) } else { 0.0 };
         let bound = |value: f32, otherwise: f64| {
             if value.is_nan() { otherwise } else { f64::from(value).clamp(0.0, duration) }
         };
-        let (start, end) = (bound(playback.start, 0.0), bound(playback.end, duration));
-        Self { start, length: (end - start).max(0.0), repeat: playback.repeat }
+        let (start, end) = (bound(start, 0.0), bound(end, duration));
+        Self { start, length: (end - start).max(0.0), repeat }
     }
 
     /// Whether there is nothing to play.
@@ -57,19 +57,14 @@ impl Span {
         self.length <= 0.0
     }
 
-    /// Whether it is played to and fro.
-    pub(super) fn is_ping_pong(&self) -> bool {
-        self.repeat == Repeat::PingPong
+    /// What happens at its end.
+    pub(super) fn repeat(&self) -> Repeat {
+        self.repeat
     }
 
-    /// Whether it starts over at its end.
-    pub(super) fn is_loop(&self) -> bool {
-        self.repeat == Repeat::Loop
-    }
-
-    /// Where the range begins.
-    pub(super) fn start(&self) -> f32 {
-        self.start as f32
+    /// Where it begins, unrounded.
+    pub(super) fn start(&self) -> f64 {
+        self.start
     }
 
     /// Where it ends, unrounded.
@@ -77,10 +72,10 @@ impl Span {
         self.start + self.length
     }
 
-    /// The phase, in the first pass (or the first two, to and fro), that shows a moment; what lies outside counts as the nearer end.
+    /// The phase that shows `time`, in the first pass or, of a ping-pong range, the first two. Times outside are clamped.
     pub(super) fn phase(&self, time: f32, returning: bool) -> f64 {
         let into = (f64::from(time) - self.start).clamp(0.0, self.length);
-        if self.is_ping_pong() && returning { 2.0 * self.length - into } else { into }
+        if self.repeat.turns_round() && returning { 2.0 * self.length - into } else { into }
     }
 
     /// The phase at `seconds` of a shared clock.
@@ -89,44 +84,44 @@ impl Span {
         if speed < 0.0 { self.length - offset + speed * seconds } else { offset + speed * seconds }
     }
 
-    /// The moment at a phase of the first pass (or two): seconds since the capture's start, unrounded. The end of a loop is its
+    /// The time at a phase of the first pass (or two): seconds since the capture's start, unrounded. The end of a loop is its
     /// beginning.
     pub(super) fn exact(&self, phase: f64) -> f64 {
-        if self.is_loop() && phase >= self.length {
+        if self.repeat.wraps() && phase >= self.length {
             return self.start;
         }
         self.start + if phase > self.length { (2.0 * self.length - phase).max(0.0) } else { phase.max(0.0) }
     }
 
-    /// The moment at a phase of the first pass (or two), and whether it is on the way back.
+    /// The time at a phase of the first pass (or two), and whether it is on the way back.
     pub(super) fn moment(&self, phase: f64) -> (f32, bool) {
         let time = self.exact(phase) as f32;
         // Rounding may reach the end of a loop, too.
-        let wrapped = self.is_loop() && f64::from(time) >= self.end();
-        (if wrapped { self.start() } else { time }, self.is_ping_pong() && phase >= self.length)
+        let wrapped = self.repeat.wraps() && f64::from(time) >= self.end();
+        (if wrapped { self.start as f32 } else { time }, self.repeat.turns_round() && phase >= self.length)
     }
 
-    /// Whether a phase is at or beyond the end in the direction of `speed`.
+    /// Whether a phase is at or beyond the end at which playing stops, in the given direction.
     pub(super) fn is_over(&self, phase: f64, forward: bool) -> bool {
-        self.repeat == Repeat::Once && if forward { phase >= self.length } else { phase <= 0.0 }
+        self.repeat.stops() && if forward { phase >= self.length } else { phase <= 0.0 }
     }
 
-    /// What is played between two finite phases. With `fresh`, what is exactly at the beginning counts, too. Arriving at an end
-    /// is a turn, leaving it is none.
+    /// The stretches between two finite phases. With `fresh`, the moment at `from` counts as passed, too. Arriving at an end counts as a
+    /// turn, leaving it does not.
     pub(super) fn travel(&self, from: f64, to: f64, fresh: bool) -> Travel {
         let (forward, length, distance) = (to >= from, self.length, to - from);
         let pass = |phase: f64| match (self.repeat, forward) {
             (Repeat::Once, _) => 0.0,
-            (_, true) => (phase / length).floor(),
-            (_, false) => (phase / length).ceil() - 1.0,
+            (Repeat::Loop | Repeat::PingPong, true) => (phase / length).floor(),
+            (Repeat::Loop | Repeat::PingPong, false) => (phase / length).ceil() - 1.0,
         };
         let inclusive = match self.repeat {
             Repeat::Once if from < 0.0 => to >= 0.0,
             Repeat::Once if from > length => to <= length,
-            _ => fresh,
+            Repeat::Once | Repeat::Loop | Repeat::PingPong => fresh,
         };
         let round = (2.0 * length).copysign(distance);
-        let cut = self.repeat != Repeat::Once && distance.abs() > 4.0 * length;
+        let cut = !self.repeat.stops() && distance.abs() > 4.0 * length;
         let near = if cut { from + round + distance % round } else { to };
         Travel {
             span: *self,
@@ -142,13 +137,13 @@ impl Span {
 }
 
 impl Travel {
-    /// The phase that is reached, as one of the first pass (or two).
+    /// The phase that was reached, as a phase of the first pass (or two).
     pub(super) fn phase(&self) -> f64 {
         let into = self.within_pass(self.to, self.last);
         if self.is_returning(self.last) { self.span.length + into } else { into }
     }
 
-    /// The stretches, in the order in which they were played. Of a step longer than four passes, two to four are told.
+    /// The stretches, in the order of play. A step longer than four passes yields only two to four.
     pub(super) fn legs(&self) -> impl Iterator<Item = Leg> {
         let count = (self.last - self.first).abs() as u32;
         let direction = (self.last - self.first).signum();
@@ -158,17 +153,17 @@ impl Travel {
                 let into = self.within_pass(phase, pass);
                 self.span.start + if self.is_returning(pass) { self.span.length - into } else { into }
             };
-            let inclusive = if index == 0 { self.inclusive } else { self.span.is_loop() };
+            let inclusive = if index == 0 { self.inclusive } else { self.span.repeat.wraps() };
             Leg { from: place(self.from), to: place(self.to), inclusive }
         })
     }
 
-    /// Whether it came to the end of a loop and starts over.
+    /// Whether it passed the end of a loop and started over.
     pub(super) fn wraps(&self) -> bool {
-        self.span.is_loop() && self.turns > 0
+        self.span.repeat.wraps() && self.turns > 0
     }
 
-    /// Whether it was played in the direction of time.
+    /// Whether it was played forwards.
     pub(super) fn is_forward(&self) -> bool {
         self.from < self.to
     }
@@ -178,12 +173,12 @@ impl Travel {
     }
 
     fn is_returning(&self, pass: f64) -> bool {
-        self.span.is_ping_pong() && pass.rem_euclid(2.0) == 1.0
+        self.span.repeat.turns_round() && pass.rem_euclid(2.0) == 1.0
     }
 }
 
 impl Leg {
-    /// Whether a moment was passed.
+    /// Whether `time`, in seconds since the capture's start, was passed.
     pub(super) fn passes(&self, time: f64) -> bool {
         let within = if self.from <= self.to {
             self.from < time && time <= self.to
@@ -194,49 +189,13 @@ impl Leg {
     }
 }
 
-/// What counts as the same, in frames: less than any difference that is meant, more than rounding.
-const FRAME_SLACK: f64 = 1e-3;
-/// Beyond this many frames they can no longer be told apart.
-const MOST_FRAMES: f64 = 1e12;
-
-/// The frame `frames` after the one nearest to `time`, as [`Playback::step`] describes; none where the range holds no frame.
-pub(super) fn frame_after(span: &Span, time: f32, returning: bool, frames: i32, fps: f32) -> Option<(f32, bool)> {
-    let fps = f64::from(fps);
-    let (low, high) = (span.start * fps, span.end() * fps);
-    if !(fps > 0.0 && high <= MOST_FRAMES) {
-        return None;
-    }
-    let first = (low - FRAME_SLACK).ceil() as i64;
-    // The end of a loop is its beginning.
-    let last =
-        if span.is_loop() { (high - FRAME_SLACK).ceil() as i64 - 1 } else { (high + FRAME_SLACK).floor() as i64 };
-    if last < first {
-        return None;
-    }
-    let now = (f64::from(time).clamp(span.start, span.end()) * fps).round() as i64;
-    let now = now.clamp(first, last) - first;
-    let (count, frames) = (last - first, i64::from(frames));
-    let (frame, returning) = match span.repeat {
-        Repeat::Once => ((now + frames).clamp(0, count), false),
-        Repeat::Loop => ((now + frames).rem_euclid(count + 1), false),
-        Repeat::PingPong if count == 0 => (0, false),
-        Repeat::PingPong => {
-            let place = if returning { 2 * count - now } else { now };
-            let place = (place + frames).rem_euclid(2 * count);
-            if place < count { (place, false) } else { (2 * count - place, true) }
-        }
-    };
-    let time = ((first + frame) as f64 / fps).clamp(span.start, span.end()) as f32;
-    Some((time, returning))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
 
     fn span(start: f32, end: f32, repeat: Repeat) -> Span {
-        Span::new(&Playback { start, end, repeat, ..Playback::default() }, 10.0)
+        Span::new([start, end], repeat, 10.0)
     }
 
     fn legs(travel: &Travel) -> Vec<(f64, f64, bool)> {
@@ -303,7 +262,7 @@ mod tests {
                 assert!(travel.legs().count() <= 5, "{repeat:?} to {to} has {} stretches", travel.legs().count());
                 assert!((1.0..=3.0).contains(&span.moment(travel.phase()).0), "and ends in the range");
                 let passed = |time| travel.legs().any(|leg| leg.passes(time));
-                assert!(repeat == Repeat::Once || (passed(1.25) && passed(2.75)), "{repeat:?} passed all there is");
+                assert!(repeat.stops() || (passed(1.25) && passed(2.75)), "{repeat:?} passed all there is");
             }
         }
     }
@@ -328,9 +287,9 @@ mod tests {
             // Phases, in the direction of play, at which the mark is shown.
             let shown: Vec<f64> = match repeat {
                 Repeat::PingPong => vec![mark, 4.0 - mark],
-                _ => vec![if backwards { 2.0 - mark } else { mark }],
+                Repeat::Once | Repeat::Loop => vec![if backwards { 2.0 - mark } else { mark }],
             };
-            let round = if repeat == Repeat::PingPong { 4.0 } else { 2.0 };
+            let round = if repeat.turns_round() { 4.0 } else { 2.0 };
             let nearest = shown.iter().map(|s| ((played - s) / round - ((played - s) / round).round()).abs());
             // Rounding of the sum decides about what is exactly at its end.
             prop_assume!(nearest.fold(1.0, f64::min) > 1e-9);

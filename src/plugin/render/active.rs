@@ -1,12 +1,12 @@
-//! Active lists: which Gaussians the temporal filters leave, once for each placed capture and frame.
+//! Active lists: which Gaussians are active in the segments of temporal filters, once for each placed capture and frame.
 //!
-//! In: [`ExtractedCaptures`]. Out: [`ActiveLists`], shared by all cameras and made on the GPU before any of them draws, only when a
+//! In: [`ExtractedCaptures`]. Out: [`ActiveLists`], shared by all cameras, and written on the GPU before any of them draws, only when a
 //! capture has entered another segment of time.
 
 use super::extract::ExtractedCaptures;
-use super::prepare::CaptureRenderer;
+use super::renderer::CaptureRenderer;
 use super::upload::GpuGaussianCapture;
-use crate::plugin::asset::GaussianCapture;
+use crate::plugin::component::GaussianCapture;
 use crate::renderer::ActiveList;
 use bevy::asset::AssetId;
 use bevy::ecs::resource::Resource;
@@ -17,7 +17,7 @@ use bevy::render::render_asset::RenderAssets;
 use bevy::render::renderer::{RenderContext, RenderDevice, RenderQueue};
 use bevy::render::sync_world::MainEntityHashMap;
 
-/// The lists of captures with a filter, by entity of the main world. One lasts as long as its entity shows the same capture.
+/// The lists of captures with a temporal filter, by entity of the main world. A list is kept while its entity shows the same capture.
 #[derive(Resource, Default)]
 pub(super) struct ActiveLists(pub(super) MainEntityHashMap<PlacedList>);
 
@@ -25,11 +25,11 @@ pub(super) struct ActiveLists(pub(super) MainEntityHashMap<PlacedList>);
 pub(super) struct PlacedList {
     pub(super) list: ActiveList,
     asset: AssetId<GaussianCapture>,
-    /// Whether it holds another segment than it should.
+    /// Whether it must be written for another segment.
     stale: bool,
 }
 
-/// Makes lists for what has appeared, drops those of what has gone, and moves the others on in time.
+/// Creates the lists of new captures, drops those of removed ones, and moves the others to the current segment.
 pub(super) fn prepare_active_lists(
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
@@ -60,7 +60,7 @@ pub(super) fn prepare_active_lists(
     }
 }
 
-/// Records `activate` where it is due, before the cameras.
+/// Records `activate` for the lists that must be written, before the cameras.
 pub(super) fn record_active_lists(
     renderer: Option<Res<CaptureRenderer>>,
     captures: Res<RenderAssets<GpuGaussianCapture>>,
@@ -69,7 +69,7 @@ pub(super) fn record_active_lists(
 ) {
     let _span = debug_span!("gs4d/activate").entered();
     let Some(renderer) = renderer else { return };
-    // Most frames begin no encoder.
+    // Most frames need no encoder.
     if !lists.0.values().any(|placed| placed.stale) {
         return;
     }

@@ -3,7 +3,7 @@
 //! In: a view target and a view's captures (colour and transmittance). Out: pipeline and bind group for `shaders/composite.wgsl`.
 //! Where nothing changes, nothing is made.
 
-use crate::renderer::note_created;
+use crate::renderer::WorkCounters;
 use crate::view::BlendSpace;
 use bevy::asset::Handle;
 use bevy::core_pipeline::FullscreenShader;
@@ -24,6 +24,8 @@ use glam::UVec4;
 pub(super) struct CaptureShaders {
     pub(super) composite: Handle<Shader>,
     pub(super) write_depth: Handle<Shader>,
+    /// The library that composite imports: nothing reads the handle, but the import resolves only as long as it is held.
+    pub(super) _srgb: Handle<Shader>,
 }
 
 /// What pipelines for different targets are made from.
@@ -49,7 +51,7 @@ impl CompositeKey {
         match (self.encoded, self.blend_space) {
             (false, BlendSpace::Encoded) => vec!["ENCODE_TARGET".into()],
             (true, BlendSpace::Linear) => vec!["DECODE_TARGET".into()],
-            _ => Vec::new(),
+            (false, BlendSpace::Linear) | (true, BlendSpace::Encoded) => Vec::new(),
         }
     }
 }
@@ -100,30 +102,36 @@ struct CachedGroup {
 }
 
 impl CompositeBindings {
-    /// Lets go of the targets that were bound.
+    /// Releases the targets that were bound.
     pub(super) fn forget(&mut self) {
         self.groups.clear();
     }
 
     /// Writes the corner and size of the viewport, pixels of the target, if they have changed.
-    pub(super) fn set_viewport(&mut self, viewport: UVec4, device: &RenderDevice, queue: &RenderQueue) {
+    pub(super) fn set_viewport(
+        &mut self,
+        viewport: UVec4,
+        device: &RenderDevice,
+        queue: &RenderQueue,
+        work: &WorkCounters,
+    ) {
         let first = self.viewport.buffer().is_none();
         if first || *self.viewport.get() != viewport {
             self.viewport.set(viewport);
             self.viewport.write_buffer(device, queue);
         }
         if first {
-            note_created();
+            work.add_created();
         }
     }
 
-    /// The viewport's uniform, for other passes over the same view; nothing before the first
+    /// The viewport's uniform, for other passes over the same view; `None` before the first
     /// [`set_viewport`](Self::set_viewport).
     pub(super) fn viewport(&self) -> Option<BindingResource<'_>> {
         self.viewport.binding()
     }
 
-    /// The bind group that reads `source`, the target so far, and `captures`; nothing before the first
+    /// The bind group that reads `source`, the target so far, and `captures`; `None` before the first
     /// [`set_viewport`](Self::set_viewport).
     pub(super) fn group(
         &mut self,
@@ -132,6 +140,7 @@ impl CompositeBindings {
         pipeline: &CompositePipeline,
         source: &TextureView,
         captures: &wgpu::TextureView,
+        work: &WorkCounters,
     ) -> Option<&BindGroup> {
         let known = self.groups.iter().position(|g| g.source == source.id() && g.captures == *captures);
         let index = match known {
@@ -140,7 +149,7 @@ impl CompositeBindings {
                 let layout = cache.get_bind_group_layout(&pipeline.layout);
                 let entries = BindGroupEntries::sequential((source, captures, self.viewport.binding()?));
                 let group = device.create_bind_group("gs4d composite", &layout, &entries);
-                note_created();
+                work.add_created();
                 // Both sides of the target are made together: where one is new, the other is.
                 if self.groups.len() >= 2 || self.groups.iter().any(|known| known.captures != *captures) {
                     self.groups.clear();

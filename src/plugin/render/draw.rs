@@ -1,13 +1,15 @@
 //! Draw: captures into a camera's target, in Bevy's `Core3d` schedule.
 //!
-//! In: what [`prepare`](super::prepare) left for the camera. Out: one compute pass, the composite and, where it is wanted,
+//! In: the camera's view, as [`prepare`](super::prepare) left it. Out: one compute pass, the composite and, if the camera asks for it,
 //! `write_depth`, recorded.
 
 use super::active::ActiveLists;
+use super::capture_views::{CaptureView, CaptureViews};
 use super::composite::CompositePipeline;
-use super::prepare::{CaptureRenderer, CaptureView, CaptureViews};
+use super::renderer::CaptureRenderer;
 use super::upload::GpuGaussianCapture;
 use super::write_depth::WriteDepthPipeline;
+use crate::renderer::WorkCounters;
 use bevy::ecs::schedule::SystemSet;
 use bevy::ecs::system::{Res, ResMut, SystemParam};
 use bevy::log::debug_span;
@@ -30,7 +32,7 @@ pub enum CaptureSystems {
     DrawLate,
 }
 
-/// Pipelines, and what their bind groups are made with.
+/// The pipelines, and the device that creates their bind groups.
 #[derive(SystemParam)]
 pub(super) struct Passes<'w> {
     device: Res<'w, RenderDevice>,
@@ -39,7 +41,7 @@ pub(super) struct Passes<'w> {
     write_depth: Res<'w, WriteDepthPipeline>,
 }
 
-/// Draws the captures of one camera. Registered twice: multisampled targets can only be read once they have been resolved, that
+/// Draws the captures of one camera. Registered twice, because multisampled targets can be read only once they have been resolved, which
 /// is after transparent meshes.
 pub(super) fn draw_captures<const LATE: bool>(
     camera: ViewQuery<(&ViewTarget, &ViewDepthTexture, &Msaa)>,
@@ -57,7 +59,7 @@ pub(super) fn draw_captures<const LATE: bool>(
     if (*msaa != Msaa::Off || view.late) != LATE {
         return;
     }
-    // Without the composite there would be work that nobody sees.
+    // Without the composite the work would stay invisible.
     if !view.sees_something() || passes.cache.get_render_pipeline(view.composite).is_none() {
         return;
     }
@@ -67,18 +69,18 @@ pub(super) fn draw_captures<const LATE: bool>(
     let span = diagnostics.time_span(context.command_encoder(), "gs4d");
     view.renderer.record(&renderer.0, context.command_encoder(), &instances);
     span.end(context.command_encoder());
-    passes.composite(view, target, &mut context);
-    passes.write_depth(view, depth, &mut context);
+    passes.composite(view, target, &mut context, renderer.0.work());
+    passes.write_depth(view, depth, &mut context, renderer.0.work());
 }
 
 impl Passes<'_> {
-    /// Captures over the target.
-    fn composite(&self, view: &mut CaptureView, target: &ViewTarget, context: &mut RenderContext) {
-        // Fetched before the target is turned round: from then on, something must be written to the other side.
+    /// Draws captures over the target.
+    fn composite(&self, view: &mut CaptureView, target: &ViewTarget, context: &mut RenderContext, work: &WorkCounters) {
+        // Fetched before `post_process_write` swaps the target's textures: from then on, the other one must be written.
         let Some(pipeline) = self.cache.get_render_pipeline(view.composite) else { return };
         let Some(color) = view.renderer.color() else { return };
         let source = target.main_texture_view();
-        let group = view.bindings.group(&self.device, &self.cache, &self.composite, source, color);
+        let group = view.bindings.group(&self.device, &self.cache, &self.composite, source, color, work);
         let Some(group) = group else { return };
         let write = target.post_process_write();
         let diagnostics = context.diagnostic_recorder();
@@ -103,13 +105,19 @@ impl Passes<'_> {
         span.end(&mut pass);
     }
 
-    /// Captures into the depth buffer, if the camera asks for it.
-    fn write_depth(&self, view: &mut CaptureView, depth: &ViewDepthTexture, context: &mut RenderContext) {
+    /// Writes captures into the depth buffer, if the camera asks for it.
+    fn write_depth(
+        &self,
+        view: &mut CaptureView,
+        depth: &ViewDepthTexture,
+        context: &mut RenderContext,
+        work: &WorkCounters,
+    ) {
         let Some(pipeline) = view.write_depth.and_then(|id| self.cache.get_render_pipeline(id)) else { return };
         let (Some(color), Some(depths)) = (view.renderer.color(), view.renderer.depth()) else { return };
         let Some(viewport) = view.bindings.viewport() else { return };
         let targets = [color, depths];
-        let group = view.depth_bindings.group(&self.device, &self.cache, &self.write_depth, viewport, targets);
+        let group = view.depth_bindings.group(&self.device, &self.cache, &self.write_depth, viewport, targets, work);
         let Some(group) = group else { return };
         let diagnostics = context.diagnostic_recorder();
         let diagnostics = diagnostics.as_deref();

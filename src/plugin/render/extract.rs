@@ -1,11 +1,10 @@
-//! Extract: what is to be drawn this frame.
+//! Extract: the captures and the cameras' settings of this frame.
 //!
-//! In (main world): entities with a loaded capture, their transform, playback and settings; cameras' choices. Out (render world):
-//! [`ExtractedCaptures`] and [`ExtractedViewSettings`], by entity of the main world.
+//! In (main world): entities with a loaded capture, their transform, playback and settings; the settings of cameras. Out (render
+//! world): [`ExtractedCaptures`] and [`ExtractedViewSettings`], by entity of the main world.
 
-use super::{CaptureSettings, CaptureViewSettings};
-use crate::plugin::asset::GaussianCapture;
-use crate::plugin::component::GaussianCapture3d;
+use super::settings::{CaptureSettings, CaptureViewSettings};
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::{ClipFade, Playback};
 use crate::view::Appearance;
 use bevy::asset::{AssetId, Assets};
@@ -29,7 +28,7 @@ pub(super) struct ExtractedCaptures(pub(super) MainEntityHashMap<ExtractedCaptur
 pub(super) struct ExtractedCapture {
     pub(super) asset: AssetId<GaussianCapture>,
     pub(super) world_from_capture: Affine3A,
-    /// In the capture's own unit.
+    /// In the capture's own unit of time.
     pub(super) time: f32,
     /// Whether its temporal filter is used.
     pub(super) filtered: bool,
@@ -38,7 +37,7 @@ pub(super) struct ExtractedCapture {
     pub(super) seen: bool,
 }
 
-/// How cameras draw captures, where they say so.
+/// How cameras draw captures, for those with settings.
 #[derive(Resource, Default)]
 pub(super) struct ExtractedViewSettings(pub(super) MainEntityHashMap<CaptureViewSettings>);
 

@@ -1,15 +1,17 @@
-//! The plugin: what runs where.
+//! The plugin of rendering: which system runs in which world and when.
 //!
-//! In: an app with Bevy's `DefaultPlugins` (or at least its `AssetPlugin`). Out: the same app, in which captures load, play and,
-//! where there is a renderer, show.
+//! In: an app in which captures load and play. Out: the same app, in which captures are drawn if it has a renderer.
 
-use super::CaptureSettings;
 use super::active::{ActiveLists, prepare_active_lists, record_active_lists};
+use super::capture_views::CaptureViews;
 use super::composite::{CaptureShaders, CompositePipeline};
 use super::draw::{CaptureSystems, draw_captures};
 use super::extract::{ExtractedCaptures, ExtractedViewSettings, extract_captures, extract_view_settings};
-use super::prepare::{CaptureViews, init_renderer, make_depth_readable, prepare_views};
-use super::statistics::{CaptureStatistics, publish_statistics};
+use super::prepare::{make_depth_readable, prepare_views};
+use super::publish::publish_statistics;
+use super::renderer::init_renderer;
+use super::settings::CaptureSettings;
+use super::statistics::CaptureStatistics;
 use super::upload::GpuGaussianCapture;
 use super::visibility::update_bounds;
 use super::write_depth::WriteDepthPipeline;
@@ -41,7 +43,7 @@ impl Plugin for CaptureRenderPlugin {
     }
 }
 
-/// What runs in the render world, if there is one.
+/// Adds the systems and resources of the render world, if there is one.
 fn build_rendering(app: &mut App) {
     let statistics = app.world().resource::<CaptureStatistics>().clone();
     let failures = app.world().resource::<UploadFailures>().clone();
@@ -57,7 +59,7 @@ fn build_rendering(app: &mut App) {
         .insert_resource(failures)
         .init_resource::<ExtractedCaptures>()
         .init_resource::<ExtractedViewSettings>()
-        // Made again when a lost device comes back: everything on the GPU hangs on these.
+        // Created anew after a lost device: they hold everything on the GPU.
         .init_gpu_resource::<CompositePipeline>()
         .init_gpu_resource::<SpecializedRenderPipelines<CompositePipeline>>()
         .init_gpu_resource::<WriteDepthPipeline>()
@@ -74,7 +76,7 @@ fn build_rendering(app: &mut App) {
                 (prepare_views, publish_statistics).chain().in_set(RenderSystems::PrepareBindGroups),
             ),
         )
-        // Recorded before the first camera, and so submitted before it.
+        // Recorded, and therefore submitted, before the first camera.
         .add_systems(RenderGraph, record_active_lists.in_set(RenderGraphSystems::Render).before(camera_driver))
         .add_systems(
             Core3d,
@@ -96,5 +98,6 @@ fn add_shaders(app: &mut App) -> Option<CaptureShaders> {
     Some(CaptureShaders {
         composite: add(include_str!("../../../shaders/composite.wgsl"), "bevy_gs4d/shaders/composite.wgsl"),
         write_depth: add(include_str!("../../../shaders/write_depth.wgsl"), "bevy_gs4d/shaders/write_depth.wgsl"),
+        _srgb: add(include_str!("../../../shaders/shared/srgb.wgsl"), "bevy_gs4d/shaders/shared/srgb.wgsl"),
     })
 }

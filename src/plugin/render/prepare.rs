@@ -1,77 +1,34 @@
 //! Prepare: for each camera, the captures it sees and the renderer's working buffers.
 //!
-//! In: [`ExtractedCaptures`], Bevy's extracted cameras with what they see and their depth textures. Out: [`CaptureViews`], with
-//! everything written that drawing needs. In the steady state nothing is created on the GPU.
+//! In: [`ExtractedCaptures`], Bevy's extracted cameras with their visible entities and depth textures. Out: [`CaptureViews`], with
+//! everything that drawing needs written to the GPU. In the steady state nothing is created there.
 
 use super::active::ActiveLists;
-use super::composite::{CompositeBindings, CompositeKey, CompositePipeline};
+use super::capture_views::{CaptureView, CaptureViews, Drawn};
+use super::composite::{CompositeKey, CompositePipeline};
 use super::extract::{ExtractedCaptures, ExtractedViewSettings};
+use super::renderer::CaptureRenderer;
+use super::settings::{CaptureViewSettings, DepthWrite};
 use super::statistics::CaptureStatistics;
 use super::upload::GpuGaussianCapture;
-use super::view::Lens;
-use super::write_depth::{WriteDepthBindings, WriteDepthKey, WriteDepthPipeline};
-use super::{CaptureViewSettings, DepthWrite};
-use crate::plugin::asset::GaussianCapture;
+use super::view::CameraLens;
+use super::write_depth::{WriteDepthKey, WriteDepthPipeline};
 use crate::plugin::component::GaussianCapture3d;
-use crate::renderer::{Instance, OpaqueDepth, Renderer, ShaderChecks, ViewParameters, ViewRenderer};
-use crate::view::{Appearance, Background, DebugView, View};
-use bevy::asset::AssetId;
+use crate::renderer::{OpaqueDepth, ViewParameters};
+use crate::view::{Background, DebugView};
 use bevy::camera::{Camera3d, CompositingSpace, MainPassResolutionOverride};
 use bevy::ecs::entity::Entity;
 use bevy::ecs::query::With;
-use bevy::ecs::resource::Resource;
-use bevy::ecs::system::{Commands, Query, Res, ResMut, SystemParam};
-use bevy::log::{debug_span, error, error_once, warn_once};
-use bevy::platform::collections::HashMap;
+use bevy::ecs::system::{Query, Res, ResMut, SystemParam};
+use bevy::log::{debug_span, error_once, warn_once};
 use bevy::render::camera::ExtractedCamera;
 use bevy::render::render_asset::RenderAssets;
 use bevy::render::render_resource::{CachedRenderPipelineId, PipelineCache, SpecializedRenderPipelines, TextureUsages};
 use bevy::render::renderer::{RenderDevice, RenderQueue};
-use bevy::render::sync_world::MainEntity;
 use bevy::render::view::{ExtractedView, Msaa, RenderVisibleEntities, ViewDepthTexture};
 use glam::{UVec2, UVec4};
 
-/// The renderer's pipelines; absent where this GPU cannot run them.
-#[derive(Resource)]
-pub struct CaptureRenderer(pub(super) Renderer);
-
-/// State of every camera that may see captures, by its entity in the render world.
-#[derive(Resource, Default)]
-pub(super) struct CaptureViews(pub(super) HashMap<Entity, CaptureView>);
-
-/// State of one camera.
-pub(super) struct CaptureView {
-    /// The camera's entity in the main world.
-    pub(super) camera: Entity,
-    pub(super) renderer: ViewRenderer,
-    /// The composite into the camera's target, and what it binds.
-    pub(super) composite: CachedRenderPipelineId,
-    pub(super) bindings: CompositeBindings,
-    /// Writing to the camera's depth buffer, if it is wanted, and what that binds.
-    pub(super) write_depth: Option<CachedRenderPipelineId>,
-    pub(super) depth_bindings: WriteDepthBindings,
-    measured: bool,
-    /// Whether it is drawn after transparent meshes even without multisampling.
-    pub(super) late: bool,
-    /// Frames since it last saw something.
-    idle: u32,
-    /// What it sees this frame; nothing is drawn where this is empty.
-    drawn: Vec<Drawn>,
-}
-
-/// One capture, seen by one camera.
-struct Drawn {
-    entity: MainEntity,
-    asset: AssetId<GaussianCapture>,
-    view: View,
-    appearance: Appearance,
-    filtered: bool,
-}
-
-/// Frames without anything to be seen until a camera gives memory back.
-const RELEASE_AFTER_IDLE_FRAMES: u32 = 120;
-
-/// What there is to be seen.
+/// Everything that can be drawn this frame.
 #[derive(SystemParam)]
 pub(super) struct Scene<'w> {
     extracted: Res<'w, ExtractedCaptures>,
@@ -90,81 +47,25 @@ pub(super) struct Pipelines<'w> {
     depth_writers: ResMut<'w, SpecializedRenderPipelines<WriteDepthPipeline>>,
 }
 
-impl CaptureView {
-    fn new(device: &RenderDevice, camera: Entity, composite: CachedRenderPipelineId) -> Self {
-        Self {
-            camera,
-            renderer: ViewRenderer::new(device.wgpu_device()),
-            composite,
-            bindings: CompositeBindings::default(),
-            write_depth: None,
-            depth_bindings: WriteDepthBindings::default(),
-            measured: false,
-            late: false,
-            idle: 0,
-            drawn: Vec::new(),
-        }
-    }
-
-    /// Whether it draws anything this frame.
-    pub(super) fn sees_something(&self) -> bool {
-        !self.drawn.is_empty()
-    }
-
-    /// What is drawn this frame, in the renderer's terms.
-    pub(super) fn instances<'a>(
-        &self,
-        captures: &'a RenderAssets<GpuGaussianCapture>,
-        lists: &'a ActiveLists,
-    ) -> Vec<Instance<'a>> {
-        let instance = |drawn: &Drawn| {
-            let capture = captures.get(drawn.asset)?.capture()?;
-            let list = if drawn.filtered { lists.0.get(&drawn.entity) } else { None };
-            Some(Instance {
-                capture,
-                active: list.map(|placed| &placed.list),
-                view: drawn.view,
-                appearance: drawn.appearance,
-            })
-        };
-        self.drawn.iter().filter_map(instance).collect()
-    }
-
-    /// Collects what this camera sees, in the order of Bevy's list, which is always the same.
+impl Scene<'_> {
+    /// Appends the captures that a camera sees to `drawn`, in the order of Bevy's list, which is the same in every frame.
     fn collect(
-        &mut self,
-        lens: &Lens,
+        &self,
+        lens: &CameraLens,
         view: &ExtractedView,
         size: UVec2,
         visible: &RenderVisibleEntities,
-        scene: &Scene<'_>,
+        drawn: &mut Vec<Drawn>,
     ) {
         let camera = view.world_from_view.affine();
         let Some(visible) = visible.get::<GaussianCapture3d>() else { return };
-        self.drawn.extend(visible.iter_visible().filter_map(|(_, entity)| {
-            let placed = scene.extracted.0.get(entity)?;
-            scene.captures.get(placed.asset)?.capture()?;
+        drawn.extend(visible.iter_visible().filter_map(|(_, entity)| {
+            let placed = self.extracted.0.get(entity)?;
+            self.captures.get(placed.asset)?.capture()?;
             let view = lens.view(size, placed.time, camera, placed.world_from_capture)?;
             let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
             Some(Drawn { entity: *entity, asset, view, appearance, filtered })
         }));
-    }
-
-    /// Counts a frame in which it sees nothing. After many its memory is given back.
-    fn rest(&mut self) {
-        self.idle = self.idle.saturating_add(1);
-        if self.idle == RELEASE_AFTER_IDLE_FRAMES {
-            self.renderer.release();
-            self.bindings.forget();
-            self.depth_bindings.forget();
-        }
-    }
-
-    fn measure(&mut self, on: bool, device: &RenderDevice, queue: &RenderQueue) {
-        if self.measured != on {
-            self.measured = on;
-            self.renderer.measure(device.wgpu_device(), queue, on);
-        }
     }
 }
 
@@ -186,22 +87,6 @@ impl Pipelines<'_> {
     }
 }
 
-/// Compiles the renderer's pipelines; shaders check their bounds in debug builds.
-pub(super) fn init_renderer(mut commands: Commands, device: Res<RenderDevice>, statistics: Res<CaptureStatistics>) {
-    let checks = if cfg!(debug_assertions) { ShaderChecks::On } else { ShaderChecks::Off };
-    match Renderer::new(device.wgpu_device(), checks) {
-        Ok(renderer) => {
-            statistics.set_renderer_missing(None);
-            commands.insert_resource(CaptureRenderer(renderer));
-        }
-        Err(failure) => {
-            error!("captures are not drawn: {failure}");
-            statistics.set_renderer_missing(Some(failure.to_string()));
-            commands.remove_resource::<CaptureRenderer>();
-        }
-    }
-}
-
 /// Lets the renderer read the depth of opaque meshes.
 pub(super) fn make_depth_readable(mut cameras: Query<&mut Camera3d>) {
     for mut camera in &mut cameras {
@@ -219,6 +104,7 @@ type CameraView = (
     Option<&'static MainPassResolutionOverride>,
 );
 
+/// Prepares the view of every camera: the captures it sees, its pipelines and its working buffers.
 pub(super) fn prepare_views(
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
@@ -234,31 +120,31 @@ pub(super) fn prepare_views(
     let measure = statistics.is_measuring();
     views.0.retain(|&camera, _| cameras.contains(camera));
     for (entity, view, camera, depth, &msaa, visible, resolution) in &cameras {
-        // Meshes may be drawn smaller than the camera says, to be scaled up later.
+        // Meshes may be drawn at a lower resolution than the camera's, to be scaled up later.
         let size = resolution.map_or(UVec2::new(view.viewport.z, view.viewport.w), |smaller| smaller.0);
         let main = view.retained_view_entity.main_entity;
         let settings = scene.settings.0.get(&main).copied().unwrap_or_default();
-        // Before there is anything to draw: it is compiled while captures load.
+        // Even without anything to draw, so that it is compiled while captures load.
         let composite = pipelines.composite(view, camera, settings);
-        let state = views.0.entry(entity).or_insert_with(|| CaptureView::new(&device, main.id(), composite));
+        let state =
+            views.0.entry(entity).or_insert_with(|| CaptureView::new(&device, &renderer.0, main.id(), composite));
         state.composite = composite;
         state.late = settings.late;
-        state.measure(measure, &device, &queue);
+        state.measure(measure, &device, &queue, &renderer.0);
         state.drawn.clear();
         let Some(lens) = drawable_lens(view, camera) else { continue };
-        state.collect(&lens, view, size, visible, &scene);
-        if state.drawn.is_empty() {
-            state.rest();
+        scene.collect(&lens, view, size, visible, &mut state.drawn);
+        state.count_idle_frames();
+        if !state.sees_something() {
             continue;
         }
-        state.idle = 0;
         let viewport = UVec4::new(view.viewport.x, view.viewport.y, size.x, size.y);
-        state.bindings.set_viewport(viewport, &device, &queue);
+        state.bindings.set_viewport(viewport, &device, &queue, renderer.0.work());
         let instances = state.instances(&scene.captures, &scene.lists);
         let surrounded = instances.iter().any(|instance| instance.capture.has_environment());
         let opaque = opaque_depth(&lens, view, depth, msaa);
         let parameters = ViewParameters {
-            // Without depth a map would hide every mesh.
+            // Without depth, an environment map would hide every mesh.
             background: if surrounded && opaque.is_some() { Background::Environment } else { Background::None },
             opaque,
             blend_space: settings.blend_space,
@@ -269,23 +155,39 @@ pub(super) fn prepare_views(
             error_once!("captures are not drawn: {failure}");
             state.drawn.clear();
         }
-        // Expected depths are divided by the captures' opacity, which a map around them and overdraw hide.
-        let median = settings.depth == DepthWrite::Median || surrounded || settings.debug == DebugView::Overdraw;
-        let distance = lens.distance.filter(|_| settings.depth != DepthWrite::None);
-        state.write_depth = distance.map(|_| pipelines.write_depth(msaa, median));
-        if let Some(distance) = distance {
-            state.depth_bindings.set_distance(distance, &device, &queue);
+        let written = lens.distance.zip(writes_median(&settings, surrounded));
+        state.write_depth = written.map(|(_, median)| pipelines.write_depth(msaa, median));
+        if let Some((distance, _)) = written {
+            state.depth_bindings.set_distance(distance, &device, &queue, renderer.0.work());
         }
     }
 }
 
-/// The lens of a camera that captures can be drawn for; others are named once.
-fn drawable_lens(view: &ExtractedView, camera: &ExtractedCamera) -> Option<Lens> {
+/// Whether the depth that a camera asks for is the median one; `None` if it asks for none.
+fn writes_median(settings: &CaptureViewSettings, surrounded: bool) -> Option<bool> {
+    match settings.depth {
+        DepthWrite::None => None,
+        // Expected depths are divided by the captures' opacity, which an environment map and some debug views hide.
+        DepthWrite::Expected => Some(surrounded || hides_opacity(settings.debug)),
+        DepthWrite::Median => Some(true),
+    }
+}
+
+/// Whether a debug view replaces the opacity of captures.
+fn hides_opacity(debug: DebugView) -> bool {
+    match debug {
+        DebugView::Overdraw => true,
+        DebugView::Color | DebugView::Depth | DebugView::Active | DebugView::Lifespan | DebugView::Velocity => false,
+    }
+}
+
+/// The lens of a camera that captures can be drawn for. `None`, with a warning the first time, for other cameras.
+fn drawable_lens(view: &ExtractedView, camera: &ExtractedCamera) -> Option<CameraLens> {
     if camera.compositing_space == Some(CompositingSpace::Oklab) {
         warn_once!("captures are not drawn for a camera with CompositingSpace::Oklab: use Srgb or Linear");
         return None;
     }
-    let lens = Lens::of(&view.clip_from_view);
+    let lens = CameraLens::of(&view.clip_from_view);
     match &lens {
         None => warn_once!(
             "captures are not drawn for a camera whose projection is skewed, mirrored or not reversed in depth: use Bevy's \
@@ -300,14 +202,14 @@ fn drawable_lens(view: &ExtractedView, camera: &ExtractedCamera) -> Option<Lens>
     lens
 }
 
-/// The depth of opaque meshes, where it can be read.
+/// The depth of opaque meshes; `None` if it cannot be read.
 fn opaque_depth<'a>(
-    lens: &Lens,
+    lens: &CameraLens,
     view: &ExtractedView,
     depth: &'a ViewDepthTexture,
     msaa: Msaa,
 ) -> Option<OpaqueDepth<'a>> {
-    // Another plugin may have made the texture.
+    // Another plugin may have created the texture.
     if !depth.texture.usage().contains(TextureUsages::TEXTURE_BINDING) {
         warn_once!(
             "captures are drawn over meshes: a camera's depth texture cannot be read; add TEXTURE_BINDING to it"

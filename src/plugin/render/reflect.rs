@@ -1,6 +1,6 @@
-//! Reflection for the choices that the core defines without knowing Bevy.
+//! Reflection for the enums of [`crate::view`], which does not use Bevy.
 //!
-//! In: enums of [`crate::view`]. Out: the same, reflected, so that components that hold them can be saved, inspected and animated.
+//! In: [`BlendSpace`] and [`DebugView`]. Out: `Reflect` for both, so that components with them can be saved, inspected and animated.
 
 use crate::view::{BlendSpace, DebugView};
 use bevy::reflect::impl_reflect;
@@ -31,7 +31,7 @@ impl_reflect!(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plugin::render::CaptureViewSettings;
+    use crate::plugin::render::settings::CaptureViewSettings;
     use bevy::reflect::enums::Enum;
     use bevy::reflect::{FromReflect, GetPath, PartialReflect, TypePath};
 

@@ -1,6 +1,6 @@
-//! What a game sets: how a capture is drawn, and how a camera draws captures.
+//! The settings of drawing: how a capture is drawn, and how a camera draws captures.
 //!
-//! In: fields that any system or animation may write. Out: an [`Appearance`] for the renderer, and a camera's choices.
+//! In: fields that any system or animation may set. Out: an [`Appearance`] for the renderer, and the settings of a camera.
 
 use crate::view::{Appearance, BlendSpace, DebugView};
 use bevy::color::LinearRgba;
@@ -10,63 +10,122 @@ use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 use glam::{Affine3A, Mat3, Quat, Vec3};
 
-/// How a capture is drawn. On every [`GaussianCapture3d`](super::GaussianCapture3d).
+/// How a capture is drawn: on every [`GaussianCapture3d`](crate::GaussianCapture3d).
+///
+/// An opacity, or a factor on light, that is negative or not finite counts as 0.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
+///     // Half transparent, bluish, and with twice the light.
+///     let tint = LinearRgba::rgb(0.6, 0.8, 1.0);
+///     let ghost = CaptureSettings { opacity: 0.5, tint, exposure: 1.0, ..default() };
+///     commands.spawn((GaussianCapture3d(assets.load("toybox.gs4d")), ghost));
+/// }
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 pub struct CaptureSettings {
-    /// Whether the capture's temporal filter is used, if it has one: what is not active at a time is then not even looked at.
+    /// Whether the capture's temporal filter is used, if it has one: Gaussians that are not active in the current segment are then
+    /// skipped. Default: true.
     pub filter: bool,
-    /// Factor on every Gaussian's opacity, 0 (nothing shows) to 1. A timeline's fade is a further factor.
+    /// Factor on every Gaussian's opacity, from 0 (invisible) to 1. A timeline's fade is a further factor. Default: 1.
     pub opacity: f32,
-    /// Factor on the linear light of each channel; alpha is not used.
+    /// Factor on the linear light of each channel; alpha is not used. Default: white, which changes nothing.
     pub tint: LinearRgba,
-    /// Stops: each doubles the linear light.
+    /// Exposure in stops: each doubles the linear light. Default: 0.
     pub exposure: f32,
-    /// What shows of the capture; all of it without one.
+    /// The part of the capture that is drawn. Default: `None`, all of it.
     pub crop: Option<CropBox>,
 }
 
-/// A box in capture space: Gaussians whose means are outside at the moment are not drawn.
+/// A box in capture space, in capture units: Gaussians whose means are outside at the current time are not drawn.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// // A column of 2 x 2 units about the z axis, infinitely high.
+/// let column = CropBox { half_size: Vec3::new(1.0, 1.0, f32::INFINITY), ..default() };
+/// assert!(column.contains(Vec3::new(0.5, -0.5, 100.0)), "inside");
+/// assert!(!column.contains(Vec3::new(1.5, 0.0, 0.0)), "outside");
+/// let settings = CaptureSettings { crop: Some(column), ..default() };
+/// # assert_ne!(settings, CaptureSettings::default(), "cropped");
+/// ```
 #[derive(Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Default, Debug, Clone, PartialEq)]
 pub struct CropBox {
-    /// Its centre.
+    /// Its centre. Default: the origin.
     pub center: Vec3,
-    /// Half its sides; an infinite one does not crop.
+    /// Half the lengths of its sides. An infinite one does not crop; a negative one counts as 0. Default: 1 on each axis.
     pub half_size: Vec3,
-    /// How it is turned about its centre.
+    /// Its rotation about its centre. Default: none.
     pub rotation: Quat,
 }
 
-/// How a camera draws captures. Optional, beside `Camera3d`.
+/// How a camera draws captures: an optional component beside `Camera3d`. Without it the defaults apply.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn setup(mut commands: Commands) {
+///     let settings = CaptureViewSettings { blend_space: BlendSpace::Linear, ..default() };
+///     commands.spawn((Camera3d::default(), settings));
+/// }
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
 #[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 pub struct CaptureViewSettings {
-    /// The space in which Gaussians are blended with each other and with what is behind them.
+    /// The space in which Gaussians are blended with each other and with the background. Default: [`BlendSpace::Encoded`], as trained.
     pub blend_space: BlendSpace,
-    /// Whether captures are written to the camera's depth buffer, for what is drawn after them.
+    /// Which depth of captures is written to the camera's depth buffer. Default: [`DepthWrite::None`].
     pub depth: DepthWrite,
-    /// What is shown of captures in place of their colour.
+    /// What is shown of captures. Default: [`DebugView::Color`].
     pub debug: DebugView,
-    /// Whether captures are drawn after transparent meshes without multisampling, too. Needed where something is drawn between
-    /// opaque and transparent meshes that cannot be ordered against captures: Bevy's atmosphere.
+    /// Whether captures are drawn after transparent meshes even without multisampling. Cameras with Bevy's atmosphere need it, because the
+    /// atmosphere is drawn between opaque and transparent meshes and cannot be ordered against captures. Default: false.
     pub late: bool,
 }
 
-/// Which depth of a capture is written to the camera's depth buffer, at pixels where captures hide more than half of what is behind.
+/// Which depth of captures is written to the camera's depth buffer, at pixels where they hide more than half of the background.
 ///
-/// Post-processing that reads the depth buffer (depth of field, volumetric fog) then takes captures for surfaces, and so do
-/// transparent meshes, which captures cut pixel by pixel. See [the order of a frame](crate::plugin::render#the-order-of-a-frame).
+/// Post-processing that reads the depth buffer (depth of field, volumetric fog) then treats captures as surfaces. So do transparent
+/// meshes: captures cut them pixel by pixel. See [the order of a frame](crate::render#the-order-of-a-frame). Default:
+/// [`None`](Self::None).
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn setup(mut commands: Commands) {
+///     let settings = CaptureViewSettings { depth: DepthWrite::Median, ..default() };
+///     commands.spawn((Camera3d::default(), Msaa::Off, settings));
+/// }
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
 #[derive(Reflect, Debug, Default, Clone, Copy, PartialEq, Eq, Hash)]
 #[reflect(Default, Debug, Clone, PartialEq, Hash)]
 pub enum DepthWrite {
-    /// None.
+    /// No depth is written.
     #[default]
     None,
-    /// The mean of the depths that a pixel's colour comes from: smooth, but between surfaces where several show. Of captures with an
-    /// environment map it is the median all the same.
+    /// The mean depth of the splats at a pixel, weighted as their colours are: smooth, but between surfaces where several are visible. For
+    /// captures with an environment map, and with [`DebugView::Overdraw`], the median is written instead.
     Expected,
-    /// The depth at which half of the light has been held back: on a surface, but with steps.
+    /// The depth at which half of the light is absorbed: on a surface, but with steps.
     Median,
 }
 
@@ -77,14 +136,14 @@ impl Default for CaptureSettings {
 }
 
 impl Default for CropBox {
-    /// One unit about the origin to all sides.
+    /// The cube from −1 to 1.
     fn default() -> Self {
         Self { center: Vec3::ZERO, half_size: Vec3::ONE, rotation: Quat::IDENTITY }
     }
 }
 
 impl CaptureSettings {
-    /// For the renderer, with a further factor on opacity. What is not a number counts as 0.
+    /// The settings for the renderer. `fade` is a further factor on opacity.
     pub(crate) fn appearance(&self, fade: f32) -> Appearance {
         let stops = self.exposure.exp2();
         let light = [self.tint.red, self.tint.green, self.tint.blue].map(|channel| number(channel * stops));
@@ -97,14 +156,15 @@ impl CaptureSettings {
 }
 
 impl CropBox {
-    /// Whether a point of capture space is inside. A box that is not made of numbers holds everything.
+    /// Whether a point of capture space is inside. A box contains every point if its centre is not finite or its
+    /// rotation has the length 0.
     pub fn contains(&self, point: Vec3) -> bool {
         self.cube_from_capture().is_none_or(|cube| cube.transform_point3(point).abs().max_element() <= 1.0)
     }
 
-    /// Capture space to the cube from −1 to 1; nothing for a box that is not made of numbers.
+    /// From capture space to the cube from −1 to 1; `None` if the box has no finite centre or rotation.
     fn cube_from_capture(&self) -> Option<Affine3A> {
-        // A side of nothing holds nothing, but must not divide by zero.
+        // A side of length 0 contains nothing, but must not divide by zero.
         let scale = self.half_size.max(Vec3::splat(1e-12)).recip();
         let matrix = Mat3::from_diagonal(scale) * Mat3::from_quat(self.rotation.normalize()).transpose();
         let cube = Affine3A::from_mat3_translation(matrix, matrix * -self.center);
@@ -112,7 +172,7 @@ impl CropBox {
     }
 }
 
-/// Not negative, and a number.
+/// A finite number from 0 on.
 fn number(value: f32) -> f32 {
     if value.is_finite() { value.max(0.0) } else { 0.0 }
 }
@@ -166,7 +226,7 @@ mod tests {
         let empty = CropBox { half_size: Vec3::new(1.0, -1.0, 1.0), ..CropBox::default() };
         assert!(!empty.contains(Vec3::Y * 0.1), "a negative side holds nothing");
         let broken = CropBox { center: Vec3::NAN, ..CropBox::default() };
-        assert!(broken.contains(Vec3::ONE * 9.0), "what is no box crops nothing");
+        assert!(broken.contains(Vec3::ONE * 9.0), "an invalid box crops nothing");
         let unturned = CropBox { rotation: Quat::from_xyzw(0.0, 0.0, 0.0, 0.0), ..CropBox::default() };
         assert!(unturned.contains(Vec3::ONE * 9.0), "nor does one without a rotation");
     }

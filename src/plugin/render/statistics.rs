@@ -1,19 +1,31 @@
 //! Statistics: what drawing captures costs, for panels and tests.
 //!
-//! In: what the render world counts and measures. Out: [`CaptureStatistics`], a resource of the main world that shares it.
+//! In: the counts and times of the render world. Out: [`CaptureStatistics`], a resource that both worlds share.
 
-use super::prepare::CaptureViews;
-use super::upload::GpuGaussianCapture;
-use crate::renderer::{GpuCapture, ViewStatistics};
+use crate::renderer::{ViewStatistics, WorkCounters};
 use bevy::ecs::entity::Entity;
 use bevy::ecs::resource::Resource;
-use bevy::ecs::system::Res;
-use bevy::log::debug_span;
-use bevy::render::render_asset::RenderAssets;
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What drawing captures costs, as of the newest frame that the render world has prepared.
+/// What drawing captures costs, as of the newest frame that the render world has prepared: a resource.
+///
+/// Clones share the numbers. Default: no views, no captures, nothing measured.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn report(statistics: Res<CaptureStatistics>) {
+///     for (camera, view) in statistics.views() {
+///         info!("{camera}: {} of {} Gaussians are visible", view.visible, view.total);
+///     }
+///     info!("{} bytes for {} captures", statistics.capture_bytes(), statistics.uploaded_captures());
+/// }
+/// # bevy::ecs::system::assert_is_system(report);
+/// ```
 #[derive(Resource, Debug, Clone, Default)]
 pub struct CaptureStatistics(Arc<Mutex<Shared>>);
 
@@ -24,36 +36,43 @@ struct Shared {
     capture_bytes: u64,
     uploaded_captures: usize,
     renderer_missing: Option<String>,
+    /// Kept when the renderer is made anew after a lost device.
+    work: WorkCounters,
 }
 
 impl CaptureStatistics {
-    /// Asks for the GPU time of each pass, or no longer for it. The first times arrive some frames later; where the GPU has no
-    /// timestamps there are none.
+    /// Starts or stops measuring the GPU time of each pass. The first times arrive some frames later; on a GPU without timestamps none
+    /// arrive. Default: not measured.
     pub fn measure(&self, on: bool) {
         self.lock().measure = on;
     }
 
-    /// Of one camera, by its entity in the main world; nothing while it sees no capture.
+    /// Returns the statistics of one camera, by its entity in the main world; `None` while it sees no capture.
     pub fn view(&self, camera: Entity) -> Option<ViewStatistics> {
         self.lock().views.iter().find(|(entity, _)| *entity == camera).map(|(_, statistics)| statistics.clone())
     }
 
-    /// Of every camera that sees a capture.
+    /// Returns the statistics of every camera that sees a capture, by its entity in the main world.
     pub fn views(&self) -> Vec<(Entity, ViewStatistics)> {
         self.lock().views.clone()
     }
 
-    /// GPU memory of all uploaded captures, bytes. What views need on top is in [`ViewStatistics::bytes`].
+    /// Returns the GPU memory of all uploaded captures, in bytes. The memory of views is in [`ViewStatistics::bytes`].
     pub fn capture_bytes(&self) -> u64 {
         self.lock().capture_bytes
     }
 
-    /// How many captures are on the GPU.
+    /// Returns the number of captures on the GPU.
     pub fn uploaded_captures(&self) -> usize {
         self.lock().uploaded_captures
     }
 
-    /// Why no capture is drawn at all: what this GPU lacks. Nothing where captures can be drawn.
+    /// Returns the counters of what has been created, uploaded and recorded on the GPU so far. Clones share the counters.
+    pub fn work(&self) -> WorkCounters {
+        self.lock().work.clone()
+    }
+
+    /// Returns why no capture is drawn at all, which is what this GPU or app lacks; `None` if captures can be drawn.
     pub fn renderer_missing(&self) -> Option<String> {
         self.lock().renderer_missing.clone()
     }
@@ -66,36 +85,29 @@ impl CaptureStatistics {
         self.lock().measure
     }
 
-    /// What a panic elsewhere left behind is still only numbers.
+    /// Replaces the numbers by those of a new frame: of each camera that sees captures or holds memory for them, and the bytes and the
+    /// count of all uploaded captures.
+    pub(super) fn update<'a>(
+        &self,
+        views: impl Iterator<Item = (Entity, Cow<'a, ViewStatistics>)> + Clone,
+        capture_bytes: u64,
+        uploaded_captures: usize,
+    ) {
+        let mut shared = self.lock();
+        shared.views.retain(|(camera, _)| views.clone().any(|(shown, _)| shown == *camera));
+        for (camera, numbers) in views {
+            match shared.views.iter_mut().find(|(known, _)| *known == camera) {
+                Some((_, known)) if *known == *numbers => {}
+                Some((_, known)) => *known = numbers.into_owned(),
+                None => shared.views.push((camera, numbers.into_owned())),
+            }
+        }
+        shared.capture_bytes = capture_bytes;
+        shared.uploaded_captures = uploaded_captures;
+    }
+
+    /// A panic of another holder leaves nothing worse than old numbers.
     fn lock(&self) -> MutexGuard<'_, Shared> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-/// Hands the numbers of a frame over.
-pub(super) fn publish_statistics(
-    statistics: Res<CaptureStatistics>,
-    views: Res<CaptureViews>,
-    captures: Res<RenderAssets<GpuGaussianCapture>>,
-) {
-    let _span = debug_span!("gs4d/statistics").entered();
-    let mut shared = statistics.lock();
-    // A view that sees nothing any more may still hold memory.
-    let seen = || views.0.values().filter(|view| view.sees_something() || view.renderer.statistics().bytes > 0);
-    shared.views.retain(|(camera, _)| seen().any(|view| view.camera == *camera));
-    for view in seen() {
-        let all = view.renderer.statistics();
-        let fresh = match view.sees_something() {
-            true => Cow::Borrowed(all),
-            false => Cow::Owned(ViewStatistics { bytes: all.bytes, ..ViewStatistics::default() }),
-        };
-        match shared.views.iter_mut().find(|(camera, _)| *camera == view.camera) {
-            Some((_, known)) if known == fresh.as_ref() => {}
-            Some((_, known)) => *known = fresh.into_owned(),
-            None => shared.views.push((view.camera, fresh.into_owned())),
-        }
-    }
-    let uploaded = || captures.iter().filter_map(|(_, capture)| capture.capture());
-    shared.capture_bytes = uploaded().map(GpuCapture::bytes).sum();
-    shared.uploaded_captures = uploaded().count();
 }

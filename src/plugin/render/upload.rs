@@ -1,8 +1,8 @@
 //! Upload: from a loaded capture to its buffers on the GPU, once per asset (and again when it changes or the device was lost).
 //!
-//! In: [`GaussianCapture`]. Out: [`GpuGaussianCapture`] in `RenderAssets`; what could not be uploaded is told to the game.
+//! In: [`GaussianCapture`]. Out: [`GpuGaussianCapture`] in `RenderAssets`, or an entry in [`UploadFailures`], which becomes a message.
 
-use super::prepare::CaptureRenderer;
+use super::renderer::CaptureRenderer;
 use super::statistics::CaptureStatistics;
 use crate::plugin::asset::UploadFailures;
 use crate::plugin::component::GaussianCapture;
@@ -14,11 +14,11 @@ use bevy::log::{error, warn};
 use bevy::render::render_asset::{PrepareAssetError, RenderAsset};
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 
-/// A capture on the GPU; empty where it could not be uploaded, which has been logged and told.
+/// A capture on the GPU; empty if it could not be uploaded, which has then been logged and reported.
 pub struct GpuGaussianCapture(Option<GpuCapture>);
 
 impl GpuGaussianCapture {
-    /// The buffers, if the capture can be drawn.
+    /// Returns the buffers; `None` if the capture cannot be drawn.
     pub fn capture(&self) -> Option<&GpuCapture> {
         self.0.as_ref()
     }
@@ -26,7 +26,7 @@ impl GpuGaussianCapture {
 
 impl RenderAsset for GpuGaussianCapture {
     type SourceAsset = GaussianCapture;
-    // No `byte_len`: under a limit of bytes for each frame Bevy takes the old upload away before it makes the new one.
+    // No `byte_len`: with a limit of bytes for each frame, Bevy removes the old upload before it prepares the new one.
     type Param = (
         SRes<RenderDevice>,
         SRes<RenderQueue>,

@@ -1,16 +1,16 @@
 //! Views: Bevy's camera and an entity's transform in the renderer's terms.
 //!
-//! In: a projection matrix (Bevy's: y up, looking along −z, reverse-z), the poses of a camera and of a capture. Out: a [`Lens`],
-//! and a [`View`] (y down, looking along +z) that leads from capture space straight to camera space.
+//! In: a projection matrix (Bevy's: y up, looking along −z, reverse-z), the poses of a camera and of a capture. Out: a
+//! [`CameraLens`], and a [`View`] (y down, looking along +z) that leads from capture space straight to camera space.
 
 use crate::view::View;
 use glam::{Affine3A, DMat3, DMat4, DVec4, Mat4, UVec2, Vec2, Vec4};
 
 /// A camera's lens: a pinhole, or parallel rays.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Lens {
+pub(super) struct CameraLens {
     rays: Rays,
-    /// How the depth buffer's value `d` leads to depth in camera space: `z = (x + y d) / (z + w d)`. Nothing where it depends on
+    /// How the depth buffer's value `d` leads to depth in camera space: `z = (x + y d) / (z + w d)`. `None` where it depends on
     /// the place in the picture, too.
     pub(super) distance: Option<Vec4>,
 }
@@ -33,8 +33,8 @@ enum Rays {
     },
 }
 
-impl Lens {
-    /// The lens behind a projection matrix; nothing for one that is skewed, mirrored or, with parallel rays, not reversed in depth.
+impl CameraLens {
+    /// The lens behind a projection matrix; `None` for one that is skewed, mirrored or, with parallel rays, not reversed in depth.
     pub(super) fn of(clip_from_view: &Mat4) -> Option<Self> {
         let [x, y, _, _] = columns(clip_from_view);
         if !clip_from_view.is_finite() || (x.y, y.x) != (0.0, 0.0) || x.x <= 0.0 || y.y <= 0.0 {
@@ -55,11 +55,11 @@ impl Lens {
         if (w.x, w.y) != (0.0, 0.0) {
             return None;
         }
-        // Clip w is −z = depth. With depth and y turned round: ndc x = (x.x x − z.x depth) / depth, and downwards
+        // Clip w is −z = depth. With depth and y reversed: ndc x = (x.x x − z.x depth) / depth, and downwards
         // ndc y = (y.y y + z.y depth) / depth.
         let projection = Vec4::new(x.x, y.y, -z.x, z.y);
         let rays = Rays::Pinhole { projection, tan_fov: Vec2::new(x.x.recip(), y.y.recip()) };
-        // d = (w.z − z.z depth) / depth; z.z is 0 where the far plane is infinitely far.
+        // d = (w.z − z.z depth) / depth; z.z is 0 if the far plane is infinitely far.
         let plain = (x.z, y.z) == (0.0, 0.0) && w.z > 0.0 && z.z >= 0.0;
         Some(Self { rays, distance: plain.then_some(Vec4::new(w.z, 0.0, z.z, 1.0)) })
     }
@@ -75,7 +75,7 @@ impl Lens {
         Some(Self { rays, distance: Some(Vec4::new(w.z, -1.0, z.z, 0.0)) })
     }
 
-    /// The view of one capture through this lens: `size` in pixels, `time` in the capture's unit. Nothing where the transforms
+    /// The view of one capture through this lens: `size` in pixels, `time` in the capture's unit. `None` where the transforms
     /// flatten the capture or are not finite.
     pub(super) fn view(
         &self,
@@ -148,7 +148,7 @@ mod tests {
         let (eye, target) = (Vec3::new(1.0, 2.0, 4.0), Vec3::new(0.2, 0.1, -0.3));
         let fov_x = 2.0 * ((0.7f32 / 2.0).tan() * 4.0 / 3.0).atan();
         let ours = Camera::look_at(eye, target, Vec3::Y, fov_x, SIZE).view(0.3, RasterFov::Corrected);
-        let lens = Lens::of(&perspective(0.7)).expect("a pinhole");
+        let lens = CameraLens::of(&perspective(0.7)).expect("a pinhole");
         let theirs = lens.view(SIZE, 0.3, bevy_camera(eye, target), Affine3A::IDENTITY).expect("not flat");
         assert!(theirs.world_to_camera.abs_diff_eq(ours.world_to_camera, 1e-5), "poses agree");
         assert!(theirs.projection.abs_diff_eq(ours.projection, 1e-5), "projections agree");
@@ -169,7 +169,8 @@ mod tests {
             Vec3::new(0.1, -0.2, 0.3),
         );
         for projection in [perspective(0.9), off_center, orthographic()] {
-            let view = Lens::of(&projection).and_then(|lens| lens.view(SIZE, 0.0, camera, model)).expect("a view");
+            let view =
+                CameraLens::of(&projection).and_then(|lens| lens.view(SIZE, 0.0, camera, model)).expect("a view");
             for point in [Vec3::ZERO, Vec3::new(0.3, 0.2, -0.1), Vec3::new(-0.4, 0.1, 0.5)] {
                 let expected = seen_by_bevy(projection, camera, model.transform_point3(point));
                 assert!(seen(&view, point).abs_diff_eq(expected, 1e-5), "{point} must be seen at {expected}");
@@ -183,7 +184,7 @@ mod tests {
         let bevy_s = PerspectiveProjection { near: 0.3, ..PerspectiveProjection::default() }.get_clip_from_view();
         for (name, projection) in [("infinite", bevy_s), ("finite far plane", finite), ("orthographic", orthographic())]
         {
-            let distance = Lens::of(&projection).and_then(|lens| lens.distance).expect("a plain depth");
+            let distance = CameraLens::of(&projection).and_then(|lens| lens.distance).expect("a plain depth");
             for depth in [0.5, 1.0, 7.5, 39.0] {
                 let clip = projection * Vec4::new(0.3, -0.2, -depth, 1.0);
                 let d = clip.z / clip.w;
@@ -197,35 +198,36 @@ mod tests {
 
     #[test]
     fn an_orthographic_camera_begins_at_its_near_plane() {
-        let lens = Lens::of(&orthographic()).expect("a lens");
+        let lens = CameraLens::of(&orthographic()).expect("a lens");
         let camera = bevy_camera(Vec3::ZERO, Vec3::NEG_Z);
         let view = lens.view(SIZE, 0.0, camera, Affine3A::IDENTITY).expect("not flat");
         assert!((view.near - 0.5).abs() < 1e-4, "half a unit away, not {}", view.near);
         let behind = OrthographicProjection { near: -5.0, ..OrthographicProjection::default_3d() };
-        let view = Lens::of(&behind.get_clip_from_view()).and_then(|l| l.view(SIZE, 0.0, camera, Affine3A::IDENTITY));
+        let view =
+            CameraLens::of(&behind.get_clip_from_view()).and_then(|l| l.view(SIZE, 0.0, camera, Affine3A::IDENTITY));
         assert!((view.expect("a view").near + 5.0).abs() < 1e-3, "or five behind it");
     }
 
     #[test]
     fn other_projections_have_no_lens() {
         let forward = Mat4::orthographic_rh(-1.0, 1.0, -1.0, 1.0, 0.1, 10.0);
-        assert_eq!(Lens::of(&forward), None, "orthographic, near first");
-        assert_eq!(Lens::of(&Mat4::NAN), None, "not a number");
+        assert_eq!(CameraLens::of(&forward), None, "orthographic, near first");
+        assert_eq!(CameraLens::of(&Mat4::NAN), None, "not a number");
         let mut skewed = orthographic();
         skewed.z_axis.x = 0.1;
-        assert_eq!(Lens::of(&skewed), None, "parallel rays at a slant");
+        assert_eq!(CameraLens::of(&skewed), None, "parallel rays at a slant");
         let mut mirrored = perspective(0.7);
         mirrored.x_axis.x = -mirrored.x_axis.x;
-        assert_eq!(Lens::of(&mirrored), None, "mirrored");
+        assert_eq!(CameraLens::of(&mirrored), None, "mirrored");
         let plane = Vec3::new(0.1, 0.0, -1.0).normalize().extend(-0.4);
         let oblique = PerspectiveProjection { near_clip_plane: plane, ..PerspectiveProjection::default() };
-        let lens = Lens::of(&oblique.get_clip_from_view()).expect("still a pinhole");
+        let lens = CameraLens::of(&oblique.get_clip_from_view()).expect("still a pinhole");
         assert_eq!(lens.distance, None, "but its depth depends on the place, too");
     }
 
     #[test]
     fn flat_and_broken_transforms_have_no_view() {
-        let lens = Lens::of(&perspective(0.7)).expect("a pinhole");
+        let lens = CameraLens::of(&perspective(0.7)).expect("a pinhole");
         let camera = bevy_camera(Vec3::Z, Vec3::ZERO);
         let view = |model| lens.view(SIZE, 0.0, camera, model);
         assert_eq!(view(Affine3A::from_scale(Vec3::new(1.0, 0.0, 1.0))), None, "scaled to nothing");

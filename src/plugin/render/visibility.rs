@@ -1,9 +1,8 @@
-//! Visibility: where each placed capture is at its moment, for frustum culling.
+//! Visibility: the bounds of each placed capture at its current time, for frustum culling.
 //!
 //! In: loaded captures and their playback. Out: an `Aabb` on each entity, in capture space, written only when it changes.
 
-use crate::plugin::asset::GaussianCapture;
-use crate::plugin::component::GaussianCapture3d;
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::Playback;
 use bevy::asset::Assets;
 use bevy::camera::primitives::Aabb;
@@ -12,7 +11,7 @@ use bevy::ecs::entity::Entity;
 use bevy::ecs::system::{Commands, Query, Res};
 use bevy::log::debug_span;
 
-/// Keeps the boxes up with time. After whatever moves playback on, before Bevy asks which entities a camera sees.
+/// Updates the boxes, after everything that advances playback and before Bevy decides which entities a camera sees.
 pub(super) fn update_bounds(
     captures: Res<Assets<GaussianCapture>>,
     mut placed: Query<(Entity, &GaussianCapture3d, &Playback, Option<&mut Aabb>)>,
@@ -36,8 +35,8 @@ pub(super) fn update_bounds(
     }
 }
 
-/// The box at `seconds` since the start; nothing, so that it is never culled, for a capture with an environment map, which shows
-/// wherever a camera looks, and for one that is nowhere.
+/// The box at `seconds` since the start. `None`, so that it is never culled, for a capture with an environment map, which every camera sees,
+/// and for one of which nothing is drawn.
 fn aabb_at(capture: &GaussianCapture, seconds: f32) -> Option<Aabb> {
     if capture.scene().environment.is_some() {
         return None;

@@ -4,7 +4,7 @@
 //! for cameras that ask for it with [`DepthWrite`](super::DepthWrite).
 
 use super::composite::CaptureShaders;
-use crate::renderer::note_created;
+use crate::renderer::WorkCounters;
 use bevy::asset::Handle;
 use bevy::core_pipeline::FullscreenShader;
 use bevy::core_pipeline::core_3d::CORE_3D_DEPTH_FORMAT;
@@ -93,23 +93,29 @@ struct CachedGroup {
 
 impl WriteDepthBindings {
     /// Writes how the lens maps depth, `n0 n1 m0 m1` as in [`OpaqueDepth`](crate::renderer::OpaqueDepth), if it has changed.
-    pub(super) fn set_distance(&mut self, distance: Vec4, device: &RenderDevice, queue: &RenderQueue) {
+    pub(super) fn set_distance(
+        &mut self,
+        distance: Vec4,
+        device: &RenderDevice,
+        queue: &RenderQueue,
+        work: &WorkCounters,
+    ) {
         let first = self.distance.buffer().is_none();
         if first || *self.distance.get() != distance {
             self.distance.set(distance);
             self.distance.write_buffer(device, queue);
         }
         if first {
-            note_created();
+            work.add_created();
         }
     }
 
-    /// Lets go of the targets that were bound.
+    /// Releases the targets that were bound.
     pub(super) fn forget(&mut self) {
         self.group = None;
     }
 
-    /// The bind group for the targets of a view; nothing before the first [`set_distance`](Self::set_distance).
+    /// The bind group for the targets of a view; `None` before the first [`set_distance`](Self::set_distance).
     pub(super) fn group(
         &mut self,
         device: &RenderDevice,
@@ -117,12 +123,13 @@ impl WriteDepthBindings {
         pipeline: &WriteDepthPipeline,
         viewport: BindingResource<'_>,
         [colors, depths]: [&wgpu::TextureView; 2],
+        work: &WorkCounters,
     ) -> Option<&BindGroup> {
         if self.group.as_ref().is_none_or(|known| known.colors != *colors || known.depths != *depths) {
             let layout = cache.get_bind_group_layout(&pipeline.layout);
             let entries = BindGroupEntries::sequential((colors, depths, viewport, self.distance.binding()?));
             let group = device.create_bind_group("gs4d write_depth", &layout, &entries);
-            note_created();
+            work.add_created();
             self.group = Some(CachedGroup { colors: colors.clone(), depths: depths.clone(), group });
         }
         self.group.as_ref().map(|known| &known.group)

@@ -1,11 +1,11 @@
 //! Stereo: a head with two eyes, for views side by side and for pairs of pictures.
 //!
-//! In: a [`StereoRig`] on the head's entity and where its eyes draw ([`EyeTargets`]). Out: two cameras, children of the head, that
-//! keep their distance and their half of the target. Nothing here knows of captures: each eye is a camera like any other, and what
-//! is one for both (time, which Gaussians are active) is so for any two cameras.
+//! In: a [`StereoRig`] on the head's entity, and the targets of its eyes ([`EyeTargets`]). Out: two cameras, children of the head, at the
+//! right distance and, side by side, each with its half of the target. Captures need no support for stereo: each eye is a camera like
+//! any other, and everything that does not depend on the camera (time, which Gaussians are active) is computed once for all cameras.
 //!
-//! Both eyes look straight ahead through symmetric frusta, so that what is far away is at the same place in both pictures. A point
-//! at depth `z` is `focal length · ipd / z` pixels further right in the left eye's.
+//! Both eyes look straight ahead through symmetric frusta, so that distant points are at the same place in both pictures. A point
+//! at depth `z` is `focal length · ipd / z` pixels further right in the picture of the left eye.
 //!
 //! ```no_run
 //! use bevy::camera::RenderTarget;
@@ -24,7 +24,7 @@
 //! App::new().add_plugins((DefaultPlugins, StereoPlugin)).add_systems(Startup, setup).run();
 //! ```
 //!
-//! A headset brings its own cameras, with the lenses it has; this is for everything else.
+//! A headset has its own cameras, with its own lenses; this module is for screens and pictures.
 
 mod plugin;
 mod rig;

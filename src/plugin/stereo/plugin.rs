@@ -1,9 +1,9 @@
-//! What keeps eyes in their places.
+//! The plugin of stereo: the places and viewports of eyes.
 //!
-//! In: rigs, and the size of what their eyes draw into. Out: the eyes' transforms, viewports and aspect ratios, right in the frame in
-//! which anything has changed.
+//! In: rigs, and the sizes of the eyes' targets. Out: the eyes' transforms, viewports and aspect ratios, updated in the frame in which
+//! anything has changed.
 
-use super::{Eye, SideBySide, StereoRig};
+use super::rig::{Eye, SideBySide, StereoRig};
 use bevy::app::{App, Plugin, PostUpdate};
 use bevy::camera::visibility::VisibilitySystems;
 use bevy::camera::{Camera, CameraUpdateSystems, Projection, Viewport};
@@ -17,6 +17,15 @@ use bevy::transform::components::Transform;
 use glam::UVec2;
 
 /// Keeps the eyes of every [`StereoRig`] at their distance, and those that draw [side by side](SideBySide) in their halves.
+///
+/// # Examples
+///
+/// ```no_run
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// App::new().add_plugins((DefaultPlugins, GaussianCapturePlugin, StereoPlugin)).run();
+/// ```
 #[derive(Debug, Default, Clone, Copy)]
 pub struct StereoPlugin;
 
@@ -42,7 +51,7 @@ fn place_eyes(rigs: Query<(&StereoRig, &Children)>, mut eyes: Query<(&Eye, &mut 
     }
 }
 
-/// Runs after Bevy has learnt the target's size, and then has to do for a changed viewport what Bevy would do a frame later.
+/// Runs after Bevy has updated the target's size, and does for a changed viewport what Bevy would do one frame later.
 fn fit_eyes(mut eyes: Query<(&Eye, &mut Camera, &mut Projection), With<SideBySide>>) {
     for (eye, mut camera, mut projection) in &mut eyes {
         let Some((corner, size)) = camera.physical_target_size().and_then(|target| half(*eye, target)) else {
@@ -61,7 +70,7 @@ fn fit_eyes(mut eyes: Query<(&Eye, &mut Camera, &mut Projection), With<SideBySid
     }
 }
 
-/// Corner and size of an eye's half, in pixels; nothing where it has none.
+/// Corner and size of an eye's half, in pixels; `None` if the target is too small to have halves.
 fn half(eye: Eye, target: UVec2) -> Option<(UVec2, UVec2)> {
     let size = UVec2::new(target.x / 2, target.y);
     let left = match eye {
@@ -74,7 +83,7 @@ fn half(eye: Eye, target: UVec2) -> Option<(UVec2, UVec2)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plugin::stereo::{EyeTargets, Stereo, spawn_stereo};
+    use crate::plugin::stereo::rig::{EyeTargets, Stereo, spawn_stereo};
     use bevy::camera::{RenderTarget, RenderTargetInfo};
     use bevy::transform::TransformPlugin;
     use bevy::transform::components::GlobalTransform;

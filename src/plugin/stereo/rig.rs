@@ -1,6 +1,6 @@
-//! The rig: a head, its eyes, and where they draw.
+//! The rig: a head, its eyes, and their targets.
 //!
-//! In: the distance between the eyes and their targets. Out: three entities.
+//! In: the distance between the eyes, and their targets. Out: three entities.
 
 use bevy::camera::visibility::Visibility;
 use bevy::camera::{Camera, Camera3d, RenderTarget};
@@ -13,24 +13,55 @@ use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 use bevy::transform::components::Transform;
 
-/// A head. Its children with an [`Eye`] are kept beside its middle; its own transform is the game's.
+/// A head. [`StereoPlugin`](super::StereoPlugin) places its children with an [`Eye`] on either side of it; the game sets its own transform.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn widen(mut rig: Single<&mut StereoRig>) {
+///     rig.ipd = 0.070;
+/// }
+/// # bevy::ecs::system::assert_is_system(widen);
+/// ```
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[require(Transform, Visibility)]
 pub struct StereoRig {
-    /// Distance between the eyes in units of the world, which for a true sense of size are metres. 0 shows both eyes the same; what
-    /// is no finite number leaves the eyes where they are.
+    /// Distance between the eyes in world units, which are metres for a true sense of size. With 0 both eyes see the same; a number that is
+    /// not finite leaves the eyes where they are. Default: 0.064, the mean of adults.
     pub ipd: f32,
 }
 
 impl Default for StereoRig {
-    /// 64 mm, the mean of adults.
     fn default() -> Self {
         Self { ipd: 0.064 }
     }
 }
 
 /// Which eye a camera is.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// /// Shows the depth of captures to the right eye alone.
+/// fn setup(eyes: Query<(Entity, &Eye)>, mut commands: Commands) {
+///     for (camera, eye) in &eyes {
+///         let debug = match eye {
+///             Eye::Left => DebugView::Color,
+///             Eye::Right => DebugView::Depth,
+///         };
+///         commands.entity(camera).insert(CaptureViewSettings { debug, ..default() });
+///     }
+/// }
+/// # bevy::ecs::system::assert_is_system(setup);
+/// assert_eq!(Eye::BOTH.map(Eye::side), [-1.0, 1.0], "left and right of the head");
+/// ```
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[reflect(Component, Debug, Clone, PartialEq, Hash)]
 #[require(Camera3d)]
@@ -42,10 +73,10 @@ pub enum Eye {
 }
 
 impl Eye {
-    /// Both, the left one first.
+    /// Both eyes, the left one first.
     pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
 
-    /// −1 for the left, +1 for the right: times half the distance, where it is on the head's x axis.
+    /// Returns −1 for the left eye, +1 for the right one: its place on the head's x axis, in halves of the distance between the eyes.
     pub fn side(self) -> f32 {
         match self {
             Self::Left => -1.0,
@@ -54,33 +85,71 @@ impl Eye {
     }
 }
 
-/// On an eye: it draws into its half of the target, the left eye into the left one, whatever the target's size becomes. Where the
-/// width is odd, the column in the middle is nobody's.
+/// On an eye: it draws into its half of the target, the left eye into the left half, and follows the target's size. If the width is
+/// odd, neither eye draws the column in the middle.
 #[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 pub struct SideBySide;
 
-/// Where the eyes draw.
+/// The targets that the eyes draw into.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::camera::RenderTarget;
+/// use bevy::prelude::*;
+/// use bevy::render::render_resource::TextureFormat;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn setup(mut commands: Commands, mut images: ResMut<Assets<Image>>) {
+///     let mut picture = || {
+///         let image = Image::new_target_texture(512, 512, TextureFormat::Rgba8UnormSrgb, None);
+///         RenderTarget::Image(images.add(image).into())
+///     };
+///     let targets = EyeTargets::Separate([picture(), picture()]);
+///     spawn_stereo(&mut commands, StereoRig::default(), targets);
+/// }
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
 #[derive(Debug, Clone)]
 pub enum EyeTargets {
     /// Both into one target, each into its half.
     SideBySide(RenderTarget),
-    /// Each into a target of its own, the left eye first.
+    /// Each into its own target, the left eye's first.
     Separate([RenderTarget; 2]),
 }
 
-/// What [`spawn_stereo`] has spawned.
+/// The entities that [`spawn_stereo`] has spawned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stereo {
-    /// The entity with the [`StereoRig`]; insert its transform, or make it a child.
+    /// The entity with the [`StereoRig`]. Insert its transform, or make it a child.
     pub head: Entity,
-    /// The eyes' cameras, the left one first; insert what cameras have, the same for both.
+    /// The cameras of the eyes, the left one first. Insert further components of cameras, the same for both.
     pub eyes: [Entity; 2],
 }
 
-/// Spawns a head with two eyes. The left one is drawn first: its camera has the order 0, the right one's 1.
+/// Spawns a head with two eyes, and returns their entities. The left eye is drawn first: its camera has the order 0, the right one's 1.
 ///
-/// [`StereoPlugin`](super::StereoPlugin) keeps them in their places.
+/// [`StereoPlugin`](super::StereoPlugin) keeps the eyes in their places.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::camera::RenderTarget;
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn setup(mut commands: Commands) {
+///     // Side by side in the primary window.
+///     let window = EyeTargets::SideBySide(RenderTarget::default());
+///     let stereo = spawn_stereo(&mut commands, StereoRig::default(), window);
+///     commands.entity(stereo.head).insert(Transform::from_xyz(0.0, 1.6, 3.0));
+///     for eye in stereo.eyes {
+///         commands.entity(eye).insert(Msaa::Off);
+///     }
+/// }
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
 pub fn spawn_stereo(commands: &mut Commands, rig: StereoRig, targets: EyeTargets) -> Stereo {
     let head = commands.spawn(rig).id();
     let (targets, halved) = match targets {

@@ -1,6 +1,6 @@
-//! Why there is no picture.
+//! Why an app could not be drawn into a picture.
 //!
-//! In: what loading, drawing, reading back and writing report. Out: a [`TestingError`].
+//! In: the errors of loading, drawing, reading back and writing. Out: a [`TestingError`].
 
 use crate::codec::CodecError;
 use bevy::asset::AssetLoadError;
@@ -9,19 +9,19 @@ use std::sync::Arc;
 /// Why an app could not be drawn into a picture.
 #[derive(Debug, thiserror::Error)]
 pub enum TestingError {
-    /// There is nothing to draw with: a reason to skip a test, not to fail it.
+    /// The machine has no GPU adapter: a reason to skip a test, not to fail it.
     #[error("no GPU adapter: install a Vulkan driver (mesa-vulkan-drivers has one in software)")]
     NoGpu,
     /// The app has no [`Offscreen`](super::Offscreen).
     #[error("the app has no picture to draw into; make it with bevy_gs4d::testing::app")]
     NotOffscreen,
-    /// Something that is waited for cannot be loaded.
+    /// An asset that is waited for cannot be loaded.
     #[error(transparent)]
     Asset(Arc<AssetLoadError>),
-    /// Something is not there in time.
+    /// An asset or a shader is not ready in time.
     #[error("not ready after {seconds} s: {what}")]
     Slow {
-        /// How long it was waited for.
+        /// The time waited, in seconds.
         seconds: u64,
         /// What is missing.
         what: String,

@@ -1,7 +1,7 @@
 //! Pictures of a Bevy app without a window: for tests of games, and for examples that write files.
 //!
 //! In: an app made by [`app`], whose cameras draw into an [`Offscreen`] instead of the primary window. Out: pictures, each at an
-//! exact time, for time stands still but for the steps asked for. A software driver of Vulkan is enough.
+//! exact time: time advances only by the steps that are asked for. A software driver of Vulkan is enough.
 //!
 //! # Render a Bevy app to an image in ten lines
 //!
@@ -17,15 +17,16 @@
 //! let eye = Transform::from_xyz(0.0, 1.0, 4.0).looking_at(Vec3::ZERO, Vec3::Y);
 //! app.world_mut().spawn((Camera3d::default(), eye));
 //! let picture = testing::picture(&mut app, Duration::from_secs(1))?;
-//! assert!(picture.pixels().any(|pixel| pixel.0[0] > 128), "something bright is to be seen");
+//! assert!(picture.pixels().any(|pixel| pixel.0[0] > 128), "something bright is visible");
 //! # Ok::<(), testing::TestingError>(())
 //! ```
 //!
-//! [`picture`] waits until every capture and timeline in the world has been loaded; [`wait_for`] adds what else a game loads. Where
-//! there is no GPU at all, everything that draws is [`TestingError::NoGpu`]: a test can print it and return.
+//! [`picture`] waits until every capture and timeline in the world has been loaded; [`wait_for`] adds other assets of a game. Without any
+//! GPU, everything that draws returns [`TestingError::NoGpu`]: a test can print it and return.
 
 mod error;
 mod offscreen;
+mod pipelines;
 mod readback;
 mod waiting;
 

@@ -1,6 +1,6 @@
 //! The app without a window.
 //!
-//! In: the size of a picture. Out: an app with Bevy's default plugins that draws into one, and in which time stands still.
+//! In: the size of a picture. Out: an app with Bevy's default plugins that draws into a picture, and in which time stands still.
 
 use crate::renderer::GpuContext;
 use bevy::DefaultPlugins;
@@ -25,19 +25,17 @@ use glam::UVec2;
 use std::sync::OnceLock;
 use std::time::Duration;
 
-/// A picture that cameras draw into. [`app`] inserts one as a resource, for all cameras that would draw into the primary window.
+/// A picture that cameras draw into. [`app`] inserts one as a resource, for all cameras whose target is the primary window.
 #[derive(Resource, Debug, Clone)]
 pub struct Offscreen {
-    /// The picture on the GPU: 8 bits for each of RGBA, sRGB-encoded.
+    /// The picture on the GPU: RGBA, 8 bits each, sRGB-encoded.
     pub image: Handle<Image>,
     /// Its width and height in pixels.
     pub size: UVec2,
 }
 
 impl Offscreen {
-    /// A picture of its own, for apps that draw into more than one: [`read`](super::read) reads it.
-    ///
-    /// A size of 0 counts as 1.
+    /// Makes another picture, for apps that draw into more than one: [`read`](super::read) reads it. `size` is in pixels; 0 counts as 1.
     pub fn new(images: &mut Assets<Image>, size: UVec2) -> Self {
         let size = size.max(UVec2::ONE);
         let mut image = Image::new_target_texture(size.x, size.y, TextureFormat::Rgba8UnormSrgb, None);
@@ -45,22 +43,23 @@ impl Offscreen {
         Self { image: images.add(image), size }
     }
 
-    /// For cameras, beside their `Camera3d`. Those of the primary window get that of the app's own picture by themselves.
+    /// Returns the target for cameras, beside their `Camera3d`. Cameras of the primary window get that of the app's own picture
+    /// automatically.
     pub fn target(&self) -> RenderTarget {
         RenderTarget::Image(self.image.clone().into())
     }
 }
 
-/// Whether this machine has anything to draw with, be it a driver in software.
+/// Whether this machine has a GPU adapter; a software driver counts.
 pub fn has_gpu() -> bool {
     static FOUND: OnceLock<bool> = OnceLock::new();
     *FOUND.get_or_init(|| !GpuContext::adapters().is_empty())
 }
 
-/// Bevy's `DefaultPlugins` without a window, with time standing still, and with an [`Offscreen`] of `size` pixels.
+/// Returns an app with Bevy's `DefaultPlugins`, without a window, with time standing still, and with an [`Offscreen`] of `size` pixels.
 ///
-/// Add plugins, resources and systems to it as to any app; [`picture`](super::picture) runs it. Cameras that would draw into the
-/// primary window draw into the picture. Where there is no GPU, nothing is drawn and everything else works.
+/// Add plugins, resources and systems to it as to any app; [`picture`](super::picture) runs it. Cameras whose target is the primary window
+/// draw into the picture. Without a GPU nothing is drawn and everything else works.
 pub fn app(size: UVec2) -> App {
     app_with(size, |plugins| plugins)
 }
@@ -70,7 +69,7 @@ pub fn app_with(size: UVec2, adjust: impl FnOnce(PluginGroupBuilder) -> PluginGr
     let settings = WgpuSettings { backends: has_gpu().then(backends), ..WgpuSettings::default() };
     let plugins = DefaultPlugins
         .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..WindowPlugin::default() })
-        // A read-back that nobody waits for any more is no news.
+        // Bevy logs a read-back that is abandoned as a warning.
         .set(LogPlugin { filter: format!("{DEFAULT_FILTER},bevy_render::gpu_readback=error"), ..LogPlugin::default() })
         .set(AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..AssetPlugin::default() })
         .set(RenderPlugin {
@@ -79,11 +78,11 @@ pub fn app_with(size: UVec2, adjust: impl FnOnce(PluginGroupBuilder) -> PluginGr
             ..RenderPlugin::default()
         })
         .disable::<WinitPlugin>()
-        // Main and render world take turns, so that a picture belongs to the update that made it.
+        // Without pipelining, a picture belongs to the update that drew it.
         .disable::<PipelinedRenderingPlugin>();
     let mut app = App::new();
     app.add_plugins(adjust(plugins)).insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
-    // Steps longer than Bevy's quarter of a second are wanted, too.
+    // Bevy's default would cut steps to a quarter of a second.
     app.world_mut().get_resource_or_init::<Time<Virtual>>().set_max_delta(Duration::MAX);
     let offscreen = Offscreen::new(&mut app.world_mut().get_resource_or_init::<Assets<Image>>(), size);
     app.insert_resource(offscreen)
@@ -91,7 +90,7 @@ pub fn app_with(size: UVec2, adjust: impl FnOnce(PluginGroupBuilder) -> PluginGr
     app
 }
 
-/// There is no primary window: cameras that would draw into it draw into the picture.
+/// Gives cameras of the primary window, which does not exist, the picture as their target.
 fn draw_offscreen(offscreen: Res<Offscreen>, mut targets: Query<&mut RenderTarget, Changed<RenderTarget>>) {
     for mut target in &mut targets {
         if matches!(*target, RenderTarget::Window(WindowRef::Primary)) {

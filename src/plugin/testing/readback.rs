@@ -1,11 +1,11 @@
 //! Taking pictures.
 //!
-//! In: an app, and how much time is to go by. Out: what its camera sees then, in memory or as PNG files.
+//! In: an app, and a step of time. Out: the picture that its cameras draw after that step, in memory or as a PNG file.
 
+use super::error::TestingError;
+use super::offscreen::Offscreen;
 use super::waiting::{load, settle, update};
-use super::{Offscreen, TestingError};
 use crate::codec::CodecError;
-use crate::offline::write_beside;
 use bevy::app::App;
 use bevy::ecs::observer::On;
 use bevy::render::gpu_readback::{Readback, ReadbackComplete};
@@ -18,13 +18,13 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// Updates that a read-back may take.
+/// Most updates that a read-back may take.
 const READBACK: usize = 100;
 
-/// Waits until everything is there, lets `step` go by, and takes the picture of that moment: of the app's own [`Offscreen`].
+/// Waits until all assets are loaded, advances time by `step`, and returns the picture of that time: of the app's own [`Offscreen`].
 ///
 /// # Errors
-/// Those of [`settle`], and a picture that does not come back from the GPU.
+/// Those of [`settle`], and a read-back from the GPU that fails.
 pub fn picture(app: &mut App, step: Duration) -> Result<RgbaImage, TestingError> {
     load(app)?;
     app.insert_resource(TimeUpdateStrategy::ManualDuration(step));
@@ -36,10 +36,10 @@ pub fn picture(app: &mut App, step: Duration) -> Result<RgbaImage, TestingError>
     read(app, &offscreen)
 }
 
-/// The picture as it was last drawn: for a second one of the moment of [`picture`].
+/// Returns another picture as it was last drawn, at the time of the last [`picture`].
 ///
 /// # Errors
-/// What went wrong in drawing, and a picture that does not come back from the GPU.
+/// Errors of drawing, and a read-back from the GPU that fails.
 pub fn read(app: &mut App, offscreen: &Offscreen) -> Result<RgbaImage, TestingError> {
     let arrived = Arc::new(Mutex::new(None));
     let sink = arrived.clone();
@@ -69,8 +69,8 @@ fn unpadded(data: &[u8], size: UVec2) -> Vec<u8> {
     data.chunks(row.next_multiple_of(256)).flat_map(|padded| padded.iter().take(row).copied()).collect()
 }
 
-/// Takes `frames` pictures, `step` apart and the first at once, and writes them into `folder` as `0000.png`, `0001.png` and so on.
-/// Returns where they are.
+/// Takes `frames` pictures, `step` apart and the first without a step, and writes them into `folder` as `0000.png`, `0001.png` and so on.
+/// Returns their paths.
 ///
 /// # Errors
 /// Those of [`picture`] and [`save`].
@@ -86,17 +86,30 @@ pub fn pictures(app: &mut App, folder: &Path, frames: u32, step: Duration) -> Re
     Ok(paths)
 }
 
-/// Writes a picture as PNG, whole or not at all, and makes the folder if there is none.
+/// Writes a picture as PNG, whole or not at all, and creates the folder if there is none.
 ///
 /// # Errors
-/// A folder that cannot be made or written to, a full disk.
+/// A folder that cannot be created or written to, a full disk.
 pub fn save(picture: &RgbaImage, path: &Path) -> Result<(), TestingError> {
+    let failed = |path: &Path, error: io::Error| CodecError { path: path.to_owned(), kind: error.into() };
     if let Some(folder) = path.parent() {
-        let failed = |error: io::Error| CodecError { path: folder.to_owned(), kind: error.into() };
-        std::fs::create_dir_all(folder).map_err(failed)?;
+        std::fs::create_dir_all(folder).map_err(|error| failed(folder, error))?;
     }
-    write_beside(path, |file| picture.write_with_encoder(PngEncoder::new(file)).map_err(io::Error::other))?;
+    write_png(picture, path).map_err(|error| failed(path, error))?;
     Ok(())
+}
+
+/// Writes under another name, which is changed once the file is complete.
+fn write_png(picture: &RgbaImage, path: &Path) -> io::Result<()> {
+    let mut png = Vec::new();
+    picture.write_with_encoder(PngEncoder::new(&mut png)).map_err(io::Error::other)?;
+    let partial = path.with_extension("png.part");
+    let written = std::fs::write(&partial, png).and_then(|()| std::fs::rename(&partial, path));
+    if written.is_err() {
+        // Removing may fail, too; the first error is the one to report.
+        std::fs::remove_file(&partial).ok();
+    }
+    written
 }
 
 #[cfg(test)]

@@ -1,30 +1,27 @@
-//! Running an app until everything shows.
+//! Running an app until everything is drawn.
 //!
-//! In: an app, and hooks that name the assets it still needs. Out: the same app with those loaded and uploaded, every pipeline
-//! compiled, and no time gone by.
+//! In: an app, and hooks that return the assets it still needs. Out: the same app with those loaded and uploaded, every pipeline
+//! compiled, and no time passed.
 
-use super::TestingError;
-use crate::plugin::asset::GaussianCapture;
-use crate::plugin::component::GaussianCapture3d;
+use super::error::TestingError;
+use super::pipelines::{pipelines_are_ready, watch_pipelines};
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::{Timeline, TimelinePlayer};
 use bevy::app::{App, PluginsState};
 use bevy::asset::{AssetId, AssetServer, Assets, LoadState, UntypedAssetId};
 use bevy::ecs::resource::Resource;
 use bevy::ecs::world::World;
-use bevy::render::RenderApp;
-use bevy::render::render_resource::{CachedPipelineState, PipelineCache};
-use bevy::shader::ShaderCacheError;
 use std::time::{Duration, Instant};
 
-/// How long everything may take to load and compile.
-const RELEASE_AFTER_IDLE_FRAMES: Duration = Duration::from_secs(120);
-/// Updates until everything that has been loaded shows: uploads, and buffers that grow by what a frame before counted.
+/// How long assets and pipelines may take to load and compile.
+const LOAD_TIMEOUT: Duration = Duration::from_secs(120);
+/// Updates until everything that has been loaded is drawn: uploads take some, and buffers that grow by the counts of an earlier frame.
 const SETTLING: usize = 3;
 
-/// Names the assets that are needed and not there yet.
+/// Returns the assets that are needed and not loaded yet.
 type Hook = fn(&mut World) -> Vec<UntypedAssetId>;
 
-/// What is waited for.
+/// The hooks that return what to wait for.
 #[derive(Resource, Clone)]
 struct Awaited(Vec<Hook>);
 
@@ -34,8 +31,10 @@ impl Default for Awaited {
     }
 }
 
-/// Makes [`settle`] and everything that takes pictures wait for more than captures and timelines: for the assets that `missing`
-/// names until it names them no longer, or until the asset server knows nothing of them. One that cannot be loaded is an error.
+/// Makes [`settle`] and everything that takes pictures wait for more than captures and timelines: for each asset that `missing` returns,
+/// until it no longer returns it or the asset server no longer tracks it. An asset that cannot be loaded is an error.
+///
+/// # Examples
 ///
 /// ```no_run
 /// # use bevy::prelude::*;
@@ -54,20 +53,28 @@ pub fn wait_for(app: &mut App, missing: fn(&mut World) -> Vec<UntypedAssetId>) {
     app.world_mut().get_resource_or_init::<Awaited>().0.push(missing);
 }
 
-/// Runs the app until every capture and timeline in its world has been loaded and everything shows.
+/// Runs the app until every capture and timeline in its world has been loaded and everything is drawn.
 ///
 /// # Errors
-/// [`TestingError::NoGpu`]; an asset that cannot be loaded, or not within two minutes; what went wrong in drawing.
+/// [`TestingError::NoGpu`]; an asset that cannot be loaded, or not within two minutes; errors of drawing.
 pub fn settle(app: &mut App) -> Result<(), TestingError> {
     load(app)?;
-    for _ in 0..SETTLING {
-        update(app)?;
+    let began = Instant::now();
+    loop {
+        for _ in 0..SETTLING {
+            update(app)?;
+        }
+        // What has been loaded may need pipelines that are compiled in the background.
+        if pipelines_are_ready(app)? {
+            return Ok(());
+        }
+        if began.elapsed() > LOAD_TIMEOUT {
+            return Err(TestingError::Slow { seconds: LOAD_TIMEOUT.as_secs(), what: "shaders".into() });
+        }
     }
-    pipelines_are_ready(app)?;
-    Ok(())
 }
 
-/// Runs the app, at least once, until everything is there.
+/// Runs the app, at least once, until all assets are loaded and all pipelines compiled.
 pub(super) fn load(app: &mut App) -> Result<(), TestingError> {
     start(app)?;
     let began = Instant::now();
@@ -78,19 +85,17 @@ pub(super) fn load(app: &mut App) -> Result<(), TestingError> {
         if missing.is_empty() && compiled {
             return Ok(());
         }
-        if began.elapsed() > RELEASE_AFTER_IDLE_FRAMES {
+        if began.elapsed() > LOAD_TIMEOUT {
             let what = if compiled { missing.join(", ") } else { "shaders".into() };
-            return Err(TestingError::Slow { seconds: RELEASE_AFTER_IDLE_FRAMES.as_secs(), what });
+            return Err(TestingError::Slow { seconds: LOAD_TIMEOUT.as_secs(), what });
         }
         std::thread::sleep(Duration::from_millis(2));
     }
 }
 
-/// What a runner does before the first update.
+/// Finishes the plugins, as a runner does before the first update.
 fn start(app: &mut App) -> Result<(), TestingError> {
-    if app.get_sub_app(RenderApp).is_none() {
-        return Err(TestingError::NoGpu);
-    }
+    watch_pipelines(app)?;
     while app.plugins_state() == PluginsState::Adding {
         bevy::tasks::tick_global_task_pools_on_main_thread();
     }
@@ -101,7 +106,7 @@ fn start(app: &mut App) -> Result<(), TestingError> {
     Ok(())
 }
 
-/// One update; what went wrong in drawing is an error.
+/// Runs one update.
 pub(super) fn update(app: &mut App) -> Result<(), TestingError> {
     app.update();
     match app.should_exit() {
@@ -110,7 +115,7 @@ pub(super) fn update(app: &mut App) -> Result<(), TestingError> {
     }
 }
 
-/// The names of what is still being loaded.
+/// The names of the assets that are still being loaded.
 fn missing(world: &mut World) -> Result<Vec<String>, TestingError> {
     let hooks = world.get_resource_or_init::<Awaited>().clone();
     let wanted: Vec<UntypedAssetId> = hooks.0.iter().flat_map(|hook| hook(world)).collect();
@@ -122,7 +127,7 @@ fn missing(world: &mut World) -> Result<Vec<String>, TestingError> {
             Some(LoadState::NotLoaded | LoadState::Loading) => {
                 missing.push(server.get_path(id).map_or_else(|| id.to_string(), |path| path.to_string()));
             }
-            // Removed by the game, or never loaded by the server: it will not come.
+            // Removed by the game, or not loaded by the server: it will never be ready.
             Some(LoadState::Loaded) | None => {}
         }
     }
@@ -150,20 +155,4 @@ fn timelines(world: &mut World) -> Vec<UntypedAssetId> {
 fn absent(world: &World, captures: impl Iterator<Item = AssetId<GaussianCapture>>) -> Vec<UntypedAssetId> {
     let Some(loaded) = world.get_resource::<Assets<GaussianCapture>>() else { return Vec::new() };
     captures.filter(|capture| !loaded.contains(*capture)).map(AssetId::untyped).collect()
-}
-
-fn pipelines_are_ready(app: &App) -> Result<bool, TestingError> {
-    let renderer = app.get_sub_app(RenderApp).ok_or(TestingError::NoGpu)?;
-    let Some(cache) = renderer.world().get_resource::<PipelineCache>() else { return Ok(false) };
-    for pipeline in cache.pipelines() {
-        match &pipeline.state {
-            // Bevy tries these again: the shader is still on its way.
-            CachedPipelineState::Err(
-                ShaderCacheError::ShaderNotLoaded(_) | ShaderCacheError::ShaderImportNotYetAvailable,
-            ) => return Ok(false),
-            CachedPipelineState::Err(failure) => return Err(TestingError::Pipeline(failure.to_string())),
-            _ => {}
-        }
-    }
-    Ok(cache.waiting_pipelines().count() == 0)
 }

@@ -1,14 +1,13 @@
 //! The buffers of a capture: what `project` and `activate` read.
 //!
-//! In: a [`RuntimeScene`] and a range of its Gaussians. Out: storage buffers in the order of the shader's bindings. Packed scenes go
-//! up as they are.
+//! In: the [`Form`] of a scene and a range of its Gaussians. Out: storage buffers in the order of the shader's bindings. Packed scenes
+//! go up as they are.
 
-use crate::gaussian::Gaussian;
-use crate::renderer::Storage;
+use crate::gaussian::{Gaussian, Harmonics};
 use crate::renderer::layout::CODEBOOK_SCALES;
-use crate::renderer::memory::buffer;
-use crate::scene::packed::{BLOCK, BLOCK_RANGES, SHARED_RANGES};
-use crate::scene::{ActiveSets, CodedColors, RuntimeScene, TemporalFilter};
+use crate::renderer::memory::Allocator;
+use crate::scene::packed::{BLOCK, BLOCK_RANGES, COLOR_WORDS, RECORD_WORDS, SHARED_RANGES};
+use crate::scene::{ActiveSets, CodedColors, Form, PackedColors, TemporalFilter};
 use std::ops::Range;
 
 /// Records that are written together.
@@ -17,48 +16,47 @@ const RECORDS_AT_ONCE: usize = 1 << 14;
 /// Where buffers are made.
 #[derive(Clone, Copy)]
 pub(super) struct Gpu<'a> {
-    pub device: &'a wgpu::Device,
+    pub allocator: Allocator<'a>,
     pub queue: &'a wgpu::Queue,
 }
 
-/// How this scene is stored.
-pub(super) fn storage_of(scene: &RuntimeScene) -> Storage {
-    match (&scene.packed, scene.coded_colors()) {
-        (None, _) => Storage::Full,
-        (Some(_), None) => Storage::Packed,
-        (Some(_), Some(_)) => Storage::Coded,
-    }
-}
-
-/// Bytes that one Gaussian takes in the largest buffer.
-pub(super) fn largest_record(storage: Storage, stride: usize) -> u64 {
-    let (geometry, color) = match storage {
-        Storage::Full => (size_of::<Gaussian>(), stride * 16),
-        Storage::Packed => (32, stride * 16),
-        Storage::Coded => (32, 12),
+/// Bytes that one Gaussian takes in the largest buffer. `stride` is the number of four-vectors of whole coefficients per Gaussian.
+pub(super) fn largest_record(form: &Form, stride: usize) -> u64 {
+    let whole = stride * size_of::<[f32; 4]>();
+    let (geometry, color) = match form {
+        Form::Sliced(_) => (size_of::<Gaussian>(), whole),
+        Form::Packed(packed) => {
+            let color = match &packed.colors {
+                PackedColors::Whole(_) => whole,
+                PackedColors::Coded(_) => size_of::<[u32; COLOR_WORDS]>(),
+            };
+            (size_of::<[u32; RECORD_WORDS]>(), color)
+        }
     };
     geometry.max(color) as u64
 }
 
-/// Geometry and colour of some Gaussians, the first at a multiple of a block; codebooks aside. `stride` are the four-vectors of whole
-/// coefficients per Gaussian.
-pub(super) fn part(gpu: Gpu<'_>, scene: &RuntimeScene, own: Range<usize>, stride: usize) -> Vec<wgpu::Buffer> {
-    let mut buffers = match &scene.packed {
-        None => vec![gaussians(gpu, &scene.gaussians[own.clone()])],
-        Some(packed) => {
+/// Geometry and color of some Gaussians, the first at a multiple of a block; codebooks aside. `stride` as for [`largest_record`].
+pub(super) fn part(gpu: Gpu<'_>, form: &Form, own: Range<usize>, stride: usize) -> Vec<wgpu::Buffer> {
+    match form {
+        Form::Sliced(sliced) => {
+            vec![gaussians(gpu, &sliced.gaussians[own.clone()]), harmonics(gpu, &sliced.harmonics, own, stride)]
+        }
+        Form::Packed(packed) => {
             let blocks = own.start / BLOCK * BLOCK_RANGES..own.end.div_ceil(BLOCK) * BLOCK_RANGES;
             let (shared, blocks) = (&packed.ranges[..SHARED_RANGES], &packed.ranges[SHARED_RANGES..][blocks]);
             vec![
                 plain(gpu, "gs4d records", bytemuck::cast_slice(&packed.records[own.clone()])),
                 plain(gpu, "gs4d ranges", bytemuck::cast_slice(&[shared, blocks].concat())),
+                match &packed.colors {
+                    PackedColors::Whole(whole) => harmonics(gpu, whole, own, stride),
+                    PackedColors::Coded(coded) => {
+                        plain(gpu, "gs4d color records", bytemuck::cast_slice(&coded.records[own]))
+                    }
+                },
             ]
         }
-    };
-    buffers.push(match scene.coded_colors() {
-        Some(colors) => plain(gpu, "gs4d color records", bytemuck::cast_slice(&colors.records[own])),
-        None => harmonics(gpu, scene, own, stride),
-    });
-    buffers
+    }
 }
 
 /// All codebooks, and their scales.
@@ -93,7 +91,7 @@ pub(super) fn plain(gpu: Gpu<'_>, label: &'static str, contents: &[u8]) -> wgpu:
 
 /// Written through the queue: on a device that has just been lost, mapping would panic.
 fn filled(gpu: Gpu<'_>, label: &'static str, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
-    let made = buffer(gpu.device, label, contents.len() as u64, usage);
+    let made = gpu.allocator.buffer(label, contents.len() as u64, usage);
     gpu.queue.write_buffer(&made, 0, contents);
     made
 }
@@ -107,10 +105,10 @@ fn gaussians(gpu: Gpu<'_>, gaussians: &[Gaussian]) -> wgpu::Buffer {
 }
 
 /// The coefficients that are evaluated, padded to whole four-vectors per Gaussian.
-fn harmonics(gpu: Gpu<'_>, scene: &RuntimeScene, own: Range<usize>, stride: usize) -> wgpu::Buffer {
-    let used = scene.harmonics.evaluated() * 3;
+fn harmonics(gpu: Gpu<'_>, harmonics: &Harmonics, own: Range<usize>, stride: usize) -> wgpu::Buffer {
+    let used = harmonics.evaluated() * 3;
     records(gpu, "gs4d harmonics", own.len(), stride * 16, |index, record| {
-        record[..used * 4].copy_from_slice(bytemuck::cast_slice(&scene.harmonics.of(own.start + index)[..used]));
+        record[..used * 4].copy_from_slice(bytemuck::cast_slice(&harmonics.of(own.start + index)[..used]));
     })
 }
 
@@ -122,7 +120,7 @@ fn records(
     size: usize,
     fill: impl Fn(usize, &mut [u8]),
 ) -> wgpu::Buffer {
-    let made = buffer(gpu.device, label, (count * size) as u64, wgpu::BufferUsages::STORAGE);
+    let made = gpu.allocator.buffer(label, (count * size) as u64, wgpu::BufferUsages::STORAGE);
     let mut chunk = Vec::new();
     for first in (0..count).step_by(RECORDS_AT_ONCE) {
         let own = RECORDS_AT_ONCE.min(count - first);

@@ -6,29 +6,28 @@
 mod buffers;
 
 use super::memory::binding_limit;
-use super::{ActiveList, GpuError, Renderer, Storage, layout, note_uploaded};
+use super::{GpuError, Renderer, Storage, layout};
 use crate::gaussian::ShDirection;
 use crate::gaussian::harmonics::evaluated;
-use crate::renderer::bind::bind_group as bind_group_of;
 use crate::scene::packed::MAX_STAGES;
-use crate::scene::{ActiveSets, CodedColors, RuntimeScene, TemporalFilter, segment_of};
+use crate::scene::{ActiveSets, CodedColors, ColorDegrees, RuntimeScene, TemporalFilter, segment_of};
 use layout::BLOCK;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A capture on the GPU: its Gaussians, colour and environment map in buffers, in as many parts as bindings ask for.
+/// A capture on the GPU: its Gaussians, color and environment map in buffers, in as many parts as bindings ask for.
 #[derive(Debug)]
 pub struct GpuCapture {
     pub(super) parts: Vec<Part>,
     pub(super) environment: Option<EnvironmentBuffer>,
-    /// How its Gaussians and colours are stored.
+    /// How its Gaussians and colors are stored.
     pub(super) storage: Storage,
     /// Tells captures apart, as long as the program runs.
     pub(super) id: u64,
     pub(super) filter: Option<Filter>,
     /// Bytes of its buffers.
     bytes: u64,
-    /// Colour and time settings of an [`layout::Instance`]; the rest is zero.
-    settings: layout::Instance,
+    /// Color and time settings of the [`layout::InstanceUniforms`]; the rest is zero.
+    settings: layout::InstanceUniforms,
     len: usize,
 }
 
@@ -97,12 +96,11 @@ impl GpuCapture {
         scene: &RuntimeScene,
     ) -> Result<Self, GpuError> {
         scene.check().map_err(GpuError::Scene)?;
-        let gpu = buffers::Gpu { device, queue };
-        let storage = buffers::storage_of(scene);
-        let (degree, degree_t) = match scene.coded_colors() {
-            Some(colors) => (colors.degree, colors.degree_t),
-            None => (scene.harmonics.degree, scene.harmonics.degree_t),
-        };
+        let allocator = renderer.allocator(device);
+        let gpu = buffers::Gpu { allocator, queue };
+        let form = &scene.form;
+        let storage = Storage::of(form);
+        let ColorDegrees { degree, degree_t, .. } = form.color_degrees();
         let stride = (evaluated(degree, degree_t) * 3).div_ceil(4);
         let limits = device.limits();
         if let Some(map) = &scene.environment {
@@ -112,7 +110,7 @@ impl GpuCapture {
             }
         }
         let bits = scene.filter.as_ref().map_or(0, |filter| u64::from(filter.segments).div_ceil(8));
-        let record = buffers::largest_record(storage, stride).max(bits);
+        let record = buffers::largest_record(form, stride).max(bits);
         let threads = u64::from(limits.max_compute_workgroups_per_dimension) * 256;
         // A multiple of what one block of `activate` takes.
         let per_part = ((binding_limit(&limits) / record).min(threads) as usize / BLOCK as usize) * BLOCK as usize;
@@ -122,17 +120,17 @@ impl GpuCapture {
         }
         let mut parts = Vec::new();
         let mut bytes = 0;
-        let codebooks = scene.coded_colors().map(|colors| buffers::codebooks(gpu, colors));
+        let codebooks = form.coded_colors().map(|colors| buffers::codebooks(gpu, colors));
         for first in (0..scene.len()).step_by(per_part) {
             let count = per_part.min(scene.len() - first);
-            let own = buffers::part(gpu, scene, first..first + count, stride);
+            let own = buffers::part(gpu, form, first..first + count, stride);
             let all: Vec<_> = own.iter().chain(codebooks.iter().flatten()).collect();
             bytes += own.iter().map(wgpu::Buffer::size).sum::<u64>();
             let bind_group = renderer.capture_bind_group(device, storage, &all);
             let filter = scene.filter.as_ref().map(|filter| {
                 let sets = buffers::filter(gpu, filter, first..first + count);
                 bytes += sets.size();
-                bind_group_of(device, "gs4d filter", &renderer.layouts.filter, &[sets.as_entire_binding()])
+                allocator.bind_group("gs4d filter", &renderer.layouts.filter, &[sets.as_entire_binding()])
             });
             parts.push(Part { count: count as u32, bind_group, filter });
         }
@@ -142,12 +140,12 @@ impl GpuCapture {
             size: [map.width, map.height],
         });
         bytes += environment.as_ref().map_or(0, |map| map.buffer.size());
-        let settings = layout::Instance {
+        let settings = layout::InstanceUniforms {
             degree,
             degree_t: if degree == 3 { degree_t } else { 0 },
             stride: stride as u32,
-            stages: scene.coded_colors().map_or(0, |colors| colors.entries.len() as u32),
-            first_entries: scene.coded_colors().map(first_entries).unwrap_or_default(),
+            stages: form.coded_colors().map_or(0, |colors| colors.entries.len() as u32),
+            first_entries: form.coded_colors().map(first_entries).unwrap_or_default(),
             displaced: u32::from(scene.trained_with.sh_direction == ShDirection::Displaced),
             time_span: scene.trained_with.time_span(),
             ..bytemuck::Zeroable::zeroed()
@@ -155,7 +153,7 @@ impl GpuCapture {
         let interval = scene.trained_with.time_interval;
         let filter = scene.filter.as_ref().map(|filter| Filter::new(filter, interval, &parts));
         let id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
-        note_uploaded(bytes);
+        renderer.work().add_uploaded(bytes);
         Ok(Self { parts, environment, storage, id, filter, bytes, settings, len: scene.len() })
     }
 
@@ -184,17 +182,9 @@ impl GpuCapture {
         self.bytes
     }
 
-    /// How many Gaussians of part `index` are drawn: those of the list if there is one, else all.
-    pub(super) fn drawn(&self, index: usize, active: Option<&ActiveList>) -> u32 {
-        match (&self.filter, active) {
-            (Some(filter), Some(active)) => active.count(filter, index),
-            _ => self.parts[index].count,
-        }
-    }
-
     /// What is the same for all parts of a capture and in all views, filled into `view`.
-    pub(super) fn instance(&self, view: &layout::Instance) -> layout::Instance {
-        layout::Instance {
+    pub(super) fn instance(&self, view: &layout::InstanceUniforms) -> layout::InstanceUniforms {
+        layout::InstanceUniforms {
             degree: self.settings.degree,
             degree_t: self.settings.degree_t,
             stride: self.settings.stride,

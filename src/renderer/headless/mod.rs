@@ -3,10 +3,12 @@
 //! In: scenes and views. Out: [`Frame`]s on the host, or [`Timings`]. Each call waits for the GPU; inside a frame nothing does.
 
 use super::layout::Counters;
+use super::memory::Allocator;
 use super::timing::{PassTime, PassTimer, TIMED_PASSES, Timings, median};
-use super::view::{Finished, max_pairs};
+use super::view::{FinishedFrame, max_pairs};
 use super::{
     ActiveList, GpuCapture, GpuContext, GpuError, Instance, Renderer, ShaderChecks, ViewParameters, ViewRenderer,
+    WorkCounters,
 };
 use crate::scene::RuntimeScene;
 use crate::view::{Appearance, Background, Counts, Frame, Picture, View};
@@ -31,13 +33,23 @@ impl Headless {
     /// When the device cannot run them.
     pub fn new(context: GpuContext, checks: ShaderChecks) -> Result<Self, GpuError> {
         let renderer = Renderer::new(&context.device, checks)?;
-        let view = ViewRenderer::new(&context.device);
+        let view = ViewRenderer::new(&context.device, &renderer);
         Ok(Self { context, renderer, view, filtered: true, active: None })
     }
 
     /// The device and its name.
     pub fn context(&self) -> &GpuContext {
         &self.context
+    }
+
+    /// What has been created, uploaded and recorded so far.
+    pub fn work(&self) -> &WorkCounters {
+        self.renderer.work()
+    }
+
+    /// Creates resources for clients of this renderer.
+    pub fn allocator(&self) -> Allocator<'_> {
+        self.renderer.allocator(&self.context.device)
     }
 
     /// Whether temporal filters are used (they are at first).
@@ -120,8 +132,8 @@ impl Headless {
             self.reactivate(active.as_deref_mut(), capture, view.time);
             counts.push(self.render_all(&[instance(capture, active.as_deref(), view)], parameters)?.counts);
         }
-        let around = PassTimer::new(&self.context.device, &self.context.queue, false);
-        let inside = PassTimer::new(&self.context.device, &self.context.queue, true);
+        let around = PassTimer::new(self.allocator(), &self.context.queue, false);
+        let inside = PassTimer::new(self.allocator(), &self.context.queue, true);
         let (mut frame, mut wall) = (Vec::new(), Vec::new());
         for i in 0..frames {
             let view = &views[i % views.len()];
@@ -197,13 +209,16 @@ impl Headless {
     }
 
     /// Draws all Gaussians of one capture, whatever its filter says, and leaves everything on the GPU.
-    pub(crate) fn draw(&mut self, capture: &GpuCapture, view: &View, background: Background) -> Result<(), GpuError> {
+    ///
+    /// # Errors
+    /// As [`render`](Self::render).
+    pub fn draw(&mut self, capture: &GpuCapture, view: &View, background: Background) -> Result<(), GpuError> {
         let parameters = ViewParameters { background, ..ViewParameters::default() };
         self.submit_whole(&[instance(capture, None, view)], &parameters).map(|_| ())
     }
 
-    /// What the last frame left there.
-    pub(crate) fn finished(&self) -> Option<Finished<'_>> {
+    /// Returns what the last frame left on the GPU; `None` before the first.
+    pub fn finished(&self) -> Option<FinishedFrame<'_>> {
         self.view.finished()
     }
 
@@ -290,7 +305,10 @@ impl Headless {
     }
 
     /// The first `size` bytes of a buffer, waited for.
-    pub(crate) fn copy_out(&self, source: &wgpu::Buffer, size: u64) -> Result<Vec<u8>, GpuError> {
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn copy_out(&self, source: &wgpu::Buffer, size: u64) -> Result<Vec<u8>, GpuError> {
         let GpuContext { device, queue, .. } = &self.context;
         let buffer = readback_buffer(device, size);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());

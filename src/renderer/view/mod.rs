@@ -7,7 +7,8 @@ mod readback;
 mod record;
 mod resources;
 
-use super::memory::{alignment_of, binding_limit, buffer, texture};
+use super::active::drawn_count;
+use super::memory::{alignment_of, binding_limit};
 use super::pipelines::Renderer;
 use super::timing::{PassTime, PassTimer, TIMED_PASSES};
 use super::{ActiveList, GpuCapture, GpuError, ViewStatistics, layout};
@@ -16,7 +17,8 @@ use crate::view::{Appearance, Background, BlendSpace, DebugView, View};
 use glam::UVec2;
 use layout::{BLOCK, Counters, DEPTH_STEPS};
 use readback::Readback;
-use resources::{Kept, Resources, Sizes};
+pub use resources::PassBuffers;
+use resources::{Resources, Sizes};
 use wgpu::{BufferUsages, TextureFormat};
 
 /// A capture in a view. The view includes the transform of the capture and the capture's own time.
@@ -97,36 +99,42 @@ pub struct ViewRenderer {
 const OVERSIZE_FACTOR: u32 = 4;
 const RELEASE_AFTER_IDLE_FRAMES: u32 = 120;
 
-/// What a finished frame leaves behind.
+/// What a finished frame leaves on the GPU, for passes of clients: scoring, a backward pass.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Finished<'a> {
+pub struct FinishedFrame<'a> {
+    /// Uniform buffer: one [`layout::FrameUniforms`].
     pub frame: &'a wgpu::Buffer,
+    /// Storage buffer: one [`layout::Counters`].
     pub counters: &'a wgpu::Buffer,
-    pub kept: &'a Kept,
+    /// What the passes have written.
+    pub buffers: &'a PassBuffers,
+    /// Color over the background and transmittance, `Rgba32Float`.
     pub color: &'a wgpu::TextureView,
-    /// Room there is for splats and pairs.
+    /// Splats that the buffers have room for.
     pub slots: u32,
+    /// Pairs that the buffers have room for.
     pub pairs: u32,
 }
 
 impl ViewRenderer {
     /// A view without size; [`prepare`](Self::prepare) gives it one.
-    pub fn new(device: &wgpu::Device) -> Self {
-        let alignment = alignment_of::<layout::Instance>(device);
+    pub fn new(device: &wgpu::Device, renderer: &Renderer) -> Self {
+        let allocator = renderer.allocator(device);
+        let alignment = alignment_of::<layout::InstanceUniforms>(device);
         let counters = size_of::<Counters>() as u64;
-        let depth = texture(device, "gs4d no depth", UVec2::ONE, TextureFormat::Depth32Float);
+        let depth = allocator.texture("gs4d no depth", UVec2::ONE, TextureFormat::Depth32Float);
         Self {
             alignment,
             slots: 0,
             pairs_wanted: 0,
             oversized_frames: 0,
-            frame: buffer(device, "gs4d frame", size_of::<layout::Frame>() as u64, BufferUsages::UNIFORM),
-            steps: buffer(device, "gs4d steps", u64::from(alignment * 2 * DEPTH_STEPS), BufferUsages::UNIFORM),
-            counters: buffer(device, "gs4d counters", counters, BufferUsages::STORAGE | BufferUsages::COPY_SRC),
-            arguments: buffer(device, "gs4d arguments", 6 * 4, BufferUsages::STORAGE | BufferUsages::INDIRECT),
+            frame: allocator.buffer("gs4d frame", size_of::<layout::FrameUniforms>() as u64, BufferUsages::UNIFORM),
+            steps: allocator.buffer("gs4d steps", u64::from(alignment * 2 * DEPTH_STEPS), BufferUsages::UNIFORM),
+            counters: allocator.buffer("gs4d counters", counters, BufferUsages::STORAGE | BufferUsages::COPY_SRC),
+            arguments: allocator.buffer("gs4d arguments", 6 * 4, BufferUsages::STORAGE | BufferUsages::INDIRECT),
             no_depth: depth.create_view(&wgpu::TextureViewDescriptor::default()),
-            no_environment: buffer(device, "gs4d no environment", 16, BufferUsages::STORAGE),
-            readback: Readback::new(device, "gs4d counter readback", counters),
+            no_environment: allocator.buffer("gs4d no environment", 16, BufferUsages::STORAGE),
+            readback: Readback::new(allocator, "gs4d counter readback", counters),
             statistics: ViewStatistics::default(),
             timing: None,
             multisampled: false,
@@ -160,7 +168,7 @@ impl ViewRenderer {
         let parts: usize = instances.iter().map(|instance| instance.capture.parts.len()).sum();
         let limit = binding_limit(&limits);
         // The largest buffer per slot holds splats.
-        let needed = (slots as u64).next_multiple_of(u64::from(BLOCK)) * size_of::<layout::Splat>() as u64;
+        let needed = (slots as u64).next_multiple_of(u64::from(BLOCK)) * size_of::<layout::SplatRecord>() as u64;
         if needed > limit {
             return Err(GpuError::TooLarge { what: "the splats", needed, limit });
         }
@@ -184,7 +192,8 @@ impl ViewRenderer {
         if stale {
             self.resources = Some(self.make(device, queue, renderer, sizes, opaque_view, environment_buffer));
         }
-        let active = |i: &Instance<'_>| (0..i.capture.parts.len()).map(|at| i.capture.drawn(at, i.active)).sum::<u32>();
+        let active =
+            |i: &Instance<'_>| (0..i.capture.parts.len()).map(|at| drawn_count(i.capture, at, i.active)).sum::<u32>();
         self.slots = instances.iter().map(active).sum();
         self.statistics.bytes = self.resources.as_ref().map_or(0, |made| made.bytes);
         self.statistics.total = slots;
@@ -207,14 +216,15 @@ impl ViewRenderer {
 
     /// Whether GPU time is measured from the next frame on, pass by pass. Results arrive in [`statistics`](Self::statistics) some
     /// frames later; without timestamps inside passes there are none.
-    pub fn measure(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, on: bool) {
+    pub fn measure(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, renderer: &Renderer, on: bool) {
         if !on {
             self.timing = None;
             self.statistics.passes.clear();
         } else if self.timing.is_none() {
-            self.timing = PassTimer::new(device, queue, true).map(|timer| {
+            let allocator = renderer.allocator(device);
+            self.timing = PassTimer::new(allocator, queue, true).map(|timer| {
                 let size = timer.resolved().size();
-                (timer, Readback::new(device, "gs4d timestamp readback", size))
+                (timer, Readback::new(allocator, "gs4d timestamp readback", size))
             });
         }
     }
@@ -229,12 +239,12 @@ impl ViewRenderer {
         self.resources.as_ref().map(|made| (&made.color, &made.depth))
     }
 
-    /// What the frame recorded last leaves behind.
-    pub(crate) fn finished(&self) -> Option<Finished<'_>> {
-        self.resources.as_ref().map(|made| Finished {
+    /// Returns what the frame recorded last leaves on the GPU; `None` before the first.
+    pub fn finished(&self) -> Option<FinishedFrame<'_>> {
+        self.resources.as_ref().map(|made| FinishedFrame {
             frame: &self.frame,
             counters: &self.counters,
-            kept: &made.kept,
+            buffers: &made.buffers,
             color: &made.color_view,
             slots: made.sizes.slots,
             pairs: made.sizes.pairs,
@@ -314,13 +324,13 @@ impl ViewRenderer {
         let mut index = 0;
         for instance in instances {
             let ViewParameters { blend_space, debug, .. } = *parameters;
-            let view = layout::Instance::new(&instance.view, &instance.appearance, blend_space, debug);
+            let view = layout::InstanceUniforms::new(&instance.view, &instance.appearance, blend_space, debug);
             let capture = instance.capture.instance(&view);
             let mut first_listed = 0;
             for (part_index, part) in instance.capture.parts.iter().enumerate() {
-                let count = instance.capture.drawn(part_index, instance.active);
+                let count = drawn_count(instance.capture, part_index, instance.active);
                 let listed = u32::from(instance.active.is_some());
-                let uniform = layout::Instance { first_slot: slot, count, listed, first_listed, ..capture };
+                let uniform = layout::InstanceUniforms { first_slot: slot, count, listed, first_listed, ..capture };
                 let at = u64::from(index * self.alignment);
                 queue.write_buffer(&made.instances, at, bytemuck::bytes_of(&uniform));
                 slot += count;
@@ -343,7 +353,7 @@ impl ViewRenderer {
         let to_world = view.world_to_camera.inverse();
         let column = |axis: usize| to_world.col(axis).truncate().extend(view.camera_position[axis]).to_array();
         let opaque = parameters.opaque.as_ref();
-        let frame = layout::Frame {
+        let frame = layout::FrameUniforms {
             size: made.sizes.picture.to_array(),
             tiles: tiles(made.sizes.picture).to_array(),
             slots: self.slots,

@@ -2,7 +2,7 @@
 //!
 //! In: copies recorded into a frame. Out: their bytes, some frames later. While one copy is under way no other is begun.
 
-use crate::renderer::memory::buffer;
+use crate::renderer::memory::Allocator;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// A buffer that is copied into, mapped and read, in turn.
@@ -32,8 +32,8 @@ enum Arrival {
 }
 
 impl Readback {
-    pub fn new(device: &wgpu::Device, label: &str, size: u64) -> Self {
-        Self { buffer: buffer(device, label, size, wgpu::BufferUsages::MAP_READ), state: State::Idle }
+    pub fn new(allocator: Allocator<'_>, label: &str, size: u64) -> Self {
+        Self { buffer: allocator.buffer(label, size, wgpu::BufferUsages::MAP_READ), state: State::Idle }
     }
 
     /// Whether a copy can be begun.

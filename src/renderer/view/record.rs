@@ -4,6 +4,7 @@
 
 use super::resources::tile_steps;
 use super::{Instance, ViewRenderer};
+use crate::renderer::active::drawn_count;
 use crate::renderer::layout::{BLOCK, DEPTH_STEPS, DIGITS};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::timing::PassTimer;
@@ -52,7 +53,7 @@ impl ViewRenderer {
                 for (at, part) in instance.capture.parts.iter().enumerate() {
                     pass.set_bind_group(0, &made.project, &[index * self.alignment]);
                     pass.set_bind_group(1, &part.bind_group, &[]);
-                    let count = instance.capture.drawn(at, instance.active);
+                    let count = drawn_count(instance.capture, at, instance.active);
                     pass.dispatch_workgroups(count.div_ceil(256), 1, 1);
                     index += 1;
                 }

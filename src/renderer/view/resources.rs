@@ -3,9 +3,7 @@
 //! In: sizes, what to cut by and what stands behind. Out: [`Resources`], made anew only when one of these changes.
 
 use super::ViewRenderer;
-use crate::renderer::bind::bind_group;
 use crate::renderer::layout::{self, BLOCK, DEPTH_STEPS, DIGIT_BITS, DIGITS, SortStep};
-use crate::renderer::memory::{buffer, texture};
 use crate::renderer::pipelines::Renderer;
 use crate::view::tiles;
 use glam::UVec2;
@@ -20,7 +18,7 @@ pub(super) struct Resources {
     pub bytes: u64,
     pub instances: wgpu::Buffer,
     /// What `score` reads beside the frame.
-    pub kept: Kept,
+    pub buffers: PassBuffers,
     pub color: wgpu::Texture,
     pub color_view: wgpu::TextureView,
     pub depth: wgpu::Texture,
@@ -39,16 +37,20 @@ pub(super) struct Resources {
     pub blend: wgpu::BindGroup,
 }
 
-/// Buffers of a frame that a later pass can read.
+/// Storage buffers of a frame that a later pass can read.
 #[derive(Debug)]
-pub(crate) struct Kept {
+pub struct PassBuffers {
+    /// First and last + 1 pair of each tile, two words each.
     pub tile_ranges: wgpu::Buffer,
-    /// Ordered by tile, then depth.
+    /// Splat of each pair, ordered by tile, then depth.
     pub pair_splats: wgpu::Buffer,
+    /// One [`layout::SplatRecord`] for each slot.
     pub splats: wgpu::Buffer,
-    /// Visible splats by depth.
+    /// Slots of the visible splats, by depth.
     pub order: wgpu::Buffer,
+    /// First pair of each visible splat, in that order.
     pub offsets: wgpu::Buffer,
+    /// Depth key of each slot; [`layout::INVISIBLE`] for one without a splat.
     pub depth_keys: wgpu::Buffer,
 }
 
@@ -75,18 +77,19 @@ impl ViewRenderer {
         environment: wgpu::Buffer,
     ) -> Resources {
         let Sizes { slots, pairs, parts, picture: size } = sizes;
+        let allocator = renderer.allocator(device);
         let bytes = Cell::new(0);
         let storage = |label, count: u32, each: usize| {
             let size = u64::from(count) * each as u64;
             bytes.set(bytes.get() + size);
-            buffer(device, label, size, BufferUsages::STORAGE)
+            allocator.buffer(label, size, BufferUsages::STORAGE)
         };
         let slot_blocks = slots.div_ceil(BLOCK);
         let stride = slot_blocks.max(pairs.div_ceil(BLOCK));
         let tiles = tiles(size);
         let instances =
-            buffer(device, "gs4d instances", u64::from(parts) * u64::from(self.alignment), BufferUsages::UNIFORM);
-        let splats = storage("gs4d splats", slots, size_of::<layout::Splat>());
+            allocator.buffer("gs4d instances", u64::from(parts) * u64::from(self.alignment), BufferUsages::UNIFORM);
+        let splats = storage("gs4d splats", slots, size_of::<layout::SplatRecord>());
         let depth_keys = storage("gs4d depth keys", slots, 4);
         let keys = [(); 2].map(|()| storage("gs4d sort keys", slots, 4));
         let order = [(); 2].map(|()| storage("gs4d sort values", slots, 4));
@@ -95,8 +98,8 @@ impl ViewRenderer {
         let pair_splats = [(); 2].map(|()| storage("gs4d pair splats", pairs, 4));
         let histogram = storage("gs4d histogram", DIGITS * (stride + 1), 4);
         let tile_ranges = storage("gs4d tile ranges", tiles.x * tiles.y, 8);
-        let color = texture(device, "gs4d color", size, TextureFormat::Rgba32Float);
-        let depth = texture(device, "gs4d depth", size, TextureFormat::Rg32Float);
+        let color = allocator.texture("gs4d color", size, TextureFormat::Rgba32Float);
+        let depth = allocator.texture("gs4d depth", size, TextureFormat::Rg32Float);
         let color_view = color.create_view(&wgpu::TextureViewDescriptor::default());
         let depth_view = depth.create_view(&wgpu::TextureViewDescriptor::default());
         self.write_steps(queue, stride);
@@ -121,12 +124,12 @@ impl ViewRenderer {
                     values_out.as_entire_binding(),
                     histogram.as_entire_binding(),
                 ];
-                bind_group(device, "gs4d sort", &layouts.sort, &resources)
+                allocator.bind_group("gs4d sort", &layouts.sort, &resources)
             };
         let instance = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
             buffer: &instances,
             offset: 0,
-            size: std::num::NonZeroU64::new(size_of::<layout::Instance>() as u64),
+            size: std::num::NonZeroU64::new(size_of::<layout::InstanceUniforms>() as u64),
         });
         // After an even number of steps the pairs are back where they were made.
         let sorted = tile_steps(size) as usize % 2;
@@ -134,8 +137,7 @@ impl ViewRenderer {
             sizes,
             // 16 bytes of colour and 8 of depth for each pixel.
             bytes: bytes.get() + u64::from(size.x) * u64::from(size.y) * 24,
-            project: bind_group(
-                device,
+            project: allocator.bind_group(
                 "gs4d project",
                 &layouts.project,
                 &[instance, splats.as_entire_binding(), depth_keys.as_entire_binding()],
@@ -147,9 +149,12 @@ impl ViewRenderer {
                 sort(&keys[1], &order[1], &keys[0], &order[0]),
             ],
             sort_tiles: [0, 1].map(|i| sort(&pair_tiles[i], &pair_splats[i], &pair_tiles[1 - i], &pair_splats[1 - i])),
-            arguments: bind_group(device, "gs4d arguments", &layouts.arguments, &[self.arguments.as_entire_binding()]),
-            bin: bind_group(
-                device,
+            arguments: allocator.bind_group(
+                "gs4d arguments",
+                &layouts.arguments,
+                &[self.arguments.as_entire_binding()],
+            ),
+            bin: allocator.bind_group(
                 "gs4d bin",
                 &layouts.bin,
                 &[
@@ -163,14 +168,12 @@ impl ViewRenderer {
                     pair_splats[0].as_entire_binding(),
                 ],
             ),
-            ranges: bind_group(
-                device,
+            ranges: allocator.bind_group(
                 "gs4d ranges",
                 &layouts.ranges,
                 &[frame.clone(), counters, pair_tiles[sorted].as_entire_binding(), tile_ranges.as_entire_binding()],
             ),
-            blend: bind_group(
-                device,
+            blend: allocator.bind_group(
                 "gs4d blend",
                 if self.multisampled { &layouts.blend_multisampled } else { &layouts.blend },
                 &[
@@ -185,7 +188,7 @@ impl ViewRenderer {
                 ],
             ),
             instances,
-            kept: Kept {
+            buffers: PassBuffers {
                 tile_ranges,
                 pair_splats: pair_splats[sorted].clone(),
                 splats,

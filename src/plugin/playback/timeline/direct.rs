@@ -1,16 +1,18 @@
 //! The systems that play timelines.
 //!
-//! In: loaded timelines and their players. Out: an entity for each track, and on it what its clip says for this moment.
+//! In: loaded timelines and their players. Out: an entity for each track, with the capture, playback, fade and visibility of its clip at
+//! this time.
 
-use super::player::Directed;
-use super::{Clip, ClipFade, Marker, Timeline, TimelinePlayer, TimelineTrack};
-use crate::plugin::asset::GaussianCapture;
-use crate::plugin::component::GaussianCapture3d;
+use super::asset::{Marker, Timeline};
+use super::clip::Clip;
+use super::player::{ClipFade, Directed, TimelinePlayer, TimelineTrack};
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
+use crate::plugin::playback::clock::{FollowsClock, PlaybackClock};
+use crate::plugin::playback::component::Playback;
+use crate::plugin::playback::drive::drive;
 use crate::plugin::playback::messages::Announcer;
 use crate::plugin::playback::span::Leg;
 use crate::plugin::playback::state::PlaybackState;
-use crate::plugin::playback::systems::drive;
-use crate::plugin::playback::{FollowsClock, Playback, PlaybackClock};
 use bevy::asset::Assets;
 use bevy::camera::visibility::Visibility;
 use bevy::ecs::change_detection::{DetectChangesMut, Mut};
@@ -21,7 +23,7 @@ use bevy::ecs::system::{Commands, Query, Res};
 use bevy::log::debug_span;
 use bevy::time::Time;
 
-/// Gives every track an entity, and every such entity the player's clock.
+/// Gives every track an entity that follows the player's clock.
 pub(in crate::plugin::playback) fn bind_tracks(
     timelines: Res<Assets<Timeline>>,
     players: Query<(Entity, &TimelinePlayer, Option<&Children>)>,
@@ -46,7 +48,7 @@ pub(in crate::plugin::playback) fn bind_tracks(
     }
 }
 
-/// Moves the playheads on.
+/// Advances the playheads.
 pub(in crate::plugin::playback) fn advance_timelines(
     time: Res<Time>,
     timelines: Res<Assets<Timeline>>,
@@ -68,7 +70,7 @@ pub(in crate::plugin::playback) fn advance_timelines(
         let was_at_end = state.is_at_end_of_loop();
         let (next, progress) = state.advance(*playback, drive, timeline.duration_seconds());
         playback.set_if_neq(next);
-        // What starts over does not play its tracks backwards to the start.
+        // Starting over is a jump: tracks do not play backwards to the start.
         let wrapped = progress.travel.is_some_and(|travel| travel.wraps() || was_at_end && travel.is_forward());
         let mut shown = *clock;
         if progress.jumped || wrapped {
@@ -77,7 +79,7 @@ pub(in crate::plugin::playback) fn advance_timelines(
             shown.set(state.seconds());
         }
         clock.set_if_neq(shown);
-        announcer.tell(entity, &progress, |announcer, leg| {
+        announcer.report(entity, &progress, |announcer, leg| {
             for marker in crossed(timeline, leg) {
                 announcer.marker(entity, &marker.name, marker.time);
             }
@@ -85,7 +87,7 @@ pub(in crate::plugin::playback) fn advance_timelines(
     }
 }
 
-/// The markers on a stretch, in the order in which it is played.
+/// The markers on a stretch, in the order of play.
 fn crossed<'a>(timeline: &'a Timeline, leg: &Leg) -> impl Iterator<Item = &'a Marker> {
     let (markers, leg) = (timeline.markers(), *leg);
     (0..markers.len())
@@ -94,7 +96,7 @@ fn crossed<'a>(timeline: &'a Timeline, leg: &Leg) -> impl Iterator<Item = &'a Ma
         .filter(move |marker| leg.passes(marker.time.into()))
 }
 
-/// Gives every track's entity its clip, fade and visibility for this moment.
+/// Gives every track's entity its clip, fade and visibility at this time.
 pub(in crate::plugin::playback) fn direct_tracks(
     timelines: Res<Assets<Timeline>>,
     captures: Res<Assets<GaussianCapture>>,
@@ -107,7 +109,7 @@ pub(in crate::plugin::playback) fn direct_tracks(
         let time = clock.seconds;
         for &child in children {
             let Ok((track, mut visibility, mut fade, actor)) = stages.get_mut(child) else { continue };
-            // After a reload a track may be gone.
+            // A reload may have removed the track.
             let Some(clip) = timeline.track(&track.0).and_then(|track| track.clip_at(time)) else {
                 visibility.set_if_neq(Visibility::Hidden);
                 continue;
@@ -120,10 +122,10 @@ pub(in crate::plugin::playback) fn direct_tracks(
     }
 }
 
-/// What changes with the clip.
+/// The components that change with the clip.
 type Actor<'a> = (&'a mut Directed, &'a mut GaussianCapture3d, &'a mut Playback, &'a mut PlaybackState);
 
-/// Gives an entity another clip, if it is another one. Its capture may still be on its way.
+/// Gives an entity its clip if that has changed. `loaded` is the clip's capture, `None` until it has been loaded.
 fn cast(
     (mut directed, mut capture, mut playback, mut state): (
         Mut<Directed>,
@@ -138,11 +140,11 @@ fn cast(
     if directed.0.as_ref() != Some(clip) {
         capture.set_if_neq(GaussianCapture3d(clip.capture.clone()));
         playback.set_if_neq(wanted);
-        // Not where the last clip ended, sought elsewhere, but a new beginning.
+        // A clip begins anew; it is not a seek from where the last one ended.
         *state = PlaybackState::default();
         directed.0 = Some(clip.clone());
     } else if playback.offset != wanted.offset {
-        // Only the loaded capture says how far the clip reaches beyond it.
+        // How far the clip reaches beyond its capture is known only once that is loaded.
         playback.offset = wanted.offset;
     }
 }

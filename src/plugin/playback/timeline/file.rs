@@ -1,10 +1,12 @@
 //! The timeline as a file.
 //!
-//! In: the text of a `*.timeline.ron`, as the [module](super) describes. Out: a [`Timeline`], with the loading of its captures
-//! begun, or a [`TimelineError`], to which Bevy adds the path.
+//! In: the text of a `*.timeline.ron`, as the [module](super) describes. Out: a [`Timeline`] whose captures have begun to load, or a
+//! [`TimelineError`], to which Bevy adds the path.
 
-use super::{Clip, InvalidTimeline, Marker, Timeline, Track};
-use crate::plugin::asset::GaussianCapture;
+use super::asset::{Marker, Timeline, Track};
+use super::clip::Clip;
+use super::error::InvalidTimeline;
+use crate::plugin::component::GaussianCapture;
 use bevy::asset::io::Reader;
 use bevy::asset::{AssetLoader, AssetPath, Handle, LoadContext, ParseAssetPathError};
 use bevy::reflect::TypePath;
@@ -17,15 +19,15 @@ pub enum TimelineError {
     /// The asset source could not deliver the bytes.
     #[error("the file could not be read: {0}")]
     Read(#[from] std::io::Error),
-    /// The text is not what a timeline looks like. Says the line and the column.
+    /// The text is not a timeline. The message names the line and the column.
     #[error("not a timeline, at line and column {0}")]
     Syntax(#[from] ron::error::SpannedError),
-    /// A capture's path cannot be read.
+    /// A capture's path cannot be parsed.
     #[error("capture {path:?}: {reason}")]
     Path {
-        /// As it is written.
+        /// The path, as written.
         path: String,
-        /// What is wrong.
+        /// What is wrong with it.
         reason: ParseAssetPathError,
     },
     /// A capture's path is empty, absolute, or leads out of the asset folder.
@@ -33,15 +35,15 @@ pub enum TimelineError {
         "capture {path:?} is not in the asset folder; write a path relative to that folder, such as \"toybox.gs4d\""
     )]
     Outside {
-        /// As it is written.
+        /// The path, as written.
         path: String,
     },
-    /// What it says makes no sense.
+    /// The timeline is invalid.
     #[error(transparent)]
     Invalid(#[from] InvalidTimeline),
 }
 
-/// Loads timelines, `.timeline.ron`.
+/// Loads timelines, `.timeline.ron`. Errors: [`TimelineError`].
 #[derive(Debug, Default, TypePath)]
 pub struct TimelineLoader;
 
@@ -112,7 +114,7 @@ fn normal_speed() -> f32 {
     1.0
 }
 
-/// Reads the text of a file; `load` gives the handle of a capture.
+/// Reads the text of a file. `load` returns the handle of a capture.
 fn read(
     bytes: &[u8],
     mut load: impl FnMut(AssetPath<'static>) -> Handle<GaussianCapture>,
@@ -137,7 +139,7 @@ fn read(
     Ok(Timeline::new(tracks, markers, file.duration)?)
 }
 
-/// The path of a capture. Bevy would panic at one that leads out of the asset folder.
+/// Parses the path of a capture. Bevy would panic at one that leads out of the asset folder.
 fn asset_path(path: &str) -> Result<AssetPath<'static>, TimelineError> {
     let parsed = AssetPath::try_parse(path).map_err(|reason| TimelineError::Path { path: path.to_owned(), reason })?;
     if parsed.path().as_os_str().is_empty() || parsed.is_unapproved() {

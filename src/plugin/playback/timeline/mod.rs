@@ -1,7 +1,7 @@
-//! Timelines: when which capture plays.
+//! Timelines: which captures play when.
 //!
 //! In: a file named `*.timeline.ron`, or a [`Timeline`] made in code, on a [`TimelinePlayer`]. Out: an entity for each track, whose
-//! capture, playback, fade and visibility follow the player; and a message for every marker.
+//! capture, playback, fade and visibility follow the player; and a message for every marker that is reached.
 //!
 //! ```ron
 //! (
@@ -22,11 +22,15 @@
 //! until the last clip or marker, or longer: `duration: 10.0`.
 
 mod asset;
+mod clip;
 mod direct;
+mod error;
 mod file;
 mod player;
 
-pub use asset::{Clip, InvalidTimeline, Marker, Timeline, Track};
+pub use asset::{Marker, Timeline, Track};
+pub use clip::Clip;
 pub(super) use direct::{advance_timelines, bind_tracks, direct_tracks};
+pub use error::InvalidTimeline;
 pub use file::{TimelineError, TimelineLoader};
 pub use player::{ClipFade, TimelinePlayer, TimelineTrack};

@@ -1,10 +1,12 @@
 //! The components of a timeline in the world.
 //!
-//! In: a handle to a [`Timeline`] on an entity. Out: that entity as the timeline's clock and parent, one child for each track.
+//! In: a handle to a [`Timeline`] on an entity. Out: that entity as the clock and the parent of one child for each track.
 
-use super::asset::{Clip, Timeline};
+use super::asset::Timeline;
+use super::clip::Clip;
 use crate::plugin::component::GaussianCapture3d;
-use crate::plugin::playback::{Playback, PlaybackClock};
+use crate::plugin::playback::clock::PlaybackClock;
+use crate::plugin::playback::component::Playback;
 use bevy::asset::Handle;
 use bevy::camera::visibility::Visibility;
 use bevy::ecs::component::Component;
@@ -13,26 +15,56 @@ use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 use bevy::transform::components::Transform;
 
-/// Plays a timeline: `commands.spawn(TimelinePlayer(asset_server.load("demo.timeline.ron")))`.
+/// Plays a timeline.
 ///
 /// Its [`Playback`] is the playhead: play, pause, seek, reverse and loop it like that of a capture, or let it
-/// [follow a clock](crate::plugin::playback::FollowsClock). Its own [`PlaybackClock`] shows the same time to the tracks, so that anything
-/// else can follow it, too, except other timelines: of two that are to keep together, both follow a third clock.
+/// [follow a clock](crate::playback::FollowsClock). Its own [`PlaybackClock`] shows the time of the playhead to its tracks. Other captures
+/// can follow that clock, too, but other timelines cannot: to keep two timelines together, let both follow a third clock.
 ///
-/// Each track is played by the child that has the [`TimelineTrack`] of its name; for a track without one, a child is spawned.
+/// Each track is played by the child with the [`TimelineTrack`] of its name. For a track without such a child, one is spawned.
+///
+/// Default: a handle of no asset, with which nothing plays.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
+///     let once = Playback { repeat: Repeat::Once, ..default() };
+///     commands.spawn((TimelinePlayer(assets.load("demo.timeline.ron")), once));
+/// }
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
 #[derive(Component, Reflect, Debug, Default, Clone, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[require(Playback, PlaybackClock = PlaybackClock::manual(), Transform, Visibility)]
 pub struct TimelinePlayer(pub Handle<Timeline>);
 
-/// Lets the timeline on the parent entity decide what this entity shows: its capture, playback, fade and visibility. Spawn it
-/// yourself, as a child of the [`TimelinePlayer`], to choose its transform and what else is on it.
+/// Names the track that sets this entity's capture, playback, fade and visibility: a track of the timeline on the parent entity.
+///
+/// Spawn it yourself, as a child of the [`TimelinePlayer`], to choose its transform and its other components. Default: the empty name.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
+///     let left = (TimelineTrack("left".into()), Transform::from_xyz(-1.0, 0.0, 0.0));
+///     commands.spawn((TimelinePlayer(assets.load("demo.timeline.ron")), children![left]));
+/// }
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
 #[derive(Component, Reflect, Debug, Default, Clone, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[require(GaussianCapture3d, ClipFade, Directed)]
 pub struct TimelineTrack(pub String);
 
-/// How much of a capture shows, from 0 (nothing) to 1 (all of it, as by default): a timeline's fades set it.
+/// A factor on a capture's opacity, from 0 to 1, beside that of its [`CaptureSettings`](crate::render::CaptureSettings): a timeline's fades
+/// set it. Default: 1.
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 pub struct ClipFade(pub f32);
@@ -43,6 +75,6 @@ impl Default for ClipFade {
     }
 }
 
-/// The clip that a track's entity has been given.
+/// The clip that a track's entity plays; `None` before its first.
 #[derive(Component, Debug, Default)]
 pub(in crate::plugin::playback) struct Directed(pub(super) Option<Clip>);

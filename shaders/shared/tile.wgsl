@@ -1,0 +1,78 @@
+// Overlap of splats and tiles: which tiles a splat covers, and in which order its pairs with them come. CPU reference:
+// src/gaussian/overlap.rs. Rectangles are x0, y0, x1, y1 with the ends excluded; packed into two words of 16 bits each, `low` holds
+// x0 and y0, `high` x1 and y1.
+#define_import_path gs4d::tile
+
+#import gs4d::alpha::INVERSE_ALPHA_MIN
+
+// Side of a tile in pixels.
+const TILE_SIZE: u32 = 16u;
+
+// The tiles that the original assigns: those of the square of `radius` pixels about `center`, clamped to the grid.
+fn tiles_of(center: vec2<f32>, radius: f32, grid: vec2<f32>) -> vec4<f32> {
+    let side = f32(TILE_SIZE);
+    let low = clamp(trunc((center - radius) / side), vec2(0.0), grid);
+    let high = clamp(trunc((center + radius + (side - 1.0)) / side), vec2(0.0), grid);
+    return vec4(low, high);
+}
+
+// The part of `tiles` where alpha can reach 1/255, empty where it never does; blend would skip the rest. `variance` is xx and yy of
+// the covariance on the screen, `det` the determinant of all of it.
+fn contributing_tiles(
+    tiles: vec4<f32>,
+    center: vec2<f32>,
+    variance: vec2<f32>,
+    det: f32,
+    opacity: f32,
+) -> vec4<f32> {
+    // Written so that what is not a number is no ellipse either.
+    if !(det > 0.0) {
+        return tiles;
+    }
+    let energy = 2.0 * log(opacity * INVERSE_ALPHA_MIN);
+    if energy < -1e-3 {
+        return vec4(0.0);
+    }
+    // A hundredth of a pixel and a thousandth of the size stand above rounding.
+    let half = sqrt(max(energy, 0.0) * variance) * 1.001 + 0.01;
+    let side = f32(TILE_SIZE);
+    let low = max(tiles.xy, floor((center - half) / side));
+    let high = min(tiles.zw, floor((center + half) / side) + 1.0);
+    return vec4(low, high);
+}
+
+// The words `low` and `high` of a rectangle.
+fn pack_tiles(tiles: vec4<f32>) -> vec2<u32> {
+    return vec2(u32(tiles.x) | (u32(tiles.y) << 16u), u32(tiles.z) | (u32(tiles.w) << 16u));
+}
+
+// Columns of a rectangle.
+fn tile_columns(low: u32, high: u32) -> u32 {
+    return (high & 0xffffu) - (low & 0xffffu);
+}
+
+// Tiles of a rectangle, which are the pairs of its splat.
+fn tile_count(low: u32, high: u32) -> u32 {
+    return tile_columns(low, high) * ((high >> 16u) - (low >> 16u));
+}
+
+// The tile of pair `k` of a splat: the tiles of its rectangle come row by row.
+fn tile_of_pair(low: u32, high: u32, k: u32) -> vec2<u32> {
+    let columns = tile_columns(low, high);
+    return vec2((low & 0xffffu) + k % columns, (low >> 16u) + k / columns);
+}
+
+// The pair of a splat that a tile of its rectangle has: the reverse of tile_of_pair.
+fn pair_of_tile(low: u32, high: u32, tile: vec2<u32>) -> u32 {
+    return (tile.y - (low >> 16u)) * tile_columns(low, high) + tile.x - (low & 0xffffu);
+}
+
+// Index of a tile in a grid of that many columns: row by row, too.
+fn tile_index(tile: vec2<u32>, columns: u32) -> u32 {
+    return tile.y * columns + tile.x;
+}
+
+// The pixel of one of the 256 threads that share a tile.
+fn pixel_of(tile: vec2<u32>, thread: u32) -> vec2<u32> {
+    return tile * TILE_SIZE + vec2(thread % TILE_SIZE, thread / TILE_SIZE);
+}

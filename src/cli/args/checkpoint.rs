@@ -1,0 +1,127 @@
+//! What a checkpoint does not say about itself.
+//!
+//! In: the options for it, a path. Out: a scene.
+
+use super::values;
+use crate::cli::failure::Failure;
+use crate::codec::checkpoint::CheckpointOptions;
+use crate::codec::{self, package};
+use crate::gaussian::ShDirection;
+use crate::scene::{GaussianScene, RotationConvention, TrainedCameras, TrainedWith, UpAxis};
+use crate::view::RasterFov;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// What a checkpoint does not say about itself.
+#[derive(clap::Args)]
+#[command(next_help_heading = "What a checkpoint does not say (taken from cfg_args beside it, else the default)")]
+pub struct CheckpointArgs {
+    /// First and last timestamp of training [default: 0,1].
+    #[arg(long, value_name = "T0,T1", value_parser = values::interval, allow_hyphen_values = true)]
+    time_interval: Option<[f32; 2]>,
+    /// Background colour, 0 to 1 in the space of the pictures; also instead of a package's own [default: 0,0,0].
+    #[arg(long, value_name = "R,G,B", value_parser = values::color, allow_hyphen_values = true)]
+    pub background: Option<[f32; 3]>,
+    /// Order of the axes when the rotations were trained; unflipped: code before 2024-09-15 [default: flipped].
+    #[arg(long, value_name = "CONVENTION", value_parser = values::one_of(&ROTATION_CONVENTIONS))]
+    rotation_convention: Option<RotationConvention>,
+    /// Field of view that shapes splats seen by intrinsics cameras: the original's placeholder or the true one; also instead
+    /// of a package's own [default: reference].
+    #[arg(long, value_name = "FOV", value_parser = values::one_of(&RASTER_FOVS))]
+    raster_fov: Option<RasterFov>,
+    /// Kind of cameras of the training views; also instead of a package's own [default: intrinsics if there is an
+    /// environment map, else fov].
+    #[arg(long, value_name = "KIND", value_parser = values::one_of(&TRAINED_CAMERAS))]
+    trained_cameras: Option<TrainedCameras>,
+    /// Mean that gives the viewing direction of colour; also instead of a package's own [default: canonical].
+    #[arg(long, value_name = "MEAN", value_parser = values::one_of(&SH_DIRECTIONS))]
+    sh_direction: Option<ShDirection>,
+    /// Only the first 16 colour coefficients count.
+    #[arg(long)]
+    force_sh_3d: bool,
+    /// Added to the temporal variance in the marginal, if positive [default: -1].
+    #[arg(long, value_name = "VARIANCE", value_parser = values::number, allow_hyphen_values = true)]
+    prefilter_var: Option<f32>,
+    /// Axis that points up; also instead of a package's own [default: +z].
+    #[arg(long, value_name = "AXIS", value_parser = values::one_of(&UP_AXES), allow_hyphen_values = true)]
+    up: Option<UpAxis>,
+    /// Seconds of one pass through the time interval at speed 1; also instead of a package's own [default: the interval's
+    /// length].
+    #[arg(long, value_name = "SECONDS", value_parser = values::positive)]
+    duration: Option<f32>,
+}
+
+const ROTATION_CONVENTIONS: [(&str, RotationConvention); 2] =
+    [("flipped", RotationConvention::Flipped), ("unflipped", RotationConvention::Unflipped)];
+const RASTER_FOVS: [(&str, RasterFov); 2] = [("reference", RasterFov::Reference), ("corrected", RasterFov::Corrected)];
+const TRAINED_CAMERAS: [(&str, TrainedCameras); 2] =
+    [("fov", TrainedCameras::Fov), ("intrinsics", TrainedCameras::Intrinsics)];
+const SH_DIRECTIONS: [(&str, ShDirection); 2] =
+    [("canonical", ShDirection::Canonical), ("displaced", ShDirection::Displaced)];
+const UP_AXES: [(&str, UpAxis); 6] = [
+    ("+x", UpAxis::PosX),
+    ("-x", UpAxis::NegX),
+    ("+y", UpAxis::PosY),
+    ("-y", UpAxis::NegY),
+    ("+z", UpAxis::PosZ),
+    ("-z", UpAxis::NegZ),
+];
+
+impl CheckpointArgs {
+    /// Opens a checkpoint or a package.
+    ///
+    /// # Errors
+    /// What the codec reports; options that contradict what a package says about its training.
+    pub fn load(&self, path: &Path) -> Result<GaussianScene, Failure> {
+        let mut scene = codec::load(path, &self.options())?;
+        if is_package(path) {
+            self.check_against(&scene.trained_with).map_err(|message| Failure::about(path, &message))?;
+            let trained = &mut scene.trained_with;
+            trained.raster_fov = self.raster_fov.unwrap_or(trained.raster_fov);
+            trained.cameras = self.trained_cameras.unwrap_or(trained.cameras);
+            trained.sh_direction = self.sh_direction.unwrap_or(trained.sh_direction);
+        }
+        Ok(scene)
+    }
+
+    fn options(&self) -> CheckpointOptions {
+        CheckpointOptions {
+            time_interval: self.time_interval,
+            background: self.background,
+            rotation_convention: self.rotation_convention,
+            raster_fov: self.raster_fov,
+            cameras: self.trained_cameras,
+            sh_direction: self.sh_direction,
+            force_sh_3d: self.force_sh_3d.then_some(true),
+            prefilter_var: self.prefilter_var,
+            up: self.up,
+            duration_seconds: self.duration,
+        }
+    }
+
+    /// Whether the options that went into the numbers of a package are those it was made with.
+    fn check_against(&self, stored: &TrainedWith) -> Result<(), String> {
+        let differing = [
+            ("--time-interval", self.time_interval.is_some_and(|given| given != stored.time_interval)),
+            (
+                "--rotation-convention",
+                self.rotation_convention.is_some_and(|given| given != stored.rotation_convention),
+            ),
+            ("--force-sh-3d", self.force_sh_3d && !stored.force_sh_3d),
+            ("--prefilter-var", self.prefilter_var.is_some_and(|given| given != stored.prefilter_var)),
+        ];
+        match differing.into_iter().find(|(_, differs)| *differs) {
+            Some((option, _)) => Err(format!(
+                "this package was made with another {option}: convert its checkpoint again with that option"
+            )),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Whether a file starts like a package.
+pub fn is_package(path: &Path) -> bool {
+    let mut magic = [0; package::MAGIC.len()];
+    File::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && magic == package::MAGIC
+}

@@ -1,0 +1,73 @@
+//! Which dataset a verb works with.
+//!
+//! In: `--data DIR`, sizes, a split. Out: its views inside the capture's time interval.
+
+use super::values;
+use crate::cli::failure::Failure;
+use crate::offline::Progress;
+use crate::offline::dataset::{CameraOptions, Dataset, DatasetError, Split, TrainingView};
+use crate::offline::splits::open_split;
+use crate::scene::TrainedWith;
+use glam::UVec2;
+use std::path::PathBuf;
+
+/// Where the training views are.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Training data")]
+pub struct DataArgs {
+    /// Folder of the data the capture was trained on, with `transforms_train.json`. Cameras and times are enough unless results
+    /// are compared with the images.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Picture size [default: w and h of the camera file, else that of the first image found beside it, after --resolution].
+    #[arg(long, value_name = "WxH", value_parser = values::size)]
+    size: Option<UVec2>,
+    /// Divisor of the picture size (1, 2, 3, 4, 8), -1 (at most 1600 wide) or a target width, as in training.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with = "size")]
+    resolution: Option<i32>,
+}
+
+impl DataArgs {
+    /// The training views within the capture's time interval.
+    ///
+    /// # Errors
+    /// No folder given, or one that cannot be used.
+    pub fn open(&self, trained_with: &TrainedWith) -> Result<Vec<TrainingView>, Failure> {
+        let folder = self.data.as_ref().ok_or_else(|| {
+            Failure::new("this needs the training views: give --data DIR, the folder that the capture was trained on")
+        })?;
+        let options = CameraOptions {
+            size: self.size,
+            resolution: self.resolution,
+            time_interval: Some(trained_with.time_interval),
+        };
+        Ok(Dataset::open(folder, Split::Train, &options)?.views)
+    }
+}
+
+/// Where the training and test views are.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Data")]
+pub struct SplitArgs {
+    /// Folder of the dataset, with `transforms_train.json` and `transforms_test.json`.
+    #[arg(long, value_name = "DIR")]
+    pub data: PathBuf,
+    /// Divisor of the picture size (1, 2, 3, 4, 8), -1 (at most 1600 wide) or a target width, as in training.
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub resolution: Option<i32>,
+}
+
+impl SplitArgs {
+    /// The views of a split; see [`open_split`].
+    ///
+    /// # Errors
+    /// A split that is not there or cannot be used.
+    pub fn open(
+        &self,
+        split: Split,
+        trained_with: &TrainedWith,
+        progress: &mut dyn Progress,
+    ) -> Result<Dataset, DatasetError> {
+        open_split(&self.data, split, self.resolution, trained_with, progress)
+    }
+}

@@ -1,0 +1,55 @@
+//! What scores and draws for a verb.
+//!
+//! In: `--engine`, `--adapter` and `--checks`. Out: an [`Engine`], or a headless renderer.
+
+use super::values;
+use crate::offline::engine::{Engine, EngineChoice, EngineSettings, GpuSettings};
+use crate::renderer::{GpuError, Headless, ShaderChecks};
+
+/// Where to compute.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Engine")]
+pub struct EngineArgs {
+    /// Where to score and draw: cpu, gpu, or auto: the GPU unless there is none but a software driver.
+    #[arg(long, value_name = "ENGINE", default_value = "auto", value_parser = values::one_of(&EngineChoice::NAMES))]
+    engine: EngineChoice,
+    #[command(flatten)]
+    gpu: GpuArgs,
+}
+
+impl EngineArgs {
+    /// Opens it.
+    ///
+    /// # Errors
+    /// A GPU was asked for that cannot be used.
+    pub fn open(&self) -> Result<Engine, GpuError> {
+        Engine::open(&EngineSettings { choice: self.engine, gpu: self.gpu.settings() })
+    }
+}
+
+/// Which GPU draws, and how carefully.
+#[derive(clap::Args)]
+#[command(next_help_heading = "GPU")]
+pub struct GpuArgs {
+    /// The adapter: part of its name in any case, or its index. A wrong one lists those there are [default: the fastest].
+    #[arg(long, value_name = "NAME|INDEX")]
+    adapter: Option<String>,
+    /// Have shaders check every array index (slower; to look for defects).
+    #[arg(long)]
+    checks: bool,
+}
+
+impl GpuArgs {
+    /// Opens the adapter and compiles the passes.
+    ///
+    /// # Errors
+    /// No such adapter, or one that cannot run the passes.
+    pub fn open(&self) -> Result<Headless, GpuError> {
+        self.settings().open()
+    }
+
+    fn settings(&self) -> GpuSettings {
+        let checks = if self.checks { ShaderChecks::On } else { ShaderChecks::Off };
+        GpuSettings { adapter: self.adapter.clone(), checks }
+    }
+}

@@ -1,0 +1,18 @@
+//! Groups of options that several verbs share, and how the values of options are spelled.
+//!
+//! In: the part of the command line that belongs to a group. Out: settings of the library, or what it opens with them.
+
+mod checkpoint;
+mod data;
+mod engine;
+mod package;
+mod scoring;
+pub mod values;
+mod views;
+
+pub use checkpoint::{CheckpointArgs, is_package};
+pub use data::{DataArgs, SplitArgs};
+pub use engine::{EngineArgs, GpuArgs};
+pub use package::{PackageArgs, file_size};
+pub use scoring::{ScoringArgs, score_choice};
+pub use views::ViewArgs;

@@ -1,0 +1,69 @@
+//! Where a package is written, and how.
+//!
+//! In: the options for it, a scene. Out: the package on disk.
+
+use crate::cli::failure::Failure;
+use crate::cli::interrupt;
+use crate::offline::{self, write_settings};
+use crate::scene::GaussianScene;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Where to write a package, and how.
+#[derive(clap::Args)]
+pub struct PackageArgs {
+    /// The package to write (.gs4d). A file that is there is replaced, once the new one is whole.
+    #[arg(value_name = "OUT", required_unless_present = "out_option")]
+    out: Option<PathBuf>,
+    /// The package to write, said the other way.
+    #[arg(short = 'o', long = "out", value_name = "OUT", conflicts_with = "out")]
+    out_option: Option<PathBuf>,
+    /// zstd level, 1 (fast) to 19 (small) [default: 9; of packed captures 19].
+    #[arg(long, value_name = "LEVEL", value_parser = clap::value_parser!(i32).range(1..=19))]
+    pub level: Option<i32>,
+}
+
+impl PackageArgs {
+    /// Where to write.
+    ///
+    /// # Errors
+    /// A name that belongs to another kind of file.
+    pub fn out(&self) -> Result<&Path, Failure> {
+        let out = self.out.as_ref().or(self.out_option.as_ref());
+        let out = out.ok_or_else(|| Failure::new("no OUT is given: name the package to write"))?;
+        let foreign = ["pth", "json", "png", "jpg", "f32"];
+        if out.extension().is_some_and(|found| foreign.iter().any(|extension| found.eq_ignore_ascii_case(extension))) {
+            return Err(Failure::about(out, "packages are written here, and their names end in .gs4d"));
+        }
+        Ok(out)
+    }
+
+    /// As [`out`](Self::out), for a verb that reads `input`.
+    ///
+    /// # Errors
+    /// As [`out`](Self::out), and an input that would be overwritten.
+    pub fn out_apart_from(&self, input: &Path) -> Result<&Path, Failure> {
+        let out = self.out()?;
+        offline::require_another_file(input, out)?;
+        Ok(out)
+    }
+
+    /// Writes the package. Returns its size in bytes.
+    ///
+    /// # Errors
+    /// What the codec reports.
+    pub fn save(&self, scene: &GaussianScene) -> Result<u64, Failure> {
+        let out = self.out()?;
+        let settings = write_settings(&scene.form, self.level);
+        interrupt::whole(|| offline::save(out, scene, &settings))?;
+        file_size(out)
+    }
+}
+
+/// Bytes of a file.
+///
+/// # Errors
+/// What the system reports.
+pub fn file_size(path: &Path) -> Result<u64, Failure> {
+    Ok(fs::metadata(path).map_err(|error| Failure::at(path, &error))?.len())
+}

@@ -1,0 +1,45 @@
+//! Which score, and from which views.
+//!
+//! In: the name of a score, the options for scoring. Out: a [`ScoreChoice`], [`ScoringSettings`].
+
+use super::values;
+use crate::offline::score::variant::Variant;
+use crate::offline::score::{ScoreSettings, ScoringSettings};
+use crate::offline::search::ScoreChoice;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+
+/// Parses `auto`, `all` (where that makes sense) or the name of a score.
+pub fn score_choice(with_all: bool) -> impl TypedValueParser<Value = ScoreChoice> {
+    let special: &[&str] = if with_all { &["auto", "all"] } else { &["auto"] };
+    let names = special.iter().copied().chain(Variant::ALL.map(Variant::name));
+    PossibleValuesParser::new(names).map(|name: String| match name.as_str() {
+        "all" => ScoreChoice::All,
+        name => name.parse().map_or(ScoreChoice::Auto, ScoreChoice::One),
+    })
+}
+
+/// From which views scores come, and how.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Scoring")]
+pub struct ScoringArgs {
+    /// Score with an even share of N views [default: all].
+    #[arg(long, value_name = "N", value_parser = values::count(10_000_000))]
+    views: Option<usize>,
+    /// Training views that are kept out of scoring where results are compared, to compare them on; at most a quarter of all.
+    #[arg(long, value_name = "N", default_value = "24", value_parser = values::count(100_000))]
+    held_out: usize,
+    /// Power of the volume in the paper's factor; 0 leaves it out.
+    #[arg(long, value_name = "P", default_value = "0.1", value_parser = values::not_negative)]
+    volume_power: f64,
+    /// Share of the volumes, from the largest down, at which the paper's reference volume lies.
+    #[arg(long, value_name = "R", default_value = "0.9", value_parser = values::share)]
+    volume_rank: f64,
+}
+
+impl ScoringArgs {
+    /// As settings of the library.
+    pub fn settings(&self) -> ScoringSettings {
+        let score = ScoreSettings { volume_power: self.volume_power, volume_rank: self.volume_rank };
+        ScoringSettings { views: self.views, held_out: self.held_out, score }
+    }
+}

@@ -1,0 +1,134 @@
+//! `gs4d bake CHECKPOINT --data DIR -o OUT`: from a trained checkpoint to a small, fast package, and a report of what it cost.
+//!
+//! In: a checkpoint, its training views. Out: a package, `OUT.report.json` and `OUT.report.html`, and the report in short.
+
+use super::args::{CheckpointArgs, EngineArgs, PackageArgs, ScoringArgs, SplitArgs, score_choice, values};
+use super::failure::Failure;
+use super::progress::Bars;
+use super::report::Report;
+use super::table::{bytes, lines};
+use crate::offline::bake::{BakeSettings, Baked, bake};
+use crate::offline::quantize::Quality;
+use crate::offline::report::{BakeReport, Change};
+use crate::offline::search::{Goal, ScoreChoice};
+use crate::offline::temporal_filter::FILTER_NAMES;
+use crate::scene::{FilterKind, MAX_SEGMENTS};
+use std::path::{Path, PathBuf};
+
+/// Turn a trained checkpoint into a small, fast package: score, prune, mask, compress, evaluate, report.
+///
+/// An interrupted bake goes on where it was, from the results in OUT.bake/; with other inputs or options it starts over where they
+/// matter. Nothing is trained.
+#[derive(clap::Args)]
+#[command(group = clap::ArgGroup::new("goal").args(["ratio", "keep", "max_loss"]))]
+#[command(after_help = "\
+Examples:
+  gs4d bake chkpnt30000.pth --data data/toybox -o toybox.gs4d
+  gs4d bake chkpnt30000.pth --data data/toybox --ratio 0.5 --quality small -o toybox.gs4d
+  gs4d bake n3v.pth --data data/n3v --time-interval 0,10 --max-loss 0.2 --every 20 -o n3v.gs4d
+
+Beside the package: OUT.report.html with plots and pictures (open it in a browser; it needs no network) and OUT.report.json.
+Cameras and times of the training views are enough with --ratio or --keep; --max-loss needs their images, too, and the report
+compares the test views only if theirs are there.")]
+pub struct Bake {
+    /// The checkpoint, or a package of it in the trained form.
+    #[arg(value_name = "CHECKPOINT")]
+    input: PathBuf,
+    #[command(flatten)]
+    package: PackageArgs,
+    #[command(flatten)]
+    data: SplitArgs,
+    /// Share of the Gaussians to remove, 0 to 1.
+    #[arg(long, value_name = "R", value_parser = values::share)]
+    ratio: Option<f64>,
+    /// Number of Gaussians to keep.
+    #[arg(long, value_name = "N", value_parser = values::count(1_000_000_000))]
+    keep: Option<usize>,
+    /// Keep as few as lose no more than this on held-out training views, dB [default: 0.1, unless --ratio or --keep is given].
+    #[arg(long, value_name = "DB", value_parser = values::not_negative)]
+    max_loss: Option<f64>,
+    /// Prune by this score; auto tries ours and the paper's.
+    #[arg(long, value_name = "SCORE", default_value = "auto", value_parser = score_choice(false))]
+    variant: ScoreChoice,
+    /// Which temporal filter.
+    #[arg(long, value_name = "FILTER", default_value = "support", value_parser = values::one_of(&FILTER_NAMES))]
+    filter: FilterKind,
+    /// Number of key-frames of the filter, evenly over the time interval, both ends included [default: 11].
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(2..=i64::from(MAX_SEGMENTS) + 1))]
+    key_frames: Option<u32>,
+    /// A key-frame every so many of the training data's timestamps, instead.
+    #[arg(long, value_name = "FRAMES", conflicts_with = "key_frames", value_parser = values::count(1_000_000))]
+    every: Option<usize>,
+    /// How small against how exact.
+    #[arg(long, value_name = "QUALITY", default_value = "balanced", value_parser = values::one_of(&Quality::NAMES))]
+    quality: Quality,
+    /// Leave the intermediate results in OUT.bake/ when all is done.
+    #[arg(long)]
+    keep_work: bool,
+    #[command(flatten)]
+    scoring: ScoringArgs,
+    #[command(flatten)]
+    engine: EngineArgs,
+    #[command(flatten)]
+    checkpoint: CheckpointArgs,
+}
+
+impl Bake {
+    /// Runs every stage that is not done yet.
+    pub fn run(&self) -> Result<Report, Failure> {
+        let out = self.package.out_apart_from(&self.input)?;
+        let scene = self.checkpoint.load(&self.input)?;
+        let engine = &mut self.engine.open()?;
+        let Baked { report, html, .. } = bake(scene, &self.settings(out), engine, &mut Bars::default())?;
+        Ok(Report::new(report.json()?, in_short(&report, &html)))
+    }
+
+    fn settings(&self, out: &Path) -> BakeSettings {
+        BakeSettings {
+            checkpoint: self.input.clone(),
+            data: self.data.data.clone(),
+            out: out.to_owned(),
+            resolution: self.data.resolution,
+            background: self.checkpoint.background,
+            goal: self.goal(),
+            score: self.variant,
+            scoring: self.scoring.settings(),
+            filter: self.filter,
+            key_frames: values::key_frames(self.key_frames, self.every),
+            quality: self.quality,
+            level: self.package.level,
+            keep_work: self.keep_work,
+        }
+    }
+
+    /// How many Gaussians to keep.
+    fn goal(&self) -> Goal {
+        match (self.keep, self.ratio, self.max_loss) {
+            (Some(keep), ..) => Goal::Keep(keep),
+            (_, Some(ratio), _) => Goal::Remove(ratio),
+            (.., Some(loss)) => Goal::MaxLoss(loss),
+            (None, None, None) => Goal::default(),
+        }
+    }
+}
+
+/// The report for people, in short.
+fn in_short(report: &BakeReport, page: &Path) -> String {
+    let mut pairs = vec![
+        ("package", format!("{}, {}", report.package, bytes(report.bytes.after))),
+        ("Gaussians", format!("{} of {}", report.gaussians.after, report.gaussians.before)),
+    ];
+    if let Some(Change { before, after }) = &report.evaluation {
+        let (before, after) = (before.mean, after.mean);
+        pairs.push(("PSNR", format!("{:.3} dB, checkpoint {:.3} dB", after.psnr, before.psnr)));
+        if let (Some(before), Some(after)) = (before.ssim, after.ssim) {
+            pairs.push(("SSIM", format!("{after:.4}, checkpoint {before:.4}")));
+        }
+    }
+    let choices = report.choices.iter().map(|(name, value)| (name.as_str(), value.clone()));
+    pairs.extend(choices);
+    let seconds: f64 = report.stages.iter().map(|stage| stage.seconds).sum();
+    pairs.push(("time", format!("{seconds:.1} s")));
+    pairs.push(("report", page.display().to_string()));
+    lines(&pairs)
+}

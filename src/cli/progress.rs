@@ -1,0 +1,75 @@
+//! Progress on standard error.
+//!
+//! In: the tasks and remarks of library calls. Out: one bar for each unfinished task, below those of the tasks around
+//! it; lines.
+
+use super::interrupt;
+use crate::codec::CodecError;
+use crate::offline::Progress;
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::{Write, stderr};
+use std::sync::LazyLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// All progress bars on the screen, one below the other.
+static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
+
+/// Whether progress bars stay away.
+static SILENT: AtomicBool = AtomicBool::new(false);
+
+/// Hides progress bars from here on.
+pub fn silence_progress(silent: bool) {
+    SILENT.store(silent, Ordering::Relaxed);
+}
+
+/// Writes a line to standard error, or nowhere if that is closed.
+pub fn note(line: &str) {
+    let _ = BARS.suspend(|| writeln!(stderr(), "{line}"));
+}
+
+/// The bars of the unfinished tasks; hidden with `--json` and where standard error is no terminal. They go when this is
+/// dropped.
+#[derive(Default)]
+pub struct Bars(Vec<ProgressBar>);
+
+impl Progress for Bars {
+    fn begin(&mut self, task: &'static str, steps: usize) {
+        let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
+        let bar = ProgressBar::with_draw_target(Some(steps as u64), ProgressDrawTarget::hidden());
+        let bar = bar.with_style(style).with_message(task);
+        let bar = if SILENT.load(Ordering::Relaxed) { bar } else { BARS.add(bar) };
+        if steps > 0 {
+            bar.tick();
+        }
+        self.0.push(bar);
+    }
+
+    fn advance(&mut self) {
+        if let Some(bar) = self.0.last() {
+            bar.inc(1);
+        }
+    }
+
+    fn finish(&mut self) {
+        if let Some(bar) = self.0.pop() {
+            bar.finish_and_clear();
+        }
+    }
+
+    fn note(&mut self, line: &str) {
+        note(line);
+    }
+
+    fn uninterrupted(&mut self, write: &mut dyn FnMut() -> Result<(), CodecError>) -> Result<(), CodecError> {
+        interrupt::whole(write)
+    }
+}
+
+impl Drop for Bars {
+    fn drop(&mut self) {
+        while !self.0.is_empty() {
+            self.finish();
+        }
+    }
+}

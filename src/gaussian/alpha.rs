@@ -1,0 +1,93 @@
+//! Alpha: how much of a splat a pixel takes, and the step that blends it. Section 3.4 of the 4DGS model.
+//!
+//! In: conic and opacity of a splat, where a pixel lies in it, the transmittance that the pixel has left. Out: its alpha, or what the
+//! splat does to the pixel ([`BlendStep`]). The CPU reference of `shaders/shared/alpha.wgsl`; [`visible`] is also the rule of picking.
+
+use glam::{Vec2, Vec3};
+
+/// A splat's alpha below this is skipped.
+pub const ALPHA_MIN: f32 = 1.0 / 255.0;
+/// Alpha is clamped to this from above.
+pub const ALPHA_MAX: f32 = 0.99;
+/// A pixel stops before its transmittance would fall below this.
+pub const TRANSMITTANCE_MIN: f32 = 1e-4;
+
+/// What one splat does to a pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum BlendStep {
+    /// Nothing: its alpha is too small.
+    Skip,
+    /// The pixel takes neither this splat nor any after it.
+    Stop,
+    /// The splat is blended.
+    Blend {
+        /// Factor on the splat's colour and depth: alpha times the transmittance before it.
+        weight: f32,
+        /// Transmittance after it.
+        transmittance: f32,
+    },
+}
+
+/// Blends one splat over a pixel that has `transmittance` left; see [`alpha_at`] for the others.
+pub fn blend_step(conic: Vec3, opacity: f32, offset: Vec2, transmittance: f32) -> BlendStep {
+    let Some(alpha) = alpha_at(conic, opacity, offset) else { return BlendStep::Skip };
+    let left = transmittance * (1.0 - alpha);
+    if left < TRANSMITTANCE_MIN {
+        return BlendStep::Stop;
+    }
+    BlendStep::Blend { weight: alpha * transmittance, transmittance: left }
+}
+
+/// A splat's alpha at a pixel; `None` where it is skipped. `conic` is the inverse covariance on the screen (xx, xy, yy), `offset` leads
+/// from the pixel to the splat's centre, pixels.
+pub fn alpha_at(conic: Vec3, opacity: f32, offset: Vec2) -> Option<f32> {
+    let Vec2 { x, y } = offset;
+    let power = -0.5 * (conic.x * x * x + conic.z * y * y) - conic.y * x * y;
+    if power > 0.0 { None } else { visible(opacity * power.exp()) }
+}
+
+/// Alpha as it is blended: clamped from above by [`ALPHA_MAX`]; `None` below [`ALPHA_MIN`], where it is skipped.
+pub fn visible(alpha: f32) -> Option<f32> {
+    let alpha = alpha.min(ALPHA_MAX);
+    (alpha >= ALPHA_MIN).then_some(alpha)
+}
+
+/// The largest squared Mahalanobis distance from its centre at which a splat of this opacity is not skipped; negative if it always is.
+///
+/// `opacity · exp(−½ d²) ≥ 1/255` needs `d² ≤ 2 ln(255 opacity)`.
+pub fn reach_squared(opacity: f32) -> f32 {
+    2.0 * (opacity / ALPHA_MIN).ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A round splat of one pixel's deviation.
+    const CONIC: Vec3 = Vec3::new(1.0, 0.0, 1.0);
+
+    #[test]
+    fn a_splat_is_skipped_blended_or_stopped_before() {
+        let step = |opacity, offset, transmittance| blend_step(CONIC, opacity, offset, transmittance);
+        assert_eq!(
+            step(0.5, Vec2::ZERO, 0.5),
+            BlendStep::Blend { weight: 0.25, transmittance: 0.25 },
+            "half of the half that is left"
+        );
+        assert_eq!(step(0.003, Vec2::ZERO, 1.0), BlendStep::Skip, "an opacity below 1/255");
+        assert_eq!(step(1.0, Vec2::new(0.0, 3.4), 1.0), BlendStep::Skip, "too far away");
+        assert_eq!(step(1.0, Vec2::ZERO, 0.005), BlendStep::Stop, "a hundredth of it is less than 1e-4");
+        let saddle = Vec3::new(1.0, 2.0, 1.0);
+        assert_eq!(alpha_at(saddle, 0.5, Vec2::new(1.0, -1.0)), None, "a power above 0");
+    }
+
+    #[test]
+    fn alpha_ends_where_it_can_reach_no_farther() {
+        for opacity in [0.005, 0.1, 1.0] {
+            let reach = reach_squared(opacity).sqrt();
+            assert!(alpha_at(CONIC, opacity, Vec2::X * reach * 0.999).is_some(), "inside, at opacity {opacity}");
+            assert_eq!(alpha_at(CONIC, opacity, Vec2::X * reach * 1.001), None, "outside, at opacity {opacity}");
+        }
+        assert!(reach_squared(0.003) < 0.0, "what is always skipped reaches nowhere");
+    }
+}

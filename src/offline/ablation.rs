@@ -1,0 +1,156 @@
+//! What every score, prune ratio and temporal filter costs, without any training.
+//!
+//! In: a scene, its training views, the views to measure on. Out: one row for the whole scene, one for each filter, one
+//! for each score at each ratio ([`AblationRow`]).
+
+use super::dataset::TrainingView;
+use super::engine::Engine;
+use super::evaluation::evaluate_scene;
+use super::metrics::{ImageMetrics, MetricSet};
+use super::prune::{highest, kept_count, select};
+use super::score::ScoringSettings;
+use super::score::variant::Variant;
+use super::search::ScoreChoice;
+use super::temporal_filter::{filter, filter_name};
+use super::{OfflineError, Progress, Subject};
+use crate::scene::{FilterKind, GaussianScene, RuntimeScene, TemporalFilter};
+use crate::view::Background;
+use serde::Serialize;
+
+/// What to try. Every row is measured on its own: filters on the whole scene, ratios without a filter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AblationSettings {
+    /// Kinds of temporal filter.
+    pub filters: Vec<FilterKind>,
+    /// Numbers of key-frames, each tried with every kind of filter.
+    pub key_frames: Vec<u32>,
+    /// Shares of the Gaussians to remove, 0 to 1.
+    pub ratios: Vec<f64>,
+    /// Scores to prune by, each tried at every ratio.
+    pub scores: Vec<ScoreChoice>,
+    /// How to score.
+    pub scoring: ScoringSettings,
+}
+
+/// One row of the table.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AblationRow {
+    /// What was tried, in words.
+    pub row: String,
+    /// How close it is to the views it was measured on.
+    #[serde(flatten)]
+    pub metrics: ImageMetrics,
+    /// Number of Gaussians.
+    pub gaussians: usize,
+    /// Share of them that a filter leaves active, mean over its segments.
+    pub active_share: Option<f64>,
+}
+
+/// Measures every row on the views `measured`, which need their images; scores and filters come from the views `train`.
+/// Begins the tasks "filters" and "pruned".
+///
+/// # Errors
+/// Images that cannot be read, training views that show nothing of the scene, a failure of the engine.
+pub fn ablate(
+    engine: &mut Engine,
+    mut subject: Subject,
+    train: Vec<TrainingView>,
+    measured: &[TrainingView],
+    settings: &AblationSettings,
+    progress: &mut dyn Progress,
+) -> Result<Vec<AblationRow>, OfflineError> {
+    subject.runtime.filter = None;
+    let mut table = Table { engine, measured, background: subject.background, rows: Vec::new() };
+    let AblationSettings { filters, key_frames, ratios, scores, scoring } = settings;
+    progress.begin("filters", 1 + filters.len() * key_frames.len());
+    table.measure("vanilla".to_owned(), &subject.runtime, progress)?;
+    for &kind in filters {
+        for &keys in key_frames {
+            progress.advance();
+            subject.runtime.filter = Some(filter(table.engine, &subject.scene, kind, keys, &train, progress)?);
+            let name = format!("filter only, {}, {keys} key-frames", filter_name(kind));
+            table.measure(name, &subject.runtime, progress)?;
+        }
+    }
+    progress.finish();
+    subject.runtime.filter = None;
+    if ratios.is_empty() || scores.is_empty() {
+        return Ok(table.rows);
+    }
+    let (scored, _) = scoring.split(train, false);
+    let found = scoring.scores(table.engine, &subject, &scored, progress)?;
+    drop(subject.scene);
+    let variants = variants(scores, found.has_volume()).into_iter();
+    let scores = variants.map(|variant| found.of(variant).map(|scores| (variant, scores)));
+    let scores = scores.collect::<Result<Vec<_>, _>>()?;
+    table.prune(&subject.runtime.into(), ratios, &scores, progress)?;
+    Ok(table.rows)
+}
+
+/// The scores that the choices stand for, each once.
+fn variants(choices: &[ScoreChoice], has_volume: bool) -> Vec<Variant> {
+    let mut variants: Vec<Variant> = Vec::new();
+    for choice in choices {
+        let chosen = choice.variants(has_volume);
+        // In the order of all scores.
+        let new = Variant::ALL.into_iter().filter(|variant| chosen.contains(variant) && !variants.contains(variant));
+        let new: Vec<Variant> = new.collect();
+        variants.extend(new);
+    }
+    variants
+}
+
+/// The rows so far, and what they are measured with.
+struct Table<'a> {
+    engine: &'a mut Engine,
+    measured: &'a [TrainingView],
+    background: Background,
+    rows: Vec<AblationRow>,
+}
+
+impl Table<'_> {
+    fn prune(
+        &mut self,
+        scene: &GaussianScene,
+        ratios: &[f64],
+        scores: &[(Variant, Vec<f32>)],
+        progress: &mut dyn Progress,
+    ) -> Result<(), OfflineError> {
+        progress.begin("pruned", ratios.len() * scores.len());
+        for &ratio in ratios {
+            for (variant, scores) in scores {
+                progress.advance();
+                let kept = highest(scores, kept_count(scene.len(), ratio));
+                // Tenths of a percent are shown where there are any.
+                let percent = (ratio * 1000.0).round() / 10.0;
+                let pruned = select(scene, &kept).into_runtime()?;
+                self.measure(format!("prune {percent}% {variant}"), &pruned, progress)?;
+            }
+        }
+        progress.finish();
+        Ok(())
+    }
+
+    /// Adds a row.
+    fn measure(&mut self, row: String, scene: &RuntimeScene, progress: &mut dyn Progress) -> Result<(), OfflineError> {
+        let Self { measured, background, .. } = *self;
+        let evaluation =
+            evaluate_scene(self.engine, scene, measured, background, MetricSet::SSIM, progress, |_, _, _| Ok(()))?;
+        let active_share = scene.filter.as_ref().map(TemporalFilter::active_share);
+        self.rows.push(AblationRow { row, metrics: evaluation.mean, gaussians: scene.len(), active_share });
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_score_is_tried_once() {
+        let choices = [ScoreChoice::One(Variant::Energy), ScoreChoice::Auto, ScoreChoice::All];
+        let all = variants(&choices, true);
+        assert_eq!(all[..3], [Variant::Energy, Variant::Full, Variant::Removal], "as they are asked for");
+        assert_eq!(all.len(), Variant::ALL.len(), "none twice");
+    }
+}

@@ -1,0 +1,64 @@
+//! The stages mask and compress of a bake.
+//!
+//! In: the Gaussians that are left. Out: their temporal filter; the package on disk.
+
+use super::stages::Stages;
+use super::work::{bytes, words};
+use super::{Bake, Fingerprint, Stage};
+use crate::offline::quantize::{CompressSettings, compress};
+use crate::offline::temporal_filter::filter;
+use crate::offline::{OfflineError, save, write_settings};
+use crate::scene::{GaussianScene, MAX_SEGMENTS, TemporalFilter};
+
+impl Bake<'_> {
+    /// Finds the filter of the Gaussians that are left.
+    pub(super) fn mask(
+        &mut self,
+        stages: &mut Stages<'_>,
+        pruned: &GaussianScene,
+        before: Fingerprint,
+    ) -> Result<(TemporalFilter, Fingerprint), OfflineError> {
+        const FILE: &str = "filter.bits";
+        let Self { settings, engine, views, work, .. } = self;
+        let kind = settings.filter;
+        let keys = u32::try_from(settings.key_frames.count(views)).unwrap_or(u32::MAX).min(MAX_SEGMENTS + 1);
+        let fingerprint = before.and(&format!("{kind:?} {keys}"));
+        let (segments, count) = (keys - 1, pruned.len());
+        let stored = work.load(FILE, fingerprint).and_then(|bytes| {
+            let bits = words(&bytes);
+            let whole = bits.len() == TemporalFilter::words(count) * segments as usize;
+            whole.then(|| TemporalFilter::from_bits(kind, segments, count, bits))
+        });
+        let filter = stages.run(Stage::Mask, stored, |progress| {
+            let filter = filter(engine, pruned, kind, keys, views, progress)?;
+            work.store(FILE, fingerprint, &bytes(&filter.to_bits()), progress)?;
+            Ok(filter)
+        })?;
+        Ok((filter, fingerprint))
+    }
+
+    /// Writes the package, unless the one that is there is it.
+    pub(super) fn compress(
+        &self,
+        stages: &mut Stages<'_>,
+        pruned: GaussianScene,
+        before: Fingerprint,
+    ) -> Result<(), OfflineError> {
+        const FILE: &str = "package.crc32";
+        let Self { settings, work, .. } = self;
+        let out = &settings.out;
+        let fingerprint = before.and(&format!("{:?} {:?}", settings.quality, settings.level));
+        let checksum = || Some(Fingerprint::of_files(&[out]).ok()?.0.to_le_bytes().to_vec());
+        let stored = work.load(FILE, fingerprint).filter(|stored| checksum().as_ref() == Some(stored));
+        stages.run(Stage::Compress, stored.map(|_| ()), |progress| {
+            let runtime = pruned.into_runtime().map_err(|error| OfflineError::at(&settings.checkpoint, error))?;
+            let (compressed, _) = compress(runtime, &CompressSettings::from(settings.quality))?;
+            let written = write_settings(&compressed.form, settings.level);
+            progress.uninterrupted(&mut || save(out, &compressed, &written))?;
+            if let Some(checksum) = checksum() {
+                work.store(FILE, fingerprint, &checksum, progress)?;
+            }
+            Ok(())
+        })
+    }
+}

@@ -1,0 +1,149 @@
+//! The stages score and prune of a bake.
+//!
+//! In: a checkpoint and its training views, some of them held out from scoring. Out: which Gaussians stay
+//! ([`Pruning`]), by which score, and what every count that was tried gives on the held-out views.
+
+use super::stages::Stages;
+use super::work::{bytes, words};
+use super::{Bake, Fingerprint, Stage};
+use crate::offline::dataset::TrainingView;
+use crate::offline::prune::highest;
+use crate::offline::report::Tried;
+use crate::offline::search::{Candidate, Goal, ScoreSearch, candidates};
+use crate::offline::{OfflineError, Progress};
+use crate::scene::{GaussianScene, SceneForm};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Shares removed that are tried for the report, whatever the goal.
+const SWEEP: [f64; 4] = [0.2, 0.5, 0.7, 0.85];
+
+/// Which Gaussians stay.
+pub(super) struct Pruning {
+    /// Their indices, ascending.
+    pub kept: Vec<u32>,
+    /// How they were found.
+    pub found: Found,
+    /// Of everything so far.
+    pub fingerprint: Fingerprint,
+}
+
+/// How the Gaussians that stay were found.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Found {
+    /// Name of the score.
+    pub score: String,
+    /// How many views were held out, and what they were compared with.
+    pub held_out: String,
+    /// The counts tried.
+    pub tried: Vec<Tried>,
+}
+
+impl Bake<'_> {
+    /// Scores and prunes.
+    pub(super) fn prune(&mut self, stages: &mut Stages<'_>) -> Result<Pruning, OfflineError> {
+        const FILES: [&str; 2] = ["kept.u32", "found.ron"];
+        let goal = self.settings.goal;
+        let (scored, held_out) = self.settings.scoring.split(self.views.clone(), true);
+        require_images(goal, &held_out)?;
+        let (candidates, scores) = self.score(stages, &scored)?;
+        let images: Vec<&Path> = held_out.iter().map(|view| view.image.as_path()).collect();
+        let images = Fingerprint::of_files(&images).ok();
+        let fingerprint = scores.and(&format!("{goal:?} {images:?} {held_out:?}"));
+        let load = |file| self.work.load(file, fingerprint);
+        let kept = load(FILES[0]).map(|bytes| words(&bytes));
+        let kept = kept.filter(|kept| kept.iter().all(|&index| (index as usize) < self.subject.scene.len()));
+        let found = load(FILES[1]).and_then(|text| ron::de::from_bytes::<Found>(&text).ok());
+        let (kept, found) = stages.run(Stage::Prune, kept.zip(found), |progress| {
+            let (kept, found) = self.find(&held_out, candidates, progress)?;
+            let text = ron::to_string(&found)?;
+            self.work.store(FILES[0], fingerprint, &bytes(&kept), progress)?;
+            self.work.store(FILES[1], fingerprint, text.as_bytes(), progress)?;
+            Ok((kept, found))
+        })?;
+        Ok(Pruning { kept, found, fingerprint })
+    }
+
+    /// Every score that may be pruned by.
+    fn score(
+        &mut self,
+        stages: &mut Stages<'_>,
+        views: &[TrainingView],
+    ) -> Result<(Vec<Candidate>, Fingerprint), OfflineError> {
+        let Self { settings, engine, subject, work, fingerprint, .. } = self;
+        let has_volume = matches!(subject.scene.form, SceneForm::Trained(_));
+        let variants = settings.score.variants(has_volume);
+        let fingerprint = fingerprint.and(&format!("{:?} {variants:?} {views:?}", settings.scoring));
+        let file = |name: &str| format!("score-{name}.f32");
+        let stored: Option<Vec<Candidate>> = variants
+            .iter()
+            .map(|variant| {
+                let words = words(&work.load(&file(variant.name()), fingerprint)?);
+                let scores: Vec<f32> = words.into_iter().map(f32::from_bits).collect();
+                (scores.len() == subject.scene.len()).then(|| Candidate { name: variant.name().to_owned(), scores })
+            })
+            .collect();
+        let found = stages.run(Stage::Score, stored, |progress| {
+            let scores = settings.scoring.scores(engine, subject, views, progress)?;
+            let found = candidates(settings.score, &scores)?;
+            for candidate in &found {
+                let words: Vec<u32> = candidate.scores.iter().map(|score| score.to_bits()).collect();
+                work.store(&file(&candidate.name), fingerprint, &bytes(&words), progress)?;
+            }
+            Ok(found)
+        })?;
+        Ok((found, fingerprint))
+    }
+
+    /// Prunes by each candidate, keeps the best, and tries a few more counts with it.
+    fn find(
+        &mut self,
+        held_out: &[TrainingView],
+        candidates: Vec<Candidate>,
+        progress: &mut dyn Progress,
+    ) -> Result<(Vec<u32>, Found), OfflineError> {
+        let (goal, engine, runtime) = (self.settings.goal, &mut *self.engine, &self.subject.runtime);
+        let by_loss = matches!(goal, Goal::MaxLoss(_));
+        let search = ScoreSearch::open(engine, held_out, runtime, self.subject.background, by_loss, progress)?;
+        let whole = GaussianScene::from(runtime.clone());
+        let total = whole.len();
+        let found = search.best(engine, &whole, candidates, goal, progress)?;
+        let (mut candidate, kept, mut outcomes) = (found.candidate, found.best.kept, found.outcomes);
+        for ratio in SWEEP {
+            let more = search.best(engine, &whole, vec![candidate], Goal::Remove(ratio), progress)?;
+            candidate = more.candidate;
+            outcomes.extend(more.outcomes);
+        }
+        let summary = search.summary(outcomes);
+        let mut tried = Vec::new();
+        let mut add = |score: &str, count: usize, psnr: f64| {
+            if psnr.is_finite() {
+                let ratio = 1.0 - count as f64 / total.max(1) as f64;
+                tried.push(Tried { variant: score.to_owned(), ratio, kept: count, psnr });
+            }
+        };
+        if let Some(psnr) = summary.psnr_before {
+            add(&candidate.name, total, psnr);
+        }
+        for outcome in &summary.candidates {
+            for trial in &outcome.trials {
+                add(&outcome.score, trial.count, trial.psnr);
+            }
+        }
+        let held_out = format!("{}, {}", summary.views, summary.compared_with);
+        Ok((highest(&candidate.scores, kept), Found { score: candidate.name, held_out, tried }))
+    }
+}
+
+/// Only images show a loss: reports missing ones before anything is scored.
+fn require_images(goal: Goal, held_out: &[TrainingView]) -> Result<(), OfflineError> {
+    let missing = held_out.iter().find(|view| !view.image.is_file());
+    match (goal, missing) {
+        (Goal::MaxLoss(_), Some(view)) => Err(OfflineError::at(
+            &view.image,
+            "is missing: a loss is told by the images of training views; put them beside the camera file, or give --ratio \
+             or --keep",
+        )),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,123 @@
+//! The stage report of a bake.
+//!
+//! In: the Gaussians before and after, the package, the trials, the test views. Out: the [`BakeReport`], and its two
+//! files.
+
+use super::BakeSettings;
+use super::evaluation::Compared;
+use super::pruning::Found;
+use crate::codec::package;
+use crate::gaussian::Gaussian;
+use crate::offline::quantize::Quality;
+use crate::offline::report::{
+    Activity, BakeReport, Change, SectionSize, StageTime, VarianceHistogram, even_times, filter_shares,
+};
+use crate::offline::search::Goal;
+use crate::offline::temporal_filter::filter_name;
+use crate::offline::{OfflineError, Progress, write_beside};
+use crate::scene::{TemporalFilter, TrainedWith};
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Times at which the active sets are looked at.
+const TIMES: usize = 61;
+
+/// What the report is about.
+pub(super) struct Facts<'a> {
+    pub settings: &'a BakeSettings,
+    pub trained_with: &'a TrainedWith,
+    pub before: &'a [Gaussian],
+    pub after: &'a [Gaussian],
+    pub filter: &'a TemporalFilter,
+    pub found: Found,
+    pub stages: Vec<StageTime>,
+    pub compared: Option<Compared>,
+}
+
+impl Facts<'_> {
+    /// The report.
+    ///
+    /// # Errors
+    /// The package cannot be read back.
+    pub fn report(self) -> Result<BakeReport, OfflineError> {
+        let BakeSettings { checkpoint, data, out, .. } = self.settings;
+        let interval = self.trained_with.time_interval;
+        let times = even_times(interval, TIMES);
+        let file = File::open(out).map_err(|error| OfflineError::at(out, error))?;
+        let info = package::inspect(file).map_err(|error| OfflineError::at(out, error))?;
+        let choices = self.choices();
+        let (split, evaluation, samples) = match self.compared {
+            Some(compared) => (Some(compared.split.to_owned()), Some(compared.evaluation), compared.samples),
+            None => (None, None, Vec::new()),
+        };
+        Ok(BakeReport {
+            generator: format!("gs4d {}", env!("CARGO_PKG_VERSION")),
+            checkpoint: checkpoint.display().to_string(),
+            data: data.display().to_string(),
+            package: out.display().to_string(),
+            gaussians: Change { before: self.before.len(), after: self.after.len() },
+            bytes: Change { before: file_size(checkpoint)?, after: file_size(out)? },
+            choices,
+            stages: self.stages,
+            sections: SectionSize::by_name(&info.header.sections),
+            variances: VarianceHistogram::of(self.before, self.after),
+            activity: Change { before: Activity::of(self.before, &times), after: Activity::of(self.after, &times) },
+            filter_share: Some(filter_shares(self.filter, interval, &times)),
+            times,
+            trials: self.found.tried,
+            split,
+            evaluation,
+            samples,
+        })
+    }
+
+    /// What was chosen, in words.
+    fn choices(&self) -> Vec<(String, String)> {
+        let pair = |name: &str, value: String| (name.to_owned(), value);
+        let goal = match self.settings.goal {
+            Goal::Keep(count) => format!("keep {count}"),
+            Goal::Remove(ratio) => format!("remove {:.1} %", ratio * 100.0),
+            Goal::MaxLoss(loss) => format!("lose at most {loss} dB on held-out training views"),
+        };
+        let quality = Quality::NAMES.iter().find(|(_, quality)| *quality == self.settings.quality);
+        let (kind, filter) = (filter_name(self.filter.kind), self.filter);
+        vec![
+            pair("goal", goal),
+            pair("score", self.found.score.clone()),
+            pair("held-out views", self.found.held_out.clone()),
+            pair("fine-tuning", "none".to_owned()),
+            pair("temporal filter", format!("{kind}, {} key-frames", filter.segments + 1)),
+            pair("active share", format!("{:.1} %", filter.active_share() * 100.0)),
+            pair("quality", quality.map_or("", |(name, _)| name).to_owned()),
+        ]
+    }
+}
+
+/// Writes the report beside the package, as JSON and as a page. Returns where they are.
+///
+/// # Errors
+/// A folder that cannot be written to, a full disk.
+pub(super) fn write(
+    report: &BakeReport,
+    out: &Path,
+    progress: &mut dyn Progress,
+) -> Result<[PathBuf; 2], OfflineError> {
+    let paths = [beside(out, ".report.json"), beside(out, ".report.html")];
+    for (path, text) in paths.iter().zip([format!("{:#}\n", report.json()?), report.html()]) {
+        progress.uninterrupted(&mut || write_beside(path, |file| file.write_all(text.as_bytes())))?;
+    }
+    Ok(paths)
+}
+
+/// `scene.gs4d` and an ending: `scene` with that ending.
+fn beside(out: &Path, ending: &str) -> PathBuf {
+    let mut name: OsString = out.file_stem().unwrap_or_default().to_owned();
+    name.push(ending);
+    out.with_file_name(name)
+}
+
+fn file_size(path: &Path) -> Result<u64, OfflineError> {
+    Ok(fs::metadata(path).map_err(|error| OfflineError::at(path, error))?.len())
+}

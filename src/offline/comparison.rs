@@ -1,0 +1,167 @@
+//! How alike pictures on disk are.
+//!
+//! In: two pictures, or two folders matched by file stem (8-bit, 16-bit or raw float32). Out: the [`Pairs`] of
+//! pictures, and PSNR and SSIM of each ([`PairMetrics`]).
+
+use super::OfflineError;
+use super::metrics::{self, SizeMismatch};
+use crate::view::Picture;
+use glam::{UVec2, Vec3};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Two pictures to compare.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Pair {
+    /// Their name: the file stem in folders, else that of the first file with its extension.
+    pub name: String,
+    /// The first picture.
+    pub a: PathBuf,
+    /// The second picture.
+    pub b: PathBuf,
+}
+
+/// What is compared with what.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Pairs {
+    /// The pairs, at least one.
+    pub both: Vec<Pair>,
+    /// File stems that only the first folder has.
+    pub only_a: Vec<String>,
+    /// File stems that only the second folder has.
+    pub only_b: Vec<String>,
+}
+
+impl Pairs {
+    /// Pairs two files, or the pictures of two folders by file stem. Raw files (`.f32`) of folders count only if their
+    /// size is given, and then before others of the same stem.
+    ///
+    /// # Errors
+    /// A file and a folder, a folder that cannot be listed or has one stem twice, no pair at all.
+    pub fn of(a: &Path, b: &Path, raw_size: Option<UVec2>) -> Result<Self, OfflineError> {
+        match (a.is_dir(), b.is_dir()) {
+            (true, true) => Self::of_folders(a, b, raw_size.is_some()),
+            (false, false) => {
+                let name = a.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                Ok(Self { both: vec![Pair { name, a: a.to_owned(), b: b.to_owned() }], ..Self::default() })
+            }
+            (true, false) => Err(OfflineError::at(b, "is not a folder, but the other one is")),
+            (false, true) => Err(OfflineError::at(a, "is not a folder, but the other one is")),
+        }
+    }
+
+    fn of_folders(a: &Path, b: &Path, with_raw: bool) -> Result<Self, OfflineError> {
+        let (first, mut second) = (pictures(a, with_raw)?, pictures(b, with_raw)?);
+        let mut pairs = Self::default();
+        for (stem, path) in first {
+            let name = stem.to_string_lossy().into_owned();
+            match second.remove(&stem) {
+                Some(other) => pairs.both.push(Pair { name, a: path, b: other }),
+                None => pairs.only_a.push(name),
+            }
+        }
+        pairs.only_b.extend(second.into_keys().map(|stem| stem.to_string_lossy().into_owned()));
+        if pairs.both.is_empty() {
+            return Err(OfflineError::NoPairs { a: a.to_owned(), b: b.to_owned() });
+        }
+        Ok(pairs)
+    }
+}
+
+/// The pictures of a folder by file stem.
+fn pictures(folder: &Path, with_raw: bool) -> Result<BTreeMap<OsString, PathBuf>, OfflineError> {
+    let mut found: BTreeMap<OsString, PathBuf> = BTreeMap::new();
+    for entry in fs::read_dir(folder).map_err(|error| OfflineError::at(folder, error))? {
+        let path = entry.map_err(|error| OfflineError::at(folder, error))?.path();
+        let raw = is_raw(&path);
+        let Some(stem) = path.file_stem().filter(|_| is_picture(&path) || (raw && with_raw)) else {
+            continue;
+        };
+        match found.get(stem) {
+            Some(other) if is_raw(other) == raw => {
+                let message = format!("has the same name before the extension as {}", other.display());
+                return Err(OfflineError::at(&path, message));
+            }
+            Some(_) if !raw => {}
+            _ => drop(found.insert(stem.to_owned(), path)),
+        }
+    }
+    Ok(found)
+}
+
+/// How alike two pictures are, or the means of several pairs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PairMetrics {
+    /// PSNR in dB, the mean of the channels'. Infinite (null in JSON) for equal pictures.
+    pub psnr: f64,
+    /// PSNR in dB of all values together.
+    pub psnr_pooled: f64,
+    /// SSIM, at most 1.
+    pub ssim: f64,
+}
+
+impl PairMetrics {
+    /// Compares two pictures on disk. Raw ones have the size `raw_size` and are taken as they are if both are raw;
+    /// everything else is clamped to 0..1.
+    ///
+    /// # Errors
+    /// A picture that cannot be read, pictures of different sizes.
+    pub fn of(pair: &Pair, raw_size: Option<UVec2>) -> Result<Self, OfflineError> {
+        let (mut left, mut right) = (load(&pair.a, raw_size)?, load(&pair.b, raw_size)?);
+        if !(is_raw(&pair.a) && is_raw(&pair.b)) {
+            (left, right) = (left.clamped(), right.clamped());
+        }
+        let mismatch = |error: SizeMismatch| OfflineError::at(&pair.b, error);
+        Ok(Self {
+            psnr: metrics::psnr(&left, &right).map_err(mismatch)?,
+            psnr_pooled: metrics::psnr_pooled(&left, &right).map_err(mismatch)?,
+            ssim: metrics::ssim(&left, &right).map_err(mismatch)?,
+        })
+    }
+
+    /// The means; NaN of nothing.
+    pub fn mean(all: &[Self]) -> Self {
+        let mean = |of: fn(&Self) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
+        Self { psnr: mean(|m| m.psnr), psnr_pooled: mean(|m| m.psnr_pooled), ssim: mean(|m| m.ssim) }
+    }
+}
+
+fn load(path: &Path, raw_size: Option<UVec2>) -> Result<Picture, OfflineError> {
+    if is_raw(path) {
+        return load_raw(path, raw_size);
+    }
+    let image = image::open(path).map_err(|error| OfflineError::at(path, error))?.into_rgb32f();
+    let size = UVec2::new(image.width(), image.height());
+    Ok(Picture { size, pixels: image.pixels().map(|pixel| Vec3::from(pixel.0)).collect() })
+}
+
+fn load_raw(path: &Path, size: Option<UVec2>) -> Result<Picture, OfflineError> {
+    let size = size.ok_or_else(|| OfflineError::at(path, "a raw picture does not tell its size: give --size WxH"))?;
+    let expected = u64::from(size.x) * u64::from(size.y) * 12;
+    let found = fs::metadata(path).map_err(|error| OfflineError::at(path, error))?.len();
+    if found != expected {
+        let message = format!("{found} bytes, but a raw picture of {}x{} has {expected}", size.x, size.y);
+        return Err(OfflineError::at(path, message));
+    }
+    let bytes = fs::read(path).map_err(|error| OfflineError::at(path, error))?;
+    let values: Vec<f32> = bytes.as_chunks().0.iter().map(|&four| f32::from_le_bytes(four)).collect();
+    if values.iter().any(|value| !value.is_finite()) {
+        return Err(OfflineError::at(path, "holds a value that is not finite"));
+    }
+    Ok(Picture { size, pixels: values.chunks_exact(3).map(Vec3::from_slice).collect() })
+}
+
+fn has_extension(path: &Path, extensions: &[&str]) -> bool {
+    path.extension().is_some_and(|found| extensions.iter().any(|extension| found.eq_ignore_ascii_case(extension)))
+}
+
+fn is_raw(path: &Path) -> bool {
+    has_extension(path, &["f32"])
+}
+
+fn is_picture(path: &Path) -> bool {
+    has_extension(path, &["png", "jpg", "jpeg"])
+}

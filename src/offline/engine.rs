@@ -1,0 +1,198 @@
+//! What scores and draws: the GPU where there is a real one, else the CPU reference.
+//!
+//! In: [`EngineSettings`]; this is the one place that chooses. Out: an [`Engine`], which puts a scene where it is
+//! scored ([`ScoreEngine`]) or drawn ([`Draw`]), once for many views.
+
+use super::OfflineError;
+use super::score::{CpuEngine, GpuEngine, ScoreEngine};
+use crate::reference;
+use crate::renderer::{GpuCapture, GpuContext, GpuError, Headless, ShaderChecks};
+use crate::scene::RuntimeScene;
+use crate::view::{Background, Picture, View};
+use serde::Serialize;
+use std::fmt;
+
+/// Where to compute.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum EngineChoice {
+    /// On the GPU, unless no adapter is asked for and there is none but a software driver.
+    #[default]
+    Auto,
+    /// On the CPU.
+    Cpu,
+    /// On the GPU.
+    Gpu,
+}
+
+impl EngineChoice {
+    /// Every choice with its name.
+    pub const NAMES: [(&'static str, Self); 3] = [("auto", Self::Auto), ("cpu", Self::Cpu), ("gpu", Self::Gpu)];
+}
+
+/// Which GPU to use, and with which checks.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct GpuSettings {
+    /// Part of the adapter's name in any case, or its index; the fastest one if `None`.
+    pub adapter: Option<String>,
+    /// Whether the shaders that draw check their array indices.
+    pub checks: ShaderChecks,
+}
+
+impl GpuSettings {
+    /// Opens the adapter and compiles the passes.
+    ///
+    /// # Errors
+    /// No such adapter, or one that cannot run the passes.
+    pub fn open(&self) -> Result<Headless, GpuError> {
+        Headless::new(GpuContext::headless(self.adapter.as_deref())?, self.checks)
+    }
+
+    /// Opens the fastest adapter if that is a real GPU: a software driver is slower than the CPU reference.
+    fn open_hardware(&self) -> Option<Headless> {
+        let context = GpuContext::headless(None).ok()?;
+        let software = context.info.device_type == wgpu::DeviceType::Cpu;
+        if software { None } else { Headless::new(context, self.checks).ok() }
+    }
+}
+
+/// Which engine to open.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct EngineSettings {
+    /// Where to compute.
+    pub choice: EngineChoice,
+    /// The GPU, where it is used.
+    pub gpu: GpuSettings,
+}
+
+/// What scores and draws.
+#[derive(Debug)]
+pub enum Engine {
+    /// The CPU reference.
+    Cpu,
+    /// A GPU.
+    Gpu(Box<Headless>),
+}
+
+impl Engine {
+    /// Opens the engine that the settings choose.
+    ///
+    /// # Errors
+    /// A GPU is asked for that cannot be used.
+    pub fn open(settings: &EngineSettings) -> Result<Self, GpuError> {
+        let gpu = |headless| Self::Gpu(Box::new(headless));
+        match settings.choice {
+            EngineChoice::Cpu => Ok(Self::Cpu),
+            EngineChoice::Auto if settings.gpu.adapter.is_none() => {
+                Ok(settings.gpu.open_hardware().map_or(Self::Cpu, gpu))
+            }
+            EngineChoice::Auto | EngineChoice::Gpu => settings.gpu.open().map(gpu),
+        }
+    }
+
+    /// Its name, for people.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Cpu => format!("CPU, {} threads", rayon::current_num_threads()),
+            Self::Gpu(headless) => AdapterDescription::of(headless).to_string(),
+        }
+    }
+
+    /// Puts a scene where it is scored.
+    ///
+    /// # Errors
+    /// The scene does not fit the GPU.
+    pub fn scorer<'a>(
+        &'a mut self,
+        scene: &'a RuntimeScene,
+        background: Background,
+    ) -> Result<Box<dyn ScoreEngine + 'a>, GpuError> {
+        Ok(match self {
+            Self::Cpu => Box::new(CpuEngine { scene, background }),
+            Self::Gpu(headless) => Box::new(GpuEngine::new(headless, scene, background, ShaderChecks::Off)?),
+        })
+    }
+
+    /// Puts a scene where it is drawn.
+    ///
+    /// # Errors
+    /// The scene does not fit the GPU.
+    pub fn drawing<'a>(
+        &'a mut self,
+        scene: &'a RuntimeScene,
+        background: Background,
+    ) -> Result<Box<dyn Draw + 'a>, GpuError> {
+        Ok(match self {
+            Self::Cpu => Box::new(CpuDrawing { scene, background }),
+            Self::Gpu(headless) => {
+                let capture = headless.upload(scene)?;
+                Box::new(GpuDrawing { headless, capture, background })
+            }
+        })
+    }
+}
+
+/// A scene that is ready to be drawn, view after view.
+pub trait Draw {
+    /// Draws a view: RGB, not clamped.
+    ///
+    /// # Errors
+    /// A picture that does not fit the GPU, a lost device.
+    fn draw(&mut self, view: &View) -> Result<Picture, OfflineError>;
+}
+
+/// A scene drawn by the CPU reference.
+struct CpuDrawing<'a> {
+    scene: &'a RuntimeScene,
+    background: Background,
+}
+
+impl Draw for CpuDrawing<'_> {
+    fn draw(&mut self, view: &View) -> Result<Picture, OfflineError> {
+        Ok(reference::render(self.scene, view, self.background).picture)
+    }
+}
+
+/// A scene uploaded to the GPU.
+struct GpuDrawing<'a> {
+    headless: &'a mut Headless,
+    capture: GpuCapture,
+    background: Background,
+}
+
+impl Draw for GpuDrawing<'_> {
+    fn draw(&mut self, view: &View) -> Result<Picture, OfflineError> {
+        Ok(self.headless.render(&self.capture, view, self.background)?.picture)
+    }
+}
+
+/// Which adapter a GPU engine runs on. Displayed in one line.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct AdapterDescription {
+    /// Name of the adapter.
+    pub name: String,
+    /// The API it is used through.
+    pub backend: String,
+    /// Name of the driver.
+    pub driver: String,
+    /// What else the driver reports, such as its version.
+    pub driver_info: String,
+}
+
+impl AdapterDescription {
+    /// Describes the adapter of a headless renderer.
+    pub fn of(headless: &Headless) -> Self {
+        let info = &headless.context().info;
+        Self {
+            name: info.name.clone(),
+            backend: info.backend.to_string(),
+            driver: info.driver.clone(),
+            driver_info: info.driver_info.clone(),
+        }
+    }
+}
+
+impl fmt::Display for AdapterDescription {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({}, {} {})", self.name, self.backend, self.driver, self.driver_info)
+    }
+}

@@ -1,0 +1,85 @@
+//! What can go wrong in the offline half.
+//!
+//! In: errors of the codec, the datasets, the renderer, scoring and compression. Out: [`OfflineError`], which displays
+//! them unchanged, with the file's name where the error itself does not have it.
+
+use super::dataset::DatasetError;
+use super::metrics::SizeMismatch;
+use super::quantize::CompressError;
+use super::score::ScoreError;
+use crate::codec::CodecError;
+use crate::gaussian::InvalidGaussian;
+use crate::renderer::GpuError;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+/// Why work on a capture stopped.
+#[derive(Debug, thiserror::Error)]
+pub enum OfflineError {
+    /// A file cannot be read or written.
+    #[error(transparent)]
+    Codec(#[from] CodecError),
+    /// Training or test views cannot be used.
+    #[error(transparent)]
+    Dataset(#[from] DatasetError),
+    /// Two pictures cannot be compared.
+    #[error(transparent)]
+    Size(#[from] SizeMismatch),
+    /// The GPU failed.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// Gaussians cannot be scored.
+    #[error(transparent)]
+    Score(#[from] ScoreError),
+    /// A Gaussian cannot be drawn.
+    #[error(transparent)]
+    Invalid(#[from] InvalidGaussian),
+    /// A scene cannot be compressed.
+    #[error(transparent)]
+    Compress(#[from] CompressError),
+    /// A file cannot be used.
+    #[error("{}: {reason}", .path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        #[source]
+        reason: Box<dyn Error + Send + Sync>,
+    },
+    /// No two pictures of two folders belong together.
+    #[error("{} and {}: no two pictures with the same name before the extension", .a.display(), .b.display())]
+    NoPairs {
+        /// The first folder.
+        a: PathBuf,
+        /// The second folder.
+        b: PathBuf,
+    },
+    /// There is no score to choose from.
+    #[error("there is no score to prune by")]
+    NoScore,
+    /// An orbit needs Gaussians to look at.
+    #[error("the scene has no Gaussians to go around")]
+    NothingToOrbit,
+    /// A sliced scene cannot become the trained form.
+    #[error("holds a sliced form, which cannot be turned back: convert the checkpoint with --form trained")]
+    NotTrained,
+    /// The threads that write pictures cannot be started.
+    #[error(transparent)]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+    /// The threads that write pictures panicked.
+    #[error("the threads that write pictures broke down")]
+    WritersPanicked,
+    /// The results of a stage of a bake cannot be stored.
+    #[error(transparent)]
+    Store(#[from] ron::Error),
+    /// A report cannot be written as JSON.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+}
+
+impl OfflineError {
+    /// An error that does not name its file, or a reason in words, about this file.
+    pub(super) fn at(path: &Path, reason: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
+        Self::File { path: path.to_owned(), reason: reason.into() }
+    }
+}

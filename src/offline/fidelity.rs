@@ -1,0 +1,65 @@
+//! How close a compressed scene is to the one it was made from.
+//!
+//! In: the original scene, views, an [`Engine`]; then the compressed scene. Out: PSNR of each view.
+
+use super::engine::Engine;
+use super::metrics::psnr_pooled;
+use super::{OfflineError, Progress};
+use crate::scene::RuntimeScene;
+use crate::view::{Picture, View};
+
+/// Views of the original, drawn before it is compressed.
+#[derive(Debug, Clone)]
+pub struct Originals {
+    views: Vec<View>,
+    pictures: Vec<Picture>,
+}
+
+impl Originals {
+    /// Draws the views over the background that the scene was trained with. Begins the task "comparing".
+    ///
+    /// # Errors
+    /// A failure of the engine.
+    pub fn draw(
+        engine: &mut Engine,
+        scene: &RuntimeScene,
+        views: Vec<View>,
+        progress: &mut dyn Progress,
+    ) -> Result<Self, OfflineError> {
+        let pictures = pictures(engine, scene, &views, progress)?;
+        Ok(Self { views, pictures })
+    }
+
+    /// PSNR of all values of each view of another scene to the original, dB; clamped to 0..1 first. Infinite where both
+    /// are equal. Begins the task "comparing".
+    ///
+    /// # Errors
+    /// A failure of the engine.
+    pub fn psnr(
+        &self,
+        engine: &mut Engine,
+        scene: &RuntimeScene,
+        progress: &mut dyn Progress,
+    ) -> Result<Vec<f64>, OfflineError> {
+        let found = pictures(engine, scene, &self.views, progress)?;
+        let psnr = |(a, b): (&Picture, &Picture)| psnr_pooled(&a.clamped(), &b.clamped()).map_err(OfflineError::from);
+        found.iter().zip(&self.pictures).map(psnr).collect()
+    }
+}
+
+fn pictures(
+    engine: &mut Engine,
+    scene: &RuntimeScene,
+    views: &[View],
+    progress: &mut dyn Progress,
+) -> Result<Vec<Picture>, OfflineError> {
+    let mut drawing = engine.drawing(scene, scene.trained_background())?;
+    progress.begin("comparing", views.len());
+    let mut pictures = Vec::with_capacity(views.len());
+    for view in views {
+        pictures.push(drawing.draw(view)?);
+        progress.advance();
+    }
+    progress.finish();
+    Ok(pictures)
+}

@@ -1,0 +1,101 @@
+//! How much compression may lose, and by which options.
+//!
+//! In: a [`Quality`]. Out: the [`CompressSettings`] that it chooses.
+//!
+//! A further option touches five files at most: this one, with its value for each quality; `scene/packed/encode.rs`, which obeys it;
+//! `scene/packed/lanes.rs` (or `decode.rs`) and `shaders/shared/packed.wgsl`, if records are read in another way; and
+//! `cli/compress.rs`, with its name on the command line.
+
+use crate::scene::packed::encode::Bits;
+use serde::{Deserialize, Serialize};
+
+/// How much may be lost.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Quality {
+    /// The smallest that still looks right.
+    Small,
+    /// At most 24 bytes per Gaussian and 1 MB of codebooks; 48 dB and more to the original's pictures.
+    #[default]
+    Balanced,
+    /// Color rounded but not coded, geometry with more bits: about 60 dB.
+    VisuallyLossless,
+    /// Sliced, in single precision.
+    Lossless,
+}
+
+impl Quality {
+    /// All of them, by name.
+    pub const NAMES: [(&'static str, Self); 4] = [
+        ("small", Self::Small),
+        ("balanced", Self::Balanced),
+        ("visually-lossless", Self::VisuallyLossless),
+        ("lossless", Self::Lossless),
+    ];
+}
+
+/// Every option of compression.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CompressSettings {
+    /// Bits of geometry; `None` keeps single precision (and the order of the Gaussians).
+    pub geometry: Option<Bits>,
+    /// Entries of each codebook of color, up to four; none keeps every coefficient.
+    pub codebooks: Vec<usize>,
+    /// Whole coefficients are rounded to multiples of this, so that they compress; 0 keeps them as they are.
+    pub color_step: f32,
+    /// How much each Gaussian's color counts, in the order of the scene; by opacity unless given.
+    #[serde(skip)]
+    pub weights: Option<Vec<f32>>,
+}
+
+impl From<Quality> for CompressSettings {
+    fn from(quality: Quality) -> Self {
+        let (geometry, codebooks) = match quality {
+            Quality::Small => (
+                Some(Bits {
+                    mean: 10,
+                    mean_t: 10,
+                    velocity: 7,
+                    sigma_t: 7,
+                    scale: 7,
+                    rotation: 7,
+                    opacity: 7,
+                    base: 7,
+                    escape: 0.02,
+                }),
+                vec![1024; 3],
+            ),
+            Quality::Balanced => (
+                Some(Bits {
+                    mean: 11,
+                    mean_t: 11,
+                    velocity: 8,
+                    sigma_t: 8,
+                    scale: 8,
+                    rotation: 8,
+                    opacity: 7,
+                    base: 8,
+                    escape: 0.02,
+                }),
+                vec![2048, 2048, 2048, 1024],
+            ),
+            Quality::VisuallyLossless => (
+                Some(Bits {
+                    mean: 14,
+                    mean_t: 14,
+                    velocity: 12,
+                    sigma_t: 10,
+                    scale: 11,
+                    rotation: 11,
+                    opacity: 10,
+                    base: 10,
+                    escape: 0.03,
+                }),
+                Vec::new(),
+            ),
+            Quality::Lossless => (None, Vec::new()),
+        };
+        let color_step = if quality == Quality::VisuallyLossless { 1.0 / 256.0 } else { 0.0 };
+        Self { geometry, codebooks, color_step, weights: None }
+    }
+}

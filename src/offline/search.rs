@@ -1,0 +1,278 @@
+//! Which of several scores to prune by, and to how many Gaussians: found on training views held out from scoring.
+//!
+//! In: scores ([`Candidate`]), a [`Goal`], views that were not scored. Out: the best candidate, with what every one of
+//! them gives ([`SearchOutcome`]).
+
+use super::dataset::{DatasetError, TrainingView};
+use super::engine::Engine;
+use super::prune::kept_count;
+use super::quality::{Evaluator, Trial, smallest_count};
+use super::score::variant::Variant;
+use super::score::{ScoreError, Scores};
+use super::{OfflineError, Progress};
+use crate::scene::{GaussianScene, RuntimeScene};
+use crate::view::Background;
+use serde::{Serialize, Serializer};
+use std::cmp::Ordering;
+use std::fmt;
+
+/// Which score is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ScoreChoice {
+    /// The best on held-out views of ours and the paper's.
+    Auto,
+    /// Every one.
+    All,
+    /// This one.
+    One(Variant),
+}
+
+impl ScoreChoice {
+    /// The scores that a choice stands for. Without the volume of the Gaussians, `Auto` and `All` leave out those that
+    /// need it.
+    pub fn variants(self, has_volume: bool) -> Vec<Variant> {
+        let known = |variants: &[Variant]| -> Vec<Variant> {
+            variants.iter().copied().filter(|variant| has_volume || !variant.needs_volume()).collect()
+        };
+        match self {
+            Self::Auto => known(&Variant::AUTO),
+            Self::All => known(&Variant::ALL),
+            Self::One(variant) => vec![variant],
+        }
+    }
+}
+
+/// A score that may be pruned by.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Its name.
+    pub name: String,
+    /// The score of each Gaussian.
+    pub scores: Vec<f32>,
+}
+
+/// The candidates that a choice stands for.
+///
+/// # Errors
+/// One score is asked for that needs the volume of the Gaussians, and the scene no longer has it.
+pub fn candidates(choice: ScoreChoice, scores: &Scores) -> Result<Vec<Candidate>, ScoreError> {
+    let named = |variant: Variant, scores| Candidate { name: variant.name().to_owned(), scores };
+    let candidate = |variant: Variant| scores.of(variant).map(|scores| named(variant, scores));
+    choice.variants(scores.has_volume()).into_iter().map(candidate).collect()
+}
+
+/// How many Gaussians to keep.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Goal {
+    /// This many.
+    Keep(usize),
+    /// All but this share, 0 to 1.
+    Remove(f64),
+    /// As few as lose no more than this on held-out training views, dB.
+    MaxLoss(f64),
+}
+
+impl Default for Goal {
+    fn default() -> Self {
+        Self::MaxLoss(0.1)
+    }
+}
+
+impl Goal {
+    /// How many of `total` Gaussians to keep; `None` where a loss decides.
+    pub fn count(self, total: usize) -> Option<usize> {
+        match self {
+            Self::Keep(count) => Some(count.min(total)),
+            Self::Remove(ratio) => Some(kept_count(total, ratio)),
+            Self::MaxLoss(_) => None,
+        }
+    }
+
+    /// The better outcome comes first: the higher PSNR at a count, the smaller count within a loss.
+    fn compare(self, a: &Outcome, b: &Outcome) -> Ordering {
+        let psnr = |outcome: &Outcome| outcome.psnr.unwrap_or(f64::NEG_INFINITY);
+        let by_psnr = psnr(b).total_cmp(&psnr(a));
+        match self {
+            Self::Keep(_) | Self::Remove(_) => by_psnr,
+            Self::MaxLoss(_) => a.kept.cmp(&b.kept).then(by_psnr),
+        }
+    }
+}
+
+/// What pruning by one candidate gives.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Outcome {
+    /// Name of the candidate.
+    pub score: String,
+    /// Gaussians kept.
+    pub kept: usize,
+    /// PSNR on the held-out views, dB, if it is known.
+    pub psnr: Option<f64>,
+    /// Every count tried, in order.
+    pub trials: Vec<Trial>,
+}
+
+/// The best candidate, and how it was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SearchOutcome {
+    /// The best candidate.
+    pub candidate: Candidate,
+    /// What pruning by it gives.
+    pub best: Outcome,
+    /// What pruning by each candidate gives, in their order.
+    pub outcomes: Vec<Outcome>,
+}
+
+/// What pictures of the held-out views are compared with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ComparedWith {
+    /// The images of the dataset.
+    Images,
+    /// What the whole scene shows, where there are no images.
+    WholeScene,
+}
+
+impl fmt::Display for ComparedWith {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Images => "against their images",
+            Self::WholeScene => "against the whole scene",
+        })
+    }
+}
+
+impl Serialize for ComparedWith {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// A search in short.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SearchSummary {
+    /// Number of held-out views.
+    pub views: usize,
+    /// What they are compared with.
+    pub compared_with: ComparedWith,
+    /// PSNR of the whole scene, dB; `None` where it is compared with itself.
+    pub psnr_before: Option<f64>,
+    /// What pruning by each candidate gives.
+    pub candidates: Vec<Outcome>,
+}
+
+/// The held-out views, and how close the whole scene is to them.
+#[derive(Debug)]
+pub struct ScoreSearch {
+    evaluator: Evaluator,
+    /// PSNR of the whole scene; `None` where it is compared with itself.
+    baseline: Option<f64>,
+}
+
+impl ScoreSearch {
+    /// Loads the images of the held-out views. Without images, results are compared with the whole scene, which is
+    /// noted, unless images are `required`.
+    ///
+    /// # Errors
+    /// Images that are required and missing, or cannot be used; a failure of the engine.
+    pub fn open(
+        engine: &mut Engine,
+        held_out: &[TrainingView],
+        scene: &RuntimeScene,
+        background: Background,
+        required: bool,
+        progress: &mut dyn Progress,
+    ) -> Result<Self, OfflineError> {
+        match Evaluator::by_images(held_out, &scene.trained_with, background) {
+            Ok(evaluator) => {
+                let baseline = Some(evaluator.psnr(engine, scene)?);
+                Ok(Self { evaluator, baseline })
+            }
+            Err(error @ DatasetError::MissingImages { .. }) if !required => {
+                progress.note(&format!("note: {error}. Compared with what the whole scene shows instead"));
+                let evaluator = Evaluator::by_scene(engine, scene, held_out, background)?;
+                Ok(Self { evaluator, baseline: None })
+            }
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    /// Prunes by each candidate and keeps the best: the highest PSNR at a count, or the smallest count within a loss.
+    /// `scene` is in the runtime form. Begins the task "comparing scores".
+    ///
+    /// # Errors
+    /// No candidates, a failure of the engine.
+    pub fn best(
+        &self,
+        engine: &mut Engine,
+        scene: &GaussianScene,
+        candidates: Vec<Candidate>,
+        goal: Goal,
+        progress: &mut dyn Progress,
+    ) -> Result<SearchOutcome, OfflineError> {
+        progress.begin("comparing scores", candidates.len());
+        let mut outcomes = Vec::with_capacity(candidates.len());
+        for candidate in &candidates {
+            outcomes.push(self.outcome(engine, scene, candidate, goal)?);
+            progress.advance();
+        }
+        progress.finish();
+        let best = candidates.into_iter().zip(&outcomes).min_by(|(_, a), (_, b)| goal.compare(a, b));
+        let (candidate, best) = best.ok_or(OfflineError::NoScore)?;
+        let best = best.clone();
+        Ok(SearchOutcome { candidate, best, outcomes })
+    }
+
+    /// Summarizes the search, given the outcomes of all candidates.
+    pub fn summary(&self, outcomes: Vec<Outcome>) -> SearchSummary {
+        let compared_with = if self.baseline.is_some() { ComparedWith::Images } else { ComparedWith::WholeScene };
+        SearchSummary { views: self.evaluator.views(), compared_with, psnr_before: self.baseline, candidates: outcomes }
+    }
+
+    fn outcome(
+        &self,
+        engine: &mut Engine,
+        scene: &GaussianScene,
+        candidate: &Candidate,
+        goal: Goal,
+    ) -> Result<Outcome, OfflineError> {
+        let total = scene.len();
+        let mut psnr = |count: usize| self.evaluator.psnr_of_highest(engine, scene, &candidate.scores, count);
+        let (kept, trials) = match (goal, self.baseline) {
+            (Goal::MaxLoss(loss), Some(baseline)) => smallest_count(total, baseline - loss, psnr)?,
+            (Goal::MaxLoss(_), None) => (total, Vec::new()),
+            (Goal::Keep(_) | Goal::Remove(_), _) => {
+                let count = goal.count(total).unwrap_or(total);
+                (count, vec![Trial { count, psnr: psnr(count)? }])
+            }
+        };
+        let at_kept = trials.iter().find(|trial| trial.count == kept).map(|trial| trial.psnr);
+        Ok(Outcome { score: candidate.name.clone(), kept, psnr: at_kept.or(self.baseline), trials })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outcome(kept: usize, psnr: Option<f64>) -> Outcome {
+        Outcome { score: "energy".to_owned(), kept, psnr, trials: Vec::new() }
+    }
+
+    #[test]
+    fn goals_count_and_compare() {
+        assert_eq!(Goal::Keep(7).count(5), Some(5), "no more than there are");
+        assert_eq!(Goal::Remove(0.4).count(2000), Some(1200), "all but a share");
+        assert_eq!(Goal::default().count(5), None, "a loss decides");
+        let (sharp, small) = (outcome(9, Some(30.0)), outcome(5, Some(29.0)));
+        assert_eq!(Goal::Keep(9).compare(&sharp, &small), Ordering::Less, "the higher PSNR");
+        assert_eq!(Goal::MaxLoss(2.0).compare(&sharp, &small), Ordering::Greater, "the smaller count");
+        assert_eq!(Goal::Keep(9).compare(&outcome(9, None), &small), Ordering::Greater, "unknown comes last");
+    }
+
+    #[test]
+    fn choices_leave_out_what_the_runtime_form_lacks() {
+        assert_eq!(ScoreChoice::All.variants(true), Variant::ALL, "every score of a trained scene");
+        assert!(ScoreChoice::Auto.variants(false).iter().all(|variant| !variant.needs_volume()), "no volume");
+        assert_eq!(ScoreChoice::One(Variant::Full).variants(false), [Variant::Full], "what is named stays");
+    }
+}

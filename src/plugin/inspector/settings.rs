@@ -1,0 +1,44 @@
+//! The settings of the panel.
+//!
+//! In: fields that any system may set. Out: [`Inspector`], a resource that the panel reads, and writes when it is used.
+
+use bevy::ecs::entity::Entity;
+use bevy::ecs::resource::Resource;
+use bevy::input::keyboard::KeyCode;
+
+/// The settings of the panel: a resource. Any field may be set at any time.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::inspector::Inspector;
+///
+/// fn setup(mut inspector: ResMut<Inspector>) {
+///     inspector.open = false;
+///     inspector.key = KeyCode::KeyI;
+///     inspector.note = "I opens the inspector".into();
+/// }
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
+#[derive(Resource, Debug, Clone, PartialEq)]
+pub struct Inspector {
+    /// Whether the panel is drawn. A closed panel takes no time. Default: true.
+    pub open: bool,
+    /// The key that closes and opens it. Default: F1.
+    pub key: KeyCode,
+    /// The entity whose capture is shown. While it is `None`, or without a capture, the first capture is shown. Default: `None`.
+    pub selected: Option<Entity>,
+    /// The camera whose view is shown. While it is `None`, or not a `Camera3d`, the first camera is shown. Default: `None`.
+    pub camera: Option<Entity>,
+    /// Frame rate of the buttons that step, in frames per second. Default: 30.
+    pub fps: f32,
+    /// A line of text at the end of the panel. Default: empty, which shows none.
+    pub note: String,
+}
+
+impl Default for Inspector {
+    fn default() -> Self {
+        Self { open: true, key: KeyCode::F1, selected: None, camera: None, fps: 30.0, note: String::new() }
+    }
+}

@@ -1,0 +1,274 @@
+//! One step of a playback.
+//!
+//! In: a [`Playback`] as the game left it, its [`PlaybackState`], and what moves it on. Out: the playback as it is drawn, and a
+//! [`Progress`]: what happened during the step.
+
+use super::component::Playback;
+use super::drive::Drive;
+use super::span::{Span, Travel};
+use super::state::{Follow, PlaybackState};
+
+/// What happened in a step.
+#[derive(Debug, Default, Clone, PartialEq)]
+pub(super) struct Progress {
+    pub(super) started: bool,
+    pub(super) paused: bool,
+    /// From and to which time it jumped because the game or the clock that it follows sought, in seconds.
+    pub(super) seeked: Option<[f32; 2]>,
+    /// Whether this moment does not continue the one before: the first one, and seeks.
+    pub(super) jumped: bool,
+    pub(super) travel: Option<Travel>,
+    pub(super) ended: bool,
+}
+
+impl PlaybackState {
+    /// One step of a playback of a capture that lasts `duration` seconds. Returns the playback after it, and what happened.
+    pub(super) fn advance(&mut self, mut now: Playback, drive: Drive, duration: f32) -> (Playback, Progress) {
+        let span = now.span(duration);
+        let mut progress = self.notice(&mut now, &span, matches!(drive, Drive::Follow { .. }));
+        if now.playing && !span.is_still() {
+            match drive {
+                Drive::By(delta) => self.run(&mut now, &span, delta, &mut progress),
+                Drive::Follow { clock, seconds, jumps } => {
+                    let phase = span.phase_at(seconds, now.speed, now.offset);
+                    let next = Follow { clock, jumps, speed: now.speed, offset: now.offset, phase };
+                    if phase.is_finite() {
+                        self.follow(&mut now, &span, next, &mut progress);
+                    }
+                }
+                Drive::Hold => {}
+            }
+        }
+        if !now.playing || !matches!(drive, Drive::Follow { .. }) {
+            self.follow = None;
+        }
+        (self.time, self.returning, self.playing) = (now.time, now.returning, now.playing);
+        (now, progress)
+    }
+
+    /// Compares the playback with its memory: what differs, the game has set since the last step.
+    fn notice(&mut self, now: &mut Playback, span: &Span, following: bool) -> Progress {
+        if !now.time.is_finite() {
+            now.time = if now.time == f32::INFINITY { span.end() as f32 } else { span.start() as f32 };
+        }
+        let first = self.span.is_none();
+        let moved = now.time != self.time || span.repeat().turns_round() && now.returning != self.returning;
+        // A clock that is followed sets the time; setting it otherwise is not a seek.
+        let seeked = !first && moved && !(following && now.playing);
+        if self.span != Some(*span) {
+            self.follow = None;
+            self.span = Some(*span);
+            self.phase = span.phase(now.time, now.returning);
+        }
+        if first || seeked {
+            self.phase = span.phase(now.time, now.returning);
+            (self.fresh, self.over) = (true, false);
+        }
+        Progress {
+            started: now.playing && !self.playing,
+            paused: !now.playing && self.playing,
+            seeked: seeked.then_some([self.time, now.time]),
+            jumped: first || seeked,
+            ..Progress::default()
+        }
+    }
+
+    /// Plays `delta` seconds of the game's time.
+    fn run(&mut self, now: &mut Playback, span: &Span, delta: f64, progress: &mut Progress) {
+        let to = self.phase + delta * f64::from(now.speed);
+        if !to.is_finite() || to == self.phase {
+            return;
+        }
+        let travel = self.go(now, span, self.phase, to);
+        if travel.at_end {
+            now.playing = false;
+            progress.ended = true;
+        }
+        progress.travel = Some(travel);
+    }
+
+    /// Plays, or jumps, to what a shared clock shows.
+    fn follow(&mut self, now: &mut Playback, span: &Span, next: Follow, progress: &mut Progress) {
+        let before = self.follow.replace(next);
+        match before {
+            Some(before) if (Follow { phase: before.phase, ..next }) == before => {
+                if next.phase != before.phase {
+                    let travel = self.go(now, span, before.phase, next.phase);
+                    progress.ended = travel.at_end && !self.over;
+                    self.over = travel.at_end;
+                    progress.travel = Some(travel);
+                }
+            }
+            _ => {
+                self.go(now, span, next.phase, next.phase);
+                self.fresh = true;
+                self.over = span.is_over(next.phase, now.speed >= 0.0);
+                // The first moment is not a seek.
+                if !progress.jumped && now.time != self.time {
+                    progress.seeked = Some([self.time, now.time]);
+                }
+                progress.jumped = true;
+            }
+        }
+    }
+
+    fn go(&mut self, now: &mut Playback, span: &Span, from: f64, to: f64) -> Travel {
+        let travel = span.travel(from, to, std::mem::take(&mut self.fresh));
+        self.phase = travel.phase();
+        (now.time, now.returning) = span.moment(self.phase);
+        travel
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plugin::playback::repeat::Repeat;
+    use bevy::ecs::entity::Entity;
+
+    /// A playback of two seconds with its memory.
+    struct Player(Playback, PlaybackState);
+
+    impl Player {
+        fn new(playback: Playback) -> Self {
+            Self(playback, PlaybackState::default())
+        }
+
+        fn step(&mut self, drive: Drive) -> Progress {
+            let (next, progress) = self.1.advance(self.0, drive, 2.0);
+            self.0 = next;
+            progress
+        }
+
+        fn follow(&mut self, seconds: f64, jumps: u32) -> Progress {
+            self.step(Drive::Follow { clock: Entity::PLACEHOLDER, seconds, jumps })
+        }
+    }
+
+    #[test]
+    fn start_pause_and_seek_are_noticed_once() {
+        let mut player = Player::new(Playback::default());
+        let first = player.step(Drive::By(0.25));
+        assert!(first.started && first.seeked.is_none(), "the first step starts, and does not seek");
+        assert!(!player.step(Drive::By(0.25)).started, "the second one does not start again");
+        player.0.pause();
+        assert!(player.step(Drive::By(0.25)).paused, "a pause");
+        assert_eq!(player.step(Drive::By(0.25)), Progress::default(), "nothing happens while paused");
+        player.0.seek(1.25);
+        assert_eq!(player.step(Drive::By(0.25)).seeked, Some([0.5, 1.25]), "but a seek");
+        player.0.play();
+        assert!(player.step(Drive::By(0.25)).started, "and a start");
+        assert_eq!(player.0.time, 1.5, "from there");
+    }
+
+    #[test]
+    fn the_end_comes_once_and_is_no_pause() {
+        let mut player = Player::new(Playback { repeat: Repeat::Once, ..Playback::default() });
+        player.step(Drive::By(1.5));
+        let end = player.step(Drive::By(1.5));
+        assert!(end.ended && !player.0.playing, "it ends");
+        assert_eq!(player.step(Drive::By(1.5)), Progress::default(), "and that is all");
+        player.0.play();
+        assert!(player.step(Drive::By(1.5)).ended, "played at the end, it ends again");
+    }
+
+    #[test]
+    fn small_steps_add_up_without_rounding() {
+        let mut player = Player::new(Playback::default());
+        for _ in 0..60_000 {
+            player.step(Drive::By(1.0 / 60.0));
+        }
+        let off = player.0.time.min(2.0 - player.0.time);
+        assert!(off < 1e-6, "1000 s in 60 steps a second end where a loop does, not {off} s beside it");
+    }
+
+    #[test]
+    fn a_clock_decides_where_its_followers_are() {
+        let mut player = Player::new(Playback { time: 1.75, ..Playback::default() });
+        let first = player.follow(10.5, 0);
+        assert!(first.started && first.seeked.is_none() && player.0.time == 0.5, "at once");
+        player.0.time = 1.9;
+        assert_eq!(player.follow(11.0, 0).seeked, None, "what else sets the time does not count");
+        assert_eq!(player.0.time, 1.0, "where the clock is");
+        assert_eq!(player.follow(12.5, 0).travel.map(|travel| travel.turns), Some(1), "it loops");
+        assert_eq!(player.follow(13.0, 1).seeked, Some([0.5, 1.0]), "a jump of the clock is a seek");
+        player.0.speed = -1.0;
+        assert_eq!(player.follow(13.0, 1).seeked, None, "half a loop from either end is the same moment");
+        player.0.pause();
+        player.follow(14.5, 1);
+        assert_eq!(player.0.time, 1.0, "a pause holds one follower");
+        player.0.play();
+        player.follow(14.75, 1);
+        assert_eq!(player.0.time, 1.25, "and it falls in again");
+        player.follow(f64::NAN, 1);
+        assert_eq!(player.0.time, 1.25, "a clock that shows no number is waited for");
+    }
+
+    #[test]
+    fn a_follower_ends_whenever_the_clock_passes_its_end() {
+        let mut player = Player::new(Playback { repeat: Repeat::Once, offset: -1.0, ..Playback::default() });
+        player.follow(0.0, 0);
+        assert_eq!(player.0.time, 0.0, "before its beginning it waits there");
+        player.follow(2.0, 0);
+        assert_eq!(player.0.time, 1.0, "the offset is a second");
+        assert!(player.follow(3.5, 0).ended && player.0.playing, "at its end it still follows");
+        assert!(!player.follow(4.0, 0).ended, "it ends once");
+        assert!(!player.follow(2.0, 0).ended && player.0.time == 1.0, "the clock may run backwards");
+        assert!(player.follow(3.0, 0).ended, "and forwards again");
+    }
+
+    #[test]
+    fn a_moment_sought_counts_as_passed_when_it_is_played_from() {
+        let mut player = Player::new(Playback::default());
+        let passes =
+            |progress: &Progress, time| progress.travel.is_some_and(|travel| travel.legs().any(|leg| leg.passes(time)));
+        assert!(passes(&player.step(Drive::By(0.5)), 0.0), "the beginning, when it starts there");
+        assert!(!passes(&player.step(Drive::By(0.5)), 0.5), "never twice");
+        player.0.seek(1.5);
+        assert!(passes(&player.step(Drive::By(0.25)), 1.5), "where it was sought");
+        player.0.seek(0.25);
+        player.0.pause();
+        assert!(!passes(&player.step(Drive::By(0.25)), 0.25), "not while paused");
+        player.0.play();
+        assert!(passes(&player.step(Drive::By(0.25)), 0.25), "but then");
+    }
+
+    #[test]
+    fn the_end_of_a_loop_can_be_sought_but_not_played_to() {
+        let mut player = Player::new(Playback { start: 0.1, end: 1.9, ..Playback::default() });
+        player.step(Drive::By(1.8));
+        assert!((player.1.seconds() - 0.1).abs() < 1e-6, "played to its end, it is at {}", player.1.seconds());
+        player.0.pause();
+        player.0.seek(1.9);
+        player.step(Drive::By(1.0));
+        assert!((player.1.seconds() - 1.9).abs() < 1e-6, "sought, it is at its end, not at {}", player.1.seconds());
+        assert!(player.1.is_at_end_of_loop(), "and knows it");
+        player.0.play();
+        player.step(Drive::By(0.25));
+        assert!((player.1.seconds() - 0.35).abs() < 1e-6, "from there it starts over: {}", player.1.seconds());
+        assert!(!player.1.is_at_end_of_loop(), "no longer at the end");
+    }
+
+    #[test]
+    fn infinite_times_are_the_ends() {
+        for drive in [Drive::By(0.0), Drive::Hold] {
+            let mut player = Player::new(Playback { speed: -1.0, ..Playback::default() });
+            player.step(drive);
+            player.0.replay();
+            assert_eq!(player.step(drive).seeked, Some([0.0, 2.0]), "backwards it is replayed from the end");
+            assert_eq!(player.0.time, 2.0, "and stands there until time goes by, {drive:?}");
+            player.0.seek(f32::NEG_INFINITY);
+            player.step(drive);
+            assert_eq!(player.0.time, 0.0, "the other end");
+        }
+    }
+
+    #[test]
+    fn a_range_that_changes_is_no_seek() {
+        let mut player = Player::new(Playback::default());
+        player.step(Drive::By(0.75));
+        player.0.end = 1.0;
+        assert_eq!(player.step(Drive::By(0.5)).seeked, None, "the game moved the out point, not the time");
+        assert_eq!(player.0.time, 0.25, "and the new range is played");
+    }
+}

@@ -1,0 +1,64 @@
+//! What happens at the end of the range that is played.
+//!
+//! In: a game's choice. Out: [`Repeat`], and the properties of its modes on which the arithmetic of playing depends.
+
+use bevy::reflect::Reflect;
+use bevy::reflect::std_traits::ReflectDefault;
+
+/// What happens when the range has been played to its end.
+///
+/// Default: [`Loop`](Self::Loop).
+///
+/// # Examples
+///
+/// ```
+/// use bevy_gs4d::prelude::*;
+///
+/// /// Half a second before the end of a capture of 2 s, a second passes.
+/// fn time_after(repeat: Repeat) -> f32 {
+///     let mut playback = Playback { time: 1.5, repeat, ..Playback::default() };
+///     playback.advance(1.0, 2.0);
+///     playback.time
+/// }
+///
+/// assert_eq!(time_after(Repeat::Once), 2.0, "stopped at the end");
+/// assert_eq!(time_after(Repeat::Loop), 0.5, "started over");
+/// assert_eq!(time_after(Repeat::PingPong), 1.5, "turned round");
+/// ```
+#[derive(Reflect, Debug, Default, Clone, Copy, PartialEq, Eq, Hash)]
+#[reflect(Default, Debug, Clone, PartialEq)]
+pub enum Repeat {
+    /// Stops: at the last moment of the range, or at its first one when played backwards.
+    Once,
+    /// Starts over. The end of the range is its start.
+    #[default]
+    Loop,
+    /// Ping-pong: turns round at each end of the range.
+    PingPong,
+}
+
+impl Repeat {
+    /// Whether playing stops at the end of the range.
+    pub(super) fn stops(self) -> bool {
+        match self {
+            Self::Once => true,
+            Self::Loop | Self::PingPong => false,
+        }
+    }
+
+    /// Whether the end of the range is the same moment as its start.
+    pub(super) fn wraps(self) -> bool {
+        match self {
+            Self::Loop => true,
+            Self::Once | Self::PingPong => false,
+        }
+    }
+
+    /// Whether every second pass runs in the opposite direction.
+    pub(super) fn turns_round(self) -> bool {
+        match self {
+            Self::PingPong => true,
+            Self::Once | Self::Loop => false,
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! A clip: a part of a capture, at a time of a timeline.
+//!
+//! In: a capture, a range of it, and when and how fast it plays. Out: what the clip shows at a time, and the [`Playback`] that shows it.
+
+use super::error::InvalidTimeline;
+use crate::plugin::component::GaussianCapture;
+use crate::plugin::playback::component::Playback;
+use crate::plugin::playback::repeat::Repeat;
+use bevy::asset::{Handle, VisitAssetDependencies};
+
+/// A part of a capture, at a time of a timeline.
+#[derive(VisitAssetDependencies, Debug, Clone, PartialEq)]
+pub struct Clip {
+    /// The capture.
+    #[dependency]
+    pub capture: Handle<GaussianCapture>,
+    /// When the clip begins, in seconds of the timeline: 0 or later.
+    pub start: f32,
+    /// The first and the last moment of the capture that are played, in seconds of the capture. Beyond the capture's end its last moment
+    /// stands still; backwards, the clip begins with that.
+    pub range: [f32; 2],
+    /// Seconds of the capture per second of the timeline; negative plays from the last moment to the first. Never 0.
+    pub speed: f32,
+    /// Durations of fading in and fading out, in seconds of the timeline; 0 for none.
+    pub fade: [f32; 2],
+}
+
+/// Seconds by which clips that follow each other may overlap or lie apart, because speeds and ends are rounded. A clip begins this much
+/// early, so that no such gap is visible.
+pub(super) const TOUCH: f32 = 1e-4;
+
+impl Clip {
+    /// Returns how long it plays, in seconds of the timeline.
+    pub fn duration(&self) -> f32 {
+        (self.range[1] - self.range[0]) / self.speed.abs()
+    }
+
+    /// Returns when it ends, in seconds of the timeline.
+    pub fn end(&self) -> f32 {
+        self.start + self.duration()
+    }
+
+    /// Whether it is shown at `time`, in seconds of the timeline: from its start until just before its end, and at its end if the timeline,
+    /// which lasts `duration` seconds, ends there, too.
+    pub fn shows(&self, time: f64, duration: f32) -> bool {
+        let end = f64::from(self.end());
+        self.has_begun(time) && (time < end || self.end() >= duration - TOUCH && time <= f64::from(duration))
+    }
+
+    pub(super) fn has_begun(&self, time: f64) -> bool {
+        f64::from(self.start) - f64::from(TOUCH) <= time
+    }
+
+    /// Returns the factor on its opacity at `time`, in seconds of the timeline: 0 to 1.
+    pub fn fade_at(&self, time: f64) -> f32 {
+        let share = |passed: f64, fade: f32| {
+            if fade > 0.0 { (passed / f64::from(fade)).clamp(0.0, 1.0) as f32 } else { 1.0 }
+        };
+        let (start, end) = (f64::from(self.start), f64::from(self.end()));
+        share(time - start, self.fade[0]).min(share(end - time, self.fade[1]))
+    }
+
+    /// The playback that shows this clip while it follows the timeline's clock. `duration` is that of the capture in seconds, `None` until
+    /// it has been loaded.
+    pub(super) fn playback(&self, duration: Option<f32>) -> Playback {
+        let ([start, end], backwards) = (self.range, self.speed < 0.0);
+        // Without it, playback would begin at the capture's end at once.
+        let beyond = duration.filter(|_| backwards).map_or(0.0, |duration| (end - duration).max(0.0));
+        Playback {
+            // Stays if the whole clip lies beyond the capture, whose end is then drawn.
+            time: if backwards { end } else { start },
+            start,
+            end,
+            speed: self.speed,
+            offset: -self.start * self.speed.abs() - beyond,
+            repeat: Repeat::Once,
+            ..Playback::default()
+        }
+    }
+
+    /// Checks its numbers. `track` and `clip` name it in errors.
+    pub(super) fn check(&self, track: &str, clip: usize) -> Result<(), InvalidTimeline> {
+        let ([first, last], [fade_in, fade_out]) = (self.range, self.fade);
+        let numbers = [
+            ("start", self.start, is_time(self.start), "0 or later, in seconds of the timeline"),
+            ("in", first, is_time(first), "0 or later, in seconds of the capture"),
+            ("out", last, last.is_finite() && last > first, "later than in, in seconds of the capture"),
+            ("speed", self.speed, self.speed.is_normal(), "a number other than 0"),
+            ("fade_in", fade_in, is_time(fade_in), "0 or longer, in seconds"),
+            ("fade_out", fade_out, is_time(fade_out), "0 or longer, in seconds"),
+        ];
+        if let Some(&(field, value, _, must)) = numbers.iter().find(|(.., fine, _)| !fine) {
+            return Err(InvalidTimeline::Number { track: track.to_owned(), clip, field, value, must });
+        }
+        let (fades, lasts) = (fade_in + fade_out, self.duration());
+        if !self.end().is_finite() {
+            let must = "fast enough for the clip to end";
+            return Err(InvalidTimeline::Number {
+                track: track.to_owned(),
+                clip,
+                field: "speed",
+                value: self.speed,
+                must,
+            });
+        }
+        if fades > lasts + TOUCH {
+            return Err(InvalidTimeline::Fades { track: track.to_owned(), clip, fades, lasts });
+        }
+        Ok(())
+    }
+}
+
+/// Whether a number is a time of a timeline or a capture.
+pub(super) fn is_time(seconds: f32) -> bool {
+    seconds.is_finite() && seconds >= 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn clip(start: f32, range: [f32; 2], speed: f32) -> Clip {
+        Clip { capture: Handle::default(), start, range, speed, fade: [0.0; 2] }
+    }
+
+    #[test]
+    fn a_clip_lasts_as_its_speed_says() {
+        assert_eq!(clip(1.0, [0.5, 2.5], 1.0).end(), 3.0, "as long as its range");
+        assert_eq!(clip(1.0, [0.5, 2.5], -0.5).end(), 5.0, "backwards at half speed, twice as long");
+    }
+
+    #[test]
+    fn a_clip_that_reaches_beyond_its_capture_waits_at_its_end() {
+        let backwards = clip(2.0, [0.0, 5.0], -2.0);
+        assert_eq!(backwards.playback(Some(4.0)).offset, -5.0, "a second of the capture that is not there");
+        assert_eq!(backwards.playback(Some(9.0)).offset, -4.0, "within its capture it begins at once");
+        assert_eq!(backwards.playback(None).offset, -4.0, "until the capture has been loaded");
+        assert_eq!(clip(2.0, [0.0, 5.0], 2.0).playback(Some(4.0)).offset, -4.0, "forwards, the end comes last");
+    }
+
+    #[test]
+    fn fades_rise_and_fall_within_the_clip() {
+        let faded = Clip { fade: [0.5, 1.0], ..clip(1.0, [0.0, 4.0], 2.0) };
+        let fades = [0.0, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 9.0].map(|time| faded.fade_at(time));
+        assert_eq!(fades, [0.0, 0.0, 0.5, 1.0, 1.0, 0.5, 0.0, 0.0], "in, full, out");
+        assert_eq!(clip(1.0, [0.0, 4.0], 2.0).fade_at(1.0), 1.0, "without fades it is all there");
+    }
+}

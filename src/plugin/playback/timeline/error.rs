@@ -1,0 +1,77 @@
+//! Why a timeline is invalid.
+//!
+//! In: the checks of [`asset`](super::asset) and [`clip`](super::clip). Out: [`InvalidTimeline`], whose text names the place, the fault and
+//! the remedy.
+
+/// Why a timeline is invalid. Clips and markers are counted from 1, in the order in which they are written.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum InvalidTimeline {
+    /// It has nothing to play.
+    #[error("the timeline has neither clips nor markers nor a duration; give it at least one clip")]
+    Empty,
+    /// Two tracks have one name.
+    #[error("two tracks are named {0:?}; a track's name says which entity plays it, so give each its own")]
+    SameName(String),
+    /// A number is out of its range.
+    #[error("track {track:?}, clip {clip}: {field} is {value}, but must be {must}")]
+    Number {
+        /// The track's name.
+        track: String,
+        /// The clip.
+        clip: usize,
+        /// The field's name, as in files.
+        field: &'static str,
+        /// Its value.
+        value: f32,
+        /// What it must be.
+        must: &'static str,
+    },
+    /// A clip fades in and out for longer than it lasts.
+    #[error(
+        "track {track:?}, clip {clip}: fades take {fades} s, but the clip lasts {lasts} s; shorten fade_in or fade_out"
+    )]
+    Fades {
+        /// The track's name.
+        track: String,
+        /// The clip.
+        clip: usize,
+        /// Both fades together, in seconds.
+        fades: f32,
+        /// The clip's duration, in seconds of the timeline.
+        lasts: f32,
+    },
+    /// Two clips of a track overlap in time.
+    #[error(
+        "track {track:?}: clip {second} starts at {start} s, before clip {first} ends at {end} s; move one to another track"
+    )]
+    Overlap {
+        /// The track's name.
+        track: String,
+        /// The clip that starts earlier.
+        first: usize,
+        /// When it ends, in seconds of the timeline.
+        end: f32,
+        /// The clip that starts before that.
+        second: usize,
+        /// When it starts, in seconds of the timeline.
+        start: f32,
+    },
+    /// A marker's time is out of its range.
+    #[error("marker {marker} ({name:?}): time is {time}, but must be 0 or later, in seconds")]
+    MarkerTime {
+        /// The marker.
+        marker: usize,
+        /// Its name.
+        name: String,
+        /// Its time, in seconds of the timeline.
+        time: f32,
+    },
+    /// The given duration is shorter than the clips and markers.
+    #[error("duration is {given} s, but the last clip or marker ends at {needed} s; leave duration out or lengthen it")]
+    Duration {
+        /// The given duration, in seconds.
+        given: f32,
+        /// The shortest possible duration, in seconds.
+        needed: f32,
+    },
+}

@@ -1,0 +1,126 @@
+//! The state of every camera that may see captures, kept from frame to frame.
+//!
+//! In: what [`prepare`](super::prepare) finds that a camera sees. Out: [`CaptureViews`], which drawing and statistics read.
+
+use super::active::ActiveLists;
+use super::composite::CompositeBindings;
+use super::upload::GpuGaussianCapture;
+use super::write_depth::WriteDepthBindings;
+use crate::plugin::component::GaussianCapture;
+use crate::renderer::{Instance, Renderer, ViewRenderer};
+use crate::view::{Appearance, View};
+use bevy::asset::AssetId;
+use bevy::ecs::entity::Entity;
+use bevy::ecs::resource::Resource;
+use bevy::platform::collections::HashMap;
+use bevy::render::render_asset::RenderAssets;
+use bevy::render::render_resource::CachedRenderPipelineId;
+use bevy::render::renderer::{RenderDevice, RenderQueue};
+use bevy::render::sync_world::MainEntity;
+
+/// State of every camera that may see captures, by its entity in the render world.
+#[derive(Resource, Default)]
+pub(super) struct CaptureViews(pub(super) HashMap<Entity, CaptureView>);
+
+/// State of one camera.
+pub(super) struct CaptureView {
+    /// The camera's entity in the main world.
+    pub(super) camera: Entity,
+    pub(super) renderer: ViewRenderer,
+    /// The composite into the camera's target, and what it binds.
+    pub(super) composite: CachedRenderPipelineId,
+    pub(super) bindings: CompositeBindings,
+    /// The pass that writes to the camera's depth buffer, if the camera asks for it, and what that pass binds.
+    pub(super) write_depth: Option<CachedRenderPipelineId>,
+    pub(super) depth_bindings: WriteDepthBindings,
+    /// Whether GPU times are measured.
+    measured: bool,
+    /// Whether captures are drawn after transparent meshes even without multisampling.
+    pub(super) late: bool,
+    /// Frames since the camera last saw a capture.
+    idle: u32,
+    /// The captures that the camera sees this frame; nothing is drawn while this is empty.
+    pub(super) drawn: Vec<Drawn>,
+}
+
+/// One capture, seen by one camera.
+pub(super) struct Drawn {
+    pub(super) entity: MainEntity,
+    pub(super) asset: AssetId<GaussianCapture>,
+    pub(super) view: View,
+    pub(super) appearance: Appearance,
+    /// Whether the capture's temporal filter is used.
+    pub(super) filtered: bool,
+}
+
+/// Frames in a row without a visible capture after which a camera releases its GPU memory.
+const RELEASE_AFTER_IDLE_FRAMES: u32 = 120;
+
+impl CaptureView {
+    pub(super) fn new(
+        device: &RenderDevice,
+        renderer: &Renderer,
+        camera: Entity,
+        composite: CachedRenderPipelineId,
+    ) -> Self {
+        Self {
+            camera,
+            renderer: ViewRenderer::new(device.wgpu_device(), renderer),
+            composite,
+            bindings: CompositeBindings::default(),
+            write_depth: None,
+            depth_bindings: WriteDepthBindings::default(),
+            measured: false,
+            late: false,
+            idle: 0,
+            drawn: Vec::new(),
+        }
+    }
+
+    /// Whether it draws anything this frame.
+    pub(super) fn sees_something(&self) -> bool {
+        !self.drawn.is_empty()
+    }
+
+    /// The captures drawn this frame, as the renderer takes them.
+    pub(super) fn instances<'a>(
+        &self,
+        captures: &'a RenderAssets<GpuGaussianCapture>,
+        lists: &'a ActiveLists,
+    ) -> Vec<Instance<'a>> {
+        let instance = |drawn: &Drawn| {
+            let capture = captures.get(drawn.asset)?.capture()?;
+            let list = if drawn.filtered { lists.0.get(&drawn.entity) } else { None };
+            Some(Instance {
+                capture,
+                active: list.map(|placed| &placed.list),
+                view: drawn.view,
+                appearance: drawn.appearance,
+            })
+        };
+        self.drawn.iter().filter_map(instance).collect()
+    }
+
+    /// Counts a frame in which the camera sees a capture, or none. After [`RELEASE_AFTER_IDLE_FRAMES`] without one, GPU memory is
+    /// released.
+    pub(super) fn count_idle_frames(&mut self) {
+        if self.sees_something() {
+            self.idle = 0;
+            return;
+        }
+        self.idle = self.idle.saturating_add(1);
+        if self.idle == RELEASE_AFTER_IDLE_FRAMES {
+            self.renderer.release();
+            self.bindings.forget();
+            self.depth_bindings.forget();
+        }
+    }
+
+    /// Starts or stops measuring GPU times.
+    pub(super) fn measure(&mut self, on: bool, device: &RenderDevice, queue: &RenderQueue, renderer: &Renderer) {
+        if self.measured != on {
+            self.measured = on;
+            self.renderer.measure(device.wgpu_device(), queue, renderer, on);
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! Publish: the numbers of a frame, from the render world to [`CaptureStatistics`].
+//!
+//! In: the views that were prepared, and all uploaded captures. Out: [`CaptureStatistics`], brought up to date.
+
+use super::capture_views::CaptureViews;
+use super::statistics::CaptureStatistics;
+use super::upload::GpuGaussianCapture;
+use crate::renderer::{GpuCapture, ViewStatistics};
+use bevy::ecs::system::Res;
+use bevy::log::debug_span;
+use bevy::render::render_asset::RenderAssets;
+use std::borrow::Cow;
+
+/// Copies the numbers of this frame to the main world.
+pub(super) fn publish_statistics(
+    statistics: Res<CaptureStatistics>,
+    views: Res<CaptureViews>,
+    captures: Res<RenderAssets<GpuGaussianCapture>>,
+) {
+    let _span = debug_span!("gs4d/statistics").entered();
+    // A view that sees nothing any more may still hold memory.
+    let shown = views.0.values().filter(|view| view.sees_something() || view.renderer.statistics().bytes > 0);
+    let numbers = shown.map(|view| {
+        let all = view.renderer.statistics();
+        let numbers = match view.sees_something() {
+            true => Cow::Borrowed(all),
+            false => Cow::Owned(ViewStatistics { bytes: all.bytes, ..ViewStatistics::default() }),
+        };
+        (view.camera, numbers)
+    });
+    let uploaded = || captures.iter().filter_map(|(_, capture)| capture.capture());
+    statistics.update(numbers, uploaded().map(GpuCapture::bytes).sum(), uploaded().count());
+}

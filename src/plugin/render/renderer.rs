@@ -1,0 +1,31 @@
+//! The renderer's pipelines, as a resource of the render world.
+//!
+//! In: Bevy's render device, once when rendering starts and again after a lost device. Out: [`CaptureRenderer`], or the reason why there
+//! is none, in [`CaptureStatistics`].
+
+use super::statistics::CaptureStatistics;
+use crate::renderer::{Renderer, ShaderChecks};
+use bevy::ecs::resource::Resource;
+use bevy::ecs::system::{Commands, Res};
+use bevy::log::error;
+use bevy::render::renderer::RenderDevice;
+
+/// The renderer's pipelines; absent where this GPU cannot run them.
+#[derive(Resource)]
+pub struct CaptureRenderer(pub(super) Renderer);
+
+/// Compiles the renderer's pipelines. Shaders check their bounds in debug builds.
+pub(super) fn init_renderer(mut commands: Commands, device: Res<RenderDevice>, statistics: Res<CaptureStatistics>) {
+    let checks = if cfg!(debug_assertions) { ShaderChecks::On } else { ShaderChecks::Off };
+    match Renderer::new(device.wgpu_device(), checks) {
+        Ok(renderer) => {
+            statistics.set_renderer_missing(None);
+            commands.insert_resource(CaptureRenderer(renderer.counting(statistics.work())));
+        }
+        Err(failure) => {
+            error!("captures are not drawn: {failure}");
+            statistics.set_renderer_missing(Some(failure.to_string()));
+            commands.remove_resource::<CaptureRenderer>();
+        }
+    }
+}

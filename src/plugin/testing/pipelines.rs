@@ -1,0 +1,74 @@
+//! Whether the pipelines of an app are compiled, as seen from the main world.
+//!
+//! In: the pipeline cache of the render world, after every frame. Out: [`PipelineReport`], which both worlds share: with pipelined
+//! rendering the render world is on another thread and cannot be looked into.
+
+use super::error::TestingError;
+use bevy::app::App;
+use bevy::ecs::resource::Resource;
+use bevy::ecs::schedule::IntoScheduleConfigs;
+use bevy::ecs::system::Res;
+use bevy::render::render_resource::{CachedPipelineState, PipelineCache};
+use bevy::render::{Render, RenderApp, RenderSystems};
+use bevy::shader::ShaderCacheError;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// The pipelines as of the newest frame that has been drawn.
+#[derive(Resource, Clone, Default)]
+struct PipelineReport(Arc<Mutex<State>>);
+
+#[derive(Clone, Default)]
+enum State {
+    /// No frame has been drawn yet, or some pipelines are still being compiled.
+    #[default]
+    Waiting,
+    Ready,
+    Failed(String),
+}
+
+/// Starts reporting, before the app's first update.
+///
+/// # Errors
+/// [`TestingError::NoGpu`] if the app has no renderer.
+pub(super) fn watch_pipelines(app: &mut App) -> Result<(), TestingError> {
+    if app.world().contains_resource::<PipelineReport>() {
+        return Ok(());
+    }
+    let report = PipelineReport::default();
+    let renderer = app.get_sub_app_mut(RenderApp).ok_or(TestingError::NoGpu)?;
+    renderer.insert_resource(report.clone()).add_systems(Render, report_pipelines.in_set(RenderSystems::Cleanup));
+    app.insert_resource(report);
+    Ok(())
+}
+
+/// Returns whether every pipeline is compiled.
+///
+/// # Errors
+/// A pipeline that cannot be compiled.
+pub(super) fn pipelines_are_ready(app: &App) -> Result<bool, TestingError> {
+    let report = app.world().get_resource::<PipelineReport>().ok_or(TestingError::NoGpu)?;
+    match &*report.0.lock().unwrap_or_else(PoisonError::into_inner) {
+        State::Waiting => Ok(false),
+        State::Ready => Ok(true),
+        State::Failed(failure) => Err(TestingError::Pipeline(failure.clone())),
+    }
+}
+
+fn report_pipelines(report: Res<PipelineReport>, cache: Option<Res<PipelineCache>>) {
+    let state = cache.map_or(State::Waiting, |cache| state_of(&cache));
+    *report.0.lock().unwrap_or_else(PoisonError::into_inner) = state;
+}
+
+fn state_of(cache: &PipelineCache) -> State {
+    for pipeline in cache.pipelines() {
+        match &pipeline.state {
+            // Bevy tries these again: the shader is still being loaded.
+            CachedPipelineState::Err(
+                ShaderCacheError::ShaderNotLoaded(_) | ShaderCacheError::ShaderImportNotYetAvailable,
+            ) => return State::Waiting,
+            CachedPipelineState::Err(failure) => return State::Failed(failure.to_string()),
+            _ => {}
+        }
+    }
+    if cache.waiting_pipelines().count() == 0 { State::Ready } else { State::Waiting }
+}

@@ -1,0 +1,47 @@
+//! Counters of the work that is done for a renderer.
+//!
+//! In: every resource created, byte uploaded and list recorded. Out: [`WorkCounters`], from which a test can tell that nothing is done
+//! twice.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// What has been created, uploaded and recorded for a renderer so far. Clones share the counters.
+#[derive(Debug, Clone, Default)]
+pub struct WorkCounters(Arc<Counts>);
+
+#[derive(Debug, Default)]
+struct Counts {
+    created: AtomicU64,
+    uploaded: AtomicU64,
+    activated: AtomicU64,
+}
+
+impl WorkCounters {
+    /// Returns the number of buffers, textures and bind groups created.
+    pub fn created(&self) -> u64 {
+        self.0.created.load(Ordering::Relaxed)
+    }
+
+    /// Returns the bytes of captures uploaded.
+    pub fn uploaded(&self) -> u64 {
+        self.0.uploaded.load(Ordering::Relaxed)
+    }
+
+    /// Returns the number of lists of active Gaussians recorded: runs of `activate`.
+    pub fn activated(&self) -> u64 {
+        self.0.activated.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn add_created(&self) {
+        self.0.created.fetch_add(1, Ordering::Relaxed);
+    }
+
+    pub(crate) fn add_uploaded(&self, bytes: u64) {
+        self.0.uploaded.fetch_add(bytes, Ordering::Relaxed);
+    }
+
+    pub(crate) fn add_activated(&self) {
+        self.0.activated.fetch_add(1, Ordering::Relaxed);
+    }
+}

@@ -1,0 +1,163 @@
+//! Colors by codebook: a first coefficient each, and the rest as a sum of entries of up to four codebooks, one from each.
+//!
+//! In: first coefficients, and codebooks with a code for every Gaussian. Out: [`CodedColors`], the words that the GPU reads; and back
+//! to coefficients. How codebooks are trained is another matter (`offline::quantize::codebook`).
+
+use super::lanes::{self, BASE_MAX, COLOR_WORDS, MAX_STAGES};
+use crate::gaussian::{Harmonics, harmonics};
+use glam::Vec3;
+
+/// Colors by codebook.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct CodedColors {
+    /// Spatial degree evaluated.
+    pub degree: u32,
+    /// Time degree evaluated.
+    pub degree_t: u32,
+    /// One record each: the first coefficient (10 bits for each channel), then four codes of 16 bits.
+    pub records: Vec<[u32; COLOR_WORDS]>,
+    /// Entries of each codebook.
+    pub entries: Vec<u32>,
+    /// All codebooks: `words_per_entry` words for each entry, four signed bytes to a word, RGB innermost, first coefficient 0.
+    pub codebooks: Vec<u32>,
+    /// What a byte of 127 stands for: `words_per_entry` four-vectors for each codebook.
+    pub scales: Vec<[f32; 4]>,
+}
+
+impl CodedColors {
+    /// Coefficients per Gaussian and channel: 1, 4, 9, 16, 32 or 48.
+    pub fn coefficients(&self) -> usize {
+        harmonics::evaluated(self.degree, self.degree_t)
+    }
+
+    /// Words of one entry of a codebook.
+    pub fn words_per_entry(&self) -> usize {
+        (self.coefficients() * 3).div_ceil(4)
+    }
+
+    /// Bytes in memory.
+    pub fn size(&self) -> usize {
+        size_of_val(self.records.as_slice())
+            + size_of_val(self.codebooks.as_slice())
+            + size_of_val(self.scales.as_slice())
+    }
+
+    /// Colors of these degrees from the first coefficient of each Gaussian, RGB, without any codebook yet; and the ends of the range
+    /// within which the first coefficients lie. They keep `bits` bits for each channel, 1 to 10.
+    pub fn of_base(degree: u32, degree_t: u32, base: &[[f32; 3]], bits: u32) -> (Self, [f32; 2]) {
+        let values = base.as_flattened().iter();
+        let (low, high) = values.fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+        let (low, size) = if low > high { (0.0, 0.0) } else { (low, high - low) };
+        // A base of fewer bits takes so many of the 1024 values, the first and last among them.
+        let levels = ((1u32 << bits.clamp(1, 10)) - 1) as f32;
+        let place = |value: f32| {
+            let level = if size > 0.0 { ((value - low) / size * levels).round() } else { 0.0 };
+            (level * (BASE_MAX / levels)).round() as u32
+        };
+        let records = base.iter().map(|&rgb| lanes::pack_base(rgb.map(place))).collect();
+        (Self { degree, degree_t, records, ..Self::default() }, [low, low + size * (BASE_MAX / 1022.0)])
+    }
+
+    /// Adds a codebook, which must be at most the fourth. A row holds every coefficient but the first, RGB innermost: `entries` are rows
+    /// of signed bytes, one after the other, `scales` is one row of what a byte of 127 stands for, and `codes` has the entry of each
+    /// Gaussian.
+    pub fn push_codebook(&mut self, entries: &[i8], scales: &[f32], codes: &[u16]) {
+        let (stage, words) = (self.entries.len(), self.words_per_entry());
+        let rows = entries.chunks_exact(scales.len());
+        self.entries.push(rows.len() as u32);
+        for row in rows {
+            let fours = padded(row, words);
+            self.codebooks.extend(fours.iter().map(|&four| u32::from_le_bytes(four.map(i8::cast_unsigned))));
+        }
+        self.scales.extend(padded(scales, words));
+        for (record, &code) in self.records.iter_mut().zip(codes) {
+            lanes::pack_code(record, stage, code);
+        }
+    }
+
+    /// The code of a Gaussian in one of the codebooks.
+    pub fn code(&self, index: usize, stage: usize) -> u32 {
+        lanes::unpack_code(self.records[index], stage)
+    }
+
+    /// All coefficients but the first (which is 0 here), RGB innermost, padded to whole words.
+    pub fn rest(&self, index: usize) -> Vec<f32> {
+        let words = self.words_per_entry();
+        let mut rest = vec![0.0; words * 4];
+        let mut first = 0;
+        for (stage, &entries) in self.entries.iter().enumerate() {
+            let entry = (first + self.code(index, stage) as usize) * words;
+            let scales = &self.scales[stage * words..][..words];
+            for ((four, &word), scale) in rest.chunks_exact_mut(4).zip(&self.codebooks[entry..]).zip(scales) {
+                for ((value, byte), scale) in four.iter_mut().zip(word.to_le_bytes()).zip(scale) {
+                    *value += f32::from(byte as i8) / 127.0 * scale;
+                }
+            }
+            first += entries as usize;
+        }
+        rest
+    }
+
+    /// The first coefficient of a Gaussian; `low` and `size` are the range within which it lies.
+    fn base(&self, index: usize, [low, size]: [f32; 2]) -> Vec3 {
+        Vec3::from(lanes::unpack_base(self.records[index]).map(|place| low + place as f32 / BASE_MAX * size))
+    }
+
+    /// Color of one Gaussian, whose first coefficient lies in the range `base`; see [`Harmonics::color`].
+    pub(super) fn color(&self, index: usize, base: [f32; 2], direction: Vec3, tau: f32, time_span: f32) -> Vec3 {
+        let basis = harmonics::basis(direction);
+        let rest = self.rest(index);
+        let block = |first: usize, count: usize| {
+            (0..count).fold(Vec3::ZERO, |sum, k| sum + basis[k] * Vec3::from_slice(&rest[(first + k) * 3..]))
+        };
+        let mut color = self.base(index, base) * basis[0] + block(0, (self.degree as usize + 1).pow(2));
+        if self.degree == 3 {
+            for n in 1..=self.degree_t as usize {
+                color += harmonics::time_cosine(n, tau, time_span) * block(16 * n, 16);
+            }
+        }
+        (color + 0.5).max(Vec3::ZERO)
+    }
+
+    /// All coefficients of all Gaussians, whose first coefficients lie in the range `base`.
+    pub(super) fn harmonics(&self, base: [f32; 2]) -> Harmonics {
+        let coefficients = self.coefficients();
+        let mut values = Vec::with_capacity(self.records.len() * coefficients * 3);
+        for index in 0..self.records.len() {
+            values.extend(self.base(index, base).to_array());
+            values.extend_from_slice(&self.rest(index)[3..coefficients * 3]);
+        }
+        Harmonics { coefficients, degree: self.degree, degree_t: self.degree_t, values }
+    }
+
+    /// Whether the parts fit together for `count` Gaussians and every code has an entry.
+    pub(super) fn check(&self, count: usize) -> Result<(), &'static str> {
+        if self.degree > 3 || self.degree_t > 2 {
+            return Err("a degree of colour that does not exist");
+        }
+        let words = self.words_per_entry();
+        let total: u64 = self.entries.iter().map(|&entries| u64::from(entries)).sum();
+        if self.records.len() != count || self.entries.len() > MAX_STAGES {
+            return Err("the colours do not fit the number of Gaussians");
+        }
+        if self.codebooks.len() as u64 != total * words as u64 || self.scales.len() != words * self.entries.len() {
+            return Err("the codebooks do not have the size that their entries need");
+        }
+        if !self.scales.as_flattened().iter().all(|value| value.is_finite()) {
+            return Err("a scale of a codebook that is not finite");
+        }
+        let fits = |stage: usize, &entries: &u32| (0..count).all(|index| self.code(index, stage) < entries);
+        if self.entries.iter().enumerate().all(|(stage, entries)| fits(stage, entries)) {
+            Ok(())
+        } else {
+            Err("a code beyond its codebook")
+        }
+    }
+}
+
+/// A row behind a first coefficient of 0, padded to whole words.
+fn padded<T: Copy + Default>(row: &[T], words: usize) -> Vec<[T; 4]> {
+    let mut fours = vec![[T::default(); 4]; words];
+    fours.as_flattened_mut()[3..][..row.len()].copy_from_slice(row);
+    fours
+}

@@ -1,0 +1,69 @@
+//! Decoding: from records and ranges back to Gaussians and colors.
+//!
+//! In: a [`PackedScene`]. Out: any one Gaussian or color, or all of them as [`Sliced`].
+
+use super::lanes::{self, ALWAYS, AT_REST, BlockRanges, FARTHEST, LANE_MAX, SharedRanges};
+use super::{PackedColors, PackedScene, shape};
+use crate::gaussian::Gaussian;
+use crate::scene::Sliced;
+use glam::Vec3;
+use std::f32::consts::FRAC_1_SQRT_2;
+
+impl PackedScene {
+    /// Decodes one Gaussian; panics beyond the end, as a slice does.
+    pub fn gaussian(&self, index: usize) -> Gaussian {
+        let record = lanes::unpack(self.records[index]);
+        let part = |lane: usize| f32::from(record[lane]) / LANE_MAX;
+        let parts = |lane| Vec3::new(part(lane), part(lane + 1), part(lane + 2));
+        let shared = SharedRanges::read(&self.ranges);
+        let block = BlockRanges::read(&self.ranges, index);
+        let mean = Vec3::from(block.mean_low) + parts(lanes::MEAN) * Vec3::from(block.mean_size);
+        let (sigma_t, velocity) = match record[lanes::SIGMA_T] {
+            ALWAYS => (f32::INFINITY, Vec3::ZERO),
+            _ => {
+                let [low, size] = shared.log_sigma_t;
+                let sigma_t = (low + part(lanes::SIGMA_T) * size).exp();
+                let signed = Vec3::from([0, 1, 2].map(|axis| {
+                    let place = f32::from(record[lanes::DISPLACEMENT + axis]);
+                    (place - AT_REST) / FARTHEST
+                }));
+                (sigma_t, signed * signed.abs() * block.displacement * sigma_t.recip().max(block.rate))
+            }
+        };
+        let [scale_low, scale_size] = shared.log_scale;
+        let scale = (parts(lanes::SCALE) * scale_size + scale_low).map(f32::exp);
+        let three = (parts(lanes::ROTATION) * shared.rotation_stretch * 2.0 - 1.0) * FRAC_1_SQRT_2;
+        let rotation = shape::with_largest(three, record[lanes::LEFT_OUT]);
+        let [t_low, t_size] = shared.mean_t;
+        Gaussian {
+            mean: mean.to_array(),
+            mean_t: t_low + part(lanes::MEAN_T) * t_size,
+            velocity: velocity.to_array(),
+            sigma_t,
+            covariance: shape::covariance(scale, rotation),
+            opacity: (part(lanes::OPACITY) * shared.opacity_stretch).clamp(0.0, 1.0),
+            padding: 0.0,
+        }
+    }
+
+    /// Color of one Gaussian; see [`Harmonics::color`](crate::gaussian::Harmonics::color).
+    pub fn color(&self, index: usize, direction: Vec3, tau: f32, time_span: f32) -> Vec3 {
+        match &self.colors {
+            PackedColors::Whole(harmonics) => harmonics.color(index, direction, tau, time_span),
+            PackedColors::Coded(colors) => {
+                let base = SharedRanges::read(&self.ranges).base;
+                colors.color(index, base, direction, tau, time_span)
+            }
+        }
+    }
+
+    /// Every Gaussian and every coefficient, decoded.
+    pub fn unpack(self) -> Sliced {
+        let gaussians = (0..self.len()).map(|index| self.gaussian(index)).collect();
+        let harmonics = match self.colors {
+            PackedColors::Whole(harmonics) => harmonics,
+            PackedColors::Coded(colors) => colors.harmonics(SharedRanges::read(&self.ranges).base),
+        };
+        Sliced { gaussians, harmonics }
+    }
+}

@@ -1,0 +1,392 @@
+//! Captures as assets in Bevy apps: what entities report of loading, files that are missing, broken, replaced or saved, and what
+//! goes when nobody wants it any more.
+//!
+//! In: packages and checkpoints written to a folder. Out: proof that states and messages say what happened. Needs neither a GPU nor a
+//! window.
+
+use crate::support::event_log::{Observed, record, take_events};
+use crate::support::pth::Pth;
+use bevy::asset::io::memory::{Dir, MemoryAssetReader};
+use bevy::asset::io::{AssetReader, AssetReaderError, AssetSourceBuilder, PathStream, Reader};
+use bevy::asset::saver::{SaveAssetError, SavedAsset, save_using_saver};
+use bevy::prelude::*;
+use bevy::tasks::block_on;
+use bevy_gs4d::asset::{
+    CaptureFailed, CaptureReady, CaptureSaveError, CaptureState, GaussianCapture, PackageSaver, PackageSaverSettings,
+};
+use bevy_gs4d::codec::checkpoint::CheckpointOptions;
+use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::offline;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{GaussianScene, RuntimeScene, TemporalFilter};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
+use std::fs;
+use std::path::Path;
+use std::sync::mpsc::{self, Receiver};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// How long files may take to load.
+const LOAD_TIMEOUT: Duration = Duration::from_secs(60);
+
+/// An app whose assets are in `folder`. It watches them only with `watch`, so that every reload is one that was asked for.
+fn app(folder: &Path, watch: bool) -> App {
+    let assets = AssetPlugin {
+        file_path: folder.to_str().expect("temporary folders have plain names").into(),
+        watch_for_changes_override: Some(watch),
+        ..default()
+    };
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, assets, GaussianCapturePlugin));
+    record::<CaptureReady>(&mut app, Update);
+    record::<CaptureFailed>(&mut app, Update);
+    app
+}
+
+fn ready(entity: Entity, capture: &Handle<GaussianCapture>) -> String {
+    format!("{:?}", CaptureReady { entity, capture: capture.id() })
+}
+
+/// Updates until something is so, and twice more: nothing that is said late is missed.
+fn wait(app: &mut App, what: &str, so: impl Fn(&App) -> bool) {
+    let start = Instant::now();
+    while !so(app) {
+        assert!(start.elapsed() < LOAD_TIMEOUT, "{what}: waited in vain");
+        std::thread::sleep(Duration::from_millis(2));
+        app.update();
+    }
+    app.update();
+    app.update();
+}
+
+fn load(app: &App, name: &'static str) -> Handle<GaussianCapture> {
+    app.world().resource::<AssetServer>().load(name)
+}
+
+fn reload(app: &App, name: &'static str) {
+    app.world().resource::<AssetServer>().reload(name);
+}
+
+fn spawn(app: &mut App, capture: &Handle<GaussianCapture>) -> Entity {
+    app.world_mut().spawn(GaussianCapture3d(capture.clone())).id()
+}
+
+fn state(app: &App, entity: Entity) -> CaptureState {
+    app.world().get::<CaptureState>(entity).expect("every capture has a state").clone()
+}
+
+fn is_ready(app: &App, entity: Entity) -> bool {
+    state(app, entity) == CaptureState::Ready
+}
+
+fn captures(app: &App) -> &Assets<GaussianCapture> {
+    app.world().resource()
+}
+
+fn scene<'a>(app: &'a App, capture: &Handle<GaussianCapture>) -> Option<&'a RuntimeScene> {
+    Some(captures(app).get(capture)?.scene())
+}
+
+/// How many Gaussians a capture has; 0 for one that is not there.
+fn count(app: &App, capture: &Handle<GaussianCapture>) -> usize {
+    scene(app, capture).map_or(0, RuntimeScene::len)
+}
+
+fn synthetic(count: usize) -> GaussianScene {
+    synthesize(&SynthSettings { count, ..SynthSettings::default() })
+}
+
+fn folder() -> TempDir {
+    tempfile::tempdir().expect("a temporary folder")
+}
+
+fn write(folder: &Path, name: &str, count: usize) {
+    offline::save(&folder.join(name), &synthetic(count), &WriteSettings { level: 1 })
+        .expect("the folder can be written to");
+}
+
+/// Half of a package.
+fn write_broken(folder: &Path, name: &str) {
+    write(folder, name, 50);
+    let bytes = fs::read(folder.join(name)).expect("just written");
+    fs::write(folder.join(name), &bytes[..bytes.len() / 2]).expect("the folder can be written to");
+}
+
+#[test]
+fn a_capture_is_ready_once_it_has_been_loaded() {
+    let folder = folder();
+    write(folder.path(), "good.gs4d", 50);
+    let mut app = app(folder.path(), false);
+    let capture = load(&app, "good.gs4d");
+    let entity = spawn(&mut app, &capture);
+    assert_eq!(state(&app, entity), CaptureState::Loading, "as long as nobody has looked");
+    wait(&mut app, "loading", |app| is_ready(app, entity));
+    assert_eq!(count(&app, &capture), 50, "the capture is there");
+    assert_eq!(take_events(&mut app), [ready(entity, &capture)], "said once");
+    let second = spawn(&mut app, &capture);
+    app.update();
+    app.update();
+    assert_eq!(state(&app, second), CaptureState::Ready, "another entity has nothing to wait for");
+    assert_eq!(take_events(&mut app), [ready(second, &capture)], "and only this one is told");
+}
+
+/// Files that are handed out only when the test lets them go.
+#[derive(Clone)]
+struct Gated {
+    files: MemoryAssetReader,
+    gate: Arc<Mutex<Receiver<()>>>,
+}
+
+impl AssetReader for Gated {
+    async fn read<'a>(&'a self, path: &'a Path) -> Result<impl Reader + 'a, AssetReaderError> {
+        // Who reads on the main thread waits for nothing, and the test fails. A test that has failed lets everything go.
+        let _ = self.gate.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOAD_TIMEOUT);
+        self.files.read(path).await
+    }
+
+    async fn read_meta<'a>(&'a self, path: &'a Path) -> Result<impl Reader + 'a, AssetReaderError> {
+        self.files.read_meta(path).await
+    }
+
+    async fn read_directory<'a>(&'a self, path: &'a Path) -> Result<Box<PathStream>, AssetReaderError> {
+        self.files.read_directory(path).await
+    }
+
+    async fn is_directory<'a>(&'a self, path: &'a Path) -> Result<bool, AssetReaderError> {
+        self.files.is_directory(path).await
+    }
+}
+
+#[test]
+fn a_game_goes_on_while_a_capture_loads() {
+    let folder = folder();
+    write(folder.path(), "slow.gs4d", 50);
+    let files = Dir::default();
+    files.insert_asset(Path::new("slow.gs4d"), fs::read(folder.path().join("slow.gs4d")).expect("just written"));
+    let (open, gate) = mpsc::channel();
+    let gated = Gated { files: MemoryAssetReader { root: files }, gate: Arc::new(Mutex::new(gate)) };
+    let mut app = App::new();
+    app.register_asset_source("gated", AssetSourceBuilder::new(move || Box::new(gated.clone())));
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), GaussianCapturePlugin));
+    let capture = load(&app, "gated://slow.gs4d");
+    let entity = spawn(&mut app, &capture);
+    for frame in 0..50 {
+        app.update();
+        assert_eq!(state(&app, entity), CaptureState::Loading, "frame {frame} does not wait for it");
+    }
+    open.send(()).expect("the reader waits");
+    wait(&mut app, "loading", |app| is_ready(app, entity));
+    assert_eq!(count(&app, &capture), 50, "all of it");
+}
+
+#[test]
+fn failures_name_the_file_and_the_remedy() {
+    let folder = folder();
+    write_broken(folder.path(), "broken.gs4d");
+    fs::write(folder.path().join("text.pth"), "epoch 30000\n".repeat(100)).expect("the folder can be written to");
+    let mut app = app(folder.path(), false);
+    for (name, fault) in [
+        ("missing.gs4d", "check the name"),
+        ("broken.gs4d", "copy or download it again"),
+        ("text.pth", "copy the file again"),
+    ] {
+        let capture = load(&app, name);
+        let entity = spawn(&mut app, &capture);
+        wait(&mut app, name, |app| matches!(state(app, entity), CaptureState::Failed(_)));
+        let CaptureState::Failed(error) = state(&app, entity) else { panic!("{name} has failed") };
+        assert!(error.starts_with(name) && error.contains(fault), "{error:?} names {name} and says {fault:?}");
+        assert!(!error.contains("loader"), "without what a player need not know: {error:?}");
+        let failed = |entity| format!("{:?}", CaptureFailed { entity, error: error.clone() });
+        assert_eq!(take_events(&mut app), [failed(entity)], "said once");
+        let late = spawn(&mut app, &capture);
+        app.update();
+        app.update();
+        assert_eq!(state(&app, late), CaptureState::Failed(error.clone()), "who comes later hears of it, too");
+        assert_eq!(take_events(&mut app), [failed(late)], "and nobody else");
+    }
+}
+
+#[test]
+fn a_repaired_file_can_be_loaded_again() {
+    let folder = folder();
+    let mut app = app(folder.path(), false);
+    let capture = load(&app, "late.gs4d");
+    let entity = spawn(&mut app, &capture);
+    wait(&mut app, "failing", |app| matches!(state(app, entity), CaptureState::Failed(_)));
+    take_events(&mut app);
+    reload(&app, "late.gs4d");
+    wait(&mut app, "failing again", |app| !app.world().resource::<Observed>().0.is_empty());
+    assert_eq!(take_events(&mut app).len(), 1, "another attempt, another message");
+    write(folder.path(), "late.gs4d", 50);
+    reload(&app, "late.gs4d");
+    wait(&mut app, "loading", |app| is_ready(app, entity));
+    assert_eq!(take_events(&mut app), [ready(entity, &capture)], "now it is there");
+}
+
+#[test]
+fn a_state_follows_the_handle() {
+    let folder = folder();
+    write(folder.path(), "one.gs4d", 50);
+    write(folder.path(), "two.gs4d", 60);
+    let mut app = app(folder.path(), false);
+    let [one, two] = ["one.gs4d", "two.gs4d"].map(|name| load(&app, name));
+    let entity = spawn(&mut app, &one);
+    wait(&mut app, "both", |app| count(app, &one) > 0 && count(app, &two) > 0);
+    assert_eq!(take_events(&mut app), [ready(entity, &one)], "the first");
+    app.world_mut().entity_mut(entity).insert(GaussianCapture3d(two.clone()));
+    app.update();
+    app.update();
+    assert_eq!(
+        (state(&app, entity), take_events(&mut app)),
+        (CaptureState::Ready, vec![ready(entity, &two)]),
+        "the second"
+    );
+    app.world_mut().entity_mut(entity).insert(GaussianCapture3d::default());
+    app.update();
+    app.update();
+    assert_eq!(state(&app, entity), CaptureState::Loading, "one that is not there");
+    assert_eq!(take_events(&mut app), [""; 0], "of which there is nothing to say");
+    app.world_mut().entity_mut(entity).insert(GaussianCapture3d(one.clone()));
+    app.update();
+    app.update();
+    assert_eq!(take_events(&mut app), [ready(entity, &one)], "the first again");
+}
+
+#[test]
+fn a_file_that_changes_is_shown_and_one_that_breaks_is_not() {
+    let folder = folder();
+    write(folder.path(), "baked.gs4d", 50);
+    let mut app = app(folder.path(), false);
+    let capture = load(&app, "baked.gs4d");
+    let entity = spawn(&mut app, &capture);
+    wait(&mut app, "loading", |app| is_ready(app, entity));
+    take_events(&mut app);
+
+    write(folder.path(), "baked.gs4d", 70);
+    reload(&app, "baked.gs4d");
+    wait(&mut app, "the new one", |app| count(app, &capture) == 70);
+    assert_eq!(state(&app, entity), CaptureState::Ready, "ready as before");
+    assert_eq!(take_events(&mut app), [ready(entity, &capture)], "ready again");
+
+    write_broken(folder.path(), "baked.gs4d");
+    reload(&app, "baked.gs4d");
+    wait(&mut app, "the failure", |app| !app.world().resource::<Observed>().0.is_empty());
+    assert_eq!((state(&app, entity), count(&app, &capture)), (CaptureState::Ready, 70), "the old one goes on");
+    let said_now = take_events(&mut app);
+    let failed = said_now.iter().all(|said| said.contains("CaptureFailed") && said.contains("baked.gs4d"));
+    assert!(said_now.len() == 1 && failed, "{said_now:?} is one failure that names the file");
+
+    write(folder.path(), "baked.gs4d", 90);
+    reload(&app, "baked.gs4d");
+    wait(&mut app, "the repaired one", |app| count(app, &capture) == 90);
+    assert_eq!(take_events(&mut app), [ready(entity, &capture)], "and ready once more");
+}
+
+#[test]
+fn a_capture_goes_with_its_last_handle() {
+    let folder = folder();
+    write(folder.path(), "good.gs4d", 50);
+    let mut app = app(folder.path(), false);
+    let capture = load(&app, "good.gs4d");
+    let entities = [spawn(&mut app, &capture), spawn(&mut app, &capture)];
+    wait(&mut app, "loading", |app| is_ready(app, entities[1]));
+    drop(capture);
+    app.world_mut().despawn(entities[0]);
+    app.update();
+    app.update();
+    assert_eq!(captures(&app).len(), 1, "it is still wanted");
+    app.world_mut().despawn(entities[1]);
+    app.update();
+    app.update();
+    assert_eq!(captures(&app).len(), 0, "now it is not");
+}
+
+/// A capture that uses what the format has: colours over time and a filter.
+fn dressed() -> RuntimeScene {
+    let scene = synthetic(200);
+    let runtime = scene.clone().into_runtime().expect("a synthetic scene can be drawn");
+    let filter = TemporalFilter::support(runtime.iter(), scene.trained_with.time_interval, 5);
+    RuntimeScene { filter: Some(filter), ..runtime }
+}
+
+fn save(app: &App, capture: &GaussianCapture) -> Result<(), SaveAssetError> {
+    let server = app.world().resource::<AssetServer>().clone();
+    let settings = PackageSaverSettings { level: 1 };
+    block_on(save_using_saver(server, &PackageSaver, &"made.gs4d".into(), SavedAsset::from_asset(capture), &settings))
+}
+
+#[test]
+fn what_is_saved_is_loaded_as_it_was() {
+    let folder = folder();
+    let mut app = app(folder.path(), false);
+    let made = GaussianCapture::new(dressed());
+    save(&app, &made).expect("the folder can be written to");
+    let capture = load(&app, "made.gs4d");
+    let entity = spawn(&mut app, &capture);
+    wait(&mut app, "loading", |app| is_ready(app, entity));
+    assert!(scene(&app, &capture) == Some(made.scene()), "the same scene, bit for bit");
+}
+
+#[test]
+fn what_cannot_be_saved_is_an_error() {
+    let folder = folder();
+    let app = app(folder.path(), false);
+    let mut broken = dressed();
+    broken.form.as_sliced_mut().expect("sliced").harmonics.values.pop();
+    let Err(SaveAssetError::SaverError(error)) = save(&app, &GaussianCapture::new(broken)) else {
+        panic!("a scene whose parts do not fit together is refused")
+    };
+    let typed = error.downcast_ref::<CaptureSaveError>();
+    assert!(matches!(typed, Some(CaptureSaveError::Package(_))), "{error} says that the package cannot hold it");
+}
+
+const WHITE: &str = "Namespace(sh_degree=3, white_background=True, prefilter_var=0.25)";
+
+/// A checkpoint without `cfg_args`, and two with.
+fn checkpoints() -> TempDir {
+    let folder = folder();
+    let bytes = Pth::rotating(3, 48).bytes();
+    for name in ["without/a.pth", "with/a.pth", "with/b.pth"] {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().expect("in a folder")).expect("the folder can be written to");
+        fs::write(path, &bytes).expect("the folder can be written to");
+    }
+    fs::write(folder.path().join("with/cfg_args"), WHITE).expect("the folder can be written to");
+    folder
+}
+
+#[test]
+fn checkpoints_take_from_cfg_args_what_settings_leave_open() {
+    let folder = checkpoints();
+    let mut app = app(folder.path(), false);
+    let server = app.world().resource::<AssetServer>().clone();
+    let settings = |options: &mut CheckpointOptions| options.background = Some([0.25; 3]);
+    let captures: [Handle<GaussianCapture>; 3] = [
+        server.load("without/a.pth"),
+        server.load("with/a.pth"),
+        server.load_builder().with_settings(settings).load("with/b.pth"),
+    ];
+    let entities = captures.each_ref().map(|capture| spawn(&mut app, capture));
+    wait(&mut app, "all three", |app| entities.iter().all(|&entity| is_ready(app, entity)));
+    let trained = captures.each_ref().map(|capture| {
+        let trained_with = &scene(&app, capture).expect("loaded").trained_with;
+        (trained_with.background, trained_with.prefilter_var)
+    });
+    let expected = [([0.0; 3], -1.0), ([1.0; 3], 0.25), ([0.25; 3], 0.25)];
+    assert_eq!(trained, expected, "without the file the defaults, with it what it says, but settings win");
+}
+
+#[test]
+fn a_checkpoint_is_loaded_again_when_its_cfg_args_change() {
+    let folder = checkpoints();
+    let mut app = app(folder.path(), true);
+    let capture = load(&app, "with/a.pth");
+    let entity = spawn(&mut app, &capture);
+    let background = |app: &App| scene(app, &capture).map(|scene| scene.trained_with.background);
+    wait(&mut app, "loading", |app| is_ready(app, entity));
+    assert_eq!(background(&app), Some([1.0; 3]), "white");
+    fs::write(folder.path().join("with/cfg_args"), "Namespace(white_background=False)").expect("the file");
+    wait(&mut app, "the change", |app| background(app) == Some([0.0; 3]));
+    assert!(is_ready(&app, entity), "and it shows");
+}

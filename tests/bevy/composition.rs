@@ -1,0 +1,459 @@
+//! Captures among everything else in a Bevy frame: looks, cameras, visibility, depth, colour.
+//!
+//! In: small scenes made by hand, in headless apps. Out: proof that opacity, light, crop and blend spaces are those of the CPU reference,
+//! that every camera sees what it should from where it stands, and that captures and meshes hide each other in the documented
+//! order. Skipped where there is no GPU, not even a software one.
+
+use crate::support::cpu_reference::{
+    DURATION, SIZE, blob, difference, difference_between, eye, rgb, scene, view, view_of,
+};
+use crate::support::fixtures::{
+    BLACK, MIDDLE, check, crowd, front, insert, lone, orthographic, reference_picture, spawn, spawn_box,
+};
+use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
+use bevy::camera::primitives::Aabb;
+use bevy::camera::visibility::{NoFrustumCulling, RenderLayers};
+use bevy::camera::{CameraProjection, Hdr, SubCameraView};
+use bevy::core_pipeline::tonemapping::Tonemapping;
+use bevy::math::{Affine3A, Vec3A};
+use bevy::prelude::*;
+use bevy_gs4d::gaussian::Gaussian;
+use bevy_gs4d::playback::{ClipFade, Playback};
+use bevy_gs4d::reference::{self, Layer};
+use bevy_gs4d::render::{CaptureSettings, CaptureStatistics, CaptureViewSettings, CropBox, DepthWrite};
+use bevy_gs4d::scene::{Environment, RuntimeScene, Sliced};
+use bevy_gs4d::testing::{self, Offscreen};
+use bevy_gs4d::view::srgb::{decode, encode};
+use bevy_gs4d::view::{Appearance, Background, BlendSpace, DebugView, View};
+
+fn red() -> RuntimeScene {
+    lone(Vec3::X)
+}
+
+#[test]
+fn opacity_light_and_crop_are_those_of_the_twin() {
+    let Some(mut app) = app(SIZE) else { return };
+    let scene = crowd();
+    let entity = spawn(&mut app, &scene, ());
+    spawn_camera(&mut app, Msaa::Off, eye());
+    let crop = CropBox {
+        center: Vec3::new(0.2, 0.0, 0.0),
+        half_size: Vec3::new(0.5, 0.35, 2.0),
+        rotation: Quat::from_rotation_z(0.5),
+    };
+    let cube = Affine3A::from_scale_rotation_translation(crop.half_size, crop.rotation, crop.center).inverse();
+    let (settings, appearance) = (CaptureSettings::default(), Appearance::default());
+    let tint = LinearRgba::rgb(0.2, 1.0, 3.0);
+    let cases = [
+        ("opacity", CaptureSettings { opacity: 0.4, ..settings }, Appearance { opacity: 0.4, ..appearance }),
+        ("tint", CaptureSettings { tint, ..settings }, Appearance { light: Vec3::new(0.2, 1.0, 3.0), ..appearance }),
+        (
+            "exposure",
+            CaptureSettings { exposure: -1.0, ..settings },
+            Appearance { light: Vec3::splat(0.5), ..appearance },
+        ),
+        ("crop", CaptureSettings { crop: Some(crop), ..settings }, Appearance { crop: Some(cube), ..appearance }),
+    ];
+    let plain = reference_picture(&scene, view(&eye(), SIZE, 0.0), appearance);
+    for (what, settings, appearance) in cases {
+        insert(&mut app, entity, settings);
+        let expected = reference_picture(&scene, view(&eye(), SIZE, 0.0), appearance);
+        assert!(expected != plain, "{what} changes something");
+        check(&mut app, &expected, what);
+    }
+}
+
+#[test]
+fn a_timeline_s_fade_is_a_factor_on_opacity() {
+    let Some(mut app) = app(SIZE) else { return };
+    let scene = crowd();
+    let half = CaptureSettings { opacity: 0.5, ..default() };
+    spawn(&mut app, &scene, (half, ClipFade(0.5)));
+    spawn_camera(&mut app, Msaa::Off, eye());
+    let expected =
+        reference_picture(&scene, view(&eye(), SIZE, 0.0), Appearance { opacity: 0.25, ..Appearance::default() });
+    check(&mut app, &expected, "half of a half");
+}
+
+#[test]
+fn a_red_tint_leaves_only_red() {
+    let Some(mut app) = app(SIZE) else { return };
+    let tint = LinearRgba::rgb(1.0, 0.0, 0.0);
+    spawn(&mut app, &lone(Vec3::new(0.6, 0.7, 0.8)), CaptureSettings { tint, ..default() });
+    spawn_camera(&mut app, Msaa::Off, eye());
+    let picture = picture(&mut app, 0.0);
+    assert!(rgb(&picture, MIDDLE.x, MIDDLE.y)[0] > 130, "red stays");
+    assert!(picture.pixels().all(|pixel| pixel.0[1..3] == [0, 0]), "and nothing else does");
+}
+
+#[test]
+fn a_stop_doubles_linear_light() {
+    let Some(mut app) = app(SIZE) else { return };
+    let entity = spawn(&mut app, &lone(Vec3::splat(0.4)), ());
+    spawn_camera(&mut app, Msaa::Off, front());
+    // The splat is blended as an encoded value with an alpha of 0.98 over black.
+    let mut light = |exposure| {
+        insert(&mut app, entity, CaptureSettings { exposure, ..default() });
+        let value = f32::from(rgb(&picture(&mut app, 0.0), MIDDLE.x, MIDDLE.y)[0]);
+        decode(Vec3::splat(value / 255.0 / 0.98)).x
+    };
+    let (before, after) = (light(0.0), light(1.0));
+    // Half a step of 8 bits is 1.3 % of the light of an encoded 0.4, and less of the brighter one.
+    assert!((after / before - 2.0).abs() < 0.05, "{before} becomes {after}");
+}
+
+#[test]
+fn a_crop_box_hides_exactly_what_is_outside() {
+    let Some(mut app) = app(SIZE) else { return };
+    let crop = CropBox { half_size: Vec3::new(0.42, 1.0, f32::INFINITY), ..default() };
+    let whole = crowd();
+    let inside: Vec<bool> = whole.iter().map(|gaussian| crop.contains(gaussian.mean_at(0.0))).collect();
+    assert!(inside.contains(&true) && inside.contains(&false), "some are inside and some are not: {inside:?}");
+    spawn(&mut app, &whole, CaptureSettings { crop: Some(crop), ..default() });
+    spawn_camera(&mut app, Msaa::Off, eye());
+    let mut kept = whole.clone();
+    let Sliced { gaussians, harmonics } = kept.form.as_sliced_mut().expect("sliced");
+    *gaussians = whole.iter().zip(&inside).filter(|(_, inside)| **inside).map(|(g, _)| g).collect();
+    let colors = harmonics.values.chunks(3).zip(&inside).filter(|(_, inside)| **inside);
+    harmonics.values = colors.flat_map(|(color, _)| color.to_vec()).collect();
+    check(
+        &mut app,
+        &reference_picture(&kept, view(&eye(), SIZE, 0.0), Appearance::default()),
+        "the scene without what is outside",
+    );
+}
+
+#[test]
+fn captures_in_one_view_keep_their_own_looks() {
+    let Some(mut app) = app(SIZE) else { return };
+    let place = Transform::from_xyz(0.3, 0.1, -0.2).with_rotation(Quat::from_rotation_y(0.8));
+    let (near, far) = (crowd(), red());
+    let faint = CaptureSettings { opacity: 0.5, ..default() };
+    let bright = CaptureSettings { exposure: 1.0, ..default() };
+    spawn(&mut app, &near, (place, faint));
+    spawn(&mut app, &far, bright);
+    spawn_camera(&mut app, Msaa::Off, eye());
+    let layers = [
+        Layer {
+            scene: &near,
+            view: view_of(&eye(), &place, SIZE, 0.0),
+            appearance: Appearance { opacity: 0.5, ..Appearance::default() },
+        },
+        Layer {
+            scene: &far,
+            view: view(&eye(), SIZE, 0.0),
+            appearance: Appearance { light: Vec3::splat(2.0), ..Appearance::default() },
+        },
+    ];
+    check(&mut app, &reference::render_layers(&layers, BLACK, BlendSpace::Encoded).picture, "two captures");
+}
+
+#[test]
+fn blend_spaces_are_those_of_the_twin_on_every_kind_of_target() {
+    let clear = Vec3::new(0.2, 0.5, 0.9);
+    for (target, hdr, space) in
+        [("8 bits", false, None), ("HDR", true, None), ("sRGB-encoded", false, Some(CompositingSpace::Srgb))]
+    {
+        let Some(mut app) = app(SIZE) else { return };
+        app.insert_resource(ClearColor(Color::srgb(clear.x, clear.y, clear.z)));
+        let scene = crowd();
+        spawn(&mut app, &scene, ());
+        let camera = spawn_camera(&mut app, Msaa::Off, eye());
+        if hdr {
+            insert(&mut app, camera, Hdr);
+        }
+        if let Some(space) = space {
+            insert(&mut app, camera, space);
+        }
+        let layer = Layer { scene: &scene, view: view(&eye(), SIZE, 0.0), appearance: Appearance::default() };
+        let expected = |background: Vec3, space| {
+            reference::render_layers(&[layer], Background::Color(background.to_array()), space).picture
+        };
+        check(&mut app, &expected(clear, BlendSpace::Encoded), &format!("encoded, {target}"));
+        insert(&mut app, camera, CaptureViewSettings { blend_space: BlendSpace::Linear, ..default() });
+        let mut linear = expected(decode(clear), BlendSpace::Linear);
+        linear.pixels.iter_mut().for_each(|pixel| *pixel = encode(*pixel));
+        check(&mut app, &linear, &format!("linear, {target}"));
+    }
+}
+
+#[test]
+fn tonemapping_applies_to_captures_on_hdr_cameras_and_leaves_the_rest_alone() {
+    let Some(mut app) = app(SIZE) else { return };
+    app.insert_resource(ClearColor(Color::srgb(0.2, 0.3, 0.4)));
+    let entity = spawn(&mut app, &crowd(), ());
+    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    let as_trained = picture(&mut app, 0.0);
+    insert(&mut app, camera, Tonemapping::TonyMcMapface);
+    let apart = difference_between(&picture(&mut app, 0.0), &as_trained);
+    assert_eq!(apart, 0, "without HDR Bevy tonemaps meshes in their shaders and nothing else");
+    insert(&mut app, camera, Hdr);
+    let all = [
+        Tonemapping::Reinhard,
+        Tonemapping::ReinhardLuminance,
+        Tonemapping::AcesFitted,
+        Tonemapping::AgX,
+        Tonemapping::SomewhatBoringDisplayTransform,
+        Tonemapping::TonyMcMapface,
+        Tonemapping::BlenderFilmic,
+        Tonemapping::KhronosPbrNeutral,
+    ];
+    for tonemapping in all {
+        insert(&mut app, camera, tonemapping);
+        insert(&mut app, entity, Visibility::Hidden);
+        let without = picture(&mut app, 0.0);
+        insert(&mut app, entity, Visibility::Inherited);
+        let with = picture(&mut app, 0.0);
+        let [toned, trained] = [&with, &as_trained].map(|picture| rgb(picture, MIDDLE.x, MIDDLE.y));
+        assert_ne!(toned, trained, "{tonemapping:?} changes the capture");
+        assert_eq!(rgb(&with, 2, 2), rgb(&without, 2, 2), "{tonemapping:?}: where no splat is, nothing changes");
+    }
+}
+
+#[test]
+fn every_camera_sees_the_captures_of_its_layers() {
+    let Some(mut app) = app(SIZE) else { return };
+    let blue = lone(Vec3::Z);
+    spawn(&mut app, &red(), ());
+    spawn(&mut app, &blue, RenderLayers::layer(1));
+    spawn_camera(&mut app, Msaa::Off, eye());
+    let second = Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), SIZE);
+    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    insert(&mut app, camera, (second.target(), RenderLayers::layer(1)));
+    let appearance = Appearance::default();
+    check(&mut app, &reference_picture(&red(), view(&eye(), SIZE, 0.0), appearance), "layer 0");
+    let seen = testing::read(&mut app, &second).expect("the second camera's picture");
+    let apart = difference(&seen, &reference_picture(&blue, view(&eye(), SIZE, 0.0), appearance));
+    assert!(apart <= 2.0, "layer 1: Bevy and the CPU reference are {apart} / 255 apart");
+}
+
+#[test]
+fn a_second_camera_sorts_for_itself() {
+    let Some(mut app) = app(SIZE) else { return };
+    let scene = crowd();
+    spawn(&mut app, &scene, ());
+    let behind = Transform::from_xyz(-0.6, 0.4, -3.5).looking_at(Vec3::ZERO, Vec3::Y);
+    spawn_camera(&mut app, Msaa::Off, eye());
+    let second = Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), SIZE);
+    let camera = spawn_camera(&mut app, Msaa::Off, behind);
+    insert(&mut app, camera, second.target());
+    check(&mut app, &reference_picture(&scene, view(&eye(), SIZE, 0.0), Appearance::default()), "from the front");
+    // The app stands still: the same frame, seen by the other camera.
+    let seen = testing::read(&mut app, &second).expect("the second camera's picture");
+    let apart = difference(&seen, &reference_picture(&scene, view(&behind, SIZE, 0.0), Appearance::default()));
+    assert!(apart <= 2.0, "from behind: Bevy and the CPU reference are {apart} / 255 apart");
+}
+
+#[test]
+fn a_capture_is_culled_by_where_it_is_at_the_moment() {
+    let Some(mut app) = app(SIZE) else { return };
+    // Forty units away at the start, at the origin at the end.
+    let coming = Gaussian { velocity: [40.0, 0.0, 0.0], ..blob(Vec3::NEG_X * 20.0, Vec3::splat(0.4), 0.98) };
+    let entity = spawn(&mut app, &scene(&[(coming, Vec3::X)]), ());
+    spawn_camera(&mut app, Msaa::Off, eye());
+    let seen = |app: &App| app.world().get::<ViewVisibility>(entity).expect("a required component").get();
+    let bounds = |app: &App| *app.world().get::<Aabb>(entity).expect("kept by the plugin");
+    let away = picture(&mut app, 0.0);
+    assert!(!seen(&app), "out of view");
+    assert!(bounds(&app).max().x < -10.0, "the box is far to the left: {:?}", bounds(&app));
+    assert!(away.pixels().all(|pixel| pixel.0[..3] == [0, 0, 0]), "nothing shows");
+    insert(&mut app, entity, Playback::paused_at(DURATION));
+    let here = picture(&mut app, 0.0);
+    assert!(seen(&app), "in view");
+    let bounds = bounds(&app);
+    assert!(
+        bounds.min().x < 0.0 && bounds.max().x > 0.0 && bounds.min().x > -30.0,
+        "the box has come along: {bounds:?}"
+    );
+    assert!(rgb(&here, MIDDLE.x, MIDDLE.y)[0] > 200, "it shows");
+}
+
+#[test]
+fn what_must_not_be_culled_is_not() {
+    let Some(mut app) = app(SIZE) else { return };
+    let behind = Transform::from_xyz(-9.0, 0.0, 0.0);
+    let plain = spawn(&mut app, &red(), behind);
+    let kept = spawn(&mut app, &red(), (behind, NoFrustumCulling));
+    // All its Gaussians are behind the camera, too, but its map is not.
+    let map = Environment { width: 8, height: 4, texels: vec![0.5; 8 * 4 * 3] };
+    let far = scene(&[(blob(Vec3::NEG_X * 9.0, Vec3::splat(0.4), 0.98), Vec3::X)]);
+    let around = spawn(&mut app, &RuntimeScene { environment: Some(map), ..far }, ());
+    spawn_camera(&mut app, Msaa::Off, Transform::default().looking_to(Vec3::X, Vec3::Y));
+    let picture = picture(&mut app, 0.0);
+    let seen = |entity| app.world().get::<ViewVisibility>(entity).expect("a required component").get();
+    assert!(!seen(plain), "a capture behind the camera is culled");
+    assert!(seen(kept), "unless it says that it must not be");
+    assert!(seen(around), "or is all around");
+    assert!(app.world().get::<Aabb>(around).is_none(), "and so has no box");
+    assert!(rgb(&picture, MIDDLE.x, MIDDLE.y).iter().all(|value| *value > 100), "its map shows");
+}
+
+#[test]
+fn an_orthographic_camera_is_that_of_the_twin() {
+    let Some(mut app) = app(SIZE) else { return };
+    let scene = crowd();
+    spawn(&mut app, &scene, ());
+    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    let lens = OrthographicProjection { viewport_origin: Vec2::new(0.4, 0.6), ..orthographic() };
+    insert(&mut app, camera, Projection::Orthographic(lens));
+    // Three units high and four wide, the camera at 0.4 of the width and 0.6 of the height from the lower left.
+    let projection = Vec4::new(2.0 / 4.0, 2.0 / 3.0, -0.2, -0.2);
+    let world_to_camera = view(&eye(), SIZE, 0.0).world_to_camera;
+    let view = View::orthographic(SIZE, 0.0, world_to_camera, projection, 0.0);
+    check(&mut app, &reference_picture(&scene, view, Appearance::default()), "parallel rays");
+}
+
+/// A perspective with a finite far plane, as games with their own projections have.
+#[derive(Debug, Clone)]
+struct FiniteFar(PerspectiveProjection);
+
+impl CameraProjection for FiniteFar {
+    fn get_clip_from_view(&self) -> Mat4 {
+        // Near and far change places: depth is reversed.
+        Mat4::perspective_rh(self.0.fov, self.0.aspect_ratio, self.0.far, self.0.near)
+    }
+
+    fn get_clip_from_view_for_sub(&self, _: &SubCameraView) -> Mat4 {
+        self.get_clip_from_view()
+    }
+
+    fn update(&mut self, width: f32, height: f32) {
+        self.0.update(width, height);
+    }
+
+    fn far(&self) -> f32 {
+        self.0.far
+    }
+
+    fn get_frustum_corners(&self, z_near: f32, z_far: f32) -> [Vec3A; 8] {
+        self.0.get_frustum_corners(z_near, z_far)
+    }
+}
+
+fn finite_far() -> Projection {
+    Projection::custom(FiniteFar(PerspectiveProjection { fov: FOV_Y, far: 30.0, ..default() }))
+}
+
+#[test]
+fn a_finite_far_plane_changes_nothing_in_a_capture() {
+    let Some(mut app) = app(SIZE) else { return };
+    let scene = crowd();
+    spawn(&mut app, &scene, ());
+    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    insert(&mut app, camera, finite_far());
+    check(&mut app, &reference_picture(&scene, view(&eye(), SIZE, 0.0), Appearance::default()), "a finite far plane");
+}
+
+#[test]
+fn meshes_cut_captures_for_every_kind_of_camera() {
+    let Some(mut app) = app(SIZE) else { return };
+    spawn(&mut app, &red(), ());
+    let camera = spawn_camera(&mut app, Msaa::Off, front());
+    // The right half of the view.
+    let green = Color::srgb(0.0, 1.0, 0.0);
+    let half = spawn_box(&mut app, Vec3::new(6.0, 12.0, 0.1), Vec3::X * 3.0, green, AlphaMode::Opaque);
+    let perspective = || Projection::Perspective(PerspectiveProjection { fov: FOV_Y, ..default() });
+    let cameras = [
+        ("orthographic", Projection::Orthographic(orthographic()), Msaa::Off),
+        ("finite far plane", finite_far(), Msaa::Off),
+        ("multisampled", perspective(), Msaa::Sample4),
+        ("multisampled and orthographic", Projection::Orthographic(orthographic()), Msaa::Sample4),
+    ];
+    for (name, projection, msaa) in cameras {
+        insert(&mut app, camera, (projection, msaa));
+        for (depth, hides) in [(1.5, true), (0.2, true), (-0.2, false), (-1.5, false)] {
+            insert(&mut app, half, Transform::from_xyz(3.0, 0.0, depth));
+            let picture = picture(&mut app, 0.0);
+            let [[r, g, _], [x, y, _]] = [MIDDLE.x - 8, MIDDLE.x + 8].map(|x| rgb(&picture, x, MIDDLE.y));
+            assert!(r > 200 && g < 60, "{name}, {depth}: beside the mesh the capture shows, not {r}, {g}");
+            if hides {
+                assert_eq!((x, y), (0, 255), "{name}: a mesh at {depth} hides the capture");
+            } else {
+                assert!(x > 200 && y < 60, "{name}: the capture hides a mesh at {depth}, yet {x}, {y} show");
+            }
+        }
+    }
+}
+
+#[test]
+fn transparent_meshes_are_drawn_in_the_documented_order() {
+    let Some(mut app) = app(SIZE) else { return };
+    spawn(&mut app, &red(), ());
+    let camera = spawn_camera(&mut app, Msaa::Off, front());
+    let blue = Color::srgba(0.0, 0.0, 1.0, 0.8);
+    let pane = spawn_box(&mut app, Vec3::new(12.0, 12.0, 0.01), Vec3::ZERO, blue, AlphaMode::Blend);
+    let perspective = || Projection::Perspective(PerspectiveProjection { fov: FOV_Y, ..default() });
+    let parallel = || Projection::Orthographic(orthographic());
+    let [none, expected, median] = [DepthWrite::None, DepthWrite::Expected, DepthWrite::Median];
+    // What the camera is, where the pane stands, and whether it is seen before the capture.
+    let cases = [
+        (Msaa::Off, perspective(), none, 1.5, true),
+        (Msaa::Off, perspective(), none, -1.5, true),
+        // The one Gaussian's depth is that of its centre.
+        (Msaa::Off, perspective(), median, 0.1, true),
+        (Msaa::Off, perspective(), median, -0.1, false),
+        (Msaa::Off, perspective(), expected, 0.1, true),
+        (Msaa::Off, perspective(), expected, -0.1, false),
+        (Msaa::Off, parallel(), median, 0.1, true),
+        (Msaa::Off, parallel(), median, -0.1, false),
+        (Msaa::Off, finite_far(), median, 0.1, true),
+        (Msaa::Off, finite_far(), median, -0.1, false),
+        (Msaa::Sample4, perspective(), none, 1.5, false),
+        (Msaa::Sample4, perspective(), none, -1.5, false),
+        (Msaa::Sample4, perspective(), median, 1.5, false),
+    ];
+    for (msaa, projection, depth, place, shows) in cases {
+        let name = format!("{msaa:?}, {depth:?}, {projection:?}, at {place}");
+        insert(&mut app, camera, (msaa, projection, CaptureViewSettings { depth, ..default() }));
+        insert(&mut app, pane, Transform::from_xyz(0.0, 0.0, place));
+        let picture = picture(&mut app, 0.0);
+        let [r, _, b] = rgb(&picture, MIDDLE.x, MIDDLE.y);
+        if shows {
+            assert!(b > 150 && r < 200, "{name}: the pane is over the capture, not {r}, {b}");
+        } else {
+            assert!(r > 200 && b < 60, "{name}: the capture is over the pane, not {r}, {b}");
+        }
+        assert!(rgb(&picture, 10, 10)[2] > 150, "{name}: beside the capture the pane shows");
+    }
+}
+
+#[test]
+fn debug_views_show_something_else() {
+    let Some(mut app) = app(SIZE) else { return };
+    spawn(&mut app, &crowd(), ());
+    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    let color = picture(&mut app, 0.0);
+    let mut seen = vec![color];
+    for debug in [DebugView::Depth, DebugView::Overdraw, DebugView::Active, DebugView::Lifespan, DebugView::Velocity] {
+        insert(&mut app, camera, CaptureViewSettings { debug, ..default() });
+        let picture = picture(&mut app, 0.0);
+        assert!(picture.pixels().any(|pixel| pixel.0[..3] != [0, 0, 0]), "{debug:?} shows something");
+        for other in &seen {
+            assert!(difference_between(&picture, other) > 10, "{debug:?} is another picture");
+        }
+        seen.push(picture);
+    }
+}
+
+#[test]
+fn statistics_count_what_each_camera_sees() {
+    let Some(mut app) = app(SIZE) else { return };
+    let entity = spawn(&mut app, &crowd(), ());
+    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    // Counts arrive some frames late.
+    for _ in 0..3 {
+        picture(&mut app, 0.0);
+    }
+    let statistics = app.world().resource::<CaptureStatistics>().clone();
+    assert_eq!(statistics.renderer_missing(), None, "everything is there");
+    assert_eq!(statistics.uploaded_captures(), 1, "one capture");
+    assert!(statistics.capture_bytes() >= 5 * 64, "five Gaussians of 64 bytes at least");
+    let view = statistics.view(camera).expect("the camera sees it");
+    assert_eq!((view.total, view.visible), (5, 5), "all five show");
+    assert!(view.pairs >= 5 && view.bytes > 0, "each in a tile, in buffers: {view:?}");
+    assert_eq!(statistics.views(), [(camera, view)], "and no other camera does");
+    insert(&mut app, entity, Visibility::Hidden);
+    picture(&mut app, 0.0);
+    let hidden = statistics.view(camera).expect("its buffers are kept for a while");
+    assert_eq!((hidden.total, hidden.active, hidden.visible, hidden.pairs), (0, 0, 0, 0), "nobody sees what is hidden");
+}

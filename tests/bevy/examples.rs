@@ -1,0 +1,200 @@
+//! The examples as programs: what they write without a window, and how they take wrong arguments.
+//!
+//! In: the examples that `cargo test` has built beside the tests. Out: proof that each writes as many pictures as it is asked for and
+//! ends well, that there is something on them, captures among it, and that it moves. Drawing is skipped where there is no GPU, not
+//! even a software one.
+
+use crate::support::skip::skip;
+use bevy_gs4d::codec;
+use bevy_gs4d::codec::checkpoint::CheckpointOptions;
+use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::offline;
+use bevy_gs4d::scene::GaussianScene;
+use bevy_gs4d::testing::{TestingError, has_gpu};
+use image::RgbaImage;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+const EXAMPLES: [&str; 5] = ["minimal", "play", "timeline", "walkthrough", "headless"];
+
+/// Tests are in `deps`, beside `examples`.
+fn program(example: &str) -> PathBuf {
+    let test = std::env::current_exe().expect("tests know where they are");
+    let folder = test.ancestors().nth(2).expect("tests are in a folder of the target folder").join("examples");
+    let program = folder.join(format!("{example}{}", std::env::consts::EXE_SUFFIX));
+    assert!(
+        program.is_file(),
+        "{} is missing: plain `cargo test` builds the examples, `cargo test --test` does not; \
+         `cargo build --examples --features viewer` does",
+        program.display()
+    );
+    program
+}
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+fn run(example: &str, arguments: &[&str]) -> Output {
+    run_with(Path::new(ROOT), example, arguments)
+}
+
+/// With the folder `assets` that is in `root`.
+fn run_with(root: &Path, example: &str, arguments: &[&str]) -> Output {
+    let mut command = Command::new(program(example));
+    command.args(arguments).current_dir(root).env("BEVY_ASSET_ROOT", root);
+    command.output().unwrap_or_else(|error| panic!("{example} can be started: {error}"))
+}
+
+/// What an example writes without a window, in the order of the names, `frames` moments.
+fn pictures(root: &Path, example: &str, options: &[&str], frames: usize) -> Option<Vec<RgbaImage>> {
+    if !has_gpu() {
+        skip(TestingError::NoGpu);
+        return None;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let target = folder.path().join("pictures");
+    let (target_name, count) = (target.to_str().expect("temporary folders have plain names"), frames.to_string());
+    let output = run_with(root, example, &[&["--headless", target_name, "--frames", &count][..], options].concat());
+    let said = [&output.stdout, &output.stderr].map(|said| String::from_utf8_lossy(said).into_owned()).concat();
+    assert!(output.status.success(), "{example} ended with {}:\n{said}", output.status);
+    assert!(said.contains(target_name), "{example} says where the pictures are:\n{said}");
+    Some(read(&target))
+}
+
+fn read(folder: &Path) -> Vec<RgbaImage> {
+    let entries = std::fs::read_dir(folder).expect("the folder has been made");
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.expect("a file").path()).collect();
+    paths.sort();
+    assert!(
+        paths.iter().all(|path| path.extension().is_some_and(|end| end == "png")),
+        "nothing but pictures: {paths:?}"
+    );
+    paths.iter().map(|path| image::open(path).expect("a whole picture").into_rgba8()).collect()
+}
+
+/// Draws two moments and looks at them.
+fn check(example: &str, options: &[&str], expected: usize) {
+    let Some(pictures) = pictures(Path::new(ROOT), example, options, 2) else { return };
+    assert_eq!(pictures.len(), expected, "{example} writes as many pictures as it is asked for");
+    for picture in &pictures {
+        let first = picture.get_pixel(0, 0);
+        assert!(picture.pixels().any(|pixel| pixel != first), "{example} shows more than one colour");
+    }
+    for pair in pictures.windows(2) {
+        assert!(pair[0] != pair[1], "{example} shows something that moves");
+    }
+}
+
+#[test]
+fn minimal_writes_pictures() {
+    check("minimal", &[], 2);
+}
+
+#[test]
+fn play_writes_pictures() {
+    check("play", &[], 2);
+}
+
+#[test]
+fn timeline_writes_pictures() {
+    check("timeline", &[], 2);
+}
+
+#[test]
+fn walkthrough_writes_pictures() {
+    check("walkthrough", &[], 2);
+}
+
+#[test]
+fn walkthrough_writes_pairs_of_pictures() {
+    check("walkthrough", &["--two-targets"], 4);
+}
+
+#[test]
+fn headless_writes_pictures() {
+    check("headless", &["--size", "200x120"], 2);
+}
+
+/// A folder whose assets are those of the crate, but that the capture has gone entirely transparent: it is as long and as large as
+/// it was, so that everything else is as it was, too.
+fn invisible() -> TempDir {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (from, to) = (Path::new(ROOT).join("assets"), folder.path().join("assets"));
+    std::fs::create_dir(&to).expect("the folder can be written to");
+    std::fs::copy(from.join("demo.timeline.ron"), to.join("demo.timeline.ron")).expect("the timeline can be copied");
+    let scene = codec::load(&from.join("toybox.gs4d"), &CheckpointOptions::default()).expect("the bundled capture");
+    let mut scene = scene.unpacked().into_runtime().expect("it can be drawn");
+    for gaussian in &mut scene.form.as_sliced_mut().expect("unpacked").gaussians {
+        gaussian.opacity = 0.0;
+    }
+    let scene = GaussianScene::from(scene);
+    offline::save(&to.join("toybox.gs4d"), &scene, &WriteSettings { level: 1 }).expect("the folder can be written to");
+    folder
+}
+
+#[test]
+fn captures_are_to_be_seen() {
+    let invisible = invisible();
+    for example in ["timeline", "walkthrough"] {
+        let roots = [Path::new(ROOT), invisible.path()];
+        // In the first picture the timeline's capture has not faded in.
+        let [Some(seen), Some(unseen)] = roots.map(|root| pictures(root, example, &[], 4)) else { return };
+        let (seen, unseen) = (&seen[3], &unseen[3]);
+        let differ = seen.pixels().zip(unseen.pixels()).filter(|(a, b)| a != b).count();
+        let share = differ as f64 / f64::from(seen.width() * seen.height());
+        assert!(share > 0.01, "{example} shows its captures: without them {share} of the picture differs");
+        assert!(share < 0.9, "and other things, too, which stay: {share} of the picture differs");
+    }
+}
+
+#[test]
+fn a_file_that_is_missing_is_named() {
+    if !has_gpu() {
+        skip(TestingError::NoGpu);
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let target = folder.path().join("pictures");
+    let target_name = target.to_str().expect("temporary folders have plain names");
+    for example in EXAMPLES {
+        let file = if example == "timeline" { "there-is-none.timeline.ron" } else { "there-is-none.gs4d" };
+        let output = run(example, &["--headless", target_name, "--frames", "1", file]);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success(), "{example} without its file is an error");
+        assert!(
+            said.lines().any(|line| line.starts_with("Error") && line.contains(file)),
+            "{example} names it:\n{said}"
+        );
+        assert!(!said.contains("panicked"), "{example} does not panic:\n{said}");
+        assert!(!target.exists(), "{example} writes nothing");
+    }
+}
+
+#[test]
+fn wrong_arguments_are_named() {
+    for example in EXAMPLES {
+        for (arguments, named) in [
+            (&["--nonsense"][..], "--nonsense"),
+            (&["--headless"][..], "--headless"),
+            (&["--frames", "many"][..], "many"),
+            (&["one.gs4d", "two.gs4d"][..], "two.gs4d"),
+        ] {
+            let output = run(example, arguments);
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert!(!output.status.success(), "{example} {arguments:?} is an error");
+            assert!(said.contains(named), "{example} {arguments:?} names what is wrong:\n{said}");
+        }
+    }
+}
+
+#[test]
+fn help_says_what_there_is_to_see_and_how_to_call_it() {
+    for example in EXAMPLES {
+        let output = run(example, &["--help"]);
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success(), "{example} --help ends with {}", output.status);
+        for expected in ["--headless", "--frames", &format!("--example {example}")] {
+            assert!(said.contains(expected), "{example} --help mentions {expected}:\n{said}");
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! The panel, in Bevy apps without a window.
+//!
+//! In: captures that have been loaded, failed to load, or are missing. Out: proof that the panel draws itself over its edge of the
+//! picture only, touches nothing by itself, and sets views that change pixels. Skipped where there is no GPU, not even a software
+//! one.
+
+use crate::support::offscreen_app::{app, picture, spawn_camera};
+use crate::support::skip;
+use bevy::core_pipeline::tonemapping::Tonemapping;
+use bevy::input::ButtonState;
+use bevy::input::keyboard::{Key, KeyboardInput};
+use bevy::prelude::*;
+use bevy::render::RenderApp;
+use bevy::render::render_resource::WgpuFeatures;
+use bevy::render::renderer::RenderDevice;
+use bevy::time::TimeUpdateStrategy;
+use bevy_egui::EguiContext;
+use bevy_gs4d::asset::{CaptureState, GaussianCapture};
+use bevy_gs4d::inspector::{Inspector, InspectorPlugin};
+use bevy_gs4d::playback::{Playback, PlaybackSeeked};
+use bevy_gs4d::render::{CaptureSettings, CaptureStatistics, CaptureViewSettings};
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::view::DebugView;
+use bevy_gs4d::{GaussianCapture3d, testing};
+use image::RgbaImage;
+use std::ops::Range;
+use std::time::Duration;
+
+/// The panel is 300 points wide and stands 8 from the right edge.
+const SIZE: UVec2 = UVec2::new(420, 200);
+/// Columns that neither the panel nor its shadow reaches.
+const BESIDE: Range<u32> = 0..64;
+/// Columns that the panel covers.
+const PANEL: Range<u32> = 114..410;
+
+/// How often an event was sent, or a component marked as changed.
+#[derive(Resource, Default)]
+struct Seen {
+    seeks: usize,
+    changes: usize,
+}
+
+/// An app with a camera and the panel, or nothing where there is no GPU.
+fn inspected() -> Option<(App, Entity)> {
+    let mut app = app(SIZE)?;
+    app.add_plugins(InspectorPlugin).init_resource::<Seen>();
+    app.add_observer(|_: On<PlaybackSeeked>, mut seen: ResMut<Seen>| seen.seeks += 1);
+    let camera = spawn_camera(&mut app, Msaa::Off, place());
+    Some((app, camera))
+}
+
+fn place() -> Transform {
+    Transform::from_xyz(2.5, 2.0, 1.5).looking_at(Vec3::ZERO, Vec3::Z)
+}
+
+fn spawn_capture(app: &mut App, playback: Playback) -> Entity {
+    let settings = SynthSettings { count: 300, degree: 0, duration_seconds: 2.0, ..SynthSettings::default() };
+    let scene = synthesize(&settings).into_runtime().expect("a synthetic scene can be drawn");
+    let handle = app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(scene));
+    app.world_mut().spawn((GaussianCapture3d(handle), playback)).id()
+}
+
+fn set_open(app: &mut App, open: bool) {
+    app.world_mut().resource_mut::<Inspector>().open = open;
+}
+
+/// Updates `seconds` apart, none of which may fail.
+fn run(app: &mut App, updates: usize, seconds: f32) {
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f32(seconds)));
+    for _ in 0..updates {
+        app.update();
+        assert_eq!(app.should_exit(), None, "drawing goes on");
+    }
+}
+
+/// The share of pixels of some columns that are not the same.
+fn changed(a: &RgbaImage, b: &RgbaImage, columns: Range<u32>) -> f64 {
+    let all = f64::from(columns.end - columns.start) * f64::from(SIZE.y);
+    let differs = |&(x, y): &(u32, u32)| a.get_pixel(x, y) != b.get_pixel(x, y);
+    columns.flat_map(|x| (0..SIZE.y).map(move |y| (x, y))).filter(differs).count() as f64 / all
+}
+
+#[test]
+fn the_panel_covers_its_edge_of_the_picture_and_nothing_else() {
+    let Some((mut app, _)) = inspected() else { return };
+    spawn_capture(&mut app, Playback::paused_at(0.5));
+    let open = picture(&mut app, 0.0);
+    set_open(&mut app, false);
+    let closed = picture(&mut app, 0.0);
+    let covered = changed(&open, &closed, PANEL);
+    assert!(covered > 0.5, "the panel changes most of what it covers, not {covered}");
+    assert_eq!(changed(&open, &closed, BESIDE), 0.0, "and nothing beside it");
+    set_open(&mut app, true);
+    assert_eq!(changed(&open, &picture(&mut app, 0.0), 0..SIZE.x), 0.0, "open again, it is the same");
+}
+
+#[test]
+fn the_panel_runs_without_a_capture_with_one_and_with_a_failed_one() {
+    let Some((mut app, _)) = inspected() else { return };
+    testing::settle(&mut app).expect("the app runs without a capture");
+    run(&mut app, 5, 0.1);
+    let good = spawn_capture(&mut app, Playback::default());
+    testing::settle(&mut app).expect("the capture shows");
+    run(&mut app, 5, 0.1);
+    let state = |app: &App, entity| format!("{:?}", app.world().get::<CaptureState>(entity));
+    assert!(state(&app, good).contains("Ready"), "it has been loaded: {}", state(&app, good));
+
+    let handle = app.world().resource::<AssetServer>().load("there-is-none.gs4d");
+    let bad = app.world_mut().spawn(GaussianCapture3d(handle)).id();
+    app.world_mut().resource_mut::<Inspector>().selected = Some(bad);
+    for _ in 0..1000 {
+        if state(&app, bad).contains("Failed") {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+        run(&mut app, 1, 0.0);
+    }
+    assert!(state(&app, bad).contains("there-is-none.gs4d"), "the failure names the file: {}", state(&app, bad));
+    run(&mut app, 5, 0.1);
+    app.world_mut().despawn(bad);
+    run(&mut app, 5, 0.1);
+    assert_eq!(app.world().resource::<Inspector>().selected, Some(bad), "what is shown instead was not selected");
+}
+
+#[test]
+fn an_open_panel_that_nobody_touches_seeks_and_changes_nothing() {
+    let Some((mut app, _)) = inspected() else { return };
+    let odd = Playback { time: 0.123_45, speed: 3.5, start: 0.1, end: 7.0, ..Playback::default() };
+    let entity = spawn_capture(&mut app, odd);
+    app.add_systems(Last, count_changes);
+    testing::settle(&mut app).expect("the capture shows");
+    run(&mut app, 5, 0.1);
+    assert_eq!(app.world().resource::<Seen>().seeks, 0, "playing on is no seek");
+
+    app.world_mut().get_mut::<Playback>(entity).expect("a required component").pause();
+    run(&mut app, 1, 0.1);
+    app.world_mut().resource_mut::<Seen>().changes = 0;
+    run(&mut app, 5, 0.1);
+    let seen = app.world().resource::<Seen>();
+    assert_eq!((seen.seeks, seen.changes), (0, 0), "paused, everything stays as it is");
+
+    app.world_mut().get_mut::<Playback>(entity).expect("a required component").seek(1.5);
+    run(&mut app, 1, 0.1);
+    let seen = app.world().resource::<Seen>();
+    assert_eq!((seen.seeks, seen.changes), (1, 1), "what the game does is noticed");
+}
+
+type Changes = Or<(
+    Changed<Playback>,
+    Changed<CaptureSettings>,
+    Changed<CaptureViewSettings>,
+    Changed<Msaa>,
+    Changed<Tonemapping>,
+)>;
+
+fn count_changes(changed: Query<(), Changes>, inspector: Res<Inspector>, mut seen: ResMut<Seen>) {
+    seen.changes += changed.iter().count() + usize::from(inspector.is_changed());
+}
+
+#[test]
+fn a_debug_view_changes_what_a_camera_shows() {
+    let Some((mut app, camera)) = inspected() else { return };
+    spawn_capture(&mut app, Playback::paused_at(0.5));
+    set_open(&mut app, false);
+    let as_trained = picture(&mut app, 0.0);
+    app.world_mut().entity_mut(camera).insert(CaptureViewSettings::default());
+    assert_eq!(changed(&as_trained, &picture(&mut app, 0.0), 0..SIZE.x), 0.0, "the default is what is shown without");
+    for debug in [DebugView::Depth, DebugView::Overdraw, DebugView::Lifespan, DebugView::Velocity] {
+        app.world_mut().entity_mut(camera).insert(CaptureViewSettings { debug, ..default() });
+        let share = changed(&as_trained, &picture(&mut app, 0.0), 0..SIZE.x);
+        assert!(share > 0.01, "{debug:?} must not look like colour: {share} of the picture differs");
+    }
+}
+
+#[test]
+fn the_panel_outlives_its_camera() {
+    let Some((mut app, first)) = inspected() else { return };
+    let with_first = picture(&mut app, 0.0);
+    app.world_mut().despawn(first);
+    run(&mut app, 3, 0.0);
+    let second = spawn_camera(&mut app, Msaa::Off, place());
+    let with_second = picture(&mut app, 0.0);
+    assert_eq!(changed(&with_first, &with_second, 0..SIZE.x), 0.0, "the next camera has the same panel");
+    let contexts = app.world_mut().query::<&EguiContext>().iter(app.world()).count();
+    assert!(contexts == 1 && app.world().get::<EguiContext>(second).is_some(), "which is the only one of {contexts}");
+    let third = spawn_camera(&mut app, Msaa::Off, place());
+    app.world_mut().despawn(second);
+    assert_eq!(changed(&with_first, &picture(&mut app, 0.0), 0..SIZE.x), 0.0, "one that is there already gets it, too");
+    assert!(app.world().get::<EguiContext>(third).is_some(), "at once");
+    set_open(&mut app, false);
+    let covered = changed(&with_first, &picture(&mut app, 0.0), PANEL);
+    assert!(covered > 0.5, "and that is what was seen: closed, {covered} of its place looks otherwise");
+}
+
+fn key(state: ButtonState) -> KeyboardInput {
+    let window = Entity::PLACEHOLDER;
+    KeyboardInput { key_code: KeyCode::F1, logical_key: Key::F1, state, text: None, repeat: false, window }
+}
+
+#[test]
+fn f1_toggles_once_however_long_it_is_held() {
+    let Some((mut app, _)) = inspected() else { return };
+    testing::settle(&mut app).expect("the app runs");
+    let is_open = |app: &App| app.world().resource::<Inspector>().open;
+    assert!(is_open(&app), "open from the start");
+    for expected in [false, true] {
+        for _ in 0..5 {
+            // Held keys are repeated.
+            app.world_mut().write_message(key(ButtonState::Pressed));
+            run(&mut app, 1, 0.1);
+            assert_eq!(is_open(&app), expected, "toggled by the first of five");
+        }
+        app.world_mut().write_message(key(ButtonState::Released));
+        run(&mut app, 2, 0.1);
+        assert_eq!(is_open(&app), expected, "letting go does nothing");
+    }
+}
+
+#[test]
+fn gpu_time_is_measured_only_while_its_section_is_open() {
+    let Some((mut app, camera)) = inspected() else { return };
+    spawn_capture(&mut app, Playback::paused_at(0.5));
+    testing::settle(&mut app).expect("the capture shows");
+    let renderer = app.get_sub_app(RenderApp).expect("it has drawn");
+    let features = renderer.world().resource::<RenderDevice>().features();
+    if !features.contains(WgpuFeatures::TIMESTAMP_QUERY_INSIDE_PASSES) {
+        skip::skip("this GPU has no timestamps inside passes");
+        return;
+    }
+    let measured = |app: &App| {
+        let view = app.world().resource::<CaptureStatistics>().view(camera).expect("it draws the capture");
+        !view.passes.is_empty()
+    };
+    // Opens all sections, or leaves each as it was.
+    let unfold = |app: &mut App, all: bool| {
+        let mut context = app.world_mut().get_mut::<EguiContext>(camera).expect("the panel's");
+        context.get_mut().memory_mut(|memory| memory.set_everything_is_visible(all));
+    };
+    run(&mut app, 20, 0.0);
+    assert!(!measured(&app), "the section is closed at first");
+    unfold(&mut app, true);
+    let mut updates = 0;
+    while !measured(&app) && updates < 500 {
+        run(&mut app, 1, 0.0);
+        updates += 1;
+    }
+    assert!(measured(&app), "open, it shows times");
+    unfold(&mut app, false);
+    run(&mut app, 20, 0.0);
+    assert!(!measured(&app), "closed again, there are none");
+    unfold(&mut app, true);
+    set_open(&mut app, false);
+    run(&mut app, 20, 0.0);
+    assert!(!measured(&app), "nor while the whole panel is closed");
+}

@@ -1,0 +1,33 @@
+//! The Bevy plugin, in apps without a window, and the examples as programs.
+//!
+//! In: scenes made here, `assets/`, and the trained captures where `GS4D_DATA` names their folder. Out: one test binary. Each module
+//! says what it tests; what draws is skipped where there is no GPU, not even a software one.
+
+mod animation;
+mod app;
+mod assets;
+mod composition;
+mod examples;
+mod golden;
+mod inspector;
+mod picking;
+mod playback;
+mod steady;
+mod stereo;
+mod timeline;
+mod views;
+mod walkthrough;
+
+#[path = "../support"]
+mod support {
+    pub mod cpu_reference;
+    pub mod data;
+    pub mod event_log;
+    pub mod fixtures;
+    pub mod gpu;
+    pub mod npz;
+    pub mod offscreen_app;
+    pub mod playback_app;
+    pub mod pth;
+    pub mod skip;
+}

@@ -1,0 +1,173 @@
+//! Picking in Bevy apps: rays of the world against captures that are placed, played, cropped and hidden.
+//!
+//! In: small scenes made by hand. Out: proof that a ray hits what is seen, where it is seen. Needs neither a GPU nor a window. What a
+//! ray does to the Gaussians themselves is tested in `scene::pick`.
+
+use bevy::ecs::system::RunSystemOnce;
+use bevy::prelude::*;
+use bevy_gs4d::asset::GaussianCapture;
+use bevy_gs4d::gaussian::{Gaussian, Harmonics};
+use bevy_gs4d::picking::{CaptureHit, CapturePicker};
+use bevy_gs4d::playback::{ClipFade, Playback};
+use bevy_gs4d::render::{CaptureSettings, CropBox};
+use bevy_gs4d::scene::{FilterKind, RuntimeScene, TemporalFilter};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
+use std::f32::consts::FRAC_PI_2;
+
+/// A round Gaussian with a standard deviation of a tenth, at `mean` at the start.
+fn ball(mean: Vec3, opacity: f32) -> Gaussian {
+    Gaussian {
+        mean: mean.to_array(),
+        mean_t: 0.0,
+        velocity: [0.0; 3],
+        sigma_t: f32::INFINITY,
+        covariance: [0.01, 0.0, 0.0, 0.01, 0.0, 0.01],
+        opacity,
+        padding: 0.0,
+    }
+}
+
+/// A scene of one second.
+fn scene(gaussians: &[Gaussian]) -> RuntimeScene {
+    let harmonics = Harmonics { coefficients: 1, values: vec![0.0; gaussians.len() * 3], ..Harmonics::default() };
+    RuntimeScene::sliced(gaussians.to_vec(), harmonics)
+}
+
+fn app() -> App {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), GaussianCapturePlugin));
+    app
+}
+
+/// A capture at a place, paused at its start. Without Bevy's plugins for it, where it is and that it is visible is said here.
+fn place(app: &mut App, scene: RuntimeScene, transform: Transform) -> Entity {
+    let handle = app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(scene));
+    let seen = (GlobalTransform::from(transform), InheritedVisibility::VISIBLE);
+    app.world_mut().spawn((GaussianCapture3d(handle), Playback::paused_at(0.0), transform, seen)).id()
+}
+
+fn cast(app: &mut App, ray: Ray3d) -> Option<CaptureHit> {
+    app.world_mut()
+        .run_system_once(move |picker: CapturePicker| picker.cast(ray))
+        .expect("the picker's assets are there")
+}
+
+fn cast_on(app: &mut App, entity: Entity, ray: Ray3d) -> Option<CaptureHit> {
+    let system = move |picker: CapturePicker| picker.cast_on(entity, ray);
+    app.world_mut().run_system_once(system).expect("the picker's assets are there")
+}
+
+/// From five units along +z back to the origin.
+fn ahead() -> Ray3d {
+    Ray3d::new(Vec3::new(0.0, 0.0, 5.0), Dir3::NEG_Z)
+}
+
+/// The Gaussian that [`ahead`] hits.
+fn hit(app: &mut App) -> Option<usize> {
+    cast(app, ahead()).map(|hit| hit.gaussian)
+}
+
+fn set(app: &mut App, entity: Entity, settings: CaptureSettings) {
+    app.world_mut().entity_mut(entity).insert(settings);
+}
+
+#[test]
+fn hits_are_in_the_world_whatever_the_transform() {
+    let mean = Vec3::new(0.5, -0.2, 0.3);
+    let transforms = [
+        Transform::IDENTITY,
+        Transform::from_xyz(1.0, 2.0, 3.0).with_rotation(Quat::from_rotation_y(FRAC_PI_2)),
+        Transform::from_xyz(-4.0, 0.0, 1.0)
+            .with_rotation(Quat::from_euler(EulerRot::XYZ, 0.3, -1.1, 2.0))
+            .with_scale(Vec3::new(2.0, 0.5, 30.0)),
+        Transform::from_scale(Vec3::new(-0.01, 0.02, 0.01)),
+    ];
+    for transform in transforms {
+        let mut app = app();
+        let entity = place(&mut app, scene(&[ball(mean, 0.9)]), transform);
+        let target = transform.transform_point(mean);
+        for direction in [Dir3::X, Dir3::NEG_Y, Dir3::Z] {
+            let ray = Ray3d::new(target - *direction * 7.0, direction);
+            let hit = cast(&mut app, ray).expect("straight through its middle");
+            assert_eq!((hit.entity, hit.gaussian), (entity, 0), "what is hit, {transform:?}");
+            assert!((hit.distance - 7.0).abs() < 1e-3, "seven units away, not {}, {transform:?}", hit.distance);
+            assert!(hit.point.distance(target) < 1e-3, "at {target}, not {}, {transform:?}", hit.point);
+            let back = Ray3d::new(target + *direction * 7.0, direction);
+            assert_eq!(cast(&mut app, back), None, "behind the ray is nothing, {transform:?}");
+        }
+    }
+}
+
+#[test]
+fn the_nearest_capture_that_is_not_hidden_is_hit() {
+    let mut app = app();
+    let front = place(&mut app, scene(&[ball(Vec3::ZERO, 0.9)]), Transform::from_xyz(0.0, 0.0, 2.0));
+    let back = place(&mut app, scene(&[ball(Vec3::ZERO, 0.9)]), Transform::from_xyz(0.0, 0.0, -2.0));
+    let middle = place(&mut app, scene(&[ball(Vec3::ZERO, 0.9)]), Transform::IDENTITY);
+    let entity = |app: &mut App| cast(app, ahead()).map(|hit| hit.entity);
+    assert_eq!(entity(&mut app), Some(front), "the first on the way");
+    app.world_mut().entity_mut(front).insert(InheritedVisibility::HIDDEN);
+    assert_eq!(entity(&mut app), Some(middle), "through a hidden one");
+    let on = [front, back].map(|entity| cast_on(&mut app, entity, ahead()).map(|hit| hit.distance));
+    assert_eq!(on, [Some(3.0), Some(7.0)], "each alone, hidden or not");
+    let bystander = app.world_mut().spawn_empty().id();
+    assert_eq!(cast_on(&mut app, bystander, ahead()), None, "what is no capture is not hit");
+}
+
+#[test]
+fn what_is_hit_is_where_playback_is() {
+    let mut app = app();
+    let mover = Gaussian { velocity: [0.0, 0.0, 4.0], ..ball(Vec3::ZERO, 0.9) };
+    let entity = place(&mut app, scene(&[mover]), Transform::IDENTITY);
+    for (seconds, distance) in [(0.0, 5.0), (0.5, 3.0), (1.0, 1.0), (9.0, 1.0)] {
+        app.world_mut().entity_mut(entity).insert(Playback::paused_at(seconds));
+        let hit = cast(&mut app, ahead()).map(|hit| hit.distance);
+        assert_eq!(hit, Some(distance), "at {seconds} s; past the end it stands still");
+    }
+}
+
+#[test]
+fn filter_opacity_fade_and_crop_are_those_that_are_drawn() {
+    let mut app = app();
+    let pair = [ball(Vec3::Z, 0.9), ball(Vec3::NEG_Z, 0.9)];
+    // In the second half of the time only the farther one is active.
+    let filter = TemporalFilter::from_bits(FilterKind::Support, 2, 2, vec![0b11, 0b10]);
+    let entity = place(&mut app, RuntimeScene { filter: Some(filter), ..scene(&pair) }, Transform::IDENTITY);
+    assert_eq!(hit(&mut app), Some(0), "the nearer one");
+    app.world_mut().entity_mut(entity).insert(Playback::paused_at(0.75));
+    assert_eq!(hit(&mut app), Some(1), "filtered");
+    set(&mut app, entity, CaptureSettings { filter: false, ..default() });
+    assert_eq!(hit(&mut app), Some(0), "not filtered");
+    set(&mut app, entity, CaptureSettings { filter: false, opacity: 0.5, ..default() });
+    assert_eq!(hit(&mut app), Some(1), "the nearer one alone is too faint");
+    app.world_mut().entity_mut(entity).insert(ClipFade(0.5));
+    assert_eq!(hit(&mut app), None, "both are");
+    let crop = CropBox { center: Vec3::NEG_Z, half_size: Vec3::splat(0.5), rotation: Quat::IDENTITY };
+    set(&mut app, entity, CaptureSettings { filter: false, crop: Some(crop), ..default() });
+    app.world_mut().entity_mut(entity).remove::<ClipFade>();
+    assert_eq!(hit(&mut app), Some(1), "the nearer one is cropped");
+}
+
+#[test]
+fn what_adds_up_outside_of_three_standard_deviations_is_not_missed() {
+    let mut app = app();
+    place(&mut app, scene(&[ball(Vec3::ZERO, 1.0); 200]), Transform::IDENTITY);
+    // An alpha of exp(-3.2² / 2) = 0.006 each: 116 of them hold back half of the light.
+    let beside = |app: &mut App, deviations: f32| {
+        cast(app, Ray3d::new(Vec3::new(0.1 * deviations, 0.0, 5.0), Dir3::NEG_Z)).map(|hit| hit.gaussian)
+    };
+    assert_eq!(beside(&mut app, 3.2), Some(115), "the 116th");
+    assert_eq!(beside(&mut app, 3.4), None, "an alpha below 1/255 counts for nothing, however often");
+}
+
+#[test]
+fn what_is_nowhere_is_not_hit() {
+    let mut app = app();
+    let flat = place(&mut app, scene(&[ball(Vec3::ZERO, 0.9)]), Transform::from_scale(Vec3::ZERO));
+    assert_eq!(cast_on(&mut app, flat, ahead()), None, "a scale of nothing");
+    let empty = place(&mut app, scene(&[]), Transform::IDENTITY);
+    assert_eq!(cast_on(&mut app, empty, ahead()), None, "an empty capture");
+    let unloaded = app.world_mut().spawn((GaussianCapture3d::default(), InheritedVisibility::VISIBLE)).id();
+    assert_eq!(cast_on(&mut app, unloaded, ahead()), None, "a capture that is not there");
+    assert_eq!(hit(&mut app), None, "and nothing else is");
+}

@@ -1,0 +1,287 @@
+//! Playback in Bevy apps: which events are sent and when, shared clocks, the game's time, and what tools see of the components.
+//!
+//! In: captures of two seconds with key-frames every half second. Out: proof that time goes where it is sent and that
+//! every change has its event. Needs neither a GPU nor a window.
+
+use crate::support::event_log::{debug, take_events};
+use crate::support::playback_app::{app, capture, change, get, pass};
+use bevy::prelude::*;
+use bevy_gs4d::playback::{ClipFade, ClockSource};
+use bevy_gs4d::prelude::*;
+use bevy_gs4d::stereo::SideBySide;
+use std::any::{TypeId, type_name};
+
+/// A capture of two seconds with five key-frames.
+fn spawn(app: &mut App, bundle: impl Bundle) -> Entity {
+    let handle = capture(app, 2.0, 4);
+    app.world_mut().spawn((GaussianCapture3d(handle), bundle)).id()
+}
+
+fn time(app: &App, entity: Entity) -> f32 {
+    get::<Playback>(app, entity).time
+}
+
+fn crossed(entity: Entity, indices: &[u32]) -> Vec<String> {
+    indices.iter().map(|&index| debug(&KeyFrameCrossed { entity, index, time: index as f32 / 2.0 })).collect()
+}
+
+#[test]
+fn everything_that_happens_is_said_once() {
+    let mut app = app("assets");
+    let entity = spawn(&mut app, Playback { repeat: Repeat::Once, ..default() });
+    pass(&mut app, 0.0);
+    assert_eq!(take_events(&mut app), [debug(&PlaybackStarted { entity })], "it starts");
+    pass(&mut app, 0.75);
+    assert_eq!(take_events(&mut app), crossed(entity, &[0, 1]), "key-frames it began at and passed");
+    change(&mut app, entity, Playback::pause);
+    pass(&mut app, 0.75);
+    assert_eq!(take_events(&mut app), [debug(&PlaybackPaused { entity })], "a pause");
+    change(&mut app, entity, |playback: &mut Playback| playback.seek(1.25));
+    pass(&mut app, 0.75);
+    assert_eq!(
+        take_events(&mut app),
+        [debug(&PlaybackSeeked { entity, from: 0.75, to: 1.25 })],
+        "a seek, and nothing between"
+    );
+    change(&mut app, entity, Playback::play);
+    pass(&mut app, 0.5);
+    let started = debug(&PlaybackStarted { entity });
+    assert_eq!(take_events(&mut app), [vec![started], crossed(entity, &[3])].concat(), "on from there");
+    pass(&mut app, 9.0);
+    let ended = debug(&PlaybackEnded { entity });
+    assert_eq!(take_events(&mut app), [crossed(entity, &[4]), vec![ended]].concat(), "up to the end");
+    pass(&mut app, 9.0);
+    assert_eq!(take_events(&mut app), [""; 0], "and then no more");
+}
+
+#[test]
+fn loops_and_turns_are_said() {
+    let mut app = app("assets");
+    let looped = spawn(&mut app, Playback { time: 1.75, ..default() });
+    pass(&mut app, 0.5);
+    let turn = |entity, turns| vec![debug(&PlaybackLooped { entity, turns })];
+    let begun = |entity| vec![debug(&PlaybackStarted { entity })];
+    let expected = [begun(looped), crossed(looped, &[4, 0]), turn(looped, 1)].concat();
+    assert_eq!(take_events(&mut app), expected, "a loop crosses its end and its start");
+    pass(&mut app, 6.0);
+    assert_eq!(take_events(&mut app).last(), turn(looped, 3).last(), "three at once");
+    app.world_mut().despawn(looped);
+
+    let to_and_fro = spawn(&mut app, Playback { time: 1.75, repeat: Repeat::PingPong, ..default() });
+    pass(&mut app, 0.75);
+    let expected = [begun(to_and_fro), crossed(to_and_fro, &[4, 3]), turn(to_and_fro, 1)].concat();
+    assert_eq!(take_events(&mut app), expected, "to and fro it crosses its end once");
+    app.world_mut().despawn(to_and_fro);
+
+    let back = spawn(&mut app, Playback { time: 0.25, speed: -1.0, ..default() });
+    pass(&mut app, 0.75);
+    let expected = [begun(back), crossed(back, &[0, 4, 3]), turn(back, 1)].concat();
+    assert_eq!(take_events(&mut app), expected, "backwards, in the order of play");
+}
+
+#[test]
+fn one_entity_can_be_observed() {
+    #[derive(Resource, Default)]
+    struct Ends(u32);
+
+    let mut app = app("assets");
+    app.init_resource::<Ends>();
+    let [first, second] = [1.0, 1.5].map(|time| spawn(&mut app, Playback { time, repeat: Repeat::Once, ..default() }));
+    app.world_mut().entity_mut(first).observe(|_: On<PlaybackEnded>, mut ends: ResMut<Ends>| ends.0 += 1);
+    pass(&mut app, 0.75);
+    assert!(!get::<Playback>(&app, second).playing, "the other one has ended");
+    assert_eq!(app.world().resource::<Ends>().0, 0, "which is not this one's business");
+    pass(&mut app, 0.75);
+    assert_eq!(app.world().resource::<Ends>().0, 1, "its own end is");
+}
+
+#[test]
+fn the_virtual_clock_pauses_and_scales_playback() {
+    let mut app = app("assets");
+    let entity = spawn(&mut app, Playback::default());
+    app.world_mut().resource_mut::<Time<Virtual>>().set_relative_speed(0.5);
+    pass(&mut app, 1.0);
+    assert_eq!(time(&app, entity), 0.5, "at half speed");
+    app.world_mut().resource_mut::<Time<Virtual>>().pause();
+    pass(&mut app, 1.0);
+    assert_eq!(time(&app, entity), 0.5, "not while the game is paused");
+    app.world_mut().resource_mut::<Time<Virtual>>().unpause();
+    pass(&mut app, 1.0);
+    assert_eq!(time(&app, entity), 1.0, "and on");
+    assert!(get::<Playback>(&app, entity).playing, "all that without touching the capture");
+}
+
+#[test]
+fn a_capture_that_is_not_loaded_waits() {
+    let mut app = app("assets");
+    let entity = app.world_mut().spawn(GaussianCapture3d(Handle::default())).id();
+    pass(&mut app, 1.0);
+    assert_eq!((time(&app, entity), take_events(&mut app)), (0.0, Vec::new()), "nothing has started");
+    let handle = capture(&mut app, 2.0, 4);
+    app.world_mut().entity_mut(entity).insert(GaussianCapture3d(handle));
+    pass(&mut app, 0.25);
+    assert_eq!(time(&app, entity), 0.25, "until it has been loaded");
+}
+
+#[test]
+fn what_stands_is_not_marked_as_changed() {
+    #[derive(Resource, Default)]
+    struct Changes(usize);
+
+    let mut app = app("assets");
+    let entity = spawn(&mut app, Playback::paused_at(0.5));
+    let stopped = PlaybackClock { running: false, ..default() };
+    app.world_mut().spawn(stopped);
+    app.init_resource::<Changes>();
+    app.add_systems(
+        Last,
+        |playbacks: Query<&Playback, Changed<Playback>>,
+         clocks: Query<&PlaybackClock, Changed<PlaybackClock>>,
+         mut changes: ResMut<Changes>| {
+            changes.0 = playbacks.iter().count() + clocks.iter().count();
+        },
+    );
+    pass(&mut app, 0.25);
+    pass(&mut app, 0.25);
+    assert_eq!(app.world().resource::<Changes>().0, 0, "nothing changes");
+    change(&mut app, entity, Playback::play);
+    pass(&mut app, 0.25);
+    assert_eq!(app.world().resource::<Changes>().0, 1, "until it plays");
+}
+
+#[test]
+fn followers_of_a_clock_never_drift_apart() {
+    let mut app = app("assets");
+    let clock = app.world_mut().spawn(PlaybackClock::default()).id();
+    let follow =
+        |app: &mut App, speed, offset| spawn(app, (Playback { speed, offset, ..default() }, FollowsClock(clock)));
+    let first = follow(&mut app, 1.0, 0.0);
+    let ahead = follow(&mut app, 1.0, 0.5);
+    let back = follow(&mut app, -1.0, 0.0);
+    for step in 0..200 {
+        pass(&mut app, 0.001 * f64::from(step % 37));
+    }
+    let late = follow(&mut app, 1.0, 0.0);
+    pass(&mut app, 0.1);
+    let shown = get::<PlaybackClock>(&app, clock).seconds;
+    let expected = |seconds: f64| seconds.rem_euclid(2.0) as f32;
+    assert_eq!(time(&app, first), time(&app, late), "whenever they were spawned, they show the same");
+    assert!((time(&app, first) - expected(shown)).abs() < 1e-6, "the clock's moment");
+    assert!((time(&app, ahead) - expected(shown + 0.5)).abs() < 1e-6, "half a second ahead of it");
+    assert!((time(&app, back) - expected(-shown)).abs() < 1e-6, "backwards from the end");
+}
+
+#[test]
+fn a_clock_set_by_hand_moves_its_followers() {
+    let mut app = app("assets");
+    let clock = app.world_mut().spawn(PlaybackClock::manual()).id();
+    let entity = spawn(&mut app, FollowsClock(clock));
+    pass(&mut app, 5.0);
+    assert_eq!(time(&app, entity), 0.0, "the game's time does not");
+    take_events(&mut app);
+    change(&mut app, clock, |clock: &mut PlaybackClock| clock.set(1.25));
+    pass(&mut app, 5.0);
+    assert_eq!(
+        (time(&app, entity), take_events(&mut app)),
+        (1.25, crossed(entity, &[0, 1, 2])),
+        "what passes is played"
+    );
+    change(&mut app, clock, |clock: &mut PlaybackClock| clock.set(0.75));
+    pass(&mut app, 0.0);
+    assert_eq!((time(&app, entity), take_events(&mut app)), (0.75, crossed(entity, &[2])), "even a little back");
+    change(&mut app, clock, |clock: &mut PlaybackClock| clock.seek(1.75));
+    pass(&mut app, 0.0);
+    let seeked = vec![debug(&PlaybackSeeked { entity, from: 0.75, to: 1.75 })];
+    assert_eq!((time(&app, entity), take_events(&mut app)), (1.75, seeked), "a jump is a seek");
+    app.world_mut().despawn(clock);
+    pass(&mut app, 5.0);
+    assert_eq!((time(&app, entity), take_events(&mut app)), (1.75, Vec::new()), "without its clock it stands");
+    app.world_mut().entity_mut(entity).remove::<FollowsClock>();
+    pass(&mut app, 0.125);
+    assert_eq!(time(&app, entity), 1.875, "and on its own it goes on");
+}
+
+#[test]
+fn a_clock_of_the_game_can_be_stopped_and_turned() {
+    let mut app = app("assets");
+    let clock = app.world_mut().spawn(PlaybackClock { speed: 2.0, ..default() }).id();
+    let entity = spawn(&mut app, FollowsClock(clock));
+    pass(&mut app, 0.5);
+    assert_eq!(time(&app, entity), 1.0, "twice as fast");
+    change(&mut app, clock, |clock: &mut PlaybackClock| clock.running = false);
+    pass(&mut app, 0.5);
+    assert_eq!(time(&app, entity), 1.0, "stopped");
+    change(&mut app, clock, |clock: &mut PlaybackClock| (clock.running, clock.speed) = (true, -1.0));
+    pass(&mut app, 0.25);
+    assert_eq!(time(&app, entity), 0.75, "turned round");
+    assert_eq!(get::<PlaybackClock>(&app, clock).source, ClockSource::Game, "by the game's time");
+}
+
+#[test]
+fn frames_are_stepped_through_exactly() {
+    let mut app = app("assets");
+    let entity = spawn(&mut app, Playback::default());
+    pass(&mut app, 0.51);
+    let mut shown = Vec::new();
+    for steps in [1, 1, -1, -1] {
+        change(&mut app, entity, |playback: &mut Playback| playback.step(steps, 30.0, 2.0));
+        pass(&mut app, 0.25);
+        shown.push(time(&app, entity));
+    }
+    assert_eq!(shown, [16.0, 17.0, 16.0, 15.0].map(|frame: f32| frame / 30.0), "whole frames from the nearest one");
+}
+
+#[test]
+fn whoever_hears_of_an_end_may_despawn() {
+    let mut app = app("assets");
+    let [first, second] = [1.5, 0.0].map(|time| spawn(&mut app, Playback { time, repeat: Repeat::Once, ..default() }));
+    app.add_observer(|ended: On<PlaybackEnded>, mut commands: Commands| commands.entity(ended.entity).despawn());
+    pass(&mut app, 1.0);
+    assert!(app.world().get_entity(first).is_err(), "the one that has ended is gone");
+    assert_eq!(time(&app, second), 1.0, "the other one plays on");
+    let ended = |entity| debug(&PlaybackEnded { entity });
+    assert!(take_events(&mut app).contains(&ended(first)), "the end was said");
+    pass(&mut app, 1.0);
+    assert!(app.world().get_entity(second).is_err(), "until it ends, too");
+    assert!(take_events(&mut app).contains(&ended(second)), "which is said, too");
+}
+
+/// What is missing of a component for scenes, animations and inspectors.
+fn unknown<C: Component>(app: &App) -> Option<&'static str> {
+    let registry = app.world().resource::<AppTypeRegistry>().read();
+    registry.get_type_data::<ReflectComponent>(TypeId::of::<C>()).is_none().then(type_name::<C>)
+}
+
+#[test]
+fn components_are_known_to_reflection() {
+    let app = app("assets");
+    let unknown = [
+        unknown::<Playback>(&app),
+        unknown::<PlaybackClock>(&app),
+        unknown::<FollowsClock>(&app),
+        unknown::<TimelinePlayer>(&app),
+        unknown::<TimelineTrack>(&app),
+        unknown::<ClipFade>(&app),
+        unknown::<GaussianCapture3d>(&app),
+        unknown::<CaptureSettings>(&app),
+        unknown::<CaptureViewSettings>(&app),
+        unknown::<CaptureState>(&app),
+        unknown::<StereoRig>(&app),
+        unknown::<Eye>(&app),
+        unknown::<SideBySide>(&app),
+    ];
+    let unknown: Vec<_> = unknown.into_iter().flatten().collect();
+    assert_eq!(unknown, [""; 0], "all are registered as components");
+}
+
+#[test]
+fn a_follower_finds_its_clock_in_another_world() {
+    let mut app = app("assets");
+    let clocks = [(); 2].map(|()| app.world_mut().spawn(PlaybackClock::manual()).id());
+    let mut follows = FollowsClock(clocks[0]);
+    let registry = app.world().resource::<AppTypeRegistry>().read();
+    let component = registry.get_type_data::<ReflectComponent>(TypeId::of::<FollowsClock>()).expect("registered");
+    // What a scene does with every component that it spawns.
+    component.map_entities(&mut follows, &mut (clocks[0], clocks[1]));
+    assert_eq!(follows, FollowsClock(clocks[1]), "the entity that stands for its clock there");
+}

@@ -1,0 +1,244 @@
+//! Two eyes in real Bevy apps without a window: where they see things, and that each sees what a single camera would.
+//!
+//! In: small scenes made by hand, heads with two eyes. Out: proof that disparity is that of pinholes, that both eyes' pictures are
+//! those of single cameras at the same moment, and that halves of one target and two targets show the same. Skipped where there is no
+//! GPU, not even a software one.
+
+use crate::support::cpu_reference::{DURATION, SIZE, add, difference_between, scene};
+use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
+use bevy::camera::RenderTarget;
+use bevy::core_pipeline::tonemapping::{DebandDither, Tonemapping};
+use bevy::math::DVec3;
+use bevy::prelude::*;
+use bevy::render::render_resource::Extent3d;
+use bevy_gs4d::GaussianCapture3d;
+use bevy_gs4d::gaussian::Gaussian;
+use bevy_gs4d::playback::Playback;
+use bevy_gs4d::render::CaptureStatistics;
+use bevy_gs4d::scene::{RuntimeScene, TemporalFilter};
+use bevy_gs4d::stereo::{EyeTargets, StereoPlugin, StereoRig, spawn_stereo};
+use bevy_gs4d::testing::{self, Offscreen};
+use image::RgbaImage;
+use image::imageops::crop_imm;
+
+/// Far more than people have, so that disparity is many pixels.
+const RIG: StereoRig = StereoRig { ipd: 0.2 };
+
+/// A round Gaussian and its colour.
+fn splat(mean: Vec3, deviation: f32, velocity: Vec3, color: Vec3) -> (Gaussian, Vec3) {
+    let variance = deviation * deviation;
+    let gaussian = Gaussian {
+        mean: mean.to_array(),
+        mean_t: 0.0,
+        velocity: velocity.to_array(),
+        sigma_t: 10.0,
+        covariance: [variance, 0.0, 0.0, variance, 0.0, variance],
+        opacity: 0.9,
+        padding: 0.0,
+    };
+    (gaussian, color)
+}
+
+/// One small white Gaussian near the origin that rises by 0.8 units in the scene's time.
+fn dot() -> RuntimeScene {
+    scene(&[splat(Vec3::new(0.1, -0.2, 0.0), 0.05, Vec3::new(0.0, 0.8, 0.0), Vec3::ONE)])
+}
+
+/// Overlapping Gaussians near and far, some of them moving.
+fn crowd() -> RuntimeScene {
+    scene(&[
+        splat(Vec3::new(0.3, 0.1, 0.6), 0.2, Vec3::ZERO, Vec3::new(0.9, 0.2, 0.1)),
+        splat(Vec3::new(-0.3, 0.2, -0.4), 0.3, Vec3::X, Vec3::new(0.1, 0.7, 0.3)),
+        splat(Vec3::new(0.0, -0.3, 0.2), 0.1, Vec3::new(-0.5, 0.6, 0.4), Vec3::new(0.2, 0.3, 1.0)),
+        splat(Vec3::new(0.1, 0.0, -1.5), 0.6, Vec3::ZERO, Vec3::splat(0.8)),
+    ])
+}
+
+fn spawn(app: &mut App, scene: &RuntimeScene, playback: Playback) {
+    let handle = add(app, scene);
+    app.world_mut().spawn((GaussianCapture3d(handle), playback));
+}
+
+/// An app with a head.
+struct StereoApp {
+    app: App,
+    head: Entity,
+    /// What the right eye draws into; without, both draw side by side.
+    right: Option<Offscreen>,
+}
+
+impl StereoApp {
+    fn new(scene: &RuntimeScene, head: Transform, separate: bool) -> Option<Self> {
+        Self::of_size(SIZE, scene, head, separate)
+    }
+
+    /// The same with so many pixels for each eye.
+    fn of_size(eye: UVec2, scene: &RuntimeScene, head: Transform, separate: bool) -> Option<Self> {
+        let size = if separate { eye } else { eye * UVec2::new(2, 1) };
+        let mut app = app(size)?;
+        app.add_plugins(StereoPlugin);
+        spawn(&mut app, scene, Playback::default());
+        let target = RenderTarget::default();
+        let right = separate.then(|| Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), eye));
+        let targets = match &right {
+            Some(right) => EyeTargets::Separate([target, right.target()]),
+            None => EyeTargets::SideBySide(target),
+        };
+        let stereo = spawn_stereo(&mut app.world_mut().commands(), RIG, targets);
+        app.world_mut().flush();
+        app.world_mut().entity_mut(stereo.head).insert(head);
+        for eye in stereo.eyes {
+            let lens = Projection::Perspective(PerspectiveProjection { fov: FOV_Y, ..default() });
+            app.world_mut().entity_mut(eye).insert((lens, Msaa::Off, Tonemapping::None, DebandDither::Disabled));
+        }
+        Some(Self { app, head: stereo.head, right })
+    }
+
+    /// What the left and the right eye see after `seconds` more.
+    fn eyes(&mut self, seconds: f32) -> [RgbaImage; 2] {
+        let left = picture(&mut self.app, seconds);
+        match &self.right {
+            Some(right) => [left, testing::read(&mut self.app, right).expect("the right eye has drawn, too")],
+            None => [0, SIZE.x].map(|corner| crop_imm(&left, corner, 0, SIZE.x, SIZE.y).to_image()),
+        }
+    }
+}
+
+/// Lists of active Gaussians that have been made so far.
+fn activated(app: &App) -> u64 {
+    app.world().resource::<CaptureStatistics>().work().activated()
+}
+
+/// What a single camera sees of a paused scene.
+fn mono(scene: &RuntimeScene, seconds: f32, pose: Transform) -> Option<RgbaImage> {
+    let mut app = app(SIZE)?;
+    spawn(&mut app, scene, Playback::paused_at(seconds));
+    spawn_camera(&mut app, Msaa::Off, pose);
+    Some(picture(&mut app, 0.0))
+}
+
+/// Where the light is, in pixels.
+fn centroid(picture: &RgbaImage) -> Vec2 {
+    let mut sum = DVec3::ZERO;
+    for (x, y, pixel) in picture.enumerate_pixels() {
+        let weight = f64::from(pixel.0[0]);
+        sum += weight * DVec3::new(f64::from(x) + 0.5, f64::from(y) + 0.5, 1.0);
+    }
+    assert!(sum.z > 0.0, "something is seen");
+    Vec2::new((sum.x / sum.z) as f32, (sum.y / sum.z) as f32)
+}
+
+/// Pixels for a unit at distance 1.
+fn focal() -> f32 {
+    SIZE.y as f32 / 2.0 / (FOV_Y / 2.0).tan()
+}
+
+#[test]
+fn disparity_is_focal_length_times_distance_over_depth() {
+    let Some(mut stereo) = StereoApp::new(&dot(), Transform::default(), false) else { return };
+    for depth in [1.5, 2.0, 3.0, 5.0] {
+        stereo.app.world_mut().entity_mut(stereo.head).insert(Transform::from_xyz(0.0, 0.0, depth));
+        let [left, right] = stereo.eyes(0.0).map(|picture| centroid(&picture));
+        let (disparity, expected) = (left.x - right.x, focal() * RIG.ipd / depth);
+        // A tenth of a pixel: pixels are rounded to 255ths, which moves the middle of a spot by less.
+        assert!((disparity - expected).abs() < 0.1, "{disparity} pixels at {depth}, where a pinhole has {expected}");
+        assert!((left.y - right.y).abs() < 0.1, "at one height in both, not {} and {}", left.y, right.y);
+        let middle = (left.x + right.x) / 2.0 - SIZE.x as f32 / 2.0;
+        let expected = focal() * 0.1 / depth;
+        assert!((middle - expected).abs() < 0.1, "{middle} right of the middle, where the head's axis has {expected}");
+    }
+}
+
+#[test]
+fn the_distance_between_the_eyes_may_change_at_any_time() {
+    let Some(mut stereo) = StereoApp::new(&dot(), Transform::from_xyz(0.0, 0.0, 3.0), false) else { return };
+    for ipd in [0.2, 0.3, 0.0] {
+        stereo.app.world_mut().entity_mut(stereo.head).insert(StereoRig { ipd });
+        let pictures = stereo.eyes(0.0);
+        let [left, right] = [&pictures[0], &pictures[1]].map(centroid);
+        let expected = focal() * ipd / 3.0;
+        assert!((left.x - right.x - expected).abs() < 0.1, "{} pixels, not {expected}", left.x - right.x);
+        if ipd == 0.0 {
+            assert_eq!(difference_between(&pictures[0], &pictures[1]), 0, "eyes in one place see one picture");
+        }
+    }
+}
+
+#[test]
+fn each_eye_sees_what_a_single_camera_in_its_place_sees() {
+    let head = Transform::from_xyz(0.5, 0.4, 3.0).looking_at(Vec3::ZERO, Vec3::Y);
+    let Some(mut stereo) = StereoApp::new(&crowd(), head, false) else { return };
+    for (seconds, step) in [(0.0, 0.0), (0.75, 0.75)] {
+        for (eye, side) in stereo.eyes(step).into_iter().zip([-0.5, 0.5]) {
+            let pose = head * Transform::from_xyz(side * RIG.ipd, 0.0, 0.0);
+            let Some(expected) = mono(&crowd(), seconds, pose) else { return };
+            // One 255th: the two poses are the same product in another order, and round differently.
+            let apart = difference_between(&eye, &expected);
+            assert!(apart <= 1, "at {seconds} s the eye at {side} and a single camera are {apart} / 255 apart");
+        }
+    }
+}
+
+#[test]
+fn both_eyes_see_the_same_moment() {
+    let Some(mut stereo) = StereoApp::new(&dot(), Transform::from_xyz(0.0, 0.0, 3.0), false) else { return };
+    let at_first = stereo.eyes(0.0).map(|picture| centroid(&picture).y);
+    let later = stereo.eyes(0.5).map(|picture| centroid(&picture).y);
+    // A quarter of the scene's time.
+    let expected = focal() * 0.8 * 0.25 / 3.0;
+    for (first, later) in at_first.into_iter().zip(later) {
+        assert!((first - later - expected).abs() < 0.1, "it rose by {} pixels, not {expected}", first - later);
+    }
+}
+
+#[test]
+fn two_halves_and_two_targets_show_the_same() {
+    let head = Transform::from_xyz(-0.3, 0.2, 2.5).looking_at(Vec3::ZERO, Vec3::Y);
+    let apps = [false, true].map(|separate| StereoApp::new(&crowd(), head, separate));
+    let [Some(mut halves), Some(mut pair)] = apps else { return };
+    let (halves, pair) = (halves.eyes(0.25), pair.eyes(0.25));
+    for (index, name) in ["left", "right"].into_iter().enumerate() {
+        assert_eq!(difference_between(&halves[index], &pair[index]), 0, "the {name} eye's pictures are the same");
+    }
+    assert!(difference_between(&halves[0], &halves[1]) > 50, "while the two eyes' differ");
+}
+
+#[test]
+fn halves_grow_with_their_target() {
+    let head = Transform::from_xyz(-0.3, 0.2, 2.5).looking_at(Vec3::ZERO, Vec3::Y);
+    let larger = SIZE + UVec2::new(50, 30);
+    let apps = [SIZE, larger].map(|eye| StereoApp::of_size(eye, &crowd(), head, false));
+    let [Some(mut stereo), Some(mut expected)] = apps else { return };
+    stereo.eyes(0.0);
+    let mut offscreen = stereo.app.world_mut().resource_mut::<Offscreen>();
+    offscreen.size = larger * UVec2::new(2, 1);
+    let (image, size) = (offscreen.image.clone(), offscreen.size);
+    let size = Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 };
+    let mut images = stereo.app.world_mut().resource_mut::<Assets<Image>>();
+    images.get_mut(&image).expect("the app's own picture").resize(size);
+    let pictures = [&mut stereo, &mut expected].map(|stereo| picture(&mut stereo.app, 0.0));
+    assert_eq!(
+        difference_between(&pictures[0], &pictures[1]),
+        0,
+        "both eyes fill it as if it had always been that large"
+    );
+}
+
+#[test]
+fn both_eyes_share_one_list_of_the_active() {
+    let mut filtered = crowd();
+    let interval = filtered.trained_with.time_interval;
+    filtered.filter = Some(TemporalFilter::support(filtered.iter(), interval, 4));
+    let Some(mut stereo) = StereoApp::new(&filtered, Transform::from_xyz(0.0, 0.0, 4.0), false) else { return };
+    stereo.eyes(0.0);
+    let made = activated(&stereo.app);
+    stereo.eyes(0.2 * DURATION);
+    assert_eq!(activated(&stereo.app), made, "within a segment of time the list stays");
+    let eyes = stereo.eyes(0.1 * DURATION);
+    assert_eq!(activated(&stereo.app), made + 1, "in the next one it is made once, not for each eye");
+    let Some(mut plain) = StereoApp::new(&crowd(), Transform::from_xyz(0.0, 0.0, 4.0), false) else { return };
+    let expected = plain.eyes(0.3 * DURATION);
+    for (eye, expected) in eyes.iter().zip(&expected) {
+        assert_eq!(difference_between(eye, expected), 0, "and both see what they see without a filter");
+    }
+}

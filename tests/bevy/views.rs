@@ -1,0 +1,514 @@
+//! Views of captures in Bevy apps: what is before and behind them, parts of pictures, shared and resized targets, time in both
+//! directions, and what the command would have drawn.
+//!
+//! In: small scenes made by hand, synthetic ones and the capture of the examples, in headless apps. Out: proof that glass and late
+//! cameras keep to the documented order, that environment maps look like their captures and have no holes, that parts of pictures and
+//! targets are those of the CPU reference, that temporal filters and the direction of play change no pixel, and that extremes stay
+//! numbers. Skipped where there is no GPU, not even a software one.
+
+use crate::support::cpu_reference::{
+    DURATION, SIZE, add, blob, difference, difference_between, eye, rgb, scene, view, view_of,
+};
+use crate::support::fixtures::{
+    BLACK, MIDDLE, check, crowd, front, insert, lone, orthographic, reference_picture, spawn, spawn_box,
+};
+use crate::support::gpu;
+use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
+use crate::support::skip::skip;
+use bevy::camera::visibility::{NoFrustumCulling, RenderLayers};
+use bevy::camera::{Hdr, SubCameraView, Viewport};
+use bevy::core_pipeline::schedule::Core3d;
+use bevy::pbr::main_transmissive_pass_3d;
+use bevy::prelude::*;
+use bevy::render::RenderApp;
+use bevy::render::render_resource::{Extent3d, TextureFormat, TextureUsages};
+use bevy::render::renderer::{RenderAdapter, RenderDevice};
+use bevy::render::settings::WgpuFeatures;
+use bevy_gs4d::asset::GaussianCapture;
+use bevy_gs4d::codec::checkpoint::CheckpointOptions;
+use bevy_gs4d::playback::{ClipFade, Playback, Repeat};
+use bevy_gs4d::render::{CaptureSettings, CaptureStatistics, CaptureSystems, CaptureViewSettings};
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{Environment, RuntimeScene, TemporalFilter};
+use bevy_gs4d::testing::{self, Offscreen};
+use bevy_gs4d::view::srgb::{decode, encode};
+use bevy_gs4d::view::{Appearance, Background, Camera as PinholeCamera, DebugView, Lens, Picture, RasterFov};
+use bevy_gs4d::{GaussianCapture3d, codec};
+use image::RgbaImage;
+use image::imageops::crop_imm;
+use std::path::Path;
+
+/// For tests that need many pictures.
+const SMALL: UVec2 = UVec2::new(96, 72);
+
+#[test]
+fn captures_ordered_before_glass_show_through_it() {
+    let Some(mut app) = app(SIZE) else { return };
+    let render_app = app.sub_app_mut(RenderApp);
+    render_app.configure_sets(Core3d, CaptureSystems::Draw.before(main_transmissive_pass_3d));
+    spawn(&mut app, &lone(Vec3::ONE), ());
+    spawn_camera(&mut app, Msaa::Off, front());
+    // Green, clear and without a reflection, over the right half of the view.
+    let glass = StandardMaterial {
+        base_color: Color::srgb(0.0, 1.0, 0.0),
+        specular_transmission: 1.0,
+        perceptual_roughness: 0.0,
+        reflectance: 0.0,
+        ior: 1.0,
+        ..default()
+    };
+    let glass = app.world_mut().resource_mut::<Assets<StandardMaterial>>().add(glass);
+    let (size, center) = (Vec3::new(6.0, 12.0, 0.01), Vec3::new(3.0, 0.0, 1.5));
+    let pane = spawn_box(&mut app, size, center, Color::BLACK, AlphaMode::Opaque);
+    insert(&mut app, pane, MeshMaterial3d(glass));
+    let picture = picture(&mut app, 0.0);
+    // As far from the middle on both sides: the Gaussian is as bright at either.
+    let [beside, through] = [MIDDLE.x - 9, MIDDLE.x + 8].map(|x| rgb(&picture, x, MIDDLE.y));
+    assert!(beside.iter().all(|value| *value > 200), "beside the glass the capture is white, not {beside:?}");
+    let [r, g, b] = through;
+    assert!(g.abs_diff(beside[1]) <= 3, "through the glass its green is {g}, not {}", beside[1]);
+    assert!(r < 30 && b < 30, "and nothing else of it shows: {through:?}");
+}
+
+#[test]
+fn a_late_camera_draws_captures_over_transparent_meshes() {
+    let Some(mut app) = app(SIZE) else { return };
+    spawn(&mut app, &lone(Vec3::X), ());
+    let camera = spawn_camera(&mut app, Msaa::Off, front());
+    let late = CaptureViewSettings { late: true, ..default() };
+    insert(&mut app, camera, late);
+    let blue = Color::srgba(0.0, 0.0, 1.0, 0.8);
+    let pane = spawn_box(&mut app, Vec3::new(12.0, 12.0, 0.01), Vec3::ZERO, blue, AlphaMode::Blend);
+    for place in [1.5, -1.5] {
+        insert(&mut app, pane, Transform::from_xyz(0.0, 0.0, place));
+        let picture = picture(&mut app, 0.0);
+        let [r, _, b] = rgb(&picture, MIDDLE.x, MIDDLE.y);
+        assert!(r > 200 && b < 60, "the capture is over a pane at {place}, not {r}, {b}");
+        assert!(rgb(&picture, 10, 10)[2] > 150, "beside the capture the pane at {place} shows");
+    }
+    // Over the right half, before everything.
+    let (size, center) = (Vec3::new(6.0, 12.0, 0.1), Vec3::new(3.0, 0.0, 2.0));
+    spawn_box(&mut app, size, center, Color::srgb(0.0, 1.0, 0.0), AlphaMode::Opaque);
+    let cut = picture(&mut app, 0.0);
+    let [[r, _, b], wall] = [MIDDLE.x - 8, MIDDLE.x + 8].map(|x| rgb(&cut, x, MIDDLE.y));
+    assert!(r > 200 && b < 60, "beside the wall the capture shows, not {r}, {b}");
+    assert_eq!(wall, [0, 255, 0], "an opaque mesh hides it");
+    insert(&mut app, camera, CaptureViewSettings::default());
+    let [r, _, b] = rgb(&picture(&mut app, 0.0), MIDDLE.x - 8, MIDDLE.y);
+    assert!(b > 150 && r < 200, "a camera that is not late draws the pane last: {r}, {b}");
+}
+
+/// A grey map all around, and a Gaussian that no camera of these tests looks at.
+fn surrounded() -> RuntimeScene {
+    let map = Environment { width: 8, height: 4, texels: vec![0.5; 8 * 4 * 3] };
+    let far = scene(&[(blob(Vec3::NEG_X * 9.0, Vec3::splat(0.4), 0.98), Vec3::X)]);
+    RuntimeScene { environment: Some(map), ..far }
+}
+
+/// From the origin to where the map has no seam.
+fn ahead() -> Transform {
+    Transform::default().looking_to(Vec3::X, Vec3::Y)
+}
+
+#[test]
+fn a_map_is_faded_tinted_and_lit_as_its_capture_is() {
+    let Some(mut app) = app(SIZE) else { return };
+    app.insert_resource(ClearColor(Color::srgb(0.0, 0.0, 1.0)));
+    let entity = spawn(&mut app, &surrounded(), ());
+    spawn_camera(&mut app, Msaa::Off, ahead());
+    let lit = |light: Vec3| encode(decode(Vec3::splat(0.5)) * light);
+    let settings = CaptureSettings::default();
+    let red = LinearRgba::rgb(1.0, 0.0, 0.0);
+    let (half, gone) = (CaptureSettings { opacity: 0.5, ..settings }, CaptureSettings { opacity: 0.0, ..settings });
+    let cases = [
+        ("as trained", settings, ClipFade(1.0), lit(Vec3::ONE)),
+        ("tinted", CaptureSettings { tint: red, ..settings }, ClipFade(1.0), lit(Vec3::X)),
+        ("a stop brighter", CaptureSettings { exposure: 1.0, ..settings }, ClipFade(1.0), lit(Vec3::splat(2.0))),
+        // Encoded values are blended.
+        ("of half its opacity", half, ClipFade(1.0), 0.5 * lit(Vec3::ONE) + 0.5 * Vec3::Z),
+        ("without opacity", gone, ClipFade(1.0), Vec3::Z),
+        ("faded out by a timeline", settings, ClipFade(0.0), Vec3::Z),
+    ];
+    for (what, settings, fade, expected) in cases {
+        insert(&mut app, entity, (settings, fade));
+        let seen = Vec3::from(rgb(&picture(&mut app, 0.0), MIDDLE.x, MIDDLE.y).map(f32::from));
+        let apart = (seen - expected * 255.0).abs().max_element();
+        assert!(apart <= 2.0, "a map {what} shows as {seen}, {apart} / 255 from what it should");
+    }
+}
+
+#[test]
+fn a_map_has_no_hole_where_rays_miss_its_sphere() {
+    let Some(mut app) = app(SIZE) else { return };
+    spawn(&mut app, &surrounded(), ());
+    // Far outside, and the sphere is not in view.
+    let aside = Transform::from_xyz(0.0, 400.0, 0.0).looking_to(Vec3::X, Vec3::Z);
+    let camera = spawn_camera(&mut app, Msaa::Off, aside);
+    insert(&mut app, camera, Hdr);
+    let picture = picture(&mut app, 0.0);
+    // What is not a number comes out as black. Towards the poles the map fades to half.
+    let darkest = picture.pixels().flat_map(|pixel| pixel.0).min();
+    assert!(darkest > Some(20), "every pixel has a colour; the darkest is {darkest:?}");
+    let middle = rgb(&picture, MIDDLE.x, MIDDLE.y);
+    assert!(middle.iter().all(|value| value.abs_diff(128) <= 2), "in the middle it is the map's: {middle:?}");
+}
+
+#[test]
+fn a_map_needs_one_point_of_view_and_the_depth_of_meshes() {
+    let Some(mut app) = app(SIZE) else { return };
+    app.insert_resource(ClearColor(Color::srgb(0.0, 0.0, 1.0)));
+    spawn(&mut app, &surrounded(), ());
+    let camera = spawn_camera(&mut app, Msaa::Off, ahead());
+    let near_clip_plane = Vec3::new(0.1, 0.0, -1.0).normalize().extend(-0.4);
+    let oblique = PerspectiveProjection { fov: FOV_Y, near_clip_plane, ..default() };
+    let projections = [
+        ("its own near clip plane", Projection::Perspective(oblique)),
+        ("parallel rays", Projection::Orthographic(orthographic())),
+    ];
+    for (what, projection) in projections {
+        insert(&mut app, camera, projection);
+        let picture = picture(&mut app, 0.0);
+        let empty = picture.pixels().all(|pixel| pixel.0[..3] == [0, 0, 255]);
+        assert!(empty, "a camera with {what} shows what is behind, not {:?}", rgb(&picture, MIDDLE.x, MIDDLE.y));
+    }
+}
+
+/// A part of a picture.
+fn part(whole: &Picture, offset: UVec2, size: UVec2) -> Picture {
+    let row = |y| (0..size.x).map(move |x| whole.pixel(offset.x + x, offset.y + y));
+    Picture { size, pixels: (0..size.y).flat_map(row).collect() }
+}
+
+/// The largest difference of any channel of any pixel, in 255ths.
+fn apart(picture: &Picture, expected: &Picture) -> f32 {
+    assert_eq!(picture.size, expected.size, "pictures of one size");
+    let channel = |(pixel, expected): (&Vec3, &Vec3)| (*pixel - *expected).abs().max_element() * 255.0;
+    picture.pixels.iter().zip(&expected.pixels).map(channel).fold(0.0, f32::max)
+}
+
+#[test]
+fn a_sub_view_is_that_part_of_the_whole() {
+    // Of whole tiles: a splat ends with the last one that its three standard deviations touch.
+    let (offset, size) = (UVec2::new(112, 32), UVec2::new(88, 96));
+    let Some(mut app) = app(size) else { return };
+    let Some(mut headless) = gpu::headless() else { return };
+    // One of them near the right edge and long in depth: its footprint depends on the angle that it is seen at.
+    let scene = scene(&[
+        (blob(Vec3::new(1.9, 0.5, 0.0), Vec3::new(0.05, 0.05, 0.8), 0.9), Vec3::new(0.9, 0.3, 0.1)),
+        (blob(Vec3::new(0.9, -0.3, 0.4), Vec3::new(0.2, 0.1, 0.3), 0.8), Vec3::new(0.1, 0.6, 0.9)),
+    ]);
+    let whole = view(&front(), SIZE, 0.0);
+    let expected = part(&reference_picture(&scene, whole, Appearance::default()), offset, size);
+    assert!(expected.pixel(72, 20).x > 0.3, "the long splat is in view: {}", expected.pixel(72, 20));
+
+    // The same pixels behind a lens that is off-centre.
+    let lens = Lens::Intrinsics { focal: whole.focal(), center: SIZE.as_vec2() / 2.0 - offset.as_vec2() };
+    let pinhole = PinholeCamera { world_to_camera: whole.world_to_camera, size, lens };
+    let sub = pinhole.view(0.0, RasterFov::Corrected);
+    let difference = apart(&reference_picture(&scene, sub, Appearance::default()), &expected);
+    assert!(difference <= 2.0, "the CPU reference's part and its whole are {difference} / 255 apart");
+    let capture = headless.upload(&scene).expect("it fits");
+    let drawn = headless.render(&capture, &sub, BLACK).expect("it is drawn").picture;
+    let difference = apart(&drawn, &expected);
+    assert!(difference <= 2.0, "the GPU's part and the reference's whole are {difference} / 255 apart");
+
+    // Bevy culls by the frustum of the whole target, not of the part.
+    spawn(&mut app, &scene, NoFrustumCulling);
+    let camera = spawn_camera(&mut app, Msaa::Off, front());
+    let sub_camera_view = Some(SubCameraView { full_size: SIZE, offset: offset.as_vec2(), size });
+    insert(&mut app, camera, Camera { sub_camera_view, ..default() });
+    check(&mut app, &expected, "a sub view");
+}
+
+/// Whether cameras can have so many samples here.
+fn can_sample(app: &App, msaa: Msaa) -> bool {
+    let world = app.sub_app(RenderApp).world();
+    let (adapter, device) = (world.resource::<RenderAdapter>(), world.resource::<RenderDevice>());
+    let specific = device.features().contains(WgpuFeatures::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES);
+    let supported = |format| {
+        let features = adapter.get_texture_format_features(format);
+        features.flags.sample_count_supported(msaa.samples())
+    };
+    // Every device has the first two, and others if it has been asked for them.
+    let everywhere = matches!(msaa, Msaa::Off | Msaa::Sample4);
+    everywhere || specific && supported(TextureFormat::Depth32Float) && supported(TextureFormat::Rgba8UnormSrgb)
+}
+
+#[test]
+fn every_sample_count_cuts_captures_at_the_right_pixels_of_a_viewport() {
+    let Some(mut app) = app(SIZE) else { return };
+    // Larger than the viewport.
+    spawn(&mut app, &scene(&[(blob(Vec3::ZERO, Vec3::new(2.0, 2.0, 0.1), 0.98), Vec3::X)]), ());
+    let (corner, size) = (UVec2::new(37, 21), UVec2::new(120, 90));
+    let viewport = Some(Viewport { physical_position: corner, physical_size: size, ..default() });
+    let camera = spawn_camera(&mut app, Msaa::Off, front());
+    insert(&mut app, camera, Camera { viewport, ..default() });
+    // The lower right quarter of the view.
+    let green = Color::srgb(0.0, 1.0, 0.0);
+    let quarter = spawn_box(&mut app, Vec3::new(6.0, 6.0, 0.1), Vec3::ZERO, green, AlphaMode::Opaque);
+    testing::settle(&mut app).expect("the app draws without an error");
+    let middle = corner + size / 2;
+    let last = corner + size - 1;
+    for msaa in [Msaa::Off, Msaa::Sample2, Msaa::Sample4, Msaa::Sample8] {
+        if !can_sample(&app, msaa) {
+            skip(format_args!("{msaa:?}: this GPU has no such targets"));
+            continue;
+        }
+        insert(&mut app, camera, msaa);
+        for (depth, hides) in [(1.5, true), (-1.5, false)] {
+            insert(&mut app, quarter, Transform::from_xyz(3.0, -3.0, depth));
+            let picture = picture(&mut app, 0.0);
+            let name = format!("{msaa:?}, a mesh at {depth}");
+            let is_red = |[r, g, b]: [u8; 3]| r > 200 && g < 60 && b < 60;
+            for (left, up) in [(1, 1), (0, 1), (1, 0)] {
+                let seen = rgb(&picture, middle.x - left, middle.y - up);
+                assert!(is_red(seen), "{name}: {left} left and {up} up of its corner is {seen:?}");
+            }
+            let seen = rgb(&picture, middle.x, middle.y);
+            let right = if hides { seen == [0, 255, 0] } else { is_red(seen) };
+            assert!(right, "{name}: its first pixel is {seen:?}");
+            // The other quarters reach to the edges of the viewport.
+            let edges = [
+                ([corner.x, 40], [corner.x - 1, 40]),
+                ([last.x, 40], [last.x + 1, 40]),
+                ([97, corner.y], [97, corner.y - 1]),
+                ([60, last.y], [60, last.y + 1]),
+            ];
+            for ([x, y], [u, v]) in edges {
+                assert!(rgb(&picture, x, y)[0] > 60, "{name}: inside the viewport, at {x}, {y}, the capture shows");
+                assert_eq!(rgb(&picture, u, v), [0, 0, 0], "{name}: outside, at {u}, {v}, nothing does");
+            }
+        }
+    }
+}
+
+/// A synthetic scene with a filter of four segments, and without one.
+fn twice(count: usize, seed: u64) -> [RuntimeScene; 2] {
+    let settings = SynthSettings { count, seed, degree: 0, degree_t: 0, duration_seconds: DURATION };
+    let plain = synthesize(&settings).into_runtime().expect("synthetic scenes can be drawn");
+    let filter = TemporalFilter::support(plain.iter(), plain.trained_with.time_interval, 4);
+    [RuntimeScene { filter: Some(filter), ..plain.clone() }, plain]
+}
+
+/// One app with everything in it twice, with a temporal filter and without, each for a camera of its own.
+struct Both {
+    app: App,
+    cameras: [Entity; 2],
+    /// What the camera without filters draws into.
+    plain: Offscreen,
+}
+
+impl Both {
+    fn new() -> Option<Self> {
+        let mut app = app(SMALL)?;
+        let eye = Transform::from_xyz(0.5, -3.0, 1.5).looking_at(Vec3::ZERO, Vec3::Z);
+        let cameras = [(); 2].map(|()| spawn_camera(&mut app, Msaa::Off, eye));
+        let plain = Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), SMALL);
+        insert(&mut app, cameras[1], (plain.target(), RenderLayers::layer(1)));
+        Some(Self { app, cameras, plain })
+    }
+
+    fn add(&mut self, scenes: &[RuntimeScene; 2]) -> [Handle<GaussianCapture>; 2] {
+        [0, 1].map(|index| add(&mut self.app, &scenes[index]))
+    }
+
+    fn place(&mut self, captures: &[Handle<GaussianCapture>; 2], seconds: f32, place: Transform) -> [Entity; 2] {
+        [0, 1].map(|index| {
+            let capture = GaussianCapture3d(captures[index].clone());
+            let placed = (capture, Playback::paused_at(seconds), place, RenderLayers::layer(index));
+            self.app.world_mut().spawn(placed).id()
+        })
+    }
+
+    fn change<B: Bundle>(&mut self, entities: [Entity; 2], bundle: impl Fn(usize) -> B) {
+        for (index, entity) in entities.into_iter().enumerate() {
+            insert(&mut self.app, entity, bundle(index));
+        }
+    }
+
+    /// Both cameras must see the same, and one of them without looking at every Gaussian, if filters are on.
+    fn check(&mut self, what: &str, filters: bool) {
+        let filtered = picture(&mut self.app, 0.0);
+        let plain = testing::read(&mut self.app, &self.plain).expect("the second camera's picture");
+        assert!(plain.pixels().any(|pixel| pixel.0[..3] != [0, 0, 0]), "{what}: something shows");
+        assert_eq!(difference_between(&filtered, &plain), 0, "{what}: with the filter and without, in 255ths");
+        let statistics = self.app.world().resource::<CaptureStatistics>();
+        let [with, without] = self.cameras.map(|camera| statistics.view(camera).expect("it sees captures"));
+        assert_eq!((with.total, without.active), (without.total, without.total), "{what}: the same Gaussians");
+        assert_eq!(with.active < with.total, filters, "{what}: {} of {} are active", with.active, with.total);
+    }
+}
+
+#[test]
+fn a_filter_changes_no_pixel_whatever_happens_to_its_capture() {
+    let Some(mut both) = Both::new() else { return };
+    let [first, other] = [(400, 1), (300, 2)].map(|(count, seed)| both.add(&twice(count, seed)));
+    let placed = both.place(&first, 0.1, Transform::default());
+    both.check("at the start", true);
+    for seconds in [0.6, 1.1, 1.9, 0.1] {
+        both.change(placed, |_| Playback::paused_at(seconds));
+        both.check(&format!("at {seconds} s"), true);
+    }
+    both.change(placed, |index| GaussianCapture3d(other[index].clone()));
+    both.check("with another capture", true);
+    both.change(placed, |_| (CaptureSettings { filter: false, ..default() }, Playback::paused_at(1.4)));
+    both.check("with the filter off", false);
+    both.change(placed, |_| (CaptureSettings::default(), Playback::paused_at(0.7)));
+    both.check("with the filter on again", true);
+    both.change(placed, |_| Visibility::Hidden);
+    picture(&mut both.app, 0.0);
+    both.change(placed, |_| (Visibility::Inherited, Playback::paused_at(1.7)));
+    both.check("at another time than when it was hidden", true);
+    for (handle, scene) in other.iter().zip(twice(500, 3)) {
+        let mut captures = both.app.world_mut().resource_mut::<Assets<GaussianCapture>>();
+        captures.insert(handle, GaussianCapture::new(scene)).expect("its handle is alive");
+    }
+    both.check("with another scene under the same name", true);
+    let second = both.place(&other, 0.2, Transform::from_xyz(0.4, 0.3, 0.0));
+    both.check("at two times at once", true);
+    both.change(second, |_| Playback::paused_at(1.2));
+    both.check("at two times, one of which has moved on", true);
+}
+
+#[test]
+fn a_resized_target_shows_captures_at_its_new_size() {
+    let Some(mut app) = app(SIZE) else { return };
+    let scene = crowd();
+    spawn(&mut app, &scene, ());
+    spawn_camera(&mut app, Msaa::Off, eye());
+    let image = app.world().resource::<Offscreen>().image.clone();
+    for size in [SIZE, UVec2::new(120, 100), UVec2::new(230, 160), SIZE] {
+        let extent = Extent3d { width: size.x, height: size.y, ..default() };
+        app.world_mut().resource_mut::<Assets<Image>>().get_mut(&image).expect("it is the app's").resize(extent);
+        app.insert_resource(Offscreen { image: image.clone(), size });
+        let expected = reference_picture(&scene, view(&eye(), size, 0.0), Appearance::default());
+        check(&mut app, &expected, &format!("{} x {}", size.x, size.y));
+    }
+}
+
+#[test]
+fn two_cameras_share_a_target_and_each_half_is_its_own() {
+    let Some(mut app) = app(SIZE) else { return };
+    let scene = crowd();
+    let place = Transform::from_xyz(0.2, -0.1, 0.3).with_rotation(Quat::from_rotation_y(0.6));
+    spawn(&mut app, &scene, place);
+    let half = UVec2::new(SIZE.x / 2, SIZE.y);
+    let behind = Transform::from_xyz(-0.6, 0.4, -3.5).looking_at(Vec3::ZERO, Vec3::Y);
+    let halves = [(0, eye(), ClearColorConfig::Default), (1, behind, ClearColorConfig::None)];
+    for (order, pose, clear_color) in halves {
+        let camera = spawn_camera(&mut app, Msaa::Off, pose);
+        let physical_position = UVec2::new(order * half.x, 0);
+        let viewport = Some(Viewport { physical_position, physical_size: half, ..default() });
+        insert(&mut app, camera, Camera { viewport, order: order as isize, clear_color, ..default() });
+    }
+    let picture = picture(&mut app, 0.0);
+    for (order, pose, _) in halves {
+        let seen = crop_imm(&picture, order * half.x, 0, half.x, half.y).to_image();
+        let expected = reference_picture(&scene, view_of(&pose, &place, half, 0.0), Appearance::default());
+        let apart = difference(&seen, &expected);
+        assert!(apart <= 2.0, "half {order}: Bevy and the CPU reference are {apart} / 255 apart");
+    }
+}
+
+#[test]
+fn reverse_and_ping_pong_show_the_pictures_of_forward() {
+    let Some(mut app) = app(SMALL) else { return };
+    spawn_camera(&mut app, Msaa::Off, eye());
+    let capture = add(&mut app, &crowd());
+    // From the start, a quarter of the duration from picture to picture.
+    let mut play = |playback: Playback, steps: usize| -> Vec<RgbaImage> {
+        let entity = app.world_mut().spawn((GaussianCapture3d(capture.clone()), playback)).id();
+        let pictures = (0..steps).map(|_| picture(&mut app, DURATION / 4.0)).collect();
+        app.world_mut().despawn(entity);
+        pictures
+    };
+    let forward = play(Playback::default(), 3);
+    assert!(forward[0] != forward[1] && forward[1] != forward[2], "something moves");
+    let mut reverse = play(Playback { speed: -1.0, ..default() }, 3);
+    reverse.reverse();
+    assert!(reverse == forward, "backwards, from the end");
+    let to_and_fro = play(Playback { repeat: Repeat::PingPong, ..default() }, 7);
+    assert!(to_and_fro[..3] == forward[..], "to");
+    let mut fro = to_and_fro[4..].to_vec();
+    fro.reverse();
+    assert!(fro == forward, "and fro");
+}
+
+#[test]
+fn an_orthographic_camera_shows_what_is_near_brighter_as_depth() {
+    let Some(mut app) = app(SIZE) else { return };
+    let ball = |x, z| (blob(Vec3::new(x, 0.0, z), Vec3::splat(0.2), 0.98), Vec3::ONE);
+    spawn(&mut app, &scene(&[ball(-0.7, 0.5), ball(0.7, -1.5)]), ());
+    let camera = spawn_camera(&mut app, Msaa::Off, front());
+    let depth = CaptureViewSettings { debug: DebugView::Depth, ..default() };
+    insert(&mut app, camera, (Projection::Orthographic(orthographic()), depth));
+    let picture = picture(&mut app, 0.0);
+    // Three units are 150 pixels high.
+    let [near, far] = [MIDDLE.x - 35, MIDDLE.x + 35].map(|x| rgb(&picture, x, MIDDLE.y));
+    assert!(far[0] > 20, "what is far is dim, not black: {far:?}");
+    assert!(near[0].saturating_sub(far[0]) > 10, "what is near is brighter: {near:?}, not {far:?}");
+    assert!([near, far].iter().all(|[r, g, b]| r == g && g == b), "depth is grey: {near:?}, {far:?}");
+}
+
+#[test]
+fn extreme_exposure_is_white_and_finite() {
+    let Some(mut app) = app(SIZE) else { return };
+    app.insert_resource(ClearColor(Color::srgb_u8(51, 76, 102)));
+    spawn(&mut app, &lone(Vec3::splat(0.8)), CaptureSettings { exposure: 120.0, ..default() });
+    let camera = spawn_camera(&mut app, Msaa::Off, front());
+    insert(&mut app, camera, Hdr);
+    // A second camera's target keeps what the first one's rounds to 8 bits.
+    let mut image = Image::new_target_texture(SIZE.x, SIZE.y, TextureFormat::Rgba16Float, None);
+    image.texture_descriptor.usage |= TextureUsages::COPY_SRC;
+    let image = app.world_mut().resource_mut::<Assets<Image>>().add(image);
+    // One pixel of eight bytes is read as two of four.
+    let halves = Offscreen { image, size: SIZE * UVec2::new(2, 1) };
+    let second = spawn_camera(&mut app, Msaa::Off, front());
+    insert(&mut app, second, (Hdr, halves.target()));
+    let picture = picture(&mut app, 0.0);
+    assert_eq!(rgb(&picture, MIDDLE.x, MIDDLE.y), [255; 3], "the capture is white");
+    let corner = rgb(&picture, 2, 2);
+    let apart = corner.iter().zip([51u8, 76, 102]).map(|(seen, clear)| seen.abs_diff(clear)).max();
+    assert!(apart <= Some(1), "where it is not, the clear colour shows: {corner:?}");
+    let halves = testing::read(&mut app, &halves).expect("the second camera's picture");
+    // All bits of the exponent are set in infinities and in what is no number.
+    let mut exponents = halves.as_raw().chunks_exact(2).map(|half| u16::from_le_bytes([half[0], half[1]]) & 0x7c00);
+    assert!(exponents.all(|exponent| exponent != 0x7c00), "every value of the HDR target is finite");
+}
+
+#[test]
+fn without_tonemapping_bevy_shows_what_the_command_renders() {
+    let size = UVec2::new(160, 120);
+    let Some(mut app) = app(size) else { return };
+    let Some(mut headless) = gpu::headless() else { return };
+    let package = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/toybox.gs4d");
+    let scene = codec::load(&package, &CheckpointOptions::default()).expect("a readable package");
+    let scene = scene.into_runtime().expect("a drawable capture");
+    let pose = Transform::from_xyz(2.5, -3.0, 1.5).looking_at(Vec3::ZERO, Vec3::Z);
+    let seconds = 1.3;
+    let time = GaussianCapture::new(scene.clone()).time_at(seconds);
+
+    let clear = [51u8, 102, 153];
+    let background = Background::Color(clear.map(|value| f32::from(value) / 255.0));
+    let capture = headless.upload(&scene).expect("it fits");
+    let frame = headless.render(&capture, &view(&pose, size, time), background).expect("it is drawn");
+    let expected = frame.picture.to_rgb8();
+    assert!(expected.pixels().filter(|pixel| pixel.0 != clear).count() > 2000, "the capture is in view");
+
+    let [r, g, b] = clear;
+    app.insert_resource(ClearColor(Color::srgb_u8(r, g, b)));
+    let entity = spawn(&mut app, &scene, ());
+    insert(&mut app, entity, Playback::paused_at(seconds));
+    let camera = spawn_camera(&mut app, Msaa::Off, pose);
+    for target in ["8 bits", "HDR"] {
+        if target == "HDR" {
+            insert(&mut app, camera, Hdr);
+        }
+        let picture = picture(&mut app, 0.0);
+        let channel = |(seen, expected): (&image::Rgba<u8>, &image::Rgb<u8>)| {
+            seen.0.iter().zip(expected.0).map(|(seen, expected)| seen.abs_diff(expected)).max()
+        };
+        let apart = picture.pixels().zip(expected.pixels()).filter_map(channel).max();
+        assert!(apart <= Some(1), "{target}: Bevy and the command are {apart:?} / 255 apart");
+    }
+}

@@ -1,0 +1,172 @@
+//! `gs4d bake`, run as a user runs it on a scene's own pictures.
+//!
+//! In: a small synthetic scene and a dataset drawn from it by the CPU reference. Checked: a smaller package and both reports, stages that
+//! are done are not done again, data that does not belong and paths that cannot be written are refused.
+
+use crate::support::command::{arguments, gs4d};
+use crate::support::dataset;
+use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::offline;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use glam::{UVec2, Vec3};
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+struct Capture {
+    folder: TempDir,
+    scene: PathBuf,
+    data: PathBuf,
+}
+
+/// A scene and a dataset around `center`, which belongs to it at the origin.
+fn capture(center: Vec3, images: bool) -> Capture {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (scene, data) = (folder.path().join("scene.gs4d"), folder.path().join("data"));
+    let trained = synthesize(&SynthSettings { count: 2000, ..SynthSettings::default() });
+    offline::save(&scene, &trained, &WriteSettings::default()).expect("the folder can be written to");
+    let runtime = trained.into_runtime().expect("a synthetic scene can be drawn");
+    dataset::write(&data, &runtime, center, 4, 4, UVec2::splat(48), images);
+    Capture { folder, scene, data }
+}
+
+impl Capture {
+    fn out(&self) -> PathBuf {
+        self.folder.path().join("out.gs4d")
+    }
+
+    fn left(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.folder.path()).expect("the folder");
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+}
+
+fn read(path: &Path) -> String {
+    fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+#[test]
+fn a_bake_makes_a_smaller_package_and_says_what_it_cost() {
+    let capture = capture(Vec3::ZERO, true);
+    let out = capture.out();
+    let json =
+        gs4d(&arguments!["bake", &capture.scene, "--data", &capture.data, "--ratio", "0.4", "-o", &out, "--json"])
+            .json();
+    assert_eq!(json["gaussians"]["after"], 1200, "2000 less 40 percent");
+    let bytes = |path: &Path| fs::metadata(path).expect("the file is there").len();
+    assert!(bytes(&out) < bytes(&capture.scene), "smaller");
+    let info = gs4d(&arguments!["info", &out, "--json"]).json();
+    assert_eq!((&info["gaussians"], &info["package"]["intact"]), (&1200.into(), &true.into()), "a whole package");
+
+    let report: Value = serde_json::from_str(&read(&capture.folder.path().join("out.report.json"))).expect("JSON");
+    assert_eq!(report, json, "what is printed is what is kept");
+    for name in ["sections", "trials", "stages", "times", "choices", "filter_share"] {
+        assert!(report[name].as_array().is_some_and(|list| !list.is_empty()), "{name} in {report}");
+    }
+    assert_eq!(report["variances"]["borders"].as_array().map(Vec::len), Some(41), "a histogram");
+    assert_eq!(report["activity"]["after"]["overlap"][0], 1.0, "the first set agrees with itself");
+    assert_eq!(report["bytes"]["after"], bytes(&out), "the size of the package");
+    let psnr = |side: &str| report["evaluation"][side]["mean"]["psnr"].as_f64().expect("a number");
+    assert!(psnr("before") > 45.0 && psnr("after") > 15.0, "its own pictures: {}", report["evaluation"]);
+
+    let html = read(&capture.folder.path().join("out.report.html"));
+    for title in [
+        "Size by section",
+        "Temporal variance",
+        "Active ratio over time",
+        "IoU of active sets over time",
+        "PSNR against prune ratio",
+        "Views",
+    ] {
+        assert!(html.contains(title), "{title} is on the page");
+    }
+    assert!(html.matches("<svg").count() >= 5 && html.contains("data:image/png;base64,"), "plots and pictures");
+    assert!(!html.contains("://") && !html.contains("src=\"/"), "nothing is loaded from elsewhere");
+    assert_eq!(
+        capture.left(),
+        ["data", "out.gs4d", "out.report.html", "out.report.json", "scene.gs4d"],
+        "nothing else"
+    );
+}
+
+#[test]
+fn stages_that_are_done_are_not_done_again() {
+    let capture = capture(Vec3::ZERO, true);
+    let out = capture.out();
+    let bake = |more: &[&str]| {
+        let fixed = arguments!["bake", &capture.scene, "--data", &capture.data, "-o", &out, "--keep-work"];
+        let run = gs4d(&[fixed.to_vec(), more.iter().map(Into::into).collect()].concat());
+        assert_eq!(run.code, Some(0), "it works: {}", run.err);
+        run.err
+    };
+    let skipped = |log: &str, stage: &str| log.contains(&format!("{stage}: skipped"));
+    let first = bake(&["--ratio", "0.5"]);
+    assert!(!first.contains("skipped"), "everything is new: {first}");
+    let package = fs::read(&out).expect("the package is there");
+    let again = bake(&["--ratio", "0.5"]);
+    for stage in ["score", "prune", "mask", "compress"] {
+        assert!(skipped(&again, stage), "{stage}: {again}");
+    }
+    assert_eq!(fs::read(&out).expect("still there"), package, "the same package");
+    let other = bake(&["--ratio", "0.3"]);
+    assert!(skipped(&other, "score") && !skipped(&other, "prune") && !skipped(&other, "compress"), "{other}");
+    fs::remove_file(&out).expect("the package is there");
+    let lost = bake(&["--ratio", "0.3"]);
+    assert!(skipped(&lost, "prune") && !skipped(&lost, "compress"), "a lost package is made again: {lost}");
+}
+
+#[test]
+fn a_loss_decides_how_many_stay() {
+    let capture = capture(Vec3::ZERO, true);
+    let bake = |loss: &str| {
+        let fixed = arguments![
+            "bake",
+            &capture.scene,
+            "--data",
+            &capture.data,
+            "-o",
+            capture.out(),
+            "--max-loss",
+            loss,
+            "--json"
+        ];
+        gs4d(&fixed).json()["gaussians"]["after"].as_u64().expect("a count")
+    };
+    let (careful, careless) = (bake("0.5"), bake("20"));
+    assert!(careless < careful && careful <= 2000, "more loss, fewer Gaussians: {careless} and {careful}");
+}
+
+#[test]
+fn what_cannot_be_baked_is_refused() {
+    let elsewhere = capture(Vec3::splat(1000.0), true);
+    let out = elsewhere.out();
+    gs4d(&arguments!["bake", &elsewhere.scene, "--data", &elsewhere.data, "--ratio", "0.5", "-o", &out])
+        .must_fail("no Gaussian contributes");
+    assert!(!out.exists(), "nothing is written");
+
+    let capture = capture(Vec3::ZERO, false);
+    let inside_a_file = capture.scene.join("out.gs4d");
+    gs4d(&arguments!["bake", &capture.scene, "--data", &capture.data, "--ratio", "0.5", "-o", &inside_a_file])
+        .must_fail("out.gs4d");
+    gs4d(&arguments!["bake", &capture.scene, "--data", &capture.data, "--ratio", "0.5", "-o", &capture.scene])
+        .must_fail("scene.gs4d");
+    gs4d(&arguments!["bake", &capture.scene, "--data", &capture.data, "--max-loss", "1", "-o", capture.out()])
+        .must_fail("--ratio");
+    let report = gs4d(&arguments![
+        "bake",
+        &capture.scene,
+        "--data",
+        &capture.data,
+        "--ratio",
+        "0.5",
+        "-o",
+        capture.out(),
+        "--json",
+    ])
+    .json();
+    assert!(report["evaluation"].is_null() && report["gaussians"]["after"] == 1000, "cameras suffice: {report}");
+}

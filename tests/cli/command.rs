@@ -1,0 +1,168 @@
+//! The `gs4d` command, run as a user runs it: looking into captures, converting them, and everything that is wrong with a command line.
+//!
+//! In: command lines, whole and damaged files. Out: proof that exit codes, what is printed and what is written are right, and that
+//! nothing panics.
+
+use crate::support::command::{arguments, folder, gs4d, scene};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+#[test]
+fn conversion_keeps_what_it_should() {
+    let folder = folder();
+    let trained = scene(&folder, "700");
+    let info = gs4d(&arguments!["info", &trained, "--json"]).json();
+    assert_eq!(info["gaussians"], 700, "the count asked for");
+    assert_eq!(
+        (&info["form"], &info["degree"], &info["degree_t"]),
+        (&"trained".into(), &3.into(), &2.into()),
+        "trained"
+    );
+
+    let copy = folder.path().join("copy.gs4d");
+    gs4d(&arguments!["convert", &trained, &copy]).text();
+    let bytes = |path: &Path| fs::read(path).expect("the package is there");
+    assert_eq!(bytes(&trained), bytes(&copy), "a plain conversion changes nothing");
+
+    let small = folder.path().join("small.gs4d");
+    let converted = gs4d(&arguments![
+        "convert",
+        &trained,
+        "--form",
+        "runtime",
+        "--sh-degree",
+        "0",
+        "--up",
+        "-y",
+        "--background",
+        "1,0.5,0",
+        "--json",
+        "-o",
+        &small,
+    ])
+    .json();
+    assert_eq!(converted["bytes_out"], bytes(&small).len(), "the size that is printed");
+    let info = gs4d(&arguments!["info", &small, "--json"]).json();
+    assert_eq!(
+        (&info["form"], &info["degree"], &info["coefficients"]),
+        (&"runtime".into(), &0.into(), &1.into()),
+        "small"
+    );
+    assert_eq!(info["switches"]["playback"]["up"], "neg_y", "the axis is stored");
+    assert_eq!(info["switches"]["trained_with"]["background"][1], 0.5, "the background is stored");
+    assert_eq!(info["package"]["intact"], true, "checksums hold");
+
+    let back = folder.path().join("back.gs4d");
+    gs4d(&arguments!["convert", &small, &back, "--form", "trained"]).must_fail("small.gs4d");
+    assert!(!back.exists(), "nothing is written");
+}
+
+#[test]
+fn a_package_knows_how_it_was_trained() {
+    let folder = folder();
+    let path = scene(&folder, "50");
+    gs4d(&arguments!["info", &path, "--time-interval", "0,10"]).must_fail("--time-interval");
+    gs4d(&arguments!["info", &path, "--time-interval", "0,1"]).text();
+}
+
+#[test]
+fn people_get_text() {
+    const VERBS: [&str; 12] =
+        ["info", "convert", "render", "compare", "synth", "bench", "score", "prune", "mask", "eval", "ablate", "bake"];
+    let folder = folder();
+    let path = scene(&folder, "50");
+    let text = gs4d(&arguments!["info", &path]).text();
+    for expected in ["Gaussians", "time interval", "bounds", "sh_rest", "hold"] {
+        assert!(text.contains(expected), "{expected} in {text}");
+    }
+    for verb in VERBS {
+        assert!(gs4d(&[verb, "--help"]).text().contains("Examples:"), "{verb} explains itself");
+    }
+}
+
+#[test]
+fn damaged_files_are_named() {
+    let folder = folder();
+    let good = fs::read(scene(&folder, "300")).expect("the package is there");
+    let flipped = |at: usize| {
+        let mut bytes = good.clone();
+        bytes[at] ^= 0x10;
+        bytes
+    };
+    let bad = [
+        ("empty.gs4d", Vec::new()),
+        ("garbage.gs4d", vec![0xa5; 5000]),
+        ("garbage.pth", b"PK\x03\x04 and nothing after it".repeat(20)),
+        ("short.gs4d", good[..good.len() - 10].to_vec()),
+        ("header.gs4d", flipped(40)),
+        ("body.gs4d", flipped(good.len() / 2)),
+        ("last.gs4d", flipped(good.len() - 1)),
+        ("long.gs4d", [good.as_slice(), b"more"].concat()),
+    ];
+    for (name, bytes) in bad {
+        let path = folder.path().join(name);
+        fs::write(&path, bytes).expect("the folder can be written to");
+        let out = folder.path().join("out.gs4d");
+        gs4d(&arguments!["info", &path]).must_fail(name);
+        gs4d(&arguments!["convert", &path, &out]).must_fail(name);
+        gs4d(&arguments!["bench", &path, "--frames", "1"]).must_fail(name);
+        assert!(!out.exists(), "{name}: nothing is written");
+        let json = gs4d(&arguments!["info", &path, "--json"]);
+        let document: Value = serde_json::from_str(&json.out).expect("one JSON document for a failure, too");
+        assert!(document["error"].as_str().is_some_and(|error| error.contains(name)), "{name} in {document}");
+    }
+}
+
+#[test]
+fn bad_paths_are_named() {
+    let folder = folder();
+    let path = scene(&folder, "50");
+    let before = fs::read(&path).expect("the package is there");
+    let nowhere = folder.path().join("nowhere.pth");
+    gs4d(&arguments!["info", &nowhere]).must_fail("nowhere.pth");
+    gs4d(&arguments!["convert", &path, &path]).must_fail("scene.gs4d");
+    let roundabout = folder.path().join(".").join("scene.gs4d");
+    gs4d(&arguments!["convert", &path, &roundabout]).must_fail("scene.gs4d");
+    assert_eq!(fs::read(&path).expect("still there"), before, "the input is as it was");
+
+    let inside_a_file = path.join("out.gs4d");
+    gs4d(&arguments!["convert", &path, &inside_a_file]).must_fail("out.gs4d");
+    gs4d(&arguments!["synth", &inside_a_file]).must_fail("out.gs4d");
+    gs4d(&arguments!["render", &path, "--cameras", "gone.json", "--out", "frames"]).must_fail("gone.json");
+    gs4d(&arguments!["convert", &path, &nowhere]).must_fail("nowhere.pth");
+    gs4d(&arguments!["compare", &path, folder.path()]).must_fail("scene.gs4d");
+    let left = fs::read_dir(folder.path()).expect("the folder").count();
+    assert_eq!(left, 1, "no file stays behind");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn paths_need_not_be_unicode() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let folder = folder();
+    let path = folder.path().join(OsStr::from_bytes(b"sc\xff\xfene.gs4d"));
+    gs4d(&arguments!["synth", &path, "--count", "20"]).text();
+    let info = gs4d(&arguments!["info", &path, "--json"]).json();
+    assert_eq!(info["gaussians"], 20, "read back");
+    let gone = folder.path().join(OsStr::from_bytes(b"g\xffne.pth"));
+    gs4d(&arguments!["info", &gone]).must_fail("ne.pth");
+}
+
+#[test]
+fn usage_errors_name_the_option() {
+    for (arguments, name) in [
+        (&["info"][..], "FILE"),
+        (&["frobnicate"], "frobnicate"),
+        (&["synth", "x.gs4d", "--count", "0"], "--count"),
+        (&["info", "x.gs4d", "--background", "1,2"], "--background"),
+        (&["info", "x.gs4d", "--time-interval", "1,0"], "--time-interval"),
+        (&["info", "x.gs4d", "--up", "sideways"], "--up"),
+        (&["render", "x.gs4d", "--out", "frames"], "--cameras"),
+        (&["render", "x.gs4d", "--orbit", "3", "--size", "0x9", "--out", "frames"], "--size"),
+        (&["synth"], "OUT"),
+    ] {
+        gs4d(arguments).must_fail(name);
+    }
+}

@@ -1,0 +1,61 @@
+//! `gs4d compare`, run as a user runs it.
+//!
+//! In: pictures of known values. Out: proof that the numbers are right and that what cannot be compared is named.
+
+use crate::support::command::{arguments, folder, gs4d};
+use bevy_gs4d::view::Picture;
+use glam::{UVec2, Vec3};
+use serde_json::Value;
+use std::fs;
+use tempfile::TempDir;
+
+#[test]
+fn comparison_tells_equal_from_different() {
+    let (a, b) = (folder(), folder());
+    let size = UVec2::new(24, 16);
+    let save = |folder: &TempDir, name: &str, value: f32| {
+        let picture = Picture::filled(size, Vec3::splat(value));
+        picture.to_rgb8().save(folder.path().join(name)).expect("the folder can be written to");
+    };
+    save(&a, "same.png", 0.2);
+    save(&b, "same.png", 0.2);
+    save(&a, "other.png", 0.2);
+    save(&b, "other.png", 0.4);
+    save(&a, "alone.png", 0.1);
+    let json = gs4d(&arguments!["compare", a.path(), b.path(), "--json"]).json();
+    let row = |name: &str| {
+        let pictures = json["pictures"].as_array().expect("a list of pictures");
+        pictures.iter().find(|row| row["name"] == name).expect("the picture is listed").clone()
+    };
+    assert!(row("same")["psnr"].is_null(), "infinite");
+    assert!((row("same")["ssim"].as_f64().expect("a number") - 1.0).abs() < 1e-9, "identical");
+    // 51 and 102 of 255: a difference of exactly one fifth.
+    let psnr = row("other")["psnr"].as_f64().expect("a number");
+    assert!((psnr - 13.979_4).abs() < 1e-3, "20 log10(5), not {psnr}");
+    assert_eq!(json["only_in_a"][0], "alone", "what has no partner is listed");
+
+    let one = a.path().join("same.png");
+    let text = gs4d(&arguments!["compare", &one, &b.path().join("other.png")]).text();
+    assert!(text.contains("13.979"), "two files: {text}");
+    save(&a, "same.jpg", 0.2);
+    gs4d(&arguments!["compare", a.path(), b.path()]).must_fail("same.");
+    gs4d(&arguments!["compare", b.path(), folder().path()]).must_fail("no two pictures");
+    gs4d(&arguments!["compare", &one, b.path()]).must_fail("not a folder");
+}
+
+#[test]
+fn raw_pictures_need_their_size() {
+    let folder = folder();
+    let path = folder.path().join("a.f32");
+    let picture = Picture::filled(UVec2::new(16, 12), Vec3::new(-0.5, 0.5, 1.5));
+    fs::write(&path, picture.to_raw()).expect("the folder can be written to");
+    gs4d(&arguments!["compare", &path, &path]).must_fail("--size");
+    gs4d(&arguments!["compare", &path, &path, "--size", "16x13"]).must_fail("a.f32");
+    let json = gs4d(&arguments!["compare", &path, &path, "--size", "16x12", "--json"]).json();
+    assert_eq!(json["pictures"][0]["psnr_pooled"], Value::Null, "identical: infinite");
+    let png = folder.path().join("a.png");
+    picture.clamped().to_rgb8().save(&png).expect("the folder can be written to");
+    let json = gs4d(&arguments!["compare", &path, &png, "--size", "16x12", "--json"]).json();
+    let psnr = json["pictures"][0]["psnr_pooled"].as_f64().expect("0.5 is no 8-bit value");
+    assert!(psnr > 50.0, "clamped against 8 bits: {psnr}");
+}

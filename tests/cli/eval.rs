@@ -1,0 +1,108 @@
+//! `gs4d eval` and `gs4d ablate`, run as a user runs them on a scene's own pictures.
+//!
+//! In: a small synthetic scene and a dataset drawn from it by the CPU reference. Checked: the scene matches its own pictures, what is
+//! missing is named, the tables have the rows and columns that they promise.
+
+use crate::support::command::{arguments, gs4d};
+use crate::support::dataset;
+use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::offline;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use glam::{UVec2, Vec3};
+use std::fs;
+use std::path::PathBuf;
+use tempfile::TempDir;
+
+/// A scene and its own pictures.
+fn capture(size: UVec2) -> (TempDir, PathBuf, PathBuf) {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (scene, data) = (folder.path().join("scene.gs4d"), folder.path().join("data"));
+    let trained = synthesize(&SynthSettings { count: 1500, ..SynthSettings::default() });
+    offline::save(&scene, &trained, &WriteSettings::default()).expect("the folder can be written to");
+    let runtime = trained.into_runtime().expect("a synthetic scene can be drawn");
+    dataset::write(&data, &runtime, Vec3::ZERO, 3, 3, size, true);
+    (folder, scene, data)
+}
+
+#[test]
+fn a_scene_matches_its_own_pictures() {
+    let (folder, scene, data) = capture(UVec2::new(192, 176));
+    let pictures = folder.path().join("pictures");
+    let json = gs4d(&arguments!["eval", &scene, "--data", &data, "--out", &pictures, "--json"]).json();
+    assert_eq!((&json["split"], json["views"].as_array().map(Vec::len)), (&"test".into(), Some(6)), "the test views");
+    let mean = |name: &str| json["mean"][name].as_f64().unwrap_or_else(|| panic!("{name} in {json}"));
+    assert!(mean("psnr") > 45.0 && mean("psnr_pooled") > 45.0, "only the rounding to 8 bits differs: {}", json["mean"]);
+    assert!(mean("ssim") > 0.99 && mean("ms_ssim") > 0.99, "alike: {}", json["mean"]);
+    assert!((0.0..0.05).contains(&mean("flip")), "hardly any difference: {}", json["mean"]);
+    let name = json["views"][0]["name"].as_str().expect("a name");
+    let picture = image::open(pictures.join(format!("{name}.png"))).expect("a picture").into_rgb8();
+    assert_eq!(picture.dimensions(), (3 * 192, 176), "reference, render and difference");
+
+    let some = gs4d(&arguments![
+        "eval",
+        &scene,
+        "--data",
+        &data,
+        "--split",
+        "train",
+        "--views",
+        "4",
+        "--metrics",
+        "psnr",
+        "--resolution",
+        "2",
+        "--json",
+    ])
+    .json();
+    assert_eq!(some["views"].as_array().map(Vec::len), Some(4), "an even subset");
+    assert!(some["mean"]["ssim"].is_null() && some["mean"]["psnr"].is_number(), "what was asked for: {}", some["mean"]);
+    let text = gs4d(&arguments!["eval", &scene, "--data", &data, "--metrics", "psnr,ssim"]).text();
+    assert!(text.contains("mean of 6") && text.contains("SSIM") && !text.contains("FLIP"), "a table: {text}");
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    let (folder, scene, data) = capture(UVec2::splat(32));
+    gs4d(&arguments!["eval", &scene, "--data", folder.path().join("nowhere")]).must_fail("transforms_test.json");
+    gs4d(&arguments!["eval", &scene, "--data", &data, "--split", "val"]).must_fail("transforms_val.json");
+    gs4d(&arguments!["eval", &scene, "--data", &data, "--metrics", "lpips"]).must_fail("lpips");
+    fs::remove_file(data.join("test/c00_01.png")).expect("the picture is there");
+    gs4d(&arguments!["eval", &scene, "--data", &data]).must_fail("c00_01.png");
+    gs4d(&arguments!["eval", &scene]).must_fail("--data");
+}
+
+#[test]
+fn an_ablation_has_every_row() {
+    let (folder, scene, data) = capture(UVec2::splat(48));
+    let csv = folder.path().join("table.csv");
+    let json = gs4d(&arguments![
+        "ablate",
+        &scene,
+        "--data",
+        &data,
+        "--ratios",
+        "0.2,0.6",
+        "--variants",
+        "energy,full",
+        "--filters",
+        "support,key-frame",
+        "--key-frames",
+        "3,5",
+        "--csv",
+        &csv,
+        "--json",
+    ])
+    .json();
+    let rows = json["rows"].as_array().expect("a list of rows");
+    assert_eq!(rows.len(), 1 + 2 * 2 + 2 * 2, "vanilla, filters by key-frames, variants by ratios: {json}");
+    let row = |name: &str| rows.iter().find(|row| row["row"] == name).unwrap_or_else(|| panic!("{name} in {json}"));
+    let psnr = |name: &str| row(name)["psnr"].as_f64().expect("a number");
+    assert!(psnr("vanilla") > 45.0, "its own pictures");
+    assert_eq!(row("filter only, support, 5 key-frames")["psnr"], row("vanilla")["psnr"], "support changes no pixel");
+    assert!(row("filter only, support, 5 key-frames")["active_share"].as_f64().is_some_and(|s| s < 1.0), "some rest");
+    assert_eq!(row("prune 60% energy")["gaussians"], 600, "1500 less 60 percent");
+    assert!(psnr("prune 20% energy") > psnr("prune 60% energy"), "fewer Gaussians, less likeness");
+    let lines = fs::read_to_string(&csv).expect("the table is there");
+    assert_eq!(lines.lines().count(), rows.len() + 1, "heads and rows: {lines}");
+    assert!(lines.starts_with("row,psnr,psnr_pooled,ssim,gaussians,active_share"), "columns: {lines}");
+}

@@ -1,0 +1,20 @@
+//! The `gs4d` command, run as a user runs it.
+//!
+//! In: command lines, scenes and datasets made here, and the trained captures where `GS4D_DATA` names their folder. Out: one test
+//! binary. Each module says which verbs it tests.
+
+mod bake;
+mod command;
+mod compare;
+mod eval;
+mod prune;
+mod render;
+
+#[path = "../support"]
+mod support {
+    pub mod command;
+    pub mod data;
+    pub mod dataset;
+    pub mod npz;
+    pub mod skip;
+}

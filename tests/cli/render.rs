@@ -1,0 +1,107 @@
+//! `gs4d render` and `bench`, run as a user runs them.
+//!
+//! In: a synthetic scene; with `GS4D_DATA` set, the trained captures. Out: proof that pictures are written and frames timed, and that
+//! renders match the original's. Skipped where there is no GPU.
+
+use crate::support::command::{arguments, folder, gs4d, scene};
+use crate::support::data::data;
+use crate::support::npz;
+use crate::support::skip::skip;
+use bevy_gs4d::offline::metrics;
+use bevy_gs4d::renderer::GpuContext;
+use bevy_gs4d::view::Picture;
+use glam::{UVec2, Vec3};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+fn no_gpu() -> bool {
+    let none = GpuContext::adapters().is_empty();
+    if none {
+        skip("no GPU adapter");
+    }
+    none
+}
+
+#[test]
+fn pictures_are_drawn_and_written() {
+    if no_gpu() {
+        return;
+    }
+    let folder = folder();
+    let (path, frames) = (scene(&folder, "3000"), folder.path().join("deep/frames"));
+    let json = gs4d(&arguments![
+        "render", &path, "--orbit", "3", "--size", "64x48", "--raw", "--checks", "--json", "--out", &frames,
+    ])
+    .json();
+    let list = json["frames"].as_array().expect("a list of frames");
+    assert_eq!(list.len(), 3, "as many as asked for");
+    assert_eq!((&list[0]["time"], &list[2]["time"]), (&0.0.into(), &1.0.into()), "time runs through the interval");
+    for index in 0..3 {
+        let raw = raw_picture(&frames.join(format!("orbit_{index:04}.f32")), UVec2::new(64, 48));
+        let png = image::open(frames.join(format!("orbit_{index:04}.png"))).expect("a picture").into_rgb8();
+        assert_eq!(png, raw.to_rgb8(), "both are the same picture");
+        let lit = raw.pixels.iter().filter(|pixel| pixel.max_element() > 0.1).count();
+        assert!(lit > 64 * 48 / 50, "the scene is in the picture: {lit} pixels");
+    }
+    let alike = gs4d(&arguments!["compare", &frames, &frames, "--size", "64x48", "--json"]).json();
+    assert_eq!(alike["pictures"].as_array().map(Vec::len), Some(3), "raw pictures go before others of their name");
+    assert!(alike["mean"]["psnr"].is_null(), "equal to themselves");
+}
+
+#[test]
+fn benchmarks_measure() {
+    if no_gpu() {
+        return;
+    }
+    let folder = folder();
+    let path = scene(&folder, "1000");
+    let bench = |more: &[&str]| {
+        let fixed =
+            arguments!["bench", &path, "--frames", "3", "--views", "2", "--times", "2", "--size", "64x64"].to_vec();
+        gs4d(&[fixed, more.iter().map(Into::into).collect()].concat())
+    };
+    let json = bench(&["--json"]).json();
+    assert_eq!((&json["views"], &json["timings"]["frames"]), (&4.into(), &3.into()), "two views at two times");
+    assert!(json["timings"]["wall_milliseconds"].as_f64().is_some_and(|ms| ms > 0.0), "frames take time");
+    assert!(bench(&[]).text().contains("frame, many in flight"), "a table");
+    gs4d(&arguments!["bench", &path, "--adapter", "no such card"]).must_fail("no such card");
+}
+
+fn raw_picture(path: &Path, size: UVec2) -> Picture {
+    let bytes = fs::read(path).expect("the raw picture is there");
+    assert_eq!(bytes.len(), size.x as usize * size.y as usize * 12, "height x width x 3 float32");
+    let values: Vec<f32> = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+    Picture { size, pixels: values.chunks_exact(3).map(Vec3::from_slice).collect() }
+}
+
+#[test]
+fn real_captures_match_the_original() {
+    let Some(data) = data() else { return };
+    if no_gpu() {
+        return;
+    }
+    for (checkpoint, golden) in [
+        ("toybox/toybox_chkpnt.pth", "toybox/golden_vanilla"),
+        ("toybox/toybox_4dgs1k.pth", "toybox/golden_4dgs1k"),
+        ("toybox/toybox_45k.pth", "toybox/golden_45k"),
+        ("standup/standup_chkpnt.pth", "standup/standup_golden"),
+    ] {
+        let out = folder();
+        let cameras = data.join(format!("{golden}.json"));
+        let scene = data.join(checkpoint);
+        gs4d(&arguments!["render", &scene, "--raw", "--cameras", &cameras, "--out", out.path()]).text();
+        let views: Value =
+            serde_json::from_slice(&fs::read(&cameras).expect("the cameras are there")).expect("cameras are JSON");
+        let truth = npz::pictures(&data.join(format!("{golden}.npz")), "images");
+        let views = views["views"].as_array().expect("a list of views");
+        assert_eq!(views.len(), truth.len(), "{golden}: a picture for each view");
+        for (view, truth) in views.iter().zip(&truth) {
+            let name = Path::new(view["file"].as_str().expect("a file")).file_stem().expect("a stem");
+            let drawn = raw_picture(&out.path().join(name).with_extension("f32"), truth.size);
+            let psnr = metrics::psnr_pooled(&drawn, truth).expect("one size");
+            eprintln!("{checkpoint} {}: {psnr:.2} dB", name.display());
+            assert!(psnr >= 75.0, "{checkpoint} {}: {psnr:.2} dB", name.display());
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! The real captures, found through `GS4D_DATA`.
+
+use std::path::{Path, PathBuf};
+
+use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, Dataset, ImageMode, Split};
+use bevy_gs4d::view::Lens;
+use glam::{UVec2, Vec3};
+
+use super::resolution_option;
+use crate::support::data::data;
+
+fn capture(name: &str) -> Option<PathBuf> {
+    Some(data()?.join(name))
+}
+
+/// Every golden view has the camera that the transforms file gives for the same image.
+fn assert_golden_cameras(folder: &Path, golden: &str, options: &CameraOptions) {
+    let views = Dataset::open(folder, Split::Test, options).expect("a dataset").views;
+    let golden = CameraFile::load(&folder.join(golden), &CameraOptions::default()).expect("golden views");
+    for view in &golden {
+        let same = views.iter().find(|other| other.name == view.name).expect("the same image in the test split");
+        assert_eq!((view.time, view.camera.size), (same.time, same.camera.size), "{}", view.name);
+        let (a, b) = (view.camera.world_to_camera, same.camera.world_to_camera);
+        assert!(a.abs_diff_eq(b, 1e-5), "{}: {a} and {b}", view.name);
+        let (Lens::Fov { tan: a }, Lens::Fov { tan: b }) = (view.camera.lens, same.camera.lens) else {
+            panic!("{}: both are FoV cameras", view.name);
+        };
+        assert!(a.abs_diff_eq(b, 1e-6), "{}: {a} and {b}", view.name);
+    }
+}
+
+#[test]
+fn toybox_test_split_is_read() {
+    let Some(folder) = capture("toybox") else { return };
+    let dataset = Dataset::open(&folder, Split::Test, &CameraOptions::default()).expect("a dataset");
+    assert_eq!(dataset.views.len(), 60, "two cameras of thirty frames");
+    assert_eq!((dataset.views[0].name.as_str(), dataset.views[0].time), ("c04_f00", 0.0), "the first frame");
+    assert!(dataset.views.iter().all(|view| view.camera.size == UVec2::splat(400)), "400x400 everywhere");
+    assert!(dataset.require_images().is_ok(), "images and masks are all there");
+    for golden in ["golden_vanilla.json", "golden_4dgs1k.json", "golden_45k.json"] {
+        assert_golden_cameras(&folder, golden, &CameraOptions::default());
+    }
+    let image = dataset.views[0].load_image([0.0; 3], ImageMode::InMemory).expect("an image");
+    let mean = image.picture.pixels.iter().map(|p| f64::from(p.element_sum())).sum::<f64>() / (3.0 * 400.0 * 400.0);
+    // JPEG decoders differ in the last bit.
+    assert!((mean - 0.2664869526).abs() < 1e-3, "{mean}");
+    let alpha = image.alpha.expect("a mask");
+    let covered = alpha.iter().map(|&v| f64::from(v)).sum::<f64>() / alpha.len() as f64;
+    assert!((covered - 99.3727625 / 255.0).abs() < 1e-6, "{covered}");
+}
+
+#[test]
+fn standup_at_resolution_two_equals_the_originals_values() {
+    let Some(folder) = capture("standup") else { return };
+    let options = resolution_option(2);
+    let dataset = Dataset::open(&folder, Split::Test, &options).expect("a dataset");
+    assert!(dataset.views.iter().all(|view| view.camera.size == UVec2::splat(400)), "800 halved");
+    assert_golden_cameras(&folder, "standup_golden.json", &options);
+    let image = dataset.views[0].load_image([0.0; 3], ImageMode::InMemory).expect("an image");
+    // Worked out with numpy and Pillow.
+    let pixel = image.picture.pixel(200, 200);
+    assert!(pixel.abs_diff_eq(Vec3::new(0.6431373, 0.28235295, 0.22352941), 1e-6), "{pixel}");
+    let mean = image.picture.pixels.iter().map(|p| p.as_dvec3().element_sum()).sum::<f64>() / (3.0 * 400.0 * 400.0);
+    assert!((mean - 0.026506900842140507).abs() < 1e-8, "{mean}");
+    let alpha = image.alpha.expect("transparent images");
+    let covered = alpha.iter().map(|&v| f64::from(v)).sum::<f64>() / alpha.len() as f64;
+    assert!((covered - 0.06513357848631277).abs() < 1e-8, "{covered}");
+}
+
+#[test]
+fn standup_training_cameras_need_no_training_images() {
+    let Some(folder) = capture("standup") else { return };
+    let dataset = Dataset::open(&folder, Split::Train, &resolution_option(2)).expect("cameras");
+    assert_eq!(dataset.views.len(), 150, "every training camera");
+    assert_eq!(dataset.views[0].camera.size, UVec2::splat(400), "the size comes from the test images");
+    let error = dataset.require_images().expect_err("the training images are not there").to_string();
+    assert!(error.contains("150 of 150"), "{error}");
+}

@@ -1,0 +1,171 @@
+//! Camera files and options that are wrong: a clear error, never a panic.
+
+use std::ffi::OsStr;
+use std::path::Path;
+
+use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, Dataset, DatasetError, MAX_SIDE, Split, TrainingView};
+use glam::UVec2;
+use proptest::prelude::*;
+use serde_json::{Value, json};
+
+use super::{Folder, identity, lens_values, load, resolution_option, transforms, with};
+use crate::support::skip::skip;
+
+#[test]
+fn wrong_entries_are_errors_that_name_file_frame_and_reason() {
+    let singular = json!([[1, 0, 0, 0], [2, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]);
+    let projective = json!([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 1, 1]]);
+    let three_rows = json!([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]);
+    let cases = [
+        ("/frames/0/transform_matrix", singular, "cannot be inverted"),
+        ("/frames/0/transform_matrix", projective, "0 0 0 1"),
+        ("/frames/0/transform_matrix", three_rows, "length 3"),
+        ("/frames/0/transform_matrix", Value::Null, "array of length 4"),
+        ("/frames/0/transform_matrix/0/0", Value::Null, "null"),
+        ("/frames/0/transform_matrix/0/3", json!(1e300), "float32"),
+        ("/frames/0/time", json!(1e300), "time"),
+        ("/frames/0/time", json!("soon"), "soon"),
+        ("/frames/0/file_path", json!(".."), "names no file"),
+        ("/frames/0/file_path", json!(""), "names no file"),
+        ("/frames/0/w", json!(0), "0x400"),
+        ("/frames/0/w", json!(1e12), "16384"),
+        ("/frames/0/h", json!(2.5), "whole number"),
+        ("/camera_angle_x", json!(0), "camera_angle_x is 0"),
+        ("/camera_angle_x", json!(3.2), "camera_angle_x is 3.2"),
+        ("/camera_angle_x", json!(1e-60), "lens"),
+        ("/camera_angle_x", Value::Null, "no lens"),
+    ];
+    for (pointer, value, reason) in cases {
+        let error =
+            load(&with(transforms(), pointer, value), &CameraOptions::default()).expect_err(pointer).to_string();
+        for part in ["transforms_test.json", "frame 0", reason] {
+            assert!(error.contains(part), "{pointer}: {part:?} is not in: {error}");
+        }
+    }
+}
+
+#[test]
+fn wrong_files_are_errors_that_name_them() {
+    let folder = Folder::new();
+    let cases = [
+        (r#"{"frames": []}"#, "empty"),
+        (r#"{"views": []}"#, "empty"),
+        (r#"{"frames": 3}"#, "neither"),
+        (r#"{"cameras": [1, 2]}"#, "neither"),
+        ("[]", "neither"),
+        ("3", "neither"),
+        ("", "EOF"),
+        (r#"{"frames": [{"file_path": "a", "time": NaN}]}"#, "line 1"),
+        (r#"{"frames": [1e999]}"#, "range"),
+        (r#"{"frames": [{}], "w": "wide"}"#, "wide"),
+        (r#"{"frames": [{}]}"#, "file_path"),
+        (r#"{"frames": [7]}"#, "frame 0"),
+        (r#"{"views": [{"file": "a"}]}"#, "width"),
+    ];
+    for (text, reason) in cases {
+        let error =
+            CameraFile::load(&folder.write("bad.json", text), &CameraOptions::default()).expect_err(text).to_string();
+        assert!(error.contains("bad.json") && error.contains(reason), "{text}: {reason:?} is not in: {error}");
+    }
+    let deep = "[".repeat(100_000);
+    assert!(CameraFile::load(&folder.write("deep.json", deep), &CameraOptions::default()).is_err(), "bounded depth");
+    let error = CameraFile::load(&folder.path().join("none.json"), &CameraOptions::default()).expect_err("no file");
+    assert!(error.to_string().contains("none.json"), "{error}");
+    let error = Dataset::open(folder.path(), Split::Test, &CameraOptions::default()).expect_err("no dataset");
+    assert!(error.to_string().contains("transforms_test.json"), "{error}");
+}
+
+#[test]
+fn unusable_options_are_errors() {
+    for size in [UVec2::ZERO, UVec2::new(0, 5), UVec2::splat(u32::MAX)] {
+        let error =
+            load(&transforms(), &CameraOptions { size: Some(size), ..Default::default() }).expect_err("a bad size");
+        assert!(matches!(error, DatasetError::Size { .. }), "{error}");
+    }
+    for resolution in [0, -2, i32::MIN, i32::MAX] {
+        let error = load(&transforms(), &resolution_option(resolution)).expect_err("a bad resolution");
+        assert!(matches!(error, DatasetError::Resolution { .. }), "{error}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn folders_that_are_not_utf8_work() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = Folder::new();
+    let name = Path::new(OsStr::from_bytes(b"sc\xffne"));
+    if std::fs::create_dir(folder.path().join(name)).is_err() {
+        skip("this file system takes UTF-8 names only");
+        return;
+    }
+    let path = folder.write(name.join("transforms_test.json"), transforms().to_string());
+    let views = CameraFile::load(&path, &CameraOptions::default()).expect("a valid camera file");
+    assert_eq!(views[0].image, path.with_file_name("./a.png"), "the folder's bytes are kept");
+}
+
+/// Any small JSON value.
+fn any_json() -> impl Strategy<Value = Value> {
+    let leaf = prop_oneof![
+        Just(Value::Null),
+        any::<bool>().prop_map(Value::from),
+        any::<i64>().prop_map(Value::from),
+        any::<f64>().prop_map(Value::from),
+        "[./a-z]{0,8}".prop_map(Value::from),
+        Just(identity()),
+    ];
+    leaf.prop_recursive(2, 16, 4, |inner| proptest::collection::vec(inner, 0..5).prop_map(Value::from))
+}
+
+/// What holds for every file: a usable list of views, or an error that names the file.
+fn check_outcome(outcome: Result<Vec<TrainingView>, DatasetError>) -> Result<(), TestCaseError> {
+    match outcome {
+        Ok(views) => {
+            prop_assert!(!views.is_empty(), "no views and no error");
+            for view in views {
+                let size = view.camera.size;
+                prop_assert!(size.min_element() >= 1 && size.max_element() <= MAX_SIDE, "size {}", size);
+                prop_assert!(view.camera.world_to_camera.is_finite() && view.time.is_finite(), "{:?}", view);
+                prop_assert!(lens_values(&view).1.iter().all(|value| value.is_finite()), "{:?}", view.camera.lens);
+                prop_assert_eq!(Path::new(&view.name).file_name(), Some(OsStr::new(&view.name)));
+            }
+        }
+        Err(error) => prop_assert!(error.to_string().contains("transforms_test.json"), "{}", error),
+    }
+    Ok(())
+}
+
+proptest! {
+    #[test]
+    fn random_values_anywhere_never_panic(
+        file in proptest::sample::subsequence(vec!["camera_angle_x", "w", "h", "fl_x", "fl_y", "cx", "cy"], 0..5),
+        entry in proptest::sample::subsequence(vec!["file_path", "transform_matrix", "time", "mask_path", "w", "fl_x", "cy"], 0..3),
+        values in proptest::collection::vec(any_json(), 8),
+    ) {
+        let mut json = transforms();
+        let mut values = values.into_iter();
+        for (prefix, keys) in [("", file), ("/frames/0", entry)] {
+            for key in keys {
+                json = with(json, &format!("{prefix}/{key}"), values.next().unwrap_or_default());
+            }
+        }
+        check_outcome(load(&json, &CameraOptions::default()))?;
+    }
+
+    #[test]
+    fn random_bytes_anywhere_never_panic(
+        edits in proptest::collection::vec((any::<proptest::sample::Index>(), any::<u8>()), 0..6),
+        end in any::<proptest::sample::Index>(),
+        cut in any::<bool>(),
+    ) {
+        let mut bytes = transforms().to_string().into_bytes();
+        for (index, byte) in edits {
+            let position = index.index(bytes.len());
+            bytes[position] = byte;
+        }
+        if cut {
+            bytes.truncate(end.index(bytes.len()));
+        }
+        let folder = Folder::new();
+        check_outcome(CameraFile::load(&folder.write("transforms_test.json", bytes), &CameraOptions::default()))?;
+    }
+}

@@ -1,0 +1,84 @@
+//! Memory that loading takes.
+//!
+//! In: a synthetic package, and with `GS4D_DATA` set a real checkpoint and the package made from it. Out: proof that a capture is
+//! ready to be drawn without more than three times the size of its file having been allocated at any moment. The allocator counts for
+//! all threads of the process, so that each of these tests runs in a process of its own.
+
+use crate::support::data::data;
+use crate::support::own_process::run_alone;
+use bevy_gs4d::codec;
+use bevy_gs4d::codec::checkpoint::CheckpointOptions;
+use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::offline;
+use bevy_gs4d::scene::GaussianScene;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// The system's allocator, counting. Growing a block counts the old and the new one, as when it has to be moved.
+struct Counting;
+
+static NOW: AtomicUsize = AtomicUsize::new(0);
+static PEAK: AtomicUsize = AtomicUsize::new(0);
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[expect(unsafe_code, reason = "an allocator cannot be written without")]
+// SAFETY: both functions hand the caller's promises on to `System` and return what it returns.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        let now = NOW.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
+        PEAK.fetch_max(now, Ordering::Relaxed);
+        // SAFETY: the caller keeps the contract, which is the same.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
+        NOW.fetch_sub(layout.size(), Ordering::Relaxed);
+        // SAFETY: as above; the block came from `System`.
+        unsafe { System.dealloc(block, layout) }
+    }
+}
+
+/// Loads until the scene could be drawn, and compares the peak with the size of the file.
+fn check(path: &Path) {
+    let size = path.metadata().expect("the file is there").len() as usize;
+    let before = NOW.load(Ordering::Relaxed);
+    PEAK.store(before, Ordering::Relaxed);
+    let scene = codec::load(path, &CheckpointOptions::default()).expect("the file can be read");
+    let scene = scene.into_runtime().expect("the scene can be drawn");
+    let peak = PEAK.load(Ordering::Relaxed) - before;
+    let factor = peak as f64 / size as f64;
+    assert!(factor < 3.0, "{}: {factor:.2} times {size} bytes are allocated at the peak", path.display());
+    // The counting works: what was loaded is in memory.
+    let held = scene.size();
+    assert!(held > 0 && peak >= held, "{}: the peak of {peak} bytes holds the scene's {held}", path.display());
+}
+
+fn check_package(scene: &GaussianScene) {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("scene.gs4d");
+    offline::save(&path, scene, &WriteSettings::default()).expect("the folder can be written to");
+    check(&path);
+}
+
+#[test]
+fn a_synthetic_package_loads_in_three_times_its_size() {
+    run_alone("loading::a_synthetic_package_loads_in_three_times_its_size", || {
+        check_package(&synthesize(&SynthSettings { count: 50_000, ..SynthSettings::default() }));
+    });
+}
+
+#[test]
+fn real_captures_load_in_three_times_their_size() {
+    let Some(data) = data() else { return };
+    run_alone("loading::real_captures_load_in_three_times_their_size", || {
+        for file in ["toybox/toybox_chkpnt.pth", "standup/standup_chkpnt.pth"] {
+            let path = data.join(file);
+            check(&path);
+            check_package(&codec::load(&path, &CheckpointOptions::default()).expect("the file can be read"));
+        }
+    });
+}

@@ -1,0 +1,36 @@
+//! What needs neither a GPU nor Bevy: files, scenes, maths and the CPU reference; with the feature `offline` also datasets, metrics,
+//! scores and quantization.
+//!
+//! In: scenes, files and pictures made here, `tests/golden/`, and the trained captures where `GS4D_DATA` names their folder. Out: one
+//! test binary. Each module says what it tests.
+
+mod checkpoint;
+mod checkpoint_poison;
+#[cfg(feature = "offline")]
+mod dataset;
+mod golden;
+#[cfg(feature = "offline")]
+mod loading;
+#[cfg(feature = "offline")]
+mod metrics;
+mod package;
+mod pick;
+#[cfg(feature = "offline")]
+mod quantize;
+mod rings;
+#[cfg(feature = "offline")]
+mod score;
+
+#[path = "../support"]
+mod support {
+    pub mod data;
+    pub mod golden;
+    #[cfg(feature = "offline")]
+    pub mod npy;
+    #[cfg(feature = "offline")]
+    pub mod own_process;
+    #[cfg(feature = "offline")]
+    pub mod packed_scene;
+    pub mod pth;
+    pub mod skip;
+}

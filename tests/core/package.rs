@@ -1,0 +1,498 @@
+//! The package format from outside.
+//!
+//! In: scenes made here, and packages taken apart, changed and sealed again. Out: proof that nothing is lost on the way through a
+//! file, that no damage goes unnoticed, and that what a newer writer adds does no harm.
+
+use bevy_gs4d::codec::package::{self, MAGIC, PackageError, PackageInfo, VERSION, WriteSettings};
+use bevy_gs4d::gaussian::{Gaussian, Harmonics, Model, Parameters};
+use bevy_gs4d::scene::{
+    Environment, Form, GaussianScene, PlaybackHints, SceneForm, Sliced, Trained, TrainedCameras, TrainedWith, UpAxis,
+};
+use bytemuck::{Zeroable, cast_slice};
+use proptest::prelude::*;
+use std::io::Cursor;
+
+/// Everything about a scene of the tests but its values.
+#[derive(Debug, Clone, Copy)]
+struct Shape {
+    /// The model of a trained form, or the runtime form.
+    model: Option<Model>,
+    count: usize,
+    coefficients: usize,
+    degrees: (u32, u32),
+    environment: Option<(u32, u32)>,
+}
+
+const SMALL: Shape =
+    Shape { model: Some(Model::Rotated4d), count: 3, coefficients: 2, degrees: (0, 0), environment: None };
+
+/// Pseudo-random bits: NaNs with payloads, infinities and subnormal numbers among them.
+struct Bits(u64);
+
+impl Bits {
+    fn float(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        match self.0 >> 61 {
+            0 => [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.0][(self.0 >> 40) as usize % 4],
+            _ => f32::from_bits((self.0 >> 29) as u32),
+        }
+    }
+
+    fn floats<const N: usize>(&mut self, count: usize) -> Vec<[f32; N]> {
+        (0..count).map(|_| [0.0; N].map(|_| self.float())).collect()
+    }
+
+    fn values(&mut self, count: usize) -> Vec<f32> {
+        (0..count).map(|_| self.float()).collect()
+    }
+}
+
+fn scene(shape: &Shape, seed: u64) -> GaussianScene {
+    let (mut bits, n) = (Bits(seed), shape.count);
+    let harmonics = |bits: &mut Bits| Harmonics {
+        coefficients: shape.coefficients,
+        degree: shape.degrees.0,
+        degree_t: shape.degrees.1,
+        values: bits.values(n * shape.coefficients * 3),
+    };
+    let form = match shape.model {
+        Some(model) => {
+            let timed = if model == Model::Static3d { 0 } else { n };
+            let pairs = if model == Model::Rotated4d { n } else { 0 };
+            let parameters = Parameters {
+                mean: bits.floats(n),
+                mean_t: bits.values(timed),
+                log_scale: bits.floats(n),
+                log_scale_t: bits.values(timed),
+                rotation_l: bits.floats(n),
+                rotation_r: bits.floats(pairs),
+                opacity_logit: bits.values(n),
+            };
+            SceneForm::Trained(Trained { parameters, harmonics: harmonics(&mut bits) })
+        }
+        None => {
+            let gaussians = (0..n).map(|_| gaussian(&mut bits)).collect();
+            SceneForm::Ready(Form::Sliced(Sliced { gaussians, harmonics: harmonics(&mut bits) }))
+        }
+    };
+    GaussianScene {
+        form,
+        filter: None,
+        environment: shape.environment.map(|(width, height)| Environment {
+            width,
+            height,
+            texels: bits.values((3 * width * height) as usize),
+        }),
+        trained_with: TrainedWith {
+            time_interval: [-0.1, 2.7],
+            background: [1.0, 0.3, f32::MIN_POSITIVE],
+            cameras: TrainedCameras::Intrinsics,
+            iteration: 30_000,
+            spatial_lr_scale: 4.43 / 3.0,
+            ..TrainedWith::default()
+        },
+        playback: PlaybackHints { up: UpAxis::NegY, duration_seconds: 1.0 / 3.0 },
+    }
+}
+
+fn gaussian(bits: &mut Bits) -> Gaussian {
+    Gaussian {
+        mean: bits.floats(1)[0],
+        mean_t: bits.float(),
+        velocity: bits.floats(1)[0],
+        sigma_t: bits.float(),
+        covariance: bits.floats(1)[0],
+        opacity: bits.float(),
+        padding: 0.0,
+    }
+}
+
+/// All values of a scene as bits, so that NaNs compare.
+fn bits(scene: &GaussianScene) -> Vec<Vec<u32>> {
+    let mut all = match &scene.form {
+        SceneForm::Ready(Form::Sliced(sliced)) => vec![cast_slice(&sliced.gaussians).to_vec()],
+        SceneForm::Ready(Form::Packed(_)) => panic!("packed scenes are tested with compression"),
+        SceneForm::Trained(Trained { parameters: p, .. }) => vec![
+            cast_slice(&p.mean).to_vec(),
+            cast_slice(&p.mean_t).to_vec(),
+            cast_slice(&p.log_scale).to_vec(),
+            cast_slice(&p.log_scale_t).to_vec(),
+            cast_slice(&p.rotation_l).to_vec(),
+            cast_slice(&p.rotation_r).to_vec(),
+            cast_slice(&p.opacity_logit).to_vec(),
+        ],
+    };
+    all.extend(scene.form.harmonics().map(|harmonics| cast_slice(&harmonics.values).to_vec()));
+    all.extend(scene.environment.as_ref().map(|e| cast_slice(&e.texels).to_vec()));
+    all
+}
+
+fn assert_same(a: &GaussianScene, b: &GaussianScene) {
+    let numbers = |s: &GaussianScene| {
+        let size = s.environment.as_ref().map(|e| (e.width, e.height));
+        (s.len(), s.model(), s.form.color_degrees(), size)
+    };
+    assert_eq!(numbers(a), numbers(b), "counts, form and degrees");
+    assert_eq!(a.trained_with, b.trained_with, "switches of training");
+    assert_eq!(a.playback, b.playback, "playback hints");
+    assert!(bits(a) == bits(b), "every value keeps its bits");
+}
+
+fn pack(scene: &GaussianScene) -> Vec<u8> {
+    let mut file = Vec::new();
+    package::write(&mut file, scene, &WriteSettings::default()).expect("a consistent scene can be written");
+    file
+}
+
+fn read(file: &[u8]) -> Result<GaussianScene, PackageError> {
+    package::read(Cursor::new(file))
+}
+
+fn inspect(file: &[u8]) -> Result<PackageInfo, PackageError> {
+    package::inspect(Cursor::new(file))
+}
+
+fn refusal(file: &[u8]) -> PackageError {
+    let error = read(file).expect_err("must be refused");
+    let inspected = inspect(file);
+    assert!(
+        !inspected.is_ok_and(|info| info.is_intact()) || matches!(error, PackageError::SectionBody { .. }),
+        "inspection finds it too, unless only decompressing shows it: {error}"
+    );
+    error
+}
+
+/// A package in its parts. `seal` makes it whole again, with the right checksum of whatever header there is now.
+#[derive(Clone)]
+struct Parts {
+    header: String,
+    bodies: Vec<Vec<u8>>,
+}
+
+impl Parts {
+    fn of(file: &[u8]) -> Self {
+        let number = |at: usize| u64::from_le_bytes(file[at..at + 8].try_into().expect("eight bytes")) as usize;
+        let mut at = 20 + number(8);
+        let header = String::from_utf8(file[20..at].to_vec()).expect("the header is UTF-8");
+        let mut bodies = Vec::new();
+        while at < file.len() {
+            let end = at + 8 + number(at);
+            bodies.push(file[at + 8..end].to_vec());
+            at = end;
+        }
+        Self { header, bodies }
+    }
+
+    fn seal(&self) -> Vec<u8> {
+        let mut start = MAGIC.to_vec();
+        start.extend(VERSION.to_le_bytes());
+        start.extend((self.header.len() as u64).to_le_bytes());
+        let checksum = crc32fast::hash(&[&start[..], self.header.as_bytes()].concat());
+        let mut file = [&start[..], &checksum.to_le_bytes()[..], self.header.as_bytes()].concat();
+        for body in &self.bodies {
+            file.extend((body.len() as u64).to_le_bytes());
+            file.extend(body);
+        }
+        file
+    }
+
+    /// Replaces the first such text of the header.
+    fn swap(mut self, from: &str, to: &str) -> Self {
+        assert!(self.header.contains(from), "the header holds {from:?}:\n{}", self.header);
+        self.header = self.header.replacen(from, to, 1);
+        self
+    }
+
+    /// Puts another body in place of one, with the right length and checksum.
+    fn replace_body(mut self, index: usize, body: Vec<u8>) -> Self {
+        let old = std::mem::replace(&mut self.bodies[index], body);
+        let entry =
+            |body: &[u8], raw| format!("length: {}, raw_length: {raw}, crc32: {}", body.len(), crc32fast::hash(body));
+        let raw = zstd::bulk::decompress(&old, 1 << 20).expect("a body as it was written").len();
+        let (from, to) = (entry(&old, raw), entry(&self.bodies[index], raw));
+        self.swap(&from, &to)
+    }
+}
+
+fn shapes() -> impl Strategy<Value = Shape> {
+    let model = prop_oneof![
+        Just(None),
+        Just(Some(Model::Static3d)),
+        Just(Some(Model::Unrotated4d)),
+        Just(Some(Model::Rotated4d)),
+    ];
+    let degrees = prop_oneof![(0..=3u32, Just(0u32)), (Just(3u32), 0..=2u32)];
+    let environment = proptest::option::of((1..5u32, 1..4u32));
+    // No trained model can be told from an empty scene.
+    (model, 1..70usize, degrees, 0..5usize, environment).prop_map(|(model, count, degrees, spare, environment)| {
+        let evaluated = Harmonics { degree: degrees.0, degree_t: degrees.1, ..Harmonics::default() }.evaluated();
+        Shape { model, count, coefficients: (evaluated + spare).min(48), degrees, environment }
+    })
+}
+
+proptest! {
+    #[test]
+    fn every_bit_survives_the_round_trip(shape in shapes(), seed: u64) {
+        let scene = scene(&shape, seed);
+        let file = pack(&scene);
+        assert_same(&scene, &read(&file).expect("a package just written can be read"));
+        prop_assert!(inspect(&file).expect("and inspected").is_intact(), "all checksums hold");
+    }
+
+    #[test]
+    fn random_bytes_never_panic(mut bytes in proptest::collection::vec(any::<u8>(), 0..400), dressed: bool) {
+        if dressed {
+            // Looks like a package as far as the header's length.
+            bytes.splice(..bytes.len().min(4), MAGIC);
+            bytes.splice(4..bytes.len().min(16), [1, 0, 0, 0, 40, 0, 0, 0, 0, 0, 0, 0]);
+        }
+        prop_assert!(read(&bytes).is_err() && inspect(&bytes).is_err(), "noise is no package");
+    }
+
+    #[test]
+    fn changed_headers_never_panic(
+        at: prop::sample::Index,
+        with in proptest::collection::vec(32..127u8, 0..4),
+        drop in 0..4usize,
+    ) {
+        let mut parts = Parts::of(&pack(&scene(&SMALL, 1)));
+        let at = at.index(parts.header.len());
+        let end = parts.header.len().min(at + drop);
+        parts.header.replace_range(at..end, &String::from_utf8(with).expect("ASCII"));
+        let file = parts.seal();
+        // A changed number may still make a sound package: then both ways of reading it agree.
+        prop_assert!(read(&file).is_err() || inspect(&file).is_ok_and(|info| info.is_intact()), "the two agree");
+    }
+
+    #[test]
+    fn changed_bodies_never_panic(section in 0..9usize, at: prop::sample::Index, with: u8) {
+        let parts = Parts::of(&pack(&scene(&SMALL, 1)));
+        let mut body = parts.bodies[section].clone();
+        let at = at.index(body.len());
+        body[at] ^= with;
+        match read(&parts.replace_body(section, body).seal()) {
+            Ok(scene) => prop_assert_eq!(scene.len(), SMALL.count, "still as many Gaussians"),
+            Err(error) => prop_assert!(matches!(error, PackageError::SectionBody { .. }), "{error}"),
+        }
+    }
+}
+
+#[test]
+fn long_scenes_survive_in_several_sections() {
+    for (model, count) in [(None, 70_000), (Some(Model::Rotated4d), 16_384), (Some(Model::Static3d), 16_385)] {
+        let shape = Shape { model, count, coefficients: 5, degrees: (1, 0), environment: Some((151, 77)) };
+        let scene = scene(&shape, 3);
+        let file = pack(&scene);
+        assert_same(&scene, &read(&file).expect("readable"));
+        let info = inspect(&file).expect("readable");
+        let means = info.header.sections.iter().filter(|s| s.name == "mean").count();
+        assert_eq!(means, count.div_ceil(16_384), "runs of at most 16384 Gaussians");
+    }
+}
+
+#[test]
+fn geometry_comes_before_colour_and_surroundings() {
+    let info = inspect(&pack(&scene(&Shape { environment: Some((2, 1)), ..SMALL }, 4))).expect("readable");
+    let names: Vec<_> = info.header.sections.iter().map(|s| s.name.as_str()).collect();
+    let geometry = ["mean", "mean_t", "log_scale", "log_scale_t", "rotation_l", "rotation_r", "opacity_logit"];
+    assert_eq!(names[..7], geometry, "geometry first");
+    assert_eq!(names[7..], ["sh_dc", "sh_rest", "environment"], "then colour, then parameters");
+}
+
+#[test]
+fn an_empty_scene_survives() {
+    for model in [None, Some(Model::Static3d)] {
+        let scene = scene(&Shape { model, count: 0, environment: Some((1, 1)), ..SMALL }, 5);
+        assert_same(&scene, &read(&pack(&scene)).expect("readable"));
+    }
+}
+
+#[test]
+fn the_same_scene_gives_the_same_bytes() {
+    let scene = scene(&Shape { count: 40_000, ..SMALL }, 6);
+    assert!(pack(&scene) == pack(&scene), "writing is deterministic");
+}
+
+#[test]
+fn every_flipped_bit_is_noticed() {
+    let mut file = pack(&scene(&Shape { model: None, environment: Some((1, 1)), ..SMALL }, 7));
+    for bit in 0..file.len() * 8 {
+        file[bit / 8] ^= 1 << (bit % 8);
+        assert!(read(&file).is_err(), "bit {} of byte {} while reading", bit % 8, bit / 8);
+        let noticed = !inspect(&file).is_ok_and(|info| info.is_intact());
+        assert!(noticed, "bit {} of byte {} while inspecting", bit % 8, bit / 8);
+        file[bit / 8] ^= 1 << (bit % 8);
+    }
+    assert!(read(&file).is_ok(), "all bits are back in place");
+}
+
+#[test]
+fn truncation_at_every_length_is_noticed() {
+    let file = pack(&scene(&SMALL, 8));
+    for length in 0..file.len() {
+        let error = refusal(&file[..length]);
+        let right = if length < 4 {
+            matches!(error, PackageError::NotAPackage)
+        } else {
+            matches!(error, PackageError::Truncated { found, .. } if found == length as u64)
+        };
+        assert!(right, "cut to {length} bytes: {error}");
+    }
+}
+
+#[test]
+fn trailing_bytes_are_noticed() {
+    let mut file = pack(&scene(&SMALL, 9));
+    file.push(0);
+    assert!(matches!(refusal(&file), PackageError::TrailingBytes { count: 1 }), "one byte too many");
+}
+
+#[test]
+fn damaged_sections_are_named() {
+    let scene = scene(&SMALL, 10);
+    let mut file = pack(&scene);
+    let last = file.len() - 1;
+    file[last] ^= 0x10;
+    assert!(matches!(refusal(&file), PackageError::SectionChecksum { name } if name == "sh_rest"), "the last section");
+    let info = inspect(&file).expect("the header is whole");
+    assert_eq!(info.damaged, [info.header.sections.len() - 1], "the last section alone");
+}
+
+#[test]
+fn what_a_newer_writer_adds_is_skipped() {
+    let scene = scene(&SMALL, 11);
+    let field = "mood: bright(hue: Some((0.5, -1e-3)), tags: [\"a\", 'b'], more: {1: inf}),";
+    // The checksum is that of "123456789" in every CRC-32 table.
+    let section =
+        "(name: \"masks\", encoding: \"bits\", first: 0, count: 9, length: 9, raw_length: 7, crc32: 3421780262),";
+    let mut parts = Parts::of(&pack(&scene))
+        .swap("gaussians:", &format!("{field} gaussians:"))
+        .swap("(name: \"sh_dc\",", &format!("{section} (name: \"sh_dc\", time: (0.0, 1.0),"));
+    parts.bodies.insert(7, b"123456789".to_vec());
+    let mut file = parts.seal();
+    assert_same(&scene, &read(&file).expect("unknown fields and sections are skipped"));
+    let info = inspect(&file).expect("readable");
+    assert!(info.is_intact() && info.header.sections[7].name == "masks", "the unknown section is listed and whole");
+
+    let at = file.windows(9).position(|w| w == b"123456789").expect("the body is there");
+    file[at] ^= 1;
+    assert!(matches!(refusal(&file), PackageError::SectionChecksum { name } if name == "masks"), "and is verified");
+}
+
+#[test]
+fn what_is_too_new_is_refused_by_name() {
+    let file = pack(&scene(&SMALL, 12));
+    let mut newer = file.clone();
+    newer[4] = 2;
+    let error = refusal(&newer);
+    assert!(matches!(error, PackageError::UnsupportedVersion { found: 2, known: VERSION }), "{error}");
+
+    let parts = Parts::of(&file);
+    let feature = parts.clone().swap("requires: []", "requires: [\"codebook\"]").swap("trained(", "packed(");
+    let error = refusal(&feature.seal());
+    assert!(matches!(&error, PackageError::UnknownFeature { name } if name == "codebook"), "{error}");
+
+    let encoded = parts.swap("f32-planes-zstd", "f16-planes-zstd");
+    let error = refusal(&encoded.seal());
+    assert!(matches!(&error, PackageError::UnknownEncoding { name, .. } if name == "mean"), "{error}");
+}
+
+#[test]
+fn other_files_are_refused() {
+    for file in [&b""[..], b"GS4", b"PK\x03\x04 and so on, as a zip file starts", &[0; 64]] {
+        assert!(matches!(refusal(file), PackageError::NotAPackage), "{file:?}");
+    }
+}
+
+#[test]
+fn huge_numbers_are_refused_before_anything_is_allocated() {
+    let parts = Parts::of(&pack(&scene(&Shape { environment: Some((2, 3)), ..SMALL }, 13)));
+    let refused = |from: &str, to: &str| refusal(&parts.clone().swap(from, to).seal());
+    for count in ["4000000000", "9223372036854775807", "18446744073709551615"] {
+        let error = refused("gaussians: 3", &format!("gaussians: {count}"));
+        assert!(matches!(error, PackageError::TooLarge { .. }), "{count} Gaussians: {error}");
+        let error = refused("count: 3,", &format!("count: {count},"));
+        assert!(matches!(error, PackageError::SectionRange { .. }), "{count} in a section: {error}");
+        let error = refused("first: 0,", &format!("first: {count},"));
+        assert!(matches!(error, PackageError::SectionRange { .. }), "from {count} on: {error}");
+        let error = refused("raw_length: 36", &format!("raw_length: {count}"));
+        assert!(matches!(error, PackageError::SectionLength { .. }), "{count} bytes raw: {error}");
+        let length = Parts::of(&parts.seal()).bodies[0].len();
+        let error = refused(&format!("length: {length},"), &format!("length: {count},"));
+        assert!(matches!(error, PackageError::Truncated { .. }), "{count} bytes: {error}");
+    }
+    let error = refused("width: 2", "width: 4294967295");
+    assert!(matches!(error, PackageError::Inconsistent(_)), "a map of too many texels: {error}");
+    let error = refused("width: 2", "width: 1431655765");
+    assert!(matches!(error, PackageError::TooLarge { .. }), "a map larger than the file: {error}");
+    let error = refused("coefficients: 2", "coefficients: 4611686018427387904");
+    assert!(matches!(error, PackageError::Inconsistent(_)), "far too many coefficients: {error}");
+}
+
+#[test]
+fn bombs_are_refused() {
+    let parts = Parts::of(&pack(&scene(&SMALL, 14)));
+    for length in [35, 37, 100_000_000] {
+        let bomb = zstd::bulk::compress(&vec![0; length], 3).expect("compressible");
+        let error = refusal(&parts.clone().replace_body(0, bomb).seal());
+        assert!(matches!(&error, PackageError::SectionBody { name, .. } if name == "mean"), "{length} bytes: {error}");
+    }
+    let gaussians = vec![Gaussian::zeroed(); 3_000_000];
+    let harmonics = Harmonics { coefficients: 1, values: vec![0.0; 9_000_000], ..Harmonics::default() };
+    let all_alike = SceneForm::Ready(Form::Sliced(Sliced { gaussians, harmonics }));
+    let vast = GaussianScene { form: all_alike, ..scene(&SMALL, 15) };
+    let error = package::write(Vec::new(), &vast, &WriteSettings { level: 1 }).expect_err("nobody could read it");
+    assert!(matches!(error, PackageError::TooLarge { .. }), "what reads as a bomb is not written: {error}");
+}
+
+#[test]
+fn sections_must_hold_every_gaussian_once() {
+    let parts = Parts::of(&pack(&scene(&SMALL, 16)));
+    let error = refusal(&parts.clone().swap("name: \"mean_t\"", "name: \"mean_x\"").seal());
+    assert!(matches!(&error, PackageError::MissingSection { name } if name == "mean_t"), "{error}");
+    let error = refusal(&parts.clone().swap("name: \"log_scale\"", "name: \"mean\"").seal());
+    assert!(matches!(&error, PackageError::SectionRange { name, .. } if name == "mean"), "{error}");
+    let error = refusal(&parts.swap("gaussians: 3", "gaussians: 4").seal());
+    assert!(matches!(&error, PackageError::MissingSection { name } if name == "mean"), "{error}");
+}
+
+#[test]
+fn senseless_switches_are_refused() {
+    let parts = Parts::of(&pack(&scene(&SMALL, 17)));
+    for (from, to) in [
+        ("time_interval: (-0.1, 2.7)", "time_interval: (2.7, 2.7)"),
+        ("time_interval: (-0.1, 2.7)", "time_interval: (NaN, 2.7)"),
+        ("prefilter_var: -1.0", "prefilter_var: inf"),
+        ("background: (1.0, ", "background: (NaN, "),
+        ("duration_seconds: 0.", "duration_seconds: -0."),
+        ("degree: 0", "degree: 4"),
+        ("degree: 0", "degree: 1"),
+    ] {
+        let error = refusal(&parts.clone().swap(from, to).seal());
+        assert!(matches!(error, PackageError::Inconsistent(_)), "{to}: {error}");
+    }
+    let error = refusal(&parts.swap("gaussians: 3", "gaussians: -3").seal());
+    assert!(matches!(error, PackageError::Header(_)), "a negative count: {error}");
+}
+
+#[test]
+fn scenes_that_contradict_themselves_are_not_written() {
+    let good = scene(&SMALL, 18);
+    let SceneForm::Trained(Trained { parameters, harmonics }) = good.form.clone() else { panic!("a trained form") };
+    let short = Parameters { log_scale: Vec::new(), ..parameters.clone() };
+    let mixed = Parameters { mean_t: Vec::new(), log_scale_t: Vec::new(), ..parameters.clone() };
+    let few = Harmonics { values: vec![0.0; 5], ..harmonics.clone() };
+    let with = |parameters, harmonics| GaussianScene {
+        form: SceneForm::Trained(Trained { parameters, harmonics }),
+        ..good.clone()
+    };
+    for bad in [
+        with(short, harmonics.clone()),
+        with(mixed, harmonics),
+        with(parameters, few),
+        GaussianScene { environment: Some(Environment { width: 2, height: 2, texels: vec![0.0; 11] }), ..good },
+    ] {
+        let error = package::write(Vec::new(), &bad, &WriteSettings::default()).expect_err("must be refused");
+        assert!(matches!(error, PackageError::Inconsistent(_)), "{error}");
+    }
+}

@@ -1,0 +1,248 @@
+//! Quantization: what the packed form keeps, and that packages hold it whole.
+//!
+//! In: synthetic scenes; with `GS4D_DATA` set, trained captures.
+
+use crate::support::data;
+use crate::support::packed_scene::{BLACK, scene, settings, view};
+use bevy_gs4d::codec::checkpoint::CheckpointOptions;
+use bevy_gs4d::codec::{self, package};
+use bevy_gs4d::gaussian::Gaussian;
+use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions};
+use bevy_gs4d::offline::metrics::psnr_pooled;
+use bevy_gs4d::offline::quantize::order::morton_order;
+use bevy_gs4d::offline::quantize::{CompressError, CompressSettings, Quality, compress};
+use bevy_gs4d::reference;
+use bevy_gs4d::scene::packed::encode::Bits;
+use bevy_gs4d::scene::{FilterKind, Form, GaussianScene, RuntimeScene, SceneForm, TemporalFilter};
+use bevy_gs4d::view::{RasterFov, View};
+use glam::Vec3;
+use std::io::Cursor;
+
+fn pack(scene: &GaussianScene) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    package::write(&mut bytes, scene, &package::WriteSettings { level: 3 }).expect("it can be written");
+    bytes
+}
+
+fn psnr(a: &RuntimeScene, b: &RuntimeScene, view: &View) -> f64 {
+    let [a, b] = [a, b].map(|scene| reference::render(scene, view, BLACK).picture.clamped());
+    psnr_pooled(&a, &b).expect("the same size")
+}
+
+/// The order in which a scene is packed.
+fn order(scene: &RuntimeScene) -> Vec<u32> {
+    morton_order(&scene.form.as_sliced().expect("sliced").gaussians)
+}
+
+/// Each Gaussian of the scene beside its packed self. Morton order is found again by the means.
+fn beside(scene: &RuntimeScene, packed: &RuntimeScene) -> Vec<(Gaussian, Gaussian)> {
+    let order = order(scene);
+    order.iter().enumerate().map(|(to, &from)| (scene.gaussian(from as usize), packed.gaussian(to))).collect()
+}
+
+#[test]
+fn every_attribute_stays_within_its_step() {
+    let scene = scene(3_000, 0, 0);
+    let fine = Bits {
+        mean: 16,
+        mean_t: 16,
+        velocity: 16,
+        sigma_t: 15,
+        scale: 16,
+        rotation: 16,
+        opacity: 16,
+        base: 10,
+        escape: 0.0,
+    };
+    let coarse =
+        Bits { mean: 12, mean_t: 10, velocity: 9, sigma_t: 8, scale: 9, rotation: 9, opacity: 8, base: 8, escape: 0.0 };
+    for (bits, slack) in [(fine, 1.0), (coarse, 1.0)] {
+        let settings = CompressSettings { geometry: Some(bits), ..settings(&[]) };
+        let (packed, _) = compress(scene.clone(), &settings).expect("it is compressed");
+        let packed = packed.into_runtime().expect("it can be drawn");
+        let step = |bits: u32, range: f32| slack * (0.51 * range / ((1u32 << bits) - 1) as f32 + 2e-6 * range.max(1.0));
+        for (a, b) in beside(&scene, &packed) {
+            for axis in 0..3 {
+                assert!((a.mean[axis] - b.mean[axis]).abs() <= step(bits.mean, 2.4), "mean {a:?} {b:?}");
+            }
+            assert!((a.mean_t - b.mean_t).abs() <= step(bits.mean_t, 1.2), "temporal mean {a:?} {b:?}");
+            assert!((a.opacity - b.opacity).abs() <= step(bits.opacity, 1.0), "opacity {a:?} {b:?}");
+            assert_eq!(a.sigma_t.is_finite(), b.sigma_t.is_finite(), "always there or not");
+            if a.sigma_t.is_finite() {
+                assert!((a.sigma_t.ln() - b.sigma_t.ln()).abs() <= step(bits.sigma_t, 5.0), "deviation {a:?} {b:?}");
+            } else {
+                assert_eq!(b.velocity, [0.0; 3], "at rest");
+            }
+            let size = a.covariance[0] + a.covariance[3] + a.covariance[5];
+            let apart = a.covariance.iter().zip(b.covariance).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            let allowed = if bits.scale == 16 { 2e-3 } else { 0.08 };
+            assert!(apart <= allowed * size, "covariance {a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn pictures_survive() {
+    let scene = scene(20_000, 1, 0);
+    let lowest = |settings: &CompressSettings| {
+        let (packed, _) = compress(scene.clone(), settings).expect("it is compressed");
+        let packed = packed.into_runtime().expect("it can be drawn");
+        [0.05, 0.4, 0.9].map(|time| psnr(&scene, &packed, &view(time))).into_iter().fold(f64::INFINITY, f64::min)
+    };
+    let balanced = lowest(&settings(&[]));
+    assert!(balanced >= 47.0, "balanced geometry, whole colours: {balanced:.1} dB");
+    let exact = lowest(&CompressSettings::from(Quality::VisuallyLossless));
+    assert!(exact >= 55.0, "visually lossless: {exact:.1} dB");
+    let coded = [&[256][..], &[256, 256], &[256, 256, 256]].map(|codebooks| lowest(&settings(codebooks)));
+    assert!(coded.is_sorted(), "each codebook brings colours closer, random ones too: {coded:.1?} dB");
+    let (_, report) = compress(scene.clone(), &settings(&[256, 256])).expect("it is compressed");
+    assert!(report.memory_after < report.memory_before / 2, "half the memory or less: {report:?}");
+}
+
+#[test]
+fn the_filter_moves_with_its_gaussians() {
+    let mut scene = scene(2_000, 0, 0);
+    // A support filter is made anew.
+    scene.filter = scene.filter.map(|filter| TemporalFilter { kind: FilterKind::KeyFrame, ..filter });
+    let (packed, _) = compress(scene.clone(), &settings(&[])).expect("it is compressed");
+    let order = order(&scene);
+    let (before, after) = (scene.filter.expect("a filter"), packed.filter.expect("the filter is kept"));
+    for segment in 0..before.segments {
+        for (to, &from) in order.iter().enumerate() {
+            assert_eq!(after.is_active(segment, to), before.is_active(segment, from as usize), "{to} was {from}");
+        }
+    }
+}
+
+#[test]
+fn a_support_filter_still_changes_no_picture() {
+    let (packed, _) = compress(scene(3_000, 0, 0), &settings(&[])).expect("it is compressed");
+    let filtered = packed.into_runtime().expect("it can be drawn");
+    let share = filtered.filter.as_ref().map_or(1.0, TemporalFilter::active_share);
+    assert!(share < 0.95, "some rest: {share}");
+    let free = RuntimeScene { filter: None, ..filtered.clone() };
+    for step in 0..=27 {
+        let view = view(step as f32 / 27.0);
+        let [with, without] = [&filtered, &free].map(|scene| reference::render(scene, &view, BLACK).picture);
+        assert!(with == without, "at {}: nothing that is seen rests", view.time);
+    }
+}
+
+#[test]
+fn velocities_outlast_the_rounding_of_lifespans() {
+    let scene = scene(3_000, 0, 0);
+    let coarse = Bits {
+        mean: 16,
+        mean_t: 16,
+        velocity: 16,
+        sigma_t: 4,
+        scale: 8,
+        rotation: 8,
+        opacity: 8,
+        base: 8,
+        escape: 0.0,
+    };
+    let settings = CompressSettings { geometry: Some(coarse), ..settings(&[]) };
+    let (packed, _) = compress(scene.clone(), &settings).expect("it is compressed");
+    let packed = packed.into_runtime().expect("it can be drawn");
+    let fastest = scene.iter().map(|g| Vec3::from(g.velocity).length()).fold(0.0, f32::max);
+    for (a, b) in beside(&scene, &packed).into_iter().filter(|(a, _)| a.sigma_t.is_finite()) {
+        let apart = (Vec3::from(a.velocity) - Vec3::from(b.velocity)).length();
+        assert!(apart <= 2e-3 * fastest, "{a:?} {b:?}");
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let small = scene(100, 1, 0);
+    let (packed, _) = compress(small.clone(), &settings(&[8])).expect("it is compressed");
+    let again = compress(packed.into_runtime().expect("drawable"), &settings(&[8]));
+    assert!(matches!(again, Err(CompressError::AlreadyPacked)), "packed twice");
+    for codebooks in [vec![0], vec![70_000], vec![4; 5]] {
+        let refused = compress(small.clone(), &settings(&codebooks));
+        assert!(matches!(refused, Err(CompressError::Codebooks(_))), "{codebooks:?}");
+    }
+    let alone = CompressSettings { geometry: None, ..settings(&[8]) };
+    assert!(matches!(compress(small, &alone), Err(CompressError::CodebooksAlone)), "codebooks without geometry");
+}
+
+#[test]
+fn few_gaussians_are_no_trouble() {
+    for count in [0, 1, 2, 255, 256, 257] {
+        let scene = scene(count, 3, 2);
+        for codebooks in [&[][..], &[16, 16, 16, 16]] {
+            let (packed, _) = compress(scene.clone(), &settings(codebooks)).expect("it is compressed");
+            let read = package::read(Cursor::new(pack(&packed))).expect("it can be read");
+            assert_eq!(read, packed, "{count} Gaussians, bit for bit");
+            assert_eq!(read.into_runtime().expect("drawable").len(), count, "none is lost");
+        }
+    }
+}
+
+#[test]
+fn packages_hold_the_packed_form_bit_for_bit() {
+    for (degree, degree_t, codebooks) in
+        [(3, 2, &[32, 16, 8][..]), (2, 0, &[16]), (1, 0, &[]), (0, 0, &[4]), (3, 1, &[9, 9, 9, 9])]
+    {
+        let (packed, _) = compress(scene(700, degree, degree_t), &settings(codebooks)).expect("it is compressed");
+        let bytes = pack(&packed);
+        let read = package::read(Cursor::new(&bytes)).expect("it can be read");
+        assert_eq!(read, packed, "degree {degree} and {degree_t}");
+        let info = package::inspect(Cursor::new(&bytes)).expect("it can be looked into");
+        assert_eq!(info.header.requires, ["packed", "filter"], "older readers must refuse it");
+        let back = read.unpacked();
+        let is_sliced = matches!(back.form, SceneForm::Ready(Form::Sliced(_)));
+        assert!(is_sliced && back.len() == 700, "it can be unpacked");
+        let is_consistent = back.form.harmonics().is_some_and(|harmonics| harmonics.is_consistent(700));
+        assert!(is_consistent, "with all its colours");
+    }
+}
+
+#[test]
+fn unpacking_changes_no_picture() {
+    let (packed, _) = compress(scene(1_500, 3, 2), &settings(&[64, 32])).expect("it is compressed");
+    let unpacked = packed.clone().unpacked().into_runtime().expect("drawable");
+    let packed = packed.into_runtime().expect("drawable");
+    for time in [0.1, 0.7] {
+        let seen = psnr(&packed, &unpacked, &view(time));
+        assert!(seen >= 100.0, "at {time}: {seen:.1} dB");
+    }
+}
+
+#[test]
+fn every_flipped_bit_of_a_packed_package_is_noticed() {
+    let (packed, _) = compress(scene(40, 1, 0), &settings(&[4, 2])).expect("it is compressed");
+    let bytes = pack(&packed);
+    for bit in 0..bytes.len() * 8 {
+        let mut damaged = bytes.clone();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        assert!(package::read(Cursor::new(damaged)).is_err(), "bit {bit}");
+    }
+}
+
+#[test]
+fn real_captures_reach_the_balanced_targets() {
+    let Some(data) = data::data() else { return };
+    // As in the demo: 45,000 Gaussians; the larger captures take minutes in a build without optimisation.
+    let scene =
+        codec::load(&data.join("toybox/toybox_45k.pth"), &CheckpointOptions::default()).expect("the checkpoint");
+    let scene = scene.into_runtime().expect("drawable");
+    let (packed, _) = compress(scene.clone(), &settings(&[1024, 1024, 1024])).expect("it is compressed");
+    let mut bytes = Vec::new();
+    package::write(&mut bytes, &packed, &package::WriteSettings { level: 19 }).expect("it can be written");
+    let info = package::inspect(Cursor::new(&bytes)).expect("it can be looked into");
+    let books = |name: &str| name.starts_with("codebook");
+    let (codebooks, rest): (Vec<_>, Vec<_>) = info.header.sections.iter().partition(|section| books(&section.name));
+    let size = |sections: &[&package::Section]| sections.iter().map(|section| section.length).sum::<usize>();
+    let each = size(&rest) as f64 / 45_000.0;
+    assert!(each <= 24.0, "{each:.2} bytes per Gaussian");
+    assert!(size(&codebooks) <= 1_500_000, "{} bytes of codebooks", size(&codebooks));
+    let packed = packed.into_runtime().expect("drawable");
+    let Form::Packed(records) = &packed.form else { panic!("it is packed") };
+    assert_eq!(size_of_val(&records.records[..]), 45_000 * 32, "32 bytes each");
+    let views = CameraFile::load(&data.join("toybox/golden_45k.json"), &CameraOptions::default()).expect("cameras");
+    for shot in views {
+        let seen = psnr(&scene, &packed, &shot.camera.view(shot.time, RasterFov::Reference));
+        assert!(seen >= 44.0, "{}: {seen:.2} dB with codebooks of 1024", shot.name);
+    }
+}

@@ -1,0 +1,98 @@
+//! The rings: no module uses one that lies further out, and the files of a folder build on each other in one direction.
+//!
+//! In: the text of every file in `src/`. Out: the paths that point outwards or lead round in a circle, each with its file and line; there
+//! must be none.
+//!
+//! Comments and strings do not count; unit tests do. What a file uses without naming it, such as a method, goes unseen.
+
+mod paths;
+mod sources;
+
+use sources::{Order, Sources};
+use std::collections::BTreeSet;
+
+/// That of the rings.
+const RINGS: &Order = &[
+    ("view", &[]),
+    ("gaussian", &["view"]),
+    ("scene", &["view", "gaussian"]),
+    ("codec", &["view", "gaussian", "scene"]),
+    ("reference", &["view", "gaussian", "scene"]),
+    ("renderer", &["view", "gaussian", "scene", "codec", "reference"]),
+    ("offline", &["view", "gaussian", "scene", "codec", "reference", "renderer"]),
+    ("plugin", &["view", "gaussian", "scene", "codec", "reference", "renderer"]),
+    ("cli", &["view", "gaussian", "scene", "codec", "reference", "renderer", "offline"]),
+];
+
+/// That inside the plugin.
+const PLUGIN: &Order = &[
+    ("component", &[]),
+    ("asset", &["component"]),
+    ("playback", &["component", "asset"]),
+    ("render", &["component", "asset", "playback"]),
+    ("picking", &["component", "asset", "playback", "render"]),
+    ("stereo", &["component", "asset", "playback", "render"]),
+    ("inspector", &["component", "asset", "playback", "render", "picking", "stereo"]),
+    ("testing", &["component", "asset", "playback", "render", "picking", "stereo"]),
+];
+
+/// Folders whose files must not use each other in a circle. A `mod.rs` does not count: it gathers what the others define.
+const WITHOUT_CYCLES: [&str; 3] = ["renderer/", "plugin/render/", "plugin/playback/"];
+
+#[test]
+fn no_path_points_outwards() {
+    let sources = Sources::of_this_crate();
+    assert!(sources.uses().len() > 300, "the paths are found");
+    let outward = sources.outward(RINGS, PLUGIN);
+    assert!(outward.is_empty(), "{} paths point outwards:\n{}", outward.len(), outward.join("\n"));
+}
+
+#[test]
+fn no_files_use_each_other_in_a_circle() {
+    let sources = Sources::of_this_crate();
+    for folder in WITHOUT_CYCLES {
+        assert!(sources.modules.values().any(|source| source.file.starts_with(folder)), "src/{folder} has files");
+        let cycles = sources.cycles(folder);
+        assert!(cycles.is_empty(), "src/{folder} has {} cycles:\n{}", cycles.len(), cycles.join("\n"));
+    }
+}
+
+#[test]
+fn every_folder_has_its_place() {
+    let sources = Sources::of_this_crate();
+    let folders = |depth: usize| sources.modules.keys().filter(move |module| module.len() > depth + 1);
+    let rings: BTreeSet<&str> = folders(0).map(|module| module[0].as_str()).collect();
+    let plugin = folders(1).filter(|module| module[0] == "plugin").map(|module| module[1].as_str());
+    let names = |order: &Order| order.iter().map(|(name, _)| *name).collect::<BTreeSet<&str>>();
+    assert_eq!(rings, names(RINGS), "every folder of src is a ring");
+    assert_eq!(
+        plugin.collect::<BTreeSet<&str>>(),
+        names(PLUGIN),
+        "every folder of the plugin has a place in its order"
+    );
+}
+
+#[test]
+fn outward_paths_and_cycles_are_found() {
+    let sources = Sources::new([
+        ("lib.rs", "pub mod view; pub mod scene; pub mod plugin; pub use plugin::*;"),
+        ("view/mod.rs", "mod a; pub use a::A; use crate::scene;"),
+        ("view/a.rs", "pub struct A;\nfn f() { crate::Root; super::super::scene::S }"),
+        ("scene/mod.rs", "mod s; mod t; pub use s::S; pub use t::*;"),
+        ("scene/s.rs", "use crate::view::A; use super::T; pub struct S;"),
+        ("scene/t.rs", "pub struct T; mod tests { use super::super::S; use super::*; }"),
+        ("plugin/mod.rs", "mod asset; mod component; pub use asset::Asset;"),
+        ("plugin/asset.rs", "use super::component::C; pub struct Asset;"),
+        ("plugin/component.rs", "use crate::Asset; pub struct C;"),
+    ]);
+    let outward = [
+        "src/plugin/component.rs:1: crate::Asset leads to plugin::asset, which plugin::component may not use",
+        "src/view/mod.rs:1: crate::scene leads to scene, which view may not use",
+        "src/view/a.rs:2: crate::Root leads to the crate root, which view may not use",
+        "src/view/a.rs:2: super::super::scene::S leads to scene, which view may not use",
+    ];
+    assert_eq!(sources.outward(RINGS, PLUGIN), outward, "the paths that point outwards");
+    let cycle = "src/scene/s.rs:1: super::T\nsrc/scene/t.rs:1: super::super::S\n";
+    assert_eq!(sources.cycles("scene/"), [cycle], "the files that use each other");
+    assert_eq!(sources.cycles("view/"), [""; 0], "and no others");
+}

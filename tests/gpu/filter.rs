@@ -1,0 +1,130 @@
+//! The temporal filter on the GPU: what it leaves out, and that nothing else changes.
+//!
+//! In: synthetic scenes with filters of both kinds of storage. Skipped where there is no GPU.
+
+use crate::support::gpu;
+use bevy_gs4d::reference;
+use bevy_gs4d::renderer::{Headless, Instance, ViewParameters};
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{ActiveSets, FilterKind, RuntimeScene, TemporalFilter};
+use bevy_gs4d::view::{Appearance, Background, Camera, Frame, RasterFov, View};
+use glam::{UVec2, Vec3};
+
+const SEGMENTS: u32 = 9;
+const BLACK: Background = Background::Color([0.0; 3]);
+
+fn scene(count: usize, seed: u64) -> RuntimeScene {
+    let settings = SynthSettings { count, seed, degree: 1, ..SynthSettings::default() };
+    synthesize(&settings).into_runtime().expect("synthetic scenes are valid")
+}
+
+fn with_support(scene: &RuntimeScene) -> RuntimeScene {
+    let filter = TemporalFilter::support(scene.iter(), scene.trained_with.time_interval, SEGMENTS);
+    RuntimeScene { filter: Some(filter), ..scene.clone() }
+}
+
+fn as_bits(scene: &RuntimeScene) -> RuntimeScene {
+    let filter = scene.filter.clone().expect("a filter");
+    let sets = ActiveSets::Bits(filter.to_bits());
+    RuntimeScene { filter: Some(TemporalFilter { sets, ..filter }), ..scene.clone() }
+}
+
+fn view(time: f32) -> View {
+    let eye = Vec3::new(2.0, -1.5, 1.2);
+    Camera::look_at(eye, Vec3::ZERO, Vec3::Z, 0.9, UVec2::new(90, 61)).view(time, RasterFov::Reference)
+}
+
+/// Times in order and back again: the segment changes, stays, and returns.
+fn times() -> impl Iterator<Item = f32> {
+    [0.0, 0.05, 0.11, 0.112, 0.5, 0.93, 1.0, 0.5, 0.0, -0.3, 1.4].into_iter()
+}
+
+fn bits_of(frame: &Frame) -> Vec<u32> {
+    let colors = frame.picture.pixels.iter().flat_map(|p| p.to_array());
+    colors.chain(frame.transmittance.iter().copied()).chain(frame.depth.iter().copied()).map(f32::to_bits).collect()
+}
+
+fn draw(headless: &mut Headless, scene: &RuntimeScene, time: f32) -> Frame {
+    let capture = headless.upload(scene).expect("it fits");
+    headless.render(&capture, &view(time), BLACK).expect("it is drawn")
+}
+
+#[test]
+fn support_changes_no_bit() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let whole = scene(5_000, 3);
+    let filtered = with_support(&whole);
+    let share = filtered.filter.as_ref().expect("a filter").active_share();
+    assert!(share < 0.9, "the filter leaves something out: {share} is active");
+    let [a, b, c] = [&whole, &filtered, &as_bits(&filtered)].map(|scene| headless.upload(scene).expect("it fits"));
+    for time in times() {
+        let expected = headless.render(&a, &view(time), BLACK).expect("it is drawn");
+        for capture in [&b, &c] {
+            let frame = headless.render(capture, &view(time), BLACK).expect("it is drawn");
+            assert_eq!(frame.counts, expected.counts, "at {time}: as many splats and pairs");
+            assert!(bits_of(&frame) == bits_of(&expected), "at {time}: bit for bit the same");
+        }
+    }
+}
+
+#[test]
+fn inactive_gaussians_are_not_drawn() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let whole = scene(3_000, 5);
+    // Every third Gaussian is active in even segments, the others in odd ones: intervals cannot say that.
+    let words = TemporalFilter::words(3_000);
+    let mut bits = vec![0u32; words * SEGMENTS as usize];
+    for segment in 0..SEGMENTS as usize {
+        for index in (0..3_000).filter(|i| (i % 3 == 0) == (segment % 2 == 0)) {
+            bits[segment * words + index / 32] |= 1 << (index % 32);
+        }
+    }
+    let filter = TemporalFilter::from_bits(FilterKind::KeyFrame, SEGMENTS, 3_000, bits);
+    assert!(matches!(filter.sets, ActiveSets::Bits(_)), "sets with pauses are bits");
+    let filtered = RuntimeScene { filter: Some(filter), ..whole.clone() };
+    let capture = headless.upload(&filtered).expect("it fits");
+    for time in times() {
+        let frame = headless.render(&capture, &view(time), BLACK).expect("it is drawn");
+        let expected = reference::render(&filtered, &view(time), BLACK);
+        assert_eq!(frame.counts.visible, expected.counts.visible, "at {time}: the same splats as on the CPU");
+        let apart = frame.picture.pixels.iter().zip(&expected.picture.pixels);
+        let apart = apart.map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
+        assert!(apart <= 1e-3, "at {time}: {apart} apart from the CPU reference");
+    }
+    let all = draw(&mut headless, &whole, 0.5);
+    let some = headless.render(&capture, &view(0.5), BLACK).expect("it is drawn");
+    assert!(some.counts.visible < all.counts.visible, "fewer splats than without the filter");
+    headless.use_filters(false);
+    let unfiltered = headless.render(&capture, &view(0.5), BLACK).expect("it is drawn");
+    assert!(bits_of(&unfiltered) == bits_of(&all), "switched off, everything is drawn");
+    headless.use_filters(true);
+    let again = headless.render(&capture, &view(0.5), BLACK).expect("it is drawn");
+    assert!(bits_of(&again) == bits_of(&some), "switched on again, the list is made again");
+}
+
+#[test]
+fn captures_with_and_without_a_filter_share_a_view() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let (a, b) = (scene(2_000, 7), scene(2_500, 8));
+    let filtered = with_support(&a);
+    let [plain, other, filtered] = [&a, &b, &filtered].map(|scene| headless.upload(scene).expect("it fits"));
+    let mut previous = None;
+    for (time, late) in times().zip(times().skip(3)) {
+        let parameters = ViewParameters { background: BLACK, ..ViewParameters::default() };
+        let instance =
+            |capture, active, time| Instance { capture, active, view: view(time), appearance: Appearance::default() };
+        let expected = [instance(&plain, None, time), instance(&other, None, late), instance(&plain, None, late)];
+        let expected = headless.render_all(&expected, &parameters).expect("it is drawn");
+        // The same capture twice, at different times: each place has a list of its own.
+        let [now, then] = [time, late].map(|time| headless.active(&filtered, time));
+        let mixed = [
+            instance(&filtered, now.as_ref(), time),
+            instance(&other, None, late),
+            instance(&filtered, then.as_ref(), late),
+        ];
+        let mixed = headless.render_all(&mixed, &parameters).expect("it is drawn");
+        assert!(bits_of(&mixed) == bits_of(&expected), "at {time} and {late}: bit for bit the same");
+        assert!(previous != Some(bits_of(&mixed)), "time moves the picture");
+        previous = Some(bits_of(&mixed));
+    }
+}

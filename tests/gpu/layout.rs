@@ -1,0 +1,269 @@
+//! Structures and constants that stand in the shaders and in the host's code.
+//!
+//! In: the composed passes, as naga lays them out. Out: proof that every structure and shared constant is the same on both sides.
+
+use bevy_gs4d::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
+use bevy_gs4d::gaussian::projection::LOW_PASS;
+use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF};
+use bevy_gs4d::renderer::layout::{
+    self, Activation, BLOCK, Counters, DIGITS, FrameUniforms, InstanceUniforms, SortStep, SplatRecord,
+};
+use bevy_gs4d::renderer::shaders::{compose, pass_names};
+use bevy_gs4d::view::TILE_SIZE;
+use std::collections::{BTreeMap, BTreeSet};
+use std::mem::offset_of;
+use wgpu::naga::front::wgsl::parse_str;
+use wgpu::naga::{Expression, GlobalVariable, Literal, Module, StructMember, TypeInner};
+
+/// A member: its name, where it begins, how many bytes it has.
+type Member = (String, usize, usize);
+
+/// A structure of the host.
+struct Mirror {
+    name: &'static str,
+    size: usize,
+    members: Vec<Member>,
+}
+
+fn member_size<T, M>(_: impl Fn(&T) -> &M) -> usize {
+    size_of::<M>()
+}
+
+macro_rules! mirror {
+    ($type:ident { $($member:ident),* $(,)? }) => {
+        Mirror {
+            name: stringify!($type),
+            size: size_of::<$type>(),
+            members: vec![$((
+                stringify!($member).to_owned(),
+                offset_of!($type, $member),
+                member_size(|value: &$type| &value.$member),
+            )),*],
+        }
+    };
+}
+
+/// The Gaussian on the GPU holds the reciprocal of the temporal deviation, and its covariance in two pieces.
+fn gaussian() -> Mirror {
+    let mut mirror = mirror!(Gaussian { mean, mean_t, velocity, sigma_t, covariance, opacity, padding });
+    let covariance = offset_of!(Gaussian, covariance);
+    mirror.members[3].0 = "inverse_sigma_t".to_owned();
+    mirror.members[4] = ("covariance_a".to_owned(), covariance, 16);
+    mirror.members.insert(5, ("covariance_b".to_owned(), covariance + 16, 8));
+    mirror
+}
+
+fn mirrors() -> [Mirror; 7] {
+    [
+        gaussian(),
+        mirror!(InstanceUniforms {
+            camera_x,
+            camera_y,
+            camera_z,
+            clip_x,
+            clip_y,
+            camera_position,
+            time,
+            reach,
+            focal,
+            size,
+            tiles,
+            first_slot,
+            count,
+            degree,
+            degree_t,
+            stride,
+            displaced,
+            near,
+            time_span,
+            listed,
+            first_listed,
+            stages,
+            orthographic,
+            first_entries,
+            light,
+            opacity,
+            lighting,
+            debug,
+            cropped,
+            padding,
+            crop_x,
+            crop_y,
+            crop_z,
+        }),
+        mirror!(Activation { count, first, filter_mode, segment }),
+        mirror!(FrameUniforms {
+            size,
+            tiles,
+            slots,
+            pair_capacity,
+            background_mode,
+            opaque_samples,
+            background,
+            projection,
+            world_x,
+            world_y,
+            world_z,
+            environment_size,
+            opaque_origin,
+            opaque_distance,
+            environment_lighting,
+            debug,
+            debug_depth,
+            environment_opacity,
+        }),
+        mirror!(SplatRecord { center, opacity, depth, conic, tiles_low, color, tiles_high }),
+        mirror!(Counters { visible, pairs, pairs_wanted, padding }),
+        mirror!(SortStep { shift, source, stride, padding }),
+    ]
+}
+
+/// The name without what naga_oil appends to imported ones.
+fn plain(name: &str) -> &str {
+    name.split("X_naga_oil").next().unwrap_or(name)
+}
+
+/// All passes, composed.
+fn modules() -> BTreeMap<&'static str, Module> {
+    pass_names().map(|name| (name, compose(name, &[]).expect("the pass composes"))).collect()
+}
+
+/// A structure that the host fills or reads, as a pass lays it out.
+struct Shared {
+    name: String,
+    size: usize,
+    members: Vec<Member>,
+    /// Distance from one to the next, where they come in an array.
+    stride: Option<usize>,
+}
+
+/// The structures behind the bindings of a pass.
+fn shared(module: &Module) -> Vec<Shared> {
+    let member = |member: &StructMember| {
+        let size = module.types[member.ty].inner.size(module.to_ctx()) as usize;
+        (member.name.clone().unwrap_or_default(), member.offset as usize, size)
+    };
+    let structure = |variable: &GlobalVariable| {
+        variable.binding?;
+        let (ty, stride) = match module.types[variable.ty].inner {
+            TypeInner::Array { base, stride, .. } => (base, Some(stride as usize)),
+            _ => (variable.ty, None),
+        };
+        let TypeInner::Struct { members, span } = &module.types[ty].inner else { return None };
+        let name = plain(module.types[ty].name.as_deref().unwrap_or_default()).to_owned();
+        Some(Shared { name, size: *span as usize, members: members.iter().map(member).collect(), stride })
+    };
+    module.global_variables.iter().filter_map(|(_, variable)| structure(variable)).collect()
+}
+
+#[test]
+fn every_structure_has_the_same_members_in_the_same_places() {
+    let mirrors = mirrors();
+    let mut seen = BTreeSet::new();
+    let mut wrong = Vec::new();
+    for (pass, module) in modules() {
+        for Shared { name, size, members, stride } in shared(&module) {
+            let Some(mirror) = mirrors.iter().find(|mirror| mirror.name == name) else {
+                wrong.push(format!("{pass}: the host has no `{name}`"));
+                continue;
+            };
+            seen.insert(mirror.name);
+            if mirror.size != size || stride.is_some_and(|stride| stride != size) {
+                wrong.push(format!("{pass}: `{name}` has {size} bytes, apart {stride:?}, the host's {}", mirror.size));
+            }
+            if mirror.members != members {
+                wrong.push(format!("{pass}: `{name}` is\n  {members:?}, the host's\n  {:?}", mirror.members));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert_eq!(seen.len(), mirrors.len(), "every structure of the host is bound by some pass: {seen:?}");
+}
+
+#[test]
+fn members_of_the_host_leave_no_gap() {
+    for mirror in mirrors() {
+        let bytes: usize = mirror.members.iter().map(|(_, _, size)| size).sum();
+        assert_eq!(bytes, mirror.size, "`{}` is compared whole", mirror.name);
+    }
+}
+
+/// The value of a constant, in double precision, which holds every u32 and f32.
+fn constant(module: &Module, name: &str) -> f64 {
+    let found = module.constants.iter().find(|(_, constant)| constant.name.as_deref() == Some(name));
+    let (_, constant) = found.unwrap_or_else(|| panic!("there is no constant `{name}`"));
+    match module.global_expressions[constant.init] {
+        Expression::Literal(Literal::F32(value)) => value.into(),
+        Expression::Literal(Literal::U32(value)) => value.into(),
+        ref other => panic!("`{name}` is not a plain number: {other:?}"),
+    }
+}
+
+#[test]
+fn constants_of_the_passes_are_those_of_the_host() {
+    let modules = modules();
+    let threads = 256;
+    let expected: [(&str, &str, f64); 11] = [
+        ("activate", "BLOCK", BLOCK.into()),
+        ("activate", "PER_THREAD", (BLOCK / threads).into()),
+        ("project", "MARGINAL_CUTOFF", MARGINAL_CUTOFF.into()),
+        ("project", "LOW_PASS", LOW_PASS.into()),
+        ("sort", "BLOCK", BLOCK.into()),
+        ("sort", "KEYS_PER_THREAD", (BLOCK / threads).into()),
+        ("sort", "NO_DIGIT", DIGITS.into()),
+        ("bin", "BLOCK", BLOCK.into()),
+        ("bin", "SPLATS_PER_THREAD", (BLOCK / threads).into()),
+        ("blend", "BATCH", (TILE_SIZE * TILE_SIZE).into()),
+        ("score", "PIXELS", (TILE_SIZE * TILE_SIZE).into()),
+    ];
+    for (pass, name, value) in expected {
+        let found = constant(&modules[pass], name);
+        assert!(found == value, "{name} of {pass} is {found}, the host's {value}");
+    }
+}
+
+#[test]
+fn constants_of_the_libraries_are_those_of_the_host() {
+    // These import from each other alone: one after the other and without their directives they are plain WGSL.
+    let sources = [
+        include_str!("../../shaders/shared/types.wgsl"),
+        include_str!("../../shaders/shared/alpha.wgsl"),
+        include_str!("../../shaders/shared/tile.wgsl"),
+    ];
+    let lines = sources.iter().flat_map(|source| source.lines()).filter(|line| !line.starts_with('#'));
+    let libraries = parse_str(&lines.collect::<Vec<_>>().join("\n")).expect("the libraries are WGSL");
+    let integers = [
+        ("LIGHTING_AS_TRAINED", layout::LIGHTING_AS_TRAINED),
+        ("LIGHTING_ENCODED", layout::LIGHTING_ENCODED),
+        ("LIGHTING_LINEAR", layout::LIGHTING_LINEAR),
+        ("DEBUG_COLOR", layout::DEBUG_COLOR),
+        ("DEBUG_DEPTH", layout::DEBUG_DEPTH),
+        ("DEBUG_OVERDRAW", layout::DEBUG_OVERDRAW),
+        ("DEBUG_ACTIVE", layout::DEBUG_ACTIVE),
+        ("DEBUG_LIFESPAN", layout::DEBUG_LIFESPAN),
+        ("DEBUG_VELOCITY", layout::DEBUG_VELOCITY),
+        ("FILTER_BITS", layout::FILTER_BITS),
+        ("FILTER_INTERVALS", layout::FILTER_INTERVALS),
+        ("INVISIBLE", layout::INVISIBLE),
+        ("BACKGROUND_NONE", layout::BACKGROUND_NONE),
+        ("BACKGROUND_COLOR", layout::BACKGROUND_COLOR),
+        ("BACKGROUND_ENVIRONMENT", layout::BACKGROUND_ENVIRONMENT),
+        ("SORT_SLOTS", layout::SORT_SLOTS),
+        ("SORT_VISIBLE", layout::SORT_VISIBLE),
+        ("SORT_PAIRS", layout::SORT_PAIRS),
+        ("TILE_SIZE", TILE_SIZE),
+    ];
+    let floats = [
+        ("ALPHA_MIN", ALPHA_MIN),
+        ("INVERSE_ALPHA_MIN", ALPHA_MIN.recip().round()),
+        ("ALPHA_MAX", ALPHA_MAX),
+        ("TRANSMITTANCE_MIN", TRANSMITTANCE_MIN),
+    ];
+    assert_eq!(libraries.constants.len(), integers.len() + floats.len(), "every constant of the libraries is compared");
+    let integers = integers.map(|(name, value)| (name, f64::from(value)));
+    let floats = floats.map(|(name, value)| (name, f64::from(value)));
+    for (name, value) in integers.into_iter().chain(floats) {
+        let found = constant(&libraries, name);
+        assert!(found == value, "{name} is {found}, the host's {value}");
+    }
+}

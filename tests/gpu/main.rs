@@ -1,0 +1,24 @@
+//! The renderer without Bevy, and the shaders on their own.
+//!
+//! In: scenes and buffers made here, `tests/golden/`, the files of `shaders/`. Out: one test binary. Each module says what it tests;
+//! what needs a device is skipped where there is none, not even a software one.
+
+mod appearance;
+mod filter;
+mod golden;
+mod layout;
+mod packed;
+mod passes;
+mod render;
+mod score;
+mod shaders;
+
+#[path = "../support"]
+mod support {
+    pub mod golden;
+    pub mod gpu;
+    pub mod limited_device;
+    pub mod packed_scene;
+    pub mod passes;
+    pub mod skip;
+}

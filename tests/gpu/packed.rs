@@ -1,0 +1,29 @@
+//! The packed form on the GPU.
+//!
+//! In: synthetic scenes, packed. Out: proof that the GPU reads them as the CPU does. Skipped where there is no GPU.
+
+use crate::support::gpu;
+use crate::support::packed_scene::{BLACK, scene, settings, view};
+use bevy_gs4d::offline::quantize::compress;
+use bevy_gs4d::reference;
+
+#[test]
+fn the_gpu_reads_the_packed_form_as_the_cpu_does() {
+    let Some(mut headless) = gpu::headless() else { return };
+    for (degree, degree_t, codebooks) in
+        [(3, 2, &[64, 32, 16, 8][..]), (3, 2, &[]), (3, 1, &[50]), (2, 0, &[16, 16]), (1, 0, &[8]), (0, 0, &[2])]
+    {
+        let (packed, _) = compress(scene(5_000, degree, degree_t), &settings(codebooks)).expect("it is compressed");
+        let packed = packed.into_runtime().expect("drawable");
+        let capture = headless.upload(&packed).expect("it fits");
+        for time in [0.0, 0.33, 0.8] {
+            let found = headless.render(&capture, &view(time), BLACK).expect("it is drawn");
+            let expected = reference::render(&packed, &view(time), BLACK);
+            let pixels = found.picture.pixels.iter().zip(&expected.picture.pixels);
+            let far = pixels.filter(|(a, b)| (**a - **b).abs().max_element() > 1e-3).count();
+            // Where float rounding decides whether a splat counts, a pixel may differ by more.
+            assert!(far <= 20, "degree {degree} and {degree_t}, {codebooks:?}, at {time}: {far} pixels differ");
+            assert!(found.counts.visible > 500, "something is seen");
+        }
+    }
+}

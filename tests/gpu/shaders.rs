@@ -1,0 +1,75 @@
+//! Every shader on its own, without a device.
+//!
+//! In: the files of `shaders/`. Out: proof that each is known to the renderer and is valid WGSL that needs no optional capability.
+
+use bevy_gs4d::renderer::shaders::{MULTISAMPLED, Storage, compose, pass_names};
+use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
+use std::collections::BTreeSet;
+use std::path::Path;
+use wgpu::naga::Module;
+use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
+
+/// What is wrong with a module, if anything. No capability is allowed, so that subgroups would be noticed.
+fn validate(name: &str, module: &Module) -> Result<(), String> {
+    Validator::new(ValidationFlags::all(), Capabilities::empty())
+        .validate(module)
+        .map(|_| ())
+        .map_err(|error| format!("{name}: {error:?}"))
+}
+
+/// Fails once, with everything that is wrong.
+fn report(failures: Vec<String>) {
+    assert!(failures.is_empty(), "{} shaders are wrong:\n{}", failures.len(), failures.join("\n"));
+}
+
+#[test]
+fn every_shader_file_is_a_pass_or_one_of_bevy_s() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
+    let files = std::fs::read_dir(folder).expect("the folder of shaders").map(|entry| entry.expect("an entry").path());
+    let shaders = files.filter(|path| path.extension().is_some_and(|ending| ending == "wgsl"));
+    let mut names: BTreeSet<String> =
+        shaders.filter_map(|path| Some(path.file_stem()?.to_string_lossy().into_owned())).collect();
+    for name in ["composite", "write_depth"] {
+        assert!(names.remove(name), "{name} is there");
+    }
+    let passes: BTreeSet<String> = pass_names().map(str::to_owned).collect();
+    assert!(!passes.is_empty(), "there are passes");
+    assert_eq!(passes, names, "the passes are the files");
+    assert_eq!(passes.len(), pass_names().count(), "no pass has the name of another");
+}
+
+#[test]
+fn every_pass_composes_and_is_valid() {
+    let check =
+        |name: &str, definitions| validate(name, &compose(name, definitions).map_err(|error| error.to_string())?);
+    let definitions = Storage::ALL.map(Storage::definitions).into_iter().chain([MULTISAMPLED]);
+    let all = definitions.flat_map(|definitions| pass_names().map(move |name| (name, definitions)));
+    report(all.filter_map(|(name, definitions)| check(name, definitions).err()).collect());
+}
+
+#[test]
+fn an_unknown_pass_is_named() {
+    let message = compose("no such pass", &[]).expect_err("there is none").to_string();
+    assert!(message.contains("no such pass"), "{message}");
+}
+
+#[test]
+fn bevy_s_passes_are_valid_with_all_their_definitions() {
+    let composite = ("composite", include_str!("../../shaders/composite.wgsl"), ["ENCODE_TARGET", "DECODE_TARGET"]);
+    let write_depth = ("write_depth", include_str!("../../shaders/write_depth.wgsl"), ["MEDIAN", "UNUSED"]);
+    let check = |(name, source, defines): (&str, &str, [&str; 2]), chosen: usize| {
+        let chosen = defines.iter().enumerate().filter(|(index, _)| (chosen >> index) & 1 == 1);
+        let shader_defs = chosen.map(|(_, define)| ((*define).to_owned(), ShaderDefValue::Bool(true))).collect();
+        let mut composer = Composer::default();
+        let srgb = include_str!("../../shaders/shared/srgb.wgsl");
+        let library = ComposableModuleDescriptor { source: srgb, file_path: "srgb", ..Default::default() };
+        if let Err(error) = composer.add_composable_module(library) {
+            return Err(error.emit_to_string(&composer));
+        }
+        let descriptor = NagaModuleDescriptor { source, file_path: name, shader_defs, ..Default::default() };
+        let module = composer.make_naga_module(descriptor).map_err(|error| error.emit_to_string(&composer))?;
+        validate(name, &module)
+    };
+    let all = [composite, write_depth].into_iter().flat_map(|pass| (0..4).map(move |chosen| (pass, chosen)));
+    report(all.filter_map(|(pass, chosen)| check(pass, chosen).err()).collect());
+}

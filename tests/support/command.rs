@@ -1,0 +1,61 @@
+//! Running the `gs4d` command as a user does.
+//!
+//! In: arguments. Out: exit code, standard output, standard error.
+
+use serde_json::Value;
+use std::ffi::OsStr;
+use std::path::PathBuf;
+use std::process::Command;
+use tempfile::TempDir;
+
+/// A run that has ended.
+pub struct Run {
+    pub code: Option<i32>,
+    pub out: String,
+    pub err: String,
+}
+
+/// Runs the command.
+pub fn gs4d<S: AsRef<OsStr>>(arguments: &[S]) -> Run {
+    let output = Command::new(env!("CARGO_BIN_EXE_gs4d")).args(arguments).output().expect("the command starts");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    Run { code: output.status.code(), out: text(&output.stdout), err: text(&output.stderr) }
+}
+
+impl Run {
+    /// The text of a run that must have worked.
+    pub fn text(self) -> String {
+        assert_eq!(self.code, Some(0), "the command works: {}", self.err);
+        self.out
+    }
+
+    /// The one JSON document of a run that must have worked.
+    pub fn json(self) -> Value {
+        serde_json::from_str(&self.text()).expect("exactly one JSON document")
+    }
+
+    /// That it failed cleanly and named this.
+    pub fn must_fail(&self, name: &str) {
+        assert_eq!(self.code, Some(2), "{name}: exit code 2; stdout {} stderr {}", self.out, self.err);
+        assert!(self.err.contains("error:") && self.err.contains(name), "{name} is named: {}", self.err);
+        assert!(!self.err.contains("panicked"), "{name}: no panic: {}", self.err);
+    }
+}
+
+/// Arguments from paths and words.
+macro_rules! arguments {
+    ($($argument:expr),* $(,)?) => { [$(std::ffi::OsString::from($argument)),*] };
+}
+pub(crate) use arguments;
+
+/// A temporary folder.
+pub fn folder() -> TempDir {
+    tempfile::tempdir().expect("a temporary folder")
+}
+
+/// A synthetic scene of so many Gaussians, `scene.gs4d` in this folder.
+pub fn scene(folder: &TempDir, count: &str) -> PathBuf {
+    let path = folder.path().join("scene.gs4d");
+    gs4d(&arguments!["synth", &path, "--count", count]).text();
+    path
+}

@@ -1,0 +1,91 @@
+//! Scenes and cameras that both a Bevy app and the CPU reference draw.
+//!
+//! In: Gaussians, a camera's transform. Out: a scene for both, the same view for [`bevy_gs4d::reference`], and how far two pictures are
+//! apart.
+
+use crate::support::offscreen_app::FOV_Y;
+use bevy::prelude::*;
+use bevy_gs4d::asset::GaussianCapture;
+use bevy_gs4d::gaussian::{Gaussian, Harmonics};
+use bevy_gs4d::scene::{PlaybackHints, RuntimeScene};
+use bevy_gs4d::view::{Camera as PinholeCamera, Lens, Picture, RasterFov, View};
+use image::RgbaImage;
+
+/// Rows of this width are padded when they are read back.
+pub const SIZE: UVec2 = UVec2::new(200, 150);
+/// Seconds that the scenes of [`scene`] last.
+pub const DURATION: f32 = 2.0;
+
+/// Puts a scene among the assets.
+pub fn add(app: &mut App, scene: &RuntimeScene) -> Handle<GaussianCapture> {
+    app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(scene.clone()))
+}
+
+/// A Gaussian at rest, always there: its mean and the standard deviations along the axes.
+pub fn blob(mean: Vec3, deviation: Vec3, opacity: f32) -> Gaussian {
+    let variance = deviation * deviation;
+    Gaussian {
+        mean: mean.to_array(),
+        mean_t: 0.5,
+        velocity: [0.0; 3],
+        sigma_t: f32::INFINITY,
+        covariance: [variance.x, 0.0, 0.0, variance.y, 0.0, variance.z],
+        opacity,
+        padding: 0.0,
+    }
+}
+
+/// A scene of Gaussians and their colours, the same from every direction.
+pub fn scene(gaussians: &[(Gaussian, Vec3)]) -> RuntimeScene {
+    // The first harmonic is 0.282; one half is added to colours.
+    let values = gaussians.iter().flat_map(|(_, color)| ((*color - 0.5) / 0.282_094_79).to_array()).collect();
+    let harmonics = Harmonics { coefficients: 1, degree: 0, degree_t: 0, values };
+    RuntimeScene {
+        playback: PlaybackHints { duration_seconds: DURATION, ..PlaybackHints::default() },
+        ..RuntimeScene::sliced(gaussians.iter().map(|(gaussian, _)| *gaussian).collect(), harmonics)
+    }
+}
+
+/// Where the test camera stands unless a test says otherwise.
+pub fn eye() -> Transform {
+    Transform::from_xyz(0.6, 0.9, 3.5).looking_at(Vec3::ZERO, Vec3::Y)
+}
+
+/// The view of [`spawn_camera`] with a target of `size` pixels, for the CPU reference. `time` in the capture's unit.
+pub fn view(camera: &Transform, size: UVec2, time: f32) -> View {
+    let tan_y = (FOV_Y / 2.0).tan();
+    let lens = Lens::Fov { tan: Vec2::new(tan_y * size.x as f32 / size.y as f32, tan_y) };
+    // Bevy's cameras look along -z with y up, the reference's along +z with y down.
+    let flip = Mat4::from_diagonal(Vec4::new(1.0, -1.0, -1.0, 1.0));
+    let world_to_camera = flip * camera.to_matrix().inverse();
+    PinholeCamera { world_to_camera, size, lens }.view(time, RasterFov::Corrected)
+}
+
+/// The same view of an entity with a transform.
+pub fn view_of(camera: &Transform, entity: &Transform, size: UVec2, time: f32) -> View {
+    let plain = view(camera, size, time);
+    View::new(size, time, plain.world_to_camera * entity.to_matrix(), plain.projection, plain.tan_fov)
+}
+
+/// The largest difference of any channel of any pixel, in 255ths.
+pub fn difference(picture: &RgbaImage, expected: &Picture) -> f32 {
+    assert_eq!(UVec2::from(picture.dimensions()), expected.size, "pictures of one size");
+    let expected = expected.clamped();
+    let channel = |(pixel, expected): (&image::Rgba<u8>, &Vec3)| {
+        let [r, g, b, _] = pixel.0.map(f32::from);
+        (Vec3::new(r, g, b) - *expected * 255.0).abs().max_element()
+    };
+    picture.pixels().zip(&expected.pixels).map(channel).fold(0.0, f32::max)
+}
+
+/// The largest difference of any channel between two pictures, in 255ths.
+pub fn difference_between(a: &RgbaImage, b: &RgbaImage) -> u8 {
+    assert_eq!(a.dimensions(), b.dimensions(), "pictures of one size");
+    a.iter().zip(b.iter()).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or_default()
+}
+
+/// Red, green and blue of a pixel.
+pub fn rgb(picture: &RgbaImage, x: u32, y: u32) -> [u8; 3] {
+    let [r, g, b, _] = picture.get_pixel(x, y).0;
+    [r, g, b]
+}

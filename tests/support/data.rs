@@ -1,0 +1,15 @@
+//! The real captures.
+//!
+//! In: the environment variable `GS4D_DATA`. Out: the folder that it names.
+
+use crate::support::skip::skip;
+use std::path::PathBuf;
+
+/// Returns the folder that holds `toybox/` and `standup/`; `None` where it is not known, which is reported.
+pub fn data() -> Option<PathBuf> {
+    let folder = std::env::var_os("GS4D_DATA").map(PathBuf::from);
+    if folder.is_none() {
+        skip("GS4D_DATA is not set to the folder of the real captures (toybox, standup)");
+    }
+    folder
+}

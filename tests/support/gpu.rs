@@ -1,0 +1,20 @@
+//! A GPU for tests.
+//!
+//! In: the usual adapter. Out: a renderer on it, with shader checks on as long as debug assertions are.
+
+use crate::support::skip::skip;
+use bevy_gs4d::renderer::{GpuContext, Headless, ShaderChecks};
+
+/// As the plugin chooses them: a build as shipped does not check.
+pub const CHECKS: ShaderChecks = if cfg!(debug_assertions) { ShaderChecks::On } else { ShaderChecks::Off };
+
+/// Returns a renderer; `None` where there is no adapter, which is reported.
+pub fn headless() -> Option<Headless> {
+    match GpuContext::headless(None) {
+        Ok(context) => Some(Headless::new(context, CHECKS).expect("the passes compile")),
+        Err(error) => {
+            skip(format_args!("no GPU adapter: {error}"));
+            None
+        }
+    }
+}

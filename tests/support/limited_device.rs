@@ -1,0 +1,38 @@
+//! A device with low limits, on which small scenes are as large as huge ones are elsewhere.
+//!
+//! In: the usual adapter. Out: a renderer on it whose storage buffer bindings end at [`BINDING`] bytes.
+
+use crate::support::skip::skip;
+use bevy_gs4d::renderer::{GpuContext, Headless, ShaderChecks};
+use pollster::block_on;
+
+/// Most bytes that can be bound.
+pub const BINDING: u64 = 1 << 21;
+
+/// Returns a renderer with shader checks on; `None` where there is no adapter, which is reported.
+pub fn headless() -> Option<Headless> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
+        backends: wgpu::Backends::PRIMARY,
+        ..wgpu::InstanceDescriptor::new_without_display_handle()
+    });
+    let fastest = wgpu::RequestAdapterOptions {
+        power_preference: wgpu::PowerPreference::HighPerformance,
+        ..wgpu::RequestAdapterOptions::default()
+    };
+    let adapter = match block_on(instance.request_adapter(&fastest)) {
+        Ok(adapter) => adapter,
+        Err(error) => {
+            skip(format_args!("no GPU adapter: {error}"));
+            return None;
+        }
+    };
+    let limits = wgpu::Limits { max_storage_buffer_binding_size: BINDING, ..adapter.limits() };
+    let (device, queue) = block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+        label: Some("limited"),
+        required_limits: limits,
+        ..Default::default()
+    }))
+    .expect("less than the adapter can do");
+    let context = GpuContext { device, queue, info: adapter.get_info() };
+    Some(Headless::new(context, ShaderChecks::On).expect("the passes compile"))
+}

@@ -1,0 +1,54 @@
+//! Headless Bevy apps for tests.
+//!
+//! In: the size of a picture. Out: an app that draws into one without a window, a camera for it, and the picture.
+
+use crate::support::skip::skip;
+use bevy::app::PluginGroupBuilder;
+use bevy::core_pipeline::tonemapping::{DebandDither, Tonemapping};
+use bevy::prelude::*;
+use bevy::render::RenderPlugin;
+use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
+use bevy_gs4d::GaussianCapturePlugin;
+use bevy_gs4d::testing::{self, Offscreen, TestingError};
+use image::RgbaImage;
+use std::time::Duration;
+
+/// Vertical field of view of every test camera, radians.
+pub const FOV_Y: f32 = 0.8;
+
+/// Returns an app without a window; `None` where there is no GPU to draw with, which is reported.
+pub fn app(size: UVec2) -> Option<App> {
+    if !testing::has_gpu() {
+        skip(TestingError::NoGpu);
+        return None;
+    }
+    let mut app = if as_shipped() { testing::app_with(size, shipped_plugins) } else { testing::app(size) };
+    app.add_plugins(GaussianCapturePlugin).insert_resource(ClearColor(Color::BLACK));
+    Some(app)
+}
+
+/// Whether apps run as a game ships them: shaders unchecked, pipelined rendering on, pipelines compiled in the background.
+fn as_shipped() -> bool {
+    let wanted = std::env::var_os("GS4D_AS_SHIPPED").is_some();
+    assert!(!wanted || !cfg!(debug_assertions), "GS4D_AS_SHIPPED needs a build without debug assertions");
+    wanted
+}
+
+fn shipped_plugins(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+    plugins
+        .enable::<PipelinedRenderingPlugin>()
+        .set(RenderPlugin { synchronous_pipeline_compilation: false, ..default() })
+}
+
+/// A camera whose pixels are compared: no tonemapping, no dithering.
+pub fn spawn_camera(app: &mut App, msaa: Msaa, transform: Transform) -> Entity {
+    let target = app.world().resource::<Offscreen>().target();
+    let lens = Projection::Perspective(PerspectiveProjection { fov: FOV_Y, ..default() });
+    let appearance = (Tonemapping::None, DebandDither::Disabled);
+    app.world_mut().spawn((Camera3d::default(), target, msaa, lens, appearance, transform)).id()
+}
+
+/// The picture after `seconds` more.
+pub fn picture(app: &mut App, seconds: f32) -> RgbaImage {
+    testing::picture(app, Duration::from_secs_f32(seconds)).expect("the app draws without an error")
+}

@@ -1,0 +1,38 @@
+//! Scenes for tests of the packed form.
+//!
+//! In: a number of Gaussians, degrees of their harmonics. Out: a scene to be packed, settings to pack it with, a view to compare it in.
+
+use bevy_gs4d::offline::quantize::{CompressSettings, Quality};
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{RuntimeScene, TemporalFilter};
+use bevy_gs4d::view::{Background, Camera, RasterFov, View};
+use glam::{UVec2, Vec3};
+
+/// Nothing behind the scene.
+pub const BLACK: Background = Background::Color([0.0; 3]);
+
+/// A synthetic scene with a support filter of nine segments, some of whose Gaussians are at rest and always active.
+pub fn scene(count: usize, degree: u32, degree_t: u32) -> RuntimeScene {
+    let settings = SynthSettings { count, degree, degree_t, ..SynthSettings::default() };
+    let mut scene = synthesize(&settings).into_runtime().expect("synthetic scenes are valid");
+    // Some that are always there, at rest.
+    let sliced = scene.form.as_sliced_mut().expect("sliced");
+    for gaussian in sliced.gaussians.iter_mut().step_by(17) {
+        gaussian.sigma_t = f32::INFINITY;
+        gaussian.velocity = [0.0; 3];
+    }
+    let filter = TemporalFilter::support(scene.iter(), scene.trained_with.time_interval, 9);
+    scene.filter = Some(filter);
+    scene
+}
+
+/// A view of it at a time of [0, 1].
+pub fn view(time: f32) -> View {
+    let eye = Vec3::new(1.9, -1.2, 1.1);
+    Camera::look_at(eye, Vec3::ZERO, Vec3::Z, 0.9, UVec2::new(120, 90)).view(time, RasterFov::Reference)
+}
+
+/// Balanced geometry with codebooks of these sizes for the colors.
+pub fn settings(codebooks: &[usize]) -> CompressSettings {
+    CompressSettings { codebooks: codebooks.to_vec(), ..CompressSettings::from(Quality::Balanced) }
+}
