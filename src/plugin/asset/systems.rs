@@ -17,10 +17,11 @@ use bevy::asset::{AssetEvent, AssetId, AssetLoadError, AssetLoadFailedEvent, Ass
 use bevy::ecs::change_detection::{DetectChanges, DetectChangesMut, Ref};
 use bevy::ecs::entity::Entity;
 use bevy::ecs::message::MessageReader;
-use bevy::ecs::system::{Query, Res};
+use bevy::ecs::system::{Local, Query, Res};
 use bevy::log::debug_span;
 use std::collections::{HashMap, HashSet};
 use std::fmt::Display;
+use std::time::{Duration, Instant};
 
 /// Updates the state of every entity with a capture, and sends messages about changes.
 pub(super) fn update_states(
@@ -31,11 +32,13 @@ pub(super) fn update_states(
     rejected: Res<UploadFailures>,
     mut captures: Query<(Entity, Ref<GaussianCapture3d>, &mut CaptureState)>,
     mut announcer: Announcer,
+    mut repeated: Local<RecentFailures>,
 ) {
     let _span = debug_span!("gs4d/states").entered();
     let changed: HashSet<AssetId<GaussianCapture>> = changes.read().filter_map(modified).collect();
-    let failed: HashMap<AssetId<GaussianCapture>, String> =
+    let mut failed: HashMap<AssetId<GaussianCapture>, String> =
         failures.read().map(|failure| (failure.id, describe(&failure.path, &failure.error))).collect();
+    failed.retain(|id, error| repeated.is_new(*id, error));
     for (entity, capture, mut state) in &mut captures {
         let id = capture.0.id();
         if rejected.contains(id) {
@@ -67,6 +70,23 @@ pub(super) fn update_states(
         } else {
             state.set_if_neq(CaptureState::Loading);
         }
+    }
+}
+
+/// Failures of the last moments. Bevy tries a reload that failed a second time at once, and its failure is the same one.
+#[derive(Default)]
+pub(super) struct RecentFailures(HashMap<AssetId<GaussianCapture>, (Instant, String)>);
+
+impl RecentFailures {
+    /// How long a failure like the one before counts as its repetition.
+    const REPETITION: Duration = Duration::from_millis(500);
+
+    /// Whether a failure is not the repetition of the last one.
+    fn is_new(&mut self, id: AssetId<GaussianCapture>, error: &str) -> bool {
+        let now = Instant::now();
+        self.0.retain(|_, (then, _)| now.duration_since(*then) < Self::REPETITION);
+        let known = self.0.insert(id, (now, error.to_owned()));
+        known.is_none_or(|(_, last)| last != error)
     }
 }
 
