@@ -3,7 +3,7 @@
 // depth. Each sample of a multisampled depth hides what is behind it from its share of the pixel. Section 3.4 of the 4DGS model.
 // CPU reference: src/reference/blend.rs.
 #import gs4d::types::{FrameUniforms, SplatRecord, BACKGROUND_COLOR, BACKGROUND_ENVIRONMENT, DEBUG_DEPTH, DEBUG_OVERDRAW}
-#import gs4d::alpha::blend_step
+#import gs4d::alpha::{alpha_at, is_opaque, is_skipped, left_behind}
 #import gs4d::appearance::{heat, lit}
 #import gs4d::environment::environment_texel
 #import gs4d::tile::{pixel_of, tile_index}
@@ -101,21 +101,22 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
                 }
                 limit = next_limit(a.w);
             }
-            let taken = blend_step(batch_b[i], a.z, a.xy - position, transmittance);
-            if taken.weight == 0.0 {
+            let alpha = alpha_at(batch_b[i], a.z, a.xy - position);
+            if is_skipped(alpha) {
                 continue;
             }
-            if taken.weight < 0.0 {
+            let left = left_behind(transmittance, alpha);
+            if is_opaque(left) {
                 done = true;
                 break;
             }
-            let weight = taken.weight * (f32(samples - hidden) / f32(samples));
+            let weight = alpha * transmittance * (f32(samples - hidden) / f32(samples));
             color += batch_c[i] * weight;
             depth += a.w * weight;
-            if transmittance > 0.5 && taken.transmittance <= 0.5 {
+            if transmittance > 0.5 && left <= 0.5 {
                 median = a.w;
             }
-            transmittance = taken.transmittance;
+            transmittance = left;
             blended++;
         }
         if done {

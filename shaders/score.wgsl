@@ -3,7 +3,7 @@
 // channels of (c (color - behind))^2 (removal). `place` gives each splat its first pair; `pairs` sums every pair over its tile,
 // one workgroup each; `gather` sums the pairs of each slot, in their order: the same on every run. CPU reference:
 // src/offline/score/reference.rs.
-#import gs4d::alpha::blend_step
+#import gs4d::alpha::{alpha_at, is_opaque, is_skipped, left_behind}
 #import gs4d::tile::{pair_of_tile, pixel_of, tile_count, tile_index}
 #import gs4d::types::{Counters, FrameUniforms, SplatRecord, INVISIBLE}
 
@@ -52,14 +52,19 @@ fn advance(pixel: ptr<function, Pixel>, splat: SplatRecord, position: vec2<f32>)
     if (*pixel).done {
         return 0.0;
     }
-    let taken = blend_step(splat.conic, splat.opacity, splat.center - position, (*pixel).transmittance);
-    if taken.weight <= 0.0 {
-        (*pixel).done = taken.weight < 0.0;
+    let alpha = alpha_at(splat.conic, splat.opacity, splat.center - position);
+    if is_skipped(alpha) {
         return 0.0;
     }
-    (*pixel).color += splat.color * taken.weight;
-    (*pixel).transmittance = taken.transmittance;
-    return taken.weight;
+    let left = left_behind((*pixel).transmittance, alpha);
+    if is_opaque(left) {
+        (*pixel).done = true;
+        return 0.0;
+    }
+    let weight = alpha * (*pixel).transmittance;
+    (*pixel).color += splat.color * weight;
+    (*pixel).transmittance = left;
+    return weight;
 }
 
 @compute @workgroup_size(256)
