@@ -21,7 +21,6 @@ use bevy::ecs::system::{Local, Query, Res};
 use bevy::log::debug_span;
 use std::collections::{HashMap, HashSet};
 use std::fmt::Display;
-use std::time::{Duration, Instant};
 
 /// Updates the state of every entity with a capture, and sends messages about changes.
 pub(super) fn update_states(
@@ -32,13 +31,26 @@ pub(super) fn update_states(
     rejected: Res<UploadFailures>,
     mut captures: Query<(Entity, Ref<GaussianCapture3d>, &mut CaptureState)>,
     mut announcer: Announcer,
-    mut repeated: Local<RecentFailures>,
+    mut attempts: Local<Attempts>,
 ) {
     let _span = debug_span!("gs4d/states").entered();
-    let changed: HashSet<AssetId<GaussianCapture>> = changes.read().filter_map(modified).collect();
-    let mut failed: HashMap<AssetId<GaussianCapture>, String> =
-        failures.read().map(|failure| (failure.id, describe(&failure.path, &failure.error))).collect();
-    failed.retain(|id, error| repeated.is_new(*id, error));
+    let mut changed: HashSet<AssetId<GaussianCapture>> = HashSet::new();
+    for change in changes.read() {
+        match change {
+            AssetEvent::Added { id } => attempts.succeeded(*id),
+            AssetEvent::Modified { id } => {
+                attempts.succeeded(*id);
+                changed.insert(*id);
+            }
+            AssetEvent::Removed { .. } | AssetEvent::Unused { .. } | AssetEvent::LoadedWithDependencies { .. } => {}
+        }
+    }
+    let mut failed: HashMap<AssetId<GaussianCapture>, String> = HashMap::new();
+    for failure in failures.read() {
+        if !attempts.failed_again(failure.id, loaded.contains(failure.id)) {
+            failed.insert(failure.id, describe(&failure.path, &failure.error));
+        }
+    }
     for (entity, capture, mut state) in &mut captures {
         let id = capture.0.id();
         if rejected.contains(id) {
@@ -73,27 +85,27 @@ pub(super) fn update_states(
     }
 }
 
-/// Failures of the last moments. Bevy tries a reload that failed a second time at once, and its failure is the same one.
+/// Tells the two failures of one reload apart: Bevy tries a reload that failed a second time at once, and only the first attempt is
+/// reported.
 #[derive(Default)]
-pub(super) struct RecentFailures(HashMap<AssetId<GaussianCapture>, (Instant, String)>);
-
-impl RecentFailures {
-    /// How long a failure like the one before counts as its repetition.
-    const REPETITION: Duration = Duration::from_millis(500);
-
-    /// Whether a failure is not the repetition of the last one.
-    fn is_new(&mut self, id: AssetId<GaussianCapture>, error: &str) -> bool {
-        let now = Instant::now();
-        self.0.retain(|_, (then, _)| now.duration_since(*then) < Self::REPETITION);
-        let known = self.0.insert(id, (now, error.to_owned()));
-        known.is_none_or(|(_, last)| last != error)
-    }
+pub(super) struct Attempts {
+    /// Captures that have failed to load, so that further failures are of reloads.
+    failed: HashSet<AssetId<GaussianCapture>>,
+    /// Captures whose reload has failed once.
+    repeating: HashSet<AssetId<GaussianCapture>>,
 }
 
-fn modified(event: &AssetEvent<GaussianCapture>) -> Option<AssetId<GaussianCapture>> {
-    match event {
-        AssetEvent::Modified { id } => Some(*id),
-        _ => None,
+impl Attempts {
+    /// A load or a reload succeeded.
+    fn succeeded(&mut self, id: AssetId<GaussianCapture>) {
+        self.failed.remove(&id);
+        self.repeating.remove(&id);
+    }
+
+    /// A load or a reload failed. Returns whether it is the second attempt of a reload. `is_loaded`: an earlier load succeeded.
+    fn failed_again(&mut self, id: AssetId<GaussianCapture>, is_loaded: bool) -> bool {
+        let is_reload = !self.failed.insert(id) || is_loaded;
+        is_reload && !self.repeating.insert(id) && self.repeating.remove(&id)
     }
 }
 
@@ -129,4 +141,22 @@ pub(super) fn report_upload_failures(
         }
     }
     failures.values_mut().for_each(|failure| failure.reported = true);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_reload_counts_once_and_the_next_one_again() {
+        let mut attempts = Attempts::default();
+        let id = AssetId::default();
+        let mut failures = |is_loaded| [(); 2].map(|()| attempts.failed_again(id, is_loaded));
+        assert_eq!(failures(true), [false, true], "two attempts of one reload");
+        assert_eq!(failures(true), [false, true], "and of the next");
+        attempts.succeeded(id);
+        assert!(!attempts.failed_again(id, false), "a first load is tried once");
+        assert!(!attempts.failed_again(id, false), "so that this is a reload");
+        assert!(attempts.failed_again(id, false), "which is tried twice");
+    }
 }
