@@ -1,7 +1,6 @@
-//! What the CPU does with a capture: slicing, packages, the CPU reference.
+//! Benchmarks of the CPU: slicing, packages, the CPU reference.
 //!
-//! In: a synthetic scene of 10,000 Gaussians. Out: Criterion's figures, from short runs. What the GPU does is measured by
-//! `gs4d bench`.
+//! In: a synthetic scene of 10,000 Gaussians. Out: Criterion's figures, from short runs. `gs4d bench` measures the GPU.
 
 use bevy_gs4d::codec::package::{self, WriteSettings};
 use bevy_gs4d::gaussian::SliceSettings;

@@ -1,11 +1,12 @@
-//! What a frame costs on the CPU: the crate's own systems in a headless Bevy app, by their spans.
+//! CPU time of a frame: the crate's own systems in a headless Bevy app, by their spans.
 //!
 //! ```text
 //! cargo bench --features viewer,cli --bench frame -- [CAPTURE] [FRAMES]
 //! ```
 //!
-//! In: a capture (the bundled one) that plays before one camera. Out: a line for each span: how often it is entered in a frame, its
-//! median, and its 95th percentile, microseconds; then the sum over a frame. What Bevy does by itself, and the GPU, are not in it.
+//! In: a capture (default: the bundled one) that plays before one camera, a number of frames (default: 600). Out: a
+//! line for each span: how often it is entered in a frame, its median, and its 95th percentile, microseconds; then the
+//! sum over a frame. Bevy's own systems and the GPU are not included.
 
 use bevy::log::tracing::span::Id;
 use bevy::log::tracing::subscriber::Interest;
@@ -22,7 +23,7 @@ use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Time spent in each span of the crate since it was last taken: how often, and how long in all.
+/// Number of entries and total time of each span of the crate since the last reset.
 static SPENT: Mutex<BTreeMap<&'static str, (u32, Duration)>> = Mutex::new(BTreeMap::new());
 
 /// Measures spans by their name.
@@ -62,7 +63,7 @@ fn stopwatch(_: &mut App) -> Option<BoxedLayer> {
 }
 
 fn main() -> Result {
-    // Cargo adds options of its own.
+    // Cargo passes options of its own.
     let mut arguments = std::env::args().skip(1).filter(|argument| !argument.starts_with("--"));
     let bundled = || format!("{}/assets/toybox.gs4d", env!("CARGO_MANIFEST_DIR"));
     let capture = PathBuf::from(arguments.next().unwrap_or_else(bundled));
@@ -101,7 +102,7 @@ fn main() -> Result {
     Ok(())
 }
 
-/// The middle and the 95th percentile, microseconds.
+/// Returns the median and the 95th percentile, microseconds.
 fn quantiles(mut times: Vec<Duration>) -> [f64; 2] {
     times.sort();
     [times.len() / 2, times.len() * 95 / 100].map(|at| times.get(at).copied().unwrap_or_default().as_secs_f64() * 1e6)

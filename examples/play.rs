@@ -70,7 +70,7 @@ fn main() -> Result {
     }
 }
 
-/// The scene, with and without a window.
+/// Adds the scene, with or without a window.
 fn scene(app: &mut App, capture: Capture) {
     app.add_plugins(GaussianCapturePlugin)
         .insert_resource(capture)

@@ -82,7 +82,7 @@ fn main() -> Result {
     }
 }
 
-/// The scene, with and without a window.
+/// Adds the scene, with or without a window.
 fn scene(app: &mut App, show: Show) {
     app.add_plugins(GaussianCapturePlugin)
         .insert_resource(show)
@@ -110,7 +110,7 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>, show: Res<Show>) {
     ));
 }
 
-/// A ball that one of Bevy's animations moves.
+/// Spawns a ball that one of Bevy's animations moves.
 fn setup_ball(
     mut commands: Commands,
     mut meshes: ResMut<Assets<Mesh>>,
@@ -240,7 +240,7 @@ fn panel(
     Ok(())
 }
 
-/// When the ball is at its key-frames, in seconds of the timeline.
+/// Returns the times when the ball is at its key-frames, in seconds of the timeline.
 fn flight_key_frames(timeline: &Timeline) -> Vec<f32> {
     let spacing = FLIGHT_SECONDS / WAY.len() as f32;
     let count = (timeline.duration_seconds() / spacing) as u32;

@@ -51,7 +51,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use teleport::Teleport;
 
-/// Pixels of one eye where there is no window to fill.
+/// Size of the picture of one eye without a window, pixels.
 const EYE: UVec2 = UVec2::new(480, 480);
 /// Half the diagonal to which a capture is scaled, metres.
 const CAPTURE_RADIUS: f32 = 1.5;
@@ -107,7 +107,7 @@ fn main() -> Result {
     }
 }
 
-/// The scene, with and without a window, and the path that is followed automatically.
+/// Adds the scene, with or without a window, and the path. `playing`: whether it is followed from the start.
 fn scene(app: &mut App, capture: Capture, path: HeadPath, playing: bool) {
     app.add_plugins((GaussianCapturePlugin, StereoPlugin, ComfortPlugin))
         .insert_resource(capture)
@@ -168,7 +168,7 @@ fn spawn_body(mut commands: Commands, targets: Res<Targets>) {
     commands.spawn((Body::default(), START, Visibility::default())).add_child(stereo.head);
 }
 
-/// The settings of every eye, ours and a headset's.
+/// Returns the settings of every eye, ours and a headset's.
 fn eye_settings() -> impl Bundle {
     // The closing edges are transparent, and drawn over captures only without multisampling. The colours of the capture stay as trained.
     (Msaa::Off, Tonemapping::None)
@@ -191,7 +191,7 @@ fn arrange(
     *transform = Transform { translation: place, rotation: turn, scale: Vec3::splat(scale) };
 }
 
-/// The keys V and I.
+/// Handles the keys V and I.
 fn switches(keys: Res<ButtonInput<KeyCode>>, mut comfort: ResMut<Comfort>, rig: Option<Single<&mut StereoRig>>) {
     if keys.just_pressed(KeyCode::KeyV) {
         comfort.vignette = !comfort.vignette;

@@ -1,6 +1,7 @@
-// activate: the index list of the Gaussians that are active in a segment of time, in ascending order.
-// In: the filter of one part of a capture, as bits or intervals. Out: the list; the host knows its length. Runs once for all views,
-// and only when the segment changes. `count` counts blocks, `scan` sums them, `write` fills the list. CPU reference:
+// activate: the indices of the Gaussians that are active in a segment of time, in ascending order.
+// In: the filter of one part of a capture, as bits or intervals. Out: the list; the host knows its length. Runs once
+// for all views, and only when the segment changes. `count` counts blocks, `scan` sums them, `write` fills the list.
+// CPU reference:
 // src/reference/activate.rs.
 #import gs4d::types::{Activation, FILTER_BITS}
 #import gs4d::scan::{exclusive_scan, scan_total}

@@ -1,7 +1,8 @@
-// bin: makes one pair for each overlap of a splat with a tile, in order of depth.
-// In: splats and their order. Out: pairs (tile, splat), their number and the size of the dispatches over them. `count` sums the
-// tiles of blocks of splats, `scan` sums the blocks, `offset` gives each splat its first pair, and `emit` fills pairs one thread
-// each, so that a large splat holds nobody up. CPU reference: src/reference/bin.rs.
+// bin: writes one pair for each overlap of a splat with a tile, in order of depth.
+// In: splats and their order. Out: pairs (tile, splat), their number and the size of the dispatches over them. `count`
+// sums the tiles of blocks of splats, `scan` sums the blocks, `offset` computes the first pair of each splat, and
+// `emit` writes one pair per thread, so that a large splat does not delay the others. CPU reference:
+// src/reference/bin.rs.
 #import gs4d::types::{Counters, FrameUniforms, SplatRecord}
 #import gs4d::scan::{exclusive_scan, saturating_add, scan_total}
 #import gs4d::tile::{tile_count, tile_index, tile_of_pair}
@@ -23,7 +24,7 @@ fn pair_count(splat: u32) -> u32 {
     return tile_count(splats[splat].tiles_low, splats[splat].tiles_high);
 }
 
-// Pairs of this thread's splats.
+// Returns the number of pairs of this thread's splats.
 fn thread_sum(first: u32) -> u32 {
     var sum = 0u;
     for (var i = first; i < min(first + SPLATS_PER_THREAD, counters.visible); i++) {

@@ -1,7 +1,7 @@
-// blend: front to back over each tile of 16 x 16 pixels, one workgroup each.
-// In: tile ranges, pairs, splats, the depth of opaque surfaces, the background. Out: colour and transmittance, expected and median
-// depth. Each sample of a multisampled depth hides what is behind it from its share of the pixel. Section 3.4 of the 4DGS model.
-// CPU reference: src/reference/blend.rs.
+// blend: front to back over each tile of 16 x 16 pixels, one workgroup each, as the original rasterizer does.
+// In: tile ranges, pairs, splats, the depth of opaque surfaces, the background. Out: color and transmittance, expected
+// and median depth. Each sample of a multisampled depth hides what is behind it from its share of the pixel. CPU
+// reference: src/reference/blend.rs.
 #import gs4d::types::{FrameUniforms, SplatRecord, BACKGROUND_COLOR, BACKGROUND_ENVIRONMENT, DEBUG_DEPTH, DEBUG_OVERDRAW}
 #import gs4d::alpha::{alpha_at, is_opaque, is_skipped, left_behind}
 #import gs4d::appearance::{heat, lit}
@@ -10,7 +10,7 @@
 
 const BATCH: u32 = 256u;
 const FAR: f32 = 3.4e38;
-// Blended splats that show at the end of the scale of overdraw.
+// Number of blended splats at the end of the scale of overdraw.
 const OVERDRAW_MAX: f32 = 64.0;
 #ifdef MULTISAMPLED
 const SAMPLES_MAX: u32 = 8u;
@@ -30,11 +30,11 @@ const SAMPLES_MAX: u32 = 8u;
 @group(0) @binding(6) var color_out: texture_storage_2d<rgba32float, write>;
 @group(0) @binding(7) var depth_out: texture_storage_2d<rg32float, write>;
 
-// Centre, opacity, depth; conic; colour.
+// Center, opacity, depth; conic; color.
 var<workgroup> batch_a: array<vec4<f32>, 256>;
 var<workgroup> batch_b: array<vec3<f32>, 256>;
 var<workgroup> batch_c: array<vec3<f32>, 256>;
-// Camera-space depth of the opaque surface of each sample, and how many samples there are.
+// Camera-space depth of the opaque surface of each sample, and the number of samples.
 #ifdef MULTISAMPLED
 var<private> limits: array<f32, 8>;
 #else
@@ -42,7 +42,7 @@ var<private> limits: array<f32, 1>;
 #endif
 var<private> samples: u32;
 
-// Pixels of this tile that need no more splats.
+// Number of pixels of this tile that need no more splats.
 var<workgroup> finished: atomic<u32>;
 
 @compute @workgroup_size(256)
@@ -59,7 +59,8 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
     var depth = 0.0;
     var median = 0.0;
     var blended = 0u;
-    // Samples whose surface has been passed, their summed transmittance, and where the next surface is.
+    // Number of samples whose surface has been passed, the sum of their transmittances, and the depth of the next
+    // surface.
     var hidden = 0u;
     var hidden_transmittance = 0.0;
     var limit = next_limit(-FAR);
@@ -72,7 +73,7 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
         atomicAdd(&finished, 1u);
     }
     for (var first = range.x; first < range.y; first += BATCH) {
-        // Nobody adds to `finished` between these barriers, so that all threads leave together.
+        // No thread adds to `finished` between these barriers, so that all threads leave together.
         workgroupBarrier();
         if atomicLoad(&finished) == BATCH {
             break;
@@ -124,7 +125,7 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
         }
     }
     if inside {
-        // What is left behind all splats where there is no surface, and over all samples.
+        // Transmittance where there is no surface, and the mean over all samples.
         let behind = transmittance * open;
         transmittance = (hidden_transmittance + f32(samples - hidden) * transmittance) / f32(samples);
         if frame.debug == DEBUG_DEPTH {
@@ -137,7 +138,7 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
         } else if frame.background_mode == BACKGROUND_ENVIRONMENT && open > 0.0 {
             let shown = behind * frame.environment_opacity;
             color += shown * environment_color(position);
-            // background.w: whether what is behind the map is hidden by it.
+            // background.w: factor on the transmittance behind the map, 0 or 1.
             transmittance -= shown * (1.0 - frame.background.w);
         }
         textureStore(color_out, pixel, vec4(color, transmittance));
@@ -145,7 +146,7 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
     }
 }
 
-// Premultiplied: near is bright.
+// Returns the brightness of a depth, premultiplied: near is bright.
 fn debug_depth(depth: f32, opacity: f32) -> f32 {
     if opacity <= 0.0 {
         return 0.0;
@@ -153,7 +154,7 @@ fn debug_depth(depth: f32, opacity: f32) -> f32 {
     return opacity * frame.debug_depth / (frame.debug_depth + max(depth / opacity, 0.0));
 }
 
-// Camera-space depth of the opaque surface of each sample of this pixel.
+// Loads the camera-space depth of the opaque surface of each sample of this pixel.
 fn find_limits(pixel: vec2<u32>, inside: bool) {
     samples = 1u;
     limits[0] = FAR;
@@ -170,13 +171,13 @@ fn find_limits(pixel: vec2<u32>, inside: bool) {
 #endif
 }
 
-// Depth 0 is where nothing is: the far plane.
+// Returns the camera-space depth of a value of the depth buffer. 0 means that there is no surface: the far plane.
 fn distance_of(depth: f32) -> f32 {
     let d = frame.opaque_distance;
     return select(FAR, (d.x + d.y * depth) / (d.z + d.w * depth), depth > 0.0);
 }
 
-// Share of the samples without a surface.
+// Returns the share of the samples without a surface.
 fn open_share() -> f32 {
     var open = 0u;
     for (var i = 0u; i < samples; i++) {
@@ -185,7 +186,7 @@ fn open_share() -> f32 {
     return f32(open) / f32(samples);
 }
 
-// The nearest surface that is not before `depth`.
+// Returns the depth of the nearest surface that is not before `depth`.
 fn next_limit(depth: f32) -> f32 {
     var nearest = FAR;
     for (var i = 0u; i < samples; i++) {
@@ -194,7 +195,7 @@ fn next_limit(depth: f32) -> f32 {
     return nearest;
 }
 
-// How many surfaces are before `depth`.
+// Returns the number of samples whose surface is before `depth`.
 fn passed_limits(depth: f32) -> u32 {
     var passed = 0u;
     for (var i = 0u; i < samples; i++) {
@@ -219,7 +220,7 @@ fn environment_color(position: vec2<f32>) -> vec3<f32> {
     return lit(color, frame.environment_lighting, frame.background.xyz);
 }
 
-// Black outside the texture: the seam fades, as in the original.
+// Returns a texel, black outside the texture: the seam fades, as in the original.
 fn environment_at(texel: vec2<f32>) -> vec3<f32> {
     let size = frame.environment_size;
     if any(texel < vec2(0.0)) || any(texel >= vec2<f32>(size)) {

@@ -1,8 +1,8 @@
-// composite: lays the captures of a view over what the game has drawn.
+// composite: blends the captures of a view over what the camera has drawn so far.
 //
-// In: the view target so far, linear or sRGB-encoded, the captures' colour and transmittance (premultiplied, in the space they were
-// blended in, linear or sRGB-encoded, too) for the pixels of the viewport. Out: the view target. Blending with what is behind happens
-// in the captures' space: ENCODE_TARGET and DECODE_TARGET lead there from a target in the other one.
+// In: the view target so far, linear or sRGB-encoded; the captures' color and transmittance (premultiplied, in their
+// blend space, linear or sRGB-encoded) for the pixels of the viewport. Out: the view target. Blending is done in the
+// captures' blend space: ENCODE_TARGET and DECODE_TARGET convert a target in the other space.
 #import gs4d::srgb
 
 // The largest half float: an infinite pixel would spread through bloom.
@@ -13,7 +13,7 @@ const BRIGHTEST: f32 = 65504.0;
 // Corner and size of the viewport in the target, pixels.
 @group(0) @binding(2) var<uniform> viewport: vec4<u32>;
 
-// The transfer functions, mirrored below 0, so that one undoes the other there, too.
+// The transfer functions, mirrored below 0, so that they are inverses of each other there too.
 fn encode(linear: vec3<f32>) -> vec3<f32> {
     return sign(linear) * srgb::encode(abs(linear));
 }
@@ -22,7 +22,7 @@ fn decode(encoded: vec3<f32>) -> vec3<f32> {
     return sign(encoded) * srgb::decode(abs(encoded));
 }
 
-// From the target's space to that of the captures, and back.
+// Converts from the target's space to that of the captures, and back.
 fn to_blend_space(color: vec3<f32>) -> vec3<f32> {
 #ifdef ENCODE_TARGET
     return encode(color);
@@ -52,7 +52,7 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
     }
     let front = textureLoad(captures, pixel - viewport.xy, 0);
     let transmittance = front.a;
-    // Where no splat is, the target is left as it is, to the bit.
+    // Where there is no splat, the target is unchanged, to the bit.
     if transmittance >= 1.0 && all(front.rgb == vec3(0.0)) {
         return behind;
     }

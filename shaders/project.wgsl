@@ -1,7 +1,7 @@
-// project: slices each Gaussian at the view's time and projects it.
-// In: Gaussians, colour coefficients, an instance, a list of the active. Out: one splat and one depth key for each active Gaussian;
-// the key of an invisible splat is INVISIBLE. Section 3.3 of the 4DGS model, in its order. CPU reference:
-// src/reference/project.rs over src/gaussian/projection.rs.
+// project: slices each Gaussian at the view's time and projects it, as the original rasterizer does.
+// In: Gaussians, color coefficients, an instance, a list of active Gaussians. Out: one splat and one depth key for each
+// active Gaussian; the key of an invisible splat is INVISIBLE. CPU reference: src/reference/project.rs with
+// src/gaussian/projection.rs.
 #import gs4d::types::{Gaussian, InstanceUniforms, SplatRecord, INVISIBLE}
 #import gs4d::types::{DEBUG_ACTIVE, DEBUG_LIFESPAN, DEBUG_VELOCITY}
 #import gs4d::appearance::{heat, lit}
@@ -26,7 +26,7 @@ const FRUSTUM_CLAMP: f32 = 1.3;
 // Three words for each Gaussian.
 @group(1) @binding(2) var<storage, read> color_records: array<u32>;
 @group(1) @binding(3) var<storage, read> codebooks: array<u32>;
-// Four codebooks of 36 words; a uniform, since few storage buffers are left and all threads read the same.
+// Four codebooks of 36 four-vectors; a uniform, since few storage buffers are left and all threads read the same.
 @group(1) @binding(4) var<uniform> codebook_scales: array<vec4<f32>, 144>;
 #else
 @group(1) @binding(2) var<storage, read> harmonics: array<vec4<f32>>;
@@ -36,7 +36,7 @@ const FRUSTUM_CLAMP: f32 = 1.3;
 @group(1) @binding(1) var<storage, read> harmonics: array<vec4<f32>>;
 #endif
 
-// The list of `activate`; not read without a filter.
+// The list that `activate` writes; not read without a filter.
 @group(2) @binding(0) var<storage, read> active_list: array<u32>;
 
 @compute @workgroup_size(256)
@@ -79,7 +79,7 @@ fn project_one(index: u32, slot: u32) -> u32 {
     let mean = vec4(g.mean + g.velocity * dt, 1.0);
     if instance.cropped != 0u {
         let place = vec3(dot(instance.crop_x, mean), dot(instance.crop_y, mean), dot(instance.crop_z, mean));
-        // Written so that what is not a number is outside.
+        // Written so that NaN is outside.
         if !all(abs(place) <= vec3(1.0)) {
             return INVISIBLE;
         }
@@ -112,14 +112,14 @@ fn project_one(index: u32, slot: u32) -> u32 {
     }
     let mid = 0.5 * (a + c);
     let radius = ceil(3.0 * sqrt(mid + sqrt(max(0.1, mid * mid - det))));
-    // Neither infinite nor not a number.
+    // Neither infinite nor NaN.
     if !(radius <= 3.4e38) {
         return INVISIBLE;
     }
     let opacity = g.opacity * marginal * instance.opacity;
     let square = tiles_of(center, radius, vec2<f32>(instance.tiles));
     let tiles = contributing_tiles(square, center, vec2(a, c), det, opacity);
-    // Written so that a value that is not a number is invisible.
+    // Written so that NaN is invisible.
     if !(tiles.z > tiles.x && tiles.w > tiles.y) {
         return INVISIBLE;
     }
@@ -146,13 +146,14 @@ fn project_one(index: u32, slot: u32) -> u32 {
     splat.tiles_low = words.x;
     splat.tiles_high = words.y;
     splats[slot] = splat;
-    // Positive numbers sort as their bits do; the near plane of an orthographic camera may be behind it.
+    // Positive floats have the same order as their bits. Depths are taken from the near plane of an orthographic
+    // camera, which may be behind it.
     return bitcast<u32>(select(q.z, q.z - instance.near, parallel));
 }
 
 fn debug_color(g: Gaussian, absent: bool) -> vec3<f32> {
     if instance.debug == DEBUG_VELOCITY {
-        // Units over the whole time interval; one unit is halfway to full colour.
+        // Distance over the whole time interval; one unit is halfway to full color.
         let distance = g.velocity * instance.time_span;
         return 0.5 + 0.5 * distance / (1.0 + length(distance));
     }
@@ -171,7 +172,7 @@ var<private> entries: vec4<u32>;
 var<private> first_coefficient: u32;
 #endif
 
-// Four values of this Gaussian's coefficients, RGB innermost.
+// Returns four values of this Gaussian's coefficients, RGB innermost.
 fn coefficients(at: u32) -> vec4<f32> {
 #ifdef CODED_COLORS
     var sum = vec4(0.0);
@@ -220,7 +221,7 @@ fn color(index: u32, direction: vec3<f32>, tau: f32) -> vec3<f32> {
     return max(sum, vec3(0.0));
 }
 
-// Sum of four coefficients (three four-vectors from `at`) times their basis values.
+// Returns the sum of four coefficients (three four-vectors from `at`) times their basis values.
 fn four(at: u32, basis: vec4<f32>) -> vec3<f32> {
     let u = coefficients(at);
     let v = coefficients(at + 1u);

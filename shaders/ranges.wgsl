@@ -1,4 +1,4 @@
-// ranges: where the pairs of each tile begin and end.
+// ranges: the first and the last pair of each tile.
 // In: pairs sorted by tile. Out: first and last + 1 for each tile. CPU reference: `ranges` in src/reference/bin.rs.
 #import gs4d::types::{Counters, FrameUniforms}
 
@@ -7,7 +7,7 @@
 @group(0) @binding(2) var<storage, read> pair_tiles: array<u32>;
 @group(0) @binding(3) var<storage, read_write> tile_ranges: array<vec2<u32>>;
 
-// The first pair whose tile is not below `tile`.
+// Returns the first pair whose tile is not below `tile`.
 fn lower_bound(tile: u32) -> u32 {
     var low = 0u;
     var high = counters.pairs;

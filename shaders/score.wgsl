@@ -1,14 +1,14 @@
-// score: what each Gaussian contributes to a view, without float atomics.
-// In: what `blend` reads. Out: for each slot, sums over pixels of c = alpha T (contribution), c^2 (energy), and over pixels and
-// channels of (c (color - behind))^2 (removal). `place` gives each splat its first pair; `pairs` sums every pair over its tile,
-// one workgroup each; `gather` sums the pairs of each slot, in their order: the same on every run. CPU reference:
-// src/offline/score/reference.rs.
+// score: the contribution of each Gaussian to a view, without float atomics.
+// In: what `blend` reads. Out: for each slot, sums over pixels of c = alpha T (contribution) and c^2 (energy), and the
+// sum over pixels and channels of (c (color - behind))^2 (removal). `place` writes the first pair of each splat;
+// `pairs` sums every pair over its tile, one workgroup each; `gather` sums the pairs of each slot in a fixed order, so
+// that the result is the same on every run. CPU reference: src/offline/score/reference.rs.
 #import gs4d::alpha::{alpha_at, is_opaque, is_skipped, left_behind}
 #import gs4d::tile::{pair_of_tile, pixel_of, tile_count, tile_index}
 #import gs4d::types::{Counters, FrameUniforms, SplatRecord, INVISIBLE}
 
 const PIXELS: u32 = 256u;
-// Splats whose terms are summed at once.
+// Number of splats whose terms are summed at once.
 const BATCH: u32 = 8u;
 
 @group(0) @binding(0) var<uniform> frame: FrameUniforms;
@@ -19,18 +19,18 @@ const BATCH: u32 = 8u;
 @group(0) @binding(5) var<storage, read> order: array<u32>;
 @group(0) @binding(6) var<storage, read> offsets: array<u32>;
 @group(0) @binding(7) var<storage, read> depth_keys: array<u32>;
-// What blend made, with the background.
+// The color that `blend` wrote, with the background.
 @group(0) @binding(8) var color: texture_2d<f32>;
 // First pair of each slot.
 @group(1) @binding(0) var<storage, read_write> first_pairs: array<u32>;
 @group(1) @binding(1) var<storage, read_write> pair_scores: array<vec4<f32>>;
 @group(1) @binding(2) var<storage, read_write> scores: array<vec4<f32>>;
 
-// Of the batch: c and the squared removal of each pixel, splat by splat; then sums over eight pixels.
+// Of the batch: c and the squared removal of each pixel, splat by splat; then their sums over eight pixels.
 var<workgroup> contribution: array<f32, 2048>;
 var<workgroup> removal: array<f32, 2048>;
 var<workgroup> partial: array<vec3<f32>, 256>;
-// Pixels of this tile that need no more splats.
+// Number of pixels of this tile that need no more splats.
 var<workgroup> finished: atomic<u32>;
 
 @compute @workgroup_size(256)
@@ -40,14 +40,14 @@ fn place(@builtin(global_invocation_id) id: vec3<u32>) {
     }
 }
 
-// What one pixel has seen so far.
+// The accumulated state of one pixel.
 struct Pixel {
     color: vec3<f32>,
     transmittance: f32,
     done: bool,
 }
 
-// Weight of a splat at a pixel; 0 where it is skipped. Moves the pixel on, as blend does.
+// Returns the weight of a splat at a pixel, 0 if it is skipped, and updates the pixel as `blend` does.
 fn advance(pixel: ptr<function, Pixel>, splat: SplatRecord, position: vec2<f32>) -> f32 {
     if (*pixel).done {
         return 0.0;
@@ -74,7 +74,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
     let range = tile_ranges[tile_index(tile.xy, frame.tiles.x)];
     let inside = all(at < frame.size);
 
-    // The finished pixel says what lies behind each splat.
+    // What is behind each splat follows from the finished pixel.
     var total = vec3(0.0);
     if inside {
         total = textureLoad(color, at, 0).xyz;
@@ -122,7 +122,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
             }
             pair_scores[pair_of(pair_splats[first + thread], tile.xy)] = vec4(sum, 0.0);
         }
-        // All that follow contribute nothing; their sums must say so.
+        // All pairs that follow contribute nothing, so their sums are set to 0.
         if over {
             for (var i = first + BATCH + thread; i < range.y; i += PIXELS) {
                 pair_scores[pair_of(pair_splats[i], tile.xy)] = vec4(0.0);
@@ -132,7 +132,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
     }
 }
 
-// Where `bin` made the pair of this splat and tile.
+// Returns the index that `bin` gave the pair of this splat and tile.
 fn pair_of(splat: u32, tile: vec2<u32>) -> u32 {
     return first_pairs[splat] + pair_of_tile(splats[splat].tiles_low, splats[splat].tiles_high, tile);
 }

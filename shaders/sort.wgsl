@@ -1,7 +1,7 @@
-// sort: one step of a stable radix sort, four bits at a time, for any subgroup size.
-// In: keys and values. Out: both, ordered by the digit at `sort_step.shift`; equal digits keep their order. A block of 2048 keys is
-// counted by `count`, the counts of all blocks are summed by `scan`, and `scatter` ranks the block again and moves it.
-// `visible` writes how many keys the first step kept. CPU reference: src/reference/sort.rs.
+// sort: one step of a stable radix sort by four bits, for any subgroup size.
+// In: keys and values. Out: both, ordered by the digit at `sort_step.shift`; equal digits keep their order. `count`
+// counts a block of 2048 keys, `scan` sums the counts of all blocks, and `scatter` ranks the keys of a block again and
+// moves them. `visible` writes how many keys the first step kept. CPU reference: src/reference/sort.rs.
 #import gs4d::types::{Counters, FrameUniforms, SortStep, INVISIBLE, SORT_SLOTS, SORT_VISIBLE}
 #import gs4d::scan::{exclusive_scan, scan_total}
 
@@ -116,7 +116,7 @@ fn scan(@builtin(workgroup_id) digit: vec3<u32>, @builtin(local_invocation_index
     }
 }
 
-// After the scan of the first step: the number of visible splats, and blocks for the steps to come.
+// Writes the number of visible splats, and the number of blocks of the later steps, after the scan of the first step.
 @compute @workgroup_size(1)
 fn visible() {
     var sum = 0u;
@@ -139,7 +139,7 @@ fn scatter(@builtin(workgroup_id) block: vec3<u32>, @builtin(local_invocation_in
         }
         starts[thread] = start;
     }
-    // Counts become ranks: keys of the same digit held by the threads before.
+    // Counts become ranks: the number of keys of the same digit in the threads before.
     if thread < 128u {
         let d = thread / 16u;
         var sum = 0u;

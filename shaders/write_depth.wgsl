@@ -1,10 +1,11 @@
 // write_depth: writes captures to the camera's depth buffer, where they hide more than half of what is behind.
 //
-// In: the captures' colour and transmittance, and their depths, for the pixels of the viewport. Out: depth-buffer values, which the
-// depth test keeps where nothing nearer has been drawn; for every sample alike.
+// In: the captures' color and transmittance, and their depths, for the pixels of the viewport. Out: values for the
+// depth test, which keeps them where nothing nearer has been drawn; the same for every sample.
 
 @group(0) @binding(0) var colors: texture_2d<f32>;
-// Camera units: x the sum of z alpha T, not divided by 1 - T; y where T falls to one half or below, 0 where it does not.
+// Camera units: x the sum of z alpha T, not divided by 1 - T; y the depth at which T falls to one half or below, 0 if
+// it never does.
 @group(0) @binding(1) var depths: texture_2d<f32>;
 // Corner and size of the viewport in the target, pixels.
 @group(0) @binding(2) var<uniform> viewport: vec4<u32>;

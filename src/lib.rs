@@ -28,7 +28,7 @@
 //! 2. [`scene`] is what a capture is: its Gaussians and their color in the trained, the sliced or the packed form, an environment map,
 //!    a temporal filter, the switches it was trained with, and how it is meant to be played.
 //! 3. [`gaussian`] is the maths. [`Parameters::slice`](gaussian::Parameters::slice) makes the runtime form, once: a 3D Gaussian in
-//!    straight-line motion under an opacity envelope ([`Gaussian`](gaussian::Gaussian), 64 bytes, the record that shaders read too).
+//!    straight-line motion under an opacity envelope ([`Gaussian`](gaussian::Gaussian), 64 bytes, the layout of the GPU record too).
 //! 4. [`renderer::GpuCapture`] holds that form, or the packed one, in buffers. In Bevy, [`asset`] loads the file in the background and
 //!    [`render`] uploads it.
 //!

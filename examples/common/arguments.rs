@@ -1,4 +1,4 @@
-//! The command line of every example, and pictures instead of a window.
+//! The command line of every example, and pictures without a window.
 //!
 //! In: `[FILE] [--headless FOLDER] [--frames N] [--help]` and the options of one example. Out: [`Arguments`], an asset path, pictures in
 //! a folder.
@@ -19,8 +19,11 @@ pub struct Arguments {
     pub frames: u32,
 }
 
-/// Reads the command line. `more` gets each option that not all examples have, with the arguments after it, and returns whether it
-/// is an option of this example. Without a display, pictures are written in any case.
+/// Reads the command line. `more` is called with each option that not all examples have and the arguments after it, and
+/// returns whether it is an option of this example. Without a display, pictures are written in any case.
+///
+/// # Errors
+/// An unknown option, an option without its value, more than one file.
 pub fn parse(
     defaults: Arguments,
     mut more: impl FnMut(&str, &mut dyn Iterator<Item = String>) -> Result<bool>,
@@ -58,12 +61,15 @@ pub fn parse(
     Ok(parsed)
 }
 
-/// The argument after an option.
+/// Returns the argument after an option.
+///
+/// # Errors
+/// There is none.
 pub fn value(option: &str, what: &str, arguments: &mut dyn Iterator<Item = String>) -> Result<String> {
     Ok(arguments.next().ok_or_else(|| format!("{option} needs {what}"))?)
 }
 
-/// The lines that the example begins with.
+/// Returns the header of the example.
 fn help() -> String {
     let lines = SOURCE.lines().map_while(|line| line.strip_prefix("//!"));
     let lines = lines.map(|line| line.strip_prefix(' ').unwrap_or(line)).filter(|line| !line.starts_with("```"));
@@ -75,13 +81,17 @@ fn has_display() -> bool {
     !cfg!(target_os = "linux") || std::env::var_os("DISPLAY").is_some_and(|display| !display.is_empty())
 }
 
-/// A path from the command line as an asset path: relative to the current folder if there is such a file, else to `assets/`.
+/// Returns a path from the command line as an asset path: relative to the current folder if there is such a file, else
+/// to `assets/`.
 pub fn asset_path(argument: &str) -> PathBuf {
     let path = Path::new(argument);
     if path.exists() { std::path::absolute(path).unwrap_or_else(|_| path.into()) } else { path.into() }
 }
 
-/// Renders `count` pictures, `step` apart, into `folder`, and prints where they are.
+/// Renders `count` pictures, `step` apart, into `folder`, and prints its path.
+///
+/// # Errors
+/// Those of [`testing::pictures`].
 pub fn save_pictures(app: &mut App, count: u32, step: Duration, folder: &Path) -> Result {
     testing::pictures(app, folder, count, step)?;
     println!("{count} pictures in {}", folder.display());

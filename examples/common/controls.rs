@@ -7,19 +7,22 @@ use crate::common::arguments::{Arguments, parse};
 use bevy::input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll, MouseScrollUnit};
 use bevy::prelude::*;
 
-/// `[FILE] [--headless FOLDER] [--frames N]`: a window, or eight pictures.
+/// Reads `[FILE] [--headless FOLDER] [--frames N]`. Default: a window, or eight pictures.
+///
+/// # Errors
+/// Those of [`parse`].
 pub fn arguments(file: &str) -> Result<Arguments> {
     parse(Arguments { file: file.into(), headless: None, frames: 8 }, |_, _| Ok(false))
 }
 
-/// Puts cameras where they orbit.
+/// Moves cameras to their places on the orbit.
 pub fn follow(mut cameras: Query<(&Orbit, &mut Transform)>) {
     for (orbit, mut transform) in &mut cameras {
         *transform = orbit.transform();
     }
 }
 
-/// Drag with the left button: go round; wheel: nearer and farther.
+/// Orbits while the left button is dragged; the wheel moves the camera nearer and farther.
 pub fn mouse(
     buttons: Res<ButtonInput<MouseButton>>,
     motion: Res<AccumulatedMouseMotion>,

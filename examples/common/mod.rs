@@ -21,7 +21,7 @@ pub struct Orbit {
 }
 
 impl Orbit {
-    /// An orbit from which the whole of a capture is visible that stands upright at the origin.
+    /// Returns an orbit from which the core of a capture that stands upright at the origin is visible.
     pub fn around(capture: &GaussianCapture) -> Self {
         let core = Bounds::core(capture.scene().iter());
         let (center, radius) = core.map_or((Vec3::ZERO, 1.0), |core| (core.center(), core.radius().max(0.1)));

@@ -35,7 +35,7 @@ impl Scale {
         ((x - self.bounds.left() - LABELS) / self.width() * self.duration).clamp(0.0, self.duration)
     }
 
-    /// The bar from one time to another in a row; row 0 has the flags of markers.
+    /// Returns the bar from one time to another in a row; row 0 has the flags of markers.
     fn bar(&self, row: usize, from: f32, to: f32) -> Rect {
         let top = self.bounds.top() + ROW * row as f32;
         Rect::from_x_y_ranges(self.x(from)..=self.x(to), top + 2.0..=top + ROW - 2.0)
@@ -86,7 +86,7 @@ impl Chart<'_> {
     }
 }
 
-/// A bar whose corners are cut off by its fades.
+/// Draws a bar whose corners are cut off by its fades.
 fn draw_clip(painter: &Painter, scale: &Scale, row: usize, clip: &Clip, ground: Color32) {
     let bar = scale.bar(row, clip.start, clip.end());
     let color = if clip.speed < 0.0 { Color32::DARK_RED } else { Color32::DARK_BLUE };
@@ -100,7 +100,7 @@ fn draw_clip(painter: &Painter, scale: &Scale, row: usize, clip: &Clip, ground: 
     }
 }
 
-/// Short marks in the lower half of a row.
+/// Draws short marks in the lower half of a row.
 fn marks(painter: &Painter, scale: &Scale, row: Rect, moments: &[f32]) {
     for moment in moments {
         let (x, height) = (scale.x(*moment), row.center().y..=row.bottom());
@@ -108,7 +108,7 @@ fn marks(painter: &Painter, scale: &Scale, row: Rect, moments: &[f32]) {
     }
 }
 
-/// When a clip shows key-frames of its capture, in seconds of the timeline.
+/// Returns the times when a clip shows key-frames of its capture, in seconds of the timeline.
 fn key_frames(clip: &Clip, captures: &Assets<GaussianCapture>) -> Vec<f32> {
     let [first, last] = clip.range;
     let Some(key_frames) = captures.get(&clip.capture).and_then(|capture| capture.key_frames()) else {

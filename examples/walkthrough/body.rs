@@ -7,15 +7,15 @@ use bevy::prelude::*;
 use bevy_gs4d::stereo::StereoRig;
 use std::f32::consts::FRAC_PI_6;
 
-/// Of the head above the floor, metres.
+/// Height of the head above the floor, metres.
 pub const EYE_HEIGHT: f32 = 1.6;
 /// Where the body stands at first.
 pub const START: Transform = Transform::from_xyz(0.0, 0.0, 3.3);
-/// Metres per second.
+/// Speed of walking, metres per second.
 const SPEED: f32 = 1.5;
 /// How quickly walking starts and stops, per second.
 const EAGERNESS: f32 = 8.0;
-/// Radians per pixel.
+/// Rotation for a motion of the mouse, radians per pixel.
 const SENSITIVITY: f32 = 0.004;
 
 /// Stands on the floor and turns about the vertical only: the space in which a headset tracks the head, or a body in its place.
@@ -32,7 +32,7 @@ pub struct Head;
 #[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Moves;
 
-/// Turns the body and nods our head with the mouse. The wearer of a headset nods.
+/// Turns the body and tilts the head with the mouse. The wearer of a headset tilts the head.
 pub fn look_around(
     buttons: Res<ButtonInput<MouseButton>>,
     motion: Res<AccumulatedMouseMotion>,

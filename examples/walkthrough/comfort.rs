@@ -74,7 +74,7 @@ impl FromWorld for Cloth {
     }
 }
 
-/// Everything for comfort. Add it after `DefaultPlugins`.
+/// Adds everything for comfort. Add it after `DefaultPlugins`.
 pub struct ComfortPlugin;
 
 impl Plugin for ComfortPlugin {
@@ -85,7 +85,7 @@ impl Plugin for ComfortPlugin {
     }
 }
 
-/// A ring about the −z axis, at distance 1: clear inside, black outside.
+/// Returns a ring about the −z axis, at distance 1: clear inside, black outside.
 fn ring() -> Mesh {
     let (mut positions, mut colors, mut indices) = (Vec::new(), Vec::new(), Vec::new());
     for (radius, alpha) in RADII {
@@ -147,7 +147,7 @@ fn close(
     }
 }
 
-/// The motion from one place and direction to another in `seconds`: 0 for none or a jump, 1 from [`FAST`] on.
+/// Returns the motion from one place and direction to another in `seconds`: 0 for none or a jump, 1 from [`FAST`] on.
 fn motion(before: (Vec3, f32), now: (Vec3, f32), seconds: f32) -> f32 {
     let (speed, turn) = (before.0.distance(now.0) / seconds, wrapped(now.1 - before.1).abs() / seconds);
     if speed > JUMP[0] || turn > JUMP[1] { 0.0 } else { (speed.max(turn) / FAST).min(1.0) }
@@ -200,7 +200,8 @@ mod tests {
         assert_eq!(motion(before, (Vec3::ZERO, FRAC_PI_6), FRAME), 0.0, "a snap turn");
     }
 
-    /// Whether the ring shows, and how large it is for its distance, after the body has gone `step` metres in each of `frames` frames.
+    /// Returns whether the ring shows, and how large it is for its distance, after the body has gone `step` metres in
+    /// each of `frames` frames.
     fn walk(app: &mut App, step: f32, frames: usize) -> (bool, f32) {
         for _ in 0..frames {
             let mut body = app.world_mut().query_filtered::<&mut Transform, With<Body>>();

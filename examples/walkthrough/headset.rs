@@ -48,12 +48,12 @@ mod worn {
         found
     }
 
-    /// The space that the headset is tracked in walks and teleports.
+    /// Makes the space that the headset is tracked in the body, which walks and teleports.
     fn give_body(mut commands: Commands, root: Single<Entity, With<XrTrackingRoot>>) {
         commands.entity(*root).insert((Body::default(), START));
     }
 
-    /// The headset's cameras have lenses and poses already.
+    /// Inserts the settings of eyes on the headset's cameras, which have lenses and poses already.
     fn give_eyes(mut commands: Commands, eyes: Query<(Entity, &XrCamera), Added<XrCamera>>) {
         for (entity, camera) in &eyes {
             let mut eye = commands.entity(entity);

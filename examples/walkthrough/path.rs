@@ -48,6 +48,9 @@ pub struct HeadPath(Vec<Pose>);
 
 impl HeadPath {
     /// Reads the path of a file, or the bundled one.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is not a valid path.
     pub fn load(path: Option<&Path>) -> Result<Self> {
         let read = match path {
             Some(path) => {
@@ -84,7 +87,8 @@ impl HeadPath {
         self.0.last().map_or(0.0, |pose| pose.time)
     }
 
-    /// The pose at a time: along a smooth curve through the poses, which starts and ends at rest; constant before and after it.
+    /// Returns the pose at a time: along a smooth curve through the poses, which starts and ends at rest; constant
+    /// before and after it.
     fn at(&self, seconds: f32) -> Pose {
         let Some(last) = self.0.len().checked_sub(1).filter(|last| *last > 0) else { return self.0[0] };
         let next = self.0.partition_point(|pose| pose.time <= seconds).clamp(1, last);
@@ -96,7 +100,7 @@ impl HeadPath {
         Pose { time: seconds, position: [x, y, z], yaw, pitch }
     }
 
-    /// The slopes of the curve at a pose, per second.
+    /// Returns the slopes of the curve at a pose, per second.
     fn slopes(&self, index: usize) -> [f32; 5] {
         let (Some(before), Some(after)) = (index.checked_sub(1).map(|i| self.0[i]), self.0.get(index + 1)) else {
             return [0.0; 5];
@@ -106,14 +110,14 @@ impl HeadPath {
     }
 }
 
-/// The cubic from one value to another with given slopes at both ends; `s` from 0 to 1.
+/// Evaluates the cubic from one value to another with given slopes at both ends; `s` from 0 to 1.
 fn hermite(s: f32, [a, b]: [f32; 2], [from, to]: [f32; 2]) -> f32 {
     let (s2, s3) = (s * s, s * s * s);
     let rise = 3.0 * s2 - 2.0 * s3;
     a * (1.0 - rise) + b * rise + from * (s3 - 2.0 * s2 + s) + to * (s3 - s2)
 }
 
-/// An angle as one from −π to π.
+/// Returns an angle as one from −π to π.
 pub fn wrapped(angle: f32) -> f32 {
     (angle + PI).rem_euclid(TAU) - PI
 }
@@ -125,12 +129,12 @@ pub struct PathPlayer {
     pub seconds: f32,
 }
 
-/// Whether the body is free: no path is followed.
+/// Returns whether the body is free: no path is followed.
 pub fn walking(player: Res<PathPlayer>) -> bool {
     !player.playing
 }
 
-/// P follows the path from its beginning, or stops.
+/// Starts to follow the path from its beginning, or stops, when P is pressed.
 pub fn start(keys: Res<ButtonInput<KeyCode>>, mut player: ResMut<PathPlayer>, mut teleport: ResMut<Teleport>) {
     if keys.just_pressed(KeyCode::KeyP) {
         *player = PathPlayer { playing: !player.playing, seconds: 0.0 };
@@ -164,7 +168,7 @@ pub struct Recorder {
     seconds: f32,
 }
 
-/// R starts and ends a recording.
+/// Starts and ends a recording when R is pressed, and records poses in between.
 pub fn record(
     time: Res<Time>,
     keys: Res<ButtonInput<KeyCode>>,
@@ -188,7 +192,7 @@ pub fn record(
     }
 }
 
-/// The text of poses, as [`HeadPath::read`] reads it.
+/// Returns the text of poses, as [`HeadPath::read`] reads it.
 fn text(poses: &[Pose]) -> Result<String, String> {
     let lines = ron::ser::PrettyConfig::default().depth_limit(1);
     ron::ser::to_string_pretty(poses, lines).map_err(|error| error.to_string())

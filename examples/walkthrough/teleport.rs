@@ -6,11 +6,11 @@ use super::body::{Body, Head, Moves};
 use super::path::{follow, walking};
 use bevy::prelude::*;
 
-/// How far from the middle there is floor to stand on, metres.
+/// Radius of the floor, metres.
 pub const FLOOR_RADIUS: f32 = 8.0;
 /// Speed of the throw, metres per second.
 const THROW: f32 = 6.0;
-/// Metres per second squared.
+/// Gravity, metres per second squared.
 const GRAVITY: f32 = 9.8;
 /// From the head to the hand that throws, metres.
 const HAND: Vec3 = Vec3::new(0.15, -0.3, -0.1);
@@ -35,7 +35,7 @@ pub enum Teleport {
 }
 
 impl Teleport {
-    /// The darkness of the view, 0 to 1.
+    /// Returns the darkness of the view, 0 to 1.
     pub fn dark(&self) -> f32 {
         match self {
             Self::Idle | Self::Aiming(_) => 0.0,
@@ -66,13 +66,13 @@ impl Throw {
         self.from + self.velocity * seconds - Vec3::Y * (GRAVITY / 2.0 * seconds * seconds)
     }
 
-    /// Seconds until it meets the height of the floor.
+    /// Returns the seconds until it meets the height of the floor.
     fn flight(&self) -> f32 {
         let up = self.velocity.y;
         (up + (up * up + 2.0 * GRAVITY * self.from.y.max(0.0)).sqrt()) / GRAVITY
     }
 
-    /// Where it meets the floor; `None` beyond the floor's edge.
+    /// Returns where it meets the floor; `None` beyond the floor's edge.
     fn landing(&self) -> Option<Vec3> {
         let place = self.at(self.flight()).with_y(0.0);
         (place.length() < FLOOR_RADIUS).then_some(place)
@@ -102,8 +102,8 @@ pub fn setup(
     }
 }
 
-/// Aiming by keys, and the teleport that follows. While a recorded path is followed there is no aiming, but a teleport that has begun is
-/// completed, or the view would stay dark.
+/// Adds aiming by keys, and the teleport that follows. While a recorded path is followed there is no aiming, but a
+/// teleport that has begun is completed, or the view would stay dark.
 pub fn plugin(app: &mut App) {
     app.add_systems(Update, (aim.run_if(walking), travel).chain().before(follow).in_set(Moves))
         .add_systems(Update, show.after(Moves));
@@ -174,7 +174,7 @@ mod tests {
     use super::*;
     use std::time::Duration;
 
-    /// Where the body is at first, the head above a place beside it, and where it is sent.
+    /// Returns an app with a body, its head above a place beside it, and a teleport.
     const BODY: Vec3 = Vec3::new(1.0, 0.0, 0.0);
     const HEAD: Vec3 = Vec3::new(1.5, 1.6, 0.5);
     const TARGET: Vec3 = Vec3::new(3.0, 0.0, -1.0);
@@ -194,7 +194,7 @@ mod tests {
         app
     }
 
-    /// One update, so many times the length of a fade later.
+    /// Runs one update, `fades` times the length of a fade later. Returns the state of teleporting.
     fn pass(app: &mut App, fades: f32) -> Teleport {
         app.world_mut().resource_mut::<Time>().advance_by(Duration::from_secs_f32(fades * FADE));
         app.update();

@@ -1,13 +1,13 @@
-// Alpha: how much of a splat a pixel takes, and the step that blends it. CPU reference: src/gaussian/alpha.rs.
+// Alpha: the opacity of a splat at a pixel, and the step that blends it. CPU reference: src/gaussian/alpha.rs.
 #define_import_path gs4d::alpha
 
-// A splat's alpha below this is skipped.
+// A splat whose alpha at a pixel is below this is skipped there.
 const ALPHA_MIN: f32 = 1.0 / 255.0;
 // 1 / ALPHA_MIN.
 const INVERSE_ALPHA_MIN: f32 = 255.0;
 // Alpha is clamped to this from above.
 const ALPHA_MAX: f32 = 0.99;
-// A pixel stops before its transmittance would fall below this.
+// Blending stops at a pixel before its transmittance would fall below this.
 const TRANSMITTANCE_MIN: f32 = 1e-4;
 
 // The blending step, front to back, for a pixel that has `transmittance` left:
@@ -16,9 +16,11 @@ const TRANSMITTANCE_MIN: f32 = 1e-4;
 //     let left = left_behind(transmittance, alpha);      if is_opaque(left) the pixel stops before the splat,
 //     color += alpha * transmittance * splat's color;    transmittance = left.
 //
-// In parts and not as one function: a result that says which of the three it is costs a seventh of blend's time.
+// Separate functions, because a single one that returns which of the three cases applies makes `blend` a seventh
+// slower.
 
-// Alpha of a splat at a pixel; `offset` leads from the pixel to the splat's centre. Negative where the falloff would exceed 1.
+// Returns the alpha of a splat at a pixel; `offset` is the vector from the pixel to the splat's center, pixels.
+// Negative if the falloff would exceed 1.
 fn alpha_at(conic: vec3<f32>, opacity: f32, offset: vec2<f32>) -> f32 {
     let d = offset;
     let power = -0.5 * (conic.x * d.x * d.x + conic.z * d.y * d.y) - conic.y * d.x * d.y;

@@ -1,7 +1,7 @@
 // Spherical harmonics up to degree 3. CPU reference: src/gaussian/harmonics.rs.
 #define_import_path gs4d::harmonics
 
-// Basis values 0-3, 4-7, 8-11, 12-15 in the unit direction `d`, with the constants and signs of 3DGS.
+// Return basis values 0-3, 4-7, 8-11, 12-15 in the unit direction `d`, with the constants and signs of 3DGS.
 fn basis_first(d: vec3<f32>) -> vec4<f32> {
     return vec4(0.28209479, -0.48860251 * d.y, 0.48860251 * d.z, -0.48860251 * d.x);
 }
@@ -33,7 +33,7 @@ fn basis_fourth(d: vec3<f32>) -> vec4<f32> {
     );
 }
 
-// cos(2 pi n tau / T), reduced to one turn first: drivers promise little precision beyond it.
+// Returns cos(2 pi n tau / T). The angle is reduced to one turn first: drivers guarantee little precision beyond it.
 fn time_cosine(n: f32, tau: f32, time_span: f32) -> f32 {
     let turns = n * tau / time_span;
     return cos(6.2831853 * (turns - round(turns)));

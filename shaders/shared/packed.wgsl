@@ -1,11 +1,11 @@
-// The packed form: records of sixteen 16-bit lanes, read with the ranges of their block. CPU reference:
-// src/scene/packed/decode.rs; lanes.rs beside it lists the lanes.
+// The packed form: records of sixteen 16-bit lanes, decoded with the ranges of their block. CPU reference:
+// src/scene/packed/decode.rs; lanes.rs in the same folder lists the lanes.
 #define_import_path gs4d::packed
 
 #import gs4d::types::Gaussian
 
 const LANE_MAX: f32 = 65535.0;
-// Gaussians that share a box.
+// Number of Gaussians in a block, which share the range of their means.
 const PACKED_BLOCK: u32 = 256u;
 const SHARED_RANGES: u32 = 3u;
 const BLOCK_RANGES: u32 = 2u;
@@ -15,7 +15,8 @@ fn lanes(word: u32) -> vec2<f32> {
     return vec2(f32(word & 0xffffu), f32(word >> 16u));
 }
 
-// `low` and `high` are the record; `time` and `scale` the first two shared ranges; `box_low` and `box_size` those of the block.
+// Decodes a Gaussian. `low` and `high` are the record, `time` and `scale` the first two shared ranges, `box_low` and
+// `box_size` the ranges of the block.
 fn unpack_gaussian(
     low: vec4<u32>,
     high: vec4<u32>,
@@ -71,7 +72,7 @@ fn unpack_gaussian(
     return g;
 }
 
-// The unit quaternion (w, x, y, z) whose largest component was left out.
+// Returns the unit quaternion (w, x, y, z) whose largest component was left out.
 fn with_largest(three: vec3<f32>, largest: u32) -> vec4<f32> {
     let rest = sqrt(max(0.0, 1.0 - dot(three, three)));
     if largest == 0u {
@@ -86,7 +87,7 @@ fn with_largest(three: vec3<f32>, largest: u32) -> vec4<f32> {
     return vec4(three, rest);
 }
 
-// The first coefficient of a coded colour: ten bits for each channel.
+// Decodes the first coefficient of a coded color: ten bits for each channel.
 fn unpack_base(word: u32, base: vec4<f32>) -> vec3<f32> {
     let parts = vec3(f32(word & 1023u), f32((word >> 10u) & 1023u), f32((word >> 20u) & 1023u));
     return base.x + parts / 1023.0 * base.y;

@@ -10,7 +10,7 @@ fn saturating_add(a: u32, b: u32) -> u32 {
     return select(a + b, 0xffffffffu, a + b < a);
 }
 
-// Every thread of the workgroup must call this. Begins with a barrier, so that it can be called again.
+// Every thread of the workgroup must call this. It starts with a barrier, so that it can be called again.
 fn exclusive_scan(value: u32, thread: u32) -> u32 {
     let slot = thread + thread / 16u;
     workgroupBarrier();
@@ -40,7 +40,7 @@ fn exclusive_scan(value: u32, thread: u32) -> u32 {
     return saturating_add(scan_groups[thread / 16u], scan_values[slot]);
 }
 
-// Sum over the workgroup of the last scan.
+// Returns the sum over the workgroup of the last scan.
 fn scan_total() -> u32 {
     return scan_groups[16];
 }

@@ -1,13 +1,14 @@
-// The sRGB transfer functions, for values not below 0; the power curve goes on above 1. The same as src/view/srgb.rs.
+// The sRGB transfer functions, for values of 0 and above; the power curve continues above 1. The same as
+// src/view/srgb.rs.
 #define_import_path gs4d::srgb
 
-// Linear light to the sRGB-encoded value.
+// Converts linear light to sRGB-encoded values.
 fn encode(linear: vec3<f32>) -> vec3<f32> {
     let curve = 1.055 * pow(linear, vec3(1.0 / 2.4)) - 0.055;
     return select(curve, 12.92 * linear, linear <= vec3(0.0031308));
 }
 
-// The reverse.
+// The inverse of encode.
 fn decode(encoded: vec3<f32>) -> vec3<f32> {
     let curve = pow((encoded + 0.055) / 1.055, vec3(2.4));
     return select(curve, encoded / 12.92, encoded <= vec3(0.04045));

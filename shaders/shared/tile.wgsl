@@ -1,6 +1,6 @@
-// Overlap of splats and tiles: which tiles a splat covers, and in which order its pairs with them come. CPU reference:
-// src/gaussian/overlap.rs. Rectangles are x0, y0, x1, y1 with the ends excluded; packed into two words of 16 bits each, `low` holds
-// x0 and y0, `high` x1 and y1.
+// Overlap of splats and tiles: which tiles a splat covers, and the order of its pairs with them. CPU reference:
+// src/gaussian/overlap.rs. Rectangles are x0, y0, x1, y1 with the ends excluded; packed into two words of 16 bits each,
+// `low` contains x0 and y0, `high` x1 and y1.
 #define_import_path gs4d::tile
 
 #import gs4d::alpha::INVERSE_ALPHA_MIN
@@ -8,7 +8,8 @@
 // Side of a tile in pixels.
 const TILE_SIZE: u32 = 16u;
 
-// The tiles that the original assigns: those of the square of `radius` pixels about `center`, clamped to the grid.
+// Returns the tiles that the original assigns: those of the square of +-`radius` pixels around `center`, clamped to the
+// grid.
 fn tiles_of(center: vec2<f32>, radius: f32, grid: vec2<f32>) -> vec4<f32> {
     let side = f32(TILE_SIZE);
     let low = clamp(trunc((center - radius) / side), vec2(0.0), grid);
@@ -16,8 +17,8 @@ fn tiles_of(center: vec2<f32>, radius: f32, grid: vec2<f32>) -> vec4<f32> {
     return vec4(low, high);
 }
 
-// The part of `tiles` where alpha can reach 1/255, empty where it never does; blend would skip the rest. `variance` is xx and yy of
-// the covariance on the screen, `det` the determinant of all of it.
+// Returns the part of `tiles` where alpha can reach 1/255, empty if it never does; `blend` would skip the rest.
+// `variance` is xx and yy of the covariance on the screen, `det` the determinant of the covariance.
 fn contributing_tiles(
     tiles: vec4<f32>,
     center: vec2<f32>,
@@ -25,7 +26,7 @@ fn contributing_tiles(
     det: f32,
     opacity: f32,
 ) -> vec4<f32> {
-    // Written so that what is not a number is no ellipse either.
+    // Written so that NaN takes this branch too.
     if !(det > 0.0) {
         return tiles;
     }
@@ -33,7 +34,7 @@ fn contributing_tiles(
     if energy < -1e-3 {
         return vec4(0.0);
     }
-    // A hundredth of a pixel and a thousandth of the size stand above rounding.
+    // Margins for rounding: a thousandth of the size and a hundredth of a pixel.
     let half = sqrt(max(energy, 0.0) * variance) * 1.001 + 0.01;
     let side = f32(TILE_SIZE);
     let low = max(tiles.xy, floor((center - half) / side));
@@ -41,38 +42,38 @@ fn contributing_tiles(
     return vec4(low, high);
 }
 
-// The words `low` and `high` of a rectangle.
+// Returns the words `low` and `high` of a rectangle.
 fn pack_tiles(tiles: vec4<f32>) -> vec2<u32> {
     return vec2(u32(tiles.x) | (u32(tiles.y) << 16u), u32(tiles.z) | (u32(tiles.w) << 16u));
 }
 
-// Columns of a rectangle.
+// Returns the number of columns of a rectangle.
 fn tile_columns(low: u32, high: u32) -> u32 {
     return (high & 0xffffu) - (low & 0xffffu);
 }
 
-// Tiles of a rectangle, which are the pairs of its splat.
+// Returns the number of tiles of a rectangle, which is the number of pairs of its splat.
 fn tile_count(low: u32, high: u32) -> u32 {
     return tile_columns(low, high) * ((high >> 16u) - (low >> 16u));
 }
 
-// The tile of pair `k` of a splat: the tiles of its rectangle come row by row.
+// Returns the tile of pair `k` of a splat: the tiles of its rectangle are ordered row by row.
 fn tile_of_pair(low: u32, high: u32, k: u32) -> vec2<u32> {
     let columns = tile_columns(low, high);
     return vec2((low & 0xffffu) + k % columns, (low >> 16u) + k / columns);
 }
 
-// The pair of a splat that a tile of its rectangle has: the reverse of tile_of_pair.
+// Returns the pair of a splat with a tile of its rectangle: the inverse of tile_of_pair.
 fn pair_of_tile(low: u32, high: u32, tile: vec2<u32>) -> u32 {
     return (tile.y - (low >> 16u)) * tile_columns(low, high) + tile.x - (low & 0xffffu);
 }
 
-// Index of a tile in a grid of that many columns: row by row, too.
+// Returns the index of a tile in a grid of that many columns, row by row.
 fn tile_index(tile: vec2<u32>, columns: u32) -> u32 {
     return tile.y * columns + tile.x;
 }
 
-// The pixel of one of the 256 threads that share a tile.
+// Returns the pixel of one of the 256 threads of a tile.
 fn pixel_of(tile: vec2<u32>, thread: u32) -> vec2<u32> {
     return tile * TILE_SIZE + vec2(thread % TILE_SIZE, thread / TILE_SIZE);
 }

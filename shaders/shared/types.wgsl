@@ -1,7 +1,8 @@
-// Structures that the host writes or reads; kept in step with src/renderer/layout.rs (a test compares every offset).
+// Structures that the host writes or reads, identical to those in src/renderer/layout.rs (a test compares every
+// offset).
 #define_import_path gs4d::types
 
-// One Gaussian in the runtime form. `inverse_sigma_t` is 0 for a Gaussian that is always there.
+// One Gaussian in the runtime form. `inverse_sigma_t` is 0 for a Gaussian that is present at every time.
 struct Gaussian {
     mean: vec3<f32>,
     mean_t: f32,
@@ -15,7 +16,7 @@ struct Gaussian {
     padding: f32,
 }
 
-// One part of a capture in one view: where its camera is and which slots its splats take.
+// One part of a capture in one view: its camera and the slots of its splats.
 struct InstanceUniforms {
     // Rows of capture-to-camera.
     camera_x: vec4<f32>,
@@ -24,10 +25,10 @@ struct InstanceUniforms {
     // Rows x and y of projection times capture-to-camera.
     clip_x: vec4<f32>,
     clip_y: vec4<f32>,
-    // Of an orthographic camera the direction in which it looks.
+    // Camera center in capture space; for an orthographic camera, the unit vector of its viewing direction.
     camera_position: vec3<f32>,
     time: f32,
-    // Half-angle tangents that rays are clamped to.
+    // Half-angle tangents to which rays are clamped.
     reach: vec2<f32>,
     focal: vec2<f32>,
     size: vec2<u32>,
@@ -36,16 +37,16 @@ struct InstanceUniforms {
     count: u32,
     degree: u32,
     degree_t: u32,
-    // vec4s of colour coefficients per Gaussian.
+    // vec4s of color coefficients per Gaussian.
     stride: u32,
-    // 1: colour looks along the displaced mean.
+    // 1: the viewing direction of color points to the displaced mean.
     displaced: u32,
     near: f32,
     time_span: f32,
-    // 1: drawn are the Gaussians of the active list from `first_listed` on; 0: all.
+    // 1: the Gaussians of the active list are drawn, from `first_listed` on; 0: all.
     listed: u32,
     first_listed: u32,
-    // Codebooks of colour; 0 where the coefficients are whole.
+    // Number of codebooks of color; 0 if the coefficients are whole.
     stages: u32,
     orthographic: u32,
     // First entry of each codebook.
@@ -57,10 +58,10 @@ struct InstanceUniforms {
     lighting: u32,
     // DEBUG_*
     debug: u32,
-    // 1: only means inside the crop box are drawn.
+    // 1: only Gaussians whose mean is inside the crop box are drawn.
     cropped: u32,
     padding: u32,
-    // Rows of capture to crop box, which goes from -1 to 1.
+    // Rows of capture-to-crop-box; the box is from -1 to 1.
     crop_x: vec4<f32>,
     crop_y: vec4<f32>,
     crop_z: vec4<f32>,
@@ -77,9 +78,9 @@ const DEBUG_ACTIVE: u32 = 3u;
 const DEBUG_LIFESPAN: u32 = 4u;
 const DEBUG_VELOCITY: u32 = 5u;
 
-// What `activate` needs of one part of a capture.
+// Input of `activate` for one part of a capture.
 struct Activation {
-    // Gaussians in this part, and the first of them in the list.
+    // Number of Gaussians in this part, and its first entry in the list.
     count: u32,
     first: u32,
     // FILTER_*
@@ -93,7 +94,7 @@ const FILTER_INTERVALS: u32 = 2u;
 // Depth key of a slot without a splat.
 const INVISIBLE: u32 = 0xffffffffu;
 
-// What all instances of a view share.
+// Values shared by all instances of a view.
 struct FrameUniforms {
     size: vec2<u32>,
     tiles: vec2<u32>,
@@ -102,9 +103,9 @@ struct FrameUniforms {
     pair_capacity: u32,
     // BACKGROUND_*
     background_mode: u32,
-    // Samples of the opaque depth; 0 where there is none.
+    // Samples per pixel of the opaque depth; 0 if there is none.
     opaque_samples: u32,
-    // Colour, or the factor on the light of an environment map; w: what is left of the transmittance behind one.
+    // Color, or the factor on the light of an environment map; w: factor on the transmittance behind a map, 0 or 1.
     background: vec4<f32>,
     // P00, P11, P02, P12.
     projection: vec4<f32>,
@@ -121,7 +122,7 @@ struct FrameUniforms {
     environment_lighting: u32,
     // DEBUG_*
     debug: u32,
-    // Depth that shows half as bright as the nearest.
+    // Depth that is shown half as bright as depth 0.
     debug_depth: f32,
     environment_opacity: f32,
 }
@@ -144,9 +145,9 @@ struct SplatRecord {
 
 struct Counters {
     visible: u32,
-    // Pairs made: never above the capacity.
+    // Number of pairs written: never above the capacity.
     pairs: u32,
-    // Pairs that there would be.
+    // Number of pairs that there would be with room for all.
     pairs_wanted: u32,
     padding: u32,
 }
@@ -156,12 +157,12 @@ struct SortStep {
     shift: u32,
     // SORT_*
     source: u32,
-    // Blocks the histogram has room for, per digit.
+    // Number of blocks for which the histogram has room, per digit.
     stride: u32,
     padding: u32,
 }
 
-// All slots, leaving out the invisible; the value of a key is its index.
+// All slots; the invisible ones are left out, and the value of a key is its index.
 const SORT_SLOTS: u32 = 0u;
 const SORT_VISIBLE: u32 = 1u;
 const SORT_PAIRS: u32 = 2u;

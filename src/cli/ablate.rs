@@ -1,4 +1,4 @@
-//! `gs4d ablate CHECKPOINT --data DIR`: what every score, prune ratio and temporal filter costs, in one table.
+//! `gs4d ablate CHECKPOINT --data DIR`: the cost of every score, prune ratio and temporal filter, in one table.
 //!
 //! In: a checkpoint, its training views, its test views with images. Out: one row for the whole scene, one for each filter, one for
 //! each score at each ratio; nothing is trained.
@@ -69,6 +69,10 @@ pub struct Ablate {
 
 impl Ablate {
     /// Measures every row.
+    ///
+    /// # Errors
+    /// A checkpoint or views that cannot be used, missing test images, a table that cannot be written, a failure of the
+    /// engine.
     pub fn run(&self) -> Result<Report, Failure> {
         let progress = &mut Bars::default();
         let start = Instant::now();

@@ -1,6 +1,7 @@
 //! `gs4d bake CHECKPOINT --data DIR -o OUT`: from a trained checkpoint to a small, fast package, and a report of what it cost.
 //!
-//! In: a checkpoint, its training views. Out: a package, `OUT.report.json` and `OUT.report.html`, and the report in short.
+//! In: a checkpoint, its training views. Out: a package `NAME.gs4d`, `NAME.report.json` and `NAME.report.html` beside
+//! it, and a summary of the report.
 
 use super::args::{CheckpointArgs, EngineArgs, PackageArgs, ScoringArgs, SplitArgs, score_choice, values};
 use super::failure::Failure;
@@ -74,7 +75,10 @@ pub struct Bake {
 }
 
 impl Bake {
-    /// Runs every stage that is not done yet.
+    /// Runs every stage whose result is not stored yet.
+    ///
+    /// # Errors
+    /// A checkpoint or views that cannot be used, files that cannot be written, a failure of the engine.
     pub fn run(&self) -> Result<Report, Failure> {
         let out = self.package.out_apart_from(&self.input)?;
         let scene = self.checkpoint.load(&self.input)?;
@@ -101,7 +105,7 @@ impl Bake {
         }
     }
 
-    /// How many Gaussians to keep.
+    /// Returns how many Gaussians to keep.
     fn goal(&self) -> Goal {
         match (self.keep, self.ratio, self.max_loss) {
             (Some(keep), ..) => Goal::Keep(keep),
@@ -112,7 +116,7 @@ impl Bake {
     }
 }
 
-/// The report for people, in short.
+/// Returns a summary of the report for people.
 fn in_short(report: &BakeReport, page: &Path) -> String {
     let mut pairs = vec![
         ("package", format!("{}, {}", report.package, bytes(report.bytes.after))),

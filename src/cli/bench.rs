@@ -1,4 +1,4 @@
-//! `gs4d bench SCENE`: how fast a scene is drawn.
+//! `gs4d bench SCENE`: measures how fast a scene is drawn.
 //!
 //! In: a scene and views of it. Out: medians of GPU milliseconds per pass and per frame, and of wall-clock time.
 
@@ -47,6 +47,9 @@ pub struct Bench {
 
 impl Bench {
     /// Measures.
+    ///
+    /// # Errors
+    /// A scene or views that cannot be used, no such adapter, a failure of the GPU.
     pub fn run(&self) -> Result<Report, Failure> {
         let scene = self.checkpoint.load(&self.scene)?;
         let scene = scene.into_runtime().map_err(|error| Failure::at(&self.scene, &error))?;

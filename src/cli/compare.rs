@@ -1,4 +1,4 @@
-//! `gs4d compare A B`: how alike pictures are.
+//! `gs4d compare A B`: compares pictures.
 //!
 //! In: two pictures, or two folders matched by file stem (8-bit, 16-bit or raw float32). Out: PSNR and SSIM of each pair and
 //! their means.
@@ -41,6 +41,9 @@ pub struct Compare {
 
 impl Compare {
     /// Compares and tabulates.
+    ///
+    /// # Errors
+    /// Pictures that cannot be read or paired, or that have different sizes.
     pub fn run(&self) -> Result<Report, Failure> {
         let progress = &mut Bars::default();
         let pairs = Pairs::of(&self.a, &self.b, self.size)?;

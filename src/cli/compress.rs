@@ -1,7 +1,7 @@
-//! `gs4d compress IN OUT`: quantized geometry and colors by codebook, as small as the quality asked for allows.
+//! `gs4d compress IN OUT`: quantizes geometry and codes colors by codebook.
 //!
-//! In: a scene, a quality or every knob. Out: a package in the packed form, bytes by section, and how close its pictures are to those
-//! of the scene it was made from.
+//! In: a scene, a quality or single options. Out: a package in the packed form, bytes by section, and PSNR of its
+//! pictures to those of the original scene.
 
 use super::args::{CheckpointArgs, EngineArgs, PackageArgs, ViewArgs, file_size, values};
 use super::failure::Failure;
@@ -119,10 +119,10 @@ impl Knobs {
 }
 
 impl Compress {
-    /// Compresses.
+    /// Compresses and writes.
     ///
     /// # Errors
-    /// The scene cannot be read, is packed already, or the package cannot be written.
+    /// The scene cannot be read or is packed already, the package cannot be written, a failure of the engine.
     pub fn run(&self) -> Result<Report, Failure> {
         let progress = &mut Bars::default();
         let out = self.package.out_apart_from(&self.input)?;
@@ -185,7 +185,7 @@ impl Compress {
         Ok(Report::new(json, text))
     }
 
-    /// The views to compare, as the original shows them.
+    /// Draws the views to compare with, of the original scene; `None` if there are none.
     fn originals(&self, scene: &RuntimeScene, progress: &mut Bars) -> Result<Option<Originals>, Failure> {
         if self.verify == 0 || scene.is_empty() {
             return Ok(None);

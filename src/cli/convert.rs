@@ -1,6 +1,7 @@
-//! `gs4d convert IN OUT`: a checkpoint or package becomes a package.
+//! `gs4d convert IN OUT`: converts a checkpoint or a package to a package.
 //!
-//! In: a scene, the form wanted, colour degrees. Out: a package, the switches that were chosen, sizes before and after.
+//! In: a scene, a target form, colour degrees. Out: a package, the training and playback settings in it, sizes before
+//! and after.
 
 use super::args::{CheckpointArgs, PackageArgs, file_size, values};
 use super::failure::Failure;
@@ -40,7 +41,10 @@ pub struct Convert {
 }
 
 impl Convert {
-    /// Converts.
+    /// Converts and writes.
+    ///
+    /// # Errors
+    /// The scene cannot be read or converted, or the package cannot be written.
     pub fn run(&self) -> Result<Report, Failure> {
         let out = self.package.out_apart_from(&self.input)?;
         let before = file_size(&self.input)?;

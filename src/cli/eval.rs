@@ -1,7 +1,7 @@
-//! `gs4d eval SCENE --data DIR`: how close a scene is to the views of a dataset.
+//! `gs4d eval SCENE --data DIR`: compares a scene with the views of a dataset.
 //!
-//! In: a scene, a split with its images. Out: the metrics of every view and their means; with `--out` a picture of each:
-//! reference, render, amplified difference.
+//! In: a scene, a split with its images. Out: the metrics of every view and their means; with `--out` a picture for
+//! each view: reference, render, amplified difference.
 
 use super::args::{CheckpointArgs, EngineArgs, SplitArgs, values};
 use super::failure::Failure;
@@ -77,7 +77,7 @@ enum Metric {
     Flip,
 }
 
-/// The metrics of a list.
+/// Returns the set of metrics in a list.
 fn metric_set(list: &[Metric]) -> MetricSet {
     let has = |metric| list.contains(&metric);
     MetricSet { ssim: has(Metric::Ssim), ms_ssim: has(Metric::MsSsim), flip: has(Metric::Flip) }
@@ -85,6 +85,9 @@ fn metric_set(list: &[Metric]) -> MetricSet {
 
 impl Eval {
     /// Draws, compares and tabulates.
+    ///
+    /// # Errors
+    /// A scene or views that cannot be used, missing images, pictures that cannot be written, a failure of the engine.
     pub fn run(&self) -> Result<Report, Failure> {
         let progress = &mut Bars::default();
         let scene = self.checkpoint.load(&self.scene)?;
@@ -136,7 +139,7 @@ impl Eval {
     }
 }
 
-/// A row for each view and one for the means; columns of metrics that no view has are left out.
+/// Returns a table with a row for each view and one for the means, without columns for metrics that no view has.
 fn table(evaluation: &Evaluation) -> Table {
     let all = || evaluation.views.iter().map(|view| &view.metrics);
     let optional: [(&str, fn(&ImageMetrics) -> Option<f64>); 3] =

@@ -1,31 +1,32 @@
-//! Why a verb stopped.
+//! Errors of verbs.
 //!
-//! In: any error, with the path it concerns where the error does not name it. Out: one line, the whole chain of causes.
+//! In: any error, with the path of the file if the error does not contain it. Out: one line with the whole chain of
+//! causes.
 
 use std::error::Error;
 use std::path::Path;
 
-/// The line that follows `error: `.
+/// An error of a verb: the line that is printed after `error: `.
 #[derive(Debug)]
 pub struct Failure(String);
 
 impl Failure {
-    /// A failure in our own words.
+    /// Returns a failure with this message.
     pub fn new(message: impl Into<String>) -> Self {
         Self(message.into())
     }
 
-    /// A failure in our own words about a file.
+    /// Returns a failure with this message about a file.
     pub fn about(path: &Path, message: &str) -> Self {
         Self(format!("{}: {message}", path.display()))
     }
 
-    /// An error that does not name its file, about this file.
+    /// Returns a failure from an error about this file that does not contain its name.
     pub fn at(path: &Path, error: &dyn Error) -> Self {
         Self::about(path, &chain(error))
     }
 
-    /// The line.
+    /// Returns the message.
     pub fn message(&self) -> &str {
         &self.0
     }
@@ -37,7 +38,7 @@ impl<E: Error> From<E> for Failure {
     }
 }
 
-/// The error and its causes, leaving out causes that a message already quotes.
+/// Returns the messages of an error and of its causes, without causes that are part of the message already.
 fn chain(error: &dyn Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();

@@ -1,6 +1,6 @@
-//! `gs4d info FILE`: what a checkpoint or package holds.
+//! `gs4d info FILE`: shows the contents of a checkpoint or a package.
 //!
-//! In: a file. Out: its facts, its bounds, and for packages every section and whether its checksum holds.
+//! In: a file. Out: its properties, its bounds, and for packages every section and whether its checksum is right.
 
 use super::args::{CheckpointArgs, file_size, is_package};
 use super::failure::Failure;
@@ -31,7 +31,7 @@ pub struct Info {
     checkpoint: CheckpointArgs,
 }
 
-/// What a file says, without its Gaussians.
+/// The contents of a file, without its Gaussians.
 struct Facts {
     gaussians: usize,
     form: &'static str,
@@ -44,16 +44,19 @@ struct Facts {
     playback: PlaybackHints,
 }
 
-/// Where the Gaussians are.
+/// The bounds of the Gaussians.
 struct Extent {
-    /// All of them, over the whole time interval.
+    /// Of all of them, over the whole time interval.
     all: Bounds,
-    /// The middle of them.
+    /// Of the core ([`Bounds::core`]).
     core: Bounds,
 }
 
 impl Info {
-    /// Looks into the file.
+    /// Reads the file and describes it.
+    ///
+    /// # Errors
+    /// The file cannot be read. Damaged sections and Gaussians that cannot be drawn are a report with a failure.
     pub fn run(&self) -> Result<Report, Failure> {
         let size = file_size(&self.file)?;
         let package = if is_package(&self.file) { Some(self.inspect()?) } else { None };
@@ -122,7 +125,7 @@ impl Info {
 
 impl Facts {
     fn of_scene(scene: &GaussianScene) -> Self {
-        // Of coded colors only the first coefficient counts as stored.
+        // For colors by codebook, only the first coefficient counts as stored.
         let (coefficients, degree, degree_t) =
             scene.form.harmonics().map_or((1, 0, 0), |whole| (whole.coefficients, whole.degree, whole.degree_t));
         Self {
@@ -177,7 +180,7 @@ impl Facts {
     }
 }
 
-/// Sections of the same name in one row.
+/// Returns a table with one row for all sections of the same name.
 fn section_table(info: &PackageInfo) -> Table {
     let sections = &info.header.sections;
     let mut names: Vec<&str> = sections.iter().map(|section| section.name.as_str()).collect();

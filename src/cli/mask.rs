@@ -1,7 +1,7 @@
 //! `gs4d mask IN -o OUT`: adds a temporal filter to a scene.
 //!
-//! In: a scene, how many key-frames, training views where the filter needs them. Out: a package that knows which of its Gaussians are
-//! active when, and how many those are.
+//! In: a scene, a number of key-frames, training views if the filter needs them. Out: a package with the filter, and
+//! the share of active Gaussians.
 
 use super::args::{CheckpointArgs, DataArgs, EngineArgs, PackageArgs, values};
 use super::failure::Failure;
@@ -51,7 +51,11 @@ pub struct Mask {
 }
 
 impl Mask {
-    /// Makes the filter and writes the scene with it.
+    /// Computes the filter and writes the scene with it.
+    ///
+    /// # Errors
+    /// A scene or views that cannot be used, too many key-frames, a package that cannot be written, a failure of the
+    /// engine.
     pub fn run(&self) -> Result<Report, Failure> {
         let out = self.package.out()?;
         let mut scene = self.checkpoint.load(&self.input)?;
@@ -100,7 +104,7 @@ impl Mask {
     }
 }
 
-/// How the sets are stored, and in how many bytes.
+/// Returns how the sets are stored, and their size in bytes.
 fn stored(filter: &TemporalFilter) -> (&'static str, u64) {
     match &filter.sets {
         ActiveSets::Bits(words) => ("bits", size_of_val(words.as_slice()) as u64),

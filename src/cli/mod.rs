@@ -1,7 +1,7 @@
-//! The `gs4d` command: looks into captures, converts, renders, compares and times them, and makes them smaller.
+//! The `gs4d` command: inspects, converts, renders, compares, times and compresses captures.
 //!
-//! One file for each verb: its options, one call of [`offline`](crate::offline), what it prints. `args` has the options
-//! that verbs share.
+//! One file for each verb: its options, a call of [`offline`](crate::offline), its output. `args` has the options that
+//! verbs share.
 //!
 //! In: the command line. Out: one report on standard output (text, or one JSON document with `--json`); progress, notes
 //! and errors on standard error; exit code 0, 2 for any failure, 130 when interrupted.

@@ -1,7 +1,7 @@
 //! Progress on standard error.
 //!
-//! In: the tasks and remarks of library calls. Out: one bar for each unfinished task, below those of the tasks around
-//! it; lines.
+//! In: the tasks and notes of library calls. Out: one bar for each unfinished task, below those of the tasks around it;
+//! one line for each note.
 
 use super::interrupt;
 use crate::codec::CodecError;
@@ -14,21 +14,21 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// All progress bars on the screen, one below the other.
 static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
 
-/// Whether progress bars stay away.
+/// Whether progress bars are hidden.
 static SILENT: AtomicBool = AtomicBool::new(false);
 
-/// Hides progress bars from here on.
+/// Sets whether progress bars are hidden from now on.
 pub fn silence_progress(silent: bool) {
     SILENT.store(silent, Ordering::Relaxed);
 }
 
-/// Writes a line to standard error, or nowhere if that is closed.
+/// Writes a line to standard error, if that is open.
 pub fn note(line: &str) {
     let _ = BARS.suspend(|| writeln!(stderr(), "{line}"));
 }
 
-/// The bars of the unfinished tasks; hidden with `--json` and where standard error is no terminal. They go when this is
-/// dropped.
+/// The bars of the unfinished tasks; hidden with `--json` and if standard error is not a terminal. Dropping this
+/// removes them. Default: no tasks.
 #[derive(Default)]
 pub struct Bars(Vec<ProgressBar>);
 

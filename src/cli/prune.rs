@@ -1,7 +1,7 @@
-//! `gs4d prune IN -o OUT`: the scene without the Gaussians that matter least.
+//! `gs4d prune IN -o OUT`: removes the Gaussians with the lowest scores.
 //!
-//! In: a scene, training views or a file of scores, how many to keep or how much may be lost. Out: a package of the others, in their
-//! old order.
+//! In: a scene, training views or a file of scores, the number to keep or the loss allowed. Out: a package of the
+//! remaining Gaussians, in their original order.
 
 use super::args::{CheckpointArgs, DataArgs, EngineArgs, PackageArgs, ScoringArgs, file_size, score_choice, values};
 use super::failure::Failure;
@@ -64,6 +64,9 @@ pub struct Prune {
 
 impl Prune {
     /// Prunes and writes.
+    ///
+    /// # Errors
+    /// A scene, views or scores that cannot be used, a package that cannot be written, a failure of the engine.
     pub fn run(&self) -> Result<Report, Failure> {
         let out = self.package.out()?;
         let before = file_size(&self.input)?;
@@ -94,7 +97,7 @@ impl Prune {
         Ok(Report::new(json, text))
     }
 
-    /// How many Gaussians to keep.
+    /// Returns how many Gaussians to keep.
     fn goal(&self) -> Goal {
         match (self.max_loss, self.keep, self.ratio) {
             (Some(loss), ..) => Goal::MaxLoss(loss),
@@ -121,7 +124,7 @@ impl Prune {
     }
 }
 
-/// Every count that was tried on the way to the best, if there were several.
+/// Returns a table of every count that was tried; empty if there are fewer than two.
 fn trials_table(trials: &[Trial]) -> String {
     if trials.len() < 2 {
         return String::new();

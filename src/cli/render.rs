@@ -1,4 +1,4 @@
-//! `gs4d render SCENE`: pictures of a scene.
+//! `gs4d render SCENE`: draws pictures of a scene.
 //!
 //! In: a scene and views of it. Out: a folder of PNG files, and raw float32 ones with `--raw`.
 
@@ -52,6 +52,9 @@ pub struct Render {
 
 impl Render {
     /// Draws and writes.
+    ///
+    /// # Errors
+    /// A scene or views that cannot be used, pictures that cannot be written, no such adapter, a failure of the GPU.
     pub fn run(&self) -> Result<Report, Failure> {
         let scene = self.checkpoint.load(&self.scene)?;
         let scene = scene.into_runtime().map_err(|error| Failure::at(&self.scene, &error))?;

@@ -1,6 +1,6 @@
-//! What a verb reports in the end, as text and as JSON.
+//! The report of a verb, as text and as JSON.
 //!
-//! In: what a verb found out. Out: one document on standard output, errors on standard error.
+//! In: the result of a verb. Out: one document on standard output, errors on standard error.
 
 use super::failure::Failure;
 use super::progress::note;
@@ -11,26 +11,26 @@ use std::io::{ErrorKind, Write, stdout};
 
 /// The result of a verb.
 pub struct Report {
-    /// For `--json`.
+    /// The report with `--json`.
     pub json: Value,
-    /// For people; lines end with a line break.
+    /// The report for people; lines end with a line break.
     pub text: String,
-    /// Why the command fails although it has something to report.
+    /// Why the command fails although it has a report; `None` on success.
     pub failure: Option<Failure>,
 }
 
 impl Report {
-    /// A report of success.
+    /// Returns a report of success.
     pub fn new(json: Value, text: String) -> Self {
         Self { json, text, failure: None }
     }
 
-    /// A report of a failure alone.
+    /// Returns a report of a failure alone.
     pub fn of_failure(failure: Failure) -> Self {
         Self { json: json!({ "error": failure.message() }), text: String::new(), failure: Some(failure) }
     }
 
-    /// Prints it. A reader that went away (`| head`) is no error.
+    /// Prints the report. A closed pipe (`| head`) is not an error.
     ///
     /// # Errors
     /// Standard output cannot be written.
@@ -50,12 +50,12 @@ impl Report {
     }
 }
 
-/// How a scene was trained and is played, for people.
+/// Returns the training and playback settings of a scene, for people.
 pub fn switches(trained_with: &TrainedWith, playback: &PlaybackHints) -> Vec<(&'static str, String)> {
     checkpoint::describe(trained_with, playback)
 }
 
-/// How a scene was trained and is played, for programs.
+/// Returns the training and playback settings of a scene, for programs.
 pub fn switches_json(trained_with: &TrainedWith, playback: &PlaybackHints) -> Value {
     json!({ "trained_with": trained_with, "playback": playback })
 }

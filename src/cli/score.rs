@@ -1,6 +1,7 @@
-//! `gs4d score CHECKPOINT --data DIR`: what each Gaussian is worth to the training views.
+//! `gs4d score CHECKPOINT --data DIR`: scores each Gaussian over the training views.
 //!
-//! In: a checkpoint, cameras and times. Out: one float32 for each Gaussian, or a folder of every score.
+//! In: a checkpoint, cameras and times. Out: a file of one float32 for each Gaussian, or a folder with a file for each
+//! score.
 
 use super::args::{CheckpointArgs, DataArgs, EngineArgs, ScoringArgs, score_choice, values};
 use super::failure::Failure;
@@ -54,6 +55,9 @@ pub struct Score {
 
 impl Score {
     /// Scores and writes.
+    ///
+    /// # Errors
+    /// A checkpoint or views that cannot be used, scores that cannot be written, a failure of the engine.
     pub fn run(&self) -> Result<Report, Failure> {
         if self.variant != ScoreChoice::All && self.out.is_dir() {
             return Err(Failure::about(&self.out, "is a folder: name a file, or give --variant all"));
@@ -102,7 +106,7 @@ impl Score {
         Ok(Report::new(json, text))
     }
 
-    /// Writes one file, or one for each in a folder. Returns their paths.
+    /// Writes one file, or a folder with one for each candidate. Returns the paths of the files.
     fn write(&self, found: &[Candidate]) -> Result<Vec<String>, Failure> {
         let folder = self.variant == ScoreChoice::All;
         if folder {
@@ -118,7 +122,7 @@ impl Score {
     }
 }
 
-/// One row for what pruning by each candidate gives.
+/// Returns a table with a row for the outcome of each candidate.
 pub fn search_table(search: &SearchSummary) -> String {
     let mut table = Table::new(&["score", "kept", "PSNR", "loss"]);
     let decibels = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));

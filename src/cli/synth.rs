@@ -1,4 +1,4 @@
-//! `gs4d synth OUT`: a procedural moving scene of any size.
+//! `gs4d synth OUT`: creates a procedural moving scene of any size.
 //!
 //! In: a count and a seed. Out: a package in the trained form, for tests and benchmarks.
 
@@ -36,7 +36,10 @@ pub struct Synth {
 }
 
 impl Synth {
-    /// Makes the scene and writes it.
+    /// Creates the scene and writes it.
+    ///
+    /// # Errors
+    /// The package cannot be written.
     pub fn run(&self) -> Result<Report, Failure> {
         let out = self.package.out()?;
         let scene = synthesize(&SynthSettings {

@@ -2,11 +2,11 @@
 //!
 //! In: cells, names with values, numbers of bytes. Out: lines for people.
 
-/// A table: the first column to the left, the others to the right.
+/// A table: the first column is aligned to the left, the others to the right.
 pub struct Table(Vec<Vec<String>>);
 
 impl Table {
-    /// An empty table with these column heads.
+    /// Returns an empty table with these column heads.
     pub fn new(heads: &[&str]) -> Self {
         Self(vec![heads.iter().map(ToString::to_string).collect()])
     }
@@ -36,13 +36,13 @@ impl std::fmt::Display for Table {
     }
 }
 
-/// Lines of names and values, the values aligned.
+/// Returns lines of names and values, the values aligned.
 pub fn lines(pairs: &[(&str, String)]) -> String {
     let width = pairs.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
     pairs.iter().map(|(name, value)| format!("{name:<width$}  {value}\n")).collect()
 }
 
-/// A number of bytes for people, in powers of 1000.
+/// Returns a number of bytes for people, in powers of 1000.
 pub fn bytes(count: u64) -> String {
     match count {
         0..1_000 => format!("{count} B"),

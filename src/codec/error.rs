@@ -1,4 +1,4 @@
-//! What can go wrong with a file, with the file's name.
+//! Errors of reading and writing files, with the path of the file.
 //!
 //! In: a codec's own error. Out: a [`CodecError`], displayed as `PATH: reason`.
 
@@ -24,7 +24,7 @@ pub enum CodecErrorKind {
     /// The system could not open, read or write the file.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// The file starts like none of the formats that can be read.
+    /// The file does not start like any format that can be read.
     #[error("{}", format::none_of_them())]
     UnknownFormat,
     /// A checkpoint that cannot be read.

@@ -1,7 +1,7 @@
 //! The table of formats that captures are stored in.
 //!
-//! In: the first bytes or the name of a file. Out: its [`Format`], which says how it is read and written. A further format is one new
-//! file in this folder, which defines its row, and one line of [`FORMATS`].
+//! In: the first bytes or the name of a file. Out: its [`Format`], with the functions that read and write it. A further
+//! format is one new file in this folder, which defines its row, and one line of [`FORMATS`].
 
 use super::CodecErrorKind;
 use super::checkpoint::{self, CheckpointOptions};
@@ -11,46 +11,50 @@ use std::fs::File;
 use std::io::{BufReader, Write};
 use std::path::Path;
 
-/// A row of the table.
+/// A file format: a row of the table.
 #[derive(Debug, Clone, Copy)]
 pub struct Format {
-    /// What a file of it is, with article and extension, for messages.
+    /// Description of a file of this format, with article and extension, for messages.
     pub name: &'static str,
     /// Extensions of its files, without the dot.
     pub extensions: &'static [&'static str],
     /// The first bytes of each of its files.
     pub magic: &'static [u8],
-    /// Reads the file at a path, which is open and at its start.
+    /// Reads a scene from the file at a path, which is open and positioned at its start.
     pub read: fn(&Path, BufReader<File>, &CheckpointOptions) -> Result<GaussianScene, CodecErrorKind>,
     /// Writes a scene; `None` if the format is only read.
     pub write: Option<fn(&mut dyn Write, &GaussianScene, &WriteSettings) -> Result<(), CodecErrorKind>>,
 }
 
 /// All formats.
-pub const FORMATS: [Format; 2] = [checkpoint::FORMAT, package::FORMAT];
+pub const FORMATS: &[Format] = &[checkpoint::FORMAT, package::FORMAT];
 
 impl Format {
-    /// The format of a file that starts with these bytes, of which [`longest_magic`] are enough; `None` if they are those of no format.
+    /// Returns the format of a file that starts with these bytes, of which [`longest_magic`] are enough; `None` if no
+    /// format does.
     pub fn of_start(start: &[u8]) -> Option<Self> {
-        FORMATS.into_iter().find(|format| start.starts_with(format.magic))
+        FORMATS.iter().copied().find(|format| start.starts_with(format.magic))
     }
 
-    /// Whether a path ends in one of its extensions.
+    /// Returns whether a path ends in one of its extensions.
     pub fn is_named(&self, path: &Path) -> bool {
         path.extension()
             .is_some_and(|found| self.extensions.iter().any(|extension| found.eq_ignore_ascii_case(extension)))
     }
 }
 
-/// Most first bytes that any format is recognized by.
+/// Returns the largest number of first bytes by which a format is recognized.
 pub fn longest_magic() -> usize {
     FORMATS.iter().map(|format| format.magic.len()).max().unwrap_or_default()
 }
 
-/// What is said about a file of none of the formats.
+/// Returns the message about a file of no known format.
 pub(super) fn none_of_them() -> String {
-    let [others @ .., last] = FORMATS.map(|format| format.name);
-    format!("neither {} nor {last}", others.join(", "))
+    let names: Vec<&str> = FORMATS.iter().map(|format| format.name).collect();
+    match names.split_last() {
+        Some((last, others)) => format!("neither {} nor {last}", others.join(", ")),
+        None => "of no known format".to_owned(),
+    }
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! Files and scenes.
 //!
-//! In: a path and the options for what a file does not say. Out: a [`GaussianScene`]; and back. [`format`](mod@format) is the table of
-//! formats: [`checkpoint`] reads what a trainer stores (`.pth`), [`package`] reads and writes our own format (`.gs4d`).
+//! In: a path, and options for what the file does not contain. Out: a [`GaussianScene`]; and back.
+//! [`format`](mod@format) is the table of formats: [`checkpoint`] reads what a trainer stores (`.pth`), [`package`]
+//! reads and writes the format of this crate (`.gs4d`).
 
 pub mod checkpoint;
 mod error;
@@ -18,13 +19,14 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, Write};
 use std::path::Path;
 
-/// Reads a capture, whichever format the file is in (its first bytes tell, not its name).
+/// Reads a capture. Its format follows from the first bytes of the file, not from its name.
 ///
-/// For a checkpoint, `cfg_args` beside it supplies what `options` leave open. For a package, which knows how it was trained,
-/// only the options `up`, `duration_seconds` and `background` count, and replace what is stored.
+/// For a checkpoint, the file `cfg_args` in the same folder supplies what `options` leave open. For a package, which
+/// stores how it was trained, only the options `up`, `duration_seconds` and `background` are used; they replace the
+/// stored values.
 ///
 /// # Errors
-/// A file that cannot be opened, is of another format, or is damaged; options that make no sense.
+/// A file that cannot be opened, is of another format, or is damaged; invalid options.
 pub fn load(path: &Path, options: &CheckpointOptions) -> Result<GaussianScene, CodecError> {
     load_file(path, options).map_err(|kind| CodecError { path: path.to_owned(), kind })
 }
@@ -38,10 +40,11 @@ fn load_file(path: &Path, options: &CheckpointOptions) -> Result<GaussianScene, 
     (format.read)(path, file, options)
 }
 
-/// Writes a scene in the format that the name of the file asks for; as a package if that format cannot be written, or is none.
+/// Writes a scene in the format that the extension of `path` names; as a package if there is no such format or it
+/// cannot be written.
 ///
 /// # Errors
-/// A scene that the format cannot hold, and what the writer reports.
+/// A scene that the format cannot hold; errors of the writer.
 pub fn write(
     writer: &mut dyn Write,
     path: &Path,

@@ -1,34 +1,35 @@
-//! Alpha: how much of a splat a pixel takes, and the step that blends it. Section 3.4 of the 4DGS model.
+//! Alpha: the opacity of a splat at a pixel, and the step that blends it.
 //!
-//! In: conic and opacity of a splat, where a pixel lies in it, the transmittance that the pixel has left. Out: its alpha, or what the
-//! splat does to the pixel ([`BlendStep`]). The CPU reference of `shaders/shared/alpha.wgsl`; [`visible`] is also the rule of picking.
+//! In: conic and opacity of a splat, the offset of a pixel from its center, the transmittance left at the pixel. Out:
+//! its alpha, or the result of blending it ([`BlendStep`]), as the original rasterizer computes them. The CPU reference
+//! of `shaders/shared/alpha.wgsl`; picking uses [`visible`] too.
 
 use glam::{Vec2, Vec3};
 
-/// A splat's alpha below this is skipped.
+/// A splat whose alpha at a pixel is below this is skipped there.
 pub const ALPHA_MIN: f32 = 1.0 / 255.0;
 /// Alpha is clamped to this from above.
 pub const ALPHA_MAX: f32 = 0.99;
-/// A pixel stops before its transmittance would fall below this.
+/// Blending stops at a pixel before its transmittance would fall below this.
 pub const TRANSMITTANCE_MIN: f32 = 1e-4;
 
-/// What one splat does to a pixel.
+/// The result of blending one splat over a pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum BlendStep {
-    /// Nothing: its alpha is too small.
+    /// The splat is skipped: its alpha is too small.
     Skip,
-    /// The pixel takes neither this splat nor any after it.
+    /// Blending stops: neither this splat nor any after it is blended.
     Stop,
     /// The splat is blended.
     Blend {
-        /// Factor on the splat's colour and depth: alpha times the transmittance before it.
+        /// Factor on the splat's color and depth: alpha times the transmittance before it.
         weight: f32,
         /// Transmittance after it.
         transmittance: f32,
     },
 }
 
-/// Blends one splat over a pixel that has `transmittance` left; see [`alpha_at`] for the others.
+/// Blends one splat over a pixel that has `transmittance` left. The other arguments are those of [`alpha_at`].
 pub fn blend_step(conic: Vec3, opacity: f32, offset: Vec2, transmittance: f32) -> BlendStep {
     let Some(alpha) = alpha_at(conic, opacity, offset) else { return BlendStep::Skip };
     let left = transmittance * (1.0 - alpha);
@@ -38,21 +39,23 @@ pub fn blend_step(conic: Vec3, opacity: f32, offset: Vec2, transmittance: f32) -
     BlendStep::Blend { weight: alpha * transmittance, transmittance: left }
 }
 
-/// A splat's alpha at a pixel; `None` where it is skipped. `conic` is the inverse covariance on the screen (xx, xy, yy), `offset` leads
-/// from the pixel to the splat's centre, pixels.
+/// Returns the alpha of a splat at a pixel; `None` if it is skipped. `conic` is the inverse covariance on the screen
+/// (xx, xy, yy), `offset` the vector from the pixel to the splat's center, pixels.
 pub fn alpha_at(conic: Vec3, opacity: f32, offset: Vec2) -> Option<f32> {
     let Vec2 { x, y } = offset;
     let power = -0.5 * (conic.x * x * x + conic.z * y * y) - conic.y * x * y;
     if power > 0.0 { None } else { visible(opacity * power.exp()) }
 }
 
-/// Alpha as it is blended: clamped from above by [`ALPHA_MAX`]; `None` below [`ALPHA_MIN`], where it is skipped.
+/// Returns alpha as it is blended, clamped from above to [`ALPHA_MAX`]; `None` below [`ALPHA_MIN`], where it is
+/// skipped.
 pub fn visible(alpha: f32) -> Option<f32> {
     let alpha = alpha.min(ALPHA_MAX);
     (alpha >= ALPHA_MIN).then_some(alpha)
 }
 
-/// The largest squared Mahalanobis distance from its centre at which a splat of this opacity is not skipped; negative if it always is.
+/// Returns the largest squared Mahalanobis distance from its center at which a splat of this opacity is not skipped;
+/// negative if it always is.
 ///
 /// `opacity · exp(−½ d²) ≥ 1/255` needs `d² ≤ 2 ln(255 opacity)`.
 pub fn reach_squared(opacity: f32) -> f32 {
@@ -63,7 +66,7 @@ pub fn reach_squared(opacity: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// A round splat of one pixel's deviation.
+    /// A round splat with a standard deviation of one pixel.
     const CONIC: Vec3 = Vec3::new(1.0, 0.0, 1.0);
 
     #[test]

@@ -1,11 +1,11 @@
-//! Colour: spherindrical harmonics, spherical ones whose coefficients are modulated by cosines of time.
+//! Color: spherindrical harmonics, that is, spherical harmonics whose coefficients are modulated by cosines of time.
 //!
-//! In: coefficients, a unit direction from the camera to the Gaussian, and `tau = mean_t − time`. Out: linear combination plus
-//! one half, clamped below at zero; in the space the capture was trained in (sRGB-encoded values).
+//! In: coefficients, a unit direction from the camera to the Gaussian, and `tau = mean_t − time`. Out: the linear
+//! combination plus one half, clamped below at 0, in the space the capture was trained in (sRGB-encoded values).
 
 use glam::Vec3;
 
-/// Colour coefficients of `N` Gaussians.
+/// Color coefficients of `N` Gaussians.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Harmonics {
     /// Coefficients stored per Gaussian and channel, K. Time-major: 16 spatial, 16 of the first harmonic, 16 of the second.
@@ -18,33 +18,36 @@ pub struct Harmonics {
     pub values: Vec<f32>,
 }
 
-/// The mean that gives the viewing direction of the colour.
+/// The mean toward which the viewing direction of the color points. Default: [`Canonical`](Self::Canonical).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ShDirection {
     /// The undisplaced mean μ (the original's CUDA path, all shipped configurations).
     #[default]
     Canonical,
-    /// The conditional mean at the time drawn (the original's Python path).
+    /// The conditional mean at the time that is drawn (the original's Python path).
     Displaced,
 }
 
-/// π as the original rasterizer spells it.
+/// π with the digits of the original rasterizer.
 #[expect(clippy::approx_constant, reason = "the original's literal, digit for digit")]
 const PI: f64 = 3.14159265;
 
 impl Harmonics {
-    /// Coefficients per Gaussian and channel that are evaluated: 1, 4, 9, 16, 32 or 48.
+    /// Returns the number of coefficients per Gaussian and channel that are evaluated: 1, 4, 9, 16, 32 or 48.
     pub fn evaluated(&self) -> usize {
         evaluated(self.degree, self.degree_t)
     }
 
-    /// The K × 3 values of one Gaussian.
+    /// Returns the K × 3 values of one Gaussian.
+    ///
+    /// # Panics
+    /// If `index` is out of range.
     pub fn of(&self, index: usize) -> &[f32] {
         &self.values[index * self.coefficients * 3..][..self.coefficients * 3]
     }
 
-    /// Keeps the coefficients of the degrees given (each at most what is there) and drops the rest from memory.
+    /// Lowers the degrees to at most those given and frees the coefficients that are no longer evaluated.
     pub fn truncate(&mut self, degree: u32, degree_t: u32) {
         self.degree = self.degree.min(degree);
         self.degree_t = if self.degree == 3 { self.degree_t.min(degree_t) } else { 0 };
@@ -61,7 +64,8 @@ impl Harmonics {
         }
     }
 
-    /// Whether the numbers fit together for `count` Gaussians: degrees in range and enough coefficients for them.
+    /// Returns whether the parts fit together for `count` Gaussians: degrees in range, and enough coefficients and
+    /// values for them.
     pub fn is_consistent(&self, count: usize) -> bool {
         self.degree <= 3
             && self.degree_t <= 2
@@ -70,8 +74,12 @@ impl Harmonics {
             && self.coefficients.checked_mul(3).and_then(|k| k.checked_mul(count)) == Some(self.values.len())
     }
 
-    /// Colour of one Gaussian seen along the unit vector `direction` (camera to Gaussian), with `tau = mean_t − time` and the
-    /// full length of the capture's time interval. Clamped below at 0.
+    /// Returns the color of one Gaussian seen along the unit vector `direction` (camera to Gaussian, capture space),
+    /// with `tau = mean_t − time` and the full length of the capture's time interval, both in timestamp units. Clamped
+    /// below at 0.
+    ///
+    /// # Panics
+    /// If `index` is out of range.
     pub fn color(&self, index: usize, direction: Vec3, tau: f32, time_span: f32) -> Vec3 {
         let basis = basis(direction);
         let sh = self.of(index);
@@ -88,18 +96,19 @@ impl Harmonics {
     }
 }
 
-/// Coefficients per Gaussian and channel of these degrees.
+/// Returns the number of coefficients per Gaussian and channel of these degrees.
 pub fn evaluated(degree: u32, degree_t: u32) -> usize {
     let spatial = (degree as usize + 1).pow(2);
     if degree == 3 { spatial * (1 + degree_t as usize) } else { spatial }
 }
 
-/// Factor of harmonic `n` in time: `cos(2π n tau / T)`.
+/// Returns the factor of harmonic `n` in time: `cos(2π n tau / T)`.
 pub fn time_cosine(n: usize, tau: f32, time_span: f32) -> f32 {
     (2.0 * PI * n as f64 * f64::from(tau) / f64::from(time_span)).cos() as f32
 }
 
-/// The 16 real spherical harmonics up to degree 3 in the direction given, in coefficient order, with the signs of 3DGS.
+/// Returns the 16 real spherical harmonics up to degree 3 in the unit direction given, in coefficient order, with the
+/// signs of 3DGS.
 pub fn basis(direction: Vec3) -> [f32; 16] {
     let Vec3 { x, y, z } = direction;
     let (xx, yy, zz) = (x * x, y * y, z * z);

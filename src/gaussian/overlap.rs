@@ -1,13 +1,13 @@
-//! Overlap of splats and tiles: which tiles a splat covers, and in which order its pairs with them come.
+//! Overlap of splats and tiles: which tiles a splat covers, and the order of its pairs with them.
 //!
-//! In: a splat's place, size and opacity on the screen, and the grid of tiles. Out: [`TileRect`], the tiles within, and their index in
-//! the grid. The CPU reference of `shaders/shared/tile.wgsl`.
+//! In: center, size and opacity of a splat on the screen, and the grid of tiles. Out: [`TileRect`], the tiles in it,
+//! and their index in the grid. The CPU reference of `shaders/shared/tile.wgsl`.
 
 use super::alpha::reach_squared;
 use crate::view::TILE_SIZE;
 use glam::{Mat2, UVec2, Vec2, Vec3};
 
-/// A rectangle of tiles; empty where [`high`](Self::high) is not beyond [`low`](Self::low) on both axes.
+/// A rectangle of tiles; empty unless [`high`](Self::high) is beyond [`low`](Self::low) on both axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TileRect {
     /// First column and row.
@@ -17,33 +17,33 @@ pub struct TileRect {
 }
 
 impl TileRect {
-    /// No tile.
+    /// The empty rectangle.
     pub const EMPTY: Self = Self { low: UVec2::ZERO, high: UVec2::ZERO };
 
-    /// Whether there is no tile in it.
+    /// Returns whether there is no tile in it.
     pub fn is_empty(self) -> bool {
         self.high.cmple(self.low).any()
     }
 
-    /// Number of tiles in it, which is the number of pairs of its splat.
+    /// Returns the number of tiles in it, which is the number of pairs of its splat.
     pub fn count(self) -> u32 {
         self.high.x.saturating_sub(self.low.x) * self.high.y.saturating_sub(self.low.y)
     }
 
-    /// Its tiles row by row: the order of the pairs of its splat.
+    /// Returns its tiles row by row, the order of the pairs of its splat.
     pub fn tiles(self) -> impl Iterator<Item = UVec2> {
         let Self { low, high } = self;
         (low.y..high.y).flat_map(move |y| (low.x..high.x).map(move |x| UVec2::new(x, y)))
     }
 
-    /// x0, y0, x1, y1, the ends excluded.
+    /// Returns x0, y0, x1, y1, ends excluded.
     pub fn to_array(self) -> [u32; 4] {
         [self.low.x, self.low.y, self.high.x, self.high.y]
     }
 }
 
-/// The tiles that the original assigns: those of the square of `radius` pixels about `center` (pixels), clamped to the grid; division
-/// truncates as in C.
+/// Returns the tiles that the original assigns: those of the square of ±`radius` pixels around `center` (pixels),
+/// clamped to the grid. Division truncates as in C.
 pub fn tiles_of(center: Vec2, radius: f32, grid: UVec2) -> TileRect {
     let grid = grid.as_vec2();
     let side = TILE_SIZE as f32;
@@ -52,11 +52,11 @@ pub fn tiles_of(center: Vec2, radius: f32, grid: UVec2) -> TileRect {
     TileRect { low: low.as_uvec2(), high: high.as_uvec2() }
 }
 
-/// The part of `tiles` where alpha can reach 1/255, empty where it never does. `center` in pixels, `covariance` on the screen (xx, xy,
-/// yy), pixels squared.
+/// Returns the part of `tiles` where alpha can reach 1/255, empty if it never does. `center` is in pixels, `covariance`
+/// on the screen (xx, xy, yy) in pixels squared.
 ///
-/// [`reach_squared`] bounds an ellipse `dᵀ conic d ≤ e`, and the box about it is `|dx| ≤ sqrt(e · xx)`, `|dy| ≤ sqrt(e · yy)`.
-/// Leaving out the rest changes no pixel: `blend` would skip it.
+/// [`reach_squared`] gives an ellipse `dᵀ conic d ≤ e`, whose bounding box is `|dx| ≤ sqrt(e · xx)`,
+/// `|dy| ≤ sqrt(e · yy)`. Leaving out the other tiles changes no pixel: `blend` would skip the splat there.
 pub fn contributing_tiles(tiles: TileRect, center: Vec2, covariance: Vec3, opacity: f32) -> TileRect {
     let Vec3 { x: xx, y: xy, z: yy } = covariance;
     if Mat2::from_cols_array(&[xx, xy, xy, yy]).determinant() <= 0.0 {
@@ -66,7 +66,7 @@ pub fn contributing_tiles(tiles: TileRect, center: Vec2, covariance: Vec3, opaci
     if energy < -1e-3 {
         return TileRect::EMPTY;
     }
-    // A hundredth of a pixel and a thousandth of the size stand above rounding.
+    // Margins for rounding: a thousandth of the size and a hundredth of a pixel.
     let half = (energy.max(0.0) * Vec2::new(xx, yy)).sqrt() * 1.001 + 0.01;
     let side = TILE_SIZE as f32;
     let low = ((center - half) / side).floor().max(Vec2::ZERO);
@@ -74,12 +74,12 @@ pub fn contributing_tiles(tiles: TileRect, center: Vec2, covariance: Vec3, opaci
     TileRect { low: tiles.low.max(low.as_uvec2()), high: tiles.high.min(high.as_uvec2()) }
 }
 
-/// Index of a tile in a grid of that many tiles across and down: row by row.
+/// Returns the index of a tile in a grid of that many tiles across and down, row by row.
 pub fn tile_index(tile: UVec2, grid: UVec2) -> u32 {
     tile.y * grid.x + tile.x
 }
 
-/// The tile at an index of the grid: the reverse of [`tile_index`].
+/// Returns the tile at an index of the grid: the inverse of [`tile_index`].
 pub fn tile_at(index: u32, grid: UVec2) -> UVec2 {
     UVec2::new(index % grid.x, index / grid.x)
 }

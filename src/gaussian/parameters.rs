@@ -1,12 +1,12 @@
-//! The trained form: the raw parameters as an optimiser stores them, colour aside.
+//! The trained form: the raw parameters as an optimizer stores them, without color.
 //!
 //! In: tensors of a checkpoint. Out: [`Parameters`], which [`slice`](Parameters::slice) turns into the runtime form.
 
 /// Raw parameters of `N` Gaussians, one entry per Gaussian and attribute, in capture space.
 ///
-/// *Raw* means before activation: scales are logarithms, opacity is a logit, quaternions need not be unit length.
-/// Colour coefficients live beside them in [`Harmonics`](super::Harmonics). Rotations are in the *flipped* convention
-/// (the axis order of the 4D vector is x, y, z, t; loaders convert).
+/// *Raw* means before activation: scales are logarithms, opacity is a logit, quaternions need not be unit length. Color
+/// coefficients are separate, in [`Harmonics`](super::Harmonics). Rotations are in the *flipped* convention (the axis
+/// order of the 4D vector is x, y, z, t; loaders convert).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Parameters {
     /// Mean μ, capture units.
@@ -37,17 +37,17 @@ pub enum Model {
 }
 
 impl Parameters {
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     pub fn len(&self) -> usize {
         self.mean.len()
     }
 
-    /// Whether there is no Gaussian.
+    /// Returns whether there is no Gaussian.
     pub fn is_empty(&self) -> bool {
         self.mean.is_empty()
     }
 
-    /// The model, from which attributes are present.
+    /// Returns the model, which follows from the attributes that are present.
     pub fn model(&self) -> Model {
         if self.mean_t.is_empty() {
             Model::Static3d
@@ -58,8 +58,8 @@ impl Parameters {
         }
     }
 
-    /// Rewrites rotations of the *unflipped* convention (code before 2024-09-15) in ours: `l' = (a, −b, c, −d)`,
-    /// `r' = (p, q, −r, −s)`. Exact, also for raw quaternions. Only 4D rotations are affected.
+    /// Converts rotations of the *unflipped* convention (original code before 2024-09-15) to the flipped one:
+    /// `l' = (a, −b, c, −d)`, `r' = (p, q, −r, −s)`. Exact, also for raw quaternions. Changes 4D rotations only.
     pub fn flip_rotations(&mut self) {
         if self.model() != Model::Rotated4d {
             return;

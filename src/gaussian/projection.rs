@@ -1,7 +1,7 @@
 //! Projection: from a Gaussian at a time to a splat on the screen (EWA splatting, as the original rasterizer does it).
 //!
-//! In: a [`Gaussian`] and a [`View`]. Out: [`Projected`]; `None` where the Gaussian is not drawn. Section 3.3 of the 4DGS model, step
-//! by step in its order; to be read beside `shaders/project.wgsl`.
+//! In: a [`Gaussian`] and a [`View`]. Out: [`Projected`]; `None` if the Gaussian is not drawn. The steps and their
+//! order are those of the original rasterizer, and of `shaders/project.wgsl`.
 
 use super::overlap::{TileRect, tiles_of};
 use super::{Gaussian, MARGINAL_CUTOFF};
@@ -13,16 +13,16 @@ pub const LOW_PASS: f32 = 0.3;
 /// Rays are clamped to this multiple of the field of view before the Jacobian is taken.
 const FRUSTUM_CLAMP: f32 = 1.3;
 
-/// The geometry of a splat: a Gaussian sliced at a time and projected to a view, without its colour.
+/// The geometry of a splat: a Gaussian sliced at a time and projected to a view, without its color.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Projected {
-    /// Centre in pixels (pixel centres at integers).
+    /// Center in pixels (pixel centers at integers).
     pub center: Vec2,
     /// Depth: z in camera space.
     pub depth: f32,
     /// Covariance on the screen with the low-pass: xx, xy, yy, pixels squared.
     pub covariance: Vec3,
-    /// Its inverse: xx, xy, yy.
+    /// Inverse of the covariance: xx, xy, yy.
     pub conic: Vec3,
     /// Opacity times marginal.
     pub opacity: f32,
@@ -30,16 +30,17 @@ pub struct Projected {
     pub mean: Vec3,
     /// The original's radius: three standard deviations of the longer axis, rounded up, pixels.
     pub radius: u32,
-    /// Tiles the original assigns.
+    /// Tiles that the original assigns.
     pub tiles: TileRect,
 }
 
-/// Projects one Gaussian.
+/// Projects one Gaussian; `None` if it is not drawn.
 pub fn project(gaussian: &Gaussian, view: &View) -> Option<Projected> {
     project_with(gaussian, view, &view.clip_rows())
 }
 
-/// Projects one of many Gaussians: `clip` are the view's [`clip_rows`](View::clip_rows), worked out once for all.
+/// Projects one of many Gaussians, as [`project`]; `clip` are the view's [`clip_rows`](View::clip_rows), computed once
+/// for all.
 pub fn project_with(gaussian: &Gaussian, view: &View, clip: &[Vec4; 2]) -> Option<Projected> {
     let marginal = gaussian.marginal(view.time);
     if marginal <= MARGINAL_CUTOFF {

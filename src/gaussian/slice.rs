@@ -5,7 +5,8 @@
 use super::{Model, Parameters};
 use glam::{DMat3, DMat4, DQuat, DVec3, DVec4, Vec3};
 
-/// One Gaussian in the runtime form: activated, sliced, capture space. 64 bytes, the record the GPU reads too.
+/// One Gaussian in the runtime form: activated, sliced, capture space. 64 bytes; the record on the GPU is the same,
+/// except that it holds `1/σ_t` in place of `σ_t`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Gaussian {
@@ -15,7 +16,8 @@ pub struct Gaussian {
     pub mean_t: f32,
     /// Velocity c/v, capture units per timestamp unit.
     pub velocity: [f32; 3],
-    /// Temporal standard deviation σ_t of the marginal, timestamp units; infinite for a Gaussian that is always there.
+    /// Temporal standard deviation σ_t of the marginal, timestamp units; infinite if the Gaussian is present at every
+    /// time.
     pub sigma_t: f32,
     /// Conditional covariance, upper triangle xx, xy, xz, yy, yz, zz, capture units squared.
     pub covariance: [f32; 6],
@@ -26,24 +28,25 @@ pub struct Gaussian {
 }
 
 impl Gaussian {
-    /// How present the Gaussian is at `time`: the unnormalised marginal in (0, 1].
+    /// Returns the unnormalized marginal at `time`, in (0, 1]: the factor on the opacity.
     pub fn marginal(&self, time: f32) -> f32 {
         let z = (time - self.mean_t) * self.sigma_t.recip();
         (-0.5 * z * z).exp()
     }
 
-    /// The conditional mean at `time`, capture units.
+    /// Returns the conditional mean at `time`, capture space.
     pub fn mean_at(&self, time: f32) -> Vec3 {
         Vec3::from(self.mean) + Vec3::from(self.velocity) * (time - self.mean_t)
     }
 }
 
-/// What the slice needs beside the parameters.
+/// Settings of the slice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SliceSettings {
-    /// Multiplies all four scales (1 in training).
+    /// Factor on all four scales. Default: 1, as in training.
     pub scale_modifier: f32,
-    /// Added to the temporal variance in the marginal alone, if positive (the original's `prefilter_var`).
+    /// Added to the temporal variance in the marginal only, if positive (the original's `prefilter_var`). Default: −1,
+    /// nothing is added.
     pub prefilter_var: f32,
 }
 
@@ -57,18 +60,21 @@ impl Default for SliceSettings {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("Gaussian {index}: {reason}")]
 pub struct InvalidGaussian {
-    /// Its place in the file, from 0.
+    /// Its index in the file, from 0.
     pub index: usize,
     /// What is wrong with it.
     pub reason: &'static str,
 }
 
 impl Parameters {
-    /// Slices every Gaussian: section 2 of the 4DGS model (`cov3 = A − c cᵀ/v`, velocity `c/v`, `v' = v + prefilter_var`).
+    /// Slices every Gaussian: `cov3 = A − c cᵀ/v`, velocity `c/v`, marginal variance `v + prefilter_var`.
     ///
     /// # Errors
-    /// The first Gaussian with a value that is not finite, a quaternion of length zero, or scales so extreme that the result
-    /// is not finite.
+    /// The first Gaussian with a value that is not finite, a quaternion of length zero, or scales so extreme that the
+    /// result is not finite.
+    ///
+    /// # Panics
+    /// If an attribute of the model has fewer entries than there are means.
     pub fn slice(&self, settings: &SliceSettings) -> Result<Vec<Gaussian>, InvalidGaussian> {
         let model = self.model();
         (0..self.len()).map(|i| self.slice_one(i, model, settings)).collect()
@@ -123,10 +129,11 @@ impl Parameters {
 }
 
 impl Gaussian {
-    /// Whether every value is finite (σ_t may be infinite) and the temporal deviation positive.
+    /// Checks that every value is finite (σ_t may be infinite), the temporal deviation positive and the opacity from 0
+    /// to 1.
     ///
     /// # Errors
-    /// What is wrong, in words.
+    /// A description of what is wrong.
     pub fn check(&self) -> Result<(), &'static str> {
         let finite = |values: &[f32]| values.iter().all(|v| v.is_finite());
         if !finite(&self.mean) {
@@ -147,21 +154,21 @@ impl Gaussian {
     }
 }
 
-/// The unit quaternion (w, x, y, z); `None` where the length is zero or not finite.
+/// Returns the unit quaternion (w, x, y, z); `None` if the length is zero or not finite.
 fn unit(q: [f32; 4]) -> Option<DVec4> {
     let q = DVec4::from(q.map(f64::from));
     let length = q.length();
     (length.is_finite() && length > 1e-12).then(|| q / length)
 }
 
-/// `R diag(s)² Rᵀ` with the ordinary rotation matrix of the quaternion (w, x, y, z).
+/// Returns `R diag(s)² Rᵀ` with the ordinary rotation matrix of the quaternion (w, x, y, z).
 fn covariance_3d(q: DVec4, scale: DVec3) -> DMat3 {
     let m = DMat3::from_quat(DQuat::from_xyzw(q.y, q.z, q.w, q.x)) * DMat3::from_diagonal(scale);
     m * m.transpose()
 }
 
-/// The 4D rotation `Q = L(l) R(r)` of a pair of unit quaternions (a, b, c, d) and (p, q, r, s), acting on column vectors
-/// (x, y, z, t); section 2.1 of the 4DGS model, flipped convention.
+/// Returns the 4D rotation `Q = L(l) R(r)` of a pair of unit quaternions (a, b, c, d) and (p, q, r, s), acting on
+/// column vectors (x, y, z, t); flipped convention.
 pub fn rotation_4d(l: DVec4, r: DVec4) -> DMat4 {
     let [a, b, c, d] = l.to_array();
     let [p, q, r, s] = r.to_array();

@@ -17,7 +17,7 @@ use crate::scene::{FilterKind, GaussianScene, RuntimeScene, TemporalFilter};
 use crate::view::Background;
 use serde::Serialize;
 
-/// What to try. Every row is measured on its own: filters on the whole scene, ratios without a filter.
+/// Settings of an ablation. Every row is measured on its own: filters on the whole scene, ratios without a filter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AblationSettings {
     /// Kinds of temporal filter.
@@ -28,7 +28,7 @@ pub struct AblationSettings {
     pub ratios: Vec<f64>,
     /// Scores to prune by, each tried at every ratio.
     pub scores: Vec<ScoreChoice>,
-    /// How to score.
+    /// Settings of the scoring.
     pub scoring: ScoringSettings,
 }
 
@@ -37,12 +37,12 @@ pub struct AblationSettings {
 pub struct AblationRow {
     /// What was tried, in words.
     pub row: String,
-    /// How close it is to the views it was measured on.
+    /// Means of the metrics over the measured views.
     #[serde(flatten)]
     pub metrics: ImageMetrics,
     /// Number of Gaussians.
     pub gaussians: usize,
-    /// Share of them that a filter leaves active, mean over its segments.
+    /// Share of them that the filter leaves active, mean over its segments; `None` without a filter.
     pub active_share: Option<f64>,
 }
 
@@ -87,7 +87,7 @@ pub fn ablate(
     Ok(table.rows)
 }
 
-/// The scores that the choices stand for, each once.
+/// Returns the scores that the choices stand for, each once.
 fn variants(choices: &[ScoreChoice], has_volume: bool) -> Vec<Variant> {
     let mut variants: Vec<Variant> = Vec::new();
     for choice in choices {
@@ -121,7 +121,7 @@ impl Table<'_> {
             for (variant, scores) in scores {
                 progress.advance();
                 let kept = highest(scores, kept_count(scene.len(), ratio));
-                // Tenths of a percent are shown where there are any.
+                // Rounded to tenths of a percent, which are shown unless they are 0.
                 let percent = (ratio * 1000.0).round() / 10.0;
                 let pruned = select(scene, &kept).into_runtime()?;
                 self.measure(format!("prune {percent}% {variant}"), &pruned, progress)?;

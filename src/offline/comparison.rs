@@ -1,4 +1,4 @@
-//! How alike pictures on disk are.
+//! Comparing pictures on disk.
 //!
 //! In: two pictures, or two folders matched by file stem (8-bit, 16-bit or raw float32). Out: the [`Pairs`] of
 //! pictures, and PSNR and SSIM of each ([`PairMetrics`]).
@@ -24,7 +24,7 @@ pub struct Pair {
     pub b: PathBuf,
 }
 
-/// What is compared with what.
+/// The pictures to compare. Default: none.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Pairs {
     /// The pairs, at least one.
@@ -36,8 +36,8 @@ pub struct Pairs {
 }
 
 impl Pairs {
-    /// Pairs two files, or the pictures of two folders by file stem. Raw files (`.f32`) of folders count only if their
-    /// size is given, and then before others of the same stem.
+    /// Pairs two files, or the pictures of two folders by file stem. Raw files (`.f32`) in folders are used only if
+    /// `raw_size` (pixels) is given, and then take precedence over other pictures of the same stem.
     ///
     /// # Errors
     /// A file and a folder, a folder that cannot be listed or has one stem twice, no pair at all.
@@ -71,7 +71,7 @@ impl Pairs {
     }
 }
 
-/// The pictures of a folder by file stem.
+/// Returns the pictures of a folder by file stem.
 fn pictures(folder: &Path, with_raw: bool) -> Result<BTreeMap<OsString, PathBuf>, OfflineError> {
     let mut found: BTreeMap<OsString, PathBuf> = BTreeMap::new();
     for entry in fs::read_dir(folder).map_err(|error| OfflineError::at(folder, error))? {
@@ -92,10 +92,10 @@ fn pictures(folder: &Path, with_raw: bool) -> Result<BTreeMap<OsString, PathBuf>
     Ok(found)
 }
 
-/// How alike two pictures are, or the means of several pairs.
+/// Metrics of two pictures, or the means over several pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PairMetrics {
-    /// PSNR in dB, the mean of the channels'. Infinite (null in JSON) for equal pictures.
+    /// PSNR in dB, mean of the three channels. Infinite (null in JSON) for equal pictures.
     pub psnr: f64,
     /// PSNR in dB of all values together.
     pub psnr_pooled: f64,
@@ -104,11 +104,11 @@ pub struct PairMetrics {
 }
 
 impl PairMetrics {
-    /// Compares two pictures on disk. Raw ones have the size `raw_size` and are taken as they are if both are raw;
-    /// everything else is clamped to 0..1.
+    /// Compares two pictures on disk. Raw ones have `raw_size` pixels and are not clamped if both are raw; all other
+    /// pictures are clamped to 0..1.
     ///
     /// # Errors
-    /// A picture that cannot be read, pictures of different sizes.
+    /// A picture that cannot be read, a raw one without `raw_size`, pictures of different sizes.
     pub fn of(pair: &Pair, raw_size: Option<UVec2>) -> Result<Self, OfflineError> {
         let (mut left, mut right) = (load(&pair.a, raw_size)?, load(&pair.b, raw_size)?);
         if !(is_raw(&pair.a) && is_raw(&pair.b)) {
@@ -122,7 +122,7 @@ impl PairMetrics {
         })
     }
 
-    /// The means; NaN of nothing.
+    /// Returns the means over `all`; NaN if it is empty.
     pub fn mean(all: &[Self]) -> Self {
         let mean = |of: fn(&Self) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
         Self { psnr: mean(|m| m.psnr), psnr_pooled: mean(|m| m.psnr_pooled), ssim: mean(|m| m.ssim) }

@@ -1,6 +1,6 @@
 //! The form and the colors that a scene is stored with.
 //!
-//! In: a scene, the form wanted, color degrees. Out: the scene in that form.
+//! In: a scene, a target form, color degrees. Out: the scene in that form, with those degrees.
 
 use super::OfflineError;
 use crate::scene::{Form, GaussianScene, SceneForm};
@@ -8,9 +8,9 @@ use crate::scene::{Form, GaussianScene, SceneForm};
 /// A form to convert to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TargetForm {
-    /// Can be pruned and fine-tuned.
+    /// The trained form, which can be pruned and fine-tuned.
     Trained,
-    /// Smaller, draws the same.
+    /// The runtime form: smaller, with the same pictures.
     Runtime,
 }
 
@@ -19,21 +19,22 @@ impl TargetForm {
     pub const NAMES: [(&'static str, Self); 2] = [("trained", Self::Trained), ("runtime", Self::Runtime)];
 }
 
-/// What is changed in a scene. `None` keeps what is there.
+/// What to change in a scene; `None` keeps what it has. Default: all `None`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ConvertSettings {
-    /// The form wanted.
+    /// Target form.
     pub form: Option<TargetForm>,
-    /// Highest spatial degree of color to keep, 0 to 3.
+    /// Highest spatial degree of color to keep, 0 to 3. No effect on colors by codebook unless they are unpacked.
     pub sh_degree: Option<u32>,
-    /// Highest time degree of color to keep, 0 to 2.
+    /// Highest time degree of color to keep, 0 to 2. No effect on colors by codebook unless they are unpacked.
     pub sh_degree_t: Option<u32>,
 }
 
-/// The scene in the form and with the color degrees that the settings ask for.
+/// Converts a scene to the form and the color degrees of the settings.
 ///
 /// # Errors
-/// [`OfflineError::NotTrained`] if a sliced scene is to become the trained form; a Gaussian that cannot be sliced.
+/// [`OfflineError::NotTrained`] if a scene in the runtime or the packed form is to become the trained form; a Gaussian
+/// that cannot be sliced.
 pub fn convert(mut scene: GaussianScene, settings: &ConvertSettings) -> Result<GaussianScene, OfflineError> {
     if settings.form == Some(TargetForm::Runtime) {
         scene = scene.unpacked();
@@ -48,7 +49,7 @@ pub fn convert(mut scene: GaussianScene, settings: &ConvertSettings) -> Result<G
     }
 }
 
-/// Name of a form.
+/// Returns the name of a form.
 pub fn form_name(form: &SceneForm) -> &'static str {
     match form {
         SceneForm::Trained(_) => "trained",

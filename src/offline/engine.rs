@@ -1,7 +1,7 @@
-//! What scores and draws: the GPU where there is a real one, else the CPU reference.
+//! Scoring and drawing on the GPU or, without a hardware GPU, by the CPU reference.
 //!
-//! In: [`EngineSettings`]; this is the one place that chooses. Out: an [`Engine`], which puts a scene where it is
-//! scored ([`ScoreEngine`]) or drawn ([`Draw`]), once for many views.
+//! In: [`EngineSettings`]. Out: an [`Engine`], which prepares a scene for scoring ([`ScoreEngine`]) or drawing
+//! ([`Draw`]), once for many views. Nothing else chooses between GPU and CPU.
 
 use super::OfflineError;
 use super::score::{CpuEngine, GpuEngine, ScoreEngine};
@@ -12,10 +12,11 @@ use crate::view::{Background, Picture, View};
 use serde::Serialize;
 use std::fmt;
 
-/// Where to compute.
+/// Where to compute. Default: [`EngineChoice::Auto`].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum EngineChoice {
-    /// On the GPU, unless no adapter is asked for and there is none but a software driver.
+    /// On the GPU if an adapter is named; else on the fastest adapter if it is a hardware GPU that can run the passes,
+    /// or on the CPU.
     #[default]
     Auto,
     /// On the CPU.
@@ -32,9 +33,9 @@ impl EngineChoice {
 /// Which GPU to use, and with which checks.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct GpuSettings {
-    /// Part of the adapter's name in any case, or its index; the fastest one if `None`.
+    /// Part of the adapter's name in any case, or its index. Default: `None`, the fastest one.
     pub adapter: Option<String>,
-    /// Whether the shaders that draw check their array indices.
+    /// Whether the shaders that draw check their array indices. Default: [`ShaderChecks::Off`].
     pub checks: ShaderChecks,
 }
 
@@ -47,7 +48,8 @@ impl GpuSettings {
         Headless::new(GpuContext::headless(self.adapter.as_deref())?, self.checks)
     }
 
-    /// Opens the fastest adapter if that is a real GPU: a software driver is slower than the CPU reference.
+    /// Opens the fastest adapter; `None` if it is a software driver, which is slower than the CPU reference, or cannot
+    /// run the passes.
     fn open_hardware(&self) -> Option<Headless> {
         let context = GpuContext::headless(None).ok()?;
         let software = context.info.device_type == wgpu::DeviceType::Cpu;
@@ -58,13 +60,13 @@ impl GpuSettings {
 /// Which engine to open.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct EngineSettings {
-    /// Where to compute.
+    /// Where to compute. Default: [`EngineChoice::Auto`].
     pub choice: EngineChoice,
-    /// The GPU, where it is used.
+    /// Settings of the GPU, if it is used.
     pub gpu: GpuSettings,
 }
 
-/// What scores and draws.
+/// Scores and draws scenes.
 #[derive(Debug)]
 pub enum Engine {
     /// The CPU reference.
@@ -74,10 +76,10 @@ pub enum Engine {
 }
 
 impl Engine {
-    /// Opens the engine that the settings choose.
+    /// Opens the engine that the settings select.
     ///
     /// # Errors
-    /// A GPU is asked for that cannot be used.
+    /// The requested GPU cannot be used.
     pub fn open(settings: &EngineSettings) -> Result<Self, GpuError> {
         let gpu = |headless| Self::Gpu(Box::new(headless));
         match settings.choice {
@@ -89,7 +91,7 @@ impl Engine {
         }
     }
 
-    /// Its name, for people.
+    /// Returns a description for people: the CPU and its threads, or the adapter.
     pub fn name(&self) -> String {
         match self {
             Self::Cpu => format!("CPU, {} threads", rayon::current_num_threads()),
@@ -97,7 +99,7 @@ impl Engine {
         }
     }
 
-    /// Puts a scene where it is scored.
+    /// Prepares a scene for scoring.
     ///
     /// # Errors
     /// The scene does not fit the GPU.
@@ -112,7 +114,7 @@ impl Engine {
         })
     }
 
-    /// Puts a scene where it is drawn.
+    /// Prepares a scene for drawing.
     ///
     /// # Errors
     /// The scene does not fit the GPU.
@@ -131,7 +133,7 @@ impl Engine {
     }
 }
 
-/// A scene that is ready to be drawn, view after view.
+/// A scene prepared for drawing.
 pub trait Draw {
     /// Draws a view: RGB, not clamped.
     ///
@@ -165,7 +167,7 @@ impl Draw for GpuDrawing<'_> {
     }
 }
 
-/// Which adapter a GPU engine runs on. Displayed in one line.
+/// The adapter of a GPU engine. `Display` gives one line.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct AdapterDescription {
     /// Name of the adapter.

@@ -1,7 +1,7 @@
-//! What can go wrong in the offline half.
+//! Errors of the offline half.
 //!
 //! In: errors of the codec, the datasets, the renderer, scoring and compression. Out: [`OfflineError`], which displays
-//! them unchanged, with the file's name where the error itself does not have it.
+//! them unchanged, preceded by the name of the file if the error does not contain it.
 
 use super::dataset::DatasetError;
 use super::metrics::SizeMismatch;
@@ -13,7 +13,7 @@ use crate::renderer::GpuError;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-/// Why work on a capture stopped.
+/// An error of the offline half.
 #[derive(Debug, thiserror::Error)]
 pub enum OfflineError {
     /// A file cannot be read or written.
@@ -46,7 +46,7 @@ pub enum OfflineError {
         #[source]
         reason: Box<dyn Error + Send + Sync>,
     },
-    /// No two pictures of two folders belong together.
+    /// Two folders have no two pictures of the same name.
     #[error("{} and {}: no two pictures with the same name before the extension", .a.display(), .b.display())]
     NoPairs {
         /// The first folder.
@@ -57,7 +57,7 @@ pub enum OfflineError {
     /// There is no score to choose from.
     #[error("there is no score to prune by")]
     NoScore,
-    /// An orbit needs Gaussians to look at.
+    /// An orbit needs a scene with Gaussians.
     #[error("the scene has no Gaussians to go around")]
     NothingToOrbit,
     /// A sliced scene cannot become the trained form.
@@ -78,7 +78,7 @@ pub enum OfflineError {
 }
 
 impl OfflineError {
-    /// An error that does not name its file, or a reason in words, about this file.
+    /// Returns an error about the file `path`. `reason` is an error that does not name the file, or a message.
     pub(super) fn at(path: &Path, reason: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
         Self::File { path: path.to_owned(), reason: reason.into() }
     }

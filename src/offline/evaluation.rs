@@ -1,7 +1,6 @@
-//! How close a scene is to the views of a dataset.
+//! Evaluating a scene on the views of a dataset.
 //!
-//! In: a scene, views with their images, an [`Engine`] that draws them. Out: an [`Evaluation`], with every picture
-//! shown on the way.
+//! In: a scene, views with their images, an [`Engine`]. Out: an [`Evaluation`]; each picture is passed to the caller.
 
 use super::dataset::TrainingView;
 use super::engine::Engine;
@@ -10,12 +9,12 @@ use super::{OfflineError, Progress};
 use crate::scene::RuntimeScene;
 use crate::view::{Background, Picture};
 
-/// Draws every view of a scene and compares it with its image, as the capture was trained. Transparent images are laid
-/// over the color of the background, or over that of training where the background is none. `seen` is shown each view
-/// with its image and its picture (not clamped). Begins the task "comparing".
+/// Draws every view of a scene, with the field of view that it was trained with, and compares it with its image.
+/// Transparent images are composited over the color of `background`, or over that of training if `background` has none.
+/// Calls `seen` with the metrics of each view, its image and its picture (not clamped). Begins the task "comparing".
 ///
 /// # Errors
-/// Images that are missing or cannot be read, no views at all, a failure of the engine, and what `seen` reports.
+/// Images that are missing or cannot be read, no views, a failure of the engine, and errors of `seen`.
 pub fn evaluate_scene(
     engine: &mut Engine,
     scene: &RuntimeScene,

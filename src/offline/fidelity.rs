@@ -1,4 +1,4 @@
-//! How close a compressed scene is to the one it was made from.
+//! Comparing a compressed scene with the original.
 //!
 //! In: the original scene, views, an [`Engine`]; then the compressed scene. Out: PSNR of each view.
 
@@ -30,8 +30,8 @@ impl Originals {
         Ok(Self { views, pictures })
     }
 
-    /// PSNR of all values of each view of another scene to the original, dB; clamped to 0..1 first. Infinite where both
-    /// are equal. Begins the task "comparing".
+    /// Returns the PSNR of each view of `scene` against the original, dB, over all values of the pictures clamped to
+    /// 0..1; infinite for equal pictures. Begins the task "comparing".
     ///
     /// # Errors
     /// A failure of the engine.

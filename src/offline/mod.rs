@@ -1,8 +1,8 @@
 //! The offline half: from a trained checkpoint and its training views to a small, fast capture, and what it costs.
 //!
-//! In: a [`GaussianScene`], the views it was trained on, an [`Engine`](engine::Engine) that scores and draws them, on
-//! the GPU or the CPU. Out: a smaller scene, packages, pictures, measurements. Every call can be made by a build script
-//! or an editor as well as by the command: it reports its [`Progress`], and its results are data.
+//! In: a [`GaussianScene`], the views it was trained on, an [`Engine`](engine::Engine) that scores and draws them on
+//! the GPU or the CPU. Out: a smaller scene, packages, pictures, measurements. Build scripts and editors can call every
+//! function as the command does: functions report their [`Progress`] and return data.
 //!
 //! | module | what it does |
 //! |---|---|
@@ -13,7 +13,7 @@
 //! | [`search`], [`quality`] | finds the best score and the smallest count that a loss allows |
 //! | [`temporal_filter`] | finds which Gaussians are active when |
 //! | [`quantize`], [`convert`] | changes the form that a scene is stored in |
-//! | [`bake`](mod@bake), [`report`] | all of it in order, resumable, with a report |
+//! | [`bake`](mod@bake), [`report`] | runs all of it in order, resumable, and writes a report |
 //! | [`metrics`], [`evaluation`], [`fidelity`], [`comparison`] | measures how close pictures are |
 //! | [`ablation`] | tabulates what every score, ratio and filter costs |
 //! | [`orbit`], [`render`] | draws a scene from all around, many pictures at a time |
@@ -52,7 +52,7 @@ use crate::gaussian::{Gaussian, InvalidGaussian, SliceSettings};
 use crate::scene::{Form, GaussianScene, SceneForm, Trained};
 use std::borrow::Cow;
 
-/// The Gaussians of a scene in the runtime form, without its color.
+/// Returns the Gaussians of a scene in the runtime form, without its color.
 ///
 /// # Errors
 /// The first Gaussian that cannot be drawn.

@@ -8,11 +8,11 @@ use crate::view::{Camera, View};
 use glam::{UVec2, Vec3};
 use std::f32::consts::TAU;
 
-/// Picture size of an orbit unless another is asked for, pixels.
+/// Default picture size of an orbit, pixels.
 pub const ORBIT_SIZE: UVec2 = UVec2::splat(400);
 /// Horizontal field of view, radians.
 const FIELD_OF_VIEW: f32 = 0.7;
-/// Height over the center, radians.
+/// Elevation of the cameras above the center, radians.
 const ELEVATION: f32 = 0.35;
 
 /// A named camera at a time.
@@ -27,14 +27,14 @@ pub struct Shot {
 }
 
 impl Shot {
-    /// What the renderer takes, for this scene.
+    /// Returns the renderer's view of a scene for this shot.
     pub fn view(&self, scene: &RuntimeScene) -> View {
         self.camera.view(self.time, scene.trained_with.raster_fov)
     }
 }
 
-/// `count` views on a circle around the middle of the scene, about its up axis, from which all of it is seen. Time runs
-/// through the interval, both ends included.
+/// Returns `count` views on a circle around the core of the scene ([`Bounds::core`]), about its up axis, each with the
+/// whole core in view. Their times are evenly spaced over the time interval, both ends included.
 ///
 /// # Errors
 /// A scene without Gaussians.
@@ -62,7 +62,7 @@ pub fn orbit(scene: &RuntimeScene, count: usize, size: UVec2) -> Result<Vec<Shot
     Ok((0..count).map(shot).collect())
 }
 
-/// An even share of at most `count` shots, in their order.
+/// Returns an even share of at most `count` shots, in their order.
 pub fn share(shots: Vec<Shot>, count: usize) -> Vec<Shot> {
     let all = shots.len();
     let count = count.min(all);
@@ -70,7 +70,7 @@ pub fn share(shots: Vec<Shot>, count: usize) -> Vec<Shot> {
     chosen.map(|(_, shot)| shot).collect()
 }
 
-/// Each shot at `times` times in place of its own: the middles of as many equal parts of the interval.
+/// Returns each shot at `times` times instead of its own: at the middles of as many equal parts of the interval.
 pub fn at_times(shots: Vec<Shot>, times: usize, [first, last]: [f32; 2]) -> Vec<Shot> {
     let time = |k: usize| first + (last - first) * (k as f32 + 0.5) / times as f32;
     let seen = |shot: Shot| (0..times).map(move |k| Shot { time: time(k), ..shot.clone() });

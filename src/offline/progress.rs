@@ -1,7 +1,7 @@
-//! How a library call reports how far it is.
+//! Progress reports of library calls.
 //!
-//! In: the tasks of a call as they begin, advance and finish, and remarks. Out: whatever the caller makes of them, such
-//! as progress bars or a log.
+//! In: the tasks of a call as they begin, advance and finish, and notes. Out: what the caller shows of them, such as
+//! progress bars or a log.
 
 use crate::codec::CodecError;
 
@@ -11,20 +11,20 @@ use crate::codec::CodecError;
 /// function that takes a `Progress` documents whether it begins tasks of its own or advances one of the caller's. When
 /// it returns an error, the tasks that it began stay unfinished.
 pub trait Progress {
-    /// A task of so many steps begins.
+    /// Begins a task of `steps` steps.
     fn begin(&mut self, task: &'static str, steps: usize);
 
-    /// One more step of the task is done.
+    /// Reports that one more step of the task is done.
     fn advance(&mut self);
 
-    /// The task is done.
+    /// Finishes the task.
     fn finish(&mut self);
 
-    /// One line about the work: how long a stage took, or something that would otherwise surprise.
+    /// Reports one line about the work, such as the duration of a stage or views that are left out.
     fn note(&mut self, line: &str);
 
-    /// Writes a file. A program that can be interrupted finishes the write first, so that no temporary file stays
-    /// behind.
+    /// Writes a file by calling `write`. A program that can be interrupted completes the write first, so that no
+    /// temporary file is left behind.
     ///
     /// # Errors
     /// Those of `write`, which is called exactly once.

@@ -1,28 +1,32 @@
 //! Pruning: the scene with the Gaussians that score highest.
 //!
-//! In: a scene of either form and a score for each Gaussian. Out: the scene with some of them, in their old order, with
-//! their colour and their part of the temporal filter.
+//! In: a scene of any form and a score for each Gaussian. Out: the scene with some of them, in their original order,
+//! with their color and their part of the temporal filter.
 
 use crate::gaussian::{Harmonics, Parameters};
 use crate::scene::{Form, GaussianScene, SceneForm, Sliced, Trained};
 
-/// How many of `count` Gaussians are left when this share of them (0 to 1) is removed: `round((1 − ratio) count)`.
+/// Returns how many of `count` Gaussians are left when this share of them (0 to 1) is removed: `round((1 − ratio)
+/// count)`.
 pub fn kept_count(count: usize, ratio: f64) -> usize {
     (((1.0 - ratio) * count as f64).round() as usize).min(count)
 }
 
-/// Indices of the `count` highest scores, ascending; of equal scores the earlier Gaussians.
+/// Returns the indices of the `count` highest scores, ascending; of equal scores, those of the earlier Gaussians.
 pub fn highest(scores: &[f32], count: usize) -> Vec<u32> {
     let mut order: Vec<u32> = (0..scores.len() as u32).collect();
-    // Stable: equal scores stay in the order of the scene.
+    // A stable sort: equal scores stay in the order of the scene.
     order.sort_by(|&a, &b| scores[b as usize].total_cmp(&scores[a as usize]));
     order.truncate(count);
     order.sort_unstable();
     order
 }
 
-/// The scene with only the Gaussians at these indices, in this order; a packed one comes back in the runtime form. The
-/// indices must be below the scene's length.
+/// Returns the scene with only the Gaussians at these indices, in this order. A packed scene is returned in the runtime
+/// form.
+///
+/// # Panics
+/// If an index is not below the length of the scene.
 pub fn select(scene: &GaussianScene, keep: &[u32]) -> GaussianScene {
     let form = match &scene.form {
         SceneForm::Trained(Trained { parameters, harmonics }) => SceneForm::Trained(Trained {
@@ -64,7 +68,7 @@ pub(super) fn select_harmonics(harmonics: &Harmonics, keep: &[u32]) -> Harmonics
     Harmonics { values, ..*harmonics }
 }
 
-/// Those rows of an attribute; an attribute that the model does not have stays empty.
+/// Returns these rows of an attribute; an attribute that the model does not have stays empty.
 fn rows<T: Copy>(values: &[T], keep: &[u32]) -> Vec<T> {
     if values.is_empty() { Vec::new() } else { keep.iter().map(|&index| values[index as usize]).collect() }
 }

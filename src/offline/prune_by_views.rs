@@ -1,7 +1,6 @@
-//! Pruning a scene by what its training views show: scoring, the search for the best score, and the scene that is left.
+//! Pruning a scene by its training views: scoring, the search for the best score, and the scene that is left.
 //!
-//! In: a scene, its training views, a [`Goal`]. Out: the scene with the Gaussians that matter most to them
-//! ([`Pruned`]).
+//! In: a scene, its training views, a [`Goal`]. Out: the scene with the Gaussians that score highest ([`Pruned`]).
 
 use super::dataset::TrainingView;
 use super::engine::Engine;
@@ -11,41 +10,41 @@ use super::search::{Candidate, Goal, Outcome, ScoreChoice, ScoreSearch, SearchOu
 use super::{OfflineError, Progress, Subject};
 use crate::scene::GaussianScene;
 
-/// How to prune.
+/// Settings of pruning.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PruneSettings {
     /// How many Gaussians to keep.
     pub goal: Goal,
     /// Which score to prune by.
     pub score: ScoreChoice,
-    /// How to score.
+    /// Settings of the scoring.
     pub scoring: ScoringSettings,
 }
 
-/// A pruned scene, and how it was found.
+/// A pruned scene, and how its Gaussians were selected.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pruned {
-    /// What is left, in its old order.
+    /// The remaining Gaussians, in their original order.
     pub scene: GaussianScene,
-    /// The score, the number of Gaussians kept and what that costs.
+    /// The score, the number of Gaussians kept, and the PSNR if it was measured.
     pub outcome: Outcome,
-    /// What every score gives; `None` where nothing was compared.
+    /// The outcome for every score; `None` if nothing was compared.
     pub search: Option<SearchSummary>,
 }
 
 impl Pruned {
-    /// Keeps the `count` Gaussians that score highest, without a look at any view.
+    /// Returns the scene with the `count` Gaussians that score highest, without measuring the loss.
     pub fn unchecked(scene: &GaussianScene, candidate: Candidate, count: usize) -> Self {
         let outcome = Outcome { score: candidate.name, kept: count, psnr: None, trials: Vec::new() };
         Self { scene: select(scene, &highest(&candidate.scores, count)), outcome, search: None }
     }
 }
 
-/// Prunes by the scores in `given`, or else by those that the settings choose. Scores are compared on views held out
-/// from scoring where a loss decides or several of them may be the best.
+/// Prunes by the scores in `given` or, if it is `None`, by those that the settings select. Results are compared on
+/// views held out from scoring if the goal is a loss, or if the best score is to be found ([`ScoreChoice::Auto`]).
 ///
 /// # Errors
-/// A loss decides, and images of held-out views are missing; views that show nothing of the scene; a failure of the
+/// The goal is a loss and images of held-out views are missing; views that show nothing of the scene; a failure of the
 /// engine.
 pub fn prune_by_views(
     engine: &mut Engine,
@@ -58,7 +57,7 @@ pub fn prune_by_views(
     let count = settings.goal.count(subject.scene.len());
     let compared = count.is_none() || (given.is_none() && settings.score == ScoreChoice::Auto);
     let (scored, held_out) = settings.scoring.split(views, compared);
-    // First of all, so that missing images are reported at once.
+    // Before scoring, so that missing images are reported at once.
     let search = if compared {
         let Subject { runtime, background, .. } = &subject;
         Some(ScoreSearch::open(engine, &held_out, runtime, *background, count.is_none(), progress)?)

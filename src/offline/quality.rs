@@ -1,7 +1,7 @@
-//! What pruning costs: PSNR on training views held out from scoring, and the smallest count that a loss allows.
+//! The loss by pruning: PSNR on training views held out from scoring, and the smallest count that a loss allows.
 //!
-//! In: views with the pictures they should show ([`Evaluator`]) and an [`Engine`] that draws them. Out: PSNR of a
-//! pruned scene in dB; the smallest count within a loss, with every count tried ([`Trial`]).
+//! In: views with the pictures to compare them with ([`Evaluator`]), an [`Engine`] that draws them. Out: PSNR of a
+//! pruned scene in dB; the smallest count within a loss, and every count tried ([`Trial`]).
 
 use super::OfflineError;
 use super::dataset::selection::to_draw;
@@ -14,7 +14,7 @@ use crate::view::{Background, Picture, View};
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Views, and what they should show.
+/// Views and the pictures to compare them with.
 #[derive(Debug)]
 pub struct Evaluator {
     views: Vec<View>,
@@ -23,7 +23,8 @@ pub struct Evaluator {
 }
 
 impl Evaluator {
-    /// Compares with the images of these training views, as the original trains on them.
+    /// Returns an evaluator that compares with the images of these training views, composited once
+    /// ([`ImageMode::Dataloader`]).
     ///
     /// # Errors
     /// Images that are missing or cannot be decoded.
@@ -41,10 +42,10 @@ impl Evaluator {
         Ok(Self { views: to_draw(views, trained_with.raster_fov), truth, background })
     }
 
-    /// Compares with what the scene itself shows before it is pruned, where there are no images.
+    /// Returns an evaluator that compares with the pictures of `scene` itself, for views without images.
     ///
     /// # Errors
-    /// The engine's.
+    /// A failure of the engine.
     pub fn by_scene(
         engine: &mut Engine,
         scene: &RuntimeScene,
@@ -58,15 +59,16 @@ impl Evaluator {
         Ok(Self { views, truth, background })
     }
 
-    /// Number of views.
+    /// Returns the number of views.
     pub fn views(&self) -> usize {
         self.views.len()
     }
 
-    /// Mean over the views of the mean PSNR of the three channels, dB; pictures are clamped to 0..1.
+    /// Returns the mean over the views of the mean PSNR of the three channels, dB; pictures are clamped to 0..1. NaN
+    /// without views.
     ///
     /// # Errors
-    /// The engine's, or a picture of the wrong size.
+    /// A failure of the engine, or a picture of another size.
     pub fn psnr(&self, engine: &mut Engine, scene: &RuntimeScene) -> Result<f64, OfflineError> {
         let mut drawing = engine.drawing(scene, self.background)?;
         let mut total = 0.0;
@@ -76,10 +78,14 @@ impl Evaluator {
         Ok(total / self.views.len() as f64)
     }
 
-    /// As [`psnr`](Self::psnr), of the `count` Gaussians that score highest. Slicing takes time: pass the runtime form.
+    /// Returns the [`psnr`](Self::psnr) of the `count` Gaussians that score highest. Pass the scene in the runtime
+    /// form, because slicing takes time.
     ///
     /// # Errors
-    /// As [`psnr`](Self::psnr).
+    /// As [`psnr`](Self::psnr), and a Gaussian that cannot be drawn.
+    ///
+    /// # Panics
+    /// If there are more scores than Gaussians.
     pub fn psnr_of_highest(
         &self,
         engine: &mut Engine,
@@ -100,8 +106,8 @@ pub struct Trial {
     pub psnr: f64,
 }
 
-/// The smallest of `total` counts whose PSNR stays at or above `floor`, and every count tried, in order. Halves the
-/// range until it is one fivehundredth of `total`; keeping everything is taken to be good enough.
+/// Returns the smallest count, up to `total`, whose PSNR is at or above `floor`, and every count tried, in order.
+/// Bisects to within 1/500 of `total`, or one Gaussian; `total` itself is assumed to reach `floor`.
 ///
 /// # Errors
 /// Those of `measure`, which returns the PSNR of a count.

@@ -1,7 +1,6 @@
-//! Drawing many views of one capture while pictures drawn before are still being written.
+//! Drawing many views of one capture while earlier pictures are still being written.
 //!
-//! In: a capture on the GPU, views of it, a function that writes a picture. Out: what was drawn in each of them
-//! ([`Counts`]).
+//! In: a capture on the GPU, views of it, a function that writes a picture. Out: the [`Counts`] of each view.
 
 use super::orbit::Shot;
 use super::{OfflineError, Progress};
@@ -11,14 +10,14 @@ use rayon::prelude::*;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread;
 
-/// Pictures drawn but not yet written, at most.
+/// Most pictures that wait to be written.
 const QUEUE: usize = 4;
 
-/// Draws the views in order, each with the shot it belongs to, while other threads call `write` on the pictures. Begins
-/// the task "rendering".
+/// Draws the views in order, each with the shot it belongs to, while other threads call `write` on the pictures.
+/// Returns the counts of each view. Begins the task "rendering".
 ///
 /// # Errors
-/// A failure of the GPU, and what `write` reports.
+/// A failure of the GPU, threads that cannot be started, and errors of `write`.
 pub fn render_shots(
     headless: &mut Headless,
     capture: &GpuCapture,
@@ -28,7 +27,7 @@ pub fn render_shots(
     progress: &mut dyn Progress,
 ) -> Result<Vec<Counts>, OfflineError> {
     let (queue, drawn) = sync_channel::<(&Shot, Picture)>(QUEUE);
-    // Threads of their own: they wait for pictures, which would stall rayon's shared ones.
+    // A thread pool of its own: threads that wait for pictures would stall rayon's shared pool.
     let writers = rayon::ThreadPoolBuilder::new().build()?;
     thread::scope(|scope| {
         let written = scope.spawn(|| {
@@ -41,7 +40,7 @@ pub fn render_shots(
     })
 }
 
-/// Hands over every picture; the queue closes at the end.
+/// Draws every view and queues its picture; the queue closes at the end.
 fn draw<'s>(
     headless: &mut Headless,
     capture: &GpuCapture,
@@ -56,7 +55,7 @@ fn draw<'s>(
         let frame = headless.render(capture, view, background)?;
         counts.push(frame.counts);
         if queue.send((shot, frame.picture)).is_err() {
-            // The writers stopped at an error, which they report.
+            // The writers stopped at an error, which they return.
             break;
         }
         progress.advance();

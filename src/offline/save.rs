@@ -1,7 +1,7 @@
 //! Writing files whole or not at all.
 //!
-//! In: a path and what to write: a scene, a picture, anything else. Out: the file, which takes the place of what was
-//! there only once it is complete.
+//! In: a path and its contents: a scene, a picture, anything else. Out: the file, which replaces an existing one only
+//! once it is complete.
 
 use super::OfflineError;
 use crate::codec::package::WriteSettings;
@@ -21,7 +21,8 @@ pub fn save(path: &Path, scene: &GaussianScene, settings: &WriteSettings) -> Res
     write_beside(path, |writer| codec::write(writer, path, scene, settings))
 }
 
-/// How a scene of this form is written: at the zstd level given (1 to 19), else at the usual one of the form.
+/// Returns the settings for writing a scene of this form. `level` is the zstd level, 1 to 19; `None` uses 19 for the
+/// packed form and the default of [`WriteSettings`] for the others.
 pub fn write_settings(form: &SceneForm, level: Option<i32>) -> WriteSettings {
     let usual = match form {
         // A tenth of the bytes for seconds of time.
@@ -31,10 +32,10 @@ pub fn write_settings(form: &SceneForm, level: Option<i32>) -> WriteSettings {
     WriteSettings { level: level.unwrap_or(usual) }
 }
 
-/// Checks that two paths do not lead to the same file, which would be overwritten while it is still needed.
+/// Checks that `out` is not the same file as `input`, which would be overwritten while it is still needed.
 ///
 /// # Errors
-/// They do.
+/// Both paths lead to the same file.
 pub fn require_another_file(input: &Path, out: &Path) -> Result<(), OfflineError> {
     match (input.canonicalize(), out.canonicalize()) {
         (Ok(a), Ok(b)) if a == b => Err(OfflineError::at(out, "is the input itself: write to another file")),
@@ -50,13 +51,13 @@ pub fn write_png(path: &Path, picture: &Picture) -> Result<(), CodecError> {
     write_beside(path, |file| picture.to_rgb8().write_with_encoder(PngEncoder::new(file)).map_err(io::Error::other))
 }
 
-/// Writes a file whole or not at all: `write` fills a temporary file in the same folder, which then takes the place of
-/// `path`. If anything fails, or the program ends on the way, what was at `path` before is still there.
+/// Writes a file whole or not at all: `write` fills a temporary file in the same folder, which then replaces `path`. If
+/// anything fails, or the program ends before, an existing file at `path` is unchanged.
 ///
 /// Devices and pipes are written to directly.
 ///
 /// # Errors
-/// What `write` reports, a folder that cannot be written to, a full disk.
+/// Errors of `write`, a folder that cannot be written to, a full disk.
 pub fn write_beside<E>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>) -> Result<(), CodecError>
 where
     CodecErrorKind: From<E>,
@@ -78,7 +79,7 @@ where
     builder.prefix(".gs4d-").suffix(".part");
     #[cfg(unix)]
     {
-        // As any new file: readable by whom the umask allows, not by the owner alone.
+        // Permissions as of any new file, by the umask; those of temporary files allow the owner only.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }

@@ -1,7 +1,8 @@
-//! Which of several scores to prune by, and to how many Gaussians: found on training views held out from scoring.
+//! The search for the score to prune by and for the number of Gaussians to keep, on training views held out from
+//! scoring.
 //!
-//! In: scores ([`Candidate`]), a [`Goal`], views that were not scored. Out: the best candidate, with what every one of
-//! them gives ([`SearchOutcome`]).
+//! In: scores ([`Candidate`]), a [`Goal`], views that were not scored. Out: the best candidate, and the outcome of each
+//! of them ([`SearchOutcome`]).
 
 use super::dataset::{DatasetError, TrainingView};
 use super::engine::Engine;
@@ -16,20 +17,20 @@ use serde::{Serialize, Serializer};
 use std::cmp::Ordering;
 use std::fmt;
 
-/// Which score is asked for.
+/// Which scores to try.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ScoreChoice {
-    /// The best on held-out views of ours and the paper's.
+    /// The best of [`Variant::AUTO`] on held-out views.
     Auto,
-    /// Every one.
+    /// Every variant.
     All,
-    /// This one.
+    /// Only this one.
     One(Variant),
 }
 
 impl ScoreChoice {
-    /// The scores that a choice stands for. Without the volume of the Gaussians, `Auto` and `All` leave out those that
-    /// need it.
+    /// Returns the scores that a choice stands for. Without the volume of the Gaussians, `Auto` and `All` leave out
+    /// those that need it.
     pub fn variants(self, has_volume: bool) -> Vec<Variant> {
         let known = |variants: &[Variant]| -> Vec<Variant> {
             variants.iter().copied().filter(|variant| has_volume || !variant.needs_volume()).collect()
@@ -42,7 +43,7 @@ impl ScoreChoice {
     }
 }
 
-/// A score that may be pruned by.
+/// A score to prune by.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
     /// Its name.
@@ -51,24 +52,24 @@ pub struct Candidate {
     pub scores: Vec<f32>,
 }
 
-/// The candidates that a choice stands for.
+/// Returns the candidates that a choice stands for.
 ///
 /// # Errors
-/// One score is asked for that needs the volume of the Gaussians, and the scene no longer has it.
+/// A single score is chosen that needs the volume of the Gaussians, and the scene no longer has it.
 pub fn candidates(choice: ScoreChoice, scores: &Scores) -> Result<Vec<Candidate>, ScoreError> {
     let named = |variant: Variant, scores| Candidate { name: variant.name().to_owned(), scores };
     let candidate = |variant: Variant| scores.of(variant).map(|scores| named(variant, scores));
     choice.variants(scores.has_volume()).into_iter().map(candidate).collect()
 }
 
-/// How many Gaussians to keep.
+/// How many Gaussians to keep. Default: `MaxLoss(0.1)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Goal {
     /// This many.
     Keep(usize),
     /// All but this share, 0 to 1.
     Remove(f64),
-    /// As few as lose no more than this on held-out training views, dB.
+    /// The fewest whose PSNR on held-out training views is at most this much lower, dB.
     MaxLoss(f64),
 }
 
@@ -79,7 +80,7 @@ impl Default for Goal {
 }
 
 impl Goal {
-    /// How many of `total` Gaussians to keep; `None` where a loss decides.
+    /// Returns how many of `total` Gaussians to keep; `None` if that depends on a loss.
     pub fn count(self, total: usize) -> Option<usize> {
         match self {
             Self::Keep(count) => Some(count.min(total)),
@@ -88,7 +89,7 @@ impl Goal {
         }
     }
 
-    /// The better outcome comes first: the higher PSNR at a count, the smaller count within a loss.
+    /// Orders outcomes, the better one first: the higher PSNR at a count, the smaller count within a loss.
     fn compare(self, a: &Outcome, b: &Outcome) -> Ordering {
         let psnr = |outcome: &Outcome| outcome.psnr.unwrap_or(f64::NEG_INFINITY);
         let by_psnr = psnr(b).total_cmp(&psnr(a));
@@ -99,14 +100,14 @@ impl Goal {
     }
 }
 
-/// What pruning by one candidate gives.
+/// The outcome of pruning by one candidate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Outcome {
     /// Name of the candidate.
     pub score: String,
     /// Gaussians kept.
     pub kept: usize,
-    /// PSNR on the held-out views, dB, if it is known.
+    /// PSNR on the held-out views, dB; `None` if it was not measured.
     pub psnr: Option<f64>,
     /// Every count tried, in order.
     pub trials: Vec<Trial>,
@@ -117,9 +118,9 @@ pub struct Outcome {
 pub struct SearchOutcome {
     /// The best candidate.
     pub candidate: Candidate,
-    /// What pruning by it gives.
+    /// The outcome of pruning by it.
     pub best: Outcome,
-    /// What pruning by each candidate gives, in their order.
+    /// The outcomes of all candidates, in their order.
     pub outcomes: Vec<Outcome>,
 }
 
@@ -128,7 +129,7 @@ pub struct SearchOutcome {
 pub enum ComparedWith {
     /// The images of the dataset.
     Images,
-    /// What the whole scene shows, where there are no images.
+    /// The pictures of the whole scene, if there are no images.
     WholeScene,
 }
 
@@ -147,33 +148,33 @@ impl Serialize for ComparedWith {
     }
 }
 
-/// A search in short.
+/// The summary of a search.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SearchSummary {
     /// Number of held-out views.
     pub views: usize,
     /// What they are compared with.
     pub compared_with: ComparedWith,
-    /// PSNR of the whole scene, dB; `None` where it is compared with itself.
+    /// PSNR of the whole scene, dB; `None` if it is compared with itself.
     pub psnr_before: Option<f64>,
-    /// What pruning by each candidate gives.
+    /// The outcomes of the candidates.
     pub candidates: Vec<Outcome>,
 }
 
-/// The held-out views, and how close the whole scene is to them.
+/// A search on held-out views.
 #[derive(Debug)]
 pub struct ScoreSearch {
     evaluator: Evaluator,
-    /// PSNR of the whole scene; `None` where it is compared with itself.
+    /// PSNR of the whole scene, dB; `None` if it is compared with itself.
     baseline: Option<f64>,
 }
 
 impl ScoreSearch {
-    /// Loads the images of the held-out views. Without images, results are compared with the whole scene, which is
-    /// noted, unless images are `required`.
+    /// Loads the images of the held-out views. If images are missing and not `required`, reports a note and compares
+    /// with the pictures of the whole scene instead.
     ///
     /// # Errors
-    /// Images that are required and missing, or cannot be used; a failure of the engine.
+    /// Images that are required and missing, or cannot be read; a failure of the engine.
     pub fn open(
         engine: &mut Engine,
         held_out: &[TrainingView],
@@ -196,8 +197,8 @@ impl ScoreSearch {
         }
     }
 
-    /// Prunes by each candidate and keeps the best: the highest PSNR at a count, or the smallest count within a loss.
-    /// `scene` is in the runtime form. Begins the task "comparing scores".
+    /// Prunes by each candidate and returns the best: the highest PSNR at a count, or the smallest count within a loss.
+    /// Pass `scene` in the runtime form. Begins the task "comparing scores".
     ///
     /// # Errors
     /// No candidates, a failure of the engine.

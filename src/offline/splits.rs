@@ -1,7 +1,7 @@
-//! The splits of a dataset as work on a capture uses them.
+//! The splits of a dataset, limited to the time interval of a capture.
 //!
-//! In: a dataset folder, a split, how the capture was trained. Out: the views of that split inside the capture's time
-//! interval, or an even share of them.
+//! In: a dataset folder, a split, the settings the capture was trained with. Out: the views of that split inside the
+//! capture's time interval, or an even share of them.
 
 use super::dataset::selection::even_share;
 use super::dataset::{CameraOptions, Dataset, DatasetError, Split, TrainingView};
@@ -12,16 +12,16 @@ use std::path::Path;
 /// Every split with its name.
 pub const SPLIT_NAMES: [(&str, Split); 3] = [("train", Split::Train), ("test", Split::Test), ("val", Split::Val)];
 
-/// The name of a split.
+/// Returns the name of a split.
 pub fn split_name(split: Split) -> &'static str {
     SPLIT_NAMES.iter().find(|(_, other)| *other == split).map_or("test", |(name, _)| name)
 }
 
-/// Opens a split. Views outside the time interval are dropped, as the trainer drops them, and noted. `resolution` is a
-/// divisor of the picture size or a target width, as in training.
+/// Opens a split. Views outside the time interval are dropped, as in training, and their number is reported as a note.
+/// `resolution` is a divisor of the picture size or a target width in pixels, as in training; `None` keeps the size.
 ///
 /// # Errors
-/// A split that is not there or cannot be used.
+/// A split that is missing or cannot be used.
 pub fn open_split(
     folder: &Path,
     split: Split,
@@ -44,7 +44,7 @@ pub fn open_split(
     Dataset::open(folder, split, &CameraOptions { time_interval: Some([first, last]), ..options })
 }
 
-/// An even share of at most `count` views, in their order; all without a count.
+/// Returns an even share of at most `count` views, in their order; `None` returns all.
 pub fn share(views: Vec<TrainingView>, count: Option<usize>) -> Vec<TrainingView> {
     match count {
         Some(count) => even_share(&views, count).into_iter().map(|index| views[index].clone()).collect(),

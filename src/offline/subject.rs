@@ -1,6 +1,7 @@
 //! A scene to score, prune and bake.
 //!
-//! In: a scene as it was read. Out: the same, ready to draw as well, and the background to draw it over ([`Subject`]).
+//! In: a scene as it was read. Out: the same scene, the form that is drawn, and the background to draw it over
+//! ([`Subject`]).
 
 use super::OfflineError;
 use crate::scene::{GaussianScene, RuntimeScene};
@@ -12,14 +13,15 @@ use std::path::Path;
 pub struct Subject {
     /// As it was read, in any form.
     pub scene: GaussianScene,
-    /// Ready to draw.
+    /// In the form that is drawn.
     pub runtime: RuntimeScene,
-    /// What it is drawn over.
+    /// The background it is drawn over.
     pub background: Background,
 }
 
 impl Subject {
-    /// Slices a scene that was read from `path`. `background` (RGB, 0 to 1) replaces the one it was trained with.
+    /// Slices a scene that was read from `path`. `background` (RGB, 0 to 1) replaces the one it was trained with;
+    /// `None` keeps that.
     ///
     /// # Errors
     /// The first Gaussian that cannot be drawn, with the path.

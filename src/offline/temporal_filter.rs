@@ -1,7 +1,7 @@
-//! Temporal filters of any kind, and the masks they are made of: which Gaussians are seen when.
+//! Computing temporal filters of any kind, and the paper's visibility masks at key-frames.
 //!
-//! In: a scene, a kind of filter, key-frames, training cameras and views, an [`Engine`]. Out: a [`TemporalFilter`]. On
-//! the way, masks: sets of Gaussians at key-frames, 32 to a word.
+//! In: a scene, a kind of filter, key-frames, training cameras and views, an [`Engine`]. Out: a [`TemporalFilter`]. A
+//! mask is the set of Gaussians that are visible at a key-frame, 32 to a word.
 
 use super::dataset::TrainingView;
 use super::dataset::selection::{distinct_cameras, distinct_times, to_draw};
@@ -15,17 +15,17 @@ use crate::view::{Camera, RasterFov, View};
 pub const FILTER_NAMES: [(&str, FilterKind); 3] =
     [("support", FilterKind::Support), ("interval", FilterKind::Interval), ("key-frame", FilterKind::KeyFrame)];
 
-/// The name of a kind.
+/// Returns the name of a kind.
 pub fn filter_name(kind: FilterKind) -> &'static str {
     FILTER_NAMES.iter().find(|(_, other)| *other == kind).map_or("support", |(name, _)| name)
 }
 
-/// Whether a kind of filter is made of what training views see; the others need the Gaussians alone.
+/// Returns whether a kind of filter is computed from training views; the others need only the Gaussians.
 pub fn needs_views(kind: FilterKind) -> bool {
     kind != FilterKind::Support
 }
 
-/// How many key-frames a filter has, evenly over the time interval, both ends included.
+/// How many key-frames a filter has, evenly over the time interval, both ends included. Default: `Count(11)`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum KeyFrames {
     /// This many.
@@ -41,7 +41,8 @@ impl Default for KeyFrames {
 }
 
 impl KeyFrames {
-    /// Their number, given the training views. It may be more than a filter can have.
+    /// Returns their number, given the training views. It may be more than a filter can have:
+    /// [`MAX_SEGMENTS`](crate::scene::MAX_SEGMENTS) + 1.
     pub fn count(self, views: &[TrainingView]) -> usize {
         match self {
             Self::Count(count) => count as usize,
@@ -50,7 +51,8 @@ impl KeyFrames {
     }
 }
 
-/// Makes a filter of any kind with `keys` key-frames, two at least. Kinds that need views begin the task "looking".
+/// Computes a filter of any kind with `keys` key-frames; fewer than two count as two. Kinds that need views begin the
+/// task "looking".
 ///
 /// # Errors
 /// A scene that cannot be drawn; for kinds that need views also views that show nothing of it, a failure of the engine.
@@ -85,22 +87,23 @@ pub fn filter(
 /// A set of Gaussians: Gaussian `i` at bit `i % 32` of word `i / 32`.
 pub type Mask = Vec<u32>;
 
-/// `keys` times at even spacing over the interval, both ends included; at least two.
+/// Returns `keys` evenly spaced times over the interval, both ends included; at least two.
 pub fn key_times(interval: [f32; 2], keys: u32) -> Vec<f32> {
     let [first, last] = interval.map(f64::from);
     let segments = keys.max(2) - 1;
     (0..=segments).map(|j| (first + (last - first) * f64::from(j) / f64::from(segments)) as f32).collect()
 }
 
-/// How many key-frames there are, both ends included, if one comes every `frames` of `times` timestamps; at least two.
+/// Returns how many key-frames there are, both ends included, if one comes every `frames` of `times` timestamps; at
+/// least two.
 pub fn keys_every(times: usize, frames: usize) -> usize {
     times.saturating_sub(1).div_ceil(frames.max(1)).max(1) + 1
 }
 
-/// Adds to a set whatever the view blends into at least one pixel.
+/// Adds the Gaussians that the view blends into at least one pixel to a set.
 ///
 /// # Errors
-/// The engine's.
+/// A failure of the engine.
 pub fn add_blended(engine: &mut dyn ScoreEngine, view: &View, mask: &mut [u32]) -> Result<(), ScoreError> {
     let score = engine.score(view, Want::Contribution)?;
     for (word, values) in mask.iter_mut().zip(score.contribution.chunks(32)) {
@@ -111,11 +114,11 @@ pub fn add_blended(engine: &mut dyn ScoreEngine, view: &View, mask: &mut [u32]) 
     Ok(())
 }
 
-/// One mask for each key-frame: what any of the cameras blends at that time. `count` is the number of Gaussians.
-/// Advances the caller's task once for each view.
+/// Returns one mask for each key-frame: the Gaussians that any of the cameras blends at that time. `count` is the
+/// number of Gaussians. Advances the caller's task once for each view.
 ///
 /// # Errors
-/// No cameras, nothing seen by any of them at any time, a failure of the engine.
+/// No cameras, cameras that show nothing of the scene at any of the times, a failure of the engine.
 pub fn key_frame_masks(
     engine: &mut dyn ScoreEngine,
     cameras: &[Camera],
@@ -140,16 +143,23 @@ pub fn key_frame_masks(
     Ok(masks)
 }
 
-/// The paper's filter: in each segment, what is in the masks at its two ends. At least two masks of `count` Gaussians.
+/// Returns the paper's filter: in each segment, the Gaussians in either of the masks at its two ends. Pass at least two
+/// masks of `count` Gaussians.
+///
+/// # Panics
+/// If a mask is not one of `count` Gaussians.
 pub fn key_frame_filter(masks: &[Mask], count: usize) -> TemporalFilter {
     from_segments(FilterKind::KeyFrame, &unions(masks), count)
 }
 
-/// The key-frame filter, and in each segment what any of the views whose time lies in it blends. Advances the caller's
-/// task once for each view.
+/// Returns the key-frame filter with, in each segment, also the Gaussians that any of the views whose time lies in it
+/// blends. Pass at least two masks of `count` Gaussians. Advances the caller's task once for each view.
 ///
 /// # Errors
-/// The engine's.
+/// A failure of the engine.
+///
+/// # Panics
+/// If a mask is not one of `count` Gaussians, or if there are views but fewer than two masks.
 pub fn interval_filter(
     engine: &mut dyn ScoreEngine,
     masks: &[Mask],
@@ -168,7 +178,7 @@ pub fn interval_filter(
     Ok(from_segments(FilterKind::Interval, &segments, count))
 }
 
-/// Intersection over union of the sets of each pair of neighbouring segments; 1 where both are empty.
+/// Returns the intersection over union of the sets of each pair of neighbouring segments; 1 if both are empty.
 pub fn neighbour_overlap(filter: &TemporalFilter) -> Vec<f64> {
     let bits = filter.to_bits();
     let sets: Vec<&[u32]> = bits.chunks(TemporalFilter::words(filter.count).max(1)).collect();

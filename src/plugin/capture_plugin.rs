@@ -1,7 +1,7 @@
 //! The plugin that a game adds.
 //!
-//! In: an app with Bevy's `DefaultPlugins` (or at least its `AssetPlugin`). Out: the same app, in which captures load, play and, if it
-//! has a renderer, are drawn.
+//! In: an app with Bevy's `DefaultPlugins` (or at least its `MinimalPlugins` and `AssetPlugin`). Out: the same app, in
+//! which captures load, play and, if it has a renderer, are drawn.
 
 use super::asset::CaptureAssetPlugin;
 use super::playback::PlaybackPlugin;

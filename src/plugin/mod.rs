@@ -1,7 +1,8 @@
 //! Captures in a Bevy app: everything that uses Bevy.
 //!
-//! In: an app with Bevy's `DefaultPlugins`, or at least its `AssetPlugin`. Out: the same app, in which captures load, play and are drawn.
-//! The crate root re-exports these modules. Each uses only modules before it:
+//! In: an app with Bevy's `DefaultPlugins`, or at least its `MinimalPlugins` and `AssetPlugin`. Out: the same app, in
+//! which captures load, play and, if it has a renderer, are drawn. The crate root re-exports these modules. Each uses
+//! only modules before it:
 //!
 //! ```text
 //! component ──▶ asset ──▶ playback ──▶ render ──▶ picking, stereo ──▶ inspector, testing

@@ -1,10 +1,10 @@
-//! `activate`: which Gaussians are drawn in a segment of time; CPU reference of `shaders/activate.wgsl`.
+//! `activate`: which Gaussians are active in a segment of time; CPU reference of `shaders/activate.wgsl`.
 //!
 //! In: a temporal filter and a segment. Out: the indices of its active Gaussians, ascending.
 
 use crate::scene::TemporalFilter;
 
-/// Lists the active Gaussians of a segment.
+/// Returns the indices of the active Gaussians of a segment, ascending.
 pub fn activate(filter: &TemporalFilter, segment: u32) -> Vec<u32> {
     (0..filter.count as u32).filter(|&index| filter.is_active(segment, index as usize)).collect()
 }
@@ -18,7 +18,7 @@ mod tests {
     fn the_list_holds_what_the_filter_leaves_active() {
         let (segments, count) = (3, 70);
         let words = TemporalFilter::words(count) * segments as usize;
-        // Some bits of each word; those beyond the last Gaussian belong to nobody.
+        // Some bits of each word; those beyond the last Gaussian have no meaning.
         let bits: Vec<u32> = (0..words as u32).map(|word| 0x9e37_79b9u32.rotate_left(5 * word)).collect();
         let intervals = (0..count as u32).map(|index| (index % 3) | ((index % 4) << 16)).collect();
         for sets in [ActiveSets::Bits(bits), ActiveSets::Intervals(intervals)] {

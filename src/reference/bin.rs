@@ -1,4 +1,5 @@
-//! `bin` and `ranges`: splat–tile pairs and where each tile's begin; CPU reference of `shaders/bin.wgsl` and `shaders/ranges.wgsl`.
+//! `bin` and `ranges`: splat–tile pairs, and the range of each tile in them; CPU reference of `shaders/bin.wgsl` and
+//! `shaders/ranges.wgsl`.
 //!
 //! In: splats and their order by depth. Out: [`Pair`]s in that order; and, from sorted pairs, one range for each tile.
 
@@ -16,8 +17,11 @@ pub struct Pair {
     pub splat: u32,
 }
 
-/// Makes the pairs of every visible splat, in the order given; the tiles of a splat row by row. `grid` is the number of tiles across and
-/// down.
+/// Returns the pairs of every visible splat, in the order given; the tiles of a splat row by row. `grid` is the number
+/// of tiles across and down.
+///
+/// # Panics
+/// If `order` contains an index beyond `splats`.
 pub fn bin(splats: &[Splat], order: &[u32], grid: UVec2) -> Vec<Pair> {
     let mut pairs = Vec::with_capacity(order.iter().map(|&i| splats[i as usize].tiles.count() as usize).sum());
     for &splat in order {
@@ -27,7 +31,7 @@ pub fn bin(splats: &[Splat], order: &[u32], grid: UVec2) -> Vec<Pair> {
     pairs
 }
 
-/// The range of every tile of a grid in pairs sorted by tile.
+/// Returns the range of every tile of a grid in pairs sorted by tile.
 pub fn ranges(pairs: &[Pair], grid: UVec2) -> Vec<Range<usize>> {
     let first = |tile: u32| pairs.partition_point(|pair| pair.tile < tile);
     (0..grid.element_product()).map(|tile| first(tile)..first(tile + 1)).collect()

@@ -1,4 +1,4 @@
-//! `blend`: front to back over each tile; CPU reference of `shaders/blend.wgsl`. Section 3.4 of the 4DGS model.
+//! `blend`: front to back over each tile, as the original rasterizer does; CPU reference of `shaders/blend.wgsl`.
 //!
 //! In: splats, sorted pairs and tile ranges, the background. Out: the [`Frame`].
 
@@ -11,7 +11,10 @@ use glam::{UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Blends every pixel.
+/// Blends every pixel. `environment` is a map and the appearance of its capture; `view` is the view of that capture.
+///
+/// # Panics
+/// If `ranges` has fewer entries than the view has tiles, or if a range or a pair is out of range.
 pub fn blend(
     splats: &[Splat],
     pairs: &[Pair],
@@ -43,7 +46,7 @@ pub fn blend(
     }
 }
 
-/// What stands behind all Gaussians at pixel `(x, y)`, in the blend space.
+/// Returns what is behind all Gaussians at pixel `(x, y)`, in the blend space.
 pub fn behind(
     view: &View,
     background: Background,
@@ -62,7 +65,7 @@ pub fn behind(
     }
 }
 
-/// What a pixel has gathered.
+/// Accumulated values of a pixel.
 #[derive(Debug, Clone, Copy)]
 struct Pixel {
     color: Vec3,

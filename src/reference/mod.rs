@@ -1,7 +1,7 @@
 //! The CPU reference of every GPU pass of a frame, with the same names and in the same order.
 //!
-//! In: [`Layer`]s and a [`Background`]. Out: a [`Frame`]. Plain functions over slices, to be read beside `shaders/`: [`activate()`],
-//! [`project()`], [`sort`], [`bin`], `sort` again, [`ranges`], [`blend`].
+//! In: [`Layer`]s and a [`Background`]. Out: a [`Frame`]. Plain functions over slices, which correspond to the files of
+//! `shaders/`: [`activate()`], [`project()`], [`sort`], [`bin`], `sort` again, [`ranges`], [`blend`].
 
 mod activate;
 mod bin;
@@ -19,12 +19,12 @@ use crate::scene::RuntimeScene;
 use crate::view::{Appearance, Background, BlendSpace, Counts, Frame, View};
 use std::ops::Range;
 
-/// A scene in a view, as it is shown there.
+/// A scene, and how it is shown in a view.
 #[derive(Debug, Clone, Copy)]
 pub struct Layer<'a> {
     /// The scene.
     pub scene: &'a RuntimeScene,
-    /// Where it is seen from, and when.
+    /// Camera and time, with the transform of the scene.
     pub view: View,
     /// How it is shown.
     pub appearance: Appearance,
@@ -39,7 +39,7 @@ pub fn render(scene: &RuntimeScene, view: &View, background: Background) -> Fram
 /// Draws scenes into one picture, sorted together. All views must have the same size and lens.
 ///
 /// # Panics
-/// Without a layer: there is no view then.
+/// If `layers` is empty.
 pub fn render_layers(layers: &[Layer<'_>], background: Background, space: BlendSpace) -> Frame {
     let view = &layers[0].view;
     let splats: Vec<Splat> = layers.iter().flat_map(|layer| project(layer, space)).collect();
@@ -58,14 +58,15 @@ pub struct TileLists {
     pub pairs: Vec<Pair>,
     /// The range of each tile in `pairs`.
     pub ranges: Vec<Range<usize>>,
-    /// Number of splats that touch a tile.
+    /// Number of splats that cover at least one tile.
     pub visible: u32,
 }
 
-/// Everything between `project` and the last pass: `sort` by depth, `bin`, `sort` by tile, `ranges`.
+/// Runs what is between `project` and the last pass: `sort` by depth, `bin`, `sort` by tile, `ranges`.
 pub fn tile_lists(splats: &[Splat], view: &View) -> TileLists {
     let mut order: Vec<u32> = (0..splats.len() as u32).filter(|&i| splats[i as usize].is_visible()).collect();
-    // Positive numbers sort as their bits do; the near plane of an orthographic camera may be behind it.
+    // Positive floats have the same order as their bits. Depths are taken from the near plane of an orthographic
+    // camera, which may be behind it.
     let nearest = if view.orthographic { view.near } else { 0.0 };
     sort(&mut order, |&i| (splats[i as usize].depth - nearest).to_bits());
     let mut pairs = bin(splats, &order, view.tiles());

@@ -1,6 +1,6 @@
 //! `project`: Gaussians to splats; CPU reference of `shaders/project.wgsl`.
 //!
-//! In: a [`Layer`] and the blend space. Out: one [`Splat`] for each Gaussian, invisible where it is not drawn.
+//! In: a [`Layer`] and the blend space. Out: one [`Splat`] for each Gaussian, invisible if it is not drawn.
 
 use super::{Layer, activate};
 use crate::gaussian::ShDirection;
@@ -13,17 +13,17 @@ use rayon::prelude::*;
 /// A Gaussian sliced at a time and projected to a view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Splat {
-    /// Centre in pixels.
+    /// Center in pixels.
     pub center: Vec2,
     /// Inverse covariance on the screen: xx, xy, yy.
     pub conic: Vec3,
     /// Opacity times marginal.
     pub opacity: f32,
-    /// Colour, clamped below at 0.
+    /// Color in the blend space, clamped below at 0.
     pub color: Vec3,
     /// Depth in camera units.
     pub depth: f32,
-    /// Tiles where it can contribute.
+    /// Tiles where its alpha can reach 1/255.
     pub tiles: TileRect,
 }
 
@@ -37,13 +37,13 @@ impl Splat {
         tiles: TileRect::EMPTY,
     };
 
-    /// Whether it touches a tile at all.
+    /// Returns whether it covers at least one tile.
     pub fn is_visible(&self) -> bool {
         !self.tiles.is_empty()
     }
 }
 
-/// Projects every Gaussian of the scene that its filter, if it has one, leaves active.
+/// Projects every Gaussian of the scene. Those that its filter, if it has one, leaves inactive are invisible.
 pub fn project(layer: &Layer<'_>, space: BlendSpace) -> Vec<Splat> {
     let Layer { scene, view, .. } = layer;
     let clip = view.clip_rows();

@@ -2,7 +2,7 @@
 //!
 //! In: items and their key. Out: the items in order; equal keys keep theirs, so that equal depths stay in Gaussian order.
 
-/// Sorts in place.
+/// Sorts in place, stably.
 pub fn sort<T>(items: &mut [T], key: impl Fn(&T) -> u32) {
     items.sort_by_key(key);
 }

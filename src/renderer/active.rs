@@ -1,7 +1,7 @@
-//! The list of active Gaussians of a capture where it is placed, shared by all views that see it.
+//! The list of active Gaussians of one placed capture, shared by all views that draw it.
 //!
-//! In: a capture with a temporal filter and a time. Out: the indices that are active in that time's segment, ascending, part by
-//! part: made by `activate`, and only when the segment has changed.
+//! In: a capture with a temporal filter and a time. Out: the indices of the Gaussians that are active in the segment of
+//! that time, ascending, part by part. `activate` writes them, only when the segment has changed.
 
 use super::capture::{Filter, GpuCapture};
 use super::layout::{Activation, BLOCK};
@@ -9,22 +9,22 @@ use super::memory::alignment_of;
 use super::pipelines::Renderer;
 use wgpu::BufferUsages;
 
-/// Which Gaussians of a capture are drawn.
+/// The list of the Gaussians of a capture that are drawn.
 #[derive(Debug)]
 pub struct ActiveList {
     capture: u64,
-    /// Segment of the time prepared last, and whether the list holds it.
+    /// Segment of the time prepared last; `recorded` is whether the list holds it.
     segment: Option<u32>,
     recorded: bool,
     alignment: u32,
     uniforms: wgpu::Buffer,
     activate: wgpu::BindGroup,
-    /// What `project` reads.
+    /// Bind group of the list, which `project` reads.
     pub(super) list: wgpu::BindGroup,
 }
 
 impl ActiveList {
-    /// An empty list; nothing for a capture without a filter.
+    /// Creates an empty list; `None` if the capture has no filter.
     pub fn new(device: &wgpu::Device, renderer: &Renderer, capture: &GpuCapture) -> Option<Self> {
         capture.filter.as_ref()?;
         let allocator = renderer.allocator(device);
@@ -45,12 +45,13 @@ impl ActiveList {
         Some(Self { capture: capture.id, segment: None, recorded: false, alignment, uniforms, activate, list })
     }
 
-    /// Whether it belongs to this upload of a capture; after another, make a new one.
+    /// Returns whether it belongs to this upload of a capture; if not, create a new list.
     pub fn is_for(&self, capture: &GpuCapture) -> bool {
         self.capture == capture.id
     }
 
-    /// Moves on to `time`, in the capture's unit. Returns whether the list must be [recorded](Self::record) before it is drawn.
+    /// Sets the time, in the capture's unit. Returns whether the list must be [recorded](Self::record) before it is
+    /// drawn.
     pub fn prepare(&mut self, queue: &wgpu::Queue, capture: &GpuCapture, time: f32) -> bool {
         let Some(filter) = &capture.filter else { return false };
         let segment = filter.segment_of(time);
@@ -68,7 +69,7 @@ impl ActiveList {
         !self.recorded
     }
 
-    /// Records `activate`, if the list is not the wanted one yet.
+    /// Records `activate`, unless the list is that of the current segment already.
     pub fn record(&mut self, renderer: &Renderer, encoder: &mut wgpu::CommandEncoder, capture: &GpuCapture) {
         if self.recorded {
             return;
@@ -91,13 +92,13 @@ impl ActiveList {
         }
     }
 
-    /// How many Gaussians of a part are active.
+    /// Returns the number of active Gaussians of a part.
     pub(super) fn count(&self, filter: &Filter, part: usize) -> u32 {
         self.segment.map_or(0, |segment| filter.count(part, segment))
     }
 }
 
-/// How many Gaussians of a part of a capture are drawn: those of the list if there is one, else all.
+/// Returns the number of Gaussians of a part of a capture that are drawn: those of the list if there is one, else all.
 pub(super) fn drawn_count(capture: &GpuCapture, part: usize, active: Option<&ActiveList>) -> u32 {
     match (&capture.filter, active) {
         (Some(filter), Some(active)) => active.count(filter, part),

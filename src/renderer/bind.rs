@@ -1,11 +1,11 @@
-//! Bind group layouts and compute pipelines, each in one line.
+//! Bind group layouts and compute pipelines.
 //!
 //! In: kinds of bindings in the order of a shader's `@binding` numbers; a module, its entry point and its groups. Out: wgpu layouts and
 //! pipelines.
 
 use std::num::NonZeroU64;
 
-/// Kinds of bindings, to write layouts in one line each.
+/// The kind of a binding.
 #[derive(Debug, Clone, Copy)]
 pub enum Bind {
     /// Uniform buffer of this many bytes.
@@ -58,7 +58,7 @@ impl Bind {
     }
 }
 
-/// A compute pipeline over these groups.
+/// Creates a compute pipeline with these bind group layouts.
 pub fn pipeline(
     device: &wgpu::Device,
     module: &wgpu::ShaderModule,
@@ -85,7 +85,7 @@ pub fn pipeline(
     })
 }
 
-/// A bind group layout whose bindings are numbered in order.
+/// Creates a bind group layout for compute shaders, with bindings numbered in order.
 pub fn group_layout(device: &wgpu::Device, label: &str, bindings: &[Bind]) -> wgpu::BindGroupLayout {
     let entries: Vec<_> = bindings.iter().enumerate().map(|(i, bind)| bind.entry(i as u32)).collect();
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })

@@ -1,26 +1,27 @@
-//! A device of our own, for commands and tests.
+//! A device that is not Bevy's, for commands and tests.
 //!
 //! In: the adapter wanted, if any. Out: a [`GpuContext`]. Inside Bevy the renderer uses Bevy's device instead.
 
 use super::GpuError;
 use pollster::block_on;
 
-/// A device, its queue, and what it can do.
+/// A device, its queue and its adapter.
 #[derive(Debug)]
 pub struct GpuContext {
     /// The device.
     pub device: wgpu::Device,
     /// Its queue.
     pub queue: wgpu::Queue,
-    /// Which adapter it is.
+    /// Description of the adapter.
     pub info: wgpu::AdapterInfo,
 }
 
 impl GpuContext {
-    /// Opens the adapter whose index or part of whose name is `wanted`, or the fastest one.
+    /// Opens a device on the adapter whose index or part of whose name is `wanted`; on the one with the highest
+    /// performance if `None`.
     ///
     /// # Errors
-    /// When there is no such adapter (the message says what to install) or it gives no device.
+    /// When there is no such adapter (the message names the packages to install) or it does not provide a device.
     pub fn headless(wanted: Option<&str>) -> Result<Self, GpuError> {
         let adapter = match wanted {
             Some(wanted) => choose(wanted)?,
@@ -43,14 +44,14 @@ impl GpuContext {
         Ok(Self { device, queue, info })
     }
 
-    /// All adapters of this machine.
+    /// Returns all adapters of this machine.
     pub fn adapters() -> Vec<wgpu::AdapterInfo> {
         all().iter().map(wgpu::Adapter::get_info).collect()
     }
 }
 
 fn backends() -> wgpu::Backends {
-    // Without DX12 among them, wgpu does not validate indirect dispatches with a hidden dispatch each.
+    // If DX12 is not included, wgpu adds no hidden dispatch to validate each indirect dispatch.
     if cfg!(windows) {
         wgpu::Backends::DX12 | wgpu::Backends::VULKAN
     } else {

@@ -1,6 +1,7 @@
-//! What can go wrong between a scene and its picture on the GPU.
+//! Errors of the renderer.
 //!
-//! In: nothing. Out: [`GpuError`], whose messages name the remedy.
+//! In: a missing or failing device, or a scene or picture that it cannot draw. Out: [`GpuError`], whose messages name
+//! the remedy.
 
 /// Failure of the GPU renderer.
 #[derive(Debug, thiserror::Error)]
@@ -11,56 +12,56 @@ pub enum GpuError {
          `apt-get install mesa-vulkan-drivers libvulkan1` on Debian and Ubuntu"
     )]
     NoAdapter {
-        /// What wgpu said.
+        /// Message of wgpu.
         reason: String,
     },
-    /// No adapter by the name or index asked for.
+    /// No adapter with the name or index asked for.
     #[error("no GPU adapter matches `{wanted}`; there are: {found}")]
     AdapterNotFound {
-        /// What was asked for.
+        /// Name or index asked for.
         wanted: String,
-        /// Names of those there are.
+        /// Names of the adapters that exist.
         found: String,
     },
-    /// The adapter gives no device.
+    /// The adapter does not provide a device.
     #[error("the GPU adapter `{adapter}` gives no device: {reason}")]
     NoDevice {
-        /// Its name.
+        /// Name of the adapter.
         adapter: String,
-        /// What wgpu said.
+        /// Message of wgpu.
         reason: String,
     },
-    /// The device cannot run our passes.
+    /// A limit of the device is too low for the passes.
     #[error("this GPU cannot run the renderer: {what} is {found}, {needed} is needed")]
     Limit {
         /// Name of the limit.
         what: &'static str,
-        /// What there is.
+        /// Value of the device.
         found: u64,
-        /// What there should be.
+        /// Value needed.
         needed: u64,
     },
     /// A shader does not compile: a defect of this crate or of the driver.
     #[error("shader `{name}` does not compile: {reason}")]
     Shader {
-        /// File name without the ending.
+        /// File name without its extension.
         name: &'static str,
-        /// What the compiler said.
+        /// Message of the compiler.
         reason: String,
     },
-    /// A buffer would be larger than the device binds.
+    /// A buffer would be larger than the device can bind.
     #[error(
         "{what} need a buffer of {needed} bytes and this GPU binds at most {limit}: draw fewer Gaussians or a smaller picture"
     )]
     TooLarge {
-        /// What it is for.
+        /// What the buffer is for.
         what: &'static str,
         /// Bytes needed.
         needed: u64,
-        /// Bytes the device binds.
+        /// Bytes that the device can bind.
         limit: u64,
     },
-    /// The picture has no pixels or more than a texture holds.
+    /// The picture has no pixels or more than a texture can hold.
     #[error("a picture of {width} x {height} pixels cannot be drawn: sides must be between 1 and {limit}")]
     Size {
         /// Width asked for.

@@ -9,18 +9,18 @@ use bytemuck::{Pod, Zeroable};
 /// Side of a tile in pixels.
 pub use crate::view::TILE_SIZE;
 
-/// Keys or pairs that one workgroup of `sort` and `bin` takes.
+/// Keys or pairs that one workgroup of `sort` and `bin` processes.
 pub const BLOCK: u32 = 2048;
 /// Four-vectors of the uniform of codebook scales: 36 for each codebook of 48 coefficients.
 pub const CODEBOOK_SCALES: usize = MAX_STAGES * 36;
-/// Bits that one step of `sort` orders by.
+/// Bits that one step of `sort` sorts by.
 pub const DIGIT_BITS: u32 = 4;
-/// Values of a digit.
+/// Number of values of a digit.
 pub const DIGITS: u32 = 1 << DIGIT_BITS;
-/// Steps that order 32-bit depths.
+/// Number of steps that sort 32-bit depths.
 pub const DEPTH_STEPS: u32 = 32 / DIGIT_BITS;
 
-/// What `project` needs of one part of a capture in one view. An [`Instance`](super::Instance) may have several parts.
+/// Input of `project` for one part of a capture in one view. An [`Instance`](super::Instance) may have several parts.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct InstanceUniforms {
@@ -34,11 +34,11 @@ pub struct InstanceUniforms {
     pub clip_x: [f32; 4],
     /// Row y of it.
     pub clip_y: [f32; 4],
-    /// Camera centre in capture space; of an orthographic camera the direction in which it looks.
+    /// Camera center in capture space; for an orthographic camera, the unit vector of its viewing direction.
     pub camera_position: [f32; 3],
-    /// Timestamp.
+    /// Timestamp, in the capture's unit.
     pub time: f32,
-    /// Half-angle tangents that rays are clamped to.
+    /// Half-angle tangents to which rays are clamped.
     pub reach: [f32; 2],
     /// Focal lengths that shape footprints, pixels.
     pub focal: [f32; 2],
@@ -50,23 +50,23 @@ pub struct InstanceUniforms {
     pub first_slot: u32,
     /// Gaussians in this part.
     pub count: u32,
-    /// Spatial degree of colour.
+    /// Spatial degree of color.
     pub degree: u32,
-    /// Time degree of colour.
+    /// Time degree of color.
     pub degree_t: u32,
-    /// Four-vectors of colour coefficients per Gaussian.
+    /// Four-vectors of color coefficients per Gaussian.
     pub stride: u32,
-    /// 1: colour looks along the displaced mean.
+    /// 1: the viewing direction of color points to the displaced mean.
     pub displaced: u32,
     /// Near limit, camera units.
     pub near: f32,
-    /// Length of the capture's time interval.
+    /// Length of the capture's time interval, in its unit.
     pub time_span: f32,
-    /// 1: drawn are the Gaussians of the active list; 0: all.
+    /// 1: the Gaussians of the active list are drawn; 0: all.
     pub listed: u32,
     /// First entry of this part in that list.
     pub first_listed: u32,
-    /// Codebooks of colour; 0 where the coefficients are whole.
+    /// Number of codebooks of color; 0 if the coefficients are whole.
     pub stages: u32,
     /// 1: rays are parallel.
     pub orthographic: u32,
@@ -80,7 +80,7 @@ pub struct InstanceUniforms {
     pub lighting: u32,
     /// `DEBUG_*`.
     pub debug: u32,
-    /// 1: only means inside the crop box are drawn.
+    /// 1: only Gaussians whose mean is inside the crop box are drawn.
     pub cropped: u32,
     /// Unused.
     pub padding: u32,
@@ -92,20 +92,20 @@ pub struct InstanceUniforms {
     pub crop_z: [f32; 4],
 }
 
-/// Colours are blended as trained.
+/// Colors are blended as trained.
 pub const LIGHTING_AS_TRAINED: u32 = 0;
-/// Light changes, colours stay encoded.
+/// Colors are multiplied by the light and stay encoded.
 pub const LIGHTING_ENCODED: u32 = 1;
-/// Light changes, colours are linear.
+/// Colors are multiplied by the light and become linear.
 pub const LIGHTING_LINEAR: u32 = 2;
 
-/// What `activate` needs of one part of a capture.
+/// Input of `activate` for one part of a capture.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct Activation {
     /// Gaussians in this part.
     pub count: u32,
-    /// Where this part begins in the list.
+    /// First entry of this part in the list.
     pub first: u32,
     /// `FILTER_*`.
     pub filter_mode: u32,
@@ -114,7 +114,7 @@ pub struct Activation {
 }
 
 impl InstanceUniforms {
-    /// The part that a view and a look decide; slots and colour are zero.
+    /// Creates the values that follow from a view and an appearance; slots and color settings are zero.
     pub fn new(view: &View, appearance: &Appearance, space: BlendSpace, debug: DebugView) -> Self {
         let m = view.world_to_camera;
         let [clip_x, clip_y] = view.clip_rows();
@@ -146,7 +146,7 @@ impl InstanceUniforms {
     }
 }
 
-/// What all instances of a view share.
+/// Values shared by all instances of a view.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct FrameUniforms {
@@ -156,13 +156,13 @@ pub struct FrameUniforms {
     pub tiles: [u32; 2],
     /// Splat slots in use.
     pub slots: u32,
-    /// Pairs there is room for.
+    /// Number of pairs for which there is room.
     pub pair_capacity: u32,
     /// `BACKGROUND_*`.
     pub background_mode: u32,
-    /// Samples of the opaque depth; 0 where there is none.
+    /// Samples per pixel of the opaque depth; 0 if there is none.
     pub opaque_samples: u32,
-    /// Colour, or the factor on the light of an environment map; w: what is left of the transmittance behind one.
+    /// Color, or the factor on the light of an environment map; w: factor on the transmittance behind a map, 0 or 1.
     pub background: [f32; 4],
     /// `P00, P11, P02, P12`.
     pub projection: [f32; 4],
@@ -178,17 +178,17 @@ pub struct FrameUniforms {
     pub opaque_origin: [u32; 2],
     /// From opaque depth `d` to camera space: `z = (x + y d) / (z + w d)`.
     pub opaque_distance: [f32; 4],
-    /// What is done to the colours of the environment map: `LIGHTING_*`.
+    /// How the colors of the environment map are changed: `LIGHTING_*`.
     pub environment_lighting: u32,
     /// `DEBUG_*`.
     pub debug: u32,
-    /// Depth that shows half as bright as the nearest.
+    /// Depth that is shown half as bright as depth 0, camera units.
     pub debug_depth: f32,
-    /// How much of the environment map shows, from 0 to 1.
+    /// Opacity of the environment map, from 0 to 1.
     pub environment_opacity: f32,
 }
 
-/// The number of what a look does to colours in the shaders: `LIGHTING_*`.
+/// Returns how an appearance changes colors, as in the shaders: `LIGHTING_*`.
 pub fn lighting_mode(appearance: &Appearance, space: BlendSpace) -> u32 {
     match appearance.lighting(space) {
         Lighting::AsTrained => LIGHTING_AS_TRAINED,
@@ -197,7 +197,7 @@ pub fn lighting_mode(appearance: &Appearance, space: BlendSpace) -> u32 {
     }
 }
 
-/// The number of a debug view in the shaders: `DEBUG_*`.
+/// Returns a debug view as in the shaders: `DEBUG_*`.
 pub fn debug_mode(debug: DebugView) -> u32 {
     match debug {
         DebugView::Color => DEBUG_COLOR,
@@ -209,13 +209,13 @@ pub fn debug_mode(debug: DebugView) -> u32 {
     }
 }
 
-/// Colours.
+/// Colors.
 pub const DEBUG_COLOR: u32 = 0;
 /// Expected depth.
 pub const DEBUG_DEPTH: u32 = 1;
 /// Splats per pixel.
 pub const DEBUG_OVERDRAW: u32 = 2;
-/// What the filter leaves active.
+/// Gaussians that the filter leaves active.
 pub const DEBUG_ACTIVE: u32 = 3;
 /// Deviation in time.
 pub const DEBUG_LIFESPAN: u32 = 4;
@@ -231,16 +231,16 @@ pub const INVISIBLE: u32 = u32::MAX;
 
 /// No background: a compositor follows.
 pub const BACKGROUND_NONE: u32 = 0;
-/// One colour.
+/// One color.
 pub const BACKGROUND_COLOR: u32 = 1;
 /// The environment map.
 pub const BACKGROUND_ENVIRONMENT: u32 = 2;
 
-/// A splat: a Gaussian sliced at a time and projected to a view, with its colour.
+/// A splat: a Gaussian sliced at a time and projected to a view, with its color.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct SplatRecord {
-    /// Centre in pixels.
+    /// Center in pixels.
     pub center: [f32; 2],
     /// Opacity times marginal.
     pub opacity: f32,
@@ -250,21 +250,21 @@ pub struct SplatRecord {
     pub conic: [f32; 3],
     /// Tiles x0 and y0, 16 bits each.
     pub tiles_low: u32,
-    /// Colour.
+    /// Color.
     pub color: [f32; 3],
     /// Tiles x1 and y1 (excluded), 16 bits each.
     pub tiles_high: u32,
 }
 
-/// Numbers the GPU counts.
+/// Numbers that the GPU counts.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
 pub struct Counters {
-    /// Visible splats.
+    /// Number of visible splats.
     pub visible: u32,
-    /// Pairs made.
+    /// Number of pairs written.
     pub pairs: u32,
-    /// Pairs that there would be with room for all.
+    /// Number of pairs that there would be with room for all.
     pub pairs_wanted: u32,
     /// Unused.
     pub padding: u32,
@@ -278,13 +278,13 @@ pub struct SortStep {
     pub shift: u32,
     /// `SORT_*`.
     pub source: u32,
-    /// Blocks the histogram has room for, per digit.
+    /// Number of blocks for which the histogram has room, per digit.
     pub stride: u32,
     /// Unused.
     pub padding: u32,
 }
 
-/// All slots, leaving out the invisible.
+/// All slots; the invisible ones are left out.
 pub const SORT_SLOTS: u32 = 0;
 /// The visible splats.
 pub const SORT_VISIBLE: u32 = 1;

@@ -1,12 +1,13 @@
-//! Buffers, textures and bind groups, and what a device allows of them.
+//! Creation of buffers, textures and bind groups, and the limits of a device for them.
 //!
-//! In: a device, sizes, what they are for. Out: buffers, textures and bind groups, each counted; the limits that sizes are held against.
+//! In: a device, sizes and usages. Out: buffers, textures and bind groups, each counted; the limits that sizes are
+//! checked against.
 
 use super::work::WorkCounters;
 use glam::UVec2;
 use wgpu::{BufferUsages, TextureFormat};
 
-/// A device on which resources are created, and where they are counted.
+/// A device on which resources are created and counted.
 #[derive(Debug, Clone, Copy)]
 pub struct Allocator<'a> {
     /// The device.
@@ -16,7 +17,7 @@ pub struct Allocator<'a> {
 }
 
 impl Allocator<'_> {
-    /// A buffer that can also be written through the queue.
+    /// Creates a buffer that can also be written through the queue.
     pub fn buffer(self, label: &str, size: u64, usage: BufferUsages) -> wgpu::Buffer {
         self.work.add_created();
         self.device.create_buffer(&wgpu::BufferDescriptor {
@@ -27,7 +28,7 @@ impl Allocator<'_> {
         })
     }
 
-    /// A texture that passes write and later ones read; a depth texture is only read.
+    /// Creates a texture that passes write and later ones read; a depth texture is only read.
     pub fn texture(self, label: &str, size: UVec2, format: TextureFormat) -> wgpu::Texture {
         let usage = if format == TextureFormat::Depth32Float {
             wgpu::TextureUsages::TEXTURE_BINDING
@@ -47,7 +48,7 @@ impl Allocator<'_> {
         })
     }
 
-    /// A bind group whose bindings are numbered in order.
+    /// Creates a bind group whose bindings are numbered in order.
     pub fn bind_group(
         self,
         label: &str,
@@ -64,12 +65,12 @@ impl Allocator<'_> {
     }
 }
 
-/// Largest storage buffer that can be created and bound whole, bytes.
+/// Returns the size of the largest storage buffer that can be created and bound whole, bytes.
 pub fn binding_limit(limits: &wgpu::Limits) -> u64 {
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
 }
 
-/// Distance between uniforms of type `T` that are bound at a dynamic offset, bytes.
+/// Returns the distance between uniforms of type `T` that are bound at a dynamic offset, bytes.
 pub fn alignment_of<T>(device: &wgpu::Device) -> u32 {
     let least = device.limits().min_uniform_buffer_offset_alignment;
     least.max(size_of::<T>() as u32).next_power_of_two()

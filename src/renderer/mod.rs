@@ -1,22 +1,22 @@
 //! The renderer: plain wgpu, without Bevy.
 //!
-//! In: a [`RuntimeScene`](crate::scene::RuntimeScene) put on the GPU once ([`GpuCapture`]), views of it, and somebody's device and
-//! encoder. Out: colour, transmittance and depth textures ([`ViewRenderer`]), or pictures ([`Headless`]). `activate` runs once for
-//! each placed capture, when its segment of time changes ([`ActiveList`]); a frame of a view is one compute pass, sized on the GPU,
-//! without a read-back:
+//! In: a [`RuntimeScene`](crate::scene::RuntimeScene) uploaded once ([`GpuCapture`]), views of it, and a device and an
+//! encoder. Out: color, transmittance and depth textures ([`ViewRenderer`]), or pictures ([`Headless`]). `activate`
+//! runs for each placed capture, when its segment of time changes ([`ActiveList`]); a frame of a view is one compute
+//! pass, sized on the GPU, without a read-back:
 //!
 //! | pass | reads | writes |
 //! |---|---|---|
 //! | `activate` | temporal filter | list of the active Gaussians |
-//! | `project` | that list, Gaussians, colour coefficients | splats, depth keys |
+//! | `project` | that list, Gaussians, color coefficients | splats, depth keys |
 //! | `sort` (8 steps of 4 bits) | depth keys | order of the visible splats |
 //! | `bin` | splats in order | pairs (tile, splat), their number |
 //! | `sort` (as many steps as tiles need) | pairs | pairs ordered by tile, then depth |
 //! | `ranges` | pairs | first and last pair of each tile |
-//! | `blend` | ranges, pairs, splats, opaque depth | colour and transmittance, expected and median depth |
+//! | `blend` | ranges, pairs, splats, opaque depth | color and transmittance, expected and median depth |
 //!
-//! Sorting by depth first and by tile after, both stably, gives the original's order by (tile, depth, index) with far less to
-//! move than its 64-bit keys. No pass needs subgroups, and the results do not depend on their size.
+//! Two stable sorts, first by depth and then by tile, give the original's order by (tile, depth, index), and move far
+//! less data than a sort by its 64-bit keys. No pass needs subgroups, and the results do not depend on their size.
 
 mod active;
 pub mod bind;

@@ -1,6 +1,7 @@
 //! The pipelines: one [`Renderer`] for each device.
 //!
-//! In: a device. Out: compiled passes and the bind group layouts that they share with the buffers of views and captures.
+//! In: a device. Out: the compiled passes and the bind group layouts that they share with the buffers of views and
+//! captures.
 
 use super::bind::{Bind, group_layout, pipeline};
 use super::layout::CODEBOOK_SCALES;
@@ -9,14 +10,14 @@ use super::shaders::{MULTISAMPLED, ShaderChecks, Storage, module};
 use super::work::WorkCounters;
 use super::{GpuError, layout};
 
-/// All pipelines and layouts.
+/// All pipelines and bind group layouts of a device.
 #[derive(Debug)]
 pub struct Renderer {
     pub(super) layouts: Layouts,
     pub(super) activate_count: wgpu::ComputePipeline,
     pub(super) activate_scan: wgpu::ComputePipeline,
     pub(super) activate_write: wgpu::ComputePipeline,
-    /// By how a capture is stored, in the order of [`Storage::ALL`].
+    /// Indexed by how a capture is stored, in the order of [`Storage::ALL`].
     project: [wgpu::ComputePipeline; 3],
     pub(super) sort_count: wgpu::ComputePipeline,
     pub(super) sort_scan: wgpu::ComputePipeline,
@@ -29,7 +30,7 @@ pub struct Renderer {
     pub(super) ranges: wgpu::ComputePipeline,
     pub(super) blend: wgpu::ComputePipeline,
     pub(super) blend_multisampled: wgpu::ComputePipeline,
-    /// Stands in for a list of active Gaussians where all are drawn.
+    /// Bound instead of a list of active Gaussians if all are drawn.
     pub(super) no_list: wgpu::BindGroup,
     work: WorkCounters,
 }
@@ -41,7 +42,7 @@ pub(super) struct Layouts {
     pub filter: wgpu::BindGroupLayout,
     pub active: wgpu::BindGroupLayout,
     pub project: wgpu::BindGroupLayout,
-    /// By how a capture is stored, in the order of [`Storage::ALL`].
+    /// Indexed by how a capture is stored, in the order of [`Storage::ALL`].
     pub captures: [wgpu::BindGroupLayout; 3],
     pub sort: wgpu::BindGroupLayout,
     pub arguments: wgpu::BindGroupLayout,
@@ -55,7 +56,7 @@ impl Renderer {
     /// Compiles every pass.
     ///
     /// # Errors
-    /// When the device lacks a limit that the passes need, or a shader does not compile.
+    /// When a limit of the device is too low for the passes, or a shader does not compile.
     pub fn new(device: &wgpu::Device, checks: ShaderChecks) -> Result<Self, GpuError> {
         check_limits(&device.limits())?;
         let layouts = Layouts::new(device);
@@ -99,27 +100,28 @@ impl Renderer {
         })
     }
 
-    /// The renderer with these counters in place of its own: for one that is made anew after a lost device.
+    /// Returns the renderer with these counters in place of its own: for one that is created again after a lost device.
     pub fn counting(self, work: WorkCounters) -> Self {
         Self { work, ..self }
     }
 
-    /// What has been created, uploaded and recorded for this renderer.
+    /// Returns the counters of what has been created, uploaded and recorded for this renderer.
     pub fn work(&self) -> &WorkCounters {
         &self.work
     }
 
-    /// Creates resources of its views, its captures and its clients. The device must be the one the renderer was made on.
+    /// Returns an allocator for the resources of its views, its captures and its clients. The device must be the one
+    /// the renderer was created on.
     pub fn allocator<'a>(&'a self, device: &'a wgpu::Device) -> Allocator<'a> {
         Allocator { device, work: &self.work }
     }
 
-    /// `project` for captures stored this way.
+    /// Returns the pipeline of `project` for captures stored this way.
     pub(super) fn project(&self, storage: Storage) -> &wgpu::ComputePipeline {
         &self.project[storage as usize]
     }
 
-    /// The bind group of one part of a capture, its buffers in the order of the shader's bindings.
+    /// Creates the bind group of one part of a capture, its buffers in the order of the shader's bindings.
     pub(super) fn capture_bind_group(
         &self,
         device: &wgpu::Device,

@@ -1,6 +1,6 @@
-//! The shaders: WGSL with imports, put together by naga_oil.
+//! The shaders: WGSL with imports, composed by naga_oil.
 //!
-//! In: the name of a pass. Out: a naga module, or a wgpu shader module. The files are part of the binary.
+//! In: the name of a pass. Out: a naga module, or a wgpu shader module. The files are compiled into the binary.
 
 use super::GpuError;
 use crate::scene::{Form, PackedColors, PackedScene};
@@ -8,7 +8,7 @@ use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescript
 use std::borrow::Cow;
 
 /// Libraries, each before those that import it.
-const LIBRARIES: [(&str, &str); 9] = [
+const LIBRARIES: &[(&str, &str)] = &[
     ("types", include_str!("../../shaders/shared/types.wgsl")),
     ("alpha", include_str!("../../shaders/shared/alpha.wgsl")),
     ("tile", include_str!("../../shaders/shared/tile.wgsl")),
@@ -21,7 +21,7 @@ const LIBRARIES: [(&str, &str); 9] = [
 ];
 
 /// Passes by name.
-const PASSES: [(&str, &str); 7] = [
+const PASSES: &[(&str, &str)] = &[
     ("activate", include_str!("../../shaders/activate.wgsl")),
     ("project", include_str!("../../shaders/project.wgsl")),
     ("sort", include_str!("../../shaders/sort.wgsl")),
@@ -31,17 +31,17 @@ const PASSES: [(&str, &str); 7] = [
     ("score", include_str!("../../shaders/score.wgsl")),
 ];
 
-/// Whether shaders check their array indices and loops, which can cost much.
+/// Whether shaders check their array indices and loops, which can cost much time. Default: [`Off`](Self::Off).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum ShaderChecks {
     /// No checks: every index is bounded by construction.
     #[default]
     Off,
-    /// With checks, to look for defects.
+    /// With checks, to find defects.
     On,
 }
 
-/// Names of all passes.
+/// Returns the names of all passes.
 pub fn pass_names() -> impl Iterator<Item = &'static str> {
     PASSES.iter().map(|(name, _)| *name)
 }
@@ -58,10 +58,10 @@ pub enum Storage {
 }
 
 impl Storage {
-    /// All of them.
+    /// All kinds of storage.
     pub const ALL: [Self; 3] = [Self::Sliced, Self::Packed, Self::Coded];
 
-    /// How a form is stored.
+    /// Returns how a form is stored.
     pub fn of(form: &Form) -> Self {
         match form {
             Form::Sliced(_) => Self::Sliced,
@@ -70,7 +70,7 @@ impl Storage {
         }
     }
 
-    /// What the shader is told.
+    /// Returns the shader definitions with which `project` reads it.
     pub fn definitions(self) -> &'static [&'static str] {
         match self {
             Self::Sliced => &[],
@@ -83,8 +83,8 @@ impl Storage {
 /// The definition of `blend` for multisampled opaque depth.
 pub const MULTISAMPLED: &[&str] = &["MULTISAMPLED"];
 
-/// The naga module of a pass, imports resolved, validated, with these definitions: those of a [`Storage`] for `project`, none or
-/// [`MULTISAMPLED`] for `blend`, none for the others.
+/// Returns the naga module of a pass, imports resolved, validated, with these definitions: those of a [`Storage`] for
+/// `project`, none or [`MULTISAMPLED`] for `blend`, none for the others.
 ///
 /// # Errors
 /// When there is no such pass or it does not compile.
@@ -93,7 +93,7 @@ pub fn compose(name: &str, definitions: &[&str]) -> Result<wgpu::naga::Module, G
         return Err(GpuError::Shader { name: "unknown", reason: format!("there is no pass `{name}`") });
     };
     let mut composer = Composer::default();
-    for (library, source) in LIBRARIES {
+    for &(library, source) in LIBRARIES {
         let descriptor = ComposableModuleDescriptor { source, file_path: library, ..Default::default() };
         if let Err(error) = composer.add_composable_module(descriptor) {
             return Err(GpuError::Shader { name: library, reason: error.emit_to_string(&composer) });
@@ -106,7 +106,7 @@ pub fn compose(name: &str, definitions: &[&str]) -> Result<wgpu::naga::Module, G
         .map_err(|error| GpuError::Shader { name, reason: error.emit_to_string(&composer) })
 }
 
-/// The shader module of a pass, as [`compose`] puts it together.
+/// Creates the shader module of a pass, as [`compose`] composes it.
 ///
 /// # Errors
 /// As [`compose`].

@@ -1,19 +1,20 @@
-//! How much work a view is.
+//! The amount of work of a view.
 //!
-//! In: counters and timestamps that the GPU has sent back. Out: [`ViewStatistics`].
+//! In: counters and timestamps read back from the GPU. Out: [`ViewStatistics`].
 
 use super::PassTime;
 
-/// Work of a view in a frame. What the GPU counts is that of the newest frame whose counters have arrived, some frames late.
+/// Work of a view in a frame. What the GPU counts belongs to the newest frame whose counters have arrived, some frames
+/// ago.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ViewStatistics {
-    /// Gaussians of all captures in view.
+    /// Number of Gaussians of all captures in the view.
     pub total: u32,
-    /// Those that the temporal filters leave active.
+    /// Number of them that the temporal filters leave active.
     pub active: u32,
-    /// Those that become splats of at least one tile.
+    /// Number of splats that cover at least one tile.
     pub visible: u32,
-    /// Splat–tile pairs.
+    /// Number of splat–tile pairs.
     pub pairs: u32,
     /// Bytes of the view's working buffers and targets.
     pub bytes: u64,

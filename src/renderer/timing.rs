@@ -1,29 +1,29 @@
 //! GPU time of a frame and of its passes, by timestamps.
 //!
-//! In: a device that has timestamps. Out: [`Timings`]: medians over many frames, views and times.
+//! In: a device with timestamps. Out: [`Timings`]: medians over many frames, views and times.
 
 use super::memory::Allocator;
 use crate::view::Counts;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// The timed stretches of a frame, in order.
+/// Names of the timed passes of a frame, in order.
 pub(super) const TIMED_PASSES: [&str; 6] = ["project", "sort (depth)", "bin", "sort (tile)", "ranges", "blend"];
 
 /// Medians over the frames of a benchmark.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Timings {
-    /// Each pass, in frame order. Measured in frames of their own, since timestamps between passes cost some time themselves;
-    /// empty where the device has no timestamps inside passes.
+    /// Each pass, in frame order. Measured in separate frames, since timestamps between passes cost some time
+    /// themselves; empty if the device has no timestamps inside passes.
     pub passes: Vec<PassTime>,
-    /// GPU time of the whole compute pass; nothing where the device has no timestamps.
+    /// Median GPU time of the whole compute pass; `None` if the device has no timestamps.
     pub frame_milliseconds: Option<f64>,
-    /// Wall-clock time from submitting a frame to its end, one at a time.
+    /// Median wall-clock time from submitting a frame to its end, one at a time.
     pub wall_milliseconds: f64,
     /// Wall-clock time for each frame with many in flight.
     pub pipelined_milliseconds: f64,
-    /// Work in a frame.
+    /// Median amount of work in a frame.
     pub counts: Counts,
-    /// Frames measured.
+    /// Number of frames measured.
     pub frames: usize,
 }
 
@@ -47,7 +47,7 @@ pub(super) struct PassTimer {
 }
 
 impl PassTimer {
-    /// A timer around frames, or between passes; nothing where the device cannot.
+    /// Creates a timer around frames, or between passes; `None` if the device does not support it.
     pub fn new(allocator: Allocator<'_>, queue: &wgpu::Queue, inside: bool) -> Option<Self> {
         let device = allocator.device;
         let needed =
@@ -70,7 +70,7 @@ impl PassTimer {
         })
     }
 
-    /// What to ask of the compute pass.
+    /// Returns the timestamp writes of the compute pass.
     pub fn frame_writes(&self) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
         Some(wgpu::ComputePassTimestampWrites {
             query_set: &self.queries,
@@ -79,33 +79,33 @@ impl PassTimer {
         })
     }
 
-    /// Ends a stretch.
+    /// Writes the timestamp at the end of a pass, if passes are timed.
     pub fn mark(&self, pass: &mut wgpu::ComputePass<'_>) {
         if self.inside {
             pass.write_timestamp(&self.queries, self.next.fetch_add(1, Ordering::Relaxed));
         }
     }
 
-    /// Writes the timestamps into the buffer, after the pass.
+    /// Copies the timestamps into the buffer, after the pass.
     pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
         let count = if self.inside { TIMED_PASSES.len() as u32 + 1 } else { 2 };
         encoder.resolve_query_set(&self.queries, 0..count, &self.resolved, 0);
         self.next.store(1, Ordering::Relaxed);
     }
 
-    /// The buffer that the timestamps arrive in, eight bytes each.
+    /// Returns the buffer of the timestamps, eight bytes each.
     pub fn resolved(&self) -> &wgpu::Buffer {
         &self.resolved
     }
 
-    /// Milliseconds between each timestamp and the next.
+    /// Returns the milliseconds between each timestamp and the next.
     pub fn intervals(&self, timestamps: &[u8]) -> Vec<f64> {
         let ticks: Vec<u64> = timestamps.chunks_exact(8).map(bytemuck::pod_read_unaligned).collect();
         ticks.windows(2).map(|pair| pair[1].saturating_sub(pair[0]) as f64 * self.period).collect()
     }
 }
 
-/// The middle value; zero of none.
+/// Returns the middle value; 0 if there is none.
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)

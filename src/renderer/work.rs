@@ -1,7 +1,7 @@
-//! Counters of the work that is done for a renderer.
+//! Counters of the work done for a renderer.
 //!
-//! In: every resource created, byte uploaded and list recorded. Out: [`WorkCounters`], from which a test can tell that nothing is done
-//! twice.
+//! In: every resource created, byte uploaded and list recorded. Out: [`WorkCounters`], with which a test can check that
+//! nothing is done twice.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

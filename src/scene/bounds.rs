@@ -1,17 +1,17 @@
-//! Where a capture is: boxes about its Gaussians, over all of its time and over stretches of it.
+//! Bounding boxes of a capture, over its whole time interval and over stretches of it.
 //!
 //! In: runtime Gaussians. Out: [`Bounds`] and [`BoundsOverTime`] in capture space.
 
 use crate::gaussian::Gaussian;
 use glam::{DVec3, Vec3};
 
-/// Stretches of time that have a box each.
-const TIMED_PASSES: usize = 32;
+/// Number of stretches of time, each with a box.
+const TIME_SPANS: usize = 32;
 /// The marginal falls to its cut-off of 0.05 at sqrt(−2 ln 0.05) = 2.4477 σ_t.
 const LIFESPAN: f64 = 2.4478;
-/// Part by which boxes are larger than the numbers say: more than drawing loses by computing in `f32`.
+/// Relative margin of the boxes: more than the `f32` rounding of drawing.
 const ROUNDING: f64 = 1e-6;
-/// What is as near as this to the border between two stretches, in stretches, belongs to both.
+/// A time as close as this to the border of two stretches, in stretches, belongs to both.
 const BORDER: f64 = 1e-6;
 
 /// An axis-aligned box in capture space.
@@ -24,14 +24,14 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The box that holds three standard deviations of every Gaussian wherever it is drawn within `interval`; `None` for an
-    /// empty scene. A Gaussian that cannot be drawn ([`Gaussian::check`]) does not count.
+    /// Returns the box that holds three standard deviations of every Gaussian wherever it is drawn within `interval`;
+    /// `None` if nothing is drawn. Gaussians that cannot be drawn ([`Gaussian::check`]) are ignored.
     pub fn of(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2]) -> Option<Self> {
         BoundsOverTime::with_stretches(gaussians, interval, 1).map(|bounds| bounds.whole)
     }
 
-    /// The box about the middle nine tenths of the means, each at its own temporal mean, along each axis: where to look, without
-    /// stray Gaussians.
+    /// Returns the box around the middle nine tenths of the means, each at its own temporal mean, along each axis:
+    /// where to point a camera, without stray Gaussians. `None` if there is no Gaussian.
     pub fn core(gaussians: impl Iterator<Item = Gaussian>) -> Option<Self> {
         let means: Vec<[f32; 3]> = gaussians.map(|gaussian| gaussian.mean).collect();
         if means.is_empty() {
@@ -47,28 +47,29 @@ impl Bounds {
         Some(Self { min, max })
     }
 
-    /// The box about both.
+    /// Returns the box around both.
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
-    /// Its center.
+    /// Returns its center.
     pub fn center(self) -> Vec3 {
         (self.min + self.max) * 0.5
     }
 
-    /// Half its diagonal.
+    /// Returns half its diagonal.
     pub fn radius(self) -> f32 {
         (self.max - self.min).length() * 0.5
     }
 
-    /// The box of `factor` times the size about the same center.
+    /// Returns the box of `factor` times the size around the same center.
     pub fn scaled(self, factor: f32) -> Self {
         let (center, half) = (self.center(), (self.max - self.min) * (0.5 * factor));
         Self { min: center - half, max: center + half }
     }
 
-    /// Where a ray comes in, in lengths of `direction` from `origin`: 0 if it starts inside, `None` if it passes by.
+    /// Returns the distance at which a ray enters the box, in lengths of `direction` from `origin`: 0 if it starts
+    /// inside, `None` if it misses the box.
     pub fn entry(self, origin: Vec3, direction: Vec3) -> Option<f32> {
         let (mut from, mut to) = (0.0f32, f32::INFINITY);
         for axis in 0..3 {
@@ -90,17 +91,17 @@ impl Bounds {
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoundsOverTime {
     interval: [f32; 2],
-    /// One box each; `None` where nothing is drawn. At least one stretch.
+    /// The box of each stretch; `None` if nothing is drawn in it. At least one stretch.
     stretches: Vec<Option<Bounds>>,
     whole: Bounds,
 }
 
 impl BoundsOverTime {
-    /// The boxes that hold three standard deviations of every Gaussian wherever it is drawn, for 32 stretches of `interval` (one, if
-    /// the interval has no length); `None` for a scene of which nothing is drawn. A Gaussian that cannot be drawn
-    /// ([`Gaussian::check`]) does not count.
+    /// Returns the boxes that hold three standard deviations of every Gaussian wherever it is drawn, for 32 stretches
+    /// of `interval` (one, if the interval has no length); `None` if nothing is drawn. Gaussians that cannot be drawn
+    /// ([`Gaussian::check`]) are ignored.
     pub fn of(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2]) -> Option<Self> {
-        Self::with_stretches(gaussians, interval, TIMED_PASSES)
+        Self::with_stretches(gaussians, interval, TIME_SPANS)
     }
 
     fn with_stretches(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2], stretches: usize) -> Option<Self> {
@@ -114,25 +115,26 @@ impl BoundsOverTime {
         Some(Self { interval, stretches, whole })
     }
 
-    /// The box about everything that is drawn at any time.
+    /// Returns the box around everything that is drawn at any time.
     pub fn whole(&self) -> Bounds {
         self.whole
     }
 
-    /// The box about everything that is drawn in the stretch that holds `time`, a timestamp of the capture (about both at a border);
-    /// `None` where nothing is drawn. What lies outside the interval counts as its nearer end.
+    /// Returns the box around everything that is drawn in the stretch that contains `time`, a timestamp of the capture
+    /// (around both stretches at a border); `None` if nothing is drawn. A time outside the interval counts as its
+    /// nearer end.
     pub fn at(&self, time: f32) -> Option<Bounds> {
         let [start, end] = self.interval.map(f64::from);
         let place = (f64::from(time) - start) / (end - start) * self.stretches.len() as f64;
-        // What is negative or no number becomes 0.
+        // Negative values and NaN become 0.
         let stretch = |place: f64| (place as usize).min(self.stretches.len() - 1);
         let near = &self.stretches[stretch(place - BORDER)..=stretch(place + BORDER)];
         near.iter().flatten().copied().reduce(Bounds::union)
     }
 }
 
-/// Grows the boxes of all stretches in which a Gaussian is drawn. It moves in a straight line: where it is at the ends of its stay
-/// in a stretch says where it is in between.
+/// Grows the boxes of all stretches in which a Gaussian is drawn. It moves in a straight line, so its positions at the
+/// ends of its time in a stretch bound those in between.
 fn cover(extents: &mut [Extent], gaussian: &Gaussian, [start, end]: [f64; 2]) {
     let mean_t = f64::from(gaussian.mean_t);
     let lifespan = LIFESPAN * f64::from(gaussian.sigma_t);
@@ -172,7 +174,7 @@ impl Extent {
         self.max = self.max.max(center + reach);
     }
 
-    /// The box; `None` if nothing is in it. What is farther than `f32` can say is as far as it can.
+    /// Returns the box; `None` if it is empty. Coordinates beyond the range of `f32` are clamped to it.
     fn bounds(self) -> Option<Bounds> {
         let said = |corner: DVec3| corner.clamp(DVec3::splat(f32::MIN.into()), DVec3::splat(f32::MAX.into())).as_vec3();
         (self.min.x <= self.max.x).then(|| Bounds { min: said(self.min), max: said(self.max) })
@@ -234,7 +236,7 @@ mod tests {
         ) {
             let bounds = over_time(&gaussians, [start, start + span]);
             // The borders between stretches, too.
-            let borders = (0..=TIMED_PASSES).map(|index| index as f32 / TIMED_PASSES as f32);
+            let borders = (0..=TIME_SPANS).map(|index| index as f32 / TIME_SPANS as f32);
             for time in moments.into_iter().chain(borders).map(|moment| start + moment * span) {
                 for gaussian in gaussians.iter().filter(|gaussian| gaussian.marginal(time) > MARGINAL_CUTOFF) {
                     let (mean, reach) = (gaussian.mean_at(time), 3.0 * gaussian.covariance[0].sqrt());
@@ -254,7 +256,7 @@ mod tests {
         assert!(bounds.whole().max.x - bounds.whole().min.x > 10.0, "it runs ten units");
         for time in [0.0, 0.3, 0.5, 1.0] {
             let now = bounds.at(time).expect("always there");
-            let [length, most] = [now.max.x - now.min.x, 2.0 * 10.0 / TIMED_PASSES as f32 + 0.07];
+            let [length, most] = [now.max.x - now.min.x, 2.0 * 10.0 / TIME_SPANS as f32 + 0.07];
             assert!(length < most, "at {time} the box is {length} long, but two stretches are {most}");
         }
         assert_eq!(bounds.at(-9.0), bounds.at(0.0), "before the start is the start");
@@ -265,7 +267,7 @@ mod tests {
     #[test]
     fn at_a_border_both_stretches_count() {
         let bounds = over_time(&[runner()], [0.0, 1.0]).expect("drawn");
-        let step = 1.0 / TIMED_PASSES as f32;
+        let step = 1.0 / TIME_SPANS as f32;
         let [before, border, after] = [0.5, 1.0, 1.5].map(|place| bounds.at(place * step).expect("always there"));
         assert_eq!(border, before.union(after), "the box about both");
     }

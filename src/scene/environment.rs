@@ -1,7 +1,7 @@
-//! The environment map: what stands behind all Gaussians, on a sphere of radius 60 about the capture's origin.
+//! The environment map: the background of a capture, on a sphere of radius 60 around its origin.
 //!
-//! In: a lat-long texture from slot 17 of a checkpoint, a camera position and a ray. Out: the color behind that pixel.
-//! Section 3.7 of the 4DGS model.
+//! In: a lat-long texture from slot 17 of a checkpoint, a camera position and a ray. Out: the color behind that pixel,
+//! as the original computes it.
 
 use glam::Vec3;
 use std::f32::consts::{PI, TAU};
@@ -16,16 +16,19 @@ pub struct Environment {
     pub width: u32,
     /// Texels down.
     pub height: u32,
-    /// Planar: 3 × height × width.
+    /// Values, planar: 3 × height × width.
     pub texels: Vec<f32>,
 }
 
 impl Environment {
-    /// Color where the ray from `origin` along the unit vector `direction` leaves the sphere. Bilinear, black outside the
-    /// texture: the seam at the ends of `u` fades, as in the original.
+    /// Returns the color where the ray from `origin` along the unit vector `direction` (capture space) leaves the
+    /// sphere. Bilinear, black outside the texture: the seam at the ends of `u` fades, as in the original.
+    ///
+    /// # Panics
+    /// If there are fewer than 3 × height × width values.
     pub fn sample(&self, origin: Vec3, direction: Vec3) -> Vec3 {
         let along = origin.dot(direction);
-        // Rays from outside may miss the sphere: they see where they come nearest to it.
+        // Rays from outside may miss the sphere: then the point of the ray nearest to it is used.
         let reach = -along + (along * along - (origin.length_squared() - RADIUS * RADIUS)).max(0.0).sqrt();
         let hit = origin + direction * reach;
         let u = hit.y.atan2(hit.x) / TAU + 0.5;

@@ -6,16 +6,17 @@
 use crate::gaussian::{Gaussian, MARGINAL_CUTOFF};
 use serde::{Deserialize, Serialize};
 
-/// How the sets of a filter were found.
+/// How the sets of a filter were computed. Default: [`Support`](Self::Support).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FilterKind {
-    /// The paper's: the union of what training cameras see at the two key-frames around a segment. Loses what comes and goes
-    /// between them.
+    /// The paper's filter: the union of the Gaussians that training cameras see at the two key-frames around a segment.
+    /// Misses Gaussians that are visible only between them.
     KeyFrame,
-    /// The key-frame filter and whatever any training view inside the segment blends.
+    /// The key-frame filter, and every Gaussian that any training view inside the segment blends.
     Interval,
-    /// Whatever has a marginal above the cut-off somewhere in the segment: exact by construction, needs no views.
+    /// Every Gaussian whose marginal is above the cut-off somewhere in the segment: exact by construction, needs no
+    /// views.
     #[default]
     Support,
 }
@@ -23,7 +24,7 @@ pub enum FilterKind {
 /// Sets of active Gaussians, one for each segment of time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TemporalFilter {
-    /// How it was made.
+    /// How the sets were computed.
     pub kind: FilterKind,
     /// Number of segments: key-frames less one.
     pub segments: u32,
@@ -36,17 +37,21 @@ pub struct TemporalFilter {
 /// The two ways to store the sets.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ActiveSets {
-    /// Segment by segment, `words_per_segment` words each, Gaussian `i` at bit `i % 32` of word `i / 32`.
+    /// Segment by segment, [`TemporalFilter::words`] words each, Gaussian `i` at bit `i % 32` of word `i / 32`.
     Bits(Vec<u32>),
-    /// The first (low half) and last segment of each Gaussian; first after last where it is never active.
+    /// One word for each Gaussian: its first active segment in the low half, its last in the high half; first after
+    /// last if it is never active.
     Intervals(Vec<u32>),
 }
 
-/// Most segments a filter can have.
+/// Largest number of segments of a filter.
 pub const MAX_SEGMENTS: u32 = u16::MAX as u32;
 
 impl TemporalFilter {
-    /// Makes a filter from one set of bits for each segment, and stores it the smaller way.
+    /// Creates a filter from one set of bits for each segment, stored as bits or as intervals, whichever is smaller.
+    ///
+    /// # Panics
+    /// If the length of `bits` is not `segments` times the number of [`words`](Self::words) of a set.
     pub fn from_bits(kind: FilterKind, segments: u32, count: usize, bits: Vec<u32>) -> Self {
         let words = Self::words(count);
         assert_eq!(bits.len(), words * segments as usize, "one set of bits for each segment");
@@ -59,8 +64,9 @@ impl TemporalFilter {
         }
     }
 
-    /// The support filter: Gaussian `i` is active in a segment if its marginal exceeds the cut-off anywhere within. The marginal
-    /// has one peak, so that this is one interval. A little slack stands above rounding: too much active changes no pixel.
+    /// Creates the support filter: Gaussian `i` is active in a segment if its marginal exceeds the cut-off anywhere in
+    /// it. The marginal has one peak, so these segments are one interval. A margin covers rounding: an additional
+    /// active Gaussian changes no pixel. `interval` is the time interval of the capture, `segments` at least 1.
     pub fn support(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2], segments: u32) -> Self {
         let reach = f64::from(-2.0 * MARGINAL_CUTOFF.ln()).sqrt() * 1.0001;
         let span = f64::from(interval[1]) - f64::from(interval[0]);
@@ -84,17 +90,20 @@ impl TemporalFilter {
         filter
     }
 
-    /// Words of bits for one set.
+    /// Returns the number of words of one set of bits for `count` Gaussians.
     pub fn words(count: usize) -> usize {
         count.div_ceil(32)
     }
 
-    /// The segment that a time belongs to, see [`segment_of`].
+    /// Returns the segment of `time`, which is in the capture's unit; see [`segment_of`].
     pub fn segment_of(&self, time: f32, interval: [f32; 2]) -> u32 {
         segment_of(time, interval, self.segments)
     }
 
-    /// Whether Gaussian `index` is active in `segment`.
+    /// Returns whether Gaussian `index` is active in `segment`.
+    ///
+    /// # Panics
+    /// If `index` is out of range, or if the sets are bits and `segment` is.
     pub fn is_active(&self, segment: u32, index: usize) -> bool {
         match &self.sets {
             ActiveSets::Bits(bits) => {
@@ -107,7 +116,11 @@ impl TemporalFilter {
         }
     }
 
-    /// How many of the Gaussians `own` are active in each segment; `own` begins at a multiple of 32.
+    /// Returns the number of active Gaussians among those in the range `own`, for each segment. `own` begins at a
+    /// multiple of 32.
+    ///
+    /// # Panics
+    /// If `own` is out of range.
     pub fn active_counts(&self, own: std::ops::Range<usize>) -> Vec<u32> {
         match &self.sets {
             ActiveSets::Bits(bits) => {
@@ -137,14 +150,17 @@ impl TemporalFilter {
         }
     }
 
-    /// Share of active Gaussians, the mean over all segments; 1 for an empty scene.
+    /// Returns the share of active Gaussians, the mean over all segments; 1 for an empty scene.
     pub fn active_share(&self) -> f64 {
         let active: usize = (0..self.segments).map(|s| (0..self.count).filter(|&i| self.is_active(s, i)).count()).sum();
         let all = self.count * self.segments as usize;
         if all == 0 { 1.0 } else { active as f64 / all as f64 }
     }
 
-    /// The filter of the Gaussians kept, in their new order.
+    /// Returns the filter of the Gaussians kept, in their new order.
+    ///
+    /// # Panics
+    /// If an index in `keep` is out of range.
     pub fn select(&self, keep: &[u32]) -> Self {
         let sets = match &self.sets {
             ActiveSets::Intervals(intervals) => {
@@ -165,7 +181,7 @@ impl TemporalFilter {
         Self { count: keep.len(), sets, ..self.clone() }
     }
 
-    /// One set of bits for each segment.
+    /// Returns the sets as bits, one set for each segment.
     pub fn to_bits(&self) -> Vec<u32> {
         let words = Self::words(self.count);
         let mut bits = vec![0; words * self.segments as usize];
@@ -179,7 +195,7 @@ impl TemporalFilter {
         bits
     }
 
-    /// The sets as intervals, if no Gaussian pauses.
+    /// Returns the sets as intervals; `None` if the active segments of a Gaussian are not contiguous.
     fn intervals(&self) -> Option<Vec<u32>> {
         (0..self.count)
             .map(|index| {
@@ -203,7 +219,8 @@ fn interval_word(first: u32, last: u32) -> u32 {
     first | last << 16
 }
 
-/// The segment of a time: `min(floor(t' (K − 1)), K − 2)` with `t'` the place in the interval, clamped to it, and `K − 1` segments.
+/// Returns the segment of a time: `min(floor(p s), s − 1)` with `s` segments and `p` the position of the time in the
+/// interval, clamped to 0..1.
 pub fn segment_of(time: f32, interval: [f32; 2], segments: u32) -> u32 {
     let place = ((time - interval[0]) / (interval[1] - interval[0])).clamp(0.0, 1.0);
     ((place * segments as f32) as u32).min(segments.saturating_sub(1))

@@ -1,4 +1,4 @@
-//! The forms of a scene's Gaussians, each with its color: the one model of how a scene is stored.
+//! The forms of a scene's Gaussians, each with its color.
 //!
 //! In: a trainer's parameters, sliced Gaussians or packed records. Out: a [`SceneForm`], or a [`Form`] if it is ready to draw.
 //!
@@ -9,8 +9,8 @@
 //!                                         └─ Coded    quantized records, colors by codebook
 //! ```
 //!
-//! What depends on the form is derived from it by an exhaustive `match`, once each: which variant of `project` draws it
-//! (`renderer::Storage::of`), and what the header of a package says (`codec::package::StoredForm::of`).
+//! Two values are derived from the form by an exhaustive `match`: the variant of `project` that draws it
+//! (`renderer::Storage::of`), and the form in the header of a package (`codec::package::StoredForm::of`).
 
 use super::packed::{CodedColors, PackedColors, PackedScene};
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Model, Parameters, SliceSettings};
@@ -39,7 +39,7 @@ pub struct Trained {
 pub enum Form {
     /// In single precision.
     Sliced(Sliced),
-    /// Quantized: smaller, and drawn as it is.
+    /// Quantized: smaller, and drawn without unpacking.
     Packed(PackedScene),
 }
 
@@ -52,19 +52,19 @@ pub struct Sliced {
     pub harmonics: Harmonics,
 }
 
-/// How much color a form holds.
+/// Number of coefficients and degrees of the color of a form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ColorDegrees {
     /// Coefficients per Gaussian and channel, whether they are evaluated or not.
     pub coefficients: usize,
     /// Spatial degree evaluated, 0 to 3.
     pub degree: u32,
-    /// Time degree evaluated, 0 to 2; counts only with `degree` 3.
+    /// Time degree evaluated, 0 to 2; used only if `degree` is 3.
     pub degree_t: u32,
 }
 
 impl SceneForm {
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     pub fn len(&self) -> usize {
         match self {
             Self::Trained(trained) => trained.parameters.len(),
@@ -72,12 +72,12 @@ impl SceneForm {
         }
     }
 
-    /// Whether there is no Gaussian.
+    /// Returns whether there is no Gaussian.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The model of the trained form; `None` for the others, which no longer show it.
+    /// Returns the model of the trained form; `None` for the other forms, which do not contain it.
     pub fn model(&self) -> Option<Model> {
         match self {
             Self::Trained(trained) => Some(trained.parameters.model()),
@@ -85,7 +85,7 @@ impl SceneForm {
         }
     }
 
-    /// The harmonics; `None` if the colors are coded.
+    /// Returns the harmonics; `None` if the colors are coded.
     pub fn harmonics(&self) -> Option<&Harmonics> {
         match self {
             Self::Trained(trained) => Some(&trained.harmonics),
@@ -93,7 +93,7 @@ impl SceneForm {
         }
     }
 
-    /// As [`harmonics`](Self::harmonics), to be changed.
+    /// Returns the same as [`harmonics`](Self::harmonics), mutable.
     pub fn harmonics_mut(&mut self) -> Option<&mut Harmonics> {
         match self {
             Self::Trained(trained) => Some(&mut trained.harmonics),
@@ -101,7 +101,7 @@ impl SceneForm {
         }
     }
 
-    /// How much color it holds.
+    /// Returns the number of coefficients and the degrees of its color.
     pub fn color_degrees(&self) -> ColorDegrees {
         match self {
             Self::Trained(trained) => ColorDegrees::of_harmonics(&trained.harmonics),
@@ -109,10 +109,10 @@ impl SceneForm {
         }
     }
 
-    /// The form that is drawn: slices the Gaussians if they are not yet. Color is moved, not copied.
+    /// Converts to the form that is drawn: slices trained Gaussians. Colors are moved, not copied.
     ///
     /// # Errors
-    /// The first Gaussian that cannot be drawn.
+    /// The first Gaussian that cannot be drawn, or has a color coefficient that is not finite.
     pub(super) fn into_ready(self, settings: &SliceSettings) -> Result<Form, InvalidGaussian> {
         let form = match self {
             Self::Trained(Trained { parameters, harmonics }) => {
@@ -134,7 +134,7 @@ impl SceneForm {
 }
 
 impl Form {
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     pub fn len(&self) -> usize {
         match self {
             Self::Sliced(sliced) => sliced.gaussians.len(),
@@ -142,12 +142,12 @@ impl Form {
         }
     }
 
-    /// Whether there is no Gaussian.
+    /// Returns whether there is no Gaussian.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Bytes of Gaussians and colors in memory.
+    /// Returns the bytes of Gaussians and colors in memory.
     pub fn size(&self) -> usize {
         match self {
             Self::Sliced(Sliced { gaussians, harmonics }) => {
@@ -157,7 +157,10 @@ impl Form {
         }
     }
 
-    /// One Gaussian, decoded if need be; panics beyond the end, as a slice does.
+    /// Returns one Gaussian, decoded if it is packed.
+    ///
+    /// # Panics
+    /// If `index` is out of range.
     pub fn gaussian(&self, index: usize) -> Gaussian {
         match self {
             Self::Sliced(sliced) => sliced.gaussians[index],
@@ -165,12 +168,15 @@ impl Form {
         }
     }
 
-    /// All Gaussians in order.
+    /// Returns all Gaussians in order.
     pub fn iter(&self) -> impl Iterator<Item = Gaussian> + '_ {
         (0..self.len()).map(|index| self.gaussian(index))
     }
 
-    /// Color of one Gaussian; see [`Harmonics::color`].
+    /// Returns the color of one Gaussian; see [`Harmonics::color`].
+    ///
+    /// # Panics
+    /// If `index` is out of range.
     pub fn color(&self, index: usize, direction: Vec3, tau: f32, time_span: f32) -> Vec3 {
         match self {
             Self::Sliced(sliced) => sliced.harmonics.color(index, direction, tau, time_span),
@@ -178,7 +184,7 @@ impl Form {
         }
     }
 
-    /// The harmonics; `None` if the colors are coded.
+    /// Returns the harmonics; `None` if the colors are coded.
     pub fn harmonics(&self) -> Option<&Harmonics> {
         match self {
             Self::Sliced(Sliced { harmonics, .. })
@@ -187,7 +193,7 @@ impl Form {
         }
     }
 
-    /// As [`harmonics`](Self::harmonics), to be changed.
+    /// Returns the same as [`harmonics`](Self::harmonics), mutable.
     pub fn harmonics_mut(&mut self) -> Option<&mut Harmonics> {
         match self {
             Self::Sliced(Sliced { harmonics, .. })
@@ -196,7 +202,7 @@ impl Form {
         }
     }
 
-    /// The colors by codebook; `None` if they are whole.
+    /// Returns the colors coded by codebooks; `None` if they are whole.
     pub fn coded_colors(&self) -> Option<&CodedColors> {
         match self {
             Self::Packed(PackedScene { colors: PackedColors::Coded(colors), .. }) => Some(colors),
@@ -204,7 +210,7 @@ impl Form {
         }
     }
 
-    /// How much color it holds.
+    /// Returns the number of coefficients and the degrees of its color.
     pub fn color_degrees(&self) -> ColorDegrees {
         match self {
             Self::Sliced(Sliced { harmonics, .. })
@@ -218,7 +224,7 @@ impl Form {
         }
     }
 
-    /// The Gaussians in single precision and their harmonics; `None` if they are packed.
+    /// Returns the Gaussians in single precision and their harmonics; `None` if they are packed.
     pub fn as_sliced(&self) -> Option<&Sliced> {
         match self {
             Self::Sliced(sliced) => Some(sliced),
@@ -226,7 +232,7 @@ impl Form {
         }
     }
 
-    /// As [`as_sliced`](Self::as_sliced), to be changed.
+    /// Returns the same as [`as_sliced`](Self::as_sliced), mutable.
     pub fn as_sliced_mut(&mut self) -> Option<&mut Sliced> {
         match self {
             Self::Sliced(sliced) => Some(sliced),
@@ -234,7 +240,7 @@ impl Form {
         }
     }
 
-    /// Whether every Gaussian can be drawn.
+    /// Checks that every Gaussian can be drawn.
     fn check(&self) -> Result<(), InvalidGaussian> {
         match self {
             Self::Sliced(sliced) => {

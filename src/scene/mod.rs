@@ -1,7 +1,8 @@
-//! What a capture is: its Gaussians and their color, an environment map, and how it was trained and is played.
+//! A capture in memory: its Gaussians and their color, an environment map, and how it was trained and is played.
 //!
-//! In: a codec's result. Out: a [`GaussianScene`] that can be stored, or a [`RuntimeScene`] that can be drawn, which
-//! [`into_runtime`](GaussianScene::into_runtime) makes of it. They differ in the [forms](SceneForm) that their Gaussians may have.
+//! In: the result of a codec. Out: a [`GaussianScene`] that can be stored, or a [`RuntimeScene`] that can be drawn,
+//! which [`into_runtime`](GaussianScene::into_runtime) returns. They differ in the [forms](SceneForm) that their
+//! Gaussians may have.
 
 mod bounds;
 mod environment;
@@ -31,7 +32,7 @@ pub struct GaussianScene {
     pub form: SceneForm,
     /// The environment map, if the capture has one.
     pub environment: Option<Environment>,
-    /// Which Gaussians are active when; without one, all are.
+    /// Which Gaussians are active in each segment of time; if `None`, all are.
     pub filter: Option<TemporalFilter>,
     /// The switches it was trained with, which drawing must repeat.
     pub trained_with: TrainedWith,
@@ -46,7 +47,7 @@ pub struct RuntimeScene {
     pub form: Form,
     /// The environment map, if the capture has one.
     pub environment: Option<Environment>,
-    /// Which Gaussians are active when; without one, all are.
+    /// Which Gaussians are active in each segment of time; if `None`, all are.
     pub filter: Option<TemporalFilter>,
     /// The switches it was trained with.
     pub trained_with: TrainedWith,
@@ -55,22 +56,23 @@ pub struct RuntimeScene {
 }
 
 impl GaussianScene {
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     pub fn len(&self) -> usize {
         self.form.len()
     }
 
-    /// Whether there is no Gaussian.
+    /// Returns whether there is no Gaussian.
     pub fn is_empty(&self) -> bool {
         self.form.is_empty()
     }
 
-    /// The model of the trained form; `None` for the others, which no longer show it.
+    /// Returns the model of the trained form; `None` for the other forms, which do not contain it.
     pub fn model(&self) -> Option<Model> {
         self.form.model()
     }
 
-    /// The scene with its Gaussians sliced if they were packed; as it is otherwise. What packing lost stays lost.
+    /// Returns the scene with packed Gaussians decoded to the sliced form; other forms are returned unchanged.
+    /// Quantization errors remain.
     pub fn unpacked(self) -> Self {
         let form = match self.form {
             SceneForm::Ready(Form::Packed(packed)) => SceneForm::Ready(Form::Sliced(packed.unpack())),
@@ -79,19 +81,21 @@ impl GaussianScene {
         Self { form, ..self }
     }
 
-    /// Slices the Gaussians (if they are not yet) and hands everything over for drawing. Color is moved, not copied.
+    /// Converts the scene for drawing: slices the Gaussians if they are in the trained form. Colors are moved, not
+    /// copied.
     ///
     /// # Errors
-    /// The first Gaussian that cannot be drawn.
+    /// The first Gaussian that cannot be drawn, or has a color coefficient that is not finite.
     pub fn into_runtime(self) -> Result<RuntimeScene, InvalidGaussian> {
         let prefilter_var = self.trained_with.prefilter_var;
         self.into_runtime_with(&SliceSettings { prefilter_var, ..SliceSettings::default() })
     }
 
-    /// As [`into_runtime`](Self::into_runtime), with slice settings other than the scene's own.
+    /// Converts as [`into_runtime`](Self::into_runtime) does, with slice settings other than the scene's own. They
+    /// apply to the trained form only.
     ///
     /// # Errors
-    /// The first Gaussian that cannot be drawn.
+    /// The first Gaussian that cannot be drawn, or has a color coefficient that is not finite.
     pub fn into_runtime_with(self, settings: &SliceSettings) -> Result<RuntimeScene, InvalidGaussian> {
         Ok(RuntimeScene {
             form: self.form.into_ready(settings)?,
@@ -104,7 +108,8 @@ impl GaussianScene {
 }
 
 impl RuntimeScene {
-    /// A scene of sliced Gaussians and their color, without an environment map and a filter, trained and played by default.
+    /// Creates a scene of sliced Gaussians and their color, without environment map and filter, with default
+    /// [`TrainedWith`] and [`PlaybackHints`].
     pub fn sliced(gaussians: Vec<Gaussian>, harmonics: Harmonics) -> Self {
         Self {
             form: Form::Sliced(Sliced { gaussians, harmonics }),
@@ -115,35 +120,42 @@ impl RuntimeScene {
         }
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     pub fn len(&self) -> usize {
         self.form.len()
     }
 
-    /// Whether there is no Gaussian.
+    /// Returns whether there is no Gaussian.
     pub fn is_empty(&self) -> bool {
         self.form.is_empty()
     }
 
-    /// One Gaussian, decoded if need be; panics beyond the end, as a slice does.
+    /// Returns one Gaussian, decoded if it is packed.
+    ///
+    /// # Panics
+    /// If `index` is out of range.
     pub fn gaussian(&self, index: usize) -> Gaussian {
         self.form.gaussian(index)
     }
 
-    /// All Gaussians in order.
+    /// Returns all Gaussians in order.
     pub fn iter(&self) -> impl Iterator<Item = Gaussian> + '_ {
         self.form.iter()
     }
 
-    /// Color of one Gaussian in the unit vector `direction` from the camera, with `tau = mean_t − time`; see [`Harmonics::color`].
+    /// Returns the color of one Gaussian seen along the unit vector `direction` from the camera, with
+    /// `tau = mean_t − time`; see [`Harmonics::color`].
+    ///
+    /// # Panics
+    /// If `index` is out of range.
     pub fn color(&self, index: usize, direction: Vec3, tau: f32) -> Vec3 {
         self.form.color(index, direction, tau, self.trained_with.time_span())
     }
 
-    /// Whether its parts fit together, as those of every scene that was loaded do.
+    /// Checks that its parts fit together, as those of every loaded scene do.
     ///
     /// # Errors
-    /// What does not fit.
+    /// A description of what does not fit.
     pub fn check(&self) -> Result<(), &'static str> {
         let fits = |filter: &TemporalFilter| {
             filter.count == self.len()
@@ -171,7 +183,7 @@ impl RuntimeScene {
         Ok(())
     }
 
-    /// The background that the capture was trained with: its environment map if it has one, else its color.
+    /// Returns the background that the capture was trained with: its environment map if it has one, else its color.
     pub fn trained_background(&self) -> Background {
         match self.environment {
             Some(_) => Background::Environment,
@@ -179,7 +191,7 @@ impl RuntimeScene {
         }
     }
 
-    /// Bytes of Gaussians and colors in memory.
+    /// Returns the bytes of Gaussians and colors in memory.
     pub fn size(&self) -> usize {
         self.form.size()
     }

@@ -1,7 +1,7 @@
 //! Picking: the Gaussian that a ray hits.
 //!
-//! In: a ray in capture space, a moment and what is to be seen of the capture ([`PickSettings`]). Out: a [`Pick`];
-//! `None` if the ray hits nothing.
+//! In: a ray in capture space, a time, and which Gaussians count ([`PickSettings`]). Out: a [`Pick`]; `None` if the ray
+//! hits nothing.
 //!
 //! Along a ray every Gaussian is a Gaussian of one dimension. With the conditional mean `m` and covariance `Σ` at time `t`, the
 //! ray's origin `o`, its unit direction `w` and two unit vectors `u`, `v` across it:
@@ -14,15 +14,16 @@
 //! alpha = min(0.99, opacity · marginal(t) · exp(−½ D²))
 //! ```
 //!
-//! This is what `blend` does to a pixel, but for the perspective within a splat and the low-pass of the screen. As there, a marginal
-//! of 0.05 or less is not there, and an alpha below 1/255 is skipped. Front to back by depth, what is left of the light is
-//! multiplied by `1 − alpha`; the Gaussian at which it falls to `1 − threshold` or below is hit: with a threshold of one half, the one
-//! whose depth is the median.
+//! This is what `blend` computes for a pixel, without the perspective within a splat and the low-pass of the screen. As
+//! there, a Gaussian with a marginal of 0.05 or less, or an alpha below 1/255, is skipped. Front to back by depth, the
+//! transmittance is multiplied by `1 − alpha`; the Gaussian at which it falls to `1 − threshold` or below is hit. With
+//! a threshold of one half, this is the Gaussian whose depth is the median depth.
 //!
-//! `S` is the projection of `Σ` and needs no inverse of it, so that flat Gaussians, whose `Σ` has none, are no special case. Only a
-//! disc seen exactly from its edge, or a needle from its tip, leaves `S` without an inverse. Therefore `ε = 2⁻²² tr Σ`, which is as
-//! small as it can be: the rounding of covariances to `f32` can make a variance of 0 appear as −¾ of that. It makes a disc about
-//! 1/2000 as thick as it is wide. A Gaussian without any extent is never hit.
+//! `S` is the projection of `Σ` and does not need its inverse, so that flat Gaussians, whose `Σ` has none, are no
+//! special case. `S` has no inverse only for a disk seen exactly edge-on or a needle seen exactly end-on. Therefore
+//! `ε = 2⁻²² tr Σ` is added, which is as small as possible: the rounding of covariances to `f32` can make a variance of
+//! 0 appear as −¾ of that. It makes a disk about 1/2000 as thick as it is wide. A Gaussian without any extent is never
+//! hit.
 
 use super::{RuntimeScene, TemporalFilter};
 use crate::gaussian::alpha::{ALPHA_MIN, visible};
@@ -33,20 +34,21 @@ use rayon::prelude::*;
 /// ε in parts of the trace of Σ: 2⁻²².
 const LEAST_VARIANCE: f64 = 1.0 / (1u32 << 22) as f64;
 
-/// What is to be seen of a capture, and when.
+/// At what time a ray is cast, and which Gaussians count.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PickSettings {
-    /// Timestamp, in the capture's unit.
+    /// Timestamp, in the capture's unit. Default: 0.
     pub time: f32,
-    /// Whether what the capture's temporal filter, if it has one, does not leave active is not there.
+    /// Whether Gaussians that the capture's temporal filter leaves inactive are ignored. Default: `true`.
     pub use_filter: bool,
-    /// Opacity that has to add up along the ray, 0 to 1, for something to be hit.
+    /// Opacity that must accumulate along the ray for a hit, 0 to 1. Default: 0.5.
     pub threshold: f32,
-    /// Factor on the opacity of every Gaussian.
+    /// Factor on the opacity of every Gaussian. Default: 1.
     pub opacity: f32,
-    /// Capture space to the cube from −1 to 1: Gaussians whose mean lies outside are not there.
+    /// Transforms capture space to the cube from −1 to 1; Gaussians whose mean is outside are ignored. Default: `None`,
+    /// no crop.
     pub crop: Option<Affine3A>,
-    /// Gaussians beyond are not there; in lengths of the ray's direction.
+    /// Largest distance of a hit, in lengths of the ray's direction. Default: infinite.
     pub max_distance: f32,
 }
 
@@ -56,23 +58,23 @@ impl Default for PickSettings {
     }
 }
 
-/// What a ray hits.
+/// The Gaussian that a ray hits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pick {
     /// Index of the Gaussian.
     pub gaussian: usize,
-    /// Where on the ray that Gaussian is densest, in lengths of the ray's direction.
+    /// Distance to the densest point of that Gaussian on the ray, in lengths of the ray's direction.
     pub distance: f32,
-    /// The same as a point in capture space.
+    /// That point, in capture space.
     pub point: Vec3,
 }
 
 impl RuntimeScene {
-    /// What the ray from `origin` along `direction` (of any length), both in capture space, hits. The page of
-    /// [`scene::pick`](crate::scene::pick) has the formula.
+    /// Returns what the ray from `origin` along `direction` (of any length), both in capture space, hits. The formula
+    /// is in [`scene::pick`](crate::scene::pick).
     ///
-    /// `None` if the ray passes through or by, and for what is no ray: a direction without a length, numbers that are not finite.
-    /// A Gaussian whose densest point on the ray lies behind the origin is not hit.
+    /// `None` if the ray hits nothing, and for an invalid ray: a direction of length zero, or numbers that are not
+    /// finite. A Gaussian whose densest point on the ray lies behind the origin is not hit.
     pub fn pick(&self, origin: Vec3, direction: Vec3, settings: &PickSettings) -> Option<Pick> {
         let ray = Ray::new(origin, direction)?;
         let fits = |filter: &&TemporalFilter| settings.use_filter && filter.count == self.len();
@@ -95,19 +97,19 @@ impl RuntimeScene {
     }
 }
 
-/// A ray with the two directions across it.
+/// A ray with two unit vectors perpendicular to it.
 struct Ray {
     origin: DVec3,
     along: DVec3,
     across: [DVec3; 2],
-    /// Of the direction that was given; the three above are unit vectors.
+    /// Length of the direction that was given; `along` is a unit vector.
     length: f64,
 }
 
 /// A Gaussian on a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Crossing {
-    /// Of its densest point, capture units from the origin.
+    /// Depth of its densest point, capture units from the origin.
     depth: f64,
     alpha: f32,
 }
@@ -124,7 +126,8 @@ impl Ray {
         Some(Self { origin, along, across: [u, v], length })
     }
 
-    /// Where and how much of a Gaussian is on the ray, if any of it is. Comparisons are such that what is no number is not there.
+    /// Returns the depth and alpha of a Gaussian on the ray; `None` if it is not visible there. The comparisons treat
+    /// NaN as not visible.
     fn cross(&self, gaussian: &Gaussian, settings: &PickSettings) -> Option<Crossing> {
         let marginal = gaussian.marginal(settings.time);
         let mean = gaussian.mean_at(settings.time);
@@ -162,7 +165,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
 
-        /// The other way to the same numbers: the inverse of the covariance, and a search along the ray.
+        /// Computes the same numbers another way: by the inverse of the covariance and a search along the ray.
         #[test]
         fn depth_and_alpha_are_those_of_the_densest_point(
             factors in prop::array::uniform9(-0.5f64..0.5),

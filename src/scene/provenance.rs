@@ -1,4 +1,4 @@
-//! How a capture was trained and is meant to be played: the scalars that no tensor holds.
+//! How a capture was trained and is meant to be played: the scalars that are not tensors.
 //!
 //! In: options of a command, `cfg_args`, or a package's header. Out: [`TrainedWith`] and [`PlaybackHints`], stored in every
 //! package so that drawing needs no options.
@@ -7,29 +7,29 @@ use crate::gaussian::ShDirection;
 use crate::view::RasterFov;
 use serde::{Deserialize, Serialize};
 
-/// The switches a capture was trained with. Drawing must repeat them to match.
+/// The switches a capture was trained with. Drawing must use the same to match the original.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct TrainedWith {
-    /// First and last timestamp of training, `[T0, T1]`.
+    /// First and last timestamp of training, `[T0, T1]`. Default: `[0, 1]`.
     pub time_interval: [f32; 2],
-    /// Background color, in the blend space.
+    /// Background color, in the blend space. Default: black.
     pub background: [f32; 3],
-    /// Convention of the rotations *in the source file*; in memory they are always flipped.
+    /// Convention of the rotations *in the source file*; in memory they are always flipped. Default: flipped.
     pub rotation_convention: RotationConvention,
-    /// Which field of view shaped the footprints.
+    /// Which field of view shaped the footprints. Default: reference.
     pub raster_fov: RasterFov,
-    /// What kind of cameras took the training views.
+    /// What kind of cameras took the training views. Default: cameras with a field of view.
     pub cameras: TrainedCameras,
-    /// Which mean gives the viewing direction of color.
+    /// Which mean gives the viewing direction of color. Default: canonical.
     pub sh_direction: ShDirection,
-    /// Only the first 16 coefficients count, whatever is stored.
+    /// Whether only the first 16 coefficients are evaluated, whatever is stored. Default: `false`.
     pub force_sh_3d: bool,
-    /// Added to the temporal variance in the marginal, if positive.
+    /// Added to the temporal variance in the marginal, if positive. Default: −1, nothing is added.
     pub prefilter_var: f32,
-    /// Iteration of the checkpoint.
+    /// Iteration of the checkpoint. Default: 0.
     pub iteration: u64,
-    /// Extent of the training cameras, the factor of positional learning rates.
+    /// Extent of the training cameras, the factor of positional learning rates. Default: 1.
     pub spatial_lr_scale: f64,
 }
 
@@ -51,29 +51,29 @@ impl Default for TrainedWith {
 }
 
 impl TrainedWith {
-    /// Full length of the time interval.
+    /// Returns the length of the time interval, in the capture's unit.
     pub fn time_span(&self) -> f32 {
         self.time_interval[1] - self.time_interval[0]
     }
 
-    /// Whether footprints were shaped by the field-of-view sentinel of intrinsics cameras.
+    /// Returns whether footprints were shaped by the field-of-view sentinel of intrinsics cameras.
     pub fn uses_fov_sentinel(&self) -> bool {
         self.raster_fov == RasterFov::Reference && self.cameras == TrainedCameras::Intrinsics
     }
 }
 
-/// The order in which the 4D vector was read when the rotations were trained.
+/// The axis order of the 4D vector in the code that trained the rotations. Default: [`Flipped`](Self::Flipped).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RotationConvention {
     /// (x, y, z, t): code since 2024-09-15.
     #[default]
     Flipped,
-    /// The order before that.
+    /// The order of code before that date.
     Unflipped,
 }
 
-/// The kind of cameras that took the training views.
+/// The kind of cameras that took the training views. Default: [`Fov`](Self::Fov).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TrainedCameras {
@@ -84,13 +84,13 @@ pub enum TrainedCameras {
     Intrinsics,
 }
 
-/// How a capture is meant to be shown.
+/// How a capture is meant to be played.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PlaybackHints {
-    /// The axis that points up in the capture's own space.
+    /// The axis that points up in the capture's own space. Default: +Z.
     pub up: UpAxis,
-    /// Seconds that one pass through the time interval takes at speed 1.
+    /// Seconds that one pass through the time interval takes at speed 1. Default: 1.
     pub duration_seconds: f32,
 }
 
@@ -100,7 +100,7 @@ impl Default for PlaybackHints {
     }
 }
 
-/// A signed axis.
+/// A signed axis. Default: [`PosZ`](Self::PosZ).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum UpAxis {
@@ -120,7 +120,7 @@ pub enum UpAxis {
 }
 
 impl UpAxis {
-    /// The unit vector.
+    /// Returns the unit vector of the axis.
     pub fn vector(self) -> glam::Vec3 {
         match self {
             Self::PosX => glam::Vec3::X,

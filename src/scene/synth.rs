@@ -8,18 +8,18 @@ use crate::gaussian::{Harmonics, Parameters};
 use glam::{EulerRot, Quat, Vec3};
 use std::f32::consts::TAU;
 
-/// What to synthesize.
+/// Settings of the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SynthSettings {
-    /// Number of Gaussians.
+    /// Number of Gaussians. Default: 10,000.
     pub count: usize,
-    /// Seed of the random numbers.
+    /// Seed of the random numbers. Default: 1.
     pub seed: u64,
-    /// Spatial degree of color, 0 to 3.
+    /// Spatial degree of color, 0 to 3. Default: 3.
     pub degree: u32,
-    /// Time degree of color, 0 to 2; counts only with `degree` 3.
+    /// Time degree of color, 0 to 2; used only if `degree` is 3. Default: 2.
     pub degree_t: u32,
-    /// Seconds of playback.
+    /// Seconds of playback. Default: 2.
     pub duration_seconds: f32,
 }
 
@@ -31,12 +31,12 @@ impl Default for SynthSettings {
 
 /// Number of balls over the ground.
 const BALLS: usize = 7;
-/// Share of the Gaussians that make the ground, in percent.
+/// Share of the Gaussians that form the ground, in percent.
 const GROUND_PERCENT: usize = 40;
-/// Value of the first harmonic, by which colors are stored.
+/// Value of the first spherical harmonic: a stored coefficient is `color − 0.5` divided by it.
 const SH_C0: f32 = 0.282_094_79;
 
-/// Makes the scene. The time interval is [0, 1], up is +z, and everything fits in a box of about two units.
+/// Returns the scene. The time interval is [0, 1], up is +z, and everything fits in a box of about two units.
 pub fn synthesize(settings: &SynthSettings) -> GaussianScene {
     let mut random = Random(settings.seed);
     let mut harmonics = Harmonics { degree: settings.degree.min(3), ..Harmonics::default() };
@@ -93,7 +93,8 @@ fn ball_point(ball: usize, random: &mut Random) -> (Vec3, Vec3, Motion) {
     (motion(0.0), color, Box::new(motion))
 }
 
-/// A pair of quaternions: equal ones (read backwards) stay, a twist between them moves.
+/// Returns a pair of quaternions: equal ones give a Gaussian at rest, a twist between them one that moves. Their
+/// components are reversed so that the 3D part is the rotation `turn`.
 fn rotations(ground: bool, random: &mut Random) -> ([f32; 4], [f32; 4]) {
     let [a, b, c] = if ground {
         [random.in_range(0.0, TAU), 0.0, 0.0]

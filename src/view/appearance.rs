@@ -1,7 +1,8 @@
 //! How captures are shown: background, blend space, debug views, and the opacity, light and crop of one placed capture.
 //!
-//! In: choices of a view and of a placed capture, the trained colour and the mean of a Gaussian. Out: whether it is drawn and in which
-//! colour. The colours are those of `shaders/shared/appearance.wgsl`.
+//! In: the settings of a view and of a placed capture; the trained color (sRGB-encoded) and the mean (capture space) of
+//! a Gaussian. Out: whether the Gaussian is drawn, and its color in the blend space, as
+//! `shaders/shared/appearance.wgsl` computes it.
 
 use super::srgb::{decode, encode};
 use glam::{Affine3A, Vec3};
@@ -23,7 +24,7 @@ pub enum BlendSpace {
     /// sRGB-encoded values: the space captures are trained in.
     #[default]
     Encoded,
-    /// Linear light. Edges and haze come out lighter than in training.
+    /// Linear light. Edges and haze are lighter than in training.
     Linear,
 }
 
@@ -35,47 +36,48 @@ pub enum BlendSpace {
 /// # #[cfg(feature = "bevy")] {
 /// use bevy_gs4d::prelude::*;
 ///
-/// // On a camera: false colours for the number of splats at each pixel.
+/// // On a camera: false colors for the number of splats at each pixel.
 /// let settings = CaptureViewSettings { debug: DebugView::Overdraw, ..CaptureViewSettings::default() };
 /// assert_eq!(settings.blend_space, BlendSpace::Encoded, "the rest stays as it is");
 /// # }
 /// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum DebugView {
-    /// Their colours.
+    /// The colors of the captures.
     #[default]
     Color,
-    /// Expected depth: near is bright. Two units of the first capture are half as bright as its nearest.
+    /// Expected depth, near is bright: full brightness at depth 0, half of it at two units of the first capture.
     Depth,
-    /// How many splats were blended at each pixel: black 0, then blue, green and yellow to red, 64 and more.
+    /// Number of splats blended at each pixel, from black (0) through blue, green and yellow to red (64 or more).
     Overdraw,
     /// Every Gaussian that is active in the temporal filter's current segment: green if it is visible at this time, red if it is not.
     Active,
     /// The standard deviation in time `σ_t`: blue for an instant, red for the whole duration.
     Lifespan,
-    /// The direction and speed of motion: grey for rest; red, green and blue for x, y and z of the capture.
+    /// The direction and speed of motion: gray for rest; red, green and blue for x, y and z of the capture.
     Velocity,
 }
 
-/// What stands behind all Gaussians.
+/// What is behind all Gaussians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Background {
-    /// Nothing: the picture is premultiplied, for a compositor.
+    /// No background: the picture is premultiplied, for a compositor.
     None,
-    /// One colour, in the blend space.
+    /// One color, in the blend space.
     Color([f32; 3]),
     /// The capture's environment map.
     Environment,
 }
 
-/// What is changed in a capture where it is placed.
+/// How one placed capture is shown: opacity, light and crop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Appearance {
-    /// Factor on every opacity, from 0 to 1.
+    /// Factor on every opacity, from 0 to 1. Default: 1.
     pub opacity: f32,
-    /// Factor on linear light, one for each channel.
+    /// Factor on linear light, one for each channel. Default: 1.
     pub light: Vec3,
-    /// From capture space to a box from −1 to 1: Gaussians with means outside are not drawn.
+    /// Transforms capture space to a box from −1 to 1; Gaussians with means outside are not drawn. Default: `None`, no
+    /// crop.
     pub crop: Option<Affine3A>,
 }
 
@@ -85,19 +87,19 @@ impl Default for Appearance {
     }
 }
 
-/// What is done to the colours of Gaussians.
+/// How the colors of Gaussians are changed before they are blended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Lighting {
-    /// Nothing: blended as trained.
+    /// Not changed: blended as trained.
     AsTrained,
-    /// Light changes; the result is encoded again.
+    /// Multiplied by a factor on linear light, then sRGB-encoded again.
     Encoded,
-    /// Light changes and stays linear.
+    /// Multiplied by a factor on linear light and left linear.
     Linear,
 }
 
 impl Appearance {
-    /// What it does to colours that are blended in `space`.
+    /// Returns how colors that are blended in `space` are changed.
     pub fn lighting(&self, space: BlendSpace) -> Lighting {
         match space {
             BlendSpace::Linear => Lighting::Linear,
@@ -106,7 +108,7 @@ impl Appearance {
         }
     }
 
-    /// A trained colour (sRGB-encoded) in the blend space.
+    /// Returns a trained color (sRGB-encoded) with the light applied, in the blend space.
     pub fn color(&self, color: Vec3, space: BlendSpace) -> Vec3 {
         match self.lighting(space) {
             Lighting::AsTrained => color,
@@ -115,7 +117,7 @@ impl Appearance {
         }
     }
 
-    /// Whether a Gaussian with this mean, in capture space, is drawn.
+    /// Returns whether a Gaussian with this mean, in capture space, is inside the crop box, if there is one.
     pub fn shows(&self, mean: Vec3) -> bool {
         self.crop.is_none_or(|crop| crop.transform_point3(mean).abs().max_element() <= 1.0)
     }

@@ -1,7 +1,7 @@
 //! Cameras: pose, lens and picture size, as a dataset describes them.
 //!
-//! In: where a camera stands and its [`Lens`], in the conventions of OpenCV and COLMAP. Out: a [`Camera`], which makes a [`View`] of
-//! any moment.
+//! In: a pose and a [`Lens`], in the conventions of OpenCV and COLMAP. Out: a [`Camera`], which returns its [`View`] at
+//! a time.
 
 use super::View;
 use glam::{Mat4, UVec2, Vec2, Vec3, Vec4};
@@ -17,15 +17,15 @@ pub struct Camera {
     pub lens: Lens,
 }
 
-/// How a camera's lens was described, which matters: the original treats the two differently ([`RasterFov`]).
+/// How a camera's lens is described. The original treats the two descriptions differently ([`RasterFov`]).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Lens {
-    /// A *FoV camera*: tangents of half the horizontal and vertical field of view, centred.
+    /// A *FoV camera*: tangents of half the horizontal and vertical field of view, centered.
     Fov {
         /// `tan(FovX / 2)`, `tan(FovY / 2)`.
         tan: Vec2,
     },
-    /// An *intrinsics camera*: focal lengths and principal point in pixels (pixel centres at half-integers, as in COLMAP).
+    /// An *intrinsics camera*: focal lengths and principal point in pixels (pixel centers at half-integers, as in COLMAP).
     Intrinsics {
         /// `fl_x`, `fl_y` in pixels.
         focal: Vec2,
@@ -34,12 +34,13 @@ pub enum Lens {
     },
 }
 
-/// Which field of view shapes the footprints of splats seen by an intrinsics camera.
+/// Which field of view shapes the footprints of splats seen by an intrinsics camera. Default:
+/// [`Reference`](Self::Reference).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RasterFov {
-    /// The original's placeholder of −1 rad on both axes, with which its N3V-type captures were trained (section 3.2 of the
-    /// 4DGS model: the *sentinel*). FoV cameras are not affected.
+    /// The original's placeholder of −1 rad on both axes (the *sentinel*), with which its N3V-type captures were
+    /// trained. FoV cameras are not affected.
     #[default]
     Reference,
     /// The camera's true field of view.
@@ -47,21 +48,23 @@ pub enum RasterFov {
 }
 
 impl Camera {
-    /// Half-angle tangents of a FoV camera from its horizontal angle (radians) and picture size: square pixels.
+    /// Returns the lens of a FoV camera with square pixels, from its horizontal field of view (radians) and picture
+    /// size (pixels).
     pub fn fov_lens(fov_x: f64, size: UVec2) -> Lens {
         let tan_x = (fov_x / 2.0).tan();
         Lens::Fov { tan: Vec2::new(tan_x as f32, (tan_x * f64::from(size.y) / f64::from(size.x)) as f32) }
     }
 
-    /// A camera at `eye` looking at `target`, with the horizontal field of view given (radians).
+    /// Creates a camera at `eye` that looks at `target` (capture space), with the horizontal field of view given
+    /// (radians).
     pub fn look_at(eye: Vec3, target: Vec3, up: Vec3, fov_x: f32, size: UVec2) -> Self {
-        // OpenGL axes to OpenCV axes: y and z turn round.
+        // OpenGL axes to OpenCV axes: y and z are negated.
         let flip = Mat4::from_diagonal(Vec4::new(1.0, -1.0, -1.0, 1.0));
         let world_to_camera = flip * Mat4::look_at_rh(eye, target, up);
         Self { world_to_camera, size, lens: Self::fov_lens(f64::from(fov_x), size) }
     }
 
-    /// This camera at `time`.
+    /// Returns the view of this camera at `time`, in the capture's unit.
     pub fn view(&self, time: f32, raster_fov: RasterFov) -> View {
         let size = self.size.as_vec2();
         let (projection, tan_fov) = match self.lens {

@@ -1,7 +1,7 @@
-//! Views of a capture and what drawing them gives, on glam alone: the innermost ring, which knows no Gaussian.
+//! Views of a capture and the results of drawing them: the innermost ring, which contains nothing about Gaussians.
 //!
-//! In: cameras ([`Camera`]), at a time a [`View`], and how captures are shown ([`Appearance`], [`Background`], [`BlendSpace`],
-//! [`DebugView`]). Out: the types of a drawn view: [`Picture`] and [`Frame`].
+//! In: cameras ([`Camera`]; at one time, a [`View`]), and how captures are shown ([`Appearance`], [`Background`],
+//! [`BlendSpace`], [`DebugView`]). Out: the types of a drawn view, [`Picture`] and [`Frame`].
 
 mod appearance;
 mod camera;

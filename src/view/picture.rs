@@ -1,6 +1,6 @@
-//! Pictures in floating point: what training views are compared with and what rendering gives.
+//! Pictures in floating point: training images and rendered views.
 //!
-//! In and out: RGB values in the blend space (sRGB-encoded), usually 0 to 1; files as 8-bit PNG/JPEG or raw float32.
+//! In and out: RGB values in the blend space (sRGB-encoded), usually 0 to 1; 8-bit RGB images or raw float32 bytes.
 
 use glam::{UVec2, Vec3};
 
@@ -14,34 +14,37 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// A picture of one colour.
+    /// Returns a picture of one color.
     pub fn filled(size: UVec2, color: Vec3) -> Self {
         Self { size, pixels: vec![color; size.x as usize * size.y as usize] }
     }
 
-    /// The pixel at column `x`, row `y`.
+    /// Returns the pixel at column `x`, row `y`.
+    ///
+    /// # Panics
+    /// If `y * width + x` is beyond the last pixel.
     pub fn pixel(&self, x: u32, y: u32) -> Vec3 {
         self.pixels[y as usize * self.size.x as usize + x as usize]
     }
 
-    /// Every value clamped to 0..1, as the original evaluates.
+    /// Returns the picture with every value clamped to 0..1, as the original evaluates it.
     pub fn clamped(&self) -> Self {
         Self { size: self.size, pixels: self.pixels.iter().map(|p| p.clamp(Vec3::ZERO, Vec3::ONE)).collect() }
     }
 
-    /// 8-bit RGB: clamped, times 255, rounded.
+    /// Converts to 8-bit RGB: clamped to 0..1, times 255, rounded.
     pub fn to_rgb8(&self) -> image::RgbImage {
         let bytes = self.pixels.iter().flat_map(|p| p.to_array()).map(|v| (v.clamp(0.0, 1.0) * 255.0).round() as u8);
         image::RgbImage::from_raw(self.size.x, self.size.y, bytes.collect()).unwrap_or_default()
     }
 
-    /// From 8-bit RGB.
+    /// Converts from 8-bit RGB: divided by 255.
     pub fn from_rgb8(image: &image::RgbImage) -> Self {
         let pixels = image.pixels().map(|p| Vec3::from(p.0.map(f32::from)) / 255.0).collect();
         Self { size: UVec2::new(image.width(), image.height()), pixels }
     }
 
-    /// The raw form: height × width × 3 little-endian float32, unclamped.
+    /// Returns the raw form: height × width × 3 little-endian float32, unclamped.
     pub fn to_raw(&self) -> Vec<u8> {
         self.pixels.iter().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes).collect()
     }

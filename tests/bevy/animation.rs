@@ -1,7 +1,7 @@
 //! Playback animated by Bevy's own animations.
 //!
-//! In: an `AnimationClip` with curves over fields of a `Playback`. Out: proof that what it says is played. Needs neither a GPU nor a
-//! window.
+//! In: an `AnimationClip` with curves over fields of a `Playback`. Out: proof that playback follows the curves. Needs
+//! neither a GPU nor a window.
 
 use crate::support::event_log::{debug, take_events};
 use crate::support::playback_app::{app, capture, change, get, pass};
@@ -10,13 +10,13 @@ use bevy::prelude::*;
 use bevy_gs4d::playback::{Clip, Track};
 use bevy_gs4d::prelude::*;
 
-/// A capture of four seconds whose playback an animation of two seconds moves.
+/// Spawns a capture of four seconds whose playback an animation of two seconds animates.
 fn spawn(app: &mut App, playback: Playback, curve: impl AnimationCurve) -> Entity {
     let capture = capture(app, 4.0, 4);
     animate(app, (GaussianCapture3d(capture), playback), curve)
 }
 
-/// An entity that an animation of two seconds moves.
+/// Spawns an entity that an animation of two seconds animates.
 fn animate(app: &mut App, bundle: impl Bundle, curve: impl AnimationCurve) -> Entity {
     let target = AnimationTargetId::from_name(&Name::new("capture"));
     let mut clip = AnimationClip::default();

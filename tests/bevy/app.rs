@@ -1,7 +1,8 @@
 //! Captures in real Bevy apps without a window: what is drawn, where, and when.
 //!
-//! In: small scenes made by hand. Out: proof that Bevy's pixels are those of the CPU reference, that meshes hide what they should, that
-//! transforms, viewports, multisampling and time do what they say. Skipped where there is no GPU, not even a software one.
+//! In: small scenes made by hand. Out: proof that Bevy's pixels are those of the CPU reference, that meshes hide what
+//! is behind them, and that transforms, viewports, multisampling and time have their documented effect. Skipped where
+//! there is no GPU, not even a software one.
 
 use crate::support::cpu_reference::{
     DURATION, SIZE, add, blob, difference, difference_between, eye, rgb, scene, view, view_of,
@@ -21,7 +22,7 @@ use std::time::Duration;
 
 const BLACK: Background = Background::Color([0.0; 3]);
 
-/// Overlapping Gaussians of all kinds of shapes; two of them move.
+/// Returns overlapping Gaussians of all kinds of shapes; two of them move.
 fn crowd() -> RuntimeScene {
     let moving = |gaussian: Gaussian, velocity: [f32; 3]| Gaussian { velocity, sigma_t: 0.4, ..gaussian };
     let tilted = Gaussian {
@@ -37,7 +38,7 @@ fn crowd() -> RuntimeScene {
     ])
 }
 
-/// One red Gaussian at the origin.
+/// Returns one red Gaussian at the origin.
 fn red() -> RuntimeScene {
     scene(&[(blob(Vec3::ZERO, Vec3::splat(0.4), 0.98), Vec3::new(1.0, 0.0, 0.0))])
 }
@@ -47,7 +48,7 @@ fn spawn(app: &mut App, scene: &RuntimeScene, transform: Transform) -> Entity {
     app.world_mut().spawn((GaussianCapture3d(handle), Playback::paused_at(0.0), transform)).id()
 }
 
-/// An unlit green box.
+/// Spawns an unlit green box.
 fn spawn_box(app: &mut App, size: Vec3, center: Vec3) {
     let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(Cuboid::from_size(size));
     let green = StandardMaterial { base_color: Color::srgb(0.0, 1.0, 0.0), unlit: true, ..default() };
@@ -134,7 +135,7 @@ fn a_transform_moves_positions_and_shapes() {
     assert!(apart <= 2.0, "the reference with every Gaussian transformed is {apart} / 255 apart");
 }
 
-/// Every Gaussian transformed by itself.
+/// Returns the scene with every Gaussian transformed.
 fn moved(scene: &RuntimeScene, transform: &Transform) -> RuntimeScene {
     let matrix = Mat3::from_mat4(transform.to_matrix());
     let mut moved = scene.clone();

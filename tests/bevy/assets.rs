@@ -1,8 +1,8 @@
-//! Captures as assets in Bevy apps: what entities report of loading, files that are missing, broken, replaced or saved, and what
-//! goes when nobody wants it any more.
+//! Captures as assets in Bevy apps: the loading states of entities; files that are missing, broken, replaced or saved;
+//! captures without handles.
 //!
-//! In: packages and checkpoints written to a folder. Out: proof that states and messages say what happened. Needs neither a GPU nor a
-//! window.
+//! In: packages and checkpoints written to a folder. Out: proof that states and messages are right, and that captures
+//! are dropped with their last handle. Needs neither a GPU nor a window.
 
 use crate::support::event_log::{Observed, record, take_events};
 use crate::support::pth::Pth;
@@ -30,7 +30,8 @@ use tempfile::TempDir;
 /// How long files may take to load.
 const LOAD_TIMEOUT: Duration = Duration::from_secs(60);
 
-/// An app whose assets are in `folder`. It watches them only with `watch`, so that every reload is one that was asked for.
+/// Returns an app whose assets are in `folder`. It watches them only with `watch`, so that every other reload is an
+/// explicit one.
 fn app(folder: &Path, watch: bool) -> App {
     let assets = AssetPlugin {
         file_path: folder.to_str().expect("temporary folders have plain names").into(),
@@ -48,7 +49,7 @@ fn ready(entity: Entity, capture: &Handle<GaussianCapture>) -> String {
     format!("{:?}", CaptureReady { entity, capture: capture.id() })
 }
 
-/// Updates until something is so, and twice more: nothing that is said late is missed.
+/// Updates until `so` returns true, and twice more, so that late messages are not missed.
 fn wait(app: &mut App, what: &str, so: impl Fn(&App) -> bool) {
     let start = Instant::now();
     while !so(app) {
@@ -88,7 +89,7 @@ fn scene<'a>(app: &'a App, capture: &Handle<GaussianCapture>) -> Option<&'a Runt
     Some(captures(app).get(capture)?.scene())
 }
 
-/// How many Gaussians a capture has; 0 for one that is not there.
+/// Returns the number of Gaussians of a capture; 0 if it is not among the assets.
 fn count(app: &App, capture: &Handle<GaussianCapture>) -> usize {
     scene(app, capture).map_or(0, RuntimeScene::len)
 }
@@ -106,7 +107,7 @@ fn write(folder: &Path, name: &str, count: usize) {
         .expect("the folder can be written to");
 }
 
-/// Half of a package.
+/// Writes the first half of a package.
 fn write_broken(folder: &Path, name: &str) {
     write(folder, name, 50);
     let bytes = fs::read(folder.join(name)).expect("just written");
@@ -131,7 +132,7 @@ fn a_capture_is_ready_once_it_has_been_loaded() {
     assert_eq!(take_events(&mut app), [ready(second, &capture)], "and only this one is told");
 }
 
-/// Files that are handed out only when the test lets them go.
+/// An asset source whose files can be read only once the test has opened the gate.
 #[derive(Clone)]
 struct Gated {
     files: MemoryAssetReader,
@@ -140,7 +141,8 @@ struct Gated {
 
 impl AssetReader for Gated {
     async fn read<'a>(&'a self, path: &'a Path) -> Result<impl Reader + 'a, AssetReaderError> {
-        // Who reads on the main thread waits for nothing, and the test fails. A test that has failed lets everything go.
+        // A read on the main thread waits until the timeout, and the test fails. A failed test drops the sender, which
+        // opens the gate.
         let _ = self.gate.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOAD_TIMEOUT);
         self.files.read(path).await
     }
@@ -302,7 +304,7 @@ fn a_capture_goes_with_its_last_handle() {
     assert_eq!(captures(&app).len(), 0, "now it is not");
 }
 
-/// A capture that uses what the format has: colours over time and a filter.
+/// Returns a capture with colours over time and a filter.
 fn dressed() -> RuntimeScene {
     let scene = synthetic(200);
     let runtime = scene.clone().into_runtime().expect("a synthetic scene can be drawn");
@@ -343,7 +345,7 @@ fn what_cannot_be_saved_is_an_error() {
 
 const WHITE: &str = "Namespace(sh_degree=3, white_background=True, prefilter_var=0.25)";
 
-/// A checkpoint without `cfg_args`, and two with.
+/// Returns a folder with a checkpoint without `cfg_args`, and two with.
 fn checkpoints() -> TempDir {
     let folder = folder();
     let bytes = Pth::rotating(3, 48).bytes();

@@ -1,8 +1,8 @@
-//! Captures among everything else in a Bevy frame: looks, cameras, visibility, depth, colour.
+//! Captures among everything else in a Bevy frame: appearance, cameras, visibility, depth, colour.
 //!
-//! In: small scenes made by hand, in headless apps. Out: proof that opacity, light, crop and blend spaces are those of the CPU reference,
-//! that every camera sees what it should from where it stands, and that captures and meshes hide each other in the documented
-//! order. Skipped where there is no GPU, not even a software one.
+//! In: small scenes made by hand, in headless apps. Out: proof that opacity, light, crop and blend spaces are those of
+//! the CPU reference, that every camera draws the captures that it should, from its own place, and that captures and
+//! meshes hide each other in the documented order. Skipped where there is no GPU, not even a software one.
 
 use crate::support::cpu_reference::{
     DURATION, SIZE, blob, difference, difference_between, eye, rgb, scene, view, view_of,

@@ -1,8 +1,8 @@
-//! The examples as programs: what they write without a window, and how they take wrong arguments.
+//! The examples as programs: the pictures that they write without a window, and their errors for wrong arguments.
 //!
-//! In: the examples that `cargo test` has built beside the tests. Out: proof that each writes as many pictures as it is asked for and
-//! ends well, that there is something on them, captures among it, and that it moves. Drawing is skipped where there is no GPU, not
-//! even a software one.
+//! In: the examples that `cargo test` has built beside the tests. Out: proof that each exits with success and writes as
+//! many pictures as it is asked for, that these show captures, and that the captures move. Drawing is skipped where
+//! there is no GPU, not even a software one.
 
 use crate::support::skip::skip;
 use bevy_gs4d::codec;
@@ -18,7 +18,7 @@ use tempfile::TempDir;
 
 const EXAMPLES: [&str; 5] = ["minimal", "play", "timeline", "walkthrough", "headless"];
 
-/// Tests are in `deps`, beside `examples`.
+/// Returns the path of an example: tests are in `deps`, beside `examples`.
 fn program(example: &str) -> PathBuf {
     let test = std::env::current_exe().expect("tests know where they are");
     let folder = test.ancestors().nth(2).expect("tests are in a folder of the target folder").join("examples");
@@ -38,14 +38,15 @@ fn run(example: &str, arguments: &[&str]) -> Output {
     run_with(Path::new(ROOT), example, arguments)
 }
 
-/// With the folder `assets` that is in `root`.
+/// Runs an example with the folder `assets` in `root`.
 fn run_with(root: &Path, example: &str, arguments: &[&str]) -> Output {
     let mut command = Command::new(program(example));
     command.args(arguments).current_dir(root).env("BEVY_ASSET_ROOT", root);
     command.output().unwrap_or_else(|error| panic!("{example} can be started: {error}"))
 }
 
-/// What an example writes without a window, in the order of the names, `frames` moments.
+/// Returns the pictures of `frames` moments that an example writes without a window, in the order of their names;
+/// `None` if there is no GPU.
 fn pictures(root: &Path, example: &str, options: &[&str], frames: usize) -> Option<Vec<RgbaImage>> {
     if !has_gpu() {
         skip(TestingError::NoGpu);
@@ -72,7 +73,7 @@ fn read(folder: &Path) -> Vec<RgbaImage> {
     paths.iter().map(|path| image::open(path).expect("a whole picture").into_rgba8()).collect()
 }
 
-/// Draws two moments and looks at them.
+/// Draws two moments and checks the pictures.
 fn check(example: &str, options: &[&str], expected: usize) {
     let Some(pictures) = pictures(Path::new(ROOT), example, options, 2) else { return };
     assert_eq!(pictures.len(), expected, "{example} writes as many pictures as it is asked for");
@@ -115,8 +116,8 @@ fn headless_writes_pictures() {
     check("headless", &["--size", "200x120"], 2);
 }
 
-/// A folder whose assets are those of the crate, but that the capture has gone entirely transparent: it is as long and as large as
-/// it was, so that everything else is as it was, too.
+/// Returns a folder with the assets of the crate, except that the capture is entirely transparent. It is as long and as
+/// large as before, so that everything else is the same.
 fn invisible() -> TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (from, to) = (Path::new(ROOT).join("assets"), folder.path().join("assets"));

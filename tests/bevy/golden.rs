@@ -84,7 +84,7 @@ fn pose(view: &GoldenView) -> Transform {
     Transform::from_matrix((flip * world_to_camera).inverse())
 }
 
-/// Of 8-bit RGB against floats clamped to 0..1.
+/// Returns the PSNR of 8-bit RGB against floats clamped to 0..1, dB.
 fn psnr(picture: &RgbaImage, expected: &Picture) -> f64 {
     let error = |(pixel, expected): (&image::Rgba<u8>, &Vec3)| -> f64 {
         let channel = |c: usize| f64::from(pixel.0[c]) / 255.0 - f64::from(expected[c].clamp(0.0, 1.0));

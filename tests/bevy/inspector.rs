@@ -1,8 +1,8 @@
 //! The panel, in Bevy apps without a window.
 //!
-//! In: captures that have been loaded, failed to load, or are missing. Out: proof that the panel draws itself over its edge of the
-//! picture only, touches nothing by itself, and sets views that change pixels. Skipped where there is no GPU, not even a software
-//! one.
+//! In: captures that have been loaded, failed to load, or are missing. Out: proof that the panel covers its edge of the
+//! picture only, changes nothing by itself, and sets views that change pixels. Skipped where there is no GPU, not even
+//! a software one.
 
 use crate::support::offscreen_app::{app, picture, spawn_camera};
 use crate::support::skip;
@@ -40,7 +40,7 @@ struct Seen {
     changes: usize,
 }
 
-/// An app with a camera and the panel, or nothing where there is no GPU.
+/// Returns an app with a camera and the panel, and the camera; `None` if there is no GPU.
 fn inspected() -> Option<(App, Entity)> {
     let mut app = app(SIZE)?;
     app.add_plugins(InspectorPlugin).init_resource::<Seen>();
@@ -64,7 +64,7 @@ fn set_open(app: &mut App, open: bool) {
     app.world_mut().resource_mut::<Inspector>().open = open;
 }
 
-/// Updates `seconds` apart, none of which may fail.
+/// Runs updates `seconds` apart, none of which may fail.
 fn run(app: &mut App, updates: usize, seconds: f32) {
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f32(seconds)));
     for _ in 0..updates {
@@ -73,7 +73,7 @@ fn run(app: &mut App, updates: usize, seconds: f32) {
     }
 }
 
-/// The share of pixels of some columns that are not the same.
+/// Returns the share of pixels of some columns that differ.
 fn changed(a: &RgbaImage, b: &RgbaImage, columns: Range<u32>) -> f64 {
     let all = f64::from(columns.end - columns.start) * f64::from(SIZE.y);
     let differs = |&(x, y): &(u32, u32)| a.get_pixel(x, y) != b.get_pixel(x, y);

@@ -1,7 +1,7 @@
 //! Picking in Bevy apps: rays of the world against captures that are placed, played, cropped and hidden.
 //!
-//! In: small scenes made by hand. Out: proof that a ray hits what is seen, where it is seen. Needs neither a GPU nor a window. What a
-//! ray does to the Gaussians themselves is tested in `scene::pick`.
+//! In: small scenes made by hand. Out: proof that a ray hits what is visible, where it is visible. Needs neither a GPU
+//! nor a window. `tests/core/pick.rs` and `scene::pick` test rays against the Gaussians themselves.
 
 use bevy::ecs::system::RunSystemOnce;
 use bevy::prelude::*;
@@ -14,7 +14,7 @@ use bevy_gs4d::scene::{FilterKind, RuntimeScene, TemporalFilter};
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
 use std::f32::consts::FRAC_PI_2;
 
-/// A round Gaussian with a standard deviation of a tenth, at `mean` at the start.
+/// Returns a round Gaussian with a standard deviation of a tenth, at `mean` at the start.
 fn ball(mean: Vec3, opacity: f32) -> Gaussian {
     Gaussian {
         mean: mean.to_array(),
@@ -27,7 +27,7 @@ fn ball(mean: Vec3, opacity: f32) -> Gaussian {
     }
 }
 
-/// A scene of one second.
+/// Returns a scene of one second.
 fn scene(gaussians: &[Gaussian]) -> RuntimeScene {
     let harmonics = Harmonics { coefficients: 1, values: vec![0.0; gaussians.len() * 3], ..Harmonics::default() };
     RuntimeScene::sliced(gaussians.to_vec(), harmonics)
@@ -39,7 +39,8 @@ fn app() -> App {
     app
 }
 
-/// A capture at a place, paused at its start. Without Bevy's plugins for it, where it is and that it is visible is said here.
+/// Spawns a capture at a place, paused at its start. The app has no plugins for transforms and visibility, so that both
+/// are set here.
 fn place(app: &mut App, scene: RuntimeScene, transform: Transform) -> Entity {
     let handle = app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(scene));
     let seen = (GlobalTransform::from(transform), InheritedVisibility::VISIBLE);
@@ -57,12 +58,12 @@ fn cast_on(app: &mut App, entity: Entity, ray: Ray3d) -> Option<CaptureHit> {
     app.world_mut().run_system_once(system).expect("the picker's assets are there")
 }
 
-/// From five units along +z back to the origin.
+/// Returns a ray from five units along +z back to the origin.
 fn ahead() -> Ray3d {
     Ray3d::new(Vec3::new(0.0, 0.0, 5.0), Dir3::NEG_Z)
 }
 
-/// The Gaussian that [`ahead`] hits.
+/// Returns the Gaussian that [`ahead`] hits; `None` if it hits none.
 fn hit(app: &mut App) -> Option<usize> {
     cast(app, ahead()).map(|hit| hit.gaussian)
 }

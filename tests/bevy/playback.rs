@@ -1,7 +1,8 @@
-//! Playback in Bevy apps: which events are sent and when, shared clocks, the game's time, and what tools see of the components.
+//! Playback in Bevy apps: which events are sent and when, shared clocks, the game's time, and reflection of the
+//! components.
 //!
-//! In: captures of two seconds with key-frames every half second. Out: proof that time goes where it is sent and that
-//! every change has its event. Needs neither a GPU nor a window.
+//! In: captures of two seconds with key-frames every half second. Out: proof that times are right and that every change
+//! has its event. Needs neither a GPU nor a window.
 
 use crate::support::event_log::{debug, take_events};
 use crate::support::playback_app::{app, capture, change, get, pass};
@@ -11,7 +12,7 @@ use bevy_gs4d::prelude::*;
 use bevy_gs4d::stereo::SideBySide;
 use std::any::{TypeId, type_name};
 
-/// A capture of two seconds with five key-frames.
+/// Spawns a capture of two seconds with five key-frames.
 fn spawn(app: &mut App, bundle: impl Bundle) -> Entity {
     let handle = capture(app, 2.0, 4);
     app.world_mut().spawn((GaussianCapture3d(handle), bundle)).id()
@@ -246,7 +247,7 @@ fn whoever_hears_of_an_end_may_despawn() {
     assert!(take_events(&mut app).contains(&ended(second)), "which is said, too");
 }
 
-/// What is missing of a component for scenes, animations and inspectors.
+/// Returns what a component lacks to be used in scenes, animations and inspectors; `None` if nothing.
 fn unknown<C: Component>(app: &App) -> Option<&'static str> {
     let registry = app.world().resource::<AppTypeRegistry>().read();
     registry.get_type_data::<ReflectComponent>(TypeId::of::<C>()).is_none().then(type_name::<C>)

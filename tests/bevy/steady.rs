@@ -1,9 +1,9 @@
-//! Captures over many frames: nothing is made that is not needed, nothing stays that is not needed any more.
+//! Captures over many frames: nothing is created without need, and nothing is kept that is no longer needed.
 //!
-//! In: synthetic captures in headless apps. Out: proof that the GPU's memory stands still while time advances, that captures and cameras
-//! come and go without a trace and views give back what they need no longer, that captures are exchanged without a gap and survive a
-//! new start of the renderer; and that a GPU that is too small, and a capture that cannot be right, are named. Skipped where there is
-//! no GPU.
+//! In: synthetic captures in headless apps. Out: proof that GPU memory is constant while time advances, that removed
+//! captures and cameras leave nothing behind, that views release memory that they no longer need, that captures are
+//! replaced without a gap and survive a restart of the renderer, and that a GPU that is too small and an invalid
+//! capture are reported. Skipped where there is no GPU.
 
 use crate::support::cpu_reference::{blob, scene};
 use crate::support::offscreen_app::{self, app, picture, spawn_camera};
@@ -40,7 +40,7 @@ fn settings() -> WgpuSettings {
     WgpuSettings { backends: Some(backends), ..default() }
 }
 
-/// Two seconds of a moving scene with +z up, with a filter of half-second segments if wanted.
+/// Returns two seconds of a moving scene with +z up, with a filter of half-second segments if `filtered`.
 fn synthetic(count: usize, seed: u64, filtered: bool) -> RuntimeScene {
     let settings = SynthSettings { count, seed, degree: 0, degree_t: 0, duration_seconds: 2.0 };
     let mut scene = synthesize(&settings).into_runtime().expect("synthetic scenes can be drawn");
@@ -51,13 +51,13 @@ fn synthetic(count: usize, seed: u64, filtered: bool) -> RuntimeScene {
     scene
 }
 
-/// Still Gaussians of one color at the origin.
+/// Returns Gaussians of one color at rest at the origin.
 fn heap(count: usize, color: Vec3) -> RuntimeScene {
     let gaussian = Gaussian { covariance: [0.2, 0.0, 0.0, 0.2, 0.0, 0.2], ..blob(Vec3::ZERO, Vec3::ONE, 0.98) };
     scene(&vec![(gaussian, color); count])
 }
 
-/// Looks at a synthetic scene.
+/// Returns the pose of a camera that sees a synthetic scene.
 fn eye() -> Transform {
     Transform::from_xyz(0.5, -3.0, 1.5).looking_at(Vec3::ZERO, Vec3::Z)
 }
@@ -67,7 +67,7 @@ fn spawn(app: &mut App, scene: RuntimeScene, playback: Playback) -> Entity {
     app.world_mut().spawn((GaussianCapture3d(handle), playback)).id()
 }
 
-/// Two eyes of one size, of which the second writes depth.
+/// Spawns two cameras with targets of one size, of which the second writes depth.
 fn spawn_eyes(app: &mut App) {
     spawn_camera(app, Msaa::Off, eye());
     let second = Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), SIZE);
@@ -76,7 +76,7 @@ fn spawn_eyes(app: &mut App) {
     app.world_mut().entity_mut(camera).insert((second.target(), depth));
 }
 
-/// Frames of [`STEP`] each.
+/// Runs frames of [`STEP`] each.
 fn run(app: &mut App, frames: usize) {
     run_in_steps(app, frames, STEP);
 }
@@ -91,14 +91,14 @@ fn run_in_steps(app: &mut App, frames: usize, step: Duration) {
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
 }
 
-/// Waits until the GPU has drawn everything and its counters have arrived: how many frames late they are must not depend on what
-/// else the machine does.
+/// Waits until the GPU has drawn everything and its counters have arrived, so that the number of frames by which they
+/// are late does not depend on the load of the machine.
 fn finish_drawing(app: &App) {
     let device = app.sub_app(RenderApp).world().resource::<RenderDevice>().wgpu_device();
     device.poll(PollType::wait_indefinitely()).expect("the GPU finishes its work");
 }
 
-/// What is said of captures that fail, from now on.
+/// Collects the failures of captures from now on.
 fn failures_of(app: &mut App) -> Arc<Mutex<Vec<CaptureFailed>>> {
     let failures = Arc::new(Mutex::new(Vec::new()));
     let sink = failures.clone();
@@ -112,18 +112,18 @@ fn statistics(app: &App) -> CaptureStatistics {
     app.world().resource::<CaptureStatistics>().clone()
 }
 
-/// What has been done so far for this app.
+/// Returns the counters of the work done so far for this app.
 fn work(app: &App) -> WorkCounters {
     statistics(app).work()
 }
 
-/// Resources made and bytes uploaded so far for this app.
+/// Returns the number of resources created and of bytes uploaded so far for this app.
 fn made(app: &App) -> (u64, u64) {
     let work = work(app);
     (work.created(), work.uploaded())
 }
 
-/// Bytes of a view's buffers and targets.
+/// Returns the bytes of a view's buffers and targets.
 fn view_bytes(app: &App, camera: Entity) -> u64 {
     statistics(app).view(camera).map_or(0, |view| view.bytes)
 }
@@ -255,7 +255,7 @@ fn captures_come_and_go_without_a_trace() {
             let scene = synthetic(50_000, frame, frame % 20 == 0);
             living.push_back(spawn(&mut app, scene, Playback::default()));
         }
-        // Each shows for some frames, then all do.
+        // Each is visible for some frames, then all are.
         let show = match frame % 10 {
             _ if frame == 105 => Some(Visibility::Inherited),
             4 | 7 => Some(Visibility::Hidden),
@@ -326,7 +326,7 @@ fn a_new_start_of_the_renderer_makes_everything_again() {
     let before = picture(&mut app, 0.0);
     assert!(before.pixels().any(|pixel| pixel.0[..3] != [0, 0, 0]), "something shows");
     let (created, uploaded) = made(&app);
-    // What Bevy does once it has another device.
+    // Bevy does this once it has another device.
     app.sub_app_mut(RenderApp).world_mut().run_schedule(RenderStartup);
     let after = picture(&mut app, 0.0);
     assert!(work(&app).uploaded() > uploaded, "the capture has been uploaded again");
@@ -347,7 +347,7 @@ fn captures_come_back_after_a_lost_device() {
     app.add_plugins(GaussianCapturePlugin).insert_resource(ClearColor(Color::BLACK));
     app.insert_resource(RenderErrorHandler(|error, _, _| match error.ty {
         ErrorType::DeviceLost => RenderErrorPolicy::Recover(RenderCreation::Automatic(Box::new(settings()))),
-        // What was under way when it was lost.
+        // Errors of work that was under way when it was lost.
         _ => RenderErrorPolicy::Ignore,
     }));
     spawn(&mut app, synthetic(2000, 3, true), Playback::paused_at(0.7));
@@ -361,7 +361,7 @@ fn captures_come_back_after_a_lost_device() {
     let lost = app.sub_app(RenderApp).world().resource::<RenderDevice>().wgpu_device().clone();
     let uploaded = work(&app).uploaded();
     lost.destroy();
-    // Says so to Bevy.
+    // Lets Bevy notice it.
     lost.poll(PollType::wait_indefinitely()).expect("all work has been done");
     let start = Instant::now();
     while work(&app).uploaded() == uploaded {

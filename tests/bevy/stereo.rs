@@ -1,4 +1,4 @@
-//! Two eyes in real Bevy apps without a window: where they see things, and that each sees what a single camera would.
+//! Two eyes in real Bevy apps without a window: their disparity, and their pictures against those of single cameras.
 //!
 //! In: small scenes made by hand, heads with two eyes. Out: proof that disparity is that of pinholes, that both eyes' pictures are
 //! those of single cameras at the same moment, and that halves of one target and two targets show the same. Skipped where there is no
@@ -24,7 +24,7 @@ use image::imageops::crop_imm;
 /// Far more than people have, so that disparity is many pixels.
 const RIG: StereoRig = StereoRig { ipd: 0.2 };
 
-/// A round Gaussian and its colour.
+/// Returns a round Gaussian and its colour.
 fn splat(mean: Vec3, deviation: f32, velocity: Vec3, color: Vec3) -> (Gaussian, Vec3) {
     let variance = deviation * deviation;
     let gaussian = Gaussian {
@@ -39,12 +39,12 @@ fn splat(mean: Vec3, deviation: f32, velocity: Vec3, color: Vec3) -> (Gaussian, 
     (gaussian, color)
 }
 
-/// One small white Gaussian near the origin that rises by 0.8 units in the scene's time.
+/// Returns one small white Gaussian near the origin that rises by 0.8 units over the time interval.
 fn dot() -> RuntimeScene {
     scene(&[splat(Vec3::new(0.1, -0.2, 0.0), 0.05, Vec3::new(0.0, 0.8, 0.0), Vec3::ONE)])
 }
 
-/// Overlapping Gaussians near and far, some of them moving.
+/// Returns overlapping Gaussians near and far, some of them moving.
 fn crowd() -> RuntimeScene {
     scene(&[
         splat(Vec3::new(0.3, 0.1, 0.6), 0.2, Vec3::ZERO, Vec3::new(0.9, 0.2, 0.1)),
@@ -63,7 +63,7 @@ fn spawn(app: &mut App, scene: &RuntimeScene, playback: Playback) {
 struct StereoApp {
     app: App,
     head: Entity,
-    /// What the right eye draws into; without, both draw side by side.
+    /// The target of the right eye; `None` if both draw side by side.
     right: Option<Offscreen>,
 }
 
@@ -72,7 +72,7 @@ impl StereoApp {
         Self::of_size(SIZE, scene, head, separate)
     }
 
-    /// The same with so many pixels for each eye.
+    /// Like [`new`](Self::new), with `eye` pixels for each eye.
     fn of_size(eye: UVec2, scene: &RuntimeScene, head: Transform, separate: bool) -> Option<Self> {
         let size = if separate { eye } else { eye * UVec2::new(2, 1) };
         let mut app = app(size)?;
@@ -94,7 +94,7 @@ impl StereoApp {
         Some(Self { app, head: stereo.head, right })
     }
 
-    /// What the left and the right eye see after `seconds` more.
+    /// Returns the pictures of the left and the right eye after `seconds` more.
     fn eyes(&mut self, seconds: f32) -> [RgbaImage; 2] {
         let left = picture(&mut self.app, seconds);
         match &self.right {
@@ -104,12 +104,12 @@ impl StereoApp {
     }
 }
 
-/// Lists of active Gaussians that have been made so far.
+/// Returns the number of lists of active Gaussians that have been written so far.
 fn activated(app: &App) -> u64 {
     app.world().resource::<CaptureStatistics>().work().activated()
 }
 
-/// What a single camera sees of a paused scene.
+/// Returns the picture of a single camera of a scene paused at `seconds`; `None` if there is no GPU.
 fn mono(scene: &RuntimeScene, seconds: f32, pose: Transform) -> Option<RgbaImage> {
     let mut app = app(SIZE)?;
     spawn(&mut app, scene, Playback::paused_at(seconds));
@@ -117,7 +117,7 @@ fn mono(scene: &RuntimeScene, seconds: f32, pose: Transform) -> Option<RgbaImage
     Some(picture(&mut app, 0.0))
 }
 
-/// Where the light is, in pixels.
+/// Returns the centroid of the light, in pixels.
 fn centroid(picture: &RgbaImage) -> Vec2 {
     let mut sum = DVec3::ZERO;
     for (x, y, pixel) in picture.enumerate_pixels() {
@@ -128,7 +128,7 @@ fn centroid(picture: &RgbaImage) -> Vec2 {
     Vec2::new((sum.x / sum.z) as f32, (sum.y / sum.z) as f32)
 }
 
-/// Pixels for a unit at distance 1.
+/// Returns the focal length, in pixels.
 fn focal() -> f32 {
     SIZE.y as f32 / 2.0 / (FOV_Y / 2.0).tan()
 }

@@ -1,7 +1,7 @@
-//! Timelines in Bevy apps: what plays when, markers, scrubbing, files that change and files that are broken.
+//! Timelines in Bevy apps: clips, markers, scrubbing, files that change and files that are broken.
 //!
-//! In: timelines made in code and written to a folder. Out: proof that every track shows what the timeline says, however its moment
-//! was reached. Needs neither a GPU nor a window.
+//! In: timelines made in code and written to a folder. Out: proof that every track shows the clip of the current time,
+//! however that time was reached. Needs neither a GPU nor a window.
 
 use crate::support::event_log::{debug, take_events};
 use crate::support::playback_app::{self, app, app_with, capture, change, get, pass};
@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 /// How long files may take to load.
 const LOAD_TIMEOUT: Duration = Duration::from_secs(60);
 
-/// Two tracks and three markers in six seconds, of captures of two and four seconds.
+/// Returns two tracks and three markers in six seconds, and their captures of two and four seconds.
 fn timeline(app: &mut App) -> (Timeline, [Handle<GaussianCapture>; 2]) {
     let captures = [capture(app, 2.0, 4), capture(app, 4.0, 8)];
     let clip = |capture: usize, start, range, speed, fade| {
@@ -37,7 +37,7 @@ fn spawn(app: &mut App, timeline: Timeline, playback: Playback) -> Entity {
     app.world_mut().spawn((TimelinePlayer(handle), playback)).id()
 }
 
-/// The entity of a track.
+/// Returns the entity of a track.
 fn track(app: &mut App, name: &str) -> Entity {
     let mut tracks = app.world_mut().query::<(Entity, &TimelineTrack)>();
     let mut found = tracks.iter(app.world()).filter(|(_, track)| track.0 == name).map(|(entity, _)| entity);
@@ -46,14 +46,14 @@ fn track(app: &mut App, name: &str) -> Entity {
     entity
 }
 
-/// What a track shows: whether it is seen, the capture's time, the fade.
+/// Returns whether a track is visible, the time of its capture, and its fade.
 fn shown(app: &mut App, name: &str) -> (bool, f32, f32) {
     let entity = track(app, name);
     let visible = get::<Visibility>(app, entity) != Visibility::Hidden;
     (visible, get::<Playback>(app, entity).time, get::<ClipFade>(app, entity).0)
 }
 
-/// The messages of one entity among all.
+/// Returns the messages of one entity among all.
 fn said_by(app: &mut App, entity: Entity) -> Vec<String> {
     let mark = format!("entity: {entity:?}");
     take_events(app).into_iter().filter(|message| message.contains(&mark)).collect()
@@ -242,7 +242,7 @@ fn a_timeline_follows_a_shared_clock() {
     assert_eq!(shown(&mut app, "left").1, 3.0, "the second clip");
 }
 
-/// A folder with a capture `two.gs4d` of two seconds.
+/// Returns a folder with a capture `two.gs4d` of two seconds.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");
     offline::save(&folder.path().join("two.gs4d"), &playback_app::scene(2.0, 4), &WriteSettings::default())
@@ -254,7 +254,7 @@ fn app_in(folder: &Path) -> App {
     app(folder.to_str().expect("temporary folders have plain names"))
 }
 
-/// Updates until something is so.
+/// Updates until `so` returns true.
 fn wait(app: &mut App, what: &str, so: impl Fn(&App) -> bool) {
     let start = Instant::now();
     while !so(app) {
@@ -268,7 +268,7 @@ fn load(app: &App, name: &'static str) -> Handle<Timeline> {
     app.world().resource::<AssetServer>().load(name)
 }
 
-/// A timeline of one clip.
+/// Returns the text of a timeline of one clip.
 fn text(range: &str) -> String {
     format!("(tracks: [(name: \"left\", clips: [(capture: \"two.gs4d\", start: 0, {range})])])")
 }

@@ -1,10 +1,11 @@
-//! Views of captures in Bevy apps: what is before and behind them, parts of pictures, shared and resized targets, time in both
-//! directions, and what the command would have drawn.
+//! Views of captures in Bevy apps: glass before and environment maps behind them, parts of pictures, shared and resized
+//! targets, time in both directions, and the pictures of the command.
 //!
-//! In: small scenes made by hand, synthetic ones and the capture of the examples, in headless apps. Out: proof that glass and late
-//! cameras keep to the documented order, that environment maps look like their captures and have no holes, that parts of pictures and
-//! targets are those of the CPU reference, that temporal filters and the direction of play change no pixel, and that extremes stay
-//! numbers. Skipped where there is no GPU, not even a software one.
+//! In: small scenes made by hand, synthetic ones and the capture of the examples, in headless apps. Out: proof that
+//! glass and late cameras keep to the documented order, that environment maps have the appearance of their captures and
+//! no holes, that parts of pictures and targets are those of the CPU reference, that temporal filters and the direction
+//! of play change no pixel, and that extreme values stay finite. Skipped where there is no GPU, not even a software
+//! one.
 
 use crate::support::cpu_reference::{
     DURATION, SIZE, add, blob, difference, difference_between, eye, rgb, scene, view, view_of,
@@ -98,14 +99,14 @@ fn a_late_camera_draws_captures_over_transparent_meshes() {
     assert!(b > 150 && r < 200, "a camera that is not late draws the pane last: {r}, {b}");
 }
 
-/// A grey map all around, and a Gaussian that no camera of these tests looks at.
+/// Returns a grey map all around, and a Gaussian that no camera of these tests sees.
 fn surrounded() -> RuntimeScene {
     let map = Environment { width: 8, height: 4, texels: vec![0.5; 8 * 4 * 3] };
     let far = scene(&[(blob(Vec3::NEG_X * 9.0, Vec3::splat(0.4), 0.98), Vec3::X)]);
     RuntimeScene { environment: Some(map), ..far }
 }
 
-/// From the origin to where the map has no seam.
+/// Returns the pose of a camera at the origin that does not see the seam of the map.
 fn ahead() -> Transform {
     Transform::default().looking_to(Vec3::X, Vec3::Y)
 }
@@ -146,7 +147,7 @@ fn a_map_has_no_hole_where_rays_miss_its_sphere() {
     let camera = spawn_camera(&mut app, Msaa::Off, aside);
     insert(&mut app, camera, Hdr);
     let picture = picture(&mut app, 0.0);
-    // What is not a number comes out as black. Towards the poles the map fades to half.
+    // NaN would be black. Towards the poles the map fades to half.
     let darkest = picture.pixels().flat_map(|pixel| pixel.0).min();
     assert!(darkest > Some(20), "every pixel has a colour; the darkest is {darkest:?}");
     let middle = rgb(&picture, MIDDLE.x, MIDDLE.y);
@@ -173,13 +174,13 @@ fn a_map_needs_one_point_of_view_and_the_depth_of_meshes() {
     }
 }
 
-/// A part of a picture.
+/// Returns a part of a picture.
 fn part(whole: &Picture, offset: UVec2, size: UVec2) -> Picture {
     let row = |y| (0..size.x).map(move |x| whole.pixel(offset.x + x, offset.y + y));
     Picture { size, pixels: (0..size.y).flat_map(row).collect() }
 }
 
-/// The largest difference of any channel of any pixel, in 255ths.
+/// Returns the largest difference of any channel of any pixel, in 255ths.
 fn apart(picture: &Picture, expected: &Picture) -> f32 {
     assert_eq!(picture.size, expected.size, "pictures of one size");
     let channel = |(pixel, expected): (&Vec3, &Vec3)| (*pixel - *expected).abs().max_element() * 255.0;
@@ -220,7 +221,7 @@ fn a_sub_view_is_that_part_of_the_whole() {
     check(&mut app, &expected, "a sub view");
 }
 
-/// Whether cameras can have so many samples here.
+/// Returns whether this GPU supports so many samples.
 fn can_sample(app: &App, msaa: Msaa) -> bool {
     let world = app.sub_app(RenderApp).world();
     let (adapter, device) = (world.resource::<RenderAdapter>(), world.resource::<RenderDevice>());
@@ -282,7 +283,7 @@ fn every_sample_count_cuts_captures_at_the_right_pixels_of_a_viewport() {
     }
 }
 
-/// A synthetic scene with a filter of four segments, and without one.
+/// Returns a synthetic scene with a filter of four segments, and without one.
 fn twice(count: usize, seed: u64) -> [RuntimeScene; 2] {
     let settings = SynthSettings { count, seed, degree: 0, degree_t: 0, duration_seconds: DURATION };
     let plain = synthesize(&settings).into_runtime().expect("synthetic scenes can be drawn");
@@ -294,7 +295,7 @@ fn twice(count: usize, seed: u64) -> [RuntimeScene; 2] {
 struct Both {
     app: App,
     cameras: [Entity; 2],
-    /// What the camera without filters draws into.
+    /// The target of the camera without filters.
     plain: Offscreen,
 }
 
@@ -326,7 +327,7 @@ impl Both {
         }
     }
 
-    /// Both cameras must see the same, and one of them without looking at every Gaussian, if filters are on.
+    /// Checks that both cameras see the same and, if filters are on, that one of them does not project every Gaussian.
     fn check(&mut self, what: &str, filters: bool) {
         let filtered = picture(&mut self.app, 0.0);
         let plain = testing::read(&mut self.app, &self.plain).expect("the second camera's picture");
@@ -471,7 +472,7 @@ fn extreme_exposure_is_white_and_finite() {
     let apart = corner.iter().zip([51u8, 76, 102]).map(|(seen, clear)| seen.abs_diff(clear)).max();
     assert!(apart <= Some(1), "where it is not, the clear colour shows: {corner:?}");
     let halves = testing::read(&mut app, &halves).expect("the second camera's picture");
-    // All bits of the exponent are set in infinities and in what is no number.
+    // All bits of the exponent are set in infinities and NaN.
     let mut exponents = halves.as_raw().chunks_exact(2).map(|half| u16::from_le_bytes([half[0], half[1]]) & 0x7c00);
     assert!(exponents.all(|exponent| exponent != 0x7c00), "every value of the HDR target is finite");
 }

@@ -1,6 +1,8 @@
-//! The parts of the example `walkthrough`, by the tests that they carry: Cargo builds examples, but runs no tests in them.
+//! The unit tests of the example `walkthrough`, which Cargo does not run: it builds examples, but runs no tests in
+//! them.
 //!
-//! In: bodies, heads and keys. Out: proof that moving about is what comfort asks for. Needs neither a GPU nor a window.
+//! In: bodies, heads and keys. Out: proof that walking, turning, teleporting and recorded paths work, and that the view
+//! closes in as comfort requires. Needs neither a GPU nor a window.
 
 #[path = "../../examples/walkthrough/body.rs"]
 #[expect(dead_code, reason = "the example uses the rest")]

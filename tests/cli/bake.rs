@@ -1,7 +1,8 @@
 //! `gs4d bake`, run as a user runs it on a scene's own pictures.
 //!
-//! In: a small synthetic scene and a dataset drawn from it by the CPU reference. Checked: a smaller package and both reports, stages that
-//! are done are not done again, data that does not belong and paths that cannot be written are refused.
+//! In: a small synthetic scene and a dataset drawn from it by the CPU reference. Out: proof that the package is smaller
+//! and both reports are written, that finished stages are not repeated, and that data of another capture and paths that
+//! cannot be written are refused.
 
 use crate::support::command::{arguments, gs4d};
 use crate::support::dataset;
@@ -20,7 +21,7 @@ struct Capture {
     data: PathBuf,
 }
 
-/// A scene and a dataset around `center`, which belongs to it at the origin.
+/// Returns a scene and a dataset around `center`, which belongs to the scene if it is the origin.
 fn capture(center: Vec3, images: bool) -> Capture {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (scene, data) = (folder.path().join("scene.gs4d"), folder.path().join("data"));

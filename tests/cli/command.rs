@@ -1,4 +1,4 @@
-//! The `gs4d` command, run as a user runs it: looking into captures, converting them, and everything that is wrong with a command line.
+//! The `gs4d` command, run as a user runs it: inspecting captures, converting them, and all errors of a command line.
 //!
 //! In: command lines, whole and damaged files. Out: proof that exit codes, what is printed and what is written are right, and that
 //! nothing panics.

@@ -1,7 +1,7 @@
 //! `gs4d eval` and `gs4d ablate`, run as a user runs them on a scene's own pictures.
 //!
-//! In: a small synthetic scene and a dataset drawn from it by the CPU reference. Checked: the scene matches its own pictures, what is
-//! missing is named, the tables have the rows and columns that they promise.
+//! In: a small synthetic scene and a dataset drawn from it by the CPU reference. Out: proof that the scene matches its
+//! own pictures, that missing data is named, and that the tables have the documented rows and columns.
 
 use crate::support::command::{arguments, gs4d};
 use crate::support::dataset;
@@ -13,7 +13,7 @@ use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
 
-/// A scene and its own pictures.
+/// Returns a folder with a scene and its own pictures, and the paths of both.
 fn capture(size: UVec2) -> (TempDir, PathBuf, PathBuf) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (scene, data) = (folder.path().join("scene.gs4d"), folder.path().join("data"));

@@ -1,6 +1,7 @@
 //! `gs4d score`, `prune` and `mask`, run as a user runs them.
 //!
-//! In: a synthetic scene with training views of it. Checked: what is written and reported, and what is said of data that cannot do.
+//! In: a synthetic scene with training views of it. Out: proof that the files and reports are right, and that unusable
+//! data is refused.
 
 use crate::support::command::{Run, arguments, gs4d};
 use bevy_gs4d::reference;
@@ -23,7 +24,8 @@ struct Bench {
 }
 
 impl Bench {
-    /// `images`: whether the training images are there; `astray`: cameras that look elsewhere.
+    /// Writes the scene and its data. `images`: whether the training images exist; `astray`: whether the cameras see
+    /// nothing of the scene.
     fn new(images: bool, astray: bool) -> Self {
         let bench = Self { folder: tempfile::tempdir().expect("a temporary folder") };
         gs4d(&arguments!["synth", bench.path("scene.gs4d"), "--count", COUNT.to_string(), "--seed", "5", "--json"])

@@ -1,4 +1,7 @@
-//! Checkpoints of the original trainer become the scenes they were written from.
+//! Reading checkpoints of the original trainer.
+//!
+//! In: the checkpoints in `tests/golden/`, crafted ones and, with `GS4D_DATA` set, those of trained captures. Out:
+//! proof that they are read as the scenes that they were written from.
 
 use crate::support::data;
 use crate::support::golden;
@@ -40,7 +43,7 @@ fn numbers(value: &Value, out: &mut Vec<f32>) {
     }
 }
 
-/// One attribute of `raw` in a golden scene; empty where the scene has none.
+/// Returns one attribute of `raw` in a golden scene; empty if the scene does not have it.
 fn raw(scene: &Value, name: &str) -> Vec<f32> {
     let mut out = Vec::new();
     if let Some(values) = scene["raw"].get(name) {

@@ -1,4 +1,7 @@
-//! Damaged, hostile and nonsensical checkpoints give an error that says why, never a panic and never a wrong scene.
+//! Damaged, hostile and invalid checkpoints.
+//!
+//! In: a small crafted checkpoint with changes. Out: proof that each is refused with an error that names the reason,
+//! never with a panic and never read as a wrong scene.
 
 use crate::support::pth::{self, Pth};
 use bevy_gs4d::codec::checkpoint::{self, CheckpointError, CheckpointOptions};
@@ -12,13 +15,13 @@ fn read(bytes: &[u8]) -> Result<GaussianScene, CheckpointError> {
     checkpoint::read(Cursor::new(bytes), &CheckpointOptions::default(), None)
 }
 
-/// That the file is refused with a message that contains all of `words`.
+/// Checks that the file is refused with a message that contains all of `words`.
 fn assert_refused(bytes: &[u8], words: &[&str]) {
     let message = read(bytes).expect_err("must be refused").to_string();
     assert!(words.iter().all(|word| message.contains(word)), "{words:?} in: {message}");
 }
 
-/// The small checkpoint after `spoil` had its way.
+/// Returns the small checkpoint as changed by `spoil`.
 fn spoilt(spoil: impl FnOnce(&mut Pth)) -> Vec<u8> {
     let mut pth = Pth::rotating(3, 48);
     spoil(&mut pth);
@@ -130,7 +133,7 @@ fn damaged_values_do_not_match_their_checksum() {
     assert_refused(&bytes, &["checksum"]);
 }
 
-/// The opcodes that the unpickler knows.
+/// The opcodes that the unpickler supports.
 const OPCODES: &[u8] = b"\x80(.N\x88\x89JKMGX)t\x85\x86\x87]ae}ucRbQqrhj";
 
 proptest! {
@@ -150,7 +153,7 @@ proptest! {
             let at = at.index(bytes.len());
             bytes[at] ^= 1u8 << bit;
         }
-        // Some bytes are never looked at: time stamps, the version.
+        // Some bytes are never read: time stamps, the version.
         if let Ok(scene) = read(&bytes) {
             prop_assert!(scene == whole, "a damaged file was taken for a valid one");
         }

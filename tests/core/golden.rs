@@ -21,7 +21,7 @@ fn cpu_twin_matches_the_original() {
     }
 }
 
-/// What the original has computed of each Gaussian of a view.
+/// Returns what the original has computed for each Gaussian of a view.
 fn gaussians(golden: &GoldenView) -> Value {
     let (scene, name) = golden.name.split_once('/').expect("a scene and a view");
     let text = std::fs::read_to_string(golden::folder().join(scene).join("scene.json")).expect("scene.json");

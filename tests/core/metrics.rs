@@ -1,18 +1,21 @@
-//! Picture metrics against values worked out by hand and by an independent float64 implementation.
+//! Metrics of pictures.
+//!
+//! In: synthetic pictures. Out: proof that metrics equal values computed by hand and by independent float64
+//! implementations, and that pictures of different sizes are refused.
 
 use bevy_gs4d::offline::metrics::{MS_SSIM_MIN_SIDE, SizeMismatch, flip, ms_ssim, psnr, psnr_pooled, ssim};
 use bevy_gs4d::view::Picture;
 use glam::{UVec2, Vec3};
 use proptest::prelude::*;
 
-/// A deterministic pattern; `k` changes it.
+/// Returns a deterministic pattern; `k` changes it.
 fn pattern(width: u32, height: u32, k: u32) -> Picture {
     let value = |x: u32, y: u32, c: u32| ((x * (7 + k) + y * (13 - k) + c * 29 + k * x * y) % 32) as f32 / 31.0;
     let pixel = |i: u32| Vec3::from([0, 1, 2].map(|c| value(i % width, i / width, c)));
     Picture { size: UVec2::new(width, height), pixels: (0..width * height).map(pixel).collect() }
 }
 
-/// Flat blocks with sharp borders.
+/// Returns flat blocks with sharp borders.
 fn blocks(width: u32, height: u32) -> Picture {
     let value = |x: u32, y: u32, c: u32| ((x / 9 * 5 + y / 7 * 3 + c * 7) % 16) as f32 / 15.0;
     let pixel = |i: u32| Vec3::from([0, 1, 2].map(|c| value(i % width, i / width, c)));
@@ -151,7 +154,7 @@ fn pictures_of_other_sizes_are_refused() {
     assert!(psnr(&a, &short).is_err() && ssim(&short, &a).is_err(), "fewer pixels than the size says");
 }
 
-/// Two pictures of the same small random size.
+/// Generates two pictures of the same small random size.
 fn two_pictures() -> impl Strategy<Value = (Picture, Picture)> {
     (1u32..20, 1u32..20).prop_flat_map(|(width, height)| {
         let values = proptest::collection::vec(proptest::array::uniform6(0.0f32..1.0), (width * height) as usize);

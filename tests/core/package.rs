@@ -1,7 +1,7 @@
-//! The package format from outside.
+//! The package format, tested through its public functions.
 //!
-//! In: scenes made here, and packages taken apart, changed and sealed again. Out: proof that nothing is lost on the way through a
-//! file, that no damage goes unnoticed, and that what a newer writer adds does no harm.
+//! In: scenes made here, and packages taken apart, changed and sealed again. Out: proof that files store scenes without
+//! loss, that every damage is noticed, and that additions of a newer writer are skipped.
 
 use bevy_gs4d::codec::package::{self, MAGIC, PackageError, PackageInfo, VERSION, WriteSettings};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics, Model, Parameters};
@@ -107,7 +107,7 @@ fn gaussian(bits: &mut Bits) -> Gaussian {
     }
 }
 
-/// All values of a scene as bits, so that NaNs compare.
+/// Returns all values of a scene as bits, so that NaNs can be compared.
 fn bits(scene: &GaussianScene) -> Vec<Vec<u32>> {
     let mut all = match &scene.form {
         SceneForm::Ready(Form::Sliced(sliced)) => vec![cast_slice(&sliced.gaussians).to_vec()],
@@ -162,7 +162,7 @@ fn refusal(file: &[u8]) -> PackageError {
     error
 }
 
-/// A package in its parts. `seal` makes it whole again, with the right checksum of whatever header there is now.
+/// A package in its parts. `seal` puts them together, with the right checksum of the current header.
 #[derive(Clone)]
 struct Parts {
     header: String,
@@ -223,7 +223,7 @@ fn shapes() -> impl Strategy<Value = Shape> {
     ];
     let degrees = prop_oneof![(0..=3u32, Just(0u32)), (Just(3u32), 0..=2u32)];
     let environment = proptest::option::of((1..5u32, 1..4u32));
-    // No trained model can be told from an empty scene.
+    // An empty scene does not have the model of a trained form.
     (model, 1..70usize, degrees, 0..5usize, environment).prop_map(|(model, count, degrees, spare, environment)| {
         let evaluated = Harmonics { degree: degrees.0, degree_t: degrees.1, ..Harmonics::default() }.evaluated();
         Shape { model, count, coefficients: (evaluated + spare).min(48), degrees, environment }
@@ -260,7 +260,7 @@ proptest! {
         let end = parts.header.len().min(at + drop);
         parts.header.replace_range(at..end, &String::from_utf8(with).expect("ASCII"));
         let file = parts.seal();
-        // A changed number may still make a sound package: then both ways of reading it agree.
+        // A package with a changed number may still be valid: then both ways of reading it agree.
         prop_assert!(read(&file).is_err() || inspect(&file).is_ok_and(|info| info.is_intact()), "the two agree");
     }
 

@@ -1,4 +1,4 @@
-//! Picking: what a ray hits.
+//! Picking: the Gaussian that a ray hits.
 //!
 //! In: Gaussians placed by hand, and a column of them with its render by the CPU reference. Out: proof that a ray hits the Gaussian that
 //! it should, where it should, and respects what is set.
@@ -10,7 +10,7 @@ use bevy_gs4d::scene::{FilterKind, Pick, PickSettings, RuntimeScene, TemporalFil
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, RasterFov};
 use glam::{Affine3A, Mat4, Quat, UVec2, Vec2, Vec3};
 
-/// A Gaussian at rest, always there.
+/// Returns a Gaussian at rest that is always active.
 fn still(mean: Vec3, covariance: [f32; 6], opacity: f32) -> Gaussian {
     Gaussian {
         mean: mean.to_array(),
@@ -23,7 +23,7 @@ fn still(mean: Vec3, covariance: [f32; 6], opacity: f32) -> Gaussian {
     }
 }
 
-/// A round one on the z axis.
+/// Returns a round one on the z axis.
 fn ball(z: f32, opacity: f32) -> Gaussian {
     still(Vec3::new(0.0, 0.0, z), [0.01, 0.0, 0.0, 0.01, 0.0, 0.01], opacity)
 }
@@ -33,7 +33,7 @@ fn scene(gaussians: &[Gaussian]) -> RuntimeScene {
     RuntimeScene::sliced(gaussians.to_vec(), harmonics)
 }
 
-/// Along +z from the origin.
+/// Picks along +z from the origin.
 fn pick(gaussians: &[Gaussian], settings: &PickSettings) -> Option<Pick> {
     scene(gaussians).pick(Vec3::ZERO, Vec3::Z, settings)
 }
@@ -157,7 +157,7 @@ fn what_is_no_covariance_or_no_number_is_not_hit() {
     assert_eq!(hit(&[nowhere, good]), Some((1, 7.0)), "a mean that is no number is passed");
 }
 
-/// Ten Gaussians one behind the other, of about the same size on the screen, spread over it.
+/// Returns ten Gaussians one behind the other, of about the same size on the screen, spread over it.
 fn column() -> Vec<Gaussian> {
     (0..10)
         .map(|index| {
@@ -171,7 +171,7 @@ fn column() -> Vec<Gaussian> {
         .collect()
 }
 
-/// Whether a transmittance at the pixel is within 0.04 of one half; splats are in order of depth.
+/// Returns whether a transmittance at the pixel is within 0.04 of one half; splats are in order of depth.
 fn is_close(splats: &[Splat], x: u32, y: u32) -> bool {
     let mut transmittance = 1.0f32;
     splats.iter().filter(|splat| splat.is_visible()).any(|splat| {
@@ -181,9 +181,10 @@ fn is_close(splats: &[Splat], x: u32, y: u32) -> bool {
     })
 }
 
-/// Splats are affine approximations and have a low-pass, so that their alphas are not exactly those along the ray: for this scene,
-/// transmittances are up to 0.032 apart. Pixels where one of them is within 0.04 of one half could go either way and do not count;
-/// everywhere else both must say the same. Depths are those of different points (the splat's mean, the densest point).
+/// Splats are affine approximations and have a low-pass, so that their alphas are not exactly those along the ray: for
+/// this scene, transmittances are up to 0.032 apart. Pixels where one of them is within 0.04 of one half could go
+/// either way and are not compared; at all others both must hit the same Gaussian. Depths are those of different points
+/// (the splat's mean, the densest point).
 #[test]
 fn the_median_of_the_reference_render_is_hit() {
     let scene = scene(&column());

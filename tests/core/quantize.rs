@@ -1,6 +1,7 @@
-//! Quantization: what the packed form keeps, and that packages hold it whole.
+//! Quantization and the packed form in packages.
 //!
-//! In: synthetic scenes; with `GS4D_DATA` set, trained captures.
+//! In: synthetic scenes; with `GS4D_DATA` set, trained captures. Out: proof that the packed form keeps attributes and
+//! pictures within its steps, and that packages store it bit for bit.
 
 use crate::support::data;
 use crate::support::packed_scene::{BLACK, scene, settings, view};
@@ -29,12 +30,12 @@ fn psnr(a: &RuntimeScene, b: &RuntimeScene, view: &View) -> f64 {
     psnr_pooled(&a, &b).expect("the same size")
 }
 
-/// The order in which a scene is packed.
+/// Returns the order in which a scene is packed.
 fn order(scene: &RuntimeScene) -> Vec<u32> {
     morton_order(&scene.form.as_sliced().expect("sliced").gaussians)
 }
 
-/// Each Gaussian of the scene beside its packed self. Morton order is found again by the means.
+/// Returns each Gaussian of the scene with its packed form, matched by Morton order.
 fn beside(scene: &RuntimeScene, packed: &RuntimeScene) -> Vec<(Gaussian, Gaussian)> {
     let order = order(scene);
     order.iter().enumerate().map(|(to, &from)| (scene.gaussian(from as usize), packed.gaussian(to))).collect()
@@ -102,7 +103,7 @@ fn pictures_survive() {
 #[test]
 fn the_filter_moves_with_its_gaussians() {
     let mut scene = scene(2_000, 0, 0);
-    // A support filter is made anew.
+    // A support filter would be computed anew.
     scene.filter = scene.filter.map(|filter| TemporalFilter { kind: FilterKind::KeyFrame, ..filter });
     let (packed, _) = compress(scene.clone(), &settings(&[])).expect("it is compressed");
     let order = order(&scene);

@@ -1,7 +1,9 @@
-//! Scores, pruning and masks, on small scenes against brute force, and on captures against the yardstick.
+//! Scores, pruning and visibility masks: on small scenes against brute force, on trained captures against scores that
+//! were computed independently (`scores.npz`).
 //!
-//! In: synthetic scenes; with `GS4D_DATA` set, toybox and standup. Checked: the CPU reference of `score` pixel by pixel, the relations between
-//! scores, what pruning keeps, which mask holds which. `GS4D_SLOW=1` adds the comparison over all training views.
+//! In: synthetic scenes; with `GS4D_DATA` set, toybox and standup. Out: proof that the CPU reference of `score` is
+//! right pixel by pixel, that scores are related as defined, that pruning keeps the right Gaussians, and that masks and
+//! filters contain one another. `GS4D_SLOW=1` adds the comparison over all training views.
 
 use crate::support::data::data;
 use crate::support::npy;
@@ -35,7 +37,7 @@ fn runtime(count: usize) -> RuntimeScene {
     synth(count).into_runtime().expect("synthetic scenes are valid")
 }
 
-/// Gaussians so faint that no pixel stops.
+/// Returns Gaussians so faint that no pixel stops early.
 fn faint(count: usize) -> RuntimeScene {
     let mut scene = runtime(count);
     let sliced = scene.form.as_sliced_mut().expect("sliced");
@@ -52,7 +54,7 @@ fn view(angle: f32, time: f32) -> View {
     camera(angle).view(time, RasterFov::Reference)
 }
 
-/// Three times, two cameras each.
+/// Returns the views of two cameras at each of three times.
 fn views() -> Vec<View> {
     (0..6).map(|i| view(i as f32, (i / 2) as f32 * 0.5)).collect()
 }
@@ -75,7 +77,7 @@ fn contributions_are_what_the_background_loses() {
     }
 }
 
-/// Every pixel against every splat of its tile, without any shortcut.
+/// Scores every pixel against every splat of its tile, without any shortcut.
 fn brute_force(scene: &RuntimeScene, view: &View) -> Vec<[f64; 2]> {
     let splats =
         reference::project(&Layer { scene, view: *view, appearance: Appearance::default() }, BlendSpace::Encoded);
@@ -163,7 +165,7 @@ fn scores_depend_neither_on_threads_nor_on_what_is_wanted() {
     assert!(less.removal.is_empty() && alone.removal.len() == 3000, "removal only where wanted");
 }
 
-/// All scores of a scene over some views.
+/// Returns all scores of a scene over some views.
 fn accumulate(scene: &GaussianScene, views: &[View], background: Background) -> Result<Scores, ScoreError> {
     let runtime = scene.clone().into_runtime().expect("a valid scene");
     let traits = Traits::of(scene).expect("a valid scene");
@@ -275,7 +277,7 @@ fn filters_contain_one_another() {
     }
 }
 
-/// A capture with its training views; `None` without data, which is reported.
+/// Returns a capture with its training views; `None` without data, which is reported.
 fn capture(name: &str, resolution: Option<i32>) -> Option<(PathBuf, GaussianScene, Dataset)> {
     let folder = data()?.join(name);
     let path = folder.join(format!("{name}_chkpnt.pth"));
@@ -285,7 +287,7 @@ fn capture(name: &str, resolution: Option<i32>) -> Option<(PathBuf, GaussianScen
     Some((folder, scene, dataset))
 }
 
-/// Places in ascending order, equal values sharing theirs.
+/// Returns the ranks of the values in ascending order; equal values have the mean of their ranks.
 fn ranks(values: &[f32]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
@@ -307,14 +309,15 @@ fn spearman(a: &[f32], b: &[f32]) -> f64 {
     product(&a, &b) / (product(&a, &a) * product(&b, &b)).sqrt()
 }
 
-/// Share of the highest fifth that both have.
+/// Returns the share of the highest fifth that both have in common.
 fn overlap(a: &[f32], b: &[f32]) -> f64 {
     let count = kept_count(a.len(), 0.8);
     let (a, b) = (highest(a, count), highest(b, count));
     a.iter().filter(|index| b.binary_search(index).is_ok()).count() as f64 / count as f64
 }
 
-/// A fifteenth of the views already ranks alike, as far as a fifteenth can: 0.861 and 0.973 were worked out independently.
+/// Scores from a fifteenth of the views correlate with those from all views. The independent implementation reaches
+/// 0.861 and 0.973.
 #[test]
 fn a_share_of_toybox_ranks_like_all_of_it() {
     let Some((folder, scene, dataset)) = capture("toybox", None) else { return };
@@ -337,8 +340,8 @@ fn slow() -> bool {
     slow
 }
 
-/// All views of both captures: every score of the yardstick. The last two are estimates from random pictures there, whose own noise
-/// leaves 0.92 to 0.95 of the highest fifth.
+/// Compares every score over all views of both captures. The last two of `scores.npz` are estimates from random
+/// pictures, whose own noise leaves an overlap of 0.92 to 0.95 of the highest fifth.
 #[test]
 fn scores_rank_as_the_yardstick_does() {
     for (name, resolution) in [("toybox", None), ("standup", Some(2))] {

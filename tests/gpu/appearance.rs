@@ -1,6 +1,8 @@
-//! Captures that do not look as trained: placed light, opacity and crop, linear blending, parallel rays, multisampled surfaces.
+//! Captures with another appearance than trained: light, opacity and crop, linear blending, parallel rays, multisampled
+//! surfaces.
 //!
-//! In: synthetic scenes, the same for GPU and CPU. Out: proof that both draw the same, or that a number is what it must be.
+//! In: synthetic scenes, the same for GPU and CPU. Out: proof that both draw the same, or that a pixel has the expected
+//! value.
 
 use crate::support::gpu;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
@@ -28,7 +30,7 @@ fn view() -> View {
     camera().view(0.4, RasterFov::default())
 }
 
-/// Grey Gaussians at rest that are always there: mean, deviation, opacity.
+/// Returns grey Gaussians at rest that are always active: mean, deviation, opacity.
 fn blobs(blobs: &[(Vec3, f32, f32)]) -> RuntimeScene {
     let gaussian = |(mean, deviation, opacity): &(Vec3, f32, f32)| {
         let variance = deviation * deviation;
@@ -46,7 +48,7 @@ fn blobs(blobs: &[(Vec3, f32, f32)]) -> RuntimeScene {
     RuntimeScene::sliced(blobs.iter().map(gaussian).collect(), harmonics)
 }
 
-/// One scene with that look, on the GPU and on the CPU.
+/// Draws one scene with that appearance, on the GPU and on the CPU.
 fn both(
     headless: &mut Headless,
     scene: &RuntimeScene,
@@ -149,8 +151,8 @@ fn parallel_rays_show_far_and_near_at_one_size() {
     }
 }
 
-/// A multisampled depth that is `value` left of the middle, and nothing right of it, but for the samples of the middle column:
-/// half of them are covered.
+/// Returns a multisampled depth that is `near / distance` left of the middle, and 0 right of it. In the middle column
+/// half of the samples are covered.
 fn edge(context: &GpuContext, near: f32, distance: f32) -> (wgpu::Texture, u32) {
     let GpuContext { device, queue, .. } = context;
     let texture = device.create_texture(&wgpu::TextureDescriptor {

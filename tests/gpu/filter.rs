@@ -1,6 +1,7 @@
-//! The temporal filter on the GPU: what it leaves out, and that nothing else changes.
+//! The temporal filter on the GPU.
 //!
-//! In: synthetic scenes with filters of both kinds of storage. Skipped where there is no GPU.
+//! In: synthetic scenes with filters of both kinds of storage. Out: proof that inactive Gaussians are not drawn and
+//! that nothing else changes. Skipped where there is no GPU.
 
 use crate::support::gpu;
 use bevy_gs4d::reference;
@@ -34,7 +35,7 @@ fn view(time: f32) -> View {
     Camera::look_at(eye, Vec3::ZERO, Vec3::Z, 0.9, UVec2::new(90, 61)).view(time, RasterFov::Reference)
 }
 
-/// Times in order and back again: the segment changes, stays, and returns.
+/// Returns times in order and back again: the segment changes, stays, and returns.
 fn times() -> impl Iterator<Item = f32> {
     [0.0, 0.05, 0.11, 0.112, 0.5, 0.93, 1.0, 0.5, 0.0, -0.3, 1.4].into_iter()
 }
@@ -71,7 +72,7 @@ fn support_changes_no_bit() {
 fn inactive_gaussians_are_not_drawn() {
     let Some(mut headless) = gpu::headless() else { return };
     let whole = scene(3_000, 5);
-    // Every third Gaussian is active in even segments, the others in odd ones: intervals cannot say that.
+    // Every third Gaussian is active in even segments, the others in odd ones, which intervals cannot represent.
     let words = TemporalFilter::words(3_000);
     let mut bits = vec![0u32; words * SEGMENTS as usize];
     for segment in 0..SEGMENTS as usize {

@@ -1,4 +1,4 @@
-//! Structures and constants that stand in the shaders and in the host's code.
+//! Structures and constants that the shaders and the host's code both define.
 //!
 //! In: the composed passes, as naga lays them out. Out: proof that every structure and shared constant is the same on both sides.
 
@@ -43,7 +43,8 @@ macro_rules! mirror {
     };
 }
 
-/// The Gaussian on the GPU holds the reciprocal of the temporal deviation, and its covariance in two pieces.
+/// Returns the mirror of the Gaussian, which on the GPU has the reciprocal of the temporal deviation, and its
+/// covariance in two pieces.
 fn gaussian() -> Mirror {
     let mut mirror = mirror!(Gaussian { mean, mean_t, velocity, sigma_t, covariance, opacity, padding });
     let covariance = offset_of!(Gaussian, covariance);
@@ -118,12 +119,12 @@ fn mirrors() -> [Mirror; 7] {
     ]
 }
 
-/// The name without what naga_oil appends to imported ones.
+/// Returns the name without what naga_oil appends to imported ones.
 fn plain(name: &str) -> &str {
     name.split("X_naga_oil").next().unwrap_or(name)
 }
 
-/// All passes, composed.
+/// Returns all passes, composed.
 fn modules() -> BTreeMap<&'static str, Module> {
     pass_names().map(|name| (name, compose(name, &[]).expect("the pass composes"))).collect()
 }
@@ -137,7 +138,7 @@ struct Shared {
     stride: Option<usize>,
 }
 
-/// The structures behind the bindings of a pass.
+/// Returns the structures behind the bindings of a pass.
 fn shared(module: &Module) -> Vec<Shared> {
     let member = |member: &StructMember| {
         let size = module.types[member.ty].inner.size(module.to_ctx()) as usize;
@@ -188,7 +189,7 @@ fn members_of_the_host_leave_no_gap() {
     }
 }
 
-/// The value of a constant, in double precision, which holds every u32 and f32.
+/// Returns the value of a constant, in double precision, which represents every u32 and f32.
 fn constant(module: &Module, name: &str) -> f64 {
     let found = module.constants.iter().find(|(_, constant)| constant.name.as_deref() == Some(name));
     let (_, constant) = found.unwrap_or_else(|| panic!("there is no constant `{name}`"));

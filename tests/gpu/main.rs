@@ -1,7 +1,7 @@
 //! The renderer without Bevy, and the shaders on their own.
 //!
-//! In: scenes and buffers made here, `tests/golden/`, the files of `shaders/`. Out: one test binary. Each module says what it tests;
-//! what needs a device is skipped where there is none, not even a software one.
+//! In: scenes and buffers made here, `tests/golden/`, the files of `shaders/`. Out: one test binary. The header of each
+//! module describes its tests; those that need a device are skipped where there is none, not even a software one.
 
 mod appearance;
 mod filter;

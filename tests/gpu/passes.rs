@@ -1,7 +1,7 @@
 //! Each pass on its own, against its CPU reference.
 //!
-//! In: buffers filled by hand, what a pass writes filled with rubbish. Out: proof that the GPU leaves in them what the functions of
-//! [`reference`] return. `blend`, which needs textures, is compared as part of whole frames.
+//! In: buffers filled by hand, output buffers filled with an arbitrary value. Out: proof that the GPU writes what the
+//! functions of [`reference`] return. `blend`, which needs textures, is compared as part of whole frames.
 
 use crate::support::passes::{Gpu, Pass};
 use bevy_gs4d::gaussian::Gaussian;
@@ -17,10 +17,10 @@ use bytemuck::Zeroable;
 use glam::{UVec2, Vec2, Vec3};
 use std::fmt::{Debug, Display};
 
-/// What stands in buffers that nobody has written.
+/// The value of buffers that have not been written.
 const RUBBISH: u32 = 0xdead_beef;
 
-/// Random numbers, the same everywhere.
+/// Returns random numbers, the same everywhere.
 fn noise(count: usize, seed: u32) -> Vec<u32> {
     let mut state = seed;
     let next = || {
@@ -31,7 +31,7 @@ fn noise(count: usize, seed: u32) -> Vec<u32> {
     std::iter::repeat_with(next).take(count).collect()
 }
 
-/// Names the first difference instead of printing all of both.
+/// Reports the first difference instead of printing all of both.
 fn assert_same<T: PartialEq + Debug>(found: &[T], expected: &[T], what: impl Display) {
     assert_eq!(found.len(), expected.len(), "{what}: the length");
     if let Some(at) = found.iter().zip(expected).position(|(a, b)| a != b) {
@@ -95,7 +95,7 @@ impl<'a> Sort<'a> {
         std::mem::swap(&mut self.from, &mut self.to);
     }
 
-    /// Keys and values as they are now.
+    /// Returns the current keys and values.
     fn pairs(&self) -> [Vec<u32>; 2] {
         [0, 1].map(|i| self.gpu.read(&self.from[i]))
     }
@@ -183,13 +183,13 @@ fn sort_by_tile_keeps_the_order_of_depth_and_touches_pairs_only() {
     }
 }
 
-/// A splat of which only the tiles matter.
+/// Returns a splat of which only the tiles matter.
 fn splat([x0, y0, x1, y1]: [u32; 4]) -> Splat {
     let tiles = TileRect { low: UVec2::new(x0, y0), high: UVec2::new(x1, y1) };
     Splat { center: Vec2::ZERO, conic: Vec3::ZERO, opacity: 1.0, color: Vec3::ZERO, depth: 1.0, tiles }
 }
 
-/// Most splats small, one in a hundred over the whole grid.
+/// Returns splats of which most are small and one in a hundred covers the whole grid.
 fn random_splats(count: usize, grid: UVec2) -> Vec<Splat> {
     let random = noise(4 * count, 4);
     let one = |r: &[u32]| {
@@ -202,7 +202,7 @@ fn random_splats(count: usize, grid: UVec2) -> Vec<Splat> {
     random.chunks_exact(4).map(one).collect()
 }
 
-/// Three in four of so many splats, shuffled.
+/// Returns the indices of three in four of `count` splats, shuffled.
 fn random_order(count: usize) -> Vec<u32> {
     let random = noise(count, 5);
     let mut order: Vec<u32> = (0..count as u32).filter(|&i| !random[i as usize].is_multiple_of(4)).collect();
@@ -210,8 +210,8 @@ fn random_order(count: usize) -> Vec<u32> {
     order
 }
 
-/// Bins with room for `capacity` pairs. `expected` are the pairs with room for all, or as many of them as fit; `wanted` how many
-/// there would be.
+/// Bins with room for `capacity` pairs, and compares. `expected` are the pairs, as many of them as fit; `wanted` is
+/// their number with room for all.
 fn check_bin(gpu: &Gpu, splats: &[Splat], order: &[u32], grid: UVec2, capacity: u32, expected: &[Pair], wanted: u32) {
     let what = format!("{} splats, room for {capacity} of {wanted} pairs", order.len());
     let pass = gpu.pass("bin");

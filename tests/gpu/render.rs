@@ -1,7 +1,7 @@
-//! Whole frames on the GPU: what must hold for any scene, camera and device.
+//! Whole frames on the GPU: properties that hold for any scene, camera and device.
 //!
-//! In: synthetic scenes. Out: proof that the GPU draws what the CPU reference draws, however the scene is cut up, however many pairs it
-//! makes, and whatever stands in front of it.
+//! In: synthetic scenes. Out: proof that the GPU draws what the CPU reference draws, however the scene is divided,
+//! however many pairs it has, and whatever is in front of it.
 
 use crate::support::{gpu, limited_device};
 use bevy_gs4d::gaussian::{Gaussian, Parameters};
@@ -19,7 +19,7 @@ use std::ops::Range;
 const COLOR: [f32; 3] = [0.1, 0.4, 0.9];
 const BACKGROUND: Background = Background::Color(COLOR);
 const SIZE: UVec2 = UVec2::new(200, 150);
-/// Where most tests look from; the scene lies between 1.5 and 4 units away.
+/// The camera of most tests; the scene lies between 1.5 and 4 units away.
 const EYE: Vec3 = Vec3::new(2.2, 1.1, 1.4);
 /// Pairs that a view has room for before it has seen any.
 const FIRST_ROOM: u32 = 1 << 16;
@@ -32,7 +32,7 @@ fn scene(count: usize) -> RuntimeScene {
     trained(count).into_runtime().expect("a synthetic scene can be drawn")
 }
 
-/// The same scene with larger Gaussians.
+/// Returns the same scene with larger Gaussians.
 fn swollen(count: usize, factor: f32) -> RuntimeScene {
     let mut scene = scene(count);
     for gaussian in &mut scene.form.as_sliced_mut().expect("sliced").gaussians {
@@ -41,7 +41,7 @@ fn swollen(count: usize, factor: f32) -> RuntimeScene {
     scene
 }
 
-/// Some of the Gaussians of a scene.
+/// Returns some of the Gaussians of a scene.
 fn part(scene: &RuntimeScene, range: Range<usize>) -> RuntimeScene {
     let mut part = scene.clone();
     let Sliced { gaussians, harmonics } = part.form.as_sliced_mut().expect("sliced");
@@ -51,7 +51,7 @@ fn part(scene: &RuntimeScene, range: Range<usize>) -> RuntimeScene {
     part
 }
 
-/// A scene and one bright Gaussian more.
+/// Returns a scene and one bright Gaussian more.
 fn with(scene: &RuntimeScene, gaussian: Gaussian) -> RuntimeScene {
     let mut more = scene.clone();
     let Sliced { gaussians, harmonics } = more.form.as_sliced_mut().expect("sliced");
@@ -68,17 +68,17 @@ fn project(scene: &RuntimeScene, view: &View) -> Vec<Splat> {
     reference::project(&Layer { scene, view: *view, appearance: Appearance::default() }, BlendSpace::Encoded)
 }
 
-/// A capture as trained, all of it.
+/// Returns a capture as trained, all of it.
 fn instance<'a>(capture: &'a GpuCapture, view: &View) -> Instance<'a> {
     Instance { capture, active: None, view: *view, appearance: Appearance::default() }
 }
 
-/// Over the background, cut by nothing.
+/// Returns parameters for frames over the background, with nothing in front.
 fn parameters() -> ViewParameters<'static> {
     ViewParameters { background: BACKGROUND, ..ViewParameters::default() }
 }
 
-/// Several captures on the CPU, cut behind a depth.
+/// Draws several captures on the CPU, cut behind a depth.
 fn expected_frame(instances: &[(&RuntimeScene, View)], limit: f32) -> Frame {
     let splats: Vec<Splat> = instances.iter().flat_map(|(scene, view)| project(scene, view)).collect();
     let drawn = |splat: &Splat| splat.is_visible() && splat.depth <= limit;
@@ -97,8 +97,8 @@ fn assert_finite(frame: &Frame, what: &str) {
     assert!(numbers && frame.picture.pixels.iter().all(|pixel| pixel.is_finite()), "{what}: a value is not finite");
 }
 
-/// Within 1e-3 (depths 5e-3), but for one pixel in two hundred: the two sides round differently, and here and there a splat's alpha
-/// lies on 1/255, or two splats at the same depth change places.
+/// Checks that frames agree within 1e-3 (depths 5e-3), except for one pixel in two hundred: the two sides round
+/// differently, and here and there a splat's alpha lies on 1/255, or two splats at the same depth change places.
 fn assert_close(found: &Frame, expected: &Frame, what: &str) {
     assert_eq!(found.picture.size, expected.picture.size, "{what}: size");
     assert_finite(found, what);
@@ -114,7 +114,7 @@ fn assert_close(found: &Frame, expected: &Frame, what: &str) {
     assert!(beyond * 200 <= apart.len(), "{what}: {beyond} of {} pixels differ, the worst by {worst}", apart.len());
 }
 
-/// As [`assert_close`], and as much work.
+/// As [`assert_close`]; also checks that the counts agree.
 fn assert_equivalent(found: &Frame, expected: &Frame, what: &str) {
     assert_close(found, expected, what);
     let (a, b) = (found.counts, expected.counts);
@@ -329,7 +329,7 @@ fn what_does_not_fit_the_device_is_refused_and_does_no_harm() {
     assert!(limited.render(&capture, &view, BACKGROUND).expect("render") == before, "what fits is drawn as before");
 }
 
-/// Small from afar, then so close and large that the pairs of the first guess are far too few.
+/// Returns a scene, a view from afar, and a view so close that the room for pairs of the first guess is far too small.
 fn afar_and_close() -> (RuntimeScene, View, View) {
     (swollen(3_000, 5.0), look_from(20.0 * EYE, UVec2::new(64, 48), 0.5), look_from(EYE, UVec2::new(400, 300), 0.5))
 }
@@ -370,7 +370,7 @@ fn a_view_makes_room_without_anybody_waiting() {
     }
 }
 
-/// Red, green and blue of every pixel; rows must need no padding.
+/// Reads red, green and blue of every pixel; rows must need no padding.
 fn read_color(context: &GpuContext, view: &ViewRenderer) -> Vec<[f32; 3]> {
     let texture = view.color().expect("a frame was prepared").texture();
     let (size, row) = (texture.size(), texture.width() * 16);
@@ -395,7 +395,7 @@ fn read_color(context: &GpuContext, view: &ViewRenderer) -> Vec<[f32; 3]> {
     bytes.chunks_exact(16).map(|pixel| bytemuck::pod_read_unaligned(&pixel[..12])).collect()
 }
 
-/// A depth texture with the same value everywhere.
+/// Returns a depth texture with the same value everywhere.
 fn depth_texture(context: &GpuContext, size: UVec2, value: f32) -> wgpu::TextureView {
     let texture = context.device.create_texture(&wgpu::TextureDescriptor {
         label: None,
@@ -491,7 +491,7 @@ fn poison_is_refused_before_it_reaches_the_gpu() {
     }
 }
 
-/// A scene in which every tenth Gaussian has another scale along one axis, or along all three.
+/// Returns a scene in which every tenth Gaussian has another scale along one axis, or along all three.
 fn extreme(scale: f32, axes: usize) -> RuntimeScene {
     let mut scene = trained(500);
     let SceneForm::Trained(trained) = &mut scene.form else { panic!("synthetic scenes are in the trained form") };

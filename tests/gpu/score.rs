@@ -1,4 +1,6 @@
-//! `score` on the GPU against its CPU reference. Skipped where there is no GPU.
+//! `score` on the GPU against its CPU reference.
+//!
+//! In: synthetic scenes. Out: proof that both return the same sums. Skipped where there is no GPU.
 
 use crate::support::gpu;
 use bevy_gs4d::offline::score::score;

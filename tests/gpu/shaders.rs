@@ -9,7 +9,7 @@ use std::path::Path;
 use wgpu::naga::Module;
 use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
 
-/// What is wrong with a module, if anything. No capability is allowed, so that subgroups would be noticed.
+/// Validates a module. No capability is allowed, so that subgroups would be noticed.
 fn validate(name: &str, module: &Module) -> Result<(), String> {
     Validator::new(ValidationFlags::all(), Capabilities::empty())
         .validate(module)

@@ -23,18 +23,18 @@ pub fn gs4d<S: AsRef<OsStr>>(arguments: &[S]) -> Run {
 }
 
 impl Run {
-    /// The text of a run that must have worked.
+    /// Returns the text of a run that must have succeeded.
     pub fn text(self) -> String {
         assert_eq!(self.code, Some(0), "the command works: {}", self.err);
         self.out
     }
 
-    /// The one JSON document of a run that must have worked.
+    /// Returns the one JSON document of a run that must have succeeded.
     pub fn json(self) -> Value {
         serde_json::from_str(&self.text()).expect("exactly one JSON document")
     }
 
-    /// That it failed cleanly and named this.
+    /// Checks that it failed with an error that names `name`.
     pub fn must_fail(&self, name: &str) {
         assert_eq!(self.code, Some(2), "{name}: exit code 2; stdout {} stderr {}", self.out, self.err);
         assert!(self.err.contains("error:") && self.err.contains(name), "{name} is named: {}", self.err);
@@ -48,12 +48,12 @@ macro_rules! arguments {
 }
 pub(crate) use arguments;
 
-/// A temporary folder.
+/// Returns a temporary folder.
 pub fn folder() -> TempDir {
     tempfile::tempdir().expect("a temporary folder")
 }
 
-/// A synthetic scene of so many Gaussians, `scene.gs4d` in this folder.
+/// Writes a synthetic scene of `count` Gaussians as `scene.gs4d` in this folder. Returns its path.
 pub fn scene(folder: &TempDir, count: &str) -> PathBuf {
     let path = folder.path().join("scene.gs4d");
     gs4d(&arguments!["synth", &path, "--count", count]).text();

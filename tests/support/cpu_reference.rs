@@ -21,7 +21,7 @@ pub fn add(app: &mut App, scene: &RuntimeScene) -> Handle<GaussianCapture> {
     app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(scene.clone()))
 }
 
-/// A Gaussian at rest, always there: its mean and the standard deviations along the axes.
+/// Returns a Gaussian at rest that is always active, with its standard deviations along the axes.
 pub fn blob(mean: Vec3, deviation: Vec3, opacity: f32) -> Gaussian {
     let variance = deviation * deviation;
     Gaussian {
@@ -35,7 +35,7 @@ pub fn blob(mean: Vec3, deviation: Vec3, opacity: f32) -> Gaussian {
     }
 }
 
-/// A scene of Gaussians and their colours, the same from every direction.
+/// Returns a scene of Gaussians and their colours, the same from every direction.
 pub fn scene(gaussians: &[(Gaussian, Vec3)]) -> RuntimeScene {
     // The first harmonic is 0.282; one half is added to colours.
     let values = gaussians.iter().flat_map(|(_, color)| ((*color - 0.5) / 0.282_094_79).to_array()).collect();
@@ -46,12 +46,13 @@ pub fn scene(gaussians: &[(Gaussian, Vec3)]) -> RuntimeScene {
     }
 }
 
-/// Where the test camera stands unless a test says otherwise.
+/// Returns the pose of the camera of most tests.
 pub fn eye() -> Transform {
     Transform::from_xyz(0.6, 0.9, 3.5).looking_at(Vec3::ZERO, Vec3::Y)
 }
 
-/// The view of [`spawn_camera`] with a target of `size` pixels, for the CPU reference. `time` in the capture's unit.
+/// Returns the view of `offscreen_app::spawn_camera` with a target of `size` pixels, for the CPU reference. `time` in
+/// the capture's unit.
 pub fn view(camera: &Transform, size: UVec2, time: f32) -> View {
     let tan_y = (FOV_Y / 2.0).tan();
     let lens = Lens::Fov { tan: Vec2::new(tan_y * size.x as f32 / size.y as f32, tan_y) };
@@ -61,13 +62,13 @@ pub fn view(camera: &Transform, size: UVec2, time: f32) -> View {
     PinholeCamera { world_to_camera, size, lens }.view(time, RasterFov::Corrected)
 }
 
-/// The same view of an entity with a transform.
+/// Returns the same view of an entity with a transform.
 pub fn view_of(camera: &Transform, entity: &Transform, size: UVec2, time: f32) -> View {
     let plain = view(camera, size, time);
     View::new(size, time, plain.world_to_camera * entity.to_matrix(), plain.projection, plain.tan_fov)
 }
 
-/// The largest difference of any channel of any pixel, in 255ths.
+/// Returns the largest difference of any channel of any pixel, in 255ths.
 pub fn difference(picture: &RgbaImage, expected: &Picture) -> f32 {
     assert_eq!(UVec2::from(picture.dimensions()), expected.size, "pictures of one size");
     let expected = expected.clamped();
@@ -78,13 +79,13 @@ pub fn difference(picture: &RgbaImage, expected: &Picture) -> f32 {
     picture.pixels().zip(&expected.pixels).map(channel).fold(0.0, f32::max)
 }
 
-/// The largest difference of any channel between two pictures, in 255ths.
+/// Returns the largest difference of any channel between two pictures, in 255ths.
 pub fn difference_between(a: &RgbaImage, b: &RgbaImage) -> u8 {
     assert_eq!(a.dimensions(), b.dimensions(), "pictures of one size");
     a.iter().zip(b.iter()).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or_default()
 }
 
-/// Red, green and blue of a pixel.
+/// Returns red, green and blue of a pixel.
 pub fn rgb(picture: &RgbaImage, x: u32, y: u32) -> [u8; 3] {
     let [r, g, b, _] = picture.get_pixel(x, y).0;
     [r, g, b]

@@ -5,7 +5,7 @@
 use crate::support::skip::skip;
 use std::path::PathBuf;
 
-/// Returns the folder that holds `toybox/` and `standup/`; `None` where it is not known, which is reported.
+/// Returns the folder that contains `toybox/` and `standup/`; `None` if the variable is not set, which is reported.
 pub fn data() -> Option<PathBuf> {
     let folder = std::env::var_os("GS4D_DATA").map(PathBuf::from);
     if folder.is_none() {

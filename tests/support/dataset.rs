@@ -51,7 +51,7 @@ pub fn write(
     }
 }
 
-/// One frame of the Blender form: OpenGL axes.
+/// Returns one frame of the Blender form: OpenGL axes.
 fn frame(camera: &Camera, name: &str, time: f32) -> Value {
     let to_world = camera.world_to_camera.inverse() * glam::Mat4::from_diagonal(Vec4::new(1.0, -1.0, -1.0, 1.0));
     let rows: Vec<[f32; 4]> = (0..4).map(|row| to_world.row(row).to_array()).collect();

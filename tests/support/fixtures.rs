@@ -1,7 +1,7 @@
 //! Captures placed in headless apps, and meshes among them.
 //!
-//! In: an app, scenes, what their entities and cameras are to have. Out: entities, and the comparison of the app's picture with that of
-//! the CPU reference.
+//! In: an app, scenes, components of their entities and cameras. Out: entities, and the comparison of the app's picture
+//! with that of the CPU reference.
 
 use crate::support::cpu_reference::{SIZE, add, blob, difference, scene};
 use crate::support::offscreen_app::picture;
@@ -14,12 +14,12 @@ use bevy_gs4d::reference::{self, Layer};
 use bevy_gs4d::scene::RuntimeScene;
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Picture, View};
 
-/// Nothing behind captures.
+/// Black behind captures.
 pub const BLACK: Background = Background::Color([0.0; 3]);
 /// The pixel in the middle, or its neighbour.
 pub const MIDDLE: UVec2 = UVec2::new(SIZE.x / 2, SIZE.y / 2);
 
-/// Overlapping Gaussians; two of them move.
+/// Returns overlapping Gaussians; two of them move.
 pub fn crowd() -> RuntimeScene {
     let moving = |gaussian: Gaussian, velocity: [f32; 3]| Gaussian { velocity, sigma_t: 0.4, ..gaussian };
     scene(&[
@@ -31,45 +31,45 @@ pub fn crowd() -> RuntimeScene {
     ])
 }
 
-/// One Gaussian at the origin.
+/// Returns one Gaussian at the origin.
 pub fn lone(color: Vec3) -> RuntimeScene {
     scene(&[(blob(Vec3::ZERO, Vec3::splat(0.4), 0.98), color)])
 }
 
-/// A capture at its start, with whatever else its entity is to have.
+/// Spawns a capture, paused at its start, with further components.
 pub fn spawn(app: &mut App, scene: &RuntimeScene, bundle: impl Bundle) -> Entity {
     let handle = add(app, scene);
     app.world_mut().spawn((GaussianCapture3d(handle), Playback::paused_at(0.0), bundle)).id()
 }
 
-/// Gives an entity something, or something else.
+/// Inserts or replaces components of an entity.
 pub fn insert(app: &mut App, entity: Entity, bundle: impl Bundle) {
     app.world_mut().entity_mut(entity).insert(bundle);
 }
 
-/// The app's picture must be this one, but for rounding to 8 bits and the GPU's arithmetic.
+/// Checks that the app's picture is `expected`, except for rounding to 8 bits and the GPU's arithmetic.
 pub fn check(app: &mut App, expected: &Picture, what: &str) {
     let apart = difference(&picture(app, 0.0), expected);
     assert!(apart <= 2.0, "{what}: Bevy and the CPU reference are {apart} / 255 apart");
 }
 
-/// The CPU reference's picture of one capture over black.
+/// Returns the CPU reference's picture of one capture over black.
 pub fn reference_picture(scene: &RuntimeScene, view: View, appearance: Appearance) -> Picture {
     reference::render_layers(&[Layer { scene, view, appearance }], BLACK, BlendSpace::Encoded).picture
 }
 
-/// Straight ahead at the origin from four units away.
+/// Returns the pose of a camera that looks straight at the origin from four units away.
 pub fn front() -> Transform {
     Transform::from_xyz(0.0, 0.0, 4.0)
 }
 
-/// A picture three units high.
+/// Returns a projection for pictures three units high.
 pub fn orthographic() -> OrthographicProjection {
     let scaling_mode = ScalingMode::FixedVertical { viewport_height: 3.0 };
     OrthographicProjection { scaling_mode, ..OrthographicProjection::default_3d() }
 }
 
-/// An unlit mesh of one colour.
+/// Spawns an unlit box of one colour.
 pub fn spawn_box(app: &mut App, size: Vec3, center: Vec3, color: Color, alpha_mode: AlphaMode) -> Entity {
     let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(Cuboid::from_size(size));
     let material = StandardMaterial { base_color: color, unlit: true, alpha_mode, ..default() };

@@ -18,7 +18,7 @@ pub struct GoldenView {
     pub scene: RuntimeScene,
     pub view: View,
     pub background: Background,
-    /// What the original shows: planar colour, depth, alpha.
+    /// The output of the original: planar colour, depth, alpha.
     pub color: Vec<f32>,
     pub depth: Vec<f32>,
     pub alpha: Vec<f32>,
@@ -46,7 +46,7 @@ pub fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden")
 }
 
-/// Every view of every golden scene: sixteen.
+/// Returns every view of every golden scene: sixteen.
 pub fn all_views() -> Vec<GoldenView> {
     let views: Vec<_> = SCENES.iter().flat_map(|scene| load(scene)).collect();
     assert_eq!(views.len(), 16, "five scenes have sixteen views");
@@ -115,7 +115,7 @@ fn load_view(folder: &Path, scene_name: &str, json: &Value, view: &Value) -> Gol
     }
 }
 
-/// The tensors of a golden scene, raw, and its colour with the full degrees.
+/// Returns the raw tensors of a golden scene, and its colour with the full degrees.
 pub fn raw_scene(json: &Value) -> (Parameters, Harmonics) {
     let raw = &json["raw"];
     fn get<T: serde::de::DeserializeOwned + Default>(raw: &Value, key: &str) -> T {
@@ -163,7 +163,8 @@ fn make_view(entry: &CameraEntry) -> View {
     view
 }
 
-/// Largest absolute differences of colour, depth and alpha, outside the ambiguous pixels and inside.
+/// Returns the largest absolute differences: of colour, depth and alpha outside the ambiguous pixels, and of any
+/// inside.
 pub fn differences(golden: &GoldenView, frame: &Frame) -> ([f32; 3], f32) {
     let count = golden.alpha.len();
     let (mut clear, mut ambiguous) = ([0.0f32; 3], 0.0f32);

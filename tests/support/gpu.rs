@@ -8,7 +8,7 @@ use bevy_gs4d::renderer::{GpuContext, Headless, ShaderChecks};
 /// As the plugin chooses them: a build as shipped does not check.
 pub const CHECKS: ShaderChecks = if cfg!(debug_assertions) { ShaderChecks::On } else { ShaderChecks::Off };
 
-/// Returns a renderer; `None` where there is no adapter, which is reported.
+/// Returns a renderer; `None` if there is no adapter, which is reported.
 pub fn headless() -> Option<Headless> {
     match GpuContext::headless(None) {
         Ok(context) => Some(Headless::new(context, CHECKS).expect("the passes compile")),

@@ -9,7 +9,7 @@ use pollster::block_on;
 /// Most bytes that can be bound.
 pub const BINDING: u64 = 1 << 21;
 
-/// Returns a renderer with shader checks on; `None` where there is no adapter, which is reported.
+/// Returns a renderer with shader checks on; `None` if there is no adapter, which is reported.
 pub fn headless() -> Option<Headless> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
         backends: wgpu::Backends::PRIMARY,

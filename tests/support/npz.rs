@@ -34,7 +34,7 @@ pub fn pictures(path: &Path, array: &str) -> Vec<Picture> {
     values.chunks_exact(3 * plane).map(picture).collect()
 }
 
-/// The four numbers behind `'shape': (`.
+/// Returns the four numbers after `'shape': (`.
 fn shape(header: &str) -> [usize; 4] {
     let (_, rest) = header.split_once("'shape': (").expect("a shape");
     let (inside, _) = rest.split_once(')').expect("a closed shape");
@@ -42,7 +42,7 @@ fn shape(header: &str) -> [usize; 4] {
     numbers.try_into().expect("four dimensions")
 }
 
-/// IEEE half precision, infinities and NaN aside.
+/// Converts from IEEE half precision, except infinities and NaN.
 fn from_half(bits: u16) -> f32 {
     let magnitude = match ((bits >> 10) & 0x1f, f32::from(bits & 0x3ff)) {
         (0, fraction) => fraction * (-24.0f32).exp2(),

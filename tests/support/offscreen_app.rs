@@ -16,7 +16,7 @@ use std::time::Duration;
 /// Vertical field of view of every test camera, radians.
 pub const FOV_Y: f32 = 0.8;
 
-/// Returns an app without a window; `None` where there is no GPU to draw with, which is reported.
+/// Returns an app without a window; `None` if there is no GPU to draw with, which is reported.
 pub fn app(size: UVec2) -> Option<App> {
     if !testing::has_gpu() {
         skip(TestingError::NoGpu);
@@ -27,7 +27,8 @@ pub fn app(size: UVec2) -> Option<App> {
     Some(app)
 }
 
-/// Whether apps run as a game ships them: shaders unchecked, pipelined rendering on, pipelines compiled in the background.
+/// Returns whether apps run as a game ships them: shaders unchecked, pipelined rendering on, pipelines compiled in the
+/// background.
 fn as_shipped() -> bool {
     let wanted = std::env::var_os("GS4D_AS_SHIPPED").is_some();
     assert!(!wanted || !cfg!(debug_assertions), "GS4D_AS_SHIPPED needs a build without debug assertions");
@@ -40,7 +41,7 @@ fn shipped_plugins(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
         .set(RenderPlugin { synchronous_pipeline_compilation: false, ..default() })
 }
 
-/// A camera whose pixels are compared: no tonemapping, no dithering.
+/// Spawns a camera whose pixels are compared: no tonemapping, no dithering.
 pub fn spawn_camera(app: &mut App, msaa: Msaa, transform: Transform) -> Entity {
     let target = app.world().resource::<Offscreen>().target();
     let lens = Projection::Perspective(PerspectiveProjection { fov: FOV_Y, ..default() });
@@ -48,7 +49,7 @@ pub fn spawn_camera(app: &mut App, msaa: Msaa, transform: Transform) -> Entity {
     app.world_mut().spawn((Camera3d::default(), target, msaa, lens, appearance, transform)).id()
 }
 
-/// The picture after `seconds` more.
+/// Returns the picture after `seconds` more.
 pub fn picture(app: &mut App, seconds: f32) -> RgbaImage {
     testing::picture(app, Duration::from_secs_f32(seconds)).expect("the app draws without an error")
 }

@@ -8,14 +8,15 @@ use bevy_gs4d::scene::{RuntimeScene, TemporalFilter};
 use bevy_gs4d::view::{Background, Camera, RasterFov, View};
 use glam::{UVec2, Vec3};
 
-/// Nothing behind the scene.
+/// Black behind the scene.
 pub const BLACK: Background = Background::Color([0.0; 3]);
 
-/// A synthetic scene with a support filter of nine segments, some of whose Gaussians are at rest and always active.
+/// Returns a synthetic scene with a support filter of nine segments, some of whose Gaussians are at rest and always
+/// active.
 pub fn scene(count: usize, degree: u32, degree_t: u32) -> RuntimeScene {
     let settings = SynthSettings { count, degree, degree_t, ..SynthSettings::default() };
     let mut scene = synthesize(&settings).into_runtime().expect("synthetic scenes are valid");
-    // Some that are always there, at rest.
+    // Some at rest that are always active.
     let sliced = scene.form.as_sliced_mut().expect("sliced");
     for gaussian in sliced.gaussians.iter_mut().step_by(17) {
         gaussian.sigma_t = f32::INFINITY;
@@ -26,13 +27,13 @@ pub fn scene(count: usize, degree: u32, degree_t: u32) -> RuntimeScene {
     scene
 }
 
-/// A view of it at a time of [0, 1].
+/// Returns a view of it at a time of [0, 1].
 pub fn view(time: f32) -> View {
     let eye = Vec3::new(1.9, -1.2, 1.1);
     Camera::look_at(eye, Vec3::ZERO, Vec3::Z, 0.9, UVec2::new(120, 90)).view(time, RasterFov::Reference)
 }
 
-/// Balanced geometry with codebooks of these sizes for the colors.
+/// Returns settings with balanced geometry and codebooks of these sizes for the colors.
 pub fn settings(codebooks: &[usize]) -> CompressSettings {
     CompressSettings { codebooks: codebooks.to_vec(), ..CompressSettings::from(Quality::Balanced) }
 }

@@ -30,12 +30,12 @@ struct Resource {
 }
 
 impl Gpu {
-    /// Returns a device; `None` where there is no adapter, which is reported.
+    /// Returns a device; `None` if there is no adapter, which is reported.
     pub fn new() -> Option<Self> {
         GpuContext::headless(None).map(Self).map_err(|error| skip(format_args!("no GPU adapter: {error}"))).ok()
     }
 
-    /// A buffer of these values; where there are none, of some zeros, so that it can be bound.
+    /// Returns a buffer of these values, or of some zeros if there are none, so that it can be bound.
     pub fn buffer<T: Pod>(&self, values: &[T]) -> wgpu::Buffer {
         let contents: &[u8] = if values.is_empty() { &[0; 64] } else { bytemuck::cast_slice(values) };
         self.0.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -45,7 +45,7 @@ impl Gpu {
         })
     }
 
-    /// What is in a buffer.
+    /// Reads a buffer.
     pub fn read<T: Pod>(&self, buffer: &wgpu::Buffer) -> Vec<T> {
         let GpuContext { device, queue, .. } = &self.0;
         let copy = device.create_buffer(&wgpu::BufferDescriptor {

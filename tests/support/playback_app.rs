@@ -12,12 +12,12 @@ use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{FilterKind, GaussianScene, TemporalFilter};
 use std::time::Duration;
 
-/// An app whose time stands still but for [`pass`]. Its assets are in `folder`.
+/// Returns an app whose time advances only by [`pass`]. Its assets are in `folder`.
 pub fn app(folder: &str) -> App {
     app_with(AssetPlugin { file_path: folder.into(), ..default() })
 }
 
-/// The same with any assets.
+/// Returns the same with any assets.
 pub fn app_with(assets: AssetPlugin) -> App {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, assets, GaussianCapturePlugin));
@@ -35,13 +35,13 @@ pub fn app_with(assets: AssetPlugin) -> App {
     app
 }
 
-/// One update, `seconds` after the last.
+/// Runs one update, `seconds` after the last.
 pub fn pass(app: &mut App, seconds: f64) {
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(seconds)));
     app.update();
 }
 
-/// A scene of some seconds whose filter has so many segments.
+/// Returns a scene of `seconds` whose filter has `segments` segments.
 pub fn scene(seconds: f32, segments: u32) -> GaussianScene {
     let count = 20;
     let settings = SynthSettings { count, degree: 0, duration_seconds: seconds, ..SynthSettings::default() };
@@ -50,13 +50,13 @@ pub fn scene(seconds: f32, segments: u32) -> GaussianScene {
     GaussianScene { filter: Some(filter), ..synthesize(&settings) }
 }
 
-/// The same among the assets.
+/// Adds the same to the assets.
 pub fn capture(app: &mut App, seconds: f32, segments: u32) -> Handle<GaussianCapture> {
     let scene = scene(seconds, segments).into_runtime().expect("a synthetic scene can be drawn");
     app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(scene))
 }
 
-/// The component of an entity.
+/// Returns the component of an entity.
 pub fn get<C: Component + Clone>(app: &App, entity: Entity) -> C {
     app.world().get::<C>(entity).expect("the entity has this component").clone()
 }

@@ -20,10 +20,11 @@ pub struct Pth {
 }
 
 impl Pth {
-    /// `count` Gaussians of a `rot_4d` model with `k` coefficients per channel, degrees 3 and 2.
+    /// Returns a checkpoint of `count` Gaussians of a `rot_4d` model with `k` coefficients per channel, degrees 3 and
+    /// 2.
     pub fn rotating(count: usize, k: usize) -> Self {
         let mut pth = Self { slots: vec![NONE.to_vec(); 19], storages: Vec::new() };
-        // Statistics and optimiser state have no storage here: whoever reads them fails.
+        // Statistics and optimiser state have no storage here: reading them fails.
         let unread = tensor(999, 1, 0, &[1], &[1]);
         pth.slots[7..11].fill(unread);
         pth.slots[0] = int(3);
@@ -58,7 +59,7 @@ impl Pth {
         self.storages.push(values);
     }
 
-    /// The pickle: the pair of state tuple and iteration 30,000.
+    /// Returns the pickle: the pair of state tuple and iteration 30,000.
     pub fn pickle(&self) -> Vec<u8> {
         let mut pickle = b"\x80\x02".to_vec();
         pickle.extend(tuple(&[tuple(&self.slots), int(30_000)]));
@@ -66,12 +67,12 @@ impl Pth {
         pickle
     }
 
-    /// The file.
+    /// Returns the file.
     pub fn bytes(&self) -> Vec<u8> {
         self.bytes_with(&self.pickle())
     }
 
-    /// The file, with another pickle in place of its own.
+    /// Returns the file, with another pickle in place of its own.
     pub fn bytes_with(&self, pickle: &[u8]) -> Vec<u8> {
         let mut entries = vec![("archive/data.pkl".to_owned(), pickle.to_vec())];
         for (key, values) in self.storages.iter().enumerate() {
@@ -83,7 +84,7 @@ impl Pth {
     }
 }
 
-/// A zip archive of entries stored as they are.
+/// Returns a zip archive of uncompressed entries.
 pub fn archive(entries: &[(String, Vec<u8>)]) -> Vec<u8> {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
@@ -94,34 +95,34 @@ pub fn archive(entries: &[(String, Vec<u8>)]) -> Vec<u8> {
     zip.finish().expect("a complete archive").into_inner()
 }
 
-/// An int.
+/// Returns an int.
 pub fn int(value: usize) -> Vec<u8> {
     let value = i32::try_from(value).expect("tests use small numbers");
     [&b"J"[..], &value.to_le_bytes()].concat()
 }
 
-/// A float.
+/// Returns a float.
 pub fn float(value: f64) -> Vec<u8> {
     [&b"G"[..], &value.to_be_bytes()].concat()
 }
 
-/// A bool.
+/// Returns a bool.
 pub fn flag(value: bool) -> Vec<u8> {
     vec![if value { 0x88 } else { 0x89 }]
 }
 
-/// A text.
+/// Returns a text.
 pub fn text(value: &str) -> Vec<u8> {
     let length = u32::try_from(value.len()).expect("tests use short texts");
     [&b"X"[..], &length.to_le_bytes()[..], value.as_bytes()].concat()
 }
 
-/// A tuple.
+/// Returns a tuple.
 pub fn tuple(items: &[Vec<u8>]) -> Vec<u8> {
     [&b"("[..], &items.concat()[..], b"t"].concat()
 }
 
-/// A tensor as torch rebuilds it: a view of the storage `key`, which claims to have `count` values.
+/// Returns a tensor as torch rebuilds it: a view of the storage `key`, whose declared length is `count` values.
 pub fn tensor(key: usize, count: usize, offset: usize, size: &[usize], stride: &[usize]) -> Vec<u8> {
     let ints = |values: &[usize]| tuple(&values.iter().map(|&value| int(value)).collect::<Vec<_>>());
     let class = b"ctorch\nFloatStorage\n".to_vec();

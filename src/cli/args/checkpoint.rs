@@ -1,6 +1,6 @@
-//! What a checkpoint does not say about itself.
+//! Options for settings that a checkpoint does not contain.
 //!
-//! In: the options for it, a path. Out: a scene.
+//! In: options, a path. Out: a scene.
 
 use super::values;
 use crate::cli::failure::Failure;
@@ -72,7 +72,7 @@ impl CheckpointArgs {
     /// Opens a checkpoint or a package.
     ///
     /// # Errors
-    /// What the codec reports; options that contradict what a package says about its training.
+    /// Errors of the codec; options that contradict the training settings in a package.
     pub fn load(&self, path: &Path) -> Result<GaussianScene, Failure> {
         let mut scene = codec::load(path, &self.options())?;
         if is_package(path) {
@@ -100,7 +100,7 @@ impl CheckpointArgs {
         }
     }
 
-    /// Whether the options that went into the numbers of a package are those it was made with.
+    /// Checks that the options that a package cannot change any more are those it was written with.
     fn check_against(&self, stored: &TrainedWith) -> Result<(), String> {
         let differing = [
             ("--time-interval", self.time_interval.is_some_and(|given| given != stored.time_interval)),
@@ -120,7 +120,7 @@ impl CheckpointArgs {
     }
 }
 
-/// Whether a file starts like a package.
+/// Returns whether a file starts with the magic bytes of a package.
 pub fn is_package(path: &Path) -> bool {
     let mut magic = [0; package::MAGIC.len()];
     File::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && magic == package::MAGIC

@@ -1,4 +1,4 @@
-//! Which dataset a verb works with.
+//! The dataset that a verb works with.
 //!
 //! In: `--data DIR`, sizes, a split. Out: its views inside the capture's time interval.
 
@@ -28,10 +28,10 @@ pub struct DataArgs {
 }
 
 impl DataArgs {
-    /// The training views within the capture's time interval.
+    /// Returns the training views within the capture's time interval.
     ///
     /// # Errors
-    /// No folder given, or one that cannot be used.
+    /// No folder is given, or it cannot be used.
     pub fn open(&self, trained_with: &TrainedWith) -> Result<Vec<TrainingView>, Failure> {
         let folder = self.data.as_ref().ok_or_else(|| {
             Failure::new("this needs the training views: give --data DIR, the folder that the capture was trained on")
@@ -58,10 +58,10 @@ pub struct SplitArgs {
 }
 
 impl SplitArgs {
-    /// The views of a split; see [`open_split`].
+    /// Returns the views of a split; see [`open_split`].
     ///
     /// # Errors
-    /// A split that is not there or cannot be used.
+    /// A split that is missing or cannot be used.
     pub fn open(
         &self,
         split: Split,

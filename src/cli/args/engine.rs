@@ -1,4 +1,4 @@
-//! What scores and draws for a verb.
+//! The engine that scores and draws for a verb.
 //!
 //! In: `--engine`, `--adapter` and `--checks`. Out: an [`Engine`], or a headless renderer.
 
@@ -18,10 +18,10 @@ pub struct EngineArgs {
 }
 
 impl EngineArgs {
-    /// Opens it.
+    /// Opens the engine.
     ///
     /// # Errors
-    /// A GPU was asked for that cannot be used.
+    /// The requested GPU cannot be used.
     pub fn open(&self) -> Result<Engine, GpuError> {
         Engine::open(&EngineSettings { choice: self.engine, gpu: self.gpu.settings() })
     }

@@ -1,6 +1,6 @@
-//! Where a package is written, and how.
+//! The path of a package to write, and its compression.
 //!
-//! In: the options for it, a scene. Out: the package on disk.
+//! In: options, a scene. Out: the package on disk.
 
 use crate::cli::failure::Failure;
 use crate::cli::interrupt;
@@ -24,10 +24,10 @@ pub struct PackageArgs {
 }
 
 impl PackageArgs {
-    /// Where to write.
+    /// Returns the path to write to.
     ///
     /// # Errors
-    /// A name that belongs to another kind of file.
+    /// No path is given, or its extension is that of another kind of file.
     pub fn out(&self) -> Result<&Path, Failure> {
         let out = self.out.as_ref().or(self.out_option.as_ref());
         let out = out.ok_or_else(|| Failure::new("no OUT is given: name the package to write"))?;
@@ -38,7 +38,7 @@ impl PackageArgs {
         Ok(out)
     }
 
-    /// As [`out`](Self::out), for a verb that reads `input`.
+    /// As [`out`](Self::out), for a verb that still reads `input` while it writes.
     ///
     /// # Errors
     /// As [`out`](Self::out), and an input that would be overwritten.
@@ -51,7 +51,7 @@ impl PackageArgs {
     /// Writes the package. Returns its size in bytes.
     ///
     /// # Errors
-    /// What the codec reports.
+    /// Errors of the codec.
     pub fn save(&self, scene: &GaussianScene) -> Result<u64, Failure> {
         let out = self.out()?;
         let settings = write_settings(&scene.form, self.level);
@@ -60,10 +60,10 @@ impl PackageArgs {
     }
 }
 
-/// Bytes of a file.
+/// Returns the size of a file, bytes.
 ///
 /// # Errors
-/// What the system reports.
+/// The file cannot be accessed.
 pub fn file_size(path: &Path) -> Result<u64, Failure> {
     Ok(fs::metadata(path).map_err(|error| Failure::at(path, &error))?.len())
 }

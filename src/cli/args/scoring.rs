@@ -1,4 +1,4 @@
-//! Which score, and from which views.
+//! The score, and the views that it comes from.
 //!
 //! In: the name of a score, the options for scoring. Out: a [`ScoreChoice`], [`ScoringSettings`].
 
@@ -8,7 +8,7 @@ use crate::offline::score::{ScoreSettings, ScoringSettings};
 use crate::offline::search::ScoreChoice;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-/// Parses `auto`, `all` (where that makes sense) or the name of a score.
+/// Returns a parser for `auto`, `all` (if `with_all`) or the name of a score.
 pub fn score_choice(with_all: bool) -> impl TypedValueParser<Value = ScoreChoice> {
     let special: &[&str] = if with_all { &["auto", "all"] } else { &["auto"] };
     let names = special.iter().copied().chain(Variant::ALL.map(Variant::name));
@@ -37,7 +37,7 @@ pub struct ScoringArgs {
 }
 
 impl ScoringArgs {
-    /// As settings of the library.
+    /// Returns the settings of the library.
     pub fn settings(&self) -> ScoringSettings {
         let score = ScoreSettings { volume_power: self.volume_power, volume_rank: self.volume_rank };
         ScoringSettings { views: self.views, held_out: self.held_out, score }

@@ -1,6 +1,6 @@
 //! Values of options: how they are spelled and which are accepted.
 //!
-//! In: the text after an option. Out: the value, or a reason that clap shows with the option's name.
+//! In: the text after an option. Out: the value, or as an error the reason, which clap shows with the option's name.
 
 use crate::offline::temporal_filter::KeyFrames;
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
@@ -14,41 +14,41 @@ fn numbers<const N: usize>(text: &str) -> Option<[f32; N]> {
     <[f32; N]>::try_from(values).ok().filter(|values| values.iter().all(|v| v.is_finite()))
 }
 
-/// `R,G,B`.
+/// Parses `R,G,B`.
 pub fn color(text: &str) -> Result<[f32; 3], String> {
     numbers(text).ok_or_else(|| "expected three numbers, such as 0,0.5,1".to_owned())
 }
 
-/// `T0,T1` with T0 before T1.
+/// Parses `T0,T1` with T0 before T1.
 pub fn interval(text: &str) -> Result<[f32; 2], String> {
     numbers::<2>(text)
         .filter(|[t0, t1]| t0 < t1)
         .ok_or_else(|| "expected two numbers in order, such as 0,10".to_owned())
 }
 
-/// A finite number.
+/// Parses a finite number.
 pub fn number(text: &str) -> Result<f32, String> {
     numbers::<1>(text).map(|[value]| value).ok_or_else(|| "expected a finite number".to_owned())
 }
 
-/// A finite number above zero.
+/// Parses a finite number above zero.
 pub fn positive(text: &str) -> Result<f32, String> {
     number(text).ok().filter(|v| *v > 0.0).ok_or_else(|| "expected a number above zero".to_owned())
 }
 
-/// A share, 0 to 1.
+/// Parses a share, 0 to 1.
 pub fn share(text: &str) -> Result<f64, String> {
     let share = text.trim().parse::<f64>().ok().filter(|share| (0.0..=1.0).contains(share));
     share.ok_or_else(|| "expected a number from 0 to 1".to_owned())
 }
 
-/// A finite number, not below zero, in double precision.
+/// Parses a finite number, not below zero, in double precision.
 pub fn not_negative(text: &str) -> Result<f64, String> {
     let value = text.trim().parse::<f64>().ok().filter(|value| value.is_finite() && *value >= 0.0);
     value.ok_or_else(|| "expected a number, zero or above".to_owned())
 }
 
-/// `WxH` in pixels.
+/// Parses `WxH` in pixels.
 pub fn size(text: &str) -> Result<UVec2, String> {
     let side = |text: &str| text.parse::<u32>().ok().filter(|side| (1..=MAX_SIDE).contains(side));
     text.split_once(['x', 'X'])
@@ -56,12 +56,12 @@ pub fn size(text: &str) -> Result<UVec2, String> {
         .ok_or_else(|| format!("expected WIDTHxHEIGHT, such as 1352x1014, at most {MAX_SIDE} each"))
 }
 
-/// A whole number from 1 to `most`.
+/// Returns a parser for whole numbers from 1 to `most`.
 pub fn count(most: u64) -> RangedU64ValueParser<usize> {
     RangedU64ValueParser::new().range(1..=most)
 }
 
-/// One of a few names, each standing for a value.
+/// Returns a parser for one of a few names, each of which stands for a value.
 pub fn one_of<T>(choices: &'static [(&'static str, T)]) -> impl TypedValueParser<Value = T>
 where
     T: Copy + Send + Sync + 'static,
@@ -71,7 +71,7 @@ where
         .map(move |text| choices.iter().find(|(name, _)| *name == text).map_or(first, |(_, value)| *value))
 }
 
-/// The key-frames that `--key-frames K` and `--every FRAMES` ask for, of which at most one is given.
+/// Returns the key-frames that `--key-frames K` or `--every FRAMES` specify, of which at most one is given.
 pub fn key_frames(count: Option<u32>, every: Option<usize>) -> KeyFrames {
     every.map(KeyFrames::Every).or(count.map(KeyFrames::Count)).unwrap_or_default()
 }

@@ -1,4 +1,4 @@
-//! Which views to draw: those of a camera file, or a circle around the scene.
+//! The views to draw: those of a camera file, or a circle around the scene.
 //!
 //! In: `--cameras FILE` or `--orbit N`, sizes, a fixed time. Out: named cameras at a time each ([`Shot`]).
 
@@ -35,12 +35,13 @@ pub struct ViewArgs {
 }
 
 impl ViewArgs {
-    /// How many views to take of all there are, when `count` is enough: an orbit that was asked for stays whole.
+    /// Returns how many views to use: all of `--orbit` if it is given, else `count`.
     pub fn limit(&self, count: usize) -> usize {
         self.orbit.unwrap_or(count)
     }
 
-    /// The shots of the camera file, or else of an orbit (of `count` views unless `--orbit` says how many).
+    /// Returns the shots of the camera file or, without one, of an orbit: `count` views unless `--orbit` gives their
+    /// number.
     ///
     /// # Errors
     /// A camera file that cannot be used, a scene without Gaussians to go around.
@@ -61,7 +62,7 @@ impl ViewArgs {
     }
 }
 
-/// Notes on what would otherwise surprise.
+/// Prints notes about views outside the time interval and about another field of view than in training.
 fn point_out(scene: &RuntimeScene, shots: &[Shot]) {
     let [first, last] = scene.trained_with.time_interval;
     let outside = shots.iter().filter(|shot| !(first..=last).contains(&shot.time)).count();

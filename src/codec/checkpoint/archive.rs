@@ -1,7 +1,7 @@
 //! The zip archive of a checkpoint.
 //!
-//! In: a seekable reader, and [`Tensor`]s whose values are wanted. Out: the small entries as bytes, and the values of one tensor
-//! at a time, read in one pass to where they belong and checked against the entry's checksum. What is not asked for is not read.
+//! In: a seekable reader, and the [`Tensor`]s to read. Out: the small entries as bytes, and the values of one tensor at
+//! a time, read in one pass to their destination and checked against the checksum of the entry. Nothing else is read.
 
 use super::error::CheckpointError;
 use super::tensor::Tensor;
@@ -9,12 +9,12 @@ use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use zip::read::{ArchiveOffset, Config};
 use zip::{CompressionMethod, ZipArchive};
 
-/// Most bytes of `data.pkl`. Real ones have some 5,000, however many Gaussians there are.
+/// Largest size of `data.pkl` in bytes. Real ones have some 5,000, whatever the number of Gaussians.
 const PICKLE_LIMIT: u64 = 1 << 20;
 /// Bytes read at once.
 const BUFFER: usize = 1 << 16;
 
-/// An archive with one `<root>/data.pkl`, all of whose entries are stored as they are.
+/// An archive with one `<root>/data.pkl`, all of whose entries are stored uncompressed.
 pub(super) struct Archive<R> {
     zip: ZipArchive<R>,
     root: Vec<u8>,
@@ -24,11 +24,11 @@ pub(super) struct Archive<R> {
 /// A tensor of the state tuple.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Slot<'p> {
-    /// Place in the state tuple.
+    /// Index in the state tuple, from 0.
     pub index: usize,
     /// Name of the attribute in the trainer.
     pub name: &'static str,
-    /// What a row is, for messages: a Gaussian, a channel.
+    /// Name of a row in messages: Gaussian or channel.
     pub row: &'static str,
     /// The tensor.
     pub tensor: &'p Tensor<'p>,
@@ -45,7 +45,7 @@ pub(super) struct Located<'p> {
     storage: usize,
 }
 
-/// Where the rows of a tensor go: `width` values from `start` in each stretch of `pitch` values.
+/// The destination of the rows of a tensor: `width` values from `start` in each stretch of `pitch` values.
 pub(super) struct Rows<'v> {
     /// All stretches.
     pub values: &'v mut [f32],
@@ -62,7 +62,7 @@ impl Slot<'_> {
         CheckpointError::Tensor { index: self.index, name: self.name, reason: reason.into() }
     }
 
-    /// That the shape is not `expected`.
+    /// Returns the error about a shape that is not `expected`.
     pub(super) fn shape_error(&self, expected: impl Into<String>) -> CheckpointError {
         let found = self.tensor.size.clone();
         CheckpointError::Shape { index: self.index, name: self.name, found, expected: expected.into() }
@@ -70,13 +70,14 @@ impl Slot<'_> {
 }
 
 impl<R: Read + Seek> Archive<R> {
-    /// Opens the archive and looks at its directory.
+    /// Opens the archive and checks its directory.
     ///
     /// # Errors
-    /// No zip archive, a packed entry, an entry longer than the file, another byte order, none or several `data.pkl`.
+    /// Not a zip archive, a compressed entry, an entry longer than the file, another byte order, no `data.pkl` or
+    /// several.
     pub(super) fn open(mut reader: R) -> Result<Self, CheckpointError> {
         let length = reader.seek(SeekFrom::End(0)).map_err(CheckpointError::Io)?;
-        // Nothing stands before the archive; guessing where it begins goes wrong with some of them.
+        // The archive starts at the beginning of the file; the search for its start fails for some checkpoints.
         let config = Config { archive_offset: ArchiveOffset::Known(0) };
         let zip = ZipArchive::with_config(config, reader).map_err(CheckpointError::Archive)?;
         let mut roots = Vec::new();
@@ -101,7 +102,7 @@ impl<R: Read + Seek> Archive<R> {
         }
     }
 
-    /// The bytes of `data.pkl`.
+    /// Returns the bytes of `data.pkl`.
     ///
     /// # Errors
     /// An entry that cannot be read, is damaged or too large.
@@ -109,7 +110,8 @@ impl<R: Read + Seek> Archive<R> {
         self.small("data.pkl", PICKLE_LIMIT)?.ok_or(CheckpointError::Root(0))
     }
 
-    /// An entry of at most `limit` bytes, if there is one of that name.
+    /// Returns the bytes of an entry; `None` if there is none of that name. An entry of more than `limit` bytes is an
+    /// error.
     fn small(&mut self, name: &'static str, limit: u64) -> Result<Option<Vec<u8>>, CheckpointError> {
         let Some(index) = self.index_of(name) else { return Ok(None) };
         let mut entry = self.zip.by_index(index).map_err(CheckpointError::Archive)?;
@@ -129,7 +131,7 @@ impl<R: Read + Seek> Archive<R> {
     /// Checks that a tensor has the shape given and that all its values are in the file.
     ///
     /// # Errors
-    /// Another shape, a tensor outside its storage, a storage that is not there or too short.
+    /// Another shape, a tensor outside its storage, a storage that is missing or too short.
     pub(super) fn locate<'p>(&mut self, slot: Slot<'p>, shape: &[usize]) -> Result<Located<'p>, CheckpointError> {
         if !slot.tensor.size.iter().copied().eq(shape.iter().map(|&size| size as u64)) {
             return Err(slot.shape_error(format!("{shape:?}")));
@@ -155,7 +157,7 @@ impl<R: Read + Seek> Archive<R> {
         Ok(Located { slot, entry: index, count, storage })
     }
 
-    /// Reads a tensor to where its rows belong.
+    /// Reads the values of a tensor into `rows`.
     ///
     /// # Errors
     /// Values that cannot be read, do not match their checksum, or are not finite.
@@ -183,7 +185,7 @@ impl<R: Read + Seek> Archive<R> {
         }
     }
 
-    /// A tensor of shape `count` × W.
+    /// Reads a tensor of shape `count` × W.
     ///
     /// # Errors
     /// As [`locate`](Self::locate) and [`fill`](Self::fill).
@@ -210,7 +212,7 @@ fn read_contiguous(reader: &mut impl BufRead, offset: u64, rows: &mut Rows) -> i
 fn read_strided(reader: &mut impl BufRead, tensor: &Tensor, count: usize, rows: &mut Rows) -> io::Result<()> {
     let mut storage = vec![0.0; count];
     read_values(reader, &mut storage)?;
-    // Every place was found to be inside the storage by `locate`.
+    // `locate` has checked that every index is inside the storage.
     for (at, value) in rows.iter_mut().flatten().enumerate() {
         *value = storage[tensor.place(at as u64) as usize];
     }
@@ -225,7 +227,7 @@ fn read_values(reader: &mut impl BufRead, values: &mut [f32]) -> io::Result<()> 
     Ok(())
 }
 
-/// A name from the file in a form that can be shown: short, without control characters.
+/// Returns a name from the file in a form that can be shown: short, without control characters.
 fn printable(name: &[u8]) -> String {
     String::from_utf8_lossy(name).chars().take(120).flat_map(char::escape_debug).collect()
 }

@@ -1,33 +1,33 @@
-//! `cfg_args`, the text that the trainer leaves beside its checkpoints.
+//! `cfg_args`, the text file that the trainer writes next to its checkpoints.
 //!
-//! In: the path of a checkpoint, and the text `Namespace(sh_degree=3, ..., white_background=False, prefilter_var=-1.0)` in the file
-//! beside it. Out: the entries that drawing depends on.
+//! In: the path of a checkpoint, and the text `Namespace(sh_degree=3, ..., white_background=False, prefilter_var=-1.0)`
+//! of the file in the same folder. Out: the entries that drawing depends on.
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// Most bytes read of the file, which has some 300.
+/// Largest number of bytes read of the file, which has some 300.
 const LIMIT: u64 = 1 << 16;
 
-/// The text of the file in the folder of a checkpoint. It is optional: one that cannot be read counts as absent.
+/// Returns the text of the file in the folder of a checkpoint; `None` if it cannot be read, since it is optional.
 pub(super) fn beside(checkpoint: &Path) -> Option<String> {
     let mut text = Vec::new();
     File::open(checkpoint.with_file_name("cfg_args")).ok()?.take(LIMIT).read_to_end(&mut text).ok()?;
     Some(String::from_utf8_lossy(&text).into_owned())
 }
 
-/// The entries of `cfg_args` that matter here; what is absent or not understood stays out.
+/// The entries of `cfg_args` that are used; `None` if absent or not understood.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct CfgArgs {
-    /// Whether the capture was trained before white instead of black.
+    /// Whether the background in training was white instead of black.
     pub white_background: Option<bool>,
     /// Added to the temporal variance in the marginal, if positive.
     pub prefilter_var: Option<f32>,
 }
 
 impl CfgArgs {
-    /// Reads the text; nothing at all if it is not a `Namespace(...)`.
+    /// Parses the text. All entries are `None` if it is not a `Namespace(...)`.
     pub(super) fn parse(text: &str) -> Self {
         let mut found = Self::default();
         let Some(inside) = text.trim().strip_prefix("Namespace(").and_then(|rest| rest.strip_suffix(')')) else {

@@ -1,14 +1,14 @@
-//! What can be wrong with a checkpoint.
+//! Errors of reading checkpoints.
 //!
-//! In: a reader's finding. Out: one line that says what is wrong and, where there is one, the remedy. The path is added by
-//! [`CodecError`](crate::codec::CodecError).
+//! In: a problem found by the reader. Out: a message of one line that names the problem and, if there is one, the
+//! remedy. [`CodecError`](crate::codec::CodecError) adds the path.
 
 use std::io;
 
 /// Why a checkpoint was not read.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
-    /// The zip archive around everything is damaged or incomplete.
+    /// The zip archive is damaged or incomplete.
     #[error("not a complete zip archive, which a checkpoint is ({0}); copy the file again")]
     Archive(zip::result::ZipError),
     /// The file could not be read.
@@ -19,7 +19,7 @@ pub enum CheckpointError {
         "{0} entries named <folder>/data.pkl where a checkpoint has one; only files of torch.save (1.6 and later) can be read"
     )]
     Root(usize),
-    /// An entry that is compressed or encrypted; torch never does that, zip bombs do.
+    /// An entry that is compressed or encrypted, which torch never writes.
     #[error(
         "entry {0} is compressed or encrypted, and torch stores entries as they are; save the checkpoint again with torch.save"
     )]
@@ -32,7 +32,7 @@ pub enum CheckpointError {
         /// Bytes claimed.
         size: u64,
     },
-    /// An entry larger than anything it could hold.
+    /// An entry larger than its content can need.
     #[error("entry {entry} is {size} bytes long, which is more than the {limit} that a checkpoint can need there")]
     TooLarge {
         /// Name of the entry.
@@ -50,15 +50,15 @@ pub enum CheckpointError {
     /// `data.pkl` is malformed.
     #[error("data.pkl, byte {offset}: {reason}")]
     Pickle {
-        /// Where, in bytes from the start of `data.pkl`.
+        /// Offset in bytes from the start of `data.pkl`.
         offset: usize,
-        /// What is wrong there.
+        /// What is wrong.
         reason: String,
     },
     /// An opcode that no checkpoint of the trainer contains.
     #[error("data.pkl, byte {offset}: pickle opcode {code:#04x} is not one that 4DGS checkpoints use; refused")]
     Opcode {
-        /// Where, in bytes from the start of `data.pkl`.
+        /// Offset in bytes from the start of `data.pkl`.
         offset: usize,
         /// The opcode.
         code: u8,
@@ -68,7 +68,7 @@ pub enum CheckpointError {
         "data.pkl, byte {offset}: the file asks for the Python object `{name}`, which no 4DGS checkpoint needs; refused"
     )]
     Global {
-        /// Where, in bytes from the start of `data.pkl`.
+        /// Offset in bytes from the start of `data.pkl`.
         offset: usize,
         /// Module and name, as in the pickle.
         name: String,
@@ -79,19 +79,19 @@ pub enum CheckpointError {
     /// A slot of the state tuple holds the wrong kind of value.
     #[error("slot {index} ({name}) holds {found}, expected {expected}")]
     Slot {
-        /// Place in the state tuple, from 0.
+        /// Index in the state tuple, from 0.
         index: usize,
         /// Name of the attribute in the trainer.
         name: &'static str,
-        /// What is there.
+        /// The kind of value in the slot.
         found: &'static str,
-        /// What belongs there.
+        /// The kind of value that is expected.
         expected: &'static str,
     },
-    /// A tensor does not have the shape that the others ask for.
+    /// A tensor does not have the shape that the others require.
     #[error("slot {index} ({name}) has shape {found:?}, expected {expected}")]
     Shape {
-        /// Place in the state tuple, from 0.
+        /// Index in the state tuple, from 0.
         index: usize,
         /// Name of the attribute in the trainer.
         name: &'static str,
@@ -100,10 +100,10 @@ pub enum CheckpointError {
         /// The shape it must have.
         expected: String,
     },
-    /// A tensor lies outside its storage, or the storage is not there.
+    /// A tensor lies outside its storage, or the storage is missing.
     #[error("slot {index} ({name}): {reason}")]
     Tensor {
-        /// Place in the state tuple, from 0.
+        /// Index in the state tuple, from 0.
         index: usize,
         /// Name of the attribute in the trainer.
         name: &'static str,
@@ -113,11 +113,11 @@ pub enum CheckpointError {
     /// The values of a tensor could not be read, or do not match their checksum.
     #[error("slot {index} ({name}) cannot be read ({reason}); the file is damaged, copy it again")]
     Read {
-        /// Place in the state tuple, from 0.
+        /// Index in the state tuple, from 0.
         index: usize,
         /// Name of the attribute in the trainer.
         name: &'static str,
-        /// What the system says.
+        /// The error of the system.
         reason: io::Error,
     },
     /// A value is infinite or not a number.
@@ -125,23 +125,23 @@ pub enum CheckpointError {
     NotFinite {
         /// Name of the attribute in the trainer.
         name: &'static str,
-        /// What a row of that attribute is.
+        /// Name of a row of that attribute: Gaussian or channel.
         row: &'static str,
-        /// Which row, from 0.
+        /// Index of the row, from 0.
         at: usize,
     },
-    /// A quaternion without a direction.
+    /// A quaternion of length zero.
     #[error("Gaussian {at}: a quaternion of length zero in {name}; training diverged or the file is damaged")]
     ZeroRotation {
         /// Name of the attribute in the trainer.
         name: &'static str,
-        /// Which Gaussian, from 0.
+        /// Index of the Gaussian, from 0.
         at: usize,
     },
-    /// An option that makes no sense.
+    /// An invalid option.
     #[error("option {name}: {reason}")]
     Option {
-        /// Which option.
+        /// Name of the option.
         name: &'static str,
         /// What is wrong with it.
         reason: String,

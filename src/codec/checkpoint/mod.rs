@@ -3,10 +3,10 @@
 //! In: a seekable file, [`CheckpointOptions`], and the text of `cfg_args`. Out: a [`GaussianScene`] in the trained form.
 //!
 //! ```text
-//! Archive   the zip: which entries there are, and that none is packed or beyond the end of the file
-//! Pickle    data.pkl through a restricted unpickler: scalars, and tensors that only say where their values lie
-//! State     what stands in which slot of the trainer's tuple
-//! read      the tensors wanted, one pass each, straight to their final place; optimizer state is never touched
+//! Archive   the zip: its entries, none of which may be compressed or beyond the end of the file
+//! Pickle    data.pkl through a restricted unpickler: scalars, and tensors with the location of their values
+//! State     the content of each slot of the trainer's tuple
+//! read      the tensors needed, one pass each, directly to their destination; optimizer state is never read
 //! ```
 
 mod archive;
@@ -32,7 +32,7 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
-/// Checkpoints in the table of formats.
+/// The row of checkpoints in the table of formats.
 pub const FORMAT: Format = Format {
     name: "a checkpoint of the 4DGS trainer (.pth, a zip archive)",
     extensions: &["pth"],
@@ -42,12 +42,13 @@ pub const FORMAT: Format = Format {
     write: None,
 };
 
-/// Reads a checkpoint. `cfg_args` is the text of the file of that name beside it, if there is one.
+/// Reads a checkpoint. `cfg_args` is the text of the file of that name in the same folder; `None` if there is none.
 ///
-/// Rotations of the unflipped convention are converted; [`TrainedWith`](crate::scene::TrainedWith) records what the file had.
+/// Rotations of the unflipped convention are converted; [`TrainedWith`](crate::scene::TrainedWith) records the
+/// convention of the file.
 ///
 /// # Errors
-/// Options that make no sense; a damaged or foreign file; values that are not finite, quaternions of length zero.
+/// Invalid options; a damaged or foreign file; values that are not finite, quaternions of length zero.
 pub fn read<R: Read + Seek>(
     reader: R,
     options: &CheckpointOptions,
@@ -78,13 +79,13 @@ pub fn read<R: Read + Seek>(
     Ok(GaussianScene { form, environment, filter: None, trained_with, playback })
 }
 
-/// Reads a checkpoint with what `cfg_args` beside it says.
+/// Reads a checkpoint, and `cfg_args` in the same folder.
 fn read_file(path: &Path, file: BufReader<File>, options: &CheckpointOptions) -> Result<GaussianScene, CodecErrorKind> {
     Ok(read(file, options, cfg_args::beside(path).as_deref())?)
 }
 
-/// The convention of a file that nothing is said about. Code whose backward pass never wrote the time blocks is older than the
-/// flip, so time degree 2 with time blocks of exact zeros is unflipped for certain (section 4.6 of the 4DGS model).
+/// Returns the convention of a file for which none is given. Code whose backward pass never wrote the time blocks is
+/// older than the flip, so a file with time degree 2 and time blocks of exact zeros is certainly unflipped.
 fn convention(state: &State, harmonics: &Harmonics) -> RotationConvention {
     let stretch = harmonics.coefficients * 3;
     let never_written = state.model == Model::Rotated4d

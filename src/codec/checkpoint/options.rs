@@ -1,7 +1,7 @@
-//! What a checkpoint does not say about itself.
+//! Settings that a checkpoint does not contain.
 //!
 //! In: [`CheckpointOptions`] from a command line or a loader's settings, and `cfg_args`. Out: [`TrainedWith`] and
-//! [`PlaybackHints`]. An option that is given wins over `cfg_args`, which wins over the defaults.
+//! [`PlaybackHints`]. An option that is given takes precedence over `cfg_args`, and that over the defaults.
 
 use super::cfg_args::CfgArgs;
 use super::error::CheckpointError;
@@ -10,35 +10,37 @@ use crate::scene::{GaussianScene, PlaybackHints, RotationConvention, TrainedCame
 use crate::view::RasterFov;
 use serde::{Deserialize, Serialize};
 
-/// How a checkpoint was trained and is meant to be played, as far as one wants to say so. `None`: look into `cfg_args` beside the
-/// file, else take the default.
+/// How a checkpoint was trained and is meant to be played. A field that is `None` is taken from `cfg_args` in the
+/// folder of the file, else from the default.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CheckpointOptions {
-    /// First and last timestamp of training. Default 0, 1.
+    /// First and last timestamp of training. Default: 0, 1.
     pub time_interval: Option<[f32; 2]>,
-    /// Background color in the blend space. Default black, or white if `cfg_args` says so.
+    /// Background color in the blend space. Default: black, or white according to `cfg_args`.
     pub background: Option<[f32; 3]>,
-    /// Convention of the rotations in the file. Default flipped, unless the file can only be unflipped (section 4.6 of the 4DGS
-    /// model: all coefficients of the time blocks zero at time degree 2).
+    /// Convention of the rotations in the file. Default: flipped, unless the file is certainly unflipped (all
+    /// coefficients of the time blocks zero at time degree 2).
     pub rotation_convention: Option<RotationConvention>,
-    /// Which field of view shaped the footprints. Default reference.
+    /// Which field of view shaped the footprints. Default: reference.
     pub raster_fov: Option<RasterFov>,
-    /// What kind of cameras took the training views. Default intrinsics if there is an environment map, else field of view.
+    /// What kind of cameras took the training views. Default: intrinsics if there is an environment map, else field of
+    /// view.
     pub cameras: Option<TrainedCameras>,
-    /// Which mean gives the viewing direction of color. Default canonical.
+    /// Which mean gives the viewing direction of color. Default: canonical.
     pub sh_direction: Option<ShDirection>,
-    /// Whether only the first 16 coefficients count. Default false.
+    /// Whether only the first 16 coefficients are evaluated. Default: `false`.
     pub force_sh_3d: Option<bool>,
-    /// Added to the temporal variance in the marginal, if positive. Default −1, or what `cfg_args` says.
+    /// Added to the temporal variance in the marginal, if positive. Default: the value in `cfg_args`, else −1.
     pub prefilter_var: Option<f32>,
-    /// The axis that points up. Default +Z.
+    /// The axis that points up. Default: +Z.
     pub up: Option<UpAxis>,
-    /// Seconds of one pass through the time interval. Default the length of the interval, as if its unit were the second.
+    /// Seconds of one pass through the time interval. Default: the length of the interval, as if its unit were the
+    /// second.
     pub duration_seconds: Option<f32>,
 }
 
-/// What the file itself says.
+/// Values from the file itself.
 pub(super) struct FromFile {
     pub has_environment: bool,
     pub rotation_convention: RotationConvention,
@@ -47,10 +49,10 @@ pub(super) struct FromFile {
 }
 
 impl CheckpointOptions {
-    /// Whether the values given make sense.
+    /// Checks the values given.
     ///
     /// # Errors
-    /// The first that does not: a time interval or duration that is not positive, a number that is not finite.
+    /// The first invalid value: a time interval or duration that is not positive, a number that is not finite.
     pub fn check(&self) -> Result<(), CheckpointError> {
         let refuse = |name, reason: String| Err(CheckpointError::Option { name, reason });
         if let Some([first, last]) = self.time_interval
@@ -102,8 +104,8 @@ impl CheckpointOptions {
         }
     }
 
-    /// Puts what is given for `up`, `duration_seconds` and `background` in place of what a stored scene says. The other options
-    /// describe a checkpoint and change nothing.
+    /// Replaces `up`, `duration_seconds` and `background` of a stored scene by the options that are given. The other
+    /// options describe a checkpoint and have no effect.
     pub fn override_stored(&self, scene: &mut GaussianScene) {
         scene.playback.up = self.up.unwrap_or(scene.playback.up);
         scene.playback.duration_seconds = self.duration_seconds.unwrap_or(scene.playback.duration_seconds);
@@ -111,7 +113,7 @@ impl CheckpointOptions {
     }
 }
 
-/// The values that were chosen, as pairs of a name and a text, for a command to print.
+/// Returns the values as pairs of a name and a text, for a command to print.
 pub fn describe(trained_with: &TrainedWith, playback: &PlaybackHints) -> Vec<(&'static str, String)> {
     let [first, last] = trained_with.time_interval;
     let [r, g, b] = trained_with.background;

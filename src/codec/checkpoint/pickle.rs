@@ -1,20 +1,20 @@
 //! A restricted unpickler for `data.pkl`.
 //!
-//! In: the bytes of a protocol 2 pickle. Out: a [`Pickle`], a flat arena of values in which tensors are lazy: they say where
-//! their values lie, nothing else.
+//! In: the bytes of a protocol 2 pickle. Out: a [`Pickle`], a flat arena of values in which tensors are lazy: they
+//! contain the location of their values only.
 //!
-//! Only the opcodes and objects of section 4.3 of the 4DGS model are known; everything else is refused by name and nothing is
-//! ever run. Every step adds at most one value, values refer to each other by index (so nothing recurses), and no
-//! value is copied: time and memory are bounded by the length of the input.
+//! Only the opcodes and objects that `torch.save` writes for checkpoints of the trainer are accepted; everything else
+//! is refused by name, and nothing is ever executed. Every step adds at most one value, values refer to each other by
+//! index (so nothing recurses), and no value is copied: time and memory are bounded by the length of the input.
 
 use super::error::CheckpointError;
 use super::tensor::{Storage, Tensor};
 use std::collections::HashMap;
 
-/// Place of a value in a [`Pickle`].
+/// Index of a value in a [`Pickle`].
 pub(super) type Id = u32;
 
-/// A value of a pickle. Lists and dictionaries hold optimizer state only, so what is put into them is dropped.
+/// A value of a pickle. Lists and dictionaries contain optimizer state only, so their items are dropped.
 #[derive(Debug)]
 pub(super) enum Value<'a> {
     None,
@@ -29,12 +29,12 @@ pub(super) enum Value<'a> {
     Global(Global),
     Storage(Storage<'a>),
     Tensor(Box<Tensor<'a>>),
-    /// A numpy floating-point type of so many bytes.
+    /// A numpy floating-point type, with its size in bytes.
     Dtype(usize),
 }
 
 impl Value<'_> {
-    /// What it is, for messages.
+    /// Returns what it is, for messages.
     pub(super) fn kind(&self) -> &'static str {
         match self {
             Self::None => "None",
@@ -80,7 +80,7 @@ impl Global {
     }
 }
 
-/// What a pickle holds.
+/// The values of a pickle.
 #[derive(Debug)]
 pub(super) struct Pickle<'a> {
     values: Vec<Value<'a>>,
@@ -88,7 +88,7 @@ pub(super) struct Pickle<'a> {
 }
 
 impl<'a> Pickle<'a> {
-    /// Unpickles.
+    /// Parses a pickle.
     ///
     /// # Errors
     /// The first opcode, object or argument that is not one of a checkpoint.
@@ -104,18 +104,18 @@ impl<'a> Pickle<'a> {
         }
     }
 
-    /// The outermost value.
+    /// Returns the outermost value.
     pub(super) fn root(&self) -> &Value<'a> {
         self.get(self.root)
     }
 
-    /// The value that a tuple of this pickle refers to.
+    /// Returns the value that a tuple of this pickle refers to.
     pub(super) fn get(&self, id: Id) -> &Value<'a> {
         &self.values[id as usize]
     }
 }
 
-/// The opcodes of section 4.3, by their names in Python's `pickletools`.
+/// The opcodes of checkpoints, by their names in Python's `pickletools`.
 mod op {
     pub const PROTO: u8 = 0x80;
     pub const MARK: u8 = b'(';
@@ -147,27 +147,27 @@ mod op {
     pub const LONG_BINGET: u8 = b'j';
 }
 
-/// Most axes a tensor may have; those that are read have three.
+/// Largest number of axes of a tensor; those that are read have at most three.
 const AXES: usize = 8;
-/// Most bytes of a numpy scalar in its text form, where a byte takes one or two.
+/// Largest length in bytes of a numpy scalar in its text form, in which a byte takes one or two.
 const SCALAR_TEXT: usize = 16;
 
-/// The stack machine that a pickle is a program for.
+/// The stack machine that interprets a pickle.
 #[derive(Default)]
 struct Machine<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// Where the present opcode stands, for messages.
+    /// Offset of the current opcode, for messages.
     opcode_at: usize,
     values: Vec<Value<'a>>,
     stack: Vec<Id>,
-    /// Lengths of the stack where a MARK was set.
+    /// Lengths of the stack at each MARK.
     marks: Vec<usize>,
     memo: HashMap<u32, Id>,
 }
 
 impl<'a> Machine<'a> {
-    /// One opcode; the outermost value at the last one.
+    /// Interprets one opcode. Returns the outermost value at the last opcode, else `None`.
     fn step(&mut self) -> Result<Option<Id>, CheckpointError> {
         self.opcode_at = self.at;
         let code = self.byte()?;
@@ -321,7 +321,7 @@ impl<'a> Machine<'a> {
         self.values.push(value);
     }
 
-    /// The part of the stack above the last mark: what an opcode may take away.
+    /// Returns the number of values above the last mark, which an opcode may take.
     fn available(&self) -> usize {
         self.stack.len() - self.marks.last().copied().unwrap_or(0)
     }
@@ -372,7 +372,7 @@ impl<'a> Machine<'a> {
 
     // The objects.
 
-    /// BUILD: only numpy's types have a state, whose second item is the byte order.
+    /// Checks the state of BUILD: only numpy types have one, whose second item is the byte order.
     fn expect_little_endian(&self, state: Id) -> Result<(), CheckpointError> {
         if let (Value::Dtype(_), Value::Tuple(items)) = (self.value(self.top()?), self.value(state))
             && let Some(&order) = items.get(1)
@@ -383,7 +383,7 @@ impl<'a> Machine<'a> {
         Err(self.error("a state other than that of a little-endian numpy type"))
     }
 
-    /// A persistent id: `("storage", FloatStorage, key, location, element count)`.
+    /// Returns the storage of a persistent id: `("storage", FloatStorage, key, location, element count)`.
     fn storage(&self, id: Id) -> Result<Storage<'a>, CheckpointError> {
         if let Value::Tuple(items) = self.value(id)
             && let &[tag, class, key, _, count] = items.as_slice()
@@ -402,7 +402,7 @@ impl<'a> Machine<'a> {
         }
     }
 
-    /// Calls `callable` and pushes what it gives.
+    /// Evaluates a call of `callable` and pushes the result.
     fn reduce(&mut self, callable: Id, arguments: Id) -> Result<(), CheckpointError> {
         let (&Value::Global(global), Value::Tuple(arguments)) = (self.value(callable), self.value(arguments)) else {
             return Err(self.error("a call of something that cannot be called"));
@@ -456,7 +456,7 @@ impl<'a> Machine<'a> {
         Some(Value::Float(value))
     }
 
-    /// Bytes, which protocol 2 writes as a text of the first 256 characters.
+    /// Returns bytes, which protocol 2 writes as a text of the first 256 characters.
     fn encode(&self, text: Id, encoding: Id) -> Option<Value<'a>> {
         match (self.value(text), self.value(encoding)) {
             (&Value::Text(text), Value::Text("latin1")) if text.len() <= SCALAR_TEXT => {

@@ -1,7 +1,7 @@
-//! The state tuple: what stands in which slot (section 4.2 of the 4DGS model).
+//! The state tuple: the content of each slot.
 //!
-//! In: a [`Pickle`]. Out: a [`State`] whose numbers are checked and whose tensors are lazy; its methods read them from the
-//! archive into [`Parameters`], [`Harmonics`] and [`Environment`].
+//! In: a [`Pickle`]. Out: a [`State`] whose numbers are checked and whose tensors are lazy; its methods read them from
+//! the archive into [`Parameters`], [`Harmonics`] and [`Environment`].
 
 use super::archive::{Archive, Rows, Slot};
 use super::error::CheckpointError;
@@ -10,9 +10,9 @@ use crate::gaussian::{Harmonics, Model, Parameters};
 use crate::scene::Environment;
 use std::io::{Read, Seek};
 
-/// Most coefficients per channel that the trainer knows: 16 spatial ones for each of three time blocks.
+/// Largest number of coefficients per channel in the trainer: 16 spatial ones for each of three time blocks.
 const COEFFICIENTS: u64 = 48;
-/// Most texels along an edge of an environment map.
+/// Largest number of texels along an edge of an environment map.
 const ENVIRONMENT_EDGE: u64 = 16_384;
 
 /// A checkpoint's state: scalars as values, tensors not yet read.
@@ -23,7 +23,7 @@ pub(super) struct State<'p> {
     pub count: usize,
     /// Active spatial degree, 0 to 3.
     pub degree: u32,
-    /// Active time degree, 0 to 2; counts only where `degree` is 3.
+    /// Active time degree, 0 to 2; used only if `degree` is 3.
     pub degree_t: u32,
     /// Iteration at which the checkpoint was written.
     pub iteration: u64,
@@ -93,7 +93,8 @@ impl<'p> Slots<'p> {
         }
     }
 
-    /// Slot 17: nothing, an empty tensor where the map was never set, or 3 × R × R.
+    /// Returns the tensor of slot 17, of shape 3 × R × R; `None` if the slot is empty, or holds an empty tensor because
+    /// the map was never set.
     fn environment(&self) -> Result<Option<Slot<'p>>, CheckpointError> {
         if matches!(self.value(17), Value::None) {
             return Ok(None);
@@ -108,7 +109,7 @@ impl<'p> Slots<'p> {
 }
 
 impl<'p> State<'p> {
-    /// Finds everything in its slot.
+    /// Finds every value in its slot.
     ///
     /// # Errors
     /// Another layout than that of the 4DGS trainer, a slot of the wrong type, a number out of range.
@@ -167,7 +168,7 @@ impl<'p> State<'p> {
         Ok(parameters)
     }
 
-    /// Reads the color coefficients: the first from one tensor, the rest from another, side by side.
+    /// Reads the color coefficients: the first from one tensor, the others from another, interleaved per Gaussian.
     ///
     /// # Errors
     /// Tensors of other shapes or that cannot be read, too few coefficients for the active degrees, a value that is not finite.
@@ -205,7 +206,7 @@ impl<'p> State<'p> {
         Ok(harmonics)
     }
 
-    /// Reads the environment map, if there is one.
+    /// Reads the environment map; `None` if there is none.
     ///
     /// # Errors
     /// A tensor that cannot be read, a value that is not finite.
@@ -214,7 +215,7 @@ impl<'p> State<'p> {
         archive: &mut Archive<R>,
     ) -> Result<Option<Environment>, CheckpointError> {
         let Some(slot) = self.environment else { return Ok(None) };
-        // At most 16,384: found to be so with the slot.
+        // At most 16,384, which was checked with the slot.
         let edge = slot.tensor.size.last().map_or(0, |&edge| edge as u32);
         let plane = edge as usize * edge as usize;
         let located = archive.locate(slot, &[3, edge as usize, edge as usize])?;
@@ -224,7 +225,7 @@ impl<'p> State<'p> {
     }
 }
 
-/// The outermost pair: state tuple and iteration.
+/// Returns the outermost pair: state tuple and iteration.
 fn pair<'p>(pickle: &'p Pickle<'p>) -> Result<(Slots<'p>, u64), CheckpointError> {
     let layout = |found: String| {
         CheckpointError::Layout(format!(
@@ -250,7 +251,7 @@ fn pair<'p>(pickle: &'p Pickle<'p>) -> Result<(Slots<'p>, u64), CheckpointError>
     Ok((Slots { pickle, ids }, iteration))
 }
 
-/// A tensor of N × 4 quaternions, all of which have a direction.
+/// Reads a tensor of N × 4 quaternions and checks that none has length zero.
 fn rotations<R: Read + Seek>(
     archive: &mut Archive<R>,
     slot: Slot,
@@ -258,7 +259,7 @@ fn rotations<R: Read + Seek>(
 ) -> Result<Vec<[f32; 4]>, CheckpointError> {
     let rows = archive.rows::<4>(slot, count)?;
     let square = |q: &[f32; 4]| q.iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>();
-    // 1e-12 is the length below which the trainer no longer normalises.
+    // 1e-12 is the length below which the trainer no longer normalizes.
     match rows.iter().position(|q| square(q) <= 1e-24) {
         Some(at) => Err(CheckpointError::ZeroRotation { name: slot.name, at }),
         None => Ok(rows),

@@ -1,9 +1,9 @@
-//! Lazy tensors: where the values of one lie in its storage.
+//! Lazy tensors: the location of the values of a tensor in its storage.
 //!
-//! In: the arguments of torch's rebuild function. Out: a [`Tensor`] whose every index is known to be inside the storage
-//! before anything is allocated for it.
+//! In: the arguments of torch's rebuild function. Out: a [`Tensor`], checked to lie inside its storage before anything
+//! is allocated for it.
 
-/// A storage: an entry of the archive, of which nothing has been read.
+/// A storage: an entry of the archive that has not been read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Storage<'a> {
     /// Name of the entry below `data/`.
@@ -15,7 +15,7 @@ pub(super) struct Storage<'a> {
 /// A view of a storage.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Tensor<'a> {
-    /// Where the values lie.
+    /// The storage with the values.
     pub storage: Storage<'a>,
     /// Index of the first value.
     pub offset: u64,
@@ -26,10 +26,10 @@ pub(super) struct Tensor<'a> {
 }
 
 impl Tensor<'_> {
-    /// Number of values of a tensor that lies within its storage.
+    /// Checks that the tensor lies within its storage, and returns its number of values.
     ///
     /// # Errors
-    /// What is wrong, in words.
+    /// A description of what is wrong.
     pub(super) fn check(&self) -> Result<u64, &'static str> {
         let beyond = "reaches beyond the end of its storage";
         let count = self.size.iter().try_fold(1u64, |product, &size| product.checked_mul(size)).ok_or(beyond)?;
@@ -46,7 +46,7 @@ impl Tensor<'_> {
         Ok(count)
     }
 
-    /// Whether the values lie one after another, the last axis innermost.
+    /// Returns whether the values lie one after another, the last axis innermost.
     pub(super) fn is_contiguous(&self) -> bool {
         let mut expected = 1;
         self.size.iter().zip(&self.stride).rev().all(|(&size, &stride)| {
@@ -56,7 +56,7 @@ impl Tensor<'_> {
         })
     }
 
-    /// Place in the storage of the value with the number `at`, counted with the last axis innermost.
+    /// Returns the index in the storage of the value with the number `at`, counted with the last axis innermost.
     pub(super) fn place(&self, mut at: u64) -> u64 {
         let mut place = self.offset;
         for (&size, &stride) in self.size.iter().zip(&self.stride).rev() {

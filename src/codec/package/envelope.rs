@@ -11,7 +11,7 @@ const FIXED: u64 = 20;
 /// Longest header read, bytes. A million Gaussians need a tenth of a megabyte.
 const HEADER_LIMIT: u64 = 16 << 20;
 
-/// Writes the fixed start and the header, having checked that [`read`] will take both.
+/// Writes the fixed start and the header, after checking that [`read`] will accept both.
 pub(super) fn write(writer: &mut impl Write, header: &Header) -> Result<(), PackageError> {
     let text = header.to_text()?;
     let length = text.len() as u64;
@@ -24,7 +24,8 @@ pub(super) fn write(writer: &mut impl Write, header: &Header) -> Result<(), Pack
     Ok(writer.write_all(text.as_bytes())?)
 }
 
-/// Reads the fixed start and the header, checked. Also gives the length of the whole file; the reader is left at the first section.
+/// Reads and checks the fixed start and the header. Also returns the length of the whole file; the reader is left at
+/// the first section.
 pub(super) fn read(reader: &mut (impl Read + Seek)) -> Result<(Header, u64), PackageError> {
     let file_length = reader.seek(SeekFrom::End(0))?;
     reader.rewind()?;
@@ -50,7 +51,7 @@ pub(super) fn read(reader: &mut (impl Read + Seek)) -> Result<(Header, u64), Pac
     Ok((header, file_length))
 }
 
-/// CRC-32 of everything before the first section but the checksum itself.
+/// Returns the CRC-32 of everything before the first section except the checksum itself.
 fn checksum(text: &[u8]) -> u32 {
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(&MAGIC);

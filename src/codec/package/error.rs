@@ -1,8 +1,9 @@
-//! What can be wrong with a package.
+//! Errors of reading and writing packages.
 //!
-//! In: a finding of the reader or writer. Out: a [`PackageError`] that says in plain words what it is and what helps.
+//! In: a problem found by the reader or writer. Out: a [`PackageError`], whose message names the problem and what
+//! helps.
 
-/// Why a package cannot be read or written. The path is added by whoever opened the file.
+/// Why a package cannot be read or written. [`CodecError`](crate::codec::CodecError) adds the path.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PackageError {
@@ -17,18 +18,18 @@ pub enum PackageError {
         /// Version this reader knows.
         known: u32,
     },
-    /// The file is shorter than it says.
+    /// The file is shorter than its fixed start or header requires.
     #[error("the package is cut off: it should have {expected} bytes and has {found}; copy or download it again")]
     Truncated {
-        /// Bytes that the fixed start or the section table ask for.
+        /// Bytes that the fixed start or the section table require.
         expected: u64,
-        /// Bytes there are.
+        /// Bytes in the file.
         found: u64,
     },
-    /// Bytes behind the last section.
+    /// Bytes after the last section.
     #[error("{count} bytes too many after the last section; copy or download the package again")]
     TrailingBytes {
-        /// How many.
+        /// Number of bytes.
         count: u64,
     },
     /// A header longer than any package needs.
@@ -39,19 +40,19 @@ pub enum PackageError {
         /// Length allowed.
         limit: u64,
     },
-    /// The header's checksum does not hold.
+    /// The checksum of the header is wrong.
     #[error("the header is damaged (its checksum does not hold); copy or download the package again")]
     HeaderChecksum,
-    /// The header is whole but cannot be understood.
+    /// The header is intact but cannot be parsed.
     #[error("the header cannot be understood: {0}")]
     Header(String),
-    /// The package cannot be read without something this reader does not know.
+    /// The package requires a feature that this reader does not know.
     #[error("made by a newer gs4d: it needs the feature `{name}`; update this one")]
     UnknownFeature {
         /// Name in the header's list of requirements.
         name: String,
     },
-    /// Numbers of the header, or parts of a scene to be written, that contradict each other or make no sense.
+    /// Numbers of the header, or parts of a scene to be written, that contradict each other or are invalid.
     #[error("{0}")]
     Inconsistent(&'static str),
     /// The scene is far larger than the file could hold.
@@ -62,7 +63,7 @@ pub enum PackageError {
         /// Bytes allowed for a file of this length.
         limit: u64,
     },
-    /// An attribute is not there for every Gaussian.
+    /// The sections of an attribute do not hold every row.
     #[error("section `{name}` is missing, or ends early")]
     MissingSection {
         /// Name of the attribute.
@@ -77,7 +78,7 @@ pub enum PackageError {
         found: usize,
         /// Rows that the section claims.
         count: usize,
-        /// Rows there are before it.
+        /// First row that was expected.
         expected: usize,
     },
     /// A section is encoded in a way that this reader does not know.
@@ -88,23 +89,23 @@ pub enum PackageError {
         /// Encoding in the section table.
         encoding: String,
     },
-    /// A length of a section is not what it must be.
+    /// A length of a section is wrong.
     #[error("section `{name}` is damaged: a length of {found} bytes is given where it must be {expected}")]
     SectionLength {
         /// Name of the section.
         name: String,
-        /// Length that is right.
+        /// Length that was expected.
         expected: u64,
         /// Length found.
         found: u64,
     },
-    /// The checksum of a section does not hold.
+    /// The checksum of a section is wrong.
     #[error("section `{name}` is damaged (its checksum does not hold); copy or download the package again")]
     SectionChecksum {
         /// Name of the section.
         name: String,
     },
-    /// A section arrived whole, yet does not decompress to what it should.
+    /// A section is intact, but does not decompress to the length expected.
     #[error("section `{name}` does not decompress: {reason}")]
     SectionBody {
         /// Name of the section.

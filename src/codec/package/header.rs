@@ -1,7 +1,7 @@
-//! The header: what a package holds and where.
+//! The header: the contents of a package and their location.
 //!
-//! In: a scene, or the RON text of a file. Out: a [`Header`] whose numbers have been checked against each other and against the
-//! length of the file, so that everything after it may rely on them.
+//! In: a scene, or the RON text of a file. Out: a [`Header`] whose numbers have been checked against each other and
+//! against the length of the file, so that the code that follows can rely on them.
 
 use super::{PackageError, Section};
 use crate::gaussian::{Harmonics, Model};
@@ -12,19 +12,19 @@ use crate::scene::{
 };
 use serde::{Deserialize, Serialize};
 
-/// Uncompressed bytes that any package may hold, however short it is.
+/// Uncompressed bytes that a package of any length may hold.
 const RAW_FLOOR: u64 = 64 << 20;
 
-/// Uncompressed bytes allowed beyond that for each byte of the file. Trained captures reach 1.2.
+/// Further uncompressed bytes allowed for each byte of the file. Trained captures need 1.2.
 const RAW_PER_BYTE: u64 = 256;
 
 /// The header of a package. Fields that a reader does not know are ignored.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Header {
-    /// What wrote the package, for people.
+    /// The program that wrote the package, for people.
     #[serde(default)]
     pub generator: String,
-    /// Features without which the package cannot be read rightly. A reader refuses those it does not know.
+    /// Features that a reader must know to read the package correctly. A reader refuses those it does not know.
     #[serde(default)]
     pub requires: Vec<String>,
     /// The form of the Gaussians.
@@ -71,7 +71,7 @@ pub enum StoredForm {
 }
 
 impl StoredForm {
-    /// The form of a scene.
+    /// Returns the form of a scene.
     pub fn of(form: &SceneForm) -> Self {
         match form {
             SceneForm::Trained(Trained { parameters, .. }) => Self::Trained { model: parameters.model() },
@@ -89,18 +89,18 @@ impl StoredForm {
     }
 }
 
-/// The temporal filter, sets aside.
+/// The temporal filter, without its sets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredFilter {
-    /// How it was made.
+    /// How the sets were computed.
     pub kind: FilterKind,
-    /// Segments of time.
+    /// Number of segments of time.
     pub segments: u32,
-    /// How the sets are stored: as bits, or else as intervals.
+    /// Whether the sets are stored as bits; otherwise, as intervals.
     pub bits: bool,
 }
 
-/// Features of this version that older readers do not know, by name.
+/// Names of the features that packages of this version may require.
 const FEATURES: [&str; 2] = ["packed", "filter"];
 
 /// Size of an environment map.
@@ -112,7 +112,7 @@ pub struct EnvironmentSize {
     pub height: u32,
 }
 
-/// The one field that is understood before all others.
+/// The field that is parsed before all others.
 #[derive(Deserialize)]
 struct Requirements {
     #[serde(default)]
@@ -120,7 +120,7 @@ struct Requirements {
 }
 
 impl Header {
-    /// The header of a scene, with no sections yet.
+    /// Returns the header of a scene, without sections.
     pub(super) fn of(scene: &GaussianScene) -> Result<Self, PackageError> {
         let form = StoredForm::of(&scene.form);
         let ColorDegrees { coefficients, degree, degree_t } = scene.form.color_degrees();
@@ -149,13 +149,13 @@ impl Header {
         Ok(header)
     }
 
-    /// The RON text: one line for each field and each section.
+    /// Returns the RON text: one line for each field and each section.
     pub(super) fn to_text(&self) -> Result<String, PackageError> {
         let config = ron::ser::PrettyConfig::new().depth_limit(2).new_line("\n");
         ron::ser::to_string_pretty(self, config).map_err(|e| PackageError::Header(e.to_string()))
     }
 
-    /// The header that the text describes. Requirements come first, so that a newer package is refused for the right reason.
+    /// Parses the text. `requires` is checked first, so that a newer package is refused for the right reason.
     pub(super) fn parse(text: &[u8]) -> Result<Self, PackageError> {
         let unclear = |e: ron::error::SpannedError| PackageError::Header(e.to_string());
         let requirements: Requirements = ron::de::from_bytes(text).map_err(unclear)?;
@@ -165,14 +165,14 @@ impl Header {
         }
     }
 
-    /// Where the last section ends, in bytes, when the first starts at `start`.
+    /// Returns where the last section ends, in bytes, if the first starts at `start`.
     pub(super) fn end(&self, start: u64) -> u64 {
-        // Each body stands behind its own length.
+        // Each body follows its length.
         self.sections.iter().fold(start, |end, s| end.saturating_add(8).saturating_add(s.length as u64))
     }
 
-    /// Whether the sections, from `start` on, fill a file of `file_length` bytes and hold every attribute once, and whether all
-    /// numbers make sense. Afterwards the sizes of [`attributes`](Self::attributes) can be allocated.
+    /// Checks that the sections, from `start` on, fill a file of `file_length` bytes and hold every attribute once, and
+    /// that all numbers are valid. Afterwards the sizes of [`attributes`](Self::attributes) can be allocated.
     pub(super) fn check(&self, start: u64, file_length: u64) -> Result<(), PackageError> {
         let expected = self.end(start);
         if expected > file_length {
@@ -191,14 +191,14 @@ impl Header {
         attributes.iter().try_for_each(|attribute| attribute.check_sections(&self.sections))
     }
 
-    /// Whether the numbers make sense, sections aside.
+    /// Checks the numbers, without the sections.
     fn check_numbers(&self) -> Result<(), PackageError> {
         let trained = &self.trained_with;
         let [first, last] = trained.time_interval;
         let sane = |condition: bool, otherwise: &'static str| {
             if condition { Ok(()) } else { Err(PackageError::Inconsistent(otherwise)) }
         };
-        // Of no Gaussians, the harmonics are consistent if their degrees are.
+        // For no Gaussians, the harmonics are consistent if their degrees are.
         let color = Harmonics {
             coefficients: self.coefficients,
             degree: self.degree,

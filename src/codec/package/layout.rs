@@ -1,7 +1,7 @@
-//! Attributes: which sections a scene consists of, and where their values lie in memory.
+//! Attributes: the sections of a scene, and where their values are in memory.
 //!
-//! In: a [`Header`]. Out: its [`Attribute`]s in the order of the file, a blank scene of its size, and the 32-bit words behind
-//! each attribute's name.
+//! In: a [`Header`]. Out: its [`Attribute`]s in the order of the file, a blank scene of its size, and the 32-bit words
+//! of each attribute.
 
 use super::{FLOAT_PLANES, Header, PackageError, Section, StoredForm};
 use crate::gaussian::{Gaussian, Harmonics, Model, Parameters};
@@ -20,26 +20,26 @@ pub(super) struct Attribute {
     pub name: &'static str,
     /// Rows of the table: Gaussians, or values of the environment map.
     pub rows: usize,
-    /// Words from one row to the next in memory.
+    /// Number of words from one row to the next in memory.
     pub stride: usize,
     /// First word of the attribute within a row.
     pub offset: usize,
-    /// Words of the attribute in a row.
+    /// Number of words of the attribute in a row.
     pub width: usize,
 }
 
 impl Attribute {
-    /// Uncompressed bytes of so many rows.
+    /// Returns the uncompressed bytes of `rows` rows.
     pub fn raw_length(&self, rows: usize) -> u64 {
         (rows as u64).saturating_mul(self.width as u64 * 4)
     }
 
-    /// Its rows in runs of at most `length`.
+    /// Returns its rows in runs of at most `length`.
     pub fn runs(self, length: usize) -> impl Iterator<Item = (Self, Range<usize>)> {
         (0..self.rows).step_by(length).map(move |first| (self, first..self.rows.min(first.saturating_add(length))))
     }
 
-    /// Whether the sections of this name hold every row once, in order.
+    /// Checks that the sections of this name hold every row once, in order.
     pub fn check_sections(&self, sections: &[Section]) -> Result<(), PackageError> {
         let mut next = 0;
         for section in sections.iter().filter(|section| section.name == self.name) {
@@ -65,7 +65,7 @@ impl Attribute {
 }
 
 impl Header {
-    /// The attributes of a scene with these numbers, in the order in which their sections are written.
+    /// Returns the attributes of a scene with these numbers, in the order in which their sections are written.
     pub(super) fn attributes(&self) -> Vec<Attribute> {
         let rows = self.gaussians;
         let alone = |name, width| Attribute { name, rows, stride: width, offset: 0, width };
@@ -140,7 +140,7 @@ impl Header {
         attributes
     }
 
-    /// Whether the scene has exactly the values that these numbers ask for.
+    /// Checks that the scene has exactly the values that these numbers require.
     pub(super) fn check_scene(&self, scene: &GaussianScene) -> Result<(), PackageError> {
         let fits = |a: &Attribute| a.rows.checked_mul(a.stride) == Some(words(scene, a.name).len());
         if !self.attributes().iter().all(fits) {
@@ -157,7 +157,7 @@ impl Header {
     }
 }
 
-/// A scene of the header's size with all values zero. The header must have been checked.
+/// Returns a scene of the header's size with all values zero. The header must have been checked.
 pub(super) fn blank(header: &Header) -> GaussianScene {
     let count = header.gaussians;
     let harmonics = || Harmonics {
@@ -224,8 +224,8 @@ fn blank_colors(header: &Header, entries: &[u32]) -> CodedColors {
     colors
 }
 
-/// The table of words in which the attribute of this name lies; empty if the scene has no such attribute.
-/// Words rather than floats, so that the payload of a NaN survives everywhere.
+/// Returns the table of words that contains the attribute of this name; empty if the scene has no such attribute. Words
+/// rather than floats, so that NaN payloads are preserved.
 pub(super) fn words<'a>(scene: &'a GaussianScene, name: &str) -> &'a [u32] {
     match name {
         "filter" => match scene.filter.as_ref().map(|filter| &filter.sets) {
@@ -266,7 +266,7 @@ fn words_of_packed<'a>(packed: &'a PackedScene, name: &str) -> &'a [u32] {
     }
 }
 
-/// As [`words`], for filling in.
+/// Returns the same as [`words`], mutable.
 pub(super) fn words_mut<'a>(scene: &'a mut GaussianScene, name: &str) -> &'a mut [u32] {
     match name {
         "filter" => match scene.filter.as_mut().map(|filter| &mut filter.sets) {

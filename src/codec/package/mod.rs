@@ -1,11 +1,13 @@
-//! Our own format, `.gs4d`: written once, loaded often, every byte of it checked.
+//! The package format `.gs4d`: written once, loaded often, with a checksum on every byte.
 //!
-//! In: a [`GaussianScene`]. Out: a file, and back, bit for bit. `docs/format.md` describes the layout byte by byte.
+//! In: a [`GaussianScene`]. Out: a file; and the same scene again, bit for bit. `docs/format.md` describes the layout
+//! byte by byte.
 //!
-//! A package is a fixed start ([`MAGIC`], [`VERSION`], length and checksum of the header), a [`Header`] in RON, and the sections
-//! that the header lists. A section holds one attribute of a run of Gaussians: the four bytes of its floats apart from
-//! each other (`planes`), compressed on their own and checksummed. What a scene needs first comes first: geometry, plain color, the
-//! rest of the color, parameters. Whatever a reader does not know is skipped, unless the header lists it as required.
+//! A package is a fixed start ([`MAGIC`], [`VERSION`], length and checksum of the header), a [`Header`] in RON, and the
+//! sections that the header lists. A section holds one attribute of a run of Gaussians, split into byte planes
+//! (`planes`), compressed and checksummed on its own. The order is geometry, first color coefficients, the other
+//! coefficients, temporal filter, environment map. A reader skips what it does not know, unless the header lists it as
+//! required.
 
 mod envelope;
 mod error;
@@ -28,7 +30,7 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, Write};
 use std::path::Path;
 
-/// Packages in the table of formats.
+/// The row of packages in the table of formats.
 pub const FORMAT: Format = Format {
     name: "a package (.gs4d)",
     extensions: &["gs4d"],
@@ -40,23 +42,24 @@ pub const FORMAT: Format = Format {
 /// The first bytes of every package.
 pub const MAGIC: [u8; 4] = *b"GS4D";
 
-/// The format version written, and the only one read. It rises when an old reader could no longer make sense of the fixed start
-/// or the header; smaller steps are listed in [`Header::requires`].
+/// The format version written, and the only one read. It increases when an old reader could no longer read the fixed
+/// start or the header; smaller changes are listed in [`Header::requires`].
 pub const VERSION: u32 = 1;
 
-/// Gaussians per section at most: small enough to decode one at a time in little memory, large enough to compress well.
+/// Largest number of Gaussians per section: small enough to decode one at a time in little memory, large enough to
+/// compress well.
 const ROWS_PER_SECTION: usize = 1 << 14;
 
 /// The same for records of the packed form, whose columns compress best in one piece.
 const PACKED_ROWS_PER_SECTION: usize = 1 << 20;
 
-/// Words of the widest attribute of those.
+/// Largest width, in words, of an attribute to which that applies.
 const PACKED_WORDS: usize = 8;
 
 /// How a package is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WriteSettings {
-    /// zstd level, 1 (fast) to 19 (small); what is outside is clamped.
+    /// zstd level, 1 (fast) to 19 (small); values outside are clamped. Default: 9.
     pub level: i32,
 }
 
@@ -66,21 +69,21 @@ impl Default for WriteSettings {
     }
 }
 
-/// What a package says about itself, and whether it arrived whole.
+/// The header of a package, and which of its sections are damaged.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PackageInfo {
     /// Format version.
     pub version: u32,
     /// Bytes of the whole package.
     pub file_length: u64,
-    /// The header, whose checksum held.
+    /// The header; its checksum is correct.
     pub header: Header,
-    /// Places in `header.sections` of the sections whose checksum or length does not hold.
+    /// Indices in `header.sections` of the sections with a wrong checksum or length.
     pub damaged: Vec<usize>,
 }
 
 impl PackageInfo {
-    /// Whether every checksum holds.
+    /// Returns whether every checksum is correct.
     pub fn is_intact(&self) -> bool {
         self.damaged.is_empty()
     }
@@ -89,8 +92,8 @@ impl PackageInfo {
 /// Writes a scene without loss. The same scene and settings give the same bytes.
 ///
 /// # Errors
-/// [`PackageError::Inconsistent`] for a scene whose parts do not fit together, [`PackageError::TooLarge`] for one that compresses
-/// so well that a reader would take it for a decompression bomb, and what the writer reports.
+/// [`PackageError::Inconsistent`] for a scene whose parts do not fit together, [`PackageError::TooLarge`] for one that
+/// compresses so well that a reader would take it for a decompression bomb, and errors of the writer.
 pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), PackageError> {
     let mut header = Header::of(scene)?;
     let level = settings.level.clamp(1, 19);
@@ -112,13 +115,14 @@ pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSet
     Ok(writer.flush()?)
 }
 
-/// Reads a scene from a reader that holds a package and nothing else. All checksums are verified, those of unknown sections too.
+/// Reads a scene from a reader that contains a package and nothing else. All checksums are verified, also those of
+/// unknown sections.
 ///
-/// Memory beside the scene: one section, compressed and not. Values are taken as they are: whether a Gaussian can be drawn is
-/// found out by [`GaussianScene::into_runtime`].
+/// Besides the scene, one section is in memory at a time, compressed and decompressed. Values are not checked here;
+/// [`GaussianScene::into_runtime`] checks whether every Gaussian can be drawn.
 ///
 /// # Errors
-/// Whatever is wrong with the package, one [`PackageError`] for each kind of damage.
+/// One [`PackageError`] for each kind of damage.
 pub fn read<R: Read + Seek>(reader: R) -> Result<GaussianScene, PackageError> {
     let mut reader = BufReader::new(reader);
     let (header, _) = envelope::read(&mut reader)?;
@@ -137,7 +141,7 @@ pub fn read<R: Read + Seek>(reader: R) -> Result<GaussianScene, PackageError> {
     Ok(scene)
 }
 
-/// Reads a package; of the options only those count that replace what it says.
+/// Reads a package; only the options that replace stored values are used.
 fn read_file(_: &Path, file: BufReader<File>, options: &CheckpointOptions) -> Result<GaussianScene, CodecErrorKind> {
     options.check()?;
     let mut scene = read(file)?;

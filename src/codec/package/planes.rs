@@ -1,15 +1,15 @@
-//! Byte planes: the shape in which floats compress.
+//! Byte planes: an order of bytes in which floats compress well.
 //!
-//! In: rows of 32-bit words. Out: their lowest bytes, then their second ones, and so on; within each plane one component
-//! after the other (`xxxx yyyy zzzz`), so that like stands beside like; and back.
+//! In: rows of 32-bit words. Out: their lowest bytes, then their second ones, and so on; within each plane one
+//! component after the other (`xxxx yyyy zzzz`), so that similar bytes are adjacent; and back.
 
 use super::layout::Attribute;
 use std::ops::Range;
 
-/// Rows handled at a time: what they touch stays in the cache, however wide they are.
+/// Rows processed at a time, few enough that they stay in the cache, whatever their width.
 const TILE: usize = 64;
 
-/// The planes of some rows of an attribute within the table `words`.
+/// Returns the planes of some rows of an attribute within the table `words`.
 pub(super) fn split(words: &[u32], attribute: &Attribute, rows: Range<usize>) -> Vec<u8> {
     let (count, width) = (rows.len(), attribute.width);
     let mut planes = vec![0; count * width * 4];
@@ -36,7 +36,7 @@ pub(super) fn join(planes: &[u8], attribute: &Attribute, rows: Range<usize>, wor
     }
 }
 
-/// Every component of every tile.
+/// Returns every component of every tile of rows.
 fn tiles(count: usize, width: usize) -> impl Iterator<Item = (Range<usize>, usize)> {
     (0..count)
         .step_by(TILE)

@@ -1,6 +1,6 @@
 //! Sections: one attribute of a run of Gaussians, as bytes.
 //!
-//! In: words of a scene. Out: a zstd frame of their byte planes and its entry in the section table; and back, checked.
+//! In: words of a scene. Out: a zstd frame of their byte planes and the entry in the section table; and back, checked.
 
 use super::layout::Attribute;
 use super::{PackageError, planes};
@@ -16,11 +16,11 @@ pub const FLOAT_PLANES: &str = "f32-planes-zstd";
 pub struct Section {
     /// The attribute it holds. Sections of unknown names are skipped.
     pub name: String,
-    /// How the body is to be read: [`FLOAT_PLANES`].
+    /// Encoding of the body: [`FLOAT_PLANES`].
     pub encoding: String,
-    /// First Gaussian (of the environment map: first value).
+    /// First row of the attribute: a Gaussian, or a value of the environment map.
     pub first: usize,
-    /// Number of Gaussians (of the environment map: values).
+    /// Number of rows.
     pub count: usize,
     /// Bytes in the file.
     pub length: usize,
@@ -30,7 +30,7 @@ pub struct Section {
     pub crc32: u32,
 }
 
-/// Some rows of an attribute within the table `words`, and their entry in the section table.
+/// Returns the entry in the section table and the body of some rows of an attribute within the table `words`.
 pub(super) fn encode(
     words: &[u32],
     attribute: &Attribute,
@@ -39,7 +39,7 @@ pub(super) fn encode(
 ) -> Result<(Section, Vec<u8>), PackageError> {
     let planes = planes::split(words, attribute, rows.clone());
     let mut body = zstd::bulk::compress(&planes, level)?;
-    // All bodies wait in memory until the table is complete.
+    // All bodies stay in memory until the table is complete.
     body.shrink_to_fit();
     let section = Section {
         name: attribute.name.to_owned(),
@@ -53,14 +53,14 @@ pub(super) fn encode(
     Ok((section, body))
 }
 
-/// Writes a body behind its length.
+/// Writes the length of a body, then the body.
 pub(super) fn write_body(writer: &mut impl Write, body: &[u8]) -> Result<(), PackageError> {
     writer.write_all(&(body.len() as u64).to_le_bytes())?;
     Ok(writer.write_all(body)?)
 }
 
 impl Section {
-    /// Reads the body with the length before it, and checks both. Damage leaves the reader behind the body all the same.
+    /// Reads the length and the body, and checks both. If one is wrong, the reader is still positioned after the body.
     pub(super) fn read_body(&self, reader: &mut impl Read, body: &mut Vec<u8>) -> Result<(), PackageError> {
         let mut prefix = [0; 8];
         reader.read_exact(&mut prefix)?;
@@ -78,8 +78,8 @@ impl Section {
         Ok(())
     }
 
-    /// Decompresses a body into the table `words`; `planes` is memory to work in. The section must have been checked against
-    /// the attribute.
+    /// Decompresses a body into the table `words`; `planes` is a scratch buffer. The section must have been checked
+    /// against the attribute.
     pub(super) fn decode(
         &self,
         body: &[u8],

@@ -1,6 +1,6 @@
 //! The stages mask and compress of a bake.
 //!
-//! In: the Gaussians that are left. Out: their temporal filter; the package on disk.
+//! In: the remaining Gaussians. Out: their temporal filter; the package on disk.
 
 use super::stages::Stages;
 use super::work::{bytes, words};
@@ -11,7 +11,7 @@ use crate::offline::{OfflineError, save, write_settings};
 use crate::scene::{GaussianScene, MAX_SEGMENTS, TemporalFilter};
 
 impl Bake<'_> {
-    /// Finds the filter of the Gaussians that are left.
+    /// Computes the temporal filter of the remaining Gaussians, or loads it from an earlier bake.
     pub(super) fn mask(
         &mut self,
         stages: &mut Stages<'_>,
@@ -37,7 +37,7 @@ impl Bake<'_> {
         Ok((filter, fingerprint))
     }
 
-    /// Writes the package, unless the one that is there is it.
+    /// Writes the package, unless an earlier bake has written the same one and it is still on disk.
     pub(super) fn compress(
         &self,
         stages: &mut Stages<'_>,

@@ -1,7 +1,7 @@
 //! The stage evaluate of a bake.
 //!
-//! In: the scene before and the package on disk, the test views. Out: how close both are to the views, and a few
-//! pictures ([`Compared`]).
+//! In: the scene before pruning, the package on disk, the test views. Out: the metrics of both, and a few pictures
+//! ([`Compared`]).
 
 use super::Bake;
 use crate::codec;
@@ -15,22 +15,22 @@ use crate::offline::{OfflineError, Progress};
 use crate::scene::RuntimeScene;
 use crate::view::Picture;
 
-/// Views whose pictures are on the page.
+/// Most views whose pictures are on the page.
 const SAMPLES: usize = 3;
 
 /// The test views, drawn before and after.
 pub(super) struct Compared {
     /// Name of the split.
     pub split: &'static str,
-    /// How close both are.
+    /// Metrics of the scene before pruning and of the package.
     pub evaluation: Change<Evaluation>,
     /// A few of the views.
     pub samples: Vec<Sample>,
 }
 
 impl Bake<'_> {
-    /// Draws the test views of the scene and of the package; `None` if they or their images are not there, which is
-    /// noted.
+    /// Draws the test views of the scene and of the package. `None`, with a note, if the views or their images are
+    /// missing.
     pub(super) fn compare(&mut self, progress: &mut dyn Progress) -> Result<Option<Compared>, OfflineError> {
         let out = &self.settings.out;
         let after = codec::load(out, &CheckpointOptions::default())?.into_runtime();
@@ -69,7 +69,7 @@ impl Bake<'_> {
         Ok(Some(Compared { split: split_name(dataset.split), evaluation: Change { before, after }, samples }))
     }
 
-    /// The test views with their images, if they are all there.
+    /// Returns the test views; `None`, with a note, if they or any of their images are missing.
     fn test_views(&self, progress: &mut dyn Progress) -> Option<Dataset> {
         let (settings, trained_with) = (self.settings, &self.subject.runtime.trained_with);
         let dataset = open_split(&settings.data, Split::Test, settings.resolution, trained_with, progress);

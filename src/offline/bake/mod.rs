@@ -1,9 +1,9 @@
 //! The whole way from a trained checkpoint to a small, fast package, and a report of what it cost.
 //!
-//! In: a checkpoint, its training views, how small it is to be ([`BakeSettings`]). Out: a package, `OUT.report.json`
-//! and `OUT.report.html` beside it ([`Baked`]). The stages score, prune, mask, compress, evaluate and report (see
-//! [`Stage`]) leave their results in the folder `OUT.bake` ([`Work`]), so that an interrupted bake goes on where it
-//! was. Nothing is trained.
+//! In: a checkpoint, its training views, [`BakeSettings`]. Out: a package, and `NAME.report.json` and
+//! `NAME.report.html` beside a package `NAME.gs4d` ([`Baked`]). The stages (see [`Stage`]) before the evaluation store
+//! their results in the folder `OUT.bake` beside a package `OUT` ([`Work`]), so that an interrupted bake resumes.
+//! Nothing is trained.
 
 mod compression;
 mod evaluation;
@@ -30,51 +30,52 @@ use stages::Stages;
 use std::path::PathBuf;
 use summary::Facts;
 
-/// What to bake, and how small against how exact.
+/// Settings of a bake.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BakeSettings {
-    /// The file that the scene was read from: results of an earlier bake count only while it is the same.
+    /// The file that the scene was read from. Results of an earlier bake are reused only if it has not changed.
     pub checkpoint: PathBuf,
     /// Folder of the dataset, with `transforms_train.json`. The report compares test views if there is a
     /// `transforms_test.json`.
     pub data: PathBuf,
-    /// The package to write, another file than the checkpoint.
+    /// The package to write; must not be the checkpoint.
     pub out: PathBuf,
-    /// Divisor of the picture size or target width, as in training; pictures as they are if `None`.
+    /// Divisor of the picture size, or target width in pixels, as in training; `None` keeps the size of the images.
     pub resolution: Option<i32>,
-    /// Background, RGB, 0 to 1, in place of the one the capture was trained with.
+    /// Background, RGB, 0 to 1; `None` uses the one that the capture was trained with.
     pub background: Option<[f32; 3]>,
     /// How many Gaussians to keep.
     pub goal: Goal,
     /// Which score to prune by.
     pub score: ScoreChoice,
-    /// How to score.
+    /// Settings of the scoring.
     pub scoring: ScoringSettings,
-    /// Which temporal filter to make.
+    /// Kind of the temporal filter.
     pub filter: FilterKind,
-    /// Number of its key-frames.
+    /// Number of key-frames of the filter.
     pub key_frames: KeyFrames,
     /// How much compression may lose.
     pub quality: Quality,
-    /// zstd level of the package, 1 (fast) to 19 (small); the usual one if `None`.
+    /// zstd level of the package, 1 (fast) to 19 (small); `None` uses the default of
+    /// [`write_settings`](super::write_settings).
     pub level: Option<i32>,
-    /// Whether to leave the results of the stages in `OUT.bake` when all is done.
+    /// Whether to keep the folder `OUT.bake` after the bake.
     pub keep_work: bool,
 }
 
 /// A finished bake.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Baked {
-    /// What was done and what it cost.
+    /// The report.
     pub report: BakeReport,
-    /// The report as JSON on disk.
+    /// Path of the report as JSON.
     pub json: PathBuf,
-    /// The report as a page on disk.
+    /// Path of the report as an HTML page.
     pub html: PathBuf,
 }
 
-/// Runs every stage that is not done yet, on the scene that was read from the checkpoint. Its temporal filter, if it
-/// has one, is replaced. Begins the task "bake", and in it those of the stages.
+/// Runs every stage whose result is not stored yet, on the scene that was read from the checkpoint. A temporal filter
+/// of the scene is replaced. Begins the task "bake" and, inside it, the tasks of the stages.
 ///
 /// # Errors
 /// Training views that are missing or show nothing of the scene, images that a loss needs and that are missing, files
@@ -96,7 +97,7 @@ pub fn bake(
     baked
 }
 
-/// What the stages work with.
+/// The state that the stages share.
 struct Bake<'a> {
     settings: &'a BakeSettings,
     engine: &'a mut Engine,
@@ -104,7 +105,7 @@ struct Bake<'a> {
     /// Every training view.
     views: Vec<TrainingView>,
     work: Work,
-    /// Of the files and of how the checkpoint was read.
+    /// Fingerprint of the files and of the options that the checkpoint was read with.
     fingerprint: Fingerprint,
 }
 
@@ -131,7 +132,7 @@ impl<'a> Bake<'a> {
         let mut stages = Stages::begin(progress);
         let pruning = self.prune(&mut stages)?;
         let mut pruned = select(&self.subject.scene, &pruning.kept);
-        // Stage::FineTune has its place here: it trains what is left, and everything after goes by what it trained.
+        // `Stage::FineTune` is to run here: it trains the remaining Gaussians, and the later stages use its result.
         let (filter, masked) = self.mask(&mut stages, &pruned, pruning.fingerprint)?;
         let after = sliced(&pruned)?.into_owned();
         pruned.filter = Some(filter.clone());

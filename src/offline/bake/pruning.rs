@@ -1,7 +1,7 @@
 //! The stages score and prune of a bake.
 //!
-//! In: a checkpoint and its training views, some of them held out from scoring. Out: which Gaussians stay
-//! ([`Pruning`]), by which score, and what every count that was tried gives on the held-out views.
+//! In: a checkpoint and its training views, some of them held out from scoring. Out: the Gaussians to keep
+//! ([`Pruning`]), the score that selected them, and the PSNR on the held-out views for every count tried.
 
 use super::stages::Stages;
 use super::work::{bytes, words};
@@ -15,20 +15,20 @@ use crate::scene::{GaussianScene, SceneForm};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Shares removed that are tried for the report, whatever the goal.
+/// Shares of the Gaussians whose removal is measured for the report, whatever the goal.
 const SWEEP: [f64; 4] = [0.2, 0.5, 0.7, 0.85];
 
-/// Which Gaussians stay.
+/// The Gaussians to keep.
 pub(super) struct Pruning {
     /// Their indices, ascending.
     pub kept: Vec<u32>,
-    /// How they were found.
+    /// How they were selected.
     pub found: Found,
-    /// Of everything so far.
+    /// Fingerprint of everything that the result depends on.
     pub fingerprint: Fingerprint,
 }
 
-/// How the Gaussians that stay were found.
+/// How the Gaussians to keep were selected.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Found {
     /// Name of the score.
@@ -64,7 +64,7 @@ impl Bake<'_> {
         Ok(Pruning { kept, found, fingerprint })
     }
 
-    /// Every score that may be pruned by.
+    /// Returns the scores of every candidate, computed or loaded from an earlier bake.
     fn score(
         &mut self,
         stages: &mut Stages<'_>,
@@ -95,7 +95,7 @@ impl Bake<'_> {
         Ok((found, fingerprint))
     }
 
-    /// Prunes by each candidate, keeps the best, and tries a few more counts with it.
+    /// Prunes by each candidate, selects the best one, and measures the shares of [`SWEEP`] with it.
     fn find(
         &mut self,
         held_out: &[TrainingView],
@@ -135,7 +135,7 @@ impl Bake<'_> {
     }
 }
 
-/// Only images show a loss: reports missing ones before anything is scored.
+/// Checks before the scoring that the images of the held-out views exist, which measuring a loss needs.
 fn require_images(goal: Goal, held_out: &[TrainingView]) -> Result<(), OfflineError> {
     let missing = held_out.iter().find(|view| !view.image.is_file());
     match (goal, missing) {

@@ -1,38 +1,38 @@
-//! The stages of a bake as they go by.
+//! The stages of a bake, run one after the other.
 //!
-//! In: the stages, each with the result of an earlier bake where there is one. Out: their results; one task for all of
-//! them, a note for each, and how long each took.
+//! In: the work of each stage, and its result of an earlier bake if there is one. Out: the results; a task for the
+//! whole bake, a note for each stage, and its duration.
 
 use crate::offline::report::StageTime;
 use crate::offline::{OfflineError, Progress};
 use serde::Serialize;
 use std::time::Instant;
 
-/// Stages of a bake, without the fine-tuning that is to come.
+/// Number of stages of a bake; [`Stage::FineTune`] is not part of it yet.
 const STAGES: usize = 6;
 
 /// The stages of a bake, in order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stage {
-    /// How much each Gaussian contributes to the training views.
+    /// Scores the Gaussians over the training views.
     Score,
-    /// Which Gaussians stay.
+    /// Selects the Gaussians to keep.
     Prune,
-    /// Training of those that stay, to make up for those that left. Not part of a bake yet.
+    /// Trains the remaining Gaussians to compensate for the removed ones. Not part of a bake yet.
     FineTune,
-    /// Which of them are active when.
+    /// Computes the temporal filter.
     Mask,
-    /// Quantization and the package.
+    /// Quantizes the scene and writes the package.
     Compress,
-    /// How close the package is to the test views.
+    /// Compares the package with the test views.
     Evaluate,
-    /// What it all cost.
+    /// Writes the report.
     Report,
 }
 
 impl Stage {
-    /// Its name, as on the command line.
+    /// Returns its name, in kebab-case.
     pub fn name(self) -> &'static str {
         match self {
             Self::Score => "score",
@@ -46,23 +46,23 @@ impl Stage {
     }
 }
 
-/// The stages so far.
+/// The durations of the stages run so far.
 pub(super) struct Stages<'a> {
     progress: &'a mut dyn Progress,
     times: Vec<StageTime>,
 }
 
 impl<'a> Stages<'a> {
-    /// Before the first stage. Begins the task "bake".
+    /// Begins the task "bake".
     pub fn begin(progress: &'a mut dyn Progress) -> Self {
         progress.begin("bake", STAGES);
         Self { progress, times: Vec::new() }
     }
 
-    /// Runs a stage, unless its result is already there.
+    /// Runs a stage, or skips it if `stored` has its result of an earlier bake. Returns the result.
     ///
     /// # Errors
-    /// What the stage reports.
+    /// Those of `work`.
     pub fn run<T>(
         &mut self,
         stage: Stage,
@@ -83,12 +83,12 @@ impl<'a> Stages<'a> {
         Ok(result)
     }
 
-    /// How long the stages so far took.
+    /// Returns the durations of the stages run so far.
     pub fn times(&self) -> Vec<StageTime> {
         self.times.clone()
     }
 
-    /// After the last stage.
+    /// Finishes the task "bake".
     pub fn finish(self) {
         self.progress.finish();
     }

@@ -21,10 +21,10 @@ use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Times at which the active sets are looked at.
+/// Number of times at which the active sets are computed.
 const TIMES: usize = 61;
 
-/// What the report is about.
+/// The contents of a report before they are summarized.
 pub(super) struct Facts<'a> {
     pub settings: &'a BakeSettings,
     pub trained_with: &'a TrainedWith,
@@ -37,7 +37,7 @@ pub(super) struct Facts<'a> {
 }
 
 impl Facts<'_> {
-    /// The report.
+    /// Returns the report.
     ///
     /// # Errors
     /// The package cannot be read back.
@@ -73,7 +73,7 @@ impl Facts<'_> {
         })
     }
 
-    /// What was chosen, in words.
+    /// Returns the choices of the user and of the bake, as names and values for people.
     fn choices(&self) -> Vec<(String, String)> {
         let pair = |name: &str, value: String| (name.to_owned(), value);
         let goal = match self.settings.goal {
@@ -95,7 +95,7 @@ impl Facts<'_> {
     }
 }
 
-/// Writes the report beside the package, as JSON and as a page. Returns where they are.
+/// Writes the report beside the package, as JSON and as an HTML page. Returns the paths of both.
 ///
 /// # Errors
 /// A folder that cannot be written to, a full disk.
@@ -111,7 +111,7 @@ pub(super) fn write(
     Ok(paths)
 }
 
-/// `scene.gs4d` and an ending: `scene` with that ending.
+/// Returns the path with `ending` in place of its extension: `scene.report.json` beside `scene.gs4d`.
 fn beside(out: &Path, ending: &str) -> PathBuf {
     let mut name: OsString = out.file_stem().unwrap_or_default().to_owned();
     name.push(ending);

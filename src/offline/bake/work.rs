@@ -1,10 +1,9 @@
-//! The folder where the results of a bake's stages wait for the next ones, so that an interrupted bake goes on where it
-//! was.
+//! The folder of intermediate results, from which an interrupted bake resumes.
 //!
-//! In: a fingerprint of all that a result depends on, and the result as bytes. Out: the same bytes, as long as the
-//! fingerprint is the same and not one of them has changed; else `None`, and the stage runs again.
+//! In: a fingerprint of everything that a result depends on, and the result as bytes. Out: the same bytes; `None`, so
+//! that the stage runs again, if the fingerprint is another or the bytes are damaged.
 //!
-//! Each fingerprint includes that of the stage before, so that a change at the beginning starts everything over.
+//! Each fingerprint includes that of the previous stage, so that a change invalidates all later results.
 
 use crate::codec::CodecError;
 use crate::offline::{Progress, write_beside};
@@ -16,15 +15,15 @@ use std::path::{Path, PathBuf};
 const MAGIC: [u8; 4] = *b"GS4W";
 /// Version of the stored results: other versions count as absent.
 const VERSION: u32 = 1;
-/// Magic, version, fingerprint, checksum of the body.
+/// Bytes of the header: magic, version, fingerprint, checksum of the body.
 const HEAD: usize = 16;
 
-/// What a result depends on, in 32 bits.
+/// A 32-bit checksum of everything that a result depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Fingerprint(pub u32);
 
 impl Fingerprint {
-    /// Of files, byte by byte, in this order.
+    /// Returns the fingerprint of the contents of these files, in this order.
     ///
     /// # Errors
     /// The first file that cannot be read, by name.
@@ -37,7 +36,7 @@ impl Fingerprint {
         Ok(Self(hasher.finalize()))
     }
 
-    /// Of this and what follows: settings, as text.
+    /// Returns the fingerprint of this one and of `settings`.
     pub fn and(self, settings: &str) -> Self {
         let mut hasher = crc32fast::Hasher::new();
         hasher.update(&self.0.to_le_bytes());
@@ -58,7 +57,7 @@ fn hash_file(path: &Path, hasher: &mut crc32fast::Hasher) -> io::Result<()> {
         length += count as u64;
         hasher.update(&block[..count]);
     }
-    // So that two files are not mistaken for one.
+    // The length separates the files: their bytes are hashed one after the other.
     hasher.update(&length.to_le_bytes());
     Ok(())
 }
@@ -70,10 +69,10 @@ pub struct Work {
 }
 
 impl Work {
-    /// The folder `OUT.bake` beside the package to be, made if it is not there.
+    /// Returns the folder `OUT.bake` beside the package `out`, created if it does not exist.
     ///
     /// # Errors
-    /// The folder cannot be made.
+    /// The folder cannot be created.
     pub fn beside(out: &Path) -> Result<Self, CodecError> {
         let mut name = out.file_name().unwrap_or_default().to_owned();
         name.push(".bake");
@@ -82,12 +81,12 @@ impl Work {
         Ok(Self { folder })
     }
 
-    /// The folder.
+    /// Returns the path of the folder.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// A result stored before, if it is whole and its fingerprint is this one.
+    /// Returns a stored result; `None` if there is none, or if it is damaged or has another fingerprint.
     pub fn load(&self, name: &str, fingerprint: Fingerprint) -> Option<Vec<u8>> {
         let bytes = fs::read(self.folder.join(name)).ok()?;
         let (head, body) = bytes.split_at_checked(HEAD)?;
@@ -115,14 +114,14 @@ impl Work {
 
     /// Removes the folder if nothing was stored.
     pub fn remove_if_empty(&self) {
-        // The system does not remove a folder with something in it.
+        // `remove_dir` does not remove a folder that has contents.
         let _ = fs::remove_dir(&self.folder);
     }
 
     /// Removes the folder and what is in it.
     ///
     /// # Errors
-    /// What the system reports.
+    /// The folder or its contents cannot be removed.
     pub fn remove(self) -> Result<(), CodecError> {
         fs::remove_dir_all(&self.folder).map_err(|error| CodecError { path: self.folder.clone(), kind: error.into() })
     }
@@ -137,12 +136,12 @@ fn head(fingerprint: Fingerprint, body: &[u8]) -> [u8; HEAD] {
     head
 }
 
-/// Little-endian words as bytes.
+/// Returns the little-endian bytes of words.
 pub(super) fn bytes(words: &[u32]) -> Vec<u8> {
     words.iter().flat_map(|word| word.to_le_bytes()).collect()
 }
 
-/// The words of such bytes; a rest of fewer than four is left out.
+/// Returns the words of little-endian bytes. A remainder of fewer than four bytes is ignored.
 pub(super) fn words(bytes: &[u8]) -> Vec<u32> {
     bytes.as_chunks().0.iter().map(|&four| u32::from_le_bytes(four)).collect()
 }

@@ -19,20 +19,21 @@ use crate::view::Camera;
 /// Below this share of the product of its columns' lengths, a determinant counts as zero.
 const SINGULAR: f64 = 1e-9;
 
-/// What a camera file does not say.
+/// How to read a camera file. Default: all `None`.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CameraOptions {
-    /// Picture size in pixels, instead of the file's. The field of view stays that of the original pictures on both axes, so that
-    /// another aspect ratio gives pixels that are not square; where the original size is unknown, this one is taken for it.
+    /// Picture size in pixels, instead of the file's. The field of view stays that of the original pictures on both
+    /// axes, so that another aspect ratio gives pixels that are not square. If the original size is unknown, this one
+    /// is used for it.
     pub size: Option<UVec2>,
-    /// The original's `--resolution`: 1, 2, 3, 4 or 8 divide the size, −1 caps the width at 1600, anything else is a target width.
-    /// Golden views are not affected, and neither is an explicit `size`.
+    /// The original's `--resolution`: 1, 2, 3, 4 or 8 divide the size, −1 limits the width to 1600 pixels, any other
+    /// number is a target width. It has no effect on golden views or with an explicit `size`.
     pub resolution: Option<i32>,
-    /// Frames outside these times (ends included) are dropped.
+    /// First and last time, both included: frames outside are dropped.
     pub time_interval: Option<[f32; 2]>,
 }
 
-/// A camera file, read but not interpreted.
+/// A camera file, parsed as JSON but not interpreted.
 #[derive(Debug, Clone)]
 pub struct CameraFile {
     path: PathBuf,
@@ -59,7 +60,7 @@ struct TransformsFrame {
     mask_path: Option<String>,
 }
 
-/// One golden view. Its principal point is the centre and not read.
+/// One golden view. Its principal point is always the center and is not read.
 #[derive(Deserialize)]
 #[serde(expecting = "an object")]
 struct GoldenFrame {
@@ -79,13 +80,13 @@ struct Frame {
     mask: Option<String>,
     time: f32,
     world_to_camera: Mat4,
-    /// Size of the original picture, if the file says it.
+    /// Size of the original picture; `None` if the file does not have it.
     size: Option<UVec2>,
     lens: OriginalLens,
 }
 
 impl CameraFile {
-    /// Reads the cameras of a file. Images need not be on disk, unless only they can tell the picture size.
+    /// Reads the cameras of a file. Images need not be on disk, unless the picture size is found nowhere else.
     ///
     /// The picture size is `options.size`, else `w` and `h` of the frame or the file, else that of the first image found, in this file
     /// or the folder's other splits; the latter two after `options.resolution`.
@@ -151,7 +152,8 @@ impl CameraFile {
             .collect()
     }
 
-    /// The size of the first image on disk. An unreadable image matters only where nothing else gives the size.
+    /// Returns the size of the first image on disk; `None` if there is none. An unreadable image is an error only if
+    /// nothing else gives the size.
     fn probe_size(&self, options: &CameraOptions) -> Result<Option<UVec2>, DatasetError> {
         let found = self.images().find(|path| path.is_file()).or_else(|| self.sibling_image());
         match found.map(|path| image_size(&path)) {
@@ -169,7 +171,7 @@ impl CameraFile {
             .find_map(|file| file.images().find(|path| path.is_file()))
     }
 
-    /// Paths of the images, as far as the entries name any.
+    /// Returns the paths of the images that the entries name.
     fn images(&self) -> impl Iterator<Item = PathBuf> {
         let files = self.entries().iter().filter_map(move |entry| entry.get(self.form.file_key())?.as_str());
         files.map(move |file| self.folder().join(with_image_extension(file)))
@@ -235,7 +237,7 @@ fn transforms_frame(entry: &Value, shared: &LensEntries) -> Result<Frame, FrameP
     let frame = TransformsFrame::deserialize(entry).map_err(FrameProblem::Malformed)?;
     let entries = LensEntries::deserialize(entry).map_err(FrameProblem::Malformed)?.or(shared);
     let mut camera_to_world = pose(&frame.transform_matrix)?;
-    // OpenGL axes to OpenCV axes: the camera's y and z turn round.
+    // OpenGL axes to OpenCV axes: the camera's y and z are negated.
     camera_to_world.y_axis = -camera_to_world.y_axis;
     camera_to_world.z_axis = -camera_to_world.z_axis;
     Ok(Frame {
@@ -266,7 +268,7 @@ fn finite_time(time: f64) -> Result<f32, FrameProblem> {
     if narrow.is_finite() { Ok(narrow) } else { Err(FrameProblem::Time(time)) }
 }
 
-/// A finite, invertible, affine matrix from its rows.
+/// Returns the matrix with these rows, which must be finite, affine and invertible.
 fn pose(rows: &[[f64; 4]; 4]) -> Result<DMat4, FrameProblem> {
     let matrix = DMat4::from_cols_array_2d(rows).transpose();
     if !matrix.is_finite() {
@@ -284,21 +286,21 @@ fn single_precision(matrix: DMat4) -> Result<Mat4, FrameProblem> {
     if usable { Ok(narrow) } else { Err(FrameProblem::Matrix("is too large or too small for float32")) }
 }
 
-/// Also false where the determinant overflows.
+/// Returns whether the linear part is invertible; false if its determinant overflows.
 fn is_invertible(matrix: DMat4) -> bool {
     let linear = DMat3::from_mat4(matrix);
     let volume = linear.x_axis.length() * linear.y_axis.length() * linear.z_axis.length();
     volume.is_finite() && linear.determinant().abs() > SINGULAR * volume
 }
 
-/// `.png` is appended where a path does not end in the extension of an image.
+/// Appends `.png` unless the path ends in the extension of an image.
 fn with_image_extension(file: &str) -> String {
     let extension = Path::new(file).extension().unwrap_or_default();
     let known = ["png", "jpg", "jpeg"].iter().any(|known| extension.eq_ignore_ascii_case(known));
     if known { file.to_owned() } else { format!("{file}.png") }
 }
 
-/// The stem of an image path, made unique with the frame's index. `None` where it is no plain file name.
+/// Returns the stem of an image path, made unique with the index of the frame; `None` if it is not a plain file name.
 fn output_name(file: &str, index: usize, taken: &mut HashSet<String>) -> Option<String> {
     let path = Path::new(file);
     let stem = path.extension().and(path.file_stem())?.to_str()?;

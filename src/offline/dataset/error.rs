@@ -1,6 +1,7 @@
-//! What can be wrong with a dataset.
+//! Errors of datasets.
 //!
-//! Every message names the file, the frame where there is one, the reason and what to do about it.
+//! In: a file, a frame, a reason. Out: a [`DatasetError`], whose message names the file, the frame if there is one, the
+//! reason and the remedy.
 
 use std::path::PathBuf;
 use std::{fmt, io};
@@ -12,7 +13,7 @@ use super::MAX_SIDE;
 /// A dataset, a camera file or an image that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
-    /// The folder holds no camera file of the split asked for.
+    /// The folder has no camera file for the requested split.
     #[error(
         "{}: no {file} in it: a dataset folder holds transforms_train.json and transforms_test.json (the Blender form; COLMAP folders \
          must be converted first)",
@@ -29,7 +30,7 @@ pub enum DatasetError {
     Read {
         /// The camera file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the operating system.
         reason: io::Error,
     },
     /// A camera file is not JSON, or a file-level entry has the wrong type.
@@ -37,7 +38,7 @@ pub enum DatasetError {
     Json {
         /// The camera file.
         path: PathBuf,
-        /// Where and why.
+        /// The error of the parser, with its line and column.
         reason: serde_json::Error,
     },
     /// The JSON has neither `frames` nor `views`.
@@ -63,7 +64,7 @@ pub enum DatasetError {
     NoFramesInInterval {
         /// The camera file.
         path: PathBuf,
-        /// The interval asked for.
+        /// The requested interval.
         interval: [f32; 2],
         /// First and last time found.
         times: [f32; 2],
@@ -78,7 +79,7 @@ pub enum DatasetError {
         /// What is wrong with it.
         problem: FrameProblem,
     },
-    /// Nothing says how large the pictures are.
+    /// The picture size is not given anywhere.
     #[error(
         "{}: the picture size is unknown: no \"w\" and \"h\" in it, and none of its images is on disk; pass --size WIDTHxHEIGHT",
         .path.display()
@@ -87,22 +88,22 @@ pub enum DatasetError {
         /// The camera file.
         path: PathBuf,
     },
-    /// The size asked for is not one that a picture can have.
+    /// The requested picture size is out of range.
     #[error("pictures of {}x{} pixels cannot be made: each side must be 1 to {MAX_SIDE}", .size.x, .size.y)]
     Size {
-        /// Width and height asked for.
+        /// Requested width and height, pixels.
         size: UVec2,
     },
-    /// The resolution asked for does not lead to a size that a picture can have.
+    /// The requested resolution gives a picture size that is out of range.
     #[error(
         "resolution {resolution} cannot be used on {}x{} pixels: it is a divisor (1, 2, 3, 4 or 8), -1 (at most 1600 wide) or a target \
          width up to {MAX_SIDE}",
         .original.x, .original.y
     )]
     Resolution {
-        /// The value asked for.
+        /// The requested value.
         resolution: i32,
-        /// Size of the pictures before it.
+        /// Size of the original pictures.
         original: UVec2,
     },
     /// Images named by the camera file are not on disk.
@@ -120,7 +121,7 @@ pub enum DatasetError {
     Image {
         /// The image.
         path: PathBuf,
-        /// What the decoder says.
+        /// The error of the decoder.
         reason: image::ImageError,
     },
 }
@@ -146,10 +147,10 @@ pub enum FrameProblem {
     /// The horizontal field of view is out of range.
     #[error("camera_angle_x is {0}: it must lie between 0 and π (radians)")]
     FieldOfView(f64),
-    /// The lens values do not give a camera.
+    /// The values of the lens are not those of a camera.
     #[error("the lens cannot be used: focal lengths must be above 0 and every value finite (in float32)")]
     Lens,
-    /// The picture size is not one that a picture can have.
+    /// The picture size is out of range.
     #[error("pictures of {width}x{height} pixels cannot be made: each side must be a whole number, 1 to {MAX_SIDE}")]
     Size {
         /// Width in the file.

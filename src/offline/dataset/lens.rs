@@ -1,7 +1,7 @@
 //! Picture sizes and lenses of training views.
 //!
-//! In: sizes, focal lengths and angles as a camera file gives them, in pixels of the original pictures, and the size or resolution
-//! asked for. Out: the size to render at and the [`Lens`] for it.
+//! In: sizes, focal lengths and angles of a camera file, in pixels of the original pictures, and the requested size or
+//! resolution. Out: the size to render at and the [`Lens`] for it.
 
 use glam::{DVec2, UVec2};
 use serde::Deserialize;
@@ -9,7 +9,7 @@ use serde::Deserialize;
 use super::{DatasetError, FrameProblem, MAX_SIDE};
 use crate::view::{Camera, Lens};
 
-/// The width that `--resolution -1` allows.
+/// The largest width with `--resolution -1`, pixels.
 const AUTOMATIC_WIDTH: f64 = 1600.0;
 
 /// The camera entries of a file or of one of its frames.
@@ -37,7 +37,7 @@ pub(super) enum OriginalLens {
 }
 
 impl LensEntries {
-    /// These entries, and where there is none that of the whole file.
+    /// Returns these entries, with missing ones replaced by those of the whole file.
     pub fn or(self, file: &Self) -> Self {
         Self {
             w: self.w.or(file.w),
@@ -50,12 +50,12 @@ impl LensEntries {
         }
     }
 
-    /// The picture size, if both sides are given.
+    /// Returns the picture size in pixels; `None` unless both sides are given.
     pub fn size(&self) -> Result<Option<UVec2>, FrameProblem> {
         self.w.zip(self.h).map(|(width, height)| checked_size(width, height)).transpose()
     }
 
-    /// The lens: intrinsics when all four are given, as in the original, else the field of view.
+    /// Returns the lens: intrinsics if all four entries are given, as in the original, else the field of view.
     pub fn lens(&self) -> Result<OriginalLens, FrameProblem> {
         if let Self { fl_x: Some(fl_x), fl_y: Some(fl_y), cx: Some(cx), cy: Some(cy), .. } = *self {
             return Ok(OriginalLens::Intrinsics { focal: DVec2::new(fl_x, fl_y), center: DVec2::new(cx, cy) });
@@ -70,7 +70,7 @@ impl LensEntries {
 }
 
 impl OriginalLens {
-    /// The lens for pictures made smaller by `divisor` than the original ones. The field of view stays.
+    /// Returns the lens for pictures that are smaller than the original ones by `divisor`, with the same field of view.
     pub fn scaled(self, original: UVec2, divisor: DVec2) -> Result<Lens, FrameProblem> {
         let lens = match self {
             Self::Angle(angle) => Camera::fov_lens(angle, original),
@@ -88,15 +88,15 @@ impl OriginalLens {
     }
 }
 
-/// A size from a file: whole numbers, possibly written as `400.0`.
+/// Returns a picture size from a file: whole numbers, possibly written as `400.0`.
 pub(super) fn checked_size(width: f64, height: f64) -> Result<UVec2, FrameProblem> {
     let side =
         |value: f64| (value.fract() == 0.0 && (1.0..=f64::from(MAX_SIDE)).contains(&value)).then_some(value as u32);
     side(width).zip(side(height)).map(UVec2::from).ok_or(FrameProblem::Size { width, height })
 }
 
-/// The size after `--resolution`, with the divisor for focal lengths (the original divides them by the factor asked for, not by the
-/// ratio of the rounded sizes).
+/// Returns the size after `--resolution` and the divisor for focal lengths (the original divides them by the requested
+/// factor, not by the ratio of the rounded sizes).
 pub(super) fn reduced(original: UVec2, resolution: Option<i32>) -> Result<(UVec2, f64), DatasetError> {
     let full = original.as_dvec2();
     let (size, divisor) = match resolution {
@@ -114,8 +114,8 @@ pub(super) fn reduced(original: UVec2, resolution: Option<i32>) -> Result<(UVec2
     }
 }
 
-/// Rounds down where the divisor comes from a width, as the original does, but keeps the width itself: there 1601 pixels capped at
-/// 1600 become 1599, lost to the last bit of a division.
+/// Divides and rounds down, as the original does if the divisor comes from a width, but keeps the width itself exact:
+/// in the original, 1601 pixels limited to 1600 become 1599, because the division is rounded.
 fn rounded_down(full: DVec2, divisor: f64) -> (DVec2, f64) {
     ((full / divisor + 1e-6).floor(), divisor)
 }

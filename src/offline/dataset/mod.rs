@@ -8,7 +8,7 @@
 //! | converted N3V | the same with `fl_x`, `fl_y`, `cx`, `cy`, for the file or per frame | intrinsics cameras |
 //! | golden views | `golden*.json`, a list `views` | FoV cameras always |
 //!
-//! Cameras can be read without any image on disk; [`Dataset::require_images`] says early which ones are missing.
+//! Cameras can be read without any image on disk; [`Dataset::require_images`] reports missing images early.
 
 mod camera_file;
 mod error;
@@ -29,12 +29,12 @@ pub const MAX_SIDE: u32 = 16_384;
 /// How many missing images an error names.
 const MISSING_LISTED: usize = 4;
 
-/// Which views of a dataset.
+/// A subset of the views of a dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Split {
-    /// What a capture is trained on.
+    /// The views that a capture is trained on.
     Train,
-    /// What it is evaluated on.
+    /// The views that it is evaluated on.
     Test,
     /// D-NeRF's third split; the test set of its `lego` scene.
     Val,
@@ -44,7 +44,7 @@ impl Split {
     /// Every split.
     pub const ALL: [Self; 3] = [Self::Train, Self::Test, Self::Val];
 
-    /// Name of the split's camera file.
+    /// Returns the name of the split's camera file.
     pub fn file_name(self) -> &'static str {
         match self {
             Self::Train => "transforms_train.json",
@@ -53,7 +53,7 @@ impl Split {
         }
     }
 
-    /// The split that the original uses in its place: folders whose name ends in `lego` are evaluated on `val`.
+    /// Returns the split that the original uses in its place: folders whose name ends in `lego` are evaluated on `val`.
     fn resolved(self, folder: &Path) -> Self {
         let lego = folder.file_name().is_some_and(|name| name.as_encoded_bytes().ends_with(b"lego"));
         if self == Self::Test && lego { Self::Val } else { self }
@@ -65,7 +65,7 @@ impl Split {
 pub struct Dataset {
     /// The folder.
     pub folder: PathBuf,
-    /// The split that was read ([`Split::Val`] when the test set of a `lego` folder was asked for).
+    /// The split that was read: [`Split::Val`] if the test split of a `lego` folder was requested.
     pub split: Split,
     /// Its views in file order, at least one.
     pub views: Vec<TrainingView>,
@@ -75,7 +75,7 @@ impl Dataset {
     /// Reads the cameras of one split.
     ///
     /// # Errors
-    /// [`DatasetError`] when the split's file is missing or unusable. Missing images are no error here.
+    /// [`DatasetError`] if the split's file is missing or unusable. Missing images are not an error here.
     pub fn open(folder: &Path, split: Split, options: &CameraOptions) -> Result<Self, DatasetError> {
         let split = split.resolved(folder);
         let path = folder.join(split.file_name());
@@ -94,7 +94,7 @@ impl Dataset {
     }
 }
 
-/// Fails with a list of those files that do not exist.
+/// Checks that all files exist; the error names the first few that do not.
 fn require_files<'a>(files: impl Iterator<Item = &'a PathBuf>) -> Result<(), DatasetError> {
     let (mut first, mut missing, mut total) = (Vec::new(), 0, 0);
     for file in files {

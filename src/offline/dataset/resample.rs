@@ -12,7 +12,7 @@ use glam::UVec2;
 const PRECISION_BITS: u32 = 22;
 const HALF: i64 = 1 << (PRECISION_BITS - 1);
 
-/// What one output position reads: inputs from `first` on, with these fixed-point weights.
+/// The inputs of one output position: from `first` on, with these fixed-point weights.
 struct Taps {
     first: usize,
     weights: Vec<i64>,
@@ -93,14 +93,14 @@ fn clipped(sum: i64) -> u8 {
     (sum >> PRECISION_BITS).clamp(0, 255) as u8
 }
 
-/// The taps of every output position along one side.
+/// Returns the taps of every output position along one side.
 fn taps(from: u32, to: u32) -> Vec<Taps> {
     let scale = f64::from(from) / f64::from(to);
     let stretch = scale.max(1.0);
     let support = 2.0 * stretch;
     let taps_at = |position: u32| {
         let center = (f64::from(position) + 0.5) * scale;
-        // Casts to unsigned saturate: what lies before the picture starts at 0.
+        // Casts to unsigned saturate: positions before the picture become 0.
         let first = (center - support + 0.5) as u32;
         let end = ((center + support + 0.5) as u32).min(from);
         let weight = |input: u32| cubic((f64::from(input) - center + 0.5) * (1.0 / stretch));
@@ -112,7 +112,7 @@ fn taps(from: u32, to: u32) -> Vec<Taps> {
     (0..to).map(taps_at).collect()
 }
 
-/// Keys' cubic with a = −0.5.
+/// Evaluates Keys' cubic with a = −0.5.
 fn cubic(x: f64) -> f64 {
     const A: f64 = -0.5;
     let x = x.abs();
@@ -129,7 +129,7 @@ fn cubic(x: f64) -> f64 {
 mod tests {
     use super::*;
 
-    // What Pillow 9.5 makes of `noise` with `Image.resize(size)`.
+    // The result of Pillow 9.5 for `noise` with `Image.resize(size)`.
     #[rustfmt::skip]
     const RGB_5X4_TO_11X9: [u8; 297] = [
         30, 90, 136, 59, 70, 130, 129, 19, 118, 188, 7, 90, 210, 88, 32, 214, 154, 0, 200, 110, 41, 179, 52, 100, 165,
@@ -163,7 +163,7 @@ mod tests {
         126, 153, 175, 112, 166, 129, 149, 189, 111,
     ];
 
-    /// Bytes of a linear congruential generator.
+    /// Returns bytes of a linear congruential generator.
     fn noise(count: usize, mut state: u32) -> Vec<u8> {
         let next = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -172,7 +172,7 @@ mod tests {
         std::iter::repeat_with(next).take(count).collect()
     }
 
-    /// RGBA noise with many pixels fully covered and fully empty.
+    /// Returns RGBA noise with many pixels fully covered and fully empty.
     fn rgba_noise(pixels: usize, state: u32) -> Vec<u8> {
         let mut bytes = noise(pixels * 4, state);
         for alpha in bytes.iter_mut().skip(3).step_by(4) {

@@ -1,16 +1,18 @@
-//! Which training views are used for what.
+//! Selecting training views.
 //!
-//! In: the training views of a dataset. Out: an even share of them, some held out, their distinct cameras, their distinct times.
+//! In: the training views of a dataset. Out: an even share of them, held-out views, their distinct cameras, the number
+//! of their distinct times.
 
 use super::TrainingView;
 use crate::view::{Camera, Lens, RasterFov, View};
 use std::collections::HashSet;
 
-/// The golden ratio's fraction, whose multiples fall evenly between 0 and 1.
+/// The fraction of the golden ratio: the fractions of its multiples are evenly distributed between 0 and 1.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// Indices of an even share of the views, ascending: one from each of `wanted` stretches of time, from changing places within it, so
-/// that neither times nor cameras are favoured. All of them if there are no more than `wanted`.
+/// Returns the indices of an even share of the views, ascending: one from each of `wanted` stretches of time, at a
+/// different place within each, so that neither times nor cameras are favoured. Returns all indices if there are no
+/// more than `wanted`.
 pub fn even_share(views: &[TrainingView], wanted: usize) -> Vec<usize> {
     let count = views.len();
     let mut by_time: Vec<usize> = (0..count).collect();
@@ -29,8 +31,8 @@ pub fn even_share(views: &[TrainingView], wanted: usize) -> Vec<usize> {
     share
 }
 
-/// Takes an even share of the views out: the rest first, then the share. At most a quarter is taken; of fewer than four views, nothing
-/// can be spared and both parts are all of them.
+/// Holds out an even share of the views. Returns the other views and those held out: at most `wanted`, and at most a
+/// quarter of all. With fewer than four views, or if `wanted` is 0, both parts are all of them.
 pub fn hold_out(views: &[TrainingView], wanted: usize) -> (Vec<TrainingView>, Vec<TrainingView>) {
     let wanted = wanted.min(views.len() / 4);
     if wanted == 0 {
@@ -44,7 +46,7 @@ pub fn hold_out(views: &[TrainingView], wanted: usize) -> (Vec<TrainingView>, Ve
     (part(false), part(true))
 }
 
-/// Every camera once, in order of appearance: those with the same pose, size and lens are one.
+/// Returns every camera once, in order of appearance. Cameras with the same pose, size and lens are the same.
 pub fn distinct_cameras(views: &[TrainingView]) -> Vec<Camera> {
     let mut seen = HashSet::new();
     views.iter().map(|view| view.camera).filter(|camera| seen.insert(identity(camera))).collect()
@@ -59,12 +61,12 @@ fn identity(camera: &Camera) -> ([u32; 16], [u32; 2], [u32; 5]) {
     (pose, camera.size.to_array(), [kind, a.x, a.y, b.x, b.y].map(f32::to_bits))
 }
 
-/// How many different times the views have.
+/// Returns the number of distinct times of the views.
 pub fn distinct_times(views: &[TrainingView]) -> usize {
     views.iter().map(|view| view.time.to_bits()).collect::<HashSet<_>>().len()
 }
 
-/// What the passes read, for each of the views.
+/// Returns the renderer's view for each training view.
 pub fn to_draw(views: &[TrainingView], raster_fov: RasterFov) -> Vec<View> {
     views.iter().map(|view| view.camera.view(view.time, raster_fov)).collect()
 }
@@ -74,7 +76,7 @@ mod tests {
     use super::*;
     use glam::{Mat4, UVec2, Vec3};
 
-    /// Twenty cameras of thirty frames, camera by camera.
+    /// Returns the views of twenty cameras with thirty frames each, camera by camera.
     fn views() -> Vec<TrainingView> {
         let camera = |index: usize| Camera {
             world_to_camera: Mat4::from_translation(Vec3::X * index as f32),

@@ -11,7 +11,7 @@ use image::{DynamicImage, ImageReader, Limits, RgbaImage};
 use super::{DatasetError, MAX_SIDE, require_files, resample};
 use crate::view::{Camera, Picture};
 
-/// A camera at one time, and the image that was seen there.
+/// A camera at one time, and the path of the image taken there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrainingView {
     /// Name for output files: the stem of the image path, without folders; unique within its camera file (a repeated stem has the
@@ -21,13 +21,14 @@ pub struct TrainingView {
     pub camera: Camera,
     /// Timestamp, in the capture's unit.
     pub time: f32,
-    /// The image. It may not be on disk.
+    /// Path of the image, which may not exist.
     pub image: PathBuf,
-    /// Coverage as an 8-bit grey image, already multiplied into the image.
+    /// Path of the coverage as an 8-bit grey image, which has been multiplied into the image already; `None` if the
+    /// view has none.
     pub mask: Option<PathBuf>,
 }
 
-/// Which of the original's two ways of loading images is reproduced.
+/// Which of the original's two ways of loading images is reproduced. Default: [`InMemory`](Self::InMemory).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum ImageMode {
     /// Its in-memory mode, used for D-NeRF: transparent images keep alpha through resampling and are multiplied by it once more.
@@ -42,19 +43,19 @@ pub enum ImageMode {
 pub struct TrainingImage {
     /// RGB, 0 to 1.
     pub picture: Picture,
-    /// Coverage per pixel, 0 to 1: the mask where the view has one, else the image's own alpha ([`ImageMode::InMemory`] only). `None`
-    /// where everything is covered.
+    /// Coverage per pixel, 0 to 1: the mask if the view has one, else the image's own alpha ([`ImageMode::InMemory`]
+    /// only). `None` if everything is covered.
     pub alpha: Option<Vec<f32>>,
 }
 
 impl TrainingView {
-    /// Loads the image as the original does: composited over `background` (RGB, 0 to 1), truncated to 8 bits, resampled to the camera's
-    /// size (Pillow's bicubic), and multiplied by alpha again where `mode` says so. A mask is only reported as coverage: the image is
-    /// already multiplied by it.
+    /// Loads the image as the original does: composited over `background` (RGB, 0 to 1), truncated to 8 bits, resampled
+    /// to the camera's size (Pillow's bicubic), and multiplied by alpha again if `mode` is [`ImageMode::InMemory`]. A
+    /// mask is only returned as coverage: the image has been multiplied by it already.
     ///
     /// # Errors
-    /// [`DatasetError::MissingImages`] when the image or the mask is not on disk, [`DatasetError::Image`] when one cannot be decoded,
-    /// [`DatasetError::Size`] when the camera's size is not usable.
+    /// [`DatasetError::MissingImages`] if the image or the mask is not on disk, [`DatasetError::Image`] if one cannot
+    /// be decoded, [`DatasetError::Size`] if the size of the camera is out of range.
     pub fn load_image(&self, background: [f32; 3], mode: ImageMode) -> Result<TrainingImage, DatasetError> {
         let size = self.camera.size;
         if size.min_element() == 0 || size.max_element() > MAX_SIDE {
@@ -69,7 +70,7 @@ impl TrainingView {
     }
 }
 
-/// Width and height of an image, from its header.
+/// Returns width and height of an image, from its header.
 pub(super) fn image_size(path: &Path) -> Result<UVec2, DatasetError> {
     let size = reader(path).and_then(ImageReader::into_dimensions);
     size.map(UVec2::from).map_err(|reason| DatasetError::Image { path: path.to_owned(), reason })
@@ -80,7 +81,7 @@ fn decode(path: &Path) -> Result<DynamicImage, DatasetError> {
     image.map_err(|reason| DatasetError::Image { path: path.to_owned(), reason })
 }
 
-/// A reader that goes by the contents of the file rather than by its name, and refuses huge images.
+/// Returns a reader that detects the format by the contents of the file, not by its name, and refuses huge images.
 fn reader(path: &Path) -> image::ImageResult<ImageReader<std::io::BufReader<std::fs::File>>> {
     let mut limits = Limits::default();
     limits.max_image_width = Some(MAX_SIDE);
@@ -104,7 +105,8 @@ fn resampled(image: &RgbaImage, background: [f32; 3], mode: ImageMode, size: UVe
     TrainingImage { picture: Picture { size, pixels }, alpha: Some(alpha) }
 }
 
-/// RGB over the background in double precision, times 255, truncated; alpha follows each pixel where it is kept.
+/// Composites RGB over the background in double precision, times 255, truncated; with `keep_alpha`, alpha follows each
+/// pixel.
 fn composited(image: &RgbaImage, background: [f32; 3], keep_alpha: bool) -> Vec<u8> {
     let channels = if keep_alpha { 4 } else { 3 };
     let mut bytes = Vec::with_capacity(image.pixels().len() * channels);
@@ -132,7 +134,7 @@ fn unit(byte: u8) -> f32 {
     f32::from(byte) / 255.0
 }
 
-/// The first three bytes as RGB.
+/// Returns the first three bytes as RGB, 0 to 1.
 fn unit_rgb(bytes: &[u8]) -> Vec3 {
     Vec3::new(unit(bytes[0]), unit(bytes[1]), unit(bytes[2]))
 }

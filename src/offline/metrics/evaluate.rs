@@ -1,7 +1,8 @@
-//! How close a scene is to the views of a dataset.
+//! Metrics of a scene over the views of a dataset.
 //!
-//! In: training views with their images and a closure that draws a view. Out: an [`Evaluation`], the metrics of each view and their
-//! means, as the original evaluates: renders clamped, not rounded, against the images it trains on.
+//! In: training views with their images and a closure that draws a view. Out: an [`Evaluation`], the metrics of each
+//! view and their means, as the original evaluates: renders are clamped, not rounded, and images are loaded as in
+//! training.
 
 use glam::{UVec2, Vec3};
 use serde::Serialize;
@@ -11,7 +12,7 @@ use crate::offline::dataset::{DatasetError, ImageMode, TrainingView};
 use crate::scene::TrainedWith;
 use crate::view::{Picture, RasterFov, View};
 
-/// Which metrics to compute beside PSNR. Each costs more than the one before.
+/// Which metrics to compute beside PSNR. Each takes longer than the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MetricSet {
     /// Structural similarity.
@@ -31,16 +32,16 @@ impl MetricSet {
     pub const ALL: Self = Self { ssim: true, ms_ssim: true, flip: true };
 }
 
-/// How close two pictures are, or the means of several pairs. What was not computed is `None`.
+/// Metrics of a render, or the means over several. A metric that was not computed is `None`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ImageMetrics {
-    /// PSNR in dB, the mean of the channels'. Infinite (null in JSON) for equal pictures.
+    /// PSNR in dB, mean of the three channels. Infinite (null in JSON) for equal pictures.
     pub psnr: f64,
     /// PSNR in dB of all values together.
     pub psnr_pooled: f64,
     /// SSIM, at most 1.
     pub ssim: Option<f64>,
-    /// MS-SSIM, 0 to 1; `None` too where pictures are too small.
+    /// MS-SSIM, 0 to 1; also `None` if a side is shorter than [`MS_SSIM_MIN_SIDE`](super::MS_SSIM_MIN_SIDE).
     pub ms_ssim: Option<f64>,
     /// Mean FLIP, 0 (same) to 1.
     pub flip: Option<f64>,
@@ -50,7 +51,7 @@ impl ImageMetrics {
     /// Compares a render, clamped to 0..1 first, with the reference.
     ///
     /// # Errors
-    /// [`SizeMismatch`] when the pictures do not have the same size, or are empty.
+    /// [`SizeMismatch`] if the pictures do not have the same size, or are empty.
     pub fn of(reference: &Picture, render: &Picture, wanted: MetricSet) -> Result<Self, SizeMismatch> {
         let render = render.clamped();
         Ok(Self {
@@ -62,7 +63,7 @@ impl ImageMetrics {
         })
     }
 
-    /// The means; a metric that some pair lacks has none. `None` of nothing.
+    /// Returns the means; a metric that is `None` in any of `all` is `None`. Returns `None` if `all` is empty.
     pub fn mean(all: &[Self]) -> Option<Self> {
         let count = all.len() as f64;
         let mean = |of: fn(&Self) -> Option<f64>| all.iter().map(of).sum::<Option<f64>>().map(|sum| sum / count);
@@ -76,19 +77,19 @@ impl ImageMetrics {
     }
 }
 
-/// How close one view is.
+/// Metrics of one view.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ViewMetrics {
     /// Name of the view.
     pub name: String,
-    /// Its timestamp.
+    /// Its timestamp, in the capture's unit.
     pub time: f32,
     /// The metrics.
     #[serde(flatten)]
     pub metrics: ImageMetrics,
 }
 
-/// How close a scene is to a dataset.
+/// Metrics of a scene over the views of a dataset.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Evaluation {
     /// Every view, in the order of the dataset.
@@ -97,32 +98,34 @@ pub struct Evaluation {
     pub mean: ImageMetrics,
 }
 
-/// What the images and views depend on beside the dataset.
+/// How images are loaded, views drawn and both compared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EvaluationSettings {
-    /// What transparent images are laid over, RGB.
+    /// Background of transparent images, RGB, 0 to 1.
     pub background: [f32; 3],
-    /// Which of the original's ways of loading images.
+    /// Which of the original's two ways of loading images is used.
     pub images: ImageMode,
-    /// Which field of view shapes footprints.
+    /// Which field of view determines the footprints.
     pub raster_fov: RasterFov,
     /// Which metrics to compute.
     pub metrics: MetricSet,
 }
 
 impl EvaluationSettings {
-    /// As the capture was trained: its background and field of view. Transparent images are composited once, as the figures that
-    /// captures are held against were measured; the in-memory mode of training multiplies them by alpha twice.
+    /// Returns settings with the background and the field of view that the capture was trained with. Transparent images
+    /// are composited once ([`ImageMode::Dataloader`]), as for the figures that captures are compared with; the
+    /// in-memory mode of training multiplies them by alpha twice.
     pub fn of(trained: &TrainedWith, metrics: MetricSet) -> Self {
         let images = ImageMode::Dataloader;
         Self { background: trained.background, images, raster_fov: trained.raster_fov, metrics }
     }
 }
 
-/// Compares every view. `draw` renders one; `seen` is shown each with its reference, its render (not clamped) and what was measured.
+/// Compares every view with its image. `draw` renders a view; `seen` is called with the metrics of each view, its image
+/// and its render (not clamped).
 ///
 /// # Errors
-/// An image that is missing or cannot be read, a render of another size, no views at all, and what `draw` and `seen` report.
+/// An image that is missing or cannot be read, a render of another size, no views, and errors of `draw` and `seen`.
 pub fn evaluate<E>(
     views: &[TrainingView],
     settings: &EvaluationSettings,
@@ -146,7 +149,7 @@ where
     Ok(Evaluation { views: all, mean })
 }
 
-/// Reference, render and their difference times `gain`, side by side; the heights must agree.
+/// Returns reference, render and their difference times `gain`, side by side. Both must have the same size.
 pub fn side_by_side(reference: &Picture, render: &Picture, gain: f32) -> Picture {
     let render = render.clamped();
     let difference: Vec<Vec3> =

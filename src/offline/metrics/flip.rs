@@ -3,8 +3,9 @@
 //! In: two pictures, sRGB-encoded, values 0 to 1. Out: the mean of their FLIP map, 0 (same) to 1, seen at 67 pixels per degree: a 4K
 //! monitor 0.7 m wide from 0.7 m away.
 //!
-//! Two paths meet. Colour: what the eye resolves (contrast sensitivity filters in YCxCz), compared in a Hunt-adjusted L\*a\*b\* by
-//! the HyAB distance. Features: edges and points of the luminance, which make a difference of colour more visible.
+//! Two measures are combined. Colour: the pictures filtered by the contrast sensitivity of the eye (in YCxCz), compared
+//! in a Hunt-adjusted L\*a\*b\* by the HyAB distance. Features: edges and points of the luminance, which make a
+//! difference of colour more visible.
 
 use std::f64::consts::{PI, SQRT_2};
 use std::ops::{Add, Mul};
@@ -27,16 +28,17 @@ const SENSITIVITY: [(DVec3, DVec3); 2] = [
 const WIDEST: f64 = 0.04;
 /// Width of the eye's edge detector, in degrees from peak to trough.
 const DETECTOR_WIDTH: f64 = 0.082;
-/// Exponent of the difference of colour, and where its scale bends: this share of the largest difference maps to `BEND_TO`.
+/// Exponent of the difference of colour, and the bend of its scale: this share of the largest difference maps to
+/// `BEND_TO`.
 const COLOR_EXPONENT: f64 = 0.7;
 const BEND_AT: f64 = 0.4;
 const BEND_TO: f64 = 0.95;
 const FEATURE_EXPONENT: f64 = 0.5;
 
-/// Mean FLIP of `test` against `reference`, 0 to 1 for values within 0 to 1. Symmetric.
+/// Returns the mean FLIP of `test` against `reference`, 0 to 1 for values within 0 to 1. Symmetric.
 ///
 /// # Errors
-/// [`SizeMismatch`] when the pictures do not have the same size, or are empty.
+/// [`SizeMismatch`] if the pictures do not have the same size, or are empty.
 pub fn flip(reference: &Picture, test: &Picture) -> Result<f64, SizeMismatch> {
     check_sizes(reference, test)?;
     let (a, b) = (Seen::of(reference), Seen::of(test));
@@ -49,7 +51,7 @@ pub fn flip(reference: &Picture, test: &Picture) -> Result<f64, SizeMismatch> {
     Ok(differences.sum::<f64>() / reference.pixels.len() as f64)
 }
 
-/// A picture as the eye sees it.
+/// A picture after the filters of the eye.
 struct Seen {
     /// Filtered colours, Hunt-adjusted L\*a\*b\*.
     colors: Vec<DVec3>,
@@ -79,8 +81,8 @@ impl Seen {
     }
 }
 
-/// The weights of one Gaussian per channel along an axis, and what its square is multiplied by so that the sum of both Gaussians
-/// over the plane is one.
+/// Returns the weights of one Gaussian per channel along an axis, and the factor on its square with which the sum of
+/// both Gaussians over the plane is one.
 fn sensitivity(height: DVec3, spread: DVec3) -> (Vec<DVec3>, DVec3) {
     let radius = (3.0 * (WIDEST / (2.0 * PI * PI)).sqrt() * PIXELS_PER_DEGREE).ceil() as i32;
     let gaussian = |spread: DVec3| -> Vec<DVec3> {
@@ -95,7 +97,7 @@ fn sensitivity(height: DVec3, spread: DVec3) -> (Vec<DVec3>, DVec3) {
     (gaussian(spread), amplitude(height, spread) / total.sum::<DVec3>())
 }
 
-/// Strength of edges (x) and points (y) of the luminance of opponent colours.
+/// Returns the strength of edges (x) and points (y) of the luminance of opponent colours.
 fn features(opponent: &[DVec3], width: usize) -> Vec<DVec2> {
     let deviation = 0.5 * DETECTOR_WIDTH * PIXELS_PER_DEGREE;
     let radius = (3.0 * deviation).ceil() as i32;
@@ -111,7 +113,7 @@ fn features(opponent: &[DVec3], width: usize) -> Vec<DVec2> {
     across.into_par_iter().zip(down).map(|(x, y)| (x * x + y * y).map(f64::sqrt)).collect()
 }
 
-/// The weights with their positive part scaled to a sum of 1 and their negative part to −1.
+/// Returns the weights with the sum of their positive part scaled to 1 and that of their negative part to −1.
 fn balanced(mut weights: Vec<f64>) -> Vec<f64> {
     let positive: f64 = weights.iter().filter(|w| **w > 0.0).sum();
     let negative: f64 = -weights.iter().filter(|w| **w < 0.0).sum::<f64>();
@@ -119,7 +121,7 @@ fn balanced(mut weights: Vec<f64>) -> Vec<f64> {
     weights
 }
 
-/// Weighs neighbours along rows, then along columns; beyond the border the outermost pixel repeats.
+/// Filters along rows, then along columns; the outermost pixels are repeated beyond the border.
 fn separable<T>(image: &[T], width: usize, across: &[T], down: &[T]) -> Vec<T>
 where
     T: Copy + Default + Send + Sync + Add<Output = T> + Mul<Output = T>,
@@ -131,7 +133,7 @@ where
     (0..image.len()).into_par_iter().map(along_column).collect()
 }
 
-/// The weighted sum of what is `at` the positions about `center`.
+/// Returns the weighted sum of the values `at` the positions about `center`.
 fn weighted<T>(weights: &[T], center: usize, length: usize, at: impl Fn(usize) -> T) -> T
 where
     T: Copy + Default + Add<Output = T> + Mul<Output = T>,
@@ -143,7 +145,7 @@ where
         .fold(T::default(), |sum, (i, &weight)| sum + weight * at((center + i).saturating_sub(radius).min(length - 1)))
 }
 
-/// Linear RGB of an sRGB-encoded colour.
+/// Converts an sRGB-encoded colour to linear RGB.
 fn linear(color: DVec3) -> DVec3 {
     color.map(|v| if v > 0.04045 { ((v + 0.055) / 1.055).powf(2.4) } else { v / 12.92 })
 }
@@ -160,19 +162,19 @@ static TO_XYZ: LazyLock<DMat3> = LazyLock::new(|| {
 });
 static FROM_XYZ: LazyLock<DMat3> = LazyLock::new(|| TO_XYZ.inverse());
 
-/// Linear RGB to YCxCz.
+/// Converts linear RGB to YCxCz.
 fn opponent(color: DVec3) -> DVec3 {
     let DVec3 { x, y, z } = *TO_XYZ * color;
     DVec3::new(116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z))
 }
 
-/// YCxCz to linear RGB.
+/// Converts YCxCz to linear RGB.
 fn from_opponent(color: DVec3) -> DVec3 {
     let y = (color.x + 16.0) / 116.0;
     *FROM_XYZ * DVec3::new(y + color.y / 500.0, y, y - color.z / 200.0)
 }
 
-/// Linear RGB to L\*a\*b\*.
+/// Converts linear RGB to L\*a\*b\*.
 fn lab(color: DVec3) -> DVec3 {
     const DELTA: f64 = 6.0 / 29.0;
     let bent = |v: f64| if v > DELTA.powi(3) { v.cbrt() } else { v / (3.0 * DELTA * DELTA) + 4.0 / 29.0 };
@@ -180,7 +182,7 @@ fn lab(color: DVec3) -> DVec3 {
     DVec3::new(116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z))
 }
 
-/// Colours look stronger where it is light.
+/// Applies the Hunt effect: colours look stronger the lighter they are.
 fn hunt(lab: DVec3) -> DVec3 {
     let strength = 0.01 * lab.x;
     DVec3::new(lab.x, strength * lab.y, strength * lab.z)
@@ -191,12 +193,12 @@ fn hyab(a: DVec3, b: DVec3) -> f64 {
     difference.x.abs() + difference.y.hypot(difference.z)
 }
 
-/// The largest difference of colour, between green and blue, with its exponent.
+/// Returns the largest difference of colour, between green and blue, with its exponent.
 fn largest_distance() -> f64 {
     hyab(hunt(lab(DVec3::Y)), hunt(lab(DVec3::Z))).powf(COLOR_EXPONENT)
 }
 
-/// A difference on a scale of 0 to 1 that leaves little room for the largest ones.
+/// Maps a difference to 0..1, with those above the bend compressed into the range from `BEND_TO` to 1.
 fn bent(difference: f64, largest: f64) -> f64 {
     let bend = BEND_AT * largest;
     if difference < bend {

@@ -1,8 +1,8 @@
-//! How close two pictures are: PSNR, SSIM, MS-SSIM and FLIP; and how close a scene is to a dataset.
+//! Metrics of pictures: PSNR, SSIM, MS-SSIM and FLIP; and their means over the views of a dataset.
 //!
-//! In: two [`Picture`]s of the same size, values 0 to 1 (nothing is clamped here: clamp a rendering with [`Picture::clamped`] first,
-//! as the original evaluation does). Out: one number. Pixels that are not finite make the number not finite too.
-//! [`evaluate()`] does this for every view of a dataset.
+//! In: two [`Picture`]s of the same size, values 0 to 1 (nothing is clamped here: clamp a rendering with
+//! [`Picture::clamped`] first, as the original evaluation does). Out: one number, which is not finite if a pixel is
+//! not. [`evaluate()`] computes them for every view of a dataset.
 
 mod evaluate;
 mod flip;
@@ -33,7 +33,7 @@ pub struct SizeMismatch {
     pub second: UVec2,
 }
 
-/// Passes pictures of one size, with as many pixels as it says.
+/// Checks that both pictures have the same size, at least one pixel, and as many pixels as their size.
 fn check_sizes(a: &Picture, b: &Picture) -> Result<(), SizeMismatch> {
     let count = a.size.x as usize * a.size.y as usize;
     if a.size == b.size && count > 0 && a.pixels.len() == count && b.pixels.len() == count {

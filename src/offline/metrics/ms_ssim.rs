@@ -18,10 +18,10 @@ pub const MS_SSIM_MIN_SIDE: u32 = 176;
 /// Exponents of the scales, finest first.
 const EXPONENTS: [f64; 5] = [0.0448, 0.2856, 0.3001, 0.2363, 0.1333];
 
-/// MS-SSIM, 0 to 1, which identical pictures reach; nothing where a side is shorter than [`MS_SSIM_MIN_SIDE`].
+/// Returns the MS-SSIM, from 0 to 1 for identical pictures; `None` if a side is shorter than [`MS_SSIM_MIN_SIDE`].
 ///
 /// # Errors
-/// [`SizeMismatch`] when the pictures do not have the same size, or are empty.
+/// [`SizeMismatch`] if the pictures do not have the same size, or are empty.
 pub fn ms_ssim(a: &Picture, b: &Picture) -> Result<Option<f64>, SizeMismatch> {
     check_sizes(a, b)?;
     if a.size.min_element() < MS_SSIM_MIN_SIDE {
@@ -35,15 +35,15 @@ pub fn ms_ssim(a: &Picture, b: &Picture) -> Result<Option<f64>, SizeMismatch> {
             (a, b) = (Cow::Owned(halved(&a)), Cow::Owned(halved(&b)));
         }
         let [whole, contrast] = similarity(&a, &b, &window);
-        // The luminance counts at the coarsest scale alone.
+        // The luminance is used at the coarsest scale only.
         let factor = if scale + 1 == EXPONENTS.len() { whole } else { contrast };
-        // What is opposite counts as nothing; a NaN stays one.
+        // A negative factor counts as 0; NaN stays NaN.
         product *= if factor < 0.0 { 0.0 } else { factor.powf(exponent) };
     }
     Ok(Some(product))
 }
 
-/// SSIM and its contrast factor, averaged over channels and all windows that lie inside.
+/// Returns SSIM and its contrast factor, averaged over channels and all windows that lie inside.
 fn similarity(a: &Picture, b: &Picture, window: &[f64; WINDOW]) -> [f64; 2] {
     let (width, height) = (a.size.x as usize, a.size.y as usize);
     let row = |y: usize| {
@@ -59,7 +59,7 @@ fn similarity(a: &Picture, b: &Picture, window: &[f64; WINDOW]) -> [f64; 2] {
     [0, 1].map(|which| rows.iter().map(|row| row[which]).sum::<DVec3>().element_sum() / count)
 }
 
-/// Means of 2 × 2 pixels; an odd last row or column is left out.
+/// Returns the means of 2 × 2 pixels; an odd last row or column is left out.
 fn halved(picture: &Picture) -> Picture {
     let size = picture.size / 2;
     let mean = |i: u32| {

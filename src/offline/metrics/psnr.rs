@@ -1,27 +1,27 @@
 //! Peak signal-to-noise ratio.
 //!
-//! In: two pictures, peak value 1. Out: decibels; infinite where nothing differs.
+//! In: two pictures, peak value 1. Out: decibels; infinite for equal pictures.
 
 use glam::DVec3;
 
 use super::{SizeMismatch, check_sizes};
 use crate::view::Picture;
 
-/// PSNR in dB as the original reports it: `−10 log10(MSE)` per color channel, then the mean of the three.
+/// Returns the PSNR in dB as the original reports it: `−10 log10(MSE)` per color channel, then the mean of the three.
 ///
-/// Infinite as soon as one channel is identical.
+/// Infinite if any channel is identical.
 ///
 /// # Errors
-/// [`SizeMismatch`] when the pictures do not have the same size, or are empty.
+/// [`SizeMismatch`] if the pictures do not have the same size, or are empty.
 pub fn psnr(a: &Picture, b: &Picture) -> Result<f64, SizeMismatch> {
     let error = mean_squared_error(a, b)?;
     Ok(error.to_array().into_iter().map(decibels).sum::<f64>() / 3.0)
 }
 
-/// PSNR in dB of the mean squared error over all channels together. Never above [`psnr`].
+/// Returns the PSNR in dB of the mean squared error over all channels together. Never above [`psnr`].
 ///
 /// # Errors
-/// [`SizeMismatch`] when the pictures do not have the same size, or are empty.
+/// [`SizeMismatch`] if the pictures do not have the same size, or are empty.
 pub fn psnr_pooled(a: &Picture, b: &Picture) -> Result<f64, SizeMismatch> {
     Ok(decibels(mean_squared_error(a, b)?.element_sum() / 3.0))
 }

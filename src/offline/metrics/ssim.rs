@@ -21,10 +21,10 @@ const C2: f64 = 0.03 * 0.03;
 /// Window-weighted means of `a`, `b`, `a²`, `b²`, `ab`, each per channel.
 pub(super) type Moments = [DVec3; 5];
 
-/// SSIM, at most 1, which identical pictures reach.
+/// Returns the SSIM, at most 1 (for identical pictures).
 ///
 /// # Errors
-/// [`SizeMismatch`] when the pictures do not have the same size, or are empty.
+/// [`SizeMismatch`] if the pictures do not have the same size, or are empty.
 pub fn ssim(a: &Picture, b: &Picture) -> Result<f64, SizeMismatch> {
     check_sizes(a, b)?;
     let window = gaussian_window();
@@ -33,7 +33,7 @@ pub fn ssim(a: &Picture, b: &Picture) -> Result<f64, SizeMismatch> {
     Ok(rows.into_iter().sum::<DVec3>().element_sum() / (3.0 * a.pixels.len() as f64))
 }
 
-/// The weights of the window along one axis; they sum to one.
+/// Returns the weights of the window along one axis; they sum to one.
 pub(super) fn gaussian_window() -> [f64; WINDOW] {
     let weights: [f64; WINDOW] = std::array::from_fn(|i| {
         let distance = i as f64 - RADIUS as f64;
@@ -43,20 +43,21 @@ pub(super) fn gaussian_window() -> [f64; WINDOW] {
     weights.map(|weight| weight / sum)
 }
 
-/// The window's weights over positions `0..length`, centred on `center`; what lies beyond counts as zero.
+/// Returns the positions from `0..length` under the window centred on `center`, with their weights; values beyond them
+/// count as zero.
 fn inside(window: &[f64; WINDOW], center: usize, length: usize) -> impl Iterator<Item = (usize, f64)> {
     let taps = window.iter().enumerate();
     taps.filter_map(move |(i, &weight)| Some(((center + i).checked_sub(RADIUS)?, weight)))
         .filter(move |&(position, _)| position < length)
 }
 
-/// SSIM summed over row `y`, per channel.
+/// Returns the SSIM summed over row `y`, per channel.
 fn row_sum(a: &Picture, b: &Picture, y: usize, window: &[f64; WINDOW]) -> DVec3 {
     let columns = column_moments(a, b, y, window);
     (0..columns.len()).map(|x| similarity(&moments_at(&columns, x, window))).sum()
 }
 
-/// The window about row `y`, applied down each column.
+/// Applies the window about row `y` down each column.
 pub(super) fn column_moments(a: &Picture, b: &Picture, y: usize, window: &[f64; WINDOW]) -> Vec<Moments> {
     let (width, height) = (a.size.x as usize, a.size.y as usize);
     let mut columns = vec![Moments::default(); width];
@@ -71,7 +72,7 @@ pub(super) fn column_moments(a: &Picture, b: &Picture, y: usize, window: &[f64; 
     columns
 }
 
-/// The window about column `x`, applied along the row that [`column_moments`] gave.
+/// Applies the window about column `x` along the row that [`column_moments`] returned.
 pub(super) fn moments_at(columns: &[Moments], x: usize, window: &[f64; WINDOW]) -> Moments {
     let mut moments = Moments::default();
     for (column, weight) in inside(window, x, columns.len()) {
@@ -91,7 +92,7 @@ fn similarity(moments: &Moments) -> DVec3 {
     luminance * contrast
 }
 
-/// The two factors of SSIM: of the means, and of contrast and structure together.
+/// Returns the two factors of SSIM: that of the means, and that of contrast and structure together.
 pub(super) fn factors(&[mean_a, mean_b, square_a, square_b, product]: &Moments) -> (DVec3, DVec3) {
     let (mean_aa, mean_bb, mean_ab) = (mean_a * mean_a, mean_b * mean_b, mean_a * mean_b);
     let (variance_a, variance_b, covariance) = (square_a - mean_aa, square_b - mean_bb, product - mean_ab);
@@ -107,7 +108,7 @@ mod tests {
         let window = gaussian_window();
         assert!((window.iter().sum::<f64>() - 1.0).abs() < 1e-15, "sum of {window:?}");
         assert!((0..WINDOW).all(|i| window[i] == window[WINDOW - 1 - i]), "asymmetric: {window:?}");
-        // exp(-1/4.5) / sum, the published value of the window beside its center.
+        // exp(-1/4.5) / sum: the published value of the window next to its center.
         assert!((window[RADIUS + 1] / window[RADIUS] - (-1.0f64 / 4.5).exp()).abs() < 1e-15, "shape of {window:?}");
     }
 

@@ -1,39 +1,42 @@
-//! Codebooks: vector quantization of color, one codebook after another over what the ones before left.
+//! Codebooks: residual vector quantization of color, in which each codebook codes what the previous ones leave.
 //!
-//! In: rows of coefficients and how much each counts. Out: [`Codebooks`] of signed bytes, and a code into each for every row. Seeds
-//! are k-means++, refined by Lloyd's steps on a sample; once every row has its codes, all entries are fitted again to all rows. The
-//! same input gives the same result, whatever the number of threads.
+//! In: rows of coefficients and a weight for each. Out: [`Codebooks`] of signed bytes, and a code into each for every
+//! row. Seeds are k-means++, refined by Lloyd's steps on a sample; once every row has its codes, all entries are fitted
+//! again to all rows. The same input gives the same result, whatever the number of threads.
 
 use ndarray::{Array1, Array2, ArrayView2, Axis, s};
 use rayon::prelude::*;
 
-/// Rows that codebooks are trained on at most.
+/// Most rows that a codebook is trained on.
 const SAMPLE: usize = 24_576;
-/// Lloyd's steps.
+/// Number of Lloyd's steps.
 const STEPS: usize = 8;
-/// Times that all entries are fitted again to what their rows have left. Worth 0.4 to 0.6 dB at no cost in bytes.
+/// Times that all entries are fitted again to the residuals of their rows. Gains 0.4 to 0.6 dB at no cost in bytes.
 const REFITS: usize = 2;
 /// Rows assigned at a time.
 const BLOCK: usize = 512;
-/// Seeds drawn at a time, at most: distances to many are found much faster together.
+/// Most seeds drawn at a time: distances to many are computed much faster together.
 const SEEDS: usize = 64;
 
 /// Codebooks whose entries add up.
 #[derive(Debug, Clone, Default)]
 pub struct Codebooks {
-    /// Each one's entries: rows of signed bytes.
+    /// The entries of each codebook: rows of signed bytes.
     pub entries: Vec<Array2<i8>>,
-    /// What a byte of 127 stands for, for each column of each codebook.
+    /// The value of a byte of 127, for each column of each codebook.
     pub scales: Vec<Array1<f32>>,
-    /// For each codebook the entry of every row of the input.
+    /// For each codebook, the index of the entry of every row of the input.
     pub codes: Vec<Vec<u16>>,
 }
 
 impl Codebooks {
-    /// Trains one codebook after another, of these many entries (at most 65,536 each), over `data`, rows × columns. Rows count by
-    /// `weights`, none of which may be negative.
+    /// Trains one codebook after another over `data`, rows × columns, with these numbers of entries (at most 65,536
+    /// each). `weights` has a weight for each row, none of them negative. Calls `done` after each codebook.
+    ///
+    /// # Panics
+    /// If there are fewer weights than rows.
     pub fn train(mut data: Array2<f32>, weights: &[f32], entries: &[usize], mut done: impl FnMut()) -> Self {
-        // From here on `data` is what the entries chosen so far leave of the rows.
+        // From here on `data` has the residuals of the rows.
         let mut stages: Vec<(Array2<f32>, Vec<u32>)> = Vec::new();
         for (stage, &count) in entries.iter().enumerate() {
             let count = count.min(data.nrows()).clamp(1, 1 << 16);
@@ -69,14 +72,14 @@ impl Codebooks {
     }
 }
 
-/// Takes from every row the entry that its code names.
+/// Subtracts the entry of its code from every row.
 fn subtract(data: &mut Array2<f32>, centers: &Array2<f32>, codes: &[u32]) {
     data.axis_iter_mut(Axis(0)).into_par_iter().zip(codes).for_each(|(mut row, &code)| {
         row -= &centers.row(code as usize);
     });
 }
 
-/// The weighted mean of the rows of each code, zero where there are none that count, and what they weigh together.
+/// Returns the weighted mean of the rows of each code, zero if they have no weight, and the sum of their weights.
 fn means(data: ArrayView2<'_, f32>, weights: &[f32], codes: &[u32], count: usize) -> (Array2<f32>, Vec<f64>) {
     let mut sums = Array2::<f64>::zeros((count, data.ncols()));
     let mut totals = vec![0.0f64; count];
@@ -94,12 +97,12 @@ fn means(data: ArrayView2<'_, f32>, weights: &[f32], codes: &[u32], count: usize
     (sums.mapv(|mean| mean as f32), totals)
 }
 
-/// The nearest center of every row.
+/// Returns the nearest center of every row.
 fn assign(data: ArrayView2<'_, f32>, centers: &Array2<f32>) -> Vec<u32> {
     nearest_centers(data, centers).into_iter().map(|(index, _)| index).collect()
 }
 
-/// The nearest center c of every row x, and `x·c − |c|²/2`.
+/// Returns the nearest center c of every row x, and `x·c − |c|²/2`.
 fn nearest_centers(data: ArrayView2<'_, f32>, centers: &Array2<f32>) -> Vec<(u32, f32)> {
     let half_norms: Vec<f32> = centers.rows().into_iter().map(|center| 0.5 * center.dot(&center)).collect();
     let transposed = centers.t().as_standard_layout().into_owned();
@@ -123,7 +126,7 @@ fn nearest(products: impl Iterator<Item = f32>, half_norms: &[f32]) -> (u32, f32
     (best, most)
 }
 
-/// k-means over a sample of the rows.
+/// Returns centers by k-means over a sample of the rows.
 fn centers(data: &Array2<f32>, weights: &[f32], count: usize, seed: u64) -> Array2<f32> {
     let mut random = Random(seed);
     let (sample, weights) = sample(data, weights, &mut random);
@@ -132,7 +135,7 @@ fn centers(data: &Array2<f32>, weights: &[f32], count: usize, seed: u64) -> Arra
         let codes = assign(sample.view(), &centers);
         let (means, totals) = means(sample.view(), &weights, &codes, count);
         for (index, total) in totals.into_iter().enumerate() {
-            // A center that nothing is near to stays where it is.
+            // A center without rows stays where it is.
             if total > 0.0 {
                 centers.row_mut(index).assign(&means.row(index));
             }
@@ -141,7 +144,7 @@ fn centers(data: &Array2<f32>, weights: &[f32], count: usize, seed: u64) -> Arra
     centers
 }
 
-/// Rows to train on: all of them, or evenly many at random places.
+/// Returns rows to train on with their weights: all, or one at a random place in each of [`SAMPLE`] equal stretches.
 fn sample(data: &Array2<f32>, weights: &[f32], random: &mut Random) -> (Array2<f32>, Vec<f32>) {
     let rows = data.nrows();
     if rows <= SAMPLE {
@@ -156,8 +159,8 @@ fn sample(data: &Array2<f32>, weights: &[f32], random: &mut Random) -> (Array2<f
     (data.select(Axis(0), &chosen), chosen.iter().map(|&row| weights[row]).collect())
 }
 
-/// k-means++: each seed drawn by weight times squared distance to the seeds before it. Where there are many, those of the same
-/// handful do not see each other.
+/// Returns seeds by k-means++: each is drawn by weight times squared distance to the previous seeds. If there are many,
+/// those that are drawn together do not see each other.
 fn seeds(sample: &Array2<f32>, weights: &[f32], count: usize, random: &mut Random) -> Array2<f32> {
     let mut seeds = Array2::zeros((count, sample.ncols()));
     let handful = (count / 32).clamp(1, SEEDS);
@@ -180,7 +183,7 @@ fn seeds(sample: &Array2<f32>, weights: &[f32], count: usize, random: &mut Rando
     seeds
 }
 
-/// A place, drawn by weight; the first where all weights are zero.
+/// Returns an index, drawn by weight; 0 if all weights are zero.
 fn draw(weights: impl Iterator<Item = f32> + Clone, random: &mut Random) -> usize {
     let total: f64 = weights.clone().map(f64::from).sum();
     let mut left = random.unit() * total;

@@ -1,12 +1,12 @@
 //! Compression: from a scene ready to draw to the packed form.
 //!
-//! In: a [`RuntimeScene`] and [`CompressSettings`] (or a [`Quality`] that chooses them). Out: a scene in the packed form, its
-//! Gaussians in Morton order, and a [`CompressReport`]. The original is not touched.
+//! In: a [`RuntimeScene`] and [`CompressSettings`] (or a [`Quality`] that selects them). Out: a scene in the packed
+//! form, its Gaussians in Morton order, and a [`CompressReport`].
 //!
-//! 1. [`CompressSettings`] say how much may be lost.
+//! 1. [`CompressSettings`] specify how much may be lost.
 //! 2. [`order`] sorts the Gaussians, so that neighbors share a box.
 //! 3. [`codebook`] trains the codebooks of color.
-//! 4. [`scene::packed`](crate::scene::packed) makes records of the result.
+//! 4. [`scene::packed`](crate::scene::packed) encodes the result as records.
 
 pub mod codebook;
 pub mod order;
@@ -26,29 +26,29 @@ use ndarray::Array2;
 use order::morton_order;
 use serde::Serialize;
 
-/// What compression did.
+/// Figures of a compression. Default: zeros.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct CompressReport {
-    /// Gaussians.
+    /// Number of Gaussians.
     pub gaussians: usize,
-    /// Bytes of Gaussians and colors in memory, before and after.
+    /// Bytes of Gaussians and colors in memory before compression.
     pub memory_before: usize,
-    /// The same, packed: what the GPU holds.
+    /// The same after compression, which is what the GPU holds.
     pub memory_after: usize,
     /// Entries of each codebook.
     pub codebooks: Vec<u32>,
 }
 
-/// Why a scene is not compressed.
+/// Why a scene cannot be compressed.
 #[derive(Debug, thiserror::Error)]
 pub enum CompressError {
-    /// It is already.
+    /// It is in the packed form already.
     #[error("the scene is packed already: compress the checkpoint or the lossless package it was made from")]
     AlreadyPacked,
-    /// Codebooks cannot go without quantized geometry.
+    /// Codebooks need quantized geometry.
     #[error("codebooks need quantised geometry: choose a quality other than lossless, or no codebooks")]
     CodebooksAlone,
-    /// Too many codebooks, or of no entries, or too many.
+    /// Too many codebooks, or a codebook with no or too many entries.
     #[error("at most {MAX_STAGES} codebooks of 1 to 65536 entries each, not {0:?}")]
     Codebooks(Vec<usize>),
     /// A Gaussian cannot be drawn.
@@ -59,7 +59,10 @@ pub enum CompressError {
 /// Compresses a scene.
 ///
 /// # Errors
-/// When the scene is packed already or the settings do not fit together.
+/// If the scene is packed already or the settings contradict each other.
+///
+/// # Panics
+/// If `settings.weights` has fewer values than the scene has Gaussians.
 pub fn compress(
     scene: RuntimeScene,
     settings: &CompressSettings,
@@ -67,9 +70,12 @@ pub fn compress(
     compress_with(scene, settings, || {})
 }
 
-/// As [`compress`]; `done` is called after each codebook.
+/// As [`compress`]; calls `done` after each codebook.
 ///
 /// # Errors
+/// As [`compress`].
+///
+/// # Panics
 /// As [`compress`].
 pub fn compress_with(
     scene: RuntimeScene,
@@ -105,7 +111,7 @@ pub fn compress_with(
     };
     let packed = PackedScene::encode(&gaussians, bits, colors, base, scene.trained_with.time_span());
     let filter = scene.filter.map(|filter| match filter.kind {
-        // Lifespans are rounded too: what the filter promises must hold for those that are drawn.
+        // Lifespans are rounded too: the filter must be exact for the Gaussians that are drawn.
         FilterKind::Support => {
             let gaussians = (0..packed.len()).map(|index| packed.gaussian(index));
             TemporalFilter::support(gaussians, scene.trained_with.time_interval, filter.segments)
@@ -123,7 +129,7 @@ pub fn compress_with(
     Ok((scene, report))
 }
 
-/// Coefficients as multiples of a step, if it is one.
+/// Rounds coefficients to multiples of `step`, if it is positive.
 fn rounded(mut harmonics: Harmonics, step: f32) -> Harmonics {
     if step > 0.0 {
         harmonics.values.iter_mut().for_each(|value| *value = (*value / step).round() * step);
@@ -131,7 +137,8 @@ fn rounded(mut harmonics: Harmonics, step: f32) -> Harmonics {
     harmonics
 }
 
-/// Colors by codebooks of these many entries, in the order given, and the ends of the range of their first coefficients.
+/// Returns the colors by codebooks of these numbers of entries, in the given order, and the ends of the range of their
+/// first coefficients.
 fn code(
     harmonics: &Harmonics,
     order: &[u32],

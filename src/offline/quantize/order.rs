@@ -4,7 +4,7 @@
 
 use crate::gaussian::Gaussian;
 
-/// Indices of the Gaussians in Morton order of their means; equal codes keep their order.
+/// Returns the indices of the Gaussians in Morton order of their means; equal codes keep their order.
 pub fn morton_order(gaussians: &[Gaussian]) -> Vec<u32> {
     let ends = |axis: usize| {
         gaussians

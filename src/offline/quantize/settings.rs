@@ -1,31 +1,32 @@
-//! How much compression may lose, and by which options.
+//! The options of compression, and the qualities that select them.
 //!
-//! In: a [`Quality`]. Out: the [`CompressSettings`] that it chooses.
+//! In: a [`Quality`]. Out: its [`CompressSettings`].
 //!
-//! A further option touches five files at most: this one, with its value for each quality; `scene/packed/encode.rs`, which obeys it;
-//! `scene/packed/lanes.rs` (or `decode.rs`) and `shaders/shared/packed.wgsl`, if records are read in another way; and
-//! `cli/compress.rs`, with its name on the command line.
+//! A further option touches five files at most: this one, with its value for each quality; `scene/packed/encode.rs`
+//! (geometry) or `mod.rs` beside this file (colors), which applies it; `scene/packed/lanes.rs` (or `decode.rs`) and
+//! `shaders/shared/packed.wgsl`, if records are read in another way; and `cli/compress.rs`, with its name on the
+//! command line.
 
 use crate::scene::packed::encode::Bits;
 use serde::{Deserialize, Serialize};
 
-/// How much may be lost.
+/// How much may be lost. Default: [`Balanced`](Self::Balanced).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Quality {
-    /// The smallest that still looks right.
+    /// The smallest packages without obvious differences.
     Small,
     /// At most 24 bytes per Gaussian and 1 MB of codebooks; 48 dB and more to the original's pictures.
     #[default]
     Balanced,
     /// Color rounded but not coded, geometry with more bits: about 60 dB.
     VisuallyLossless,
-    /// Sliced, in single precision.
+    /// The runtime form, in single precision.
     Lossless,
 }
 
 impl Quality {
-    /// All of them, by name.
+    /// Every quality with its name.
     pub const NAMES: [(&'static str, Self); 4] = [
         ("small", Self::Small),
         ("balanced", Self::Balanced),
@@ -39,11 +40,12 @@ impl Quality {
 pub struct CompressSettings {
     /// Bits of geometry; `None` keeps single precision (and the order of the Gaussians).
     pub geometry: Option<Bits>,
-    /// Entries of each codebook of color, up to four; none keeps every coefficient.
+    /// Number of entries of each codebook of color, at most four; without any, every coefficient is kept.
     pub codebooks: Vec<usize>,
-    /// Whole coefficients are rounded to multiples of this, so that they compress; 0 keeps them as they are.
+    /// Without codebooks, coefficients are rounded to multiples of this, so that they compress; 0 keeps them as they
+    /// are.
     pub color_step: f32,
-    /// How much each Gaussian's color counts, in the order of the scene; by opacity unless given.
+    /// Weight of each Gaussian's color, not negative, in the order of the scene; `None` weighs by opacity.
     #[serde(skip)]
     pub weights: Option<Vec<f32>>,
 }

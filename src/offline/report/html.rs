@@ -12,9 +12,9 @@ use glam::Vec3;
 use image::codecs::png::PngEncoder;
 use image::imageops::{self, FilterType};
 
-/// Pictures are made at most this wide, in pixels.
+/// Largest width of the pictures, pixels.
 const PICTURE_WIDTH: u32 = 480;
-/// What differences are multiplied by to be seen.
+/// Factor on differences, so that they are visible.
 const GAIN: f32 = 5.0;
 
 const STYLE: &str = "\
@@ -37,12 +37,12 @@ i.s0,.bar.s0{background:var(--c0);fill:var(--c0)}i.s1{background:var(--c1)}i.s2{
 i.s4{background:var(--c4)}i.s5{background:var(--c5)}.dot{fill:var(--card);stroke-width:2}\
 .views{display:grid;grid-template-columns:repeat(4,1fr);gap:8px;margin-bottom:12px}figure{margin:0}img{width:100%;display:block}";
 
-/// Text with what means something to HTML replaced.
+/// Escapes the special characters of HTML.
 pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// The whole page.
+/// Returns the whole page.
 pub(super) fn page(report: &BakeReport) -> String {
     let name = escape(&report.package);
     let cards: String = [
@@ -107,9 +107,9 @@ fn in_short(report: &BakeReport) -> String {
     }
     let about = match (&report.evaluation, &report.split) {
         (Some(evaluation), Some(split)) => {
-            format!("ImageMetrics: means over the {} views of the {split} split.", evaluation.after.views.len())
+            format!("Metrics: means over the {} views of the {split} split.", evaluation.after.views.len())
         }
-        _ => "ImageMetrics was not measured: the images of the test split are not there.".to_owned(),
+        _ => "Metrics were not measured: the images of the test split are not there.".to_owned(),
     };
     table(&["", "checkpoint", "package"], rows) + &format!("<p class=\"soft\">{}</p>", escape(&about))
 }
@@ -223,7 +223,7 @@ fn samples(samples: &[Sample]) -> String {
     format!("<section class=\"card wide\"><h2>Views</h2>{views}</section>")
 }
 
-/// Where and how much two pictures of one size differ, multiplied.
+/// Returns the absolute difference of two pictures of one size, times [`GAIN`].
 fn difference(a: &Picture, b: &Picture) -> Picture {
     let pixels = a
         .pixels
@@ -233,7 +233,7 @@ fn difference(a: &Picture, b: &Picture) -> Picture {
     Picture { size: a.size, pixels: pixels.collect() }
 }
 
-/// A picture as the source of an `img`; empty if it cannot be encoded.
+/// Returns a picture as the source of an `img`; empty if it cannot be encoded.
 fn png_data(picture: &Picture) -> String {
     let mut image = picture.to_rgb8();
     if image.width() > PICTURE_WIDTH {

@@ -1,6 +1,6 @@
-//! What a bake did and what it cost, for people and for programs.
+//! The report of a bake, for people and for programs.
 //!
-//! In: facts gathered by the stages of a bake. Out: a [`BakeReport`], as JSON and as one HTML page that needs nothing else.
+//! In: the results of the stages of a bake. Out: a [`BakeReport`], as JSON and as one self-contained HTML page.
 
 mod html;
 mod plot;
@@ -15,47 +15,48 @@ use crate::view::Picture;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// Everything a bake has to say.
+/// The report of a bake.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BakeReport {
-    /// What made it: name and version.
+    /// Name and version of the program that wrote it.
     pub generator: String,
-    /// The checkpoint.
+    /// Path of the checkpoint.
     pub checkpoint: String,
-    /// The folder of the training views.
+    /// Path of the folder of the training views.
     pub data: String,
-    /// The package.
+    /// Path of the package.
     pub package: String,
     /// Number of Gaussians.
     pub gaussians: Change<usize>,
     /// Bytes of the checkpoint and of the package.
     pub bytes: Change<u64>,
-    /// What was chosen, by the user or by the bake, in words: name and value.
+    /// The choices of the user and of the bake, as names and values.
     pub choices: Vec<(String, String)>,
-    /// What each stage took.
+    /// Durations of the stages, in order; the stage that writes the report is not among them.
     pub stages: Vec<StageTime>,
     /// Bytes of the package by section.
     pub sections: Vec<SectionSize>,
-    /// How the temporal variances are distributed.
+    /// Distribution of the temporal variances.
     pub variances: VarianceHistogram,
     /// The times of `activity` and `filter_share`.
     pub times: Vec<f32>,
-    /// Which Gaussians are active when.
+    /// Active Gaussians over time.
     pub activity: Change<Activity>,
-    /// Share of the kept Gaussians that the filter lets through, at each time.
+    /// Share of the kept Gaussians that the filter leaves active, at each time; `None` without a filter.
     pub filter_share: Option<Vec<f64>>,
     /// The counts that were tried on held-out training views.
     pub trials: Vec<Tried>,
-    /// The split that the evaluation is about; `None` where its images are not there.
+    /// Name of the evaluated split; `None` if its images are missing.
     pub split: Option<String>,
-    /// The test views, drawn from the checkpoint and from the package.
+    /// Metrics over the views of that split, drawn from the checkpoint and from the package; `None` if their images are
+    /// missing.
     pub evaluation: Option<Change<Evaluation>>,
-    /// A few of those views.
+    /// A few of those views with their pictures. Not part of the JSON.
     #[serde(skip)]
     pub samples: Vec<Sample>,
 }
 
-/// The same before and after the bake.
+/// A value before and after the bake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Change<T> {
     /// Of the checkpoint.
@@ -64,25 +65,25 @@ pub struct Change<T> {
     pub after: T,
 }
 
-/// What a stage took.
+/// The duration of a stage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StageTime {
     /// Its name.
     pub name: String,
     /// Seconds.
     pub seconds: f64,
-    /// Whether the result of an earlier bake was taken.
+    /// Whether the result of an earlier bake was used.
     pub skipped: bool,
 }
 
-/// All sections of one name.
+/// The size of all sections of one name.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SectionSize {
     /// Their name.
     pub name: String,
     /// Bytes in the file.
     pub bytes: u64,
-    /// Bytes when unpacked.
+    /// Bytes before compression.
     pub unpacked: u64,
 }
 
@@ -99,7 +100,7 @@ pub struct Tried {
     pub psnr: f64,
 }
 
-/// One view as it was seen and as it is drawn before and after.
+/// One view: its image, and its pictures before and after the bake.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sample {
     /// Name of the view, with its time.
@@ -113,7 +114,7 @@ pub struct Sample {
 }
 
 impl SectionSize {
-    /// Adds up sections of the same name, largest first.
+    /// Returns the sizes of sections, added up by name, largest first.
     pub fn by_name(sections: &[Section]) -> Vec<Self> {
         let mut sizes: Vec<Self> = Vec::new();
         for section in sections {
@@ -129,15 +130,15 @@ impl SectionSize {
 }
 
 impl BakeReport {
-    /// The JSON document, without the samples.
+    /// Returns the JSON document, without the samples. Numbers that are infinite or NaN become null.
     ///
     /// # Errors
-    /// None that numbers and names could cause: what is infinite or NaN becomes null.
+    /// Those of `serde_json`; the contents of a report cause none.
     pub fn json(&self) -> Result<Value, serde_json::Error> {
         serde_json::to_value(self)
     }
 
-    /// The HTML page.
+    /// Returns the HTML page.
     pub fn html(&self) -> String {
         html::page(self)
     }

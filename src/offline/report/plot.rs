@@ -1,7 +1,7 @@
 //! Plots as inline SVG.
 //!
-//! In: numbers with names. Out: SVG text without any style of its own: classes `s0`, `s1`, … colour the series, `axis`, `grid` and
-//! `text` the rest, so that the page decides how they look.
+//! In: numbers with names. Out: SVG text without any style: classes `s0`, `s1`, … colour the series, `axis`, `grid` and
+//! `text` the rest, so that the style of the page applies.
 
 use std::fmt::Write;
 
@@ -35,7 +35,7 @@ pub struct Axis {
     pub label: String,
     /// Whether it is logarithmic; only values above zero are drawn then.
     pub log: bool,
-    /// The range shown; else that of the values.
+    /// The range shown; `None` shows that of the values.
     pub range: Option<[f64; 2]>,
 }
 
@@ -46,17 +46,17 @@ pub struct Series {
     pub name: String,
     /// Its points; those that are not finite interrupt it.
     pub points: Vec<[f64; 2]>,
-    /// Whether every point has a dot.
+    /// Whether a dot is drawn at every point.
     pub dots: bool,
 }
 
 impl Axis {
-    /// A linear axis over the values.
+    /// Returns a linear axis over the range of the values.
     pub fn new(label: &str) -> Self {
         Self { label: label.to_owned(), log: false, range: None }
     }
 
-    /// The range of these values (of their logarithms, for a logarithmic axis), never empty.
+    /// Returns the range of these values (of their logarithms, for a logarithmic axis), never empty.
     fn limits(&self, values: impl Iterator<Item = f64>) -> [f64; 2] {
         let [low, high] = match self.range {
             Some(range) => range.map(|v| self.place(v)),
@@ -77,7 +77,7 @@ impl Axis {
         if self.log { value.log10() } else { value }
     }
 
-    /// Places of the ticks and what they say.
+    /// Returns the positions of the ticks and their labels.
     fn ticks(&self, [low, high]: [f64; 2]) -> Vec<(f64, String)> {
         if self.log && high - low >= 1.0 {
             let step = ((high - low) / 8.0).ceil().max(1.0) as i32;
@@ -94,14 +94,14 @@ impl Axis {
     }
 }
 
-/// The step of 1, 2 or 5 times a power of ten at or above `least`.
+/// Returns the smallest step at or above `least` that is 1, 2 or 5 times a power of ten.
 fn nice_step(least: f64) -> f64 {
     let power = 10f64.powf(least.log10().floor());
     [1.0, 2.0, 5.0, 10.0].map(|factor| factor * power).into_iter().find(|s| *s >= least * (1.0 - 1e-9)).unwrap_or(least)
 }
 
 impl Chart {
-    /// The plot.
+    /// Returns the plot as SVG text.
     pub fn svg(&self) -> String {
         let values = |axis: usize| self.series.iter().flat_map(move |s| s.points.iter().map(move |p| p[axis]));
         let (xs, ys) = (self.x.limits(values(0)), self.y.limits(values(1)));
@@ -137,7 +137,7 @@ impl Chart {
         svg + "</svg>"
     }
 
-    /// The names of the lines, coloured as they are.
+    /// Returns the legend as HTML: the names of the lines in their colours.
     pub fn legend(&self) -> String {
         let entry = |(index, series): (usize, &Series)| {
             format!("<span class=\"key\"><i class=\"s{index}\"></i>{}</span>", escape(&series.name))
@@ -164,7 +164,7 @@ impl Series {
     }
 }
 
-/// Horizontal bars: name, value, and what stands beside it.
+/// Returns horizontal bars as SVG text. Each row has a name, a value and the label beside the bar.
 pub fn bars(rows: &[(String, f64, String)]) -> String {
     let height = BAR * rows.len().max(1) as f64;
     let most = rows.iter().map(|row| row.1).fold(f64::MIN_POSITIVE, f64::max);

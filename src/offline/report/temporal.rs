@@ -1,7 +1,7 @@
-//! How Gaussians share the time: the three plots of the paper's Figure 2.
+//! Activity of Gaussians over time: the data of the three plots in the paper's Figure 2.
 //!
-//! In: runtime Gaussians before and after. Out: the distribution of their temporal variances, the share that is active at each time,
-//! and how far that set agrees with the first one.
+//! In: runtime Gaussians before and after. Out: the distribution of their temporal variances, the share that is active
+//! at each time, and the overlap of each active set with the first one.
 
 use crate::gaussian::{Gaussian, MARGINAL_CUTOFF};
 use crate::scene::TemporalFilter;
@@ -22,7 +22,7 @@ pub struct VarianceHistogram {
 }
 
 impl VarianceHistogram {
-    /// Counts. Gaussians that are always there have no finite variance and are in no bin.
+    /// Computes the histogram. Gaussians that are always active have no finite variance and are in no bin.
     pub fn of(before: &[Gaussian], after: &[Gaussian]) -> Self {
         let variance = |g: &Gaussian| f64::from(g.sigma_t).powi(2).log10();
         let all = before.iter().chain(after).map(variance).filter(|v| v.is_finite());
@@ -45,7 +45,7 @@ impl VarianceHistogram {
     }
 }
 
-/// Which share of the Gaussians is active when, and how far the sets agree.
+/// The active Gaussians over time: their share, and the overlap of the active sets.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Activity {
     /// Share of the Gaussians whose marginal exceeds the cut-off, at each time.
@@ -55,7 +55,7 @@ pub struct Activity {
 }
 
 impl Activity {
-    /// Looks at every time.
+    /// Computes share and overlap at each of `times`.
     pub fn of(gaussians: &[Gaussian], times: &[f32]) -> Self {
         let active = |time: f32| gaussians.iter().map(move |g| g.marginal(time) > MARGINAL_CUTOFF);
         let first: Vec<bool> = times.first().map(|&time| active(time).collect()).unwrap_or_default();
@@ -74,7 +74,10 @@ impl Activity {
     }
 }
 
-/// Share of the Gaussians that a filter lets through, at each time.
+/// Returns the share of the Gaussians that a filter leaves active, at each time.
+///
+/// # Panics
+/// If the filter has no segments.
 pub fn filter_shares(filter: &TemporalFilter, interval: [f32; 2], times: &[f32]) -> Vec<f64> {
     let share = |segment: u32| {
         let active = (0..filter.count).filter(|&index| filter.is_active(segment, index)).count();
@@ -84,7 +87,7 @@ pub fn filter_shares(filter: &TemporalFilter, interval: [f32; 2], times: &[f32])
     times.iter().map(|&time| shares[filter.segment_of(time, interval) as usize]).collect()
 }
 
-/// Times at even spacing, both ends of the interval included.
+/// Returns `count` evenly spaced times, both ends of the interval included.
 pub fn even_times(interval: [f32; 2], count: usize) -> Vec<f32> {
     let step = (interval[1] - interval[0]) / (count.max(2) - 1) as f32;
     (0..count).map(|i| interval[0] + step * i as f32).collect()

@@ -20,7 +20,7 @@ pub fn write_scores(path: &Path, scores: &[f32]) -> Result<(), CodecError> {
 /// Reads the scores of `count` Gaussians, to prune by.
 ///
 /// # Errors
-/// A file of another length, or with a value that is not finite.
+/// A file that cannot be read, has another length, or has a value that is not finite.
 pub fn read_scores(path: &Path, count: usize) -> Result<Vec<f32>, OfflineError> {
     let bytes = fs::read(path).map_err(|error| OfflineError::at(path, error))?;
     if bytes.len() != count * 4 {
@@ -41,7 +41,7 @@ pub fn read_scores(path: &Path, count: usize) -> Result<Vec<f32>, OfflineError> 
 /// Reads the scores of `count` Gaussians, to weigh their colors by.
 ///
 /// # Errors
-/// A file of another length, or with a value that is negative or not finite.
+/// A file that cannot be read, has another length, or has a value that is negative or not finite.
 pub fn read_weights(path: &Path, count: usize) -> Result<Vec<f32>, OfflineError> {
     let bytes = fs::read(path).map_err(|error| OfflineError::at(path, error))?;
     let weights = floats(&bytes);

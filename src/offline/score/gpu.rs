@@ -1,7 +1,7 @@
 //! Scoring views on the GPU, with the renderer's own passes.
 //!
-//! In: a finished frame of a [`Headless`] renderer. Out: what each Gaussian contributed to it ([`ViewScore`]), summed without float
-//! atomics: the same on every run.
+//! In: a finished frame of a [`Headless`] renderer. Out: the contribution of each Gaussian to it ([`ViewScore`]),
+//! summed without float atomics, so that every run gives the same result.
 
 use super::{ScoreEngine, ScoreError, ViewScore, Want};
 use crate::renderer::bind::{Bind, group_layout, pipeline};
@@ -34,7 +34,7 @@ impl Scorer {
     /// Compiles the pass.
     ///
     /// # Errors
-    /// When the device lacks a limit that it needs.
+    /// If a limit of the device is too low.
     pub fn new(headless: &Headless, checks: ShaderChecks) -> Result<Self, GpuError> {
         let device = &headless.context().device;
         let limits = device.limits();
@@ -70,7 +70,7 @@ impl Scorer {
     /// Draws the view and scores it.
     ///
     /// # Errors
-    /// When the picture or the pairs do not fit the device, or it is lost.
+    /// If the picture or the pairs do not fit the device, or it is lost.
     pub fn score(
         &mut self,
         headless: &mut Headless,
@@ -120,7 +120,7 @@ impl Scorer {
         Ok(ViewScore { contribution: column(0), energy: column(1), removal: column(2) })
     }
 
-    /// Makes the buffers of that many slots and pairs.
+    /// Creates the buffers for these numbers of slots and pairs.
     fn make(&self, allocator: Allocator<'_>, slots: u32, pairs: u32) -> Result<Buffers, GpuError> {
         let limit = binding_limit(&allocator.device.limits());
         let needed = u64::from(pairs) * 16;
@@ -138,7 +138,7 @@ impl Scorer {
     }
 }
 
-/// A scene on the GPU, ready to be scored: takes the place of the CPU reference.
+/// A scene on the GPU, prepared for scoring. Its CPU reference is [`CpuEngine`](super::CpuEngine).
 #[derive(Debug)]
 pub struct GpuEngine<'a> {
     headless: &'a mut Headless,
@@ -151,7 +151,7 @@ impl<'a> GpuEngine<'a> {
     /// Uploads the scene and compiles the pass.
     ///
     /// # Errors
-    /// When either does not fit the device.
+    /// If the scene or the pass does not fit the device.
     pub fn new(
         headless: &'a mut Headless,
         scene: &RuntimeScene,
@@ -165,7 +165,7 @@ impl<'a> GpuEngine<'a> {
 }
 
 impl ScoreEngine for GpuEngine<'_> {
-    /// Everything is found out at once; `want` changes nothing.
+    /// Computes all sums in any case: `want` has no effect.
     fn score(&mut self, view: &View, _want: Want) -> Result<ViewScore, ScoreError> {
         self.scorer
             .score(self.headless, &self.capture, view, self.background)

@@ -1,4 +1,4 @@
-//! Scores: what each Gaussian is worth, over all training views.
+//! Scores: the importance of each Gaussian for the training views.
 //!
 //! In: a [`ScoreEngine`], the [`Traits`] of the Gaussians, the views. Out: [`Scores`], every [`Variant`] from a single
 //! pass over the views, summed in double precision.
@@ -22,9 +22,9 @@ use rayon::prelude::*;
 use std::error::Error;
 use variant::Variant;
 
-/// Something that scores one view of a scene: the CPU reference or the GPU.
+/// Scores views of a scene: the CPU reference or the GPU.
 pub trait ScoreEngine {
-    /// Scores one view. Vectors are indexed as the scene.
+    /// Scores one view. The vectors of the result are indexed as the scene.
     ///
     /// # Errors
     /// [`ScoreError::Engine`].
@@ -34,9 +34,9 @@ pub trait ScoreEngine {
 /// The CPU reference.
 #[derive(Debug)]
 pub struct CpuEngine<'a> {
-    /// What is scored.
+    /// The scene to score.
     pub scene: &'a RuntimeScene,
-    /// What stands behind it.
+    /// The background behind it.
     pub background: Background,
 }
 
@@ -52,7 +52,7 @@ pub enum ScoreError {
     /// No view was given.
     #[error("there are no training views to score with: pass a dataset whose transforms_train.json lists some")]
     NoViews,
-    /// Views and scene have nothing to do with one another.
+    /// No Gaussian contributes to any view: the views are not of this scene.
     #[error(
         "no Gaussian contributes to any training view: does this data belong to the checkpoint? (its cameras look elsewhere, or its \
          times lie outside the time interval)"
@@ -65,7 +65,7 @@ pub enum ScoreError {
         Variant::ALL.into_iter().filter(|v| !v.needs_volume()).map(Variant::name).collect::<Vec<_>>().join(", ")
     )]
     NoVolume {
-        /// What was asked for.
+        /// The requested variant.
         variant: Variant,
     },
     /// The engine failed.
@@ -73,13 +73,13 @@ pub enum ScoreError {
     Engine(#[source] Box<dyn Error + Send + Sync>),
 }
 
-/// Readings of the paper that it leaves open.
+/// Parameters that the paper leaves open.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct ScoreSettings {
-    /// Power of the volume in `γ = (V / V_ref)^power`; 0 leaves the volume out.
+    /// Power of the volume in `γ = (V / V_ref)^power`; 0 leaves the volume out. Default: 0.1.
     pub volume_power: f64,
-    /// `V_ref` is the volume at this share of all volumes sorted from the largest down, 0 to 1.
+    /// `V_ref` is the volume at this share of all volumes sorted from the largest down, 0 to 1. Default: 0.9.
     pub volume_rank: f64,
 }
 
@@ -89,25 +89,26 @@ impl Default for ScoreSettings {
     }
 }
 
-/// Largest variance that counts, timestamp units squared.
+/// Upper limit of the variance, timestamp units squared.
 const LONGEST: f64 = 1e24;
 
-/// What scores need to know of the Gaussians beside their contributions.
+/// Properties of the Gaussians that scores depend on beside their contributions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Traits {
-    /// Temporal mean and variance of each, timestamp units.
+    /// Temporal mean (timestamp units) and variance (timestamp units squared) of each.
     moments: Vec<[f64; 2]>,
-    /// Logarithm of the product of the activated scales; nothing for the runtime form.
+    /// Logarithm of the product of the activated scales; `None` unless the scene is in the trained form.
     log_volume: Option<Vec<f64>>,
 }
 
 impl Traits {
-    /// Reads them off a scene of either form.
+    /// Reads them from a scene of any form.
     ///
     /// # Errors
     /// The first Gaussian that cannot be drawn.
     pub fn of(scene: &GaussianScene) -> Result<Self, InvalidGaussian> {
-        // Where nothing ever fades, the variance is the same for all and any number will do that stays finite in the sums.
+        // If no Gaussian ever fades, all have the same variance, and any number is right for which the sums stay
+        // finite.
         let moments = sliced(scene)?
             .iter()
             .map(|gaussian| [f64::from(gaussian.mean_t), f64::from(gaussian.sigma_t).powi(2).min(LONGEST)])
@@ -119,7 +120,7 @@ impl Traits {
         Ok(Self { moments, log_volume })
     }
 
-    /// γ of each Gaussian, or nothing where the volume is not known.
+    /// Returns γ of each Gaussian; `None` if the volume is unknown.
     fn volume_factors(&self, settings: &ScoreSettings) -> Option<Vec<f64>> {
         let volumes = self.log_volume.as_ref()?;
         let mut sorted = volumes.clone();
@@ -145,7 +146,7 @@ fn log_volumes(parameters: &Parameters) -> Vec<f64> {
 ///
 /// ```text
 /// change(t)  = 1 / (½ tanh |p''(t)| + ½)      p'' = ((t − μ_t)²/v² − 1/v) p        in (1, 2]: 2 where opacity does not change
-/// γ          = (V / V_ref)^0.1                V: product of the activated scales
+/// γ          = (V / V_ref)^volume_power       V: product of the activated scales
 ///
 /// spatial    = Σ_t C_t                        norm2      = sqrt Σ_t C_t²                    peak      = max_t C_t
 /// full       = Σ_t change γ C_t               full-norm2 = sqrt Σ_t (change γ C_t)²         full-peak = max_t change γ C_t
@@ -161,10 +162,10 @@ pub struct Scores {
 }
 
 impl Scores {
-    /// Goes over the views once, those of one time together. Advances the caller's task once for each.
+    /// Scores every view once, those of one time together. Advances the caller's task once for each view.
     ///
     /// # Errors
-    /// No views, nothing in any of them, a failure of the engine.
+    /// No views, views that show nothing of the scene, a failure of the engine.
     pub fn accumulate(
         engine: &mut dyn ScoreEngine,
         traits: &Traits,
@@ -202,10 +203,10 @@ impl Scores {
         Ok(Self { sums, has_volume: factors.is_some() })
     }
 
-    /// One score, in the order of the scene.
+    /// Returns one score of each Gaussian, in the order of the scene.
     ///
     /// # Errors
-    /// [`ScoreError::NoVolume`] for one that needs the volume, of a scene in the runtime form.
+    /// [`ScoreError::NoVolume`] for a score that needs the volume, unless the scene was in the trained form.
     pub fn of(&self, variant: Variant) -> Result<Vec<f32>, ScoreError> {
         if variant.needs_volume() && !self.has_volume {
             return Err(ScoreError::NoVolume { variant });
@@ -213,12 +214,12 @@ impl Scores {
         Ok(self.sums.iter().map(|sum| sum.value(variant) as f32).collect())
     }
 
-    /// Whether the volume of the Gaussians is known, which some variants need.
+    /// Returns whether the volume of the Gaussians is known, which some variants need.
     pub fn has_volume(&self) -> bool {
         self.has_volume
     }
 
-    /// How many Gaussians contribute to any view at all.
+    /// Returns how many Gaussians contribute to at least one view.
     pub fn contributing(&self) -> usize {
         self.sums.iter().filter(|sum| sum.spatial > 0.0).count()
     }
@@ -230,7 +231,7 @@ fn add(sums: &mut [f64], values: &[f32]) {
     }
 }
 
-/// What is summed for each Gaussian.
+/// The sums of one Gaussian.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     spatial: f64,
@@ -247,7 +248,7 @@ struct Sums {
 }
 
 impl Sums {
-    /// Adds the views of one time: how many, and what the Gaussian contributes to them together.
+    /// Adds the views of one time: their number, and the sum of the contributions of the Gaussian to them.
     fn add_moment(&mut self, time: f64, views: f64, [mean, variance]: [f64; 2], volume: f64, contribution: f64) {
         let distance = time - mean;
         let marginal = (-0.5 * distance * distance / variance).exp();

@@ -1,8 +1,8 @@
-//! `score`: what each Gaussian does to a picture; CPU reference of `shaders/score.wgsl`.
+//! `score`: the contribution of each Gaussian to a picture; CPU reference of `shaders/score.wgsl`.
 //!
-//! In: a scene, a view, the background. Out: [`ViewScore`], sums over the picture's pixels for each Gaussian. With `c = α T` where a
-//! Gaussian was blended into a pixel (after the tests of [`blend`](crate::reference::blend())), these are Σ c, Σ c², and what the
-//! squared picture would change by if that Gaussian alone were gone.
+//! In: a scene, a view, the background. Out: [`ViewScore`], sums over the picture's pixels for each Gaussian. With `c =
+//! α T` where a Gaussian was blended into a pixel (after the tests of [`blend`](crate::reference::blend())), these are
+//! Σ c, Σ c², and the squared change of the picture if that Gaussian alone were removed.
 
 use crate::gaussian::alpha::{BlendStep, blend_step, reach_squared};
 use crate::gaussian::overlap::tile_at;
@@ -13,7 +13,7 @@ use glam::{UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// How much to find out about a view.
+/// Which sums to compute for a view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Want {
     /// `contribution` and `energy`: one pass front to back. `removal` stays empty.
@@ -22,15 +22,17 @@ pub enum Want {
     Removal,
 }
 
-/// What every Gaussian of a scene does to one picture. Indexed as the scene; 0 for whatever is not blended anywhere.
+/// The contributions of every Gaussian of a scene to one picture. Indexed as the scene; 0 for Gaussians that are not
+/// blended. Default: empty.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ViewScore {
     /// Σ c over pixels. Above 0 exactly if the Gaussian was blended into some pixel.
     pub contribution: Vec<f32>,
     /// Σ c² over pixels.
     pub energy: Vec<f32>,
-    /// Σ (c (colour − B))² over pixels and channels, B the colour behind the Gaussian at that pixel, background included: the squared
-    /// change of the picture if it were gone. Exact wherever the pixel does not stop early. Empty unless wanted.
+    /// Σ (c (colour − B))² over pixels and channels, B the colour behind the Gaussian at that pixel, background
+    /// included: the squared change of the picture if it were removed. Exact wherever the pixel does not stop early.
+    /// Empty with [`Want::Contribution`].
     pub removal: Vec<f32>,
 }
 
@@ -81,7 +83,7 @@ impl Slot {
     }
 }
 
-/// One slot for each pair of the tile.
+/// Returns one slot for each pair of the tile.
 fn score_tile(
     tile: Tile,
     splats: &[Splat],
@@ -108,13 +110,13 @@ fn score_tile(
 const SIDE: usize = TILE_SIZE as usize;
 const PIXELS: usize = SIDE * SIDE;
 
-/// The pixels of a tile on their way from front to back.
+/// The pixels of a tile while splats are blended front to back.
 #[derive(Clone)]
 struct Tile {
     origin: UVec2,
     width: usize,
     height: usize,
-    /// Transmittance; with the sign turned where the pixel has stopped.
+    /// Transmittance; negated once the pixel has stopped.
     transmittance: [f32; PIXELS],
     color: [Vec3; PIXELS],
     /// Pixels of each row that have not stopped.
@@ -128,7 +130,7 @@ struct Blended {
     weight: f32,
     /// Transmittance after it.
     transmittance: f32,
-    /// Colour of the pixel after it, without what is behind.
+    /// Colour of the pixel after it, without the background.
     color: Vec3,
 }
 
@@ -146,7 +148,8 @@ impl Tile {
         }
     }
 
-    /// Blends the splats of the tile in order, each into all pixels that it reaches; `each` sees the number of its pair.
+    /// Blends the splats of the tile in order, each into all pixels that it reaches. Calls `each` with the index of the
+    /// pair.
     fn blend(mut self, splats: &[Splat], pairs: &[Pair], mut each: impl FnMut(usize, &Splat, &Blended)) -> Self {
         for (number, pair) in pairs.iter().enumerate() {
             if self.live.iter().all(|&live| live == 0) {
@@ -187,7 +190,7 @@ impl Tile {
         }
     }
 
-    /// The final colours, over what stands behind.
+    /// Returns the final colours, composited over `behind`.
     fn over(self, behind: &impl Fn(u32, u32) -> Vec3) -> [Vec3; PIXELS] {
         let mut color = self.color;
         for row in 0..self.height {
@@ -201,7 +204,8 @@ impl Tile {
     }
 }
 
-/// Where the alpha of a splat can reach 1/255: the inside of an ellipse. What lies outside is skipped; what lies inside is tested.
+/// The region where the alpha of a splat can reach 1/255: the inside of an ellipse. Pixels outside are skipped, pixels
+/// inside are tested.
 struct Reach {
     center: f64,
     conic: [f64; 3],
@@ -218,13 +222,13 @@ impl Reach {
         Self {
             center: f64::from(splat.center.x),
             conic,
-            // With room for rounding.
+            // With a margin for rounding.
             energy: f64::from(reach_squared(splat.opacity)) + 0.012,
             bounded: xx > 0.0 && yy > 0.0 && xx * yy > xy * xy,
         }
     }
 
-    /// The columns of a row at height `dy` below the centre, of a tile that begins at pixel `first`.
+    /// Returns the columns of a row at height `dy` below the centre, of a tile that begins at pixel `first`.
     fn columns(&self, dy: f32, first: u32, width: usize) -> Range<usize> {
         if !self.bounded {
             return 0..width;

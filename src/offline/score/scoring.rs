@@ -10,14 +10,14 @@ use crate::offline::engine::Engine;
 use crate::offline::splits::share;
 use crate::offline::{OfflineError, Progress, Subject};
 
-/// From which views scores come, and how.
+/// Settings of scoring.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScoringSettings {
-    /// Score with an even share of this many views; with all if `None`.
+    /// Number of views to score with, an even share of all. Default: `None`, all of them.
     pub views: Option<usize>,
-    /// Views that are held out of scoring where results are compared; at most a quarter of all.
+    /// Number of views held out from scoring if results are compared; at most a quarter of all. Default: 24.
     pub held_out: usize,
-    /// How contributions become scores.
+    /// Parameters of the scores.
     pub score: ScoreSettings,
 }
 
@@ -28,7 +28,7 @@ impl Default for ScoringSettings {
 }
 
 impl ScoringSettings {
-    /// The views to score with, and those that are held out of scoring if `compared`.
+    /// Returns the views to score with, and those held out from scoring: none unless `compared`.
     pub fn split(&self, views: Vec<TrainingView>, compared: bool) -> (Vec<TrainingView>, Vec<TrainingView>) {
         let (scored, held_out) = if compared { hold_out(&views, self.held_out) } else { (views, Vec::new()) };
         (share(scored, self.views), held_out)

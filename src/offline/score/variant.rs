@@ -1,4 +1,4 @@
-//! The scores that can be asked for, by name.
+//! The variants of scores, by name.
 //!
 //! In: a name. Out: a [`Variant`]. [`Scores`](super::Scores) defines each of them.
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// A way to judge what a Gaussian is worth. Names are in kebab-case.
+/// A definition of a score. Names are in kebab-case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Variant {
@@ -28,9 +28,9 @@ pub enum Variant {
     FullNorm2,
     /// `peak` with the paper's factors.
     FullPeak,
-    /// `√Σ c²`: what a squared error would feel.
+    /// `√Σ c²`: the influence on a squared error.
     Energy,
-    /// Root of the squared change of all pictures if this Gaussian alone were gone.
+    /// Root of the squared change of all pictures if this Gaussian alone were removed.
     Removal,
     /// Geometric mean of `energy` and `removal`.
     EnergyRemoval,
@@ -53,10 +53,10 @@ impl Variant {
         Self::EnergyRemoval,
     ];
 
-    /// Those that are worth trying: ours, and the paper's.
+    /// The variants that [`ScoreChoice::Auto`](crate::offline::search::ScoreChoice::Auto) tries: ours and the paper's.
     pub const AUTO: [Self; 4] = [Self::EnergyRemoval, Self::Energy, Self::Removal, Self::Full];
 
-    /// Its name.
+    /// Returns its name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Spatial => "spatial",
@@ -74,7 +74,7 @@ impl Variant {
         }
     }
 
-    /// Whether the volume of the Gaussians is part of it, which only the trained form has.
+    /// Returns whether it needs the volume of the Gaussians, which only the trained form has.
     pub fn needs_volume(self) -> bool {
         matches!(
             self,
@@ -89,11 +89,11 @@ impl fmt::Display for Variant {
     }
 }
 
-/// A name that no score has.
+/// An unknown name of a score.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{name}` is no score; there are: {}", Variant::ALL.map(Variant::name).join(", "))]
 pub struct UnknownVariant {
-    /// What was asked for.
+    /// The name.
     pub name: String,
 }
 

@@ -82,7 +82,7 @@ impl AssetLoader for CheckpointLoader {
     }
 }
 
-/// The text of `cfg_args` in the folder of a checkpoint. It is optional: one that cannot be read counts as absent.
+/// Returns the text of `cfg_args` in the folder of a checkpoint; `None` if there is none, or it cannot be read.
 async fn cfg_args_beside(context: &mut LoadContext<'_>) -> Option<String> {
     let checkpoint = context.path();
     let beside = AssetPath::from(checkpoint.path().with_file_name("cfg_args"));
@@ -91,7 +91,7 @@ async fn cfg_args_beside(context: &mut LoadContext<'_>) -> Option<String> {
     Some(String::from_utf8_lossy(&text).into_owned())
 }
 
-/// The whole file: both formats are read out of order.
+/// Reads the whole file, because both formats are read out of order.
 async fn bytes(reader: &mut dyn Reader) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     reader.read_to_end(&mut bytes).await?;

@@ -61,7 +61,7 @@ pub struct CaptureReady {
 pub struct CaptureFailed {
     /// The entity with the capture.
     pub entity: Entity,
-    /// The file, its fault and, where there is one, the remedy.
+    /// The file, its fault and, if there is one, the remedy.
     pub error: String,
 }
 

@@ -13,7 +13,8 @@ use bevy::asset::{AssetPath, AsyncWriteExt};
 use bevy::reflect::TypePath;
 use serde::{Deserialize, Serialize};
 
-/// Saves captures as packages, `.gs4d`, without loss. Meanwhile the scene is in memory twice. Errors: [`CaptureSaveError`].
+/// Saves captures as packages, `.gs4d`, without loss. While one is saved, its scene is in memory twice. Errors:
+/// [`CaptureSaveError`].
 ///
 /// # Examples
 ///

@@ -32,8 +32,8 @@ pub enum CaptureState {
     Loading,
     /// Loaded and drawn.
     Ready,
-    /// Could not be loaded or uploaded, for this reason: file, fault and, where there is one, remedy. `AssetServer::reload`, or a change
-    /// of a file that Bevy watches, loads it again.
+    /// Could not be loaded or uploaded, for this reason: file, fault and, if there is one, remedy.
+    /// `AssetServer::reload`, or a change of a file that Bevy watches, loads it again.
     Failed(String),
 }
 

@@ -85,7 +85,7 @@ pub(super) fn update_states(
     }
 }
 
-/// Tells the two failures of one reload apart: Bevy tries a reload that failed a second time at once, and only the first attempt is
+/// Distinguishes the two failures of one reload: Bevy repeats a failed reload at once, and only the first failure is
 /// reported.
 #[derive(Default)]
 pub(super) struct Attempts {
@@ -96,20 +96,21 @@ pub(super) struct Attempts {
 }
 
 impl Attempts {
-    /// A load or a reload succeeded.
+    /// Records that a load or a reload succeeded.
     fn succeeded(&mut self, id: AssetId<GaussianCapture>) {
         self.failed.remove(&id);
         self.repeating.remove(&id);
     }
 
-    /// A load or a reload failed. Returns whether it is the second attempt of a reload. `is_loaded`: an earlier load succeeded.
+    /// Records that a load or a reload failed. Returns whether this was the second attempt of a reload. `is_loaded`: an
+    /// earlier load succeeded.
     fn failed_again(&mut self, id: AssetId<GaussianCapture>, is_loaded: bool) -> bool {
         let is_reload = !self.failed.insert(id) || is_loaded;
         is_reload && !self.repeating.insert(id) && self.repeating.remove(&id)
     }
 }
 
-/// File, fault and remedy, without the names of loaders and types that Bevy puts before them.
+/// Returns file, fault and remedy, without the names of loaders and types that Bevy puts before them.
 fn describe(path: impl Display, error: &AssetLoadError) -> String {
     match error {
         AssetLoadError::AssetReaderError(AssetReaderError::NotFound(file)) => format!(

@@ -21,7 +21,7 @@ pub(super) struct UploadFailure {
 }
 
 impl UploadFailures {
-    /// Whether a capture is among them: its entities have then failed, although it has been loaded.
+    /// Returns whether a capture is among them: its entities have then failed, although it has been loaded.
     pub(super) fn contains(&self, capture: AssetId<GaussianCapture>) -> bool {
         self.lock().contains_key(&capture)
     }

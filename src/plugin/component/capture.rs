@@ -33,7 +33,7 @@ pub struct GaussianCapture {
 }
 
 impl GaussianCapture {
-    /// Makes a capture of a scene in memory. Its bounds over time are computed here, from every Gaussian.
+    /// Creates a capture from a scene in memory, and computes its bounds over time from every Gaussian.
     pub fn new(scene: RuntimeScene) -> Self {
         let mut capture = Self { scene: Arc::new(scene), bounds: None };
         // A still never leaves its first moment.

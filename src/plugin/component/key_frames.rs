@@ -11,7 +11,7 @@ pub struct KeyFrames {
 }
 
 impl KeyFrames {
-    /// The key-frames of a filter with `segments` segments over `duration` seconds; `None` for a still.
+    /// Returns the key-frames of a filter with `segments` segments over `duration` seconds; `None` for a still.
     pub(super) fn new(segments: u32, duration: f32) -> Option<Self> {
         (segments > 0 && duration > 0.0).then_some(Self { segments, duration })
     }
@@ -35,8 +35,8 @@ impl KeyFrames {
         f64::from(self.duration) / f64::from(self.segments)
     }
 
-    /// Indices of those after `from` (or at it, if `inclusive`) up to and including `to`, in the order of play: falling if `to` is
-    /// before `from`. Both in seconds since the capture's start.
+    /// Returns the indices of those after `from` (or at it, if `inclusive`) up to and including `to`, in the order of
+    /// play: falling if `to` is before `from`. Both in seconds since the capture's start.
     pub(crate) fn within(&self, from: f64, to: f64, inclusive: bool) -> impl Iterator<Item = u32> + use<> {
         let last = f64::from(self.segments);
         let [from, to] = [from, to].map(|time| time / self.spacing());

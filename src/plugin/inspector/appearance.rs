@@ -40,13 +40,13 @@ pub(super) fn show(ui: &mut egui::Ui, settings: CaptureSettings, bounds: Option<
     edited
 }
 
-/// The box about the whole capture.
+/// Returns the box about the whole capture.
 fn crop_around(bounds: Option<Bounds>) -> CropBox {
     let (center, half_size) = bounds.map_or((Vec3::ZERO, Vec3::ONE), |b| (b.center(), (b.max - b.min) * 0.5));
     CropBox { center, half_size, rotation: Quat::IDENTITY }
 }
 
-/// Three values that can be dragged, none below `least`.
+/// Draws three values that can be dragged, none below `least`.
 fn axes(ui: &mut egui::Ui, name: &str, vector: &mut Vec3, least: f32) {
     ui.horizontal(|ui| {
         for value in [&mut vector.x, &mut vector.y, &mut vector.z] {

@@ -22,7 +22,7 @@ pub(super) fn show(ui: &mut egui::Ui, view: Option<&ViewStatistics>, frame_secon
         .on_hover_text("a pair is one Gaussian in one tile of the picture");
 }
 
-/// A bar with its meaning on it; `share` from 0 to 1.
+/// Draws a bar with a text on it; `share` from 0 to 1.
 pub(super) fn bar(ui: &mut egui::Ui, share: f32, text: String) {
     ui.add(egui::ProgressBar::new(share).corner_radius(2.0).text(text));
 }

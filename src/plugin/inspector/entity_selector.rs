@@ -13,14 +13,14 @@ pub(super) struct Choice {
 }
 
 impl Choice {
-    /// Labelled by its name, else by its asset path, else by its number.
+    /// Returns a choice labelled by its name, else by its asset path, else by its number.
     pub(super) fn new(entity: Entity, name: Option<&str>, path: Option<String>, kind: &str) -> Self {
         let label = name.map(str::to_owned).or(path).unwrap_or_else(|| format!("{kind} {entity}"));
         Self { entity, label }
     }
 }
 
-/// The entity to show: the selected one while it exists, else the first; `None` if there is none.
+/// Returns the entity to show: the selected one while it exists, else the first; `None` if there is none.
 pub(super) fn shown(selected: Option<Entity>, choices: &[Choice]) -> Option<Entity> {
     let is_there = |entity: &Entity| choices.iter().any(|choice| choice.entity == *entity);
     selected.filter(is_there).or_else(|| choices.first().map(|choice| choice.entity))

@@ -12,7 +12,7 @@ pub(super) trait Listed: Copy + PartialEq + 'static {
     /// All values, in the order of the list.
     const ALL: &'static [Self];
 
-    /// The name of a value.
+    /// Returns the name of a value.
     fn name(self) -> &'static str;
 }
 
@@ -101,7 +101,7 @@ mod tests {
     use bevy::reflect::{TypeInfo, Typed};
     use std::collections::HashSet;
 
-    /// Whether a list holds every value of its enum, each by its own name.
+    /// Returns whether a list has every value of its enum, each with a name of its own.
     fn is_complete<T: Listed + Typed>() -> bool {
         let TypeInfo::Enum(known) = T::type_info() else { return false };
         let names: HashSet<&str> = T::ALL.iter().map(|value| value.name()).collect();

@@ -10,7 +10,7 @@ use bevy_egui::egui;
 use egui::{DragValue, Slider, SliderClamping};
 use std::ops::RangeInclusive;
 
-/// Points that the number beside a slider takes.
+/// Width of the number beside a slider, points.
 const NUMBER_WIDTH: f32 = 76.0;
 /// Height of the strip of key-frame marks, points.
 const STRIP_HEIGHT: f32 = 10.0;
@@ -49,7 +49,7 @@ fn buttons(ui: &mut egui::Ui, playback: &mut Playback, duration: f32, fps: &mut 
     });
 }
 
-/// The time, under the marks of the key-frames.
+/// Draws the time, under the marks of the key-frames.
 fn scrub(ui: &mut egui::Ui, playback: &mut Playback, capture: &GaussianCapture, duration: f32) {
     ui.scope(|ui| {
         ui.spacing_mut().slider_width = (ui.available_width() - NUMBER_WIDTH).max(40.0);
@@ -62,7 +62,7 @@ fn scrub(ui: &mut egui::Ui, playback: &mut Playback, capture: &GaussianCapture, 
     });
 }
 
-/// The range that is played and the key-frames of the filter, over the slider's rail.
+/// Draws the range that is played and the key-frames of the filter, over the slider's rail.
 fn strip(ui: &mut egui::Ui, playback: &Playback, capture: &GaussianCapture, duration: f32) {
     let size = egui::vec2(ui.spacing().slider_width, STRIP_HEIGHT);
     let (bounds, response) = ui.allocate_exact_size(size, egui::Sense::hover());
@@ -80,7 +80,7 @@ fn strip(ui: &mut egui::Ui, playback: &Playback, capture: &GaussianCapture, dura
     response.on_hover_text(format!("{} key-frames", key_frames.count()));
 }
 
-/// The distance between the end of a slider and the middle of its handle there, in points.
+/// Returns the distance between the end of a slider and the middle of its handle there, in points.
 fn handle_inset(ui: &egui::Ui) -> f32 {
     let height = ui.text_style_height(&egui::TextStyle::Body).max(ui.spacing().interact_size.y);
     let radius = height / 2.5;
@@ -105,7 +105,7 @@ fn pace(ui: &mut egui::Ui, playback: &mut Playback) {
     });
 }
 
-/// The in and the out point.
+/// Draws the in and the out point.
 fn range(ui: &mut egui::Ui, playback: &mut Playback, duration: f32) {
     ui.horizontal(|ui| {
         let mut start = within(playback.start, 0.0, duration);
@@ -128,7 +128,7 @@ fn seconds(value: &mut f32, range: RangeInclusive<f32>) -> DragValue<'_> {
     DragValue::new(value).range(range).clamp_existing_to_range(false).speed(0.01).max_decimals(3).suffix(" s")
 }
 
-/// An end of the range, in seconds: clamped to the capture; `own`, the capture's own end, if it is NaN.
+/// Returns an end of the range, in seconds: clamped to the capture; `own`, the capture's own end, if it is NaN.
 fn within(seconds: f32, own: f32, duration: f32) -> f32 {
     if seconds.is_nan() { own } else { seconds.clamp(0.0, duration) }
 }
@@ -149,7 +149,7 @@ mod tests {
         GaussianCapture::new(scene.into_runtime().expect("a synthetic scene can be drawn"))
     }
 
-    /// The section, drawn once while `events` happen.
+    /// Draws the section once while `events` happen. Returns the playback as edited.
     fn pass(context: &egui::Context, events: Vec<Event>, playback: Playback, capture: &GaussianCapture) -> Playback {
         let screen = egui::Rect::from_min_size(Pos2::ZERO, egui::vec2(320.0, 240.0));
         let input = egui::RawInput { screen_rect: Some(screen), events, ..egui::RawInput::default() };

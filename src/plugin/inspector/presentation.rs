@@ -2,7 +2,7 @@
 //!
 //! In: counts, bytes, times. Out: text for people, shares for bars, positions for marks.
 
-/// A count in groups of three digits: `1,234,567`.
+/// Formats a count in groups of three digits: `1,234,567`.
 pub(super) fn count(number: u64) -> String {
     let digits = number.to_string();
     let mut text = String::with_capacity(digits.len() * 4 / 3);
@@ -15,7 +15,7 @@ pub(super) fn count(number: u64) -> String {
     text
 }
 
-/// Bytes in the largest unit that leaves at least one: `512 B`, `1.5 MiB`.
+/// Formats bytes in the largest unit that leaves at least one: `512 B`, `1.5 MiB`.
 pub(super) fn bytes(number: u64) -> String {
     const UNITS: [&str; 5] = ["KiB", "MiB", "GiB", "TiB", "PiB"];
     if number < 1024 {
@@ -31,12 +31,12 @@ pub(super) fn bytes(number: u64) -> String {
     format!("{value:.1} {}", UNITS[unit])
 }
 
-/// The share of a part in a whole, from 0 to 1; 0 if the whole is 0.
+/// Returns the share of a part in a whole, from 0 to 1; 0 if the whole is 0.
 pub(super) fn share(part: f64, whole: f64) -> f32 {
     if whole > 0.0 { (part / whole).clamp(0.0, 1.0) as f32 } else { 0.0 }
 }
 
-/// A frame time in seconds as text: `60.0 frames/s, 16.7 ms`.
+/// Formats a frame time in seconds: `60.0 frames/s, 16.7 ms`.
 pub(super) fn frame_rate(seconds: f32) -> String {
     if seconds > 0.0 {
         format!("{:.1} frames/s, {:.1} ms", 1.0 / seconds, seconds * 1e3)
@@ -45,13 +45,14 @@ pub(super) fn frame_rate(seconds: f32) -> String {
     }
 }
 
-/// The next mean of about the last twenty values. A `mean` of 0 stands for none yet.
+/// Returns the mean of about the last twenty values, given the `mean` before and the newest value. A `mean` of 0 means
+/// that there is none yet.
 pub(super) fn smoothed(mean: f32, value: f32) -> f32 {
     if mean > 0.0 { mean + (value - mean) * 0.05 } else { value }
 }
 
-/// The positions between `left` and `right` of marks at rising `times` of `duration` seconds. Of marks that would touch, only the first is
-/// kept.
+/// Returns the positions between `left` and `right` of marks at rising `times` of `duration` seconds. Of marks that
+/// would touch, only the first is kept.
 pub(super) fn mark_positions(times: impl Iterator<Item = f32>, duration: f32, left: f32, right: f32) -> Vec<f32> {
     const APART: f32 = 2.0;
     let mut positions: Vec<f32> = Vec::new();

@@ -128,8 +128,9 @@ impl CapturePicker<'_, '_> {
     }
 }
 
-/// How much farther than three standard deviations, which bounds hold, an alpha can reach 1/255: to `sqrt(2 ln(255 opacity))`, 3.33 for
-/// a peak of 1. A box that holds three of every Gaussian in it, scaled by this, holds so many of each.
+/// Returns how much farther than three standard deviations, which bounds enclose, an alpha can reach 1/255: to `sqrt(2
+/// ln(255 opacity))`, 3.33 for a peak of 1. A box that encloses three of every Gaussian, scaled by this, encloses that
+/// many of each.
 fn reach(opacity: f32) -> f32 {
     reach_squared(opacity.max(1.0)).sqrt() / 3.0
 }

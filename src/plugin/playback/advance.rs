@@ -1,7 +1,7 @@
 //! One step of a playback.
 //!
-//! In: a [`Playback`] as the game left it, its [`PlaybackState`], and what moves it on. Out: the playback as it is drawn, and a
-//! [`Progress`]: what happened during the step.
+//! In: a [`Playback`] with the changes of the game, its [`PlaybackState`], and a [`Drive`]. Out: the playback as it is
+//! drawn, and a [`Progress`]: what happened during the step.
 
 use super::component::Playback;
 use super::drive::Drive;
@@ -13,7 +13,8 @@ use super::state::{Follow, PlaybackState};
 pub(super) struct Progress {
     pub(super) started: bool,
     pub(super) paused: bool,
-    /// From and to which time it jumped because the game or the clock that it follows sought, in seconds.
+    /// The times before and after a jump because the game, or the clock that is followed, sought, in seconds; `None`
+    /// without one.
     pub(super) seeked: Option<[f32; 2]>,
     /// Whether this moment does not continue the one before: the first one, and seeks.
     pub(super) jumped: bool,
@@ -22,7 +23,8 @@ pub(super) struct Progress {
 }
 
 impl PlaybackState {
-    /// One step of a playback of a capture that lasts `duration` seconds. Returns the playback after it, and what happened.
+    /// Advances a playback of a capture that lasts `duration` seconds by one step. Returns the playback after it, and
+    /// what happened.
     pub(super) fn advance(&mut self, mut now: Playback, drive: Drive, duration: f32) -> (Playback, Progress) {
         let span = now.span(duration);
         let mut progress = self.notice(&mut now, &span, matches!(drive, Drive::Follow { .. }));
@@ -46,7 +48,7 @@ impl PlaybackState {
         (now, progress)
     }
 
-    /// Compares the playback with its memory: what differs, the game has set since the last step.
+    /// Compares the playback with its state after the last step: the game has set whatever differs.
     fn notice(&mut self, now: &mut Playback, span: &Span, following: bool) -> Progress {
         if !now.time.is_finite() {
             now.time = if now.time == f32::INFINITY { span.end() as f32 } else { span.start() as f32 };
@@ -87,7 +89,7 @@ impl PlaybackState {
         progress.travel = Some(travel);
     }
 
-    /// Plays, or jumps, to what a shared clock shows.
+    /// Plays, or jumps, to the time of a shared clock.
     fn follow(&mut self, now: &mut Playback, span: &Span, next: Follow, progress: &mut Progress) {
         let before = self.follow.replace(next);
         match before {

@@ -110,7 +110,7 @@ impl Playback {
         self.playing = true;
     }
 
-    /// The range that is played of a capture that lasts `duration` seconds.
+    /// Returns the range that is played of a capture that lasts `duration` seconds.
     pub(super) fn span(&self, duration: f32) -> Span {
         Span::new([self.start, self.end], self.repeat, duration)
     }

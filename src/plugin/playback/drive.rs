@@ -1,4 +1,4 @@
-//! What moves a playback on: the game's time, or a shared clock.
+//! What advances a playback: the game's time, or a shared clock.
 //!
 //! In: an entity's [`FollowsClock`], if it has one, all clocks, and Bevy's time. Out: a [`Drive`] for this step.
 
@@ -8,7 +8,7 @@ use bevy::ecs::query::QueryFilter;
 use bevy::ecs::system::Query;
 use bevy::time::Time;
 
-/// What moves a playback on in one step.
+/// What advances a playback in one step.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Drive {
     /// This many seconds have passed.
@@ -19,7 +19,7 @@ pub(super) enum Drive {
     Hold,
 }
 
-/// What moves an entity on that follows a clock, or none.
+/// Returns what advances an entity that follows a clock, or none.
 pub(super) fn drive<F: QueryFilter>(
     follows: Option<&FollowsClock>,
     clocks: &Query<&PlaybackClock, F>,

@@ -38,7 +38,7 @@ pub enum Repeat {
 }
 
 impl Repeat {
-    /// Whether playing stops at the end of the range.
+    /// Returns whether playing stops at the end of the range.
     pub(super) fn stops(self) -> bool {
         match self {
             Self::Once => true,
@@ -46,7 +46,7 @@ impl Repeat {
         }
     }
 
-    /// Whether the end of the range is the same moment as its start.
+    /// Returns whether the end of the range is the same moment as its start.
     pub(super) fn wraps(self) -> bool {
         match self {
             Self::Loop => true,
@@ -54,7 +54,7 @@ impl Repeat {
         }
     }
 
-    /// Whether every second pass runs in the opposite direction.
+    /// Returns whether every second pass runs in the opposite direction.
     pub(super) fn turns_round(self) -> bool {
         match self {
             Self::PingPong => true,

@@ -42,7 +42,8 @@ pub(super) struct Leg {
 }
 
 impl Span {
-    /// The range from `start` to `end` of a capture that lasts `duration` seconds. Both are clamped to it; NaN counts as its own end.
+    /// Returns the range from `start` to `end` of a capture that lasts `duration` seconds. Both are clamped to it; NaN
+    /// counts as its own end.
     pub(super) fn new([start, end]: [f32; 2], repeat: Repeat, duration: f32) -> Self {
         let duration = if duration.is_finite() { f64::from(duration.max(0.0)) } else { 0.0 };
         let bound = |value: f32, otherwise: f64| {
@@ -52,40 +53,41 @@ impl Span {
         Self { start, length: (end - start).max(0.0), repeat }
     }
 
-    /// Whether there is nothing to play.
+    /// Returns whether there is nothing to play.
     pub(super) fn is_still(&self) -> bool {
         self.length <= 0.0
     }
 
-    /// What happens at its end.
+    /// Returns what happens at its end.
     pub(super) fn repeat(&self) -> Repeat {
         self.repeat
     }
 
-    /// Where it begins, unrounded.
+    /// Returns its start, unrounded.
     pub(super) fn start(&self) -> f64 {
         self.start
     }
 
-    /// Where it ends, unrounded.
+    /// Returns its end, unrounded.
     pub(super) fn end(&self) -> f64 {
         self.start + self.length
     }
 
-    /// The phase that shows `time`, in the first pass or, of a ping-pong range, the first two. Times outside are clamped.
+    /// Returns the phase that shows `time`, in the first pass or, of a ping-pong range, the first two. Times outside
+    /// are clamped.
     pub(super) fn phase(&self, time: f32, returning: bool) -> f64 {
         let into = (f64::from(time) - self.start).clamp(0.0, self.length);
         if self.repeat.turns_round() && returning { 2.0 * self.length - into } else { into }
     }
 
-    /// The phase at `seconds` of a shared clock.
+    /// Returns the phase at `seconds` of a shared clock.
     pub(super) fn phase_at(&self, seconds: f64, speed: f32, offset: f32) -> f64 {
         let (speed, offset) = (f64::from(speed), f64::from(offset));
         if speed < 0.0 { self.length - offset + speed * seconds } else { offset + speed * seconds }
     }
 
-    /// The time at a phase of the first pass (or two): seconds since the capture's start, unrounded. The end of a loop is its
-    /// beginning.
+    /// Returns the time at a phase of the first pass (or two): seconds since the capture's start, unrounded. The end of
+    /// a loop is its beginning.
     pub(super) fn exact(&self, phase: f64) -> f64 {
         if self.repeat.wraps() && phase >= self.length {
             return self.start;
@@ -93,7 +95,7 @@ impl Span {
         self.start + if phase > self.length { (2.0 * self.length - phase).max(0.0) } else { phase.max(0.0) }
     }
 
-    /// The time at a phase of the first pass (or two), and whether it is on the way back.
+    /// Returns the time at a phase of the first pass (or two), and whether it is on the way back.
     pub(super) fn moment(&self, phase: f64) -> (f32, bool) {
         let time = self.exact(phase) as f32;
         // Rounding may reach the end of a loop, too.
@@ -101,13 +103,13 @@ impl Span {
         (if wrapped { self.start as f32 } else { time }, self.repeat.turns_round() && phase >= self.length)
     }
 
-    /// Whether a phase is at or beyond the end at which playing stops, in the given direction.
+    /// Returns whether a phase is at or beyond the end at which playing stops, in the given direction.
     pub(super) fn is_over(&self, phase: f64, forward: bool) -> bool {
         self.repeat.stops() && if forward { phase >= self.length } else { phase <= 0.0 }
     }
 
-    /// The stretches between two finite phases. With `fresh`, the moment at `from` counts as passed, too. Arriving at an end counts as a
-    /// turn, leaving it does not.
+    /// Returns the stretches between two finite phases. With `fresh`, the moment at `from` counts as passed, too.
+    /// Arriving at an end counts as a turn, leaving it does not.
     pub(super) fn travel(&self, from: f64, to: f64, fresh: bool) -> Travel {
         let (forward, length, distance) = (to >= from, self.length, to - from);
         let pass = |phase: f64| match (self.repeat, forward) {
@@ -137,13 +139,13 @@ impl Span {
 }
 
 impl Travel {
-    /// The phase that was reached, as a phase of the first pass (or two).
+    /// Returns the phase that was reached, as a phase of the first pass (or two).
     pub(super) fn phase(&self) -> f64 {
         let into = self.within_pass(self.to, self.last);
         if self.is_returning(self.last) { self.span.length + into } else { into }
     }
 
-    /// The stretches, in the order of play. A step longer than four passes yields only two to four.
+    /// Returns the stretches, in the order of play. A step longer than four passes yields only two to four.
     pub(super) fn legs(&self) -> impl Iterator<Item = Leg> {
         let count = (self.last - self.first).abs() as u32;
         let direction = (self.last - self.first).signum();
@@ -158,12 +160,12 @@ impl Travel {
         })
     }
 
-    /// Whether it passed the end of a loop and started over.
+    /// Returns whether it passed the end of a loop and started over.
     pub(super) fn wraps(&self) -> bool {
         self.span.repeat.wraps() && self.turns > 0
     }
 
-    /// Whether it was played forwards.
+    /// Returns whether it was played forwards.
     pub(super) fn is_forward(&self) -> bool {
         self.from < self.to
     }
@@ -178,7 +180,7 @@ impl Travel {
 }
 
 impl Leg {
-    /// Whether `time`, in seconds since the capture's start, was passed.
+    /// Returns whether `time`, in seconds since the capture's start, was passed.
     pub(super) fn passes(&self, time: f64) -> bool {
         let within = if self.from <= self.to {
             self.from < time && time <= self.to

@@ -1,4 +1,4 @@
-//! The memory of a playback from frame to frame.
+//! The state of a playback from frame to frame.
 //!
 //! In: what [`advance`](super::advance) leaves after a step. Out: a [`PlaybackState`], which the next step continues.
 
@@ -6,14 +6,15 @@ use super::span::Span;
 use bevy::ecs::component::Component;
 use bevy::ecs::entity::Entity;
 
-/// The memory of a [`Playback`](super::Playback), kept beside it.
+/// The state of a [`Playback`](super::Playback) after the last step. Default: before the first step.
 #[derive(Component, Debug, Default, Clone)]
 pub(super) struct PlaybackState {
     /// How far it has played, without the rounding of [`Playback::time`](super::Playback::time).
     pub(super) phase: f64,
     /// The range that `phase` is measured in; `None` before the first step.
     pub(super) span: Option<Span>,
-    /// Time, direction and state of the playback after the last step: if they differ now, the game has set them.
+    /// `time`, `returning` and `playing` of the playback after the last step: if they differ now, the game has set
+    /// them.
     pub(super) time: f32,
     pub(super) returning: bool,
     pub(super) playing: bool,
@@ -36,7 +37,8 @@ pub(super) struct Follow {
 }
 
 impl PlaybackState {
-    /// The time, in seconds since the capture's start, without the rounding of [`Playback::time`](super::Playback::time).
+    /// Returns the time, in seconds since the capture's start, without the rounding of
+    /// [`Playback::time`](super::Playback::time).
     pub(super) fn seconds(&self) -> f64 {
         match self.span {
             // Reached by a seek: playing never stops at the end of a loop.
@@ -46,7 +48,7 @@ impl PlaybackState {
         }
     }
 
-    /// Whether it stands at the end of a loop, from where playing on starts over.
+    /// Returns whether it is at the end of a loop, from where playing continues at the start.
     pub(super) fn is_at_end_of_loop(&self) -> bool {
         self.span.is_some_and(|span| span.repeat().wraps() && self.is_at_end(&span))
     }

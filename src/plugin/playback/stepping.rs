@@ -12,8 +12,8 @@ impl Playback {
     /// Pauses, and goes `frames` on (negative: back) in a capture that lasts `duration` seconds: from the nearest frame, to a
     /// frame that begins at exactly a whole number of `1 / fps` seconds since the capture's start.
     ///
-    /// Frames stay in the range and continue at its ends as `repeat` specifies. The same number of steps back ends at the same frame, to the
-    /// bit. If the range contains no frame, or `fps` is not a positive number, this only pauses.
+    /// Frames stay in the range and continue at its ends as `repeat` specifies. The same number of steps back ends at
+    /// the same frame, to the bit. If the range contains no frame, or `fps` is not a positive number, this only pauses.
     pub fn step(&mut self, frames: i32, fps: f32, duration: f32) {
         self.pause();
         let span = self.span(duration);
@@ -38,8 +38,8 @@ const FRAME_SLACK: f64 = 1e-3;
 /// Largest number of a frame at which frames can still be distinguished.
 const MOST_FRAMES: f64 = 1e12;
 
-/// The frame `frames` after the one nearest to `time`, as [`Playback::step`] describes, and whether it is on the way back; `None` if the
-/// range contains no frame.
+/// Returns the time of the frame `frames` after the one nearest to `time`, as [`Playback::step`] describes, and whether
+/// it is on the way back; `None` if the range contains no frame.
 fn frame_after(span: &Span, time: f32, returning: bool, frames: i32, fps: f32) -> Option<(f32, bool)> {
     let fps = f64::from(fps);
     let (low, high) = (span.start() * fps, span.end() * fps);

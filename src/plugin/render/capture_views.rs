@@ -77,12 +77,12 @@ impl CaptureView {
         }
     }
 
-    /// Whether it draws anything this frame.
+    /// Returns whether it draws anything this frame.
     pub(super) fn sees_something(&self) -> bool {
         !self.drawn.is_empty()
     }
 
-    /// The captures drawn this frame, as the renderer takes them.
+    /// Returns the captures drawn this frame, as input of the renderer.
     pub(super) fn instances<'a>(
         &self,
         captures: &'a RenderAssets<GpuGaussianCapture>,

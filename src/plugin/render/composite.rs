@@ -1,7 +1,7 @@
-//! Composite: captures over what the camera has drawn so far, through Bevy's pipeline cache.
+//! Composite: draws captures over what the camera has drawn so far, through Bevy's pipeline cache.
 //!
-//! In: a view target and a view's captures (colour and transmittance). Out: pipeline and bind group for `shaders/composite.wgsl`.
-//! Where nothing changes, nothing is made.
+//! In: a view target and a view's captures (colour and transmittance). Out: pipeline and bind group for
+//! `shaders/composite.wgsl`, which are created only when something has changed.
 
 use crate::renderer::WorkCounters;
 use crate::view::BlendSpace;
@@ -28,7 +28,7 @@ pub(super) struct CaptureShaders {
     pub(super) _srgb: Handle<Shader>,
 }
 
-/// What pipelines for different targets are made from.
+/// The parts that the pipelines for all targets share.
 #[derive(Resource)]
 pub(super) struct CompositePipeline {
     layout: BindGroupLayoutDescriptor,
@@ -36,7 +36,7 @@ pub(super) struct CompositePipeline {
     shader: Handle<Shader>,
 }
 
-/// What tells targets apart.
+/// The properties of a target that its pipeline depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct CompositeKey {
     pub(super) format: TextureFormat,
@@ -125,13 +125,13 @@ impl CompositeBindings {
         }
     }
 
-    /// The viewport's uniform, for other passes over the same view; `None` before the first
+    /// Returns the viewport's uniform, for other passes over the same view; `None` before the first
     /// [`set_viewport`](Self::set_viewport).
     pub(super) fn viewport(&self) -> Option<BindingResource<'_>> {
         self.viewport.binding()
     }
 
-    /// The bind group that reads `source`, the target so far, and `captures`; `None` before the first
+    /// Returns the bind group that reads `source`, the target so far, and `captures`; `None` before the first
     /// [`set_viewport`](Self::set_viewport).
     pub(super) fn group(
         &mut self,
@@ -150,7 +150,7 @@ impl CompositeBindings {
                 let entries = BindGroupEntries::sequential((source, captures, self.viewport.binding()?));
                 let group = device.create_bind_group("gs4d composite", &layout, &entries);
                 work.add_created();
-                // Both sides of the target are made together: where one is new, the other is.
+                // Both textures of the target are created together: if one is new, so is the other.
                 if self.groups.len() >= 2 || self.groups.iter().any(|known| known.captures != *captures) {
                     self.groups.clear();
                 }

@@ -1,7 +1,7 @@
 //! Draw: captures into a camera's target, in Bevy's `Core3d` schedule.
 //!
-//! In: the camera's view, as [`prepare`](super::prepare) left it. Out: one compute pass, the composite and, if the camera asks for it,
-//! `write_depth`, recorded.
+//! In: the camera's view, prepared by [`prepare`](super::prepare). Out: one compute pass, the composite and, if the
+//! camera asks for it, `write_depth`, recorded.
 
 use super::active::ActiveLists;
 use super::capture_views::{CaptureView, CaptureViews};

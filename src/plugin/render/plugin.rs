@@ -91,7 +91,7 @@ fn build_rendering(app: &mut App) {
         );
 }
 
-/// The passes that go through Bevy's pipeline cache.
+/// Adds the shaders of the passes that go through Bevy's pipeline cache; `None` if the app has no shader assets.
 fn add_shaders(app: &mut App) -> Option<CaptureShaders> {
     let mut shaders = app.world_mut().get_resource_mut::<Assets<Shader>>()?;
     let mut add = |source: &'static str, path: &str| shaders.add(Shader::from_wgsl(source, path));

@@ -163,7 +163,7 @@ pub(super) fn prepare_views(
     }
 }
 
-/// Whether the depth that a camera asks for is the median one; `None` if it asks for none.
+/// Returns whether the depth that a camera asks for is the median one; `None` if it asks for none.
 fn writes_median(settings: &CaptureViewSettings, surrounded: bool) -> Option<bool> {
     match settings.depth {
         DepthWrite::None => None,
@@ -173,7 +173,7 @@ fn writes_median(settings: &CaptureViewSettings, surrounded: bool) -> Option<boo
     }
 }
 
-/// Whether a debug view replaces the opacity of captures.
+/// Returns whether a debug view replaces the opacity of captures.
 fn hides_opacity(debug: DebugView) -> bool {
     match debug {
         DebugView::Overdraw => true,
@@ -181,7 +181,8 @@ fn hides_opacity(debug: DebugView) -> bool {
     }
 }
 
-/// The lens of a camera that captures can be drawn for. `None`, with a warning the first time, for other cameras.
+/// Returns the lens of a camera that captures can be drawn for; `None`, with a warning the first time, for other
+/// cameras.
 fn drawable_lens(view: &ExtractedView, camera: &ExtractedCamera) -> Option<CameraLens> {
     if camera.compositing_space == Some(CompositingSpace::Oklab) {
         warn_once!("captures are not drawn for a camera with CompositingSpace::Oklab: use Srgb or Linear");
@@ -202,7 +203,7 @@ fn drawable_lens(view: &ExtractedView, camera: &ExtractedCamera) -> Option<Camer
     lens
 }
 
-/// The depth of opaque meshes; `None` if it cannot be read.
+/// Returns the depth of opaque meshes; `None` if it cannot be read.
 fn opaque_depth<'a>(
     lens: &CameraLens,
     view: &ExtractedView,

@@ -1,6 +1,6 @@
 //! Publish: the numbers of a frame, from the render world to [`CaptureStatistics`].
 //!
-//! In: the views that were prepared, and all uploaded captures. Out: [`CaptureStatistics`], brought up to date.
+//! In: the views that were prepared, and all uploaded captures. Out: updated [`CaptureStatistics`].
 
 use super::capture_views::CaptureViews;
 use super::statistics::CaptureStatistics;

@@ -10,11 +10,11 @@ use bevy::ecs::system::{Commands, Res};
 use bevy::log::error;
 use bevy::render::renderer::RenderDevice;
 
-/// The renderer's pipelines; absent where this GPU cannot run them.
+/// The renderer's pipelines; absent if this GPU cannot run them.
 #[derive(Resource)]
 pub struct CaptureRenderer(pub(super) Renderer);
 
-/// Compiles the renderer's pipelines. Shaders check their bounds in debug builds.
+/// Compiles the renderer's pipelines. Shaders check their array indices in debug builds.
 pub(super) fn init_renderer(mut commands: Commands, device: Res<RenderDevice>, statistics: Res<CaptureStatistics>) {
     let checks = if cfg!(debug_assertions) { ShaderChecks::On } else { ShaderChecks::Off };
     match Renderer::new(device.wgpu_device(), checks) {

@@ -143,7 +143,7 @@ impl Default for CropBox {
 }
 
 impl CaptureSettings {
-    /// The settings for the renderer. `fade` is a further factor on opacity.
+    /// Returns the settings for the renderer. `fade` is a further factor on opacity.
     pub(crate) fn appearance(&self, fade: f32) -> Appearance {
         let stops = self.exposure.exp2();
         let light = [self.tint.red, self.tint.green, self.tint.blue].map(|channel| number(channel * stops));
@@ -156,13 +156,14 @@ impl CaptureSettings {
 }
 
 impl CropBox {
-    /// Whether a point of capture space is inside. A box contains every point if its centre is not finite or its
-    /// rotation has the length 0.
+    /// Returns whether a point of capture space is inside. A box contains every point if its centre is not finite or
+    /// its rotation has the length 0.
     pub fn contains(&self, point: Vec3) -> bool {
         self.cube_from_capture().is_none_or(|cube| cube.transform_point3(point).abs().max_element() <= 1.0)
     }
 
-    /// From capture space to the cube from −1 to 1; `None` if the box has no finite centre or rotation.
+    /// Returns the transform from capture space to the cube from −1 to 1; `None` if the box has no finite centre or
+    /// rotation.
     fn cube_from_capture(&self) -> Option<Affine3A> {
         // A side of length 0 contains nothing, but must not divide by zero.
         let scale = self.half_size.max(Vec3::splat(1e-12)).recip();
@@ -172,7 +173,7 @@ impl CropBox {
     }
 }
 
-/// A finite number from 0 on.
+/// Returns a value if it is finite and positive, else 0.
 fn number(value: f32) -> f32 {
     if value.is_finite() { value.max(0.0) } else { 0.0 }
 }

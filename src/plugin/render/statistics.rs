@@ -36,7 +36,7 @@ struct Shared {
     capture_bytes: u64,
     uploaded_captures: usize,
     renderer_missing: Option<String>,
-    /// Kept when the renderer is made anew after a lost device.
+    /// Kept when the renderer is created anew after a lost device.
     work: WorkCounters,
 }
 
@@ -47,12 +47,14 @@ impl CaptureStatistics {
         self.lock().measure = on;
     }
 
-    /// Returns the statistics of one camera, by its entity in the main world; `None` while it sees no capture.
+    /// Returns the statistics of one camera, by its entity in the main world; `None` while it sees no capture and holds
+    /// no memory for captures.
     pub fn view(&self, camera: Entity) -> Option<ViewStatistics> {
         self.lock().views.iter().find(|(entity, _)| *entity == camera).map(|(_, statistics)| statistics.clone())
     }
 
-    /// Returns the statistics of every camera that sees a capture, by its entity in the main world.
+    /// Returns the statistics of every camera that sees a capture or holds memory for captures, by its entity in the
+    /// main world.
     pub fn views(&self) -> Vec<(Entity, ViewStatistics)> {
         self.lock().views.clone()
     }
@@ -106,7 +108,7 @@ impl CaptureStatistics {
         shared.uploaded_captures = uploaded_captures;
     }
 
-    /// A panic of another holder leaves nothing worse than old numbers.
+    /// Locks the numbers. After a panic of another holder they are still valid, if old.
     fn lock(&self) -> MutexGuard<'_, Shared> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

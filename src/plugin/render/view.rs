@@ -10,8 +10,8 @@ use glam::{Affine3A, DMat3, DMat4, DVec4, Mat4, UVec2, Vec2, Vec4};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct CameraLens {
     rays: Rays,
-    /// How the depth buffer's value `d` leads to depth in camera space: `z = (x + y d) / (z + w d)`. `None` where it depends on
-    /// the place in the picture, too.
+    /// How the depth buffer's value `d` gives depth in camera space: `z = (x + y d) / (z + w d)`. `None` if it also
+    /// depends on the place in the picture.
     pub(super) distance: Option<Vec4>,
 }
 
@@ -34,7 +34,8 @@ enum Rays {
 }
 
 impl CameraLens {
-    /// The lens behind a projection matrix; `None` for one that is skewed, mirrored or, with parallel rays, not reversed in depth.
+    /// Returns the lens behind a projection matrix; `None` for one that is skewed, mirrored or, with parallel rays, not
+    /// reversed in depth.
     pub(super) fn of(clip_from_view: &Mat4) -> Option<Self> {
         let [x, y, _, _] = columns(clip_from_view);
         if !clip_from_view.is_finite() || (x.y, y.x) != (0.0, 0.0) || x.x <= 0.0 || y.y <= 0.0 {
@@ -75,8 +76,8 @@ impl CameraLens {
         Some(Self { rays, distance: Some(Vec4::new(w.z, -1.0, z.z, 0.0)) })
     }
 
-    /// The view of one capture through this lens: `size` in pixels, `time` in the capture's unit. `None` where the transforms
-    /// flatten the capture or are not finite.
+    /// Returns the view of one capture through this lens: `size` in pixels, `time` in the capture's unit. `None` if the
+    /// transforms flatten the capture or are not finite.
     pub(super) fn view(
         &self,
         size: UVec2,
@@ -122,14 +123,14 @@ mod tests {
         Mat4::perspective_infinite_reverse_rh(fov_y, SIZE.x as f32 / SIZE.y as f32, 0.1)
     }
 
-    /// A picture of 4 x 3 units, 0.5 to 50 units away and off its middle.
+    /// Returns a projection for a picture of 4 x 3 units, 0.5 to 50 units away and off its middle.
     fn orthographic() -> Mat4 {
         let area = Rect::new(-1.0, -2.0, 3.0, 1.0);
         OrthographicProjection { near: 0.5, far: 50.0, area, ..OrthographicProjection::default_3d() }
             .get_clip_from_view()
     }
 
-    /// Where the renderer puts a point: normalised device coordinates with y down.
+    /// Returns where the renderer puts a point: normalised device coordinates with y down.
     fn seen(view: &View, point: Vec3) -> Vec2 {
         let depth = view.world_to_camera.transform_point3(point).z;
         let [x, y] = view.clip_rows();
@@ -137,7 +138,7 @@ mod tests {
         Vec2::new(x.dot(point.extend(1.0)), y.dot(point.extend(1.0))) / divisor
     }
 
-    /// Where Bevy puts it, likewise.
+    /// Returns where Bevy puts it, likewise.
     fn seen_by_bevy(clip_from_view: Mat4, camera: Affine3A, point: Vec3) -> Vec2 {
         let clip = clip_from_view * Mat4::from(camera.inverse()) * point.extend(1.0);
         Vec2::new(clip.x, -clip.y) / clip.w

@@ -35,8 +35,8 @@ pub(super) fn update_bounds(
     }
 }
 
-/// The box at `seconds` since the start. `None`, so that it is never culled, for a capture with an environment map, which every camera sees,
-/// and for one of which nothing is drawn.
+/// Returns the box at `seconds` since the start. `None`, so that it is never culled, for a capture with an environment
+/// map, which every camera sees, and for one of which nothing is drawn.
 fn aabb_at(capture: &GaussianCapture, seconds: f32) -> Option<Aabb> {
     if capture.scene().environment.is_some() {
         return None;

@@ -1,4 +1,4 @@
-//! `write_depth`: lets what is drawn after captures see them in the camera's depth buffer.
+//! `write_depth`: writes the depth of captures to the camera's depth buffer, for passes that come after them.
 //!
 //! In: a view's captures (colour, transmittance, depths) and its lens. Out: pipeline and bind group for `shaders/write_depth.wgsl`,
 //! for cameras that ask for it with [`DepthWrite`](super::DepthWrite).
@@ -20,7 +20,7 @@ use bevy::render::renderer::{RenderDevice, RenderQueue};
 use bevy::shader::Shader;
 use glam::{UVec4, Vec4};
 
-/// What pipelines for different depth buffers are made from.
+/// The parts that the pipelines for all depth buffers share.
 #[derive(Resource)]
 pub(super) struct WriteDepthPipeline {
     layout: BindGroupLayoutDescriptor,
@@ -28,12 +28,12 @@ pub(super) struct WriteDepthPipeline {
     shader: Handle<Shader>,
 }
 
-/// What tells them apart.
+/// The properties of a depth buffer that its pipeline depends on, and the depth to write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct WriteDepthKey {
     /// Samples of the depth buffer.
     pub(super) samples: u32,
-    /// The median in place of the expected depth.
+    /// Whether the median depth is written instead of the expected one.
     pub(super) median: bool,
 }
 
@@ -115,7 +115,7 @@ impl WriteDepthBindings {
         self.group = None;
     }
 
-    /// The bind group for the targets of a view; `None` before the first [`set_distance`](Self::set_distance).
+    /// Returns the bind group for the targets of a view; `None` before the first [`set_distance`](Self::set_distance).
     pub(super) fn group(
         &mut self,
         device: &RenderDevice,

@@ -51,7 +51,8 @@ fn place_eyes(rigs: Query<(&StereoRig, &Children)>, mut eyes: Query<(&Eye, &mut 
     }
 }
 
-/// Runs after Bevy has updated the target's size, and does for a changed viewport what Bevy would do one frame later.
+/// Sets the viewports. Runs after Bevy has updated the target's size, and does for a changed viewport what Bevy would
+/// do one frame later.
 fn fit_eyes(mut eyes: Query<(&Eye, &mut Camera, &mut Projection), With<SideBySide>>) {
     for (eye, mut camera, mut projection) in &mut eyes {
         let Some((corner, size)) = camera.physical_target_size().and_then(|target| half(*eye, target)) else {
@@ -70,7 +71,7 @@ fn fit_eyes(mut eyes: Query<(&Eye, &mut Camera, &mut Projection), With<SideBySid
     }
 }
 
-/// Corner and size of an eye's half, in pixels; `None` if the target is too small to have halves.
+/// Returns corner and size of an eye's half, in pixels; `None` if the target is too small to have halves.
 fn half(eye: Eye, target: UVec2) -> Option<(UVec2, UVec2)> {
     let size = UVec2::new(target.x / 2, target.y);
     let left = match eye {

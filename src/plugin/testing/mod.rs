@@ -1,7 +1,7 @@
 //! Pictures of a Bevy app without a window: for tests of games, and for examples that write files.
 //!
-//! In: an app made by [`app`], whose cameras draw into an [`Offscreen`] instead of the primary window. Out: pictures, each at an
-//! exact time: time advances only by the steps that are asked for. A software driver of Vulkan is enough.
+//! In: an app from [`app`], whose cameras draw into an [`Offscreen`] instead of the primary window. Out: pictures, each
+//! at an exact time: time advances only by the steps that are asked for. A software driver of Vulkan is enough.
 //!
 //! # Render a Bevy app to an image in ten lines
 //!

@@ -35,7 +35,8 @@ pub struct Offscreen {
 }
 
 impl Offscreen {
-    /// Makes another picture, for apps that draw into more than one: [`read`](super::read) reads it. `size` is in pixels; 0 counts as 1.
+    /// Creates another picture, for apps that draw into more than one; [`read`](super::read) returns it. `size` is in
+    /// pixels; 0 counts as 1.
     pub fn new(images: &mut Assets<Image>, size: UVec2) -> Self {
         let size = size.max(UVec2::ONE);
         let mut image = Image::new_target_texture(size.x, size.y, TextureFormat::Rgba8UnormSrgb, None);
@@ -50,7 +51,7 @@ impl Offscreen {
     }
 }
 
-/// Whether this machine has a GPU adapter; a software driver counts.
+/// Returns whether this machine has a GPU adapter; a software driver counts.
 pub fn has_gpu() -> bool {
     static FOUND: OnceLock<bool> = OnceLock::new();
     *FOUND.get_or_init(|| !GpuContext::adapters().is_empty())
@@ -99,7 +100,7 @@ fn draw_offscreen(offscreen: Res<Offscreen>, mut targets: Query<&mut RenderTarge
     }
 }
 
-/// Without DX12 among them wgpu needs no extra dispatch to validate each indirect one.
+/// Returns the backends to use. Without DX12 among them, wgpu needs no extra dispatch to validate each indirect one.
 fn backends() -> Backends {
     if cfg!(target_os = "linux") { Backends::VULKAN } else { Backends::PRIMARY }
 }

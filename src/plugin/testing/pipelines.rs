@@ -1,7 +1,7 @@
 //! Whether the pipelines of an app are compiled, as seen from the main world.
 //!
-//! In: the pipeline cache of the render world, after every frame. Out: [`PipelineReport`], which both worlds share: with pipelined
-//! rendering the render world is on another thread and cannot be looked into.
+//! In: the pipeline cache of the render world, after every frame. Out: [`PipelineReport`], which both worlds share:
+//! with pipelined rendering the render world is on another thread and cannot be accessed.
 
 use super::error::TestingError;
 use bevy::app::App;

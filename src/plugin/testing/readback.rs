@@ -63,7 +63,7 @@ fn wait(app: &mut App, arrived: &Mutex<Option<Vec<u8>>>) -> Result<Vec<u8>, Test
     Err(TestingError::Readback)
 }
 
-/// A texture is read back in rows padded to a multiple of 256 bytes.
+/// Removes the padding of a texture that was read back: its rows are padded to a multiple of 256 bytes.
 fn unpadded(data: &[u8], size: UVec2) -> Vec<u8> {
     let row = size.x as usize * 4;
     data.chunks(row.next_multiple_of(256)).flat_map(|padded| padded.iter().take(row).copied()).collect()
@@ -99,7 +99,7 @@ pub fn save(picture: &RgbaImage, path: &Path) -> Result<(), TestingError> {
     Ok(())
 }
 
-/// Writes under another name, which is changed once the file is complete.
+/// Writes under a temporary name, and renames the file once it is complete.
 fn write_png(picture: &RgbaImage, path: &Path) -> io::Result<()> {
     let mut png = Vec::new();
     picture.write_with_encoder(PngEncoder::new(&mut png)).map_err(io::Error::other)?;

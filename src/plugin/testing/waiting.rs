@@ -15,7 +15,8 @@ use std::time::{Duration, Instant};
 
 /// How long assets and pipelines may take to load and compile.
 const LOAD_TIMEOUT: Duration = Duration::from_secs(120);
-/// Updates until everything that has been loaded is drawn: uploads take some, and buffers that grow by the counts of an earlier frame.
+/// Number of updates after which everything that has been loaded is drawn: uploads take some, as do buffers that grow
+/// by the counts of an earlier frame.
 const SETTLING: usize = 3;
 
 /// Returns the assets that are needed and not loaded yet.
@@ -115,7 +116,7 @@ pub(super) fn update(app: &mut App) -> Result<(), TestingError> {
     }
 }
 
-/// The names of the assets that are still being loaded.
+/// Returns the names of the assets that are still being loaded.
 fn missing(world: &mut World) -> Result<Vec<String>, TestingError> {
     let hooks = world.get_resource_or_init::<Awaited>().clone();
     let wanted: Vec<UntypedAssetId> = hooks.0.iter().flat_map(|hook| hook(world)).collect();
@@ -139,7 +140,7 @@ fn captures(world: &mut World) -> Vec<UntypedAssetId> {
     absent(world, spawned.iter(world).map(|capture| capture.0.id()))
 }
 
-/// Timelines, and the captures of those that have been loaded.
+/// Returns the timelines that are needed, and the captures of those that have been loaded.
 fn timelines(world: &mut World) -> Vec<UntypedAssetId> {
     let mut players = world.query::<&TimelinePlayer>();
     let players: Vec<AssetId<Timeline>> = players.iter(world).map(|player| player.0.id()).collect();
@@ -151,7 +152,7 @@ fn timelines(world: &mut World) -> Vec<UntypedAssetId> {
     absent
 }
 
-/// Those that are not among the assets.
+/// Returns those that are not among the assets.
 fn absent(world: &World, captures: impl Iterator<Item = AssetId<GaussianCapture>>) -> Vec<UntypedAssetId> {
     let Some(loaded) = world.get_resource::<Assets<GaussianCapture>>() else { return Vec::new() };
     captures.filter(|capture| !loaded.contains(*capture)).map(AssetId::untyped).collect()

@@ -1,7 +1,7 @@
-//! The buffers of a capture: what `project` and `activate` read.
+//! The buffers of a capture, which `project` and `activate` read.
 //!
-//! In: the [`Form`] of a scene and a range of its Gaussians. Out: storage buffers in the order of the shader's bindings. Packed scenes
-//! go up as they are.
+//! In: the [`Form`] of a scene and a range of its Gaussians. Out: storage buffers in the order of the shader's
+//! bindings. Packed scenes are uploaded without unpacking.
 
 use crate::gaussian::{Gaussian, Harmonics};
 use crate::renderer::layout::CODEBOOK_SCALES;
@@ -10,17 +10,18 @@ use crate::scene::packed::{BLOCK, BLOCK_RANGES, COLOR_WORDS, RECORD_WORDS, SHARE
 use crate::scene::{ActiveSets, CodedColors, Form, PackedColors, TemporalFilter};
 use std::ops::Range;
 
-/// Records that are written together.
+/// Number of records that are written together.
 const RECORDS_AT_ONCE: usize = 1 << 14;
 
-/// Where buffers are made.
+/// The device and the queue with which buffers are created and written.
 #[derive(Clone, Copy)]
 pub(super) struct Gpu<'a> {
     pub allocator: Allocator<'a>,
     pub queue: &'a wgpu::Queue,
 }
 
-/// Bytes that one Gaussian takes in the largest buffer. `stride` is the number of four-vectors of whole coefficients per Gaussian.
+/// Returns the bytes of one Gaussian in the largest buffer. `stride` is the number of four-vectors of whole
+/// coefficients per Gaussian.
 pub(super) fn largest_record(form: &Form, stride: usize) -> u64 {
     let whole = stride * size_of::<[f32; 4]>();
     let (geometry, color) = match form {
@@ -36,7 +37,8 @@ pub(super) fn largest_record(form: &Form, stride: usize) -> u64 {
     geometry.max(color) as u64
 }
 
-/// Geometry and color of some Gaussians, the first at a multiple of a block; codebooks aside. `stride` as for [`largest_record`].
+/// Creates the buffers of geometry and color of some Gaussians, the first at a multiple of a block, without codebooks.
+/// `stride` as for [`largest_record`].
 pub(super) fn part(gpu: Gpu<'_>, form: &Form, own: Range<usize>, stride: usize) -> Vec<wgpu::Buffer> {
     match form {
         Form::Sliced(sliced) => {
@@ -59,7 +61,7 @@ pub(super) fn part(gpu: Gpu<'_>, form: &Form, own: Range<usize>, stride: usize) 
     }
 }
 
-/// All codebooks, and their scales.
+/// Creates the buffers of all codebooks and of their scales.
 pub(super) fn codebooks(gpu: Gpu<'_>, colors: &CodedColors) -> [wgpu::Buffer; 2] {
     let mut scales = colors.scales.clone();
     scales.resize(CODEBOOK_SCALES, [0.0; 4]);
@@ -71,7 +73,8 @@ pub(super) fn codebooks(gpu: Gpu<'_>, colors: &CodedColors) -> [wgpu::Buffer; 2]
     ]
 }
 
-/// The sets of some Gaussians: the words of each segment in turn, or one word of interval for each.
+/// Creates the buffer of the sets of some Gaussians: the words of each segment in turn, or one word of interval for
+/// each Gaussian.
 pub(super) fn filter(gpu: Gpu<'_>, filter: &TemporalFilter, own: Range<usize>) -> wgpu::Buffer {
     let words = match &filter.sets {
         ActiveSets::Bits(bits) => {
@@ -89,14 +92,14 @@ pub(super) fn plain(gpu: Gpu<'_>, label: &'static str, contents: &[u8]) -> wgpu:
     filled(gpu, label, contents, wgpu::BufferUsages::STORAGE)
 }
 
-/// Written through the queue: on a device that has just been lost, mapping would panic.
+/// Creates a buffer and writes it through the queue: mapping would panic on a device that has just been lost.
 fn filled(gpu: Gpu<'_>, label: &'static str, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
     let made = gpu.allocator.buffer(label, contents.len() as u64, usage);
     gpu.queue.write_buffer(&made, 0, contents);
     made
 }
 
-/// The records as they are, but for `1/σ_t` in the place of `σ_t`: zero, not infinity, for what is always there.
+/// Creates the buffer of the records, with `1/σ_t` in place of `σ_t`: zero instead of infinity.
 fn gaussians(gpu: Gpu<'_>, gaussians: &[Gaussian]) -> wgpu::Buffer {
     records(gpu, "gs4d gaussians", gaussians.len(), size_of::<Gaussian>(), |index, record| {
         let gaussian = gaussians[index];
@@ -104,7 +107,7 @@ fn gaussians(gpu: Gpu<'_>, gaussians: &[Gaussian]) -> wgpu::Buffer {
     })
 }
 
-/// The coefficients that are evaluated, padded to whole four-vectors per Gaussian.
+/// Creates the buffer of the coefficients that are evaluated, padded to whole four-vectors per Gaussian.
 fn harmonics(gpu: Gpu<'_>, harmonics: &Harmonics, own: Range<usize>, stride: usize) -> wgpu::Buffer {
     let used = harmonics.evaluated() * 3;
     records(gpu, "gs4d harmonics", own.len(), stride * 16, |index, record| {
@@ -112,7 +115,7 @@ fn harmonics(gpu: Gpu<'_>, harmonics: &Harmonics, own: Range<usize>, stride: usi
     })
 }
 
-/// A storage buffer of records, written some at a time: no second copy of all on the host.
+/// Creates a storage buffer of records, written in chunks to avoid a second copy of all of them on the host.
 fn records(
     gpu: Gpu<'_>,
     label: &'static str,

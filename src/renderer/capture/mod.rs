@@ -1,7 +1,7 @@
 //! A capture on the GPU.
 //!
-//! In: a [`RuntimeScene`]. Out: buffers that stay as long as the capture does. Large captures are split into parts, so that no
-//! binding grows over what the device allows; a part is drawn by one dispatch of `project`.
+//! In: a [`RuntimeScene`]. Out: buffers that live as long as the capture. Large captures are split into parts, so that
+//! no binding exceeds the limit of the device; a part is drawn by one dispatch of `project`.
 
 mod buffers;
 
@@ -14,14 +14,15 @@ use crate::scene::{ActiveSets, CodedColors, ColorDegrees, RuntimeScene, Temporal
 use layout::BLOCK;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A capture on the GPU: its Gaussians, color and environment map in buffers, in as many parts as bindings ask for.
+/// A capture on the GPU: its Gaussians, color and environment map in buffers, in as many parts as the binding limit
+/// requires.
 #[derive(Debug)]
 pub struct GpuCapture {
     pub(super) parts: Vec<Part>,
     pub(super) environment: Option<EnvironmentBuffer>,
     /// How its Gaussians and colors are stored.
     pub(super) storage: Storage,
-    /// Tells captures apart, as long as the program runs.
+    /// Identifies this upload within the process.
     pub(super) id: u64,
     pub(super) filter: Option<Filter>,
     /// Bytes of its buffers.
@@ -31,7 +32,7 @@ pub struct GpuCapture {
     len: usize,
 }
 
-/// As many Gaussians as fit one binding.
+/// A range of Gaussians that fits one binding.
 #[derive(Debug)]
 pub(super) struct Part {
     pub count: u32,
@@ -40,7 +41,7 @@ pub(super) struct Part {
     pub filter: Option<wgpu::BindGroup>,
 }
 
-/// What the host needs to know of a filter.
+/// The filter, as the host needs it.
 #[derive(Debug)]
 pub(super) struct Filter {
     /// `FILTER_*`.
@@ -67,12 +68,12 @@ impl Filter {
         Self { mode, segments: filter.segments, interval, counts }
     }
 
-    /// The segment of a time, in the capture's unit.
+    /// Returns the segment of a time, in the capture's unit.
     pub fn segment_of(&self, time: f32) -> u32 {
         segment_of(time, self.interval, self.segments)
     }
 
-    /// Active Gaussians of a part in a segment.
+    /// Returns the number of active Gaussians of a part in a segment.
     pub fn count(&self, part: usize, segment: u32) -> u32 {
         self.counts.get(part * self.segments as usize + segment as usize).copied().unwrap_or_default()
     }
@@ -88,7 +89,8 @@ impl GpuCapture {
     /// Uploads a scene.
     ///
     /// # Errors
-    /// When the environment map is larger than the device binds, or the parts of the scene do not fit together.
+    /// When the environment map, or the smallest part of the Gaussians, is larger than the device can bind, or the
+    /// parts of the scene do not fit together.
     pub fn upload(
         device: &wgpu::Device,
         queue: &wgpu::Queue,
@@ -112,7 +114,7 @@ impl GpuCapture {
         let bits = scene.filter.as_ref().map_or(0, |filter| u64::from(filter.segments).div_ceil(8));
         let record = buffers::largest_record(form, stride).max(bits);
         let threads = u64::from(limits.max_compute_workgroups_per_dimension) * 256;
-        // A multiple of what one block of `activate` takes.
+        // A multiple of the block that one workgroup of `activate` processes.
         let per_part = ((binding_limit(&limits) / record).min(threads) as usize / BLOCK as usize) * BLOCK as usize;
         if per_part == 0 {
             let (needed, limit) = (record * u64::from(BLOCK), binding_limit(&limits));
@@ -157,32 +159,32 @@ impl GpuCapture {
         Ok(Self { parts, environment, storage, id, filter, bytes, settings, len: scene.len() })
     }
 
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     pub fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether there is no Gaussian.
+    /// Returns whether there is no Gaussian.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Whether it has an environment map.
+    /// Returns whether it has an environment map.
     pub fn has_environment(&self) -> bool {
         self.environment.is_some()
     }
 
-    /// Whether it has a temporal filter.
+    /// Returns whether it has a temporal filter.
     pub fn has_filter(&self) -> bool {
         self.filter.is_some()
     }
 
-    /// Bytes of its buffers on the GPU.
+    /// Returns the bytes of its buffers on the GPU.
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// What is the same for all parts of a capture and in all views, filled into `view`.
+    /// Returns `view` with the values that are the same for all parts of a capture and in all views.
     pub(super) fn instance(&self, view: &layout::InstanceUniforms) -> layout::InstanceUniforms {
         layout::InstanceUniforms {
             degree: self.settings.degree,
@@ -199,7 +201,7 @@ impl GpuCapture {
 
 static NEXT_ID: AtomicU64 = AtomicU64::new(0);
 
-/// Where each codebook begins among all entries.
+/// Returns the index of the first entry of each codebook among all entries.
 fn first_entries(colors: &CodedColors) -> [u32; MAX_STAGES] {
     std::array::from_fn(|stage| colors.entries.iter().take(stage).sum())
 }

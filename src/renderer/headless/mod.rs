@@ -1,6 +1,7 @@
 //! Drawing without a window: for commands, scoring and tests.
 //!
-//! In: scenes and views. Out: [`Frame`]s on the host, or [`Timings`]. Each call waits for the GPU; inside a frame nothing does.
+//! In: scenes and views. Out: [`Frame`]s on the host, or [`Timings`]. Each call waits for the GPU; within a frame
+//! nothing is read back.
 
 use super::layout::Counters;
 use super::memory::Allocator;
@@ -22,12 +23,12 @@ pub struct Headless {
     renderer: Renderer,
     view: ViewRenderer,
     filtered: bool,
-    /// Of the capture drawn last.
+    /// The list of the capture drawn last.
     active: Option<ActiveList>,
 }
 
 impl Headless {
-    /// Compiles the passes on that device.
+    /// Creates a renderer on that device and compiles its passes.
     ///
     /// # Errors
     /// When the device cannot run them.
@@ -37,35 +38,36 @@ impl Headless {
         Ok(Self { context, renderer, view, filtered: true, active: None })
     }
 
-    /// The device and its name.
+    /// Returns the device and its adapter.
     pub fn context(&self) -> &GpuContext {
         &self.context
     }
 
-    /// What has been created, uploaded and recorded so far.
+    /// Returns the counters of what has been created, uploaded and recorded so far.
     pub fn work(&self) -> &WorkCounters {
         self.renderer.work()
     }
 
-    /// Creates resources for clients of this renderer.
+    /// Returns an allocator for resources of clients of this renderer.
     pub fn allocator(&self) -> Allocator<'_> {
         self.renderer.allocator(&self.context.device)
     }
 
-    /// Whether temporal filters are used (they are at first).
+    /// Sets whether temporal filters are used. Default: `true`.
     pub fn use_filters(&mut self, filtered: bool) {
         self.filtered = filtered;
     }
 
-    /// Puts a scene on the GPU.
+    /// Uploads a scene.
     ///
     /// # Errors
-    /// When it does not fit.
+    /// As [`GpuCapture::upload`].
     pub fn upload(&self, scene: &RuntimeScene) -> Result<GpuCapture, GpuError> {
         GpuCapture::upload(&self.context.device, &self.context.queue, &self.renderer, scene)
     }
 
-    /// Which Gaussians of a capture its filter leaves active at a time, for [`render_all`](Self::render_all); nothing without a filter.
+    /// Returns the list of the Gaussians that the filter of a capture leaves active at a time, for
+    /// [`render_all`](Self::render_all); `None` if the capture has no filter.
     pub fn active(&self, capture: &GpuCapture, time: f32) -> Option<ActiveList> {
         let GpuContext { device, queue, .. } = &self.context;
         let mut active = ActiveList::new(device, &self.renderer, capture)?;
@@ -108,6 +110,9 @@ impl Headless {
     }
 
     /// Measures frames over the views given, in turn, `frames` of each kind after a warm-up.
+    ///
+    /// # Panics
+    /// If there are frames to measure but no views.
     ///
     /// # Errors
     /// As [`render`](Self::render).
@@ -181,7 +186,8 @@ impl Headless {
         })
     }
 
-    /// The list for this capture at that time: the one of the last call if it belongs to it. Hand it back when it has been used.
+    /// Returns the list for this capture at that time, that of the last call if it belongs to the capture; `None`
+    /// without a filter. The caller stores it in `active` again after use.
     fn take_active(&mut self, capture: &GpuCapture, time: f32) -> Option<ActiveList> {
         if !self.filtered {
             return None;
@@ -192,7 +198,7 @@ impl Headless {
         Some(active)
     }
 
-    /// Moves a list on, if there is one.
+    /// Sets the time of a list, if there is one.
     fn reactivate(&self, active: Option<&mut ActiveList>, capture: &GpuCapture, time: f32) {
         if let Some(active) = active {
             self.activate(active, &self.context.queue, capture, time);
@@ -208,7 +214,7 @@ impl Headless {
         }
     }
 
-    /// Draws all Gaussians of one capture, whatever its filter says, and leaves everything on the GPU.
+    /// Draws all Gaussians of one capture, without its filter, and leaves the results on the GPU.
     ///
     /// # Errors
     /// As [`render`](Self::render).
@@ -217,12 +223,12 @@ impl Headless {
         self.submit_whole(&[instance(capture, None, view)], &parameters).map(|_| ())
     }
 
-    /// Returns what the last frame left on the GPU; `None` before the first.
+    /// Returns the resources of the last frame on the GPU; `None` before the first.
     pub fn finished(&self) -> Option<FinishedFrame<'_>> {
         self.view.finished()
     }
 
-    /// One frame, drawn again with more room until all pairs fit.
+    /// Draws one frame, again with more room until all pairs fit.
     fn submit_whole(
         &mut self,
         instances: &[Instance<'_>],
@@ -243,7 +249,7 @@ impl Headless {
         }
     }
 
-    /// One frame, waited for. Returns what it counted.
+    /// Draws one frame and waits for it. Returns its counters.
     fn submit(
         &mut self,
         instances: &[Instance<'_>],
@@ -278,7 +284,7 @@ impl Headless {
         self.context.device.poll(wait).map(|_| ()).map_err(|error| GpuError::Device(error.to_string()))
     }
 
-    /// Colour (four floats each) and depth of every pixel, without the padding of rows.
+    /// Returns color (four floats each) and depths (two) of every pixel, without the padding of rows.
     fn read_targets(&self, size: UVec2) -> Result<(Vec<f32>, Vec<f32>), GpuError> {
         let Some((color, depth)) = self.view.textures() else { return Ok(Default::default()) };
         Ok((self.read_texture(color, size, 16)?, self.read_texture(depth, size, 8)?))
@@ -304,7 +310,7 @@ impl Headless {
         Ok(rows.map(bytemuck::pod_read_unaligned).collect())
     }
 
-    /// The first `size` bytes of a buffer, waited for.
+    /// Copies the first `size` bytes of a buffer to the host and waits for them.
     ///
     /// # Errors
     /// When the device is lost.
@@ -321,7 +327,7 @@ impl Headless {
     fn read(&self, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
         let (sender, receiver) = std::sync::mpsc::channel();
         buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
-            // The receiver waits below; if it is gone, nobody wants the result.
+            // The receiver waits below; if it is gone, the result is not needed.
             let _ = sender.send(result);
         });
         self.wait()?;
@@ -336,7 +342,7 @@ impl Headless {
     }
 }
 
-/// One capture as trained.
+/// Returns the instance of one capture as trained.
 fn instance<'a>(capture: &'a GpuCapture, active: Option<&'a ActiveList>, view: &View) -> Instance<'a> {
     Instance { capture, active, view: *view, appearance: Appearance::default() }
 }

@@ -1,7 +1,8 @@
 //! One view on the GPU: its working buffers, its targets, and the frame.
 //!
-//! In: captures with a [`View`](crate::view::View) each, a background, the depth of opaque surfaces. Out: a texture of colour
-//! and transmittance and one of expected depth. [`ViewRenderer::prepare`] sizes and fills, [`ViewRenderer::record`] is the frame.
+//! In: captures with a [`View`](crate::view::View) each, a background, the depth of opaque surfaces. Out: a texture of
+//! color and transmittance and one of expected and median depth. [`ViewRenderer::prepare`] sizes and fills the buffers,
+//! [`ViewRenderer::record`] records the frame.
 
 mod readback;
 mod record;
@@ -26,24 +27,25 @@ use wgpu::{BufferUsages, TextureFormat};
 pub struct Instance<'a> {
     /// The capture.
     pub capture: &'a GpuCapture,
-    /// Which of its Gaussians are drawn: prepared for the view's time and recorded before the view is; all without a list.
+    /// The list of the Gaussians that are drawn, prepared for the view's time and recorded before the view is; all are
+    /// drawn if `None`.
     pub active: Option<&'a ActiveList>,
-    /// Where it is seen from, and when.
+    /// Camera and time, with the transform of the capture.
     pub view: View,
     /// Its opacity, light and crop.
     pub appearance: Appearance,
 }
 
-/// What is around the captures of a view, and how they are shown.
+/// The background and the opaque surfaces of a view, and how its captures are shown.
 #[derive(Debug, Clone, Copy)]
 pub struct ViewParameters<'a> {
-    /// What stands behind them.
+    /// What is behind the captures. Default: [`Background::None`].
     pub background: Background,
-    /// What cuts them. Behind an environment map nothing shows where this is given.
+    /// The opaque surfaces that hide splats. If given, what is behind an environment map is hidden. Default: `None`.
     pub opaque: Option<OpaqueDepth<'a>>,
-    /// The space in which they are blended.
+    /// The space in which the captures are blended. Default: [`BlendSpace::Encoded`].
     pub blend_space: BlendSpace,
-    /// What is shown of them.
+    /// What is shown of the captures. Default: [`DebugView::Color`].
     pub debug: DebugView,
 }
 
@@ -54,14 +56,14 @@ impl Default for ViewParameters<'_> {
     }
 }
 
-/// The depth of opaque surfaces that cut the splats, pixel by pixel.
+/// The depth of opaque surfaces that hide splats, pixel by pixel.
 #[derive(Debug, Clone, Copy)]
 pub struct OpaqueDepth<'a> {
-    /// A `Depth32Float` texture, 0 where nothing is.
+    /// A `Depth32Float` texture, 0 where there is no surface.
     pub texture: &'a wgpu::TextureView,
-    /// Its samples for each pixel. Splats are hidden from as large a share of a pixel as samples are before them.
+    /// Number of samples per pixel. A splat is hidden from the share of a pixel whose samples are in front of it.
     pub samples: u32,
-    /// Corner of the view in it, pixels.
+    /// Corner of the view in the texture, pixels.
     pub origin: UVec2,
     /// From its depth `d` to camera space, `[a, b, c, e]` in `z = (a + b d) / (c + e d)`. Reverse-z with an infinite far plane is
     /// `[near, 0, 0, 1]`.
@@ -73,13 +75,13 @@ pub struct OpaqueDepth<'a> {
 pub struct ViewRenderer {
     /// Alignment of dynamic uniform offsets.
     alignment: u32,
-    /// Slots of the frame prepared last.
+    /// Number of slots of the frame prepared last.
     slots: u32,
     /// Whether its opaque depth is multisampled.
     multisampled: bool,
-    /// Pairs that an earlier frame wanted room for.
+    /// Number of pairs for which an earlier frame wanted room.
     pairs_wanted: u32,
-    /// Frames for which there has been far too much room.
+    /// Number of successive frames for which the buffers have been far too large.
     oversized_frames: u32,
     frame: wgpu::Buffer,
     steps: wgpu::Buffer,
@@ -89,35 +91,35 @@ pub struct ViewRenderer {
     no_environment: wgpu::Buffer,
     readback: Readback,
     statistics: ViewStatistics,
-    /// Timestamps, while they are wanted and the device has them.
+    /// Timestamps, if they are measured and the device has them.
     timing: Option<(PassTimer, Readback)>,
     /// Everything whose size depends on the view or the captures.
     resources: Option<Resources>,
 }
 
-/// How many times too large buffers may be, and for how many frames, before they are made anew.
+/// Buffers that are more than this factor too large, for more than this number of frames, are replaced.
 const OVERSIZE_FACTOR: u32 = 4;
 const RELEASE_AFTER_IDLE_FRAMES: u32 = 120;
 
-/// What a finished frame leaves on the GPU, for passes of clients: scoring, a backward pass.
+/// Resources of a finished frame on the GPU, for further passes of clients: scoring, a backward pass.
 #[derive(Debug, Clone, Copy)]
 pub struct FinishedFrame<'a> {
     /// Uniform buffer: one [`layout::FrameUniforms`].
     pub frame: &'a wgpu::Buffer,
     /// Storage buffer: one [`layout::Counters`].
     pub counters: &'a wgpu::Buffer,
-    /// What the passes have written.
+    /// Buffers that the passes have written.
     pub buffers: &'a PassBuffers,
     /// Color over the background and transmittance, `Rgba32Float`.
     pub color: &'a wgpu::TextureView,
-    /// Splats that the buffers have room for.
+    /// Number of splats for which the buffers have room.
     pub slots: u32,
-    /// Pairs that the buffers have room for.
+    /// Number of pairs for which the buffers have room.
     pub pairs: u32,
 }
 
 impl ViewRenderer {
-    /// A view without size; [`prepare`](Self::prepare) gives it one.
+    /// Creates a view without size; [`prepare`](Self::prepare) sets it.
     pub fn new(device: &wgpu::Device, renderer: &Renderer) -> Self {
         let allocator = renderer.allocator(device);
         let alignment = alignment_of::<layout::InstanceUniforms>(device);
@@ -142,8 +144,8 @@ impl ViewRenderer {
         }
     }
 
-    /// Sizes buffers for what is to be drawn, growing them also by what earlier frames counted, and writes the uniforms. Call it
-    /// before the queue is submitted. In the steady state it creates nothing.
+    /// Sizes the buffers for the instances and for the pairs that earlier frames counted, and writes the uniforms. Call
+    /// it before the queue is submitted. In the steady state it creates nothing.
     ///
     /// All instances must have views of the same size and lens.
     ///
@@ -173,7 +175,7 @@ impl ViewRenderer {
             return Err(GpuError::TooLarge { what: "the splats", needed, limit });
         }
         let slots = slots as u32;
-        // Two pairs for each Gaussian are a first guess; counters correct it.
+        // Two pairs for each Gaussian are a first guess; the counters of later frames correct it.
         let pairs = self.pairs_wanted.max(slots.saturating_mul(2)).max(1 << 16).min(max_pairs(device));
         let needed =
             Sizes { slots: slots.next_multiple_of(BLOCK).max(BLOCK), pairs, parts: (parts as u32).max(1), picture };
@@ -202,20 +204,22 @@ impl ViewRenderer {
         Ok(())
     }
 
-    /// Colour `C` (premultiplied, in the blend space) and transmittance: `Rgba32Float`. Before the first
-    /// [`prepare`](Self::prepare) there is none.
+    /// Returns the color `C` (premultiplied, in the blend space) and transmittance: `Rgba32Float`. `None` before the
+    /// first [`prepare`](Self::prepare).
     pub fn color(&self) -> Option<&wgpu::TextureView> {
         self.resources.as_ref().map(|made| &made.color_view)
     }
 
-    /// Camera-space depth: `Rg32Float`. Red is the expected depth `Σ z α T`, not divided by `1 − T`; green the median depth, that of the
-    /// splat at which T falls to one half or below, 0 where none does.
+    /// Returns the camera-space depth: `Rg32Float`. Red is the expected depth `Σ z α T`, not divided by `1 − T`; green
+    /// the median depth, that of the splat at which T falls to one half or below, 0 if it never does. `None` before the
+    /// first [`prepare`](Self::prepare).
     pub fn depth(&self) -> Option<&wgpu::TextureView> {
         self.resources.as_ref().map(|made| &made.depth_view)
     }
 
-    /// Whether GPU time is measured from the next frame on, pass by pass. Results arrive in [`statistics`](Self::statistics) some
-    /// frames later; without timestamps inside passes there are none.
+    /// Sets whether GPU time is measured from the next frame on, pass by pass. Results arrive in
+    /// [`statistics`](Self::statistics) some frames later; there are none if the device has no timestamps inside
+    /// passes.
     pub fn measure(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, renderer: &Renderer, on: bool) {
         if !on {
             self.timing = None;
@@ -229,17 +233,17 @@ impl ViewRenderer {
         }
     }
 
-    /// Work of the view.
+    /// Returns the work of the view.
     pub fn statistics(&self) -> &ViewStatistics {
         &self.statistics
     }
 
-    /// The textures behind [`color`](Self::color) and [`depth`](Self::depth).
+    /// Returns the textures behind [`color`](Self::color) and [`depth`](Self::depth).
     pub(crate) fn textures(&self) -> Option<(&wgpu::Texture, &wgpu::Texture)> {
         self.resources.as_ref().map(|made| (&made.color, &made.depth))
     }
 
-    /// Returns what the frame recorded last leaves on the GPU; `None` before the first.
+    /// Returns the resources of the frame recorded last; `None` before the first [`prepare`](Self::prepare).
     pub fn finished(&self) -> Option<FinishedFrame<'_>> {
         self.resources.as_ref().map(|made| FinishedFrame {
             frame: &self.frame,
@@ -251,33 +255,34 @@ impl ViewRenderer {
         })
     }
 
-    /// The counters of the frame recorded last, on the GPU.
+    /// Returns the counters of the frame recorded last, on the GPU.
     pub(crate) fn counters(&self) -> &wgpu::Buffer {
         &self.counters
     }
 
-    /// Lets the next [`prepare`](Self::prepare) make room for that many pairs and half as many more, if there is hardly enough and
-    /// the device allows it.
+    /// Makes the next [`prepare`](Self::prepare) allocate room for that many pairs and half as many more, if there is
+    /// hardly enough and the device allows it.
     pub(crate) fn make_room(&mut self, pairs: u32) {
-        // Before there is too little: counts arrive some frames late.
+        // The buffers grow early, since counts arrive some frames late.
         if pairs > self.pair_capacity() / 4 * 3 {
             self.pairs_wanted = pairs.saturating_add(pairs / 2);
         }
     }
 
-    /// Pairs there is room for.
+    /// Returns the number of pairs for which there is room.
     pub(crate) fn pair_capacity(&self) -> u32 {
         self.resources.as_ref().map_or(0, |made| made.sizes.pairs)
     }
 
-    /// Gives the memory of working buffers and targets back; the next [`prepare`](Self::prepare) makes them anew.
+    /// Frees the working buffers and targets; the next [`prepare`](Self::prepare) creates them again.
     pub fn release(&mut self) {
         self.resources = None;
         self.pairs_wanted = 0;
         self.statistics = ViewStatistics::default();
     }
 
-    /// Sizes only grow from frame to frame, but what has been far too large for a while is given back.
+    /// Returns the sizes to allocate. Sizes grow from frame to frame, but buffers that have been far too large for a
+    /// while are reduced.
     fn kept_sizes(&mut self, made: Sizes, needed: Sizes) -> Sizes {
         let counted = self.statistics.pairs.saturating_add(self.statistics.pairs / 2).max(1 << 16);
         let oversized = made.slots / OVERSIZE_FACTOR > needed.slots
@@ -296,7 +301,7 @@ impl ViewRenderer {
         }
     }
 
-    /// Takes in what earlier frames have sent back.
+    /// Processes the counters and timestamps of earlier frames that have arrived.
     fn poll(&mut self) {
         if let Some(counters) = self.readback.poll() {
             let counters: Counters = bytemuck::pod_read_unaligned(&counters);
@@ -360,7 +365,7 @@ impl ViewRenderer {
             pair_capacity: made.sizes.pairs,
             background_mode: mode,
             opaque_samples: opaque.map_or(0, |depth| depth.samples),
-            // With opaque depth there is a compositor: it must not see anything behind the map.
+            // With opaque depth a compositor follows: the map must hide what is behind it.
             background: [color[0], color[1], color[2], if opaque.is_some() { 0.0 } else { 1.0 }],
             projection: view.projection.to_array(),
             world_x: column(0),
@@ -379,10 +384,10 @@ impl ViewRenderer {
     }
 }
 
-/// Pairs that fit one binding and one dispatch.
+/// Returns the number of pairs that fit one binding and one dispatch.
 pub(crate) fn max_pairs(device: &wgpu::Device) -> u32 {
     let limits = device.limits();
     let bound = u32::try_from(binding_limit(&limits) / 4).unwrap_or(u32::MAX);
-    // One workgroup takes a block of them.
+    // One workgroup processes a block of them.
     bound.min(limits.max_compute_workgroups_per_dimension.saturating_mul(BLOCK))
 }

@@ -1,6 +1,7 @@
-//! Bytes on their way from the GPU to the host, without anybody waiting.
+//! Asynchronous read-back of buffers from the GPU.
 //!
-//! In: copies recorded into a frame. Out: their bytes, some frames later. While one copy is under way no other is begun.
+//! In: copies recorded into a frame. Out: their bytes, some frames later. While one copy is in progress no other is
+//! started.
 
 use crate::renderer::memory::Allocator;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -36,12 +37,12 @@ impl Readback {
         Self { buffer: allocator.buffer(label, size, wgpu::BufferUsages::MAP_READ), state: State::Idle }
     }
 
-    /// Whether a copy can be begun.
+    /// Returns whether a copy can be started.
     pub fn is_idle(&self) -> bool {
         matches!(self.state, State::Idle)
     }
 
-    /// Records the copy of all of it from the beginning of `source`, if none is under way.
+    /// Records a copy from the beginning of `source` that fills the buffer, unless one is in progress.
     pub fn copy(&mut self, encoder: &mut wgpu::CommandEncoder, source: &wgpu::Buffer) {
         if self.is_idle() {
             encoder.copy_buffer_to_buffer(source, 0, &self.buffer, 0, self.buffer.size());
@@ -49,7 +50,8 @@ impl Readback {
         }
     }
 
-    /// Moves on by one state; the bytes when they have arrived. Call it once a frame, before the next is recorded.
+    /// Advances by one state; returns the bytes if they have arrived, else `None`. Call it once a frame, before the
+    /// next is recorded.
     pub fn poll(&mut self) -> Option<Vec<u8>> {
         let arrival = match &self.state {
             State::Idle => return None,
@@ -65,13 +67,13 @@ impl Readback {
                 self.state = State::Idle;
                 Some(bytes)
             }
-            // It will not be used again: views are made anew on the next device.
+            // It will not be used again: views are created again on the next device.
             Arrival::Lost => None,
         }
     }
 
-    /// Begins to map. Bytes are taken where it is said that they are there: later the device may have been lost, and a look into the
-    /// buffer would panic.
+    /// Starts to map the buffer. The bytes are copied in the callback: later the device may have been lost, and reading
+    /// the buffer would panic.
     fn map(&self) -> Arc<Mutex<Arrival>> {
         let arrival = Arc::new(Mutex::new(Arrival::Expected));
         let (buffer, to) = (self.buffer.clone(), arrival.clone());

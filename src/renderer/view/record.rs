@@ -60,7 +60,8 @@ impl ViewRenderer {
             }
             mark(&mut pass);
 
-            // sort by depth: the first step drops the invisible and counts the rest, the others are sized by that count.
+            // sort by depth: the first step drops the invisible splats and counts the others; the later steps are sized
+            // by that count.
             for step in 0..DEPTH_STEPS {
                 let group = &made.sort_depth[if step == 0 { 0 } else { 2 - (step as usize % 2) }];
                 let blocks = (step == 0).then(|| self.slots.div_ceil(BLOCK));
@@ -104,7 +105,8 @@ impl ViewRenderer {
         self.readback.copy(encoder, &self.counters);
     }
 
-    /// One step of `sort`. `blocks` where the host knows them; otherwise the GPU does, at `offset` of the arguments.
+    /// Records one step of `sort`. `blocks` is the number of workgroups if the host knows it; otherwise the dispatch is
+    /// indirect, at `offset` of the arguments.
     fn sort_step(
         &self,
         renderer: &Renderer,

@@ -1,6 +1,7 @@
-//! Everything of a view whose size depends on the view or the captures, and the bind groups over it.
+//! The resources of a view whose sizes depend on the view or the captures, and the bind groups over them.
 //!
-//! In: sizes, what to cut by and what stands behind. Out: [`Resources`], made anew only when one of these changes.
+//! In: sizes, the opaque depth and the environment map. Out: [`Resources`], created again only when one of these
+//! changes.
 
 use super::ViewRenderer;
 use crate::renderer::layout::{self, BLOCK, DEPTH_STEPS, DIGIT_BITS, DIGITS, SortStep};
@@ -14,21 +15,21 @@ use wgpu::{BufferUsages, TextureFormat};
 #[derive(Debug)]
 pub(super) struct Resources {
     pub sizes: Sizes,
-    /// Of storage buffers and targets.
+    /// Bytes of storage buffers and targets.
     pub bytes: u64,
     pub instances: wgpu::Buffer,
-    /// What `score` reads beside the frame.
+    /// Buffers that later passes, such as `score`, can read.
     pub buffers: PassBuffers,
     pub color: wgpu::Texture,
     pub color_view: wgpu::TextureView,
     pub depth: wgpu::Texture,
     pub depth_view: wgpu::TextureView,
-    /// What the bind groups were made for, apart from sizes.
+    /// Opaque depth that the bind groups were created for, like `multisampled` and `environment`.
     pub opaque: wgpu::TextureView,
     pub multisampled: bool,
     pub environment: wgpu::Buffer,
     pub project: wgpu::BindGroup,
-    /// From the projected keys into the first pair of buffers, from there into the second, and back.
+    /// Bind groups from the projected keys into the first pair of buffers, from there into the second, and back.
     pub sort_depth: [wgpu::BindGroup; 3],
     pub sort_tiles: [wgpu::BindGroup; 2],
     pub arguments: wgpu::BindGroup,
@@ -54,19 +55,19 @@ pub struct PassBuffers {
     pub depth_keys: wgpu::Buffer,
 }
 
-/// What [`Resources`] have room for.
+/// What [`Resources`] has room for.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Sizes {
     pub slots: u32,
     pub pairs: u32,
     /// Instance uniforms.
     pub parts: u32,
-    /// Of the picture, pixels.
+    /// Size of the picture, pixels.
     pub picture: UVec2,
 }
 
 impl ViewRenderer {
-    /// Makes them all.
+    /// Creates the resources.
     pub(super) fn make(
         &self,
         device: &wgpu::Device,
@@ -131,11 +132,11 @@ impl ViewRenderer {
             offset: 0,
             size: std::num::NonZeroU64::new(size_of::<layout::InstanceUniforms>() as u64),
         });
-        // After an even number of steps the pairs are back where they were made.
+        // After an even number of steps the pairs are in the buffers that `bin` wrote.
         let sorted = tile_steps(size) as usize % 2;
         Resources {
             sizes,
-            // 16 bytes of colour and 8 of depth for each pixel.
+            // 16 bytes of color and 8 of depth for each pixel.
             bytes: bytes.get() + u64::from(size.x) * u64::from(size.y) * 24,
             project: allocator.bind_group(
                 "gs4d project",
@@ -143,7 +144,7 @@ impl ViewRenderer {
                 &[instance, splats.as_entire_binding(), depth_keys.as_entire_binding()],
             ),
             sort_depth: [
-                // The values of the first step are the indices: what is bound for them is not read.
+                // The values of the first step are the indices, so the buffer bound for them is not read.
                 sort(&depth_keys, &order[1], &keys[0], &order[0]),
                 sort(&keys[0], &order[0], &keys[1], &order[1]),
                 sort(&keys[1], &order[1], &keys[0], &order[0]),
@@ -206,7 +207,7 @@ impl ViewRenderer {
         }
     }
 
-    /// The steps of both sorts: by all bits of the depth, then by the bits of the tile.
+    /// Writes the steps of both sorts: by all bits of the depth, then by the bits of the tile.
     fn write_steps(&self, queue: &wgpu::Queue, stride: u32) {
         let mut bytes = vec![0; (self.alignment * 2 * DEPTH_STEPS) as usize];
         for index in 0..2 * DEPTH_STEPS {
@@ -223,7 +224,7 @@ impl ViewRenderer {
     }
 }
 
-/// Steps that order by tile.
+/// Returns the number of steps that sort by tile.
 pub(super) fn tile_steps(size: UVec2) -> u32 {
     let tiles = tiles(size);
     (u32::BITS - (tiles.x * tiles.y - 1).leading_zeros()).div_ceil(DIGIT_BITS)

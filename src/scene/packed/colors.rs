@@ -1,54 +1,55 @@
-//! Colors by codebook: a first coefficient each, and the rest as a sum of entries of up to four codebooks, one from each.
+//! Colors coded by codebooks: a first coefficient for each Gaussian, and the others as a sum of entries, one from each
+//! of up to four codebooks.
 //!
-//! In: first coefficients, and codebooks with a code for every Gaussian. Out: [`CodedColors`], the words that the GPU reads; and back
-//! to coefficients. How codebooks are trained is another matter (`offline::quantize::codebook`).
+//! In: first coefficients, and codebooks with a code for every Gaussian. Out: [`CodedColors`], the words that the GPU
+//! reads; and the coefficients decoded from them. `offline::quantize::codebook` trains the codebooks.
 
 use super::lanes::{self, BASE_MAX, COLOR_WORDS, MAX_STAGES};
 use crate::gaussian::{Harmonics, harmonics};
 use glam::Vec3;
 
-/// Colors by codebook.
+/// Colors coded by codebooks.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct CodedColors {
-    /// Spatial degree evaluated.
+    /// Spatial degree evaluated, 0 to 3.
     pub degree: u32,
-    /// Time degree evaluated.
+    /// Time degree evaluated, 0 to 2.
     pub degree_t: u32,
-    /// One record each: the first coefficient (10 bits for each channel), then four codes of 16 bits.
+    /// One record for each Gaussian: the first coefficient (10 bits for each channel), then four codes of 16 bits.
     pub records: Vec<[u32; COLOR_WORDS]>,
-    /// Entries of each codebook.
+    /// Number of entries of each codebook.
     pub entries: Vec<u32>,
     /// All codebooks: `words_per_entry` words for each entry, four signed bytes to a word, RGB innermost, first coefficient 0.
     pub codebooks: Vec<u32>,
-    /// What a byte of 127 stands for: `words_per_entry` four-vectors for each codebook.
+    /// Value of a byte of 127: `words_per_entry` four-vectors for each codebook.
     pub scales: Vec<[f32; 4]>,
 }
 
 impl CodedColors {
-    /// Coefficients per Gaussian and channel: 1, 4, 9, 16, 32 or 48.
+    /// Returns the number of coefficients per Gaussian and channel: 1, 4, 9, 16, 32 or 48.
     pub fn coefficients(&self) -> usize {
         harmonics::evaluated(self.degree, self.degree_t)
     }
 
-    /// Words of one entry of a codebook.
+    /// Returns the number of words of one entry of a codebook.
     pub fn words_per_entry(&self) -> usize {
         (self.coefficients() * 3).div_ceil(4)
     }
 
-    /// Bytes in memory.
+    /// Returns the bytes in memory.
     pub fn size(&self) -> usize {
         size_of_val(self.records.as_slice())
             + size_of_val(self.codebooks.as_slice())
             + size_of_val(self.scales.as_slice())
     }
 
-    /// Colors of these degrees from the first coefficient of each Gaussian, RGB, without any codebook yet; and the ends of the range
-    /// within which the first coefficients lie. They keep `bits` bits for each channel, 1 to 10.
+    /// Creates colors of these degrees, without codebooks, from the first coefficient of each Gaussian, RGB, quantized
+    /// to `bits` bits for each channel, 1 to 10. Also returns the range (low, high) of the first coefficients.
     pub fn of_base(degree: u32, degree_t: u32, base: &[[f32; 3]], bits: u32) -> (Self, [f32; 2]) {
         let values = base.as_flattened().iter();
         let (low, high) = values.fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
         let (low, size) = if low > high { (0.0, 0.0) } else { (low, high - low) };
-        // A base of fewer bits takes so many of the 1024 values, the first and last among them.
+        // Fewer bits use fewer of the 1024 values, the first and the last included.
         let levels = ((1u32 << bits.clamp(1, 10)) - 1) as f32;
         let place = |value: f32| {
             let level = if size > 0.0 { ((value - low) / size * levels).round() } else { 0.0 };
@@ -58,9 +59,12 @@ impl CodedColors {
         (Self { degree, degree_t, records, ..Self::default() }, [low, low + size * (BASE_MAX / 1022.0)])
     }
 
-    /// Adds a codebook, which must be at most the fourth. A row holds every coefficient but the first, RGB innermost: `entries` are rows
-    /// of signed bytes, one after the other, `scales` is one row of what a byte of 127 stands for, and `codes` has the entry of each
+    /// Adds a codebook. A row holds every coefficient but the first, RGB innermost: `entries` are rows of signed bytes,
+    /// one after the other, `scales` is one row with the values of a byte of 127, and `codes` has the entry of each
     /// Gaussian.
+    ///
+    /// # Panics
+    /// If there are four codebooks already, or if `scales` is empty or longer than a row.
     pub fn push_codebook(&mut self, entries: &[i8], scales: &[f32], codes: &[u16]) {
         let (stage, words) = (self.entries.len(), self.words_per_entry());
         let rows = entries.chunks_exact(scales.len());
@@ -75,12 +79,18 @@ impl CodedColors {
         }
     }
 
-    /// The code of a Gaussian in one of the codebooks.
+    /// Returns the code of a Gaussian in the codebook with the index `stage`.
+    ///
+    /// # Panics
+    /// If `index` or `stage` is out of range.
     pub fn code(&self, index: usize, stage: usize) -> u32 {
         lanes::unpack_code(self.records[index], stage)
     }
 
-    /// All coefficients but the first (which is 0 here), RGB innermost, padded to whole words.
+    /// Returns all coefficients of a Gaussian but the first (which is 0 here), RGB innermost, padded to whole words.
+    ///
+    /// # Panics
+    /// If `index` is out of range.
     pub fn rest(&self, index: usize) -> Vec<f32> {
         let words = self.words_per_entry();
         let mut rest = vec![0.0; words * 4];
@@ -98,12 +108,12 @@ impl CodedColors {
         rest
     }
 
-    /// The first coefficient of a Gaussian; `low` and `size` are the range within which it lies.
+    /// Returns the first coefficient of a Gaussian; `low` and `size` are its range.
     fn base(&self, index: usize, [low, size]: [f32; 2]) -> Vec3 {
         Vec3::from(lanes::unpack_base(self.records[index]).map(|place| low + place as f32 / BASE_MAX * size))
     }
 
-    /// Color of one Gaussian, whose first coefficient lies in the range `base`; see [`Harmonics::color`].
+    /// Returns the color of one Gaussian, whose first coefficient is in the range `base`; see [`Harmonics::color`].
     pub(super) fn color(&self, index: usize, base: [f32; 2], direction: Vec3, tau: f32, time_span: f32) -> Vec3 {
         let basis = harmonics::basis(direction);
         let rest = self.rest(index);
@@ -119,7 +129,7 @@ impl CodedColors {
         (color + 0.5).max(Vec3::ZERO)
     }
 
-    /// All coefficients of all Gaussians, whose first coefficients lie in the range `base`.
+    /// Returns all coefficients of all Gaussians, whose first coefficients are in the range `base`.
     pub(super) fn harmonics(&self, base: [f32; 2]) -> Harmonics {
         let coefficients = self.coefficients();
         let mut values = Vec::with_capacity(self.records.len() * coefficients * 3);
@@ -130,7 +140,7 @@ impl CodedColors {
         Harmonics { coefficients, degree: self.degree, degree_t: self.degree_t, values }
     }
 
-    /// Whether the parts fit together for `count` Gaussians and every code has an entry.
+    /// Checks that the parts fit together for `count` Gaussians and every code has an entry.
     pub(super) fn check(&self, count: usize) -> Result<(), &'static str> {
         if self.degree > 3 || self.degree_t > 2 {
             return Err("a degree of colour that does not exist");
@@ -155,7 +165,7 @@ impl CodedColors {
     }
 }
 
-/// A row behind a first coefficient of 0, padded to whole words.
+/// Returns a row after a first coefficient of 0, padded to whole words.
 fn padded<T: Copy + Default>(row: &[T], words: usize) -> Vec<[T; 4]> {
     let mut fours = vec![[T::default(); 4]; words];
     fours.as_flattened_mut()[3..][..row.len()].copy_from_slice(row);

@@ -10,7 +10,10 @@ use glam::Vec3;
 use std::f32::consts::FRAC_1_SQRT_2;
 
 impl PackedScene {
-    /// Decodes one Gaussian; panics beyond the end, as a slice does.
+    /// Decodes one Gaussian.
+    ///
+    /// # Panics
+    /// If `index` is out of range.
     pub fn gaussian(&self, index: usize) -> Gaussian {
         let record = lanes::unpack(self.records[index]);
         let part = |lane: usize| f32::from(record[lane]) / LANE_MAX;
@@ -46,7 +49,10 @@ impl PackedScene {
         }
     }
 
-    /// Color of one Gaussian; see [`Harmonics::color`](crate::gaussian::Harmonics::color).
+    /// Returns the color of one Gaussian; see [`Harmonics::color`](crate::gaussian::Harmonics::color).
+    ///
+    /// # Panics
+    /// If `index` is out of range.
     pub fn color(&self, index: usize, direction: Vec3, tau: f32, time_span: f32) -> Vec3 {
         match &self.colors {
             PackedColors::Whole(harmonics) => harmonics.color(index, direction, tau, time_span),
@@ -57,7 +63,7 @@ impl PackedScene {
         }
     }
 
-    /// Every Gaussian and every coefficient, decoded.
+    /// Decodes every Gaussian and every coefficient.
     pub fn unpack(self) -> Sliced {
         let gaussians = (0..self.len()).map(|index| self.gaussian(index)).collect();
         let harmonics = match self.colors {

@@ -1,8 +1,8 @@
 //! Encoding: from sliced Gaussians to the records and ranges of the packed form.
 //!
-//! In: Gaussians in the order in which they will be stored, how many bits each attribute gets, and colors that are packed already.
-//! Out: a [`PackedScene`]. An attribute of fewer than 16 bits leaves the low bits of its lanes zero, which costs nothing on disk; the
-//! largest splats keep all 16, since the picture shows their errors first.
+//! In: Gaussians in the order in which they will be stored, the number of bits of each attribute, and colors that are
+//! packed already. Out: a [`PackedScene`]. An attribute of fewer than 16 bits leaves the low bits of its lanes zero,
+//! which costs nothing on disk; the largest splats keep all 16, since their errors are the most visible.
 
 use super::lanes::{self, ALWAYS, AT_REST, BlockRanges, FARTHEST, LANE_MAX, SharedRanges};
 use super::shape::{Shape, smallest_three};
@@ -12,11 +12,12 @@ use crate::scene::Bounds;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// The smallest scale that is distinguished from none, as a part of the radius of the middle of the scene. Trained captures have scales a
-/// thousand times smaller yet, which no picture shows and which would waste half the range; this floor costs nothing up to 100 dB.
+/// Smallest scale that is stored, as a fraction of the radius of [`Bounds::core`]; smaller ones are raised to it.
+/// Trained captures have scales a thousand times smaller, which are not visible and would waste half the range. This
+/// floor has no visible effect up to 100 dB.
 const FLATTEST: f32 = 1.0 / 16_384.0;
 
-/// Bits of each attribute, and who gets more.
+/// Number of bits of each attribute.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Bits {
     /// Mean, per axis, within the box of its block; 1 to 16.
@@ -35,14 +36,14 @@ pub struct Bits {
     pub opacity: u32,
     /// Base color, per channel, where colors are coded; 1 to 10.
     pub base: u32,
-    /// Share of the Gaussians, those with the largest splats, that keep 16 bits for scale, rotation and mean.
+    /// Share of the Gaussians, those with the largest splats, that keep 16 bits for scale, rotation and mean; 0 to 1.
     pub escape: f32,
 }
 
 impl PackedScene {
-    /// Packs Gaussians in their order. `base` are the ends of the range of coded first coefficients, as
-    /// [`CodedColors::of_base`](super::CodedColors::of_base) returns them; `reach` is the longest time over which motion matters, the
-    /// length of the time interval in timestamp units.
+    /// Packs Gaussians, keeping their order. `base` is the range (low, high) of coded first coefficients, as
+    /// [`CodedColors::of_base`](super::CodedColors::of_base) returns it; `reach` is the longest time over which motion
+    /// matters, the length of the time interval in timestamp units.
     pub fn encode(gaussians: &[Gaussian], bits: &Bits, colors: PackedColors, base: [f32; 2], reach: f32) -> Self {
         let radius = Bounds::core(gaussians.iter().copied()).map_or(0.0, Bounds::radius);
         let flattest = f64::from(radius * FLATTEST);
@@ -65,7 +66,7 @@ impl PackedScene {
         let [sigma_low, sigma_size] = shared.log_sigma_t.map(f64::from);
         let deviation =
             |gaussian: &Gaussian| quantizers.sigma_t.encode(sigma.place(f64::from(gaussian.sigma_t).ln()), false);
-        // Within one σ_t as it will be decoded, so that its error does not change the velocity.
+        // Within one σ_t as it will be decoded, so that the error of σ_t does not change the velocity.
         let displacement = |gaussian: &Gaussian| {
             let sigma_t = (sigma_low + f64::from(deviation(gaussian)) / f64::from(LANE_MAX) * sigma_size).exp();
             gaussian.velocity.map(|velocity| f64::from(velocity) * sigma_t.min(f64::from(reach)))
@@ -112,7 +113,7 @@ impl PackedScene {
     }
 }
 
-/// Places `k · step` of a lane with `k` from 0 to `levels`: those of so many bits.
+/// Quantizes to the lane values `k · step` with `k` from 0 to `levels`.
 #[derive(Clone, Copy)]
 struct Quantizer {
     levels: f64,
@@ -125,24 +126,24 @@ impl Quantizer {
         Self { levels: f64::from((1u32 << bits) - 1), step: f64::from(1u32 << (16 - bits)) }
     }
 
-    /// The value at the upper end.
+    /// Returns the largest lane value.
     fn top(self) -> f64 {
         self.levels * self.step
     }
 
-    /// What a range must grow by, since lanes are read as parts of 65535.
+    /// Returns the factor by which a range must grow, since lanes are decoded as fractions of 65535.
     fn stretch(self) -> f64 {
         f64::from(LANE_MAX) / self.top()
     }
 
-    /// A place between 0 and 1; with all bits if `fine`.
+    /// Returns the lane value of a position in a range, 0 to 1; with all bits if `fine`.
     fn encode(self, place: f64, fine: bool) -> u16 {
         let place = place.clamp(0.0, 1.0);
         if fine { (place * self.top()).round() as u16 } else { ((place * self.levels).round() * self.step) as u16 }
     }
 }
 
-/// The ends of some values.
+/// The range of some values.
 #[derive(Clone, Copy)]
 struct Span {
     low: f64,
@@ -152,7 +153,7 @@ struct Span {
 impl Span {
     fn of(values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-        // Ends are stored in single precision: what they enclose must not fall outside.
+        // The low end is rounded to single precision, as it is stored.
         if low > high { Self { low: 0.0, size: 0.0 } } else { Self { low: f64::from(low as f32), size: high - low } }
     }
 
@@ -160,7 +161,7 @@ impl Span {
         if self.size > 0.0 { (value - self.low) / self.size } else { 0.0 }
     }
 
-    /// Low end and size as they are stored for a lane of this quantizer.
+    /// Returns low end and size as they are stored for a lane of this quantizer.
     fn range(self, quantizer: Quantizer) -> [f32; 2] {
         [self.low as f32, (self.size * quantizer.stretch()) as f32]
     }
@@ -183,7 +184,7 @@ impl Quantizers {
             mean: Quantizer::new(bits.mean),
             mean_t: Quantizer::new(bits.mean_t),
             velocity_bits: bits.velocity.clamp(2, 16),
-            // The top value of 16 bits means something else.
+            // With 16 bits the largest value would be `ALWAYS`.
             sigma_t: Quantizer::new(bits.sigma_t.min(15)),
             scale: Quantizer::new(bits.scale),
             rotation: Quantizer::new(bits.rotation),
@@ -191,13 +192,14 @@ impl Quantizers {
         }
     }
 
-    /// The largest step away from the middle.
+    /// Returns the largest difference from the middle of a lane.
     fn velocity_top(&self) -> f64 {
         let levels = (1u32 << (self.velocity_bits - 1)) - 1;
         f64::from(levels << (16 - self.velocity_bits))
     }
 
-    /// A part of the largest displacement, −1 to 1, as its signed square root: small ones are the most.
+    /// Returns the lane value of a fraction of the largest displacement, −1 to 1: its signed square root, since most
+    /// displacements are small.
     fn encode_velocity(&self, part: f64) -> u16 {
         let step = f64::from(1u32 << (16 - self.velocity_bits));
         let root = part.abs().sqrt().min(1.0).copysign(part);
@@ -205,7 +207,7 @@ impl Quantizers {
     }
 }
 
-/// The Gaussians whose splats are largest and most opaque.
+/// Returns for each Gaussian whether its splats are among the largest and most opaque.
 fn largest(gaussians: &[Gaussian], shapes: &[Shape], share: f32) -> Vec<bool> {
     let count = ((gaussians.len() as f32 * share.clamp(0.0, 1.0)).round() as usize).min(gaussians.len());
     let size =

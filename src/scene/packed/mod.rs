@@ -1,11 +1,11 @@
-//! The packed form: what [`encode`] makes and the GPU reads as it is, without unpacking it in memory.
+//! The packed form: the result of [`encode`], which the GPU reads without unpacking it in memory.
 //!
-//! In: quantized records of 32 bytes, ranges to read them with, and colors, whole or by codebook. Out: any one Gaussian or color,
-//! decoded, as `shaders/shared/packed.wgsl` decodes it.
+//! In: quantized records of 32 bytes, ranges to decode them with, and colors, whole or coded by codebooks. Out: any one
+//! Gaussian or color, decoded as `shaders/shared/packed.wgsl` decodes it.
 //!
-//! | file | what it says |
+//! | file | content |
 //! |---|---|
-//! | `lanes.rs` | which value lies where in a record, and between which ends: the encoder and the decoder go by it |
+//! | `lanes.rs` | the position and the range of each value in a record, for the encoder and the decoder |
 //! | `encode.rs` | from Gaussians to records and ranges |
 //! | `decode.rs` | from records and ranges to Gaussians and colors |
 //! | `shape.rs` | a covariance as scales and a rotation, and back |
@@ -25,9 +25,10 @@ use crate::gaussian::Harmonics;
 /// Packed Gaussians and their color.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PackedScene {
-    /// One record each: sixteen lanes, two to a word, the first in the lower half.
+    /// One record for each Gaussian: sixteen lanes, two to a word, the first in the lower half.
     pub records: Vec<[u32; RECORD_WORDS]>,
-    /// Ends of the lanes: [`SHARED_RANGES`] four-vectors for all Gaussians, then [`BLOCK_RANGES`] for each [`BLOCK`] of them.
+    /// Ranges of the lanes: [`SHARED_RANGES`] four-vectors for all Gaussians, then [`BLOCK_RANGES`] for each [`BLOCK`]
+    /// of them.
     pub ranges: Vec<[f32; 4]>,
     /// Their color.
     pub colors: PackedColors,
@@ -38,22 +39,22 @@ pub struct PackedScene {
 pub enum PackedColors {
     /// Every coefficient, in single precision.
     Whole(Harmonics),
-    /// By codebook.
+    /// Coded by codebooks.
     Coded(CodedColors),
 }
 
 impl PackedScene {
-    /// Number of Gaussians.
+    /// Returns the number of Gaussians.
     pub fn len(&self) -> usize {
         self.records.len()
     }
 
-    /// Whether there is no Gaussian.
+    /// Returns whether there is no Gaussian.
     pub fn is_empty(&self) -> bool {
         self.records.is_empty()
     }
 
-    /// Bytes in memory, on the host and on the GPU alike.
+    /// Returns the bytes in host memory.
     pub fn size(&self) -> usize {
         let colors = match &self.colors {
             PackedColors::Whole(harmonics) => size_of_val(harmonics.values.as_slice()),
@@ -62,15 +63,16 @@ impl PackedScene {
         size_of_val(self.records.as_slice()) + size_of_val(self.ranges.as_slice()) + colors
     }
 
-    /// How many ranges `count` Gaussians need.
+    /// Returns the number of ranges (four-vectors) that `count` Gaussians need.
     pub fn range_count(count: usize) -> usize {
         SHARED_RANGES + BLOCK_RANGES * count.div_ceil(BLOCK)
     }
 
-    /// Whether the records, ranges and coded colors fit together and every code has an entry: then decoding them cannot panic.
+    /// Checks that the records, ranges and coded colors fit together and every code has an entry, so that decoding them
+    /// cannot panic.
     ///
     /// # Errors
-    /// What does not fit, in words.
+    /// A description of what does not fit.
     pub fn check(&self) -> Result<(), &'static str> {
         if self.ranges.len() != Self::range_count(self.len()) {
             return Err("the ranges do not fit the number of Gaussians");

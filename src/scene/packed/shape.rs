@@ -1,12 +1,12 @@
 //! Shapes: a covariance as scales and a rotation, and a rotation as three of its four components.
 //!
-//! In: the covariance of a Gaussian. Out: the logarithms of its scales, and which component of the rotation is the largest beside the
-//! other three; and back.
+//! In: the covariance of a Gaussian. Out: the logarithms of its scales, the three smaller components of its rotation
+//! and which component is the largest; and back.
 
 use crate::gaussian::Gaussian;
 use glam::{DMat3, DQuat, DVec3, Mat3, Quat, Vec3};
 
-/// A covariance taken apart.
+/// A covariance, decomposed.
 pub(super) struct Shape {
     /// Logarithm of the scale along each rotated axis.
     pub log_scale: DVec3,
@@ -15,7 +15,7 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    /// Scales, none below the `flattest`, and rotation of the conditional covariance.
+    /// Returns the scales, at least `flattest`, and the rotation of the conditional covariance.
     pub fn of(gaussian: &Gaussian, flattest: f64) -> Self {
         let [xx, xy, xz, yy, yz, zz] = gaussian.covariance.map(f64::from);
         let covariance = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
@@ -23,7 +23,7 @@ impl Shape {
         if vectors.determinant() < 0.0 {
             vectors.z_axis = -vectors.z_axis;
         }
-        // Rounding can leave a flat Gaussian a variance below zero.
+        // Rounding can make a variance of a flat Gaussian negative.
         let floor = (flattest * flattest).max(values.max_element() * 1e-12).max(1e-30);
         Self {
             log_scale: values.max(DVec3::splat(floor)).map(|v| 0.5 * v.ln()),
@@ -32,14 +32,14 @@ impl Shape {
     }
 }
 
-/// The covariance xx, xy, xz, yy, yz, zz of these scales along the rotated axes.
+/// Returns the covariance xx, xy, xz, yy, yz, zz of these scales along the rotated axes.
 pub(super) fn covariance(scale: Vec3, rotation: Quat) -> [f32; 6] {
     let m = Mat3::from_quat(rotation) * Mat3::from_diagonal(scale);
     let Mat3 { x_axis: x, y_axis: y, z_axis: z } = m * m.transpose();
     [x.x, x.y, x.z, y.y, y.z, z.z]
 }
 
-/// Eigenvalues and eigenvectors (columns) of a symmetric matrix, by Jacobi's rotations.
+/// Returns eigenvalues and eigenvectors (columns) of a symmetric matrix, by Jacobi rotations.
 fn eigen(mut a: DMat3) -> (DVec3, DMat3) {
     let mut vectors = DMat3::IDENTITY;
     // Convergence is quadratic: a dozen sweeps are more than enough.
@@ -66,7 +66,8 @@ fn eigen(mut a: DMat3) -> (DVec3, DMat3) {
     (DVec3::new(a.x_axis.x, a.y_axis.y, a.z_axis.z), vectors)
 }
 
-/// The three smaller components in the order w, x, y, z, with the sign that makes the largest positive, and which that is.
+/// Returns the three smaller components in the order w, x, y, z, with the sign that makes the largest positive, and the
+/// index of the largest.
 pub(super) fn smallest_three(q: DQuat) -> ([f64; 3], u16) {
     let all = [q.w, q.x, q.y, q.z];
     let largest = (0..4).fold(0, |best, i| if all[i].abs() > all[best].abs() { i } else { best });
@@ -75,7 +76,7 @@ pub(super) fn smallest_three(q: DQuat) -> ([f64; 3], u16) {
     (std::array::from_fn(|_| others.next().unwrap_or_default()), largest as u16)
 }
 
-/// The unit quaternion whose largest component was left out; `three` are the others in the order w, x, y, z.
+/// Returns the unit quaternion whose largest component was left out; `three` are the others in the order w, x, y, z.
 pub(super) fn with_largest(three: Vec3, largest: u16) -> Quat {
     let rest = (1.0 - three.length_squared()).max(0.0).sqrt();
     let [a, b, c] = three.to_array();

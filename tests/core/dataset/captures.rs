@@ -1,4 +1,7 @@
-//! The real captures, found through `GS4D_DATA`.
+//! The datasets of trained captures.
+//!
+//! In: the folder named by `GS4D_DATA`; skipped without it. Out: proof that their cameras and images are those of the
+//! original.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +16,7 @@ fn capture(name: &str) -> Option<PathBuf> {
     Some(data()?.join(name))
 }
 
-/// Every golden view has the camera that the transforms file gives for the same image.
+/// Checks that every golden view has the camera that the transforms file gives for the same image.
 fn assert_golden_cameras(folder: &Path, golden: &str, options: &CameraOptions) {
     let views = Dataset::open(folder, Split::Test, options).expect("a dataset").views;
     let golden = CameraFile::load(&folder.join(golden), &CameraOptions::default()).expect("golden views");
@@ -57,7 +60,7 @@ fn standup_at_resolution_two_equals_the_originals_values() {
     assert!(dataset.views.iter().all(|view| view.camera.size == UVec2::splat(400)), "800 halved");
     assert_golden_cameras(&folder, "standup_golden.json", &options);
     let image = dataset.views[0].load_image([0.0; 3], ImageMode::InMemory).expect("an image");
-    // Worked out with numpy and Pillow.
+    // Computed with numpy and Pillow.
     let pixel = image.picture.pixel(200, 200);
     assert!(pixel.abs_diff_eq(Vec3::new(0.6431373, 0.28235295, 0.22352941), 1e-6), "{pixel}");
     let mean = image.picture.pixels.iter().map(|p| p.as_dvec3().element_sum()).sum::<f64>() / (3.0 * 400.0 * 400.0);

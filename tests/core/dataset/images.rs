@@ -1,4 +1,7 @@
-//! Image values, equal to those of numpy and Pillow, and images that are missing or damaged.
+//! Images of datasets.
+//!
+//! In: small images written to temporary folders. Out: proof that their values are those of numpy and Pillow, and that
+//! missing and damaged images are named.
 
 use std::fs;
 
@@ -12,7 +15,7 @@ use serde_json::json;
 
 use super::{Folder, frame, noise, resolution_option, transforms, with};
 
-// What numpy and Pillow 9.5 make of `rgba_noise(13 * 9, 4)` and, for the mask, of `noise(13 * 9, 5)`, at 6x4.
+// The results of numpy and Pillow 9.5 for `rgba_noise(13 * 9, 4)` and, for the mask, for `noise(13 * 9, 5)`, at 6x4.
 #[rustfmt::skip]
 const IN_MEMORY_BLACK: [u8; 96] = [
     100, 157, 85, 89, 125, 170, 65, 124, 92, 152, 70, 102, 140, 106, 129, 122, 92, 127, 21, 94, 71, 100, 82, 96, 131,
@@ -32,7 +35,7 @@ const MASK: [u8; 24] = [
     128, 141, 134, 113, 139, 111, 136, 106, 90, 94, 131, 78, 143, 131, 95, 131, 141, 104, 113, 136, 94, 141, 88, 102,
 ];
 
-/// RGBA noise with many pixels fully covered and fully empty.
+/// Returns RGBA noise with many pixels fully covered and fully empty.
 fn rgba_noise(pixels: usize, state: u32) -> Vec<u8> {
     let mut bytes = noise(pixels * 4, state);
     for alpha in bytes.iter_mut().skip(3).step_by(4) {
@@ -45,7 +48,7 @@ fn rgba_noise(pixels: usize, state: u32) -> Vec<u8> {
     bytes
 }
 
-/// A view of 13x9 RGBA noise, to be loaded at 6x4.
+/// Returns a view of 13x9 RGBA noise, to be loaded at 6x4.
 fn noise_view(folder: &Folder, mask: bool) -> TrainingView {
     let image = RgbaImage::from_raw(13, 9, rgba_noise(13 * 9, 4)).expect("enough bytes");
     image.save(folder.path().join("a.png")).expect("an image");

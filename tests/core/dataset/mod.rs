@@ -1,7 +1,8 @@
 //! Datasets.
 //!
-//! In: small camera files and images written to temporary folders, and the real captures where they are at hand. Here: cameras in every
-//! form and their sizes; beside it [`images`], what is [`wrong`], and [`captures`].
+//! In: small camera files and images written to temporary folders; with `GS4D_DATA` set, trained captures. Out: proof
+//! that cameras in every form and their sizes are read as in the original; images, invalid files and trained captures
+//! are tested in [`images`], [`wrong`] and [`captures`].
 
 mod captures;
 mod images;
@@ -16,7 +17,7 @@ use glam::{Mat4, UVec2, Vec3, Vec4};
 use image::RgbImage;
 use serde_json::{Value, json};
 
-/// Bytes of a linear congruential generator.
+/// Returns bytes of a linear congruential generator.
 fn noise(count: usize, mut state: u32) -> Vec<u8> {
     let next = || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -25,7 +26,7 @@ fn noise(count: usize, mut state: u32) -> Vec<u8> {
     std::iter::repeat_with(next).take(count).collect()
 }
 
-/// A dataset folder that disappears with it.
+/// A dataset folder that is deleted when this is dropped.
 struct Folder(tempfile::TempDir);
 
 impl Folder {
@@ -63,12 +64,12 @@ fn frame(file: &str) -> Value {
     json!({"file_path": file, "transform_matrix": identity()})
 }
 
-/// A Blender file of one frame, 800x400, whose entries can be changed.
+/// Returns a Blender file of one frame, 800x400, whose entries can be changed.
 fn transforms() -> Value {
     json!({"camera_angle_x": 0.8, "w": 800, "h": 400, "frames": [frame("./a")]})
 }
 
-/// The JSON with the value at a pointer replaced, or added to an object.
+/// Returns the JSON with the value at a pointer replaced, or added to an object.
 fn with(mut json: Value, pointer: &str, value: Value) -> Value {
     let (parent, key) = pointer.rsplit_once('/').expect("a JSON pointer");
     match json.pointer_mut(parent).expect("the parent exists") {
@@ -87,7 +88,8 @@ fn load_one(json: &Value, options: &CameraOptions) -> TrainingView {
     load(json, options).expect("a valid camera file").remove(0)
 }
 
-/// The tangents of a FoV camera, or focal lengths and principal point of an intrinsics camera.
+/// Returns whether a view has a FoV camera, and its tangents, or the focal lengths and the principal point of an
+/// intrinsics camera.
 fn lens_values(view: &TrainingView) -> (bool, Vec<f32>) {
     match view.camera.lens {
         Lens::Fov { tan } => (true, tan.to_array().to_vec()),

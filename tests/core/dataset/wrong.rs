@@ -1,4 +1,7 @@
-//! Camera files and options that are wrong: a clear error, never a panic.
+//! Invalid camera files and options.
+//!
+//! In: camera files with invalid entries, random values and random bytes. Out: proof that each gives an error that
+//! names it, never a panic.
 
 use std::ffi::OsStr;
 use std::path::Path;
@@ -103,7 +106,7 @@ fn folders_that_are_not_utf8_work() {
     assert_eq!(views[0].image, path.with_file_name("./a.png"), "the folder's bytes are kept");
 }
 
-/// Any small JSON value.
+/// Generates any small JSON value.
 fn any_json() -> impl Strategy<Value = Value> {
     let leaf = prop_oneof![
         Just(Value::Null),
@@ -116,7 +119,7 @@ fn any_json() -> impl Strategy<Value = Value> {
     leaf.prop_recursive(2, 16, 4, |inner| proptest::collection::vec(inner, 0..5).prop_map(Value::from))
 }
 
-/// What holds for every file: a usable list of views, or an error that names the file.
+/// Checks what holds for every file: a usable list of views, or an error that names the file.
 fn check_outcome(outcome: Result<Vec<TrainingView>, DatasetError>) -> Result<(), TestCaseError> {
     match outcome {
         Ok(views) => {

@@ -1,9 +1,9 @@
 //! The rings: no module uses one that lies further out, and the files of a folder build on each other in one direction.
 //!
-//! In: the text of every file in `src/`. Out: the paths that point outwards or lead round in a circle, each with its file and line; there
-//! must be none.
+//! In: the text of every file in `src/`. Out: proof that no path points outwards and none is part of a circle; a
+//! failure lists those that do, with file and line.
 //!
-//! Comments and strings do not count; unit tests do. What a file uses without naming it, such as a method, goes unseen.
+//! Comments and strings are ignored, unit tests are not. Uses without a path, such as calls of methods, are not found.
 
 mod paths;
 mod sources;
@@ -11,7 +11,7 @@ mod sources;
 use sources::{Order, Sources};
 use std::collections::BTreeSet;
 
-/// That of the rings.
+/// The order of the rings.
 const RINGS: &Order = &[
     ("view", &[]),
     ("gaussian", &["view"]),
@@ -24,7 +24,7 @@ const RINGS: &Order = &[
     ("cli", &["view", "gaussian", "scene", "codec", "reference", "renderer", "offline"]),
 ];
 
-/// That inside the plugin.
+/// The order inside the plugin.
 const PLUGIN: &Order = &[
     ("component", &[]),
     ("asset", &["component"]),
@@ -36,7 +36,8 @@ const PLUGIN: &Order = &[
     ("testing", &["component", "asset", "playback", "render", "picking", "stereo"]),
 ];
 
-/// Folders whose files must not use each other in a circle. A `mod.rs` does not count: it gathers what the others define.
+/// Folders whose files must not use each other in a circle. A `mod.rs` is ignored: it re-exports what the others
+/// define.
 const WITHOUT_CYCLES: [&str; 3] = ["renderer/", "plugin/render/", "plugin/playback/"];
 
 #[test]

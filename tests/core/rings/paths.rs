@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 /// The path of a module from the crate root: `plugin`, `asset`.
 pub type Module = Vec<String>;
 
-/// What a file says of modules.
+/// The modules that a file mentions, and the items that it defines.
 pub struct Source {
     /// Its path below `src`, with forward slashes.
     pub file: String,
@@ -28,7 +28,7 @@ pub struct Mention {
 }
 
 impl Source {
-    /// From its path and its text.
+    /// Reads a file from its path and its text.
     pub fn new(file: &str, text: &str) -> Self {
         let code = code(text);
         let mut reader = Reader { tokens: tokens(&code), ..Reader::default() };
@@ -83,7 +83,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The word or sign so many further on; empty at the end.
+    /// Returns the word or sign `ahead` positions further on; empty at the end.
     fn peek(&self, ahead: usize) -> &'a str {
         self.tokens.get(self.at + ahead).map_or("", |&(token, _)| token)
     }
@@ -168,7 +168,7 @@ fn tokens(code: &str) -> Vec<(&str, usize)> {
     tokens
 }
 
-/// The text with comments, strings and characters blanked out. Everything else stays on its line.
+/// Returns the text with comments, strings and characters blanked out. Everything else stays on its line.
 fn code(text: &str) -> String {
     let mut code = String::with_capacity(text.len());
     let mut rest = text;
@@ -194,7 +194,7 @@ fn code(text: &str) -> String {
     code
 }
 
-/// The length of the comment that the text begins with, comments inside it included.
+/// Returns the length of the comment that the text begins with, comments inside it included.
 fn block_comment(text: &str) -> usize {
     let (mut depth, mut at) = (0, 0);
     while let Some(c) = text[at..].chars().next() {
@@ -214,7 +214,7 @@ fn block_comment(text: &str) -> usize {
     at
 }
 
-/// The length of the string that the text begins with.
+/// Returns the length of the string that the text begins with.
 fn string(text: &str) -> usize {
     let mut escaped = false;
     for (at, c) in text.char_indices().skip(1) {
@@ -226,7 +226,7 @@ fn string(text: &str) -> usize {
     text.len()
 }
 
-/// The length of the raw string that the text begins with; `None` if with anything else.
+/// Returns the length of the raw string that the text begins with; `None` if it begins with anything else.
 fn raw_string(text: &str) -> Option<usize> {
     let start = text.strip_prefix(['b', 'c']).unwrap_or(text).strip_prefix('r')?;
     let hashes = start.len() - start.trim_start_matches('#').len();
@@ -236,7 +236,7 @@ fn raw_string(text: &str) -> Option<usize> {
     Some(text.len() - body.len() + length)
 }
 
-/// The length of the character that the text begins with; `None` if with a lifetime.
+/// Returns the length of the character that the text begins with; `None` if it begins with a lifetime.
 fn character(text: &str) -> Option<usize> {
     let body = text.strip_prefix('\'')?;
     let first = body.chars().next()?;

@@ -1,7 +1,7 @@
 //! The files of a crate as modules, and which of them use which.
 //!
-//! In: files with their paths below `src`. Out: the module that each path in them leads to, also through re-exports; the paths that an order
-//! of the modules forbids; the files that use each other in a circle.
+//! In: files with their paths below `src`. Out: the module that each path in them leads to, also through re-exports;
+//! the paths that an order of the modules forbids; the files that use each other in a circle.
 
 use super::paths::{Mention, Module, Source};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -26,14 +26,14 @@ pub struct Use<'a> {
 }
 
 impl Sources {
-    /// Those of this crate, without its binaries.
+    /// Returns the files of this crate, without its binaries.
     pub fn of_this_crate() -> Self {
         let mut files = Vec::new();
         collect(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), "", &mut files);
         Self::new(files.iter().map(|(file, text)| (file.as_str(), text.as_str())))
     }
 
-    /// From paths below `src`, with forward slashes, and what the files contain.
+    /// Reads files, given their paths below `src`, with forward slashes, and their contents.
     pub fn new<'a>(files: impl IntoIterator<Item = (&'a str, &'a str)>) -> Self {
         let mut modules = BTreeMap::new();
         for (file, text) in files {
@@ -46,7 +46,7 @@ impl Sources {
         Self { modules }
     }
 
-    /// Every path that leads to a module of the crate.
+    /// Returns every path that leads to a module of the crate.
     pub fn uses(&self) -> Vec<Use<'_>> {
         let mut uses = Vec::new();
         for (module, source) in &self.modules {
@@ -59,14 +59,14 @@ impl Sources {
         uses
     }
 
-    /// The module that a path leads to; `None` if it is one of another crate.
+    /// Returns the module that a path leads to; `None` if it is one of another crate.
     fn target(&self, module: &Module, mention: &Mention) -> Option<Module> {
         let module = [module.as_slice(), mention.inside.as_slice()].concat();
         let (base, path) = self.start(&module, &mention.path)?;
         Some(self.find(&base, path, 8).unwrap_or_else(|| self.descend(&base, path).0))
     }
 
-    /// The module at which a path starts, and the rest of the path; `None` for a path of another crate.
+    /// Returns the module at which a path starts, and the rest of the path; `None` for a path of another crate.
     fn start<'a>(&self, module: &[String], path: &'a [String]) -> Option<(Module, &'a [String])> {
         let mut base = module.to_vec();
         let (first, mut rest) = path.split_first()?;
@@ -102,7 +102,8 @@ impl Sources {
         (module, path)
     }
 
-    /// The module that defines the item of a path, behind at most so many re-exports; `None` if there is none.
+    /// Returns the module that defines the item of a path, behind at most `reexports` re-exports; `None` if there is
+    /// none.
     fn find(&self, base: &[String], path: &[String], reexports: usize) -> Option<Module> {
         let (module, rest) = self.descend(base, path);
         let source = self.modules.get(&module)?;
@@ -124,7 +125,8 @@ impl Sources {
         globs.find_map(behind)
     }
 
-    /// The paths that are forbidden by the order of the outermost modules, or by that inside the module `plugin`.
+    /// Returns the paths that are forbidden by the order of the outermost modules, or by that inside the module
+    /// `plugin`.
     pub fn outward(&self, rings: &Order, plugin: &Order) -> Vec<String> {
         let mut outward = Vec::new();
         for Use { module, source, mention, target } in self.uses() {
@@ -142,7 +144,8 @@ impl Sources {
         outward
     }
 
-    /// The shortest circle through each file of a folder, each circle once: the paths that it consists of, one a line.
+    /// Returns the shortest circle through each file of a folder, each circle once: the paths that it consists of, one
+    /// a line.
     pub fn cycles(&self, folder: &str) -> Vec<String> {
         let counts = |source: &Source| source.file.starts_with(folder) && !source.file.ends_with("mod.rs");
         let mut edges: BTreeMap<&Module, BTreeMap<Module, String>> = BTreeMap::new();
@@ -171,7 +174,8 @@ impl Sources {
     }
 }
 
-/// Whether an order lets one module use another. One that is not in it may use all others and be used by none.
+/// Returns whether an order lets one module use another. A module that is not in it may use all others and be used by
+/// none.
 fn may_use(order: &Order, from: &str, to: &str) -> bool {
     let row = order.iter().find(|(name, _)| *name == from);
     row.is_none_or(|(_, inner)| from == to || inner.contains(&to))
@@ -181,7 +185,7 @@ fn position(source: &Source, mention: &Mention) -> String {
     format!("src/{}:{}: {}", source.file, mention.line, mention.path.join("::"))
 }
 
-/// Every Rust file below a folder with its text. Binaries are left out: they are crates of their own.
+/// Collects every Rust file below a folder with its text. Binaries are left out: they are crates of their own.
 fn collect(folder: &Path, prefix: &str, files: &mut Vec<(String, String)>) {
     for entry in fs::read_dir(folder).expect("the folder can be listed") {
         let path = entry.expect("the entry can be read").path();

@@ -52,7 +52,7 @@ pub struct Marker {
 }
 
 impl Timeline {
-    /// Makes a timeline that lasts until its last clip or marker or, if given, for `duration` seconds.
+    /// Creates a timeline that lasts until its last clip or marker or, if given, for `duration` seconds.
     ///
     /// # Errors
     /// The first invalid track, clip, marker or duration.
@@ -111,8 +111,8 @@ impl Timeline {
 }
 
 impl Track {
-    /// Returns the last clip that has begun at `time`, in seconds of the timeline, whether it still plays or not; before the first clip, the
-    /// first. `None` if the track has no clip.
+    /// Returns the last clip that has begun at `time`, in seconds of the timeline, whether it still plays or not;
+    /// before the first clip, the first. `None` if the track has no clip.
     pub fn clip_at(&self, time: f64) -> Option<&Clip> {
         self.clips.iter().rev().find(|clip| clip.has_begun(time)).or(self.clips.first())
     }

@@ -1,6 +1,7 @@
 //! A clip: a part of a capture, at a time of a timeline.
 //!
-//! In: a capture, a range of it, and when and how fast it plays. Out: what the clip shows at a time, and the [`Playback`] that shows it.
+//! In: a capture, a range of it, its start and its speed. Out: whether the clip is shown at a time and its fade, and
+//! the [`Playback`] that shows it.
 
 use super::error::InvalidTimeline;
 use crate::plugin::component::GaussianCapture;
@@ -40,8 +41,8 @@ impl Clip {
         self.start + self.duration()
     }
 
-    /// Whether it is shown at `time`, in seconds of the timeline: from its start until just before its end, and at its end if the timeline,
-    /// which lasts `duration` seconds, ends there, too.
+    /// Returns whether it is shown at `time`, in seconds of the timeline: from its start until just before its end, and
+    /// at its end if the timeline, which lasts `duration` seconds, ends there, too.
     pub fn shows(&self, time: f64, duration: f32) -> bool {
         let end = f64::from(self.end());
         self.has_begun(time) && (time < end || self.end() >= duration - TOUCH && time <= f64::from(duration))
@@ -60,8 +61,8 @@ impl Clip {
         share(time - start, self.fade[0]).min(share(end - time, self.fade[1]))
     }
 
-    /// The playback that shows this clip while it follows the timeline's clock. `duration` is that of the capture in seconds, `None` until
-    /// it has been loaded.
+    /// Returns the playback that shows this clip while it follows the timeline's clock. `duration` is that of the
+    /// capture in seconds, `None` until it has been loaded.
     pub(super) fn playback(&self, duration: Option<f32>) -> Playback {
         let ([start, end], backwards) = (self.range, self.speed < 0.0);
         // Without it, playback would begin at the capture's end at once.
@@ -110,7 +111,7 @@ impl Clip {
     }
 }
 
-/// Whether a number is a time of a timeline or a capture.
+/// Returns whether a number is a time of a timeline or a capture.
 pub(super) fn is_time(seconds: f32) -> bool {
     seconds.is_finite() && seconds >= 0.0
 }

@@ -87,7 +87,7 @@ pub(in crate::plugin::playback) fn advance_timelines(
     }
 }
 
-/// The markers on a stretch, in the order of play.
+/// Returns the markers on a stretch, in the order of play.
 fn crossed<'a>(timeline: &'a Timeline, leg: &Leg) -> impl Iterator<Item = &'a Marker> {
     let (markers, leg) = (timeline.markers(), *leg);
     (0..markers.len())

@@ -1,7 +1,8 @@
 //! Timelines: which captures play when.
 //!
-//! In: a file named `*.timeline.ron`, or a [`Timeline`] made in code, on a [`TimelinePlayer`]. Out: an entity for each track, whose
-//! capture, playback, fade and visibility follow the player; and a message for every marker that is reached.
+//! In: a file named `*.timeline.ron`, or a [`Timeline`] created in code, on a [`TimelinePlayer`]. Out: an entity for
+//! each track, whose capture, playback, fade and visibility follow the player; and a message for every marker that is
+//! reached.
 //!
 //! ```ron
 //! (
