@@ -2,7 +2,7 @@
 // In: Gaussians, color coefficients, an instance, a list of active Gaussians. Out: one splat and one depth key for each
 // active Gaussian; the key of an invisible splat is INVISIBLE. CPU reference: src/reference/project.rs with
 // src/gaussian/projection.rs.
-#import gs4d::types::{Gaussian, InstanceUniforms, SplatRecord, INVISIBLE}
+#import gs4d::types::{Gaussian, InstanceUniforms, SplatRecord, BIN_COUNTERS, INVISIBLE}
 #import gs4d::types::{DEBUG_ACTIVE, DEBUG_LIFESPAN, DEBUG_VELOCITY}
 #import gs4d::appearance::{heat, lit}
 #import gs4d::tile::{contributing_tiles, pack_tiles, tiles_of}
@@ -17,7 +17,14 @@ const FRUSTUM_CLAMP: f32 = 1.3;
 
 @group(0) @binding(0) var<uniform> instance: InstanceUniforms;
 @group(0) @binding(1) var<storage, read_write> splats: array<SplatRecord>;
+#ifdef BINNED
+// Counters, see BIN_COUNTERS; then the number of splats of each bin.
+@group(0) @binding(2) var<storage, read_write> bins: array<atomic<u32>>;
+// Bin by bin: the tiles that a splat covers (bit 4 y + x of the bin's 4 x 4), and its slot.
+@group(0) @binding(3) var<storage, read_write> bin_entries: array<vec2<u32>>;
+#else
 @group(0) @binding(2) var<storage, read_write> depth_keys: array<u32>;
+#endif
 #ifdef PACKED_GEOMETRY
 // Two four-vectors for each Gaussian.
 @group(1) @binding(0) var<storage, read> records: array<vec4<u32>>;
@@ -39,6 +46,90 @@ const FRUSTUM_CLAMP: f32 = 1.3;
 // The list that `activate` writes; not read without a filter.
 @group(2) @binding(0) var<storage, read> active_list: array<u32>;
 
+#ifdef BINNED
+// Bins that a workgroup counts by itself before it reserves places for all of its splats at once.
+const OWN_BINS: u32 = 2048u;
+
+var<workgroup> own: array<atomic<u32>, 2048>;
+var<workgroup> own_visible: atomic<u32>;
+// Tiles of the splat that project_one made: first and last + 1.
+var<private> covered: vec4<u32>;
+
+// Tiles (of 4 x 4) of a bin that `covered` holds.
+fn tiles_of_bin(bin: vec2<u32>) -> u32 {
+    let first = max(covered.xy, bin * 4u) - bin * 4u;
+    let last = min(covered.zw, bin * 4u + 4u) - bin * 4u;
+    let columns = (1u << last.x) - (1u << first.x);
+    let rows = 0x1111u & ((1u << (4u * last.y)) - (1u << (4u * first.y)));
+    return columns * rows;
+}
+
+@compute @workgroup_size(256)
+fn project_bin(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let across = instance.binning.x;
+    let capacity = instance.binning.y;
+    let first_bin = instance.binning.z + BIN_COUNTERS;
+    let down = (instance.tiles.y + 3u) / 4u;
+    let count = across * down;
+    let by_group = count <= OWN_BINS;
+    for (var i = thread; i < min(count, OWN_BINS); i += 256u) {
+        atomicStore(&own[i], 0u);
+    }
+    if thread == 0u {
+        atomicStore(&own_visible, 0u);
+    }
+    workgroupBarrier();
+    covered = vec4(0u);
+    let slot = instance.first_slot + id.x;
+    if id.x < instance.count {
+        var index = id.x;
+        if instance.listed != 0u {
+            index = active_list[instance.first_listed + id.x];
+        }
+        if project_one(index, slot) == INVISIBLE {
+            // Not found by a search through all splats.
+            splats[slot].tiles_high = 0u;
+            covered = vec4(0u);
+        } else {
+            atomicAdd(&own_visible, 1u);
+        }
+    }
+    let low = covered.xy / 4u;
+    let high = (covered.zw + 3u) / 4u;
+    if by_group {
+        for (var y = low.y; y < high.y; y++) {
+            for (var x = low.x; x < high.x; x++) {
+                atomicAdd(&own[y * across + x], 1u);
+            }
+        }
+    }
+    workgroupBarrier();
+    if thread == 0u {
+        atomicAdd(&bins[instance.binning.z], atomicLoad(&own_visible));
+    }
+    for (var i = thread; i < min(count, OWN_BINS); i += 256u) {
+        let many = atomicLoad(&own[i]);
+        if many > 0u {
+            atomicStore(&own[i], atomicAdd(&bins[first_bin + i], many));
+        }
+    }
+    workgroupBarrier();
+    for (var y = low.y; y < high.y; y++) {
+        for (var x = low.x; x < high.x; x++) {
+            let bin = y * across + x;
+            var place = 0u;
+            if by_group {
+                place = atomicAdd(&own[bin], 1u);
+            } else {
+                place = atomicAdd(&bins[first_bin + bin], 1u);
+            }
+            if place < capacity {
+                bin_entries[bin * capacity + place] = vec2(tiles_of_bin(vec2(x, y)), slot);
+            }
+        }
+    }
+}
+#else
 @compute @workgroup_size(256)
 fn project(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= instance.count {
@@ -51,6 +142,7 @@ fn project(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     depth_keys[slot] = project_one(index, slot);
 }
+#endif
 
 fn load_gaussian(index: u32) -> Gaussian {
 #ifdef PACKED_GEOMETRY
@@ -124,6 +216,9 @@ fn project_one(index: u32, slot: u32) -> u32 {
         return INVISIBLE;
     }
 
+#ifdef BINNED
+    covered = vec4<u32>(tiles);
+#endif
     var seen = g.mean;
     if instance.displaced != 0u {
         seen = mean.xyz;

@@ -61,6 +61,8 @@ struct InstanceUniforms {
     // 1: only Gaussians whose mean is inside the crop box are drawn.
     cropped: u32,
     padding: u32,
+    // Of the fast renderer: bins across, splats a bin has room for, first counter of this frame and of the next.
+    binning: vec4<u32>,
     // Rows of capture-to-crop-box; the box is from -1 to 1.
     crop_x: vec4<f32>,
     crop_y: vec4<f32>,
@@ -125,6 +127,8 @@ struct FrameUniforms {
     // Depth that is shown half as bright as depth 0.
     debug_depth: f32,
     environment_opacity: f32,
+    // As in InstanceUniforms.
+    binning: vec4<u32>,
 }
 
 const BACKGROUND_NONE: u32 = 0u;
@@ -166,3 +170,6 @@ struct SortStep {
 const SORT_SLOTS: u32 = 0u;
 const SORT_VISIBLE: u32 = 1u;
 const SORT_PAIRS: u32 = 2u;
+
+// Counters of the fast renderer before those of its bins: visible splats, pairs, splats of the fullest bin.
+const BIN_COUNTERS: u32 = 4u;

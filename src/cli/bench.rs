@@ -9,6 +9,7 @@ use super::report::{Report, switches_json};
 use super::table::Table;
 use crate::offline::engine::AdapterDescription;
 use crate::offline::orbit::{at_times, share};
+use crate::renderer::Design;
 use crate::renderer::Timings;
 use crate::view::View;
 use serde_json::json;
@@ -39,6 +40,9 @@ pub struct Bench {
     times: Option<usize>,
     #[command(flatten)]
     views: ViewArgs,
+    /// How views are drawn; both draw the same picture.
+    #[arg(long, value_name = "RENDERER", default_value = "reference", value_parser = values::one_of(&Design::NAMES))]
+    renderer: Design,
     #[command(flatten)]
     gpu: GpuArgs,
     #[command(flatten)]
@@ -60,6 +64,7 @@ impl Bench {
         let views: Vec<View> = shots.iter().map(|shot| shot.view(&scene)).collect();
         let size = views.first().map_or([0, 0], |view| view.size.to_array());
         let mut headless = self.gpu.open()?;
+        headless.set_design(self.renderer);
         let capture = headless.upload(&scene)?;
         note(&format!("measuring {} frames over {} views", self.frames, views.len()));
         let timings = headless.time(&capture, &views, self.frames)?;

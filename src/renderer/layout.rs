@@ -84,6 +84,8 @@ pub struct InstanceUniforms {
     pub cropped: u32,
     /// Unused.
     pub padding: u32,
+    /// Of the fast renderer: bins across, splats a bin has room for, first counter of this frame and of the next.
+    pub binning: [u32; 4],
     /// Rows of capture-to-crop-box: x.
     pub crop_x: [f32; 4],
     /// Row y.
@@ -186,6 +188,8 @@ pub struct FrameUniforms {
     pub debug_depth: f32,
     /// Opacity of the environment map, from 0 to 1.
     pub environment_opacity: f32,
+    /// As in [`InstanceUniforms`].
+    pub binning: [u32; 4],
 }
 
 /// Returns how an appearance changes colors, as in the shaders: `LIGHTING_*`.
@@ -290,3 +294,6 @@ pub const SORT_SLOTS: u32 = 0;
 pub const SORT_VISIBLE: u32 = 1;
 /// The pairs.
 pub const SORT_PAIRS: u32 = 2;
+
+/// Counters of the fast renderer before those of its bins: visible splats, pairs, splats of the fullest bin.
+pub const BIN_COUNTERS: u32 = 4;

@@ -17,6 +17,10 @@
 //!
 //! Two stable sorts, first by depth and then by tile, give the original's order by (tile, depth, index), and move far
 //! less data than a sort by its 64-bit keys. No pass needs subgroups, and the results do not depend on their size.
+//!
+//! That is the reference design ([`Design::Reference`], the default), whose order is the original's. [`Design::Fast`] draws the same picture
+//! in two dispatches, `project_bin` and `sort_blend`: bins of 4 x 4 tiles without order, and one workgroup for each tile that collects, sorts
+//! and blends its splats in workgroup memory.
 
 mod active;
 pub mod bind;
@@ -42,5 +46,5 @@ pub use pipelines::Renderer;
 pub use shaders::{ShaderChecks, Storage};
 pub use statistics::ViewStatistics;
 pub use timing::{PassTime, Timings};
-pub use view::{FinishedFrame, Instance, OpaqueDepth, PassBuffers, ViewParameters, ViewRenderer};
+pub use view::{Design, FinishedFrame, Instance, OpaqueDepth, PassBuffers, ViewParameters, ViewRenderer};
 pub use work::WorkCounters;

@@ -6,9 +6,10 @@
 use super::bind::{Bind, group_layout, pipeline};
 use super::layout::CODEBOOK_SCALES;
 use super::memory::Allocator;
-use super::shaders::{MULTISAMPLED, ShaderChecks, Storage, module};
+use super::shaders::{BINNED, LONG_LISTS, MULTISAMPLED, ShaderChecks, Storage, module};
 use super::work::WorkCounters;
 use super::{GpuError, layout};
+use std::sync::OnceLock;
 
 /// All pipelines and bind group layouts of a device.
 #[derive(Debug)]
@@ -30,6 +31,9 @@ pub struct Renderer {
     pub(super) ranges: wgpu::ComputePipeline,
     pub(super) blend: wgpu::ComputePipeline,
     pub(super) blend_multisampled: wgpu::ComputePipeline,
+    /// Passes of the fast renderer, compiled when they are first used.
+    fast: OnceLock<FastPipelines>,
+    checks: ShaderChecks,
     /// Bound instead of a list of active Gaussians if all are drawn.
     pub(super) no_list: wgpu::BindGroup,
     work: WorkCounters,
@@ -49,7 +53,19 @@ pub(super) struct Layouts {
     pub bin: wgpu::BindGroupLayout,
     pub ranges: wgpu::BindGroupLayout,
     pub blend: wgpu::BindGroupLayout,
-    pub blend_multisampled: wgpu::BindGroupLayout,
+    /// Uniforms, background, opaque depth and targets of the pixels, without and with multisampled depth.
+    pub pixel: [wgpu::BindGroupLayout; 2],
+    pub project_bin: wgpu::BindGroupLayout,
+    pub sort_blend: wgpu::BindGroupLayout,
+}
+
+/// The passes of the fast renderer.
+#[derive(Debug)]
+pub(super) struct FastPipelines {
+    /// Indexed by how a capture is stored, in the order of [`Storage::ALL`].
+    pub project_bin: [wgpu::ComputePipeline; 3],
+    /// Without and with multisampled depth.
+    pub sort_blend: [wgpu::ComputePipeline; 2],
 }
 
 impl Renderer {
@@ -92,8 +108,10 @@ impl Renderer {
             bin_offset: pipeline(&bin, "offset", &[&layouts.bin]),
             bin_emit: pipeline(&bin, "emit", &[&layouts.bin]),
             ranges: pipeline(&ranges, "ranges", &[&layouts.ranges]),
-            blend: pipeline(&blend, "blend", &[&layouts.blend]),
-            blend_multisampled: pipeline(&blend_multisampled, "blend", &[&layouts.blend_multisampled]),
+            blend: pipeline(&blend, "blend", &[&layouts.pixel[0], &layouts.blend]),
+            blend_multisampled: pipeline(&blend_multisampled, "blend", &[&layouts.pixel[1], &layouts.blend]),
+            fast: OnceLock::new(),
+            checks,
             no_list: allocator.bind_group("gs4d no active list", &layouts.active, &[no_list.as_entire_binding()]),
             layouts,
             work,
@@ -116,6 +134,23 @@ impl Renderer {
         Allocator { device, work: &self.work }
     }
 
+    /// Returns the passes of the fast renderer, compiled at the first call.
+    ///
+    /// # Errors
+    /// When a shader does not compile.
+    pub(super) fn fast(&self, device: &wgpu::Device) -> Result<&FastPipelines, GpuError> {
+        if let Some(made) = self.fast.get() {
+            return Ok(made);
+        }
+        let made = FastPipelines::new(device, &self.layouts, self.checks)?;
+        Ok(self.fast.get_or_init(|| made))
+    }
+
+    /// Returns the passes of the fast renderer if they have been compiled.
+    pub(super) fn compiled_fast(&self) -> Option<&FastPipelines> {
+        self.fast.get()
+    }
+
     /// Returns the pipeline of `project` for captures stored this way.
     pub(super) fn project(&self, storage: Storage) -> &wgpu::ComputePipeline {
         &self.project[storage as usize]
@@ -133,16 +168,40 @@ impl Renderer {
     }
 }
 
+/// Workgroup memory that `sort_blend` needs for lists of 2048 splats, bytes.
+const LONG_LISTS_MEMORY: u32 = 24 * 1024;
+
+impl FastPipelines {
+    fn new(device: &wgpu::Device, layouts: &Layouts, checks: ShaderChecks) -> Result<Self, GpuError> {
+        let missing = || GpuError::Device("a pipeline is missing".into());
+        let mut project_bin = Vec::new();
+        for (storage, capture) in Storage::ALL.into_iter().zip(&layouts.captures) {
+            let shader = module(device, "project", &[BINNED, storage.definitions()].concat(), checks)?;
+            let groups = [&layouts.project_bin, capture, &layouts.active];
+            project_bin.push(pipeline(device, &shader, "project_bin", &groups));
+        }
+        let long = device.limits().max_compute_workgroup_storage_size >= LONG_LISTS_MEMORY;
+        let mut sort_blend = Vec::new();
+        for (samples, pixel) in [&[] as &[&str], MULTISAMPLED].into_iter().zip(&layouts.pixel) {
+            let lists = if long { LONG_LISTS } else { &[] };
+            let shader = module(device, "sort_blend", &[samples, lists].concat(), checks)?;
+            sort_blend.push(pipeline(device, &shader, "sort_blend", &[pixel, &layouts.sort_blend]));
+        }
+        Ok(Self {
+            project_bin: project_bin.try_into().map_err(|_| missing())?,
+            sort_blend: sort_blend.try_into().map_err(|_| missing())?,
+        })
+    }
+}
+
 impl Layouts {
     fn new(device: &wgpu::Device) -> Self {
         use Bind::{Depth, Depths, Read, Target, Uniform, UniformAt, Write};
         const FRAME: usize = size_of::<layout::FrameUniforms>();
         const INSTANCE: Bind = UniformAt(size_of::<layout::InstanceUniforms>());
         let new = |label, bindings: &[Bind]| group_layout(device, label, bindings);
-        let blend = |depth| {
-            let targets = [wgpu::TextureFormat::Rgba32Float, wgpu::TextureFormat::Rg32Float].map(Target);
-            [Uniform(FRAME), Read, Read, Read, Read, depth, targets[0], targets[1]]
-        };
+        let targets = [wgpu::TextureFormat::Rgba32Float, wgpu::TextureFormat::Rg32Float].map(Target);
+        let pixel = |depth| new("gs4d pixel", &[Uniform(FRAME), Read, depth, targets[0], targets[1]]);
         Self {
             activate: new("gs4d activate", &[UniformAt(size_of::<layout::Activation>()), Write, Write]),
             filter: new("gs4d filter", &[Read]),
@@ -160,8 +219,10 @@ impl Layouts {
             arguments: new("gs4d arguments", &[Write]),
             bin: new("gs4d bin", &[Uniform(FRAME), Write, Read, Read, Write, Write, Write]),
             ranges: new("gs4d ranges", &[Uniform(FRAME), Read, Read, Write]),
-            blend: new("gs4d blend", &blend(Depth)),
-            blend_multisampled: new("gs4d blend", &blend(Depths)),
+            blend: new("gs4d blend", &[Read, Read, Read]),
+            pixel: [pixel(Depth), pixel(Depths)],
+            project_bin: new("gs4d project_bin", &[INSTANCE, Write, Write, Write]),
+            sort_blend: new("gs4d sort_blend", &[Read, Write, Read]),
         }
     }
 }

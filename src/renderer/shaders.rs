@@ -18,6 +18,7 @@ const LIBRARIES: &[(&str, &str)] = &[
     ("packed", include_str!("../../shaders/shared/packed.wgsl")),
     ("scan", include_str!("../../shaders/shared/scan.wgsl")),
     ("environment", include_str!("../../shaders/shared/environment.wgsl")),
+    ("pixel", include_str!("../../shaders/shared/pixel.wgsl")),
 ];
 
 /// Passes by name.
@@ -28,6 +29,7 @@ const PASSES: &[(&str, &str)] = &[
     ("bin", include_str!("../../shaders/bin.wgsl")),
     ("ranges", include_str!("../../shaders/ranges.wgsl")),
     ("blend", include_str!("../../shaders/blend.wgsl")),
+    ("sort_blend", include_str!("../../shaders/sort_blend.wgsl")),
     ("score", include_str!("../../shaders/score.wgsl")),
 ];
 
@@ -82,6 +84,12 @@ impl Storage {
 
 /// The definition of `blend` for multisampled opaque depth.
 pub const MULTISAMPLED: &[&str] = &["MULTISAMPLED"];
+
+/// Definitions of `project` as the first pass of the fast renderer, `project_bin`.
+pub const BINNED: &[&str] = &["BINNED"];
+
+/// Definitions of `sort_blend` on devices with enough workgroup memory for lists of 2048 splats.
+pub const LONG_LISTS: &[&str] = &["LONG_LISTS"];
 
 /// Returns the naga module of a pass, imports resolved, validated, with these definitions: those of a [`Storage`] for
 /// `project`, none or [`MULTISAMPLED`] for `blend`, none for the others.

@@ -6,8 +6,10 @@ use super::memory::Allocator;
 use crate::view::Counts;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Names of the timed passes of a frame, in order.
-pub(super) const TIMED_PASSES: [&str; 6] = ["project", "sort (depth)", "bin", "sort (tile)", "ranges", "blend"];
+/// Names of the timed passes of a frame, in order, with the reference design.
+pub(super) const TIMED_PASSES: &[&str] = &["project", "sort (depth)", "bin", "sort (tile)", "ranges", "blend"];
+/// The same with the fast design.
+pub(super) const TIMED_FAST_PASSES: &[&str] = &["project_bin", "sort_blend"];
 
 /// Medians over the frames of a benchmark.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -42,20 +44,22 @@ pub(super) struct PassTimer {
     queries: wgpu::QuerySet,
     resolved: wgpu::Buffer,
     period: f64,
-    inside: bool,
+    /// Names of the passes; empty if the frame is timed as a whole.
+    passes: &'static [&'static str],
     next: AtomicU32,
 }
 
 impl PassTimer {
-    /// Creates a timer around frames, or between passes; `None` if the device does not support it.
-    pub fn new(allocator: Allocator<'_>, queue: &wgpu::Queue, inside: bool) -> Option<Self> {
+    /// Creates a timer around frames, or after each of these passes; `None` if the device does not support it.
+    pub fn new(allocator: Allocator<'_>, queue: &wgpu::Queue, passes: &'static [&'static str]) -> Option<Self> {
+        let inside = !passes.is_empty();
         let device = allocator.device;
         let needed =
             if inside { wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES } else { wgpu::Features::TIMESTAMP_QUERY };
         if !device.features().contains(needed | wgpu::Features::TIMESTAMP_QUERY) {
             return None;
         }
-        let count = if inside { TIMED_PASSES.len() as u32 + 1 } else { 2 };
+        let count = timestamps(passes);
         let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
         Some(Self {
             queries: device.create_query_set(&wgpu::QuerySetDescriptor {
@@ -65,7 +69,7 @@ impl PassTimer {
             }),
             resolved: allocator.buffer("gs4d timestamps", u64::from(count) * 8, usage),
             period: f64::from(queue.get_timestamp_period()) * 1e-6,
-            inside,
+            passes,
             next: AtomicU32::new(1),
         })
     }
@@ -75,22 +79,26 @@ impl PassTimer {
         Some(wgpu::ComputePassTimestampWrites {
             query_set: &self.queries,
             beginning_of_pass_write_index: Some(0),
-            end_of_pass_write_index: (!self.inside).then_some(1),
+            end_of_pass_write_index: self.passes.is_empty().then_some(1),
         })
     }
 
     /// Writes the timestamp at the end of a pass, if passes are timed.
     pub fn mark(&self, pass: &mut wgpu::ComputePass<'_>) {
-        if self.inside {
+        if !self.passes.is_empty() {
             pass.write_timestamp(&self.queries, self.next.fetch_add(1, Ordering::Relaxed));
         }
     }
 
     /// Copies the timestamps into the buffer, after the pass.
     pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
-        let count = if self.inside { TIMED_PASSES.len() as u32 + 1 } else { 2 };
-        encoder.resolve_query_set(&self.queries, 0..count, &self.resolved, 0);
+        encoder.resolve_query_set(&self.queries, 0..timestamps(self.passes), &self.resolved, 0);
         self.next.store(1, Ordering::Relaxed);
+    }
+
+    /// Returns the names of the passes; empty if the frame is timed as a whole.
+    pub fn passes(&self) -> &'static [&'static str] {
+        self.passes
     }
 
     /// Returns the buffer of the timestamps, eight bytes each.
@@ -109,4 +117,9 @@ impl PassTimer {
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Number of timestamps of a frame in which these passes are timed.
+fn timestamps(passes: &[&str]) -> u32 {
+    if passes.is_empty() { 2 } else { passes.len() as u32 + 1 }
 }

@@ -88,6 +88,7 @@ fn mirrors() -> [Mirror; 7] {
             debug,
             cropped,
             padding,
+            binning,
             crop_x,
             crop_y,
             crop_z,
@@ -112,6 +113,7 @@ fn mirrors() -> [Mirror; 7] {
             debug,
             debug_depth,
             environment_opacity,
+            binning,
         }),
         mirror!(SplatRecord { center, opacity, depth, conic, tiles_low, color, tiles_high }),
         mirror!(Counters { visible, pairs, pairs_wanted, padding }),
@@ -253,6 +255,7 @@ fn constants_of_the_libraries_are_those_of_the_host() {
         ("SORT_VISIBLE", layout::SORT_VISIBLE),
         ("SORT_PAIRS", layout::SORT_PAIRS),
         ("TILE_SIZE", TILE_SIZE),
+        ("BIN_COUNTERS", layout::BIN_COUNTERS),
     ];
     let floats = [
         ("ALPHA_MIN", ALPHA_MIN),

@@ -5,11 +5,11 @@
 
 use super::layout::Counters;
 use super::memory::Allocator;
-use super::timing::{PassTime, PassTimer, TIMED_PASSES, Timings, median};
+use super::timing::{PassTime, PassTimer, Timings, median};
 use super::view::{FinishedFrame, max_pairs};
 use super::{
-    ActiveList, GpuCapture, GpuContext, GpuError, Instance, Renderer, ShaderChecks, ViewParameters, ViewRenderer,
-    WorkCounters,
+    ActiveList, Design, GpuCapture, GpuContext, GpuError, Instance, Renderer, ShaderChecks, ViewParameters,
+    ViewRenderer, WorkCounters,
 };
 use crate::scene::RuntimeScene;
 use crate::view::{Appearance, Background, Counts, Frame, Picture, View};
@@ -51,6 +51,11 @@ impl Headless {
     /// Returns an allocator for resources of clients of this renderer.
     pub fn allocator(&self) -> Allocator<'_> {
         self.renderer.allocator(&self.context.device)
+    }
+
+    /// Chooses how views are drawn. Default: [`Design::Reference`].
+    pub fn set_design(&mut self, design: Design) {
+        self.view.set_design(design);
     }
 
     /// Sets whether temporal filters are used. Default: `true`.
@@ -137,8 +142,8 @@ impl Headless {
             self.reactivate(active.as_deref_mut(), capture, view.time);
             counts.push(self.render_all(&[instance(capture, active.as_deref(), view)], parameters)?.counts);
         }
-        let around = PassTimer::new(self.allocator(), &self.context.queue, false);
-        let inside = PassTimer::new(self.allocator(), &self.context.queue, true);
+        let around = PassTimer::new(self.allocator(), &self.context.queue, &[]);
+        let inside = PassTimer::new(self.allocator(), &self.context.queue, self.view.design().timed_passes());
         let (mut frame, mut wall) = (Vec::new(), Vec::new());
         for i in 0..frames {
             let view = &views[i % views.len()];
@@ -150,7 +155,7 @@ impl Headless {
                 frame.push(timer.intervals(&self.copy_out(timer.resolved(), timer.resolved().size())?)[0]);
             }
         }
-        let mut passes = vec![Vec::new(); TIMED_PASSES.len()];
+        let mut passes = vec![Vec::new(); self.view.design().timed_passes().len()];
         if let Some(timer) = &inside {
             for i in 0..frames {
                 let view = &views[i % views.len()];
@@ -172,11 +177,14 @@ impl Headless {
         let pipelined = start.elapsed().as_secs_f64() * 1e3 / frames.max(1) as f64;
         let middle = |value: fn(&Counts) -> u32| median(counts.iter().map(|c| f64::from(value(c))).collect()) as u32;
         Ok(Timings {
-            passes: TIMED_PASSES
-                .into_iter()
+            passes: self
+                .view
+                .design()
+                .timed_passes()
+                .iter()
                 .zip(passes)
                 .filter(|(_, times)| !times.is_empty())
-                .map(|(name, times)| PassTime { name, milliseconds: median(times) })
+                .map(|(&name, times)| PassTime { name, milliseconds: median(times) })
                 .collect(),
             frame_milliseconds: around.map(|_| median(frame)),
             wall_milliseconds: median(wall),
@@ -219,6 +227,8 @@ impl Headless {
     /// # Errors
     /// As [`render`](Self::render).
     pub fn draw(&mut self, capture: &GpuCapture, view: &View, background: Background) -> Result<(), GpuError> {
+        // Its buffers are what clients read.
+        self.set_design(Design::Reference);
         let parameters = ViewParameters { background, ..ViewParameters::default() };
         self.submit_whole(&[instance(capture, None, view)], &parameters).map(|_| ())
     }
@@ -258,7 +268,8 @@ impl Headless {
     ) -> Result<Counters, GpuError> {
         self.submit_without_waiting(instances, parameters, timer)?;
         self.wait()?;
-        let counters = self.copy_out(self.view.counters(), size_of::<Counters>() as u64)?;
+        let counters =
+            self.copy_out_from(self.view.counters(), self.view.counters_offset(), size_of::<Counters>() as u64)?;
         Ok(bytemuck::pod_read_unaligned(&counters))
     }
 
@@ -315,10 +326,14 @@ impl Headless {
     /// # Errors
     /// When the device is lost.
     pub fn copy_out(&self, source: &wgpu::Buffer, size: u64) -> Result<Vec<u8>, GpuError> {
+        self.copy_out_from(source, 0, size)
+    }
+
+    fn copy_out_from(&self, source: &wgpu::Buffer, offset: u64, size: u64) -> Result<Vec<u8>, GpuError> {
         let GpuContext { device, queue, .. } = &self.context;
         let buffer = readback_buffer(device, size);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(source, 0, &buffer, 0, size);
+        encoder.copy_buffer_to_buffer(source, offset, &buffer, 0, size);
         queue.submit([encoder.finish()]);
         self.read(&buffer)
     }

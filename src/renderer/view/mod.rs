@@ -4,6 +4,7 @@
 //! color and transmittance and one of expected and median depth. [`ViewRenderer::prepare`] sizes and fills the buffers,
 //! [`ViewRenderer::record`] records the frame.
 
+mod fast;
 mod readback;
 mod record;
 mod resources;
@@ -11,7 +12,7 @@ mod resources;
 use super::active::drawn_count;
 use super::memory::{alignment_of, binding_limit};
 use super::pipelines::Renderer;
-use super::timing::{PassTime, PassTimer, TIMED_PASSES};
+use super::timing::{PassTime, PassTimer, TIMED_FAST_PASSES, TIMED_PASSES};
 use super::{ActiveList, GpuCapture, GpuError, ViewStatistics, layout};
 use crate::view::tiles;
 use crate::view::{Appearance, Background, BlendSpace, DebugView, View};
@@ -77,6 +78,10 @@ pub struct ViewRenderer {
     alignment: u32,
     /// Number of slots of the frame prepared last.
     slots: u32,
+    design: Design,
+    /// Whether the counters of odd frames are used, and whether the frame prepared last has been recorded.
+    odd: bool,
+    recorded: bool,
     /// Whether its opaque depth is multisampled.
     multisampled: bool,
     /// Number of pairs for which an earlier frame wanted room.
@@ -118,6 +123,29 @@ pub struct FinishedFrame<'a> {
     pub pairs: u32,
 }
 
+/// How a view is drawn. Both designs draw the same picture.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum Design {
+    /// Bins of splats, sorted and blended by one workgroup for each tile.
+    Fast,
+    /// Global sorts by depth and by tile, in the order of the original rasterizer.
+    #[default]
+    Reference,
+}
+
+impl Design {
+    /// All designs, by name.
+    pub const NAMES: [(&'static str, Self); 2] = [("fast", Self::Fast), ("reference", Self::Reference)];
+
+    /// Returns the names of the passes that are timed.
+    pub(super) fn timed_passes(self) -> &'static [&'static str] {
+        match self {
+            Self::Fast => TIMED_FAST_PASSES,
+            Self::Reference => TIMED_PASSES,
+        }
+    }
+}
+
 impl ViewRenderer {
     /// Creates a view without size; [`prepare`](Self::prepare) sets it.
     pub fn new(device: &wgpu::Device, renderer: &Renderer) -> Self {
@@ -128,6 +156,9 @@ impl ViewRenderer {
         Self {
             alignment,
             slots: 0,
+            design: Design::default(),
+            odd: false,
+            recorded: false,
             pairs_wanted: 0,
             oversized_frames: 0,
             frame: allocator.buffer("gs4d frame", size_of::<layout::FrameUniforms>() as u64, BufferUsages::UNIFORM),
@@ -160,6 +191,12 @@ impl ViewRenderer {
         parameters: &ViewParameters<'_>,
     ) -> Result<(), GpuError> {
         self.poll();
+        if self.design == Design::Fast {
+            renderer.fast(device)?;
+        }
+        if std::mem::take(&mut self.recorded) {
+            self.odd = !self.odd;
+        }
         let made = self.resources.as_ref().map(|resources| resources.sizes).unwrap_or_default();
         let picture = instances.first().map_or(made.picture.max(UVec2::ONE), |instance| instance.view.size);
         let limits = device.limits();
@@ -176,7 +213,11 @@ impl ViewRenderer {
         }
         let slots = slots as u32;
         // Two pairs for each Gaussian are a first guess; the counters of later frames correct it.
-        let pairs = self.pairs_wanted.max(slots.saturating_mul(2)).max(1 << 16).min(max_pairs(device));
+        let pairs = self
+            .pairs_wanted
+            .max(slots.saturating_mul(2))
+            .max(1 << 16)
+            .min(max_pairs(device) / if self.design == Design::Fast { 2 } else { 1 });
         let needed =
             Sizes { slots: slots.next_multiple_of(BLOCK).max(BLOCK), pairs, parts: (parts as u32).max(1), picture };
         let sizes = self.kept_sizes(made, needed);
@@ -192,6 +233,7 @@ impl ViewRenderer {
                 || made.environment != environment_buffer
         });
         if stale {
+            self.odd = false;
             self.resources = Some(self.make(device, queue, renderer, sizes, opaque_view, environment_buffer));
         }
         let active =
@@ -226,11 +268,26 @@ impl ViewRenderer {
             self.statistics.passes.clear();
         } else if self.timing.is_none() {
             let allocator = renderer.allocator(device);
-            self.timing = PassTimer::new(allocator, queue, true).map(|timer| {
+            self.timing = PassTimer::new(allocator, queue, self.design.timed_passes()).map(|timer| {
                 let size = timer.resolved().size();
                 (timer, Readback::new(allocator, "gs4d timestamp readback", size))
             });
         }
+    }
+
+    /// Chooses how the view is drawn from the next [`prepare`](Self::prepare) on. Default: [`Design::Reference`]. GPU time is no
+    /// longer [measured](Self::measure) after a change.
+    pub fn set_design(&mut self, design: Design) {
+        if self.design != design {
+            self.design = design;
+            self.timing = None;
+            self.release();
+        }
+    }
+
+    /// Returns how the view is drawn.
+    pub fn design(&self) -> Design {
+        self.design
     }
 
     /// Returns the work of the view.
@@ -255,9 +312,10 @@ impl ViewRenderer {
         })
     }
 
-    /// Returns the counters of the frame recorded last, on the GPU.
+    /// Returns the counters of the frame recorded last, on the GPU, from [`counters_offset`](Self::counters_offset) on.
     pub(crate) fn counters(&self) -> &wgpu::Buffer {
-        &self.counters
+        let fast = self.resources.as_ref().and_then(|made| made.fast.as_ref());
+        fast.map_or(&self.counters, |fast| &fast.bins)
     }
 
     /// Makes the next [`prepare`](Self::prepare) allocate room for that many pairs and half as many more, if there is
@@ -284,7 +342,11 @@ impl ViewRenderer {
     /// Returns the sizes to allocate. Sizes grow from frame to frame, but buffers that have been far too large for a
     /// while are reduced.
     fn kept_sizes(&mut self, made: Sizes, needed: Sizes) -> Sizes {
-        let counted = self.statistics.pairs.saturating_add(self.statistics.pairs / 2).max(1 << 16);
+        let counted = match self.design {
+            Design::Fast => self.pairs_wanted,
+            Design::Reference => self.statistics.pairs.saturating_add(self.statistics.pairs / 2),
+        }
+        .max(1 << 16);
         let oversized = made.slots / OVERSIZE_FACTOR > needed.slots
             || made.pairs / OVERSIZE_FACTOR > needed.slots.saturating_mul(2).max(counted);
         self.oversized_frames = if oversized { self.oversized_frames + 1 } else { 0 };
@@ -307,13 +369,20 @@ impl ViewRenderer {
             let counters: Counters = bytemuck::pod_read_unaligned(&counters);
             self.statistics.visible = counters.visible;
             self.statistics.pairs = counters.pairs;
-            self.make_room(counters.pairs_wanted);
+            let wanted = match self.design {
+                Design::Fast => {
+                    let grid = fast::bin_grid(self.resources.as_ref().map_or(UVec2::ONE, |made| made.sizes.picture));
+                    counters.pairs_wanted.saturating_mul(grid.x * grid.y)
+                }
+                Design::Reference => counters.pairs_wanted,
+            };
+            self.make_room(wanted);
         }
         if let Some((timer, readback)) = &mut self.timing
             && let Some(timestamps) = readback.poll()
         {
-            let named = TIMED_PASSES.into_iter().zip(timer.intervals(&timestamps));
-            self.statistics.passes = named.map(|(name, milliseconds)| PassTime { name, milliseconds }).collect();
+            let named = timer.passes().iter().zip(timer.intervals(&timestamps));
+            self.statistics.passes = named.map(|(&name, milliseconds)| PassTime { name, milliseconds }).collect();
         }
     }
 
@@ -335,7 +404,9 @@ impl ViewRenderer {
             for (part_index, part) in instance.capture.parts.iter().enumerate() {
                 let count = drawn_count(instance.capture, part_index, instance.active);
                 let listed = u32::from(instance.active.is_some());
-                let uniform = layout::InstanceUniforms { first_slot: slot, count, listed, first_listed, ..capture };
+                let binning = self.binning(&made.sizes);
+                let uniform =
+                    layout::InstanceUniforms { first_slot: slot, count, listed, first_listed, binning, ..capture };
                 let at = u64::from(index * self.alignment);
                 queue.write_buffer(&made.instances, at, bytemuck::bytes_of(&uniform));
                 slot += count;
@@ -379,6 +450,7 @@ impl ViewRenderer {
             // Two capture units.
             debug_depth: 2.0 * view.world_to_camera.row(2).truncate().length(),
             environment_opacity: appearance.opacity.clamp(0.0, 1.0),
+            binning: self.binning(&made.sizes),
         };
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
     }

@@ -43,9 +43,9 @@ impl Readback {
     }
 
     /// Records a copy from the beginning of `source` that fills the buffer, unless one is in progress.
-    pub fn copy(&mut self, encoder: &mut wgpu::CommandEncoder, source: &wgpu::Buffer) {
+    pub fn copy(&mut self, encoder: &mut wgpu::CommandEncoder, source: &wgpu::Buffer, offset: u64) {
         if self.is_idle() {
-            encoder.copy_buffer_to_buffer(source, 0, &self.buffer, 0, self.buffer.size());
+            encoder.copy_buffer_to_buffer(source, offset, &self.buffer, 0, self.buffer.size());
             self.state = State::Recorded;
         }
     }

@@ -19,7 +19,7 @@ impl ViewRenderer {
         self.timing = timing.map(|(timer, mut readback)| {
             if readback.is_idle() {
                 timer.resolve(encoder);
-                readback.copy(encoder, timer.resolved());
+                readback.copy(encoder, timer.resolved(), 0);
             }
             (timer, readback)
         });
@@ -34,6 +34,13 @@ impl ViewRenderer {
         timer: Option<&PassTimer>,
     ) {
         let Some(made) = &self.resources else { return };
+        if let (Some(fast), Some(pipelines)) = (&made.fast, renderer.compiled_fast()) {
+            self.record_fast(renderer, pipelines, made, fast, encoder, instances, timer);
+            let counters = self.counters_offset();
+            self.readback.copy(encoder, &fast.bins.clone(), counters);
+            self.recorded = true;
+            return;
+        }
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                 label: Some("gs4d"),
@@ -98,11 +105,12 @@ impl ViewRenderer {
 
             // blend
             pass.set_pipeline(if self.multisampled { &renderer.blend_multisampled } else { &renderer.blend });
-            pass.set_bind_group(0, &made.blend, &[]);
+            pass.set_bind_group(0, &made.pixel, &[]);
+            pass.set_bind_group(1, &made.blend, &[]);
             pass.dispatch_workgroups(tiles.x, tiles.y, 1);
             mark(&mut pass);
         }
-        self.readback.copy(encoder, &self.counters);
+        self.readback.copy(encoder, &self.counters, 0);
     }
 
     /// Records one step of `sort`. `blocks` is the number of workgroups if the host knows it; otherwise the dispatch is

@@ -3,7 +3,8 @@
 //! In: sizes, the opaque depth and the environment map. Out: [`Resources`], created again only when one of these
 //! changes.
 
-use super::ViewRenderer;
+use super::fast::FastResources;
+use super::{Design, ViewRenderer};
 use crate::renderer::layout::{self, BLOCK, DEPTH_STEPS, DIGIT_BITS, DIGITS, SortStep};
 use crate::renderer::pipelines::Renderer;
 use crate::view::tiles;
@@ -35,7 +36,10 @@ pub(super) struct Resources {
     pub arguments: wgpu::BindGroup,
     pub bin: wgpu::BindGroup,
     pub ranges: wgpu::BindGroup,
+    pub pixel: wgpu::BindGroup,
     pub blend: wgpu::BindGroup,
+    /// Buffers and bind groups of the fast renderer.
+    pub fast: Option<FastResources>,
 }
 
 /// Storage buffers of a frame that a later pass can read.
@@ -134,10 +138,14 @@ impl ViewRenderer {
         });
         // After an even number of steps the pairs are in the buffers that `bin` wrote.
         let sorted = tile_steps(size) as usize % 2;
+        let fast = (self.design == Design::Fast)
+            .then(|| self.make_fast(renderer, &allocator, sizes, instance.clone(), &splats));
         Resources {
             sizes,
             // 16 bytes of color and 8 of depth for each pixel.
-            bytes: bytes.get() + u64::from(size.x) * u64::from(size.y) * 24,
+            bytes: bytes.get()
+                + u64::from(size.x) * u64::from(size.y) * 24
+                + fast.as_ref().map_or(0, |fast| fast.bytes),
             project: allocator.bind_group(
                 "gs4d project",
                 &layouts.project,
@@ -174,19 +182,21 @@ impl ViewRenderer {
                 &layouts.ranges,
                 &[frame.clone(), counters, pair_tiles[sorted].as_entire_binding(), tile_ranges.as_entire_binding()],
             ),
-            blend: allocator.bind_group(
-                "gs4d blend",
-                if self.multisampled { &layouts.blend_multisampled } else { &layouts.blend },
+            pixel: allocator.bind_group(
+                "gs4d pixel",
+                &layouts.pixel[usize::from(self.multisampled)],
                 &[
                     frame,
-                    tile_ranges.as_entire_binding(),
-                    pair_splats[sorted].as_entire_binding(),
-                    splats.as_entire_binding(),
                     environment.as_entire_binding(),
                     wgpu::BindingResource::TextureView(&opaque),
                     wgpu::BindingResource::TextureView(&color_view),
                     wgpu::BindingResource::TextureView(&depth_view),
                 ],
+            ),
+            blend: allocator.bind_group(
+                "gs4d blend",
+                &layouts.blend,
+                &[tile_ranges.as_entire_binding(), pair_splats[sorted].as_entire_binding(), splats.as_entire_binding()],
             ),
             instances,
             buffers: PassBuffers {
@@ -204,6 +214,7 @@ impl ViewRenderer {
             opaque,
             multisampled: self.multisampled,
             environment,
+            fast,
         }
     }
 

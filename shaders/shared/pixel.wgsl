@@ -1,0 +1,213 @@
+// A pixel on its way from front to back: the surfaces that cut it, the splats that are blended into it, what is behind.
+// Used by `blend` and `sort_blend`, which differ in how they find the splats. CPU reference: src/reference/blend.rs.
+#define_import_path gs4d::pixel
+
+#import gs4d::types::{FrameUniforms, BACKGROUND_COLOR, BACKGROUND_ENVIRONMENT, DEBUG_DEPTH, DEBUG_OVERDRAW}
+#import gs4d::alpha::{is_opaque, is_skipped, left_behind}
+#import gs4d::appearance::{heat, lit}
+#import gs4d::environment::environment_texel
+
+const FAR: f32 = 3.4e38;
+// Number of blended splats at the end of the scale of overdraw.
+const OVERDRAW_MAX: f32 = 64.0;
+#ifdef MULTISAMPLED
+const SAMPLES_MAX: u32 = 8u;
+#endif
+
+@group(0) @binding(0) var<uniform> frame: FrameUniforms;
+// Planar: 3 x height x width.
+@group(0) @binding(1) var<storage, read> environment: array<f32>;
+#ifdef MULTISAMPLED
+@group(0) @binding(2) var opaque_depth: texture_depth_multisampled_2d;
+#else
+@group(0) @binding(2) var opaque_depth: texture_depth_2d;
+#endif
+@group(0) @binding(3) var color_out: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(4) var depth_out: texture_storage_2d<rg32float, write>;
+
+// Camera-space depth of the opaque surface of each sample, and the number of samples.
+#ifdef MULTISAMPLED
+var<private> limits: array<f32, 8>;
+#else
+var<private> limits: array<f32, 1>;
+#endif
+var<private> samples: u32;
+
+struct Pixel {
+    color: vec3<f32>,
+    transmittance: f32,
+    // Expected depth, not divided by opacity, and median depth.
+    depth: f32,
+    median: f32,
+    // Number of splats blended.
+    blended: u32,
+    // Number of samples whose surface has been passed, their summed transmittance, and the depth of the next surface.
+    hidden: u32,
+    hidden_transmittance: f32,
+    limit: f32,
+    // Whether no further splat changes it.
+    done: bool,
+}
+
+// Returns the pixel before the first splat.
+fn begin_pixel(at: vec2<u32>) -> Pixel {
+    let inside = all(at < frame.size);
+    find_limits(at, inside);
+    return Pixel(vec3(0.0), 1.0, 0.0, 0.0, 0u, 0u, 0.0, next_limit(-FAR), !inside);
+}
+
+// Passes the surfaces in front of a splat at this depth, the nearest that has not been blended: they hide it and all
+// that follow.
+fn pass_surfaces(pixel: ptr<function, Pixel>, depth: f32) {
+    let passed = passed_limits(depth);
+    (*pixel).hidden_transmittance += f32(passed - (*pixel).hidden) * (*pixel).transmittance;
+    (*pixel).hidden = passed;
+    (*pixel).limit = next_limit(depth);
+    (*pixel).done = passed == samples;
+}
+
+// Blends a splat.
+fn blend_splat(pixel: ptr<function, Pixel>, alpha: f32, color: vec3<f32>, depth: f32) {
+    if is_skipped(alpha) {
+        return;
+    }
+    let left = left_behind((*pixel).transmittance, alpha);
+    if is_opaque(left) {
+        (*pixel).done = true;
+        return;
+    }
+    let weight = alpha * (*pixel).transmittance * (f32(samples - (*pixel).hidden) / f32(samples));
+    (*pixel).color += color * weight;
+    (*pixel).depth += depth * weight;
+    if (*pixel).transmittance > 0.5 && left <= 0.5 {
+        (*pixel).median = depth;
+    }
+    (*pixel).transmittance = left;
+    (*pixel).blended++;
+}
+
+// As blend_splat, without a branch: an alpha of 0 skips the splat, and a pixel that is done stays as it is.
+fn blend_or_skip(pixel: ptr<function, Pixel>, alpha: f32, color: vec3<f32>, depth: f32) {
+    let before = (*pixel).transmittance;
+    let left = left_behind(before, alpha);
+    (*pixel).done = (*pixel).done || is_opaque(left);
+    let taken = !(*pixel).done && alpha > 0.0;
+    let weight = select(0.0, alpha * before * (f32(samples - (*pixel).hidden) / f32(samples)), taken);
+    (*pixel).color += color * weight;
+    (*pixel).depth += depth * weight;
+    (*pixel).median = select((*pixel).median, depth, taken && before > 0.5 && left <= 0.5);
+    (*pixel).transmittance = select(before, left, taken);
+    (*pixel).blended += select(0u, 1u, taken);
+}
+
+// Writes the pixel, over what is behind.
+fn finish_pixel(pixel: Pixel, at: vec2<u32>) {
+    if !all(at < frame.size) {
+        return;
+    }
+    var color = pixel.color;
+    let open = open_share();
+    // Transmittance where there is no surface, and the mean over all samples.
+    let behind = pixel.transmittance * open;
+    var transmittance = (pixel.hidden_transmittance + f32(samples - pixel.hidden) * pixel.transmittance) / f32(samples);
+    if frame.debug == DEBUG_DEPTH {
+        color = vec3(debug_depth(pixel.depth, 1.0 - transmittance));
+    } else if frame.debug == DEBUG_OVERDRAW {
+        color = heat(f32(pixel.blended) / OVERDRAW_MAX);
+        transmittance = select(0.0, 1.0, pixel.blended == 0u);
+    } else if frame.background_mode == BACKGROUND_COLOR {
+        color += transmittance * frame.background.xyz;
+    } else if frame.background_mode == BACKGROUND_ENVIRONMENT && open > 0.0 {
+        let shown = behind * frame.environment_opacity;
+        color += shown * environment_color(vec2<f32>(at));
+        // background.w: factor on the transmittance behind the map, 0 or 1.
+        transmittance -= shown * (1.0 - frame.background.w);
+    }
+    textureStore(color_out, at, vec4(color, transmittance));
+    textureStore(depth_out, at, vec4(pixel.depth, pixel.median, 0.0, 0.0));
+}
+
+// Returns the brightness of a depth, premultiplied: near is bright.
+fn debug_depth(depth: f32, opacity: f32) -> f32 {
+    if opacity <= 0.0 {
+        return 0.0;
+    }
+    return opacity * frame.debug_depth / (frame.debug_depth + max(depth / opacity, 0.0));
+}
+
+// Loads the camera-space depth of the opaque surface of each sample of this pixel.
+fn find_limits(pixel: vec2<u32>, inside: bool) {
+    samples = 1u;
+    limits[0] = FAR;
+    if frame.opaque_samples == 0u || !inside {
+        return;
+    }
+#ifdef MULTISAMPLED
+    samples = min(frame.opaque_samples, SAMPLES_MAX);
+    for (var i = 0u; i < samples; i++) {
+        limits[i] = distance_of(textureLoad(opaque_depth, pixel + frame.opaque_origin, i));
+    }
+#else
+    limits[0] = distance_of(textureLoad(opaque_depth, pixel + frame.opaque_origin, 0));
+#endif
+}
+
+// Returns the camera-space depth of a value of the depth buffer. 0 means that there is no surface: the far plane.
+fn distance_of(depth: f32) -> f32 {
+    let d = frame.opaque_distance;
+    return select(FAR, (d.x + d.y * depth) / (d.z + d.w * depth), depth > 0.0);
+}
+
+// Returns the share of the samples without a surface.
+fn open_share() -> f32 {
+    var open = 0u;
+    for (var i = 0u; i < samples; i++) {
+        open += select(0u, 1u, limits[i] == FAR);
+    }
+    return f32(open) / f32(samples);
+}
+
+// Returns the depth of the nearest surface that is not before `depth`.
+fn next_limit(depth: f32) -> f32 {
+    var nearest = FAR;
+    for (var i = 0u; i < samples; i++) {
+        nearest = select(nearest, min(nearest, limits[i]), limits[i] >= depth);
+    }
+    return nearest;
+}
+
+// Returns the number of samples whose surface is before `depth`.
+fn passed_limits(depth: f32) -> u32 {
+    var passed = 0u;
+    for (var i = 0u; i < samples; i++) {
+        passed += select(0u, 1u, limits[i] < depth);
+    }
+    return passed;
+}
+
+fn environment_color(position: vec2<f32>) -> vec3<f32> {
+    let ndc = (position + 0.5) / vec2<f32>(frame.size) * 2.0 - 1.0;
+    let ray = vec3((ndc - frame.projection.zw) / frame.projection.xy, 1.0);
+    let world = frame.world_x.xyz * ray.x + frame.world_y.xyz * ray.y + frame.world_z.xyz * ray.z;
+    let origin = vec3(frame.world_x.w, frame.world_y.w, frame.world_z.w);
+    let at = environment_texel(origin, normalize(world), frame.environment_size);
+    let corner = floor(at);
+    var color = vec3(0.0);
+    for (var i = 0u; i < 4u; i++) {
+        let texel = corner + vec2(f32(i & 1u), f32(i >> 1u));
+        let weight = (1.0 - abs(at.x - texel.x)) * (1.0 - abs(at.y - texel.y));
+        color += weight * environment_at(texel);
+    }
+    return lit(color, frame.environment_lighting, frame.background.xyz);
+}
+
+// Returns a texel, black outside the texture: the seam fades, as in the original.
+fn environment_at(texel: vec2<f32>) -> vec3<f32> {
+    let size = frame.environment_size;
+    if any(texel < vec2(0.0)) || any(texel >= vec2<f32>(size)) {
+        return vec3(0.0);
+    }
+    let plane = size.x * size.y;
+    let at = u32(texel.y) * size.x + u32(texel.x);
+    return vec3(environment[at], environment[plane + at], environment[2u * plane + at]);
+}

@@ -1,0 +1,136 @@
+//! The fast renderer of a view: two dispatches instead of the global sorts.
+//!
+//! In: what the reference design takes: instances, sizes, the bind group of the pixels. Out: the same picture.
+//!
+//! | pass | reads | writes |
+//! |---|---|---|
+//! | `project_bin` | active list, Gaussians, color coefficients | splats, bins of 4 x 4 tiles, in no order |
+//! | `sort_blend` | bins, splats, opaque depth | color and transmittance, expected and median depth |
+
+use super::resources::{Resources, Sizes};
+use super::{Instance, ViewRenderer};
+use crate::renderer::active::drawn_count;
+use crate::renderer::layout::BIN_COUNTERS;
+use crate::renderer::memory::Allocator;
+use crate::renderer::pipelines::{FastPipelines, Renderer};
+use crate::renderer::timing::PassTimer;
+use crate::view::tiles;
+use glam::UVec2;
+use wgpu::BufferUsages;
+
+/// Buffers and bind groups of the fast renderer.
+#[derive(Debug)]
+pub(super) struct FastResources {
+    /// Counters of even and of odd frames.
+    pub bins: wgpu::Buffer,
+    /// Size of all buffers.
+    pub bytes: u64,
+    project_bin: wgpu::BindGroup,
+    sort_blend: wgpu::BindGroup,
+}
+
+/// Tiles along each side of a bin.
+const BIN_TILES: u32 = 4;
+
+/// Returns the number of bins across and down a picture.
+pub(super) fn bin_grid(picture: UVec2) -> UVec2 {
+    (tiles(picture) + (BIN_TILES - 1)) / BIN_TILES
+}
+
+/// Returns the number of splats that each bin has room for.
+pub(super) fn bin_capacity(sizes: &Sizes) -> u32 {
+    let grid = bin_grid(sizes.picture);
+    (sizes.pairs / (grid.x * grid.y)).max(256)
+}
+
+impl ViewRenderer {
+    /// Returns the index of the first counter of a frame.
+    fn first_counter(&self, sizes: &Sizes, odd: bool) -> u32 {
+        let grid = bin_grid(sizes.picture);
+        if odd { BIN_COUNTERS + grid.x * grid.y } else { 0 }
+    }
+
+    /// Returns where the counters of the frame prepared last are, in bytes.
+    pub(in crate::renderer) fn counters_offset(&self) -> u64 {
+        self.resources
+            .as_ref()
+            .filter(|made| made.fast.is_some())
+            .map_or(0, |made| u64::from(self.first_counter(&made.sizes, self.odd)) * 4)
+    }
+
+    /// Returns the uniform `binning` of the frame that is prepared.
+    pub(super) fn binning(&self, sizes: &Sizes) -> [u32; 4] {
+        let grid = bin_grid(sizes.picture);
+        let counters = [self.odd, !self.odd].map(|odd| self.first_counter(sizes, odd));
+        [grid.x, bin_capacity(sizes), counters[0], counters[1]]
+    }
+
+    /// Creates the resources.
+    pub(super) fn make_fast(
+        &self,
+        renderer: &Renderer,
+        allocator: &Allocator<'_>,
+        sizes: Sizes,
+        instance: wgpu::BindingResource<'_>,
+        splats: &wgpu::Buffer,
+    ) -> FastResources {
+        let grid = bin_grid(sizes.picture);
+        let count = u64::from(grid.x * grid.y);
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
+        let bins = allocator.buffer("gs4d bins", 2 * 4 * (count + u64::from(BIN_COUNTERS)), usage);
+        let size = count * u64::from(bin_capacity(&sizes)) * 8;
+        let entries = allocator.buffer("gs4d bin entries", size, BufferUsages::STORAGE);
+        let (splats, entries) = (splats.as_entire_binding(), entries.as_entire_binding());
+        let counters = bins.as_entire_binding();
+        let resources = [instance, splats.clone(), counters.clone(), entries.clone()];
+        let project_bin = allocator.bind_group("gs4d project_bin", &renderer.layouts.project_bin, &resources);
+        let resources = [splats, counters, entries];
+        let sort_blend = allocator.bind_group("gs4d sort_blend", &renderer.layouts.sort_blend, &resources);
+        FastResources { bytes: bins.size() + size, bins, project_bin, sort_blend }
+    }
+
+    /// Records the frame.
+    pub(super) fn record_fast(
+        &self,
+        renderer: &Renderer,
+        pipelines: &FastPipelines,
+        made: &Resources,
+        fast: &FastResources,
+        encoder: &mut wgpu::CommandEncoder,
+        instances: &[Instance<'_>],
+        timer: Option<&PassTimer>,
+    ) {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some("gs4d"),
+            timestamp_writes: timer.and_then(PassTimer::frame_writes),
+        });
+        let mark = |pass: &mut wgpu::ComputePass<'_>| {
+            if let Some(timer) = timer {
+                timer.mark(pass);
+            }
+        };
+
+        // project_bin
+        let mut index = 0;
+        for instance in instances {
+            pass.set_pipeline(&pipelines.project_bin[instance.capture.storage as usize]);
+            pass.set_bind_group(2, instance.active.map_or(&renderer.no_list, |active| &active.list), &[]);
+            for (at, part) in instance.capture.parts.iter().enumerate() {
+                pass.set_bind_group(0, &fast.project_bin, &[index * self.alignment]);
+                pass.set_bind_group(1, &part.bind_group, &[]);
+                let count = drawn_count(instance.capture, at, instance.active);
+                pass.dispatch_workgroups(count.div_ceil(256), 1, 1);
+                index += 1;
+            }
+        }
+        mark(&mut pass);
+
+        // sort_blend
+        let tiles = tiles(made.sizes.picture);
+        pass.set_pipeline(&pipelines.sort_blend[usize::from(made.multisampled)]);
+        pass.set_bind_group(0, &made.pixel, &[]);
+        pass.set_bind_group(1, &fast.sort_blend, &[]);
+        pass.dispatch_workgroups(tiles.x, tiles.y, 1);
+        mark(&mut pass);
+    }
+}

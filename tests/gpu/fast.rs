@@ -1,0 +1,83 @@
+//! The fast renderer against the reference design, where its buffers and its workgroup memory are too small.
+//!
+//! In: scenes of many splats in few tiles. Out: proof that both designs draw the same picture, from the first frame on. Skipped where
+//! there is no GPU.
+
+use crate::support::gpu;
+use bevy_gs4d::gaussian::{Gaussian, Harmonics};
+use bevy_gs4d::renderer::{Design, Headless};
+use bevy_gs4d::scene::RuntimeScene;
+use bevy_gs4d::view::{Background, Camera, Frame, RasterFov, View};
+use glam::{UVec2, Vec3};
+
+/// Faint Gaussians about the origin, behind each other in layers along the line of sight: `layer` Gaussians have one depth.
+fn crowd(count: usize, layer: usize, deviation: f32) -> RuntimeScene {
+    let gaussians = (0..count).map(|index| {
+        let spread = |step: usize| (index * step % 97) as f32 / 97.0 - 0.5;
+        let depth = (index / layer * 37 % 101) as f32 / 101.0;
+        Gaussian {
+            mean: [0.1 * spread(31), depth, 0.1 * spread(57)],
+            mean_t: 0.0,
+            velocity: [0.0; 3],
+            sigma_t: f32::INFINITY,
+            covariance: [deviation * deviation, 0.0, 0.0, deviation * deviation, 0.0, deviation * deviation],
+            opacity: 0.012,
+            padding: 0.0,
+        }
+    });
+    let values = (0..count).flat_map(|index| [3, 5, 7].map(|step| (index * step % 11) as f32 / 11.0)).collect();
+    RuntimeScene::sliced(gaussians.collect(), Harmonics { coefficients: 1, degree: 0, degree_t: 0, values })
+}
+
+fn view(size: u32) -> View {
+    Camera::look_at(Vec3::new(0.0, -3.0, 0.0), Vec3::ZERO, Vec3::Z, 0.8, UVec2::splat(size))
+        .view(0.0, RasterFov::Reference)
+}
+
+/// Draws a scene with a renderer that has drawn nothing before.
+fn first_frame(headless: &mut Headless, design: Design, scene: &RuntimeScene, view: &View) -> Frame {
+    // A change of design releases all buffers.
+    for (_, other) in Design::NAMES {
+        headless.set_design(other);
+    }
+    headless.set_design(design);
+    let capture = headless.upload(scene).expect("the scene fits");
+    headless.render(&capture, view, Background::Color([0.1, 0.2, 0.3])).expect("the picture fits")
+}
+
+fn assert_same(found: &Frame, expected: &Frame, what: &str) {
+    let pixels = found.picture.pixels.iter().zip(&expected.picture.pixels);
+    let color = pixels.map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
+    let depths = found.depth.iter().zip(&expected.depth);
+    let depth = depths.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(color <= 1e-4, "{what}: color differs by {color}");
+    assert!(depth <= 1e-3, "{what}: depth differs by {depth}");
+    assert_eq!(found.counts.visible, expected.counts.visible, "{what}: visible splats");
+}
+
+#[test]
+fn lists_longer_than_workgroup_memory_are_drawn_in_order() {
+    let Some(mut headless) = gpu::headless() else { return };
+    for (count, layer) in [(3000, 1), (5000, 50), (6000, 6000)] {
+        let (scene, view) = (crowd(count, layer, 0.05), view(64));
+        let expected = first_frame(&mut headless, Design::Reference, &scene, &view);
+        assert!(expected.counts.pairs as usize > 4 * 2048, "tiles have more splats than fit: {:?}", expected.counts);
+        let found = first_frame(&mut headless, Design::Fast, &scene, &view);
+        assert_same(&found, &expected, &format!("{count} splats in layers of {layer}"));
+    }
+}
+
+#[test]
+fn bins_that_overflow_lack_no_splat_in_the_first_frame() {
+    let Some(mut headless) = gpu::headless() else { return };
+    // A picture of 256 bins with room for 256 splats each, and a few bins that hold all.
+    let (scene, view) = (crowd(4000, 1, 0.01), view(1024));
+    let expected = first_frame(&mut headless, Design::Reference, &scene, &view);
+    let found = first_frame(&mut headless, Design::Fast, &scene, &view);
+    assert_same(&found, &expected, "the first frame");
+    let capture = headless.upload(&scene).expect("the scene fits");
+    for number in 2..6 {
+        let found = headless.render(&capture, &view, Background::Color([0.1, 0.2, 0.3])).expect("the picture fits");
+        assert_same(&found, &expected, &format!("frame {number}, with more room"));
+    }
+}
