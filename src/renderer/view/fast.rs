@@ -7,41 +7,14 @@
 //! | `project_bin` | active list, Gaussians, color coefficients | splats, bins of 4 x 4 tiles, in no order |
 //! | `sort_blend` | bins, splats, opaque depth | color and transmittance, expected and median depth |
 
+use super::bins::{FastResources, bin_capacity, bin_grid};
 use super::resources::{Resources, Sizes};
 use super::{Instance, ViewRenderer};
 use crate::renderer::active::drawn_count;
 use crate::renderer::layout::BIN_COUNTERS;
-use crate::renderer::memory::Allocator;
 use crate::renderer::pipelines::{FastPipelines, Renderer};
 use crate::renderer::timing::PassTimer;
 use crate::view::tiles;
-use glam::UVec2;
-use wgpu::BufferUsages;
-
-/// Buffers and bind groups of the fast renderer.
-#[derive(Debug)]
-pub(super) struct FastResources {
-    /// Counters of even and of odd frames.
-    pub bins: wgpu::Buffer,
-    /// Size of all buffers.
-    pub bytes: u64,
-    project_bin: wgpu::BindGroup,
-    sort_blend: wgpu::BindGroup,
-}
-
-/// Tiles along each side of a bin.
-const BIN_TILES: u32 = 4;
-
-/// Returns the number of bins across and down a picture.
-pub(super) fn bin_grid(picture: UVec2) -> UVec2 {
-    (tiles(picture) + (BIN_TILES - 1)) / BIN_TILES
-}
-
-/// Returns the number of splats that each bin has room for.
-pub(super) fn bin_capacity(sizes: &Sizes) -> u32 {
-    let grid = bin_grid(sizes.picture);
-    (sizes.pairs / (grid.x * grid.y)).max(256)
-}
 
 impl ViewRenderer {
     /// Returns the index of the first counter of a frame.
@@ -62,31 +35,7 @@ impl ViewRenderer {
     pub(super) fn binning(&self, sizes: &Sizes) -> [u32; 4] {
         let grid = bin_grid(sizes.picture);
         let counters = [self.odd, !self.odd].map(|odd| self.first_counter(sizes, odd));
-        [grid.x, bin_capacity(sizes), counters[0], counters[1]]
-    }
-
-    /// Creates the resources.
-    pub(super) fn make_fast(
-        &self,
-        renderer: &Renderer,
-        allocator: &Allocator<'_>,
-        sizes: Sizes,
-        instance: wgpu::BindingResource<'_>,
-        splats: &wgpu::Buffer,
-    ) -> FastResources {
-        let grid = bin_grid(sizes.picture);
-        let count = u64::from(grid.x * grid.y);
-        let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
-        let bins = allocator.buffer("gs4d bins", 2 * 4 * (count + u64::from(BIN_COUNTERS)), usage);
-        let size = count * u64::from(bin_capacity(&sizes)) * 8;
-        let entries = allocator.buffer("gs4d bin entries", size, BufferUsages::STORAGE);
-        let (splats, entries) = (splats.as_entire_binding(), entries.as_entire_binding());
-        let counters = bins.as_entire_binding();
-        let resources = [instance, splats.clone(), counters.clone(), entries.clone()];
-        let project_bin = allocator.bind_group("gs4d project_bin", &renderer.layouts.project_bin, &resources);
-        let resources = [splats, counters, entries];
-        let sort_blend = allocator.bind_group("gs4d sort_blend", &renderer.layouts.sort_blend, &resources);
-        FastResources { bytes: bins.size() + size, bins, project_bin, sort_blend }
+        [grid.x, bin_capacity(sizes.picture, sizes.pairs), counters[0], counters[1]]
     }
 
     /// Records the frame.

@@ -4,6 +4,7 @@
 //! color and transmittance and one of expected and median depth. [`ViewRenderer::prepare`] sizes and fills the buffers,
 //! [`ViewRenderer::record`] records the frame.
 
+mod bins;
 mod fast;
 mod readback;
 mod record;
@@ -371,7 +372,7 @@ impl ViewRenderer {
             self.statistics.pairs = counters.pairs;
             let wanted = match self.design {
                 Design::Fast => {
-                    let grid = fast::bin_grid(self.resources.as_ref().map_or(UVec2::ONE, |made| made.sizes.picture));
+                    let grid = bins::bin_grid(self.resources.as_ref().map_or(UVec2::ONE, |made| made.sizes.picture));
                     counters.pairs_wanted.saturating_mul(grid.x * grid.y)
                 }
                 Design::Reference => counters.pairs_wanted,

@@ -3,7 +3,7 @@
 //! In: sizes, the opaque depth and the environment map. Out: [`Resources`], created again only when one of these
 //! changes.
 
-use super::fast::FastResources;
+use super::bins::FastResources;
 use super::{Design, ViewRenderer};
 use crate::renderer::layout::{self, BLOCK, DEPTH_STEPS, DIGIT_BITS, DIGITS, SortStep};
 use crate::renderer::pipelines::Renderer;
@@ -139,7 +139,7 @@ impl ViewRenderer {
         // After an even number of steps the pairs are in the buffers that `bin` wrote.
         let sorted = tile_steps(size) as usize % 2;
         let fast = (self.design == Design::Fast)
-            .then(|| self.make_fast(renderer, &allocator, sizes, instance.clone(), &splats));
+            .then(|| self.make_fast(renderer, &allocator, sizes.picture, sizes.pairs, instance.clone(), &splats));
         Resources {
             sizes,
             // 16 bytes of color and 8 of depth for each pixel.
