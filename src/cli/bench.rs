@@ -2,14 +2,13 @@
 //!
 //! In: a scene and views of it. Out: medians of GPU milliseconds per pass and per frame, and of wall-clock time.
 
-use super::args::{CheckpointArgs, GpuArgs, ViewArgs, values};
+use super::args::{CheckpointArgs, RendererArgs, ViewArgs, values};
 use super::failure::Failure;
 use super::progress::note;
 use super::report::{Report, switches_json};
 use super::table::Table;
 use crate::offline::engine::AdapterDescription;
 use crate::offline::orbit::{at_times, share};
-use crate::renderer::Design;
 use crate::renderer::Timings;
 use crate::view::View;
 use serde_json::json;
@@ -40,11 +39,8 @@ pub struct Bench {
     times: Option<usize>,
     #[command(flatten)]
     views: ViewArgs,
-    /// How views are drawn; both draw the same picture.
-    #[arg(long, value_name = "RENDERER", default_value = "reference", value_parser = values::one_of(&Design::NAMES))]
-    renderer: Design,
     #[command(flatten)]
-    gpu: GpuArgs,
+    renderer: RendererArgs,
     #[command(flatten)]
     checkpoint: CheckpointArgs,
 }
@@ -63,8 +59,7 @@ impl Bench {
         }
         let views: Vec<View> = shots.iter().map(|shot| shot.view(&scene)).collect();
         let size = views.first().map_or([0, 0], |view| view.size.to_array());
-        let mut headless = self.gpu.open()?;
-        headless.set_design(self.renderer);
+        let mut headless = self.renderer.open()?;
         let capture = headless.upload(&scene)?;
         note(&format!("measuring {} frames over {} views", self.frames, views.len()));
         let timings = headless.time(&capture, &views, self.frames)?;

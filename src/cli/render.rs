@@ -2,7 +2,7 @@
 //!
 //! In: a scene and views of it. Out: a folder of PNG files, and raw float32 ones with `--raw`.
 
-use super::args::{CheckpointArgs, GpuArgs, ViewArgs, values};
+use super::args::{CheckpointArgs, RendererArgs, ViewArgs};
 use super::failure::Failure;
 use super::interrupt::whole;
 use super::progress::Bars;
@@ -12,7 +12,6 @@ use crate::offline::engine::AdapterDescription;
 use crate::offline::orbit::Shot;
 use crate::offline::render::render_shots;
 use crate::offline::{OfflineError, write_beside, write_png};
-use crate::renderer::Design;
 use crate::view::{Background, Counts, Picture, View};
 use serde_json::{Value, json};
 use std::fs;
@@ -45,11 +44,8 @@ pub struct Render {
     raw: bool,
     #[command(flatten)]
     views: ViewArgs,
-    /// How views are drawn; both draw the same picture.
-    #[arg(long, value_name = "RENDERER", default_value = "reference", value_parser = values::one_of(&Design::NAMES))]
-    renderer: Design,
     #[command(flatten)]
-    gpu: GpuArgs,
+    renderer: RendererArgs,
     #[command(flatten)]
     checkpoint: CheckpointArgs,
 }
@@ -64,8 +60,7 @@ impl Render {
         let scene = scene.into_runtime().map_err(|error| Failure::at(&self.scene, &error))?;
         let shots = self.views.shots(&scene, 1)?;
         fs::create_dir_all(&self.out).map_err(|error| Failure::at(&self.out, &error))?;
-        let mut headless = self.gpu.open()?;
-        headless.set_design(self.renderer);
+        let mut headless = self.renderer.open()?;
         let capture = headless.upload(&scene)?;
         let background = self.checkpoint.background.map_or(scene.trained_background(), Background::Color);
         let with_view = |shot: Shot| {

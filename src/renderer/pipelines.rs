@@ -19,7 +19,7 @@ pub struct Renderer {
     pub(super) activate_scan: wgpu::ComputePipeline,
     pub(super) activate_write: wgpu::ComputePipeline,
     /// Indexed by how a capture is stored, in the order of [`Storage::ALL`].
-    project: [wgpu::ComputePipeline; 3],
+    pub(super) project: [wgpu::ComputePipeline; 3],
     pub(super) sort_count: wgpu::ComputePipeline,
     pub(super) sort_scan: wgpu::ComputePipeline,
     pub(super) sort_visible: wgpu::ComputePipeline,
@@ -149,11 +149,6 @@ impl Renderer {
     /// Returns the passes of the fast renderer if they have been compiled.
     pub(super) fn compiled_fast(&self) -> Option<&FastPipelines> {
         self.fast.get()
-    }
-
-    /// Returns the pipeline of `project` for captures stored this way.
-    pub(super) fn project(&self, storage: Storage) -> &wgpu::ComputePipeline {
-        &self.project[storage as usize]
     }
 
     /// Creates the bind group of one part of a capture, its buffers in the order of the shader's bindings.

@@ -26,6 +26,7 @@ mod support {
     pub mod event_log;
     pub mod fixtures;
     pub mod gpu;
+    pub mod npy;
     pub mod npz;
     pub mod offscreen_app;
     pub mod playback_app;

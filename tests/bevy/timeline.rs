@@ -273,6 +273,19 @@ fn text(range: &str) -> String {
     format!("(tracks: [(name: \"left\", clips: [(capture: \"two.gs4d\", start: 0, {range})])])")
 }
 
+/// Plays `show.timeline.ron`, one clip from 0.5 to 1.5, and stops a quarter of a second into it.
+fn play_show(app: &mut App) -> Handle<Timeline> {
+    let handle = load(app, "show.timeline.ron");
+    app.world_mut().spawn((TimelinePlayer(handle.clone()), Playback::paused_at(0.25)));
+    let loaded = handle.clone();
+    wait(app, "timeline and capture", move |app| {
+        app.world().resource::<AssetServer>().is_loaded_with_dependencies(loaded.id())
+    });
+    pass(app, 0.0);
+    assert_eq!(shown(app, "left"), (true, 0.75, 1.0), "what the file says");
+    handle
+}
+
 #[test]
 fn a_file_that_bevy_watches_is_played_as_it_becomes() {
     let folder = folder();
@@ -280,14 +293,7 @@ fn a_file_that_bevy_watches_is_played_as_it_becomes() {
     std::fs::write(&file, text("in: 0.5, out: 1.5")).expect("a file");
     let file_path = folder.path().to_str().expect("temporary folders have plain names").into();
     let mut app = app_with(AssetPlugin { file_path, watch_for_changes_override: Some(true), ..default() });
-    let handle = load(&app, "show.timeline.ron");
-    app.world_mut().spawn((TimelinePlayer(handle.clone()), Playback::paused_at(0.25)));
-    let loaded = handle.clone();
-    wait(&mut app, "timeline and capture", move |app| {
-        app.world().resource::<AssetServer>().is_loaded_with_dependencies(loaded.id())
-    });
-    pass(&mut app, 0.0);
-    assert_eq!(shown(&mut app, "left"), (true, 0.75, 1.0), "what the file says");
+    let handle = play_show(&mut app);
     std::fs::write(&file, text("in: 1.0, out: 2.0, speed: -1")).expect("the file");
     wait(&mut app, "the change, which nobody told of", move |app| {
         let timeline = app.world().resource::<Assets<Timeline>>().get(&handle);
@@ -303,14 +309,7 @@ fn a_file_loads_with_its_captures_and_reloads_when_it_changes() {
     let file = folder.path().join("show.timeline.ron");
     std::fs::write(&file, text("in: 0.5, out: 1.5")).expect("a file");
     let mut app = app_in(folder.path());
-    let handle = load(&app, "show.timeline.ron");
-    app.world_mut().spawn((TimelinePlayer(handle.clone()), Playback::paused_at(0.25)));
-    let loaded = handle.clone();
-    wait(&mut app, "timeline and capture", move |app| {
-        app.world().resource::<AssetServer>().is_loaded_with_dependencies(loaded.id())
-    });
-    pass(&mut app, 0.0);
-    assert_eq!(shown(&mut app, "left"), (true, 0.75, 1.0), "what the file says");
+    let handle = play_show(&mut app);
 
     std::fs::write(&file, text("in: 1.0, out: 2.0, speed: -1")).expect("the file");
     app.world().resource::<AssetServer>().reload("show.timeline.ron");

@@ -15,6 +15,7 @@ mod support {
     pub mod command;
     pub mod data;
     pub mod dataset;
+    pub mod npy;
     pub mod npz;
     pub mod skip;
 }

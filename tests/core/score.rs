@@ -23,6 +23,7 @@ use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene, TemporalFilter};
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, RasterFov, TILE_SIZE, View};
 use glam::{UVec2, Vec3};
+use std::path::Path;
 use std::path::PathBuf;
 
 /// No multiple of a tile.
@@ -325,7 +326,7 @@ fn a_share_of_toybox_ranks_like_all_of_it() {
     let views = to_draw(&views, scene.trained_with.raster_fov);
     let scores = accumulate(&scene, &views, Background::Color([0.0; 3])).expect("toybox's own views");
     for (variant, array, least) in [(Variant::Spatial, "spatial", 0.855), (Variant::Sigma, "sigma", 0.97)] {
-        let theirs = npy::floats(&folder.join("scores.npz"), array);
+        let theirs = floats(&folder.join("scores.npz"), array);
         let alike = spearman(&scores.of(variant).expect("a trained scene"), &theirs);
         println!("{variant}: {alike:.4}");
         assert!(alike >= least, "{variant}: rank correlation {alike}");
@@ -354,7 +355,7 @@ fn scores_rank_as_the_yardstick_does() {
         for variant in Variant::ALL.into_iter().filter(|variant| *variant != Variant::EnergyRemoval) {
             let estimated = matches!(variant, Variant::Energy | Variant::Removal);
             let array = variant.name().replace('-', "_") + if estimated { "_estimate" } else { "" };
-            let theirs = npy::floats(&folder.join("scores.npz"), &array);
+            let theirs = floats(&folder.join("scores.npz"), &array);
             let ours = scores.of(variant).expect("a trained scene");
             let floor = if estimated { 1e-3 } else { f32::NEG_INFINITY };
             let pairs = ours.iter().zip(&theirs).filter(|(_, theirs)| **theirs > floor);
@@ -381,7 +382,7 @@ fn key_frame_masks_are_those_of_the_yardstick() {
         let (times, count) = (key_times([0.0, 1.0], keys), runtime.len());
         let raster_fov = runtime.trained_with.raster_fov;
         let masks = key_frame_masks(&mut engine, &cameras, raster_fov, &times, count, &mut NoProgress).expect("masks");
-        let theirs = npy::values(&folder.join("masks.npz"), "vanilla", "|u1");
+        let theirs = values(&folder.join("masks.npz"), "vanilla", "|u1");
         let row = count.div_ceil(8);
         assert_eq!(theirs.len(), row * masks.len(), "as many masks");
         let bit = |bytes: &[u8], i: usize| u32::from(bytes[i / 8] >> (i % 8) & 1);
@@ -394,4 +395,17 @@ fn key_frame_masks_are_those_of_the_yardstick() {
         println!("{name}: {:.4} % of bits differ", share * 100.0);
         assert!(share <= 0.005, "{name}: {share} of all bits differ");
     }
+}
+
+/// Reads the values' bytes of an array whose type NumPy calls `kind`, such as `<f4`.
+fn values(path: &Path, name: &str, kind: &str) -> Vec<u8> {
+    let (header, values) = npy::array(path, name);
+    assert!(header.contains(&format!("'{kind}'")), "values of type {kind}: {header}");
+    values
+}
+
+/// Reads a column of float32.
+fn floats(path: &Path, array: &str) -> Vec<f32> {
+    let bytes = values(path, array, "<f4");
+    bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
 }

@@ -2,29 +2,22 @@
 //!
 //! In: an archive and the name of an array of views × 3 × height × width (float32 or float16). Out: one picture per view.
 
+use super::npy;
 use bevy_gs4d::view::Picture;
 use glam::{UVec2, Vec3};
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 /// Reads the pictures.
 pub fn pictures(path: &Path, array: &str) -> Vec<Picture> {
-    let mut archive = zip::ZipArchive::new(File::open(path).expect("the archive is there")).expect("a zip archive");
-    let mut bytes = Vec::new();
-    let mut entry = archive.by_name(&format!("{array}.npy")).expect("the array is in the archive");
-    entry.read_to_end(&mut bytes).expect("the array can be unpacked");
-    assert_eq!(&bytes[..8], b"\x93NUMPY\x01\x00", "a .npy file of version 1");
-    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    let header = std::str::from_utf8(&bytes[10..start]).expect("the header is text");
+    let (header, bytes) = npy::array(path, array);
     assert!(header.contains("'fortran_order': False"), "rows are innermost: {header}");
     let values: Vec<f32> = if header.contains("'<f4'") {
-        bytes[start..].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+        bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
     } else {
         assert!(header.contains("'<f2'"), "float32 or float16: {header}");
-        bytes[start..].chunks_exact(2).map(|b| from_half(u16::from_le_bytes([b[0], b[1]]))).collect()
+        bytes.chunks_exact(2).map(|b| from_half(u16::from_le_bytes([b[0], b[1]]))).collect()
     };
-    let [views, channels, height, width] = shape(header);
+    let [views, channels, height, width] = shape(&header);
     assert_eq!((channels, values.len()), (3, views * 3 * height * width), "as many values as the shape says");
     let plane = height * width;
     let picture = |view: &[f32]| Picture {

@@ -1,10 +1,10 @@
 //! The engine that scores and draws for a verb.
 //!
-//! In: `--engine`, `--adapter` and `--checks`. Out: an [`Engine`], or a headless renderer.
+//! In: `--engine`, `--renderer`, `--adapter` and `--checks`. Out: an [`Engine`], or a headless renderer.
 
 use super::values;
 use crate::offline::engine::{Engine, EngineChoice, EngineSettings, GpuSettings};
-use crate::renderer::{GpuError, Headless, ShaderChecks};
+use crate::renderer::{Design, GpuError, Headless, ShaderChecks};
 
 /// Where to compute.
 #[derive(clap::Args)]
@@ -27,10 +27,32 @@ impl EngineArgs {
     }
 }
 
+/// How views are drawn, and where.
+#[derive(clap::Args)]
+pub struct RendererArgs {
+    /// How views are drawn; both draw the same picture.
+    #[arg(long, value_name = "RENDERER", default_value = "reference", value_parser = values::one_of(&Design::NAMES))]
+    renderer: Design,
+    #[command(flatten)]
+    gpu: GpuArgs,
+}
+
+impl RendererArgs {
+    /// Opens the adapter and compiles the passes.
+    ///
+    /// # Errors
+    /// No such adapter, or one that cannot run the passes.
+    pub fn open(&self) -> Result<Headless, GpuError> {
+        let mut headless = self.gpu.settings().open()?;
+        headless.set_design(self.renderer);
+        Ok(headless)
+    }
+}
+
 /// Which GPU draws, and how carefully.
 #[derive(clap::Args)]
 #[command(next_help_heading = "GPU")]
-pub struct GpuArgs {
+struct GpuArgs {
     /// The adapter: part of its name in any case, or its index. A wrong one lists those there are [default: the fastest].
     #[arg(long, value_name = "NAME|INDEX")]
     adapter: Option<String>,
@@ -40,14 +62,6 @@ pub struct GpuArgs {
 }
 
 impl GpuArgs {
-    /// Opens the adapter and compiles the passes.
-    ///
-    /// # Errors
-    /// No such adapter, or one that cannot run the passes.
-    pub fn open(&self) -> Result<Headless, GpuError> {
-        self.settings().open()
-    }
-
     fn settings(&self) -> GpuSettings {
         let checks = if self.checks { ShaderChecks::On } else { ShaderChecks::Off };
         GpuSettings { adapter: self.adapter.clone(), checks }

@@ -8,9 +8,9 @@
 //! | `sort_blend` | bins, splats, opaque depth | color and transmittance, expected and median depth |
 
 use super::bins::{FastResources, bin_capacity, bin_grid};
+use super::record::mark;
 use super::resources::{Resources, Sizes};
 use super::{Instance, ViewRenderer};
-use crate::renderer::active::drawn_count;
 use crate::renderer::layout::BIN_COUNTERS;
 use crate::renderer::pipelines::{FastPipelines, Renderer};
 use crate::renderer::timing::PassTimer;
@@ -38,41 +38,20 @@ impl ViewRenderer {
         [grid.x, bin_capacity(sizes.picture, sizes.pairs), counters[0], counters[1]]
     }
 
-    /// Records the frame.
+    /// Records the passes of the fast design.
     pub(super) fn record_fast(
         &self,
         renderer: &Renderer,
         pipelines: &FastPipelines,
         made: &Resources,
         fast: &FastResources,
-        encoder: &mut wgpu::CommandEncoder,
+        pass: &mut wgpu::ComputePass<'_>,
         instances: &[Instance<'_>],
         timer: Option<&PassTimer>,
     ) {
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some("gs4d"),
-            timestamp_writes: timer.and_then(PassTimer::frame_writes),
-        });
-        let mark = |pass: &mut wgpu::ComputePass<'_>| {
-            if let Some(timer) = timer {
-                timer.mark(pass);
-            }
-        };
-
         // project_bin
-        let mut index = 0;
-        for instance in instances {
-            pass.set_pipeline(&pipelines.project_bin[instance.capture.storage as usize]);
-            pass.set_bind_group(2, instance.active.map_or(&renderer.no_list, |active| &active.list), &[]);
-            for (at, part) in instance.capture.parts.iter().enumerate() {
-                pass.set_bind_group(0, &fast.project_bin, &[index * self.alignment]);
-                pass.set_bind_group(1, &part.bind_group, &[]);
-                let count = drawn_count(instance.capture, at, instance.active);
-                pass.dispatch_workgroups(count.div_ceil(256), 1, 1);
-                index += 1;
-            }
-        }
-        mark(&mut pass);
+        self.project(renderer, &pipelines.project_bin, &fast.project_bin, pass, instances);
+        mark(timer, pass);
 
         // sort_blend
         let tiles = tiles(made.sizes.picture);
@@ -80,6 +59,6 @@ impl ViewRenderer {
         pass.set_bind_group(0, &made.pixel, &[]);
         pass.set_bind_group(1, &fast.sort_blend, &[]);
         pass.dispatch_workgroups(tiles.x, tiles.y, 1);
-        mark(&mut pass);
+        mark(timer, pass);
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! In: a prepared view and the instances it was prepared for. Out: commands.
 
-use super::resources::tile_steps;
+use super::resources::{Resources, tile_steps};
 use super::{Instance, ViewRenderer};
 use crate::renderer::active::drawn_count;
 use crate::renderer::layout::{BLOCK, DEPTH_STEPS, DIGITS};
@@ -34,83 +34,99 @@ impl ViewRenderer {
         timer: Option<&PassTimer>,
     ) {
         let Some(made) = &self.resources else { return };
-        if let (Some(fast), Some(pipelines)) = (&made.fast, renderer.compiled_fast()) {
-            self.record_fast(renderer, pipelines, made, fast, encoder, instances, timer);
-            let counters = self.counters_offset();
-            self.readback.copy(encoder, &fast.bins.clone(), counters);
-            self.recorded = true;
-            return;
+        let fast = made.fast.as_ref().zip(renderer.compiled_fast());
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some("gs4d"),
+            timestamp_writes: timer.and_then(PassTimer::frame_writes),
+        });
+        match fast {
+            Some((fast, pipelines)) => self.record_fast(renderer, pipelines, made, fast, &mut pass, instances, timer),
+            None => self.record_reference(renderer, made, &mut pass, instances, timer),
         }
-        {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                label: Some("gs4d"),
-                timestamp_writes: timer.and_then(PassTimer::frame_writes),
-            });
-            let mark = |pass: &mut wgpu::ComputePass<'_>| {
-                if let Some(timer) = timer {
-                    timer.mark(pass);
-                }
-            };
+        drop(pass);
+        let offset = self.counters_offset();
+        self.readback.copy(encoder, fast.map_or(&self.counters, |(fast, _)| &fast.bins), offset);
+        self.recorded = true;
+    }
 
-            // project
-            let mut index = 0;
-            for instance in instances {
-                pass.set_pipeline(renderer.project(instance.capture.storage));
-                pass.set_bind_group(2, instance.active.map_or(&renderer.no_list, |active| &active.list), &[]);
-                for (at, part) in instance.capture.parts.iter().enumerate() {
-                    pass.set_bind_group(0, &made.project, &[index * self.alignment]);
-                    pass.set_bind_group(1, &part.bind_group, &[]);
-                    let count = drawn_count(instance.capture, at, instance.active);
-                    pass.dispatch_workgroups(count.div_ceil(256), 1, 1);
-                    index += 1;
-                }
-            }
-            mark(&mut pass);
+    /// Records the passes of the reference design.
+    fn record_reference(
+        &self,
+        renderer: &Renderer,
+        made: &Resources,
+        pass: &mut wgpu::ComputePass<'_>,
+        instances: &[Instance<'_>],
+        timer: Option<&PassTimer>,
+    ) {
+        // project
+        self.project(renderer, &renderer.project, &made.project, pass, instances);
+        mark(timer, pass);
 
-            // sort by depth: the first step drops the invisible splats and counts the others; the later steps are sized
-            // by that count.
-            for step in 0..DEPTH_STEPS {
-                let group = &made.sort_depth[if step == 0 { 0 } else { 2 - (step as usize % 2) }];
-                let blocks = (step == 0).then(|| self.slots.div_ceil(BLOCK));
-                self.sort_step(renderer, &mut pass, group, step, blocks, 0, Some(&made.arguments));
-            }
-            mark(&mut pass);
-
-            // bin
-            pass.set_bind_group(0, &made.bin, &[]);
-            pass.set_pipeline(&renderer.bin_count);
-            pass.dispatch_workgroups_indirect(&self.arguments, 0);
-            pass.set_pipeline(&renderer.bin_scan);
-            pass.set_bind_group(1, &made.arguments, &[]);
-            pass.dispatch_workgroups(1, 1, 1);
-            pass.set_pipeline(&renderer.bin_offset);
-            pass.dispatch_workgroups_indirect(&self.arguments, 0);
-            pass.set_pipeline(&renderer.bin_emit);
-            pass.dispatch_workgroups_indirect(&self.arguments, 12);
-            mark(&mut pass);
-
-            // sort by tile
-            for step in 0..tile_steps(made.sizes.picture) {
-                let group = &made.sort_tiles[step as usize % 2];
-                self.sort_step(renderer, &mut pass, group, DEPTH_STEPS + step, None, 12, None);
-            }
-            mark(&mut pass);
-
-            // ranges
-            let tiles = tiles(made.sizes.picture);
-            pass.set_pipeline(&renderer.ranges);
-            pass.set_bind_group(0, &made.ranges, &[]);
-            pass.dispatch_workgroups((tiles.x * tiles.y).div_ceil(256), 1, 1);
-            mark(&mut pass);
-
-            // blend
-            pass.set_pipeline(if self.multisampled { &renderer.blend_multisampled } else { &renderer.blend });
-            pass.set_bind_group(0, &made.pixel, &[]);
-            pass.set_bind_group(1, &made.blend, &[]);
-            pass.dispatch_workgroups(tiles.x, tiles.y, 1);
-            mark(&mut pass);
+        // sort by depth: the first step drops the invisible splats and counts the others; the later steps are sized
+        // by that count.
+        for step in 0..DEPTH_STEPS {
+            let group = &made.sort_depth[if step == 0 { 0 } else { 2 - (step as usize % 2) }];
+            let blocks = (step == 0).then(|| self.slots.div_ceil(BLOCK));
+            self.sort_step(renderer, pass, group, step, blocks, 0, Some(&made.arguments));
         }
-        self.readback.copy(encoder, &self.counters, 0);
+        mark(timer, pass);
+
+        // bin
+        pass.set_bind_group(0, &made.bin, &[]);
+        pass.set_pipeline(&renderer.bin_count);
+        pass.dispatch_workgroups_indirect(&self.arguments, 0);
+        pass.set_pipeline(&renderer.bin_scan);
+        pass.set_bind_group(1, &made.arguments, &[]);
+        pass.dispatch_workgroups(1, 1, 1);
+        pass.set_pipeline(&renderer.bin_offset);
+        pass.dispatch_workgroups_indirect(&self.arguments, 0);
+        pass.set_pipeline(&renderer.bin_emit);
+        pass.dispatch_workgroups_indirect(&self.arguments, 12);
+        mark(timer, pass);
+
+        // sort by tile
+        for step in 0..tile_steps(made.sizes.picture) {
+            let group = &made.sort_tiles[step as usize % 2];
+            self.sort_step(renderer, pass, group, DEPTH_STEPS + step, None, 12, None);
+        }
+        mark(timer, pass);
+
+        // ranges
+        let tiles = tiles(made.sizes.picture);
+        pass.set_pipeline(&renderer.ranges);
+        pass.set_bind_group(0, &made.ranges, &[]);
+        pass.dispatch_workgroups((tiles.x * tiles.y).div_ceil(256), 1, 1);
+        mark(timer, pass);
+
+        // blend
+        pass.set_pipeline(if self.multisampled { &renderer.blend_multisampled } else { &renderer.blend });
+        pass.set_bind_group(0, &made.pixel, &[]);
+        pass.set_bind_group(1, &made.blend, &[]);
+        pass.dispatch_workgroups(tiles.x, tiles.y, 1);
+        mark(timer, pass);
+    }
+
+    /// Records one dispatch of `project` or `project_bin` for each part of each instance.
+    pub(super) fn project(
+        &self,
+        renderer: &Renderer,
+        pipelines: &[wgpu::ComputePipeline; 3],
+        group: &wgpu::BindGroup,
+        pass: &mut wgpu::ComputePass<'_>,
+        instances: &[Instance<'_>],
+    ) {
+        let mut index = 0;
+        for instance in instances {
+            pass.set_pipeline(&pipelines[instance.capture.storage as usize]);
+            pass.set_bind_group(2, instance.active.map_or(&renderer.no_list, |active| &active.list), &[]);
+            for (at, part) in instance.capture.parts.iter().enumerate() {
+                pass.set_bind_group(0, group, &[index * self.alignment]);
+                pass.set_bind_group(1, &part.bind_group, &[]);
+                let count = drawn_count(instance.capture, at, instance.active);
+                pass.dispatch_workgroups(count.div_ceil(256), 1, 1);
+                index += 1;
+            }
+        }
     }
 
     /// Records one step of `sort`. `blocks` is the number of workgroups if the host knows it; otherwise the dispatch is
@@ -141,5 +157,12 @@ impl ViewRenderer {
         }
         pass.set_pipeline(&renderer.sort_scatter);
         dispatch(pass);
+    }
+}
+
+/// Marks the end of a pass, if the frame is timed.
+pub(super) fn mark(timer: Option<&PassTimer>, pass: &mut wgpu::ComputePass<'_>) {
+    if let Some(timer) = timer {
+        timer.mark(pass);
     }
 }
