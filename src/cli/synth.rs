@@ -1,26 +1,36 @@
 //! `gs4d synth OUT`: creates a procedural moving scene of any size.
 //!
-//! In: a count and a seed. Out: a package in the trained form, for tests and benchmarks.
+//! In: a count and a seed, or a capture to grow. Out: a package in the trained form, for tests and benchmarks.
 
-use super::args::{PackageArgs, values};
+use super::args::{CheckpointArgs, PackageArgs, values};
 use super::failure::Failure;
 use super::report::Report;
 use super::table::{bytes, lines};
+use crate::offline;
+use crate::scene::grow::grow;
 use crate::scene::synth::{SynthSettings, synthesize};
+use crate::scene::{GaussianScene, SceneForm};
 use serde_json::json;
+use std::ffi::OsString;
+use std::path::Path;
 
-/// Make a procedural moving scene, for tests and benchmarks.
+/// Make a procedural moving scene or grow a capture, for tests and benchmarks.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   gs4d synth small.gs4d
-  gs4d synth large.gs4d --count 667000 --seed 7")]
+  gs4d synth large.gs4d --count 667000 --seed 7
+  gs4d synth grown.gs4d --grow 37 chkpnt30000.pth --level 1")]
 pub struct Synth {
     #[command(flatten)]
     package: PackageArgs,
     /// Number of Gaussians.
-    #[arg(long, value_name = "N", default_value = "10000", value_parser = values::count(20_000_000))]
+    #[arg(long, value_name = "N", default_value = "10000", value_parser = values::count(MAX_COUNT as u64))]
     count: usize,
+    /// Split each Gaussian of CAPTURE into K inside its own 4D volume instead: nearly the same pictures from K times as
+    /// many Gaussians.
+    #[arg(long, num_args = 2, value_names = ["K", "CAPTURE"], conflicts_with_all = ["count", "sh_degree", "sh_degree_t"])]
+    grow: Option<Vec<OsString>>,
     /// Seed of the random numbers: the same seed makes the same scene on every machine.
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
@@ -31,9 +41,12 @@ pub struct Synth {
     #[arg(long, value_name = "D", default_value_t = 2, value_parser = clap::value_parser!(u32).range(0..=2))]
     sh_degree_t: u32,
     /// Seconds of playback.
-    #[arg(long, value_name = "SECONDS", default_value = "2", value_parser = values::positive)]
+    #[arg(long, value_name = "SECONDS", default_value = "2", value_parser = values::positive, conflicts_with = "grow")]
     duration: f32,
 }
+
+/// The largest number of Gaussians that are made.
+const MAX_COUNT: usize = 20_000_000;
 
 impl Synth {
     /// Creates the scene and writes it.
@@ -42,18 +55,38 @@ impl Synth {
     /// The package cannot be written.
     pub fn run(&self) -> Result<Report, Failure> {
         let out = self.package.out()?;
-        let scene = synthesize(&SynthSettings {
-            count: self.count,
-            seed: self.seed,
-            degree: self.sh_degree,
-            degree_t: self.sh_degree_t,
-            duration_seconds: self.duration,
-        });
+        let scene = match self.grow.as_deref() {
+            Some([times, capture]) => self.grown(times, Path::new(capture))?,
+            _ => synthesize(&SynthSettings {
+                count: self.count,
+                seed: self.seed,
+                degree: self.sh_degree,
+                degree_t: self.sh_degree_t,
+                duration_seconds: self.duration,
+            }),
+        };
         let size = self.package.save(&scene)?;
         let text =
             lines(&[("wrote", format!("{}, {}", out.display(), bytes(size))), ("Gaussians", scene.len().to_string())]);
         let json =
             json!({ "out": out.display().to_string(), "gaussians": scene.len(), "bytes": size, "seed": self.seed });
         Ok(Report::new(json, text))
+    }
+
+    fn grown(&self, times: &OsString, capture: &Path) -> Result<GaussianScene, Failure> {
+        let text = times.to_string_lossy();
+        let times: usize = text.parse().ok().filter(|&times| times > 0).ok_or_else(|| {
+            Failure::new(format!("--grow {text}: expected the number of parts of each Gaussian, such as 37"))
+        })?;
+        offline::require_another_file(capture, self.package.out()?)?;
+        let scene = CheckpointArgs::default().load(capture)?;
+        let SceneForm::Trained(trained) = &scene.form else {
+            let reason = "only Gaussians in the trained form can be grown: name a checkpoint or a package in that form";
+            return Err(Failure::about(capture, reason));
+        };
+        if trained.parameters.len().saturating_mul(times) > MAX_COUNT {
+            return Err(Failure::about(capture, &format!("{times} times as many Gaussians are more than {MAX_COUNT}")));
+        }
+        grow(&scene, trained, times, self.seed).map_err(|error| Failure::at(capture, &error))
     }
 }

@@ -80,6 +80,31 @@ impl Parameters {
         (0..self.len()).map(|i| self.slice_one(i, model, settings)).collect()
     }
 
+    /// Returns the factor `L = R S` of the 4D covariance `L Lᵀ` of one Gaussian, axes x, y, z, t; the last is zero in a
+    /// static model.
+    ///
+    /// # Errors
+    /// A quaternion of length zero or not finite.
+    ///
+    /// # Panics
+    /// As [`slice`](Self::slice).
+    pub fn factor(&self, index: usize) -> Result<DMat4, InvalidGaussian> {
+        let invalid = |reason| InvalidGaussian { index, reason };
+        let scale = DVec3::from(self.log_scale[index].map(|s| f64::from(s).exp()));
+        let l = unit(self.rotation_l[index]).ok_or(invalid("a rotation of length zero or not finite"))?;
+        let around = || DMat4::from_quat(DQuat::from_xyzw(l.y, l.z, l.w, l.x));
+        let temporal = || f64::from(self.log_scale_t[index]).exp();
+        let (rotation, scale_t) = match self.model() {
+            Model::Rotated4d => {
+                let r = unit(self.rotation_r[index]);
+                (rotation_4d(l, r.ok_or(invalid("a right rotation of length zero or not finite"))?), temporal())
+            }
+            Model::Unrotated4d => (around(), temporal().sqrt()),
+            Model::Static3d => (around(), 0.0),
+        };
+        Ok(rotation * DMat4::from_diagonal(scale.extend(scale_t)))
+    }
+
     fn slice_one(&self, index: usize, model: Model, settings: &SliceSettings) -> Result<Gaussian, InvalidGaussian> {
         let invalid = |reason| InvalidGaussian { index, reason };
         let modifier = f64::from(settings.scale_modifier);

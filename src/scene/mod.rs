@@ -8,9 +8,11 @@ mod bounds;
 mod environment;
 mod filter;
 mod form;
+pub mod grow;
 pub mod packed;
 pub mod pick;
 mod provenance;
+mod random;
 pub mod synth;
 
 pub use bounds::{Bounds, BoundsOverTime};

@@ -3,6 +3,7 @@
 //! In: a count and a seed. Out: a [`GaussianScene`] in the trained form, the same on every machine: a checkered ground at rest
 //! and colored balls circling over it, with lifespans from a flash to the whole interval.
 
+use super::random::Random;
 use super::{GaussianScene, PlaybackHints, SceneForm, Trained, TrainedWith};
 use crate::gaussian::{Harmonics, Parameters};
 use glam::{EulerRot, Quat, Vec3};
@@ -38,7 +39,7 @@ const SH_C0: f32 = 0.282_094_79;
 
 /// Returns the scene. The time interval is [0, 1], up is +z, and everything fits in a box of about two units.
 pub fn synthesize(settings: &SynthSettings) -> GaussianScene {
-    let mut random = Random(settings.seed);
+    let mut random = Random::new(settings.seed);
     let mut harmonics = Harmonics { degree: settings.degree.min(3), ..Harmonics::default() };
     harmonics.degree_t = if harmonics.degree == 3 { settings.degree_t.min(2) } else { 0 };
     harmonics.coefficients = harmonics.evaluated();
@@ -106,21 +107,4 @@ fn rotations(ground: bool, random: &mut Random) -> ([f32; 4], [f32; 4]) {
     let other = turn * Quat::from_rotation_x(twist) * Quat::from_rotation_z(twist);
     let backwards = |q: Quat| [q.w, -q.z, -q.y, -q.x];
     (backwards(turn), backwards(other))
-}
-
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 40) as f32 / (1u64 << 24) as f32
-    }
-
-    fn in_range(&mut self, low: f32, high: f32) -> f32 {
-        low + (high - low) * self.unit()
-    }
 }

@@ -144,6 +144,10 @@ fn paths_need_not_be_unicode() {
     let folder = folder();
     let path = folder.path().join(OsStr::from_bytes(b"sc\xff\xfene.gs4d"));
     gs4d(&arguments!["synth", &path, "--count", "20"]).text();
+    let grown = folder.path().join("grown.gs4d");
+    let made = gs4d(&arguments!["synth", &grown, "--grow", "3", &path, "--json"]).json();
+    assert_eq!(made["gaussians"], 60, "three for each");
+    gs4d(&arguments!["synth", &path, "--grow", "3", &path]).must_fail("the input itself");
     let info = gs4d(&arguments!["info", &path, "--json"]).json();
     assert_eq!(info["gaussians"], 20, "read back");
     let gone = folder.path().join(OsStr::from_bytes(b"g\xffne.pth"));
@@ -156,6 +160,8 @@ fn usage_errors_name_the_option() {
         (&["info"][..], "FILE"),
         (&["frobnicate"], "frobnicate"),
         (&["synth", "x.gs4d", "--count", "0"], "--count"),
+        (&["synth", "x.gs4d", "--grow", "0", "y.gs4d"], "--grow 0"),
+        (&["synth", "x.gs4d", "--grow", "2", "y.gs4d", "--count", "5"], "--count"),
         (&["info", "x.gs4d", "--background", "1,2"], "--background"),
         (&["info", "x.gs4d", "--time-interval", "1,0"], "--time-interval"),
         (&["info", "x.gs4d", "--up", "sideways"], "--up"),

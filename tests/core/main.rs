@@ -9,6 +9,7 @@ mod checkpoint_poison;
 #[cfg(feature = "offline")]
 mod dataset;
 mod golden;
+mod grow;
 #[cfg(feature = "offline")]
 mod loading;
 #[cfg(feature = "offline")]

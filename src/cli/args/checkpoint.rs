@@ -14,7 +14,7 @@ use std::io::Read;
 use std::path::Path;
 
 /// What a checkpoint does not say about itself.
-#[derive(clap::Args)]
+#[derive(clap::Args, Default)]
 #[command(next_help_heading = "What a checkpoint does not say (taken from cfg_args beside it, else the default)")]
 pub struct CheckpointArgs {
     /// First and last timestamp of training [default: 0,1].
