@@ -6,8 +6,11 @@
 #import gs4d::types::{DEBUG_ACTIVE, DEBUG_LIFESPAN, DEBUG_VELOCITY}
 #import gs4d::appearance::{heat, lit}
 #import gs4d::tile::{contributing_tiles, pack_tiles, tiles_of}
+#ifdef BINNED
+#import gs4d::bins::{depth_order, entry_word, stamp}
+#endif
 #ifdef PACKED_GEOMETRY
-#import gs4d::packed::{unpack_base, unpack_gaussian, BLOCK_RANGES, PACKED_BLOCK, SHARED_RANGES}
+#import gs4d::packed::{unpack_base, unpack_gaussian, unpack_lifespan, BLOCK_RANGES, PACKED_BLOCK, SHARED_RANGES}
 #endif
 #import gs4d::harmonics::{basis_first, basis_second, basis_third, basis_fourth, time_cosine}
 
@@ -20,7 +23,7 @@ const FRUSTUM_CLAMP: f32 = 1.3;
 #ifdef BINNED
 // Counters, see BIN_COUNTERS; then the number of splats of each bin.
 @group(0) @binding(2) var<storage, read_write> bins: array<atomic<u32>>;
-// Bin by bin: the tiles that a splat covers (bit 4 y + x of the bin's 4 x 4), and its slot.
+// Bin by bin: the depth key of a splat, and its slot with the tiles of the bin that it covers.
 @group(0) @binding(3) var<storage, read_write> bin_entries: array<vec2<u32>>;
 #else
 @group(0) @binding(2) var<storage, read_write> depth_keys: array<u32>;
@@ -32,8 +35,9 @@ const FRUSTUM_CLAMP: f32 = 1.3;
 #ifdef CODED_COLORS
 // Three words for each Gaussian.
 @group(1) @binding(2) var<storage, read> color_records: array<u32>;
-@group(1) @binding(3) var<storage, read> codebooks: array<u32>;
-// Four codebooks of 36 four-vectors; a uniform, since few storage buffers are left and all threads read the same.
+// Entries of a multiple of three four-vectors: 48 signed bytes for each time harmonic.
+@group(1) @binding(3) var<storage, read> codebooks: array<vec4<u32>>;
+// The value of a byte of 1: four codebooks of 36 four-vectors; a uniform, since few storage buffers are left and all threads read the same.
 @group(1) @binding(4) var<uniform> codebook_scales: array<vec4<f32>, 144>;
 #else
 @group(1) @binding(2) var<storage, read> harmonics: array<vec4<f32>>;
@@ -52,34 +56,30 @@ const OWN_BINS: u32 = 2048u;
 
 var<workgroup> own: array<atomic<u32>, 2048>;
 var<workgroup> own_visible: atomic<u32>;
-// Tiles of the splat that project_one made: first and last + 1.
+var<workgroup> own_pairs: atomic<u32>;
+// Tiles of the splat that project_one made, first and last + 1, and its depth.
 var<private> covered: vec4<u32>;
-
-// Tiles (of 4 x 4) of a bin that `covered` holds.
-fn tiles_of_bin(bin: vec2<u32>) -> u32 {
-    let first = max(covered.xy, bin * 4u) - bin * 4u;
-    let last = min(covered.zw, bin * 4u + 4u) - bin * 4u;
-    let columns = (1u << last.x) - (1u << first.x);
-    let rows = 0x1111u & ((1u << (4u * last.y)) - (1u << (4u * first.y)));
-    return columns * rows;
-}
+var<private> covered_depth: f32;
 
 @compute @workgroup_size(256)
 fn project_bin(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
-    let across = instance.binning.x;
+    let side = instance.binning.x & 0xffu;
     let capacity = instance.binning.y;
     let first_bin = instance.binning.z + BIN_COUNTERS;
-    let down = (instance.tiles.y + 3u) / 4u;
-    let count = across * down;
+    let grid = (instance.tiles + side - 1u) / side;
+    let across = grid.x;
+    let count = grid.x * grid.y;
     let by_group = count <= OWN_BINS;
     for (var i = thread; i < min(count, OWN_BINS); i += 256u) {
         atomicStore(&own[i], 0u);
     }
     if thread == 0u {
         atomicStore(&own_visible, 0u);
+        atomicStore(&own_pairs, 0u);
     }
     workgroupBarrier();
     covered = vec4(0u);
+    var key = 0u;
     let slot = instance.first_slot + id.x;
     if id.x < instance.count {
         var index = id.x;
@@ -87,15 +87,15 @@ fn project_bin(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invo
             index = active_list[instance.first_listed + id.x];
         }
         if project_one(index, slot) == INVISIBLE {
-            // Not found by a search through all splats.
-            splats[slot].tiles_high = 0u;
             covered = vec4(0u);
         } else {
             atomicAdd(&own_visible, 1u);
+            atomicAdd(&own_pairs, (covered.z - covered.x) * (covered.w - covered.y));
+            key = depth_order(covered_depth);
         }
     }
-    let low = covered.xy / 4u;
-    let high = (covered.zw + 3u) / 4u;
+    let low = covered.xy / side;
+    let high = (covered.zw + side - 1u) / side;
     if by_group {
         for (var y = low.y; y < high.y; y++) {
             for (var x = low.x; x < high.x; x++) {
@@ -106,6 +106,7 @@ fn project_bin(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invo
     workgroupBarrier();
     if thread == 0u {
         atomicAdd(&bins[instance.binning.z], atomicLoad(&own_visible));
+        atomicAdd(&bins[instance.binning.z + 1u], atomicLoad(&own_pairs));
     }
     for (var i = thread; i < min(count, OWN_BINS); i += 256u) {
         let many = atomicLoad(&own[i]);
@@ -124,7 +125,10 @@ fn project_bin(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invo
                 place = atomicAdd(&bins[first_bin + bin], 1u);
             }
             if place < capacity {
-                bin_entries[bin * capacity + place] = vec2(tiles_of_bin(vec2(x, y)), slot);
+                let corner = side * vec2(x, y);
+                let first = max(covered.xy, corner) - corner;
+                let last = min(covered.zw, corner + side) - 1u - corner;
+                bin_entries[bin * capacity + place] = vec2(key, entry_word(slot, first, last));
             }
         }
     }
@@ -144,6 +148,15 @@ fn project(@builtin(global_invocation_id) id: vec3<u32>) {
 }
 #endif
 
+// Returns mean_t and inverse_sigma_t.
+fn load_lifespan(index: u32) -> vec2<f32> {
+#ifdef PACKED_GEOMETRY
+    return unpack_lifespan(records[2u * index], ranges[0]);
+#else
+    return vec2(gaussians[index].mean_t, gaussians[index].inverse_sigma_t);
+#endif
+}
+
 fn load_gaussian(index: u32) -> Gaussian {
 #ifdef PACKED_GEOMETRY
     let block = SHARED_RANGES + index / PACKED_BLOCK * BLOCK_RANGES;
@@ -157,9 +170,10 @@ fn load_gaussian(index: u32) -> Gaussian {
 
 // Writes the splat of a Gaussian into its slot and returns its depth key.
 fn project_one(index: u32, slot: u32) -> u32 {
-    let g = load_gaussian(index);
-    let dt = instance.time - g.mean_t;
-    let z = dt * g.inverse_sigma_t;
+    // Half of the record is enough to drop an absent Gaussian.
+    let lifespan = load_lifespan(index);
+    let dt = instance.time - lifespan.x;
+    let z = dt * lifespan.y;
     var marginal = exp(-0.5 * z * z);
     let absent = marginal <= MARGINAL_CUTOFF;
     if absent {
@@ -168,6 +182,7 @@ fn project_one(index: u32, slot: u32) -> u32 {
         }
         marginal = MARGINAL_CUTOFF;
     }
+    let g = load_gaussian(index);
     let mean = vec4(g.mean + g.velocity * dt, 1.0);
     if instance.cropped != 0u {
         let place = vec3(dot(instance.crop_x, mean), dot(instance.crop_y, mean), dot(instance.crop_z, mean));
@@ -218,6 +233,7 @@ fn project_one(index: u32, slot: u32) -> u32 {
 
 #ifdef BINNED
     covered = vec4<u32>(tiles);
+    covered_depth = q.z;
 #endif
     var seen = g.mean;
     if instance.displaced != 0u {
@@ -237,7 +253,10 @@ fn project_one(index: u32, slot: u32) -> u32 {
         }
         splat.color = lit(color(index, direction, -dt), instance.lighting, instance.light);
     }
-    let words = pack_tiles(tiles);
+    var words = pack_tiles(tiles);
+#ifdef BINNED
+    words |= stamp(instance.binning.x >> 8u);
+#endif
     splat.tiles_low = words.x;
     splat.tiles_high = words.y;
     splats[slot] = splat;
@@ -259,67 +278,108 @@ fn debug_color(g: Gaussian, absent: bool) -> vec3<f32> {
     return select(vec3(0.1, 0.8, 0.2), vec3(0.9, 0.1, 0.1), absent);
 }
 
-#ifdef CODED_COLORS
-// First word of this Gaussian's entry in each codebook.
-var<private> entries: vec4<u32>;
-#else
-// First four-vector of this Gaussian's coefficients.
-var<private> first_coefficient: u32;
-#endif
-
-// Returns four values of this Gaussian's coefficients, RGB innermost.
-fn coefficients(at: u32) -> vec4<f32> {
-#ifdef CODED_COLORS
-    var sum = vec4(0.0);
-    for (var stage = 0u; stage < instance.stages; stage++) {
-        sum += unpack4x8snorm(codebooks[entries[stage] + at]) * codebook_scales[stage * instance.stride + at];
-    }
-    return sum;
-#else
-    return harmonics[first_coefficient + at];
-#endif
-}
-
 fn color(index: u32, direction: vec3<f32>, tau: f32) -> vec3<f32> {
-#ifdef CODED_COLORS
-    // The first coefficient is not in the codebooks.
-    let start = unpack_base(color_records[3u * index], ranges[2]) * 0.28209479 + 0.5;
-    let a = color_records[3u * index + 1u];
-    let b = color_records[3u * index + 2u];
-    entries = (instance.first_entries + vec4(a & 0xffffu, a >> 16u, b & 0xffffu, b >> 16u)) * instance.stride;
-    if instance.stages == 0u {
-        return max(start, vec3(0.0));
-    }
-#else
-    let start = vec3(0.5);
-    first_coefficient = index * instance.stride;
-#endif
-    if instance.degree == 0u {
-        return max(start + coefficients(0u).xyz * 0.28209479, vec3(0.0));
-    }
     let b0 = basis_first(direction);
-    if instance.degree == 1u {
-        return max(start + four(0u, b0), vec3(0.0));
-    }
     let b1 = basis_second(direction);
     let b2 = basis_third(direction);
-    if instance.degree == 2u {
-        return max(start + four(0u, b0) + four(3u, b1) + coefficients(6u).xyz * b2.x, vec3(0.0));
-    }
     let b3 = basis_fourth(direction);
-    var sum = start + four(0u, b0) + four(3u, b1) + four(6u, b2) + four(9u, b3);
-    for (var n = 1u; n <= instance.degree_t; n++) {
-        let block = 12u * n;
-        let value = four(block, b0) + four(block + 3u, b1) + four(block + 6u, b2) + four(block + 9u, b3);
-        sum += time_cosine(f32(n), tau, instance.time_span) * value;
+    // Factors of the time harmonics.
+    var times = vec3(1.0, 0.0, 0.0);
+    if instance.degree_t >= 1u {
+        times.y = time_cosine(1.0, tau, instance.time_span);
+    }
+    if instance.degree_t >= 2u {
+        times.z = time_cosine(2.0, tau, instance.time_span);
+    }
+#ifdef CODED_COLORS
+    // The first coefficient is not in the codebooks.
+    var sum = unpack_base(color_records[3u * index], ranges[2]) * 0.28209479 + 0.5;
+    let a = color_records[3u * index + 1u];
+    let b = color_records[3u * index + 2u];
+    let entries = (instance.first_entries + vec4(a & 0xffffu, a >> 16u, b & 0xffffu, b >> 16u)) * (instance.stride / 4u);
+    // Without some time harmonics their factors are 0, and other entries are read in their place.
+    let second = min(1u, instance.degree_t) * 3u;
+    let third = min(2u, instance.degree_t) * 3u;
+    for (var stage = 0u; stage < instance.stages; stage++) {
+        let entry = entries[stage];
+        // All at once, to hide their latency.
+        let u0 = codebooks[entry];
+        let v0 = codebooks[entry + 1u];
+        let w0 = codebooks[entry + 2u];
+        let u1 = codebooks[entry + second];
+        let v1 = codebooks[entry + second + 1u];
+        let w1 = codebooks[entry + second + 2u];
+        let u2 = codebooks[entry + third];
+        let v2 = codebooks[entry + third + 1u];
+        let w2 = codebooks[entry + third + 2u];
+        let scale = stage * instance.stride;
+        sum += coded_block(u0, v0, w0, scale, b0, b1, b2, b3);
+        sum += times.y * coded_block(u1, v1, w1, scale + 4u * second, b0, b1, b2, b3);
+        sum += times.z * coded_block(u2, v2, w2, scale + 4u * third, b0, b1, b2, b3);
     }
     return max(sum, vec3(0.0));
+#else
+    let start = vec3(0.5);
+    if instance.degree == 0u {
+        return max(start + harmonic(index, 0u).xyz * b0.x, vec3(0.0));
+    }
+    if instance.degree == 1u {
+        return max(start + whole(index, 0u, b0), vec3(0.0));
+    }
+    if instance.degree == 2u {
+        let last = harmonic(index, 6u).xyz * b2.x;
+        return max(start + whole(index, 0u, b0) + whole(index, 3u, b1) + last, vec3(0.0));
+    }
+    var sum = start;
+    for (var n = 0u; n <= instance.degree_t; n++) {
+        let at = 12u * n;
+        let value = whole(index, at, b0) + whole(index, at + 3u, b1) + whole(index, at + 6u, b2) + whole(index, at + 9u, b3);
+        sum += times[n] * value;
+    }
+    return max(sum, vec3(0.0));
+#endif
 }
 
-// Returns the sum of four coefficients (three four-vectors from `at`) times their basis values.
-fn four(at: u32, basis: vec4<f32>) -> vec3<f32> {
-    let u = coefficients(at);
-    let v = coefficients(at + 1u);
-    let w = coefficients(at + 2u);
+#ifdef CODED_COLORS
+// Returns the sum of the sixteen coefficients of one time harmonic times their basis values.
+fn coded_block(
+    u: vec4<u32>,
+    v: vec4<u32>,
+    w: vec4<u32>,
+    scale: u32,
+    b0: vec4<f32>,
+    b1: vec4<f32>,
+    b2: vec4<f32>,
+    b3: vec4<f32>,
+) -> vec3<f32> {
+    return coded(u.xyz, scale, b0) + coded(vec3(u.w, v.xy), scale + 3u, b1)
+        + coded(vec3(v.zw, w.x), scale + 6u, b2) + coded(w.yzw, scale + 9u, b3);
+}
+
+// Returns the sum of four coefficients (three words of signed bytes) times their basis values; `scale` is the first of their
+// values of a byte of 1.
+fn coded(words: vec3<u32>, scale: u32, basis: vec4<f32>) -> vec3<f32> {
+    let u = signed_bytes(words.x) * codebook_scales[scale];
+    let v = signed_bytes(words.y) * codebook_scales[scale + 1u];
+    let w = signed_bytes(words.z) * codebook_scales[scale + 2u];
+    return four(u, v, w, basis);
+}
+
+fn signed_bytes(word: u32) -> vec4<f32> {
+    return vec4<f32>(unpack4xI8(word));
+}
+#else
+// Returns the sum of four coefficients (three four-vectors from `at`) of a Gaussian times their basis values.
+fn whole(index: u32, at: u32, basis: vec4<f32>) -> vec3<f32> {
+    return four(harmonic(index, at), harmonic(index, at + 1u), harmonic(index, at + 2u), basis);
+}
+
+fn harmonic(index: u32, at: u32) -> vec4<f32> {
+    return harmonics[index * instance.stride + at];
+}
+#endif
+
+// Returns the sum of four coefficients, RGB innermost, times their basis values.
+fn four(u: vec4<f32>, v: vec4<f32>, w: vec4<f32>, basis: vec4<f32>) -> vec3<f32> {
     return u.xyz * basis.x + vec3(u.w, v.xy) * basis.y + vec3(v.zw, w.x) * basis.z + w.yzw * basis.w;
 }

@@ -31,14 +31,13 @@ fn unpack_gaussian(
     let d = lanes(low.w);
     var g: Gaussian;
     g.mean = box_low.xyz + vec3(a, b.x) / LANE_MAX * box_size.xyz;
-    g.mean_t = time.x + b.y / LANE_MAX * time.y;
+    let lifespan = unpack_lifespan(low, time);
+    g.mean_t = lifespan.x;
     g.velocity = vec3(0.0);
-    g.inverse_sigma_t = 0.0;
+    g.inverse_sigma_t = lifespan.y;
     if (low.w >> 16u) != ALWAYS {
-        let inverse = exp(-(time.z + d.y / LANE_MAX * time.w));
         let signed = (vec3(c, d.x) - 32768.0) / 32767.0;
-        g.inverse_sigma_t = inverse;
-        g.velocity = signed * abs(signed) * box_low.w * max(inverse, box_size.w);
+        g.velocity = signed * abs(signed) * box_low.w * max(lifespan.y, box_size.w);
     }
     let e = lanes(high.x);
     let f = lanes(high.y);
@@ -70,6 +69,13 @@ fn unpack_gaussian(
     g.covariance_b = vec2(row_y.z, row_z.z);
     g.opacity = clamp(i.x / LANE_MAX * scale.w, 0.0, 1.0);
     return g;
+}
+
+// Decodes mean_t and inverse_sigma_t from the first half of a record.
+fn unpack_lifespan(low: vec4<u32>, time: vec4<f32>) -> vec2<f32> {
+    let mean_t = time.x + f32(low.y >> 16u) / LANE_MAX * time.y;
+    let inverse = exp(-(time.z + f32(low.w >> 16u) / LANE_MAX * time.w));
+    return vec2(mean_t, select(inverse, 0.0, (low.w >> 16u) == ALWAYS));
 }
 
 // Returns the unit quaternion (w, x, y, z) whose largest component was left out.

@@ -1,5 +1,5 @@
 // A pixel on its way from front to back: the surfaces that cut it, the splats that are blended into it, what is behind.
-// Used by `blend` and `sort_blend`, which differ in how they find the splats. CPU reference: src/reference/blend.rs.
+// Used by `blend` and `blend_blocks`, which differ in how they find the splats. CPU reference: src/reference/blend.rs.
 #define_import_path gs4d::pixel
 
 #import gs4d::types::{FrameUniforms, BACKGROUND_COLOR, BACKGROUND_ENVIRONMENT, DEBUG_DEPTH, DEBUG_OVERDRAW}
@@ -105,26 +105,48 @@ fn finish_pixel(pixel: Pixel, at: vec2<u32>) {
     if !all(at < frame.size) {
         return;
     }
-    var color = pixel.color;
-    let open = open_share();
     // Transmittance where there is no surface, and the mean over all samples.
-    let behind = pixel.transmittance * open;
-    var transmittance = (pixel.hidden_transmittance + f32(samples - pixel.hidden) * pixel.transmittance) / f32(samples);
+    let behind = pixel.transmittance * open_share();
+    let transmittance = (pixel.hidden_transmittance + f32(samples - pixel.hidden) * pixel.transmittance) / f32(samples);
     if frame.debug == DEBUG_DEPTH {
-        color = vec3(debug_depth(pixel.depth, 1.0 - transmittance));
+        let value = vec3(debug_depth(pixel.depth, 1.0 - transmittance));
+        textureStore(color_out, at, vec4(value, transmittance));
     } else if frame.debug == DEBUG_OVERDRAW {
-        color = heat(f32(pixel.blended) / OVERDRAW_MAX);
-        transmittance = select(0.0, 1.0, pixel.blended == 0u);
-    } else if frame.background_mode == BACKGROUND_COLOR {
-        color += transmittance * frame.background.xyz;
-    } else if frame.background_mode == BACKGROUND_ENVIRONMENT && open > 0.0 {
-        let shown = behind * frame.environment_opacity;
-        color += shown * environment_color(vec2<f32>(at));
-        // background.w: factor on the transmittance behind the map, 0 or 1.
-        transmittance -= shown * (1.0 - frame.background.w);
+        let value = heat(f32(pixel.blended) / OVERDRAW_MAX);
+        textureStore(color_out, at, vec4(value, select(0.0, 1.0, pixel.blended == 0u)));
+    } else {
+        textureStore(color_out, at, over_background(pixel.color, transmittance, behind, at));
     }
-    textureStore(color_out, at, vec4(color, transmittance));
     textureStore(depth_out, at, vec4(pixel.depth, pixel.median, 0.0, 0.0));
+}
+
+// Writes the color of a pixel with at most one surface, without depths, over what is behind. `open`: there is no surface.
+fn write_color(color: vec3<f32>, transmittance: f32, open: bool, at: vec2<u32>) {
+    textureStore(color_out, at, over_background(color, transmittance, select(0.0, transmittance, open), at));
+}
+
+#ifndef MULTISAMPLED
+// Returns the camera-space depth of the opaque surface of a pixel; FAR if there is none.
+fn surface_depth(pixel: vec2<u32>, inside: bool) -> f32 {
+    if frame.opaque_samples == 0u || !inside {
+        return FAR;
+    }
+    return distance_of(textureLoad(opaque_depth, pixel + frame.opaque_origin, 0));
+}
+#endif
+
+// Returns color and transmittance over the background. `behind` is the transmittance where there is no surface.
+fn over_background(color: vec3<f32>, transmittance: f32, behind: f32, at: vec2<u32>) -> vec4<f32> {
+    if frame.background_mode == BACKGROUND_COLOR {
+        return vec4(color + transmittance * frame.background.xyz, transmittance);
+    }
+    if frame.background_mode == BACKGROUND_ENVIRONMENT && behind > 0.0 {
+        let shown = behind * frame.environment_opacity;
+        // background.w: factor on the transmittance behind the map, 0 or 1.
+        let left = transmittance - shown * (1.0 - frame.background.w);
+        return vec4(color + shown * environment_color(vec2<f32>(at)), left);
+    }
+    return vec4(color, transmittance);
 }
 
 // Returns the brightness of a depth, premultiplied: near is bright.
@@ -148,7 +170,7 @@ fn find_limits(pixel: vec2<u32>, inside: bool) {
         limits[i] = distance_of(textureLoad(opaque_depth, pixel + frame.opaque_origin, i));
     }
 #else
-    limits[0] = distance_of(textureLoad(opaque_depth, pixel + frame.opaque_origin, 0));
+    limits[0] = surface_depth(pixel, inside);
 #endif
 }
 

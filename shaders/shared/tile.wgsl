@@ -82,20 +82,3 @@ fn pixel_of(tile: vec2<u32>, thread: u32) -> vec2<u32> {
 fn energy_of(opacity: f32) -> f32 {
     return 2.0 * log(opacity * INVERSE_ALPHA_MIN);
 }
-
-// Whether the alpha of a splat can reach 1/255 at a pixel of a box, with room for rounding. `low` and `high` are the first and
-// the last pixel.
-fn reaches(center: vec2<f32>, conic: vec3<f32>, energy: f32, low: vec2<f32>, high: vec2<f32>) -> bool {
-    // Written so that NaN, which is no ellipse, reaches everything.
-    if !(conic.x * conic.z > conic.y * conic.y) {
-        return true;
-    }
-    let near = clamp(center, low, high) - center;
-    // The minimum of the quadratic form over the box lies on one of the two sides that face the center.
-    let y = clamp(-conic.y * near.x / conic.z, low.y - center.y, high.y - center.y);
-    let x = clamp(-conic.y * near.y / conic.x, low.x - center.x, high.x - center.x);
-    let on_x = conic.x * near.x * near.x + conic.z * y * y + 2.0 * conic.y * near.x * y;
-    let on_y = conic.x * x * x + conic.z * near.y * near.y + 2.0 * conic.y * x * near.y;
-    let form = select(select(min(on_x, on_y), on_y, near.x == 0.0), on_x, near.y == 0.0);
-    return select(form, 0.0, all(near == vec2(0.0))) <= energy * 1.001 + 0.02;
-}

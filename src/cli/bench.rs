@@ -1,33 +1,37 @@
-//! `gs4d bench SCENE`: measures how fast a scene is drawn.
+//! `gs4d bench SCENE..`: measures how fast scenes are drawn.
 //!
-//! In: a scene and views of it. Out: medians of GPU milliseconds per pass and per frame, and of wall-clock time.
+//! In: scenes, views of them, and the ways in which they are drawn. Out: medians of GPU milliseconds per pass and per frame, and of wall-clock
+//! time, with their spread over rounds.
 
-use super::args::{CheckpointArgs, RendererArgs, ViewArgs, values};
+use super::args::{CheckpointArgs, RenderersArgs, ViewArgs, values};
 use super::failure::Failure;
 use super::progress::note;
 use super::report::{Report, switches_json};
-use super::table::Table;
+use super::table::{Table, bytes};
 use crate::offline::engine::AdapterDescription;
 use crate::offline::orbit::{at_times, share};
-use crate::renderer::Timings;
+use crate::renderer::{Design, GpuCapture, Headless, Timings};
+use crate::scene::RuntimeScene;
 use crate::view::View;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// Measure how fast a scene is drawn.
+/// Measure how fast scenes are drawn.
 ///
-/// Medians over frames that take the views in turn. GPU times are timestamps around each frame and, in other frames, between its
-/// passes; wall-clock time is that of one frame at a time, and that per frame with many in flight.
+/// Every scene is drawn in every way that the options name; with --rounds the rows are measured in turn, so that a
+/// change of the machine's state meets all of them. Medians over frames that take the views in turn, then over rounds. GPU times
+/// are timestamps around each frame and, in other frames, between its passes.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   gs4d bench capture.gs4d
   gs4d bench chkpnt30000.pth --cameras data/transforms_test.json --resolution 2 --times 5
+  gs4d bench a.gs4d b.gs4d --renderer fast,reference --form stored,fp32 --filter on,off --rounds 3
   gs4d bench capture.gs4d --orbit 24 --size 1352x1014 --frames 1000 --json")]
 pub struct Bench {
-    /// The package or checkpoint to draw.
-    #[arg(value_name = "SCENE")]
-    scene: PathBuf,
+    /// The packages or checkpoints to draw.
+    #[arg(value_name = "SCENE", required = true)]
+    scenes: Vec<PathBuf>,
     /// Frames of each kind to measure.
     #[arg(long, value_name = "N", default_value = "240", value_parser = values::count(1_000_000))]
     frames: usize,
@@ -37,12 +41,51 @@ pub struct Bench {
     /// See every view at K times, evenly over the interval [default: each at its own time].
     #[arg(long, value_name = "K", conflicts_with = "time", value_parser = values::count(10_000))]
     times: Option<usize>,
+    /// Times that all rows are measured, in turn.
+    #[arg(long, value_name = "N", default_value = "1", value_parser = values::count(1000))]
+    rounds: usize,
+    /// Form of packed Gaussians: stored, or fp32: unpacked to single precision. Colours by codebook become whole too.
+    #[arg(long, value_name = "FORM,..", default_value = "stored", value_delimiter = ',', value_parser = values::one_of(&FORMS))]
+    form: Vec<Form>,
+    /// Whether temporal filters are used.
+    #[arg(long, value_name = "on|off,..", default_value = "on", value_delimiter = ',', value_parser = values::one_of(&SWITCH))]
+    filter: Vec<bool>,
+    /// Also compute expected and median depth.
+    #[arg(long)]
+    depths: bool,
     #[command(flatten)]
     views: ViewArgs,
     #[command(flatten)]
-    renderer: RendererArgs,
+    renderer: RenderersArgs,
     #[command(flatten)]
     checkpoint: CheckpointArgs,
+}
+
+/// In which form a scene is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Form {
+    Stored,
+    Unpacked,
+}
+
+const FORMS: [(&str, Form); 2] = [("stored", Form::Stored), ("fp32", Form::Unpacked)];
+const SWITCH: [(&str, bool); 2] = [("on", true), ("off", false)];
+
+/// A scene on the GPU, with its views.
+struct Subject<'a> {
+    path: &'a Path,
+    form: Form,
+    scene: RuntimeScene,
+    capture: GpuCapture,
+    views: Vec<View>,
+}
+
+/// One way to draw a subject, and what was measured.
+struct Row<'a> {
+    subject: &'a Subject<'a>,
+    design: Design,
+    filtered: bool,
+    rounds: Vec<Timings>,
 }
 
 impl Bench {
@@ -51,60 +94,135 @@ impl Bench {
     /// # Errors
     /// A scene or views that cannot be used, no such adapter, a failure of the GPU.
     pub fn run(&self) -> Result<Report, Failure> {
-        let scene = self.checkpoint.load(&self.scene)?;
-        let scene = scene.into_runtime().map_err(|error| Failure::at(&self.scene, &error))?;
+        let mut headless = self.renderer.open()?;
+        let mut subjects = Vec::new();
+        for path in &self.scenes {
+            for &form in &self.form {
+                subjects.push(self.subject(&headless, path, form)?);
+            }
+        }
+        let mut rows = Vec::new();
+        for subject in &subjects {
+            for &filtered in &self.filter {
+                let ways = self.renderer.renderers.iter();
+                rows.extend(ways.map(|&design| Row { subject, design, filtered, rounds: Vec::new() }));
+            }
+        }
+        headless.measure_depths(self.depths);
+        for round in 1..=self.rounds {
+            for row in &mut rows {
+                let Subject { path, capture, views, .. } = row.subject;
+                note(&format!("round {round} of {}: {}", self.rounds, path.display()));
+                headless.set_design(row.design);
+                headless.use_filters(row.filtered);
+                row.rounds.push(headless.time(capture, views, self.frames)?);
+            }
+        }
+        let adapter = AdapterDescription::of(&headless);
+        let table: String = rows.iter().map(Row::text).collect();
+        let json = json!({ "adapter": adapter, "rows": rows.iter().map(Row::json).collect::<Vec<_>>() });
+        Ok(Report::new(json, format!("{adapter}\n{table}")))
+    }
+
+    fn subject<'a>(&self, headless: &Headless, path: &'a Path, form: Form) -> Result<Subject<'a>, Failure> {
+        let scene = self.checkpoint.load(path)?;
+        let scene = if form == Form::Unpacked { scene.unpacked() } else { scene };
+        let scene = scene.into_runtime().map_err(|error| Failure::at(path, &error))?;
         let mut shots = share(self.views.shots(&scene, self.count)?, self.views.limit(self.count));
         if let Some(times) = self.times {
             shots = at_times(shots, times, scene.trained_with.time_interval);
         }
-        let views: Vec<View> = shots.iter().map(|shot| shot.view(&scene)).collect();
+        let views = shots.iter().map(|shot| shot.view(&scene)).collect();
+        Ok(Subject { path, form, capture: headless.upload(&scene)?, scene, views })
+    }
+}
+
+impl Row<'_> {
+    fn json(&self) -> serde_json::Value {
+        let Subject { path, scene, capture, views, .. } = self.subject;
+        let timings = self.medians();
+        let [low, high] = self.spread();
+        json!({
+            "scene": path.display().to_string(),
+            "gaussians": scene.len(),
+            "form": name_of(&FORMS, self.subject.form),
+            "renderer": name_of(&Design::NAMES, self.design),
+            "filter": self.filtered && capture.has_filter(),
+            "views": views.len(),
+            "size": views.first().map_or([0, 0], |view| view.size.to_array()),
+            "bytes": capture.bytes(),
+            "fps": { "gpu": timings.frame_milliseconds.map(fps), "pipelined": fps(timings.pipelined_milliseconds) },
+            "rounds": { "count": self.rounds.len(), "least": low, "most": high },
+            "timings": timings,
+            "switches": switches_json(&scene.trained_with, &scene.playback),
+        })
+    }
+
+    fn text(&self) -> String {
+        let Subject { path, scene, capture, views, form } = self.subject;
+        let timings = self.medians();
+        let mut table = Table::new(&["", "ms", "FPS"]);
+        let mut row = |name: &str, milliseconds: f64, rate: bool| {
+            let rate = if rate { format!("{:.0}", fps(milliseconds)) } else { String::new() };
+            table.row([name.to_owned(), format!("{milliseconds:.4}"), rate]);
+        };
+        for pass in &timings.passes {
+            row(pass.name, pass.milliseconds, false);
+        }
+        if let Some(milliseconds) = timings.frame_milliseconds {
+            row("frame on the GPU", milliseconds, true);
+        }
+        row("frame, many in flight", timings.pipelined_milliseconds, true);
+        row("frame, one at a time", timings.wall_milliseconds, true);
+        row("preparing and recording", timings.encode_milliseconds, false);
         let size = views.first().map_or([0, 0], |view| view.size.to_array());
-        let mut headless = self.renderer.open()?;
-        let capture = headless.upload(&scene)?;
-        note(&format!("measuring {} frames over {} views", self.frames, views.len()));
-        let timings = headless.time(&capture, &views, self.frames)?;
-        let adapter = AdapterDescription::of(&headless);
-        let text = format!(
-            "{}: {} Gaussians, {} views of {}x{}\n{adapter}\n{}",
-            self.scene.display(),
+        let [low, high] = self.spread();
+        let spread = match self.rounds.len() {
+            1 => String::new(),
+            count => format!("{count} rounds: {low:.4} to {high:.4} ms on the GPU\n"),
+        };
+        let counts = timings.counts;
+        format!(
+            "\n{}: {} Gaussians ({}), {} renderer, filter {}, {} views of {}x{}\n{table}{spread}\
+             {} splats visible, {} pairs of splat and tile (medians); {} of the capture, {} of the view\n",
+            path.display(),
             scene.len(),
+            name_of(&FORMS, *form),
+            name_of(&Design::NAMES, self.design),
+            name_of(&SWITCH, self.filtered && capture.has_filter()),
             views.len(),
             size[0],
             size[1],
-            table(&timings),
-        );
-        let json = json!({
-            "scene": self.scene.display().to_string(),
-            "adapter": adapter,
-            "gaussians": scene.len(),
-            "views": views.len(),
-            "size": size,
-            "timings": timings,
-            "fps": { "gpu": timings.frame_milliseconds.map(fps), "pipelined": fps(timings.pipelined_milliseconds) },
-            "switches": switches_json(&scene.trained_with, &scene.playback),
-        });
-        Ok(Report::new(json, text))
+            counts.visible,
+            counts.pairs,
+            bytes(capture.bytes()),
+            bytes(timings.bytes),
+        )
     }
+
+    /// Returns the round whose frame took the median time, so that all its numbers belong together.
+    fn medians(&self) -> &Timings {
+        let mut rounds: Vec<&Timings> = self.rounds.iter().collect();
+        rounds.sort_by(|a, b| time_of(a).total_cmp(&time_of(b)));
+        rounds[rounds.len() / 2]
+    }
+
+    /// Returns the shortest and the longest time of a frame of all rounds.
+    fn spread(&self) -> [f64; 2] {
+        let times = self.rounds.iter().map(time_of);
+        times.fold([f64::INFINITY, 0.0], |[low, high], time| [low.min(time), high.max(time)])
+    }
+}
+
+/// Returns the GPU time of a frame, or what comes nearest to it without timestamps.
+fn time_of(timings: &Timings) -> f64 {
+    timings.frame_milliseconds.unwrap_or(timings.pipelined_milliseconds)
+}
+
+fn name_of<T: PartialEq + Copy>(names: &[(&'static str, T)], value: T) -> &'static str {
+    names.iter().find(|(_, named)| *named == value).map_or("", |(name, _)| name)
 }
 
 fn fps(milliseconds: f64) -> f64 {
     1e3 / milliseconds
-}
-
-fn table(timings: &Timings) -> String {
-    let mut table = Table::new(&["", "ms", "FPS"]);
-    let mut row = |name: &str, milliseconds: f64, rate: bool| {
-        let rate = if rate { format!("{:.0}", fps(milliseconds)) } else { String::new() };
-        table.row([name.to_owned(), format!("{milliseconds:.4}"), rate]);
-    };
-    for pass in &timings.passes {
-        row(pass.name, pass.milliseconds, false);
-    }
-    if let Some(milliseconds) = timings.frame_milliseconds {
-        row("frame on the GPU", milliseconds, true);
-    }
-    row("frame, many in flight", timings.pipelined_milliseconds, true);
-    row("frame, one at a time", timings.wall_milliseconds, true);
-    let counts = timings.counts;
-    format!("{table}{} splats visible, {} pairs of splat and tile (medians)\n", counts.visible, counts.pairs)
 }

@@ -32,8 +32,9 @@ impl GpuContext {
             .map_err(|error| GpuError::NoAdapter { reason: error.to_string() })?,
         };
         let info = adapter.get_info();
-        // Timestamps are for benchmarks; nothing else is needed.
-        let wanted_features = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES;
+        // Timestamps are for benchmarks, subgroups for the fast renderer; nothing is needed.
+        let timestamps = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES;
+        let wanted_features = timestamps | wgpu::Features::SUBGROUP;
         let (device, queue) = block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("gs4d"),
             required_features: adapter.features() & wanted_features,

@@ -6,7 +6,9 @@
 use super::bind::{Bind, group_layout, pipeline};
 use super::layout::CODEBOOK_SCALES;
 use super::memory::Allocator;
-use super::shaders::{BINNED, LONG_LISTS, MULTISAMPLED, ShaderChecks, Storage, module};
+use super::shaders::{
+    BINNED, Blending, LARGE_BATCHES, LONG_LISTS, MULTISAMPLED, SUBGROUPS_OF_32, ShaderChecks, Storage, module,
+};
 use super::work::WorkCounters;
 use super::{GpuError, layout};
 use std::sync::OnceLock;
@@ -31,8 +33,12 @@ pub struct Renderer {
     pub(super) ranges: wgpu::ComputePipeline,
     pub(super) blend: wgpu::ComputePipeline,
     pub(super) blend_multisampled: wgpu::ComputePipeline,
-    /// Passes of the fast renderer, compiled when they are first used.
-    fast: OnceLock<FastPipelines>,
+    /// Passes of the fast renderer, each compiled when it is first used: `project_bin`, indexed by how a capture is stored, in
+    /// the order of [`Storage::ALL`], `sort_bins`, and `blend_blocks`, with small and with large batches, in the order of
+    /// [`Blending::ALL`].
+    project_bin: [OnceLock<wgpu::ComputePipeline>; 3],
+    sort_bins: OnceLock<wgpu::ComputePipeline>,
+    blend_blocks: [[OnceLock<wgpu::ComputePipeline>; 4]; 2],
     checks: ShaderChecks,
     /// Bound instead of a list of active Gaussians if all are drawn.
     pub(super) no_list: wgpu::BindGroup,
@@ -56,16 +62,7 @@ pub(super) struct Layouts {
     /// Uniforms, background, opaque depth and targets of the pixels, without and with multisampled depth.
     pub pixel: [wgpu::BindGroupLayout; 2],
     pub project_bin: wgpu::BindGroupLayout,
-    pub sort_blend: wgpu::BindGroupLayout,
-}
-
-/// The passes of the fast renderer.
-#[derive(Debug)]
-pub(super) struct FastPipelines {
-    /// Indexed by how a capture is stored, in the order of [`Storage::ALL`].
-    pub project_bin: [wgpu::ComputePipeline; 3],
-    /// Without and with multisampled depth.
-    pub sort_blend: [wgpu::ComputePipeline; 2],
+    pub sort_bins: wgpu::BindGroupLayout,
 }
 
 impl Renderer {
@@ -110,7 +107,9 @@ impl Renderer {
             ranges: pipeline(&ranges, "ranges", &[&layouts.ranges]),
             blend: pipeline(&blend, "blend", &[&layouts.pixel[0], &layouts.blend]),
             blend_multisampled: pipeline(&blend_multisampled, "blend", &[&layouts.pixel[1], &layouts.blend]),
-            fast: OnceLock::new(),
+            project_bin: Default::default(),
+            sort_bins: OnceLock::new(),
+            blend_blocks: Default::default(),
             checks,
             no_list: allocator.bind_group("gs4d no active list", &layouts.active, &[no_list.as_entire_binding()]),
             layouts,
@@ -134,21 +133,60 @@ impl Renderer {
         Allocator { device, work: &self.work }
     }
 
-    /// Returns the passes of the fast renderer, compiled at the first call.
+    /// Compiles the passes of the fast renderer for captures stored in these ways, unless they have been.
     ///
     /// # Errors
     /// When a shader does not compile.
-    pub(super) fn fast(&self, device: &wgpu::Device) -> Result<&FastPipelines, GpuError> {
-        if let Some(made) = self.fast.get() {
-            return Ok(made);
+    pub(super) fn compile_fast(
+        &self,
+        device: &wgpu::Device,
+        storages: impl Iterator<Item = Storage>,
+        blending: Blending,
+        large_batches: bool,
+    ) -> Result<(), GpuError> {
+        let layouts = &self.layouts;
+        for storage in storages {
+            if self.project_bin(storage).is_none() {
+                let shader = module(device, "project", &[BINNED, storage.definitions()].concat(), self.checks)?;
+                let groups = [&layouts.project_bin, &layouts.captures[storage as usize], &layouts.active];
+                let made = pipeline(device, &shader, "project_bin", &groups);
+                self.project_bin[storage as usize].get_or_init(|| made);
+            }
         }
-        let made = FastPipelines::new(device, &self.layouts, self.checks)?;
-        Ok(self.fast.get_or_init(|| made))
+        let subgroups = if has_subgroups_of_32(device) { SUBGROUPS_OF_32 } else { &[] };
+        if self.sort_bins().is_none() {
+            let limits = device.limits();
+            let long = limits.max_compute_workgroup_storage_size >= LONG_LISTS_MEMORY
+                && limits.max_compute_workgroup_size_x.min(limits.max_compute_invocations_per_workgroup) >= 512;
+            let lists = if long { LONG_LISTS } else { &[] };
+            let shader = module(device, "sort_bins", &[lists, subgroups].concat(), self.checks)?;
+            let made = pipeline(device, &shader, "sort_bins", &[&layouts.sort_bins]);
+            self.sort_bins.get_or_init(|| made);
+        }
+        if self.blend_blocks(blending, large_batches).is_none() {
+            let batches = if large_batches { LARGE_BATCHES } else { &[] };
+            let definitions = [blending.definitions(), batches, subgroups].concat();
+            let shader = module(device, "blend_blocks", &definitions, self.checks)?;
+            let pixel = &layouts.pixel[usize::from(blending == Blending::AllMultisampled)];
+            let made = pipeline(device, &shader, "blend_blocks", &[pixel, &layouts.blend]);
+            self.blend_blocks[usize::from(large_batches)][blending as usize].get_or_init(|| made);
+        }
+        Ok(())
     }
 
-    /// Returns the passes of the fast renderer if they have been compiled.
-    pub(super) fn compiled_fast(&self) -> Option<&FastPipelines> {
-        self.fast.get()
+    /// Returns `project_bin` for captures stored in this way, if it has been compiled.
+    pub(super) fn project_bin(&self, storage: Storage) -> Option<&wgpu::ComputePipeline> {
+        self.project_bin[storage as usize].get()
+    }
+
+    /// Returns `sort_bins`, if it has been compiled.
+    pub(super) fn sort_bins(&self) -> Option<&wgpu::ComputePipeline> {
+        self.sort_bins.get()
+    }
+
+    /// Returns `blend_blocks`, if it has been compiled.
+    pub(super) fn blend_blocks(&self, blending: Blending, large_batches: bool) -> Option<&wgpu::ComputePipeline> {
+        self.blend_blocks[usize::from(large_batches)][blending as usize].get()
     }
 
     /// Creates the bind group of one part of a capture, its buffers in the order of the shader's bindings.
@@ -163,30 +201,13 @@ impl Renderer {
     }
 }
 
-/// Workgroup memory that `sort_blend` needs for lists of 2048 splats, bytes.
-const LONG_LISTS_MEMORY: u32 = 24 * 1024;
+/// Workgroup memory that `sort_bins` needs for lists of 3072 splats, bytes.
+const LONG_LISTS_MEMORY: u32 = 48 * 1024;
 
-impl FastPipelines {
-    fn new(device: &wgpu::Device, layouts: &Layouts, checks: ShaderChecks) -> Result<Self, GpuError> {
-        let missing = || GpuError::Device("a pipeline is missing".into());
-        let mut project_bin = Vec::new();
-        for (storage, capture) in Storage::ALL.into_iter().zip(&layouts.captures) {
-            let shader = module(device, "project", &[BINNED, storage.definitions()].concat(), checks)?;
-            let groups = [&layouts.project_bin, capture, &layouts.active];
-            project_bin.push(pipeline(device, &shader, "project_bin", &groups));
-        }
-        let long = device.limits().max_compute_workgroup_storage_size >= LONG_LISTS_MEMORY;
-        let mut sort_blend = Vec::new();
-        for (samples, pixel) in [&[] as &[&str], MULTISAMPLED].into_iter().zip(&layouts.pixel) {
-            let lists = if long { LONG_LISTS } else { &[] };
-            let shader = module(device, "sort_blend", &[samples, lists].concat(), checks)?;
-            sort_blend.push(pipeline(device, &shader, "sort_blend", &[pixel, &layouts.sort_blend]));
-        }
-        Ok(Self {
-            project_bin: project_bin.try_into().map_err(|_| missing())?,
-            sort_blend: sort_blend.try_into().map_err(|_| missing())?,
-        })
-    }
+fn has_subgroups_of_32(device: &wgpu::Device) -> bool {
+    let info = device.adapter_info();
+    let sizes = [info.subgroup_min_size, info.subgroup_max_size];
+    device.features().contains(wgpu::Features::SUBGROUP) && sizes == [32, 32]
 }
 
 impl Layouts {
@@ -217,7 +238,7 @@ impl Layouts {
             blend: new("gs4d blend", &[Read, Read, Read]),
             pixel: [pixel(Depth), pixel(Depths)],
             project_bin: new("gs4d project_bin", &[INSTANCE, Write, Write, Write]),
-            sort_blend: new("gs4d sort_blend", &[Read, Write, Read]),
+            sort_bins: new("gs4d sort_bins", &[Uniform(FRAME), Write, Read, Write, Write]),
         }
     }
 }

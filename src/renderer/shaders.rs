@@ -6,6 +6,7 @@ use super::GpuError;
 use crate::scene::{Form, PackedColors, PackedScene};
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::borrow::Cow;
+use wgpu::naga::valid::Capabilities;
 
 /// Libraries, each before those that import it.
 const LIBRARIES: &[(&str, &str)] = &[
@@ -18,6 +19,7 @@ const LIBRARIES: &[(&str, &str)] = &[
     ("packed", include_str!("../../shaders/shared/packed.wgsl")),
     ("scan", include_str!("../../shaders/shared/scan.wgsl")),
     ("environment", include_str!("../../shaders/shared/environment.wgsl")),
+    ("bins", include_str!("../../shaders/shared/bins.wgsl")),
     ("pixel", include_str!("../../shaders/shared/pixel.wgsl")),
 ];
 
@@ -29,7 +31,8 @@ const PASSES: &[(&str, &str)] = &[
     ("bin", include_str!("../../shaders/bin.wgsl")),
     ("ranges", include_str!("../../shaders/ranges.wgsl")),
     ("blend", include_str!("../../shaders/blend.wgsl")),
-    ("sort_blend", include_str!("../../shaders/sort_blend.wgsl")),
+    ("sort_bins", include_str!("../../shaders/sort_bins.wgsl")),
+    ("blend_blocks", include_str!("../../shaders/blend_blocks.wgsl")),
     ("score", include_str!("../../shaders/score.wgsl")),
 ];
 
@@ -88,8 +91,43 @@ pub const MULTISAMPLED: &[&str] = &["MULTISAMPLED"];
 /// Definitions of `project` as the first pass of the fast renderer, `project_bin`.
 pub const BINNED: &[&str] = &["BINNED"];
 
-/// Definitions of `sort_blend` on devices with enough workgroup memory for lists of 2048 splats.
+/// Definitions of `sort_bins` on devices with workgroups of 512 threads and enough memory for lists of 3072 splats.
 pub const LONG_LISTS: &[&str] = &["LONG_LISTS"];
+
+/// Definitions of `sort_bins` and `blend_blocks` on devices whose subgroups always have 32 threads.
+pub const SUBGROUPS_OF_32: &[&str] = &["SUBGROUPS_OF_32"];
+
+/// Definitions of `blend_blocks` for small pictures.
+pub const LARGE_BATCHES: &[&str] = &["LARGE_BATCHES"];
+
+/// What `blend_blocks` writes, and what it heeds. The picture is the same where several can draw it; the first is the fastest.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Blending {
+    /// Color, without opaque surfaces.
+    Color,
+    /// Color, cut by opaque surfaces.
+    ColorBehindSurfaces,
+    /// Color and depths, opaque surfaces, every debug view.
+    #[default]
+    All,
+    /// The same with a multisampled depth of opaque surfaces.
+    AllMultisampled,
+}
+
+impl Blending {
+    /// All kinds.
+    pub const ALL: [Self; 4] = [Self::Color, Self::ColorBehindSurfaces, Self::All, Self::AllMultisampled];
+
+    /// Returns the definitions of `blend_blocks`.
+    pub fn definitions(self) -> &'static [&'static str] {
+        match self {
+            Self::Color => &[],
+            Self::ColorBehindSurfaces => &["OPAQUE"],
+            Self::All => &["DEPTHS"],
+            Self::AllMultisampled => &["DEPTHS", "MULTISAMPLED"],
+        }
+    }
+}
 
 /// Returns the naga module of a pass, imports resolved, validated, with these definitions: those of a [`Storage`] for
 /// `project`, none or [`MULTISAMPLED`] for `blend`, none for the others.
@@ -100,7 +138,9 @@ pub fn compose(name: &str, definitions: &[&str]) -> Result<wgpu::naga::Module, G
     let Some(&(name, source)) = PASSES.iter().find(|(pass, _)| *pass == name) else {
         return Err(GpuError::Shader { name: "unknown", reason: format!("there is no pass `{name}`") });
     };
-    let mut composer = Composer::default();
+    let subgroups = definitions.iter().any(|definition| SUBGROUPS_OF_32.contains(definition));
+    let capabilities = if subgroups { Capabilities::SUBGROUP } else { Capabilities::empty() };
+    let mut composer = Composer::default().with_capabilities(capabilities);
     for &(library, source) in LIBRARIES {
         let descriptor = ComposableModuleDescriptor { source, file_path: library, ..Default::default() };
         if let Err(error) = composer.add_composable_module(descriptor) {

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// Names of the timed passes of a frame, in order, with the reference design.
 pub(super) const TIMED_PASSES: &[&str] = &["project", "sort (depth)", "bin", "sort (tile)", "ranges", "blend"];
 /// The same with the fast design.
-pub(super) const TIMED_FAST_PASSES: &[&str] = &["project_bin", "sort_blend"];
+pub(super) const TIMED_FAST_PASSES: &[&str] = &["project_bin", "sort_bins", "blend_blocks"];
 
 /// Medians over the frames of a benchmark.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -21,8 +21,12 @@ pub struct Timings {
     pub frame_milliseconds: Option<f64>,
     /// Median wall-clock time from submitting a frame to its end, one at a time.
     pub wall_milliseconds: f64,
-    /// Wall-clock time for each frame with many in flight.
+    /// Wall-clock time for each frame with many in flight, several recorded for each submit.
     pub pipelined_milliseconds: f64,
+    /// CPU time in which a frame is prepared and recorded, without its submit.
+    pub encode_milliseconds: f64,
+    /// Bytes of the buffers and targets of a view.
+    pub bytes: u64,
     /// Median amount of work in a frame.
     pub counts: Counts,
     /// Number of frames measured.

@@ -62,8 +62,16 @@ fn benchmarks_measure() {
         gs4d(&[fixed, more.iter().map(Into::into).collect()].concat())
     };
     let json = bench(&["--json"]).json();
-    assert_eq!((&json["views"], &json["timings"]["frames"]), (&4.into(), &3.into()), "two views at two times");
-    assert!(json["timings"]["wall_milliseconds"].as_f64().is_some_and(|ms| ms > 0.0), "frames take time");
+    let row = &json["rows"][0];
+    assert_eq!((&row["views"], &row["timings"]["frames"]), (&4.into(), &3.into()), "two views at two times");
+    assert!(row["timings"]["wall_milliseconds"].as_f64().is_some_and(|ms| ms > 0.0), "frames take time");
+    let ways = ["--renderer", "fast,reference", "--filter", "on,off", "--form", "stored,fp32", "--rounds", "2", "--json"];
+    let json = bench(&ways).json();
+    let rows = json["rows"].as_array().expect("rows");
+    assert_eq!(rows.len(), 8, "every way");
+    let counts: Vec<_> = rows.iter().map(|row| &row["timings"]["counts"]).collect();
+    assert!(counts.iter().all(|found| *found == counts[0]), "the same work: {counts:?}");
+    assert!(rows.iter().all(|row| row["rounds"]["count"] == 2), "two rounds");
     assert!(bench(&[]).text().contains("frame, many in flight"), "a table");
     gs4d(&arguments!["bench", &path, "--adapter", "no such card"]).must_fail("no such card");
 }

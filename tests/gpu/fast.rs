@@ -3,11 +3,13 @@
 //! In: scenes of many splats in few tiles. Out: proof that both designs draw the same picture, from the first frame on. Skipped where
 //! there is no GPU.
 
+use crate::render::depth_texture;
 use crate::support::gpu;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
-use bevy_gs4d::renderer::{Design, Headless};
+use bevy_gs4d::renderer::{Design, Headless, Instance, OpaqueDepth, ViewParameters};
 use bevy_gs4d::scene::RuntimeScene;
-use bevy_gs4d::view::{Background, Camera, Frame, RasterFov, View};
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::view::{Appearance, Background, Camera, DebugView, Frame, RasterFov, View};
 use glam::{UVec2, Vec3};
 
 /// Faint Gaussians about the origin, behind each other in layers along the line of sight: `layer` Gaussians have one depth.
@@ -80,4 +82,57 @@ fn bins_that_overflow_lack_no_splat_in_the_first_frame() {
         let found = headless.render(&capture, &view, Background::Color([0.1, 0.2, 0.3])).expect("the picture fits");
         assert_same(&found, &expected, &format!("frame {number}, with more room"));
     }
+}
+
+/// Returns the largest difference of two pictures or their transmittance.
+fn difference(found: &Frame, expected: &Frame) -> f32 {
+    let colors = found.picture.pixels.iter().zip(&expected.picture.pixels).map(|(a, b)| (*a - *b).abs().max_element());
+    let left = found.transmittance.iter().zip(&expected.transmittance).map(|(a, b)| (a - b).abs());
+    colors.chain(left).fold(0.0, f32::max)
+}
+
+#[test]
+fn every_way_of_blending_shows_the_picture_of_the_reference() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let scene = synthesize(&SynthSettings { count: 4_000, ..SynthSettings::default() });
+    let scene = scene.into_runtime().expect("a scene that can be drawn");
+    let size = UVec2::new(131, 97);
+    let camera = Camera::look_at(Vec3::new(2.0, 1.0, 1.2), Vec3::ZERO, Vec3::Z, 0.8, size);
+    let view = camera.view(0.4, RasterFov::Reference);
+    let capture = headless.upload(&scene).expect("the scene fits");
+    let instances = [Instance { capture: &capture, active: None, view, appearance: Appearance::default() }];
+    // A surface through the middle of the scene.
+    let (near, distance) = (0.1, 2.5);
+    let texture = depth_texture(headless.context(), size, near / distance);
+    let surface = OpaqueDepth { texture: &texture, samples: 1, origin: UVec2::ZERO, distance: [near, 0.0, 0.0, 1.0] };
+    for debug in [DebugView::Color, DebugView::Depth, DebugView::Overdraw, DebugView::Velocity] {
+        for opaque in [None, Some(surface)] {
+            for background in [Background::None, Background::Color([0.3, 0.2, 0.1])] {
+                let parameters = ViewParameters { background, opaque, debug, ..ViewParameters::default() };
+                headless.set_design(Design::Reference);
+                let expected = headless.render_all(&instances, &parameters).expect("the picture fits");
+                assert!(expected.counts.visible > 1000, "something is there");
+                headless.set_design(Design::Fast);
+                for depths in [true, false] {
+                    let parameters = ViewParameters { depths, ..parameters };
+                    let found = headless.render_all(&instances, &parameters).expect("the picture fits");
+                    let what = format!("{debug:?}, surface {}, depths {depths}", opaque.is_some());
+                    let difference = difference(&found, &expected);
+                    assert!(difference <= 2e-4, "{what}: differs by {difference}");
+                    assert_eq!(found.counts, expected.counts, "{what}: counts");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn pictures_of_many_tiles_have_larger_bins() {
+    let Some(mut headless) = gpu::headless() else { return };
+    // 8281 tiles: bins of 2 x 2 would be more than a workgroup counts.
+    let (scene, view) = (crowd(500, 1, 0.1), view(1456));
+    let expected = first_frame(&mut headless, Design::Reference, &scene, &view);
+    let found = first_frame(&mut headless, Design::Fast, &scene, &view);
+    assert_same(&found, &expected, "1456 x 1456");
+    assert_eq!(found.counts, expected.counts, "counts");
 }

@@ -396,7 +396,7 @@ fn read_color(context: &GpuContext, view: &ViewRenderer) -> Vec<[f32; 3]> {
 }
 
 /// Returns a depth texture with the same value everywhere.
-fn depth_texture(context: &GpuContext, size: UVec2, value: f32) -> wgpu::TextureView {
+pub fn depth_texture(context: &GpuContext, size: UVec2, value: f32) -> wgpu::TextureView {
     let texture = context.device.create_texture(&wgpu::TextureDescriptor {
         label: None,
         size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },

@@ -2,16 +2,18 @@
 //!
 //! In: the files of `shaders/`. Out: proof that each is known to the renderer and is valid WGSL that needs no optional capability.
 
-use bevy_gs4d::renderer::shaders::{MULTISAMPLED, Storage, compose, pass_names};
+use bevy_gs4d::renderer::shaders::{
+    BINNED, Blending, LARGE_BATCHES, LONG_LISTS, MULTISAMPLED, SUBGROUPS_OF_32, Storage, compose, pass_names,
+};
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
 use std::path::Path;
-use wgpu::naga::Module;
 use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
+use wgpu::naga::{AddressSpace, Module};
 
-/// Validates a module. No capability is allowed, so that subgroups would be noticed.
-fn validate(name: &str, module: &Module) -> Result<(), String> {
-    Validator::new(ValidationFlags::all(), Capabilities::empty())
+/// Validates a module that may use no optional capability but these.
+fn validate(name: &str, module: &Module, capabilities: Capabilities) -> Result<(), String> {
+    Validator::new(ValidationFlags::all(), capabilities)
         .validate(module)
         .map(|_| ())
         .map_err(|error| format!("{name}: {error:?}"))
@@ -40,11 +42,35 @@ fn every_shader_file_is_a_pass_or_one_of_bevy_s() {
 
 #[test]
 fn every_pass_composes_and_is_valid() {
-    let check =
-        |name: &str, definitions| validate(name, &compose(name, definitions).map_err(|error| error.to_string())?);
-    let definitions = Storage::ALL.map(Storage::definitions).into_iter().chain([MULTISAMPLED]);
-    let all = definitions.flat_map(|definitions| pass_names().map(move |name| (name, definitions)));
+    let check = |name: &str, definitions: &[&str]| {
+        let subgroups = definitions.iter().any(|definition| SUBGROUPS_OF_32.contains(definition));
+        let capabilities = if subgroups { Capabilities::SUBGROUP } else { Capabilities::empty() };
+        validate(name, &compose(name, definitions).map_err(|error| error.to_string())?, capabilities)
+    };
+    let binned = Storage::ALL.map(|storage| [BINNED, storage.definitions()].concat());
+    let blending = Blending::ALL.into_iter().flat_map(|blending| {
+        [&[][..], LONG_LISTS, LARGE_BATCHES, SUBGROUPS_OF_32].map(|device| [blending.definitions(), device].concat())
+    });
+    let storages = Storage::ALL.map(|storage| storage.definitions().to_vec());
+    let definitions: Vec<_> =
+        storages.into_iter().chain([MULTISAMPLED.to_vec()]).chain(binned).chain(blending).collect();
+    let all = definitions.iter().flat_map(|definitions| pass_names().map(move |name| (name, &definitions[..])));
     report(all.filter_map(|(name, definitions)| check(name, definitions).err()).collect());
+}
+
+#[test]
+fn workgroup_memory_is_within_the_limits_that_are_asked_for() {
+    let blending = Blending::ALL.map(|blending| ("blend_blocks", blending.definitions(), 16 * 1024));
+    let large = [("blend_blocks", [LARGE_BATCHES, Blending::All.definitions()].concat(), 32 * 1024)];
+    let large = large.iter().map(|(name, definitions, limit)| (*name, &definitions[..], *limit));
+    let sorting = [("sort_bins", &[][..], 16 * 1024), ("sort_bins", LONG_LISTS, 48 * 1024)];
+    for (name, definitions, limit) in blending.into_iter().chain(large).chain(sorting) {
+        let module = compose(name, definitions).expect("the pass composes");
+        let shared = module.global_variables.iter().filter(|(_, v)| v.space == AddressSpace::WorkGroup);
+        let bytes: u32 = shared.map(|(_, v)| module.types[v.ty].inner.size(module.to_ctx()).next_multiple_of(16)).sum();
+        assert!(bytes <= limit, "{name} with {definitions:?} needs {bytes} bytes, and {limit} may be used");
+        assert!(2 * bytes > limit, "{name} with {definitions:?} is counted: {bytes} bytes");
+    }
 }
 
 #[test]
@@ -68,7 +94,7 @@ fn bevy_s_passes_are_valid_with_all_their_definitions() {
         }
         let descriptor = NagaModuleDescriptor { source, file_path: name, shader_defs, ..Default::default() };
         let module = composer.make_naga_module(descriptor).map_err(|error| error.emit_to_string(&composer))?;
-        validate(name, &module)
+        validate(name, &module, Capabilities::empty())
     };
     let all = [composite, write_depth].into_iter().flat_map(|pass| (0..4).map(move |chosen| (pass, chosen)));
     report(all.filter_map(|(pass, chosen)| check(pass, chosen).err()).collect());

@@ -37,6 +37,27 @@ pub struct RendererArgs {
     gpu: GpuArgs,
 }
 
+/// In which ways views are drawn, and where.
+#[derive(clap::Args)]
+pub struct RenderersArgs {
+    /// How views are drawn, one or more.
+    #[arg(long = "renderer", value_name = "RENDERER,..", default_value = "reference", value_delimiter = ',',
+        value_parser = values::one_of(&Design::NAMES))]
+    pub renderers: Vec<Design>,
+    #[command(flatten)]
+    gpu: GpuArgs,
+}
+
+impl RenderersArgs {
+    /// Opens the adapter and compiles the passes.
+    ///
+    /// # Errors
+    /// As [`RendererArgs::open`].
+    pub fn open(&self) -> Result<Headless, GpuError> {
+        self.gpu.settings().open()
+    }
+}
+
 impl RendererArgs {
     /// Opens the adapter and compiles the passes.
     ///

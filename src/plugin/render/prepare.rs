@@ -149,6 +149,7 @@ pub(super) fn prepare_views(
             opaque,
             blend_space: settings.blend_space,
             debug: settings.debug,
+            depths: settings.depth != DepthWrite::None,
         };
         let prepared = state.renderer.prepare(device.wgpu_device(), &queue, &renderer.0, &instances, &parameters);
         if let Err(failure) = prepared {

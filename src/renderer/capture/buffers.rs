@@ -61,16 +61,28 @@ pub(super) fn part(gpu: Gpu<'_>, form: &Form, own: Range<usize>, stride: usize) 
     }
 }
 
-/// Creates the buffers of all codebooks and of their scales.
+/// Returns the words of one entry of a codebook on the GPU: 48 bytes for each time harmonic, whatever the spatial degree.
+pub(super) fn entry_words(colors: &CodedColors) -> usize {
+    colors.words_per_entry().next_multiple_of(12)
+}
+
+/// Creates the buffers of all codebooks and of their scales, the values of a byte of 1.
 pub(super) fn codebooks(gpu: Gpu<'_>, colors: &CodedColors) -> [wgpu::Buffer; 2] {
-    let mut scales = colors.scales.clone();
+    let (words, padded) = (colors.words_per_entry(), entry_words(colors));
+    let mut scales = pad_rows(&colors.scales, words, padded, [0.0; 4]);
+    scales.iter_mut().flatten().for_each(|scale| *scale /= 127.0);
     scales.resize(CODEBOOK_SCALES, [0.0; 4]);
+    let mut entries = pad_rows(&colors.codebooks, words, padded, 0);
     // A binding of no bytes is not allowed.
-    let or_zero = |bytes: &[u8]| if bytes.is_empty() { vec![0; 16] } else { bytes.to_vec() };
+    entries.resize(entries.len().max(4), 0);
     [
-        plain(gpu, "gs4d codebooks", &or_zero(bytemuck::cast_slice(&colors.codebooks))),
+        plain(gpu, "gs4d codebooks", bytemuck::cast_slice(&entries)),
         filled(gpu, "gs4d codebook scales", bytemuck::cast_slice(&scales), wgpu::BufferUsages::UNIFORM),
     ]
+}
+
+fn pad_rows<T: Copy>(rows: &[T], from: usize, to: usize, with: T) -> Vec<T> {
+    rows.chunks(from.max(1)).flat_map(|row| row.iter().copied().chain((row.len()..to).map(move |_| with))).collect()
 }
 
 /// Creates the buffer of the sets of some Gaussians: the words of each segment in turn, or one word of interval for

@@ -145,7 +145,7 @@ impl GpuCapture {
         let settings = layout::InstanceUniforms {
             degree,
             degree_t: if degree == 3 { degree_t } else { 0 },
-            stride: stride as u32,
+            stride: form.coded_colors().map_or(stride, buffers::entry_words) as u32,
             stages: form.coded_colors().map_or(0, |colors| colors.entries.len() as u32),
             first_entries: form.coded_colors().map(first_entries).unwrap_or_default(),
             displaced: u32::from(scene.trained_with.sh_direction == ShDirection::Displaced),

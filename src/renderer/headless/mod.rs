@@ -1,11 +1,12 @@
 //! Drawing without a window: for commands, scoring and tests.
 //!
-//! In: scenes and views. Out: [`Frame`]s on the host, or [`Timings`]. Each call waits for the GPU; within a frame
-//! nothing is read back.
+//! In: scenes and views. Out: [`Frame`]s on the host, or [`Timings`](super::Timings). Each call waits for the GPU; within a
+//! frame nothing is read back.
+
+mod measure;
 
 use super::layout::Counters;
 use super::memory::Allocator;
-use super::timing::{PassTime, PassTimer, Timings, median};
 use super::view::{FinishedFrame, max_pairs};
 use super::{
     ActiveList, Design, GpuCapture, GpuContext, GpuError, Instance, Renderer, ShaderChecks, ViewParameters,
@@ -14,7 +15,6 @@ use super::{
 use crate::scene::RuntimeScene;
 use crate::view::{Appearance, Background, Counts, Frame, Picture, View};
 use glam::{UVec2, Vec3};
-use std::time::Instant;
 
 /// A renderer with a device of its own and one view.
 #[derive(Debug)]
@@ -23,6 +23,8 @@ pub struct Headless {
     renderer: Renderer,
     view: ViewRenderer,
     filtered: bool,
+    /// Whether frames that are measured have depths.
+    depths: bool,
     /// The list of the capture drawn last.
     active: Option<ActiveList>,
 }
@@ -35,7 +37,7 @@ impl Headless {
     pub fn new(context: GpuContext, checks: ShaderChecks) -> Result<Self, GpuError> {
         let renderer = Renderer::new(&context.device, checks)?;
         let view = ViewRenderer::new(&context.device, &renderer);
-        Ok(Self { context, renderer, view, filtered: true, active: None })
+        Ok(Self { context, renderer, view, filtered: true, depths: false, active: None })
     }
 
     /// Returns the device and its adapter.
@@ -56,6 +58,12 @@ impl Headless {
     /// Chooses how views are drawn. Default: [`Design::Reference`].
     pub fn set_design(&mut self, design: Design) {
         self.view.set_design(design);
+    }
+
+    /// Sets whether the frames that [`time`](Self::time) measures have expected and median depth. Default: `false`, only color and
+    /// transmittance.
+    pub fn measure_depths(&mut self, depths: bool) {
+        self.depths = depths;
     }
 
     /// Sets whether temporal filters are used. Default: `true`.
@@ -114,86 +122,6 @@ impl Headless {
         })
     }
 
-    /// Measures frames over the views given, in turn, `frames` of each kind after a warm-up.
-    ///
-    /// # Panics
-    /// If there are frames to measure but no views.
-    ///
-    /// # Errors
-    /// As [`render`](Self::render).
-    pub fn time(&mut self, capture: &GpuCapture, views: &[View], frames: usize) -> Result<Timings, GpuError> {
-        let mut active = self.take_active(capture, views.first().map_or(0.0, |view| view.time));
-        let timings = self.time_with(capture, active.as_mut(), views, frames);
-        self.active = active;
-        timings
-    }
-
-    fn time_with(
-        &mut self,
-        capture: &GpuCapture,
-        mut active: Option<&mut ActiveList>,
-        views: &[View],
-        frames: usize,
-    ) -> Result<Timings, GpuError> {
-        let parameters = &ViewParameters { background: Background::Color([0.0; 3]), ..ViewParameters::default() };
-        let mut counts = Vec::new();
-        // The warm-up also finds room for the pairs of every view.
-        for view in views {
-            self.reactivate(active.as_deref_mut(), capture, view.time);
-            counts.push(self.render_all(&[instance(capture, active.as_deref(), view)], parameters)?.counts);
-        }
-        let around = PassTimer::new(self.allocator(), &self.context.queue, &[]);
-        let inside = PassTimer::new(self.allocator(), &self.context.queue, self.view.design().timed_passes());
-        let (mut frame, mut wall) = (Vec::new(), Vec::new());
-        for i in 0..frames {
-            let view = &views[i % views.len()];
-            let start = Instant::now();
-            self.reactivate(active.as_deref_mut(), capture, view.time);
-            self.submit(&[instance(capture, active.as_deref(), view)], parameters, around.as_ref())?;
-            wall.push(start.elapsed().as_secs_f64() * 1e3);
-            if let Some(timer) = &around {
-                frame.push(timer.intervals(&self.copy_out(timer.resolved(), timer.resolved().size())?)[0]);
-            }
-        }
-        let mut passes = vec![Vec::new(); self.view.design().timed_passes().len()];
-        if let Some(timer) = &inside {
-            for i in 0..frames {
-                let view = &views[i % views.len()];
-                self.reactivate(active.as_deref_mut(), capture, view.time);
-                self.submit(&[instance(capture, active.as_deref(), view)], parameters, Some(timer))?;
-                let timestamps = self.copy_out(timer.resolved(), timer.resolved().size())?;
-                for (pass, time) in passes.iter_mut().zip(timer.intervals(&timestamps)) {
-                    pass.push(time);
-                }
-            }
-        }
-        let start = Instant::now();
-        for i in 0..frames {
-            let view = &views[i % views.len()];
-            self.reactivate(active.as_deref_mut(), capture, view.time);
-            self.submit_without_waiting(&[instance(capture, active.as_deref(), view)], parameters, None)?;
-        }
-        self.wait()?;
-        let pipelined = start.elapsed().as_secs_f64() * 1e3 / frames.max(1) as f64;
-        let middle = |value: fn(&Counts) -> u32| median(counts.iter().map(|c| f64::from(value(c))).collect()) as u32;
-        Ok(Timings {
-            passes: self
-                .view
-                .design()
-                .timed_passes()
-                .iter()
-                .zip(passes)
-                .filter(|(_, times)| !times.is_empty())
-                .map(|(&name, times)| PassTime { name, milliseconds: median(times) })
-                .collect(),
-            frame_milliseconds: around.map(|_| median(frame)),
-            wall_milliseconds: median(wall),
-            pipelined_milliseconds: pipelined,
-            counts: Counts { visible: middle(|c| c.visible), pairs: middle(|c| c.pairs) },
-            frames,
-        })
-    }
-
     /// Returns the list for this capture at that time, that of the last call if it belongs to the capture; `None`
     /// without a filter. The caller stores it in `active` again after use.
     fn take_active(&mut self, capture: &GpuCapture, time: f32) -> Option<ActiveList> {
@@ -204,13 +132,6 @@ impl Headless {
         let mut active = made.or_else(|| ActiveList::new(&self.context.device, &self.renderer, capture))?;
         self.activate(&mut active, &self.context.queue, capture, time);
         Some(active)
-    }
-
-    /// Sets the time of a list, if there is one.
-    fn reactivate(&self, active: Option<&mut ActiveList>, capture: &GpuCapture, time: f32) {
-        if let Some(active) = active {
-            self.activate(active, &self.context.queue, capture, time);
-        }
     }
 
     fn activate(&self, active: &mut ActiveList, queue: &wgpu::Queue, capture: &GpuCapture, time: f32) {
@@ -245,7 +166,7 @@ impl Headless {
         parameters: &ViewParameters<'_>,
     ) -> Result<Counters, GpuError> {
         loop {
-            let counters = self.submit(instances, parameters, None)?;
+            let counters = self.submit(instances, parameters)?;
             let capacity = self.view.pair_capacity();
             if counters.pairs_wanted <= capacity {
                 return Ok(counters);
@@ -260,34 +181,16 @@ impl Headless {
     }
 
     /// Draws one frame and waits for it. Returns its counters.
-    fn submit(
-        &mut self,
-        instances: &[Instance<'_>],
-        parameters: &ViewParameters<'_>,
-        timer: Option<&PassTimer>,
-    ) -> Result<Counters, GpuError> {
-        self.submit_without_waiting(instances, parameters, timer)?;
+    fn submit(&mut self, instances: &[Instance<'_>], parameters: &ViewParameters<'_>) -> Result<Counters, GpuError> {
+        let GpuContext { device, queue, .. } = &self.context;
+        self.view.prepare(device, queue, &self.renderer, instances, parameters)?;
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gs4d") });
+        self.view.record(&self.renderer, &mut encoder, instances);
+        queue.submit([encoder.finish()]);
         self.wait()?;
         let counters =
             self.copy_out_from(self.view.counters(), self.view.counters_offset(), size_of::<Counters>() as u64)?;
         Ok(bytemuck::pod_read_unaligned(&counters))
-    }
-
-    fn submit_without_waiting(
-        &mut self,
-        instances: &[Instance<'_>],
-        parameters: &ViewParameters<'_>,
-        timer: Option<&PassTimer>,
-    ) -> Result<(), GpuError> {
-        let GpuContext { device, queue, .. } = &self.context;
-        self.view.prepare(device, queue, &self.renderer, instances, parameters)?;
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gs4d") });
-        self.view.record_timed(&self.renderer, &mut encoder, instances, timer);
-        if let Some(timer) = timer {
-            timer.resolve(&mut encoder);
-        }
-        queue.submit([encoder.finish()]);
-        Ok(())
     }
 
     fn wait(&self) -> Result<(), GpuError> {

@@ -1,9 +1,10 @@
 //! The bins of the fast renderer.
 //!
 //! In: the size of a picture and the number of pairs of splats and tiles to have room for. Out: [`FastResources`], the
-//! counters and entries of bins of 4 x 4 tiles, and the bind groups of both passes over them.
+//! counters and entries of bins of a few tiles, and the bind groups of the passes over them.
 
-use super::ViewRenderer;
+use super::resources::Sizes;
+use super::{Instance, ViewRenderer};
 use crate::renderer::layout::BIN_COUNTERS;
 use crate::renderer::memory::Allocator;
 use crate::renderer::pipelines::Renderer;
@@ -19,15 +20,34 @@ pub(super) struct FastResources {
     /// Size of all buffers.
     pub bytes: u64,
     pub project_bin: wgpu::BindGroup,
-    pub sort_blend: wgpu::BindGroup,
+    pub sort_bins: wgpu::BindGroup,
 }
 
-/// Tiles along each side of a bin.
-const BIN_TILES: u32 = 4;
+/// The largest number of bins that a workgroup of `project_bin` counts by itself.
+const OWN_BINS: u32 = 2048;
+
+/// Returns the number of tiles along each side of a bin: 2, or 4 if there were too many bins.
+pub(super) fn bin_side(picture: UVec2) -> u32 {
+    if tiles(picture).map(|tiles| tiles.div_ceil(2)).element_product() <= OWN_BINS { 2 } else { 4 }
+}
 
 /// Returns the number of bins across and down a picture.
 pub(super) fn bin_grid(picture: UVec2) -> UVec2 {
-    (tiles(picture) + (BIN_TILES - 1)) / BIN_TILES
+    tiles(picture).map(|tiles| tiles.div_ceil(bin_side(picture)))
+}
+
+/// The largest number of slots that the entries of bins have bits for.
+pub(super) const MAX_SLOTS: u32 = 1 << 24;
+
+/// Pictures of up to this number of tiles leave the GPU idle: there is room for large batches of `blend_blocks`.
+const FEW_TILES: u32 = 1024;
+/// Workgroup memory that they need, bytes.
+const LARGE_BATCHES_MEMORY: u32 = 32 * 1024;
+
+/// Returns whether `blend_blocks` takes large batches.
+pub(super) fn large_batches(limits: &wgpu::Limits, instances: &[Instance<'_>]) -> bool {
+    let few = instances.first().is_some_and(|instance| tiles(instance.view.size).element_product() <= FEW_TILES);
+    few && limits.max_compute_workgroup_storage_size >= LARGE_BATCHES_MEMORY
 }
 
 /// Returns the number of splats that each bin has room for.
@@ -37,28 +57,28 @@ pub(super) fn bin_capacity(picture: UVec2, pairs: u32) -> u32 {
 }
 
 impl ViewRenderer {
-    /// Creates bins for a picture, with room for `pairs` splats in all of them.
+    /// Creates bins, with room for as many splats in all of them as there is for pairs.
     pub(super) fn make_fast(
         &self,
         renderer: &Renderer,
         allocator: &Allocator<'_>,
-        picture: UVec2,
-        pairs: u32,
+        sizes: &Sizes,
         instance: wgpu::BindingResource<'_>,
-        splats: &wgpu::Buffer,
+        [splats, tile_ranges, pair_splats]: [&wgpu::Buffer; 3],
     ) -> FastResources {
-        let grid = bin_grid(picture);
+        let grid = bin_grid(sizes.picture);
         let count = u64::from(grid.x * grid.y);
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
         let bins = allocator.buffer("gs4d bins", 2 * 4 * (count + u64::from(BIN_COUNTERS)), usage);
-        let size = count * u64::from(bin_capacity(picture, pairs)) * 8;
+        let size = 8 * count * u64::from(bin_capacity(sizes.picture, sizes.pairs));
         let entries = allocator.buffer("gs4d bin entries", size, BufferUsages::STORAGE);
-        let (splats, entries) = (splats.as_entire_binding(), entries.as_entire_binding());
-        let counters = bins.as_entire_binding();
-        let resources = [instance, splats.clone(), counters.clone(), entries.clone()];
-        let project_bin = allocator.bind_group("gs4d project_bin", &renderer.layouts.project_bin, &resources);
-        let resources = [splats, counters, entries];
-        let sort_blend = allocator.bind_group("gs4d sort_blend", &renderer.layouts.sort_blend, &resources);
-        FastResources { bytes: bins.size() + size, bins, project_bin, sort_blend }
+        let (counters, entries) = (bins.as_entire_binding(), entries.as_entire_binding());
+        let layouts = &renderer.layouts;
+        let resources = [instance, splats.as_entire_binding(), counters.clone(), entries.clone()];
+        let project_bin = allocator.bind_group("gs4d project_bin", &layouts.project_bin, &resources);
+        let (ranges, pairs) = (tile_ranges.as_entire_binding(), pair_splats.as_entire_binding());
+        let resources = [self.frame.as_entire_binding(), counters, entries, ranges, pairs];
+        let sort_bins = allocator.bind_group("gs4d sort_bins", &layouts.sort_bins, &resources);
+        FastResources { bytes: bins.size() + size, bins, project_bin, sort_bins }
     }
 }

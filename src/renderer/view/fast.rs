@@ -1,18 +1,19 @@
-//! The fast renderer of a view: two dispatches instead of the global sorts.
+//! The fast renderer of a view: three dispatches instead of the global sorts.
 //!
 //! In: what the reference design takes: instances, sizes, the bind group of the pixels. Out: the same picture.
 //!
 //! | pass | reads | writes |
 //! |---|---|---|
-//! | `project_bin` | active list, Gaussians, color coefficients | splats, bins of 4 x 4 tiles, in no order |
-//! | `sort_blend` | bins, splats, opaque depth | color and transmittance, expected and median depth |
+//! | `project_bin` | active list, Gaussians, color coefficients | splats, bins of a few tiles, in no order |
+//! | `sort_bins` | bins | pairs of each tile, in order of depth |
+//! | `blend_blocks` | pairs, splats, opaque depth | color and transmittance, expected and median depth |
 
-use super::bins::{FastResources, bin_capacity, bin_grid};
+use super::bins::{FastResources, bin_capacity, bin_grid, bin_side};
 use super::record::mark;
 use super::resources::{Resources, Sizes};
 use super::{Instance, ViewRenderer};
 use crate::renderer::layout::BIN_COUNTERS;
-use crate::renderer::pipelines::{FastPipelines, Renderer};
+use crate::renderer::pipelines::Renderer;
 use crate::renderer::timing::PassTimer;
 use crate::view::tiles;
 
@@ -33,16 +34,16 @@ impl ViewRenderer {
 
     /// Returns the uniform `binning` of the frame that is prepared.
     pub(super) fn binning(&self, sizes: &Sizes) -> [u32; 4] {
-        let grid = bin_grid(sizes.picture);
         let counters = [self.odd, !self.odd].map(|odd| self.first_counter(sizes, odd));
-        [grid.x, bin_capacity(sizes.picture, sizes.pairs), counters[0], counters[1]]
+        // Never 0, which is the stamp of a new buffer.
+        let frame = self.frames % 0xffff + 1;
+        [bin_side(sizes.picture) | (frame << 8), bin_capacity(sizes.picture, sizes.pairs), counters[0], counters[1]]
     }
 
     /// Records the passes of the fast design.
     pub(super) fn record_fast(
         &self,
         renderer: &Renderer,
-        pipelines: &FastPipelines,
         made: &Resources,
         fast: &FastResources,
         pass: &mut wgpu::ComputePass<'_>,
@@ -50,14 +51,26 @@ impl ViewRenderer {
         timer: Option<&PassTimer>,
     ) {
         // project_bin
-        self.project(renderer, &pipelines.project_bin, &fast.project_bin, pass, instances);
+        self.project(renderer, |storage| renderer.project_bin(storage), &fast.project_bin, pass, instances);
         mark(timer, pass);
 
-        // sort_blend
+        // sort_bins
+        let (Some(sort_bins), Some(blend_blocks)) =
+            (renderer.sort_bins(), renderer.blend_blocks(self.blending, self.large_batches))
+        else {
+            return;
+        };
+        let bins = bin_grid(made.sizes.picture);
+        pass.set_pipeline(sort_bins);
+        pass.set_bind_group(0, &fast.sort_bins, &[]);
+        pass.dispatch_workgroups(bins.x, bins.y, 1);
+        mark(timer, pass);
+
+        // blend_blocks
         let tiles = tiles(made.sizes.picture);
-        pass.set_pipeline(&pipelines.sort_blend[usize::from(made.multisampled)]);
+        pass.set_pipeline(blend_blocks);
         pass.set_bind_group(0, &made.pixel, &[]);
-        pass.set_bind_group(1, &fast.sort_blend, &[]);
+        pass.set_bind_group(1, &made.blend, &[]);
         pass.dispatch_workgroups(tiles.x, tiles.y, 1);
         mark(timer, pass);
     }

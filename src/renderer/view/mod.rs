@@ -13,6 +13,7 @@ mod resources;
 use super::active::drawn_count;
 use super::memory::{alignment_of, binding_limit};
 use super::pipelines::Renderer;
+use super::shaders::Blending;
 use super::timing::{PassTime, PassTimer, TIMED_FAST_PASSES, TIMED_PASSES};
 use super::{ActiveList, GpuCapture, GpuError, ViewStatistics, layout};
 use crate::view::tiles;
@@ -49,12 +50,14 @@ pub struct ViewParameters<'a> {
     pub blend_space: BlendSpace,
     /// What is shown of the captures. Default: [`DebugView::Color`].
     pub debug: DebugView,
+    /// Whether expected and median depth are computed; drawing is faster without. Default: `true`.
+    pub depths: bool,
 }
 
 impl Default for ViewParameters<'_> {
     fn default() -> Self {
         let (blend_space, debug) = Default::default();
-        Self { background: Background::None, opaque: None, blend_space, debug }
+        Self { background: Background::None, opaque: None, blend_space, debug, depths: true }
     }
 }
 
@@ -82,9 +85,15 @@ pub struct ViewRenderer {
     design: Design,
     /// Whether the counters of odd frames are used, and whether the frame prepared last has been recorded.
     odd: bool,
+    /// Number of frames that have been recorded.
+    frames: u32,
     recorded: bool,
     /// Whether its opaque depth is multisampled.
     multisampled: bool,
+    /// What the fast design blends in the frame prepared last.
+    blending: Blending,
+    large_batches: bool,
+    has_depths: bool,
     /// Number of pairs for which an earlier frame wanted room.
     pairs_wanted: u32,
     /// Number of successive frames for which the buffers have been far too large.
@@ -159,6 +168,7 @@ impl ViewRenderer {
             slots: 0,
             design: Design::default(),
             odd: false,
+            frames: 0,
             recorded: false,
             pairs_wanted: 0,
             oversized_frames: 0,
@@ -172,6 +182,9 @@ impl ViewRenderer {
             statistics: ViewStatistics::default(),
             timing: None,
             multisampled: false,
+            blending: Blending::default(),
+            large_batches: false,
+            has_depths: true,
             resources: None,
         }
     }
@@ -192,11 +205,16 @@ impl ViewRenderer {
         parameters: &ViewParameters<'_>,
     ) -> Result<(), GpuError> {
         self.poll();
+        self.blending = blending(parameters);
+        self.has_depths = parameters.depths;
         if self.design == Design::Fast {
-            renderer.fast(device)?;
+            let storages = instances.iter().map(|instance| instance.capture.storage);
+            self.large_batches = bins::large_batches(&device.limits(), instances);
+            renderer.compile_fast(device, storages, self.blending, self.large_batches)?;
         }
         if std::mem::take(&mut self.recorded) {
             self.odd = !self.odd;
+            self.frames = self.frames.wrapping_add(1);
         }
         let made = self.resources.as_ref().map(|resources| resources.sizes).unwrap_or_default();
         let picture = instances.first().map_or(made.picture.max(UVec2::ONE), |instance| instance.view.size);
@@ -206,9 +224,13 @@ impl ViewRenderer {
         }
         let slots: usize = instances.iter().map(|instance| instance.capture.len()).sum();
         let parts: usize = instances.iter().map(|instance| instance.capture.parts.len()).sum();
-        let limit = binding_limit(&limits);
+        let splat = size_of::<layout::SplatRecord>() as u64;
+        let limit = match self.design {
+            Design::Fast => binding_limit(&limits).min(u64::from(bins::MAX_SLOTS) * splat),
+            Design::Reference => binding_limit(&limits),
+        };
         // The largest buffer per slot holds splats.
-        let needed = (slots as u64).next_multiple_of(u64::from(BLOCK)) * size_of::<layout::SplatRecord>() as u64;
+        let needed = (slots as u64).next_multiple_of(u64::from(BLOCK)) * splat;
         if needed > limit {
             return Err(GpuError::TooLarge { what: "the splats", needed, limit });
         }
@@ -255,9 +277,9 @@ impl ViewRenderer {
 
     /// Returns the camera-space depth: `Rg32Float`. Red is the expected depth `Σ z α T`, not divided by `1 − T`; green
     /// the median depth, that of the splat at which T falls to one half or below, 0 if it never does. `None` before the
-    /// first [`prepare`](Self::prepare).
+    /// first [`prepare`](Self::prepare), and if the last was without [`depths`](ViewParameters::depths).
     pub fn depth(&self) -> Option<&wgpu::TextureView> {
-        self.resources.as_ref().map(|made| &made.depth_view)
+        self.resources.as_ref().filter(|_| self.has_depths).map(|made| &made.depth_view)
     }
 
     /// Sets whether GPU time is measured from the next frame on, pass by pass. Results arrive in
@@ -373,7 +395,7 @@ impl ViewRenderer {
             let wanted = match self.design {
                 Design::Fast => {
                     let grid = bins::bin_grid(self.resources.as_ref().map_or(UVec2::ONE, |made| made.sizes.picture));
-                    counters.pairs_wanted.saturating_mul(grid.x * grid.y)
+                    counters.pairs_wanted.saturating_mul(grid.x * grid.y).max(counters.pairs)
                 }
                 Design::Reference => counters.pairs_wanted,
             };
@@ -454,6 +476,21 @@ impl ViewRenderer {
             binning: self.binning(&made.sizes),
         };
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
+    }
+}
+
+/// Returns what the fast design has to blend.
+fn blending(parameters: &ViewParameters<'_>) -> Blending {
+    let samples = parameters.opaque.map_or(0, |opaque| opaque.samples);
+    let color = match parameters.debug {
+        DebugView::Color | DebugView::Active | DebugView::Lifespan | DebugView::Velocity => !parameters.depths,
+        DebugView::Depth | DebugView::Overdraw => false,
+    };
+    match samples {
+        0 if color => Blending::Color,
+        1 if color => Blending::ColorBehindSurfaces,
+        0 | 1 => Blending::All,
+        _ => Blending::AllMultisampled,
     }
 }
 

@@ -7,6 +7,7 @@ use super::{Instance, ViewRenderer};
 use crate::renderer::active::drawn_count;
 use crate::renderer::layout::{BLOCK, DEPTH_STEPS, DIGITS};
 use crate::renderer::pipelines::Renderer;
+use crate::renderer::shaders::Storage;
 use crate::renderer::timing::PassTimer;
 use crate::view::tiles;
 
@@ -34,18 +35,18 @@ impl ViewRenderer {
         timer: Option<&PassTimer>,
     ) {
         let Some(made) = &self.resources else { return };
-        let fast = made.fast.as_ref().zip(renderer.compiled_fast());
+        let fast = made.fast.as_ref();
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("gs4d"),
             timestamp_writes: timer.and_then(PassTimer::frame_writes),
         });
         match fast {
-            Some((fast, pipelines)) => self.record_fast(renderer, pipelines, made, fast, &mut pass, instances, timer),
+            Some(fast) => self.record_fast(renderer, made, fast, &mut pass, instances, timer),
             None => self.record_reference(renderer, made, &mut pass, instances, timer),
         }
         drop(pass);
         let offset = self.counters_offset();
-        self.readback.copy(encoder, fast.map_or(&self.counters, |(fast, _)| &fast.bins), offset);
+        self.readback.copy(encoder, fast.map_or(&self.counters, |fast| &fast.bins), offset);
         self.recorded = true;
     }
 
@@ -59,7 +60,7 @@ impl ViewRenderer {
         timer: Option<&PassTimer>,
     ) {
         // project
-        self.project(renderer, &renderer.project, &made.project, pass, instances);
+        self.project(renderer, |storage| Some(&renderer.project[storage as usize]), &made.project, pass, instances);
         mark(timer, pass);
 
         // sort by depth: the first step drops the invisible splats and counts the others; the later steps are sized
@@ -107,17 +108,18 @@ impl ViewRenderer {
     }
 
     /// Records one dispatch of `project` or `project_bin` for each part of each instance.
-    pub(super) fn project(
+    pub(super) fn project<'a>(
         &self,
         renderer: &Renderer,
-        pipelines: &[wgpu::ComputePipeline; 3],
+        pipeline: impl Fn(Storage) -> Option<&'a wgpu::ComputePipeline>,
         group: &wgpu::BindGroup,
         pass: &mut wgpu::ComputePass<'_>,
         instances: &[Instance<'_>],
     ) {
         let mut index = 0;
         for instance in instances {
-            pass.set_pipeline(&pipelines[instance.capture.storage as usize]);
+            let Some(pipeline) = pipeline(instance.capture.storage) else { continue };
+            pass.set_pipeline(pipeline);
             pass.set_bind_group(2, instance.active.map_or(&renderer.no_list, |active| &active.list), &[]);
             for (at, part) in instance.capture.parts.iter().enumerate() {
                 pass.set_bind_group(0, group, &[index * self.alignment]);

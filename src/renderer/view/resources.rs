@@ -84,6 +84,7 @@ impl ViewRenderer {
         let Sizes { slots, pairs, parts, picture: size } = sizes;
         let allocator = renderer.allocator(device);
         let bytes = Cell::new(0);
+        let fast = self.design == Design::Fast;
         let storage = |label, count: u32, each: usize| {
             let size = u64::from(count) * each as u64;
             bytes.set(bytes.get() + size);
@@ -95,13 +96,19 @@ impl ViewRenderer {
         let instances =
             allocator.buffer("gs4d instances", u64::from(parts) * u64::from(self.alignment), BufferUsages::UNIFORM);
         let splats = storage("gs4d splats", slots, size_of::<layout::SplatRecord>());
-        let depth_keys = storage("gs4d depth keys", slots, 4);
-        let keys = [(); 2].map(|()| storage("gs4d sort keys", slots, 4));
-        let order = [(); 2].map(|()| storage("gs4d sort values", slots, 4));
-        let offsets = storage("gs4d offsets", slots + slot_blocks, 4);
-        let pair_tiles = [(); 2].map(|()| storage("gs4d pair tiles", pairs, 4));
-        let pair_splats = [(); 2].map(|()| storage("gs4d pair splats", pairs, 4));
-        let histogram = storage("gs4d histogram", DIGITS * (stride + 1), 4);
+        // What only the reference design uses has no room with the fast one.
+        let sorting = |label, count: u32| storage(label, if fast { 1 } else { count }, 4);
+        let depth_keys = sorting("gs4d depth keys", slots);
+        let keys = [(); 2].map(|()| sorting("gs4d sort keys", slots));
+        let order = [(); 2].map(|()| sorting("gs4d sort values", slots));
+        let offsets = sorting("gs4d offsets", slots + slot_blocks);
+        let pair_tiles = [(); 2].map(|()| sorting("gs4d pair tiles", pairs));
+        // After an even number of steps the pairs are in the buffers that `bin` wrote.
+        let sorted = tile_steps(size) as usize % 2;
+        let pair_splats = [0, 1].map(|i| {
+            if i == sorted { storage("gs4d pair splats", pairs, 4) } else { sorting("gs4d pair splats", pairs) }
+        });
+        let histogram = sorting("gs4d histogram", DIGITS * (stride + 1));
         let tile_ranges = storage("gs4d tile ranges", tiles.x * tiles.y, 8);
         let color = allocator.texture("gs4d color", size, TextureFormat::Rgba32Float);
         let depth = allocator.texture("gs4d depth", size, TextureFormat::Rg32Float);
@@ -136,10 +143,10 @@ impl ViewRenderer {
             offset: 0,
             size: std::num::NonZeroU64::new(size_of::<layout::InstanceUniforms>() as u64),
         });
-        // After an even number of steps the pairs are in the buffers that `bin` wrote.
-        let sorted = tile_steps(size) as usize % 2;
-        let fast = (self.design == Design::Fast)
-            .then(|| self.make_fast(renderer, &allocator, sizes.picture, sizes.pairs, instance.clone(), &splats));
+        let fast = (self.design == Design::Fast).then(|| {
+            let buffers = [&splats, &tile_ranges, &pair_splats[sorted]];
+            self.make_fast(renderer, &allocator, &sizes, instance.clone(), buffers)
+        });
         Resources {
             sizes,
             // 16 bytes of color and 8 of depth for each pixel.

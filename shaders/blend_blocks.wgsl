@@ -1,0 +1,496 @@
+// blend_blocks: blends the splats of one tile, one workgroup each: the last pass of the fast renderer.
+// In: the list of the tile that `sort_bins` wrote, splats, the depth of opaque surfaces, the background. Out: color and
+// transmittance, with DEPTHS also expected and median depth. CPU reference: src/reference/blend.rs.
+//
+// The list is read in batches: each thread takes one splat and finds the blocks of 8 x 4 pixels that it reaches; each block
+// queues its own splats, and its 32 threads blend them. If there was no room for the list, all splats are searched for the
+// nearest ones of each batch instead, which gives the same picture.
+#import gs4d::types::SplatRecord
+#import gs4d::bins::{depth_order, is_after, stamp, FIRST, NONE, STAMP_MASK}
+#import gs4d::alpha::is_opaque
+#ifdef DEPTHS
+#import gs4d::pixel::{Pixel, begin_pixel, blend_or_skip, blend_splat, finish_pixel, frame, pass_surfaces}
+#else
+#import gs4d::pixel::{frame, surface_depth, write_color, FAR}
+#endif
+#import gs4d::tile::{energy_of, TILE_SIZE}
+
+const THREADS: u32 = 256u;
+// Splats that are blended at once: more make fewer waits for the slowest block, fewer leave room for more workgroups.
+#ifdef LARGE_BATCHES
+const BATCH: u32 = 256u;
+#else
+const BATCH: u32 = 128u;
+#endif
+// Blocks of 8 x 4 pixels, one for each 32 threads.
+const BLOCKS: u32 = 8u;
+const LANES: u32 = 32u;
+// Splats of a batch that each thread queues.
+const OWN_SPLATS: u32 = BATCH / LANES;
+const LOG2_E: f32 = 1.442695;
+// log2 of ALPHA_MIN and of ALPHA_MAX.
+const LOG2_ALPHA_MIN: f32 = -7.9943534;
+const LOG2_ALPHA_MAX: f32 = -0.014499569;
+
+// First and last + 1 pair of each tile; NONE if there was no room for them.
+@group(1) @binding(0) var<storage, read> tile_ranges: array<vec2<u32>>;
+@group(1) @binding(1) var<storage, read> pair_splats: array<u32>;
+@group(1) @binding(2) var<storage, read> splats: array<SplatRecord>;
+
+// Center, conic xx and xy scaled for exp2; conic yy, log2 of opacity, red, green; blue, depth. The last changes no pixel.
+var<workgroup> batch_a: array<vec4<f32>, BATCH + 1u>;
+var<workgroup> batch_b: array<vec4<f32>, BATCH + 1u>;
+var<workgroup> batch_c: array<vec2<f32>, BATCH + 1u>;
+// Blocks that each splat of the batch reaches, one bit each.
+var<workgroup> reached: array<u32, BATCH>;
+// Splats of the batch that each block blends, in order.
+var<workgroup> queues: array<u32, BLOCKS * BATCH>;
+#ifndef SUBGROUPS_OF_32
+// Number of splats that each thread queues.
+var<workgroup> queued_by: array<u32, THREADS>;
+#endif
+var<workgroup> finished: atomic<u32>;
+// What is found in all splats: depth keys, slots, numbers of splats in intervals of keys.
+var<workgroup> keys: array<u32, BATCH>;
+var<workgroup> slots: array<u32, BATCH>;
+var<workgroup> intervals: array<atomic<u32>, 256>;
+var<workgroup> listed: atomic<u32>;
+var<workgroup> least: atomic<u32>;
+var<workgroup> greatest: atomic<u32>;
+var<workgroup> chosen: vec2<u32>;
+
+var<private> tile: vec2<u32>;
+
+// Returns the depth key and slot of a splat; NONE if it is of another frame or does not cover this tile.
+fn splat_of_tile(i: u32) -> vec2<u32> {
+    let words = vec2(splats[i].tiles_low, splats[i].tiles_high);
+    if any((words & vec2(STAMP_MASK)) != stamp(frame.binning.x >> 8u)) {
+        return NONE;
+    }
+    let first = words.x & ~STAMP_MASK;
+    let last = words.y & ~STAMP_MASK;
+    if tile.x < (first & 0xffffu) || tile.y < (first >> 16u) || tile.x >= (last & 0xffffu) || tile.y >= (last >> 16u) {
+        return NONE;
+    }
+    return vec2(depth_order(splats[i].depth), i);
+}
+
+// Lists the splats of this tile after `lower` and not after `upper`, in no order. Returns how many there are; those that do not
+// fit a batch are not listed.
+fn search(lower: vec2<u32>, upper: vec2<u32>, thread: u32) -> u32 {
+    workgroupBarrier();
+    if thread == 0u {
+        atomicStore(&listed, 0u);
+        atomicStore(&least, 0xffffffffu);
+        atomicStore(&greatest, 0u);
+    }
+    workgroupBarrier();
+    for (var i = thread; i < frame.slots; i += THREADS) {
+        let found = splat_of_tile(i);
+        if found.y != NONE.y && is_after(found, lower) && !is_after(found, upper) {
+            let place = atomicAdd(&listed, 1u);
+            if place < BATCH {
+                keys[place] = found.x;
+                slots[place] = found.y;
+            }
+            atomicMin(&least, found.x);
+            atomicMax(&greatest, found.x);
+        }
+    }
+    return workgroupUniformLoad(&listed);
+}
+
+// The last place up to which the splats after `lower` fit a batch: at least one does, as no two have the same slot.
+fn fitting(lower: vec2<u32>, thread: u32) -> vec2<u32> {
+    var low = workgroupUniformLoad(&least);
+    var high = workgroupUniformLoad(&greatest);
+    // Where more splats than fit have one depth, they are told apart by slot.
+    var by_slot = false;
+    var key = 0u;
+    loop {
+        let shift = max(32u - countLeadingZeros(high - low), 8u) - 8u;
+        atomicStore(&intervals[thread], 0u);
+        workgroupBarrier();
+        for (var i = thread; i < frame.slots; i += THREADS) {
+            let found = splat_of_tile(i);
+            if found.y != NONE.y && is_after(found, lower) && (!by_slot || found.x == key) {
+                let value = select(found.x, found.y, by_slot);
+                if value >= low && value <= high {
+                    atomicAdd(&intervals[(value - low) >> shift], 1u);
+                }
+            }
+        }
+        workgroupBarrier();
+        if thread == 0u {
+            var sum = 0u;
+            var count = 0u;
+            for (; count < 256u; count++) {
+                let next = sum + atomicLoad(&intervals[count]);
+                if next > BATCH {
+                    break;
+                }
+                sum = next;
+            }
+            chosen = vec2(count, sum);
+        }
+        let found = workgroupUniformLoad(&chosen);
+        let start = low + (found.x << shift);
+        if found.y > 0u {
+            let last = select(start - 1u, high, found.x >= 256u || start - 1u > high || start == 0u);
+            if by_slot {
+                return vec2(key, last);
+            }
+            return vec2(last, 0xffffffffu);
+        }
+        if shift == 0u {
+            by_slot = true;
+            key = start;
+            low = 0u;
+            high = 0xfffffffeu;
+        } else {
+            low = start;
+            high = min(high, start + ((1u << shift) - 1u));
+        }
+    }
+    return NONE;
+}
+
+// Lists the nearest splats of this tile after `lower` that fit a batch, in order. Returns their last place; NONE after the
+// last splat.
+fn search_batch(lower: vec2<u32>, thread: u32) -> vec2<u32> {
+    var upper = NONE;
+    if search(lower, NONE, thread) > BATCH {
+        upper = fitting(lower, thread);
+    }
+    let count = search(lower, upper, thread);
+    var own = NONE;
+    var place = 0u;
+    if thread < count {
+        own = vec2(keys[thread], slots[thread]);
+        for (var i = 0u; i < count; i++) {
+            place += select(0u, 1u, is_after(own, vec2(keys[i], slots[i])));
+        }
+    }
+    workgroupBarrier();
+    if thread < count {
+        slots[place] = own.y;
+    } else if thread < BATCH {
+        slots[thread] = NONE.y;
+    }
+    workgroupBarrier();
+    return upper;
+}
+
+// Returns the splat of a pair, one of opacity 0 from `end` on.
+fn load_pair(pair: u32, end: u32) -> SplatRecord {
+    var splat: SplatRecord;
+    if pair < end {
+        splat = splats[pair_splats[pair]];
+    }
+    return splat;
+}
+
+// Returns the splat that `search_batch` found for a thread, one of opacity 0 if there is none.
+fn load_found(thread: u32) -> SplatRecord {
+    var splat: SplatRecord;
+    if slots[thread] != NONE.y {
+        splat = splats[slots[thread]];
+    }
+    return splat;
+}
+
+// Returns the first pixel of a block in its tile.
+fn corner_of(block: u32) -> vec2<u32> {
+    return vec2(block % (TILE_SIZE / 8u) * 8u, block / (TILE_SIZE / 8u) * 4u);
+}
+
+// Makes a splat part of the batch.
+fn put_in_batch(splat: SplatRecord, thread: u32) {
+    let conic = vec3(-0.5, -1.0, -0.5) * LOG2_E * splat.conic;
+    batch_a[thread] = vec4(splat.center, conic.xy);
+    batch_b[thread] = vec4(conic.z, log2(splat.opacity), splat.color.xy);
+    batch_c[thread] = vec2(splat.color.z, splat.depth);
+    var blocks = 0u;
+    if splat.opacity > 0.0 {
+        blocks = blocks_reached(splat);
+    }
+    reached[place_of(thread)] = blocks;
+}
+
+#ifdef SUBGROUPS_OF_32
+fn place_of(i: u32) -> u32 {
+    return i;
+}
+#else
+// Splats 0, 8, 16, .. first, so that the threads of `queue_splats` read from different banks.
+fn place_of(i: u32) -> u32 {
+    return i % OWN_SPLATS * LANES + i / OWN_SPLATS;
+}
+#endif
+
+// Returns the blocks of 8 x 4 pixels where the alpha of a splat can reach 1/255, one bit each, with room for rounding.
+fn blocks_reached(splat: SplatRecord) -> u32 {
+    let c = splat.conic;
+    // Written so that NaN, which is no ellipse, reaches everything.
+    if !(c.x * c.z > c.y * c.y) {
+        return 0xffu;
+    }
+    let bound = energy_of(splat.opacity) * 1.001 + 0.02;
+    // On the line x = 1 the quadratic form is least at y = slope.x, on y = 1 at x = slope.y.
+    let slope = vec2(-c.y / c.z, -c.y / c.x);
+    let corner = vec2<f32>(tile * TILE_SIZE) - splat.center;
+    let left = corner.x + vec2(0.0, 8.0);
+    let right = left + 7.0;
+    let near_x = clamp(vec2(0.0), left, right);
+    var blocks = 0u;
+    for (var row = 0u; row < 4u; row++) {
+        let top = corner.y + f32(4u * row);
+        let bottom = top + 3.0;
+        let near_y = clamp(0.0, top, bottom);
+        // The minimum of the form over a block lies on one of the two sides that face the center.
+        let y = clamp(slope.x * near_x, vec2(top), vec2(bottom));
+        let x = clamp(vec2(slope.y * near_y), left, right);
+        let on_x = (c.x * near_x + 2.0 * c.y * y) * near_x + c.z * y * y;
+        let on_y = (c.z * near_y + 2.0 * c.y * x) * near_y + c.x * x * x;
+        let hit = min(on_x, on_y) <= vec2(bound);
+        blocks |= (select(0u, 1u, hit.x) | select(0u, 2u, hit.y)) << (2u * row);
+    }
+    return blocks;
+}
+
+// Lists the splats of the batch that reach each block, in order. Returns their number, a multiple of four: the last may be
+// BATCH, which changes no pixel.
+fn queue_splats(thread: u32) -> u32 {
+    let block = thread / LANES;
+    let lane = thread % LANES;
+    let queue = block * BATCH;
+    var total = 0u;
+#ifdef SUBGROUPS_OF_32
+    for (var i = 0u; i < OWN_SPLATS; i++) {
+        let hit = ((reached[i * LANES + lane] >> block) & 1u) == 1u;
+        let hits = subgroupBallot(hit).x;
+        if hit {
+            queues[queue + total + countOneBits(hits & ((1u << lane) - 1u))] = i * LANES + lane;
+        }
+        total += countOneBits(hits);
+    }
+#else
+    var own = 0u;
+    for (var i = 0u; i < OWN_SPLATS; i++) {
+        own |= ((reached[i * LANES + lane] >> block) & 1u) << i;
+    }
+    queued_by[thread] = countOneBits(own);
+    workgroupBarrier();
+    var place = 0u;
+    for (var i = 0u; i < LANES; i++) {
+        place = select(place, total, i == lane);
+        total += queued_by[block * LANES + i];
+    }
+    for (var i = 0u; i < OWN_SPLATS; i++) {
+        if ((own >> i) & 1u) == 1u {
+            queues[queue + place] = lane * OWN_SPLATS + i;
+            place++;
+        }
+    }
+#endif
+    let end = (total + 3u) & ~3u;
+    if total + lane < end {
+        queues[queue + total + lane] = BATCH;
+    }
+    workgroupBarrier();
+    return end;
+}
+
+// Returns the alpha of a splat of the batch, as alpha_at does, with the conic scaled for exp2; 0 if it is skipped.
+fn batch_alpha(a: vec4<f32>, b: vec4<f32>, position: vec2<f32>) -> f32 {
+    let d = a.xy - position;
+    let exponent = (a.z * d.x + a.w * d.y) * d.x + (b.x * d.y * d.y + b.y);
+    let shows = exponent >= LOG2_ALPHA_MIN && exponent <= b.y;
+    return select(0.0, exp2(min(exponent, LOG2_ALPHA_MAX)), shows);
+}
+
+#ifdef DEPTHS
+// Blends four splats of the batch; those with alpha 0 are skipped.
+fn blend_four(pixel: ptr<function, Pixel>, alphas: vec4<f32>, four: vec4<u32>) {
+    let depths = vec4(batch_c[four.x].y, batch_c[four.y].y, batch_c[four.z].y, batch_c[four.w].y);
+    if any(depths > vec4((*pixel).limit)) {
+        for (var i = 0u; i < 4u; i++) {
+            if alphas[i] > 0.0 && !(*pixel).done {
+                if depths[i] > (*pixel).limit {
+                    pass_surfaces(pixel, depths[i]);
+                }
+                if !(*pixel).done {
+                    blend_splat(pixel, alphas[i], batch_color(four[i]), depths[i]);
+                }
+            }
+        }
+        return;
+    }
+    blend_or_skip(pixel, alphas.x, batch_color(four.x), depths.x);
+    blend_or_skip(pixel, alphas.y, batch_color(four.y), depths.y);
+    blend_or_skip(pixel, alphas.z, batch_color(four.z), depths.z);
+    blend_or_skip(pixel, alphas.w, batch_color(four.w), depths.w);
+}
+
+fn batch_color(i: u32) -> vec3<f32> {
+    return vec3(batch_b[i].zw, batch_c[i].x);
+}
+#else
+// Color blended so far and transmittance left: 0 once the pixel is opaque, with `opaque_at` what it was then.
+struct Sample {
+    color: vec3<f32>,
+    left: f32,
+    opaque_at: f32,
+}
+
+// Blends a splat; one with alpha 0 is skipped, and a pixel that is opaque stays as it is.
+fn blend_one(sample: ptr<function, Sample>, alpha: f32, color: vec3<f32>) {
+    let left = (*sample).left * (1.0 - alpha);
+    if is_opaque(left) {
+        (*sample).opaque_at = select((*sample).opaque_at, (*sample).left, (*sample).left > 0.0);
+        (*sample).left = 0.0;
+        return;
+    }
+    (*sample).color += color * (alpha * (*sample).left);
+    (*sample).left = left;
+}
+#endif
+
+@compute @workgroup_size(THREADS)
+#ifdef SUBGROUPS_OF_32
+fn blend_blocks(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(subgroup_id) subgroup: u32,
+    @builtin(subgroup_invocation_id) lane: u32,
+) {
+    let thread = LANES * subgroup + lane;
+#else
+fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+#endif
+    tile = group.xy;
+    if thread == 0u {
+        chosen = tile_ranges[tile.y * frame.tiles.x + tile.x];
+        atomicStore(&finished, 0u);
+        batch_a[BATCH] = vec4(0.0);
+        batch_b[BATCH] = vec4(0.0, -1e9, 0.0, 0.0);
+        batch_c[BATCH] = vec2(0.0);
+    }
+    let range = workgroupUniformLoad(&chosen);
+    let searching = range.x == NONE.x;
+    let end = range.y;
+
+    let block = thread / LANES;
+    let at = tile * TILE_SIZE + corner_of(block) + vec2(thread % 8u, thread % LANES / 8u);
+    let position = vec2<f32>(at);
+#ifdef DEPTHS
+    var pixel = begin_pixel(at);
+    var done = pixel.done;
+#else
+    var sample = Sample(vec3(0.0), 1.0, 0.0);
+    var done = any(at >= frame.size);
+#ifdef OPAQUE
+    let limit = surface_depth(at, !done);
+#endif
+#endif
+    if done {
+        atomicAdd(&finished, 1u);
+    }
+
+    // The last place that has been blended, for a search.
+    var lower = FIRST;
+    // The first pair of the batch. Threads without a splat of it have none of the next either.
+    var first = range.x;
+    let own = select(end, thread, thread < BATCH);
+    var next: SplatRecord;
+    if !searching {
+        next = load_pair(first + own, end);
+    }
+    var more = searching || first < end;
+    while more {
+        if searching {
+            lower = search_batch(lower, thread);
+            next = load_found(thread % BATCH);
+        }
+        if thread < BATCH {
+            put_in_batch(next, thread);
+        }
+        workgroupBarrier();
+        let queued = queue_splats(thread);
+        if searching {
+            more = any(lower != NONE);
+        } else {
+            first += BATCH;
+            more = first < end;
+            // Loaded while this batch is blended.
+            next = load_pair(first + own, end);
+        }
+        let queue = block * BATCH;
+        if !done {
+            for (var i = 0u; i < queued; i += 4u) {
+                // Four at a time: their exponentials do not wait for each other's blends.
+                let k = vec4(queues[queue + i], queues[queue + i + 1u], queues[queue + i + 2u], queues[queue + i + 3u]);
+                let b0 = batch_b[k.x];
+                let b1 = batch_b[k.y];
+                let b2 = batch_b[k.z];
+                let b3 = batch_b[k.w];
+                var alphas = vec4(
+                    batch_alpha(batch_a[k.x], b0, position),
+                    batch_alpha(batch_a[k.y], b1, position),
+                    batch_alpha(batch_a[k.z], b2, position),
+                    batch_alpha(batch_a[k.w], b3, position),
+                );
+#ifdef DEPTHS
+                blend_four(&pixel, alphas, k);
+#else
+                let c0 = vec3(b0.zw, batch_c[k.x].x);
+                let c1 = vec3(b1.zw, batch_c[k.y].x);
+                let c2 = vec3(b2.zw, batch_c[k.z].x);
+                let c3 = vec3(b3.zw, batch_c[k.w].x);
+#ifdef OPAQUE
+                // The surface hides what is behind it.
+                let depths = vec4(batch_c[k.x].y, batch_c[k.y].y, batch_c[k.z].y, batch_c[k.w].y);
+                alphas = select(alphas, vec4(0.0), depths > vec4(limit));
+#endif
+                let passed = 1.0 - alphas;
+                let after_two = sample.left * passed.x * passed.y;
+                let after_four = after_two * passed.z * passed.w;
+                if is_opaque(after_four) {
+                    blend_one(&sample, alphas.x, c0);
+                    blend_one(&sample, alphas.y, c1);
+                    blend_one(&sample, alphas.z, c2);
+                    blend_one(&sample, alphas.w, c3);
+                } else {
+                    sample.color += c0 * (alphas.x * sample.left);
+                    sample.color += c1 * (alphas.y * (sample.left * passed.x));
+                    sample.color += c2 * (alphas.z * after_two);
+                    sample.color += c3 * (alphas.w * (after_two * passed.z));
+                    sample.left = after_four;
+                }
+#endif
+            }
+#ifdef DEPTHS
+            done = pixel.done;
+#else
+            done = sample.left == 0.0;
+#endif
+            if done {
+                atomicAdd(&finished, 1u);
+            }
+        }
+        if workgroupUniformLoad(&finished) == THREADS {
+            more = false;
+        }
+    }
+#ifdef DEPTHS
+    finish_pixel(pixel, at);
+#else
+    if all(at < frame.size) {
+        let transmittance = select(sample.left, sample.opaque_at, sample.left == 0.0);
+#ifdef OPAQUE
+        write_color(sample.color, transmittance, limit == FAR, at);
+#else
+        write_color(sample.color, transmittance, true, at);
+#endif
+    }
+#endif
+}

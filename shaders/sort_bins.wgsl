@@ -1,0 +1,401 @@
+// sort_bins: sorts the splats of one bin by depth, one workgroup each: the second pass of the fast renderer.
+// In: the bins that `project_bin` filled, in no order. Out: the pairs of each tile in order of depth, then slot, and the range of each
+// tile; the counters of the next frame, cleared. If there is no room for the splats of a bin or for the pairs of its tiles, their
+// ranges are NONE: `blend_blocks` searches all splats instead.
+//
+// The list is sorted in workgroup memory: into buckets of equal width, then by rank in each bucket. A list that does not fit is
+// sorted in rounds, the nearest splats first.
+#import gs4d::types::{FrameUniforms, BIN_COUNTERS}
+#import gs4d::bins::{covers, is_after, FIRST, NONE, SLOT_MASK}
+
+// Splats that are sorted at once.
+#ifdef LONG_LISTS
+const THREADS: u32 = 512u;
+const LIST: u32 = 3072u;
+#else
+const THREADS: u32 = 256u;
+const LIST: u32 = 1024u;
+#endif
+const LANES: u32 = 32u;
+// Buckets of the sort, one for each thread.
+const BUCKETS: u32 = THREADS;
+
+@group(0) @binding(0) var<uniform> frame: FrameUniforms;
+@group(0) @binding(1) var<storage, read_write> bins: array<atomic<u32>>;
+@group(0) @binding(2) var<storage, read> bin_entries: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read_write> tile_ranges: array<vec2<u32>>;
+@group(0) @binding(4) var<storage, read_write> pair_splats: array<u32>;
+
+// The list, in no order.
+var<workgroup> keys: array<u32, LIST>;
+var<workgroup> words: array<u32, LIST>;
+// Low half: first the place of a splat in its bucket, then the index of the splat at this place of the order. High half:
+// the index of the splat at this place of all buckets.
+var<workgroup> places: array<atomic<u32>, LIST>;
+// Number of splats of each bucket, then its first place.
+var<workgroup> buckets: array<atomic<u32>, BUCKETS>;
+#ifndef SUBGROUPS_OF_32
+var<workgroup> sums: array<u32, THREADS>;
+#endif
+var<workgroup> group_sums: array<u32, THREADS / LANES>;
+var<workgroup> listed: atomic<u32>;
+var<workgroup> least: atomic<u32>;
+var<workgroup> greatest: atomic<u32>;
+var<workgroup> chosen: vec2<u32>;
+// Number of pairs of four tiles, two in each word, and the next pair of each.
+var<workgroup> totals: vec2<u32>;
+var<workgroup> next_pairs: array<vec4<u32>, 4>;
+
+// Lists entries `first` to `first + count` of the bin if `whole`, else those after `lower` and not after `upper`. Returns how
+// many there are; those that do not fit are not listed.
+fn collect(first: u32, count: u32, whole: bool, lower: vec2<u32>, upper: vec2<u32>, thread: u32) -> u32 {
+    workgroupBarrier();
+    if thread == 0u {
+        atomicStore(&listed, select(0u, count, whole));
+        atomicStore(&least, 0xffffffffu);
+        atomicStore(&greatest, 0u);
+    }
+    workgroupBarrier();
+    var low = 0xffffffffu;
+    var high = 0u;
+    for (var i = thread; i < count; i += THREADS) {
+        let entry = bin_entries[first + i];
+        let place = vec2(entry.x, entry.y & SLOT_MASK);
+        var at = i;
+        if !whole {
+            if !is_after(place, lower) || is_after(place, upper) {
+                continue;
+            }
+            at = atomicAdd(&listed, 1u);
+        }
+        low = min(low, entry.x);
+        high = max(high, entry.x);
+        if at < LIST {
+            keys[at] = entry.x;
+            words[at] = entry.y;
+        }
+    }
+#ifdef SUBGROUPS_OF_32
+    low = subgroupMin(low);
+    high = subgroupMax(high);
+    if thread % LANES == 0u {
+        atomicMin(&least, low);
+        atomicMax(&greatest, high);
+    }
+#else
+    atomicMin(&least, low);
+    atomicMax(&greatest, high);
+#endif
+    return workgroupUniformLoad(&listed);
+}
+
+// The last place up to which the entries after `lower` fit the list: at least one does, as no two have the same slot.
+fn fitting(first: u32, count: u32, lower: vec2<u32>, thread: u32) -> vec2<u32> {
+    var low = workgroupUniformLoad(&least);
+    var high = workgroupUniformLoad(&greatest);
+    // Where more splats than fit have one depth, they are told apart by slot.
+    var by_slot = false;
+    var key = 0u;
+    loop {
+        let shift = max(32u - countLeadingZeros(high - low), 8u) - 8u;
+        if thread < 256u {
+            atomicStore(&buckets[thread], 0u);
+        }
+        workgroupBarrier();
+        for (var i = thread; i < count; i += THREADS) {
+            let entry = bin_entries[first + i];
+            let place = vec2(entry.x, entry.y & SLOT_MASK);
+            if is_after(place, lower) && (!by_slot || place.x == key) {
+                let value = select(place.x, place.y, by_slot);
+                if value >= low && value <= high {
+                    atomicAdd(&buckets[(value - low) >> shift], 1u);
+                }
+            }
+        }
+        workgroupBarrier();
+        if thread == 0u {
+            var sum = 0u;
+            var bucket = 0u;
+            for (; bucket < 256u; bucket++) {
+                let next = sum + atomicLoad(&buckets[bucket]);
+                if next > LIST {
+                    break;
+                }
+                sum = next;
+            }
+            chosen = vec2(bucket, sum);
+        }
+        let found = workgroupUniformLoad(&chosen);
+        let start = low + (found.x << shift);
+        if found.y > 0u {
+            let last = select(start - 1u, high, found.x >= 256u || start - 1u > high || start == 0u);
+            if by_slot {
+                return vec2(key, last);
+            }
+            return vec2(last, 0xffffffffu);
+        }
+        if shift == 0u {
+            by_slot = true;
+            key = start;
+            low = 0u;
+            high = 0xfffffffeu;
+        } else {
+            low = start;
+            high = min(high, start + ((1u << shift) - 1u));
+        }
+    }
+    return NONE;
+}
+
+// Returns the sum of the values of all threads before this one. Two numbers below 65536 in one value do not disturb each other.
+fn sum_before(value: u32, thread: u32) -> u32 {
+    var sum = 0u;
+#ifdef SUBGROUPS_OF_32
+    sum = subgroupExclusiveAdd(value);
+    workgroupBarrier();
+    if thread % LANES == LANES - 1u {
+        group_sums[thread / LANES] = sum + value;
+    }
+    workgroupBarrier();
+    for (var i = 0u; i < THREADS / LANES; i++) {
+        sum += select(0u, group_sums[i], i < thread / LANES);
+    }
+#else
+    workgroupBarrier();
+    sums[thread] = value;
+    workgroupBarrier();
+    if thread < THREADS / LANES {
+        var group = 0u;
+        for (var i = 0u; i < LANES; i++) {
+            group += sums[LANES * thread + i];
+        }
+        group_sums[thread] = group;
+    }
+    workgroupBarrier();
+    for (var i = 0u; i < THREADS / LANES; i++) {
+        sum += select(0u, group_sums[i], i < thread / LANES);
+    }
+    for (var i = 0u; i < LANES; i++) {
+        sum += select(0u, sums[thread / LANES * LANES + i], i < thread % LANES);
+    }
+#endif
+    return sum;
+}
+
+// Replaces the numbers of the buckets by their first places.
+fn scan_buckets(thread: u32) {
+    let place = sum_before(atomicLoad(&buckets[thread]), thread);
+    atomicStore(&buckets[thread], place);
+    workgroupBarrier();
+}
+
+// Sorts the first `count` of the list: the low half of `places` becomes their indices.
+fn sort_list(count: u32, thread: u32) {
+    atomicStore(&buckets[thread], 0u);
+    let low = workgroupUniformLoad(&least);
+    let scale = f32(BUCKETS - 1u) / max(f32(workgroupUniformLoad(&greatest) - low), 1.0);
+    for (var i = thread; i < count; i += THREADS) {
+        let bucket = u32(f32(keys[i] - low) * scale);
+        atomicStore(&places[i], atomicAdd(&buckets[bucket], 1u));
+    }
+    workgroupBarrier();
+    scan_buckets(thread);
+    for (var i = thread; i < count; i += THREADS) {
+        let bucket = u32(f32(keys[i] - low) * scale);
+        let place = atomicLoad(&buckets[bucket]) + (atomicLoad(&places[i]) & 0xffffu);
+        atomicOr(&places[place], i << 16u);
+    }
+    workgroupBarrier();
+    for (var i = thread; i < count; i += THREADS) {
+        let word = words[i];
+        let own = vec2(keys[i], word & SLOT_MASK);
+        let bucket = u32(f32(own.x - low) * scale);
+        let first = atomicLoad(&buckets[bucket]);
+        var end = count;
+        if bucket + 1u < BUCKETS {
+            end = atomicLoad(&buckets[bucket + 1u]);
+        }
+        var place = first;
+        for (var k = first; k < end; k++) {
+            let other = atomicLoad(&places[k]) >> 16u;
+            place += select(0u, 1u, is_after(own, vec2(keys[other], words[other] & SLOT_MASK)));
+        }
+        // Only this thread changes this half.
+        atomicXor(&places[place], (atomicLoad(&places[place]) & 0xffffu) ^ i);
+    }
+    workgroupBarrier();
+}
+
+// Returns the number of tiles along each side of a bin.
+fn side() -> u32 {
+    return frame.binning.x & 0xffu;
+}
+
+// Returns a tile of a bin; they are numbered row by row.
+fn tile_in_bin(number: u32) -> vec2<u32> {
+    return vec2(number % side(), number / side());
+}
+
+// Returns which of four tiles from `number` on an entry covers, 0 or 1.
+fn covered(word: u32, number: u32) -> vec4<u32> {
+    let hit = vec4(
+        covers(word, tile_in_bin(number)),
+        covers(word, tile_in_bin(number + 1u)),
+        covers(word, tile_in_bin(number + 2u)),
+        covers(word, tile_in_bin(number + 3u)),
+    );
+    return select(vec4(0u), vec4(1u), hit);
+}
+
+fn halves(four: vec4<u32>) -> vec2<u32> {
+    return four.xz | (four.yw << vec2(16u));
+}
+
+fn whole(two: vec2<u32>) -> vec4<u32> {
+    return vec4(two.x & 0xffffu, two.x >> 16u, two.y & 0xffffu, two.y >> 16u);
+}
+
+// Returns the sums of four small numbers over all threads before this one, and over all threads in `totals`.
+fn sums_before(four: vec4<u32>, thread: u32) -> vec4<u32> {
+    let two = halves(four);
+    let before = vec2(sum_before(two.x, thread), sum_before(two.y, thread));
+    if thread == THREADS - 1u {
+        totals = before + two;
+    }
+    return whole(before);
+}
+
+// Reserves room for pairs of four tiles from `number` on, of the bin with the first tile `corner`, and writes their ranges.
+fn reserve(counts: vec4<u32>, corner: vec2<u32>, number: u32) {
+    let before = vec4(0u, counts.x, counts.x + counts.y, counts.x + counts.y + counts.z);
+    let total = before.w + counts.w;
+    let first = atomicAdd(&bins[frame.binning.z + 3u], total);
+    let fits = first + total <= frame.pair_capacity;
+    let firsts = first + before;
+    for (var i = 0u; i < 4u; i++) {
+        write_range(corner, number + i, select(NONE, vec2(firsts[i], firsts[i] + counts[i]), fits));
+    }
+    next_pairs[number / 4u] = select(vec4(NONE.x), firsts, fits);
+}
+
+fn write_range(corner: vec2<u32>, number: u32, range: vec2<u32>) {
+    let tile = corner + tile_in_bin(number);
+    if all(tile < frame.tiles) {
+        tile_ranges[tile.y * frame.tiles.x + tile.x] = range;
+    }
+}
+
+// Writes the pairs of the sorted list of all tiles of a bin, after reserving room for them if there is none.
+fn write_pairs(count: u32, corner: vec2<u32>, reserved: bool, thread: u32) {
+    let each = (count + THREADS - 1u) / THREADS;
+    let first = min(thread * each, count);
+    let end = min(first + each, count);
+    for (var number = 0u; number < side() * side(); number += 4u) {
+        var own = vec4(0u);
+        for (var i = first; i < end; i++) {
+            own += covered(words[atomicLoad(&places[i]) & 0xffffu], number);
+        }
+        let before = sums_before(own, thread);
+        workgroupBarrier();
+        if !reserved && thread == 0u {
+            reserve(whole(totals), corner, number);
+        }
+        workgroupBarrier();
+        let firsts = next_pairs[number / 4u];
+        if firsts.x != NONE.x {
+            var pairs = firsts + before;
+            for (var i = first; i < end; i++) {
+                let word = words[atomicLoad(&places[i]) & 0xffffu];
+                let hit = covered(word, number);
+                for (var k = 0u; k < 4u; k++) {
+                    if hit[k] == 1u {
+                        pair_splats[pairs[k]] = word & SLOT_MASK;
+                    }
+                }
+                pairs += hit;
+            }
+        }
+        workgroupBarrier();
+        if thread == 0u && firsts.x != NONE.x {
+            next_pairs[number / 4u] = firsts + whole(totals);
+        }
+    }
+}
+
+// Reserves room for the pairs of all entries of a bin.
+fn reserve_all(first: u32, count: u32, corner: vec2<u32>, thread: u32) {
+    for (var number = 0u; number < side() * side(); number += 4u) {
+        var counts = vec4(0u);
+        // As many as the halves of words have room for.
+        for (var begin = 0u; begin < count; begin += 32768u) {
+            var own = vec4(0u);
+            for (var i = begin + thread; i < min(count, begin + 32768u); i += THREADS) {
+                own += covered(bin_entries[first + i].y, number);
+            }
+            sums_before(own, thread);
+            workgroupBarrier();
+            counts += whole(totals);
+            workgroupBarrier();
+        }
+        if thread == 0u {
+            reserve(counts, corner, number);
+        }
+    }
+    workgroupBarrier();
+}
+
+@compute @workgroup_size(THREADS)
+#ifdef SUBGROUPS_OF_32
+fn sort_bins(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(subgroup_id) subgroup: u32,
+    @builtin(subgroup_invocation_id) lane: u32,
+) {
+    let thread = LANES * subgroup + lane;
+#else
+fn sort_bins(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+#endif
+    let capacity = frame.binning.y;
+    let counters = frame.binning.z;
+    let bin = group.y * ((frame.tiles.x + side() - 1u) / side()) + group.x;
+    if thread == 0u {
+        let binned = atomicLoad(&bins[counters + BIN_COUNTERS + bin]);
+        chosen = vec2(binned, 0u);
+        atomicMax(&bins[counters + 2u], binned);
+        atomicStore(&bins[frame.binning.w + BIN_COUNTERS + bin], 0u);
+        if bin == 0u {
+            for (var i = 0u; i < BIN_COUNTERS; i++) {
+                atomicStore(&bins[frame.binning.w + i], 0u);
+            }
+        }
+    }
+    let binned = workgroupUniformLoad(&chosen).x;
+    let corner = side() * group.xy;
+    if binned == 0u || binned > capacity {
+        if thread < side() * side() {
+            write_range(corner, thread, select(NONE, vec2(0u), binned == 0u));
+        }
+        return;
+    }
+    let first = bin * capacity;
+    if binned <= LIST {
+        sort_list(collect(first, binned, true, FIRST, NONE, thread), thread);
+        write_pairs(binned, corner, false, thread);
+        return;
+    }
+    reserve_all(first, binned, corner, thread);
+    // The last place that has been sorted, and the number of entries up to there.
+    var lower = FIRST;
+    var done = 0u;
+    while done < binned {
+        var upper = NONE;
+        if collect(first, binned, false, lower, NONE, thread) > LIST {
+            upper = fitting(first, binned, lower, thread);
+        }
+        let count = collect(first, binned, false, lower, upper, thread);
+        sort_list(count, thread);
+        write_pairs(count, corner, true, thread);
+        done += count;
+        lower = upper;
+    }
+}

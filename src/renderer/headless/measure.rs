@@ -1,0 +1,179 @@
+//! How fast a capture is drawn.
+//!
+//! In: a capture and views of it. Out: [`Timings`]. GPU times are measured while several frames are recorded for each submit and the host
+//! does not wait, as a GPU that is idle between frames lowers its clock.
+
+use super::{Headless, instance};
+use crate::renderer::active::ActiveList;
+use crate::renderer::timing::{PassTime, PassTimer, Timings, median};
+use crate::renderer::{GpuCapture, GpuContext, GpuError, ViewParameters, ViewRenderer};
+use crate::view::{Background, Counts, View};
+use std::time::{Duration, Instant};
+
+/// Frames that are recorded for each submit, each with buffers of its own.
+const FRAMES_PER_SUBMIT: usize = 4;
+
+/// How long frames are drawn before any is measured: a GPU takes part of a second to raise its clocks.
+const WARM_UP: Duration = Duration::from_millis(600);
+
+/// Everything that one of the frames of a submit needs for itself.
+struct Lane {
+    view: ViewRenderer,
+    active: Option<ActiveList>,
+    timer: Option<PassTimer>,
+}
+
+impl Headless {
+    /// Measures frames over the views given, in turn, `frames` of each kind after a warm-up.
+    ///
+    /// # Panics
+    /// If there are frames to measure but no views.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render).
+    pub fn time(&mut self, capture: &GpuCapture, views: &[View], frames: usize) -> Result<Timings, GpuError> {
+        let parameters = &ViewParameters { depths: self.depths, ..black() };
+        let mut counts = Vec::new();
+        // The warm-up also finds room for the pairs of every view.
+        for view in views {
+            let active = self.take_active(capture, view.time);
+            let frame = self.render_all(&[instance(capture, active.as_ref(), view)], parameters);
+            self.active = active;
+            counts.push(frame?.counts);
+        }
+        let mut lanes: Vec<Lane> = (0..FRAMES_PER_SUBMIT).map(|_| self.lane(capture)).collect();
+        let start = Instant::now();
+        while frames > 0 && start.elapsed() < WARM_UP {
+            self.run(&mut lanes, capture, views, views.len().max(2 * FRAMES_PER_SUBMIT), None)?;
+        }
+        let untimed = self.run(&mut lanes, capture, views, frames, None)?;
+        let around = self.run(&mut lanes, capture, views, frames, Some(&[]))?;
+        let passes = self.view.design().timed_passes();
+        let inside = self.run(&mut lanes, capture, views, frames, Some(passes))?;
+        let mut alone = Vec::new();
+        for i in 0..frames {
+            let start = Instant::now();
+            self.record_frame(&mut lanes[0], capture, &views[i % views.len()], None)?;
+            self.wait()?;
+            alone.push(start.elapsed().as_secs_f64() * 1e3);
+        }
+        let middle = |value: fn(&Counts) -> u32| median(counts.iter().map(|c| f64::from(value(c))).collect()) as u32;
+        let pass = |at: usize| median(inside.frames.iter().filter_map(|times| times.get(at).copied()).collect());
+        Ok(Timings {
+            passes: (0..passes.len())
+                .filter(|_| !inside.frames.is_empty())
+                .map(|at| PassTime { name: passes[at], milliseconds: pass(at) })
+                .collect(),
+            frame_milliseconds: (!around.frames.is_empty())
+                .then(|| median(around.frames.iter().map(|times| times[0]).collect())),
+            wall_milliseconds: median(alone),
+            pipelined_milliseconds: untimed.wall_milliseconds,
+            encode_milliseconds: untimed.encode_milliseconds,
+            bytes: self.view.statistics().bytes,
+            counts: Counts { visible: middle(|c| c.visible), pairs: middle(|c| c.pairs) },
+            frames,
+        })
+    }
+
+    fn lane(&self, capture: &GpuCapture) -> Lane {
+        let device = &self.context.device;
+        let mut view = ViewRenderer::new(device, &self.renderer);
+        view.set_design(self.view.design());
+        // Room for what the warm-up counted.
+        view.make_room(self.view.pair_capacity());
+        let filtered = self.filtered.then(|| ActiveList::new(device, &self.renderer, capture));
+        Lane { view, active: filtered.flatten(), timer: None }
+    }
+
+    /// Draws frames without waiting, if passes are given with timestamps: after each of them, or around frames if there are none.
+    fn run(
+        &self,
+        lanes: &mut [Lane],
+        capture: &GpuCapture,
+        views: &[View],
+        frames: usize,
+        passes: Option<&'static [&'static str]>,
+    ) -> Result<Run, GpuError> {
+        let GpuContext { device, queue, .. } = &self.context;
+        for lane in &mut *lanes {
+            lane.timer = passes.and_then(|passes| PassTimer::new(self.allocator(), queue, passes));
+        }
+        let each = lanes[0].timer.as_ref().map_or(0, |timer| timer.resolved().size());
+        let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
+        let all = self.allocator().buffer("gs4d timestamps", (each * frames as u64).max(8), usage);
+        let start = Instant::now();
+        let mut encode = 0.0;
+        for first in (0..frames).step_by(lanes.len()) {
+            let begin = Instant::now();
+            let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gs4d") });
+            for (i, lane) in (first..frames).zip(&mut *lanes) {
+                let place = lane.timer.is_some().then_some((&all, each * i as u64));
+                self.encode(lane, capture, &views[i % views.len()], &mut encoder, place)?;
+            }
+            let commands = encoder.finish();
+            encode += begin.elapsed().as_secs_f64() * 1e3;
+            queue.submit([commands]);
+        }
+        self.wait()?;
+        let wall_milliseconds = start.elapsed().as_secs_f64() * 1e3 / frames.max(1) as f64;
+        let mut times = Vec::new();
+        if let (Some(timer), 1..) = (&lanes[0].timer, frames) {
+            let timestamps = self.copy_out(&all, each * frames as u64)?;
+            times.extend(timestamps.chunks_exact(each as usize).map(|frame| timer.intervals(frame)));
+        }
+        Ok(Run { frames: times, wall_milliseconds, encode_milliseconds: encode / frames.max(1) as f64 })
+    }
+
+    /// Draws one frame in a submit of its own.
+    fn record_frame(
+        &self,
+        lane: &mut Lane,
+        capture: &GpuCapture,
+        view: &View,
+        timestamps: Option<(&wgpu::Buffer, u64)>,
+    ) -> Result<(), GpuError> {
+        let GpuContext { device, queue, .. } = &self.context;
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gs4d") });
+        self.encode(lane, capture, view, &mut encoder, timestamps)?;
+        queue.submit([encoder.finish()]);
+        Ok(())
+    }
+
+    /// Records one frame; its timestamps are copied to the given place.
+    fn encode(
+        &self,
+        lane: &mut Lane,
+        capture: &GpuCapture,
+        view: &View,
+        encoder: &mut wgpu::CommandEncoder,
+        timestamps: Option<(&wgpu::Buffer, u64)>,
+    ) -> Result<(), GpuError> {
+        let GpuContext { device, queue, .. } = &self.context;
+        let parameters = ViewParameters { depths: self.depths, ..black() };
+        if let Some(active) = &mut lane.active {
+            self.activate(active, queue, capture, view.time);
+        }
+        let instances = [instance(capture, lane.active.as_ref(), view)];
+        lane.view.prepare(device, queue, &self.renderer, &instances, &parameters)?;
+        lane.view.record_timed(&self.renderer, encoder, &instances, timestamps.and(lane.timer.as_ref()));
+        if let (Some(timer), Some((to, at))) = (&lane.timer, timestamps) {
+            timer.resolve(encoder);
+            encoder.copy_buffer_to_buffer(timer.resolved(), 0, to, at, timer.resolved().size());
+        }
+        Ok(())
+    }
+}
+
+/// Frames that were drawn without waiting.
+struct Run {
+    /// Milliseconds of each frame, or of each of its passes; empty if the device has no such timestamps.
+    frames: Vec<Vec<f64>>,
+    /// Wall-clock time of a frame.
+    wall_milliseconds: f64,
+    /// CPU time in which a frame is prepared and recorded.
+    encode_milliseconds: f64,
+}
+
+fn black() -> ViewParameters<'static> {
+    ViewParameters { background: Background::Color([0.0; 3]), ..ViewParameters::default() }
+}
