@@ -65,7 +65,8 @@ fn benchmarks_measure() {
     let row = &json["rows"][0];
     assert_eq!((&row["views"], &row["timings"]["frames"]), (&4.into(), &3.into()), "two views at two times");
     assert!(row["timings"]["wall_milliseconds"].as_f64().is_some_and(|ms| ms > 0.0), "frames take time");
-    let ways = ["--renderer", "fast,reference", "--filter", "on,off", "--form", "stored,fp32", "--rounds", "2", "--json"];
+    let ways =
+        ["--renderer", "fast,reference", "--filter", "on,off", "--form", "stored,fp32", "--rounds", "2", "--json"];
     let json = bench(&ways).json();
     let rows = json["rows"].as_array().expect("rows");
     assert_eq!(rows.len(), 8, "every way");
