@@ -57,6 +57,11 @@ const OWN_BINS: u32 = 2048u;
 var<workgroup> own: array<atomic<u32>, 2048>;
 var<workgroup> own_visible: atomic<u32>;
 var<workgroup> own_pairs: atomic<u32>;
+// What the colors of the visible splats need, without gaps: index and slot; the point that is seen, and tau.
+var<workgroup> seen_splats: array<vec2<u32>, 256>;
+var<workgroup> seen_points: array<vec4<f32>, 256>;
+// Those of the splat that project_one made.
+var<private> seen_point: vec4<f32>;
 // Tiles of the splat that project_one made, first and last + 1, and its depth.
 var<private> covered: vec4<u32>;
 var<private> covered_depth: f32;
@@ -89,7 +94,9 @@ fn project_bin(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invo
         if project_one(index, slot) == INVISIBLE {
             covered = vec4(0u);
         } else {
-            atomicAdd(&own_visible, 1u);
+            let place = atomicAdd(&own_visible, 1u);
+            seen_splats[place] = vec2(index, slot);
+            seen_points[place] = seen_point;
             atomicAdd(&own_pairs, (covered.z - covered.x) * (covered.w - covered.y));
             key = depth_order(covered_depth);
         }
@@ -113,6 +120,12 @@ fn project_bin(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invo
         if many > 0u {
             atomicStore(&own[i], atomicAdd(&bins[first_bin + i], many));
         }
+    }
+    // The colors are a task of the first threads, so that none waits for those without a splat.
+    if thread < atomicLoad(&own_visible) && instance.debug < DEBUG_ACTIVE {
+        let own_splat = seen_splats[thread];
+        let point = seen_points[thread];
+        splats[own_splat.y].color = seen_color(own_splat.x, point.xyz, point.w);
     }
     workgroupBarrier();
     for (var y = low.y; y < high.y; y++) {
@@ -239,30 +252,37 @@ fn project_one(index: u32, slot: u32) -> u32 {
     if instance.displaced != 0u {
         seen = mean.xyz;
     }
-    var splat: SplatRecord;
-    splat.center = center;
-    splat.opacity = opacity;
-    splat.depth = q.z;
-    splat.conic = vec3(c, -b, a) / det;
+    splats[slot].center = center;
+    splats[slot].opacity = opacity;
+    splats[slot].depth = q.z;
+    splats[slot].conic = vec3(c, -b, a) / det;
     if instance.debug >= DEBUG_ACTIVE {
-        splat.color = debug_color(g, absent);
+        splats[slot].color = debug_color(g, absent);
     } else {
-        var direction = instance.camera_position;
-        if !parallel {
-            direction = normalize(seen - instance.camera_position);
-        }
-        splat.color = lit(color(index, direction, -dt), instance.lighting, instance.light);
+#ifdef BINNED
+        seen_point = vec4(seen, -dt);
+#else
+        splats[slot].color = seen_color(index, seen, -dt);
+#endif
     }
     var words = pack_tiles(tiles);
 #ifdef BINNED
     words |= stamp(instance.binning.x >> 8u);
 #endif
-    splat.tiles_low = words.x;
-    splat.tiles_high = words.y;
-    splats[slot] = splat;
+    splats[slot].tiles_low = words.x;
+    splats[slot].tiles_high = words.y;
     // Positive floats have the same order as their bits. Depths are taken from the near plane of an orthographic
     // camera, which may be behind it.
     return bitcast<u32>(select(q.z, q.z - instance.near, parallel));
+}
+
+// Returns the color of a Gaussian seen at a point, in the blend space.
+fn seen_color(index: u32, seen: vec3<f32>, tau: f32) -> vec3<f32> {
+    var direction = instance.camera_position;
+    if instance.orthographic == 0u {
+        direction = normalize(seen - instance.camera_position);
+    }
+    return lit(color(index, direction, tau), instance.lighting, instance.light);
 }
 
 fn debug_color(g: Gaussian, absent: bool) -> vec3<f32> {
