@@ -21,6 +21,7 @@ use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::playback::{ClipFade, Playback};
 use bevy_gs4d::reference::{self, Layer};
 use bevy_gs4d::render::{CaptureSettings, CaptureStatistics, CaptureViewSettings, CropBox, DepthWrite};
+use bevy_gs4d::renderer::Design;
 use bevy_gs4d::scene::{Environment, RuntimeScene, Sliced};
 use bevy_gs4d::testing::{self, Offscreen};
 use bevy_gs4d::view::srgb::{decode, encode};
@@ -174,6 +175,29 @@ fn blend_spaces_are_those_of_the_twin_on_every_kind_of_target() {
         let mut linear = expected(decode(clear), BlendSpace::Linear);
         linear.pixels.iter_mut().for_each(|pixel| *pixel = encode(*pixel));
         check(&mut app, &linear, &format!("linear, {target}"));
+    }
+}
+
+#[test]
+fn every_design_draws_the_same_among_meshes() {
+    for (msaa, depth) in [
+        (Msaa::Off, DepthWrite::None),
+        (Msaa::Sample4, DepthWrite::None),
+        (Msaa::Off, DepthWrite::Median),
+        (Msaa::Sample4, DepthWrite::Expected),
+    ] {
+        let Some(mut app) = app(SIZE) else { return };
+        spawn(&mut app, &crowd(), ());
+        spawn_box(&mut app, Vec3::splat(0.3), Vec3::ZERO, Color::srgb(0.1, 0.6, 0.2), AlphaMode::Opaque);
+        let camera = spawn_camera(&mut app, msaa, eye());
+        let mut drawn = |design| {
+            insert(&mut app, camera, CaptureViewSettings { design, depth, ..default() });
+            picture(&mut app, 0.0)
+        };
+        let [reference, fast, again] = [Design::Reference, Design::Fast, Design::Reference].map(&mut drawn);
+        let apart = difference_between(&fast, &reference);
+        assert!(apart <= 1, "{msaa:?}, {depth:?}: {apart} of 255 apart");
+        assert_eq!(difference_between(&again, &reference), 0, "{msaa:?}, {depth:?}: and back");
     }
 }
 

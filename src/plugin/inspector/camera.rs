@@ -14,6 +14,7 @@ pub(super) fn show(ui: &mut egui::Ui, settings: CaptureViewSettings) -> CaptureV
     choice(ui, "debug view", &mut edited.debug);
     choice(ui, "blend space", &mut edited.blend_space);
     choice(ui, "written depth", &mut edited.depth);
+    choice(ui, "renderer", &mut edited.design);
     edited
 }
 

@@ -4,6 +4,7 @@
 
 use crate::plugin::playback::Repeat;
 use crate::plugin::render::DepthWrite;
+use crate::renderer::Design;
 use crate::view::{BlendSpace, DebugView};
 use bevy::core_pipeline::tonemapping::Tonemapping;
 
@@ -40,6 +41,17 @@ impl Listed for DebugView {
             Self::Active => "active",
             Self::Lifespan => "lifespan (Σ_t)",
             Self::Velocity => "velocity",
+        }
+    }
+}
+
+impl Listed for Design {
+    const ALL: &'static [Self] = &[Self::Fast, Self::Reference];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Reference => "reference",
         }
     }
 }

@@ -7,7 +7,7 @@ use super::composite::CompositeBindings;
 use super::upload::GpuGaussianCapture;
 use super::write_depth::WriteDepthBindings;
 use crate::plugin::component::GaussianCapture;
-use crate::renderer::{Instance, Renderer, ViewRenderer};
+use crate::renderer::{Design, Instance, Renderer, ViewRenderer};
 use crate::view::{Appearance, View};
 use bevy::asset::AssetId;
 use bevy::ecs::entity::Entity;
@@ -114,6 +114,12 @@ impl CaptureView {
             self.bindings.forget();
             self.depth_bindings.forget();
         }
+    }
+
+    /// Sets how captures are drawn. The renderer no longer measures after a change.
+    pub(super) fn set_design(&mut self, design: Design) {
+        self.measured &= self.renderer.design() == design;
+        self.renderer.set_design(design);
     }
 
     /// Starts or stops measuring GPU times.

@@ -1,7 +1,8 @@
-//! Reflection for the enums of [`crate::view`], which does not use Bevy.
+//! Reflection for the enums of [`crate::view`] and [`crate::renderer`], which do not use Bevy.
 //!
-//! In: [`BlendSpace`] and [`DebugView`]. Out: `Reflect` for both, so that components with them can be saved, inspected and animated.
+//! In: [`BlendSpace`], [`DebugView`] and [`Design`]. Out: `Reflect` for each, so that components with them can be saved, inspected and animated.
 
+use crate::renderer::Design;
 use crate::view::{BlendSpace, DebugView};
 use bevy::reflect::impl_reflect;
 use bevy::reflect::std_traits::ReflectDefault;
@@ -25,6 +26,15 @@ impl_reflect!(
         Active,
         Lifespan,
         Velocity,
+    }
+);
+
+impl_reflect!(
+    #[reflect(Default, Debug, Clone, PartialEq, Hash)]
+    #[type_path = "bevy_gs4d::renderer"]
+    enum Design {
+        Fast,
+        Reference,
     }
 );
 

@@ -2,6 +2,7 @@
 //!
 //! In: fields that any system or animation may set. Out: an [`Appearance`] for the renderer, and the settings of a camera.
 
+use crate::renderer::Design;
 use crate::view::{Appearance, BlendSpace, DebugView};
 use bevy::color::LinearRgba;
 use bevy::ecs::component::Component;
@@ -96,6 +97,9 @@ pub struct CaptureViewSettings {
     /// Whether captures are drawn after transparent meshes even without multisampling. Cameras with Bevy's atmosphere need it, because the
     /// atmosphere is drawn between opaque and transparent meshes and cannot be ordered against captures. Default: false.
     pub late: bool,
+    /// How captures are drawn; every design draws the same picture. [`Design::Fast`] is several times as fast on large GPUs and slower on
+    /// software drivers. Default: [`Design::Reference`].
+    pub design: Design,
 }
 
 /// Which depth of captures is written to the camera's depth buffer, at pixels where they hide more than half of the background.

@@ -3,7 +3,6 @@
 //! In: the size of a picture and the number of pairs of splats and tiles to have room for. Out: [`FastResources`], the
 //! counters and entries of bins of a few tiles, and the bind groups of the passes over them.
 
-use super::resources::Sizes;
 use super::{Instance, ViewRenderer};
 use crate::renderer::layout::BIN_COUNTERS;
 use crate::renderer::memory::Allocator;
@@ -62,15 +61,16 @@ impl ViewRenderer {
         &self,
         renderer: &Renderer,
         allocator: &Allocator<'_>,
-        sizes: &Sizes,
+        picture: UVec2,
+        pairs: u32,
         instance: wgpu::BindingResource<'_>,
         [splats, tile_ranges, pair_splats]: [&wgpu::Buffer; 3],
     ) -> FastResources {
-        let grid = bin_grid(sizes.picture);
+        let grid = bin_grid(picture);
         let count = u64::from(grid.x * grid.y);
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
         let bins = allocator.buffer("gs4d bins", 2 * 4 * (count + u64::from(BIN_COUNTERS)), usage);
-        let size = 8 * count * u64::from(bin_capacity(sizes.picture, sizes.pairs));
+        let size = 8 * count * u64::from(bin_capacity(picture, pairs));
         let entries = allocator.buffer("gs4d bin entries", size, BufferUsages::STORAGE);
         let (counters, entries) = (bins.as_entire_binding(), entries.as_entire_binding());
         let layouts = &renderer.layouts;

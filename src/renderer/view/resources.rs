@@ -145,7 +145,7 @@ impl ViewRenderer {
         });
         let fast = (self.design == Design::Fast).then(|| {
             let buffers = [&splats, &tile_ranges, &pair_splats[sorted]];
-            self.make_fast(renderer, &allocator, &sizes, instance.clone(), buffers)
+            self.make_fast(renderer, &allocator, size, pairs, instance.clone(), buffers)
         });
         Resources {
             sizes,
