@@ -10,10 +10,12 @@ use super::progress::Bars;
 use super::report::{Report, switches_json};
 use super::table::{Table, lines};
 use crate::offline::dataset::Split;
+use crate::offline::engine::Engine;
 use crate::offline::evaluation::evaluate_scene;
 use crate::offline::metrics::{Evaluation, ImageMetrics, MetricSet, ViewMetrics, side_by_side};
 use crate::offline::splits::{SPLIT_NAMES, share, split_name};
 use crate::offline::{OfflineError, write_png};
+use crate::renderer::Design;
 use crate::scene::TemporalFilter;
 use crate::view::{Background, Picture};
 use clap::ValueEnum;
@@ -58,6 +60,9 @@ pub struct Eval {
     /// What differences are multiplied by in those pictures.
     #[arg(long, value_name = "FACTOR", default_value = "5", value_parser = values::positive)]
     gain: f32,
+    /// How views are drawn on a GPU; every renderer draws the same picture.
+    #[arg(long, value_name = "RENDERER", default_value = "reference", value_parser = values::one_of(&Design::NAMES))]
+    renderer: Design,
     #[command(flatten)]
     engine: EngineArgs,
     #[command(flatten)]
@@ -104,6 +109,9 @@ impl Eval {
         let background = self.checkpoint.background.map_or(scene.trained_background(), Background::Color);
         let metrics = metric_set(&self.metrics);
         let mut engine = self.engine.open()?;
+        if let Engine::Gpu(headless) = &mut engine {
+            headless.set_design(self.renderer);
+        }
 
         let start = Instant::now();
         let seen = |view: &ViewMetrics, reference: &Picture, render: &Picture| -> Result<(), OfflineError> {

@@ -63,7 +63,8 @@ fn workgroup_memory_is_within_the_limits_that_are_asked_for() {
     let blending = Blending::ALL.map(|blending| ("blend_blocks", blending.definitions(), 16 * 1024));
     let large = [("blend_blocks", [LARGE_BATCHES, Blending::All.definitions()].concat(), 32 * 1024)];
     let large = large.iter().map(|(name, definitions, limit)| (*name, &definitions[..], *limit));
-    let sorting = [("sort_bins", &[][..], 16 * 1024), ("sort_bins", LONG_LISTS, 48 * 1024)];
+    let sorting =
+        [("project", BINNED, 16 * 1024), ("sort_bins", &[][..], 16 * 1024), ("sort_bins", LONG_LISTS, 48 * 1024)];
     for (name, definitions, limit) in blending.into_iter().chain(large).chain(sorting) {
         let module = compose(name, definitions).expect("the pass composes");
         let shared = module.global_variables.iter().filter(|(_, v)| v.space == AddressSpace::WorkGroup);

@@ -1,6 +1,6 @@
 //! The bins of the fast renderer.
 //!
-//! In: the size of a picture and the number of pairs of splats and tiles to have room for. Out: [`FastResources`], the
+//! In: the size of a picture and the number of splats in all bins to have room for. Out: [`FastResources`], the
 //! counters and entries of bins of a few tiles, and the bind groups of the passes over them.
 
 use super::{Instance, ViewRenderer};
@@ -50,19 +50,19 @@ pub(super) fn large_batches(limits: &wgpu::Limits, instances: &[Instance<'_>]) -
 }
 
 /// Returns the number of splats that each bin has room for.
-pub(super) fn bin_capacity(picture: UVec2, pairs: u32) -> u32 {
+pub(super) fn bin_capacity(picture: UVec2, entries: u32) -> u32 {
     let grid = bin_grid(picture);
-    (pairs / (grid.x * grid.y)).max(256)
+    (entries / (grid.x * grid.y)).max(256)
 }
 
 impl ViewRenderer {
-    /// Creates bins, with room for as many splats in all of them as there is for pairs.
+    /// Creates bins, with room for that many splats in all of them together.
     pub(super) fn make_fast(
         &self,
         renderer: &Renderer,
         allocator: &Allocator<'_>,
         picture: UVec2,
-        pairs: u32,
+        entries: u32,
         instance: wgpu::BindingResource<'_>,
         [splats, tile_ranges, pair_splats]: [&wgpu::Buffer; 3],
     ) -> FastResources {
@@ -70,7 +70,7 @@ impl ViewRenderer {
         let count = u64::from(grid.x * grid.y);
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
         let bins = allocator.buffer("gs4d bins", 2 * 4 * (count + u64::from(BIN_COUNTERS)), usage);
-        let size = 8 * count * u64::from(bin_capacity(picture, pairs));
+        let size = 8 * count * u64::from(bin_capacity(picture, entries));
         let entries = allocator.buffer("gs4d bin entries", size, BufferUsages::STORAGE);
         let (counters, entries) = (bins.as_entire_binding(), entries.as_entire_binding());
         let layouts = &renderer.layouts;

@@ -37,7 +37,7 @@ impl ViewRenderer {
         let counters = [self.odd, !self.odd].map(|odd| self.first_counter(sizes, odd));
         // Never 0, which is the stamp of a new buffer.
         let frame = self.frames % 0xffff + 1;
-        [bin_side(sizes.picture) | (frame << 8), bin_capacity(sizes.picture, sizes.pairs), counters[0], counters[1]]
+        [bin_side(sizes.picture) | (frame << 8), bin_capacity(sizes.picture, sizes.entries), counters[0], counters[1]]
     }
 
     /// Records the passes of the fast design.

@@ -96,6 +96,9 @@ pub struct ViewRenderer {
     has_depths: bool,
     /// Number of pairs for which an earlier frame wanted room.
     pairs_wanted: u32,
+    /// Number of splats for which all bins of the fast design would have room if each had as much as an earlier frame's
+    /// fullest bin.
+    entries_wanted: u32,
     /// Number of successive frames for which the buffers have been far too large.
     oversized_frames: u32,
     frame: wgpu::Buffer,
@@ -171,6 +174,7 @@ impl ViewRenderer {
             frames: 0,
             recorded: false,
             pairs_wanted: 0,
+            entries_wanted: 0,
             oversized_frames: 0,
             frame: allocator.buffer("gs4d frame", size_of::<layout::FrameUniforms>() as u64, BufferUsages::UNIFORM),
             steps: allocator.buffer("gs4d steps", u64::from(alignment * 2 * DEPTH_STEPS), BufferUsages::UNIFORM),
@@ -236,13 +240,20 @@ impl ViewRenderer {
         }
         let slots = slots as u32;
         // Two pairs for each Gaussian are a first guess; the counters of later frames correct it.
-        let pairs = self
-            .pairs_wanted
-            .max(slots.saturating_mul(2))
-            .max(1 << 16)
-            .min(max_pairs(device) / if self.design == Design::Fast { 2 } else { 1 });
-        let needed =
-            Sizes { slots: slots.next_multiple_of(BLOCK).max(BLOCK), pairs, parts: (parts as u32).max(1), picture };
+        let (guess, most) = (slots.saturating_mul(2).max(1 << 16), max_pairs(device));
+        let pairs = self.pairs_wanted.max(guess).min(most);
+        let entries = match self.design {
+            // Twice as many bytes as for pairs.
+            Design::Fast => self.entries_wanted.max(guess).min(most / 2),
+            Design::Reference => 0,
+        };
+        let needed = Sizes {
+            slots: slots.next_multiple_of(BLOCK).max(BLOCK),
+            pairs,
+            entries,
+            parts: (parts as u32).max(1),
+            picture,
+        };
         let sizes = self.kept_sizes(made, needed);
         let environment = instances.iter().find_map(|i| Some((i, i.capture.environment.as_ref()?)));
         let opaque = parameters.opaque.filter(|opaque| opaque.samples > 0);
@@ -359,28 +370,28 @@ impl ViewRenderer {
     pub fn release(&mut self) {
         self.resources = None;
         self.pairs_wanted = 0;
+        self.entries_wanted = 0;
         self.statistics = ViewStatistics::default();
     }
 
     /// Returns the sizes to allocate. Sizes grow from frame to frame, but buffers that have been far too large for a
     /// while are reduced.
     fn kept_sizes(&mut self, made: Sizes, needed: Sizes) -> Sizes {
-        let counted = match self.design {
-            Design::Fast => self.pairs_wanted,
-            Design::Reference => self.statistics.pairs.saturating_add(self.statistics.pairs / 2),
-        }
-        .max(1 << 16);
+        let counted = self.statistics.pairs.saturating_add(self.statistics.pairs / 2).max(1 << 16);
+        let guess = needed.slots.saturating_mul(2);
         let oversized = made.slots / OVERSIZE_FACTOR > needed.slots
-            || made.pairs / OVERSIZE_FACTOR > needed.slots.saturating_mul(2).max(counted);
+            || made.pairs / OVERSIZE_FACTOR > guess.max(counted)
+            || made.entries / OVERSIZE_FACTOR > needed.entries;
         self.oversized_frames = if oversized { self.oversized_frames + 1 } else { 0 };
         if self.oversized_frames > RELEASE_AFTER_IDLE_FRAMES {
             self.oversized_frames = 0;
             self.pairs_wanted = counted;
-            return Sizes { pairs: needed.slots.saturating_mul(2).max(counted), ..needed };
+            return Sizes { pairs: guess.max(counted), ..needed };
         }
         Sizes {
             slots: made.slots.max(needed.slots),
             pairs: made.pairs.max(needed.pairs),
+            entries: made.entries.max(needed.entries),
             parts: made.parts.max(needed.parts),
             picture: needed.picture,
         }
@@ -394,8 +405,14 @@ impl ViewRenderer {
             self.statistics.pairs = counters.pairs;
             let wanted = match self.design {
                 Design::Fast => {
-                    let grid = bins::bin_grid(self.resources.as_ref().map_or(UVec2::ONE, |made| made.sizes.picture));
-                    counters.pairs_wanted.saturating_mul(grid.x * grid.y).max(counters.pairs)
+                    let sizes = self.resources.as_ref().map(|made| made.sizes).unwrap_or_default();
+                    let bins = bins::bin_grid(sizes.picture.max(UVec2::ONE)).element_product();
+                    let entries = counters.pairs_wanted.saturating_mul(bins);
+                    // It falls again, so that the buffers can be reduced, but not by what makes them grow soon after.
+                    if entries > sizes.entries / 4 * 3 || self.entries_wanted / OVERSIZE_FACTOR > entries {
+                        self.entries_wanted = entries.saturating_add(entries / 2);
+                    }
+                    counters.pairs
                 }
                 Design::Reference => counters.pairs_wanted,
             };

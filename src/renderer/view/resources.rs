@@ -64,6 +64,8 @@ pub struct PassBuffers {
 pub(super) struct Sizes {
     pub slots: u32,
     pub pairs: u32,
+    /// Splats in all bins of the fast design together.
+    pub entries: u32,
     /// Instance uniforms.
     pub parts: u32,
     /// Size of the picture, pixels.
@@ -81,7 +83,7 @@ impl ViewRenderer {
         opaque: wgpu::TextureView,
         environment: wgpu::Buffer,
     ) -> Resources {
-        let Sizes { slots, pairs, parts, picture: size } = sizes;
+        let Sizes { slots, pairs, entries, parts, picture: size } = sizes;
         let allocator = renderer.allocator(device);
         let bytes = Cell::new(0);
         let fast = self.design == Design::Fast;
@@ -145,7 +147,7 @@ impl ViewRenderer {
         });
         let fast = (self.design == Design::Fast).then(|| {
             let buffers = [&splats, &tile_ranges, &pair_splats[sorted]];
-            self.make_fast(renderer, &allocator, size, pairs, instance.clone(), buffers)
+            self.make_fast(renderer, &allocator, size, entries, instance.clone(), buffers)
         });
         Resources {
             sizes,
