@@ -7,6 +7,7 @@
 // nearest ones of each batch instead, which gives the same picture.
 #import gs4d::types::SplatRecord
 #import gs4d::bins::{depth_order, is_after, stamp, FIRST, NONE, STAMP_MASK}
+#import gs4d::nearest::{begin_search, clear_intervals, count_candidate, next_search}
 #import gs4d::alpha::is_opaque
 #ifdef DEPTHS
 #import gs4d::pixel::{Pixel, begin_pixel, blend_or_skip, blend_splat, finish_pixel, frame, pass_surfaces}
@@ -50,14 +51,13 @@ var<workgroup> queues: array<u32, BLOCKS * BATCH>;
 var<workgroup> queued_by: array<u32, THREADS>;
 #endif
 var<workgroup> finished: atomic<u32>;
-// What is found in all splats: depth keys, slots, numbers of splats in intervals of keys.
+// What is found in all splats: depth keys, slots.
 var<workgroup> keys: array<u32, BATCH>;
 var<workgroup> slots: array<u32, BATCH>;
-var<workgroup> intervals: array<atomic<u32>, 256>;
 var<workgroup> listed: atomic<u32>;
 var<workgroup> least: atomic<u32>;
 var<workgroup> greatest: atomic<u32>;
-var<workgroup> chosen: vec2<u32>;
+var<workgroup> own_range: vec2<u32>;
 
 var<private> tile: vec2<u32>;
 
@@ -100,59 +100,20 @@ fn search(lower: vec2<u32>, upper: vec2<u32>, thread: u32) -> u32 {
     return workgroupUniformLoad(&listed);
 }
 
-// The last place up to which the splats after `lower` fit a batch: at least one does, as no two have the same slot.
-fn fitting(lower: vec2<u32>, thread: u32) -> vec2<u32> {
-    var low = workgroupUniformLoad(&least);
-    var high = workgroupUniformLoad(&greatest);
-    // Where more splats than fit have one depth, they are told apart by slot.
-    var by_slot = false;
-    var key = 0u;
-    loop {
-        let shift = max(32u - countLeadingZeros(high - low), 8u) - 8u;
-        atomicStore(&intervals[thread], 0u);
-        workgroupBarrier();
+// The last place up to which the splats of this tile after `lower` fit a batch.
+fn last_fitting(lower: vec2<u32>, thread: u32) -> vec2<u32> {
+    var nearest = begin_search(lower, workgroupUniformLoad(&least), workgroupUniformLoad(&greatest));
+    while !nearest.found {
+        clear_intervals(thread);
         for (var i = thread; i < frame.slots; i += THREADS) {
             let found = splat_of_tile(i);
-            if found.y != NONE.y && is_after(found, lower) && (!by_slot || found.x == key) {
-                let value = select(found.x, found.y, by_slot);
-                if value >= low && value <= high {
-                    atomicAdd(&intervals[(value - low) >> shift], 1u);
-                }
+            if found.y != NONE.y {
+                count_candidate(nearest, found);
             }
         }
-        workgroupBarrier();
-        if thread == 0u {
-            var sum = 0u;
-            var count = 0u;
-            for (; count < 256u; count++) {
-                let next = sum + atomicLoad(&intervals[count]);
-                if next > BATCH {
-                    break;
-                }
-                sum = next;
-            }
-            chosen = vec2(count, sum);
-        }
-        let found = workgroupUniformLoad(&chosen);
-        let start = low + (found.x << shift);
-        if found.y > 0u {
-            let last = select(start - 1u, high, found.x >= 256u || start - 1u > high || start == 0u);
-            if by_slot {
-                return vec2(key, last);
-            }
-            return vec2(last, 0xffffffffu);
-        }
-        if shift == 0u {
-            by_slot = true;
-            key = start;
-            low = 0u;
-            high = 0xfffffffeu;
-        } else {
-            low = start;
-            high = min(high, start + ((1u << shift) - 1u));
-        }
+        nearest = next_search(nearest, BATCH, thread);
     }
-    return NONE;
+    return nearest.last;
 }
 
 // Lists the nearest splats of this tile after `lower` that fit a batch, in order. Returns their last place; NONE after the
@@ -160,7 +121,7 @@ fn fitting(lower: vec2<u32>, thread: u32) -> vec2<u32> {
 fn search_batch(lower: vec2<u32>, thread: u32) -> vec2<u32> {
     var upper = NONE;
     if search(lower, NONE, thread) > BATCH {
-        upper = fitting(lower, thread);
+        upper = last_fitting(lower, thread);
     }
     let count = search(lower, upper, thread);
     var own = NONE;
@@ -369,13 +330,13 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
 #endif
     tile = group.xy;
     if thread == 0u {
-        chosen = tile_ranges[tile.y * frame.tiles.x + tile.x];
+        own_range = tile_ranges[tile.y * frame.tiles.x + tile.x];
         atomicStore(&finished, 0u);
         batch_a[BATCH] = vec4(0.0);
         batch_b[BATCH] = vec4(0.0, -1e9, 0.0, 0.0);
         batch_c[BATCH] = vec2(0.0);
     }
-    let range = workgroupUniformLoad(&chosen);
+    let range = workgroupUniformLoad(&own_range);
     let searching = range.x == NONE.x;
     let end = range.y;
 

@@ -7,6 +7,7 @@
 // sorted in rounds, the nearest splats first.
 #import gs4d::types::{FrameUniforms, BIN_COUNTERS}
 #import gs4d::bins::{covers, is_after, FIRST, NONE, SLOT_MASK}
+#import gs4d::nearest::{begin_search, clear_intervals, count_candidate, next_search}
 
 // Splats that are sorted at once.
 #ifdef LONG_LISTS
@@ -41,7 +42,7 @@ var<workgroup> group_sums: array<u32, THREADS / LANES>;
 var<workgroup> listed: atomic<u32>;
 var<workgroup> least: atomic<u32>;
 var<workgroup> greatest: atomic<u32>;
-var<workgroup> chosen: vec2<u32>;
+var<workgroup> own_count: u32;
 // Number of pairs of four tiles, two in each word, and the next pair of each.
 var<workgroup> totals: vec2<u32>;
 var<workgroup> next_pairs: array<vec4<u32>, 4>;
@@ -89,62 +90,18 @@ fn collect(first: u32, count: u32, whole: bool, lower: vec2<u32>, upper: vec2<u3
     return workgroupUniformLoad(&listed);
 }
 
-// The last place up to which the entries after `lower` fit the list: at least one does, as no two have the same slot.
-fn fitting(first: u32, count: u32, lower: vec2<u32>, thread: u32) -> vec2<u32> {
-    var low = workgroupUniformLoad(&least);
-    var high = workgroupUniformLoad(&greatest);
-    // Where more splats than fit have one depth, they are told apart by slot.
-    var by_slot = false;
-    var key = 0u;
-    loop {
-        let shift = max(32u - countLeadingZeros(high - low), 8u) - 8u;
-        if thread < 256u {
-            atomicStore(&buckets[thread], 0u);
-        }
-        workgroupBarrier();
+// The last place up to which the entries of a bin after `lower` fit the list.
+fn last_fitting(first: u32, count: u32, lower: vec2<u32>, thread: u32) -> vec2<u32> {
+    var search = begin_search(lower, workgroupUniformLoad(&least), workgroupUniformLoad(&greatest));
+    while !search.found {
+        clear_intervals(thread);
         for (var i = thread; i < count; i += THREADS) {
             let entry = bin_entries[first + i];
-            let place = vec2(entry.x, entry.y & SLOT_MASK);
-            if is_after(place, lower) && (!by_slot || place.x == key) {
-                let value = select(place.x, place.y, by_slot);
-                if value >= low && value <= high {
-                    atomicAdd(&buckets[(value - low) >> shift], 1u);
-                }
-            }
+            count_candidate(search, vec2(entry.x, entry.y & SLOT_MASK));
         }
-        workgroupBarrier();
-        if thread == 0u {
-            var sum = 0u;
-            var bucket = 0u;
-            for (; bucket < 256u; bucket++) {
-                let next = sum + atomicLoad(&buckets[bucket]);
-                if next > LIST {
-                    break;
-                }
-                sum = next;
-            }
-            chosen = vec2(bucket, sum);
-        }
-        let found = workgroupUniformLoad(&chosen);
-        let start = low + (found.x << shift);
-        if found.y > 0u {
-            let last = select(start - 1u, high, found.x >= 256u || start - 1u > high || start == 0u);
-            if by_slot {
-                return vec2(key, last);
-            }
-            return vec2(last, 0xffffffffu);
-        }
-        if shift == 0u {
-            by_slot = true;
-            key = start;
-            low = 0u;
-            high = 0xfffffffeu;
-        } else {
-            low = start;
-            high = min(high, start + ((1u << shift) - 1u));
-        }
+        search = next_search(search, LIST, thread);
     }
-    return NONE;
+    return search.last;
 }
 
 // Returns the sum of the values of all threads before this one. Two numbers below 65536 in one value do not disturb each other.
@@ -360,7 +317,7 @@ fn sort_bins(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     let bin = group.y * ((frame.tiles.x + side() - 1u) / side()) + group.x;
     if thread == 0u {
         let binned = atomicLoad(&bins[counters + BIN_COUNTERS + bin]);
-        chosen = vec2(binned, 0u);
+        own_count = binned;
         atomicMax(&bins[counters + 2u], binned);
         atomicStore(&bins[frame.binning.w + BIN_COUNTERS + bin], 0u);
         if bin == 0u {
@@ -369,7 +326,7 @@ fn sort_bins(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
             }
         }
     }
-    let binned = workgroupUniformLoad(&chosen).x;
+    let binned = workgroupUniformLoad(&own_count);
     let corner = side() * group.xy;
     if binned == 0u || binned > capacity {
         if thread < side() * side() {
@@ -390,7 +347,7 @@ fn sort_bins(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     while done < binned {
         var upper = NONE;
         if collect(first, binned, false, lower, NONE, thread) > LIST {
-            upper = fitting(first, binned, lower, thread);
+            upper = last_fitting(first, binned, lower, thread);
         }
         let count = collect(first, binned, false, lower, upper, thread);
         sort_list(count, thread);

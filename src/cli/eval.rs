@@ -3,7 +3,7 @@
 //! In: a scene, a split with its images. Out: the metrics of every view and their means; with `--out` a picture for
 //! each view: reference, render, amplified difference.
 
-use super::args::{CheckpointArgs, EngineArgs, SplitArgs, values};
+use super::args::{CheckpointArgs, DesignArgs, EngineArgs, SplitArgs, values};
 use super::failure::Failure;
 use super::interrupt;
 use super::progress::Bars;
@@ -15,7 +15,6 @@ use crate::offline::evaluation::evaluate_scene;
 use crate::offline::metrics::{Evaluation, ImageMetrics, MetricSet, ViewMetrics, side_by_side};
 use crate::offline::splits::{SPLIT_NAMES, share, split_name};
 use crate::offline::{OfflineError, write_png};
-use crate::renderer::Design;
 use crate::scene::TemporalFilter;
 use crate::view::{Background, Picture};
 use clap::ValueEnum;
@@ -60,9 +59,8 @@ pub struct Eval {
     /// What differences are multiplied by in those pictures.
     #[arg(long, value_name = "FACTOR", default_value = "5", value_parser = values::positive)]
     gain: f32,
-    /// How views are drawn on a GPU; every renderer draws the same picture.
-    #[arg(long, value_name = "RENDERER", default_value = "reference", value_parser = values::one_of(&Design::NAMES))]
-    renderer: Design,
+    #[command(flatten)]
+    design: DesignArgs,
     #[command(flatten)]
     engine: EngineArgs,
     #[command(flatten)]
@@ -110,7 +108,7 @@ impl Eval {
         let metrics = metric_set(&self.metrics);
         let mut engine = self.engine.open()?;
         if let Engine::Gpu(headless) = &mut engine {
-            headless.set_design(self.renderer);
+            headless.set_design(self.design.renderer);
         }
 
         let start = Instant::now();

@@ -20,6 +20,7 @@ const LIBRARIES: &[(&str, &str)] = &[
     ("scan", include_str!("../../shaders/shared/scan.wgsl")),
     ("environment", include_str!("../../shaders/shared/environment.wgsl")),
     ("bins", include_str!("../../shaders/shared/bins.wgsl")),
+    ("nearest", include_str!("../../shaders/shared/nearest.wgsl")),
     ("pixel", include_str!("../../shaders/shared/pixel.wgsl")),
 ];
 

@@ -27,12 +27,19 @@ impl EngineArgs {
     }
 }
 
+/// How views are drawn.
+#[derive(clap::Args)]
+pub struct DesignArgs {
+    /// How views are drawn on a GPU; both draw the same picture.
+    #[arg(long, value_name = "RENDERER", default_value = "reference", value_parser = values::one_of(&Design::NAMES))]
+    pub renderer: Design,
+}
+
 /// How views are drawn, and where.
 #[derive(clap::Args)]
 pub struct RendererArgs {
-    /// How views are drawn; both draw the same picture.
-    #[arg(long, value_name = "RENDERER", default_value = "reference", value_parser = values::one_of(&Design::NAMES))]
-    renderer: Design,
+    #[command(flatten)]
+    design: DesignArgs,
     #[command(flatten)]
     gpu: GpuArgs,
 }
@@ -65,7 +72,7 @@ impl RendererArgs {
     /// No such adapter, or one that cannot run the passes.
     pub fn open(&self) -> Result<Headless, GpuError> {
         let mut headless = self.gpu.settings().open()?;
-        headless.set_design(self.renderer);
+        headless.set_design(self.design.renderer);
         Ok(headless)
     }
 }

@@ -12,7 +12,7 @@ mod views;
 
 pub use checkpoint::{CheckpointArgs, is_package};
 pub use data::{DataArgs, SplitArgs};
-pub use engine::{EngineArgs, RendererArgs, RenderersArgs};
+pub use engine::{DesignArgs, EngineArgs, RendererArgs, RenderersArgs};
 pub use package::{PackageArgs, file_size};
 pub use scoring::{ScoringArgs, score_choice};
 pub use views::ViewArgs;

@@ -32,7 +32,7 @@ impl Headless {
     /// # Errors
     /// As [`render`](Self::render).
     pub fn time(&mut self, capture: &GpuCapture, views: &[View], frames: usize) -> Result<Timings, GpuError> {
-        let parameters = &ViewParameters { depths: self.depths, ..black() };
+        let parameters = &self.measured();
         let mut counts = Vec::new();
         // The warm-up also finds room for the pairs of every view.
         for view in views {
@@ -53,7 +53,7 @@ impl Headless {
         let mut alone = Vec::new();
         for i in 0..frames {
             let start = Instant::now();
-            self.record_frame(&mut lanes[0], capture, &views[i % views.len()], None)?;
+            self.submit_frame(&mut lanes[0], capture, &views[i % views.len()])?;
             self.wait()?;
             alone.push(start.elapsed().as_secs_f64() * 1e3);
         }
@@ -73,6 +73,11 @@ impl Headless {
             counts: Counts { visible: middle(|c| c.visible), pairs: middle(|c| c.pairs) },
             frames,
         })
+    }
+
+    /// Returns how the frames are drawn.
+    fn measured(&self) -> ViewParameters<'static> {
+        ViewParameters { background: Background::Color([0.0; 3]), depths: self.depths, ..ViewParameters::default() }
     }
 
     fn lane(&self, capture: &GpuCapture) -> Lane {
@@ -125,16 +130,10 @@ impl Headless {
     }
 
     /// Draws one frame in a submit of its own.
-    fn record_frame(
-        &self,
-        lane: &mut Lane,
-        capture: &GpuCapture,
-        view: &View,
-        timestamps: Option<(&wgpu::Buffer, u64)>,
-    ) -> Result<(), GpuError> {
+    fn submit_frame(&self, lane: &mut Lane, capture: &GpuCapture, view: &View) -> Result<(), GpuError> {
         let GpuContext { device, queue, .. } = &self.context;
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gs4d") });
-        self.encode(lane, capture, view, &mut encoder, timestamps)?;
+        self.encode(lane, capture, view, &mut encoder, None)?;
         queue.submit([encoder.finish()]);
         Ok(())
     }
@@ -149,7 +148,7 @@ impl Headless {
         timestamps: Option<(&wgpu::Buffer, u64)>,
     ) -> Result<(), GpuError> {
         let GpuContext { device, queue, .. } = &self.context;
-        let parameters = ViewParameters { depths: self.depths, ..black() };
+        let parameters = self.measured();
         if let Some(active) = &mut lane.active {
             self.activate(active, queue, capture, view.time);
         }
@@ -172,8 +171,4 @@ struct Run {
     wall_milliseconds: f64,
     /// CPU time in which a frame is prepared and recorded.
     encode_milliseconds: f64,
-}
-
-fn black() -> ViewParameters<'static> {
-    ViewParameters { background: Background::Color([0.0; 3]), ..ViewParameters::default() }
 }
