@@ -402,6 +402,9 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
                 );
 #ifdef DEPTHS
                 blend_four(&pixel, alphas, k);
+                if pixel.done {
+                    break;
+                }
 #else
                 let c0 = vec3(b0.zw, batch_c[k.x].x);
                 let c1 = vec3(b1.zw, batch_c[k.y].x);
@@ -420,6 +423,9 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
                     blend_one(&sample, alphas.y, c1);
                     blend_one(&sample, alphas.z, c2);
                     blend_one(&sample, alphas.w, c3);
+                    if sample.left == 0.0 {
+                        break;
+                    }
                 } else {
                     sample.color += c0 * (alphas.x * sample.left);
                     sample.color += c1 * (alphas.y * (sample.left * passed.x));

@@ -53,10 +53,17 @@ const FRUSTUM_CLAMP: f32 = 1.3;
 #ifdef BINNED
 // Bins that a workgroup counts by itself before it reserves places for all of its splats at once.
 const OWN_BINS: u32 = 2048u;
+// Bins into which a thread puts its splat by itself.
+const OWN_ENTRIES: u32 = 16u;
+const WIDE: u32 = 64u;
 
 var<workgroup> own: array<atomic<u32>, 2048>;
 var<workgroup> own_visible: atomic<u32>;
 var<workgroup> own_pairs: atomic<u32>;
+// Splats of more bins than OWN_ENTRIES, which all threads put into bins together: as far as there is room for them, tiles, depth key
+// and slot.
+var<workgroup> wide: array<vec4<u32>, WIDE>;
+var<workgroup> wide_count: atomic<u32>;
 // What the colors of the visible splats need, without gaps: index and slot; the point that is seen, and tau.
 var<workgroup> seen_splats: array<vec2<u32>, 256>;
 var<workgroup> seen_points: array<vec4<f32>, 256>;
@@ -66,12 +73,43 @@ var<private> seen_point: vec4<f32>;
 var<private> covered: vec4<u32>;
 var<private> covered_depth: f32;
 
+// Returns the number of tiles along each side of a bin.
+fn side() -> u32 {
+    return instance.binning.x & 0xffu;
+}
+
+// Returns the number of bins across and down the picture.
+fn bin_grid() -> vec2<u32> {
+    return (instance.tiles + side() - 1u) / side();
+}
+
+// Returns the first bin and the last + 1 of a rectangle of tiles.
+fn bins_of(tiles: vec4<u32>) -> vec4<u32> {
+    return vec4(tiles.xy, tiles.zw + side() - 1u) / side();
+}
+
+// Puts a splat into one of its bins: into its place among those of the workgroup if they have been counted, else of all.
+fn put_in_bin(x: u32, y: u32, tiles: vec4<u32>, key: u32, slot: u32, by_group: bool) {
+    let bin = y * bin_grid().x + x;
+    let capacity = instance.binning.y;
+    var place = 0u;
+    if by_group {
+        place = atomicAdd(&own[bin], 1u);
+    } else {
+        place = atomicAdd(&bins[instance.binning.z + BIN_COUNTERS + bin], 1u);
+    }
+    if place < capacity {
+        let corner = side() * vec2(x, y);
+        let first = max(tiles.xy, corner) - corner;
+        let last = min(tiles.zw, corner + side()) - 1u - corner;
+        bin_entries[bin * capacity + place] = vec2(key, entry_word(slot, first, last));
+    }
+}
+
 @compute @workgroup_size(256)
 fn project_bin(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
-    let side = instance.binning.x & 0xffu;
-    let capacity = instance.binning.y;
     let first_bin = instance.binning.z + BIN_COUNTERS;
-    let grid = (instance.tiles + side - 1u) / side;
+    let grid = bin_grid();
     let across = grid.x;
     let count = grid.x * grid.y;
     let by_group = count <= OWN_BINS;
@@ -81,6 +119,7 @@ fn project_bin(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invo
     if thread == 0u {
         atomicStore(&own_visible, 0u);
         atomicStore(&own_pairs, 0u);
+        atomicStore(&wide_count, 0u);
     }
     workgroupBarrier();
     covered = vec4(0u);
@@ -101,16 +140,31 @@ fn project_bin(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invo
             key = depth_order(covered_depth);
         }
     }
-    let low = covered.xy / side;
-    let high = (covered.zw + side - 1u) / side;
+    var own_bins = bins_of(covered);
+    if (own_bins.z - own_bins.x) * (own_bins.w - own_bins.y) > OWN_ENTRIES {
+        let place = atomicAdd(&wide_count, 1u);
+        if place < WIDE {
+            wide[place] = vec4(covered.xy | (covered.zw << vec2(16u)), key, slot);
+            own_bins = vec4(0u);
+        }
+    }
     if by_group {
-        for (var y = low.y; y < high.y; y++) {
-            for (var x = low.x; x < high.x; x++) {
+        for (var y = own_bins.y; y < own_bins.w; y++) {
+            for (var x = own_bins.x; x < own_bins.z; x++) {
                 atomicAdd(&own[y * across + x], 1u);
             }
         }
     }
-    workgroupBarrier();
+    let wide_ones = min(workgroupUniformLoad(&wide_count), WIDE);
+    if by_group && wide_ones > 0u {
+        for (var i = 0u; i < wide_ones; i++) {
+            let b = bins_of(vec4(wide[i].xy & vec2(0xffffu), wide[i].xy >> vec2(16u)));
+            for (var k = thread; k < (b.z - b.x) * (b.w - b.y); k += 256u) {
+                atomicAdd(&own[(b.y + k / (b.z - b.x)) * across + b.x + k % (b.z - b.x)], 1u);
+            }
+        }
+        workgroupBarrier();
+    }
     if thread == 0u {
         atomicAdd(&bins[instance.binning.z], atomicLoad(&own_visible));
         atomicAdd(&bins[instance.binning.z + 1u], atomicLoad(&own_pairs));
@@ -128,21 +182,17 @@ fn project_bin(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invo
         splats[own_splat.y].color = seen_color(own_splat.x, point.xyz, point.w);
     }
     workgroupBarrier();
-    for (var y = low.y; y < high.y; y++) {
-        for (var x = low.x; x < high.x; x++) {
-            let bin = y * across + x;
-            var place = 0u;
-            if by_group {
-                place = atomicAdd(&own[bin], 1u);
-            } else {
-                place = atomicAdd(&bins[first_bin + bin], 1u);
-            }
-            if place < capacity {
-                let corner = side * vec2(x, y);
-                let first = max(covered.xy, corner) - corner;
-                let last = min(covered.zw, corner + side) - 1u - corner;
-                bin_entries[bin * capacity + place] = vec2(key, entry_word(slot, first, last));
-            }
+    for (var y = own_bins.y; y < own_bins.w; y++) {
+        for (var x = own_bins.x; x < own_bins.z; x++) {
+            put_in_bin(x, y, covered, key, slot, by_group);
+        }
+    }
+    for (var i = 0u; i < wide_ones; i++) {
+        let splat = wide[i];
+        let tiles = vec4(splat.xy & vec2(0xffffu), splat.xy >> vec2(16u));
+        let b = bins_of(tiles);
+        for (var k = thread; k < (b.z - b.x) * (b.w - b.y); k += 256u) {
+            put_in_bin(b.x + k % (b.z - b.x), b.y + k / (b.z - b.x), tiles, splat.z, splat.w, by_group);
         }
     }
 }

@@ -3,8 +3,9 @@
 // tile; the counters of the next frame, cleared. If there is no room for the splats of a bin or for the pairs of its tiles, their
 // ranges are NONE: `blend_blocks` searches all splats instead.
 //
-// The list is sorted in workgroup memory: into buckets of equal width, then by rank in each bucket. A list that does not fit is
-// sorted in rounds, the nearest splats first.
+// The list is sorted in workgroup memory: into buckets, then by rank in each bucket. Most depths of a bin may be close together, so
+// the splats are counted in steps of equal width first, and the buckets are chosen so that each has about as many splats. A list
+// that does not fit is sorted in rounds of half as many splats, the nearest first.
 #import gs4d::types::{FrameUniforms, BIN_COUNTERS}
 #import gs4d::bins::{covers, is_after, FIRST, NONE, SLOT_MASK}
 #import gs4d::nearest::{begin_search, clear_intervals, count_candidate, next_search}
@@ -12,13 +13,18 @@
 // Splats that are sorted at once.
 #ifdef LONG_LISTS
 const THREADS: u32 = 512u;
-const LIST: u32 = 3072u;
+const LIST: u32 = 5120u;
+#else ifdef MEDIUM_LISTS
+const THREADS: u32 = 512u;
+const LIST: u32 = 2304u;
 #else
 const THREADS: u32 = 256u;
-const LIST: u32 = 1024u;
+const LIST: u32 = 1280u;
 #endif
+// Splats of one round.
+const ROUND: u32 = LIST / 2u;
 const LANES: u32 = 32u;
-// Buckets of the sort, one for each thread.
+// Steps and buckets of the sort, one for each thread.
 const BUCKETS: u32 = THREADS;
 
 @group(0) @binding(0) var<uniform> frame: FrameUniforms;
@@ -27,14 +33,16 @@ const BUCKETS: u32 = THREADS;
 @group(0) @binding(3) var<storage, read_write> tile_ranges: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read_write> pair_splats: array<u32>;
 
-// The list, in no order.
-var<workgroup> keys: array<u32, LIST>;
-var<workgroup> words: array<u32, LIST>;
-// Low half: first the place of a splat in its bucket, then the index of the splat at this place of the order. High half:
-// the index of the splat at this place of all buckets.
+// First the depth keys of the list, in no order, and in rounds the second words of its entries from ROUND on; then the second
+// words, in order.
+var<workgroup> list: array<u32, LIST>;
+// Low half: first the place of a splat in its bucket, then its place in the order. High half: the index of the splat at this
+// place of all buckets.
 var<workgroup> places: array<atomic<u32>, LIST>;
+// Number of splats of each step, then of those before it.
+var<workgroup> steps: array<atomic<u32>, BUCKETS + 1u>;
 // Number of splats of each bucket, then its first place.
-var<workgroup> buckets: array<atomic<u32>, BUCKETS>;
+var<workgroup> buckets: array<atomic<u32>, BUCKETS + 1u>;
 #ifndef SUBGROUPS_OF_32
 var<workgroup> sums: array<u32, THREADS>;
 #endif
@@ -48,7 +56,7 @@ var<workgroup> totals: vec2<u32>;
 var<workgroup> next_pairs: array<vec4<u32>, 4>;
 
 // Lists entries `first` to `first + count` of the bin if `whole`, else those after `lower` and not after `upper`. Returns how
-// many there are; those that do not fit are not listed.
+// many there are; those that do not fit a round are not listed.
 fn collect(first: u32, count: u32, whole: bool, lower: vec2<u32>, upper: vec2<u32>, thread: u32) -> u32 {
     workgroupBarrier();
     if thread == 0u {
@@ -71,9 +79,11 @@ fn collect(first: u32, count: u32, whole: bool, lower: vec2<u32>, upper: vec2<u3
         }
         low = min(low, entry.x);
         high = max(high, entry.x);
-        if at < LIST {
-            keys[at] = entry.x;
-            words[at] = entry.y;
+        if whole {
+            list[at] = entry.x;
+        } else if at < ROUND {
+            list[at] = entry.x;
+            list[ROUND + at] = entry.y;
         }
     }
 #ifdef SUBGROUPS_OF_32
@@ -90,7 +100,7 @@ fn collect(first: u32, count: u32, whole: bool, lower: vec2<u32>, upper: vec2<u3
     return workgroupUniformLoad(&listed);
 }
 
-// The last place up to which the entries of a bin after `lower` fit the list.
+// The last place up to which the entries of a bin after `lower` fit a round.
 fn last_fitting(first: u32, count: u32, lower: vec2<u32>, thread: u32) -> vec2<u32> {
     var search = begin_search(lower, workgroupUniformLoad(&least), workgroupUniformLoad(&greatest));
     while !search.found {
@@ -99,7 +109,7 @@ fn last_fitting(first: u32, count: u32, lower: vec2<u32>, thread: u32) -> vec2<u
             let entry = bin_entries[first + i];
             count_candidate(search, vec2(entry.x, entry.y & SLOT_MASK));
         }
-        search = next_search(search, LIST, thread);
+        search = next_search(search, ROUND, thread);
     }
     return search.last;
 }
@@ -139,48 +149,91 @@ fn sum_before(value: u32, thread: u32) -> u32 {
     return sum;
 }
 
-// Replaces the numbers of the buckets by their first places.
-fn scan_buckets(thread: u32) {
-    let place = sum_before(atomicLoad(&buckets[thread]), thread);
-    atomicStore(&buckets[thread], place);
-    workgroupBarrier();
+// Returns the step of a key, and how far in it the key is.
+fn step_of(key: u32, low: u32, scale: f32) -> vec2<f32> {
+    let at = f32(key - low) * scale;
+    return vec2(floor(at), fract(at));
 }
 
-// Sorts the first `count` of the list: the low half of `places` becomes their indices.
-fn sort_list(count: u32, thread: u32) {
+// Returns the bucket of a key; greater keys have the same or greater buckets.
+fn bucket_of(key: u32, low: u32, scale: f32, share: f32) -> u32 {
+    let step = step_of(key, low, scale);
+    let first = atomicLoad(&steps[u32(step.x)]);
+    let count = atomicLoad(&steps[u32(step.x) + 1u]) - first;
+    return min(u32((f32(first) + step.y * f32(count)) * share), BUCKETS - 1u);
+}
+
+// Returns the second word of the entry of a splat in the list, as `collect` listed it.
+fn word_of(i: u32, first: u32, whole: bool) -> u32 {
+    if whole {
+        return bin_entries[first + i].y;
+    }
+    return list[ROUND + i];
+}
+
+// Sorts the first `count` of the list: it becomes the second words of their entries, in order.
+fn sort_list(first: u32, count: u32, whole: bool, thread: u32) {
+    atomicStore(&steps[thread], 0u);
     atomicStore(&buckets[thread], 0u);
     let low = workgroupUniformLoad(&least);
     let scale = f32(BUCKETS - 1u) / max(f32(workgroupUniformLoad(&greatest) - low), 1.0);
+    let share = f32(BUCKETS) / f32(count);
     for (var i = thread; i < count; i += THREADS) {
-        let bucket = u32(f32(keys[i] - low) * scale);
-        atomicStore(&places[i], atomicAdd(&buckets[bucket], 1u));
+        atomicAdd(&steps[u32(step_of(list[i], low, scale).x)], 1u);
     }
     workgroupBarrier();
-    scan_buckets(thread);
+    let before_step = sum_before(atomicLoad(&steps[thread]), thread);
+    atomicStore(&steps[thread], before_step);
+    if thread == 0u {
+        atomicStore(&steps[BUCKETS], count);
+        atomicStore(&buckets[BUCKETS], count);
+    }
+    workgroupBarrier();
     for (var i = thread; i < count; i += THREADS) {
-        let bucket = u32(f32(keys[i] - low) * scale);
+        atomicStore(&places[i], atomicAdd(&buckets[bucket_of(list[i], low, scale, share)], 1u));
+    }
+    workgroupBarrier();
+    let before_bucket = sum_before(atomicLoad(&buckets[thread]), thread);
+    atomicStore(&buckets[thread], before_bucket);
+    workgroupBarrier();
+    for (var i = thread; i < count; i += THREADS) {
+        let bucket = bucket_of(list[i], low, scale, share);
         let place = atomicLoad(&buckets[bucket]) + (atomicLoad(&places[i]) & 0xffffu);
         atomicOr(&places[place], i << 16u);
     }
     workgroupBarrier();
     for (var i = thread; i < count; i += THREADS) {
-        let word = words[i];
-        let own = vec2(keys[i], word & SLOT_MASK);
-        let bucket = u32(f32(own.x - low) * scale);
-        let first = atomicLoad(&buckets[bucket]);
-        var end = count;
-        if bucket + 1u < BUCKETS {
-            end = atomicLoad(&buckets[bucket + 1u]);
-        }
-        var place = first;
-        for (var k = first; k < end; k++) {
+        let own = list[i];
+        let bucket = bucket_of(own, low, scale, share);
+        let begin = atomicLoad(&buckets[bucket]);
+        let end = atomicLoad(&buckets[bucket + 1u]);
+        var place = begin;
+        for (var k = begin; k < end; k++) {
             let other = atomicLoad(&places[k]) >> 16u;
-            place += select(0u, 1u, is_after(own, vec2(keys[other], words[other] & SLOT_MASK)));
+            let key = list[other];
+            if key < own || (key == own && other != i && comes_before(other, i, first, whole)) {
+                place++;
+            }
         }
-        // Only this thread changes this half.
-        atomicXor(&places[place], (atomicLoad(&places[place]) & 0xffffu) ^ i);
+        // Only this thread changes this half; the others read the high one.
+        atomicStore(&places[i], (atomicLoad(&places[i]) & 0xffff0000u) | place);
     }
     workgroupBarrier();
+    if whole {
+        for (var i = thread; i < count; i += THREADS) {
+            list[atomicLoad(&places[i]) & 0xffffu] = bin_entries[first + i].y;
+        }
+    } else {
+        for (var i = thread; i < count; i += THREADS) {
+            list[atomicLoad(&places[i]) & 0xffffu] = list[ROUND + i];
+        }
+    }
+    workgroupBarrier();
+}
+
+// Whether one of two splats of the same depth comes before the other: by slot.
+fn comes_before(a: u32, b: u32, first: u32, whole: bool) -> bool {
+    return (word_of(a, first, whole) & SLOT_MASK) < (word_of(b, first, whole) & SLOT_MASK);
 }
 
 // Returns the number of tiles along each side of a bin.
@@ -237,7 +290,7 @@ fn reserve(counts: vec4<u32>, corner: vec2<u32>, number: u32) {
 
 fn write_range(corner: vec2<u32>, number: u32, range: vec2<u32>) {
     let tile = corner + tile_in_bin(number);
-    if all(tile < frame.tiles) {
+    if number < side() * side() && all(tile < frame.tiles) {
         tile_ranges[tile.y * frame.tiles.x + tile.x] = range;
     }
 }
@@ -250,7 +303,7 @@ fn write_pairs(count: u32, corner: vec2<u32>, reserved: bool, thread: u32) {
     for (var number = 0u; number < side() * side(); number += 4u) {
         var own = vec4(0u);
         for (var i = first; i < end; i++) {
-            own += covered(words[atomicLoad(&places[i]) & 0xffffu], number);
+            own += covered(list[i], number);
         }
         let before = sums_before(own, thread);
         workgroupBarrier();
@@ -262,7 +315,7 @@ fn write_pairs(count: u32, corner: vec2<u32>, reserved: bool, thread: u32) {
         if firsts.x != NONE.x {
             var pairs = firsts + before;
             for (var i = first; i < end; i++) {
-                let word = words[atomicLoad(&places[i]) & 0xffffu];
+                let word = list[i];
                 let hit = covered(word, number);
                 for (var k = 0u; k < 4u; k++) {
                     if hit[k] == 1u {
@@ -336,7 +389,7 @@ fn sort_bins(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     }
     let first = bin * capacity;
     if binned <= LIST {
-        sort_list(collect(first, binned, true, FIRST, NONE, thread), thread);
+        sort_list(first, collect(first, binned, true, FIRST, NONE, thread), true, thread);
         write_pairs(binned, corner, false, thread);
         return;
     }
@@ -346,11 +399,11 @@ fn sort_bins(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     var done = 0u;
     while done < binned {
         var upper = NONE;
-        if collect(first, binned, false, lower, NONE, thread) > LIST {
+        if collect(first, binned, false, lower, NONE, thread) > ROUND {
             upper = last_fitting(first, binned, lower, thread);
         }
         let count = collect(first, binned, false, lower, upper, thread);
-        sort_list(count, thread);
+        sort_list(first, count, false, thread);
         write_pairs(count, corner, true, thread);
         done += count;
         lower = upper;

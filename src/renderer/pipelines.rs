@@ -7,7 +7,7 @@ use super::bind::{Bind, group_layout, pipeline};
 use super::layout::CODEBOOK_SCALES;
 use super::memory::Allocator;
 use super::shaders::{
-    BINNED, Blending, LARGE_BATCHES, LONG_LISTS, MULTISAMPLED, SUBGROUPS_OF_32, ShaderChecks, Storage, module,
+    BINNED, Blending, LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32, ShaderChecks, Storage, module,
 };
 use super::work::WorkCounters;
 use super::{GpuError, layout};
@@ -34,10 +34,10 @@ pub struct Renderer {
     pub(super) blend: wgpu::ComputePipeline,
     pub(super) blend_multisampled: wgpu::ComputePipeline,
     /// Passes of the fast renderer, each compiled when it is first used: `project_bin`, indexed by how a capture is stored, in
-    /// the order of [`Storage::ALL`], `sort_bins`, and `blend_blocks`, with small and with large batches, in the order of
-    /// [`Blending::ALL`].
+    /// the order of [`Storage::ALL`], `sort_bins`, in the order of [`Lists::ALL`], and `blend_blocks`, with small and with large
+    /// batches, in the order of [`Blending::ALL`].
     project_bin: [OnceLock<wgpu::ComputePipeline>; 3],
-    sort_bins: OnceLock<wgpu::ComputePipeline>,
+    sort_bins: [OnceLock<wgpu::ComputePipeline>; 3],
     blend_blocks: [[OnceLock<wgpu::ComputePipeline>; 4]; 2],
     checks: ShaderChecks,
     /// Bound instead of a list of active Gaussians if all are drawn.
@@ -108,7 +108,7 @@ impl Renderer {
             blend: pipeline(&blend, "blend", &[&layouts.pixel[0], &layouts.blend]),
             blend_multisampled: pipeline(&blend_multisampled, "blend", &[&layouts.pixel[1], &layouts.blend]),
             project_bin: Default::default(),
-            sort_bins: OnceLock::new(),
+            sort_bins: Default::default(),
             blend_blocks: Default::default(),
             checks,
             no_list: allocator.bind_group("gs4d no active list", &layouts.active, &[no_list.as_entire_binding()]),
@@ -141,6 +141,7 @@ impl Renderer {
         &self,
         device: &wgpu::Device,
         storages: impl Iterator<Item = Storage>,
+        lists: Lists,
         blending: Blending,
         large_batches: bool,
     ) -> Result<(), GpuError> {
@@ -154,14 +155,10 @@ impl Renderer {
             }
         }
         let subgroups = if has_subgroups_of_32(device) { SUBGROUPS_OF_32 } else { &[] };
-        if self.sort_bins().is_none() {
-            let limits = device.limits();
-            let long = limits.max_compute_workgroup_storage_size >= LONG_LISTS_MEMORY
-                && limits.max_compute_workgroup_size_x.min(limits.max_compute_invocations_per_workgroup) >= 512;
-            let lists = if long { LONG_LISTS } else { &[] };
-            let shader = module(device, "sort_bins", &[lists, subgroups].concat(), self.checks)?;
+        if self.sort_bins(lists).is_none() {
+            let shader = module(device, "sort_bins", &[lists.definitions(), subgroups].concat(), self.checks)?;
             let made = pipeline(device, &shader, "sort_bins", &[&layouts.sort_bins]);
-            self.sort_bins.get_or_init(|| made);
+            self.sort_bins[lists as usize].get_or_init(|| made);
         }
         if self.blend_blocks(blending, large_batches).is_none() {
             let batches = if large_batches { LARGE_BATCHES } else { &[] };
@@ -179,9 +176,9 @@ impl Renderer {
         self.project_bin[storage as usize].get()
     }
 
-    /// Returns `sort_bins`, if it has been compiled.
-    pub(super) fn sort_bins(&self) -> Option<&wgpu::ComputePipeline> {
-        self.sort_bins.get()
+    /// Returns `sort_bins` for lists of this length, if it has been compiled.
+    pub(super) fn sort_bins(&self, lists: Lists) -> Option<&wgpu::ComputePipeline> {
+        self.sort_bins[lists as usize].get()
     }
 
     /// Returns `blend_blocks`, if it has been compiled.
@@ -200,9 +197,6 @@ impl Renderer {
         self.allocator(device).bind_group("gs4d capture", &self.layouts.captures[storage as usize], &resources)
     }
 }
-
-/// Workgroup memory that `sort_bins` needs for lists of 3072 splats, bytes.
-const LONG_LISTS_MEMORY: u32 = 48 * 1024;
 
 fn has_subgroups_of_32(device: &wgpu::Device) -> bool {
     let info = device.adapter_info();

@@ -92,8 +92,54 @@ pub const MULTISAMPLED: &[&str] = &["MULTISAMPLED"];
 /// Definitions of `project` as the first pass of the fast renderer, `project_bin`.
 pub const BINNED: &[&str] = &["BINNED"];
 
-/// Definitions of `sort_bins` on devices with workgroups of 512 threads and enough memory for lists of 3072 splats.
-pub const LONG_LISTS: &[&str] = &["LONG_LISTS"];
+/// How many splats `sort_bins` sorts at once in workgroup memory. Shorter lists leave room for more workgroups; longer ones are sorted
+/// in rounds.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Lists {
+    /// 1280, by 256 threads: for every device.
+    #[default]
+    Short,
+    /// 2304, by 512 threads.
+    Medium,
+    /// 5120, by 512 threads.
+    Long,
+}
+
+impl Lists {
+    /// All lengths.
+    pub const ALL: [Self; 3] = [Self::Short, Self::Medium, Self::Long];
+
+    /// Returns the definitions of `sort_bins`.
+    pub fn definitions(self) -> &'static [&'static str] {
+        match self {
+            Self::Short => &[],
+            Self::Medium => &["MEDIUM_LISTS"],
+            Self::Long => &["LONG_LISTS"],
+        }
+    }
+
+    /// Returns the largest number of bytes of workgroup memory that it may take.
+    pub fn memory(self) -> u32 {
+        match self {
+            Self::Short => 16 * 1024,
+            Self::Medium => 32 * 1024,
+            Self::Long => 48 * 1024,
+        }
+    }
+
+    /// Returns the length for a device and the number of splats of the fullest bin.
+    pub(super) fn suiting(limits: &wgpu::Limits, fullest: u32) -> Self {
+        let memory = limits.max_compute_workgroup_storage_size;
+        let threads = limits.max_compute_workgroup_size_x.min(limits.max_compute_invocations_per_workgroup);
+        if threads < 512 || memory < Self::Medium.memory() {
+            Self::Short
+        } else if fullest <= 2304 || memory < Self::Long.memory() {
+            Self::Medium
+        } else {
+            Self::Long
+        }
+    }
+}
 
 /// Definitions of `sort_bins` and `blend_blocks` on devices whose subgroups always have 32 threads.
 pub const SUBGROUPS_OF_32: &[&str] = &["SUBGROUPS_OF_32"];

@@ -3,7 +3,7 @@
 //! In: the files of `shaders/`. Out: proof that each is known to the renderer and is valid WGSL that needs no optional capability.
 
 use bevy_gs4d::renderer::shaders::{
-    BINNED, Blending, LARGE_BATCHES, LONG_LISTS, MULTISAMPLED, SUBGROUPS_OF_32, Storage, compose, pass_names,
+    BINNED, Blending, LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32, Storage, compose, pass_names,
 };
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
@@ -49,11 +49,14 @@ fn every_pass_composes_and_is_valid() {
     };
     let binned = Storage::ALL.map(|storage| [BINNED, storage.definitions()].concat());
     let blending = Blending::ALL.into_iter().flat_map(|blending| {
-        [&[][..], LONG_LISTS, LARGE_BATCHES, SUBGROUPS_OF_32].map(|device| [blending.definitions(), device].concat())
+        [&[][..], LARGE_BATCHES, SUBGROUPS_OF_32].map(|device| [blending.definitions(), device].concat())
     });
+    let lists = Lists::ALL
+        .into_iter()
+        .flat_map(|lists| [&[][..], SUBGROUPS_OF_32].map(|device| [lists.definitions(), device].concat()));
     let storages = Storage::ALL.map(|storage| storage.definitions().to_vec());
     let definitions: Vec<_> =
-        storages.into_iter().chain([MULTISAMPLED.to_vec()]).chain(binned).chain(blending).collect();
+        storages.into_iter().chain([MULTISAMPLED.to_vec()]).chain(binned).chain(blending).chain(lists).collect();
     let all = definitions.iter().flat_map(|definitions| pass_names().map(move |name| (name, &definitions[..])));
     report(all.filter_map(|(name, definitions)| check(name, definitions).err()).collect());
 }
@@ -63,9 +66,9 @@ fn workgroup_memory_is_within_the_limits_that_are_asked_for() {
     let blending = Blending::ALL.map(|blending| ("blend_blocks", blending.definitions(), 16 * 1024));
     let large = [("blend_blocks", [LARGE_BATCHES, Blending::All.definitions()].concat(), 32 * 1024)];
     let large = large.iter().map(|(name, definitions, limit)| (*name, &definitions[..], *limit));
-    let sorting =
-        [("project", BINNED, 16 * 1024), ("sort_bins", &[][..], 16 * 1024), ("sort_bins", LONG_LISTS, 48 * 1024)];
-    for (name, definitions, limit) in blending.into_iter().chain(large).chain(sorting) {
+    let sorting = Lists::ALL.map(|lists| ("sort_bins", lists.definitions(), lists.memory()));
+    let binning = [("project", BINNED, 16 * 1024)];
+    for (name, definitions, limit) in blending.into_iter().chain(large).chain(sorting).chain(binning) {
         let module = compose(name, definitions).expect("the pass composes");
         let shared = module.global_variables.iter().filter(|(_, v)| v.space == AddressSpace::WorkGroup);
         let bytes: u32 = shared.map(|(_, v)| module.types[v.ty].inner.size(module.to_ctx()).next_multiple_of(16)).sum();

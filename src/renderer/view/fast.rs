@@ -56,7 +56,7 @@ impl ViewRenderer {
 
         // sort_bins
         let (Some(sort_bins), Some(blend_blocks)) =
-            (renderer.sort_bins(), renderer.blend_blocks(self.blending, self.large_batches))
+            (renderer.sort_bins(self.lists), renderer.blend_blocks(self.blending, self.large_batches))
         else {
             return;
         };

@@ -13,7 +13,7 @@ mod resources;
 use super::active::drawn_count;
 use super::memory::{alignment_of, binding_limit};
 use super::pipelines::Renderer;
-use super::shaders::Blending;
+use super::shaders::{Blending, Lists};
 use super::timing::{PassTime, PassTimer, TIMED_FAST_PASSES, TIMED_PASSES};
 use super::{ActiveList, GpuCapture, GpuError, ViewStatistics, layout};
 use crate::view::tiles;
@@ -93,6 +93,9 @@ pub struct ViewRenderer {
     /// What the fast design blends in the frame prepared last.
     blending: Blending,
     large_batches: bool,
+    /// How the fast design sorts it, and the number of splats of the fullest bin of an earlier frame.
+    lists: Lists,
+    fullest_bin: u32,
     has_depths: bool,
     /// Number of pairs for which an earlier frame wanted room.
     pairs_wanted: u32,
@@ -188,6 +191,8 @@ impl ViewRenderer {
             multisampled: false,
             blending: Blending::default(),
             large_batches: false,
+            lists: Lists::default(),
+            fullest_bin: 0,
             has_depths: true,
             resources: None,
         }
@@ -214,7 +219,8 @@ impl ViewRenderer {
         if self.design == Design::Fast {
             let storages = instances.iter().map(|instance| instance.capture.storage);
             self.large_batches = bins::large_batches(&device.limits(), instances);
-            renderer.compile_fast(device, storages, self.blending, self.large_batches)?;
+            self.lists = Lists::suiting(&device.limits(), self.fullest_bin);
+            renderer.compile_fast(device, storages, self.lists, self.blending, self.large_batches)?;
         }
         if std::mem::take(&mut self.recorded) {
             self.odd = !self.odd;
@@ -371,6 +377,7 @@ impl ViewRenderer {
         self.resources = None;
         self.pairs_wanted = 0;
         self.entries_wanted = 0;
+        self.fullest_bin = 0;
         self.statistics = ViewStatistics::default();
     }
 
@@ -405,6 +412,7 @@ impl ViewRenderer {
             self.statistics.pairs = counters.pairs;
             let wanted = match self.design {
                 Design::Fast => {
+                    self.fullest_bin = counters.pairs_wanted;
                     let sizes = self.resources.as_ref().map(|made| made.sizes).unwrap_or_default();
                     let bins = bins::bin_grid(sizes.picture.max(UVec2::ONE)).element_product();
                     let entries = counters.pairs_wanted.saturating_mul(bins);
