@@ -28,10 +28,12 @@ const LANES: u32 = 32u;
 const BUCKETS: u32 = THREADS;
 
 @group(0) @binding(0) var<uniform> frame: FrameUniforms;
-@group(0) @binding(1) var<storage, read_write> bins: array<atomic<u32>>;
-@group(0) @binding(2) var<storage, read> bin_entries: array<vec2<u32>>;
-@group(0) @binding(3) var<storage, read_write> tile_ranges: array<vec2<u32>>;
-@group(0) @binding(4) var<storage, read_write> pair_splats: array<u32>;
+// The counters of this frame, and those of the next, which are cleared.
+@group(0) @binding(1) var<storage, read> bins: array<u32>;
+@group(0) @binding(2) var<storage, read_write> next_bins: array<atomic<u32>>;
+@group(0) @binding(3) var<storage, read> bin_entries: array<vec2<u32>>;
+@group(0) @binding(4) var<storage, read_write> tile_ranges: array<vec2<u32>>;
+@group(0) @binding(5) var<storage, read_write> pair_splats: array<u32>;
 
 // First the depth keys of the list, in no order, and in rounds the second words of its entries from ROUND on; then the second
 // words, in order.
@@ -279,7 +281,7 @@ fn sums_before(four: vec4<u32>, thread: u32) -> vec4<u32> {
 fn reserve(counts: vec4<u32>, corner: vec2<u32>, number: u32) {
     let before = vec4(0u, counts.x, counts.x + counts.y, counts.x + counts.y + counts.z);
     let total = before.w + counts.w;
-    let first = atomicAdd(&bins[frame.binning.z + 3u], total);
+    let first = atomicAdd(&next_bins[5], total);
     let fits = first + total <= frame.pair_capacity;
     let firsts = first + before;
     for (var i = 0u; i < 4u; i++) {
@@ -366,16 +368,19 @@ fn sort_bins(
 fn sort_bins(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
 #endif
     let capacity = frame.binning.y;
-    let counters = frame.binning.z;
+    let first_bin = BIN_COUNTERS + frame.binning.w;
     let bin = group.y * ((frame.tiles.x + side() - 1u) / side()) + group.x;
     if thread == 0u {
-        let binned = atomicLoad(&bins[counters + BIN_COUNTERS + bin]);
-        own_count = binned;
-        atomicMax(&bins[counters + 2u], binned);
-        atomicStore(&bins[frame.binning.w + BIN_COUNTERS + bin], 0u);
+        own_count = bins[first_bin + bin];
+        atomicMax(&next_bins[4], own_count);
+        atomicStore(&next_bins[first_bin + bin], 0u);
         if bin == 0u {
-            for (var i = 0u; i < BIN_COUNTERS; i++) {
-                atomicStore(&bins[frame.binning.w + i], 0u);
+            atomicStore(&next_bins[0], 0u);
+            atomicStore(&next_bins[1], 0u);
+            atomicStore(&next_bins[2], bins[0]);
+            atomicStore(&next_bins[3], bins[1]);
+            for (var part = 0u; part < frame.binning.w; part++) {
+                atomicStore(&next_bins[BIN_COUNTERS + part], 0u);
             }
         }
     }

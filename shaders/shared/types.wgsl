@@ -61,7 +61,7 @@ struct InstanceUniforms {
     // 1: only Gaussians whose mean is inside the crop box are drawn.
     cropped: u32,
     padding: u32,
-    // Of the fast renderer: tiles along each side of a bin (8 bits) and a number of the frame, splats a bin has room for, first counter of this frame and of the next.
+    // Of the fast renderer: tiles along each side of a bin (8 bits) and a number of the frame, splats a bin has room for, number of this part, number of parts.
     binning: vec4<u32>,
     // Rows of capture-to-crop-box; the box is from -1 to 1.
     crop_x: vec4<f32>,
@@ -171,5 +171,6 @@ const SORT_SLOTS: u32 = 0u;
 const SORT_VISIBLE: u32 = 1u;
 const SORT_PAIRS: u32 = 2u;
 
-// Counters of the fast renderer before those of its bins: visible splats, pairs, splats of the fullest bin, pairs written.
-const BIN_COUNTERS: u32 = 4u;
+// Counters of the fast renderer before those of parts and bins: visible splats and pairs of this frame; then of the frame before: visible
+// splats, pairs, splats of the fullest bin, pairs written.
+const BIN_COUNTERS: u32 = 6u;

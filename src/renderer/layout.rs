@@ -84,7 +84,7 @@ pub struct InstanceUniforms {
     pub cropped: u32,
     /// Unused.
     pub padding: u32,
-    /// Of the fast renderer: tiles along each side of a bin (8 bits) and a number of the frame, splats a bin has room for, first counter of this frame and of the next.
+    /// Of the fast renderer: tiles along each side of a bin (8 bits) and a number of the frame, splats a bin has room for, number of this part, number of parts.
     pub binning: [u32; 4],
     /// Rows of capture-to-crop-box: x.
     pub crop_x: [f32; 4],
@@ -295,5 +295,6 @@ pub const SORT_VISIBLE: u32 = 1;
 /// The pairs.
 pub const SORT_PAIRS: u32 = 2;
 
-/// Counters of the fast renderer before those of its bins: visible splats, pairs, splats of the fullest bin, pairs written.
-pub const BIN_COUNTERS: u32 = 4;
+/// Counters of the fast renderer before those of parts and bins: visible splats and pairs of this frame; then the [`Counters`] of the
+/// frame before, the last of which is the number of pairs written.
+pub const BIN_COUNTERS: u32 = 6;

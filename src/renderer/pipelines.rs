@@ -33,10 +33,11 @@ pub struct Renderer {
     pub(super) ranges: wgpu::ComputePipeline,
     pub(super) blend: wgpu::ComputePipeline,
     pub(super) blend_multisampled: wgpu::ComputePipeline,
-    /// Passes of the fast renderer, each compiled when it is first used: `project_bin`, indexed by how a capture is stored, in
-    /// the order of [`Storage::ALL`], `sort_bins`, in the order of [`Lists::ALL`], and `blend_blocks`, with small and with large
+    /// Passes of the fast renderer, each compiled when it is first used: `project_bin` and `colors`, indexed by how a capture is
+    /// stored, in the order of [`Storage::ALL`], `sort_bins`, in the order of [`Lists::ALL`], and `blend_blocks`, with small and with large
     /// batches, in the order of [`Blending::ALL`].
     project_bin: [OnceLock<wgpu::ComputePipeline>; 3],
+    colors: [OnceLock<wgpu::ComputePipeline>; 3],
     sort_bins: [OnceLock<wgpu::ComputePipeline>; 3],
     blend_blocks: [[OnceLock<wgpu::ComputePipeline>; 4]; 2],
     checks: ShaderChecks,
@@ -52,8 +53,8 @@ pub(super) struct Layouts {
     pub filter: wgpu::BindGroupLayout,
     pub active: wgpu::BindGroupLayout,
     pub project: wgpu::BindGroupLayout,
-    /// Indexed by how a capture is stored, in the order of [`Storage::ALL`].
-    pub captures: [wgpu::BindGroupLayout; 3],
+    /// Geometry and color, indexed by how a capture is stored, in the order of [`Storage::ALL`].
+    pub captures: [[wgpu::BindGroupLayout; 2]; 3],
     pub sort: wgpu::BindGroupLayout,
     pub arguments: wgpu::BindGroupLayout,
     pub bin: wgpu::BindGroupLayout,
@@ -62,6 +63,7 @@ pub(super) struct Layouts {
     /// Uniforms, background, opaque depth and targets of the pixels, without and with multisampled depth.
     pub pixel: [wgpu::BindGroupLayout; 2],
     pub project_bin: wgpu::BindGroupLayout,
+    pub colors: wgpu::BindGroupLayout,
     pub sort_bins: wgpu::BindGroupLayout,
 }
 
@@ -90,9 +92,10 @@ impl Renderer {
             activate_write: pipeline(&activate, "write", &[&layouts.activate, &layouts.filter]),
             project: {
                 let mut all = Vec::new();
-                for (storage, capture) in Storage::ALL.into_iter().zip(&layouts.captures) {
+                for storage in Storage::ALL {
                     let shader = module(device, "project", storage.definitions(), checks)?;
-                    all.push(pipeline(&shader, "project", &[&layouts.project, capture, &layouts.active]));
+                    let [geometry, color] = &layouts.captures[storage as usize];
+                    all.push(pipeline(&shader, "project", &[&layouts.project, geometry, &layouts.active, color]));
                 }
                 all.try_into().map_err(|_| GpuError::Device("a pipeline is missing".into()))?
             },
@@ -108,6 +111,7 @@ impl Renderer {
             blend: pipeline(&blend, "blend", &[&layouts.pixel[0], &layouts.blend]),
             blend_multisampled: pipeline(&blend_multisampled, "blend", &[&layouts.pixel[1], &layouts.blend]),
             project_bin: Default::default(),
+            colors: Default::default(),
             sort_bins: Default::default(),
             blend_blocks: Default::default(),
             checks,
@@ -149,9 +153,12 @@ impl Renderer {
         for storage in storages {
             if self.project_bin(storage).is_none() {
                 let shader = module(device, "project", &[BINNED, storage.definitions()].concat(), self.checks)?;
-                let groups = [&layouts.project_bin, &layouts.captures[storage as usize], &layouts.active];
-                let made = pipeline(device, &shader, "project_bin", &groups);
+                let [geometry, color] = &layouts.captures[storage as usize];
+                let made = pipeline(device, &shader, "project_bin", &[&layouts.project_bin, geometry, &layouts.active]);
                 self.project_bin[storage as usize].get_or_init(|| made);
+                let shader = module(device, "colors", storage.definitions(), self.checks)?;
+                let made = pipeline(device, &shader, "colors", &[&layouts.colors, geometry, &layouts.active, color]);
+                self.colors[storage as usize].get_or_init(|| made);
             }
         }
         let subgroups = if has_subgroups_of_32(device) { SUBGROUPS_OF_32 } else { &[] };
@@ -176,6 +183,11 @@ impl Renderer {
         self.project_bin[storage as usize].get()
     }
 
+    /// Returns `colors` for captures stored in this way, if it has been compiled.
+    pub(super) fn colors(&self, storage: Storage) -> Option<&wgpu::ComputePipeline> {
+        self.colors[storage as usize].get()
+    }
+
     /// Returns `sort_bins` for lists of this length, if it has been compiled.
     pub(super) fn sort_bins(&self, lists: Lists) -> Option<&wgpu::ComputePipeline> {
         self.sort_bins[lists as usize].get()
@@ -186,15 +198,20 @@ impl Renderer {
         self.blend_blocks[usize::from(large_batches)][blending as usize].get()
     }
 
-    /// Creates the bind group of one part of a capture, its buffers in the order of the shader's bindings.
-    pub(super) fn capture_bind_group(
+    /// Creates the bind groups of the geometry and the color of one part of a capture, the buffers in the order of the shaders'
+    /// bindings.
+    pub(super) fn capture_bind_groups(
         &self,
         device: &wgpu::Device,
         storage: Storage,
-        buffers: &[&wgpu::Buffer],
-    ) -> wgpu::BindGroup {
-        let resources: Vec<_> = buffers.iter().map(|buffer| buffer.as_entire_binding()).collect();
-        self.allocator(device).bind_group("gs4d capture", &self.layouts.captures[storage as usize], &resources)
+        [geometry, color]: [&[&wgpu::Buffer]; 2],
+    ) -> [wgpu::BindGroup; 2] {
+        let layouts = &self.layouts.captures[storage as usize];
+        let group = |layout: &wgpu::BindGroupLayout, buffers: &[&wgpu::Buffer]| {
+            let resources: Vec<_> = buffers.iter().map(|buffer| buffer.as_entire_binding()).collect();
+            self.allocator(device).bind_group("gs4d capture", layout, &resources)
+        };
+        [group(&layouts[0], geometry), group(&layouts[1], color)]
     }
 }
 
@@ -211,16 +228,20 @@ impl Layouts {
         const INSTANCE: Bind = UniformAt(size_of::<layout::InstanceUniforms>());
         let new = |label, bindings: &[Bind]| group_layout(device, label, bindings);
         let targets = [wgpu::TextureFormat::Rgba32Float, wgpu::TextureFormat::Rg32Float].map(Target);
+        let ahead: &[Bind] = if has_room_for_bins(&device.limits()) { &[Read] } else { &[] };
         let pixel = |depth| new("gs4d pixel", &[Uniform(FRAME), Read, depth, targets[0], targets[1]]);
         Self {
             activate: new("gs4d activate", &[UniformAt(size_of::<layout::Activation>()), Write, Write]),
             filter: new("gs4d filter", &[Read]),
             active: new("gs4d active list", &[Read]),
             project: new("gs4d project", &[INSTANCE, Write, Write]),
-            captures: Storage::ALL.map(|storage| match storage {
-                Storage::Sliced => new("gs4d capture", &[Read, Read]),
-                Storage::Packed => new("gs4d capture", &[Read, Read, Read]),
-                Storage::Coded => new("gs4d capture", &[Read, Read, Read, Read, Uniform(16 * CODEBOOK_SCALES)]),
+            captures: Storage::ALL.map(|storage| {
+                let (geometry, color): (&[Bind], &[Bind]) = match storage {
+                    Storage::Sliced => (&[Read], &[Read]),
+                    Storage::Packed => (&[Read, Read], &[Read]),
+                    Storage::Coded => (&[Read, Read], &[Read, Read, Uniform(16 * CODEBOOK_SCALES)]),
+                };
+                [new("gs4d geometry", geometry), new("gs4d color", color)]
             }),
             sort: new(
                 "gs4d sort",
@@ -231,10 +252,17 @@ impl Layouts {
             ranges: new("gs4d ranges", &[Uniform(FRAME), Read, Read, Write]),
             blend: new("gs4d blend", &[Read, Read, Read]),
             pixel: [pixel(Depth), pixel(Depths)],
-            project_bin: new("gs4d project_bin", &[INSTANCE, Write, Write, Write]),
-            sort_bins: new("gs4d sort_bins", &[Uniform(FRAME), Write, Read, Write, Write]),
+            project_bin: new("gs4d project_bin", &[INSTANCE, Write, Write, Write, Write]),
+            colors: new("gs4d colors", &[&[INSTANCE, Write, Read, Read], ahead].concat()),
+            sort_bins: new("gs4d sort_bins", &[Uniform(FRAME), Read, Write, Read, Write, Write]),
         }
     }
+}
+
+/// Returns whether a shader may bind the nine storage buffers of `colors` and the entries of bins, which it does not read: then everything
+/// that `project_bin` wrote and `sort_bins` reads is made visible before `colors`, not between the two, and they run at the same time.
+pub(super) fn has_room_for_bins(limits: &wgpu::Limits) -> bool {
+    limits.max_storage_buffers_per_shader_stage > 8
 }
 
 fn check_limits(limits: &wgpu::Limits) -> Result<(), GpuError> {

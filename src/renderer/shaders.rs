@@ -19,6 +19,8 @@ const LIBRARIES: &[(&str, &str)] = &[
     ("packed", include_str!("../../shaders/shared/packed.wgsl")),
     ("scan", include_str!("../../shaders/shared/scan.wgsl")),
     ("environment", include_str!("../../shaders/shared/environment.wgsl")),
+    ("capture", include_str!("../../shaders/shared/capture.wgsl")),
+    ("color", include_str!("../../shaders/shared/color.wgsl")),
     ("bins", include_str!("../../shaders/shared/bins.wgsl")),
     ("nearest", include_str!("../../shaders/shared/nearest.wgsl")),
     ("pixel", include_str!("../../shaders/shared/pixel.wgsl")),
@@ -32,6 +34,7 @@ const PASSES: &[(&str, &str)] = &[
     ("bin", include_str!("../../shaders/bin.wgsl")),
     ("ranges", include_str!("../../shaders/ranges.wgsl")),
     ("blend", include_str!("../../shaders/blend.wgsl")),
+    ("colors", include_str!("../../shaders/colors.wgsl")),
     ("sort_bins", include_str!("../../shaders/sort_bins.wgsl")),
     ("blend_blocks", include_str!("../../shaders/blend_blocks.wgsl")),
     ("score", include_str!("../../shaders/score.wgsl")),
@@ -52,7 +55,7 @@ pub fn pass_names() -> impl Iterator<Item = &'static str> {
     PASSES.iter().map(|(name, _)| *name)
 }
 
-/// How a capture is stored, and so how `project` reads it: a [`Form`] without its values.
+/// How a capture is stored, and so how `project` and `colors` read it: a [`Form`] without its values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Storage {
     /// Single precision.
@@ -76,7 +79,7 @@ impl Storage {
         }
     }
 
-    /// Returns the shader definitions with which `project` reads it.
+    /// Returns the shader definitions with which `project` and `colors` read it.
     pub fn definitions(self) -> &'static [&'static str] {
         match self {
             Self::Sliced => &[],
@@ -177,7 +180,7 @@ impl Blending {
 }
 
 /// Returns the naga module of a pass, imports resolved, validated, with these definitions: those of a [`Storage`] for
-/// `project`, none or [`MULTISAMPLED`] for `blend`, none for the others.
+/// `project` and `colors`, none or [`MULTISAMPLED`] for `blend`, those of the fast renderer's passes, none for the others.
 ///
 /// # Errors
 /// When there is no such pass or it does not compile.

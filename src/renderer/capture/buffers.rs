@@ -37,27 +37,29 @@ pub(super) fn largest_record(form: &Form, stride: usize) -> u64 {
     geometry.max(color) as u64
 }
 
-/// Creates the buffers of geometry and color of some Gaussians, the first at a multiple of a block, without codebooks.
-/// `stride` as for [`largest_record`].
-pub(super) fn part(gpu: Gpu<'_>, form: &Form, own: Range<usize>, stride: usize) -> Vec<wgpu::Buffer> {
+/// Creates the buffers of the geometry of some Gaussians, the first at a multiple of a block.
+pub(super) fn geometry(gpu: Gpu<'_>, form: &Form, own: Range<usize>) -> Vec<wgpu::Buffer> {
     match form {
-        Form::Sliced(sliced) => {
-            vec![gaussians(gpu, &sliced.gaussians[own.clone()]), harmonics(gpu, &sliced.harmonics, own, stride)]
-        }
+        Form::Sliced(sliced) => vec![gaussians(gpu, &sliced.gaussians[own])],
         Form::Packed(packed) => {
             let blocks = own.start / BLOCK * BLOCK_RANGES..own.end.div_ceil(BLOCK) * BLOCK_RANGES;
             let (shared, blocks) = (&packed.ranges[..SHARED_RANGES], &packed.ranges[SHARED_RANGES..][blocks]);
             vec![
-                plain(gpu, "gs4d records", bytemuck::cast_slice(&packed.records[own.clone()])),
+                plain(gpu, "gs4d records", bytemuck::cast_slice(&packed.records[own])),
                 plain(gpu, "gs4d ranges", bytemuck::cast_slice(&[shared, blocks].concat())),
-                match &packed.colors {
-                    PackedColors::Whole(whole) => harmonics(gpu, whole, own, stride),
-                    PackedColors::Coded(coded) => {
-                        plain(gpu, "gs4d color records", bytemuck::cast_slice(&coded.records[own]))
-                    }
-                },
             ]
         }
+    }
+}
+
+/// Creates the buffer of the color of some Gaussians, without codebooks. `stride` as for [`largest_record`].
+pub(super) fn color(gpu: Gpu<'_>, form: &Form, own: Range<usize>, stride: usize) -> wgpu::Buffer {
+    match form {
+        Form::Sliced(sliced) => harmonics(gpu, &sliced.harmonics, own, stride),
+        Form::Packed(packed) => match &packed.colors {
+            PackedColors::Whole(whole) => harmonics(gpu, whole, own, stride),
+            PackedColors::Coded(coded) => plain(gpu, "gs4d color records", bytemuck::cast_slice(&coded.records[own])),
+        },
     }
 }
 

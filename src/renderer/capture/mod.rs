@@ -36,7 +36,8 @@ pub struct GpuCapture {
 #[derive(Debug)]
 pub(super) struct Part {
     pub count: u32,
-    pub bind_group: wgpu::BindGroup,
+    pub geometry: wgpu::BindGroup,
+    pub color: wgpu::BindGroup,
     /// Its share of the filter, if there is one.
     pub filter: Option<wgpu::BindGroup>,
 }
@@ -125,16 +126,18 @@ impl GpuCapture {
         let codebooks = form.coded_colors().map(|colors| buffers::codebooks(gpu, colors));
         for first in (0..scene.len()).step_by(per_part) {
             let count = per_part.min(scene.len() - first);
-            let own = buffers::part(gpu, form, first..first + count, stride);
-            let all: Vec<_> = own.iter().chain(codebooks.iter().flatten()).collect();
-            bytes += own.iter().map(wgpu::Buffer::size).sum::<u64>();
-            let bind_group = renderer.capture_bind_group(device, storage, &all);
+            let geometry = buffers::geometry(gpu, form, first..first + count);
+            let color = buffers::color(gpu, form, first..first + count, stride);
+            bytes += geometry.iter().chain([&color]).map(wgpu::Buffer::size).sum::<u64>();
+            let all = [&color].into_iter().chain(codebooks.iter().flatten());
+            let both = [geometry.iter().collect::<Vec<_>>(), all.collect()];
+            let [geometry, color] = renderer.capture_bind_groups(device, storage, both.each_ref().map(|all| &all[..]));
             let filter = scene.filter.as_ref().map(|filter| {
                 let sets = buffers::filter(gpu, filter, first..first + count);
                 bytes += sets.size();
                 allocator.bind_group("gs4d filter", &renderer.layouts.filter, &[sets.as_entire_binding()])
             });
-            parts.push(Part { count: count as u32, bind_group, filter });
+            parts.push(Part { count: count as u32, geometry, color, filter });
         }
         bytes += codebooks.iter().flatten().map(wgpu::Buffer::size).sum::<u64>();
         let environment = scene.environment.as_ref().map(|map| EnvironmentBuffer {

@@ -99,7 +99,7 @@ impl Headless {
         frames: usize,
         passes: Option<&'static [&'static str]>,
     ) -> Result<Run, GpuError> {
-        let GpuContext { device, queue, .. } = &self.context;
+        let queue = &self.context.queue;
         for lane in &mut *lanes {
             lane.timer = passes.and_then(|passes| PassTimer::new(self.allocator(), queue, passes));
         }
@@ -110,14 +110,13 @@ impl Headless {
         let mut encode = 0.0;
         for first in (0..frames).step_by(lanes.len()) {
             let begin = Instant::now();
-            let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gs4d") });
+            let mut commands = Vec::new();
             for (i, lane) in (first..frames).zip(&mut *lanes) {
                 let place = lane.timer.is_some().then_some((&all, each * i as u64));
-                self.encode(lane, capture, &views[i % views.len()], &mut encoder, place)?;
+                commands.push(self.encode(lane, capture, &views[i % views.len()], place)?);
             }
-            let commands = encoder.finish();
             encode += begin.elapsed().as_secs_f64() * 1e3;
-            queue.submit([commands]);
+            queue.submit(commands);
         }
         self.wait()?;
         let wall_milliseconds = start.elapsed().as_secs_f64() * 1e3 / frames.max(1) as f64;
@@ -131,22 +130,19 @@ impl Headless {
 
     /// Draws one frame in a submit of its own.
     fn submit_frame(&self, lane: &mut Lane, capture: &GpuCapture, view: &View) -> Result<(), GpuError> {
-        let GpuContext { device, queue, .. } = &self.context;
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gs4d") });
-        self.encode(lane, capture, view, &mut encoder, None)?;
-        queue.submit([encoder.finish()]);
+        let commands = self.encode(lane, capture, view, None)?;
+        self.context.queue.submit([commands]);
         Ok(())
     }
 
-    /// Records one frame; its timestamps are copied to the given place.
+    /// Records one frame with an encoder of its own; its timestamps are copied to the given place.
     fn encode(
         &self,
         lane: &mut Lane,
         capture: &GpuCapture,
         view: &View,
-        encoder: &mut wgpu::CommandEncoder,
         timestamps: Option<(&wgpu::Buffer, u64)>,
-    ) -> Result<(), GpuError> {
+    ) -> Result<wgpu::CommandBuffer, GpuError> {
         let GpuContext { device, queue, .. } = &self.context;
         let parameters = self.measured();
         if let Some(active) = &mut lane.active {
@@ -154,12 +150,13 @@ impl Headless {
         }
         let instances = [instance(capture, lane.active.as_ref(), view)];
         lane.view.prepare(device, queue, &self.renderer, &instances, &parameters)?;
-        lane.view.record_timed(&self.renderer, encoder, &instances, timestamps.and(lane.timer.as_ref()));
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gs4d") });
+        lane.view.record_timed(&self.renderer, &mut encoder, &instances, timestamps.and(lane.timer.as_ref()));
         if let (Some(timer), Some((to, at))) = (&lane.timer, timestamps) {
-            timer.resolve(encoder);
+            timer.resolve(&mut encoder);
             encoder.copy_buffer_to_buffer(timer.resolved(), 0, to, at, timer.resolved().size());
         }
-        Ok(())
+        Ok(encoder.finish())
     }
 }
 

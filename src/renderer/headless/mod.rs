@@ -188,8 +188,8 @@ impl Headless {
         self.view.record(&self.renderer, &mut encoder, instances);
         queue.submit([encoder.finish()]);
         self.wait()?;
-        let counters =
-            self.copy_out_from(self.view.counters(), self.view.counters_offset(), size_of::<Counters>() as u64)?;
+        let (counters, offset) = self.view.counters();
+        let counters = self.copy_out_from(counters, offset, size_of::<Counters>() as u64)?;
         Ok(bytemuck::pod_read_unaligned(&counters))
     }
 

@@ -3,10 +3,11 @@
 //! In: the size of a picture and the number of splats in all bins to have room for. Out: [`FastResources`], the
 //! counters and entries of bins of a few tiles, and the bind groups of the passes over them.
 
+use super::resources::Sizes;
 use super::{Instance, ViewRenderer};
 use crate::renderer::layout::BIN_COUNTERS;
 use crate::renderer::memory::Allocator;
-use crate::renderer::pipelines::Renderer;
+use crate::renderer::pipelines::{Renderer, has_room_for_bins};
 use crate::view::tiles;
 use glam::UVec2;
 use wgpu::BufferUsages;
@@ -15,11 +16,13 @@ use wgpu::BufferUsages;
 #[derive(Debug)]
 pub(super) struct FastResources {
     /// Counters of even and of odd frames.
-    pub bins: wgpu::Buffer,
+    pub bins: [wgpu::Buffer; 2],
     /// Size of all buffers.
     pub bytes: u64,
-    pub project_bin: wgpu::BindGroup,
-    pub sort_bins: wgpu::BindGroup,
+    /// Bind groups of even and of odd frames.
+    pub project_bin: [wgpu::BindGroup; 2],
+    pub colors: [wgpu::BindGroup; 2],
+    pub sort_bins: [wgpu::BindGroup; 2],
 }
 
 /// The largest number of bins that a workgroup of `project_bin` counts by itself.
@@ -61,24 +64,39 @@ impl ViewRenderer {
         &self,
         renderer: &Renderer,
         allocator: &Allocator<'_>,
-        picture: UVec2,
-        entries: u32,
+        sizes: Sizes,
         instance: wgpu::BindingResource<'_>,
         [splats, tile_ranges, pair_splats]: [&wgpu::Buffer; 3],
     ) -> FastResources {
-        let grid = bin_grid(picture);
-        let count = u64::from(grid.x * grid.y);
+        let count = u64::from(bin_grid(sizes.picture).element_product());
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
-        let bins = allocator.buffer("gs4d bins", 2 * 4 * (count + u64::from(BIN_COUNTERS)), usage);
-        let size = 8 * count * u64::from(bin_capacity(picture, entries));
-        let entries = allocator.buffer("gs4d bin entries", size, BufferUsages::STORAGE);
-        let (counters, entries) = (bins.as_entire_binding(), entries.as_entire_binding());
+        let counters = count + u64::from(BIN_COUNTERS + sizes.parts);
+        let bins = [(); 2].map(|()| allocator.buffer("gs4d bins", 4 * counters, usage));
+        let entries_size = 8 * count * u64::from(bin_capacity(sizes.picture, sizes.entries));
+        let entries = allocator.buffer("gs4d bin entries", entries_size, BufferUsages::STORAGE);
+        let visible = allocator.buffer("gs4d visible", 4 * u64::from(sizes.slots), BufferUsages::STORAGE);
+        let bytes = 2 * bins[0].size() + entries_size + visible.size();
         let layouts = &renderer.layouts;
-        let resources = [instance, splats.as_entire_binding(), counters.clone(), entries.clone()];
-        let project_bin = allocator.bind_group("gs4d project_bin", &layouts.project_bin, &resources);
+        let [splats, entries, visible] = [splats, &entries, &visible].map(wgpu::Buffer::as_entire_binding);
+        let [even, odd] = bins.each_ref().map(wgpu::Buffer::as_entire_binding);
         let (ranges, pairs) = (tile_ranges.as_entire_binding(), pair_splats.as_entire_binding());
-        let resources = [self.frame.as_entire_binding(), counters, entries, ranges, pairs];
-        let sort_bins = allocator.bind_group("gs4d sort_bins", &layouts.sort_bins, &resources);
-        FastResources { bytes: bins.size() + size, bins, project_bin, sort_bins }
+        let both = [[&even, &odd], [&odd, &even]];
+        let project_bin = both.map(|[now, _]| {
+            let resources = [instance.clone(), splats.clone(), now.clone(), entries.clone(), visible.clone()];
+            allocator.bind_group("gs4d project_bin", &layouts.project_bin, &resources)
+        });
+        let colors = both.map(|[now, _]| {
+            let mut resources = vec![instance.clone(), splats.clone(), now.clone(), visible.clone()];
+            if has_room_for_bins(&allocator.device.limits()) {
+                resources.push(entries.clone());
+            }
+            allocator.bind_group("gs4d colors", &layouts.colors, &resources)
+        });
+        let sort_bins = both.map(|[now, next]| {
+            let frame = self.frame.as_entire_binding();
+            let resources = [frame, now.clone(), next.clone(), entries.clone(), ranges.clone(), pairs.clone()];
+            allocator.bind_group("gs4d sort_bins", &layouts.sort_bins, &resources)
+        });
+        FastResources { bytes, bins, project_bin, colors, sort_bins }
     }
 }

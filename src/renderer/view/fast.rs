@@ -1,43 +1,46 @@
-//! The fast renderer of a view: three dispatches instead of the global sorts.
+//! The fast renderer of a view: four dispatches instead of the global sorts.
 //!
 //! In: what the reference design takes: instances, sizes, the bind group of the pixels. Out: the same picture.
 //!
 //! | pass | reads | writes |
 //! |---|---|---|
-//! | `project_bin` | active list, Gaussians, color coefficients | splats, bins of a few tiles, in no order |
+//! | `project_bin` | active list, Gaussians | splats, list of the visible ones, bins of a few tiles, in no order |
+//! | `colors` | visible splats, color coefficients | colors of splats |
 //! | `sort_bins` | bins | pairs of each tile, in order of depth |
 //! | `blend_blocks` | pairs, splats, opaque depth | color and transmittance, expected and median depth |
+//!
+//! `colors` and `sort_bins` do not depend on each other and run at the same time, if each frame has an encoder of its own: wgpu waits
+//! between two passes of an encoder for each buffer that the second writes and an earlier one used. So the counters of even and odd
+//! frames are separate buffers.
 
 use super::bins::{FastResources, bin_capacity, bin_grid, bin_side};
 use super::record::mark;
 use super::resources::{Resources, Sizes};
 use super::{Instance, ViewRenderer};
-use crate::renderer::layout::BIN_COUNTERS;
+use crate::renderer::layout::{BIN_COUNTERS, Counters};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::timing::PassTimer;
 use crate::view::tiles;
 
+/// Splats of a workgroup of `colors`.
+const COLORS_OF_GROUP: u32 = 64;
+/// The largest number of workgroups of `colors`, which go on until all visible splats have a color: enough for any GPU.
+const COLOR_GROUPS: u32 = 4096;
+
 impl ViewRenderer {
-    /// Returns the index of the first counter of a frame.
-    fn first_counter(&self, sizes: &Sizes, odd: bool) -> u32 {
-        let grid = bin_grid(sizes.picture);
-        if odd { BIN_COUNTERS + grid.x * grid.y } else { 0 }
+    /// Returns the counters of the frame prepared last, on the GPU, and where they are, in bytes.
+    pub(in crate::renderer) fn counters(&self) -> (&wgpu::Buffer, u64) {
+        let first = u64::from(BIN_COUNTERS) * 4 - size_of::<Counters>() as u64;
+        let fast = self.resources.as_ref().and_then(|made| made.fast.as_ref());
+        // `sort_bins` writes them beside those of the next frame.
+        fast.map_or((&self.counters, 0), |fast| (&fast.bins[usize::from(!self.odd)], first))
     }
 
-    /// Returns where the counters of the frame prepared last are, in bytes.
-    pub(in crate::renderer) fn counters_offset(&self) -> u64 {
-        self.resources
-            .as_ref()
-            .filter(|made| made.fast.is_some())
-            .map_or(0, |made| u64::from(self.first_counter(&made.sizes, self.odd)) * 4)
-    }
-
-    /// Returns the uniform `binning` of the frame that is prepared.
-    pub(super) fn binning(&self, sizes: &Sizes) -> [u32; 4] {
-        let counters = [self.odd, !self.odd].map(|odd| self.first_counter(sizes, odd));
+    /// Returns the uniform `binning` of a part in the frame that is prepared.
+    pub(super) fn binning(&self, sizes: &Sizes, part: u32) -> [u32; 4] {
         // Never 0, which is the stamp of a new buffer.
         let frame = self.frames % 0xffff + 1;
-        [bin_side(sizes.picture) | (frame << 8), bin_capacity(sizes.picture, sizes.entries), counters[0], counters[1]]
+        [bin_side(sizes.picture) | (frame << 8), bin_capacity(sizes.picture, sizes.entries), part, sizes.parts]
     }
 
     /// Records the passes of the fast design.
@@ -50,8 +53,22 @@ impl ViewRenderer {
         instances: &[Instance<'_>],
         timer: Option<&PassTimer>,
     ) {
+        let odd = usize::from(self.odd);
         // project_bin
-        self.project(renderer, |storage| renderer.project_bin(storage), &fast.project_bin, pass, instances);
+        let groups = |count: u32| count.div_ceil(256);
+        self.project(
+            |storage| renderer.project_bin(storage),
+            renderer,
+            &fast.project_bin[odd],
+            groups,
+            pass,
+            instances,
+        );
+        mark(timer, pass);
+
+        // colors
+        let groups = |count: u32| count.div_ceil(COLORS_OF_GROUP).min(COLOR_GROUPS);
+        self.project(|storage| renderer.colors(storage), renderer, &fast.colors[odd], groups, pass, instances);
         mark(timer, pass);
 
         // sort_bins
@@ -62,7 +79,7 @@ impl ViewRenderer {
         };
         let bins = bin_grid(made.sizes.picture);
         pass.set_pipeline(sort_bins);
-        pass.set_bind_group(0, &fast.sort_bins, &[]);
+        pass.set_bind_group(0, &fast.sort_bins[odd], &[]);
         pass.dispatch_workgroups(bins.x, bins.y, 1);
         mark(timer, pass);
 

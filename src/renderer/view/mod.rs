@@ -352,12 +352,6 @@ impl ViewRenderer {
         })
     }
 
-    /// Returns the counters of the frame recorded last, on the GPU, from [`counters_offset`](Self::counters_offset) on.
-    pub(crate) fn counters(&self) -> &wgpu::Buffer {
-        let fast = self.resources.as_ref().and_then(|made| made.fast.as_ref());
-        fast.map_or(&self.counters, |fast| &fast.bins)
-    }
-
     /// Makes the next [`prepare`](Self::prepare) allocate room for that many pairs and half as many more, if there is
     /// hardly enough and the device allows it.
     pub(crate) fn make_room(&mut self, pairs: u32) {
@@ -452,7 +446,7 @@ impl ViewRenderer {
             for (part_index, part) in instance.capture.parts.iter().enumerate() {
                 let count = drawn_count(instance.capture, part_index, instance.active);
                 let listed = u32::from(instance.active.is_some());
-                let binning = self.binning(&made.sizes);
+                let binning = self.binning(&made.sizes, index);
                 let uniform =
                     layout::InstanceUniforms { first_slot: slot, count, listed, first_listed, binning, ..capture };
                 let at = u64::from(index * self.alignment);
@@ -498,7 +492,7 @@ impl ViewRenderer {
             // Two capture units.
             debug_depth: 2.0 * view.world_to_camera.row(2).truncate().length(),
             environment_opacity: appearance.opacity.clamp(0.0, 1.0),
-            binning: self.binning(&made.sizes),
+            binning: self.binning(&made.sizes, 0),
         };
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
     }

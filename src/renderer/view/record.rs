@@ -45,8 +45,9 @@ impl ViewRenderer {
             None => self.record_reference(renderer, made, &mut pass, instances, timer),
         }
         drop(pass);
-        let offset = self.counters_offset();
-        self.readback.copy(encoder, fast.map_or(&self.counters, |fast| &fast.bins), offset);
+        let (counters, offset) = self.counters();
+        let counters = counters.clone();
+        self.readback.copy(encoder, &counters, offset);
         self.recorded = true;
     }
 
@@ -60,7 +61,8 @@ impl ViewRenderer {
         timer: Option<&PassTimer>,
     ) {
         // project
-        self.project(renderer, |storage| Some(&renderer.project[storage as usize]), &made.project, pass, instances);
+        let pipeline = |storage| Some(&renderer.project[storage as usize]);
+        self.project(pipeline, renderer, &made.project, |count| count.div_ceil(256), pass, instances);
         mark(timer, pass);
 
         // sort by depth: the first step drops the invisible splats and counts the others; the later steps are sized
@@ -107,12 +109,14 @@ impl ViewRenderer {
         mark(timer, pass);
     }
 
-    /// Records one dispatch of `project` or `project_bin` for each part of each instance.
+    /// Records one dispatch of `project`, `project_bin` or `colors` for each part of each instance; `groups` returns the
+    /// number of workgroups for a number of Gaussians.
     pub(super) fn project<'a>(
         &self,
-        renderer: &Renderer,
         pipeline: impl Fn(Storage) -> Option<&'a wgpu::ComputePipeline>,
+        renderer: &Renderer,
         group: &wgpu::BindGroup,
+        groups: impl Fn(u32) -> u32,
         pass: &mut wgpu::ComputePass<'_>,
         instances: &[Instance<'_>],
     ) {
@@ -123,9 +127,10 @@ impl ViewRenderer {
             pass.set_bind_group(2, instance.active.map_or(&renderer.no_list, |active| &active.list), &[]);
             for (at, part) in instance.capture.parts.iter().enumerate() {
                 pass.set_bind_group(0, group, &[index * self.alignment]);
-                pass.set_bind_group(1, &part.bind_group, &[]);
+                pass.set_bind_group(1, &part.geometry, &[]);
+                pass.set_bind_group(3, &part.color, &[]);
                 let count = drawn_count(instance.capture, at, instance.active);
-                pass.dispatch_workgroups(count.div_ceil(256), 1, 1);
+                pass.dispatch_workgroups(groups(count), 1, 1);
                 index += 1;
             }
         }

@@ -83,7 +83,7 @@ impl ViewRenderer {
         opaque: wgpu::TextureView,
         environment: wgpu::Buffer,
     ) -> Resources {
-        let Sizes { slots, pairs, entries, parts, picture: size } = sizes;
+        let Sizes { slots, pairs, parts, picture: size, .. } = sizes;
         let allocator = renderer.allocator(device);
         let bytes = Cell::new(0);
         let fast = self.design == Design::Fast;
@@ -147,7 +147,7 @@ impl ViewRenderer {
         });
         let fast = (self.design == Design::Fast).then(|| {
             let buffers = [&splats, &tile_ranges, &pair_splats[sorted]];
-            self.make_fast(renderer, &allocator, size, entries, instance.clone(), buffers)
+            self.make_fast(renderer, &allocator, sizes, instance.clone(), buffers)
         });
         Resources {
             sizes,

@@ -1,0 +1,47 @@
+// The Gaussians of one part of a capture and the instance in which they are drawn, for the passes that read them. In: an index. Out: a
+// Gaussian, whole or packed (PACKED_GEOMETRY).
+#define_import_path gs4d::capture
+
+#import gs4d::types::{Gaussian, InstanceUniforms}
+#ifdef PACKED_GEOMETRY
+#import gs4d::packed::{unpack_gaussian, unpack_lifespan, BLOCK_RANGES, PACKED_BLOCK, SHARED_RANGES}
+#endif
+
+@group(0) @binding(0) var<uniform> instance: InstanceUniforms;
+#ifdef PACKED_GEOMETRY
+// Two four-vectors for each Gaussian.
+@group(1) @binding(0) var<storage, read> records: array<vec4<u32>>;
+@group(1) @binding(1) var<storage, read> ranges: array<vec4<f32>>;
+#else
+@group(1) @binding(0) var<storage, read> gaussians: array<Gaussian>;
+#endif
+// The list that `activate` writes; not read without a filter.
+@group(2) @binding(0) var<storage, read> active_list: array<u32>;
+
+// Returns the index of the Gaussian of a slot of this part.
+fn index_of(slot: u32) -> u32 {
+    if instance.listed != 0u {
+        return active_list[instance.first_listed + slot];
+    }
+    return slot;
+}
+
+// Returns mean_t and inverse_sigma_t.
+fn load_lifespan(index: u32) -> vec2<f32> {
+#ifdef PACKED_GEOMETRY
+    return unpack_lifespan(records[2u * index], ranges[0]);
+#else
+    return vec2(gaussians[index].mean_t, gaussians[index].inverse_sigma_t);
+#endif
+}
+
+fn load_gaussian(index: u32) -> Gaussian {
+#ifdef PACKED_GEOMETRY
+    let block = SHARED_RANGES + index / PACKED_BLOCK * BLOCK_RANGES;
+    let low = records[2u * index];
+    let high = records[2u * index + 1u];
+    return unpack_gaussian(low, high, ranges[0], ranges[1], ranges[block], ranges[block + 1u]);
+#else
+    return gaussians[index];
+#endif
+}
