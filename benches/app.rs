@@ -7,7 +7,7 @@
 //! In: a capture (default: the bundled one), a picture size (640x480), a number of frames for each measurement (600), how often each is
 //! repeated (3), and an eye in capture space that looks at the origin with z up (-3.57,1.3,1.69). Out: for Bevy's default plugins and
 //! for the few that a capture needs, with one sample and with four, for no capture and for each [`Design`]: frames per second and
-//! milliseconds of a frame, the median of the rounds, and how much longer the frame is than without a capture. Rendering is pipelined,
+//! milliseconds of a frame, the median of the rounds, how much longer the frame is than without a capture, and the spread of the rounds. Rendering is pipelined,
 //! there is no window, and each measurement ends when the GPU has finished.
 
 use bevy::a11y::AccessibilityPlugin;
@@ -72,14 +72,23 @@ fn main() -> Result {
         }
     }
     println!("{}, {}x{}", arguments.capture.display(), arguments.size.x, arguments.size.y);
-    println!("{:<8} {:>7} {:<10} {:>8} {:>9} {:>9}", "plugins", "samples", "capture", "FPS", "frame ms", "more ms");
+    println!(
+        "{:<8} {:>7} {:<10} {:>8} {:>9} {:>9} {:>15}",
+        "plugins", "samples", "capture", "FPS", "frame ms", "more ms", "rounds ms"
+    );
     let mut without = f64::NAN;
     for Subject { plugins, samples, design, times, .. } in &mut subjects {
         times.sort_by(f64::total_cmp);
         let time = times.get(times.len() / 2).copied().unwrap_or(f64::NAN);
         without = if design.is_none() { time } else { without };
         let name = Design::NAMES.iter().find(|(_, known)| Some(*known) == *design).map_or("none", |(name, _)| name);
-        println!("{plugins:<8} {samples:>7} {name:<10} {:>8.0} {time:>9.3} {:>9.3}", 1e3 / time, time - without);
+        let spread =
+            times.first().zip(times.last()).map_or(String::new(), |(low, high)| format!("{low:.3} - {high:.3}"));
+        println!(
+            "{plugins:<8} {samples:>7} {name:<10} {:>8.0} {time:>9.3} {:>9.3} {spread:>15}",
+            1e3 / time,
+            time - without
+        );
     }
     Ok(())
 }

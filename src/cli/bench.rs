@@ -114,6 +114,7 @@ impl Bench {
                 let Subject { path, capture, views, .. } = row.subject;
                 note(&format!("round {round} of {}: {}", self.rounds, path.display()));
                 headless.set_design(row.design);
+                row.design = headless.design();
                 headless.use_filters(row.filtered);
                 row.rounds.push(headless.time(capture, views, self.frames)?);
             }

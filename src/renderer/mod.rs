@@ -18,7 +18,7 @@
 //! Two stable sorts, first by depth and then by tile, give the original's order by (tile, depth, index), and move far
 //! less data than a sort by its 64-bit keys. No pass needs subgroups, and the results do not depend on their size.
 //!
-//! That is the reference design ([`Design::Reference`], the default), whose order is the original's. [`Design::Fast`] draws the same picture
+//! That is the reference design ([`Design::Reference`]), whose order is the original's. [`Design::Fast`] draws the same picture
 //! in three dispatches: `project_bin` puts splats into bins of a few tiles without order, `sort_bins` sorts each bin in workgroup memory and
 //! writes the pairs of its tiles, and `blend_blocks` blends each tile in blocks of 8 x 4 pixels.
 

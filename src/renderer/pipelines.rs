@@ -9,6 +9,7 @@ use super::memory::Allocator;
 use super::shaders::{
     BINNED, Blending, LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32, ShaderChecks, Storage, module,
 };
+use super::view::Design;
 use super::work::WorkCounters;
 use super::{GpuError, layout};
 use std::sync::OnceLock;
@@ -20,19 +21,10 @@ pub struct Renderer {
     pub(super) activate_count: wgpu::ComputePipeline,
     pub(super) activate_scan: wgpu::ComputePipeline,
     pub(super) activate_write: wgpu::ComputePipeline,
-    /// Indexed by how a capture is stored, in the order of [`Storage::ALL`].
-    pub(super) project: [wgpu::ComputePipeline; 3],
-    pub(super) sort_count: wgpu::ComputePipeline,
-    pub(super) sort_scan: wgpu::ComputePipeline,
-    pub(super) sort_visible: wgpu::ComputePipeline,
-    pub(super) sort_scatter: wgpu::ComputePipeline,
-    pub(super) bin_count: wgpu::ComputePipeline,
-    pub(super) bin_scan: wgpu::ComputePipeline,
-    pub(super) bin_offset: wgpu::ComputePipeline,
-    pub(super) bin_emit: wgpu::ComputePipeline,
-    pub(super) ranges: wgpu::ComputePipeline,
-    pub(super) blend: wgpu::ComputePipeline,
-    pub(super) blend_multisampled: wgpu::ComputePipeline,
+    /// The passes of the reference design, compiled when they are first used: `project`, indexed by how a capture is stored, in the
+    /// order of [`Storage::ALL`], and the others.
+    project: [OnceLock<wgpu::ComputePipeline>; 3],
+    reference: OnceLock<ReferencePasses>,
     /// Passes of the fast renderer, each compiled when it is first used: `project_bin` and `colors`, indexed by how a capture is
     /// stored, in the order of [`Storage::ALL`], `sort_bins`, in the order of [`Lists::ALL`], and `blend_blocks`, with small and with large
     /// batches, in the order of [`Blending::ALL`].
@@ -41,9 +33,52 @@ pub struct Renderer {
     sort_bins: [OnceLock<wgpu::ComputePipeline>; 3],
     blend_blocks: [[OnceLock<wgpu::ComputePipeline>; 4]; 2],
     checks: ShaderChecks,
+    /// Whether the device is a software driver.
+    is_software: bool,
     /// Bound instead of a list of active Gaussians if all are drawn.
     pub(super) no_list: wgpu::BindGroup,
     work: WorkCounters,
+}
+
+/// The passes of the reference design after `project`.
+#[derive(Debug)]
+pub(super) struct ReferencePasses {
+    pub sort_count: wgpu::ComputePipeline,
+    pub sort_scan: wgpu::ComputePipeline,
+    pub sort_visible: wgpu::ComputePipeline,
+    pub sort_scatter: wgpu::ComputePipeline,
+    pub bin_count: wgpu::ComputePipeline,
+    pub bin_scan: wgpu::ComputePipeline,
+    pub bin_offset: wgpu::ComputePipeline,
+    pub bin_emit: wgpu::ComputePipeline,
+    pub ranges: wgpu::ComputePipeline,
+    pub blend: wgpu::ComputePipeline,
+    pub blend_multisampled: wgpu::ComputePipeline,
+}
+
+impl ReferencePasses {
+    fn new(device: &wgpu::Device, layouts: &Layouts, checks: ShaderChecks) -> Result<Self, GpuError> {
+        let shader = |name| module(device, name, &[], checks);
+        let (sort, bin) = (shader("sort")?, shader("bin")?);
+        let (ranges, blend) = (shader("ranges")?, shader("blend")?);
+        let blend_multisampled = module(device, "blend", MULTISAMPLED, checks)?;
+        let pipeline = |module: &wgpu::ShaderModule, entry: &str, groups: &[&wgpu::BindGroupLayout]| {
+            pipeline(device, module, entry, groups)
+        };
+        Ok(Self {
+            sort_count: pipeline(&sort, "count", &[&layouts.sort]),
+            sort_scan: pipeline(&sort, "scan", &[&layouts.sort]),
+            sort_visible: pipeline(&sort, "visible", &[&layouts.sort, &layouts.arguments]),
+            sort_scatter: pipeline(&sort, "scatter", &[&layouts.sort]),
+            bin_count: pipeline(&bin, "count", &[&layouts.bin]),
+            bin_scan: pipeline(&bin, "scan", &[&layouts.bin, &layouts.arguments]),
+            bin_offset: pipeline(&bin, "offset", &[&layouts.bin]),
+            bin_emit: pipeline(&bin, "emit", &[&layouts.bin]),
+            ranges: pipeline(&ranges, "ranges", &[&layouts.ranges]),
+            blend: pipeline(&blend, "blend", &[&layouts.pixel[0], &layouts.blend]),
+            blend_multisampled: pipeline(&blend_multisampled, "blend", &[&layouts.pixel[1], &layouts.blend]),
+        })
+    }
 }
 
 /// Bind group layouts, in the order of the shaders' bindings.
@@ -68,18 +103,14 @@ pub(super) struct Layouts {
 }
 
 impl Renderer {
-    /// Compiles every pass.
+    /// Compiles the passes that both designs need, and creates the layouts of all; others are compiled when a view first needs them.
     ///
     /// # Errors
     /// When a limit of the device is too low for the passes, or a shader does not compile.
     pub fn new(device: &wgpu::Device, checks: ShaderChecks) -> Result<Self, GpuError> {
         check_limits(&device.limits())?;
         let layouts = Layouts::new(device);
-        let shader = |name| module(device, name, &[], checks);
-        let activate = shader("activate")?;
-        let (sort, bin) = (shader("sort")?, shader("bin")?);
-        let (ranges, blend) = (shader("ranges")?, shader("blend")?);
-        let blend_multisampled = module(device, "blend", MULTISAMPLED, checks)?;
+        let activate = module(device, "activate", &[], checks)?;
         let work = WorkCounters::default();
         let allocator = Allocator { device, work: &work };
         let no_list = allocator.buffer("gs4d no active list", 4, wgpu::BufferUsages::STORAGE);
@@ -90,31 +121,14 @@ impl Renderer {
             activate_count: pipeline(&activate, "count", &[&layouts.activate, &layouts.filter]),
             activate_scan: pipeline(&activate, "scan", &[&layouts.activate, &layouts.filter]),
             activate_write: pipeline(&activate, "write", &[&layouts.activate, &layouts.filter]),
-            project: {
-                let mut all = Vec::new();
-                for storage in Storage::ALL {
-                    let shader = module(device, "project", storage.definitions(), checks)?;
-                    let [geometry, color] = &layouts.captures[storage as usize];
-                    all.push(pipeline(&shader, "project", &[&layouts.project, geometry, &layouts.active, color]));
-                }
-                all.try_into().map_err(|_| GpuError::Device("a pipeline is missing".into()))?
-            },
-            sort_count: pipeline(&sort, "count", &[&layouts.sort]),
-            sort_scan: pipeline(&sort, "scan", &[&layouts.sort]),
-            sort_visible: pipeline(&sort, "visible", &[&layouts.sort, &layouts.arguments]),
-            sort_scatter: pipeline(&sort, "scatter", &[&layouts.sort]),
-            bin_count: pipeline(&bin, "count", &[&layouts.bin]),
-            bin_scan: pipeline(&bin, "scan", &[&layouts.bin, &layouts.arguments]),
-            bin_offset: pipeline(&bin, "offset", &[&layouts.bin]),
-            bin_emit: pipeline(&bin, "emit", &[&layouts.bin]),
-            ranges: pipeline(&ranges, "ranges", &[&layouts.ranges]),
-            blend: pipeline(&blend, "blend", &[&layouts.pixel[0], &layouts.blend]),
-            blend_multisampled: pipeline(&blend_multisampled, "blend", &[&layouts.pixel[1], &layouts.blend]),
+            project: Default::default(),
+            reference: OnceLock::new(),
             project_bin: Default::default(),
             colors: Default::default(),
             sort_bins: Default::default(),
             blend_blocks: Default::default(),
             checks,
+            is_software: device.adapter_info().device_type == wgpu::DeviceType::Cpu,
             no_list: allocator.bind_group("gs4d no active list", &layouts.active, &[no_list.as_entire_binding()]),
             layouts,
             work,
@@ -135,6 +149,50 @@ impl Renderer {
     /// the renderer was created on.
     pub fn allocator<'a>(&'a self, device: &'a wgpu::Device) -> Allocator<'a> {
         Allocator { device, work: &self.work }
+    }
+
+    /// Returns [`Design::Fast`] or [`Design::Reference`]: what a design is on this device.
+    pub(super) fn resolve(&self, design: Design) -> Design {
+        match design {
+            Design::Auto if self.is_software => Design::Reference,
+            Design::Auto => Design::Fast,
+            chosen @ (Design::Fast | Design::Reference) => chosen,
+        }
+    }
+
+    /// Compiles the passes of the reference design for captures stored in these ways, unless they have been.
+    ///
+    /// # Errors
+    /// When a shader does not compile.
+    pub(super) fn compile_reference(
+        &self,
+        device: &wgpu::Device,
+        storages: impl Iterator<Item = Storage>,
+    ) -> Result<(), GpuError> {
+        let layouts = &self.layouts;
+        for storage in storages {
+            if self.project(storage).is_none() {
+                let shader = module(device, "project", storage.definitions(), self.checks)?;
+                let [geometry, color] = &layouts.captures[storage as usize];
+                let made = pipeline(device, &shader, "project", &[&layouts.project, geometry, &layouts.active, color]);
+                self.project[storage as usize].get_or_init(|| made);
+            }
+        }
+        if self.reference().is_none() {
+            let made = ReferencePasses::new(device, layouts, self.checks)?;
+            self.reference.get_or_init(|| made);
+        }
+        Ok(())
+    }
+
+    /// Returns `project` for captures stored in this way, if it has been compiled.
+    pub(super) fn project(&self, storage: Storage) -> Option<&wgpu::ComputePipeline> {
+        self.project[storage as usize].get()
+    }
+
+    /// Returns the other passes of the reference design, if they have been compiled.
+    pub(super) fn reference(&self) -> Option<&ReferencePasses> {
+        self.reference.get()
     }
 
     /// Compiles the passes of the fast renderer for captures stored in these ways, unless they have been.

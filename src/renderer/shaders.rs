@@ -6,6 +6,7 @@ use super::GpuError;
 use crate::scene::{Form, PackedColors, PackedScene};
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::borrow::Cow;
+use std::sync::{Mutex, PoisonError};
 use wgpu::naga::valid::Capabilities;
 
 /// Libraries, each before those that import it.
@@ -190,6 +191,25 @@ pub fn compose(name: &str, definitions: &[&str]) -> Result<wgpu::naga::Module, G
     };
     let subgroups = definitions.iter().any(|definition| SUBGROUPS_OF_32.contains(definition));
     let capabilities = if subgroups { Capabilities::SUBGROUP } else { Capabilities::empty() };
+    let mut composer = COMPOSERS[usize::from(subgroups)].lock().unwrap_or_else(PoisonError::into_inner);
+    if composer.is_none() {
+        *composer = Some(with_libraries(capabilities)?);
+    }
+    let Some(composer) = composer.as_mut() else {
+        return Err(GpuError::Shader { name, reason: "there is no composer".into() });
+    };
+    let shader_defs = definitions.iter().map(|name| ((*name).to_owned(), ShaderDefValue::Bool(true))).collect();
+    let descriptor = NagaModuleDescriptor { source, file_path: name, shader_defs, ..Default::default() };
+    composer
+        .make_naga_module(descriptor)
+        .map_err(|error| GpuError::Shader { name, reason: error.emit_to_string(composer) })
+}
+
+/// Composers that have parsed the libraries, without and with subgroups.
+static COMPOSERS: [Mutex<Option<Composer>>; 2] = [const { Mutex::new(None) }; 2];
+
+/// Returns a composer that has parsed the libraries.
+fn with_libraries(capabilities: Capabilities) -> Result<Composer, GpuError> {
     let mut composer = Composer::default().with_capabilities(capabilities);
     for &(library, source) in LIBRARIES {
         let descriptor = ComposableModuleDescriptor { source, file_path: library, ..Default::default() };
@@ -197,11 +217,7 @@ pub fn compose(name: &str, definitions: &[&str]) -> Result<wgpu::naga::Module, G
             return Err(GpuError::Shader { name: library, reason: error.emit_to_string(&composer) });
         }
     }
-    let shader_defs = definitions.iter().map(|name| ((*name).to_owned(), ShaderDefValue::Bool(true))).collect();
-    let descriptor = NagaModuleDescriptor { source, file_path: name, shader_defs, ..Default::default() };
-    composer
-        .make_naga_module(descriptor)
-        .map_err(|error| GpuError::Shader { name, reason: error.emit_to_string(&composer) })
+    Ok(composer)
 }
 
 /// Creates the shader module of a pass, as [`compose`] composes it.

@@ -30,8 +30,8 @@ impl EngineArgs {
 /// How views are drawn.
 #[derive(clap::Args)]
 pub struct DesignArgs {
-    /// How views are drawn on a GPU; both draw the same picture.
-    #[arg(long, value_name = "RENDERER", default_value = "reference", value_parser = values::one_of(&Design::NAMES))]
+    /// How views are drawn on a GPU; all draw the same picture. auto: fast, but reference on a software driver.
+    #[arg(long, value_name = "RENDERER", default_value = "auto", value_parser = values::one_of(&Design::NAMES))]
     pub renderer: Design,
 }
 
@@ -47,8 +47,8 @@ pub struct RendererArgs {
 /// In which ways views are drawn, and where.
 #[derive(clap::Args)]
 pub struct RenderersArgs {
-    /// How views are drawn, one or more.
-    #[arg(long = "renderer", value_name = "RENDERER,..", default_value = "reference", value_delimiter = ',',
+    /// How views are drawn, one or more; all draw the same picture. auto: fast, but reference on a software driver.
+    #[arg(long = "renderer", value_name = "RENDERER,..", default_value = "auto", value_delimiter = ',',
         value_parser = values::one_of(&Design::NAMES))]
     pub renderers: Vec<Design>,
     #[command(flatten)]

@@ -46,10 +46,11 @@ impl Listed for DebugView {
 }
 
 impl Listed for Design {
-    const ALL: &'static [Self] = &[Self::Fast, Self::Reference];
+    const ALL: &'static [Self] = &[Self::Auto, Self::Fast, Self::Reference];
 
     fn name(self) -> &'static str {
         match self {
+            Self::Auto => "auto",
             Self::Fast => "fast",
             Self::Reference => "reference",
         }

@@ -117,9 +117,10 @@ impl CaptureView {
     }
 
     /// Sets how captures are drawn. The renderer no longer measures after a change.
-    pub(super) fn set_design(&mut self, design: Design) {
-        self.measured &= self.renderer.design() == design;
-        self.renderer.set_design(design);
+    pub(super) fn set_design(&mut self, renderer: &Renderer, design: Design) {
+        let before = self.renderer.design();
+        self.renderer.set_design(renderer, design);
+        self.measured &= self.renderer.design() == before;
     }
 
     /// Starts or stops measuring GPU times.

@@ -130,7 +130,7 @@ pub(super) fn prepare_views(
             views.0.entry(entity).or_insert_with(|| CaptureView::new(&device, &renderer.0, main.id(), composite));
         state.composite = composite;
         state.late = settings.late;
-        state.set_design(settings.design);
+        state.set_design(&renderer.0, settings.design);
         state.measure(measure, &device, &queue, &renderer.0);
         state.drawn.clear();
         let Some(lens) = drawable_lens(view, camera) else { continue };

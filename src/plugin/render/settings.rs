@@ -97,8 +97,7 @@ pub struct CaptureViewSettings {
     /// Whether captures are drawn after transparent meshes even without multisampling. Cameras with Bevy's atmosphere need it, because the
     /// atmosphere is drawn between opaque and transparent meshes and cannot be ordered against captures. Default: false.
     pub late: bool,
-    /// How captures are drawn; every design draws the same picture. [`Design::Fast`] is several times as fast on large GPUs and slower on
-    /// software drivers. Default: [`Design::Reference`].
+    /// How captures are drawn; every design draws the same picture. Default: [`Design::Auto`], the fastest on this GPU.
     pub design: Design,
 }
 

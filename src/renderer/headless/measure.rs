@@ -83,7 +83,7 @@ impl Headless {
     fn lane(&self, capture: &GpuCapture) -> Lane {
         let device = &self.context.device;
         let mut view = ViewRenderer::new(device, &self.renderer);
-        view.set_design(self.view.design());
+        view.set_design(&self.renderer, self.view.design());
         // Room for what the warm-up counted.
         view.make_room(self.view.pair_capacity());
         let filtered = self.filtered.then(|| ActiveList::new(device, &self.renderer, capture));

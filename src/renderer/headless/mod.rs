@@ -55,9 +55,14 @@ impl Headless {
         self.renderer.allocator(&self.context.device)
     }
 
-    /// Chooses how views are drawn. Default: [`Design::Reference`].
+    /// Chooses how views are drawn. Default: [`Design::Auto`].
     pub fn set_design(&mut self, design: Design) {
-        self.view.set_design(design);
+        self.view.set_design(&self.renderer, design);
+    }
+
+    /// Returns how views are drawn: never [`Design::Auto`].
+    pub fn design(&self) -> Design {
+        self.view.design()
     }
 
     /// Sets whether the frames that [`time`](Self::time) measures have expected and median depth. Default: `false`, only color and

@@ -82,6 +82,7 @@ pub struct ViewRenderer {
     alignment: u32,
     /// Number of slots of the frame prepared last.
     slots: u32,
+    /// Never [`Design::Auto`].
     design: Design,
     /// Whether the counters of odd frames are used, and whether the frame prepared last has been recorded.
     odd: bool,
@@ -104,6 +105,8 @@ pub struct ViewRenderer {
     entries_wanted: u32,
     /// Number of successive frames for which the buffers have been far too large.
     oversized_frames: u32,
+    /// Bytes of the instance uniforms of a frame, kept for their memory.
+    instance_uniforms: Vec<u8>,
     frame: wgpu::Buffer,
     steps: wgpu::Buffer,
     counters: wgpu::Buffer,
@@ -139,24 +142,27 @@ pub struct FinishedFrame<'a> {
     pub pairs: u32,
 }
 
-/// How a view is drawn. Both designs draw the same picture.
+/// How a view is drawn. All draw the same picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Design {
-    /// Bins of splats, sorted and blended by one workgroup for each tile.
+    /// [`Fast`](Self::Fast), but on software drivers [`Reference`](Self::Reference), which is faster there.
+    #[default]
+    Auto,
+    /// Bins of splats, each sorted by one workgroup.
     Fast,
     /// Global sorts by depth and by tile, in the order of the original rasterizer.
-    #[default]
     Reference,
 }
 
 impl Design {
     /// All designs, by name.
-    pub const NAMES: [(&'static str, Self); 2] = [("fast", Self::Fast), ("reference", Self::Reference)];
+    pub const NAMES: [(&'static str, Self); 3] =
+        [("auto", Self::Auto), ("fast", Self::Fast), ("reference", Self::Reference)];
 
     /// Returns the names of the passes that are timed.
     pub(super) fn timed_passes(self) -> &'static [&'static str] {
         match self {
-            Self::Fast => TIMED_FAST_PASSES,
+            Self::Auto | Self::Fast => TIMED_FAST_PASSES,
             Self::Reference => TIMED_PASSES,
         }
     }
@@ -172,13 +178,14 @@ impl ViewRenderer {
         Self {
             alignment,
             slots: 0,
-            design: Design::default(),
+            design: renderer.resolve(Design::Auto),
             odd: false,
             frames: 0,
             recorded: false,
             pairs_wanted: 0,
             entries_wanted: 0,
             oversized_frames: 0,
+            instance_uniforms: Vec::new(),
             frame: allocator.buffer("gs4d frame", size_of::<layout::FrameUniforms>() as u64, BufferUsages::UNIFORM),
             steps: allocator.buffer("gs4d steps", u64::from(alignment * 2 * DEPTH_STEPS), BufferUsages::UNIFORM),
             counters: allocator.buffer("gs4d counters", counters, BufferUsages::STORAGE | BufferUsages::COPY_SRC),
@@ -216,8 +223,10 @@ impl ViewRenderer {
         self.poll();
         self.blending = blending(parameters);
         self.has_depths = parameters.depths;
-        if self.design == Design::Fast {
-            let storages = instances.iter().map(|instance| instance.capture.storage);
+        let storages = instances.iter().map(|instance| instance.capture.storage);
+        if self.design == Design::Reference {
+            renderer.compile_reference(device, storages)?;
+        } else {
             self.large_batches = bins::large_batches(&device.limits(), instances);
             self.lists = Lists::suiting(&device.limits(), self.fullest_bin);
             renderer.compile_fast(device, storages, self.lists, self.blending, self.large_batches)?;
@@ -236,8 +245,8 @@ impl ViewRenderer {
         let parts: usize = instances.iter().map(|instance| instance.capture.parts.len()).sum();
         let splat = size_of::<layout::SplatRecord>() as u64;
         let limit = match self.design {
-            Design::Fast => binding_limit(&limits).min(u64::from(bins::MAX_SLOTS) * splat),
             Design::Reference => binding_limit(&limits),
+            Design::Auto | Design::Fast => binding_limit(&limits).min(u64::from(bins::MAX_SLOTS) * splat),
         };
         // The largest buffer per slot holds splats.
         let needed = (slots as u64).next_multiple_of(u64::from(BLOCK)) * splat;
@@ -249,9 +258,9 @@ impl ViewRenderer {
         let (guess, most) = (slots.saturating_mul(2).max(1 << 16), max_pairs(device));
         let pairs = self.pairs_wanted.max(guess).min(most);
         let entries = match self.design {
-            // Twice as many bytes as for pairs.
-            Design::Fast => self.entries_wanted.max(guess).min(most / 2),
             Design::Reference => 0,
+            // Twice as many bytes as for pairs.
+            Design::Auto | Design::Fast => self.entries_wanted.max(guess).min(most / 2),
         };
         let needed = Sizes {
             slots: slots.next_multiple_of(BLOCK).max(BLOCK),
@@ -315,9 +324,10 @@ impl ViewRenderer {
         }
     }
 
-    /// Chooses how the view is drawn from the next [`prepare`](Self::prepare) on. Default: [`Design::Reference`]. GPU time is no
-    /// longer [measured](Self::measure) after a change.
-    pub fn set_design(&mut self, design: Design) {
+    /// Chooses how the view is drawn from the next [`prepare`](Self::prepare) on. Default: [`Design::Auto`]. GPU time is no longer
+    /// [measured](Self::measure) after a change.
+    pub fn set_design(&mut self, renderer: &Renderer, design: Design) {
+        let design = renderer.resolve(design);
         if self.design != design {
             self.design = design;
             self.timing = None;
@@ -325,7 +335,7 @@ impl ViewRenderer {
         }
     }
 
-    /// Returns how the view is drawn.
+    /// Returns how the view is drawn: never [`Design::Auto`].
     pub fn design(&self) -> Design {
         self.design
     }
@@ -405,7 +415,7 @@ impl ViewRenderer {
             self.statistics.visible = counters.visible;
             self.statistics.pairs = counters.pairs;
             let wanted = match self.design {
-                Design::Fast => {
+                Design::Auto | Design::Fast => {
                     self.fullest_bin = counters.pairs_wanted;
                     let sizes = self.resources.as_ref().map(|made| made.sizes).unwrap_or_default();
                     let bins = bins::bin_grid(sizes.picture.max(UVec2::ONE)).element_product();
@@ -429,12 +439,14 @@ impl ViewRenderer {
     }
 
     fn write_uniforms(
-        &self,
+        &mut self,
         queue: &wgpu::Queue,
         instances: &[Instance<'_>],
         parameters: &ViewParameters<'_>,
         environment: Option<(View, Appearance, [u32; 2])>,
     ) {
+        let mut uniforms = std::mem::take(&mut self.instance_uniforms);
+        uniforms.clear();
         let Some(made) = &self.resources else { return };
         let mut slot = 0;
         let mut index = 0;
@@ -449,13 +461,14 @@ impl ViewRenderer {
                 let binning = self.binning(&made.sizes, index);
                 let uniform =
                     layout::InstanceUniforms { first_slot: slot, count, listed, first_listed, binning, ..capture };
-                let at = u64::from(index * self.alignment);
-                queue.write_buffer(&made.instances, at, bytemuck::bytes_of(&uniform));
+                uniforms.extend_from_slice(bytemuck::bytes_of(&uniform));
+                uniforms.resize(uniforms.len().next_multiple_of(self.alignment as usize), 0);
                 slot += count;
                 first_listed += part.count;
                 index += 1;
             }
         }
+        queue.write_buffer(&made.instances, 0, &uniforms);
         let (mode, color) = match (parameters.background, environment) {
             (Background::Color(color), _) => (layout::BACKGROUND_COLOR, color),
             (Background::Environment, Some((view, ..))) if !view.orthographic => {
@@ -495,6 +508,7 @@ impl ViewRenderer {
             binning: self.binning(&made.sizes, 0),
         };
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
+        self.instance_uniforms = uniforms;
     }
 }
 

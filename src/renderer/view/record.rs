@@ -6,7 +6,7 @@ use super::resources::{Resources, tile_steps};
 use super::{Instance, ViewRenderer};
 use crate::renderer::active::drawn_count;
 use crate::renderer::layout::{BLOCK, DEPTH_STEPS, DIGITS};
-use crate::renderer::pipelines::Renderer;
+use crate::renderer::pipelines::{ReferencePasses, Renderer};
 use crate::renderer::shaders::Storage;
 use crate::renderer::timing::PassTimer;
 use crate::view::tiles;
@@ -61,7 +61,8 @@ impl ViewRenderer {
         timer: Option<&PassTimer>,
     ) {
         // project
-        let pipeline = |storage| Some(&renderer.project[storage as usize]);
+        let Some(passes) = renderer.reference() else { return };
+        let pipeline = |storage| renderer.project(storage);
         self.project(pipeline, renderer, &made.project, |count| count.div_ceil(256), pass, instances);
         mark(timer, pass);
 
@@ -70,39 +71,39 @@ impl ViewRenderer {
         for step in 0..DEPTH_STEPS {
             let group = &made.sort_depth[if step == 0 { 0 } else { 2 - (step as usize % 2) }];
             let blocks = (step == 0).then(|| self.slots.div_ceil(BLOCK));
-            self.sort_step(renderer, pass, group, step, blocks, 0, Some(&made.arguments));
+            self.sort_step(passes, pass, group, step, blocks, 0, Some(&made.arguments));
         }
         mark(timer, pass);
 
         // bin
         pass.set_bind_group(0, &made.bin, &[]);
-        pass.set_pipeline(&renderer.bin_count);
+        pass.set_pipeline(&passes.bin_count);
         pass.dispatch_workgroups_indirect(&self.arguments, 0);
-        pass.set_pipeline(&renderer.bin_scan);
+        pass.set_pipeline(&passes.bin_scan);
         pass.set_bind_group(1, &made.arguments, &[]);
         pass.dispatch_workgroups(1, 1, 1);
-        pass.set_pipeline(&renderer.bin_offset);
+        pass.set_pipeline(&passes.bin_offset);
         pass.dispatch_workgroups_indirect(&self.arguments, 0);
-        pass.set_pipeline(&renderer.bin_emit);
+        pass.set_pipeline(&passes.bin_emit);
         pass.dispatch_workgroups_indirect(&self.arguments, 12);
         mark(timer, pass);
 
         // sort by tile
         for step in 0..tile_steps(made.sizes.picture) {
             let group = &made.sort_tiles[step as usize % 2];
-            self.sort_step(renderer, pass, group, DEPTH_STEPS + step, None, 12, None);
+            self.sort_step(passes, pass, group, DEPTH_STEPS + step, None, 12, None);
         }
         mark(timer, pass);
 
         // ranges
         let tiles = tiles(made.sizes.picture);
-        pass.set_pipeline(&renderer.ranges);
+        pass.set_pipeline(&passes.ranges);
         pass.set_bind_group(0, &made.ranges, &[]);
         pass.dispatch_workgroups((tiles.x * tiles.y).div_ceil(256), 1, 1);
         mark(timer, pass);
 
         // blend
-        pass.set_pipeline(if self.multisampled { &renderer.blend_multisampled } else { &renderer.blend });
+        pass.set_pipeline(if self.multisampled { &passes.blend_multisampled } else { &passes.blend });
         pass.set_bind_group(0, &made.pixel, &[]);
         pass.set_bind_group(1, &made.blend, &[]);
         pass.dispatch_workgroups(tiles.x, tiles.y, 1);
@@ -140,7 +141,7 @@ impl ViewRenderer {
     /// indirect, at `offset` of the arguments.
     fn sort_step(
         &self,
-        renderer: &Renderer,
+        passes: &ReferencePasses,
         pass: &mut wgpu::ComputePass<'_>,
         group: &wgpu::BindGroup,
         step: u32,
@@ -153,16 +154,16 @@ impl ViewRenderer {
             None => pass.dispatch_workgroups_indirect(&self.arguments, offset),
         };
         pass.set_bind_group(0, group, &[step * self.alignment]);
-        pass.set_pipeline(&renderer.sort_count);
+        pass.set_pipeline(&passes.sort_count);
         dispatch(pass);
-        pass.set_pipeline(&renderer.sort_scan);
+        pass.set_pipeline(&passes.sort_scan);
         pass.dispatch_workgroups(DIGITS, 1, 1);
         if let (0, Some(arguments)) = (step, arguments) {
-            pass.set_pipeline(&renderer.sort_visible);
+            pass.set_pipeline(&passes.sort_visible);
             pass.set_bind_group(1, arguments, &[]);
             pass.dispatch_workgroups(1, 1, 1);
         }
-        pass.set_pipeline(&renderer.sort_scatter);
+        pass.set_pipeline(&passes.sort_scatter);
         dispatch(pass);
     }
 }
