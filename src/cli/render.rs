@@ -12,6 +12,7 @@ use crate::offline::engine::AdapterDescription;
 use crate::offline::orbit::Shot;
 use crate::offline::render::render_shots;
 use crate::offline::{OfflineError, write_beside, write_png};
+use crate::renderer::{GpuError, Storage};
 use crate::view::{Background, Counts, Picture, View};
 use serde_json::{Value, json};
 use std::fs;
@@ -56,11 +57,20 @@ impl Render {
     /// # Errors
     /// A scene or views that cannot be used, pictures that cannot be written, no such adapter, a failure of the GPU.
     pub fn run(&self) -> Result<Report, Failure> {
-        let scene = self.checkpoint.load(&self.scene)?;
-        let scene = scene.into_runtime().map_err(|error| Failure::at(&self.scene, &error))?;
+        let (scene, headless) = std::thread::scope(|scope| {
+            // The adapter opens while the scene is read, and most are compressed packages.
+            let opening = scope.spawn(|| {
+                let headless = self.renderer.open()?;
+                headless.compile_ahead(Storage::Coded)?;
+                Ok::<_, GpuError>(headless)
+            });
+            let scene = self.checkpoint.load(&self.scene)?;
+            let scene = scene.into_runtime().map_err(|error| Failure::at(&self.scene, &error))?;
+            Ok::<_, Failure>((scene, opening.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))))
+        })?;
         let shots = self.views.shots(&scene, 1)?;
         fs::create_dir_all(&self.out).map_err(|error| Failure::at(&self.out, &error))?;
-        let mut headless = self.renderer.open()?;
+        let mut headless = headless?;
         let capture = headless.upload(&scene)?;
         let background = self.checkpoint.background.map_or(scene.trained_background(), Background::Color);
         let with_view = |shot: Shot| {

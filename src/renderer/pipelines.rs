@@ -35,6 +35,8 @@ pub struct Renderer {
     checks: ShaderChecks,
     /// Whether the device is a software driver.
     is_software: bool,
+    /// [`SUBGROUPS_OF_32`], or nothing.
+    subgroups: &'static [&'static str],
     /// Bound instead of a list of active Gaussians if all are drawn.
     pub(super) no_list: wgpu::BindGroup,
     work: WorkCounters,
@@ -111,6 +113,8 @@ impl Renderer {
         check_limits(&device.limits())?;
         let layouts = Layouts::new(device);
         let activate = module(device, "activate", &[], checks)?;
+        let info = device.adapter_info();
+        let sizes = [info.subgroup_min_size, info.subgroup_max_size];
         let work = WorkCounters::default();
         let allocator = Allocator { device, work: &work };
         let no_list = allocator.buffer("gs4d no active list", 4, wgpu::BufferUsages::STORAGE);
@@ -128,7 +132,12 @@ impl Renderer {
             sort_bins: Default::default(),
             blend_blocks: Default::default(),
             checks,
-            is_software: device.adapter_info().device_type == wgpu::DeviceType::Cpu,
+            is_software: info.device_type == wgpu::DeviceType::Cpu,
+            subgroups: if device.features().contains(wgpu::Features::SUBGROUP) && sizes == [32, 32] {
+                SUBGROUPS_OF_32
+            } else {
+                &[]
+            },
             no_list: allocator.bind_group("gs4d no active list", &layouts.active, &[no_list.as_entire_binding()]),
             layouts,
             work,
@@ -195,6 +204,26 @@ impl Renderer {
         self.reference.get()
     }
 
+    /// Compiles what a first frame of captures stored in this way would compile, as far as it is known.
+    ///
+    /// # Errors
+    /// When a shader does not compile.
+    pub(super) fn compile_ahead(
+        &self,
+        device: &wgpu::Device,
+        design: Design,
+        storage: Storage,
+    ) -> Result<(), GpuError> {
+        let storages = std::iter::once(storage);
+        match self.resolve(design) {
+            Design::Reference => self.compile_reference(device, storages),
+            Design::Auto | Design::Fast => {
+                let lists = Lists::suiting(&device.limits(), 0);
+                self.compile_fast(device, storages, lists, Blending::default(), false)
+            }
+        }
+    }
+
     /// Compiles the passes of the fast renderer for captures stored in these ways, unless they have been.
     ///
     /// # Errors
@@ -219,15 +248,14 @@ impl Renderer {
                 self.colors[storage as usize].get_or_init(|| made);
             }
         }
-        let subgroups = if has_subgroups_of_32(device) { SUBGROUPS_OF_32 } else { &[] };
         if self.sort_bins(lists).is_none() {
-            let shader = module(device, "sort_bins", &[lists.definitions(), subgroups].concat(), self.checks)?;
+            let shader = module(device, "sort_bins", &[lists.definitions(), self.subgroups].concat(), self.checks)?;
             let made = pipeline(device, &shader, "sort_bins", &[&layouts.sort_bins]);
             self.sort_bins[lists as usize].get_or_init(|| made);
         }
         if self.blend_blocks(blending, large_batches).is_none() {
             let batches = if large_batches { LARGE_BATCHES } else { &[] };
-            let definitions = [blending.definitions(), batches, subgroups].concat();
+            let definitions = [blending.definitions(), batches, self.subgroups].concat();
             let shader = module(device, "blend_blocks", &definitions, self.checks)?;
             let pixel = &layouts.pixel[usize::from(blending == Blending::AllMultisampled)];
             let made = pipeline(device, &shader, "blend_blocks", &[pixel, &layouts.blend]);
@@ -271,12 +299,6 @@ impl Renderer {
         };
         [group(&layouts[0], geometry), group(&layouts[1], color)]
     }
-}
-
-fn has_subgroups_of_32(device: &wgpu::Device) -> bool {
-    let info = device.adapter_info();
-    let sizes = [info.subgroup_min_size, info.subgroup_max_size];
-    device.features().contains(wgpu::Features::SUBGROUP) && sizes == [32, 32]
 }
 
 impl Layouts {

@@ -72,8 +72,8 @@ fn lists_longer_than_workgroup_memory_are_drawn_in_order() {
 #[test]
 fn bins_that_overflow_lack_no_splat_in_the_first_frame() {
     let Some(mut headless) = gpu::headless() else { return };
-    // A picture of 256 bins with room for 256 splats each, and a few bins that hold all.
-    let (scene, view) = (crowd(4000, 1, 0.01), view(1024));
+    // Bins have room for 4096 splats at first, and a few hold all of these.
+    let (scene, view) = (crowd(6000, 1, 0.05), view(1024));
     let expected = first_frame(&mut headless, Design::Reference, &scene, &view);
     let found = first_frame(&mut headless, Design::Fast, &scene, &view);
     assert_same(&found, &expected, "the first frame");

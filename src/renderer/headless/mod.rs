@@ -9,7 +9,7 @@ use super::layout::Counters;
 use super::memory::Allocator;
 use super::view::{FinishedFrame, max_pairs};
 use super::{
-    ActiveList, Design, GpuCapture, GpuContext, GpuError, Instance, Renderer, ShaderChecks, ViewParameters,
+    ActiveList, Design, GpuCapture, GpuContext, GpuError, Instance, Renderer, ShaderChecks, Storage, ViewParameters,
     ViewRenderer, WorkCounters,
 };
 use crate::scene::RuntimeScene;
@@ -58,6 +58,14 @@ impl Headless {
     /// Chooses how views are drawn. Default: [`Design::Auto`].
     pub fn set_design(&mut self, design: Design) {
         self.view.set_design(&self.renderer, design);
+    }
+
+    /// Compiles what the first frame of a capture stored in this way would compile: for clients that load it at the same time.
+    ///
+    /// # Errors
+    /// When a shader does not compile.
+    pub fn compile_ahead(&self, storage: Storage) -> Result<(), GpuError> {
+        self.renderer.compile_ahead(&self.context.device, self.design(), storage)
     }
 
     /// Returns how views are drawn: never [`Design::Auto`].

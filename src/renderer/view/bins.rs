@@ -52,6 +52,15 @@ pub(super) fn large_batches(limits: &wgpu::Limits, instances: &[Instance<'_>]) -
     few && limits.max_compute_workgroup_storage_size >= LARGE_BATCHES_MEMORY
 }
 
+/// Splats of a bin for which there is room at first: few bins of few captures have more.
+const FIRST_CAPACITY: u32 = 4096;
+
+/// Returns the number of splats for which all bins together have room before any has been counted.
+pub(super) fn first_guess(picture: UVec2, slots: u32) -> u32 {
+    let grid = bin_grid(picture);
+    (grid.x * grid.y).saturating_mul(slots.clamp(256, FIRST_CAPACITY))
+}
+
 /// Returns the number of splats that each bin has room for.
 pub(super) fn bin_capacity(picture: UVec2, entries: u32) -> u32 {
     let grid = bin_grid(picture);
@@ -98,5 +107,76 @@ impl ViewRenderer {
             allocator.bind_group("gs4d sort_bins", &layouts.sort_bins, &resources)
         });
         FastResources { bytes, bins, project_bin, colors, sort_bins }
+    }
+}
+
+/// The room that bins should have: how many splats all of them together must hold if each holds as many as the fullest.
+#[derive(Debug, Default)]
+pub(super) struct BinRoom {
+    wanted: u32,
+    /// The most that a frame has needed since this was reset, and the number of frames.
+    peak: u32,
+    frames: u32,
+}
+
+/// Frames over which the most that one needs is found.
+const FRAMES_OF_PEAK: u32 = 1200;
+/// Room is given back if so many times less would have been enough.
+const MUCH: u32 = 4;
+
+impl BinRoom {
+    /// Returns the number of splats that there should be room for.
+    pub fn wanted(&self) -> u32 {
+        self.wanted
+    }
+
+    /// Notes what a frame has needed, with room for `capacity`. A frame that lacks room is slow, so it grows early, and is only given
+    /// back after many frames that did not need it.
+    pub fn note(&mut self, needed: u32, capacity: u32) {
+        let with_reserve = |needed: u32| needed.saturating_add(needed / 2);
+        if needed > capacity / 4 * 3 {
+            self.wanted = self.wanted.max(with_reserve(needed));
+        }
+        self.peak = self.peak.max(needed);
+        self.frames += 1;
+        if self.frames == FRAMES_OF_PEAK {
+            if self.wanted / MUCH > with_reserve(self.peak) {
+                self.wanted = with_reserve(self.peak);
+            }
+            (self.peak, self.frames) = (0, 0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn room_grows_before_it_is_lacking() {
+        let mut room = BinRoom::default();
+        room.note(700, 1000);
+        assert_eq!(room.wanted(), 0, "there is enough");
+        room.note(800, 1000);
+        assert_eq!(room.wanted(), 1200, "half as much again");
+    }
+
+    #[test]
+    fn views_that_take_turns_keep_the_room_of_the_fullest() {
+        let mut room = BinRoom::default();
+        for frame in 0..10 * FRAMES_OF_PEAK {
+            room.note(if frame % 60 == 0 { 9000 } else { 10 }, room.wanted().max(1000));
+        }
+        assert_eq!(room.wanted(), 13_500, "a frame every second needs it");
+    }
+
+    #[test]
+    fn room_that_nothing_needs_is_given_back() {
+        let mut room = BinRoom::default();
+        room.note(9000, 1000);
+        for _ in 0..2 * FRAMES_OF_PEAK {
+            room.note(100, room.wanted());
+        }
+        assert_eq!(room.wanted(), 150, "as much as is needed, and a reserve");
     }
 }

@@ -18,6 +18,7 @@ use super::timing::{PassTime, PassTimer, TIMED_FAST_PASSES, TIMED_PASSES};
 use super::{ActiveList, GpuCapture, GpuError, ViewStatistics, layout};
 use crate::view::tiles;
 use crate::view::{Appearance, Background, BlendSpace, DebugView, View};
+use bins::BinRoom;
 use glam::UVec2;
 use layout::{BLOCK, Counters, DEPTH_STEPS};
 use readback::Readback;
@@ -100,9 +101,8 @@ pub struct ViewRenderer {
     has_depths: bool,
     /// Number of pairs for which an earlier frame wanted room.
     pairs_wanted: u32,
-    /// Number of splats for which all bins of the fast design would have room if each had as much as an earlier frame's
-    /// fullest bin.
-    entries_wanted: u32,
+    /// The room that the bins of the fast design should have.
+    bin_room: BinRoom,
     /// Number of successive frames for which the buffers have been far too large.
     oversized_frames: u32,
     /// Bytes of the instance uniforms of a frame, kept for their memory.
@@ -183,7 +183,7 @@ impl ViewRenderer {
             frames: 0,
             recorded: false,
             pairs_wanted: 0,
-            entries_wanted: 0,
+            bin_room: BinRoom::default(),
             oversized_frames: 0,
             instance_uniforms: Vec::new(),
             frame: allocator.buffer("gs4d frame", size_of::<layout::FrameUniforms>() as u64, BufferUsages::UNIFORM),
@@ -260,7 +260,7 @@ impl ViewRenderer {
         let entries = match self.design {
             Design::Reference => 0,
             // Twice as many bytes as for pairs.
-            Design::Auto | Design::Fast => self.entries_wanted.max(guess).min(most / 2),
+            Design::Auto | Design::Fast => self.bin_room.wanted().max(bins::first_guess(picture, slots)).min(most / 2),
         };
         let needed = Sizes {
             slots: slots.next_multiple_of(BLOCK).max(BLOCK),
@@ -380,7 +380,7 @@ impl ViewRenderer {
     pub fn release(&mut self) {
         self.resources = None;
         self.pairs_wanted = 0;
-        self.entries_wanted = 0;
+        self.bin_room = BinRoom::default();
         self.fullest_bin = 0;
         self.statistics = ViewStatistics::default();
     }
@@ -419,11 +419,7 @@ impl ViewRenderer {
                     self.fullest_bin = counters.pairs_wanted;
                     let sizes = self.resources.as_ref().map(|made| made.sizes).unwrap_or_default();
                     let bins = bins::bin_grid(sizes.picture.max(UVec2::ONE)).element_product();
-                    let entries = counters.pairs_wanted.saturating_mul(bins);
-                    // It falls again, so that the buffers can be reduced, but not by what makes them grow soon after.
-                    if entries > sizes.entries / 4 * 3 || self.entries_wanted / OVERSIZE_FACTOR > entries {
-                        self.entries_wanted = entries.saturating_add(entries / 2);
-                    }
+                    self.bin_room.note(counters.pairs_wanted.saturating_mul(bins), sizes.entries);
                     counters.pairs
                 }
                 Design::Reference => counters.pairs_wanted,
