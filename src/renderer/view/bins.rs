@@ -3,7 +3,7 @@
 //! In: the size of a picture and the number of splats in all bins to have room for. Out: [`FastResources`], the
 //! counters and entries of bins of a few tiles, and the bind groups of the passes over them.
 
-use super::resources::Sizes;
+use super::sizes::Sizes;
 use super::{Instance, ViewRenderer};
 use crate::renderer::layout::BIN_COUNTERS;
 use crate::renderer::memory::Allocator;

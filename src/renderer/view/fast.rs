@@ -15,7 +15,8 @@
 
 use super::bins::{FastResources, bin_capacity, bin_grid, bin_side};
 use super::record::mark;
-use super::resources::{Resources, Sizes};
+use super::resources::Resources;
+use super::sizes::Sizes;
 use super::{Instance, ViewRenderer};
 use crate::renderer::layout::{BIN_COUNTERS, Counters};
 use crate::renderer::pipelines::Renderer;

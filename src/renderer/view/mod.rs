@@ -9,6 +9,7 @@ mod fast;
 mod readback;
 mod record;
 mod resources;
+mod sizes;
 
 use super::active::drawn_count;
 use super::memory::{alignment_of, binding_limit};
@@ -23,7 +24,8 @@ use glam::UVec2;
 use layout::{BLOCK, Counters, DEPTH_STEPS};
 use readback::Readback;
 pub use resources::PassBuffers;
-use resources::{Resources, Sizes};
+use resources::Resources;
+use sizes::Sizes;
 use wgpu::{BufferUsages, TextureFormat};
 
 /// A capture in a view. The view includes the transform of the capture and the capture's own time.

@@ -4,6 +4,7 @@
 //! changes.
 
 use super::bins::FastResources;
+use super::sizes::Sizes;
 use super::{Design, ViewRenderer};
 use crate::renderer::layout::{self, BLOCK, DEPTH_STEPS, DIGIT_BITS, DIGITS, SortStep};
 use crate::renderer::pipelines::Renderer;
@@ -57,19 +58,6 @@ pub struct PassBuffers {
     pub offsets: wgpu::Buffer,
     /// Depth key of each slot; [`layout::INVISIBLE`] for one without a splat.
     pub depth_keys: wgpu::Buffer,
-}
-
-/// What [`Resources`] has room for.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Sizes {
-    pub slots: u32,
-    pub pairs: u32,
-    /// Splats in all bins of the fast design together.
-    pub entries: u32,
-    /// Instance uniforms.
-    pub parts: u32,
-    /// Size of the picture, pixels.
-    pub picture: UVec2,
 }
 
 impl ViewRenderer {

@@ -1,0 +1,18 @@
+//! Sizes: what the resources of a view have room for.
+//!
+//! In: what a frame needs. Out: [`Sizes`], by which buffers and targets are created.
+
+use glam::UVec2;
+
+/// What the resources of a view have room for.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Sizes {
+    pub slots: u32,
+    pub pairs: u32,
+    /// Splats in all bins of the fast design together.
+    pub entries: u32,
+    /// Instance uniforms.
+    pub parts: u32,
+    /// Size of the picture, pixels.
+    pub picture: UVec2,
+}
