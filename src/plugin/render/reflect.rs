@@ -33,6 +33,7 @@ impl_reflect!(
     #[reflect(Default, Debug, Clone, PartialEq, Hash)]
     #[type_path = "bevy_gs4d::renderer"]
     enum Design {
+        Auto,
         Fast,
         Reference,
     }
@@ -59,5 +60,10 @@ mod tests {
         let settings = CaptureViewSettings { blend_space: BlendSpace::Linear, ..CaptureViewSettings::default() };
         let copy = CaptureViewSettings::from_reflect(settings.to_dynamic().as_ref());
         assert_eq!(copy, Some(settings), "as it was");
+        for (name, design) in Design::NAMES {
+            let settings = CaptureViewSettings { design, ..CaptureViewSettings::default() };
+            let copy = CaptureViewSettings::from_reflect(settings.to_dynamic().as_ref());
+            assert_eq!(copy, Some(settings), "{name}, as it was");
+        }
     }
 }
