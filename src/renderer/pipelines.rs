@@ -33,8 +33,9 @@ pub struct Renderer {
     sort_bins: [OnceLock<wgpu::ComputePipeline>; 3],
     blend_blocks: [[OnceLock<wgpu::ComputePipeline>; 4]; 2],
     checks: ShaderChecks,
-    /// Whether the device is a software driver.
-    is_software: bool,
+    /// Whether [`Design::Auto`] is the reference design: for a software driver, where it is faster, and in browsers, where the fast one
+    /// is untried.
+    prefers_reference: bool,
     /// [`SUBGROUPS_OF_32`], or nothing.
     subgroups: &'static [&'static str],
     /// Bound instead of a list of active Gaussians if all are drawn.
@@ -132,7 +133,8 @@ impl Renderer {
             sort_bins: Default::default(),
             blend_blocks: Default::default(),
             checks,
-            is_software: info.device_type == wgpu::DeviceType::Cpu,
+            prefers_reference: info.device_type == wgpu::DeviceType::Cpu
+                || info.backend == wgpu::Backend::BrowserWebGpu,
             subgroups: if device.features().contains(wgpu::Features::SUBGROUP) && sizes == [32, 32] {
                 SUBGROUPS_OF_32
             } else {
@@ -163,7 +165,7 @@ impl Renderer {
     /// Returns [`Design::Fast`] or [`Design::Reference`]: what a design is on this device.
     pub(super) fn resolve(&self, design: Design) -> Design {
         match design {
-            Design::Auto if self.is_software => Design::Reference,
+            Design::Auto if self.prefers_reference => Design::Reference,
             Design::Auto => Design::Fast,
             chosen @ (Design::Fast | Design::Reference) => chosen,
         }

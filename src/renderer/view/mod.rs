@@ -147,7 +147,8 @@ pub struct FinishedFrame<'a> {
 /// How a view is drawn. All draw the same picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Design {
-    /// [`Fast`](Self::Fast), but on software drivers [`Reference`](Self::Reference), which is faster there.
+    /// [`Fast`](Self::Fast), but [`Reference`](Self::Reference) on software drivers, where it is faster, and in browsers, where the fast
+    /// design is untried.
     #[default]
     Auto,
     /// Bins of splats, each sorted by one workgroup.
