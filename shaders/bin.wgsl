@@ -21,7 +21,7 @@ const BLOCK: u32 = 2048u;
 @group(1) @binding(0) var<storage, read_write> arguments: array<u32>;
 
 fn pair_count(splat: u32) -> u32 {
-    return tile_count(splats[splat].tiles_low, splats[splat].tiles_high);
+    return tile_count(splats[splat].shape.w, splats[splat].color.w);
 }
 
 // Returns the number of pairs of this thread's splats.
@@ -94,7 +94,7 @@ fn emit(@builtin(workgroup_id) block: vec3<u32>, @builtin(local_invocation_index
             }
         }
         let splat = order[low];
-        let tile = tile_of_pair(splats[splat].tiles_low, splats[splat].tiles_high, pair - offsets[low]);
+        let tile = tile_of_pair(splats[splat].shape.w, splats[splat].color.w, pair - offsets[low]);
         pair_tiles[pair] = tile_index(tile, frame.tiles.x);
         pair_splats[pair] = splat;
     }

@@ -3,6 +3,7 @@
 // depth. Each sample of a multisampled depth hides what is behind it from its share of the pixel. CPU reference:
 // src/reference/blend.rs.
 #import gs4d::types::SplatRecord
+#import gs4d::records::read_splat
 #import gs4d::alpha::alpha_at
 #import gs4d::pixel::{begin_pixel, blend_splat, finish_pixel, frame, pass_surfaces}
 #import gs4d::tile::{pixel_of, tile_index}
@@ -41,7 +42,7 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
         }
         let mine = first + thread;
         if mine < range.y {
-            let splat = splats[pair_splats[mine]];
+            let splat = read_splat(splats[pair_splats[mine]]);
             batch_a[thread] = vec4(splat.center, splat.opacity, splat.depth);
             batch_b[thread] = splat.conic;
             batch_c[thread] = splat.color;

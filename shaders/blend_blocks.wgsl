@@ -5,7 +5,8 @@
 // The list is read in batches: each thread takes one splat and finds the blocks of 8 x 4 pixels that it reaches; each block
 // queues its own splats, and its 32 threads blend them. If there was no room for the list, all splats are searched for the
 // nearest ones of each batch instead, which gives the same picture.
-#import gs4d::types::SplatRecord
+#import gs4d::types::{SplatShape, VisibleSplat}
+#import gs4d::records::{read_shape, Splat}
 #import gs4d::bins::{depth_order, is_after, stamp, FIRST, NONE, STAMP_MASK}
 #import gs4d::nearest::{begin_search, clear_intervals, count_candidate, next_search}
 #import gs4d::alpha::is_opaque
@@ -36,7 +37,10 @@ const LOG2_ALPHA_MAX: f32 = -0.014499569;
 // First and last + 1 pair of each tile; NONE if there was no room for them.
 @group(1) @binding(0) var<storage, read> tile_ranges: array<vec2<u32>>;
 @group(1) @binding(1) var<storage, read> pair_splats: array<u32>;
-@group(1) @binding(2) var<storage, read> splats: array<SplatRecord>;
+// By slot, like their colors.
+@group(1) @binding(2) var<storage, read> splats: array<SplatShape>;
+@group(1) @binding(3) var<storage, read> splat_colors: array<vec4<f32>>;
+@group(1) @binding(4) var<storage, read> visible: array<VisibleSplat>;
 
 // Center, conic xx and xy scaled for exp2; conic yy, log2 of opacity, red, green; blue, depth. The last changes no pixel.
 var<workgroup> batch_a: array<vec4<f32>, BATCH + 1u>;
@@ -61,9 +65,9 @@ var<workgroup> own_range: vec2<u32>;
 
 var<private> tile: vec2<u32>;
 
-// Returns the depth key and slot of a splat; NONE if it is of another frame or does not cover this tile.
+// Returns the depth key and slot of a visible splat; NONE if it is of another frame or does not cover this tile.
 fn splat_of_tile(i: u32) -> vec2<u32> {
-    let words = vec2(splats[i].tiles_low, splats[i].tiles_high);
+    let words = visible[i].words.zw;
     if any((words & vec2(STAMP_MASK)) != stamp(frame.binning.x >> 8u)) {
         return NONE;
     }
@@ -72,7 +76,8 @@ fn splat_of_tile(i: u32) -> vec2<u32> {
     if tile.x < (first & 0xffffu) || tile.y < (first >> 16u) || tile.x >= (last & 0xffffu) || tile.y >= (last >> 16u) {
         return NONE;
     }
-    return vec2(depth_order(splats[i].depth), i);
+    let slot = visible[i].words.x;
+    return vec2(depth_order(splats[slot].place.w), slot);
 }
 
 // Lists the splats of this tile after `lower` and not after `upper`, in no order. Returns how many there are; those that do not
@@ -143,21 +148,25 @@ fn search_batch(lower: vec2<u32>, thread: u32) -> vec2<u32> {
 }
 
 // Returns the splat of a pair, one of opacity 0 from `end` on.
-fn load_pair(pair: u32, end: u32) -> SplatRecord {
-    var splat: SplatRecord;
+fn load_pair(pair: u32, end: u32) -> Splat {
+    var splat: Splat;
     if pair < end {
-        splat = splats[pair_splats[pair]];
+        splat = load_splat(pair_splats[pair]);
     }
     return splat;
 }
 
 // Returns the splat that `search_batch` found for a thread, one of opacity 0 if there is none.
-fn load_found(thread: u32) -> SplatRecord {
-    var splat: SplatRecord;
+fn load_found(thread: u32) -> Splat {
+    var splat: Splat;
     if slots[thread] != NONE.y {
-        splat = splats[slots[thread]];
+        splat = load_splat(slots[thread]);
     }
     return splat;
+}
+
+fn load_splat(slot: u32) -> Splat {
+    return read_shape(splats[slot], splat_colors[slot].xyz);
 }
 
 // Returns the first pixel of a block in its tile.
@@ -166,7 +175,7 @@ fn corner_of(block: u32) -> vec2<u32> {
 }
 
 // Makes a splat part of the batch.
-fn put_in_batch(splat: SplatRecord, thread: u32) {
+fn put_in_batch(splat: Splat, thread: u32) {
     let conic = vec3(-0.5, -1.0, -0.5) * LOG2_E * splat.conic;
     batch_a[thread] = vec4(splat.center, conic.xy);
     batch_b[thread] = vec4(conic.z, log2(splat.opacity), splat.color.xy);
@@ -190,7 +199,7 @@ fn place_of(i: u32) -> u32 {
 #endif
 
 // Returns the blocks of 8 x 4 pixels where the alpha of a splat can reach 1/255, one bit each, with room for rounding.
-fn blocks_reached(splat: SplatRecord) -> u32 {
+fn blocks_reached(splat: Splat) -> u32 {
     let c = splat.conic;
     // Written so that NaN, which is no ellipse, reaches everything.
     if !(c.x * c.z > c.y * c.y) {
@@ -362,7 +371,7 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
     // The first pair of the batch. Threads without a splat of it have none of the next either.
     var first = range.x;
     let own = select(end, thread, thread < BATCH);
-    var next: SplatRecord;
+    var next: Splat;
     if !searching {
         next = load_pair(first + own, end);
     }

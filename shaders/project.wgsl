@@ -2,14 +2,24 @@
 // In: Gaussians, color coefficients, an instance, a list of active Gaussians. Out: one splat and one depth key for each
 // active Gaussian; the key of an invisible splat is INVISIBLE. CPU reference: src/reference/project.rs with
 // src/gaussian/projection.rs.
-#import gs4d::types::{Gaussian, SplatRecord, BIN_COUNTERS, INVISIBLE}
+#import gs4d::types::{BIN_COUNTERS, INVISIBLE}
 #import gs4d::types::{DEBUG_ACTIVE, DEBUG_LIFESPAN, DEBUG_VELOCITY}
+#import gs4d::records::Gaussian
 #import gs4d::appearance::heat
 #import gs4d::capture::{index_of, instance, load_gaussian, load_lifespan}
-#import gs4d::tile::{contributing_tiles, pack_tiles, tiles_of}
 #ifdef BINNED
+#import gs4d::capture::viewing_direction
+#endif
+#import gs4d::tile::{contributing_tiles, tiles_of}
+#ifndef BINNED
+#import gs4d::tile::pack_tiles
+#endif
+#ifdef BINNED
+#import gs4d::types::{SplatShape, VisibleSplat}
 #import gs4d::bins::{depth_order, entry_word, stamp}
 #else
+#import gs4d::types::SplatRecord
+#import gs4d::records::{record_of, Splat}
 #import gs4d::color::seen_color
 #endif
 
@@ -17,15 +27,16 @@ const MARGINAL_CUTOFF: f32 = 0.05;
 const LOW_PASS: f32 = 0.3;
 const FRUSTUM_CLAMP: f32 = 1.3;
 
-@group(0) @binding(1) var<storage, read_write> splats: array<SplatRecord>;
 #ifdef BINNED
+@group(0) @binding(1) var<storage, read_write> splats: array<SplatShape>;
 // Counters, see BIN_COUNTERS; then the number of visible splats of each part; then the number of splats of each bin.
 @group(0) @binding(2) var<storage, read_write> bins: array<atomic<u32>>;
 // Bin by bin: the depth key of a splat, and its slot with the tiles of the bin that it covers.
 @group(0) @binding(3) var<storage, read_write> bin_entries: array<vec2<u32>>;
-// Slots of the visible splats of each part, from its first slot on; less that slot.
-@group(0) @binding(4) var<storage, read_write> visible: array<u32>;
+// The visible splats of each part, from its first slot on.
+@group(0) @binding(4) var<storage, read_write> visible: array<VisibleSplat>;
 #else
+@group(0) @binding(1) var<storage, read_write> splats: array<SplatRecord>;
 @group(0) @binding(2) var<storage, read_write> depth_keys: array<u32>;
 #endif
 
@@ -36,6 +47,9 @@ const OWN_BINS: u32 = 2048u;
 const OWN_ENTRIES: u32 = 16u;
 const WIDE: u32 = 64u;
 
+// Gaussians of the workgroup that are present, of the part; the host gives it at most four for each thread.
+var<workgroup> present: array<u32, 1024>;
+var<workgroup> present_count: atomic<u32>;
 var<workgroup> own: array<atomic<u32>, 2048>;
 var<workgroup> own_visible: atomic<u32>;
 var<workgroup> own_pairs: atomic<u32>;
@@ -45,9 +59,10 @@ var<workgroup> wide: array<vec4<u32>, WIDE>;
 var<workgroup> wide_count: atomic<u32>;
 // Number of visible splats of the part before those of the workgroup.
 var<workgroup> visible_before: u32;
-// Tiles of the splat that project_one made, first and last + 1, and its depth.
+// Of the splat that project_one made: tiles, first and last + 1; depth; how it is seen, as in VisibleSplat.
 var<private> covered: vec4<u32>;
 var<private> covered_depth: f32;
+var<private> covered_seen: vec4<f32>;
 
 // Returns the number of tiles along each side of a bin.
 fn side() -> u32 {
@@ -87,13 +102,10 @@ fn put_in_bin(x: u32, y: u32, tiles: vec4<u32>, key: u32, slot: u32, by_group: b
     }
 }
 
-@compute @workgroup_size(256)
-fn project_bin(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+// Clears what a workgroup counts.
+fn clear_own(thread: u32) {
     let grid = bin_grid();
-    let across = grid.x;
-    let count = grid.x * grid.y;
-    let by_group = count <= OWN_BINS;
-    for (var i = thread; i < min(count, OWN_BINS); i += 256u) {
+    for (var i = thread; i < min(grid.x * grid.y, OWN_BINS); i += 256u) {
         atomicStore(&own[i], 0u);
     }
     if thread == 0u {
@@ -101,13 +113,51 @@ fn project_bin(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invo
         atomicStore(&own_pairs, 0u);
         atomicStore(&wide_count, 0u);
     }
+}
+
+@compute @workgroup_size(256)
+fn project_bin(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    if thread == 0u {
+        atomicStore(&present_count, 0u);
+        // `sort_bins` of the next frame counts from 0.
+        if group.x == 0u {
+            atomicStore(&bins[3], 0u);
+            atomicStore(&bins[4], 0u);
+        }
+    }
     workgroupBarrier();
+    // Without those that are absent, few threads of the projection are idle.
+    for (var k = 0u; k < instance.per_thread; k++) {
+        let i = (group.x * instance.per_thread + k) * 256u + thread;
+        if i < instance.count && is_present(index_of(i)) {
+            present[atomicAdd(&present_count, 1u)] = i;
+        }
+    }
+    let count = workgroupUniformLoad(&present_count);
+    for (var first = 0u; first < count; first += 256u) {
+        clear_own(thread);
+        workgroupBarrier();
+        project_and_bin(first + thread, count, thread);
+        workgroupBarrier();
+    }
+}
+
+// Projects the Gaussian at a place of those that are present, of which there are `count`, and puts it into its bins. All threads of the
+// workgroup enter.
+fn project_and_bin(place: u32, count: u32, thread: u32) {
+    let grid = bin_grid();
+    let across = grid.x;
+    let bin_count = grid.x * grid.y;
+    let by_group = bin_count <= OWN_BINS;
     covered = vec4(0u);
     var key = 0u;
+    var slot = 0u;
+    var index = 0u;
     var place_of_visible = 0u;
-    let slot = instance.first_slot + id.x;
-    if id.x < instance.count {
-        if project_one(index_of(id.x), slot) == INVISIBLE {
+    if place < count {
+        slot = instance.first_slot + present[place];
+        index = index_of(present[place]);
+        if project_one(index, slot) == INVISIBLE {
             covered = vec4(0u);
         } else {
             place_of_visible = atomicAdd(&own_visible, 1u);
@@ -117,9 +167,9 @@ fn project_bin(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invo
     }
     var own_bins = bins_of(covered);
     if (own_bins.z - own_bins.x) * (own_bins.w - own_bins.y) > OWN_ENTRIES {
-        let place = atomicAdd(&wide_count, 1u);
-        if place < WIDE {
-            wide[place] = vec4(covered.xy | (covered.zw << vec2(16u)), key, slot);
+        let wide_place = atomicAdd(&wide_count, 1u);
+        if wide_place < WIDE {
+            wide[wide_place] = vec4(covered.xy | (covered.zw << vec2(16u)), key, slot);
             own_bins = vec4(0u);
         }
     }
@@ -142,15 +192,9 @@ fn project_bin(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invo
     }
     if thread == 0u {
         visible_before = atomicAdd(&bins[BIN_COUNTERS + instance.binning.z], atomicLoad(&own_visible));
-        atomicAdd(&bins[0], atomicLoad(&own_visible));
-        atomicAdd(&bins[1], atomicLoad(&own_pairs));
-        // `sort_bins` of the next frame counts from 0.
-        if id.x == 0u {
-            atomicStore(&bins[4], 0u);
-            atomicStore(&bins[5], 0u);
-        }
+        atomicAdd(&bins[0], atomicLoad(&own_pairs));
     }
-    for (var i = thread; i < min(count, OWN_BINS); i += 256u) {
+    for (var i = thread; i < min(bin_count, OWN_BINS); i += 256u) {
         let many = atomicLoad(&own[i]);
         if many > 0u {
             atomicStore(&own[i], atomicAdd(&bins[first_bin() + i], many));
@@ -158,7 +202,8 @@ fn project_bin(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invo
     }
     workgroupBarrier();
     if covered.z > covered.x {
-        visible[instance.first_slot + visible_before + place_of_visible] = id.x;
+        let tiles = (covered.xz | (covered.yw << vec2(16u))) | stamp(instance.binning.x >> 8u);
+        visible[instance.first_slot + visible_before + place_of_visible] = VisibleSplat(covered_seen, vec4(slot, index, tiles));
     }
     for (var y = own_bins.y; y < own_bins.w; y++) {
         for (var x = own_bins.x; x < own_bins.z; x++) {
@@ -182,6 +227,15 @@ fn project(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let slot = instance.first_slot + id.x;
     depth_keys[slot] = project_one(index_of(id.x), slot);
+}
+#endif
+
+#ifdef BINNED
+// Whether a Gaussian may show at the time of the instance.
+fn is_present(index: u32) -> bool {
+    let lifespan = load_lifespan(index);
+    let z = (instance.time - lifespan.x) * lifespan.y;
+    return exp(-0.5 * z * z) > MARGINAL_CUTOFF || instance.debug == DEBUG_ACTIVE;
 }
 #endif
 
@@ -252,24 +306,24 @@ fn project_one(index: u32, slot: u32) -> u32 {
     covered = vec4<u32>(tiles);
     covered_depth = q.z;
 #endif
-    splats[slot].center = center;
-    splats[slot].opacity = opacity;
-    splats[slot].depth = q.z;
-    splats[slot].conic = vec3(c, -b, a) / det;
-    if instance.debug >= DEBUG_ACTIVE {
-        splats[slot].color = debug_color(g, absent);
-    }
-#ifndef BINNED
-    if instance.debug < DEBUG_ACTIVE {
-        splats[slot].color = seen_color(index, g, dt);
-    }
-#endif
-    var words = pack_tiles(tiles);
+    let conic = vec3(c, -b, a) / det;
 #ifdef BINNED
-    words |= stamp(instance.binning.x >> 8u);
+    splats[slot] = SplatShape(vec4(center, opacity, q.z), vec4(conic, 0.0));
+    if instance.debug >= DEBUG_ACTIVE {
+        covered_seen = vec4(debug_color(g, absent), 0.0);
+    } else {
+        covered_seen = vec4(viewing_direction(g, dt), -dt);
+    }
+#else
+    var color: vec3<f32>;
+    if instance.debug >= DEBUG_ACTIVE {
+        color = debug_color(g, absent);
+    } else {
+        color = seen_color(index, g, dt);
+    }
+    let words = pack_tiles(tiles);
+    splats[slot] = record_of(Splat(center, opacity, q.z, conic, color, words.x, words.y));
 #endif
-    splats[slot].tiles_low = words.x;
-    splats[slot].tiles_high = words.y;
     // Positive floats have the same order as their bits. Depths are taken from the near plane of an orthographic
     // camera, which may be behind it.
     return bitcast<u32>(select(q.z, q.z - instance.near, parallel));

@@ -6,6 +6,7 @@
 #import gs4d::alpha::{alpha_at, is_opaque, is_skipped, left_behind}
 #import gs4d::tile::{pair_of_tile, pixel_of, tile_count, tile_index}
 #import gs4d::types::{Counters, FrameUniforms, SplatRecord, INVISIBLE}
+#import gs4d::records::{read_splat, Splat}
 
 const PIXELS: u32 = 256u;
 // Number of splats whose terms are summed at once.
@@ -48,7 +49,7 @@ struct Pixel {
 }
 
 // Returns the weight of a splat at a pixel, 0 if it is skipped, and updates the pixel as `blend` does.
-fn advance(pixel: ptr<function, Pixel>, splat: SplatRecord, position: vec2<f32>) -> f32 {
+fn advance(pixel: ptr<function, Pixel>, splat: Splat, position: vec2<f32>) -> f32 {
     if (*pixel).done {
         return 0.0;
     }
@@ -93,7 +94,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
         let over = atomicLoad(&finished) == PIXELS;
         let was_done = pixel.done;
         for (var i = 0u; i < count; i++) {
-            let splat = splats[pair_splats[first + i]];
+            let splat = read_splat(splats[pair_splats[first + i]]);
             let weight = advance(&pixel, splat, position);
             let behind = (total - pixel.color) / pixel.transmittance;
             let change = weight * (splat.color - behind);
@@ -134,7 +135,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
 
 // Returns the index that `bin` gave the pair of this splat and tile.
 fn pair_of(splat: u32, tile: vec2<u32>) -> u32 {
-    return first_pairs[splat] + pair_of_tile(splats[splat].tiles_low, splats[splat].tiles_high, tile);
+    return first_pairs[splat] + pair_of_tile(splats[splat].shape.w, splats[splat].color.w, tile);
 }
 
 @compute @workgroup_size(256)
@@ -144,7 +145,7 @@ fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     var sum = vec4(0.0);
     if depth_keys[id.x] != INVISIBLE {
-        let count = tile_count(splats[id.x].tiles_low, splats[id.x].tiles_high);
+        let count = tile_count(splats[id.x].shape.w, splats[id.x].color.w);
         for (var i = 0u; i < count; i++) {
             sum += pair_scores[first_pairs[id.x] + i];
         }

@@ -7,7 +7,7 @@
 // the splats are counted in steps of equal width first, and the buckets are chosen so that each has about as many splats. A list
 // that does not fit is sorted in rounds of half as many splats, the nearest first.
 #import gs4d::types::{FrameUniforms, BIN_COUNTERS}
-#import gs4d::bins::{covers, is_after, FIRST, NONE, SLOT_MASK}
+#import gs4d::bins::{is_after, FIRST, NONE, SLOT_MASK}
 #import gs4d::nearest::{begin_search, clear_intervals, count_candidate, next_search}
 
 // Splats that are sorted at once.
@@ -49,13 +49,18 @@ var<workgroup> buckets: array<atomic<u32>, BUCKETS + 1u>;
 var<workgroup> sums: array<u32, THREADS>;
 #endif
 var<workgroup> group_sums: array<u32, THREADS / LANES>;
+#ifdef SUBGROUPS_OF_32
+var<workgroup> group_pairs: array<vec4<u32>, THREADS / LANES>;
+#endif
 var<workgroup> listed: atomic<u32>;
 var<workgroup> least: atomic<u32>;
 var<workgroup> greatest: atomic<u32>;
 var<workgroup> own_count: u32;
-// Number of pairs of four tiles, two in each word, and the next pair of each.
-var<workgroup> totals: vec2<u32>;
-var<workgroup> next_pairs: array<vec4<u32>, 4>;
+// Number of pairs of each tile with the list and with the bin; the first pair of the bin and the next of each tile.
+var<workgroup> totals: array<vec4<u32>, 4>;
+var<workgroup> counted: array<u32, 16>;
+var<workgroup> first_pair: u32;
+var<workgroup> next_pairs: array<u32, 16>;
 
 // Lists entries `first` to `first + count` of the bin if `whole`, else those after `lower` and not after `upper`. Returns how
 // many there are; those that do not fit a round are not listed.
@@ -248,46 +253,86 @@ fn tile_in_bin(number: u32) -> vec2<u32> {
     return vec2(number % side(), number / side());
 }
 
-// Returns which of four tiles from `number` on an entry covers, 0 or 1.
-fn covered(word: u32, number: u32) -> vec4<u32> {
-    let hit = vec4(
-        covers(word, tile_in_bin(number)),
-        covers(word, tile_in_bin(number + 1u)),
-        covers(word, tile_in_bin(number + 2u)),
-        covers(word, tile_in_bin(number + 3u)),
-    );
-    return select(vec4(0u), vec4(1u), hit);
+// Returns the tiles of a bin that an entry covers, one bit each.
+fn tiles_covered(word: u32) -> u32 {
+    let columns = (1u << (((word >> 28u) & 3u) + 1u)) - (1u << ((word >> 24u) & 3u));
+    let rows = (1u << (side() * ((word >> 30u) + 1u))) - (1u << (side() * ((word >> 26u) & 3u)));
+    // The first tile of each row.
+    return columns * (rows & select(0x5u, 0x1111u, side() == 4u));
 }
 
-fn halves(four: vec4<u32>) -> vec2<u32> {
-    return four.xz | (four.yw << vec2(16u));
+// Returns the first eight bits, two in each word.
+fn halves(bits: u32) -> vec4<u32> {
+    let number = vec4(0u, 2u, 4u, 6u);
+    return ((vec4(bits) >> number) & vec4(1u)) | (((vec4(bits) >> (number + 1u)) & vec4(1u)) << vec4(16u));
 }
 
-fn whole(two: vec2<u32>) -> vec4<u32> {
-    return vec4(two.x & 0xffffu, two.x >> 16u, two.y & 0xffffu, two.y >> 16u);
+// Returns the four numbers of two words.
+fn quarters(low: u32, high: u32) -> vec4<u32> {
+    return vec4(low & 0xffffu, low >> 16u, high & 0xffffu, high >> 16u);
 }
 
-// Returns the sums of four small numbers over all threads before this one, and over all threads in `totals`.
-fn sums_before(four: vec4<u32>, thread: u32) -> vec4<u32> {
-    let two = halves(four);
-    let before = vec2(sum_before(two.x, thread), sum_before(two.y, thread));
+// Returns the sums of eight small numbers, two in each word, over all threads before this one. The sums over all threads become those of
+// tiles `number` to `number + 8`.
+fn sums_before(eight: vec4<u32>, number: u32, thread: u32) -> vec4<u32> {
+    var before: vec4<u32>;
+#ifdef SUBGROUPS_OF_32
+    before = subgroupExclusiveAdd(eight);
+    let own_group = thread / LANES;
+    if thread % LANES == LANES - 1u {
+        group_pairs[own_group] = before + eight;
+    }
+    workgroupBarrier();
+    for (var i = 0u; i < own_group; i++) {
+        before += group_pairs[i];
+    }
+#else
+    before.x = sum_before(eight.x, thread);
+    before.y = sum_before(eight.y, thread);
+    before.z = sum_before(eight.z, thread);
+    before.w = sum_before(eight.w, thread);
+#endif
     if thread == THREADS - 1u {
-        totals = before + two;
+        let all = before + eight;
+        totals[number / 4u] = quarters(all.x, all.y);
+        totals[number / 4u + 1u] = quarters(all.z, all.w);
     }
-    return whole(before);
+    workgroupBarrier();
+    return before;
 }
 
-// Reserves room for pairs of four tiles from `number` on, of the bin with the first tile `corner`, and writes their ranges.
-fn reserve(counts: vec4<u32>, corner: vec2<u32>, number: u32) {
-    let before = vec4(0u, counts.x, counts.x + counts.y, counts.x + counts.y + counts.z);
-    let total = before.w + counts.w;
-    let first = atomicAdd(&next_bins[5], total);
-    let fits = first + total <= frame.pair_capacity;
-    let firsts = first + before;
-    for (var i = 0u; i < 4u; i++) {
-        write_range(corner, number + i, select(NONE, vec2(firsts[i], firsts[i] + counts[i]), fits));
+// Counts the pairs of the entries of a thread with all tiles of the bin: returns those of earlier threads, tiles 0 to 7 and 8 to 15.
+fn pairs_before(low: vec4<u32>, high: vec4<u32>, thread: u32) -> array<vec4<u32>, 2> {
+    var before = array(sums_before(low, 0u, thread), vec4(0u));
+    if side() == 4u {
+        before[1] = sums_before(high, 8u, thread);
     }
-    next_pairs[number / 4u] = select(vec4(NONE.x), firsts, fits);
+    return before;
+}
+
+// Reserves room for `counted` pairs of each tile of the bin with the first tile `corner`, and writes their ranges.
+fn reserve(corner: vec2<u32>, thread: u32) {
+    let tiles = side() * side();
+    if thread == 0u {
+        var total = 0u;
+        for (var number = 0u; number < tiles; number++) {
+            total += counted[number];
+        }
+        let first = atomicAdd(&next_bins[4], total);
+        first_pair = select(NONE.x, first, first + total <= frame.pair_capacity);
+    }
+    let reserved = workgroupUniformLoad(&first_pair);
+    if thread < tiles {
+        var first = reserved;
+        if reserved != NONE.x {
+            for (var number = 0u; number < thread; number++) {
+                first += counted[number];
+            }
+        }
+        next_pairs[thread] = first;
+        write_range(corner, thread, select(vec2(first, first + counted[thread]), NONE, reserved == NONE.x));
+    }
+    workgroupBarrier();
 }
 
 fn write_range(corner: vec2<u32>, number: u32, range: vec2<u32>) {
@@ -297,63 +342,85 @@ fn write_range(corner: vec2<u32>, number: u32, range: vec2<u32>) {
     }
 }
 
-// Writes the pairs of the sorted list of all tiles of a bin, after reserving room for them if there is none.
+// Writes a pair with each of four tiles that `bits` has a bit of, and moves its place on.
+fn put_pairs(pairs: ptr<function, vec4<u32>>, bits: u32, slot: u32) {
+    let hit = (vec4(bits) >> vec4(0u, 1u, 2u, 3u)) & vec4(1u);
+    for (var k = 0u; k < 4u; k++) {
+        if hit[k] == 1u {
+            pair_splats[(*pairs)[k]] = slot;
+        }
+    }
+    *pairs += hit;
+}
+
+// Returns the places of the next pairs of four tiles.
+fn next_four(number: u32) -> vec4<u32> {
+    return vec4(next_pairs[number], next_pairs[number + 1u], next_pairs[number + 2u], next_pairs[number + 3u]);
+}
+
+// Writes the pairs of the sorted list with all tiles of a bin, after reserving room for them if there is none.
 fn write_pairs(count: u32, corner: vec2<u32>, reserved: bool, thread: u32) {
     let each = (count + THREADS - 1u) / THREADS;
     let first = min(thread * each, count);
     let end = min(first + each, count);
-    for (var number = 0u; number < side() * side(); number += 4u) {
-        var own = vec4(0u);
+    var low = vec4(0u);
+    var high = vec4(0u);
+    for (var i = first; i < end; i++) {
+        let covered = tiles_covered(list[i]);
+        low += halves(covered);
+        high += halves(covered >> 8u);
+    }
+    let before = pairs_before(low, high, thread);
+    if !reserved {
+        count_all(thread, true);
+        reserve(corner, thread);
+    }
+    if next_pairs[0] != NONE.x {
+        var pairs0 = next_four(0u) + quarters(before[0].x, before[0].y);
+        var pairs1 = next_four(4u) + quarters(before[0].z, before[0].w);
+        var pairs2 = next_four(8u) + quarters(before[1].x, before[1].y);
+        var pairs3 = next_four(12u) + quarters(before[1].z, before[1].w);
         for (var i = first; i < end; i++) {
-            own += covered(list[i], number);
-        }
-        let before = sums_before(own, thread);
-        workgroupBarrier();
-        if !reserved && thread == 0u {
-            reserve(whole(totals), corner, number);
-        }
-        workgroupBarrier();
-        let firsts = next_pairs[number / 4u];
-        if firsts.x != NONE.x {
-            var pairs = firsts + before;
-            for (var i = first; i < end; i++) {
-                let word = list[i];
-                let hit = covered(word, number);
-                for (var k = 0u; k < 4u; k++) {
-                    if hit[k] == 1u {
-                        pair_splats[pairs[k]] = word & SLOT_MASK;
-                    }
-                }
-                pairs += hit;
+            let slot = list[i] & SLOT_MASK;
+            let covered = tiles_covered(list[i]);
+            put_pairs(&pairs0, covered, slot);
+            if side() == 4u {
+                put_pairs(&pairs1, covered >> 4u, slot);
+                put_pairs(&pairs2, covered >> 8u, slot);
+                put_pairs(&pairs3, covered >> 12u, slot);
             }
         }
-        workgroupBarrier();
-        if thread == 0u && firsts.x != NONE.x {
-            next_pairs[number / 4u] = firsts + whole(totals);
-        }
     }
+    workgroupBarrier();
+    if thread < side() * side() && next_pairs[thread] != NONE.x {
+        next_pairs[thread] += totals[thread / 4u][thread % 4u];
+    }
+}
+
+// Adds the sums of `pairs_before` to the pairs that are counted, or starts with them.
+fn count_all(thread: u32, start: bool) {
+    if thread < side() * side() {
+        let more = totals[thread / 4u][thread % 4u];
+        counted[thread] = select(counted[thread], 0u, start) + more;
+    }
+    workgroupBarrier();
 }
 
 // Reserves room for the pairs of all entries of a bin.
 fn reserve_all(first: u32, count: u32, corner: vec2<u32>, thread: u32) {
-    for (var number = 0u; number < side() * side(); number += 4u) {
-        var counts = vec4(0u);
-        // As many as the halves of words have room for.
-        for (var begin = 0u; begin < count; begin += 32768u) {
-            var own = vec4(0u);
-            for (var i = begin + thread; i < min(count, begin + 32768u); i += THREADS) {
-                own += covered(bin_entries[first + i].y, number);
-            }
-            sums_before(own, thread);
-            workgroupBarrier();
-            counts += whole(totals);
-            workgroupBarrier();
+    // As many at once as the halves of words have room for.
+    for (var begin = 0u; begin < count; begin += 32768u) {
+        var low = vec4(0u);
+        var high = vec4(0u);
+        for (var i = begin + thread; i < min(count, begin + 32768u); i += THREADS) {
+            let covered = tiles_covered(bin_entries[first + i].y);
+            low += halves(covered);
+            high += halves(covered >> 8u);
         }
-        if thread == 0u {
-            reserve(counts, corner, number);
-        }
+        pairs_before(low, high, thread);
+        count_all(thread, begin == 0u);
     }
-    workgroupBarrier();
+    reserve(corner, thread);
 }
 
 @compute @workgroup_size(THREADS)
@@ -372,16 +439,17 @@ fn sort_bins(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     let bin = group.y * ((frame.tiles.x + side() - 1u) / side()) + group.x;
     if thread == 0u {
         own_count = bins[first_bin + bin];
-        atomicMax(&next_bins[4], own_count);
+        atomicMax(&next_bins[3], own_count);
         atomicStore(&next_bins[first_bin + bin], 0u);
         if bin == 0u {
             atomicStore(&next_bins[0], 0u);
-            atomicStore(&next_bins[1], 0u);
-            atomicStore(&next_bins[2], bins[0]);
-            atomicStore(&next_bins[3], bins[1]);
+            var visible = 0u;
             for (var part = 0u; part < frame.binning.w; part++) {
+                visible += bins[BIN_COUNTERS + part];
                 atomicStore(&next_bins[BIN_COUNTERS + part], 0u);
             }
+            atomicStore(&next_bins[1], visible);
+            atomicStore(&next_bins[2], bins[0]);
         }
     }
     let binned = workgroupUniformLoad(&own_count);

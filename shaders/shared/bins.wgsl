@@ -18,13 +18,6 @@ fn entry_word(slot: u32, low: vec2<u32>, high: vec2<u32>) -> u32 {
     return slot | (low.x << 24u) | (low.y << 26u) | (high.x << 28u) | (high.y << 30u);
 }
 
-// Whether an entry covers a tile of its bin.
-fn covers(word: u32, tile: vec2<u32>) -> bool {
-    let low = vec2((word >> 24u) & 3u, (word >> 26u) & 3u);
-    let high = vec2((word >> 28u) & 3u, word >> 30u);
-    return all(tile >= low) && all(tile <= high);
-}
-
 // Returns a mark of the frame in the four highest bits of each half of a packed rectangle of tiles, of which there are fewer than
 // 4096 in a row. Splats of other frames do not have it.
 fn stamp(frame: u32) -> vec2<u32> {

@@ -2,7 +2,8 @@
 // Gaussian, whole or packed (PACKED_GEOMETRY).
 #define_import_path gs4d::capture
 
-#import gs4d::types::{Gaussian, InstanceUniforms}
+#import gs4d::types::{GaussianRecord, InstanceUniforms}
+#import gs4d::records::{read_gaussian, Gaussian}
 #ifdef PACKED_GEOMETRY
 #import gs4d::packed::{unpack_gaussian, unpack_lifespan, BLOCK_RANGES, PACKED_BLOCK, SHARED_RANGES}
 #endif
@@ -13,7 +14,9 @@
 @group(1) @binding(0) var<storage, read> records: array<vec4<u32>>;
 @group(1) @binding(1) var<storage, read> ranges: array<vec4<f32>>;
 #else
-@group(1) @binding(0) var<storage, read> gaussians: array<Gaussian>;
+@group(1) @binding(0) var<storage, read> gaussians: array<GaussianRecord>;
+// mean_t and inverse_sigma_t of each Gaussian once more: most of a long capture is absent, and only this is read of what is.
+@group(1) @binding(1) var<storage, read> lifespans: array<vec2<f32>>;
 #endif
 // The list that `activate` writes; not read without a filter.
 @group(2) @binding(0) var<storage, read> active_list: array<u32>;
@@ -31,7 +34,11 @@ fn load_lifespan(index: u32) -> vec2<f32> {
 #ifdef PACKED_GEOMETRY
     return unpack_lifespan(records[2u * index], ranges[0]);
 #else
-    return vec2(gaussians[index].mean_t, gaussians[index].inverse_sigma_t);
+    // A list has few absent ones, and its Gaussians are far apart: their records are read in any case.
+    if instance.listed != 0u {
+        return vec2(gaussians[index].mean.w, gaussians[index].velocity.w);
+    }
+    return lifespans[index];
 #endif
 }
 
@@ -42,6 +49,18 @@ fn load_gaussian(index: u32) -> Gaussian {
     let high = records[2u * index + 1u];
     return unpack_gaussian(low, high, ranges[0], ranges[1], ranges[block], ranges[block + 1u]);
 #else
-    return gaussians[index];
+    return read_gaussian(gaussians[index]);
 #endif
+}
+
+// Returns the direction from which a Gaussian is seen in the view of the instance, `dt` after its mean.
+fn viewing_direction(g: Gaussian, dt: f32) -> vec3<f32> {
+    if instance.orthographic != 0u {
+        return instance.camera_position;
+    }
+    var seen = g.mean;
+    if instance.displaced != 0u {
+        seen += g.velocity * dt;
+    }
+    return normalize(seen - instance.camera_position);
 }

@@ -2,9 +2,9 @@
 // index, the time since its mean. Out: its color in the blend space.
 #define_import_path gs4d::color
 
-#import gs4d::types::Gaussian
+#import gs4d::records::Gaussian
 #import gs4d::appearance::lit
-#import gs4d::capture::instance
+#import gs4d::capture::{instance, viewing_direction}
 #import gs4d::harmonics::{basis_first, basis_second, basis_third, basis_fourth, time_cosine}
 #ifdef CODED_COLORS
 #import gs4d::capture::ranges
@@ -14,28 +14,14 @@
 #ifdef CODED_COLORS
 // Three words for each Gaussian.
 @group(3) @binding(0) var<storage, read> color_records: array<u32>;
-// Entries of a multiple of three four-vectors: 48 signed bytes for each time harmonic.
+// Entries of a multiple of six four-vectors: 48 values of half precision for each time harmonic.
 @group(3) @binding(1) var<storage, read> codebooks: array<vec4<u32>>;
-// The value of a byte of 1: four codebooks of 36 four-vectors; a uniform, since few storage buffers are left and all threads read the same.
-@group(3) @binding(2) var<uniform> codebook_scales: array<vec4<f32>, 144>;
 #else
 @group(3) @binding(0) var<storage, read> harmonics: array<vec4<f32>>;
 #endif
 
 // A color is the sum of this many shares, which several threads can compute.
 const SHARES: u32 = 4u;
-
-// Returns the direction from which a Gaussian is seen in the view of the instance.
-fn viewing_direction(g: Gaussian, dt: f32) -> vec3<f32> {
-    if instance.orthographic != 0u {
-        return instance.camera_position;
-    }
-    var seen = g.mean;
-    if instance.displaced != 0u {
-        seen += g.velocity * dt;
-    }
-    return normalize(seen - instance.camera_position);
-}
 
 // Returns the color from the sum of all shares, in the blend space.
 fn finished_color(sum: vec3<f32>) -> vec3<f32> {
@@ -82,23 +68,13 @@ fn color_share(share: u32, index: u32, direction: vec3<f32>, tau: f32) -> vec3<f
     let codes = color_records[3u * index + 1u + share / 2u];
     let code = (codes >> (16u * (share & 1u))) & 0xffffu;
     let entry = (instance.first_entries[share] + code) * (instance.stride / 4u);
-    // Without some time harmonics their factors are 0, and other entries are read in their place.
-    let second = min(1u, instance.degree_t) * 3u;
-    let third = min(2u, instance.degree_t) * 3u;
-    // All at once, to hide their latency.
-    let u0 = codebooks[entry];
-    let v0 = codebooks[entry + 1u];
-    let w0 = codebooks[entry + 2u];
-    let u1 = codebooks[entry + second];
-    let v1 = codebooks[entry + second + 1u];
-    let w1 = codebooks[entry + second + 2u];
-    let u2 = codebooks[entry + third];
-    let v2 = codebooks[entry + third + 1u];
-    let w2 = codebooks[entry + third + 2u];
-    let scale = share * instance.stride;
-    sum += coded_block(u0, v0, w0, scale, b0, b1, b2, b3);
-    sum += times.y * coded_block(u1, v1, w1, scale + 4u * second, b0, b1, b2, b3);
-    sum += times.z * coded_block(u2, v2, w2, scale + 4u * third, b0, b1, b2, b3);
+    sum += coded_block(entry, b0, b1, b2, b3);
+    if instance.degree_t >= 1u {
+        sum += times.y * coded_block(entry + 6u, b0, b1, b2, b3);
+    }
+    if instance.degree_t >= 2u {
+        sum += times.z * coded_block(entry + 12u, b0, b1, b2, b3);
+    }
     return sum;
 }
 #else
@@ -129,32 +105,28 @@ fn color_share(share: u32, index: u32, direction: vec3<f32>, tau: f32) -> vec3<f
 #endif
 
 #ifdef CODED_COLORS
-// Returns the sum of the sixteen coefficients of one time harmonic times their basis values.
-fn coded_block(
-    u: vec4<u32>,
-    v: vec4<u32>,
-    w: vec4<u32>,
-    scale: u32,
-    b0: vec4<f32>,
-    b1: vec4<f32>,
-    b2: vec4<f32>,
-    b3: vec4<f32>,
-) -> vec3<f32> {
-    return coded(u.xyz, scale, b0) + coded(vec3(u.w, v.xy), scale + 3u, b1)
-        + coded(vec3(v.zw, w.x), scale + 6u, b2) + coded(w.yzw, scale + 9u, b3);
+// Returns the sum of the sixteen coefficients of one time harmonic, six four-vectors from `at`, times their basis values.
+fn coded_block(at: u32, b0: vec4<f32>, b1: vec4<f32>, b2: vec4<f32>, b3: vec4<f32>) -> vec3<f32> {
+    // All at once, to hide their latency.
+    let u = codebooks[at];
+    let v = codebooks[at + 1u];
+    let w = codebooks[at + 2u];
+    let x = codebooks[at + 3u];
+    let y = codebooks[at + 4u];
+    let z = codebooks[at + 5u];
+    return coded(u.xyz, vec3(u.w, v.xy), b0) + coded(vec3(v.zw, w.x), w.yzw, b1)
+        + coded(x.xyz, vec3(x.w, y.xy), b2) + coded(vec3(y.zw, z.x), z.yzw, b3);
 }
 
-// Returns the sum of four coefficients (three words of signed bytes) times their basis values; `scale` is the first of their
-// values of a byte of 1.
-fn coded(words: vec3<u32>, scale: u32, basis: vec4<f32>) -> vec3<f32> {
-    let u = signed_bytes(words.x) * codebook_scales[scale];
-    let v = signed_bytes(words.y) * codebook_scales[scale + 1u];
-    let w = signed_bytes(words.z) * codebook_scales[scale + 2u];
-    return four(u, v, w, basis);
-}
-
-fn signed_bytes(word: u32) -> vec4<f32> {
-    return vec4<f32>(unpack4xI8(word));
+// Returns the sum of four coefficients (six words of two values, RGB innermost) times their basis values.
+fn coded(low: vec3<u32>, high: vec3<u32>, basis: vec4<f32>) -> vec3<f32> {
+    let a = unpack2x16float(low.x);
+    let b = unpack2x16float(low.y);
+    let c = unpack2x16float(low.z);
+    let d = unpack2x16float(high.x);
+    let e = unpack2x16float(high.y);
+    let f = unpack2x16float(high.z);
+    return four(vec4(a, b), vec4(c, d), vec4(e, f), basis);
 }
 #else
 // Returns the sum of four coefficients (three four-vectors from `at`) of a Gaussian times their basis values.

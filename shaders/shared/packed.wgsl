@@ -2,7 +2,7 @@
 // src/scene/packed/decode.rs; lanes.rs in the same folder lists the lanes.
 #define_import_path gs4d::packed
 
-#import gs4d::types::Gaussian
+#import gs4d::records::Gaussian
 
 const LANE_MAX: f32 = 65535.0;
 // Number of Gaussians in a block, which share the range of their means.

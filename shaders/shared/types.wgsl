@@ -2,18 +2,16 @@
 // offset).
 #define_import_path gs4d::types
 
-// One Gaussian in the runtime form. `inverse_sigma_t` is 0 for a Gaussian that is present at every time.
-struct Gaussian {
-    mean: vec3<f32>,
-    mean_t: f32,
-    velocity: vec3<f32>,
-    inverse_sigma_t: f32,
+// One Gaussian in the runtime form. See records.wgsl.
+struct GaussianRecord {
+    // Mean, mean_t.
+    mean: vec4<f32>,
+    // Velocity, inverse_sigma_t: 0 for a Gaussian that is present at every time.
+    velocity: vec4<f32>,
     // Conditional covariance: xx, xy, xz, yy.
     covariance_a: vec4<f32>,
-    // yz, zz.
-    covariance_b: vec2<f32>,
-    opacity: f32,
-    padding: f32,
+    // yz, zz; opacity.
+    covariance_b: vec4<f32>,
 }
 
 // One part of a capture in one view: its camera and the slots of its splats.
@@ -60,7 +58,8 @@ struct InstanceUniforms {
     debug: u32,
     // 1: only Gaussians whose mean is inside the crop box are drawn.
     cropped: u32,
-    padding: u32,
+    // Gaussians that each thread of `project_bin` takes.
+    per_thread: u32,
     // Of the fast renderer: tiles along each side of a bin (8 bits) and a number of the frame, splats a bin has room for, number of this part, number of parts.
     binning: vec4<u32>,
     // Rows of capture-to-crop-box; the box is from -1 to 1.
@@ -135,16 +134,30 @@ const BACKGROUND_NONE: u32 = 0u;
 const BACKGROUND_COLOR: u32 = 1u;
 const BACKGROUND_ENVIRONMENT: u32 = 2u;
 
-// A Gaussian on the screen. Tiles x0, y0, x1, y1 (ends excluded) take 16 bits each.
+// A Gaussian on the screen: a splat. See records.wgsl.
 struct SplatRecord {
-    center: vec2<f32>,
-    opacity: f32,
-    depth: f32,
-    // xx, xy, yy
-    conic: vec3<f32>,
-    tiles_low: u32,
-    color: vec3<f32>,
-    tiles_high: u32,
+    // Center, opacity, depth.
+    place: vec4<f32>,
+    // Inverse covariance xx, xy, yy; tiles x0 and y0.
+    shape: vec4<u32>,
+    // Color; tiles x1 and y1 (ends excluded).
+    color: vec4<u32>,
+}
+
+// A splat of the fast renderer, without its color. See records.wgsl.
+struct SplatShape {
+    // Center, opacity, depth.
+    place: vec4<f32>,
+    // Inverse covariance xx, xy, yy.
+    conic: vec4<f32>,
+}
+
+// What the fast renderer notes of a visible splat besides.
+struct VisibleSplat {
+    // Direction from which it is seen, or its color in some debug views; time from the frame to its mean.
+    seen: vec4<f32>,
+    // Slot, index of the Gaussian; tiles x0 and y0, x1 and y1 (ends excluded), 16 bits each.
+    words: vec4<u32>,
 }
 
 struct Counters {
@@ -171,6 +184,6 @@ const SORT_SLOTS: u32 = 0u;
 const SORT_VISIBLE: u32 = 1u;
 const SORT_PAIRS: u32 = 2u;
 
-// Counters of the fast renderer before those of parts and bins: visible splats and pairs of this frame; then of the frame before: visible
-// splats, pairs, splats of the fullest bin, pairs written.
-const BIN_COUNTERS: u32 = 6u;
+// Counters of the fast renderer before those of parts and bins: pairs of this frame; then of the frame before: visible splats, pairs,
+// splats of the fullest bin, pairs written.
+const BIN_COUNTERS: u32 = 5u;

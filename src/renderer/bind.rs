@@ -58,17 +58,16 @@ impl Bind {
     }
 }
 
-/// Creates a compute pipeline with these bind group layouts.
+/// Creates a compute pipeline with these bind group layouts; `None` for a group that the shader does not use.
 pub fn pipeline(
     device: &wgpu::Device,
     module: &wgpu::ShaderModule,
     entry: &str,
-    groups: &[&wgpu::BindGroupLayout],
+    groups: &[Option<&wgpu::BindGroupLayout>],
 ) -> wgpu::ComputePipeline {
-    let groups: Vec<_> = groups.iter().map(|group| Some(*group)).collect();
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some("gs4d"),
-        bind_group_layouts: &groups,
+        bind_group_layouts: groups,
         immediate_size: 0,
     });
     device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {

@@ -2,7 +2,6 @@
 //!
 //! In: views and settings. Out: plain data for uniform and storage buffers.
 
-use crate::scene::packed::MAX_STAGES;
 use crate::view::{Appearance, BlendSpace, DebugView, Lighting, View};
 use bytemuck::{Pod, Zeroable};
 
@@ -11,8 +10,6 @@ pub use crate::view::TILE_SIZE;
 
 /// Keys or pairs that one workgroup of `sort` and `bin` processes.
 pub const BLOCK: u32 = 2048;
-/// Four-vectors of the uniform of codebook scales: 36 for each codebook of 48 coefficients.
-pub const CODEBOOK_SCALES: usize = MAX_STAGES * 36;
 /// Bits that one step of `sort` sorts by.
 pub const DIGIT_BITS: u32 = 4;
 /// Number of values of a digit.
@@ -82,8 +79,8 @@ pub struct InstanceUniforms {
     pub debug: u32,
     /// 1: only Gaussians whose mean is inside the crop box are drawn.
     pub cropped: u32,
-    /// Unused.
-    pub padding: u32,
+    /// Gaussians that each thread of `project_bin` takes.
+    pub per_thread: u32,
     /// Of the fast renderer: tiles along each side of a bin (8 bits) and a number of the frame, splats a bin has room for, number of this part, number of parts.
     pub binning: [u32; 4],
     /// Rows of capture-to-crop-box: x.
@@ -260,6 +257,26 @@ pub struct SplatRecord {
     pub tiles_high: u32,
 }
 
+/// A splat of the fast renderer, without its color.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct SplatShape {
+    /// Center in pixels, opacity times marginal, depth in camera units.
+    pub place: [f32; 4],
+    /// Inverse covariance: xx, xy, yy.
+    pub conic: [f32; 4],
+}
+
+/// What the fast renderer notes of a visible splat besides.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct VisibleSplat {
+    /// Direction from which it is seen, or its color in some debug views; time from the frame to its mean.
+    pub seen: [f32; 4],
+    /// Slot, index of the Gaussian; tiles x0 and y0, x1 and y1 (excluded), 16 bits each.
+    pub words: [u32; 4],
+}
+
 /// Numbers that the GPU counts.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
@@ -295,6 +312,6 @@ pub const SORT_VISIBLE: u32 = 1;
 /// The pairs.
 pub const SORT_PAIRS: u32 = 2;
 
-/// Counters of the fast renderer before those of parts and bins: visible splats and pairs of this frame; then the [`Counters`] of the
-/// frame before, the last of which is the number of pairs written.
-pub const BIN_COUNTERS: u32 = 6;
+/// Counters of the fast renderer before those of parts and bins: pairs of this frame; then the [`Counters`] of the frame before, the
+/// last of which is the number of pairs written.
+pub const BIN_COUNTERS: u32 = 5;

@@ -4,7 +4,6 @@
 //! captures.
 
 use super::bind::{Bind, group_layout, pipeline};
-use super::layout::CODEBOOK_SCALES;
 use super::memory::Allocator;
 use super::shaders::{
     BINNED, Blending, LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32, ShaderChecks, Storage, module,
@@ -66,7 +65,8 @@ impl ReferencePasses {
         let (ranges, blend) = (shader("ranges")?, shader("blend")?);
         let blend_multisampled = module(device, "blend", MULTISAMPLED, checks)?;
         let pipeline = |module: &wgpu::ShaderModule, entry: &str, groups: &[&wgpu::BindGroupLayout]| {
-            pipeline(device, module, entry, groups)
+            let groups: Vec<_> = groups.iter().copied().map(Some).collect();
+            pipeline(device, module, entry, &groups)
         };
         Ok(Self {
             sort_count: pipeline(&sort, "count", &[&layouts.sort]),
@@ -101,8 +101,9 @@ pub(super) struct Layouts {
     /// Uniforms, background, opaque depth and targets of the pixels, without and with multisampled depth.
     pub pixel: [wgpu::BindGroupLayout; 2],
     pub project_bin: wgpu::BindGroupLayout,
-    pub colors: wgpu::BindGroupLayout,
     pub sort_bins: wgpu::BindGroupLayout,
+    pub colors: wgpu::BindGroupLayout,
+    pub blend_blocks: wgpu::BindGroupLayout,
 }
 
 impl Renderer {
@@ -120,7 +121,8 @@ impl Renderer {
         let allocator = Allocator { device, work: &work };
         let no_list = allocator.buffer("gs4d no active list", 4, wgpu::BufferUsages::STORAGE);
         let pipeline = |module: &wgpu::ShaderModule, entry: &str, groups: &[&wgpu::BindGroupLayout]| {
-            pipeline(device, module, entry, groups)
+            let groups: Vec<_> = groups.iter().copied().map(Some).collect();
+            pipeline(device, module, entry, &groups)
         };
         Ok(Self {
             activate_count: pipeline(&activate, "count", &[&layouts.activate, &layouts.filter]),
@@ -185,7 +187,12 @@ impl Renderer {
             if self.project(storage).is_none() {
                 let shader = module(device, "project", storage.definitions(), self.checks)?;
                 let [geometry, color] = &layouts.captures[storage as usize];
-                let made = pipeline(device, &shader, "project", &[&layouts.project, geometry, &layouts.active, color]);
+                let made = pipeline(
+                    device,
+                    &shader,
+                    "project",
+                    &[&layouts.project, geometry, &layouts.active, color].map(Some),
+                );
                 self.project[storage as usize].get_or_init(|| made);
             }
         }
@@ -243,16 +250,22 @@ impl Renderer {
             if self.project_bin(storage).is_none() {
                 let shader = module(device, "project", &[BINNED, storage.definitions()].concat(), self.checks)?;
                 let [geometry, color] = &layouts.captures[storage as usize];
-                let made = pipeline(device, &shader, "project_bin", &[&layouts.project_bin, geometry, &layouts.active]);
+                let made = pipeline(
+                    device,
+                    &shader,
+                    "project_bin",
+                    &[&layouts.project_bin, geometry, &layouts.active].map(Some),
+                );
                 self.project_bin[storage as usize].get_or_init(|| made);
                 let shader = module(device, "colors", storage.definitions(), self.checks)?;
-                let made = pipeline(device, &shader, "colors", &[&layouts.colors, geometry, &layouts.active, color]);
+                let groups = [Some(&layouts.colors), Some(geometry), None, Some(color)];
+                let made = pipeline(device, &shader, "colors", &groups);
                 self.colors[storage as usize].get_or_init(|| made);
             }
         }
         if self.sort_bins(lists).is_none() {
             let shader = module(device, "sort_bins", &[lists.definitions(), self.subgroups].concat(), self.checks)?;
-            let made = pipeline(device, &shader, "sort_bins", &[&layouts.sort_bins]);
+            let made = pipeline(device, &shader, "sort_bins", &[Some(&layouts.sort_bins)]);
             self.sort_bins[lists as usize].get_or_init(|| made);
         }
         if self.blend_blocks(blending, large_batches).is_none() {
@@ -260,7 +273,7 @@ impl Renderer {
             let definitions = [blending.definitions(), batches, self.subgroups].concat();
             let shader = module(device, "blend_blocks", &definitions, self.checks)?;
             let pixel = &layouts.pixel[usize::from(blending == Blending::AllMultisampled)];
-            let made = pipeline(device, &shader, "blend_blocks", &[pixel, &layouts.blend]);
+            let made = pipeline(device, &shader, "blend_blocks", &[pixel, &layouts.blend_blocks].map(Some));
             self.blend_blocks[usize::from(large_batches)][blending as usize].get_or_init(|| made);
         }
         Ok(())
@@ -310,7 +323,6 @@ impl Layouts {
         const INSTANCE: Bind = UniformAt(size_of::<layout::InstanceUniforms>());
         let new = |label, bindings: &[Bind]| group_layout(device, label, bindings);
         let targets = [wgpu::TextureFormat::Rgba32Float, wgpu::TextureFormat::Rg32Float].map(Target);
-        let ahead: &[Bind] = if has_room_for_bins(&device.limits()) { &[Read] } else { &[] };
         let pixel = |depth| new("gs4d pixel", &[Uniform(FRAME), Read, depth, targets[0], targets[1]]);
         Self {
             activate: new("gs4d activate", &[UniformAt(size_of::<layout::Activation>()), Write, Write]),
@@ -319,9 +331,9 @@ impl Layouts {
             project: new("gs4d project", &[INSTANCE, Write, Write]),
             captures: Storage::ALL.map(|storage| {
                 let (geometry, color): (&[Bind], &[Bind]) = match storage {
-                    Storage::Sliced => (&[Read], &[Read]),
+                    Storage::Sliced => (&[Read, Read], &[Read]),
                     Storage::Packed => (&[Read, Read], &[Read]),
-                    Storage::Coded => (&[Read, Read], &[Read, Read, Uniform(16 * CODEBOOK_SCALES)]),
+                    Storage::Coded => (&[Read, Read], &[Read, Read]),
                 };
                 [new("gs4d geometry", geometry), new("gs4d color", color)]
             }),
@@ -335,16 +347,13 @@ impl Layouts {
             blend: new("gs4d blend", &[Read, Read, Read]),
             pixel: [pixel(Depth), pixel(Depths)],
             project_bin: new("gs4d project_bin", &[INSTANCE, Write, Write, Write, Write]),
-            colors: new("gs4d colors", &[&[INSTANCE, Write, Read, Read], ahead].concat()),
-            sort_bins: new("gs4d sort_bins", &[Uniform(FRAME), Read, Write, Read, Write, Write]),
+            // The shader does not read the last, the list of the visible splats: so everything that `project_bin` wrote and `colors` reads
+            // is made visible before `sort_bins`, not between the two, and they run at the same time.
+            sort_bins: new("gs4d sort_bins", &[Uniform(FRAME), Read, Write, Read, Write, Write, Read]),
+            colors: new("gs4d colors", &[INSTANCE, Read, Read, Write]),
+            blend_blocks: new("gs4d blend_blocks", &[Read, Read, Read, Read, Read]),
         }
     }
-}
-
-/// Returns whether a shader may bind the nine storage buffers of `colors` and the entries of bins, which it does not read: then everything
-/// that `project_bin` wrote and `sort_bins` reads is made visible before `colors`, not between the two, and they run at the same time.
-pub(super) fn has_room_for_bins(limits: &wgpu::Limits) -> bool {
-    limits.max_storage_buffers_per_shader_stage > 8
 }
 
 fn check_limits(limits: &wgpu::Limits) -> Result<(), GpuError> {

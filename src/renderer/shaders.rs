@@ -12,6 +12,7 @@ use wgpu::naga::valid::Capabilities;
 /// Libraries, each before those that import it.
 const LIBRARIES: &[(&str, &str)] = &[
     ("types", include_str!("../../shaders/shared/types.wgsl")),
+    ("records", include_str!("../../shaders/shared/records.wgsl")),
     ("alpha", include_str!("../../shaders/shared/alpha.wgsl")),
     ("tile", include_str!("../../shaders/shared/tile.wgsl")),
     ("srgb", include_str!("../../shaders/shared/srgb.wgsl")),
@@ -190,7 +191,9 @@ pub fn compose(name: &str, definitions: &[&str]) -> Result<wgpu::naga::Module, G
         return Err(GpuError::Shader { name: "unknown", reason: format!("there is no pass `{name}`") });
     };
     let subgroups = definitions.iter().any(|definition| SUBGROUPS_OF_32.contains(definition));
-    let capabilities = if subgroups { Capabilities::SUBGROUP } else { Capabilities::empty() };
+    // WebGPU has values of half precision in words.
+    let halves = Capabilities::SHADER_FLOAT16_IN_FLOAT32;
+    let capabilities = if subgroups { halves | Capabilities::SUBGROUP } else { halves };
     let mut composer = COMPOSERS[usize::from(subgroups)].lock().unwrap_or_else(PoisonError::into_inner);
     if composer.is_none() {
         *composer = Some(with_libraries(capabilities)?);

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// Names of the timed passes of a frame, in order, with the reference design.
 pub(super) const TIMED_PASSES: &[&str] = &["project", "sort (depth)", "bin", "sort (tile)", "ranges", "blend"];
 /// The same with the fast design.
-pub(super) const TIMED_FAST_PASSES: &[&str] = &["project_bin", "colors", "sort_bins", "blend_blocks"];
+pub(super) const TIMED_FAST_PASSES: &[&str] = &["project_bin", "sort_bins", "colors", "blend_blocks"];
 
 /// Medians over the frames of a benchmark.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

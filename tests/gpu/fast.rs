@@ -7,8 +7,8 @@ use crate::render::depth_texture;
 use crate::support::gpu;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::renderer::{Design, Headless, Instance, OpaqueDepth, ViewParameters};
-use bevy_gs4d::scene::RuntimeScene;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{Form, RuntimeScene};
 use bevy_gs4d::view::{Appearance, Background, Camera, DebugView, Frame, RasterFov, View};
 use glam::{UVec2, Vec3};
 
@@ -134,5 +134,26 @@ fn pictures_of_many_tiles_have_larger_bins() {
     let expected = first_frame(&mut headless, Design::Reference, &scene, &view);
     let found = first_frame(&mut headless, Design::Fast, &scene, &view);
     assert_same(&found, &expected, "1456 x 1456");
+    assert_eq!(found.counts, expected.counts, "counts");
+}
+
+#[test]
+fn parts_of_very_many_gaussians_take_several_for_each_thread() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let (mut scene, view) = (crowd(300_000, 1000, 0.02), view(256));
+    let Form::Sliced(sliced) = &mut scene.form else { panic!("single precision") };
+    // Some are seen, some are behind the camera, some are absent: whole workgroups of each kind too.
+    for (index, gaussian) in sliced.gaussians.iter_mut().enumerate() {
+        if index % 3 == 0 || (100_000..120_000).contains(&index) {
+            (gaussian.mean_t, gaussian.sigma_t) = (10.0, 0.1);
+        }
+        if index % 97 > 0 && !(50_000..51_500).contains(&index) {
+            gaussian.mean[1] = -10.0;
+        }
+    }
+    let expected = first_frame(&mut headless, Design::Reference, &scene, &view);
+    assert!(expected.counts.visible > 2000, "something is there: {:?}", expected.counts);
+    let found = first_frame(&mut headless, Design::Fast, &scene, &view);
+    assert_same(&found, &expected, "300,000 Gaussians");
     assert_eq!(found.counts, expected.counts, "counts");
 }

@@ -6,7 +6,8 @@ use bevy_gs4d::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
 use bevy_gs4d::gaussian::projection::LOW_PASS;
 use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF};
 use bevy_gs4d::renderer::layout::{
-    self, Activation, BLOCK, Counters, DIGITS, FrameUniforms, InstanceUniforms, SortStep, SplatRecord,
+    self, Activation, BLOCK, Counters, DIGITS, FrameUniforms, InstanceUniforms, SortStep, SplatRecord, SplatShape,
+    VisibleSplat,
 };
 use bevy_gs4d::renderer::shaders::{compose, pass_names};
 use bevy_gs4d::view::TILE_SIZE;
@@ -43,18 +44,28 @@ macro_rules! mirror {
     };
 }
 
-/// Returns the mirror of the Gaussian, which on the GPU has the reciprocal of the temporal deviation, and its
-/// covariance in two pieces.
-fn gaussian() -> Mirror {
-    let mut mirror = mirror!(Gaussian { mean, mean_t, velocity, sigma_t, covariance, opacity, padding });
-    let covariance = offset_of!(Gaussian, covariance);
-    mirror.members[3].0 = "inverse_sigma_t".to_owned();
-    mirror.members[4] = ("covariance_a".to_owned(), covariance, 16);
-    mirror.members.insert(5, ("covariance_b".to_owned(), covariance + 16, 8));
-    mirror
+/// Returns a mirror whose members on the GPU are those of the host in pieces of four words.
+fn in_fours(mirror: Mirror, name: &'static str, members: [&str; 4]) -> Mirror {
+    assert!(
+        mirror.members.iter().all(|(_, at, size)| at / 16 == (at + size - 1) / 16 || at % 16 == 0),
+        "no member straddles"
+    );
+    let pieces = members.into_iter().take(mirror.size / 16).enumerate();
+    Mirror { name, size: mirror.size, members: pieces.map(|(i, member)| (member.to_owned(), 16 * i, 16)).collect() }
 }
 
-fn mirrors() -> [Mirror; 7] {
+/// Returns the mirror of the Gaussian, which on the GPU has the reciprocal of the temporal deviation.
+fn gaussian() -> Mirror {
+    let mirror = mirror!(Gaussian { mean, mean_t, velocity, sigma_t, covariance, opacity, padding });
+    in_fours(mirror, "GaussianRecord", ["mean", "velocity", "covariance_a", "covariance_b"])
+}
+
+fn splat() -> Mirror {
+    let mirror = mirror!(SplatRecord { center, opacity, depth, conic, tiles_low, color, tiles_high });
+    in_fours(mirror, "SplatRecord", ["place", "shape", "color", ""])
+}
+
+fn mirrors() -> [Mirror; 9] {
     [
         gaussian(),
         mirror!(InstanceUniforms {
@@ -87,7 +98,7 @@ fn mirrors() -> [Mirror; 7] {
             lighting,
             debug,
             cropped,
-            padding,
+            per_thread,
             binning,
             crop_x,
             crop_y,
@@ -115,7 +126,9 @@ fn mirrors() -> [Mirror; 7] {
             environment_opacity,
             binning,
         }),
-        mirror!(SplatRecord { center, opacity, depth, conic, tiles_low, color, tiles_high }),
+        splat(),
+        mirror!(SplatShape { place, conic }),
+        mirror!(VisibleSplat { seen, words }),
         mirror!(Counters { visible, pairs, pairs_wanted, padding }),
         mirror!(SortStep { shift, source, stride, padding }),
     ]

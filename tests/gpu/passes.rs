@@ -366,6 +366,7 @@ fn project_makes_the_splats_of_the_twin() {
         ("splats", &gpu.buffer(&vec![SplatRecord::zeroed(); slots])),
         ("depth_keys", &gpu.buffer(&vec![RUBBISH; slots])),
         ("gaussians", &gpu.buffer(&scene.iter().map(record).collect::<Vec<_>>())),
+        ("lifespans", &gpu.buffer(&scene.iter().map(|g| [g.mean_t, g.sigma_t.recip()]).collect::<Vec<_>>())),
         ("harmonics", &gpu.buffer(&scene.form.harmonics().expect("whole").values)),
         // Without a filter these are not read.
         ("active_list", &gpu.buffer(&[RUBBISH])),

@@ -44,7 +44,8 @@ fn every_shader_file_is_a_pass_or_one_of_bevy_s() {
 fn every_pass_composes_and_is_valid() {
     let check = |name: &str, definitions: &[&str]| {
         let subgroups = definitions.iter().any(|definition| SUBGROUPS_OF_32.contains(definition));
-        let capabilities = if subgroups { Capabilities::SUBGROUP } else { Capabilities::empty() };
+        let halves = Capabilities::SHADER_FLOAT16_IN_FLOAT32;
+        let capabilities = if subgroups { halves | Capabilities::SUBGROUP } else { halves };
         validate(name, &compose(name, definitions).map_err(|error| error.to_string())?, capabilities)
     };
     let binned = Storage::ALL.map(|storage| [BINNED, storage.definitions()].concat());
@@ -98,7 +99,7 @@ fn bevy_s_passes_are_valid_with_all_their_definitions() {
         }
         let descriptor = NagaModuleDescriptor { source, file_path: name, shader_defs, ..Default::default() };
         let module = composer.make_naga_module(descriptor).map_err(|error| error.emit_to_string(&composer))?;
-        validate(name, &module, Capabilities::empty())
+        validate(name, &module, Capabilities::SHADER_FLOAT16_IN_FLOAT32)
     };
     let all = [composite, write_depth].into_iter().flat_map(|pass| (0..4).map(move |chosen| (pass, chosen)));
     report(all.filter_map(|(pass, chosen)| check(pass, chosen).err()).collect());

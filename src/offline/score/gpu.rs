@@ -56,7 +56,7 @@ impl Scorer {
         );
         let outputs = group_layout(device, "gs4d score outputs", &[Bind::Write, Bind::Write, Bind::Write]);
         let shader = module(device, "score", &[], checks)?;
-        let pipeline = |entry| pipeline(device, &shader, entry, &[&inputs, &outputs]);
+        let pipeline = |entry| pipeline(device, &shader, entry, &[&inputs, &outputs].map(Some));
         Ok(Self {
             place: pipeline("place"),
             pairs: pipeline("pairs"),

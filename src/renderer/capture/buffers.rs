@@ -4,7 +4,6 @@
 //! bindings. Packed scenes are uploaded without unpacking.
 
 use crate::gaussian::{Gaussian, Harmonics};
-use crate::renderer::layout::CODEBOOK_SCALES;
 use crate::renderer::memory::Allocator;
 use crate::scene::packed::{BLOCK, BLOCK_RANGES, COLOR_WORDS, RECORD_WORDS, SHARED_RANGES};
 use crate::scene::{ActiveSets, CodedColors, Form, PackedColors, TemporalFilter};
@@ -40,7 +39,10 @@ pub(super) fn largest_record(form: &Form, stride: usize) -> u64 {
 /// Creates the buffers of the geometry of some Gaussians, the first at a multiple of a block.
 pub(super) fn geometry(gpu: Gpu<'_>, form: &Form, own: Range<usize>) -> Vec<wgpu::Buffer> {
     match form {
-        Form::Sliced(sliced) => vec![gaussians(gpu, &sliced.gaussians[own])],
+        Form::Sliced(sliced) => {
+            let own = &sliced.gaussians[own];
+            vec![gaussians(gpu, own), lifespans(gpu, own)]
+        }
         Form::Packed(packed) => {
             let blocks = own.start / BLOCK * BLOCK_RANGES..own.end.div_ceil(BLOCK) * BLOCK_RANGES;
             let (shared, blocks) = (&packed.ranges[..SHARED_RANGES], &packed.ranges[SHARED_RANGES..][blocks]);
@@ -63,28 +65,24 @@ pub(super) fn color(gpu: Gpu<'_>, form: &Form, own: Range<usize>, stride: usize)
     }
 }
 
-/// Returns the words of one entry of a codebook on the GPU: 48 bytes for each time harmonic, whatever the spatial degree.
+/// Returns the words of one entry of a codebook on the GPU: 48 values of half precision for each time harmonic, whatever the spatial
+/// degree.
 pub(super) fn entry_words(colors: &CodedColors) -> usize {
-    colors.words_per_entry().next_multiple_of(12)
+    colors.words_per_entry().next_multiple_of(12) * 2
 }
 
-/// Creates the buffers of all codebooks and of their scales, the values of a byte of 1.
-pub(super) fn codebooks(gpu: Gpu<'_>, colors: &CodedColors) -> [wgpu::Buffer; 2] {
-    let (words, padded) = (colors.words_per_entry(), entry_words(colors));
-    let mut scales = pad_rows(&colors.scales, words, padded, [0.0; 4]);
-    scales.iter_mut().flatten().for_each(|scale| *scale /= 127.0);
-    scales.resize(CODEBOOK_SCALES, [0.0; 4]);
-    let mut entries = pad_rows(&colors.codebooks, words, padded, 0);
+/// Creates the buffer of all codebooks.
+pub(super) fn codebooks(gpu: Gpu<'_>, colors: &CodedColors) -> wgpu::Buffer {
+    let words = entry_words(colors);
+    let mut halves = Vec::with_capacity(colors.codebooks.len() / colors.words_per_entry().max(1) * words * 2);
+    for (entry, scales) in colors.all_entries() {
+        let end = halves.len() + words * 2;
+        halves.extend(entry.iter().zip(scales).flat_map(|(&word, scale)| CodedColors::values(word, scale)));
+        halves.resize(end, half::f16::ZERO);
+    }
     // A binding of no bytes is not allowed.
-    entries.resize(entries.len().max(4), 0);
-    [
-        plain(gpu, "gs4d codebooks", bytemuck::cast_slice(&entries)),
-        filled(gpu, "gs4d codebook scales", bytemuck::cast_slice(&scales), wgpu::BufferUsages::UNIFORM),
-    ]
-}
-
-fn pad_rows<T: Copy>(rows: &[T], from: usize, to: usize, with: T) -> Vec<T> {
-    rows.chunks(from.max(1)).flat_map(|row| row.iter().copied().chain((row.len()..to).map(move |_| with))).collect()
+    halves.resize(halves.len().max(8), half::f16::ZERO);
+    plain(gpu, "gs4d codebooks", bytemuck::cast_slice(&halves))
 }
 
 /// Creates the buffer of the sets of some Gaussians: the words of each segment in turn, or one word of interval for
@@ -118,6 +116,14 @@ fn gaussians(gpu: Gpu<'_>, gaussians: &[Gaussian]) -> wgpu::Buffer {
     records(gpu, "gs4d gaussians", gaussians.len(), size_of::<Gaussian>(), |index, record| {
         let gaussian = gaussians[index];
         record.copy_from_slice(bytemuck::bytes_of(&Gaussian { sigma_t: gaussian.sigma_t.recip(), ..gaussian }));
+    })
+}
+
+/// Creates the buffer of `mean_t` and `1/σ_t`, once more.
+fn lifespans(gpu: Gpu<'_>, gaussians: &[Gaussian]) -> wgpu::Buffer {
+    records(gpu, "gs4d lifespans", gaussians.len(), size_of::<[f32; 2]>(), |index, record| {
+        let Gaussian { mean_t, sigma_t, .. } = gaussians[index];
+        record.copy_from_slice(bytemuck::bytes_of(&[mean_t, sigma_t.recip()]));
     })
 }
 

@@ -129,7 +129,7 @@ impl GpuCapture {
             let geometry = buffers::geometry(gpu, form, first..first + count);
             let color = buffers::color(gpu, form, first..first + count, stride);
             bytes += geometry.iter().chain([&color]).map(wgpu::Buffer::size).sum::<u64>();
-            let all = [&color].into_iter().chain(codebooks.iter().flatten());
+            let all = [&color].into_iter().chain(codebooks.iter());
             let both = [geometry.iter().collect::<Vec<_>>(), all.collect()];
             let [geometry, color] = renderer.capture_bind_groups(device, storage, both.each_ref().map(|all| &all[..]));
             let filter = scene.filter.as_ref().map(|filter| {
@@ -139,7 +139,7 @@ impl GpuCapture {
             });
             parts.push(Part { count: count as u32, geometry, color, filter });
         }
-        bytes += codebooks.iter().flatten().map(wgpu::Buffer::size).sum::<u64>();
+        bytes += codebooks.iter().map(wgpu::Buffer::size).sum::<u64>();
         let environment = scene.environment.as_ref().map(|map| EnvironmentBuffer {
             buffer: buffers::plain(gpu, "gs4d environment", bytemuck::cast_slice(&map.texels)),
             size: [map.width, map.height],

@@ -5,9 +5,9 @@
 
 use super::sizes::Sizes;
 use super::{Instance, ViewRenderer};
-use crate::renderer::layout::BIN_COUNTERS;
+use crate::renderer::layout::{BIN_COUNTERS, VisibleSplat};
 use crate::renderer::memory::Allocator;
-use crate::renderer::pipelines::{Renderer, has_room_for_bins};
+use crate::renderer::pipelines::Renderer;
 use crate::view::tiles;
 use glam::UVec2;
 use wgpu::BufferUsages;
@@ -21,9 +21,13 @@ pub(super) struct FastResources {
     pub bytes: u64,
     /// Bind groups of even and of odd frames.
     pub project_bin: [wgpu::BindGroup; 2],
-    pub colors: [wgpu::BindGroup; 2],
     pub sort_bins: [wgpu::BindGroup; 2],
+    pub colors: [wgpu::BindGroup; 2],
+    pub blend_blocks: wgpu::BindGroup,
 }
+
+/// Bytes of the color of a splat.
+const COLOR_BYTES: u64 = 16;
 
 /// The largest number of bins that a workgroup of `project_bin` counts by itself.
 const OWN_BINS: u32 = 2048;
@@ -83,10 +87,13 @@ impl ViewRenderer {
         let bins = [(); 2].map(|()| allocator.buffer("gs4d bins", 4 * counters, usage));
         let entries_size = 8 * count * u64::from(bin_capacity(sizes.picture, sizes.entries));
         let entries = allocator.buffer("gs4d bin entries", entries_size, BufferUsages::STORAGE);
-        let visible = allocator.buffer("gs4d visible", 4 * u64::from(sizes.slots), BufferUsages::STORAGE);
-        let bytes = 2 * bins[0].size() + entries_size + visible.size();
+        let slots = u64::from(sizes.slots);
+        let visible = allocator.buffer("gs4d visible", size_of::<VisibleSplat>() as u64 * slots, BufferUsages::STORAGE);
+        let splat_colors = allocator.buffer("gs4d splat colors", COLOR_BYTES * slots, BufferUsages::STORAGE);
+        let bytes = 2 * bins[0].size() + entries_size + visible.size() + splat_colors.size();
         let layouts = &renderer.layouts;
         let [splats, entries, visible] = [splats, &entries, &visible].map(wgpu::Buffer::as_entire_binding);
+        let splat_colors = splat_colors.as_entire_binding();
         let [even, odd] = bins.each_ref().map(wgpu::Buffer::as_entire_binding);
         let (ranges, pairs) = (tile_ranges.as_entire_binding(), pair_splats.as_entire_binding());
         let both = [[&even, &odd], [&odd, &even]];
@@ -94,19 +101,19 @@ impl ViewRenderer {
             let resources = [instance.clone(), splats.clone(), now.clone(), entries.clone(), visible.clone()];
             allocator.bind_group("gs4d project_bin", &layouts.project_bin, &resources)
         });
-        let colors = both.map(|[now, _]| {
-            let mut resources = vec![instance.clone(), splats.clone(), now.clone(), visible.clone()];
-            if has_room_for_bins(&allocator.device.limits()) {
-                resources.push(entries.clone());
-            }
-            allocator.bind_group("gs4d colors", &layouts.colors, &resources)
-        });
         let sort_bins = both.map(|[now, next]| {
             let frame = self.frame.as_entire_binding();
-            let resources = [frame, now.clone(), next.clone(), entries.clone(), ranges.clone(), pairs.clone()];
-            allocator.bind_group("gs4d sort_bins", &layouts.sort_bins, &resources)
+            let lists = [entries.clone(), ranges.clone(), pairs.clone()];
+            let resources = [frame, now.clone(), next.clone()].into_iter().chain(lists).chain([visible.clone()]);
+            allocator.bind_group("gs4d sort_bins", &layouts.sort_bins, &resources.collect::<Vec<_>>())
         });
-        FastResources { bytes, bins, project_bin, colors, sort_bins }
+        let colors = both.map(|[now, _]| {
+            let resources = [instance.clone(), now.clone(), visible.clone(), splat_colors.clone()];
+            allocator.bind_group("gs4d colors", &layouts.colors, &resources)
+        });
+        let blend_blocks = [ranges, pairs, splats, splat_colors, visible];
+        let blend_blocks = allocator.bind_group("gs4d blend_blocks", &layouts.blend_blocks, &blend_blocks);
+        FastResources { bytes, bins, project_bin, sort_bins, colors, blend_blocks }
     }
 }
 

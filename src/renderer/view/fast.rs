@@ -23,6 +23,14 @@ use crate::renderer::pipelines::Renderer;
 use crate::renderer::timing::PassTimer;
 use crate::view::tiles;
 
+/// Gaussians of a part from which on each thread of `project_bin` takes four: then there are enough of them for any GPU.
+const MANY_GAUSSIANS: u32 = 1 << 18;
+
+/// Returns the number of Gaussians that each thread of `project_bin` takes.
+pub(super) fn per_thread(count: u32) -> u32 {
+    if count < MANY_GAUSSIANS { 1 } else { 4 }
+}
+
 /// Splats of a workgroup of `colors`.
 const COLORS_OF_GROUP: u32 = 64;
 /// The largest number of workgroups of `colors`, which go on until all visible splats have a color: enough for any GPU.
@@ -56,7 +64,7 @@ impl ViewRenderer {
     ) {
         let odd = usize::from(self.odd);
         // project_bin
-        let groups = |count: u32| count.div_ceil(256);
+        let groups = |count: u32| count.div_ceil(256 * per_thread(count));
         self.project(
             |storage| renderer.project_bin(storage),
             renderer,
@@ -65,11 +73,6 @@ impl ViewRenderer {
             pass,
             instances,
         );
-        mark(timer, pass);
-
-        // colors
-        let groups = |count: u32| count.div_ceil(COLORS_OF_GROUP).min(COLOR_GROUPS);
-        self.project(|storage| renderer.colors(storage), renderer, &fast.colors[odd], groups, pass, instances);
         mark(timer, pass);
 
         // sort_bins
@@ -84,11 +87,16 @@ impl ViewRenderer {
         pass.dispatch_workgroups(bins.x, bins.y, 1);
         mark(timer, pass);
 
+        // colors
+        let groups = |count: u32| count.div_ceil(COLORS_OF_GROUP).min(COLOR_GROUPS);
+        self.project(|storage| renderer.colors(storage), renderer, &fast.colors[odd], groups, pass, instances);
+        mark(timer, pass);
+
         // blend_blocks
         let tiles = tiles(made.sizes.picture);
         pass.set_pipeline(blend_blocks);
         pass.set_bind_group(0, &made.pixel, &[]);
-        pass.set_bind_group(1, &made.blend, &[]);
+        pass.set_bind_group(1, &fast.blend_blocks, &[]);
         pass.dispatch_workgroups(tiles.x, tiles.y, 1);
         mark(timer, pass);
     }

@@ -458,8 +458,16 @@ impl ViewRenderer {
                 let count = drawn_count(instance.capture, part_index, instance.active);
                 let listed = u32::from(instance.active.is_some());
                 let binning = self.binning(&made.sizes, index);
-                let uniform =
-                    layout::InstanceUniforms { first_slot: slot, count, listed, first_listed, binning, ..capture };
+                let per_thread = fast::per_thread(count);
+                let uniform = layout::InstanceUniforms {
+                    first_slot: slot,
+                    count,
+                    listed,
+                    first_listed,
+                    per_thread,
+                    binning,
+                    ..capture
+                };
                 uniforms.extend_from_slice(bytemuck::bytes_of(&uniform));
                 uniforms.resize(uniforms.len().next_multiple_of(self.alignment as usize), 0);
                 slot += count;

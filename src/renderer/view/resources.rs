@@ -85,7 +85,8 @@ impl ViewRenderer {
         let tiles = tiles(size);
         let instances =
             allocator.buffer("gs4d instances", u64::from(parts) * u64::from(self.alignment), BufferUsages::UNIFORM);
-        let splats = storage("gs4d splats", slots, size_of::<layout::SplatRecord>());
+        let splat_size = if fast { size_of::<layout::SplatShape>() } else { size_of::<layout::SplatRecord>() };
+        let splats = storage("gs4d splats", slots, splat_size);
         // What only the reference design uses has no room with the fast one.
         let sorting = |label, count: u32| storage(label, if fast { 1 } else { count }, 4);
         let depth_keys = sorting("gs4d depth keys", slots);

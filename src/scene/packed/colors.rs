@@ -7,6 +7,7 @@
 use super::lanes::{self, BASE_MAX, COLOR_WORDS, MAX_STAGES};
 use crate::gaussian::{Harmonics, harmonics};
 use glam::Vec3;
+use half::f16;
 
 /// Colors coded by codebooks.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -99,13 +100,33 @@ impl CodedColors {
             let entry = (first + self.code(index, stage) as usize) * words;
             let scales = &self.scales[stage * words..][..words];
             for ((four, &word), scale) in rest.chunks_exact_mut(4).zip(&self.codebooks[entry..]).zip(scales) {
-                for ((value, byte), scale) in four.iter_mut().zip(word.to_le_bytes()).zip(scale) {
-                    *value += f32::from(byte as i8) / 127.0 * scale;
+                for (value, add) in four.iter_mut().zip(Self::values(word, scale)) {
+                    *value += add.to_f32();
                 }
             }
             first += entries as usize;
         }
         rest
+    }
+
+    /// Returns the values of the four bytes of a word of an entry; `scale` is the value of a byte of 127. They have half precision, which is
+    /// finer than the bytes, so that a GPU need not compute them for each color.
+    pub fn values(word: u32, scale: &[f32; 4]) -> [f16; 4] {
+        let bytes = word.to_le_bytes();
+        std::array::from_fn(|i| {
+            let value = f32::from(bytes[i].cast_signed()) * (scale[i] / 127.0);
+            f16::from_f32(value.clamp(f16::MIN.to_f32(), f16::MAX.to_f32()))
+        })
+    }
+
+    /// Returns the words of each entry of all codebooks, with their scales.
+    pub fn all_entries(&self) -> impl Iterator<Item = (&[u32], &[[f32; 4]])> {
+        let words = self.words_per_entry().max(1);
+        let stages = self.entries.iter().enumerate();
+        let scales = stages.flat_map(move |(stage, &count)| {
+            std::iter::repeat_n(&self.scales[stage * words..][..words], count as usize)
+        });
+        self.codebooks.chunks_exact(words).zip(scales)
     }
 
     /// Returns the first coefficient of a Gaussian; `low` and `size` are its range.

@@ -1,0 +1,67 @@
+// Gaussians and splats, and their records in storage. Drivers move each member of a structure in storage by itself: records have members of
+// four words, so that each move is as wide as it can be.
+#define_import_path gs4d::records
+
+#import gs4d::types::{GaussianRecord, SplatRecord, SplatShape}
+
+// One Gaussian in the runtime form. `inverse_sigma_t` is 0 for a Gaussian that is present at every time.
+struct Gaussian {
+    mean: vec3<f32>,
+    mean_t: f32,
+    velocity: vec3<f32>,
+    inverse_sigma_t: f32,
+    // Conditional covariance: xx, xy, xz, yy.
+    covariance_a: vec4<f32>,
+    // yz, zz.
+    covariance_b: vec2<f32>,
+    opacity: f32,
+}
+
+fn read_gaussian(record: GaussianRecord) -> Gaussian {
+    return Gaussian(
+        record.mean.xyz,
+        record.mean.w,
+        record.velocity.xyz,
+        record.velocity.w,
+        record.covariance_a,
+        record.covariance_b.xy,
+        record.covariance_b.z,
+    );
+}
+
+// A Gaussian on the screen. Tiles x0, y0 (low) and x1, y1 (high, ends excluded) take 16 bits each.
+struct Splat {
+    center: vec2<f32>,
+    opacity: f32,
+    depth: f32,
+    // xx, xy, yy
+    conic: vec3<f32>,
+    color: vec3<f32>,
+    tiles_low: u32,
+    tiles_high: u32,
+}
+
+fn read_splat(record: SplatRecord) -> Splat {
+    return Splat(
+        record.place.xy,
+        record.place.z,
+        record.place.w,
+        bitcast<vec3<f32>>(record.shape.xyz),
+        bitcast<vec3<f32>>(record.color.xyz),
+        record.shape.w,
+        record.color.w,
+    );
+}
+
+// Returns a splat of the fast renderer, whose tiles are elsewhere.
+fn read_shape(shape: SplatShape, color: vec3<f32>) -> Splat {
+    return Splat(shape.place.xy, shape.place.z, shape.place.w, shape.conic.xyz, color, 0u, 0u);
+}
+
+fn record_of(splat: Splat) -> SplatRecord {
+    return SplatRecord(
+        vec4(splat.center, splat.opacity, splat.depth),
+        vec4(bitcast<vec3<u32>>(splat.conic), splat.tiles_low),
+        vec4(bitcast<vec3<u32>>(splat.color), splat.tiles_high),
+    );
+}
