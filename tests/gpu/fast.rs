@@ -72,8 +72,8 @@ fn lists_longer_than_workgroup_memory_are_drawn_in_order() {
 #[test]
 fn bins_that_overflow_lack_no_splat_in_the_first_frame() {
     let Some(mut headless) = gpu::headless() else { return };
-    // Bins have room for 4096 splats at first, and a few hold all of these.
-    let (scene, view) = (crowd(6000, 1, 0.05), view(1024));
+    // Bins of 2 x 2 tiles have room for 4096 splats at first, and a few hold all of these.
+    let (scene, view) = (crowd(6000, 1, 0.05), view(400));
     let expected = first_frame(&mut headless, Design::Reference, &scene, &view);
     let found = first_frame(&mut headless, Design::Fast, &scene, &view);
     assert_same(&found, &expected, "the first frame");
@@ -129,7 +129,7 @@ fn every_way_of_blending_shows_the_picture_of_the_reference() {
 #[test]
 fn pictures_of_many_tiles_have_larger_bins() {
     let Some(mut headless) = gpu::headless() else { return };
-    // 8281 tiles: bins of 2 x 2 would be more than a workgroup counts.
+    // 8281 tiles: bins of 2 x 2 would be too many.
     let (scene, view) = (crowd(500, 1, 0.1), view(1456));
     let expected = first_frame(&mut headless, Design::Reference, &scene, &view);
     let found = first_frame(&mut headless, Design::Fast, &scene, &view);

@@ -29,17 +29,23 @@ pub(super) struct FastResources {
 /// Bytes of the color of a splat.
 const COLOR_BYTES: u64 = 16;
 
-/// The largest number of bins that a workgroup of `project_bin` counts by itself.
-const OWN_BINS: u32 = 2048;
+/// The largest number of bins of 2 x 2 tiles: they have so many splats each, or there are so few of them, that larger ones would be sorted
+/// more slowly.
+const MAX_SMALL_BINS: u32 = 1024;
+/// From so many bins of 4 x 4 tiles on they occupy a GPU if they have few Gaussians each.
+const FEW_LARGE_BINS: u32 = 128;
+const FEW_GAUSSIANS: u32 = 300;
 
-/// Returns the number of tiles along each side of a bin: 2, or 4 if there were too many bins.
-pub(super) fn bin_side(picture: UVec2) -> u32 {
-    if tiles(picture).map(|tiles| tiles.div_ceil(2)).element_product() <= OWN_BINS { 2 } else { 4 }
+/// Returns the number of tiles along each side of a bin: 2, or 4 if there were too many bins or they had too few of all Gaussians.
+pub(super) fn bin_side(picture: UVec2, gaussians: u32) -> u32 {
+    let large = bin_grid(picture, 4).element_product();
+    let few = large >= FEW_LARGE_BINS && gaussians / large <= FEW_GAUSSIANS;
+    if few || bin_grid(picture, 2).element_product() > MAX_SMALL_BINS { 4 } else { 2 }
 }
 
 /// Returns the number of bins across and down a picture.
-pub(super) fn bin_grid(picture: UVec2) -> UVec2 {
-    tiles(picture).map(|tiles| tiles.div_ceil(bin_side(picture)))
+pub(super) fn bin_grid(picture: UVec2, side: u32) -> UVec2 {
+    tiles(picture).map(|tiles| tiles.div_ceil(side))
 }
 
 /// The largest number of slots that the entries of bins have bits for.
@@ -56,19 +62,29 @@ pub(super) fn large_batches(limits: &wgpu::Limits, instances: &[Instance<'_>]) -
     few && limits.max_compute_workgroup_storage_size >= LARGE_BATCHES_MEMORY
 }
 
-/// Splats of a bin for which there is room at first: few bins of few captures have more.
+/// Splats of a bin for which there is room at first: this many, or a share of all Gaussians, but no more than this many for each tile. Few
+/// bins of few captures have more.
 const FIRST_CAPACITY: u32 = 4096;
+const FIRST_SHARE: u32 = 16;
+const FIRST_OF_TILE: u32 = 1024;
 
 /// Returns the number of splats for which all bins together have room before any has been counted.
-pub(super) fn first_guess(picture: UVec2, slots: u32) -> u32 {
-    let grid = bin_grid(picture);
-    (grid.x * grid.y).saturating_mul(slots.clamp(256, FIRST_CAPACITY))
+pub(super) fn first_guess(picture: UVec2, side: u32, slots: u32) -> u32 {
+    let bins = bin_grid(picture, side).element_product();
+    let share = (slots / FIRST_SHARE).clamp(FIRST_CAPACITY, FIRST_OF_TILE * side * side);
+    bins.saturating_mul(slots.min(share).max(256))
 }
 
-/// Returns the number of splats that each bin has room for.
-pub(super) fn bin_capacity(picture: UVec2, entries: u32) -> u32 {
-    let grid = bin_grid(picture);
-    (entries / (grid.x * grid.y)).max(256)
+impl Sizes {
+    /// Returns the number of bins across and down the picture.
+    pub(super) fn bin_grid(&self) -> UVec2 {
+        bin_grid(self.picture, self.bin_side)
+    }
+
+    /// Returns the number of splats that each bin has room for.
+    pub(super) fn bin_capacity(&self) -> u32 {
+        (self.entries / self.bin_grid().element_product()).max(256)
+    }
 }
 
 impl ViewRenderer {
@@ -81,11 +97,11 @@ impl ViewRenderer {
         instance: wgpu::BindingResource<'_>,
         [splats, tile_ranges, pair_splats]: [&wgpu::Buffer; 3],
     ) -> FastResources {
-        let count = u64::from(bin_grid(sizes.picture).element_product());
+        let count = u64::from(sizes.bin_grid().element_product());
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
         let counters = count + u64::from(BIN_COUNTERS + sizes.parts);
         let bins = [(); 2].map(|()| allocator.buffer("gs4d bins", 4 * counters, usage));
-        let entries_size = 8 * count * u64::from(bin_capacity(sizes.picture, sizes.entries));
+        let entries_size = 8 * count * u64::from(sizes.bin_capacity());
         let entries = allocator.buffer("gs4d bin entries", entries_size, BufferUsages::STORAGE);
         let slots = u64::from(sizes.slots);
         let visible = allocator.buffer("gs4d visible", size_of::<VisibleSplat>() as u64 * slots, BufferUsages::STORAGE);
@@ -158,6 +174,15 @@ impl BinRoom {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bins_are_small_where_few_large_ones_would_have_many_splats() {
+        for (size, gaussians, side) in
+            [(400, 45_000, 2), (800, 45_000, 4), (800, 600_000, 2), (1024, 3_000_000, 2), (1200, 90_000, 4)]
+        {
+            assert_eq!(bin_side(UVec2::splat(size), gaussians), side, "{gaussians} Gaussians, {size} pixels");
+        }
+    }
 
     #[test]
     fn room_grows_before_it_is_lacking() {

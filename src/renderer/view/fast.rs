@@ -13,7 +13,7 @@
 //! between two passes of an encoder for each buffer that the second writes and an earlier one used. So the counters of even and odd
 //! frames are separate buffers.
 
-use super::bins::{FastResources, bin_capacity, bin_grid, bin_side};
+use super::bins::FastResources;
 use super::record::mark;
 use super::resources::Resources;
 use super::sizes::Sizes;
@@ -49,7 +49,7 @@ impl ViewRenderer {
     pub(super) fn binning(&self, sizes: &Sizes, part: u32) -> [u32; 4] {
         // Never 0, which is the stamp of a new buffer.
         let frame = self.frames % 0xffff + 1;
-        [bin_side(sizes.picture) | (frame << 8), bin_capacity(sizes.picture, sizes.entries), part, sizes.parts]
+        [sizes.bin_side | (frame << 8), sizes.bin_capacity(), part, sizes.parts]
     }
 
     /// Records the passes of the fast design.
@@ -81,7 +81,7 @@ impl ViewRenderer {
         else {
             return;
         };
-        let bins = bin_grid(made.sizes.picture);
+        let bins = made.sizes.bin_grid();
         pass.set_pipeline(sort_bins);
         pass.set_bind_group(0, &fast.sort_bins[odd], &[]);
         pass.dispatch_workgroups(bins.x, bins.y, 1);

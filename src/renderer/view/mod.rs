@@ -260,14 +260,18 @@ impl ViewRenderer {
         // Two pairs for each Gaussian are a first guess; the counters of later frames correct it.
         let (guess, most) = (slots.saturating_mul(2).max(1 << 16), max_pairs(device));
         let pairs = self.pairs_wanted.max(guess).min(most);
+        let bin_side = bins::bin_side(picture, slots);
         let entries = match self.design {
             Design::Reference => 0,
             // Twice as many bytes as for pairs.
-            Design::Auto | Design::Fast => self.bin_room.wanted().max(bins::first_guess(picture, slots)).min(most / 2),
+            Design::Auto | Design::Fast => {
+                self.bin_room.wanted().max(bins::first_guess(picture, bin_side, slots)).min(most / 2)
+            }
         };
         let needed = Sizes {
             slots: slots.next_multiple_of(BLOCK).max(BLOCK),
             pairs,
+            bin_side,
             entries,
             parts: (parts as u32).max(1),
             picture,
@@ -405,6 +409,7 @@ impl ViewRenderer {
         Sizes {
             slots: made.slots.max(needed.slots),
             pairs: made.pairs.max(needed.pairs),
+            bin_side: needed.bin_side,
             entries: made.entries.max(needed.entries),
             parts: made.parts.max(needed.parts),
             picture: needed.picture,
@@ -420,8 +425,8 @@ impl ViewRenderer {
             let wanted = match self.design {
                 Design::Auto | Design::Fast => {
                     self.fullest_bin = counters.pairs_wanted;
-                    let sizes = self.resources.as_ref().map(|made| made.sizes).unwrap_or_default();
-                    let bins = bins::bin_grid(sizes.picture.max(UVec2::ONE)).element_product();
+                    let Some(sizes) = self.resources.as_ref().map(|made| made.sizes) else { return };
+                    let bins = sizes.bin_grid().element_product();
                     self.bin_room.note(counters.pairs_wanted.saturating_mul(bins), sizes.entries);
                     counters.pairs
                 }

@@ -9,6 +9,8 @@ use glam::UVec2;
 pub(super) struct Sizes {
     pub slots: u32,
     pub pairs: u32,
+    /// Tiles along each side of a bin of the fast design.
+    pub bin_side: u32,
     /// Splats in all bins of the fast design together.
     pub entries: u32,
     /// Instance uniforms.
