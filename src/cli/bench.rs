@@ -10,6 +10,7 @@ use super::report::{Report, switches_json};
 use super::table::{Table, bytes};
 use crate::offline::engine::AdapterDescription;
 use crate::offline::orbit::{at_times, share};
+use crate::reference::{Workload, workload};
 use crate::renderer::{Design, GpuCapture, Headless, Timings};
 use crate::scene::RuntimeScene;
 use crate::view::View;
@@ -71,6 +72,9 @@ enum Form {
 const FORMS: [(&str, Form); 2] = [("stored", Form::Stored), ("fp32", Form::Unpacked)];
 const SWITCH: [(&str, bool); 2] = [("on", true), ("off", false)];
 
+/// Views in which the splats of each pixel are counted, on the CPU.
+const COUNTED_VIEWS: usize = 3;
+
 /// A scene on the GPU, with its views.
 struct Subject<'a> {
     path: &'a Path,
@@ -78,6 +82,8 @@ struct Subject<'a> {
     scene: RuntimeScene,
     capture: GpuCapture,
     views: Vec<View>,
+    /// Splats per pixel, a mean over some of the views.
+    workload: Workload,
 }
 
 /// One way to draw a subject, and what was measured.
@@ -133,8 +139,11 @@ impl Bench {
         if let Some(times) = self.times {
             shots = at_times(shots, times, scene.trained_with.time_interval);
         }
-        let views = shots.iter().map(|shot| shot.view(&scene)).collect();
-        Ok(Subject { path, form, capture: headless.upload(&scene)?, scene, views })
+        let views: Vec<View> = shots.iter().map(|shot| shot.view(&scene)).collect();
+        note(&format!("counting splats per pixel: {}", path.display()));
+        let counted = share(views.clone(), COUNTED_VIEWS);
+        let workload = mean(counted.iter().map(|view| workload(&scene, view)).collect());
+        Ok(Subject { path, form, capture: headless.upload(&scene)?, scene, views, workload })
     }
 }
 
@@ -152,6 +161,7 @@ impl Row<'_> {
             "views": views.len(),
             "size": views.first().map_or([0, 0], |view| view.size.to_array()),
             "bytes": capture.bytes(),
+            "splats_per_pixel": self.subject.workload,
             "fps": { "gpu": timings.frame_milliseconds.map(fps), "pipelined": fps(timings.pipelined_milliseconds) },
             "rounds": { "count": self.rounds.len(), "least": low, "most": high },
             "timings": timings,
@@ -160,7 +170,7 @@ impl Row<'_> {
     }
 
     fn text(&self) -> String {
-        let Subject { path, scene, capture, views, form } = self.subject;
+        let Subject { path, scene, capture, views, form, workload } = self.subject;
         let timings = self.medians();
         let mut table = Table::new(&["", "ms", "FPS"]);
         let mut row = |name: &str, milliseconds: f64, rate: bool| {
@@ -185,7 +195,9 @@ impl Row<'_> {
         let counts = timings.counts;
         format!(
             "\n{}: {} Gaussians ({}), {} renderer, filter {}, {} views of {}x{}\n{table}{spread}\
-             {} splats visible, {} pairs of splat and tile (medians); {} of the capture, {} of the view\n",
+             {} Gaussians active, {} splats visible, {} pairs of splat and tile (medians)\n\
+             {:.1} splats evaluated for each pixel, {:.1} of them blended (mean of {} views, counted on the CPU)\n\
+             {} of the capture, {} of the view\n",
             path.display(),
             scene.len(),
             name_of(&FORMS, *form),
@@ -194,8 +206,12 @@ impl Row<'_> {
             views.len(),
             size[0],
             size[1],
+            timings.active,
             counts.visible,
             counts.pairs,
+            workload.evaluated,
+            workload.contributing,
+            views.len().min(COUNTED_VIEWS),
             bytes(capture.bytes()),
             bytes(timings.bytes),
         )
@@ -213,6 +229,13 @@ impl Row<'_> {
         let times = self.rounds.iter().map(time_of);
         times.fold([f64::INFINITY, 0.0], |[low, high], time| [low.min(time), high.max(time)])
     }
+}
+
+/// Returns the mean of the workloads of some views.
+fn mean(workloads: Vec<Workload>) -> Workload {
+    let each = 1.0 / workloads.len().max(1) as f64;
+    let sum = |value: fn(&Workload) -> f64| workloads.iter().map(value).sum::<f64>() * each;
+    Workload { evaluated: sum(|w| w.evaluated), contributing: sum(|w| w.contributing) }
 }
 
 /// Returns the GPU time of a frame, or what comes nearest to it without timestamps.

@@ -62,12 +62,12 @@ pub fn orbit(scene: &RuntimeScene, count: usize, size: UVec2) -> Result<Vec<Shot
     Ok((0..count).map(shot).collect())
 }
 
-/// Returns an even share of at most `count` shots, in their order.
-pub fn share(shots: Vec<Shot>, count: usize) -> Vec<Shot> {
-    let all = shots.len();
-    let count = count.min(all);
-    let chosen = shots.into_iter().enumerate().filter(|(i, _)| i * count / all != (i + 1) * count / all);
-    chosen.map(|(_, shot)| shot).collect()
+/// Returns an even share of at most `count` shots or views, in their order.
+pub fn share<T>(all: Vec<T>, count: usize) -> Vec<T> {
+    let total = all.len();
+    let count = count.min(total);
+    let chosen = all.into_iter().enumerate().filter(|(i, _)| i * count / total != (i + 1) * count / total);
+    chosen.map(|(_, one)| one).collect()
 }
 
 /// Returns each shot at `times` times instead of its own: at the middles of as many equal parts of the interval.
@@ -91,7 +91,7 @@ mod tests {
         let names = |count: usize| share(shots(6), count).into_iter().map(|shot| shot.name).collect::<Vec<_>>();
         assert_eq!(names(3), ["1", "3", "5"], "every second");
         assert_eq!(names(9).len(), 6, "no more than there are");
-        assert!(share(Vec::new(), 3).is_empty(), "nothing of nothing");
+        assert!(share(Vec::<Shot>::new(), 3).is_empty(), "nothing of nothing");
     }
 
     #[test]

@@ -8,12 +8,14 @@ mod bin;
 mod blend;
 mod project;
 mod sort;
+mod workload;
 
 pub use activate::activate;
 pub use bin::{Pair, bin, ranges};
 pub use blend::{behind, blend};
 pub use project::{Splat, project};
 pub use sort::sort;
+pub use workload::{Workload, workload};
 
 use crate::scene::RuntimeScene;
 use crate::view::{Appearance, Background, BlendSpace, Counts, Frame, View};

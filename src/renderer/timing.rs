@@ -27,6 +27,8 @@ pub struct Timings {
     pub encode_milliseconds: f64,
     /// Bytes of the buffers and targets of a view.
     pub bytes: u64,
+    /// Gaussians that are active, a median.
+    pub active: u32,
     /// Median amount of work in a frame.
     pub counts: Counts,
     /// Number of frames measured.

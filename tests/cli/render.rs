@@ -65,6 +65,10 @@ fn benchmarks_measure() {
     let row = &json["rows"][0];
     assert_eq!((&row["views"], &row["timings"]["frames"]), (&4.into(), &3.into()), "two views at two times");
     assert!(row["timings"]["wall_milliseconds"].as_f64().is_some_and(|ms| ms > 0.0), "frames take time");
+    let [evaluated, contributing] =
+        ["evaluated", "contributing"].map(|name| row["splats_per_pixel"][name].as_f64().expect("a number"));
+    assert!(0.0 < contributing && contributing <= evaluated, "{contributing} of {evaluated} splats are blended");
+    assert_eq!(row["timings"]["active"], 1000, "no filter");
     let ways =
         ["--renderer", "fast,reference", "--filter", "on,off", "--form", "stored,fp32", "--rounds", "2", "--json"];
     let json = bench(&ways).json();

@@ -33,13 +33,14 @@ impl Headless {
     /// As [`render`](Self::render).
     pub fn time(&mut self, capture: &GpuCapture, views: &[View], frames: usize) -> Result<Timings, GpuError> {
         let parameters = &self.measured();
-        let mut counts = Vec::new();
+        let (mut counts, mut active_counts) = (Vec::new(), Vec::new());
         // The warm-up also finds room for the pairs of every view.
         for view in views {
             let active = self.take_active(capture, view.time);
             let frame = self.render_all(&[instance(capture, active.as_ref(), view)], parameters);
             self.active = active;
             counts.push(frame?.counts);
+            active_counts.push(f64::from(self.view.statistics().active));
         }
         let mut lanes: Vec<Lane> = (0..FRAMES_PER_SUBMIT).map(|_| self.lane(capture)).collect();
         let start = Instant::now();
@@ -70,6 +71,7 @@ impl Headless {
             pipelined_milliseconds: untimed.wall_milliseconds,
             encode_milliseconds: untimed.encode_milliseconds,
             bytes: self.view.statistics().bytes,
+            active: median(active_counts) as u32,
             counts: Counts { visible: middle(|c| c.visible), pairs: middle(|c| c.pairs) },
             frames,
         })
