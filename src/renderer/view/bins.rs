@@ -29,18 +29,22 @@ pub(super) struct FastResources {
 /// Bytes of the color of a splat.
 const COLOR_BYTES: u64 = 16;
 
-/// The largest number of bins of 2 x 2 tiles: they have so many splats each, or there are so few of them, that larger ones would be sorted
-/// more slowly.
-const MAX_SMALL_BINS: u32 = 1024;
-/// From so many bins of 4 x 4 tiles on they occupy a GPU if they have few Gaussians each.
+/// Bins of 2 x 2 tiles up to which they are better: a GPU is idle with fewer of 4 x 4. Those of so many Gaussians are too long to be sorted at
+/// once, and are small up to as many as a workgroup of `project_bin` counts by itself.
+const SMALL_BINS: u32 = 1024;
+const CROWD: u32 = 1 << 14;
+const SMALL_BINS_OF_CROWD: u32 = 2048;
+/// Bins of 4 x 4 tiles from which on they occupy a GPU if they have few Gaussians each.
 const FEW_LARGE_BINS: u32 = 128;
 const FEW_GAUSSIANS: u32 = 300;
 
-/// Returns the number of tiles along each side of a bin: 2, or 4 if there were too many bins or they had too few of all Gaussians.
+/// Returns the number of tiles along each side of a bin, 2 or 4, by the size of the picture and the number of all Gaussians.
 pub(super) fn bin_side(picture: UVec2, gaussians: u32) -> u32 {
-    let large = bin_grid(picture, 4).element_product();
-    let few = large >= FEW_LARGE_BINS && gaussians / large <= FEW_GAUSSIANS;
-    if few || bin_grid(picture, 2).element_product() > MAX_SMALL_BINS { 4 } else { 2 }
+    let [small, large] = [2, 4].map(|side| bin_grid(picture, side).element_product());
+    let each = gaussians / large;
+    let enough_large = large >= FEW_LARGE_BINS && each <= FEW_GAUSSIANS;
+    let limit = if each > CROWD { SMALL_BINS_OF_CROWD } else { SMALL_BINS };
+    if enough_large || small > limit { 4 } else { 2 }
 }
 
 /// Returns the number of bins across and down a picture.
@@ -176,10 +180,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bins_are_small_where_few_large_ones_would_have_many_splats() {
-        for (size, gaussians, side) in
-            [(400, 45_000, 2), (800, 45_000, 4), (800, 600_000, 2), (1024, 3_000_000, 2), (1200, 90_000, 4)]
-        {
+    fn bins_are_small_where_large_ones_would_be_few_or_crowded() {
+        for (size, gaussians, side) in [
+            (400, 45_000, 2),
+            (800, 45_000, 4),
+            (800, 600_000, 2),
+            (1024, 3_000_000, 2),
+            (1200, 90_000, 4),
+            (1200, 10_000_000, 2),
+        ] {
             assert_eq!(bin_side(UVec2::splat(size), gaussians), side, "{gaussians} Gaussians, {size} pixels");
         }
     }
