@@ -19,8 +19,9 @@
 //! less data than a sort by its 64-bit keys. No pass needs subgroups, and the results do not depend on their size.
 //!
 //! That is the reference design ([`Design::Reference`]), whose order is the original's. [`Design::Fast`] draws the same picture
-//! in four dispatches: `project_bin` puts splats into bins of a few tiles without order, `colors` computes their colors, `sort_bins` sorts
-//! each bin in workgroup memory and writes the pairs of its tiles, and `blend_blocks` blends each tile in blocks of 8 x 4 pixels.
+//! in four dispatches: `project_bin` puts splats into bins of a few tiles without order, `sort_bins` sorts each bin in workgroup memory and
+//! writes the pairs of its tiles, `colors` computes the colors of the visible splats, and `blend_blocks` blends each tile in blocks of 8 x 4
+//! pixels.
 
 mod active;
 pub mod bind;

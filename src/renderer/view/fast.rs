@@ -5,13 +5,14 @@
 //! | pass | reads | writes |
 //! |---|---|---|
 //! | `project_bin` | active list, Gaussians | splats, list of the visible ones, bins of a few tiles, in no order |
-//! | `colors` | visible splats, color coefficients | colors of splats |
 //! | `sort_bins` | bins | pairs of each tile, in order of depth |
-//! | `blend_blocks` | pairs, splats, opaque depth | color and transmittance, expected and median depth |
+//! | `colors` | visible splats, color coefficients | colors of splats |
+//! | `blend_blocks` | pairs, splats and their colors, opaque depth | color and transmittance, expected and median depth |
 //!
-//! `colors` and `sort_bins` do not depend on each other and run at the same time, if each frame has an encoder of its own: wgpu waits
+//! `sort_bins` and `colors` do not depend on each other and run at the same time, if each frame has an encoder of its own: wgpu waits
 //! between two passes of an encoder for each buffer that the second writes and an earlier one used. So the counters of even and odd
-//! frames are separate buffers.
+//! frames are separate buffers, and so are splats and their colors. The bins are sorted first, as that takes few threads for long: the
+//! colors have the others.
 
 use super::bins::FastResources;
 use super::record::mark;
