@@ -3,8 +3,8 @@
 // src/reference/project.rs.
 //
 // Several threads compute the shares of one color: there are too few visible splats for all threads of a large GPU. Whole coefficients
-// are read by neighboring threads, which reads whole lines; those of a codebook by threads far apart, so that neighbors read the
-// same scales.
+// are read by neighboring threads, which reads whole lines; those of a codebook by whole subgroups, so that codebooks that a scene does
+// not have cost nothing.
 #import gs4d::types::{VisibleSplat, BIN_COUNTERS, DEBUG_ACTIVE}
 #import gs4d::capture::instance
 #import gs4d::color::{color_share, finished_color, SHARES}

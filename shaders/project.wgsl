@@ -230,12 +230,17 @@ fn project(@builtin(global_invocation_id) id: vec3<u32>) {
 }
 #endif
 
+// Returns the temporal marginal of a Gaussian `dt` after its mean, not yet cut.
+fn marginal_of(dt: f32, inverse_sigma_t: f32) -> f32 {
+    let z = dt * inverse_sigma_t;
+    return exp(-0.5 * z * z);
+}
+
 #ifdef BINNED
 // Whether a Gaussian may show at the time of the instance.
 fn is_present(index: u32) -> bool {
     let lifespan = load_lifespan(index);
-    let z = (instance.time - lifespan.x) * lifespan.y;
-    return exp(-0.5 * z * z) > MARGINAL_CUTOFF || instance.debug == DEBUG_ACTIVE;
+    return marginal_of(instance.time - lifespan.x, lifespan.y) > MARGINAL_CUTOFF || instance.debug == DEBUG_ACTIVE;
 }
 #endif
 
@@ -244,8 +249,7 @@ fn project_one(index: u32, slot: u32) -> u32 {
     // Half of the record is enough to drop an absent Gaussian.
     let lifespan = load_lifespan(index);
     let dt = instance.time - lifespan.x;
-    let z = dt * lifespan.y;
-    var marginal = exp(-0.5 * z * z);
+    var marginal = marginal_of(dt, lifespan.y);
     let absent = marginal <= MARGINAL_CUTOFF;
     if absent {
         if instance.debug != DEBUG_ACTIVE {
@@ -321,8 +325,7 @@ fn project_one(index: u32, slot: u32) -> u32 {
     } else {
         color = seen_color(index, g, dt);
     }
-    let words = pack_tiles(tiles);
-    splats[slot] = record_of(Splat(center, opacity, q.z, conic, color, words.x, words.y));
+    splats[slot] = record_of(Splat(center, opacity, q.z, conic, color), pack_tiles(tiles));
 #endif
     // Positive floats have the same order as their bits. Depths are taken from the near plane of an orthographic
     // camera, which may be behind it.

@@ -29,7 +29,7 @@ fn read_gaussian(record: GaussianRecord) -> Gaussian {
     );
 }
 
-// A Gaussian on the screen. Tiles x0, y0 (low) and x1, y1 (high, ends excluded) take 16 bits each.
+// A Gaussian on the screen.
 struct Splat {
     center: vec2<f32>,
     opacity: f32,
@@ -37,31 +37,26 @@ struct Splat {
     // xx, xy, yy
     conic: vec3<f32>,
     color: vec3<f32>,
-    tiles_low: u32,
-    tiles_high: u32,
 }
 
 fn read_splat(record: SplatRecord) -> Splat {
-    return Splat(
-        record.place.xy,
-        record.place.z,
-        record.place.w,
-        bitcast<vec3<f32>>(record.shape.xyz),
-        bitcast<vec3<f32>>(record.color.xyz),
-        record.shape.w,
-        record.color.w,
-    );
+    return splat_of(record.place, bitcast<vec3<f32>>(record.shape.xyz), bitcast<vec3<f32>>(record.color.xyz));
 }
 
-// Returns a splat of the fast renderer, whose tiles are elsewhere.
+// Returns a splat of the fast renderer, whose color is elsewhere.
 fn read_shape(shape: SplatShape, color: vec3<f32>) -> Splat {
-    return Splat(shape.place.xy, shape.place.z, shape.place.w, shape.conic.xyz, color, 0u, 0u);
+    return splat_of(shape.place, shape.conic.xyz, color);
 }
 
-fn record_of(splat: Splat) -> SplatRecord {
+fn splat_of(place: vec4<f32>, conic: vec3<f32>, color: vec3<f32>) -> Splat {
+    return Splat(place.xy, place.z, place.w, conic, color);
+}
+
+// `tiles` are x0, y0 and x1, y1 (ends excluded), 16 bits each.
+fn record_of(splat: Splat, tiles: vec2<u32>) -> SplatRecord {
     return SplatRecord(
         vec4(splat.center, splat.opacity, splat.depth),
-        vec4(bitcast<vec3<u32>>(splat.conic), splat.tiles_low),
-        vec4(bitcast<vec3<u32>>(splat.color), splat.tiles_high),
+        vec4(bitcast<vec3<u32>>(splat.conic), tiles.x),
+        vec4(bitcast<vec3<u32>>(splat.color), tiles.y),
     );
 }

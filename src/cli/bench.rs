@@ -82,8 +82,6 @@ struct Subject<'a> {
     scene: RuntimeScene,
     capture: GpuCapture,
     views: Vec<View>,
-    /// Splats per pixel, a mean over some of the views.
-    workload: Workload,
 }
 
 /// One way to draw a subject, and what was measured.
@@ -92,6 +90,8 @@ struct Row<'a> {
     design: Design,
     filtered: bool,
     rounds: Vec<Timings>,
+    /// Splats per pixel, a mean over some of the views.
+    workload: Workload,
 }
 
 impl Bench {
@@ -111,7 +111,7 @@ impl Bench {
         for subject in &subjects {
             for &filtered in &self.filter {
                 let ways = self.renderer.renderers.iter();
-                rows.extend(ways.map(|&design| Row { subject, design, filtered, rounds: Vec::new() }));
+                rows.extend(ways.map(|&design| Row::new(subject, design, filtered)));
             }
         }
         headless.measure_depths(self.depths);
@@ -124,6 +124,16 @@ impl Bench {
                 headless.use_filters(row.filtered);
                 row.rounds.push(headless.time(capture, views, self.frames)?);
             }
+        }
+        let mut counted: Vec<(&Path, Workload)> = Vec::new();
+        // All ways to draw a scene have the same work.
+        for row in &mut rows {
+            let path = row.subject.path;
+            row.workload = match counted.iter().find(|(of, _)| *of == path) {
+                Some((_, workload)) => *workload,
+                None => row.subject.workload(),
+            };
+            counted.push((path, row.workload));
         }
         let adapter = AdapterDescription::of(&headless);
         let table: String = rows.iter().map(Row::text).collect();
@@ -140,14 +150,24 @@ impl Bench {
             shots = at_times(shots, times, scene.trained_with.time_interval);
         }
         let views: Vec<View> = shots.iter().map(|shot| shot.view(&scene)).collect();
-        note(&format!("counting splats per pixel: {}", path.display()));
-        let counted = share(views.clone(), COUNTED_VIEWS);
-        let workload = mean(counted.iter().map(|view| workload(&scene, view)).collect());
-        Ok(Subject { path, form, capture: headless.upload(&scene)?, scene, views, workload })
+        Ok(Subject { path, form, capture: headless.upload(&scene)?, scene, views })
     }
 }
 
-impl Row<'_> {
+impl Subject<'_> {
+    /// Returns the mean of the splats per pixel over some of the views.
+    fn workload(&self) -> Workload {
+        note(&format!("counting splats per pixel: {}", self.path.display()));
+        let views = share(self.views.clone(), COUNTED_VIEWS);
+        mean(&views.iter().map(|view| workload(&self.scene, view)).collect::<Vec<_>>())
+    }
+}
+
+impl<'a> Row<'a> {
+    fn new(subject: &'a Subject<'a>, design: Design, filtered: bool) -> Self {
+        Self { subject, design, filtered, rounds: Vec::new(), workload: Workload::default() }
+    }
+
     fn json(&self) -> serde_json::Value {
         let Subject { path, scene, capture, views, .. } = self.subject;
         let timings = self.medians();
@@ -161,7 +181,7 @@ impl Row<'_> {
             "views": views.len(),
             "size": views.first().map_or([0, 0], |view| view.size.to_array()),
             "bytes": capture.bytes(),
-            "splats_per_pixel": self.subject.workload,
+            "splats_per_pixel": self.workload,
             "fps": { "gpu": timings.frame_milliseconds.map(fps), "pipelined": fps(timings.pipelined_milliseconds) },
             "rounds": { "count": self.rounds.len(), "least": low, "most": high },
             "timings": timings,
@@ -170,7 +190,7 @@ impl Row<'_> {
     }
 
     fn text(&self) -> String {
-        let Subject { path, scene, capture, views, form, workload } = self.subject;
+        let Subject { path, scene, capture, views, form } = self.subject;
         let timings = self.medians();
         let mut table = Table::new(&["", "ms", "FPS"]);
         let mut row = |name: &str, milliseconds: f64, rate: bool| {
@@ -209,8 +229,8 @@ impl Row<'_> {
             timings.active,
             counts.visible,
             counts.pairs,
-            workload.evaluated,
-            workload.contributing,
+            self.workload.evaluated,
+            self.workload.contributing,
             views.len().min(COUNTED_VIEWS),
             bytes(capture.bytes()),
             bytes(timings.bytes),
@@ -232,7 +252,7 @@ impl Row<'_> {
 }
 
 /// Returns the mean of the workloads of some views.
-fn mean(workloads: Vec<Workload>) -> Workload {
+fn mean(workloads: &[Workload]) -> Workload {
     let each = 1.0 / workloads.len().max(1) as f64;
     let sum = |value: fn(&Workload) -> f64| workloads.iter().map(value).sum::<f64>() * each;
     Workload { evaluated: sum(|w| w.evaluated), contributing: sum(|w| w.contributing) }

@@ -74,7 +74,7 @@ pub(super) fn entry_words(colors: &CodedColors) -> usize {
 /// Creates the buffer of all codebooks.
 pub(super) fn codebooks(gpu: Gpu<'_>, colors: &CodedColors) -> wgpu::Buffer {
     let words = entry_words(colors);
-    let mut halves = Vec::with_capacity(colors.codebooks.len() / colors.words_per_entry().max(1) * words * 2);
+    let mut halves = Vec::with_capacity(colors.codebooks.len() / colors.words_per_entry() * words * 2);
     for (entry, scales) in colors.all_entries() {
         let end = halves.len() + words * 2;
         halves.extend(entry.iter().zip(scales).flat_map(|(&word, scale)| CodedColors::values(word, scale)));

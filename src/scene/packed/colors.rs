@@ -121,7 +121,7 @@ impl CodedColors {
 
     /// Returns the words of each entry of all codebooks, with their scales.
     pub fn all_entries(&self) -> impl Iterator<Item = (&[u32], &[[f32; 4]])> {
-        let words = self.words_per_entry().max(1);
+        let words = self.words_per_entry();
         let stages = self.entries.iter().enumerate();
         let scales = stages.flat_map(move |(stage, &count)| {
             std::iter::repeat_n(&self.scales[stage * words..][..words], count as usize)
