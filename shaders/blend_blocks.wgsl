@@ -12,6 +12,8 @@
 #import gs4d::alpha::is_opaque
 #ifdef DEPTHS
 #import gs4d::pixel::{Pixel, begin_pixel, blend_or_skip, blend_splat, finish_pixel, frame, pass_surfaces}
+#else ifdef MULTISAMPLED
+#import gs4d::pixel::{frame, sample_count, samples_before, surface_range, write_color, FAR}
 #else
 #import gs4d::pixel::{frame, surface_depth, write_color, FAR}
 #endif
@@ -311,6 +313,11 @@ struct Sample {
     color: vec3<f32>,
     left: f32,
     opaque_at: f32,
+#ifdef MULTISAMPLED
+    // Number of samples whose surface has been passed, and their summed transmittance.
+    hidden: u32,
+    hidden_left: f32,
+#endif
 }
 
 // Blends a splat; one with alpha 0 is skipped, and a pixel that is opaque stays as it is.
@@ -321,9 +328,33 @@ fn blend_one(sample: ptr<function, Sample>, alpha: f32, color: vec3<f32>) {
         (*sample).left = 0.0;
         return;
     }
+#ifdef MULTISAMPLED
+    let open = 1.0 - f32((*sample).hidden) / f32(sample_count());
+    (*sample).color += color * (alpha * (*sample).left * open);
+#else
     (*sample).color += color * (alpha * (*sample).left);
+#endif
     (*sample).left = left;
 }
+#endif
+
+#ifdef MULTISAMPLED
+#ifndef DEPTHS
+// Blends a splat into a pixel whose samples have different surfaces, after the nearest of them.
+fn blend_cut(sample: ptr<function, Sample>, alpha: f32, color: vec3<f32>, depth: f32, at: vec2<u32>) {
+    if alpha == 0.0 || (*sample).left == 0.0 {
+        return;
+    }
+    let passed = samples_before(at, depth);
+    (*sample).hidden_left += f32(passed - (*sample).hidden) * (*sample).left;
+    (*sample).hidden = passed;
+    if passed == sample_count() {
+        (*sample).left = 0.0;
+        return;
+    }
+    blend_one(sample, alpha, color);
+}
+#endif
 #endif
 
 @compute @workgroup_size(THREADS)
@@ -356,9 +387,13 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
     var pixel = begin_pixel(at);
     var done = pixel.done;
 #else
-    var sample = Sample(vec3(0.0), 1.0, 0.0);
+    var sample: Sample;
+    sample.left = 1.0;
     var done = any(at >= frame.size);
-#ifdef OPAQUE
+#ifdef MULTISAMPLED
+    let surfaces = surface_range(at, !done);
+    let limit = surfaces.x;
+#else ifdef OPAQUE
     let limit = surface_depth(at, !done);
 #endif
 #endif
@@ -420,8 +455,20 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
                 let c2 = vec3(b2.zw, batch_c[k.z].x);
                 let c3 = vec3(b3.zw, batch_c[k.w].x);
 #ifdef OPAQUE
-                // The surface hides what is behind it.
                 let depths = vec4(batch_c[k.x].y, batch_c[k.y].y, batch_c[k.z].y, batch_c[k.w].y);
+#ifdef MULTISAMPLED
+                if surfaces.y > limit && any(depths > vec4(limit)) {
+                    blend_cut(&sample, alphas.x, c0, depths.x, at);
+                    blend_cut(&sample, alphas.y, c1, depths.y, at);
+                    blend_cut(&sample, alphas.z, c2, depths.z, at);
+                    blend_cut(&sample, alphas.w, c3, depths.w, at);
+                    if sample.left == 0.0 {
+                        break;
+                    }
+                    continue;
+                }
+#endif
+                // The surface hides what is behind it.
                 alphas = select(alphas, vec4(0.0), depths > vec4(limit));
 #endif
                 let passed = 1.0 - alphas;
@@ -462,10 +509,15 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
 #else
     if all(at < frame.size) {
         let transmittance = select(sample.left, sample.opaque_at, sample.left == 0.0);
-#ifdef OPAQUE
-        write_color(sample.color, transmittance, limit == FAR, at);
+#ifdef MULTISAMPLED
+        let all = sample_count();
+        let mean = (sample.hidden_left + f32(all - sample.hidden) * transmittance) / f32(all);
+        let behind = transmittance * (1.0 - f32(samples_before(at, FAR)) / f32(all));
+        write_color(sample.color, mean, behind, at);
+#else ifdef OPAQUE
+        write_color(sample.color, transmittance, select(0.0, transmittance, limit == FAR), at);
 #else
-        write_color(sample.color, transmittance, true, at);
+        write_color(sample.color, transmittance, transmittance, at);
 #endif
     }
 #endif

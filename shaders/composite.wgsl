@@ -1,17 +1,18 @@
 // composite: blends the captures of a view over what the camera has drawn so far.
 //
-// In: the view target so far, linear or sRGB-encoded; the captures' color and transmittance (premultiplied, in their
-// blend space, linear or sRGB-encoded) for the pixels of the viewport. Out: the view target. Blending is done in the
-// captures' blend space: ENCODE_TARGET and DECODE_TARGET convert a target in the other space.
+// In: the captures' color and transmittance (premultiplied, in their blend space, linear or sRGB-encoded) for the pixels of the viewport;
+// with READ_TARGET the view target so far. Out: the view target. Blending is done in the captures' blend space: a target in the same space
+// is blended in place; one in the other space is read, linear with ENCODE_TARGET, otherwise sRGB-encoded, and written to another texture.
 #import gs4d::srgb
 
 // The largest half float: an infinite pixel would spread through bloom.
 const BRIGHTEST: f32 = 65504.0;
 
-@group(0) @binding(0) var source: texture_2d<f32>;
-@group(0) @binding(1) var captures: texture_2d<f32>;
+@group(0) @binding(0) var captures: texture_2d<f32>;
 // Corner and size of the viewport in the target, pixels.
-@group(0) @binding(2) var<uniform> viewport: vec4<u32>;
+@group(0) @binding(1) var<uniform> viewport: vec4<u32>;
+#ifdef READ_TARGET
+@group(0) @binding(2) var source: texture_2d<f32>;
 
 // The transfer functions, mirrored below 0, so that they are inverses of each other there too.
 fn encode(linear: vec3<f32>) -> vec3<f32> {
@@ -26,20 +27,16 @@ fn decode(encoded: vec3<f32>) -> vec3<f32> {
 fn to_blend_space(color: vec3<f32>) -> vec3<f32> {
 #ifdef ENCODE_TARGET
     return encode(color);
-#else ifdef DECODE_TARGET
-    return decode(color);
 #else
-    return color;
+    return decode(color);
 #endif
 }
 
 fn from_blend_space(color: vec3<f32>) -> vec3<f32> {
 #ifdef ENCODE_TARGET
     return decode(color);
-#else ifdef DECODE_TARGET
-    return encode(color);
 #else
-    return color;
+    return encode(color);
 #endif
 }
 
@@ -60,3 +57,15 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
     let color = from_blend_space(front.rgb + transmittance * to_blend_space(behind.rgb));
     return vec4(min(color, vec3(BRIGHTEST)), alpha);
 }
+#else
+
+@fragment
+fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
+    let pixel = vec2<u32>(position.xy);
+    if any(pixel < viewport.xy) || any(pixel >= viewport.xy + viewport.zw) {
+        discard;
+    }
+    let front = textureLoad(captures, pixel - viewport.xy, 0);
+    return vec4(min(front.rgb, vec3(BRIGHTEST)), 1.0 - front.a);
+}
+#endif

@@ -22,7 +22,11 @@ const SAMPLES_MAX: u32 = 8u;
 #else
 @group(0) @binding(2) var opaque_depth: texture_depth_2d;
 #endif
+#ifdef HALF_COLOR
+@group(0) @binding(3) var color_out: texture_storage_2d<rgba16float, write>;
+#else
 @group(0) @binding(3) var color_out: texture_storage_2d<rgba32float, write>;
+#endif
 @group(0) @binding(4) var depth_out: texture_storage_2d<rg32float, write>;
 
 // Camera-space depth of the opaque surface of each sample, and the number of samples.
@@ -120,12 +124,43 @@ fn finish_pixel(pixel: Pixel, at: vec2<u32>) {
     textureStore(depth_out, at, vec4(pixel.depth, pixel.median, 0.0, 0.0));
 }
 
-// Writes the color of a pixel with at most one surface, without depths, over what is behind. `open`: there is no surface.
-fn write_color(color: vec3<f32>, transmittance: f32, open: bool, at: vec2<u32>) {
-    textureStore(color_out, at, over_background(color, transmittance, select(0.0, transmittance, open), at));
+// Writes the color of a pixel, without depths, over what is behind. `behind` is the transmittance where there is no surface.
+fn write_color(color: vec3<f32>, transmittance: f32, behind: f32, at: vec2<u32>) {
+    textureStore(color_out, at, over_background(color, transmittance, behind, at));
 }
 
-#ifndef MULTISAMPLED
+#ifdef MULTISAMPLED
+fn sample_count() -> u32 {
+    return clamp(frame.opaque_samples, 1u, SAMPLES_MAX);
+}
+
+// Returns the camera-space depth of the opaque surface of a sample of a pixel; FAR if there is none.
+fn sample_depth(pixel: vec2<u32>, i: u32) -> f32 {
+    return distance_of(textureLoad(opaque_depth, pixel + frame.opaque_origin, i));
+}
+
+// Returns the depth of the nearest and of the farthest surface of the samples of a pixel.
+fn surface_range(pixel: vec2<u32>, inside: bool) -> vec2<f32> {
+    if frame.opaque_samples == 0u || !inside {
+        return vec2(FAR);
+    }
+    var range = vec2(sample_depth(pixel, 0u));
+    for (var i = 1u; i < sample_count(); i++) {
+        let depth = sample_depth(pixel, i);
+        range = vec2(min(range.x, depth), max(range.y, depth));
+    }
+    return range;
+}
+
+// Returns the number of samples of a pixel whose surface is before `depth`; with FAR, of those that have a surface.
+fn samples_before(pixel: vec2<u32>, depth: f32) -> u32 {
+    var before = 0u;
+    for (var i = 0u; i < sample_count(); i++) {
+        before += select(0u, 1u, sample_depth(pixel, i) < depth);
+    }
+    return before;
+}
+#else
 // Returns the camera-space depth of the opaque surface of a pixel; FAR if there is none.
 fn surface_depth(pixel: vec2<u32>, inside: bool) -> f32 {
     if frame.opaque_samples == 0u || !inside {
@@ -165,9 +200,9 @@ fn find_limits(pixel: vec2<u32>, inside: bool) {
         return;
     }
 #ifdef MULTISAMPLED
-    samples = min(frame.opaque_samples, SAMPLES_MAX);
+    samples = sample_count();
     for (var i = 0u; i < samples; i++) {
-        limits[i] = distance_of(textureLoad(opaque_depth, pixel + frame.opaque_origin, i));
+        limits[i] = sample_depth(pixel, i);
     }
 #else
     limits[0] = surface_depth(pixel, inside);

@@ -11,7 +11,7 @@ use super::table::{Table, bytes};
 use crate::offline::engine::AdapterDescription;
 use crate::offline::orbit::{at_times, share};
 use crate::reference::{Workload, workload};
-use crate::renderer::{Design, GpuCapture, Headless, Timings};
+use crate::renderer::{ColorPrecision, Design, GpuCapture, Headless, Timings};
 use crate::scene::RuntimeScene;
 use crate::view::View;
 use serde_json::json;
@@ -54,6 +54,9 @@ pub struct Bench {
     /// Also compute expected and median depth.
     #[arg(long)]
     depths: bool,
+    /// Draw into a color target of half precision, as in Bevy apps, instead of single.
+    #[arg(long)]
+    half: bool,
     #[command(flatten)]
     views: ViewArgs,
     #[command(flatten)]
@@ -115,6 +118,7 @@ impl Bench {
             }
         }
         headless.measure_depths(self.depths);
+        headless.measure_precision(if self.half { ColorPrecision::Half } else { ColorPrecision::Single });
         for round in 1..=self.rounds {
             for row in &mut rows {
                 let Subject { path, capture, views, .. } = row.subject;

@@ -44,7 +44,7 @@ pub use device::GpuContext;
 pub use error::GpuError;
 pub use headless::Headless;
 pub use pipelines::Renderer;
-pub use shaders::{ShaderChecks, Storage};
+pub use shaders::{ColorPrecision, ShaderChecks, Storage};
 pub use statistics::ViewStatistics;
 pub use timing::{PassTime, Timings};
 pub use view::{Design, FinishedFrame, Instance, OpaqueDepth, PassBuffers, ViewParameters, ViewRenderer};

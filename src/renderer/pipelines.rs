@@ -5,9 +5,7 @@
 
 use super::bind::{Bind, group_layout, pipeline};
 use super::memory::Allocator;
-use super::shaders::{
-    BINNED, Blending, LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32, ShaderChecks, Storage, module,
-};
+use super::shaders::{BINNED, FastVariant, Lists, Pixels, SUBGROUPS_OF_32, ShaderChecks, Storage, module};
 use super::view::Design;
 use super::work::WorkCounters;
 use super::{GpuError, layout};
@@ -21,16 +19,17 @@ pub struct Renderer {
     pub(super) activate_scan: wgpu::ComputePipeline,
     pub(super) activate_write: wgpu::ComputePipeline,
     /// The passes of the reference design, compiled when they are first used: `project`, indexed by how a capture is stored, in the
-    /// order of [`Storage::ALL`], and the others.
+    /// order of [`Storage::ALL`], `blend`, in the order of [`Pixels::ALL`], and the others.
     project: [OnceLock<wgpu::ComputePipeline>; 3],
+    blend: [OnceLock<wgpu::ComputePipeline>; 4],
     reference: OnceLock<ReferencePasses>,
     /// Passes of the fast renderer, each compiled when it is first used: `project_bin` and `colors`, indexed by how a capture is
-    /// stored, in the order of [`Storage::ALL`], `sort_bins`, in the order of [`Lists::ALL`], and `blend_blocks`, with small and with large
-    /// batches, in the order of [`Blending::ALL`].
+    /// stored, in the order of [`Storage::ALL`], `sort_bins`, in the order of [`Lists::ALL`], and `blend_blocks`, by
+    /// [`FastVariant::blend_index`].
     project_bin: [OnceLock<wgpu::ComputePipeline>; 3],
     colors: [OnceLock<wgpu::ComputePipeline>; 3],
     sort_bins: [OnceLock<wgpu::ComputePipeline>; 3],
-    blend_blocks: [[OnceLock<wgpu::ComputePipeline>; 4]; 2],
+    blend_blocks: [OnceLock<wgpu::ComputePipeline>; FastVariant::BLENDS],
     checks: ShaderChecks,
     /// Whether [`Design::Auto`] is the reference design: for a software driver, where it is faster, and in browsers, where the fast one
     /// is untried.
@@ -42,7 +41,7 @@ pub struct Renderer {
     work: WorkCounters,
 }
 
-/// The passes of the reference design after `project`.
+/// The passes of the reference design between `project` and `blend`.
 #[derive(Debug)]
 pub(super) struct ReferencePasses {
     pub sort_count: wgpu::ComputePipeline,
@@ -54,16 +53,12 @@ pub(super) struct ReferencePasses {
     pub bin_offset: wgpu::ComputePipeline,
     pub bin_emit: wgpu::ComputePipeline,
     pub ranges: wgpu::ComputePipeline,
-    pub blend: wgpu::ComputePipeline,
-    pub blend_multisampled: wgpu::ComputePipeline,
 }
 
 impl ReferencePasses {
     fn new(device: &wgpu::Device, layouts: &Layouts, checks: ShaderChecks) -> Result<Self, GpuError> {
         let shader = |name| module(device, name, &[], checks);
-        let (sort, bin) = (shader("sort")?, shader("bin")?);
-        let (ranges, blend) = (shader("ranges")?, shader("blend")?);
-        let blend_multisampled = module(device, "blend", MULTISAMPLED, checks)?;
+        let (sort, bin, ranges) = (shader("sort")?, shader("bin")?, shader("ranges")?);
         let pipeline = |module: &wgpu::ShaderModule, entry: &str, groups: &[&wgpu::BindGroupLayout]| {
             let groups: Vec<_> = groups.iter().copied().map(Some).collect();
             pipeline(device, module, entry, &groups)
@@ -78,8 +73,6 @@ impl ReferencePasses {
             bin_offset: pipeline(&bin, "offset", &[&layouts.bin]),
             bin_emit: pipeline(&bin, "emit", &[&layouts.bin]),
             ranges: pipeline(&ranges, "ranges", &[&layouts.ranges]),
-            blend: pipeline(&blend, "blend", &[&layouts.pixel[0], &layouts.blend]),
-            blend_multisampled: pipeline(&blend_multisampled, "blend", &[&layouts.pixel[1], &layouts.blend]),
         })
     }
 }
@@ -98,8 +91,8 @@ pub(super) struct Layouts {
     pub bin: wgpu::BindGroupLayout,
     pub ranges: wgpu::BindGroupLayout,
     pub blend: wgpu::BindGroupLayout,
-    /// Uniforms, background, opaque depth and targets of the pixels, without and with multisampled depth.
-    pub pixel: [wgpu::BindGroupLayout; 2],
+    /// Uniforms, background, opaque depth and targets of the pixels, in the order of [`Pixels::ALL`].
+    pub pixel: [wgpu::BindGroupLayout; 4],
     pub project_bin: wgpu::BindGroupLayout,
     pub sort_bins: wgpu::BindGroupLayout,
     pub colors: wgpu::BindGroupLayout,
@@ -129,6 +122,7 @@ impl Renderer {
             activate_scan: pipeline(&activate, "scan", &[&layouts.activate, &layouts.filter]),
             activate_write: pipeline(&activate, "write", &[&layouts.activate, &layouts.filter]),
             project: Default::default(),
+            blend: Default::default(),
             reference: OnceLock::new(),
             project_bin: Default::default(),
             colors: Default::default(),
@@ -181,6 +175,7 @@ impl Renderer {
         &self,
         device: &wgpu::Device,
         storages: impl Iterator<Item = Storage>,
+        pixels: Pixels,
     ) -> Result<(), GpuError> {
         let layouts = &self.layouts;
         for storage in storages {
@@ -200,12 +195,23 @@ impl Renderer {
             let made = ReferencePasses::new(device, layouts, self.checks)?;
             self.reference.get_or_init(|| made);
         }
+        if self.blend(pixels).is_none() {
+            let shader = module(device, "blend", &pixels.definitions(), self.checks)?;
+            let groups = [&layouts.pixel[pixels.index()], &layouts.blend].map(Some);
+            let made = pipeline(device, &shader, "blend", &groups);
+            self.blend[pixels.index()].get_or_init(|| made);
+        }
         Ok(())
     }
 
     /// Returns `project` for captures stored in this way, if it has been compiled.
     pub(super) fn project(&self, storage: Storage) -> Option<&wgpu::ComputePipeline> {
         self.project[storage as usize].get()
+    }
+
+    /// Returns `blend` for pixels of this kind, if it has been compiled.
+    pub(super) fn blend(&self, pixels: Pixels) -> Option<&wgpu::ComputePipeline> {
+        self.blend[pixels.index()].get()
     }
 
     /// Returns the other passes of the reference design, if they have been compiled.
@@ -225,10 +231,10 @@ impl Renderer {
     ) -> Result<(), GpuError> {
         let storages = std::iter::once(storage);
         match self.resolve(design) {
-            Design::Reference => self.compile_reference(device, storages),
+            Design::Reference => self.compile_reference(device, storages, Pixels::default()),
             Design::Auto | Design::Fast => {
                 let lists = Lists::suiting(&device.limits(), 0);
-                self.compile_fast(device, storages, lists, Blending::default(), false)
+                self.compile_fast(device, storages, FastVariant { lists, ..FastVariant::default() })
             }
         }
     }
@@ -241,9 +247,7 @@ impl Renderer {
         &self,
         device: &wgpu::Device,
         storages: impl Iterator<Item = Storage>,
-        lists: Lists,
-        blending: Blending,
-        large_batches: bool,
+        variant: FastVariant,
     ) -> Result<(), GpuError> {
         let layouts = &self.layouts;
         for storage in storages {
@@ -263,18 +267,18 @@ impl Renderer {
                 self.colors[storage as usize].get_or_init(|| made);
             }
         }
+        let lists = variant.lists;
         if self.sort_bins(lists).is_none() {
             let shader = module(device, "sort_bins", &[lists.definitions(), self.subgroups].concat(), self.checks)?;
             let made = pipeline(device, &shader, "sort_bins", &[Some(&layouts.sort_bins)]);
             self.sort_bins[lists as usize].get_or_init(|| made);
         }
-        if self.blend_blocks(blending, large_batches).is_none() {
-            let batches = if large_batches { LARGE_BATCHES } else { &[] };
-            let definitions = [blending.definitions(), batches, self.subgroups].concat();
+        if self.blend_blocks(variant).is_none() {
+            let definitions = [&variant.blend_definitions(), self.subgroups].concat();
             let shader = module(device, "blend_blocks", &definitions, self.checks)?;
-            let pixel = &layouts.pixel[usize::from(blending == Blending::AllMultisampled)];
+            let pixel = &layouts.pixel[variant.pixels().index()];
             let made = pipeline(device, &shader, "blend_blocks", &[pixel, &layouts.blend_blocks].map(Some));
-            self.blend_blocks[usize::from(large_batches)][blending as usize].get_or_init(|| made);
+            self.blend_blocks[variant.blend_index()].get_or_init(|| made);
         }
         Ok(())
     }
@@ -295,8 +299,8 @@ impl Renderer {
     }
 
     /// Returns `blend_blocks`, if it has been compiled.
-    pub(super) fn blend_blocks(&self, blending: Blending, large_batches: bool) -> Option<&wgpu::ComputePipeline> {
-        self.blend_blocks[usize::from(large_batches)][blending as usize].get()
+    pub(super) fn blend_blocks(&self, variant: FastVariant) -> Option<&wgpu::ComputePipeline> {
+        self.blend_blocks[variant.blend_index()].get()
     }
 
     /// Creates the bind groups of the geometry and the color of one part of a capture, the buffers in the order of the shaders'
@@ -322,8 +326,11 @@ impl Layouts {
         const FRAME: usize = size_of::<layout::FrameUniforms>();
         const INSTANCE: Bind = UniformAt(size_of::<layout::InstanceUniforms>());
         let new = |label, bindings: &[Bind]| group_layout(device, label, bindings);
-        let targets = [wgpu::TextureFormat::Rgba32Float, wgpu::TextureFormat::Rg32Float].map(Target);
-        let pixel = |depth| new("gs4d pixel", &[Uniform(FRAME), Read, depth, targets[0], targets[1]]);
+        let pixel = |pixels: Pixels| {
+            let opaque = if pixels.multisampled { Depths } else { Depth };
+            let targets = [pixels.precision.format(), wgpu::TextureFormat::Rg32Float].map(Target);
+            new("gs4d pixel", &[Uniform(FRAME), Read, opaque, targets[0], targets[1]])
+        };
         Self {
             activate: new("gs4d activate", &[UniformAt(size_of::<layout::Activation>()), Write, Write]),
             filter: new("gs4d filter", &[Read]),
@@ -345,7 +352,7 @@ impl Layouts {
             bin: new("gs4d bin", &[Uniform(FRAME), Write, Read, Read, Write, Write, Write]),
             ranges: new("gs4d ranges", &[Uniform(FRAME), Read, Read, Write]),
             blend: new("gs4d blend", &[Read, Read, Read]),
-            pixel: [pixel(Depth), pixel(Depths)],
+            pixel: Pixels::ALL.map(pixel),
             project_bin: new("gs4d project_bin", &[INSTANCE, Write, Write, Write, Write]),
             // The shader does not read the last, the list of the visible splats: so everything that `project_bin` wrote and `colors` reads
             // is made visible before `sort_bins`, not between the two, and they run at the same time.

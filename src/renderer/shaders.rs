@@ -146,6 +146,62 @@ impl Lists {
     }
 }
 
+/// Precision of the color and transmittance of each pixel.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum ColorPrecision {
+    /// `Rgba32Float`: 16 bytes for each pixel.
+    #[default]
+    Single,
+    /// `Rgba16Float`: 8 bytes, for targets with no more than that.
+    Half,
+}
+
+impl ColorPrecision {
+    /// Returns the format of the texture.
+    pub fn format(self) -> wgpu::TextureFormat {
+        match self {
+            Self::Single => wgpu::TextureFormat::Rgba32Float,
+            Self::Half => wgpu::TextureFormat::Rgba16Float,
+        }
+    }
+
+    /// Returns the definitions of `blend` and `blend_blocks`.
+    pub fn definitions(self) -> &'static [&'static str] {
+        match self {
+            Self::Single => &[],
+            Self::Half => &["HALF_COLOR"],
+        }
+    }
+}
+
+/// How the pixels of a view are read and written: what the layout of their bindings depends on.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Pixels {
+    /// Whether the opaque depth is multisampled.
+    pub multisampled: bool,
+    pub precision: ColorPrecision,
+}
+
+impl Pixels {
+    /// All kinds, by [`index`](Self::index).
+    pub const ALL: [Self; 4] = [
+        Self { multisampled: false, precision: ColorPrecision::Single },
+        Self { multisampled: true, precision: ColorPrecision::Single },
+        Self { multisampled: false, precision: ColorPrecision::Half },
+        Self { multisampled: true, precision: ColorPrecision::Half },
+    ];
+
+    pub fn index(self) -> usize {
+        usize::from(self.multisampled) + 2 * self.precision as usize
+    }
+
+    /// Returns the definitions of `blend`.
+    pub fn definitions(self) -> Vec<&'static str> {
+        let multisampled = if self.multisampled { MULTISAMPLED } else { &[] };
+        [multisampled, self.precision.definitions()].concat()
+    }
+}
+
 /// Definitions of `sort_bins` and `blend_blocks` on devices whose subgroups always have 32 threads.
 pub const SUBGROUPS_OF_32: &[&str] = &["SUBGROUPS_OF_32"];
 
@@ -159,6 +215,8 @@ pub enum Blending {
     Color,
     /// Color, cut by opaque surfaces.
     ColorBehindSurfaces,
+    /// Color, cut by opaque surfaces with several samples for each pixel.
+    ColorBehindSamples,
     /// Color and depths, opaque surfaces, every debug view.
     #[default]
     All,
@@ -168,21 +226,62 @@ pub enum Blending {
 
 impl Blending {
     /// All kinds.
-    pub const ALL: [Self; 4] = [Self::Color, Self::ColorBehindSurfaces, Self::All, Self::AllMultisampled];
+    pub const ALL: [Self; 5] =
+        [Self::Color, Self::ColorBehindSurfaces, Self::ColorBehindSamples, Self::All, Self::AllMultisampled];
 
     /// Returns the definitions of `blend_blocks`.
     pub fn definitions(self) -> &'static [&'static str] {
         match self {
             Self::Color => &[],
             Self::ColorBehindSurfaces => &["OPAQUE"],
+            Self::ColorBehindSamples => &["OPAQUE", "MULTISAMPLED"],
             Self::All => &["DEPTHS"],
             Self::AllMultisampled => &["DEPTHS", "MULTISAMPLED"],
         }
     }
+
+    /// Returns whether depths are written.
+    pub(super) fn writes_depths(self) -> bool {
+        matches!(self, Self::All | Self::AllMultisampled)
+    }
+
+    /// Returns whether the opaque depth is multisampled.
+    pub(super) fn is_multisampled(self) -> bool {
+        matches!(self, Self::ColorBehindSamples | Self::AllMultisampled)
+    }
+}
+
+/// Which variants of its last passes a frame of the fast design needs.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct FastVariant {
+    pub lists: Lists,
+    pub blending: Blending,
+    pub precision: ColorPrecision,
+    pub large_batches: bool,
+}
+
+impl FastVariant {
+    /// Number of variants of `blend_blocks`.
+    pub const BLENDS: usize = 4 * Blending::ALL.len();
+
+    /// Returns the number of its `blend_blocks`.
+    pub fn blend_index(self) -> usize {
+        (self.blending as usize * 2 + self.precision as usize) * 2 + usize::from(self.large_batches)
+    }
+
+    /// Returns the definitions of `blend_blocks`.
+    pub fn blend_definitions(self) -> Vec<&'static str> {
+        let batches = if self.large_batches { LARGE_BATCHES } else { &[] };
+        [self.blending.definitions(), self.precision.definitions(), batches].concat()
+    }
+
+    pub fn pixels(self) -> Pixels {
+        Pixels { multisampled: self.blending.is_multisampled(), precision: self.precision }
+    }
 }
 
 /// Returns the naga module of a pass, imports resolved, validated, with these definitions: those of a [`Storage`] for
-/// `project` and `colors`, none or [`MULTISAMPLED`] for `blend`, those of the fast renderer's passes, none for the others.
+/// `project` and `colors`, none, [`MULTISAMPLED`] or those of a [`ColorPrecision`] for `blend`, those of the fast renderer's passes, none for the others.
 ///
 /// # Errors
 /// When there is no such pass or it does not compile.

@@ -151,13 +151,13 @@ fn parallel_rays_show_far_and_near_at_one_size() {
     }
 }
 
-/// Returns a multisampled depth that is `near / distance` left of the middle, and 0 right of it. In the middle column
-/// half of the samples are covered.
-fn edge(context: &GpuContext, near: f32, distance: f32) -> (wgpu::Texture, u32) {
+/// Returns a multisampled depth that is `near / distance` left of the middle, and 0 right of it, and the middle column, where half of the
+/// samples are covered. The edge leans by `slant` pictures' widths.
+pub fn edge(context: &GpuContext, size: UVec2, near: f32, distance: f32, slant: f32) -> (wgpu::Texture, u32) {
     let GpuContext { device, queue, .. } = context;
     let texture = device.create_texture(&wgpu::TextureDescriptor {
         label: None,
-        size: wgpu::Extent3d { width: SIZE.x, height: SIZE.y, depth_or_array_layers: 1 },
+        size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
         mip_level_count: 1,
         sample_count: 4,
         dimension: wgpu::TextureDimension::D2,
@@ -165,13 +165,14 @@ fn edge(context: &GpuContext, near: f32, distance: f32) -> (wgpu::Texture, u32) 
         usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
         view_formats: &[],
     });
-    let column = SIZE.x / 2;
+    let column = size.x / 2;
     // The edge goes through the middle of the column's pixels.
-    let end = (column as f32 + 0.5) / SIZE.x as f32 * 2.0 - 1.0;
+    let end = (column as f32 + 0.5) / size.x as f32 * 2.0 - 1.0;
     let source = format!(
         "@vertex fn main(@builtin(vertex_index) i: u32) -> @builtin(position) vec4<f32> {{
             let corner = vec2(f32(i & 1u), f32(i >> 1u));
-            return vec4(mix(-1.0, {end:?}, corner.x), corner.y * 2.0 - 1.0, {:?}, 1.0);
+            let y = corner.y * 2.0 - 1.0;
+            return vec4(mix(-1.0, {end:?} + {slant:?} * y, corner.x), y, {:?}, 1.0);
         }}",
         near / distance
     );
@@ -226,7 +227,7 @@ fn edge(context: &GpuContext, near: f32, distance: f32) -> (wgpu::Texture, u32) 
 fn multisampled_surfaces_hide_a_share_of_a_pixel() {
     let Some(mut headless) = gpu::headless() else { return };
     let (near, distance) = (0.1, 2.5);
-    let (texture, column) = edge(headless.context(), near, distance);
+    let (texture, column) = edge(headless.context(), SIZE, near, distance, 0.0);
     // Wide ones before and behind the surface, which is 2.5 away from a camera at the origin.
     let scene = blobs(&[(Vec3::Z * 2.0, 3.0, 0.5), (Vec3::Z * 4.0, 6.0, 0.6)]);
     let view = View::new(SIZE, 0.0, Mat4::IDENTITY, Vec4::new(1.0, 1.5, 0.0, 0.0), Vec2::new(1.0, 1.0 / 1.5));
@@ -263,7 +264,7 @@ fn a_surface_has_its_distance_from_any_projection() {
     let Some(mut headless) = gpu::headless() else { return };
     let scene = blobs(&[(Vec3::Z * 2.0, 3.0, 0.5), (Vec3::Z * 4.0, 6.0, 0.6)]);
     let capture = headless.upload(&scene).expect("it fits");
-    let (texture, _) = edge(headless.context(), 0.25, 1.0);
+    let (texture, _) = edge(headless.context(), SIZE, 0.25, 1.0, 0.0);
     let view = View::new(SIZE, 0.0, Mat4::IDENTITY, Vec4::new(1.0, 1.5, 0.0, 0.0), Vec2::new(1.0, 1.0 / 1.5));
     let instance = Instance { capture: &capture, active: None, view, appearance: Appearance::default() };
     let depth = texture.create_view(&wgpu::TextureViewDescriptor::default());

@@ -3,10 +3,11 @@
 //! In: scenes of many splats in few tiles. Out: proof that both designs draw the same picture, from the first frame on. Skipped where
 //! there is no GPU.
 
+use crate::appearance::edge;
 use crate::render::depth_texture;
 use crate::support::gpu;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
-use bevy_gs4d::renderer::{Design, Headless, Instance, OpaqueDepth, ViewParameters};
+use bevy_gs4d::renderer::{ColorPrecision, Design, Headless, Instance, OpaqueDepth, ViewParameters};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Form, RuntimeScene};
 use bevy_gs4d::view::{Appearance, Background, Camera, DebugView, Frame, RasterFov, View};
@@ -105,8 +106,11 @@ fn every_way_of_blending_shows_the_picture_of_the_reference() {
     let (near, distance) = (0.1, 2.5);
     let texture = depth_texture(headless.context(), size, near / distance);
     let surface = OpaqueDepth { texture: &texture, samples: 1, origin: UVec2::ZERO, distance: [near, 0.0, 0.0, 1.0] };
+    let (samples, _) = edge(headless.context(), size, near, distance, 0.3);
+    let samples = samples.create_view(&wgpu::TextureViewDescriptor::default());
+    let slanted = OpaqueDepth { texture: &samples, samples: 4, ..surface };
     for debug in [DebugView::Color, DebugView::Depth, DebugView::Overdraw, DebugView::Velocity] {
-        for opaque in [None, Some(surface)] {
+        for opaque in [None, Some(surface), Some(slanted)] {
             for background in [Background::None, Background::Color([0.3, 0.2, 0.1])] {
                 let parameters = ViewParameters { background, opaque, debug, ..ViewParameters::default() };
                 headless.set_design(Design::Reference);
@@ -116,13 +120,36 @@ fn every_way_of_blending_shows_the_picture_of_the_reference() {
                 for depths in [true, false] {
                     let parameters = ViewParameters { depths, ..parameters };
                     let found = headless.render_all(&instances, &parameters).expect("the picture fits");
-                    let what = format!("{debug:?}, surface {}, depths {depths}", opaque.is_some());
+                    let samples = opaque.map_or(0, |opaque| opaque.samples);
+                    let what = format!("{debug:?}, samples of the surface {samples}, depths {depths}");
+                    assert_eq!(found.depth.is_empty(), !depths, "{what}: depths");
                     let difference = difference(&found, &expected);
                     assert!(difference <= 2e-4, "{what}: differs by {difference}");
                     assert_eq!(found.counts, expected.counts, "{what}: counts");
                 }
             }
         }
+    }
+}
+
+#[test]
+fn colors_of_half_precision_are_those_of_single_precision_rounded() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let (scene, view) = (crowd(2000, 7, 0.05), view(130));
+    let capture = headless.upload(&scene).expect("the scene fits");
+    let instances = [Instance { capture: &capture, active: None, view, appearance: Appearance::default() }];
+    for design in [Design::Reference, Design::Fast] {
+        headless.set_design(design);
+        let [single, half] = [ColorPrecision::Single, ColorPrecision::Half].map(|precision| {
+            let parameters = ViewParameters { precision, ..ViewParameters::default() };
+            headless.render_all(&instances, &parameters).expect("the picture fits")
+        });
+        let (step, most) = (difference(&half, &single), single.picture.pixels.iter().map(|p| p.max_element()));
+        let most = most.fold(1.0, f32::max);
+        // Ten bits after the leading one; drivers may round towards zero.
+        assert!(step <= most * 2.0_f32.powi(-10), "{design:?}: differs by {step}");
+        assert!(step > 0.0, "{design:?}: it is another precision");
+        assert_eq!(half.depth, single.depth, "{design:?}: depths");
     }
 }
 

@@ -3,7 +3,7 @@
 //! In: the files of `shaders/`. Out: proof that each is known to the renderer and is valid WGSL that needs no optional capability.
 
 use bevy_gs4d::renderer::shaders::{
-    BINNED, Blending, LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32, Storage, compose, pass_names,
+    BINNED, Blending, ColorPrecision, LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32, Storage, compose, pass_names,
 };
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
@@ -50,7 +50,8 @@ fn every_pass_composes_and_is_valid() {
     };
     let binned = Storage::ALL.map(|storage| [BINNED, storage.definitions()].concat());
     let blending = Blending::ALL.into_iter().flat_map(|blending| {
-        [&[][..], LARGE_BATCHES, SUBGROUPS_OF_32].map(|device| [blending.definitions(), device].concat())
+        let half = ColorPrecision::Half.definitions();
+        [&[][..], LARGE_BATCHES, SUBGROUPS_OF_32, half].map(|device| [blending.definitions(), device].concat())
     });
     let lists = Lists::ALL
         .into_iter()
@@ -86,7 +87,7 @@ fn an_unknown_pass_is_named() {
 
 #[test]
 fn bevy_s_passes_are_valid_with_all_their_definitions() {
-    let composite = ("composite", include_str!("../../shaders/composite.wgsl"), ["ENCODE_TARGET", "DECODE_TARGET"]);
+    let composite = ("composite", include_str!("../../shaders/composite.wgsl"), ["READ_TARGET", "ENCODE_TARGET"]);
     let write_depth = ("write_depth", include_str!("../../shaders/write_depth.wgsl"), ["MEDIAN", "UNUSED"]);
     let check = |(name, source, defines): (&str, &str, [&str; 2]), chosen: usize| {
         let chosen = defines.iter().enumerate().filter(|(index, _)| (chosen >> index) & 1 == 1);

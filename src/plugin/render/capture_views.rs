@@ -29,6 +29,8 @@ pub(super) struct CaptureView {
     pub(super) renderer: ViewRenderer,
     /// The composite into the camera's target, and what it binds.
     pub(super) composite: CachedRenderPipelineId,
+    /// Whether it blends with the target where that is, instead of reading it.
+    pub(super) in_place: bool,
     pub(super) bindings: CompositeBindings,
     /// The pass that writes to the camera's depth buffer, if the camera asks for it, and what that pass binds.
     pub(super) write_depth: Option<CachedRenderPipelineId>,
@@ -67,6 +69,7 @@ impl CaptureView {
             camera,
             renderer: ViewRenderer::new(device.wgpu_device(), renderer),
             composite,
+            in_place: false,
             bindings: CompositeBindings::default(),
             write_depth: None,
             depth_bindings: WriteDepthBindings::default(),

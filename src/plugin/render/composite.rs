@@ -11,9 +11,10 @@ use bevy::ecs::resource::Resource;
 use bevy::ecs::world::{FromWorld, World};
 use bevy::render::render_resource::binding_types::{texture_2d, uniform_buffer};
 use bevy::render::render_resource::{
-    BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, BindingResource, ColorTargetState,
-    ColorWrites, FragmentState, PipelineCache, RenderPipelineDescriptor, ShaderStages, SpecializedRenderPipeline,
-    TextureFormat, TextureSampleType, TextureView, TextureViewId, UniformBuffer, VertexState,
+    BindGroup, BindGroupEntries, BindGroupEntry, BindGroupLayoutDescriptor, BindGroupLayoutEntries, BindingResource,
+    BlendState, ColorTargetState, ColorWrites, FragmentState, PipelineCache, RenderPipelineDescriptor, ShaderStages,
+    SpecializedRenderPipeline, TextureFormat, TextureSampleType, TextureView, TextureViewId, UniformBuffer,
+    VertexState,
 };
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 use bevy::shader::{Shader, ShaderDefVal};
@@ -31,7 +32,9 @@ pub(super) struct CaptureShaders {
 /// The parts that the pipelines for all targets share.
 #[derive(Resource)]
 pub(super) struct CompositePipeline {
+    /// Captures, viewport, and the target so far if the composite reads it.
     layout: BindGroupLayoutDescriptor,
+    reading: BindGroupLayoutDescriptor,
     vertex: VertexState,
     shader: Handle<Shader>,
 }
@@ -47,10 +50,16 @@ pub(super) struct CompositeKey {
 }
 
 impl CompositeKey {
+    /// Returns whether captures are blended in the space of the target, so that the hardware does it, in place. Otherwise the target is
+    /// read, and written to another texture.
+    pub(super) fn blends_in_place(self) -> bool {
+        self.encoded == (self.blend_space == BlendSpace::Encoded)
+    }
+
     fn shader_defs(self) -> Vec<ShaderDefVal> {
         match (self.encoded, self.blend_space) {
-            (false, BlendSpace::Encoded) => vec!["ENCODE_TARGET".into()],
-            (true, BlendSpace::Linear) => vec!["DECODE_TARGET".into()],
+            (false, BlendSpace::Encoded) => vec!["READ_TARGET".into(), "ENCODE_TARGET".into()],
+            (true, BlendSpace::Linear) => vec!["READ_TARGET".into()],
             (false, BlendSpace::Linear) | (true, BlendSpace::Encoded) => Vec::new(),
         }
     }
@@ -59,10 +68,13 @@ impl CompositeKey {
 impl FromWorld for CompositePipeline {
     fn from_world(world: &mut World) -> Self {
         let texture = || texture_2d(TextureSampleType::Float { filterable: false });
-        let entries = (texture(), texture(), uniform_buffer::<UVec4>(false));
-        let entries = BindGroupLayoutEntries::sequential(ShaderStages::FRAGMENT, entries);
+        let captures = (texture(), uniform_buffer::<UVec4>(false));
+        let captures = BindGroupLayoutEntries::sequential(ShaderStages::FRAGMENT, captures);
+        let all = (texture(), uniform_buffer::<UVec4>(false), texture());
+        let all = BindGroupLayoutEntries::sequential(ShaderStages::FRAGMENT, all);
         Self {
-            layout: BindGroupLayoutDescriptor::new("gs4d composite", &entries),
+            layout: BindGroupLayoutDescriptor::new("gs4d composite", &captures),
+            reading: BindGroupLayoutDescriptor::new("gs4d composite", &all),
             vertex: world.resource::<FullscreenShader>().to_vertex_state(),
             shader: world.resource::<CaptureShaders>().composite.clone(),
         }
@@ -73,18 +85,26 @@ impl SpecializedRenderPipeline for CompositePipeline {
     type Key = CompositeKey;
 
     fn specialize(&self, key: CompositeKey) -> RenderPipelineDescriptor {
+        let in_place = key.blends_in_place();
+        let blend = in_place.then_some(BlendState::PREMULTIPLIED_ALPHA_BLENDING);
         RenderPipelineDescriptor {
             label: Some("gs4d composite".into()),
-            layout: vec![self.layout.clone()],
+            layout: vec![self.layout(in_place).clone()],
             vertex: self.vertex.clone(),
             fragment: Some(FragmentState {
                 shader: self.shader.clone(),
                 shader_defs: key.shader_defs(),
                 entry_point: Some("fragment".into()),
-                targets: vec![Some(ColorTargetState { format: key.format, blend: None, write_mask: ColorWrites::ALL })],
+                targets: vec![Some(ColorTargetState { format: key.format, blend, write_mask: ColorWrites::ALL })],
             }),
             ..RenderPipelineDescriptor::default()
         }
+    }
+}
+
+impl CompositePipeline {
+    fn layout(&self, in_place: bool) -> &BindGroupLayoutDescriptor {
+        if in_place { &self.layout } else { &self.reading }
     }
 }
 
@@ -96,7 +116,8 @@ pub(super) struct CompositeBindings {
 }
 
 struct CachedGroup {
-    source: TextureViewId,
+    /// The target so far, if it is read.
+    source: Option<TextureViewId>,
     captures: wgpu::TextureView,
     group: BindGroup,
 }
@@ -131,30 +152,35 @@ impl CompositeBindings {
         self.viewport.binding()
     }
 
-    /// Returns the bind group that reads `source`, the target so far, and `captures`; `None` before the first
-    /// [`set_viewport`](Self::set_viewport).
+    /// Returns the bind group that reads `captures` and `source`, the target so far, unless they are blended in place; `None` before
+    /// the first [`set_viewport`](Self::set_viewport).
     pub(super) fn group(
         &mut self,
         device: &RenderDevice,
         cache: &PipelineCache,
         pipeline: &CompositePipeline,
-        source: &TextureView,
+        source: Option<&TextureView>,
         captures: &wgpu::TextureView,
         work: &WorkCounters,
     ) -> Option<&BindGroup> {
-        let known = self.groups.iter().position(|g| g.source == source.id() && g.captures == *captures);
+        let id = source.map(TextureView::id);
+        let known = self.groups.iter().position(|g| g.source == id && g.captures == *captures);
         let index = match known {
             Some(index) => index,
             None => {
-                let layout = cache.get_bind_group_layout(&pipeline.layout);
-                let entries = BindGroupEntries::sequential((source, captures, self.viewport.binding()?));
-                let group = device.create_bind_group("gs4d composite", &layout, &entries);
+                let layout = cache.get_bind_group_layout(pipeline.layout(source.is_none()));
+                let viewport = self.viewport.binding()?;
+                let create = |entries: &[BindGroupEntry]| device.create_bind_group("gs4d composite", &layout, entries);
+                let group = match source {
+                    Some(source) => create(&BindGroupEntries::sequential((captures, viewport, source))),
+                    None => create(&BindGroupEntries::sequential((captures, viewport))),
+                };
                 work.add_created();
                 // Both textures of the target are created together: if one is new, so is the other.
                 if self.groups.len() >= 2 || self.groups.iter().any(|known| known.captures != *captures) {
                     self.groups.clear();
                 }
-                self.groups.push(CachedGroup { source: source.id(), captures: captures.clone(), group });
+                self.groups.push(CachedGroup { source: id, captures: captures.clone(), group });
                 self.groups.len() - 1
             }
         };

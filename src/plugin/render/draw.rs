@@ -79,20 +79,24 @@ impl Passes<'_> {
         // Fetched before `post_process_write` swaps the target's textures: from then on, the other one must be written.
         let Some(pipeline) = self.cache.get_render_pipeline(view.composite) else { return };
         let Some(color) = view.renderer.color() else { return };
-        let source = target.main_texture_view();
+        let source = (!view.in_place).then(|| target.main_texture_view());
         let group = view.bindings.group(&self.device, &self.cache, &self.composite, source, color, work);
         let Some(group) = group else { return };
-        let write = target.post_process_write();
+        let attachment = if view.in_place {
+            target.get_unsampled_color_attachment()
+        } else {
+            RenderPassColorAttachment {
+                view: target.post_process_write().destination,
+                depth_slice: None,
+                resolve_target: None,
+                ops: Operations::default(),
+            }
+        };
         let diagnostics = context.diagnostic_recorder();
         let diagnostics = diagnostics.as_deref();
         let mut pass = context.begin_tracked_render_pass(RenderPassDescriptor {
             label: Some("gs4d composite"),
-            color_attachments: &[Some(RenderPassColorAttachment {
-                view: write.destination,
-                depth_slice: None,
-                resolve_target: None,
-                ops: Operations::default(),
-            })],
+            color_attachments: &[Some(attachment)],
             depth_stencil_attachment: None,
             timestamp_writes: None,
             occlusion_query_set: None,

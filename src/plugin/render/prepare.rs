@@ -14,7 +14,7 @@ use super::upload::GpuGaussianCapture;
 use super::view::CameraLens;
 use super::write_depth::{WriteDepthKey, WriteDepthPipeline};
 use crate::plugin::component::GaussianCapture3d;
-use crate::renderer::{OpaqueDepth, ViewParameters};
+use crate::renderer::{ColorPrecision, OpaqueDepth, ViewParameters};
 use crate::view::{Background, DebugView};
 use bevy::camera::{Camera3d, CompositingSpace, MainPassResolutionOverride};
 use bevy::ecs::entity::Entity;
@@ -70,15 +70,16 @@ impl Scene<'_> {
 }
 
 impl Pipelines<'_> {
+    /// Returns the composite for a camera's target, and whether it blends in place.
     fn composite(
         &mut self,
         view: &ExtractedView,
         camera: &ExtractedCamera,
         settings: CaptureViewSettings,
-    ) -> CachedRenderPipelineId {
+    ) -> (CachedRenderPipelineId, bool) {
         let encoded = camera.compositing_space == Some(CompositingSpace::Srgb);
         let key = CompositeKey { format: view.target_format, encoded, blend_space: settings.blend_space };
-        self.composites.specialize(&self.cache, &self.composite, key)
+        (self.composites.specialize(&self.cache, &self.composite, key), key.blends_in_place())
     }
 
     fn write_depth(&mut self, msaa: Msaa, median: bool) -> CachedRenderPipelineId {
@@ -125,10 +126,10 @@ pub(super) fn prepare_views(
         let main = view.retained_view_entity.main_entity;
         let settings = scene.settings.0.get(&main).copied().unwrap_or_default();
         // Even without anything to draw, so that it is compiled while captures load.
-        let composite = pipelines.composite(view, camera, settings);
+        let (composite, in_place) = pipelines.composite(view, camera, settings);
         let state =
             views.0.entry(entity).or_insert_with(|| CaptureView::new(&device, &renderer.0, main.id(), composite));
-        state.composite = composite;
+        (state.composite, state.in_place) = (composite, in_place);
         state.late = settings.late;
         state.set_design(&renderer.0, settings.design);
         state.measure(measure, &device, &queue, &renderer.0);
@@ -151,6 +152,8 @@ pub(super) fn prepare_views(
             blend_space: settings.blend_space,
             debug: settings.debug,
             depths: settings.depth != DepthWrite::None,
+            // Bevy's own targets have no more.
+            precision: ColorPrecision::Half,
         };
         let prepared = state.renderer.prepare(device.wgpu_device(), &queue, &renderer.0, &instances, &parameters);
         if let Err(failure) = prepared {

@@ -79,7 +79,12 @@ impl Headless {
 
     /// Returns how the frames are drawn.
     fn measured(&self) -> ViewParameters<'static> {
-        ViewParameters { background: Background::Color([0.0; 3]), depths: self.depths, ..ViewParameters::default() }
+        ViewParameters {
+            background: Background::Color([0.0; 3]),
+            depths: self.depths,
+            precision: self.precision,
+            ..ViewParameters::default()
+        }
     }
 
     fn lane(&self, capture: &GpuCapture) -> Lane {

@@ -9,8 +9,8 @@ use super::layout::Counters;
 use super::memory::Allocator;
 use super::view::{FinishedFrame, max_pairs};
 use super::{
-    ActiveList, Design, GpuCapture, GpuContext, GpuError, Instance, Renderer, ShaderChecks, Storage, ViewParameters,
-    ViewRenderer, WorkCounters,
+    ActiveList, ColorPrecision, Design, GpuCapture, GpuContext, GpuError, Instance, Renderer, ShaderChecks, Storage,
+    ViewParameters, ViewRenderer, WorkCounters,
 };
 use crate::scene::RuntimeScene;
 use crate::view::{Appearance, Background, Counts, Frame, Picture, View};
@@ -25,6 +25,7 @@ pub struct Headless {
     filtered: bool,
     /// Whether frames that are measured have depths.
     depths: bool,
+    precision: ColorPrecision,
     /// The list of the capture drawn last.
     active: Option<ActiveList>,
 }
@@ -37,7 +38,15 @@ impl Headless {
     pub fn new(context: GpuContext, checks: ShaderChecks) -> Result<Self, GpuError> {
         let renderer = Renderer::new(&context.device, checks)?;
         let view = ViewRenderer::new(&context.device, &renderer);
-        Ok(Self { context, renderer, view, filtered: true, depths: false, active: None })
+        Ok(Self {
+            context,
+            renderer,
+            view,
+            filtered: true,
+            depths: false,
+            precision: ColorPrecision::Single,
+            active: None,
+        })
     }
 
     /// Returns the device and its adapter.
@@ -79,6 +88,11 @@ impl Headless {
         self.depths = depths;
     }
 
+    /// Sets the precision of the color of frames that [`time`](Self::time) measures. Default: [`ColorPrecision::Single`].
+    pub fn measure_precision(&mut self, precision: ColorPrecision) {
+        self.precision = precision;
+    }
+
     /// Sets whether temporal filters are used. Default: `true`.
     pub fn use_filters(&mut self, filtered: bool) {
         self.filtered = filtered;
@@ -113,7 +127,8 @@ impl Headless {
         frame
     }
 
-    /// Draws several captures into one picture, in order of depth, cut by opaque surfaces if given.
+    /// Draws several captures into one picture, in order of depth, cut by opaque surfaces if given. Depths are empty if the parameters
+    /// ask for none.
     ///
     /// # Errors
     /// As [`render`](Self::render).
@@ -125,12 +140,11 @@ impl Headless {
         let counters = self.submit_whole(instances, parameters)?;
         let size = instances.first().map_or(UVec2::ONE, |instance| instance.view.size);
         let (color, depth) = self.read_targets(size)?;
-        let color: &[[f32; 4]] = bytemuck::cast_slice(&color);
         Ok(Frame {
             picture: Picture { size, pixels: color.iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect() },
             transmittance: color.iter().map(|p| p[3]).collect(),
-            depth: depth.iter().step_by(2).copied().collect(),
-            median_depth: depth.iter().skip(1).step_by(2).copied().collect(),
+            depth: depth.iter().map(|p| p[0]).collect(),
+            median_depth: depth.iter().map(|p| p[1]).collect(),
             counts: Counts { visible: counters.visible, pairs: counters.pairs },
         })
     }
@@ -211,15 +225,26 @@ impl Headless {
         self.context.device.poll(wait).map(|_| ()).map_err(|error| GpuError::Device(error.to_string()))
     }
 
-    /// Returns color (four floats each) and depths (two) of every pixel, without the padding of rows.
-    fn read_targets(&self, size: UVec2) -> Result<(Vec<f32>, Vec<f32>), GpuError> {
+    /// Returns color with transmittance, and depths, of every pixel.
+    fn read_targets(&self, size: UVec2) -> Result<(Vec<[f32; 4]>, Vec<[f32; 2]>), GpuError> {
         let Some((color, depth)) = self.view.textures() else { return Ok(Default::default()) };
-        Ok((self.read_texture(color, size, 16)?, self.read_texture(depth, size, 8)?))
+        let bytes = self.read_texture(color, size)?;
+        let colors = if color.format() == ColorPrecision::Half.format() {
+            bytemuck::pod_collect_to_vec::<u8, [half::f16; 4]>(&bytes)
+                .iter()
+                .map(|p| p.map(half::f16::to_f32))
+                .collect()
+        } else {
+            bytemuck::pod_collect_to_vec(&bytes)
+        };
+        let depths = depth.map(|depth| self.read_texture(depth, size)).transpose()?.unwrap_or_default();
+        Ok((colors, bytemuck::pod_collect_to_vec(&depths)))
     }
 
-    fn read_texture(&self, texture: &wgpu::Texture, size: UVec2, pixel: u32) -> Result<Vec<f32>, GpuError> {
+    /// Returns the texels, without the padding of rows.
+    fn read_texture(&self, texture: &wgpu::Texture, size: UVec2) -> Result<Vec<u8>, GpuError> {
         let GpuContext { device, queue, .. } = &self.context;
-        let row = size.x * pixel;
+        let row = size.x * texture.format().block_copy_size(None).unwrap_or(0);
         let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let buffer = readback_buffer(device, u64::from(padded) * u64::from(size.y));
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -233,8 +258,7 @@ impl Headless {
         );
         queue.submit([encoder.finish()]);
         let bytes = self.read(&buffer)?;
-        let rows = bytes.chunks_exact(padded as usize).flat_map(|r| r[..row as usize].chunks_exact(4));
-        Ok(rows.map(bytemuck::pod_read_unaligned).collect())
+        Ok(bytes.chunks_exact(padded as usize).flat_map(|padded| &padded[..row as usize]).copied().collect())
     }
 
     /// Copies the first `size` bytes of a buffer to the host and waits for them.

@@ -78,7 +78,7 @@ impl ViewRenderer {
 
         // sort_bins
         let (Some(sort_bins), Some(blend_blocks)) =
-            (renderer.sort_bins(self.lists), renderer.blend_blocks(self.blending, self.large_batches))
+            (renderer.sort_bins(self.variant.lists), renderer.blend_blocks(self.variant))
         else {
             return;
         };

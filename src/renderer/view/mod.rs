@@ -14,7 +14,7 @@ mod sizes;
 use super::active::drawn_count;
 use super::memory::{alignment_of, binding_limit};
 use super::pipelines::Renderer;
-use super::shaders::{Blending, Lists};
+use super::shaders::{Blending, ColorPrecision, FastVariant, Lists, Pixels};
 use super::timing::{PassTime, PassTimer, TIMED_FAST_PASSES, TIMED_PASSES};
 use super::{ActiveList, GpuCapture, GpuError, ViewStatistics, layout};
 use crate::view::tiles;
@@ -55,12 +55,14 @@ pub struct ViewParameters<'a> {
     pub debug: DebugView,
     /// Whether expected and median depth are computed; drawing is faster without. Default: `true`.
     pub depths: bool,
+    /// Precision of the color target. Default: [`ColorPrecision::Single`].
+    pub precision: ColorPrecision,
 }
 
 impl Default for ViewParameters<'_> {
     fn default() -> Self {
-        let (blend_space, debug) = Default::default();
-        Self { background: Background::None, opaque: None, blend_space, debug, depths: true }
+        let (blend_space, debug, precision) = Default::default();
+        Self { background: Background::None, opaque: None, blend_space, debug, depths: true, precision }
     }
 }
 
@@ -92,13 +94,10 @@ pub struct ViewRenderer {
     /// Number of frames that have been recorded.
     frames: u32,
     recorded: bool,
-    /// Whether its opaque depth is multisampled.
-    multisampled: bool,
-    /// What the fast design blends in the frame prepared last.
-    blending: Blending,
-    large_batches: bool,
-    /// How the fast design sorts it, and the number of splats of the fullest bin of an earlier frame.
-    lists: Lists,
+    /// The kind of its pixels, and how the fast design draws it, in the frame prepared last.
+    pixels: Pixels,
+    variant: FastVariant,
+    /// Number of splats of the fullest bin of an earlier frame.
     fullest_bin: u32,
     has_depths: bool,
     /// Number of pairs for which an earlier frame wanted room.
@@ -198,10 +197,8 @@ impl ViewRenderer {
             readback: Readback::new(allocator, "gs4d counter readback", counters),
             statistics: ViewStatistics::default(),
             timing: None,
-            multisampled: false,
-            blending: Blending::default(),
-            large_batches: false,
-            lists: Lists::default(),
+            pixels: Pixels::default(),
+            variant: FastVariant::default(),
             fullest_bin: 0,
             has_depths: true,
             resources: None,
@@ -224,16 +221,20 @@ impl ViewRenderer {
         parameters: &ViewParameters<'_>,
     ) -> Result<(), GpuError> {
         self.poll();
-        self.blending = blending(parameters);
+        let (precision, blending) = (parameters.precision, blending(parameters));
+        self.pixels = Pixels { multisampled: blending.is_multisampled(), precision };
         self.has_depths = parameters.depths;
         let storages = instances.iter().map(|instance| instance.capture.storage);
-        if self.design == Design::Reference {
-            renderer.compile_reference(device, storages)?;
+        let writes_depths = if self.design == Design::Reference {
+            renderer.compile_reference(device, storages, self.pixels)?;
+            true
         } else {
-            self.large_batches = bins::large_batches(&device.limits(), instances);
-            self.lists = Lists::suiting(&device.limits(), self.fullest_bin);
-            renderer.compile_fast(device, storages, self.lists, self.blending, self.large_batches)?;
-        }
+            let large_batches = bins::large_batches(&device.limits(), instances);
+            let lists = Lists::suiting(&device.limits(), self.fullest_bin);
+            self.variant = FastVariant { lists, blending, precision, large_batches };
+            renderer.compile_fast(device, storages, self.variant)?;
+            blending.writes_depths()
+        };
         if std::mem::take(&mut self.recorded) {
             self.odd = !self.odd;
             self.frames = self.frames.wrapping_add(1);
@@ -275,16 +276,16 @@ impl ViewRenderer {
             entries,
             parts: (parts as u32).max(1),
             picture,
+            depths: if writes_depths { picture } else { UVec2::ONE },
         };
         let sizes = self.kept_sizes(made, needed);
         let environment = instances.iter().find_map(|i| Some((i, i.capture.environment.as_ref()?)));
         let opaque = parameters.opaque.filter(|opaque| opaque.samples > 0);
-        self.multisampled = opaque.is_some_and(|opaque| opaque.samples > 1);
         let opaque_view = opaque.map_or(&self.no_depth, |depth| depth.texture).clone();
         let environment_buffer = environment.map_or(&self.no_environment, |(_, map)| &map.buffer).clone();
         let stale = self.resources.as_ref().is_none_or(|made| {
             made.sizes != sizes
-                || made.multisampled != self.multisampled
+                || made.pixels != self.pixels
                 || made.opaque != opaque_view
                 || made.environment != environment_buffer
         });
@@ -302,8 +303,8 @@ impl ViewRenderer {
         Ok(())
     }
 
-    /// Returns the color `C` (premultiplied, in the blend space) and transmittance: `Rgba32Float`. `None` before the
-    /// first [`prepare`](Self::prepare).
+    /// Returns the color `C` (premultiplied, in the blend space) and transmittance, as precise as
+    /// [asked for](ViewParameters::precision). `None` before the first [`prepare`](Self::prepare).
     pub fn color(&self) -> Option<&wgpu::TextureView> {
         self.resources.as_ref().map(|made| &made.color_view)
     }
@@ -353,8 +354,8 @@ impl ViewRenderer {
     }
 
     /// Returns the textures behind [`color`](Self::color) and [`depth`](Self::depth).
-    pub(crate) fn textures(&self) -> Option<(&wgpu::Texture, &wgpu::Texture)> {
-        self.resources.as_ref().map(|made| (&made.color, &made.depth))
+    pub(crate) fn textures(&self) -> Option<(&wgpu::Texture, Option<&wgpu::Texture>)> {
+        self.resources.as_ref().map(|made| (&made.color, self.has_depths.then_some(&made.depth)))
     }
 
     /// Returns the resources of the frame recorded last; `None` before the first [`prepare`](Self::prepare).
@@ -413,6 +414,7 @@ impl ViewRenderer {
             entries: made.entries.max(needed.entries),
             parts: made.parts.max(needed.parts),
             picture: needed.picture,
+            depths: needed.depths,
         }
     }
 
@@ -534,6 +536,7 @@ fn blending(parameters: &ViewParameters<'_>) -> Blending {
     match samples {
         0 if color => Blending::Color,
         1 if color => Blending::ColorBehindSurfaces,
+        _ if color => Blending::ColorBehindSamples,
         0 | 1 => Blending::All,
         _ => Blending::AllMultisampled,
     }

@@ -61,7 +61,7 @@ impl ViewRenderer {
         timer: Option<&PassTimer>,
     ) {
         // project
-        let Some(passes) = renderer.reference() else { return };
+        let (Some(passes), Some(blend)) = (renderer.reference(), renderer.blend(self.pixels)) else { return };
         let pipeline = |storage| renderer.project(storage);
         self.project(pipeline, renderer, &made.project, |count| count.div_ceil(256), pass, instances);
         mark(timer, pass);
@@ -103,7 +103,7 @@ impl ViewRenderer {
         mark(timer, pass);
 
         // blend
-        pass.set_pipeline(if self.multisampled { &passes.blend_multisampled } else { &passes.blend });
+        pass.set_pipeline(blend);
         pass.set_bind_group(0, &made.pixel, &[]);
         pass.set_bind_group(1, &made.blend, &[]);
         pass.dispatch_workgroups(tiles.x, tiles.y, 1);

@@ -8,6 +8,7 @@ use super::sizes::Sizes;
 use super::{Design, ViewRenderer};
 use crate::renderer::layout::{self, BLOCK, DEPTH_STEPS, DIGIT_BITS, DIGITS, SortStep};
 use crate::renderer::pipelines::Renderer;
+use crate::renderer::shaders::Pixels;
 use crate::view::tiles;
 use glam::UVec2;
 use std::cell::Cell;
@@ -26,9 +27,9 @@ pub(super) struct Resources {
     pub color_view: wgpu::TextureView,
     pub depth: wgpu::Texture,
     pub depth_view: wgpu::TextureView,
-    /// Opaque depth that the bind groups were created for, like `multisampled` and `environment`.
+    /// Opaque depth that the bind groups were created for, like `pixels` and `environment`.
     pub opaque: wgpu::TextureView,
-    pub multisampled: bool,
+    pub pixels: Pixels,
     pub environment: wgpu::Buffer,
     pub project: wgpu::BindGroup,
     /// Bind groups from the projected keys into the first pair of buffers, from there into the second, and back.
@@ -101,8 +102,8 @@ impl ViewRenderer {
         });
         let histogram = sorting("gs4d histogram", DIGITS * (stride + 1));
         let tile_ranges = storage("gs4d tile ranges", tiles.x * tiles.y, 8);
-        let color = allocator.texture("gs4d color", size, TextureFormat::Rgba32Float);
-        let depth = allocator.texture("gs4d depth", size, TextureFormat::Rg32Float);
+        let color = allocator.texture("gs4d color", size, self.pixels.precision.format());
+        let depth = allocator.texture("gs4d depth", sizes.depths, TextureFormat::Rg32Float);
         let color_view = color.create_view(&wgpu::TextureViewDescriptor::default());
         let depth_view = depth.create_view(&wgpu::TextureViewDescriptor::default());
         self.write_steps(queue, stride);
@@ -140,9 +141,9 @@ impl ViewRenderer {
         });
         Resources {
             sizes,
-            // 16 bytes of color and 8 of depth for each pixel.
             bytes: bytes.get()
-                + u64::from(size.x) * u64::from(size.y) * 24
+                + texture_bytes(&color)
+                + texture_bytes(&depth)
                 + fast.as_ref().map_or(0, |fast| fast.bytes),
             project: allocator.bind_group(
                 "gs4d project",
@@ -182,7 +183,7 @@ impl ViewRenderer {
             ),
             pixel: allocator.bind_group(
                 "gs4d pixel",
-                &layouts.pixel[usize::from(self.multisampled)],
+                &layouts.pixel[self.pixels.index()],
                 &[
                     frame,
                     environment.as_entire_binding(),
@@ -210,7 +211,7 @@ impl ViewRenderer {
             depth,
             depth_view,
             opaque,
-            multisampled: self.multisampled,
+            pixels: self.pixels,
             environment,
             fast,
         }
@@ -231,6 +232,11 @@ impl ViewRenderer {
         }
         queue.write_buffer(&self.steps, 0, &bytes);
     }
+}
+
+fn texture_bytes(texture: &wgpu::Texture) -> u64 {
+    let texel = texture.format().block_copy_size(None).unwrap_or(0);
+    u64::from(texture.width()) * u64::from(texture.height()) * u64::from(texel)
 }
 
 /// Returns the number of steps that sort by tile.

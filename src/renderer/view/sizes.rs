@@ -17,4 +17,6 @@ pub(super) struct Sizes {
     pub parts: u32,
     /// Size of the picture, pixels.
     pub picture: UVec2,
+    /// Size of the target of depths: that of the picture, or one pixel if none are written.
+    pub depths: UVec2,
 }
