@@ -33,8 +33,13 @@ fn basis_fourth(d: vec3<f32>) -> vec4<f32> {
     );
 }
 
-// Returns cos(2 pi n tau / T). The angle is reduced to one turn first: drivers guarantee little precision beyond it.
+// Returns cos(2 pi n tau / T).
 fn time_cosine(n: f32, tau: f32, time_span: f32) -> f32 {
+    return cos(time_angle(n, tau, time_span));
+}
+
+// Returns 2 pi n tau / T, reduced to one turn: drivers guarantee little precision beyond it.
+fn time_angle(n: f32, tau: f32, time_span: f32) -> f32 {
     let turns = n * tau / time_span;
-    return cos(6.2831853 * (turns - round(turns)));
+    return 6.2831853 * (turns - round(turns));
 }

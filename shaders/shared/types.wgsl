@@ -14,6 +14,52 @@ struct GaussianRecord {
     covariance_b: vec4<f32>,
 }
 
+// The raw parameters of one Gaussian, or their gradients. Quaternions are (w, x, y, z).
+struct TrainedRecord {
+    // Mean, mean_t.
+    mean: vec4<f32>,
+    // Logarithms of the scales, the last in time.
+    log_scale: vec4<f32>,
+    rotation_l: vec4<f32>,
+    rotation_r: vec4<f32>,
+    // Logit of opacity; three unused.
+    opacity_logit: vec4<f32>,
+}
+
+// The scene that is trained, and the number of a view.
+struct TrainedScene {
+    count: u32,
+    // 0: static, 1: without 4D rotation, 2: with it.
+    model: u32,
+    // Added to the temporal variance in the marginal, if positive.
+    prefilter_var: f32,
+    view: u32,
+}
+
+// Input of `loss` for one view.
+struct LossUniforms {
+    // Behind the image where it is not covered.
+    background: vec4<f32>,
+    size: vec2<u32>,
+    tiles: vec2<u32>,
+    // Share of the view in the loss of the batch.
+    share: f32,
+    // Share of SSIM in the loss of the view.
+    similarity_share: f32,
+    padding: vec2<u32>,
+}
+
+// Input of `adam` for one buffer.
+struct AdamUniforms {
+    // Of the first four four-vectors of each Gaussian, and of the others.
+    rates: array<vec4<f32>, 5>,
+    // 1 / (1 - decay^step) of the first moment, and the root of it of the second.
+    correction: vec2<f32>,
+    count: u32,
+    // Four-vectors of each Gaussian.
+    stride: u32,
+}
+
 // One part of a capture in one view: its camera and the slots of its splats.
 struct InstanceUniforms {
     // Rows of capture-to-camera.

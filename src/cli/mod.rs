@@ -15,6 +15,7 @@ mod compress;
 mod convert;
 mod eval;
 mod failure;
+mod fine_tune;
 mod info;
 mod interrupt;
 mod mask;
@@ -64,6 +65,8 @@ enum Verb {
     Mask(mask::Mask),
     Eval(eval::Eval),
     Ablate(ablate::Ablate),
+    #[command(name = "finetune")]
+    FineTune(fine_tune::FineTune),
     Bake(bake::Bake),
 }
 
@@ -82,6 +85,7 @@ impl Verb {
             Self::Mask(verb) => verb.run(),
             Self::Eval(verb) => verb.run(),
             Self::Ablate(verb) => verb.run(),
+            Self::FineTune(verb) => verb.run(),
             Self::Bake(verb) => verb.run(),
         }
     }
@@ -94,6 +98,7 @@ pub fn run() -> ExitCode {
     let outcome = interrupt::install().map_err(Failure::from).and_then(|()| cli.verb.run());
     let report = outcome.unwrap_or_else(Report::of_failure);
     match report.print(cli.json) {
+        Ok(()) if report.interrupted => interrupt::exit_code(),
         Ok(()) if report.failure.is_none() => ExitCode::SUCCESS,
         _ => ExitCode::from(2),
     }

@@ -61,6 +61,10 @@ impl Progress for Bars {
         note(line);
     }
 
+    fn is_interrupted(&self) -> bool {
+        interrupt::is_asked()
+    }
+
     fn uninterrupted(&mut self, write: &mut dyn FnMut() -> Result<(), CodecError>) -> Result<(), CodecError> {
         interrupt::whole(write)
     }

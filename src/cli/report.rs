@@ -17,17 +17,24 @@ pub struct Report {
     pub text: String,
     /// Why the command fails although it has a report; `None` on success.
     pub failure: Option<Failure>,
+    /// Whether the work ended early because the user asked for it.
+    pub interrupted: bool,
 }
 
 impl Report {
     /// Returns a report of success.
     pub fn new(json: Value, text: String) -> Self {
-        Self { json, text, failure: None }
+        Self { json, text, failure: None, interrupted: false }
     }
 
     /// Returns a report of a failure alone.
     pub fn of_failure(failure: Failure) -> Self {
-        Self { json: json!({ "error": failure.message() }), text: String::new(), failure: Some(failure) }
+        Self {
+            json: json!({ "error": failure.message() }),
+            text: String::new(),
+            failure: Some(failure),
+            interrupted: false,
+        }
     }
 
     /// Prints the report. A closed pipe (`| head`) is not an error.

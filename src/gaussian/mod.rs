@@ -14,12 +14,14 @@
 //! ```
 
 pub mod alpha;
+mod gradient;
 pub mod harmonics;
 pub mod overlap;
 mod parameters;
 pub mod projection;
 mod slice;
 
+pub use gradient::{GradientMode, GradientSettings, ParameterGradient, SplatGradient, parameter_gradient};
 pub use harmonics::{Harmonics, ShDirection};
 pub use parameters::{Model, Parameters};
 pub use slice::{Gaussian, InvalidGaussian, SliceSettings, rotation_4d};

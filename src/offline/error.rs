@@ -4,6 +4,7 @@
 //! them unchanged, preceded by the name of the file if the error does not contain it.
 
 use super::dataset::DatasetError;
+use super::fine_tune::TrainerError;
 use super::metrics::SizeMismatch;
 use super::quantize::CompressError;
 use super::score::ScoreError;
@@ -31,6 +32,9 @@ pub enum OfflineError {
     /// Gaussians cannot be scored.
     #[error(transparent)]
     Score(#[from] ScoreError),
+    /// A scene cannot be fine-tuned.
+    #[error(transparent)]
+    Train(#[from] TrainerError),
     /// A Gaussian cannot be drawn.
     #[error(transparent)]
     Invalid(#[from] InvalidGaussian),

@@ -12,10 +12,12 @@
 //! | [`prune`], [`prune_by_views`] | keeps the Gaussians that score highest |
 //! | [`search`], [`quality`] | finds the best score and the smallest count that a loss allows |
 //! | [`temporal_filter`] | finds which Gaussians are active when |
+//! | [`fine_tune`](mod@fine_tune) | trains what is left, so that it makes up for what was removed |
 //! | [`quantize`], [`convert`] | changes the form that a scene is stored in |
 //! | [`bake`](mod@bake), [`report`] | runs all of it in order, resumable, and writes a report |
 //! | [`metrics`], [`evaluation`], [`fidelity`], [`comparison`] | measures how close pictures are |
 //! | [`ablation`] | tabulates what every score, ratio and filter costs |
+//! | [`work`] | keeps the results of stages, from which interrupted work resumes |
 //! | [`orbit`], [`render`] | draws a scene from all around, many pictures at a time |
 
 pub mod ablation;
@@ -27,6 +29,7 @@ pub mod engine;
 mod error;
 pub mod evaluation;
 pub mod fidelity;
+pub mod fine_tune;
 pub mod metrics;
 pub mod orbit;
 mod progress;
@@ -42,6 +45,7 @@ pub mod search;
 pub mod splits;
 mod subject;
 pub mod temporal_filter;
+pub mod work;
 
 pub use error::OfflineError;
 pub use progress::{NoProgress, Progress};

@@ -23,6 +23,11 @@ pub trait Progress {
     /// Reports one line about the work, such as the duration of a stage or views that are left out.
     fn note(&mut self, line: &str);
 
+    /// Returns whether the user wants the work to end early with what there is. Long work that can do so asks now and then.
+    fn is_interrupted(&self) -> bool {
+        false
+    }
+
     /// Writes a file by calling `write`. A program that can be interrupted completes the write first, so that no
     /// temporary file is left behind.
     ///

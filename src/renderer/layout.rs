@@ -17,6 +17,72 @@ pub const DIGITS: u32 = 1 << DIGIT_BITS;
 /// Number of steps that sort 32-bit depths.
 pub const DEPTH_STEPS: u32 = 32 / DIGIT_BITS;
 
+/// The raw parameters of one Gaussian, or their gradients. Quaternions are (w, x, y, z).
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+pub struct TrainedRecord {
+    /// Mean.
+    pub mean: [f32; 3],
+    /// Temporal mean.
+    pub mean_t: f32,
+    /// Logarithms of the scales.
+    pub log_scale: [f32; 3],
+    /// Logarithm of the temporal scale.
+    pub log_scale_t: f32,
+    /// Left rotation.
+    pub rotation_l: [f32; 4],
+    /// Right rotation.
+    pub rotation_r: [f32; 4],
+    /// Logit of opacity; three unused.
+    pub opacity_logit: [f32; 4],
+}
+
+/// The scene that is trained, and the number of a view.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct TrainedScene {
+    /// Number of Gaussians.
+    pub count: u32,
+    /// 0: static, 1: without 4D rotation, 2: with it.
+    pub model: u32,
+    /// Added to the temporal variance in the marginal, if positive.
+    pub prefilter_var: f32,
+    /// Number of the view.
+    pub view: u32,
+}
+
+/// Input of `loss` for one view.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct LossUniforms {
+    /// Behind the image where it is not covered.
+    pub background: [f32; 4],
+    /// Picture size, pixels.
+    pub size: [u32; 2],
+    /// Tiles across and down.
+    pub tiles: [u32; 2],
+    /// Share of the view in the loss of the batch.
+    pub share: f32,
+    /// Share of SSIM in the loss of the view.
+    pub similarity_share: f32,
+    /// Unused.
+    pub padding: [u32; 2],
+}
+
+/// Input of `adam` for one buffer.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct AdamUniforms {
+    /// Rates of the first four four-vectors of each Gaussian, and of the others.
+    pub rates: [[f32; 4]; 5],
+    /// `1 / (1 - decay^step)` of the first moment, and the root of it of the second.
+    pub correction: [f32; 2],
+    /// Number of Gaussians.
+    pub count: u32,
+    /// Four-vectors of each Gaussian.
+    pub stride: u32,
+}
+
 /// Input of `project` for one part of a capture in one view. An [`Instance`](super::Instance) may have several parts.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]

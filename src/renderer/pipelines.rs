@@ -303,6 +303,11 @@ impl Renderer {
         self.blend_blocks[variant.blend_index()].get()
     }
 
+    /// Returns the bind group layouts of geometry in single precision and of lists of active Gaussians.
+    pub(super) fn capture_layouts(&self) -> [&wgpu::BindGroupLayout; 2] {
+        [&self.layouts.captures[Storage::Sliced as usize][0], &self.layouts.active]
+    }
+
     /// Creates the bind groups of the geometry and the color of one part of a capture, the buffers in the order of the shaders'
     /// bindings.
     pub(super) fn capture_bind_groups(

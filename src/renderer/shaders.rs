@@ -26,6 +26,7 @@ const LIBRARIES: &[(&str, &str)] = &[
     ("bins", include_str!("../../shaders/shared/bins.wgsl")),
     ("nearest", include_str!("../../shaders/shared/nearest.wgsl")),
     ("pixel", include_str!("../../shaders/shared/pixel.wgsl")),
+    ("trained", include_str!("../../shaders/shared/trained.wgsl")),
 ];
 
 /// Passes by name.
@@ -40,6 +41,11 @@ const PASSES: &[(&str, &str)] = &[
     ("sort_bins", include_str!("../../shaders/sort_bins.wgsl")),
     ("blend_blocks", include_str!("../../shaders/blend_blocks.wgsl")),
     ("score", include_str!("../../shaders/score.wgsl")),
+    ("slice", include_str!("../../shaders/slice.wgsl")),
+    ("loss", include_str!("../../shaders/loss.wgsl")),
+    ("blend_backward", include_str!("../../shaders/blend_backward.wgsl")),
+    ("project_backward", include_str!("../../shaders/project_backward.wgsl")),
+    ("adam", include_str!("../../shaders/adam.wgsl")),
 ];
 
 /// Whether shaders check their array indices and loops, which can cost much time. Default: [`Off`](Self::Off).
@@ -93,6 +99,12 @@ impl Storage {
 
 /// The definition of `blend` for multisampled opaque depth.
 pub const MULTISAMPLED: &[&str] = &["MULTISAMPLED"];
+
+/// Definitions of `blend_backward` and `project_backward` that compute what the original does, with its deviations.
+pub const COMPAT: &[&str] = &["COMPAT"];
+
+/// The same of captures whose color does not depend on time.
+pub const COMPAT_WITHOUT_TIME: &[&str] = &["COMPAT", "WITHOUT_TIME"];
 
 /// Definitions of `project` as the first pass of the fast renderer, `project_bin`.
 pub const BINNED: &[&str] = &["BINNED"];

@@ -12,7 +12,7 @@ pub mod grow;
 pub mod packed;
 pub mod pick;
 mod provenance;
-mod random;
+pub(crate) mod random;
 pub mod synth;
 
 pub use bounds::{Bounds, BoundsOverTime};

@@ -5,7 +5,7 @@
 use std::f32::consts::TAU;
 
 /// SplitMix64.
-pub(super) struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
     /// Returns the numbers of a seed.

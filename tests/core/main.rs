@@ -9,6 +9,7 @@ mod checkpoint_poison;
 #[cfg(feature = "offline")]
 mod dataset;
 mod golden;
+mod gradients;
 mod grow;
 #[cfg(feature = "offline")]
 mod loading;
@@ -26,6 +27,7 @@ mod score;
 mod support {
     pub mod data;
     pub mod golden;
+    pub mod golden_gradients;
     #[cfg(feature = "offline")]
     pub mod npy;
     #[cfg(feature = "offline")]

@@ -6,8 +6,8 @@ use bevy_gs4d::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
 use bevy_gs4d::gaussian::projection::LOW_PASS;
 use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF};
 use bevy_gs4d::renderer::layout::{
-    self, Activation, BLOCK, Counters, DIGITS, FrameUniforms, InstanceUniforms, SortStep, SplatRecord, SplatShape,
-    VisibleSplat,
+    self, Activation, AdamUniforms, BLOCK, Counters, DIGITS, FrameUniforms, InstanceUniforms, LossUniforms, SortStep,
+    SplatRecord, SplatShape, TrainedRecord, TrainedScene, VisibleSplat,
 };
 use bevy_gs4d::renderer::shaders::{compose, pass_names};
 use bevy_gs4d::view::TILE_SIZE;
@@ -45,7 +45,7 @@ macro_rules! mirror {
 }
 
 /// Returns a mirror whose members on the GPU are those of the host in pieces of four words.
-fn in_fours(mirror: Mirror, name: &'static str, members: [&str; 4]) -> Mirror {
+fn in_fours<const N: usize>(mirror: Mirror, name: &'static str, members: [&str; N]) -> Mirror {
     assert!(
         mirror.members.iter().all(|(_, at, size)| at / 16 == (at + size - 1) / 16 || at % 16 == 0),
         "no member straddles"
@@ -60,12 +60,17 @@ fn gaussian() -> Mirror {
     in_fours(mirror, "GaussianRecord", ["mean", "velocity", "covariance_a", "covariance_b"])
 }
 
+fn trained() -> Mirror {
+    let mirror = mirror!(TrainedRecord { mean, mean_t, log_scale, log_scale_t, rotation_l, rotation_r, opacity_logit });
+    in_fours(mirror, "TrainedRecord", ["mean", "log_scale", "rotation_l", "rotation_r", "opacity_logit"])
+}
+
 fn splat() -> Mirror {
     let mirror = mirror!(SplatRecord { center, opacity, depth, conic, tiles_low, color, tiles_high });
     in_fours(mirror, "SplatRecord", ["place", "shape", "color", ""])
 }
 
-fn mirrors() -> [Mirror; 9] {
+fn mirrors() -> [Mirror; 13] {
     [
         gaussian(),
         mirror!(InstanceUniforms {
@@ -131,6 +136,10 @@ fn mirrors() -> [Mirror; 9] {
         mirror!(VisibleSplat { seen, words }),
         mirror!(Counters { visible, pairs, pairs_wanted, padding }),
         mirror!(SortStep { shift, source, stride, padding }),
+        trained(),
+        mirror!(TrainedScene { count, model, prefilter_var, view }),
+        mirror!(LossUniforms { background, size, tiles, share, similarity_share, padding }),
+        mirror!(AdamUniforms { rates, correction, count, stride }),
     ]
 }
 
@@ -219,7 +228,7 @@ fn constant(module: &Module, name: &str) -> f64 {
 fn constants_of_the_passes_are_those_of_the_host() {
     let modules = modules();
     let threads = 256;
-    let expected: [(&str, &str, f64); 11] = [
+    let expected: [(&str, &str, f64); 14] = [
         ("activate", "BLOCK", BLOCK.into()),
         ("activate", "PER_THREAD", (BLOCK / threads).into()),
         ("project", "MARGINAL_CUTOFF", MARGINAL_CUTOFF.into()),
@@ -231,6 +240,9 @@ fn constants_of_the_passes_are_those_of_the_host() {
         ("bin", "SPLATS_PER_THREAD", (BLOCK / threads).into()),
         ("blend", "BATCH", (TILE_SIZE * TILE_SIZE).into()),
         ("score", "PIXELS", (TILE_SIZE * TILE_SIZE).into()),
+        ("blend_backward", "PIXELS", (TILE_SIZE * TILE_SIZE).into()),
+        ("project_backward", "LOW_PASS", LOW_PASS.into()),
+        ("loss", "SIDE", TILE_SIZE.into()),
     ];
     for (pass, name, value) in expected {
         let found = constant(&modules[pass], name);

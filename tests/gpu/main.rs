@@ -6,6 +6,7 @@
 mod appearance;
 mod fast;
 mod filter;
+mod fine_tune;
 mod golden;
 mod layout;
 mod packed;

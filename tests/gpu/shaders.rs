@@ -3,7 +3,8 @@
 //! In: the files of `shaders/`. Out: proof that each is known to the renderer and is valid WGSL that needs no optional capability.
 
 use bevy_gs4d::renderer::shaders::{
-    BINNED, Blending, ColorPrecision, LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32, Storage, compose, pass_names,
+    BINNED, Blending, COMPAT, COMPAT_WITHOUT_TIME, ColorPrecision, LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32,
+    Storage, compose, pass_names,
 };
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
@@ -57,8 +58,13 @@ fn every_pass_composes_and_is_valid() {
         .into_iter()
         .flat_map(|lists| [&[][..], SUBGROUPS_OF_32].map(|device| [lists.definitions(), device].concat()));
     let storages = Storage::ALL.map(|storage| storage.definitions().to_vec());
-    let definitions: Vec<_> =
-        storages.into_iter().chain([MULTISAMPLED.to_vec()]).chain(binned).chain(blending).chain(lists).collect();
+    let definitions: Vec<_> = storages
+        .into_iter()
+        .chain([MULTISAMPLED.to_vec(), COMPAT.to_vec(), COMPAT_WITHOUT_TIME.to_vec()])
+        .chain(binned)
+        .chain(blending)
+        .chain(lists)
+        .collect();
     let all = definitions.iter().flat_map(|definitions| pass_names().map(move |name| (name, &definitions[..])));
     report(all.filter_map(|(name, definitions)| check(name, definitions).err()).collect());
 }

@@ -3,10 +3,10 @@
 //! In: the remaining Gaussians. Out: their temporal filter; the package on disk.
 
 use super::stages::Stages;
-use super::work::{bytes, words};
 use super::{Bake, Fingerprint, Stage};
 use crate::offline::quantize::{CompressSettings, compress};
 use crate::offline::temporal_filter::filter;
+use crate::offline::work::{bytes, words};
 use crate::offline::{OfflineError, save, write_settings};
 use crate::scene::{GaussianScene, MAX_SEGMENTS, TemporalFilter};
 

@@ -10,10 +10,8 @@ mod evaluation;
 mod pruning;
 mod stages;
 mod summary;
-mod work;
 
 pub use stages::Stage;
-pub use work::{Fingerprint, Work};
 
 use super::dataset::{Split, TrainingView};
 use super::engine::Engine;
@@ -24,6 +22,7 @@ use super::score::ScoringSettings;
 use super::search::{Goal, ScoreChoice};
 use super::splits::open_split;
 use super::temporal_filter::KeyFrames;
+use super::work::{Fingerprint, Work};
 use super::{OfflineError, Progress, Subject, require_another_file, sliced};
 use crate::scene::{FilterKind, GaussianScene};
 use stages::Stages;
@@ -124,7 +123,7 @@ impl<'a> Bake<'a> {
         let read = format!("{:?} {:?} {resolution:?}", scene.trained_with, scene.playback);
         let fingerprint = files.and(env!("CARGO_PKG_VERSION")).and(&read);
         let subject = Subject::new(checkpoint, scene, settings.background)?;
-        let work = Work::beside(&settings.out)?;
+        let work = Work::beside(&settings.out, ".bake")?;
         Ok(Self { settings, engine, subject, views, work, fingerprint })
     }
 

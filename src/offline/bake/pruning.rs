@@ -4,12 +4,12 @@
 //! ([`Pruning`]), the score that selected them, and the PSNR on the held-out views for every count tried.
 
 use super::stages::Stages;
-use super::work::{bytes, words};
 use super::{Bake, Fingerprint, Stage};
 use crate::offline::dataset::TrainingView;
 use crate::offline::prune::highest;
 use crate::offline::report::Tried;
 use crate::offline::search::{Candidate, Goal, ScoreSearch, candidates};
+use crate::offline::work::{bytes, words};
 use crate::offline::{OfflineError, Progress};
 use crate::scene::{GaussianScene, SceneForm};
 use serde::{Deserialize, Serialize};

@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 
 pub use camera_file::{CameraFile, CameraOptions};
 pub use error::{DatasetError, FrameProblem};
-pub use view::{ImageMode, TrainingImage, TrainingView};
+pub use view::{CoveredImage, ImageMode, TrainingImage, TrainingView};
 
 /// The longest side of a picture that is accepted, in pixels.
 pub const MAX_SIDE: u32 = 16_384;

@@ -48,7 +48,55 @@ pub struct TrainingImage {
     pub alpha: Option<Vec<f32>>,
 }
 
+/// The image of a training view and what it covers, at its camera's size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoveredImage {
+    /// Size, pixels.
+    pub size: UVec2,
+    /// RGB times coverage, and coverage: one byte each.
+    pub texels: Vec<[u8; 4]>,
+    /// Whether a pixel is not covered.
+    pub has_gaps: bool,
+}
+
+impl CoveredImage {
+    /// Returns the image over a background (RGB, 0 to 1).
+    pub fn over(&self, background: Vec3) -> Picture {
+        let over = |texel: &[u8; 4]| unit_rgb(texel) + (1.0 - unit(texel[3])) * background;
+        Picture { size: self.size, pixels: self.texels.iter().map(over).collect() }
+    }
+}
+
 impl TrainingView {
+    /// Loads the image over black, as the original's `dataloader` mode does, and its coverage: the mask if the view has one, else the image's
+    /// own alpha.
+    ///
+    /// # Errors
+    /// As [`load_image`](Self::load_image).
+    pub fn load_covered(&self) -> Result<CoveredImage, DatasetError> {
+        let size = self.camera.size;
+        if size.min_element() == 0 || size.max_element() > MAX_SIDE {
+            return Err(DatasetError::Size { size });
+        }
+        require_files([Some(&self.image), self.mask.as_ref()].into_iter().flatten())?;
+        let image = decode(&self.image)?.into_rgba8();
+        let from = UVec2::new(image.width(), image.height());
+        let colors = resample::resize(composited(&image, [0.0; 3], false), 3, from, size);
+        let coverage = match &self.mask {
+            Some(mask) => {
+                let mask = decode(mask)?.into_luma8();
+                let from = UVec2::new(mask.width(), mask.height());
+                resample::resize(mask.into_raw(), 1, from, size)
+            }
+            None => resample::resize(image.pixels().map(|pixel| pixel.0[3]).collect(), 1, from, size),
+        };
+        let texels =
+            colors.chunks_exact(3).zip(coverage).map(|(color, covered)| [color[0], color[1], color[2], covered]);
+        let texels: Vec<[u8; 4]> = texels.collect();
+        let has_gaps = texels.iter().any(|texel| texel[3] < u8::MAX);
+        Ok(CoveredImage { size, texels, has_gaps })
+    }
+
     /// Loads the image as the original does: composited over `background` (RGB, 0 to 1), truncated to 8 bits, resampled
     /// to the camera's size (Pillow's bicubic), and multiplied by alpha again if `mode` is [`ImageMode::InMemory`]. A
     /// mask is only returned as coverage: the image has been multiplied by it already.

@@ -14,7 +14,7 @@ pub use evaluate::{Evaluation, EvaluationSettings, ImageMetrics, MetricSet, View
 pub use flip::flip;
 pub use ms_ssim::{MS_SSIM_MIN_SIDE, ms_ssim};
 pub use psnr::{psnr, psnr_pooled};
-pub use ssim::ssim;
+pub use ssim::{similarity_slopes, ssim};
 
 use glam::UVec2;
 

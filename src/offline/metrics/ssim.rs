@@ -33,6 +33,50 @@ pub fn ssim(a: &Picture, b: &Picture) -> Result<f64, SizeMismatch> {
     Ok(rows.into_iter().sum::<DVec3>().element_sum() / (3.0 * a.pixels.len() as f64))
 }
 
+/// Returns the SSIM, and its derivatives with respect to each pixel of `a`.
+///
+/// # Errors
+/// As [`ssim`].
+pub fn similarity_slopes(a: &Picture, b: &Picture) -> Result<(f64, Vec<DVec3>), SizeMismatch> {
+    check_sizes(a, b)?;
+    let window = gaussian_window();
+    let (width, height) = (a.size.x as usize, a.size.y as usize);
+    let values = 3.0 * a.pixels.len() as f64;
+    let of_row = |y: usize| {
+        let columns = column_moments(a, b, y, &window);
+        (0..width).map(|x| slopes(&moments_at(&columns, x, &window))).collect::<Vec<_>>()
+    };
+    let maps: Vec<[DVec3; 4]> = (0..height).into_par_iter().flat_map_iter(of_row).collect();
+    let sum: DVec3 = maps.iter().map(|[.., similarity]| *similarity).sum();
+    // A pixel counts in all windows that it lies in, with the weights that they have there: the window is symmetric.
+    let spread = |index: usize| {
+        let (x, y) = (index % width, index / width);
+        let mut spread = [DVec3::ZERO; 3];
+        for (row, weight_y) in inside(&window, y, height) {
+            for (column, weight_x) in inside(&window, x, width) {
+                for (sum, slope) in spread.iter_mut().zip(&maps[row * width + column]) {
+                    *sum += weight_x * weight_y * *slope;
+                }
+            }
+        }
+        let (p, q) = (a.pixels[index].as_dvec3(), b.pixels[index].as_dvec3());
+        (spread[0] + 2.0 * p * spread[1] + q * spread[2]) / values
+    };
+    let slopes = (0..width * height).into_par_iter().map(spread).collect();
+    Ok((sum.element_sum() / values, slopes))
+}
+
+/// Returns the derivatives of the similarity with respect to the means of `a`, `a²` and `ab`, and the similarity.
+fn slopes(moments: &Moments) -> [DVec3; 4] {
+    let [mean_a, mean_b, square_a, square_b, product] = *moments;
+    let (a1, a2) = (2.0 * mean_a * mean_b + C1, 2.0 * (product - mean_a * mean_b) + C2);
+    let b1 = mean_a * mean_a + mean_b * mean_b + C1;
+    let b2 = square_a - mean_a * mean_a + square_b - mean_b * mean_b + C2;
+    let similarity = a1 * a2 / (b1 * b2);
+    let by_mean = 2.0 * mean_b * (a2 - a1) / (b1 * b2) + 2.0 * mean_a * similarity * (1.0 / b2 - 1.0 / b1);
+    [by_mean, -similarity / b2, 2.0 * a1 / (b1 * b2), similarity]
+}
+
 /// Returns the weights of the window along one axis; they sum to one.
 pub(super) fn gaussian_window() -> [f64; WINDOW] {
     let weights: [f64; WINDOW] = std::array::from_fn(|i| {

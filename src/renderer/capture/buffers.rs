@@ -143,7 +143,8 @@ fn records(
     size: usize,
     fill: impl Fn(usize, &mut [u8]),
 ) -> wgpu::Buffer {
-    let made = gpu.allocator.buffer(label, (count * size) as u64, wgpu::BufferUsages::STORAGE);
+    let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+    let made = gpu.allocator.buffer(label, (count * size) as u64, usage);
     let mut chunk = Vec::new();
     for first in (0..count).step_by(RECORDS_AT_ONCE) {
         let own = RECORDS_AT_ONCE.min(count - first);

@@ -38,6 +38,8 @@ pub(super) struct Part {
     pub count: u32,
     pub geometry: wgpu::BindGroup,
     pub color: wgpu::BindGroup,
+    /// The buffers of both.
+    buffers: Vec<wgpu::Buffer>,
     /// Its share of the filter, if there is one.
     pub filter: Option<wgpu::BindGroup>,
 }
@@ -131,13 +133,14 @@ impl GpuCapture {
             bytes += geometry.iter().chain([&color]).map(wgpu::Buffer::size).sum::<u64>();
             let all = [&color].into_iter().chain(codebooks.iter());
             let both = [geometry.iter().collect::<Vec<_>>(), all.collect()];
+            let buffers = both.concat().into_iter().cloned().collect();
             let [geometry, color] = renderer.capture_bind_groups(device, storage, both.each_ref().map(|all| &all[..]));
             let filter = scene.filter.as_ref().map(|filter| {
                 let sets = buffers::filter(gpu, filter, first..first + count);
                 bytes += sets.size();
                 allocator.bind_group("gs4d filter", &renderer.layouts.filter, &[sets.as_entire_binding()])
             });
-            parts.push(Part { count: count as u32, geometry, color, filter });
+            parts.push(Part { count: count as u32, geometry, color, buffers, filter });
         }
         bytes += codebooks.iter().map(wgpu::Buffer::size).sum::<u64>();
         let environment = scene.environment.as_ref().map(|map| EnvironmentBuffer {
@@ -185,6 +188,20 @@ impl GpuCapture {
     /// Returns the bytes of its buffers on the GPU.
     pub fn bytes(&self) -> u64 {
         self.bytes
+    }
+
+    /// Returns the buffers of records, lifespans and color coefficients, for passes of clients that write them; `None` if the capture is not
+    /// in single precision or has several parts.
+    pub fn writable(&self) -> Option<[&wgpu::Buffer; 3]> {
+        match (&self.parts[..], self.storage) {
+            ([Part { buffers, .. }], Storage::Sliced) => buffers.iter().collect::<Vec<_>>().try_into().ok(),
+            _ => None,
+        }
+    }
+
+    /// Returns the bind group of its geometry, if it has one part, for passes of clients.
+    pub fn geometry(&self) -> Option<&wgpu::BindGroup> {
+        if let [part] = &self.parts[..] { Some(&part.geometry) } else { None }
     }
 
     /// Returns `view` with the values that are the same for all parts of a capture and in all views.

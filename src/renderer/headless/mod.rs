@@ -181,6 +181,38 @@ impl Headless {
         self.submit_whole(&[instance(capture, None, view)], &parameters).map(|_| ())
     }
 
+    /// Records a frame of all Gaussians of one capture, without waiting for it. Pairs for which there is no room are left out; earlier
+    /// frames make room for those of later ones. Submit the encoder before the next frame is recorded.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render).
+    pub fn record(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        capture: &GpuCapture,
+        view: &View,
+        background: Background,
+    ) -> Result<(), GpuError> {
+        self.set_design(Design::Reference);
+        let GpuContext { device, queue, .. } = &self.context;
+        let parameters = ViewParameters { background, ..ViewParameters::default() };
+        let instances = [instance(capture, None, view)];
+        self.view.prepare(device, queue, &self.renderer, &instances, &parameters)?;
+        self.view.record(&self.renderer, encoder, &instances);
+        Ok(())
+    }
+
+    /// Returns the bind group layouts of the geometry of captures in single precision and of lists of active Gaussians, for passes of
+    /// clients.
+    pub fn capture_layouts(&self) -> [&wgpu::BindGroupLayout; 2] {
+        self.renderer.capture_layouts()
+    }
+
+    /// Returns the bind group to use instead of a list of active Gaussians when all are drawn.
+    pub fn no_list(&self) -> &wgpu::BindGroup {
+        &self.renderer.no_list
+    }
+
     /// Returns the resources of the last frame on the GPU; `None` before the first.
     pub fn finished(&self) -> Option<FinishedFrame<'_>> {
         self.view.finished()

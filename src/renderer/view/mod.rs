@@ -131,12 +131,16 @@ const RELEASE_AFTER_IDLE_FRAMES: u32 = 120;
 pub struct FinishedFrame<'a> {
     /// Uniform buffer: one [`layout::FrameUniforms`].
     pub frame: &'a wgpu::Buffer,
+    /// Uniform buffer: begins with one [`layout::InstanceUniforms`], of the first part of the first instance.
+    pub instances: &'a wgpu::Buffer,
     /// Storage buffer: one [`layout::Counters`].
     pub counters: &'a wgpu::Buffer,
     /// Buffers that the passes have written.
     pub buffers: &'a PassBuffers,
     /// Color over the background and transmittance, `Rgba32Float`.
     pub color: &'a wgpu::TextureView,
+    /// Expected and median depth, `Rg32Float`.
+    pub depth: &'a wgpu::TextureView,
     /// Number of splats for which the buffers have room.
     pub slots: u32,
     /// Number of pairs for which the buffers have room.
@@ -362,9 +366,11 @@ impl ViewRenderer {
     pub fn finished(&self) -> Option<FinishedFrame<'_>> {
         self.resources.as_ref().map(|made| FinishedFrame {
             frame: &self.frame,
+            instances: &made.instances,
             counters: &self.counters,
             buffers: &made.buffers,
             color: &made.color_view,
+            depth: &made.depth_view,
             slots: made.sizes.slots,
             pairs: made.sizes.pairs,
         })

@@ -1,4 +1,4 @@
-//! The folder of intermediate results, from which an interrupted bake resumes.
+//! The folder of intermediate results, from which interrupted work resumes.
 //!
 //! In: a fingerprint of everything that a result depends on, and the result as bytes. Out: the same bytes; `None`, so
 //! that the stage runs again, if the fingerprint is another or the bytes are damaged.
@@ -69,13 +69,13 @@ pub struct Work {
 }
 
 impl Work {
-    /// Returns the folder `OUT.bake` beside the package `out`, created if it does not exist.
+    /// Returns the folder beside the package `out` whose name ends in `ending` as well (`OUT.bake`), created if it does not exist.
     ///
     /// # Errors
     /// The folder cannot be created.
-    pub fn beside(out: &Path) -> Result<Self, CodecError> {
+    pub fn beside(out: &Path, ending: &str) -> Result<Self, CodecError> {
         let mut name = out.file_name().unwrap_or_default().to_owned();
-        name.push(".bake");
+        name.push(ending);
         let folder = out.with_file_name(name);
         fs::create_dir_all(&folder).map_err(|error| CodecError { path: folder.clone(), kind: error.into() })?;
         Ok(Self { folder })
@@ -137,12 +137,12 @@ fn head(fingerprint: Fingerprint, body: &[u8]) -> [u8; HEAD] {
 }
 
 /// Returns the little-endian bytes of words.
-pub(super) fn bytes(words: &[u32]) -> Vec<u8> {
+pub fn bytes(words: &[u32]) -> Vec<u8> {
     words.iter().flat_map(|word| word.to_le_bytes()).collect()
 }
 
 /// Returns the words of little-endian bytes. A remainder of fewer than four bytes is ignored.
-pub(super) fn words(bytes: &[u8]) -> Vec<u32> {
+pub fn words(bytes: &[u8]) -> Vec<u32> {
     bytes.as_chunks().0.iter().map(|&four| u32::from_le_bytes(four)).collect()
 }
 
@@ -157,7 +157,7 @@ mod tests {
         let out = folder.path().join("scene.gs4d");
         fs::write(&out, b"input").expect("the folder can be written to");
         let inputs = Fingerprint::of_files(&[&out]).expect("the file is there");
-        let work = Work::beside(&out).expect("the folder can be made");
+        let work = Work::beside(&out, ".bake").expect("the folder can be made");
         let (settings, others) = (inputs.and("ratio 0.8"), inputs.and("ratio 0.5"));
         let stored = work.store("kept", settings, b"some bytes", &mut NoProgress);
         stored.expect("the folder can be written to");

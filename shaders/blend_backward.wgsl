@@ -1,0 +1,171 @@
+// blend_backward: the gradient of a loss with respect to the splats of a view, without float atomics.
+// In: what `blend` read and wrote, and the gradient of the loss with respect to each pixel. Out: for each pair of splat and tile, sums over
+// the pixels of the tile. `place` writes the first pair of each splat; `pairs` sums every pair, one workgroup for each tile.
+// CPU reference: src/reference/blend_backward.rs; equations: section 7.1 of the 4DGS model.
+//
+// A pixel is walked front to back, as `blend` does, so that it stops at the same splat. What is behind a splat is the finished pixel
+// less what has been blended so far.
+#import gs4d::alpha::{is_opaque, is_skipped, left_behind, ALPHA_MAX}
+#import gs4d::tile::{pair_of_tile, pixel_of, tile_index}
+#import gs4d::types::{Counters, FrameUniforms, SplatRecord}
+#import gs4d::records::read_splat
+
+const PIXELS: u32 = 256u;
+// Number of splats whose terms are summed at once, and of sums for each.
+const BATCH: u32 = 8u;
+const SUMS: u32 = 10u;
+
+@group(0) @binding(0) var<uniform> frame: FrameUniforms;
+@group(0) @binding(1) var<storage, read> counters: Counters;
+@group(0) @binding(2) var<storage, read> tile_ranges: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read> pair_splats: array<u32>;
+@group(0) @binding(4) var<storage, read> splats: array<SplatRecord>;
+@group(0) @binding(5) var<storage, read> order: array<u32>;
+@group(0) @binding(6) var<storage, read> offsets: array<u32>;
+// The color that `blend` wrote, with the background, and the transmittance.
+@group(0) @binding(7) var color: texture_2d<f32>;
+// Expected and median depth.
+@group(0) @binding(8) var depth: texture_2d<f32>;
+// First pair of each slot.
+@group(1) @binding(0) var<storage, read_write> first_pairs: array<u32>;
+// SUMS values for each pair: with d from pixel to center, w = alpha T and q = alpha dL/dalpha, the sums of q dx, q dy, q dx^2, q dx dy,
+// q dy^2, q, and of w times the gradient of the pixel's red, green, blue and depth.
+@group(1) @binding(1) var<storage, read_write> pair_gradients: array<f32>;
+// Gradient with respect to red, green, blue and opacity of each pixel.
+@group(1) @binding(2) var<storage, read> pixel_gradients: array<vec4<f32>>;
+// Gradient with respect to the expected depth of each pixel.
+@group(1) @binding(3) var<storage, read> depth_gradients: array<f32>;
+
+// Of the batch: w and q of each pixel, splat by splat; then their sums over eight pixels.
+var<workgroup> weights: array<f32, 2048>;
+var<workgroup> terms: array<f32, 2048>;
+// Gradients with respect to red, green, blue and depth.
+var<workgroup> own_gradients: array<vec4<f32>, 256>;
+// Number of pixels of this tile that need no more splats.
+var<workgroup> finished: atomic<u32>;
+
+@compute @workgroup_size(256)
+fn place(@builtin(global_invocation_id) id: vec3<u32>) {
+    if id.x < counters.visible {
+        first_pairs[order[id.x]] = offsets[id.x];
+    }
+}
+
+@compute @workgroup_size(256)
+fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+    let at = pixel_of(tile.xy, thread);
+    let position = vec2<f32>(at);
+    let range = tile_ranges[tile_index(tile.xy, frame.tiles.x)];
+    var gradient = vec4(0.0);
+    var by_opacity = 0.0;
+    // Gradient-weighted sum of what is behind the splats blended so far.
+    var behind = 0.0;
+    var transmittance = 1.0;
+    var done = !all(at < frame.size);
+    if !done {
+        let pixel = at.y * frame.size.x + at.x;
+        let whole = textureLoad(color, at, 0);
+        gradient = vec4(pixel_gradients[pixel].xyz, depth_gradients[pixel]);
+        by_opacity = pixel_gradients[pixel].w;
+        behind = dot(vec4(whole.xyz, textureLoad(depth, at, 0).x), gradient) + (1.0 - whole.w) * by_opacity;
+    }
+    if thread == 0u {
+        atomicStore(&finished, 0u);
+    }
+    own_gradients[thread] = gradient;
+    workgroupBarrier();
+    if done {
+        atomicAdd(&finished, 1u);
+    }
+    for (var first = range.x; first < range.y; first += BATCH) {
+        let count = min(BATCH, range.y - first);
+        workgroupBarrier();
+        let over = atomicLoad(&finished) == PIXELS;
+        let was_done = done;
+        for (var i = 0u; i < count; i++) {
+            let splat = read_splat(splats[pair_splats[first + i]]);
+            var weight = 0.0;
+            var term = 0.0;
+            let d = splat.center - position;
+            let power = -0.5 * (splat.conic.x * d.x * d.x + splat.conic.z * d.y * d.y) - splat.conic.y * d.x * d.y;
+            let peak = splat.opacity * exp(power);
+            let alpha = min(ALPHA_MAX, peak);
+            if !done && power <= 0.0 && !is_skipped(alpha) {
+                let left = left_behind(transmittance, alpha);
+                if is_opaque(left) {
+                    done = true;
+                } else {
+                    weight = alpha * transmittance;
+                    let own = dot(vec4(splat.color, splat.depth), gradient) + by_opacity;
+                    behind -= weight * own;
+                    let slope = transmittance * own - behind / (1.0 - alpha);
+#ifdef COMPAT
+                    term = peak * slope;
+#else
+                    // A clamped alpha does not change.
+                    term = select(peak * slope, 0.0, peak > ALPHA_MAX);
+#endif
+                    transmittance = left;
+                }
+            }
+            weights[i * PIXELS + thread] = weight;
+            terms[i * PIXELS + thread] = term;
+        }
+        workgroupBarrier();
+        if done && !was_done {
+            atomicAdd(&finished, 1u);
+        }
+        let own_splat = thread / 32u;
+        var moments = vec3(0.0);
+        var squares = vec3(0.0);
+        var colors = vec4(0.0);
+        if own_splat < count {
+            let center = splats[pair_splats[first + own_splat]].place.xy;
+            for (var i = 0u; i < 8u; i++) {
+                let pixel = thread % 32u + 32u * i;
+                let q = terms[own_splat * PIXELS + pixel];
+                let d = center - vec2<f32>(pixel_of(tile.xy, pixel));
+                moments += q * vec3(d, d.x * d.x);
+                squares += q * vec3(d.x * d.y, d.y * d.y, 1.0);
+                colors += weights[own_splat * PIXELS + pixel] * own_gradients[pixel];
+            }
+        }
+        workgroupBarrier();
+        for (var k = 0u; k < 3u; k++) {
+            weights[k * 256u + thread] = moments[k];
+            weights[(3u + k) * 256u + thread] = squares[k];
+        }
+        for (var k = 0u; k < 4u; k++) {
+            terms[k * 256u + thread] = colors[k];
+        }
+        workgroupBarrier();
+        if thread < SUMS * count {
+            let splat = thread / SUMS;
+            let k = thread % SUMS;
+            var sum = 0.0;
+            for (var i = 0u; i < 32u; i++) {
+                if k < 6u {
+                    sum += weights[k * 256u + splat * 32u + i];
+                } else {
+                    sum += terms[(k - 6u) * 256u + splat * 32u + i];
+                }
+            }
+            pair_gradients[pair_of(pair_splats[first + splat], tile.xy) * SUMS + k] = sum;
+        }
+        // All pairs that follow change nothing.
+        if over {
+            for (var i = first + BATCH + thread; i < range.y; i += PIXELS) {
+                let pair = pair_of(pair_splats[i], tile.xy) * SUMS;
+                for (var k = 0u; k < SUMS; k++) {
+                    pair_gradients[pair + k] = 0.0;
+                }
+            }
+            break;
+        }
+    }
+}
+
+// Returns the index that `bin` gave the pair of this splat and tile.
+fn pair_of(splat: u32, tile: vec2<u32>) -> u32 {
+    return first_pairs[splat] + pair_of_tile(splats[splat].shape.w, splats[splat].color.w, tile);
+}

@@ -1,0 +1,188 @@
+//! `gs4d finetune SCENE --data DIR -o OUT`: trains a scene, so that it makes up for what was pruned.
+//!
+//! In: a scene in the trained form, training views with their images. Out: a package in the trained form, and how its quality developed.
+
+use super::args::{CheckpointArgs, PackageArgs, RendererArgs, SplitArgs, values};
+use super::failure::Failure;
+use super::interrupt;
+use super::progress::Bars;
+use super::report::Report;
+use super::table::{Table, bytes, lines};
+use crate::gaussian::GradientMode;
+use crate::offline::dataset::Split;
+use crate::offline::engine::AdapterDescription;
+use crate::offline::fine_tune::{Behind, CurvePoint, FineTuneSettings, FineTuned, Rates, Resume, fine_tune};
+use crate::offline::work::{Fingerprint, Work};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Train a scene on its views, so that it makes up for what was pruned.
+///
+/// The number of Gaussians stays. Some training views are held out; the parameters that show them best are kept. A run that was killed
+/// goes on where it was, from OUT.tune/. Ctrl-C ends the run and writes the best parameters so far; pressed again it stops at once.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  gs4d prune chkpnt30000.pth --data data/toybox --ratio 0.8 -o pruned.gs4d
+  gs4d finetune pruned.gs4d --data data/toybox -o tuned.gs4d
+  gs4d finetune pruned.gs4d --data data/standup --resolution 2 --steps 10000 --batch 4 -o tuned.gs4d
+
+A temporal filter of the scene is not used in training. One of the kind support is computed again afterwards (gs4d mask), so that it
+changes no picture.")]
+pub struct FineTune {
+    /// The checkpoint, or a package of it in the trained form.
+    #[arg(value_name = "SCENE")]
+    input: PathBuf,
+    #[command(flatten)]
+    package: PackageArgs,
+    #[command(flatten)]
+    data: SplitArgs,
+    /// Number of steps.
+    #[arg(long, value_name = "N", default_value = "5000", value_parser = values::count(100_000_000))]
+    steps: usize,
+    /// Views of each step.
+    #[arg(long, value_name = "N", default_value = "2", value_parser = values::count(1000))]
+    batch: usize,
+    /// Rates of the optimizer: ours, or those with which the original ends its training.
+    #[arg(long, value_name = "RATES", default_value = "ours", value_parser = values::one_of(&RATES))]
+    rates: Rates,
+    /// Factor that the rates fall to; 1 keeps them as they are.
+    #[arg(long, value_name = "FACTOR", default_value = "0.05", value_parser = values::share)]
+    last_rate: f64,
+    /// Factor on the rates of the means.
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = values::not_negative)]
+    mean_rate: f64,
+    /// Share of SSIM in the loss; the rest is L1.
+    #[arg(long, value_name = "SHARE", default_value = "0.2", value_parser = values::share)]
+    similarity: f64,
+    /// What is behind images that do not cover all pixels: a random color for each view, or that of training.
+    #[arg(long, value_name = "WHAT", default_value = "random", value_parser = values::one_of(&BEHIND))]
+    behind: Behind,
+    /// Training views to hold out, at most a quarter of all; 0 trains on all, and looks at the same.
+    #[arg(long, value_name = "N", default_value = "8")]
+    held_out: usize,
+    /// Steps between two evaluations on the held-out views.
+    #[arg(long, value_name = "N", default_value = "500", value_parser = values::count(1_000_000))]
+    evaluate_every: usize,
+    /// End after this many evaluations without an improvement.
+    #[arg(long, value_name = "N", value_parser = values::count(1_000_000))]
+    patience: Option<usize>,
+    /// Steps between two states on disk; rounded up to an evaluation.
+    #[arg(long, value_name = "N", default_value = "500", value_parser = values::count(1_000_000))]
+    save_every: usize,
+    /// Seed of the order of views and of random backgrounds.
+    #[arg(long, value_name = "N", default_value = "0")]
+    seed: u64,
+    /// Gradients: exact, or compat: as the original computes them, with its deviations.
+    #[arg(long, value_name = "MODE", default_value = "exact", value_parser = values::one_of(&MODES))]
+    gradients: GradientMode,
+    #[command(flatten)]
+    renderer: RendererArgs,
+    #[command(flatten)]
+    checkpoint: CheckpointArgs,
+}
+
+const RATES: [(&str, Rates); 2] = [("ours", Rates::OURS), ("original", Rates::ORIGINAL)];
+const BEHIND: [(&str, Behind); 2] = [("random", Behind::Random), ("fixed", Behind::Fixed)];
+const MODES: [(&str, GradientMode); 2] = [("exact", GradientMode::Exact), ("compat", GradientMode::Compat)];
+
+impl FineTune {
+    /// Trains and writes.
+    ///
+    /// # Errors
+    /// A scene or views that cannot be used, a package that cannot be written, a failure of the GPU.
+    pub fn run(&self) -> Result<Report, Failure> {
+        let out = self.package.out_apart_from(&self.input)?;
+        let mut scene = self.checkpoint.load(&self.input)?;
+        if let Some(background) = self.checkpoint.background {
+            scene.trained_with.background = background;
+        }
+        let (gaussians, progress) = (scene.len(), &mut Bars::default());
+        let views = self.data.open(Split::Train, &scene.trained_with, progress)?.views;
+        let mut headless = self.renderer.open()?;
+        let work = Work::beside(out, ".tune")?;
+        let cameras = self.data.data.join(Split::Train.file_name());
+        let fingerprint = Fingerprint::of_files(&[&self.input, &cameras])?;
+        let fingerprint = fingerprint.and(&format!("{:?} {:?}", scene.trained_with, self.data.resolution));
+        let resume = Resume { work: &work, fingerprint, every: self.save_every };
+        let deferred = interrupt::defer();
+        let tuned = fine_tune(&mut headless, scene, &views, &self.settings(), Some(resume), progress);
+        let tuned = match tuned {
+            Ok(tuned) => tuned,
+            Err(error) => {
+                work.remove_if_empty();
+                return Err(error.into());
+            }
+        };
+        let size = self.package.save(&tuned.scene)?;
+        drop(deferred);
+        if tuned.interrupted {
+            work.remove_if_empty();
+        } else {
+            work.remove()?;
+        }
+        let FineTuned { curve, best, steps_per_second, held_out, faults, interrupted, .. } = &tuned;
+        let before = curve.first().map_or(f64::NAN, |point| point.psnr);
+        let speed = steps_per_second.map_or("-".to_owned(), |speed| format!("{speed:.1}"));
+        let mut pairs = vec![
+            (
+                "fine-tuned",
+                format!("{gaussians} Gaussians on {} views, {speed} steps a second", views.len() - held_out),
+            ),
+            (
+                "PSNR",
+                format!("{:.3} dB at step {}, before {before:.3} dB ({held_out} held-out views)", best.psnr, best.step),
+            ),
+            ("wrote", format!("{}, {}", out.display(), bytes(size))),
+        ];
+        if *interrupted {
+            pairs.push(("interrupted", "the best so far; the same command goes on where this ended".to_owned()));
+        }
+        if let Some(faults) = faults {
+            pairs.push(("left out", format!("{} gradients that were not finite", faults.count)));
+        }
+        let json = json!({
+            "in": self.input.display().to_string(),
+            "out": out.display().to_string(),
+            "bytes_out": size,
+            "gaussians": gaussians,
+            "views": views.len() - held_out,
+            "held_out": held_out,
+            "psnr_before": before,
+            "best": best,
+            "curve": curve,
+            "steps_per_second": steps_per_second,
+            "interrupted": interrupted,
+            "gradients_left_out": faults.map_or(0, |faults| faults.count),
+            "adapter": AdapterDescription::of(&headless),
+        });
+        let mut report = Report::new(json, format!("{}\n{}", lines(&pairs), curve_table(curve)));
+        report.interrupted = *interrupted;
+        Ok(report)
+    }
+
+    fn settings(&self) -> FineTuneSettings {
+        FineTuneSettings {
+            steps: self.steps,
+            batch: self.batch,
+            rates: Rates { mean: self.rates.mean * self.mean_rate, ..self.rates },
+            last_rate: self.last_rate,
+            similarity_share: self.similarity,
+            behind: self.behind,
+            seed: self.seed,
+            held_out: self.held_out,
+            evaluate_every: self.evaluate_every,
+            patience: self.patience,
+            mode: self.gradients,
+        }
+    }
+}
+
+fn curve_table(curve: &[CurvePoint]) -> String {
+    let mut table = Table::new(&["step", "loss", "training dB", "held-out dB"]);
+    let number = |value: Option<f64>, digits| value.map_or("-".to_owned(), |value| format!("{value:.digits$}"));
+    for CurvePoint { step, loss, training_psnr, psnr } in curve {
+        table.row([step.to_string(), number(*loss, 5), number(*training_psnr, 2), format!("{psnr:.3}")]);
+    }
+    table.to_string()
+}

@@ -1,0 +1,685 @@
+//! Training on the GPU, with the renderer's own passes.
+//!
+//! In: a scene in the trained form, views with their images. Out: the scene after some steps. Nothing is added without order, so that every
+//! run gives the same result.
+//!
+//! | pass | reads | writes |
+//! |---|---|---|
+//! | `slice` | raw parameters | the records that `project` reads |
+//! | the passes of the reference design | records, color | splats, pairs, picture |
+//! | `loss` | picture, image | gradients of pixels, sums |
+//! | `blend_backward` | splats, pairs, gradients of pixels | gradients of pairs |
+//! | `project_backward` | gradients of pairs, parameters | gradients of raw parameters, added up over a batch |
+//! | `adam` | gradients, moments | parameters |
+
+use super::adam::correction;
+use super::schedule::Rates;
+use crate::gaussian::{GradientMode, Harmonics, Model, Parameters};
+use crate::offline::dataset::CoveredImage;
+use crate::renderer::bind::{Bind, group_layout, pipeline};
+use crate::renderer::layout::{
+    AdamUniforms, FrameUniforms, InstanceUniforms, LossUniforms, TILE_SIZE, TrainedRecord, TrainedScene,
+};
+use crate::renderer::memory::binding_limit;
+use crate::renderer::shaders::{COMPAT, COMPAT_WITHOUT_TIME, module};
+use crate::renderer::{FinishedFrame, GpuCapture, GpuError, Headless, ShaderChecks};
+use crate::scene::{GaussianScene, SceneForm, Trained};
+use crate::view::{Background, Frame, View};
+use glam::UVec2;
+use std::collections::VecDeque;
+use wgpu::BufferUsages;
+
+/// Values that `blend_backward` writes for each pair.
+const SUMS: u64 = 10;
+/// Steps that may be submitted before the first of them has finished.
+const STEPS_IN_FLIGHT: usize = 4;
+/// Most workgroups of `adam`.
+const ADAM_GROUPS: u32 = 4096;
+
+/// Layouts and pipelines of the passes of training.
+#[derive(Debug)]
+struct Passes {
+    slice_group: wgpu::BindGroupLayout,
+    slice: wgpu::ComputePipeline,
+    loss_group: wgpu::BindGroupLayout,
+    similarity: wgpu::ComputePipeline,
+    gradient: wgpu::ComputePipeline,
+    total: wgpu::ComputePipeline,
+    blended_group: wgpu::BindGroupLayout,
+    sums_group: wgpu::BindGroupLayout,
+    place: wgpu::ComputePipeline,
+    pairs: wgpu::ComputePipeline,
+    splats_group: wgpu::BindGroupLayout,
+    parameters_group: wgpu::BindGroupLayout,
+    project_backward: wgpu::ComputePipeline,
+    adam_group: wgpu::BindGroupLayout,
+    adam: wgpu::ComputePipeline,
+}
+
+impl Passes {
+    fn new(headless: &Headless, definitions: &[&str], checks: ShaderChecks) -> Result<Self, GpuError> {
+        use Bind::{Read, Texture, Uniform, Write};
+        let device = &headless.context().device;
+        let limits = device.limits();
+        // Two arrays of 8 x 256 numbers and one of 256 vectors in `blend_backward`; the bindings of `project_backward`.
+        let needs = [
+            ("max_compute_workgroup_storage_size", limits.max_compute_workgroup_storage_size, 20_484),
+            ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 12),
+        ];
+        for (what, found, needed) in needs {
+            if found < needed {
+                return Err(GpuError::Limit { what, found: found.into(), needed: needed.into() });
+            }
+        }
+        const SCENE: Bind = Uniform(size_of::<TrainedScene>());
+        let group = |label, bindings: &[Bind]| group_layout(device, label, bindings);
+        let slice_group = group("gs4d slice", &[SCENE, Read, Write, Write]);
+        let loss_group =
+            group("gs4d loss", &[Uniform(size_of::<LossUniforms>()), Texture, Read, Write, Write, Write, Write]);
+        let frame = Uniform(size_of::<FrameUniforms>());
+        let blended_group = group("gs4d blended", &[frame, Read, Read, Read, Read, Read, Read, Texture, Texture]);
+        let sums_group = group("gs4d sums", &[Write, Write, Read, Read]);
+        let splats_group =
+            group("gs4d splats", &[Uniform(size_of::<InstanceUniforms>()), SCENE, Read, Read, Read, Read]);
+        let parameters_group = group("gs4d parameters", &[Read, Read, Write, Write, Write]);
+        let adam_group = group("gs4d adam", &[Uniform(size_of::<AdamUniforms>()), Write, Write, Write, Write]);
+        let slice = module(device, "slice", &[], checks)?;
+        let loss = module(device, "loss", &[], checks)?;
+        let blend_backward = module(device, "blend_backward", definitions, checks)?;
+        let project_backward = module(device, "project_backward", definitions, checks)?;
+        let adam = module(device, "adam", &[], checks)?;
+        let make = |module, entry, groups: &[&wgpu::BindGroupLayout]| {
+            let groups: Vec<_> = groups.iter().copied().map(Some).collect();
+            pipeline(device, module, entry, &groups)
+        };
+        let [geometry, list] = headless.capture_layouts();
+        Ok(Self {
+            slice: make(&slice, "slice", &[&slice_group]),
+            similarity: make(&loss, "similarity", &[&loss_group]),
+            gradient: make(&loss, "gradient", &[&loss_group]),
+            total: make(&loss, "total", &[&loss_group]),
+            place: make(&blend_backward, "place", &[&blended_group, &sums_group]),
+            pairs: make(&blend_backward, "pairs", &[&blended_group, &sums_group]),
+            project_backward: make(
+                &project_backward,
+                "project_backward",
+                &[&splats_group, geometry, list, &parameters_group],
+            ),
+            adam: make(&adam, "adam", &[&adam_group]),
+            slice_group,
+            loss_group,
+            blended_group,
+            sums_group,
+            splats_group,
+            parameters_group,
+            adam_group,
+        })
+    }
+}
+
+/// One kind of parameters on the GPU, with what the optimizer knows of each.
+#[derive(Debug)]
+struct Optimized {
+    values: wgpu::Buffer,
+    gradients: wgpu::Buffer,
+    moments: [wgpu::Buffer; 2],
+    settings: wgpu::Buffer,
+    group: wgpu::BindGroup,
+    /// Four-vectors of each Gaussian.
+    stride: u32,
+}
+
+impl Optimized {
+    /// Creates gradients and moments, which are 0, beside the values.
+    fn new(headless: &Headless, passes: &Passes, values: wgpu::Buffer, count: u32, stride: u32) -> Self {
+        let allocator = headless.allocator();
+        let size = u64::from(count) * u64::from(stride) * 16;
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
+        let gradients = allocator.buffer("gs4d gradients", size, usage);
+        let moments = [(); 2].map(|()| allocator.buffer("gs4d moments", size, usage));
+        let settings = allocator.buffer("gs4d adam", size_of::<AdamUniforms>() as u64, BufferUsages::UNIFORM);
+        let buffers = [&settings, &values, &gradients, &moments[0], &moments[1]];
+        let resources = buffers.map(wgpu::Buffer::as_entire_binding);
+        let group = allocator.bind_group("gs4d adam", &passes.adam_group, &resources);
+        Self { values, gradients, moments, settings, group, stride }
+    }
+}
+
+/// What depends on the size of the picture and of the renderer's buffers.
+#[derive(Debug)]
+struct ViewBuffers {
+    /// What it was created for.
+    splats: wgpu::Buffer,
+    color: wgpu::TextureView,
+    size: UVec2,
+    image: wgpu::Buffer,
+    loss_settings: wgpu::Buffer,
+    pixel_gradients: wgpu::Buffer,
+    depth_gradients: wgpu::Buffer,
+    loss: wgpu::BindGroup,
+    blended: wgpu::BindGroup,
+    sums: wgpu::BindGroup,
+    splat_gradients: wgpu::BindGroup,
+}
+
+/// A scene that is trained.
+#[derive(Debug)]
+pub struct Trainer<'a> {
+    headless: &'a mut Headless,
+    passes: Passes,
+    capture: GpuCapture,
+    /// What is not trained: switches, coefficients that are not evaluated.
+    scene: GaussianScene,
+    model: Model,
+    geometry: Optimized,
+    color: Optimized,
+    scene_settings: wgpu::Buffer,
+    slice: wgpu::BindGroup,
+    parameters: wgpu::BindGroup,
+    faults: wgpu::Buffer,
+    totals: wgpu::Buffer,
+    view: Option<ViewBuffers>,
+    in_flight: VecDeque<wgpu::SubmissionIndex>,
+}
+
+/// One view of a batch.
+#[derive(Debug, Clone, Copy)]
+pub struct Sample<'a> {
+    /// Camera and time.
+    pub view: &'a View,
+    /// What it should look like.
+    pub image: &'a CoveredImage,
+    /// Color behind the scene and the image.
+    pub background: [f32; 3],
+    /// Number of the view, for reports.
+    pub number: u32,
+}
+
+/// Sums over the views since the last report.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Totals {
+    /// Mean loss.
+    pub loss: f64,
+    /// PSNR of all pixels together, dB.
+    pub psnr: f64,
+    /// Number of views.
+    pub views: u64,
+}
+
+/// Gradients that were not finite and have been left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Faults {
+    /// Their number.
+    pub count: u32,
+    /// The Gaussian and the view of the first.
+    pub gaussian: u32,
+    /// Number of that view.
+    pub view: u32,
+}
+
+/// Parameters and moments, as they are on the GPU.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TrainerState {
+    /// Raw parameters, their first and their second moments; the same of the color coefficients.
+    pub buffers: [Vec<u8>; 6],
+}
+
+impl<'a> Trainer<'a> {
+    /// Uploads a scene in the trained form. Its temporal filter is not used.
+    ///
+    /// # Errors
+    /// A Gaussian that cannot be drawn, a scene that does not fit one binding of the device, a limit that is too low.
+    pub fn new(headless: &'a mut Headless, scene: GaussianScene, mode: GradientMode) -> Result<Self, TrainerError> {
+        let SceneForm::Trained(trained) = &scene.form else { return Err(TrainerError::NotTrained) };
+        let model = trained.parameters.model();
+        let records = records(&trained.parameters);
+        let runtime = GaussianScene { filter: None, ..scene.clone() }.into_runtime()?;
+        let plain = model == Model::Static3d || scene.trained_with.force_sh_3d;
+        let definitions = match mode {
+            GradientMode::Exact => &[][..],
+            GradientMode::Compat if plain => COMPAT_WITHOUT_TIME,
+            GradientMode::Compat => COMPAT,
+        };
+        let passes = Passes::new(headless, definitions, ShaderChecks::Off)?;
+        let degrees = runtime.form.color_degrees();
+        let stride = crate::gaussian::harmonics::evaluated(degrees.degree, degrees.degree_t) * 3;
+        let stride = stride.div_ceil(4) as u32;
+        let count = runtime.len() as u32;
+        let limit = binding_limit(&headless.context().device.limits());
+        let needed = u64::from(count) * 16 * u64::from(stride.max(5));
+        if needed > limit {
+            return Err(GpuError::TooLarge { what: "the Gaussians that are trained", needed, limit }.into());
+        }
+        let capture = headless.upload(&runtime)?;
+        let Some(writable) = capture.writable() else { return Err(TrainerError::Empty) };
+        let [gaussians, lifespans, harmonics] = writable.map(wgpu::Buffer::clone);
+        let allocator = headless.allocator();
+        let queue = &headless.context().queue;
+        let storage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
+        let raw = allocator.buffer("gs4d trained", size_of_val(&records[..]) as u64, storage);
+        queue.write_buffer(&raw, 0, bytemuck::cast_slice(&records));
+        let geometry = Optimized::new(headless, &passes, raw, count, 5);
+        let color = Optimized::new(headless, &passes, harmonics, count, stride);
+        let uniform = BufferUsages::UNIFORM;
+        let scene_settings = allocator.buffer("gs4d trained scene", size_of::<TrainedScene>() as u64, uniform);
+        let faults = allocator.buffer("gs4d faults", 12, storage);
+        let totals = allocator.buffer("gs4d totals", 16, storage);
+        let slice = allocator.bind_group(
+            "gs4d slice",
+            &passes.slice_group,
+            &[&scene_settings, &geometry.values, &gaussians, &lifespans].map(wgpu::Buffer::as_entire_binding),
+        );
+        let buffers = [&geometry.values, &color.values, &geometry.gradients, &color.gradients, &faults];
+        let parameters = allocator.bind_group(
+            "gs4d parameters",
+            &passes.parameters_group,
+            &buffers.map(wgpu::Buffer::as_entire_binding),
+        );
+        let mut trainer = Self {
+            headless,
+            passes,
+            capture,
+            scene,
+            model,
+            geometry,
+            color,
+            scene_settings,
+            slice,
+            parameters,
+            faults,
+            totals,
+            view: None,
+            in_flight: VecDeque::new(),
+        };
+        trainer.slice();
+        Ok(trainer)
+    }
+
+    /// Returns the adapter's description and the device.
+    pub fn headless(&self) -> &Headless {
+        self.headless
+    }
+
+    /// Draws the scene as it is.
+    ///
+    /// # Errors
+    /// A picture that does not fit the GPU, a lost device.
+    pub fn draw(&mut self, view: &View, background: [f32; 3]) -> Result<Frame, GpuError> {
+        self.headless.render(&self.capture, view, Background::Color(background))
+    }
+
+    /// Draws a view of the scene, so that later frames have room for at least as many pairs.
+    ///
+    /// # Errors
+    /// As [`draw`](Self::draw).
+    pub fn make_room(&mut self, view: &View) -> Result<(), GpuError> {
+        self.headless.draw(&self.capture, view, Background::None)
+    }
+
+    /// Adds the gradients of the loss of a batch, each view with the same share.
+    ///
+    /// # Errors
+    /// A picture or pairs that do not fit the GPU.
+    pub fn accumulate(&mut self, batch: &[Sample<'_>], similarity_share: f64) -> Result<(), GpuError> {
+        let share = 1.0 / batch.len().max(1) as f32;
+        for sample in batch {
+            let mut encoder = self.encoder("gs4d view");
+            self.headless.record(&mut encoder, &self.capture, sample.view, Background::Color(sample.background))?;
+            self.fit(sample.view.size)?;
+            let Some(buffers) = &self.view else { continue };
+            let queue = &self.headless.context().queue;
+            queue.write_buffer(&buffers.image, 0, bytemuck::cast_slice(&sample.image.texels));
+            let [r, g, b] = sample.background;
+            let settings = LossUniforms {
+                background: [r, g, b, 0.0],
+                size: sample.view.size.to_array(),
+                tiles: sample.view.tiles().to_array(),
+                share,
+                similarity_share: similarity_share as f32,
+                padding: [0; 2],
+            };
+            queue.write_buffer(&buffers.loss_settings, 0, bytemuck::bytes_of(&settings));
+            self.write_scene(sample.number);
+            self.record_backward(&mut encoder, buffers, sample.view, true);
+            queue.submit([encoder.finish()]);
+        }
+        Ok(())
+    }
+
+    /// Adds the gradients of a loss whose gradient with respect to each pixel is given: of red, green, blue and opacity, and of expected depth.
+    ///
+    /// # Errors
+    /// As [`accumulate`](Self::accumulate).
+    pub fn accumulate_pixels(
+        &mut self,
+        view: &View,
+        background: Background,
+        pixels: &[[f32; 4]],
+        depths: &[f32],
+    ) -> Result<(), GpuError> {
+        self.headless.draw(&self.capture, view, background)?;
+        self.fit(view.size)?;
+        let Some(buffers) = &self.view else { return Ok(()) };
+        let queue = &self.headless.context().queue;
+        queue.write_buffer(&buffers.pixel_gradients, 0, bytemuck::cast_slice(pixels));
+        queue.write_buffer(&buffers.depth_gradients, 0, bytemuck::cast_slice(depths));
+        self.write_scene(0);
+        let mut encoder = self.encoder("gs4d view");
+        self.record_backward(&mut encoder, buffers, view, false);
+        queue.submit([encoder.finish()]);
+        Ok(())
+    }
+
+    /// Records the passes after the picture. `judged`: with its loss.
+    fn record_backward(&self, encoder: &mut wgpu::CommandEncoder, buffers: &ViewBuffers, view: &View, judged: bool) {
+        let Some(frame) = self.headless.finished() else { return };
+        let (tiles, passes) = (view.tiles(), &self.passes);
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        if judged {
+            pass.set_bind_group(0, &buffers.loss, &[]);
+            pass.set_pipeline(&passes.similarity);
+            pass.dispatch_workgroups(tiles.x, tiles.y, 1);
+            pass.set_pipeline(&passes.gradient);
+            pass.dispatch_workgroups(tiles.x, tiles.y, 1);
+            pass.set_pipeline(&passes.total);
+            pass.dispatch_workgroups(1, 1, 1);
+        }
+        pass.set_bind_group(0, &buffers.blended, &[]);
+        pass.set_bind_group(1, &buffers.sums, &[]);
+        pass.set_pipeline(&passes.place);
+        pass.dispatch_workgroups(frame.slots.div_ceil(256), 1, 1);
+        pass.set_pipeline(&passes.pairs);
+        pass.dispatch_workgroups(tiles.x, tiles.y, 1);
+        pass.set_pipeline(&passes.project_backward);
+        pass.set_bind_group(0, &buffers.splat_gradients, &[]);
+        pass.set_bind_group(1, self.capture.geometry(), &[]);
+        pass.set_bind_group(2, self.headless.no_list(), &[]);
+        pass.set_bind_group(3, &self.parameters, &[]);
+        pass.dispatch_workgroups((self.capture.len() as u32).div_ceil(64), 1, 1);
+    }
+
+    /// Makes a step with the gradients accumulated so far, which become 0; the first `step` is 1.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn step(&mut self, rates: &Rates, factor: f64, step: usize) -> Result<(), GpuError> {
+        let count = self.capture.len() as u32;
+        let scale = self.scene.trained_with.spatial_lr_scale;
+        let rated = [(&self.geometry, rates.of_parameters(scale, factor)), (&self.color, rates.of_harmonics(factor))];
+        let queue = &self.headless.context().queue;
+        let mut encoder = self.encoder("gs4d step");
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            pass.set_pipeline(&self.passes.adam);
+            for (optimized, rates) in rated {
+                let stride = optimized.stride;
+                let settings = AdamUniforms { rates, correction: correction(step), count, stride };
+                queue.write_buffer(&optimized.settings, 0, bytemuck::bytes_of(&settings));
+                pass.set_bind_group(0, &optimized.group, &[]);
+                pass.dispatch_workgroups((count * stride).div_ceil(256).min(ADAM_GROUPS), 1, 1);
+            }
+            pass.set_pipeline(&self.passes.slice);
+            pass.set_bind_group(0, &self.slice, &[]);
+            pass.dispatch_workgroups(count.div_ceil(256), 1, 1);
+        }
+        let index = queue.submit([encoder.finish()]);
+        self.in_flight.push_back(index);
+        if self.in_flight.len() > STEPS_IN_FLIGHT
+            && let Some(oldest) = self.in_flight.pop_front()
+        {
+            let wait = wgpu::PollType::Wait { submission_index: Some(oldest), timeout: None };
+            let waited = self.headless.context().device.poll(wait);
+            waited.map_err(|error| GpuError::Device(error.to_string()))?;
+        }
+        Ok(())
+    }
+
+    /// Returns the sums over the views since the last call, and begins new ones.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn totals(&mut self) -> Result<Totals, GpuError> {
+        let bytes = self.headless.copy_out(&self.totals, 16)?;
+        let [loss, _, squares, views]: [f32; 4] = bytemuck::pod_read_unaligned(&bytes);
+        self.headless.context().queue.write_buffer(&self.totals, 0, &[0; 16]);
+        let each = 1.0 / f64::from(views.max(1.0));
+        let psnr = -10.0 * (f64::from(squares) * each).log10();
+        Ok(Totals { loss: f64::from(loss) * each, psnr, views: views as u64 })
+    }
+
+    /// Returns the gradients that were not finite so far; `None` if there were none.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn faults(&self) -> Result<Option<Faults>, GpuError> {
+        let bytes = self.headless.copy_out(&self.faults, 12)?;
+        let [count, gaussian, view]: [u32; 3] = bytemuck::pod_read_unaligned(&bytes);
+        Ok((count > 0).then(|| Faults { count, gaussian: gaussian.saturating_sub(1), view }))
+    }
+
+    /// Returns the scene as it is.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn scene(&self) -> Result<GaussianScene, GpuError> {
+        let (records, values) = (self.read(&self.geometry.values)?, self.read(&self.color.values)?);
+        Ok(self.with(&records, &values))
+    }
+
+    /// Returns the gradients accumulated since the last step, as raw parameters and color coefficients.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn gradients(&self) -> Result<GaussianScene, GpuError> {
+        let (records, values) = (self.read(&self.geometry.gradients)?, self.read(&self.color.gradients)?);
+        let mut gradients = self.with(&records, &values);
+        if let SceneForm::Trained(Trained { harmonics, .. }) = &mut gradients.form {
+            let (used, own) = (harmonics.evaluated() * 3, harmonics.coefficients * 3);
+            // Coefficients that are not evaluated change nothing.
+            harmonics.values.chunks_exact_mut(own.max(1)).for_each(|values| values[used..].fill(0.0));
+        }
+        Ok(gradients)
+    }
+
+    /// Returns parameters and moments, to resume from.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn state(&self) -> Result<TrainerState, GpuError> {
+        let [geometry, color] = [&self.geometry, &self.color].map(|o| [&o.values, &o.moments[0], &o.moments[1]]);
+        let mut state = TrainerState::default();
+        for (bytes, buffer) in state.buffers.iter_mut().zip(geometry.into_iter().chain(color)) {
+            *bytes = self.read(buffer)?;
+        }
+        Ok(state)
+    }
+
+    /// Replaces parameters and moments by those of [`state`](Self::state). Returns whether they are of as many Gaussians.
+    pub fn resume(&mut self, state: &TrainerState) -> bool {
+        let [geometry, color] = [&self.geometry, &self.color].map(|o| [&o.values, &o.moments[0], &o.moments[1]]);
+        let buffers: Vec<&wgpu::Buffer> = geometry.into_iter().chain(color).collect();
+        if state.buffers.iter().zip(&buffers).any(|(bytes, buffer)| bytes.len() as u64 != buffer.size()) {
+            return false;
+        }
+        for (bytes, buffer) in state.buffers.iter().zip(buffers) {
+            self.headless.context().queue.write_buffer(buffer, 0, bytes);
+        }
+        self.slice();
+        true
+    }
+
+    fn read(&self, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
+        self.headless.copy_out(buffer, buffer.size())
+    }
+
+    /// Returns the scene with these records and color coefficients, as they are on the GPU.
+    fn with(&self, records: &[u8], values: &[u8]) -> GaussianScene {
+        let mut scene = self.scene.clone();
+        if let SceneForm::Trained(Trained { parameters, harmonics }) = &mut scene.form {
+            let records: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(records);
+            set_parameters(parameters, &records);
+            let stride = self.color.stride as usize * 4;
+            set_harmonics(harmonics, &bytemuck::pod_collect_to_vec::<u8, f32>(values), stride);
+        }
+        scene
+    }
+
+    fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
+        let label = wgpu::CommandEncoderDescriptor { label: Some(label) };
+        self.headless.context().device.create_command_encoder(&label)
+    }
+
+    fn write_scene(&self, view: u32) {
+        let settings = TrainedScene {
+            count: self.capture.len() as u32,
+            model: match self.model {
+                Model::Static3d => 0,
+                Model::Unrotated4d => 1,
+                Model::Rotated4d => 2,
+            },
+            prefilter_var: self.scene.trained_with.prefilter_var,
+            view,
+        };
+        self.headless.context().queue.write_buffer(&self.scene_settings, 0, bytemuck::bytes_of(&settings));
+    }
+
+    /// Slices the parameters.
+    fn slice(&mut self) {
+        self.write_scene(0);
+        let mut encoder = self.encoder("gs4d slice");
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            pass.set_pipeline(&self.passes.slice);
+            pass.set_bind_group(0, &self.slice, &[]);
+            pass.dispatch_workgroups((self.capture.len() as u32).div_ceil(256), 1, 1);
+        }
+        self.headless.context().queue.submit([encoder.finish()]);
+    }
+
+    /// Creates what depends on the sizes of the frame that has been recorded, unless it has been.
+    fn fit(&mut self, size: UVec2) -> Result<(), GpuError> {
+        let Some(frame) = self.headless.finished() else { return Ok(()) };
+        let fits =
+            |made: &ViewBuffers| made.size == size && made.splats == frame.buffers.splats && made.color == *frame.color;
+        if !self.view.as_ref().is_some_and(fits) {
+            self.view = Some(self.make(&frame, size)?);
+        }
+        Ok(())
+    }
+
+    fn make(&self, frame: &FinishedFrame<'_>, size: UVec2) -> Result<ViewBuffers, GpuError> {
+        let (allocator, passes) = (self.headless.allocator(), &self.passes);
+        let limit = binding_limit(&allocator.device.limits());
+        let needed = u64::from(frame.pairs) * SUMS * 4;
+        if needed > limit {
+            return Err(GpuError::TooLarge { what: "the gradients of pairs", needed, limit });
+        }
+        let pixels = u64::from(size.x) * u64::from(size.y);
+        let tiles = u64::from(size.x.div_ceil(TILE_SIZE)) * u64::from(size.y.div_ceil(TILE_SIZE));
+        let storage = |label, size| allocator.buffer(label, size, BufferUsages::STORAGE);
+        let image = storage("gs4d image", pixels * 4);
+        let settings = size_of::<LossUniforms>() as u64;
+        let loss_settings = allocator.buffer("gs4d loss settings", settings, BufferUsages::UNIFORM);
+        let slopes = storage("gs4d slopes of similarity", pixels * 48);
+        let pixel_gradients = storage("gs4d gradients of pixels", pixels * 16);
+        // Zero: the loss does not depend on depth.
+        let depth_gradients = storage("gs4d gradients of depths", pixels * 4);
+        let tile_sums = storage("gs4d sums of tiles", tiles * 16);
+        let first_pairs = storage("gs4d first pairs", u64::from(frame.slots) * 4);
+        let pair_gradients = storage("gs4d gradients of pairs", needed);
+        let color = wgpu::BindingResource::TextureView(frame.color);
+        let whole = wgpu::Buffer::as_entire_binding;
+        let written = [&image, &slopes, &pixel_gradients, &tile_sums, &self.totals].map(whole);
+        let loss = [vec![whole(&loss_settings), color.clone()], written.to_vec()].concat();
+        let buffers = frame.buffers;
+        let read = [
+            frame.frame,
+            frame.counters,
+            &buffers.tile_ranges,
+            &buffers.pair_splats,
+            &buffers.splats,
+            &buffers.order,
+            &buffers.offsets,
+        ];
+        let depth = wgpu::BindingResource::TextureView(frame.depth);
+        let blended = [read.map(whole).to_vec(), vec![color, depth]].concat();
+        let sums = [&first_pairs, &pair_gradients, &pixel_gradients, &depth_gradients].map(whole);
+        let instance = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+            buffer: frame.instances,
+            offset: 0,
+            size: std::num::NonZeroU64::new(size_of::<InstanceUniforms>() as u64),
+        });
+        let splats =
+            [&self.scene_settings, &buffers.splats, &buffers.depth_keys, &first_pairs, &pair_gradients].map(whole);
+        let splat_gradients = [vec![instance], splats.to_vec()].concat();
+        Ok(ViewBuffers {
+            splats: buffers.splats.clone(),
+            color: frame.color.clone(),
+            size,
+            loss: allocator.bind_group("gs4d loss", &passes.loss_group, &loss),
+            blended: allocator.bind_group("gs4d blended", &passes.blended_group, &blended),
+            sums: allocator.bind_group("gs4d sums", &passes.sums_group, &sums),
+            splat_gradients: allocator.bind_group("gs4d splats", &passes.splats_group, &splat_gradients),
+            image,
+            loss_settings,
+            pixel_gradients,
+            depth_gradients,
+        })
+    }
+}
+
+/// Why a scene cannot be trained.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainerError {
+    /// The scene has lost its raw parameters.
+    #[error("only the trained form can be fine-tuned: give the checkpoint, or a package written with --form trained")]
+    NotTrained,
+    /// There is nothing to train.
+    #[error("there are no Gaussians to fine-tune")]
+    Empty,
+    /// A Gaussian cannot be drawn.
+    #[error(transparent)]
+    Invalid(#[from] crate::gaussian::InvalidGaussian),
+    /// The GPU cannot train the scene.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+}
+
+/// Returns the raw parameters as `slice` reads them.
+fn records(parameters: &Parameters) -> Vec<TrainedRecord> {
+    let record = |index: usize| TrainedRecord {
+        mean: parameters.mean[index],
+        mean_t: parameters.mean_t.get(index).copied().unwrap_or_default(),
+        log_scale: parameters.log_scale[index],
+        log_scale_t: parameters.log_scale_t.get(index).copied().unwrap_or_default(),
+        rotation_l: parameters.rotation_l[index],
+        rotation_r: parameters.rotation_r.get(index).copied().unwrap_or([1.0, 0.0, 0.0, 0.0]),
+        opacity_logit: [parameters.opacity_logit[index], 0.0, 0.0, 0.0],
+    };
+    (0..parameters.len()).map(record).collect()
+}
+
+/// Replaces the attributes that the model has.
+fn set_parameters(parameters: &mut Parameters, records: &[TrainedRecord]) {
+    fn set<T>(attribute: &mut [T], records: &[TrainedRecord], value: impl Fn(&TrainedRecord) -> T) {
+        for (attribute, record) in attribute.iter_mut().zip(records) {
+            *attribute = value(record);
+        }
+    }
+    set(&mut parameters.mean, records, |record| record.mean);
+    set(&mut parameters.mean_t, records, |record| record.mean_t);
+    set(&mut parameters.log_scale, records, |record| record.log_scale);
+    set(&mut parameters.log_scale_t, records, |record| record.log_scale_t);
+    set(&mut parameters.rotation_l, records, |record| record.rotation_l);
+    set(&mut parameters.rotation_r, records, |record| record.rotation_r);
+    set(&mut parameters.opacity_logit, records, |record| record.opacity_logit[0]);
+}
+
+/// Replaces the coefficients that are evaluated; `stride` is the number of values of each Gaussian.
+fn set_harmonics(harmonics: &mut Harmonics, values: &[f32], stride: usize) {
+    let used = harmonics.evaluated() * 3;
+    let own = harmonics.coefficients * 3;
+    for (coefficients, values) in harmonics.values.chunks_exact_mut(own.max(1)).zip(values.chunks_exact(stride)) {
+        coefficients[..used].copy_from_slice(&values[..used]);
+    }
+}
