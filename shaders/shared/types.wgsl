@@ -49,6 +49,17 @@ struct LossUniforms {
     padding: vec2<u32>,
 }
 
+// Input of `codebooks`.
+struct TiedColors {
+    // Number of Gaussians.
+    count: u32,
+    // Four-vectors of each Gaussian and of each entry.
+    stride: u32,
+    // Number of codebooks.
+    stages: u32,
+    padding: u32,
+}
+
 // Input of `adam` for one buffer.
 struct AdamUniforms {
     // Of the first four four-vectors of each Gaussian, and of the others.

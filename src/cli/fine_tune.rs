@@ -12,6 +12,7 @@ use crate::gaussian::GradientMode;
 use crate::offline::dataset::Split;
 use crate::offline::engine::AdapterDescription;
 use crate::offline::fine_tune::{Behind, CurvePoint, FineTuneSettings, FineTuned, Rates, Resume, fine_tune};
+use crate::offline::quantize::Quality;
 use crate::offline::work::{Fingerprint, Work};
 use serde_json::json;
 use std::path::PathBuf;
@@ -76,6 +77,13 @@ pub struct FineTune {
     /// Gradients: exact, or compat: as the original computes them, with its deviations.
     #[arg(long, value_name = "MODE", default_value = "exact", value_parser = values::one_of(&MODES))]
     gradients: GradientMode,
+    /// Compress the result: code its colors by codebooks, whose sizes follow the number of Gaussians, and train these as well. The package
+    /// is as that of `gs4d compress`, and loses less.
+    #[arg(long, value_name = "QUALITY", value_parser = values::one_of(&Quality::NAMES))]
+    compress: Option<Quality>,
+    /// Steps in which codebooks are trained, after the others.
+    #[arg(long, value_name = "N", default_value = "2000", requires = "compress", value_parser = values::count(1_000_000))]
+    compress_steps: usize,
     #[command(flatten)]
     renderer: RendererArgs,
     #[command(flatten)]
@@ -174,6 +182,7 @@ impl FineTune {
             evaluate_every: self.evaluate_every,
             patience: self.patience,
             mode: self.gradients,
+            compress: self.compress.map(|quality| (quality, self.compress_steps)),
         }
     }
 }

@@ -69,6 +69,20 @@ pub struct LossUniforms {
     pub padding: [u32; 2],
 }
 
+/// Input of `codebooks`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct TiedColors {
+    /// Number of Gaussians.
+    pub count: u32,
+    /// Four-vectors of each Gaussian and of each entry.
+    pub stride: u32,
+    /// Number of codebooks.
+    pub stages: u32,
+    /// Unused.
+    pub padding: u32,
+}
+
 /// Input of `adam` for one buffer.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]

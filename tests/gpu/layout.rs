@@ -7,7 +7,7 @@ use bevy_gs4d::gaussian::projection::LOW_PASS;
 use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF};
 use bevy_gs4d::renderer::layout::{
     self, Activation, AdamUniforms, BLOCK, Counters, DIGITS, FrameUniforms, InstanceUniforms, LossUniforms, SortStep,
-    SplatRecord, SplatShape, TrainedRecord, TrainedScene, VisibleSplat,
+    SplatRecord, SplatShape, TiedColors, TrainedRecord, TrainedScene, VisibleSplat,
 };
 use bevy_gs4d::renderer::shaders::{compose, pass_names};
 use bevy_gs4d::view::TILE_SIZE;
@@ -70,7 +70,7 @@ fn splat() -> Mirror {
     in_fours(mirror, "SplatRecord", ["place", "shape", "color", ""])
 }
 
-fn mirrors() -> [Mirror; 13] {
+fn mirrors() -> [Mirror; 14] {
     [
         gaussian(),
         mirror!(InstanceUniforms {
@@ -139,6 +139,7 @@ fn mirrors() -> [Mirror; 13] {
         trained(),
         mirror!(TrainedScene { count, model, prefilter_var, view }),
         mirror!(LossUniforms { background, size, tiles, share, similarity_share, padding }),
+        mirror!(TiedColors { count, stride, stages, padding }),
         mirror!(AdamUniforms { rates, correction, count, stride }),
     ]
 }

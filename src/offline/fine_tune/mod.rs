@@ -23,11 +23,12 @@ pub use trainer::{Faults, Sample, Totals, Trainer, TrainerError, TrainerState};
 use super::dataset::selection::{even_share, hold_out};
 use super::dataset::{CoveredImage, TrainingView};
 use super::metrics::{SizeMismatch, psnr};
+use super::quantize::{self, CompressSettings, Quality, compress_tied, train_codebooks};
 use super::work::{Fingerprint, Work};
 use super::{OfflineError, Progress};
 use crate::gaussian::GradientMode;
 use crate::renderer::Headless;
-use crate::scene::GaussianScene;
+use crate::scene::{GaussianScene, TemporalFilter};
 use crate::view::View;
 use glam::Vec3;
 use resume::Checkpoint;
@@ -37,6 +38,11 @@ use std::time::Instant;
 
 /// Views that are drawn before the first step, so that there is room for the pairs of all.
 const VIEWS_OF_ROOM: usize = 64;
+/// Gaussians for each entry of a codebook, at least, and entries of a codebook, at least.
+const CODED_GAUSSIANS_OF_ENTRY: usize = 64;
+const LEAST_ENTRIES: usize = 64;
+/// Factor on the rates while codebooks are trained.
+const CODED_RATE: f64 = 0.5;
 /// Steps between two looks at gradients that are not finite.
 const STEPS_OF_FAULTS: usize = 50;
 
@@ -65,6 +71,9 @@ pub struct FineTuneSettings {
     pub patience: Option<usize>,
     /// Whether gradients are those of the original, with its deviations.
     pub mode: GradientMode,
+    /// How the result is compressed, and the number of further steps in which the codebooks of color are trained; `None` leaves the scene in
+    /// the trained form.
+    pub compress: Option<(Quality, usize)>,
 }
 
 impl Default for FineTuneSettings {
@@ -81,6 +90,7 @@ impl Default for FineTuneSettings {
             evaluate_every: 500,
             patience: None,
             mode: GradientMode::default(),
+            compress: None,
         }
     }
 }
@@ -160,9 +170,7 @@ pub fn fine_tune(
         run.trainer.make_room(&run.shots[index].view)?;
     }
     belonging::check(&mut run.trainer, &run.shots, run.background, &trained_on)?;
-    let mut tuned = run.run(resume, progress)?;
-    tuned.scene.filter = filter;
-    Ok(tuned)
+    run.run(filter, resume, progress)
 }
 
 /// A view with its image.
@@ -184,7 +192,13 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    fn run(&mut self, resume: Option<Resume<'_>>, progress: &mut dyn Progress) -> Result<FineTuned, OfflineError> {
+    /// Trains; `filter` is that of the scene.
+    fn run(
+        &mut self,
+        filter: Option<TemporalFilter>,
+        resume: Option<Resume<'_>>,
+        progress: &mut dyn Progress,
+    ) -> Result<FineTuned, OfflineError> {
         let settings = self.settings;
         let every = settings.evaluate_every.max(1);
         let fingerprint = resume.map(|resume| resume.fingerprint.and(&format!("{settings:?}")));
@@ -207,7 +221,7 @@ impl Run<'_> {
         let (start, mut interrupted, mut told) = (Instant::now(), false, false);
         let mut step = first;
         while step < settings.steps && !interrupted {
-            self.step(step)?;
+            self.step(step, step + 1, decay(step, settings.steps, settings.last_rate))?;
             step += 1;
             progress.advance();
             interrupted = progress.is_interrupted();
@@ -230,7 +244,7 @@ impl Run<'_> {
             if let Some((resume, print)) = resume.zip(fingerprint) {
                 let due = step.is_multiple_of(resume.every.max(1)) || interrupted;
                 let checkpoint = Checkpoint { curve, best, state };
-                if due && step < settings.steps {
+                if due && (step < settings.steps || settings.compress.is_some()) {
                     checkpoint.store(resume.work, print, progress)?;
                 }
                 Checkpoint { curve, best, .. } = checkpoint;
@@ -245,8 +259,12 @@ impl Run<'_> {
         progress.finish();
         let faults = self.trainer.faults()?;
         self.trainer.resume(&TrainerState { buffers: best.state });
+        let scene = match settings.compress {
+            Some((quality, steps)) if !interrupted => self.compress(quality, steps, &mut curve, filter, progress)?,
+            _ => GaussianScene { filter, ..self.trainer.scene()? },
+        };
         Ok(FineTuned {
-            scene: self.trainer.scene()?,
+            scene,
             curve,
             best: best.point,
             steps_per_second: (step > first).then(|| (step - first) as f64 / seconds),
@@ -256,8 +274,54 @@ impl Run<'_> {
         })
     }
 
-    /// Makes step number `step`, from 0.
-    fn step(&mut self, step: usize) -> Result<(), OfflineError> {
+    /// Codes the colors by codebooks whose number of entries follows that of the Gaussians, trains these and everything else for some more
+    /// steps, and compresses the result. A temporal filter of the kind support is that of the compressed Gaussians.
+    fn compress(
+        &mut self,
+        quality: Quality,
+        steps: usize,
+        curve: &mut Vec<CurvePoint>,
+        filter: Option<TemporalFilter>,
+        progress: &mut dyn Progress,
+    ) -> Result<GaussianScene, OfflineError> {
+        let made = self.settings.steps;
+        self.trainer.forget_moments();
+        let scene = self.trainer.scene()?.into_runtime()?;
+        let mut settings = CompressSettings::from(quality);
+        let suiting = (scene.len() / CODED_GAUSSIANS_OF_ENTRY).next_power_of_two().max(LEAST_ENTRIES);
+        settings.codebooks.iter_mut().for_each(|entries| *entries = (*entries).min(suiting));
+        let books = if settings.codebooks.is_empty() {
+            None
+        } else {
+            let books = train_codebooks(&scene, &settings)?;
+            self.trainer.tie(books)?;
+            Some(())
+        };
+        progress.begin("training codebooks", steps);
+        self.trainer.totals()?;
+        if books.is_some() {
+            for step in 0..steps {
+                let factor = decay(step, steps, self.settings.last_rate);
+                self.step(made + step, step + 1, factor * CODED_RATE)?;
+                progress.advance();
+            }
+        }
+        progress.finish();
+        let scene = GaussianScene { filter, ..self.trainer.scene()? }.into_runtime()?;
+        let (compressed, _) = match self.trainer.codebooks()? {
+            Some(books) => compress_tied(scene, &settings, &books)?,
+            None => quantize::compress(scene, &settings)?,
+        };
+        let totals = self.trainer.totals()?;
+        let (loss, training_psnr) = (Some(totals.loss), Some(totals.psnr));
+        let point = CurvePoint { step: made + steps, loss, training_psnr, psnr: self.evaluate()? };
+        progress.note(&describe(&point, None));
+        curve.push(point);
+        Ok(compressed)
+    }
+
+    /// Makes the step with the views of number `step`, from 0; it is number `count`, from 1, since the moments were 0.
+    fn step(&mut self, step: usize, count: usize, factor: f64) -> Result<(), OfflineError> {
         let settings = self.settings;
         let schedule = Schedule { seed: settings.seed, views: self.shots.len(), batch: settings.batch };
         let sample = |(place, index): (usize, usize)| {
@@ -267,8 +331,7 @@ impl Run<'_> {
         };
         let batch: Vec<Sample<'_>> = schedule.batch(step).into_iter().enumerate().map(sample).collect();
         self.trainer.accumulate(&batch, settings.similarity_share)?;
-        let factor = decay(step, settings.steps, settings.last_rate);
-        Ok(self.trainer.step(&settings.rates, factor, step + 1)?)
+        Ok(self.trainer.step(&settings.rates, factor, count)?)
     }
 
     /// Returns the mean PSNR on the held-out views.

@@ -36,8 +36,8 @@ impl Rates {
         harmonics: 1.25e-4,
     };
 
-    /// Ours: the mean moves faster, since the Gaussians that are left spread into the place of the others.
-    pub const OURS: Self = Self { mean: 1.6e-5, ..Self::ORIGINAL };
+    /// Ours: the mean moves as fast as when training begins, since the Gaussians that are left spread into the place of the others.
+    pub const OURS: Self = Self { mean: 1.6e-4, ..Self::ORIGINAL };
 
     /// Returns the rates of the first four four-vectors of each Gaussian's raw parameters and of the fifth, as `adam` reads them.
     pub(super) fn of_parameters(&self, spatial_lr_scale: f64, factor: f64) -> [[f32; 4]; 5] {

@@ -11,14 +11,16 @@
 //! | `blend_backward` | splats, pairs, gradients of pixels | gradients of pairs |
 //! | `project_backward` | gradients of pairs, parameters | gradients of raw parameters, added up over a batch |
 //! | `adam` | gradients, moments | parameters |
+//! | `codebooks` | gradients of coefficients; entries | gradients of entries; coefficients, once colors are [tied](Trainer::tie) |
 
 use super::adam::correction;
 use super::schedule::Rates;
 use crate::gaussian::{GradientMode, Harmonics, Model, Parameters};
 use crate::offline::dataset::CoveredImage;
+use crate::offline::quantize::codebook::Centers;
 use crate::renderer::bind::{Bind, group_layout, pipeline};
 use crate::renderer::layout::{
-    AdamUniforms, FrameUniforms, InstanceUniforms, LossUniforms, TILE_SIZE, TrainedRecord, TrainedScene,
+    AdamUniforms, FrameUniforms, InstanceUniforms, LossUniforms, TILE_SIZE, TiedColors, TrainedRecord, TrainedScene,
 };
 use crate::renderer::memory::binding_limit;
 use crate::renderer::shaders::{COMPAT, COMPAT_WITHOUT_TIME, module};
@@ -26,6 +28,7 @@ use crate::renderer::{FinishedFrame, GpuCapture, GpuError, Headless, ShaderCheck
 use crate::scene::{GaussianScene, SceneForm, Trained};
 use crate::view::{Background, Frame, View};
 use glam::UVec2;
+use ndarray::Array2;
 use std::collections::VecDeque;
 use wgpu::BufferUsages;
 
@@ -54,6 +57,9 @@ struct Passes {
     project_backward: wgpu::ComputePipeline,
     adam_group: wgpu::BindGroupLayout,
     adam: wgpu::ComputePipeline,
+    tied_group: wgpu::BindGroupLayout,
+    collect: wgpu::ComputePipeline,
+    expand: wgpu::ComputePipeline,
 }
 
 impl Passes {
@@ -83,7 +89,10 @@ impl Passes {
             group("gs4d splats", &[Uniform(size_of::<InstanceUniforms>()), SCENE, Read, Read, Read, Read]);
         let parameters_group = group("gs4d parameters", &[Read, Read, Write, Write, Write]);
         let adam_group = group("gs4d adam", &[Uniform(size_of::<AdamUniforms>()), Write, Write, Write, Write]);
+        let tied = [Uniform(size_of::<TiedColors>()), Read, Read, Read, Read, Write, Read, Write];
+        let tied_group = group("gs4d tied colors", &tied);
         let slice = module(device, "slice", &[], checks)?;
+        let codebooks = module(device, "codebooks", &[], checks)?;
         let loss = module(device, "loss", &[], checks)?;
         let blend_backward = module(device, "blend_backward", definitions, checks)?;
         let project_backward = module(device, "project_backward", definitions, checks)?;
@@ -106,6 +115,8 @@ impl Passes {
                 &[&splats_group, geometry, list, &parameters_group],
             ),
             adam: make(&adam, "adam", &[&adam_group]),
+            collect: make(&codebooks, "collect", &[&tied_group]),
+            expand: make(&codebooks, "expand", &[&tied_group]),
             slice_group,
             loss_group,
             blended_group,
@@ -113,6 +124,7 @@ impl Passes {
             splats_group,
             parameters_group,
             adam_group,
+            tied_group,
         })
     }
 }
@@ -125,7 +137,8 @@ struct Optimized {
     moments: [wgpu::Buffer; 2],
     settings: wgpu::Buffer,
     group: wgpu::BindGroup,
-    /// Four-vectors of each Gaussian.
+    /// Number of Gaussians or entries, and four-vectors of each.
+    count: u32,
     stride: u32,
 }
 
@@ -141,8 +154,17 @@ impl Optimized {
         let buffers = [&settings, &values, &gradients, &moments[0], &moments[1]];
         let resources = buffers.map(wgpu::Buffer::as_entire_binding);
         let group = allocator.bind_group("gs4d adam", &passes.adam_group, &resources);
-        Self { values, gradients, moments, settings, group, stride }
+        Self { values, gradients, moments, settings, group, count, stride }
     }
+}
+
+/// Codebooks that the colors are tied to.
+#[derive(Debug)]
+struct Tied {
+    entries: Optimized,
+    group: wgpu::BindGroup,
+    /// Codes, and the number of entries of each codebook.
+    books: Centers,
 }
 
 /// What depends on the size of the picture and of the renderer's buffers.
@@ -178,6 +200,7 @@ pub struct Trainer<'a> {
     parameters: wgpu::BindGroup,
     faults: wgpu::Buffer,
     totals: wgpu::Buffer,
+    tied: Option<Tied>,
     view: Option<ViewBuffers>,
     in_flight: VecDeque<wgpu::SubmissionIndex>,
 }
@@ -288,6 +311,7 @@ impl<'a> Trainer<'a> {
             parameters,
             faults,
             totals,
+            tied: None,
             view: None,
             in_flight: VecDeque::new(),
         };
@@ -405,18 +429,35 @@ impl<'a> Trainer<'a> {
     pub fn step(&mut self, rates: &Rates, factor: f64, step: usize) -> Result<(), GpuError> {
         let count = self.capture.len() as u32;
         let scale = self.scene.trained_with.spatial_lr_scale;
-        let rated = [(&self.geometry, rates.of_parameters(scale, factor)), (&self.color, rates.of_harmonics(factor))];
+        let colors = rates.of_harmonics(factor);
+        let mut rated = vec![(&self.geometry, rates.of_parameters(scale, factor))];
+        match &self.tied {
+            // The first coefficient of each Gaussian is its own.
+            Some(tied) => rated.extend([
+                (&self.color, Rates { harmonics: 0.0, ..*rates }.of_harmonics(factor)),
+                (&tied.entries, [colors[1]; 5]),
+            ]),
+            None => rated.push((&self.color, colors)),
+        }
         let queue = &self.headless.context().queue;
         let mut encoder = self.encoder("gs4d step");
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            if let Some(Tied { entries, group, .. }) = &self.tied {
+                pass.set_pipeline(&self.passes.collect);
+                pass.set_bind_group(0, group, &[]);
+                pass.dispatch_workgroups(entries.count, 1, 1);
+            }
             pass.set_pipeline(&self.passes.adam);
             for (optimized, rates) in rated {
-                let stride = optimized.stride;
+                let Optimized { count, stride, .. } = *optimized;
                 let settings = AdamUniforms { rates, correction: correction(step), count, stride };
                 queue.write_buffer(&optimized.settings, 0, bytemuck::bytes_of(&settings));
                 pass.set_bind_group(0, &optimized.group, &[]);
                 pass.dispatch_workgroups((count * stride).div_ceil(256).min(ADAM_GROUPS), 1, 1);
+            }
+            if let Some(tied) = &self.tied {
+                self.expand(&mut pass, tied);
             }
             pass.set_pipeline(&self.passes.slice);
             pass.set_bind_group(0, &self.slice, &[]);
@@ -432,6 +473,99 @@ impl<'a> Trainer<'a> {
             waited.map_err(|error| GpuError::Device(error.to_string()))?;
         }
         Ok(())
+    }
+
+    /// Makes all color coefficients but the first of each Gaussian sums of entries of codebooks, which are trained in their place. Rows are
+    /// Gaussians.
+    ///
+    /// # Errors
+    /// Codebooks of other Gaussians or coefficients.
+    pub fn tie(&mut self, books: Centers) -> Result<(), TrainerError> {
+        let (count, stride) = (self.capture.len(), self.color.stride);
+        let sizes: Vec<usize> = books.entries.iter().map(|book| book.nrows()).collect();
+        let fits = |(codes, size): (&Vec<u32>, &usize)| {
+            codes.len() == count && codes.iter().all(|&code| (code as usize) < *size)
+        };
+        let columns = |book: &Array2<f32>| (1..=stride as usize * 4 - 3).contains(&book.ncols());
+        if books.codes.len() != sizes.len()
+            || !books.codes.iter().zip(&sizes).all(fits)
+            || !books.entries.iter().all(columns)
+        {
+            return Err(TrainerError::Codebooks);
+        }
+        let (total, stages) = (sizes.iter().sum::<usize>(), sizes.len());
+        let mut values = vec![0.0f32; total * stride as usize * 4];
+        let rows = books.entries.iter().flat_map(|book| book.rows());
+        for (entry, row) in values.chunks_exact_mut(stride as usize * 4).zip(rows) {
+            entry[3..].iter_mut().zip(row).for_each(|(to, from)| *to = *from);
+        }
+        let mut codes = Vec::with_capacity(count * stages);
+        let mut members = vec![Vec::new(); total];
+        for index in 0..count {
+            let mut first = 0;
+            for (own, size) in books.codes.iter().zip(&sizes) {
+                let entry = first + own[index];
+                codes.push(entry);
+                members[entry as usize].push(index as u32);
+                first += *size as u32;
+            }
+        }
+        let mut firsts = vec![0u32];
+        for own in &members {
+            firsts.push(firsts.last().copied().unwrap_or_default() + own.len() as u32);
+        }
+        let allocator = self.headless.allocator();
+        let queue = &self.headless.context().queue;
+        let filled = |label, bytes: &[u8], usage| {
+            let made = allocator.buffer(label, bytes.len().max(16) as u64, usage);
+            queue.write_buffer(&made, 0, bytes);
+            made
+        };
+        let storage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
+        let settings = TiedColors { count: count as u32, stride, stages: stages as u32, padding: 0 };
+        let settings = filled("gs4d tied colors", bytemuck::bytes_of(&settings), BufferUsages::UNIFORM);
+        let codes = filled("gs4d codes", bytemuck::cast_slice(&codes), storage);
+        let firsts = filled("gs4d first members", bytemuck::cast_slice(&firsts), storage);
+        let members = filled("gs4d members", bytemuck::cast_slice(&members.concat()), storage);
+        let values = filled("gs4d entries", bytemuck::cast_slice(&values), storage);
+        let entries = Optimized::new(self.headless, &self.passes, values, total as u32, stride);
+        let Optimized { values, gradients, .. } = &entries;
+        let buffers =
+            [&settings, &codes, &firsts, &members, values, &self.color.values, &self.color.gradients, gradients];
+        let group = allocator.bind_group(
+            "gs4d tied colors",
+            &self.passes.tied_group,
+            &buffers.map(wgpu::Buffer::as_entire_binding),
+        );
+        let tied = Tied { entries, group, books };
+        let mut encoder = self.encoder("gs4d expand");
+        self.expand(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), &tied);
+        queue.submit([encoder.finish()]);
+        self.tied = Some(tied);
+        Ok(())
+    }
+
+    /// Records that the coefficients become the sums of their entries.
+    fn expand(&self, pass: &mut wgpu::ComputePass<'_>, tied: &Tied) {
+        let values = self.color.count * self.color.stride;
+        pass.set_pipeline(&self.passes.expand);
+        pass.set_bind_group(0, &tied.group, &[]);
+        pass.dispatch_workgroups(values.div_ceil(256).min(ADAM_GROUPS), 1, 1);
+    }
+
+    /// Returns the codebooks as they are; `None` unless colors are [tied](Self::tie).
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn codebooks(&self) -> Result<Option<Centers>, GpuError> {
+        let Some(Tied { entries, books, .. }) = &self.tied else { return Ok(None) };
+        let values: Vec<f32> = bytemuck::pod_collect_to_vec(&self.read(&entries.values)?);
+        let mut books = books.clone();
+        let rows = books.entries.iter_mut().flat_map(|book| book.rows_mut());
+        for (entry, mut row) in values.chunks_exact(entries.stride as usize * 4).zip(rows) {
+            row.iter_mut().zip(&entry[3..]).for_each(|(to, from)| *to = *from);
+        }
+        Ok(Some(books))
     }
 
     /// Returns the sums over the views since the last call, and begins new ones.
@@ -506,6 +640,15 @@ impl<'a> Trainer<'a> {
         }
         self.slice();
         true
+    }
+
+    /// Sets all moments to 0, as before the first step.
+    pub fn forget_moments(&mut self) {
+        let mut encoder = self.encoder("gs4d moments");
+        for moments in self.geometry.moments.iter().chain(&self.color.moments) {
+            encoder.clear_buffer(moments, 0, None);
+        }
+        self.headless.context().queue.submit([encoder.finish()]);
     }
 
     fn read(&self, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
@@ -634,6 +777,9 @@ pub enum TrainerError {
     /// The scene has lost its raw parameters.
     #[error("only the trained form can be fine-tuned: give the checkpoint, or a package written with --form trained")]
     NotTrained,
+    /// Codebooks of another scene.
+    #[error("the codebooks are not of the colors of this scene")]
+    Codebooks,
     /// There is nothing to train.
     #[error("there are no Gaussians to fine-tune")]
     Empty,

@@ -1,7 +1,7 @@
 //! Codebooks: residual vector quantization of color, in which each codebook codes what the previous ones leave.
 //!
-//! In: rows of coefficients and a weight for each. Out: [`Codebooks`] of signed bytes, and a code into each for every
-//! row. Seeds are k-means++, refined by Lloyd's steps on a sample; once every row has its codes, all entries are fitted
+//! In: rows of coefficients and a weight for each. Out: [`Centers`], a code into each codebook for every row, and the same as
+//! [`Codebooks`] of signed bytes. Seeds are k-means++, refined by Lloyd's steps on a sample; once every row has its codes, all entries are fitted
 //! again to all rows. The same input gives the same result, whatever the number of threads.
 
 use ndarray::{Array1, Array2, ArrayView2, Axis, s};
@@ -18,7 +18,16 @@ const BLOCK: usize = 512;
 /// Most seeds drawn at a time: distances to many are computed much faster together.
 const SEEDS: usize = 64;
 
-/// Codebooks whose entries add up.
+/// Codebooks whose entries add up, in single precision.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Centers {
+    /// The entries of each codebook: rows.
+    pub entries: Vec<Array2<f32>>,
+    /// For each codebook, the index of the entry of every row of the input.
+    pub codes: Vec<Vec<u32>>,
+}
+
+/// Codebooks whose entries add up, as bytes.
 #[derive(Debug, Clone, Default)]
 pub struct Codebooks {
     /// The entries of each codebook: rows of signed bytes.
@@ -29,7 +38,7 @@ pub struct Codebooks {
     pub codes: Vec<Vec<u16>>,
 }
 
-impl Codebooks {
+impl Centers {
     /// Trains one codebook after another over `data`, rows × columns, with these numbers of entries (at most 65,536
     /// each). `weights` has a weight for each row, none of them negative. Calls `done` after each codebook.
     ///
@@ -56,8 +65,14 @@ impl Codebooks {
                 *centers += &left;
             }
         }
-        let mut books = Self::default();
-        for (centers, codes) in stages {
+        let (entries, codes) = stages.into_iter().unzip();
+        Self { entries, codes }
+    }
+
+    /// Returns the entries as bytes.
+    pub fn quantized(&self) -> Codebooks {
+        let mut books = Codebooks::default();
+        for (centers, codes) in self.entries.iter().zip(&self.codes) {
             let scales = centers.fold_axis(Axis(0), 0.0f32, |most, value| most.max(value.abs()));
             let scaled = |value: f32, scale: f32| if scale > 0.0 { (value / scale * 127.0).round() as i8 } else { 0 };
             let mut bytes = Array2::zeros(centers.raw_dim());
@@ -66,7 +81,7 @@ impl Codebooks {
             }
             books.entries.push(bytes);
             books.scales.push(scales);
-            books.codes.push(codes.into_iter().map(|code| code as u16).collect());
+            books.codes.push(codes.iter().map(|&code| code as u16).collect());
         }
         books
     }
@@ -233,8 +248,9 @@ mod tests {
     fn each_codebook_leaves_less() {
         let data = data(3_000, 9);
         let weights = vec![1.0; 3_000];
-        let errors: Vec<f64> =
-            (1..=3).map(|n| error(&data, &Codebooks::train(data.clone(), &weights, &vec![16; n], || {}))).collect();
+        let errors: Vec<f64> = (1..=3)
+            .map(|n| error(&data, &Centers::train(data.clone(), &weights, &vec![16; n], || {}).quantized()))
+            .collect();
         assert!(errors[0] < 0.02, "sixteen entries find thirteen clusters: {errors:?}");
         assert!(errors[1] < 0.9 * errors[0] && errors[2] < 0.9 * errors[1], "the rest is coded too: {errors:?}");
     }
@@ -242,7 +258,7 @@ mod tests {
     #[test]
     fn training_is_the_same_on_every_run() {
         let weights: Vec<f32> = (0..2_000).map(|i| (i % 5) as f32).collect();
-        let train = || Codebooks::train(data(2_000, 12), &weights, &[32, 32], || {});
+        let train = || Centers::train(data(2_000, 12), &weights, &[32, 32], || {}).quantized();
         let (a, b) = (train(), train());
         assert!(a.codes == b.codes && a.entries == b.entries && a.scales == b.scales, "deterministic");
     }
@@ -252,7 +268,7 @@ mod tests {
         let data = data(2_600, 6);
         let heavy = |row: usize| row % 13 == 4;
         let weights: Vec<f32> = (0..2_600).map(|row| if heavy(row) { 100.0 } else { 0.01 }).collect();
-        let books = Codebooks::train(data.clone(), &weights, &[4], || {});
+        let books = Centers::train(data.clone(), &weights, &[4], || {}).quantized();
         let mut errors = [0.0, 0.0];
         for (row, &code) in books.codes[0].iter().enumerate() {
             let entry = books.entries[0].row(code as usize).mapv(f32::from) * &books.scales[0] / 127.0;
@@ -264,9 +280,9 @@ mod tests {
 
     #[test]
     fn few_or_equal_rows_are_no_trouble() {
-        let none = Codebooks::train(Array2::zeros((0, 5)), &[], &[8, 8], || {});
+        let none = Centers::train(Array2::zeros((0, 5)), &[], &[8, 8], || {}).quantized();
         assert!(none.codes.is_empty(), "nothing to code");
-        let equal = Codebooks::train(Array2::zeros((3, 5)), &[0.0; 3], &[8], || {});
+        let equal = Centers::train(Array2::zeros((3, 5)), &[0.0; 3], &[8], || {}).quantized();
         assert!(equal.codes[0].len() == 3 && equal.entries[0].nrows() == 3, "no more entries than rows");
     }
 }

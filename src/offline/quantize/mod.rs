@@ -21,7 +21,7 @@ use crate::scene::packed::encode::Bits;
 use crate::scene::{
     CodedColors, FilterKind, Form, GaussianScene, PackedColors, PackedScene, RuntimeScene, SceneForm, TemporalFilter,
 };
-use codebook::Codebooks;
+use codebook::Centers;
 use ndarray::Array2;
 use order::morton_order;
 use serde::Serialize;
@@ -82,6 +82,46 @@ pub fn compress_with(
     settings: &CompressSettings,
     done: impl FnMut(),
 ) -> Result<(GaussianScene, CompressReport), CompressError> {
+    compress_by(scene, settings, |colors, weights, entries| Centers::train(colors, weights, entries, done))
+}
+
+/// As [`compress`], with codebooks that have been trained: rows are Gaussians in the order of the scene.
+///
+/// # Errors
+/// As [`compress`].
+///
+/// # Panics
+/// If the codebooks are of fewer Gaussians.
+pub fn compress_tied(
+    scene: RuntimeScene,
+    settings: &CompressSettings,
+    books: &Centers,
+) -> Result<(GaussianScene, CompressReport), CompressError> {
+    let Form::Sliced(sliced) = &scene.form else { return Err(CompressError::AlreadyPacked) };
+    let order = morton_order(&sliced.gaussians);
+    let codes = books.codes.iter().map(|codes| order.iter().map(|&index| codes[index as usize]).collect());
+    let ordered = Centers { entries: books.entries.clone(), codes: codes.collect() };
+    compress_by(scene, settings, |_, _, _| ordered)
+}
+
+/// Returns codebooks for the colors of a scene, rows in its order, and the weights that [`compress`] gives them.
+///
+/// # Errors
+/// A scene that is packed.
+pub fn train_codebooks(scene: &RuntimeScene, settings: &CompressSettings) -> Result<Centers, CompressError> {
+    let Form::Sliced(sliced) = &scene.form else { return Err(CompressError::AlreadyPacked) };
+    let order: Vec<u32> = (0..scene.len() as u32).collect();
+    let opacities = || sliced.gaussians.iter().map(|gaussian| gaussian.opacity).collect();
+    let weights = settings.weights.clone().unwrap_or_else(opacities);
+    Ok(Centers::train(rest_of(&sliced.harmonics, &order), &weights, &settings.codebooks, || {}))
+}
+
+/// As [`compress`]; `train` returns the codebooks for rows of coefficients, their weights and the numbers of entries.
+fn compress_by(
+    scene: RuntimeScene,
+    settings: &CompressSettings,
+    train: impl FnOnce(Array2<f32>, &[f32], &[usize]) -> Centers,
+) -> Result<(GaussianScene, CompressReport), CompressError> {
     let Form::Sliced(sliced) = &scene.form else { return Err(CompressError::AlreadyPacked) };
     let books = &settings.codebooks;
     if books.len() > MAX_STAGES || books.iter().any(|&entries| !(1..=1 << 16).contains(&entries)) {
@@ -105,7 +145,7 @@ pub fn compress_with(
             Some(weights) => order.iter().map(|&index| weights[index as usize]).collect(),
             None => gaussians.iter().map(|gaussian| gaussian.opacity).collect::<Vec<_>>(),
         };
-        let (coded, base) = code(&sliced.harmonics, &order, &weights, books, bits, done);
+        let (coded, base) = code(&sliced.harmonics, &order, bits, |rest| train(rest, &weights, books));
         report.codebooks.clone_from(&coded.entries);
         (PackedColors::Coded(coded), base)
     };
@@ -137,31 +177,34 @@ fn rounded(mut harmonics: Harmonics, step: f32) -> Harmonics {
     harmonics
 }
 
-/// Returns the colors by codebooks of these numbers of entries, in the given order, and the ends of the range of their
-/// first coefficients.
+/// Returns the colors by the codebooks that `train` returns, in the given order, and the ends of the range of their first
+/// coefficients.
 fn code(
     harmonics: &Harmonics,
     order: &[u32],
-    weights: &[f32],
-    entries: &[usize],
     bits: &Bits,
-    done: impl FnMut(),
+    train: impl FnOnce(Array2<f32>) -> Centers,
 ) -> (CodedColors, [f32; 2]) {
     let used = harmonics.evaluated() * 3;
     let of = |&index: &u32| &harmonics.of(index as usize)[..used];
     let base: Vec<[f32; 3]> = order.iter().map(of).map(|row| [row[0], row[1], row[2]]).collect();
     let (mut colors, ends) = CodedColors::of_base(harmonics.degree, harmonics.degree_t, &base, bits.base);
-    let columns = used - 3;
-    if columns > 0 {
-        let mut rest = Array2::zeros((order.len(), columns));
-        for (mut row, index) in rest.rows_mut().into_iter().zip(order) {
-            row.iter_mut().zip(&of(index)[3..]).for_each(|(to, from)| *to = *from);
-        }
-        let books = Codebooks::train(rest, weights, entries, done);
+    if used > 3 {
+        let books = train(rest_of(harmonics, order)).quantized();
         for ((book, scales), codes) in books.entries.iter().zip(&books.scales).zip(&books.codes) {
             let bytes: Vec<i8> = book.iter().copied().collect();
             colors.push_codebook(&bytes, &scales.to_vec(), codes);
         }
     }
     (colors, ends)
+}
+
+/// Returns all coefficients that are evaluated but the first, a row for each of these Gaussians.
+fn rest_of(harmonics: &Harmonics, order: &[u32]) -> Array2<f32> {
+    let used = harmonics.evaluated() * 3;
+    let mut rest = Array2::zeros((order.len(), used - 3));
+    for (mut row, &index) in rest.rows_mut().into_iter().zip(order) {
+        row.iter_mut().zip(&harmonics.of(index as usize)[3..used]).for_each(|(to, from)| *to = *from);
+    }
+    rest
 }
