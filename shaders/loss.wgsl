@@ -15,16 +15,16 @@ const C2: f32 = 0.0009;
 
 @group(0) @binding(0) var<uniform> loss: LossUniforms;
 @group(0) @binding(1) var color: texture_2d<f32>;
-// Color times coverage, coverage: one byte each.
-@group(0) @binding(2) var<storage, read> image: array<u32>;
 // For each pixel and channel: derivatives of SSIM with respect to the mean, the mean square and the mean product with the image; SSIM.
-@group(0) @binding(3) var<storage, read_write> slopes: array<vec4<f32>>;
+@group(0) @binding(2) var<storage, read_write> slopes: array<vec4<f32>>;
 // Gradient with respect to red, green, blue and opacity of each pixel.
-@group(0) @binding(4) var<storage, read_write> pixel_gradients: array<vec4<f32>>;
+@group(0) @binding(3) var<storage, read_write> pixel_gradients: array<vec4<f32>>;
 // Of each tile: sums of the absolute difference, of SSIM and of the squared difference of the clamped colors.
-@group(0) @binding(5) var<storage, read_write> tile_sums: array<vec4<f32>>;
+@group(0) @binding(4) var<storage, read_write> tile_sums: array<vec4<f32>>;
 // Loss, absolute difference, squared difference and number of views so far.
-@group(0) @binding(6) var<storage, read_write> totals: array<vec4<f32>>;
+@group(0) @binding(5) var<storage, read_write> totals: array<vec4<f32>>;
+// Color times coverage, coverage: one byte each.
+@group(1) @binding(0) var<storage, read> image: array<u32>;
 
 // Both pictures with the border, then three maps at a time; sums over rows.
 var<workgroup> field: array<vec3<f32>, 676>;

@@ -9,6 +9,7 @@ use super::progress::Bars;
 use super::report::Report;
 use super::table::{bytes, lines};
 use crate::offline::bake::{BakeSettings, Baked, bake};
+use crate::offline::fine_tune::FineTuneSettings;
 use crate::offline::quantize::Quality;
 use crate::offline::report::{BakeReport, Change};
 use crate::offline::search::{Goal, ScoreChoice};
@@ -16,10 +17,10 @@ use crate::offline::temporal_filter::FILTER_NAMES;
 use crate::scene::{FilterKind, MAX_SEGMENTS};
 use std::path::{Path, PathBuf};
 
-/// Turn a trained checkpoint into a small, fast package: score, prune, mask, compress, evaluate, report.
+/// Turn a trained checkpoint into a small, fast package: score, prune, fine-tune, mask, compress, evaluate, report.
 ///
 /// An interrupted bake goes on where it was, from the results in OUT.bake/; with other inputs or options it starts over where they
-/// matter. Nothing is trained.
+/// matter.
 #[derive(clap::Args)]
 #[command(group = clap::ArgGroup::new("goal").args(["ratio", "keep", "max_loss"]))]
 #[command(after_help = "\
@@ -63,6 +64,15 @@ pub struct Bake {
     /// How small against how exact.
     #[arg(long, value_name = "QUALITY", default_value = "balanced", value_parser = values::one_of(&Quality::NAMES))]
     quality: Quality,
+    /// Do not train what is left after pruning. It is trained if there is a GPU and the images of the training views are there.
+    #[arg(long)]
+    no_fine_tune: bool,
+    /// Steps of fine-tuning; a third as many train the codebooks of color.
+    #[arg(long, value_name = "N", default_value = "5000", conflicts_with = "no_fine_tune", value_parser = values::count(100_000_000))]
+    steps: usize,
+    /// Views of each of these steps.
+    #[arg(long, value_name = "N", default_value = "2", conflicts_with = "no_fine_tune", value_parser = values::count(1000))]
+    batch: usize,
     /// Leave the intermediate results in OUT.bake/ when all is done.
     #[arg(long)]
     keep_work: bool,
@@ -99,6 +109,11 @@ impl Bake {
             scoring: self.scoring.settings(),
             filter: self.filter,
             key_frames: values::key_frames(self.key_frames, self.every),
+            fine_tune: (!self.no_fine_tune).then(|| FineTuneSettings {
+                steps: self.steps,
+                batch: self.batch,
+                ..FineTuneSettings::default()
+            }),
             quality: self.quality,
             level: self.package.level,
             keep_work: self.keep_work,

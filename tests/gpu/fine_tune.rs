@@ -6,7 +6,7 @@
 use crate::support::{golden, gpu};
 use bevy_gs4d::gaussian::{GradientMode, Harmonics, Parameters};
 use bevy_gs4d::offline::dataset::CoveredImage;
-use bevy_gs4d::offline::fine_tune::{Moments, Rates, Sample, Trainer, adam, loss};
+use bevy_gs4d::offline::fine_tune::{GpuImage, Moments, Rates, Sample, Trainer, adam, loss};
 use bevy_gs4d::renderer::Headless;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, SceneForm, Trained};
@@ -135,8 +135,12 @@ impl Lesson {
         scene
     }
 
-    fn sample(&self, index: usize) -> Sample<'_> {
-        Sample { view: &self.views[index], image: &self.images[index], background: BEHIND, number: index as u32 }
+    fn upload(&self, trainer: &Trainer<'_>) -> Vec<GpuImage> {
+        self.images.iter().map(|image| trainer.upload(image).expect("it fits")).collect()
+    }
+
+    fn sample<'a>(&'a self, images: &'a [GpuImage], index: usize) -> Sample<'a> {
+        Sample { view: &self.views[index], image: &images[index], background: BEHIND, number: index as u32 }
     }
 }
 
@@ -150,7 +154,8 @@ fn the_loss_and_its_gradient_are_those_of_the_reference() {
     // A hole in the image shows the background.
     let mut image = lesson.images[0].clone();
     image.texels[500..560].fill([20, 10, 5, 100]);
-    let sample = Sample { image: &image, ..lesson.sample(0) };
+    let images = [trainer.upload(&image).expect("it fits")];
+    let sample = lesson.sample(&images, 0);
     trainer.accumulate(&[sample], 0.2).expect("it is drawn");
     let found = trainer.gradients().expect("they can be read");
     let totals = trainer.totals().expect("they can be read");
@@ -188,9 +193,12 @@ fn a_step_is_that_of_the_reference() {
         ("opacity_logit", rates.opacity),
     ];
     let read = |scene: &GaussianScene| tensors(&trained(scene).parameters, &trained(scene).harmonics);
+    let images = lesson.upload(&trainer);
     let mut moments: Vec<Vec<Moments>> = Vec::new();
     for step in 1..=3 {
-        trainer.accumulate(&[lesson.sample(step), lesson.sample(step + 1)], 0.2).expect("they are drawn");
+        trainer
+            .accumulate(&[lesson.sample(&images, step), lesson.sample(&images, step + 1)], 0.2)
+            .expect("they are drawn");
         let before = read(&trainer.scene().expect("it can be read"));
         let gradients = read(&trainer.gradients().expect("they can be read"));
         trainer.step(&rates, 0.5, step).expect("it is made");
@@ -229,6 +237,7 @@ fn fifty_steps_halve_the_loss_and_a_resumed_run_ends_as_an_uninterrupted_one() {
         let mut trainer =
             Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("it can be trained");
         let rates = Rates { mean: 2e-3, mean_t: 1e-3, harmonics: 2.5e-3, color: 1e-2, ..Rates::OURS };
+        let images = lesson.upload(&trainer);
         let mut losses = Vec::new();
         for step in 0..50 {
             if pause == Some(step) {
@@ -236,7 +245,9 @@ fn fifty_steps_halve_the_loss_and_a_resumed_run_ends_as_an_uninterrupted_one() {
                 trainer = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("it can be trained");
                 assert!(trainer.resume(&state), "the state is of as many Gaussians");
             }
-            trainer.accumulate(&[lesson.sample(step % 6), lesson.sample((step + 3) % 6)], 0.2).expect("they are drawn");
+            trainer
+                .accumulate(&[lesson.sample(&images, step % 6), lesson.sample(&images, (step + 3) % 6)], 0.2)
+                .expect("they are drawn");
             trainer.step(&rates, 1.0, step + 1).expect("it is made");
             losses.push(trainer.totals().expect("they can be read").loss);
         }

@@ -3,6 +3,7 @@
 //! In: the remaining Gaussians. Out: their temporal filter; the package on disk.
 
 use super::stages::Stages;
+use super::tuning::Tuning;
 use super::{Bake, Fingerprint, Stage};
 use crate::offline::quantize::{CompressSettings, compress};
 use crate::offline::temporal_filter::filter;
@@ -39,20 +40,27 @@ impl Bake<'_> {
 
     /// Writes the package, unless an earlier bake has written the same one and it is still on disk.
     pub(super) fn compress(
-        &self,
+        &mut self,
         stages: &mut Stages<'_>,
         pruned: GaussianScene,
+        tuning: Option<&Tuning>,
         before: Fingerprint,
     ) -> Result<(), OfflineError> {
         const FILE: &str = "package.crc32";
-        let Self { settings, work, .. } = self;
+        let (settings, work) = (self.settings, self.work.clone());
         let out = &settings.out;
         let fingerprint = before.and(&format!("{:?} {:?}", settings.quality, settings.level));
         let checksum = || Some(Fingerprint::of_files(&[out]).ok()?.0.to_le_bytes().to_vec());
         let stored = work.load(FILE, fingerprint).filter(|stored| checksum().as_ref() == Some(stored));
         stages.run(Stage::Compress, stored.map(|_| ()), |progress| {
-            let runtime = pruned.into_runtime().map_err(|error| OfflineError::at(&settings.checkpoint, error))?;
-            let (compressed, _) = compress(runtime, &CompressSettings::from(settings.quality))?;
+            let compressed = match self.compress_tuned(&pruned, tuning, progress)? {
+                Some(compressed) => compressed,
+                None => {
+                    let runtime = pruned.into_runtime();
+                    let runtime = runtime.map_err(|error| OfflineError::at(&settings.checkpoint, error))?;
+                    compress(runtime, &CompressSettings::from(settings.quality))?.0
+                }
+            };
             let written = write_settings(&compressed.form, settings.level);
             progress.uninterrupted(&mut || save(out, &compressed, &written))?;
             if let Some(checksum) = checksum() {

@@ -3,18 +3,19 @@
 //! In: a checkpoint, its training views, [`BakeSettings`]. Out: a package, and `NAME.report.json` and
 //! `NAME.report.html` beside a package `NAME.gs4d` ([`Baked`]). The stages (see [`Stage`]) before the evaluation store
 //! their results in the folder `OUT.bake` beside a package `OUT` ([`Work`]), so that an interrupted bake resumes.
-//! Nothing is trained.
 
 mod compression;
 mod evaluation;
 mod pruning;
 mod stages;
 mod summary;
+mod tuning;
 
 pub use stages::Stage;
 
 use super::dataset::{Split, TrainingView};
 use super::engine::Engine;
+use super::fine_tune::FineTuneSettings;
 use super::prune::select;
 use super::quantize::Quality;
 use super::report::BakeReport;
@@ -53,6 +54,8 @@ pub struct BakeSettings {
     pub filter: FilterKind,
     /// Number of key-frames of the filter.
     pub key_frames: KeyFrames,
+    /// How the remaining Gaussians are trained, if there is a GPU and the images of the training views are there; `None` leaves that out.
+    pub fine_tune: Option<FineTuneSettings>,
     /// How much compression may lose.
     pub quality: Quality,
     /// zstd level of the package, 1 (fast) to 19 (small); `None` uses the default of
@@ -130,12 +133,12 @@ impl<'a> Bake<'a> {
     fn run(&mut self, progress: &mut dyn Progress) -> Result<Baked, OfflineError> {
         let mut stages = Stages::begin(progress);
         let pruning = self.prune(&mut stages)?;
-        let mut pruned = select(&self.subject.scene, &pruning.kept);
-        // `Stage::FineTune` is to run here: it trains the remaining Gaussians, and the later stages use its result.
-        let (filter, masked) = self.mask(&mut stages, &pruned, pruning.fingerprint)?;
-        let after = sliced(&pruned)?.into_owned();
-        pruned.filter = Some(filter.clone());
-        self.compress(&mut stages, pruned, masked)?;
+        let pruned = select(&self.subject.scene, &pruning.kept);
+        let (mut tuned, tuning, fingerprint) = self.fine_tune(&mut stages, pruned, pruning.fingerprint)?;
+        let (filter, masked) = self.mask(&mut stages, &tuned, fingerprint)?;
+        let after = sliced(&tuned)?.into_owned();
+        tuned.filter = Some(filter.clone());
+        self.compress(&mut stages, tuned, tuning.as_ref(), masked)?;
         let compared = stages.run(Stage::Evaluate, None, |progress| self.compare(progress))?;
         let times = stages.times();
         let before = sliced(&self.subject.scene)?;
@@ -147,6 +150,7 @@ impl<'a> Bake<'a> {
                 after: &after,
                 filter: &filter,
                 found: pruning.found,
+                tuning,
                 stages: times,
                 compared,
             };

@@ -8,8 +8,8 @@ use crate::offline::{OfflineError, Progress};
 use serde::Serialize;
 use std::time::Instant;
 
-/// Number of stages of a bake; [`Stage::FineTune`] is not part of it yet.
-const STAGES: usize = 6;
+/// Number of stages of a bake.
+const STAGES: usize = 7;
 
 /// The stages of a bake, in order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -19,7 +19,7 @@ pub enum Stage {
     Score,
     /// Selects the Gaussians to keep.
     Prune,
-    /// Trains the remaining Gaussians to compensate for the removed ones. Not part of a bake yet.
+    /// Trains the remaining Gaussians to compensate for the removed ones.
     FineTune,
     /// Computes the temporal filter.
     Mask,
@@ -81,6 +81,14 @@ impl<'a> Stages<'a> {
         self.times.push(StageTime { name, seconds, skipped });
         self.progress.advance();
         Ok(result)
+    }
+
+    /// Leaves a stage out, with a note if there is a reason that the user should know.
+    pub fn note_left_out(&mut self, stage: Stage, reason: Option<&str>) {
+        if let Some(reason) = reason {
+            self.progress.note(&format!("note: {} is left out: {reason}", stage.name()));
+        }
+        self.progress.advance();
     }
 
     /// Returns the durations of the stages run so far.

@@ -6,6 +6,7 @@
 use super::BakeSettings;
 use super::evaluation::Compared;
 use super::pruning::Found;
+use super::tuning::Tuning;
 use crate::codec::package;
 use crate::gaussian::Gaussian;
 use crate::offline::quantize::Quality;
@@ -32,6 +33,7 @@ pub(super) struct Facts<'a> {
     pub after: &'a [Gaussian],
     pub filter: &'a TemporalFilter,
     pub found: Found,
+    pub tuning: Option<Tuning>,
     pub stages: Vec<StageTime>,
     pub compared: Option<Compared>,
 }
@@ -67,6 +69,7 @@ impl Facts<'_> {
             filter_share: Some(filter_shares(self.filter, interval, &times)),
             times,
             trials: self.found.tried,
+            fine_tuning: self.tuning.map(|tuning| tuning.curve).unwrap_or_default(),
             split,
             evaluation,
             samples,
@@ -87,12 +90,19 @@ impl Facts<'_> {
             pair("goal", goal),
             pair("score", self.found.score.clone()),
             pair("held-out views", self.found.held_out.clone()),
-            pair("fine-tuning", "none".to_owned()),
+            pair("fine-tuning", self.tuning.as_ref().map_or("none".to_owned(), in_words)),
             pair("temporal filter", format!("{kind}, {} key-frames", filter.segments + 1)),
             pair("active share", format!("{:.1} %", filter.active_share() * 100.0)),
             pair("quality", quality.map_or("", |(name, _)| name).to_owned()),
         ]
     }
+}
+
+/// Returns what fine-tuning has won.
+fn in_words(tuning: &Tuning) -> String {
+    let Tuning { curve, best, held_out } = tuning;
+    let before = curve.first().map_or(f64::NAN, |point| point.psnr);
+    format!("{} steps, {before:.2} to {:.2} dB on {held_out} held-out training views", best.step, best.psnr)
 }
 
 /// Writes the report beside the package, as JSON and as an HTML page. Returns the paths of both.

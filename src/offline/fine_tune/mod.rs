@@ -18,7 +18,7 @@ mod trainer;
 pub use adam::{DECAY, Moments, adam};
 pub use loss::{Loss, loss};
 pub use schedule::{Behind, Rates};
-pub use trainer::{Faults, Sample, Totals, Trainer, TrainerError, TrainerState};
+pub use trainer::{Faults, GpuImage, Sample, Totals, Trainer, TrainerError, TrainerState};
 
 use super::dataset::selection::{even_share, hold_out};
 use super::dataset::{CoveredImage, TrainingView};
@@ -43,6 +43,8 @@ const CODED_GAUSSIANS_OF_ENTRY: usize = 64;
 const LEAST_ENTRIES: usize = 64;
 /// Factor on the rates while codebooks are trained.
 const CODED_RATE: f64 = 0.5;
+/// Most bytes of images that stay on the GPU.
+const RESIDENT_BYTES: usize = 3 << 30;
 /// Steps between two looks at gradients that are not finite.
 const STEPS_OF_FAULTS: usize = 50;
 
@@ -117,7 +119,7 @@ pub struct FineTuned {
     pub curve: Vec<CurvePoint>,
     /// The point with the best parameters.
     pub best: CurvePoint,
-    /// Steps a second, of those made now; `None` if there were none.
+    /// Steps a second, of those made now, without evaluations; `None` if there were none.
     pub steps_per_second: Option<f64>,
     /// Number of held-out views.
     pub held_out: usize,
@@ -165,12 +167,23 @@ pub fn fine_tune(
     let (shots, held_out) = (load(&trained_on, progress)?, load(&held_out, progress)?);
     let trainer = Trainer::new(headless, scene, settings.mode)?;
     let random = settings.behind == Behind::Random && shots.iter().any(|shot| shot.image.has_gaps);
-    let mut run = Run { trainer, settings, shots, held_out, background: trained_with.background, random };
+    let resident = resident_images(&trainer, &shots)?;
+    let mut run = Run { trainer, settings, shots, resident, held_out, background: trained_with.background, random };
     for index in even_share(&trained_on, VIEWS_OF_ROOM) {
         run.trainer.make_room(&run.shots[index].view)?;
     }
     belonging::check(&mut run.trainer, &run.shots, run.background, &trained_on)?;
     run.run(filter, resume, progress)
+}
+
+/// Uploads images, as many as have room.
+fn resident_images(trainer: &Trainer<'_>, shots: &[Shot]) -> Result<Vec<GpuImage>, OfflineError> {
+    let mut bytes = 0;
+    let fits = |shot: &&Shot| {
+        bytes += 4 * shot.image.texels.len();
+        bytes <= RESIDENT_BYTES
+    };
+    Ok(shots.iter().take_while(fits).map(|shot| trainer.upload(&shot.image)).collect::<Result<_, _>>()?)
 }
 
 /// A view with its image.
@@ -185,6 +198,8 @@ struct Run<'a> {
     trainer: Trainer<'a>,
     settings: &'a FineTuneSettings,
     shots: Vec<Shot>,
+    /// The images of the first of them, on the GPU; others are uploaded when they are needed.
+    resident: Vec<GpuImage>,
     held_out: Vec<Shot>,
     background: [f32; 3],
     /// Whether backgrounds are random.
@@ -218,7 +233,8 @@ impl Run<'_> {
         let first = curve.last().map_or(0, |last| last.step);
         progress.begin("fine-tuning", settings.steps);
         (0..first).for_each(|_| progress.advance());
-        let (start, mut interrupted, mut told) = (Instant::now(), false, false);
+        let (mut seconds, mut interrupted, mut told) = (0.0, false, false);
+        let mut start = Instant::now();
         let mut step = first;
         while step < settings.steps && !interrupted {
             self.step(step, step + 1, decay(step, settings.steps, settings.last_rate))?;
@@ -231,10 +247,12 @@ impl Run<'_> {
             if !step.is_multiple_of(every) && step != settings.steps && !interrupted {
                 continue;
             }
+            // Waits for the steps made so far.
             let totals = self.trainer.totals()?;
+            seconds += start.elapsed().as_secs_f64();
             let (loss, training_psnr) = (Some(totals.loss), Some(totals.psnr));
             let point = CurvePoint { step, loss, training_psnr, psnr: self.evaluate()? };
-            let speed = (step - first) as f64 / start.elapsed().as_secs_f64();
+            let speed = (step - first) as f64 / seconds;
             progress.note(&describe(&point, Some(speed)));
             curve.push(point);
             let state = self.trainer.state()?;
@@ -254,8 +272,8 @@ impl Run<'_> {
                 progress.note(&format!("no better after {waited} evaluations: fine-tuning ends"));
                 break;
             }
+            start = Instant::now();
         }
-        let seconds = start.elapsed().as_secs_f64();
         progress.finish();
         let faults = self.trainer.faults()?;
         self.trainer.resume(&TrainerState { buffers: best.state });
@@ -324,12 +342,21 @@ impl Run<'_> {
     fn step(&mut self, step: usize, count: usize, factor: f64) -> Result<(), OfflineError> {
         let settings = self.settings;
         let schedule = Schedule { seed: settings.seed, views: self.shots.len(), batch: settings.batch };
-        let sample = |(place, index): (usize, usize)| {
-            let Shot { view, image, .. } = &self.shots[index];
-            let background = if self.random { schedule.background(step, place) } else { self.background };
-            Sample { view, image, background, number: index as u32 }
+        let indices = schedule.batch(step);
+        let uploaded = |&index: &usize| match self.resident.get(index) {
+            Some(_) => Ok(None),
+            None => self.trainer.upload(&self.shots[index].image).map(Some),
         };
-        let batch: Vec<Sample<'_>> = schedule.batch(step).into_iter().enumerate().map(sample).collect();
+        let uploaded: Vec<Option<GpuImage>> = indices.iter().map(uploaded).collect::<Result<_, _>>()?;
+        let mut batch = Vec::with_capacity(indices.len());
+        for (place, (index, own)) in indices.into_iter().zip(&uploaded).enumerate() {
+            batch.push(Sample {
+                view: &self.shots[index].view,
+                image: own.as_ref().unwrap_or_else(|| &self.resident[index]),
+                background: if self.random { schedule.background(step, place) } else { self.background },
+                number: index as u32,
+            });
+        }
         self.trainer.accumulate(&batch, settings.similarity_share)?;
         Ok(self.trainer.step(&settings.rates, factor, count)?)
     }

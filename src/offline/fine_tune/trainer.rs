@@ -45,6 +45,7 @@ struct Passes {
     slice_group: wgpu::BindGroupLayout,
     slice: wgpu::ComputePipeline,
     loss_group: wgpu::BindGroupLayout,
+    image_group: wgpu::BindGroupLayout,
     similarity: wgpu::ComputePipeline,
     gradient: wgpu::ComputePipeline,
     total: wgpu::ComputePipeline,
@@ -80,8 +81,8 @@ impl Passes {
         const SCENE: Bind = Uniform(size_of::<TrainedScene>());
         let group = |label, bindings: &[Bind]| group_layout(device, label, bindings);
         let slice_group = group("gs4d slice", &[SCENE, Read, Write, Write]);
-        let loss_group =
-            group("gs4d loss", &[Uniform(size_of::<LossUniforms>()), Texture, Read, Write, Write, Write, Write]);
+        let loss_group = group("gs4d loss", &[Uniform(size_of::<LossUniforms>()), Texture, Write, Write, Write, Write]);
+        let image_group = group("gs4d image", &[Read]);
         let frame = Uniform(size_of::<FrameUniforms>());
         let blended_group = group("gs4d blended", &[frame, Read, Read, Read, Read, Read, Read, Texture, Texture]);
         let sums_group = group("gs4d sums", &[Write, Write, Read, Read]);
@@ -104,9 +105,9 @@ impl Passes {
         let [geometry, list] = headless.capture_layouts();
         Ok(Self {
             slice: make(&slice, "slice", &[&slice_group]),
-            similarity: make(&loss, "similarity", &[&loss_group]),
-            gradient: make(&loss, "gradient", &[&loss_group]),
-            total: make(&loss, "total", &[&loss_group]),
+            similarity: make(&loss, "similarity", &[&loss_group, &image_group]),
+            gradient: make(&loss, "gradient", &[&loss_group, &image_group]),
+            total: make(&loss, "total", &[&loss_group, &image_group]),
             place: make(&blend_backward, "place", &[&blended_group, &sums_group]),
             pairs: make(&blend_backward, "pairs", &[&blended_group, &sums_group]),
             project_backward: make(
@@ -119,6 +120,7 @@ impl Passes {
             expand: make(&codebooks, "expand", &[&tied_group]),
             slice_group,
             loss_group,
+            image_group,
             blended_group,
             sums_group,
             splats_group,
@@ -174,7 +176,6 @@ struct ViewBuffers {
     splats: wgpu::Buffer,
     color: wgpu::TextureView,
     size: UVec2,
-    image: wgpu::Buffer,
     loss_settings: wgpu::Buffer,
     pixel_gradients: wgpu::Buffer,
     depth_gradients: wgpu::Buffer,
@@ -205,13 +206,20 @@ pub struct Trainer<'a> {
     in_flight: VecDeque<wgpu::SubmissionIndex>,
 }
 
+/// An image on the GPU.
+#[derive(Debug)]
+pub struct GpuImage {
+    size: UVec2,
+    group: wgpu::BindGroup,
+}
+
 /// One view of a batch.
 #[derive(Debug, Clone, Copy)]
 pub struct Sample<'a> {
     /// Camera and time.
     pub view: &'a View,
-    /// What it should look like.
-    pub image: &'a CoveredImage,
+    /// What it should look like, in the size of the view.
+    pub image: &'a GpuImage,
     /// Color behind the scene and the image.
     pub background: [f32; 3],
     /// Number of the view, for reports.
@@ -340,19 +348,38 @@ impl<'a> Trainer<'a> {
         self.headless.draw(&self.capture, view, Background::None)
     }
 
+    /// Uploads an image.
+    ///
+    /// # Errors
+    /// An image that does not fit one binding of the device.
+    pub fn upload(&self, image: &CoveredImage) -> Result<GpuImage, GpuError> {
+        let bytes: &[u8] = bytemuck::cast_slice(&image.texels);
+        let (needed, limit) = (bytes.len() as u64, binding_limit(&self.headless.context().device.limits()));
+        if needed > limit || needed == 0 {
+            return Err(GpuError::TooLarge { what: "an image", needed, limit });
+        }
+        let allocator = self.headless.allocator();
+        let buffer = allocator.buffer("gs4d image", needed, BufferUsages::STORAGE);
+        self.headless.context().queue.write_buffer(&buffer, 0, bytes);
+        let group = allocator.bind_group("gs4d image", &self.passes.image_group, &[buffer.as_entire_binding()]);
+        Ok(GpuImage { size: image.size, group })
+    }
+
     /// Adds the gradients of the loss of a batch, each view with the same share.
     ///
     /// # Errors
-    /// A picture or pairs that do not fit the GPU.
+    /// A picture or pairs that do not fit the GPU, an image of another size than its view.
     pub fn accumulate(&mut self, batch: &[Sample<'_>], similarity_share: f64) -> Result<(), GpuError> {
         let share = 1.0 / batch.len().max(1) as f32;
         for sample in batch {
+            if sample.image.size != sample.view.size {
+                return Err(GpuError::Scene("an image to train on has another size than its view"));
+            }
             let mut encoder = self.encoder("gs4d view");
             self.headless.record(&mut encoder, &self.capture, sample.view, Background::Color(sample.background))?;
             self.fit(sample.view.size)?;
             let Some(buffers) = &self.view else { continue };
             let queue = &self.headless.context().queue;
-            queue.write_buffer(&buffers.image, 0, bytemuck::cast_slice(&sample.image.texels));
             let [r, g, b] = sample.background;
             let settings = LossUniforms {
                 background: [r, g, b, 0.0],
@@ -364,7 +391,7 @@ impl<'a> Trainer<'a> {
             };
             queue.write_buffer(&buffers.loss_settings, 0, bytemuck::bytes_of(&settings));
             self.write_scene(sample.number);
-            self.record_backward(&mut encoder, buffers, sample.view, true);
+            self.record_backward(&mut encoder, buffers, sample.view, Some(sample.image));
             queue.submit([encoder.finish()]);
         }
         Ok(())
@@ -389,18 +416,25 @@ impl<'a> Trainer<'a> {
         queue.write_buffer(&buffers.depth_gradients, 0, bytemuck::cast_slice(depths));
         self.write_scene(0);
         let mut encoder = self.encoder("gs4d view");
-        self.record_backward(&mut encoder, buffers, view, false);
+        self.record_backward(&mut encoder, buffers, view, None);
         queue.submit([encoder.finish()]);
         Ok(())
     }
 
-    /// Records the passes after the picture. `judged`: with its loss.
-    fn record_backward(&self, encoder: &mut wgpu::CommandEncoder, buffers: &ViewBuffers, view: &View, judged: bool) {
+    /// Records the passes after the picture; with an image, that of its loss.
+    fn record_backward(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        buffers: &ViewBuffers,
+        view: &View,
+        image: Option<&GpuImage>,
+    ) {
         let Some(frame) = self.headless.finished() else { return };
         let (tiles, passes) = (view.tiles(), &self.passes);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        if judged {
+        if let Some(image) = image {
             pass.set_bind_group(0, &buffers.loss, &[]);
+            pass.set_bind_group(1, &image.group, &[]);
             pass.set_pipeline(&passes.similarity);
             pass.dispatch_workgroups(tiles.x, tiles.y, 1);
             pass.set_pipeline(&passes.gradient);
@@ -720,7 +754,6 @@ impl<'a> Trainer<'a> {
         let pixels = u64::from(size.x) * u64::from(size.y);
         let tiles = u64::from(size.x.div_ceil(TILE_SIZE)) * u64::from(size.y.div_ceil(TILE_SIZE));
         let storage = |label, size| allocator.buffer(label, size, BufferUsages::STORAGE);
-        let image = storage("gs4d image", pixels * 4);
         let settings = size_of::<LossUniforms>() as u64;
         let loss_settings = allocator.buffer("gs4d loss settings", settings, BufferUsages::UNIFORM);
         let slopes = storage("gs4d slopes of similarity", pixels * 48);
@@ -732,7 +765,7 @@ impl<'a> Trainer<'a> {
         let pair_gradients = storage("gs4d gradients of pairs", needed);
         let color = wgpu::BindingResource::TextureView(frame.color);
         let whole = wgpu::Buffer::as_entire_binding;
-        let written = [&image, &slopes, &pixel_gradients, &tile_sums, &self.totals].map(whole);
+        let written = [&slopes, &pixel_gradients, &tile_sums, &self.totals].map(whole);
         let loss = [vec![whole(&loss_settings), color.clone()], written.to_vec()].concat();
         let buffers = frame.buffers;
         let read = [
@@ -763,7 +796,6 @@ impl<'a> Trainer<'a> {
             blended: allocator.bind_group("gs4d blended", &passes.blended_group, &blended),
             sums: allocator.bind_group("gs4d sums", &passes.sums_group, &sums),
             splat_gradients: allocator.bind_group("gs4d splats", &passes.splats_group, &splat_gradients),
-            image,
             loss_settings,
             pixel_gradients,
             depth_gradients,

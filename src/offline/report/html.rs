@@ -2,6 +2,7 @@
 //!
 //! In: a [`BakeReport`]. Out: HTML with its style, its plots (SVG) and its pictures (PNG, base64) inside: it loads nothing.
 
+use super::super::fine_tune::CurvePoint;
 use super::plot::{Axis, Chart, Series, bars};
 use super::{BakeReport, Sample};
 use crate::offline::metrics::ImageMetrics;
@@ -50,6 +51,7 @@ pub(super) fn page(report: &BakeReport) -> String {
         card("Choices", "", &choices(report)),
         sections(report),
         trials(report),
+        fine_tuning(report),
         variances(report),
         activity(report),
         overlap(report),
@@ -149,6 +151,21 @@ fn trials(report: &BakeReport) -> String {
     let chart = Chart { x: Axis::new("removed, %"), y: Axis::new("PSNR, dB"), series };
     let note = "Held-out training views, drawn from what each score keeps, before any fine-tuning.";
     plotted("PSNR against prune ratio", note, &chart)
+}
+
+fn fine_tuning(report: &BakeReport) -> String {
+    let curve = &report.fine_tuning;
+    if curve.is_empty() {
+        return String::new();
+    }
+    let line = |name: &str, psnr: fn(&CurvePoint) -> Option<f64>| Series {
+        name: name.to_owned(),
+        points: curve.iter().filter_map(|point| Some([point.step as f64, psnr(point)?])).collect(),
+        dots: true,
+    };
+    let series = vec![line("held-out views", |point| Some(point.psnr)), line("views trained on", |p| p.training_psnr)];
+    let chart = Chart { x: Axis::new("steps"), y: Axis::new("PSNR, dB"), series };
+    plotted("Fine-tuning", "Training views, before compression. Those trained on are over random backgrounds.", &chart)
 }
 
 fn variances(report: &BakeReport) -> String {

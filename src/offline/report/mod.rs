@@ -9,6 +9,7 @@ mod temporal;
 pub use plot::{Axis, Chart, Series, bars};
 pub use temporal::{Activity, VarianceHistogram, even_times, filter_shares};
 
+use super::fine_tune::CurvePoint;
 use super::metrics::Evaluation;
 use crate::codec::package::Section;
 use crate::view::Picture;
@@ -46,6 +47,8 @@ pub struct BakeReport {
     pub filter_share: Option<Vec<f64>>,
     /// The counts that were tried on held-out training views.
     pub trials: Vec<Tried>,
+    /// The quality during fine-tuning, on training views; empty without it.
+    pub fine_tuning: Vec<CurvePoint>,
     /// Name of the evaluated split; `None` if its images are missing.
     pub split: Option<String>,
     /// Metrics over the views of that split, drawn from the checkpoint and from the package; `None` if their images are
