@@ -7,6 +7,7 @@ mod bake;
 mod command;
 mod compare;
 mod eval;
+mod fine_tune;
 mod prune;
 mod render;
 

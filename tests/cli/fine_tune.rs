@@ -1,0 +1,109 @@
+//! `gs4d finetune`, run as a user runs it on a scene's own pictures.
+//!
+//! In: a small synthetic scene, a dataset drawn from it, the scene pruned. Out: proof that training wins quality, that the result can be
+//! compressed on the way, and that wrong inputs are refused with nothing left behind. Skipped where there is no GPU.
+
+use crate::support::command::{arguments, gs4d};
+use crate::support::dataset;
+use crate::support::skip::skip;
+use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::offline;
+use bevy_gs4d::renderer::GpuContext;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use glam::{UVec2, Vec3};
+use std::fs;
+use std::path::PathBuf;
+use tempfile::TempDir;
+
+struct Lesson {
+    folder: TempDir,
+    scene: PathBuf,
+    pruned: PathBuf,
+    data: PathBuf,
+}
+
+/// Returns a scene, the same with fewer Gaussians, and its pictures; `None` if there is no GPU.
+fn lesson() -> Option<Lesson> {
+    if let Err(error) = GpuContext::headless(None) {
+        skip(&error.to_string());
+        return None;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let [scene, pruned, data] = ["scene.gs4d", "pruned.gs4d", "data"].map(|name| folder.path().join(name));
+    let trained = synthesize(&SynthSettings { count: 1000, ..SynthSettings::default() });
+    offline::save(&scene, &trained, &WriteSettings::default()).expect("the folder can be written to");
+    let runtime = trained.into_runtime().expect("a synthetic scene can be drawn");
+    dataset::write(&data, &runtime, Vec3::ZERO, 4, 4, UVec2::splat(48), true);
+    gs4d(&arguments!["prune", &scene, "--data", &data, "--ratio", "0.5", "--variant", "energy", "-o", &pruned]).text();
+    Some(Lesson { folder, scene, pruned, data })
+}
+
+impl Lesson {
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn left(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.folder.path()).expect("the folder");
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+}
+
+#[test]
+fn training_wins_back_what_pruning_lost() {
+    let Some(lesson) = lesson() else { return };
+    let out = lesson.path("tuned.gs4d");
+    let steps = ["--steps", "120", "--held-out", "2", "--evaluate-every", "60", "--json"];
+    let command = arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &out];
+    let json = gs4d(&[command.to_vec(), steps.map(Into::into).to_vec()].concat()).json();
+    assert_eq!((json["gaussians"].as_u64(), json["views"].as_u64()), (Some(500), Some(14)), "two of sixteen held out");
+    let (before, best) = (json["psnr_before"].as_f64(), json["best"]["psnr"].as_f64());
+    assert!(best > before.map(|before| before + 2.0), "{best:?} dB after {before:?}");
+    assert_eq!(json["curve"].as_array().map(Vec::len), Some(3), "before, halfway, at the end");
+    assert_eq!(lesson.left(), ["data", "pruned.gs4d", "scene.gs4d", "tuned.gs4d"], "no state is left");
+    let info = gs4d(&arguments!["info", &out, "--json"]).json();
+    assert_eq!((info["gaussians"].as_u64(), info["form"].as_str()), (Some(500), Some("trained")), "{info}");
+    let small = lesson.path("small.gs4d");
+    let command = arguments!["finetune", &out, "--data", &lesson.data, "-o", &small];
+    let coded = ["--steps", "4", "--held-out", "2", "--compress", "balanced", "--compress-steps", "10", "--json"];
+    gs4d(&[command.to_vec(), coded.map(Into::into).to_vec()].concat()).json();
+    let info = gs4d(&arguments!["info", &small, "--json"]).json();
+    assert_eq!((info["gaussians"].as_u64(), info["form"].as_str()), (Some(500), Some("packed")), "{info}");
+    let psnr = |scene: &PathBuf| {
+        let found = gs4d(&arguments!["eval", scene, "--data", &lesson.data, "--metrics", "psnr", "--json"]).json();
+        found["mean"]["psnr"].as_f64().expect("a number")
+    };
+    assert!(psnr(&small) > psnr(&lesson.pruned) + 1.0, "better than before, and smaller");
+}
+
+#[test]
+fn what_cannot_be_trained_is_refused_and_nothing_is_left() {
+    let Some(lesson) = lesson() else { return };
+    let out = lesson.path("out.gs4d");
+    let before = lesson.left();
+    let packed = lesson.path("packed.gs4d");
+    gs4d(&arguments!["compress", &lesson.pruned, &packed, "--verify", "0"]).text();
+    let run = |scene: &PathBuf, data: &PathBuf| {
+        gs4d(&arguments!["finetune", scene, "--data", data, "-o", &out, "--steps", "2"])
+    };
+    run(&packed, &lesson.data).must_fail("trained form");
+    fs::remove_file(&packed).expect("it is there");
+    run(&lesson.pruned, &lesson.path("nowhere")).must_fail("nowhere");
+    gs4d(&arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &lesson.pruned]).must_fail("itself");
+    // The images of another scene.
+    let other = synthesize(&SynthSettings { count: 1000, seed: 9, ..SynthSettings::default() });
+    let mut other = other.into_runtime().expect("it can be drawn");
+    other.trained_with.background = [0.9, 0.8, 0.1];
+    let elsewhere = lesson.path("elsewhere");
+    dataset::write(&elsewhere, &other, Vec3::new(0.0, 0.0, 40.0), 4, 4, UVec2::splat(48), true);
+    run(&lesson.pruned, &elsewhere).must_fail("do not show this capture");
+    fs::remove_dir_all(&elsewhere).expect("it is there");
+    let image = lesson.data.join("train/c01_02.png");
+    fs::remove_file(&image).expect("it is there");
+    run(&lesson.pruned, &lesson.data).must_fail("c01_02.png");
+    assert_eq!(lesson.left(), before, "nothing is left");
+    assert!(lesson.scene.is_file(), "the scene is there");
+}
