@@ -14,6 +14,8 @@ const PIXELS: u32 = 256u;
 // Number of splats whose terms are summed at once, and of sums for each.
 const BATCH: u32 = 8u;
 const SUMS: u32 = 10u;
+// Number of splats that are loaded at once, a multiple of BATCH: one after the other, each would wait for memory.
+const CHUNK: u32 = 64u;
 
 @group(0) @binding(0) var<uniform> frame: FrameUniforms;
 @group(0) @binding(1) var<storage, read> counters: Counters;
@@ -36,6 +38,11 @@ const SUMS: u32 = 10u;
 // Gradient with respect to the expected depth of each pixel.
 @group(1) @binding(3) var<storage, read> depth_gradients: array<f32>;
 
+// Of the chunk: center, opacity, depth; conic; color; pair.
+var<workgroup> places: array<vec4<f32>, CHUNK>;
+var<workgroup> conics: array<vec3<f32>, CHUNK>;
+var<workgroup> colors: array<vec3<f32>, CHUNK>;
+var<workgroup> chunk_pairs: array<u32, CHUNK>;
 // Of the batch: w and q of each pixel, splat by splat; then their sums over eight pixels.
 var<workgroup> weights: array<f32, 2048>;
 var<workgroup> terms: array<f32, 2048>;
@@ -79,16 +86,27 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
     }
     for (var first = range.x; first < range.y; first += BATCH) {
         let count = min(BATCH, range.y - first);
+        let in_chunk = (first - range.x) % CHUNK;
+        workgroupBarrier();
+        if in_chunk == 0u && thread < min(CHUNK, range.y - first) {
+            let slot = pair_splats[first + thread];
+            let splat = read_splat(splats[slot]);
+            places[thread] = vec4(splat.center, splat.opacity, splat.depth);
+            conics[thread] = splat.conic;
+            colors[thread] = splat.color;
+            chunk_pairs[thread] = pair_of(slot, tile.xy);
+        }
         workgroupBarrier();
         let over = atomicLoad(&finished) == PIXELS;
         let was_done = done;
         for (var i = 0u; i < count; i++) {
-            let splat = read_splat(splats[pair_splats[first + i]]);
+            let place = places[in_chunk + i];
+            let conic = conics[in_chunk + i];
             var weight = 0.0;
             var term = 0.0;
-            let d = splat.center - position;
-            let power = -0.5 * (splat.conic.x * d.x * d.x + splat.conic.z * d.y * d.y) - splat.conic.y * d.x * d.y;
-            let peak = splat.opacity * exp(power);
+            let d = place.xy - position;
+            let power = -0.5 * (conic.x * d.x * d.x + conic.z * d.y * d.y) - conic.y * d.x * d.y;
+            let peak = place.z * exp(power);
             let alpha = min(ALPHA_MAX, peak);
             if !done && power <= 0.0 && !is_skipped(alpha) {
                 let left = left_behind(transmittance, alpha);
@@ -96,7 +114,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
                     done = true;
                 } else {
                     weight = alpha * transmittance;
-                    let own = dot(vec4(splat.color, splat.depth), gradient) + by_opacity;
+                    let own = dot(vec4(colors[in_chunk + i], place.w), gradient) + by_opacity;
                     behind -= weight * own;
                     let slope = transmittance * own - behind / (1.0 - alpha);
 #ifdef COMPAT
@@ -118,16 +136,16 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
         let own_splat = thread / 32u;
         var moments = vec3(0.0);
         var squares = vec3(0.0);
-        var colors = vec4(0.0);
+        var shares = vec4(0.0);
         if own_splat < count {
-            let center = splats[pair_splats[first + own_splat]].place.xy;
+            let center = places[in_chunk + own_splat].xy;
             for (var i = 0u; i < 8u; i++) {
                 let pixel = thread % 32u + 32u * i;
                 let q = terms[own_splat * PIXELS + pixel];
                 let d = center - vec2<f32>(pixel_of(tile.xy, pixel));
                 moments += q * vec3(d, d.x * d.x);
                 squares += q * vec3(d.x * d.y, d.y * d.y, 1.0);
-                colors += weights[own_splat * PIXELS + pixel] * own_gradients[pixel];
+                shares += weights[own_splat * PIXELS + pixel] * own_gradients[pixel];
             }
         }
         workgroupBarrier();
@@ -136,7 +154,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
             weights[(3u + k) * 256u + thread] = squares[k];
         }
         for (var k = 0u; k < 4u; k++) {
-            terms[k * 256u + thread] = colors[k];
+            terms[k * 256u + thread] = shares[k];
         }
         workgroupBarrier();
         if thread < SUMS * count {
@@ -150,7 +168,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
                     sum += terms[(k - 6u) * 256u + splat * 32u + i];
                 }
             }
-            pair_gradients[pair_of(pair_splats[first + splat], tile.xy) * SUMS + k] = sum;
+            pair_gradients[chunk_pairs[in_chunk + splat] * SUMS + k] = sum;
         }
         // All pairs that follow change nothing.
         if over {

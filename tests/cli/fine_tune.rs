@@ -25,7 +25,7 @@ struct Lesson {
 /// Returns a scene, the same with fewer Gaussians, and its pictures; `None` if there is no GPU.
 fn lesson() -> Option<Lesson> {
     if let Err(error) = GpuContext::headless(None) {
-        skip(&error.to_string());
+        skip(error);
         return None;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
