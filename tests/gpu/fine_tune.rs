@@ -140,7 +140,12 @@ impl Lesson {
     }
 
     fn sample<'a>(&'a self, images: &'a [GpuImage], index: usize) -> Sample<'a> {
-        Sample { view: &self.views[index], image: &images[index], background: BEHIND, number: index as u32 }
+        Sample {
+            view: &self.views[index],
+            image: &images[index],
+            background: Background::Color(BEHIND),
+            number: index as u32,
+        }
     }
 }
 
@@ -159,7 +164,7 @@ fn the_loss_and_its_gradient_are_those_of_the_reference() {
     trainer.accumulate(&[sample], 0.2).expect("it is drawn");
     let found = trainer.gradients().expect("they can be read");
     let totals = trainer.totals().expect("they can be read");
-    let picture = trainer.draw(&lesson.views[0], BEHIND).expect("it is drawn").picture;
+    let picture = trainer.draw(&lesson.views[0], Background::Color(BEHIND)).expect("it is drawn").picture;
     let expected = loss(&picture, &image.over(Vec3::from(BEHIND)), 0.2).expect("the same size");
     assert!((totals.loss - expected.value).abs() < 1e-6, "loss {} is {}", totals.loss, expected.value);
     assert_eq!(totals.views, 1, "of one view");

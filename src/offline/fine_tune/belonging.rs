@@ -2,9 +2,11 @@
 //!
 //! In: a scene, views and images. Out: an error if the scene explains its images no better than those of other views.
 
-use super::{Shot, Trainer, psnr_of};
+use super::Trainer;
+use super::run::{Shot, psnr_of};
 use crate::offline::OfflineError;
 use crate::offline::dataset::TrainingView;
+use crate::view::Background;
 
 /// Views that are looked at.
 const VIEWS: usize = 8;
@@ -18,7 +20,7 @@ const CLOSER: f64 = 0.1;
 pub(super) fn check(
     trainer: &mut Trainer<'_>,
     shots: &[Shot],
-    background: [f32; 3],
+    background: Background,
     files: &[TrainingView],
 ) -> Result<(), OfflineError> {
     let count = VIEWS.min(shots.len());

@@ -2,7 +2,8 @@
 //!
 //! In: the curve so far, the best parameters, parameters and moments. Out: the same, if they are of the same settings and whole.
 
-use super::{Best, CurvePoint, TrainerState};
+use super::run::Best;
+use super::{CurvePoint, TrainerState};
 use crate::offline::work::{Fingerprint, Work};
 use crate::offline::{OfflineError, Progress};
 use serde::{Deserialize, Serialize};

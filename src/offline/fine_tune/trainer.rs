@@ -220,8 +220,8 @@ pub struct Sample<'a> {
     pub view: &'a View,
     /// What it should look like, in the size of the view.
     pub image: &'a GpuImage,
-    /// Color behind the scene and the image.
-    pub background: [f32; 3],
+    /// Behind the scene, and behind the image if it is a color.
+    pub background: Background,
     /// Number of the view, for reports.
     pub number: u32,
 }
@@ -336,8 +336,8 @@ impl<'a> Trainer<'a> {
     ///
     /// # Errors
     /// A picture that does not fit the GPU, a lost device.
-    pub fn draw(&mut self, view: &View, background: [f32; 3]) -> Result<Frame, GpuError> {
-        self.headless.render(&self.capture, view, Background::Color(background))
+    pub fn draw(&mut self, view: &View, background: Background) -> Result<Frame, GpuError> {
+        self.headless.render(&self.capture, view, background)
     }
 
     /// Draws a view of the scene, so that later frames have room for at least as many pairs.
@@ -376,11 +376,14 @@ impl<'a> Trainer<'a> {
                 return Err(GpuError::Scene("an image to train on has another size than its view"));
             }
             let mut encoder = self.encoder("gs4d view");
-            self.headless.record(&mut encoder, &self.capture, sample.view, Background::Color(sample.background))?;
+            self.headless.record(&mut encoder, &self.capture, sample.view, sample.background)?;
             self.fit(sample.view.size)?;
             let Some(buffers) = &self.view else { continue };
             let queue = &self.headless.context().queue;
-            let [r, g, b] = sample.background;
+            let [r, g, b] = match sample.background {
+                Background::Color(color) => color,
+                Background::None | Background::Environment => [0.0; 3],
+            };
             let settings = LossUniforms {
                 background: [r, g, b, 0.0],
                 size: sample.view.size.to_array(),
