@@ -6,8 +6,8 @@
 // A pixel is walked front to back, as `blend` does, so that it stops at the same splat. What is behind a splat is the finished pixel
 // less what has been blended so far.
 #import gs4d::alpha::{is_opaque, is_skipped, left_behind, ALPHA_MAX}
-#import gs4d::tile::{pair_of_tile, pixel_of, tile_index}
-#import gs4d::types::{Counters, FrameUniforms, SplatRecord}
+#import gs4d::tile::{pixel_of, tile_index}
+#import gs4d::pairs::{frame, pair_of, pair_splats, place_pairs, splats, tile_ranges}
 #import gs4d::records::read_splat
 
 const PIXELS: u32 = 256u;
@@ -17,19 +17,10 @@ const SUMS: u32 = 10u;
 // Number of splats that are loaded at once, a multiple of BATCH: one after the other, each would wait for memory.
 const CHUNK: u32 = 64u;
 
-@group(0) @binding(0) var<uniform> frame: FrameUniforms;
-@group(0) @binding(1) var<storage, read> counters: Counters;
-@group(0) @binding(2) var<storage, read> tile_ranges: array<vec2<u32>>;
-@group(0) @binding(3) var<storage, read> pair_splats: array<u32>;
-@group(0) @binding(4) var<storage, read> splats: array<SplatRecord>;
-@group(0) @binding(5) var<storage, read> order: array<u32>;
-@group(0) @binding(6) var<storage, read> offsets: array<u32>;
 // The color that `blend` wrote, with the background, and the transmittance.
 @group(0) @binding(7) var color: texture_2d<f32>;
 // Expected and median depth.
 @group(0) @binding(8) var depth: texture_2d<f32>;
-// First pair of each slot.
-@group(1) @binding(0) var<storage, read_write> first_pairs: array<u32>;
 // SUMS values for each pair: with d from pixel to center, w = alpha T and q = alpha dL/dalpha, the sums of q dx, q dy, q dx^2, q dx dy,
 // q dy^2, q, and of w times the gradient of the pixel's red, green, blue and depth.
 @group(1) @binding(1) var<storage, read_write> pair_gradients: array<f32>;
@@ -53,9 +44,7 @@ var<workgroup> finished: atomic<u32>;
 
 @compute @workgroup_size(256)
 fn place(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x < counters.visible {
-        first_pairs[order[id.x]] = offsets[id.x];
-    }
+    place_pairs(id.x);
 }
 
 @compute @workgroup_size(256)
@@ -181,9 +170,4 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
             break;
         }
     }
-}
-
-// Returns the index that `bin` gave the pair of this splat and tile.
-fn pair_of(splat: u32, tile: vec2<u32>) -> u32 {
-    return first_pairs[splat] + pair_of_tile(splats[splat].shape.w, splats[splat].color.w, tile);
 }

@@ -4,7 +4,7 @@
 // src/gaussian/projection.rs.
 #import gs4d::types::{BIN_COUNTERS, INVISIBLE}
 #import gs4d::types::{DEBUG_ACTIVE, DEBUG_LIFESPAN, DEBUG_VELOCITY}
-#import gs4d::records::Gaussian
+#import gs4d::records::{covariance_of, Gaussian}
 #import gs4d::appearance::heat
 #import gs4d::capture::{index_of, instance, load_gaussian, load_lifespan}
 #ifdef BINNED
@@ -281,9 +281,7 @@ fn project_one(index: u32, slot: u32) -> u32 {
     let j = instance.focal / select(q.z, 1.0, parallel);
     let mx = j.x * (instance.camera_x.xyz - ray.x * instance.camera_z.xyz);
     let my = j.y * (instance.camera_y.xyz - ray.y * instance.camera_z.xyz);
-    let ca = g.covariance_a;
-    let cb = g.covariance_b;
-    let covariance = mat3x3(ca.x, ca.y, ca.z, ca.y, ca.w, cb.x, ca.z, cb.x, cb.y);
+    let covariance = covariance_of(g);
     let cx = covariance * mx;
     let a = dot(mx, cx) + LOW_PASS;
     let b = dot(my, cx);

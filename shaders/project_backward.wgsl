@@ -3,10 +3,11 @@
 // CPU reference: src/gaussian/gradient.rs; equations: sections 7.2 to 7.4 of the 4DGS model. COMPAT: as the original computes them, with
 // the deviations of section 7.5.
 #import gs4d::types::{SplatRecord, TrainedRecord, TrainedScene, INVISIBLE}
-#import gs4d::records::read_splat
+#import gs4d::records::{covariance_of, read_splat}
 #import gs4d::tile::tile_count
 #import gs4d::capture::{index_of, instance, load_gaussian}
-#import gs4d::harmonics::{basis_first, basis_second, basis_third, basis_fourth, time_cosine, time_angle}
+#import gs4d::harmonics::{basis_first, basis_second, basis_third, basis_fourth, time_angle, time_cosine}
+#import gs4d::harmonics::{slope_first, slope_second, slope_third, slope_fourth}
 #import gs4d::trained::{left_matrix, opacity_of, outer, right_matrix, rotation_3d, slice_of, ROTATED_4D, STATIC_3D}
 
 // As in `project`.
@@ -52,52 +53,6 @@ fn sums_of(slot: u32) -> Sums {
         sums.depth += pair_gradients[at + 9u];
     }
     return sums;
-}
-
-// Derivatives of four basis values at a time with respect to the direction: of x, y and z in the columns.
-fn slope_first() -> mat3x4<f32> {
-    let c = 0.48860251;
-    return mat3x4(vec4(0.0, 0.0, 0.0, -c), vec4(0.0, -c, 0.0, 0.0), vec4(0.0, 0.0, c, 0.0));
-}
-
-fn slope_second(d: vec3<f32>) -> mat3x4<f32> {
-    let a = 1.0925484;
-    let b = 0.31539157;
-    return mat3x4(
-        vec4(a * d.y, 0.0, -2.0 * b * d.x, -a * d.z),
-        vec4(a * d.x, -a * d.z, -2.0 * b * d.y, 0.0),
-        vec4(0.0, -a * d.y, 4.0 * b * d.z, -a * d.x),
-    );
-}
-
-fn slope_third(d: vec3<f32>) -> mat3x4<f32> {
-    let c = 0.5462742;
-    let e = 0.5900436;
-    let f = 2.8906114;
-    let h = 0.4570458;
-    let xx = d.x * d.x;
-    let yy = d.y * d.y;
-    let zz = d.z * d.z;
-    return mat3x4(
-        vec4(2.0 * c * d.x, -6.0 * e * d.x * d.y, f * d.y * d.z, 2.0 * h * d.x * d.y),
-        vec4(-2.0 * c * d.y, -3.0 * e * (xx - yy), f * d.x * d.z, -h * (4.0 * zz - xx - 3.0 * yy)),
-        vec4(0.0, 0.0, f * d.x * d.y, -8.0 * h * d.y * d.z),
-    );
-}
-
-fn slope_fourth(d: vec3<f32>) -> mat3x4<f32> {
-    let p = 0.37317633;
-    let h = 0.4570458;
-    let r = 1.4453057;
-    let e = 0.5900436;
-    let xx = d.x * d.x;
-    let yy = d.y * d.y;
-    let zz = d.z * d.z;
-    return mat3x4(
-        vec4(-6.0 * p * d.x * d.z, -h * (4.0 * zz - 3.0 * xx - yy), 2.0 * r * d.x * d.z, -3.0 * e * (xx - yy)),
-        vec4(-6.0 * p * d.y * d.z, 2.0 * h * d.x * d.y, -2.0 * r * d.y * d.z, 6.0 * e * d.x * d.y),
-        vec4(p * (6.0 * zz - 3.0 * xx - 3.0 * yy), -8.0 * h * d.x * d.z, r * (xx - yy), 0.0),
-    );
 }
 
 // What the color passes on: gradients with respect to the direction and to the time since the frame.
@@ -264,9 +219,7 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
     let j = instance.focal / q.z;
     let mx = j.x * (instance.camera_x.xyz - ray.x * instance.camera_z.xyz);
     let my = j.y * (instance.camera_y.xyz - ray.y * instance.camera_z.xyz);
-    let ca = g.covariance_a;
-    let cb = g.covariance_b;
-    let covariance = mat3x3(ca.x, ca.y, ca.z, ca.y, ca.w, cb.x, ca.z, cb.x, cb.y);
+    let covariance = covariance_of(g);
     let cx = covariance * mx;
     let cy = covariance * my;
     let a = dot(mx, cx) + LOW_PASS;

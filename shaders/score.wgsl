@@ -4,26 +4,18 @@
 // `pairs` sums every pair over its tile, one workgroup each; `gather` sums the pairs of each slot in a fixed order, so
 // that the result is the same on every run. CPU reference: src/offline/score/reference.rs.
 #import gs4d::alpha::{alpha_at, is_opaque, is_skipped, left_behind}
-#import gs4d::tile::{pair_of_tile, pixel_of, tile_count, tile_index}
-#import gs4d::types::{Counters, FrameUniforms, SplatRecord, INVISIBLE}
+#import gs4d::tile::{pixel_of, tile_count, tile_index}
+#import gs4d::types::INVISIBLE
+#import gs4d::pairs::{first_pairs, frame, pair_of, pair_splats, place_pairs, splats, tile_ranges}
 #import gs4d::records::{read_splat, Splat}
 
 const PIXELS: u32 = 256u;
 // Number of splats whose terms are summed at once.
 const BATCH: u32 = 8u;
 
-@group(0) @binding(0) var<uniform> frame: FrameUniforms;
-@group(0) @binding(1) var<storage, read> counters: Counters;
-@group(0) @binding(2) var<storage, read> tile_ranges: array<vec2<u32>>;
-@group(0) @binding(3) var<storage, read> pair_splats: array<u32>;
-@group(0) @binding(4) var<storage, read> splats: array<SplatRecord>;
-@group(0) @binding(5) var<storage, read> order: array<u32>;
-@group(0) @binding(6) var<storage, read> offsets: array<u32>;
 @group(0) @binding(7) var<storage, read> depth_keys: array<u32>;
 // The color that `blend` wrote, with the background.
 @group(0) @binding(8) var color: texture_2d<f32>;
-// First pair of each slot.
-@group(1) @binding(0) var<storage, read_write> first_pairs: array<u32>;
 @group(1) @binding(1) var<storage, read_write> pair_scores: array<vec4<f32>>;
 @group(1) @binding(2) var<storage, read_write> scores: array<vec4<f32>>;
 
@@ -36,9 +28,7 @@ var<workgroup> finished: atomic<u32>;
 
 @compute @workgroup_size(256)
 fn place(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x < counters.visible {
-        first_pairs[order[id.x]] = offsets[id.x];
-    }
+    place_pairs(id.x);
 }
 
 // The accumulated state of one pixel.
@@ -131,11 +121,6 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
             break;
         }
     }
-}
-
-// Returns the index that `bin` gave the pair of this splat and tile.
-fn pair_of(splat: u32, tile: vec2<u32>) -> u32 {
-    return first_pairs[splat] + pair_of_tile(splats[splat].shape.w, splats[splat].color.w, tile);
 }
 
 @compute @workgroup_size(256)

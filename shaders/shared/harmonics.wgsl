@@ -33,6 +33,52 @@ fn basis_fourth(d: vec3<f32>) -> vec4<f32> {
     );
 }
 
+// Derivatives of four basis values at a time with respect to the direction: of x, y and z in the columns.
+fn slope_first() -> mat3x4<f32> {
+    let c = 0.48860251;
+    return mat3x4(vec4(0.0, 0.0, 0.0, -c), vec4(0.0, -c, 0.0, 0.0), vec4(0.0, 0.0, c, 0.0));
+}
+
+fn slope_second(d: vec3<f32>) -> mat3x4<f32> {
+    let a = 1.0925484;
+    let b = 0.31539157;
+    return mat3x4(
+        vec4(a * d.y, 0.0, -2.0 * b * d.x, -a * d.z),
+        vec4(a * d.x, -a * d.z, -2.0 * b * d.y, 0.0),
+        vec4(0.0, -a * d.y, 4.0 * b * d.z, -a * d.x),
+    );
+}
+
+fn slope_third(d: vec3<f32>) -> mat3x4<f32> {
+    let c = 0.5462742;
+    let e = 0.5900436;
+    let f = 2.8906114;
+    let h = 0.4570458;
+    let xx = d.x * d.x;
+    let yy = d.y * d.y;
+    let zz = d.z * d.z;
+    return mat3x4(
+        vec4(2.0 * c * d.x, -6.0 * e * d.x * d.y, f * d.y * d.z, 2.0 * h * d.x * d.y),
+        vec4(-2.0 * c * d.y, -3.0 * e * (xx - yy), f * d.x * d.z, -h * (4.0 * zz - xx - 3.0 * yy)),
+        vec4(0.0, 0.0, f * d.x * d.y, -8.0 * h * d.y * d.z),
+    );
+}
+
+fn slope_fourth(d: vec3<f32>) -> mat3x4<f32> {
+    let p = 0.37317633;
+    let h = 0.4570458;
+    let r = 1.4453057;
+    let e = 0.5900436;
+    let xx = d.x * d.x;
+    let yy = d.y * d.y;
+    let zz = d.z * d.z;
+    return mat3x4(
+        vec4(-6.0 * p * d.x * d.z, -h * (4.0 * zz - 3.0 * xx - yy), 2.0 * r * d.x * d.z, -3.0 * e * (xx - yy)),
+        vec4(-6.0 * p * d.y * d.z, 2.0 * h * d.x * d.y, -2.0 * r * d.y * d.z, 6.0 * e * d.x * d.y),
+        vec4(p * (6.0 * zz - 3.0 * xx - 3.0 * yy), -8.0 * h * d.x * d.z, r * (xx - yy), 0.0),
+    );
+}
+
 // Returns cos(2 pi n tau / T).
 fn time_cosine(n: f32, tau: f32, time_span: f32) -> f32 {
     return cos(time_angle(n, tau, time_span));

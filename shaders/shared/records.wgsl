@@ -29,6 +29,12 @@ fn read_gaussian(record: GaussianRecord) -> Gaussian {
     );
 }
 
+fn covariance_of(g: Gaussian) -> mat3x3<f32> {
+    let a = g.covariance_a;
+    let b = g.covariance_b;
+    return mat3x3(a.x, a.y, a.z, a.y, a.w, b.x, a.z, b.x, b.y);
+}
+
 // A Gaussian on the screen.
 struct Splat {
     center: vec2<f32>,

@@ -8,15 +8,12 @@
 //! Decisions are constant: what is not drawn, which rays and colors are clamped. `g_x` is the gradient with respect to
 //! `x`.
 
-use super::projection::LOW_PASS;
+use super::projection::{FRUSTUM_CLAMP, LOW_PASS};
 use super::{Harmonics, Model, Parameters, ShDirection, SliceSettings, rotation_4d};
 use crate::view::View;
 use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 use std::f64::consts::TAU;
 use std::ops::AddAssign;
-
-/// Rays are clamped to this multiple of the field of view, as in [`projection`](super::projection).
-const FRUSTUM_CLAMP: f64 = 1.3;
 
 /// Which gradient is computed. Default: [`Exact`](Self::Exact).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -262,7 +259,7 @@ fn through_projection(gaussian: &Moment, view: &View, mode: GradientMode, splat:
     // The conic, from the rows m of the Jacobian in capture space; as in `projection`.
     let focal = view.focal().as_dvec2();
     let unclamped = q.truncate() / q.z;
-    let limit = FRUSTUM_CLAMP * view.reach().as_dvec2();
+    let limit = f64::from(FRUSTUM_CLAMP) * view.reach().as_dvec2();
     let ray = limit.min((-limit).max(unclamped));
     let (jx, jy) = if view.orthographic {
         (DVec3::X * focal.x, DVec3::Y * focal.y)

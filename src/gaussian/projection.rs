@@ -11,7 +11,7 @@ use glam::{Mat3, Vec2, Vec3, Vec3Swizzles, Vec4};
 /// Added to both variances on the screen, pixels squared; the original does not compensate opacity for it.
 pub const LOW_PASS: f32 = 0.3;
 /// Rays are clamped to this multiple of the field of view before the Jacobian is taken.
-const FRUSTUM_CLAMP: f32 = 1.3;
+pub(super) const FRUSTUM_CLAMP: f32 = 1.3;
 
 /// The geometry of a splat: a Gaussian sliced at a time and projected to a view, without its color.
 #[derive(Debug, Clone, Copy, PartialEq)]

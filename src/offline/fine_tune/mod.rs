@@ -10,10 +10,14 @@
 mod adam;
 mod belonging;
 mod loss;
+mod optimized;
+mod passes;
+mod records;
 mod resume;
 mod run;
 mod schedule;
 mod targets;
+mod tied;
 mod trainer;
 
 pub use adam::{DECAY, Moments, adam};

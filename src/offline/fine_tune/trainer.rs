@@ -14,21 +14,21 @@
 //! | `codebooks` | gradients of coefficients; entries | gradients of entries; coefficients, once colors are [tied](Trainer::tie) |
 
 use super::adam::correction;
+use super::optimized::Optimized;
+use super::passes::Passes;
+use super::records::{records, set_harmonics, set_parameters};
 use super::schedule::Rates;
-use crate::gaussian::{GradientMode, Harmonics, Model, Parameters};
+use super::tied::Tied;
+use crate::gaussian::harmonics::evaluated;
+use crate::gaussian::{GradientMode, InvalidGaussian, Model};
 use crate::offline::dataset::CoveredImage;
-use crate::offline::quantize::codebook::Centers;
-use crate::renderer::bind::{Bind, group_layout, pipeline};
-use crate::renderer::layout::{
-    AdamUniforms, FrameUniforms, InstanceUniforms, LossUniforms, TILE_SIZE, TiedColors, TrainedRecord, TrainedScene,
-};
+use crate::renderer::layout::{AdamUniforms, InstanceUniforms, LossUniforms, TILE_SIZE, TrainedRecord, TrainedScene};
 use crate::renderer::memory::binding_limit;
-use crate::renderer::shaders::{COMPAT, COMPAT_WITHOUT_TIME, module};
+use crate::renderer::shaders::{COMPAT, COMPAT_WITHOUT_TIME};
 use crate::renderer::{FinishedFrame, GpuCapture, GpuError, Headless, ShaderChecks};
 use crate::scene::{GaussianScene, SceneForm, Trained};
 use crate::view::{Background, Frame, View};
 use glam::UVec2;
-use ndarray::Array2;
 use std::collections::VecDeque;
 use wgpu::BufferUsages;
 
@@ -37,137 +37,7 @@ const SUMS: u64 = 10;
 /// Steps that may be submitted before the first of them has finished.
 const STEPS_IN_FLIGHT: usize = 4;
 /// Most workgroups of `adam`.
-const ADAM_GROUPS: u32 = 4096;
-
-/// Layouts and pipelines of the passes of training.
-#[derive(Debug)]
-struct Passes {
-    slice_group: wgpu::BindGroupLayout,
-    slice: wgpu::ComputePipeline,
-    loss_group: wgpu::BindGroupLayout,
-    image_group: wgpu::BindGroupLayout,
-    similarity: wgpu::ComputePipeline,
-    gradient: wgpu::ComputePipeline,
-    total: wgpu::ComputePipeline,
-    blended_group: wgpu::BindGroupLayout,
-    sums_group: wgpu::BindGroupLayout,
-    place: wgpu::ComputePipeline,
-    pairs: wgpu::ComputePipeline,
-    splats_group: wgpu::BindGroupLayout,
-    parameters_group: wgpu::BindGroupLayout,
-    project_backward: wgpu::ComputePipeline,
-    adam_group: wgpu::BindGroupLayout,
-    adam: wgpu::ComputePipeline,
-    tied_group: wgpu::BindGroupLayout,
-    collect: wgpu::ComputePipeline,
-    expand: wgpu::ComputePipeline,
-}
-
-impl Passes {
-    fn new(headless: &Headless, definitions: &[&str], checks: ShaderChecks) -> Result<Self, GpuError> {
-        use Bind::{Read, Texture, Uniform, Write};
-        let device = &headless.context().device;
-        let limits = device.limits();
-        // Two arrays of 8 x 256 numbers, one of 256 vectors and 64 splats in `blend_backward`; the bindings of `project_backward`.
-        let needs = [
-            ("max_compute_workgroup_storage_size", limits.max_compute_workgroup_storage_size, 23_812),
-            ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 12),
-        ];
-        for (what, found, needed) in needs {
-            if found < needed {
-                return Err(GpuError::Limit { what, found: found.into(), needed: needed.into() });
-            }
-        }
-        const SCENE: Bind = Uniform(size_of::<TrainedScene>());
-        let group = |label, bindings: &[Bind]| group_layout(device, label, bindings);
-        let slice_group = group("gs4d slice", &[SCENE, Read, Write, Write]);
-        let loss_group = group("gs4d loss", &[Uniform(size_of::<LossUniforms>()), Texture, Write, Write, Write, Write]);
-        let image_group = group("gs4d image", &[Read]);
-        let frame = Uniform(size_of::<FrameUniforms>());
-        let blended_group = group("gs4d blended", &[frame, Read, Read, Read, Read, Read, Read, Texture, Texture]);
-        let sums_group = group("gs4d sums", &[Write, Write, Read, Read]);
-        let splats_group =
-            group("gs4d splats", &[Uniform(size_of::<InstanceUniforms>()), SCENE, Read, Read, Read, Read]);
-        let parameters_group = group("gs4d parameters", &[Read, Read, Write, Write, Write]);
-        let adam_group = group("gs4d adam", &[Uniform(size_of::<AdamUniforms>()), Write, Write, Write, Write]);
-        let tied = [Uniform(size_of::<TiedColors>()), Read, Read, Read, Read, Write, Read, Write];
-        let tied_group = group("gs4d tied colors", &tied);
-        let slice = module(device, "slice", &[], checks)?;
-        let codebooks = module(device, "codebooks", &[], checks)?;
-        let loss = module(device, "loss", &[], checks)?;
-        let blend_backward = module(device, "blend_backward", definitions, checks)?;
-        let project_backward = module(device, "project_backward", definitions, checks)?;
-        let adam = module(device, "adam", &[], checks)?;
-        let make = |module, entry, groups: &[&wgpu::BindGroupLayout]| {
-            let groups: Vec<_> = groups.iter().copied().map(Some).collect();
-            pipeline(device, module, entry, &groups)
-        };
-        let [geometry, list] = headless.capture_layouts();
-        Ok(Self {
-            slice: make(&slice, "slice", &[&slice_group]),
-            similarity: make(&loss, "similarity", &[&loss_group, &image_group]),
-            gradient: make(&loss, "gradient", &[&loss_group, &image_group]),
-            total: make(&loss, "total", &[&loss_group, &image_group]),
-            place: make(&blend_backward, "place", &[&blended_group, &sums_group]),
-            pairs: make(&blend_backward, "pairs", &[&blended_group, &sums_group]),
-            project_backward: make(
-                &project_backward,
-                "project_backward",
-                &[&splats_group, geometry, list, &parameters_group],
-            ),
-            adam: make(&adam, "adam", &[&adam_group]),
-            collect: make(&codebooks, "collect", &[&tied_group]),
-            expand: make(&codebooks, "expand", &[&tied_group]),
-            slice_group,
-            loss_group,
-            image_group,
-            blended_group,
-            sums_group,
-            splats_group,
-            parameters_group,
-            adam_group,
-            tied_group,
-        })
-    }
-}
-
-/// One kind of parameters on the GPU, with what the optimizer knows of each.
-#[derive(Debug)]
-struct Optimized {
-    values: wgpu::Buffer,
-    gradients: wgpu::Buffer,
-    moments: [wgpu::Buffer; 2],
-    settings: wgpu::Buffer,
-    group: wgpu::BindGroup,
-    /// Number of Gaussians or entries, and four-vectors of each.
-    count: u32,
-    stride: u32,
-}
-
-impl Optimized {
-    /// Creates gradients and moments, which are 0, beside the values.
-    fn new(headless: &Headless, passes: &Passes, values: wgpu::Buffer, count: u32, stride: u32) -> Self {
-        let allocator = headless.allocator();
-        let size = u64::from(count) * u64::from(stride) * 16;
-        let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
-        let gradients = allocator.buffer("gs4d gradients", size, usage);
-        let moments = [(); 2].map(|()| allocator.buffer("gs4d moments", size, usage));
-        let settings = allocator.buffer("gs4d adam", size_of::<AdamUniforms>() as u64, BufferUsages::UNIFORM);
-        let buffers = [&settings, &values, &gradients, &moments[0], &moments[1]];
-        let resources = buffers.map(wgpu::Buffer::as_entire_binding);
-        let group = allocator.bind_group("gs4d adam", &passes.adam_group, &resources);
-        Self { values, gradients, moments, settings, group, count, stride }
-    }
-}
-
-/// Codebooks that the colors are tied to.
-#[derive(Debug)]
-struct Tied {
-    entries: Optimized,
-    group: wgpu::BindGroup,
-    /// Codes, and the number of entries of each codebook.
-    books: Centers,
-}
+pub(super) const ADAM_GROUPS: u32 = 4096;
 
 /// What depends on the size of the picture and of the renderer's buffers.
 #[derive(Debug)]
@@ -188,20 +58,20 @@ struct ViewBuffers {
 /// A scene that is trained.
 #[derive(Debug)]
 pub struct Trainer<'a> {
-    headless: &'a mut Headless,
-    passes: Passes,
-    capture: GpuCapture,
+    pub(super) headless: &'a mut Headless,
+    pub(super) passes: Passes,
+    pub(super) capture: GpuCapture,
     /// What is not trained: switches, coefficients that are not evaluated.
     scene: GaussianScene,
     model: Model,
     geometry: Optimized,
-    color: Optimized,
+    pub(super) color: Optimized,
     scene_settings: wgpu::Buffer,
     slice: wgpu::BindGroup,
     parameters: wgpu::BindGroup,
     faults: wgpu::Buffer,
     totals: wgpu::Buffer,
-    tied: Option<Tied>,
+    pub(super) tied: Option<Tied>,
     view: Option<ViewBuffers>,
     in_flight: VecDeque<wgpu::SubmissionIndex>,
 }
@@ -273,7 +143,7 @@ impl<'a> Trainer<'a> {
         };
         let passes = Passes::new(headless, definitions, ShaderChecks::Off)?;
         let degrees = runtime.form.color_degrees();
-        let stride = crate::gaussian::harmonics::evaluated(degrees.degree, degrees.degree_t) * 3;
+        let stride = evaluated(degrees.degree, degrees.degree_t) * 3;
         let stride = stride.div_ceil(4) as u32;
         let count = runtime.len() as u32;
         let limit = binding_limit(&headless.context().device.limits());
@@ -512,99 +382,6 @@ impl<'a> Trainer<'a> {
         Ok(())
     }
 
-    /// Makes all color coefficients but the first of each Gaussian sums of entries of codebooks, which are trained in their place. Rows are
-    /// Gaussians.
-    ///
-    /// # Errors
-    /// Codebooks of other Gaussians or coefficients.
-    pub fn tie(&mut self, books: Centers) -> Result<(), TrainerError> {
-        let (count, stride) = (self.capture.len(), self.color.stride);
-        let sizes: Vec<usize> = books.entries.iter().map(|book| book.nrows()).collect();
-        let fits = |(codes, size): (&Vec<u32>, &usize)| {
-            codes.len() == count && codes.iter().all(|&code| (code as usize) < *size)
-        };
-        let columns = |book: &Array2<f32>| (1..=stride as usize * 4 - 3).contains(&book.ncols());
-        if books.codes.len() != sizes.len()
-            || !books.codes.iter().zip(&sizes).all(fits)
-            || !books.entries.iter().all(columns)
-        {
-            return Err(TrainerError::Codebooks);
-        }
-        let (total, stages) = (sizes.iter().sum::<usize>(), sizes.len());
-        let mut values = vec![0.0f32; total * stride as usize * 4];
-        let rows = books.entries.iter().flat_map(|book| book.rows());
-        for (entry, row) in values.chunks_exact_mut(stride as usize * 4).zip(rows) {
-            entry[3..].iter_mut().zip(row).for_each(|(to, from)| *to = *from);
-        }
-        let mut codes = Vec::with_capacity(count * stages);
-        let mut members = vec![Vec::new(); total];
-        for index in 0..count {
-            let mut first = 0;
-            for (own, size) in books.codes.iter().zip(&sizes) {
-                let entry = first + own[index];
-                codes.push(entry);
-                members[entry as usize].push(index as u32);
-                first += *size as u32;
-            }
-        }
-        let mut firsts = vec![0u32];
-        for own in &members {
-            firsts.push(firsts.last().copied().unwrap_or_default() + own.len() as u32);
-        }
-        let allocator = self.headless.allocator();
-        let queue = &self.headless.context().queue;
-        let filled = |label, bytes: &[u8], usage| {
-            let made = allocator.buffer(label, bytes.len().max(16) as u64, usage);
-            queue.write_buffer(&made, 0, bytes);
-            made
-        };
-        let storage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
-        let settings = TiedColors { count: count as u32, stride, stages: stages as u32, padding: 0 };
-        let settings = filled("gs4d tied colors", bytemuck::bytes_of(&settings), BufferUsages::UNIFORM);
-        let codes = filled("gs4d codes", bytemuck::cast_slice(&codes), storage);
-        let firsts = filled("gs4d first members", bytemuck::cast_slice(&firsts), storage);
-        let members = filled("gs4d members", bytemuck::cast_slice(&members.concat()), storage);
-        let values = filled("gs4d entries", bytemuck::cast_slice(&values), storage);
-        let entries = Optimized::new(self.headless, &self.passes, values, total as u32, stride);
-        let Optimized { values, gradients, .. } = &entries;
-        let buffers =
-            [&settings, &codes, &firsts, &members, values, &self.color.values, &self.color.gradients, gradients];
-        let group = allocator.bind_group(
-            "gs4d tied colors",
-            &self.passes.tied_group,
-            &buffers.map(wgpu::Buffer::as_entire_binding),
-        );
-        let tied = Tied { entries, group, books };
-        let mut encoder = self.encoder("gs4d expand");
-        self.expand(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), &tied);
-        queue.submit([encoder.finish()]);
-        self.tied = Some(tied);
-        Ok(())
-    }
-
-    /// Records that the coefficients become the sums of their entries.
-    fn expand(&self, pass: &mut wgpu::ComputePass<'_>, tied: &Tied) {
-        let values = self.color.count * self.color.stride;
-        pass.set_pipeline(&self.passes.expand);
-        pass.set_bind_group(0, &tied.group, &[]);
-        pass.dispatch_workgroups(values.div_ceil(256).min(ADAM_GROUPS), 1, 1);
-    }
-
-    /// Returns the codebooks as they are; `None` unless colors are [tied](Self::tie).
-    ///
-    /// # Errors
-    /// A lost device.
-    pub fn codebooks(&self) -> Result<Option<Centers>, GpuError> {
-        let Some(Tied { entries, books, .. }) = &self.tied else { return Ok(None) };
-        let values: Vec<f32> = bytemuck::pod_collect_to_vec(&self.read(&entries.values)?);
-        let mut books = books.clone();
-        let rows = books.entries.iter_mut().flat_map(|book| book.rows_mut());
-        for (entry, mut row) in values.chunks_exact(entries.stride as usize * 4).zip(rows) {
-            row.iter_mut().zip(&entry[3..]).for_each(|(to, from)| *to = *from);
-        }
-        Ok(Some(books))
-    }
-
     /// Returns the sums over the views since the last call, and begins new ones.
     ///
     /// # Errors
@@ -688,7 +465,7 @@ impl<'a> Trainer<'a> {
         self.headless.context().queue.submit([encoder.finish()]);
     }
 
-    fn read(&self, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
+    pub(super) fn read(&self, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
         self.headless.copy_out(buffer, buffer.size())
     }
 
@@ -704,7 +481,7 @@ impl<'a> Trainer<'a> {
         scene
     }
 
-    fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
+    pub(super) fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
         let label = wgpu::CommandEncoderDescriptor { label: Some(label) };
         self.headless.context().device.create_command_encoder(&label)
     }
@@ -820,47 +597,8 @@ pub enum TrainerError {
     Empty,
     /// A Gaussian cannot be drawn.
     #[error(transparent)]
-    Invalid(#[from] crate::gaussian::InvalidGaussian),
+    Invalid(#[from] InvalidGaussian),
     /// The GPU cannot train the scene.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-}
-
-/// Returns the raw parameters as `slice` reads them.
-fn records(parameters: &Parameters) -> Vec<TrainedRecord> {
-    let record = |index: usize| TrainedRecord {
-        mean: parameters.mean[index],
-        mean_t: parameters.mean_t.get(index).copied().unwrap_or_default(),
-        log_scale: parameters.log_scale[index],
-        log_scale_t: parameters.log_scale_t.get(index).copied().unwrap_or_default(),
-        rotation_l: parameters.rotation_l[index],
-        rotation_r: parameters.rotation_r.get(index).copied().unwrap_or([1.0, 0.0, 0.0, 0.0]),
-        opacity_logit: [parameters.opacity_logit[index], 0.0, 0.0, 0.0],
-    };
-    (0..parameters.len()).map(record).collect()
-}
-
-/// Replaces the attributes that the model has.
-fn set_parameters(parameters: &mut Parameters, records: &[TrainedRecord]) {
-    fn set<T>(attribute: &mut [T], records: &[TrainedRecord], value: impl Fn(&TrainedRecord) -> T) {
-        for (attribute, record) in attribute.iter_mut().zip(records) {
-            *attribute = value(record);
-        }
-    }
-    set(&mut parameters.mean, records, |record| record.mean);
-    set(&mut parameters.mean_t, records, |record| record.mean_t);
-    set(&mut parameters.log_scale, records, |record| record.log_scale);
-    set(&mut parameters.log_scale_t, records, |record| record.log_scale_t);
-    set(&mut parameters.rotation_l, records, |record| record.rotation_l);
-    set(&mut parameters.rotation_r, records, |record| record.rotation_r);
-    set(&mut parameters.opacity_logit, records, |record| record.opacity_logit[0]);
-}
-
-/// Replaces the coefficients that are evaluated; `stride` is the number of values of each Gaussian.
-fn set_harmonics(harmonics: &mut Harmonics, values: &[f32], stride: usize) {
-    let used = harmonics.evaluated() * 3;
-    let own = harmonics.coefficients * 3;
-    for (coefficients, values) in harmonics.values.chunks_exact_mut(own.max(1)).zip(values.chunks_exact(stride)) {
-        coefficients[..used].copy_from_slice(&values[..used]);
-    }
 }
