@@ -28,8 +28,8 @@ Examples:
   gs4d finetune pruned.gs4d --data data/toybox -o tuned.gs4d
   gs4d finetune pruned.gs4d --data data/standup --resolution 2 --steps 10000 --batch 4 -o tuned.gs4d
 
-A temporal filter of the scene is not used in training. One of the kind support is computed again afterwards (gs4d mask), so that it
-changes no picture.")]
+What a temporal filter of the scene leaves out is not drawn in training either, and the filter is computed again now and then: gs4d mask
+before gs4d finetune trains with it. One of the kind support changes no picture; it is computed again afterwards.")]
 pub struct FineTune {
     /// The checkpoint, or a package of it in the trained form.
     #[arg(value_name = "SCENE")]
@@ -65,6 +65,9 @@ pub struct FineTune {
     /// Steps between two evaluations on the held-out views.
     #[arg(long, value_name = "N", default_value = "500", value_parser = values::count(1_000_000))]
     evaluate_every: usize,
+    /// Steps after which a temporal filter of the kind key-frame or interval is computed again.
+    #[arg(long, value_name = "N", default_value = "1000", value_parser = values::count(100_000_000))]
+    refresh_filter: usize,
     /// End after this many evaluations without an improvement.
     #[arg(long, value_name = "N", value_parser = values::count(1_000_000))]
     patience: Option<usize>,
@@ -181,6 +184,7 @@ impl FineTune {
             held_out: self.held_out,
             evaluate_every: self.evaluate_every,
             patience: self.patience,
+            refresh_filter: self.refresh_filter,
             mode: self.gradients,
             compress: self.compress.map(|quality| (quality, self.compress_steps)),
         }

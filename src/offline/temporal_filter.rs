@@ -8,7 +8,7 @@ use super::dataset::selection::{distinct_cameras, distinct_times, to_draw};
 use super::engine::Engine;
 use super::score::{ScoreEngine, ScoreError, Want};
 use super::{OfflineError, Progress, sliced};
-use crate::scene::{FilterKind, GaussianScene, TemporalFilter};
+use crate::scene::{FilterKind, GaussianScene, RuntimeScene, TemporalFilter};
 use crate::view::{Camera, RasterFov, View};
 
 /// Every kind of filter with its name.
@@ -64,19 +64,35 @@ pub fn filter(
     views: &[TrainingView],
     progress: &mut dyn Progress,
 ) -> Result<TemporalFilter, OfflineError> {
-    let (interval, raster_fov) = (scene.trained_with.time_interval, scene.trained_with.raster_fov);
     if !needs_views(kind) {
+        let interval = scene.trained_with.time_interval;
         let gaussians = sliced(scene)?;
         return Ok(TemporalFilter::support(gaussians.iter().copied(), interval, keys.max(2) - 1));
     }
     let runtime = GaussianScene { filter: None, ..scene.clone() }.into_runtime()?;
+    let mut scorer = engine.scorer(&runtime, runtime.trained_background())?;
+    Ok(seen_filter(scorer.as_mut(), &runtime, kind, keys, views, progress)?)
+}
+
+/// As [`filter`], of a kind that needs views, with what scores this scene. Begins the task "looking".
+///
+/// # Errors
+/// Views that show nothing of the scene, a failure of the engine.
+pub fn seen_filter(
+    scorer: &mut dyn ScoreEngine,
+    scene: &RuntimeScene,
+    kind: FilterKind,
+    keys: u32,
+    views: &[TrainingView],
+    progress: &mut dyn Progress,
+) -> Result<TemporalFilter, ScoreError> {
+    let (interval, raster_fov) = (scene.trained_with.time_interval, scene.trained_with.raster_fov);
     let (times, cameras, count) = (key_times(interval, keys), distinct_cameras(views), scene.len());
     let inside = if kind == FilterKind::Interval { views.len() } else { 0 };
-    let mut scorer = engine.scorer(&runtime, runtime.trained_background())?;
     progress.begin("looking", times.len() * cameras.len() + inside);
-    let masks = key_frame_masks(scorer.as_mut(), &cameras, raster_fov, &times, count, progress)?;
+    let masks = key_frame_masks(scorer, &cameras, raster_fov, &times, count, progress)?;
     let filter = if kind == FilterKind::Interval {
-        interval_filter(scorer.as_mut(), &masks, &to_draw(views, raster_fov), interval, count, progress)?
+        interval_filter(scorer, &masks, &to_draw(views, raster_fov), interval, count, progress)?
     } else {
         key_frame_filter(&masks, count)
     };

@@ -7,6 +7,7 @@ mod appearance;
 mod fast;
 mod filter;
 mod fine_tune;
+mod fine_tune_run;
 mod golden;
 mod layout;
 mod packed;
@@ -17,6 +18,7 @@ mod shaders;
 
 #[path = "../support"]
 mod support {
+    pub mod dataset;
     pub mod golden;
     pub mod gpu;
     pub mod limited_device;

@@ -3,7 +3,8 @@
 //! In: a scene, views and images. Out: an error if the scene explains its images no better than those of other views.
 
 use super::Trainer;
-use super::run::{Shot, psnr_of};
+use super::run::psnr_of;
+use super::targets::Shot;
 use crate::offline::OfflineError;
 use crate::offline::dataset::TrainingView;
 use crate::view::Background;

@@ -9,6 +9,7 @@
 
 mod adam;
 mod belonging;
+mod coding;
 mod loss;
 mod optimized;
 mod passes;
@@ -23,6 +24,7 @@ mod trainer;
 pub use adam::{DECAY, Moments, adam};
 pub use loss::{Loss, loss};
 pub use schedule::{Behind, Rates};
+pub use targets::TrainingImages;
 pub use trainer::{Faults, GpuImage, Sample, Totals, Trainer, TrainerError, TrainerState};
 
 use super::dataset::TrainingView;
@@ -58,6 +60,8 @@ pub struct FineTuneSettings {
     pub evaluate_every: usize,
     /// Evaluations without an improvement after which training ends. Default: `None`, all steps are made.
     pub patience: Option<usize>,
+    /// Steps after which a temporal filter that depends on what views see is computed again. Default: 1000.
+    pub refresh_filter: usize,
     /// Whether gradients are those of the original, with its deviations.
     pub mode: GradientMode,
     /// How the result is compressed, and the number of further steps in which the codebooks of color are trained; `None` leaves the scene in
@@ -78,6 +82,7 @@ impl Default for FineTuneSettings {
             held_out: 8,
             evaluate_every: 500,
             patience: None,
+            refresh_filter: 1000,
             mode: GradientMode::default(),
             compress: None,
         }
@@ -127,7 +132,8 @@ pub struct Resume<'a> {
     pub every: usize,
 }
 
-/// Trains a scene on views. Begins the tasks "loading images" and "fine-tuning".
+/// Trains a scene on views. What its temporal filter leaves out is not drawn in training either; a filter of the kind support, which changes no
+/// picture, is computed again afterwards. Begins the tasks "loading images" and "fine-tuning".
 ///
 /// # Errors
 /// A scene that is not in the trained form or does not fit the GPU, images that are missing or show something else, a lost device.
@@ -139,5 +145,21 @@ pub fn fine_tune(
     resume: Option<Resume<'_>>,
     progress: &mut dyn Progress,
 ) -> Result<FineTuned, OfflineError> {
-    Run::open(headless, scene, views, settings, progress)?.run(resume, progress)
+    let images = TrainingImages::load(views, settings.held_out, &scene.trained_with, progress)?;
+    fine_tune_on(headless, scene, &images, settings, resume, progress)
+}
+
+/// As [`fine_tune`], on images that have been loaded. Begins the task "fine-tuning".
+///
+/// # Errors
+/// As [`fine_tune`].
+pub fn fine_tune_on(
+    headless: &mut Headless,
+    scene: GaussianScene,
+    images: &TrainingImages,
+    settings: &FineTuneSettings,
+    resume: Option<Resume<'_>>,
+    progress: &mut dyn Progress,
+) -> Result<FineTuned, OfflineError> {
+    Run::open(headless, scene, images, settings)?.run(resume, progress)
 }

@@ -4,8 +4,9 @@
 
 use super::run::Best;
 use super::{CurvePoint, TrainerState};
-use crate::offline::work::{Fingerprint, Work};
+use crate::offline::work::{Fingerprint, Work, bytes, words};
 use crate::offline::{OfflineError, Progress};
+use crate::scene::{FilterKind, TemporalFilter};
 use serde::{Deserialize, Serialize};
 
 /// Name of the file.
@@ -17,6 +18,8 @@ pub(super) struct Checkpoint {
     pub curve: Vec<CurvePoint>,
     pub best: Best,
     pub state: TrainerState,
+    /// Steps in which codebooks were trained; `None` before that.
+    pub coded: Option<usize>,
 }
 
 /// What comes before the buffers.
@@ -24,8 +27,45 @@ pub(super) struct Checkpoint {
 struct Head {
     curve: Vec<CurvePoint>,
     best: CurvePoint,
-    /// Bytes of each buffer: of the state, then of the best.
+    coded: Option<usize>,
+    /// Of the state, then of the best.
+    states: [StateHead; 2],
+}
+
+/// The contents of a state: bytes of each buffer, then those of the bits of the filter.
+#[derive(Serialize, Deserialize)]
+struct StateHead {
     sizes: Vec<usize>,
+    filter: Option<FilterHead>,
+}
+
+/// Kind, segments and Gaussians of a filter.
+type FilterHead = (FilterKind, u32, usize);
+
+/// Returns the head of a state, and its buffers.
+fn parts(state: &TrainerState) -> (StateHead, Vec<Vec<u8>>) {
+    let filter = state.filter.as_ref();
+    let bits = filter.map(|filter| bytes(&filter.to_bits()));
+    let buffers: Vec<_> = state.buffers.iter().cloned().chain(bits).collect();
+    let filter = filter.map(|filter| (filter.kind, filter.segments, filter.count));
+    (StateHead { sizes: buffers.iter().map(Vec::len).collect(), filter }, buffers)
+}
+
+/// Returns a state from the bytes after the head, and the bytes after the state; `None` if there are too few.
+fn state<'a>(head: &StateHead, mut rest: &'a [u8]) -> Option<(TrainerState, &'a [u8])> {
+    let mut state = TrainerState::default();
+    for &size in &head.sizes {
+        let (buffer, left) = rest.split_at_checked(size)?;
+        state.buffers.push(buffer.to_vec());
+        rest = left;
+    }
+    if let Some((kind, segments, count)) = head.filter {
+        let bits = words(&state.buffers.pop()?);
+        let expected = TemporalFilter::words(count).checked_mul(segments as usize)?;
+        let filter = (bits.len() == expected).then(|| TemporalFilter::from_bits(kind, segments, count, bits));
+        state.filter = Some(filter?);
+    }
+    Some((state, rest))
 }
 
 impl Checkpoint {
@@ -36,13 +76,12 @@ impl Checkpoint {
         fingerprint: Fingerprint,
         progress: &mut dyn Progress,
     ) -> Result<(), OfflineError> {
-        let buffers: Vec<&Vec<u8>> = self.state.buffers.iter().chain(&self.best.state).collect();
-        let sizes = buffers.iter().map(|buffer| buffer.len()).collect();
-        let head = Head { curve: self.curve.clone(), best: self.best.point, sizes };
+        let ((state, buffers), (best, best_buffers)) = (parts(&self.state), parts(&self.best.state));
+        let head = Head { curve: self.curve.clone(), best: self.best.point, coded: self.coded, states: [state, best] };
         let head = ron::to_string(&head)?;
         let mut bytes = (head.len() as u64).to_le_bytes().to_vec();
         bytes.extend_from_slice(head.as_bytes());
-        buffers.iter().for_each(|buffer| bytes.extend_from_slice(buffer));
+        buffers.iter().chain(&best_buffers).for_each(|buffer| bytes.extend_from_slice(buffer));
         Ok(work.store(FILE, fingerprint, &bytes, progress)?)
     }
 
@@ -50,16 +89,10 @@ impl Checkpoint {
     pub fn load(work: &Work, fingerprint: Fingerprint) -> Option<Self> {
         let bytes = work.load(FILE, fingerprint)?;
         let (size, rest) = bytes.split_first_chunk()?;
-        let (head, mut rest) = rest.split_at_checked(usize::try_from(u64::from_le_bytes(*size)).ok()?)?;
-        let Head { curve, best, sizes } = ron::de::from_bytes(head).ok()?;
-        let mut buffers = Vec::new();
-        for size in sizes {
-            let (buffer, left) = rest.split_at_checked(size)?;
-            buffers.push(buffer.to_vec());
-            rest = left;
-        }
-        let best_state: [Vec<u8>; 6] = (buffers.len() == 12).then(|| buffers.split_off(6))?.try_into().ok()?;
-        let state = TrainerState { buffers: buffers.try_into().ok()? };
-        Some(Self { curve, best: Best { point: best, state: best_state }, state })
+        let (head, rest) = rest.split_at_checked(usize::try_from(u64::from_le_bytes(*size)).ok()?)?;
+        let Head { curve, best, coded, states } = ron::de::from_bytes(head).ok()?;
+        let (state_of_run, rest) = state(&states[0], rest)?;
+        let (best_state, _) = state(&states[1], rest)?;
+        Some(Self { curve, best: Best { point: best, state: best_state }, state: state_of_run, coded })
     }
 }

@@ -4,14 +4,17 @@
 
 use super::resume::Checkpoint;
 use super::schedule::{Schedule, decay};
-use super::{Behind, CurvePoint, FineTuneSettings, FineTuned, Resume, belonging, targets};
+use super::targets::{Shot, TrainingImages};
+use super::{Behind, CurvePoint, FineTuneSettings, FineTuned, Resume, belonging};
 use super::{GpuImage, Sample, Trainer, TrainerState};
-use crate::offline::dataset::selection::{even_share, hold_out};
-use crate::offline::dataset::{CoveredImage, TrainingView};
+use crate::offline::dataset::CoveredImage;
+use crate::offline::dataset::selection::even_share;
 use crate::offline::metrics::{SizeMismatch, psnr};
-use crate::offline::quantize::{self, CompressSettings, Quality, compress_tied, train_codebooks};
-use crate::offline::{OfflineError, Progress};
-use crate::renderer::Headless;
+use crate::offline::score::GpuEngine;
+use crate::offline::temporal_filter::{needs_views, seen_filter};
+use crate::offline::work::Fingerprint;
+use crate::offline::{OfflineError, Progress, sliced};
+use crate::renderer::{Headless, ShaderChecks};
 use crate::scene::{GaussianScene, TemporalFilter};
 use crate::view::{Background, View};
 use glam::Vec3;
@@ -19,11 +22,6 @@ use std::time::Instant;
 
 /// Views that are drawn before the first step, so that there is room for the pairs of all.
 const VIEWS_OF_ROOM: usize = 64;
-/// Gaussians for each entry of a codebook, at least, and entries of a codebook, at least.
-const CODED_GAUSSIANS_OF_ENTRY: usize = 64;
-const LEAST_ENTRIES: usize = 64;
-/// Factor on the rates while codebooks are trained.
-const CODED_RATE: f64 = 0.5;
 /// Most bytes of images that stay on the GPU.
 const RESIDENT_BYTES: usize = 3 << 30;
 /// Steps between two looks at gradients that are not finite.
@@ -39,73 +37,121 @@ fn resident_images(trainer: &Trainer<'_>, shots: &[Shot]) -> Result<Vec<GpuImage
     Ok(shots.iter().take_while(fits).map(|shot| trainer.upload(&shot.image)).collect::<Result<_, _>>()?)
 }
 
-/// A view with its image.
-pub(super) struct Shot {
-    pub view: View,
-    name: String,
-    pub image: CoveredImage,
-}
-
 /// A run of training.
 pub(super) struct Run<'a> {
-    trainer: Trainer<'a>,
-    settings: &'a FineTuneSettings,
-    shots: Vec<Shot>,
+    pub(super) trainer: Trainer<'a>,
+    pub(super) settings: &'a FineTuneSettings,
+    images: &'a TrainingImages,
     /// The images of the first of them, on the GPU; others are uploaded when they are needed.
     resident: Vec<GpuImage>,
-    held_out: Vec<Shot>,
     background: Background,
     /// Whether backgrounds are random.
     random: bool,
-    /// That of the scene, which is not used in training.
-    filter: Option<TemporalFilter>,
+    /// Segments of the scene's filter of the kind support, which changes no picture: it is left out of training and computed afterwards.
+    support: Option<u32>,
+}
+
+/// Where a run stores its state.
+#[derive(Clone, Copy)]
+pub(super) struct Saves<'a> {
+    resume: Resume<'a>,
+    fingerprint: Fingerprint,
+}
+
+impl Saves<'_> {
+    /// Returns whether the state is stored after this step.
+    pub fn are_due(self, step: usize) -> bool {
+        step.is_multiple_of(self.resume.every.max(1))
+    }
+
+    pub fn store(self, checkpoint: &Checkpoint, progress: &mut dyn Progress) -> Result<(), OfflineError> {
+        checkpoint.store(self.resume.work, self.fingerprint, progress)
+    }
+}
+
+/// What a run has found.
+pub(super) struct Progressed {
+    pub curve: Vec<CurvePoint>,
+    pub best: Best,
+    pub interrupted: bool,
+    /// Steps made now and seconds that they took.
+    pub pace: (usize, f64),
 }
 
 impl<'a> Run<'a> {
-    /// Loads the images and uploads the scene.
+    /// Uploads the scene and the images.
     pub fn open(
         headless: &'a mut Headless,
-        scene: GaussianScene,
-        views: &[TrainingView],
+        mut scene: GaussianScene,
+        images: &'a TrainingImages,
         settings: &'a FineTuneSettings,
-        progress: &mut dyn Progress,
     ) -> Result<Self, OfflineError> {
-        let trained_with = scene.trained_with.clone();
-        let filter = scene.filter.clone();
         let background = match scene.environment {
             Some(_) => Background::Environment,
-            None => Background::Color(trained_with.background),
+            None => Background::Color(scene.trained_with.background),
         };
-        let (trained_on, held_out) = hold_out(views, settings.held_out);
-        let load = |views: &[TrainingView], progress: &mut dyn Progress| -> Result<Vec<Shot>, OfflineError> {
-            let images = targets::load(views, progress)?;
-            let shot = |(view, image): (&TrainingView, CoveredImage)| Shot {
-                view: view.camera.view(view.time, trained_with.raster_fov),
-                name: view.name.clone(),
-                image,
-            };
-            Ok(views.iter().zip(images).map(shot).collect())
-        };
-        let (shots, held_out) = (load(&trained_on, progress)?, load(&held_out, progress)?);
+        let (used, support) = scene.filter.take().map_or((None, None), |filter| match needs_views(filter.kind) {
+            true => (Some(filter), None),
+            false => (None, Some(filter.segments)),
+        });
+        scene.filter = used;
         let trainer = Trainer::new(headless, scene, settings.mode)?;
         let random = settings.behind == Behind::Random
             && background != Background::Environment
-            && shots.iter().any(|shot| shot.image.has_gaps);
-        let resident = resident_images(&trainer, &shots)?;
-        let mut run = Self { trainer, settings, shots, resident, held_out, background, random, filter };
-        for index in even_share(&trained_on, VIEWS_OF_ROOM) {
-            run.trainer.make_room(&run.shots[index].view)?;
+            && images.shots.iter().any(|shot| shot.image.has_gaps);
+        let resident = resident_images(&trainer, &images.shots)?;
+        let mut run = Self { trainer, settings, images, resident, background, random, support };
+        for index in even_share(&images.views, VIEWS_OF_ROOM) {
+            run.trainer.make_room(&images.shots[index].view)?;
         }
-        belonging::check(&mut run.trainer, &run.shots, run.background, &trained_on)?;
+        belonging::check(&mut run.trainer, &images.shots, run.background, &images.views)?;
         Ok(run)
     }
 
-    /// Trains.
+    /// Trains, and compresses if that is wanted.
     pub fn run(&mut self, resume: Option<Resume<'_>>, progress: &mut dyn Progress) -> Result<FineTuned, OfflineError> {
-        let (settings, filter) = (self.settings, self.filter.take());
+        let saves = resume.map(|resume| {
+            let fingerprint = resume.fingerprint.and(&format!("{:?}", self.settings));
+            Saves { resume, fingerprint }
+        });
+        let stored = saves.and_then(|saves| Checkpoint::load(saves.resume.work, saves.fingerprint));
+        let stored = stored.filter(|stored| self.trainer.resume(&stored.best.state));
+        let is_coded = |stored: &&Checkpoint| stored.coded.is_some();
+        let mut found = match stored.as_ref().filter(is_coded) {
+            Some(Checkpoint { curve, best, .. }) => {
+                Progressed { curve: curve.clone(), best: best.clone(), interrupted: false, pace: (0, 0.0) }
+            }
+            None => self.train(stored.clone(), saves, progress)?,
+        };
+        let faults = self.trainer.faults()?;
+        self.trainer.resume(&found.best.state);
+        let scene = match self.settings.compress {
+            Some((quality, steps)) if !found.interrupted => {
+                self.compress(quality, steps, &mut found, stored, saves, progress)?
+            }
+            _ => self.scene()?,
+        };
+        let (steps, seconds) = found.pace;
+        Ok(FineTuned {
+            scene,
+            curve: found.curve,
+            best: found.best.point,
+            steps_per_second: (steps > 0).then(|| steps as f64 / seconds),
+            held_out: self.images.held_out.len(),
+            faults,
+            interrupted: found.interrupted,
+        })
+    }
+
+    /// Makes the steps, from where a stored run ended.
+    fn train(
+        &mut self,
+        stored: Option<Checkpoint>,
+        saves: Option<Saves<'_>>,
+        progress: &mut dyn Progress,
+    ) -> Result<Progressed, OfflineError> {
+        let settings = self.settings;
         let every = settings.evaluate_every.max(1);
-        let fingerprint = resume.map(|resume| resume.fingerprint.and(&format!("{settings:?}")));
-        let stored = resume.zip(fingerprint).and_then(|(resume, print)| Checkpoint::load(resume.work, print));
         let stored = stored.filter(|stored| self.trainer.resume(&stored.state));
         let (mut curve, mut best) = match stored {
             Some(Checkpoint { curve, best, .. }) => {
@@ -115,7 +161,7 @@ impl<'a> Run<'a> {
             None => {
                 let point = CurvePoint { step: 0, loss: None, training_psnr: None, psnr: self.evaluate()? };
                 progress.note(&describe(&point, None));
-                (vec![point], Best { point, state: self.trainer.state()?.buffers })
+                (vec![point], Best { point, state: self.trainer.state()? })
             }
         };
         let first = curve.last().map_or(0, |last| last.step);
@@ -132,6 +178,9 @@ impl<'a> Run<'a> {
             if !told && step.is_multiple_of(STEPS_OF_FAULTS) {
                 told = self.tell_faults(progress)?;
             }
+            if step.is_multiple_of(settings.refresh_filter.max(1)) && step != settings.steps {
+                self.refresh_filter(progress)?;
+            }
             if !step.is_multiple_of(every) && step != settings.steps && !interrupted {
                 continue;
             }
@@ -144,15 +193,15 @@ impl<'a> Run<'a> {
             progress.note(&describe(&point, Some(speed)));
             curve.push(point);
             if point.psnr > best.point.psnr {
-                best = Best { point, state: self.trainer.state()?.buffers };
+                best = Best { point, state: self.trainer.state()? };
             }
             let goes_on = step < settings.steps || settings.compress.is_some();
-            if let Some((resume, print)) = resume.zip(fingerprint)
-                && (step.is_multiple_of(resume.every.max(1)) || interrupted)
+            if let Some(saves) = saves
+                && (saves.are_due(step) || interrupted)
                 && goes_on
             {
-                let checkpoint = Checkpoint { curve, best, state: self.trainer.state()? };
-                checkpoint.store(resume.work, print, progress)?;
+                let checkpoint = Checkpoint { curve, best, state: self.trainer.state()?, coded: None };
+                saves.store(&checkpoint, progress)?;
                 Checkpoint { curve, best, .. } = checkpoint;
             }
             let waited = curve.iter().rev().take_while(|point| point.step > best.point.step).count();
@@ -163,81 +212,46 @@ impl<'a> Run<'a> {
             start = Instant::now();
         }
         progress.finish();
-        let faults = self.trainer.faults()?;
-        self.trainer.resume(&TrainerState { buffers: best.state });
-        let scene = match settings.compress {
-            Some((quality, steps)) if !interrupted => self.compress(quality, steps, &mut curve, filter, progress)?,
-            _ => GaussianScene { filter, ..self.trainer.scene()? },
-        };
-        Ok(FineTuned {
-            scene,
-            curve,
-            best: best.point,
-            steps_per_second: (step > first).then(|| (step - first) as f64 / seconds),
-            held_out: self.held_out.len(),
-            faults,
-            interrupted,
-        })
+        Ok(Progressed { curve, best, interrupted, pace: (step - first, seconds) })
     }
 
-    /// Codes the colors by codebooks whose number of entries follows that of the Gaussians, trains these and everything else for some more
-    /// steps, and compresses the result. A temporal filter of the kind support is that of the compressed Gaussians.
-    fn compress(
-        &mut self,
-        quality: Quality,
-        steps: usize,
-        curve: &mut Vec<CurvePoint>,
-        filter: Option<TemporalFilter>,
-        progress: &mut dyn Progress,
-    ) -> Result<GaussianScene, OfflineError> {
-        let made = self.settings.steps;
-        self.trainer.forget_moments();
-        let scene = self.trainer.scene()?.into_runtime()?;
-        let mut settings = CompressSettings::from(quality);
-        let suiting = (scene.len() / CODED_GAUSSIANS_OF_ENTRY).next_power_of_two().max(LEAST_ENTRIES);
-        settings.codebooks.iter_mut().for_each(|entries| *entries = (*entries).min(suiting));
-        let steps = if settings.codebooks.is_empty() { 0 } else { steps };
-        if steps > 0 {
-            self.trainer.tie(train_codebooks(&scene, &settings)?)?;
+    /// Returns the scene as it is, with its filter.
+    pub(super) fn scene(&self) -> Result<GaussianScene, OfflineError> {
+        let mut scene = self.trainer.scene()?;
+        if let Some(segments) = self.support {
+            let interval = scene.trained_with.time_interval;
+            scene.filter = Some(TemporalFilter::support(sliced(&scene)?.iter().copied(), interval, segments));
         }
-        progress.begin("training codebooks", steps);
-        self.trainer.totals()?;
-        for step in 0..steps {
-            let factor = decay(step, steps, self.settings.last_rate);
-            self.step(made + step, step + 1, factor * CODED_RATE)?;
-            progress.advance();
-            if progress.is_interrupted() {
-                break;
-            }
-        }
-        progress.finish();
-        let scene = GaussianScene { filter, ..self.trainer.scene()? }.into_runtime()?;
-        let (compressed, _) = match self.trainer.codebooks()? {
-            Some(books) => compress_tied(scene, &settings, &books)?,
-            None => quantize::compress(scene, &settings)?,
+        Ok(scene)
+    }
+
+    /// Computes the temporal filter again from the Gaussians as they are, if it is used in training.
+    fn refresh_filter(&mut self, progress: &mut dyn Progress) -> Result<(), OfflineError> {
+        let mut scene = self.trainer.scene()?;
+        let Some(TemporalFilter { kind, segments, .. }) = scene.filter.take() else { return Ok(()) };
+        let runtime = scene.into_runtime()?;
+        let background = runtime.trained_background();
+        let filter = {
+            let mut scorer = GpuEngine::new(self.trainer.headless, &runtime, background, ShaderChecks::Off)?;
+            seen_filter(&mut scorer, &runtime, kind, segments + 1, &self.images.views, progress)?
         };
-        let totals = self.trainer.totals()?;
-        let (loss, training_psnr) = (Some(totals.loss), Some(totals.psnr));
-        let point = CurvePoint { step: made + steps, loss, training_psnr, psnr: self.evaluate()? };
-        progress.note(&describe(&point, None));
-        curve.push(point);
-        Ok(compressed)
+        Ok(self.trainer.set_filter(filter)?)
     }
 
     /// Makes the step with the views of number `step`, from 0; it is number `count`, from 1, since the moments were 0.
-    fn step(&mut self, step: usize, count: usize, factor: f64) -> Result<(), OfflineError> {
+    pub(super) fn step(&mut self, step: usize, count: usize, factor: f64) -> Result<(), OfflineError> {
         let settings = self.settings;
-        let schedule = Schedule { seed: settings.seed, views: self.shots.len(), batch: settings.batch };
+        let schedule = Schedule { seed: settings.seed, views: self.images.shots.len(), batch: settings.batch };
         let indices = schedule.batch(step);
         let uploaded = |&index: &usize| match self.resident.get(index) {
             Some(_) => Ok(None),
-            None => self.trainer.upload(&self.shots[index].image).map(Some),
+            None => self.trainer.upload(&self.images.shots[index].image).map(Some),
         };
         let uploaded: Vec<Option<GpuImage>> = indices.iter().map(uploaded).collect::<Result<_, _>>()?;
         let mut batch = Vec::with_capacity(indices.len());
         for (place, (index, own)) in indices.into_iter().zip(&uploaded).enumerate() {
             batch.push(Sample {
-                view: &self.shots[index].view,
+                view: &self.images.shots[index].view,
                 image: own.as_ref().unwrap_or_else(|| &self.resident[index]),
                 background: match self.random {
                     true => Background::Color(schedule.background(step, place)),
@@ -251,14 +265,14 @@ impl<'a> Run<'a> {
     }
 
     /// Returns the mean PSNR on the held-out views.
-    fn evaluate(&mut self) -> Result<f64, OfflineError> {
-        mean_psnr(&mut self.trainer, &self.held_out, self.background)
+    pub(super) fn evaluate(&mut self) -> Result<f64, OfflineError> {
+        mean_psnr(&mut self.trainer, &self.images.held_out, self.background)
     }
 
     /// Reports the first gradient that was not finite. Returns whether there was one.
     fn tell_faults(&self, progress: &mut dyn Progress) -> Result<bool, OfflineError> {
         let Some(faults) = self.trainer.faults()? else { return Ok(false) };
-        let view = self.shots.get(faults.view as usize).map_or("", |shot| shot.name.as_str());
+        let view = self.images.shots.get(faults.view as usize).map_or("", |shot| shot.name.as_str());
         progress.note(&format!(
             "note: the gradient of Gaussian {} in view {view} is not finite; such gradients are left out ({} so far)",
             faults.gaussian, faults.count
@@ -271,7 +285,7 @@ impl<'a> Run<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Best {
     pub point: CurvePoint,
-    pub state: [Vec<u8>; 6],
+    pub state: TrainerState,
 }
 
 /// Returns the mean over views of the PSNR against their images, as evaluations compute it.
@@ -302,7 +316,7 @@ fn behind(background: Background) -> Vec3 {
     }
 }
 
-fn describe(point: &CurvePoint, speed: Option<f64>) -> String {
+pub(super) fn describe(point: &CurvePoint, speed: Option<f64>) -> String {
     let CurvePoint { step, loss, training_psnr, psnr } = point;
     let loss = loss.map_or(String::new(), |loss| format!("loss {loss:.5}, "));
     let training = training_psnr.map_or(String::new(), |psnr| format!("training {psnr:.2} dB, "));

@@ -26,7 +26,7 @@ use crate::renderer::layout::{AdamUniforms, InstanceUniforms, LossUniforms, TILE
 use crate::renderer::memory::binding_limit;
 use crate::renderer::shaders::{COMPAT, COMPAT_WITHOUT_TIME};
 use crate::renderer::{FinishedFrame, GpuCapture, GpuError, Headless, ShaderChecks};
-use crate::scene::{GaussianScene, SceneForm, Trained};
+use crate::scene::{GaussianScene, SceneForm, TemporalFilter, Trained};
 use crate::view::{Background, Frame, View};
 use glam::UVec2;
 use std::collections::VecDeque;
@@ -121,12 +121,15 @@ pub struct Faults {
 /// Parameters and moments, as they are on the GPU.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TrainerState {
-    /// Raw parameters, their first and their second moments; the same of the color coefficients.
-    pub buffers: [Vec<u8>; 6],
+    /// Raw parameters, their first and their second moments; the same of the color coefficients, and of the entries of codebooks if colors
+    /// are [tied](Trainer::tie).
+    pub buffers: Vec<Vec<u8>>,
+    /// The temporal filter.
+    pub filter: Option<TemporalFilter>,
 }
 
 impl<'a> Trainer<'a> {
-    /// Uploads a scene in the trained form. Its temporal filter is not used.
+    /// Uploads a scene in the trained form. What its temporal filter leaves out is neither drawn nor trained.
     ///
     /// # Errors
     /// A Gaussian that cannot be drawn, a scene that does not fit one binding of the device, a limit that is too low.
@@ -134,7 +137,7 @@ impl<'a> Trainer<'a> {
         let SceneForm::Trained(trained) = &scene.form else { return Err(TrainerError::NotTrained) };
         let model = trained.parameters.model();
         let records = records(&trained.parameters);
-        let runtime = GaussianScene { filter: None, ..scene.clone() }.into_runtime()?;
+        let runtime = scene.clone().into_runtime()?;
         let plain = model == Model::Static3d || scene.trained_with.force_sh_3d;
         let definitions = match mode {
             GradientMode::Exact => &[][..],
@@ -324,7 +327,7 @@ impl<'a> Trainer<'a> {
         pass.set_pipeline(&passes.project_backward);
         pass.set_bind_group(0, &buffers.splat_gradients, &[]);
         pass.set_bind_group(1, self.capture.geometry(), &[]);
-        pass.set_bind_group(2, self.headless.no_list(), &[]);
+        pass.set_bind_group(2, self.headless.recorded_list(), &[]);
         pass.set_bind_group(3, &self.parameters, &[]);
         pass.dispatch_workgroups((self.capture.len() as u32).div_ceil(64), 1, 1);
     }
@@ -434,26 +437,49 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// A lost device.
     pub fn state(&self) -> Result<TrainerState, GpuError> {
-        let [geometry, color] = [&self.geometry, &self.color].map(|o| [&o.values, &o.moments[0], &o.moments[1]]);
-        let mut state = TrainerState::default();
-        for (bytes, buffer) in state.buffers.iter_mut().zip(geometry.into_iter().chain(color)) {
-            *bytes = self.read(buffer)?;
-        }
-        Ok(state)
+        let buffers = self.stored().into_iter().map(|buffer| self.read(buffer)).collect::<Result<_, _>>()?;
+        Ok(TrainerState { buffers, filter: self.scene.filter.clone() })
     }
 
-    /// Replaces parameters and moments by those of [`state`](Self::state). Returns whether they are of as many Gaussians.
+    /// Replaces parameters, moments and filter by those of [`state`](Self::state). Returns whether they are of as many Gaussians, and of as
+    /// many entries if colors are tied; if not, nothing is replaced.
     pub fn resume(&mut self, state: &TrainerState) -> bool {
-        let [geometry, color] = [&self.geometry, &self.color].map(|o| [&o.values, &o.moments[0], &o.moments[1]]);
-        let buffers: Vec<&wgpu::Buffer> = geometry.into_iter().chain(color).collect();
-        if state.buffers.iter().zip(&buffers).any(|(bytes, buffer)| bytes.len() as u64 != buffer.size()) {
+        let buffers = self.stored();
+        let fits = |(bytes, buffer): (&Vec<u8>, &&wgpu::Buffer)| bytes.len() as u64 == buffer.size();
+        if state.buffers.len() != buffers.len() || !state.buffers.iter().zip(&buffers).all(fits) {
             return false;
         }
-        for (bytes, buffer) in state.buffers.iter().zip(buffers) {
+        if state.filter != self.scene.filter
+            && !state.filter.clone().is_some_and(|filter| self.set_filter(filter).is_ok())
+        {
+            return false;
+        }
+        for (bytes, buffer) in state.buffers.iter().zip(self.stored()) {
             self.headless.context().queue.write_buffer(buffer, 0, bytes);
+        }
+        if let Some(tied) = &self.tied {
+            let mut encoder = self.encoder("gs4d expand");
+            self.expand(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), tied);
+            self.headless.context().queue.submit([encoder.finish()]);
         }
         self.slice();
         true
+    }
+
+    /// Returns the buffers of a state, in its order.
+    fn stored(&self) -> Vec<&wgpu::Buffer> {
+        let all = [Some(&self.geometry), Some(&self.color), self.tied.as_ref().map(|tied| &tied.entries)];
+        all.into_iter().flatten().flat_map(|o| [&o.values, &o.moments[0], &o.moments[1]]).collect()
+    }
+
+    /// Replaces the temporal filter.
+    ///
+    /// # Errors
+    /// A filter of another number of Gaussians.
+    pub fn set_filter(&mut self, filter: TemporalFilter) -> Result<(), GpuError> {
+        self.headless.replace_filter(&mut self.capture, &filter, self.scene.trained_with.time_interval)?;
+        self.scene.filter = Some(filter);
+        Ok(())
     }
 
     /// Sets all moments to 0, as before the first step.

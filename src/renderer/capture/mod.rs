@@ -25,7 +25,7 @@ pub struct GpuCapture {
     /// Identifies this upload within the process.
     pub(super) id: u64,
     pub(super) filter: Option<Filter>,
-    /// Bytes of its buffers.
+    /// Bytes of its buffers, without the filter.
     bytes: u64,
     /// Color and time settings of the [`layout::InstanceUniforms`]; the rest is zero.
     settings: layout::InstanceUniforms,
@@ -53,10 +53,12 @@ pub(super) struct Filter {
     interval: [f32; 2],
     /// Active Gaussians, part by part and segment by segment.
     counts: Vec<u32>,
+    /// Bytes of its buffers.
+    bytes: u64,
 }
 
 impl Filter {
-    fn new(filter: &TemporalFilter, interval: [f32; 2], parts: &[Part]) -> Self {
+    fn new(filter: &TemporalFilter, interval: [f32; 2], parts: &[Part], bytes: u64) -> Self {
         let mut counts = Vec::with_capacity(parts.len() * filter.segments as usize);
         let mut first = 0;
         for part in parts {
@@ -68,7 +70,7 @@ impl Filter {
             ActiveSets::Bits(_) => layout::FILTER_BITS,
             ActiveSets::Intervals(_) => layout::FILTER_INTERVALS,
         };
-        Self { mode, segments: filter.segments, interval, counts }
+        Self { mode, segments: filter.segments, interval, counts, bytes }
     }
 
     /// Returns the segment of a time, in the capture's unit.
@@ -135,12 +137,7 @@ impl GpuCapture {
             let both = [geometry.iter().collect::<Vec<_>>(), all.collect()];
             let buffers = both.concat().into_iter().cloned().collect();
             let [geometry, color] = renderer.capture_bind_groups(device, storage, both.each_ref().map(|all| &all[..]));
-            let filter = scene.filter.as_ref().map(|filter| {
-                let sets = buffers::filter(gpu, filter, first..first + count);
-                bytes += sets.size();
-                allocator.bind_group("gs4d filter", &renderer.layouts.filter, &[sets.as_entire_binding()])
-            });
-            parts.push(Part { count: count as u32, geometry, color, buffers, filter });
+            parts.push(Part { count: count as u32, geometry, color, buffers, filter: None });
         }
         bytes += codebooks.iter().map(wgpu::Buffer::size).sum::<u64>();
         let environment = scene.environment.as_ref().map(|map| EnvironmentBuffer {
@@ -158,11 +155,48 @@ impl GpuCapture {
             time_span: scene.trained_with.time_span(),
             ..bytemuck::Zeroable::zeroed()
         };
-        let interval = scene.trained_with.time_interval;
-        let filter = scene.filter.as_ref().map(|filter| Filter::new(filter, interval, &parts));
         let id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
-        renderer.work().add_uploaded(bytes);
-        Ok(Self { parts, environment, storage, id, filter, bytes, settings, len: scene.len() })
+        let mut capture = Self { parts, environment, storage, id, filter: None, bytes, settings, len: scene.len() };
+        if let Some(filter) = &scene.filter {
+            capture.set_filter(gpu, renderer, filter, scene.trained_with.time_interval);
+        }
+        renderer.work().add_uploaded(capture.bytes());
+        Ok(capture)
+    }
+
+    /// Replaces the temporal filter by another of as many Gaussians.
+    fn set_filter(&mut self, gpu: buffers::Gpu<'_>, renderer: &Renderer, filter: &TemporalFilter, interval: [f32; 2]) {
+        let (mut first, mut bytes) = (0, 0);
+        for part in &mut self.parts {
+            let end = first + part.count as usize;
+            let sets = buffers::filter(gpu, filter, first..end);
+            bytes += sets.size();
+            let group = &renderer.layouts.filter;
+            part.filter = Some(gpu.allocator.bind_group("gs4d filter", group, &[sets.as_entire_binding()]));
+            first = end;
+        }
+        self.filter = Some(Filter::new(filter, interval, &self.parts, bytes));
+        // Lists of the old filter are not those of this one.
+        self.id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Replaces the temporal filter, for clients that change the Gaussians. `interval` is the time interval of the capture.
+    ///
+    /// # Errors
+    /// A filter of another number of Gaussians.
+    pub fn replace_filter(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        renderer: &Renderer,
+        filter: &TemporalFilter,
+        interval: [f32; 2],
+    ) -> Result<(), GpuError> {
+        if filter.count != self.len {
+            return Err(GpuError::Scene("the temporal filter is of another number of Gaussians"));
+        }
+        self.set_filter(buffers::Gpu { allocator: renderer.allocator(device), queue }, renderer, filter, interval);
+        Ok(())
     }
 
     /// Returns the number of Gaussians.
@@ -187,7 +221,7 @@ impl GpuCapture {
 
     /// Returns the bytes of its buffers on the GPU.
     pub fn bytes(&self) -> u64 {
-        self.bytes
+        self.bytes + self.filter.as_ref().map_or(0, |filter| filter.bytes)
     }
 
     /// Returns the buffers of records, lifespans and color coefficients, for passes of clients that write them; `None` if the capture is not

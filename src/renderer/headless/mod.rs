@@ -12,7 +12,7 @@ use super::{
     ActiveList, ColorPrecision, Design, GpuCapture, GpuContext, GpuError, Instance, Renderer, ShaderChecks, Storage,
     ViewParameters, ViewRenderer, WorkCounters,
 };
-use crate::scene::RuntimeScene;
+use crate::scene::{RuntimeScene, TemporalFilter};
 use crate::view::{Appearance, Background, Counts, Frame, Picture, View};
 use glam::{UVec2, Vec3};
 
@@ -181,7 +181,7 @@ impl Headless {
         self.submit_whole(&[instance(capture, None, view)], &parameters).map(|_| ())
     }
 
-    /// Records a frame of all Gaussians of one capture, without waiting for it. Pairs for which there is no room are left out; earlier
+    /// Records a frame of one capture, with its filter, without waiting for it. Pairs for which there is no room are left out; earlier
     /// frames make room for those of later ones. Submit the encoder before the next frame is recorded.
     ///
     /// # Errors
@@ -194,12 +194,29 @@ impl Headless {
         background: Background,
     ) -> Result<(), GpuError> {
         self.set_design(Design::Reference);
+        let active = self.take_active(capture, view.time);
         let GpuContext { device, queue, .. } = &self.context;
         let parameters = ViewParameters { background, ..ViewParameters::default() };
-        let instances = [instance(capture, None, view)];
-        self.view.prepare(device, queue, &self.renderer, &instances, &parameters)?;
-        self.view.record(&self.renderer, encoder, &instances);
-        Ok(())
+        let instances = [instance(capture, active.as_ref(), view)];
+        let prepared = self.view.prepare(device, queue, &self.renderer, &instances, &parameters);
+        if prepared.is_ok() {
+            self.view.record(&self.renderer, encoder, &instances);
+        }
+        self.active = active;
+        prepared
+    }
+
+    /// Replaces the temporal filter of a capture. `interval` is the time interval of the capture.
+    ///
+    /// # Errors
+    /// As [`GpuCapture::replace_filter`].
+    pub fn replace_filter(
+        &self,
+        capture: &mut GpuCapture,
+        filter: &TemporalFilter,
+        interval: [f32; 2],
+    ) -> Result<(), GpuError> {
+        capture.replace_filter(&self.context.device, &self.context.queue, &self.renderer, filter, interval)
     }
 
     /// Returns the bind group layouts of the geometry of captures in single precision and of lists of active Gaussians, for passes of
@@ -211,6 +228,12 @@ impl Headless {
     /// Returns the bind group to use instead of a list of active Gaussians when all are drawn.
     pub fn no_list(&self) -> &wgpu::BindGroup {
         &self.renderer.no_list
+    }
+
+    /// Returns the bind group of the list of the Gaussians that were active in the frame [recorded](Self::record) last; without a filter,
+    /// that of no list.
+    pub fn recorded_list(&self) -> &wgpu::BindGroup {
+        self.active.as_ref().map_or(&self.renderer.no_list, |active| &active.list)
     }
 
     /// Returns the resources of the last frame on the GPU; `None` before the first.

@@ -1,0 +1,86 @@
+//! The last phase of a run: codebooks of color that are trained with everything else, and compression.
+//!
+//! In: a run with the best parameters. Out: the scene in the packed form, and the quality before it was compressed.
+
+use super::CurvePoint;
+use super::resume::Checkpoint;
+use super::run::{Progressed, Run, Saves, describe};
+use super::schedule::decay;
+use crate::offline::quantize::{self, CompressSettings, Quality, compress_tied, train_codebooks};
+use crate::offline::{OfflineError, Progress};
+use crate::scene::GaussianScene;
+
+/// Gaussians for each entry of a codebook, at least, and entries of a codebook, at least.
+const GAUSSIANS_OF_ENTRY: usize = 64;
+const LEAST_ENTRIES: usize = 64;
+/// Factor on the rates while codebooks are trained.
+const RATE: f64 = 0.5;
+
+/// Returns the settings of a quality, with codebooks that suit a number of Gaussians.
+pub(crate) fn settings_of(quality: Quality, gaussians: usize) -> CompressSettings {
+    let mut settings = CompressSettings::from(quality);
+    let suiting = (gaussians / GAUSSIANS_OF_ENTRY).next_power_of_two().max(LEAST_ENTRIES);
+    settings.codebooks.iter_mut().for_each(|entries| *entries = (*entries).min(suiting));
+    settings
+}
+
+impl Run<'_> {
+    /// Codes the colors by codebooks whose number of entries follows that of the Gaussians, trains these and everything else for some more
+    /// steps, and compresses the result. A stored run goes on where it ended.
+    pub(super) fn compress(
+        &mut self,
+        quality: Quality,
+        steps: usize,
+        found: &mut Progressed,
+        stored: Option<Checkpoint>,
+        saves: Option<Saves<'_>>,
+        progress: &mut dyn Progress,
+    ) -> Result<GaussianScene, OfflineError> {
+        let made = self.settings.steps;
+        self.trainer.forget_moments();
+        let scene = self.trainer.scene()?.into_runtime()?;
+        let settings = settings_of(quality, scene.len());
+        let steps = if settings.codebooks.is_empty() { 0 } else { steps };
+        let mut step = 0;
+        if steps > 0 {
+            // The same scene gives the same codes: they are not stored.
+            self.trainer.tie(train_codebooks(&scene, &settings)?)?;
+            let stored = stored.and_then(|stored| Some((stored.coded?, stored.state)));
+            if let Some((coded, state)) = stored
+                && self.trainer.resume(&state)
+            {
+                progress.note(&format!("the codebooks go on after step {coded}"));
+                step = coded;
+            }
+        }
+        progress.begin("training codebooks", steps);
+        (0..step).for_each(|_| progress.advance());
+        self.trainer.totals()?;
+        while step < steps && !found.interrupted {
+            self.step(made + step, step + 1, RATE * decay(step, steps, self.settings.last_rate))?;
+            step += 1;
+            progress.advance();
+            found.interrupted = progress.is_interrupted();
+            if let Some(saves) = saves
+                && (saves.are_due(step) || found.interrupted)
+            {
+                let Progressed { curve, best, .. } = &*found;
+                let state = self.trainer.state()?;
+                let checkpoint = Checkpoint { curve: curve.clone(), best: best.clone(), state, coded: Some(step) };
+                saves.store(&checkpoint, progress)?;
+            }
+        }
+        progress.finish();
+        let scene = self.scene()?.into_runtime()?;
+        let (compressed, _) = match self.trainer.codebooks()? {
+            Some(books) => compress_tied(scene, &settings, &books)?,
+            None => quantize::compress(scene, &settings)?,
+        };
+        let totals = self.trainer.totals()?;
+        let (loss, training_psnr) = (Some(totals.loss), Some(totals.psnr));
+        let point = CurvePoint { step: made + step, loss, training_psnr, psnr: self.evaluate()? };
+        progress.note(&describe(&point, None));
+        found.curve.push(point);
+        Ok(compressed)
+    }
+}

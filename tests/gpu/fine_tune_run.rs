@@ -1,0 +1,187 @@
+//! Whole runs of fine-tuning: with a temporal filter, interrupted and resumed.
+//!
+//! In: a small synthetic scene, its own pictures as a dataset. Out: proof that what a filter leaves out is not trained, that the filter
+//! follows the Gaussians, and that an interrupted run ends as another. Skipped where there is no GPU.
+
+use crate::support::{dataset, gpu};
+use bevy_gs4d::gaussian::GradientMode;
+use bevy_gs4d::offline::dataset::{Split, TrainingView};
+use bevy_gs4d::offline::fine_tune::{
+    FineTuneSettings, FineTuned, Rates, Resume, Sample, Trainer, TrainingImages, fine_tune,
+};
+use bevy_gs4d::offline::prune::select;
+use bevy_gs4d::offline::quantize::Quality;
+use bevy_gs4d::offline::splits::open_split;
+use bevy_gs4d::offline::work::{Fingerprint, Work};
+use bevy_gs4d::offline::{NoProgress, Progress};
+use bevy_gs4d::renderer::Headless;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{FilterKind, GaussianScene, SceneForm, TemporalFilter, Trained};
+use bevy_gs4d::view::Background;
+use glam::{UVec2, Vec3};
+use tempfile::TempDir;
+
+const COUNT: usize = 300;
+
+/// A scene and its views, with images in a folder.
+struct Lesson {
+    folder: TempDir,
+    scene: GaussianScene,
+    views: Vec<TrainingView>,
+}
+
+impl Lesson {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let scene = synthesize(&SynthSettings { count: COUNT, ..SynthSettings::default() });
+        let runtime = scene.clone().into_runtime().expect("a synthetic scene can be drawn");
+        let data = folder.path().join("data");
+        dataset::write(&data, &runtime, Vec3::ZERO, 3, 4, UVec2::splat(40), true);
+        let views = open_split(&data, Split::Train, None, &scene.trained_with, &mut NoProgress);
+        Self { scene, views: views.expect("it was just written").views, folder }
+    }
+
+    /// Returns the scene with darker colors and a filter.
+    fn disturbed(&self, filter: Option<TemporalFilter>) -> GaussianScene {
+        let mut scene = GaussianScene { filter, ..self.scene.clone() };
+        trained(&mut scene).harmonics.values.iter_mut().for_each(|value| *value *= 0.7);
+        scene
+    }
+
+    fn work(&self, name: &str) -> Work {
+        Work::beside(&self.folder.path().join(name), ".tune").expect("the folder can be written to")
+    }
+}
+
+fn trained(scene: &mut GaussianScene) -> &mut Trained {
+    let SceneForm::Trained(trained) = &mut scene.form else { panic!("the trained form") };
+    trained
+}
+
+/// Returns a filter of two segments: the even Gaussians in the first, those that three divides in the second.
+fn filter(kind: FilterKind) -> TemporalFilter {
+    let mut bits = vec![0; 2 * TemporalFilter::words(COUNT)];
+    for index in 0..COUNT {
+        for (segment, divisor) in [2, 3].into_iter().enumerate() {
+            bits[segment * TemporalFilter::words(COUNT) + index / 32] |=
+                u32::from(index % divisor == 0) << (index % 32);
+        }
+    }
+    TemporalFilter::from_bits(kind, 2, COUNT, bits)
+}
+
+#[test]
+fn what_a_filter_leaves_out_is_not_trained() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new();
+    let images = TrainingImages::load(&lesson.views, 0, &lesson.scene.trained_with, &mut NoProgress);
+    assert_eq!(images.expect("they were just written").len(), 12, "all views");
+    let mut gradients = |scene: GaussianScene, view: &TrainingView| {
+        let mut trainer = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("it can be trained");
+        let image = trainer.upload(&view.load_covered().expect("it was just written")).expect("it fits");
+        let view = view.camera.view(view.time, lesson.scene.trained_with.raster_fov);
+        let background = Background::Color([0.3; 3]);
+        let sample = Sample { view: &view, image: &image, background, number: 0 };
+        trainer.accumulate(&[sample], 0.2).expect("it is drawn");
+        trainer.gradients().expect("they can be read")
+    };
+    for (time, divisor) in [(0.0, 2), (1.0, 3)] {
+        let view = lesson.views.iter().find(|view| view.time == time).expect("both ends have views");
+        let mut found = gradients(lesson.disturbed(Some(filter(FilterKind::KeyFrame))), view);
+        let kept: Vec<u32> = (0..COUNT as u32).filter(|index| index % divisor == 0).collect();
+        let mut alone = gradients(select(&lesson.disturbed(None), &kept), view);
+        let mut active = select(&found, &kept);
+        assert_eq!(trained(&mut active).parameters, trained(&mut alone).parameters, "as if there were no others");
+        assert_eq!(trained(&mut active).harmonics, trained(&mut alone).harmonics, "as if there were no others");
+        assert!(trained(&mut alone).harmonics.values.iter().any(|&value| value != 0.0), "there is something to learn");
+        let parameters = &trained(&mut found).parameters;
+        let still = (0..COUNT)
+            .filter(|index| index % divisor as usize != 0)
+            .all(|index| parameters.mean[index] == [0.0; 3] && parameters.opacity_logit[index] == 0.0);
+        assert!(still, "at time {time} the others have no gradient");
+    }
+}
+
+#[test]
+fn a_filter_of_what_views_see_follows_the_gaussians_and_support_comes_last() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new();
+    let mut run = |kind, refresh_filter| {
+        let settings = FineTuneSettings {
+            steps: 6,
+            held_out: 2,
+            evaluate_every: 3,
+            refresh_filter,
+            ..FineTuneSettings::default()
+        };
+        let scene = lesson.disturbed(Some(filter(kind)));
+        let tuned = fine_tune(&mut headless, scene, &lesson.views, &settings, None, &mut NoProgress);
+        let filter = tuned.expect("it can be trained").scene.filter.expect("it had one");
+        assert_eq!((filter.kind, filter.segments, filter.count), (kind, 2, COUNT), "of the same kind");
+        filter
+    };
+    assert_eq!(run(FilterKind::KeyFrame, 100), filter(FilterKind::KeyFrame), "not computed again");
+    let seen = run(FilterKind::KeyFrame, 2);
+    assert!(seen.active_share() > filter(FilterKind::KeyFrame).active_share(), "most Gaussians are seen");
+    assert_ne!(run(FilterKind::Support, 100), filter(FilterKind::Support), "the lifespans that were trained");
+}
+
+/// Interrupts a task at one of its steps.
+struct Interrupting {
+    task: &'static str,
+    left: usize,
+    /// The tasks that have begun and not finished.
+    running: Vec<&'static str>,
+}
+
+impl Progress for Interrupting {
+    fn begin(&mut self, task: &'static str, _: usize) {
+        self.running.push(task);
+    }
+
+    fn advance(&mut self) {
+        if self.running.last() == Some(&self.task) {
+            self.left = self.left.saturating_sub(1);
+        }
+    }
+
+    fn finish(&mut self) {
+        self.running.pop();
+    }
+
+    fn note(&mut self, _: &str) {}
+
+    fn is_interrupted(&self) -> bool {
+        self.left == 0
+    }
+}
+
+#[test]
+fn runs_that_were_interrupted_end_as_others() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new();
+    let settings = FineTuneSettings {
+        steps: 8,
+        held_out: 2,
+        evaluate_every: 2,
+        rates: Rates { mean: 2e-3, color: 1e-2, ..Rates::OURS },
+        refresh_filter: 3,
+        compress: Some((Quality::Balanced, 6)),
+        ..FineTuneSettings::default()
+    };
+    let run = |headless: &mut Headless, work: &Work, progress: &mut dyn Progress| -> FineTuned {
+        let resume = Resume { work, fingerprint: Fingerprint(7), every: 1 };
+        let scene = lesson.disturbed(Some(filter(FilterKind::KeyFrame)));
+        fine_tune(headless, scene, &lesson.views, &settings, Some(resume), progress).expect("it can be trained")
+    };
+    let whole = run(&mut headless, &lesson.work("whole"), &mut NoProgress);
+    assert!(!whole.interrupted, "nobody interrupts it");
+    for (task, left) in [("fine-tuning", 4), ("training codebooks", 2)] {
+        let work = lesson.work(task);
+        let stopped = run(&mut headless, &work, &mut Interrupting { task, left, running: Vec::new() });
+        assert!(stopped.interrupted, "{task} is interrupted");
+        let resumed = run(&mut headless, &work, &mut NoProgress);
+        assert!(!resumed.interrupted && resumed.scene == whole.scene, "{task}: the same scene");
+        assert_eq!(resumed.best, whole.best, "{task}: the same quality");
+    }
+}
