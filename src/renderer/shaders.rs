@@ -27,6 +27,7 @@ const LIBRARIES: &[(&str, &str)] = &[
     ("nearest", include_str!("../../shaders/shared/nearest.wgsl")),
     ("pixel", include_str!("../../shaders/shared/pixel.wgsl")),
     ("trained", include_str!("../../shaders/shared/trained.wgsl")),
+    ("slice_backward", include_str!("../../shaders/shared/slice_backward.wgsl")),
     ("pairs", include_str!("../../shaders/shared/pairs.wgsl")),
 ];
 
