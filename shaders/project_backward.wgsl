@@ -17,6 +17,8 @@ const LOW_PASS: f32 = 0.3;
 const TAU: f32 = 6.2831853;
 // As in `blend_backward`.
 const SUMS: u32 = 10u;
+// Place of the first Gaussian in the notes.
+const FIRST_SEEN: u32 = 3u;
 
 @group(0) @binding(1) var<uniform> scene: TrainedScene;
 @group(0) @binding(2) var<storage, read> splats: array<SplatRecord>;
@@ -28,7 +30,8 @@ const SUMS: u32 = 10u;
 @group(3) @binding(2) var<storage, read_write> trained_gradients: array<TrainedRecord>;
 @group(3) @binding(3) var<storage, read_write> harmonic_gradients: array<vec4<f32>>;
 // Gradients that are not finite so far: their number, one more than the index of the Gaussian and the number of the view of the first.
-@group(3) @binding(4) var<storage, read_write> faults: array<atomic<u32>, 3>;
+// Then a word for each Gaussian: 1 if a view of the batch shows it.
+@group(3) @binding(4) var<storage, read_write> notes: array<atomic<u32>>;
 
 // Sums over the pairs of a splat, see `blend_backward`.
 struct Sums {
@@ -142,6 +145,7 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let index = index_of(id.x);
+    atomicStore(&notes[FIRST_SEEN + index], 1u);
     let splat = read_splat(splats[slot]);
     let sums = sums_of(slot);
     if !is_finite(vec4(sums.center, sums.opacity, sums.color.x)) || !is_finite(vec4(sums.conic, sums.color.y + sums.color.z + sums.depth)) {
@@ -265,8 +269,8 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
 
 // Notes a gradient that is not finite; it is left out.
 fn report(index: u32) {
-    if atomicAdd(&faults[0], 1u) == 0u {
-        atomicStore(&faults[1], index + 1u);
-        atomicStore(&faults[2], scene.view);
+    if atomicAdd(&notes[0], 1u) == 0u {
+        atomicStore(&notes[1], index + 1u);
+        atomicStore(&notes[2], scene.view);
     }
 }

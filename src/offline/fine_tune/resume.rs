@@ -24,7 +24,7 @@ pub(super) struct Checkpoint {
 struct Head {
     curve: Vec<CurvePoint>,
     best: CurvePoint,
-    /// Bytes of each buffer: of the state, then of the best.
+    /// Bytes of each buffer: of the state, its neighbors, then of the best.
     sizes: Vec<usize>,
 }
 
@@ -36,7 +36,8 @@ impl Checkpoint {
         fingerprint: Fingerprint,
         progress: &mut dyn Progress,
     ) -> Result<(), OfflineError> {
-        let buffers: Vec<&Vec<u8>> = self.state.buffers.iter().chain(&self.best.state).collect();
+        let TrainerState { buffers, neighbors } = &self.state;
+        let buffers: Vec<&Vec<u8>> = buffers.iter().chain([neighbors]).chain(&self.best.state).collect();
         let sizes = buffers.iter().map(|buffer| buffer.len()).collect();
         let head = Head { curve: self.curve.clone(), best: self.best.point, sizes };
         let head = ron::to_string(&head)?;
@@ -58,8 +59,9 @@ impl Checkpoint {
             buffers.push(buffer.to_vec());
             rest = left;
         }
-        let best_state: [Vec<u8>; 6] = (buffers.len() == 12).then(|| buffers.split_off(6))?.try_into().ok()?;
-        let state = TrainerState { buffers: buffers.try_into().ok()? };
+        let best_state: [Vec<u8>; 6] = (buffers.len() == 13).then(|| buffers.split_off(7))?.try_into().ok()?;
+        let neighbors = buffers.pop()?;
+        let state = TrainerState { buffers: buffers.try_into().ok()?, neighbors };
         Some(Self { curve, best: Best { point: best, state: best_state }, state })
     }
 }

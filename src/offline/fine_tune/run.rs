@@ -164,7 +164,7 @@ impl<'a> Run<'a> {
         }
         progress.finish();
         let faults = self.trainer.faults()?;
-        self.trainer.resume(&TrainerState { buffers: best.state });
+        self.trainer.resume(&TrainerState { buffers: best.state, ..TrainerState::default() });
         let scene = match settings.compress {
             Some((quality, steps)) if !interrupted => self.compress(quality, steps, &mut curve, filter, progress)?,
             _ => GaussianScene { filter, ..self.trainer.scene()? },
