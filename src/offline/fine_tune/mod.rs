@@ -53,6 +53,10 @@ pub struct FineTuneSettings {
     pub last_rate: f64,
     /// Share of SSIM in the loss. Default: 0.2.
     pub similarity_share: f64,
+    /// Weights of further terms of the loss. Default: 0.
+    pub terms: Terms,
+    /// Whether a step leaves Gaussians as they are that none of its views shows. Default: `false`.
+    pub sparse: bool,
     /// What is behind images that do not cover all of their pixels.
     pub behind: Behind,
     /// Seed of the order of views and of random backgrounds.
@@ -78,6 +82,8 @@ impl Default for FineTuneSettings {
             rates: Rates::OURS,
             last_rate: 0.05,
             similarity_share: 0.2,
+            terms: Terms::default(),
+            sparse: false,
             behind: Behind::default(),
             seed: 0,
             held_out: 8,

@@ -87,7 +87,9 @@ impl<'a> Run<'a> {
             Ok(views.iter().zip(images).map(shot).collect())
         };
         let (shots, held_out) = (load(&trained_on, progress)?, load(&held_out, progress)?);
-        let trainer = Trainer::new(headless, scene, settings.mode)?;
+        let mut trainer = Trainer::new(headless, scene, settings.mode)?;
+        trainer.set_terms(settings.terms)?;
+        trainer.set_sparse(settings.sparse);
         let random = settings.behind == Behind::Random
             && background != Background::Environment
             && shots.iter().any(|shot| shot.image.has_gaps);
@@ -247,6 +249,7 @@ impl<'a> Run<'a> {
             });
         }
         self.trainer.accumulate(&batch, settings.similarity_share)?;
+        self.trainer.accumulate_terms(step)?;
         Ok(self.trainer.step(&settings.rates, factor, count)?)
     }
 
