@@ -1,23 +1,33 @@
 // adam: one step of the optimizer Adam, for four values by each thread.
-// In: gradients summed over the views of a batch, moments, rates. Out: parameters and moments; the gradients are 0 again. CPU reference:
-// src/offline/fine_tune/adam.rs.
+// In: gradients summed over the views of a batch, moments, rates. Out: parameters and moments; the gradients are 0 again. What no view of
+// the batch shows stays as it is, if that is asked for. CPU reference: src/offline/fine_tune/adam.rs.
 #import gs4d::types::AdamUniforms
 
 const DECAY_1: f32 = 0.9;
 const DECAY_2: f32 = 0.999;
 const EPSILON: f32 = 1e-15;
+// As in `project_backward`.
+const FIRST_SEEN: u32 = 3u;
 
 @group(0) @binding(0) var<uniform> settings: AdamUniforms;
 @group(0) @binding(1) var<storage, read_write> values: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read_write> gradients: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read_write> first_moments: array<vec4<f32>>;
 @group(0) @binding(4) var<storage, read_write> second_moments: array<vec4<f32>>;
+// What `project_backward` notes: from FIRST_SEEN on 1 for each Gaussian that a view of the batch shows.
+@group(0) @binding(5) var<storage, read> notes: array<u32>;
 
 // Each Gaussian has `stride` four-vectors; the rates of the first few are their own, those of the others are the last.
 @compute @workgroup_size(256)
 fn adam(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     for (var i = id.x; i < settings.count * settings.stride; i += groups.x * 256u) {
         let gradient = gradients[i];
+        gradients[i] = vec4(0.0);
+        if settings.sparse.x != 0u {
+            if notes[FIRST_SEEN + i / settings.stride] == 0u {
+                continue;
+            }
+        }
         let first = DECAY_1 * first_moments[i] + (1.0 - DECAY_1) * gradient;
         let second = DECAY_2 * second_moments[i] + (1.0 - DECAY_2) * gradient * gradient;
         let rate = settings.rates[min(i % settings.stride, 4u)];
@@ -25,6 +35,5 @@ fn adam(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) g
         values[i] -= rate * settings.correction.x * first / scaled;
         first_moments[i] = first;
         second_moments[i] = second;
-        gradients[i] = vec4(0.0);
     }
 }

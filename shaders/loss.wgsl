@@ -1,5 +1,6 @@
 // loss: how far a picture is from its image, and the gradient with respect to each pixel.
-// In: color over the background, the image. Out: (1 - share) L1 + share (1 - SSIM) of the view, and its gradient.
+// In: color over the background and transmittance, the image. Out: (1 - share) L1 + share (1 - SSIM) + weight mask of the view, and its
+// gradient. The mask is the mean over pixels of -(1 - coverage) log(1 - opacity): where the image covers nothing there should be nothing.
 // `similarity` writes the derivatives of SSIM with respect to the windowed means; `gradient` spreads them over the windows and adds L1, with
 // sums for each tile; `total` adds these to the sums of all views so far. CPU reference: src/offline/fine_tune/loss.rs.
 //
@@ -12,6 +13,8 @@ const SIDE: u32 = 16u;
 const REACH: u32 = 26u;
 const C1: f32 = 0.0001;
 const C2: f32 = 0.0009;
+// The mask clamps opacity to this distance from 0 and 1.
+const MARGIN: f32 = 1e-6;
 
 @group(0) @binding(0) var<uniform> loss: LossUniforms;
 @group(0) @binding(1) var color: texture_2d<f32>;
@@ -19,7 +22,7 @@ const C2: f32 = 0.0009;
 @group(0) @binding(2) var<storage, read_write> slopes: array<vec4<f32>>;
 // Gradient with respect to red, green, blue and opacity of each pixel.
 @group(0) @binding(3) var<storage, read_write> pixel_gradients: array<vec4<f32>>;
-// Of each tile: sums of the absolute difference, of SSIM and of the squared difference of the clamped colors.
+// Of each tile: sums of the absolute difference, of SSIM, of the squared difference of the clamped colors and of the mask.
 @group(0) @binding(4) var<storage, read_write> tile_sums: array<vec4<f32>>;
 // Loss, absolute difference, squared difference and number of views so far.
 @group(0) @binding(5) var<storage, read_write> totals: array<vec4<f32>>;
@@ -30,7 +33,7 @@ const C2: f32 = 0.0009;
 var<workgroup> field: array<vec3<f32>, 676>;
 var<workgroup> rows_a: array<vec3<f32>, 416>;
 var<workgroup> rows_b: array<vec2<f32>, 416>;
-var<workgroup> sums: array<vec3<f32>, 256>;
+var<workgroup> sums: array<vec4<f32>, 256>;
 
 fn window(i: u32) -> f32 {
     let weights = array<f32, 6>(0.26601172, 0.21300553, 0.10936069, 0.03600077, 0.00759874, 0.00102838);
@@ -49,6 +52,10 @@ fn index_of(at: vec2<i32>) -> u32 {
 fn image_at(at: vec2<i32>) -> vec3<f32> {
     let texel = unpack4x8unorm(image[index_of(at)]);
     return texel.xyz + (1.0 - texel.w) * loss.background.xyz;
+}
+
+fn coverage_at(at: vec2<i32>) -> f32 {
+    return unpack4x8unorm(image[index_of(at)]).w;
 }
 
 // Returns the place of an element of the field in the picture.
@@ -108,11 +115,14 @@ fn gradient(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_in
     let own = vec2(thread % SIDE, thread / SIDE);
     let at = vec2<i32>(tile.xy * SIDE + own);
     let inside = is_inside(at);
-    var rendered = vec3(0.0);
+    // Color, transmittance.
+    var rendered = vec4(0.0);
     var expected = vec3(0.0);
+    var uncovered = 0.0;
     if inside {
-        rendered = textureLoad(color, at, 0).xyz;
+        rendered = textureLoad(color, at, 0);
         expected = image_at(at);
+        uncovered = 1.0 - coverage_at(at);
     }
     var by_similarity = vec3(0.0);
     var similarity_sum = 0.0;
@@ -144,33 +154,40 @@ fn gradient(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_in
         }
         workgroupBarrier();
     }
-    let difference = rendered - expected;
-    let clamped = clamp(rendered, vec3(0.0), vec3(1.0)) - expected;
+    let difference = rendered.xyz - expected;
+    let clamped = clamp(rendered.xyz, vec3(0.0), vec3(1.0)) - expected;
     if inside {
-        let values = 3.0 * f32(loss.size.x * loss.size.y);
+        let pixels = f32(loss.size.x * loss.size.y);
         let gradient = (1.0 - loss.similarity_share) * sign(difference) - loss.similarity_share * by_similarity;
-        pixel_gradients[index_of(at)] = vec4(gradient * loss.share / values, 0.0);
-        sums[thread] = vec3(dot(abs(difference), vec3(1.0)), similarity_sum, dot(clamped, clamped));
+        let left = clamp(rendered.w, MARGIN, 1.0 - MARGIN);
+        // A clamped opacity does not change.
+        let by_opacity = select(0.0, loss.mask_weight * uncovered / left, left == rendered.w);
+        pixel_gradients[index_of(at)] =
+            vec4(gradient * loss.share / (3.0 * pixels), by_opacity * loss.share / pixels);
+        sums[thread] =
+            vec4(dot(abs(difference), vec3(1.0)), similarity_sum, dot(clamped, clamped), -uncovered * log(left));
     } else {
-        sums[thread] = vec3(0.0);
+        sums[thread] = vec4(0.0);
     }
     add_sums(thread);
     if thread == 0u {
-        tile_sums[tile.y * loss.tiles.x + tile.x] = vec4(sums[0], 0.0);
+        tile_sums[tile.y * loss.tiles.x + tile.x] = sums[0];
     }
 }
 
 @compute @workgroup_size(256)
 fn total(@builtin(local_invocation_index) thread: u32) {
-    var sum = vec3(0.0);
+    var sum = vec4(0.0);
     for (var i = thread; i < loss.tiles.x * loss.tiles.y; i += 256u) {
-        sum += tile_sums[i].xyz;
+        sum += tile_sums[i];
     }
     sums[thread] = sum;
     add_sums(thread);
     if thread == 0u {
-        let mean = sums[0] / (3.0 * f32(loss.size.x * loss.size.y));
-        let value = (1.0 - loss.similarity_share) * mean.x + loss.similarity_share * (1.0 - mean.y);
+        let pixels = f32(loss.size.x * loss.size.y);
+        let mean = sums[0].xyz / (3.0 * pixels);
+        let mask = loss.mask_weight * sums[0].w / pixels;
+        let value = (1.0 - loss.similarity_share) * mean.x + loss.similarity_share * (1.0 - mean.y) + mask;
         totals[0] += vec4(value, mean.x, mean.z, 1.0);
     }
 }

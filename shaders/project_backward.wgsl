@@ -8,7 +8,8 @@
 #import gs4d::capture::{index_of, instance, load_gaussian}
 #import gs4d::harmonics::{basis_first, basis_second, basis_third, basis_fourth, time_angle, time_cosine}
 #import gs4d::harmonics::{slope_first, slope_second, slope_third, slope_fourth}
-#import gs4d::trained::{left_matrix, opacity_of, outer, right_matrix, rotation_3d, slice_of, ROTATED_4D, STATIC_3D}
+#import gs4d::trained::{opacity_of, outer, slice_of, STATIC_3D, UNROTATED_4D}
+#import gs4d::slice_backward::{is_finite, is_finite_slice, through_slice}
 
 // As in `project`.
 const FRUSTUM_CLAMP: f32 = 1.3;
@@ -16,6 +17,8 @@ const LOW_PASS: f32 = 0.3;
 const TAU: f32 = 6.2831853;
 // As in `blend_backward`.
 const SUMS: u32 = 10u;
+// Place of the first Gaussian in the notes.
+const FIRST_SEEN: u32 = 3u;
 
 @group(0) @binding(1) var<uniform> scene: TrainedScene;
 @group(0) @binding(2) var<storage, read> splats: array<SplatRecord>;
@@ -27,7 +30,8 @@ const SUMS: u32 = 10u;
 @group(3) @binding(2) var<storage, read_write> trained_gradients: array<TrainedRecord>;
 @group(3) @binding(3) var<storage, read_write> harmonic_gradients: array<vec4<f32>>;
 // Gradients that are not finite so far: their number, one more than the index of the Gaussian and the number of the view of the first.
-@group(3) @binding(4) var<storage, read_write> faults: array<atomic<u32>, 3>;
+// Then a word for each Gaussian: 1 if a view of the batch shows it.
+@group(3) @binding(4) var<storage, read_write> notes: array<atomic<u32>>;
 
 // Sums over the pairs of a splat, see `blend_backward`.
 struct Sums {
@@ -131,55 +135,6 @@ fn color_backward(index: u32, g: vec3<f32>, d: vec3<f32>, tau: f32) -> ColorSlop
     return slope;
 }
 
-// Returns the gradient of a raw quaternion from that of its unit quaternion.
-fn raw_rotation(raw: vec4<f32>, unit: vec4<f32>, gradient: vec4<f32>) -> vec4<f32> {
-    return (gradient - unit * dot(unit, gradient)) / length(raw);
-}
-
-// Returns the gradients with respect to l and r from those of the matrices L and R; see left_matrix. Matrices are m[column][row].
-fn left_gradient(h: mat4x4<f32>) -> vec4<f32> {
-    return vec4(
-        h[0][0] + h[1][1] + h[2][2] + h[3][3],
-        h[1][0] - h[0][1] + h[3][2] - h[2][3],
-        -h[2][0] + h[3][1] + h[0][2] - h[1][3],
-        h[3][0] + h[2][1] - h[1][2] - h[0][3],
-    );
-}
-
-fn right_gradient(k: mat4x4<f32>) -> vec4<f32> {
-    return vec4(
-        k[0][0] + k[1][1] + k[2][2] + k[3][3],
-        k[1][0] - k[0][1] - k[3][2] + k[2][3],
-        -k[2][0] - k[3][1] + k[0][2] + k[1][3],
-        -k[3][0] + k[2][1] - k[1][2] + k[0][3],
-    );
-}
-
-// Returns the gradient with respect to a unit quaternion from that of its rotation matrix g[column][row].
-fn rotation_gradient(q: vec4<f32>, g: mat3x3<f32>) -> vec4<f32> {
-    let w = q.x;
-    let x = q.y;
-    let y = q.z;
-    let z = q.w;
-    let g01 = g[1][0];
-    let g02 = g[2][0];
-    let g10 = g[0][1];
-    let g12 = g[2][1];
-    let g20 = g[0][2];
-    let g21 = g[1][2];
-    return 2.0 * vec4(
-        -z * g01 + y * g02 + z * g10 - x * g12 - y * g20 + x * g21,
-        y * g01 + z * g02 + y * g10 - 2.0 * x * g[1][1] - w * g12 + z * g20 + w * g21 - 2.0 * x * g[2][2],
-        -2.0 * y * g[0][0] + x * g01 + w * g02 + x * g10 + z * g12 - w * g20 + z * g21 - 2.0 * y * g[2][2],
-        -2.0 * z * g[0][0] - w * g01 + x * g02 + w * g10 - 2.0 * z * g[1][1] + y * g12 + x * g20 + y * g21,
-    );
-}
-
-fn is_finite(v: vec4<f32>) -> bool {
-    // Written so that NaN is not finite.
-    return all(abs(v) <= vec4(3.4e38));
-}
-
 @compute @workgroup_size(64)
 fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x >= instance.count {
@@ -190,6 +145,7 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let index = index_of(id.x);
+    atomicStore(&notes[FIRST_SEEN + index], 1u);
     let splat = read_splat(splats[slot]);
     let sums = sums_of(slot);
     if !is_finite(vec4(sums.center, sums.opacity, sums.color.x)) || !is_finite(vec4(sums.conic, sums.color.y + sums.color.z + sums.depth)) {
@@ -279,72 +235,32 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
     if scene.model == STATIC_3D {
         marginal = 1.0;
     }
-    // The gradient with respect to the marginal, times the marginal.
-    let by_marginal = by_opacity * opacity * marginal;
-    var by_v = by_marginal * dt * dt / (2.0 * variance * variance);
-    var by_log_scale = vec4(0.0);
-    var by_l = vec4(0.0);
-    var by_r = vec4(0.0);
-    let scale = exp(raw.log_scale);
-    let l = normalize(raw.rotation_l);
     var by_peak = by_opacity * marginal;
-    if scene.model == ROTATED_4D {
-        let v = sliced.v;
-        let by_velocity = dot(by_mean, sliced.c);
-        let gc = by_covariance * sliced.c;
-        by_v += dot(sliced.c, gc) / (v * v) - dt / (v * v) * by_velocity;
-        by_mean_t += by_marginal * dt / variance - by_velocity / v;
-        let half_c = -gc / v + 0.5 * dt / v * by_mean;
-        let g4 = mat4x4(
-            vec4(by_covariance[0], half_c.x),
-            vec4(by_covariance[1], half_c.y),
-            vec4(by_covariance[2], half_c.z),
-            vec4(half_c, by_v),
-        );
-        let r = normalize(raw.rotation_r);
-        let left = left_matrix(l);
-        let right = right_matrix(r);
-        let turn = left * right;
-        let x = 2.0 * (g4 * turn);
-        let squares = scale * scale;
-        by_log_scale = squares * vec4(dot(x[0], turn[0]), dot(x[1], turn[1]), dot(x[2], turn[2]), dot(x[3], turn[3]));
-        let by_turn = mat4x4(x[0] * squares.x, x[1] * squares.y, x[2] * squares.z, x[3] * squares.w);
-        by_l = raw_rotation(raw.rotation_l, l, left_gradient(by_turn * transpose(right)));
-        by_r = raw_rotation(raw.rotation_r, r, right_gradient(transpose(left) * by_turn));
-    } else {
-        let turn = rotation_3d(l);
-        let x = 2.0 * (by_covariance * turn);
-        let squares = scale.xyz * scale.xyz;
-        by_log_scale = vec4(squares * vec3(dot(x[0], turn[0]), dot(x[1], turn[1]), dot(x[2], turn[2])), 0.0);
-        let by_turn = mat3x3(x[0] * squares.x, x[1] * squares.y, x[2] * squares.z);
-        by_l = raw_rotation(raw.rotation_l, l, rotation_gradient(l, by_turn));
-        if scene.model != STATIC_3D {
+    // The gradient with respect to the marginal, times the marginal.
+    var by_marginal = by_opacity * opacity * marginal;
 #ifdef COMPAT
-            by_peak = by_opacity;
-#else
-            by_log_scale.w = by_v * sliced.v;
-            by_mean_t += by_marginal * dt / variance;
-#endif
-        }
+    if scene.model == UNROTATED_4D {
+        by_peak = by_opacity;
+        by_marginal = 0.0;
     }
+#endif
+    by_mean_t += by_marginal * dt / variance - dot(by_mean, sliced.c) / sliced.v;
     if scene.model == STATIC_3D {
         by_mean_t = 0.0;
     }
-    let gradient = TrainedRecord(
-        vec4(by_mean + by_seen, by_mean_t),
-        by_log_scale,
-        by_l,
-        by_r,
-        vec4(by_peak * opacity * (1.0 - opacity), 0.0, 0.0, 0.0),
-    );
-    if is_finite(gradient.mean) && is_finite(by_log_scale) && is_finite(by_l) && is_finite(by_r) && is_finite(gradient.opacity_logit) {
+    let by_variance = by_marginal * dt * dt / (2.0 * variance * variance);
+    // The mean moves by the velocity times dt.
+    let shape = through_slice(raw, scene.model, sliced, by_covariance, dt * by_mean, by_variance);
+    let by_raw_mean = vec4(by_mean + by_seen, by_mean_t);
+    let by_logit = vec4(by_peak * opacity * (1.0 - opacity), 0.0, 0.0, 0.0);
+    if is_finite(by_raw_mean) && is_finite_slice(shape) && is_finite(by_logit) {
         let before = trained_gradients[index];
         trained_gradients[index] = TrainedRecord(
-            before.mean + gradient.mean,
-            before.log_scale + gradient.log_scale,
-            before.rotation_l + gradient.rotation_l,
-            before.rotation_r + gradient.rotation_r,
-            before.opacity_logit + gradient.opacity_logit,
+            before.mean + by_raw_mean,
+            before.log_scale + shape.log_scale,
+            before.rotation_l + shape.rotation_l,
+            before.rotation_r + shape.rotation_r,
+            before.opacity_logit + by_logit,
         );
     } else {
         report(index);
@@ -353,8 +269,8 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
 
 // Notes a gradient that is not finite; it is left out.
 fn report(index: u32) {
-    if atomicAdd(&faults[0], 1u) == 0u {
-        atomicStore(&faults[1], index + 1u);
-        atomicStore(&faults[2], scene.view);
+    if atomicAdd(&notes[0], 1u) == 0u {
+        atomicStore(&notes[1], index + 1u);
+        atomicStore(&notes[2], scene.view);
     }
 }

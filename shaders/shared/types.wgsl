@@ -46,7 +46,9 @@ struct LossUniforms {
     share: f32,
     // Share of SSIM in the loss of the view.
     similarity_share: f32,
-    padding: vec2<u32>,
+    // Weight of the opacity mask.
+    mask_weight: f32,
+    padding: u32,
 }
 
 // Input of `codebooks`.
@@ -69,6 +71,19 @@ struct AdamUniforms {
     count: u32,
     // Four-vectors of each Gaussian.
     stride: u32,
+    // 1: only Gaussians that a view of the batch shows are stepped; three unused.
+    sparse: vec4<u32>,
+}
+
+// Input of `regularize`: the weights of its terms for each Gaussian.
+struct TermWeights {
+    // Of the length of its velocity.
+    motion: f32,
+    // Of the length of the difference from the velocity of a neighbor at the same place.
+    rigid: f32,
+    // Of its opacity.
+    opacity: f32,
+    padding: u32,
 }
 
 // One part of a capture in one view: its camera and the slots of its splats.

@@ -11,7 +11,7 @@ use super::table::{Table, bytes, lines};
 use crate::gaussian::GradientMode;
 use crate::offline::dataset::Split;
 use crate::offline::engine::AdapterDescription;
-use crate::offline::fine_tune::{Behind, CurvePoint, FineTuneSettings, FineTuned, Rates, Resume, fine_tune};
+use crate::offline::fine_tune::{Behind, CurvePoint, FineTuneSettings, FineTuned, Rates, Resume, Terms, fine_tune};
 use crate::offline::quantize::Quality;
 use crate::offline::work::{Fingerprint, Work};
 use serde_json::json;
@@ -56,6 +56,21 @@ pub struct FineTune {
     /// Share of SSIM in the loss; the rest is L1.
     #[arg(long, value_name = "SHARE", default_value = "0.2", value_parser = values::share)]
     similarity: f64,
+    /// Weight of opacity where images cover nothing, in the loss: the original's opacity mask.
+    #[arg(long, value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
+    mask_weight: f64,
+    /// Weight of motion: the mean length of 0.1 times the velocity, in the loss.
+    #[arg(long, value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
+    motion_weight: f64,
+    /// Weight of motion unlike that of the 20 nearest Gaussians, in the loss: the original's rigid term.
+    #[arg(long, value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
+    rigid_weight: f64,
+    /// Weight of the mean opacity, in the loss: what is not needed fades, so that more can be pruned.
+    #[arg(long, value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
+    opacity_weight: f64,
+    /// In each step leave Gaussians as they are, with what the optimizer knows of them, that none of its views shows.
+    #[arg(long)]
+    sparse: bool,
     /// What is behind images that do not cover all pixels: a random color for each view, or that of training.
     #[arg(long, value_name = "WHAT", default_value = "random", value_parser = values::one_of(&BEHIND))]
     behind: Behind,
@@ -179,6 +194,14 @@ impl FineTune {
             rates: Rates { mean: self.rates.mean * self.mean_rate, ..self.rates },
             last_rate: self.last_rate,
             similarity_share: self.similarity,
+            terms: Terms {
+                mask: self.mask_weight,
+                motion: self.motion_weight,
+                rigid: self.rigid_weight,
+                opacity: self.opacity_weight,
+                ..Terms::default()
+            },
+            sparse: self.sparse,
             behind: self.behind,
             seed: self.seed,
             held_out: self.held_out,

@@ -135,6 +135,20 @@ pub fn parameter_gradient(
     gradient
 }
 
+/// Returns the gradient with respect to the raw parameters of the Gaussian at `index`, from that of a loss on what no view
+/// changes: with respect to its velocity c/v and to its peak opacity. Coefficients of color are left out.
+///
+/// # Panics
+/// As [`parameter_gradient`].
+pub fn slice_gradient(parameters: &Parameters, index: usize, velocity: DVec3, opacity: f64) -> ParameterGradient {
+    let gaussian = Moment::new(parameters, index, &SliceSettings::default(), 0.0);
+    let peak = gaussian.opacity;
+    ParameterGradient {
+        opacity_logit: opacity * peak * (1.0 - peak),
+        ..through_sigma(&gaussian, DMat3::ZERO, velocity, 0.0)
+    }
+}
+
 /// A Gaussian at the time of a view, activated and sliced in double precision (section 2 of the 4DGS model).
 ///
 /// All models are one here: a 3D rotation is the 4D rotation by two equal quaternions, which leaves time alone, and a
@@ -408,12 +422,30 @@ fn through_slice(
         (g_splat_opacity * marginal, g_splat_opacity * opacity * marginal)
     };
 
+    let g_variance = g_exponent * dt * dt / (2.0 * variance_marginal * variance_marginal);
+    let g_mean_t = g_exponent * dt / variance_marginal - g_mean.dot(c) / v;
+    let shape = through_sigma(gaussian, g_covariance, g_mean * dt, g_variance);
+    // The original leaves out the modifier.
+    let modifier = if compat { f64::from(settings.slice.scale_modifier) } else { 1.0 };
+    ParameterGradient {
+        mean: g_mean.to_array(),
+        mean_t: if model == Model::Static3d { 0.0 } else { g_mean_t },
+        log_scale: shape.log_scale.map(|gradient| gradient / modifier),
+        log_scale_t: if ignores_marginal { 0.0 } else { shape.log_scale_t / modifier },
+        opacity_logit: g_opacity * opacity * (1.0 - opacity),
+        ..shape
+    }
+}
+
+/// Returns the gradients with respect to scales and rotations, from those with respect to conditional covariance,
+/// velocity c/v and temporal variance; all others are zero.
+fn through_sigma(gaussian: &Moment, g_covariance: DMat3, g_velocity: DVec3, g_variance: f64) -> ParameterGradient {
+    let Moment { model, coupling: c, variance_t: v, .. } = *gaussian;
+
     // The parts of the 4D covariance.
     let coupled = g_covariance * c;
-    let g_c = coupled * (-2.0 / v) + g_mean * (dt / v);
-    let g_v = (c.dot(coupled) - dt * g_mean.dot(c)) / (v * v)
-        + g_exponent * dt * dt / (2.0 * variance_marginal * variance_marginal);
-    let g_mean_t = g_exponent * dt / variance_marginal - g_mean.dot(c) / v;
+    let g_c = coupled * (-2.0 / v) + g_velocity / v;
+    let g_v = (c.dot(coupled) - g_velocity.dot(c)) / (v * v) + g_variance;
     let g_sigma = DMat4::from_cols(
         g_covariance.x_axis.extend(0.5 * g_c.x),
         g_covariance.y_axis.extend(0.5 * g_c.y),
@@ -426,9 +458,7 @@ fn through_slice(
     let x = g_sigma * rotation * 2.0;
     let squared = gaussian.scale * gaussian.scale;
     let columns = DVec4::from([0, 1, 2, 3].map(|i| x.col(i).dot(rotation.col(i))));
-    // The original leaves out the modifier.
-    let modifier = if compat { f64::from(settings.slice.scale_modifier) } else { 1.0 };
-    let g_log_scale = squared * columns / modifier;
+    let g_log_scale = squared * columns;
     let g_rotation = x * DMat4::from_diagonal(squared);
     let along = |m: DMat4| (0..4).map(|i| g_rotation.col(i).dot(m.col(i))).sum::<f64>();
     let (l, r) = (&gaussian.rotation_l, &gaussian.rotation_r);
@@ -440,19 +470,16 @@ fn through_slice(
         Model::Unrotated4d | Model::Static3d => (at_rest(l.raw_gradient(g_l + g_r)), DVec4::ZERO),
     };
     ParameterGradient {
-        mean: g_mean.to_array(),
-        mean_t: if model == Model::Static3d { 0.0 } else { g_mean_t },
         log_scale: g_log_scale.truncate().to_array(),
         log_scale_t: match model {
             Model::Rotated4d => g_log_scale.w,
             // The temporal scale is the square of the deviation.
-            Model::Unrotated4d if !ignores_marginal => 0.5 * g_log_scale.w,
-            Model::Unrotated4d | Model::Static3d => 0.0,
+            Model::Unrotated4d => 0.5 * g_log_scale.w,
+            Model::Static3d => 0.0,
         },
         rotation_l: rotation_l.to_array(),
         rotation_r: rotation_r.to_array(),
-        opacity_logit: g_opacity * opacity * (1.0 - opacity),
-        harmonics: Vec::new(),
+        ..ParameterGradient::default()
     }
 }
 

@@ -21,7 +21,9 @@ mod parameters;
 pub mod projection;
 mod slice;
 
-pub use gradient::{GradientMode, GradientSettings, ParameterGradient, SplatGradient, parameter_gradient};
+pub use gradient::{
+    GradientMode, GradientSettings, ParameterGradient, SplatGradient, parameter_gradient, slice_gradient,
+};
 pub use harmonics::{Harmonics, ShDirection};
 pub use parameters::{Model, Parameters};
 pub use slice::{Gaussian, InvalidGaussian, SliceSettings, rotation_4d};

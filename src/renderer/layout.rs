@@ -65,8 +65,10 @@ pub struct LossUniforms {
     pub share: f32,
     /// Share of SSIM in the loss of the view.
     pub similarity_share: f32,
+    /// Weight of the opacity mask.
+    pub mask_weight: f32,
     /// Unused.
-    pub padding: [u32; 2],
+    pub padding: u32,
 }
 
 /// Input of `codebooks`.
@@ -95,6 +97,25 @@ pub struct AdamUniforms {
     pub count: u32,
     /// Four-vectors of each Gaussian.
     pub stride: u32,
+    /// 1: only Gaussians that a view of the batch shows are stepped; three unused.
+    pub sparse: [u32; 4],
+}
+
+/// Place of the first Gaussian in the notes of `project_backward`, after three words about gradients that are not finite.
+pub const FIRST_SEEN: u32 = 3;
+
+/// Input of `regularize`: the weights of its terms for each Gaussian.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct TermWeights {
+    /// Of the length of its velocity.
+    pub motion: f32,
+    /// Of the length of the difference from the velocity of a neighbor at the same place.
+    pub rigid: f32,
+    /// Of its opacity.
+    pub opacity: f32,
+    /// Unused.
+    pub padding: u32,
 }
 
 /// Input of `project` for one part of a capture in one view. An [`Instance`](super::Instance) may have several parts.

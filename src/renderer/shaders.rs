@@ -27,6 +27,7 @@ const LIBRARIES: &[(&str, &str)] = &[
     ("nearest", include_str!("../../shaders/shared/nearest.wgsl")),
     ("pixel", include_str!("../../shaders/shared/pixel.wgsl")),
     ("trained", include_str!("../../shaders/shared/trained.wgsl")),
+    ("slice_backward", include_str!("../../shaders/shared/slice_backward.wgsl")),
     ("pairs", include_str!("../../shaders/shared/pairs.wgsl")),
 ];
 
@@ -46,6 +47,7 @@ const PASSES: &[(&str, &str)] = &[
     ("loss", include_str!("../../shaders/loss.wgsl")),
     ("blend_backward", include_str!("../../shaders/blend_backward.wgsl")),
     ("project_backward", include_str!("../../shaders/project_backward.wgsl")),
+    ("regularize", include_str!("../../shaders/regularize.wgsl")),
     ("codebooks", include_str!("../../shaders/codebooks.wgsl")),
     ("adam", include_str!("../../shaders/adam.wgsl")),
 ];

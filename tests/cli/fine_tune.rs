@@ -69,7 +69,9 @@ fn training_wins_back_what_pruning_lost() {
     let small = lesson.path("small.gs4d");
     let command = arguments!["finetune", &out, "--data", &lesson.data, "-o", &small];
     let coded = ["--steps", "4", "--held-out", "2", "--compress", "balanced", "--compress-steps", "10", "--json"];
-    gs4d(&[command.to_vec(), coded.map(Into::into).to_vec()].concat()).json();
+    let terms = ["--mask-weight", "--motion-weight", "--rigid-weight", "--opacity-weight"];
+    let terms = terms.into_iter().flat_map(|term| [term, "1e-6"]).chain(["--sparse"]).map(Into::into).collect();
+    gs4d(&[command.to_vec(), coded.map(Into::into).to_vec(), terms].concat()).json();
     let info = gs4d(&arguments!["info", &small, "--json"]).json();
     assert_eq!((info["gaussians"].as_u64(), info["form"].as_str()), (Some(500), Some("packed")), "{info}");
     let psnr = |scene: &PathBuf| {
@@ -93,6 +95,8 @@ fn what_cannot_be_trained_is_refused_and_nothing_is_left() {
     fs::remove_file(&packed).expect("it is there");
     run(&lesson.pruned, &lesson.path("nowhere")).must_fail("nowhere");
     gs4d(&arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &lesson.pruned]).must_fail("itself");
+    let weighted = arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &out, "--rigid-weight=-1"];
+    gs4d(&weighted).must_fail("--rigid-weight");
     // The images of another scene.
     let other = synthesize(&SynthSettings { count: 1000, seed: 9, ..SynthSettings::default() });
     let mut other = other.into_runtime().expect("it can be drawn");

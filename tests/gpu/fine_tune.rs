@@ -4,13 +4,15 @@
 //! lowers the loss. Skipped where there is no GPU.
 
 use crate::support::{golden, gpu};
-use bevy_gs4d::gaussian::{GradientMode, Harmonics, Parameters};
+use bevy_gs4d::gaussian::{GradientMode, Harmonics, ParameterGradient, Parameters};
 use bevy_gs4d::offline::dataset::CoveredImage;
-use bevy_gs4d::offline::fine_tune::{GpuImage, Moments, Rates, Sample, Trainer, adam, loss};
+use bevy_gs4d::offline::fine_tune::{
+    GpuImage, Moments, NEIGHBORS, Rates, Sample, Terms, Trainer, adam, loss, neighbors, opacity_mask, regularization,
+};
 use bevy_gs4d::renderer::Headless;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, SceneForm, Trained};
-use bevy_gs4d::view::{Background, Camera, RasterFov, View};
+use bevy_gs4d::view::{Background, Camera, Frame, RasterFov, View};
 use glam::{UVec2, Vec3};
 use serde_json::{Value, json};
 
@@ -108,9 +110,7 @@ impl Lesson {
         let views: Vec<View> = (0..6).map(view).collect();
         let mut image = |view: &View| {
             let frame = headless.render(&capture, view, Background::Color(BEHIND)).expect("it is drawn");
-            let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
-            let texel = |pixel: &Vec3| [byte(pixel.x), byte(pixel.y), byte(pixel.z), 255];
-            CoveredImage { size, texels: frame.picture.pixels.iter().map(texel).collect(), has_gaps: false }
+            covered(&frame, 255)
         };
         let images = views.iter().map(&mut image).collect();
         Self { scene, views, images }
@@ -135,6 +135,16 @@ impl Lesson {
         scene
     }
 
+    /// Returns the same with Gaussians that all move, none as its neighbors do.
+    fn moving(&self) -> GaussianScene {
+        let mut scene = self.disturbed();
+        let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
+        for (i, rotation) in parameters.rotation_r.iter_mut().enumerate() {
+            rotation[1] += 0.1 + 0.05 * ((i * 37 % 64) as f32 / 32.0 - 1.0);
+        }
+        scene
+    }
+
     fn upload(&self, trainer: &Trainer<'_>) -> Vec<GpuImage> {
         self.images.iter().map(|image| trainer.upload(image).expect("it fits")).collect()
     }
@@ -151,34 +161,252 @@ impl Lesson {
 
 const BEHIND: [f32; 3] = [0.2, 0.1, 0.4];
 
+/// Returns a drawn frame as an image that covers each pixel as much.
+fn covered(frame: &Frame, coverage: u8) -> CoveredImage {
+    let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
+    let texel = |pixel: &Vec3| [byte(pixel.x), byte(pixel.y), byte(pixel.z), coverage];
+    let texels = frame.picture.pixels.iter().map(texel).collect();
+    CoveredImage { size: frame.picture.size, texels, has_gaps: coverage < 255 }
+}
+
 #[test]
 fn the_loss_and_its_gradient_are_those_of_the_reference() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
-    let mut trainer = Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("it can be trained");
-    // A hole in the image shows the background.
+    // Holes in the image show the background, or are masked.
     let mut image = lesson.images[0].clone();
     image.texels[500..560].fill([20, 10, 5, 100]);
-    let images = [trainer.upload(&image).expect("it fits")];
-    let sample = lesson.sample(&images, 0);
-    trainer.accumulate(&[sample], 0.2).expect("it is drawn");
-    let found = trainer.gradients().expect("they can be read");
-    let totals = trainer.totals().expect("they can be read");
-    let picture = trainer.draw(&lesson.views[0], Background::Color(BEHIND)).expect("it is drawn").picture;
-    let expected = loss(&picture, &image.over(Vec3::from(BEHIND)), 0.2).expect("the same size");
-    assert!((totals.loss - expected.value).abs() < 1e-6, "loss {} is {}", totals.loss, expected.value);
-    assert_eq!(totals.views, 1, "of one view");
-    let pixels: Vec<[f32; 4]> = expected.gradient.iter().map(|g| [g.x, g.y, g.z, 0.0]).collect();
-    let scene = trainer.scene().expect("it can be read");
-    let mut other = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("it can be trained");
-    let depths = vec![0.0; pixels.len()];
-    other.accumulate_pixels(&lesson.views[0], Background::Color(BEHIND), &pixels, &depths).expect("it is drawn");
-    let expected = other.gradients().expect("they can be read");
-    let (found, expected) = (trained(&found), trained(&expected));
-    let pairs = tensors(&found.parameters, &found.harmonics).into_iter();
-    for ((name, found), (_, expected)) in pairs.zip(tensors(&expected.parameters, &expected.harmonics)) {
-        let error = relative_error(&found, &expected);
-        assert!(error < 1e-3, "{name} differs by {error:.1e}");
+    image.texels[1800..1960].fill([0; 4]);
+    for weight in [0.0, 0.3] {
+        let scene = lesson.disturbed();
+        let mut trainer = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("it can be trained");
+        trainer.set_terms(Terms { mask: weight, ..Terms::default() }).expect("the weight is right");
+        let images = [trainer.upload(&image).expect("it fits")];
+        let sample = lesson.sample(&images, 0);
+        trainer.accumulate(&[sample], 0.2).expect("it is drawn");
+        let found = trainer.gradients().expect("they can be read");
+        let totals = trainer.totals().expect("they can be read");
+        let frame = trainer.draw(&lesson.views[0], Background::Color(BEHIND)).expect("it is drawn");
+        let expected = loss(&frame.picture, &image.over(Vec3::from(BEHIND)), 0.2).expect("the same size");
+        let mask = opacity_mask(&frame, &image).expect("the same size");
+        assert!(mask.value > 1e-3, "something is drawn in the holes: {}", mask.value);
+        let value = expected.value + weight * mask.value;
+        assert!((totals.loss - value).abs() < 1e-6, "loss {} is {value} with a mask of {weight}", totals.loss);
+        assert_eq!(totals.views, 1, "of one view");
+        let pixel = |(color, opacity): (&Vec3, &f32)| [color.x, color.y, color.z, weight as f32 * opacity];
+        let pixels: Vec<[f32; 4]> = expected.gradient.iter().zip(&mask.gradient).map(pixel).collect();
+        let scene = trainer.scene().expect("it can be read");
+        let mut other = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("it can be trained");
+        let depths = vec![0.0; pixels.len()];
+        other.accumulate_pixels(&lesson.views[0], Background::Color(BEHIND), &pixels, &depths).expect("it is drawn");
+        let expected = other.gradients().expect("they can be read");
+        let (found, expected) = (trained(&found), trained(&expected));
+        let pairs = tensors(&found.parameters, &found.harmonics).into_iter();
+        for ((name, found), (_, expected)) in pairs.zip(tensors(&expected.parameters, &expected.harmonics)) {
+            let error = relative_error(&found, &expected);
+            assert!(error < 1e-3, "{name} differs by {error:.1e} with a mask of {weight}");
+        }
+    }
+}
+
+/// Returns gradients as the parameters that they are of, in single precision.
+fn as_parameters(gradients: &[ParameterGradient]) -> Parameters {
+    fn each<T>(gradients: &[ParameterGradient], value: impl Fn(&ParameterGradient) -> T) -> Vec<T> {
+        gradients.iter().map(value).collect()
+    }
+    fn single<const N: usize>(values: [f64; N]) -> [f32; N] {
+        values.map(|value| value as f32)
+    }
+    Parameters {
+        mean: each(gradients, |gradient| single(gradient.mean)),
+        mean_t: each(gradients, |gradient| gradient.mean_t as f32),
+        log_scale: each(gradients, |gradient| single(gradient.log_scale)),
+        log_scale_t: each(gradients, |gradient| gradient.log_scale_t as f32),
+        rotation_l: each(gradients, |gradient| single(gradient.rotation_l)),
+        rotation_r: each(gradients, |gradient| single(gradient.rotation_r)),
+        opacity_logit: each(gradients, |gradient| gradient.opacity_logit as f32),
+    }
+}
+
+/// Terms of Gaussians alone, each with the only weight.
+const TERMS: [(&str, [f64; 3]); 3] =
+    [("motion", [0.7, 0.0, 0.0]), ("rigid", [0.0, 30.0, 0.0]), ("opacity", [0.0, 0.0, 0.5])];
+
+fn terms([motion, rigid, opacity]: [f64; 3]) -> Terms {
+    Terms { motion, rigid, opacity, ..Terms::default() }
+}
+
+#[test]
+fn the_gradients_of_terms_are_those_of_the_reference() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let scene = Lesson::new(&mut headless).moving();
+    let Trained { parameters, harmonics } = trained(&scene);
+    let near = neighbors(&parameters.mean);
+    for (term, weights) in TERMS {
+        let terms = terms(weights);
+        let mut trainer = Trainer::new(&mut headless, scene.clone(), GradientMode::Exact).expect("it can be trained");
+        trainer.set_terms(terms).expect("the weights are right");
+        trainer.accumulate_terms(0).expect("they are added");
+        let found = trainer.gradients().expect("they can be read");
+        let expected = regularization(parameters, &near, &terms).expect("they can be drawn").gradients;
+        let none = Harmonics { values: vec![0.0; harmonics.values.len()], ..harmonics.clone() };
+        let expected = tensors(&as_parameters(&expected), &none);
+        let moves = expected.iter().filter(|(_, values)| values.iter().any(|&value| value != 0.0)).count();
+        assert_eq!(moves, if term == "opacity" { 1 } else { 4 }, "{term}: tensors that it moves");
+        let found = tensors(&trained(&found).parameters, &trained(&found).harmonics);
+        for ((name, found), (_, expected)) in found.iter().zip(&expected) {
+            let error = relative_error(found, expected);
+            println!("{term:8} {name:14} {error:.1e}");
+            assert!(error <= 1e-3, "{term}: {name} differs by {error:.1e}");
+        }
+    }
+}
+
+#[test]
+fn fifty_steps_lower_each_term() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new(&mut headless);
+    // The shares that are left: of opacity a step takes at most 0.05 of each logit.
+    for ((term, weights), most) in TERMS.into_iter().zip([0.25, 0.25, 0.6]) {
+        let mut trainer = Trainer::new(&mut headless, lesson.moving(), GradientMode::Exact).expect("it can be trained");
+        let terms = terms(weights);
+        trainer.set_terms(terms).expect("the weights are right");
+        let value = |trainer: &Trainer<'_>| {
+            let scene = trainer.scene().expect("it can be read");
+            let parameters = &trained(&scene).parameters;
+            let found = regularization(parameters, &neighbors(&parameters.mean), &terms).expect("they can be drawn");
+            terms.motion * found.motion + terms.rigid * found.rigid + terms.opacity * found.opacity
+        };
+        let before = value(&trainer);
+        for step in 0..50 {
+            trainer.accumulate_terms(step).expect("they are added");
+            trainer.step(&Rates::OURS, 1.0, step + 1).expect("it is made");
+        }
+        let after = value(&trainer);
+        assert!(after < most * before, "{term} falls from {before:.3e} to {after:.3e}");
+    }
+}
+
+#[test]
+fn the_mask_empties_what_images_do_not_cover() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new(&mut headless);
+    let black = Background::Color([0.0; 3]);
+    let mut left_after = |weight: f64| {
+        let mut trainer =
+            Trainer::new(&mut headless, lesson.scene.clone(), GradientMode::Exact).expect("it can be trained");
+        trainer.set_terms(Terms { mask: weight, ..Terms::default() }).expect("the weight is right");
+        // The scene's own pictures: only the mask asks for anything else.
+        let draw = |trainer: &mut Trainer<'_>, view: &View| trainer.draw(view, black).expect("it is drawn");
+        let images: Vec<CoveredImage> = lesson.views.iter().map(|view| covered(&draw(&mut trainer, view), 0)).collect();
+        let value = |trainer: &mut Trainer<'_>| -> f64 {
+            let pairs = lesson.views.iter().zip(&images);
+            pairs.map(|(view, image)| opacity_mask(&draw(trainer, view), image).expect("the same size").value).sum()
+        };
+        let before = value(&mut trainer);
+        let uploaded: Vec<GpuImage> = images.iter().map(|image| trainer.upload(image).expect("it fits")).collect();
+        for step in 0..50 {
+            let index = step % 6;
+            let (view, image) = (&lesson.views[index], &uploaded[index]);
+            let sample = Sample { view, image, background: black, number: index as u32 };
+            trainer.accumulate(&[sample], 0.2).expect("it is drawn");
+            trainer.step(&Rates::OURS, 1.0, step + 1).expect("it is made");
+        }
+        value(&mut trainer) / before
+    };
+    let (with, without) = (left_after(1.0), left_after(0.0));
+    assert!(with < 0.6, "of what is not covered {with:.3} is left");
+    assert!(without > 0.7, "without a weight {without:.3} is left");
+}
+
+#[test]
+fn sparse_steps_leave_what_no_view_shows_as_it_is() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new(&mut headless);
+    let mut train = |sparse: bool| {
+        let mut trainer =
+            Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("it can be trained");
+        trainer.set_terms(Terms { opacity: 0.01, ..Terms::default() }).expect("the weight is right");
+        trainer.set_sparse(sparse);
+        let images = lesson.upload(&trainer);
+        // What any view shows gets moments.
+        let all: Vec<Sample<'_>> = (0..6).map(|index| lesson.sample(&images, index)).collect();
+        trainer.accumulate(&all, 0.2).expect("they are drawn");
+        trainer.step(&Rates::OURS, 1.0, 1).expect("it is made");
+        let (scene, before) = (trainer.scene().expect("it can be read"), trainer.state().expect("it can be read"));
+        trainer.accumulate(&all[..1], 0.2).expect("it is drawn");
+        let gradients = trainer.gradients().expect("they can be read");
+        trainer.accumulate_terms(1).expect("they are added");
+        trainer.step(&Rates::OURS, 1.0, 2).expect("it is made");
+        let left = trainer.gradients().expect("they can be read");
+        let left = tensors(&trained(&left).parameters, &trained(&left).harmonics);
+        assert!(left.iter().all(|(_, values)| values.iter().all(|&v| v == 0.0)), "gradients begin anew");
+        let after = trainer.state().expect("it can be read");
+        let changed = move |index: usize| {
+            let own = |bytes: &Vec<u8>| {
+                let size = bytes.len() / 400;
+                bytes[index * size..][..size].to_vec()
+            };
+            let pairs = before.buffers.iter().zip(&after.buffers);
+            pairs.filter(|(before, after)| own(before) != own(after)).count()
+        };
+        let shown: Vec<bool> = trained(&gradients).parameters.opacity_logit.iter().map(|&g| g != 0.0).collect();
+        let scene = scene.into_runtime().expect("it can be drawn");
+        // Well below what is drawn at that time.
+        let absent = (0..400).filter(|&index| scene.gaussian(index).marginal(lesson.views[0].time) < 0.04);
+        (absent.collect::<Vec<usize>>(), shown, changed)
+    };
+    let (absent, shown, changed) = train(true);
+    assert!(absent.len() > 20, "{} are absent", absent.len());
+    assert!(absent.iter().all(|&index| changed(index) == 0), "no value and no moment of these changes");
+    let mut shown = (0..400).filter(|&index| shown[index]);
+    assert!(shown.clone().count() > 20, "others are shown");
+    assert!(shown.all(|index| changed(index) > 0), "and all of them change");
+    let (absent, _, changed) = train(false);
+    let moved = absent.iter().filter(|&&index| changed(index) > 0).count();
+    assert!(moved > 20, "otherwise {moved} of them move on");
+}
+
+#[test]
+fn neighbors_are_part_of_the_state() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new(&mut headless);
+    let terms = Terms { rigid: 30.0, search_every: 8, ..Terms::default() };
+    let mut train = |pause: Option<usize>| {
+        let mut trainer = Trainer::new(&mut headless, lesson.moving(), GradientMode::Exact).expect("it can be trained");
+        trainer.set_terms(terms).expect("the weight is right");
+        let rates = Rates { mean: 2e-3, ..Rates::OURS };
+        let images = lesson.upload(&trainer);
+        for step in 0..20 {
+            if pause == Some(step) {
+                let state = trainer.state().expect("it can be read");
+                assert_eq!(state.neighbors.len(), 400 * NEIGHBORS * 4, "neighbors of each");
+                trainer = Trainer::new(&mut headless, lesson.moving(), GradientMode::Exact).expect("it can be trained");
+                trainer.set_terms(terms).expect("the weight is right");
+                assert!(trainer.resume(&state), "the state is of as many Gaussians");
+                assert!(trainer.state().expect("it can be read") == state, "and is the same again");
+                let mut wrong = state.clone();
+                wrong.neighbors[..4].copy_from_slice(&400u32.to_le_bytes());
+                assert!(!trainer.resume(&wrong), "there is no Gaussian 400");
+            }
+            trainer.accumulate(&[lesson.sample(&images, step % 6)], 0.2).expect("it is drawn");
+            trainer.accumulate_terms(step).expect("they are added");
+            trainer.step(&rates, 1.0, step + 1).expect("it is made");
+        }
+        trainer.scene().expect("it can be read")
+    };
+    assert!(train(None) == train(Some(11)), "to the bit");
+}
+
+#[test]
+fn a_weight_that_is_not_a_number_is_refused() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new(&mut headless);
+    let mut trainer =
+        Trainer::new(&mut headless, lesson.scene.clone(), GradientMode::Exact).expect("it can be trained");
+    for (name, weights) in [("motion", [f64::NAN, 0.0, 0.0]), ("rigid", [0.0, -1.0, 0.0])] {
+        let refused = trainer.set_terms(terms(weights)).expect_err("it is refused").to_string();
+        assert!(refused.contains(name), "{name} is named: {refused}");
     }
 }
 

@@ -5,9 +5,10 @@
 use bevy_gs4d::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
 use bevy_gs4d::gaussian::projection::LOW_PASS;
 use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF};
+use bevy_gs4d::offline::fine_tune::NEIGHBORS;
 use bevy_gs4d::renderer::layout::{
-    self, Activation, AdamUniforms, BLOCK, Counters, DIGITS, FrameUniforms, InstanceUniforms, LossUniforms, SortStep,
-    SplatRecord, SplatShape, TiedColors, TrainedRecord, TrainedScene, VisibleSplat,
+    self, Activation, AdamUniforms, BLOCK, Counters, DIGITS, FIRST_SEEN, FrameUniforms, InstanceUniforms, LossUniforms,
+    SortStep, SplatRecord, SplatShape, TermWeights, TiedColors, TrainedRecord, TrainedScene, VisibleSplat,
 };
 use bevy_gs4d::renderer::shaders::{compose, pass_names};
 use bevy_gs4d::view::TILE_SIZE;
@@ -70,7 +71,7 @@ fn splat() -> Mirror {
     in_fours(mirror, "SplatRecord", ["place", "shape", "color", ""])
 }
 
-fn mirrors() -> [Mirror; 14] {
+fn mirrors() -> [Mirror; 15] {
     [
         gaussian(),
         mirror!(InstanceUniforms {
@@ -138,9 +139,10 @@ fn mirrors() -> [Mirror; 14] {
         mirror!(SortStep { shift, source, stride, padding }),
         trained(),
         mirror!(TrainedScene { count, model, prefilter_var, view }),
-        mirror!(LossUniforms { background, size, tiles, share, similarity_share, padding }),
+        mirror!(LossUniforms { background, size, tiles, share, similarity_share, mask_weight, padding }),
         mirror!(TiedColors { count, stride, stages, padding }),
-        mirror!(AdamUniforms { rates, correction, count, stride }),
+        mirror!(AdamUniforms { rates, correction, count, stride, sparse }),
+        mirror!(TermWeights { motion, rigid, opacity, padding }),
     ]
 }
 
@@ -229,7 +231,7 @@ fn constant(module: &Module, name: &str) -> f64 {
 fn constants_of_the_passes_are_those_of_the_host() {
     let modules = modules();
     let threads = 256;
-    let expected: [(&str, &str, f64); 14] = [
+    let expected: [(&str, &str, f64); 17] = [
         ("activate", "BLOCK", BLOCK.into()),
         ("activate", "PER_THREAD", (BLOCK / threads).into()),
         ("project", "MARGINAL_CUTOFF", MARGINAL_CUTOFF.into()),
@@ -243,6 +245,9 @@ fn constants_of_the_passes_are_those_of_the_host() {
         ("score", "PIXELS", (TILE_SIZE * TILE_SIZE).into()),
         ("blend_backward", "PIXELS", (TILE_SIZE * TILE_SIZE).into()),
         ("project_backward", "LOW_PASS", LOW_PASS.into()),
+        ("project_backward", "FIRST_SEEN", FIRST_SEEN.into()),
+        ("adam", "FIRST_SEEN", FIRST_SEEN.into()),
+        ("regularize", "NEIGHBORS", NEIGHBORS as f64),
         ("loss", "SIDE", TILE_SIZE.into()),
     ];
     for (pass, name, value) in expected {

@@ -3,28 +3,33 @@
 //! In: a scene in the trained form, its training views with their images, [`FineTuneSettings`]. Out: the scene with the best parameters that
 //! were found ([`FineTuned`]), and how its quality developed. The number of Gaussians stays.
 //!
-//! Some training views are held out: they tell which parameters are the best. The loss is `0.8 L1 + 0.2 (1 − SSIM)`, the optimizer Adam
-//! (section 6 of the 4DGS model). Views, backgrounds and rates of a step follow from its number alone, so that a run which is resumed ends
-//! as one which was not interrupted.
+//! Some training views are held out: they tell which parameters are the best. The loss is `0.8 L1 + 0.2 (1 − SSIM)`, with further [`Terms`]
+//! if these have weights, the optimizer Adam (section 6 of the 4DGS model). Views, backgrounds and rates of a step follow from its number
+//! alone, so that a run which is resumed ends as one which was not interrupted.
 
 mod adam;
 mod belonging;
 mod coding;
 mod loss;
+mod neighbors;
 mod optimized;
 mod passes;
 mod records;
+mod regularizer;
 mod resume;
 mod run;
 mod schedule;
 mod targets;
+mod terms;
 mod tied;
 mod trainer;
 
 pub use adam::{DECAY, Moments, adam};
-pub use loss::{Loss, loss};
+pub use loss::{Loss, OpacityMask, loss, opacity_mask};
+pub use neighbors::{NEIGHBORS, neighbors};
 pub use schedule::{Behind, Rates};
 pub use targets::TrainingImages;
+pub use terms::{Regularization, Terms, regularization};
 pub use trainer::{Faults, GpuImage, Sample, Totals, Trainer, TrainerError, TrainerState};
 
 use super::dataset::TrainingView;
@@ -50,6 +55,10 @@ pub struct FineTuneSettings {
     pub last_rate: f64,
     /// Share of SSIM in the loss. Default: 0.2.
     pub similarity_share: f64,
+    /// Weights of further terms of the loss. Default: 0.
+    pub terms: Terms,
+    /// Whether a step leaves Gaussians as they are that none of its views shows. Default: `false`.
+    pub sparse: bool,
     /// What is behind images that do not cover all of their pixels.
     pub behind: Behind,
     /// Seed of the order of views and of random backgrounds.
@@ -77,6 +86,8 @@ impl Default for FineTuneSettings {
             rates: Rates::OURS,
             last_rate: 0.05,
             similarity_share: 0.2,
+            terms: Terms::default(),
+            sparse: false,
             behind: Behind::default(),
             seed: 0,
             held_out: 8,

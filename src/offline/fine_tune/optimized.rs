@@ -21,15 +21,22 @@ pub(super) struct Optimized {
 }
 
 impl Optimized {
-    /// Creates gradients and moments, which are 0, beside the values.
-    pub fn new(headless: &Headless, passes: &Passes, values: wgpu::Buffer, count: u32, stride: u32) -> Self {
+    /// Creates gradients and moments, which are 0, beside the values. `notes` say which Gaussians were seen.
+    pub fn new(
+        headless: &Headless,
+        passes: &Passes,
+        notes: &wgpu::Buffer,
+        values: wgpu::Buffer,
+        count: u32,
+        stride: u32,
+    ) -> Self {
         let allocator = headless.allocator();
         let size = u64::from(count) * u64::from(stride) * 16;
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
         let gradients = allocator.buffer("gs4d gradients", size, usage);
         let moments = [(); 2].map(|()| allocator.buffer("gs4d moments", size, usage));
         let settings = allocator.buffer("gs4d adam", size_of::<AdamUniforms>() as u64, BufferUsages::UNIFORM);
-        let buffers = [&settings, &values, &gradients, &moments[0], &moments[1]];
+        let buffers = [&settings, &values, &gradients, &moments[0], &moments[1], notes];
         let resources = buffers.map(wgpu::Buffer::as_entire_binding);
         let group = allocator.bind_group("gs4d adam", &passes.adam_group, &resources);
         Self { values, gradients, moments, settings, group, count, stride }

@@ -32,7 +32,7 @@ struct Head {
     states: [StateHead; 2],
 }
 
-/// The contents of a state: bytes of each buffer, then those of the bits of the filter.
+/// The contents of a state: bytes of each buffer, then those of the neighbors and of the bits of the filter.
 #[derive(Serialize, Deserialize)]
 struct StateHead {
     sizes: Vec<usize>,
@@ -46,7 +46,7 @@ type FilterHead = (FilterKind, u32, usize);
 fn parts(state: &TrainerState) -> (StateHead, Vec<Vec<u8>>) {
     let filter = state.filter.as_ref();
     let bits = filter.map(|filter| bytes(&filter.to_bits()));
-    let buffers: Vec<_> = state.buffers.iter().cloned().chain(bits).collect();
+    let buffers: Vec<_> = state.buffers.iter().chain([&state.neighbors]).cloned().chain(bits).collect();
     let filter = filter.map(|filter| (filter.kind, filter.segments, filter.count));
     (StateHead { sizes: buffers.iter().map(Vec::len).collect(), filter }, buffers)
 }
@@ -65,6 +65,7 @@ fn state<'a>(head: &StateHead, mut rest: &'a [u8]) -> Option<(TrainerState, &'a 
         let filter = (bits.len() == expected).then(|| TemporalFilter::from_bits(kind, segments, count, bits));
         state.filter = Some(filter?);
     }
+    state.neighbors = state.buffers.pop()?;
     Some((state, rest))
 }
 

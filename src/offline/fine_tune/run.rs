@@ -95,7 +95,9 @@ impl<'a> Run<'a> {
             false => (None, Some(filter.segments)),
         });
         scene.filter = used;
-        let trainer = Trainer::new(headless, scene, settings.mode)?;
+        let mut trainer = Trainer::new(headless, scene, settings.mode)?;
+        trainer.set_terms(settings.terms)?;
+        trainer.set_sparse(settings.sparse);
         let random = settings.behind == Behind::Random
             && background != Background::Environment
             && images.shots.iter().any(|shot| shot.image.has_gaps);
@@ -261,6 +263,7 @@ impl<'a> Run<'a> {
             });
         }
         self.trainer.accumulate(&batch, settings.similarity_share)?;
+        self.trainer.accumulate_terms(step)?;
         Ok(self.trainer.step(&settings.rates, factor, count)?)
     }
 

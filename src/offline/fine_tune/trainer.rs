@@ -9,20 +9,25 @@
 //! | the passes of the reference design | records, color | splats, pairs, picture |
 //! | `loss` | picture, image | gradients of pixels, sums |
 //! | `blend_backward` | splats, pairs, gradients of pixels | gradients of pairs |
-//! | `project_backward` | gradients of pairs, parameters | gradients of raw parameters, added up over a batch |
-//! | `adam` | gradients, moments | parameters |
+//! | `project_backward` | gradients of pairs, parameters | gradients of raw parameters, added up over a batch; which Gaussians were seen |
+//! | `regularize` | parameters, their slice, neighbors | gradients of raw parameters, if there are [`Terms`] of Gaussians alone |
+//! | `adam` | gradients, moments | parameters; of Gaussians that were seen only, if steps are [sparse](Trainer::set_sparse) |
 //! | `codebooks` | gradients of coefficients; entries | gradients of entries; coefficients, once colors are [tied](Trainer::tie) |
 
 use super::adam::correction;
 use super::optimized::Optimized;
 use super::passes::Passes;
 use super::records::{records, set_harmonics, set_parameters};
+use super::regularizer::Regularizer;
 use super::schedule::Rates;
+use super::terms::Terms;
 use super::tied::Tied;
 use crate::gaussian::harmonics::evaluated;
 use crate::gaussian::{GradientMode, InvalidGaussian, Model};
 use crate::offline::dataset::CoveredImage;
-use crate::renderer::layout::{AdamUniforms, InstanceUniforms, LossUniforms, TILE_SIZE, TrainedRecord, TrainedScene};
+use crate::renderer::layout::{
+    AdamUniforms, FIRST_SEEN, InstanceUniforms, LossUniforms, TILE_SIZE, TrainedRecord, TrainedScene,
+};
 use crate::renderer::memory::binding_limit;
 use crate::renderer::shaders::{COMPAT, COMPAT_WITHOUT_TIME};
 use crate::renderer::{FinishedFrame, GpuCapture, GpuError, Headless, ShaderChecks};
@@ -36,6 +41,8 @@ use wgpu::BufferUsages;
 const SUMS: u64 = 10;
 /// Steps that may be submitted before the first of them has finished.
 const STEPS_IN_FLIGHT: usize = 4;
+/// Bytes of the notes of `project_backward` about gradients that are not finite, before a word for each Gaussian.
+const FAULT_BYTES: u64 = 4 * FIRST_SEEN as u64;
 /// Most workgroups of `adam`.
 pub(super) const ADAM_GROUPS: u32 = 4096;
 
@@ -64,14 +71,18 @@ pub struct Trainer<'a> {
     /// What is not trained: switches, coefficients that are not evaluated.
     scene: GaussianScene,
     model: Model,
-    geometry: Optimized,
+    pub(super) geometry: Optimized,
     pub(super) color: Optimized,
-    scene_settings: wgpu::Buffer,
+    pub(super) scene_settings: wgpu::Buffer,
     slice: wgpu::BindGroup,
     parameters: wgpu::BindGroup,
-    faults: wgpu::Buffer,
+    /// Gradients that were not finite; which Gaussians the views since the last step have shown.
+    pub(super) notes: wgpu::Buffer,
     totals: wgpu::Buffer,
     pub(super) tied: Option<Tied>,
+    pub(super) terms: Terms,
+    pub(super) regularizer: Option<Regularizer>,
+    sparse: bool,
     view: Option<ViewBuffers>,
     in_flight: VecDeque<wgpu::SubmissionIndex>,
 }
@@ -99,7 +110,7 @@ pub struct Sample<'a> {
 /// Sums over the views since the last report.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Totals {
-    /// Mean loss.
+    /// Mean loss, without the terms of Gaussians alone.
     pub loss: f64,
     /// PSNR of all pixels together, dB.
     pub psnr: f64,
@@ -118,12 +129,14 @@ pub struct Faults {
     pub view: u32,
 }
 
-/// Parameters and moments, as they are on the GPU.
+/// Parameters, moments and neighbors, as they are on the GPU.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TrainerState {
     /// Raw parameters, their first and their second moments; the same of the color coefficients, and of the entries of codebooks if colors
     /// are [tied](Trainer::tie).
     pub buffers: Vec<Vec<u8>>,
+    /// The neighbors of each Gaussian; empty if no term needs them.
+    pub neighbors: Vec<u8>,
     /// The temporal filter.
     pub filter: Option<TemporalFilter>,
 }
@@ -162,18 +175,18 @@ impl<'a> Trainer<'a> {
         let storage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
         let raw = allocator.buffer("gs4d trained", size_of_val(&records[..]) as u64, storage);
         queue.write_buffer(&raw, 0, bytemuck::cast_slice(&records));
-        let geometry = Optimized::new(headless, &passes, raw, count, 5);
-        let color = Optimized::new(headless, &passes, harmonics, count, stride);
+        let notes = allocator.buffer("gs4d notes", FAULT_BYTES + 4 * u64::from(count), storage);
+        let geometry = Optimized::new(headless, &passes, &notes, raw, count, 5);
+        let color = Optimized::new(headless, &passes, &notes, harmonics, count, stride);
         let uniform = BufferUsages::UNIFORM;
         let scene_settings = allocator.buffer("gs4d trained scene", size_of::<TrainedScene>() as u64, uniform);
-        let faults = allocator.buffer("gs4d faults", 12, storage);
         let totals = allocator.buffer("gs4d totals", 16, storage);
         let slice = allocator.bind_group(
             "gs4d slice",
             &passes.slice_group,
             &[&scene_settings, &geometry.values, &gaussians, &lifespans].map(wgpu::Buffer::as_entire_binding),
         );
-        let buffers = [&geometry.values, &color.values, &geometry.gradients, &color.gradients, &faults];
+        let buffers = [&geometry.values, &color.values, &geometry.gradients, &color.gradients, &notes];
         let parameters = allocator.bind_group(
             "gs4d parameters",
             &passes.parameters_group,
@@ -190,9 +203,12 @@ impl<'a> Trainer<'a> {
             scene_settings,
             slice,
             parameters,
-            faults,
+            notes,
             totals,
             tied: None,
+            terms: Terms::default(),
+            regularizer: None,
+            sparse: false,
             view: None,
             in_flight: VecDeque::new(),
         };
@@ -263,7 +279,8 @@ impl<'a> Trainer<'a> {
                 tiles: sample.view.tiles().to_array(),
                 share,
                 similarity_share: similarity_share as f32,
-                padding: [0; 2],
+                mask_weight: self.terms.mask as f32,
+                padding: 0,
             };
             queue.write_buffer(&buffers.loss_settings, 0, bytemuck::bytes_of(&settings));
             self.write_scene(sample.number);
@@ -332,6 +349,12 @@ impl<'a> Trainer<'a> {
         pass.dispatch_workgroups((self.capture.len() as u32).div_ceil(64), 1, 1);
     }
 
+    /// Sets whether a step leaves Gaussians as they are, with their moments, that no view of its batch shows. Default: `false`. Entries of
+    /// codebooks are stepped in any case.
+    pub fn set_sparse(&mut self, sparse: bool) {
+        self.sparse = sparse;
+    }
+
     /// Makes a step with the gradients accumulated so far, which become 0; the first `step` is 1.
     ///
     /// # Errors
@@ -340,14 +363,15 @@ impl<'a> Trainer<'a> {
         let count = self.capture.len() as u32;
         let scale = self.scene.trained_with.spatial_lr_scale;
         let colors = rates.of_harmonics(factor);
-        let mut rated = vec![(&self.geometry, rates.of_parameters(scale, factor))];
+        let sparse = u32::from(self.sparse);
+        let mut rated = vec![(&self.geometry, rates.of_parameters(scale, factor), sparse)];
         match &self.tied {
-            // The first coefficient of each Gaussian is its own.
+            // The first coefficient of each Gaussian is its own; entries are of many.
             Some(tied) => rated.extend([
-                (&self.color, Rates { harmonics: 0.0, ..*rates }.of_harmonics(factor)),
-                (&tied.entries, [colors[1]; 5]),
+                (&self.color, Rates { harmonics: 0.0, ..*rates }.of_harmonics(factor), sparse),
+                (&tied.entries, [colors[1]; 5], 0),
             ]),
-            None => rated.push((&self.color, colors)),
+            None => rated.push((&self.color, colors, sparse)),
         }
         let queue = &self.headless.context().queue;
         let mut encoder = self.encoder("gs4d step");
@@ -359,9 +383,10 @@ impl<'a> Trainer<'a> {
                 pass.dispatch_workgroups(entries.count, 1, 1);
             }
             pass.set_pipeline(&self.passes.adam);
-            for (optimized, rates) in rated {
+            for (optimized, rates, sparse) in rated {
                 let Optimized { count, stride, .. } = *optimized;
-                let settings = AdamUniforms { rates, correction: correction(step), count, stride };
+                let sparse = [sparse, 0, 0, 0];
+                let settings = AdamUniforms { rates, correction: correction(step), count, stride, sparse };
                 queue.write_buffer(&optimized.settings, 0, bytemuck::bytes_of(&settings));
                 pass.set_bind_group(0, &optimized.group, &[]);
                 pass.dispatch_workgroups((count * stride).div_ceil(256).min(ADAM_GROUPS), 1, 1);
@@ -373,6 +398,7 @@ impl<'a> Trainer<'a> {
             pass.set_bind_group(0, &self.slice, &[]);
             pass.dispatch_workgroups(count.div_ceil(256), 1, 1);
         }
+        encoder.clear_buffer(&self.notes, FAULT_BYTES, None);
         let index = queue.submit([encoder.finish()]);
         self.in_flight.push_back(index);
         if self.in_flight.len() > STEPS_IN_FLIGHT
@@ -403,7 +429,7 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// A lost device.
     pub fn faults(&self) -> Result<Option<Faults>, GpuError> {
-        let bytes = self.headless.copy_out(&self.faults, 12)?;
+        let bytes = self.headless.copy_out(&self.notes, FAULT_BYTES)?;
         let [count, gaussian, view]: [u32; 3] = bytemuck::pod_read_unaligned(&bytes);
         Ok((count > 0).then(|| Faults { count, gaussian: gaussian.saturating_sub(1), view }))
     }
@@ -432,21 +458,25 @@ impl<'a> Trainer<'a> {
         Ok(gradients)
     }
 
-    /// Returns parameters and moments, to resume from.
+    /// Returns parameters, moments and neighbors, to resume from.
     ///
     /// # Errors
     /// A lost device.
     pub fn state(&self) -> Result<TrainerState, GpuError> {
         let buffers = self.stored().into_iter().map(|buffer| self.read(buffer)).collect::<Result<_, _>>()?;
-        Ok(TrainerState { buffers, filter: self.scene.filter.clone() })
+        Ok(TrainerState { buffers, neighbors: self.neighbors()?, filter: self.scene.filter.clone() })
     }
 
-    /// Replaces parameters, moments and filter by those of [`state`](Self::state). Returns whether they are of as many Gaussians, and of as
-    /// many entries if colors are tied; if not, nothing is replaced.
+    /// Replaces parameters, moments and filter by those of [`state`](Self::state), and neighbors if it has some that are needed. Returns
+    /// whether they are of as many Gaussians, and of as many entries if colors are tied; if not, nothing is replaced.
     pub fn resume(&mut self, state: &TrainerState) -> bool {
         let buffers = self.stored();
         let fits = |(bytes, buffer): (&Vec<u8>, &&wgpu::Buffer)| bytes.len() as u64 == buffer.size();
         if state.buffers.len() != buffers.len() || !state.buffers.iter().zip(&buffers).all(fits) {
+            return false;
+        }
+        let neighbors: Vec<u32> = bytemuck::pod_collect_to_vec(&state.neighbors);
+        if neighbors.iter().any(|&index| index as usize >= self.capture.len()) {
             return false;
         }
         if state.filter != self.scene.filter
@@ -456,6 +486,9 @@ impl<'a> Trainer<'a> {
         }
         for (bytes, buffer) in state.buffers.iter().zip(self.stored()) {
             self.headless.context().queue.write_buffer(buffer, 0, bytes);
+        }
+        if self.regularizer.as_ref().is_some_and(|made| made.neighbors.size() == state.neighbors.len() as u64) {
+            self.set_neighbors(&state.neighbors);
         }
         if let Some(tied) = &self.tied {
             let mut encoder = self.encoder("gs4d expand");
@@ -618,6 +651,14 @@ pub enum TrainerError {
     /// Codebooks of another scene.
     #[error("the codebooks are not of the colors of this scene")]
     Codebooks,
+    /// A term of the loss cannot have this weight.
+    #[error("the weight of the term {term} is {weight}: it must be a number, zero or above")]
+    Weight {
+        /// The term.
+        term: &'static str,
+        /// Its weight.
+        weight: f64,
+    },
     /// There is nothing to train.
     #[error("there are no Gaussians to fine-tune")]
     Empty,
