@@ -22,11 +22,12 @@ use std::path::{Path, PathBuf};
 /// An interrupted bake goes on where it was, from the results in OUT.bake/; with other inputs or options it starts over where they
 /// matter.
 #[derive(clap::Args)]
-#[command(group = clap::ArgGroup::new("goal").args(["ratio", "keep", "max_loss"]))]
+#[command(group = clap::ArgGroup::new("goal").args(["ratio", "keep", "max_loss", "target_size"]))]
 #[command(after_help = "\
 Examples:
   gs4d bake chkpnt30000.pth --data data/toybox -o toybox.gs4d
   gs4d bake chkpnt30000.pth --data data/toybox --ratio 0.5 --quality small -o toybox.gs4d
+  gs4d bake chkpnt30000.pth --data data/toybox --target-size 1.5 -o toybox.gs4d
   gs4d bake n3v.pth --data data/n3v --time-interval 0,10 --max-loss 0.2 --every 20 -o n3v.gs4d
 
 Beside the package: OUT.report.html with plots and pictures (open it in a browser; it needs no network) and OUT.report.json.
@@ -46,10 +47,17 @@ pub struct Bake {
     /// Number of Gaussians to keep.
     #[arg(long, value_name = "N", value_parser = values::count(1_000_000_000))]
     keep: Option<usize>,
-    /// Keep as few as lose no more than this on held-out training views, dB [default: 0.1, unless --ratio or --keep is given].
+    /// Keep as few as lose no more than this on held-out training views, dB [default: 0.1, unless another goal is given]. Where
+    /// the others are trained, the loss is that after a short training.
     #[arg(long, value_name = "DB", value_parser = values::not_negative)]
     max_loss: Option<f64>,
-    /// Prune by this score; auto tries ours and the paper's.
+    /// Make a package of at most this many megabytes (of 1,000,000 bytes).
+    #[arg(long, value_name = "MB", value_parser = values::positive)]
+    target_size: Option<f32>,
+    /// Remove the others in so many rounds, with training and scoring between.
+    #[arg(long, value_name = "N", default_value = "1", value_parser = values::count(100))]
+    rounds: usize,
+    /// Prune by this score; auto tries ours and the paper's, each with a short training where the others are trained.
     #[arg(long, value_name = "SCORE", default_value = "auto", value_parser = score_choice(false))]
     variant: ScoreChoice,
     /// Which temporal filter.
@@ -105,6 +113,7 @@ impl Bake {
             resolution: self.data.resolution,
             background: self.checkpoint.background,
             goal: self.goal(),
+            rounds: self.rounds,
             score: self.variant,
             scoring: self.scoring.settings(),
             filter: self.filter,
@@ -122,12 +131,10 @@ impl Bake {
 
     /// Returns how many Gaussians to keep.
     fn goal(&self) -> Goal {
-        match (self.keep, self.ratio, self.max_loss) {
-            (Some(keep), ..) => Goal::Keep(keep),
-            (_, Some(ratio), _) => Goal::Remove(ratio),
-            (.., Some(loss)) => Goal::MaxLoss(loss),
-            (None, None, None) => Goal::default(),
-        }
+        let size = self.target_size.map(|megabytes| Goal::Size((f64::from(megabytes) * 1e6) as u64));
+        let loss = self.max_loss.map(Goal::MaxLoss);
+        let count = self.keep.map(Goal::Keep).or(self.ratio.map(Goal::Remove));
+        count.or(size).or(loss).unwrap_or_default()
     }
 }
 

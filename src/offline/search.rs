@@ -71,6 +71,8 @@ pub enum Goal {
     Remove(f64),
     /// The fewest whose PSNR on held-out training views is at most this much lower, dB.
     MaxLoss(f64),
+    /// As many as fit into a package of this many bytes.
+    Size(u64),
 }
 
 impl Default for Goal {
@@ -80,12 +82,12 @@ impl Default for Goal {
 }
 
 impl Goal {
-    /// Returns how many of `total` Gaussians to keep; `None` if that depends on a loss.
+    /// Returns how many of `total` Gaussians to keep; `None` if that depends on a loss or on a package.
     pub fn count(self, total: usize) -> Option<usize> {
         match self {
             Self::Keep(count) => Some(count.min(total)),
             Self::Remove(ratio) => Some(kept_count(total, ratio)),
-            Self::MaxLoss(_) => None,
+            Self::MaxLoss(_) | Self::Size(_) => None,
         }
     }
 
@@ -94,7 +96,7 @@ impl Goal {
         let psnr = |outcome: &Outcome| outcome.psnr.unwrap_or(f64::NEG_INFINITY);
         let by_psnr = psnr(b).total_cmp(&psnr(a));
         match self {
-            Self::Keep(_) | Self::Remove(_) => by_psnr,
+            Self::Keep(_) | Self::Remove(_) | Self::Size(_) => by_psnr,
             Self::MaxLoss(_) => a.kept.cmp(&b.kept).then(by_psnr),
         }
     }
@@ -223,6 +225,19 @@ impl ScoreSearch {
         Ok(SearchOutcome { candidate, best, outcomes })
     }
 
+    /// Returns the PSNR of a scene on the held-out views, dB.
+    ///
+    /// # Errors
+    /// A failure of the engine.
+    pub fn psnr(&self, engine: &mut Engine, scene: &RuntimeScene) -> Result<f64, OfflineError> {
+        self.evaluator.psnr(engine, scene)
+    }
+
+    /// Returns the PSNR of the whole scene on the held-out views, dB; `None` if it is compared with itself.
+    pub fn baseline(&self) -> Option<f64> {
+        self.baseline
+    }
+
     /// Summarizes the search, given the outcomes of all candidates.
     pub fn summary(&self, outcomes: Vec<Outcome>) -> SearchSummary {
         let compared_with = if self.baseline.is_some() { ComparedWith::Images } else { ComparedWith::WholeScene };
@@ -239,9 +254,9 @@ impl ScoreSearch {
         let total = scene.len();
         let mut psnr = |count: usize| self.evaluator.psnr_of_highest(engine, scene, &candidate.scores, count);
         let (kept, trials) = match (goal, self.baseline) {
-            (Goal::MaxLoss(loss), Some(baseline)) => smallest_count(total, baseline - loss, psnr)?,
+            (Goal::MaxLoss(loss), Some(baseline)) => smallest_count(total, total / 500, baseline - loss, psnr)?,
             (Goal::MaxLoss(_), None) => (total, Vec::new()),
-            (Goal::Keep(_) | Goal::Remove(_), _) => {
+            (Goal::Keep(_) | Goal::Remove(_) | Goal::Size(_), _) => {
                 let count = goal.count(total).unwrap_or(total);
                 (count, vec![Trial { count, psnr: psnr(count)? }])
             }

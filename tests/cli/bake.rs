@@ -6,8 +6,10 @@
 
 use crate::support::command::{arguments, gs4d};
 use crate::support::dataset;
+use crate::support::skip::skip;
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
+use bevy_gs4d::renderer::GpuContext;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use glam::{UVec2, Vec3};
 use serde_json::Value;
@@ -170,4 +172,52 @@ fn what_cannot_be_baked_is_refused() {
     ])
     .json();
     assert!(report["evaluation"].is_null() && report["gaussians"]["after"] == 1000, "cameras suffice: {report}");
+}
+
+#[test]
+fn a_size_decides_how_many_stay() {
+    let capture = capture(Vec3::ZERO, true);
+    let out = capture.out();
+    let fixed = arguments!["bake", &capture.scene, "--data", &capture.data, "-o", &out, "--variant", "energy"];
+    let bake = |size: &str| gs4d(&[fixed.to_vec(), arguments!["--target-size", size, "--json"].to_vec()].concat());
+    let json = bake("0.05").json();
+    let (bytes, kept) = (json["bytes"]["after"].as_u64(), json["gaussians"]["after"].as_u64());
+    assert!(bytes.is_some_and(|bytes| (40_000..=50_000).contains(&bytes)), "at most 50 kB, and nearly: {bytes:?}");
+    assert!(kept.is_some_and(|kept| (100..1990).contains(&kept)), "fewer Gaussians: {kept:?}");
+    let all = bake("5").json();
+    assert_eq!(all["gaussians"]["after"], 2000, "all fit");
+    let before = fs::read(&out).expect("the package is there");
+    bake("0.0001").must_fail("does not fit");
+    assert_eq!(fs::read(&out).expect("still there"), before, "nothing is replaced");
+}
+
+#[test]
+fn scores_are_judged_after_training_and_pruning_may_take_rounds() {
+    if let Err(error) = GpuContext::headless(None) {
+        skip(error);
+        return;
+    }
+    let capture = capture(Vec3::ZERO, true);
+    let out = capture.out();
+    let bake = |goal: [&str; 2], rounds: &str| {
+        let fixed = arguments!["bake", &capture.scene, "--data", &capture.data, "-o", &out, "--engine", "gpu"];
+        let more = arguments!["--steps", "30", "--rounds", rounds, goal[0], goal[1], "--json"];
+        gs4d(&[fixed.to_vec(), more.to_vec()].concat()).json()
+    };
+    let trained = |report: &Value| {
+        let trials = report["trials"].as_array().expect("a list").clone();
+        trials.into_iter().filter(|trial| trial["variant"].as_str().is_some_and(|v| v.ends_with(", 6 steps"))).collect()
+    };
+    let gradual = bake(["--ratio", "0.75"], "2");
+    let tried: Vec<Value> = trained(&gradual);
+    assert!(tried.len() >= 2 && tried.iter().all(|trial| trial["kept"] == 500), "every score is tried: {tried:?}");
+    let best = |a: &&Value, b: &&Value| a["psnr"].as_f64().partial_cmp(&b["psnr"].as_f64()).expect("numbers");
+    let winner = tried.iter().max_by(best).expect("there are some")["variant"].clone();
+    let score = gradual["choices"].as_array().and_then(|all| all.iter().find(|pair| pair[0] == "score")).expect("one");
+    assert_eq!(winner, format!("{}, 6 steps", score[1].as_str().expect("a name")), "the best after training");
+    let stages = gradual["stages"].as_array().expect("a list");
+    assert!(stages.iter().any(|stage| stage["name"] == "rounds"), "gradual: {stages:?}");
+    let loss = bake(["--max-loss", "8"], "1");
+    assert!(trained(&loss).len() > 4, "counts are tried after training: {}", loss["trials"]);
+    assert!(loss["stages"].as_array().expect("a list").iter().all(|stage| stage["name"] != "rounds"), "at once");
 }

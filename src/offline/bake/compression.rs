@@ -53,7 +53,7 @@ impl Bake<'_> {
         let checksum = || Some(Fingerprint::of_files(&[out]).ok()?.0.to_le_bytes().to_vec());
         let stored = work.load(FILE, fingerprint).filter(|stored| checksum().as_ref() == Some(stored));
         stages.run(Stage::Compress, stored.map(|_| ()), |progress| {
-            let compressed = match self.compress_tuned(&pruned, tuning, progress)? {
+            let compressed = match self.compress_tuned(&pruned, tuning, fingerprint, progress)? {
                 Some(compressed) => compressed,
                 None => {
                     let runtime = pruned.into_runtime();

@@ -7,8 +7,11 @@
 mod compression;
 mod evaluation;
 mod pruning;
+mod rounds;
+mod size;
 mod stages;
 mod summary;
+mod trials;
 mod tuning;
 
 pub use stages::Stage;
@@ -16,7 +19,6 @@ pub use stages::Stage;
 use super::dataset::{Split, TrainingView};
 use super::engine::Engine;
 use super::fine_tune::FineTuneSettings;
-use super::prune::select;
 use super::quantize::Quality;
 use super::report::BakeReport;
 use super::score::ScoringSettings;
@@ -46,6 +48,8 @@ pub struct BakeSettings {
     pub background: Option<[f32; 3]>,
     /// How many Gaussians to keep.
     pub goal: Goal,
+    /// Rounds in which the others are removed, with training between. Default of the command: 1, all at once.
+    pub rounds: usize,
     /// Which score to prune by.
     pub score: ScoreChoice,
     /// Settings of the scoring.
@@ -132,13 +136,19 @@ impl<'a> Bake<'a> {
 
     fn run(&mut self, progress: &mut dyn Progress) -> Result<Baked, OfflineError> {
         let mut stages = Stages::begin(progress);
-        let pruning = self.prune(&mut stages)?;
-        let pruned = select(&self.subject.scene, &pruning.kept);
-        let (mut tuned, tuning, fingerprint) = self.fine_tune(&mut stages, pruned, pruning.fingerprint)?;
-        let (filter, masked) = self.mask(&mut stages, &tuned, fingerprint)?;
-        let after = sliced(&tuned)?.into_owned();
-        tuned.filter = Some(filter.clone());
-        self.compress(&mut stages, tuned, tuning.as_ref(), masked)?;
+        let mut pruning = self.prune(&mut stages)?;
+        let (filter, after, tuning) = loop {
+            let (thinned, fingerprint) = self.thin(&mut stages, &pruning)?;
+            let (mut tuned, tuning, fingerprint) = self.fine_tune(&mut stages, thinned, fingerprint)?;
+            let (filter, masked) = self.mask(&mut stages, &tuned, fingerprint)?;
+            let after = sliced(&tuned)?.into_owned();
+            tuned.filter = Some(filter.clone());
+            self.compress(&mut stages, tuned, tuning.as_ref(), masked)?;
+            match self.keep_fewer(&pruning, &mut stages)? {
+                Some(fewer) => pruning = fewer,
+                None => break (filter, after, tuning),
+            }
+        };
         let compared = stages.run(Stage::Evaluate, None, |progress| self.compare(progress))?;
         let times = stages.times();
         let before = sliced(&self.subject.scene)?;
@@ -150,6 +160,7 @@ impl<'a> Bake<'a> {
                 after: &after,
                 filter: &filter,
                 found: pruning.found,
+                rounds: self.settings.rounds,
                 tuning,
                 stages: times,
                 compared,

@@ -1,12 +1,14 @@
 //! The stages score and prune of a bake.
 //!
 //! In: a checkpoint and its training views, some of them held out from scoring. Out: the Gaussians to keep
-//! ([`Pruning`]), the score that selected them, and the PSNR on the held-out views for every count tried.
+//! ([`Pruning`]), the score that selected them, and the PSNR on the held-out views for every count tried. If the
+//! remaining Gaussians are trained, a score and a loss are judged after a short training.
 
 use super::stages::Stages;
-use super::{Bake, Fingerprint, Stage};
+use super::{Bake, BakeSettings, Fingerprint, Stage};
 use crate::offline::dataset::TrainingView;
 use crate::offline::prune::highest;
+use crate::offline::quality::Trial;
 use crate::offline::report::Tried;
 use crate::offline::search::{Candidate, Goal, ScoreSearch, candidates};
 use crate::offline::work::{bytes, words};
@@ -22,14 +24,18 @@ const SWEEP: [f64; 4] = [0.2, 0.5, 0.7, 0.85];
 pub(super) struct Pruning {
     /// Their indices, ascending.
     pub kept: Vec<u32>,
+    /// The score of every Gaussian.
+    pub scores: Vec<f32>,
     /// How they were selected.
     pub found: Found,
     /// Fingerprint of everything that the result depends on.
     pub fingerprint: Fingerprint,
+    /// Packages made before with more Gaussians, which were too large.
+    pub bakes: usize,
 }
 
 /// How the Gaussians to keep were selected.
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Found {
     /// Name of the score.
     pub score: String,
@@ -49,19 +55,23 @@ impl Bake<'_> {
         let (candidates, scores) = self.score(stages, &scored)?;
         let images: Vec<&Path> = held_out.iter().map(|view| view.image.as_path()).collect();
         let images = Fingerprint::of_files(&images).ok();
-        let fingerprint = scores.and(&format!("{goal:?} {images:?} {held_out:?}"));
+        let BakeSettings { fine_tune, quality, key_frames, .. } = self.settings;
+        let fingerprint =
+            scores.and(&format!("{goal:?} {images:?} {held_out:?} {fine_tune:?} {quality:?} {key_frames:?}"));
         let load = |file| self.work.load(file, fingerprint);
         let kept = load(FILES[0]).map(|bytes| words(&bytes));
         let kept = kept.filter(|kept| kept.iter().all(|&index| (index as usize) < self.subject.scene.len()));
         let found = load(FILES[1]).and_then(|text| ron::de::from_bytes::<Found>(&text).ok());
         let (kept, found) = stages.run(Stage::Prune, kept.zip(found), |progress| {
-            let (kept, found) = self.find(&held_out, candidates, progress)?;
+            let (kept, found) = self.find(&scored, &held_out, candidates.clone(), progress)?;
             let text = ron::to_string(&found)?;
             self.work.store(FILES[0], fingerprint, &bytes(&kept), progress)?;
             self.work.store(FILES[1], fingerprint, text.as_bytes(), progress)?;
             Ok((kept, found))
         })?;
-        Ok(Pruning { kept, found, fingerprint })
+        let scores = candidates.into_iter().find(|candidate| candidate.name == found.score);
+        let scores = scores.ok_or(OfflineError::NoScore)?.scores;
+        Ok(Pruning { kept, scores, found, fingerprint, bakes: 0 })
     }
 
     /// Returns the scores of every candidate, computed or loaded from an earlier bake.
@@ -98,17 +108,22 @@ impl Bake<'_> {
     /// Prunes by each candidate, selects the best one, and measures the shares of [`SWEEP`] with it.
     fn find(
         &mut self,
+        scored: &[TrainingView],
         held_out: &[TrainingView],
         candidates: Vec<Candidate>,
         progress: &mut dyn Progress,
     ) -> Result<(Vec<u32>, Found), OfflineError> {
-        let (goal, engine, runtime) = (self.settings.goal, &mut *self.engine, &self.subject.runtime);
+        let goal = match (self.settings.goal, candidates.first()) {
+            (Goal::Size(bytes), Some(first)) => Goal::Keep(self.count_of_size(bytes, &first.scores, progress)?),
+            (goal, _) => goal,
+        };
+        let (engine, runtime) = (&mut *self.engine, &self.subject.runtime);
         let by_loss = matches!(goal, Goal::MaxLoss(_));
         let search = ScoreSearch::open(engine, held_out, runtime, self.subject.background, by_loss, progress)?;
         let whole = GaussianScene::from(runtime.clone());
         let total = whole.len();
-        let found = search.best(engine, &whole, candidates, goal, progress)?;
-        let (mut candidate, kept, mut outcomes) = (found.candidate, found.best.kept, found.outcomes);
+        let found = search.best(engine, &whole, candidates.clone(), goal, progress)?;
+        let (mut candidate, mut kept, mut outcomes) = (found.candidate, found.best.kept, found.outcomes);
         for ratio in SWEEP {
             let more = search.best(engine, &whole, vec![candidate], Goal::Remove(ratio), progress)?;
             candidate = more.candidate;
@@ -129,6 +144,13 @@ impl Bake<'_> {
             for trial in &outcome.trials {
                 add(&outcome.score, trial.count, trial.psnr);
             }
+        }
+        if let Some(trials) = self.trials(scored, held_out, &candidates, goal, progress)? {
+            let chosen = self.choose(&trials, &search, candidates, goal, (candidate, kept), progress)?;
+            for (score, Trial { count, psnr }) in chosen.tried {
+                add(&format!("{score}, {} steps", trials.steps()), count, psnr);
+            }
+            (candidate, kept) = (chosen.candidate, chosen.kept);
         }
         let held_out = format!("{}, {}", summary.views, summary.compared_with);
         Ok((highest(&candidate.scores, kept), Found { score: candidate.name, held_out, tried }))

@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::time::Instant;
 
 /// Number of stages of a bake.
-const STAGES: usize = 7;
+const STAGES: usize = 8;
 
 /// The stages of a bake, in order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -19,6 +19,8 @@ pub enum Stage {
     Score,
     /// Selects the Gaussians to keep.
     Prune,
+    /// Removes them in several rounds, with training between.
+    Rounds,
     /// Trains the remaining Gaussians to compensate for the removed ones.
     FineTune,
     /// Computes the temporal filter.
@@ -37,6 +39,7 @@ impl Stage {
         match self {
             Self::Score => "score",
             Self::Prune => "prune",
+            Self::Rounds => "rounds",
             Self::FineTune => "fine-tune",
             Self::Mask => "mask",
             Self::Compress => "compress",
@@ -89,6 +92,11 @@ impl<'a> Stages<'a> {
             self.progress.note(&format!("note: {} is left out: {reason}", stage.name()));
         }
         self.progress.advance();
+    }
+
+    /// Reports one line.
+    pub fn note(&mut self, line: &str) {
+        self.progress.note(line);
     }
 
     /// Returns the durations of the stages run so far.

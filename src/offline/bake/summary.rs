@@ -33,6 +33,8 @@ pub(super) struct Facts<'a> {
     pub after: &'a [Gaussian],
     pub filter: &'a TemporalFilter,
     pub found: Found,
+    /// Rounds in which Gaussians were removed.
+    pub rounds: usize,
     pub tuning: Option<Tuning>,
     pub stages: Vec<StageTime>,
     pub compared: Option<Compared>,
@@ -83,6 +85,7 @@ impl Facts<'_> {
             Goal::Keep(count) => format!("keep {count}"),
             Goal::Remove(ratio) => format!("remove {:.1} %", ratio * 100.0),
             Goal::MaxLoss(loss) => format!("lose at most {loss} dB on held-out training views"),
+            Goal::Size(bytes) => format!("at most {} MB", bytes as f64 / 1e6),
         };
         let quality = Quality::NAMES.iter().find(|(_, quality)| *quality == self.settings.quality);
         let (kind, filter) = (filter_name(self.filter.kind), self.filter);
@@ -90,6 +93,7 @@ impl Facts<'_> {
             pair("goal", goal),
             pair("score", self.found.score.clone()),
             pair("held-out views", self.found.held_out.clone()),
+            pair("rounds of pruning", self.rounds.to_string()),
             pair("fine-tuning", self.tuning.as_ref().map_or("none".to_owned(), in_words)),
             pair("temporal filter", format!("{kind}, {} key-frames", filter.segments + 1)),
             pair("active share", format!("{:.1} %", filter.active_share() * 100.0)),

@@ -40,14 +40,11 @@ impl Bake<'_> {
         let stored = load(FILES[0]).and_then(|bytes| package::read(Cursor::new(bytes)).ok());
         let stored = stored.zip(load(FILES[1]).and_then(|text| ron::de::from_bytes::<Tuning>(&text).ok()));
         let Self { settings, engine, views, work, .. } = self;
-        let (Some(tuning), Engine::Gpu(headless)) = (&settings.fine_tune, engine) else {
+        let (Some(tuning), Engine::Gpu(headless), None) = (&settings.fine_tune, engine, reason_of(&pruned, views))
+        else {
             stages.note_left_out(Stage::FineTune, self.reason_to_leave_out(&pruned).as_deref());
             return Ok((pruned, None, before));
         };
-        if let Some(reason) = reason_of(&pruned, views) {
-            stages.note_left_out(Stage::FineTune, Some(&reason));
-            return Ok((pruned, None, before));
-        }
         let (scene, tuning) = stages.run(Stage::FineTune, stored, |progress| {
             let resume = Resume { work, fingerprint, every: SAVE_EVERY };
             let tuned = fine_tune(headless, pruned, views, tuning, Some(resume), progress)?;
@@ -68,16 +65,24 @@ impl Bake<'_> {
         &mut self,
         scene: &GaussianScene,
         tuning: Option<&Tuning>,
+        fingerprint: Fingerprint,
         progress: &mut dyn Progress,
     ) -> Result<Option<GaussianScene>, OfflineError> {
-        let Self { settings, engine, views, .. } = self;
+        let Self { settings, engine, views, work, .. } = self;
         let coded = !CompressSettings::from(settings.quality).codebooks.is_empty();
         let (Some(_), Some(tuning), Engine::Gpu(headless), true) = (tuning, &settings.fine_tune, engine, coded) else {
             return Ok(None);
         };
         let steps = tuning.steps / 3;
         let coding = FineTuneSettings { steps: 0, compress: Some((settings.quality, steps)), ..tuning.clone() };
-        Ok(Some(fine_tune(headless, scene.clone(), views, &coding, None, progress)?.scene))
+        let resume = Resume { work, fingerprint, every: SAVE_EVERY };
+        Ok(Some(fine_tune(headless, scene.clone(), views, &coding, Some(resume), progress)?.scene))
+    }
+
+    /// Returns the settings of training; `None` if what is left after pruning is not trained.
+    pub(super) fn tunes(&self) -> Option<&FineTuneSettings> {
+        let can = matches!(self.engine, Engine::Gpu(_)) && reason_of(&self.subject.scene, &self.views).is_none();
+        self.settings.fine_tune.as_ref().filter(|_| can)
     }
 
     /// Returns why the stage is left out although it was not asked to be; `None` if it was.

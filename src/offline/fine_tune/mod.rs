@@ -25,6 +25,7 @@ mod tied;
 mod trainer;
 
 pub use adam::{DECAY, Moments, adam};
+pub(super) use coding::settings_of;
 pub use loss::{Loss, OpacityMask, loss, opacity_mask};
 pub use neighbors::{NEIGHBORS, neighbors};
 pub use schedule::{Behind, Rates};
