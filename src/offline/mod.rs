@@ -39,6 +39,7 @@ pub mod quality;
 pub mod quantize;
 pub mod render;
 pub mod report;
+mod room;
 mod save;
 pub mod score;
 pub mod search;
