@@ -88,8 +88,8 @@ struct Knobs {
     #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(1..=10))]
     base_bits: Option<u32>,
     /// Without codebooks: round every coefficient to a multiple of this; 0 keeps them as they are.
-    #[arg(long, value_name = "STEP", value_parser = values::not_negative)]
-    color_step: Option<f64>,
+    #[arg(long, value_name = "STEP", value_parser = values::step)]
+    color_step: Option<f32>,
     /// Share of the Gaussians, those with the largest splats, that keep 16 bits for mean, scale and rotation.
     #[arg(long, value_name = "SHARE", value_parser = values::share)]
     escape: Option<f64>,
@@ -112,7 +112,7 @@ impl Knobs {
         CompressSettings {
             geometry,
             codebooks: self.codebooks.clone().unwrap_or(settings.codebooks),
-            color_step: self.color_step.map_or(settings.color_step, |step| step as f32),
+            color_step: self.color_step.unwrap_or(settings.color_step),
             weights: None,
         }
     }

@@ -6,6 +6,7 @@
 mod bake;
 mod command;
 mod compare;
+mod compress;
 mod eval;
 mod fine_tune;
 mod prune;
