@@ -41,7 +41,15 @@ impl DataArgs {
             resolution: self.resolution,
             time_interval: Some(trained_with.time_interval),
         };
-        Ok(Dataset::open(folder, Split::Train, &options)?.views)
+        Ok(Dataset::open(folder, Split::Train, &options).map_err(or_give_size)?.views)
+    }
+}
+
+/// Returns the failure of a verb that takes `--size`.
+pub(super) fn or_give_size(error: DatasetError) -> Failure {
+    match &error {
+        DatasetError::SizeUnknown { .. } => Failure::new(format!("{error}, or give --size WxH")),
+        _ => error.into(),
     }
 }
 

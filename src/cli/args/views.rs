@@ -2,6 +2,7 @@
 //!
 //! In: `--cameras FILE` or `--orbit N`, sizes, a fixed time. Out: named cameras at a time each ([`Shot`]).
 
+use super::data::or_give_size;
 use super::values;
 use crate::cli::failure::Failure;
 use crate::cli::progress::note;
@@ -49,7 +50,7 @@ impl ViewArgs {
         let mut shots = match &self.cameras {
             Some(path) => {
                 let options = CameraOptions { size: self.size, resolution: self.resolution, time_interval: None };
-                let views = CameraFile::load(path, &options)?;
+                let views = CameraFile::load(path, &options).map_err(or_give_size)?;
                 views.into_iter().map(|view| Shot { name: view.name, camera: view.camera, time: view.time }).collect()
             }
             None => orbit(scene, self.orbit.unwrap_or(count), self.size.unwrap_or(ORBIT_SIZE))?,
