@@ -90,10 +90,11 @@ impl Bake {
     /// # Errors
     /// A checkpoint or views that cannot be used, files that cannot be written, a failure of the engine.
     pub fn run(&self) -> Result<Report, Failure> {
-        let out = self.package.out_apart_from(&self.input)?;
+        let settings = self.settings(self.package.out()?);
+        settings.check_files()?;
         let scene = self.checkpoint.load(&self.input)?;
         let engine = &mut self.engine.open()?;
-        let Baked { report, html, .. } = bake(scene, &self.settings(out), engine, &mut Bars::default())?;
+        let Baked { report, html, .. } = bake(scene, &settings, engine, &mut Bars::default())?;
         Ok(Report::new(report.json()?, in_short(&report, &html)))
     }
 

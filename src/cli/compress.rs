@@ -11,6 +11,7 @@ use super::table::{Table, bytes};
 use crate::codec::package;
 use crate::offline::Progress;
 use crate::offline::fidelity::Originals;
+use crate::offline::files::Files;
 use crate::offline::quantize::{CompressSettings, Quality, compress_with};
 use crate::offline::score::read_weights;
 use crate::scene::RuntimeScene;
@@ -125,7 +126,8 @@ impl Compress {
     /// The scene cannot be read or is packed already, the package cannot be written, a failure of the engine.
     pub fn run(&self) -> Result<Report, Failure> {
         let progress = &mut Bars::default();
-        let out = self.package.out_apart_from(&self.input)?;
+        let files = Files::default().reads_scene(&self.input).reads(&self.weights);
+        let out = self.package.checked_out(self.views.add_to(files))?;
         let before = file_size(&self.input)?;
         let scene = self.checkpoint.load(&self.input)?;
         let scene = scene.into_runtime().map_err(|error| Failure::at(&self.input, &error))?;

@@ -11,6 +11,7 @@ use super::table::{Table, bytes, lines};
 use crate::gaussian::GradientMode;
 use crate::offline::dataset::Split;
 use crate::offline::engine::AdapterDescription;
+use crate::offline::files::Files;
 use crate::offline::fine_tune::{Behind, CurvePoint, FineTuneSettings, FineTuned, Rates, Resume, fine_tune};
 use crate::offline::quantize::Quality;
 use crate::offline::work::{Fingerprint, Work};
@@ -100,7 +101,7 @@ impl FineTune {
     /// # Errors
     /// A scene or views that cannot be used, a package that cannot be written, a failure of the GPU.
     pub fn run(&self) -> Result<Report, Failure> {
-        let out = self.package.out_apart_from(&self.input)?;
+        let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
         let mut scene = self.checkpoint.load(&self.input)?;
         if let Some(background) = self.checkpoint.background {
             scene.trained_with.background = background;

@@ -9,6 +9,7 @@ mod compare;
 mod compress;
 mod eval;
 mod fine_tune;
+mod outputs;
 mod prune;
 mod render;
 

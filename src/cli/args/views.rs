@@ -7,6 +7,7 @@ use super::values;
 use crate::cli::failure::Failure;
 use crate::cli::progress::note;
 use crate::offline::dataset::{CameraFile, CameraOptions};
+use crate::offline::files::Files;
 use crate::offline::orbit::{ORBIT_SIZE, Shot, orbit};
 use crate::scene::RuntimeScene;
 use crate::view::Lens;
@@ -36,6 +37,11 @@ pub struct ViewArgs {
 }
 
 impl ViewArgs {
+    /// Adds the camera file, if one is given, and the images that it names to the files that the verb reads.
+    pub fn add_to(&self, files: Files) -> Files {
+        self.cameras.iter().fold(files, |files, path| files.reads_cameras(path))
+    }
+
     /// Returns how many views to use: all of `--orbit` if it is given, else `count`.
     pub fn limit(&self, count: usize) -> usize {
         self.orbit.unwrap_or(count)

@@ -15,6 +15,7 @@ pub use stages::Stage;
 
 use super::dataset::{Split, TrainingView};
 use super::engine::Engine;
+use super::files::Files;
 use super::fine_tune::FineTuneSettings;
 use super::prune::select;
 use super::quantize::Quality;
@@ -24,7 +25,7 @@ use super::search::{Goal, ScoreChoice};
 use super::splits::open_split;
 use super::temporal_filter::KeyFrames;
 use super::work::{Fingerprint, Work};
-use super::{OfflineError, Progress, Subject, require_another_file, sliced};
+use super::{OfflineError, Progress, Subject, sliced};
 use crate::scene::{FilterKind, GaussianScene};
 use stages::Stages;
 use std::path::PathBuf;
@@ -65,6 +66,19 @@ pub struct BakeSettings {
     pub keep_work: bool,
 }
 
+impl BakeSettings {
+    /// Checks that the package and the reports can be written and are none of the files that are read. [`bake`] does so, too; programs
+    /// that take long to read the checkpoint can find out before.
+    ///
+    /// # Errors
+    /// The first of them with which something is wrong.
+    pub fn check_files(&self) -> Result<(), OfflineError> {
+        let files = Files::default().reads_scene(&self.checkpoint).reads_data(&self.data).writes(&self.out, "gs4d");
+        let [json, html] = summary::paths(&self.out);
+        files.writes(&json, "json").writes(&html, "html").check()
+    }
+}
+
 /// A finished bake.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Baked {
@@ -81,14 +95,14 @@ pub struct Baked {
 ///
 /// # Errors
 /// Training views that are missing or show nothing of the scene, images that a loss needs and that are missing, files
-/// that cannot be written, a failure of the engine.
+/// that cannot be written or are read, a failure of the engine.
 pub fn bake(
     scene: GaussianScene,
     settings: &BakeSettings,
     engine: &mut Engine,
     progress: &mut dyn Progress,
 ) -> Result<Baked, OfflineError> {
-    require_another_file(&settings.checkpoint, &settings.out)?;
+    settings.check_files()?;
     let mut bake = Bake::open(scene, settings, engine, progress)?;
     let baked = bake.run(progress);
     if baked.is_err() {

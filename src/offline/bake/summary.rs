@@ -114,11 +114,16 @@ pub(super) fn write(
     out: &Path,
     progress: &mut dyn Progress,
 ) -> Result<[PathBuf; 2], OfflineError> {
-    let paths = [beside(out, ".report.json"), beside(out, ".report.html")];
+    let paths = paths(out);
     for (path, text) in paths.iter().zip([format!("{:#}\n", report.json()?), report.html()]) {
         progress.uninterrupted(&mut || write_beside(path, |file| file.write_all(text.as_bytes())))?;
     }
     Ok(paths)
+}
+
+/// Returns the paths of the report beside a package, as JSON and as an HTML page.
+pub(super) fn paths(out: &Path) -> [PathBuf; 2] {
+    [".report.json", ".report.html"].map(|ending| beside(out, ending))
 }
 
 /// Returns the path with `ending` in place of its extension: `scene.report.json` beside `scene.gs4d`.
