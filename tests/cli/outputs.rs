@@ -1,7 +1,8 @@
 //! What verbs write, run as a user runs them.
 //!
 //! In: a small synthetic scene, a dataset drawn from it, outputs of every kind. Out: proof that no verb writes over what it reads, that bad
-//! outputs are told before anything is read, and that what is replaced keeps its links and permissions.
+//! outputs are told before anything is read, that what is replaced keeps its links and permissions, and that two runs do not disturb each
+//! other.
 
 use crate::support::command::{arguments, folder, gs4d, scene};
 use crate::support::dataset;
@@ -187,4 +188,39 @@ fn what_killed_runs_left_is_removed() {
     gs4d(&arguments!["convert", &input, folder.path().join("out.gs4d")]).text();
     assert!(!killed.exists(), "nobody writes this one");
     assert!(live.exists(), "this one is being written");
+}
+
+#[test]
+fn a_bake_removes_only_what_it_has_written() {
+    let capture = capture();
+    let (out, work) = (capture.path("out.gs4d"), capture.path("out.gs4d.bake"));
+    let bake = |more: &[&str]| {
+        let (scene, data) = (&capture.scene, &capture.data);
+        let fixed = arguments!["bake", scene, "--data", data, "--ratio", "0.5", "--engine", "cpu", "-o", &out];
+        gs4d(&[fixed.to_vec(), more.iter().map(Into::into).collect()].concat()).text()
+    };
+    bake(&["--keep-work"]);
+    let notes = work.join("notes.txt");
+    fs::write(&notes, "mine").expect("the folder can be written to");
+    bake(&[]);
+    let left = contents(&work);
+    assert_eq!(left.keys().collect::<Vec<_>>(), [&notes], "the file of somebody else, and no other");
+    fs::remove_file(&notes).expect("it is there");
+    bake(&[]);
+    assert!(!work.exists(), "an empty folder goes");
+}
+
+#[test]
+fn two_runs_to_one_output_do_not_share_their_folder() {
+    let capture = capture();
+    let out = capture.path("out.gs4d");
+    for (verb, name) in [("bake", "out.gs4d.bake"), ("finetune", "out.gs4d.tune")] {
+        let lock = capture.path(name).join("lock");
+        fs::create_dir(capture.path(name)).expect("the folder can be written to");
+        let running = File::create(&lock).expect("the folder can be written to");
+        running.lock().expect("nobody else has locked it");
+        let run = gs4d(&arguments![verb, &capture.scene, "--data", &capture.data, "-o", &out]);
+        run.must_fail(&format!("{name}: another run of gs4d works in this folder"));
+        assert!(lock.exists() && !out.exists(), "{verb}: the folder is as it was, and nothing is written");
+    }
 }

@@ -2,7 +2,7 @@
 //!
 //! In: a checkpoint, its training views, [`BakeSettings`]. Out: a package, and `NAME.report.json` and
 //! `NAME.report.html` beside a package `NAME.gs4d` ([`Baked`]). The stages (see [`Stage`]) before the evaluation store
-//! their results in the folder `OUT.bake` beside a package `OUT` ([`Work`]), so that an interrupted bake resumes.
+//! their results in the folder `OUT.bake` beside a package `OUT` ([`Work`]), so that an interrupted bake resumes. Two bakes cannot share it.
 
 mod compression;
 mod evaluation;
@@ -95,7 +95,7 @@ pub struct Baked {
 ///
 /// # Errors
 /// Training views that are missing or show nothing of the scene, images that a loss needs and that are missing, files
-/// that cannot be written or are read, a failure of the engine.
+/// that cannot be written or are read, another bake to the same package, a failure of the engine.
 pub fn bake(
     scene: GaussianScene,
     settings: &BakeSettings,
@@ -104,13 +104,11 @@ pub fn bake(
 ) -> Result<Baked, OfflineError> {
     settings.check_files()?;
     let mut bake = Bake::open(scene, settings, engine, progress)?;
-    let baked = bake.run(progress);
-    if baked.is_err() {
-        bake.work.remove_if_empty();
-    } else if !settings.keep_work {
+    let baked = bake.run(progress)?;
+    if !settings.keep_work {
         bake.work.remove()?;
     }
-    baked
+    Ok(baked)
 }
 
 /// The state that the stages share.
@@ -133,6 +131,7 @@ impl<'a> Bake<'a> {
         progress: &mut dyn Progress,
     ) -> Result<Self, OfflineError> {
         let BakeSettings { checkpoint, data, resolution, .. } = settings;
+        let work = Work::beside(&settings.out, ".bake")?;
         scene.filter = None;
         let views = open_split(data, Split::Train, *resolution, &scene.trained_with, progress)?.views;
         let cameras = data.join(Split::Train.file_name());
@@ -140,7 +139,6 @@ impl<'a> Bake<'a> {
         let read = format!("{:?} {:?} {resolution:?}", scene.trained_with, scene.playback);
         let fingerprint = files.and(env!("CARGO_PKG_VERSION")).and(&read);
         let subject = Subject::new(checkpoint, scene, settings.background)?;
-        let work = Work::beside(&settings.out, ".bake")?;
         Ok(Self { settings, engine, subject, views, work, fingerprint })
     }
 
