@@ -21,19 +21,16 @@ const FIRST_SEEN: u32 = 3u;
 @compute @workgroup_size(256)
 fn adam(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     for (var i = id.x; i < settings.count * settings.stride; i += groups.x * 256u) {
-        let gradient = gradients[i];
-        gradients[i] = vec4(0.0);
-        if settings.sparse.x != 0u {
-            if notes[FIRST_SEEN + i / settings.stride] == 0u {
-                continue;
-            }
+        if settings.sparse.x == 0u || notes[FIRST_SEEN + i / settings.stride] != 0u {
+            let gradient = gradients[i];
+            let first = DECAY_1 * first_moments[i] + (1.0 - DECAY_1) * gradient;
+            let second = DECAY_2 * second_moments[i] + (1.0 - DECAY_2) * gradient * gradient;
+            let rate = settings.rates[min(i % settings.stride, 4u)];
+            let scaled = sqrt(second) * settings.correction.y + EPSILON;
+            values[i] -= rate * settings.correction.x * first / scaled;
+            first_moments[i] = first;
+            second_moments[i] = second;
         }
-        let first = DECAY_1 * first_moments[i] + (1.0 - DECAY_1) * gradient;
-        let second = DECAY_2 * second_moments[i] + (1.0 - DECAY_2) * gradient * gradient;
-        let rate = settings.rates[min(i % settings.stride, 4u)];
-        let scaled = sqrt(second) * settings.correction.y + EPSILON;
-        values[i] -= rate * settings.correction.x * first / scaled;
-        first_moments[i] = first;
-        second_moments[i] = second;
+        gradients[i] = vec4(0.0);
     }
 }

@@ -11,6 +11,7 @@ use super::report::Report;
 use super::table::{Table, lines};
 use crate::offline::ablation::{AblationRow, AblationSettings, ablate};
 use crate::offline::dataset::Split;
+use crate::offline::files::Files;
 use crate::offline::metrics::ImageMetrics;
 use crate::offline::search::ScoreChoice;
 use crate::offline::splits::{SPLIT_NAMES, share, split_name};
@@ -74,6 +75,9 @@ impl Ablate {
     /// A checkpoint or views that cannot be used, missing test images, a table that cannot be written, a failure of the
     /// engine.
     pub fn run(&self) -> Result<Report, Failure> {
+        if let Some(csv) = &self.csv {
+            self.data.add_to(Files::default().reads_scene(&self.input)).writes(csv, "csv").check()?;
+        }
         let progress = &mut Bars::default();
         let start = Instant::now();
         let mut scene = self.checkpoint.load(&self.input)?;

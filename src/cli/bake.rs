@@ -54,8 +54,8 @@ pub struct Bake {
     /// Make a package of at most this many megabytes (of 1,000,000 bytes).
     #[arg(long, value_name = "MB", value_parser = values::positive)]
     target_size: Option<f32>,
-    /// Remove the others in so many rounds, with training and scoring between.
-    #[arg(long, value_name = "N", default_value = "1", value_parser = values::count(100))]
+    /// Remove the others in so many rounds, with training and scoring between, if what is left is trained.
+    #[arg(long, value_name = "N", default_value = "4", value_parser = values::count(100))]
     rounds: usize,
     /// Prune by this score; auto tries ours and the paper's, each with a short training where the others are trained.
     #[arg(long, value_name = "SCORE", default_value = "auto", value_parser = score_choice(false))]
@@ -98,10 +98,11 @@ impl Bake {
     /// # Errors
     /// A checkpoint or views that cannot be used, files that cannot be written, a failure of the engine.
     pub fn run(&self) -> Result<Report, Failure> {
-        let out = self.package.out_apart_from(&self.input)?;
+        let settings = self.settings(self.package.out()?);
+        settings.check_files()?;
         let scene = self.checkpoint.load(&self.input)?;
         let engine = &mut self.engine.open()?;
-        let Baked { report, html, .. } = bake(scene, &self.settings(out), engine, &mut Bars::default())?;
+        let Baked { report, html, .. } = bake(scene, &settings, engine, &mut Bars::default())?;
         Ok(Report::new(report.json()?, in_short(&report, &html)))
     }
 

@@ -11,6 +11,7 @@ use super::table::{Table, bytes};
 use crate::codec::package;
 use crate::offline::Progress;
 use crate::offline::fidelity::Originals;
+use crate::offline::files::Files;
 use crate::offline::quantize::{CompressSettings, Quality, compress_with};
 use crate::offline::score::read_weights;
 use crate::scene::RuntimeScene;
@@ -88,8 +89,8 @@ struct Knobs {
     #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(1..=10))]
     base_bits: Option<u32>,
     /// Without codebooks: round every coefficient to a multiple of this; 0 keeps them as they are.
-    #[arg(long, value_name = "STEP", value_parser = values::not_negative)]
-    color_step: Option<f64>,
+    #[arg(long, value_name = "STEP", value_parser = values::step)]
+    color_step: Option<f32>,
     /// Share of the Gaussians, those with the largest splats, that keep 16 bits for mean, scale and rotation.
     #[arg(long, value_name = "SHARE", value_parser = values::share)]
     escape: Option<f64>,
@@ -112,7 +113,7 @@ impl Knobs {
         CompressSettings {
             geometry,
             codebooks: self.codebooks.clone().unwrap_or(settings.codebooks),
-            color_step: self.color_step.map_or(settings.color_step, |step| step as f32),
+            color_step: self.color_step.unwrap_or(settings.color_step),
             weights: None,
         }
     }
@@ -125,7 +126,8 @@ impl Compress {
     /// The scene cannot be read or is packed already, the package cannot be written, a failure of the engine.
     pub fn run(&self) -> Result<Report, Failure> {
         let progress = &mut Bars::default();
-        let out = self.package.out_apart_from(&self.input)?;
+        let files = Files::default().reads_scene(&self.input).reads(&self.weights);
+        let out = self.package.checked_out(self.views.add_to(files))?;
         let before = file_size(&self.input)?;
         let scene = self.checkpoint.load(&self.input)?;
         let scene = scene.into_runtime().map_err(|error| Failure::at(&self.input, &error))?;

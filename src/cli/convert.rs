@@ -8,6 +8,7 @@ use super::failure::Failure;
 use super::report::{Report, switches, switches_json};
 use super::table::{bytes, lines};
 use crate::offline::convert::{ConvertSettings, TargetForm, convert, form_name};
+use crate::offline::files::Files;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -46,7 +47,7 @@ impl Convert {
     /// # Errors
     /// The scene cannot be read or converted, or the package cannot be written.
     pub fn run(&self) -> Result<Report, Failure> {
-        let out = self.package.out_apart_from(&self.input)?;
+        let out = self.package.checked_out(Files::default().reads_scene(&self.input))?;
         let before = file_size(&self.input)?;
         let settings = ConvertSettings { form: self.form, sh_degree: self.sh_degree, sh_degree_t: self.sh_degree_t };
         let scene = convert(self.checkpoint.load(&self.input)?, &settings);

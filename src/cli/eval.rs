@@ -12,6 +12,7 @@ use super::table::{Table, lines};
 use crate::offline::dataset::Split;
 use crate::offline::engine::Engine;
 use crate::offline::evaluation::evaluate_scene;
+use crate::offline::files::Files;
 use crate::offline::metrics::{Evaluation, ImageMetrics, MetricSet, ViewMetrics, side_by_side};
 use crate::offline::splits::{SPLIT_NAMES, share, split_name};
 use crate::offline::{OfflineError, write_png};
@@ -20,7 +21,7 @@ use crate::view::{Background, Picture};
 use clap::ValueEnum;
 use serde_json::json;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Measure how close a scene is to the views of a dataset, as the original evaluates.
@@ -92,6 +93,10 @@ impl Eval {
     /// # Errors
     /// A scene or views that cannot be used, missing images, pictures that cannot be written, a failure of the engine.
     pub fn run(&self) -> Result<Report, Failure> {
+        let files = self.data.add_to(Files::default().reads_scene(&self.scene));
+        if let Some(out) = &self.out {
+            files.clone().writes_folder(out, []).check()?;
+        }
         let progress = &mut Bars::default();
         let scene = self.checkpoint.load(&self.scene)?;
         let mut scene = scene.into_runtime().map_err(|error| Failure::at(&self.scene, &error))?;
@@ -102,6 +107,8 @@ impl Eval {
         dataset.views = share(dataset.views, self.views);
         dataset.require_images()?;
         if let Some(out) = &self.out {
+            let pictures = dataset.views.iter().map(|view| picture_of(out, &view.name));
+            files.writes_folder(out, pictures).check()?;
             fs::create_dir_all(out).map_err(|error| Failure::at(out, &error))?;
         }
         let background = self.checkpoint.background.map_or(scene.trained_background(), Background::Color);
@@ -114,7 +121,7 @@ impl Eval {
         let start = Instant::now();
         let seen = |view: &ViewMetrics, reference: &Picture, render: &Picture| -> Result<(), OfflineError> {
             let Some(out) = &self.out else { return Ok(()) };
-            let (path, picture) = (out.join(format!("{}.png", view.name)), side_by_side(reference, render, self.gain));
+            let (path, picture) = (picture_of(out, &view.name), side_by_side(reference, render, self.gain));
             Ok(interrupt::whole(|| write_png(&path, &picture))?)
         };
         let evaluation = evaluate_scene(&mut engine, &scene, &dataset.views, background, metrics, progress, seen)?;
@@ -143,6 +150,11 @@ impl Eval {
         });
         Ok(Report::new(json, text))
     }
+}
+
+/// Returns the path of the picture of a view.
+fn picture_of(out: &Path, view: &str) -> PathBuf {
+    out.join(format!("{view}.png"))
 }
 
 /// Returns a table with a row for each view and one for the means, without columns for metrics that no view has.

@@ -1,24 +1,30 @@
 //! Errors of verbs.
 //!
 //! In: any error, with the path of the file if the error does not contain it. Out: one line with the whole chain of
-//! causes.
+//! causes, errors of the system in words.
 
+use super::system;
+use std::any::Any;
 use std::error::Error;
 use std::path::Path;
 
 /// An error of a verb: the line that is printed after `error: `.
 #[derive(Debug)]
-pub struct Failure(String);
+pub struct Failure {
+    message: String,
+    silent: bool,
+}
 
 impl Failure {
     /// Returns a failure with this message.
     pub fn new(message: impl Into<String>) -> Self {
-        Self(message.into())
+        let message = message.into();
+        Self { message: system::in_words(&message), silent: system::is_closed_pipe(&message) }
     }
 
     /// Returns a failure with this message about a file.
     pub fn about(path: &Path, message: &str) -> Self {
-        Self(format!("{}: {message}", path.display()))
+        Self::new(format!("{}: {message}", path.display()))
     }
 
     /// Returns a failure from an error about this file that does not contain its name.
@@ -26,15 +32,27 @@ impl Failure {
         Self::about(path, &chain(error))
     }
 
+    /// Returns a failure from what a panic left.
+    pub fn of_panic(panic: &(dyn Any + Send)) -> Self {
+        let message = panic.downcast_ref::<String>().map(String::as_str);
+        let message = message.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("a panic");
+        Self::new(format!("a defect of gs4d, please report it: {message}"))
+    }
+
     /// Returns the message.
     pub fn message(&self) -> &str {
-        &self.0
+        &self.message
+    }
+
+    /// Returns whether nothing is to be said about it: the program that reads what is written has ended before, as `head` does.
+    pub fn is_silent(&self) -> bool {
+        self.silent
     }
 }
 
 impl<E: Error> From<E> for Failure {
     fn from(error: E) -> Self {
-        Self(chain(&error))
+        Self::new(chain(&error))
     }
 }
 

@@ -11,6 +11,7 @@ use super::table::{Table, bytes, lines};
 use crate::gaussian::GradientMode;
 use crate::offline::dataset::Split;
 use crate::offline::engine::AdapterDescription;
+use crate::offline::files::Files;
 use crate::offline::fine_tune::{Behind, CurvePoint, FineTuneSettings, FineTuned, Rates, Resume, Terms, fine_tune};
 use crate::offline::quantize::Quality;
 use crate::offline::work::{Fingerprint, Work};
@@ -118,7 +119,8 @@ impl FineTune {
     /// # Errors
     /// A scene or views that cannot be used, a package that cannot be written, a failure of the GPU.
     pub fn run(&self) -> Result<Report, Failure> {
-        let out = self.package.out_apart_from(&self.input)?;
+        let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
+        let work = Work::beside(out, ".tune")?;
         let mut scene = self.checkpoint.load(&self.input)?;
         if let Some(background) = self.checkpoint.background {
             scene.trained_with.background = background;
@@ -126,25 +128,15 @@ impl FineTune {
         let (gaussians, progress) = (scene.len(), &mut Bars::default());
         let views = self.data.open(Split::Train, &scene.trained_with, progress)?.views;
         let mut headless = self.renderer.open()?;
-        let work = Work::beside(out, ".tune")?;
         let cameras = self.data.data.join(Split::Train.file_name());
         let fingerprint = Fingerprint::of_files(&[&self.input, &cameras])?;
         let fingerprint = fingerprint.and(&format!("{:?} {:?}", scene.trained_with, self.data.resolution));
         let resume = Resume { work: &work, fingerprint, every: self.save_every };
         let deferred = interrupt::defer();
-        let tuned = fine_tune(&mut headless, scene, &views, &self.settings(), Some(resume), progress);
-        let tuned = match tuned {
-            Ok(tuned) => tuned,
-            Err(error) => {
-                work.remove_if_empty();
-                return Err(error.into());
-            }
-        };
+        let tuned = fine_tune(&mut headless, scene, &views, &self.settings(), Some(resume), progress)?;
         let size = self.package.save(&tuned.scene)?;
         drop(deferred);
-        if tuned.interrupted {
-            work.remove_if_empty();
-        } else {
+        if !tuned.interrupted {
             work.remove()?;
         }
         let FineTuned { curve, best, steps_per_second, held_out, faults, interrupted, .. } = &tuned;

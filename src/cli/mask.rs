@@ -10,6 +10,7 @@ use super::report::Report;
 use super::table::{bytes, lines};
 use crate::offline::dataset::TrainingView;
 use crate::offline::engine::Engine;
+use crate::offline::files::Files;
 use crate::offline::temporal_filter::{FILTER_NAMES, filter, filter_name, needs_views, neighbour_overlap};
 use crate::scene::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter};
 use serde_json::json;
@@ -57,7 +58,7 @@ impl Mask {
     /// A scene or views that cannot be used, too many key-frames, a package that cannot be written, a failure of the
     /// engine.
     pub fn run(&self) -> Result<Report, Failure> {
-        let out = self.package.out()?;
+        let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
         let mut scene = self.checkpoint.load(&self.input)?;
         scene.filter = None;
         let by_views = needs_views(self.filter);

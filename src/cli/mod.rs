@@ -4,7 +4,7 @@
 //! verbs share.
 //!
 //! In: the command line. Out: one report on standard output (text, or one JSON document with `--json`); progress, notes
-//! and errors on standard error; exit code 0, 2 for any failure, 130 when interrupted.
+//! and errors on standard error; exit code 0, 2 for any failure, 101 for a panic, 130 when interrupted.
 
 mod ablate;
 mod args;
@@ -25,12 +25,20 @@ mod render;
 mod report;
 mod score;
 mod synth;
+mod system;
 mod table;
+mod usage;
 
 use clap::{Parser, Subcommand};
 use failure::Failure;
 use report::Report;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::ExitCode;
+
+/// The exit code of a verb that fails, and of a command line that cannot be understood.
+const FAILED: u8 = 2;
+/// The exit code after a panic, a defect of this crate.
+const PANICKED: u8 = 101;
 
 /// Dynamic captures (native 4D Gaussian Splatting): look into them, convert, render, compare, time, make smaller.
 #[derive(Parser)]
@@ -93,13 +101,39 @@ impl Verb {
 
 /// Runs the command that the process was started with. Returns its exit code.
 pub fn run() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match usage::parse::<Cli>() {
+        Ok(cli) => cli,
+        Err(code) => return code,
+    };
     progress::silence_progress(cli.json);
-    let outcome = interrupt::install().map_err(Failure::from).and_then(|()| cli.verb.run());
-    let report = outcome.unwrap_or_else(Report::of_failure);
+    let (report, failed) = report_of(|| interrupt::install().map_err(Failure::from).and_then(|()| cli.verb.run()));
     match report.print(cli.json) {
         Ok(()) if report.interrupted => interrupt::exit_code(),
         Ok(()) if report.failure.is_none() => ExitCode::SUCCESS,
-        _ => ExitCode::from(2),
+        _ => ExitCode::from(failed),
+    }
+}
+
+/// Runs a verb. Returns its report, also after a panic, and the exit code if it has failed.
+fn report_of(verb: impl FnOnce() -> Result<Report, Failure>) -> (Report, u8) {
+    match catch_unwind(AssertUnwindSafe(verb)) {
+        Ok(outcome) => (outcome.unwrap_or_else(Report::of_failure), FAILED),
+        Err(panic) => (Report::of_failure(Failure::of_panic(&*panic)), PANICKED),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io;
+
+    #[test]
+    fn panics_are_reported_as_other_failures() {
+        let (report, code) = report_of(|| panic!("{} are too many", 7));
+        let error = report.json["error"].as_str().expect("an error in the document");
+        assert!(error.contains("7 are too many") && error.contains("report"), "what and what to do: {error}");
+        assert!(code == PANICKED && report.failure.is_some_and(|failure| !failure.is_silent()), "and is a failure");
+        let (report, code) = report_of(|| Err(Failure::from(io::Error::other("no luck"))));
+        assert_eq!((report.json["error"].as_str(), code), (Some("no luck"), FAILED), "a failure stays what it is");
     }
 }

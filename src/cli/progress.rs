@@ -3,7 +3,7 @@
 //! In: the tasks and notes of library calls. Out: one bar for each unfinished task, below those of the tasks around it;
 //! one line for each note.
 
-use super::interrupt;
+use super::{interrupt, system};
 use crate::codec::CodecError;
 use crate::offline::Progress;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -22,9 +22,9 @@ pub fn silence_progress(silent: bool) {
     SILENT.store(silent, Ordering::Relaxed);
 }
 
-/// Writes a line to standard error, if that is open.
+/// Writes a line to standard error, if that is open. Errors of the system in it are put in words.
 pub fn note(line: &str) {
-    let _ = BARS.suspend(|| writeln!(stderr(), "{line}"));
+    let _ = BARS.suspend(|| writeln!(stderr(), "{}", system::in_words(line)));
 }
 
 /// The bars of the unfinished tasks; hidden with `--json` and if standard error is not a terminal. Dropping this

@@ -9,6 +9,7 @@ use super::progress::Bars;
 use super::report::Report;
 use super::score::search_table;
 use super::table::{Table, bytes, lines};
+use crate::offline::files::Files;
 use crate::offline::prune_by_views::{PruneSettings, Pruned, prune_by_views};
 use crate::offline::quality::Trial;
 use crate::offline::score::read_scores;
@@ -68,7 +69,8 @@ impl Prune {
     /// # Errors
     /// A scene, views or scores that cannot be used, a package that cannot be written, a failure of the engine.
     pub fn run(&self) -> Result<Report, Failure> {
-        let out = self.package.out()?;
+        let files = Files::default().reads_scene(&self.input).reads(&self.scores);
+        let out = self.package.checked_out(self.data.add_to(files))?;
         let before = file_size(&self.input)?;
         let scene = self.checkpoint.load(&self.input)?;
         let total = scene.len();

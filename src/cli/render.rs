@@ -9,6 +9,7 @@ use super::progress::Bars;
 use super::report::{Report, switches, switches_json};
 use super::table::lines;
 use crate::offline::engine::AdapterDescription;
+use crate::offline::files::Files;
 use crate::offline::orbit::Shot;
 use crate::offline::render::render_shots;
 use crate::offline::{OfflineError, write_beside, write_png};
@@ -57,6 +58,8 @@ impl Render {
     /// # Errors
     /// A scene or views that cannot be used, pictures that cannot be written, no such adapter, a failure of the GPU.
     pub fn run(&self) -> Result<Report, Failure> {
+        let files = self.views.add_to(Files::default().reads_scene(&self.scene));
+        files.clone().writes_folder(&self.out, []).check()?;
         let (scene, headless) = std::thread::scope(|scope| {
             // The adapter opens while the scene is read, and most are compressed packages.
             let opening = scope.spawn(|| {
@@ -69,6 +72,7 @@ impl Render {
             Ok::<_, Failure>((scene, opening.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))))
         })?;
         let shots = self.views.shots(&scene, 1)?;
+        files.writes_folder(&self.out, shots.iter().flat_map(|shot| self.paths(shot))).check()?;
         fs::create_dir_all(&self.out).map_err(|error| Failure::at(&self.out, &error))?;
         let mut headless = headless?;
         let capture = headless.upload(&scene)?;
@@ -110,6 +114,12 @@ impl Render {
             "visible": counts.visible,
             "pairs": counts.pairs,
         })
+    }
+
+    /// Returns the paths of all files for a shot.
+    fn paths(&self, shot: &Shot) -> Vec<PathBuf> {
+        let extensions: &[&str] = if self.raw { &["png", "f32"] } else { &["png"] };
+        extensions.iter().map(|extension| self.path(shot, extension)).collect()
     }
 
     fn path(&self, shot: &Shot, extension: &str) -> PathBuf {

@@ -44,7 +44,7 @@ impl Report {
     pub fn print(&self, as_json: bool) -> Result<(), Failure> {
         let text = if as_json { format!("{:#}\n", self.json) } else { self.text.clone() };
         let printed = stdout().write_all(text.as_bytes()).and_then(|()| stdout().flush());
-        if let Some(failure) = &self.failure {
+        if let Some(failure) = self.failure.as_ref().filter(|failure| !failure.is_silent()) {
             note(&format!("error: {}", failure.message()));
         }
         match printed {

@@ -10,6 +10,8 @@ use super::progress::Bars;
 use super::report::Report;
 use super::table::{Table, lines};
 use crate::offline::Subject;
+use crate::offline::files::Files;
+use crate::offline::score::variant::Variant;
 use crate::offline::score::write_scores;
 use crate::offline::search::{Candidate, Goal, ScoreChoice, ScoreSearch, SearchSummary, candidates};
 use crate::scene::GaussianScene;
@@ -62,6 +64,7 @@ impl Score {
         if self.variant != ScoreChoice::All && self.out.is_dir() {
             return Err(Failure::about(&self.out, "is a folder: name a file, or give --variant all"));
         }
+        self.files().check()?;
         let progress = &mut Bars::default();
         let scene = self.checkpoint.load(&self.input)?;
         let (auto, scoring) = (self.variant == ScoreChoice::Auto, self.scoring.settings());
@@ -106,15 +109,31 @@ impl Score {
         Ok(Report::new(json, text))
     }
 
+    /// Returns the files that are read and those that may be written.
+    fn files(&self) -> Files {
+        let files = self.data.add_to(Files::default().reads_scene(&self.input));
+        match self.variant {
+            ScoreChoice::All => files.writes_folder(&self.out, Variant::ALL.map(|variant| self.path(variant.name()))),
+            ScoreChoice::Auto | ScoreChoice::One(_) => files.writes(&self.out, "f32"),
+        }
+    }
+
+    /// Returns the path of the file with this score.
+    fn path(&self, score: &str) -> PathBuf {
+        match self.variant {
+            ScoreChoice::All => self.out.join(format!("{score}.f32")),
+            ScoreChoice::Auto | ScoreChoice::One(_) => self.out.clone(),
+        }
+    }
+
     /// Writes one file, or a folder with one for each candidate. Returns the paths of the files.
     fn write(&self, found: &[Candidate]) -> Result<Vec<String>, Failure> {
-        let folder = self.variant == ScoreChoice::All;
-        if folder {
+        if self.variant == ScoreChoice::All {
             fs::create_dir_all(&self.out).map_err(|error| Failure::at(&self.out, &error))?;
         }
         let mut files = Vec::with_capacity(found.len());
         for candidate in found {
-            let path = if folder { self.out.join(format!("{}.f32", candidate.name)) } else { self.out.clone() };
+            let path = self.path(&candidate.name);
             interrupt::whole(|| write_scores(&path, &candidate.scores))?;
             files.push(path.display().to_string());
         }

@@ -6,7 +6,7 @@ use super::args::{CheckpointArgs, PackageArgs, values};
 use super::failure::Failure;
 use super::report::Report;
 use super::table::{bytes, lines};
-use crate::offline;
+use crate::offline::files::Files;
 use crate::scene::grow::grow;
 use crate::scene::synth::{SynthSettings, synthesize};
 use crate::scene::{GaussianScene, SceneForm};
@@ -52,9 +52,11 @@ impl Synth {
     /// Creates the scene and writes it.
     ///
     /// # Errors
-    /// The package cannot be written.
+    /// The capture to grow cannot be read, or the package cannot be written.
     pub fn run(&self) -> Result<Report, Failure> {
-        let out = self.package.out()?;
+        let capture = self.grow.as_deref().and_then(<[OsString]>::last).map(Path::new);
+        let files = capture.into_iter().fold(Files::default(), Files::reads_scene);
+        let out = self.package.checked_out(files)?;
         let scene = match self.grow.as_deref() {
             Some([times, capture]) => self.grown(times, Path::new(capture))?,
             _ => synthesize(&SynthSettings {
@@ -78,7 +80,6 @@ impl Synth {
         let times: usize = text.parse().ok().filter(|&times| times > 0).ok_or_else(|| {
             Failure::new(format!("--grow {text}: expected the number of parts of each Gaussian, such as 37"))
         })?;
-        offline::require_another_file(capture, self.package.out()?)?;
         let scene = CheckpointArgs::default().load(capture)?;
         let SceneForm::Trained(trained) = &scene.form else {
             let reason = "only Gaussians in the trained form can be grown: name a checkpoint or a package in that form";

@@ -3,8 +3,8 @@
 //! In: [`EngineSettings`]. Out: an [`Engine`], which prepares a scene for scoring ([`ScoreEngine`]) or drawing
 //! ([`Draw`]), once for many views. Nothing else chooses between GPU and CPU.
 
-use super::OfflineError;
 use super::score::{CpuEngine, GpuEngine, ScoreEngine};
+use super::{OfflineError, room};
 use crate::reference;
 use crate::renderer::{GpuCapture, GpuContext, GpuError, Headless, ShaderChecks};
 use crate::scene::RuntimeScene;
@@ -138,7 +138,7 @@ pub trait Draw {
     /// Draws a view: RGB, not clamped.
     ///
     /// # Errors
-    /// A picture that does not fit the GPU, a lost device.
+    /// A picture that does not fit the memory or the GPU, a lost device.
     fn draw(&mut self, view: &View) -> Result<Picture, OfflineError>;
 }
 
@@ -150,6 +150,7 @@ struct CpuDrawing<'a> {
 
 impl Draw for CpuDrawing<'_> {
     fn draw(&mut self, view: &View) -> Result<Picture, OfflineError> {
+        room::require(view.size, room::ON_CPU)?;
         Ok(reference::render(self.scene, view, self.background).picture)
     }
 }
@@ -163,6 +164,7 @@ struct GpuDrawing<'a> {
 
 impl Draw for GpuDrawing<'_> {
     fn draw(&mut self, view: &View) -> Result<Picture, OfflineError> {
+        room::require(view.size, room::on_gpu(self.headless))?;
         Ok(self.headless.render(&self.capture, view, self.background)?.picture)
     }
 }

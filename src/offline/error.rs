@@ -11,6 +11,7 @@ use super::score::ScoreError;
 use crate::codec::CodecError;
 use crate::gaussian::InvalidGaussian;
 use crate::renderer::GpuError;
+use glam::UVec2;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
@@ -49,6 +50,19 @@ pub enum OfflineError {
         /// What is wrong with it.
         #[source]
         reason: Box<dyn Error + Send + Sync>,
+    },
+    /// Pictures are too large for the memory.
+    #[error(
+        "pictures of {}x{} pixels need {:.1} GB of memory, and {:.1} GB are available: draw smaller ones",
+        .size.x, .size.y, *.needed as f64 / 1e9, *.available as f64 / 1e9
+    )]
+    Memory {
+        /// Width and height, pixels.
+        size: UVec2,
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes that the system can give.
+        available: u64,
     },
     /// Two folders have no two pictures of the same name.
     #[error("{} and {}: no two pictures with the same name before the extension", .a.display(), .b.display())]

@@ -17,6 +17,7 @@
 //! | [`bake`](mod@bake), [`report`] | runs all of it in order, resumable, and writes a report |
 //! | [`metrics`], [`evaluation`], [`fidelity`], [`comparison`] | measures how close pictures are |
 //! | [`ablation`] | tabulates what every score, ratio and filter costs |
+//! | [`files`] | tells inputs from outputs, and what cannot be written, before anything is computed |
 //! | [`work`] | keeps the results of stages, from which interrupted work resumes |
 //! | [`orbit`], [`render`] | draws a scene from all around, many pictures at a time |
 
@@ -29,9 +30,11 @@ pub mod engine;
 mod error;
 pub mod evaluation;
 pub mod fidelity;
+pub mod files;
 pub mod fine_tune;
 pub mod metrics;
 pub mod orbit;
+mod part;
 mod progress;
 pub mod prune;
 pub mod prune_by_views;
@@ -39,6 +42,7 @@ pub mod quality;
 pub mod quantize;
 pub mod render;
 pub mod report;
+mod room;
 mod save;
 pub mod score;
 pub mod search;
@@ -49,7 +53,7 @@ pub mod work;
 
 pub use error::OfflineError;
 pub use progress::{NoProgress, Progress};
-pub use save::{require_another_file, save, write_beside, write_png, write_settings};
+pub use save::{save, write_beside, write_png, write_settings};
 pub use subject::Subject;
 
 use crate::gaussian::{Gaussian, InvalidGaussian, SliceSettings};

@@ -3,7 +3,7 @@
 //! In: a capture on the GPU, views of it, a function that writes a picture. Out: the [`Counts`] of each view.
 
 use super::orbit::Shot;
-use super::{OfflineError, Progress};
+use super::{OfflineError, Progress, room};
 use crate::renderer::{GpuCapture, Headless};
 use crate::view::{Background, Counts, Picture, View};
 use rayon::prelude::*;
@@ -17,7 +17,7 @@ const QUEUE: usize = 4;
 /// Returns the counts of each view. Begins the task "rendering".
 ///
 /// # Errors
-/// A failure of the GPU, threads that cannot be started, and errors of `write`.
+/// Pictures that do not fit the memory, a failure of the GPU, threads that cannot be started, and errors of `write`.
 pub fn render_shots(
     headless: &mut Headless,
     capture: &GpuCapture,
@@ -26,6 +26,11 @@ pub fn render_shots(
     write: impl Fn(&Shot, &Picture) -> Result<(), OfflineError> + Sync,
     progress: &mut dyn Progress,
 ) -> Result<Vec<Counts>, OfflineError> {
+    // One picture is being drawn and one written while the queue is full.
+    let waiting = views.len().min(QUEUE + 2) as u64;
+    if let Some(size) = views.iter().map(|(_, view)| view.size).max_by_key(|size| size.as_u64vec2().element_product()) {
+        room::require(size, room::on_gpu(headless) + waiting * room::PICTURE)?;
+    }
     let (queue, drawn) = sync_channel::<(&Shot, Picture)>(QUEUE);
     // A thread pool of its own: threads that wait for pictures would stall rayon's shared pool.
     let writers = rayon::ThreadPoolBuilder::new().build()?;

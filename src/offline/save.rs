@@ -1,24 +1,40 @@
 //! Writing files whole or not at all.
 //!
 //! In: a path and its contents: a scene, a picture, anything else. Out: the file, which replaces an existing one only
-//! once it is complete.
+//! once it is complete, and has its permissions. A package is read back before.
 
-use super::OfflineError;
-use crate::codec::package::WriteSettings;
+use super::part;
+use crate::codec::package::{self, WriteSettings};
 use crate::codec::{self, CodecError, CodecErrorKind};
 use crate::scene::{Form, GaussianScene, SceneForm};
 use crate::view::Picture;
 use image::codecs::png::PngEncoder;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Writes a scene in the format of the path's extension ([`codec::write`]), through [`write_beside`].
+/// Most symbolic links that are followed from one to the next, as on Linux.
+const MAX_LINKS: usize = 40;
+
+/// Writes a scene in the format of the path's extension ([`codec::write`]), as [`write_beside`] does. The new file is read back whole
+/// before it replaces an existing one.
 ///
 /// # Errors
-/// A scene that the format cannot hold, a folder that cannot be written to, a full disk.
+/// A scene that the format cannot hold, a folder that cannot be written to, a full disk, a package that cannot be read back.
 pub fn save(path: &Path, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), CodecError> {
-    write_beside(path, |writer| codec::write(writer, path, scene, settings))
+    replace(path, |writer| codec::write(writer, path, scene, settings), read_back)
+        .map_err(|kind| CodecError { path: path.to_owned(), kind })
+}
+
+/// Checks that a package that was just written can be read.
+fn read_back(file: File) -> Result<(), CodecErrorKind> {
+    match package::read(file) {
+        Ok(_) => Ok(()),
+        Err(error) => {
+            let message = format!("the package cannot be read back ({error}), so that it is not kept");
+            Err(io::Error::other(message).into())
+        }
+    }
 }
 
 /// Returns the settings for writing a scene of this form. `level` is the zstd level, 1 to 19; `None` uses 19 for the
@@ -32,17 +48,6 @@ pub fn write_settings(form: &SceneForm, level: Option<i32>) -> WriteSettings {
     WriteSettings { level: level.unwrap_or(usual) }
 }
 
-/// Checks that `out` is not the same file as `input`, which would be overwritten while it is still needed.
-///
-/// # Errors
-/// Both paths lead to the same file.
-pub fn require_another_file(input: &Path, out: &Path) -> Result<(), OfflineError> {
-    match (input.canonicalize(), out.canonicalize()) {
-        (Ok(a), Ok(b)) if a == b => Err(OfflineError::at(out, "is the input itself: write to another file")),
-        _ => Ok(()),
-    }
-}
-
 /// Writes a picture as an 8-bit PNG file, through [`write_beside`].
 ///
 /// # Errors
@@ -52,7 +57,8 @@ pub fn write_png(path: &Path, picture: &Picture) -> Result<(), CodecError> {
 }
 
 /// Writes a file whole or not at all: `write` fills a temporary file in the same folder, which then replaces `path`. If
-/// anything fails, or the program ends before, an existing file at `path` is unchanged.
+/// anything fails, or the program ends before, an existing file at `path` is unchanged. The new file has the permissions of
+/// the one that it replaces; a symbolic link stays, and the file that it leads to is replaced.
 ///
 /// Devices and pipes are written to directly.
 ///
@@ -62,38 +68,72 @@ pub fn write_beside<E>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> 
 where
     CodecErrorKind: From<E>,
 {
-    replace(path, write).map_err(|kind| CodecError { path: path.to_owned(), kind })
+    replace(path, write, |_| Ok(())).map_err(|kind| CodecError { path: path.to_owned(), kind })
 }
 
-fn replace<E>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>) -> Result<(), CodecErrorKind>
+/// As [`write_beside`]; `check` may refuse the file that was written.
+fn replace<E>(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>,
+    check: impl FnOnce(File) -> Result<(), CodecErrorKind>,
+) -> Result<(), CodecErrorKind>
 where
     CodecErrorKind: From<E>,
 {
-    if path.metadata().is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir()) {
+    if is_stream(path) {
         let mut writer = BufWriter::new(File::create(path)?);
         write(&mut writer)?;
         return Ok(writer.flush()?);
     }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".gs4d-").suffix(".part");
-    #[cfg(unix)]
-    {
-        // Permissions as of any new file, by the umask; those of temporary files allow the owner only.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let temporary = builder.tempfile_in(folder)?;
+    let target = resolved(path);
+    let temporary = part::create(folder_of(&target))?;
     let mut writer = BufWriter::with_capacity(1 << 16, temporary.as_file().try_clone()?);
     write(&mut writer)?;
-    writer.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
-    temporary.persist(path).map_err(|failed| failed.error)?;
+    let written = writer.into_inner().map_err(io::IntoInnerError::into_error)?;
+    written.sync_all()?;
+    check(written)?;
+    if let Ok(replaced) = target.metadata()
+        && replaced.is_file()
+    {
+        temporary.as_file().set_permissions(replaced.permissions())?;
+    }
+    temporary.persist(&target).map_err(|failed| failed.error)?;
     Ok(())
+}
+
+/// Returns whether a path leads to a device or a pipe.
+pub(super) fn is_stream(path: &Path) -> bool {
+    path.metadata().is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
+}
+
+/// Returns the folder of a file: the current one for a name alone.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Returns the path that a path leads to through symbolic links, whether there is a file or not.
+pub(super) fn resolved(path: &Path) -> PathBuf {
+    let mut path = path.to_owned();
+    for _ in 0..MAX_LINKS {
+        if let Ok(found) = path.canonicalize() {
+            return found;
+        }
+        match fs::read_link(&path) {
+            Ok(link) => path = folder_of(&path).join(link),
+            Err(_) => break,
+        }
+    }
+    match path.file_name() {
+        Some(name) => resolved(folder_of(&path)).join(name),
+        None => path,
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::offline::quantize::{CompressSettings, Quality, compress};
+    use crate::scene::synth::{SynthSettings, synthesize};
 
     #[test]
     fn a_failed_write_leaves_what_was_there() {
@@ -106,10 +146,48 @@ mod tests {
         });
         let message = failed.expect_err("the writer failed").to_string();
         assert!(message.contains("scene.gs4d: disk full"), "path and reason: {message}");
-        assert_eq!(std::fs::read(&path).expect("still there"), b"first", "the old file is whole");
+        assert_eq!(fs::read(&path).expect("still there"), b"first", "the old file is whole");
         write_beside(&path, |writer| writer.write_all(b"third")).expect("the folder can be written to");
-        assert_eq!(std::fs::read(&path).expect("replaced"), b"third", "the new file took its place");
-        let left = std::fs::read_dir(folder.path()).expect("the folder").count();
+        assert_eq!(fs::read(&path).expect("replaced"), b"third", "the new file took its place");
+        let left = fs::read_dir(folder.path()).expect("the folder").count();
         assert_eq!(left, 1, "no temporary file stays behind");
+    }
+
+    #[test]
+    fn a_package_that_cannot_be_read_back_replaces_nothing() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("scene.gs4d");
+        let scene = synthesize(&SynthSettings { count: 40, ..SynthSettings::default() });
+        let runtime = scene.into_runtime().expect("a synthetic scene can be drawn");
+        let (mut packed, _) = compress(runtime, &CompressSettings::from(Quality::Small)).expect("it is compressed");
+        save(&path, &packed, &WriteSettings::default()).expect("a package that can be read");
+        let before = fs::read(&path).expect("the package is there");
+        let SceneForm::Ready(Form::Packed(records)) = &mut packed.form else { panic!("it is packed") };
+        records.ranges[0][0] = f32::INFINITY;
+        let message = save(&path, &packed, &WriteSettings::default()).expect_err("it cannot be read").to_string();
+        assert!(message.contains("scene.gs4d") && message.contains("not finite"), "path and reason: {message}");
+        assert_eq!(fs::read(&path).expect("still there"), before, "the old package is whole");
+        assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 1, "nothing else is left");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_permissions_stay() {
+        use std::os::unix::fs::{PermissionsExt, symlink};
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let [file, link, ahead, later] = ["file", "link", "ahead", "later"].map(|name| folder.path().join(name));
+        fs::write(&file, b"first").expect("the folder can be written to");
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o640)).expect("it is ours");
+        symlink("file", &link).expect("the folder can be written to");
+        symlink(&later, &ahead).expect("the folder can be written to");
+        for path in [&link, &ahead] {
+            write_beside(path, |writer| writer.write_all(b"second")).expect("the folder can be written to");
+            assert!(path.is_symlink(), "{} is still a link", path.display());
+        }
+        for path in [&file, &later] {
+            assert_eq!(fs::read(path).expect("it is there"), b"second", "{} was written", path.display());
+        }
+        let mode = file.metadata().expect("it is there").permissions().mode() & 0o777;
+        assert_eq!(mode, 0o640, "the permissions are those of the replaced file");
     }
 }

@@ -1,15 +1,18 @@
 //! The folder of intermediate results, from which interrupted work resumes.
 //!
 //! In: a fingerprint of everything that a result depends on, and the result as bytes. Out: the same bytes; `None`, so
-//! that the stage runs again, if the fingerprint is another or the bytes are damaged.
+//! that the stage runs again, if the fingerprint is another or the bytes are damaged. One run at a time works in a folder.
 //!
 //! Each fingerprint includes that of the previous stage, so that a change invalidates all later results.
 
+use super::files::node;
+use super::part;
 use crate::codec::CodecError;
 use crate::offline::{Progress, write_beside};
-use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use std::fs::{self, File, TryLockError};
+use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// First bytes of every stored result.
 const MAGIC: [u8; 4] = *b"GS4W";
@@ -17,6 +20,11 @@ const MAGIC: [u8; 4] = *b"GS4W";
 const VERSION: u32 = 1;
 /// Bytes of the header: magic, version, fingerprint, checksum of the body.
 const HEAD: usize = 16;
+
+/// Name of the file that is locked while a run works in the folder.
+const LOCK: &str = "lock";
+/// Most attempts to lock it while runs that end remove it.
+const ATTEMPTS: usize = 100;
 
 /// A 32-bit checksum of everything that a result depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,33 +70,45 @@ fn hash_file(path: &Path, hasher: &mut crc32fast::Hasher) -> io::Result<()> {
     Ok(())
 }
 
-/// The folder of intermediate results.
+/// The folder of intermediate results, for one run alone. Once the last clone is dropped, another run can work in it; if nothing is
+/// stored, the folder is removed then.
 #[derive(Debug, Clone)]
-pub struct Work {
+pub struct Work(Arc<Held>);
+
+/// A folder in which no other run works.
+#[derive(Debug)]
+struct Held {
     folder: PathBuf,
+    /// The file [`LOCK`]; always there until the folder is given back.
+    lock: Option<File>,
 }
 
 impl Work {
     /// Returns the folder beside the package `out` whose name ends in `ending` as well (`OUT.bake`), created if it does not exist.
     ///
     /// # Errors
-    /// The folder cannot be created.
+    /// Another run works in the folder, or it cannot be created.
     pub fn beside(out: &Path, ending: &str) -> Result<Self, CodecError> {
         let mut name = out.file_name().unwrap_or_default().to_owned();
         name.push(ending);
         let folder = out.with_file_name(name);
-        fs::create_dir_all(&folder).map_err(|error| CodecError { path: folder.clone(), kind: error.into() })?;
-        Ok(Self { folder })
+        match lock(&folder) {
+            Ok(lock) => {
+                part::remove_stale(&folder);
+                Ok(Self(Arc::new(Held { folder, lock: Some(lock) })))
+            }
+            Err(error) => Err(CodecError { path: folder, kind: error.into() }),
+        }
     }
 
     /// Returns the path of the folder.
     pub fn folder(&self) -> &Path {
-        &self.folder
+        &self.0.folder
     }
 
     /// Returns a stored result; `None` if there is none, or if it is damaged or has another fingerprint.
     pub fn load(&self, name: &str, fingerprint: Fingerprint) -> Option<Vec<u8>> {
-        let bytes = fs::read(self.folder.join(name)).ok()?;
+        let bytes = fs::read(self.folder().join(name)).ok()?;
         let (head, body) = bytes.split_at_checked(HEAD)?;
         (head == self::head(fingerprint, body)).then(|| body.to_vec())
     }
@@ -105,26 +125,69 @@ impl Work {
         progress: &mut dyn Progress,
     ) -> Result<(), CodecError> {
         progress.uninterrupted(&mut || {
-            write_beside(&self.folder.join(name), |file| {
+            write_beside(&self.folder().join(name), |file| {
                 file.write_all(&head(fingerprint, body))?;
                 file.write_all(body)
             })
         })
     }
 
-    /// Removes the folder if nothing was stored.
-    pub fn remove_if_empty(&self) {
+    /// Removes what was stored. The folder stays if it has other files.
+    ///
+    /// # Errors
+    /// The folder cannot be listed, or a file in it not removed.
+    pub fn remove(self) -> Result<(), CodecError> {
+        let removed = fs::read_dir(self.folder()).and_then(|entries| {
+            let paths = entries.map(|entry| entry.map(|entry| entry.path())).collect::<io::Result<Vec<_>>>()?;
+            paths.iter().filter(|path| is_stored(path)).try_for_each(fs::remove_file)
+        });
+        removed.map_err(|error| CodecError { path: self.folder().to_owned(), kind: error.into() })
+    }
+}
+
+impl Drop for Held {
+    fn drop(&mut self) {
+        // A run that begins now makes another lock: the folder is then not empty, and stays.
+        let _ = fs::remove_file(self.folder.join(LOCK));
+        drop(self.lock.take());
         // `remove_dir` does not remove a folder that has contents.
         let _ = fs::remove_dir(&self.folder);
     }
+}
 
-    /// Removes the folder and what is in it.
-    ///
-    /// # Errors
-    /// The folder or its contents cannot be removed.
-    pub fn remove(self) -> Result<(), CodecError> {
-        fs::remove_dir_all(&self.folder).map_err(|error| CodecError { path: self.folder.clone(), kind: error.into() })
+/// Makes the folder, and locks it against other runs.
+fn lock(folder: &Path) -> io::Result<File> {
+    let path = folder.join(LOCK);
+    for _ in 0..ATTEMPTS {
+        fs::create_dir_all(folder)?;
+        let file = match File::options().create(true).truncate(false).write(true).open(&path) {
+            // A run that has just ended removed the folder.
+            Err(error) if error.kind() == ErrorKind::NotFound => continue,
+            file => file?,
+        };
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => break,
+            // A run that has just ended removed the file.
+            Ok(()) if !is_at(&file, &path) => {}
+            // Where files cannot be locked, it is left to the user.
+            Ok(()) | Err(TryLockError::Error(_)) => return Ok(file),
+        }
     }
+    let message = "another run of gs4d works in this folder: wait until it has ended, or write to another OUT";
+    Err(io::Error::new(ErrorKind::ResourceBusy, message))
+}
+
+/// Returns whether an open file is the one at this path.
+fn is_at(file: &File, path: &Path) -> bool {
+    let (open, there) = (file.metadata().ok(), path.metadata().ok());
+    there.is_some() && open.as_ref().and_then(node) == there.as_ref().and_then(node)
+}
+
+/// Returns whether a file is a stored result.
+fn is_stored(path: &Path) -> bool {
+    let mut start = [0; MAGIC.len()];
+    let read = path.is_file() && File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok();
+    read && start == MAGIC
 }
 
 fn head(fingerprint: Fingerprint, body: &[u8]) -> [u8; HEAD] {
@@ -173,6 +236,36 @@ mod tests {
         assert_eq!(work.load("kept", settings), None, "cut off");
         work.remove().expect("the folder can be removed");
         assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 1, "nothing stays behind");
+    }
+
+    #[test]
+    fn only_what_was_stored_is_removed() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let out = folder.path().join("scene.gs4d");
+        let work = Work::beside(&out, ".bake").expect("the folder can be made");
+        let (path, foreign) = (work.folder().to_owned(), work.folder().join("notes.txt"));
+        work.store("kept", Fingerprint(1), b"some bytes", &mut NoProgress).expect("the folder can be written to");
+        fs::write(&foreign, b"mine").expect("the folder can be written to");
+        work.remove().expect("the folder can be listed");
+        let left: Vec<_> = fs::read_dir(&path).expect("the folder").flatten().map(|entry| entry.path()).collect();
+        assert_eq!(left, [foreign], "the file of somebody else");
+    }
+
+    #[test]
+    fn one_run_at_a_time_works_in_a_folder() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let out = folder.path().join("scene.gs4d");
+        let first = Work::beside(&out, ".bake").expect("the folder can be made");
+        let message = Work::beside(&out, ".bake").expect_err("the first is still there").to_string();
+        assert!(message.contains("scene.gs4d.bake: another run"), "folder and reason: {message}");
+        let clone = first.clone();
+        drop(first);
+        Work::beside(&out, ".bake").expect_err("a clone of the first is still there");
+        drop(clone);
+        assert!(!folder.path().join("scene.gs4d.bake").exists(), "nothing was stored");
+        Work::beside(&out, ".bake").expect("nobody works in it");
+        fs::write(folder.path().join("file.bake"), b"mine").expect("the folder can be written to");
+        Work::beside(&folder.path().join("file"), ".bake").expect_err("a file of that name");
     }
 
     #[test]

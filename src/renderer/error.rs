@@ -61,6 +61,17 @@ pub enum GpuError {
         /// Bytes that the device can bind.
         limit: u64,
     },
+    /// The device has no memory left for a buffer or a texture.
+    #[error(
+        "at least {needed} bytes of this GPU's memory are needed, and there is no room for them ({reason}): draw fewer Gaussians or a \
+         smaller picture"
+    )]
+    Memory {
+        /// Bytes needed.
+        needed: u64,
+        /// Message of wgpu.
+        reason: String,
+    },
     /// The picture has no pixels or more than a texture can hold.
     #[error("a picture of {width} x {height} pixels cannot be drawn: sides must be between 1 and {limit}")]
     Size {

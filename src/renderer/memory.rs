@@ -1,10 +1,12 @@
 //! Creation of buffers, textures and bind groups, and the limits of a device for them.
 //!
 //! In: a device, sizes and usages. Out: buffers, textures and bind groups, each counted; the limits that sizes are
-//! checked against.
+//! checked against; an error where memory runs out.
 
+use super::GpuError;
 use super::work::WorkCounters;
 use glam::UVec2;
+use pollster::block_on;
 use wgpu::{BufferUsages, TextureFormat};
 
 /// A device on which resources are created and counted.
@@ -62,6 +64,23 @@ impl Allocator<'_> {
             .collect();
         self.work.add_created();
         self.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
+    }
+}
+
+/// Runs `create`, which takes `needed` bytes or more. Memory that the device does not have is an error then, not a panic of wgpu.
+///
+/// # Errors
+/// The device has no memory left, or refuses what is made of a resource without memory.
+pub fn with_room<T>(device: &wgpu::Device, needed: u64, create: impl FnOnce() -> T) -> Result<T, GpuError> {
+    let refused = device.push_error_scope(wgpu::ErrorFilter::Validation);
+    let lacking = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+    let created = create();
+    let lacking = block_on(lacking.pop());
+    let refused = block_on(refused.pop());
+    match (lacking, refused) {
+        (Some(error), _) => Err(GpuError::Memory { needed, reason: error.to_string() }),
+        (None, Some(error)) => Err(GpuError::Device(error.to_string())),
+        (None, None) => Ok(created),
     }
 }
 

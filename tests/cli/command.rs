@@ -1,12 +1,14 @@
-//! The `gs4d` command, run as a user runs it: inspecting captures, converting them, and all errors of a command line.
+//! The `gs4d` command, run as a user runs it: inspecting captures, converting them, all errors of a command line, readers that end early.
 //!
 //! In: command lines, whole and damaged files. Out: proof that exit codes, what is printed and what is written are right, and that
 //! nothing panics.
 
 use crate::support::command::{arguments, folder, gs4d, scene};
 use serde_json::Value;
+use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
+use std::process::{Command, Stdio};
 
 #[test]
 fn conversion_keeps_what_it_should() {
@@ -170,5 +172,59 @@ fn usage_errors_name_the_option() {
         (&["synth"], "OUT"),
     ] {
         gs4d(arguments).must_fail(name);
+    }
+}
+
+#[test]
+fn errors_of_usage_are_json_if_asked_for() {
+    for (arguments, name) in [
+        (&["info", "--json"][..], "FILE"),
+        (&["frobnicate", "--json"], "frobnicate"),
+        (&["--json", "synth", "x.gs4d", "--count", "0"], "--count"),
+        (&["compress", "x.gs4d", "y.gs4d", "--data", "z", "--json"], "--data"),
+    ] {
+        let run = gs4d(arguments);
+        run.must_fail(name);
+        let document: Value = serde_json::from_str(&run.out).expect("one JSON document for an error of usage, too");
+        let error = document["error"].as_str().expect("an error");
+        assert!(error.contains(name) && !error.contains("Usage") && !error.contains('\n'), "{name} in short: {error}");
+    }
+    let text = gs4d(&["info"]);
+    text.must_fail("FILE");
+    assert!(text.out.is_empty() && text.err.contains("Usage: gs4d info"), "people see how it is used: {}", text.err);
+    let help = gs4d(&["info", "--help", "--json"]).text();
+    assert!(help.contains("Examples:"), "help is no error");
+}
+
+#[test]
+fn errors_of_the_system_are_put_in_words() {
+    let folder = folder();
+    let run = gs4d(&arguments!["info", folder.path().join("nowhere.gs4d"), "--json"]);
+    run.must_fail("nowhere.gs4d: there is no such file or folder");
+    let document: Value = serde_json::from_str(&run.out).expect("one JSON document");
+    let error = document["error"].as_str().expect("an error");
+    assert!(error.contains("check the path") && !error.contains("os error"), "the same in JSON: {error}");
+}
+
+/// Runs the command while nobody reads its standard output. Returns exit code and standard error.
+fn unread(arguments: &[OsString]) -> (Option<i32>, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gs4d"));
+    command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("the command starts");
+    drop(child.stdout.take());
+    let output = child.wait_with_output().expect("the command ends");
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn a_reader_that_ends_early_is_not_told_of() {
+    let folder = folder();
+    let path = scene(&folder, "300");
+    let quiet = |code: i32| (Some(code), String::new());
+    assert_eq!(unread(&arguments!["info", &path]), quiet(0), "text");
+    assert_eq!(unread(&arguments!["info", &path, "--json"]), quiet(0), "JSON");
+    assert_eq!(unread(&arguments!["info", "--help"]), quiet(0), "help");
+    if cfg!(target_os = "linux") {
+        assert_eq!(unread(&arguments!["convert", &path, "/dev/stdout"]), quiet(2), "a package that nobody has read");
     }
 }

@@ -8,7 +8,8 @@ use crate::support::dataset;
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use glam::{UVec2, Vec3};
+use glam::{Mat4, UVec2, Vec3};
+use serde_json::json;
 use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
@@ -69,6 +70,22 @@ fn what_is_missing_is_named() {
     fs::remove_file(data.join("test/c00_01.png")).expect("the picture is there");
     gs4d(&arguments!["eval", &scene, "--data", &data]).must_fail("c00_01.png");
     gs4d(&arguments!["eval", &scene]).must_fail("--data");
+}
+
+#[test]
+fn advice_names_no_option_that_the_verb_lacks() {
+    let (folder, scene, _) = capture(UVec2::splat(16));
+    let data = folder.path().join("sizeless");
+    fs::create_dir(&data).expect("the folder can be written to");
+    let frame = json!({ "file_path": "nothing", "time": 0, "transform_matrix": Mat4::IDENTITY.to_cols_array_2d() });
+    for split in ["train", "test"] {
+        let cameras = json!({ "camera_angle_x": 0.7, "frames": [frame] });
+        fs::write(data.join(format!("transforms_{split}.json")), cameras.to_string()).expect("it can be written to");
+    }
+    let eval = gs4d(&arguments!["eval", &scene, "--data", &data]);
+    eval.must_fail("the picture size is unknown");
+    assert!(!eval.err.contains("--size"), "eval has no such option: {}", eval.err);
+    gs4d(&arguments!["score", &scene, "--data", &data, "--out", folder.path().join("out.f32")]).must_fail("--size");
 }
 
 #[test]

@@ -6,8 +6,10 @@
 mod bake;
 mod command;
 mod compare;
+mod compress;
 mod eval;
 mod fine_tune;
+mod outputs;
 mod prune;
 mod render;
 

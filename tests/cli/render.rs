@@ -50,6 +50,27 @@ fn pictures_are_drawn_and_written() {
 }
 
 #[test]
+fn pictures_that_do_not_fit_are_refused_before_they_are_drawn() {
+    let limit = match GpuContext::headless(None) {
+        Ok(context) => context.device.limits().max_buffer_size,
+        Err(error) => return skip(error),
+    };
+    let folder = folder();
+    let (path, frames) = (scene(&folder, "100"), folder.path().join("frames"));
+    for (size, bytes) in [("16384x16384", 1u64 << 32), ("16384x8192", 1 << 31)] {
+        if bytes <= limit {
+            skip(format_args!("this GPU has room for a picture of {size}"));
+            continue;
+        }
+        let run = gs4d(&arguments!["render", &path, "--orbit", "1", "--size", size, "--out", &frames]);
+        run.must_fail("smaller");
+        let told = run.err.contains("GB are available") || run.err.contains(&format!("{bytes} bytes"));
+        assert!(told, "{size}: how much is needed: {}", run.err);
+        assert!(!frames.join("orbit_0000.png").exists(), "{size}: nothing is drawn");
+    }
+}
+
+#[test]
 fn benchmarks_measure() {
     if no_gpu() {
         return;

@@ -168,6 +168,32 @@ fn what_does_not_fit_is_refused() {
 }
 
 #[test]
+fn values_that_the_packed_form_cannot_hold_are_refused() {
+    let (mut far, mut bright) = (scene(300, 0, 0), scene(300, 0, 0));
+    let gaussians = &mut far.form.as_sliced_mut().expect("sliced").gaussians;
+    (gaussians[7].mean, gaussians[8].mean) = ([3e38; 3], [-3e38; 3]);
+    bright.form.as_sliced_mut().expect("sliced").harmonics.values[..2].copy_from_slice(&[3e38, -3e38]);
+    for (what, scene) in [("means", far), ("colours", bright)] {
+        let refused = compress(scene, &settings(&[8]));
+        assert!(matches!(refused, Err(CompressError::Range(_))), "{what} that are too far apart");
+    }
+    for color_step in [f32::INFINITY, f32::NAN, -1.0] {
+        let refused = compress(scene(50, 1, 0), &CompressSettings { color_step, ..settings(&[]) });
+        assert!(matches!(refused, Err(CompressError::ColorStep(_))), "a step of {color_step}");
+    }
+}
+
+#[test]
+fn steps_of_any_size_leave_colors_finite() {
+    let scene = scene(300, 1, 0);
+    for color_step in [f32::from_bits(1), f32::MIN_POSITIVE, f32::MAX] {
+        let settings = CompressSettings { color_step, ..settings(&[]) };
+        let (packed, _) = compress(scene.clone(), &settings).expect("it is compressed");
+        packed.into_runtime().unwrap_or_else(|error| panic!("a step of {color_step}: {error}"));
+    }
+}
+
+#[test]
 fn few_gaussians_are_no_trouble() {
     for count in [0, 1, 2, 255, 256, 257] {
         let scene = scene(count, 3, 2);

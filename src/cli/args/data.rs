@@ -6,6 +6,7 @@ use super::values;
 use crate::cli::failure::Failure;
 use crate::offline::Progress;
 use crate::offline::dataset::{CameraOptions, Dataset, DatasetError, Split, TrainingView};
+use crate::offline::files::Files;
 use crate::offline::splits::open_split;
 use crate::scene::TrainedWith;
 use glam::UVec2;
@@ -28,6 +29,11 @@ pub struct DataArgs {
 }
 
 impl DataArgs {
+    /// Adds the files of the folder, if one is given, to those that the verb reads.
+    pub fn add_to(&self, files: Files) -> Files {
+        self.data.iter().fold(files, |files, folder| files.reads_data(folder))
+    }
+
     /// Returns the training views within the capture's time interval.
     ///
     /// # Errors
@@ -41,7 +47,15 @@ impl DataArgs {
             resolution: self.resolution,
             time_interval: Some(trained_with.time_interval),
         };
-        Ok(Dataset::open(folder, Split::Train, &options)?.views)
+        Ok(Dataset::open(folder, Split::Train, &options).map_err(or_give_size)?.views)
+    }
+}
+
+/// Returns the failure of a verb that takes `--size`.
+pub(super) fn or_give_size(error: DatasetError) -> Failure {
+    match &error {
+        DatasetError::SizeUnknown { .. } => Failure::new(format!("{error}, or give --size WxH")),
+        _ => error.into(),
     }
 }
 
@@ -58,6 +72,11 @@ pub struct SplitArgs {
 }
 
 impl SplitArgs {
+    /// Adds the files of the folder to those that the verb reads.
+    pub fn add_to(&self, files: Files) -> Files {
+        files.reads_data(&self.data)
+    }
+
     /// Returns the views of a split; see [`open_split`].
     ///
     /// # Errors

@@ -1,9 +1,10 @@
 //! The path of a package to write, and its compression.
 //!
-//! In: options, a scene. Out: the package on disk.
+//! In: options, the files that are read, a scene. Out: the package on disk.
 
 use crate::cli::failure::Failure;
 use crate::cli::interrupt;
+use crate::offline::files::Files;
 use crate::offline::{self, write_settings};
 use crate::scene::GaussianScene;
 use std::fs;
@@ -27,24 +28,19 @@ impl PackageArgs {
     /// Returns the path to write to.
     ///
     /// # Errors
-    /// No path is given, or its extension is that of another kind of file.
+    /// No path is given.
     pub fn out(&self) -> Result<&Path, Failure> {
-        let out = self.out.as_ref().or(self.out_option.as_ref());
-        let out = out.ok_or_else(|| Failure::new("no OUT is given: name the package to write"))?;
-        let foreign = ["pth", "json", "png", "jpg", "f32"];
-        if out.extension().is_some_and(|found| foreign.iter().any(|extension| found.eq_ignore_ascii_case(extension))) {
-            return Err(Failure::about(out, "packages are written here, and their names end in .gs4d"));
-        }
-        Ok(out)
+        let out = self.out.as_deref().or(self.out_option.as_deref());
+        out.ok_or_else(|| Failure::new("no OUT is given: name the package to write"))
     }
 
-    /// As [`out`](Self::out), for a verb that still reads `input` while it writes.
+    /// Returns the path to write to, after checking that a package can be written there; `files` are those that the verb reads.
     ///
     /// # Errors
-    /// As [`out`](Self::out), and an input that would be overwritten.
-    pub fn out_apart_from(&self, input: &Path) -> Result<&Path, Failure> {
+    /// As [`out`](Self::out), and those of [`Files::check`].
+    pub fn checked_out(&self, files: Files) -> Result<&Path, Failure> {
         let out = self.out()?;
-        offline::require_another_file(input, out)?;
+        files.writes(out, "gs4d").check()?;
         Ok(out)
     }
 

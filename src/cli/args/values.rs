@@ -48,6 +48,11 @@ pub fn not_negative(text: &str) -> Result<f64, String> {
     value.ok_or_else(|| "expected a number, zero or above".to_owned())
 }
 
+/// Parses a number, not below zero, that single precision can hold.
+pub fn step(text: &str) -> Result<f32, String> {
+    number(text).ok().filter(|value| *value >= 0.0).ok_or_else(|| "expected a number, zero or above".to_owned())
+}
+
 /// Parses `WxH` in pixels.
 pub fn size(text: &str) -> Result<UVec2, String> {
     let side = |text: &str| text.parse::<u32>().ok().filter(|side| (1..=MAX_SIDE).contains(side));
@@ -98,6 +103,7 @@ mod tests {
             assert!(share(text).is_err(), "{text:?} is no share");
         }
         assert!(not_negative("-1").is_err() && not_negative("inf").is_err(), "finite and not below zero");
+        assert!(step("-1").is_err() && step("1e308").is_err(), "in single precision and not below zero");
         assert!(interval("1,1").is_err(), "an interval has a length");
         assert!(positive("0").is_err(), "zero is not above zero");
     }

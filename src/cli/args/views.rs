@@ -2,10 +2,12 @@
 //!
 //! In: `--cameras FILE` or `--orbit N`, sizes, a fixed time. Out: named cameras at a time each ([`Shot`]).
 
+use super::data::or_give_size;
 use super::values;
 use crate::cli::failure::Failure;
 use crate::cli::progress::note;
 use crate::offline::dataset::{CameraFile, CameraOptions};
+use crate::offline::files::Files;
 use crate::offline::orbit::{ORBIT_SIZE, Shot, orbit};
 use crate::scene::RuntimeScene;
 use crate::view::Lens;
@@ -35,6 +37,11 @@ pub struct ViewArgs {
 }
 
 impl ViewArgs {
+    /// Adds the camera file, if one is given, and the images that it names to the files that the verb reads.
+    pub fn add_to(&self, files: Files) -> Files {
+        self.cameras.iter().fold(files, |files, path| files.reads_cameras(path))
+    }
+
     /// Returns how many views to use: all of `--orbit` if it is given, else `count`.
     pub fn limit(&self, count: usize) -> usize {
         self.orbit.unwrap_or(count)
@@ -49,7 +56,7 @@ impl ViewArgs {
         let mut shots = match &self.cameras {
             Some(path) => {
                 let options = CameraOptions { size: self.size, resolution: self.resolution, time_interval: None };
-                let views = CameraFile::load(path, &options)?;
+                let views = CameraFile::load(path, &options).map_err(or_give_size)?;
                 views.into_iter().map(|view| Shot { name: view.name, camera: view.camera, time: view.time }).collect()
             }
             None => orbit(scene, self.orbit.unwrap_or(count), self.size.unwrap_or(ORBIT_SIZE))?,

@@ -2,7 +2,7 @@
 //!
 //! In: a checkpoint, its training views, [`BakeSettings`]. Out: a package, and `NAME.report.json` and
 //! `NAME.report.html` beside a package `NAME.gs4d` ([`Baked`]). The stages (see [`Stage`]) before the evaluation store
-//! their results in the folder `OUT.bake` beside a package `OUT` ([`Work`]), so that an interrupted bake resumes.
+//! their results in the folder `OUT.bake` beside a package `OUT` ([`Work`]), so that an interrupted bake resumes. Two bakes cannot share it.
 
 mod compression;
 mod evaluation;
@@ -18,6 +18,7 @@ pub use stages::Stage;
 
 use super::dataset::{Split, TrainingView};
 use super::engine::Engine;
+use super::files::Files;
 use super::fine_tune::FineTuneSettings;
 use super::quantize::Quality;
 use super::report::BakeReport;
@@ -26,7 +27,7 @@ use super::search::{Goal, ScoreChoice};
 use super::splits::open_split;
 use super::temporal_filter::KeyFrames;
 use super::work::{Fingerprint, Work};
-use super::{OfflineError, Progress, Subject, require_another_file, sliced};
+use super::{OfflineError, Progress, Subject, sliced};
 use crate::scene::{FilterKind, GaussianScene};
 use stages::Stages;
 use std::path::PathBuf;
@@ -48,7 +49,7 @@ pub struct BakeSettings {
     pub background: Option<[f32; 3]>,
     /// How many Gaussians to keep.
     pub goal: Goal,
-    /// Rounds in which the others are removed, with training between. Default of the command: 1, all at once.
+    /// Rounds in which the others are removed, with training between where the Gaussians are trained; 1 removes all at once.
     pub rounds: usize,
     /// Which score to prune by.
     pub score: ScoreChoice,
@@ -69,6 +70,19 @@ pub struct BakeSettings {
     pub keep_work: bool,
 }
 
+impl BakeSettings {
+    /// Checks that the package and the reports can be written and are none of the files that are read. [`bake`] does so, too; programs
+    /// that take long to read the checkpoint can find out before.
+    ///
+    /// # Errors
+    /// The first of them with which something is wrong.
+    pub fn check_files(&self) -> Result<(), OfflineError> {
+        let files = Files::default().reads_scene(&self.checkpoint).reads_data(&self.data).writes(&self.out, "gs4d");
+        let [json, html] = summary::paths(&self.out);
+        files.writes(&json, "json").writes(&html, "html").check()
+    }
+}
+
 /// A finished bake.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Baked {
@@ -85,22 +99,20 @@ pub struct Baked {
 ///
 /// # Errors
 /// Training views that are missing or show nothing of the scene, images that a loss needs and that are missing, files
-/// that cannot be written, a failure of the engine.
+/// that cannot be written or are read, another bake to the same package, a failure of the engine.
 pub fn bake(
     scene: GaussianScene,
     settings: &BakeSettings,
     engine: &mut Engine,
     progress: &mut dyn Progress,
 ) -> Result<Baked, OfflineError> {
-    require_another_file(&settings.checkpoint, &settings.out)?;
+    settings.check_files()?;
     let mut bake = Bake::open(scene, settings, engine, progress)?;
-    let baked = bake.run(progress);
-    if baked.is_err() {
-        bake.work.remove_if_empty();
-    } else if !settings.keep_work {
+    let baked = bake.run(progress)?;
+    if !settings.keep_work {
         bake.work.remove()?;
     }
-    baked
+    Ok(baked)
 }
 
 /// The state that the stages share.
@@ -123,6 +135,7 @@ impl<'a> Bake<'a> {
         progress: &mut dyn Progress,
     ) -> Result<Self, OfflineError> {
         let BakeSettings { checkpoint, data, resolution, .. } = settings;
+        let work = Work::beside(&settings.out, ".bake")?;
         scene.filter = None;
         let views = open_split(data, Split::Train, *resolution, &scene.trained_with, progress)?.views;
         let cameras = data.join(Split::Train.file_name());
@@ -130,7 +143,6 @@ impl<'a> Bake<'a> {
         let read = format!("{:?} {:?} {resolution:?}", scene.trained_with, scene.playback);
         let fingerprint = files.and(env!("CARGO_PKG_VERSION")).and(&read);
         let subject = Subject::new(checkpoint, scene, settings.background)?;
-        let work = Work::beside(&settings.out, ".bake")?;
         Ok(Self { settings, engine, subject, views, work, fingerprint })
     }
 

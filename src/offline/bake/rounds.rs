@@ -8,6 +8,7 @@ use super::stages::Stages;
 use super::trials::Trials;
 use super::{Bake, Fingerprint, Stage};
 use crate::codec::package::{self, WriteSettings};
+use crate::offline::fine_tune::TrainingImages;
 use crate::offline::prune::{highest, select};
 use crate::offline::score::variant::Variant;
 use crate::offline::{OfflineError, Subject};
@@ -32,8 +33,10 @@ impl Bake<'_> {
         let Self { settings, engine, subject, views, work, .. } = self;
         let stored = work.load(FILE, fingerprint).and_then(|bytes| package::read(Cursor::new(bytes)).ok());
         let scene = stages.run(Stage::Rounds, stored, |progress| {
-            let (scored, held_out) = settings.scoring.split(views.clone(), true);
-            let trials = Trials::load(&scored, &held_out, &subject.scene, &tuning, progress)?;
+            let (scored, _) = settings.scoring.split(views.clone(), true);
+            // What is held out later is never trained on.
+            let images = TrainingImages::load(views, tuning.held_out, &subject.scene.trained_with, progress)?;
+            let trials = Trials::new(images, &tuning);
             let counts = counts(subject.scene.len(), pruning.kept.len(), rounds);
             let mut scene = select(&subject.scene, &highest(&pruning.scores, counts[0]));
             for &count in &counts[1..] {

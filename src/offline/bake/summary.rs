@@ -93,7 +93,7 @@ impl Facts<'_> {
             pair("goal", goal),
             pair("score", self.found.score.clone()),
             pair("held-out views", self.found.held_out.clone()),
-            pair("rounds of pruning", self.rounds.to_string()),
+            pair("rounds of pruning", if self.tuning.is_some() { self.rounds } else { 1 }.to_string()),
             pair("fine-tuning", self.tuning.as_ref().map_or("none".to_owned(), in_words)),
             pair("temporal filter", format!("{kind}, {} key-frames", filter.segments + 1)),
             pair("active share", format!("{:.1} %", filter.active_share() * 100.0)),
@@ -118,11 +118,16 @@ pub(super) fn write(
     out: &Path,
     progress: &mut dyn Progress,
 ) -> Result<[PathBuf; 2], OfflineError> {
-    let paths = [beside(out, ".report.json"), beside(out, ".report.html")];
+    let paths = paths(out);
     for (path, text) in paths.iter().zip([format!("{:#}\n", report.json()?), report.html()]) {
         progress.uninterrupted(&mut || write_beside(path, |file| file.write_all(text.as_bytes())))?;
     }
     Ok(paths)
+}
+
+/// Returns the paths of the report beside a package, as JSON and as an HTML page.
+pub(super) fn paths(out: &Path) -> [PathBuf; 2] {
+    [".report.json", ".report.html"].map(|ending| beside(out, ending))
 }
 
 /// Returns the path with `ending` in place of its extension: `scene.report.json` beside `scene.gs4d`.

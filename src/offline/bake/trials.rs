@@ -32,18 +32,11 @@ pub(super) struct Chosen {
 }
 
 impl Trials {
-    /// Loads the images of the views.
-    pub fn load(
-        scored: &[TrainingView],
-        held_out: &[TrainingView],
-        scene: &GaussianScene,
-        settings: &FineTuneSettings,
-        progress: &mut dyn Progress,
-    ) -> Result<Self, OfflineError> {
-        let images = TrainingImages::load_apart(scored.to_vec(), held_out, &scene.trained_with, progress)?;
+    /// Short trainings on these images, with what else the whole training is done with.
+    pub fn new(images: TrainingImages, settings: &FineTuneSettings) -> Self {
         let steps = settings.steps.div_ceil(SHARE);
         let settings = FineTuneSettings { steps, evaluate_every: steps.max(1), compress: None, ..settings.clone() };
-        Ok(Self { images, settings })
+        Self { images, settings }
     }
 
     /// Returns the number of steps of a training.
@@ -78,8 +71,10 @@ impl Bake<'_> {
         progress: &mut dyn Progress,
     ) -> Result<Option<Trials>, OfflineError> {
         let open = candidates.len() > 1 || matches!(goal, Goal::MaxLoss(_));
-        let load = |settings| Trials::load(scored, held_out, &self.subject.scene, settings, progress);
-        self.tunes().filter(|_| open).map(load).transpose()
+        let Some(settings) = self.tunes().filter(|_| open) else { return Ok(None) };
+        let trained_with = &self.subject.scene.trained_with;
+        let images = TrainingImages::load_apart(scored.to_vec(), held_out, trained_with, progress)?;
+        Ok(Some(Trials::new(images, settings)))
     }
 
     /// Trains what is left by each candidate, and searches for the smallest count if a loss decides. `alone` is what was found without

@@ -81,7 +81,7 @@ pub enum DatasetError {
     },
     /// The picture size is not given anywhere.
     #[error(
-        "{}: the picture size is unknown: no \"w\" and \"h\" in it, and none of its images is on disk; pass --size WIDTHxHEIGHT",
+        "{}: the picture size is unknown: no \"w\" and \"h\" in it, and none of its images is on disk; add them",
         .path.display()
     )]
     SizeUnknown {

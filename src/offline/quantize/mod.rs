@@ -51,6 +51,26 @@ pub enum CompressError {
     /// Too many codebooks, or a codebook with no or too many entries.
     #[error("at most {MAX_STAGES} codebooks of 1 to 65536 entries each, not {0:?}")]
     Codebooks(Vec<usize>),
+    /// Colors cannot be rounded to multiples of this.
+    #[error("colours cannot be rounded to multiples of {0}: it must be a number, zero or above")]
+    ColorStep(f32),
+    /// The values of the scene have too large a range.
+    #[error(
+        "the scene does not fit the packed form ({0}): some of its values are too large or too far apart; choose the quality lossless, or \
+         prune it first"
+    )]
+    Range(&'static str),
+    /// A Gaussian could not be drawn any more.
+    #[error(
+        "Gaussian {index} does not fit the packed form ({reason}): its values are too large or too small; choose the quality lossless, or \
+         prune the scene first"
+    )]
+    Extreme {
+        /// Its index in the scene.
+        index: u32,
+        /// What would be wrong with it.
+        reason: &'static str,
+    },
     /// A Gaussian cannot be drawn.
     #[error(transparent)]
     Invalid(#[from] InvalidGaussian),
@@ -59,7 +79,7 @@ pub enum CompressError {
 /// Compresses a scene.
 ///
 /// # Errors
-/// If the scene is packed already or the settings contradict each other.
+/// If the scene is packed already, the settings contradict each other, or the packed form cannot hold its values.
 ///
 /// # Panics
 /// If `settings.weights` has fewer values than the scene has Gaussians.
@@ -127,6 +147,10 @@ fn compress_by(
     if books.len() > MAX_STAGES || books.iter().any(|&entries| !(1..=1 << 16).contains(&entries)) {
         return Err(CompressError::Codebooks(books.clone()));
     }
+    let step = settings.color_step;
+    if !step.is_finite() || step < 0.0 {
+        return Err(CompressError::ColorStep(step));
+    }
     let mut report = CompressReport { gaussians: scene.len(), memory_before: scene.size(), ..Default::default() };
     let Some(bits) = &settings.geometry else {
         if !books.is_empty() {
@@ -138,7 +162,7 @@ fn compress_by(
     let order = morton_order(&sliced.gaussians);
     let gaussians: Vec<Gaussian> = order.iter().map(|&index| sliced.gaussians[index as usize]).collect();
     let (colors, base) = if books.is_empty() {
-        let whole = rounded(select_harmonics(&sliced.harmonics, &order), settings.color_step);
+        let whole = rounded(select_harmonics(&sliced.harmonics, &order), step);
         (PackedColors::Whole(whole), [0.0; 2])
     } else {
         let weights = match &settings.weights {
@@ -150,6 +174,10 @@ fn compress_by(
         (PackedColors::Coded(coded), base)
     };
     let packed = PackedScene::encode(&gaussians, bits, colors, base, scene.trained_with.time_span());
+    packed.check().map_err(CompressError::Range)?;
+    for (at, &index) in order.iter().enumerate() {
+        packed.gaussian(at).check().map_err(|reason| CompressError::Extreme { index, reason })?;
+    }
     let filter = scene.filter.map(|filter| match filter.kind {
         // Lifespans are rounded too: the filter must be exact for the Gaussians that are drawn.
         FilterKind::Support => {
@@ -169,10 +197,13 @@ fn compress_by(
     Ok((scene, report))
 }
 
-/// Rounds coefficients to multiples of `step`, if it is positive.
+/// Rounds coefficients to multiples of `step`, if it is positive. Those whose multiple single precision cannot hold stay as they are.
 fn rounded(mut harmonics: Harmonics, step: f32) -> Harmonics {
     if step > 0.0 {
-        harmonics.values.iter_mut().for_each(|value| *value = (*value / step).round() * step);
+        for value in &mut harmonics.values {
+            let multiple = (*value / step).round() * step;
+            *value = if multiple.is_finite() { multiple } else { *value };
+        }
     }
     harmonics
 }

@@ -3,8 +3,9 @@
 //! In: a capture and views of it. Out: [`Timings`]. GPU times are measured while several frames are recorded for each submit and the host
 //! does not wait, as a GPU that is idle between frames lowers its clock.
 
-use super::{Headless, instance};
+use super::{Headless, instance, texel_bytes};
 use crate::renderer::active::ActiveList;
+use crate::renderer::memory::with_room;
 use crate::renderer::timing::{PassTime, PassTimer, Timings, median};
 use crate::renderer::{GpuCapture, GpuContext, GpuError, ViewParameters, ViewRenderer};
 use crate::view::{Background, Counts, View};
@@ -156,7 +157,8 @@ impl Headless {
             self.activate(active, queue, capture, view.time);
         }
         let instances = [instance(capture, lane.active.as_ref(), view)];
-        lane.view.prepare(device, queue, &self.renderer, &instances, &parameters)?;
+        let needed = view.size.as_u64vec2().element_product() * texel_bytes(parameters.precision);
+        with_room(device, needed, || lane.view.prepare(device, queue, &self.renderer, &instances, &parameters))??;
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gs4d") });
         lane.view.record_timed(&self.renderer, &mut encoder, &instances, timestamps.and(lane.timer.as_ref()));
         if let (Some(timer), Some((to, at))) = (&lane.timer, timestamps) {

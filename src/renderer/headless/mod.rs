@@ -6,7 +6,7 @@
 mod measure;
 
 use super::layout::Counters;
-use super::memory::Allocator;
+use super::memory::{Allocator, with_room};
 use super::view::{FinishedFrame, max_pairs};
 use super::{
     ActiveList, ColorPrecision, Design, GpuCapture, GpuContext, GpuError, Instance, Renderer, ShaderChecks, Storage,
@@ -101,9 +101,10 @@ impl Headless {
     /// Uploads a scene.
     ///
     /// # Errors
-    /// As [`GpuCapture::upload`].
+    /// As [`GpuCapture::upload`], and too little memory.
     pub fn upload(&self, scene: &RuntimeScene) -> Result<GpuCapture, GpuError> {
-        GpuCapture::upload(&self.context.device, &self.context.queue, &self.renderer, scene)
+        let GpuContext { device, queue, .. } = &self.context;
+        with_room(device, scene.size() as u64, || GpuCapture::upload(device, queue, &self.renderer, scene))?
     }
 
     /// Returns the list of the Gaussians that the filter of a capture leaves active at a time, for
@@ -137,8 +138,9 @@ impl Headless {
         instances: &[Instance<'_>],
         parameters: &ViewParameters<'_>,
     ) -> Result<Frame, GpuError> {
-        let counters = self.submit_whole(instances, parameters)?;
         let size = instances.first().map_or(UVec2::ONE, |instance| instance.view.size);
+        self.require_readable(size, parameters.precision)?;
+        let counters = self.submit_whole(instances, parameters)?;
         let (color, depth) = self.read_targets(size)?;
         Ok(Frame {
             picture: Picture { size, pixels: color.iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect() },
@@ -195,10 +197,9 @@ impl Headless {
     ) -> Result<(), GpuError> {
         self.set_design(Design::Reference);
         let active = self.take_active(capture, view.time);
-        let GpuContext { device, queue, .. } = &self.context;
         let parameters = ViewParameters { background, ..ViewParameters::default() };
         let instances = [instance(capture, active.as_ref(), view)];
-        let prepared = self.view.prepare(device, queue, &self.renderer, &instances, &parameters);
+        let prepared = self.prepare(&instances, &parameters);
         if prepared.is_ok() {
             self.view.record(&self.renderer, encoder, &instances);
         }
@@ -264,8 +265,8 @@ impl Headless {
 
     /// Draws one frame and waits for it. Returns its counters.
     fn submit(&mut self, instances: &[Instance<'_>], parameters: &ViewParameters<'_>) -> Result<Counters, GpuError> {
+        self.prepare(instances, parameters)?;
         let GpuContext { device, queue, .. } = &self.context;
-        self.view.prepare(device, queue, &self.renderer, instances, parameters)?;
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("gs4d") });
         self.view.record(&self.renderer, &mut encoder, instances);
         queue.submit([encoder.finish()]);
@@ -273,6 +274,31 @@ impl Headless {
         let (counters, offset) = self.view.counters();
         let counters = self.copy_out_from(counters, offset, size_of::<Counters>() as u64)?;
         Ok(bytemuck::pod_read_unaligned(&counters))
+    }
+
+    /// Prepares a frame, for whose targets there may be too little memory.
+    fn prepare(&mut self, instances: &[Instance<'_>], parameters: &ViewParameters<'_>) -> Result<(), GpuError> {
+        let GpuContext { device, queue, .. } = &self.context;
+        let size = instances.first().map_or(UVec2::ONE, |instance| instance.view.size);
+        let needed = size.as_u64vec2().element_product() * texel_bytes(parameters.precision);
+        let prepare = || self.view.prepare(device, queue, &self.renderer, instances, parameters);
+        let prepared = with_room(device, needed, prepare);
+        if prepared.is_err() {
+            // Not all that was made can be used.
+            self.view.release();
+        }
+        prepared?
+    }
+
+    /// Checks that a picture can be read back, before it is drawn.
+    fn require_readable(&self, size: UVec2, precision: ColorPrecision) -> Result<(), GpuError> {
+        let row = u64::from(size.x) * texel_bytes(precision);
+        let needed = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT.into()) * u64::from(size.y);
+        let limit = self.context.device.limits().max_buffer_size;
+        match needed > limit {
+            true => Err(GpuError::TooLarge { what: "the pixels of the picture", needed, limit }),
+            false => Ok(()),
+        }
     }
 
     fn wait(&self) -> Result<(), GpuError> {
@@ -301,7 +327,7 @@ impl Headless {
         let GpuContext { device, queue, .. } = &self.context;
         let row = size.x * texture.format().block_copy_size(None).unwrap_or(0);
         let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let buffer = readback_buffer(device, u64::from(padded) * u64::from(size.y));
+        let buffer = readback_buffer(device, u64::from(padded) * u64::from(size.y))?;
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.copy_texture_to_buffer(
             texture.as_image_copy(),
@@ -326,7 +352,7 @@ impl Headless {
 
     fn copy_out_from(&self, source: &wgpu::Buffer, offset: u64, size: u64) -> Result<Vec<u8>, GpuError> {
         let GpuContext { device, queue, .. } = &self.context;
-        let buffer = readback_buffer(device, size);
+        let buffer = readback_buffer(device, size)?;
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.copy_buffer_to_buffer(source, offset, &buffer, 0, size);
         queue.submit([encoder.finish()]);
@@ -357,11 +383,17 @@ fn instance<'a>(capture: &'a GpuCapture, active: Option<&'a ActiveList>, view: &
     Instance { capture, active, view: *view, appearance: Appearance::default() }
 }
 
-fn readback_buffer(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
-    device.create_buffer(&wgpu::BufferDescriptor {
+/// Returns the bytes of the color of a pixel.
+fn texel_bytes(precision: ColorPrecision) -> u64 {
+    precision.format().block_copy_size(None).unwrap_or(0).into()
+}
+
+fn readback_buffer(device: &wgpu::Device, size: u64) -> Result<wgpu::Buffer, GpuError> {
+    let buffer = wgpu::BufferDescriptor {
         label: Some("gs4d readback"),
         size,
         usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
-    })
+    };
+    with_room(device, size, || device.create_buffer(&buffer))
 }

@@ -177,7 +177,7 @@ fn picture_size_is_found_where_it_is_given() {
         CameraFile::load(&test, options).map(|views| views.iter().map(|view| view.camera.size).collect::<Vec<_>>())
     };
     let error = sizes(&CameraOptions::default()).expect_err("no size anywhere").to_string();
-    assert!(error.contains("--size") && error.contains("transforms_test.json"), "{error}");
+    assert!(error.contains("add them") && error.contains("transforms_test.json"), "{error}");
     assert_eq!(sizes(&size_option(70, 50)).expect("a size"), [UVec2::new(70, 50); 2], "the option");
 
     // A sibling split with an image, behind a sibling that is not JSON.

@@ -1,0 +1,283 @@
+//! The files that work reads and those that it writes, checked before anything is computed.
+//!
+//! In: the paths of both. Out: an error that names the first output that is an input, is another output or cannot be written. What killed
+//! runs have left beside the outputs is removed.
+
+use super::dataset::{CameraFile, CameraOptions, Split};
+use super::save::{folder_of, is_stream, resolved};
+use super::{OfflineError, part};
+use glam::UVec2;
+use std::collections::{BTreeSet, HashMap};
+use std::fs::{File, Metadata};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// The files that work reads and those that it writes. Default: none.
+#[derive(Debug, Clone, Default)]
+pub struct Files {
+    inputs: Vec<PathBuf>,
+    outputs: Vec<Output>,
+}
+
+/// What is written.
+#[derive(Debug, Clone)]
+enum Output {
+    /// A file in a folder that exists. If its name has an extension, it is this one.
+    File(PathBuf, &'static str),
+    /// A folder, which is made if it does not exist.
+    Folder(PathBuf),
+    /// A file in such a folder.
+    Inside(PathBuf),
+}
+
+/// What a path leads to. All paths of one file have a place in common.
+#[derive(Debug, PartialEq, Eq, Hash)]
+enum Place {
+    /// By its number and that of its device: hard links have the same.
+    Node(u64, u64),
+    /// By its path without symbolic links, also if there is no file yet.
+    Path(PathBuf),
+}
+
+impl Files {
+    /// Adds inputs.
+    pub fn reads<'a>(mut self, paths: impl IntoIterator<Item = &'a PathBuf>) -> Self {
+        self.inputs.extend(paths.into_iter().cloned());
+        self
+    }
+
+    /// Adds a checkpoint or a package, and the `cfg_args` beside it.
+    pub fn reads_scene(mut self, path: &Path) -> Self {
+        self.inputs.extend([path.to_owned(), path.with_file_name("cfg_args")]);
+        self
+    }
+
+    /// Adds a camera file, the images that it names, and those of the dataset in the same folder.
+    pub fn reads_cameras(mut self, path: &Path) -> Self {
+        self.add_cameras(path);
+        self.reads_data(folder_of(path))
+    }
+
+    /// Adds the camera files of a dataset folder, and the images and masks that they name.
+    pub fn reads_data(mut self, folder: &Path) -> Self {
+        for split in Split::ALL {
+            self.add_cameras(&folder.join(split.file_name()));
+        }
+        self
+    }
+
+    fn add_cameras(&mut self, path: &Path) {
+        self.inputs.push(path.to_owned());
+        // Of any size: paths do not depend on it. What is wrong with the file is told when it is read.
+        let options = CameraOptions { size: Some(UVec2::ONE), ..CameraOptions::default() };
+        for view in CameraFile::load(path, &options).unwrap_or_default() {
+            self.inputs.push(view.image);
+            self.inputs.extend(view.mask);
+        }
+    }
+
+    /// Adds an output: a file in a folder that exists. If its name has an extension, it must be this one.
+    pub fn writes(mut self, path: &Path, extension: &'static str) -> Self {
+        self.outputs.push(Output::File(path.to_owned(), extension));
+        self
+    }
+
+    /// Adds an output: a folder, which will be made if it does not exist, and files in it.
+    pub fn writes_folder(mut self, folder: &Path, files: impl IntoIterator<Item = PathBuf>) -> Self {
+        self.outputs.push(Output::Folder(folder.to_owned()));
+        self.outputs.extend(files.into_iter().map(Output::Inside));
+        self
+    }
+
+    /// Checks that no output is an input or another output, and that all can be written. Removes the temporary files that killed runs have
+    /// left beside them.
+    ///
+    /// # Errors
+    /// The first output with which something is wrong, by name.
+    pub fn check(&self) -> Result<(), OfflineError> {
+        self.tell_apart()?;
+        let mut folders = BTreeSet::new();
+        for output in &self.outputs {
+            let folder = output.check()?;
+            if let Some(folder) = folder.filter(|folder| !folders.contains(folder)) {
+                check_folder(output.path(), &folder)?;
+                folders.insert(folder);
+            }
+        }
+        folders.iter().for_each(|folder| part::remove_stale(folder));
+        Ok(())
+    }
+
+    fn tell_apart(&self) -> Result<(), OfflineError> {
+        let (mut inputs, mut outputs) = (HashMap::<Place, &Path>::new(), HashMap::<Place, &Path>::new());
+        for path in &self.inputs {
+            inputs.extend(places(path).into_iter().map(|place| (place, path.as_path())));
+        }
+        for path in self.outputs.iter().filter(|output| output.is_file()).map(Output::path) {
+            let places = places(path);
+            if let Some(input) = places.iter().find_map(|place| inputs.get(place)) {
+                let message = format!("is the input itself, {}: write to another file", input.display());
+                return Err(OfflineError::at(path, message));
+            }
+            if let Some(other) = places.iter().find_map(|place| outputs.get(place)) {
+                let message = format!("would be written twice, also as {}: name another file", other.display());
+                return Err(OfflineError::at(path, message));
+            }
+            outputs.extend(places.into_iter().map(|place| (place, path)));
+        }
+        Ok(())
+    }
+}
+
+impl Output {
+    fn path(&self) -> &Path {
+        match self {
+            Self::File(path, _) | Self::Folder(path) | Self::Inside(path) => path,
+        }
+    }
+
+    /// Returns whether it is a file on a disk: folders are shared, and so are devices and pipes.
+    fn is_file(&self) -> bool {
+        !matches!(self, Self::Folder(_)) && !is_stream(self.path())
+    }
+
+    /// Checks what exists of it. Returns the folder in which a file will be made; `None` if that is checked with another output, or for a
+    /// device or a pipe.
+    fn check(&self) -> Result<Option<PathBuf>, OfflineError> {
+        match self {
+            Self::File(path, _) if is_stream(path) => Ok(None),
+            Self::File(path, extension) => {
+                if path.extension().is_some_and(|found| !found.eq_ignore_ascii_case(extension)) {
+                    let message = format!("the name of what is written here ends in .{extension}: choose another name");
+                    return Err(OfflineError::at(path, message));
+                }
+                check_file(path)?;
+                Ok(Some(folder_of(&resolved(path)).to_owned()))
+            }
+            Self::Folder(path) => {
+                let path = resolved(path);
+                Ok(path.ancestors().find(|folder| folder.metadata().is_ok()).map(Path::to_owned))
+            }
+            Self::Inside(path) => check_file(path).map(|()| None),
+        }
+    }
+}
+
+/// Checks that a file can be replaced if it exists.
+fn check_file(path: &Path) -> Result<(), OfflineError> {
+    match path.metadata() {
+        Ok(metadata) if metadata.is_dir() => Err(OfflineError::at(path, "is a folder: name a file")),
+        Ok(metadata) if metadata.permissions().readonly() => {
+            Err(OfflineError::at(path, "is write-protected: change its permissions, or write to another file"))
+        }
+        Ok(_) if is_stream(path) => Ok(()),
+        Ok(_) => File::options().write(true).open(path).map(drop).map_err(|error| OfflineError::at(path, error)),
+        Err(_) => Ok(()),
+    }
+}
+
+/// Checks that files can be made in the folder of an output.
+fn check_folder(out: &Path, folder: &Path) -> Result<(), OfflineError> {
+    let shown = folder.display();
+    let message = match folder.metadata() {
+        Ok(metadata) if !metadata.is_dir() => format!("{shown} is a file, not a folder: write to another place"),
+        Ok(_) => match part::create(folder) {
+            Ok(_) => return Ok(()),
+            Err(error) => format!("nothing can be written to the folder {shown}: {error}"),
+        },
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            format!("there is no folder {shown}: make it, or write to another one")
+        }
+        Err(error) => format!("the folder {shown} cannot be used: {error}"),
+    };
+    Err(OfflineError::at(out, message))
+}
+
+fn places(path: &Path) -> Vec<Place> {
+    let node = path.metadata().ok().as_ref().and_then(node).map(|(device, number)| Place::Node(device, number));
+    node.into_iter().chain([Place::Path(resolved(path))]).collect()
+}
+
+/// Returns the device of a file and its number there; `None` where the system has no such numbers.
+#[cfg(unix)]
+pub(super) fn node(metadata: &Metadata) -> Option<(u64, u64)> {
+    use std::os::unix::fs::MetadataExt;
+    Some((metadata.dev(), metadata.ino()))
+}
+
+/// Returns the device of a file and its number there; `None` where the system has no such numbers.
+#[cfg(not(unix))]
+pub(super) fn node(_: &Metadata) -> Option<(u64, u64)> {
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn failure(files: Files) -> String {
+        files.check().expect_err("it must be refused").to_string()
+    }
+
+    #[test]
+    fn no_output_is_an_input_by_any_path() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let [input, roundabout] = ["in.gs4d", "./in.gs4d"].map(|name| folder.path().join(name));
+        fs::write(&input, b"contents").expect("the folder can be written to");
+        let files = || Files::default().reads_scene(&input);
+        assert!(failure(files().writes(&roundabout, "gs4d")).contains("the input itself"), "the same path");
+        let hard = folder.path().join("hard.gs4d");
+        fs::hard_link(&input, &hard).expect("the folder can be written to");
+        if cfg!(unix) {
+            assert!(failure(files().writes(&hard, "gs4d")).contains("the input itself"), "a hard link");
+        }
+        let beside = folder.path().join("cfg_args");
+        assert!(failure(files().writes(&beside, "f32")).contains("the input itself"), "what is read with it");
+        files().writes(&folder.path().join("out.gs4d"), "gs4d").check().expect("another file");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed_also_before_there_are_files() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let [real, link] = ["real", "link"].map(|name| folder.path().join(name));
+        fs::create_dir(&real).expect("the folder can be written to");
+        symlink("real", &link).expect("the folder can be written to");
+        let twice = Files::default().writes(&real.join("new.csv"), "csv").writes(&link.join("new.csv"), "csv");
+        assert!(failure(twice).contains("written twice"), "neither is there yet");
+        let (target, ahead) = (folder.path().join("later.gs4d"), folder.path().join("ahead.gs4d"));
+        symlink("later.gs4d", &ahead).expect("the folder can be written to");
+        let twice = Files::default().writes(&target, "gs4d").writes(&ahead, "gs4d");
+        assert!(failure(twice).contains("written twice"), "a link to what is not there yet");
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_named() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = |name: &str| folder.path().join(name);
+        fs::write(path("file.gs4d"), b"contents").expect("the folder can be written to");
+        fs::create_dir(path("folder.gs4d")).expect("the folder can be written to");
+        for (name, reason) in [
+            ("missing/out.gs4d", "there is no folder"),
+            ("file.gs4d/out.gs4d", "not a folder"),
+            ("folder.gs4d", "is a folder"),
+            ("out.pth", "ends in .gs4d"),
+        ] {
+            let message = failure(Files::default().writes(&path(name), "gs4d"));
+            assert!(message.contains(&path(name).display().to_string()), "{name} is named: {message}");
+            assert!(message.contains(reason), "{name}: {reason}: {message}");
+        }
+        let inside = failure(Files::default().writes_folder(&path("file.gs4d/deep/frames"), []));
+        assert!(inside.contains("file.gs4d is a file"), "no folder can be made in a file: {inside}");
+        let new = path("deep/frames");
+        Files::default().writes_folder(&new, [new.join("0.png")]).check().expect("it can be made");
+        assert!(!path("deep").exists(), "but is not made yet");
+        let mut permissions = path("file.gs4d").metadata().expect("it is there").permissions();
+        permissions.set_readonly(true);
+        fs::set_permissions(path("file.gs4d"), permissions).expect("it is ours");
+        let message = failure(Files::default().writes(&path("file.gs4d"), "gs4d"));
+        assert!(message.contains("write-protected"), "it is kept: {message}");
+    }
+}

@@ -1,0 +1,70 @@
+//! Whether pictures fit the memory, found out before they are drawn.
+//!
+//! In: the size of a picture, bytes for each of its pixels. Out: an error that tells how much is needed and how much there is.
+
+use super::OfflineError;
+use crate::renderer::Headless;
+use glam::UVec2;
+use std::fs;
+
+/// Bytes for each pixel while the CPU reference draws: color, transmittance and two depths of each pixel, and the frame made of them.
+pub(super) const ON_CPU: u64 = 24 + 24;
+/// Bytes for each pixel of a picture that waits to be written, with those that are written.
+pub(super) const PICTURE: u64 = 12 + 3;
+/// Bytes for each pixel on the host while a frame is read back: its color, and its depths as mapped, copied and without padding.
+const READ_BACK: u64 = 2 * 16 + 3 * 8;
+/// Bytes for each pixel of the targets on the GPU: color and depths.
+const TARGETS: u64 = 16 + 8;
+
+/// Bytes up to which the system is not asked.
+const LITTLE: u64 = 1 << 28;
+
+/// Returns the bytes of the host's memory for each pixel while a GPU draws; a GPU without a memory of its own has its targets there, too.
+pub(super) fn on_gpu(headless: &Headless) -> u64 {
+    match headless.context().info.device_type {
+        wgpu::DeviceType::Cpu | wgpu::DeviceType::IntegratedGpu => READ_BACK + TARGETS,
+        _ => READ_BACK,
+    }
+}
+
+/// Checks that there is memory to draw a picture. Where the system does not tell how much there is, any picture passes.
+pub(super) fn require(size: UVec2, bytes_per_pixel: u64) -> Result<(), OfflineError> {
+    require_of(size, bytes_per_pixel, || available(&fs::read_to_string("/proc/meminfo").ok()?))
+}
+
+fn require_of(size: UVec2, bytes_per_pixel: u64, available: impl FnOnce() -> Option<u64>) -> Result<(), OfflineError> {
+    let needed = size.as_u64vec2().element_product().saturating_mul(bytes_per_pixel);
+    match (needed > LITTLE).then(available).flatten() {
+        Some(available) if needed > available => Err(OfflineError::Memory { size, needed, available }),
+        _ => Ok(()),
+    }
+}
+
+/// Returns the bytes that programs can take without swapping, from Linux's list of them.
+fn available(list: &str) -> Option<u64> {
+    let line = list.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    kilobytes.checked_mul(1024)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_needed_and_what_there_is_are_told() {
+        let list = "MemTotal:       16384000 kB\nMemAvailable:    8000000 kB\nBuffers: 0 kB\n";
+        let there = available(list);
+        assert_eq!(there, Some(8_192_000_000), "what can be taken");
+        let large = UVec2::splat(16_384);
+        let message = require_of(large, ON_CPU, || there).expect_err("too large").to_string();
+        for part in ["16384x16384", "12.9 GB", "8.2 GB"] {
+            assert!(message.contains(part), "{part}: {message}");
+        }
+        require_of(UVec2::splat(4096), ON_CPU, || there).expect("it fits");
+        require_of(UVec2::splat(400), ON_CPU, || Some(0)).expect("too little to ask for");
+        require_of(large, ON_CPU, || None).expect("nobody knows");
+        assert_eq!(available("MemTotal: 1 kB\n"), None, "not told");
+        assert_eq!(available("MemAvailable: many\n"), None, "not a number");
+    }
+}

@@ -1,0 +1,226 @@
+//! What verbs write, run as a user runs them.
+//!
+//! In: a small synthetic scene, a dataset drawn from it, outputs of every kind. Out: proof that no verb writes over what it reads, that bad
+//! outputs are told before anything is read, that what is replaced keeps its links and permissions, and that two runs do not disturb each
+//! other.
+
+use crate::support::command::{arguments, folder, gs4d, scene};
+use crate::support::dataset;
+use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::offline;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use glam::{UVec2, Vec3};
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// A folder with a scene, `scene.gs4d`, and its own pictures, `data`.
+struct Capture {
+    folder: TempDir,
+    scene: PathBuf,
+    data: PathBuf,
+}
+
+fn capture() -> Capture {
+    let folder = folder();
+    let (scene, data) = (folder.path().join("scene.gs4d"), folder.path().join("data"));
+    let trained = synthesize(&SynthSettings { count: 200, ..SynthSettings::default() });
+    offline::save(&scene, &trained, &WriteSettings::default()).expect("the folder can be written to");
+    let runtime = trained.into_runtime().expect("a synthetic scene can be drawn");
+    dataset::write(&data, &runtime, Vec3::ZERO, 4, 2, UVec2::splat(48), true);
+    Capture { folder, scene, data }
+}
+
+impl Capture {
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+}
+
+/// Returns the contents of all files in a folder and the folders in it.
+fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    for entry in fs::read_dir(folder).expect("the folder can be listed") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            all.extend(contents(&path));
+        } else {
+            all.insert(path.clone(), fs::read(&path).expect("the file can be read"));
+        }
+    }
+    all
+}
+
+#[test]
+fn no_verb_writes_over_what_it_reads() {
+    let capture = capture();
+    let (scene, data) = (&capture.scene, &capture.data);
+    let [scores, settings] = ["scores.f32", "cfg_args"].map(|name| capture.path(name));
+    fs::write(&scores, [0; 4 * 200]).expect("the folder can be written to");
+    fs::write(&settings, "Namespace()").expect("the folder can be written to");
+    let [cameras, trained_on, image] =
+        ["transforms_test.json", "transforms_train.json", "train/c01_00.png"].map(|name| data.join(name));
+    let before = contents(capture.folder.path());
+    let commands = [
+        arguments!["convert", scene, scene].to_vec(),
+        arguments!["convert", scene, data.join("../scene.gs4d")].to_vec(),
+        arguments!["convert", scene, &settings].to_vec(),
+        arguments!["compress", scene, scene].to_vec(),
+        arguments!["compress", scene, "--weights", &scores, "-o", &scores].to_vec(),
+        arguments!["compress", scene, "--cameras", &cameras, "-o", &cameras].to_vec(),
+        arguments!["synth", scene, "--grow", "2", scene].to_vec(),
+        arguments!["prune", scene, "--data", data, "--ratio", "0.5", "-o", scene].to_vec(),
+        arguments!["prune", scene, "--scores", &scores, "--keep", "9", "-o", &scores].to_vec(),
+        arguments!["mask", scene, "-o", scene].to_vec(),
+        arguments!["mask", scene, "--data", data, "-o", &image].to_vec(),
+        arguments!["score", scene, "--data", data, "--out", scene].to_vec(),
+        arguments!["score", scene, "--data", data, "--out", &trained_on].to_vec(),
+        arguments!["ablate", scene, "--data", data, "--csv", scene].to_vec(),
+        arguments!["ablate", scene, "--data", data, "--csv", &image].to_vec(),
+        arguments!["eval", scene, "--data", data, "--out", data.join("test")].to_vec(),
+        arguments!["render", scene, "--cameras", &cameras, "--out", data.join("test")].to_vec(),
+        arguments!["render", scene, "--cameras", &cameras, "--out", data.join("train")].to_vec(),
+        arguments!["finetune", scene, "--data", data, "-o", scene].to_vec(),
+        arguments!["bake", scene, "--data", data, "-o", scene].to_vec(),
+    ];
+    for command in commands {
+        gs4d(&command).must_fail("the input itself");
+    }
+    assert!(contents(capture.folder.path()) == before, "every file is as it was");
+}
+
+#[cfg(unix)]
+#[test]
+fn links_lead_to_no_input_and_to_no_other_output() {
+    use std::os::unix::fs::symlink;
+    let capture = capture();
+    let [hard, soft, report, out] =
+        ["hard.gs4d", "soft.gs4d", "out.report.json", "out.gs4d"].map(|name| capture.path(name));
+    fs::hard_link(&capture.scene, &hard).expect("the folder can be written to");
+    symlink("scene.gs4d", &soft).expect("the folder can be written to");
+    for link in [&hard, &soft] {
+        gs4d(&arguments!["convert", &capture.scene, link]).must_fail("the input itself");
+        gs4d(&arguments!["mask", link, "-o", &capture.scene]).must_fail("the input itself");
+    }
+    symlink("out.gs4d", &report).expect("the folder can be written to");
+    gs4d(&arguments!["bake", &capture.scene, "--data", &capture.data, "-o", &out]).must_fail("written twice");
+    assert!(!out.exists(), "nothing is written");
+}
+
+#[test]
+fn a_bad_output_is_told_before_anything_is_read() {
+    let folder = folder();
+    let path = |name: &str| folder.path().join(name);
+    let (nothing, no_data) = (path("nothing.pth"), path("nothing"));
+    fs::write(path("file"), "contents").expect("the folder can be written to");
+    for extension in ["gs4d", "f32", "csv"] {
+        fs::create_dir(path(&format!("folder.{extension}"))).expect("the folder can be written to");
+        let kept = path(&format!("kept.{extension}"));
+        fs::write(&kept, "contents").expect("the folder can be written to");
+        let mut permissions = kept.metadata().expect("it is there").permissions();
+        permissions.set_readonly(true);
+        fs::set_permissions(&kept, permissions).expect("it is ours");
+    }
+    let refused = |command: Vec<OsString>, reason: &str| {
+        let run = gs4d(&command);
+        run.must_fail(reason);
+        assert!(!run.err.contains("nothing"), "{command:?}: the output is told first: {}", run.err);
+    };
+    let of = |extension: &str| {
+        [
+            (path(&format!("missing/out.{extension}")), "there is no folder"),
+            (path(&format!("file/out.{extension}")), "not a folder"),
+            (path(&format!("folder.{extension}")), "is a folder"),
+            (path(&format!("kept.{extension}")), "write-protected"),
+            (path("out.png"), "choose another name"),
+        ]
+    };
+    for (out, reason) in of("gs4d") {
+        refused(arguments!["convert", &nothing, &out].to_vec(), reason);
+        refused(arguments!["compress", &nothing, &out].to_vec(), reason);
+        refused(arguments!["synth", &out, "--grow", "2", &nothing].to_vec(), reason);
+        refused(arguments!["prune", &nothing, "--data", &no_data, "--keep", "9", "-o", &out].to_vec(), reason);
+        refused(arguments!["mask", &nothing, "-o", &out].to_vec(), reason);
+        refused(arguments!["finetune", &nothing, "--data", &no_data, "-o", &out].to_vec(), reason);
+        refused(arguments!["bake", &nothing, "--data", &no_data, "-o", &out].to_vec(), reason);
+    }
+    for (out, reason) in of("f32") {
+        refused(arguments!["score", &nothing, "--data", &no_data, "--out", &out].to_vec(), reason);
+    }
+    for (out, reason) in of("csv") {
+        refused(arguments!["ablate", &nothing, "--data", &no_data, "--csv", &out].to_vec(), reason);
+    }
+    for out in [path("file"), path("file/frames")] {
+        let reason = "not a folder";
+        refused(arguments!["render", &nothing, "--orbit", "1", "--out", &out].to_vec(), reason);
+        refused(arguments!["eval", &nothing, "--data", &no_data, "--out", &out].to_vec(), reason);
+        refused(arguments!["score", &nothing, "--data", &no_data, "--variant", "all", "--out", &out].to_vec(), reason);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_replaced_keeps_its_links_and_permissions() {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+    let folder = folder();
+    let input = scene(&folder, "50");
+    let (out, link) = (folder.path().join("out.gs4d"), folder.path().join("link.gs4d"));
+    fs::write(&out, "contents").expect("the folder can be written to");
+    fs::set_permissions(&out, fs::Permissions::from_mode(0o640)).expect("it is ours");
+    symlink("out.gs4d", &link).expect("the folder can be written to");
+    gs4d(&arguments!["convert", &input, &link]).text();
+    assert!(link.is_symlink(), "the link is still one");
+    assert_eq!(fs::read(&out).expect("it is there"), fs::read(&input).expect("it is there"), "what it leads to is new");
+    let mode = out.metadata().expect("it is there").permissions().mode() & 0o777;
+    assert_eq!(mode, 0o640, "the permissions are as before");
+}
+
+#[test]
+fn what_killed_runs_left_is_removed() {
+    let folder = folder();
+    let input = scene(&folder, "50");
+    let [killed, live] = [".gs4d-killed.part", ".gs4d-live.part"].map(|name| folder.path().join(name));
+    fs::write(&killed, "some bytes").expect("the folder can be written to");
+    let writing = File::create(&live).expect("the folder can be written to");
+    writing.lock().expect("nobody else has locked it");
+    gs4d(&arguments!["convert", &input, folder.path().join("out.gs4d")]).text();
+    assert!(!killed.exists(), "nobody writes this one");
+    assert!(live.exists(), "this one is being written");
+}
+
+#[test]
+fn a_bake_removes_only_what_it_has_written() {
+    let capture = capture();
+    let (out, work) = (capture.path("out.gs4d"), capture.path("out.gs4d.bake"));
+    let bake = |more: &[&str]| {
+        let (scene, data) = (&capture.scene, &capture.data);
+        let fixed = arguments!["bake", scene, "--data", data, "--ratio", "0.5", "--engine", "cpu", "-o", &out];
+        gs4d(&[fixed.to_vec(), more.iter().map(Into::into).collect()].concat()).text()
+    };
+    bake(&["--keep-work"]);
+    let notes = work.join("notes.txt");
+    fs::write(&notes, "mine").expect("the folder can be written to");
+    bake(&[]);
+    let left = contents(&work);
+    assert_eq!(left.keys().collect::<Vec<_>>(), [&notes], "the file of somebody else, and no other");
+    fs::remove_file(&notes).expect("it is there");
+    bake(&[]);
+    assert!(!work.exists(), "an empty folder goes");
+}
+
+#[test]
+fn two_runs_to_one_output_do_not_share_their_folder() {
+    let capture = capture();
+    let out = capture.path("out.gs4d");
+    for (verb, name) in [("bake", "out.gs4d.bake"), ("finetune", "out.gs4d.tune")] {
+        let lock = capture.path(name).join("lock");
+        fs::create_dir(capture.path(name)).expect("the folder can be written to");
+        let running = File::create(&lock).expect("the folder can be written to");
+        running.lock().expect("nobody else has locked it");
+        let run = gs4d(&arguments![verb, &capture.scene, "--data", &capture.data, "-o", &out]);
+        run.must_fail(&format!("{name}: another run of gs4d works in this folder"));
+        assert!(lock.exists() && !out.exists(), "{verb}: the folder is as it was, and nothing is written");
+    }
+}
