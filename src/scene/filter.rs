@@ -4,6 +4,7 @@
 //! [`TemporalFilter`], stored as bits or as intervals, whichever is smaller; drawing skips what is not active.
 
 use crate::gaussian::{Gaussian, MARGINAL_CUTOFF};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// How the sets of a filter were computed. Default: [`Support`](Self::Support).
@@ -88,6 +89,30 @@ impl TemporalFilter {
             return Self { sets, ..filter };
         }
         filter
+    }
+
+    /// Checks that it is a filter of `count` Gaussians, and that intervals end within its segments.
+    ///
+    /// # Errors
+    /// A description of what does not fit.
+    pub fn check(&self, count: usize) -> Result<(), &'static str> {
+        let fits = match &self.sets {
+            ActiveSets::Bits(bits) => Self::words(count).checked_mul(self.segments as usize) == Some(bits.len()),
+            ActiveSets::Intervals(intervals) => intervals.len() == count,
+        };
+        if self.count != count || !(1..=MAX_SEGMENTS).contains(&self.segments) || !fits {
+            return Err("its temporal filter is that of another number of Gaussians");
+        }
+        let ends_within = |&word: &u32| {
+            let (first, last) = (word & 0xffff, word >> 16);
+            first > last || last < self.segments
+        };
+        match &self.sets {
+            ActiveSets::Intervals(intervals) if !intervals.par_iter().all(ends_within) => {
+                Err("its temporal filter has an interval that ends after its last segment")
+            }
+            ActiveSets::Bits(_) | ActiveSets::Intervals(_) => Ok(()),
+        }
     }
 
     /// Returns the number of words of one set of bits for `count` Gaussians.
