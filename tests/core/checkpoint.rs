@@ -249,7 +249,7 @@ fn options_without_sense_are_refused() {
         ("time interval", CheckpointOptions { time_interval: Some([1.0, 1.0]), ..none.clone() }),
         ("time interval", CheckpointOptions { time_interval: Some([0.0, f32::NAN]), ..none.clone() }),
         ("background", CheckpointOptions { background: Some([0.0, f32::INFINITY, 0.0]), ..none.clone() }),
-        ("duration", CheckpointOptions { duration_seconds: Some(0.0), ..none.clone() }),
+        ("duration", CheckpointOptions { duration_seconds: Some(-1.0), ..none.clone() }),
     ] {
         let message = read_with(&pth, &options).expect_err("must be refused").to_string();
         assert!(message.contains(name), "{message}");
