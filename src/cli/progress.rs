@@ -4,6 +4,7 @@
 //! one line for each note.
 
 use super::interrupt;
+use super::plain;
 use crate::codec::CodecError;
 use crate::offline::Progress;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -24,7 +25,7 @@ pub fn silence_progress(silent: bool) {
 
 /// Writes a line to standard error, if that is open.
 pub fn note(line: &str) {
-    let _ = BARS.suspend(|| writeln!(stderr(), "{line}"));
+    let _ = BARS.suspend(|| writeln!(stderr(), "{}", plain::lines(line)));
 }
 
 /// The bars of the unfinished tasks; hidden with `--json` and if standard error is not a terminal. Dropping this

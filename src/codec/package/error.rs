@@ -59,8 +59,8 @@ pub enum PackageError {
     Inconsistent(&'static str),
     /// A section of color has another number of coefficients than the degrees need.
     #[error(
-        "section `{section}` has {found} colour coefficients, and degree {degree} with time degree {degree_t} needs {needed}: \
-         damaged, or not written by gs4d"
+        "section `{section}` has {found} colour coefficients, and degree {degree} with time degree {degree_t} needs \
+         {needed}: damaged, or not written by gs4d"
     )]
     Coefficients {
         /// Name of the section.

@@ -247,7 +247,7 @@ impl Header {
         match self.form {
             StoredForm::Packed { codebooks: Some(entries) } => {
                 if entries.iter().any(|&entries| entries > MAX_ENTRIES) {
-                    return Err(PackageError::Inconsistent("section `codebooks` has more entries than codes of 16 bits"));
+                    return Err(PackageError::Inconsistent("section `codebooks` has more entries than 16-bit codes"));
                 }
                 if found == needed { Ok(()) } else { refused("codebooks") }
             }

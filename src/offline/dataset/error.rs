@@ -148,7 +148,8 @@ pub enum FrameProblem {
     Lens,
     /// A number that follows from the lens and the pose is not finite.
     #[error(
-        "the projection of camera {0:?} is not finite: check its focal lengths and principal point, its field of view and its matrix"
+        "the projection of camera {0:?} is not finite: check its focal lengths and principal point, or its field of view, \
+         and its matrix"
     )]
     Projection(String),
     /// The picture size is out of range.

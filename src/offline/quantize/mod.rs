@@ -51,6 +51,9 @@ pub enum CompressError {
     /// Too many codebooks, or a codebook with no or too many entries.
     #[error("at most {MAX_STAGES} codebooks of 1 to 65536 entries each, not {0:?}")]
     Codebooks(Vec<usize>),
+    /// The values are so large that their quantization is not finite.
+    #[error("{0} once it is quantised, since its values are too large: keep it with --quality lossless")]
+    NotFinite(&'static str),
     /// A Gaussian cannot be drawn.
     #[error(transparent)]
     Invalid(#[from] InvalidGaussian),
@@ -59,7 +62,7 @@ pub enum CompressError {
 /// Compresses a scene.
 ///
 /// # Errors
-/// If the scene is packed already or the settings contradict each other.
+/// If the scene is packed already, the settings contradict each other, or values are too large to be quantized.
 ///
 /// # Panics
 /// If `settings.weights` has fewer values than the scene has Gaussians.
@@ -150,6 +153,7 @@ fn compress_by(
         (PackedColors::Coded(coded), base)
     };
     let packed = PackedScene::encode(&gaussians, bits, colors, base, scene.trained_with.time_span());
+    packed.check().map_err(CompressError::NotFinite)?;
     let filter = scene.filter.map(|filter| match filter.kind {
         // Lifespans are rounded too: the filter must be exact for the Gaussians that are drawn.
         FilterKind::Support => {
@@ -169,10 +173,13 @@ fn compress_by(
     Ok((scene, report))
 }
 
-/// Rounds coefficients to multiples of `step`, if it is positive.
+/// Rounds coefficients to multiples of `step`, if it is positive. Values that are so large that their multiple would not
+/// be finite are kept.
 fn rounded(mut harmonics: Harmonics, step: f32) -> Harmonics {
+    let multiple = |value: f32| (value / step).round() * step;
     if step > 0.0 {
-        harmonics.values.iter_mut().for_each(|value| *value = (*value / step).round() * step);
+        let coarse = harmonics.values.iter_mut().filter(|value| multiple(**value).is_finite());
+        coarse.for_each(|value| *value = multiple(*value));
     }
     harmonics
 }

@@ -165,7 +165,8 @@ mod tests {
             ranges: Vec::new(),
             colors: PackedColors::Whole(Harmonics { coefficients: 1, values: vec![0.0; 3], ..Harmonics::default() }),
         };
-        let scene = RuntimeScene { form: Form::Packed(packed), ..RuntimeScene::sliced(Vec::new(), Harmonics::default()) };
+        let empty = RuntimeScene::sliced(Vec::new(), Harmonics::default());
+        let scene = RuntimeScene { form: Form::Packed(packed), ..empty };
         assert_eq!(GaussianCapture::new(scene).bounds(), None, "its Gaussian is not decoded without its ranges");
     }
 
