@@ -242,6 +242,13 @@ fn options_win_over_cfg_args_over_defaults() {
 }
 
 #[test]
+fn a_still_lasts_no_time() {
+    let options = CheckpointOptions { duration_seconds: Some(0.0), ..CheckpointOptions::default() };
+    let scene = read_with(&Pth::rotating(1, 48), &options).expect("a duration of nothing is one");
+    assert_eq!(scene.playback.duration_seconds, 0.0, "as it was given");
+}
+
+#[test]
 fn options_without_sense_are_refused() {
     let pth = Pth::rotating(1, 48);
     let none = CheckpointOptions::default();

@@ -8,13 +8,14 @@ use crate::support::packed_scene::{BLACK, scene, settings, view};
 use bevy_gs4d::codec::checkpoint::CheckpointOptions;
 use bevy_gs4d::codec::{self, package};
 use bevy_gs4d::gaussian::Gaussian;
+use bevy_gs4d::offline::convert::{ConvertSettings, TargetForm, convert};
 use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions};
 use bevy_gs4d::offline::metrics::psnr_pooled;
 use bevy_gs4d::offline::quantize::order::morton_order;
 use bevy_gs4d::offline::quantize::{CompressError, CompressSettings, Quality, compress};
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::packed::encode::Bits;
-use bevy_gs4d::scene::{FilterKind, Form, GaussianScene, RuntimeScene, SceneForm, TemporalFilter};
+use bevy_gs4d::scene::{FilterKind, Form, GaussianScene, RuntimeScene, SceneForm, Sliced, TemporalFilter};
 use bevy_gs4d::view::{RasterFov, View};
 use glam::Vec3;
 use std::io::Cursor;
@@ -165,6 +166,43 @@ fn what_does_not_fit_is_refused() {
     }
     let alone = CompressSettings { geometry: None, ..settings(&[8]) };
     assert!(matches!(compress(small, &alone), Err(CompressError::CodebooksAlone)), "codebooks without geometry");
+}
+
+#[test]
+fn values_that_cannot_be_quantised_are_refused() {
+    let refused = |spoil: fn(&mut Sliced)| {
+        let mut huge = scene(300, 1, 0);
+        spoil(huge.form.as_sliced_mut().expect("sliced"));
+        compress(huge, &settings(&[8])).map(drop)
+    };
+    let far: fn(&mut Sliced) = |sliced| (sliced.gaussians[7].mean[0], sliced.gaussians[9].mean[0]) = (3e38, -3e38);
+    let bright: fn(&mut Sliced) = |sliced| (sliced.harmonics.values[0], sliced.harmonics.values[12]) = (3e38, -3e38);
+    for spoil in [far, bright] {
+        let found = refused(spoil);
+        assert!(matches!(found, Err(CompressError::NotFinite(_))), "no package that cannot be read: {found:?}");
+    }
+    let mut huge = scene(300, 1, 0);
+    huge.form.as_sliced_mut().expect("sliced").harmonics.values[5] = 3e38;
+    let (packed, _) = compress(huge, &CompressSettings::from(Quality::VisuallyLossless)).expect("rounding leaves it");
+    assert!(packed.into_runtime().is_ok(), "a large value is its own multiple");
+}
+
+#[test]
+fn degrees_of_coded_colours_can_be_lowered() {
+    let (packed, _) = compress(scene(500, 3, 2), &settings(&[16, 16])).expect("it is compressed");
+    let lowered = |degree, degree_t| {
+        let settings = ConvertSettings { form: None, sh_degree: degree, sh_degree_t: degree_t };
+        convert(packed.clone(), &settings).expect("it is converted")
+    };
+    assert!(lowered(None, None) == packed, "nothing is asked for, nothing is lost");
+    for (degree, degree_t, coefficients) in [(Some(0), None, 1), (Some(2), None, 9), (None, Some(1), 32)] {
+        let converted = lowered(degree, degree_t);
+        assert_eq!(converted.form.color_degrees().coefficients, coefficients, "{degree:?} and {degree_t:?}");
+        assert!(pack(&converted).len() < pack(&packed).len(), "{degree:?} and {degree_t:?}: the package is smaller");
+    }
+    let runtime = ConvertSettings { form: Some(TargetForm::Runtime), ..ConvertSettings::default() };
+    let degrees = convert(lowered(Some(1), None), &runtime).expect("it can be unpacked").form.color_degrees();
+    assert_eq!((degrees.degree, degrees.coefficients), (1, 4), "what was lowered stays low");
 }
 
 #[test]
