@@ -37,7 +37,7 @@ fn coded(packed: &mut PackedScene, spoil: impl FnOnce(&mut CodedColors)) {
 
 #[test]
 fn scenes_that_would_be_read_beyond_their_parts_are_not_uploaded() {
-    let Some(mut headless) = gpu::headless() else { return };
+    let Some(headless) = gpu::headless() else { return };
     let (packed, _) = compress(scene(600, 2, 0), &settings(&[16, 8])).expect("it is compressed");
     let good = packed.into_runtime().expect("drawable");
     assert!(headless.upload(&good).is_ok(), "the scene that is spoilt below");

@@ -140,6 +140,9 @@ impl Jpeg {
             component.scanned = true;
             parts.push((component.blocks, tables));
         }
+        if parts.is_empty() {
+            return Err(DAMAGED);
+        }
         if !frame.sequential {
             return Ok(());
         }
