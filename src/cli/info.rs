@@ -7,11 +7,14 @@ use super::failure::Failure;
 use super::report::{Report, switches, switches_json};
 use super::table::{Table, bytes, lines};
 use crate::codec::package::{self, PackageInfo, StoredForm};
+use crate::codec::text::printable;
 use crate::gaussian::Model;
 use crate::offline::convert::form_name;
-use crate::scene::{Bounds, GaussianScene, PlaybackHints, TrainedWith};
+use crate::scene::packed::MAX_STAGES;
+use crate::scene::{Bounds, ColorDegrees, GaussianScene, PlaybackHints, SceneForm, TrainedWith};
 use glam::Vec3;
 use serde_json::{Value, json};
+use std::collections::HashMap;
 use std::fs::File;
 use std::path::PathBuf;
 
@@ -36,9 +39,9 @@ struct Facts {
     gaussians: usize,
     form: &'static str,
     model: Option<Model>,
-    coefficients: usize,
-    degree: u32,
-    degree_t: u32,
+    color: ColorDegrees,
+    /// Entries of each codebook of color; `None` if the coefficients are whole.
+    codebooks: Option<Vec<u32>>,
     environment: Option<[u32; 2]>,
     trained_with: TrainedWith,
     playback: PlaybackHints,
@@ -109,9 +112,10 @@ impl Info {
             "gaussians": facts.gaussians,
             "form": facts.form,
             "model": facts.model,
-            "coefficients": facts.coefficients,
-            "degree": facts.degree,
-            "degree_t": facts.degree_t,
+            "coefficients": facts.color.coefficients,
+            "degree": facts.color.degree,
+            "degree_t": facts.color.degree_t,
+            "codebooks": facts.codebooks,
             "environment": facts.environment,
             "switches": switches_json(&facts.trained_with, &facts.playback),
             "bounds": extent.as_ref().map(|extent| box_json(&extent.all)),
@@ -125,16 +129,16 @@ impl Info {
 
 impl Facts {
     fn of_scene(scene: &GaussianScene) -> Self {
-        // For colors by codebook, only the first coefficient counts as stored.
-        let (coefficients, degree, degree_t) =
-            scene.form.harmonics().map_or((1, 0, 0), |whole| (whole.coefficients, whole.degree, whole.degree_t));
+        let coded = match &scene.form {
+            SceneForm::Trained(_) => None,
+            SceneForm::Ready(form) => form.coded_colors(),
+        };
         Self {
             gaussians: scene.len(),
             form: form_name(&scene.form),
             model: scene.model(),
-            coefficients,
-            degree,
-            degree_t,
+            color: scene.form.color_degrees(),
+            codebooks: coded.map(|colors| colors.entries.clone()),
             environment: scene.environment.as_ref().map(|map| [map.width, map.height]),
             trained_with: scene.trained_with.clone(),
             playback: scene.playback,
@@ -143,18 +147,18 @@ impl Facts {
 
     fn of_package(info: &PackageInfo) -> Self {
         let header = &info.header;
-        let (form, model) = match header.form {
-            StoredForm::Trained { model } => ("trained", Some(model)),
-            StoredForm::Sliced => ("runtime", None),
-            StoredForm::Packed { .. } => ("packed", None),
+        let (form, model, codebooks) = match header.form {
+            StoredForm::Trained { model } => ("trained", Some(model), None),
+            StoredForm::Sliced => ("runtime", None, None),
+            StoredForm::Packed { codebooks } => ("packed", None, codebooks),
         };
+        let used = |all: [u32; MAX_STAGES]| all.into_iter().filter(|&entries| entries > 0).collect::<Vec<_>>();
         Self {
             gaussians: header.gaussians,
             form,
             model,
-            coefficients: header.coefficients,
-            degree: header.degree,
-            degree_t: header.degree_t,
+            color: ColorDegrees { coefficients: header.coefficients, degree: header.degree, degree_t: header.degree_t },
+            codebooks: codebooks.map(used),
             environment: header.environment.map(|map| [map.width, map.height]),
             trained_with: header.trained_with.clone(),
             playback: header.playback,
@@ -168,11 +172,15 @@ impl Facts {
             Some(Model::Rotated4d) => "trained form, native 4D",
             None => self.form,
         };
-        let (degree, degree_t, stored) = (self.degree, self.degree_t, self.coefficients);
+        let ColorDegrees { coefficients, degree, degree_t } = self.color;
+        let stored = match &self.codebooks {
+            None => format!("{coefficients} coefficients stored"),
+            Some(entries) => format!("{coefficients} coefficients, coded by {} codebooks", entries.len()),
+        };
         let environment = self.environment.map_or("none".to_owned(), |[width, height]| format!("{width} x {height}"));
         let mut pairs = vec![
             ("Gaussians", format!("{} ({model})", self.gaussians)),
-            ("colour", format!("degree {degree}, time degree {degree_t}, {stored} coefficients stored")),
+            ("colour", format!("degree {degree}, time degree {degree_t}, {stored}")),
             ("environment", environment),
         ];
         pairs.extend(switches(&self.trained_with, &self.playback));
@@ -180,20 +188,38 @@ impl Facts {
     }
 }
 
-/// Returns a table with one row for all sections of the same name.
+/// All sections of one name.
+#[derive(Default)]
+struct Sections {
+    parts: usize,
+    bytes: u64,
+    unpacked: u64,
+    damaged: usize,
+}
+
+/// Returns a table with one row for all sections of the same name, in the order of the file.
 fn section_table(info: &PackageInfo) -> Table {
-    let sections = &info.header.sections;
-    let mut names: Vec<&str> = sections.iter().map(|section| section.name.as_str()).collect();
-    names.dedup();
+    let mut rows: Vec<(&str, Sections)> = Vec::new();
+    let mut places = HashMap::new();
+    for (index, section) in info.header.sections.iter().enumerate() {
+        let place = *places.entry(section.name.as_str()).or_insert(rows.len());
+        if place == rows.len() {
+            rows.push((section.name.as_str(), Sections::default()));
+        }
+        let all = &mut rows[place].1;
+        all.parts += 1;
+        all.bytes += section.length as u64;
+        // Sections of unknown names may claim any number.
+        all.unpacked = all.unpacked.saturating_add(section.raw_length as u64);
+        all.damaged += usize::from(info.damaged.binary_search(&index).is_ok());
+    }
     let mut table = Table::new(&["section", "parts", "bytes", "unpacked", "checksums"]);
-    for name in names {
-        let of_name = || sections.iter().enumerate().filter(|(_, section)| section.name == name);
-        let damaged = of_name().filter(|(index, _)| info.damaged.contains(index)).count();
+    for (name, Sections { parts, bytes, unpacked, damaged }) in rows {
         table.row([
-            name.to_owned(),
-            of_name().count().to_string(),
-            of_name().map(|(_, section)| section.length as u64).sum::<u64>().to_string(),
-            of_name().map(|(_, section)| section.raw_length as u64).sum::<u64>().to_string(),
+            printable(name),
+            parts.to_string(),
+            bytes.to_string(),
+            unpacked.to_string(),
             if damaged == 0 { "hold".to_owned() } else { format!("{damaged} BROKEN") },
         ]);
     }

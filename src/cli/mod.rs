@@ -19,6 +19,7 @@ mod fine_tune;
 mod info;
 mod interrupt;
 mod mask;
+mod plain;
 mod progress;
 mod prune;
 mod render;

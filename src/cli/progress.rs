@@ -3,7 +3,7 @@
 //! In: the tasks and notes of library calls. Out: one bar for each unfinished task, below those of the tasks around it;
 //! one line for each note.
 
-use super::{interrupt, system};
+use super::{interrupt, plain, system};
 use crate::codec::CodecError;
 use crate::offline::Progress;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -24,7 +24,7 @@ pub fn silence_progress(silent: bool) {
 
 /// Writes a line to standard error, if that is open. Errors of the system in it are put in words.
 pub fn note(line: &str) {
-    let _ = BARS.suspend(|| writeln!(stderr(), "{}", system::in_words(line)));
+    let _ = BARS.suspend(|| writeln!(stderr(), "{}", plain::lines(&system::in_words(line))));
 }
 
 /// The bars of the unfinished tasks; hidden with `--json` and if standard error is not a terminal. Dropping this

@@ -3,6 +3,7 @@
 //! In: the result of a verb. Out: one document on standard output, errors on standard error.
 
 use super::failure::Failure;
+use super::plain;
 use super::progress::note;
 use crate::codec::checkpoint;
 use crate::scene::{PlaybackHints, TrainedWith};
@@ -42,7 +43,7 @@ impl Report {
     /// # Errors
     /// Standard output cannot be written.
     pub fn print(&self, as_json: bool) -> Result<(), Failure> {
-        let text = if as_json { format!("{:#}\n", self.json) } else { self.text.clone() };
+        let text = if as_json { plain::json(&format!("{:#}\n", self.json)) } else { plain::lines(&self.text) };
         let printed = stdout().write_all(text.as_bytes()).and_then(|()| stdout().flush());
         if let Some(failure) = self.failure.as_ref().filter(|failure| !failure.is_silent()) {
             note(&format!("error: {}", failure.message()));

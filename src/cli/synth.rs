@@ -40,8 +40,8 @@ pub struct Synth {
     /// Time degree of colour, 0 to 2; counts only with --sh-degree 3.
     #[arg(long, value_name = "D", default_value_t = 2, value_parser = clap::value_parser!(u32).range(0..=2))]
     sh_degree_t: u32,
-    /// Seconds of playback.
-    #[arg(long, value_name = "SECONDS", default_value = "2", value_parser = values::positive, conflicts_with = "grow")]
+    /// Seconds of playback; 0 for a still.
+    #[arg(long, value_name = "SECONDS", default_value = "2", value_parser = values::seconds, conflicts_with = "grow")]
     duration: f32,
 }
 

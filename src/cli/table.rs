@@ -1,6 +1,9 @@
 //! Tables, aligned lines and sizes, as text.
 //!
-//! In: cells, names with values, numbers of bytes. Out: lines for people.
+//! In: cells, names with values, numbers of bytes. Out: lines for people. A cell or a value stays on its line, whatever a
+//! file has put into it.
+
+use crate::codec::text::escaped;
 
 /// A table: the first column is aligned to the left, the others to the right.
 pub struct Table(Vec<Vec<String>>);
@@ -13,7 +16,7 @@ impl Table {
 
     /// Adds a row.
     pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
-        self.0.push(cells.into_iter().collect());
+        self.0.push(cells.into_iter().map(|cell| escaped(&cell)).collect());
     }
 }
 
@@ -39,7 +42,7 @@ impl std::fmt::Display for Table {
 /// Returns lines of names and values, the values aligned.
 pub fn lines(pairs: &[(&str, String)]) -> String {
     let width = pairs.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-    pairs.iter().map(|(name, value)| format!("{name:<width$}  {value}\n")).collect()
+    pairs.iter().map(|(name, value)| format!("{name:<width$}  {}\n", escaped(value))).collect()
 }
 
 /// Returns a number of bytes for people, in powers of 1000.

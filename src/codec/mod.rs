@@ -8,6 +8,7 @@ pub mod checkpoint;
 mod error;
 pub mod format;
 pub mod package;
+pub(crate) mod text;
 
 pub use error::{CodecError, CodecErrorKind};
 

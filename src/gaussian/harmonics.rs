@@ -29,6 +29,9 @@ pub enum ShDirection {
     Displaced,
 }
 
+/// Most coefficients per Gaussian and channel: 16 spatial ones for each of three blocks of time.
+pub const MAX_COEFFICIENTS: usize = 48;
+
 /// π with the digits of the original rasterizer.
 #[expect(clippy::approx_constant, reason = "the original's literal, digit for digit")]
 const PI: f64 = 3.14159265;
@@ -69,7 +72,7 @@ impl Harmonics {
     pub fn is_consistent(&self, count: usize) -> bool {
         self.degree <= 3
             && self.degree_t <= 2
-            && self.coefficients <= 48
+            && self.coefficients <= MAX_COEFFICIENTS
             && self.evaluated() <= self.coefficients
             && self.coefficients.checked_mul(3).and_then(|k| k.checked_mul(count)) == Some(self.values.len())
     }

@@ -5,6 +5,7 @@
 
 use super::OfflineError;
 use super::metrics::{self, SizeMismatch};
+use super::picture_file;
 use crate::view::Picture;
 use glam::{UVec2, Vec3};
 use serde::Serialize;
@@ -133,7 +134,7 @@ fn load(path: &Path, raw_size: Option<UVec2>) -> Result<Picture, OfflineError> {
     if is_raw(path) {
         return load_raw(path, raw_size);
     }
-    let image = image::open(path).map_err(|error| OfflineError::at(path, error))?.into_rgb32f();
+    let image = picture_file::open(path, UVec2::MAX)?.into_rgb32f();
     let size = UVec2::new(image.width(), image.height());
     Ok(Picture { size, pixels: image.pixels().map(|pixel| Vec3::from(pixel.0)).collect() })
 }

@@ -3,7 +3,7 @@
 //! In: a scene, a target form, color degrees. Out: the scene in that form, with those degrees.
 
 use super::OfflineError;
-use crate::scene::{Form, GaussianScene, SceneForm};
+use crate::scene::{ColorDegrees, Form, GaussianScene, SceneForm};
 
 /// A form to convert to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,9 +24,9 @@ impl TargetForm {
 pub struct ConvertSettings {
     /// Target form.
     pub form: Option<TargetForm>,
-    /// Highest spatial degree of color to keep, 0 to 3. No effect on colors by codebook unless they are unpacked.
+    /// Highest spatial degree of color to keep, 0 to 3.
     pub sh_degree: Option<u32>,
-    /// Highest time degree of color to keep, 0 to 2. No effect on colors by codebook unless they are unpacked.
+    /// Highest time degree of color to keep, 0 to 2.
     pub sh_degree_t: Option<u32>,
 }
 
@@ -39,9 +39,8 @@ pub fn convert(mut scene: GaussianScene, settings: &ConvertSettings) -> Result<G
     if settings.form == Some(TargetForm::Runtime) {
         scene = scene.unpacked();
     }
-    if let Some(kept) = scene.form.harmonics_mut() {
-        kept.truncate(settings.sh_degree.unwrap_or(kept.degree), settings.sh_degree_t.unwrap_or(kept.degree_t));
-    }
+    let ColorDegrees { degree, degree_t, .. } = scene.form.color_degrees();
+    scene.form.truncate_colors(settings.sh_degree.unwrap_or(degree), settings.sh_degree_t.unwrap_or(degree_t));
     match (settings.form, &scene.form) {
         (Some(TargetForm::Trained), SceneForm::Ready(_)) => Err(OfflineError::NotTrained),
         (Some(TargetForm::Runtime), SceneForm::Trained(_)) => Ok(scene.into_runtime()?.into()),

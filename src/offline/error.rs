@@ -6,6 +6,7 @@
 use super::dataset::DatasetError;
 use super::fine_tune::TrainerError;
 use super::metrics::SizeMismatch;
+use super::picture_file::PictureError;
 use super::quantize::CompressError;
 use super::score::ScoreError;
 use crate::codec::CodecError;
@@ -24,6 +25,9 @@ pub enum OfflineError {
     /// Training or test views cannot be used.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
+    /// A picture cannot be decoded.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
     /// Two pictures cannot be compared.
     #[error(transparent)]
     Size(#[from] SizeMismatch),

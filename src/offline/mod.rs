@@ -7,6 +7,7 @@
 //! | module | what it does |
 //! |---|---|
 //! | [`dataset`], [`splits`] | reads training and test views, chooses among them |
+//! | [`picture_file`] | decodes pictures, for all of the others |
 //! | [`engine`] | opens the GPU or the CPU reference |
 //! | [`score`] | sums what every Gaussian contributes to the training views |
 //! | [`prune`], [`prune_by_views`] | keeps the Gaussians that score highest |
@@ -35,6 +36,7 @@ pub mod fine_tune;
 pub mod metrics;
 pub mod orbit;
 mod part;
+pub mod picture_file;
 mod progress;
 pub mod prune;
 pub mod prune_by_views;

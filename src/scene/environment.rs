@@ -4,6 +4,7 @@
 //! as the original computes it.
 
 use glam::Vec3;
+use rayon::prelude::*;
 use std::f32::consts::{PI, TAU};
 
 /// Radius of the sphere, capture units.
@@ -41,6 +42,21 @@ impl Environment {
             color += weight * self.texel(x0 + i, y0 + j);
         }
         color
+    }
+
+    /// Checks that there is a finite value for each channel of each texel.
+    ///
+    /// # Errors
+    /// A description of what is wrong.
+    pub fn check(&self) -> Result<(), &'static str> {
+        let texels = self.width.checked_mul(self.height).filter(|&texels| texels > 0);
+        if texels.and_then(|texels| (texels as usize).checked_mul(3)) != Some(self.texels.len()) {
+            return Err("its environment map has another number of texels");
+        }
+        if !self.texels.par_iter().all(|value| value.is_finite()) {
+            return Err("its environment map has a value that is not finite");
+        }
+        Ok(())
     }
 
     fn texel(&self, x: f32, y: f32) -> Vec3 {

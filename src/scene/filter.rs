@@ -4,6 +4,7 @@
 //! [`TemporalFilter`], stored as bits or as intervals, whichever is smaller; drawing skips what is not active.
 
 use crate::gaussian::{Gaussian, MARGINAL_CUTOFF};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// How the sets of a filter were computed. Default: [`Support`](Self::Support).
@@ -90,6 +91,30 @@ impl TemporalFilter {
         filter
     }
 
+    /// Checks that it is a filter of `count` Gaussians, and that intervals end within its segments.
+    ///
+    /// # Errors
+    /// A description of what does not fit.
+    pub fn check(&self, count: usize) -> Result<(), &'static str> {
+        let fits = match &self.sets {
+            ActiveSets::Bits(bits) => Self::words(count).checked_mul(self.segments as usize) == Some(bits.len()),
+            ActiveSets::Intervals(intervals) => intervals.len() == count,
+        };
+        if self.count != count || !(1..=MAX_SEGMENTS).contains(&self.segments) || !fits {
+            return Err("its temporal filter is that of another number of Gaussians");
+        }
+        let ends_within = |&word: &u32| {
+            let (first, last) = (word & 0xffff, word >> 16);
+            first > last || last < self.segments
+        };
+        match &self.sets {
+            ActiveSets::Intervals(intervals) if !intervals.par_iter().all(ends_within) => {
+                Err("its temporal filter has an interval that ends after its last segment")
+            }
+            ActiveSets::Bits(_) | ActiveSets::Intervals(_) => Ok(()),
+        }
+    }
+
     /// Returns the number of words of one set of bits for `count` Gaussians.
     pub fn words(count: usize) -> usize {
         count.div_ceil(32)
@@ -152,7 +177,8 @@ impl TemporalFilter {
 
     /// Returns the share of active Gaussians, the mean over all segments; 1 for an empty scene.
     pub fn active_share(&self) -> f64 {
-        let active: usize = (0..self.segments).map(|s| (0..self.count).filter(|&i| self.is_active(s, i)).count()).sum();
+        // A filter from a file may have so many segments that asking for each Gaussian in each of them would not end.
+        let active: u64 = self.active_counts(0..self.count).into_iter().map(u64::from).sum();
         let all = self.count * self.segments as usize;
         if all == 0 { 1.0 } else { active as f64 / all as f64 }
     }
@@ -262,6 +288,8 @@ mod tests {
         assert!(matches!(filter.sets, ActiveSets::Intervals(_)), "forty segments are smaller as intervals");
         let bits = TemporalFilter { sets: ActiveSets::Bits(filter.to_bits()), ..filter.clone() };
         assert_eq!(bits.to_bits(), filter.to_bits(), "the same sets");
+        let each = (0..40).map(|segment| (0..70).filter(|&i| filter.is_active(segment, i)).count()).sum::<usize>();
+        assert_eq!((filter.active_share(), bits.active_share()), (each as f64 / 2800.0, each as f64 / 2800.0), "share");
         let back = TemporalFilter::from_bits(FilterKind::Support, 40, 70, filter.to_bits());
         assert_eq!(back, filter, "intervals are found again");
         for own in [0..70, 0..64, 64..70, 32..33] {

@@ -15,6 +15,7 @@
 use super::packed::{CodedColors, PackedColors, PackedScene};
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Model, Parameters, SliceSettings};
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// The Gaussians of a scene and their color.
 #[derive(Debug, Clone, PartialEq)]
@@ -106,6 +107,28 @@ impl SceneForm {
         match self {
             Self::Trained(trained) => ColorDegrees::of_harmonics(&trained.harmonics),
             Self::Ready(form) => form.color_degrees(),
+        }
+    }
+
+    /// Lowers the degrees of its color to at most those given and drops the coefficients that are no longer evaluated.
+    pub fn truncate_colors(&mut self, degree: u32, degree_t: u32) {
+        match self {
+            Self::Trained(Trained { harmonics, .. })
+            | Self::Ready(Form::Sliced(Sliced { harmonics, .. }))
+            | Self::Ready(Form::Packed(PackedScene { colors: PackedColors::Whole(harmonics), .. })) => {
+                harmonics.truncate(degree, degree_t);
+            }
+            Self::Ready(Form::Packed(PackedScene { colors: PackedColors::Coded(colors), .. })) => {
+                colors.truncate(degree, degree_t);
+            }
+        }
+    }
+
+    /// Checks that its parts fit together.
+    pub(super) fn check_parts(&self) -> Result<(), &'static str> {
+        match self {
+            Self::Trained(trained) => check_colors(&trained.harmonics, trained.parameters.len()),
+            Self::Ready(form) => form.check_parts(),
         }
     }
 
@@ -240,17 +263,27 @@ impl Form {
         }
     }
 
-    /// Checks that every Gaussian can be drawn.
-    fn check(&self) -> Result<(), InvalidGaussian> {
+    /// Checks that its parts fit together.
+    pub(super) fn check_parts(&self) -> Result<(), &'static str> {
         match self {
-            Self::Sliced(sliced) => {
-                sliced.gaussians.iter().enumerate().try_for_each(|(index, gaussian)| {
-                    gaussian.check().map_err(|reason| InvalidGaussian { index, reason })
-                })
-            }
-            Self::Packed(packed) => packed.check().map_err(|reason| InvalidGaussian { index: 0, reason }),
+            Self::Sliced(sliced) => check_colors(&sliced.harmonics, sliced.gaussians.len()),
+            Self::Packed(packed) => packed.check(),
         }
     }
+
+    /// Checks that every Gaussian can be drawn.
+    fn check(&self) -> Result<(), InvalidGaussian> {
+        if let Self::Packed(packed) = self {
+            packed.check().map_err(|reason| InvalidGaussian { index: 0, reason })?;
+        }
+        let reason = |index: usize| self.gaussian(index).check().err();
+        let invalid = |index| Some(InvalidGaussian { index, reason: reason(index)? });
+        (0..self.len()).into_par_iter().find_map_first(invalid).map_or(Ok(()), Err)
+    }
+}
+
+fn check_colors(harmonics: &Harmonics, count: usize) -> Result<(), &'static str> {
+    if harmonics.is_consistent(count) { Ok(()) } else { Err("its colours are those of another number of Gaussians") }
 }
 
 impl ColorDegrees {

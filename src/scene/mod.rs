@@ -83,6 +83,15 @@ impl GaussianScene {
         Self { form, ..self }
     }
 
+    /// Checks that its parts fit together, as [`RuntimeScene::check`] does.
+    ///
+    /// # Errors
+    /// A description of what does not fit.
+    pub fn check(&self) -> Result<(), &'static str> {
+        self.form.check_parts()?;
+        check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())
+    }
+
     /// Converts the scene for drawing: slices the Gaussians if they are in the trained form. Colors are moved, not
     /// copied.
     ///
@@ -154,35 +163,14 @@ impl RuntimeScene {
         self.form.color(index, direction, tau, self.trained_with.time_span())
     }
 
-    /// Checks that its parts fit together, as those of every loaded scene do.
+    /// Checks that its parts fit together, as those of every loaded scene do: lengths, codes, the temporal filter, and that
+    /// the environment map is finite. Then nothing is read beyond them, here or on a GPU.
     ///
     /// # Errors
     /// A description of what does not fit.
     pub fn check(&self) -> Result<(), &'static str> {
-        let fits = |filter: &TemporalFilter| {
-            filter.count == self.len()
-                && (1..=MAX_SEGMENTS).contains(&filter.segments)
-                && match &filter.sets {
-                    ActiveSets::Bits(bits) => {
-                        bits.len() == TemporalFilter::words(filter.count) * filter.segments as usize
-                    }
-                    ActiveSets::Intervals(intervals) => intervals.len() == filter.count,
-                }
-        };
-        if !self.filter.as_ref().is_none_or(fits) {
-            return Err("its temporal filter is that of another number of Gaussians");
-        }
-        if !self.form.harmonics().is_none_or(|harmonics| harmonics.is_consistent(self.len())) {
-            return Err("its colours are those of another number of Gaussians");
-        }
-        let covers = |map: &Environment| {
-            let texels = (map.width as usize).checked_mul(map.height as usize).and_then(|texels| texels.checked_mul(3));
-            map.width > 0 && map.height > 0 && texels == Some(map.texels.len())
-        };
-        if !self.environment.as_ref().is_none_or(covers) {
-            return Err("its environment map has another number of texels");
-        }
-        Ok(())
+        self.form.check_parts()?;
+        check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())
     }
 
     /// Returns the background that the capture was trained with: its environment map if it has one, else its color.
@@ -197,6 +185,16 @@ impl RuntimeScene {
     pub fn size(&self) -> usize {
         self.form.size()
     }
+}
+
+/// Checks the parts of a scene of `count` Gaussians beside its form.
+fn check_around(
+    count: usize,
+    filter: Option<&TemporalFilter>,
+    environment: Option<&Environment>,
+) -> Result<(), &'static str> {
+    filter.map_or(Ok(()), |filter| filter.check(count))?;
+    environment.map_or(Ok(()), Environment::check)
 }
 
 impl From<RuntimeScene> for GaussianScene {

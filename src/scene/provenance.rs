@@ -90,7 +90,8 @@ pub enum TrainedCameras {
 pub struct PlaybackHints {
     /// The axis that points up in the capture's own space. Default: +Z.
     pub up: UpAxis,
-    /// Seconds that one pass through the time interval takes at speed 1. Default: 1.
+    /// Seconds that one pass through the time interval takes at speed 1; 0 for a still, which shows the first timestamp.
+    /// Default: 1.
     pub duration_seconds: f32,
 }
 

@@ -109,6 +109,14 @@ impl View {
         self.world_to_camera.inverse().transform_vector3(camera).normalize()
     }
 
+    /// Returns whether every number that the passes read is finite.
+    pub fn is_finite(&self) -> bool {
+        let [x, y] = self.clip_rows();
+        let finite = [self.projection, x, y].iter().all(|numbers| numbers.is_finite());
+        let shape = [self.tan_fov, self.reach(), self.focal()].iter().all(|pair| pair.is_finite());
+        finite && shape && self.world_to_camera.is_finite() && self.camera_position.is_finite() && self.near.is_finite()
+    }
+
     /// Returns the number of 16 × 16 tiles across and down.
     pub fn tiles(&self) -> UVec2 {
         tiles(self.size)

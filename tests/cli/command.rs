@@ -4,11 +4,13 @@
 //! nothing panics.
 
 use crate::support::command::{arguments, folder, gs4d, scene};
+use crate::support::package_parts::Parts;
 use serde_json::Value;
 use std::ffi::OsString;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 #[test]
 fn conversion_keeps_what_it_should() {
@@ -58,6 +60,85 @@ fn conversion_keeps_what_it_should() {
     let back = folder.path().join("back.gs4d");
     gs4d(&arguments!["convert", &small, &back, "--form", "trained"]).must_fail("small.gs4d");
     assert!(!back.exists(), "nothing is written");
+}
+
+#[test]
+fn coded_colours_are_described_and_lowered() {
+    let folder = folder();
+    let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/toybox.gs4d");
+    let info = gs4d(&arguments!["info", &demo, "--json"]).json();
+    let figures = |info: &Value| [&info["degree"], &info["degree_t"], &info["coefficients"]].map(Value::clone);
+    assert_eq!(figures(&info), [3, 2, 48].map(Value::from), "those of the bundled capture");
+    assert_eq!(info["codebooks"], Value::from(vec![1024; 4]), "and its codebooks");
+    let text = gs4d(&arguments!["info", &demo]).text();
+    assert!(text.contains("degree 3, time degree 2, 48 coefficients, coded by 4 codebooks"), "for people: {text}");
+
+    let [coded, plain] = ["coded.gs4d", "plain.gs4d"].map(|name| folder.path().join(name));
+    gs4d(&arguments!["compress", scene(&folder, "300"), &coded, "--codebooks", "16,16", "--verify", "0"]).text();
+    gs4d(&arguments!["convert", &coded, &plain, "--sh-degree", "0"]).text();
+    let info = gs4d(&arguments!["info", &plain, "--json"]).json();
+    assert_eq!(figures(&info), [0, 0, 1].map(Value::from), "as asked for");
+    assert_eq!(info["form"], "packed", "still packed");
+    let bytes = |path: &Path| fs::metadata(path).expect("the package is there").len();
+    assert!(bytes(&plain) < bytes(&coded), "without codebooks it is smaller");
+}
+
+#[test]
+fn a_still_lasts_no_time() {
+    let folder = folder();
+    let (moving, still) = (scene(&folder, "50"), folder.path().join("still.gs4d"));
+    gs4d(&arguments!["convert", &moving, &still, "--duration", "0"]).text();
+    let info = gs4d(&arguments!["info", &still, "--json"]).json();
+    assert_eq!(info["switches"]["playback"]["duration_seconds"], 0.0, "it is stored and read again");
+    gs4d(&arguments!["convert", &moving, &still, "--duration=-1"]).must_fail("--duration");
+}
+
+#[test]
+fn sections_are_listed_once_however_many_there_are() {
+    let folder = folder();
+    let path = scene(&folder, "50");
+    let mut parts = Parts::of(&fs::read(&path).expect("the package is there"));
+    // Two names in turn, then many of their own; sections of unknown names may claim any length.
+    let names = (0..20_000).flat_map(|i| ["even".to_owned(), "odd".to_owned(), format!("x{i}")]);
+    let rest = "encoding: \"y\", first: 0, count: 0, length: 0, raw_length: 18446744073709551615, crc32: 0";
+    let entries: String = names.map(|name| format!("(name: \"{name}\", {rest}),\n")).collect();
+    parts.bodies.splice(0..0, vec![Vec::new(); 60_000]);
+    let parts = parts.swap("sections: [\n", &format!("sections: [\n{entries}"));
+    fs::write(&path, parts.seal()).expect("the folder can be written to");
+    let start = Instant::now();
+    let text = gs4d(&arguments!["info", &path]).text();
+    // Comparing each name with each would take minutes.
+    assert!(start.elapsed() < Duration::from_secs(60), "{:?}", start.elapsed());
+    let rows = |start: &str| text.lines().filter(|line| line.starts_with(start)).count();
+    assert_eq!((rows("even "), rows("odd "), rows("x")), (1, 1, 20_000), "one row for each name");
+    let even = text.lines().find(|line| line.starts_with("even ")).expect("a row");
+    assert!(even.split_whitespace().eq(["even", "20000", "0", "18446744073709551615", "hold"]), "all parts: {even}");
+    assert!(text.contains("sh_rest"), "and those that are known: {text}");
+}
+
+#[test]
+fn nothing_in_a_file_is_obeyed_by_the_terminal() {
+    let folder = folder();
+    let path = scene(&folder, "50");
+    let parts = Parts::of(&fs::read(&path).expect("the package is there"));
+    let name = r#""\u{1b}[2J\u{9b}1m\nerror: fake""#;
+    let section = format!("(name: {name}, encoding: \"y\", first: 0, count: 0, length: 0, raw_length: 0, crc32: 0)");
+    let mut unknown = parts.clone().swap("sections: [\n", &format!("sections: [\n{section},\n"));
+    unknown.bodies.insert(0, Vec::new());
+    let required = parts.swap("requires: []", &format!("requires: [{name}]"));
+    let is_plain = |text: &str| text.chars().all(|c| c == '\n' || !c.is_control());
+    for (parts, code) in [(unknown, 0), (required, 2)] {
+        fs::write(&path, parts.seal()).expect("the folder can be written to");
+        for options in [&[][..], &["--json"]] {
+            let arguments = [arguments!["info", &path].to_vec(), options.iter().map(Into::into).collect()].concat();
+            let run = gs4d(&arguments);
+            assert_eq!(run.code, Some(code), "{options:?}: {}", run.err);
+            assert!(is_plain(&run.out) && is_plain(&run.err), "{options:?}: {:?} {:?}", run.out, run.err);
+            let is_fake = |line: &str| line.starts_with("error: fake");
+            assert!(!run.out.lines().chain(run.err.lines()).any(is_fake), "{options:?}: no line of its own");
+            assert!((run.out + &run.err).contains("[2J"), "{options:?}: the name is shown");
+        }
+    }
 }
 
 #[test]

@@ -44,6 +44,21 @@ fn comparison_tells_equal_from_different() {
 }
 
 #[test]
+fn pictures_that_are_not_whole_are_named() {
+    let folder = folder();
+    let (png, jpg) = (folder.path().join("a.png"), folder.path().join("b.jpg"));
+    let picture = Picture::filled(UVec2::new(64, 48), Vec3::new(0.2, 0.5, 0.8)).to_rgb8();
+    picture.save(&png).expect("the folder can be written to");
+    picture.save(&jpg).expect("the folder can be written to");
+    gs4d(&arguments!["compare", &png, &jpg]).text();
+    let bytes = fs::read(&jpg).expect("the picture");
+    fs::write(&jpg, &bytes[..bytes.len() - 10]).expect("the folder can be written to");
+    gs4d(&arguments!["compare", &png, &jpg]).must_fail("b.jpg");
+    fs::write(&jpg, [&bytes[..bytes.len() - 10], &[0xff, 0xd9]].concat()).expect("the folder can be written to");
+    gs4d(&arguments!["compare", &jpg, &png]).must_fail("b.jpg");
+}
+
+#[test]
 fn raw_pictures_need_their_size() {
     let folder = folder();
     let path = folder.path().join("a.f32");

@@ -67,7 +67,13 @@ fn what_is_missing_is_named() {
     gs4d(&arguments!["eval", &scene, "--data", folder.path().join("nowhere")]).must_fail("transforms_test.json");
     gs4d(&arguments!["eval", &scene, "--data", &data, "--split", "val"]).must_fail("transforms_val.json");
     gs4d(&arguments!["eval", &scene, "--data", &data, "--metrics", "lpips"]).must_fail("lpips");
-    fs::remove_file(data.join("test/c00_01.png")).expect("the picture is there");
+    // A JPEG that is cut off, whatever its name.
+    let (cut, jpeg) = (data.join("test/c00_01.png"), folder.path().join("whole.jpg"));
+    image::open(&cut).expect("a picture").into_rgb8().save(&jpeg).expect("the folder can be written to");
+    let whole = fs::read(&jpeg).expect("a picture");
+    fs::write(&cut, &whole[..whole.len() - 2]).expect("the folder can be written to");
+    gs4d(&arguments!["eval", &scene, "--data", &data]).must_fail("c00_01.png");
+    fs::remove_file(cut).expect("the picture is there");
     gs4d(&arguments!["eval", &scene, "--data", &data]).must_fail("c00_01.png");
     gs4d(&arguments!["eval", &scene]).must_fail("--data");
 }

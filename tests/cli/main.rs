@@ -20,5 +20,6 @@ mod support {
     pub mod dataset;
     pub mod npy;
     pub mod npz;
+    pub mod package_parts;
     pub mod skip;
 }

@@ -138,6 +138,20 @@ fn images_are_missed_only_where_they_are_needed() {
 }
 
 #[test]
+fn images_that_are_cut_off_are_not_compared_with() {
+    let bench = Bench::new(true, false);
+    for view in 0..VIEWS {
+        let (png, jpeg) = (bench.path(&format!("r_{view:02}.png")), bench.path("whole.jpg"));
+        image::open(&png).expect("a picture").into_rgb8().save(&jpeg).expect("the folder can be written to");
+        let whole = fs::read(&jpeg).expect("a picture");
+        fs::write(&png, &whole[..whole.len() * 2 / 3]).expect("the folder can be written to");
+    }
+    let out = bench.path("pruned.gs4d");
+    bench.run("prune", &["--ratio", "0.5", "-o", &out]).must_fail("r_");
+    assert!(!PathBuf::from(out).exists(), "nothing is written");
+}
+
+#[test]
 fn a_score_file_must_fit() {
     let bench = Bench::new(false, false);
     let (scores, out) = (bench.path("scores.f32"), bench.path("pruned.gs4d"));

@@ -242,6 +242,13 @@ fn options_win_over_cfg_args_over_defaults() {
 }
 
 #[test]
+fn a_still_lasts_no_time() {
+    let options = CheckpointOptions { duration_seconds: Some(0.0), ..CheckpointOptions::default() };
+    let scene = read_with(&Pth::rotating(1, 48), &options).expect("a duration of nothing is one");
+    assert_eq!(scene.playback.duration_seconds, 0.0, "as it was given");
+}
+
+#[test]
 fn options_without_sense_are_refused() {
     let pth = Pth::rotating(1, 48);
     let none = CheckpointOptions::default();
@@ -249,7 +256,7 @@ fn options_without_sense_are_refused() {
         ("time interval", CheckpointOptions { time_interval: Some([1.0, 1.0]), ..none.clone() }),
         ("time interval", CheckpointOptions { time_interval: Some([0.0, f32::NAN]), ..none.clone() }),
         ("background", CheckpointOptions { background: Some([0.0, f32::INFINITY, 0.0]), ..none.clone() }),
-        ("duration", CheckpointOptions { duration_seconds: Some(0.0), ..none.clone() }),
+        ("duration", CheckpointOptions { duration_seconds: Some(-1.0), ..none.clone() }),
     ] {
         let message = read_with(&pth, &options).expect_err("must be refused").to_string();
         assert!(message.contains(name), "{message}");

@@ -115,7 +115,9 @@ fn values_must_be_finite() {
         assert_refused(&spoilt(|pth| pth.storages[2][141] = poison), &["Gaussian 1", "_features_rest", "not finite"]);
         assert_refused(&spoilt(|pth| pth.set(17, &[3, 1, 1], vec![0.0, 0.0, poison])), &["channel 2", "env_map"]);
     }
-    assert_refused(&spoilt(|pth| pth.slots[12] = pth::float(f64::NAN)), &["slot 12 (spatial_lr_scale)"]);
+    for poison in [f64::NAN, f64::INFINITY, -1.0] {
+        assert_refused(&spoilt(|pth| pth.slots[12] = pth::float(poison)), &["slot 12 (spatial_lr_scale)"]);
+    }
 }
 
 #[test]

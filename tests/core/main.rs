@@ -20,11 +20,13 @@ mod pick;
 #[cfg(feature = "offline")]
 mod quantize;
 mod rings;
+mod scene_parts;
 #[cfg(feature = "offline")]
 mod score;
 
 #[path = "../support"]
 mod support {
+    pub mod coded_scene;
     pub mod data;
     pub mod golden;
     pub mod golden_gradients;
@@ -32,6 +34,7 @@ mod support {
     pub mod npy;
     #[cfg(feature = "offline")]
     pub mod own_process;
+    pub mod package_parts;
     #[cfg(feature = "offline")]
     pub mod packed_scene;
     pub mod pth;

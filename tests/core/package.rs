@@ -3,6 +3,8 @@
 //! In: scenes made here, and packages taken apart, changed and sealed again. Out: proof that files store scenes without
 //! loss, that every damage is noticed, and that additions of a newer writer are skipped.
 
+use crate::support::coded_scene::coded_scene;
+use crate::support::package_parts::Parts;
 use bevy_gs4d::codec::package::{self, MAGIC, PackageError, PackageInfo, VERSION, WriteSettings};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics, Model, Parameters};
 use bevy_gs4d::scene::{
@@ -45,6 +47,10 @@ impl Bits {
     fn values(&mut self, count: usize) -> Vec<f32> {
         (0..count).map(|_| self.float()).collect()
     }
+
+    fn finite(&mut self, count: usize) -> Vec<f32> {
+        (0..count).map(|_| Some(self.float()).filter(|value| value.is_finite()).unwrap_or(0.5)).collect()
+    }
 }
 
 fn scene(shape: &Shape, seed: u64) -> GaussianScene {
@@ -81,7 +87,7 @@ fn scene(shape: &Shape, seed: u64) -> GaussianScene {
         environment: shape.environment.map(|(width, height)| Environment {
             width,
             height,
-            texels: bits.values((3 * width * height) as usize),
+            texels: bits.finite((3 * width * height) as usize),
         }),
         trained_with: TrainedWith {
             time_interval: [-0.1, 2.7],
@@ -162,56 +168,34 @@ fn refusal(file: &[u8]) -> PackageError {
     error
 }
 
-/// A package in its parts. `seal` puts them together, with the right checksum of the current header.
-#[derive(Clone)]
-struct Parts {
-    header: String,
-    bodies: Vec<Vec<u8>>,
+/// Puts another body in place of one, with the right length and checksum.
+fn replace_body(mut parts: Parts, index: usize, body: Vec<u8>) -> Parts {
+    let old = std::mem::replace(&mut parts.bodies[index], body);
+    let entry =
+        |body: &[u8], raw| format!("length: {}, raw_length: {raw}, crc32: {}", body.len(), crc32fast::hash(body));
+    let raw = zstd::bulk::decompress(&old, 1 << 20).expect("a body as it was written").len();
+    let (from, to) = (entry(&old, raw), entry(&parts.bodies[index], raw));
+    parts.swap(&from, &to)
 }
 
-impl Parts {
-    fn of(file: &[u8]) -> Self {
-        let number = |at: usize| u64::from_le_bytes(file[at..at + 8].try_into().expect("eight bytes")) as usize;
-        let mut at = 20 + number(8);
-        let header = String::from_utf8(file[20..at].to_vec()).expect("the header is UTF-8");
-        let mut bodies = Vec::new();
-        while at < file.len() {
-            let end = at + 8 + number(at);
-            bodies.push(file[at + 8..end].to_vec());
-            at = end;
-        }
-        Self { header, bodies }
+/// Puts one section of `count` rows in place of all those of a name.
+fn put(mut parts: Parts, name: &str, count: usize, raw: &[u8]) -> Parts {
+    let body = zstd::bulk::compress(raw, 1).expect("compressible");
+    let (length, raw_length, crc32) = (body.len(), raw.len(), crc32fast::hash(&body));
+    let mut lines: Vec<String> = parts.header.lines().map(str::to_owned).collect();
+    let first = lines.iter().position(|line| line.contains("sections: [")).expect("a table of sections") + 1;
+    let start = format!("(name: {name:?}, ");
+    let place = lines.iter().position(|line| line.contains(&start)).expect("a section of that name");
+    while let Some(more) = lines[place + 1..].iter().position(|line| line.contains(&start)) {
+        lines.remove(place + 1 + more);
+        parts.bodies.remove(place + 1 + more - first);
     }
-
-    fn seal(&self) -> Vec<u8> {
-        let mut start = MAGIC.to_vec();
-        start.extend(VERSION.to_le_bytes());
-        start.extend((self.header.len() as u64).to_le_bytes());
-        let checksum = crc32fast::hash(&[&start[..], self.header.as_bytes()].concat());
-        let mut file = [&start[..], &checksum.to_le_bytes()[..], self.header.as_bytes()].concat();
-        for body in &self.bodies {
-            file.extend((body.len() as u64).to_le_bytes());
-            file.extend(body);
-        }
-        file
-    }
-
-    /// Replaces the first such text of the header.
-    fn swap(mut self, from: &str, to: &str) -> Self {
-        assert!(self.header.contains(from), "the header holds {from:?}:\n{}", self.header);
-        self.header = self.header.replacen(from, to, 1);
-        self
-    }
-
-    /// Puts another body in place of one, with the right length and checksum.
-    fn replace_body(mut self, index: usize, body: Vec<u8>) -> Self {
-        let old = std::mem::replace(&mut self.bodies[index], body);
-        let entry =
-            |body: &[u8], raw| format!("length: {}, raw_length: {raw}, crc32: {}", body.len(), crc32fast::hash(body));
-        let raw = zstd::bulk::decompress(&old, 1 << 20).expect("a body as it was written").len();
-        let (from, to) = (entry(&old, raw), entry(&self.bodies[index], raw));
-        self.swap(&from, &to)
-    }
+    lines[place] = format!(
+        "{start}encoding: \"f32-planes-zstd\", first: 0, count: {count}, length: {length}, raw_length: {raw_length}, \
+         crc32: {crc32}),"
+    );
+    parts.bodies[place - first] = body;
+    Parts { header: lines.join("\n"), ..parts }
 }
 
 fn shapes() -> impl Strategy<Value = Shape> {
@@ -270,7 +254,7 @@ proptest! {
         let mut body = parts.bodies[section].clone();
         let at = at.index(body.len());
         body[at] ^= with;
-        match read(&parts.replace_body(section, body).seal()) {
+        match read(&replace_body(parts, section, body).seal()) {
             Ok(scene) => prop_assert_eq!(scene.len(), SMALL.count, "still as many Gaussians"),
             Err(error) => prop_assert!(matches!(error, PackageError::SectionBody { .. }), "{error}"),
         }
@@ -434,7 +418,7 @@ fn bombs_are_refused() {
     let parts = Parts::of(&pack(&scene(&SMALL, 14)));
     for length in [35, 37, 100_000_000] {
         let bomb = zstd::bulk::compress(&vec![0; length], 3).expect("compressible");
-        let error = refusal(&parts.clone().replace_body(0, bomb).seal());
+        let error = refusal(&replace_body(parts.clone(), 0, bomb).seal());
         assert!(matches!(&error, PackageError::SectionBody { name, .. } if name == "mean"), "{length} bytes: {error}");
     }
     let gaussians = vec![Gaussian::zeroed(); 3_000_000];
@@ -443,6 +427,90 @@ fn bombs_are_refused() {
     let vast = GaussianScene { form: all_alike, ..scene(&SMALL, 15) };
     let error = package::write(Vec::new(), &vast, &WriteSettings { level: 1 }).expect_err("nobody could read it");
     assert!(matches!(error, PackageError::TooLarge { .. }), "what reads as a bomb is not written: {error}");
+}
+
+#[test]
+fn a_section_counts_beside_the_scene_it_is_unpacked_into() {
+    let count = 90_000;
+    let harmonics = Harmonics { coefficients: 48, values: vec![0.0; count * 144], ..Harmonics::default() };
+    let sliced = Sliced { gaussians: vec![Gaussian::zeroed(); count], harmonics };
+    let scene = GaussianScene { form: SceneForm::Ready(Form::Sliced(sliced)), ..scene(&SMALL, 19) };
+    let mut file = Vec::new();
+    package::write(&mut file, &scene, &WriteSettings { level: 1 }).expect("in small sections it fits");
+    assert_eq!(read(&file).expect("and can be read").len(), count, "every Gaussian");
+    // All in one section, which would be in memory twice.
+    let error = refusal(&put(Parts::of(&file), "sh_rest", count, &vec![0; count * 47 * 12]).seal());
+    assert!(matches!(error, PackageError::TooLarge { .. }), "{error}");
+}
+
+#[test]
+fn too_many_sections_are_refused() {
+    let mut parts = Parts::of(&pack(&scene(&SMALL, 20)));
+    let nothing = "(name: \"x\", encoding: \"y\", first: 0, count: 0, length: 0, raw_length: 0, crc32: 0),\n";
+    parts.bodies.splice(0..0, vec![Vec::new(); 1 << 16]);
+    let file = parts.swap("sections: [\n", &format!("sections: [\n{}", nothing.repeat(1 << 16))).seal();
+    assert!(matches!(refusal(&file), PackageError::TooManySections { .. }), "one more than any scene needs");
+}
+
+#[test]
+fn codebooks_have_the_coefficients_of_their_degrees() {
+    let scene = GaussianScene::from(coded_scene(40, 3, 0));
+    let parts = Parts::of(&pack(&scene));
+    assert!(read(&parts.seal()).expect("as it was written") == scene, "the same scene");
+    // Seventeen coefficients for sixteen, in sections of the right length: thirteen words in place of twelve.
+    let parts = parts.swap("coefficients: 16", "coefficients: 17");
+    let parts = put(parts, "codebooks", 10, &[0; 10 * 13 * 4]);
+    let parts = put(parts, "codebook_scales", 2 * 13, &[0; 2 * 13 * 16]);
+    let message = refusal(&parts.seal()).to_string();
+    assert!(message.contains("`codebooks`") && message.contains("17") && message.contains("16"), "{message}");
+}
+
+#[test]
+fn codebooks_have_no_more_entries_than_codes() {
+    let parts = Parts::of(&pack(&GaussianScene::from(coded_scene(40, 1, 0))));
+    let parts = parts.swap("codebooks: Some((5, 5, 0, 0))", "codebooks: Some((65537, 5, 0, 0))");
+    let parts = put(parts, "codebooks", 65542, &vec![0; 65542 * 3 * 4]);
+    let error = refusal(&parts.seal());
+    assert!(matches!(error, PackageError::Inconsistent(_)), "{error}");
+}
+
+#[test]
+fn environment_maps_are_finite() {
+    let scene = scene(&Shape { environment: Some((2, 3)), ..SMALL }, 21);
+    let file = put(Parts::of(&pack(&scene)), "environment", 18, &[0xff; 72]).seal();
+    let message = read(&file).expect_err("not a number, eighteen times").to_string();
+    assert!(message.contains("environment"), "{message}");
+    let mut bad = scene;
+    bad.environment.as_mut().expect("a map").texels[4] = f32::INFINITY;
+    let error = package::write(Vec::new(), &bad, &WriteSettings::default()).expect_err("nor is such a map written");
+    assert!(matches!(error, PackageError::Inconsistent(_)), "{error}");
+}
+
+#[test]
+fn a_still_lasts_no_time() {
+    let mut still = scene(&SMALL, 22);
+    still.playback.duration_seconds = 0.0;
+    let read = read(&pack(&still)).expect("a package just written can be read");
+    assert_eq!(read.playback.duration_seconds, 0.0, "as it was written");
+}
+
+#[test]
+fn names_from_the_file_are_shown_escaped() {
+    let parts = Parts::of(&pack(&scene(&SMALL, 23)));
+    let name = r#""\u{1b}[2Jfake\nerror""#;
+    let section = format!("(name: {name}, encoding: \"y\", first: 0, count: 0, length: 0, raw_length: 0, crc32: 1)");
+    let mut unknown = parts.clone().swap("(name: \"sh_dc\",", &format!("{section}, (name: \"sh_dc\","));
+    unknown.bodies.insert(7, Vec::new());
+    let files = [
+        parts.clone().swap("requires: []", &format!("requires: [{name}]")),
+        parts.clone().swap("\"f32-planes-zstd\"", name),
+        parts.swap("model: Rotated4d", "model: r#\u{1b}"),
+        unknown,
+    ];
+    for parts in files {
+        let message = read(&parts.seal()).expect_err("must be refused").to_string();
+        assert!(!message.contains(['\u{1b}', '\n']), "nothing that a terminal obeys: {message:?}");
+    }
 }
 
 #[test]
@@ -465,11 +533,16 @@ fn senseless_switches_are_refused() {
         ("prefilter_var: -1.0", "prefilter_var: inf"),
         ("background: (1.0, ", "background: (NaN, "),
         ("duration_seconds: 0.", "duration_seconds: -0."),
+        ("time_interval: (-0.1, 2.7)", "time_interval: (-3e38, 3e38)"),
+        ("spatial_lr_scale: 1.", "spatial_lr_scale: -1."),
         ("degree: 0", "degree: 4"),
-        ("degree: 0", "degree: 1"),
     ] {
         let error = refusal(&parts.clone().swap(from, to).seal());
         assert!(matches!(error, PackageError::Inconsistent(_)), "{to}: {error}");
+    }
+    for (from, to) in [("degree: 0", "degree: 1"), ("coefficients: 2", "coefficients: 0")] {
+        let error = refusal(&parts.clone().swap(from, to).seal());
+        assert!(matches!(error, PackageError::Coefficients { .. }), "{to}: {error}");
     }
     let error = refusal(&parts.swap("gaussians: 3", "gaussians: -3").seal());
     assert!(matches!(error, PackageError::Header(_)), "a negative count: {error}");

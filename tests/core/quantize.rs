@@ -8,13 +8,14 @@ use crate::support::packed_scene::{BLACK, scene, settings, view};
 use bevy_gs4d::codec::checkpoint::CheckpointOptions;
 use bevy_gs4d::codec::{self, package};
 use bevy_gs4d::gaussian::Gaussian;
+use bevy_gs4d::offline::convert::{ConvertSettings, TargetForm, convert};
 use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions};
 use bevy_gs4d::offline::metrics::psnr_pooled;
 use bevy_gs4d::offline::quantize::order::morton_order;
 use bevy_gs4d::offline::quantize::{CompressError, CompressSettings, Quality, compress};
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::packed::encode::Bits;
-use bevy_gs4d::scene::{FilterKind, Form, GaussianScene, RuntimeScene, SceneForm, TemporalFilter};
+use bevy_gs4d::scene::{FilterKind, Form, GaussianScene, RuntimeScene, SceneForm, Sliced, TemporalFilter};
 use bevy_gs4d::view::{RasterFov, View};
 use glam::Vec3;
 use std::io::Cursor;
@@ -191,6 +192,24 @@ fn steps_of_any_size_leave_colors_finite() {
         let (packed, _) = compress(scene.clone(), &settings).expect("it is compressed");
         packed.into_runtime().unwrap_or_else(|error| panic!("a step of {color_step}: {error}"));
     }
+}
+
+#[test]
+fn degrees_of_coded_colours_can_be_lowered() {
+    let (packed, _) = compress(scene(500, 3, 2), &settings(&[16, 16])).expect("it is compressed");
+    let lowered = |degree, degree_t| {
+        let settings = ConvertSettings { form: None, sh_degree: degree, sh_degree_t: degree_t };
+        convert(packed.clone(), &settings).expect("it is converted")
+    };
+    assert!(lowered(None, None) == packed, "nothing is asked for, nothing is lost");
+    for (degree, degree_t, coefficients) in [(Some(0), None, 1), (Some(2), None, 9), (None, Some(1), 32)] {
+        let converted = lowered(degree, degree_t);
+        assert_eq!(converted.form.color_degrees().coefficients, coefficients, "{degree:?} and {degree_t:?}");
+        assert!(pack(&converted).len() < pack(&packed).len(), "{degree:?} and {degree_t:?}: the package is smaller");
+    }
+    let runtime = ConvertSettings { form: Some(TargetForm::Runtime), ..ConvertSettings::default() };
+    let degrees = convert(lowered(Some(1), None), &runtime).expect("it can be unpacked").form.color_degrees();
+    assert_eq!((degrees.degree, degrees.coefficients), (1, 4), "what was lowered stays low");
 }
 
 #[test]

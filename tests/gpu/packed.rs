@@ -6,6 +6,8 @@ use crate::support::gpu;
 use crate::support::packed_scene::{BLACK, scene, settings, view};
 use bevy_gs4d::offline::quantize::compress;
 use bevy_gs4d::reference;
+use bevy_gs4d::renderer::GpuError;
+use bevy_gs4d::scene::{CodedColors, Form, PackedColors, PackedScene};
 
 #[test]
 fn the_gpu_reads_the_packed_form_as_the_cpu_does() {
@@ -25,5 +27,30 @@ fn the_gpu_reads_the_packed_form_as_the_cpu_does() {
             assert!(far <= 20, "degree {degree} and {degree_t}, {codebooks:?}, at {time}: {far} pixels differ");
             assert!(found.counts.visible > 500, "something is seen");
         }
+    }
+}
+
+fn coded(packed: &mut PackedScene, spoil: impl FnOnce(&mut CodedColors)) {
+    let PackedColors::Coded(colors) = &mut packed.colors else { panic!("its colors are coded") };
+    spoil(colors);
+}
+
+#[test]
+fn scenes_that_would_be_read_beyond_their_parts_are_not_uploaded() {
+    let Some(headless) = gpu::headless() else { return };
+    let (packed, _) = compress(scene(600, 2, 0), &settings(&[16, 8])).expect("it is compressed");
+    let good = packed.into_runtime().expect("drawable");
+    assert!(headless.upload(&good).is_ok(), "the scene that is spoilt below");
+    let spoils: [fn(&mut PackedScene); 4] = [
+        |packed| packed.ranges.truncate(4),
+        |packed| packed.records.truncate(256),
+        |packed| coded(packed, |colors| colors.records[599][1] |= 0xffff),
+        |packed| coded(packed, |colors| colors.codebooks.truncate(7)),
+    ];
+    for (index, spoil) in spoils.into_iter().enumerate() {
+        let mut bad = good.clone();
+        let Form::Packed(packed) = &mut bad.form else { panic!("it is packed") };
+        spoil(packed);
+        assert!(matches!(headless.upload(&bad), Err(GpuError::Scene(_))), "scene {index} is refused");
     }
 }

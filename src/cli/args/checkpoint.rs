@@ -46,9 +46,9 @@ pub struct CheckpointArgs {
     /// Axis that points up; also instead of a package's own [default: +z].
     #[arg(long, value_name = "AXIS", value_parser = values::one_of(&UP_AXES), allow_hyphen_values = true)]
     up: Option<UpAxis>,
-    /// Seconds of one pass through the time interval at speed 1; also instead of a package's own [default: the interval's
-    /// length].
-    #[arg(long, value_name = "SECONDS", value_parser = values::positive)]
+    /// Seconds of one pass through the time interval at speed 1, 0 for a still; also instead of a package's own [default: the
+    /// interval's length].
+    #[arg(long, value_name = "SECONDS", value_parser = values::seconds)]
     duration: Option<f32>,
 }
 

@@ -36,6 +36,11 @@ pub fn positive(text: &str) -> Result<f32, String> {
     number(text).ok().filter(|v| *v > 0.0).ok_or_else(|| "expected a number above zero".to_owned())
 }
 
+/// Parses a finite number of seconds, not below zero.
+pub fn seconds(text: &str) -> Result<f32, String> {
+    number(text).ok().filter(|v| *v >= 0.0).ok_or_else(|| "expected a number of seconds, zero or above".to_owned())
+}
+
 /// Parses a share, 0 to 1.
 pub fn share(text: &str) -> Result<f64, String> {
     let share = text.trim().parse::<f64>().ok().filter(|share| (0.0..=1.0).contains(share));
@@ -106,5 +111,6 @@ mod tests {
         assert!(step("-1").is_err() && step("1e308").is_err(), "in single precision and not below zero");
         assert!(interval("1,1").is_err(), "an interval has a length");
         assert!(positive("0").is_err(), "zero is not above zero");
+        assert!(seconds("0").is_ok() && seconds("-1").is_err() && seconds("nan").is_err(), "a still has no seconds");
     }
 }

@@ -5,6 +5,7 @@
 
 use super::error::CheckpointError;
 use super::tensor::Tensor;
+use crate::codec::text;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use zip::read::{ArchiveOffset, Config};
 use zip::{CompressionMethod, ZipArchive};
@@ -227,7 +228,7 @@ fn read_values(reader: &mut impl BufRead, values: &mut [f32]) -> io::Result<()> 
     Ok(())
 }
 
-/// Returns a name from the file in a form that can be shown: short, without control characters.
+/// Returns a name from the file in a form that can be shown.
 fn printable(name: &[u8]) -> String {
-    String::from_utf8_lossy(name).chars().take(120).flat_map(char::escape_debug).collect()
+    text::printable(&String::from_utf8_lossy(name))
 }

@@ -35,8 +35,8 @@ pub struct CheckpointOptions {
     pub prefilter_var: Option<f32>,
     /// The axis that points up. Default: +Z.
     pub up: Option<UpAxis>,
-    /// Seconds of one pass through the time interval. Default: the length of the interval, as if its unit were the
-    /// second.
+    /// Seconds of one pass through the time interval; 0 for a still. Default: the length of the interval, as if its unit
+    /// were the second.
     pub duration_seconds: Option<f32>,
 }
 
@@ -52,7 +52,7 @@ impl CheckpointOptions {
     /// Checks the values given.
     ///
     /// # Errors
-    /// The first invalid value: a time interval or duration that is not positive, a number that is not finite.
+    /// The first invalid value: a time interval that is not positive, a negative duration, a number that is not finite.
     pub fn check(&self) -> Result<(), CheckpointError> {
         let refuse = |name, reason: String| Err(CheckpointError::Option { name, reason });
         if let Some([first, last]) = self.time_interval
@@ -71,9 +71,9 @@ impl CheckpointOptions {
             return refuse("prefilter variance", format!("{variance} is not finite"));
         }
         if let Some(seconds) = self.duration_seconds
-            && !(seconds.is_finite() && seconds > 0.0)
+            && !(seconds.is_finite() && seconds >= 0.0)
         {
-            return refuse("duration", format!("{seconds} is not a positive number of seconds"));
+            return refuse("duration", format!("{seconds} is not a number of seconds, zero or above"));
         }
         Ok(())
     }

@@ -9,6 +9,7 @@
 
 use super::error::CheckpointError;
 use super::tensor::{Storage, Tensor};
+use crate::codec::text::printable;
 use std::collections::HashMap;
 
 /// Index of a value in a [`Pickle`].
@@ -302,10 +303,8 @@ impl<'a> Machine<'a> {
     fn global(&mut self) -> Result<Global, CheckpointError> {
         let (module, name) = (self.line()?, self.line()?);
         Global::of(module, name).ok_or_else(|| {
-            // The name comes from the file: nothing in it may reach a terminal as it is.
             let name = format!("{} {}", String::from_utf8_lossy(module), String::from_utf8_lossy(name));
-            let name = name.chars().take(120).flat_map(char::escape_debug).collect();
-            CheckpointError::Global { offset: self.opcode_at, name }
+            CheckpointError::Global { offset: self.opcode_at, name: printable(&name) }
         })
     }
 

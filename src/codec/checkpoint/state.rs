@@ -78,12 +78,18 @@ impl<'p> Slots<'p> {
         }
     }
 
-    fn float(&self, index: usize, name: &'static str) -> Result<f64, CheckpointError> {
-        match *self.value(index) {
-            Value::Float(value) if value.is_finite() => Ok(value),
-            Value::Int(value) => Ok(value as f64),
-            _ => Err(self.error(index, name, "a finite number")),
+    /// Returns a finite number that is not negative.
+    fn extent(&self, index: usize, name: &'static str) -> Result<f64, CheckpointError> {
+        let value = match *self.value(index) {
+            Value::Float(value) if value.is_finite() => value,
+            Value::Int(value) => value as f64,
+            _ => return Err(self.error(index, name, "a finite number")),
+        };
+        if value < 0.0 {
+            let reason = format!("slot {index} ({name}) is {value}, expected a number that is not negative");
+            return Err(CheckpointError::Layout(reason));
         }
+        Ok(value)
     }
 
     fn flag(&self, index: usize, name: &'static str) -> Result<bool, CheckpointError> {
@@ -132,7 +138,7 @@ impl<'p> State<'p> {
             degree: slots.degree(0, "active_sh_degree", 3, "an int from 0 to 3")?,
             degree_t: if moving { slots.degree(18, "active_sh_degree_t", 2, "an int from 0 to 2")? } else { 0 },
             iteration,
-            spatial_lr_scale: slots.float(if moving { 12 } else { 11 }, "spatial_lr_scale")?,
+            spatial_lr_scale: slots.extent(if moving { 12 } else { 11 }, "spatial_lr_scale")?,
             mean,
             features_dc: slots.tensor(2, "_features_dc")?,
             features_rest: slots.tensor(3, "_features_rest")?,

@@ -3,6 +3,8 @@
 //! In: a problem found by the reader or writer. Out: a [`PackageError`], whose message names the problem and what
 //! helps.
 
+use crate::codec::text::printable;
+
 /// Why a package cannot be read or written. [`CodecError`](crate::codec::CodecError) adds the path.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -44,10 +46,10 @@ pub enum PackageError {
     #[error("the header is damaged (its checksum does not hold); copy or download the package again")]
     HeaderChecksum,
     /// The header is intact but cannot be parsed.
-    #[error("the header cannot be understood: {0}")]
+    #[error("the header cannot be understood: {}", printable(.0))]
     Header(String),
     /// The package requires a feature that this reader does not know.
-    #[error("made by a newer gs4d: it needs the feature `{name}`; update this one")]
+    #[error("made by a newer gs4d: it needs the feature `{}`; update this one", printable(.name))]
     UnknownFeature {
         /// Name in the header's list of requirements.
         name: String,
@@ -55,10 +57,35 @@ pub enum PackageError {
     /// Numbers of the header, or parts of a scene to be written, that contradict each other or are invalid.
     #[error("{0}")]
     Inconsistent(&'static str),
+    /// A section of color has another number of coefficients than the degrees need.
+    #[error(
+        "section `{section}` has {found} colour coefficients, and degree {degree} with time degree {degree_t} needs \
+         {needed}: damaged, or not written by gs4d"
+    )]
+    Coefficients {
+        /// Name of the section.
+        section: &'static str,
+        /// Coefficients per channel in the header.
+        found: usize,
+        /// Coefficients that the degrees need.
+        needed: usize,
+        /// Spatial degree in the header.
+        degree: u32,
+        /// Time degree in the header.
+        degree_t: u32,
+    },
+    /// More sections than any scene is divided into.
+    #[error("{found} sections are more than the {limit} allowed: the package is damaged, or not written by gs4d")]
+    TooManySections {
+        /// Number of sections in the header.
+        found: usize,
+        /// Number allowed.
+        limit: usize,
+    },
     /// The scene is far larger than the file could hold.
-    #[error("{raw} bytes of scene in a package that may hold {limit}: damaged, or a decompression bomb")]
+    #[error("{raw} bytes to unpack from a package that may take {limit}: damaged, or a decompression bomb")]
     TooLarge {
-        /// Bytes of the scene that the header describes.
+        /// Bytes of the scene that the header describes, with its largest section decompressed beside it.
         raw: u64,
         /// Bytes allowed for a file of this length.
         limit: u64,
@@ -82,7 +109,7 @@ pub enum PackageError {
         expected: usize,
     },
     /// A section is encoded in a way that this reader does not know.
-    #[error("section `{name}` is encoded as `{encoding}`, which is not known here: update this gs4d")]
+    #[error("section `{name}` is encoded as `{}`, which is not known here: update this gs4d", printable(.encoding))]
     UnknownEncoding {
         /// Name of the attribute.
         name: String,
@@ -90,7 +117,10 @@ pub enum PackageError {
         encoding: String,
     },
     /// A length of a section is wrong.
-    #[error("section `{name}` is damaged: a length of {found} bytes is given where it must be {expected}")]
+    #[error(
+        "section `{}` is damaged: a length of {found} bytes is given where it must be {expected}",
+        printable(.name)
+    )]
     SectionLength {
         /// Name of the section.
         name: String,
@@ -100,7 +130,10 @@ pub enum PackageError {
         found: u64,
     },
     /// The checksum of a section is wrong.
-    #[error("section `{name}` is damaged (its checksum does not hold); copy or download the package again")]
+    #[error(
+        "section `{}` is damaged (its checksum does not hold); copy or download the package again",
+        printable(.name)
+    )]
     SectionChecksum {
         /// Name of the section.
         name: String,

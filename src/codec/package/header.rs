@@ -4,8 +4,9 @@
 //! against the length of the file, so that the code that follows can rely on them.
 
 use super::{PackageError, Section};
-use crate::gaussian::{Harmonics, Model};
-use crate::scene::packed::MAX_STAGES;
+use crate::gaussian::Model;
+use crate::gaussian::harmonics::{MAX_COEFFICIENTS, evaluated};
+use crate::scene::packed::{MAX_ENTRIES, MAX_STAGES};
 use crate::scene::{
     ActiveSets, ColorDegrees, FilterKind, Form, GaussianScene, MAX_SEGMENTS, PackedColors, PlaybackHints, SceneForm,
     Trained, TrainedWith,
@@ -17,6 +18,9 @@ const RAW_FLOOR: u64 = 64 << 20;
 
 /// Further uncompressed bytes allowed for each byte of the file. Trained captures need 1.2.
 const RAW_PER_BYTE: u64 = 256;
+
+/// Most sections that are read. The writer makes fewer of a hundred million Gaussians.
+const MAX_SECTIONS: usize = 1 << 16;
 
 /// The header of a package. Fields that a reader does not know are ignored.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -146,6 +150,7 @@ impl Header {
         };
         header.check_numbers()?;
         header.check_scene(scene)?;
+        scene.check().map_err(PackageError::Inconsistent)?;
         Ok(header)
     }
 
@@ -181,14 +186,21 @@ impl Header {
         if expected < file_length {
             return Err(PackageError::TrailingBytes { count: file_length - expected });
         }
+        let found = self.sections.len();
+        if found > MAX_SECTIONS {
+            return Err(PackageError::TooManySections { found, limit: MAX_SECTIONS });
+        }
         self.check_numbers()?;
         let attributes = self.attributes();
-        let raw = attributes.iter().fold(0u64, |sum, a| sum.saturating_add(a.raw_length(a.rows)));
         let limit = RAW_PER_BYTE.saturating_mul(file_length).saturating_add(RAW_FLOOR).min(isize::MAX as u64);
-        if raw > limit {
-            return Err(PackageError::TooLarge { raw, limit });
-        }
-        attributes.iter().try_for_each(|attribute| attribute.check_sections(&self.sections))
+        let within = |raw: u64| if raw > limit { Err(PackageError::TooLarge { raw, limit }) } else { Ok(()) };
+        let scene = attributes.iter().fold(0u64, |sum, attribute| sum.saturating_add(attribute.memory()));
+        within(scene)?;
+        attributes.iter().try_for_each(|attribute| attribute.check_sections(&self.sections))?;
+        // Beside the scene, one section at a time is decompressed.
+        let decoded = self.sections.iter().filter(|s| attributes.iter().any(|attribute| attribute.name == s.name));
+        let largest = decoded.map(|section| section.raw_length as u64).max().unwrap_or_default();
+        within(scene.saturating_add(largest))
     }
 
     /// Checks the numbers, without the sections.
@@ -198,32 +210,50 @@ impl Header {
         let sane = |condition: bool, otherwise: &'static str| {
             if condition { Ok(()) } else { Err(PackageError::Inconsistent(otherwise)) }
         };
-        // For no Gaussians, the harmonics are consistent if their degrees are.
-        let color = Harmonics {
-            coefficients: self.coefficients,
-            degree: self.degree,
-            degree_t: self.degree_t,
-            values: Vec::new(),
-        };
-        sane(color.is_consistent(0), "the degrees of the colour do not fit its number of coefficients")?;
+        self.check_color()?;
         sane(
             self.environment.is_none_or(|e| e.width.checked_mul(e.height).is_some_and(|texels| texels > 0)),
             "an environment map with no texels, or far too many",
         )?;
         sane(
-            first.is_finite() && last.is_finite() && first < last,
-            "the time interval must be two finite numbers, the first below the second",
+            first.is_finite() && first < last && (last - first).is_finite(),
+            "the time interval must be two finite numbers, the first below the second, and not infinitely far apart",
         )?;
         sane(trained.background.iter().all(|c| c.is_finite()), "a background colour that is not finite")?;
         sane(
             trained.prefilter_var.is_finite() && trained.spatial_lr_scale.is_finite(),
             "a switch of training (prefilter_var or spatial_lr_scale) that is not finite",
         )?;
+        sane(trained.spatial_lr_scale >= 0.0, "a switch of training (spatial_lr_scale) that is negative")?;
         sane(
             self.filter.is_none_or(|filter| (1..=MAX_SEGMENTS).contains(&filter.segments)),
             "a temporal filter of no segments, or far too many",
         )?;
         let duration = self.playback.duration_seconds;
-        sane(duration.is_finite() && duration > 0.0, "the playback duration must be a finite number above zero")
+        sane(duration.is_finite() && duration >= 0.0, "the playback duration must be a finite number, zero or above")
+    }
+
+    /// Checks the numbers of color: degrees that exist, and as many coefficients as they need. In codebooks there are
+    /// no others.
+    fn check_color(&self) -> Result<(), PackageError> {
+        let (found, degree, degree_t) = (self.coefficients, self.degree, self.degree_t);
+        if degree > 3 || degree_t > 2 || found > MAX_COEFFICIENTS {
+            return Err(PackageError::Inconsistent(
+                "colour must have a degree of 0 to 3, a time degree of 0 to 2 and at most 48 coefficients",
+            ));
+        }
+        let needed = evaluated(degree, degree_t);
+        let refused = |section| Err(PackageError::Coefficients { section, found, needed, degree, degree_t });
+        match self.form {
+            StoredForm::Packed { codebooks: Some(entries) } => {
+                if entries.iter().any(|&entries| entries > MAX_ENTRIES) {
+                    return Err(PackageError::Inconsistent("section `codebooks` has more entries than 16-bit codes"));
+                }
+                if found == needed { Ok(()) } else { refused("codebooks") }
+            }
+            StoredForm::Trained { .. } | StoredForm::Sliced | StoredForm::Packed { codebooks: None } => {
+                if found >= needed { Ok(()) } else { refused(if found == 0 { "sh_dc" } else { "sh_rest" }) }
+            }
+        }
     }
 }

@@ -29,6 +29,11 @@ pub(super) struct Attribute {
 }
 
 impl Attribute {
+    /// Returns the bytes of its table in memory, which count with the first of the attributes that share it.
+    pub fn memory(&self) -> u64 {
+        if self.offset > 0 { 0 } else { (self.rows as u64).saturating_mul(self.stride as u64).saturating_mul(4) }
+    }
+
     /// Returns the uncompressed bytes of `rows` rows.
     pub fn raw_length(&self, rows: usize) -> u64 {
         (rows as u64).saturating_mul(self.width as u64 * 4)

@@ -23,7 +23,7 @@ pub use section::{FLOAT_PLANES, Section};
 use super::CodecErrorKind;
 use super::checkpoint::CheckpointOptions;
 use super::format::Format;
-use crate::scene::{Form, GaussianScene, SceneForm};
+use crate::scene::GaussianScene;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::fs::File;
@@ -118,8 +118,8 @@ pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSet
 /// Reads a scene from a reader that contains a package and nothing else. All checksums are verified, also those of
 /// unknown sections.
 ///
-/// Besides the scene, one section is in memory at a time, compressed and decompressed. Values are not checked here;
-/// [`GaussianScene::into_runtime`] checks whether every Gaussian can be drawn.
+/// Besides the scene, one section at a time is in memory, compressed and decompressed. The parts of the scene fit together
+/// ([`GaussianScene::check`]); whether every Gaussian can be drawn, [`GaussianScene::into_runtime`] checks.
 ///
 /// # Errors
 /// One [`PackageError`] for each kind of damage.
@@ -128,6 +128,8 @@ pub fn read<R: Read + Seek>(reader: R) -> Result<GaussianScene, PackageError> {
     let (header, _) = envelope::read(&mut reader)?;
     let attributes = header.attributes();
     let mut scene = layout::blank(&header);
+    // Values go where the header says: the tables must be of that size.
+    header.check_scene(&scene)?;
     let (mut body, mut planes) = (Vec::new(), Vec::new());
     for section in &header.sections {
         section.read_body(&mut reader, &mut body)?;
@@ -135,9 +137,7 @@ pub fn read<R: Read + Seek>(reader: R) -> Result<GaussianScene, PackageError> {
             section.decode(&body, attribute, &mut planes, layout::words_mut(&mut scene, attribute.name))?;
         }
     }
-    if let SceneForm::Ready(Form::Packed(packed)) = &scene.form {
-        packed.check().map_err(PackageError::Inconsistent)?;
-    }
+    scene.check().map_err(PackageError::Inconsistent)?;
     Ok(scene)
 }
 

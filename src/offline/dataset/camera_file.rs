@@ -12,9 +12,10 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::lens::{LensEntries, OriginalLens, checked_size, reduced};
-use super::view::image_size;
 use super::{DatasetError, FrameProblem, MAX_SIDE, Split, TrainingView};
-use crate::view::Camera;
+use crate::codec::text::is_obeyed;
+use crate::offline::picture_file;
+use crate::view::{Camera, RasterFov};
 
 /// Below this share of the product of its columns' lengths, a determinant counts as zero.
 const SINGULAR: f64 = 1e-9;
@@ -156,8 +157,8 @@ impl CameraFile {
     /// nothing else gives the size.
     fn probe_size(&self, options: &CameraOptions) -> Result<Option<UVec2>, DatasetError> {
         let found = self.images().find(|path| path.is_file()).or_else(|| self.sibling_image());
-        match found.map(|path| image_size(&path)) {
-            Some(Err(error)) if options.size.is_none() => Err(error),
+        match found.map(|path| picture_file::size(&path, UVec2::splat(MAX_SIDE))) {
+            Some(Err(error)) if options.size.is_none() => Err(error.into()),
             size => Ok(size.and_then(Result::ok)),
         }
     }
@@ -205,12 +206,21 @@ impl CameraFile {
         };
         let lens = frame.lens.scaled(original, divisor).map_err(|problem| self.frame_error(index, problem))?;
         let file = with_image_extension(&frame.file);
-        let name = output_name(&file, index, names)
-            .ok_or_else(|| self.frame_error(index, FrameProblem::FileName(frame.file)))?;
+        let unnamed = |path: &str| self.frame_error(index, FrameProblem::FileName(path.to_owned()));
+        let name = output_name(&file, index, names).ok_or_else(|| unnamed(&frame.file))?;
+        if let Some(mask) = frame.mask.as_deref().filter(|mask| mask.contains(is_obeyed)) {
+            return Err(unnamed(mask));
+        }
+        let camera = Camera { world_to_camera: frame.world_to_camera, size, lens };
+        let is_finite = |fov| camera.view(frame.time, fov).is_finite();
+        if ![RasterFov::Reference, RasterFov::Corrected].into_iter().all(is_finite) {
+            return Err(self.frame_error(index, FrameProblem::Projection(name)));
+        }
         Ok(TrainingView {
             name,
-            camera: Camera { world_to_camera: frame.world_to_camera, size, lens },
+            camera,
             time: frame.time,
+            original,
             image: self.folder().join(file),
             mask: frame.mask.map(|mask| self.folder().join(with_image_extension(&mask))),
         })
@@ -300,8 +310,12 @@ fn with_image_extension(file: &str) -> String {
     if known { file.to_owned() } else { format!("{file}.png") }
 }
 
-/// Returns the stem of an image path, made unique with the index of the frame; `None` if it is not a plain file name.
+/// Returns the stem of an image path, made unique with the index of the frame; `None` if it is not a plain file name, or
+/// the path has characters that a terminal obeys: it is shown in reports and errors.
 fn output_name(file: &str, index: usize, taken: &mut HashSet<String>) -> Option<String> {
+    if file.contains(is_obeyed) {
+        return None;
+    }
     let path = Path::new(file);
     let stem = path.extension().and(path.file_stem())?.to_str()?;
     if Path::new(stem).file_name()? != stem {
@@ -334,6 +348,7 @@ mod tests {
         assert_eq!(output_name("y/c04_f00.png", 2, &mut taken).as_deref(), Some("c04_f00-2"), "a repeated stem");
         assert_eq!(output_name("...png", 3, &mut taken), None, "would leave the folder");
         assert_eq!(output_name(".png", 4, &mut taken), None, "an empty path");
+        assert_eq!(output_name("a\u{1b}[2J/b.png", 5, &mut taken), None, "would clear the terminal");
     }
 
     #[test]

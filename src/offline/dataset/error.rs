@@ -9,6 +9,7 @@ use std::{fmt, io};
 use glam::UVec2;
 
 use super::MAX_SIDE;
+use crate::offline::picture_file::PictureError;
 
 /// A dataset, a camera file or an image that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -116,14 +117,9 @@ pub enum DatasetError {
         /// How many were looked for.
         total: usize,
     },
-    /// An image cannot be decoded.
-    #[error("{}: not a readable PNG or JPEG image: {reason}", .path.display())]
-    Image {
-        /// The image.
-        path: PathBuf,
-        /// The error of the decoder.
-        reason: image::ImageError,
-    },
+    /// An image cannot be decoded, or is larger than the camera file says.
+    #[error(transparent)]
+    Image(#[from] PictureError),
 }
 
 /// What is wrong with one frame of a camera file.
@@ -132,8 +128,8 @@ pub enum FrameProblem {
     /// An entry is missing or has the wrong type.
     #[error("{0}")]
     Malformed(serde_json::Error),
-    /// The image path names no file.
-    #[error("the image path {0:?} names no file")]
+    /// The path of the image or of its mask names no file, or has control characters.
+    #[error("the image path {0:?} names no file, or has control characters")]
     FileName(String),
     /// The time does not fit a float32.
     #[error("the time {0:?} is not a usable number")]
@@ -150,6 +146,12 @@ pub enum FrameProblem {
     /// The values of the lens are not those of a camera.
     #[error("the lens cannot be used: focal lengths must be above 0 and every value finite (in float32)")]
     Lens,
+    /// A number that follows from the lens and the pose is not finite.
+    #[error(
+        "the projection of camera {0:?} is not finite: check its focal lengths and principal point, or its field of view, \
+         and its matrix"
+    )]
+    Projection(String),
     /// The picture size is out of range.
     #[error("pictures of {width}x{height} pixels cannot be made: each side must be a whole number, 1 to {MAX_SIDE}")]
     Size {

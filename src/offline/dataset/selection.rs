@@ -87,6 +87,7 @@ mod tests {
             name: index.to_string(),
             camera: camera(index / 30),
             time: (index % 30) as f32 / 29.0,
+            original: UVec2::splat(8),
             image: "none.png".into(),
             mask: None,
         };

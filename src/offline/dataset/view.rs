@@ -6,10 +6,15 @@
 use std::path::{Path, PathBuf};
 
 use glam::{UVec2, Vec3};
-use image::{DynamicImage, ImageReader, Limits, RgbaImage};
+use image::{DynamicImage, RgbaImage};
 
 use super::{DatasetError, MAX_SIDE, require_files, resample};
+use crate::offline::picture_file;
 use crate::view::{Camera, Picture};
+
+/// How many times as wide and as high as the camera file says an image may be: it is scaled to the camera's size, and
+/// camera files made for smaller images are used with the originals.
+const LARGER: u32 = 4;
 
 /// A camera at one time, and the path of the image taken there.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,6 +26,9 @@ pub struct TrainingView {
     pub camera: Camera,
     /// Timestamp, in the capture's unit.
     pub time: f32,
+    /// Size of the image as the camera file, or else the first image, says, pixels. An image with a side of more than four
+    /// times that is not decoded.
+    pub original: UVec2,
     /// Path of the image, which may not exist.
     pub image: PathBuf,
     /// Path of the coverage as an 8-bit grey image, which has been multiplied into the image already; `None` if the
@@ -79,12 +87,12 @@ impl TrainingView {
             return Err(DatasetError::Size { size });
         }
         require_files([Some(&self.image), self.mask.as_ref()].into_iter().flatten())?;
-        let image = decode(&self.image)?.into_rgba8();
+        let image = self.decode(&self.image)?.into_rgba8();
         let from = UVec2::new(image.width(), image.height());
         let colors = resample::resize(composited(&image, [0.0; 3], false), 3, from, size);
         let coverage = match &self.mask {
             Some(mask) => {
-                let mask = decode(mask)?.into_luma8();
+                let mask = self.decode(mask)?.into_luma8();
                 let from = UVec2::new(mask.width(), mask.height());
                 resample::resize(mask.into_raw(), 1, from, size)
             }
@@ -103,40 +111,28 @@ impl TrainingView {
     ///
     /// # Errors
     /// [`DatasetError::MissingImages`] if the image or the mask is not on disk, [`DatasetError::Image`] if one cannot
-    /// be decoded, [`DatasetError::Size`] if the size of the camera is out of range.
+    /// be decoded, is not whole or is far larger than [`original`](Self::original), [`DatasetError::Size`] if the size of
+    /// the camera is out of range.
     pub fn load_image(&self, background: [f32; 3], mode: ImageMode) -> Result<TrainingImage, DatasetError> {
         let size = self.camera.size;
         if size.min_element() == 0 || size.max_element() > MAX_SIDE {
             return Err(DatasetError::Size { size });
         }
         require_files([Some(&self.image), self.mask.as_ref()].into_iter().flatten())?;
-        let mut image = resampled(&decode(&self.image)?.into_rgba8(), background, mode, size);
+        let mut image = resampled(&self.decode(&self.image)?.into_rgba8(), background, mode, size);
         if let Some(mask) = &self.mask {
-            image.alpha = Some(load_mask(mask, size)?);
+            let mask = self.decode(mask)?.into_luma8();
+            let from = UVec2::new(mask.width(), mask.height());
+            image.alpha = Some(resample::resize(mask.into_raw(), 1, from, size).into_iter().map(unit).collect());
         }
         Ok(image)
     }
-}
 
-/// Returns width and height of an image, from its header.
-pub(super) fn image_size(path: &Path) -> Result<UVec2, DatasetError> {
-    let size = reader(path).and_then(ImageReader::into_dimensions);
-    size.map(UVec2::from).map_err(|reason| DatasetError::Image { path: path.to_owned(), reason })
-}
-
-fn decode(path: &Path) -> Result<DynamicImage, DatasetError> {
-    let image = reader(path).and_then(ImageReader::decode);
-    image.map_err(|reason| DatasetError::Image { path: path.to_owned(), reason })
-}
-
-/// Returns a reader that detects the format by the contents of the file, not by its name, and refuses huge images.
-fn reader(path: &Path) -> image::ImageResult<ImageReader<std::io::BufReader<std::fs::File>>> {
-    let mut limits = Limits::default();
-    limits.max_image_width = Some(MAX_SIDE);
-    limits.max_image_height = Some(MAX_SIDE);
-    let mut reader = ImageReader::open(path)?.with_guessed_format()?;
-    reader.limits(limits);
-    Ok(reader)
+    /// Decodes the image or the mask.
+    fn decode(&self, path: &Path) -> Result<DynamicImage, DatasetError> {
+        let largest = self.original.saturating_mul(UVec2::splat(LARGER)).min(UVec2::splat(MAX_SIDE));
+        Ok(picture_file::open(path, largest)?)
+    }
 }
 
 fn resampled(image: &RgbaImage, background: [f32; 3], mode: ImageMode, size: UVec2) -> TrainingImage {
@@ -170,12 +166,6 @@ fn composited(image: &RgbaImage, background: [f32; 3], keep_alpha: bool) -> Vec<
         }
     }
     bytes
-}
-
-fn load_mask(path: &Path, size: UVec2) -> Result<Vec<f32>, DatasetError> {
-    let mask = decode(path)?.into_luma8();
-    let from = UVec2::new(mask.width(), mask.height());
-    Ok(resample::resize(mask.into_raw(), 1, from, size).into_iter().map(unit).collect())
 }
 
 fn unit(byte: u8) -> f32 {

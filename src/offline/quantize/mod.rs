@@ -199,11 +199,10 @@ fn compress_by(
 
 /// Rounds coefficients to multiples of `step`, if it is positive. Those whose multiple single precision cannot hold stay as they are.
 fn rounded(mut harmonics: Harmonics, step: f32) -> Harmonics {
+    let multiple = |value: f32| (value / step).round() * step;
     if step > 0.0 {
-        for value in &mut harmonics.values {
-            let multiple = (*value / step).round() * step;
-            *value = if multiple.is_finite() { multiple } else { *value };
-        }
+        let coarse = harmonics.values.iter_mut().filter(|value| multiple(**value).is_finite());
+        coarse.for_each(|value| *value = multiple(*value));
     }
     harmonics
 }

@@ -3,7 +3,7 @@
 //! In: a [`RuntimeScene`]. Out: a [`GaussianCapture`], cheap to clone, with its bounds, its duration and its up direction.
 
 use super::key_frames::KeyFrames;
-use crate::scene::{Bounds, BoundsOverTime, RuntimeScene};
+use crate::scene::{Bounds, BoundsOverTime, Form, RuntimeScene};
 use bevy::asset::Asset;
 use bevy::reflect::TypePath;
 use glam::{Quat, Vec3};
@@ -33,9 +33,16 @@ pub struct GaussianCapture {
 }
 
 impl GaussianCapture {
-    /// Creates a capture from a scene in memory, and computes its bounds over time from every Gaussian.
+    /// Creates a capture from a scene in memory, and computes its bounds over time from every Gaussian. A packed scene
+    /// whose parts do not fit together ([`PackedScene::check`](crate::scene::PackedScene::check)) has no bounds, and cannot
+    /// be drawn.
     pub fn new(scene: RuntimeScene) -> Self {
         let mut capture = Self { scene: Arc::new(scene), bounds: None };
+        if let Form::Packed(packed) = &capture.scene.form
+            && packed.check().is_err()
+        {
+            return capture;
+        }
         // A still never leaves its first moment.
         let shown = [0.0, f32::INFINITY].map(|seconds| capture.time_at(seconds));
         capture.bounds = BoundsOverTime::of(capture.scene.iter(), shown).map(Arc::new);
@@ -98,7 +105,8 @@ impl GaussianCapture {
 mod tests {
     use super::*;
     use crate::gaussian::{Gaussian, Harmonics};
-    use crate::scene::{PlaybackHints, TrainedWith, UpAxis};
+    use crate::scene::packed::RECORD_WORDS;
+    use crate::scene::{PackedColors, PackedScene, PlaybackHints, TrainedWith, UpAxis};
 
     fn capture(time_interval: [f32; 2], duration_seconds: f32) -> GaussianCapture {
         with(Vec::new(), time_interval, duration_seconds)
@@ -148,6 +156,18 @@ mod tests {
         assert_eq!(still.bounds_at(1.0), still.bounds(), "a still does not move");
         assert!(still.bounds().is_some_and(|all| all.min.x > 2.9 && all.max.x < 3.1), "and stays at its first moment");
         assert_eq!(empty.bounds_at(0.0), None, "an empty capture has no bounds");
+    }
+
+    #[test]
+    fn a_packed_scene_that_does_not_fit_together_has_no_bounds() {
+        let packed = PackedScene {
+            records: vec![[0; RECORD_WORDS]],
+            ranges: Vec::new(),
+            colors: PackedColors::Whole(Harmonics { coefficients: 1, values: vec![0.0; 3], ..Harmonics::default() }),
+        };
+        let empty = RuntimeScene::sliced(Vec::new(), Harmonics::default());
+        let scene = RuntimeScene { form: Form::Packed(packed), ..empty };
+        assert_eq!(GaussianCapture::new(scene).bounds(), None, "its Gaussian is not decoded without its ranges");
     }
 
     #[test]

@@ -4,10 +4,11 @@
 //! In: first coefficients, and codebooks with a code for every Gaussian. Out: [`CodedColors`], the words that the GPU
 //! reads; and the coefficients decoded from them. `offline::quantize::codebook` trains the codebooks.
 
-use super::lanes::{self, BASE_MAX, COLOR_WORDS, MAX_STAGES};
+use super::lanes::{self, BASE_MAX, COLOR_WORDS, MAX_ENTRIES, MAX_STAGES};
 use crate::gaussian::{Harmonics, harmonics};
 use glam::Vec3;
 use half::f16;
+use rayon::prelude::*;
 
 /// Colors coded by codebooks.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -168,8 +169,11 @@ impl CodedColors {
         }
         let words = self.words_per_entry();
         let total: u64 = self.entries.iter().map(|&entries| u64::from(entries)).sum();
-        if self.records.len() != count || self.entries.len() > MAX_STAGES {
-            return Err("the colours do not fit the number of Gaussians");
+        if self.records.len() != count {
+            return Err("its colours are those of another number of Gaussians");
+        }
+        if self.entries.len() > MAX_STAGES || self.entries.iter().any(|&entries| entries > MAX_ENTRIES) {
+            return Err("more codebooks, or more entries in one, than a record has codes for");
         }
         if self.codebooks.len() as u64 != total * words as u64 || self.scales.len() != words * self.entries.len() {
             return Err("the codebooks do not have the size that their entries need");
@@ -177,12 +181,42 @@ impl CodedColors {
         if !self.scales.as_flattened().iter().all(|value| value.is_finite()) {
             return Err("a scale of a codebook that is not finite");
         }
-        let fits = |stage: usize, &entries: &u32| (0..count).all(|index| self.code(index, stage) < entries);
-        if self.entries.iter().enumerate().all(|(stage, entries)| fits(stage, entries)) {
-            Ok(())
-        } else {
-            Err("a code beyond its codebook")
+        let fits = |&record: &[u32; COLOR_WORDS]| {
+            self.entries.iter().enumerate().all(|(stage, &entries)| lanes::unpack_code(record, stage) < entries)
+        };
+        if self.records.par_iter().all(fits) { Ok(()) } else { Err("a code beyond its codebook") }
+    }
+
+    /// Lowers the degrees to at most those given and drops what is no longer evaluated from the codebooks. At degree 0
+    /// they have nothing left, and are dropped too.
+    pub fn truncate(&mut self, degree: u32, degree_t: u32) {
+        let (all, before) = (self.coefficients(), self.words_per_entry());
+        self.degree = self.degree.min(degree);
+        self.degree_t = if self.degree == 3 { self.degree_t.min(degree_t) } else { 0 };
+        let (kept, after) = (self.coefficients(), self.words_per_entry());
+        if kept == all {
+            return;
         }
+        if kept == 1 {
+            (self.entries, self.codebooks, self.scales) = (Vec::new(), Vec::new(), Vec::new());
+            self.records.iter_mut().for_each(|record| record[1..].fill(0));
+            return;
+        }
+        // What does not fill the last word of an entry is 0.
+        let used = 4 - (after * 4 - kept * 3);
+        let mut codebooks = Vec::with_capacity(self.codebooks.len() / before * after);
+        for entry in self.codebooks.chunks_exact(before) {
+            codebooks.extend_from_slice(&entry[..after - 1]);
+            codebooks.push(entry[after - 1] & u32::MAX >> (8 * (4 - used)));
+        }
+        let mut scales = Vec::with_capacity(self.scales.len() / before * after);
+        for row in self.scales.chunks_exact(before) {
+            scales.extend_from_slice(&row[..after]);
+            if let Some(last) = scales.last_mut() {
+                last[used..].fill(0.0);
+            }
+        }
+        (self.codebooks, self.scales) = (codebooks, scales);
     }
 }
 

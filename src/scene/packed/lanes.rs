@@ -31,6 +31,8 @@ pub const RECORD_WORDS: usize = 8;
 pub const COLOR_WORDS: usize = 3;
 /// Largest number of codebooks, whose entries are summed.
 pub const MAX_STAGES: usize = 4;
+/// Largest number of entries of a codebook, which has codes of 16 bits.
+pub const MAX_ENTRIES: u32 = 1 << 16;
 
 /// Number of lanes of a record of geometry.
 pub(super) const LANES: usize = 2 * RECORD_WORDS;
@@ -145,6 +147,11 @@ pub(super) fn pack(lanes: [u16; LANES]) -> [u32; RECORD_WORDS] {
 /// Returns the lanes of a record.
 pub(super) fn unpack(record: [u32; RECORD_WORDS]) -> [u16; LANES] {
     std::array::from_fn(|lane| (record[lane / 2] >> (16 * (lane % 2))) as u16)
+}
+
+/// Returns the lane of a record with the index of the component of the rotation that is left out.
+pub(super) fn left_out(record: [u32; RECORD_WORDS]) -> u32 {
+    record[LEFT_OUT / 2] >> (16 * (LEFT_OUT % 2)) & 0xffff
 }
 
 /// Returns the color record of the positions of a first coefficient, with every code 0.

@@ -18,9 +18,10 @@ mod lanes;
 mod shape;
 
 pub use colors::CodedColors;
-pub use lanes::{BLOCK, BLOCK_RANGES, COLOR_WORDS, MAX_STAGES, RECORD_WORDS, SHARED_RANGES};
+pub use lanes::{BLOCK, BLOCK_RANGES, COLOR_WORDS, MAX_ENTRIES, MAX_STAGES, RECORD_WORDS, SHARED_RANGES};
 
 use crate::gaussian::Harmonics;
+use rayon::prelude::*;
 
 /// Packed Gaussians and their color.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,8 +69,8 @@ impl PackedScene {
         SHARED_RANGES + BLOCK_RANGES * count.div_ceil(BLOCK)
     }
 
-    /// Checks that the records, ranges and coded colors fit together and every code has an entry, so that decoding them
-    /// cannot panic.
+    /// Checks that the records, ranges and colors fit together and every code has an entry, so that nothing is read
+    /// beside them, here or on a GPU.
     ///
     /// # Errors
     /// A description of what does not fit.
@@ -80,8 +81,12 @@ impl PackedScene {
         if !self.ranges.as_flattened().iter().all(|value| value.is_finite()) {
             return Err("a range that is not finite");
         }
+        if !self.records.par_iter().all(|&record| lanes::left_out(record) < 4) {
+            return Err("a rotation that leaves out a component which is none of the four");
+        }
         match &self.colors {
-            PackedColors::Whole(_) => Ok(()),
+            PackedColors::Whole(harmonics) if harmonics.is_consistent(self.len()) => Ok(()),
+            PackedColors::Whole(_) => Err("its colours are those of another number of Gaussians"),
             PackedColors::Coded(colors) => colors.check(self.len()),
         }
     }

@@ -8,6 +8,7 @@ use std::fs;
 use bevy_gs4d::offline::dataset::{
     CameraFile, CameraOptions, Dataset, DatasetError, ImageMode, MAX_SIDE, Split, TrainingView,
 };
+use bevy_gs4d::offline::picture_file::PictureError;
 use bevy_gs4d::view::Camera;
 use glam::{UVec2, Vec3};
 use image::{GrayImage, RgbaImage};
@@ -140,4 +141,87 @@ fn damaged_images_are_errors_that_name_them() {
         let error = view.load_image([0.0; 3], ImageMode::InMemory).expect_err("damaged");
         assert!(matches!(error, DatasetError::Image { .. }) && error.to_string().contains("a.png"), "{error}");
     }
+}
+
+/// Returns the only view of a camera file whose pictures are `size` wide and high, with an image of that name.
+fn view_of(folder: &Folder, image: &str, size: u32) -> TrainingView {
+    let json = json!({"camera_angle_x": 0.8, "w": size, "h": size, "frames": [frame(image)]});
+    let path = folder.write_json("transforms_test.json", &json);
+    CameraFile::load(&path, &CameraOptions::default()).expect("a valid camera file").remove(0)
+}
+
+#[test]
+fn jpegs_that_are_not_whole_are_refused() {
+    let folder = Folder::new();
+    folder.write_rgb("a.jpg", 40, 40);
+    let view = view_of(&folder, "a.jpg", 40);
+    assert!(view.load_image([0.0; 3], ImageMode::InMemory).is_ok(), "the whole image");
+    let bytes = fs::read(&view.image).expect("the image");
+    for length in [bytes.len() - 2, bytes.len() - 20, bytes.len() / 2] {
+        for end in [&[][..], &[0xff, 0xd9]] {
+            if length == bytes.len() - 2 && !end.is_empty() {
+                continue;
+            }
+            folder.write("a.jpg", [&bytes[..length], end].concat());
+            let error = view.load_image([0.0; 3], ImageMode::InMemory).expect_err("cut off");
+            let incomplete = matches!(error, DatasetError::Image(PictureError::Incomplete { .. }));
+            assert!(incomplete && error.to_string().contains("a.jpg"), "{length} bytes, then {end:?}: {error}");
+            assert!(view.load_covered().is_err(), "{length} bytes: not to train on, either");
+        }
+    }
+}
+
+#[test]
+fn images_far_larger_than_the_camera_file_says_are_not_decoded() {
+    let folder = Folder::new();
+    let view = view_of(&folder, "a.png", 8);
+    folder.write_rgb("a.png", 32, 32);
+    assert!(view.load_image([0.0; 3], ImageMode::InMemory).is_ok(), "four times as large is scaled");
+    for (width, height) in [(33, 8), (8, 33), (300, 300)] {
+        folder.write_rgb("a.png", width, height);
+        let error = view.load_image([0.0; 3], ImageMode::InMemory).expect_err("too large");
+        assert!(matches!(error, DatasetError::Image(PictureError::TooLarge { .. })), "{width} x {height}: {error}");
+        let message = error.to_string();
+        assert!(message.contains("a.png") && message.contains(&width.to_string()), "{message}");
+    }
+    let halved = TrainingView { camera: Camera { size: UVec2::splat(1), ..view.camera }, ..view };
+    folder.write_rgb("a.png", 8, 8);
+    assert!(halved.load_image([0.0; 3], ImageMode::InMemory).is_ok(), "the camera's own size does not count");
+}
+
+#[test]
+fn masks_have_the_same_limits() {
+    let folder = Folder::new();
+    folder.write_rgb("a.png", 8, 8);
+    folder.write_rgb("m.jpg", 40, 40);
+    let with_mask = with(transforms(), "/frames/0/mask_path", json!("m.jpg"));
+    let with_mask = with(with(with_mask, "/w", json!(8)), "/h", json!(8));
+    let path = folder.write_json("transforms_test.json", &with_mask);
+    let view = CameraFile::load(&path, &CameraOptions::default()).expect("a valid camera file").remove(0);
+    let message = view.load_image([0.0; 3], ImageMode::InMemory).expect_err("too large").to_string();
+    assert!(message.contains("m.jpg") && message.contains("40 x 40"), "{message}");
+}
+
+/// Returns a PNG of one pixel whose header says that it has `side` times `side`.
+fn claiming(folder: &Folder, side: u32) -> Vec<u8> {
+    folder.write_rgb("one.png", 1, 1);
+    let mut bytes = fs::read(folder.path().join("one.png")).expect("the image");
+    // The header's chunk follows the signature: length, name, width, height, five bytes, checksum.
+    bytes[16..20].copy_from_slice(&side.to_be_bytes());
+    bytes[20..24].copy_from_slice(&side.to_be_bytes());
+    let checksum = crc32fast::hash(&bytes[12..29]);
+    bytes[29..33].copy_from_slice(&checksum.to_be_bytes());
+    bytes
+}
+
+#[test]
+fn a_camera_file_cannot_ask_for_any_size() {
+    let folder = Folder::new();
+    folder.write("a.png", claiming(&folder, MAX_SIDE));
+    let error = view_of(&folder, "a.png", MAX_SIDE).load_image([0.0; 3], ImageMode::InMemory).expect_err("too much");
+    assert!(matches!(error, DatasetError::Image(PictureError::FarTooLarge { .. })), "{error}");
+    let without_size = json!({"camera_angle_x": 0.8, "frames": [frame("a.png")]});
+    let path = folder.write_json("transforms_test.json", &without_size);
+    let error = CameraFile::load(&path, &CameraOptions::default()).expect_err("no size to go by");
+    assert!(matches!(error, DatasetError::Image(_)) && error.to_string().contains("a.png"), "{error}");
 }

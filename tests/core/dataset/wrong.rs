@@ -48,6 +48,31 @@ fn wrong_entries_are_errors_that_name_file_frame_and_reason() {
 }
 
 #[test]
+fn cameras_that_project_to_infinity_are_named() {
+    let shared = with(with(transforms(), "/fl_x", json!(900.0)), "/fl_y", json!(880.0));
+    let shared = with(with(shared, "/cx", json!(410.0)), "/cy", json!(190.0));
+    assert!(load(&shared, &CameraOptions::default()).is_ok(), "a camera");
+    for (pointer, value) in [("/cy", -3.4e38), ("/cx", 3.4e38), ("/fl_x", 3e38), ("/fl_y", 1e-38)] {
+        let changed = with(shared.clone(), pointer, json!(value));
+        let message = load(&changed, &CameraOptions::default()).expect_err(pointer).to_string();
+        for part in ["transforms_test.json", "frame 0", "\"a\"", "not finite"] {
+            assert!(message.contains(part), "{pointer}: {part:?} is not in: {message}");
+        }
+    }
+}
+
+#[test]
+fn paths_with_control_characters_are_refused_and_shown_escaped() {
+    let path = "a\u{1b}[2J\nb";
+    for pointer in ["/frames/0/file_path", "/frames/0/mask_path"] {
+        let changed = with(transforms(), pointer, json!(path));
+        let message = load(&changed, &CameraOptions::default()).expect_err(pointer).to_string();
+        assert!(message.contains("control characters"), "{message}");
+        assert!(!message.contains(['\u{1b}', '\n']), "nothing that a terminal obeys: {message:?}");
+    }
+}
+
+#[test]
 fn wrong_files_are_errors_that_name_them() {
     let folder = Folder::new();
     let cases = [

@@ -1,0 +1,126 @@
+//! Pictures on disk: the only place where PNG and JPEG files are decoded.
+//!
+//! In: a path, and the largest size that the picture may have. Out: the picture, or a [`PictureError`] that names the file,
+//! the reason and the remedy.
+//!
+//! The size is compared before anything is decoded, so that a small file does not cost much time and memory. A JPEG must
+//! be whole, which its decoder does not check (`jpeg`).
+
+mod huffman;
+mod jpeg;
+
+use glam::UVec2;
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use std::fs::File;
+use std::io::{self, Cursor, Read};
+use std::path::{Path, PathBuf};
+
+/// Most pixels of a picture that is decoded, whatever size is expected.
+const MAX_PIXELS: u64 = 1 << 27;
+
+/// Most bytes of a file that is read.
+const MAX_BYTES: u64 = 1 << 30;
+
+/// Why a picture was not decoded.
+#[derive(Debug, thiserror::Error)]
+pub enum PictureError {
+    /// The file cannot be read.
+    #[error("{}: cannot be read: {reason}", .path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The error of the operating system.
+        reason: io::Error,
+    },
+    /// The file is no picture, or a damaged one.
+    #[error("{}: not a readable PNG or JPEG image: {reason}", .path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// The error of the decoder.
+        reason: image::ImageError,
+    },
+    /// The file ends, but not the picture.
+    #[error("{}: not a whole JPEG image: {reason}", .path.display())]
+    Incomplete {
+        /// The file.
+        path: PathBuf,
+        /// What is missing, and the remedy.
+        reason: &'static str,
+    },
+    /// The picture is larger than it can be.
+    #[error(
+        "{}: {} x {} pixels, and at most {} x {} are expected here: scale it, or correct the size in the camera file",
+        .path.display(), .size.x, .size.y, .largest.x, .largest.y
+    )]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its width and height, pixels.
+        size: UVec2,
+        /// The largest width and height accepted.
+        largest: UVec2,
+    },
+    /// The picture, or its file, is larger than any that is decoded.
+    #[error("{}: a picture of more than {MAX_PIXELS} pixels or {MAX_BYTES} bytes is not decoded: scale it", .path.display())]
+    FarTooLarge {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// Returns width and height of a picture, pixels, from its header.
+///
+/// # Errors
+/// A file that cannot be read or is no picture, and one whose width or height is larger than that of `largest`.
+pub fn size(path: &Path, largest: UVec2) -> Result<UVec2, PictureError> {
+    let bytes = read(path)?;
+    let decoder = reader(path, &bytes)?.into_decoder();
+    let decoder = decoder.map_err(|reason| PictureError::Format { path: path.to_owned(), reason })?;
+    checked_size(path, &decoder, largest)
+}
+
+/// Decodes a picture. Its format follows from the contents of the file, not from its name.
+///
+/// # Errors
+/// As [`size`], and a picture that is damaged or not whole.
+pub fn open(path: &Path, largest: UVec2) -> Result<DynamicImage, PictureError> {
+    let failed = |reason| PictureError::Format { path: path.to_owned(), reason };
+    let bytes = read(path)?;
+    let reader = reader(path, &bytes)?;
+    let is_jpeg = reader.format() == Some(ImageFormat::Jpeg);
+    let decoder = reader.into_decoder().map_err(failed)?;
+    checked_size(path, &decoder, largest)?;
+    if is_jpeg {
+        jpeg::check(&bytes).map_err(|reason| PictureError::Incomplete { path: path.to_owned(), reason })?;
+    }
+    Limits::default().reserve(decoder.total_bytes()).map_err(failed)?;
+    DynamicImage::from_decoder(decoder).map_err(failed)
+}
+
+/// Reads a file of limited length.
+fn read(path: &Path) -> Result<Vec<u8>, PictureError> {
+    let mut bytes = Vec::new();
+    let file = File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes));
+    match file {
+        Ok(_) if bytes.len() as u64 > MAX_BYTES => Err(PictureError::FarTooLarge { path: path.to_owned() }),
+        Ok(_) => Ok(bytes),
+        Err(reason) => Err(PictureError::Read { path: path.to_owned(), reason }),
+    }
+}
+
+fn reader<'a>(path: &Path, bytes: &'a [u8]) -> Result<ImageReader<Cursor<&'a [u8]>>, PictureError> {
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    reader.map_err(|reason| PictureError::Read { path: path.to_owned(), reason })
+}
+
+fn checked_size(path: &Path, decoder: &impl ImageDecoder, largest: UVec2) -> Result<UVec2, PictureError> {
+    let size = UVec2::from(decoder.dimensions());
+    if size.cmpgt(largest).any() {
+        return Err(PictureError::TooLarge { path: path.to_owned(), size, largest });
+    }
+    if u64::from(size.x) * u64::from(size.y) > MAX_PIXELS {
+        return Err(PictureError::FarTooLarge { path: path.to_owned() });
+    }
+    Ok(size)
+}
