@@ -7,6 +7,9 @@ mod bake;
 mod command;
 mod compare;
 mod eval;
+// Faults are made with what Linux has: `/dev/full`, limits of a shell.
+#[cfg(target_os = "linux")]
+mod faults;
 mod fine_tune;
 mod prune;
 mod render;
@@ -18,5 +21,7 @@ mod support {
     pub mod dataset;
     pub mod npy;
     pub mod npz;
+    #[cfg(target_os = "linux")]
+    pub mod random;
     pub mod skip;
 }
