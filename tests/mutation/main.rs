@@ -104,7 +104,7 @@ fn give_files(trials: &mut Trials, readers: &[(&Kind, Arc<dyn Reader>)], path: &
 
 /// Returns the input of a reader with this number.
 fn input(kind: &Kind, reader: &dyn Reader, seed: u64, number: u64) -> Input {
-    let mut stream = Random::new(seed ^ u64::from(crc32fast::hash(kind.name.as_bytes())) << 32);
+    let mut stream = Random::new(seed ^ (u64::from(crc32fast::hash(kind.name.as_bytes())) << 32));
     let mut random = Random::new(stream.bits() ^ number.wrapping_mul(0xD134_2543_DE82_EF95));
     Input { name: number.to_string(), bytes: reader.input(&mut random), accepted: None }
 }
