@@ -82,6 +82,9 @@ pub enum OfflineError {
     /// An orbit needs a scene with Gaussians.
     #[error("the scene has no Gaussians to go around")]
     NothingToOrbit,
+    /// Gaussians are so far apart that no camera sees them all.
+    #[error("the Gaussians are too far apart to be looked at from around them: give --cameras, or prune the scene")]
+    TooFarApart,
     /// A sliced scene cannot become the trained form.
     #[error("holds a sliced form, which cannot be turned back: convert the checkpoint with --form trained")]
     NotTrained,

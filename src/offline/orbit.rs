@@ -37,7 +37,7 @@ impl Shot {
 /// whole core in view. Their times are evenly spaced over the time interval, both ends included.
 ///
 /// # Errors
-/// A scene without Gaussians.
+/// A scene without Gaussians, or with some that are too far apart.
 pub fn orbit(scene: &RuntimeScene, count: usize, size: UVec2) -> Result<Vec<Shot>, OfflineError> {
     let core = Bounds::core(scene.iter()).ok_or(OfflineError::NothingToOrbit)?;
     let tan_x = (FIELD_OF_VIEW / 2.0).tan();
@@ -59,7 +59,11 @@ pub fn orbit(scene: &RuntimeScene, count: usize, size: UVec2) -> Result<Vec<Shot
             time: first + (last - first) * progress,
         }
     };
-    Ok((0..count).map(shot).collect())
+    let shots: Vec<Shot> = (0..count).map(shot).collect();
+    match shots.iter().all(|shot| shot.camera.world_to_camera.is_finite()) {
+        true => Ok(shots),
+        false => Err(OfflineError::TooFarApart),
+    }
 }
 
 /// Returns an even share of at most `count` shots or views, in their order.

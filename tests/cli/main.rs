@@ -8,6 +8,9 @@ mod command;
 mod compare;
 mod compress;
 mod eval;
+// Faults are made with what Linux has: `/dev/full`, limits of a shell.
+#[cfg(target_os = "linux")]
+mod faults;
 mod fine_tune;
 mod outputs;
 mod prune;
@@ -21,5 +24,7 @@ mod support {
     pub mod npy;
     pub mod npz;
     pub mod package_parts;
+    #[cfg(target_os = "linux")]
+    pub mod random;
     pub mod skip;
 }

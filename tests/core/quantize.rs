@@ -15,7 +15,7 @@ use bevy_gs4d::offline::quantize::order::morton_order;
 use bevy_gs4d::offline::quantize::{CompressError, CompressSettings, Quality, compress};
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::packed::encode::Bits;
-use bevy_gs4d::scene::{FilterKind, Form, GaussianScene, RuntimeScene, SceneForm, Sliced, TemporalFilter};
+use bevy_gs4d::scene::{FilterKind, Form, GaussianScene, RuntimeScene, SceneForm, TemporalFilter};
 use bevy_gs4d::view::{RasterFov, View};
 use glam::Vec3;
 use std::io::Cursor;

@@ -5,8 +5,11 @@
 use serde_json::Value;
 use std::ffi::OsStr;
 use std::path::PathBuf;
-use std::process::Command;
+use std::process::{Command, Output};
 use tempfile::TempDir;
+
+/// The command, as it was built for the tests.
+pub const GS4D: &str = env!("CARGO_BIN_EXE_gs4d");
 
 /// A run that has ended.
 pub struct Run {
@@ -17,12 +20,16 @@ pub struct Run {
 
 /// Runs the command.
 pub fn gs4d<S: AsRef<OsStr>>(arguments: &[S]) -> Run {
-    let output = Command::new(env!("CARGO_BIN_EXE_gs4d")).args(arguments).output().expect("the command starts");
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    Run { code: output.status.code(), out: text(&output.stdout), err: text(&output.stderr) }
+    Run::of(&Command::new(GS4D).args(arguments).output().expect("the command starts"))
 }
 
 impl Run {
+    /// Returns the run that a process was.
+    pub fn of(output: &Output) -> Self {
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        Self { code: output.status.code(), out: text(&output.stdout), err: text(&output.stderr) }
+    }
+
     /// Returns the text of a run that must have succeeded.
     pub fn text(self) -> String {
         assert_eq!(self.code, Some(0), "the command works: {}", self.err);

@@ -23,7 +23,7 @@ use std::time::Instant;
 /// Views that are drawn before the first step, so that there is room for the pairs of all.
 const VIEWS_OF_ROOM: usize = 64;
 /// Most bytes of images that stay on the GPU.
-const RESIDENT_BYTES: usize = 3 << 30;
+const RESIDENT_BYTES: usize = 512 << 20;
 /// Steps between two looks at gradients that are not finite.
 const STEPS_OF_FAULTS: usize = 50;
 

@@ -33,7 +33,7 @@ pub enum PictureError {
         reason: io::Error,
     },
     /// The file is no picture, or a damaged one.
-    #[error("{}: not a readable PNG or JPEG image: {reason}", .path.display())]
+    #[error("{}: not a readable PNG or JPEG image: {}", .path.display(), .reason.to_string().trim_end())]
     Format {
         /// The file.
         path: PathBuf,

@@ -1,0 +1,455 @@
+//! Faults while a verb writes: killed at any moment, a folder that cannot be written to, a full disk, closed pipes, two at once.
+//!
+//! In: every verb that writes, on small inputs made here. Out: proof that inputs stay as they are, that an output is absent, the one from
+//! before, or whole and readable, and that the next good run leaves nothing else behind. Verbs that need a GPU are skipped where there is none.
+//!
+//! `GS4D_KILLS` is how often each verb is killed, for long runs: 4 times if it is not set.
+
+use crate::support::command::{GS4D, Run, arguments, gs4d};
+use crate::support::dataset;
+use crate::support::random::Random;
+use crate::support::skip::skip;
+use bevy_gs4d::codec::package::{self, WriteSettings};
+use bevy_gs4d::offline;
+use bevy_gs4d::renderer::GpuContext;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use glam::{UVec2, Vec3};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::ffi::{OsStr, OsString};
+use std::fs::{self, File, Permissions};
+use std::io::Cursor;
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::thread;
+use std::time::Instant;
+use tempfile::TempDir;
+
+/// Gaussians of the scene.
+const COUNT: usize = 600;
+/// What is in the place of each output before a run. It can be read as none of them.
+const OLD: &[u8] = b"the one from before";
+
+/// A verb that writes.
+struct Verb {
+    name: &'static str,
+    /// Its arguments, given the folder of the inputs and that of the outputs.
+    arguments: fn(&Path, &Path) -> Vec<OsString>,
+    /// What it writes.
+    files: &'static [&'static str],
+    needs_gpu: bool,
+}
+
+const PACKAGE: &[&str] = &["made.gs4d"];
+
+const VERBS: [Verb; 10] = [
+    Verb {
+        name: "convert",
+        arguments: |from, to| arguments!["convert", from.join("scene.gs4d"), to.join("made.gs4d")].to_vec(),
+        files: PACKAGE,
+        needs_gpu: false,
+    },
+    Verb {
+        name: "compress",
+        arguments: |from, to| {
+            let (scene, made) = (from.join("scene.gs4d"), to.join("made.gs4d"));
+            arguments!["compress", scene, made, "--codebooks", "16,16", "--verify", "0"].to_vec()
+        },
+        files: PACKAGE,
+        needs_gpu: false,
+    },
+    Verb {
+        name: "prune",
+        arguments: |from, to| {
+            let (scene, scores, made) = (from.join("scene.gs4d"), from.join("scores.f32"), to.join("made.gs4d"));
+            arguments!["prune", scene, "--scores", scores, "--keep", "300", "-o", made].to_vec()
+        },
+        files: PACKAGE,
+        needs_gpu: false,
+    },
+    Verb {
+        name: "mask",
+        arguments: |from, to| arguments!["mask", from.join("scene.gs4d"), "-o", to.join("made.gs4d")].to_vec(),
+        files: PACKAGE,
+        needs_gpu: false,
+    },
+    Verb {
+        name: "synth",
+        arguments: |_, to| arguments!["synth", to.join("made.gs4d"), "--count", COUNT.to_string()].to_vec(),
+        files: PACKAGE,
+        needs_gpu: false,
+    },
+    Verb {
+        name: "score",
+        arguments: |from, to| {
+            let own = arguments!["--variant", "energy", "--engine", "cpu", "--out", to.join("made.f32")];
+            [on_data("score", from), own.to_vec()].concat()
+        },
+        files: &["made.f32"],
+        needs_gpu: false,
+    },
+    Verb {
+        name: "ablate",
+        arguments: |from, to| {
+            let few = arguments!["--variants", "energy", "--ratios", "0.5", "--filters", "support", "--engine", "cpu"];
+            [on_data("ablate", from), few.to_vec(), arguments!["--csv", to.join("made.csv")].to_vec()].concat()
+        },
+        files: &["made.csv"],
+        needs_gpu: false,
+    },
+    Verb {
+        name: "bake",
+        arguments: |from, to| {
+            let few = arguments!["--variant", "energy", "--ratio", "0.5", "--quality", "visually-lossless"];
+            let own = arguments!["--engine", "cpu", "-o", to.join("made.gs4d")];
+            [on_data("bake", from), few.to_vec(), own.to_vec()].concat()
+        },
+        files: &["made.gs4d", "made.report.html", "made.report.json"],
+        needs_gpu: false,
+    },
+    Verb {
+        name: "render",
+        arguments: |from, to| {
+            let small = arguments!["--orbit", "2", "--size", "64x48", "--raw", "--out", to];
+            [arguments!["render", from.join("scene.gs4d")].to_vec(), small.to_vec()].concat()
+        },
+        files: &["orbit_0000.f32", "orbit_0000.png", "orbit_0001.f32", "orbit_0001.png"],
+        needs_gpu: true,
+    },
+    Verb {
+        name: "finetune",
+        arguments: |from, to| {
+            let few = arguments!["--steps", "8", "--evaluate-every", "4", "--save-every", "4"];
+            [on_data("finetune", from), few.to_vec(), arguments!["-o", to.join("made.gs4d")].to_vec()].concat()
+        },
+        files: PACKAGE,
+        needs_gpu: true,
+    },
+];
+
+/// Returns the arguments of a verb that looks at the training views of the scene.
+fn on_data(verb: &str, from: &Path) -> Vec<OsString> {
+    arguments![verb, from.join("scene.gs4d"), "--data", from.join("data")].to_vec()
+}
+
+/// Inputs, and folders for outputs.
+struct Stage {
+    folder: TempDir,
+    /// The checksum of each input.
+    inputs: BTreeMap<PathBuf, u32>,
+}
+
+/// A verb with a folder of its own.
+struct Act<'a> {
+    verb: Verb,
+    stage: &'a Stage,
+    out: PathBuf,
+}
+
+impl Stage {
+    /// Makes the inputs.
+    fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let from = folder.path().join("inputs");
+        let scene = synthesize(&SynthSettings { count: COUNT, ..SynthSettings::default() });
+        let runtime = scene.clone().into_runtime().expect("a synthetic scene can be drawn");
+        dataset::write(&from.join("data"), &runtime, Vec3::ZERO, 2, 3, UVec2::splat(48), true);
+        offline::save(&from.join("scene.gs4d"), &scene, &WriteSettings::default()).expect("the folder is there");
+        let scores: Vec<u8> = (0..COUNT).flat_map(|at| (at as f32).to_le_bytes()).collect();
+        fs::write(from.join("scores.f32"), scores).expect("the folder can be written to");
+        let inputs = checksums(&from);
+        Self { folder, inputs }
+    }
+
+    /// Returns every verb that this machine can run.
+    fn acts(&self) -> impl Iterator<Item = Act<'_>> {
+        let gpu = GpuContext::headless(None).is_ok();
+        let possible = VERBS.into_iter().filter(move |verb| {
+            if verb.needs_gpu && !gpu {
+                skip(format_args!("faults of {}: no GPU adapter", verb.name));
+            }
+            gpu || !verb.needs_gpu
+        });
+        possible.map(move |verb| {
+            let out = self.folder.path().join(verb.name);
+            fs::create_dir(&out).expect("each verb has its own folder");
+            Act { verb, stage: self, out }
+        })
+    }
+}
+
+impl Act<'_> {
+    fn arguments(&self, out: &Path) -> Vec<OsString> {
+        (self.verb.arguments)(&self.stage.folder.path().join("inputs"), out)
+    }
+
+    fn command(&self) -> Command {
+        let mut command = Command::new(GS4D);
+        command.args(self.arguments(&self.out));
+        command
+    }
+
+    /// Returns the command, whose report and errors can be read.
+    fn start(&self) -> Child {
+        let mut command = self.command();
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.spawn().expect("the command starts")
+    }
+
+    /// Returns the command run by a shell, after `script`, of which `$1` is `limit`.
+    fn in_shell(&self, script: &str, limit: &str) -> Command {
+        let mut command = Command::new("sh");
+        let script = format!("{script}; shift; exec \"$@\"");
+        command.args(["-c", &script, "sh", limit, GS4D]).args(self.arguments(&self.out));
+        command
+    }
+
+    /// Returns what all its files have in their names.
+    fn word(&self) -> &'static str {
+        self.verb.files[0].split(['.', '_']).next().unwrap_or_default()
+    }
+
+    /// Puts something else in the place of each output.
+    fn put_old(&self) {
+        for file in self.verb.files {
+            fs::write(self.out.join(file), OLD).expect("the folder can be written to");
+        }
+    }
+
+    /// Checks that the inputs are as they were, and each output the old one or whole.
+    fn check(&self, context: &str) {
+        let context = format!("{} {context}", self.verb.name);
+        for file in self.verb.files {
+            let bytes = fs::read(self.out.join(file)).unwrap_or_else(|error| panic!("{context}: {file}: {error}"));
+            let whole = bytes == OLD || is_whole(file, &bytes);
+            assert!(whole, "{context}: {file} is neither the old one nor whole, {} bytes", bytes.len());
+        }
+        self.check_inputs(&context);
+    }
+
+    fn check_inputs(&self, context: &str) {
+        let now = checksums(&self.stage.folder.path().join("inputs"));
+        assert_eq!(now, self.stage.inputs, "{context}: the inputs are as they were");
+    }
+
+    /// Checks that every output is whole and new, and that there is nothing else in the folder.
+    fn check_whole(&self, context: &str) {
+        let context = format!("{} {context}", self.verb.name);
+        for file in self.verb.files {
+            let bytes = fs::read(self.out.join(file)).unwrap_or_else(|error| panic!("{context}: {file}: {error}"));
+            assert!(is_whole(file, &bytes), "{context}: {file} is whole, {} bytes", bytes.len());
+        }
+        assert_eq!(names(&self.out), self.verb.files, "{context}: the outputs and nothing else");
+        self.check_inputs(&context);
+    }
+
+    /// Runs the verb without a fault, after one.
+    fn run_well(&self, context: &str) {
+        let run = Run::of(&self.command().output().expect("the command starts"));
+        assert_eq!(run.code, Some(0), "{} works {context}: {}", self.verb.name, run.err);
+        self.check_whole(context);
+    }
+
+    /// Checks that a run failed with an error that names the output.
+    fn check_refused(&self, run: &Run, context: &str) {
+        run.must_fail(self.word());
+        self.check(context);
+    }
+
+    /// Checks that there is no temporary file that was not there `before`.
+    fn check_left(&self, before: &[String], context: &str) {
+        let is_new = |name: &String| name.ends_with(".part") && !before.contains(name);
+        let left: Vec<String> = names(&self.out).into_iter().filter(is_new).collect();
+        assert!(left.is_empty(), "{} {context} leaves {left:?}", self.verb.name);
+    }
+}
+
+/// Returns whether the bytes of an output are all there.
+fn is_whole(name: &str, bytes: &[u8]) -> bool {
+    match Path::new(name).extension().and_then(OsStr::to_str) {
+        Some("gs4d") => package::read(Cursor::new(bytes)).is_ok(),
+        Some("png") => image::load_from_memory(bytes).is_ok(),
+        Some("json") => serde_json::from_slice::<Value>(bytes).is_ok(),
+        Some("html") => bytes.ends_with(b"</html>\n"),
+        // Heads, the whole scene, one filter, one ratio.
+        Some("csv") => bytes.ends_with(b"\n") && bytes.iter().filter(|&&byte| byte == b'\n').count() == 4,
+        _ if name.starts_with("orbit") => bytes.len() == 64 * 48 * 12,
+        _ => bytes.len() == 4 * COUNT,
+    }
+}
+
+/// Returns the checksum of every file in a folder and those inside it.
+fn checksums(folder: &Path) -> BTreeMap<PathBuf, u32> {
+    let mut files = BTreeMap::new();
+    for entry in fs::read_dir(folder).expect("the folder can be listed") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            files.extend(checksums(&path));
+        } else {
+            let checksum = crc32fast::hash(&fs::read(&path).expect("the file can be read"));
+            files.insert(path, checksum);
+        }
+    }
+    files
+}
+
+/// Returns the names in a folder, in order.
+fn names(folder: &Path) -> Vec<String> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder).expect("the folder can be listed") {
+        names.push(entry.expect("an entry").file_name().to_string_lossy().into_owned());
+    }
+    names.sort();
+    names
+}
+
+fn kills() -> usize {
+    let wanted = std::env::var("GS4D_KILLS").ok();
+    wanted.map_or(4, |wanted| wanted.parse().expect("GS4D_KILLS is a number"))
+}
+
+/// Ends a process at once, or by asking it to.
+fn end(child: &mut Child, asking: bool) {
+    if asking {
+        let asked = Command::new("kill").args(["-TERM", &child.id().to_string()]).status();
+        assert!(asked.is_ok_and(|status| status.success()), "the process can be asked to end");
+    } else {
+        child.kill().expect("the process can be killed");
+    }
+    child.wait().expect("the process ends");
+}
+
+#[test]
+fn killed_at_any_moment_a_verb_leaves_its_output_old_or_whole() {
+    let (stage, mut random) = (Stage::new(), Random::new(11));
+    for act in stage.acts() {
+        let start = Instant::now();
+        act.run_well("at first");
+        let time = start.elapsed();
+        for kill in 0..kills() {
+            act.put_old();
+            let before = names(&act.out);
+            let moment = time.mul_f64(random.below(1000) as f64 / 1000.0);
+            let mut child = act.start();
+            thread::sleep(moment);
+            let asking = kill % 2 == 1;
+            end(&mut child, asking);
+            let context = format!("ended after {moment:?}, number {kill}");
+            act.check(&context);
+            if asking {
+                act.check_left(&before, &context);
+            }
+        }
+        act.run_well("after it was killed");
+    }
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_to_is_named_and_left_alone() {
+    let stage = Stage::new();
+    for act in stage.acts() {
+        act.put_old();
+        let before = checksums(&act.out);
+        fs::set_permissions(&act.out, Permissions::from_mode(0o555)).expect("the folder is ours");
+        // Permissions do not hold root back; in this folder nobody can make a file.
+        let holds = File::create(act.out.join("probe")).is_err();
+        let out = if holds { act.out.as_path() } else { Path::new("/proc") };
+        let run = gs4d(&act.arguments(out));
+        fs::set_permissions(&act.out, Permissions::from_mode(0o755)).expect("the folder is ours");
+        if !holds {
+            fs::remove_file(act.out.join("probe")).expect("it was made just now");
+        }
+        let written_to = if holds { act.word() } else { "/proc" };
+        run.must_fail(written_to);
+        act.check("without a folder to write to");
+        assert_eq!(checksums(&act.out), before, "{} changes nothing there", act.verb.name);
+        act.run_well("once it can write");
+    }
+}
+
+#[test]
+fn a_full_disk_is_named_and_the_old_output_stays() {
+    let stage = Stage::new();
+    for act in stage.acts() {
+        act.run_well("at first");
+        let size = |file: &&str| fs::metadata(act.out.join(file)).expect("it was made just now").len();
+        let largest = act.verb.files.iter().map(size).max();
+        // Blocks of 512 bytes or of 1024: full from the start, and in the middle of a file. Drivers of GPUs may keep memory in files.
+        let limits: &[&str] = match largest {
+            _ if act.verb.needs_gpu => &[],
+            Some(4097..) => &["0", "4"],
+            _ => &["0"],
+        };
+        for limit in limits {
+            act.put_old();
+            let before = names(&act.out);
+            let mut full = act.in_shell("trap '' XFSZ; ulimit -f \"$1\"", limit);
+            let run = Run::of(&full.output().expect("the shell starts"));
+            act.check_refused(&run, "on a full disk");
+            act.check_left(&before, "on a full disk");
+            // Here the system ends the process in the middle of a write.
+            let ended = act.in_shell("ulimit -f \"$1\"", limit).output().expect("the shell starts").status;
+            assert!(!ended.success(), "{} on a full disk: {ended}", act.verb.name);
+            act.check("ended by the system");
+        }
+        act.run_well("once there is room");
+
+        let device = act.out.join(act.verb.files[0]);
+        fs::remove_file(&device).expect("it was made just now");
+        symlink("/dev/full", &device).expect("the folder can be written to");
+        let run = Run::of(&act.command().output().expect("the command starts"));
+        assert_eq!(run.code, Some(2), "{} to a full device: {}", act.verb.name, run.err);
+        assert!(run.err.contains("error:") && !run.err.contains("panicked"), "{}: {}", act.verb.name, run.err);
+        assert!(device.is_symlink(), "{}: the link to the device stays", act.verb.name);
+        act.check_inputs(act.verb.name);
+        fs::remove_file(&device).expect("it is there");
+        act.run_well("to a file again");
+    }
+}
+
+#[test]
+fn closed_pipes_do_not_cost_the_output() {
+    let stage = Stage::new();
+    for act in stage.acts() {
+        act.put_old();
+        let mut child = act.start();
+        drop((child.stdout.take(), child.stderr.take()));
+        let status = child.wait().expect("the process ends");
+        assert!(status.success(), "{} with nobody at the other end: {status}", act.verb.name);
+        act.check_whole("with nobody at the other end");
+
+        act.put_old();
+        let status = act.in_shell("exec >&- 2>&-", "").status().expect("the shell starts");
+        assert!(status.success(), "{} with nothing to print to: {status}", act.verb.name);
+        act.check_whole("with nothing to print to");
+
+        act.put_old();
+        let full = File::options().write(true).open("/dev/full").expect("a device of Linux");
+        let output = act.command().stdout(full).stderr(Stdio::piped()).output().expect("the command starts");
+        let run = Run::of(&output);
+        assert_eq!(run.code, Some(2), "{} says that its report is lost: {}", act.verb.name, run.err);
+        act.check_whole("with a report that is lost");
+    }
+}
+
+#[test]
+fn two_at_once_leave_one_whole_output() {
+    let stage = Stage::new();
+    for act in stage.acts() {
+        for _ in 0..2 {
+            act.put_old();
+            let both = [act.start(), act.start()];
+            let runs = both.map(|child| Run::of(&child.wait_with_output().expect("the process ends")));
+            let [one, other] = &runs;
+            let worked = runs.iter().any(|run| run.code == Some(0));
+            assert!(worked, "{}: one of two works: {} {}", act.verb.name, one.err, other.err);
+            // The other may have been told to wait for its turn.
+            for refused in runs.iter().filter(|run| run.code != Some(0)) {
+                refused.must_fail(act.word());
+            }
+            act.check_whole("beside another");
+        }
+        act.run_well("alone again");
+    }
+}

@@ -1,0 +1,106 @@
+//! Camera files.
+//!
+//! In: camera files of every form. Out: files with numbers, names and structures that are wrong; the cameras that are accepted draw a scene.
+
+use super::{Outcome, Reader};
+use crate::accepted;
+use crate::change::{bytes, text};
+use crate::support::random::Random;
+use crate::support::{dataset, packed_scene};
+use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, MAX_SIDE, TrainingView};
+use bevy_gs4d::reference;
+use bevy_gs4d::scene::RuntimeScene;
+use glam::{UVec2, Vec3};
+use serde_json::{Value, json};
+use std::collections::HashSet;
+use std::ffi::OsStr;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// Most views of a file that are drawn.
+const DRAWN: usize = 2;
+/// Longest side of a picture that is drawn, pixels.
+const SIDE: u32 = 256;
+
+/// The reader of camera files.
+pub struct Cameras {
+    folder: TempDir,
+    scene: RuntimeScene,
+    seeds: Vec<String>,
+}
+
+impl Cameras {
+    /// Makes a seed of every form.
+    pub fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let scene = packed_scene::scene(40, 1, 0);
+        dataset::write(folder.path(), &scene, Vec3::ZERO, 2, 2, UVec2::new(40, 30), false);
+        let transforms = fs::read_to_string(folder.path().join("transforms_test.json")).expect("just written");
+        let transforms: Value = serde_json::from_str(&transforms).expect("a camera file");
+        let mut intrinsics = transforms.clone();
+        for (name, value) in [("fl_x", 60.0), ("fl_y", 61.0), ("cx", 20.0), ("cy", 15.0)] {
+            intrinsics[name] = json!(value);
+        }
+        for frame in intrinsics["frames"].as_array_mut().expect("frames") {
+            frame["mask_path"] = json!("./masks/a.png");
+        }
+        let pose = json!([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 3], [0, 0, 0, 1]]);
+        let golden = json!({ "views": [{
+            "file": "./images/a.jpg", "time": 0.5, "width": 40, "height": 30, "fl_x": 60.0, "fl_y": 61.0,
+            "world_to_camera_opencv": pose,
+        }] });
+        let seeds = Vec::from([transforms, intrinsics, golden].map(|seed| seed.to_string()));
+        Self { folder, scene, seeds }
+    }
+}
+
+impl Reader for Cameras {
+    fn input(&self, random: &mut Random) -> Vec<u8> {
+        let (seed, other) = (random.pick(&self.seeds), random.pick(&self.seeds));
+        let mut file = text::change(seed, other, random).into_bytes();
+        if random.one_in(16) {
+            bytes::change(&mut file, other.as_bytes(), random);
+        }
+        file
+    }
+
+    fn read(&self, bytes: &[u8]) -> Result<Outcome, String> {
+        let path = self.folder.path().join("cameras.json");
+        fs::write(&path, bytes).expect("the folder can be written to");
+        let small = CameraOptions { size: Some(UVec2::new(24, 16)), ..CameraOptions::default() };
+        let halved = CameraOptions { resolution: Some(2), time_interval: Some([0.0, 1.0]), ..CameraOptions::default() };
+        let mut outcome = Outcome::Drawn;
+        for options in [CameraOptions::default(), small, halved] {
+            match CameraFile::load(&path, &options) {
+                Ok(views) => self.check(&views)?,
+                Err(error) => outcome = Outcome::Refused(error.to_string()),
+            }
+        }
+        Ok(outcome)
+    }
+}
+
+impl Cameras {
+    /// Checks what holds for every file that is accepted, and draws some of its views.
+    fn check(&self, views: &[TrainingView]) -> Result<(), String> {
+        let mut names = HashSet::new();
+        for view in views {
+            let size = view.camera.size;
+            if size.min_element() < 1 || size.max_element() > MAX_SIDE {
+                return Err(format!("has pictures of {size} pixels"));
+            }
+            let plain = Path::new(&view.name).file_name() == Some(OsStr::new(&view.name));
+            if !plain || !names.insert(&view.name) {
+                return Err(format!("has a view named {:?}, which is no file name or not its own", view.name));
+            }
+        }
+        let small = views.iter().filter(|view| view.camera.size.max_element() <= SIDE);
+        for TrainingView { camera, time, .. } in small.take(DRAWN) {
+            let view = camera.view(*time, self.scene.trained_with.raster_fov);
+            let frame = reference::render(&self.scene, &view, self.scene.trained_background());
+            accepted::check_frame(&frame, *time)?;
+        }
+        Ok(())
+    }
+}

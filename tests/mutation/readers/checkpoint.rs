@@ -1,0 +1,109 @@
+//! Checkpoints.
+//!
+//! In: crafted checkpoints of every model. Out: archives whose directory and checksums are right around pickles and tensors that are not.
+
+use super::{Outcome, Reader};
+use crate::accepted;
+use crate::change::archive::{self, Entry};
+use crate::change::{bytes, numbers, pickle};
+use crate::support::pth::{self, Pth};
+use crate::support::random::Random;
+use bevy_gs4d::codec::checkpoint::{self, CheckpointOptions};
+use std::io::{Cursor, Read};
+use zip::ZipArchive;
+
+/// The reader of checkpoints.
+pub struct Checkpoints {
+    seeds: Vec<Vec<Entry>>,
+}
+
+impl Checkpoints {
+    /// Makes a seed of every model, with and without an environment map.
+    pub fn new() -> Self {
+        Self { seeds: checkpoints().iter().map(|pth| entries(&pth.bytes())).collect() }
+    }
+}
+
+impl Reader for Checkpoints {
+    fn input(&self, random: &mut Random) -> Vec<u8> {
+        let (mut entries, other) = (random.pick(&self.seeds).clone(), random.pick(&self.seeds));
+        for _ in 0..=random.below(3) {
+            change(&mut entries, other, random);
+        }
+        let mut file = archive::file(&entries);
+        if random.one_in(16) {
+            bytes::change(&mut file, &archive::file(other), random);
+        }
+        file
+    }
+
+    fn read(&self, bytes: &[u8]) -> Result<Outcome, String> {
+        match checkpoint::read(Cursor::new(bytes), &CheckpointOptions::default(), None) {
+            Ok(scene) => accepted::check(scene),
+            Err(error) => Ok(Outcome::Refused(error.to_string())),
+        }
+    }
+}
+
+/// Returns a checkpoint of the model that rotates in 4D, one with an environment map and few coefficients, one that does not rotate, and a
+/// static one.
+pub fn checkpoints() -> Vec<Pth> {
+    let rotating = Pth::rotating(5, 48);
+    let mut surrounded = Pth::rotating(3, 16);
+    surrounded.slots[18] = pth::int(0);
+    surrounded.set(17, &[3, 2, 2], (0..12).map(|at| at as f32 / 12.0).collect());
+    let mut moving = Pth::rotating(4, 1);
+    moving.slots[0] = pth::int(0);
+    moving.slots[16] = pth::flag(false);
+    moving.slots[18] = pth::int(0);
+    let mut still = moving.clone();
+    // The state of the 3D model ends with the factor of its rates.
+    still.slots[11] = pth::float(5.5);
+    still.slots.truncate(12);
+    vec![rotating, surrounded, moving, still]
+}
+
+/// Returns the entries of an archive.
+fn entries(file: &[u8]) -> Vec<Entry> {
+    let mut zip = ZipArchive::new(Cursor::new(file)).expect("a zip archive");
+    let count = zip.len();
+    let read = |at: usize| {
+        let mut entry = zip.by_index(at).expect("an entry");
+        let mut body = Vec::new();
+        entry.read_to_end(&mut body).expect("a whole entry");
+        Entry::new(entry.name().expect("a name").into_owned(), body)
+    };
+    (0..count).map(read).collect()
+}
+
+/// Changes the pickle, the values of a tensor, or the archive.
+fn change(entries: &mut Vec<Entry>, other: &[Entry], random: &mut Random) {
+    let at = random.below(entries.len());
+    match random.below(8) {
+        0..=3 => {
+            let other = other.iter().find(|entry| is_pickle(entry)).map_or(&[][..], |entry| &entry.body[..]);
+            if let Some(entry) = entries.iter_mut().find(|entry| is_pickle(entry)) {
+                entry.body = pickle::change(&entry.body, other, random);
+            }
+        }
+        4..=6 => {
+            if let Some(entry) = entries.get_mut(at).filter(|entry| entry.name.contains("/data/")) {
+                change_values(&mut entry.body, random);
+            }
+        }
+        _ => archive::change(entries, other, random),
+    }
+}
+
+fn is_pickle(entry: &Entry) -> bool {
+    entry.name.ends_with("data.pkl")
+}
+
+/// Changes one value of a tensor, a few, or all.
+fn change_values(body: &mut [u8], random: &mut Random) {
+    let count = body.len() / 4;
+    let (first, changed, value) = (random.below(count), *random.pick(&[1, 1, 3, count]), numbers::float(random));
+    for four in body.chunks_exact_mut(4).skip(first).take(changed) {
+        four.copy_from_slice(&value.to_le_bytes());
+    }
+}

@@ -1,0 +1,364 @@
+//! Packages.
+//!
+//! In: small scenes in every form. Out: packages whose checksums, lengths and compression are right around a header and sections that are not.
+
+use super::{Outcome, Reader};
+use crate::accepted;
+use crate::change::{bytes, numbers, text};
+use crate::support::packed_scene;
+use crate::support::random::Random;
+use bevy_gs4d::codec::package::{
+    self, EnvironmentSize, FLOAT_PLANES, Header, MAGIC, Section, StoredFilter, StoredForm, VERSION, WriteSettings,
+};
+use bevy_gs4d::gaussian::{Model, Parameters};
+use bevy_gs4d::offline::quantize::compress;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{Environment, FilterKind, GaussianScene, SceneForm, TemporalFilter, Trained};
+use std::io::Cursor;
+
+/// Most bytes of a section that is made to fit.
+const FITTED: usize = 1 << 20;
+
+/// The reader of packages.
+pub struct Packages {
+    seeds: Vec<Parts>,
+}
+
+/// A package in its parts.
+#[derive(Clone)]
+struct Parts {
+    header: Header,
+    /// What each section decompresses to.
+    bodies: Vec<Vec<u8>>,
+}
+
+impl Packages {
+    /// Makes a seed of every form.
+    pub fn new() -> Self {
+        Self { seeds: scenes().iter().map(Parts::of).collect() }
+    }
+}
+
+impl Reader for Packages {
+    fn input(&self, random: &mut Random) -> Vec<u8> {
+        let (mut parts, other) = (random.pick(&self.seeds).clone(), random.pick(&self.seeds));
+        for _ in 0..random.below(4) {
+            parts.change(other, random);
+        }
+        if random.one_in(2) {
+            parts.fit();
+        }
+        let mut file = parts.seal(&other.header, random);
+        if random.one_in(16) {
+            bytes::change(&mut file, &other.clone().seal(&other.header, random), random);
+        }
+        file
+    }
+
+    fn read(&self, bytes: &[u8]) -> Result<Outcome, String> {
+        let intact = package::inspect(Cursor::new(bytes)).is_ok_and(|info| info.is_intact());
+        match package::read(Cursor::new(bytes)) {
+            Ok(_) if !intact => Err("is read, although inspecting it finds damage".to_owned()),
+            Ok(scene) => accepted::check(scene),
+            Err(error) => Ok(Outcome::Refused(error.to_string())),
+        }
+    }
+}
+
+/// Returns a small scene of every form, with and without what a scene may have.
+fn scenes() -> Vec<GaussianScene> {
+    let forty = SynthSettings { count: 40, ..SynthSettings::default() };
+    let synth = |degree, degree_t| synthesize(&SynthSettings { degree, degree_t, ..forty });
+    let (rotated, mut moving, mut still, mut surrounded) = (synth(1, 0), synth(0, 0), synth(0, 0), synth(3, 1));
+    if let SceneForm::Trained(Trained { parameters, .. }) = &mut moving.form {
+        parameters.rotation_r.clear();
+    }
+    if let SceneForm::Trained(Trained { parameters, .. }) = &mut still.form {
+        let Parameters { mean_t, log_scale_t, rotation_r, .. } = parameters;
+        mean_t.clear();
+        log_scale_t.clear();
+        rotation_r.clear();
+    }
+    let texels = (0..24).map(|at| at as f32 / 24.0).collect();
+    surrounded.environment = Some(Environment { width: 4, height: 2, texels });
+    let sliced = packed_scene::scene(40, 0, 0);
+    // Forty segments are smaller as intervals.
+    let mut interval = packed_scene::scene(40, 1, 0);
+    let support = TemporalFilter::support(interval.iter(), interval.trained_with.time_interval, 40);
+    interval.filter = Some(support);
+    let pack = |degree, degree_t, codebooks: &[usize]| {
+        let scene = packed_scene::scene(40, degree, degree_t);
+        compress(scene, &packed_scene::settings(codebooks)).expect("a synthetic scene can be compressed").0
+    };
+    vec![
+        rotated,
+        moving,
+        still,
+        surrounded,
+        sliced.into(),
+        interval.into(),
+        pack(3, 0, &[4, 4]),
+        pack(1, 0, &[3]),
+        pack(0, 0, &[]),
+        synthesize(&SynthSettings { count: 0, ..SynthSettings::default() }),
+    ]
+}
+
+impl Parts {
+    fn of(scene: &GaussianScene) -> Self {
+        let mut file = Vec::new();
+        package::write(&mut file, scene, &WriteSettings::default()).expect("seeds can be written");
+        let header = package::inspect(Cursor::new(&file)).expect("what was written can be read").header;
+        let length: usize = header.sections.iter().map(|section| 8 + section.length).sum();
+        let mut rest = &file[file.len() - length..];
+        let mut bodies = Vec::new();
+        for section in &header.sections {
+            let (body, after) = rest[8..].split_at(section.length);
+            bodies.push(zstd::bulk::decompress(body, section.raw_length).expect("what was written can be read"));
+            rest = after;
+        }
+        Self { header, bodies }
+    }
+
+    /// Changes one value, section or number.
+    fn change(&mut self, other: &Self, random: &mut Random) {
+        let sections = &mut self.header.sections;
+        let at = random.below(sections.len());
+        match random.below(16) {
+            0..=4 => self.change_value(random),
+            5..=8 => change_number(&mut self.header, random),
+            9 => change_switch(&mut self.header, random),
+            10 if !sections.is_empty() => {
+                sections.remove(at);
+                self.bodies.remove(at);
+            }
+            11 if !sections.is_empty() => {
+                let with = random.below(sections.len());
+                sections.swap(at, with);
+                self.bodies.swap(at, with);
+            }
+            12 if !sections.is_empty() => {
+                sections.insert(at, sections[at].clone());
+                self.bodies.insert(at, self.bodies[at].clone());
+            }
+            13 if !other.bodies.is_empty() => {
+                let from = random.below(other.bodies.len());
+                sections.insert(at, other.header.sections[from].clone());
+                self.bodies.insert(at, other.bodies[from].clone());
+            }
+            14 if !sections.is_empty() => {
+                let section = &mut sections[at];
+                match random.below(4) {
+                    0 => section.first = numbers::whole(random) as usize,
+                    1 => section.count = numbers::whole(random) as usize,
+                    2 => section.name = random.pick(&["mean", "sh_rest", "filter", "x", "", "\u{1b}[2J"]).to_string(),
+                    _ => section.encoding = random.pick(&["", "f16-planes-zstd", "\u{1b}[2J\nerror:"]).to_string(),
+                }
+            }
+            _ => self.add_unknown(random),
+        }
+    }
+
+    /// Changes some words of a section: to the ends of their type, or by a power of ten.
+    fn change_value(&mut self, random: &mut Random) {
+        let at = random.below(self.bodies.len());
+        let Some(planes) = self.bodies.get_mut(at).filter(|planes| planes.len() >= 4) else { return };
+        let words = planes.len() / 4;
+        let (first, count) = (random.below(words), *random.pick(&[1, 1, 3, words]));
+        let float = numbers::float(random);
+        let whole = numbers::whole(random) as u32;
+        let factor = 10.0f32.powi(random.below(80) as i32 - 40);
+        let way = random.below(4);
+        for word in first..words.min(first.saturating_add(count)) {
+            let old = u32::from_le_bytes([0, 1, 2, 3].map(|plane| planes[plane * words + word]));
+            let new = match way {
+                0 | 1 => float.to_bits(),
+                2 => whole,
+                _ => (f32::from_bits(old) * factor).to_bits(),
+            };
+            for (plane, byte) in new.to_le_bytes().into_iter().enumerate() {
+                planes[plane * words + word] = byte;
+            }
+        }
+    }
+
+    /// Adds sections that no reader knows: a few, or very many.
+    fn add_unknown(&mut self, random: &mut Random) {
+        for number in 0..*random.pick(&[1, 3, 10_000]) {
+            let name = format!("x{number}");
+            self.header.sections.push(section(name, 0));
+            self.bodies.push(Vec::new());
+        }
+    }
+
+    /// Makes the sections those that the header needs, as large as it needs them, so that a reader comes to the contents.
+    fn fit(&mut self) {
+        let needed = layout(&self.header);
+        if needed.iter().any(|&(_, rows, width)| rows.saturating_mul(width).saturating_mul(4) > FITTED) {
+            return;
+        }
+        let sections = std::mem::take(&mut self.header.sections);
+        let bodies = std::mem::take(&mut self.bodies);
+        for (name, rows, width) in needed {
+            let known = sections.iter().zip(&bodies).find(|(section, _)| section.name == name);
+            let mut body = known.map(|(_, body)| body.clone()).unwrap_or_default();
+            body.resize(rows * width * 4, 0);
+            self.header.sections.push(section(name.to_owned(), rows));
+            self.bodies.push(body);
+        }
+    }
+
+    /// Returns the file: bodies compressed, lengths and checksums right, most of the time; the text of the header changed now and then.
+    fn seal(mut self, other: &Header, random: &mut Random) -> Vec<u8> {
+        let mut sections = Vec::new();
+        for (section, planes) in self.header.sections.iter_mut().zip(&self.bodies) {
+            let mut body = Vec::new();
+            if !planes.is_empty() {
+                body = zstd::bulk::compress(planes, 1).expect("memory can be written to");
+            }
+            if random.one_in(100) {
+                bytes::change(&mut body, &[], random);
+            }
+            section.raw_length = if random.one_in(100) { numbers::whole(random) as usize } else { planes.len() };
+            section.length = body.len();
+            section.crc32 = crc32fast::hash(&body);
+            sections.extend((body.len() as u64).to_le_bytes());
+            sections.extend(body);
+        }
+        let mut header = in_words(&self.header);
+        if random.one_in(3) {
+            header = text::change(&header, &in_words(other), random);
+        }
+        let mut start = MAGIC.to_vec();
+        start.extend(VERSION.to_le_bytes());
+        start.extend((header.len() as u64).to_le_bytes());
+        let checksum = crc32fast::hash(&[&start[..], header.as_bytes()].concat());
+        [&start[..], &checksum.to_le_bytes(), header.as_bytes(), &sections].concat()
+    }
+}
+
+/// Returns an entry of the table of sections, whose lengths follow when the file is made.
+fn section(name: String, count: usize) -> Section {
+    Section { name, encoding: FLOAT_PLANES.to_owned(), first: 0, count, length: 0, raw_length: 0, crc32: 0 }
+}
+
+/// Returns the text of a header.
+fn in_words(header: &Header) -> String {
+    let config = ron::ser::PrettyConfig::new().depth_limit(2).new_line("\n");
+    ron::ser::to_string_pretty(header, config).expect("a header can be written as text")
+}
+
+/// Changes a number that decides about the size of the scene, or its form.
+fn change_number(header: &mut Header, random: &mut Random) {
+    const COUNTS: [usize; 12] = [0, 1, 2, 31, 32, 33, 39, 41, 255, 256, 257, 1000];
+    const COEFFICIENTS: [usize; 14] = [0, 1, 2, 4, 5, 9, 10, 15, 16, 17, 32, 33, 48, 49];
+    let any = random.one_in(5).then(|| numbers::whole(random));
+    let small = |random: &mut Random| any.map_or(random.below(5) as u32, |any| any as u32);
+    match random.below(8) {
+        0 => header.gaussians = any.map_or(*random.pick(&COUNTS), |any| any as usize),
+        1 | 2 => header.coefficients = any.map_or(*random.pick(&COEFFICIENTS), |any| any as usize),
+        3 => header.degree = small(random),
+        4 => header.degree_t = small(random),
+        5 => {
+            let size = EnvironmentSize { width: small(random), height: random.below(5) as u32 };
+            header.environment = Some(size).filter(|_| !random.one_in(3));
+        }
+        6 => {
+            let kind = *random.pick(&[FilterKind::KeyFrame, FilterKind::Interval, FilterKind::Support]);
+            let segments = *random.pick(&[0, 1, 9, 40, 65_535, 65_536, u32::MAX]);
+            let filter = StoredFilter { kind, segments, bits: random.one_in(2) };
+            header.filter = Some(filter).filter(|_| !random.one_in(3));
+        }
+        _ => header.form = form(random),
+    }
+}
+
+fn form(random: &mut Random) -> StoredForm {
+    match random.below(6) {
+        0 => StoredForm::Trained { model: Model::Rotated4d },
+        1 => StoredForm::Trained { model: Model::Unrotated4d },
+        2 => StoredForm::Trained { model: Model::Static3d },
+        3 => StoredForm::Sliced,
+        4 => StoredForm::Packed { codebooks: None },
+        _ => {
+            let mut entries = || *random.pick(&[0, 0, 1, 3, 4, 65_536, 65_537, u32::MAX]);
+            StoredForm::Packed { codebooks: Some([entries(), entries(), entries(), entries()]) }
+        }
+    }
+}
+
+/// Changes how the capture was trained or is played, or what a reader must know.
+fn change_switch(header: &mut Header, random: &mut Random) {
+    let trained = &mut header.trained_with;
+    match random.below(9) {
+        0 => trained.time_interval[random.below(2)] = numbers::float(random),
+        1 => trained.time_interval = [f32::MIN, f32::MAX],
+        2 => trained.background[random.below(3)] = numbers::float(random),
+        3 => trained.prefilter_var = numbers::float(random),
+        4 => trained.spatial_lr_scale = f64::from(numbers::float(random)),
+        5 => trained.iteration = numbers::whole(random),
+        6 => trained.force_sh_3d = !trained.force_sh_3d,
+        7 => header.playback.duration_seconds = numbers::float(random),
+        _ => {
+            let feature = *random.pick(&["packed", "filter", "more", "\u{1b}[2J\nerror: more"]);
+            header.requires.push(feature.to_owned());
+        }
+    }
+}
+
+/// Returns the sections that a header needs, in order: name, rows, words of a row. `docs/format.md` has the same in words.
+fn layout(header: &Header) -> Vec<(&'static str, usize, usize)> {
+    let (count, coefficients) = (header.gaussians, header.coefficients);
+    let mut sections: Vec<(&'static str, usize, usize)> = match header.form {
+        StoredForm::Trained { model } => {
+            let (timed, rotated) = (model != Model::Static3d, model == Model::Rotated4d);
+            let all = [
+                (true, "mean", 3),
+                (timed, "mean_t", 1),
+                (true, "log_scale", 3),
+                (timed, "log_scale_t", 1),
+                (true, "rotation_l", 4),
+                (rotated, "rotation_r", 4),
+                (true, "opacity_logit", 1),
+            ];
+            all.into_iter().filter(|(has, ..)| *has).map(|(_, name, width)| (name, count, width)).collect()
+        }
+        StoredForm::Sliced => vec![
+            ("mean", count, 3),
+            ("mean_t", count, 1),
+            ("velocity", count, 3),
+            ("sigma_t", count, 1),
+            ("covariance", count, 6),
+            ("opacity", count, 1),
+        ],
+        StoredForm::Packed { .. } => vec![
+            ("packed_mean", count, 2),
+            ("packed_motion", count, 2),
+            ("packed_shape", count, 4),
+            ("packed_ranges", 3 + 2 * count.div_ceil(256), 4),
+        ],
+    };
+    if let StoredForm::Packed { codebooks: Some(entries) } = header.form {
+        let stages = entries.iter().filter(|&&entries| entries > 0).count();
+        let words = coefficients.saturating_mul(3).div_ceil(4);
+        sections.push(("color_base", count, 1));
+        if stages > 0 {
+            sections.push(("color_codes", count, stages.div_ceil(2)));
+            sections.push(("codebooks", entries.iter().map(|&entries| entries as usize).sum(), words));
+            sections.push(("codebook_scales", stages.saturating_mul(words), 4));
+        }
+    } else {
+        sections.push(("sh_dc", count, 3));
+        if coefficients > 1 {
+            sections.push(("sh_rest", count, coefficients.saturating_mul(3) - 3));
+        }
+    }
+    if let Some(filter) = header.filter {
+        let bits = count.div_ceil(32).saturating_mul(filter.segments as usize);
+        sections.push(("filter", if filter.bits { bits } else { count }, 1));
+    }
+    if let Some(size) = header.environment {
+        sections.push(("environment", (size.width as usize).saturating_mul(size.height as usize).saturating_mul(3), 1));
+    }
+    sections
+}
