@@ -480,7 +480,7 @@ impl<'a> Trainer<'a> {
             return false;
         }
         if state.filter != self.scene.filter
-            && !state.filter.clone().is_some_and(|filter| self.set_filter(filter).is_ok())
+            && state.filter.clone().is_none_or(|filter| self.set_filter(filter).is_err())
         {
             return false;
         }

@@ -20,7 +20,7 @@ use bevy_gs4d::offline::score::ScoringSettings;
 use bevy_gs4d::offline::score::variant::Variant;
 use bevy_gs4d::offline::search::{Goal, ScoreChoice};
 use bevy_gs4d::offline::temporal_filter::KeyFrames;
-use bevy_gs4d::offline::{self, NoProgress, OfflineError};
+use bevy_gs4d::offline::{self, NoProgress};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{FilterKind, GaussianScene};
 use glam::{UVec2, Vec3};
@@ -85,8 +85,9 @@ impl Saved {
         saved
     }
 
-    fn bake(&self) -> Result<(), OfflineError> {
-        bake(self.scene.clone(), &self.settings, &mut Engine::Cpu, &mut NoProgress).map(drop)
+    fn bake(&self) -> Result<(), String> {
+        let baked = bake(self.scene.clone(), &self.settings, &mut Engine::Cpu, &mut NoProgress);
+        baked.map(drop).map_err(|error| error.to_string())
     }
 
     /// Returns the folder of the results.
