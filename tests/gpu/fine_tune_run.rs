@@ -4,7 +4,7 @@
 //! follows the Gaussians, and that an interrupted run ends as another. Skipped where there is no GPU.
 
 use crate::support::{dataset, gpu};
-use bevy_gs4d::gaussian::GradientMode;
+use bevy_gs4d::gaussian::{GradientMode, Parameters};
 use bevy_gs4d::offline::dataset::{Split, TrainingView};
 use bevy_gs4d::offline::fine_tune::{
     FineTuneSettings, FineTuned, Rates, Resume, Sample, Trainer, TrainingImages, fine_tune,
@@ -16,7 +16,7 @@ use bevy_gs4d::offline::work::{Fingerprint, Work};
 use bevy_gs4d::offline::{NoProgress, Progress};
 use bevy_gs4d::renderer::Headless;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{FilterKind, GaussianScene, SceneForm, TemporalFilter, Trained};
+use bevy_gs4d::scene::{Environment, FilterKind, GaussianScene, SceneForm, TemporalFilter, Trained};
 use bevy_gs4d::view::Background;
 use glam::{UVec2, Vec3};
 use tempfile::TempDir;
@@ -32,8 +32,11 @@ struct Lesson {
 
 impl Lesson {
     fn new() -> Self {
+        Self::of(synthesize(&SynthSettings { count: COUNT, ..SynthSettings::default() }))
+    }
+
+    fn of(scene: GaussianScene) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let scene = synthesize(&SynthSettings { count: COUNT, ..SynthSettings::default() });
         let runtime = scene.clone().into_runtime().expect("a synthetic scene can be drawn");
         let data = folder.path().join("data");
         dataset::write(&data, &runtime, Vec3::ZERO, 3, 4, UVec2::splat(40), true);
@@ -184,4 +187,50 @@ fn runs_that_were_interrupted_end_as_others() {
         assert!(!resumed.interrupted && resumed.scene == whole.scene, "{task}: the same scene");
         assert_eq!(resumed.best, whole.best, "{task}: the same quality");
     }
+}
+
+#[test]
+fn captures_of_every_model_and_with_an_environment_map_are_trained() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let texels = (0..3 * 8 * 4).map(|i| i as f32 / 95.0).collect();
+    let map = Environment { width: 8, height: 4, texels };
+    let cases: [(&str, fn(&mut Parameters), Option<Environment>); 4] = [
+        ("rotated", |_| {}, None),
+        ("unrotated", |parameters| parameters.rotation_r.clear(), None),
+        (
+            "static",
+            |parameters| {
+                parameters.rotation_r.clear();
+                parameters.mean_t.clear();
+                parameters.log_scale_t.clear();
+            },
+            None,
+        ),
+        ("environment", |_| {}, Some(map)),
+    ];
+    for (name, change, environment) in cases {
+        let mut scene = synthesize(&SynthSettings { count: COUNT, ..SynthSettings::default() });
+        change(&mut trained(&mut scene).parameters);
+        scene.environment = environment;
+        let lesson = Lesson::of(scene);
+        let settings = FineTuneSettings { steps: 20, held_out: 2, evaluate_every: 20, ..FineTuneSettings::default() };
+        let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.views, &settings, None, &mut NoProgress);
+        let tuned = tuned.unwrap_or_else(|error| panic!("{name}: {error}"));
+        let [first, .., _] = tuned.curve[..] else { panic!("{name}: a curve") };
+        assert!(tuned.best.psnr > first.psnr + 0.5, "{name}: {:.2} to {:.2} dB", first.psnr, tuned.best.psnr);
+        assert_eq!(tuned.scene.environment, lesson.scene.environment, "{name}: the map stays");
+    }
+}
+
+#[test]
+fn training_ends_early_when_it_no_longer_helps() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new();
+    let rates = Rates { color: 0.0, harmonics: 0.0, opacity: 0.0, scale: 0.0, rotation: 0.0, mean: 0.0, mean_t: 0.0 };
+    let settings =
+        FineTuneSettings { steps: 50, held_out: 2, evaluate_every: 1, patience: Some(3), rates, ..Default::default() };
+    let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.views, &settings, None, &mut NoProgress);
+    let tuned = tuned.expect("it can be trained");
+    assert_eq!((tuned.curve.len(), tuned.best.step), (4, 0), "three evaluations without an improvement");
+    assert!(!tuned.interrupted, "nobody interrupted it");
 }
