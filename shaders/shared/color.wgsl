@@ -23,9 +23,12 @@
 // A color is the sum of this many shares, which several threads can compute.
 const SHARES: u32 = 4u;
 
+// As in `Harmonics::color`.
+const BRIGHTEST: f32 = 1e30;
+
 // Returns the color from the sum of all shares, in the blend space.
 fn finished_color(sum: vec3<f32>) -> vec3<f32> {
-    return lit(max(sum, vec3(0.0)), instance.lighting, instance.light);
+    return lit(clamp(sum, vec3(0.0), vec3(BRIGHTEST)), instance.lighting, instance.light);
 }
 
 // Returns the color of a Gaussian in the view of the instance, in the blend space.

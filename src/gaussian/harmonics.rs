@@ -5,6 +5,9 @@
 
 use glam::Vec3;
 
+/// The largest color: huge coefficients stay finite, and so do pictures. As in `shaders/shared/color.wgsl`.
+const BRIGHTEST: f32 = 1e30;
+
 /// Color coefficients of `N` Gaussians.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Harmonics {
@@ -95,7 +98,7 @@ impl Harmonics {
                 color += time_cosine(n, tau, time_span) * block(16 * n, 16);
             }
         }
-        (color + 0.5).max(Vec3::ZERO)
+        (color + 0.5).max(Vec3::ZERO).min(Vec3::splat(BRIGHTEST))
     }
 }
 

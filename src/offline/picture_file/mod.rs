@@ -8,9 +8,11 @@
 
 mod huffman;
 mod jpeg;
+mod png;
 
 use glam::UVec2;
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use image::error::DecodingError;
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use std::fs::File;
 use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
@@ -38,7 +40,7 @@ pub enum PictureError {
         /// The file.
         path: PathBuf,
         /// The error of the decoder.
-        reason: image::ImageError,
+        reason: ImageError,
     },
     /// The file ends, but not the picture.
     #[error("{}: not a whole JPEG image: {reason}", .path.display())]
@@ -88,11 +90,15 @@ pub fn open(path: &Path, largest: UVec2) -> Result<DynamicImage, PictureError> {
     let failed = |reason| PictureError::Format { path: path.to_owned(), reason };
     let bytes = read(path)?;
     let reader = reader(path, &bytes)?;
-    let is_jpeg = reader.format() == Some(ImageFormat::Jpeg);
+    let format = reader.format();
     let decoder = reader.into_decoder().map_err(failed)?;
     checked_size(path, &decoder, largest)?;
-    if is_jpeg {
+    if format == Some(ImageFormat::Jpeg) {
         jpeg::check(&bytes).map_err(|reason| PictureError::Incomplete { path: path.to_owned(), reason })?;
+    }
+    if format == Some(ImageFormat::Png) && !png::has_whole_palette(&bytes) {
+        let error = DecodingError::new(ImageFormat::Png.into(), "its palette is not one of whole colours");
+        return Err(failed(ImageError::Decoding(error)));
     }
     Limits::default().reserve(decoder.total_bytes()).map_err(failed)?;
     DynamicImage::from_decoder(decoder).map_err(failed)
