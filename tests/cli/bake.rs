@@ -5,8 +5,8 @@
 //! cannot be written are refused.
 
 use crate::support::command::{arguments, gs4d};
-use crate::support::dataset;
 use crate::support::skip::skip;
+use crate::support::{dataset, folders};
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
 use bevy_gs4d::renderer::GpuContext;
@@ -40,11 +40,7 @@ impl Capture {
     }
 
     fn left(&self) -> Vec<String> {
-        let entries = fs::read_dir(self.folder.path()).expect("the folder");
-        let mut names: Vec<String> =
-            entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
-        names.sort();
-        names
+        folders::names(self.folder.path())
     }
 }
 

@@ -4,8 +4,8 @@
 //! compressed on the way, and that wrong inputs are refused with nothing left behind. Skipped where there is no GPU.
 
 use crate::support::command::{arguments, gs4d};
-use crate::support::dataset;
 use crate::support::skip::skip;
+use crate::support::{dataset, folders};
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
 use bevy_gs4d::renderer::GpuContext;
@@ -44,11 +44,7 @@ impl Lesson {
     }
 
     fn left(&self) -> Vec<String> {
-        let entries = fs::read_dir(self.folder.path()).expect("the folder");
-        let mut names: Vec<String> =
-            entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
-        names.sort();
-        names
+        folders::names(self.folder.path())
     }
 }
 

@@ -21,6 +21,7 @@ mod support {
     pub mod command;
     pub mod data;
     pub mod dataset;
+    pub mod folders;
     pub mod npy;
     pub mod npz;
     pub mod package_parts;

@@ -6,14 +6,14 @@
 
 use crate::support::command::{arguments, folder, gs4d, scene};
 use crate::support::dataset;
+use crate::support::folders::contents;
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use glam::{UVec2, Vec3};
-use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::fs::{self, File};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use tempfile::TempDir;
 
 /// A folder with a scene, `scene.gs4d`, and its own pictures, `data`.
@@ -37,20 +37,6 @@ impl Capture {
     fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
-}
-
-/// Returns the contents of all files in a folder and the folders in it.
-fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut all = BTreeMap::new();
-    for entry in fs::read_dir(folder).expect("the folder can be listed") {
-        let path = entry.expect("an entry").path();
-        if path.is_dir() {
-            all.extend(contents(&path));
-        } else {
-            all.insert(path.clone(), fs::read(&path).expect("the file can be read"));
-        }
-    }
-    all
 }
 
 #[test]

@@ -6,7 +6,6 @@ use super::Bake;
 use super::pruning::Pruning;
 use super::stages::Stages;
 use crate::codec::package;
-use crate::offline::fine_tune::settings_of;
 use crate::offline::prune::{highest, select};
 use crate::offline::quantize::{CompressSettings, compress};
 use crate::offline::search::Goal;
@@ -64,7 +63,7 @@ impl Bake<'_> {
         let interval = scene.trained_with.time_interval;
         scene.filter = Some(TemporalFilter::support(sliced(&scene)?.iter().copied(), interval, segments));
         let options = match self.tunes() {
-            Some(_) => settings_of(settings.quality, kept.len()),
+            Some(_) => CompressSettings::suiting(settings.quality, kept.len()),
             None => CompressSettings::from(settings.quality),
         };
         let (compressed, _) = compress(scene.into_runtime()?, &options)?;

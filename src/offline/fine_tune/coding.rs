@@ -10,19 +10,8 @@ use crate::offline::quantize::{self, CompressSettings, Quality, compress_tied, t
 use crate::offline::{OfflineError, Progress};
 use crate::scene::GaussianScene;
 
-/// Gaussians for each entry of a codebook, at least, and entries of a codebook, at least.
-const GAUSSIANS_OF_ENTRY: usize = 64;
-const LEAST_ENTRIES: usize = 64;
 /// Factor on the rates while codebooks are trained.
 const RATE: f64 = 0.5;
-
-/// Returns the settings of a quality, with codebooks that suit a number of Gaussians.
-pub(crate) fn settings_of(quality: Quality, gaussians: usize) -> CompressSettings {
-    let mut settings = CompressSettings::from(quality);
-    let suiting = (gaussians / GAUSSIANS_OF_ENTRY).next_power_of_two().max(LEAST_ENTRIES);
-    settings.codebooks.iter_mut().for_each(|entries| *entries = (*entries).min(suiting));
-    settings
-}
 
 impl Run<'_> {
     /// Codes the colors by codebooks whose number of entries follows that of the Gaussians, trains these and everything else for some more
@@ -39,7 +28,7 @@ impl Run<'_> {
         let made = self.settings.steps;
         self.trainer.forget_moments();
         let scene = self.trainer.scene()?.into_runtime()?;
-        let settings = settings_of(quality, scene.len());
+        let settings = CompressSettings::suiting(quality, scene.len());
         let steps = if settings.codebooks.is_empty() { 0 } else { steps };
         let mut step = 0;
         if steps > 0 {

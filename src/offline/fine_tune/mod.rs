@@ -19,19 +19,21 @@ mod regularizer;
 mod resume;
 mod run;
 mod schedule;
+mod state;
 mod targets;
 mod terms;
 mod tied;
 mod trainer;
+mod view_buffers;
 
 pub use adam::{DECAY, Moments, adam};
-pub(super) use coding::settings_of;
 pub use loss::{Loss, OpacityMask, loss, opacity_mask};
 pub use neighbors::{NEIGHBORS, neighbors};
 pub use schedule::{Behind, Rates};
+pub use state::TrainerState;
 pub use targets::TrainingImages;
 pub use terms::{Regularization, Terms, regularization};
-pub use trainer::{Faults, GpuImage, Sample, Totals, Trainer, TrainerError, TrainerState};
+pub use trainer::{Faults, GpuImage, Sample, Totals, Trainer, TrainerError};
 
 use super::dataset::TrainingView;
 use super::quantize::Quality;

@@ -37,9 +37,9 @@ impl Passes {
         use Bind::{Read, Texture, Uniform, Write};
         let device = &headless.context().device;
         let limits = device.limits();
-        // Two arrays of 8 x 256 numbers, one of 256 vectors and 64 splats in `blend_backward`; the bindings of `project_backward`.
+        // The arrays of `loss`, which has more than the others; the bindings of `project_backward`.
         let needs = [
-            ("max_compute_workgroup_storage_size", limits.max_compute_workgroup_storage_size, 23_812),
+            ("max_compute_workgroup_storage_size", limits.max_compute_workgroup_storage_size, 24_896),
             ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 12),
         ];
         for (what, found, needed) in needs {

@@ -17,50 +17,31 @@
 use super::adam::correction;
 use super::optimized::Optimized;
 use super::passes::Passes;
-use super::records::{records, set_harmonics, set_parameters};
+use super::records::records;
 use super::regularizer::Regularizer;
 use super::schedule::Rates;
 use super::terms::Terms;
 use super::tied::Tied;
+use super::view_buffers::ViewBuffers;
 use crate::gaussian::harmonics::evaluated;
 use crate::gaussian::{GradientMode, InvalidGaussian, Model};
 use crate::offline::dataset::CoveredImage;
-use crate::renderer::layout::{
-    AdamUniforms, FIRST_SEEN, InstanceUniforms, LossUniforms, TILE_SIZE, TrainedRecord, TrainedScene,
-};
+use crate::renderer::layout::{AdamUniforms, FIRST_SEEN, LossUniforms, TrainedScene};
 use crate::renderer::memory::binding_limit;
 use crate::renderer::shaders::{COMPAT, COMPAT_WITHOUT_TIME};
-use crate::renderer::{FinishedFrame, GpuCapture, GpuError, Headless, ShaderChecks};
-use crate::scene::{GaussianScene, SceneForm, TemporalFilter, Trained};
+use crate::renderer::{GpuCapture, GpuError, Headless, ShaderChecks};
+use crate::scene::{GaussianScene, SceneForm, TemporalFilter};
 use crate::view::{Background, Frame, View};
 use glam::UVec2;
 use std::collections::VecDeque;
 use wgpu::BufferUsages;
 
-/// Values that `blend_backward` writes for each pair.
-const SUMS: u64 = 10;
 /// Steps that may be submitted before the first of them has finished.
 const STEPS_IN_FLIGHT: usize = 4;
 /// Bytes of the notes of `project_backward` about gradients that are not finite, before a word for each Gaussian.
 const FAULT_BYTES: u64 = 4 * FIRST_SEEN as u64;
 /// Most workgroups of `adam`.
 pub(super) const ADAM_GROUPS: u32 = 4096;
-
-/// What depends on the size of the picture and of the renderer's buffers.
-#[derive(Debug)]
-struct ViewBuffers {
-    /// What it was created for.
-    splats: wgpu::Buffer,
-    color: wgpu::TextureView,
-    size: UVec2,
-    loss_settings: wgpu::Buffer,
-    pixel_gradients: wgpu::Buffer,
-    depth_gradients: wgpu::Buffer,
-    loss: wgpu::BindGroup,
-    blended: wgpu::BindGroup,
-    sums: wgpu::BindGroup,
-    splat_gradients: wgpu::BindGroup,
-}
 
 /// A scene that is trained.
 #[derive(Debug)]
@@ -69,7 +50,7 @@ pub struct Trainer<'a> {
     pub(super) passes: Passes,
     pub(super) capture: GpuCapture,
     /// What is not trained: switches, coefficients that are not evaluated.
-    scene: GaussianScene,
+    pub(super) scene: GaussianScene,
     model: Model,
     pub(super) geometry: Optimized,
     pub(super) color: Optimized,
@@ -78,12 +59,12 @@ pub struct Trainer<'a> {
     parameters: wgpu::BindGroup,
     /// Gradients that were not finite; which Gaussians the views since the last step have shown.
     pub(super) notes: wgpu::Buffer,
-    totals: wgpu::Buffer,
+    pub(super) totals: wgpu::Buffer,
     pub(super) tied: Option<Tied>,
     pub(super) terms: Terms,
     pub(super) regularizer: Option<Regularizer>,
     sparse: bool,
-    view: Option<ViewBuffers>,
+    pub(super) view: Option<ViewBuffers>,
     in_flight: VecDeque<wgpu::SubmissionIndex>,
 }
 
@@ -127,18 +108,6 @@ pub struct Faults {
     pub gaussian: u32,
     /// Number of that view.
     pub view: u32,
-}
-
-/// Parameters, moments and neighbors, as they are on the GPU.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct TrainerState {
-    /// Raw parameters, their first and their second moments; the same of the color coefficients, and of the entries of codebooks if colors
-    /// are [tied](Trainer::tie).
-    pub buffers: Vec<Vec<u8>>,
-    /// The neighbors of each Gaussian; empty if no term needs them.
-    pub neighbors: Vec<u8>,
-    /// The temporal filter.
-    pub filter: Option<TemporalFilter>,
 }
 
 impl<'a> Trainer<'a> {
@@ -434,77 +403,6 @@ impl<'a> Trainer<'a> {
         Ok((count > 0).then(|| Faults { count, gaussian: gaussian.saturating_sub(1), view }))
     }
 
-    /// Returns the scene as it is.
-    ///
-    /// # Errors
-    /// A lost device.
-    pub fn scene(&self) -> Result<GaussianScene, GpuError> {
-        let (records, values) = (self.read(&self.geometry.values)?, self.read(&self.color.values)?);
-        Ok(self.with(&records, &values))
-    }
-
-    /// Returns the gradients accumulated since the last step, as raw parameters and color coefficients.
-    ///
-    /// # Errors
-    /// A lost device.
-    pub fn gradients(&self) -> Result<GaussianScene, GpuError> {
-        let (records, values) = (self.read(&self.geometry.gradients)?, self.read(&self.color.gradients)?);
-        let mut gradients = self.with(&records, &values);
-        if let SceneForm::Trained(Trained { harmonics, .. }) = &mut gradients.form {
-            let (used, own) = (harmonics.evaluated() * 3, harmonics.coefficients * 3);
-            // Coefficients that are not evaluated change nothing.
-            harmonics.values.chunks_exact_mut(own.max(1)).for_each(|values| values[used..].fill(0.0));
-        }
-        Ok(gradients)
-    }
-
-    /// Returns parameters, moments and neighbors, to resume from.
-    ///
-    /// # Errors
-    /// A lost device.
-    pub fn state(&self) -> Result<TrainerState, GpuError> {
-        let buffers = self.stored().into_iter().map(|buffer| self.read(buffer)).collect::<Result<_, _>>()?;
-        Ok(TrainerState { buffers, neighbors: self.neighbors()?, filter: self.scene.filter.clone() })
-    }
-
-    /// Replaces parameters, moments and filter by those of [`state`](Self::state), and neighbors if it has some that are needed. Returns
-    /// whether they are of as many Gaussians, and of as many entries if colors are tied; if not, nothing is replaced.
-    pub fn resume(&mut self, state: &TrainerState) -> bool {
-        let buffers = self.stored();
-        let fits = |(bytes, buffer): (&Vec<u8>, &&wgpu::Buffer)| bytes.len() as u64 == buffer.size();
-        if state.buffers.len() != buffers.len() || !state.buffers.iter().zip(&buffers).all(fits) {
-            return false;
-        }
-        let neighbors: Vec<u32> = bytemuck::pod_collect_to_vec(&state.neighbors);
-        if neighbors.iter().any(|&index| index as usize >= self.capture.len()) {
-            return false;
-        }
-        if state.filter != self.scene.filter
-            && state.filter.clone().is_none_or(|filter| self.set_filter(filter).is_err())
-        {
-            return false;
-        }
-        for (bytes, buffer) in state.buffers.iter().zip(self.stored()) {
-            self.headless.context().queue.write_buffer(buffer, 0, bytes);
-        }
-        if self.regularizer.as_ref().is_some_and(|made| made.neighbors.size() == state.neighbors.len() as u64) {
-            self.set_neighbors(&state.neighbors);
-        }
-        if let Some(tied) = &self.tied {
-            let mut encoder = self.encoder("gs4d expand");
-            self.expand(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), tied);
-            self.headless.context().queue.submit([encoder.finish()]);
-        }
-        self.slice();
-        true
-    }
-
-    /// Returns the buffers of a state, in its order.
-    fn stored(&self) -> Vec<&wgpu::Buffer> {
-        let all = [Some(&self.geometry), Some(&self.color), self.tied.as_ref().map(|tied| &tied.entries)];
-        all.into_iter().flatten().flat_map(|o| [&o.values, &o.moments[0], &o.moments[1]]).collect()
-    }
-
     /// Replaces the temporal filter.
     ///
     /// # Errors
@@ -513,31 +411,6 @@ impl<'a> Trainer<'a> {
         self.headless.replace_filter(&mut self.capture, &filter, self.scene.trained_with.time_interval)?;
         self.scene.filter = Some(filter);
         Ok(())
-    }
-
-    /// Sets all moments to 0, as before the first step.
-    pub fn forget_moments(&mut self) {
-        let mut encoder = self.encoder("gs4d moments");
-        for moments in self.geometry.moments.iter().chain(&self.color.moments) {
-            encoder.clear_buffer(moments, 0, None);
-        }
-        self.headless.context().queue.submit([encoder.finish()]);
-    }
-
-    pub(super) fn read(&self, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
-        self.headless.copy_out(buffer, buffer.size())
-    }
-
-    /// Returns the scene with these records and color coefficients, as they are on the GPU.
-    fn with(&self, records: &[u8], values: &[u8]) -> GaussianScene {
-        let mut scene = self.scene.clone();
-        if let SceneForm::Trained(Trained { parameters, harmonics }) = &mut scene.form {
-            let records: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(records);
-            set_parameters(parameters, &records);
-            let stride = self.color.stride as usize * 4;
-            set_harmonics(harmonics, &bytemuck::pod_collect_to_vec::<u8, f32>(values), stride);
-        }
-        scene
     }
 
     pub(super) fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
@@ -560,7 +433,7 @@ impl<'a> Trainer<'a> {
     }
 
     /// Slices the parameters.
-    fn slice(&mut self) {
+    pub(super) fn slice(&mut self) {
         self.write_scene(0);
         let mut encoder = self.encoder("gs4d slice");
         {
@@ -570,75 +443,6 @@ impl<'a> Trainer<'a> {
             pass.dispatch_workgroups((self.capture.len() as u32).div_ceil(256), 1, 1);
         }
         self.headless.context().queue.submit([encoder.finish()]);
-    }
-
-    /// Creates what depends on the sizes of the frame that has been recorded, unless it has been.
-    fn fit(&mut self, size: UVec2) -> Result<(), GpuError> {
-        let Some(frame) = self.headless.finished() else { return Ok(()) };
-        let fits =
-            |made: &ViewBuffers| made.size == size && made.splats == frame.buffers.splats && made.color == *frame.color;
-        if !self.view.as_ref().is_some_and(fits) {
-            self.view = Some(self.make(&frame, size)?);
-        }
-        Ok(())
-    }
-
-    fn make(&self, frame: &FinishedFrame<'_>, size: UVec2) -> Result<ViewBuffers, GpuError> {
-        let (allocator, passes) = (self.headless.allocator(), &self.passes);
-        let limit = binding_limit(&allocator.device.limits());
-        let needed = u64::from(frame.pairs) * SUMS * 4;
-        if needed > limit {
-            return Err(GpuError::TooLarge { what: "the gradients of pairs", needed, limit });
-        }
-        let pixels = u64::from(size.x) * u64::from(size.y);
-        let tiles = u64::from(size.x.div_ceil(TILE_SIZE)) * u64::from(size.y.div_ceil(TILE_SIZE));
-        let storage = |label, size| allocator.buffer(label, size, BufferUsages::STORAGE);
-        let settings = size_of::<LossUniforms>() as u64;
-        let loss_settings = allocator.buffer("gs4d loss settings", settings, BufferUsages::UNIFORM);
-        let slopes = storage("gs4d slopes of similarity", pixels * 48);
-        let pixel_gradients = storage("gs4d gradients of pixels", pixels * 16);
-        // Zero: the loss does not depend on depth.
-        let depth_gradients = storage("gs4d gradients of depths", pixels * 4);
-        let tile_sums = storage("gs4d sums of tiles", tiles * 16);
-        let first_pairs = storage("gs4d first pairs", u64::from(frame.slots) * 4);
-        let pair_gradients = storage("gs4d gradients of pairs", needed);
-        let color = wgpu::BindingResource::TextureView(frame.color);
-        let whole = wgpu::Buffer::as_entire_binding;
-        let written = [&slopes, &pixel_gradients, &tile_sums, &self.totals].map(whole);
-        let loss = [vec![whole(&loss_settings), color.clone()], written.to_vec()].concat();
-        let buffers = frame.buffers;
-        let read = [
-            frame.frame,
-            frame.counters,
-            &buffers.tile_ranges,
-            &buffers.pair_splats,
-            &buffers.splats,
-            &buffers.order,
-            &buffers.offsets,
-        ];
-        let depth = wgpu::BindingResource::TextureView(frame.depth);
-        let blended = [read.map(whole).to_vec(), vec![color, depth]].concat();
-        let sums = [&first_pairs, &pair_gradients, &pixel_gradients, &depth_gradients].map(whole);
-        let instance = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-            buffer: frame.instances,
-            offset: 0,
-            size: std::num::NonZeroU64::new(size_of::<InstanceUniforms>() as u64),
-        });
-        let splats =
-            [&self.scene_settings, &buffers.splats, &buffers.depth_keys, &first_pairs, &pair_gradients].map(whole);
-        let splat_gradients = [vec![instance], splats.to_vec()].concat();
-        Ok(ViewBuffers {
-            splats: buffers.splats.clone(),
-            color: frame.color.clone(),
-            size,
-            loss: allocator.bind_group("gs4d loss", &passes.loss_group, &loss),
-            blended: allocator.bind_group("gs4d blended", &passes.blended_group, &blended),
-            sums: allocator.bind_group("gs4d sums", &passes.sums_group, &sums),
-            splat_gradients: allocator.bind_group("gs4d splats", &passes.splats_group, &splat_gradients),
-            loss_settings,
-            pixel_gradients,
-            depth_gradients,
-        })
     }
 }
 

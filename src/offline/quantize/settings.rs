@@ -10,6 +10,10 @@
 use crate::scene::packed::encode::Bits;
 use serde::{Deserialize, Serialize};
 
+/// Gaussians for each entry of a codebook, at least, and entries of a codebook, at least.
+const GAUSSIANS_OF_ENTRY: usize = 64;
+const LEAST_ENTRIES: usize = 64;
+
 /// How much may be lost. Default: [`Balanced`](Self::Balanced).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -48,6 +52,17 @@ pub struct CompressSettings {
     /// Weight of each Gaussian's color, not negative, in the order of the scene; `None` weighs by opacity.
     #[serde(skip)]
     pub weights: Option<Vec<f32>>,
+}
+
+impl CompressSettings {
+    /// Returns the settings of a quality, with codebooks whose numbers of entries suit a number of Gaussians: for codebooks that are trained
+    /// with them.
+    pub fn suiting(quality: Quality, gaussians: usize) -> Self {
+        let mut settings = Self::from(quality);
+        let entries = (gaussians / GAUSSIANS_OF_ENTRY).next_power_of_two().max(LEAST_ENTRIES);
+        settings.codebooks.iter_mut().for_each(|own| *own = (*own).min(entries));
+        settings
+    }
 }
 
 impl From<Quality> for CompressSettings {
