@@ -13,7 +13,7 @@
 //! (`renderer::Storage::of`), and the form in the header of a package (`codec::package::StoredForm::of`).
 
 use super::packed::{CodedColors, PackedColors, PackedScene};
-use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Model, Parameters, SliceSettings};
+use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Lifespan, Model, Parameters, SliceSettings};
 use glam::Vec3;
 
 /// The Gaussians of a scene and their color.
@@ -165,6 +165,17 @@ impl Form {
         match self {
             Self::Sliced(sliced) => sliced.gaussians[index],
             Self::Packed(packed) => packed.gaussian(index),
+        }
+    }
+
+    /// Returns when one Gaussian is there. Of a packed one nothing else is decoded.
+    ///
+    /// # Panics
+    /// If `index` is out of range.
+    pub fn lifespan(&self, index: usize) -> Lifespan {
+        match self {
+            Self::Sliced(sliced) => sliced.gaussians[index].lifespan(),
+            Self::Packed(packed) => packed.lifespan(index),
         }
     }
 
