@@ -9,6 +9,7 @@ use crate::support::cpu_reference::{blob, scene};
 use crate::support::offscreen_app::{self, app, picture, spawn_camera};
 use crate::support::skip::skip;
 use bevy::asset::AssetId;
+use bevy::camera::Hdr;
 use bevy::pbr::PbrPlugin;
 use bevy::prelude::*;
 use bevy::render::error_handler::{ErrorType, RenderErrorHandler, RenderErrorPolicy};
@@ -21,7 +22,7 @@ use bevy::time::TimeUpdateStrategy;
 use bevy_gs4d::asset::{CaptureFailed, CaptureState, GaussianCapture};
 use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::playback::Playback;
-use bevy_gs4d::render::{CaptureStatistics, CaptureViewSettings, DepthWrite};
+use bevy_gs4d::render::{CaptureSettings, CaptureStatistics, CaptureViewSettings, DepthWrite};
 use bevy_gs4d::renderer::WorkCounters;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Environment, RuntimeScene, TemporalFilter};
@@ -196,6 +197,44 @@ fn a_view_that_sees_nothing_gives_its_memory_back() {
     show(&mut app, entity, Visibility::Inherited);
     assert!(picture(&mut app, 0.0) == before, "it shows again as it was");
     assert!(work(&app).created() > created, "in buffers made anew, for the old ones have gone");
+}
+
+#[test]
+fn a_camera_that_cannot_draw_captures_gives_its_memory_back() {
+    let Some(mut app) = app(SIZE) else { return };
+    spawn(&mut app, synthetic(2000, 4, true), Playback::paused_at(0.7));
+    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    testing::settle(&mut app).expect("the app draws without an error");
+    assert!(view_bytes(&app, camera) > 0, "it draws one, which takes memory");
+    app.world_mut().entity_mut(camera).insert((Hdr, CompositingSpace::Oklab));
+    run(&mut app, 130);
+    assert_eq!(view_bytes(&app, camera), 0, "in a space without captures it needs none");
+}
+
+#[test]
+fn what_is_faded_out_is_not_drawn() {
+    let Some(mut app) = app(SIZE) else { return };
+    let entity = spawn(&mut app, synthetic(2000, 4, true), Playback::default());
+    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    let before = picture(&mut app, 0.0);
+    let gaussians = |app: &App| statistics(app).view(camera).map_or(0, |view| view.total);
+    assert_eq!(gaussians(&app), 2000, "the camera draws it");
+    let set = |app: &mut App, opacity| {
+        let settings = CaptureSettings { opacity, ..default() };
+        app.world_mut().entity_mut(entity).insert(settings);
+    };
+    set(&mut app, 0.0);
+    run(&mut app, 2);
+    assert_eq!(gaussians(&app), 0, "nothing of it would show");
+    let lists = work(&app).activated();
+    // Through all segments of its filter.
+    run_in_steps(&mut app, 20, Duration::from_millis(100));
+    assert_eq!(work(&app).activated(), lists, "nor is it prepared to be drawn");
+    run(&mut app, 130);
+    assert_eq!(view_bytes(&app, camera), 0, "and in the end the camera needs no memory");
+    app.world_mut().entity_mut(entity).insert(Playback::paused_at(0.0));
+    set(&mut app, 1.0);
+    assert!(picture(&mut app, 0.0) == before, "faded in it shows as before");
 }
 
 #[test]

@@ -46,7 +46,7 @@ pub(super) fn prepare_active_lists(
         shown.and_then(|shown| uploaded(shown.asset)).is_some_and(|capture| placed.list.is_for(capture))
     });
     for (entity, shown) in &extracted.0 {
-        if !(shown.seen && shown.filtered) {
+        if !(shown.seen && shown.filtered) || shown.is_faded_out() {
             continue;
         }
         let Some(capture) = uploaded(shown.asset) else { continue };

@@ -37,6 +37,13 @@ pub(super) struct ExtractedCapture {
     pub(super) seen: bool,
 }
 
+impl ExtractedCapture {
+    /// Returns whether nothing of it shows, wherever it is seen from.
+    pub(super) fn is_faded_out(&self) -> bool {
+        self.appearance.opacity <= 0.0
+    }
+}
+
 /// How cameras draw captures, for those with settings.
 #[derive(Resource, Default)]
 pub(super) struct ExtractedViewSettings(pub(super) MainEntityHashMap<CaptureViewSettings>);

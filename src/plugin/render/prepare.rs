@@ -60,7 +60,7 @@ impl Scene<'_> {
         let camera = view.world_from_view.affine();
         let Some(visible) = visible.get::<GaussianCapture3d>() else { return };
         drawn.extend(visible.iter_visible().filter_map(|(_, entity)| {
-            let placed = self.extracted.0.get(entity)?;
+            let placed = self.extracted.0.get(entity).filter(|placed| !placed.is_faded_out())?;
             self.captures.get(placed.asset)?.capture()?;
             let view = lens.view(size, placed.time, camera, placed.world_from_capture)?;
             let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
@@ -134,12 +134,12 @@ pub(super) fn prepare_views(
         state.set_design(&renderer.0, settings.design);
         state.measure(measure, &device, &queue, &renderer.0);
         state.drawn.clear();
-        let Some(lens) = drawable_lens(view, camera) else { continue };
-        scene.collect(&lens, view, size, visible, &mut state.drawn);
-        state.count_idle_frames();
-        if !state.sees_something() {
-            continue;
+        let lens = drawable_lens(view, camera);
+        if let Some(lens) = &lens {
+            scene.collect(lens, view, size, visible, &mut state.drawn);
         }
+        state.count_idle_frames();
+        let Some(lens) = lens.filter(|_| state.sees_something()) else { continue };
         let viewport = UVec4::new(view.viewport.x, view.viewport.y, size.x, size.y);
         state.bindings.set_viewport(viewport, &device, &queue, renderer.0.work());
         let instances = state.instances(&scene.captures, &scene.lists);
