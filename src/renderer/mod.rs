@@ -39,7 +39,7 @@ mod view;
 mod work;
 
 pub use active::ActiveList;
-pub use capture::GpuCapture;
+pub use capture::{CaptureUpload, GpuCapture};
 pub use device::GpuContext;
 pub use error::GpuError;
 pub use headless::Headless;

@@ -314,11 +314,11 @@ impl Renderer {
         &self,
         device: &wgpu::Device,
         storage: Storage,
-        [geometry, color]: [&[&wgpu::Buffer]; 2],
+        [geometry, color]: [&[wgpu::Buffer]; 2],
     ) -> [wgpu::BindGroup; 2] {
         let layouts = &self.layouts.captures[storage as usize];
-        let group = |layout: &wgpu::BindGroupLayout, buffers: &[&wgpu::Buffer]| {
-            let resources: Vec<_> = buffers.iter().map(|buffer| buffer.as_entire_binding()).collect();
+        let group = |layout: &wgpu::BindGroupLayout, buffers: &[wgpu::Buffer]| {
+            let resources: Vec<_> = buffers.iter().map(wgpu::Buffer::as_entire_binding).collect();
             self.allocator(device).bind_group("gs4d capture", layout, &resources)
         };
         [group(&layouts[0], geometry), group(&layouts[1], color)]

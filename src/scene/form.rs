@@ -251,6 +251,14 @@ impl Form {
         }
     }
 
+    /// Returns the packed Gaussians and their color; `None` if they are in single precision.
+    pub fn as_packed(&self) -> Option<&PackedScene> {
+        match self {
+            Self::Packed(packed) => Some(packed),
+            Self::Sliced(_) => None,
+        }
+    }
+
     /// Checks that every Gaussian can be drawn.
     fn check(&self) -> Result<(), InvalidGaussian> {
         match self {

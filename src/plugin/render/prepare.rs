@@ -61,8 +61,8 @@ impl Scene<'_> {
         let Some(visible) = visible.get::<GaussianCapture3d>() else { return };
         drawn.extend(visible.iter_visible().filter_map(|(_, entity)| {
             let placed = self.extracted.0.get(entity).filter(|placed| !placed.is_faded_out())?;
-            self.captures.get(placed.asset)?.capture()?;
-            let view = lens.view(size, placed.time, camera, placed.world_from_capture)?;
+            let time = self.captures.get(placed.asset)?.time_at(placed.seconds)?;
+            let view = lens.view(size, time, camera, placed.world_from_capture)?;
             let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
             Some(Drawn { entity: *entity, asset, view, appearance, filtered })
         }));

@@ -4,6 +4,9 @@
 //! no binding exceeds the limit of the device; a part is drawn by one dispatch of `project`.
 
 mod buffers;
+mod upload;
+
+pub use upload::CaptureUpload;
 
 use super::memory::binding_limit;
 use super::{GpuError, Renderer, Storage, layout};
@@ -11,6 +14,7 @@ use crate::gaussian::ShDirection;
 use crate::gaussian::harmonics::evaluated;
 use crate::scene::packed::MAX_STAGES;
 use crate::scene::{ActiveSets, CodedColors, ColorDegrees, RuntimeScene, TemporalFilter, segment_of};
+use buffers::Filling;
 use layout::BLOCK;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -89,7 +93,7 @@ pub(super) struct EnvironmentBuffer {
 }
 
 impl GpuCapture {
-    /// Uploads a scene.
+    /// Uploads a scene, all of it at once; a [`CaptureUpload`] does it piece by piece.
     ///
     /// # Errors
     /// When the environment map, or the smallest part of the Gaussians, is larger than the device can bind, or the
@@ -100,9 +104,17 @@ impl GpuCapture {
         renderer: &Renderer,
         scene: &RuntimeScene,
     ) -> Result<Self, GpuError> {
+        Ok(CaptureUpload::new(device, renderer, scene)?.finish(queue, renderer))
+    }
+
+    /// Creates the buffers of a scene. They are still to be filled.
+    fn allocate(
+        device: &wgpu::Device,
+        renderer: &Renderer,
+        scene: &RuntimeScene,
+    ) -> Result<(Self, Vec<Filling>), GpuError> {
         scene.check().map_err(GpuError::Scene)?;
         let allocator = renderer.allocator(device);
-        let gpu = buffers::Gpu { allocator, queue };
         let form = &scene.form;
         let storage = Storage::of(form);
         let ColorDegrees { degree, degree_t, .. } = form.color_degrees();
@@ -124,30 +136,42 @@ impl GpuCapture {
             return Err(GpuError::TooLarge { what: "the Gaussians", needed, limit });
         }
         let mut parts = Vec::new();
-        let mut bytes = 0;
-        let codebooks = form.coded_colors().map(|colors| buffers::codebooks(gpu, colors));
+        let mut fillings = Vec::new();
+        let codebooks = form.coded_colors().map(|colors| buffers::codebooks(allocator, colors));
         for first in (0..scene.len()).step_by(per_part) {
-            let count = per_part.min(scene.len() - first);
-            let geometry = buffers::geometry(gpu, form, first..first + count);
-            let color = buffers::color(gpu, form, first..first + count, stride);
-            bytes += geometry.iter().chain([&color]).map(wgpu::Buffer::size).sum::<u64>();
-            let all = [&color].into_iter().chain(codebooks.iter());
-            let both = [geometry.iter().collect::<Vec<_>>(), all.collect()];
-            let buffers = both.concat().into_iter().cloned().collect();
-            let [geometry, color] = renderer.capture_bind_groups(device, storage, both.each_ref().map(|all| &all[..]));
+            let own = first..(first + per_part).min(scene.len());
+            let geometry = buffers::geometry(allocator, form, own.clone());
+            let color = buffers::color(allocator, form, own.clone(), stride);
+            let buffer = |filling: &Filling| filling.buffer.clone();
+            let colors = [&color].into_iter().chain(&codebooks).map(buffer).collect();
+            let both: [Vec<wgpu::Buffer>; 2] = [geometry.iter().map(buffer).collect(), colors];
+            let [geometry_group, color_group] =
+                renderer.capture_bind_groups(device, storage, both.each_ref().map(|all| &all[..]));
+            fillings.extend(geometry);
+            fillings.push(color);
             let filter = scene.filter.as_ref().map(|filter| {
-                let sets = buffers::filter(gpu, filter, first..first + count);
-                bytes += sets.size();
-                allocator.bind_group("gs4d filter", &renderer.layouts.filter, &[sets.as_entire_binding()])
+                let sets = buffers::filter(allocator, filter, own.clone());
+                let resources = [sets.buffer.as_entire_binding()];
+                let group = allocator.bind_group("gs4d filter", &renderer.layouts.filter, &resources);
+                fillings.push(sets);
+                group
             });
-            parts.push(Part { count: count as u32, geometry, color, buffers, filter });
+            parts.push(Part {
+                count: own.len() as u32,
+                geometry: geometry_group,
+                color: color_group,
+                buffers: both.concat(),
+                filter,
+            });
         }
-        bytes += codebooks.iter().map(wgpu::Buffer::size).sum::<u64>();
-        let environment = scene.environment.as_ref().map(|map| EnvironmentBuffer {
-            buffer: buffers::plain(gpu, "gs4d environment", bytemuck::cast_slice(&map.texels)),
-            size: [map.width, map.height],
+        fillings.extend(codebooks);
+        let environment = scene.environment.as_ref().map(|map| {
+            let texels = buffers::environment(allocator, map);
+            let buffer = texels.buffer.clone();
+            fillings.push(texels);
+            EnvironmentBuffer { buffer, size: [map.width, map.height] }
         });
-        bytes += environment.as_ref().map_or(0, |map| map.buffer.size());
+        let bytes = fillings.iter().map(|filling| filling.buffer.size()).sum();
         let settings = layout::InstanceUniforms {
             degree,
             degree_t: if degree == 3 { degree_t } else { 0 },
@@ -161,8 +185,8 @@ impl GpuCapture {
         let interval = scene.trained_with.time_interval;
         let filter = scene.filter.as_ref().map(|filter| Filter::new(filter, interval, &parts));
         let id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
-        renderer.work().add_uploaded(bytes);
-        Ok(Self { parts, environment, storage, id, filter, bytes, settings, len: scene.len() })
+        let capture = Self { parts, environment, storage, id, filter, bytes, settings, len: scene.len() };
+        Ok((capture, fillings))
     }
 
     /// Returns the number of Gaussians.
