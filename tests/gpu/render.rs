@@ -7,7 +7,7 @@ use crate::support::{gpu, limited_device};
 use bevy_gs4d::gaussian::{Gaussian, Parameters};
 use bevy_gs4d::reference::{self, Layer, Splat};
 use bevy_gs4d::renderer::{
-    GpuCapture, GpuContext, GpuError, Headless, Instance, OpaqueDepth, Renderer, ShaderChecks, ViewParameters,
+    Design, GpuCapture, GpuContext, GpuError, Headless, Instance, OpaqueDepth, Renderer, ShaderChecks, ViewParameters,
     ViewRenderer,
 };
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
@@ -367,6 +367,36 @@ fn a_view_makes_room_without_anybody_waiting() {
         let color = read_color(headless.context(), &view);
         let right = color.iter().zip(&expected.picture.pixels).all(|(a, b)| *a == b.to_array());
         assert_eq!(right, frame == 2, "frame {frame} has room for {} pairs", if right { "all" } else { "some" });
+    }
+}
+
+#[test]
+fn a_picture_that_grows_pixel_by_pixel_needs_new_buffers_now_and_then() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let scene = scene(2_000);
+    let capture = headless.upload(&scene).expect("upload");
+    for design in [Design::Reference, Design::Fast] {
+        headless.set_design(Design::Fast);
+        headless.set_design(Design::Reference);
+        headless.set_design(design);
+        let (mut created, mut changes) = (headless.work().created(), 0);
+        // Wider and higher, and back again.
+        for step in (0..60).chain((0..60).rev()) {
+            let view = look_from(EYE, UVec2::new(150 + 2 * step, 120 + step), 0.5);
+            // As in a window, the surfaces are another texture each time, which takes a bind group. There are none.
+            let surfaces = depth_texture(headless.context(), view.size, 0.0);
+            let distance = [0.1, 0.0, 0.0, 1.0];
+            let opaque = OpaqueDepth { texture: &surfaces, samples: 1, origin: UVec2::ZERO, distance };
+            let parameters = ViewParameters { opaque: Some(opaque), ..parameters() };
+            let frame = headless.render_all(&[instance(&capture, &view)], &parameters).expect("render");
+            let now = headless.work().created();
+            (created, changes) = (now, changes + u32::from(now > created + 1));
+            if step % 20 == 7 {
+                let expected = reference::render(&scene, &view, BACKGROUND);
+                assert_equivalent(&frame, &expected, &format!("{design:?}, {}", view.size));
+            }
+        }
+        assert!((1..=6).contains(&changes), "{design:?}: buffers have been made {changes} times");
     }
 }
 

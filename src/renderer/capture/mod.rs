@@ -57,6 +57,8 @@ pub(super) struct Filter {
     interval: [f32; 2],
     /// Active Gaussians, part by part and segment by segment.
     counts: Vec<u32>,
+    /// Active Gaussians of all parts in the segment with most of them.
+    pub most: u32,
 }
 
 impl Filter {
@@ -72,7 +74,10 @@ impl Filter {
             ActiveSets::Bits(_) => layout::FILTER_BITS,
             ActiveSets::Intervals(_) => layout::FILTER_INTERVALS,
         };
-        Self { mode, segments: filter.segments, interval, counts }
+        let segments = filter.segments as usize;
+        let of_all_parts = |segment| counts.iter().skip(segment).step_by(segments.max(1)).sum();
+        let most = (0..segments).map(of_all_parts).max().unwrap_or_default();
+        Self { mode, segments: filter.segments, interval, counts, most }
     }
 
     /// Returns the segment of a time, in the capture's unit.
