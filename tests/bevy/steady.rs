@@ -23,7 +23,7 @@ use bevy_gs4d::asset::{CaptureFailed, CaptureReady, CaptureState, GaussianCaptur
 use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::render::{CaptureSettings, CaptureStatistics, CaptureUploadBudget, CaptureViewSettings, DepthWrite};
-use bevy_gs4d::renderer::WorkCounters;
+use bevy_gs4d::renderer::{Design, WorkCounters};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Environment, RuntimeScene, TemporalFilter};
 use bevy_gs4d::testing::{self, Offscreen};
@@ -433,6 +433,51 @@ fn another_scene_under_the_same_name_shows_without_a_gap() {
     let changed = seen.iter().position(blue).expect("the other scene shows in the end");
     assert!(changed > 7 && seen[..changed].iter().all(red), "the first one until it is whole: {seen:?}");
     assert!(seen[changed..].iter().all(blue), "the other one from then on: {seen:?}");
+}
+
+/// Collects the app's picture, frame by frame, from now on.
+fn frames_of(app: &mut App) -> Arc<Mutex<Vec<Vec<u8>>>> {
+    let frames = Arc::new(Mutex::new(Vec::new()));
+    let sink = frames.clone();
+    let image = app.world().resource::<Offscreen>().image.clone();
+    app.world_mut().spawn(Readback::texture(image)).observe(move |event: On<ReadbackComplete>| {
+        sink.lock().unwrap_or_else(PoisonError::into_inner).push(event.data.clone());
+    });
+    frames
+}
+
+#[test]
+fn no_frame_after_a_cut_lacks_splats() {
+    for design in [Design::Reference, Design::Fast] {
+        // Rows of this width need no padding.
+        let Some(mut app) = app(UVec2::new(384, 288)) else { return };
+        let mut scene = synthetic(3000, 2, false);
+        // Large and so faint that the farthest shows, too.
+        for gaussian in &mut scene.form.as_sliced_mut().expect("synthetic scenes are sliced").gaussians {
+            gaussian.covariance = gaussian.covariance.map(|entry| 100.0 * entry);
+            (gaussian.opacity, gaussian.sigma_t, gaussian.velocity) = (0.006, f32::INFINITY, [0.0; 3]);
+        }
+        spawn(&mut app, scene, Playback::paused_at(1.0));
+        let close = Vec3::new(2.2, 1.1, 1.4);
+        let look_from = |place: Vec3| Transform::from_translation(place).looking_at(Vec3::ZERO, Vec3::Z);
+        let camera = spawn_camera(&mut app, Msaa::Off, look_from(20.0 * close));
+        app.world_mut().entity_mut(camera).insert(CaptureViewSettings { design, ..default() });
+        testing::settle(&mut app).expect("the app draws without an error");
+        let frames = frames_of(&mut app);
+        run(&mut app, 4);
+        app.world_mut().entity_mut(camera).insert(look_from(close));
+        run(&mut app, 12);
+        let pairs = statistics(&app).view(camera).map_or(0, |view| view.pairs);
+        assert!(pairs > 1 << 16, "{design:?}: {pairs} pairs are more than there is room for at first");
+        let frames = frames.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let (before, after) = (frames.first().expect("a frame"), frames.last().expect("a frame"));
+        let cut = frames.iter().position(|frame| frame != before).expect("the cut is seen");
+        assert!(frames.len() - cut > 4, "{design:?}: frames after the cut, of {}", frames.len());
+        for (number, frame) in frames[cut..].iter().enumerate() {
+            let apart = frame.iter().zip(after).map(|(a, b)| a.abs_diff(*b)).max();
+            assert!(apart <= Some(1), "{design:?}: frame {number} after the cut is {apart:?} of 255 apart from the last");
+        }
+    }
 }
 
 #[test]

@@ -315,8 +315,9 @@ fn what_does_not_fit_the_device_is_refused_and_does_no_harm() {
 
     let large = limited.upload(&swollen(3_000, 10.0)).expect("upload");
     let view_of_all = look_from(EYE, UVec2::new(640, 480), 0.5);
-    let refused = limited.render(&large, &view_of_all, BACKGROUND).expect_err("more pairs than a binding holds");
+    let refused = limited.draw(&large, &view_of_all, BACKGROUND).expect_err("more pairs than a binding holds");
     assert!(matches!(refused, GpuError::TooLarge { what: "the pairs of splats and tiles", .. }), "{refused}");
+    limited.set_design(Design::Auto);
 
     let many = limited.upload(&self::scene(50_000)).expect("upload");
     let refused = limited.render(&many, &view, BACKGROUND).expect_err("more splats than a binding holds");
@@ -346,28 +347,78 @@ fn a_close_up_makes_room_for_its_pairs() {
     }
 }
 
+/// Records and submits a frame of a view, and waits for it.
+fn draw_frame(context: &GpuContext, renderer: &Renderer, view: &mut ViewRenderer, instances: &[Instance<'_>]) {
+    let GpuContext { device, queue, .. } = context;
+    view.prepare(device, queue, renderer, instances, &parameters()).expect("prepare");
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    view.record(renderer, &mut encoder, instances);
+    queue.submit([encoder.finish()]);
+    device.poll(wgpu::PollType::wait_indefinitely()).expect("the device finishes");
+}
+
+/// Returns the largest difference of the picture of a view from another.
+fn difference(context: &GpuContext, view: &ViewRenderer, expected: &Frame) -> f32 {
+    let pixels = read_color(context, view).into_iter().zip(&expected.picture.pixels);
+    pixels.map(|(a, b)| (Vec3::from(a) - *b).abs().max_element()).fold(0.0, f32::max)
+}
+
 #[test]
-fn a_view_makes_room_without_anybody_waiting() {
+fn a_view_draws_all_pairs_before_it_has_room_for_them() {
     let Some(mut headless) = gpu::headless() else { return };
     let (scene, _, close) = afar_and_close();
     let capture = headless.upload(&scene).expect("upload");
-    let expected = headless.render(&capture, &close, BACKGROUND).expect("render");
-    let GpuContext { device, queue, .. } = headless.context();
+    let renderer = Renderer::new(&headless.context().device, ShaderChecks::On).expect("the passes compile");
+    for design in [Design::Reference, Design::Fast] {
+        headless.set_design(design);
+        // A later frame: the first one has made room.
+        headless.render(&capture, &close, BACKGROUND).expect("render");
+        let expected = headless.render(&capture, &close, BACKGROUND).expect("render");
+        let GpuContext { device, queue, .. } = headless.context();
+        let capture = GpuCapture::upload(device, queue, &renderer, &scene).expect("upload");
+        let mut view = ViewRenderer::new(device, &renderer);
+        view.set_design(&renderer, design);
+        let instances = [instance(&capture, &close)];
+        // The first frame counts, the second asks for the count, the third has it.
+        for frame in 0..3 {
+            draw_frame(headless.context(), &renderer, &mut view, &instances);
+            let room = view.finished().expect("a frame").pairs;
+            assert_eq!(room >= expected.counts.pairs, frame == 2, "{design:?}, frame {frame}: room for {room} pairs");
+            let apart = difference(headless.context(), &view, &expected);
+            assert!(apart < 1e-4, "{design:?}, frame {frame}, with room for {room} pairs: {apart} apart");
+        }
+        assert!(!view.is_short_of_room(), "{design:?}: the device has room");
+    }
+}
+
+#[test]
+fn what_a_device_has_no_room_for_is_drawn_all_the_same() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let Some(mut limited) = limited_device::headless() else { return };
+    let (scene, view) = (swollen(3_000, 10.0), look_from(EYE, UVec2::new(640, 480), 0.5));
+    for design in [Design::Reference, Design::Fast] {
+        let [expected, found] = [&mut headless, &mut limited].map(|headless| {
+            headless.set_design(design);
+            let capture = headless.upload(&scene).expect("upload");
+            [(); 3].map(|()| headless.render(&capture, &view, BACKGROUND).expect("render"))
+        });
+        let pairs = expected[2].counts.pairs;
+        assert!(u64::from(pairs) * 4 > limited_device::BINDING, "{pairs} pairs are more than a binding holds");
+        for (frame, found) in found.iter().enumerate() {
+            assert_eq!(found.counts, expected[2].counts, "{design:?}, frame {frame}: counts");
+            let pixels = found.picture.pixels.iter().zip(&expected[2].picture.pixels);
+            let apart = pixels.map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
+            assert!(apart < 1e-4, "{design:?}, frame {frame}: {apart} apart");
+        }
+    }
+    let GpuContext { device, queue, .. } = limited.context();
     let renderer = Renderer::new(device, ShaderChecks::On).expect("the passes compile");
     let capture = GpuCapture::upload(device, queue, &renderer, &scene).expect("upload");
-    let mut view = ViewRenderer::new(device, &renderer);
-    let instances = [instance(&capture, &close)];
-    // The first frame counts, the second asks for the count, the third has it.
-    for frame in 0..3 {
-        view.prepare(device, queue, &renderer, &instances, &parameters()).expect("prepare");
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        view.record(&renderer, &mut encoder, &instances);
-        queue.submit([encoder.finish()]);
-        device.poll(wgpu::PollType::wait_indefinitely()).expect("the device finishes");
-        let color = read_color(headless.context(), &view);
-        let right = color.iter().zip(&expected.picture.pixels).all(|(a, b)| *a == b.to_array());
-        assert_eq!(right, frame == 2, "frame {frame} has room for {} pairs", if right { "all" } else { "some" });
+    let mut crowded = ViewRenderer::new(device, &renderer);
+    for _ in 0..4 {
+        draw_frame(limited.context(), &renderer, &mut crowded, &[instance(&capture, &view)]);
     }
+    assert!(crowded.is_short_of_room(), "and that it stays slow can be told");
 }
 
 #[test]

@@ -159,6 +159,11 @@ pub(super) fn prepare_views(
         if let Err(failure) = prepared {
             error_once!("captures are not drawn: {failure}");
             state.drawn.clear();
+        } else if state.renderer.is_short_of_room() {
+            warn_once!(
+                "captures are drawn whole but slowly: a camera has more pairs of splats and tiles than this GPU has room for; draw \
+                 fewer or smaller Gaussians, or a smaller picture"
+            );
         }
         let written = lens.distance.zip(writes_median(&settings, surrounded));
         state.write_depth = written.map(|(_, median)| pipelines.write_depth(msaa, median));

@@ -104,8 +104,9 @@ pub struct ViewRenderer {
     /// Number of bins that the frame recorded last has cleared for the next.
     cleared_bins: u32,
     has_depths: bool,
-    /// Number of pairs for which an earlier frame wanted room.
+    /// Number of pairs for which an earlier frame wanted room, and whether that is more than the device has.
     pairs_wanted: u32,
+    short_of_room: bool,
     /// The room that the bins of the fast design should have.
     bin_room: BinRoom,
     /// Number of successive frames for which the buffers have been far too large.
@@ -195,6 +196,7 @@ impl ViewRenderer {
             frames: 0,
             recorded: false,
             pairs_wanted: 0,
+            short_of_room: false,
             bin_room: BinRoom::default(),
             oversized_frames: 0,
             instance_uniforms: Vec::new(),
@@ -277,6 +279,8 @@ impl ViewRenderer {
         let most = max_pairs(device);
         let pairs = self.pairs_wanted.max(guess).min(most);
         (self.picture, self.bin_side) = (picture, bins::bin_side(picture, total));
+        let in_bins = self.fullest_bin.saturating_mul(self.bin_count());
+        self.short_of_room = self.statistics.pairs > most || in_bins > most / 2;
         let entries = |picture| match self.design {
             Design::Reference => 0,
             // Twice as many bytes as for pairs.
@@ -403,10 +407,30 @@ impl ViewRenderer {
         self.resources.as_ref().map_or(0, |made| made.sizes.pairs)
     }
 
+    /// Returns the number of pairs for which there is room, or will be with the next [`prepare`](Self::prepare).
+    pub(crate) fn pair_room(&self) -> u32 {
+        self.pairs_wanted.max(self.pair_capacity())
+    }
+
+    /// Returns the number of pairs of a frame with these counters, whether there was room for all of them or not.
+    pub(crate) fn pair_count(&self, counters: &Counters) -> u32 {
+        match self.design {
+            Design::Auto | Design::Fast => counters.pairs,
+            Design::Reference => counters.pairs_wanted,
+        }
+    }
+
+    /// Returns whether the newest frame whose counters have arrived had more pairs, or splats in its bins, than this device has room for.
+    /// Such frames lack nothing, but they are slow, and stay so: a frame that only lacks the room that it is going to get is not meant.
+    pub fn is_short_of_room(&self) -> bool {
+        self.short_of_room
+    }
+
     /// Frees the working buffers and targets; the next [`prepare`](Self::prepare) creates them again.
     pub fn release(&mut self) {
         self.resources = None;
         self.pairs_wanted = 0;
+        self.short_of_room = false;
         self.bin_room = BinRoom::default();
         self.fullest_bin = 0;
         self.statistics = ViewStatistics::default();
@@ -440,18 +464,15 @@ impl ViewRenderer {
     fn poll(&mut self) {
         if let Some(counters) = self.readback.poll() {
             let counters: Counters = bytemuck::pod_read_unaligned(&counters);
+            let pairs = self.pair_count(&counters);
             self.statistics.visible = counters.visible;
-            self.statistics.pairs = counters.pairs;
-            let wanted = match self.design {
-                Design::Auto | Design::Fast => {
-                    self.fullest_bin = counters.pairs_wanted;
-                    let Some(sizes) = self.resources.as_ref().map(|made| made.sizes) else { return };
-                    self.bin_room.note(counters.pairs_wanted.saturating_mul(self.bin_count()), sizes.entries);
-                    counters.pairs
-                }
-                Design::Reference => counters.pairs_wanted,
-            };
-            self.make_room(wanted);
+            self.statistics.pairs = pairs;
+            if self.design == Design::Fast {
+                self.fullest_bin = counters.pairs_wanted;
+                let Some(sizes) = self.resources.as_ref().map(|made| made.sizes) else { return };
+                self.bin_room.note(self.fullest_bin.saturating_mul(self.bin_count()), sizes.entries);
+            }
+            self.make_room(pairs);
         }
         if let Some((timer, readback)) = &mut self.timing
             && let Some(timestamps) = readback.poll()

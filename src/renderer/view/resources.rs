@@ -192,7 +192,8 @@ impl ViewRenderer {
             blend: allocator.bind_group(
                 "gs4d blend",
                 &layouts.blend,
-                &[tile_ranges.as_entire_binding(), pair_splats[sorted].as_entire_binding(), splats.as_entire_binding()],
+                &[&tile_ranges, &pair_splats[sorted], &splats, &self.counters, &order[1], &offsets]
+                    .map(wgpu::Buffer::as_entire_binding),
             ),
             instances,
             buffers: PassBuffers {
