@@ -3,15 +3,18 @@
 //! In: synthetic scenes. Out: proof that the GPU draws what the CPU reference draws, however the scene is divided,
 //! however many pairs it has, and whatever is in front of it.
 
-use crate::support::{gpu, limited_device};
+use crate::support::{gpu, limited_device, packed_scene};
 use bevy_gs4d::gaussian::{Gaussian, Parameters};
+use bevy_gs4d::offline::quantize::compress;
 use bevy_gs4d::reference::{self, Layer, Splat};
 use bevy_gs4d::renderer::{
-    Design, GpuCapture, GpuContext, GpuError, Headless, Instance, OpaqueDepth, Renderer, ShaderChecks, ViewParameters,
-    ViewRenderer,
+    ActiveList, CaptureUpload, Design, GpuCapture, GpuContext, GpuError, Headless, Instance, OpaqueDepth, Renderer,
+    ShaderChecks, ViewParameters, ViewRenderer,
 };
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{ActiveSets, FilterKind, GaussianScene, RuntimeScene, SceneForm, Sliced, TemporalFilter};
+use bevy_gs4d::scene::{
+    ActiveSets, Environment, FilterKind, GaussianScene, RuntimeScene, SceneForm, Sliced, TemporalFilter,
+};
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, Counts, Frame, RasterFov, View};
 use glam::{Mat4, Quat, UVec2, Vec3};
 use std::ops::Range;
@@ -348,9 +351,16 @@ fn a_close_up_makes_room_for_its_pairs() {
 }
 
 /// Records and submits a frame of a view, and waits for it.
-fn draw_frame(context: &GpuContext, renderer: &Renderer, view: &mut ViewRenderer, instances: &[Instance<'_>]) {
+fn draw_frame(
+    context: &GpuContext,
+    renderer: &Renderer,
+    view: &mut ViewRenderer,
+    instances: &[Instance<'_>],
+    background: Background,
+) {
     let GpuContext { device, queue, .. } = context;
-    view.prepare(device, queue, renderer, instances, &parameters()).expect("prepare");
+    let parameters = ViewParameters { background, ..ViewParameters::default() };
+    view.prepare(device, queue, renderer, instances, &parameters).expect("prepare");
     let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     view.record(renderer, &mut encoder, instances);
     queue.submit([encoder.finish()]);
@@ -381,7 +391,7 @@ fn a_view_draws_all_pairs_before_it_has_room_for_them() {
         let instances = [instance(&capture, &close)];
         // The first frame counts, the second asks for the count, the third has it.
         for frame in 0..3 {
-            draw_frame(headless.context(), &renderer, &mut view, &instances);
+            draw_frame(headless.context(), &renderer, &mut view, &instances, BACKGROUND);
             let room = view.finished().expect("a frame").pairs;
             assert_eq!(room >= expected.counts.pairs, frame == 2, "{design:?}, frame {frame}: room for {room} pairs");
             let apart = difference(headless.context(), &view, &expected);
@@ -416,9 +426,50 @@ fn what_a_device_has_no_room_for_is_drawn_all_the_same() {
     let capture = GpuCapture::upload(device, queue, &renderer, &scene).expect("upload");
     let mut crowded = ViewRenderer::new(device, &renderer);
     for _ in 0..4 {
-        draw_frame(limited.context(), &renderer, &mut crowded, &[instance(&capture, &view)]);
+        draw_frame(limited.context(), &renderer, &mut crowded, &[instance(&capture, &view)], BACKGROUND);
     }
     assert!(crowded.is_short_of_room(), "and that it stays slow can be told");
+}
+
+#[test]
+fn what_is_uploaded_in_pieces_is_what_is_uploaded_at_once() {
+    const PIECE: u64 = 10_000;
+    let Some(headless) = gpu::headless() else { return };
+    let GpuContext { device, queue, .. } = headless.context();
+    let renderer = Renderer::new(device, ShaderChecks::On).expect("the passes compile");
+    let view = look_from(EYE, UVec2::new(64, 48), 0.4);
+    let draw = |capture: &GpuCapture| {
+        let mut active = ActiveList::new(device, &renderer, capture).expect("it has a filter");
+        assert!(active.prepare(queue, capture, view.time), "the list is new");
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        active.record(&renderer, &mut encoder, capture);
+        queue.submit([encoder.finish()]);
+        let mut drawn = ViewRenderer::new(device, &renderer);
+        let instances = [Instance { active: Some(&active), ..instance(capture, &view) }];
+        draw_frame(headless.context(), &renderer, &mut drawn, &instances, Background::Environment);
+        read_color(headless.context(), &drawn)
+    };
+    let whole = packed_scene::scene(5_000, 3, 1);
+    let packed = |codebooks: &[usize]| {
+        let (packed, _) = compress(whole.clone(), &packed_scene::settings(codebooks)).expect("it is compressed");
+        packed.into_runtime().expect("drawable")
+    };
+    let map = Environment { width: 90, height: 50, texels: (0..90 * 50 * 3).map(|i| i as f32 / 13_500.0).collect() };
+    for (form, scene) in [("sliced", whole.clone()), ("packed", packed(&[])), ("coded", packed(&[64, 32]))] {
+        let scene = RuntimeScene { environment: Some(map.clone()), ..scene };
+        let at_once = GpuCapture::upload(device, queue, &renderer, &scene).expect("it fits");
+        let mut upload = CaptureUpload::new(device, &renderer, &scene).expect("it fits");
+        let (all, mut pieces) = (upload.bytes_left(), 0);
+        while upload.bytes_left() > 0 {
+            let written = upload.advance(queue, &renderer, PIECE);
+            assert!((1..=PIECE).contains(&written), "{form}: {written} bytes in a piece");
+            pieces += 1;
+        }
+        assert!(pieces >= all.div_ceil(PIECE), "{form}: {all} bytes in {pieces} pieces");
+        let in_pieces = upload.finish(queue, &renderer);
+        assert_eq!(in_pieces.bytes(), all, "{form}: all of it");
+        assert!(draw(&in_pieces) == draw(&at_once), "{form}: the pictures differ");
+    }
 }
 
 #[test]
