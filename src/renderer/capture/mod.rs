@@ -75,7 +75,7 @@ impl Filter {
             ActiveSets::Intervals(_) => layout::FILTER_INTERVALS,
         };
         let segments = filter.segments as usize;
-        let of_all_parts = |segment| counts.iter().skip(segment).step_by(segments.max(1)).sum();
+        let of_all_parts = |segment: usize| counts.iter().skip(segment).step_by(segments.max(1)).sum::<u32>();
         let most = (0..segments).map(of_all_parts).max().unwrap_or_default();
         Self { mode, segments: filter.segments, interval, counts, most }
     }

@@ -29,10 +29,8 @@ pub(super) fn grown(made: UVec2, needed: UVec2, limit: u32) -> UVec2 {
     if made == UVec2::ZERO {
         return needed;
     }
-    let side = |made: u32, needed: u32| {
-        if needed <= made { made } else { needed.next_multiple_of(PICTURE_STEP).min(limit) }
-    };
-    UVec2::new(side(made.x, needed.x), side(made.y, needed.y))
+    let steps = needed.map(|side| side.next_multiple_of(PICTURE_STEP).min(limit));
+    UVec2::select(needed.cmple(made), made, steps)
 }
 
 #[cfg(test)]
