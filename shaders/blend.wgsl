@@ -2,17 +2,25 @@
 // In: tile ranges, pairs, splats, the depth of opaque surfaces, the background. Out: color and transmittance, expected and median
 // depth. Each sample of a multisampled depth hides what is behind it from its share of the pixel. CPU reference:
 // src/reference/blend.rs.
-#import gs4d::types::SplatRecord
+//
+// If there was no room for all pairs, those of the nearest splats are in the lists. A tile then goes on through the other splats, in their
+// order, and blends those that cover it, which gives the same picture.
+#import gs4d::types::{Counters, SplatRecord}
 #import gs4d::records::read_splat
 #import gs4d::alpha::alpha_at
-#import gs4d::pixel::{begin_pixel, blend_splat, finish_pixel, frame, pass_surfaces}
-#import gs4d::tile::{pixel_of, tile_index}
+#import gs4d::pixel::{Pixel, begin_pixel, blend_splat, finish_pixel, frame, pass_surfaces}
+#import gs4d::scan::{exclusive_scan, scan_total}
+#import gs4d::tile::{covers_tile, pair_of_tile, pixel_of, tile_index}
 
 const BATCH: u32 = 256u;
 
 @group(1) @binding(0) var<storage, read> tile_ranges: array<vec2<u32>>;
 @group(1) @binding(1) var<storage, read> pair_splats: array<u32>;
 @group(1) @binding(2) var<storage, read> splats: array<SplatRecord>;
+@group(1) @binding(3) var<storage, read> counters: Counters;
+// The visible splats by depth, and the first pair of each.
+@group(1) @binding(4) var<storage, read> order: array<u32>;
+@group(1) @binding(5) var<storage, read> offsets: array<u32>;
 
 // Center, opacity, depth; conic; color.
 var<workgroup> batch_a: array<vec4<f32>, 256>;
@@ -20,6 +28,61 @@ var<workgroup> batch_b: array<vec3<f32>, 256>;
 var<workgroup> batch_c: array<vec3<f32>, 256>;
 // Number of pixels of this tile that need no more splats.
 var<workgroup> finished: atomic<u32>;
+
+fn put_in_batch(place: u32, slot: u32) {
+    let splat = read_splat(splats[slot]);
+    batch_a[place] = vec4(splat.center, splat.opacity, splat.depth);
+    batch_b[place] = splat.conic;
+    batch_c[place] = splat.color;
+}
+
+// Blends the first `count` splats of the batch into a pixel, until it is done.
+fn blend_batch(pixel: ptr<function, Pixel>, count: u32, position: vec2<f32>) {
+    if !(*pixel).done {
+        for (var i = 0u; i < count; i++) {
+            let a = batch_a[i];
+            if a.w > (*pixel).limit {
+                pass_surfaces(pixel, a.w);
+                if (*pixel).done {
+                    break;
+                }
+            }
+            blend_splat(pixel, alpha_at(batch_b[i], a.z, a.xy - position), batch_c[i], a.w);
+            if (*pixel).done {
+                break;
+            }
+        }
+        if (*pixel).done {
+            atomicAdd(&finished, 1u);
+        }
+    }
+}
+
+// Returns the place in the order of the first splat that lacks a pair.
+fn first_without_room() -> u32 {
+    var low = 0u;
+    var high = counters.visible;
+    while high - low > 1u {
+        let mid = (low + high) / 2u;
+        if offsets[mid] <= counters.pairs {
+            low = mid;
+        } else {
+            high = mid;
+        }
+    }
+    return low;
+}
+
+// Whether a splat covers a tile and there was no room for their pair. `first` is the first pair of the splat, less if there are more than
+// can be counted.
+fn lacks_pair(slot: u32, first: u32, tile: vec2<u32>) -> bool {
+    let low = splats[slot].shape.w;
+    let high = splats[slot].color.w;
+    if !covers_tile(low, high, tile) {
+        return false;
+    }
+    return first >= counters.pairs || pair_of_tile(low, high, tile) >= counters.pairs - first;
+}
 
 @compute @workgroup_size(256)
 fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
@@ -42,30 +105,29 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
         }
         let mine = first + thread;
         if mine < range.y {
-            let splat = read_splat(splats[pair_splats[mine]]);
-            batch_a[thread] = vec4(splat.center, splat.opacity, splat.depth);
-            batch_b[thread] = splat.conic;
-            batch_c[thread] = splat.color;
+            put_in_batch(thread, pair_splats[mine]);
         }
         workgroupBarrier();
-        if pixel.done {
-            continue;
-        }
-        for (var i = 0u; i < min(BATCH, range.y - first); i++) {
-            let a = batch_a[i];
-            if a.w > pixel.limit {
-                pass_surfaces(&pixel, a.w);
-                if pixel.done {
-                    break;
-                }
-            }
-            blend_splat(&pixel, alpha_at(batch_b[i], a.z, a.xy - position), batch_c[i], a.w);
-            if pixel.done {
+        blend_batch(&pixel, min(BATCH, range.y - first), position);
+    }
+    if counters.pairs < counters.pairs_wanted {
+        for (var first = first_without_room(); first < counters.visible; first += BATCH) {
+            // As above: the next barrier is the first of the scan.
+            workgroupBarrier();
+            if atomicLoad(&finished) == BATCH {
                 break;
             }
-        }
-        if pixel.done {
-            atomicAdd(&finished, 1u);
+            let mine = first + thread;
+            var found = false;
+            if mine < counters.visible {
+                found = lacks_pair(order[mine], offsets[mine], tile.xy);
+            }
+            let place = exclusive_scan(select(0u, 1u, found), thread);
+            if found {
+                put_in_batch(place, order[mine]);
+            }
+            workgroupBarrier();
+            blend_batch(&pixel, scan_total(), position);
         }
     }
     finish_pixel(pixel, at);

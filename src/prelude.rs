@@ -30,6 +30,8 @@ pub use crate::plugin::playback::{
     FollowsClock, KeyFrameCrossed, MarkerReached, Playback, PlaybackClock, PlaybackEnded, PlaybackLooped,
     PlaybackPaused, PlaybackSeeked, PlaybackStarted, Repeat, Timeline, TimelinePlayer, TimelineTrack,
 };
-pub use crate::plugin::render::{CaptureSettings, CaptureStatistics, CaptureViewSettings, CropBox, DepthWrite};
+pub use crate::plugin::render::{
+    CaptureSettings, CaptureStatistics, CaptureUploadBudget, CaptureViewSettings, CropBox, DepthWrite,
+};
 pub use crate::plugin::stereo::{Eye, EyeTargets, StereoPlugin, StereoRig, spawn_stereo};
 pub use crate::view::{BlendSpace, DebugView};

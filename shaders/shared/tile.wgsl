@@ -57,6 +57,11 @@ fn tile_count(low: u32, high: u32) -> u32 {
     return tile_columns(low, high) * ((high >> 16u) - (low >> 16u));
 }
 
+// Whether a rectangle contains a tile.
+fn covers_tile(low: u32, high: u32, tile: vec2<u32>) -> bool {
+    return all(tile >= vec2(low & 0xffffu, low >> 16u)) && all(tile < vec2(high & 0xffffu, high >> 16u));
+}
+
 // Returns the tile of pair `k` of a splat: the tiles of its rectangle are ordered row by row.
 fn tile_of_pair(low: u32, high: u32, k: u32) -> vec2<u32> {
     let columns = tile_columns(low, high);

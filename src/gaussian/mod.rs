@@ -26,7 +26,7 @@ pub use gradient::{
 };
 pub use harmonics::{Harmonics, ShDirection};
 pub use parameters::{Model, Parameters};
-pub use slice::{Gaussian, InvalidGaussian, SliceSettings, rotation_4d};
+pub use slice::{Gaussian, InvalidGaussian, Lifespan, SliceSettings, rotation_4d};
 
 /// A Gaussian whose marginal is not above this is not drawn at that time (strict, as in the original).
 pub const MARGINAL_CUTOFF: f32 = 0.05;

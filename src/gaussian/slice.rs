@@ -27,11 +27,32 @@ pub struct Gaussian {
     pub padding: f32,
 }
 
-impl Gaussian {
+/// When a Gaussian is there: its envelope in time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lifespan {
+    /// Temporal mean μ_t, timestamp units.
+    pub mean_t: f32,
+    /// Temporal standard deviation σ_t, timestamp units; infinite if the Gaussian is present at every time.
+    pub sigma_t: f32,
+}
+
+impl Lifespan {
     /// Returns the unnormalized marginal at `time`, in (0, 1]: the factor on the opacity.
-    pub fn marginal(&self, time: f32) -> f32 {
+    pub fn marginal(self, time: f32) -> f32 {
         let z = (time - self.mean_t) * self.sigma_t.recip();
         (-0.5 * z * z).exp()
+    }
+}
+
+impl Gaussian {
+    /// Returns when it is there.
+    pub fn lifespan(&self) -> Lifespan {
+        Lifespan { mean_t: self.mean_t, sigma_t: self.sigma_t }
+    }
+
+    /// Returns the unnormalized marginal at `time`, in (0, 1]: the factor on the opacity.
+    pub fn marginal(&self, time: f32) -> f32 {
+        self.lifespan().marginal(time)
     }
 
     /// Returns the conditional mean at `time`, capture space.

@@ -105,3 +105,11 @@ pub(super) fn drawn_count(capture: &GpuCapture, part: usize, active: Option<&Act
         _ => capture.parts[part].count,
     }
 }
+
+/// Returns the largest number of Gaussians of a capture that are drawn at any one time.
+pub(super) fn most_drawn(capture: &GpuCapture, active: Option<&ActiveList>) -> usize {
+    match (&capture.filter, active) {
+        (Some(filter), Some(_)) => filter.most as usize,
+        _ => capture.len(),
+    }
+}

@@ -384,9 +384,9 @@ pub struct VisibleSplat {
 pub struct Counters {
     /// Number of visible splats.
     pub visible: u32,
-    /// Number of pairs written.
+    /// Number of pairs written; of the fast renderer, of all pairs.
     pub pairs: u32,
-    /// Number of pairs that there would be with room for all.
+    /// Number of pairs that there would be with room for all; of the fast renderer, of splats in the fullest bin.
     pub pairs_wanted: u32,
     /// Unused.
     pub padding: u32,

@@ -22,6 +22,22 @@
 //! in four dispatches: `project_bin` puts splats into bins of a few tiles without order, `sort_bins` sorts each bin in workgroup memory and
 //! writes the pairs of its tiles, `colors` computes the colors of the visible splats, and `blend_blocks` blends each tile in blocks of 8 x 4
 //! pixels.
+//!
+//! # Room
+//!
+//! How many pairs a frame has, and how they are spread over bins, only the GPU knows, once it has projected the splats. Room that is enough
+//! for anything would be a pair of each Gaussian with each tile: 5 · 10⁹ for 667,000 Gaussians at 1920 x 1080, which no GPU has. A view has
+//! room for what earlier frames have counted, and a reserve; counts arrive two frames late. A frame that needs more, as the first sight of a
+//! capture or a cut may, lacks nothing all the same, and neither stops nor waits:
+//!
+//! | | without room | what the last pass does |
+//! |---|---|---|
+//! | reference | pairs of the farthest splats are not written | `blend` goes on through the splats in their order, where lists end |
+//! | fast | the pairs of whole bins, or entries of a bin, are not written | `blend_blocks` searches all splats for the nearest ones of a tile |
+//!
+//! This is exact, and slow: a tile looks at every splat. On a device that has no room at all for a view it stays so
+//! ([`ViewRenderer::is_short_of_room`]). Clients that read the lists of pairs need all of them: [`Headless::draw`] draws again with more room,
+//! or returns an error.
 
 mod active;
 pub mod bind;
@@ -39,7 +55,7 @@ mod view;
 mod work;
 
 pub use active::ActiveList;
-pub use capture::GpuCapture;
+pub use capture::{CaptureUpload, GpuCapture};
 pub use device::GpuContext;
 pub use error::GpuError;
 pub use headless::Headless;

@@ -314,11 +314,11 @@ impl Renderer {
         &self,
         device: &wgpu::Device,
         storage: Storage,
-        [geometry, color]: [&[&wgpu::Buffer]; 2],
+        [geometry, color]: [&[wgpu::Buffer]; 2],
     ) -> [wgpu::BindGroup; 2] {
         let layouts = &self.layouts.captures[storage as usize];
-        let group = |layout: &wgpu::BindGroupLayout, buffers: &[&wgpu::Buffer]| {
-            let resources: Vec<_> = buffers.iter().map(|buffer| buffer.as_entire_binding()).collect();
+        let group = |layout: &wgpu::BindGroupLayout, buffers: &[wgpu::Buffer]| {
+            let resources: Vec<_> = buffers.iter().map(wgpu::Buffer::as_entire_binding).collect();
             self.allocator(device).bind_group("gs4d capture", layout, &resources)
         };
         [group(&layouts[0], geometry), group(&layouts[1], color)]
@@ -356,7 +356,7 @@ impl Layouts {
             arguments: new("gs4d arguments", &[Write]),
             bin: new("gs4d bin", &[Uniform(FRAME), Write, Read, Read, Write, Write, Write]),
             ranges: new("gs4d ranges", &[Uniform(FRAME), Read, Read, Write]),
-            blend: new("gs4d blend", &[Read, Read, Read]),
+            blend: new("gs4d blend", &[Read, Read, Read, Read, Read, Read]),
             pixel: Pixels::ALL.map(pixel),
             project_bin: new("gs4d project_bin", &[INSTANCE, Write, Write, Write, Write]),
             // The shader does not read the last, the list of the visible splats: so everything that `project_bin` wrote and `colors` reads
@@ -373,8 +373,8 @@ fn check_limits(limits: &wgpu::Limits) -> Result<(), GpuError> {
         ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, 256),
         ("max_compute_workgroup_size_x", limits.max_compute_workgroup_size_x, 256),
         ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 8),
-        // Three arrays of `blend`.
-        ("max_compute_workgroup_storage_size", limits.max_compute_workgroup_storage_size, 16 * 256 * 3 + 16),
+        // Three arrays of `blend`, and those of its scan.
+        ("max_compute_workgroup_storage_size", limits.max_compute_workgroup_storage_size, 16 * 256 * 3 + 16 * 75),
     ];
     for (what, found, needed) in needs {
         if found < needed {

@@ -13,7 +13,7 @@
 //! (`renderer::Storage::of`), and the form in the header of a package (`codec::package::StoredForm::of`).
 
 use super::packed::{CodedColors, PackedColors, PackedScene};
-use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Model, Parameters, SliceSettings};
+use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Lifespan, Model, Parameters, SliceSettings};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -191,6 +191,17 @@ impl Form {
         }
     }
 
+    /// Returns when one Gaussian is there. Of a packed one nothing else is decoded.
+    ///
+    /// # Panics
+    /// If `index` is out of range.
+    pub fn lifespan(&self, index: usize) -> Lifespan {
+        match self {
+            Self::Sliced(sliced) => sliced.gaussians[index].lifespan(),
+            Self::Packed(packed) => packed.lifespan(index),
+        }
+    }
+
     /// Returns all Gaussians in order.
     pub fn iter(&self) -> impl Iterator<Item = Gaussian> + '_ {
         (0..self.len()).map(|index| self.gaussian(index))
@@ -260,6 +271,14 @@ impl Form {
         match self {
             Self::Sliced(sliced) => Some(sliced),
             Self::Packed(_) => None,
+        }
+    }
+
+    /// Returns the packed Gaussians and their color; `None` if they are in single precision.
+    pub fn as_packed(&self) -> Option<&PackedScene> {
+        match self {
+            Self::Packed(packed) => Some(packed),
+            Self::Sliced(_) => None,
         }
     }
 

@@ -81,9 +81,11 @@ impl RuntimeScene {
         let filter = self.filter.as_ref().filter(fits);
         let active = filter.map(|f| (f, f.segment_of(settings.time, self.trained_with.time_interval)));
         let is_active = |index| active.is_none_or(|(filter, segment)| filter.is_active(segment, index));
+        // Most Gaussians are absent at any one time: decoding all of them would take most of the time of a pick.
+        let is_present = |index| self.form.lifespan(index).marginal(settings.time) > MARGINAL_CUTOFF;
         let mut crossed: Vec<(Crossing, usize)> = (0..self.len())
             .into_par_iter()
-            .filter(|&index| is_active(index))
+            .filter(|&index| is_active(index) && is_present(index))
             .filter_map(|index| Some((ray.cross(&self.gaussian(index), settings)?, index)))
             .collect();
         crossed.sort_unstable_by(|(a, i), (b, k)| a.depth.total_cmp(&b.depth).then(i.cmp(k)));

@@ -9,6 +9,7 @@ use crate::support::cpu_reference::{blob, scene};
 use crate::support::offscreen_app::{self, app, picture, spawn_camera};
 use crate::support::skip::skip;
 use bevy::asset::AssetId;
+use bevy::camera::Hdr;
 use bevy::pbr::PbrPlugin;
 use bevy::prelude::*;
 use bevy::render::error_handler::{ErrorType, RenderErrorHandler, RenderErrorPolicy};
@@ -18,16 +19,17 @@ use bevy::render::renderer::RenderDevice;
 use bevy::render::settings::{Backends, RenderCreation, WgpuLimits, WgpuSettings};
 use bevy::render::{RenderApp, RenderPlugin, RenderStartup};
 use bevy::time::TimeUpdateStrategy;
-use bevy_gs4d::asset::{CaptureFailed, CaptureState, GaussianCapture};
+use bevy_gs4d::asset::{CaptureFailed, CaptureReady, CaptureState, GaussianCapture};
 use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::playback::Playback;
-use bevy_gs4d::render::{CaptureStatistics, CaptureViewSettings, DepthWrite};
-use bevy_gs4d::renderer::WorkCounters;
+use bevy_gs4d::render::{CaptureSettings, CaptureStatistics, CaptureUploadBudget, CaptureViewSettings, DepthWrite};
+use bevy_gs4d::renderer::{Design, WorkCounters};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Environment, RuntimeScene, TemporalFilter};
 use bevy_gs4d::testing::{self, Offscreen};
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
 use std::collections::VecDeque;
+use std::fmt::Debug;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -199,6 +201,44 @@ fn a_view_that_sees_nothing_gives_its_memory_back() {
 }
 
 #[test]
+fn a_camera_that_cannot_draw_captures_gives_its_memory_back() {
+    let Some(mut app) = app(SIZE) else { return };
+    spawn(&mut app, synthetic(2000, 4, true), Playback::paused_at(0.7));
+    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    testing::settle(&mut app).expect("the app draws without an error");
+    assert!(view_bytes(&app, camera) > 0, "it draws one, which takes memory");
+    app.world_mut().entity_mut(camera).insert((Hdr, CompositingSpace::Oklab));
+    run(&mut app, 130);
+    assert_eq!(view_bytes(&app, camera), 0, "in a space without captures it needs none");
+}
+
+#[test]
+fn what_is_faded_out_is_not_drawn() {
+    let Some(mut app) = app(SIZE) else { return };
+    let entity = spawn(&mut app, synthetic(2000, 4, true), Playback::default());
+    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    let before = picture(&mut app, 0.0);
+    let gaussians = |app: &App| statistics(app).view(camera).map_or(0, |view| view.total);
+    assert_eq!(gaussians(&app), 2000, "the camera draws it");
+    let set = |app: &mut App, opacity| {
+        let settings = CaptureSettings { opacity, ..default() };
+        app.world_mut().entity_mut(entity).insert(settings);
+    };
+    set(&mut app, 0.0);
+    run(&mut app, 2);
+    assert_eq!(gaussians(&app), 0, "nothing of it would show");
+    let lists = work(&app).activated();
+    // Through all segments of its filter.
+    run_in_steps(&mut app, 20, Duration::from_millis(100));
+    assert_eq!(work(&app).activated(), lists, "nor is it prepared to be drawn");
+    run(&mut app, 130);
+    assert_eq!(view_bytes(&app, camera), 0, "and in the end the camera needs no memory");
+    app.world_mut().entity_mut(entity).insert(Playback::paused_at(0.0));
+    set(&mut app, 1.0);
+    assert!(picture(&mut app, 0.0) == before, "faded in it shows as before");
+}
+
+#[test]
 fn a_view_shrinks_when_a_large_capture_has_gone() {
     let Some(mut app) = app(SIZE) else { return };
     let large = spawn(&mut app, synthetic(100_000, 5, false), Playback::paused_at(0.7));
@@ -288,6 +328,85 @@ fn captures_come_and_go_without_a_trace() {
     check_pipelines(&app);
 }
 
+/// Puts another scene in the place of an entity's.
+fn replace(app: &mut App, entity: Entity, scene: RuntimeScene) {
+    let id: AssetId<GaussianCapture> = app.world().get::<GaussianCapture3d>(entity).expect("still there").into();
+    let mut captures = app.world_mut().resource_mut::<Assets<GaussianCapture>>();
+    captures.insert(id, GaussianCapture::new(scene)).expect("its handle is alive");
+}
+
+/// Returns the messages of one kind about captures from now on, as texts.
+fn messages_of<E: EntityEvent + Debug>(app: &mut App) -> Arc<Mutex<Vec<String>>> {
+    let messages = Arc::new(Mutex::new(Vec::new()));
+    let sink = messages.clone();
+    app.add_observer(move |event: On<E>| {
+        sink.lock().unwrap_or_else(PoisonError::into_inner).push(format!("{:?}", event.event()));
+    });
+    messages
+}
+
+/// Returns the number of those messages about an entity.
+fn count_about(messages: &Mutex<Vec<String>>, entity: Entity) -> usize {
+    let messages = messages.lock().unwrap_or_else(PoisonError::into_inner);
+    messages.iter().filter(|message| message.contains(&format!("entity: {entity:?},"))).count()
+}
+
+fn state(app: &App, entity: Entity) -> CaptureState {
+    app.world().get::<CaptureState>(entity).expect("a required component").clone()
+}
+
+#[test]
+fn a_large_capture_is_uploaded_over_several_frames() {
+    const BUDGET: u64 = 64 << 10;
+    let Some(mut app) = app(SIZE) else { return };
+    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    testing::settle(&mut app).expect("the app draws without an error");
+    app.insert_resource(CaptureUploadBudget { bytes_per_frame: BUDGET });
+    let ready = messages_of::<CaptureReady>(&mut app);
+    let entity = spawn(&mut app, synthetic(5000, 9, true), Playback::paused_at(0.7));
+    let mut frames = 0;
+    while statistics(&app).uploaded_captures() == 0 {
+        assert_eq!(statistics(&app).view(camera), None, "nothing is drawn of a part");
+        assert_eq!(statistics(&app).uploading_captures(), usize::from(frames > 0), "it is on its way");
+        assert_eq!((state(&app, entity), count_about(&ready, entity)), (CaptureState::Loading, 0), "nor is it ready");
+        let before = work(&app).uploaded();
+        run(&mut app, 1);
+        let bytes = work(&app).uploaded() - before;
+        assert!(bytes <= BUDGET, "{bytes} bytes in frame {frames}");
+        frames += 1;
+        assert!(frames < 100, "it is whole at last");
+    }
+    let bytes = statistics(&app).capture_bytes();
+    assert_eq!(work(&app).uploaded(), bytes, "all of it, once");
+    assert!(bytes.div_ceil(BUDGET) <= frames, "{bytes} bytes take more than {frames} frames");
+    run(&mut app, 2);
+    assert_eq!((state(&app, entity), count_about(&ready, entity)), (CaptureState::Ready, 1), "now it is, said once");
+    let pieces = picture(&mut app, 0.0);
+    app.insert_resource(CaptureUploadBudget::default());
+    app.sub_app_mut(RenderApp).world_mut().run_schedule(RenderStartup);
+    assert!(picture(&mut app, 0.0) == pieces, "uploaded at once it is the same");
+}
+
+#[test]
+fn what_the_gpu_refuses_leaves_what_was_drawn_before() {
+    let Some(mut app) = app(SIZE) else { return };
+    let entity = spawn(&mut app, heap(1, Vec3::X), Playback::paused_at(0.0));
+    let camera = spawn_camera(&mut app, Msaa::Off, eye());
+    let before = picture(&mut app, 0.0);
+    let messages = (messages_of::<CaptureReady>(&mut app), messages_of::<CaptureFailed>(&mut app));
+    let said = || (count_about(&messages.0, entity), count_about(&messages.1, entity));
+    let map = Environment { width: 8, height: 4, texels: vec![0.5; 10] };
+    replace(&mut app, entity, RuntimeScene { environment: Some(map), ..heap(1, Vec3::Z) });
+    assert!(picture(&mut app, 0.0) == before, "the old one is still drawn");
+    assert_eq!((state(&app, entity), said()), (CaptureState::Ready, (0, 1)), "and the failure is said, once");
+    assert_eq!(statistics(&app).view(camera).map(|view| view.total), Some(1), "one Gaussian is drawn");
+    replace(&mut app, entity, heap(1, Vec3::Z));
+    let after = picture(&mut app, 0.0);
+    let [r, _, b, _] = after.get_pixel(SIZE.x / 2, SIZE.y / 2).0;
+    assert!(b > 200 && r < 60, "what is right replaces it: {r}, {b}");
+    assert_eq!((state(&app, entity), said()), (CaptureState::Ready, (1, 1)), "which is said, too");
+}
+
 #[test]
 fn another_scene_under_the_same_name_shows_without_a_gap() {
     let Some(mut app) = app(SIZE) else { return };
@@ -305,15 +424,63 @@ fn another_scene_under_the_same_name_shows_without_a_gap() {
     let image = app.world().resource::<Offscreen>().image.clone();
     app.world_mut().spawn(Readback::texture(image)).observe(watch);
     run(&mut app, 5);
-    let id: AssetId<GaussianCapture> = app.world().get::<GaussianCapture3d>(entity).expect("still there").into();
-    let other = GaussianCapture::new(heap(700, Vec3::Z));
-    app.world_mut().resource_mut::<Assets<GaussianCapture>>().insert(id, other).expect("its handle is alive");
-    run(&mut app, 12);
+    // Some eight frames for the other scene.
+    app.insert_resource(CaptureUploadBudget { bytes_per_frame: 8 << 10 });
+    replace(&mut app, entity, heap(700, Vec3::Z));
+    run(&mut app, 24);
     let seen = seen.lock().unwrap_or_else(PoisonError::into_inner).clone();
     let [red, blue]: [fn(&[u8; 3]) -> bool; 2] = [|p| p[0] > 200 && p[2] < 60, |p| p[2] > 200 && p[0] < 60];
     let changed = seen.iter().position(blue).expect("the other scene shows in the end");
-    assert!(changed > 0 && seen[..changed].iter().all(red), "the first one until then: {seen:?}");
+    assert!(changed > 7 && seen[..changed].iter().all(red), "the first one until it is whole: {seen:?}");
     assert!(seen[changed..].iter().all(blue), "the other one from then on: {seen:?}");
+}
+
+/// Collects the app's picture, frame by frame, from now on.
+fn frames_of(app: &mut App) -> Arc<Mutex<Vec<Vec<u8>>>> {
+    let frames = Arc::new(Mutex::new(Vec::new()));
+    let sink = frames.clone();
+    let image = app.world().resource::<Offscreen>().image.clone();
+    app.world_mut().spawn(Readback::texture(image)).observe(move |event: On<ReadbackComplete>| {
+        sink.lock().unwrap_or_else(PoisonError::into_inner).push(event.data.clone());
+    });
+    frames
+}
+
+#[test]
+fn no_frame_after_a_cut_lacks_splats() {
+    for design in [Design::Reference, Design::Fast] {
+        // Rows of this width need no padding.
+        let Some(mut app) = app(UVec2::new(384, 288)) else { return };
+        let mut scene = synthetic(3000, 2, false);
+        // Large and so faint that the farthest shows, too.
+        for gaussian in &mut scene.form.as_sliced_mut().expect("synthetic scenes are sliced").gaussians {
+            gaussian.covariance = gaussian.covariance.map(|entry| 100.0 * entry);
+            (gaussian.opacity, gaussian.sigma_t, gaussian.velocity) = (0.006, f32::INFINITY, [0.0; 3]);
+        }
+        spawn(&mut app, scene, Playback::paused_at(1.0));
+        let close = Vec3::new(2.2, 1.1, 1.4);
+        let look_from = |place: Vec3| Transform::from_translation(place).looking_at(Vec3::ZERO, Vec3::Z);
+        let camera = spawn_camera(&mut app, Msaa::Off, look_from(20.0 * close));
+        app.world_mut().entity_mut(camera).insert(CaptureViewSettings { design, ..default() });
+        testing::settle(&mut app).expect("the app draws without an error");
+        let frames = frames_of(&mut app);
+        run(&mut app, 4);
+        app.world_mut().entity_mut(camera).insert(look_from(close));
+        run(&mut app, 12);
+        let pairs = statistics(&app).view(camera).map_or(0, |view| view.pairs);
+        assert!(pairs > 1 << 16, "{design:?}: {pairs} pairs are more than there is room for at first");
+        let frames = frames.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let (before, after) = (frames.first().expect("a frame"), frames.last().expect("a frame"));
+        let cut = frames.iter().position(|frame| frame != before).expect("the cut is seen");
+        assert!(frames.len() - cut > 4, "{design:?}: frames after the cut, of {}", frames.len());
+        for (number, frame) in frames[cut..].iter().enumerate() {
+            let apart = frame.iter().zip(after).map(|(a, b)| a.abs_diff(*b)).max();
+            assert!(
+                apart <= Some(1),
+                "{design:?}: frame {number} after the cut is {apart:?} of 255 apart from the last"
+            );
+        }
+    }
 }
 
 #[test]
@@ -410,6 +577,7 @@ fn a_gpu_that_is_too_small_says_so_and_the_game_goes_on() {
 fn a_capture_that_contradicts_itself_is_refused() {
     let Some(mut app) = app(SIZE) else { return };
     let failures = failures_of(&mut app);
+    let ready = messages_of::<CaptureReady>(&mut app);
     // The filter of a smaller scene, and a map with too few texels.
     let filtered = RuntimeScene { filter: synthetic(90, 7, true).filter, ..synthetic(100, 7, false) };
     let map = Environment { width: 8, height: 4, texels: vec![0.5; 10] };
@@ -427,17 +595,13 @@ fn a_capture_that_contradicts_itself_is_refused() {
         let state = app.world().get::<CaptureState>(entity).expect("a required component");
         assert!(matches!(state, CaptureState::Failed(_)), "the wrong ones have failed: {state:?}");
         assert_eq!(said(entity), 1, "and that is said");
+        assert_eq!(count_about(&ready, entity), 0, "but never that they are ready");
     }
-    let id = app.world().get::<GaussianCapture3d>(wrong[0]).expect("it has a capture").0.id();
-    let replace = |app: &mut App, scene| {
-        let mut captures = app.world_mut().resource_mut::<Assets<GaussianCapture>>();
-        captures.insert(id, GaussianCapture::new(scene)).expect("the name is still in use");
-        offscreen_app::picture(app, 0.0);
-    };
-    replace(&mut app, filtered);
+    replace(&mut app, wrong[0], filtered);
+    offscreen_app::picture(&mut app, 0.0);
     assert_eq!(said(wrong[0]), 2, "a second attempt that fails alike is said, too");
-    replace(&mut app, heap(1, Vec3::Z));
-    let state = app.world().get::<CaptureState>(wrong[0]).expect("a required component");
-    assert_eq!(*state, CaptureState::Ready, "and one that succeeds makes it ready");
-    assert_eq!(said(wrong[0]), 2, "without another word of failure");
+    replace(&mut app, wrong[0], heap(1, Vec3::Z));
+    offscreen_app::picture(&mut app, 0.0);
+    assert_eq!(state(&app, wrong[0]), CaptureState::Ready, "and one that succeeds makes it ready");
+    assert_eq!((said(wrong[0]), count_about(&ready, wrong[0])), (2, 1), "without another word of failure");
 }

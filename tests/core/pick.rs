@@ -6,7 +6,9 @@
 use bevy_gs4d::gaussian::alpha::alpha_at;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::reference::{self, Layer, Splat};
-use bevy_gs4d::scene::{FilterKind, Pick, PickSettings, RuntimeScene, TemporalFilter};
+use bevy_gs4d::scene::packed::SHARED_RANGES;
+use bevy_gs4d::scene::packed::encode::Bits;
+use bevy_gs4d::scene::{FilterKind, Form, PackedColors, PackedScene, Pick, PickSettings, RuntimeScene, TemporalFilter};
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, RasterFov};
 use glam::{Affine3A, Mat4, Quat, UVec2, Vec2, Vec3};
 
@@ -126,6 +128,34 @@ fn the_filter_is_respected() {
     };
     assert_eq!((hit(0.25, true), hit(0.75, true)), (Some(0), Some(1)), "what is not active is not there");
     assert_eq!(hit(0.75, false), Some(0), "unless the filter is not used");
+}
+
+#[test]
+fn what_is_absent_is_not_even_decoded() {
+    let brief = |z, mean_t| Gaussian { mean_t, sigma_t: 0.01 * z, ..ball(z, 0.9) };
+    let gaussians = [brief(5.0, 0.3), brief(7.0, 0.4)];
+    let bits = Bits {
+        mean: 16,
+        mean_t: 16,
+        velocity: 16,
+        sigma_t: 15,
+        scale: 16,
+        rotation: 16,
+        opacity: 16,
+        base: 10,
+        escape: 0.0,
+    };
+    let colors = Harmonics { coefficients: 1, values: vec![0.0; gaussians.len() * 3], ..Harmonics::default() };
+    let mut packed = PackedScene::encode(&gaussians, &bits, PackedColors::Whole(colors), [0.0; 2], 1.0);
+    let pick = |packed: &PackedScene, time| {
+        let scene = RuntimeScene { form: Form::Packed(packed.clone()), ..scene(&[]) };
+        let settings = PickSettings { time, ..PickSettings::default() };
+        scene.pick(Vec3::ZERO, Vec3::Z, &settings).map(|pick| pick.gaussian)
+    };
+    assert_eq!((pick(&packed, 0.3), pick(&packed, 0.9)), (Some(0), None), "there, and long gone");
+    // Without the ranges of its block a Gaussian cannot be decoded.
+    packed.ranges.truncate(SHARED_RANGES);
+    assert_eq!(pick(&packed, 0.9), None, "its time alone says that it is not there");
 }
 
 #[test]

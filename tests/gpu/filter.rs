@@ -129,3 +129,30 @@ fn captures_with_and_without_a_filter_share_a_view() {
         previous = Some(bits_of(&mixed));
     }
 }
+
+#[test]
+fn a_view_has_room_for_the_gaussians_that_are_active_at_one_time() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let whole = scene(20_000, 8);
+    // A ninth of the Gaussians in each segment.
+    let words = TemporalFilter::words(20_000);
+    let mut bits = vec![0u32; words * SEGMENTS as usize];
+    for index in 0..20_000 {
+        bits[index % SEGMENTS as usize * words + index / 32] |= 1 << (index % 32);
+    }
+    let filter = TemporalFilter::from_bits(FilterKind::KeyFrame, SEGMENTS, 20_000, bits);
+    let filtered = RuntimeScene { filter: Some(filter), ..whole };
+    let capture = headless.upload(&filtered).expect("it fits");
+    let mut made = None;
+    for time in times() {
+        let frame = headless.render(&capture, &view(time), BLACK).expect("it is drawn");
+        let expected = reference::render(&filtered, &view(time), BLACK);
+        assert_eq!(frame.counts.visible, expected.counts.visible, "at {time}: the same splats as on the CPU");
+        let slots = headless.finished().expect("a frame").slots;
+        assert!((2_222..6_000).contains(&slots), "at {time}: room for {slots} splats, of which 2222 can be there");
+        assert_eq!(*made.get_or_insert(slots), slots, "at {time}: as much as at any other time");
+    }
+    headless.use_filters(false);
+    headless.render(&capture, &view(0.5), BLACK).expect("it is drawn");
+    assert!(headless.finished().expect("a frame").slots >= 20_000, "without the filter, for all");
+}

@@ -3,15 +3,18 @@
 //! In: synthetic scenes. Out: proof that the GPU draws what the CPU reference draws, however the scene is divided,
 //! however many pairs it has, and whatever is in front of it.
 
-use crate::support::{gpu, limited_device};
+use crate::support::{gpu, limited_device, packed_scene};
 use bevy_gs4d::gaussian::{Gaussian, Parameters};
+use bevy_gs4d::offline::quantize::compress;
 use bevy_gs4d::reference::{self, Layer, Splat};
 use bevy_gs4d::renderer::{
-    GpuCapture, GpuContext, GpuError, Headless, Instance, OpaqueDepth, Renderer, ShaderChecks, ViewParameters,
-    ViewRenderer,
+    ActiveList, CaptureUpload, Design, GpuCapture, GpuContext, GpuError, Headless, Instance, OpaqueDepth, Renderer,
+    ShaderChecks, ViewParameters, ViewRenderer,
 };
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{ActiveSets, FilterKind, GaussianScene, RuntimeScene, SceneForm, Sliced, TemporalFilter};
+use bevy_gs4d::scene::{
+    ActiveSets, Environment, FilterKind, GaussianScene, RuntimeScene, SceneForm, Sliced, TemporalFilter,
+};
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, Counts, Frame, RasterFov, View};
 use glam::{Mat4, Quat, UVec2, Vec3};
 use std::ops::Range;
@@ -315,8 +318,9 @@ fn what_does_not_fit_the_device_is_refused_and_does_no_harm() {
 
     let large = limited.upload(&swollen(3_000, 10.0)).expect("upload");
     let view_of_all = look_from(EYE, UVec2::new(640, 480), 0.5);
-    let refused = limited.render(&large, &view_of_all, BACKGROUND).expect_err("more pairs than a binding holds");
+    let refused = limited.draw(&large, &view_of_all, BACKGROUND).expect_err("more pairs than a binding holds");
     assert!(matches!(refused, GpuError::TooLarge { what: "the pairs of splats and tiles", .. }), "{refused}");
+    limited.set_design(Design::Auto);
 
     let many = limited.upload(&self::scene(50_000)).expect("upload");
     let refused = limited.render(&many, &view, BACKGROUND).expect_err("more splats than a binding holds");
@@ -346,27 +350,155 @@ fn a_close_up_makes_room_for_its_pairs() {
     }
 }
 
+/// Records and submits a frame of a view, and waits for it.
+fn draw_frame(
+    context: &GpuContext,
+    renderer: &Renderer,
+    view: &mut ViewRenderer,
+    instances: &[Instance<'_>],
+    background: Background,
+) {
+    let GpuContext { device, queue, .. } = context;
+    let parameters = ViewParameters { background, ..ViewParameters::default() };
+    view.prepare(device, queue, renderer, instances, &parameters).expect("prepare");
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    view.record(renderer, &mut encoder, instances);
+    queue.submit([encoder.finish()]);
+    device.poll(wgpu::PollType::wait_indefinitely()).expect("the device finishes");
+}
+
+/// Returns the largest difference of the picture of a view from another.
+fn difference(context: &GpuContext, view: &ViewRenderer, expected: &Frame) -> f32 {
+    let pixels = read_color(context, view).into_iter().zip(&expected.picture.pixels);
+    pixels.map(|(a, b)| (Vec3::from(a) - *b).abs().max_element()).fold(0.0, f32::max)
+}
+
 #[test]
-fn a_view_makes_room_without_anybody_waiting() {
+fn a_view_draws_all_pairs_before_it_has_room_for_them() {
     let Some(mut headless) = gpu::headless() else { return };
     let (scene, _, close) = afar_and_close();
     let capture = headless.upload(&scene).expect("upload");
-    let expected = headless.render(&capture, &close, BACKGROUND).expect("render");
-    let GpuContext { device, queue, .. } = headless.context();
+    let renderer = Renderer::new(&headless.context().device, ShaderChecks::On).expect("the passes compile");
+    for design in [Design::Reference, Design::Fast] {
+        headless.set_design(design);
+        // A later frame: the first one has made room.
+        headless.render(&capture, &close, BACKGROUND).expect("render");
+        let expected = headless.render(&capture, &close, BACKGROUND).expect("render");
+        let GpuContext { device, queue, .. } = headless.context();
+        let capture = GpuCapture::upload(device, queue, &renderer, &scene).expect("upload");
+        let mut view = ViewRenderer::new(device, &renderer);
+        view.set_design(&renderer, design);
+        let instances = [instance(&capture, &close)];
+        // The first frame counts, the second asks for the count, the third has it.
+        for frame in 0..3 {
+            draw_frame(headless.context(), &renderer, &mut view, &instances, BACKGROUND);
+            let room = view.finished().expect("a frame").pairs;
+            assert_eq!(room >= expected.counts.pairs, frame == 2, "{design:?}, frame {frame}: room for {room} pairs");
+            let apart = difference(headless.context(), &view, &expected);
+            assert!(apart < 1e-4, "{design:?}, frame {frame}, with room for {room} pairs: {apart} apart");
+        }
+        assert!(!view.is_short_of_room(), "{design:?}: the device has room");
+    }
+}
+
+#[test]
+fn what_a_device_has_no_room_for_is_drawn_all_the_same() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let Some(mut limited) = limited_device::headless() else { return };
+    let (scene, view) = (swollen(3_000, 10.0), look_from(EYE, UVec2::new(640, 480), 0.5));
+    for design in [Design::Reference, Design::Fast] {
+        let [expected, found] = [&mut headless, &mut limited].map(|headless| {
+            headless.set_design(design);
+            let capture = headless.upload(&scene).expect("upload");
+            [(); 3].map(|()| headless.render(&capture, &view, BACKGROUND).expect("render"))
+        });
+        let pairs = expected[2].counts.pairs;
+        assert!(u64::from(pairs) * 4 > limited_device::BINDING, "{pairs} pairs are more than a binding holds");
+        for (frame, found) in found.iter().enumerate() {
+            assert_eq!(found.counts, expected[2].counts, "{design:?}, frame {frame}: counts");
+            let pixels = found.picture.pixels.iter().zip(&expected[2].picture.pixels);
+            let apart = pixels.map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
+            assert!(apart < 1e-4, "{design:?}, frame {frame}: {apart} apart");
+        }
+    }
+    let GpuContext { device, queue, .. } = limited.context();
     let renderer = Renderer::new(device, ShaderChecks::On).expect("the passes compile");
     let capture = GpuCapture::upload(device, queue, &renderer, &scene).expect("upload");
-    let mut view = ViewRenderer::new(device, &renderer);
-    let instances = [instance(&capture, &close)];
-    // The first frame counts, the second asks for the count, the third has it.
-    for frame in 0..3 {
-        view.prepare(device, queue, &renderer, &instances, &parameters()).expect("prepare");
+    let mut crowded = ViewRenderer::new(device, &renderer);
+    for _ in 0..4 {
+        draw_frame(limited.context(), &renderer, &mut crowded, &[instance(&capture, &view)], BACKGROUND);
+    }
+    assert!(crowded.is_short_of_room(), "and that it stays slow can be told");
+}
+
+#[test]
+fn what_is_uploaded_in_pieces_is_what_is_uploaded_at_once() {
+    const PIECE: u64 = 10_000;
+    let Some(headless) = gpu::headless() else { return };
+    let GpuContext { device, queue, .. } = headless.context();
+    let renderer = Renderer::new(device, ShaderChecks::On).expect("the passes compile");
+    let view = look_from(EYE, UVec2::new(64, 48), 0.4);
+    let draw = |capture: &GpuCapture| {
+        let mut active = ActiveList::new(device, &renderer, capture).expect("it has a filter");
+        assert!(active.prepare(queue, capture, view.time), "the list is new");
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        view.record(&renderer, &mut encoder, &instances);
+        active.record(&renderer, &mut encoder, capture);
         queue.submit([encoder.finish()]);
-        device.poll(wgpu::PollType::wait_indefinitely()).expect("the device finishes");
-        let color = read_color(headless.context(), &view);
-        let right = color.iter().zip(&expected.picture.pixels).all(|(a, b)| *a == b.to_array());
-        assert_eq!(right, frame == 2, "frame {frame} has room for {} pairs", if right { "all" } else { "some" });
+        let mut drawn = ViewRenderer::new(device, &renderer);
+        let instances = [Instance { active: Some(&active), ..instance(capture, &view) }];
+        draw_frame(headless.context(), &renderer, &mut drawn, &instances, Background::Environment);
+        read_color(headless.context(), &drawn)
+    };
+    let whole = packed_scene::scene(5_000, 3, 1);
+    let packed = |codebooks: &[usize]| {
+        let (packed, _) = compress(whole.clone(), &packed_scene::settings(codebooks)).expect("it is compressed");
+        packed.into_runtime().expect("drawable")
+    };
+    let map = Environment { width: 90, height: 50, texels: (0..90 * 50 * 3).map(|i| i as f32 / 13_500.0).collect() };
+    for (form, scene) in [("sliced", whole.clone()), ("packed", packed(&[])), ("coded", packed(&[64, 32]))] {
+        let scene = RuntimeScene { environment: Some(map.clone()), ..scene };
+        let at_once = GpuCapture::upload(device, queue, &renderer, &scene).expect("it fits");
+        let mut upload = CaptureUpload::new(device, &renderer, &scene).expect("it fits");
+        let (all, mut pieces) = (upload.bytes_left(), 0);
+        while upload.bytes_left() > 0 {
+            let written = upload.advance(queue, &renderer, PIECE);
+            assert!((1..=PIECE).contains(&written), "{form}: {written} bytes in a piece");
+            pieces += 1;
+        }
+        assert!(pieces >= all.div_ceil(PIECE), "{form}: {all} bytes in {pieces} pieces");
+        let in_pieces = upload.finish(queue, &renderer);
+        assert_eq!(in_pieces.bytes(), all, "{form}: all of it");
+        assert!(draw(&in_pieces) == draw(&at_once), "{form}: the pictures differ");
+    }
+}
+
+#[test]
+fn a_picture_that_grows_pixel_by_pixel_needs_new_buffers_now_and_then() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let scene = scene(2_000);
+    let capture = headless.upload(&scene).expect("upload");
+    for design in [Design::Reference, Design::Fast] {
+        headless.set_design(Design::Fast);
+        headless.set_design(Design::Reference);
+        headless.set_design(design);
+        let (mut created, mut changes) = (headless.work().created(), 0);
+        // Wider and higher, and back again.
+        for step in (0..60).chain((0..60).rev()) {
+            let view = look_from(EYE, UVec2::new(150 + 2 * step, 120 + step), 0.5);
+            // As in a window, the surfaces are another texture each time, which takes a bind group. There are none.
+            let surfaces = depth_texture(headless.context(), view.size, 0.0);
+            let distance = [0.1, 0.0, 0.0, 1.0];
+            let opaque = OpaqueDepth { texture: &surfaces, samples: 1, origin: UVec2::ZERO, distance };
+            let parameters = ViewParameters { opaque: Some(opaque), ..parameters() };
+            let frame = headless.render_all(&[instance(&capture, &view)], &parameters).expect("render");
+            let now = headless.work().created();
+            (created, changes) = (now, changes + u32::from(now > created + 1));
+            if step % 20 == 7 {
+                let expected = reference::render(&scene, &view, BACKGROUND);
+                assert_equivalent(&frame, &expected, &format!("{design:?}, {}", view.size));
+            }
+        }
+        assert!((1..=6).contains(&changes), "{design:?}: buffers have been made {changes} times");
     }
 }
 

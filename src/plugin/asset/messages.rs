@@ -13,8 +13,9 @@ use bevy::ecs::event::EntityEvent;
 use bevy::ecs::message::{Message, MessageWriter};
 use bevy::ecs::system::{Commands, SystemParam};
 
-/// An entity's capture is loaded and drawn: for the first time, again after its file or the asset changed, or because the entity was
-/// given another capture that is already loaded. Sent at the latest one frame after the capture is first drawn.
+/// An entity's capture is loaded, whole on the GPU and drawn: for the first time, again after its file or the asset changed or the device
+/// was lost, or because the entity was given another capture that is already there. Sent at the latest two frames after the capture is
+/// first drawn; without a renderer, once it is loaded.
 ///
 /// # Examples
 ///
@@ -39,8 +40,8 @@ pub struct CaptureReady {
     pub capture: AssetId<GaussianCapture>,
 }
 
-/// An entity's capture could not be loaded, or this GPU cannot draw it. If it had been loaded before and its file changed, the old capture
-/// is still drawn.
+/// An entity's capture could not be loaded, or this GPU cannot draw it. If it was drawn before and its file changed, the old capture is
+/// still drawn.
 ///
 /// Bevy logs the same error, whether this is read or not.
 ///

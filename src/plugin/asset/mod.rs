@@ -7,13 +7,17 @@
 //! file ──▶ PackageLoader, CheckpointLoader ──▶ GaussianCapture ──▶ PackageSaver ──▶ file
 //!                      │                              │
 //!                      │ fails                        │ is loaded, or loaded again
-//!                      ▼                              ▼
-//!                CaptureFailed                  CaptureReady             and CaptureState on the entity
+//!                      ▼                 fails        ▼
+//!                CaptureFailed ◀─────────────── upload to the GPU
+//!                                                     │ is whole
+//!                                                     ▼
+//!                                               CaptureReady             and CaptureState on the entity
 //! ```
 //!
-//! Loading runs off the main thread and blocks no frame. When a file changes that Bevy watches, or a game calls
-//! `AssetServer::reload`, the old capture is drawn until the new one is loaded, and stays if the new one is broken. A capture is
-//! dropped with its last handle, and its memory on the GPU with it.
+//! Loading runs off the main thread, and uploading is spread over frames: neither blocks one. When a file changes that Bevy watches, or a
+//! game calls `AssetServer::reload`, the old capture is drawn until the new one is on the GPU, and stays if the new one is broken or does
+//! not fit. A capture is dropped with its last handle, and its memory on the GPU with it. Without a renderer captures are ready once they
+//! are loaded.
 
 mod loader;
 mod messages;
@@ -21,7 +25,7 @@ mod plugin;
 mod saver;
 mod state;
 mod systems;
-mod upload_failures;
+mod uploads;
 
 pub use super::component::{GaussianCapture, KeyFrames};
 pub use loader::{CaptureLoadError, CheckpointLoader, PackageLoader};
@@ -30,4 +34,4 @@ pub use messages::{CaptureFailed, CaptureReady};
 pub(crate) use plugin::CaptureAssetPlugin;
 pub use saver::{CaptureSaveError, PackageSaver, PackageSaverSettings};
 pub use state::{CaptureAssetSystems, CaptureState};
-pub(crate) use upload_failures::UploadFailures;
+pub(crate) use uploads::Uploads;

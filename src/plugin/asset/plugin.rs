@@ -6,7 +6,7 @@ use super::loader::{CheckpointLoader, PackageLoader};
 use super::messages::{CaptureFailed, CaptureReady};
 use super::state::{CaptureAssetSystems, CaptureState};
 use super::systems::{report_upload_failures, update_states};
-use super::upload_failures::UploadFailures;
+use super::uploads::Uploads;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use bevy::app::{App, Plugin, PreUpdate};
 use bevy::asset::{AssetApp, AssetTrackingSystems};
@@ -19,7 +19,7 @@ pub(crate) struct CaptureAssetPlugin;
 impl Plugin for CaptureAssetPlugin {
     fn build(&self, app: &mut App) {
         app.init_asset::<GaussianCapture>()
-            .init_resource::<UploadFailures>()
+            .init_resource::<Uploads>()
             .register_required_components::<GaussianCapture3d, CaptureState>()
             .init_asset_loader::<PackageLoader>()
             .init_asset_loader::<CheckpointLoader>()

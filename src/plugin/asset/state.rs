@@ -27,10 +27,10 @@ use bevy::reflect::std_traits::ReflectDefault;
 #[derive(Component, Reflect, Debug, Default, Clone, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 pub enum CaptureState {
-    /// Not loaded yet. Nothing is drawn.
+    /// Not loaded, or not whole on the GPU yet. Nothing is drawn.
     #[default]
     Loading,
-    /// Loaded and drawn.
+    /// Loaded and drawn; without a renderer, loaded. While another version is loaded and uploaded, the old one is drawn.
     Ready,
     /// Could not be loaded or uploaded, for this reason: file, fault and, if there is one, remedy.
     /// `AssetServer::reload`, or a change of a file that Bevy watches, loads it again.

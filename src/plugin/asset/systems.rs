@@ -1,16 +1,16 @@
 //! The systems that keep loading states up to date.
 //!
-//! In: the handle of a [`GaussianCapture3d`], what Bevy's asset server reports about it, and the uploads that failed. Out:
+//! In: the handle of a [`GaussianCapture3d`], what Bevy's asset server reports about it, and what becomes of it on the GPU. Out:
 //! [`CaptureState`], and the messages [`CaptureReady`](super::messages::CaptureReady) and
 //! [`CaptureFailed`](super::messages::CaptureFailed).
 //!
-//! A capture among the assets is ready, whatever the server reports: when a capture that has been loaded fails to load again, the
-//! server reports it as failed, but Bevy keeps the old one.
+//! A capture among the assets that is drawn is ready, whatever the server reports: when a capture that has been loaded fails to load
+//! again, the server reports it as failed, but Bevy keeps the old one.
 
 use super::loader::CaptureLoadError;
 use super::messages::Announcer;
 use super::state::CaptureState;
-use super::upload_failures::UploadFailures;
+use super::uploads::Uploads;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use bevy::asset::io::AssetReaderError;
 use bevy::asset::{AssetEvent, AssetId, AssetLoadError, AssetLoadFailedEvent, AssetServer, Assets, LoadState};
@@ -28,7 +28,7 @@ pub(super) fn update_states(
     loaded: Res<Assets<GaussianCapture>>,
     mut changes: MessageReader<AssetEvent<GaussianCapture>>,
     mut failures: MessageReader<AssetLoadFailedEvent<GaussianCapture>>,
-    rejected: Res<UploadFailures>,
+    uploads: Res<Uploads>,
     mut captures: Query<(Entity, Ref<GaussianCapture3d>, &mut CaptureState)>,
     mut announcer: Announcer,
     mut attempts: Local<Attempts>,
@@ -51,16 +51,22 @@ pub(super) fn update_states(
             failed.insert(failure.id, describe(&failure.path, &failure.error));
         }
     }
+    let mut uploads = uploads.lock();
+    // A capture that changes is ready again once the new one is drawn.
+    if let Some(finished) = uploads.take_finished() {
+        changed = finished;
+    }
     for (entity, capture, mut state) in &mut captures {
         let id = capture.0.id();
-        if rejected.contains(id) {
-            // The failed upload is reported elsewhere, but not a failure to load the capture again.
+        if loaded.contains(id) && !uploads.is_drawn(id) {
+            // A failed upload is reported elsewhere, but not a failure to load the capture again.
+            if !uploads.failures.contains_key(&id) {
+                state.set_if_neq(CaptureState::Loading);
+            }
             if let Some(error) = failed.get(&id) {
                 announcer.failed(entity, error.clone());
             }
-            continue;
-        }
-        if loaded.contains(id) {
+        } else if loaded.contains(id) {
             if !state.is_ready() || changed.contains(&id) || capture.is_changed() {
                 state.set_if_neq(CaptureState::Ready);
                 announcer.ready(entity, id);
@@ -125,23 +131,26 @@ fn describe(path: impl Display, error: &AssetLoadError) -> String {
     }
 }
 
-/// Sets the state of every entity whose capture could not be uploaded, and sends a message once for each attempt.
+/// Sends a message once for each attempt to upload a capture that failed, and sets the state of its entities, unless an older version of
+/// it is still drawn.
 pub(super) fn report_upload_failures(
-    failures: Res<UploadFailures>,
+    uploads: Res<Uploads>,
     mut captures: Query<(Entity, &GaussianCapture3d, &mut CaptureState)>,
     mut announcer: Announcer,
 ) {
-    let mut failures = failures.lock();
-    if failures.is_empty() {
+    let mut uploads = uploads.lock();
+    if uploads.failures.is_empty() {
         return;
     }
     for (entity, capture, mut state) in &mut captures {
-        let Some(failure) = failures.get(&capture.0.id()) else { continue };
-        if state.set_if_neq(CaptureState::Failed(failure.error.clone())) || !failure.reported {
+        let id = capture.0.id();
+        let Some(failure) = uploads.failures.get(&id) else { continue };
+        let is_new = !uploads.is_drawn(id) && state.set_if_neq(CaptureState::Failed(failure.error.clone()));
+        if is_new || !failure.reported {
             announcer.failed(entity, failure.error.clone());
         }
     }
-    failures.values_mut().for_each(|failure| failure.reported = true);
+    uploads.failures.values_mut().for_each(|failure| failure.reported = true);
 }
 
 #[cfg(test)]

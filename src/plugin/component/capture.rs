@@ -54,6 +54,11 @@ impl GaussianCapture {
         &self.scene
     }
 
+    /// Returns the scene, shared.
+    pub(crate) fn shared_scene(&self) -> Arc<RuntimeScene> {
+        self.scene.clone()
+    }
+
     /// Returns the box about everything that is drawn at any time, in capture space; `None` for an empty capture.
     pub fn bounds(&self) -> Option<Bounds> {
         self.bounds.as_ref().map(|bounds| bounds.whole())

@@ -40,22 +40,23 @@ pub(super) fn prepare_active_lists(
 ) {
     let _span = debug_span!("gs4d/lists").entered();
     let Some(renderer) = renderer else { return };
-    let uploaded = |asset: AssetId<GaussianCapture>| captures.get(asset)?.capture();
     lists.0.retain(|entity, placed| {
         let shown = extracted.0.get(entity).filter(|shown| shown.filtered && shown.asset == placed.asset);
-        shown.and_then(|shown| uploaded(shown.asset)).is_some_and(|capture| placed.list.is_for(capture))
+        let uploaded = shown.and_then(|shown| captures.get(shown.asset)?.capture());
+        uploaded.is_some_and(|capture| placed.list.is_for(capture))
     });
     for (entity, shown) in &extracted.0 {
-        if !(shown.seen && shown.filtered) {
+        if !(shown.seen && shown.filtered) || shown.is_faded_out() {
             continue;
         }
-        let Some(capture) = uploaded(shown.asset) else { continue };
+        let Some(uploaded) = captures.get(shown.asset) else { continue };
+        let (Some(capture), Some(time)) = (uploaded.capture(), uploaded.time_at(shown.seconds)) else { continue };
         if !lists.0.contains_key(entity) {
             let Some(list) = ActiveList::new(device.wgpu_device(), &renderer.0, capture) else { continue };
             lists.0.insert(*entity, PlacedList { list, asset: shown.asset, stale: false });
         }
         if let Some(placed) = lists.0.get_mut(entity) {
-            placed.stale = placed.list.prepare(&queue, capture, shown.time);
+            placed.stale = placed.list.prepare(&queue, capture, time);
         }
     }
 }

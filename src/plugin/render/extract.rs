@@ -28,13 +28,20 @@ pub(super) struct ExtractedCaptures(pub(super) MainEntityHashMap<ExtractedCaptur
 pub(super) struct ExtractedCapture {
     pub(super) asset: AssetId<GaussianCapture>,
     pub(super) world_from_capture: Affine3A,
-    /// In the capture's own unit of time.
-    pub(super) time: f32,
+    /// Seconds since the capture's start.
+    pub(super) seconds: f32,
     /// Whether its temporal filter is used.
     pub(super) filtered: bool,
     pub(super) appearance: Appearance,
     /// Whether any camera sees it.
     pub(super) seen: bool,
+}
+
+impl ExtractedCapture {
+    /// Returns whether nothing of it shows, wherever it is seen from.
+    pub(super) fn is_faded_out(&self) -> bool {
+        self.appearance.opacity <= 0.0
+    }
 }
 
 /// How cameras draw captures, for those with settings.
@@ -59,11 +66,13 @@ pub(super) fn extract_captures(
     let _span = debug_span!("gs4d/extract").entered();
     extracted.0.clear();
     for (entity, capture, settings, playback, transform, visibility, fade) in &captures {
-        let Some(loaded) = assets.get(&capture.0) else { continue };
+        if !assets.contains(&capture.0) {
+            continue;
+        }
         let placed = ExtractedCapture {
             asset: capture.0.id(),
             world_from_capture: transform.affine(),
-            time: loaded.time_at(playback.time),
+            seconds: playback.time,
             filtered: settings.filter,
             appearance: settings.appearance(fade.copied().unwrap_or_default().0),
             seen: visibility.get(),

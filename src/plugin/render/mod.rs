@@ -8,7 +8,7 @@
 //! renderer     compiles the pipelines                                once per device
 //! visibility   a capture's bounds at this time -> its Aabb           main world
 //! extract      captures, their times, poses and settings             main world -> render world
-//! upload       a loaded capture -> buffers on the GPU                once per asset
+//! upload       a loaded capture -> buffers on the GPU                once per asset, over several frames
 //! active       which Gaussians are active                            once per placed capture and segment, before all cameras
 //! prepare      a camera's lens and every capture's pose -> views     once per camera and frame, kept in capture_views
 //! draw         one compute pass, composite, write_depth              Core3d, after opaque meshes, before or after transparent ones
@@ -70,4 +70,4 @@ pub use draw::CaptureSystems;
 pub(crate) use plugin::CaptureRenderPlugin;
 pub use settings::{CaptureSettings, CaptureViewSettings, CropBox, DepthWrite};
 pub use statistics::CaptureStatistics;
-pub use upload::GpuGaussianCapture;
+pub use upload::{CaptureUploadBudget, GpuGaussianCapture};

@@ -12,10 +12,10 @@ use super::publish::publish_statistics;
 use super::renderer::init_renderer;
 use super::settings::CaptureSettings;
 use super::statistics::CaptureStatistics;
-use super::upload::GpuGaussianCapture;
+use super::upload::{CaptureUploadBudget, GpuGaussianCapture, continue_uploads, extract_upload_budget};
 use super::visibility::update_bounds;
 use super::write_depth::WriteDepthPipeline;
-use crate::plugin::asset::UploadFailures;
+use crate::plugin::asset::Uploads;
 use crate::plugin::component::GaussianCapture3d;
 use bevy::app::{App, Plugin, PostUpdate};
 use bevy::asset::Assets;
@@ -23,7 +23,7 @@ use bevy::camera::visibility::VisibilitySystems;
 use bevy::core_pipeline::core_3d::{main_opaque_pass_3d, main_transparent_pass_3d};
 use bevy::core_pipeline::schedule::{Core3d, Core3dSystems, camera_driver};
 use bevy::ecs::schedule::IntoScheduleConfigs;
-use bevy::render::render_asset::RenderAssetPlugin;
+use bevy::render::render_asset::{RenderAssetPlugin, prepare_assets};
 use bevy::render::render_resource::SpecializedRenderPipelines;
 use bevy::render::renderer::{RenderGraph, RenderGraphSystems};
 use bevy::render::{ExtractSchedule, GpuResourceAppExt, Render, RenderApp, RenderStartup, RenderSystems};
@@ -36,6 +36,7 @@ pub(crate) struct CaptureRenderPlugin;
 impl Plugin for CaptureRenderPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<CaptureStatistics>()
+            .init_resource::<CaptureUploadBudget>()
             .register_required_components::<GaussianCapture3d, CaptureSettings>()
             .add_plugins(RenderAssetPlugin::<GpuGaussianCapture>::default())
             .add_systems(PostUpdate, update_bounds.in_set(VisibilitySystems::CalculateBounds));
@@ -46,17 +47,19 @@ impl Plugin for CaptureRenderPlugin {
 /// Adds the systems and resources of the render world, if there is one.
 fn build_rendering(app: &mut App) {
     let statistics = app.world().resource::<CaptureStatistics>().clone();
-    let failures = app.world().resource::<UploadFailures>().clone();
+    let uploads = app.world().resource::<Uploads>().clone();
     if app.get_sub_app(RenderApp).is_none() {
         statistics.set_renderer_missing(Some("this app has no renderer: add Bevy's RenderPlugin".into()));
         return;
     }
     let Some(shaders) = add_shaders(app) else { return };
     let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
+    uploads.expect();
     render_app
         .insert_resource(shaders)
         .insert_resource(statistics)
-        .insert_resource(failures)
+        .insert_resource(uploads)
+        .init_resource::<CaptureUploadBudget>()
         .init_resource::<ExtractedCaptures>()
         .init_resource::<ExtractedViewSettings>()
         // Created anew after a lost device: they hold everything on the GPU.
@@ -67,10 +70,11 @@ fn build_rendering(app: &mut App) {
         .init_gpu_resource::<CaptureViews>()
         .init_gpu_resource::<ActiveLists>()
         .add_systems(RenderStartup, init_renderer)
-        .add_systems(ExtractSchedule, (extract_captures, extract_view_settings))
+        .add_systems(ExtractSchedule, (extract_captures, extract_view_settings, extract_upload_budget))
         .add_systems(
             Render,
             (
+                continue_uploads.in_set(RenderSystems::PrepareAssets).after(prepare_assets::<GpuGaussianCapture>),
                 make_depth_readable.in_set(RenderSystems::PrepareViews),
                 prepare_active_lists.in_set(RenderSystems::PrepareResources),
                 (prepare_views, publish_statistics).chain().in_set(RenderSystems::PrepareBindGroups),

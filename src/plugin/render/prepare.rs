@@ -60,9 +60,9 @@ impl Scene<'_> {
         let camera = view.world_from_view.affine();
         let Some(visible) = visible.get::<GaussianCapture3d>() else { return };
         drawn.extend(visible.iter_visible().filter_map(|(_, entity)| {
-            let placed = self.extracted.0.get(entity)?;
-            self.captures.get(placed.asset)?.capture()?;
-            let view = lens.view(size, placed.time, camera, placed.world_from_capture)?;
+            let placed = self.extracted.0.get(entity).filter(|placed| !placed.is_faded_out())?;
+            let time = self.captures.get(placed.asset)?.time_at(placed.seconds)?;
+            let view = lens.view(size, time, camera, placed.world_from_capture)?;
             let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
             Some(Drawn { entity: *entity, asset, view, appearance, filtered })
         }));
@@ -134,12 +134,12 @@ pub(super) fn prepare_views(
         state.set_design(&renderer.0, settings.design);
         state.measure(measure, &device, &queue, &renderer.0);
         state.drawn.clear();
-        let Some(lens) = drawable_lens(view, camera) else { continue };
-        scene.collect(&lens, view, size, visible, &mut state.drawn);
-        state.count_idle_frames();
-        if !state.sees_something() {
-            continue;
+        let lens = drawable_lens(view, camera);
+        if let Some(lens) = &lens {
+            scene.collect(lens, view, size, visible, &mut state.drawn);
         }
+        state.count_idle_frames();
+        let Some(lens) = lens.filter(|_| state.sees_something()) else { continue };
         let viewport = UVec4::new(view.viewport.x, view.viewport.y, size.x, size.y);
         state.bindings.set_viewport(viewport, &device, &queue, renderer.0.work());
         let instances = state.instances(&scene.captures, &scene.lists);
@@ -159,6 +159,11 @@ pub(super) fn prepare_views(
         if let Err(failure) = prepared {
             error_once!("captures are not drawn: {failure}");
             state.drawn.clear();
+        } else if state.renderer.is_short_of_room() {
+            warn_once!(
+                "captures are drawn whole but slowly: a camera has more pairs of splats and tiles than this GPU has room for; draw \
+                 fewer or smaller Gaussians, or a smaller picture"
+            );
         }
         let written = lens.distance.zip(writes_median(&settings, surrounded));
         state.write_depth = written.map(|(_, median)| pipelines.write_depth(msaa, median));

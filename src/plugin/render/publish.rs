@@ -29,5 +29,6 @@ pub(super) fn publish_statistics(
         (view.camera, numbers)
     });
     let uploaded = || captures.iter().filter_map(|(_, capture)| capture.capture());
-    statistics.update(numbers, uploaded().map(GpuCapture::bytes).sum(), uploaded().count());
+    let uploading = captures.iter().filter(|(_, capture)| capture.bytes_left().is_some()).count();
+    statistics.update(numbers, uploaded().map(GpuCapture::bytes).sum(), uploaded().count(), uploading);
 }

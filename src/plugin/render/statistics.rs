@@ -35,6 +35,7 @@ struct Shared {
     views: Vec<(Entity, ViewStatistics)>,
     capture_bytes: u64,
     uploaded_captures: usize,
+    uploading_captures: usize,
     renderer_missing: Option<String>,
     /// Kept when the renderer is created anew after a lost device.
     work: WorkCounters,
@@ -69,6 +70,11 @@ impl CaptureStatistics {
         self.lock().uploaded_captures
     }
 
+    /// Returns the number of captures that are on their way to the GPU, those included of which an older version is drawn.
+    pub fn uploading_captures(&self) -> usize {
+        self.lock().uploading_captures
+    }
+
     /// Returns the counters of what has been created, uploaded and recorded on the GPU so far. Clones share the counters.
     pub fn work(&self) -> WorkCounters {
         self.lock().work.clone()
@@ -87,13 +93,14 @@ impl CaptureStatistics {
         self.lock().measure
     }
 
-    /// Replaces the numbers by those of a new frame: of each camera that sees captures or holds memory for them, and the bytes and the
-    /// count of all uploaded captures.
+    /// Replaces the numbers by those of a new frame: of each camera that sees captures or holds memory for them, the bytes and the
+    /// count of all uploaded captures, and the count of those that are being uploaded.
     pub(super) fn update<'a>(
         &self,
         views: impl Iterator<Item = (Entity, Cow<'a, ViewStatistics>)> + Clone,
         capture_bytes: u64,
         uploaded_captures: usize,
+        uploading_captures: usize,
     ) {
         let mut shared = self.lock();
         shared.views.retain(|(camera, _)| views.clone().any(|(shown, _)| shown == *camera));
@@ -106,6 +113,7 @@ impl CaptureStatistics {
         }
         shared.capture_bytes = capture_bytes;
         shared.uploaded_captures = uploaded_captures;
+        shared.uploading_captures = uploading_captures;
     }
 
     /// Locks the numbers. After a panic of another holder they are still valid, if old.

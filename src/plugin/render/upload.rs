@@ -1,53 +1,124 @@
 //! Upload: from a loaded capture to its buffers on the GPU, once per asset (and again when it changes or the device was lost).
 //!
-//! In: [`GaussianCapture`]. Out: [`GpuGaussianCapture`] in `RenderAssets`, or an entry in [`UploadFailures`], which becomes a message.
+//! In: [`GaussianCapture`], and how much may be uploaded in a frame. Out: [`GpuGaussianCapture`] in `RenderAssets`, drawn once it is whole,
+//! and its state in [`Uploads`], which becomes messages. A capture that changes is drawn as it was until the new one is whole, and stays if
+//! the GPU refuses the new one.
 
 use super::renderer::CaptureRenderer;
 use super::statistics::CaptureStatistics;
-use crate::plugin::asset::UploadFailures;
+use crate::plugin::asset::Uploads;
 use crate::plugin::component::GaussianCapture;
-use crate::renderer::GpuCapture;
+use crate::renderer::{CaptureUpload, GpuCapture};
+use crate::scene::RuntimeScene;
 use bevy::asset::{AssetId, AssetServer};
-use bevy::ecs::system::SystemParamItem;
+use bevy::ecs::resource::Resource;
 use bevy::ecs::system::lifetimeless::SRes;
-use bevy::log::{error, warn};
-use bevy::render::render_asset::{PrepareAssetError, RenderAsset};
+use bevy::ecs::system::{Res, ResMut, SystemParamItem};
+use bevy::log::{debug_span, error, warn};
+use bevy::render::Extract;
+use bevy::render::render_asset::{PrepareAssetError, RenderAsset, RenderAssets};
 use bevy::render::renderer::{RenderDevice, RenderQueue};
+use std::sync::Arc;
 
-/// A capture on the GPU; empty if it could not be uploaded, which has then been logged and reported.
-pub struct GpuGaussianCapture(Option<GpuCapture>);
+/// How much of captures is uploaded to the GPU in one frame: a resource.
+///
+/// A capture of 100 MB is then drawn some frames after it has been loaded, and none of these frames is much longer than others.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// /// Behind a loading screen frames may be long.
+/// fn hurry(mut budget: ResMut<CaptureUploadBudget>) {
+///     budget.bytes_per_frame = u64::MAX;
+/// }
+/// # bevy::ecs::system::assert_is_system(hurry);
+/// ```
+#[derive(Resource, Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CaptureUploadBudget {
+    /// Bytes of all captures together; one Gaussian is uploaded in any case. Default: 16 MiB.
+    pub bytes_per_frame: u64,
+}
+
+impl Default for CaptureUploadBudget {
+    fn default() -> Self {
+        Self { bytes_per_frame: 16 << 20 }
+    }
+}
+
+/// A capture on the GPU; empty until it is whole, and if it could not be uploaded, which has then been logged and reported.
+pub struct GpuGaussianCapture {
+    shown: Option<Arc<ShownCapture>>,
+    /// What will be shown instead.
+    next: Option<NextCapture>,
+}
+
+/// A capture that is whole on the GPU.
+struct ShownCapture {
+    gpu: GpuCapture,
+    /// What it was made of: while it is replaced, the asset is another.
+    source: GaussianCapture,
+}
+
+/// A capture on its way to the GPU.
+struct NextCapture {
+    upload: CaptureUpload<Arc<RuntimeScene>>,
+    source: GaussianCapture,
+}
 
 impl GpuGaussianCapture {
     /// Returns the buffers; `None` if the capture cannot be drawn.
     pub fn capture(&self) -> Option<&GpuCapture> {
-        self.0.as_ref()
+        self.shown.as_ref().map(|shown| &shown.gpu)
+    }
+
+    /// Returns the timestamp at `seconds` since the start of the capture that is drawn, in its own unit of time; `None` if it cannot be
+    /// drawn.
+    pub(super) fn time_at(&self, seconds: f32) -> Option<f32> {
+        self.shown.as_ref().map(|shown| shown.source.time_at(seconds))
+    }
+
+    /// Uploads no more than `bytes` of what will be shown, and shows it once it is whole. Returns how many bytes that were.
+    fn advance(&mut self, queue: &RenderQueue, renderer: &CaptureRenderer, bytes: u64) -> u64 {
+        let Some(mut next) = self.next.take() else { return 0 };
+        let written = next.upload.advance(queue, &renderer.0, bytes);
+        if next.upload.bytes_left() > 0 {
+            self.next = Some(next);
+        } else {
+            let gpu = next.upload.finish(queue, &renderer.0);
+            self.shown = Some(Arc::new(ShownCapture { gpu, source: next.source }));
+        }
+        written
+    }
+
+    /// Returns the bytes that are missing until it is whole; `None` if it is, or will never be.
+    pub(super) fn bytes_left(&self) -> Option<u64> {
+        self.next.as_ref().map(|next| next.upload.bytes_left())
     }
 }
 
 impl RenderAsset for GpuGaussianCapture {
     type SourceAsset = GaussianCapture;
     // No `byte_len`: with a limit of bytes for each frame, Bevy removes the old upload before it prepares the new one.
-    type Param = (
-        SRes<RenderDevice>,
-        SRes<RenderQueue>,
-        SRes<AssetServer>,
-        SRes<UploadFailures>,
-        SRes<CaptureStatistics>,
-        Option<SRes<CaptureRenderer>>,
-    );
+    type Param =
+        (SRes<RenderDevice>, SRes<AssetServer>, SRes<Uploads>, SRes<CaptureStatistics>, Option<SRes<CaptureRenderer>>);
 
     fn prepare_asset(
         source: GaussianCapture,
         id: AssetId<GaussianCapture>,
-        (device, queue, assets, failures, statistics, renderer): &mut SystemParamItem<Self::Param>,
-        _previous: Option<&Self>,
+        (device, assets, uploads, statistics, renderer): &mut SystemParamItem<Self::Param>,
+        previous: Option<&Self>,
     ) -> Result<Self, PrepareAssetError<GaussianCapture>> {
         let name = || assets.get_path(id).map_or_else(|| format!("{id}"), |path| path.to_string());
+        let shown = previous.and_then(|previous| previous.shown.clone());
+        uploads.begin(id, shown.is_some());
         let Some(renderer) = renderer else {
             // It has been logged, once for all captures.
             let why = statistics.renderer_missing().unwrap_or_else(|| "there is no renderer".into());
-            failures.insert(id, format!("{}: not drawn: {why}", name()));
-            return Ok(Self(None));
+            uploads.fail(id, format!("{}: not drawn: {why}", name()));
+            return Ok(Self { shown, next: None });
         };
         if source.scene().trained_with.uses_fov_sentinel() {
             warn!(
@@ -56,21 +127,55 @@ impl RenderAsset for GpuGaussianCapture {
                 name()
             );
         }
-        match GpuCapture::upload(device.wgpu_device(), queue, &renderer.0, source.scene()) {
-            Ok(capture) => {
-                failures.remove(id);
-                Ok(Self(Some(capture)))
-            }
+        let next = match CaptureUpload::new(device.wgpu_device(), &renderer.0, source.shared_scene()) {
+            Ok(upload) => Some(NextCapture { upload, source }),
             Err(failure) => {
                 let failure = format!("{}: not drawn: {failure}", name());
                 error!("{failure}");
-                failures.insert(id, failure);
-                Ok(Self(None))
+                uploads.fail(id, failure);
+                None
             }
-        }
+        };
+        Ok(Self { shown, next })
     }
 
-    fn unload_asset(id: AssetId<GaussianCapture>, (_, _, _, failures, ..): &mut SystemParamItem<Self::Param>) {
-        failures.remove(id);
+    fn unload_asset(id: AssetId<GaussianCapture>, (_, _, uploads, ..): &mut SystemParamItem<Self::Param>) {
+        uploads.forget(id);
+    }
+}
+
+/// Copies the budget to the render world.
+pub(super) fn extract_upload_budget(
+    mut extracted: ResMut<CaptureUploadBudget>,
+    budget: Extract<Res<CaptureUploadBudget>>,
+) {
+    *extracted = **budget;
+}
+
+/// Uploads more of the captures that are not whole, as much as the budget allows: first of those of which least is missing, so that
+/// something shows soon.
+pub(super) fn continue_uploads(
+    queue: Res<RenderQueue>,
+    renderer: Option<Res<CaptureRenderer>>,
+    budget: Res<CaptureUploadBudget>,
+    uploads: Res<Uploads>,
+    mut captures: ResMut<RenderAssets<GpuGaussianCapture>>,
+) {
+    let _span = debug_span!("gs4d/upload").entered();
+    let Some(renderer) = renderer else { return };
+    if captures.iter().all(|(_, capture)| capture.next.is_none()) {
+        return;
+    }
+    let mut waiting: Vec<_> = captures.iter_mut().filter(|(_, capture)| capture.next.is_some()).collect();
+    waiting.sort_unstable_by_key(|(_, capture)| capture.bytes_left());
+    let mut left = budget.bytes_per_frame.max(1);
+    for (id, capture) in waiting {
+        if left == 0 {
+            break;
+        }
+        left = left.saturating_sub(capture.advance(&queue, &renderer, left));
+        if capture.next.is_none() {
+            uploads.finish(id);
+        }
     }
 }

@@ -5,8 +5,10 @@
 
 use super::error::TestingError;
 use super::pipelines::{pipelines_are_ready, watch_pipelines};
+use crate::plugin::asset::CaptureState;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::{Timeline, TimelinePlayer};
+use crate::plugin::render::CaptureStatistics;
 use bevy::app::{App, PluginsState};
 use bevy::asset::{AssetId, AssetServer, Assets, LoadState, UntypedAssetId};
 use bevy::ecs::resource::Resource;
@@ -15,8 +17,8 @@ use std::time::{Duration, Instant};
 
 /// How long assets and pipelines may take to load and compile.
 const LOAD_TIMEOUT: Duration = Duration::from_secs(120);
-/// Number of updates after which everything that has been loaded is drawn: uploads take some, as do buffers that grow
-/// by the counts of an earlier frame.
+/// Number of updates after which everything that has been loaded and uploaded is drawn, in buffers that grow by the counts of an earlier
+/// frame.
 const SETTLING: usize = 3;
 
 /// Returns the assets that are needed and not loaded yet.
@@ -65,23 +67,24 @@ pub fn settle(app: &mut App) -> Result<(), TestingError> {
         for _ in 0..SETTLING {
             update(app)?;
         }
-        // What has been loaded may need pipelines that are compiled in the background.
-        if pipelines_are_ready(app)? {
+        // What has been loaded may need pipelines that are compiled in the background, and may have changed.
+        if pipelines_are_ready(app)? && uploading(app.world_mut()).is_empty() {
             return Ok(());
         }
         if began.elapsed() > LOAD_TIMEOUT {
-            return Err(TestingError::Slow { seconds: LOAD_TIMEOUT.as_secs(), what: "shaders".into() });
+            return Err(TestingError::Slow { seconds: LOAD_TIMEOUT.as_secs(), what: "shaders, or captures".into() });
         }
     }
 }
 
-/// Runs the app, at least once, until all assets are loaded and all pipelines compiled.
+/// Runs the app, at least once, until all assets are loaded, all captures uploaded and all pipelines compiled.
 pub(super) fn load(app: &mut App) -> Result<(), TestingError> {
     start(app)?;
     let began = Instant::now();
     loop {
         update(app)?;
-        let missing = missing(app.world_mut())?;
+        let mut missing = missing(app.world_mut())?;
+        missing.extend(uploading(app.world_mut()));
         let compiled = pipelines_are_ready(app)?;
         if missing.is_empty() && compiled {
             return Ok(());
@@ -133,6 +136,17 @@ fn missing(world: &mut World) -> Result<Vec<String>, TestingError> {
         }
     }
     Ok(missing)
+}
+
+/// Returns what of captures that have been loaded is not drawn yet.
+fn uploading(world: &mut World) -> Vec<String> {
+    let mut spawned = world.query::<(&GaussianCapture3d, &CaptureState)>();
+    let Some(loaded) = world.get_resource::<Assets<GaussianCapture>>() else { return Vec::new() };
+    let waiting = spawned.iter(world).filter(|(_, state)| **state == CaptureState::Loading);
+    let waiting = waiting.map(|(capture, _)| capture.0.id()).filter(|id| loaded.contains(*id));
+    // Of those that have changed, older versions are drawn.
+    let changed = world.get_resource::<CaptureStatistics>().map_or(0, CaptureStatistics::uploading_captures);
+    waiting.map(|id| id.to_string()).chain((changed > 0).then(|| format!("{changed} captures on their way"))).collect()
 }
 
 fn captures(world: &mut World) -> Vec<UntypedAssetId> {

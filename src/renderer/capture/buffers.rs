@@ -1,22 +1,53 @@
 //! The buffers of a capture, which `project` and `activate` read.
 //!
-//! In: the [`Form`] of a scene and a range of its Gaussians. Out: storage buffers in the order of the shader's
-//! bindings. Packed scenes are uploaded without unpacking.
+//! In: the [`Form`] of a scene, its filter and its environment map, and a range of its Gaussians. Out: storage buffers in the order of the
+//! shader's bindings, which are filled piece by piece. Packed scenes are uploaded without unpacking.
 
-use crate::gaussian::{Gaussian, Harmonics};
+use crate::gaussian::Gaussian;
 use crate::renderer::memory::Allocator;
 use crate::scene::packed::{BLOCK, BLOCK_RANGES, COLOR_WORDS, RECORD_WORDS, SHARED_RANGES};
-use crate::scene::{ActiveSets, CodedColors, Form, PackedColors, TemporalFilter};
+use crate::scene::{ActiveSets, CodedColors, Environment, Form, PackedColors, RuntimeScene, TemporalFilter};
 use std::ops::Range;
 
-/// Number of records that are written together.
-const RECORDS_AT_ONCE: usize = 1 << 14;
+/// Bytes that are converted and written together: there is no second copy of all of them on the host.
+const BYTES_AT_ONCE: u64 = 1 << 20;
 
-/// The device and the queue with which buffers are created and written.
-#[derive(Clone, Copy)]
-pub(super) struct Gpu<'a> {
-    pub allocator: Allocator<'a>,
-    pub queue: &'a wgpu::Queue,
+/// A buffer of records, and how many of them have been written.
+#[derive(Debug)]
+pub(super) struct Filling {
+    pub buffer: wgpu::Buffer,
+    content: Content,
+    /// The Gaussians that it is about.
+    own: Range<usize>,
+    /// Bytes of a record.
+    size: usize,
+    /// Number of records.
+    count: usize,
+    /// Number of records that have been written.
+    done: usize,
+}
+
+/// What a buffer holds.
+#[derive(Debug, Clone, Copy)]
+enum Content {
+    /// Gaussians, with `1/σ_t` in place of `σ_t`: zero instead of infinity.
+    Gaussians,
+    /// `mean_t` and `1/σ_t`, once more.
+    Lifespans,
+    /// The coefficients that are evaluated, padded to whole four-vectors per Gaussian.
+    Harmonics,
+    /// Packed geometry.
+    Records,
+    /// Shared ranges, then those of the blocks.
+    Ranges,
+    /// Colors by codebook.
+    ColorRecords,
+    /// All codebooks, entry by entry.
+    Codebooks,
+    /// The words of each segment in turn, or one word of interval for each Gaussian.
+    Filter,
+    /// The texels of the environment map.
+    Environment,
 }
 
 /// Returns the bytes of one Gaussian in the largest buffer. `stride` is the number of four-vectors of whole
@@ -37,31 +68,32 @@ pub(super) fn largest_record(form: &Form, stride: usize) -> u64 {
 }
 
 /// Creates the buffers of the geometry of some Gaussians, the first at a multiple of a block.
-pub(super) fn geometry(gpu: Gpu<'_>, form: &Form, own: Range<usize>) -> Vec<wgpu::Buffer> {
+pub(super) fn geometry(allocator: Allocator<'_>, form: &Form, own: Range<usize>) -> Vec<Filling> {
+    let new = |label, content, size, count| Filling::new(allocator, label, content, own.clone(), size, count);
     match form {
-        Form::Sliced(sliced) => {
-            let own = &sliced.gaussians[own];
-            vec![gaussians(gpu, own), lifespans(gpu, own)]
-        }
-        Form::Packed(packed) => {
-            let blocks = own.start / BLOCK * BLOCK_RANGES..own.end.div_ceil(BLOCK) * BLOCK_RANGES;
-            let (shared, blocks) = (&packed.ranges[..SHARED_RANGES], &packed.ranges[SHARED_RANGES..][blocks]);
+        Form::Sliced(_) => vec![
+            new("gs4d gaussians", Content::Gaussians, size_of::<Gaussian>(), own.len()),
+            new("gs4d lifespans", Content::Lifespans, size_of::<[f32; 2]>(), own.len()),
+        ],
+        Form::Packed(_) => {
+            let ranges = SHARED_RANGES + own.len().div_ceil(BLOCK) * BLOCK_RANGES;
             vec![
-                plain(gpu, "gs4d records", bytemuck::cast_slice(&packed.records[own])),
-                plain(gpu, "gs4d ranges", bytemuck::cast_slice(&[shared, blocks].concat())),
+                new("gs4d records", Content::Records, size_of::<[u32; RECORD_WORDS]>(), own.len()),
+                new("gs4d ranges", Content::Ranges, size_of::<[f32; 4]>(), ranges),
             ]
         }
     }
 }
 
 /// Creates the buffer of the color of some Gaussians, without codebooks. `stride` as for [`largest_record`].
-pub(super) fn color(gpu: Gpu<'_>, form: &Form, own: Range<usize>, stride: usize) -> wgpu::Buffer {
-    match form {
-        Form::Sliced(sliced) => harmonics(gpu, &sliced.harmonics, own, stride),
-        Form::Packed(packed) => match &packed.colors {
-            PackedColors::Whole(whole) => harmonics(gpu, whole, own, stride),
-            PackedColors::Coded(coded) => plain(gpu, "gs4d color records", bytemuck::cast_slice(&coded.records[own])),
-        },
+pub(super) fn color(allocator: Allocator<'_>, form: &Form, own: Range<usize>, stride: usize) -> Filling {
+    let count = own.len();
+    match form.coded_colors() {
+        Some(_) => {
+            let size = size_of::<[u32; COLOR_WORDS]>();
+            Filling::new(allocator, "gs4d color records", Content::ColorRecords, own, size, count)
+        }
+        None => Filling::new(allocator, "gs4d harmonics", Content::Harmonics, own, stride * 16, count),
     }
 }
 
@@ -72,89 +104,153 @@ pub(super) fn entry_words(colors: &CodedColors) -> usize {
 }
 
 /// Creates the buffer of all codebooks.
-pub(super) fn codebooks(gpu: Gpu<'_>, colors: &CodedColors) -> wgpu::Buffer {
-    let words = entry_words(colors);
-    let mut halves = Vec::with_capacity(colors.codebooks.len() / colors.words_per_entry() * words * 2);
-    for (entry, scales) in colors.all_entries() {
-        let end = halves.len() + words * 2;
-        halves.extend(entry.iter().zip(scales).flat_map(|(&word, scale)| CodedColors::values(word, scale)));
-        halves.resize(end, half::f16::ZERO);
-    }
-    // A binding of no bytes is not allowed.
-    halves.resize(halves.len().max(8), half::f16::ZERO);
-    plain(gpu, "gs4d codebooks", bytemuck::cast_slice(&halves))
+pub(super) fn codebooks(allocator: Allocator<'_>, colors: &CodedColors) -> Filling {
+    let count = colors.codebooks.len() / colors.words_per_entry();
+    Filling::new(allocator, "gs4d codebooks", Content::Codebooks, 0..0, entry_words(colors) * 4, count)
 }
 
-/// Creates the buffer of the sets of some Gaussians: the words of each segment in turn, or one word of interval for
-/// each Gaussian.
-pub(super) fn filter(gpu: Gpu<'_>, filter: &TemporalFilter, own: Range<usize>) -> wgpu::Buffer {
-    let words = match &filter.sets {
-        ActiveSets::Bits(bits) => {
-            // Parts begin at multiples of 32.
-            let all = TemporalFilter::words(filter.count);
-            let own = own.start / 32..own.end.div_ceil(32);
-            bits.chunks_exact(all).flat_map(|segment| &segment[own.clone()]).copied().collect()
-        }
-        ActiveSets::Intervals(intervals) => intervals[own].to_vec(),
+/// Creates the buffer of the sets of some Gaussians, the first at a multiple of 32.
+pub(super) fn filter(allocator: Allocator<'_>, filter: &TemporalFilter, own: Range<usize>) -> Filling {
+    let count = match &filter.sets {
+        ActiveSets::Bits(_) => own_words(&own).len() * filter.segments as usize,
+        ActiveSets::Intervals(_) => own.len(),
     };
-    plain(gpu, "gs4d filter", bytemuck::cast_slice(&words))
+    Filling::new(allocator, "gs4d filter", Content::Filter, own, size_of::<u32>(), count)
 }
 
-pub(super) fn plain(gpu: Gpu<'_>, label: &'static str, contents: &[u8]) -> wgpu::Buffer {
-    filled(gpu, label, contents, wgpu::BufferUsages::STORAGE)
+/// Creates the buffer of an environment map.
+pub(super) fn environment(allocator: Allocator<'_>, map: &Environment) -> Filling {
+    Filling::new(allocator, "gs4d environment", Content::Environment, 0..0, size_of::<f32>(), map.texels.len())
 }
 
-/// Creates a buffer and writes it through the queue: mapping would panic on a device that has just been lost.
-fn filled(gpu: Gpu<'_>, label: &'static str, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
-    let made = gpu.allocator.buffer(label, contents.len() as u64, usage);
-    gpu.queue.write_buffer(&made, 0, contents);
-    made
+/// Returns the words of these Gaussians in a set of bits.
+fn own_words(own: &Range<usize>) -> Range<usize> {
+    own.start / 32..own.end.div_ceil(32)
 }
 
-/// Creates the buffer of the records, with `1/σ_t` in place of `σ_t`: zero instead of infinity.
-fn gaussians(gpu: Gpu<'_>, gaussians: &[Gaussian]) -> wgpu::Buffer {
-    records(gpu, "gs4d gaussians", gaussians.len(), size_of::<Gaussian>(), |index, record| {
-        let gaussian = gaussians[index];
-        record.copy_from_slice(bytemuck::bytes_of(&Gaussian { sigma_t: gaussian.sigma_t.recip(), ..gaussian }));
-    })
-}
+impl Filling {
+    /// Creates a buffer. It is written through the queue: mapping would panic on a device that has just been lost.
+    fn new(
+        allocator: Allocator<'_>,
+        label: &str,
+        content: Content,
+        own: Range<usize>,
+        size: usize,
+        count: usize,
+    ) -> Self {
+        // A binding of no bytes is not allowed.
+        let bytes = (count.max(1) * size) as u64;
+        let buffer = allocator.buffer(label, bytes, wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
+        Self { buffer, content, own, size, count, done: 0 }
+    }
 
-/// Creates the buffer of `mean_t` and `1/σ_t`, once more.
-fn lifespans(gpu: Gpu<'_>, gaussians: &[Gaussian]) -> wgpu::Buffer {
-    records(gpu, "gs4d lifespans", gaussians.len(), size_of::<[f32; 2]>(), |index, record| {
-        let Gaussian { mean_t, sigma_t, .. } = gaussians[index];
-        record.copy_from_slice(bytemuck::bytes_of(&[mean_t, sigma_t.recip()]));
-    })
-}
+    /// Returns the bytes of a record.
+    pub fn record_size(&self) -> u64 {
+        self.size as u64
+    }
 
-/// Creates the buffer of the coefficients that are evaluated, padded to whole four-vectors per Gaussian.
-fn harmonics(gpu: Gpu<'_>, harmonics: &Harmonics, own: Range<usize>, stride: usize) -> wgpu::Buffer {
-    let used = harmonics.evaluated() * 3;
-    records(gpu, "gs4d harmonics", own.len(), stride * 16, |index, record| {
-        record[..used * 4].copy_from_slice(bytemuck::cast_slice(&harmonics.of(own.start + index)[..used]));
-    })
-}
+    /// Returns the bytes that have not been written.
+    pub fn bytes_left(&self) -> u64 {
+        (self.count - self.done) as u64 * self.size as u64
+    }
 
-/// Creates a storage buffer of records, written in chunks to avoid a second copy of all of them on the host.
-fn records(
-    gpu: Gpu<'_>,
-    label: &'static str,
-    count: usize,
-    size: usize,
-    fill: impl Fn(usize, &mut [u8]),
-) -> wgpu::Buffer {
-    let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
-    let made = gpu.allocator.buffer(label, (count * size) as u64, usage);
-    let mut chunk = Vec::new();
-    for first in (0..count).step_by(RECORDS_AT_ONCE) {
-        let own = RECORDS_AT_ONCE.min(count - first);
+    /// Writes no more than `bytes` of what is left, but one record in any case, and returns how many bytes that were. `chunk` is memory
+    /// that is used again.
+    pub fn fill(&mut self, queue: &wgpu::Queue, scene: &RuntimeScene, bytes: u64, chunk: &mut Vec<u8>) -> u64 {
+        let most = (bytes.min(BYTES_AT_ONCE) / self.size as u64).max(1) as usize;
+        let records = self.done..self.count.min(self.done + most);
         // What is not filled is zero.
         chunk.clear();
-        chunk.resize(own * size, 0);
-        for (index, record) in chunk.chunks_exact_mut(size).enumerate() {
-            fill(first + index, record);
-        }
-        gpu.queue.write_buffer(&made, (first * size) as u64, &chunk);
+        chunk.resize(records.len() * self.size, 0);
+        self.convert(scene, records.clone(), chunk);
+        queue.write_buffer(&self.buffer, (records.start * self.size) as u64, chunk);
+        self.done = records.end;
+        chunk.len() as u64
     }
-    made
+
+    /// Writes all sets of another filter of as many Gaussians.
+    pub fn fill_filter(&self, queue: &wgpu::Queue, filter: &TemporalFilter) {
+        let mut words = vec![0; self.count * self.size];
+        self.convert_filter(filter, 0..self.count, &mut words);
+        queue.write_buffer(&self.buffer, 0, &words);
+    }
+
+    /// Converts some of its records. `None` if they are not of this scene's form.
+    fn convert(&self, scene: &RuntimeScene, records: Range<usize>, to: &mut [u8]) -> Option<()> {
+        let form = &scene.form;
+        let own = self.own.start + records.start..self.own.start + records.end;
+        let size = self.size;
+        match self.content {
+            Content::Gaussians => {
+                let gaussians = &form.as_sliced()?.gaussians[self.own.clone()];
+                each(records, size, to, |index, record| {
+                    let gaussian = gaussians[index];
+                    let sigma_t = gaussian.sigma_t.recip();
+                    record.copy_from_slice(bytemuck::bytes_of(&Gaussian { sigma_t, ..gaussian }));
+                });
+            }
+            Content::Lifespans => {
+                let gaussians = &form.as_sliced()?.gaussians[self.own.clone()];
+                each(records, size, to, |index, record| {
+                    let Gaussian { mean_t, sigma_t, .. } = gaussians[index];
+                    record.copy_from_slice(bytemuck::bytes_of(&[mean_t, sigma_t.recip()]));
+                });
+            }
+            Content::Harmonics => {
+                let harmonics = form.harmonics()?;
+                let used = harmonics.evaluated() * 3;
+                each(records, size, to, |index, record| {
+                    let values = &harmonics.of(self.own.start + index)[..used];
+                    record[..used * 4].copy_from_slice(bytemuck::cast_slice(values));
+                });
+            }
+            Content::Records => to.copy_from_slice(bytemuck::cast_slice(&form.as_packed()?.records[own])),
+            Content::Ranges => {
+                let ranges = &form.as_packed()?.ranges;
+                let before = self.own.start / BLOCK * BLOCK_RANGES;
+                each(records, size, to, |index, record| {
+                    let index = if index < SHARED_RANGES { index } else { before + index };
+                    record.copy_from_slice(bytemuck::bytes_of(&ranges[index]));
+                });
+            }
+            Content::ColorRecords => to.copy_from_slice(bytemuck::cast_slice(&form.coded_colors()?.records[own])),
+            Content::Codebooks => {
+                let entries = form.coded_colors()?.all_entries().skip(records.start);
+                for ((words, scales), record) in entries.zip(to.chunks_exact_mut(size)) {
+                    let halves = words.iter().zip(scales).flat_map(|(&word, scale)| CodedColors::values(word, scale));
+                    for (half, bytes) in halves.zip(record.chunks_exact_mut(2)) {
+                        bytes.copy_from_slice(&half.to_ne_bytes());
+                    }
+                }
+            }
+            Content::Filter => self.convert_filter(scene.filter.as_ref()?, records, to),
+            Content::Environment => {
+                to.copy_from_slice(bytemuck::cast_slice(&scene.environment.as_ref()?.texels[records]));
+            }
+        }
+        Some(())
+    }
+
+    fn convert_filter(&self, filter: &TemporalFilter, records: Range<usize>, to: &mut [u8]) {
+        match &filter.sets {
+            ActiveSets::Bits(bits) => {
+                let (all, words) = (TemporalFilter::words(filter.count), own_words(&self.own));
+                each(records, self.size, to, |index, record| {
+                    let word = bits[index / words.len() * all + words.start + index % words.len()];
+                    record.copy_from_slice(bytemuck::bytes_of(&word));
+                });
+            }
+            ActiveSets::Intervals(intervals) => {
+                let own = self.own.start + records.start..self.own.start + records.end;
+                to.copy_from_slice(bytemuck::cast_slice(&intervals[own]));
+            }
+        }
+    }
+}
+
+/// Calls `fill` with the index and the bytes of each record.
+fn each(records: Range<usize>, size: usize, to: &mut [u8], fill: impl Fn(usize, &mut [u8])) {
+    for (index, record) in records.zip(to.chunks_exact_mut(size)) {
+        fill(index, record);
+    }
 }

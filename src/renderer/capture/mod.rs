@@ -4,13 +4,17 @@
 //! no binding exceeds the limit of the device; a part is drawn by one dispatch of `project`.
 
 mod buffers;
+mod upload;
 
-use super::memory::binding_limit;
+pub use upload::CaptureUpload;
+
+use super::memory::{Allocator, binding_limit};
 use super::{GpuError, Renderer, Storage, layout};
 use crate::gaussian::ShDirection;
 use crate::gaussian::harmonics::evaluated;
 use crate::scene::packed::MAX_STAGES;
 use crate::scene::{ActiveSets, CodedColors, ColorDegrees, RuntimeScene, TemporalFilter, segment_of};
+use buffers::Filling;
 use layout::BLOCK;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -55,6 +59,8 @@ pub(super) struct Filter {
     counts: Vec<u32>,
     /// Bytes of its buffers.
     bytes: u64,
+    /// Active Gaussians of all parts in the segment with most of them.
+    pub most: u32,
 }
 
 impl Filter {
@@ -70,7 +76,10 @@ impl Filter {
             ActiveSets::Bits(_) => layout::FILTER_BITS,
             ActiveSets::Intervals(_) => layout::FILTER_INTERVALS,
         };
-        Self { mode, segments: filter.segments, interval, counts, bytes }
+        let segments = filter.segments as usize;
+        let of_all_parts = |segment: usize| counts.iter().skip(segment).step_by(segments.max(1)).sum::<u32>();
+        let most = (0..segments).map(of_all_parts).max().unwrap_or_default();
+        Self { mode, segments: filter.segments, interval, counts, bytes, most }
     }
 
     /// Returns the segment of a time, in the capture's unit.
@@ -91,7 +100,7 @@ pub(super) struct EnvironmentBuffer {
 }
 
 impl GpuCapture {
-    /// Uploads a scene.
+    /// Uploads a scene, all of it at once; a [`CaptureUpload`] does it piece by piece.
     ///
     /// # Errors
     /// When the environment map, or the smallest part of the Gaussians, is larger than the device can bind, or the
@@ -102,9 +111,17 @@ impl GpuCapture {
         renderer: &Renderer,
         scene: &RuntimeScene,
     ) -> Result<Self, GpuError> {
+        Ok(CaptureUpload::new(device, renderer, scene)?.finish(queue, renderer))
+    }
+
+    /// Creates the buffers of a scene. They are still to be filled.
+    fn allocate(
+        device: &wgpu::Device,
+        renderer: &Renderer,
+        scene: &RuntimeScene,
+    ) -> Result<(Self, Vec<Filling>), GpuError> {
         scene.check().map_err(GpuError::Scene)?;
         let allocator = renderer.allocator(device);
-        let gpu = buffers::Gpu { allocator, queue };
         let form = &scene.form;
         let storage = Storage::of(form);
         let ColorDegrees { degree, degree_t, .. } = form.color_degrees();
@@ -126,25 +143,30 @@ impl GpuCapture {
             return Err(GpuError::TooLarge { what: "the Gaussians", needed, limit });
         }
         let mut parts = Vec::new();
-        let mut bytes = 0;
-        let codebooks = form.coded_colors().map(|colors| buffers::codebooks(gpu, colors));
+        let mut fillings = Vec::new();
+        let codebooks = form.coded_colors().map(|colors| buffers::codebooks(allocator, colors));
         for first in (0..scene.len()).step_by(per_part) {
-            let count = per_part.min(scene.len() - first);
-            let geometry = buffers::geometry(gpu, form, first..first + count);
-            let color = buffers::color(gpu, form, first..first + count, stride);
-            bytes += geometry.iter().chain([&color]).map(wgpu::Buffer::size).sum::<u64>();
-            let all = [&color].into_iter().chain(codebooks.iter());
-            let both = [geometry.iter().collect::<Vec<_>>(), all.collect()];
-            let buffers = both.concat().into_iter().cloned().collect();
-            let [geometry, color] = renderer.capture_bind_groups(device, storage, both.each_ref().map(|all| &all[..]));
-            parts.push(Part { count: count as u32, geometry, color, buffers, filter: None });
+            let own = first..(first + per_part).min(scene.len());
+            let geometry = buffers::geometry(allocator, form, own.clone());
+            let color = buffers::color(allocator, form, own.clone(), stride);
+            let buffer = |filling: &Filling| filling.buffer.clone();
+            let colors = [&color].into_iter().chain(&codebooks).map(buffer).collect();
+            let both: [Vec<wgpu::Buffer>; 2] = [geometry.iter().map(buffer).collect(), colors];
+            let [geometry_group, color_group] =
+                renderer.capture_bind_groups(device, storage, both.each_ref().map(|all| &all[..]));
+            fillings.extend(geometry);
+            fillings.push(color);
+            let (count, buffers) = (own.len() as u32, both.concat());
+            parts.push(Part { count, geometry: geometry_group, color: color_group, buffers, filter: None });
         }
-        bytes += codebooks.iter().map(wgpu::Buffer::size).sum::<u64>();
-        let environment = scene.environment.as_ref().map(|map| EnvironmentBuffer {
-            buffer: buffers::plain(gpu, "gs4d environment", bytemuck::cast_slice(&map.texels)),
-            size: [map.width, map.height],
+        fillings.extend(codebooks);
+        let environment = scene.environment.as_ref().map(|map| {
+            let texels = buffers::environment(allocator, map);
+            let buffer = texels.buffer.clone();
+            fillings.push(texels);
+            EnvironmentBuffer { buffer, size: [map.width, map.height] }
         });
-        bytes += environment.as_ref().map_or(0, |map| map.buffer.size());
+        let bytes = fillings.iter().map(|filling| filling.buffer.size()).sum();
         let settings = layout::InstanceUniforms {
             degree,
             degree_t: if degree == 3 { degree_t } else { 0 },
@@ -158,26 +180,33 @@ impl GpuCapture {
         let id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
         let mut capture = Self { parts, environment, storage, id, filter: None, bytes, settings, len: scene.len() };
         if let Some(filter) = &scene.filter {
-            capture.set_filter(gpu, renderer, filter, scene.trained_with.time_interval);
+            fillings.extend(capture.allocate_filter(allocator, renderer, filter, scene.trained_with.time_interval));
         }
-        renderer.work().add_uploaded(capture.bytes());
-        Ok(capture)
+        Ok((capture, fillings))
     }
 
-    /// Replaces the temporal filter by another of as many Gaussians.
-    fn set_filter(&mut self, gpu: buffers::Gpu<'_>, renderer: &Renderer, filter: &TemporalFilter, interval: [f32; 2]) {
-        let (mut first, mut bytes) = (0, 0);
+    /// Creates the buffers of a temporal filter of as many Gaussians, in place of those of another. They are still to be filled.
+    fn allocate_filter(
+        &mut self,
+        allocator: Allocator<'_>,
+        renderer: &Renderer,
+        filter: &TemporalFilter,
+        interval: [f32; 2],
+    ) -> Vec<Filling> {
+        let (mut first, mut fillings) = (0, Vec::with_capacity(self.parts.len()));
         for part in &mut self.parts {
             let end = first + part.count as usize;
-            let sets = buffers::filter(gpu, filter, first..end);
-            bytes += sets.size();
-            let group = &renderer.layouts.filter;
-            part.filter = Some(gpu.allocator.bind_group("gs4d filter", group, &[sets.as_entire_binding()]));
+            let sets = buffers::filter(allocator, filter, first..end);
+            let resources = [sets.buffer.as_entire_binding()];
+            part.filter = Some(allocator.bind_group("gs4d filter", &renderer.layouts.filter, &resources));
+            fillings.push(sets);
             first = end;
         }
+        let bytes = fillings.iter().map(|filling| filling.buffer.size()).sum();
         self.filter = Some(Filter::new(filter, interval, &self.parts, bytes));
-        // Lists of the old filter are not those of this one.
+        // Lists of another filter are not those of this one.
         self.id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
+        fillings
     }
 
     /// Replaces the temporal filter, for clients that change the Gaussians. `interval` is the time interval of the capture.
@@ -195,7 +224,9 @@ impl GpuCapture {
         if filter.count != self.len {
             return Err(GpuError::Scene("the temporal filter is of another number of Gaussians"));
         }
-        self.set_filter(buffers::Gpu { allocator: renderer.allocator(device), queue }, renderer, filter, interval);
+        for sets in self.allocate_filter(renderer.allocator(device), renderer, filter, interval) {
+            sets.fill_filter(queue, filter);
+        }
         Ok(())
     }
 

@@ -93,7 +93,7 @@ impl Headless {
         let mut view = ViewRenderer::new(device, &self.renderer);
         view.set_design(&self.renderer, self.view.design());
         // Room for what the warm-up counted.
-        view.make_room(self.view.pair_capacity());
+        view.make_room(self.view.pair_room());
         let filtered = self.filtered.then(|| ActiveList::new(device, &self.renderer, capture));
         Lane { view, active: filtered.flatten(), timer: None }
     }

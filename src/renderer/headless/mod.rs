@@ -140,14 +140,17 @@ impl Headless {
     ) -> Result<Frame, GpuError> {
         let size = instances.first().map_or(UVec2::ONE, |instance| instance.view.size);
         self.require_readable(size, parameters.precision)?;
-        let counters = self.submit_whole(instances, parameters)?;
+        let counters = self.submit(instances, parameters)?;
+        let pairs = self.view.pair_count(&counters);
+        // This frame lacks nothing without, but later ones are faster with it.
+        self.view.make_room(pairs);
         let (color, depth) = self.read_targets(size)?;
         Ok(Frame {
             picture: Picture { size, pixels: color.iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect() },
             transmittance: color.iter().map(|p| p[3]).collect(),
             depth: depth.iter().map(|p| p[0]).collect(),
             median_depth: depth.iter().map(|p| p[1]).collect(),
-            counts: Counts { visible: counters.visible, pairs: counters.pairs },
+            counts: Counts { visible: counters.visible, pairs },
         })
     }
 
@@ -172,19 +175,32 @@ impl Headless {
         }
     }
 
-    /// Draws all Gaussians of one capture, without its filter, and leaves the results on the GPU.
+    /// Draws all Gaussians of one capture, without its filter, and leaves the results on the GPU: all pairs are in the lists.
     ///
     /// # Errors
-    /// As [`render`](Self::render).
+    /// As [`render`](Self::render), and if the device has no room for the pairs.
     pub fn draw(&mut self, capture: &GpuCapture, view: &View, background: Background) -> Result<(), GpuError> {
         // Its buffers are what clients read.
         self.set_design(Design::Reference);
         let parameters = ViewParameters { background, ..ViewParameters::default() };
-        self.submit_whole(&[instance(capture, None, view)], &parameters).map(|_| ())
+        let instances = [instance(capture, None, view)];
+        loop {
+            let counters = self.submit(&instances, &parameters)?;
+            let (pairs, capacity) = (self.view.pair_count(&counters), self.view.pair_capacity());
+            if pairs <= capacity {
+                return Ok(());
+            }
+            let limit = max_pairs(&self.context.device);
+            if capacity == limit {
+                let (needed, limit) = (u64::from(pairs) * 4, u64::from(limit) * 4);
+                return Err(GpuError::TooLarge { what: "the pairs of splats and tiles", needed, limit });
+            }
+            self.view.make_room(pairs);
+        }
     }
 
-    /// Records a frame of one capture, with its filter, without waiting for it. Pairs for which there is no room are left out; earlier
-    /// frames make room for those of later ones. Submit the encoder before the next frame is recorded.
+    /// Records a frame of one capture, with its filter, without waiting for it. The lists lack the pairs for which there is no room, the
+    /// picture does not; earlier frames make room for those of later ones. Submit the encoder before the next frame is recorded.
     ///
     /// # Errors
     /// As [`render`](Self::render).
@@ -240,27 +256,6 @@ impl Headless {
     /// Returns the resources of the last frame on the GPU; `None` before the first.
     pub fn finished(&self) -> Option<FinishedFrame<'_>> {
         self.view.finished()
-    }
-
-    /// Draws one frame, again with more room until all pairs fit.
-    fn submit_whole(
-        &mut self,
-        instances: &[Instance<'_>],
-        parameters: &ViewParameters<'_>,
-    ) -> Result<Counters, GpuError> {
-        loop {
-            let counters = self.submit(instances, parameters)?;
-            let capacity = self.view.pair_capacity();
-            if counters.pairs_wanted <= capacity {
-                return Ok(counters);
-            }
-            let limit = max_pairs(&self.context.device);
-            if capacity == limit {
-                let (needed, limit) = (u64::from(counters.pairs_wanted) * 4, u64::from(limit) * 4);
-                return Err(GpuError::TooLarge { what: "the pairs of splats and tiles", needed, limit });
-            }
-            self.view.make_room(counters.pairs_wanted);
-        }
     }
 
     /// Draws one frame and waits for it. Returns its counters.

@@ -1,7 +1,7 @@
 //! The bins of the fast renderer.
 //!
 //! In: the size of a picture and the number of splats in all bins to have room for. Out: [`FastResources`], the
-//! counters and entries of bins of a few tiles, and the bind groups of the passes over them.
+//! counters and entries of bins of a few tiles, and the bind groups of the passes over them. Pictures of any size up to that share them.
 
 use super::sizes::Sizes;
 use super::{Instance, ViewRenderer};
@@ -38,9 +38,12 @@ const SMALL_BINS_OF_CROWD: u32 = 2048;
 const FEW_LARGE_BINS: u32 = 128;
 const FEW_GAUSSIANS: u32 = 300;
 
+/// Tiles along each side of small and of large bins.
+const SIDES: [u32; 2] = [2, 4];
+
 /// Returns the number of tiles along each side of a bin, 2 or 4, by the size of the picture and the number of all Gaussians.
 pub(super) fn bin_side(picture: UVec2, gaussians: u32) -> u32 {
-    let [small, large] = [2, 4].map(|side| bin_grid(picture, side).element_product());
+    let [small, large] = SIDES.map(|side| bin_grid(picture, side).element_product());
     let each = gaussians / large;
     let enough_large = large >= FEW_LARGE_BINS && each <= FEW_GAUSSIANS;
     let limit = if each > CROWD { SMALL_BINS_OF_CROWD } else { SMALL_BINS };
@@ -79,19 +82,17 @@ pub(super) fn first_guess(picture: UVec2, side: u32, slots: u32) -> u32 {
     bins.saturating_mul(slots.min(share).max(256))
 }
 
-impl Sizes {
-    /// Returns the number of bins across and down the picture.
+impl ViewRenderer {
+    /// Returns the number of bins across and down the picture that is prepared.
     pub(super) fn bin_grid(&self) -> UVec2 {
         bin_grid(self.picture, self.bin_side)
     }
 
-    /// Returns the number of splats that each bin has room for.
-    pub(super) fn bin_capacity(&self) -> u32 {
-        (self.entries / self.bin_grid().element_product()).max(256)
+    /// Returns the number of bins of the picture that is prepared.
+    pub(super) fn bin_count(&self) -> u32 {
+        self.bin_grid().element_product()
     }
-}
 
-impl ViewRenderer {
     /// Creates bins, with room for that many splats in all of them together.
     pub(super) fn make_fast(
         &self,
@@ -101,11 +102,12 @@ impl ViewRenderer {
         instance: wgpu::BindingResource<'_>,
         [splats, tile_ranges, pair_splats]: [&wgpu::Buffer; 3],
     ) -> FastResources {
-        let count = u64::from(sizes.bin_grid().element_product());
+        // As many as there can be.
+        let count = u64::from(bin_grid(sizes.picture, SIDES[0]).element_product());
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
         let counters = count + u64::from(BIN_COUNTERS + sizes.parts);
         let bins = [(); 2].map(|()| allocator.buffer("gs4d bins", 4 * counters, usage));
-        let entries_size = 8 * count * u64::from(sizes.bin_capacity());
+        let entries_size = 8 * u64::from(sizes.entries.max(1));
         let entries = allocator.buffer("gs4d bin entries", entries_size, BufferUsages::STORAGE);
         let slots = u64::from(sizes.slots);
         let visible = allocator.buffer("gs4d visible", size_of::<VisibleSplat>() as u64 * slots, BufferUsages::STORAGE);

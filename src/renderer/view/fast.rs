@@ -50,7 +50,7 @@ impl ViewRenderer {
     pub(super) fn binning(&self, sizes: &Sizes, part: u32) -> [u32; 4] {
         // Never 0, which is the stamp of a new buffer.
         let frame = self.frames % 0xffff + 1;
-        [sizes.bin_side | (frame << 8), sizes.bin_capacity(), part, sizes.parts]
+        [self.bin_side | (frame << 8), sizes.entries / self.bin_count(), part, sizes.parts]
     }
 
     /// Records the passes of the fast design.
@@ -82,7 +82,7 @@ impl ViewRenderer {
         else {
             return;
         };
-        let bins = made.sizes.bin_grid();
+        let bins = self.bin_grid();
         pass.set_pipeline(sort_bins);
         pass.set_bind_group(0, &fast.sort_bins[odd], &[]);
         pass.dispatch_workgroups(bins.x, bins.y, 1);
@@ -94,7 +94,7 @@ impl ViewRenderer {
         mark(timer, pass);
 
         // blend_blocks
-        let tiles = tiles(made.sizes.picture);
+        let tiles = tiles(self.picture);
         pass.set_pipeline(blend_blocks);
         pass.set_bind_group(0, &made.pixel, &[]);
         pass.set_bind_group(1, &fast.blend_blocks, &[]);

@@ -11,7 +11,7 @@ mod record;
 mod resources;
 mod sizes;
 
-use super::active::drawn_count;
+use super::active::{drawn_count, most_drawn};
 use super::memory::{alignment_of, binding_limit};
 use super::pipelines::Renderer;
 use super::shaders::{Blending, ColorPrecision, FastVariant, Lists, Pixels};
@@ -25,7 +25,7 @@ use layout::{BLOCK, Counters, DEPTH_STEPS};
 use readback::Readback;
 pub use resources::PassBuffers;
 use resources::Resources;
-use sizes::Sizes;
+use sizes::{Sizes, grown};
 use wgpu::{BufferUsages, TextureFormat};
 
 /// A capture in a view. The view includes the transform of the capture and the capture's own time.
@@ -85,8 +85,10 @@ pub struct OpaqueDepth<'a> {
 pub struct ViewRenderer {
     /// Alignment of dynamic uniform offsets.
     alignment: u32,
-    /// Number of slots of the frame prepared last.
+    /// Number of slots of the frame prepared last, the size of its picture, and the tiles along each side of its bins.
     slots: u32,
+    picture: UVec2,
+    bin_side: u32,
     /// Never [`Design::Auto`].
     design: Design,
     /// Whether the counters of odd frames are used, and whether the frame prepared last has been recorded.
@@ -99,9 +101,12 @@ pub struct ViewRenderer {
     variant: FastVariant,
     /// Number of splats of the fullest bin of an earlier frame.
     fullest_bin: u32,
+    /// Number of bins that the frame recorded last has cleared for the next.
+    cleared_bins: u32,
     has_depths: bool,
-    /// Number of pairs for which an earlier frame wanted room.
+    /// Number of pairs for which an earlier frame wanted room, and whether that is more than the device has.
     pairs_wanted: u32,
+    short_of_room: bool,
     /// The room that the bins of the fast design should have.
     bin_room: BinRoom,
     /// Number of successive frames for which the buffers have been far too large.
@@ -137,7 +142,7 @@ pub struct FinishedFrame<'a> {
     pub counters: &'a wgpu::Buffer,
     /// Buffers that the passes have written.
     pub buffers: &'a PassBuffers,
-    /// Color over the background and transmittance, `Rgba32Float`.
+    /// Color over the background and transmittance, `Rgba32Float`. May be larger than the picture, like the depth.
     pub color: &'a wgpu::TextureView,
     /// Expected and median depth, `Rg32Float`.
     pub depth: &'a wgpu::TextureView,
@@ -184,11 +189,14 @@ impl ViewRenderer {
         Self {
             alignment,
             slots: 0,
+            picture: UVec2::ONE,
+            bin_side: 1,
             design: renderer.resolve(Design::Auto),
             odd: false,
             frames: 0,
             recorded: false,
             pairs_wanted: 0,
+            short_of_room: false,
             bin_room: BinRoom::default(),
             oversized_frames: 0,
             instance_uniforms: Vec::new(),
@@ -204,6 +212,7 @@ impl ViewRenderer {
             pixels: Pixels::default(),
             variant: FastVariant::default(),
             fullest_bin: 0,
+            cleared_bins: 0,
             has_depths: true,
             resources: None,
         }
@@ -244,12 +253,15 @@ impl ViewRenderer {
             self.frames = self.frames.wrapping_add(1);
         }
         let made = self.resources.as_ref().map(|resources| resources.sizes).unwrap_or_default();
-        let picture = instances.first().map_or(made.picture.max(UVec2::ONE), |instance| instance.view.size);
+        let picture = instances.first().map_or(self.picture, |instance| instance.view.size);
         let limits = device.limits();
         if picture.min_element() == 0 || picture.max_element() > limits.max_texture_dimension_2d {
             return Err(GpuError::Size { width: picture.x, height: picture.y, limit: limits.max_texture_dimension_2d });
         }
-        let slots: usize = instances.iter().map(|instance| instance.capture.len()).sum();
+        let total: usize = instances.iter().map(|instance| instance.capture.len()).sum();
+        let total = u32::try_from(total).unwrap_or(u32::MAX);
+        // As many as there will be at any time: another segment of a filter changes no buffer.
+        let slots: usize = instances.iter().map(|instance| most_drawn(instance.capture, instance.active)).sum();
         let parts: usize = instances.iter().map(|instance| instance.capture.parts.len()).sum();
         let splat = size_of::<layout::SplatRecord>() as u64;
         let limit = match self.design {
@@ -262,60 +274,65 @@ impl ViewRenderer {
             return Err(GpuError::TooLarge { what: "the splats", needed, limit });
         }
         let slots = slots as u32;
-        // Two pairs for each Gaussian are a first guess; the counters of later frames correct it.
-        let (guess, most) = (slots.saturating_mul(2).max(1 << 16), max_pairs(device));
+        // A first guess; the counters of later frames correct it.
+        let guess = total.saturating_mul(2).min(slots.saturating_mul(6)).max(1 << 16);
+        let most = max_pairs(device);
         let pairs = self.pairs_wanted.max(guess).min(most);
-        let bin_side = bins::bin_side(picture, slots);
-        let entries = match self.design {
+        (self.picture, self.bin_side) = (picture, bins::bin_side(picture, total));
+        let in_bins = self.fullest_bin.saturating_mul(self.bin_count());
+        self.short_of_room = self.statistics.pairs > most || in_bins > most / 2;
+        let entries = |picture| match self.design {
             Design::Reference => 0,
             // Twice as many bytes as for pairs.
             Design::Auto | Design::Fast => {
-                self.bin_room.wanted().max(bins::first_guess(picture, bin_side, slots)).min(most / 2)
+                self.bin_room.wanted().max(bins::first_guess(picture, self.bin_side, slots)).min(most / 2)
             }
         };
-        let needed = Sizes {
+        let needed = |picture| Sizes {
             slots: slots.next_multiple_of(BLOCK).max(BLOCK),
             pairs,
-            bin_side,
-            entries,
+            entries: entries(picture),
             parts: (parts as u32).max(1),
             picture,
             depths: if writes_depths { picture } else { UVec2::ONE },
         };
-        let sizes = self.kept_sizes(made, needed);
+        let [exact, grown] = [picture, grown(made.picture, picture, limits.max_texture_dimension_2d)].map(needed);
+        let sizes = self.kept_sizes(made, exact, grown, guess);
         let environment = instances.iter().find_map(|i| Some((i, i.capture.environment.as_ref()?)));
         let opaque = parameters.opaque.filter(|opaque| opaque.samples > 0);
         let opaque_view = opaque.map_or(&self.no_depth, |depth| depth.texture).clone();
         let environment_buffer = environment.map_or(&self.no_environment, |(_, map)| &map.buffer).clone();
-        let stale = self.resources.as_ref().is_none_or(|made| {
-            made.sizes != sizes
-                || made.pixels != self.pixels
-                || made.opaque != opaque_view
-                || made.environment != environment_buffer
-        });
-        if stale {
-            self.odd = false;
-            self.resources = Some(self.make(device, queue, renderer, sizes, opaque_view, environment_buffer));
+        match &mut self.resources {
+            Some(made) if made.sizes == sizes && made.pixels == self.pixels => {
+                let allocator = renderer.allocator(device);
+                made.bind_pixel(allocator, &renderer.layouts, &self.frame, opaque_view, environment_buffer);
+            }
+            _ => {
+                self.odd = false;
+                self.resources = Some(self.make(device, queue, renderer, sizes, opaque_view, environment_buffer));
+            }
         }
         let active =
             |i: &Instance<'_>| (0..i.capture.parts.len()).map(|at| drawn_count(i.capture, at, i.active)).sum::<u32>();
         self.slots = instances.iter().map(active).sum();
         self.statistics.bytes = self.resources.as_ref().map_or(0, |made| made.bytes);
-        self.statistics.total = slots;
+        self.statistics.total = total;
         self.statistics.active = self.slots;
         self.write_uniforms(queue, instances, parameters, environment.map(|(i, m)| (i.view, i.appearance, m.size)));
         Ok(())
     }
 
     /// Returns the color `C` (premultiplied, in the blend space) and transmittance, as precise as
-    /// [asked for](ViewParameters::precision). `None` before the first [`prepare`](Self::prepare).
+    /// [asked for](ViewParameters::precision). The picture begins at the first texel; the texture may be larger, since pictures of several
+    /// sizes share it. `None` before the first [`prepare`](Self::prepare).
     pub fn color(&self) -> Option<&wgpu::TextureView> {
         self.resources.as_ref().map(|made| &made.color_view)
     }
 
     /// Returns the camera-space depth: `Rg32Float`. Red is the expected depth `Σ z α T`, not divided by `1 − T`; green
-    /// the median depth, that of the splat at which T falls to one half or below, 0 if it never does. `None` before the
-    /// first [`prepare`](Self::prepare), and if the last was without [`depths`](ViewParameters::depths).
+    /// the median depth, that of the splat at which T falls to one half or below, 0 if it never does. The texture is as large as
+    /// that of the [color](Self::color). `None` before the first [`prepare`](Self::prepare), and if the last was without
+    /// [`depths`](ViewParameters::depths).
     pub fn depth(&self) -> Option<&wgpu::TextureView> {
         self.resources.as_ref().filter(|_| self.has_depths).map(|made| &made.depth_view)
     }
@@ -390,37 +407,56 @@ impl ViewRenderer {
         self.resources.as_ref().map_or(0, |made| made.sizes.pairs)
     }
 
+    /// Returns the number of pairs for which there is room, or will be with the next [`prepare`](Self::prepare).
+    pub(crate) fn pair_room(&self) -> u32 {
+        self.pairs_wanted.max(self.pair_capacity())
+    }
+
+    /// Returns the number of pairs of a frame with these counters, whether there was room for all of them or not.
+    pub(crate) fn pair_count(&self, counters: &Counters) -> u32 {
+        match self.design {
+            Design::Auto | Design::Fast => counters.pairs,
+            Design::Reference => counters.pairs_wanted,
+        }
+    }
+
+    /// Returns whether the newest frame whose counters have arrived had more pairs, or splats in its bins, than this device has room for.
+    /// Such frames lack nothing, but they are slow, and stay so: a frame that only lacks the room that it is going to get is not meant.
+    pub fn is_short_of_room(&self) -> bool {
+        self.short_of_room
+    }
+
     /// Frees the working buffers and targets; the next [`prepare`](Self::prepare) creates them again.
     pub fn release(&mut self) {
         self.resources = None;
         self.pairs_wanted = 0;
+        self.short_of_room = false;
         self.bin_room = BinRoom::default();
         self.fullest_bin = 0;
         self.statistics = ViewStatistics::default();
     }
 
     /// Returns the sizes to allocate. Sizes grow from frame to frame, but buffers that have been far too large for a
-    /// while are reduced.
-    fn kept_sizes(&mut self, made: Sizes, needed: Sizes) -> Sizes {
+    /// while are reduced. `exact` is what the frame needs, with `guess` pairs, `grown` the same with room for pictures to come.
+    fn kept_sizes(&mut self, made: Sizes, exact: Sizes, grown: Sizes, guess: u32) -> Sizes {
         let counted = self.statistics.pairs.saturating_add(self.statistics.pairs / 2).max(1 << 16);
-        let guess = needed.slots.saturating_mul(2);
-        let oversized = made.slots / OVERSIZE_FACTOR > needed.slots
+        let oversized = made.slots / OVERSIZE_FACTOR > exact.slots
             || made.pairs / OVERSIZE_FACTOR > guess.max(counted)
-            || made.entries / OVERSIZE_FACTOR > needed.entries;
+            || made.entries / OVERSIZE_FACTOR > exact.entries
+            || made.picture.element_product() / OVERSIZE_FACTOR > exact.picture.element_product();
         self.oversized_frames = if oversized { self.oversized_frames + 1 } else { 0 };
         if self.oversized_frames > RELEASE_AFTER_IDLE_FRAMES {
             self.oversized_frames = 0;
             self.pairs_wanted = counted;
-            return Sizes { pairs: guess.max(counted), ..needed };
+            return Sizes { pairs: guess.max(counted), ..exact };
         }
         Sizes {
-            slots: made.slots.max(needed.slots),
-            pairs: made.pairs.max(needed.pairs),
-            bin_side: needed.bin_side,
-            entries: made.entries.max(needed.entries),
-            parts: made.parts.max(needed.parts),
-            picture: needed.picture,
-            depths: needed.depths,
+            slots: made.slots.max(grown.slots),
+            pairs: made.pairs.max(grown.pairs),
+            entries: made.entries.max(grown.entries),
+            parts: made.parts.max(grown.parts),
+            picture: grown.picture,
+            depths: grown.depths,
         }
     }
 
@@ -428,19 +464,15 @@ impl ViewRenderer {
     fn poll(&mut self) {
         if let Some(counters) = self.readback.poll() {
             let counters: Counters = bytemuck::pod_read_unaligned(&counters);
+            let pairs = self.pair_count(&counters);
             self.statistics.visible = counters.visible;
-            self.statistics.pairs = counters.pairs;
-            let wanted = match self.design {
-                Design::Auto | Design::Fast => {
-                    self.fullest_bin = counters.pairs_wanted;
-                    let Some(sizes) = self.resources.as_ref().map(|made| made.sizes) else { return };
-                    let bins = sizes.bin_grid().element_product();
-                    self.bin_room.note(counters.pairs_wanted.saturating_mul(bins), sizes.entries);
-                    counters.pairs
-                }
-                Design::Reference => counters.pairs_wanted,
-            };
-            self.make_room(wanted);
+            self.statistics.pairs = pairs;
+            if self.design == Design::Fast {
+                self.fullest_bin = counters.pairs_wanted;
+                let Some(sizes) = self.resources.as_ref().map(|made| made.sizes) else { return };
+                self.bin_room.note(self.fullest_bin.saturating_mul(self.bin_count()), sizes.entries);
+            }
+            self.make_room(pairs);
         }
         if let Some((timer, readback)) = &mut self.timing
             && let Some(timestamps) = readback.poll()
@@ -497,7 +529,7 @@ impl ViewRenderer {
             _ => (layout::BACKGROUND_NONE, [0.0; 3]),
         };
         let (view, appearance, environment_size) = environment.unwrap_or_else(|| {
-            let view = View::new(made.sizes.picture, 0.0, glam::Mat4::IDENTITY, glam::Vec4::ONE, glam::Vec2::ONE);
+            let view = View::new(self.picture, 0.0, glam::Mat4::IDENTITY, glam::Vec4::ONE, glam::Vec2::ONE);
             (instances.first().map_or(view, |instance| instance.view), Appearance::default(), [0; 2])
         });
         let color = if mode == layout::BACKGROUND_ENVIRONMENT { appearance.light.to_array() } else { color };
@@ -505,8 +537,8 @@ impl ViewRenderer {
         let column = |axis: usize| to_world.col(axis).truncate().extend(view.camera_position[axis]).to_array();
         let opaque = parameters.opaque.as_ref();
         let frame = layout::FrameUniforms {
-            size: made.sizes.picture.to_array(),
-            tiles: tiles(made.sizes.picture).to_array(),
+            size: self.picture.to_array(),
+            tiles: tiles(self.picture).to_array(),
             slots: self.slots,
             pair_capacity: made.sizes.pairs,
             background_mode: mode,

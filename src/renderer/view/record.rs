@@ -36,6 +36,12 @@ impl ViewRenderer {
     ) {
         let Some(made) = &self.resources else { return };
         let fast = made.fast.as_ref();
+        if let Some(fast) = fast.filter(|_| self.cleared_bins != self.bin_count()) {
+            // The frame before has only cleared as many as it had.
+            for bins in &fast.bins {
+                encoder.clear_buffer(bins, 0, None);
+            }
+        }
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some("gs4d"),
             timestamp_writes: timer.and_then(PassTimer::frame_writes),
@@ -48,6 +54,7 @@ impl ViewRenderer {
         let (counters, offset) = self.counters();
         let counters = counters.clone();
         self.readback.copy(encoder, &counters, offset);
+        self.cleared_bins = self.bin_count();
         self.recorded = true;
     }
 
@@ -96,7 +103,7 @@ impl ViewRenderer {
         mark(timer, pass);
 
         // ranges
-        let tiles = tiles(made.sizes.picture);
+        let tiles = tiles(self.picture);
         pass.set_pipeline(&passes.ranges);
         pass.set_bind_group(0, &made.ranges, &[]);
         pass.dispatch_workgroups((tiles.x * tiles.y).div_ceil(256), 1, 1);

@@ -1,13 +1,14 @@
 //! The resources of a view whose sizes depend on the view or the captures, and the bind groups over them.
 //!
-//! In: sizes, the opaque depth and the environment map. Out: [`Resources`], created again only when one of these
-//! changes.
+//! In: sizes, the opaque depth and the environment map. Out: [`Resources`], created again only when the sizes change; for another depth or
+//! map only the bind group of the pixels is.
 
 use super::bins::FastResources;
 use super::sizes::Sizes;
 use super::{Design, ViewRenderer};
 use crate::renderer::layout::{self, BLOCK, DEPTH_STEPS, DIGIT_BITS, DIGITS, SortStep};
-use crate::renderer::pipelines::Renderer;
+use crate::renderer::memory::Allocator;
+use crate::renderer::pipelines::{Layouts, Renderer};
 use crate::renderer::shaders::Pixels;
 use crate::view::tiles;
 use glam::UVec2;
@@ -27,10 +28,10 @@ pub(super) struct Resources {
     pub color_view: wgpu::TextureView,
     pub depth: wgpu::Texture,
     pub depth_view: wgpu::TextureView,
-    /// Opaque depth that the bind groups were created for, like `pixels` and `environment`.
-    pub opaque: wgpu::TextureView,
+    /// What the bind group of the pixels was created for: opaque depth, environment map. The targets are of these pixels.
+    opaque: wgpu::TextureView,
+    environment: wgpu::Buffer,
     pub pixels: Pixels,
-    pub environment: wgpu::Buffer,
     pub project: wgpu::BindGroup,
     /// Bind groups from the projected keys into the first pair of buffers, from there into the second, and back.
     pub sort_depth: [wgpu::BindGroup; 3],
@@ -179,23 +180,20 @@ impl ViewRenderer {
             ranges: allocator.bind_group(
                 "gs4d ranges",
                 &layouts.ranges,
-                &[frame.clone(), counters, pair_tiles[sorted].as_entire_binding(), tile_ranges.as_entire_binding()],
+                &[frame, counters, pair_tiles[sorted].as_entire_binding(), tile_ranges.as_entire_binding()],
             ),
-            pixel: allocator.bind_group(
-                "gs4d pixel",
+            pixel: pixel_group(
+                allocator,
                 &layouts.pixel[self.pixels.index()],
-                &[
-                    frame,
-                    environment.as_entire_binding(),
-                    wgpu::BindingResource::TextureView(&opaque),
-                    wgpu::BindingResource::TextureView(&color_view),
-                    wgpu::BindingResource::TextureView(&depth_view),
-                ],
+                &self.frame,
+                &environment,
+                [&opaque, &color_view, &depth_view],
             ),
             blend: allocator.bind_group(
                 "gs4d blend",
                 &layouts.blend,
-                &[tile_ranges.as_entire_binding(), pair_splats[sorted].as_entire_binding(), splats.as_entire_binding()],
+                &[&tile_ranges, &pair_splats[sorted], &splats, &self.counters, &order[1], &offsets]
+                    .map(wgpu::Buffer::as_entire_binding),
             ),
             instances,
             buffers: PassBuffers {
@@ -232,6 +230,38 @@ impl ViewRenderer {
         }
         queue.write_buffer(&self.steps, 0, &bytes);
     }
+}
+
+impl Resources {
+    /// Binds an opaque depth and an environment map, unless they are bound. While a window is dragged, the depth is another in each frame.
+    pub(super) fn bind_pixel(
+        &mut self,
+        allocator: Allocator<'_>,
+        layouts: &Layouts,
+        frame: &wgpu::Buffer,
+        opaque: wgpu::TextureView,
+        environment: wgpu::Buffer,
+    ) {
+        if self.opaque == opaque && self.environment == environment {
+            return;
+        }
+        let views = [&opaque, &self.color_view, &self.depth_view];
+        self.pixel = pixel_group(allocator, &layouts.pixel[self.pixels.index()], frame, &environment, views);
+        (self.opaque, self.environment) = (opaque, environment);
+    }
+}
+
+/// Creates the bind group of the pixels: opaque depth, color, depth.
+fn pixel_group(
+    allocator: Allocator<'_>,
+    layout: &wgpu::BindGroupLayout,
+    frame: &wgpu::Buffer,
+    environment: &wgpu::Buffer,
+    views: [&wgpu::TextureView; 3],
+) -> wgpu::BindGroup {
+    let [opaque, color, depth] = views.map(wgpu::BindingResource::TextureView);
+    let resources = [frame.as_entire_binding(), environment.as_entire_binding(), opaque, color, depth];
+    allocator.bind_group("gs4d pixel", layout, &resources)
 }
 
 fn texture_bytes(texture: &wgpu::Texture) -> u64 {
