@@ -7,6 +7,9 @@
 // not have cost nothing.
 #import gs4d::types::{VisibleSplat, BIN_COUNTERS, DEBUG_ACTIVE}
 #import gs4d::capture::instance
+#ifdef COPIED_INSTANCE
+#import gs4d::capture::instances
+#endif
 #import gs4d::color::{color_share, finished_color, SHARES}
 
 const THREADS: u32 = 256u;
@@ -34,6 +37,9 @@ fn colors(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
 ) {
+#ifdef COPIED_INSTANCE
+    instance = instances[group.z];
+#endif
     let count = bins[BIN_COUNTERS + instance.binning.z];
     for (var first = group.x * SPLATS; first < count; first += groups.x * SPLATS) {
         let own = first + thread / NEXT_SPLAT % SPLATS;

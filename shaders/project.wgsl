@@ -7,6 +7,9 @@
 #import gs4d::records::{covariance_of, Gaussian}
 #import gs4d::appearance::heat
 #import gs4d::capture::{index_of, instance, load_gaussian, load_lifespan}
+#ifdef COPIED_INSTANCE
+#import gs4d::capture::instances
+#endif
 #ifdef BINNED
 #import gs4d::capture::viewing_direction
 #endif
@@ -117,6 +120,9 @@ fn clear_own(thread: u32) {
 
 @compute @workgroup_size(256)
 fn project_bin(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
+#ifdef COPIED_INSTANCE
+    instance = instances[group.z];
+#endif
     if thread == 0u {
         atomicStore(&present_count, 0u);
         // `sort_bins` of the next frame counts from 0.
@@ -222,6 +228,9 @@ fn project_and_bin(place: u32, count: u32, thread: u32) {
 #else
 @compute @workgroup_size(256)
 fn project(@builtin(global_invocation_id) id: vec3<u32>) {
+#ifdef COPIED_INSTANCE
+    instance = instances[id.z];
+#endif
     if id.x >= instance.count {
         return;
     }

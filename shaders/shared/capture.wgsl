@@ -8,7 +8,14 @@
 #import gs4d::packed::{unpack_gaussian, unpack_lifespan, BLOCK_RANGES, PACKED_BLOCK, SHARED_RANGES}
 #endif
 
+#ifdef COPIED_INSTANCE
+// For drivers that compile a pass anew for each dispatch if a branch depends on nothing but uniforms at constant places: the entry point
+// copies the instance from a place that is 0, which the compiler does not know.
+@group(0) @binding(0) var<uniform> instances: array<InstanceUniforms, 1>;
+var<private> instance: InstanceUniforms;
+#else
 @group(0) @binding(0) var<uniform> instance: InstanceUniforms;
+#endif
 #ifdef PACKED_GEOMETRY
 // Two four-vectors for each Gaussian.
 @group(1) @binding(0) var<storage, read> records: array<vec4<u32>>;

@@ -5,7 +5,9 @@
 
 use super::bind::{Bind, group_layout, pipeline};
 use super::memory::Allocator;
-use super::shaders::{BINNED, FastVariant, Lists, Pixels, SUBGROUPS_OF_32, ShaderChecks, Storage, module};
+use super::shaders::{
+    BINNED, COPIED_INSTANCE, FastVariant, Lists, Pixels, SUBGROUPS_OF_32, ShaderChecks, Storage, module,
+};
 use super::view::Design;
 use super::work::WorkCounters;
 use super::{GpuError, layout};
@@ -36,6 +38,8 @@ pub struct Renderer {
     prefers_reference: bool,
     /// [`SUBGROUPS_OF_32`], or nothing.
     subgroups: &'static [&'static str],
+    /// [`COPIED_INSTANCE`], or nothing.
+    copied_instance: &'static [&'static str],
     /// Bound instead of a list of active Gaussians if all are drawn.
     pub(super) no_list: wgpu::BindGroup,
     work: WorkCounters,
@@ -110,6 +114,7 @@ impl Renderer {
         let activate = module(device, "activate", &[], checks)?;
         let info = device.adapter_info();
         let sizes = [info.subgroup_min_size, info.subgroup_max_size];
+        let software = info.device_type == wgpu::DeviceType::Cpu;
         let work = WorkCounters::default();
         let allocator = Allocator { device, work: &work };
         let no_list = allocator.buffer("gs4d no active list", 4, wgpu::BufferUsages::STORAGE);
@@ -129,13 +134,13 @@ impl Renderer {
             sort_bins: Default::default(),
             blend_blocks: Default::default(),
             checks,
-            prefers_reference: info.device_type == wgpu::DeviceType::Cpu
-                || info.backend == wgpu::Backend::BrowserWebGpu,
+            prefers_reference: software || info.backend == wgpu::Backend::BrowserWebGpu,
             subgroups: if device.features().contains(wgpu::Features::SUBGROUP) && sizes == [32, 32] {
                 SUBGROUPS_OF_32
             } else {
                 &[]
             },
+            copied_instance: if software { COPIED_INSTANCE } else { &[] },
             no_list: allocator.bind_group("gs4d no active list", &layouts.active, &[no_list.as_entire_binding()]),
             layouts,
             work,
@@ -180,7 +185,8 @@ impl Renderer {
         let layouts = &self.layouts;
         for storage in storages {
             if self.project(storage).is_none() {
-                let shader = module(device, "project", storage.definitions(), self.checks)?;
+                let definitions = [storage.definitions(), self.copied_instance].concat();
+                let shader = module(device, "project", &definitions, self.checks)?;
                 let [geometry, color] = &layouts.captures[storage as usize];
                 let made = pipeline(
                     device,
@@ -252,7 +258,8 @@ impl Renderer {
         let layouts = &self.layouts;
         for storage in storages {
             if self.project_bin(storage).is_none() {
-                let shader = module(device, "project", &[BINNED, storage.definitions()].concat(), self.checks)?;
+                let definitions = [storage.definitions(), self.copied_instance].concat();
+                let shader = module(device, "project", &[BINNED, &definitions[..]].concat(), self.checks)?;
                 let [geometry, color] = &layouts.captures[storage as usize];
                 let made = pipeline(
                     device,
@@ -261,7 +268,7 @@ impl Renderer {
                     &[&layouts.project_bin, geometry, &layouts.active].map(Some),
                 );
                 self.project_bin[storage as usize].get_or_init(|| made);
-                let shader = module(device, "colors", storage.definitions(), self.checks)?;
+                let shader = module(device, "colors", &definitions, self.checks)?;
                 let groups = [Some(&layouts.colors), Some(geometry), None, Some(color)];
                 let made = pipeline(device, &shader, "colors", &groups);
                 self.colors[storage as usize].get_or_init(|| made);

@@ -113,6 +113,10 @@ pub const COMPAT_WITHOUT_TIME: &[&str] = &["COMPAT", "WITHOUT_TIME"];
 /// Definitions of `project` as the first pass of the fast renderer, `project_bin`.
 pub const BINNED: &[&str] = &["BINNED"];
 
+/// Definitions of `project` and `colors` on software drivers: each thread copies the uniforms of its instance. Mesa's driver compiles a long
+/// shader again with the values of its uniforms if a branch depends on nothing else; version 22 does so whenever it is bound, and keeps all.
+pub const COPIED_INSTANCE: &[&str] = &["COPIED_INSTANCE"];
+
 /// How many splats `sort_bins` sorts at once in workgroup memory. Shorter lists leave room for more workgroups; longer ones are sorted
 /// in rounds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -296,7 +300,7 @@ impl FastVariant {
     }
 }
 
-/// Returns the naga module of a pass, imports resolved, validated, with these definitions: those of a [`Storage`] for
+/// Returns the naga module of a pass, imports resolved, validated, with these definitions: those of a [`Storage`] and [`COPIED_INSTANCE`] for
 /// `project` and `colors`, none, [`MULTISAMPLED`] or those of a [`ColorPrecision`] for `blend`, those of the fast renderer's passes, none for the others.
 ///
 /// # Errors

@@ -10,6 +10,8 @@ mod fine_tune;
 mod fine_tune_run;
 mod golden;
 mod layout;
+#[cfg(target_os = "linux")]
+mod memory;
 mod packed;
 mod passes;
 mod render;
@@ -22,6 +24,8 @@ mod support {
     pub mod golden;
     pub mod gpu;
     pub mod limited_device;
+    #[cfg(target_os = "linux")]
+    pub mod own_process;
     pub mod packed_scene;
     pub mod passes;
     pub mod skip;

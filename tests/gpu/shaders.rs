@@ -3,8 +3,8 @@
 //! In: the files of `shaders/`. Out: proof that each is known to the renderer and is valid WGSL that needs no optional capability.
 
 use bevy_gs4d::renderer::shaders::{
-    BINNED, Blending, COMPAT, COMPAT_WITHOUT_TIME, ColorPrecision, LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32,
-    Storage, compose, pass_names,
+    BINNED, Blending, COMPAT, COMPAT_WITHOUT_TIME, COPIED_INSTANCE, ColorPrecision, LARGE_BATCHES, Lists, MULTISAMPLED,
+    SUBGROUPS_OF_32, Storage, compose, pass_names,
 };
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
@@ -58,10 +58,13 @@ fn every_pass_composes_and_is_valid() {
         .into_iter()
         .flat_map(|lists| [&[][..], SUBGROUPS_OF_32].map(|device| [lists.definitions(), device].concat()));
     let storages = Storage::ALL.map(|storage| storage.definitions().to_vec());
+    let copied = storages.iter().chain(&binned).map(|definitions| [&definitions[..], COPIED_INSTANCE].concat());
+    let copied: Vec<_> = copied.collect();
     let definitions: Vec<_> = storages
         .into_iter()
         .chain([MULTISAMPLED.to_vec(), COMPAT.to_vec(), COMPAT_WITHOUT_TIME.to_vec()])
         .chain(binned)
+        .chain(copied)
         .chain(blending)
         .chain(lists)
         .collect();
