@@ -193,9 +193,15 @@ impl Stage {
             };
             let Some(&entity) = self.captures.get(&placed.number) else { continue };
             let mut entity = self.app.world_mut().entity_mut(entity);
-            // What is set is a jump of time, even if it is the same.
             if before.playback != placed.playback {
-                entity.insert(placed.playback);
+                let mut playback = placed.playback;
+                // The app has let time pass since: only a seek sets it.
+                if playback.time == before.playback.time
+                    && let Some(now) = entity.get::<Playback>()
+                {
+                    playback.time = now.time;
+                }
+                entity.insert(playback);
             }
             if before.settings != placed.settings {
                 entity.insert(placed.settings);
