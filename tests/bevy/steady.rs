@@ -96,7 +96,7 @@ fn run_in_steps(app: &mut App, frames: usize, step: Duration) {
 /// Waits until the GPU has drawn everything and its counters have arrived, so that the number of frames by which they
 /// are late does not depend on the load of the machine.
 fn finish_drawing(app: &App) {
-    let device = app.sub_app(RenderApp).world().resource::<RenderDevice>().wgpu_device();
+    let device = app.world().resource::<RenderDevice>().wgpu_device();
     device.poll(PollType::wait_indefinitely()).expect("the GPU finishes its work");
 }
 

@@ -1,0 +1,242 @@
+//! Cuts: from one frame to the next another place, another moment, another camera, another capture.
+//!
+//! In: a seed and a number of cuts. Out: the closing line, if the first frame after each cut shows what the frames after it show; else the
+//! first cut after which it does not.
+//!
+//! A view has room for 65,536 pairs of splats and tiles, or for two of each Gaussian, before it has counted any, and for half as many more
+//! than it has counted (`renderer`, "Room"). Every tenth cut goes close to a crowd of large, faint splats with more pairs than that, and every
+//! second of these has a new camera or another design, whose room is that of a new view. A frame with more pairs than there can have been
+//! room for is counted; a run without any fails.
+
+use crate::changes::{spread, unit};
+use crate::checks::{self, difference, shows_something};
+use crate::stage::{add, spawn_camera};
+use crate::state::{Form, Viewer, scene};
+use crate::support::random::Random;
+use bevy::prelude::*;
+use bevy::render::gpu_readback::{Readback, ReadbackComplete};
+use bevy::render::render_resource::PollType;
+use bevy::render::renderer::RenderDevice;
+use bevy_gs4d::prelude::*;
+use bevy_gs4d::renderer::{Design, ViewStatistics};
+use bevy_gs4d::scene::RuntimeScene;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::testing::{self, Offscreen};
+use std::collections::VecDeque;
+use std::mem;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+/// Rows of this width need no padding when they are read back.
+const SIZE: UVec2 = UVec2::new(256, 192);
+/// What two frames may be apart, 255ths: without room a tile is blended in other steps, whose sums are rounded otherwise.
+const APART: u8 = 1;
+/// Splats for which a view has room before it has counted any.
+const FIRST_ROOM: u32 = 1 << 16;
+/// Updates of a cut that needs room, until frames are drawn in it; of any other; of a new capture, until it is whole.
+const UPDATES: [usize; 3] = [4, 2, 10];
+/// Bytes of captures that are uploaded in a frame, so that a new one takes several.
+const BUDGET: u64 = 48 << 10;
+/// Captures beside the crowd, at most.
+const OTHERS: usize = 3;
+
+/// What a step has done, and the frames since.
+#[derive(Default)]
+struct Cut {
+    number: u64,
+    /// Whether the frames may be as before until a new capture is whole.
+    appears: bool,
+    /// Whether the first of them had more pairs than room.
+    overflows: bool,
+    frames: Vec<Vec<u8>>,
+}
+
+/// An app that is cut.
+struct Cutter {
+    app: App,
+    random: Random,
+    camera: Entity,
+    viewer: Viewer,
+    crowd: Entity,
+    others: VecDeque<Entity>,
+    arrived: Arc<Mutex<Vec<Vec<u8>>>>,
+    /// The most pairs that the view can have room for.
+    room: u32,
+    updates: u64,
+}
+
+/// Cuts so often.
+///
+/// # Errors
+/// What does not hold, and after which cut.
+pub fn run(seed: u64, cuts: u64) -> Result<String, String> {
+    println!("cuts: seed {seed}");
+    let began = Instant::now();
+    let mut cutter = Cutter::new(seed)?;
+    let (mut overflowing, mut worst, mut shown) = (0, 0, 0);
+    let (mut last, mut before) = (Cut::default(), Vec::new());
+    for number in 1..=cuts + 1 {
+        let said = |defect: String| format!("{defect}\n    again: --seed {seed} --cuts {number}");
+        let next = cutter.cut(number).map_err(said)?;
+        let mut frames = next.frames.into_iter();
+        // The last frame of a cut arrives after the first update of the next.
+        last.frames.extend(frames.next());
+        worst = worst.max(judge(&last, &before).map_err(said)?);
+        before = last.frames.pop().unwrap_or_default();
+        overflowing += u64::from(last.overflows);
+        shown += u64::from(shows_something(&before));
+        last = Cut { frames: frames.collect(), ..next };
+        if number.is_multiple_of(500) {
+            println!("cut {number}: {overflowing} without room, worst {worst} of 255, {} s", began.elapsed().as_secs());
+        }
+    }
+    if overflowing == 0 || 2 * shown < cuts {
+        return Err(format!("nothing is proved: {overflowing} frames lacked room, {shown} of {cuts} show something"));
+    }
+    let (updates, seconds) = (cutter.updates, began.elapsed().as_secs());
+    Ok(format!(
+        "cuts: {cuts} cuts, {overflowing} overflowing frames, worst difference {worst} of 255, {updates} updates, \
+         {seconds} s"
+    ))
+}
+
+/// Returns the largest difference of any frame of a cut from its last. `before` is the last frame of the cut before.
+fn judge(cut: &Cut, before: &[u8]) -> Result<u8, String> {
+    let Some((last, frames)) = cut.frames.split_last() else { return Ok(0) };
+    let as_before = |frame: &&Vec<u8>| cut.appears && difference(frame, before) <= APART;
+    let absent = frames.iter().take_while(as_before).count();
+    let apart = frames[absent..].iter().map(|frame| difference(frame, last)).max().unwrap_or_default();
+    if apart > APART {
+        return Err(format!("a frame after cut {} is {apart} of 255 apart from the last", cut.number));
+    }
+    Ok(apart)
+}
+
+impl Cutter {
+    fn new(seed: u64) -> Result<Self, String> {
+        let mut app = checks::app(SIZE);
+        app.insert_resource(CaptureUploadBudget { bytes_per_frame: BUDGET });
+        let mut viewer = Viewer::default();
+        viewer.settings.design = Design::Reference;
+        let target = app.world().resource::<Offscreen>().clone();
+        let camera = spawn_camera(&mut app, &target, &viewer);
+        let crowd = spawn(&mut app, crowd(), Transform::default());
+        testing::settle(&mut app).map_err(|error| error.to_string())?;
+        checks::take_logged();
+        let arrived = Arc::new(Mutex::new(Vec::new()));
+        let sink = arrived.clone();
+        app.world_mut().spawn(Readback::texture(target.image)).observe(move |event: On<ReadbackComplete>| {
+            sink.lock().unwrap_or_else(PoisonError::into_inner).push(event.data.clone());
+        });
+        let (random, others) = (Random::new(seed), VecDeque::new());
+        let mut cutter = Self { app, random, camera, viewer, crowd, others, arrived, room: 0, updates: 0 };
+        cutter.update()?;
+        Ok(cutter)
+    }
+
+    /// Cuts, and returns the frames that have arrived since: first the last one of the cut before.
+    fn cut(&mut self, number: u64) -> Result<Cut, String> {
+        let close = number % 10 == 9;
+        let mut appears = None;
+        match number % 10 {
+            5 if self.others.len() < OTHERS => appears = Some(self.spawn_other()),
+            5 => {
+                if let Some(oldest) = self.others.pop_front() {
+                    self.app.world_mut().despawn(oldest);
+                }
+            }
+            _ => self.go(close, number % 20 == 9),
+        }
+        self.update()?;
+        let room = self.room;
+        let updates = match appears {
+            Some(_) => UPDATES[2],
+            None => UPDATES[usize::from(!close)],
+        };
+        for _ in 1..updates {
+            self.update()?;
+        }
+        if let Some(entity) = appears
+            && self.app.world().get::<CaptureState>(entity) != Some(&CaptureState::Ready)
+        {
+            return Err(format!("the capture of cut {number} is not ready after {updates} updates"));
+        }
+        let frames = mem::take(&mut *self.arrived.lock().unwrap_or_else(PoisonError::into_inner));
+        if frames.len() != updates {
+            return Err(format!("{} frames have arrived of {updates} updates", frames.len()));
+        }
+        Ok(Cut { number, appears: appears.is_some(), overflows: close && self.pairs() > room, frames })
+    }
+
+    /// Goes to another place and another moment, `close` to the crowd or not. With `renew` the view is a new one.
+    fn go(&mut self, close: bool, renew: bool) {
+        let distance = if close { 0.8 + 1.6 * unit(&mut self.random) } else { 8.0 + 30.0 * unit(&mut self.random) };
+        let place = distance * spread(&mut self.random).normalize_or(Vec3::X);
+        self.viewer.pose = Transform::from_translation(place).looking_at(0.3 * spread(&mut self.random), Vec3::Z);
+        let captures: Vec<Entity> = self.others.iter().copied().chain([self.crowd]).collect();
+        for capture in captures {
+            let moment = Playback::paused_at(2.0 * unit(&mut self.random));
+            self.app.world_mut().entity_mut(capture).insert(moment);
+        }
+        if !renew {
+            self.app.world_mut().entity_mut(self.camera).insert(self.viewer.pose);
+            return;
+        }
+        self.room = 0;
+        if self.random.below(2) == 0 {
+            let fast = self.viewer.settings.design == Design::Fast;
+            self.viewer.settings.design = if fast { Design::Reference } else { Design::Fast };
+            self.app.world_mut().entity_mut(self.camera).insert((self.viewer.pose, self.viewer.settings));
+        } else {
+            let target = self.app.world().resource::<Offscreen>().clone();
+            self.app.world_mut().despawn(self.camera);
+            self.camera = spawn_camera(&mut self.app, &target, &self.viewer);
+        }
+    }
+
+    /// Spawns a capture beside the crowd.
+    fn spawn_other(&mut self) -> Entity {
+        let form = [Form::Single, Form::Filtered, Form::Packed][self.random.below(3)];
+        let pose = Transform::from_translation(spread(&mut self.random));
+        let entity = spawn(&mut self.app, scene(form, self.random.bits() % 1000), pose);
+        self.others.push_back(entity);
+        entity
+    }
+
+    /// Runs one update, until the GPU has drawn it and its counters have arrived.
+    fn update(&mut self) -> Result<(), String> {
+        self.app.update();
+        self.updates += 1;
+        let device = self.app.world().resource::<RenderDevice>().wgpu_device();
+        device.poll(PollType::wait_indefinitely()).map_err(|error| format!("the GPU does not finish: {error}"))?;
+        let total = self.view().map_or(0, |view| view.total);
+        let counted = self.pairs().saturating_add(self.pairs() / 2);
+        self.room = self.room.max(FIRST_ROOM).max(total.saturating_mul(2)).max(counted);
+        checks::check_running(&self.app)
+    }
+
+    fn view(&self) -> Option<ViewStatistics> {
+        self.app.world().resource::<CaptureStatistics>().view(self.camera)
+    }
+
+    /// Returns the number of pairs of the newest frame that has been counted.
+    fn pairs(&self) -> u32 {
+        self.view().map_or(0, |view| view.pairs)
+    }
+}
+
+/// Returns Gaussians that are large, and so faint that the farthest shows, too.
+fn crowd() -> RuntimeScene {
+    let settings = SynthSettings { count: 3000, seed: 2, degree: 0, degree_t: 0, duration_seconds: 2.0 };
+    let mut scene = synthesize(&settings).into_runtime().expect("synthetic scenes can be drawn");
+    for gaussian in &mut scene.form.as_sliced_mut().expect("synthetic scenes are sliced").gaussians {
+        gaussian.covariance = gaussian.covariance.map(|entry| 250.0 * entry);
+        (gaussian.opacity, gaussian.sigma_t, gaussian.velocity) = (0.006, f32::INFINITY, [0.0; 3]);
+    }
+    scene
+}
+
+fn spawn(app: &mut App, scene: RuntimeScene, pose: Transform) -> Entity {
+    let capture = add(app, GaussianCapture::new(scene));
+    app.world_mut().spawn((GaussianCapture3d(capture), Playback::paused_at(1.0), pose)).id()
+}

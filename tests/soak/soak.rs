@@ -1,0 +1,147 @@
+//! An app that is changed at random for long.
+//!
+//! In: a seed, and when to end. Out: the closing line, if its pictures are those of new apps in the same state, its log is free of warnings
+//! and its memory is given back; else the first defect, with how to have it again.
+
+use crate::changes::Changes;
+use crate::checks;
+use crate::memory::{Memory, resident};
+use crate::options::{Fresh, Until};
+use crate::stage::Stage;
+use bevy_gs4d::testing;
+use image::RgbaImage;
+use std::collections::VecDeque;
+use std::env;
+use std::process::Command;
+use std::time::Instant;
+
+/// Changes that are told with a defect: the last ones.
+const TOLD: usize = 20;
+
+/// The last changes. They are told if something does not hold, a panic included.
+struct Tail {
+    seed: u64,
+    step: u64,
+    said: VecDeque<String>,
+    /// Whether the end was reached without a defect.
+    holds: bool,
+}
+
+impl Tail {
+    fn note(&mut self, step: u64, said: String) {
+        self.step = step;
+        self.said.push_back(format!("{step}: {said}"));
+        if self.said.len() > TOLD {
+            self.said.pop_front();
+        }
+    }
+}
+
+impl Drop for Tail {
+    fn drop(&mut self) {
+        if !self.holds {
+            self.said.iter().for_each(|said| println!("    {said}"));
+            println!("    again: --seed {} --steps {}", self.seed, self.step);
+        }
+    }
+}
+
+/// What has been compared.
+#[derive(Default)]
+struct Compared {
+    checks: u64,
+    pictures: u64,
+    shown: u64,
+}
+
+/// Changes an app until the end.
+///
+/// # Errors
+/// What does not hold.
+pub fn run(seed: u64, until: Until) -> Result<String, String> {
+    let mut tail = Tail { seed, step: 0, said: VecDeque::new(), holds: false };
+    let line = change(seed, until, &mut tail)?;
+    tail.holds = true;
+    Ok(line)
+}
+
+fn change(seed: u64, until: Until, tail: &mut Tail) -> Result<String, String> {
+    println!("soak: seed {seed}");
+    let began = Instant::now();
+    let mut changes = Changes::new(seed);
+    let mut stage = Stage::new(&changes.state, &[])?;
+    let (mut memory, mut compared) = (Memory::default(), Compared::default());
+    while changes.step < until.steps && (began.elapsed() < until.time || !changes.is_check()) {
+        let said = changes.advance();
+        tail.note(changes.step, said);
+        stage.show(&changes.state)?;
+        for _ in 0..=changes.step % 3 {
+            stage.update()?;
+        }
+        if changes.is_check() {
+            compare(seed, changes.step, &mut stage, &mut compared)?;
+            let mebibytes = resident().unwrap_or_default() >> 20;
+            println!("step {}: as new, {mebibytes} MiB, {} s", changes.step, began.elapsed().as_secs());
+        } else if changes.is_clearing() {
+            stage.wait_until_empty()?;
+            memory.note();
+        }
+    }
+    let Compared { checks, pictures, shown } = compared;
+    if checks > 0 && shown == 0 {
+        return Err("no picture showed anything".to_owned());
+    }
+    let (steps, updates, seconds) = (changes.step, stage.updates, began.elapsed().as_secs());
+    Ok(format!(
+        "soak: {steps} changes, {updates} updates, {checks} checks, {pictures} pictures as of new apps, \
+         {shown} not empty; {}; {seconds} s",
+        memory.verdict()?
+    ))
+}
+
+/// Compares all pictures of an app with those of a new one, in a process of its own: what a process has left behind, on either side, must
+/// not matter.
+fn compare(seed: u64, step: u64, stage: &mut Stage, compared: &mut Compared) -> Result<(), String> {
+    let seen = stage.pictures()?;
+    let folder = tempfile::tempdir().map_err(|error| format!("no temporary folder: {error}"))?;
+    let program = env::current_exe().map_err(|error| format!("this program is not found: {error}"))?;
+    let order: Vec<String> = stage.order().iter().map(u64::to_string).collect();
+    let mut command = Command::new(program);
+    command.args([format!("--seed={seed}"), format!("--fresh={step}")]).arg("--pictures").arg(folder.path());
+    if !order.is_empty() {
+        command.arg(format!("--order={}", order.join(",")));
+    }
+    let output = command.output().map_err(|error| format!("{command:?}: {error}"))?;
+    if !output.status.success() {
+        let said = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+        return Err(format!("a new app in the same state fails: {said}"));
+    }
+    for (index, seen) in seen.iter().enumerate() {
+        let path = folder.path().join(format!("{index}.png"));
+        let fresh = image::open(&path).map_err(|error| format!("{}: {error}", path.display()))?.into_rgba8();
+        checks::check_same(seen, &fresh).map_err(|apart| format!("the picture of camera {index} {apart}"))?;
+        compared.pictures += 1;
+        compared.shown += u64::from(checks::shows_something(seen));
+    }
+    compared.checks += 1;
+    Ok(())
+}
+
+/// Draws what an app should show after some changes, in this process, which has drawn nothing else.
+///
+/// # Errors
+/// What keeps it from being drawn.
+pub fn draw_fresh(seed: u64, fresh: &Fresh) -> Result<(), String> {
+    let mut changes = Changes::new(seed);
+    while changes.step < fresh.step {
+        changes.advance();
+    }
+    let mut stage = Stage::new(&changes.state, &fresh.order)?;
+    stage.show(&changes.state)?;
+    let pictures: Vec<RgbaImage> = stage.pictures()?;
+    for (index, picture) in pictures.iter().enumerate() {
+        let path = fresh.folder.join(format!("{index}.png"));
+        testing::save(picture, &path).map_err(|error| error.to_string())?;
+    }
+    Ok(())
+}
