@@ -4,6 +4,9 @@
 #import gs4d::srgb::{decode, encode}
 #import gs4d::types::{LIGHTING_AS_TRAINED, LIGHTING_ENCODED}
 
+// As in src/gaussian/harmonics.rs.
+const BRIGHTEST: f32 = 1e30;
+
 // Returns a trained color with the light applied, in the blend space.
 fn lit(color: vec3<f32>, lighting: u32, light: vec3<f32>) -> vec3<f32> {
     if lighting == LIGHTING_AS_TRAINED {

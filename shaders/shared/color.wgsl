@@ -3,7 +3,7 @@
 #define_import_path gs4d::color
 
 #import gs4d::records::Gaussian
-#import gs4d::appearance::lit
+#import gs4d::appearance::{BRIGHTEST, lit}
 #import gs4d::capture::{instance, viewing_direction}
 #import gs4d::harmonics::{basis_first, basis_second, basis_third, basis_fourth, time_cosine}
 #ifdef CODED_COLORS
@@ -22,9 +22,6 @@
 
 // A color is the sum of this many shares, which several threads can compute.
 const SHARES: u32 = 4u;
-
-// As in `Harmonics::color`.
-const BRIGHTEST: f32 = 1e30;
 
 // Returns the color from the sum of all shares, in the blend space.
 fn finished_color(sum: vec3<f32>) -> vec3<f32> {

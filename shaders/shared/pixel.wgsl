@@ -4,7 +4,7 @@
 
 #import gs4d::types::{FrameUniforms, BACKGROUND_COLOR, BACKGROUND_ENVIRONMENT, DEBUG_DEPTH, DEBUG_OVERDRAW}
 #import gs4d::alpha::{is_opaque, is_skipped, left_behind}
-#import gs4d::appearance::{heat, lit}
+#import gs4d::appearance::{BRIGHTEST, heat, lit}
 #import gs4d::environment::environment_texel
 
 const FAR: f32 = 3.4e38;
@@ -266,5 +266,6 @@ fn environment_at(texel: vec2<f32>) -> vec3<f32> {
     }
     let plane = size.x * size.y;
     let at = u32(texel.y) * size.x + u32(texel.x);
-    return vec3(environment[at], environment[plane + at], environment[2u * plane + at]);
+    let color = vec3(environment[at], environment[plane + at], environment[2u * plane + at]);
+    return clamp(color, vec3(-BRIGHTEST), vec3(BRIGHTEST));
 }

@@ -5,8 +5,8 @@
 
 use glam::Vec3;
 
-/// The largest color: huge coefficients stay finite, and so do pictures. As in `shaders/shared/color.wgsl`.
-const BRIGHTEST: f32 = 1e30;
+/// The largest color: huge coefficients and texels stay finite, and so do pictures. As in `shaders/shared/appearance.wgsl`.
+pub const BRIGHTEST: f32 = 1e30;
 
 /// Color coefficients of `N` Gaussians.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -3,6 +3,7 @@
 //! In: a lat-long texture from slot 17 of a checkpoint, a camera position and a ray. Out: the color behind that pixel,
 //! as the original computes it.
 
+use crate::gaussian::harmonics::BRIGHTEST;
 use glam::Vec3;
 use rayon::prelude::*;
 use std::f32::consts::{PI, TAU};
@@ -65,6 +66,7 @@ impl Environment {
         }
         let plane = (self.width * self.height) as usize;
         let at = y as usize * self.width as usize + x as usize;
-        Vec3::new(self.texels[at], self.texels[plane + at], self.texels[2 * plane + at])
+        let color = Vec3::new(self.texels[at], self.texels[plane + at], self.texels[2 * plane + at]);
+        color.clamp(Vec3::splat(-BRIGHTEST), Vec3::splat(BRIGHTEST))
     }
 }
