@@ -51,7 +51,8 @@ pub struct Bake {
     /// the others are trained, the loss is that after a short training.
     #[arg(long, value_name = "DB", value_parser = values::not_negative)]
     max_loss: Option<f64>,
-    /// Make a package of at most this many megabytes (of 1,000,000 bytes).
+    /// Make a package of at most this many megabytes (of 1,000,000 bytes). If that cannot be done, OUT stays as it was and the smallest
+    /// package is kept in OUT.bake/.
     #[arg(long, value_name = "MB", value_parser = values::positive)]
     target_size: Option<f32>,
     /// Remove the others in so many rounds, with training and scoring between, if what is left is trained.
