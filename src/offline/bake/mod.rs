@@ -147,6 +147,9 @@ impl<'a> Bake<'a> {
     }
 
     fn run(&mut self, progress: &mut dyn Progress) -> Result<Baked, OfflineError> {
+        if let (Some(tuning), Engine::Gpu(headless)) = (self.tunes(), &*self.engine) {
+            tuning.sums.check(headless)?;
+        }
         let mut stages = Stages::begin(progress);
         let mut pruning = self.prune(&mut stages)?;
         let (filter, after, tuning) = loop {
