@@ -1,6 +1,7 @@
-// blend_backward: the gradient of a loss with respect to the splats of a view, without float atomics.
+// blend_backward: the gradient of a loss with respect to the splats of a view, without float atomics unless with ATOMIC_SUMS.
 // In: what `blend` read and wrote, and the gradient of the loss with respect to each pixel. Out: for each pair of splat and tile, sums over
-// the pixels of the tile. `place` writes the first pair of each splat; `pairs` sums every pair, one workgroup for each tile.
+// the pixels of the tile. `place` writes the first pair of each splat; `pairs` sums every pair, one workgroup for each tile. With ATOMIC_SUMS
+// it adds these sums to those of the splat, in whatever order, and `place` is not needed.
 // CPU reference: src/reference/blend_backward.rs; equations: section 7.1 of the 4DGS model.
 //
 // A pixel is walked front to back, as `blend` does, so that it stops at the same splat. What is behind a splat is the finished pixel
@@ -21,19 +22,23 @@ const CHUNK: u32 = 64u;
 @group(0) @binding(7) var color: texture_2d<f32>;
 // Expected and median depth.
 @group(0) @binding(8) var depth: texture_2d<f32>;
-// SUMS values for each pair: with d from pixel to center, w = alpha T and q = alpha dL/dalpha, the sums of q dx, q dy, q dx^2, q dx dy,
-// q dy^2, q, and of w times the gradient of the pixel's red, green, blue and depth.
+// SUMS values for each pair, or for each splat: with d from pixel to center, w = alpha T and q = alpha dL/dalpha, the sums of q dx, q dy,
+// q dx^2, q dx dy, q dy^2, q, and of w times the gradient of the pixel's red, green, blue and depth.
+#ifdef ATOMIC_SUMS
+@group(1) @binding(1) var<storage, read_write> splat_gradients: array<atomic<f32>>;
+#else
 @group(1) @binding(1) var<storage, read_write> pair_gradients: array<f32>;
+#endif
 // Gradient with respect to red, green, blue and opacity of each pixel.
 @group(1) @binding(2) var<storage, read> pixel_gradients: array<vec4<f32>>;
 // Gradient with respect to the expected depth of each pixel.
 @group(1) @binding(3) var<storage, read> depth_gradients: array<f32>;
 
-// Of the chunk: center, opacity, depth; conic; color; pair.
+// Of the chunk: center, opacity, depth; conic; color; the pair or the splat whose sums are written.
 var<workgroup> places: array<vec4<f32>, CHUNK>;
 var<workgroup> conics: array<vec3<f32>, CHUNK>;
 var<workgroup> colors: array<vec3<f32>, CHUNK>;
-var<workgroup> chunk_pairs: array<u32, CHUNK>;
+var<workgroup> chunk_places: array<u32, CHUNK>;
 // Of the batch: w and q of each pixel, splat by splat; then their sums over eight pixels.
 var<workgroup> weights: array<f32, 2048>;
 var<workgroup> terms: array<f32, 2048>;
@@ -83,7 +88,11 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
             places[thread] = vec4(splat.center, splat.opacity, splat.depth);
             conics[thread] = splat.conic;
             colors[thread] = splat.color;
-            chunk_pairs[thread] = pair_of(slot, tile.xy);
+#ifdef ATOMIC_SUMS
+            chunk_places[thread] = slot;
+#else
+            chunk_places[thread] = pair_of(slot, tile.xy);
+#endif
         }
         workgroupBarrier();
         let over = atomicLoad(&finished) == PIXELS;
@@ -157,16 +166,26 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
                     sum += terms[(k - 6u) * 256u + splat * 32u + i];
                 }
             }
-            pair_gradients[chunk_pairs[in_chunk + splat] * SUMS + k] = sum;
+            let written = chunk_places[in_chunk + splat] * SUMS + k;
+#ifdef ATOMIC_SUMS
+            // Many splats of a tile are in none of its pixels.
+            if sum != 0.0 {
+                atomicAdd(&splat_gradients[written], sum);
+            }
+#else
+            pair_gradients[written] = sum;
+#endif
         }
         // All pairs that follow change nothing.
         if over {
+#ifndef ATOMIC_SUMS
             for (var i = first + BATCH + thread; i < range.y; i += PIXELS) {
                 let pair = pair_of(pair_splats[i], tile.xy) * SUMS;
                 for (var k = 0u; k < SUMS; k++) {
                     pair_gradients[pair + k] = 0.0;
                 }
             }
+#endif
             break;
         }
     }

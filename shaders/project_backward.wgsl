@@ -1,7 +1,7 @@
 // project_backward: from the gradients of splats to those of the raw parameters: projection, slice, color and activations.
 // In: what `project` read and wrote, the sums of `blend_backward`. Out: the gradients of this view, added to those of the batch so far.
 // CPU reference: src/gaussian/gradient.rs; equations: sections 7.2 to 7.4 of the 4DGS model. COMPAT: as the original computes them, with
-// the deviations of section 7.5.
+// the deviations of section 7.5. ATOMIC_SUMS: `blend_backward` has summed over the pairs of each splat.
 #import gs4d::types::{SplatRecord, TrainedRecord, TrainedScene, INVISIBLE}
 #import gs4d::records::{covariance_of, read_splat}
 #import gs4d::tile::tile_count
@@ -47,8 +47,13 @@ struct Sums {
 
 fn sums_of(slot: u32) -> Sums {
     var sums: Sums;
+#ifdef ATOMIC_SUMS
+    let first = slot;
+    let count = 1u;
+#else
     let first = first_pairs[slot];
     let count = tile_count(splats[slot].shape.w, splats[slot].color.w);
+#endif
     for (var at = SUMS * first; at < SUMS * (first + count); at += SUMS) {
         sums.center += vec2(pair_gradients[at], pair_gradients[at + 1u]);
         sums.conic += vec3(pair_gradients[at + 2u], pair_gradients[at + 3u], pair_gradients[at + 4u]);

@@ -9,7 +9,7 @@ use super::progress::Bars;
 use super::report::Report;
 use super::table::{bytes, lines};
 use crate::offline::bake::{BakeSettings, Baked, bake};
-use crate::offline::fine_tune::FineTuneSettings;
+use crate::offline::fine_tune::{FineTuneSettings, GradientSums};
 use crate::offline::quantize::Quality;
 use crate::offline::report::{BakeReport, Change};
 use crate::offline::search::{Goal, ScoreChoice};
@@ -51,7 +51,8 @@ pub struct Bake {
     /// the others are trained, the loss is that after a short training.
     #[arg(long, value_name = "DB", value_parser = values::not_negative)]
     max_loss: Option<f64>,
-    /// Make a package of at most this many megabytes (of 1,000,000 bytes).
+    /// Make a package of at most this many megabytes (of 1,000,000 bytes). If that cannot be done, OUT stays as it was and the smallest
+    /// package is kept in OUT.bake/.
     #[arg(long, value_name = "MB", value_parser = values::positive)]
     target_size: Option<f32>,
     /// Remove the others in so many rounds, with training and scoring between, if what is left is trained.
@@ -81,6 +82,11 @@ pub struct Bake {
     /// Views of each of these steps.
     #[arg(long, value_name = "N", default_value = "2", conflicts_with = "no_fine_tune", value_parser = values::count(1000))]
     batch: usize,
+    /// Sum the gradients of fine-tuning in a fixed order, the same in every run, or by atomic additions, which differ by rounding and need
+    /// an adapter with float atomics.
+    #[arg(long, value_name = "HOW", default_value = "deterministic", conflicts_with = "no_fine_tune",
+        value_parser = values::one_of(&GradientSums::NAMES))]
+    sums: GradientSums,
     /// Leave the intermediate results in OUT.bake/ when all is done.
     #[arg(long)]
     keep_work: bool,
@@ -122,6 +128,7 @@ impl Bake {
             fine_tune: (!self.no_fine_tune).then(|| FineTuneSettings {
                 steps: self.steps,
                 batch: self.batch,
+                sums: self.sums,
                 ..FineTuneSettings::default()
             }),
             quality: self.quality,

@@ -12,7 +12,9 @@ use crate::gaussian::GradientMode;
 use crate::offline::dataset::Split;
 use crate::offline::engine::AdapterDescription;
 use crate::offline::files::Files;
-use crate::offline::fine_tune::{Behind, CurvePoint, FineTuneSettings, FineTuned, Rates, Resume, Terms, fine_tune};
+use crate::offline::fine_tune::{
+    Behind, CurvePoint, FineTuneSettings, FineTuned, GradientSums, Rates, Resume, Terms, fine_tune,
+};
 use crate::offline::quantize::Quality;
 use crate::offline::work::{Fingerprint, Work};
 use serde_json::json;
@@ -96,6 +98,10 @@ pub struct FineTune {
     /// Gradients: exact, or compat: as the original computes them, with its deviations.
     #[arg(long, value_name = "MODE", default_value = "exact", value_parser = values::one_of(&MODES))]
     gradients: GradientMode,
+    /// Sum gradients in a fixed order, the same in every run, or by atomic additions, which differ by rounding and need an adapter with
+    /// float atomics.
+    #[arg(long, value_name = "HOW", default_value = "deterministic", value_parser = values::one_of(&GradientSums::NAMES))]
+    sums: GradientSums,
     /// Compress the result: code its colors by codebooks, whose sizes follow the number of Gaussians, and train these as well. The package
     /// is as that of `gs4d compress`, and loses less.
     #[arg(long, value_name = "QUALITY", value_parser = values::one_of(&Quality::NAMES))]
@@ -201,6 +207,7 @@ impl FineTune {
             patience: self.patience,
             refresh_filter: self.refresh_filter,
             mode: self.gradients,
+            sums: self.sums,
             compress: self.compress.map(|quality| (quality, self.compress_steps)),
         }
     }

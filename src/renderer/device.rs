@@ -32,9 +32,9 @@ impl GpuContext {
             .map_err(|error| GpuError::NoAdapter { reason: error.to_string() })?,
         };
         let info = adapter.get_info();
-        // Timestamps are for benchmarks, subgroups for the fast renderer; nothing is needed.
+        // Timestamps are for benchmarks, subgroups for the fast renderer, float atomics for training; nothing is needed.
         let timestamps = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES;
-        let wanted_features = timestamps | wgpu::Features::SUBGROUP;
+        let wanted_features = timestamps | wgpu::Features::SUBGROUP | wgpu::Features::SHADER_FLOAT32_ATOMIC;
         let (device, queue) = block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("gs4d"),
             required_features: adapter.features() & wanted_features,

@@ -110,6 +110,9 @@ pub const COMPAT: &[&str] = &["COMPAT"];
 /// The same of captures whose color does not depend on time.
 pub const COMPAT_WITHOUT_TIME: &[&str] = &["COMPAT", "WITHOUT_TIME"];
 
+/// The definition of `blend_backward` and `project_backward` that sums by float atomics, for devices that have them.
+pub const ATOMIC_SUMS: &[&str] = &["ATOMIC_SUMS"];
+
 /// Definitions of `project` as the first pass of the fast renderer, `project_bin`.
 pub const BINNED: &[&str] = &["BINNED"];
 
@@ -309,13 +312,18 @@ pub fn compose(name: &str, definitions: &[&str]) -> Result<wgpu::naga::Module, G
     let Some(&(name, source)) = PASSES.iter().find(|(pass, _)| *pass == name) else {
         return Err(GpuError::Shader { name: "unknown", reason: format!("there is no pass `{name}`") });
     };
-    let subgroups = definitions.iter().any(|definition| SUBGROUPS_OF_32.contains(definition));
-    // WebGPU has values of half precision in words.
-    let halves = Capabilities::SHADER_FLOAT16_IN_FLOAT32;
-    let capabilities = if subgroups { halves | Capabilities::SUBGROUP } else { halves };
-    let mut composer = COMPOSERS[usize::from(subgroups)].lock().unwrap_or_else(PoisonError::into_inner);
+    let uses = |own: &[&str]| definitions.iter().any(|definition| own.contains(definition));
+    let (composer, optional) = if uses(SUBGROUPS_OF_32) {
+        (1, Capabilities::SUBGROUP)
+    } else if uses(ATOMIC_SUMS) {
+        (2, Capabilities::SHADER_FLOAT32_ATOMIC)
+    } else {
+        (0, Capabilities::empty())
+    };
+    let mut composer = COMPOSERS[composer].lock().unwrap_or_else(PoisonError::into_inner);
     if composer.is_none() {
-        *composer = Some(with_libraries(capabilities)?);
+        // WebGPU has values of half precision in words.
+        *composer = Some(with_libraries(Capabilities::SHADER_FLOAT16_IN_FLOAT32 | optional)?);
     }
     let Some(composer) = composer.as_mut() else {
         return Err(GpuError::Shader { name, reason: "there is no composer".into() });
@@ -327,8 +335,8 @@ pub fn compose(name: &str, definitions: &[&str]) -> Result<wgpu::naga::Module, G
         .map_err(|error| GpuError::Shader { name, reason: error.emit_to_string(composer) })
 }
 
-/// Composers that have parsed the libraries, without and with subgroups.
-static COMPOSERS: [Mutex<Option<Composer>>; 2] = [const { Mutex::new(None) }; 2];
+/// Composers that have parsed the libraries: without optional capabilities, with subgroups, with float atomics.
+static COMPOSERS: [Mutex<Option<Composer>>; 3] = [const { Mutex::new(None) }; 3];
 
 /// Returns a composer that has parsed the libraries.
 fn with_libraries(capabilities: Capabilities) -> Result<Composer, GpuError> {

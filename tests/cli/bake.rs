@@ -2,15 +2,16 @@
 //!
 //! In: a small synthetic scene and a dataset drawn from it by the CPU reference. Out: proof that the package is smaller
 //! and both reports are written, that finished stages are not repeated, and that data of another capture and paths that
-//! cannot be written are refused.
+//! cannot be written are refused; that a package is as small as it was asked to be, or not there.
 
-use crate::support::command::{arguments, gs4d};
+use crate::support::command::{Run, arguments, gs4d};
 use crate::support::skip::skip;
 use crate::support::{dataset, folders};
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
 use bevy_gs4d::renderer::GpuContext;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{Environment, GaussianScene};
 use glam::{UVec2, Vec3};
 use serde_json::Value;
 use std::fs;
@@ -25,9 +26,13 @@ struct Capture {
 
 /// Returns a scene and a dataset around `center`, which belongs to the scene if it is the origin.
 fn capture(center: Vec3, images: bool) -> Capture {
+    capture_of(synthesize(&SynthSettings { count: 2000, ..SynthSettings::default() }), center, images)
+}
+
+/// As [`capture`], with this scene.
+fn capture_of(trained: GaussianScene, center: Vec3, images: bool) -> Capture {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (scene, data) = (folder.path().join("scene.gs4d"), folder.path().join("data"));
-    let trained = synthesize(&SynthSettings { count: 2000, ..SynthSettings::default() });
     offline::save(&scene, &trained, &WriteSettings::default()).expect("the folder can be written to");
     let runtime = trained.into_runtime().expect("a synthetic scene can be drawn");
     dataset::write(&data, &runtime, center, 4, 4, UVec2::splat(48), images);
@@ -39,9 +44,31 @@ impl Capture {
         self.folder.path().join("out.gs4d")
     }
 
+    /// Bakes on the CPU, without training, to a package of at most `bytes`.
+    fn bake_to_size(&self, bytes: f64, more: &[&str]) -> Run {
+        let size = (bytes / 1e6).to_string();
+        let fixed = arguments!["bake", &self.scene, "--data", &self.data, "-o", self.out(), "--target-size", size];
+        let plain = ["--variant", "energy", "--engine", "cpu"].into_iter().chain(more.iter().copied());
+        gs4d(&[fixed.to_vec(), plain.map(Into::into).collect()].concat())
+    }
+
+    /// Returns the bytes of a package of the Gaussian with the highest score, which a bake to an absurd size names.
+    fn bytes_of_one(&self) -> u64 {
+        let refused = self.bake_to_size(100.0, &[]);
+        refused.must_fail("a single Gaussian has ");
+        number_after(&refused.err, "a single Gaussian has ")
+    }
+
     fn left(&self) -> Vec<String> {
         folders::names(self.folder.path())
     }
+}
+
+/// Returns the number after these words.
+fn number_after(text: &str, words: &str) -> u64 {
+    let rest = text.split_once(words).map_or("", |(_, rest)| rest);
+    let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
+    digits.parse().unwrap_or_else(|error| panic!("a number after {words:?}: {error}: {text}"))
 }
 
 fn read(path: &Path) -> String {
@@ -185,6 +212,62 @@ fn a_size_decides_how_many_stay() {
     let before = fs::read(&out).expect("the package is there");
     bake("0.0001").must_fail("does not fit");
     assert_eq!(fs::read(&out).expect("still there"), before, "nothing is replaced");
+}
+
+#[test]
+fn a_package_that_stays_too_large_replaces_nothing_and_is_kept_aside() {
+    let capture = capture(Vec3::ZERO, true);
+    let out = capture.out();
+    let one = capture.bytes_of_one();
+    fs::write(&out, b"the one from before").expect("the folder can be written to");
+    // The count is found with the support filter: the name of this one is longer, so that not even one Gaussian fits in the end.
+    let run = capture.bake_to_size(one as f64 + 0.5, &["--filter", "key-frame"]);
+    run.must_fail("does not fit");
+    run.must_fail("choose a lower quality or a larger size");
+    assert_eq!(read(&out), "the one from before", "the old file stays");
+    let kept = capture.folder.path().join("out.gs4d.bake/too-large.gs4d");
+    run.must_fail(&kept.display().to_string());
+    let bytes = fs::metadata(&kept).expect("it is kept").len();
+    assert!(bytes > one, "{bytes} bytes are more than {one}");
+    assert_eq!(number_after(&run.err, "package that was made has "), bytes, "its size is named: {}", run.err);
+    let info = gs4d(&arguments!["info", &kept, "--json"]).json();
+    assert_eq!((&info["gaussians"], &info["package"]["intact"]), (&1.into(), &true.into()), "a whole package");
+    assert_eq!(capture.left(), ["data", "out.gs4d", "out.gs4d.bake", "scene.gs4d"], "no report of it");
+    capture.bake_to_size(5e6, &[]).text();
+    assert_eq!(
+        capture.left(),
+        ["data", "out.gs4d", "out.report.html", "out.report.json", "scene.gs4d"],
+        "nothing is kept once there is a package"
+    );
+}
+
+#[test]
+fn what_all_gaussians_need_counts_once() {
+    let mut trained = synthesize(&SynthSettings { count: 2000, degree: 0, ..SynthSettings::default() });
+    let (width, height) = (128, 64);
+    // Values that hardly compress.
+    let texel = |at: u32| (at.wrapping_mul(0x9E37_79B9) >> 8) as f32 / (1u32 << 24) as f32;
+    let texels = (0..3 * width * height).map(texel).collect();
+    trained.environment = Some(Environment { width, height, texels });
+    let capture = capture_of(trained, Vec3::ZERO, true);
+    let one = capture.bytes_of_one();
+    assert!(one > 40_000, "most of it is the environment map: {one}");
+    let limit = one + 10_000;
+    let run = capture.bake_to_size(limit as f64 + 0.5, &["--json"]);
+    assert!(!run.err.contains("again with"), "found before the package is made: {}", run.err);
+    let json = run.json();
+    let (bytes, kept) = (json["bytes"]["after"].as_u64(), json["gaussians"]["after"].as_u64());
+    assert!(bytes.is_some_and(|bytes| (one..=limit).contains(&bytes)), "it fits: {bytes:?} of {limit}");
+    assert!(kept.is_some_and(|kept| (100..1500).contains(&kept)), "with as many as there is room for: {kept:?}");
+}
+
+#[test]
+fn sizes_and_rounds_that_mean_nothing_are_refused() {
+    let bake = |option: String| gs4d(&arguments!["bake", "scene.gs4d", "--data", "data", "-o", "out.gs4d", option]);
+    for size in ["0", "-1", "nan", "inf", "1e-60", "small"] {
+        bake(format!("--target-size={size}")).must_fail("--target-size");
+    }
+    bake("--rounds=0".to_owned()).must_fail("--rounds");
 }
 
 #[test]

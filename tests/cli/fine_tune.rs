@@ -78,6 +78,22 @@ fn training_wins_back_what_pruning_lost() {
 }
 
 #[test]
+fn atomic_sums_train_or_name_what_is_missing() {
+    let Some(lesson) = lesson() else { return };
+    let (out, before) = (lesson.path("out.gs4d"), lesson.left());
+    let command = arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &out, "--steps", "2"];
+    let run = gs4d(&[command.to_vec(), arguments!["--sums", "atomic"].to_vec()].concat());
+    if run.code == Some(0) {
+        let info = gs4d(&arguments!["info", &out, "--json"]).json();
+        assert_eq!(info["gaussians"].as_u64(), Some(500), "it is trained: {info}");
+    } else {
+        run.must_fail("--sums deterministic");
+        assert_eq!(lesson.left(), before, "nothing is left");
+    }
+    gs4d(&[command.to_vec(), arguments!["--sums", "sorted"].to_vec()].concat()).must_fail("--sums");
+}
+
+#[test]
 fn what_cannot_be_trained_is_refused_and_nothing_is_left() {
     let Some(lesson) = lesson() else { return };
     let out = lesson.path("out.gs4d");

@@ -3,11 +3,13 @@
 //! In: the golden scenes with their gradients; synthetic scenes. Out: proof that gradients, loss and optimizer are right, and that training
 //! lowers the loss. Skipped where there is no GPU.
 
+use crate::support::skip::skip;
 use crate::support::{golden, gpu};
 use bevy_gs4d::gaussian::{GradientMode, Harmonics, ParameterGradient, Parameters};
 use bevy_gs4d::offline::dataset::CoveredImage;
 use bevy_gs4d::offline::fine_tune::{
-    GpuImage, Moments, NEIGHBORS, Rates, Sample, Terms, Trainer, adam, loss, neighbors, opacity_mask, regularization,
+    GpuImage, GradientSums, Moments, NEIGHBORS, Rates, Sample, Terms, Trainer, adam, loss, neighbors, opacity_mask,
+    regularization,
 };
 use bevy_gs4d::renderer::Headless;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
@@ -205,6 +207,36 @@ fn the_loss_and_its_gradient_are_those_of_the_reference() {
         for ((name, found), (_, expected)) in pairs.zip(tensors(&expected.parameters, &expected.harmonics)) {
             let error = relative_error(&found, &expected);
             assert!(error < 1e-3, "{name} differs by {error:.1e} with a mask of {weight}");
+        }
+    }
+}
+
+#[test]
+fn atomic_sums_are_those_in_a_fixed_order() {
+    let Some(mut headless) = gpu::headless() else { return };
+    if let Err(error) = GradientSums::Atomic.check(&headless) {
+        skip(error);
+        return;
+    }
+    let lesson = Lesson::new(&mut headless);
+    for mode in [GradientMode::Exact, GradientMode::Compat] {
+        let gradients = |sums| {
+            let mut trainer =
+                Trainer::with_sums(&mut headless, lesson.disturbed(), mode, sums).expect("it can be trained");
+            let images = lesson.upload(&trainer);
+            // The sums of each view begin anew.
+            for index in [0, 3] {
+                trainer.accumulate(&[lesson.sample(&images, index)], 0.2).expect("it is drawn");
+            }
+            let found = trainer.gradients().expect("they can be read");
+            tensors(&trained(&found).parameters, &trained(&found).harmonics)
+        };
+        let [expected, found] = [GradientSums::Deterministic, GradientSums::Atomic].map(gradients);
+        for ((name, found), (_, expected)) in found.iter().zip(&expected) {
+            let error = relative_error(found, expected);
+            println!("{mode:?} {name:14} {error:.1e}");
+            assert!(expected.iter().any(|&value| value != 0.0), "{mode:?}: {name} has a gradient");
+            assert!(error <= 1e-4, "{mode:?}: {name} differs by {error:.1e}");
         }
     }
 }

@@ -3,8 +3,8 @@
 //! In: the files of `shaders/`. Out: proof that each is known to the renderer and is valid WGSL that needs no optional capability.
 
 use bevy_gs4d::renderer::shaders::{
-    BINNED, Blending, COMPAT, COMPAT_WITHOUT_TIME, COPIED_INSTANCE, ColorPrecision, LARGE_BATCHES, Lists, MULTISAMPLED,
-    SUBGROUPS_OF_32, Storage, compose, pass_names,
+    ATOMIC_SUMS, BINNED, Blending, COMPAT, COMPAT_WITHOUT_TIME, COPIED_INSTANCE, ColorPrecision, LARGE_BATCHES, Lists,
+    MULTISAMPLED, SUBGROUPS_OF_32, Storage, compose, pass_names,
 };
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
@@ -44,9 +44,10 @@ fn every_shader_file_is_a_pass_or_one_of_bevy_s() {
 #[test]
 fn every_pass_composes_and_is_valid() {
     let check = |name: &str, definitions: &[&str]| {
-        let subgroups = definitions.iter().any(|definition| SUBGROUPS_OF_32.contains(definition));
-        let halves = Capabilities::SHADER_FLOAT16_IN_FLOAT32;
-        let capabilities = if subgroups { halves | Capabilities::SUBGROUP } else { halves };
+        let uses = |own: &[&str]| definitions.iter().any(|definition| own.contains(definition));
+        let mut capabilities = Capabilities::SHADER_FLOAT16_IN_FLOAT32;
+        capabilities.set(Capabilities::SUBGROUP, uses(SUBGROUPS_OF_32));
+        capabilities.set(Capabilities::SHADER_FLOAT32_ATOMIC, uses(ATOMIC_SUMS));
         validate(name, &compose(name, definitions).map_err(|error| error.to_string())?, capabilities)
     };
     let binned = Storage::ALL.map(|storage| [BINNED, storage.definitions()].concat());
@@ -63,6 +64,7 @@ fn every_pass_composes_and_is_valid() {
     let definitions: Vec<_> = storages
         .into_iter()
         .chain([MULTISAMPLED.to_vec(), COMPAT.to_vec(), COMPAT_WITHOUT_TIME.to_vec()])
+        .chain([ATOMIC_SUMS.to_vec(), [COMPAT, ATOMIC_SUMS].concat()])
         .chain(binned)
         .chain(copied)
         .chain(blending)

@@ -2,6 +2,7 @@
 //!
 //! In: the remaining Gaussians. Out: their temporal filter; the package on disk.
 
+use super::size::{MADE, put_in_place};
 use super::stages::Stages;
 use super::tuning::Tuning;
 use super::{Bake, Fingerprint, Stage};
@@ -38,21 +39,22 @@ impl Bake<'_> {
         Ok((filter, fingerprint))
     }
 
-    /// Writes the package, unless an earlier bake has written the same one and it is still on disk.
+    /// Writes the package, unless an earlier bake has written the same one and it is still on disk. A package with more bytes than are
+    /// allowed stays in the folder of the bake: then returns how many.
     pub(super) fn compress(
         &mut self,
         stages: &mut Stages<'_>,
         pruned: GaussianScene,
         tuning: Option<&Tuning>,
         before: Fingerprint,
-    ) -> Result<(), OfflineError> {
+    ) -> Result<Option<u64>, OfflineError> {
         const FILE: &str = "package.crc32";
-        let (settings, work) = (self.settings, self.work.clone());
-        let out = &settings.out;
+        let (settings, work, limit) = (self.settings, self.work.clone(), self.limit());
+        let (made, out) = (work.folder().join(MADE), &settings.out);
         let fingerprint = before.and(&format!("{:?} {:?}", settings.quality, settings.level));
         let checksum = || Some(Fingerprint::of_files(&[out]).ok()?.0.to_le_bytes().to_vec());
         let stored = work.load(FILE, fingerprint).filter(|stored| checksum().as_ref() == Some(stored));
-        stages.run(Stage::Compress, stored.map(|_| ()), |progress| {
+        stages.run(Stage::Compress, stored.map(|_| None), |progress| {
             let compressed = match self.compress_tuned(&pruned, tuning, fingerprint, progress)? {
                 Some(compressed) => compressed,
                 None => {
@@ -62,11 +64,18 @@ impl Bake<'_> {
                 }
             };
             let written = write_settings(&compressed.form, settings.level);
-            progress.uninterrupted(&mut || save(out, &compressed, &written))?;
-            if let Some(checksum) = checksum() {
+            let mut too_large = None;
+            progress.uninterrupted(&mut || {
+                save(&made, &compressed, &written)?;
+                too_large = put_in_place(&made, out, limit)?;
+                Ok(())
+            })?;
+            if too_large.is_none()
+                && let Some(checksum) = checksum()
+            {
                 work.store(FILE, fingerprint, &checksum, progress)?;
             }
-            Ok(())
+            Ok(too_large)
         })
     }
 }

@@ -147,6 +147,9 @@ impl<'a> Bake<'a> {
     }
 
     fn run(&mut self, progress: &mut dyn Progress) -> Result<Baked, OfflineError> {
+        if let (Some(tuning), Engine::Gpu(headless)) = (self.tunes(), &*self.engine) {
+            tuning.sums.check(headless)?;
+        }
         let mut stages = Stages::begin(progress);
         let mut pruning = self.prune(&mut stages)?;
         let (filter, after, tuning) = loop {
@@ -155,12 +158,12 @@ impl<'a> Bake<'a> {
             let (filter, masked) = self.mask(&mut stages, &tuned, fingerprint)?;
             let after = sliced(&tuned)?.into_owned();
             tuned.filter = Some(filter.clone());
-            self.compress(&mut stages, tuned, tuning.as_ref(), masked)?;
-            match self.keep_fewer(&pruning, &mut stages)? {
-                Some(fewer) => pruning = fewer,
+            match self.compress(&mut stages, tuned, tuning.as_ref(), masked)? {
+                Some(size) => pruning = self.keep_fewer(&pruning, size, &mut stages)?,
                 None => break (filter, after, tuning),
             }
         };
+        self.remove_made();
         let compared = stages.run(Stage::Evaluate, None, |progress| self.compare(progress))?;
         let times = stages.times();
         let before = sliced(&self.subject.scene)?;

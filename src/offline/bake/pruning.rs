@@ -32,6 +32,8 @@ pub(super) struct Pruning {
     pub fingerprint: Fingerprint,
     /// Packages made before with more Gaussians, which were too large.
     pub bakes: usize,
+    /// Bytes of the smallest of them; the largest number if there is none.
+    pub smallest: u64,
 }
 
 /// How the Gaussians to keep were selected.
@@ -71,7 +73,7 @@ impl Bake<'_> {
         })?;
         let scores = candidates.into_iter().find(|candidate| candidate.name == found.score);
         let scores = scores.ok_or(OfflineError::NoScore)?.scores;
-        Ok(Pruning { kept, scores, found, fingerprint, bakes: 0 })
+        Ok(Pruning { kept, scores, found, fingerprint, bakes: 0, smallest: u64::MAX })
     }
 
     /// Returns the scores of every candidate, computed or loaded from an earlier bake.

@@ -1,27 +1,33 @@
 //! How many Gaussians fit into a package of a given size.
 //!
-//! In: a number of bytes, scores. Out: the number of Gaussians; fewer of them if the package that was written is too large.
+//! In: a number of bytes, scores. Out: the number of Gaussians; fewer of them if the package that was made is too large. Only a package that
+//! is not takes its place.
 
 use super::Bake;
 use super::pruning::Pruning;
 use super::stages::Stages;
-use crate::codec::package;
+use crate::codec::{CodecError, package};
 use crate::offline::prune::{highest, select};
 use crate::offline::quantize::{CompressSettings, compress};
 use crate::offline::search::Goal;
-use crate::offline::{OfflineError, Progress, sliced, write_settings};
+use crate::offline::{OfflineError, Progress, sliced, write_beside, write_settings};
 use crate::scene::TemporalFilter;
-use std::fs;
+use std::fs::{self, File};
+use std::io;
+use std::path::Path;
 
 /// Bytes of a Gaussian with which the search begins.
 const BYTES_OF_GAUSSIAN: u64 = 24;
 /// Packages that are tried before the bake, and whole bakes.
 const TRIES: usize = 5;
 const BAKES: usize = 4;
-/// The share of the size that is aimed at: training changes how well a package compresses.
+/// The share of the room for Gaussians that is aimed at: training changes how well a package compresses.
 const AIM: f64 = 0.985;
 /// A package this much smaller, as a share of the size, is large enough.
 const NEAR: f64 = 0.97;
+/// Names of the package that was just made and of the smallest that was too large, in the folder of the bake.
+pub(super) const MADE: &str = "package.gs4d";
+const TOO_LARGE: &str = "too-large.gs4d";
 
 impl Bake<'_> {
     /// Returns how many of the Gaussians with the highest scores fit into a package of this many bytes, before they are trained. Begins the
@@ -36,6 +42,10 @@ impl Bake<'_> {
         progress: &mut dyn Progress,
     ) -> Result<usize, OfflineError> {
         let total = self.subject.scene.len();
+        let one = self.size_of(&highest(scores, 1))?;
+        if one > limit {
+            return Err(self.too_small(limit, &format!("a package of a single Gaussian has {one}")));
+        }
         let mut count = usize::try_from(limit / BYTES_OF_GAUSSIAN).map_or(total, |count| count.clamp(1, total.max(1)));
         progress.begin("finding the count", TRIES);
         for _ in 0..TRIES {
@@ -46,10 +56,7 @@ impl Bake<'_> {
             if whole || near {
                 break;
             }
-            count = fitting(count, size, limit).min(total);
-            if count == 0 {
-                return Err(self.too_small(limit));
-            }
+            count = fitting(count, size, limit, one).clamp(1, total.max(1));
         }
         progress.finish();
         Ok(count)
@@ -73,44 +80,83 @@ impl Bake<'_> {
         Ok(bytes.len() as u64)
     }
 
-    /// Returns a selection of fewer Gaussians if the package is larger than it may be; `None` if it is not.
+    /// Returns the most bytes that the package may have.
+    pub(super) fn limit(&self) -> u64 {
+        match self.settings.goal {
+            Goal::Size(limit) => limit,
+            Goal::Keep(_) | Goal::Remove(_) | Goal::MaxLoss(_) => u64::MAX,
+        }
+    }
+
+    /// Returns a selection of fewer Gaussians after their package turned out to have `size` bytes, which are too many. The smallest such
+    /// package is kept in the folder of the bake.
     ///
     /// # Errors
     /// It has been too large several times.
     pub(super) fn keep_fewer(
         &self,
         pruning: &Pruning,
+        size: u64,
         stages: &mut Stages<'_>,
-    ) -> Result<Option<Pruning>, OfflineError> {
-        let Goal::Size(limit) = self.settings.goal else { return Ok(None) };
-        let out = &self.settings.out;
-        let size = fs::metadata(out).map_err(|error| OfflineError::at(out, error))?.len();
-        if size <= limit {
-            return Ok(None);
+    ) -> Result<Pruning, OfflineError> {
+        let (limit, folder) = (self.limit(), self.work.folder());
+        let kept = folder.join(TOO_LARGE);
+        if size < pruning.smallest {
+            fs::rename(folder.join(MADE), &kept).map_err(|error| OfflineError::at(&kept, error))?;
         }
-        let count = fitting(pruning.kept.len(), size, limit);
+        let smallest = size.min(pruning.smallest);
+        let count = fitting(pruning.kept.len(), size, limit, self.size_of(&highest(&pruning.scores, 1))?);
         if pruning.bakes + 1 == BAKES || count == 0 {
-            return Err(self.too_small(limit));
+            let kept = kept.display();
+            let found = format!("the smallest package that was made has {smallest} and is kept as {kept}");
+            return Err(self.too_small(limit, &found));
         }
         stages.note(&format!("the package has {size} bytes, {limit} are allowed: again with {count} Gaussians"));
-        Ok(Some(Pruning {
+        Ok(Pruning {
             kept: highest(&pruning.scores, count),
             scores: pruning.scores.clone(),
             found: pruning.found.clone(),
             fingerprint: pruning.fingerprint.and(&format!("{count}")),
             bakes: pruning.bakes + 1,
-        }))
+            smallest,
+        })
     }
 
-    fn too_small(&self, limit: u64) -> OfflineError {
-        let reason = format!("this capture does not fit into {limit} bytes: choose a lower quality or a larger size");
+    /// Removes the packages in the folder of the bake, once there is one in its place.
+    pub(super) fn remove_made(&self) {
+        for name in [MADE, TOO_LARGE] {
+            // Most bakes leave neither.
+            let _ = fs::remove_file(self.work.folder().join(name));
+        }
+    }
+
+    /// Returns the error that no package has been found that is small enough; `found` says what the smallest has.
+    fn too_small(&self, limit: u64, found: &str) -> OfflineError {
+        let remedy = "choose a lower quality or a larger size; a file that was here before has not changed";
+        let reason = format!("this capture does not fit into {limit} bytes: {found}; {remedy}");
         OfflineError::at(&self.settings.out, reason)
     }
 }
 
-/// Returns the count at which a package that has `size` bytes with `count` Gaussians would have nearly `limit`.
-fn fitting(count: usize, size: u64, limit: u64) -> usize {
-    (count as f64 * AIM * limit as f64 / size.max(1) as f64) as usize
+/// Writes a package that was made elsewhere to its place, unless it has more bytes than are allowed: then returns how many.
+///
+/// # Errors
+/// A folder that cannot be written to, a full disk.
+pub(super) fn put_in_place(made: &Path, out: &Path, limit: u64) -> Result<Option<u64>, CodecError> {
+    let at_made = |error: io::Error| CodecError { path: made.to_owned(), kind: error.into() };
+    let mut file = File::open(made).map_err(at_made)?;
+    let size = file.metadata().map_err(at_made)?.len();
+    if size > limit {
+        return Ok(Some(size));
+    }
+    write_beside(out, |writer| io::copy(&mut file, writer).map(|_| ()))?;
+    Ok(None)
+}
+
+/// Returns the count at which a package that has `size` bytes with `count` Gaussians, and `one` with a single one, would have nearly `limit`.
+fn fitting(count: usize, size: u64, limit: u64, one: u64) -> usize {
+    let [room, used] = [limit, size].map(|bytes| bytes.saturating_sub(one) as f64);
+    (count as f64 * AIM * room / used.max(1.0)) as usize
 }
 
 #[cfg(test)]
@@ -119,8 +165,23 @@ mod tests {
 
     #[test]
     fn counts_follow_the_size() {
-        assert_eq!(fitting(1000, 2000, 1000), 492, "a little less than half");
-        assert_eq!(fitting(1000, 500, 1000), 1970, "a little less than twice");
-        assert_eq!(fitting(3, 1000, 10), 0, "nothing fits");
+        assert_eq!(fitting(1000, 2000, 1000, 0), 492, "a little less than half");
+        assert_eq!(fitting(1000, 500, 1000, 0), 1970, "a little less than twice");
+        assert_eq!(fitting(3, 1000, 10, 0), 0, "nothing fits");
+        assert_eq!(fitting(1000, 2900, 1900, 900), 492, "what one Gaussian needs, all of them need once");
+        assert_eq!(fitting(1, 901, 900, 900), 0, "a single one is too large");
+    }
+
+    #[test]
+    fn a_package_that_is_too_large_replaces_nothing() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let [made, out] = ["made.gs4d", "out.gs4d"].map(|name| folder.path().join(name));
+        fs::write(&made, b"ten bytes.").expect("the folder can be written to");
+        fs::write(&out, b"before").expect("the folder can be written to");
+        let put = |limit| put_in_place(&made, &out, limit).expect("the folder can be written to");
+        assert_eq!(put(9), Some(10), "one byte too many");
+        assert_eq!(fs::read(&out).expect("it is there"), b"before", "the old package stays");
+        assert_eq!(put(10), None, "as many as are allowed");
+        assert_eq!(fs::read(&out).expect("it is there"), b"ten bytes.", "the new package");
     }
 }

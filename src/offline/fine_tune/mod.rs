@@ -5,7 +5,7 @@
 //!
 //! Some training views are held out: they tell which parameters are the best. The loss is `0.8 L1 + 0.2 (1 − SSIM)`, with further [`Terms`]
 //! if these have weights, the optimizer Adam (section 6 of the 4DGS model). Views, backgrounds and rates of a step follow from its number
-//! alone, so that a run which is resumed ends as one which was not interrupted.
+//! alone, so that a run which is resumed ends as one which was not interrupted, but for rounding if sums are [atomic](GradientSums::Atomic).
 
 mod adam;
 mod belonging;
@@ -20,6 +20,7 @@ mod resume;
 mod run;
 mod schedule;
 mod state;
+mod sums;
 mod targets;
 mod terms;
 mod tied;
@@ -31,6 +32,7 @@ pub use loss::{Loss, OpacityMask, loss, opacity_mask};
 pub use neighbors::{NEIGHBORS, neighbors};
 pub use schedule::{Behind, Rates};
 pub use state::TrainerState;
+pub use sums::GradientSums;
 pub use targets::TrainingImages;
 pub use terms::{Regularization, Terms, regularization};
 pub use trainer::{Faults, GpuImage, Sample, Totals, Trainer, TrainerError};
@@ -76,6 +78,8 @@ pub struct FineTuneSettings {
     pub refresh_filter: usize,
     /// Whether gradients are those of the original, with its deviations.
     pub mode: GradientMode,
+    /// How gradients are summed. Default: in a fixed order.
+    pub sums: GradientSums,
     /// How the result is compressed, and the number of further steps in which the codebooks of color are trained; `None` leaves the scene in
     /// the trained form.
     pub compress: Option<(Quality, usize)>,
@@ -98,6 +102,7 @@ impl Default for FineTuneSettings {
             patience: None,
             refresh_filter: 1000,
             mode: GradientMode::default(),
+            sums: GradientSums::default(),
             compress: None,
         }
     }

@@ -95,7 +95,7 @@ impl<'a> Run<'a> {
             false => (None, Some(filter.segments)),
         });
         scene.filter = used;
-        let mut trainer = Trainer::new(headless, scene, settings.mode)?;
+        let mut trainer = Trainer::with_sums(headless, scene, settings.mode, settings.sums)?;
         trainer.set_terms(settings.terms)?;
         trainer.set_sparse(settings.sparse);
         let random = settings.behind == Behind::Random

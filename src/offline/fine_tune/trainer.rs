@@ -1,7 +1,7 @@
 //! Training on the GPU, with the renderer's own passes.
 //!
 //! In: a scene in the trained form, views with their images. Out: the scene after some steps. Nothing is added without order, so that every
-//! run gives the same result.
+//! run gives the same result, unless [sums](GradientSums) are atomic.
 //!
 //! | pass | reads | writes |
 //! |---|---|---|
@@ -20,6 +20,7 @@ use super::passes::Passes;
 use super::records::records;
 use super::regularizer::Regularizer;
 use super::schedule::Rates;
+use super::sums::GradientSums;
 use super::terms::Terms;
 use super::tied::Tied;
 use super::view_buffers::ViewBuffers;
@@ -64,6 +65,7 @@ pub struct Trainer<'a> {
     pub(super) terms: Terms,
     pub(super) regularizer: Option<Regularizer>,
     sparse: bool,
+    pub(super) sums: GradientSums,
     pub(super) view: Option<ViewBuffers>,
     in_flight: VecDeque<wgpu::SubmissionIndex>,
 }
@@ -116,6 +118,20 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// A Gaussian that cannot be drawn, a scene that does not fit one binding of the device, a limit that is too low.
     pub fn new(headless: &'a mut Headless, scene: GaussianScene, mode: GradientMode) -> Result<Self, TrainerError> {
+        Self::with_sums(headless, scene, mode, GradientSums::default())
+    }
+
+    /// As [`new`](Self::new), with gradients summed in this way.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new), and a device that cannot sum in this way.
+    pub fn with_sums(
+        headless: &'a mut Headless,
+        scene: GaussianScene,
+        mode: GradientMode,
+        sums: GradientSums,
+    ) -> Result<Self, TrainerError> {
+        sums.check(headless)?;
         let SceneForm::Trained(trained) = &scene.form else { return Err(TrainerError::NotTrained) };
         let model = trained.parameters.model();
         let records = records(&trained.parameters);
@@ -126,7 +142,8 @@ impl<'a> Trainer<'a> {
             GradientMode::Compat if plain => COMPAT_WITHOUT_TIME,
             GradientMode::Compat => COMPAT,
         };
-        let passes = Passes::new(headless, definitions, ShaderChecks::Off)?;
+        let definitions = [definitions, sums.definitions()].concat();
+        let passes = Passes::new(headless, &definitions, ShaderChecks::Off)?;
         let degrees = runtime.form.color_degrees();
         let stride = evaluated(degrees.degree, degrees.degree_t) * 3;
         let stride = stride.div_ceil(4) as u32;
@@ -178,6 +195,7 @@ impl<'a> Trainer<'a> {
             terms: Terms::default(),
             regularizer: None,
             sparse: false,
+            sums,
             view: None,
             in_flight: VecDeque::new(),
         };
@@ -293,6 +311,9 @@ impl<'a> Trainer<'a> {
     ) {
         let Some(frame) = self.headless.finished() else { return };
         let (tiles, passes) = (view.tiles(), &self.passes);
+        if self.sums == GradientSums::Atomic {
+            encoder.clear_buffer(&buffers.gradients, 0, None);
+        }
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
         if let Some(image) = image {
             pass.set_bind_group(0, &buffers.loss, &[]);
@@ -306,8 +327,10 @@ impl<'a> Trainer<'a> {
         }
         pass.set_bind_group(0, &buffers.blended, &[]);
         pass.set_bind_group(1, &buffers.sums, &[]);
-        pass.set_pipeline(&passes.place);
-        pass.dispatch_workgroups(frame.slots.div_ceil(256), 1, 1);
+        if self.sums == GradientSums::Deterministic {
+            pass.set_pipeline(&passes.place);
+            pass.dispatch_workgroups(frame.slots.div_ceil(256), 1, 1);
+        }
         pass.set_pipeline(&passes.pairs);
         pass.dispatch_workgroups(tiles.x, tiles.y, 1);
         pass.set_pipeline(&passes.project_backward);
@@ -462,6 +485,15 @@ pub enum TrainerError {
         term: &'static str,
         /// Its weight.
         weight: f64,
+    },
+    /// The device has no float atomics.
+    #[error(
+        "the adapter `{adapter}` cannot add floating-point numbers atomically: sum gradients with --sums deterministic, or choose another \
+         one with --adapter"
+    )]
+    NoAtomics {
+        /// Name of the adapter.
+        adapter: String,
     },
     /// There is nothing to train.
     #[error("there are no Gaussians to fine-tune")]

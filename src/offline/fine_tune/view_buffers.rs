@@ -2,6 +2,7 @@
 //!
 //! In: the frame that was recorded last. Out: [`ViewBuffers`], created anew only if sizes have changed.
 
+use super::sums::GradientSums;
 use super::trainer::Trainer;
 use crate::renderer::layout::{InstanceUniforms, LossUniforms, TILE_SIZE};
 use crate::renderer::memory::binding_limit;
@@ -9,7 +10,7 @@ use crate::renderer::{FinishedFrame, GpuError};
 use glam::UVec2;
 use wgpu::BufferUsages;
 
-/// Values that `blend_backward` writes for each pair.
+/// Values that `blend_backward` writes for each pair or splat.
 const SUMS: u64 = 10;
 
 /// What depends on the size of the picture and of the renderer's buffers.
@@ -22,6 +23,8 @@ pub(super) struct ViewBuffers {
     pub loss_settings: wgpu::Buffer,
     pub pixel_gradients: wgpu::Buffer,
     pub depth_gradients: wgpu::Buffer,
+    /// Those of pairs, or of splats if sums are atomic.
+    pub gradients: wgpu::Buffer,
     pub loss: wgpu::BindGroup,
     pub blended: wgpu::BindGroup,
     pub sums: wgpu::BindGroup,
@@ -43,9 +46,13 @@ impl Trainer<'_> {
     fn make(&self, frame: &FinishedFrame<'_>, size: UVec2) -> Result<ViewBuffers, GpuError> {
         let (allocator, passes) = (self.headless.allocator(), &self.passes);
         let limit = binding_limit(&allocator.device.limits());
-        let needed = u64::from(frame.pairs) * SUMS * 4;
+        let (what, count) = match self.sums {
+            GradientSums::Deterministic => ("the gradients of pairs", frame.pairs),
+            GradientSums::Atomic => ("the gradients of splats", frame.slots),
+        };
+        let needed = u64::from(count) * SUMS * 4;
         if needed > limit {
-            return Err(GpuError::TooLarge { what: "the gradients of pairs", needed, limit });
+            return Err(GpuError::TooLarge { what, needed, limit });
         }
         let pixels = u64::from(size.x) * u64::from(size.y);
         let tiles = u64::from(size.x.div_ceil(TILE_SIZE)) * u64::from(size.y.div_ceil(TILE_SIZE));
@@ -58,7 +65,7 @@ impl Trainer<'_> {
         let depth_gradients = storage("gs4d gradients of depths", pixels * 4);
         let tile_sums = storage("gs4d sums of tiles", tiles * 16);
         let first_pairs = storage("gs4d first pairs", u64::from(frame.slots) * 4);
-        let pair_gradients = storage("gs4d gradients of pairs", needed);
+        let gradients = storage("gs4d gradients of splats", needed);
         let color = wgpu::BindingResource::TextureView(frame.color);
         let whole = wgpu::Buffer::as_entire_binding;
         let written = [&slopes, &pixel_gradients, &tile_sums, &self.totals].map(whole);
@@ -75,14 +82,13 @@ impl Trainer<'_> {
         ];
         let depth = wgpu::BindingResource::TextureView(frame.depth);
         let blended = [read.map(whole).to_vec(), vec![color, depth]].concat();
-        let sums = [&first_pairs, &pair_gradients, &pixel_gradients, &depth_gradients].map(whole);
+        let sums = [&first_pairs, &gradients, &pixel_gradients, &depth_gradients].map(whole);
         let instance = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
             buffer: frame.instances,
             offset: 0,
             size: std::num::NonZeroU64::new(size_of::<InstanceUniforms>() as u64),
         });
-        let splats =
-            [&self.scene_settings, &buffers.splats, &buffers.depth_keys, &first_pairs, &pair_gradients].map(whole);
+        let splats = [&self.scene_settings, &buffers.splats, &buffers.depth_keys, &first_pairs, &gradients].map(whole);
         let splat_gradients = [vec![instance], splats.to_vec()].concat();
         Ok(ViewBuffers {
             splats: buffers.splats.clone(),
@@ -95,6 +101,7 @@ impl Trainer<'_> {
             loss_settings,
             pixel_gradients,
             depth_gradients,
+            gradients,
         })
     }
 }
