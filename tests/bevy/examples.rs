@@ -4,13 +4,13 @@
 //! many pictures as it is asked for, that these show captures, and that the captures move. Drawing is skipped where
 //! there is no GPU, not even a software one.
 
-use crate::support::skip::skip;
+use crate::support::no_gpu::no_gpu;
 use bevy_gs4d::codec;
 use bevy_gs4d::codec::checkpoint::CheckpointOptions;
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
 use bevy_gs4d::scene::GaussianScene;
-use bevy_gs4d::testing::{TestingError, has_gpu};
+use bevy_gs4d::testing::has_gpu;
 use image::RgbaImage;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -49,7 +49,7 @@ fn run_with(root: &Path, example: &str, arguments: &[&str]) -> Output {
 /// `None` if there is no GPU.
 fn pictures(root: &Path, example: &str, options: &[&str], frames: usize) -> Option<Vec<RgbaImage>> {
     if !has_gpu() {
-        skip(TestingError::NoGpu);
+        no_gpu();
         return None;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -151,7 +151,7 @@ fn captures_are_to_be_seen() {
 #[test]
 fn a_file_that_is_missing_is_named() {
     if !has_gpu() {
-        skip(TestingError::NoGpu);
+        no_gpu();
         return;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -5,7 +5,7 @@
 //! a software one.
 
 use crate::support::offscreen_app::{app, picture, spawn_camera};
-use crate::support::skip;
+use crate::support::skip::skip;
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::input::ButtonState;
 use bevy::input::keyboard::{Key, KeyboardInput};
@@ -224,7 +224,7 @@ fn gpu_time_is_measured_only_while_its_section_is_open() {
     let renderer = app.get_sub_app(RenderApp).expect("it has drawn");
     let features = renderer.world().resource::<RenderDevice>().features();
     if !features.contains(WgpuFeatures::TIMESTAMP_QUERY_INSIDE_PASSES) {
-        skip::skip("this GPU has no timestamps inside passes");
+        skip("this GPU has no timestamps inside passes");
         return;
     }
     let measured = |app: &App| {

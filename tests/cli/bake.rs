@@ -5,7 +5,7 @@
 //! cannot be written are refused.
 
 use crate::support::command::{arguments, gs4d};
-use crate::support::skip::skip;
+use crate::support::no_gpu::no_gpu;
 use crate::support::{dataset, folders};
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
@@ -189,9 +189,8 @@ fn a_size_decides_how_many_stay() {
 
 #[test]
 fn scores_are_judged_after_training_and_pruning_may_take_rounds() {
-    if let Err(error) = GpuContext::headless(None) {
-        skip(error);
-        return;
+    if GpuContext::headless(None).is_err() {
+        return no_gpu();
     }
     let capture = capture(Vec3::ZERO, true);
     let out = capture.out();

@@ -5,6 +5,7 @@
 
 use crate::support::command::{arguments, folder, gs4d, scene};
 use crate::support::data::data;
+use crate::support::no_gpu::no_gpu;
 use crate::support::npz;
 use crate::support::skip::skip;
 use bevy_gs4d::offline::metrics;
@@ -15,17 +16,18 @@ use serde_json::Value;
 use std::fs;
 use std::path::Path;
 
-fn no_gpu() -> bool {
-    let none = GpuContext::adapters().is_empty();
-    if none {
-        skip("no GPU adapter");
+/// Returns whether there is a GPU; that there is none is reported.
+fn has_gpu() -> bool {
+    let some = !GpuContext::adapters().is_empty();
+    if !some {
+        no_gpu();
     }
-    none
+    some
 }
 
 #[test]
 fn pictures_are_drawn_and_written() {
-    if no_gpu() {
+    if !has_gpu() {
         return;
     }
     let folder = folder();
@@ -53,7 +55,7 @@ fn pictures_are_drawn_and_written() {
 fn pictures_that_do_not_fit_are_refused_before_they_are_drawn() {
     let limit = match GpuContext::headless(None) {
         Ok(context) => context.device.limits().max_buffer_size,
-        Err(error) => return skip(error),
+        Err(_) => return no_gpu(),
     };
     let folder = folder();
     let (path, frames) = (scene(&folder, "100"), folder.path().join("frames"));
@@ -72,7 +74,7 @@ fn pictures_that_do_not_fit_are_refused_before_they_are_drawn() {
 
 #[test]
 fn benchmarks_measure() {
-    if no_gpu() {
+    if !has_gpu() {
         return;
     }
     let folder = folder();
@@ -112,7 +114,7 @@ fn raw_picture(path: &Path, size: UVec2) -> Picture {
 #[test]
 fn real_captures_match_the_original() {
     let Some(data) = data() else { return };
-    if no_gpu() {
+    if !has_gpu() {
         return;
     }
     for (checkpoint, golden) in [
