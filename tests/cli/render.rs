@@ -117,11 +117,12 @@ fn real_captures_match_the_original() {
     if !has_gpu() {
         return;
     }
-    for (checkpoint, golden) in [
-        ("toybox/toybox_chkpnt.pth", "toybox/golden_vanilla"),
-        ("toybox/toybox_4dgs1k.pth", "toybox/golden_4dgs1k"),
-        ("toybox/toybox_45k.pth", "toybox/golden_45k"),
-        ("standup/standup_chkpnt.pth", "standup/standup_golden"),
+    // 3 dB less than the worst view has; standup's pictures are of half precision.
+    for (checkpoint, golden, least) in [
+        ("toybox/toybox_chkpnt.pth", "toybox/golden_vanilla", 105.0),
+        ("toybox/toybox_4dgs1k.pth", "toybox/golden_4dgs1k", 97.0),
+        ("toybox/toybox_45k.pth", "toybox/golden_45k", 101.0),
+        ("standup/standup_chkpnt.pth", "standup/standup_golden", 90.0),
     ] {
         let out = folder();
         let cameras = data.join(format!("{golden}.json"));
@@ -136,8 +137,14 @@ fn real_captures_match_the_original() {
             let name = Path::new(view["file"].as_str().expect("a file")).file_stem().expect("a stem");
             let drawn = raw_picture(&out.path().join(name).with_extension("f32"), truth.size);
             let psnr = metrics::psnr_pooled(&drawn, truth).expect("one size");
-            eprintln!("{checkpoint} {}: {psnr:.2} dB", name.display());
-            assert!(psnr >= 75.0, "{checkpoint} {}: {psnr:.2} dB", name.display());
+            let apart = drawn.pixels.iter().zip(&truth.pixels).map(|(a, b)| (*a - *b).abs().max_element());
+            let worst = apart.clone().fold(0.0, f32::max);
+            let beyond = apart.filter(|apart| *apart > 1e-3).count();
+            let found = format!("{checkpoint} {}: {psnr:.2} dB, worst {worst:.1e}, {beyond} pixels", name.display());
+            println!("{found}");
+            assert!(psnr >= least, "{found}: {least} dB at least");
+            // Here and there a splat's alpha lies on 1/255, and counts on one side only.
+            assert!(worst <= 1e-2 && beyond <= 16, "{found} beyond 1e-3");
         }
     }
 }
