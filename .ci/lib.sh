@@ -3,6 +3,8 @@
 #
 # CARGO_TARGET_DIR  where to build; default: a folder of the user's cache, outside the clone, used again by the next run
 # GS4D_DATA         folder of the trained captures; default: ../shared/data where that exists, else their tests skip themselves
+#
+# Tests add what they skip to the file that GS4D_SKIPPED names, which is set here; the summary counts it.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 exec </dev/null
@@ -17,6 +19,17 @@ scratch=$(mktemp -d)
 current=preparation
 began=0
 summary=()
+export GS4D_SKIPPED="$scratch/skipped"
+
+# Lists why tests were skipped, or parts of them, and how many each time; a test that ran twice counts once. In: `skipped: NAME: reason`.
+skips() {
+  printf '    tests skipped, or parts of them:\n'
+  if [ -s "$GS4D_SKIPPED" ]; then
+    sort -u "$GS4D_SKIPPED" | sed 's/^skipped: [^ ]*: //' | sort | uniq -c | sort -rn
+  else
+    printf '          0\n'
+  fi
+}
 
 finish() {
   local status=$? line
@@ -25,6 +38,7 @@ finish() {
   if [ -s "$scratch/results" ]; then
     printf '    the last line of each test binary:\n'
     cat "$scratch/results"
+    skips
   fi
   rm -rf "$scratch"
   if [ "$status" -eq 0 ]; then

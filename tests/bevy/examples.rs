@@ -4,13 +4,13 @@
 //! many pictures as it is asked for, that these show captures, and that the captures move. Drawing is skipped where
 //! there is no GPU, not even a software one.
 
-use crate::support::skip::skip;
+use crate::support::no_gpu::no_gpu;
 use bevy_gs4d::codec;
 use bevy_gs4d::codec::checkpoint::CheckpointOptions;
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
 use bevy_gs4d::scene::GaussianScene;
-use bevy_gs4d::testing::{TestingError, has_gpu};
+use bevy_gs4d::testing::has_gpu;
 use image::RgbaImage;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -49,7 +49,7 @@ fn run_with(root: &Path, example: &str, arguments: &[&str]) -> Output {
 /// `None` if there is no GPU.
 fn pictures(root: &Path, example: &str, options: &[&str], frames: usize) -> Option<Vec<RgbaImage>> {
     if !has_gpu() {
-        skip(TestingError::NoGpu);
+        no_gpu();
         return None;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -73,6 +73,13 @@ fn read(folder: &Path) -> Vec<RgbaImage> {
     paths.iter().map(|path| image::open(path).expect("a whole picture").into_rgba8()).collect()
 }
 
+/// Returns the share of pixels that differ between two pictures.
+fn differing(a: &RgbaImage, b: &RgbaImage) -> f64 {
+    assert_eq!(a.dimensions(), b.dimensions(), "pictures of one size");
+    let differ = a.pixels().zip(b.pixels()).filter(|(a, b)| a != b).count();
+    differ as f64 / f64::from(a.width() * a.height())
+}
+
 /// Draws two moments and checks the pictures.
 fn check(example: &str, options: &[&str], expected: usize) {
     let Some(pictures) = pictures(Path::new(ROOT), example, options, 2) else { return };
@@ -82,7 +89,8 @@ fn check(example: &str, options: &[&str], expected: usize) {
         assert!(picture.pixels().any(|pixel| pixel != first), "{example} shows more than one colour");
     }
     for pair in pictures.windows(2) {
-        assert!(pair[0] != pair[1], "{example} shows something that moves");
+        let share = differing(&pair[0], &pair[1]);
+        assert!(share > 0.001, "{example} shows something that moves: {share} of the picture changes");
     }
 }
 
@@ -136,13 +144,11 @@ fn invisible() -> TempDir {
 #[test]
 fn captures_are_to_be_seen() {
     let invisible = invisible();
-    for example in ["timeline", "walkthrough"] {
+    for example in EXAMPLES {
         let roots = [Path::new(ROOT), invisible.path()];
         // In the first picture the timeline's capture has not faded in.
         let [Some(seen), Some(unseen)] = roots.map(|root| pictures(root, example, &[], 4)) else { return };
-        let (seen, unseen) = (&seen[3], &unseen[3]);
-        let differ = seen.pixels().zip(unseen.pixels()).filter(|(a, b)| a != b).count();
-        let share = differ as f64 / f64::from(seen.width() * seen.height());
+        let share = differing(&seen[3], &unseen[3]);
         assert!(share > 0.01, "{example} shows its captures: without them {share} of the picture differs");
         assert!(share < 0.9, "and other things, too, which stay: {share} of the picture differs");
     }
@@ -151,7 +157,7 @@ fn captures_are_to_be_seen() {
 #[test]
 fn a_file_that_is_missing_is_named() {
     if !has_gpu() {
-        skip(TestingError::NoGpu);
+        no_gpu();
         return;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -1,7 +1,7 @@
 //! Trained captures through a headless Bevy app, against pictures of the original implementation.
 //!
 //! In: the folder named by `GS4D_DATA`, with checkpoints, golden cameras (`.json`) and golden pictures (`.npz`). Out: the PSNR of
-//! every view, which must reach 50 dB. Skipped without the folder, or without a GPU.
+//! every view, which must be that of rounding to 8 bits, and the worst pixels. Skipped without the folder, or without a GPU.
 
 use crate::support::offscreen_app::{app, picture, spawn_camera};
 use crate::support::{data, npz};
@@ -72,9 +72,16 @@ fn check(checkpoint: &str, golden: &str) {
         let lens = Projection::Perspective(PerspectiveProjection { fov, ..default() });
         app.world_mut().entity_mut(camera).insert((pose(view), lens));
         app.world_mut().entity_mut(entity).insert(Playback::paused_at(seconds[index]));
-        let psnr = psnr(&picture(&mut app, 0.0), &expected[index]);
-        println!("{checkpoint} view {index}: {psnr:.2} dB");
-        assert!(psnr >= 50.0, "{checkpoint}, view {index}: {psnr:.2} dB is less than 50");
+        let picture = picture(&mut app, 0.0);
+        let (psnr, apart) = (psnr(&picture, &expected[index]), differences(&picture, &expected[index]));
+        let worst = apart.iter().copied().fold(0.0, f32::max);
+        let beyond = apart.iter().filter(|apart| **apart > 1.0).count();
+        let found = format!("{checkpoint}, view {index}: {psnr:.2} dB, worst {worst:.2} / 255, {beyond} pixels");
+        println!("{found}");
+        // The original's pictures rounded to 8 bits have 60.7 dB and more, and pixels half a step away.
+        assert!(psnr >= 57.5, "{found}: 57.5 dB at least");
+        // Here and there a splat's alpha lies on 1/255, and counts on one side only.
+        assert!(worst <= 3.0 && beyond <= 16, "{found} beyond 1 / 255");
     }
 }
 
@@ -82,6 +89,16 @@ fn pose(view: &GoldenView) -> Transform {
     let world_to_camera = Mat4::from_cols_array_2d(&view.world_to_camera_opencv).transpose();
     let flip = Mat4::from_diagonal(Vec4::new(1.0, -1.0, -1.0, 1.0));
     Transform::from_matrix((flip * world_to_camera).inverse())
+}
+
+/// Returns how far each pixel is from the expected one, in 255ths, in the channel where that is most.
+fn differences(picture: &RgbaImage, expected: &Picture) -> Vec<f32> {
+    assert_eq!(UVec2::from(picture.dimensions()), expected.size, "pictures of one size");
+    let apart = |(pixel, expected): (&image::Rgba<u8>, &Vec3)| {
+        let [r, g, b, _] = pixel.0.map(f32::from);
+        (Vec3::new(r, g, b) - (*expected).clamp(Vec3::ZERO, Vec3::ONE) * 255.0).abs().max_element()
+    };
+    picture.pixels().zip(&expected.pixels).map(apart).collect()
 }
 
 /// Returns the PSNR of 8-bit RGB against floats clamped to 0..1, dB.

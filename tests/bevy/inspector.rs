@@ -4,8 +4,11 @@
 //! picture only, changes nothing by itself, and sets views that change pixels. Skipped where there is no GPU, not even
 //! a software one.
 
+use crate::support::cpu_reference::{difference, view};
+use crate::support::fixtures::debug_picture;
+use crate::support::gpu;
 use crate::support::offscreen_app::{app, picture, spawn_camera};
-use crate::support::skip;
+use crate::support::skip::skip;
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::input::ButtonState;
 use bevy::input::keyboard::{Key, KeyboardInput};
@@ -23,6 +26,7 @@ use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::view::DebugView;
 use bevy_gs4d::{GaussianCapture3d, testing};
 use image::RgbaImage;
+use std::collections::HashMap;
 use std::ops::Range;
 use std::time::Duration;
 
@@ -53,10 +57,13 @@ fn place() -> Transform {
     Transform::from_xyz(2.5, 2.0, 1.5).looking_at(Vec3::ZERO, Vec3::Z)
 }
 
-fn spawn_capture(app: &mut App, playback: Playback) -> Entity {
+fn capture() -> GaussianCapture {
     let settings = SynthSettings { count: 300, degree: 0, duration_seconds: 2.0, ..SynthSettings::default() };
-    let scene = synthesize(&settings).into_runtime().expect("a synthetic scene can be drawn");
-    let handle = app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(scene));
+    GaussianCapture::new(synthesize(&settings).into_runtime().expect("a synthetic scene can be drawn"))
+}
+
+fn spawn_capture(app: &mut App, playback: Playback) -> Entity {
+    let handle = app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(capture());
     app.world_mut().spawn((GaussianCapture3d(handle), playback)).id()
 }
 
@@ -80,6 +87,18 @@ fn changed(a: &RgbaImage, b: &RgbaImage, columns: Range<u32>) -> f64 {
     columns.flat_map(|x| (0..SIZE.y).map(move |y| (x, y))).filter(differs).count() as f64 / all
 }
 
+/// Returns the color that most pixels of some columns have, and their share.
+fn commonest(picture: &RgbaImage, columns: Range<u32>) -> ([u8; 3], f64) {
+    let all = f64::from(columns.end - columns.start) * f64::from(SIZE.y);
+    let mut counts: HashMap<[u8; 3], u32> = HashMap::new();
+    for (x, y) in columns.flat_map(|x| (0..SIZE.y).map(move |y| (x, y))) {
+        let [r, g, b, _] = picture.get_pixel(x, y).0;
+        *counts.entry([r, g, b]).or_default() += 1;
+    }
+    let (color, count) = counts.into_iter().max_by_key(|(_, count)| *count).expect("there are pixels");
+    (color, f64::from(count) / all)
+}
+
 #[test]
 fn the_panel_covers_its_edge_of_the_picture_and_nothing_else() {
     let Some((mut app, _)) = inspected() else { return };
@@ -89,9 +108,22 @@ fn the_panel_covers_its_edge_of_the_picture_and_nothing_else() {
     let closed = picture(&mut app, 0.0);
     let covered = changed(&open, &closed, PANEL);
     assert!(covered > 0.5, "the panel changes most of what it covers, not {covered}");
+    let ([r, g, b], share) = commonest(&open, PANEL);
+    let is_dark_gray = r == g && g == b && (10..70).contains(&r);
+    assert!(is_dark_gray && share > 0.3, "the panel's ground is dark gray: {share} of it is {r}, {g}, {b}");
     assert_eq!(changed(&open, &closed, BESIDE), 0.0, "and nothing beside it");
     set_open(&mut app, true);
     assert_eq!(changed(&open, &picture(&mut app, 0.0), 0..SIZE.x), 0.0, "open again, it is the same");
+    let Some(mut without) = app_without_panel() else { return };
+    assert_eq!(changed(&closed, &picture(&mut without, 0.0), 0..SIZE.x), 0.0, "closed, as if there were no panel");
+}
+
+/// Returns an app with the same capture and camera, but no panel.
+fn app_without_panel() -> Option<App> {
+    let mut app = app(SIZE)?;
+    spawn_camera(&mut app, Msaa::Off, place());
+    spawn_capture(&mut app, Playback::paused_at(0.5));
+    Some(app)
 }
 
 #[test]
@@ -158,8 +190,9 @@ fn count_changes(changed: Query<(), Changes>, inspector: Res<Inspector>, mut see
 }
 
 #[test]
-fn a_debug_view_changes_what_a_camera_shows() {
+fn a_debug_view_is_that_of_the_renderer_without_bevy() {
     let Some((mut app, camera)) = inspected() else { return };
+    let Some(mut headless) = gpu::headless() else { return };
     spawn_capture(&mut app, Playback::paused_at(0.5));
     set_open(&mut app, false);
     let as_trained = picture(&mut app, 0.0);
@@ -167,8 +200,13 @@ fn a_debug_view_changes_what_a_camera_shows() {
     assert_eq!(changed(&as_trained, &picture(&mut app, 0.0), 0..SIZE.x), 0.0, "the default is what is shown without");
     for debug in [DebugView::Depth, DebugView::Overdraw, DebugView::Lifespan, DebugView::Velocity] {
         app.world_mut().entity_mut(camera).insert(CaptureViewSettings { debug, ..default() });
-        let share = changed(&as_trained, &picture(&mut app, 0.0), 0..SIZE.x);
+        let seen = picture(&mut app, 0.0);
+        let share = changed(&as_trained, &seen, 0..SIZE.x);
         assert!(share > 0.01, "{debug:?} must not look like colour: {share} of the picture differs");
+        let shown = capture();
+        let view = view(&place(), SIZE, shown.time_at(0.5));
+        let apart = difference(&seen, &debug_picture(&mut headless, shown.scene(), view, debug));
+        assert!(apart <= 2.0, "{debug:?}: with Bevy and without it, pictures are {apart} / 255 apart");
     }
 }
 
@@ -224,7 +262,7 @@ fn gpu_time_is_measured_only_while_its_section_is_open() {
     let renderer = app.get_sub_app(RenderApp).expect("it has drawn");
     let features = renderer.world().resource::<RenderDevice>().features();
     if !features.contains(WgpuFeatures::TIMESTAMP_QUERY_INSIDE_PASSES) {
-        skip::skip("this GPU has no timestamps inside passes");
+        skip("this GPU has no timestamps inside passes");
         return;
     }
     let measured = |app: &App| {

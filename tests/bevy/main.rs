@@ -26,6 +26,7 @@ mod support {
     pub mod event_log;
     pub mod fixtures;
     pub mod gpu;
+    pub mod no_gpu;
     pub mod npy;
     pub mod npz;
     pub mod offscreen_app;

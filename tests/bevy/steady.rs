@@ -6,8 +6,8 @@
 //! capture are reported. Skipped where there is no GPU.
 
 use crate::support::cpu_reference::{blob, scene};
+use crate::support::no_gpu::no_gpu;
 use crate::support::offscreen_app::{self, app, picture, spawn_camera};
-use crate::support::skip::skip;
 use bevy::asset::AssetId;
 use bevy::camera::Hdr;
 use bevy::pbr::PbrPlugin;
@@ -507,7 +507,7 @@ fn a_new_start_of_the_renderer_makes_everything_again() {
 #[test]
 fn captures_come_back_after_a_lost_device() {
     if !testing::has_gpu() {
-        return skip(testing::TestingError::NoGpu);
+        return no_gpu();
     }
     // Bevy's lit meshes read a buffer of the lost device back and panic.
     let mut app = testing::app_with(SIZE, |plugins| plugins.disable::<PbrPlugin>());

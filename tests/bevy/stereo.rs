@@ -200,7 +200,10 @@ fn two_halves_and_two_targets_show_the_same() {
     for (index, name) in ["left", "right"].into_iter().enumerate() {
         assert_eq!(difference_between(&halves[index], &pair[index]), 0, "the {name} eye's pictures are the same");
     }
-    assert!(difference_between(&halves[0], &halves[1]) > 50, "while the two eyes' differ");
+    // What is red or white is 2 to 4 units away.
+    let disparity = centroid(&halves[0]).x - centroid(&halves[1]).x;
+    let [least, most] = [4.5, 1.5].map(|depth| focal() * RIG.ipd / depth);
+    assert!((least..most).contains(&disparity), "while the two eyes' are shifted: by {disparity} pixels");
 }
 
 #[test]

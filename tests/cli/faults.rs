@@ -8,8 +8,8 @@
 use crate::support::command::{GS4D, Run, arguments, gs4d};
 use crate::support::dataset;
 use crate::support::folders::{contents, names};
+use crate::support::no_gpu::no_gpu;
 use crate::support::random::Random;
-use crate::support::skip::skip;
 use bevy_gs4d::codec::package::{self, WriteSettings};
 use bevy_gs4d::offline;
 use bevy_gs4d::renderer::GpuContext;
@@ -166,12 +166,10 @@ impl Stage {
     /// Returns every verb that this machine can run.
     fn acts(&self) -> impl Iterator<Item = Act<'_>> {
         let gpu = GpuContext::headless(None).is_ok();
-        let possible = VERBS.into_iter().filter(move |verb| {
-            if verb.needs_gpu && !gpu {
-                skip(format_args!("faults of {}: no GPU adapter", verb.name));
-            }
-            gpu || !verb.needs_gpu
-        });
+        if !gpu {
+            no_gpu();
+        }
+        let possible = VERBS.into_iter().filter(move |verb| gpu || !verb.needs_gpu);
         possible.map(move |verb| {
             let out = self.folder.path().join(verb.name);
             fs::create_dir(&out).expect("each verb has its own folder");

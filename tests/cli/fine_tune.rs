@@ -4,7 +4,7 @@
 //! compressed on the way, and that wrong inputs are refused with nothing left behind. Skipped where there is no GPU.
 
 use crate::support::command::{arguments, gs4d};
-use crate::support::skip::skip;
+use crate::support::no_gpu::no_gpu;
 use crate::support::{dataset, folders};
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
@@ -24,8 +24,8 @@ struct Lesson {
 
 /// Returns a scene, the same with fewer Gaussians, and its pictures; `None` if there is no GPU.
 fn lesson() -> Option<Lesson> {
-    if let Err(error) = GpuContext::headless(None) {
-        skip(error);
+    if GpuContext::headless(None).is_err() {
+        no_gpu();
         return None;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -22,6 +22,7 @@ mod support {
     pub mod data;
     pub mod dataset;
     pub mod folders;
+    pub mod no_gpu;
     pub mod npy;
     pub mod npz;
     pub mod package_parts;

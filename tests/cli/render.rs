@@ -5,6 +5,7 @@
 
 use crate::support::command::{arguments, folder, gs4d, scene};
 use crate::support::data::data;
+use crate::support::no_gpu::no_gpu;
 use crate::support::npz;
 use crate::support::skip::skip;
 use bevy_gs4d::offline::metrics;
@@ -15,17 +16,18 @@ use serde_json::Value;
 use std::fs;
 use std::path::Path;
 
-fn no_gpu() -> bool {
-    let none = GpuContext::adapters().is_empty();
-    if none {
-        skip("no GPU adapter");
+/// Returns whether there is a GPU; that there is none is reported.
+fn has_gpu() -> bool {
+    let some = !GpuContext::adapters().is_empty();
+    if !some {
+        no_gpu();
     }
-    none
+    some
 }
 
 #[test]
 fn pictures_are_drawn_and_written() {
-    if no_gpu() {
+    if !has_gpu() {
         return;
     }
     let folder = folder();
@@ -53,7 +55,7 @@ fn pictures_are_drawn_and_written() {
 fn pictures_that_do_not_fit_are_refused_before_they_are_drawn() {
     let limit = match GpuContext::headless(None) {
         Ok(context) => context.device.limits().max_buffer_size,
-        Err(error) => return skip(error),
+        Err(_) => return no_gpu(),
     };
     let folder = folder();
     let (path, frames) = (scene(&folder, "100"), folder.path().join("frames"));
@@ -72,7 +74,7 @@ fn pictures_that_do_not_fit_are_refused_before_they_are_drawn() {
 
 #[test]
 fn benchmarks_measure() {
-    if no_gpu() {
+    if !has_gpu() {
         return;
     }
     let folder = folder();
@@ -112,14 +114,15 @@ fn raw_picture(path: &Path, size: UVec2) -> Picture {
 #[test]
 fn real_captures_match_the_original() {
     let Some(data) = data() else { return };
-    if no_gpu() {
+    if !has_gpu() {
         return;
     }
-    for (checkpoint, golden) in [
-        ("toybox/toybox_chkpnt.pth", "toybox/golden_vanilla"),
-        ("toybox/toybox_4dgs1k.pth", "toybox/golden_4dgs1k"),
-        ("toybox/toybox_45k.pth", "toybox/golden_45k"),
-        ("standup/standup_chkpnt.pth", "standup/standup_golden"),
+    // 3 dB less than the worst view has; standup's pictures are of half precision.
+    for (checkpoint, golden, least) in [
+        ("toybox/toybox_chkpnt.pth", "toybox/golden_vanilla", 105.0),
+        ("toybox/toybox_4dgs1k.pth", "toybox/golden_4dgs1k", 97.0),
+        ("toybox/toybox_45k.pth", "toybox/golden_45k", 101.0),
+        ("standup/standup_chkpnt.pth", "standup/standup_golden", 90.0),
     ] {
         let out = folder();
         let cameras = data.join(format!("{golden}.json"));
@@ -134,8 +137,14 @@ fn real_captures_match_the_original() {
             let name = Path::new(view["file"].as_str().expect("a file")).file_stem().expect("a stem");
             let drawn = raw_picture(&out.path().join(name).with_extension("f32"), truth.size);
             let psnr = metrics::psnr_pooled(&drawn, truth).expect("one size");
-            eprintln!("{checkpoint} {}: {psnr:.2} dB", name.display());
-            assert!(psnr >= 75.0, "{checkpoint} {}: {psnr:.2} dB", name.display());
+            let apart = drawn.pixels.iter().zip(&truth.pixels).map(|(a, b)| (*a - *b).abs().max_element());
+            let worst = apart.clone().fold(0.0, f32::max);
+            let beyond = apart.filter(|apart| *apart > 1e-3).count();
+            let found = format!("{checkpoint} {}: {psnr:.2} dB, worst {worst:.1e}, {beyond} pixels", name.display());
+            println!("{found}");
+            assert!(psnr >= least, "{found}: {least} dB at least");
+            // Here and there a splat's alpha lies on 1/255, and counts on one side only.
+            assert!(worst <= 1e-2 && beyond <= 16, "{found} beyond 1e-3");
         }
     }
 }

@@ -68,12 +68,33 @@ fn assert_same([drawn, expected]: &[Frame; 2], what: &str) {
     let apart = colors.fold(0.0, f32::max);
     // A splat whose alpha is at the threshold of 1/255 may be on either side of it.
     assert!(apart < 5e-3, "{what}: colours are {apart} apart");
+    let left = drawn.transmittance.iter().zip(&expected.transmittance).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(left < 5e-3, "{what}: transmittances are {left} apart");
+    let depth = drawn.depth.iter().zip(&expected.depth).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(depth < 2e-2, "{what}: depths are {depth} apart");
     let mean = |frame: &Frame| frame.depth.iter().map(|d| f64::from(*d)).sum::<f64>() / frame.depth.len() as f64;
     let (a, b) = (mean(drawn), mean(expected));
     assert!((a - b).abs() < 1e-3 * b.max(1e-3), "{what}: mean depth {a}, expected {b}");
     let medians =
         drawn.median_depth.iter().zip(&expected.median_depth).filter(|(a, b)| (**a - **b).abs() > 1e-3).count();
     assert!(medians <= 4, "{what}: the median depth of {medians} pixels is another splat's");
+}
+
+/// Checks that a look changes most of what the scene covers, and nothing where no splat is.
+fn assert_shows(look: &Frame, plain: &Frame, what: &str) {
+    let Background::Color(behind) = BACKGROUND else { panic!("one color") };
+    let (mut covered, mut changed) = (0, 0);
+    for (index, left) in plain.transmittance.iter().enumerate() {
+        let pixel = look.picture.pixels[index];
+        if *left == 1.0 {
+            assert_eq!(pixel, Vec3::from(behind), "{what}: the background at pixel {index}");
+        } else if *left < 0.5 {
+            covered += 1;
+            changed += usize::from((pixel - plain.picture.pixels[index]).abs().max_element() > 0.01);
+        }
+    }
+    assert!(covered > 1000, "the scene is in the picture: it covers {covered} pixels");
+    assert!(2 * changed > covered, "{what}: {changed} of {covered} covered pixels change");
 }
 
 #[test]
@@ -93,7 +114,7 @@ fn look_is_what_the_twin_shows() {
         for space in [BlendSpace::Encoded, BlendSpace::Linear] {
             let pictures = both(&mut headless, &scene, view(), appearance, space);
             assert_same(&pictures, &format!("{what}, {space:?}"));
-            assert!(pictures[0].picture != plain[0].picture, "{what}: the look shows");
+            assert_shows(&pictures[0], &plain[0], &format!("{what}, {space:?}"));
         }
     }
 }

@@ -6,6 +6,8 @@
 use crate::support::{golden, gpu};
 use bevy_gs4d::renderer::Design;
 
+/// On a software driver the largest differences are 1e-6 of colour, 4e-6 of depth and 1e-6 of alpha, as on the CPU; and 4e-4 of colour
+/// over an environment map, whose texel depends on the driver's arc functions.
 #[test]
 fn gpu_matches_the_original() {
     let Some(mut headless) = gpu::headless() else { return };
@@ -20,9 +22,10 @@ fn gpu_matches_the_original() {
             "{:32} {design:9} colour {color:.1e} depth {depth:.1e} alpha {alpha:.1e} ambiguous {ambiguous:.1e}",
             golden.name
         );
-        assert!(color <= 1e-3, "{}, {design}: colour differs by {color}", golden.name);
-        assert!(depth <= 5e-3, "{}, {design}: depth differs by {depth}", golden.name);
-        assert!(alpha <= 1e-3, "{}, {design}: alpha differs by {alpha}", golden.name);
-        assert!(ambiguous <= 2.0 / 255.0, "{}, {design}: ambiguous pixels differ by {ambiguous}", golden.name);
+        let allowed = if golden.scene.environment.is_some() { 1e-3 } else { 1e-5 };
+        assert!(color <= allowed, "{}, {design}: colour differs by {color}", golden.name);
+        assert!(depth <= 4e-5, "{}, {design}: depth differs by {depth}", golden.name);
+        assert!(alpha <= 1e-5, "{}, {design}: alpha differs by {alpha}", golden.name);
+        assert!(ambiguous <= 1.0 / 255.0, "{}, {design}: ambiguous pixels differ by {ambiguous}", golden.name);
     }
 }

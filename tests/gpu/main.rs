@@ -24,6 +24,7 @@ mod support {
     pub mod golden;
     pub mod gpu;
     pub mod limited_device;
+    pub mod no_gpu;
     #[cfg(target_os = "linux")]
     pub mod own_process;
     pub mod packed_scene;

@@ -100,8 +100,9 @@ fn assert_finite(frame: &Frame, what: &str) {
     assert!(numbers && frame.picture.pixels.iter().all(|pixel| pixel.is_finite()), "{what}: a value is not finite");
 }
 
-/// Checks that frames agree within 1e-3 (depths 5e-3), except for one pixel in two hundred: the two sides round
-/// differently, and here and there a splat's alpha lies on 1/255, or two splats at the same depth change places.
+/// Checks that frames agree within 1e-3 (depths 5e-3), except for one pixel in two hundred, and those within fifty times as much: the two
+/// sides round differently, and here and there a splat's alpha lies on 1/255, its last tile is one farther, or two splats at the same depth
+/// change places.
 fn assert_close(found: &Frame, expected: &Frame, what: &str) {
     assert_eq!(found.picture.size, expected.picture.size, "{what}: size");
     assert_finite(found, what);
@@ -115,6 +116,7 @@ fn assert_close(found: &Frame, expected: &Frame, what: &str) {
     let worst = apart.iter().copied().fold(0.0, f32::max);
     let beyond = apart.iter().filter(|apart| **apart > 1e-3).count();
     assert!(beyond * 200 <= apart.len(), "{what}: {beyond} of {} pixels differ, the worst by {worst}", apart.len());
+    assert!(worst <= 0.05, "{what}: the worst of {beyond} pixels that differ does so by {worst}");
 }
 
 /// As [`assert_close`]; also checks that the counts agree.
@@ -244,7 +246,12 @@ fn what_is_not_there_changes_no_bit() {
     let capture = headless.upload(&with(&scene, just_there)).expect("upload");
     let frame = headless.render(&capture, &view, BACKGROUND).expect("render");
     assert_eq!(frame.counts.visible, alone.counts.visible + 1, "one that is just there counts");
-    assert!(frame.picture != alone.picture, "and shows");
+    let expected = reference::render(&with(&scene, just_there), &view, BACKGROUND);
+    assert_equivalent(&frame, &expected, "one that is just there");
+    // Where something of the background is to be seen; an opacity of 0.9 times a marginal of 0.051.
+    let pairs = frame.transmittance.iter().zip(&alone.transmittance).filter(|(_, before)| **before > 0.01);
+    let most = pairs.map(|(left, before)| 1.0 - left / before).fold(0.0, f32::max);
+    assert!((0.03..0.047).contains(&most), "and takes 0.046 of the light at its middle, not {most}");
 }
 
 #[test]
@@ -595,7 +602,7 @@ fn poison_is_refused_before_it_reaches_the_gpu() {
         ("temporal mean", |p| p.mean_t[7] = f32::NEG_INFINITY),
         ("scale", |p| p.log_scale[7][2] = f32::NAN),
         ("scale", |p| p.log_scale[7][0] = 100.0),
-        ("", |p| p.log_scale_t[7] = f32::NAN),
+        ("temporal scale", |p| p.log_scale_t[7] = f32::NAN),
         ("rotation", |p| p.rotation_l[7] = [0.0; 4]),
         ("right rotation", |p| p.rotation_r[7][3] = f32::NAN),
         ("opacity", |p| p.opacity_logit[7] = f32::NAN),

@@ -32,6 +32,11 @@ fn score_matches_reference() {
             assert!(total > 0.1, "{name} at {time}: something is seen");
             let apart: f32 = found.iter().zip(expected.iter()).map(|(a, b)| (a - b).abs()).sum();
             assert!(apart <= 1e-3 * total, "{name} at {time}: {apart} apart in {total}");
+            for (index, (found, expected)) in found.iter().zip(expected.iter()).enumerate() {
+                // An alpha that lies on 1/255 counts on one side only: in some pixels of a Gaussian.
+                let apart = (found - expected).abs();
+                assert!(apart <= 1e-2 * *expected + 0.02, "{name} at {time}: of {index} {found}, not {expected}");
+            }
         }
         let again = engine.score(&view, Want::Removal).expect("it is scored");
         assert!(again == found, "at {time}: the same on every run");

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 pub fn data() -> Option<PathBuf> {
     let folder = std::env::var_os("GS4D_DATA").map(PathBuf::from);
     if folder.is_none() {
-        skip("GS4D_DATA is not set to the folder of the real captures (toybox, standup)");
+        skip("no trained captures: GS4D_DATA is not set to their folder");
     }
     folder
 }

@@ -1,7 +1,7 @@
 //! Captures placed in headless apps, and meshes among them.
 //!
 //! In: an app, scenes, components of their entities and cameras. Out: entities, and the comparison of the app's picture
-//! with that of the CPU reference.
+//! with that of the CPU reference, or of the renderer without Bevy.
 
 use crate::support::cpu_reference::{SIZE, add, blob, difference, scene};
 use crate::support::offscreen_app::picture;
@@ -11,8 +11,9 @@ use bevy_gs4d::GaussianCapture3d;
 use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::reference::{self, Layer};
+use bevy_gs4d::renderer::{Headless, Instance, ViewParameters};
 use bevy_gs4d::scene::RuntimeScene;
-use bevy_gs4d::view::{Appearance, Background, BlendSpace, Picture, View};
+use bevy_gs4d::view::{Appearance, Background, BlendSpace, DebugView, Picture, View};
 
 /// Black behind captures.
 pub const BLACK: Background = Background::Color([0.0; 3]);
@@ -56,6 +57,14 @@ pub fn check(app: &mut App, expected: &Picture, what: &str) {
 /// Returns the CPU reference's picture of one capture over black.
 pub fn reference_picture(scene: &RuntimeScene, view: View, appearance: Appearance) -> Picture {
     reference::render_layers(&[Layer { scene, view, appearance }], BLACK, BlendSpace::Encoded).picture
+}
+
+/// Returns a debug view of one capture over black, as the renderer draws it without Bevy.
+pub fn debug_picture(headless: &mut Headless, scene: &RuntimeScene, view: View, debug: DebugView) -> Picture {
+    let capture = headless.upload(scene).expect("it fits");
+    let instance = Instance { capture: &capture, active: None, view, appearance: Appearance::default() };
+    let parameters = ViewParameters { background: BLACK, debug, ..ViewParameters::default() };
+    headless.render_all(&[instance], &parameters).expect("it is drawn").picture
 }
 
 /// Returns the pose of a camera that looks straight at the origin from four units away.

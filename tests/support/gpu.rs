@@ -2,7 +2,7 @@
 //!
 //! In: the usual adapter. Out: a renderer on it, with shader checks on as long as debug assertions are.
 
-use crate::support::skip::skip;
+use crate::support::no_gpu::no_gpu;
 use bevy_gs4d::renderer::{GpuContext, Headless, ShaderChecks};
 
 /// As the plugin chooses them: a build as shipped does not check.
@@ -12,8 +12,8 @@ pub const CHECKS: ShaderChecks = if cfg!(debug_assertions) { ShaderChecks::On } 
 pub fn headless() -> Option<Headless> {
     match GpuContext::headless(None) {
         Ok(context) => Some(Headless::new(context, CHECKS).expect("the passes compile")),
-        Err(error) => {
-            skip(format_args!("no GPU adapter: {error}"));
+        Err(_) => {
+            no_gpu();
             None
         }
     }

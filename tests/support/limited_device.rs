@@ -2,7 +2,7 @@
 //!
 //! In: the usual adapter. Out: a renderer on it whose storage buffer bindings end at [`BINDING`] bytes.
 
-use crate::support::skip::skip;
+use crate::support::no_gpu::no_gpu;
 use bevy_gs4d::renderer::{GpuContext, Headless, ShaderChecks};
 use pollster::block_on;
 
@@ -19,12 +19,9 @@ pub fn headless() -> Option<Headless> {
         power_preference: wgpu::PowerPreference::HighPerformance,
         ..wgpu::RequestAdapterOptions::default()
     };
-    let adapter = match block_on(instance.request_adapter(&fastest)) {
-        Ok(adapter) => adapter,
-        Err(error) => {
-            skip(format_args!("no GPU adapter: {error}"));
-            return None;
-        }
+    let Ok(adapter) = block_on(instance.request_adapter(&fastest)) else {
+        no_gpu();
+        return None;
     };
     let limits = wgpu::Limits { max_storage_buffer_binding_size: BINDING, ..adapter.limits() };
     let (device, queue) = block_on(adapter.request_device(&wgpu::DeviceDescriptor {

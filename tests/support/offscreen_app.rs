@@ -2,14 +2,14 @@
 //!
 //! In: the size of a picture. Out: an app that draws into one without a window, a camera for it, and the picture.
 
-use crate::support::skip::skip;
+use crate::support::no_gpu::no_gpu;
 use bevy::app::PluginGroupBuilder;
 use bevy::core_pipeline::tonemapping::{DebandDither, Tonemapping};
 use bevy::prelude::*;
 use bevy::render::RenderPlugin;
 use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
 use bevy_gs4d::GaussianCapturePlugin;
-use bevy_gs4d::testing::{self, Offscreen, TestingError};
+use bevy_gs4d::testing::{self, Offscreen};
 use image::RgbaImage;
 use std::time::Duration;
 
@@ -19,7 +19,7 @@ pub const FOV_Y: f32 = 0.8;
 /// Returns an app without a window; `None` if there is no GPU to draw with, which is reported.
 pub fn app(size: UVec2) -> Option<App> {
     if !testing::has_gpu() {
-        skip(TestingError::NoGpu);
+        no_gpu();
         return None;
     }
     let mut app = if as_shipped() { testing::app_with(size, shipped_plugins) } else { testing::app(size) };

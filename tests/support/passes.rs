@@ -2,7 +2,7 @@
 //!
 //! In: the name of a pass, and buffers under the names that its shader gives them. Out: what a dispatch leaves in those buffers.
 
-use crate::support::skip::skip;
+use crate::support::no_gpu::no_gpu;
 use bevy_gs4d::renderer::{GpuContext, shaders};
 use bytemuck::Pod;
 use std::borrow::Cow;
@@ -32,7 +32,7 @@ struct Resource {
 impl Gpu {
     /// Returns a device; `None` if there is no adapter, which is reported.
     pub fn new() -> Option<Self> {
-        GpuContext::headless(None).map(Self).map_err(|error| skip(format_args!("no GPU adapter: {error}"))).ok()
+        GpuContext::headless(None).map(Self).map_err(|_| no_gpu()).ok()
     }
 
     /// Returns a buffer of these values, or of some zeros if there are none, so that it can be bound.
