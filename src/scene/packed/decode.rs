@@ -2,11 +2,11 @@
 //!
 //! In: a [`PackedScene`]. Out: any one Gaussian or color, or all of them as [`Sliced`].
 
-use super::lanes::{self, ALWAYS, AT_REST, BlockRanges, FARTHEST, LANE_MAX, SharedRanges};
+use super::lanes::{self, ALWAYS, AT_REST, BlockRanges, FARTHEST, LANE_MAX, LANES, SharedRanges};
 use super::{PackedColors, PackedScene, shape};
 use crate::gaussian::Gaussian;
 use crate::scene::Sliced;
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use std::f32::consts::FRAC_1_SQRT_2;
 
 impl PackedScene {
@@ -16,11 +16,10 @@ impl PackedScene {
     /// If `index` is out of range.
     pub fn gaussian(&self, index: usize) -> Gaussian {
         let record = lanes::unpack(self.records[index]);
-        let part = |lane: usize| f32::from(record[lane]) / LANE_MAX;
-        let parts = |lane| Vec3::new(part(lane), part(lane + 1), part(lane + 2));
+        let part = |lane: usize| part(&record, lane);
         let shared = SharedRanges::read(&self.ranges);
         let block = BlockRanges::read(&self.ranges, index);
-        let mean = Vec3::from(block.mean_low) + parts(lanes::MEAN) * Vec3::from(block.mean_size);
+        let mean = Vec3::from(block.mean_low) + parts(&record, lanes::MEAN) * Vec3::from(block.mean_size);
         let (sigma_t, velocity) = match record[lanes::SIGMA_T] {
             ALWAYS => (f32::INFINITY, Vec3::ZERO),
             _ => {
@@ -33,10 +32,7 @@ impl PackedScene {
                 (sigma_t, signed * signed.abs() * block.displacement * sigma_t.recip().max(block.rate))
             }
         };
-        let [scale_low, scale_size] = shared.log_scale;
-        let scale = (parts(lanes::SCALE) * scale_size + scale_low).map(f32::exp);
-        let three = (parts(lanes::ROTATION) * shared.rotation_stretch * 2.0 - 1.0) * FRAC_1_SQRT_2;
-        let rotation = shape::with_largest(three, record[lanes::LEFT_OUT]);
+        let (scale, rotation) = self.shape(index);
         let [t_low, t_size] = shared.mean_t;
         Gaussian {
             mean: mean.to_array(),
@@ -47,6 +43,16 @@ impl PackedScene {
             opacity: (part(lanes::OPACITY) * shared.opacity_stretch).clamp(0.0, 1.0),
             padding: 0.0,
         }
+    }
+
+    /// Decodes the scales of one Gaussian, and the rotation of the axes that they are along.
+    pub(super) fn shape(&self, index: usize) -> (Vec3, Quat) {
+        let record = lanes::unpack(self.records[index]);
+        let shared = SharedRanges::read(&self.ranges);
+        let [low, size] = shared.log_scale;
+        let scale = (parts(&record, lanes::SCALE) * size + low).map(f32::exp);
+        let three = (parts(&record, lanes::ROTATION) * shared.rotation_stretch * 2.0 - 1.0) * FRAC_1_SQRT_2;
+        (scale, shape::with_largest(three, record[lanes::LEFT_OUT]))
     }
 
     /// Returns the color of one Gaussian; see [`Harmonics::color`](crate::gaussian::Harmonics::color).
@@ -72,4 +78,14 @@ impl PackedScene {
         };
         Sliced { gaussians, harmonics }
     }
+}
+
+/// Returns the position of a lane in its range, 0 to 1.
+fn part(record: &[u16; LANES], lane: usize) -> f32 {
+    f32::from(record[lane]) / LANE_MAX
+}
+
+/// Returns the positions of three lanes.
+fn parts(record: &[u16; LANES], first: usize) -> Vec3 {
+    Vec3::from([0, 1, 2].map(|axis| part(record, first + axis)))
 }
