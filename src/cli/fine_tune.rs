@@ -96,8 +96,8 @@ pub struct FineTune {
     /// Gradients: exact, or compat: as the original computes them, with its deviations.
     #[arg(long, value_name = "MODE", default_value = "exact", value_parser = values::one_of(&MODES))]
     gradients: GradientMode,
-    /// Compress the result: code its colors by codebooks, whose sizes follow the number of Gaussians, and train these as well. The package
-    /// is as that of `gs4d compress`, and loses less.
+    /// Compress the result: code its colors by codebooks, whose sizes follow the number of Gaussians, and train these as well, on pictures
+    /// of geometry as it will be rounded. The package is as that of `gs4d compress`, and loses less.
     #[arg(long, value_name = "QUALITY", value_parser = values::one_of(&Quality::NAMES))]
     compress: Option<Quality>,
     /// Steps in which codebooks are trained, after the others.
@@ -202,6 +202,7 @@ impl FineTune {
             refresh_filter: self.refresh_filter,
             mode: self.gradients,
             compress: self.compress.map(|quality| (quality, self.compress_steps)),
+            ..FineTuneSettings::default()
         }
     }
 }

@@ -5,7 +5,8 @@
 //!
 //! Some training views are held out: they tell which parameters are the best. The loss is `0.8 L1 + 0.2 (1 − SSIM)`, with further [`Terms`]
 //! if these have weights, the optimizer Adam (section 6 of the 4DGS model). Views, backgrounds and rates of a step follow from its number
-//! alone, so that a run which is resumed ends as one which was not interrupted.
+//! alone, so that a run which is resumed ends as one which was not interrupted. If the scene is compressed, further steps train codebooks of
+//! color, and everything else on pictures of geometry as it will be rounded.
 
 mod adam;
 mod belonging;
@@ -17,6 +18,7 @@ mod passes;
 mod records;
 mod regularizer;
 mod resume;
+mod rounding;
 mod run;
 mod schedule;
 mod state;
@@ -79,6 +81,8 @@ pub struct FineTuneSettings {
     /// How the result is compressed, and the number of further steps in which the codebooks of color are trained; `None` leaves the scene in
     /// the trained form.
     pub compress: Option<(Quality, usize)>,
+    /// Whether these further steps see geometry as the package will hold it, rounded. Default: `true`.
+    pub rounding: bool,
 }
 
 impl Default for FineTuneSettings {
@@ -99,6 +103,7 @@ impl Default for FineTuneSettings {
             refresh_filter: 1000,
             mode: GradientMode::default(),
             compress: None,
+            rounding: true,
         }
     }
 }

@@ -23,8 +23,8 @@ pub struct Rounding {
     pub velocity: Vec3,
     /// Factor on 1/σ_t; 1 if σ_t is infinite.
     pub rate: f32,
-    /// Added to the variance along every axis before `shape`, capture units squared. It is that of the smallest scale that is stored: what is
-    /// flatter has been raised to it, and would need any factor otherwise.
+    /// Added to the variance along every axis before `shape`, capture units squared. It is that of the smallest scale that is stored: what
+    /// is flatter has been raised to it, and would need any factor otherwise.
     pub variance: f32,
     /// Turns and stretches the shape: of the covariance C and the added variance V it makes `shape (C + V) shapeᵀ`.
     pub shape: Mat3,
