@@ -47,7 +47,8 @@ impl Rounder {
 
 impl Trainer<'_> {
     /// Packs the Gaussians as they are, by the rules of compression, and draws them from now on with what that changes of each: now as the
-    /// package would be drawn, after further steps as far from the parameters as now. Parameters and their gradients are not rounded.
+    /// package would be drawn, after further steps as far from the parameters as now. Parameters and their gradients are not rounded; terms
+    /// of the loss that depend on Gaussians alone see them rounded too.
     ///
     /// # Errors
     /// Gaussians that the packed form cannot hold, a shader that does not compile, a lost device.

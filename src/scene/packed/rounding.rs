@@ -88,17 +88,8 @@ mod tests {
     use crate::scene::random::Random;
     use glam::Quat;
 
-    const COARSE: Bits = Bits {
-        mean: 6,
-        mean_t: 6,
-        velocity: 5,
-        sigma_t: 5,
-        scale: 4,
-        rotation: 4,
-        opacity: 4,
-        base: 8,
-        escape: 0.02,
-    };
+    const COARSE: Bits =
+        Bits { mean: 6, mean_t: 6, velocity: 5, sigma_t: 5, scale: 4, rotation: 4, opacity: 4, base: 8, escape: 0.02 };
 
     /// Returns Gaussians of many shapes, needles and ones without any thickness among them; every fourth is always there.
     fn gaussians() -> Vec<Gaussian> {
