@@ -26,6 +26,20 @@ struct TrainedRecord {
     opacity_logit: vec4<f32>,
 }
 
+// What packing changes of one Gaussian. Input of `rounding`.
+struct RoundingRecord {
+    // Added to the mean and to mean_t.
+    mean: vec4<f32>,
+    // Added to the velocity; w: factor on inverse_sigma_t.
+    velocity: vec4<f32>,
+    // Columns of the matrix that turns and stretches its shape. w: added to its variances before that.
+    shape_x: vec4<f32>,
+    // w: added to the opacity.
+    shape_y: vec4<f32>,
+    // w: unused.
+    shape_z: vec4<f32>,
+}
+
 // The scene that is trained, and the number of a view.
 struct TrainedScene {
     count: u32,

@@ -102,8 +102,8 @@ pub struct FineTune {
     /// float atomics.
     #[arg(long, value_name = "HOW", default_value = "deterministic", value_parser = values::one_of(&GradientSums::NAMES))]
     sums: GradientSums,
-    /// Compress the result: code its colors by codebooks, whose sizes follow the number of Gaussians, and train these as well. The package
-    /// is as that of `gs4d compress`, and loses less.
+    /// Compress the result: code its colors by codebooks, whose sizes follow the number of Gaussians, and train these as well, on pictures
+    /// of geometry as it will be rounded. The package is as that of `gs4d compress`, and loses less.
     #[arg(long, value_name = "QUALITY", value_parser = values::one_of(&Quality::NAMES))]
     compress: Option<Quality>,
     /// Steps in which codebooks are trained, after the others.
@@ -209,6 +209,7 @@ impl FineTune {
             mode: self.gradients,
             sums: self.sums,
             compress: self.compress.map(|quality| (quality, self.compress_steps)),
+            ..FineTuneSettings::default()
         }
     }
 }

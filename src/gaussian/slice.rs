@@ -4,6 +4,7 @@
 
 use super::{Model, Parameters};
 use glam::{DMat3, DMat4, DQuat, DVec3, DVec4, Vec3};
+use rayon::prelude::*;
 
 /// One Gaussian in the runtime form: activated, sliced, capture space. 64 bytes; the record on the GPU is the same,
 /// except that it holds `1/σ_t` in place of `σ_t`.
@@ -98,7 +99,9 @@ impl Parameters {
     /// If an attribute of the model has fewer entries than there are means.
     pub fn slice(&self, settings: &SliceSettings) -> Result<Vec<Gaussian>, InvalidGaussian> {
         let model = self.model();
-        (0..self.len()).map(|i| self.slice_one(i, model, settings)).collect()
+        let all: Vec<_> = (0..self.len()).into_par_iter().map(|i| self.slice_one(i, model, settings)).collect();
+        // In order, so that it is the first Gaussian that is named.
+        all.into_iter().collect()
     }
 
     /// Returns the factor `L = R S` of the 4D covariance `L Lᵀ` of one Gaussian, axes x, y, z, t; the last is zero in a

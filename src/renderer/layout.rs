@@ -37,6 +37,22 @@ pub struct TrainedRecord {
     pub opacity_logit: [f32; 4],
 }
 
+/// What packing changes of one Gaussian. Input of `rounding`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct RoundingRecord {
+    /// Added to the mean and to the temporal mean.
+    pub mean: [f32; 4],
+    /// Added to the velocity; factor on the reciprocal of the temporal deviation.
+    pub velocity: [f32; 4],
+    /// Column x of the matrix that turns and stretches the shape; what is added to the variances before that.
+    pub shape_x: [f32; 4],
+    /// Column y; what is added to the opacity.
+    pub shape_y: [f32; 4],
+    /// Column z; one unused.
+    pub shape_z: [f32; 4],
+}
+
 /// The scene that is trained, and the number of a view.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]

@@ -44,6 +44,7 @@ const PASSES: &[(&str, &str)] = &[
     ("blend_blocks", include_str!("../../shaders/blend_blocks.wgsl")),
     ("score", include_str!("../../shaders/score.wgsl")),
     ("slice", include_str!("../../shaders/slice.wgsl")),
+    ("rounding", include_str!("../../shaders/rounding.wgsl")),
     ("loss", include_str!("../../shaders/loss.wgsl")),
     ("blend_backward", include_str!("../../shaders/blend_backward.wgsl")),
     ("project_backward", include_str!("../../shaders/project_backward.wgsl")),

@@ -12,7 +12,7 @@ use bevy_gs4d::offline::convert::{ConvertSettings, TargetForm, convert};
 use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions};
 use bevy_gs4d::offline::metrics::psnr_pooled;
 use bevy_gs4d::offline::quantize::order::morton_order;
-use bevy_gs4d::offline::quantize::{CompressError, CompressSettings, Quality, compress};
+use bevy_gs4d::offline::quantize::{CompressError, CompressSettings, Quality, compress, roundings};
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::packed::encode::Bits;
 use bevy_gs4d::scene::{FilterKind, Form, GaussianScene, RuntimeScene, SceneForm, TemporalFilter};
@@ -80,6 +80,25 @@ fn every_attribute_stays_within_its_step() {
             let allowed = if bits.scale == 16 { 2e-3 } else { 0.08 };
             assert!(apart <= allowed * size, "covariance {a:?} {b:?}");
         }
+    }
+}
+
+#[test]
+fn roundings_are_what_compression_changes_of_each_gaussian() {
+    let (scene, settings) = (scene(2_000, 0, 0), settings(&[]));
+    let gaussians = &scene.form.as_sliced().expect("sliced").gaussians;
+    let bits = settings.geometry.expect("it has bits");
+    let roundings = roundings(gaussians, &bits, scene.trained_with.time_span()).expect("they can be packed");
+    let (packed, _) = compress(scene.clone(), &settings).expect("it is compressed");
+    let packed = packed.into_runtime().expect("it can be drawn");
+    for (to, from) in order(&scene).into_iter().enumerate() {
+        let (a, b) = (roundings[from as usize].apply(&gaussians[from as usize]), packed.gaussian(to));
+        assert!((a.mean_at(0.3) - b.mean_at(0.3)).length() < 1e-5, "place of {from}: {a:?} is {b:?}");
+        assert!((a.marginal(0.3) - b.marginal(0.3)).abs() < 1e-5, "presence of {from}: {a:?} is {b:?}");
+        assert!((a.opacity - b.opacity).abs() < 1e-6, "opacity of {from}: {a:?} is {b:?}");
+        let apart = a.covariance.iter().zip(b.covariance).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        let size = b.covariance[0] + b.covariance[3] + b.covariance[5];
+        assert!(apart < 1e-5 * size, "shape of {from}: {a:?} is {b:?}");
     }
 }
 

@@ -11,10 +11,13 @@ use bevy_gs4d::offline::fine_tune::{
     GpuImage, GradientSums, Moments, NEIGHBORS, Rates, Sample, Terms, Trainer, adam, loss, neighbors, opacity_mask,
     regularization,
 };
+use bevy_gs4d::offline::metrics::psnr;
+use bevy_gs4d::offline::quantize::{CompressSettings, compress};
 use bevy_gs4d::renderer::Headless;
+use bevy_gs4d::scene::packed::encode::Bits;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, SceneForm, Trained};
-use bevy_gs4d::view::{Background, Camera, Frame, RasterFov, View};
+use bevy_gs4d::view::{Background, Camera, Frame, Picture, RasterFov, View};
 use glam::{UVec2, Vec3};
 use serde_json::{Value, json};
 
@@ -424,6 +427,119 @@ fn neighbors_are_part_of_the_state() {
             trainer.accumulate(&[lesson.sample(&images, step % 6)], 0.2).expect("it is drawn");
             trainer.accumulate_terms(step).expect("they are added");
             trainer.step(&rates, 1.0, step + 1).expect("it is made");
+        }
+        trainer.scene().expect("it can be read")
+    };
+    assert!(train(None) == train(Some(11)), "to the bit");
+}
+
+/// So few bits of geometry that every picture changes.
+const COARSE: Bits =
+    Bits { mean: 6, mean_t: 10, velocity: 6, sigma_t: 6, scale: 4, rotation: 4, opacity: 6, base: 8, escape: 0.02 };
+
+/// Returns the pictures of a scene that is packed with these bits, and with colors as they are.
+fn packed_pictures(headless: &mut Headless, scene: GaussianScene, views: &[View]) -> Vec<Picture> {
+    let settings = CompressSettings { geometry: Some(COARSE), codebooks: Vec::new(), color_step: 0.0, weights: None };
+    let (packed, _) = compress(scene.into_runtime().expect("it can be drawn"), &settings).expect("it is compressed");
+    let capture = headless.upload(&packed.into_runtime().expect("it can be drawn")).expect("it fits");
+    let draw = |view: &View| headless.render(&capture, view, Background::Color(BEHIND)).expect("it is drawn").picture;
+    views.iter().map(draw).collect()
+}
+
+#[test]
+fn rounded_geometry_is_drawn_as_it_is_packed() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new(&mut headless);
+    let models: [(&str, fn(&mut Parameters)); 3] = [
+        ("rotated", |_| {}),
+        ("unrotated", |parameters| parameters.rotation_r.clear()),
+        ("static", |parameters| {
+            parameters.rotation_r.clear();
+            parameters.mean_t.clear();
+            parameters.log_scale_t.clear();
+        }),
+    ];
+    for (model, change) in models {
+        let mut scene = lesson.disturbed();
+        let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
+        change(parameters);
+        let expected = packed_pictures(&mut headless, scene.clone(), &lesson.views);
+        let mut trainer = Trainer::new(&mut headless, scene.clone(), GradientMode::Exact).expect("it can be trained");
+        let far = |trainer: &mut Trainer<'_>| -> Vec<usize> {
+            let apart = |(view, expected): (&View, &Picture)| {
+                let found = trainer.draw(view, Background::Color(BEHIND)).expect("it is drawn").picture;
+                let pixels = found.pixels.iter().zip(&expected.pixels);
+                pixels.filter(|(a, b)| (**a - **b).abs().max_element() > 1e-3).count()
+            };
+            lesson.views.iter().zip(&expected).map(apart).collect()
+        };
+        let before = far(&mut trainer);
+        assert!(before.iter().all(|&count| count > 200), "{model}: so few bits are seen: {before:?} pixels differ");
+        trainer.round(&COARSE).expect("it can be packed");
+        let after = far(&mut trainer);
+        // Where float rounding decides whether a splat counts, a pixel may differ by more.
+        assert!(after.iter().all(|&count| count <= 20), "{model}: {after:?} pixels differ");
+        let kept = trainer.scene().expect("it can be read");
+        assert_eq!(trained(&kept).parameters, trained(&scene).parameters, "{model}: what is trained is not rounded");
+    }
+}
+
+#[test]
+fn training_on_rounded_geometry_makes_up_for_it() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new(&mut headless);
+    let steps = 120;
+    let mut quality_after = |rounding: bool| {
+        let mut trainer =
+            Trainer::new(&mut headless, lesson.scene.clone(), GradientMode::Exact).expect("it can be trained");
+        let rates = Rates { color: 1e-2, harmonics: 2.5e-3, ..Rates::OURS };
+        let images = lesson.upload(&trainer);
+        for step in 0..steps {
+            if rounding && step % 10 == 0 {
+                trainer.round(&COARSE).expect("it can be packed");
+            }
+            trainer
+                .accumulate(&[lesson.sample(&images, step % 6), lesson.sample(&images, (step + 3) % 6)], 0.2)
+                .expect("they are drawn");
+            let factor = 1.0 - 0.95 * step as f64 / steps as f64;
+            trainer.step(&rates, factor, step + 1).expect("it is made");
+        }
+        assert_eq!(trainer.faults().expect("they can be read"), None, "every gradient is finite");
+        let scene = trainer.scene().expect("it can be read");
+        let pictures = packed_pictures(&mut headless, scene, &lesson.views);
+        let quality = |(picture, image): (&Picture, &CoveredImage)| {
+            psnr(&picture.clamped(), &image.over(Vec3::from(BEHIND))).expect("the same size")
+        };
+        pictures.iter().zip(&lesson.images).map(quality).sum::<f64>() / 6.0
+    };
+    let (with, without) = (quality_after(true), quality_after(false));
+    println!("packed: {with:.2} dB, {without:.2} dB without rounding in training");
+    assert!(with > without + 0.5, "packed it has {with:.2} dB, and {without:.2} dB without rounding in training");
+}
+
+#[test]
+fn what_rounding_changes_is_part_of_the_state() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new(&mut headless);
+    let mut train = |pause: Option<usize>| {
+        let mut trainer =
+            Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("it can be trained");
+        let images = lesson.upload(&trainer);
+        for step in 0..20 {
+            if pause == Some(step) {
+                let state = trainer.state().expect("it can be read");
+                trainer =
+                    Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("it can be trained");
+                assert!(!trainer.resume(&state), "geometry is not rounded yet");
+                trainer.round(&COARSE).expect("it can be packed");
+                assert!(trainer.resume(&state), "the state is of as many Gaussians");
+                assert!(trainer.state().expect("it can be read") == state, "and is the same again");
+            }
+            if step % 8 == 0 {
+                trainer.round(&COARSE).expect("it can be packed");
+            }
+            trainer.accumulate(&[lesson.sample(&images, step % 6)], 0.2).expect("it is drawn");
+            trainer.step(&Rates::OURS, 1.0, step + 1).expect("it is made");
         }
         trainer.scene().expect("it can be read")
     };

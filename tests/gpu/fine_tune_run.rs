@@ -169,7 +169,8 @@ fn runs_that_were_interrupted_end_as_others() {
         evaluate_every: 2,
         rates: Rates { mean: 2e-3, color: 1e-2, ..Rates::OURS },
         refresh_filter: 3,
-        compress: Some((Quality::Balanced, 6)),
+        // Geometry is rounded before the first of these steps and after 50.
+        compress: Some((Quality::Balanced, 56)),
         ..FineTuneSettings::default()
     };
     let run = |headless: &mut Headless, work: &Work, progress: &mut dyn Progress| -> FineTuned {
@@ -179,14 +180,28 @@ fn runs_that_were_interrupted_end_as_others() {
     };
     let whole = run(&mut headless, &lesson.work("whole"), &mut NoProgress);
     assert!(!whole.interrupted, "nobody interrupts it");
-    for (task, left) in [("fine-tuning", 4), ("training codebooks", 2)] {
-        let work = lesson.work(task);
+    for (task, left) in [("fine-tuning", 4), ("training codebooks", 2), ("training codebooks", 53)] {
+        let work = lesson.work(&format!("{task} {left}"));
         let stopped = run(&mut headless, &work, &mut Interrupting { task, left, running: Vec::new() });
         assert!(stopped.interrupted, "{task} is interrupted");
         let resumed = run(&mut headless, &work, &mut NoProgress);
         assert!(!resumed.interrupted && resumed.scene == whole.scene, "{task}: the same scene");
         assert_eq!(resumed.best, whole.best, "{task}: the same quality");
     }
+}
+
+#[test]
+fn the_last_steps_see_rounded_geometry_unless_they_should_not() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new();
+    let mut run = |rounding: bool, steps: usize| {
+        let compress = Some((Quality::Small, steps));
+        let settings = FineTuneSettings { steps: 0, held_out: 2, compress, rounding, ..FineTuneSettings::default() };
+        let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.views, &settings, None, &mut NoProgress);
+        tuned.expect("it can be trained").scene
+    };
+    assert!(run(true, 5) != run(false, 5), "steps on rounded geometry lead elsewhere");
+    assert!(run(true, 0) == run(false, 0), "without these steps there is nothing to round for");
 }
 
 #[test]

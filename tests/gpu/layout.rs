@@ -8,7 +8,8 @@ use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF};
 use bevy_gs4d::offline::fine_tune::NEIGHBORS;
 use bevy_gs4d::renderer::layout::{
     self, Activation, AdamUniforms, BLOCK, Counters, DIGITS, FIRST_SEEN, FrameUniforms, InstanceUniforms, LossUniforms,
-    SortStep, SplatRecord, SplatShape, TermWeights, TiedColors, TrainedRecord, TrainedScene, VisibleSplat,
+    RoundingRecord, SortStep, SplatRecord, SplatShape, TermWeights, TiedColors, TrainedRecord, TrainedScene,
+    VisibleSplat,
 };
 use bevy_gs4d::renderer::shaders::{compose, pass_names};
 use bevy_gs4d::view::TILE_SIZE;
@@ -71,7 +72,7 @@ fn splat() -> Mirror {
     in_fours(mirror, "SplatRecord", ["place", "shape", "color", ""])
 }
 
-fn mirrors() -> [Mirror; 15] {
+fn mirrors() -> [Mirror; 16] {
     [
         gaussian(),
         mirror!(InstanceUniforms {
@@ -138,6 +139,7 @@ fn mirrors() -> [Mirror; 15] {
         mirror!(Counters { visible, pairs, pairs_wanted, padding }),
         mirror!(SortStep { shift, source, stride, padding }),
         trained(),
+        mirror!(RoundingRecord { mean, velocity, shape_x, shape_y, shape_z }),
         mirror!(TrainedScene { count, model, prefilter_var, view }),
         mirror!(LossUniforms { background, size, tiles, share, similarity_share, mask_weight, padding }),
         mirror!(TiedColors { count, stride, stages, padding }),

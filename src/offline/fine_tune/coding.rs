@@ -1,9 +1,11 @@
-//! The last phase of a run: codebooks of color that are trained with everything else, and compression.
+//! The last phase of a run: codebooks of color that are trained with everything else, geometry that is drawn as it will be packed, and
+//! compression.
 //!
-//! In: a run with the best parameters. Out: the scene in the packed form, and the quality before it was compressed.
+//! In: a run with the best parameters. Out: the scene in the packed form, and its quality before colors are rounded.
 
 use super::CurvePoint;
 use super::resume::Checkpoint;
+use super::rounding::steps_between;
 use super::run::{Progressed, Run, Saves, describe};
 use super::schedule::decay;
 use crate::offline::quantize::{self, CompressSettings, Quality, compress_tied, train_codebooks};
@@ -15,7 +17,7 @@ const RATE: f64 = 0.5;
 
 impl Run<'_> {
     /// Codes the colors by codebooks whose number of entries follows that of the Gaussians, trains these and everything else for some more
-    /// steps, and compresses the result. A stored run goes on where it ended.
+    /// steps, on pictures of geometry as it will be packed, and compresses the result. A stored run goes on where it ended.
     pub(super) fn compress(
         &mut self,
         quality: Quality,
@@ -30,10 +32,15 @@ impl Run<'_> {
         let scene = self.trainer.scene()?.into_runtime()?;
         let settings = CompressSettings::suiting(quality, scene.len());
         let steps = if settings.codebooks.is_empty() { 0 } else { steps };
+        let bits = settings.geometry.filter(|_| self.settings.rounding && steps > 0);
+        let between = steps_between(scene.len());
         let mut step = 0;
         if steps > 0 {
             // The same scene gives the same codes: they are not stored.
             self.trainer.tie(train_codebooks(&scene, &settings)?)?;
+            if let Some(bits) = &bits {
+                self.trainer.round(bits)?;
+            }
             let stored = stored.and_then(|stored| Some((stored.coded?, stored.state)));
             if let Some((coded, state)) = stored
                 && self.trainer.resume(&state)
@@ -46,6 +53,13 @@ impl Run<'_> {
         (0..step).for_each(|_| progress.advance());
         self.trainer.totals()?;
         while step < steps && !found.interrupted {
+            // When follows from the step alone, and the state has what the last rounding changed: a resumed run draws the same.
+            if let Some(bits) = &bits
+                && step > 0
+                && step.is_multiple_of(between)
+            {
+                self.trainer.round(bits)?;
+            }
             self.step(made + step, step + 1, RATE * decay(step, steps, self.settings.last_rate))?;
             step += 1;
             progress.advance();
@@ -65,6 +79,10 @@ impl Run<'_> {
             Some(books) => compress_tied(scene, &settings, &books)?,
             None => quantize::compress(scene, &settings)?,
         };
+        if let Some(bits) = &bits {
+            // What is evaluated has the geometry of the package.
+            self.trainer.round(bits)?;
+        }
         let totals = self.trainer.totals()?;
         let (loss, training_psnr) = (Some(totals.loss), Some(totals.psnr));
         let point = CurvePoint { step: made + step, loss, training_psnr, psnr: self.evaluate()? };

@@ -12,7 +12,7 @@ use crate::scene::{GaussianScene, SceneForm, TemporalFilter, Trained};
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TrainerState {
     /// Raw parameters, their first and their second moments; the same of the color coefficients, and of the entries of codebooks if colors
-    /// are [tied](Trainer::tie).
+    /// are [tied](Trainer::tie); then what rounding changes of each Gaussian, if geometry is [rounded](Trainer::round).
     pub buffers: Vec<Vec<u8>>,
     /// The neighbors of each Gaussian; empty if no term needs them.
     pub neighbors: Vec<u8>,
@@ -55,7 +55,7 @@ impl Trainer<'_> {
     }
 
     /// Replaces parameters, moments and filter by those of [`state`](Self::state), and neighbors if it has some that are needed. Returns
-    /// whether they are of as many Gaussians, and of as many entries if colors are tied; if not, nothing is replaced.
+    /// whether they are of as many Gaussians, of as many entries if colors are tied, and rounded if these are; if not, nothing is replaced.
     pub fn resume(&mut self, state: &TrainerState) -> bool {
         let buffers = self.stored();
         let fits = |(bytes, buffer): (&Vec<u8>, &&wgpu::Buffer)| bytes.len() as u64 == buffer.size();
@@ -89,7 +89,8 @@ impl Trainer<'_> {
     /// Returns the buffers of a state, in its order.
     fn stored(&self) -> Vec<&wgpu::Buffer> {
         let all = [Some(&self.geometry), Some(&self.color), self.tied.as_ref().map(|tied| &tied.entries)];
-        all.into_iter().flatten().flat_map(|o| [&o.values, &o.moments[0], &o.moments[1]]).collect()
+        let optimized = all.into_iter().flatten().flat_map(|o| [&o.values, &o.moments[0], &o.moments[1]]);
+        optimized.chain(self.rounder.as_ref().map(|rounder| &rounder.changes)).collect()
     }
 
     /// Sets all moments to 0, as before the first step.

@@ -6,6 +6,7 @@
 //! | pass | reads | writes |
 //! |---|---|---|
 //! | `slice` | raw parameters | the records that `project` reads |
+//! | `rounding` | these records, what packing changes of each | the same, once geometry is [rounded](Trainer::round) |
 //! | the passes of the reference design | records, color | splats, pairs, picture |
 //! | `loss` | picture, image | gradients of pixels, sums |
 //! | `blend_backward` | splats, pairs, gradients of pixels | gradients of pairs |
@@ -19,6 +20,7 @@ use super::optimized::Optimized;
 use super::passes::Passes;
 use super::records::records;
 use super::regularizer::Regularizer;
+use super::rounding::Rounder;
 use super::schedule::Rates;
 use super::sums::GradientSums;
 use super::terms::Terms;
@@ -27,6 +29,7 @@ use super::view_buffers::ViewBuffers;
 use crate::gaussian::harmonics::evaluated;
 use crate::gaussian::{GradientMode, InvalidGaussian, Model};
 use crate::offline::dataset::CoveredImage;
+use crate::offline::quantize::CompressError;
 use crate::renderer::layout::{AdamUniforms, FIRST_SEEN, LossUniforms, TrainedScene};
 use crate::renderer::memory::binding_limit;
 use crate::renderer::shaders::{COMPAT, COMPAT_WITHOUT_TIME};
@@ -64,6 +67,7 @@ pub struct Trainer<'a> {
     pub(super) tied: Option<Tied>,
     pub(super) terms: Terms,
     pub(super) regularizer: Option<Regularizer>,
+    pub(super) rounder: Option<Rounder>,
     sparse: bool,
     pub(super) sums: GradientSums,
     pub(super) view: Option<ViewBuffers>,
@@ -194,6 +198,7 @@ impl<'a> Trainer<'a> {
             tied: None,
             terms: Terms::default(),
             regularizer: None,
+            rounder: None,
             sparse: false,
             sums,
             view: None,
@@ -352,7 +357,6 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// A lost device.
     pub fn step(&mut self, rates: &Rates, factor: f64, step: usize) -> Result<(), GpuError> {
-        let count = self.capture.len() as u32;
         let scale = self.scene.trained_with.spatial_lr_scale;
         let colors = rates.of_harmonics(factor);
         let sparse = u32::from(self.sparse);
@@ -386,9 +390,7 @@ impl<'a> Trainer<'a> {
             if let Some(tied) = &self.tied {
                 self.expand(&mut pass, tied);
             }
-            pass.set_pipeline(&self.passes.slice);
-            pass.set_bind_group(0, &self.slice, &[]);
-            pass.dispatch_workgroups(count.div_ceil(256), 1, 1);
+            self.record_slice(&mut pass);
         }
         encoder.clear_buffer(&self.notes, FAULT_BYTES, None);
         let index = queue.submit([encoder.finish()]);
@@ -455,16 +457,22 @@ impl<'a> Trainer<'a> {
         self.headless.context().queue.write_buffer(&self.scene_settings, 0, bytemuck::bytes_of(&settings));
     }
 
+    /// Records that the parameters are sliced, and rounded if geometry is.
+    fn record_slice(&self, pass: &mut wgpu::ComputePass<'_>) {
+        let groups = (self.capture.len() as u32).div_ceil(256);
+        pass.set_pipeline(&self.passes.slice);
+        pass.set_bind_group(0, &self.slice, &[]);
+        pass.dispatch_workgroups(groups, 1, 1);
+        if let Some(rounder) = &self.rounder {
+            rounder.record(pass, groups);
+        }
+    }
+
     /// Slices the parameters.
     pub(super) fn slice(&mut self) {
         self.write_scene(0);
         let mut encoder = self.encoder("gs4d slice");
-        {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            pass.set_pipeline(&self.passes.slice);
-            pass.set_bind_group(0, &self.slice, &[]);
-            pass.dispatch_workgroups((self.capture.len() as u32).div_ceil(256), 1, 1);
-        }
+        self.record_slice(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
         self.headless.context().queue.submit([encoder.finish()]);
     }
 }
@@ -478,6 +486,9 @@ pub enum TrainerError {
     /// Codebooks of another scene.
     #[error("the codebooks are not of the colors of this scene")]
     Codebooks,
+    /// The packed form cannot hold the scene.
+    #[error(transparent)]
+    Compress(#[from] CompressError),
     /// A term of the loss cannot have this weight.
     #[error("the weight of the term {term} is {weight}: it must be a number, zero or above")]
     Weight {

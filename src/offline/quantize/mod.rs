@@ -16,14 +16,15 @@ pub use settings::{CompressSettings, Quality};
 
 use super::prune::select_harmonics;
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian};
-use crate::scene::packed::MAX_STAGES;
 use crate::scene::packed::encode::Bits;
+use crate::scene::packed::{MAX_STAGES, Rounding};
 use crate::scene::{
     CodedColors, FilterKind, Form, GaussianScene, PackedColors, PackedScene, RuntimeScene, SceneForm, TemporalFilter,
 };
 use codebook::Centers;
 use ndarray::Array2;
 use order::morton_order;
+use rayon::prelude::*;
 use serde::Serialize;
 
 /// Figures of a compression. Default: zeros.
@@ -160,24 +161,21 @@ fn compress_by(
         return Ok((scene.into(), report));
     };
     let order = morton_order(&sliced.gaussians);
-    let gaussians: Vec<Gaussian> = order.iter().map(|&index| sliced.gaussians[index as usize]).collect();
     let (colors, base) = if books.is_empty() {
         let whole = rounded(select_harmonics(&sliced.harmonics, &order), step);
         (PackedColors::Whole(whole), [0.0; 2])
     } else {
         let weights = match &settings.weights {
             Some(weights) => order.iter().map(|&index| weights[index as usize]).collect(),
-            None => gaussians.iter().map(|gaussian| gaussian.opacity).collect::<Vec<_>>(),
+            None => order.iter().map(|&index| sliced.gaussians[index as usize].opacity).collect::<Vec<_>>(),
         };
         let (coded, base) = code(&sliced.harmonics, &order, bits, |rest| train(rest, &weights, books));
         report.codebooks.clone_from(&coded.entries);
         (PackedColors::Coded(coded), base)
     };
-    let packed = PackedScene::encode(&gaussians, bits, colors, base, scene.trained_with.time_span());
+    let packed = encode(&sliced.gaussians, &order, bits, colors, base, scene.trained_with.time_span());
     packed.check().map_err(CompressError::Range)?;
-    for (at, &index) in order.iter().enumerate() {
-        packed.gaussian(at).check().map_err(|reason| CompressError::Extreme { index, reason })?;
-    }
+    check_each(&packed, &order)?;
     let filter = scene.filter.map(|filter| match filter.kind {
         // Lifespans are rounded too: the filter must be exact for the Gaussians that are drawn.
         FilterKind::Support => {
@@ -195,6 +193,39 @@ fn compress_by(
         playback: scene.playback,
     };
     Ok((scene, report))
+}
+
+/// Returns what [`compress`] would change of the geometry of each Gaussian; `reach` is the length of the time interval, timestamp units.
+///
+/// # Errors
+/// A Gaussian that the packed form cannot hold.
+pub fn roundings(gaussians: &[Gaussian], bits: &Bits, reach: f32) -> Result<Vec<Rounding>, CompressError> {
+    let order = morton_order(gaussians);
+    let packed = encode(gaussians, &order, bits, PackedColors::Whole(Harmonics::default()), [0.0; 2], reach);
+    check_each(&packed, &order)?;
+    let mut places = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(place, &index)| places[index as usize] = place);
+    Ok(places.par_iter().zip(gaussians).map(|(&place, gaussian)| packed.rounding(place, gaussian)).collect())
+}
+
+/// Packs Gaussians in the given order.
+fn encode(
+    gaussians: &[Gaussian],
+    order: &[u32],
+    bits: &Bits,
+    colors: PackedColors,
+    base: [f32; 2],
+    reach: f32,
+) -> PackedScene {
+    let ordered: Vec<Gaussian> = order.iter().map(|&index| gaussians[index as usize]).collect();
+    PackedScene::encode(&ordered, bits, colors, base, reach)
+}
+
+/// Checks that every Gaussian can still be drawn; `order` has their indices before they were packed.
+fn check_each(packed: &PackedScene, order: &[u32]) -> Result<(), CompressError> {
+    let reason = |place: usize| packed.gaussian(place).check().err();
+    let extreme = |place| Some(CompressError::Extreme { index: order[place], reason: reason(place)? });
+    (0..order.len()).into_par_iter().find_map_first(extreme).map_or(Ok(()), Err)
 }
 
 /// Rounds coefficients to multiples of `step`, if it is positive. Those whose multiple single precision cannot hold stay as they are.

@@ -6,7 +6,7 @@ use super::lanes::{self, ALWAYS, AT_REST, BlockRanges, FARTHEST, LANE_MAX, LANES
 use super::{PackedColors, PackedScene, shape};
 use crate::gaussian::{Gaussian, Lifespan};
 use crate::scene::Sliced;
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use std::f32::consts::FRAC_1_SQRT_2;
 
 impl PackedScene {
@@ -16,11 +16,10 @@ impl PackedScene {
     /// If `index` is out of range.
     pub fn gaussian(&self, index: usize) -> Gaussian {
         let record = lanes::unpack(self.records[index]);
-        let part = |lane: usize| f32::from(record[lane]) / LANE_MAX;
-        let parts = |lane| Vec3::new(part(lane), part(lane + 1), part(lane + 2));
+        let part = |lane: usize| part(&record, lane);
         let shared = SharedRanges::read(&self.ranges);
         let block = BlockRanges::read(&self.ranges, index);
-        let mean = Vec3::from(block.mean_low) + parts(lanes::MEAN) * Vec3::from(block.mean_size);
+        let mean = Vec3::from(block.mean_low) + parts(&record, lanes::MEAN) * Vec3::from(block.mean_size);
         let Lifespan { mean_t, sigma_t } = lifespan(&record, &shared);
         let velocity = match record[lanes::SIGMA_T] {
             ALWAYS => Vec3::ZERO,
@@ -32,10 +31,7 @@ impl PackedScene {
                 signed * signed.abs() * block.displacement * sigma_t.recip().max(block.rate)
             }
         };
-        let [scale_low, scale_size] = shared.log_scale;
-        let scale = (parts(lanes::SCALE) * scale_size + scale_low).map(f32::exp);
-        let three = (parts(lanes::ROTATION) * shared.rotation_stretch * 2.0 - 1.0) * FRAC_1_SQRT_2;
-        let rotation = shape::with_largest(three, record[lanes::LEFT_OUT]);
+        let (scale, rotation) = self.shape(index);
         Gaussian {
             mean: mean.to_array(),
             mean_t,
@@ -53,6 +49,16 @@ impl PackedScene {
     /// If `index` is out of range.
     pub fn lifespan(&self, index: usize) -> Lifespan {
         lifespan(&lanes::unpack(self.records[index]), &SharedRanges::read(&self.ranges))
+    }
+
+    /// Decodes the scales of one Gaussian, and the rotation of the axes that they are along.
+    pub(super) fn shape(&self, index: usize) -> (Vec3, Quat) {
+        let record = lanes::unpack(self.records[index]);
+        let shared = SharedRanges::read(&self.ranges);
+        let [low, size] = shared.log_scale;
+        let scale = (parts(&record, lanes::SCALE) * size + low).map(f32::exp);
+        let three = (parts(&record, lanes::ROTATION) * shared.rotation_stretch * 2.0 - 1.0) * FRAC_1_SQRT_2;
+        (scale, shape::with_largest(three, record[lanes::LEFT_OUT]))
     }
 
     /// Returns the color of one Gaussian; see [`Harmonics::color`](crate::gaussian::Harmonics::color).
@@ -80,13 +86,22 @@ impl PackedScene {
     }
 }
 
+/// Returns the position of a lane in its range, 0 to 1.
+fn part(record: &[u16; LANES], lane: usize) -> f32 {
+    f32::from(record[lane]) / LANE_MAX
+}
+
+/// Returns the positions of three lanes.
+fn parts(record: &[u16; LANES], first: usize) -> Vec3 {
+    Vec3::from([0, 1, 2].map(|axis| part(record, first + axis)))
+}
+
 /// Decodes the lanes of time.
 fn lifespan(record: &[u16; LANES], shared: &SharedRanges) -> Lifespan {
-    let part = |lane: usize| f32::from(record[lane]) / LANE_MAX;
     let ([t_low, t_size], [sigma_low, sigma_size]) = (shared.mean_t, shared.log_sigma_t);
     let sigma_t = match record[lanes::SIGMA_T] {
         ALWAYS => f32::INFINITY,
-        _ => (sigma_low + part(lanes::SIGMA_T) * sigma_size).exp(),
+        _ => (sigma_low + part(record, lanes::SIGMA_T) * sigma_size).exp(),
     };
-    Lifespan { mean_t: t_low + part(lanes::MEAN_T) * t_size, sigma_t }
+    Lifespan { mean_t: t_low + part(record, lanes::MEAN_T) * t_size, sigma_t }
 }

@@ -9,6 +9,7 @@ use super::shape::{Shape, smallest_three};
 use super::{BLOCK, PackedColors, PackedScene};
 use crate::gaussian::Gaussian;
 use crate::scene::Bounds;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -47,7 +48,7 @@ impl PackedScene {
     pub fn encode(gaussians: &[Gaussian], bits: &Bits, colors: PackedColors, base: [f32; 2], reach: f32) -> Self {
         let radius = Bounds::core(gaussians.iter().copied()).map_or(0.0, Bounds::radius);
         let flattest = f64::from(radius * FLATTEST);
-        let shapes: Vec<Shape> = gaussians.iter().map(|gaussian| Shape::of(gaussian, flattest)).collect();
+        let shapes: Vec<Shape> = gaussians.par_iter().map(|gaussian| Shape::of(gaussian, flattest)).collect();
         let finite = |gaussian: &&Gaussian| gaussian.sigma_t.is_finite();
         let time = Span::of(gaussians.iter().map(|g| f64::from(g.mean_t)));
         let sigma = Span::of(gaussians.iter().filter(finite).map(|g| f64::from(g.sigma_t).ln()));
@@ -71,8 +72,7 @@ impl PackedScene {
             let sigma_t = (sigma_low + f64::from(deviation(gaussian)) / f64::from(LANE_MAX) * sigma_size).exp();
             gaussian.velocity.map(|velocity| f64::from(velocity) * sigma_t.min(f64::from(reach)))
         };
-        let mut records = Vec::with_capacity(gaussians.len());
-        for (block, chunk) in gaussians.chunks(BLOCK).enumerate() {
+        let encode_block = |(block, chunk): (usize, &[Gaussian])| {
             let mean = [0, 1, 2].map(|axis| Span::of(chunk.iter().map(|g| f64::from(g.mean[axis]))));
             let most = chunk.iter().filter(finite).flat_map(displacement).fold(0.0f64, |most, d| most.max(d.abs()));
             let ends = mean.map(|span| span.range(quantizers.mean));
@@ -82,8 +82,7 @@ impl PackedScene {
                 displacement: (most * (f64::from(FARTHEST) / quantizers.velocity_top()).powi(2)) as f32,
                 rate: reach.max(f32::MIN_POSITIVE).recip(),
             };
-            ranges.extend(block_ranges.write());
-            for (index, gaussian) in (block * BLOCK..).zip(chunk) {
+            let encode = |(index, gaussian): (usize, &Gaussian)| {
                 let shape = &shapes[index];
                 let mut record = [0; lanes::LANES];
                 for axis in 0..3 {
@@ -106,8 +105,15 @@ impl PackedScene {
                 }
                 record[lanes::OPACITY] = quantizers.opacity.encode(f64::from(gaussian.opacity), false);
                 record[lanes::LEFT_OUT] = left_out;
-                records.push(lanes::pack(record));
-            }
+                lanes::pack(record)
+            };
+            (block_ranges.write(), (block * BLOCK..).zip(chunk).map(encode).collect::<Vec<_>>())
+        };
+        let blocks: Vec<_> = gaussians.par_chunks(BLOCK).enumerate().map(encode_block).collect();
+        let mut records = Vec::with_capacity(gaussians.len());
+        for (block_ranges, own) in blocks {
+            ranges.extend(block_ranges);
+            records.extend(own);
         }
         Self { records, ranges, colors }
     }
@@ -210,11 +216,12 @@ impl Quantizers {
 /// Returns for each Gaussian whether its splats are among the largest and most opaque.
 fn largest(gaussians: &[Gaussian], shapes: &[Shape], share: f32) -> Vec<bool> {
     let count = ((gaussians.len() as f32 * share.clamp(0.0, 1.0)).round() as usize).min(gaussians.len());
-    let size =
-        |index: &usize| shapes[*index].log_scale.max_element() + f64::from(gaussians[*index].opacity).max(1e-6).ln();
-    let mut order: Vec<usize> = (0..gaussians.len()).collect();
-    order.sort_by(|a, b| size(b).total_cmp(&size(a)).then(a.cmp(b)));
+    let size = |(gaussian, shape): (&Gaussian, &Shape)| {
+        shape.log_scale.max_element() + f64::from(gaussian.opacity).max(1e-6).ln()
+    };
+    let mut order: Vec<(f64, usize)> = gaussians.iter().zip(shapes).map(size).zip(0..).collect();
+    order.par_sort_unstable_by(|(a, i), (b, j)| b.total_cmp(a).then(i.cmp(j)));
     let mut fine = vec![false; gaussians.len()];
-    order[..count].iter().for_each(|&index| fine[index] = true);
+    order[..count].iter().for_each(|&(_, index)| fine[index] = true);
     fine
 }

@@ -8,6 +8,7 @@
 //! | `lanes.rs` | the position and the range of each value in a record, for the encoder and the decoder |
 //! | `encode.rs` | from Gaussians to records and ranges |
 //! | `decode.rs` | from records and ranges to Gaussians and colors |
+//! | `rounding.rs` | what packing changes of a Gaussian |
 //! | `shape.rs` | a covariance as scales and a rotation, and back |
 //! | `colors.rs` | colors by codebook, and back |
 
@@ -15,10 +16,12 @@ mod colors;
 mod decode;
 pub mod encode;
 mod lanes;
+mod rounding;
 mod shape;
 
 pub use colors::CodedColors;
 pub use lanes::{BLOCK, BLOCK_RANGES, COLOR_WORDS, MAX_ENTRIES, MAX_STAGES, RECORD_WORDS, SHARED_RANGES};
+pub use rounding::Rounding;
 
 use crate::gaussian::Harmonics;
 use rayon::prelude::*;
