@@ -10,8 +10,11 @@
 const FAR: f32 = 3.4e38;
 // Number of blended splats at the end of the scale of overdraw.
 const OVERDRAW_MAX: f32 = 64.0;
+// Loops over samples have this bound, so that they are unrolled: software drivers end all loops of a thread after 65,535 turns.
 #ifdef MULTISAMPLED
 const SAMPLES_MAX: u32 = 8u;
+#else
+const SAMPLES_MAX: u32 = 1u;
 #endif
 
 @group(0) @binding(0) var<uniform> frame: FrameUniforms;
@@ -195,7 +198,9 @@ fn debug_depth(depth: f32, opacity: f32) -> f32 {
 // Loads the camera-space depth of the opaque surface of each sample of this pixel.
 fn find_limits(pixel: vec2<u32>, inside: bool) {
     samples = 1u;
-    limits[0] = FAR;
+    for (var i = 0u; i < SAMPLES_MAX; i++) {
+        limits[i] = FAR;
+    }
     if frame.opaque_samples == 0u || !inside {
         return;
     }
@@ -218,8 +223,8 @@ fn distance_of(depth: f32) -> f32 {
 // Returns the share of the samples without a surface.
 fn open_share() -> f32 {
     var open = 0u;
-    for (var i = 0u; i < samples; i++) {
-        open += select(0u, 1u, limits[i] == FAR);
+    for (var i = 0u; i < SAMPLES_MAX; i++) {
+        open += select(0u, 1u, i < samples && limits[i] == FAR);
     }
     return f32(open) / f32(samples);
 }
@@ -227,7 +232,7 @@ fn open_share() -> f32 {
 // Returns the depth of the nearest surface that is not before `depth`.
 fn next_limit(depth: f32) -> f32 {
     var nearest = FAR;
-    for (var i = 0u; i < samples; i++) {
+    for (var i = 0u; i < SAMPLES_MAX; i++) {
         nearest = select(nearest, min(nearest, limits[i]), limits[i] >= depth);
     }
     return nearest;
@@ -236,7 +241,7 @@ fn next_limit(depth: f32) -> f32 {
 // Returns the number of samples whose surface is before `depth`.
 fn passed_limits(depth: f32) -> u32 {
     var passed = 0u;
-    for (var i = 0u; i < samples; i++) {
+    for (var i = 0u; i < SAMPLES_MAX; i++) {
         passed += select(0u, 1u, limits[i] < depth);
     }
     return passed;

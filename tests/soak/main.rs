@@ -44,7 +44,7 @@ fn main() -> ExitCode {
     if let Some(fresh) = options.fresh() {
         outcomes.push(soak::draw_fresh(options.seed, &fresh).map(|()| "drawn".to_owned()));
     } else {
-        outcomes.extend(options.changes().map(|until| soak::run(options.seed, until)));
+        outcomes.extend(options.changes().map(|until| soak::run(&options, until)));
         outcomes.extend(options.cuts().map(|number| cuts::run(options.seed, number)));
     }
     for outcome in &outcomes {

@@ -27,6 +27,12 @@ pub struct Options {
     /// Change an app so often.
     #[arg(long, value_name = "N")]
     steps: Option<u64>,
+    /// Begin with what is shown after so many changes: a defect may need fewer than led to it.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub from: u64,
+    /// Folder for the pictures that are not those of a new app, beside those.
+    #[arg(long, value_name = "DIR")]
+    pub keep: Option<PathBuf>,
     /// Cut so often, in another app.
     #[arg(long, value_name = "N")]
     cuts: Option<u64>,

@@ -6,7 +6,7 @@
 use crate::changes::Changes;
 use crate::checks;
 use crate::memory::{Memory, resident};
-use crate::options::{Fresh, Until};
+use crate::options::{Fresh, Options, Until};
 use crate::stage::Stage;
 use bevy_gs4d::testing;
 use image::RgbaImage;
@@ -58,17 +58,20 @@ struct Compared {
 ///
 /// # Errors
 /// What does not hold.
-pub fn run(seed: u64, until: Until) -> Result<String, String> {
-    let mut tail = Tail { seed, step: 0, said: VecDeque::new(), holds: false };
-    let line = change(seed, until, &mut tail)?;
+pub fn run(options: &Options, until: Until) -> Result<String, String> {
+    let mut tail = Tail { seed: options.seed, step: 0, said: VecDeque::new(), holds: false };
+    let line = change(options, until, &mut tail)?;
     tail.holds = true;
     Ok(line)
 }
 
-fn change(seed: u64, until: Until, tail: &mut Tail) -> Result<String, String> {
-    println!("soak: seed {seed}");
+fn change(options: &Options, until: Until, tail: &mut Tail) -> Result<String, String> {
+    println!("soak: seed {}", options.seed);
     let began = Instant::now();
-    let mut changes = Changes::new(seed);
+    let mut changes = Changes::new(options.seed);
+    while changes.step < options.from {
+        changes.advance();
+    }
     let mut stage = Stage::new(&changes.state, &[])?;
     let (mut memory, mut compared) = (Memory::default(), Compared::default());
     while changes.step < until.steps && (began.elapsed() < until.time || !changes.is_check()) {
@@ -79,7 +82,7 @@ fn change(seed: u64, until: Until, tail: &mut Tail) -> Result<String, String> {
             stage.update()?;
         }
         if changes.is_check() {
-            compare(seed, changes.step, &mut stage, &mut compared)?;
+            compare(options, changes.step, &mut stage, &mut compared)?;
             let mebibytes = resident().unwrap_or_default() >> 20;
             println!("step {}: as new, {mebibytes} MiB, {} s", changes.step, began.elapsed().as_secs());
         } else if changes.is_clearing() {
@@ -101,13 +104,13 @@ fn change(seed: u64, until: Until, tail: &mut Tail) -> Result<String, String> {
 
 /// Compares all pictures of an app with those of a new one, in a process of its own: what a process has left behind, on either side, must
 /// not matter.
-fn compare(seed: u64, step: u64, stage: &mut Stage, compared: &mut Compared) -> Result<(), String> {
+fn compare(options: &Options, step: u64, stage: &mut Stage, compared: &mut Compared) -> Result<(), String> {
     let seen = stage.pictures()?;
     let folder = tempfile::tempdir().map_err(|error| format!("no temporary folder: {error}"))?;
     let program = env::current_exe().map_err(|error| format!("this program is not found: {error}"))?;
     let order: Vec<String> = stage.order().iter().map(u64::to_string).collect();
     let mut command = Command::new(program);
-    command.args([format!("--seed={seed}"), format!("--fresh={step}")]).arg("--pictures").arg(folder.path());
+    command.args([format!("--seed={}", options.seed), format!("--fresh={step}")]).arg("--pictures").arg(folder.path());
     if !order.is_empty() {
         command.arg(format!("--order={}", order.join(",")));
     }
@@ -119,7 +122,14 @@ fn compare(seed: u64, step: u64, stage: &mut Stage, compared: &mut Compared) -> 
     for (index, seen) in seen.iter().enumerate() {
         let path = folder.path().join(format!("{index}.png"));
         let fresh = image::open(&path).map_err(|error| format!("{}: {error}", path.display()))?.into_rgba8();
-        checks::check_same(seen, &fresh).map_err(|apart| format!("the picture of camera {index} {apart}"))?;
+        if let Err(apart) = checks::check_same(seen, &fresh) {
+            for (name, picture) in [("seen", seen), ("new", &fresh)] {
+                let Some(keep) = &options.keep else { continue };
+                testing::save(picture, &keep.join(format!("{step}-{index}-{name}.png")))
+                    .map_err(|error| error.to_string())?;
+            }
+            return Err(format!("the picture of camera {index} {apart}"));
+        }
         compared.pictures += 1;
         compared.shown += u64::from(checks::shows_something(seen));
     }

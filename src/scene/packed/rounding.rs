@@ -21,7 +21,7 @@ pub struct Rounding {
     pub mean_t: f32,
     /// Added to the velocity, capture units per timestamp unit.
     pub velocity: Vec3,
-    /// Factor on 1/σ_t; 1 if σ_t is infinite.
+    /// Factor on `1/σ_t`; 1 if σ_t is infinite.
     pub rate: f32,
     /// Added to the variance along every axis before `shape`, capture units squared. It is that of the smallest scale that is stored: what
     /// is flatter has been raised to it, and would need any factor otherwise.
