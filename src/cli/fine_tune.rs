@@ -102,10 +102,13 @@ pub struct FineTune {
     /// float atomics.
     #[arg(long, value_name = "HOW", default_value = "deterministic", value_parser = values::one_of(&GradientSums::NAMES))]
     sums: GradientSums,
-    /// Compress the result: code its colors by codebooks, whose sizes follow the number of Gaussians, and train these as well, on pictures
-    /// of geometry as it will be rounded. The package is as that of `gs4d compress`, and loses less.
+    /// Compress the result: code its colors by codebooks, whose sizes follow the number of Gaussians, and train these as well. The package
+    /// is as that of `gs4d compress`, and loses less.
     #[arg(long, value_name = "QUALITY", value_parser = values::one_of(&Quality::NAMES))]
     compress: Option<Quality>,
+    /// Train codebooks on pictures of geometry as the package will hold it. It pays where geometry has few bits, fewer than `small` has.
+    #[arg(long, requires = "compress")]
+    round_geometry: bool,
     /// Steps in which codebooks are trained, after the others.
     #[arg(long, value_name = "N", default_value = "2000", requires = "compress", value_parser = values::count(1_000_000))]
     compress_steps: usize,
@@ -208,8 +211,8 @@ impl FineTune {
             refresh_filter: self.refresh_filter,
             mode: self.gradients,
             sums: self.sums,
+            rounding: self.round_geometry,
             compress: self.compress.map(|quality| (quality, self.compress_steps)),
-            ..FineTuneSettings::default()
         }
     }
 }

@@ -171,6 +171,7 @@ fn runs_that_were_interrupted_end_as_others() {
         refresh_filter: 3,
         // Geometry is rounded before the first of these steps and after 50.
         compress: Some((Quality::Balanced, 56)),
+        rounding: true,
         ..FineTuneSettings::default()
     };
     let run = |headless: &mut Headless, work: &Work, progress: &mut dyn Progress| -> FineTuned {
@@ -191,7 +192,7 @@ fn runs_that_were_interrupted_end_as_others() {
 }
 
 #[test]
-fn the_last_steps_see_rounded_geometry_unless_they_should_not() {
+fn the_last_steps_see_rounded_geometry_if_they_should() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let mut run = |rounding: bool, steps: usize| {

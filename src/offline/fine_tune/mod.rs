@@ -6,7 +6,7 @@
 //! Some training views are held out: they tell which parameters are the best. The loss is `0.8 L1 + 0.2 (1 − SSIM)`, with further [`Terms`]
 //! if these have weights, the optimizer Adam (section 6 of the 4DGS model). Views, backgrounds and rates of a step follow from its number
 //! alone, so that a run which is resumed ends as one which was not interrupted, but for rounding if sums are [atomic](GradientSums::Atomic).
-//! If the scene is compressed, further steps train codebooks of color, and everything else on pictures of geometry as it will be rounded.
+//! If the scene is compressed, further steps train codebooks of color with everything else, on request on pictures of rounded geometry.
 
 mod adam;
 mod belonging;
@@ -85,7 +85,7 @@ pub struct FineTuneSettings {
     /// How the result is compressed, and the number of further steps in which the codebooks of color are trained; `None` leaves the scene in
     /// the trained form.
     pub compress: Option<(Quality, usize)>,
-    /// Whether these further steps see geometry as the package will hold it, rounded. Default: `true`.
+    /// Whether these further steps see geometry as the package will hold it, rounded. Default: `false`; it pays with few bits.
     pub rounding: bool,
 }
 
@@ -108,7 +108,7 @@ impl Default for FineTuneSettings {
             mode: GradientMode::default(),
             sums: GradientSums::default(),
             compress: None,
-            rounding: true,
+            rounding: false,
         }
     }
 }

@@ -16,10 +16,10 @@ use image::codecs::png::PngEncoder;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-/// Most updates that a read-back may take.
-const READBACK: usize = 100;
+/// Longest time that a read-back may take: not a number of updates, since a GPU that is busy for others may be slow to answer.
+const READBACK: Duration = Duration::from_secs(60);
 
 /// Waits until all assets are loaded, advances time by `step`, and returns the picture of that time: of the app's own [`Offscreen`].
 ///
@@ -54,7 +54,8 @@ pub fn read(app: &mut App, offscreen: &Offscreen) -> Result<RgbaImage, TestingEr
 }
 
 fn wait(app: &mut App, arrived: &Mutex<Option<Vec<u8>>>) -> Result<Vec<u8>, TestingError> {
-    for _ in 0..READBACK {
+    let began = Instant::now();
+    while began.elapsed() < READBACK {
         update(app)?;
         if let Some(data) = arrived.lock().unwrap_or_else(PoisonError::into_inner).take() {
             return Ok(data);
