@@ -23,7 +23,7 @@ fn of_golden(gradient: &GoldenGradient, mode: GradientMode) -> Vec<ParameterGrad
     reference::gradients(trained, slice, &golden.scene, &golden.view, golden.background, &pixels, mode)
 }
 
-/// A thousandth of the norm of each tensor: views are drawn in single precision, the golden gradients in double.
+/// A hundred-thousandth of the norm of each tensor: views are drawn in single precision, the golden gradients in double.
 #[test]
 fn gradients_match_the_golden_ones() {
     for golden in all_gradients() {
@@ -41,7 +41,7 @@ fn gradients_match_the_golden_ones() {
                 );
                 println!("{of:45} norm {length:.1e} error {:.1e}", error / length);
                 let largest = found.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
-                let fits = if length == 0.0 { largest <= 1e-6 } else { error <= 1e-3 * length };
+                let fits = if length == 0.0 { largest <= 1e-6 } else { error <= 1e-5 * length };
                 assert!(fits, "{of}: differs by {error} of {length}");
             }
         }
@@ -309,7 +309,7 @@ fn assert_differences(case: &Case) {
         let error = norm(both.iter().map(|[found, difference]| found - difference));
         let length = norm(both.iter().map(|[found, _]| *found));
         println!("{:20} {:25} norm {length:.1e} error {error:.1e}", case.name, kind.name);
-        assert!(error <= 0.01 * length, "{} {}: {both:?}", case.name, kind.name);
+        assert!(error <= 2e-3 * length, "{} {}: {both:?}", case.name, kind.name);
     }
 }
 

@@ -86,7 +86,13 @@ fn gradients_are_those_of_the_original() {
                 let error = relative_error(found, expected);
                 println!("{:28} {name:7} {tensor:14} {error:.1e}", golden.name);
                 assert_eq!(found.len(), expected.len(), "{}: {tensor}", golden.name);
-                assert!(error <= 1e-3, "{}, {name}: {tensor} differs by {error:.1e}", golden.name);
+                // Sums over an environment map lose more digits; so do those over the times of static captures, which nearly cancel.
+                let limit = match (tensor, golden.scene.environment.is_some()) {
+                    (_, true) => 5e-4,
+                    (&"mean_t", false) => 1e-3,
+                    _ => 1e-4,
+                };
+                assert!(error <= limit, "{}, {name}: {tensor} differs by {error:.1e}", golden.name);
                 compared += 1;
             }
             assert_eq!(trainer.faults().expect("they can be read"), None, "every gradient is finite");
@@ -209,7 +215,8 @@ fn the_loss_and_its_gradient_are_those_of_the_reference() {
         let pairs = tensors(&found.parameters, &found.harmonics).into_iter();
         for ((name, found), (_, expected)) in pairs.zip(tensors(&expected.parameters, &expected.harmonics)) {
             let error = relative_error(&found, &expected);
-            assert!(error < 1e-3, "{name} differs by {error:.1e} with a mask of {weight}");
+            println!("mask {weight} {name:14} {error:.1e}");
+            assert!(error < 1e-4, "{name} differs by {error:.1e} with a mask of {weight}");
         }
     }
 }
@@ -292,7 +299,7 @@ fn the_gradients_of_terms_are_those_of_the_reference() {
         for ((name, found), (_, expected)) in found.iter().zip(&expected) {
             let error = relative_error(found, expected);
             println!("{term:8} {name:14} {error:.1e}");
-            assert!(error <= 1e-3, "{term}: {name} differs by {error:.1e}");
+            assert!(error <= 1e-5, "{term}: {name} differs by {error:.1e}");
         }
     }
 }

@@ -163,8 +163,8 @@ fn make_view(entry: &CameraEntry) -> View {
     view
 }
 
-/// Returns the largest absolute differences: of colour, depth and alpha outside the ambiguous pixels, and of any
-/// inside.
+/// Returns the largest absolute differences: of colour, depth and alpha outside the ambiguous pixels, and of colour and alpha inside,
+/// where a splat at the threshold may count or not.
 pub fn differences(golden: &GoldenView, frame: &Frame) -> ([f32; 3], f32) {
     let count = golden.alpha.len();
     let (mut clear, mut ambiguous) = ([0.0f32; 3], 0.0f32);
@@ -178,7 +178,7 @@ pub fn differences(golden: &GoldenView, frame: &Frame) -> ([f32; 3], f32) {
                 *worst = worst.max(value);
             }
         } else {
-            ambiguous = ambiguous.max(color);
+            ambiguous = ambiguous.max(color).max(alpha);
         }
     }
     (clear, ambiguous)
