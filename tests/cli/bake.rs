@@ -2,7 +2,8 @@
 //!
 //! In: a small synthetic scene and a dataset drawn from it by the CPU reference. Out: proof that the package is smaller
 //! and both reports are written, that finished stages are not repeated, and that data of another capture and paths that
-//! cannot be written are refused; that a package is as small as it was asked to be, or not there.
+//! cannot be written are refused; that a package is as small as it was asked to be, or not there, and that a size which cannot be is refused
+//! at once.
 
 use crate::support::command::{Run, arguments, gs4d};
 use crate::support::no_gpu::no_gpu;
