@@ -11,7 +11,7 @@ use super::table::{Table, bytes};
 use crate::offline::engine::AdapterDescription;
 use crate::offline::orbit::{at_times, share};
 use crate::reference::{Workload, workload};
-use crate::renderer::{ColorPrecision, Design, GpuCapture, Headless, Timings};
+use crate::renderer::{ColorPrecision, Design, GpuCapture, Timings};
 use crate::scene::RuntimeScene;
 use crate::view::View;
 use serde_json::json;
@@ -103,12 +103,17 @@ impl Bench {
     /// # Errors
     /// A scene or views that cannot be used, no such adapter, a failure of the GPU.
     pub fn run(&self) -> Result<Report, Failure> {
-        let mut headless = self.renderer.open()?;
-        let mut subjects = Vec::new();
+        // A file that cannot be used is named where there is no adapter, too.
+        let mut read = Vec::new();
         for path in &self.scenes {
             for &form in &self.form {
-                subjects.push(self.subject(&headless, path, form)?);
+                read.push((path, form, self.read(path, form)?));
             }
+        }
+        let mut headless = self.renderer.open()?;
+        let mut subjects = Vec::with_capacity(read.len());
+        for (path, form, (scene, views)) in read {
+            subjects.push(Subject { path, form, capture: headless.upload(&scene)?, scene, views });
         }
         let mut rows = Vec::new();
         for subject in &subjects {
@@ -145,7 +150,8 @@ impl Bench {
         Ok(Report::new(json, format!("{adapter}\n{table}")))
     }
 
-    fn subject<'a>(&self, headless: &Headless, path: &'a Path, form: Form) -> Result<Subject<'a>, Failure> {
+    /// Returns a scene in the form in which it is drawn, and its views.
+    fn read(&self, path: &Path, form: Form) -> Result<(RuntimeScene, Vec<View>), Failure> {
         let scene = self.checkpoint.load(path)?;
         let scene = if form == Form::Unpacked { scene.unpacked() } else { scene };
         let scene = scene.into_runtime().map_err(|error| Failure::at(path, &error))?;
@@ -153,8 +159,8 @@ impl Bench {
         if let Some(times) = self.times {
             shots = at_times(shots, times, scene.trained_with.time_interval);
         }
-        let views: Vec<View> = shots.iter().map(|shot| shot.view(&scene)).collect();
-        Ok(Subject { path, form, capture: headless.upload(&scene)?, scene, views })
+        let views = shots.iter().map(|shot| shot.view(&scene)).collect();
+        Ok((scene, views))
     }
 }
 

@@ -2,7 +2,8 @@
 //!
 //! In: a small synthetic scene and a dataset drawn from it by the CPU reference. Out: proof that the package is smaller
 //! and both reports are written, that finished stages are not repeated, and that data of another capture and paths that
-//! cannot be written are refused; that a package is as small as it was asked to be, or not there.
+//! cannot be written are refused; that a package is as small as it was asked to be, or not there, and that a size which cannot be is refused
+//! at once.
 
 use crate::support::command::{Run, arguments, gs4d};
 use crate::support::no_gpu::no_gpu;
@@ -52,9 +53,16 @@ impl Capture {
         gs4d(&[fixed.to_vec(), plain.map(Into::into).collect()].concat())
     }
 
-    /// Returns the bytes of a package of the Gaussian with the highest score, which a bake to an absurd size names.
-    fn bytes_of_one(&self) -> u64 {
+    /// Returns the bytes of a package without Gaussians, which a bake to an absurd size names.
+    fn bytes_of_none(&self) -> u64 {
         let refused = self.bake_to_size(100.0, &[]);
+        refused.must_fail("without Gaussians has ");
+        number_after(&refused.err, "without Gaussians has ")
+    }
+
+    /// Returns the bytes of a package of the Gaussian with the highest score, which a bake to hardly more names.
+    fn bytes_of_one(&self) -> u64 {
+        let refused = self.bake_to_size(self.bytes_of_none() as f64 + 0.5, &[]);
         refused.must_fail("a single Gaussian has ");
         number_after(&refused.err, "a single Gaussian has ")
     }
@@ -223,6 +231,7 @@ fn a_package_that_stays_too_large_replaces_nothing_and_is_kept_aside() {
     // The count is found with the support filter: the name of this one is longer, so that not even one Gaussian fits in the end.
     let run = capture.bake_to_size(one as f64 + 0.5, &["--filter", "key-frame"]);
     run.must_fail("does not fit");
+    run.must_fail("not even with a single Gaussian");
     run.must_fail("choose a lower quality or a larger size");
     assert_eq!(read(&out), "the one from before", "the old file stays");
     let kept = capture.folder.path().join("out.gs4d.bake/too-large.gs4d");
@@ -241,15 +250,32 @@ fn a_package_that_stays_too_large_replaces_nothing_and_is_kept_aside() {
     );
 }
 
-#[test]
-fn what_all_gaussians_need_counts_once() {
+/// Returns a capture with an environment map, of values that hardly compress.
+fn surrounded() -> Capture {
     let mut trained = synthesize(&SynthSettings { count: 2000, degree: 0, ..SynthSettings::default() });
     let (width, height) = (128, 64);
-    // Values that hardly compress.
     let texel = |at: u32| (at.wrapping_mul(0x9E37_79B9) >> 8) as f32 / (1u32 << 24) as f32;
     let texels = (0..3 * width * height).map(texel).collect();
     trained.environment = Some(Environment { width, height, texels });
-    let capture = capture_of(trained, Vec3::ZERO, true);
+    capture_of(trained, Vec3::ZERO, true)
+}
+
+#[test]
+fn a_size_below_what_every_package_needs_is_refused_before_anything_is_scored() {
+    let capture = surrounded();
+    let none = capture.bytes_of_none();
+    assert!(none > 20_000, "it counts the environment map: {none}");
+    let refused = capture.bake_to_size(none as f64 - 0.5, &[]);
+    refused.must_fail(&format!("does not fit into {} bytes: a package without Gaussians has {none};", none - 1));
+    assert!(!refused.err.contains("score:"), "nothing is scored: {}", refused.err);
+    assert_eq!(capture.left(), ["data", "scene.gs4d"], "nothing is left");
+    let one = capture.bytes_of_one();
+    assert!((none..none + 5000).contains(&one), "a Gaussian needs little more: {one} after {none}");
+}
+
+#[test]
+fn what_all_gaussians_need_counts_once() {
+    let capture = surrounded();
     let one = capture.bytes_of_one();
     assert!(one > 20_000, "most of it is the environment map: {one}");
     let limit = one + 10_000;

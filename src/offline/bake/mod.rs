@@ -4,6 +4,7 @@
 //! `NAME.report.html` beside a package `NAME.gs4d` ([`Baked`]). The stages (see [`Stage`]) before the evaluation store
 //! their results in the folder `OUT.bake` beside a package `OUT` ([`Work`]), so that an interrupted bake resumes. Two bakes cannot share it.
 
+mod attempts;
 mod compression;
 mod evaluation;
 mod pruning;
@@ -59,7 +60,8 @@ pub struct BakeSettings {
     pub filter: FilterKind,
     /// Number of key-frames of the filter.
     pub key_frames: KeyFrames,
-    /// How the remaining Gaussians are trained, if there is a GPU and the images of the training views are there; `None` leaves that out.
+    /// How the remaining Gaussians are trained, if there is a GPU and the images of the training views are there; `None` leaves that out. An
+    /// interrupted training goes on from its last evaluation; that of codebooks, from a multiple of as many steps.
     pub fine_tune: Option<FineTuneSettings>,
     /// How much compression may lose.
     pub quality: Quality,
@@ -150,8 +152,10 @@ impl<'a> Bake<'a> {
         if let (Some(tuning), Engine::Gpu(headless)) = (self.tunes(), &*self.engine) {
             tuning.sums.check(headless)?;
         }
+        self.require_room()?;
         let mut stages = Stages::begin(progress);
-        let mut pruning = self.prune(&mut stages)?;
+        let first = self.prune(&mut stages)?;
+        let mut pruning = self.resume_attempt(first, &mut stages);
         let (filter, after, tuning) = loop {
             let (thinned, fingerprint) = self.thin(&mut stages, &pruning)?;
             let (mut tuned, tuning, fingerprint) = self.fine_tune(&mut stages, thinned, fingerprint)?;
@@ -159,7 +163,7 @@ impl<'a> Bake<'a> {
             let after = sliced(&tuned)?.into_owned();
             tuned.filter = Some(filter.clone());
             match self.compress(&mut stages, tuned, tuning.as_ref(), masked)? {
-                Some(size) => pruning = self.keep_fewer(&pruning, size, &mut stages)?,
+                Some(size) => pruning = self.keep_fewer(pruning, size, &mut stages)?,
                 None => break (filter, after, tuning),
             }
         };

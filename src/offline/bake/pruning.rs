@@ -28,7 +28,7 @@ pub(super) struct Pruning {
     pub scores: Vec<f32>,
     /// How they were selected.
     pub found: Found,
-    /// Fingerprint of everything that the result depends on.
+    /// Fingerprint of everything that the result depends on, but for how many packages were too large.
     pub fingerprint: Fingerprint,
     /// Packages made before with more Gaussians, which were too large.
     pub bakes: usize,

@@ -23,7 +23,8 @@ impl Bake<'_> {
         pruning: &Pruning,
     ) -> Result<(GaussianScene, Fingerprint), OfflineError> {
         const FILE: &str = "thinned.gs4d";
-        let (rounds, fingerprint) = (self.settings.rounds, pruning.fingerprint);
+        let rounds = self.settings.rounds;
+        let fingerprint = pruning.fingerprint.and(&format!("{} Gaussians", pruning.kept.len()));
         let tunes = self.tunes().filter(|_| rounds > 1).cloned();
         let Some((tuning, variant)) = tunes.zip(pruning.found.score.parse::<Variant>().ok()) else {
             stages.note_left_out(Stage::Rounds, None);

@@ -1,11 +1,9 @@
 //! How many Gaussians fit into a package of a given size.
 //!
-//! In: a number of bytes, scores. Out: the number of Gaussians; fewer of them if the package that was made is too large. Only a package that
-//! is not takes its place.
+//! In: a number of bytes, scores. Out: the number of Gaussians, as far as can be told before they are trained. Only a package that is small
+//! enough takes its place.
 
 use super::Bake;
-use super::pruning::Pruning;
-use super::stages::Stages;
 use crate::codec::{CodecError, package};
 use crate::offline::prune::{highest, select};
 use crate::offline::quantize::{CompressSettings, compress};
@@ -18,18 +16,31 @@ use std::path::Path;
 
 /// Bytes of a Gaussian with which the search begins.
 const BYTES_OF_GAUSSIAN: u64 = 24;
-/// Packages that are tried before the bake, and whole bakes.
+/// Packages that are tried before the bake.
 const TRIES: usize = 5;
-const BAKES: usize = 4;
 /// The share of the room for Gaussians that is aimed at: training changes how well a package compresses.
 const AIM: f64 = 0.985;
 /// A package this much smaller, as a share of the size, is large enough.
 const NEAR: f64 = 0.97;
 /// Names of the package that was just made and of the smallest that was too large, in the folder of the bake.
 pub(super) const MADE: &str = "package.gs4d";
-const TOO_LARGE: &str = "too-large.gs4d";
+pub(super) const TOO_LARGE: &str = "too-large.gs4d";
 
 impl Bake<'_> {
+    /// Checks, before anything is computed, that there is room for what the package of this capture has whichever Gaussians are kept: the header
+    /// and the environment map. A filter and codebooks come with the Gaussians.
+    ///
+    /// # Errors
+    /// There is none.
+    pub(super) fn require_room(&self) -> Result<(), OfflineError> {
+        let Goal::Size(limit) = self.settings.goal else { return Ok(()) };
+        let least = self.size_of(&[])?;
+        if least > limit {
+            return Err(self.too_small(limit, &format!("a package without Gaussians has {least}")));
+        }
+        Ok(())
+    }
+
     /// Returns how many of the Gaussians with the highest scores fit into a package of this many bytes, before they are trained. Begins the
     /// task "finding the count".
     ///
@@ -63,7 +74,7 @@ impl Bake<'_> {
     }
 
     /// Returns the bytes of a package of these Gaussians as they are.
-    fn size_of(&self, kept: &[u32]) -> Result<u64, OfflineError> {
+    pub(super) fn size_of(&self, kept: &[u32]) -> Result<u64, OfflineError> {
         let (settings, out) = (self.settings, &self.settings.out);
         let mut scene = select(&self.subject.scene, kept);
         let segments = settings.key_frames.count(&self.views).max(2) as u32 - 1;
@@ -88,40 +99,6 @@ impl Bake<'_> {
         }
     }
 
-    /// Returns a selection of fewer Gaussians after their package turned out to have `size` bytes, which are too many. The smallest such
-    /// package is kept in the folder of the bake.
-    ///
-    /// # Errors
-    /// It has been too large several times.
-    pub(super) fn keep_fewer(
-        &self,
-        pruning: &Pruning,
-        size: u64,
-        stages: &mut Stages<'_>,
-    ) -> Result<Pruning, OfflineError> {
-        let (limit, folder) = (self.limit(), self.work.folder());
-        let kept = folder.join(TOO_LARGE);
-        if size < pruning.smallest {
-            fs::rename(folder.join(MADE), &kept).map_err(|error| OfflineError::at(&kept, error))?;
-        }
-        let smallest = size.min(pruning.smallest);
-        let count = fitting(pruning.kept.len(), size, limit, self.size_of(&highest(&pruning.scores, 1))?);
-        if pruning.bakes + 1 == BAKES || count == 0 {
-            let kept = kept.display();
-            let found = format!("the smallest package that was made has {smallest} and is kept as {kept}");
-            return Err(self.too_small(limit, &found));
-        }
-        stages.note(&format!("the package has {size} bytes, {limit} are allowed: again with {count} Gaussians"));
-        Ok(Pruning {
-            kept: highest(&pruning.scores, count),
-            scores: pruning.scores.clone(),
-            found: pruning.found.clone(),
-            fingerprint: pruning.fingerprint.and(&format!("{count}")),
-            bakes: pruning.bakes + 1,
-            smallest,
-        })
-    }
-
     /// Removes the packages in the folder of the bake, once there is one in its place.
     pub(super) fn remove_made(&self) {
         for name in [MADE, TOO_LARGE] {
@@ -131,7 +108,7 @@ impl Bake<'_> {
     }
 
     /// Returns the error that no package has been found that is small enough; `found` says what the smallest has.
-    fn too_small(&self, limit: u64, found: &str) -> OfflineError {
+    pub(super) fn too_small(&self, limit: u64, found: &str) -> OfflineError {
         let remedy = "choose a lower quality or a larger size; a file that was here before has not changed";
         let reason = format!("this capture does not fit into {limit} bytes: {found}; {remedy}");
         OfflineError::at(&self.settings.out, reason)
@@ -154,7 +131,7 @@ pub(super) fn put_in_place(made: &Path, out: &Path, limit: u64) -> Result<Option
 }
 
 /// Returns the count at which a package that has `size` bytes with `count` Gaussians, and `one` with a single one, would have nearly `limit`.
-fn fitting(count: usize, size: u64, limit: u64, one: u64) -> usize {
+pub(super) fn fitting(count: usize, size: u64, limit: u64, one: u64) -> usize {
     let [room, used] = [limit, size].map(|bytes| bytes.saturating_sub(one) as f64);
     (count as f64 * AIM * room / used.max(1.0)) as usize
 }

@@ -99,6 +99,11 @@ impl<'a> Stages<'a> {
         self.progress.note(line);
     }
 
+    /// Returns where progress is reported.
+    pub fn progress(&mut self) -> &mut dyn Progress {
+        self.progress
+    }
+
     /// Returns the durations of the stages run so far.
     pub fn times(&self) -> Vec<StageTime> {
         self.times.clone()

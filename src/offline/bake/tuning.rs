@@ -15,9 +15,6 @@ use crate::scene::{GaussianScene, SceneForm};
 use serde::{Deserialize, Serialize};
 use std::io::Cursor;
 
-/// Steps between two states that an interrupted training goes on from.
-const SAVE_EVERY: usize = 500;
-
 /// How the quality developed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Tuning {
@@ -46,7 +43,7 @@ impl Bake<'_> {
             return Ok((pruned, None, before));
         };
         let (scene, tuning) = stages.run(Stage::FineTune, stored, |progress| {
-            let resume = Resume { work, fingerprint, every: SAVE_EVERY };
+            let resume = Resume { work, fingerprint, every: tuning.evaluate_every };
             let tuned = fine_tune(headless, pruned, views, tuning, Some(resume), progress)?;
             let tuning = Tuning { curve: tuned.curve, best: tuned.best, held_out: tuned.held_out };
             let mut bytes = Vec::new();
@@ -75,7 +72,7 @@ impl Bake<'_> {
         };
         let steps = tuning.steps / 3;
         let coding = FineTuneSettings { steps: 0, compress: Some((settings.quality, steps)), ..tuning.clone() };
-        let resume = Resume { work, fingerprint, every: SAVE_EVERY };
+        let resume = Resume { work, fingerprint, every: tuning.evaluate_every };
         Ok(Some(fine_tune(headless, scene.clone(), views, &coding, Some(resume), progress)?.scene))
     }
 
