@@ -181,7 +181,8 @@ fn check_folder(out: &Path, folder: &Path) -> Result<(), OfflineError> {
     let shown = folder.display();
     let message = match folder.metadata() {
         Ok(metadata) if !metadata.is_dir() => format!("{shown} is a file, not a folder: write to another place"),
-        Ok(_) => match part::create(folder) {
+        // Without a name, where the system has that: a run that ends here leaves nothing behind.
+        Ok(_) => match tempfile::tempfile_in(folder) {
             Ok(_) => return Ok(()),
             Err(error) => format!("nothing can be written to the folder {shown}: {error}"),
         },

@@ -160,6 +160,18 @@ impl Progress for Interrupting {
 }
 
 #[test]
+fn colors_of_one_coefficient_are_compressed_without_codebooks() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new();
+    let mut scene = lesson.disturbed(None);
+    scene.form.truncate_colors(0, 0);
+    let settings = FineTuneSettings { steps: 2, compress: Some((Quality::Balanced, 4)), ..FineTuneSettings::default() };
+    let tuned = fine_tune(&mut headless, scene, &lesson.views, &settings, None, &mut NoProgress);
+    let colors = tuned.expect("it can be compressed").scene.form.color_degrees();
+    assert_eq!(colors.coefficients, 1, "nothing is added");
+}
+
+#[test]
 fn runs_that_were_interrupted_end_as_others() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();

@@ -34,9 +34,8 @@ impl Bake<'_> {
     pub(super) fn resume_attempt(&self, first: Pruning, stages: &mut Stages<'_>) -> Pruning {
         let stored = self.work.load(FILE, self.fingerprint_of_attempts(&first));
         let stored = stored.and_then(|text| ron::de::from_bytes::<Attempt>(&text).ok());
-        let follows = |stored: &Attempt| {
-            (1..first.kept.len()).contains(&stored.kept) && (1..ATTEMPTS).contains(&stored.bakes)
-        };
+        let follows =
+            |stored: &Attempt| (1..first.kept.len()).contains(&stored.kept) && (1..ATTEMPTS).contains(&stored.bakes);
         let Some(Attempt { kept, bakes, smallest }) = stored.filter(follows) else { return first };
         stages.note(&format!("packages of more Gaussians were too large: the bake goes on with {kept}"));
         let is_there = fs::metadata(self.work.folder().join(TOO_LARGE)).is_ok_and(|file| file.len() == smallest);

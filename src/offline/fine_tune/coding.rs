@@ -31,7 +31,9 @@ impl Run<'_> {
         self.trainer.forget_moments();
         let scene = self.trainer.scene()?.into_runtime()?;
         let settings = CompressSettings::suiting(quality, scene.len());
-        let steps = if settings.codebooks.is_empty() { 0 } else { steps };
+        // Codebooks hold all coefficients but the first.
+        let coded = scene.form.as_sliced().is_some_and(|sliced| sliced.harmonics.evaluated() > 1);
+        let steps = if settings.codebooks.is_empty() || !coded { 0 } else { steps };
         let bits = settings.geometry.filter(|_| self.settings.rounding && steps > 0);
         let between = steps_between(scene.len());
         let mut step = 0;
