@@ -11,7 +11,7 @@ exec </dev/null
 
 # The features that can be built by themselves, those with Bevy apart. `default` is `bevy`; `openxr` is not tested.
 without_bevy=(renderer offline cli)
-with_bevy=(bevy testing inspector viewer)
+with_bevy=(bevy pbr picking testing inspector viewer)
 # Every test, example and document needs no more than these.
 everything=viewer,cli
 

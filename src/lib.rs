@@ -99,8 +99,8 @@
 //! * [`codec`] and [`mod@reference`] lie side by side: one reads files, the other draws, and neither needs the other.
 //! * [`plugin`] lies beside [`offline`] and does not use it, so that a game compiles neither datasets nor metrics. What both need lies
 //!   further in.
-//! * [`plugin`] has rings of its own, `component ▶ asset ▶ playback ▶ render ▶ picking, stereo ▶ inspector, testing`, of which the
-//!   features `inspector` and `testing` add the last two. The crate root re-exports them: a game writes `bevy_gs4d::playback`.
+//! * [`plugin`] has rings of its own, `component ▶ asset ▶ playback ▶ render ▶ pbr, picking, stereo ▶ pointer, inspector, testing`, of
+//!   which `pbr`, `pointer` (feature `picking`), `inspector` and `testing` are features. The crate root re-exports them: a game writes `bevy_gs4d::playback`.
 //! * A picture is a [`Picture`](view::Picture), not an `Image`: Bevy and the crate `image` have an `Image` each, and one file may need
 //!   all three.
 //! * `score` is a pass of the offline half, not of a frame: its CPU reference and its pipelines are in [`mod@offline::score`], a client of
@@ -133,10 +133,12 @@
 //! | `renderer` | [`renderer`], on wgpu | |
 //! | `offline` | [`offline`] | `renderer` |
 //! | `bevy` (default) | [`plugin`]: [`asset`], [`playback`], [`render`], [`picking`], [`stereo`]; [`prelude`] | `renderer` |
+//! | `pbr` (default) | [`pbr`]: captures among Bevy's lit meshes | `bevy` |
+//! | `picking` (default) | pointer events on captures | `bevy` |
 //! | `cli` | [`cli`], the `gs4d` command; never compiles Bevy | `offline` |
 //! | `inspector` | [`inspector`]: a panel to watch and control captures with | `bevy` |
 //! | `testing` | [`testing`]: Bevy apps without a window, drawn into pictures | `bevy` |
-//! | `viewer` | what the examples need: a window, lit meshes | `inspector`, `testing` |
+//! | `viewer` | what the examples need: a window, lit meshes | `pbr`, `picking`, `inspector`, `testing` |
 //! | `openxr` | the example `walkthrough` for a headset, untried | `viewer` |
 #![cfg_attr(
     not(all(feature = "cli", feature = "inspector", feature = "testing")),

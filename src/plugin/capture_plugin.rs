@@ -25,5 +25,7 @@ pub struct GaussianCapturePlugin;
 impl Plugin for GaussianCapturePlugin {
     fn build(&self, app: &mut App) {
         app.add_plugins((CaptureAssetPlugin, PlaybackPlugin, CaptureRenderPlugin));
+        #[cfg(feature = "pbr")]
+        app.add_plugins(super::pbr::CapturePbrPlugin);
     }
 }

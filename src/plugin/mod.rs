@@ -5,25 +5,28 @@
 //! only modules before it:
 //!
 //! ```text
-//! component ──▶ asset ──▶ playback ──▶ render ──▶ picking, stereo ──▶ inspector, testing
+//! component ──▶ asset ──▶ playback ──▶ render ──▶ pbr, picking, stereo ──▶ pointer, inspector, testing
 //! ```
 //!
 //! * [`component`]: the capture asset, and the component that places it in the world
 //! * [`asset`]: loading and saving captures, and the state of loading on each entity
 //! * [`playback`]: the time of each capture; shared clocks and timelines
 //! * [`render`]: drawing captures into the targets of cameras, and their settings
+//! * `pbr` (feature `pbr`): captures among Bevy's lit meshes
 //! * [`picking`]: the Gaussian that a ray hits
 //! * [`stereo`]: two eyes on one head
 //! * `inspector` (feature `inspector`): a panel that shows and edits captures
 //! * `testing` (feature `testing`): apps without a window, drawn into pictures
 //!
-//! [`GaussianCapturePlugin`] adds the first four to an app. Picking needs no plugin; stereo and the inspector have their own.
+//! [`GaussianCapturePlugin`] adds the first five to an app. Picking needs no plugin; stereo and the inspector have their own.
 
 pub mod asset;
 mod capture_plugin;
 pub mod component;
 #[cfg(feature = "inspector")]
 pub mod inspector;
+#[cfg(feature = "pbr")]
+pub mod pbr;
 pub mod picking;
 pub mod playback;
 pub mod render;

@@ -35,6 +35,11 @@ pub(super) struct CaptureView {
     /// The pass that writes to the camera's depth buffer, if the camera asks for it, and what that pass binds.
     pub(super) write_depth: Option<CachedRenderPipelineId>,
     pub(super) depth_bindings: WriteDepthBindings,
+    /// Whether other systems work on the captures' picture before it reaches the target, in
+    /// [`CaptureSystems::Shade`](super::CaptureSystems).
+    pub(crate) is_shaded: bool,
+    /// What they made of it, which the composite takes instead of the renderer's colour.
+    pub(crate) shaded: Option<wgpu::TextureView>,
     /// Whether GPU times are measured.
     measured: bool,
     /// Whether captures are drawn after transparent meshes even without multisampling.
@@ -73,6 +78,8 @@ impl CaptureView {
             bindings: CompositeBindings::default(),
             write_depth: None,
             depth_bindings: WriteDepthBindings::default(),
+            is_shaded: false,
+            shaded: None,
             measured: false,
             late: false,
             idle: 0,

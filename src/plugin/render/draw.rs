@@ -1,7 +1,8 @@
 //! Draw: captures into a camera's target, in Bevy's `Core3d` schedule.
 //!
 //! In: the camera's view, prepared by [`prepare`](super::prepare). Out: one compute pass, the composite and, if the
-//! camera asks for it, `write_depth`, recorded.
+//! camera asks for it, `write_depth`, recorded. If other systems work on the captures' picture before it reaches the target,
+//! the compute pass is recorded before them.
 
 use super::active::ActiveLists;
 use super::capture_views::{CaptureView, CaptureViews};
@@ -24,6 +25,10 @@ use bevy::render::view::{Msaa, ViewDepthTexture, ViewTarget};
 /// Sets of systems in the render world's `Core3d` schedule, for ordering.
 #[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
 pub enum CaptureSystems {
+    /// The renderer draws captures into a picture of their own, after opaque meshes, if [`Shade`](Self::Shade) needs it.
+    Record,
+    /// That picture is changed before it reaches the target.
+    Shade,
     /// Captures are drawn after opaque meshes and before transparent ones. Passes of others between the two (transmission) should be
     /// ordered against it.
     Draw,
@@ -39,6 +44,22 @@ pub(super) struct Passes<'w> {
     cache: Res<'w, PipelineCache>,
     composite: Res<'w, CompositePipeline>,
     write_depth: Res<'w, WriteDepthPipeline>,
+}
+
+/// Draws the captures of one camera into a picture of their own, if others work on it before the composite.
+pub(super) fn record_captures(
+    camera: ViewQuery<()>,
+    renderer: Option<Res<CaptureRenderer>>,
+    captures: Res<RenderAssets<GpuGaussianCapture>>,
+    lists: Res<ActiveLists>,
+    passes: Passes,
+    mut views: ResMut<CaptureViews>,
+    mut context: RenderContext,
+) {
+    let (Some(renderer), Some(view)) = (renderer, views.0.get_mut(&camera.entity())) else { return };
+    if view.is_shaded && passes.can_draw(view) {
+        passes.record(view, &renderer, &captures, &lists, &mut context);
+    }
 }
 
 /// Draws the captures of one camera. Registered twice, because multisampled targets can be read only once they have been resolved, which
@@ -59,26 +80,44 @@ pub(super) fn draw_captures<const LATE: bool>(
     if (*msaa != Msaa::Off || view.late) != LATE {
         return;
     }
-    // Without the composite the work would stay invisible.
-    if !view.sees_something() || passes.cache.get_render_pipeline(view.composite).is_none() {
+    if !passes.can_draw(view) {
         return;
     }
-    let instances = view.instances(&captures, &lists);
-    let diagnostics = context.diagnostic_recorder();
-    let diagnostics = diagnostics.as_deref();
-    let span = diagnostics.time_span(context.command_encoder(), "gs4d");
-    view.renderer.record(&renderer.0, context.command_encoder(), &instances);
-    span.end(context.command_encoder());
+    if !view.is_shaded {
+        passes.record(view, &renderer, &captures, &lists, &mut context);
+    }
     passes.composite(view, target, &mut context, renderer.0.work());
     passes.write_depth(view, depth, &mut context, renderer.0.work());
 }
 
 impl Passes<'_> {
+    /// Returns whether there is anything to draw. Without the composite the work would stay invisible.
+    fn can_draw(&self, view: &CaptureView) -> bool {
+        view.sees_something() && self.cache.get_render_pipeline(view.composite).is_some()
+    }
+
+    /// Records the renderer's compute pass.
+    fn record(
+        &self,
+        view: &mut CaptureView,
+        renderer: &CaptureRenderer,
+        captures: &RenderAssets<GpuGaussianCapture>,
+        lists: &ActiveLists,
+        context: &mut RenderContext,
+    ) {
+        let instances = view.instances(captures, lists);
+        let diagnostics = context.diagnostic_recorder();
+        let diagnostics = diagnostics.as_deref();
+        let span = diagnostics.time_span(context.command_encoder(), "gs4d");
+        view.renderer.record(&renderer.0, context.command_encoder(), &instances);
+        span.end(context.command_encoder());
+    }
+
     /// Draws captures over the target.
     fn composite(&self, view: &mut CaptureView, target: &ViewTarget, context: &mut RenderContext, work: &WorkCounters) {
         // Fetched before `post_process_write` swaps the target's textures: from then on, the other one must be written.
         let Some(pipeline) = self.cache.get_render_pipeline(view.composite) else { return };
-        let Some(color) = view.renderer.color() else { return };
+        let Some(color) = view.shaded.as_ref().or(view.renderer.color()) else { return };
         let source = (!view.in_place).then(|| target.main_texture_view());
         let group = view.bindings.group(&self.device, &self.cache, &self.composite, source, color, work);
         let Some(group) = group else { return };

@@ -5,7 +5,7 @@
 use super::active::{ActiveLists, prepare_active_lists, record_active_lists};
 use super::capture_views::CaptureViews;
 use super::composite::{CaptureShaders, CompositePipeline};
-use super::draw::{CaptureSystems, draw_captures};
+use super::draw::{CaptureSystems, draw_captures, record_captures};
 use super::extract::{ExtractedCaptures, ExtractedViewSettings, extract_captures, extract_view_settings};
 use super::prepare::{make_depth_readable, prepare_views};
 use super::publish::publish_statistics;
@@ -82,9 +82,21 @@ fn build_rendering(app: &mut App) {
         )
         // Recorded, and therefore submitted, before the first camera.
         .add_systems(RenderGraph, record_active_lists.in_set(RenderGraphSystems::Render).before(camera_driver))
+        .configure_sets(
+            Core3d,
+            CaptureSystems::Shade
+                .after(CaptureSystems::Record)
+                .before(CaptureSystems::Draw)
+                .before(CaptureSystems::DrawLate)
+                .in_set(Core3dSystems::MainPass),
+        )
         .add_systems(
             Core3d,
             (
+                record_captures
+                    .after(main_opaque_pass_3d)
+                    .before(main_transparent_pass_3d)
+                    .in_set(CaptureSystems::Record),
                 draw_captures::<false>
                     .after(main_opaque_pass_3d)
                     .before(main_transparent_pass_3d)

@@ -134,6 +134,7 @@ pub(super) fn prepare_views(
         state.set_design(&renderer.0, settings.design);
         state.measure(measure, &device, &queue, &renderer.0);
         state.drawn.clear();
+        (state.is_shaded, state.shaded) = (false, None);
         let lens = drawable_lens(view, camera);
         if let Some(lens) = &lens {
             scene.collect(lens, view, size, visible, &mut state.drawn);

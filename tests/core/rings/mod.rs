@@ -31,8 +31,10 @@ const PLUGIN: &Order = &[
     ("playback", &["component", "asset"]),
     ("render", &["component", "asset", "playback"]),
     ("picking", &["component", "asset", "playback", "render"]),
+    ("pbr", &["component", "asset", "playback", "render"]),
     ("stereo", &["component", "asset", "playback", "render"]),
-    ("inspector", &["component", "asset", "playback", "render", "picking", "stereo"]),
+    ("pointer", &["component", "asset", "playback", "render", "picking"]),
+    ("inspector", &["component", "asset", "playback", "render", "pbr", "picking", "stereo"]),
     ("testing", &["component", "asset", "playback", "render", "picking", "stereo"]),
 ];
 
