@@ -22,7 +22,7 @@ use bevy::core_pipeline::schedule::Core3d;
 use bevy::pbr::main_transmissive_pass_3d;
 use bevy::prelude::*;
 use bevy::render::RenderApp;
-use bevy::render::render_resource::{Extent3d, TextureFormat, TextureUsages};
+use bevy::render::render_resource::{Extent3d, TextureFormat};
 use bevy::render::renderer::{RenderAdapter, RenderDevice};
 use bevy::render::settings::WgpuFeatures;
 use bevy_gs4d::asset::GaussianCapture;
