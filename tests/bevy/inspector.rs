@@ -221,11 +221,13 @@ fn the_panel_warns_of_captures_that_are_not_seen_and_cameras_that_cannot_draw() 
     picture(&mut app, 0.0);
     assert_eq!(warnings(&app), [""; 0], "hidden, it is not missed");
 
-    app.world_mut().entity_mut(camera).insert(CompositingSpace::Oklab);
+    let near_clip_plane = Vec3::new(0.1, 0.0, -1.0).normalize().extend(-0.4);
+    let oblique = PerspectiveProjection { near_clip_plane, ..default() };
+    app.world_mut().entity_mut(camera).insert(Projection::Perspective(oblique));
     picture(&mut app, 0.0);
     let said = warnings(&app);
-    assert!(matches!(&said[..], [said] if said.starts_with("eye: ") && said.contains("Oklab")), "the camera: {said:?}");
-    app.world_mut().entity_mut(camera).remove::<CompositingSpace>();
+    assert!(matches!(&said[..], [said] if said.starts_with("eye: captures are drawn over")), "the lens: {said:?}");
+    app.world_mut().entity_mut(camera).insert(Projection::default());
 
     let handle = app.world().resource::<AssetServer>().load("there-is-none.gs4d");
     app.world_mut().spawn(GaussianCapture3d(handle));
