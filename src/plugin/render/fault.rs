@@ -6,9 +6,9 @@ use super::view::CameraLens;
 use bevy::camera::CompositingSpace;
 use glam::Mat4;
 
-/// What keeps a camera from drawing captures as it draws meshes, with the remedy.
+/// What keeps a camera from drawing captures as it draws meshes; the text names the remedy. It is logged once, and shown by the inspector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum CameraFault {
+pub enum CameraFault {
     /// Colors are composited in Oklab.
     #[error("captures are not drawn for a camera with CompositingSpace::Oklab: use Srgb or Linear")]
     Oklab,
@@ -27,8 +27,9 @@ pub(crate) enum CameraFault {
 }
 
 impl CameraFault {
-    /// Returns the gravest fault of a camera.
-    pub(crate) fn of(clip_from_view: &Mat4, space: Option<CompositingSpace>) -> Option<Self> {
+    /// Returns the gravest fault of a camera with this projection matrix (`Camera::clip_from_view`) and this component, if it has it;
+    /// `None` if captures are drawn as they should be.
+    pub fn of(clip_from_view: &Mat4, space: Option<CompositingSpace>) -> Option<Self> {
         if space == Some(CompositingSpace::Oklab) {
             return Some(Self::Oklab);
         }

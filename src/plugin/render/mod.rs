@@ -68,7 +68,7 @@ mod visibility;
 mod write_depth;
 
 pub use draw::CaptureSystems;
-pub(crate) use fault::CameraFault;
+pub use fault::CameraFault;
 pub(crate) use plugin::CaptureRenderPlugin;
 pub use settings::{CaptureSettings, CaptureViewSettings, CropBox, DepthWrite};
 pub use statistics::CaptureStatistics;
