@@ -189,6 +189,59 @@ fn count_changes(changed: Query<(), Changes>, inspector: Res<Inspector>, mut see
     seen.changes += changed.iter().count() + usize::from(inspector.is_changed());
 }
 
+/// Returns how many pixels of the panel are rather red, as warnings are and nothing else of it.
+fn reddish(picture: &RgbaImage) -> usize {
+    let red = |&(x, y): &(u32, u32)| {
+        let [r, _, b, _] = picture.get_pixel(x, y).0;
+        i32::from(r) - i32::from(b) > 100
+    };
+    PANEL.flat_map(|x| (16..SIZE.y - 16).map(move |y| (x, y))).filter(red).count()
+}
+
+fn warnings(app: &App) -> Vec<String> {
+    app.world().resource::<Inspector>().warnings.clone()
+}
+
+#[test]
+fn the_panel_warns_of_captures_that_are_not_seen_and_cameras_that_cannot_draw() {
+    let Some((mut app, camera)) = inspected() else { return };
+    let entity = spawn_capture(&mut app, Playback::paused_at(0.5));
+    app.world_mut().entity_mut(entity).insert(Name::new("dancer"));
+    app.world_mut().entity_mut(camera).insert(Name::new("eye"));
+    let plain = picture(&mut app, 0.0);
+    assert_eq!(warnings(&app), [""; 0], "a capture in front of the camera");
+
+    app.world_mut().entity_mut(entity).insert(Transform::from_xyz(0.0, 0.0, 500.0));
+    let warned = picture(&mut app, 0.0);
+    let said = warnings(&app);
+    assert!(matches!(&said[..], [said] if said.starts_with("dancer: no camera sees it")), "behind it: {said:?}");
+    let [before, after] = [&plain, &warned].map(reddish);
+    assert!(after > before + 20, "which is written in red: {before} such pixels become {after}");
+    app.world_mut().entity_mut(entity).insert(Visibility::Hidden);
+    picture(&mut app, 0.0);
+    assert_eq!(warnings(&app), [""; 0], "hidden, it is not missed");
+
+    let near_clip_plane = Vec3::new(0.1, 0.0, -1.0).normalize().extend(-0.4);
+    let oblique = PerspectiveProjection { near_clip_plane, ..default() };
+    app.world_mut().entity_mut(camera).insert(Projection::Perspective(oblique));
+    picture(&mut app, 0.0);
+    let said = warnings(&app);
+    assert!(matches!(&said[..], [said] if said.starts_with("eye: captures are drawn over")), "the lens: {said:?}");
+    app.world_mut().entity_mut(camera).insert(Projection::default());
+
+    let handle = app.world().resource::<AssetServer>().load("there-is-none.gs4d");
+    app.world_mut().spawn(GaussianCapture3d(handle));
+    for _ in 0..1000 {
+        if !warnings(&app).is_empty() {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+        run(&mut app, 1, 0.0);
+    }
+    let said = warnings(&app);
+    assert!(matches!(&said[..], [said] if said.contains("there-is-none.gs4d")), "the file: {said:?}");
+}
+
 #[test]
 fn a_debug_view_is_that_of_the_renderer_without_bevy() {
     let Some((mut app, camera)) = inspected() else { return };

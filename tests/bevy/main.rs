@@ -15,6 +15,7 @@ mod picking;
 mod playback;
 mod steady;
 mod stereo;
+mod testing;
 mod timeline;
 mod views;
 mod walkthrough;

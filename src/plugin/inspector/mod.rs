@@ -13,6 +13,7 @@
 //!
 //! | section | shows and sets |
 //! |---|---|
+//! | warnings | captures that failed to load, that no camera sees or that have times without active Gaussians; cameras that cannot draw them |
 //! | capture | which capture is shown, and its state of loading, with the reason if that failed |
 //! | playback | play and pause, steps of a frame, the time under the marks of the key-frames, speed, repeat, range |
 //! | appearance | the capture's temporal filter, opacity, tint, exposure and crop box |
@@ -34,6 +35,7 @@ mod plugin;
 mod presentation;
 mod settings;
 mod timing;
+mod warnings;
 
 pub use plugin::InspectorPlugin;
 pub use settings::Inspector;

@@ -6,14 +6,16 @@ use super::entity_selector::{self, Choice};
 use super::presentation::smoothed;
 use super::settings::Inspector;
 use super::timing::Measuring;
-use super::{appearance, camera, counts, memory, playback, timing};
+use super::warnings::{IdleTimes, PlacedCamera, PlacedCapture};
+use super::{appearance, camera, counts, memory, playback, timing, warnings};
 use crate::plugin::asset::CaptureState;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::Playback;
-use crate::plugin::render::{CaptureSettings, CaptureStatistics, CaptureViewSettings};
+use crate::plugin::render::{CameraFault, CaptureSettings, CaptureStatistics, CaptureViewSettings, DepthWrite};
 use bevy::app::{App, Plugin, PreUpdate, Update};
 use bevy::asset::{AssetServer, Assets};
-use bevy::camera::{Camera, Camera3d, RenderTarget};
+use bevy::camera::visibility::{InheritedVisibility, VisibleEntities};
+use bevy::camera::{Camera, Camera3d, CompositingSpace, RenderTarget};
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::ecs::change_detection::DetectChangesMut;
 use bevy::ecs::entity::Entity;
@@ -31,6 +33,7 @@ use bevy_egui::{
     EguiContext, EguiContexts, EguiGlobalSettings, EguiPlugin, EguiPreUpdateSet, EguiPrimaryContextPass,
     PrimaryEguiContext, egui, setup_primary_egui_context_system,
 };
+use std::any::TypeId;
 
 /// Draws the panel that [the module](crate::inspector) describes at the right edge of the first camera's picture. It is open at first; F1
 /// closes and opens it.
@@ -94,6 +97,7 @@ fn show_panel(
     mut inspector: ResMut<Inspector>,
     mut subject: Subject,
     mut measuring: Local<Measuring>,
+    mut idle: Local<IdleTimes>,
     mut frame_seconds: Local<f32>,
 ) {
     *frame_seconds = smoothed(*frame_seconds, subject.time.delta_secs());
@@ -102,6 +106,7 @@ fn show_panel(
     if let Ok(context) = contexts.ctx_mut()
         && inspector.open
     {
+        edited.warnings = subject.warnings(&mut idle);
         let height = (context.content_rect().height() - 2.0 * MARGIN).max(MARGIN);
         let mut open = true;
         egui::Window::new("inspector")
@@ -112,6 +117,7 @@ fn show_panel(
             .anchor(egui::Align2::RIGHT_TOP, [-MARGIN, MARGIN])
             .show(context, |ui| {
                 egui::ScrollArea::vertical().auto_shrink([false, true]).show(ui, |ui| {
+                    warnings::show(ui, &edited.warnings);
                     subject.show_capture(ui, &mut edited);
                     measures = subject.show_camera(ui, &mut edited, &mut measuring, *frame_seconds);
                     if !edited.note.is_empty() {
@@ -143,12 +149,17 @@ type CameraParts = (
     Option<&'static mut Tonemapping>,
 );
 
+/// What a camera sees, and how.
+type Sight = (&'static Camera, &'static VisibleEntities, Option<&'static CompositingSpace>);
+
 /// The captures and cameras that the panel shows.
 #[derive(SystemParam)]
 struct Subject<'w, 's> {
     commands: Commands<'w, 's>,
     captures: Query<'w, 's, CaptureParts>,
     cameras: Query<'w, 's, CameraParts, With<Camera3d>>,
+    sights: Query<'w, 's, Sight, With<Camera3d>>,
+    shown: Query<'w, 's, &'static InheritedVisibility, With<GaussianCapture3d>>,
     loaded: Res<'w, Assets<GaussianCapture>>,
     server: Res<'w, AssetServer>,
     statistics: Res<'w, CaptureStatistics>,
@@ -228,6 +239,40 @@ impl Subject<'_, '_> {
             let edited = camera::show_tonemapping(ui, *tonemapping);
             tonemapping.set_if_neq(edited);
         }
+    }
+
+    /// Returns what is wrong with captures and active cameras.
+    fn warnings(&self, idle: &mut IdleTimes) -> Vec<String> {
+        for (_, _, handle, ..) in self.captures.iter() {
+            if let Some(capture) = self.loaded.get(&handle.0) {
+                idle.find(handle.0.id(), capture);
+            }
+        }
+        let idle = &*idle;
+        let captures = self.capture_choices().into_iter().filter_map(|Choice { entity, label }| {
+            let (_, _, handle, state, _, settings) = self.captures.get(entity).ok()?;
+            let shows = self.shown.get(entity).is_ok_and(|visibility| visibility.get());
+            let idle = if settings.filter { idle.of(handle.0.id()) } else { &[] };
+            Some(PlacedCapture { label, state, shows, is_seen: self.is_seen(entity), idle })
+        });
+        let cameras = self.camera_choices().into_iter().filter_map(|Choice { entity, label }| {
+            let (camera, _, space) = self.sights.get(entity).ok()?;
+            let (_, _, settings, msaa, _) = self.cameras.get(entity).ok()?;
+            let draws = camera.is_active && camera.physical_target_size().is_some();
+            draws.then(|| PlacedCamera {
+                label,
+                fault: CameraFault::of(&camera.clip_from_view(), space.copied()),
+                is_multisampled: msaa.is_some_and(|msaa| *msaa != Msaa::Off),
+                writes_depth: settings.is_some_and(|settings| settings.depth != DepthWrite::None),
+            })
+        });
+        warnings::list(&captures.collect::<Vec<_>>(), &cameras.collect::<Vec<_>>())
+    }
+
+    /// Returns whether an active camera sees a capture.
+    fn is_seen(&self, capture: Entity) -> bool {
+        let class = TypeId::of::<GaussianCapture3d>();
+        self.sights.iter().any(|(camera, visible, _)| camera.is_active && visible.get(class).contains(&capture))
     }
 
     fn capture_choices(&self) -> Vec<Choice> {

@@ -35,10 +35,13 @@ pub struct Inspector {
     pub fps: f32,
     /// A line of text at the end of the panel. Default: empty, which shows none.
     pub note: String,
+    /// What the panel warns of, at its top: written by the panel while it is open. Default: empty.
+    pub warnings: Vec<String>,
 }
 
 impl Default for Inspector {
     fn default() -> Self {
-        Self { open: true, key: KeyCode::F1, selected: None, camera: None, fps: 30.0, note: String::new() }
+        let (note, warnings) = (String::new(), Vec::new());
+        Self { open: true, key: KeyCode::F1, selected: None, camera: None, fps: 30.0, note, warnings }
     }
 }

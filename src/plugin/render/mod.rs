@@ -54,6 +54,7 @@ mod capture_views;
 mod composite;
 mod draw;
 mod extract;
+mod fault;
 mod plugin;
 mod prepare;
 mod publish;
@@ -67,6 +68,7 @@ mod visibility;
 mod write_depth;
 
 pub use draw::CaptureSystems;
+pub use fault::CameraFault;
 pub(crate) use plugin::CaptureRenderPlugin;
 pub use settings::{CaptureSettings, CaptureViewSettings, CropBox, DepthWrite};
 pub use statistics::CaptureStatistics;

@@ -7,6 +7,7 @@ use super::active::ActiveLists;
 use super::capture_views::{CaptureView, CaptureViews, Drawn};
 use super::composite::{CompositeKey, CompositePipeline};
 use super::extract::{ExtractedCaptures, ExtractedViewSettings};
+use super::fault::CameraFault;
 use super::renderer::CaptureRenderer;
 use super::settings::{CaptureViewSettings, DepthWrite};
 use super::statistics::CaptureStatistics;
@@ -195,23 +196,15 @@ fn hides_opacity(debug: DebugView) -> bool {
 /// Returns the lens of a camera that captures can be drawn for; `None`, with a warning the first time, for other
 /// cameras.
 fn drawable_lens(view: &ExtractedView, camera: &ExtractedCamera) -> Option<CameraLens> {
-    if camera.compositing_space == Some(CompositingSpace::Oklab) {
-        warn_once!("captures are not drawn for a camera with CompositingSpace::Oklab: use Srgb or Linear");
-        return None;
+    let fault = CameraFault::of(&view.clip_from_view, camera.compositing_space);
+    // Each once, by a statement of its own.
+    match fault {
+        Some(CameraFault::Oklab) => warn_once!("{}", CameraFault::Oklab),
+        Some(CameraFault::Projection) => warn_once!("{}", CameraFault::Projection),
+        Some(CameraFault::NearPlane) => warn_once!("{}", CameraFault::NearPlane),
+        None => {}
     }
-    let lens = CameraLens::of(&view.clip_from_view);
-    match &lens {
-        None => warn_once!(
-            "captures are not drawn for a camera whose projection is skewed, mirrored or not reversed in depth: use Bevy's \
-             perspective or orthographic projection, or Projection::custom with a matrix like theirs"
-        ),
-        Some(lens) if lens.distance.is_none() => warn_once!(
-            "captures are drawn over meshes, not behind them, and write no depth, for a camera with its own near clip plane: \
-             leave PerspectiveProjection::near_clip_plane as it is, or draw captures with another camera"
-        ),
-        Some(_) => {}
-    }
-    lens
+    CameraLens::of(&view.clip_from_view).filter(|_| fault != Some(CameraFault::Oklab))
 }
 
 /// Returns the depth of opaque meshes; `None` if it cannot be read.

@@ -6,19 +6,39 @@ use crate::codec::CodecError;
 use bevy::asset::AssetLoadError;
 use std::sync::Arc;
 
-/// Why an app could not be drawn into a picture.
+/// Why an app could not be drawn into a picture, or could not go on.
 #[derive(Debug, thiserror::Error)]
 pub enum TestingError {
     /// The machine has no GPU adapter: a reason to skip a test, not to fail it.
     #[error("no GPU adapter: install a Vulkan driver (mesa-vulkan-drivers has one in software)")]
     NoGpu,
+    /// The machine has a GPU adapter, but the app has no renderer that can be watched.
+    #[error(
+        "the app has no renderer: make it with bevy_gs4d::testing::app, or add Bevy's RenderPlugin; with PipelinedRenderingPlugin, \
+         settle the app before anything else finishes its plugins"
+    )]
+    NoRenderer,
+    /// A plugin is missing without which what was asked for has no effect.
+    #[error("the app has no {plugin}: add it before the app first runs")]
+    NoPlugin {
+        /// The plugin.
+        plugin: &'static str,
+    },
     /// The app has no [`Offscreen`](super::Offscreen).
     #[error("the app has no picture to draw into; make it with bevy_gs4d::testing::app")]
     NotOffscreen,
+    /// An HDR picture was read as one of 8 bits, or the other way round.
+    #[error("this picture has {pixels}: read it with bevy_gs4d::testing::{remedy}")]
+    Format {
+        /// What its pixels are.
+        pixels: &'static str,
+        /// The function that reads it.
+        remedy: &'static str,
+    },
     /// An asset that is waited for cannot be loaded.
     #[error(transparent)]
     Asset(Arc<AssetLoadError>),
-    /// An asset or a shader is not ready in time.
+    /// A plugin, an asset or a shader is not ready in time.
     #[error("not ready after {seconds} s: {what}")]
     Slow {
         /// The time waited, in seconds.

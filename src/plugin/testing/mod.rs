@@ -23,15 +23,40 @@
 //!
 //! [`picture`] waits until every capture and timeline in the world has been loaded; [`wait_for`] adds other assets of a game. Without any
 //! GPU, everything that draws returns [`TestingError::NoGpu`]: a test can print it and return.
+//!
+//! # Play a game without looking at it
+//!
+//! [`step`] advances time frame by frame, [`press`], [`release`] and [`tap`] use the keyboard. Neither needs a GPU:
+//!
+//! ```no_run
+//! use bevy::prelude::*;
+//! use bevy_gs4d::{prelude::*, testing};
+//! use std::time::Duration;
+//!
+//! let mut app = App::new();
+//! app.add_plugins((MinimalPlugins, AssetPlugin::default(), bevy::input::InputPlugin, GaussianCapturePlugin));
+//! let capture = app.world().resource::<AssetServer>().load("toybox.gs4d");
+//! let player = app.world_mut().spawn(GaussianCapture3d(capture)).id();
+//! testing::step(&mut app, Duration::from_millis(500))?;
+//! testing::tap(&mut app, KeyCode::Space)?;
+//! let playback = app.world().get::<Playback>(player).expect("every capture has one");
+//! assert!((playback.time - 0.5).abs() < 1e-3, "half a second has passed");
+//! # Ok::<(), testing::TestingError>(())
+//! ```
 
 mod error;
+mod keys;
 mod offscreen;
 mod pipelines;
 mod readback;
+mod stepping;
 mod waiting;
+mod window;
 
 pub use error::TestingError;
-pub use image::RgbaImage;
+pub use image::{Rgba32FImage, RgbaImage};
+pub use keys::{press, release, tap};
 pub use offscreen::{Offscreen, app, app_with, has_gpu};
-pub use readback::{picture, pictures, read, save};
+pub use readback::{picture, pictures, read, read_hdr, save};
+pub use stepping::step;
 pub use waiting::{settle, wait_for};

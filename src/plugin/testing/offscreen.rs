@@ -2,16 +2,13 @@
 //!
 //! In: the size of a picture. Out: an app with Bevy's default plugins that draws into a picture, and in which time stands still.
 
+use super::window::add_window;
 use crate::renderer::GpuContext;
 use bevy::DefaultPlugins;
-use bevy::app::{App, PluginGroup, PluginGroupBuilder, PostUpdate};
+use bevy::app::{App, PluginGroup, PluginGroupBuilder};
 use bevy::asset::{AssetPlugin, Assets, Handle, UnapprovedPathMode};
-use bevy::camera::{CameraUpdateSystems, RenderTarget};
-use bevy::ecs::query::Changed;
+use bevy::camera::RenderTarget;
 use bevy::ecs::resource::Resource;
-use bevy::ecs::schedule::IntoScheduleConfigs;
-use bevy::ecs::schedule::common_conditions::resource_exists;
-use bevy::ecs::system::{Query, Res};
 use bevy::image::Image;
 use bevy::log::{DEFAULT_FILTER, LogPlugin};
 use bevy::render::RenderPlugin;
@@ -19,7 +16,7 @@ use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
 use bevy::render::render_resource::{TextureFormat, TextureUsages};
 use bevy::render::settings::{Backends, RenderCreation, WgpuSettings};
 use bevy::time::{Time, TimeUpdateStrategy, Virtual};
-use bevy::window::{ExitCondition, WindowPlugin, WindowRef};
+use bevy::window::{ExitCondition, WindowPlugin};
 use bevy::winit::WinitPlugin;
 use glam::UVec2;
 use std::sync::OnceLock;
@@ -28,7 +25,7 @@ use std::time::Duration;
 /// A picture that cameras draw into. [`app`] inserts one as a resource, for all cameras whose target is the primary window.
 #[derive(Resource, Debug, Clone)]
 pub struct Offscreen {
-    /// The picture on the GPU: RGBA, 8 bits each, sRGB-encoded.
+    /// The picture on the GPU: RGBA, 8 bits each, sRGB-encoded; or in [HDR](Self::hdr).
     pub image: Handle<Image>,
     /// Its width and height in pixels.
     pub size: UVec2,
@@ -38,8 +35,34 @@ impl Offscreen {
     /// Creates another picture, for apps that draw into more than one; [`read`](super::read) returns it. `size` is in
     /// pixels; 0 counts as 1.
     pub fn new(images: &mut Assets<Image>, size: UVec2) -> Self {
+        Self::of(images, size, TextureFormat::Rgba8UnormSrgb)
+    }
+
+    /// Creates a picture in HDR: RGBA in linear light, 16 bits of float each, as bright as the camera makes it;
+    /// [`read_hdr`](super::read_hdr) returns it. Cameras that draw into it need [`Hdr`](bevy::camera::Hdr). `size` as in
+    /// [`new`](Self::new).
+    ///
+    /// # Examples
+    ///
+    /// ```no_run
+    /// # use bevy::camera::Hdr;
+    /// # use bevy::prelude::*;
+    /// # use bevy_gs4d::testing::{self, Offscreen};
+    /// let mut app = testing::app(UVec2::new(320, 240));
+    /// let bright = Offscreen::hdr(&mut app.world_mut().resource_mut::<Assets<Image>>(), UVec2::new(320, 240));
+    /// app.world_mut().spawn((Camera3d::default(), Hdr, bright.target()));
+    /// testing::settle(&mut app)?;
+    /// let picture = testing::read_hdr(&mut app, &bright)?;
+    /// assert!(picture.pixels().all(|pixel| pixel.0[0].is_finite()), "no light is infinite");
+    /// # Ok::<(), testing::TestingError>(())
+    /// ```
+    pub fn hdr(images: &mut Assets<Image>, size: UVec2) -> Self {
+        Self::of(images, size, TextureFormat::Rgba16Float)
+    }
+
+    fn of(images: &mut Assets<Image>, size: UVec2, format: TextureFormat) -> Self {
         let size = size.max(UVec2::ONE);
-        let mut image = Image::new_target_texture(size.x, size.y, TextureFormat::Rgba8UnormSrgb, None);
+        let mut image = Image::new_target_texture(size.x, size.y, format, None);
         image.texture_descriptor.usage |= TextureUsages::COPY_SRC;
         Self { image: images.add(image), size }
     }
@@ -60,7 +83,8 @@ pub fn has_gpu() -> bool {
 /// Returns an app with Bevy's `DefaultPlugins`, without a window, with time standing still, and with an [`Offscreen`] of `size` pixels.
 ///
 /// Add plugins, resources and systems to it as to any app; [`picture`](super::picture) runs it. Cameras whose target is the primary window
-/// draw into the picture. Without a GPU nothing is drawn and everything else works.
+/// draw into the picture, one over the other in their order: a user interface, or a `Camera2d` over the scene, is in it, too. The window
+/// is an entity that no display shows. Without a GPU nothing is drawn and everything else works.
 pub fn app(size: UVec2) -> App {
     app_with(size, |plugins| plugins)
 }
@@ -86,18 +110,9 @@ pub fn app_with(size: UVec2, adjust: impl FnOnce(PluginGroupBuilder) -> PluginGr
     // Bevy's default would cut steps to a quarter of a second.
     app.world_mut().get_resource_or_init::<Time<Virtual>>().set_max_delta(Duration::MAX);
     let offscreen = Offscreen::new(&mut app.world_mut().get_resource_or_init::<Assets<Image>>(), size);
-    app.insert_resource(offscreen)
-        .add_systems(PostUpdate, draw_offscreen.run_if(resource_exists::<Offscreen>).before(CameraUpdateSystems));
+    add_window(&mut app, &offscreen);
+    app.insert_resource(offscreen);
     app
-}
-
-/// Gives cameras of the primary window, which does not exist, the picture as their target.
-fn draw_offscreen(offscreen: Res<Offscreen>, mut targets: Query<&mut RenderTarget, Changed<RenderTarget>>) {
-    for mut target in &mut targets {
-        if matches!(*target, RenderTarget::Window(WindowRef::Primary)) {
-            *target = offscreen.target();
-        }
-    }
 }
 
 /// Returns the backends to use. Without DX12 among them, wgpu needs no extra dispatch to validate each indirect one.

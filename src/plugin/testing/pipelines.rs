@@ -4,6 +4,7 @@
 //! with pipelined rendering the render world is on another thread and cannot be accessed.
 
 use super::error::TestingError;
+use super::offscreen::has_gpu;
 use bevy::app::App;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::schedule::IntoScheduleConfigs;
@@ -26,27 +27,35 @@ enum State {
     Failed(String),
 }
 
-/// Starts reporting, before the app's first update.
+/// Starts reporting, before the app's first update, if the app has a renderer.
+pub(super) fn watch_pipelines(app: &mut App) {
+    if app.world().contains_resource::<PipelineReport>() {
+        return;
+    }
+    let Some(renderer) = app.get_sub_app_mut(RenderApp) else { return };
+    let report = PipelineReport::default();
+    renderer.insert_resource(report.clone()).add_systems(Render, report_pipelines.in_set(RenderSystems::Cleanup));
+    app.insert_resource(report);
+}
+
+/// Checks that the app can draw.
 ///
 /// # Errors
-/// [`TestingError::NoGpu`] if the app has no renderer.
-pub(super) fn watch_pipelines(app: &mut App) -> Result<(), TestingError> {
+/// [`TestingError::NoGpu`], [`TestingError::NoRenderer`].
+pub(super) fn require_renderer(app: &mut App) -> Result<(), TestingError> {
+    watch_pipelines(app);
     if app.world().contains_resource::<PipelineReport>() {
         return Ok(());
     }
-    let report = PipelineReport::default();
-    let renderer = app.get_sub_app_mut(RenderApp).ok_or(TestingError::NoGpu)?;
-    renderer.insert_resource(report.clone()).add_systems(Render, report_pipelines.in_set(RenderSystems::Cleanup));
-    app.insert_resource(report);
-    Ok(())
+    Err(if has_gpu() { TestingError::NoRenderer } else { TestingError::NoGpu })
 }
 
-/// Returns whether every pipeline is compiled.
+/// Returns whether every pipeline is compiled. An app without a renderer has none.
 ///
 /// # Errors
 /// A pipeline that cannot be compiled.
 pub(super) fn pipelines_are_ready(app: &App) -> Result<bool, TestingError> {
-    let report = app.world().get_resource::<PipelineReport>().ok_or(TestingError::NoGpu)?;
+    let Some(report) = app.world().get_resource::<PipelineReport>() else { return Ok(true) };
     match &*report.0.lock().unwrap_or_else(PoisonError::into_inner) {
         State::Waiting => Ok(false),
         State::Ready => Ok(true),

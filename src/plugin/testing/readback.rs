@@ -4,15 +4,20 @@
 
 use super::error::TestingError;
 use super::offscreen::Offscreen;
-use super::waiting::{load, settle, update};
+use super::pipelines::require_renderer;
+use super::stepping::advance;
+use super::waiting::{load, settle, start, update};
 use crate::codec::CodecError;
 use bevy::app::App;
+use bevy::asset::Assets;
 use bevy::ecs::observer::On;
+use bevy::image::Image;
 use bevy::render::gpu_readback::{Readback, ReadbackComplete};
-use bevy::time::TimeUpdateStrategy;
+use bevy::render::render_resource::TextureFormat;
 use glam::UVec2;
-use image::RgbaImage;
+use half::f16;
 use image::codecs::png::PngEncoder;
+use image::{Rgba32FImage, RgbaImage};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -21,26 +26,59 @@ use std::time::{Duration, Instant};
 /// Longest time that a read-back may take: not a number of updates, since a GPU that is busy for others may be slow to answer.
 const READBACK: Duration = Duration::from_secs(60);
 
-/// Waits until all assets are loaded, advances time by `step`, and returns the picture of that time: of the app's own [`Offscreen`].
+/// Waits until all assets are loaded, advances time by `step` in one update, and returns the picture of that time: of the app's own
+/// [`Offscreen`].
 ///
 /// # Errors
-/// Those of [`settle`], and a read-back from the GPU that fails.
+/// Those of [`settle`]; an app without [`Offscreen`], or with one in HDR; a read-back from the GPU that fails.
 pub fn picture(app: &mut App, step: Duration) -> Result<RgbaImage, TestingError> {
-    load(app)?;
-    app.insert_resource(TimeUpdateStrategy::ManualDuration(step));
-    let stepped = update(app);
-    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
-    stepped?;
-    settle(app)?;
+    require_renderer(app)?;
     let offscreen = app.world().get_resource::<Offscreen>().cloned().ok_or(TestingError::NotOffscreen)?;
+    load(app)?;
+    advance(app, step)?;
+    settle(app)?;
+    // The game may have resized it.
+    let offscreen = app.world().get_resource::<Offscreen>().cloned().unwrap_or(offscreen);
     read(app, &offscreen)
 }
 
-/// Returns another picture as it was last drawn, at the time of the last [`picture`].
+/// Returns another picture as it was last drawn, at the time of the last [`picture`] or [`step`](super::step).
 ///
 /// # Errors
-/// Errors of drawing, and a read-back from the GPU that fails.
+/// Errors of drawing; a picture in HDR; a read-back from the GPU that fails.
 pub fn read(app: &mut App, offscreen: &Offscreen) -> Result<RgbaImage, TestingError> {
+    if is_hdr(app, offscreen) {
+        return Err(TestingError::Format { pixels: "16 bits of float in each channel", remedy: "read_hdr" });
+    }
+    let size = offscreen.size;
+    RgbaImage::from_raw(size.x, size.y, pixels(app, offscreen, 4)?).ok_or(TestingError::Readback)
+}
+
+/// Returns a picture in HDR as it was last drawn: RGBA in linear light, not clamped, as the camera wrote it. A camera's tonemapping comes
+/// before that; with `Tonemapping::None` there is none.
+///
+/// # Errors
+/// Errors of drawing; a picture that was not made by [`Offscreen::hdr`]; a read-back from the GPU that fails.
+pub fn read_hdr(app: &mut App, offscreen: &Offscreen) -> Result<Rgba32FImage, TestingError> {
+    if !is_hdr(app, offscreen) {
+        return Err(TestingError::Format { pixels: "8 bits in each channel", remedy: "read" });
+    }
+    let size = offscreen.size;
+    let data = pixels(app, offscreen, 8)?;
+    let values = data.as_chunks::<2>().0.iter().map(|value| f16::from_le_bytes(*value).to_f32()).collect();
+    Rgba32FImage::from_raw(size.x, size.y, values).ok_or(TestingError::Readback)
+}
+
+fn is_hdr(app: &App, offscreen: &Offscreen) -> bool {
+    let images = app.world().get_resource::<Assets<Image>>();
+    let image = images.and_then(|images| images.get(&offscreen.image));
+    image.is_some_and(|image| image.texture_descriptor.format == TextureFormat::Rgba16Float)
+}
+
+/// Returns the pixels of a picture, of so many bytes each.
+fn pixels(app: &mut App, offscreen: &Offscreen, bytes: usize) -> Result<Vec<u8>, TestingError> {
+    require_renderer(app)?;
+    start(app)?;
     let arrived = Arc::new(Mutex::new(None));
     let sink = arrived.clone();
     let store = move |event: On<ReadbackComplete>| {
@@ -49,8 +87,7 @@ pub fn read(app: &mut App, offscreen: &Offscreen) -> Result<RgbaImage, TestingEr
     let readback = app.world_mut().spawn(Readback::texture(offscreen.image.clone())).observe(store).id();
     let data = wait(app, &arrived);
     app.world_mut().despawn(readback);
-    let size = offscreen.size;
-    RgbaImage::from_raw(size.x, size.y, unpadded(&data?, size)).ok_or(TestingError::Readback)
+    Ok(unpadded(&data?, offscreen.size, bytes))
 }
 
 fn wait(app: &mut App, arrived: &Mutex<Option<Vec<u8>>>) -> Result<Vec<u8>, TestingError> {
@@ -64,9 +101,9 @@ fn wait(app: &mut App, arrived: &Mutex<Option<Vec<u8>>>) -> Result<Vec<u8>, Test
     Err(TestingError::Readback)
 }
 
-/// Removes the padding of a texture that was read back: its rows are padded to a multiple of 256 bytes.
-fn unpadded(data: &[u8], size: UVec2) -> Vec<u8> {
-    let row = size.x as usize * 4;
+/// Removes the padding of a texture that was read back, with so many bytes a pixel: its rows are padded to a multiple of 256 bytes.
+fn unpadded(data: &[u8], size: UVec2, bytes: usize) -> Vec<u8> {
+    let row = size.x as usize * bytes;
     data.chunks(row.next_multiple_of(256)).flat_map(|padded| padded.iter().take(row).copied()).collect()
 }
 
@@ -124,7 +161,8 @@ mod tests {
         padded[..12].copy_from_slice(&[1; 12]);
         padded[256..268].copy_from_slice(&[2; 12]);
         let expected: Vec<u8> = [[1; 12], [2; 12]].concat();
-        assert_eq!(unpadded(&padded, size), expected, "the rows, one after the other");
-        assert_eq!(unpadded(&[7; 512], UVec2::new(64, 2)), [7; 512], "rows of 256 bytes have none");
+        assert_eq!(unpadded(&padded, size, 4), expected, "the rows, one after the other");
+        assert_eq!(unpadded(&[7; 512], UVec2::new(64, 2), 4), [7; 512], "rows of 256 bytes have none");
+        assert_eq!(unpadded(&[7; 512], UVec2::new(32, 2), 8), [7; 512], "nor have those of larger pixels");
     }
 }

@@ -4,7 +4,7 @@
 //! compiled, and no time passed.
 
 use super::error::TestingError;
-use super::pipelines::{pipelines_are_ready, watch_pipelines};
+use super::pipelines::{pipelines_are_ready, require_renderer, watch_pipelines};
 use crate::plugin::asset::CaptureState;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::{Timeline, TimelinePlayer};
@@ -15,7 +15,7 @@ use bevy::ecs::resource::Resource;
 use bevy::ecs::world::World;
 use std::time::{Duration, Instant};
 
-/// How long assets and pipelines may take to load and compile.
+/// How long plugins, assets and pipelines may take to get ready, to load and to compile.
 const LOAD_TIMEOUT: Duration = Duration::from_secs(120);
 /// Number of updates after which everything that has been loaded and uploaded is drawn, in buffers that grow by the counts of an earlier
 /// frame.
@@ -59,8 +59,10 @@ pub fn wait_for(app: &mut App, missing: fn(&mut World) -> Vec<UntypedAssetId>) {
 /// Runs the app until every capture and timeline in its world has been loaded and everything is drawn.
 ///
 /// # Errors
-/// [`TestingError::NoGpu`]; an asset that cannot be loaded, or not within two minutes; errors of drawing.
+/// [`TestingError::NoGpu`]; an app without a renderer, or without [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) though it has
+/// captures; an asset that cannot be loaded, or not within two minutes; errors of drawing.
 pub fn settle(app: &mut App) -> Result<(), TestingError> {
+    require_renderer(app)?;
     load(app)?;
     let began = Instant::now();
     loop {
@@ -98,13 +100,23 @@ pub(super) fn load(app: &mut App) -> Result<(), TestingError> {
 }
 
 /// Finishes the plugins, as a runner does before the first update.
-fn start(app: &mut App) -> Result<(), TestingError> {
-    watch_pipelines(app)?;
+pub(super) fn start(app: &mut App) -> Result<(), TestingError> {
+    watch_pipelines(app);
+    finish_plugins(app, LOAD_TIMEOUT)
+}
+
+fn finish_plugins(app: &mut App, limit: Duration) -> Result<(), TestingError> {
+    let began = Instant::now();
     while app.plugins_state() == PluginsState::Adding {
+        if began.elapsed() > limit {
+            return Err(TestingError::Slow { seconds: limit.as_secs(), what: "one of the app's plugins".into() });
+        }
         bevy::tasks::tick_global_task_pools_on_main_thread();
     }
-    if app.plugins_state() != PluginsState::Cleaned {
+    if app.plugins_state() == PluginsState::Ready {
         app.finish();
+    }
+    if app.plugins_state() == PluginsState::Finished {
         app.cleanup();
     }
     Ok(())
@@ -121,6 +133,10 @@ pub(super) fn update(app: &mut App) -> Result<(), TestingError> {
 
 /// Returns the names of the assets that are still being loaded.
 fn missing(world: &mut World) -> Result<Vec<String>, TestingError> {
+    let has_captures = world.query::<&GaussianCapture3d>().iter(world).next().is_some();
+    if has_captures && !world.contains_resource::<Assets<GaussianCapture>>() {
+        return Err(TestingError::NoPlugin { plugin: "GaussianCapturePlugin" });
+    }
     let hooks = world.get_resource_or_init::<Awaited>().clone();
     let wanted: Vec<UntypedAssetId> = hooks.0.iter().flat_map(|hook| hook(world)).collect();
     let Some(server) = world.get_resource::<AssetServer>() else { return Ok(Vec::new()) };
@@ -170,4 +186,40 @@ fn timelines(world: &mut World) -> Vec<UntypedAssetId> {
 fn absent(world: &World, captures: impl Iterator<Item = AssetId<GaussianCapture>>) -> Vec<UntypedAssetId> {
     let Some(loaded) = world.get_resource::<Assets<GaussianCapture>>() else { return Vec::new() };
     captures.filter(|capture| !loaded.contains(*capture)).map(AssetId::untyped).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy::MinimalPlugins;
+    use bevy::app::Plugin;
+
+    struct Endless;
+
+    impl Plugin for Endless {
+        fn build(&self, _: &mut App) {}
+
+        fn ready(&self, _: &App) -> bool {
+            false
+        }
+    }
+
+    #[test]
+    fn a_plugin_that_is_never_ready_is_not_waited_for_forever() {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, Endless));
+        let waited = finish_plugins(&mut app, Duration::from_millis(5));
+        assert!(matches!(waited, Err(TestingError::Slow { .. })), "it is given up: {waited:?}");
+    }
+
+    #[test]
+    fn plugins_are_finished_once_however_far_they_are() {
+        let mut app = App::new();
+        app.add_plugins(MinimalPlugins);
+        app.finish();
+        for _ in 0..2 {
+            finish_plugins(&mut app, LOAD_TIMEOUT).expect("they are ready");
+            assert_eq!(app.plugins_state(), PluginsState::Cleaned, "nothing is left to do");
+        }
+    }
 }
