@@ -34,7 +34,7 @@ struct Settings {
     count: u32,
     // Whether the blend space is linear light.
     is_linear: u32,
-    // Whether an environment map surrounds the captures: depths are then median ones, and 0 where the map shows.
+    // Whether an environment map surrounds the captures: where it shows through, it is part of their opacity but not of their depth.
     is_surrounded: u32,
     shadings: array<Shading, #{MOST_SHADINGS}>,
 }
@@ -83,9 +83,11 @@ fn point_at(position: vec2<f32>, alpha: f32) -> Point {
     let depth = textureLoad(depths, vec2<u32>(position), 0).xy;
     var point: Point;
     var z = depth.x / max(alpha, 1e-4);
-    if settings.is_surrounded != 0u {
-        point.is_environment = depth.y == 0.0;
-        z = select(depth.y, FAR, point.is_environment);
+    if settings.is_surrounded != 0u && depth.y != 0.0 {
+        z = depth.y;
+    } else if settings.is_surrounded != 0u && alpha > 0.999 {
+        point.is_environment = true;
+        z = FAR;
     }
     let share = position / vec2<f32>(settings.size);
     let place = vec2(2.0 * share.x - 1.0, 1.0 - 2.0 * share.y);
@@ -95,8 +97,8 @@ fn point_at(position: vec2<f32>, alpha: f32) -> Point {
     return point;
 }
 
-// Returns the shading of the capture that shows a point: the one in whose box the point lies deepest, since the picture does not say. What is
-// infinitely far belongs to the one with the largest box.
+// Returns the shading of the capture that shows a point: the one in whose box the point lies deepest, since the picture does not say. The
+// environment map belongs to the one with the largest box.
 fn shading_of(point: Point) -> u32 {
     var best = 0u;
     var least = 0.0;

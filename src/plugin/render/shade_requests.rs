@@ -1,7 +1,7 @@
 //! Shade requests: the cameras and captures for which others work on the captures' picture before it reaches the target.
 //!
-//! In: what is found during extraction, in every frame. Out: [`ShadeRequests`], by which [`prepare`](super::prepare) decides for each camera
-//! whether there is something between [`CaptureSystems::Record`](super::CaptureSystems) and the composite, and depths for it.
+//! In: what is found during extraction, in every frame. Out: [`ShadeRequests`], by which [`prepare`](super::prepare) decides for each
+//! camera whether there is something between [`CaptureSystems::Record`](super::CaptureSystems) and the composite, and depths for it.
 
 use super::capture_views::Drawn;
 use bevy::ecs::resource::Resource;

@@ -37,8 +37,8 @@ pub struct ReceivesShadows {
     /// Factor on the linear light of each channel in full shadow; alpha is not used, and a channel that is negative or not finite counts as
     /// 0. Default: 0.35 in each channel.
     pub tint: LinearRgba,
-    /// How far a point is moved towards a light before its shadow is looked up, in world units, beside the light's own biases: as far as the
-    /// capture's depth is uncertain. Default: 0.02.
+    /// How far a point is moved towards a light before its shadow is looked up, in world units, beside the light's own biases: as far as
+    /// the capture's depth is uncertain. One that is not finite counts as 0. Default: 0.02.
     pub bias: f32,
 }
 
@@ -46,8 +46,8 @@ pub struct ReceivesShadows {
 /// [`GaussianCapture3d`](crate::GaussianCapture3d).
 ///
 /// The linear light of the capture is multiplied by that of the surroundings: the mean of the camera's `EnvironmentMapLight`, in six
-/// directions, times its intensity, plus the ambient light, both at the camera's exposure. This is what a white surface shows there, so that
-/// captures keep their trained colors where white meshes are white. Light probes, irradiance volumes and lamps do not count.
+/// directions, times its intensity, plus the ambient light, both at the camera's exposure. This is about what a white surface shows there,
+/// so that captures keep their trained colors where white meshes are white. Light probes, irradiance volumes and lamps do not count.
 ///
 /// # Examples
 ///

@@ -1,7 +1,7 @@
 //! Draw: the pass `shade`, in Bevy's `Core3d` schedule.
 //!
-//! In: cameras whose captures are to be shaded, with the captures' picture and depths. Out: for each such camera a pipeline, kept while it may
-//! be needed, and a shaded picture, which the composite takes instead of the captures' own.
+//! In: cameras whose captures are to be shaded, with the captures' picture and depths. Out: for each such camera a pipeline, kept while it
+//! may be needed, and a shaded picture, which the composite takes instead of the captures' own.
 
 use super::extract::ExtractedShading;
 use super::pipeline::{FORMAT, ShadePipeline};
@@ -101,7 +101,7 @@ pub(super) fn shade_captures(
     }
     let Some(pipeline) = shading.cache.get_render_pipeline(shade.pipeline) else { return };
     let main = bevy_view.retained_view_entity.main_entity;
-    let blend_space = shading.view_settings.0.get(&main).map_or(BlendSpace::default(), |settings| settings.blend_space);
+    let blend_space = shading.view_settings.0.get(&main).copied().unwrap_or_default().blend_space;
     let Some(settings) = shading.settings(view, blend_space) else { return };
     let Some(targets) = shading.targets(shade, view, settings) else { return };
     let diagnostics = context.diagnostic_recorder();
@@ -139,7 +139,7 @@ impl Shading<'_> {
         Some(GpuSettings::new(size, blend_space == BlendSpace::Linear, drawn))
     }
 
-    /// Writes how a view is shaded, if it has changed, and returns the shaded picture, created anew if the captures' picture is another one.
+    /// Writes how a view is shaded, if it has changed, and returns the shaded picture, created anew if the captures' picture has been.
     fn targets<'a>(&self, shade: &'a mut ShadeView, view: &CaptureView, settings: GpuSettings) -> Option<&'a Targets> {
         let (colors, depths) = (view.renderer.color()?, view.renderer.depth()?);
         let work = self.statistics.work();

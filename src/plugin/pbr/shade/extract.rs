@@ -27,7 +27,7 @@ pub(super) struct ExtractedShading(pub(super) MainEntityHashMap<PlacedShading>);
 /// Where a capture is and how it is shaded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PlacedShading {
-    /// From the world to the cube from −1 to 1 about what is drawn; `None` if the capture surrounds every camera.
+    /// From the world to the cube from −1 to 1 about what is drawn; `None` if the capture surrounds every camera or is not drawn.
     pub(super) cube_from_world: Option<Affine3A>,
     pub(super) has_environment: bool,
     pub(super) shadows: Option<ReceivesShadows>,
@@ -83,6 +83,10 @@ pub(super) fn extract_shading(
 
 /// Returns the transform that makes a box in capture space the cube from −1 to 1; `None` for a flattened or broken one.
 fn cube_from_world(bounds: &Aabb, world_from_capture: Affine3A) -> Option<Affine3A> {
+    // Nothing of it is drawn, and nothing leads back to it.
+    if world_from_capture.matrix3.determinant() == 0.0 {
+        return None;
+    }
     // A flat box must not divide by zero.
     let scale = bounds.half_extents.max(Vec3A::splat(1e-6)).recip();
     let cube_from_capture =
@@ -114,5 +118,6 @@ mod tests {
     fn a_broken_transform_has_no_cube() {
         let bounds = Aabb::from_min_max(Vec3::ZERO, Vec3::ONE);
         assert_eq!(cube_from_world(&bounds, Affine3A::from_translation(Vec3::NAN)), None, "not a number");
+        assert_eq!(cube_from_world(&bounds, Affine3A::from_scale(Vec3::new(1.0, 0.0, 1.0))), None, "flattened");
     }
 }

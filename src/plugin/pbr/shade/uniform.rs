@@ -27,14 +27,18 @@ pub(super) struct GpuShading {
 pub(super) struct GpuSettings {
     pub(super) size: UVec2,
     count: u32,
-    pub(super) is_linear: u32,
+    is_linear: u32,
     is_surrounded: u32,
     shadings: [GpuShading; MOST_SHADINGS],
 }
 
 impl GpuSettings {
     /// Creates the settings of a view of these captures. Captures that nothing but fog changes are listed only beside others.
-    pub(super) fn new<'a>(size: UVec2, is_linear: bool, drawn: impl Iterator<Item = &'a PlacedShading> + Clone) -> Self {
+    pub(super) fn new<'a>(
+        size: UVec2,
+        is_linear: bool,
+        drawn: impl Iterator<Item = &'a PlacedShading> + Clone,
+    ) -> Self {
         let is_surrounded = drawn.clone().any(|placed| placed.has_environment);
         let mut settings = Self {
             size,
