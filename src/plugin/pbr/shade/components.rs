@@ -11,10 +11,10 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// Lets the shadows of meshes fall on a capture: an optional component beside [`GaussianCapture3d`](crate::GaussianCapture3d).
 ///
 /// A capture was filmed in its own light, which cannot be taken away: where a light of the scene with `shadow_maps_enabled` does not reach
-/// it, it is multiplied by [`tint`](Self::tint), once for each such light, in linear light. Point and spot lights count less towards the end
-/// of their range and of their cone. A capture has no normals: lights are taken to meet it head-on, so that the side that is turned away
-/// from a light is not dark, and their strength does not matter. A shadow falls at the depth of a pixel (the mean depth of its splats, or
-/// the median with an environment map around).
+/// it, it is multiplied by [`tint`](Self::tint), once for each such light, in linear light. Point and spot lights count less towards the
+/// end of their range and of their cone. A capture has no normals: lights are taken to meet it head-on, so that the side that is turned
+/// away from a light is not dark, and their strength does not matter. A shadow falls at the depth of a pixel (the mean depth of its splats,
+/// or the median with an environment map around).
 ///
 /// # Examples
 ///
@@ -66,8 +66,8 @@ pub struct ReceivesShadows {
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 pub struct CaptureLight {
-    /// The light of the surroundings under which the capture looks as trained: mean radiance times `EnvironmentMapLight::intensity`, cd/m²,
-    /// times the camera's exposure. At Bevy's default exposure 1 is about 1000 cd/m². Without a finite value above 0 the capture is not
+    /// The light of the surroundings under which the capture looks as trained: mean radiance times `EnvironmentMapLight::intensity`
+    /// (cd/m²), times the camera's exposure. At Bevy's default exposure 1 is about 1000 cd/m². Without a finite value above 0 the capture is not
     /// changed. Default: 1.
     pub reference: f32,
     /// How much of the surroundings' light the capture takes, from 0 (none: it looks as trained) to 1. Default: 1.

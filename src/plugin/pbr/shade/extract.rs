@@ -4,7 +4,6 @@
 //! [`ExtractedShading`] and [`ShadeRequests`], by entity of the main world.
 
 use super::components::{CaptureLight, ReceivesShadows};
-use super::pipeline::ShadePipeline;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::render::shade_requests::ShadeRequests;
 use bevy::asset::Assets;
@@ -14,7 +13,7 @@ use bevy::ecs::entity::Entity;
 use bevy::ecs::query::With;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Query, Res, ResMut};
-use bevy::pbr::DistanceFog;
+use bevy::pbr::{DistanceFog, MeshPipelineViewLayouts};
 use bevy::render::Extract;
 use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
 use bevy::transform::components::GlobalTransform;
@@ -51,7 +50,7 @@ type Placed = (
 );
 
 pub(super) fn extract_shading(
-    pipeline: Option<Res<ShadePipeline>>,
+    lit: Option<Res<MeshPipelineViewLayouts>>,
     mut extracted: ResMut<ExtractedShading>,
     mut requests: ResMut<ShadeRequests>,
     assets: Extract<Res<Assets<GaussianCapture>>>,
@@ -61,8 +60,8 @@ pub(super) fn extract_shading(
     extracted.0.clear();
     requests.cameras.clear();
     requests.captures.clear();
-    // Without Bevy's lights there is nothing to shade with.
-    if pipeline.is_none() {
+    // Without Bevy's `PbrPlugin` there is nothing to shade with.
+    if lit.is_none() {
         return;
     }
     requests.cameras.extend(foggy.iter().map(MainEntity::from));

@@ -22,6 +22,9 @@ pub(crate) struct ShadePlugin;
 
 impl Plugin for ShadePlugin {
     fn build(&self, app: &mut App) {
+        if app.get_sub_app(RenderApp).is_none() {
+            return;
+        }
         let Some(mut shaders) = app.world_mut().get_resource_mut::<Assets<Shader>>() else { return };
         let source = include_str!("../../../../shaders/pbr/shade.wgsl");
         let shader = ShadeShader(shaders.add(Shader::from_wgsl(source, "bevy_gs4d/shaders/pbr/shade.wgsl")));
