@@ -85,7 +85,7 @@ fn point_at(position: vec2<f32>, alpha: f32) -> Point {
     var z = depth.x / max(alpha, 1e-4);
     if settings.is_surrounded != 0u && depth.y != 0.0 {
         z = depth.y;
-    } else if settings.is_surrounded != 0u && alpha > 0.999 {
+    } else if settings.is_surrounded != 0u && (alpha > 0.999 || depth.x == 0.0) {
         point.is_environment = true;
         z = FAR;
     }
