@@ -3,5 +3,7 @@
 //! In: an app in which captures are drawn, Bevy's `PbrPlugin`. Out: the same app, in which captures and meshes belong to one scene.
 
 mod plugin;
+mod shade;
 
 pub(crate) use plugin::CapturePbrPlugin;
+pub use shade::{CaptureLight, ReceivesShadows};

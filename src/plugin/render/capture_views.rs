@@ -20,13 +20,13 @@ use bevy::render::sync_world::MainEntity;
 
 /// State of every camera that may see captures, by its entity in the render world.
 #[derive(Resource, Default)]
-pub(super) struct CaptureViews(pub(super) HashMap<Entity, CaptureView>);
+pub(crate) struct CaptureViews(pub(crate) HashMap<Entity, CaptureView>);
 
 /// State of one camera.
-pub(super) struct CaptureView {
+pub(crate) struct CaptureView {
     /// The camera's entity in the main world.
     pub(super) camera: Entity,
-    pub(super) renderer: ViewRenderer,
+    pub(crate) renderer: ViewRenderer,
     /// The composite into the camera's target, and what it binds.
     pub(super) composite: CachedRenderPipelineId,
     /// Whether it blends with the target where that is, instead of reading it.
@@ -47,14 +47,14 @@ pub(super) struct CaptureView {
     /// Frames since the camera last saw a capture.
     idle: u32,
     /// The captures that the camera sees this frame; nothing is drawn while this is empty.
-    pub(super) drawn: Vec<Drawn>,
+    pub(crate) drawn: Vec<Drawn>,
 }
 
 /// One capture, seen by one camera.
-pub(super) struct Drawn {
-    pub(super) entity: MainEntity,
+pub(crate) struct Drawn {
+    pub(crate) entity: MainEntity,
     pub(super) asset: AssetId<GaussianCapture>,
-    pub(super) view: View,
+    pub(crate) view: View,
     pub(super) appearance: Appearance,
     /// Whether the capture's temporal filter is used.
     pub(super) filtered: bool,
@@ -88,7 +88,7 @@ impl CaptureView {
     }
 
     /// Returns whether it draws anything this frame.
-    pub(super) fn sees_something(&self) -> bool {
+    pub(crate) fn sees_something(&self) -> bool {
         !self.drawn.is_empty()
     }
 

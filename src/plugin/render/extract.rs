@@ -46,7 +46,7 @@ impl ExtractedCapture {
 
 /// How cameras draw captures, for those with settings.
 #[derive(Resource, Default)]
-pub(super) struct ExtractedViewSettings(pub(super) MainEntityHashMap<CaptureViewSettings>);
+pub(crate) struct ExtractedViewSettings(pub(crate) MainEntityHashMap<CaptureViewSettings>);
 
 type Placed = (
     Entity,

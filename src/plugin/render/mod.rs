@@ -36,7 +36,8 @@
 //! `main_transmissive_pass_3d`, in the render world's `Core3d` schedule, to see captures through glass. Its atmosphere cannot be ordered
 //! against: cameras with one need [`CaptureViewSettings::late`], which draws captures in the order of multisampled cameras.
 //! Prepasses come first and do not contain captures; effects that read the depth prepass (screen-space ambient occlusion and reflections)
-//! ignore captures. Effects that read the depth buffer after the main pass (depth of field, volumetric fog) read the depths that
+//! ignore captures. Distance fog, shadows of meshes and light of the scene reach captures in a pass of the module `pbr`, between 1 and the
+//! captures. Effects that read the depth buffer after the main pass (depth of field, volumetric fog) read the depths that
 //! [`DepthWrite`] wrote.
 //!
 //! A perspective camera whose depth can be read draws the environment map of a capture behind everything; of several maps in one view, it
@@ -50,10 +51,10 @@
 //! captures keep their trained colours with any tonemapping.
 
 mod active;
-mod capture_views;
+pub(crate) mod capture_views;
 mod composite;
 mod draw;
-mod extract;
+pub(crate) mod extract;
 mod fault;
 mod plugin;
 mod prepare;
@@ -61,6 +62,7 @@ mod publish;
 mod reflect;
 mod renderer;
 mod settings;
+pub(crate) mod shade_requests;
 mod statistics;
 mod upload;
 mod view;

@@ -11,6 +11,7 @@ use super::prepare::{make_depth_readable, prepare_views};
 use super::publish::publish_statistics;
 use super::renderer::init_renderer;
 use super::settings::CaptureSettings;
+use super::shade_requests::ShadeRequests;
 use super::statistics::CaptureStatistics;
 use super::upload::{CaptureUploadBudget, GpuGaussianCapture, continue_uploads, extract_upload_budget};
 use super::visibility::update_bounds;
@@ -62,6 +63,7 @@ fn build_rendering(app: &mut App) {
         .init_resource::<CaptureUploadBudget>()
         .init_resource::<ExtractedCaptures>()
         .init_resource::<ExtractedViewSettings>()
+        .init_resource::<ShadeRequests>()
         // Created anew after a lost device: they hold everything on the GPU.
         .init_gpu_resource::<CompositePipeline>()
         .init_gpu_resource::<SpecializedRenderPipelines<CompositePipeline>>()

@@ -10,6 +10,7 @@ use super::extract::{ExtractedCaptures, ExtractedViewSettings};
 use super::fault::CameraFault;
 use super::renderer::CaptureRenderer;
 use super::settings::{CaptureViewSettings, DepthWrite};
+use super::shade_requests::ShadeRequests;
 use super::statistics::CaptureStatistics;
 use super::upload::GpuGaussianCapture;
 use super::view::CameraLens;
@@ -34,6 +35,7 @@ use glam::{UVec2, UVec4};
 pub(super) struct Scene<'w> {
     extracted: Res<'w, ExtractedCaptures>,
     settings: Res<'w, ExtractedViewSettings>,
+    shade: Res<'w, ShadeRequests>,
     captures: Res<'w, RenderAssets<GpuGaussianCapture>>,
     lists: Res<'w, ActiveLists>,
 }
@@ -142,6 +144,8 @@ pub(super) fn prepare_views(
         }
         state.count_idle_frames();
         let Some(lens) = lens.filter(|_| state.sees_something()) else { continue };
+        // What debug views show is not light.
+        state.is_shaded = settings.debug == DebugView::Color && scene.shade.want(main, &state.drawn);
         let viewport = UVec4::new(view.viewport.x, view.viewport.y, size.x, size.y);
         state.bindings.set_viewport(viewport, &device, &queue, renderer.0.work());
         let instances = state.instances(&scene.captures, &scene.lists);
@@ -153,7 +157,7 @@ pub(super) fn prepare_views(
             opaque,
             blend_space: settings.blend_space,
             debug: settings.debug,
-            depths: settings.depth != DepthWrite::None,
+            depths: settings.depth != DepthWrite::None || state.is_shaded,
             // Bevy's own targets have no more.
             precision: ColorPrecision::Half,
         };

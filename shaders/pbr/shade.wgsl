@@ -1,0 +1,274 @@
+// shade: what the scene around captures does to them: its light, the shadows of its meshes, its fog.
+//
+// In: the captures' color and transmittance (premultiplied, in their blend space) and their depths, for the pixels of the viewport; the
+// lights, shadow maps and fog of Bevy's view (groups 0 and 1). Out: the same picture, shaded; transmittance stays.
+#import gs4d::srgb
+#import bevy_pbr::mesh_view_bindings as view_bindings
+#import bevy_pbr::mesh_view_types as view_types
+#import bevy_pbr::clustered_forward as clustering
+#import bevy_pbr::shadows::{fetch_directional_shadow, fetch_point_shadow, fetch_spot_shadow}
+#ifdef DISTANCE_FOG
+#import bevy_pbr::fog::{linear_fog, exponential_fog, exponential_squared_fog, atmospheric_fog}
+#endif
+
+// The largest half float: an infinite pixel would spread through bloom.
+const BRIGHTEST: f32 = 65504.0;
+// Depth of what is infinitely far, camera units: any fog has reached its full strength there.
+const FAR: f32 = 1e6;
+
+// How one capture is shaded. The same as GpuShading in src/plugin/pbr/shade/uniform.rs.
+struct Shading {
+    // Rows of the transform from the world to the cube from -1 to 1 about the capture.
+    cube_from_world: array<vec4<f32>, 3>,
+    // Linear color of what is in full shadow; w is 1 if the capture receives shadows.
+    tint: vec4<f32>,
+    // How much of the scene's light the capture takes; one over the light it was trained in; offset towards lights, world units.
+    light: vec4<f32>,
+}
+
+// The same as GpuSettings there.
+struct Settings {
+    // Pixels of the captures' picture.
+    size: vec2<u32>,
+    // How many shadings there are.
+    count: u32,
+    // Whether the blend space is linear light.
+    is_linear: u32,
+    // Whether an environment map surrounds the captures: where it shows through, it is part of their opacity but not of their depth.
+    is_surrounded: u32,
+    shadings: array<Shading, #{MOST_SHADINGS}>,
+}
+
+@group(2) @binding(0) var colors: texture_2d<f32>;
+// Camera units: x the sum of z alpha T, not divided by 1 - T; y the depth at which T falls to one half or below, 0 if it never does.
+@group(2) @binding(1) var depths: texture_2d<f32>;
+@group(2) @binding(2) var<uniform> settings: Settings;
+
+// A point that captures show.
+struct Point {
+    world: vec3<f32>,
+    // Along the camera's z axis: negative in front of it.
+    view_z: f32,
+    // Pixel of the target.
+    frag_coord: vec2<f32>,
+    is_environment: bool,
+}
+
+// The transfer functions, mirrored below 0.
+fn to_linear(color: vec3<f32>) -> vec3<f32> {
+    if settings.is_linear != 0u {
+        return color;
+    }
+    return sign(color) * srgb::decode(abs(color));
+}
+
+fn to_blend_space(color: vec3<f32>) -> vec3<f32> {
+    if settings.is_linear != 0u {
+        return color;
+    }
+    return sign(color) * srgb::encode(abs(color));
+}
+
+// Returns the point of view space at depth z behind a place of the picture, normalized device coordinates.
+fn view_position(place: vec2<f32>, z: f32) -> vec3<f32> {
+    let lens = view_bindings::view.clip_from_view;
+    let scale = vec2(lens[0][0], lens[1][1]);
+    if lens[3][3] == 1.0 {
+        return vec3((place - lens[3].xy) / scale, -z);
+    }
+    return vec3(z * (place + lens[2].xy) / scale, -z);
+}
+
+fn point_at(position: vec2<f32>, alpha: f32) -> Point {
+    let depth = textureLoad(depths, vec2<u32>(position), 0).xy;
+    var point: Point;
+    var z = depth.x / max(alpha, 1e-4);
+    if settings.is_surrounded != 0u && depth.y != 0.0 {
+        z = depth.y;
+    } else if settings.is_surrounded != 0u && (alpha > 0.999 || depth.x == 0.0) {
+        point.is_environment = true;
+        z = FAR;
+    }
+    let share = position / vec2<f32>(settings.size);
+    let place = vec2(2.0 * share.x - 1.0, 1.0 - 2.0 * share.y);
+    point.world = (view_bindings::view.world_from_view * vec4(view_position(place, z), 1.0)).xyz;
+    point.view_z = -z;
+    point.frag_coord = view_bindings::view.viewport.xy + share * view_bindings::view.viewport.zw;
+    return point;
+}
+
+// Returns the shading of the capture that shows a point: the one in whose box the point lies deepest, since the picture does not say. The
+// environment map belongs to the one with the largest box.
+fn shading_of(point: Point) -> u32 {
+    var best = 0u;
+    var least = 0.0;
+    for (var i = 0u; i < settings.count; i++) {
+        let rows = settings.shadings[i].cube_from_world;
+        let world = vec4(point.world, 1.0);
+        let inside = abs(vec3(dot(rows[0], world), dot(rows[1], world), dot(rows[2], world)));
+        let reach = max(inside.x, max(inside.y, inside.z));
+        let rank = select(reach, -reach, point.is_environment);
+        if i == 0u || rank < least {
+            best = i;
+            least = rank;
+        }
+    }
+    return best;
+}
+
+// Returns the light of the surroundings, as a white surface shows it at the camera's exposure.
+fn surrounding_light() -> vec3<f32> {
+    var light = view_bindings::lights.ambient_color.rgb;
+#ifdef ENVIRONMENT_MAP
+    if view_bindings::light_probes.view_cubemap_index >= 0 {
+        let sum = irradiance(vec3(1.0, 0.0, 0.0)) + irradiance(vec3(-1.0, 0.0, 0.0))
+            + irradiance(vec3(0.0, 1.0, 0.0)) + irradiance(vec3(0.0, -1.0, 0.0))
+            + irradiance(vec3(0.0, 0.0, 1.0)) + irradiance(vec3(0.0, 0.0, -1.0));
+        light += sum / 6.0 * view_bindings::light_probes.intensity_for_view;
+    }
+#endif
+    return light * view_bindings::view.exposure;
+}
+
+#ifdef ENVIRONMENT_MAP
+fn irradiance(direction: vec3<f32>) -> vec3<f32> {
+#ifdef MULTIPLE_LIGHT_PROBES_IN_ARRAY
+    return textureSampleLevel(
+        view_bindings::diffuse_environment_maps[view_bindings::light_probes.view_cubemap_index],
+        view_bindings::environment_map_sampler,
+        direction,
+        0.0,
+    ).rgb;
+#else
+    return textureSampleLevel(
+        view_bindings::diffuse_environment_map,
+        view_bindings::environment_map_sampler,
+        direction,
+        0.0,
+    ).rgb;
+#endif
+}
+#endif
+
+// Returns what is left of a color under a light that is visible by a share.
+fn darkened(tint: vec3<f32>, visibility: f32) -> vec3<f32> {
+    return mix(tint, vec3(1.0), visibility);
+}
+
+// Returns the factor of all lights that cast shadows. A capture has no normals: each light is taken to meet it head-on.
+fn shadow(point: Point, tint: vec3<f32>, bias: f32) -> vec3<f32> {
+    var factor = vec3(1.0);
+    for (var i = 0u; i < view_bindings::lights.n_directional_lights; i++) {
+        let light = &view_bindings::lights.directional_lights[i];
+        if ((*light).flags & view_types::DIRECTIONAL_LIGHT_FLAGS_SHADOWS_ENABLED_BIT) == 0u {
+            continue;
+        }
+        let toward = (*light).direction_to_light;
+        let place = vec4(point.world + bias * toward, 1.0);
+        factor *= darkened(tint, fetch_directional_shadow(i, place, toward, point.view_z, point.frag_coord));
+    }
+    let is_orthographic = view_bindings::view.clip_from_view[3][3] == 1.0;
+    let cluster = clustering::view_fragment_cluster_index(point.frag_coord, point.view_z, is_orthographic);
+    let ranges = clustering::unpack_clusterable_object_index_ranges(cluster);
+    // Point lights come first, then spot lights.
+    for (var i = ranges.first_point_light_index_offset; i < ranges.first_reflection_probe_index_offset; i++) {
+        let id = clustering::get_clusterable_object_id(i);
+        let light = &view_bindings::clustered_lights.data[id];
+        if ((*light).flags & view_types::POINT_LIGHT_FLAGS_SHADOWS_ENABLED_BIT) == 0u {
+            continue;
+        }
+        let ray = (*light).position_radius.xyz - point.world;
+        let squared = dot(ray, ray);
+        let toward = ray * inverseSqrt(max(squared, 1e-12));
+        let place = vec4(point.world + bias * toward, 1.0);
+        // The window by which Bevy ends lights at their range; without the falloff inside it, since shadows are about contrast.
+        let share = squared * (*light).color_inverse_square_range.w;
+        let window = saturate(1.0 - share * share);
+        var weight = window * window;
+        var visibility = 1.0;
+        if i < ranges.first_spot_light_index_offset {
+            visibility = fetch_point_shadow(id, place, toward, point.frag_coord);
+        } else {
+            weight *= spot_cone(id, toward);
+            visibility = fetch_spot_shadow(id, place, toward, (*light).shadow_map_near_z, point.frag_coord);
+        }
+        factor *= mix(vec3(1.0), darkened(tint, visibility), weight);
+    }
+    return factor;
+}
+
+// Returns how much of a spot light's cone a direction towards the light meets.
+fn spot_cone(id: u32, toward: vec3<f32>) -> f32 {
+    let light = &view_bindings::clustered_lights.data[id];
+    let packed = (*light).light_custom_data;
+    let y = sqrt(max(0.0, 1.0 - packed.x * packed.x - packed.y * packed.y));
+    let is_downwards = ((*light).flags & view_types::POINT_LIGHT_FLAGS_SPOT_LIGHT_Y_NEGATIVE) != 0u;
+    let axis = vec3(packed.x, select(y, -y, is_downwards), packed.y);
+    let inside = saturate(dot(-axis, toward) * packed.z + packed.w);
+    return inside * inside;
+}
+
+#ifdef DISTANCE_FOG
+// Returns a linear color behind Bevy's fog, as on its meshes.
+fn fogged(color: vec3<f32>, point: Point) -> vec3<f32> {
+    let haze = view_bindings::fog;
+    let ray = point.world - view_bindings::view.world_position;
+    let distance = length(ray);
+    let direction = ray / max(distance, 1e-6);
+    var scattering = vec3(0.0);
+    if haze.directional_light_color.a > 0.0 {
+        for (var i = 0u; i < view_bindings::lights.n_directional_lights; i++) {
+            let light = &view_bindings::lights.directional_lights[i];
+            let alignment = max(dot(direction, (*light).direction_to_light), 0.0);
+            let glow = pow(alignment, haze.directional_light_exponent) * view_bindings::view.exposure;
+            var visibility = 1.0;
+            if ((*light).flags & view_types::DIRECTIONAL_LIGHT_FLAGS_SHADOWS_ENABLED_BIT) != 0u {
+                let place = vec4(point.world, 1.0);
+                visibility = fetch_directional_shadow(i, place, -direction, point.view_z, point.frag_coord);
+            }
+            scattering += glow * visibility * (*light).color.rgb;
+        }
+    }
+    let plain = vec4(color, 1.0);
+    if haze.mode == view_types::FOG_MODE_LINEAR {
+        return linear_fog(haze, plain, distance, scattering).rgb;
+    } else if haze.mode == view_types::FOG_MODE_EXPONENTIAL {
+        return exponential_fog(haze, plain, distance, scattering).rgb;
+    } else if haze.mode == view_types::FOG_MODE_EXPONENTIAL_SQUARED {
+        return exponential_squared_fog(haze, plain, distance, scattering).rgb;
+    } else if haze.mode == view_types::FOG_MODE_ATMOSPHERIC {
+        return atmospheric_fog(haze, plain, distance, scattering).rgb;
+    }
+    return color;
+}
+#endif
+
+@fragment
+fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
+    let picture = textureLoad(colors, vec2<u32>(position.xy), 0);
+    let alpha = 1.0 - picture.a;
+    if alpha <= 0.0 {
+        return picture;
+    }
+    let point = point_at(position.xy, alpha);
+    var factor = vec3(1.0);
+    if settings.count > 0u {
+        let shading = settings.shadings[shading_of(point)];
+        factor = mix(factor, surrounding_light() * shading.light.y, shading.light.x);
+        if shading.tint.a > 0.0 && !point.is_environment {
+            factor *= shadow(point, shading.tint.rgb, shading.light.z);
+        }
+    }
+#ifndef DISTANCE_FOG
+    // What nothing changes stays as it is, to the bit.
+    if all(factor == vec3(1.0)) {
+        return picture;
+    }
+#endif
+    var color = factor * to_linear(picture.rgb / alpha);
+#ifdef DISTANCE_FOG
+    color = fogged(color, point);
+#endif
+    let shaded = to_blend_space(color) * alpha;
+    return vec4(clamp(shaded, vec3(-BRIGHTEST), vec3(BRIGHTEST)), picture.a);
+}

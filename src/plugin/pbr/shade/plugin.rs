@@ -1,0 +1,43 @@
+//! The plugin of shading: which system runs when.
+//!
+//! In: an app in which captures are drawn, Bevy's `PbrPlugin`. Out: the same app, in which fog, shadows and light reach captures. Without
+//! `PbrPlugin` nothing changes.
+
+use super::draw::{ShadeViews, prepare_shade, shade_captures};
+use super::extract::{ExtractedShading, extract_shading};
+use super::pipeline::{ShadePipeline, ShadeShader, init_shade_pipeline};
+use crate::plugin::render::CaptureSystems;
+use bevy::app::{App, Plugin};
+use bevy::asset::Assets;
+use bevy::core_pipeline::schedule::Core3d;
+use bevy::ecs::schedule::IntoScheduleConfigs;
+use bevy::pbr::MeshPipelineSystems;
+use bevy::render::render_resource::SpecializedRenderPipelines;
+use bevy::render::{ExtractSchedule, GpuResourceAppExt, Render, RenderApp, RenderStartup, RenderSystems};
+use bevy::shader::Shader;
+
+/// Shades captures. Part of [`GaussianCapturePlugin`](crate::GaussianCapturePlugin).
+#[derive(Debug, Default, Clone, Copy)]
+pub(crate) struct ShadePlugin;
+
+impl Plugin for ShadePlugin {
+    fn build(&self, app: &mut App) {
+        if app.get_sub_app(RenderApp).is_none() {
+            return;
+        }
+        let Some(mut shaders) = app.world_mut().get_resource_mut::<Assets<Shader>>() else { return };
+        let source = include_str!("../../../../shaders/pbr/shade.wgsl");
+        let shader = ShadeShader(shaders.add(Shader::from_wgsl(source, "bevy_gs4d/shaders/pbr/shade.wgsl")));
+        let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
+        render_app
+            .insert_resource(shader)
+            .init_resource::<ExtractedShading>()
+            // Created anew after a lost device: they hold everything on the GPU.
+            .init_gpu_resource::<SpecializedRenderPipelines<ShadePipeline>>()
+            .init_gpu_resource::<ShadeViews>()
+            .add_systems(RenderStartup, init_shade_pipeline.after(MeshPipelineSystems))
+            .add_systems(ExtractSchedule, extract_shading)
+            .add_systems(Render, prepare_shade.in_set(RenderSystems::Prepare))
+            .add_systems(Core3d, shade_captures.in_set(CaptureSystems::Shade));
+    }
+}

@@ -1,0 +1,276 @@
+//! Fog, shadows of meshes and the light of the surroundings on captures.
+//!
+//! In: flat captures made by hand beside meshes of the same colour, in headless apps. Out: proof that fog is that of Bevy's meshes, that
+//! shadows and dark rooms darken captures by the documented factors and only those that ask for it, and that other cameras pay nothing.
+//! Skipped where there is no GPU, not even a software one.
+
+use crate::support::cpu_reference::{SIZE, blob, difference_between, rgb, scene};
+use crate::support::fixtures::{MIDDLE, front, insert, orthographic, spawn, spawn_box};
+use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
+use bevy::camera::{Exposure, Hdr};
+use bevy::diagnostic::DiagnosticsStore;
+use bevy::light::{DirectionalLightShadowMap, PointLightShadowMap};
+use bevy::pbr::{DistanceFog, FogFalloff};
+use bevy::prelude::*;
+use bevy::render::diagnostic::RenderDiagnosticsPlugin;
+use bevy_gs4d::pbr::{CaptureLight, ReceivesShadows};
+use bevy_gs4d::render::CaptureViewSettings;
+use bevy_gs4d::scene::{Environment, RuntimeScene};
+use bevy_gs4d::view::srgb::{decode, encode};
+use bevy_gs4d::view::{BlendSpace, DebugView};
+use image::RgbaImage;
+
+/// The colour of walls, sRGB-encoded.
+const COLOR: Vec3 = Vec3::new(0.6, 0.4, 0.8);
+
+/// Returns a flat wall through the origin, opaque to less than an 8-bit step all over the picture: three splats of the opacity 0.95 let
+/// 0.000125 through, and blending ends at 0.0001.
+fn wall() -> RuntimeScene {
+    scene(&[(blob(Vec3::ZERO, Vec3::new(30.0, 30.0, 1e-3), 0.95), COLOR); 3])
+}
+
+/// Spawns the same wall as an unlit mesh.
+fn spawn_mesh_wall(app: &mut App) -> Entity {
+    let color = Color::srgb(COLOR.x, COLOR.y, COLOR.z);
+    spawn_box(app, Vec3::new(40.0, 40.0, 0.1), Vec3::new(0.0, 0.0, -0.05), color, AlphaMode::Opaque)
+}
+
+fn fog(falloff: FogFalloff) -> DistanceFog {
+    DistanceFog { color: Color::srgba(0.2, 0.7, 0.3, 0.9), falloff, ..default() }
+}
+
+/// Returns a fog of each kind that changes colours a lot at a distance of four.
+fn fogs() -> [(&'static str, DistanceFog); 5] {
+    let linear = FogFalloff::Linear { start: 1.0, end: 8.0 };
+    let glowing = DistanceFog {
+        directional_light_color: Color::srgba(1.0, 0.8, 0.5, 0.5),
+        directional_light_exponent: 8.0,
+        ..fog(linear.clone())
+    };
+    let [extinction, inscattering] = [Vec3::new(0.1, 0.2, 0.3), Vec3::new(0.3, 0.2, 0.1)];
+    [
+        ("linear", fog(linear)),
+        ("exponential", fog(FogFalloff::Exponential { density: 0.2 })),
+        ("squared", fog(FogFalloff::ExponentialSquared { density: 0.2 })),
+        ("atmospheric", fog(FogFalloff::Atmospheric { extinction, inscattering })),
+        ("with a glow", glowing),
+    ]
+}
+
+/// Returns pictures of the capture alone, and of the mesh alone.
+fn each(app: &mut App, capture: Entity, mesh: Entity) -> [RgbaImage; 2] {
+    [(Visibility::Inherited, Visibility::Hidden), (Visibility::Hidden, Visibility::Inherited)].map(|(first, second)| {
+        insert(app, capture, first);
+        insert(app, mesh, second);
+        picture(app, 0.0)
+    })
+}
+
+/// Returns the linear light of a pixel.
+fn light(picture: &RgbaImage, x: u32) -> Vec3 {
+    decode(Vec3::from(rgb(picture, x, MIDDLE.y).map(f32::from)) / 255.0)
+}
+
+/// Checks that a pixel of the wall has the wall's light times `factor`.
+fn check(picture: &RgbaImage, x: u32, factor: Vec3, what: &str) {
+    let expected = encode(decode(COLOR) * factor) * 255.0;
+    let seen = Vec3::from(rgb(picture, x, MIDDLE.y).map(f32::from));
+    assert!((seen - expected).abs().max_element() <= 3.0, "{what}: {seen}, not {expected}");
+}
+
+/// Returns whether the pass has been recorded so far.
+fn has_shaded(app: &App, pass: &str) -> bool {
+    app.world().resource::<DiagnosticsStore>().iter().any(|known| known.path().as_str().contains(pass))
+}
+
+#[test]
+fn fog_is_that_of_a_mesh_at_the_same_place() {
+    let Some(mut app) = app(SIZE) else { return };
+    let capture = spawn(&mut app, &wall(), ());
+    let mesh = spawn_mesh_wall(&mut app);
+    let camera = spawn_camera(&mut app, Msaa::Off, front());
+    let sun = DirectionalLight { illuminance: 600.0, ..default() };
+    app.world_mut().spawn((sun, Transform::default().looking_to(Vec3::new(-0.2, -0.1, 1.0), Vec3::Y)));
+    let [plain, mesh_alone] = each(&mut app, capture, mesh);
+    let apart = difference_between(&plain, &mesh_alone);
+    assert!(apart <= 2, "without fog they are {apart} / 255 apart");
+    for (what, fog) in fogs() {
+        insert(&mut app, camera, fog);
+        let [fogged, expected] = each(&mut app, capture, mesh);
+        let apart = difference_between(&fogged, &expected);
+        assert!(apart <= 2, "{what}: the capture and the mesh are {apart} / 255 apart");
+        let changed = difference_between(&fogged, &plain);
+        assert!(changed > 20, "{what}: the fog changes only {changed} / 255");
+    }
+}
+
+#[test]
+fn fog_is_the_same_for_every_kind_of_camera() {
+    let perspective = PerspectiveProjection { fov: FOV_Y, ..default() };
+    for (what, msaa, lens) in [
+        ("orthographic", Msaa::Off, Projection::Orthographic(orthographic())),
+        ("multisampled", Msaa::Sample4, Projection::Perspective(perspective)),
+    ] {
+        let Some(mut app) = app(SIZE) else { return };
+        let capture = spawn(&mut app, &wall(), ());
+        let mesh = spawn_mesh_wall(&mut app);
+        let camera = spawn_camera(&mut app, msaa, Transform::from_xyz(0.5, 0.0, 4.0));
+        insert(&mut app, camera, (lens, fog(FogFalloff::Exponential { density: 0.2 })));
+        let [fogged, expected] = each(&mut app, capture, mesh);
+        let apart = difference_between(&fogged, &expected);
+        assert!(apart <= 2, "{what}: the capture and the mesh are {apart} / 255 apart");
+        let middle = light(&expected, MIDDLE.x).distance(decode(COLOR));
+        assert!(middle > 0.05, "{what}: there is fog, {middle}");
+    }
+}
+
+#[test]
+fn fog_is_the_same_in_every_blend_space_and_on_hdr_targets() {
+    let Some(mut app) = app(SIZE) else { return };
+    spawn(&mut app, &wall(), ());
+    let camera = spawn_camera(&mut app, Msaa::Off, front());
+    insert(&mut app, camera, fog(FogFalloff::Linear { start: 1.0, end: 8.0 }));
+    let encoded = picture(&mut app, 0.0);
+    insert(&mut app, camera, CaptureViewSettings { blend_space: BlendSpace::Linear, ..default() });
+    let apart = difference_between(&picture(&mut app, 0.0), &encoded);
+    assert!(apart <= 2, "linear and encoded blending are {apart} / 255 apart");
+    insert(&mut app, camera, Hdr);
+    let apart = difference_between(&picture(&mut app, 0.0), &encoded);
+    assert!(apart <= 2, "HDR and 8 bits are {apart} / 255 apart");
+}
+
+#[test]
+fn an_environment_map_is_fogged_as_what_is_infinitely_far() {
+    let Some(mut app) = app(SIZE) else { return };
+    let map = Environment { width: 8, height: 4, texels: vec![0.9; 8 * 4 * 3] };
+    let behind = scene(&[(blob(Vec3::Z * 9.0, Vec3::splat(0.4), 0.98), Vec3::X)]);
+    spawn(&mut app, &RuntimeScene { environment: Some(map), ..behind }, ());
+    let camera = spawn_camera(&mut app, Msaa::Off, front());
+    let plain = rgb(&picture(&mut app, 0.0), MIDDLE.x, MIDDLE.y);
+    assert!(plain.iter().all(|value| *value > 150), "the map shows: {plain:?}");
+    let color = Color::srgb(0.2, 0.7, 0.3);
+    let falloff = FogFalloff::Linear { start: 1000.0, end: 2000.0 };
+    insert(&mut app, camera, DistanceFog { color, falloff, ..default() });
+    let seen = rgb(&picture(&mut app, 0.0), MIDDLE.x, MIDDLE.y);
+    for (value, expected) in seen.into_iter().zip([51, 179, 77]) {
+        assert!(value.abs_diff(expected) <= 2, "the fog's colour, not {seen:?}");
+    }
+}
+
+#[test]
+fn the_shadow_of_a_mesh_falls_on_a_capture_that_receives_it() {
+    let tint = LinearRgba::rgb(0.2, 0.3, 0.4);
+    let in_shadow = Vec3::new(0.2, 0.3, 0.4);
+    let Some(mut app) = app(SIZE) else { return };
+    app.insert_resource(DirectionalLightShadowMap { size: 512 }).insert_resource(PointLightShadowMap { size: 256 });
+    let capture = spawn(&mut app, &wall(), ());
+    // Between the lamps and the middle of the wall, and not between that and the camera.
+    spawn_box(&mut app, Vec3::splat(0.6), Vec3::new(1.75, 0.0, 1.25), Color::BLACK, AlphaMode::Opaque);
+    spawn_camera(&mut app, Msaa::Off, front());
+    let plain = picture(&mut app, 0.0);
+    let place = Transform::from_xyz(3.5, 0.0, 2.5).looking_at(Vec3::ZERO, Vec3::Y);
+    let left = 33;
+    let sun = DirectionalLight { shadow_maps_enabled: true, ..default() };
+    let lamp = PointLight { shadow_maps_enabled: true, range: 20.0, ..default() };
+    let spot = SpotLight { shadow_maps_enabled: true, range: 20.0, outer_angle: 0.7, inner_angle: 0.6, ..default() };
+    let lights = [
+        ("directional", app.world_mut().spawn((sun, place, Visibility::Hidden)).id()),
+        ("point", app.world_mut().spawn((lamp, place, Visibility::Hidden)).id()),
+        ("spot", app.world_mut().spawn((spot, place, Visibility::Hidden)).id()),
+    ];
+    for (what, lamp) in lights {
+        insert(&mut app, lamp, Visibility::Inherited);
+        app.world_mut().entity_mut(capture).remove::<ReceivesShadows>();
+        let apart = difference_between(&picture(&mut app, 0.0), &plain);
+        assert_eq!(apart, 0, "{what}: without the component nothing changes");
+        insert(&mut app, capture, ReceivesShadows { tint, ..default() });
+        let shadowed = picture(&mut app, 0.0);
+        check(&shadowed, MIDDLE.x, in_shadow, &format!("{what}, in the shadow"));
+        check(&shadowed, left, Vec3::ONE, &format!("{what}, beside it"));
+        insert(&mut app, lamp, Visibility::Hidden);
+    }
+    let apart = difference_between(&picture(&mut app, 0.0), &plain);
+    assert_eq!(apart, 0, "without a lamp there is no shadow, to the bit");
+}
+
+#[test]
+fn a_capture_takes_the_light_of_the_surroundings() {
+    let Some(mut app) = app(SIZE) else { return };
+    app.insert_resource(GlobalAmbientLight::NONE);
+    let capture = spawn(&mut app, &wall(), ());
+    let camera = spawn_camera(&mut app, Msaa::Off, front());
+    let plain = picture(&mut app, 0.0);
+    insert(&mut app, capture, CaptureLight { amount: 0.0, ..default() });
+    assert_eq!(difference_between(&picture(&mut app, 0.0), &plain), 0, "nothing of it, to the bit");
+    insert(&mut app, capture, CaptureLight { amount: 0.75, ..default() });
+    check(&picture(&mut app, 0.0), MIDDLE.x, Vec3::splat(0.25), "a dark room");
+
+    let white = GlobalAmbientLight { brightness: 300.0, ..default() };
+    app.insert_resource(white);
+    let exposure = Exposure::default().exposure();
+    insert(&mut app, capture, CaptureLight::default());
+    check(&picture(&mut app, 0.0), MIDDLE.x, Vec3::splat(300.0 * exposure), "ambient light");
+
+    app.insert_resource(GlobalAmbientLight::NONE);
+    let color = Color::linear_rgb(1.0, 0.5, 0.25);
+    let map = EnvironmentMapLight::solid_color(&mut app.world_mut().resource_mut::<Assets<Image>>(), color);
+    insert(&mut app, camera, EnvironmentMapLight { intensity: 500.0, ..map });
+    insert(&mut app, capture, CaptureLight { reference: 0.8, amount: 1.0 });
+    let expected = Vec3::new(1.0, 0.5, 0.25) * 500.0 * exposure / 0.8;
+    check(&picture(&mut app, 0.0), MIDDLE.x, expected, "an environment map");
+}
+
+#[test]
+fn captures_beside_each_other_keep_their_own_light() {
+    let Some(mut app) = app(SIZE) else { return };
+    app.insert_resource(GlobalAmbientLight::NONE);
+    let ball = |x: f32| scene(&[(blob(Vec3::X * x, Vec3::splat(0.15), 0.98), Vec3::splat(0.8))]);
+    spawn(&mut app, &ball(-1.0), CaptureLight::default());
+    spawn(&mut app, &ball(1.0), ());
+    spawn_camera(&mut app, Msaa::Off, front());
+    let picture = picture(&mut app, 0.0);
+    // One unit beside the middle, four away: 0.44 of half the width.
+    let [left, right] = [56, 144].map(|x| rgb(&picture, x, MIDDLE.y)[0]);
+    assert!(left <= 2, "the one that takes the light of a dark room is dark: {left}");
+    assert!(right > 190, "the other shines: {right}");
+}
+
+#[test]
+fn debug_views_are_not_shaded() {
+    let Some(mut app) = app(SIZE) else { return };
+    spawn(&mut app, &wall(), ());
+    let camera = spawn_camera(&mut app, Msaa::Off, front());
+    insert(&mut app, camera, CaptureViewSettings { debug: DebugView::Depth, ..default() });
+    let plain = picture(&mut app, 0.0);
+    insert(&mut app, camera, fog(FogFalloff::Exponential { density: 0.5 }));
+    assert_eq!(difference_between(&picture(&mut app, 0.0), &plain), 0, "depths are not colours");
+}
+
+#[test]
+fn a_camera_without_any_of_it_has_no_further_pass() {
+    let Some(mut app) = app(SIZE) else { return };
+    app.add_plugins(RenderDiagnosticsPlugin);
+    let capture = spawn(&mut app, &wall(), ());
+    let camera = spawn_camera(&mut app, Msaa::Off, front());
+    let plain = picture(&mut app, 0.0);
+    // Spans arrive some frames later.
+    let wait_for = |app: &mut App, pass: &str| {
+        for _ in 0..100 {
+            if has_shaded(app, pass) {
+                return true;
+            }
+            app.update();
+        }
+        false
+    };
+    assert!(wait_for(&mut app, "gs4d/composite"), "spans arrive");
+    assert!(!has_shaded(&app, "gs4d/shade"), "captures are not shaded");
+    insert(&mut app, camera, fog(FogFalloff::Exponential { density: 0.5 }));
+    assert!(difference_between(&picture(&mut app, 0.0), &plain) > 20, "fog shows");
+    assert!(wait_for(&mut app, "gs4d/shade"), "in a pass of its own");
+    app.world_mut().entity_mut(camera).remove::<DistanceFog>();
+    assert_eq!(difference_between(&picture(&mut app, 0.0), &plain), 0, "without it the picture is as it was");
+    insert(&mut app, capture, Visibility::Hidden);
+    let hidden = picture(&mut app, 0.0);
+    assert!(hidden.pixels().all(|pixel| pixel.0[..3] == [0, 0, 0]), "and nothing is left of hidden captures");
+}
