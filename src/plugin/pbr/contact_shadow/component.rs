@@ -10,8 +10,8 @@ use glam::{Affine3A, Vec3};
 
 /// Darkens the ground beneath a capture: an optional component beside [`GaussianCapture3d`](crate::GaussianCapture3d).
 ///
-/// The ellipse is inscribed in the capture's bounds, seen from above, follows them over time, and fades as the capture rises above the
-/// ground. It needs no light, and costs as much as one small quad. It is drawn over opaque meshes (alpha-masked ones may cover it) and
+/// The ellipse is inscribed in the capture's bounds, seen from above, follows them over time, and fades with the capture's opacity and as
+/// it rises above the ground. It needs no light, and costs as much as one small quad. It is drawn over opaque meshes (alpha-masked ones may cover it) and
 /// behind captures, by a child entity that is despawned with this component.
 ///
 /// # Examples

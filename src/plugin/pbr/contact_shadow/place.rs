@@ -6,6 +6,8 @@
 use super::component::{CaptureContactShadow, Ellipse};
 use super::gradient::gradient;
 use super::material::{BlendedEarly, ContactShadowMaterial};
+use crate::plugin::playback::ClipFade;
+use crate::plugin::render::CaptureSettings;
 use bevy::asset::{Assets, Handle};
 use bevy::camera::primitives::Aabb;
 use bevy::camera::visibility::{RenderLayers, Visibility};
@@ -83,6 +85,8 @@ fn black() -> ContactShadowMaterial {
 
 type Capture = (
     &'static CaptureContactShadow,
+    &'static CaptureSettings,
+    Option<&'static ClipFade>,
     &'static GlobalTransform,
     Option<&'static Aabb>,
     Option<&'static RenderLayers>,
@@ -108,7 +112,8 @@ pub(super) fn place_contact_shadows(
     mut commands: Commands,
 ) {
     for (entity, parent, mut mesh, mut place, mut visibility, material, shadow_layers) in &mut shadows {
-        let Ok((settings, transform, bounds, layers)) = captures.get(parent.parent()) else { continue };
+        let Ok((settings, capture, fade, transform, bounds, layers)) = captures.get(parent.parent()) else { continue };
+        let opacity = capture.appearance(fade.copied().unwrap_or_default().0).opacity.min(1.0);
         if shadow_layers != layers {
             let mut entity = commands.entity(entity);
             match layers {
@@ -116,7 +121,7 @@ pub(super) fn place_contact_shadows(
                 None => entity.try_remove::<RenderLayers>(),
             };
         }
-        let ellipse = bounds.and_then(|bounds| ellipse(settings, bounds, &transform.affine()));
+        let ellipse = bounds.and_then(|bounds| ellipse(settings, bounds, &transform.affine(), opacity));
         let shown = if ellipse.is_some() { Visibility::Inherited } else { Visibility::Hidden };
         visibility.set_if_neq(shown);
         let Some(ellipse) = ellipse else { continue };
@@ -134,11 +139,17 @@ pub(super) fn place_contact_shadows(
     }
 }
 
-/// Returns the ellipse beneath a capture's bounds.
-fn ellipse(settings: &CaptureContactShadow, bounds: &Aabb, world_from_capture: &Affine3A) -> Option<Ellipse> {
+/// Returns the ellipse beneath a capture's bounds; `None` if nothing of it shows.
+fn ellipse(
+    settings: &CaptureContactShadow,
+    bounds: &Aabb,
+    world_from_capture: &Affine3A,
+    opacity: f32,
+) -> Option<Ellipse> {
     let center = world_from_capture.transform_point3a(bounds.center);
     let half_size = world_from_capture.matrix3.abs() * bounds.half_extents;
-    settings.beneath(center.into(), half_size.into())
+    let ellipse = settings.beneath(center.into(), half_size.into()).filter(|_| opacity > 0.0)?;
+    Some(Ellipse { strength: ellipse.strength * opacity, ..ellipse })
 }
 
 #[cfg(test)]
@@ -153,9 +164,13 @@ mod tests {
         let bounds = Aabb::from_min_max(Vec3::new(-0.5, -0.5, 0.0), Vec3::new(0.5, 0.5, 3.0));
         let upright = Affine3A::from_rotation_translation(Quat::from_rotation_x(-FRAC_PI_2), Vec3::new(2.0, 0.0, 1.0));
         let settings = CaptureContactShadow { softness: 0.0, ..CaptureContactShadow::default() };
-        let ellipse = ellipse(&settings, &bounds, &upright).expect("it stands on the ground");
+        let beneath = |opacity| ellipse(&settings, &bounds, &upright, opacity);
+        let ellipse = beneath(1.0).expect("it stands on the ground");
         let [middle, edge] = [Vec3::ZERO, Vec3::X].map(|at| ellipse.world_from_disk.transform_point3(at));
         assert!(middle.abs_diff_eq(Vec3::new(2.0, 0.0, 1.0), 0.01), "it is beneath, not at {middle}");
         assert!(edge.abs_diff_eq(Vec3::new(2.5, 0.0, 1.0), 0.01), "and as wide as the capture, not up to {edge}");
+        let half = beneath(0.5).expect("half of it shows");
+        assert!((half.strength - 0.5 * ellipse.strength).abs() < 1e-6, "it is as transparent as the capture");
+        assert_eq!(beneath(0.0), None, "and hidden with it");
     }
 }
