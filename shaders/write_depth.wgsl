@@ -1,4 +1,5 @@
-// write_depth: writes captures to the depth buffer of a camera or a light, where they hide more than half of what is behind.
+// write_depth: writes captures to the depth buffer of a camera or a light, where they hide more than half of what is
+// behind them.
 //
 // In: the captures' color and transmittance, and their depths, for the pixels of the viewport. Out: values for the
 // depth test, which keeps them where nothing nearer has been drawn; the same for every sample.
