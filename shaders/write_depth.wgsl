@@ -1,4 +1,5 @@
-// write_depth: writes captures to the camera's depth buffer, where they hide more than half of what is behind.
+// write_depth: writes captures to the depth buffer of a camera or a light, where they hide more than half of what is
+// behind them.
 //
 // In: the captures' color and transmittance, and their depths, for the pixels of the viewport. Out: values for the
 // depth test, which keeps them where nothing nearer has been drawn; the same for every sample.
@@ -9,14 +10,19 @@
 @group(0) @binding(1) var depths: texture_2d<f32>;
 // Corner and size of the viewport in the target, pixels.
 @group(0) @binding(2) var<uniform> viewport: vec4<u32>;
-// From depth-buffer value d to camera space: z = (x + y d) / (z + w d).
-@group(0) @binding(3) var<uniform> lens: vec4<f32>;
+struct Lens {
+    // From depth-buffer value d to camera space: z = (x + y d) / (z + w d).
+    distance: vec4<f32>,
+    // Width and height of a pixel of the captures, in pixels of the target.
+    scale: u32,
+}
+@group(0) @binding(3) var<uniform> lens: Lens;
 
 @fragment
 fn fragment(@builtin(position) position: vec4<f32>) -> @builtin(frag_depth) f32 {
     let pixel = vec2<u32>(position.xy);
     let inside = all(pixel >= viewport.xy) && all(pixel < viewport.xy + viewport.zw);
-    let at = select(vec2(0u), pixel - viewport.xy, inside);
+    let at = select(vec2(0u), (pixel - viewport.xy) / lens.scale, inside);
     let depth = textureLoad(depths, at, 0).xy;
     if !inside || depth.y == 0.0 {
         discard;
@@ -26,5 +32,6 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @builtin(frag_depth) f32 
 #else
     let z = depth.x / max(1.0 - textureLoad(colors, at, 0).a, 1e-4);
 #endif
-    return clamp((lens.x - lens.z * z) / (lens.w * z - lens.y), 0.0, 1.0);
+    let map = lens.distance;
+    return clamp((map.x - map.z * z) / (map.w * z - map.y), 0.0, 1.0);
 }

@@ -25,6 +25,8 @@
 pub use crate::plugin::GaussianCapturePlugin;
 pub use crate::plugin::asset::{CaptureFailed, CaptureReady, CaptureState};
 pub use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
+#[cfg(feature = "pbr")]
+pub use crate::plugin::pbr::{CaptureContactShadow, CaptureLight, CastsShadows, ReceivesShadows, ShadowResolution};
 pub use crate::plugin::picking::{CaptureHit, CapturePicker};
 pub use crate::plugin::playback::{
     FollowsClock, KeyFrameCrossed, MarkerReached, Playback, PlaybackClock, PlaybackEnded, PlaybackLooped,

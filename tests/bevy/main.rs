@@ -14,6 +14,7 @@ mod inspector;
 mod picking;
 mod playback;
 mod shade;
+mod shadows;
 mod steady;
 mod stereo;
 mod testing;

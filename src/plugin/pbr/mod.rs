@@ -2,8 +2,12 @@
 //!
 //! In: an app in which captures are drawn, Bevy's `PbrPlugin`. Out: the same app, in which captures and meshes belong to one scene.
 
+mod contact_shadow;
 mod plugin;
 mod shade;
+mod shadow;
 
+pub use contact_shadow::CaptureContactShadow;
 pub(crate) use plugin::CapturePbrPlugin;
 pub use shade::{CaptureLight, ReceivesShadows};
+pub use shadow::{CastsShadows, ShadowResolution};

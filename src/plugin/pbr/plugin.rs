@@ -2,7 +2,9 @@
 //!
 //! In: an app in which captures are drawn. Out: the same app with the parts of this folder.
 
+use super::contact_shadow::ContactShadowPlugin;
 use super::shade::ShadePlugin;
+use super::shadow::CaptureShadowPlugin;
 use bevy::app::{App, Plugin};
 
 /// Joins captures and lit meshes. Part of [`GaussianCapturePlugin`](crate::GaussianCapturePlugin).
@@ -11,6 +13,6 @@ pub(crate) struct CapturePbrPlugin;
 
 impl Plugin for CapturePbrPlugin {
     fn build(&self, app: &mut App) {
-        app.add_plugins(ShadePlugin);
+        app.add_plugins((ShadePlugin, CaptureShadowPlugin, ContactShadowPlugin));
     }
 }

@@ -19,7 +19,7 @@ use bevy::render::sync_world::MainEntityHashMap;
 
 /// The lists of captures with a temporal filter, by entity of the main world. A list is kept while its entity shows the same capture.
 #[derive(Resource, Default)]
-pub(super) struct ActiveLists(pub(super) MainEntityHashMap<PlacedList>);
+pub(crate) struct ActiveLists(pub(super) MainEntityHashMap<PlacedList>);
 
 /// The list of one entity.
 pub(super) struct PlacedList {

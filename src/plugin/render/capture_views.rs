@@ -50,14 +50,28 @@ pub(crate) struct CaptureView {
     pub(crate) drawn: Vec<Drawn>,
 }
 
-/// One capture, seen by one camera.
+/// One capture, seen by one camera or light.
 pub(crate) struct Drawn {
     pub(crate) entity: MainEntity,
-    pub(super) asset: AssetId<GaussianCapture>,
+    pub(crate) asset: AssetId<GaussianCapture>,
     pub(crate) view: View,
-    pub(super) appearance: Appearance,
+    pub(crate) appearance: Appearance,
     /// Whether the capture's temporal filter is used.
-    pub(super) filtered: bool,
+    pub(crate) filtered: bool,
+}
+
+impl Drawn {
+    /// Returns it as input of the renderer; `None` if the capture is no longer on the GPU.
+    pub(crate) fn instance<'a>(
+        &self,
+        captures: &'a RenderAssets<GpuGaussianCapture>,
+        lists: &'a ActiveLists,
+    ) -> Option<Instance<'a>> {
+        let capture = captures.get(self.asset)?.capture()?;
+        let list = if self.filtered { lists.0.get(&self.entity) } else { None };
+        let active = list.map(|placed| &placed.list);
+        Some(Instance { capture, active, view: self.view, appearance: self.appearance })
+    }
 }
 
 /// Frames in a row without a visible capture after which a camera releases its GPU memory.
@@ -98,17 +112,7 @@ impl CaptureView {
         captures: &'a RenderAssets<GpuGaussianCapture>,
         lists: &'a ActiveLists,
     ) -> Vec<Instance<'a>> {
-        let instance = |drawn: &Drawn| {
-            let capture = captures.get(drawn.asset)?.capture()?;
-            let list = if drawn.filtered { lists.0.get(&drawn.entity) } else { None };
-            Some(Instance {
-                capture,
-                active: list.map(|placed| &placed.list),
-                view: drawn.view,
-                appearance: drawn.appearance,
-            })
-        };
-        self.drawn.iter().filter_map(instance).collect()
+        self.drawn.iter().filter_map(|drawn| drawn.instance(captures, lists)).collect()
     }
 
     /// Counts a frame in which the camera sees a capture, or none. After [`RELEASE_AFTER_IDLE_FRAMES`] without one, GPU memory is

@@ -22,24 +22,24 @@ use glam::Affine3A;
 
 /// The captures of this frame, seen by a camera or not. The memory is kept from frame to frame.
 #[derive(Resource, Default)]
-pub(super) struct ExtractedCaptures(pub(super) MainEntityHashMap<ExtractedCapture>);
+pub(crate) struct ExtractedCaptures(pub(crate) MainEntityHashMap<ExtractedCapture>);
 
 /// One entity with a loaded capture.
-pub(super) struct ExtractedCapture {
-    pub(super) asset: AssetId<GaussianCapture>,
-    pub(super) world_from_capture: Affine3A,
+pub(crate) struct ExtractedCapture {
+    pub(crate) asset: AssetId<GaussianCapture>,
+    pub(crate) world_from_capture: Affine3A,
     /// Seconds since the capture's start.
-    pub(super) seconds: f32,
+    pub(crate) seconds: f32,
     /// Whether its temporal filter is used.
-    pub(super) filtered: bool,
-    pub(super) appearance: Appearance,
-    /// Whether any camera sees it.
-    pub(super) seen: bool,
+    pub(crate) filtered: bool,
+    pub(crate) appearance: Appearance,
+    /// Whether any camera sees it, or may see what it does to lights.
+    pub(crate) seen: bool,
 }
 
 impl ExtractedCapture {
     /// Returns whether nothing of it shows, wherever it is seen from.
-    pub(super) fn is_faded_out(&self) -> bool {
+    pub(crate) fn is_faded_out(&self) -> bool {
         self.appearance.opacity <= 0.0
     }
 }
@@ -58,7 +58,7 @@ type Placed = (
     Option<&'static ClipFade>,
 );
 
-pub(super) fn extract_captures(
+pub(crate) fn extract_captures(
     mut extracted: ResMut<ExtractedCaptures>,
     assets: Extract<Res<Assets<GaussianCapture>>>,
     captures: Extract<Query<Placed>>,

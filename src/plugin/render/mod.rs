@@ -69,9 +69,23 @@ mod view;
 mod visibility;
 mod write_depth;
 
+#[cfg(feature = "pbr")]
+pub(crate) use active::ActiveLists;
+#[cfg(feature = "pbr")]
+pub(crate) use capture_views::Drawn;
 pub use draw::CaptureSystems;
 pub use fault::CameraFault;
+#[cfg(feature = "pbr")]
+pub(crate) use extract::{ExtractedCaptures, extract_captures};
 pub(crate) use plugin::CaptureRenderPlugin;
+#[cfg(feature = "pbr")]
+pub(crate) use renderer::CaptureRenderer;
 pub use settings::{CaptureSettings, CaptureViewSettings, CropBox, DepthWrite};
 pub use statistics::CaptureStatistics;
 pub use upload::{CaptureUploadBudget, GpuGaussianCapture};
+#[cfg(feature = "pbr")]
+pub(crate) use view::CameraLens;
+#[cfg(feature = "pbr")]
+pub(crate) use visibility::update_bounds;
+#[cfg(feature = "pbr")]
+pub(crate) use write_depth::{WriteDepthBindings, WriteDepthKey, WriteDepthPipeline};

@@ -174,7 +174,7 @@ pub(super) fn prepare_views(
         let written = lens.distance.zip(writes_median(&settings, surrounded));
         state.write_depth = written.map(|(_, median)| pipelines.write_depth(msaa, median));
         if let Some((distance, _)) = written {
-            state.depth_bindings.set_distance(distance, &device, &queue, renderer.0.work());
+            state.depth_bindings.set_lens(distance, 1, &device, &queue, renderer.0.work());
         }
     }
 }

@@ -12,7 +12,7 @@ use bevy::render::renderer::RenderDevice;
 
 /// The renderer's pipelines; absent if this GPU cannot run them.
 #[derive(Resource)]
-pub struct CaptureRenderer(pub(super) Renderer);
+pub struct CaptureRenderer(pub(crate) Renderer);
 
 /// Compiles the renderer's pipelines. Shaders check their array indices in debug builds.
 pub(super) fn init_renderer(mut commands: Commands, device: Res<RenderDevice>, statistics: Res<CaptureStatistics>) {

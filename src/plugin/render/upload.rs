@@ -76,7 +76,7 @@ impl GpuGaussianCapture {
 
     /// Returns the timestamp at `seconds` since the start of the capture that is drawn, in its own unit of time; `None` if it cannot be
     /// drawn.
-    pub(super) fn time_at(&self, seconds: f32) -> Option<f32> {
+    pub(crate) fn time_at(&self, seconds: f32) -> Option<f32> {
         self.shown.as_ref().map(|shown| shown.source.time_at(seconds))
     }
 

@@ -8,11 +8,11 @@ use glam::{Affine3A, DMat3, DMat4, DVec4, Mat4, UVec2, Vec2, Vec4};
 
 /// A camera's lens: a pinhole, or parallel rays.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct CameraLens {
+pub(crate) struct CameraLens {
     rays: Rays,
     /// How the depth buffer's value `d` gives depth in camera space: `z = (x + y d) / (z + w d)`. `None` if it also
     /// depends on the place in the picture.
-    pub(super) distance: Option<Vec4>,
+    pub(crate) distance: Option<Vec4>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,7 +36,7 @@ enum Rays {
 impl CameraLens {
     /// Returns the lens behind a projection matrix; `None` for one that is skewed, mirrored or, with parallel rays, not
     /// reversed in depth.
-    pub(super) fn of(clip_from_view: &Mat4) -> Option<Self> {
+    pub(crate) fn of(clip_from_view: &Mat4) -> Option<Self> {
         let [x, y, _, _] = columns(clip_from_view);
         if !clip_from_view.is_finite() || (x.y, y.x) != (0.0, 0.0) || x.x <= 0.0 || y.y <= 0.0 {
             return None;
@@ -78,7 +78,7 @@ impl CameraLens {
 
     /// Returns the view of one capture through this lens: `size` in pixels, `time` in the capture's unit. `None` if the
     /// transforms flatten the capture or are not finite.
-    pub(super) fn view(
+    pub(crate) fn view(
         &self,
         size: UVec2,
         time: f32,

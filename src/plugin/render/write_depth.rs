@@ -1,7 +1,7 @@
-//! `write_depth`: writes the depth of captures to the camera's depth buffer, for passes that come after them.
+//! `write_depth`: writes the depth of captures to a depth buffer, for passes that come after them.
 //!
 //! In: a view's captures (colour, transmittance, depths) and its lens. Out: pipeline and bind group for `shaders/write_depth.wgsl`,
-//! for cameras that ask for it with [`DepthWrite`](super::DepthWrite).
+//! for cameras that ask for it with [`DepthWrite`](super::DepthWrite), and for the shadow maps of lights.
 
 use super::composite::CaptureShaders;
 use crate::renderer::WorkCounters;
@@ -14,7 +14,7 @@ use bevy::render::render_resource::binding_types::{texture_2d, uniform_buffer};
 use bevy::render::render_resource::{
     BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, BindingResource, CompareFunction,
     DepthBiasState, DepthStencilState, FragmentState, MultisampleState, PipelineCache, RenderPipelineDescriptor,
-    ShaderStages, SpecializedRenderPipeline, StencilState, TextureSampleType, UniformBuffer, VertexState,
+    ShaderStages, ShaderType, SpecializedRenderPipeline, StencilState, TextureSampleType, UniformBuffer, VertexState,
 };
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 use bevy::shader::Shader;
@@ -22,7 +22,7 @@ use glam::{UVec4, Vec4};
 
 /// The parts that the pipelines for all depth buffers share.
 #[derive(Resource)]
-pub(super) struct WriteDepthPipeline {
+pub(crate) struct WriteDepthPipeline {
     layout: BindGroupLayoutDescriptor,
     vertex: VertexState,
     shader: Handle<Shader>,
@@ -30,17 +30,17 @@ pub(super) struct WriteDepthPipeline {
 
 /// The properties of a depth buffer that its pipeline depends on, and the depth to write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) struct WriteDepthKey {
+pub(crate) struct WriteDepthKey {
     /// Samples of the depth buffer.
-    pub(super) samples: u32,
+    pub(crate) samples: u32,
     /// Whether the median depth is written instead of the expected one.
-    pub(super) median: bool,
+    pub(crate) median: bool,
 }
 
 impl FromWorld for WriteDepthPipeline {
     fn from_world(world: &mut World) -> Self {
         let texture = || texture_2d(TextureSampleType::Float { filterable: false });
-        let entries = (texture(), texture(), uniform_buffer::<UVec4>(false), uniform_buffer::<Vec4>(false));
+        let entries = (texture(), texture(), uniform_buffer::<UVec4>(false), uniform_buffer::<DepthLens>(false));
         let entries = BindGroupLayoutEntries::sequential(ShaderStages::FRAGMENT, entries);
         Self {
             layout: BindGroupLayoutDescriptor::new("gs4d write_depth", &entries),
@@ -78,10 +78,17 @@ impl SpecializedRenderPipeline for WriteDepthPipeline {
     }
 }
 
+/// How the captures' depths are written: as in `shaders/write_depth.wgsl`.
+#[derive(ShaderType, Debug, Default, Clone, Copy, PartialEq)]
+struct DepthLens {
+    distance: Vec4,
+    scale: u32,
+}
+
 /// What one view binds.
 #[derive(Default)]
-pub(super) struct WriteDepthBindings {
-    distance: UniformBuffer<Vec4>,
+pub(crate) struct WriteDepthBindings {
+    lens: UniformBuffer<DepthLens>,
     group: Option<CachedGroup>,
 }
 
@@ -92,18 +99,21 @@ struct CachedGroup {
 }
 
 impl WriteDepthBindings {
-    /// Writes how the lens maps depth, `n0 n1 m0 m1` as in [`OpaqueDepth`](crate::renderer::OpaqueDepth), if it has changed.
-    pub(super) fn set_distance(
+    /// Writes how the lens maps depth, `n0 n1 m0 m1` as in [`OpaqueDepth`](crate::renderer::OpaqueDepth), and how many pixels of the
+    /// depth buffer a pixel of the captures is wide and high, if they have changed.
+    pub(crate) fn set_lens(
         &mut self,
         distance: Vec4,
+        scale: u32,
         device: &RenderDevice,
         queue: &RenderQueue,
         work: &WorkCounters,
     ) {
-        let first = self.distance.buffer().is_none();
-        if first || *self.distance.get() != distance {
-            self.distance.set(distance);
-            self.distance.write_buffer(device, queue);
+        let lens = DepthLens { distance, scale };
+        let first = self.lens.buffer().is_none();
+        if first || *self.lens.get() != lens {
+            self.lens.set(lens);
+            self.lens.write_buffer(device, queue);
         }
         if first {
             work.add_created();
@@ -111,12 +121,12 @@ impl WriteDepthBindings {
     }
 
     /// Releases the targets that were bound.
-    pub(super) fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         self.group = None;
     }
 
-    /// Returns the bind group for the targets of a view; `None` before the first [`set_distance`](Self::set_distance).
-    pub(super) fn group(
+    /// Returns the bind group for the targets of a view; `None` before the first [`set_lens`](Self::set_lens).
+    pub(crate) fn group(
         &mut self,
         device: &RenderDevice,
         cache: &PipelineCache,
@@ -127,7 +137,7 @@ impl WriteDepthBindings {
     ) -> Option<&BindGroup> {
         if self.group.as_ref().is_none_or(|known| known.colors != *colors || known.depths != *depths) {
             let layout = cache.get_bind_group_layout(&pipeline.layout);
-            let entries = BindGroupEntries::sequential((colors, depths, viewport, self.distance.binding()?));
+            let entries = BindGroupEntries::sequential((colors, depths, viewport, self.lens.binding()?));
             let group = device.create_bind_group("gs4d write_depth", &layout, &entries);
             work.add_created();
             self.group = Some(CachedGroup { colors: colors.clone(), depths: depths.clone(), group });

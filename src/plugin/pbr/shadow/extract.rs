@@ -1,0 +1,72 @@
+//! Extract: the captures that cast shadows.
+//!
+//! In (main world): captures with [`CastsShadows`], their bounds and layers; the captures that have been extracted. Out (render
+//! world): [`ExtractedCasters`], and their active lists kept up to date, whether a camera sees them or not.
+
+use super::casts::CastsShadows;
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
+use crate::plugin::playback::Playback;
+use crate::plugin::render::ExtractedCaptures;
+use bevy::asset::Assets;
+use bevy::camera::primitives::Aabb;
+use bevy::camera::visibility::{InheritedVisibility, RenderLayers};
+use bevy::ecs::entity::Entity;
+use bevy::ecs::resource::Resource;
+use bevy::ecs::system::{Query, Res, ResMut};
+use bevy::render::Extract;
+use bevy::render::sync_world::MainEntity;
+use glam::Affine3A;
+
+/// The captures that cast shadows this frame. The memory is kept from frame to frame.
+#[derive(Resource, Default)]
+pub(super) struct ExtractedCasters(pub(super) Vec<Caster>);
+
+/// One capture that casts shadows.
+pub(super) struct Caster {
+    pub(super) entity: MainEntity,
+    pub(super) settings: CastsShadows,
+    /// What encloses it at its current time, in capture space.
+    pub(super) bounds: Aabb,
+    pub(super) world_from_capture: Affine3A,
+    pub(super) layers: RenderLayers,
+}
+
+type Placed = (
+    Entity,
+    &'static GaussianCapture3d,
+    &'static CastsShadows,
+    &'static Playback,
+    &'static InheritedVisibility,
+    Option<&'static Aabb>,
+    Option<&'static RenderLayers>,
+);
+
+pub(super) fn extract_casters(
+    mut casters: ResMut<ExtractedCasters>,
+    mut extracted: ResMut<ExtractedCaptures>,
+    assets: Extract<Res<Assets<GaussianCapture>>>,
+    captures: Extract<Query<Placed>>,
+) {
+    casters.0.clear();
+    for (entity, capture, settings, playback, visibility, bounds, layers) in &captures {
+        let entity = MainEntity::from(entity);
+        let Some(placed) = extracted.0.get_mut(&entity).filter(|placed| visibility.get() && !placed.is_faded_out())
+        else {
+            continue;
+        };
+        // A capture with an environment map is never culled by cameras, but its Gaussians are somewhere.
+        let known = || {
+            let bounds = assets.get(&capture.0)?.bounds_at(playback.time)?;
+            (bounds.min.is_finite() && bounds.max.is_finite()).then(|| Aabb::from_min_max(bounds.min, bounds.max))
+        };
+        let Some(bounds) = bounds.copied().or_else(known) else { continue };
+        placed.seen = true;
+        casters.0.push(Caster {
+            entity,
+            settings: *settings,
+            bounds,
+            world_from_capture: placed.world_from_capture,
+            layers: layers.cloned().unwrap_or_default(),
+        });
+    }
+}

@@ -1,0 +1,168 @@
+//! Lens of a light: a view of its shadow map in the renderer's terms.
+//!
+//! In: the projection and pose with which Bevy draws meshes into the map, the bounds of captures. Out: [`LightLens`], which makes
+//! [`View`]s of captures, pushed away from the light by their bias.
+
+use crate::plugin::render::CameraLens;
+use crate::view::View;
+use bevy::camera::primitives::Aabb;
+use glam::{Affine3A, Mat4, UVec2, Vec3, Vec3A, Vec4};
+
+/// The view of a shadow map.
+pub(super) struct LightLens {
+    lens: CameraLens,
+    world_from_light: Affine3A,
+    /// Whether its rays are parallel.
+    parallel: bool,
+    /// How the map's value `d` gives depth: as in [`CameraLens::distance`].
+    pub(super) distance: Vec4,
+}
+
+impl LightLens {
+    /// Returns the lens of a light that draws the captures with these bounds; `None` for a projection that no light of Bevy has.
+    ///
+    /// The near plane of parallel rays moves back to the first of the captures: like meshes, they cast shadows from before Bevy's near
+    /// plane, too.
+    pub(super) fn of<'a>(
+        clip_from_light: &Mat4,
+        world_from_light: Affine3A,
+        captures: impl Iterator<Item = (&'a Aabb, Affine3A)>,
+    ) -> Option<Self> {
+        let parallel = clip_from_light.row(3) == Vec4::W;
+        if !parallel {
+            let lens = CameraLens::of(clip_from_light)?;
+            return Some(Self { lens, world_from_light, parallel, distance: lens.distance? });
+        }
+        let forward = -world_from_light.matrix3.z_axis;
+        let first = |(bounds, placed): (&Aabb, Affine3A)| {
+            let center = placed.transform_point3a(bounds.center) - world_from_light.translation;
+            forward.dot(center) - bounds.relative_radius(&forward, &placed.matrix3)
+        };
+        let back = -captures.map(first).fold(0.0, f32::min);
+        let [x, y, z, w] =
+            [clip_from_light.x_axis, clip_from_light.y_axis, clip_from_light.z_axis, clip_from_light.w_axis];
+        // The same rays, from depth 0 on: a depth buffer's value of 1 there, and one less for each unit.
+        let lens = CameraLens::of(&Mat4::from_cols(x, y, Vec4::Z, Vec4::new(w.x, w.y, 1.0, 1.0)))?;
+        // d = w.z − z.z (depth − back).
+        let distance = Vec4::new(w.z + z.z * back, -1.0, z.z, 0.0);
+        let world_from_light = world_from_light * Affine3A::from_translation(Vec3::Z * back);
+        Some(Self { lens, world_from_light, parallel, distance })
+    }
+
+    /// Returns the view of a capture that is pushed away from the light by a share of the diagonal of its bounds. Its outline on the
+    /// map stays as it is. `size` in pixels, `time` in the capture's unit. `None` if the transforms flatten the capture or are not finite.
+    pub(super) fn view(
+        &self,
+        size: UVec2,
+        time: f32,
+        bounds: &Aabb,
+        world_from_capture: Affine3A,
+        bias: f32,
+    ) -> Option<View> {
+        let matrix = world_from_capture.matrix3;
+        let sides = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(Vec3A::length);
+        let diagonal = 2.0 * (Vec3A::from(sides) * bounds.half_extents).length();
+        let by = if bias.is_finite() { bias.max(0.0) * diagonal } else { 0.0 };
+        let push = if self.parallel {
+            Affine3A::from_translation((-self.world_from_light.matrix3.z_axis * by).into())
+        } else {
+            // Everything that is larger by the factor by which it is further away looks the same.
+            let light = Vec3::from(self.world_from_light.translation);
+            let distance = Vec3::from(world_from_capture.transform_point3a(bounds.center)).distance(light);
+            let scale = Vec3::splat(1.0 + by / distance.max(by).max(f32::MIN_POSITIVE));
+            Affine3A::from_translation(light) * Affine3A::from_scale(scale) * Affine3A::from_translation(-light)
+        };
+        self.lens.view(size, time, self.world_from_light, push * world_from_capture)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{EulerRot, Quat, Vec2};
+
+    const SIZE: UVec2 = UVec2::new(64, 64);
+
+    /// Returns a box of 1 x 2 x 3 units about the origin.
+    fn bounds() -> Aabb {
+        Aabb::from_min_max(Vec3::new(-0.5, -1.0, -1.5), Vec3::new(0.5, 1.0, 1.5))
+    }
+
+    /// Returns the projection of a cascade as Bevy builds it: 8 units wide, 10 deep.
+    fn cascade() -> Mat4 {
+        let (side, deep) = (2.0 / 8.0, 1.0 / 10.0);
+        Mat4::from_cols(Vec4::X * side, Vec4::Y * side, Vec4::Z * deep, Vec4::new(0.0, 0.0, 1.0, 1.0))
+    }
+
+    fn pose(eye: Vec3) -> Affine3A {
+        Affine3A::from_rotation_translation(Quat::from_euler(EulerRot::YXZ, 0.4, -0.9, 0.2), eye)
+    }
+
+    /// Returns normalised device coordinates with y down, and the value that is written to the map.
+    fn drawn(lens: &LightLens, view: &View, point: Vec3) -> (Vec2, f32) {
+        let depth = view.world_to_camera.transform_point3(point).z;
+        let [x, y] = view.clip_rows();
+        let divisor = if view.orthographic { 1.0 } else { depth };
+        let place = Vec2::new(x.dot(point.extend(1.0)), y.dot(point.extend(1.0))) / divisor;
+        let d = lens.distance;
+        (place, (d.x - d.z * depth) / (d.w * depth - d.y))
+    }
+
+    fn drawn_by_bevy(clip_from_light: Mat4, light: Affine3A, point: Vec3) -> (Vec2, f32) {
+        let clip = clip_from_light * Mat4::from(light.inverse()) * point.extend(1.0);
+        (Vec2::new(clip.x, -clip.y) / clip.w, clip.z / clip.w)
+    }
+
+    fn lens(clip_from_light: &Mat4, light: Affine3A, placed: Affine3A) -> LightLens {
+        LightLens::of(clip_from_light, light, [(&bounds(), placed)].into_iter()).expect("a light of Bevy")
+    }
+
+    #[test]
+    fn captures_are_drawn_where_and_as_deep_as_meshes() {
+        let placed = Affine3A::from_rotation_translation(Quat::from_rotation_x(0.7), Vec3::new(0.3, -0.2, 0.1));
+        let spot = Mat4::perspective_infinite_reverse_rh(1.2, 1.0, 0.1);
+        let forward = -pose(Vec3::ZERO).matrix3.z_axis;
+        let cases = [("spot", spot, 6.0), ("cascade", cascade(), 4.0), ("cascade behind it", cascade(), -5.0)];
+        for (name, projection, away) in cases {
+            let light = pose(Vec3::from(forward * -away));
+            let lens = lens(&projection, light, placed);
+            let view = lens.view(SIZE, 0.0, &bounds(), placed, 0.0).expect("not flat");
+            for corner in [bounds().min(), bounds().max()] {
+                let point = Vec3::from(corner);
+                let (place, depth) = drawn(&lens, &view, point);
+                let (expected, deep) = drawn_by_bevy(projection, light, placed.transform_point3(point));
+                assert!(place.abs_diff_eq(expected, 1e-4), "{name}: {point} is at {place}, not {expected}");
+                assert!((depth - deep).abs() < 1e-5, "{name}: {point} is {depth} deep, not {deep}");
+                let distance = view.world_to_camera.transform_point3(point).z;
+                assert!(distance >= view.near - 1e-4, "{name}: and not before the near plane, {distance}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_bias_pushes_away_and_keeps_the_outline() {
+        let diagonal = Vec3::new(1.0, 2.0, 3.0).length();
+        let spot = Mat4::perspective_infinite_reverse_rh(1.2, 1.0, 0.1);
+        let forward = -pose(Vec3::ZERO).matrix3.z_axis;
+        for (name, projection) in [("spot", spot), ("cascade", cascade())] {
+            let light = pose(Vec3::from(forward * -6.0));
+            let lens = lens(&projection, light, Affine3A::IDENTITY);
+            let view = |bias| lens.view(SIZE, 0.0, &bounds(), Affine3A::IDENTITY, bias).expect("not flat");
+            let [near, far, broken] = [view(0.0), view(0.1), view(f32::NAN)];
+            let depth = |view: &View| view.world_to_camera.transform_point3(Vec3::ZERO).z;
+            let pushed = depth(&far) - depth(&near);
+            assert!((pushed - 0.1 * diagonal).abs() < 1e-4, "{name}: the middle is pushed by {pushed}");
+            assert_eq!(near, broken, "{name}: a bias that is no number pushes nothing");
+            for corner in [bounds().min(), bounds().max()] {
+                let [(before, _), (after, _)] = [&near, &far].map(|view| drawn(&lens, view, corner.into()));
+                assert!(before.abs_diff_eq(after, 1e-4), "{name}: {corner} stays at {before}, yet it is at {after}");
+            }
+        }
+    }
+
+    #[test]
+    fn other_projections_are_no_lights() {
+        let none = LightLens::of(&Mat4::NAN, pose(Vec3::ZERO), [].into_iter());
+        assert!(none.is_none(), "not a number");
+    }
+}

@@ -1,0 +1,41 @@
+//! The plugin of shadows that captures cast: which system runs in which world and when.
+//!
+//! In: an app in which captures are drawn and lights have shadow maps. Out: the same app, in which captures cast shadows.
+
+use super::draw::{cast_cascades, cast_shared};
+use super::extract::{ExtractedCasters, extract_casters};
+use super::light_views::LightViews;
+use super::prepare::prepare_light_views;
+use crate::plugin::render::{ExtractedCaptures, extract_captures};
+use bevy::app::{App, Plugin};
+use bevy::core_pipeline::schedule::{Core3d, Core3dSystems};
+use bevy::ecs::schedule::IntoScheduleConfigs;
+use bevy::pbr::{LATE_SHADOW_PASS, PbrPlugin, per_view_shadow_pass, shared_shadow_pass};
+use bevy::render::{ExtractSchedule, GpuResourceAppExt, Render, RenderApp, RenderSystems};
+
+/// Lets captures cast shadows. Part of [`GaussianCapturePlugin`](crate::GaussianCapturePlugin).
+#[derive(Debug, Default, Clone, Copy)]
+pub(crate) struct CaptureShadowPlugin;
+
+impl Plugin for CaptureShadowPlugin {
+    fn build(&self, app: &mut App) {
+        let is_lit = app.is_plugin_added::<PbrPlugin>();
+        let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
+        if !is_lit || !render_app.world().contains_resource::<ExtractedCaptures>() {
+            return;
+        }
+        render_app
+            .init_resource::<ExtractedCasters>()
+            .init_gpu_resource::<LightViews>()
+            .add_systems(ExtractSchedule, extract_casters.after(extract_captures))
+            .add_systems(Render, prepare_light_views.in_set(RenderSystems::PrepareBindGroups))
+            .add_systems(
+                Core3d,
+                (
+                    cast_cascades.after(per_view_shadow_pass::<LATE_SHADOW_PASS>),
+                    cast_shared.after(shared_shadow_pass::<LATE_SHADOW_PASS>),
+                )
+                    .before(Core3dSystems::MainPass),
+            );
+    }
+}

@@ -1,0 +1,146 @@
+//! Prepare: for each view of a light, the captures in it and the renderer's working buffers.
+//!
+//! In: [`ExtractedCasters`], the views of lights whose shadow maps Bevy draws this frame. Out: [`LightViews`], with everything that
+//! drawing needs written to the GPU. In the steady state nothing is created there.
+
+use super::casts::ShadowResolution;
+use super::extract::{Caster, ExtractedCasters};
+use super::light_lens::LightLens;
+use super::light_views::{LightView, LightViews};
+use crate::plugin::render::{
+    ActiveLists, CaptureRenderer, Drawn, ExtractedCaptures, GpuGaussianCapture, WriteDepthKey, WriteDepthPipeline,
+};
+use crate::renderer::{ColorPrecision, Instance, ViewParameters};
+use crate::view::{Background, BlendSpace, DebugView};
+use bevy::camera::primitives::Frustum;
+use bevy::camera::visibility::RenderLayers;
+use bevy::ecs::query::With;
+use bevy::ecs::system::{Query, Res, ResMut, SystemParam};
+use bevy::log::{debug_span, error_once};
+use bevy::pbr::{Shadow, ShadowView};
+use bevy::render::render_asset::RenderAssets;
+use bevy::render::render_phase::ViewBinnedRenderPhases;
+use bevy::render::render_resource::{PipelineCache, SpecializedRenderPipelines};
+use bevy::render::renderer::{RenderDevice, RenderQueue};
+use bevy::render::view::ExtractedView;
+use glam::UVec2;
+
+/// What is drawn of captures for a shadow: nothing but depths is used.
+const PARAMETERS: ViewParameters<'static> = ViewParameters {
+    background: Background::None,
+    opaque: None,
+    blend_space: BlendSpace::Encoded,
+    debug: DebugView::Color,
+    depths: true,
+    precision: ColorPrecision::Half,
+};
+
+/// Everything that can cast a shadow this frame.
+#[derive(SystemParam)]
+pub(super) struct Casters<'w> {
+    casters: Res<'w, ExtractedCasters>,
+    extracted: Res<'w, ExtractedCaptures>,
+    captures: Res<'w, RenderAssets<GpuGaussianCapture>>,
+    lists: Res<'w, ActiveLists>,
+}
+
+impl Casters<'_> {
+    /// Returns those that reach into a view of a light, in the same order in every frame.
+    fn within(&self, frustum: &Frustum, layers: &RenderLayers) -> Vec<&Caster> {
+        // Bevy has moved the near planes of directional lights to infinity.
+        let reaches = |caster: &&Caster| {
+            caster.layers.intersects(layers)
+                && frustum.intersects_obb(&caster.bounds, &caster.world_from_capture, true, true)
+        };
+        self.casters.0.iter().filter(reaches).collect()
+    }
+
+    /// Returns what is drawn of one; `None` if nothing is.
+    fn drawn(&self, caster: &Caster, lens: &LightLens, size: UVec2) -> Option<Drawn> {
+        let placed = self.extracted.0.get(&caster.entity)?;
+        let time = self.captures.get(placed.asset)?.time_at(placed.seconds)?;
+        let view = lens.view(size, time, &caster.bounds, caster.world_from_capture, caster.settings.bias)?;
+        let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
+        Some(Drawn { entity: caster.entity, asset, view, appearance, filtered })
+    }
+}
+
+/// Prepares the views of all lights: the captures in them and their working buffers.
+pub(super) fn prepare_light_views(
+    device: Res<RenderDevice>,
+    queue: Res<RenderQueue>,
+    renderer: Option<Res<CaptureRenderer>>,
+    casters: Casters,
+    cache: Res<PipelineCache>,
+    write_depth: Res<WriteDepthPipeline>,
+    mut depth_writers: ResMut<SpecializedRenderPipelines<WriteDepthPipeline>>,
+    phases: Res<ViewBinnedRenderPhases<Shadow>>,
+    mut views: ResMut<LightViews>,
+    lights: Query<(&ExtractedView, &Frustum, Option<&RenderLayers>), With<ShadowView>>,
+) {
+    let _span = debug_span!("gs4d/shadows").entered();
+    let Some(renderer) = renderer else { return };
+    for state in views.0.values_mut() {
+        state.live = false;
+    }
+    for (light, frustum, layers) in &lights {
+        let key = light.retained_view_entity;
+        if !phases.contains_key(&key) {
+            continue;
+        }
+        let within = casters.within(frustum, layers.unwrap_or_default());
+        if within.is_empty() && !views.0.contains_key(&key) {
+            continue;
+        }
+        let state = views.0.entry(key).or_insert_with(|| {
+            let key = WriteDepthKey { samples: 1, median: true };
+            let pipeline = depth_writers.specialize(&cache, &write_depth, key);
+            LightView::new(&device, &renderer.0, pipeline)
+        });
+        state.live = true;
+        state.drawn.clear();
+        let map = UVec2::new(light.viewport.z, light.viewport.w);
+        let scale = scale(map, within.iter().map(|caster| caster.settings.resolution));
+        let boxes = within.iter().map(|caster| (&caster.bounds, caster.world_from_capture));
+        let lens = LightLens::of(&light.clip_from_view, light.world_from_view.affine(), boxes);
+        if let Some(lens) = &lens {
+            let drawn = within.iter().filter_map(|caster| casters.drawn(caster, lens, map / scale));
+            state.drawn.extend(drawn);
+        }
+        state.count_idle_frames();
+        let Some(lens) = lens.filter(|_| !state.drawn.is_empty()) else { continue };
+        state.set_map(map, &device, &queue, renderer.0.work());
+        state.depth_bindings.set_lens(lens.distance, scale, &device, &queue, renderer.0.work());
+        let instances: Vec<Instance> =
+            state.drawn.iter().filter_map(|drawn| drawn.instance(&casters.captures, &casters.lists)).collect();
+        let prepared = state.renderer.prepare(device.wgpu_device(), &queue, &renderer.0, &instances, &PARAMETERS);
+        if let Err(failure) = prepared {
+            error_once!("captures cast no shadows: {failure}");
+            state.drawn.clear();
+        }
+    }
+    views.0.retain(|_, state| state.live);
+}
+
+/// Returns the number of texels along one side of a pixel, for the finest of the resolutions, so that pixels cover the map exactly.
+fn scale(map: UVec2, resolutions: impl Iterator<Item = ShadowResolution>) -> u32 {
+    let wanted = resolutions.min().unwrap_or_default().scale();
+    let divides = |scale: &u32| map % *scale == UVec2::ZERO;
+    [wanted, wanted / 2].into_iter().filter(|scale| *scale > 0).find(divides).unwrap_or(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ShadowResolution::{Full, Half, Quarter};
+
+    #[test]
+    fn the_finest_resolution_that_covers_the_map_is_taken() {
+        let map = UVec2::splat(512);
+        assert_eq!(scale(map, [Quarter, Half].into_iter()), 2, "the finer of two");
+        assert_eq!(scale(map, [Quarter, Full].into_iter()), 1, "texel by texel");
+        assert_eq!(scale(map, [Quarter].into_iter()), 4, "alone");
+        assert_eq!(scale(UVec2::splat(514), [Quarter].into_iter()), 2, "a map that four does not divide");
+        assert_eq!(scale(UVec2::splat(513), [Quarter].into_iter()), 1, "nor two");
+    }
+}

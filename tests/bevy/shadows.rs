@@ -1,0 +1,257 @@
+//! Shadows that captures cast: on a floor, next to those of meshes with the same outline.
+//!
+//! In: a ball of opaque Gaussians, a mesh of the same size, lights of all kinds, in headless apps. Out: proof that both darken the same
+//! pixels, that shadows follow the capture's time and go with it, that captures cast them whether a camera sees them or not, and only if
+//! asked to, and that a contact shadow darkens the ground beneath its capture, not the capture and nothing far away. Skipped where there
+//! is no GPU, not even a software one.
+
+use crate::support::cpu_reference::{DURATION, blob, rgb, scene};
+use crate::support::fixtures::{insert, spawn};
+use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
+use bevy::camera::visibility::{RenderLayers, ViewVisibility};
+use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, PointLightShadowMap};
+use bevy::prelude::*;
+use bevy_gs4d::gaussian::Gaussian;
+use bevy_gs4d::pbr::{CastsShadows, CaptureContactShadow, ShadowResolution};
+use bevy_gs4d::playback::Playback;
+use bevy_gs4d::render::CaptureSettings;
+use bevy_gs4d::scene::RuntimeScene;
+use image::RgbaImage;
+use std::f32::consts::PI;
+
+const SIZE: UVec2 = UVec2::splat(160);
+/// Of the balls, in their own units.
+const RADIUS: f32 = 0.5;
+/// The layer of what casts shadows and is not seen itself.
+const UNSEEN: usize = 1;
+
+/// Returns an opaque ball with this radius, up to a few hundredths, that moves by `velocity` in the whole of its duration.
+fn ball(velocity: Vec3) -> RuntimeScene {
+    let count = 2000;
+    let gaussian = |index: u32| {
+        // A spiral of points, all as far from their neighbours. Half of the light is lost a bit further out than they are.
+        let z = 1.0 - 2.0 * (index as f32 + 0.5) / count as f32;
+        let angle = PI * (3.0 - 5f32.sqrt()) * index as f32;
+        let place = (Vec2::from_angle(angle) * (1.0 - z * z).sqrt()).extend(z) * (0.9 * RADIUS);
+        let gaussian = Gaussian { velocity: velocity.to_array(), ..blob(place, Vec3::splat(0.018), 0.98) };
+        (gaussian, Vec3::splat(0.5))
+    };
+    scene(&(0..count).map(gaussian).collect::<Vec<_>>())
+}
+
+/// Returns an app with a floor, a camera above it, and a light.
+fn scenery(camera: Transform, light: impl Bundle) -> Option<App> {
+    let mut app = app(SIZE)?;
+    app.insert_resource(DirectionalLightShadowMap { size: 512 });
+    app.insert_resource(PointLightShadowMap { size: 256 });
+    let floor = app.world_mut().resource_mut::<Assets<Mesh>>().add(Plane3d::new(Vec3::Y, Vec2::splat(6.0)));
+    let gray = StandardMaterial { base_color: Color::linear_rgb(0.1, 0.1, 0.1), reflectance: 0.0, ..default() };
+    let gray = app.world_mut().resource_mut::<Assets<StandardMaterial>>().add(gray);
+    app.world_mut().spawn((Mesh3d(floor), MeshMaterial3d(gray)));
+    spawn_camera(&mut app, Msaa::Off, camera);
+    app.world_mut().spawn((light, RenderLayers::from_layers(&[0, UNSEEN])));
+    Some(app)
+}
+
+fn spawn_mesh_ball(app: &mut App, bundle: impl Bundle) -> Entity {
+    let mesh = Sphere::new(RADIUS).mesh().uv(48, 32);
+    let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(mesh);
+    let material = app.world_mut().resource_mut::<Assets<StandardMaterial>>().add(StandardMaterial::default());
+    app.world_mut().spawn((Mesh3d(mesh), MeshMaterial3d(material), bundle)).id()
+}
+
+fn above(height: f32) -> Transform {
+    Transform::from_xyz(0.0, height, 0.0).looking_at(Vec3::ZERO, Vec3::NEG_Z)
+}
+
+/// Returns the sun, which shines along `direction`.
+fn sun(direction: Vec3) -> impl Bundle {
+    // One cascade for the distances of these tests.
+    let cascades = CascadeShadowConfigBuilder { num_cascades: 1, maximum_distance: 7.0, ..default() }.build();
+    let light = DirectionalLight { shadow_maps_enabled: true, ..default() };
+    (light, cascades, Transform::default().looking_to(direction, Vec3::Y))
+}
+
+fn lamp(place: Vec3) -> impl Bundle {
+    (PointLight { shadow_maps_enabled: true, ..default() }, Transform::from_translation(place))
+}
+
+fn spot(place: Vec3) -> impl Bundle {
+    let pose = Transform::from_translation(place).looking_at(Vec3::new(0.2, 0.0, -0.1), Vec3::Y);
+    (SpotLight { shadow_maps_enabled: true, ..default() }, pose)
+}
+
+/// Returns which pixels are lit in the first picture and much darker in the second.
+fn darkened(lit: &RgbaImage, shaded: &RgbaImage) -> Vec<bool> {
+    let is_darker = |(lit, shaded): (&image::Rgba<u8>, &image::Rgba<u8>)| {
+        let [lit, shaded] = [lit, shaded].map(|pixel| u32::from(pixel.0[1]));
+        lit > 40 && 10 * shaded < 6 * lit
+    };
+    lit.pixels().zip(shaded.pixels()).map(is_darker).collect()
+}
+
+fn count(mask: &[bool]) -> usize {
+    mask.iter().filter(|pixel| **pixel).count()
+}
+
+/// Returns the share of the pixels of either mask that are in both.
+fn overlap(a: &[bool], b: &[bool]) -> f32 {
+    let pairs = || a.iter().zip(b);
+    let both = pairs().filter(|(a, b)| **a && **b).count();
+    let either = pairs().filter(|(a, b)| **a || **b).count();
+    both as f32 / either.max(1) as f32
+}
+
+/// Returns the mean place of the pixels of a mask.
+fn middle(mask: &[bool]) -> Vec2 {
+    let places = mask.iter().enumerate().filter(|(_, pixel)| **pixel);
+    let sum: Vec2 = places.map(|(at, _)| Vec2::new((at as u32 % SIZE.x) as f32, (at as u32 / SIZE.x) as f32)).sum();
+    sum / count(mask).max(1) as f32
+}
+
+/// Checks that captures at these places darken the pixels that meshes darken there.
+fn check_shadows(name: &str, app: &mut App, places: &[Transform], layer: usize, least: f32) {
+    let lit = picture(app, 0.0);
+    let layer = RenderLayers::layer(layer);
+    let meshes: Vec<_> = places.iter().map(|place| spawn_mesh_ball(app, (*place, layer.clone()))).collect();
+    let expected = darkened(&lit, &picture(app, 0.0));
+    assert!(count(&expected) > 300, "{name}: the shadows of meshes are seen, at {} pixels", count(&expected));
+    assert!(count(&expected) < expected.len() / 2, "{name}: and are not everywhere");
+    for mesh in meshes {
+        app.world_mut().despawn(mesh);
+    }
+    let scene = ball(Vec3::ZERO);
+    for place in places {
+        spawn(app, &scene, (*place, layer.clone(), CastsShadows::default()));
+    }
+    let shadow = darkened(&lit, &picture(app, 0.0));
+    let share = overlap(&shadow, &expected);
+    assert!(share >= least, "{name}: {share} of the shadows of captures and meshes overlap");
+}
+
+#[test]
+fn captures_cast_the_shadows_of_meshes_with_their_outline() {
+    let place = [Transform::from_xyz(0.1, 1.0, -0.2)];
+    let Some(mut app) = scenery(above(5.0), sun(Vec3::new(-0.3, -1.0, 0.2))) else { return };
+    check_shadows("sun", &mut app, &place, UNSEEN, 0.9);
+    let Some(mut app) = scenery(above(5.0), lamp(Vec3::new(0.5, 3.0, 0.3))) else { return };
+    check_shadows("point light", &mut app, &place, UNSEEN, 0.9);
+    let Some(mut app) = scenery(above(5.0), spot(Vec3::new(0.6, 3.0, 0.8))) else { return };
+    check_shadows("spot light", &mut app, &place, UNSEEN, 0.9);
+}
+
+#[test]
+fn a_point_light_casts_to_all_sides() {
+    let Some(mut app) = scenery(above(10.0), lamp(Vec3::Y * 1.5)) else { return };
+    // None of them in the middle of its face.
+    let places = [(1.2, 0.2), (-0.3, 1.2), (-1.2, -0.25), (0.15, -1.2)];
+    let place = |(x, z)| Transform::from_xyz(x, 0.9, z).with_scale(Vec3::splat(0.5));
+    // Most of these shadows is edge.
+    check_shadows("four sides", &mut app, &places.map(place), UNSEEN, 0.8);
+}
+
+#[test]
+fn a_capture_behind_the_camera_casts_its_shadow() {
+    // Above the camera, in front of the near plane of the sun's cascade.
+    let Some(mut app) = scenery(above(2.5), sun(Vec3::new(-0.3, -1.0, 0.2))) else { return };
+    check_shadows("behind", &mut app, &[Transform::from_xyz(1.2, 4.0, -0.8)], 0, 0.9);
+    let mut captures = app.world_mut().query_filtered::<&ViewVisibility, With<CastsShadows>>();
+    assert!(captures.iter(app.world()).all(|visibility| !visibility.get()), "no camera sees it");
+}
+
+#[test]
+fn a_shadow_moves_with_the_capture_s_time_and_goes_with_it() {
+    let Some(mut app) = scenery(above(5.0), sun(Vec3::NEG_Y)) else { return };
+    let lit = picture(&mut app, 0.0);
+    let unseen = RenderLayers::layer(UNSEEN);
+    let place = Transform::from_xyz(0.0, 1.0, 0.0);
+    let capture = spawn(&mut app, &ball(Vec3::X), (place, unseen, CastsShadows::default()));
+    let shadow = |app: &mut App, seconds| {
+        insert(app, capture, Playback::paused_at(seconds));
+        darkened(&lit, &picture(app, 0.0))
+    };
+    let [start, end] = [0.0, DURATION].map(|seconds| shadow(&mut app, seconds));
+    assert!(count(&start) > 300 && count(&end) > 300, "there is a shadow at {} and {}", count(&start), count(&end));
+    let moved = middle(&end) - middle(&start);
+    // Pixels of one unit on the floor.
+    let unit = SIZE.y as f32 / (2.0 * 5.0 * (FOV_Y / 2.0).tan());
+    assert!((moved - Vec2::new(unit, 0.0)).length() < 3.0, "it moves by {moved}, not by {unit} to the right");
+    insert(&mut app, capture, CaptureSettings { opacity: 0.0, ..default() });
+    assert_eq!(count(&shadow(&mut app, 0.0)), 0, "what is faded out casts none");
+    insert(&mut app, capture, CaptureSettings::default());
+    insert(&mut app, capture, Visibility::Hidden);
+    assert_eq!(count(&shadow(&mut app, 0.0)), 0, "nor does what is hidden");
+    insert(&mut app, capture, Visibility::Inherited);
+    assert!(count(&shadow(&mut app, 0.0)) > 300, "until it is shown again");
+    app.world_mut().despawn(capture);
+    assert_eq!(count(&darkened(&lit, &picture(&mut app, 0.0))), 0, "it is gone with the capture");
+}
+
+#[test]
+fn captures_cast_shadows_only_if_asked_to_and_only_to_their_layers() {
+    let Some(mut app) = scenery(above(5.0), sun(Vec3::NEG_Y)) else { return };
+    let lit = picture(&mut app, 0.0);
+    let place = Transform::from_xyz(0.0, 1.0, 0.0);
+    let capture = spawn(&mut app, &ball(Vec3::ZERO), (place, RenderLayers::layer(UNSEEN)));
+    let seen = |app: &mut App| count(&darkened(&lit, &picture(app, 0.0)));
+    assert_eq!(seen(&mut app), 0, "none without the component");
+    let sharp = CastsShadows { resolution: ShadowResolution::Full, ..default() };
+    insert(&mut app, capture, sharp);
+    let full = seen(&mut app);
+    assert!(full > 300, "one with it");
+    insert(&mut app, capture, CastsShadows { resolution: ShadowResolution::Quarter, ..sharp });
+    let quarter = seen(&mut app);
+    let ratio = quarter as f32 / full as f32;
+    // Every splat is wider by half of a coarse pixel, which is 0.07 units wide.
+    assert!((0.9..1.6).contains(&ratio), "about the same when drawn coarsely: {quarter} and {full} pixels");
+    insert(&mut app, capture, RenderLayers::layer(7));
+    assert_eq!(seen(&mut app), 0, "none in a layer that the light does not have");
+    insert(&mut app, capture, RenderLayers::layer(UNSEEN));
+    app.world_mut().entity_mut(capture).remove::<CastsShadows>();
+    assert_eq!(seen(&mut app), 0, "none when it is taken off again");
+}
+
+/// Returns the pixel at which a camera sees a point.
+fn pixel_of(camera: &Transform, point: Vec3) -> UVec2 {
+    let seen = camera.to_matrix().inverse().transform_point3(point);
+    let place = Vec2::new(seen.x, -seen.y) / (-seen.z * (FOV_Y / 2.0).tan());
+    ((place * 0.5 + 0.5) * SIZE.as_vec2()).as_uvec2()
+}
+
+#[test]
+fn a_contact_shadow_darkens_the_ground_beneath_and_nothing_else() {
+    let camera = Transform::from_xyz(0.0, 1.2, 4.0).looking_at(Vec3::Y * 0.2, Vec3::Y);
+    let Some(mut app) = scenery(camera, sun(Vec3::NEG_Y)) else { return };
+    // It stands on the ground.
+    let capture = spawn(&mut app, &ball(Vec3::ZERO), Transform::from_xyz(0.0, RADIUS, 0.0));
+    let without = picture(&mut app, 0.0);
+    insert(&mut app, capture, CaptureContactShadow { strength: 1.0, ..default() });
+    let with = picture(&mut app, 0.0);
+    let green = |picture: &RgbaImage, point| {
+        let at = pixel_of(&camera, point);
+        i32::from(rgb(picture, at.x, at.y)[1])
+    };
+    let both = |point| [green(&without, point), green(&with, point)];
+    let [before, after] = both(Vec3::new(0.0, 0.0, 0.52));
+    assert!(before > 60 && 10 * after < 9 * before, "in front of its foot, the floor goes from {before} to {after}");
+    for place in [Vec3::new(1.1, 0.0, 0.0), Vec3::new(-1.1, 0.0, 0.5), Vec3::new(0.0, 0.0, 1.3)] {
+        let [before, after] = both(place);
+        assert!(before > 60 && (before - after).abs() <= 1, "at {place}, {before} stays, and is not {after}");
+    }
+    // On the ball, with the darkest of the floor behind it.
+    let [before, after] = both(Vec3::new(0.0, 0.15, 0.27));
+    assert!(before > 60 && (before - after).abs() <= 6, "the capture stays {before}, and is not {after}");
+
+    let meshes = |app: &mut App| app.world_mut().query::<&Mesh3d>().iter(app.world()).count();
+    assert_eq!(meshes(&mut app), 2, "the floor and the shadow");
+    insert(&mut app, capture, Transform::from_xyz(0.0, 9.0, 0.0));
+    let away = picture(&mut app, 0.0);
+    assert!((green(&away, Vec3::Z * 0.52) - green(&without, Vec3::Z * 0.52)).abs() <= 1, "far above there is none");
+    app.world_mut().entity_mut(capture).remove::<CaptureContactShadow>();
+    picture(&mut app, 0.0);
+    assert_eq!(meshes(&mut app), 1, "its mesh goes with the component");
+    insert(&mut app, capture, CaptureContactShadow::default());
+    picture(&mut app, 0.0);
+    app.world_mut().despawn(capture);
+    assert_eq!(meshes(&mut app), 1, "and with the capture");
+}
