@@ -47,6 +47,7 @@ fn motion_matches_the_cpu_reference() {
     let (packed, _) = compress(whole.clone(), &settings(&[16])).expect("it is compressed");
     let packed = packed.into_runtime().expect("drawable");
     let (now, before) = (view(0.0, 0.4), view(0.05, 0.37));
+    let previous = [before];
     for (name, scene) in [("sliced", &whole), ("packed", &packed)] {
         let expected = expected(scene, now, &before);
         let most = expected.iter().map(|(motion, _)| motion.abs().max_element()).fold(0.0, f32::max);
@@ -57,7 +58,7 @@ fn motion_matches_the_cpu_reference() {
             let active = headless.active(&capture, now.time);
             let instance =
                 Instance { capture: &capture, active: active.as_ref(), view: now, appearance: as_trained() };
-            let parameters = ViewParameters { previous: Some(&[before]), ..ViewParameters::default() };
+            let parameters = ViewParameters { previous: Some(&previous), ..ViewParameters::default() };
             let frame = headless.render_all(&[instance], &parameters).expect("it is drawn");
             let found = headless.read_motion().expect("it is read back");
             assert_eq!(found.len(), expected.len(), "{name}, {design:?}: a motion for each pixel");
@@ -69,9 +70,9 @@ fn motion_matches_the_cpu_reference() {
             let far = apart.filter(|apart| *apart > 1e-3).count();
             // Where float rounding decides whether a splat counts, a pixel may differ by more.
             assert!(far <= 20 && worst <= 0.05, "{name}, {design:?}: {far} pixels differ, the worst by {worst}");
-            let left: Vec<f32> = found.iter().map(|pixel| pixel[3]).collect();
-            let same = left.iter().zip(&frame.transmittance).all(|(a, b)| (a - b).abs() <= 1e-5);
-            assert!(same, "{name}, {design:?}: the transmittance is that of the colors");
+            let left = found.iter().zip(&frame.transmittance).map(|(motion, left)| (motion[3] - left).abs());
+            let apart = left.fold(0.0, f32::max);
+            assert!(apart <= 2e-4, "{name}, {design:?}: transmittance and that of the colors are {apart} apart");
         }
     }
 }
@@ -81,11 +82,12 @@ fn colors_and_depths_do_not_change_by_motions() {
     let Some(mut headless) = gpu::headless() else { return };
     let capture = headless.upload(&scene(3_000, 1, 0)).expect("it fits");
     let instances = [Instance { capture: &capture, active: None, view: view(0.0, 0.4), appearance: as_trained() }];
+    let previous = [view(0.1, 0.3)];
     for design in DESIGNS {
         headless.set_design(design);
         for (depths, precision) in [(true, ColorPrecision::Single), (false, ColorPrecision::Half)] {
             let without = ViewParameters { depths, precision, ..ViewParameters::default() };
-            let with = ViewParameters { previous: Some(&[view(0.1, 0.3)]), ..without };
+            let with = ViewParameters { previous: Some(&previous), ..without };
             let [plain, moving, again] =
                 [&without, &with, &without].map(|one| headless.render_all(&instances, one).expect("it is drawn"));
             assert!(plain.counts.visible > 500, "something is seen");
@@ -152,7 +154,8 @@ fn motions_cost_nothing_until_they_are_asked_for_and_nothing_is_created_twice() 
     let capture = headless.upload(&lone()).expect("it fits");
     let view = view(0.0, 0.0);
     let instances = [Instance { capture: &capture, active: None, view, appearance: as_trained() }];
-    let with = ViewParameters { previous: Some(&[view]), ..ViewParameters::default() };
+    let previous = [view];
+    let with = ViewParameters { previous: Some(&previous), ..ViewParameters::default() };
     let without = ViewParameters::default();
     for design in DESIGNS {
         headless.set_design(design);
