@@ -161,7 +161,7 @@ impl Vectors {
 
 /// Returns one flat Gaussian at the origin that moves with its capture's time.
 fn moving(velocity: Vec3) -> RuntimeScene {
-    let at_rest = blob(Vec3::ZERO, Vec3::new(0.4, 0.4, 0.002), 0.98);
+    let at_rest = blob(Vec3::ZERO, Vec3::new(1.2, 1.2, 0.002), 0.98);
     scene(&[(Gaussian { velocity: velocity.to_array(), mean_t: 0.0, ..at_rest }, Vec3::ONE)])
 }
 
@@ -170,8 +170,8 @@ fn motion_vectors_are_those_of_what_moves() {
     let middle = SIZE / 2;
     // Two seconds are one unit of time.
     let seconds = 0.05;
-    let by_time = Vec3::new(2.0, -1.0, 0.0);
-    let by_hand = Vec3::new(0.05, 0.02, 0.0);
+    let by_time = Vec3::new(8.0, -4.0, 0.0);
+    let by_hand = Vec3::new(0.2, 0.08, 0.0);
     for (what, in_time, entity_moves, camera_moves, expected) in [
         ("nothing moves", Vec3::ZERO, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO),
         ("the splats move", by_time, Vec3::ZERO, Vec3::ZERO, by_time * seconds / 2.0),
@@ -245,7 +245,7 @@ fn forget_motion(app: &mut App) {
 /// Returns the picture of one frame of an app in which a capture moves to the right by that many pixels in each.
 fn picture_in_motion(app: &mut App, entity: Entity, pixels: f32) -> Vec<u8> {
     testing::settle(app).expect("the app runs");
-    let mut place = |app: &mut App, frame: u32| {
+    let place = |app: &mut App, frame: u32| {
         let x = frame as f32 * pixels / pixels_of_unit(4.0);
         insert(app, entity, Transform::from_xyz(x, 0.0, 0.0));
         step(app);

@@ -8,8 +8,8 @@ use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF};
 use bevy_gs4d::offline::fine_tune::NEIGHBORS;
 use bevy_gs4d::renderer::layout::{
     self, Activation, AdamUniforms, BLOCK, Counters, DIGITS, FIRST_SEEN, FrameUniforms, InstanceUniforms, LossUniforms,
-    MotionUniforms, RoundingRecord, SortStep, SplatRecord, SplatShape, TermWeights, TiedColors, TrainedRecord, TrainedScene,
-    VisibleSplat,
+    MotionUniforms, RoundingRecord, SortStep, SplatRecord, SplatShape, TermWeights, TiedColors, TrainedRecord,
+    TrainedScene, VisibleSplat,
 };
 use bevy_gs4d::renderer::shaders::{compose, pass_names};
 use bevy_gs4d::view::TILE_SIZE;

@@ -56,8 +56,7 @@ fn motion_matches_the_cpu_reference() {
             headless.set_design(design);
             let capture = headless.upload(scene).expect("it fits");
             let active = headless.active(&capture, now.time);
-            let instance =
-                Instance { capture: &capture, active: active.as_ref(), view: now, appearance: as_trained() };
+            let instance = Instance { capture: &capture, active: active.as_ref(), view: now, appearance: as_trained() };
             let parameters = ViewParameters { previous: Some(&previous), ..ViewParameters::default() };
             let frame = headless.render_all(&[instance], &parameters).expect("it is drawn");
             let found = headless.read_motion().expect("it is read back");

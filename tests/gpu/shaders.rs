@@ -114,6 +114,7 @@ fn bevy_s_passes_are_valid_with_all_their_definitions() {
         let module = composer.make_naga_module(descriptor).map_err(|error| error.emit_to_string(&composer))?;
         validate(name, &module, Capabilities::SHADER_FLOAT16_IN_FLOAT32)
     };
-    let all = [composite, write_depth, write_motion].into_iter().flat_map(|pass| (0..4).map(move |chosen| (pass, chosen)));
+    let passes = [composite, write_depth, write_motion].into_iter();
+    let all = passes.flat_map(|pass| (0..4).map(move |chosen| (pass, chosen)));
     report(all.filter_map(|(pass, chosen)| check(pass, chosen).err()).collect());
 }

@@ -14,7 +14,7 @@ use bevy::asset::AssetId;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Res, ResMut};
 use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
-use glam::{Affine3A, UVec2};
+use glam::Affine3A;
 
 /// Seconds of a capture in one frame from which on its time has jumped: Bevy's longest step of time, at the normal speed.
 const LONGEST_STEP: f32 = 0.25;
@@ -66,17 +66,14 @@ impl PreviousCaptures {
         let world_from_capture = before.map_or(placed.world_from_capture, |before| before.world_from_capture);
         let steady = before.filter(|before| !is_jump(placed.seconds - before.seconds, before.step));
         let time = steady.and_then(|before| time_at(before.seconds)).unwrap_or(now.time);
-        // A picture of any size: only its shape matters, which is that of the lens.
-        let size = now.size.max(UVec2::ONE);
-        pose.lens.view(size, time, pose.world_from_camera, world_from_capture).unwrap_or(*now)
+        pose.lens.view(now.size, time, pose.world_from_camera, world_from_capture).unwrap_or(*now)
     }
 }
 
 /// Returns whether a step of so many seconds, after one of `before`, is a jump.
 fn is_jump(step: f32, before: f32) -> bool {
     let most = if before == 0.0 { LONGEST_STEP } else { LONGEST_STEP.min(STEPS * before.abs()) };
-    // Written so that NaN is a jump.
-    !(step.abs() <= most)
+    step.is_nan() || step.abs() > most
 }
 
 #[cfg(test)]

@@ -67,8 +67,7 @@ pub struct ViewParameters<'a> {
 impl Default for ViewParameters<'_> {
     fn default() -> Self {
         let (blend_space, debug, precision) = Default::default();
-        let (background, depths) = (Background::None, true);
-        Self { background, opaque: None, blend_space, debug, depths, precision, previous: None }
+        Self { background: Background::None, opaque: None, blend_space, debug, depths: true, precision, previous: None }
     }
 }
 

@@ -94,8 +94,7 @@ impl ViewRenderer {
     ) -> MotionResources {
         let parts = u64::from(made.sizes.parts) * u64::from(self.alignment);
         let before = allocator.buffer("gs4d frame before", parts, BufferUsages::UNIFORM);
-        let frame =
-            allocator.buffer("gs4d frame of motions", size_of::<FrameUniforms>() as u64, BufferUsages::UNIFORM);
+        let frame = allocator.buffer("gs4d frame of motions", size_of::<FrameUniforms>() as u64, BufferUsages::UNIFORM);
         let texture = allocator.texture("gs4d motion", made.sizes.picture, made.pixels.precision.format());
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         let uniform = |buffer, size: usize| {
