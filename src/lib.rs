@@ -64,11 +64,11 @@
 //!    that the temporal filter leaves, only when a capture enters another segment of time. All captures in a view share one compute
 //!    pass, so that they interleave by depth. Its size is decided on the GPU: nothing is read back inside a frame.
 //! 3. Inside `blend` the depth of opaque meshes cuts the splats, pixel by pixel. The composite lays the result over what the
-//!    camera has drawn so far; it and `write_depth` are the passes in Bevy's pipeline cache.
+//!    camera has drawn so far; it, `write_depth` and `write_motion` are the passes in Bevy's pipeline cache.
 //! 4. [`renderer::Headless`] returns the result as a [`Frame`](view::Frame) instead. The `gs4d` command and the tests use it.
 //!
-//! Each pass from `activate` to `blend` has one name everywhere: `shaders/project.wgsl`, the function in [`mod@reference`], the timestamp
-//! span (`sort` has two: by depth, by tile), the tests. Rules that several passes share are a file each, in `shaders/shared/` and in
+//! Each pass from `activate` to `blend`, and `motion` after it, has one name everywhere: `shaders/project.wgsl`, the function in
+//! [`mod@reference`], the timestamp span (`sort` has two: by depth, by tile), the tests. Rules that several passes share are a file each, in `shaders/shared/` and in
 //! [`gaussian`]: which tiles a splat covers ([`gaussian::overlap`]), what it does to a pixel ([`gaussian::alpha`]).
 //!
 //! # The rings

@@ -154,6 +154,18 @@ struct InstanceUniforms {
     crop_z: vec4<f32>,
 }
 
+// The view of one part of a capture one frame before.
+struct MotionUniforms {
+    // Rows x and y of projection times capture-to-camera.
+    clip_x: vec4<f32>,
+    clip_y: vec4<f32>,
+    // Row z of capture-to-camera.
+    camera_z: vec4<f32>,
+    time: f32,
+    near: f32,
+    padding: vec2<f32>,
+}
+
 const LIGHTING_AS_TRAINED: u32 = 0u;
 const LIGHTING_ENCODED: u32 = 1u;
 const LIGHTING_LINEAR: u32 = 2u;

@@ -1,13 +1,14 @@
 //! The CPU reference of every GPU pass of a frame, with the same names and in the same order.
 //!
 //! In: [`Layer`]s and a [`Background`]. Out: a [`Frame`]. Plain functions over slices, which correspond to the files of
-//! `shaders/`: [`activate()`], [`project()`], [`sort`], [`bin`], `sort` again, [`ranges`], [`blend`]. And back from the
+//! `shaders/`: [`activate()`], [`project()`], [`sort`], [`bin`], `sort` again, [`ranges`], [`blend`], [`motion()`]. And back from the
 //! gradient of a loss on a frame to that of the trained parameters: [`blend_backward()`], [`gradients`].
 
 mod activate;
 mod bin;
 mod blend;
 mod blend_backward;
+mod motion;
 mod project;
 mod sort;
 mod workload;
@@ -16,6 +17,7 @@ pub use activate::activate;
 pub use bin::{Pair, bin, ranges};
 pub use blend::{behind, blend};
 pub use blend_backward::{PixelGradients, blend_backward, gradients};
+pub use motion::motion;
 pub use project::{Splat, project};
 pub use sort::sort;
 pub use workload::{Workload, workload};

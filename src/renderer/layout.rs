@@ -208,6 +208,39 @@ pub struct InstanceUniforms {
     pub crop_z: [f32; 4],
 }
 
+/// The view of one part of a capture one frame before. Input of `motion`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct MotionUniforms {
+    /// Row x of projection times capture-to-camera.
+    pub clip_x: [f32; 4],
+    /// Row y of it.
+    pub clip_y: [f32; 4],
+    /// Row z of capture-to-camera.
+    pub camera_z: [f32; 4],
+    /// Timestamp, in the capture's unit.
+    pub time: f32,
+    /// Near limit, camera units.
+    pub near: f32,
+    /// Unused.
+    pub padding: [f32; 2],
+}
+
+impl MotionUniforms {
+    /// Creates the values that follow from a view.
+    pub fn new(view: &View) -> Self {
+        let [clip_x, clip_y] = view.clip_rows();
+        Self {
+            clip_x: clip_x.to_array(),
+            clip_y: clip_y.to_array(),
+            camera_z: view.world_to_camera.row(2).to_array(),
+            time: view.time,
+            near: view.near,
+            padding: [0.0; 2],
+        }
+    }
+}
+
 /// Colors are blended as trained.
 pub const LIGHTING_AS_TRAINED: u32 = 0;
 /// Colors are multiplied by the light and stay encoded.

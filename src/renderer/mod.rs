@@ -15,6 +15,9 @@
 //! | `ranges` | pairs | first and last pair of each tile |
 //! | `blend` | ranges, pairs, splats, opaque depth | color and transmittance, expected and median depth |
 //!
+//! If the views of the frame before are given, `motion` then puts the motion of each splat in place of its color, and `blend` runs once more,
+//! into a target of motions.
+//!
 //! Two stable sorts, first by depth and then by tile, give the original's order by (tile, depth, index), and move far
 //! less data than a sort by its 64-bit keys. No pass needs subgroups, and the results do not depend on their size.
 //!

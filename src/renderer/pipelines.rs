@@ -32,6 +32,9 @@ pub struct Renderer {
     colors: [OnceLock<wgpu::ComputePipeline>; 3],
     sort_bins: [OnceLock<wgpu::ComputePipeline>; 3],
     blend_blocks: [OnceLock<wgpu::ComputePipeline>; FastVariant::BLENDS],
+    /// `motion` of the reference design and of the fast one, compiled when it is first used, indexed by how a capture is stored, in the
+    /// order of [`Storage::ALL`].
+    motion: [[OnceLock<wgpu::ComputePipeline>; 3]; 2],
     checks: ShaderChecks,
     /// Whether [`Design::Auto`] is the reference design: for a software driver, where it is faster, and in browsers, where the fast one
     /// is untried.
@@ -101,6 +104,8 @@ pub(super) struct Layouts {
     pub sort_bins: wgpu::BindGroupLayout,
     pub colors: wgpu::BindGroupLayout,
     pub blend_blocks: wgpu::BindGroupLayout,
+    /// Of the reference design and of the fast one.
+    pub motion: [wgpu::BindGroupLayout; 2],
 }
 
 impl Renderer {
@@ -133,6 +138,7 @@ impl Renderer {
             colors: Default::default(),
             sort_bins: Default::default(),
             blend_blocks: Default::default(),
+            motion: Default::default(),
             checks,
             prefers_reference: software || info.backend == wgpu::Backend::BrowserWebGpu,
             subgroups: if device.features().contains(wgpu::Features::SUBGROUP) && sizes == [32, 32] {
@@ -290,6 +296,36 @@ impl Renderer {
         Ok(())
     }
 
+    /// Compiles `motion` of a design for captures stored in these ways, unless it has been.
+    ///
+    /// # Errors
+    /// When the shader does not compile.
+    pub(super) fn compile_motion(
+        &self,
+        device: &wgpu::Device,
+        storages: impl Iterator<Item = Storage>,
+        design: Design,
+    ) -> Result<(), GpuError> {
+        let fast = design != Design::Reference;
+        let binned = if fast { BINNED } else { &[] };
+        for storage in storages {
+            if self.motion(storage, design).is_none() {
+                let definitions = [binned, storage.definitions(), self.copied_instance].concat();
+                let shader = module(device, "motion", &definitions, self.checks)?;
+                let [geometry, _] = &self.layouts.captures[storage as usize];
+                let groups = [&self.layouts.motion[usize::from(fast)], geometry, &self.layouts.active].map(Some);
+                let made = pipeline(device, &shader, "motion", &groups);
+                self.motion[usize::from(fast)][storage as usize].get_or_init(|| made);
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns `motion` of a design for captures stored in this way, if it has been compiled.
+    pub(super) fn motion(&self, storage: Storage, design: Design) -> Option<&wgpu::ComputePipeline> {
+        self.motion[usize::from(design != Design::Reference)][storage as usize].get()
+    }
+
     /// Returns `project_bin` for captures stored in this way, if it has been compiled.
     pub(super) fn project_bin(&self, storage: Storage) -> Option<&wgpu::ComputePipeline> {
         self.project_bin[storage as usize].get()
@@ -337,6 +373,7 @@ impl Layouts {
         use Bind::{Depth, Depths, Read, Target, Uniform, UniformAt, Write};
         const FRAME: usize = size_of::<layout::FrameUniforms>();
         const INSTANCE: Bind = UniformAt(size_of::<layout::InstanceUniforms>());
+        const BEFORE: Bind = UniformAt(size_of::<layout::MotionUniforms>());
         let new = |label, bindings: &[Bind]| group_layout(device, label, bindings);
         let pixel = |pixels: Pixels| {
             let opaque = if pixels.multisampled { Depths } else { Depth };
@@ -371,6 +408,10 @@ impl Layouts {
             sort_bins: new("gs4d sort_bins", &[Uniform(FRAME), Read, Write, Read, Write, Write, Read]),
             colors: new("gs4d colors", &[INSTANCE, Read, Read, Write]),
             blend_blocks: new("gs4d blend_blocks", &[Read, Read, Read, Read, Read]),
+            motion: [
+                new("gs4d motion", &[INSTANCE, BEFORE, Read, Write]),
+                new("gs4d motion", &[INSTANCE, BEFORE, Read, Read, Read, Write]),
+            ],
         }
     }
 }

@@ -42,6 +42,7 @@ const PASSES: &[(&str, &str)] = &[
     ("colors", include_str!("../../shaders/colors.wgsl")),
     ("sort_bins", include_str!("../../shaders/sort_bins.wgsl")),
     ("blend_blocks", include_str!("../../shaders/blend_blocks.wgsl")),
+    ("motion", include_str!("../../shaders/motion.wgsl")),
     ("score", include_str!("../../shaders/score.wgsl")),
     ("slice", include_str!("../../shaders/slice.wgsl")),
     ("rounding", include_str!("../../shaders/rounding.wgsl")),
@@ -114,7 +115,7 @@ pub const COMPAT_WITHOUT_TIME: &[&str] = &["COMPAT", "WITHOUT_TIME"];
 /// The definition of `blend_backward` and `project_backward` that sums by float atomics, for devices that have them.
 pub const ATOMIC_SUMS: &[&str] = &["ATOMIC_SUMS"];
 
-/// Definitions of `project` as the first pass of the fast renderer, `project_bin`.
+/// Definitions of `project` as the first pass of the fast renderer, `project_bin`, and of `motion` there.
 pub const BINNED: &[&str] = &["BINNED"];
 
 /// Definitions of `project` and `colors` on software drivers: each thread copies the uniforms of its instance. Mesa's driver compiles a long
@@ -305,7 +306,7 @@ impl FastVariant {
 }
 
 /// Returns the naga module of a pass, imports resolved, validated, with these definitions: those of a [`Storage`] and [`COPIED_INSTANCE`] for
-/// `project` and `colors`, none, [`MULTISAMPLED`] or those of a [`ColorPrecision`] for `blend`, those of the fast renderer's passes, none for the others.
+/// `project`, `colors` and `motion`, none, [`MULTISAMPLED`] or those of a [`ColorPrecision`] for `blend`, those of the fast renderer's passes, none for the others.
 ///
 /// # Errors
 /// When there is no such pass or it does not compile.

@@ -6,10 +6,14 @@ use super::memory::Allocator;
 use crate::view::Counts;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Names of the timed passes of a frame, in order, with the reference design.
-pub(super) const TIMED_PASSES: &[&str] = &["project", "sort (depth)", "bin", "sort (tile)", "ranges", "blend"];
+/// Names of the timed passes of a frame, in order, with the reference design. The last [`MOTION_PASSES`] are those of motions.
+pub(super) const TIMED_PASSES: &[&str] =
+    &["project", "sort (depth)", "bin", "sort (tile)", "ranges", "blend", "motion", "blend (motion)"];
 /// The same with the fast design.
-pub(super) const TIMED_FAST_PASSES: &[&str] = &["project_bin", "sort_bins", "colors", "blend_blocks"];
+pub(super) const TIMED_FAST_PASSES: &[&str] =
+    &["project_bin", "sort_bins", "colors", "blend_blocks", "motion", "blend_blocks (motion)"];
+/// Number of passes that only a frame with motions has.
+pub(super) const MOTION_PASSES: usize = 2;
 
 /// Medians over the frames of a benchmark.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

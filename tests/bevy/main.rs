@@ -11,6 +11,7 @@ mod composition;
 mod examples;
 mod golden;
 mod inspector;
+mod motion;
 mod picking;
 mod playback;
 mod shade;

@@ -8,8 +8,8 @@ use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF};
 use bevy_gs4d::offline::fine_tune::NEIGHBORS;
 use bevy_gs4d::renderer::layout::{
     self, Activation, AdamUniforms, BLOCK, Counters, DIGITS, FIRST_SEEN, FrameUniforms, InstanceUniforms, LossUniforms,
-    RoundingRecord, SortStep, SplatRecord, SplatShape, TermWeights, TiedColors, TrainedRecord, TrainedScene,
-    VisibleSplat,
+    MotionUniforms, RoundingRecord, SortStep, SplatRecord, SplatShape, TermWeights, TiedColors, TrainedRecord,
+    TrainedScene, VisibleSplat,
 };
 use bevy_gs4d::renderer::shaders::{compose, pass_names};
 use bevy_gs4d::view::TILE_SIZE;
@@ -72,7 +72,7 @@ fn splat() -> Mirror {
     in_fours(mirror, "SplatRecord", ["place", "shape", "color", ""])
 }
 
-fn mirrors() -> [Mirror; 16] {
+fn mirrors() -> [Mirror; 17] {
     [
         gaussian(),
         mirror!(InstanceUniforms {
@@ -111,6 +111,7 @@ fn mirrors() -> [Mirror; 16] {
             crop_y,
             crop_z,
         }),
+        mirror!(MotionUniforms { clip_x, clip_y, camera_z, time, near, padding }),
         mirror!(Activation { count, first, filter_mode, segment }),
         mirror!(FrameUniforms {
             size,

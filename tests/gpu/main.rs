@@ -13,6 +13,7 @@ mod golden;
 mod layout;
 #[cfg(target_os = "linux")]
 mod memory;
+mod motion;
 mod packed;
 mod passes;
 mod render;

@@ -32,7 +32,7 @@ fn every_shader_file_is_a_pass_or_one_of_bevy_s() {
     let shaders = files.filter(|path| path.extension().is_some_and(|ending| ending == "wgsl"));
     let mut names: BTreeSet<String> =
         shaders.filter_map(|path| Some(path.file_stem()?.to_string_lossy().into_owned())).collect();
-    for name in ["composite", "write_depth"] {
+    for name in ["composite", "write_depth", "write_motion"] {
         assert!(names.remove(name), "{name} is there");
     }
     let passes: BTreeSet<String> = pass_names().map(str::to_owned).collect();
@@ -100,6 +100,7 @@ fn an_unknown_pass_is_named() {
 fn bevy_s_passes_are_valid_with_all_their_definitions() {
     let composite = ("composite", include_str!("../../shaders/composite.wgsl"), ["READ_TARGET", "ENCODE_TARGET"]);
     let write_depth = ("write_depth", include_str!("../../shaders/write_depth.wgsl"), ["MEDIAN", "UNUSED"]);
+    let write_motion = ("write_motion", include_str!("../../shaders/write_motion.wgsl"), ["MEDIAN", "UNUSED"]);
     let check = |(name, source, defines): (&str, &str, [&str; 2]), chosen: usize| {
         let chosen = defines.iter().enumerate().filter(|(index, _)| (chosen >> index) & 1 == 1);
         let shader_defs = chosen.map(|(_, define)| ((*define).to_owned(), ShaderDefValue::Bool(true))).collect();
@@ -113,6 +114,7 @@ fn bevy_s_passes_are_valid_with_all_their_definitions() {
         let module = composer.make_naga_module(descriptor).map_err(|error| error.emit_to_string(&composer))?;
         validate(name, &module, Capabilities::SHADER_FLOAT16_IN_FLOAT32)
     };
-    let all = [composite, write_depth].into_iter().flat_map(|pass| (0..4).map(move |chosen| (pass, chosen)));
+    let passes = [composite, write_depth, write_motion].into_iter();
+    let all = passes.flat_map(|pass| (0..4).map(move |chosen| (pass, chosen)));
     report(all.filter_map(|(pass, chosen)| check(pass, chosen).err()).collect());
 }

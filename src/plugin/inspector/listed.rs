@@ -69,10 +69,11 @@ impl Listed for BlendSpace {
 }
 
 impl Listed for DepthWrite {
-    const ALL: &'static [Self] = &[Self::None, Self::Expected, Self::Median];
+    const ALL: &'static [Self] = &[Self::Auto, Self::None, Self::Expected, Self::Median];
 
     fn name(self) -> &'static str {
         match self {
+            Self::Auto => "auto",
             Self::None => "none",
             Self::Expected => "expected",
             Self::Median => "median",

@@ -4,8 +4,10 @@
 
 use super::active::ActiveLists;
 use super::composite::CompositeBindings;
+use super::previous::CameraPose;
 use super::upload::GpuGaussianCapture;
 use super::write_depth::WriteDepthBindings;
+use super::write_motion::WriteMotionBindings;
 use crate::plugin::component::GaussianCapture;
 use crate::renderer::{Design, Instance, Renderer, ViewRenderer};
 use crate::view::{Appearance, View};
@@ -35,6 +37,11 @@ pub(crate) struct CaptureView {
     /// The pass that writes to the camera's depth buffer, if the camera asks for it, and what that pass binds.
     pub(super) write_depth: Option<CachedRenderPipelineId>,
     pub(super) depth_bindings: WriteDepthBindings,
+    /// The pass that writes to the camera's motion vectors, if the camera has them, and what that pass binds.
+    pub(super) write_motion: Option<CachedRenderPipelineId>,
+    pub(super) motion_bindings: WriteMotionBindings,
+    /// The camera's pose in the last frame.
+    pub(super) pose: Option<CameraPose>,
     /// Whether other systems work on the captures' picture before it reaches the target, in
     /// [`CaptureSystems::Shade`](super::CaptureSystems).
     pub(crate) is_shaded: bool,
@@ -92,6 +99,9 @@ impl CaptureView {
             bindings: CompositeBindings::default(),
             write_depth: None,
             depth_bindings: WriteDepthBindings::default(),
+            write_motion: None,
+            motion_bindings: WriteMotionBindings::default(),
+            pose: None,
             is_shaded: false,
             shaded: None,
             measured: false,
@@ -127,6 +137,7 @@ impl CaptureView {
             self.renderer.release();
             self.bindings.forget();
             self.depth_bindings.forget();
+            self.motion_bindings.forget();
         }
     }
 

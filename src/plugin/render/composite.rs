@@ -25,6 +25,7 @@ use glam::UVec4;
 pub(super) struct CaptureShaders {
     pub(super) composite: Handle<Shader>,
     pub(super) write_depth: Handle<Shader>,
+    pub(super) write_motion: Handle<Shader>,
     /// The library that composite imports: nothing reads the handle, but the import resolves only as long as it is held.
     pub(super) _srgb: Handle<Shader>,
 }

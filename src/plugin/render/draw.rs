@@ -1,7 +1,7 @@
 //! Draw: captures into a camera's target, in Bevy's `Core3d` schedule.
 //!
 //! In: the camera's view, prepared by [`prepare`](super::prepare). Out: one compute pass, the composite and, if the
-//! camera asks for it, `write_depth`, recorded. If other systems work on the captures' picture before it reaches the target,
+//! camera asks for it, `write_depth` and `write_motion`, recorded. If other systems work on the captures' picture before it reaches the target,
 //! the compute pass is recorded before them.
 
 use super::active::ActiveLists;
@@ -10,14 +10,17 @@ use super::composite::CompositePipeline;
 use super::renderer::CaptureRenderer;
 use super::upload::GpuGaussianCapture;
 use super::write_depth::WriteDepthPipeline;
+use super::write_motion::WriteMotionPipeline;
 use crate::renderer::WorkCounters;
+use bevy::core_pipeline::prepass::ViewPrepassTextures;
 use bevy::ecs::schedule::SystemSet;
 use bevy::ecs::system::{Res, ResMut, SystemParam};
 use bevy::log::debug_span;
 use bevy::render::diagnostic::RecordDiagnostics;
 use bevy::render::render_asset::RenderAssets;
 use bevy::render::render_resource::{
-    Operations, PipelineCache, RenderPassColorAttachment, RenderPassDescriptor, StoreOp,
+    LoadOp, Operations, PipelineCache, RenderPassColorAttachment, RenderPassDepthStencilAttachment,
+    RenderPassDescriptor, StoreOp,
 };
 use bevy::render::renderer::{RenderContext, RenderDevice, ViewQuery};
 use bevy::render::view::{Msaa, ViewDepthTexture, ViewTarget};
@@ -44,6 +47,7 @@ pub(super) struct Passes<'w> {
     cache: Res<'w, PipelineCache>,
     composite: Res<'w, CompositePipeline>,
     write_depth: Res<'w, WriteDepthPipeline>,
+    write_motion: Res<'w, WriteMotionPipeline>,
 }
 
 /// Draws the captures of one camera into a picture of their own, if others work on it before the composite.
@@ -65,7 +69,7 @@ pub(super) fn record_captures(
 /// Draws the captures of one camera. Registered twice, because multisampled targets can be read only once they have been resolved, which
 /// is after transparent meshes.
 pub(super) fn draw_captures<const LATE: bool>(
-    camera: ViewQuery<(&ViewTarget, &ViewDepthTexture, &Msaa)>,
+    camera: ViewQuery<(&ViewTarget, &ViewDepthTexture, &Msaa, Option<&ViewPrepassTextures>)>,
     renderer: Option<Res<CaptureRenderer>>,
     captures: Res<RenderAssets<GpuGaussianCapture>>,
     lists: Res<ActiveLists>,
@@ -75,7 +79,7 @@ pub(super) fn draw_captures<const LATE: bool>(
 ) {
     let _span = debug_span!("gs4d/draw").entered();
     let entity = camera.entity();
-    let (target, depth, msaa) = camera.into_inner();
+    let (target, depth, msaa, prepass) = camera.into_inner();
     let (Some(renderer), Some(view)) = (renderer, views.0.get_mut(&entity)) else { return };
     if (*msaa != Msaa::Off || view.late) != LATE {
         return;
@@ -88,6 +92,9 @@ pub(super) fn draw_captures<const LATE: bool>(
     }
     passes.composite(view, target, &mut context, renderer.0.work());
     passes.write_depth(view, depth, &mut context, renderer.0.work());
+    if let Some(prepass) = prepass {
+        passes.write_motion(view, prepass, &mut context, renderer.0.work());
+    }
 }
 
 impl Passes<'_> {
@@ -173,6 +180,45 @@ impl Passes<'_> {
             multiview_mask: None,
         });
         let span = diagnostics.pass_span(&mut pass, "gs4d/write_depth");
+        pass.set_render_pipeline(pipeline);
+        pass.set_bind_group(0, group, &[]);
+        pass.draw(0..3, 0..1);
+        span.end(&mut pass);
+    }
+
+    /// Writes captures into the camera's motion vectors and the depths of its prepass, if it has them.
+    fn write_motion(
+        &self,
+        view: &mut CaptureView,
+        prepass: &ViewPrepassTextures,
+        context: &mut RenderContext,
+        work: &WorkCounters,
+    ) {
+        let Some(pipeline) = view.write_motion.and_then(|id| self.cache.get_render_pipeline(id)) else { return };
+        let (Some(vectors), Some(prepass_depth)) = (&prepass.motion_vectors, &prepass.depth) else { return };
+        let (Some(motions), Some(depths)) = (view.renderer.motion(), view.renderer.depth()) else { return };
+        let (Some(viewport), Some(distance)) = (view.bindings.viewport(), view.depth_bindings.distance()) else {
+            return;
+        };
+        let (uniforms, targets) = ([viewport, distance], [motions, depths]);
+        let group = view.motion_bindings.group(&self.device, &self.cache, &self.write_motion, uniforms, targets, work);
+        let Some(group) = group else { return };
+        let diagnostics = context.diagnostic_recorder();
+        let diagnostics = diagnostics.as_deref();
+        let depth_ops = Operations { load: LoadOp::Load, store: StoreOp::Store };
+        let mut pass = context.begin_tracked_render_pass(RenderPassDescriptor {
+            label: Some("gs4d write_motion"),
+            color_attachments: &[Some(vectors.get_attachment())],
+            depth_stencil_attachment: Some(RenderPassDepthStencilAttachment {
+                view: &prepass_depth.texture.default_view,
+                depth_ops: Some(depth_ops),
+                stencil_ops: None,
+            }),
+            timestamp_writes: None,
+            occlusion_query_set: None,
+            multiview_mask: None,
+        });
+        let span = diagnostics.pass_span(&mut pass, "gs4d/write_motion");
         pass.set_render_pipeline(pipeline);
         pass.set_bind_group(0, group, &[]);
         pass.draw(0..3, 0..1);

@@ -7,11 +7,11 @@
 //! ```text
 //! renderer     compiles the pipelines                                once per device
 //! visibility   a capture's bounds at this time -> its Aabb           main world
-//! extract      captures, their times, poses and settings             main world -> render world
+//! extract      captures, their times, poses and settings             main world -> render world; those before: previous
 //! upload       a loaded capture -> buffers on the GPU                once per asset, over several frames
 //! active       which Gaussians are active                            once per placed capture and segment, before all cameras
 //! prepare      a camera's lens and every capture's pose -> views     once per camera and frame, kept in capture_views
-//! draw         one compute pass, composite, write_depth              Core3d, after opaque meshes, before or after transparent ones
+//! draw         one compute pass, composite, write_depth, write_motion  Core3d, after opaque meshes, before or after transparent ones
 //! publish      counts, times, memory -> statistics                   render world -> main world
 //! ```
 //!
@@ -21,8 +21,8 @@
 //! |---|---|---|
 //! | 1 | opaque and alpha-masked meshes, skybox | opaque and alpha-masked meshes, skybox |
 //! | 2 | **captures**, cut by the depth of 1 | transmissive and transparent meshes, cut by the depth of 1 |
-//! | 3 | **captures' depth**, if asked for | **captures**, cut by the depth of 1 |
-//! | 4 | transparent meshes and gizmos, cut by the depth of 1 (and of 3) | **captures' depth**, if asked for |
+//! | 3 | **captures' depth and motion**, if asked for | **captures**, cut by the depth of 1 |
+//! | 4 | transparent meshes and gizmos, cut by the depth of 1 (and of 3) | **captures' depth and motion**, if asked for |
 //! | 5 | post-processing, tonemapping | post-processing, tonemapping |
 //!
 //! So without multisampling everything in Bevy's transparent phase (blended materials, gizmos) is drawn over captures, whether it is in
@@ -35,10 +35,15 @@
 //! Bevy orders its transmissive meshes only between opaque and transparent ones: order [`CaptureSystems::Draw`] against
 //! `main_transmissive_pass_3d`, in the render world's `Core3d` schedule, to see captures through glass. Its atmosphere cannot be ordered
 //! against: cameras with one need [`CaptureViewSettings::late`], which draws captures in the order of multisampled cameras.
-//! Prepasses come first and do not contain captures; effects that read the depth prepass (screen-space ambient occlusion and reflections)
-//! ignore captures. Distance fog, shadows of meshes and light of the scene reach captures in a pass of the module `pbr`, between 1 and the
-//! captures. Effects that read the depth buffer after the main pass (depth of field, volumetric fog) read the depths that
-//! [`DepthWrite`] wrote.
+//! Prepasses come first and do not contain captures; effects that read the depth prepass before the main pass (screen-space ambient
+//! occlusion and reflections) ignore captures. Distance fog, shadows of meshes and light of the scene reach captures in a pass of the module
+//! `pbr`, between 1 and the captures. Effects that read the depth buffer after the main pass (depth of field, volumetric fog) read the
+//! depths that [`DepthWrite`] wrote, by default for cameras that have such an effect.
+//!
+//! For cameras with a `MotionVectorPrepass` and a `DepthPrepass`, which temporal anti-aliasing and motion blur require, captures are then
+//! written into the textures of both: at pixels where they hide more than half of the background, the mean motion of their splats since the
+//! frame before, by the time of the capture, its transform and the camera, without jitter. Captures are never drawn with jitter: their
+//! splats are smooth without.
 //!
 //! A perspective camera whose depth can be read draws the environment map of a capture behind everything; of several maps in one view, it
 //! draws that of one capture. Entities with `NoCpuCulling` are not drawn: captures are culled on the CPU.
@@ -53,11 +58,13 @@
 mod active;
 pub(crate) mod capture_views;
 mod composite;
+mod depth_readers;
 mod draw;
 pub(crate) mod extract;
 mod fault;
 mod plugin;
 mod prepare;
+mod previous;
 mod publish;
 mod reflect;
 mod renderer;
@@ -68,6 +75,7 @@ mod upload;
 mod view;
 mod visibility;
 mod write_depth;
+mod write_motion;
 
 #[cfg(feature = "pbr")]
 pub(crate) use active::ActiveLists;

@@ -5,9 +5,11 @@
 use super::active::{ActiveLists, prepare_active_lists, record_active_lists};
 use super::capture_views::CaptureViews;
 use super::composite::{CaptureShaders, CompositePipeline};
+use super::depth_readers::{DepthReaders, extract_depth_readers};
 use super::draw::{CaptureSystems, draw_captures, record_captures};
 use super::extract::{ExtractedCaptures, ExtractedViewSettings, extract_captures, extract_view_settings};
 use super::prepare::{make_depth_readable, prepare_views};
+use super::previous::{PreviousCaptures, keep_previous_captures};
 use super::publish::publish_statistics;
 use super::renderer::init_renderer;
 use super::settings::CaptureSettings;
@@ -16,6 +18,7 @@ use super::statistics::CaptureStatistics;
 use super::upload::{CaptureUploadBudget, GpuGaussianCapture, continue_uploads, extract_upload_budget};
 use super::visibility::update_bounds;
 use super::write_depth::WriteDepthPipeline;
+use super::write_motion::WriteMotionPipeline;
 use crate::plugin::asset::Uploads;
 use crate::plugin::component::GaussianCapture3d;
 use bevy::app::{App, Plugin, PostUpdate};
@@ -64,15 +67,20 @@ fn build_rendering(app: &mut App) {
         .init_resource::<ExtractedCaptures>()
         .init_resource::<ExtractedViewSettings>()
         .init_resource::<ShadeRequests>()
+        .init_resource::<PreviousCaptures>()
+        .init_resource::<DepthReaders>()
         // Created anew after a lost device: they hold everything on the GPU.
         .init_gpu_resource::<CompositePipeline>()
         .init_gpu_resource::<SpecializedRenderPipelines<CompositePipeline>>()
         .init_gpu_resource::<WriteDepthPipeline>()
         .init_gpu_resource::<SpecializedRenderPipelines<WriteDepthPipeline>>()
+        .init_gpu_resource::<WriteMotionPipeline>()
+        .init_gpu_resource::<SpecializedRenderPipelines<WriteMotionPipeline>>()
         .init_gpu_resource::<CaptureViews>()
         .init_gpu_resource::<ActiveLists>()
         .add_systems(RenderStartup, init_renderer)
         .add_systems(ExtractSchedule, (extract_captures, extract_view_settings, extract_upload_budget))
+        .add_systems(ExtractSchedule, (keep_previous_captures.before(extract_captures), extract_depth_readers))
         .add_systems(
             Render,
             (
@@ -116,6 +124,7 @@ fn add_shaders(app: &mut App) -> Option<CaptureShaders> {
     Some(CaptureShaders {
         composite: add(include_str!("../../../shaders/composite.wgsl"), "bevy_gs4d/shaders/composite.wgsl"),
         write_depth: add(include_str!("../../../shaders/write_depth.wgsl"), "bevy_gs4d/shaders/write_depth.wgsl"),
+        write_motion: add(include_str!("../../../shaders/write_motion.wgsl"), "bevy_gs4d/shaders/write_motion.wgsl"),
         _srgb: add(include_str!("../../../shaders/shared/srgb.wgsl"), "bevy_gs4d/shaders/shared/srgb.wgsl"),
     })
 }

@@ -6,8 +6,10 @@
 use super::active::ActiveLists;
 use super::capture_views::{CaptureView, CaptureViews, Drawn};
 use super::composite::{CompositeKey, CompositePipeline};
+use super::depth_readers::DepthReaders;
 use super::extract::{ExtractedCaptures, ExtractedViewSettings};
 use super::fault::CameraFault;
+use super::previous::{CameraPose, PreviousCaptures};
 use super::renderer::CaptureRenderer;
 use super::settings::{CaptureViewSettings, DepthWrite};
 use super::shade_requests::ShadeRequests;
@@ -15,10 +17,12 @@ use super::statistics::CaptureStatistics;
 use super::upload::GpuGaussianCapture;
 use super::view::CameraLens;
 use super::write_depth::{WriteDepthKey, WriteDepthPipeline};
+use super::write_motion::{WriteMotionKey, WriteMotionPipeline};
 use crate::plugin::component::GaussianCapture3d;
 use crate::renderer::{ColorPrecision, OpaqueDepth, ViewParameters};
-use crate::view::{Background, DebugView};
+use crate::view::{Background, DebugView, View};
 use bevy::camera::{Camera3d, CompositingSpace, MainPassResolutionOverride};
+use bevy::core_pipeline::prepass::ViewPrepassTextures;
 use bevy::ecs::entity::Entity;
 use bevy::ecs::query::With;
 use bevy::ecs::system::{Query, Res, ResMut, SystemParam};
@@ -38,6 +42,8 @@ pub(super) struct Scene<'w> {
     shade: Res<'w, ShadeRequests>,
     captures: Res<'w, RenderAssets<GpuGaussianCapture>>,
     lists: Res<'w, ActiveLists>,
+    previous: Res<'w, PreviousCaptures>,
+    depth_readers: Res<'w, DepthReaders>,
 }
 
 /// The pipelines that depend on a camera's target.
@@ -48,6 +54,8 @@ pub(super) struct Pipelines<'w> {
     composites: ResMut<'w, SpecializedRenderPipelines<CompositePipeline>>,
     write_depth: Res<'w, WriteDepthPipeline>,
     depth_writers: ResMut<'w, SpecializedRenderPipelines<WriteDepthPipeline>>,
+    write_motion: Res<'w, WriteMotionPipeline>,
+    motion_writers: ResMut<'w, SpecializedRenderPipelines<WriteMotionPipeline>>,
 }
 
 impl Scene<'_> {
@@ -70,6 +78,16 @@ impl Scene<'_> {
             Some(Drawn { entity: *entity, asset, view, appearance, filtered })
         }));
     }
+
+    /// Returns the view of each capture that is drawn one frame before, when the camera had this pose.
+    fn previous_views(&self, drawn: &[Drawn], pose: &CameraPose) -> Vec<View> {
+        let before = |one: &Drawn| {
+            let Some(placed) = self.extracted.0.get(&one.entity) else { return one.view };
+            let time_at = |seconds| self.captures.get(one.asset)?.time_at(seconds);
+            self.previous.view(&one.entity, placed, &one.view, pose, time_at)
+        };
+        drawn.iter().map(before).collect()
+    }
 }
 
 impl Pipelines<'_> {
@@ -89,6 +107,11 @@ impl Pipelines<'_> {
         let key = WriteDepthKey { samples: msaa.samples(), median };
         self.depth_writers.specialize(&self.cache, &self.write_depth, key)
     }
+
+    fn write_motion(&mut self, msaa: Msaa, median: bool) -> CachedRenderPipelineId {
+        let key = WriteMotionKey { samples: msaa.samples(), median };
+        self.motion_writers.specialize(&self.cache, &self.write_motion, key)
+    }
 }
 
 /// Lets the renderer read the depth of opaque meshes.
@@ -106,6 +129,7 @@ type CameraView = (
     &'static Msaa,
     &'static RenderVisibleEntities,
     Option<&'static MainPassResolutionOverride>,
+    Option<&'static ViewPrepassTextures>,
 );
 
 /// Prepares the view of every camera: the captures it sees, its pipelines and its working buffers.
@@ -123,11 +147,12 @@ pub(super) fn prepare_views(
     let Some(renderer) = renderer else { return };
     let measure = statistics.is_measuring();
     views.0.retain(|&camera, _| cameras.contains(camera));
-    for (entity, view, camera, depth, &msaa, visible, resolution) in &cameras {
+    for (entity, view, camera, depth, &msaa, visible, resolution, prepass) in &cameras {
         // Meshes may be drawn at a lower resolution than the camera's, to be scaled up later.
         let size = resolution.map_or(UVec2::new(view.viewport.z, view.viewport.w), |smaller| smaller.0);
         let main = view.retained_view_entity.main_entity;
-        let settings = scene.settings.0.get(&main).copied().unwrap_or_default();
+        let mut settings = scene.settings.0.get(&main).copied().unwrap_or_default();
+        settings.depth = scene.depth_readers.resolve(&main, settings.depth);
         // Even without anything to draw, so that it is compiled while captures load.
         let (composite, in_place) = pipelines.composite(view, camera, settings);
         let state =
@@ -143,6 +168,8 @@ pub(super) fn prepare_views(
             scene.collect(lens, view, size, visible, &mut state.drawn);
         }
         state.count_idle_frames();
+        let pose = lens.map(|lens| CameraPose { lens, world_from_camera: view.world_from_view.affine() });
+        let previous_pose = std::mem::replace(&mut state.pose, pose).or(pose);
         let Some(lens) = lens.filter(|_| state.sees_something()) else { continue };
         // What debug views show is not light.
         state.is_shaded = settings.debug == DebugView::Color && scene.shade.want(main, &state.drawn);
@@ -151,15 +178,19 @@ pub(super) fn prepare_views(
         let instances = state.instances(&scene.captures, &scene.lists);
         let surrounded = instances.iter().any(|instance| instance.capture.has_environment());
         let opaque = opaque_depth(&lens, view, depth, msaa);
+        let has_motion = prepass.is_some_and(has_motion_vectors) && lens.distance.is_some();
+        let previous_pose = previous_pose.filter(|_| has_motion);
+        let previous = previous_pose.map(|pose| scene.previous_views(&state.drawn, &pose));
         let parameters = ViewParameters {
             // Without depth, an environment map would hide every mesh.
             background: if surrounded && opaque.is_some() { Background::Environment } else { Background::None },
             opaque,
             blend_space: settings.blend_space,
             debug: settings.debug,
-            depths: settings.depth != DepthWrite::None || state.is_shaded,
+            depths: settings.depth != DepthWrite::None || state.is_shaded || has_motion,
             // Bevy's own targets have no more.
             precision: ColorPrecision::Half,
+            previous: previous.as_deref(),
         };
         let prepared = state.renderer.prepare(device.wgpu_device(), &queue, &renderer.0, &instances, &parameters);
         if let Err(failure) = prepared {
@@ -171,18 +202,26 @@ pub(super) fn prepare_views(
                  fewer or smaller Gaussians, or a smaller picture"
             );
         }
-        let written = lens.distance.zip(writes_median(&settings, surrounded));
-        state.write_depth = written.map(|(_, median)| pipelines.write_depth(msaa, median));
-        if let Some((distance, _)) = written {
+        let median = writes_median(&settings, surrounded);
+        let written = lens.distance.filter(|_| median.is_some() || has_motion);
+        state.write_depth = written.and(median).map(|median| pipelines.write_depth(msaa, median));
+        state.write_motion = has_motion.then(|| pipelines.write_motion(msaa, median.unwrap_or(false)));
+        if let Some(distance) = written {
             state.depth_bindings.set_lens(distance, 1, &device, &queue, renderer.0.work());
         }
     }
 }
 
+/// Returns whether a camera has motion vectors, and depths beside them, that captures can be written to.
+fn has_motion_vectors(prepass: &ViewPrepassTextures) -> bool {
+    prepass.motion_vectors.is_some() && prepass.depth.is_some()
+}
+
 /// Returns whether the depth that a camera asks for is the median one; `None` if it asks for none.
 fn writes_median(settings: &CaptureViewSettings, surrounded: bool) -> Option<bool> {
     match settings.depth {
-        DepthWrite::None => None,
+        // Automatic depths have been resolved.
+        DepthWrite::Auto | DepthWrite::None => None,
         // Expected depths are divided by the captures' opacity, which an environment map and some debug views hide.
         DepthWrite::Expected => Some(surrounded || hides_opacity(settings.debug)),
         DepthWrite::Median => Some(true),

@@ -90,7 +90,7 @@ pub struct CropBox {
 pub struct CaptureViewSettings {
     /// The space in which Gaussians are blended with each other and with the background. Default: [`BlendSpace::Encoded`], as trained.
     pub blend_space: BlendSpace,
-    /// Which depth of captures is written to the camera's depth buffer. Default: [`DepthWrite::None`].
+    /// Which depth of captures is written to the camera's depth buffer. Default: [`DepthWrite::Auto`], one if an effect reads it.
     pub depth: DepthWrite,
     /// What is shown of captures. Default: [`DebugView::Color`].
     pub debug: DebugView,
@@ -105,7 +105,7 @@ pub struct CaptureViewSettings {
 ///
 /// Post-processing that reads the depth buffer (depth of field, volumetric fog) then treats captures as surfaces. So do transparent
 /// meshes: captures cut them pixel by pixel. See [the order of a frame](crate::render#the-order-of-a-frame). Default:
-/// [`None`](Self::None).
+/// [`Auto`](Self::Auto).
 ///
 /// # Examples
 ///
@@ -122,8 +122,12 @@ pub struct CaptureViewSettings {
 #[derive(Reflect, Debug, Default, Clone, Copy, PartialEq, Eq, Hash)]
 #[reflect(Default, Debug, Clone, PartialEq, Hash)]
 pub enum DepthWrite {
-    /// No depth is written.
+    /// [`Expected`](Self::Expected) for cameras with one of Bevy's effects that read depths after the main pass, [`None`](Self::None) for
+    /// others. These effects are `DepthOfField`, `VolumetricFog`, and everything with a `MotionVectorPrepass`: `TemporalAntiAliasing`,
+    /// `MotionBlur`. A game with an effect of its own chooses for itself.
     #[default]
+    Auto,
+    /// No depth is written.
     None,
     /// The mean depth of the splats at a pixel, weighted as their colours are: smooth, but between surfaces where several are visible. For
     /// captures with an environment map, and with [`DebugView::Overdraw`], the median is written instead.

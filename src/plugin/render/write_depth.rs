@@ -120,6 +120,11 @@ impl WriteDepthBindings {
         }
     }
 
+    /// Returns the lens's uniform, for other passes over the same view; `None` before the first [`set_distance`](Self::set_distance).
+    pub(super) fn distance(&self) -> Option<BindingResource<'_>> {
+        self.distance.binding()
+    }
+
     /// Releases the targets that were bound.
     pub(crate) fn forget(&mut self) {
         self.group = None;

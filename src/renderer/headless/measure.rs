@@ -50,7 +50,7 @@ impl Headless {
         }
         let untimed = self.run(&mut lanes, capture, views, frames, None)?;
         let around = self.run(&mut lanes, capture, views, frames, Some(&[]))?;
-        let passes = self.view.design().timed_passes();
+        let passes = self.view.design().timed_passes(false);
         let inside = self.run(&mut lanes, capture, views, frames, Some(passes))?;
         let mut alone = Vec::new();
         for i in 0..frames {

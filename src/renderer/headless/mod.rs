@@ -304,17 +304,30 @@ impl Headless {
     /// Returns color with transmittance, and depths, of every pixel.
     fn read_targets(&self, size: UVec2) -> Result<(Vec<[f32; 4]>, Vec<[f32; 2]>), GpuError> {
         let Some((color, depth)) = self.view.textures() else { return Ok(Default::default()) };
-        let bytes = self.read_texture(color, size)?;
-        let colors = if color.format() == ColorPrecision::Half.format() {
-            bytemuck::pod_collect_to_vec::<u8, [half::f16; 4]>(&bytes)
-                .iter()
-                .map(|p| p.map(half::f16::to_f32))
-                .collect()
-        } else {
-            bytemuck::pod_collect_to_vec(&bytes)
-        };
+        let colors = self.read_colors(color, size)?;
         let depths = depth.map(|depth| self.read_texture(depth, size)).transpose()?.unwrap_or_default();
         Ok((colors, bytemuck::pod_collect_to_vec(&depths)))
+    }
+
+    /// Returns the motion of each pixel of the last frame since the one before, as [`ViewRenderer::motion`] describes it; nothing if
+    /// that was drawn without [`previous`](ViewParameters::previous) views.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn read_motion(&self) -> Result<Vec<[f32; 4]>, GpuError> {
+        let Some((motion, size)) = self.view.motion_texture() else { return Ok(Vec::new()) };
+        self.read_colors(motion, size)
+    }
+
+    /// Returns the texels of a texture of either precision.
+    fn read_colors(&self, texture: &wgpu::Texture, size: UVec2) -> Result<Vec<[f32; 4]>, GpuError> {
+        let bytes = self.read_texture(texture, size)?;
+        if texture.format() == ColorPrecision::Half.format() {
+            let halves = bytemuck::pod_collect_to_vec::<u8, [half::f16; 4]>(&bytes);
+            Ok(halves.iter().map(|p| p.map(half::f16::to_f32)).collect())
+        } else {
+            Ok(bytemuck::pod_collect_to_vec(&bytes))
+        }
     }
 
     /// Returns the texels, without the padding of rows.

@@ -17,6 +17,10 @@ use wgpu::BufferUsages;
 pub(super) struct FastResources {
     /// Counters of even and of odd frames.
     pub bins: [wgpu::Buffer; 2],
+    /// One [`VisibleSplat`] for each slot.
+    pub visible: wgpu::Buffer,
+    /// Color of each slot.
+    pub splat_colors: wgpu::Buffer,
     /// Size of all buffers.
     pub bytes: u64,
     /// Bind groups of even and of odd frames.
@@ -114,6 +118,7 @@ impl ViewRenderer {
         let splat_colors = allocator.buffer("gs4d splat colors", COLOR_BYTES * slots, BufferUsages::STORAGE);
         let bytes = 2 * bins[0].size() + entries_size + visible.size() + splat_colors.size();
         let layouts = &renderer.layouts;
+        let buffers = [visible.clone(), splat_colors.clone()];
         let [splats, entries, visible] = [splats, &entries, &visible].map(wgpu::Buffer::as_entire_binding);
         let splat_colors = splat_colors.as_entire_binding();
         let [even, odd] = bins.each_ref().map(wgpu::Buffer::as_entire_binding);
@@ -135,7 +140,8 @@ impl ViewRenderer {
         });
         let blend_blocks = [ranges, pairs, splats, splat_colors, visible];
         let blend_blocks = allocator.bind_group("gs4d blend_blocks", &layouts.blend_blocks, &blend_blocks);
-        FastResources { bytes, bins, project_bin, sort_bins, colors, blend_blocks }
+        let [visible, splat_colors] = buffers;
+        FastResources { bytes, bins, visible, splat_colors, project_bin, sort_bins, colors, blend_blocks }
     }
 }
 

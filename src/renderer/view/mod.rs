@@ -6,6 +6,7 @@
 
 mod bins;
 mod fast;
+mod motion;
 mod readback;
 mod record;
 mod resources;
@@ -15,13 +16,14 @@ use super::active::{drawn_count, most_drawn};
 use super::memory::{alignment_of, binding_limit};
 use super::pipelines::Renderer;
 use super::shaders::{Blending, ColorPrecision, FastVariant, Lists, Pixels};
-use super::timing::{PassTime, PassTimer, TIMED_FAST_PASSES, TIMED_PASSES};
+use super::timing::{MOTION_PASSES, PassTime, PassTimer, TIMED_FAST_PASSES, TIMED_PASSES};
 use super::{ActiveList, GpuCapture, GpuError, ViewStatistics, layout};
 use crate::view::tiles;
 use crate::view::{Appearance, Background, BlendSpace, DebugView, View};
 use bins::BinRoom;
 use glam::UVec2;
 use layout::{BLOCK, Counters, DEPTH_STEPS};
+use motion::MotionResources;
 use readback::Readback;
 pub use resources::PassBuffers;
 use resources::Resources;
@@ -57,12 +59,15 @@ pub struct ViewParameters<'a> {
     pub depths: bool,
     /// Precision of the color target. Default: [`ColorPrecision::Single`].
     pub precision: ColorPrecision,
+    /// The view of each instance one frame before, in their order: with its camera, its transform and its time of then. An instance without
+    /// one, or whose lens was of the other kind, has not moved. If given, [motions](ViewRenderer::motion) are computed. Default: `None`.
+    pub previous: Option<&'a [View]>,
 }
 
 impl Default for ViewParameters<'_> {
     fn default() -> Self {
         let (blend_space, debug, precision) = Default::default();
-        Self { background: Background::None, opaque: None, blend_space, debug, depths: true, precision }
+        Self { background: Background::None, opaque: None, blend_space, debug, depths: true, precision, previous: None }
     }
 }
 
@@ -125,6 +130,8 @@ pub struct ViewRenderer {
     timing: Option<(PassTimer, Readback)>,
     /// Everything whose size depends on the view or the captures.
     resources: Option<Resources>,
+    /// What motions need besides, in frames with motions.
+    motion: Option<MotionResources>,
 }
 
 /// Buffers that are more than this factor too large, for more than this number of frames, are replaced.
@@ -140,7 +147,7 @@ pub struct FinishedFrame<'a> {
     pub instances: &'a wgpu::Buffer,
     /// Storage buffer: one [`layout::Counters`].
     pub counters: &'a wgpu::Buffer,
-    /// Buffers that the passes have written.
+    /// Buffers that the passes have written. After a frame with motions, colors of splats are their motions.
     pub buffers: &'a PassBuffers,
     /// Color over the background and transmittance, `Rgba32Float`. May be larger than the picture, like the depth.
     pub color: &'a wgpu::TextureView,
@@ -170,12 +177,13 @@ impl Design {
     pub const NAMES: [(&'static str, Self); 3] =
         [("auto", Self::Auto), ("fast", Self::Fast), ("reference", Self::Reference)];
 
-    /// Returns the names of the passes that are timed.
-    pub(super) fn timed_passes(self) -> &'static [&'static str] {
-        match self {
+    /// Returns the names of the passes that are timed, in frames with motions or without.
+    pub(super) fn timed_passes(self, motions: bool) -> &'static [&'static str] {
+        let all = match self {
             Self::Auto | Self::Fast => TIMED_FAST_PASSES,
             Self::Reference => TIMED_PASSES,
-        }
+        };
+        if motions { all } else { &all[..all.len() - MOTION_PASSES] }
     }
 }
 
@@ -215,6 +223,7 @@ impl ViewRenderer {
             cleared_bins: 0,
             has_depths: true,
             resources: None,
+            motion: None,
         }
     }
 
@@ -309,13 +318,16 @@ impl ViewRenderer {
             }
             _ => {
                 self.odd = false;
+                self.motion = None;
                 self.resources = Some(self.make(device, queue, renderer, sizes, opaque_view, environment_buffer));
             }
         }
         let active =
             |i: &Instance<'_>| (0..i.capture.parts.len()).map(|at| drawn_count(i.capture, at, i.active)).sum::<u32>();
         self.slots = instances.iter().map(active).sum();
-        self.statistics.bytes = self.resources.as_ref().map_or(0, |made| made.bytes);
+        self.prepare_motion(device, queue, renderer, instances, parameters)?;
+        self.statistics.bytes = self.resources.as_ref().map_or(0, |made| made.bytes)
+            + self.motion.as_ref().map_or(0, MotionResources::bytes);
         self.statistics.total = total;
         self.statistics.active = self.slots;
         self.write_uniforms(queue, instances, parameters, environment.map(|(i, m)| (i.view, i.appearance, m.size)));
@@ -337,6 +349,13 @@ impl ViewRenderer {
         self.resources.as_ref().filter(|_| self.has_depths).map(|made| &made.depth_view)
     }
 
+    /// Returns the motion since the frame before, blended as colors are: red and green are `Σ m α T`, not divided by `1 − T`, with `m` in
+    /// pixels to the right and down; alpha is T. Format and size are those of the [color](Self::color). `None` if the last
+    /// [`prepare`](Self::prepare) was without [`previous`](ViewParameters::previous) views.
+    pub fn motion(&self) -> Option<&wgpu::TextureView> {
+        self.motion.as_ref().map(|motion| &motion.view)
+    }
+
     /// Sets whether GPU time is measured from the next frame on, pass by pass. Results arrive in
     /// [`statistics`](Self::statistics) some frames later; there are none if the device has no timestamps inside
     /// passes.
@@ -346,7 +365,7 @@ impl ViewRenderer {
             self.statistics.passes.clear();
         } else if self.timing.is_none() {
             let allocator = renderer.allocator(device);
-            self.timing = PassTimer::new(allocator, queue, self.design.timed_passes()).map(|timer| {
+            self.timing = PassTimer::new(allocator, queue, self.timed_passes()).map(|timer| {
                 let size = timer.resolved().size();
                 (timer, Readback::new(allocator, "gs4d timestamp readback", size))
             });
@@ -377,6 +396,11 @@ impl ViewRenderer {
     /// Returns the textures behind [`color`](Self::color) and [`depth`](Self::depth).
     pub(crate) fn textures(&self) -> Option<(&wgpu::Texture, Option<&wgpu::Texture>)> {
         self.resources.as_ref().map(|made| (&made.color, self.has_depths.then_some(&made.depth)))
+    }
+
+    /// Returns the texture behind [`motion`](Self::motion), and the size of the picture in it.
+    pub(crate) fn motion_texture(&self) -> Option<(&wgpu::Texture, UVec2)> {
+        self.motion.as_ref().map(|motion| (&motion.texture, self.picture))
     }
 
     /// Returns the resources of the frame recorded last; `None` before the first [`prepare`](Self::prepare).
@@ -429,6 +453,7 @@ impl ViewRenderer {
     /// Frees the working buffers and targets; the next [`prepare`](Self::prepare) creates them again.
     pub fn release(&mut self) {
         self.resources = None;
+        self.motion = None;
         self.pairs_wanted = 0;
         self.short_of_room = false;
         self.bin_room = BinRoom::default();
@@ -560,6 +585,9 @@ impl ViewRenderer {
             binning: self.binning(&made.sizes, 0),
         };
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
+        if let Some(motion) = &self.motion {
+            motion.write(queue, &frame, instances, parameters.previous.unwrap_or_default(), self.alignment);
+        }
         self.instance_uniforms = uniforms;
     }
 }

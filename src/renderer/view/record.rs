@@ -50,6 +50,7 @@ impl ViewRenderer {
             Some(fast) => self.record_fast(renderer, made, fast, &mut pass, instances, timer),
             None => self.record_reference(renderer, made, &mut pass, instances, timer),
         }
+        self.record_motion(renderer, made, &mut pass, instances, timer);
         drop(pass);
         let (counters, offset) = self.counters();
         let counters = counters.clone();

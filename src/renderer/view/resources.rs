@@ -29,8 +29,8 @@ pub(super) struct Resources {
     pub depth: wgpu::Texture,
     pub depth_view: wgpu::TextureView,
     /// What the bind group of the pixels was created for: opaque depth, environment map. The targets are of these pixels.
-    opaque: wgpu::TextureView,
-    environment: wgpu::Buffer,
+    pub opaque: wgpu::TextureView,
+    pub environment: wgpu::Buffer,
     pub pixels: Pixels,
     pub project: wgpu::BindGroup,
     /// Bind groups from the projected keys into the first pair of buffers, from there into the second, and back.
@@ -252,7 +252,7 @@ impl Resources {
 }
 
 /// Creates the bind group of the pixels: opaque depth, color, depth.
-fn pixel_group(
+pub(super) fn pixel_group(
     allocator: Allocator<'_>,
     layout: &wgpu::BindGroupLayout,
     frame: &wgpu::Buffer,
@@ -264,7 +264,8 @@ fn pixel_group(
     allocator.bind_group("gs4d pixel", layout, &resources)
 }
 
-fn texture_bytes(texture: &wgpu::Texture) -> u64 {
+/// Returns the bytes of a texture without mip levels.
+pub(super) fn texture_bytes(texture: &wgpu::Texture) -> u64 {
     let texel = texture.format().block_copy_size(None).unwrap_or(0);
     u64::from(texture.width()) * u64::from(texture.height()) * u64::from(texel)
 }

@@ -1,0 +1,82 @@
+// motion: how far each visible splat of one part has moved on the screen since the frame before.
+// In: splats, their Gaussians, the view one frame before. Out: motions, in pixels to the right and down, in place of the colors of the
+// splats, which have been blended: the last pass runs again and blends them as it has blended colors. CPU reference:
+// src/reference/motion.rs.
+#import gs4d::types::MotionUniforms
+#import gs4d::capture::{instance, load_gaussian}
+#ifdef COPIED_INSTANCE
+#import gs4d::capture::instances
+#endif
+#ifdef BINNED
+#import gs4d::types::{SplatShape, VisibleSplat, BIN_COUNTERS}
+#else
+#import gs4d::types::{SplatRecord, INVISIBLE}
+#import gs4d::capture::index_of
+#endif
+
+const THREADS: u32 = 256u;
+
+@group(0) @binding(1) var<uniform> before: MotionUniforms;
+#ifdef BINNED
+@group(0) @binding(2) var<storage, read> bins: array<u32>;
+@group(0) @binding(3) var<storage, read> visible: array<VisibleSplat>;
+@group(0) @binding(4) var<storage, read> splats: array<SplatShape>;
+// By slot.
+@group(0) @binding(5) var<storage, read_write> splat_colors: array<vec4<f32>>;
+#else
+@group(0) @binding(2) var<storage, read> depth_keys: array<u32>;
+@group(0) @binding(3) var<storage, read_write> splats: array<SplatRecord>;
+#endif
+
+// Returns the motion of the splat of a Gaussian, whose center is there now.
+fn motion_of(index: u32, center: vec2<f32>) -> vec2<f32> {
+    let g = load_gaussian(index);
+    let mean = vec4(g.mean + g.velocity * (before.time - g.mean_t), 1.0);
+    let depth = dot(before.camera_z, mean);
+    // Written so that NaN has no motion; nor has what was not on the screen.
+    if !(depth > before.near) {
+        return vec2(0.0);
+    }
+    let parallel = instance.orthographic != 0u;
+    let ndc = vec2(dot(before.clip_x, mean), dot(before.clip_y, mean)) / select(depth + 1e-7, 1.0, parallel);
+    let size = vec2<f32>(instance.size);
+    // As `project` places it.
+    let center_before = ((ndc + 1.0) * size - 1.0) * 0.5;
+    // What comes from outside the picture has no place in the one before: the whole picture is far enough.
+    return clamp(center - center_before, -size, size);
+}
+
+#ifdef BINNED
+@compute @workgroup_size(THREADS)
+fn motion(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) thread: u32,
+) {
+#ifdef COPIED_INSTANCE
+    instance = instances[group.z];
+#endif
+    let count = bins[BIN_COUNTERS + instance.binning.z];
+    for (var i = group.x * THREADS + thread; i < count; i += groups.x * THREADS) {
+        let words = visible[instance.first_slot + i].words;
+        splat_colors[words.x] = vec4(motion_of(words.y, splats[words.x].place.xy), 0.0, 0.0);
+    }
+}
+#else
+@compute @workgroup_size(THREADS)
+fn motion(@builtin(global_invocation_id) id: vec3<u32>) {
+#ifdef COPIED_INSTANCE
+    instance = instances[id.z];
+#endif
+    if id.x >= instance.count {
+        return;
+    }
+    let slot = instance.first_slot + id.x;
+    if depth_keys[slot] == INVISIBLE {
+        return;
+    }
+    let moved = motion_of(index_of(id.x), splats[slot].place.xy);
+    // The last word is of the tiles.
+    splats[slot].color = vec4(bitcast<vec2<u32>>(moved), 0u, splats[slot].color.w);
+}
+#endif

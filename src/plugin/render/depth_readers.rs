@@ -1,0 +1,57 @@
+//! Depth readers: which cameras have effects that read depths after the main pass.
+//!
+//! In (main world): cameras with all their components. Out (render world): [`DepthReaders`], for which
+//! [`DepthWrite::Auto`](super::DepthWrite::Auto) writes depths.
+//!
+//! Most of these effects belong to crates that this one does not depend on: they are found by the paths of their types.
+
+use super::settings::DepthWrite;
+use bevy::camera::Camera;
+use bevy::core_pipeline::prepass::MotionVectorPrepass;
+use bevy::ecs::query::With;
+use bevy::ecs::reflect::AppTypeRegistry;
+use bevy::ecs::resource::Resource;
+use bevy::ecs::system::{Local, Query, Res, ResMut};
+use bevy::ecs::world::EntityRef;
+use bevy::render::Extract;
+use bevy::render::sync_world::{MainEntity, MainEntityHashSet};
+use std::any::TypeId;
+
+/// Components of cameras whose effects read the depth buffer after the main pass, beside those that read motion vectors.
+const READERS: [&str; 2] = ["bevy_post_process::dof::DepthOfField", "bevy_light::volumetric::VolumetricFog"];
+
+/// Cameras that have such an effect.
+#[derive(Resource, Default)]
+pub(super) struct DepthReaders(MainEntityHashSet);
+
+impl DepthReaders {
+    /// Returns which depth is written for a camera that asks for this one: never [`DepthWrite::Auto`].
+    pub(super) fn resolve(&self, camera: &MainEntity, asked: DepthWrite) -> DepthWrite {
+        match asked {
+            DepthWrite::Auto if self.0.contains(camera) => DepthWrite::Expected,
+            DepthWrite::Auto => DepthWrite::None,
+            chosen @ (DepthWrite::None | DepthWrite::Expected | DepthWrite::Median) => chosen,
+        }
+    }
+}
+
+/// Finds those cameras.
+pub(super) fn extract_depth_readers(
+    mut readers: ResMut<DepthReaders>,
+    mut known: Local<[Option<TypeId>; READERS.len()]>,
+    registry: Extract<Res<AppTypeRegistry>>,
+    cameras: Extract<Query<EntityRef, With<Camera>>>,
+) {
+    if known.contains(&None) {
+        // A game without an effect may not have its type either.
+        let registry = registry.read();
+        for (id, path) in known.iter_mut().zip(READERS) {
+            *id = registry.get_with_type_path(path).map(|found| found.type_id());
+        }
+    }
+    let reads = |camera: &EntityRef<'_>| {
+        camera.contains::<MotionVectorPrepass>() || known.iter().flatten().any(|id| camera.contains_type_id(*id))
+    };
+    readers.0.clear();
+    readers.0.extend(cameras.iter().filter(reads).map(|camera| MainEntity::from(camera.id())));
+}

@@ -1,0 +1,99 @@
+//! Previous: where captures and cameras were one frame before, and when.
+//!
+//! In: the captures of each frame, before they are replaced by those of the next; the pose of a camera. Out: the view of a capture one frame
+//! before, by which the renderer finds how far it has moved on the screen.
+//!
+//! Splats move with the time of their capture. After a jump in time (a seek, the start of a loop, a cut) they have no motion that could be
+//! seen: the transform of the capture and the camera still have theirs.
+
+use super::extract::{ExtractedCapture, ExtractedCaptures};
+use super::view::CameraLens;
+use crate::plugin::component::GaussianCapture;
+use crate::view::View;
+use bevy::asset::AssetId;
+use bevy::ecs::resource::Resource;
+use bevy::ecs::system::{Res, ResMut};
+use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
+use glam::Affine3A;
+
+/// Seconds of a capture in one frame from which on its time has jumped: Bevy's longest step of time, at the normal speed.
+const LONGEST_STEP: f32 = 0.25;
+/// A step is a jump, too, if it is longer than this many of the one before: shorter loops have none.
+const STEPS: f32 = 8.0;
+
+/// The captures of the frame before. The memory is kept from frame to frame.
+#[derive(Resource, Default)]
+pub(super) struct PreviousCaptures(MainEntityHashMap<PreviousCapture>);
+
+struct PreviousCapture {
+    asset: AssetId<GaussianCapture>,
+    world_from_capture: Affine3A,
+    /// Seconds since the capture's start, and by how much that was more than in the frame before it.
+    seconds: f32,
+    step: f32,
+}
+
+/// Where a camera is, and its lens, without the jitter of temporal anti-aliasing.
+#[derive(Clone, Copy)]
+pub(super) struct CameraPose {
+    pub(super) lens: CameraLens,
+    pub(super) world_from_camera: Affine3A,
+}
+
+/// Keeps the captures of the frame before, which are about to be extracted anew.
+pub(super) fn keep_previous_captures(mut previous: ResMut<PreviousCaptures>, extracted: Res<ExtractedCaptures>) {
+    previous.0.retain(|entity, _| extracted.0.contains_key(entity));
+    for (entity, placed) in &extracted.0 {
+        let ExtractedCapture { asset, world_from_capture, seconds, .. } = *placed;
+        let before = previous.0.get(entity).filter(|before| before.asset == asset);
+        let step = before.map_or(0.0, |before| seconds - before.seconds);
+        previous.0.insert(*entity, PreviousCapture { asset, world_from_capture, seconds, step });
+    }
+}
+
+impl PreviousCaptures {
+    /// Returns the view of a capture one frame before: `now` is its view in this frame, `pose` the camera of then, `time_at` returns its
+    /// timestamp for its seconds. What was not there then was where it is now.
+    pub(super) fn view(
+        &self,
+        entity: &MainEntity,
+        placed: &ExtractedCapture,
+        now: &View,
+        pose: &CameraPose,
+        time_at: impl Fn(f32) -> Option<f32>,
+    ) -> View {
+        let before = self.0.get(entity).filter(|before| before.asset == placed.asset);
+        let world_from_capture = before.map_or(placed.world_from_capture, |before| before.world_from_capture);
+        let steady = before.filter(|before| !is_jump(placed.seconds - before.seconds, before.step));
+        let time = steady.and_then(|before| time_at(before.seconds)).unwrap_or(now.time);
+        pose.lens.view(now.size, time, pose.world_from_camera, world_from_capture).unwrap_or(*now)
+    }
+}
+
+/// Returns whether a step of so many seconds, after one of `before`, is a jump.
+fn is_jump(step: f32, before: f32) -> bool {
+    let most = if before == 0.0 { LONGEST_STEP } else { LONGEST_STEP.min(STEPS * before.abs()) };
+    step.is_nan() || step.abs() > most
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_are_told_from_jumps() {
+        for (step, before, jump) in [
+            (0.016, 0.016, false),
+            (0.0, 0.016, false),
+            (0.016, 0.0, false),
+            (0.1, 0.016, false),
+            (-0.016, 0.016, false),
+            (-0.184, 0.016, true),
+            (0.3, 0.0, true),
+            (0.3, 0.3, true),
+            (f32::NAN, 0.016, true),
+        ] {
+            assert_eq!(is_jump(step, before), jump, "{step} s after {before} s");
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! `write_motion`: writes the motion of captures to the camera's motion vectors, and their depth to that of its prepass, for
+//! post-processing that follows pixels from frame to frame.
+//!
+//! In: a view's captures (motions with transmittance, depths) and its lens. Out: pipeline and bind group for
+//! `shaders/write_motion.wgsl`, for cameras with Bevy's prepasses of depth and motion vectors.
+
+use super::composite::CaptureShaders;
+use crate::renderer::WorkCounters;
+use bevy::asset::Handle;
+use bevy::core_pipeline::FullscreenShader;
+use bevy::core_pipeline::core_3d::CORE_3D_DEPTH_FORMAT;
+use bevy::core_pipeline::prepass::MOTION_VECTOR_PREPASS_FORMAT;
+use bevy::ecs::resource::Resource;
+use bevy::ecs::world::{FromWorld, World};
+use bevy::render::render_resource::binding_types::{texture_2d, uniform_buffer};
+use bevy::render::render_resource::{
+    BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, BindingResource, ColorTargetState,
+    ColorWrites, CompareFunction, DepthBiasState, DepthStencilState, FragmentState, MultisampleState, PipelineCache,
+    RenderPipelineDescriptor, ShaderStages, SpecializedRenderPipeline, StencilState, TextureSampleType, VertexState,
+};
+use bevy::render::renderer::RenderDevice;
+use bevy::shader::Shader;
+use glam::{UVec4, Vec4};
+
+/// The parts that the pipelines for all prepasses share.
+#[derive(Resource)]
+pub(super) struct WriteMotionPipeline {
+    layout: BindGroupLayoutDescriptor,
+    vertex: VertexState,
+    shader: Handle<Shader>,
+}
+
+/// The properties of a prepass that its pipeline depends on, and the depth to write.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) struct WriteMotionKey {
+    /// Samples of the prepass.
+    pub(super) samples: u32,
+    /// Whether the median depth is written instead of the expected one.
+    pub(super) median: bool,
+}
+
+impl FromWorld for WriteMotionPipeline {
+    fn from_world(world: &mut World) -> Self {
+        let texture = || texture_2d(TextureSampleType::Float { filterable: false });
+        let entries = (texture(), texture(), uniform_buffer::<UVec4>(false), uniform_buffer::<Vec4>(false));
+        let entries = BindGroupLayoutEntries::sequential(ShaderStages::FRAGMENT, entries);
+        Self {
+            layout: BindGroupLayoutDescriptor::new("gs4d write_motion", &entries),
+            vertex: world.resource::<FullscreenShader>().to_vertex_state(),
+            shader: world.resource::<CaptureShaders>().write_motion.clone(),
+        }
+    }
+}
+
+impl SpecializedRenderPipeline for WriteMotionPipeline {
+    type Key = WriteMotionKey;
+
+    fn specialize(&self, key: WriteMotionKey) -> RenderPipelineDescriptor {
+        let target =
+            ColorTargetState { format: MOTION_VECTOR_PREPASS_FORMAT, blend: None, write_mask: ColorWrites::ALL };
+        RenderPipelineDescriptor {
+            label: Some("gs4d write_motion".into()),
+            layout: vec![self.layout.clone()],
+            vertex: self.vertex.clone(),
+            depth_stencil: Some(DepthStencilState {
+                format: CORE_3D_DEPTH_FORMAT,
+                depth_write_enabled: Some(true),
+                // Reverse-z: nearer is greater.
+                depth_compare: Some(CompareFunction::GreaterEqual),
+                stencil: StencilState::default(),
+                bias: DepthBiasState::default(),
+            }),
+            multisample: MultisampleState { count: key.samples, ..MultisampleState::default() },
+            fragment: Some(FragmentState {
+                shader: self.shader.clone(),
+                shader_defs: if key.median { vec!["MEDIAN".into()] } else { Vec::new() },
+                entry_point: Some("fragment".into()),
+                targets: vec![Some(target)],
+            }),
+            ..RenderPipelineDescriptor::default()
+        }
+    }
+}
+
+/// What one view binds.
+#[derive(Default)]
+pub(super) struct WriteMotionBindings {
+    group: Option<CachedGroup>,
+}
+
+struct CachedGroup {
+    motions: wgpu::TextureView,
+    depths: wgpu::TextureView,
+    group: BindGroup,
+}
+
+impl WriteMotionBindings {
+    /// Releases the targets that were bound.
+    pub(super) fn forget(&mut self) {
+        self.group = None;
+    }
+
+    /// Returns the bind group for the targets of a view, its viewport and its lens.
+    pub(super) fn group(
+        &mut self,
+        device: &RenderDevice,
+        cache: &PipelineCache,
+        pipeline: &WriteMotionPipeline,
+        [viewport, distance]: [BindingResource<'_>; 2],
+        [motions, depths]: [&wgpu::TextureView; 2],
+        work: &WorkCounters,
+    ) -> Option<&BindGroup> {
+        if self.group.as_ref().is_none_or(|known| known.motions != *motions || known.depths != *depths) {
+            let layout = cache.get_bind_group_layout(&pipeline.layout);
+            let entries = BindGroupEntries::sequential((motions, depths, viewport, distance));
+            let group = device.create_bind_group("gs4d write_motion", &layout, &entries);
+            work.add_created();
+            self.group = Some(CachedGroup { motions: motions.clone(), depths: depths.clone(), group });
+        }
+        self.group.as_ref().map(|known| &known.group)
+    }
+}
