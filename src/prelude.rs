@@ -27,8 +27,8 @@ pub use crate::plugin::asset::{CaptureFailed, CaptureReady, CaptureState};
 pub use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 pub use crate::plugin::picking::{CaptureHit, CapturePicker};
 pub use crate::plugin::playback::{
-    FollowsClock, KeyFrameCrossed, MarkerReached, Playback, PlaybackClock, PlaybackEnded, PlaybackLooped,
-    PlaybackPaused, PlaybackSeeked, PlaybackStarted, Repeat, Timeline, TimelinePlayer, TimelineTrack,
+    FollowsClock, MarkerReached, Markers, Playback, PlaybackClock, PlaybackEnded, PlaybackLooped, PlaybackPaused,
+    PlaybackSeeked, PlaybackStarted, Repeat, SegmentBoundCrossed, Timeline, TimelinePlayer, TimelineTrack,
 };
 pub use crate::plugin::render::{
     CaptureSettings, CaptureStatistics, CaptureUploadBudget, CaptureViewSettings, CropBox, DepthWrite,

@@ -23,7 +23,7 @@ fn time(app: &App, entity: Entity) -> f32 {
 }
 
 fn crossed(entity: Entity, indices: &[u32]) -> Vec<String> {
-    indices.iter().map(|&index| debug(&KeyFrameCrossed { entity, index, time: index as f32 / 2.0 })).collect()
+    indices.iter().map(|&index| debug(&SegmentBoundCrossed { entity, index, time: index as f32 / 2.0 })).collect()
 }
 
 #[test]

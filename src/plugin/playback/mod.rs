@@ -22,6 +22,7 @@ mod advance;
 mod clock;
 mod component;
 mod drive;
+mod markers;
 mod messages;
 mod plugin;
 mod repeat;
@@ -33,13 +34,13 @@ mod timeline;
 
 pub use clock::{ClockSource, FollowsClock, PlaybackClock};
 pub use component::Playback;
+pub use markers::{Marker, Markers};
 pub use messages::{
-    KeyFrameCrossed, MarkerReached, PlaybackEnded, PlaybackLooped, PlaybackPaused, PlaybackSeeked, PlaybackStarted,
+    MarkerReached, PlaybackEnded, PlaybackLooped, PlaybackPaused, PlaybackSeeked, PlaybackStarted, SegmentBoundCrossed,
 };
 pub(crate) use plugin::PlaybackPlugin;
 pub use repeat::Repeat;
 pub use systems::PlaybackSystems;
 pub use timeline::{
-    Clip, ClipFade, InvalidTimeline, Marker, Timeline, TimelineError, TimelineLoader, TimelinePlayer, TimelineTrack,
-    Track,
+    Clip, ClipFade, InvalidTimeline, Timeline, TimelineError, TimelineLoader, TimelinePlayer, TimelineTrack, Track,
 };
