@@ -30,6 +30,8 @@ pub use crate::plugin::playback::{
     FollowsClock, MarkerReached, Markers, Playback, PlaybackClock, PlaybackEnded, PlaybackLooped, PlaybackPaused,
     PlaybackSeeked, PlaybackStarted, Repeat, SegmentBoundCrossed, Timeline, TimelinePlayer, TimelineTrack,
 };
+#[cfg(feature = "picking")]
+pub use crate::plugin::pointer::{CapturePickingCamera, CapturePickingSettings};
 pub use crate::plugin::render::{
     CaptureSettings, CaptureStatistics, CaptureUploadBudget, CaptureViewSettings, CropBox, DepthWrite,
 };
