@@ -6,11 +6,13 @@
 
 use crate::support::event_log::{Observed, record, take_events};
 use crate::support::pth::Pth;
+use bevy::app::SubApp;
 use bevy::asset::AssetLoadFailedEvent;
 use bevy::asset::io::memory::{Dir, MemoryAssetReader};
 use bevy::asset::io::{AssetReader, AssetReaderError, AssetSourceBuilder, PathStream, Reader};
 use bevy::asset::saver::{SaveAssetError, SavedAsset, save_using_saver};
 use bevy::prelude::*;
+use bevy::render::RenderApp;
 use bevy::tasks::block_on;
 use bevy_gs4d::asset::{
     CaptureFailed, CaptureReady, CaptureSaveError, CaptureState, GaussianCapture, PackageSaver, PackageSaverSettings,
@@ -502,4 +504,14 @@ fn stereo_may_be_added_again_before_and_after() {
         app.update();
         assert!(app.is_plugin_added::<StereoPlugin>(), "the game's plugin is accepted");
     }
+}
+
+#[test]
+#[should_panic(expected = "Bevy's RenderPlugin was added after GaussianCapturePlugin")]
+fn with_a_late_renderer_the_plugin_names_the_remedy() {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), GaussianCapturePlugin));
+    // As RenderPlugin does.
+    app.insert_sub_app(RenderApp, SubApp::new());
+    app.finish();
 }

@@ -13,6 +13,7 @@ mod golden;
 mod inspector;
 mod picking;
 mod playback;
+mod pointer;
 mod steady;
 mod stereo;
 mod timeline;
