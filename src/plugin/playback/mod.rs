@@ -14,6 +14,8 @@
 //!  Time ──────────────────────▶ Playback::time         Advance
 //! ```
 //!
+//! A playback follows a clock or another player ([`FollowsClock`]); [`Markers`] give one capture the named moments that a timeline has.
+//!
 //! Bevy's own animations may animate any field of a [`Playback`] but `repeat` through `animated_field!(Playback::speed)`. They run in
 //! `PostUpdate`: the `time` that they set on a capture is drawn in the same frame; other fields, and every field of a
 //! [`TimelinePlayer`]'s playback, take effect in the next frame.
