@@ -158,7 +158,7 @@ mod tests {
         let mut told = Told::default();
         let id = AssetId::default();
         let mut is_new = |error| told.is_new(id, error);
-        assert_eq!(["cut off", "cut off", "cut off"].map(&mut is_new), [true, false, false], "however often it is tried");
+        assert_eq!(["cut off"; 3].map(&mut is_new), [true, false, false], "however often it is tried");
         assert_eq!(["gone", "gone", "cut off"].map(&mut is_new), [true, false, true], "another one is told");
         told.succeeded(id);
         assert!(told.is_new(id, "cut off"), "and the same one after a success");

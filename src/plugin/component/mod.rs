@@ -24,7 +24,8 @@ use bevy::transform::components::Transform;
 /// Places a capture in the world.
 ///
 /// The entity's transform (translation, rotation, any scale) maps capture space to the world. Most captures have +z up: [`Upright`] stands
-/// them upright. A perspective camera draws nothing that is nearer than 0.2 units *of the capture*, as in training; an orthographic camera draws from its near plane on.
+/// them upright. A perspective camera draws nothing that is nearer than 0.2 units *of the capture*, as in training; an orthographic camera
+/// draws from its near plane on.
 ///
 /// [`Visibility`], `RenderLayers` and frustum culling decide which cameras draw the capture, as they do for meshes. The entity's
 /// `Aabb` encloses what is drawn at the current time. A capture with an environment map surrounds every camera: it has no `Aabb`

@@ -45,7 +45,7 @@ impl Shown {
 
 /// Why an entity cannot follow another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Obstacle {
+enum Obstacle {
     /// The other does not exist.
     Missing,
     /// It shows no time.

@@ -44,7 +44,8 @@ pub(super) fn update_hits(
             is_seen && matters && (pickable.is_some() || !settings.require_markers)
         };
         let blocks = |capture: Entity| {
-            captures.get(capture).is_ok_and(|(_, pickable, _)| pickable.is_none_or(|pickable| pickable.should_block_lower))
+            let Ok((_, pickable, _)) = captures.get(capture) else { return false };
+            pickable.is_none_or(|pickable| pickable.should_block_lower)
         };
         let picks: Vec<(Entity, HitData)> = picker
             .cast_through(*ray, |capture, _| takes_part(capture), blocks)

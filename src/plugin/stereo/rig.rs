@@ -13,7 +13,8 @@ use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 use bevy::transform::components::Transform;
 
-/// A head. [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) places its children with an [`Eye`] on either side of it; the game sets its own transform.
+/// A head. [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) places its children with an [`Eye`] on either side of it; the game
+/// sets its own transform.
 ///
 /// # Examples
 ///
