@@ -11,6 +11,7 @@ mod common;
 use bevy::core_pipeline::tonemapping::{DebandDither, Tonemapping};
 use bevy::prelude::*;
 use bevy_gs4d::asset::GaussianCapture;
+use bevy_gs4d::component::Upright;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin, testing};
 use common::Orbit;
@@ -54,7 +55,7 @@ fn parse_size(text: &str) -> Option<UVec2> {
 }
 
 fn setup(mut commands: Commands, assets: Res<AssetServer>, capture: Res<Capture>) {
-    commands.spawn(GaussianCapture3d(assets.load(capture.0.clone())));
+    commands.spawn((GaussianCapture3d(assets.load(capture.0.clone())), Upright));
     commands.spawn((
         Camera3d::default(),
         Msaa::Off,
@@ -67,12 +68,11 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>, capture: Res<Capture>
 fn orbit(
     captures: Res<Assets<GaussianCapture>>,
     mut orbit: Local<Option<Orbit>>,
-    capture: Single<(&GaussianCapture3d, &Playback, &mut Transform), Without<Camera3d>>,
+    capture: Single<(&GaussianCapture3d, &Playback)>,
     mut camera: Single<&mut Transform, With<Camera3d>>,
 ) {
-    let (handle, playback, mut transform) = capture.into_inner();
+    let (handle, playback) = capture.into_inner();
     let Some(loaded) = captures.get(&handle.0) else { return };
-    transform.rotation = loaded.upright();
     let turn = playback.time / loaded.duration_seconds().max(f32::MIN_POSITIVE);
     let orbit = *orbit.get_or_insert_with(|| Orbit::around(loaded));
     **camera = Orbit { yaw: orbit.yaw + TAU * turn, ..orbit }.transform();

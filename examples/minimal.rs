@@ -13,8 +13,8 @@ mod arguments;
 use arguments::Arguments;
 use bevy::asset::UnapprovedPathMode;
 use bevy::prelude::*;
+use bevy_gs4d::component::Upright;
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin, testing};
-use std::f32::consts::FRAC_PI_2;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -23,11 +23,8 @@ use std::time::Duration;
 struct Capture(PathBuf);
 
 fn setup(mut commands: Commands, assets: Res<AssetServer>, capture: Res<Capture>) {
-    commands.spawn((
-        GaussianCapture3d(assets.load(capture.0.clone())),
-        // The capture has +z up, Bevy +y.
-        Transform::from_rotation(Quat::from_rotation_x(-FRAC_PI_2)),
-    ));
+    // Most captures have +z up, Bevy +y.
+    commands.spawn((GaussianCapture3d(assets.load(capture.0.clone())), Upright));
     commands.spawn((
         Camera3d::default(),
         // Captures are no smoother for multisampling. With it, transparent meshes would be drawn before captures, not over them.

@@ -24,6 +24,7 @@ use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_egui::input::{egui_wants_any_keyboard_input, egui_wants_any_pointer_input};
 use bevy_gs4d::asset::GaussianCapture;
+use bevy_gs4d::component::Upright;
 use bevy_gs4d::inspector::{Inspector, InspectorPlugin};
 use bevy_gs4d::picking::CapturePicker;
 use bevy_gs4d::playback::Playback;
@@ -87,7 +88,7 @@ fn setup(
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
 ) {
-    commands.spawn(GaussianCapture3d(assets.load(capture.0.clone())));
+    commands.spawn((GaussianCapture3d(assets.load(capture.0.clone())), Upright));
     let sphere = Mesh3d(meshes.add(Sphere::new(1.0).mesh().uv(48, 24)));
     let violet = materials.add(StandardMaterial::from(Color::srgb(0.45, 0.25, 0.8)));
     commands.spawn((Ball, sphere.clone(), MeshMaterial3d(violet), Visibility::Hidden));
@@ -110,18 +111,16 @@ fn setup(
     }
 }
 
-/// Stands a capture that has just been loaded upright, points the camera at it, and puts the ball into its middle.
+/// Points the camera at a capture that has just been loaded, and puts the ball into its middle.
 fn frame_capture(
     captures: Res<Assets<GaussianCapture>>,
     mut framed: Local<Option<AssetId<GaussianCapture>>>,
-    capture: Single<(&GaussianCapture3d, &mut Transform), Without<Ball>>,
+    capture: Single<&GaussianCapture3d>,
     mut orbit: Single<&mut Orbit>,
     ball: Single<(&mut Transform, &mut Visibility), With<Ball>>,
 ) {
-    let (handle, mut transform) = capture.into_inner();
-    let Some(loaded) = captures.get(&handle.0).filter(|_| *framed != Some(handle.0.id())) else { return };
-    *framed = Some(handle.0.id());
-    transform.rotation = loaded.upright();
+    let Some(loaded) = captures.get(&capture.0).filter(|_| *framed != Some(capture.0.id())) else { return };
+    *framed = Some(capture.0.id());
     **orbit = Orbit::around(loaded);
     let (mut place, mut visibility) = ball.into_inner();
     *place = Transform::from_translation(orbit.center).with_scale(Vec3::splat(orbit.distance * 0.08));

@@ -40,7 +40,7 @@ use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::prelude::*;
 use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::scene::Bounds;
-use bevy_gs4d::stereo::{EyeTargets, StereoPlugin, StereoRig, spawn_stereo};
+use bevy_gs4d::stereo::{EyeTargets, StereoRig, spawn_stereo};
 use bevy_gs4d::testing::{self, Offscreen};
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
 use body::{Body, EYE_HEIGHT, Head, Moves, START};
@@ -109,7 +109,7 @@ fn main() -> Result {
 
 /// Adds the scene, with or without a window, and the path. `playing`: whether it is followed from the start.
 fn scene(app: &mut App, capture: Capture, path: HeadPath, playing: bool) {
-    app.add_plugins((GaussianCapturePlugin, StereoPlugin, ComfortPlugin))
+    app.add_plugins((GaussianCapturePlugin, ComfortPlugin))
         .insert_resource(capture)
         .insert_resource(path)
         .insert_resource(PathPlayer { playing, seconds: 0.0 })

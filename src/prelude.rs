@@ -8,8 +8,7 @@
 //! use bevy_gs4d::prelude::*;
 //!
 //! fn setup(mut commands: Commands, assets: Res<AssetServer>) {
-//!     let once = Playback { repeat: Repeat::Once, ..default() };
-//!     commands.spawn((GaussianCapture3d(assets.load("toybox.gs4d")), once));
+//!     commands.spawn((GaussianCapture3d(assets.load("toybox.gs4d")), Upright, Playback::once()));
 //!     commands.spawn((Camera3d::default(), Transform::from_xyz(0.0, 1.0, 4.0)));
 //! }
 //!
@@ -24,14 +23,16 @@
 
 pub use crate::plugin::GaussianCapturePlugin;
 pub use crate::plugin::asset::{CaptureFailed, CaptureReady, CaptureState};
-pub use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
+pub use crate::plugin::component::{GaussianCapture, GaussianCapture3d, Upright};
 #[cfg(feature = "pbr")]
 pub use crate::plugin::pbr::{CaptureContactShadow, CaptureLight, CastsShadows, ReceivesShadows, ShadowResolution};
 pub use crate::plugin::picking::{CaptureHit, CapturePicker};
 pub use crate::plugin::playback::{
-    FollowsClock, KeyFrameCrossed, MarkerReached, Playback, PlaybackClock, PlaybackEnded, PlaybackLooped,
-    PlaybackPaused, PlaybackSeeked, PlaybackStarted, Repeat, Timeline, TimelinePlayer, TimelineTrack,
+    FollowsClock, MarkerReached, Markers, Playback, PlaybackClock, PlaybackEnded, PlaybackLooped, PlaybackPaused,
+    PlaybackSeeked, PlaybackStarted, Repeat, SegmentBoundCrossed, Timeline, TimelinePlayer, TimelineTrack,
 };
+#[cfg(feature = "picking")]
+pub use crate::plugin::pointer::{CapturePickingCamera, CapturePickingSettings};
 pub use crate::plugin::render::{
     CaptureSettings, CaptureStatistics, CaptureUploadBudget, CaptureViewSettings, CropBox, DepthWrite,
 };

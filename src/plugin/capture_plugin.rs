@@ -6,10 +6,17 @@
 use super::asset::CaptureAssetPlugin;
 use super::playback::PlaybackPlugin;
 use super::render::CaptureRenderPlugin;
+use super::stereo::StereoPlugin;
 use bevy::app::{App, Plugin};
+use bevy::asset::AssetServer;
+use bevy::time::Time;
 
-/// Loads, plays and draws captures. Add it after `DefaultPlugins`, and spawn [`GaussianCapture3d`](crate::GaussianCapture3d)s. Cameras
+/// Loads, plays and draws captures. Add it once, after `DefaultPlugins`, and spawn [`GaussianCapture3d`](crate::GaussianCapture3d)s. Cameras
 /// need no component for captures.
+///
+/// # Panics
+/// When it is added twice, or before the plugins that it needs: Bevy's `AssetPlugin` and, if the app has one, `RenderPlugin`; and when the
+/// app starts without `TimePlugin`. The message names the remedy.
 ///
 /// # Examples
 ///
@@ -24,8 +31,35 @@ pub struct GaussianCapturePlugin;
 
 impl Plugin for GaussianCapturePlugin {
     fn build(&self, app: &mut App) {
+        assert!(
+            !app.is_plugin_added::<Self>(),
+            "GaussianCapturePlugin was added twice: remove one of them. Another plugin of the game may add it, too"
+        );
+        assert!(
+            app.world().contains_resource::<AssetServer>(),
+            "GaussianCapturePlugin needs Bevy's AssetPlugin, which was not added before it: add GaussianCapturePlugin \
+             after DefaultPlugins or, in an app without them, after AssetPlugin"
+        );
         app.add_plugins((CaptureAssetPlugin, PlaybackPlugin, CaptureRenderPlugin));
+        if !app.is_plugin_added::<StereoPlugin>() {
+            app.add_plugins(StereoPlugin);
+        }
         #[cfg(feature = "pbr")]
         app.add_plugins(super::pbr::CapturePbrPlugin);
+        #[cfg(feature = "picking")]
+        app.add_plugins(super::pointer::CapturePointerPlugin);
+    }
+
+    fn finish(&self, app: &mut App) {
+        assert!(
+            app.world().contains_resource::<Time>(),
+            "GaussianCapturePlugin needs Bevy's TimePlugin, which this app does not have: add DefaultPlugins or \
+             MinimalPlugins, or TimePlugin itself"
+        );
+    }
+
+    /// A second one is refused by [`build`](Self::build), which says what to do.
+    fn is_unique(&self) -> bool {
+        false
     }
 }

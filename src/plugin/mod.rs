@@ -15,10 +15,11 @@
 //! * `pbr` (feature `pbr`): captures among Bevy's lit meshes
 //! * [`picking`]: the Gaussian that a ray hits
 //! * [`stereo`]: two eyes on one head
+//! * `pointer` (feature `picking`): pointer events on captures
 //! * `inspector` (feature `inspector`): a panel that shows and edits captures
 //! * `testing` (feature `testing`): apps without a window, drawn into pictures
 //!
-//! [`GaussianCapturePlugin`] adds the first five to an app. Picking needs no plugin; stereo and the inspector have their own.
+//! [`GaussianCapturePlugin`] adds all of them to an app but the inspector, which has a plugin of its own. Picking needs none, testing neither.
 
 pub mod asset;
 mod capture_plugin;
@@ -29,6 +30,8 @@ pub mod inspector;
 pub mod pbr;
 pub mod picking;
 pub mod playback;
+#[cfg(feature = "picking")]
+pub mod pointer;
 pub mod render;
 pub mod stereo;
 #[cfg(feature = "testing")]

@@ -6,10 +6,13 @@
 
 use crate::support::event_log::{Observed, record, take_events};
 use crate::support::pth::Pth;
+use bevy::app::SubApp;
+use bevy::asset::AssetLoadFailedEvent;
 use bevy::asset::io::memory::{Dir, MemoryAssetReader};
 use bevy::asset::io::{AssetReader, AssetReaderError, AssetSourceBuilder, PathStream, Reader};
 use bevy::asset::saver::{SaveAssetError, SavedAsset, save_using_saver};
 use bevy::prelude::*;
+use bevy::render::RenderApp;
 use bevy::tasks::block_on;
 use bevy_gs4d::asset::{
     CaptureFailed, CaptureReady, CaptureSaveError, CaptureState, GaussianCapture, PackageSaver, PackageSaverSettings,
@@ -17,8 +20,10 @@ use bevy_gs4d::asset::{
 use bevy_gs4d::codec::checkpoint::CheckpointOptions;
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
+use bevy_gs4d::prelude::Upright;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{GaussianScene, RuntimeScene, TemporalFilter};
+use bevy_gs4d::scene::{GaussianScene, RuntimeScene, TemporalFilter, UpAxis};
+use bevy_gs4d::stereo::StereoPlugin;
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
 use std::fs;
 use std::path::Path;
@@ -42,6 +47,7 @@ fn app(folder: &Path, watch: bool) -> App {
     app.add_plugins((MinimalPlugins, assets, GaussianCapturePlugin));
     record::<CaptureReady>(&mut app, Update);
     record::<CaptureFailed>(&mut app, Update);
+    app.init_resource::<Failures>().add_systems(Update, count_failures);
     app
 }
 
@@ -67,6 +73,22 @@ fn load(app: &App, name: &'static str) -> Handle<GaussianCapture> {
 
 fn reload(app: &App, name: &'static str) {
     app.world().resource::<AssetServer>().reload(name);
+}
+
+/// Loads a file again, which fails, until Bevy no longer tries: once if there is no file, twice if it is broken.
+fn attempt(app: &mut App, name: &'static str, times: usize) {
+    let failures = |app: &App| app.world().resource::<Failures>().0;
+    let enough = failures(app) + times;
+    reload(app, name);
+    wait(app, "failing", |app| failures(app) >= enough);
+}
+
+/// The number of attempts to load that have failed.
+#[derive(Resource, Default)]
+struct Failures(usize);
+
+fn count_failures(mut failures: MessageReader<AssetLoadFailedEvent<GaussianCapture>>, mut count: ResMut<Failures>) {
+    count.0 += failures.read().count();
 }
 
 fn spawn(app: &mut App, capture: &Handle<GaussianCapture>) -> Entity {
@@ -217,9 +239,15 @@ fn a_repaired_file_can_be_loaded_again() {
     let entity = spawn(&mut app, &capture);
     wait(&mut app, "failing", |app| matches!(state(app, entity), CaptureState::Failed(_)));
     take_events(&mut app);
-    reload(&app, "late.gs4d");
-    wait(&mut app, "failing again", |app| !app.world().resource::<Observed>().0.is_empty());
-    assert_eq!(take_events(&mut app).len(), 1, "another attempt, another message");
+    for _ in 0..3 {
+        attempt(&mut app, "late.gs4d", 1);
+        assert_eq!(take_events(&mut app), [""; 0], "what is known is not told again");
+        assert!(matches!(state(&app, entity), CaptureState::Failed(_)), "it has failed all the same");
+    }
+    write_broken(folder.path(), "late.gs4d");
+    attempt(&mut app, "late.gs4d", 2);
+    let said = take_events(&mut app);
+    assert!(said.len() == 1 && !said[0].contains("check the name"), "another fault is another message: {said:?}");
     write(folder.path(), "late.gs4d", 50);
     reload(&app, "late.gs4d");
     wait(&mut app, "loading", |app| is_ready(app, entity));
@@ -391,4 +419,99 @@ fn a_checkpoint_is_loaded_again_when_its_cfg_args_change() {
     fs::write(folder.path().join("with/cfg_args"), "Namespace(white_background=False)").expect("the file");
     wait(&mut app, "the change", |app| background(app) == Some([0.0; 3]));
     assert!(is_ready(&app, entity), "and it shows");
+}
+
+fn upright_of(app: &mut App, up: UpAxis, rotation: Quat) -> Entity {
+    let mut scene = synthetic(20).into_runtime().expect("a synthetic scene can be drawn");
+    scene.playback.up = up;
+    let capture = app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(scene));
+    app.world_mut().spawn((GaussianCapture3d(capture), Upright, Transform::from_rotation(rotation))).id()
+}
+
+fn rotation(app: &App, entity: Entity) -> Quat {
+    app.world().get::<Transform>(entity).expect("a required component").rotation
+}
+
+#[test]
+fn an_upright_capture_stands_whichever_axis_was_up_and_turns_about_the_vertical() {
+    let folder = folder();
+    let mut app = app(folder.path(), false);
+    let turn = Quat::from_rotation_y(0.7);
+    for up in [UpAxis::PosX, UpAxis::NegX, UpAxis::PosY, UpAxis::NegY, UpAxis::PosZ, UpAxis::NegZ] {
+        let [straight, turned] = [Quat::IDENTITY, turn].map(|rotation| upright_of(&mut app, up, rotation));
+        app.update();
+        app.update();
+        let [straight, turned] = [straight, turned].map(|entity| rotation(&app, entity));
+        let above = turned * up.vector();
+        assert!(above.abs_diff_eq(Vec3::Y, 1e-5), "{up:?} of the capture points up, not to {above}");
+        assert!(turned.abs_diff_eq(turn * straight, 1e-5), "the game's rotation turns what stands, {up:?}");
+    }
+}
+
+#[test]
+fn an_upright_capture_is_turned_once_and_again_for_another_capture() {
+    let folder = folder();
+    let mut app = app(folder.path(), false);
+    let entity = upright_of(&mut app, UpAxis::PosZ, Quat::IDENTITY);
+    let other = upright_of(&mut app, UpAxis::NegY, Quat::IDENTITY);
+    app.update();
+    let turn = Quat::from_rotation_y(0.4);
+    app.world_mut().get_mut::<Transform>(entity).expect("a required component").rotate(turn);
+    let upright = Quat::from_rotation_arc(Vec3::Z, Vec3::Y);
+    for _ in 0..3 {
+        app.update();
+        assert!(rotation(&app, entity).abs_diff_eq(turn * upright, 1e-5), "what the game turns stays turned");
+    }
+    let capture = app.world().get::<GaussianCapture3d>(other).expect("just spawned").clone();
+    app.world_mut().entity_mut(entity).insert(capture);
+    app.update();
+    let above = rotation(&app, entity) * Vec3::NEG_Y;
+    assert!(above.abs_diff_eq(Vec3::Y, 1e-5), "another capture with another axis stands, too, not at {above}");
+}
+
+#[test]
+#[should_panic(expected = "GaussianCapturePlugin needs Bevy's AssetPlugin, which was not added before it")]
+fn without_assets_the_plugin_names_the_remedy() {
+    App::new().add_plugins((MinimalPlugins, GaussianCapturePlugin));
+}
+
+#[test]
+#[should_panic(expected = "GaussianCapturePlugin was added twice: remove one of them")]
+fn twice_the_plugin_names_the_remedy() {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), GaussianCapturePlugin));
+    app.add_plugins(GaussianCapturePlugin);
+}
+
+#[test]
+#[should_panic(expected = "GaussianCapturePlugin needs Bevy's TimePlugin")]
+fn without_time_the_plugin_names_the_remedy() {
+    let mut app = App::new();
+    app.add_plugins((TaskPoolPlugin::default(), AssetPlugin::default(), GaussianCapturePlugin));
+    app.finish();
+}
+
+#[test]
+fn stereo_may_be_added_again_before_and_after() {
+    for before in [true, false] {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, AssetPlugin::default()));
+        if before {
+            app.add_plugins((StereoPlugin, GaussianCapturePlugin));
+        } else {
+            app.add_plugins((GaussianCapturePlugin, StereoPlugin));
+        }
+        app.update();
+        assert!(app.is_plugin_added::<StereoPlugin>(), "the game's plugin is accepted");
+    }
+}
+
+#[test]
+#[should_panic(expected = "Bevy's RenderPlugin was added after GaussianCapturePlugin")]
+fn with_a_late_renderer_the_plugin_names_the_remedy() {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), GaussianCapturePlugin));
+    // As RenderPlugin does.
+    app.insert_sub_app(RenderApp, SubApp::new());
+    app.finish();
 }

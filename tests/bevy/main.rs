@@ -14,6 +14,7 @@ mod inspector;
 mod motion;
 mod picking;
 mod playback;
+mod pointer;
 mod shade;
 mod shadows;
 mod steady;

@@ -23,7 +23,7 @@ fn time(app: &App, entity: Entity) -> f32 {
 }
 
 fn crossed(entity: Entity, indices: &[u32]) -> Vec<String> {
-    indices.iter().map(|&index| debug(&KeyFrameCrossed { entity, index, time: index as f32 / 2.0 })).collect()
+    indices.iter().map(|&index| debug(&SegmentBoundCrossed { entity, index, time: index as f32 / 2.0 })).collect()
 }
 
 #[test]
@@ -53,6 +53,15 @@ fn everything_that_happens_is_said_once() {
     assert_eq!(take_events(&mut app), [crossed(entity, &[4]), vec![ended]].concat(), "up to the end");
     pass(&mut app, 9.0);
     assert_eq!(take_events(&mut app), [""; 0], "and then no more");
+    change(&mut app, entity, Playback::play);
+    pass(&mut app, 0.25);
+    let again = [debug(&PlaybackSeeked { entity, from: 2.0, to: 0.0 }), debug(&PlaybackStarted { entity })].to_vec();
+    assert_eq!(take_events(&mut app), [again, crossed(entity, &[0])].concat(), "played at the end, it starts over");
+    change(&mut app, entity, |playback: &mut Playback| playback.seek(99.0));
+    pass(&mut app, 0.0);
+    let seeked = debug(&PlaybackSeeked { entity, from: 0.25, to: 2.0 });
+    assert_eq!(take_events(&mut app), [seeked], "a seek says where it has arrived");
+    assert_eq!(time(&app, entity), 2.0, "at the end");
 }
 
 #[test]
@@ -247,6 +256,81 @@ fn whoever_hears_of_an_end_may_despawn() {
     assert!(take_events(&mut app).contains(&ended(second)), "which is said, too");
 }
 
+fn reached(entity: Entity, markers: &[(f32, &str)]) -> Vec<String> {
+    markers.iter().map(|&(time, name)| debug(&MarkerReached { entity, name: name.into(), time })).collect()
+}
+
+/// Returns the events about markers since the last call.
+fn markers_said(app: &mut App) -> Vec<String> {
+    take_events(app).into_iter().filter(|said| said.starts_with("MarkerReached")).collect()
+}
+
+#[test]
+fn a_capture_has_markers_of_its_own() {
+    const A: (f32, &str) = (0.5, "a");
+    const B: (f32, &str) = (1.5, "b");
+    for (playback, seconds, expected) in [
+        (Playback::once(), 9.0, vec![A, B]),
+        (Playback { speed: -1.0, time: 2.0, ..Playback::once() }, 9.0, vec![B, A]),
+        (Playback::default(), 2.75, vec![A, B, A]),
+        (Playback { speed: -1.0, time: 1.0, ..default() }, 2.0, vec![A, B]),
+        (Playback::ping_pong(), 3.75, vec![A, B, B, A]),
+        (Playback { start: 1.0, ..Playback::once() }, 9.0, vec![B]),
+    ] {
+        let mut app = app("assets");
+        let entity = spawn(&mut app, (playback, Markers::new([B, A])));
+        pass(&mut app, seconds);
+        assert_eq!(markers_said(&mut app), reached(entity, &expected), "in the order of play: {playback:?}");
+    }
+    let mut app = app("assets");
+    let entity = spawn(&mut app, (Playback::default(), Markers::new([A, B])));
+    pass(&mut app, 0.25);
+    change(&mut app, entity, |playback: &mut Playback| playback.seek(1.5));
+    pass(&mut app, 0.0);
+    assert_eq!(markers_said(&mut app), [""; 0], "a seek skips the first and does not play the second");
+    pass(&mut app, 0.25);
+    assert_eq!(markers_said(&mut app), reached(entity, &[B]), "which is reached when playing goes on");
+}
+
+#[test]
+fn captures_follow_captures_in_chains() {
+    let mut app = app("assets");
+    let handle = capture(&mut app, 2.0, 4);
+    // Followers are spawned before those whom they follow.
+    let [last, middle, first] = [(); 3].map(|()| app.world_mut().spawn(GaussianCapture3d(handle.clone())).id());
+    app.world_mut().entity_mut(last).insert((FollowsClock(middle), Playback { offset: 0.25, ..default() }));
+    app.world_mut().entity_mut(middle).insert((FollowsClock(first), Playback { speed: 0.5, ..default() }));
+    pass(&mut app, 1.0);
+    let times = |app: &App| [first, middle, last].map(|entity| time(app, entity));
+    assert_eq!(times(&app), [1.0, 0.5, 0.75], "all in one frame");
+    take_events(&mut app);
+    change(&mut app, first, |playback: &mut Playback| playback.seek(0.5));
+    pass(&mut app, 0.0);
+    assert_eq!(times(&app), [0.5, 0.25, 0.5], "a seek is followed");
+    let seeks = take_events(&mut app).into_iter().filter(|said| said.starts_with("PlaybackSeeked")).count();
+    assert_eq!(seeks, 3, "and is one for each");
+    change(&mut app, first, Playback::pause);
+    pass(&mut app, 1.0);
+    assert_eq!(times(&app), [0.5, 0.25, 0.5], "so is a pause");
+}
+
+#[test]
+fn a_follower_in_a_circle_or_of_nothing_stands_until_it_can_follow() {
+    let mut app = app("assets");
+    let [one, other, lost] = [(); 3].map(|()| spawn(&mut app, Playback::default()));
+    let timeless = app.world_mut().spawn_empty().id();
+    app.world_mut().entity_mut(one).insert(FollowsClock(other));
+    app.world_mut().entity_mut(other).insert(FollowsClock(one));
+    app.world_mut().entity_mut(lost).insert(FollowsClock(timeless));
+    let times = |app: &App| [one, other, lost].map(|entity| time(app, entity));
+    pass(&mut app, 0.5);
+    assert_eq!(times(&app), [0.0; 3], "nothing moves them");
+    app.world_mut().entity_mut(other).remove::<FollowsClock>();
+    app.world_mut().entity_mut(timeless).insert(Playback { time: 1.25, ..default() });
+    pass(&mut app, 0.5);
+    assert_eq!(times(&app), [0.5, 0.5, 1.25], "out of the circle, and with a time that the game sets");
+}
+
 /// Returns what a component lacks to be used in scenes, animations and inspectors; `None` if nothing.
 fn unknown<C: Component>(app: &App) -> Option<&'static str> {
     let registry = app.world().resource::<AppTypeRegistry>().read();
@@ -260,6 +344,9 @@ fn components_are_known_to_reflection() {
         unknown::<Playback>(&app),
         unknown::<PlaybackClock>(&app),
         unknown::<FollowsClock>(&app),
+        unknown::<Markers>(&app),
+        unknown::<Upright>(&app),
+        unknown::<CapturePickingCamera>(&app),
         unknown::<TimelinePlayer>(&app),
         unknown::<TimelineTrack>(&app),
         unknown::<ClipFade>(&app),

@@ -16,7 +16,7 @@ use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::render::CaptureStatistics;
 use bevy_gs4d::scene::{RuntimeScene, TemporalFilter};
-use bevy_gs4d::stereo::{EyeTargets, StereoPlugin, StereoRig, spawn_stereo};
+use bevy_gs4d::stereo::{EyeTargets, StereoRig, spawn_stereo};
 use bevy_gs4d::testing::{self, Offscreen};
 use image::RgbaImage;
 use image::imageops::crop_imm;
@@ -76,7 +76,6 @@ impl StereoApp {
     fn of_size(eye: UVec2, scene: &RuntimeScene, head: Transform, separate: bool) -> Option<Self> {
         let size = if separate { eye } else { eye * UVec2::new(2, 1) };
         let mut app = app(size)?;
-        app.add_plugins(StereoPlugin);
         spawn(&mut app, scene, Playback::default());
         let target = RenderTarget::default();
         let right = separate.then(|| Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), eye));

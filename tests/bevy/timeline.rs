@@ -198,7 +198,7 @@ fn captures_hear_of_their_own_key_frames() {
     let left = track(&mut app, "left");
     assert_eq!(said_by(&mut app, left), [debug(&PlaybackStarted { entity: left })], "the first clip");
     pass(&mut app, 1.25);
-    let crossed = |index, time| debug(&KeyFrameCrossed { entity: left, index, time });
+    let crossed = |index, time| debug(&SegmentBoundCrossed { entity: left, index, time });
     assert_eq!(said_by(&mut app, left), [crossed(1, 0.5), crossed(2, 1.0)], "from its in point on");
     pass(&mut app, 1.0);
     assert_eq!(said_by(&mut app, left), [debug(&PlaybackStarted { entity: left })], "the second clip");

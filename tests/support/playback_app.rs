@@ -26,7 +26,7 @@ pub fn app_with(assets: AssetPlugin) -> App {
     record::<PlaybackStarted>(&mut app, Last);
     record::<PlaybackPaused>(&mut app, Last);
     record::<PlaybackSeeked>(&mut app, Last);
-    record::<KeyFrameCrossed>(&mut app, Last);
+    record::<SegmentBoundCrossed>(&mut app, Last);
     record::<MarkerReached>(&mut app, Last);
     record::<PlaybackLooped>(&mut app, Last);
     record::<PlaybackEnded>(&mut app, Last);

@@ -43,7 +43,8 @@ pub struct CaptureReady {
 /// An entity's capture could not be loaded, or this GPU cannot draw it. If it was drawn before and its file changed, the old capture is
 /// still drawn.
 ///
-/// Bevy logs the same error, whether this is read or not.
+/// Sent once for each entity, however often loading is tried, until it succeeds or fails in another way. Bevy logs the error of every attempt,
+/// whether this is read or not.
 ///
 /// # Examples
 ///

@@ -7,7 +7,7 @@ use super::messages::{CaptureFailed, CaptureReady};
 use super::state::{CaptureAssetSystems, CaptureState};
 use super::systems::{report_upload_failures, update_states};
 use super::uploads::Uploads;
-use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d, stand_upright};
 use bevy::app::{App, Plugin, PreUpdate};
 use bevy::asset::{AssetApp, AssetTrackingSystems};
 use bevy::ecs::schedule::IntoScheduleConfigs;
@@ -26,7 +26,8 @@ impl Plugin for CaptureAssetPlugin {
             .add_message::<CaptureReady>()
             .add_message::<CaptureFailed>()
             .configure_sets(PreUpdate, CaptureAssetSystems.after(AssetTrackingSystems))
-            .add_systems(PreUpdate, update_states.in_set(CaptureAssetSystems))
+            // Whoever hears that a capture is ready finds it upright.
+            .add_systems(PreUpdate, (stand_upright, update_states).chain().in_set(CaptureAssetSystems))
             .add_systems(PreUpdate, report_upload_failures.after(CaptureAssetSystems));
     }
 }

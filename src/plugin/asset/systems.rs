@@ -31,24 +31,26 @@ pub(super) fn update_states(
     uploads: Res<Uploads>,
     mut captures: Query<(Entity, Ref<GaussianCapture3d>, &mut CaptureState)>,
     mut announcer: Announcer,
-    mut attempts: Local<Attempts>,
+    mut told: Local<Told>,
 ) {
     let _span = debug_span!("gs4d/states").entered();
     let mut changed: HashSet<AssetId<GaussianCapture>> = HashSet::new();
     for change in changes.read() {
         match change {
-            AssetEvent::Added { id } => attempts.succeeded(*id),
+            AssetEvent::Added { id } => told.succeeded(*id),
             AssetEvent::Modified { id } => {
-                attempts.succeeded(*id);
+                told.succeeded(*id);
                 changed.insert(*id);
             }
-            AssetEvent::Removed { .. } | AssetEvent::Unused { .. } | AssetEvent::LoadedWithDependencies { .. } => {}
+            AssetEvent::Removed { id } => told.succeeded(*id),
+            AssetEvent::Unused { .. } | AssetEvent::LoadedWithDependencies { .. } => {}
         }
     }
     let mut failed: HashMap<AssetId<GaussianCapture>, String> = HashMap::new();
     for failure in failures.read() {
-        if !attempts.failed_again(failure.id, loaded.contains(failure.id)) {
-            failed.insert(failure.id, describe(&failure.path, &failure.error));
+        let error = describe(&failure.path, &failure.error);
+        if told.is_new(failure.id, &error) {
+            failed.insert(failure.id, error);
         }
     }
     let mut uploads = uploads.lock();
@@ -76,14 +78,16 @@ pub(super) fn update_states(
                 announcer.failed(entity, error.clone());
             }
         } else if let Some(LoadState::Failed(error)) = server.get_load_state(id) {
-            let is_known = state.has_failed() && !failed.contains_key(&id) && !capture.is_changed();
-            if !is_known {
+            let is_new = failed.contains_key(&id) || capture.is_changed();
+            if is_new || !state.has_failed() {
                 let error = match server.get_path(id) {
                     Some(path) => describe(path, &error),
                     None => error.to_string(),
                 };
                 state.set_if_neq(CaptureState::Failed(error.clone()));
-                announcer.failed(entity, error);
+                if is_new {
+                    announcer.failed(entity, error);
+                }
             }
         } else {
             state.set_if_neq(CaptureState::Loading);
@@ -91,28 +95,20 @@ pub(super) fn update_states(
     }
 }
 
-/// Distinguishes the two failures of one reload: Bevy repeats a failed reload at once, and only the first failure is
-/// reported.
+/// What has been told of failures to load. Bevy repeats a failed reload at once, watched files may change several times in one save, and
+/// a game may try again every second: a failure is told once, until the capture loads or fails in another way.
 #[derive(Default)]
-pub(super) struct Attempts {
-    /// Captures that have failed to load, so that further failures are of reloads.
-    failed: HashSet<AssetId<GaussianCapture>>,
-    /// Captures whose reload has failed once.
-    repeating: HashSet<AssetId<GaussianCapture>>,
-}
+pub(super) struct Told(HashMap<AssetId<GaussianCapture>, String>);
 
-impl Attempts {
-    /// Records that a load or a reload succeeded.
+impl Told {
+    /// Records that a capture has been loaded, or is gone.
     fn succeeded(&mut self, id: AssetId<GaussianCapture>) {
-        self.failed.remove(&id);
-        self.repeating.remove(&id);
+        self.0.remove(&id);
     }
 
-    /// Records that a load or a reload failed. Returns whether this was the second attempt of a reload. `is_loaded`: an
-    /// earlier load succeeded.
-    fn failed_again(&mut self, id: AssetId<GaussianCapture>, is_loaded: bool) -> bool {
-        let is_reload = !self.failed.insert(id) || is_loaded;
-        is_reload && !self.repeating.insert(id) && self.repeating.remove(&id)
+    /// Records a failure. Returns whether it has not been told yet.
+    fn is_new(&mut self, id: AssetId<GaussianCapture>, error: &str) -> bool {
+        self.0.insert(id, error.to_owned()).is_none_or(|told| told != error)
     }
 }
 
@@ -158,15 +154,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_failed_reload_counts_once_and_the_next_one_again() {
-        let mut attempts = Attempts::default();
+    fn a_failure_is_told_once_until_something_changes() {
+        let mut told = Told::default();
         let id = AssetId::default();
-        let mut failures = |is_loaded| [(); 2].map(|()| attempts.failed_again(id, is_loaded));
-        assert_eq!(failures(true), [false, true], "two attempts of one reload");
-        assert_eq!(failures(true), [false, true], "and of the next");
-        attempts.succeeded(id);
-        assert!(!attempts.failed_again(id, false), "a first load is tried once");
-        assert!(!attempts.failed_again(id, false), "so that this is a reload");
-        assert!(attempts.failed_again(id, false), "which is tried twice");
+        let mut is_new = |error| told.is_new(id, error);
+        assert_eq!(["cut off"; 3].map(&mut is_new), [true, false, false], "however often it is tried");
+        assert_eq!(["gone", "gone", "cut off"].map(&mut is_new), [true, false, true], "another one is told");
+        told.succeeded(id);
+        assert!(told.is_new(id, "cut off"), "and the same one after a success");
     }
 }

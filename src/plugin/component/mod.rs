@@ -6,9 +6,12 @@
 
 mod capture;
 mod key_frames;
+mod upright;
 
 pub use capture::GaussianCapture;
 pub use key_frames::KeyFrames;
+pub use upright::Upright;
+pub(crate) use upright::stand_upright;
 
 use bevy::asset::{AssetId, Handle};
 use bevy::camera::visibility::{Visibility, VisibilityClass, add_visibility_class};
@@ -20,9 +23,9 @@ use bevy::transform::components::Transform;
 
 /// Places a capture in the world.
 ///
-/// The entity's transform (translation, rotation, any scale) maps capture space to the world. Most captures have +z up: stand them
-/// upright with `Transform::from_rotation(Quat::from_rotation_x(-FRAC_PI_2))` or [`GaussianCapture::upright`]. A perspective camera
-/// draws nothing that is nearer than 0.2 units *of the capture*, as in training; an orthographic camera draws from its near plane on.
+/// The entity's transform (translation, rotation, any scale) maps capture space to the world. Most captures have +z up: [`Upright`] stands
+/// them upright. A perspective camera draws nothing that is nearer than 0.2 units *of the capture*, as in training; an orthographic camera
+/// draws from its near plane on.
 ///
 /// [`Visibility`], `RenderLayers` and frustum culling decide which cameras draw the capture, as they do for meshes. The entity's
 /// `Aabb` encloses what is drawn at the current time. A capture with an environment map surrounds every camera: it has no `Aabb`
@@ -32,18 +35,16 @@ use bevy::transform::components::Transform;
 /// [`Playback`](crate::playback::Playback) and [`CaptureSettings`](crate::render::CaptureSettings): they are inserted with their
 /// defaults unless they are spawned along.
 ///
-/// Default: a handle of no asset, with which nothing is drawn.
+/// Default: a handle of no asset, with which nothing is drawn. An entity that keeps it is told of in the log, once.
 ///
 /// # Examples
 ///
 /// ```
 /// use bevy::prelude::*;
 /// use bevy_gs4d::prelude::*;
-/// use std::f32::consts::FRAC_PI_2;
 ///
 /// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
-///     let upright = Transform::from_rotation(Quat::from_rotation_x(-FRAC_PI_2));
-///     commands.spawn((GaussianCapture3d(assets.load("toybox.gs4d")), upright));
+///     commands.spawn((GaussianCapture3d(assets.load("toybox.gs4d")), Upright, Transform::from_xyz(0.0, 0.0, -2.0)));
 /// }
 /// # bevy::ecs::system::assert_is_system(setup);
 /// ```

@@ -83,12 +83,28 @@ impl CapturePicker<'_, '_> {
     /// Returns the nearest hit of all captures that are loaded and not hidden, whether a camera sees them or not; `None` if the ray hits
     /// none. Captures are tested one by one: the ray passes through two that absorb half of the light only together.
     pub fn cast(&self, ray: Ray3d) -> Option<CaptureHit> {
-        let mut nearest: Option<CaptureHit> = None;
-        for placed in self.captures.iter().filter(|(.., visibility, _)| visibility.get()) {
-            let limit = nearest.map_or(f32::INFINITY, |hit| hit.distance);
-            nearest = self.cast_within(placed, ray, limit).or(nearest);
+        self.cast_through(ray, |_, visibility| visibility.get(), |_| true).first().copied()
+    }
+
+    /// Returns the hits of all captures that `takes_part` lets take part, nearest first, down to the nearest of those that hide what is
+    /// behind them, which `blocks` says.
+    pub(crate) fn cast_through(
+        &self,
+        ray: Ray3d,
+        takes_part: impl Fn(Entity, InheritedVisibility) -> bool,
+        blocks: impl Fn(Entity) -> bool,
+    ) -> Vec<CaptureHit> {
+        let (mut hits, mut limit) = (Vec::new(), f32::INFINITY);
+        for placed in self.captures.iter().filter(|(entity, .., visibility, _)| takes_part(*entity, **visibility)) {
+            let Some(hit) = self.cast_within(placed, ray, limit) else { continue };
+            if blocks(hit.entity) {
+                limit = hit.distance;
+            }
+            hits.push(hit);
         }
-        nearest
+        hits.retain(|hit| hit.distance <= limit);
+        hits.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+        hits
     }
 
     /// Returns the hit of one capture, hidden or not; `None` if the ray misses it, it is not loaded, or its scale is 0.

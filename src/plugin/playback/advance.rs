@@ -27,7 +27,8 @@ impl PlaybackState {
     /// what happened.
     pub(super) fn advance(&mut self, mut now: Playback, drive: Drive, duration: f32) -> (Playback, Progress) {
         let span = now.span(duration);
-        let mut progress = self.notice(&mut now, &span, matches!(drive, Drive::Follow { .. }));
+        let was_at_end = self.is_at_end_of_loop();
+        let mut progress = self.notice(&mut now, &span, drive);
         if now.playing && !span.is_still() {
             match drive {
                 Drive::By(delta) => self.run(&mut now, &span, delta, &mut progress),
@@ -45,16 +46,22 @@ impl PlaybackState {
             self.follow = None;
         }
         (self.time, self.returning, self.playing) = (now.time, now.returning, now.playing);
+        // Starting over is a jump: followers do not play backwards to the start.
+        let wrapped = progress.travel.is_some_and(|travel| travel.wraps() || was_at_end && travel.is_forward());
+        if progress.jumped || wrapped {
+            self.jumps = self.jumps.wrapping_add(1);
+        }
         (now, progress)
     }
 
     /// Compares the playback with its state after the last step: the game has set whatever differs.
-    fn notice(&mut self, now: &mut Playback, span: &Span, following: bool) -> Progress {
-        if !now.time.is_finite() {
-            now.time = if now.time == f32::INFINITY { span.end() as f32 } else { span.start() as f32 };
-        }
+    fn notice(&mut self, now: &mut Playback, span: &Span, drive: Drive) -> Progress {
+        now.time = span.clamped(now.time);
+        let following = matches!(drive, Drive::Follow { .. });
         let first = self.span.is_none();
-        let moved = now.time != self.time || span.repeat().turns_round() && now.returning != self.returning;
+        // A range that has changed may move the time, which is no seek.
+        let turned = span.repeat().turns_round() && now.returning != self.returning;
+        let moved = now.time != span.clamped(self.time) || turned;
         // A clock that is followed sets the time; setting it otherwise is not a seek.
         let seeked = !first && moved && !(following && now.playing);
         if self.span != Some(*span) {
@@ -62,15 +69,23 @@ impl PlaybackState {
             self.span = Some(*span);
             self.phase = span.phase(now.time, now.returning);
         }
-        if first || seeked {
+        let started = now.playing && !self.playing;
+        // Played at the end, it starts over, unless the clock says where it is.
+        let is_over = span.is_over(span.phase(now.time, now.returning), now.speed > 0.0);
+        let restarts = started && is_over && now.speed != 0.0 && !span.is_still() && matches!(drive, Drive::By(_));
+        if restarts {
+            now.replay();
+            now.time = span.clamped(now.time);
+        }
+        if first || seeked || restarts {
             self.phase = span.phase(now.time, now.returning);
             (self.fresh, self.over) = (true, false);
         }
         Progress {
-            started: now.playing && !self.playing,
+            started,
             paused: !now.playing && self.playing,
-            seeked: seeked.then_some([self.time, now.time]),
-            jumped: first || seeked,
+            seeked: ((seeked || restarts) && !first).then_some([self.time, now.time]),
+            jumped: first || seeked || restarts,
             ..Progress::default()
         }
     }
@@ -171,7 +186,24 @@ mod tests {
         assert!(end.ended && !player.0.playing, "it ends");
         assert_eq!(player.step(Drive::By(1.5)), Progress::default(), "and that is all");
         player.0.play();
-        assert!(player.step(Drive::By(1.5)).ended, "played at the end, it ends again");
+        let again = player.step(Drive::By(1.5));
+        assert_eq!((again.seeked, again.started), (Some([2.0, 0.0]), true), "played at the end, it starts over");
+        assert!(!again.ended, "which is no end");
+        assert_eq!(player.0.time, 1.5, "from its beginning");
+        player.0.seek(9.0);
+        player.0.pause();
+        assert_eq!(player.step(Drive::By(0.0)).seeked, Some([1.5, 2.0]), "sought beyond the end, it is there");
+        (player.0.speed, player.0.offset) = (-1.0, 0.5);
+        player.0.play();
+        assert_eq!(player.step(Drive::By(0.5)).seeked, None, "backwards it has not ended");
+        assert!(player.step(Drive::By(9.0)).ended, "until it is at the start");
+        player.0.play();
+        player.0.end = 2.0;
+        assert_eq!(player.step(Drive::By(0.0)).seeked, Some([0.0, 1.5]), "from where it starts over by its offset");
+        let stopped = Playback { time: 2.0, speed: 0.0, repeat: Repeat::Once, ..Playback::default() };
+        let mut player = Player::new(stopped);
+        player.step(Drive::By(1.0));
+        assert_eq!(player.0, stopped, "at speed 0 it stands at its end");
     }
 
     #[test]
@@ -263,6 +295,36 @@ mod tests {
             player.step(drive);
             assert_eq!(player.0.time, 0.0, "the other end");
         }
+    }
+
+    #[test]
+    fn times_are_those_of_the_range() {
+        let mut player = Player::new(Playback { start: 0.5, end: 1.5, ..Playback::paused_at(9.0) });
+        assert_eq!(player.step(Drive::By(0.0)).seeked, None, "the first moment is no seek");
+        assert_eq!(player.0.time, 1.5, "but in the range");
+        player.0.seek(-3.0);
+        assert_eq!(player.step(Drive::By(0.0)).seeked, Some([1.5, 0.5]), "a seek says where it has arrived");
+        player.0.seek(0.25);
+        assert_eq!(player.step(Drive::By(0.0)).seeked, None, "which is where it was");
+        player.0.start = 1.0;
+        assert_eq!(player.step(Drive::By(0.0)).seeked, None, "nor is a range that leaves it behind");
+        assert_eq!(player.0.time, 1.0, "the range is where it is");
+    }
+
+    #[test]
+    fn followers_of_a_player_see_its_jumps() {
+        let mut player = Player::new(Playback::default());
+        let mut jumps = |change: fn(&mut Playback), delta| {
+            let before = player.1.jumps;
+            change(&mut player.0);
+            player.step(Drive::By(delta));
+            player.1.jumps - before
+        };
+        assert_eq!(jumps(|_| (), 0.25), 1, "the first moment");
+        assert_eq!(jumps(|_| (), 0.5), 0, "time that passes");
+        assert_eq!(jumps(|playback| playback.seek(1.75), 0.125), 1, "a seek");
+        assert_eq!(jumps(|_| (), 0.5), 1, "a loop");
+        assert_eq!(jumps(|playback| playback.repeat = Repeat::PingPong, 1.75), 0, "not a turn");
     }
 
     #[test]

@@ -40,7 +40,7 @@ pub struct PlaybackClock {
     /// What moves it. Default: [`ClockSource::Game`].
     pub source: ClockSource,
     /// Number of its jumps. When this changes, followers [seek](super::PlaybackSeeked) to the time it shows; otherwise they play the
-    /// time between, which crosses key-frames and markers. Default: 0.
+    /// time between, which crosses bounds of segments and markers. Default: 0.
     pub jumps: u32,
 }
 
@@ -55,12 +55,17 @@ pub enum ClockSource {
     Manual,
 }
 
-/// Lets a [`Playback`](super::Playback) follow the [`PlaybackClock`] on another entity.
+/// Lets a [`Playback`](super::Playback) follow another entity: one with a [`PlaybackClock`], or any with a `Playback`, such as another
+/// capture or a [`TimelinePlayer`](super::TimelinePlayer).
 ///
 /// The playback's time is then the clock's time multiplied by the playback's own `speed`, plus its `offset`, within its range and repeated as
-/// its `repeat` specifies; setting `time` has no effect. A paused follower stands still and continues at the clock's time when it plays again. If
-/// the entity has no clock, time stands still. A [`TimelinePlayer`](super::TimelinePlayer) cannot follow the clock of another one: let
-/// both follow a third clock.
+/// its `repeat` specifies; setting `time` has no effect. A paused follower stands still and continues at the clock's time when it plays again.
+///
+/// The time of a followed `Playback` is its `time`; when that seeks or starts over, followers seek. The followed may itself follow: whoever is
+/// followed advances first. Only timelines that follow a capture show its time of the frame before, because timelines advance before captures.
+///
+/// If the other entity does not exist or shows no time, or if entities follow each other in a circle, the follower stands still, and the
+/// log says so once.
 ///
 /// # Examples
 ///

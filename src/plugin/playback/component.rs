@@ -21,7 +21,7 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// ```
 /// use bevy_gs4d::prelude::*;
 ///
-/// let mut playback = Playback { repeat: Repeat::Once, speed: 0.5, ..Playback::default() };
+/// let mut playback = Playback { speed: 0.5, ..Playback::once() };
 /// // The plugin does this once a frame; here by hand, for a capture of 2 s.
 /// playback.advance(1.0, 2.0);
 /// assert_eq!(playback.time, 0.5, "a second at half speed");
@@ -33,8 +33,8 @@ use bevy::reflect::std_traits::ReflectDefault;
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[require(PlaybackState)]
 pub struct Playback {
-    /// Seconds since the capture's start. Drawing clamps it to the capture's duration; an infinite value becomes that end of the
-    /// range. Default: 0.
+    /// Seconds since the capture's start. The plugin clamps it to the range from `start` to `end`, unless that is empty: seeking beyond
+    /// an end goes to that end. Default: 0.
     pub time: f32,
     /// Seconds of the capture per second of the clock; negative plays backwards. Default: 1.
     pub speed: f32,
@@ -42,8 +42,7 @@ pub struct Playback {
     pub playing: bool,
     /// What happens at the end of the range. Default: [`Repeat::Loop`].
     pub repeat: Repeat,
-    /// The in point: the first moment that is played, in seconds since the capture's start. Playing from an earlier time starts here.
-    /// Default: 0.
+    /// The in point: the first moment that is played, in seconds since the capture's start. Default: 0.
     pub start: f32,
     /// The out point: the last moment that is played, in seconds since the capture's start. Beyond the capture's end it is that end. An
     /// empty range stands still. Default: infinite.
@@ -72,12 +71,39 @@ impl Default for Playback {
 }
 
 impl Playback {
+    /// Returns a playback that plays once, and stops at the end.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use bevy_gs4d::prelude::*;
+    ///
+    /// assert_eq!(Playback::once().repeat, Repeat::Once);
+    /// ```
+    pub fn once() -> Self {
+        Self { repeat: Repeat::Once, ..Self::default() }
+    }
+
+    /// Returns a playback that turns round at each end.
+    ///
+    /// # Examples
+    ///
+    /// ```
+    /// use bevy_gs4d::prelude::*;
+    ///
+    /// assert_eq!(Playback::ping_pong().repeat, Repeat::PingPong);
+    /// ```
+    pub fn ping_pong() -> Self {
+        Self { repeat: Repeat::PingPong, ..Self::default() }
+    }
+
     /// Returns a playback that is paused at `seconds` since the start.
     pub fn paused_at(seconds: f32) -> Self {
         Self { time: seconds, playing: false, ..Self::default() }
     }
 
-    /// Lets time advance.
+    /// Lets time advance. At the end at which it has stopped, or would stop at once, it plays from the beginning, as
+    /// [`replay`](Self::replay) does; followers of a clock go where the clock is.
     pub fn play(&mut self) {
         self.playing = true;
     }
@@ -87,7 +113,7 @@ impl Playback {
         self.playing = false;
     }
 
-    /// Plays if paused, pauses if playing.
+    /// [Plays](Self::play) if paused, pauses if playing.
     pub fn toggle(&mut self) {
         self.playing = !self.playing;
     }

@@ -4,9 +4,10 @@
 //! that entity, to be observed: `commands.entity(capture).observe(|ended: On<PlaybackEnded>| ..)`.
 //!
 //! The entity has a [`Playback`](super::Playback): a capture or a [`TimelinePlayer`](super::TimelinePlayer). The events of one entity
-//! in one frame are triggered in this order: seeked, started, paused, key-frames or markers, looped, ended.
+//! in one frame are triggered in this order: seeked, started, paused, bounds of segments, markers, looped, ended.
 
 use super::advance::Progress;
+use super::markers::{Marker, crossed};
 use super::span::Leg;
 use crate::plugin::asset::send;
 use crate::plugin::component::KeyFrames;
@@ -67,10 +68,15 @@ pub struct PlaybackSeeked {
     pub to: f32,
 }
 
-/// A key-frame of a capture's temporal filter was crossed, or reached, while playing.
+/// A bound between two segments of a capture's temporal filter, or at the first one's start or the last one's end, was crossed, or
+/// reached, while playing. These bounds are the filter's key-frames ([`GaussianCapture::key_frames`]); they have nothing to do with those of
+/// an animation. For moments that the game defines, put [`Markers`] on the capture.
 ///
-/// A key-frame at the time of a seek counts once playing continues from there. A step that is longer than four passes of a loop sends
-/// the key-frames of two to four of them.
+/// A bound at the time of a seek counts once playing continues from there. A step that is longer than four passes of a loop sends
+/// the bounds of two to four of them.
+///
+/// [`GaussianCapture::key_frames`]: crate::asset::GaussianCapture::key_frames
+/// [`Markers`]: super::Markers
 ///
 /// # Examples
 ///
@@ -78,24 +84,25 @@ pub struct PlaybackSeeked {
 /// use bevy::prelude::*;
 /// use bevy_gs4d::prelude::*;
 ///
-/// fn report(mut crossed: MessageReader<KeyFrameCrossed>) {
-///     for KeyFrameCrossed { entity, index, time } in crossed.read() {
-///         info!("{entity}: key-frame {index} at {time} s");
+/// fn report(mut crossed: MessageReader<SegmentBoundCrossed>) {
+///     for SegmentBoundCrossed { entity, index, time } in crossed.read() {
+///         info!("{entity}: bound {index} at {time} s");
 ///     }
 /// }
 /// # bevy::ecs::system::assert_is_system(report);
 /// ```
 #[derive(Message, EntityEvent, Debug, Clone, PartialEq)]
-pub struct KeyFrameCrossed {
+pub struct SegmentBoundCrossed {
     /// The capture.
     pub entity: Entity,
-    /// The key-frame, counted from 0.
+    /// The bound, counted from 0: segment `index` begins there, and the one before ends.
     pub index: u32,
     /// Its time, in seconds since the capture's start.
     pub time: f32,
 }
 
-/// A marker of a timeline was crossed, or reached, while playing. Seeks and long steps count as for [`KeyFrameCrossed`].
+/// A marker of a timeline, or of a capture with [`Markers`](super::Markers), was crossed, or reached, while playing. Seeks and long steps
+/// count as for [`SegmentBoundCrossed`].
 ///
 /// # Examples
 ///
@@ -112,11 +119,11 @@ pub struct KeyFrameCrossed {
 /// ```
 #[derive(Message, EntityEvent, Debug, Clone, PartialEq)]
 pub struct MarkerReached {
-    /// The timeline's player.
+    /// The timeline's player, or the capture.
     pub entity: Entity,
     /// The marker's name.
     pub name: String,
-    /// Its time, in seconds since the timeline's start.
+    /// Its time, in seconds since the start of the timeline or the capture.
     pub time: f32,
 }
 
@@ -172,14 +179,15 @@ pub(super) struct Announcer<'w, 's> {
     started: MessageWriter<'w, PlaybackStarted>,
     paused: MessageWriter<'w, PlaybackPaused>,
     seeked: MessageWriter<'w, PlaybackSeeked>,
-    key_frames: MessageWriter<'w, KeyFrameCrossed>,
+    bounds: MessageWriter<'w, SegmentBoundCrossed>,
     markers: MessageWriter<'w, MarkerReached>,
     looped: MessageWriter<'w, PlaybackLooped>,
     ended: MessageWriter<'w, PlaybackEnded>,
 }
 
 impl Announcer<'_, '_> {
-    /// Sends what happened in a step. `crossed` sends the key-frames or markers on a stretch that was played.
+    /// Sends what happened in a step. `crossed` sends the bounds of segments and the markers on a stretch that
+    /// was played.
     pub(super) fn report(&mut self, entity: Entity, progress: &Progress, mut crossed: impl FnMut(&mut Self, &Leg)) {
         if let Some([from, to]) = progress.seeked {
             send(&mut self.commands, &mut self.seeked, PlaybackSeeked { entity, from, to });
@@ -201,16 +209,19 @@ impl Announcer<'_, '_> {
         }
     }
 
-    /// Sends the key-frames on a stretch that was played.
-    pub(super) fn key_frames(&mut self, entity: Entity, key_frames: &KeyFrames, leg: &Leg) {
+    /// Sends the bounds of segments on a stretch that was played.
+    pub(super) fn bounds(&mut self, entity: Entity, key_frames: &KeyFrames, leg: &Leg) {
         for index in key_frames.within(leg.from, leg.to, leg.inclusive) {
-            let crossed = KeyFrameCrossed { entity, index, time: key_frames.time(index) };
-            send(&mut self.commands, &mut self.key_frames, crossed);
+            let crossed = SegmentBoundCrossed { entity, index, time: key_frames.time(index) };
+            send(&mut self.commands, &mut self.bounds, crossed);
         }
     }
 
-    /// Sends a marker that was crossed.
-    pub(super) fn marker(&mut self, entity: Entity, name: &str, time: f32) {
-        send(&mut self.commands, &mut self.markers, MarkerReached { entity, name: name.to_owned(), time });
+    /// Sends the markers on a stretch that was played.
+    pub(super) fn markers(&mut self, entity: Entity, markers: &[Marker], leg: &Leg) {
+        for Marker { time, name } in crossed(markers, leg) {
+            let reached = MarkerReached { entity, name: name.clone(), time: *time };
+            send(&mut self.commands, &mut self.markers, reached);
+        }
     }
 }

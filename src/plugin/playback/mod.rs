@@ -14,6 +14,8 @@
 //!  Time ──────────────────────▶ Playback::time         Advance
 //! ```
 //!
+//! A playback follows a clock or another player ([`FollowsClock`]); [`Markers`] give one capture the named moments that a timeline has.
+//!
 //! Bevy's own animations may animate any field of a [`Playback`] but `repeat` through `animated_field!(Playback::speed)`. They run in
 //! `PostUpdate`: the `time` that they set on a capture is drawn in the same frame; other fields, and every field of a
 //! [`TimelinePlayer`]'s playback, take effect in the next frame.
@@ -22,6 +24,7 @@ mod advance;
 mod clock;
 mod component;
 mod drive;
+mod markers;
 mod messages;
 mod plugin;
 mod repeat;
@@ -33,13 +36,13 @@ mod timeline;
 
 pub use clock::{ClockSource, FollowsClock, PlaybackClock};
 pub use component::Playback;
+pub use markers::{Marker, Markers};
 pub use messages::{
-    KeyFrameCrossed, MarkerReached, PlaybackEnded, PlaybackLooped, PlaybackPaused, PlaybackSeeked, PlaybackStarted,
+    MarkerReached, PlaybackEnded, PlaybackLooped, PlaybackPaused, PlaybackSeeked, PlaybackStarted, SegmentBoundCrossed,
 };
 pub(crate) use plugin::PlaybackPlugin;
 pub use repeat::Repeat;
 pub use systems::PlaybackSystems;
 pub use timeline::{
-    Clip, ClipFade, InvalidTimeline, Marker, Timeline, TimelineError, TimelineLoader, TimelinePlayer, TimelineTrack,
-    Track,
+    Clip, ClipFade, InvalidTimeline, Timeline, TimelineError, TimelineLoader, TimelinePlayer, TimelineTrack, Track,
 };

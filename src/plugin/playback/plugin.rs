@@ -4,12 +4,12 @@
 
 use super::component::Playback;
 use super::messages::{
-    KeyFrameCrossed, MarkerReached, PlaybackEnded, PlaybackLooped, PlaybackPaused, PlaybackSeeked, PlaybackStarted,
+    MarkerReached, PlaybackEnded, PlaybackLooped, PlaybackPaused, PlaybackSeeked, PlaybackStarted, SegmentBoundCrossed,
 };
-use super::systems::{PlaybackSystems, advance_captures, run_clocks};
+use super::systems::{PlaybackSystems, advance_captures, run_clocks, warn_of_missing_handles};
 use super::timeline::{Timeline, TimelineLoader, advance_timelines, bind_tracks, direct_tracks};
 use crate::plugin::component::GaussianCapture3d;
-use bevy::app::{App, Plugin, Update};
+use bevy::app::{App, Last, Plugin, Update};
 use bevy::asset::AssetApp;
 use bevy::ecs::schedule::IntoScheduleConfigs;
 
@@ -26,7 +26,7 @@ impl Plugin for PlaybackPlugin {
             .add_message::<PlaybackStarted>()
             .add_message::<PlaybackPaused>()
             .add_message::<PlaybackSeeked>()
-            .add_message::<KeyFrameCrossed>()
+            .add_message::<SegmentBoundCrossed>()
             .add_message::<MarkerReached>()
             .add_message::<PlaybackLooped>()
             .add_message::<PlaybackEnded>()
@@ -38,6 +38,8 @@ impl Plugin for PlaybackPlugin {
                     (bind_tracks, advance_timelines, direct_tracks).chain().in_set(Timelines),
                     advance_captures.in_set(Advance),
                 ),
-            );
+            )
+            // A handle may follow in the same frame.
+            .add_systems(Last, warn_of_missing_handles);
     }
 }

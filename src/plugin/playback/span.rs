@@ -58,6 +58,16 @@ impl Span {
         self.length <= 0.0
     }
 
+    /// Returns `time` inside the range, NaN as its start. In an empty range time stays where it is, unless it is infinite.
+    pub(super) fn clamped(&self, time: f32) -> f32 {
+        let [start, end] = [self.start as f32, self.end() as f32];
+        match time {
+            _ if time.is_nan() => start,
+            _ if self.is_still() && time.is_finite() => time,
+            _ => time.clamp(start, end),
+        }
+    }
+
     /// Returns what happens at its end.
     pub(super) fn repeat(&self) -> Repeat {
         self.repeat

@@ -24,6 +24,10 @@ pub(super) struct PlaybackState {
     pub(super) over: bool,
     /// The last step along a shared clock.
     pub(super) follow: Option<Follow>,
+    /// Number of its jumps, for those that follow it: seeks, and passes of a loop, which end where they do not begin.
+    pub(super) jumps: u32,
+    /// The entity that it should follow and cannot, of which the log has been told.
+    pub(super) warned_of: Option<Entity>,
 }
 
 /// A step along a shared clock. While everything but `phase` stays the same, time passes; otherwise it jumps.
@@ -37,6 +41,11 @@ pub(super) struct Follow {
 }
 
 impl PlaybackState {
+    /// Returns the state before the first step of something else on the same entity. Those that follow it see a jump.
+    pub(super) fn anew(&self) -> Self {
+        Self { jumps: self.jumps, warned_of: self.warned_of, ..Self::default() }
+    }
+
     /// Returns the time, in seconds since the capture's start, without the rounding of
     /// [`Playback::time`](super::Playback::time).
     pub(super) fn seconds(&self) -> f64 {

@@ -27,9 +27,11 @@ impl Playback {
     /// entity; call it only for captures that are played without the plugin.
     ///
     /// With [`Repeat::Loop`] time stays below the out point, because a loop ends where it begins. [`Repeat::Once`] stops exactly at the
-    /// end (backwards: at the start) and pauses. A still (no positive duration) and a `delta` that is not finite change nothing.
+    /// end (backwards: at the start) and pauses; played there without the plugin, it ends again, so call
+    /// [`replay`](Self::replay). A still (no positive duration) and a `delta` that is not finite change nothing.
     pub fn advance(&mut self, delta: f32, duration: f32) {
-        (*self, _) = PlaybackState::default().advance(*self, Drive::By(delta.into()), duration);
+        let mut state = PlaybackState { playing: self.playing, ..PlaybackState::default() };
+        (*self, _) = state.advance(*self, Drive::By(delta.into()), duration);
     }
 }
 

@@ -1,22 +1,23 @@
 //! The systems that advance clocks and captures.
 //!
 //! In: Bevy's time, shared clocks, and the duration of each loaded capture. Out: [`Playback::time`] of every entity with a capture,
-//! and messages about what happened.
+//! and messages about what happened; a warning for each entity that was given no capture.
 
-use super::clock::{FollowsClock, PlaybackClock};
+use super::clock::PlaybackClock;
 use super::component::Playback;
-use super::drive::drive;
+use super::drive::{Following, Shown};
+use super::markers::Markers;
 use super::messages::Announcer;
 use super::state::PlaybackState;
-use super::timeline::TimelinePlayer;
+use super::timeline::{TimelinePlayer, TimelineTrack};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
-use bevy::asset::Assets;
+use bevy::asset::{AssetId, Assets};
 use bevy::ecs::change_detection::DetectChangesMut;
 use bevy::ecs::entity::Entity;
-use bevy::ecs::query::Without;
+use bevy::ecs::query::{Changed, QueryFilter, Without};
 use bevy::ecs::schedule::SystemSet;
 use bevy::ecs::system::{Query, Res};
-use bevy::log::debug_span;
+use bevy::log::{debug_span, warn};
 use bevy::time::Time;
 
 /// Sets of playback systems in `Update`, in this order.
@@ -41,29 +42,93 @@ pub(super) fn run_clocks(time: Res<Time>, mut clocks: Query<&mut PlaybackClock>)
     }
 }
 
-/// Advances the playback of every capture that has been loaded.
+/// Advances the playback of every capture that has been loaded, those that are followed before their followers.
 pub(super) fn advance_captures(
     time: Res<Time>,
     captures: Res<Assets<GaussianCapture>>,
+    following: Following,
     clocks: Query<&PlaybackClock>,
+    others: Query<(&Playback, &PlaybackState), (Without<GaussianCapture3d>, Without<TimelinePlayer>)>,
     mut players: Query<
-        (Entity, &GaussianCapture3d, &mut Playback, &mut PlaybackState, Option<&FollowsClock>),
+        (Entity, &GaussianCapture3d, &mut Playback, &mut PlaybackState, Option<&Markers>),
         Without<TimelinePlayer>,
     >,
     mut announcer: Announcer,
 ) {
     let _span = debug_span!("gs4d/playback").entered();
-    for (entity, handle, mut playback, mut state, follows) in &mut players {
+    let order = following.order(players.iter().map(|(entity, ..)| entity));
+    for player in order {
+        let mut state = match players.get(player) {
+            Ok((_, handle, _, state, _)) if captures.contains(&handle.0) => state.clone(),
+            Ok(_) | Err(_) => continue,
+        };
+        let shown = |clock: Entity| {
+            let by_player = |(playback, state): (&Playback, &PlaybackState)| Shown::by_player(playback, state);
+            let by_clock = clocks.get(clock).ok().map(Shown::by_clock);
+            let by_capture = || players.get(clock).ok().map(|(_, _, playback, state, _)| by_player((playback, state)));
+            by_clock.or_else(by_capture).or_else(|| others.get(clock).ok().map(by_player))
+        };
+        let drive = following.drive(player, &time, shown, &mut state);
+        let Ok((entity, handle, mut playback, mut kept, markers)) = players.get_mut(player) else { continue };
         let Some(capture) = captures.get(&handle.0) else { continue };
-        let drive = drive(follows, &clocks, &time);
         let (next, progress) = state.advance(*playback, drive, capture.duration_seconds());
+        *kept = state;
         // A playback that stands still is not marked as changed.
         playback.set_if_neq(next);
         let key_frames = capture.key_frames();
         announcer.report(entity, &progress, |announcer, leg| {
             if let Some(key_frames) = &key_frames {
-                announcer.key_frames(entity, key_frames, leg);
+                announcer.bounds(entity, key_frames, leg);
+            }
+            if let Some(Markers(markers)) = markers {
+                announcer.markers(entity, markers, leg);
             }
         });
+    }
+}
+
+/// Warns of each entity that was given the handle of no asset. Tracks get theirs from their timeline.
+pub(super) fn warn_of_missing_handles(
+    captures: Res<Assets<GaussianCapture>>,
+    changed: Query<(Entity, &GaussianCapture3d), (Changed<GaussianCapture3d>, Without<TimelineTrack>)>,
+) {
+    for entity in without_handle(&captures, &changed) {
+        warn!(
+            "{entity} has a GaussianCapture3d with the handle of no asset, so that nothing is drawn: give it the handle \
+             that AssetServer::load or Assets::add returns"
+        );
+    }
+}
+
+/// Returns the entities whose handle is the default one, under which no asset has been inserted.
+fn without_handle<F: QueryFilter>(
+    captures: &Assets<GaussianCapture>,
+    placed: &Query<(Entity, &GaussianCapture3d), F>,
+) -> Vec<Entity> {
+    let lacks = |id: AssetId<GaussianCapture>| id == AssetId::default() && !captures.contains(id);
+    placed.iter().filter(|(_, capture)| lacks(capture.0.id())).map(|(entity, _)| entity).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy::app::App;
+    use bevy::asset::Handle;
+    use bevy::ecs::system::RunSystemOnce;
+
+    #[test]
+    fn entities_without_a_handle_are_told() {
+        let mut app = App::new();
+        app.init_resource::<Assets<GaussianCapture>>();
+        let reserved: Handle<GaussianCapture> = app.world().resource::<Assets<GaussianCapture>>().reserve_handle();
+        let without = app.world_mut().spawn(GaussianCapture3d::default()).id();
+        app.world_mut().spawn(GaussianCapture3d(reserved));
+        app.world_mut().spawn(TimelineTrack::default());
+        let told = |captures: Res<Assets<GaussianCapture>>,
+                    placed: Query<(Entity, &GaussianCapture3d), Without<TimelineTrack>>| {
+            without_handle(&captures, &placed)
+        };
+        let told = app.world_mut().run_system_once(told).expect("the assets are there");
+        assert_eq!(told, [without], "not one that is loading, nor a track, whose timeline gives it one");
     }
 }

@@ -197,7 +197,7 @@ impl Passes<'_> {
         let Some(pipeline) = view.write_motion.and_then(|id| self.cache.get_render_pipeline(id)) else { return };
         let (Some(vectors), Some(prepass_depth)) = (&prepass.motion_vectors, &prepass.depth) else { return };
         let (Some(motions), Some(depths)) = (view.renderer.motion(), view.renderer.depth()) else { return };
-        let (Some(viewport), Some(distance)) = (view.bindings.viewport(), view.depth_bindings.distance()) else {
+        let (Some(viewport), Some(distance)) = (view.bindings.viewport(), view.depth_bindings.lens()) else {
             return;
         };
         let (uniforms, targets) = ([viewport, distance], [motions, depths]);

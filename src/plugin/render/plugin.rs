@@ -21,7 +21,7 @@ use super::write_depth::WriteDepthPipeline;
 use super::write_motion::WriteMotionPipeline;
 use crate::plugin::asset::Uploads;
 use crate::plugin::component::GaussianCapture3d;
-use bevy::app::{App, Plugin, PostUpdate};
+use bevy::app::{App, Plugin, PostUpdate, SubApp};
 use bevy::asset::Assets;
 use bevy::camera::visibility::VisibilitySystems;
 use bevy::core_pipeline::core_3d::{main_opaque_pass_3d, main_transparent_pass_3d};
@@ -45,6 +45,16 @@ impl Plugin for CaptureRenderPlugin {
             .add_plugins(RenderAssetPlugin::<GpuGaussianCapture>::default())
             .add_systems(PostUpdate, update_bounds.in_set(VisibilitySystems::CalculateBounds));
         build_rendering(app);
+    }
+
+    fn finish(&self, app: &mut App) {
+        let has_captures = |render_app: &SubApp| render_app.world().contains_resource::<ExtractedCaptures>();
+        let late = app.get_sub_app(RenderApp).is_some_and(|render_app| !has_captures(render_app));
+        assert!(
+            !late,
+            "Bevy's RenderPlugin was added after GaussianCapturePlugin, which therefore draws nothing: add \
+             GaussianCapturePlugin after DefaultPlugins or, in an app without them, after RenderPlugin"
+        );
     }
 }
 

@@ -120,9 +120,9 @@ impl WriteDepthBindings {
         }
     }
 
-    /// Returns the lens's uniform, for other passes over the same view; `None` before the first [`set_distance`](Self::set_distance).
-    pub(super) fn distance(&self) -> Option<BindingResource<'_>> {
-        self.distance.binding()
+    /// Returns the lens's uniform, for other passes over the same view; `None` before the first [`set_lens`](Self::set_lens).
+    pub(super) fn lens(&self) -> Option<BindingResource<'_>> {
+        self.lens.binding()
     }
 
     /// Releases the targets that were bound.

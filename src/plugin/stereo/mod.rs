@@ -10,7 +10,8 @@
 //! ```no_run
 //! use bevy::camera::RenderTarget;
 //! use bevy::prelude::*;
-//! use bevy_gs4d::stereo::{EyeTargets, StereoPlugin, StereoRig, spawn_stereo};
+//! use bevy_gs4d::GaussianCapturePlugin;
+//! use bevy_gs4d::stereo::{EyeTargets, StereoRig, spawn_stereo};
 //!
 //! fn setup(mut commands: Commands) {
 //!     let window = EyeTargets::SideBySide(RenderTarget::default());
@@ -21,7 +22,7 @@
 //!     }
 //! }
 //!
-//! App::new().add_plugins((DefaultPlugins, StereoPlugin)).add_systems(Startup, setup).run();
+//! App::new().add_plugins((DefaultPlugins, GaussianCapturePlugin)).add_systems(Startup, setup).run();
 //! ```
 //!
 //! A headset has its own cameras, with its own lenses; this module is for screens and pictures.

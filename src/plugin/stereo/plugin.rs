@@ -16,21 +16,26 @@ use bevy::transform::TransformSystems;
 use bevy::transform::components::Transform;
 use glam::UVec2;
 
-/// Keeps the eyes of every [`StereoRig`] at their distance, and those that draw [side by side](SideBySide) in their halves.
+/// Keeps the eyes of every [`StereoRig`] at their distance, and those that draw [side by side](SideBySide) in their halves. Part of
+/// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin); adding it again changes nothing.
 ///
 /// # Examples
 ///
 /// ```no_run
 /// use bevy::prelude::*;
-/// use bevy_gs4d::prelude::*;
+/// use bevy_gs4d::stereo::StereoPlugin;
 ///
-/// App::new().add_plugins((DefaultPlugins, GaussianCapturePlugin, StereoPlugin)).run();
+/// // Two eyes without captures.
+/// App::new().add_plugins((DefaultPlugins, StereoPlugin)).run();
 /// ```
 #[derive(Debug, Default, Clone, Copy)]
 pub struct StereoPlugin;
 
 impl Plugin for StereoPlugin {
     fn build(&self, app: &mut App) {
+        if app.is_plugin_added::<Self>() {
+            return;
+        }
         app.add_systems(
             PostUpdate,
             (
@@ -38,6 +43,11 @@ impl Plugin for StereoPlugin {
                 fit_eyes.after(CameraUpdateSystems).before(VisibilitySystems::UpdateFrusta),
             ),
         );
+    }
+
+    /// A second one does nothing.
+    fn is_unique(&self) -> bool {
+        false
     }
 }
 
@@ -128,6 +138,18 @@ mod tests {
             app.update();
             assert!((place(&app, 1).z - expected).abs() < 1e-6, "at {ipd} the right eye is at {}", place(&app, 1));
         }
+    }
+
+    #[test]
+    fn adding_it_twice_changes_nothing() {
+        let systems = |times| {
+            let mut app = App::new();
+            for _ in 0..times {
+                app.add_plugins(StereoPlugin);
+            }
+            app.get_schedule(PostUpdate).map_or(0, |schedule| schedule.graph().systems.len())
+        };
+        assert_eq!(systems(2), systems(1), "the systems run once");
     }
 
     #[test]

@@ -13,7 +13,8 @@ use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 use bevy::transform::components::Transform;
 
-/// A head. [`StereoPlugin`](super::StereoPlugin) places its children with an [`Eye`] on either side of it; the game sets its own transform.
+/// A head. [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) places its children with an [`Eye`] on either side of it; the game
+/// sets its own transform.
 ///
 /// # Examples
 ///
@@ -130,7 +131,7 @@ pub struct Stereo {
 
 /// Spawns a head with two eyes, and returns their entities. The left eye is drawn first: its camera has the order 0, the right one's 1.
 ///
-/// [`StereoPlugin`](super::StereoPlugin) keeps the eyes in their places.
+/// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) keeps the eyes in their places.
 ///
 /// # Examples
 ///

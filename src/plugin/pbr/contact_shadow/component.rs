@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn it_fades_with_height() {
-        let at = |height| SHADOW.beneath(Vec3::Y * (2.0 + height), Vec3::ONE).map_or(0.0, |ellipse| ellipse.strength);
+        let at = |height: f32| SHADOW.beneath(Vec3::Y * (2.0 + height), Vec3::ONE).map_or(0.0, |ellipse| ellipse.strength);
         assert!((at(1.0) - 0.4).abs() < 1e-6, "half way up half of it is left");
         assert_eq!([at(2.0), at(9.0)], [0.0; 2], "nothing at twice the radius and above");
         assert_eq!(at(-0.5), 0.8, "a capture that is partly in the ground stands on it");

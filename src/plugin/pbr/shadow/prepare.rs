@@ -33,6 +33,7 @@ const PARAMETERS: ViewParameters<'static> = ViewParameters {
     debug: DebugView::Color,
     depths: true,
     precision: ColorPrecision::Half,
+    previous: None,
 };
 
 /// Everything that can cast a shadow this frame.

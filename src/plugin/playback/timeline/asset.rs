@@ -4,6 +4,7 @@
 
 use super::clip::{Clip, TOUCH, is_time};
 use super::error::InvalidTimeline;
+use crate::plugin::playback::markers::Marker;
 use bevy::asset::{Asset, VisitAssetDependencies};
 use bevy::reflect::TypePath;
 use std::collections::HashSet;
@@ -40,15 +41,6 @@ pub struct Track {
     /// Its clips, which may touch but not overlap.
     #[dependency]
     pub clips: Vec<Clip>,
-}
-
-/// A time with a name: playing across it sends [`MarkerReached`](crate::playback::MarkerReached).
-#[derive(Debug, Clone, PartialEq)]
-pub struct Marker {
-    /// Its time, in seconds of the timeline: 0 or later.
-    pub time: f32,
-    /// Its name, which the message carries.
-    pub name: String,
 }
 
 impl Timeline {

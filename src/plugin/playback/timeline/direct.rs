@@ -3,15 +3,14 @@
 //! In: loaded timelines and their players. Out: an entity for each track, with the capture, playback, fade and visibility of its clip at
 //! this time.
 
-use super::asset::{Marker, Timeline};
+use super::asset::Timeline;
 use super::clip::Clip;
 use super::player::{ClipFade, Directed, TimelinePlayer, TimelineTrack};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::clock::{FollowsClock, PlaybackClock};
 use crate::plugin::playback::component::Playback;
-use crate::plugin::playback::drive::drive;
+use crate::plugin::playback::drive::{Following, Shown};
 use crate::plugin::playback::messages::Announcer;
-use crate::plugin::playback::span::Leg;
 use crate::plugin::playback::state::PlaybackState;
 use bevy::asset::Assets;
 use bevy::camera::visibility::Visibility;
@@ -48,52 +47,45 @@ pub(in crate::plugin::playback) fn bind_tracks(
     }
 }
 
-/// Advances the playheads.
+/// Advances the playheads, those that are followed before their followers. Captures advance later: who follows one is a frame behind it.
 pub(in crate::plugin::playback) fn advance_timelines(
     time: Res<Time>,
     timelines: Res<Assets<Timeline>>,
+    following: Following,
     clocks: Query<&PlaybackClock, Without<TimelinePlayer>>,
-    mut players: Query<(
-        Entity,
-        &TimelinePlayer,
-        &mut Playback,
-        &mut PlaybackState,
-        &mut PlaybackClock,
-        Option<&FollowsClock>,
-    )>,
+    others: Query<(&Playback, &PlaybackState), Without<TimelinePlayer>>,
+    mut players: Query<(Entity, &TimelinePlayer, &mut Playback, &mut PlaybackState, &mut PlaybackClock)>,
     mut announcer: Announcer,
 ) {
     let _span = debug_span!("gs4d/timelines").entered();
-    for (entity, handle, mut playback, mut state, mut clock, follows) in &mut players {
+    let order = following.order(players.iter().map(|(entity, ..)| entity));
+    for player in order {
+        let mut state = match players.get(player) {
+            Ok((_, handle, _, state, _)) if timelines.contains(&handle.0) => state.clone(),
+            Ok(_) | Err(_) => continue,
+        };
+        let shown = |leader: Entity| {
+            let by_timeline = players.get(leader).ok().map(|(.., clock)| Shown::by_clock(clock));
+            let by_clock = || clocks.get(leader).ok().map(Shown::by_clock);
+            let by_player = || others.get(leader).ok().map(|(playback, state)| Shown::by_player(playback, state));
+            by_timeline.or_else(by_clock).or_else(by_player)
+        };
+        let drive = following.drive(player, &time, shown, &mut state);
+        let Ok((entity, handle, mut playback, mut kept, mut clock)) = players.get_mut(player) else { continue };
         let Some(timeline) = timelines.get(&handle.0) else { continue };
-        let drive = drive(follows, &clocks, &time);
-        let was_at_end = state.is_at_end_of_loop();
+        let jumps = state.jumps;
         let (next, progress) = state.advance(*playback, drive, timeline.duration_seconds());
         playback.set_if_neq(next);
-        // Starting over is a jump: tracks do not play backwards to the start.
-        let wrapped = progress.travel.is_some_and(|travel| travel.wraps() || was_at_end && travel.is_forward());
         let mut shown = *clock;
-        if progress.jumped || wrapped {
+        if state.jumps != jumps {
             shown.seek(state.seconds());
         } else {
             shown.set(state.seconds());
         }
+        *kept = state;
         clock.set_if_neq(shown);
-        announcer.report(entity, &progress, |announcer, leg| {
-            for marker in crossed(timeline, leg) {
-                announcer.marker(entity, &marker.name, marker.time);
-            }
-        });
+        announcer.report(entity, &progress, |announcer, leg| announcer.markers(entity, timeline.markers(), leg));
     }
-}
-
-/// Returns the markers on a stretch, in the order of play.
-fn crossed<'a>(timeline: &'a Timeline, leg: &Leg) -> impl Iterator<Item = &'a Marker> {
-    let (markers, leg) = (timeline.markers(), *leg);
-    (0..markers.len())
-        .map(move |index| if leg.from <= leg.to { index } else { markers.len() - 1 - index })
-        .map(move |index| &markers[index])
-        .filter(move |marker| leg.passes(marker.time.into()))
 }
 
 /// Gives every track's entity its clip, fade and visibility at this time.
@@ -141,7 +133,7 @@ fn cast(
         capture.set_if_neq(GaussianCapture3d(clip.capture.clone()));
         playback.set_if_neq(wanted);
         // A clip begins anew; it is not a seek from where the last one ended.
-        *state = PlaybackState::default();
+        *state = state.anew();
         directed.0 = Some(clip.clone());
     } else if playback.offset != wanted.offset {
         // How far the clip reaches beyond its capture is known only once that is loaded.

@@ -3,10 +3,11 @@
 //! In: the text of a `*.timeline.ron`, as the [module](super) describes. Out: a [`Timeline`] whose captures have begun to load, or a
 //! [`TimelineError`], to which Bevy adds the path.
 
-use super::asset::{Marker, Timeline, Track};
+use super::asset::{Timeline, Track};
 use super::clip::Clip;
 use super::error::InvalidTimeline;
 use crate::plugin::component::GaussianCapture;
+use crate::plugin::playback::markers::Marker;
 use bevy::asset::io::Reader;
 use bevy::asset::{AssetLoader, AssetPath, Handle, LoadContext, ParseAssetPathError};
 use bevy::reflect::TypePath;

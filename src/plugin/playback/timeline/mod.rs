@@ -29,7 +29,7 @@ mod error;
 mod file;
 mod player;
 
-pub use asset::{Marker, Timeline, Track};
+pub use asset::{Timeline, Track};
 pub use clip::Clip;
 pub(super) use direct::{advance_timelines, bind_tracks, direct_tracks};
 pub use error::InvalidTimeline;

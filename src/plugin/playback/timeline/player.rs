@@ -19,7 +19,7 @@ use bevy::transform::components::Transform;
 ///
 /// Its [`Playback`] is the playhead: play, pause, seek, reverse and loop it like that of a capture, or let it
 /// [follow a clock](crate::playback::FollowsClock). Its own [`PlaybackClock`] shows the time of the playhead to its tracks. Other captures
-/// can follow that clock, too, but other timelines cannot: to keep two timelines together, let both follow a third clock.
+/// and timelines can follow the player, too.
 ///
 /// Each track is played by the child with the [`TimelineTrack`] of its name. For a track without such a child, one is spawned.
 ///
@@ -32,8 +32,7 @@ use bevy::transform::components::Transform;
 /// use bevy_gs4d::prelude::*;
 ///
 /// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
-///     let once = Playback { repeat: Repeat::Once, ..default() };
-///     commands.spawn((TimelinePlayer(assets.load("demo.timeline.ron")), once));
+///     commands.spawn((TimelinePlayer(assets.load("demo.timeline.ron")), Playback::once()));
 /// }
 /// # bevy::ecs::system::assert_is_system(setup);
 /// ```

@@ -1,0 +1,63 @@
+//! Captures that stand upright.
+//!
+//! In: an entity with [`Upright`], the up direction of its capture. Out: the same entity with its transform turned, once the capture is
+//! loaded.
+
+use super::GaussianCapture3d;
+use super::capture::GaussianCapture;
+use bevy::asset::Assets;
+use bevy::ecs::component::Component;
+use bevy::ecs::query::With;
+use bevy::ecs::reflect::ReflectComponent;
+use bevy::ecs::system::{Query, Res};
+use bevy::reflect::Reflect;
+use bevy::reflect::std_traits::ReflectDefault;
+use bevy::transform::components::Transform;
+use glam::Quat;
+
+/// Stands a capture upright, whichever axis its dataset has as up: beside a [`GaussianCapture3d`].
+///
+/// When the capture has been loaded, the entity's [`Transform`] is turned by [`GaussianCapture::upright`], once, before anything is drawn:
+/// `rotation` becomes the rotation that the game has set, multiplied by that. What the game sets turns the capture that already stands, so that
+/// `Transform::from_rotation(Quat::from_rotation_y(..))` turns it about the vertical. When the entity is given another capture, or its file
+/// changes, only the difference between their up directions is applied.
+///
+/// Rendering, picking, bounds and children see an ordinary transform. A game that sets `rotation` again later replaces all of it: turn the
+/// entity by `rotate`, or turn a parent.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
+///     commands.spawn((GaussianCapture3d(assets.load("toybox.gs4d")), Upright, Transform::from_xyz(0.0, 0.0, -2.0)));
+/// }
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
+#[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
+#[reflect(Component, Default, Debug, Clone, PartialEq)]
+#[require(Transform, Turned)]
+pub struct Upright;
+
+/// The rotation by which an entity's transform has been turned. Reflected, so that an entity that is saved with its transform is not turned
+/// again.
+#[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq)]
+#[reflect(Component, Default, Debug, Clone, PartialEq)]
+pub(crate) struct Turned(Quat);
+
+/// Turns what has been loaded, or has another capture than before.
+pub(crate) fn stand_upright(
+    captures: Res<Assets<GaussianCapture>>,
+    mut placed: Query<(&GaussianCapture3d, &mut Transform, &mut Turned), With<Upright>>,
+) {
+    for (handle, mut transform, mut turned) in &mut placed {
+        let Some(capture) = captures.get(&handle.0) else { continue };
+        let upright = capture.upright();
+        if turned.0 != upright {
+            transform.rotation = (transform.rotation * turned.0.inverse() * upright).normalize();
+            turned.0 = upright;
+        }
+    }
+}

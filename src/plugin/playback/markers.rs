@@ -1,0 +1,79 @@
+//! Markers: moments with a name.
+//!
+//! In: the markers of a timeline, or [`Markers`] on a capture; a stretch that was played. Out: those on it, in the order of play.
+
+use super::span::Leg;
+use bevy::ecs::component::Component;
+use bevy::ecs::reflect::ReflectComponent;
+use bevy::reflect::Reflect;
+use bevy::reflect::std_traits::ReflectDefault;
+
+/// A time with a name: playing across it sends [`MarkerReached`](super::MarkerReached).
+#[derive(Reflect, Debug, Default, Clone, PartialEq)]
+#[reflect(Default, Debug, Clone, PartialEq)]
+pub struct Marker {
+    /// Its time, in seconds since the start of the timeline or of the capture: 0 or later.
+    pub time: f32,
+    /// Its name, which the message carries.
+    pub name: String,
+}
+
+/// Markers on one capture, without a timeline: each sends [`MarkerReached`](super::MarkerReached) when the capture's
+/// [`Playback`](super::Playback) plays across it, in any direction and with any [`Repeat`](super::Repeat). Seeks skip markers; one at the
+/// very moment sought is reached once playing continues from there.
+///
+/// The order does not matter. A time outside of the range that is played, or that is not a number, is never reached. Default: none.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
+///     let steps = Markers::new([(0.4, "left foot"), (0.9, "right foot")]);
+///     commands
+///         .spawn((GaussianCapture3d(assets.load("dancer.gs4d")), steps))
+///         .observe(|reached: On<MarkerReached>| info!("{}", reached.name));
+/// }
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
+#[derive(Component, Reflect, Debug, Default, Clone, PartialEq)]
+#[reflect(Component, Default, Debug, Clone, PartialEq)]
+pub struct Markers(pub Vec<Marker>);
+
+impl Markers {
+    /// Returns markers at times in seconds since the capture's start, each with its name.
+    pub fn new<N: Into<String>>(markers: impl IntoIterator<Item = (f32, N)>) -> Self {
+        Self(markers.into_iter().map(|(time, name)| Marker { time, name: name.into() }).collect())
+    }
+}
+
+/// Returns the markers on a stretch, in the order of play.
+pub(super) fn crossed<'a>(markers: &'a [Marker], leg: &Leg) -> Vec<&'a Marker> {
+    let mut crossed: Vec<&Marker> = markers.iter().filter(|marker| leg.passes(marker.time.into())).collect();
+    crossed.sort_by(|a, b| a.time.total_cmp(&b.time));
+    if leg.from > leg.to {
+        crossed.reverse();
+    }
+    crossed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn markers_come_in_the_order_of_play() {
+        let markers = Markers::new([(1.5, "c"), (0.5, "a"), (f32::NAN, "never"), (1.0, "b")]);
+        let names = |from, to, inclusive| {
+            let crossed = crossed(&markers.0, &Leg { from, to, inclusive });
+            crossed.iter().map(|marker| marker.name.as_str()).collect::<Vec<_>>()
+        };
+        assert_eq!(names(0.0, 2.0, false), ["a", "b", "c"], "by time, however they were written");
+        assert_eq!(names(2.0, 0.0, false), ["c", "b", "a"], "and back");
+        assert_eq!(names(0.5, 1.0, false), ["b"], "not the one where it began");
+        assert_eq!(names(0.5, 1.0, true), ["a", "b"], "unless that counts");
+        assert_eq!(names(1.1, 1.4, true), [""; 0], "nor others");
+    }
+}

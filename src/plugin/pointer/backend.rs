@@ -1,0 +1,59 @@
+//! The backend: from rays of pointers to hits.
+//!
+//! In: Bevy's map of rays, cameras and captures with their layers and `Pickable`. Out: one `PointerHits` for each ray that hits a capture.
+
+use super::settings::{CapturePickingCamera, CapturePickingSettings};
+use crate::plugin::component::GaussianCapture3d;
+use crate::plugin::picking::CapturePicker;
+use bevy::camera::visibility::{RenderLayers, ViewVisibility};
+use bevy::camera::{Camera, Camera3d};
+use bevy::ecs::entity::Entity;
+use bevy::ecs::message::MessageWriter;
+use bevy::ecs::query::{Has, With};
+use bevy::ecs::system::{Query, Res};
+use bevy::log::debug_span;
+use bevy::picking::backend::ray::RayMap;
+use bevy::picking::backend::{HitData, PointerHits};
+use bevy::picking::{Pickable, PickingSettings};
+
+/// Casts the rays of this frame.
+pub(super) fn update_hits(
+    picking: Res<PickingSettings>,
+    settings: Res<CapturePickingSettings>,
+    rays: Res<RayMap>,
+    cameras: Query<(&Camera, Has<CapturePickingCamera>, Option<&RenderLayers>), With<Camera3d>>,
+    captures: Query<(&ViewVisibility, Option<&Pickable>, Option<&RenderLayers>), With<GaussianCapture3d>>,
+    picker: CapturePicker,
+    mut hits: MessageWriter<PointerHits>,
+) {
+    if !picking.is_enabled {
+        return;
+    }
+    let _span = debug_span!("gs4d/pointers").entered();
+    for (id, ray) in rays.iter() {
+        let Ok((camera, is_marked, layers)) = cameras.get(id.camera) else { continue };
+        if settings.require_markers && !is_marked {
+            continue;
+        }
+        let layers = layers.cloned().unwrap_or_default();
+        let takes_part = |capture: Entity| {
+            let Ok((visibility, pickable, its_layers)) = captures.get(capture) else { return false };
+            // One that is not hoverable may still hide what is behind it.
+            let matters = pickable.is_none_or(|pickable| pickable.is_hoverable || pickable.should_block_lower);
+            let is_seen = visibility.get() && layers.intersects(&its_layers.cloned().unwrap_or_default());
+            is_seen && matters && (pickable.is_some() || !settings.require_markers)
+        };
+        let blocks = |capture: Entity| {
+            let Ok((_, pickable, _)) = captures.get(capture) else { return false };
+            pickable.is_none_or(|pickable| pickable.should_block_lower)
+        };
+        let picks: Vec<(Entity, HitData)> = picker
+            .cast_through(*ray, |capture, _| takes_part(capture), blocks)
+            .into_iter()
+            .map(|hit| (hit.entity, HitData::new_with_extra(id.camera, hit.distance, Some(hit.point), None, hit)))
+            .collect();
+        if !picks.is_empty() {
+            hits.write(PointerHits::new(id.pointer, picks, camera.order as f32));
+        }
+    }
+}

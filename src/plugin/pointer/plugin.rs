@@ -1,0 +1,23 @@
+//! The plugin of pointer events.
+//!
+//! In: an app in which captures play, Bevy's `PickingPlugin`. Out: the same app, in which pointers hit captures.
+
+use super::backend::update_hits;
+use super::settings::CapturePickingSettings;
+use bevy::app::{App, Plugin, PreUpdate};
+use bevy::ecs::schedule::IntoScheduleConfigs;
+use bevy::ecs::schedule::common_conditions::resource_exists;
+use bevy::picking::PickingSystems;
+use bevy::picking::backend::ray::RayMap;
+
+/// Sends pointers' hits on captures, in apps with Bevy's `PickingPlugin`, whenever that is added. Part of
+/// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin).
+#[derive(Debug, Default, Clone, Copy)]
+pub(crate) struct CapturePointerPlugin;
+
+impl Plugin for CapturePointerPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<CapturePickingSettings>()
+            .add_systems(PreUpdate, update_hits.run_if(resource_exists::<RayMap>).in_set(PickingSystems::Backend));
+    }
+}
