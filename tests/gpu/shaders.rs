@@ -98,9 +98,10 @@ fn an_unknown_pass_is_named() {
 
 #[test]
 fn bevy_s_passes_are_valid_with_all_their_definitions() {
-    let composite = ("composite", include_str!("../../shaders/composite.wgsl"), ["READ_TARGET", "ENCODE_TARGET"]);
-    let write_depth = ("write_depth", include_str!("../../shaders/write_depth.wgsl"), ["MEDIAN", "UNUSED"]);
-    let check = |(name, source, defines): (&str, &str, [&str; 2]), chosen: usize| {
+    let defines = ["READ_TARGET", "ENCODE_TARGET", "KEEP_SAMPLES"];
+    let composite = ("composite", include_str!("../../shaders/composite.wgsl"), defines);
+    let write_depth = ("write_depth", include_str!("../../shaders/write_depth.wgsl"), ["MEDIAN", "UNUSED", "UNUSED_TOO"]);
+    let check = |(name, source, defines): (&str, &str, [&str; 3]), chosen: usize| {
         let chosen = defines.iter().enumerate().filter(|(index, _)| (chosen >> index) & 1 == 1);
         let shader_defs = chosen.map(|(_, define)| ((*define).to_owned(), ShaderDefValue::Bool(true))).collect();
         let mut composer = Composer::default();
@@ -113,6 +114,6 @@ fn bevy_s_passes_are_valid_with_all_their_definitions() {
         let module = composer.make_naga_module(descriptor).map_err(|error| error.emit_to_string(&composer))?;
         validate(name, &module, Capabilities::SHADER_FLOAT16_IN_FLOAT32)
     };
-    let all = [composite, write_depth].into_iter().flat_map(|pass| (0..4).map(move |chosen| (pass, chosen)));
+    let all = [composite, write_depth].into_iter().flat_map(|pass| (0..8).map(move |chosen| (pass, chosen)));
     report(all.filter_map(|(pass, chosen)| check(pass, chosen).err()).collect());
 }

@@ -2,6 +2,7 @@
 //!
 //! In: an app in which captures are drawn. Out: the same app with the parts of this folder.
 
+use super::order;
 use bevy::app::{App, Plugin};
 
 /// Joins captures and lit meshes. Part of [`GaussianCapturePlugin`](crate::GaussianCapturePlugin).
@@ -9,5 +10,7 @@ use bevy::app::{App, Plugin};
 pub(crate) struct CapturePbrPlugin;
 
 impl Plugin for CapturePbrPlugin {
-    fn build(&self, _app: &mut App) {}
+    fn build(&self, app: &mut App) {
+        order::build(app);
+    }
 }
