@@ -4,7 +4,7 @@
 //! is in front covers it, with the colours that follow from pictures of each alone, multisampled or not, HDR or not. Skipped where there
 //! is no GPU, not even a software one.
 
-use crate::support::cpu_reference::{SIZE, difference_between, eye, rgb};
+use crate::support::cpu_reference::{SIZE, blob, difference_between, eye, rgb, scene};
 use crate::support::fixtures::{MIDDLE, crowd, front, insert, lone, spawn, spawn_box};
 use crate::support::offscreen_app::{app, picture, spawn_camera};
 use crate::support::skip::skip;
@@ -130,6 +130,18 @@ fn the_captures_of_a_view_have_the_place_of_the_nearest() {
     insert(&mut app, near, Visibility::Hidden);
     let far = blue(&mut app);
     assert!(far > 150, "and in front of the other alone, not {far}");
+}
+
+#[test]
+fn a_capture_whose_centre_is_behind_the_camera_is_behind_glass() {
+    let Some(mut app) = app(SIZE) else { return };
+    let heap = |z: f32| (blob(Vec3::Z * z, Vec3::splat(0.4), 0.98), Vec3::X);
+    // The centre is ten units from the origin, the camera four.
+    spawn(&mut app, &scene(&[heap(0.0), heap(20.0)]), ());
+    spawn_camera(&mut app, Msaa::Sample4, front());
+    spawn_pane(&mut app, OPACITY, BEFORE);
+    let [r, _, b] = rgb(&picture(&mut app, 0.0), MIDDLE.x, MIDDLE.y);
+    assert!(r > 170 && b > 150, "the pane is over what is seen of the capture, not {r}, {b}");
 }
 
 #[test]

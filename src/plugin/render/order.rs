@@ -99,12 +99,14 @@ pub(super) fn place_captures(
     }
 }
 
-/// Returns where the nearest capture stands that a camera sees, by the centre of its bounds.
+/// Returns where the nearest capture stands that a camera sees, by the centre of its bounds: in Bevy's measure, which is 0 at the camera
+/// and grows towards it. A centre behind the camera, as of a room, says nothing: what is in the room is before its walls.
 fn nearest(captures: &ExtractedCaptures, view: &ExtractedView, visible: &RenderVisibleEntities) -> Option<f32> {
     let rangefinder = view.rangefinder3d();
     let placed = visible.get::<GaussianCapture3d>()?.iter_visible().filter_map(|(_, entity)| captures.0.get(entity));
     let shown = placed.filter(|placed| !placed.is_faded_out());
-    shown.map(|placed| rangefinder.distance(&placed.center)).reduce(f32::max)
+    let distances = shown.map(|placed| rangefinder.distance(&placed.center));
+    distances.map(|distance| if distance < 0.0 { distance } else { f32::NEG_INFINITY }).reduce(f32::max)
 }
 
 /// Inserts an item that draws nothing before the first that is nearer than `distance`, if there is one, and returns its index. Bevy
