@@ -30,10 +30,11 @@
 //! With or without multisampling, HDR or not, and without a setting: Bevy sorts its transparent phase (blended materials, particles of
 //! other plugins) by the distance of each item's centre, and captures have a place in it. All captures of a view are drawn at once,
 //! since their Gaussians interleave: at the centre of the bounds of the nearest one, however faint it is. One whose centre is behind the
-//! camera, as in a room, counts as the farthest; an item at the same distance is behind. What is behind is in the target before captures are blended with it, so soft edges are as over anything opaque. As between
-//! meshes, one distance for each is too little where they reach through each other, or for a capture all around the camera. With
-//! [`DepthWrite`] all transparent things are therefore drawn after captures, which cut them pixel by pixel where they hide more than half
-//! of what is behind; elsewhere, as in smoke, what is behind is drawn over them.
+//! camera, as in a room, counts as the farthest; an item at the same distance is behind. What is behind is in the target before captures
+//! are blended with it, so soft edges are as over anything opaque. As between meshes, one distance for each is too little where they reach
+//! through each other, or for a capture all around the camera. With [`DepthWrite`] all transparent things are therefore drawn after
+//! captures, which cut them pixel by pixel where they hide more than half of what is behind; elsewhere, as in smoke, what is behind is
+//! drawn over them.
 //!
 //! What this costs: nothing while no transparent thing is in front, and another render pass otherwise. Multisampled captures are drawn
 //! into the resolved picture, or, if something is in front or a wireframe is drawn, into every sample, so that these can be resolved
