@@ -27,7 +27,7 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>, capture: Res<Capture>
     commands.spawn((GaussianCapture3d(assets.load(capture.0.clone())), Upright));
     commands.spawn((
         Camera3d::default(),
-        // Captures are no smoother for multisampling. With it, transparent meshes would be drawn before captures, not over them.
+        // Captures are no smoother for multisampling.
         Msaa::Off,
         Transform::from_xyz(2.5, 1.5, 3.0).looking_at(Vec3::ZERO, Vec3::Y),
     ));

@@ -170,7 +170,7 @@ fn spawn_body(mut commands: Commands, targets: Res<Targets>) {
 
 /// Returns the settings of every eye, ours and a headset's.
 fn eye_settings() -> impl Bundle {
-    // The closing edges are transparent, and drawn over captures only without multisampling. The colours of the capture stay as trained.
+    // Captures are no smoother for multisampling. Their colours stay as trained.
     (Msaa::Off, Tonemapping::None)
 }
 

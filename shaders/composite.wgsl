@@ -3,6 +3,7 @@
 // In: the captures' color and transmittance (premultiplied, in their blend space, linear or sRGB-encoded) for the pixels of the viewport;
 // with READ_TARGET the view target so far. Out: the view target. Blending is done in the captures' blend space: a target in the same space
 // is blended in place; one in the other space is read, linear with ENCODE_TARGET, otherwise sRGB-encoded, and written to another texture.
+// With KEEP_SAMPLES what is read is the mean of a pixel's samples, and each sample is written, or keeps its value where there is no splat.
 #import gs4d::srgb
 
 // The largest half float: an infinite pixel would spread through bloom.
@@ -45,12 +46,18 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
     let pixel = vec2<u32>(position.xy);
     let behind = textureLoad(source, pixel, 0);
     if any(pixel < viewport.xy) || any(pixel >= viewport.xy + viewport.zw) {
+#ifdef KEEP_SAMPLES
+        discard;
+#endif
         return behind;
     }
     let front = textureLoad(captures, pixel - viewport.xy, 0);
     let transmittance = front.a;
     // Where there is no splat, the target is unchanged, to the bit.
     if transmittance >= 1.0 && all(front.rgb == vec3(0.0)) {
+#ifdef KEEP_SAMPLES
+        discard;
+#endif
         return behind;
     }
     let alpha = 1.0 - transmittance * (1.0 - behind.a);

@@ -439,7 +439,7 @@ fn transparent_meshes_are_drawn_in_the_documented_order() {
     // What the camera is, where the pane stands, and whether it is seen before the capture.
     let cases = [
         (Msaa::Off, perspective(), none, 1.5, true),
-        (Msaa::Off, perspective(), none, -1.5, true),
+        (Msaa::Off, perspective(), none, -1.5, false),
         // The one Gaussian's depth is that of its centre.
         (Msaa::Off, perspective(), median, 0.1, true),
         (Msaa::Off, perspective(), median, -0.1, false),
@@ -449,9 +449,12 @@ fn transparent_meshes_are_drawn_in_the_documented_order() {
         (Msaa::Off, parallel(), median, -0.1, false),
         (Msaa::Off, finite_far(), median, 0.1, true),
         (Msaa::Off, finite_far(), median, -0.1, false),
-        (Msaa::Sample4, perspective(), none, 1.5, false),
+        (Msaa::Off, parallel(), none, 1.5, true),
+        (Msaa::Off, parallel(), none, -1.5, false),
+        (Msaa::Sample4, perspective(), none, 1.5, true),
         (Msaa::Sample4, perspective(), none, -1.5, false),
-        (Msaa::Sample4, perspective(), median, 1.5, false),
+        (Msaa::Sample4, perspective(), median, 0.1, true),
+        (Msaa::Sample4, perspective(), median, -0.1, false),
     ];
     for (msaa, projection, depth, place, shows) in cases {
         let name = format!("{msaa:?}, {depth:?}, {projection:?}, at {place}");

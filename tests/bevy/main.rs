@@ -9,6 +9,7 @@ mod app;
 mod assets;
 mod composition;
 mod examples;
+mod glass;
 mod golden;
 mod inspector;
 mod motion;

@@ -98,10 +98,12 @@ fn an_unknown_pass_is_named() {
 
 #[test]
 fn bevy_s_passes_are_valid_with_all_their_definitions() {
-    let composite = ("composite", include_str!("../../shaders/composite.wgsl"), ["READ_TARGET", "ENCODE_TARGET"]);
-    let write_depth = ("write_depth", include_str!("../../shaders/write_depth.wgsl"), ["MEDIAN", "UNUSED"]);
-    let write_motion = ("write_motion", include_str!("../../shaders/write_motion.wgsl"), ["MEDIAN", "UNUSED"]);
-    let check = |(name, source, defines): (&str, &str, [&str; 2]), chosen: usize| {
+    let defines = ["READ_TARGET", "ENCODE_TARGET", "KEEP_SAMPLES"];
+    let composite = ("composite", include_str!("../../shaders/composite.wgsl"), defines);
+    let median = ["MEDIAN", "UNUSED", "UNUSED_TOO"];
+    let write_depth = ("write_depth", include_str!("../../shaders/write_depth.wgsl"), median);
+    let write_motion = ("write_motion", include_str!("../../shaders/write_motion.wgsl"), median);
+    let check = |(name, source, defines): (&str, &str, [&str; 3]), chosen: usize| {
         let chosen = defines.iter().enumerate().filter(|(index, _)| (chosen >> index) & 1 == 1);
         let shader_defs = chosen.map(|(_, define)| ((*define).to_owned(), ShaderDefValue::Bool(true))).collect();
         let mut composer = Composer::default();
@@ -115,6 +117,6 @@ fn bevy_s_passes_are_valid_with_all_their_definitions() {
         validate(name, &module, Capabilities::SHADER_FLOAT16_IN_FLOAT32)
     };
     let passes = [composite, write_depth, write_motion].into_iter();
-    let all = passes.flat_map(|pass| (0..4).map(move |chosen| (pass, chosen)));
+    let all = passes.flat_map(|pass| (0..8).map(move |chosen| (pass, chosen)));
     report(all.filter_map(|(pass, chosen)| check(pass, chosen).err()).collect());
 }

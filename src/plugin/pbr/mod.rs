@@ -3,6 +3,7 @@
 //! In: an app in which captures are drawn, Bevy's `PbrPlugin`. Out: the same app, in which captures and meshes belong to one scene.
 
 mod contact_shadow;
+mod order;
 mod plugin;
 mod shade;
 mod shadow;

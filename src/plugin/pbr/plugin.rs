@@ -3,6 +3,7 @@
 //! In: an app in which captures are drawn. Out: the same app with the parts of this folder.
 
 use super::contact_shadow::ContactShadowPlugin;
+use super::order;
 use super::shade::ShadePlugin;
 use super::shadow::CaptureShadowPlugin;
 use bevy::app::{App, Plugin};
@@ -13,6 +14,7 @@ pub(crate) struct CapturePbrPlugin;
 
 impl Plugin for CapturePbrPlugin {
     fn build(&self, app: &mut App) {
+        order::build(app);
         app.add_plugins((ShadePlugin, CaptureShadowPlugin, ContactShadowPlugin));
     }
 }

@@ -31,6 +31,8 @@ pub(crate) struct CaptureView {
     pub(crate) renderer: ViewRenderer,
     /// The composite into the camera's target, and what it binds.
     pub(super) composite: CachedRenderPipelineId,
+    /// The composite into every sample of a multisampled target.
+    pub(super) composite_samples: Option<CachedRenderPipelineId>,
     /// Whether it blends with the target where that is, instead of reading it.
     pub(super) in_place: bool,
     pub(super) bindings: CompositeBindings,
@@ -49,8 +51,6 @@ pub(crate) struct CaptureView {
     pub(crate) shaded: Option<wgpu::TextureView>,
     /// Whether GPU times are measured.
     measured: bool,
-    /// Whether captures are drawn after transparent meshes even without multisampling.
-    pub(super) late: bool,
     /// Frames since the camera last saw a capture.
     idle: u32,
     /// The captures that the camera sees this frame; nothing is drawn while this is empty.
@@ -95,6 +95,7 @@ impl CaptureView {
             camera,
             renderer: ViewRenderer::new(device.wgpu_device(), renderer),
             composite,
+            composite_samples: None,
             in_place: false,
             bindings: CompositeBindings::default(),
             write_depth: None,
@@ -105,7 +106,6 @@ impl CaptureView {
             is_shaded: false,
             shaded: None,
             measured: false,
-            late: false,
             idle: 0,
             drawn: Vec::new(),
         }

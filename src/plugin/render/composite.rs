@@ -12,9 +12,9 @@ use bevy::ecs::world::{FromWorld, World};
 use bevy::render::render_resource::binding_types::{texture_2d, uniform_buffer};
 use bevy::render::render_resource::{
     BindGroup, BindGroupEntries, BindGroupEntry, BindGroupLayoutDescriptor, BindGroupLayoutEntries, BindingResource,
-    BlendState, ColorTargetState, ColorWrites, FragmentState, PipelineCache, RenderPipelineDescriptor, ShaderStages,
-    SpecializedRenderPipeline, TextureFormat, TextureSampleType, TextureView, TextureViewId, UniformBuffer,
-    VertexState,
+    BlendState, ColorTargetState, ColorWrites, FragmentState, MultisampleState, PipelineCache,
+    RenderPipelineDescriptor, ShaderStages, SpecializedRenderPipeline, TextureFormat, TextureSampleType, TextureView,
+    TextureViewId, UniformBuffer, VertexState,
 };
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 use bevy::shader::{Shader, ShaderDefVal};
@@ -48,6 +48,8 @@ pub(super) struct CompositeKey {
     pub(super) encoded: bool,
     /// The space in which captures have been blended, and are blended with the target.
     pub(super) blend_space: BlendSpace,
+    /// Samples of the target that is written. What is read has one.
+    pub(super) samples: u32,
 }
 
 impl CompositeKey {
@@ -58,11 +60,15 @@ impl CompositeKey {
     }
 
     fn shader_defs(self) -> Vec<ShaderDefVal> {
-        match (self.encoded, self.blend_space) {
+        let mut definitions: Vec<ShaderDefVal> = match (self.encoded, self.blend_space) {
             (false, BlendSpace::Encoded) => vec!["READ_TARGET".into(), "ENCODE_TARGET".into()],
             (true, BlendSpace::Linear) => vec!["READ_TARGET".into()],
-            (false, BlendSpace::Linear) | (true, BlendSpace::Encoded) => Vec::new(),
+            (false, BlendSpace::Linear) | (true, BlendSpace::Encoded) => return Vec::new(),
+        };
+        if self.samples > 1 {
+            definitions.push("KEEP_SAMPLES".into());
         }
+        definitions
     }
 }
 
@@ -92,6 +98,7 @@ impl SpecializedRenderPipeline for CompositePipeline {
             label: Some("gs4d composite".into()),
             layout: vec![self.layout(in_place).clone()],
             vertex: self.vertex.clone(),
+            multisample: MultisampleState { count: key.samples, ..MultisampleState::default() },
             fragment: Some(FragmentState {
                 shader: self.shader.clone(),
                 shader_defs: key.shader_defs(),

@@ -1,29 +1,35 @@
 //! Draw: captures into a camera's target, in Bevy's `Core3d` schedule.
 //!
-//! In: the camera's view, prepared by [`prepare`](super::prepare). Out: one compute pass, the composite and, if the
-//! camera asks for it, `write_depth` and `write_motion`, recorded. If other systems work on the captures' picture before it reaches the target,
-//! the compute pass is recorded before them.
+//! In: the camera's view, prepared by [`prepare`](super::prepare), and its [`order`](super::order). Out: one compute pass, the composite
+//! and, if the camera asks for it, `write_depth` and `write_motion`, recorded; then what is transparent and in front. If other systems work
+//! on the captures' picture before it reaches the target, the compute pass is recorded before them.
 
 use super::active::ActiveLists;
 use super::capture_views::{CaptureView, CaptureViews};
 use super::composite::CompositePipeline;
+use super::order::CaptureOrders;
 use super::renderer::CaptureRenderer;
 use super::upload::GpuGaussianCapture;
 use super::write_depth::WriteDepthPipeline;
 use super::write_motion::WriteMotionPipeline;
 use crate::renderer::WorkCounters;
+use bevy::camera::{MainPassResolutionOverride, Viewport};
+use bevy::core_pipeline::core_3d::Transparent3d;
 use bevy::core_pipeline::prepass::ViewPrepassTextures;
 use bevy::ecs::schedule::SystemSet;
 use bevy::ecs::system::{Res, ResMut, SystemParam};
-use bevy::log::debug_span;
+use bevy::ecs::world::World;
+use bevy::log::{debug_span, error};
+use bevy::render::camera::ExtractedCamera;
 use bevy::render::diagnostic::RecordDiagnostics;
 use bevy::render::render_asset::RenderAssets;
+use bevy::render::render_phase::ViewSortedRenderPhases;
 use bevy::render::render_resource::{
     LoadOp, Operations, PipelineCache, RenderPassColorAttachment, RenderPassDepthStencilAttachment,
     RenderPassDescriptor, StoreOp,
 };
 use bevy::render::renderer::{RenderContext, RenderDevice, ViewQuery};
-use bevy::render::view::{Msaa, ViewDepthTexture, ViewTarget};
+use bevy::render::view::{ExtractedView, Msaa, ViewDepthTexture, ViewTarget};
 
 /// Sets of systems in the render world's `Core3d` schedule, for ordering.
 #[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
@@ -32,11 +38,9 @@ pub enum CaptureSystems {
     Record,
     /// That picture is changed before it reaches the target.
     Shade,
-    /// Captures are drawn after opaque meshes and before transparent ones. Passes of others between the two (transmission) should be
-    /// ordered against it.
+    /// Captures that a transmissive mesh stands in front of are drawn, after opaque meshes and before transmissive ones.
     Draw,
-    /// Captures of multisampled cameras, and of those whose [settings](super::CaptureViewSettings::late) ask for it, are drawn after
-    /// transparent meshes.
+    /// All other captures are drawn, after the transparent things behind them and before those in front of them.
     DrawLate,
 }
 
@@ -66,13 +70,13 @@ pub(super) fn record_captures(
     }
 }
 
-/// Draws the captures of one camera. Registered twice, because multisampled targets can be read only once they have been resolved, which
-/// is after transparent meshes.
+/// Draws the captures of one camera. Registered twice: before transmissive meshes, and after the transparent things behind captures.
 pub(super) fn draw_captures<const LATE: bool>(
     camera: ViewQuery<(&ViewTarget, &ViewDepthTexture, &Msaa, Option<&ViewPrepassTextures>)>,
     renderer: Option<Res<CaptureRenderer>>,
     captures: Res<RenderAssets<GpuGaussianCapture>>,
     lists: Res<ActiveLists>,
+    orders: Res<CaptureOrders>,
     passes: Passes,
     mut views: ResMut<CaptureViews>,
     mut context: RenderContext,
@@ -81,7 +85,8 @@ pub(super) fn draw_captures<const LATE: bool>(
     let entity = camera.entity();
     let (target, depth, msaa, prepass) = camera.into_inner();
     let (Some(renderer), Some(view)) = (renderer, views.0.get_mut(&entity)) else { return };
-    if (*msaa != Msaa::Off || view.late) != LATE {
+    let order = orders.of(entity);
+    if order.early == LATE {
         return;
     }
     if !passes.can_draw(view) {
@@ -90,17 +95,56 @@ pub(super) fn draw_captures<const LATE: bool>(
     if !view.is_shaded {
         passes.record(view, &renderer, &captures, &lists, &mut context);
     }
-    passes.composite(view, target, &mut context, renderer.0.work());
+    let into_samples = *msaa != Msaa::Off && order.needs_samples();
+    passes.composite(view, target, into_samples, &mut context, renderer.0.work());
     passes.write_depth(view, depth, &mut context, renderer.0.work());
     if let Some(prepass) = prepass {
         passes.write_motion(view, prepass, &mut context, renderer.0.work());
     }
 }
 
+/// Draws what is transparent and in front of the captures of one camera, in the way of Bevy's own pass.
+pub(super) fn draw_front(
+    world: &World,
+    camera: ViewQuery<(
+        &ExtractedCamera,
+        &ExtractedView,
+        &ViewTarget,
+        &ViewDepthTexture,
+        Option<&MainPassResolutionOverride>,
+    )>,
+    phases: Res<ViewSortedRenderPhases<Transparent3d>>,
+    orders: Res<CaptureOrders>,
+    mut context: RenderContext,
+) {
+    let entity = camera.entity();
+    let (camera, view, target, depth, resolution) = camera.into_inner();
+    let (Some(front), Some(phase)) = (orders.of(entity).front, phases.get(&view.retained_view_entity)) else { return };
+    let diagnostics = context.diagnostic_recorder();
+    let diagnostics = diagnostics.as_deref();
+    let mut pass = context.begin_tracked_render_pass(RenderPassDescriptor {
+        label: Some("gs4d front"),
+        color_attachments: &[Some(target.get_color_attachment())],
+        depth_stencil_attachment: Some(depth.get_attachment(StoreOp::Store)),
+        timestamp_writes: None,
+        occlusion_query_set: None,
+        multiview_mask: None,
+    });
+    let span = diagnostics.pass_span(&mut pass, "gs4d/front");
+    if let Some(viewport) = Viewport::from_viewport_and_override(camera.viewport.as_ref(), resolution) {
+        pass.set_camera_viewport(&viewport);
+    }
+    if let Err(failure) = phase.render_range(&mut pass, world, entity, front..) {
+        error!("transparent things in front of captures are not drawn: {failure}");
+    }
+    span.end(&mut pass);
+}
+
 impl Passes<'_> {
     /// Returns whether there is anything to draw. Without the composite the work would stay invisible.
     fn can_draw(&self, view: &CaptureView) -> bool {
-        view.sees_something() && self.cache.get_render_pipeline(view.composite).is_some()
+        let mut composites = [Some(view.composite), view.composite_samples].into_iter().flatten();
+        view.sees_something() && composites.all(|id| self.cache.get_render_pipeline(id).is_some())
     }
 
     /// Records the renderer's compute pass.
@@ -120,22 +164,35 @@ impl Passes<'_> {
         span.end(context.command_encoder());
     }
 
-    /// Draws captures over the target.
-    fn composite(&self, view: &mut CaptureView, target: &ViewTarget, context: &mut RenderContext, work: &WorkCounters) {
+    /// Draws captures over the target; over each of its samples with `into_samples`, so that later passes can resolve them again.
+    fn composite(
+        &self,
+        view: &mut CaptureView,
+        target: &ViewTarget,
+        into_samples: bool,
+        context: &mut RenderContext,
+        work: &WorkCounters,
+    ) {
         // Fetched before `post_process_write` swaps the target's textures: from then on, the other one must be written.
-        let Some(pipeline) = self.cache.get_render_pipeline(view.composite) else { return };
+        let id = if into_samples { view.composite_samples } else { Some(view.composite) };
+        let Some(pipeline) = id.and_then(|id| self.cache.get_render_pipeline(id)) else { return };
         let Some(color) = view.shaded.as_ref().or(view.renderer.color()) else { return };
         let source = (!view.in_place).then(|| target.main_texture_view());
         let group = view.bindings.group(&self.device, &self.cache, &self.composite, source, color, work);
         let Some(group) = group else { return };
-        let attachment = if view.in_place {
-            target.get_unsampled_color_attachment()
-        } else {
-            RenderPassColorAttachment {
+        let attachment = match (view.in_place, into_samples) {
+            (true, false) => target.get_unsampled_color_attachment(),
+            (true, true) => target.get_color_attachment(),
+            (false, false) => RenderPassColorAttachment {
                 view: target.post_process_write().destination,
                 depth_slice: None,
                 resolve_target: None,
                 ops: Operations::default(),
+            },
+            (false, true) => {
+                // Both textures have the same samples: what is read stays, and the samples are resolved into the other.
+                target.post_process_write();
+                target.get_color_attachment()
             }
         };
         let diagnostics = context.diagnostic_recorder();

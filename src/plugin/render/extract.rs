@@ -6,6 +6,7 @@
 use super::settings::{CaptureSettings, CaptureViewSettings};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::{ClipFade, Playback};
+use crate::scene::Bounds;
 use crate::view::Appearance;
 use bevy::asset::{AssetId, Assets};
 use bevy::camera::Camera;
@@ -18,7 +19,7 @@ use bevy::log::debug_span;
 use bevy::render::Extract;
 use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
 use bevy::transform::components::GlobalTransform;
-use glam::Affine3A;
+use glam::{Affine3A, Vec3};
 
 /// The captures of this frame, seen by a camera or not. The memory is kept from frame to frame.
 #[derive(Resource, Default)]
@@ -28,6 +29,8 @@ pub(crate) struct ExtractedCaptures(pub(crate) MainEntityHashMap<ExtractedCaptur
 pub(crate) struct ExtractedCapture {
     pub(crate) asset: AssetId<GaussianCapture>,
     pub(crate) world_from_capture: Affine3A,
+    /// The centre of its bounds at this time, in the world.
+    pub(super) center: Vec3,
     /// Seconds since the capture's start.
     pub(crate) seconds: f32,
     /// Whether its temporal filter is used.
@@ -66,12 +69,13 @@ pub(crate) fn extract_captures(
     let _span = debug_span!("gs4d/extract").entered();
     extracted.0.clear();
     for (entity, capture, settings, playback, transform, visibility, fade) in &captures {
-        if !assets.contains(&capture.0) {
-            continue;
-        }
+        let Some(loaded) = assets.get(&capture.0) else { continue };
+        let bounds = loaded.bounds_at(playback.time);
+        let center = |bounds: Bounds| transform.transform_point((bounds.min + bounds.max) / 2.0);
         let placed = ExtractedCapture {
             asset: capture.0.id(),
             world_from_capture: transform.affine(),
+            center: bounds.map_or(transform.translation(), center),
             seconds: playback.time,
             filtered: settings.filter,
             appearance: settings.appearance(fade.copied().unwrap_or_default().0),

@@ -11,30 +11,44 @@
 //! upload       a loaded capture -> buffers on the GPU                once per asset, over several frames
 //! active       which Gaussians are active                            once per placed capture and segment, before all cameras
 //! prepare      a camera's lens and every capture's pose -> views     once per camera and frame, kept in capture_views
-//! draw         one compute pass, composite, write_depth, write_motion  Core3d, after opaque meshes, before or after transparent ones
+//! order        what is drawn before captures, and what after them    once per camera and frame
+//! draw         one compute pass, composite, write_depth, write_motion  Core3d, among transparent things
 //! publish      counts, times, memory -> statistics                   render world -> main world
 //! ```
 //!
 //! # The order of a frame
 //!
-//! | | `Msaa::Off` | multisampled |
-//! |---|---|---|
-//! | 1 | opaque and alpha-masked meshes, skybox | opaque and alpha-masked meshes, skybox |
-//! | 2 | **captures**, cut by the depth of 1 | transmissive and transparent meshes, cut by the depth of 1 |
-//! | 3 | **captures' depth and motion**, if asked for | **captures**, cut by the depth of 1 |
-//! | 4 | transparent meshes and gizmos, cut by the depth of 1 (and of 3) | **captures' depth and motion**, if asked for |
-//! | 5 | post-processing, tonemapping | post-processing, tonemapping |
+//! 1. opaque and alpha-masked meshes, skybox
+//! 2. transmissive meshes; the atmosphere
+//! 3. gizmos, and transparent things behind captures, cut by the depth of 1 and 2
+//! 4. **captures**, cut by all depth so far
+//! 5. **captures' depth and motion**, if asked for
+//! 6. transparent things in front of captures, cut by all depth so far
+//! 7. wireframes
+//! 8. post-processing, tonemapping
 //!
-//! So without multisampling everything in Bevy's transparent phase (blended materials, gizmos) is drawn over captures, whether it is in
-//! front of them or behind; with [`DepthWrite`] captures cut what is behind them, pixel by pixel. A multisampled target can only be
-//! read once all meshes are in it: captures are then drawn over everything in the transparent phase, whether it is in front of them or
-//! behind, and only opaque and alpha-masked meshes hide them, each by as many samples of a pixel as it covers. At such an edge the mean
-//! of the pixel's samples shows through a capture. Wireframes are drawn later, resolve the samples again, and overwrite captures. If any
-//! of this matters, use `Msaa::Off`: captures need no multisampling.
+//! With or without multisampling, HDR or not, and without a setting: Bevy sorts its transparent phase (blended materials, particles of
+//! other plugins) by the distance of each item's centre, and captures have a place in it. All captures of a view are drawn at once,
+//! since their Gaussians interleave: at the centre of the bounds of the nearest one, however faint it is. One whose centre is behind the
+//! camera, as in a room, counts as the farthest; an item at the same distance is behind. What is behind is in the target before captures
+//! are blended with it, so soft edges are as over anything opaque. As between meshes, one distance for each is too little where they reach
+//! through each other, or for a capture all around the camera. With [`DepthWrite::Median`] or `Expected` all transparent things are therefore drawn after
+//! captures, which cut them pixel by pixel where they hide more than half of what is behind; elsewhere, as in smoke, what is behind is
+//! drawn over them.
 //!
-//! Bevy orders its transmissive meshes only between opaque and transparent ones: order [`CaptureSystems::Draw`] against
-//! `main_transmissive_pass_3d`, in the render world's `Core3d` schedule, to see captures through glass. Its atmosphere cannot be ordered
-//! against: cameras with one need [`CaptureViewSettings::late`], which draws captures in the order of multisampled cameras.
+//! What this costs: nothing while no transparent thing is in front, and another render pass otherwise. Multisampled captures are drawn
+//! into the resolved picture, or, if something is in front or a wireframe is drawn, into every sample, so that these can be resolved
+//! again. Opaque and alpha-masked meshes hide them by as many samples of a pixel as they cover; at such an edge the mean of the pixel's
+//! samples shows through a capture. Captures need no multisampling themselves.
+//!
+//! Gizmos write depth, so captures hide them, or are hidden, pixel by pixel; if captures are shaded (fog, shadows), they have been
+//! recorded earlier, and gizmos are drawn over them. Wireframes are drawn over captures, unless these write depth.
+//!
+//! Behind a transmissive mesh captures show refracted: if the centre of one in view is nearer than that of the nearest capture, captures
+//! are drawn between 1 and 2, and everything transparent after them. A capture in front of only some of these meshes is then seen as if it
+//! were behind them. A camera with Bevy's atmosphere draws captures after it, and so not through transmissive meshes, which hide what is
+//! behind them. With order-independent transparency, everything that takes part in it is drawn over captures.
+//!
 //! Prepasses come first and do not contain captures; effects that read the depth prepass before the main pass (screen-space ambient
 //! occlusion and reflections) ignore captures. Distance fog, shadows of meshes and light of the scene reach captures in a pass of the module
 //! `pbr`, between 1 and the captures. Effects that read the depth buffer after the main pass (depth of field, volumetric fog) read the
@@ -62,6 +76,7 @@ mod depth_readers;
 mod draw;
 pub(crate) mod extract;
 mod fault;
+pub(crate) mod order;
 mod plugin;
 mod prepare;
 mod previous;

@@ -6,8 +6,9 @@ use super::active::{ActiveLists, prepare_active_lists, record_active_lists};
 use super::capture_views::CaptureViews;
 use super::composite::{CaptureShaders, CompositePipeline};
 use super::depth_readers::{DepthReaders, extract_depth_readers};
-use super::draw::{CaptureSystems, draw_captures, record_captures};
+use super::draw::{CaptureSystems, draw_captures, draw_front, record_captures};
 use super::extract::{ExtractedCaptures, ExtractedViewSettings, extract_captures, extract_view_settings};
+use super::order::{CaptureOrders, OtherPasses, hide_front, place_captures, show_front};
 use super::prepare::{make_depth_readable, prepare_views};
 use super::previous::{PreviousCaptures, keep_previous_captures};
 use super::publish::publish_statistics;
@@ -25,6 +26,7 @@ use bevy::app::{App, Plugin, PostUpdate, SubApp};
 use bevy::asset::Assets;
 use bevy::camera::visibility::VisibilitySystems;
 use bevy::core_pipeline::core_3d::{main_opaque_pass_3d, main_transparent_pass_3d};
+use bevy::core_pipeline::oit::resolve::node::oit_resolve;
 use bevy::core_pipeline::schedule::{Core3d, Core3dSystems, camera_driver};
 use bevy::ecs::schedule::IntoScheduleConfigs;
 use bevy::render::render_asset::{RenderAssetPlugin, prepare_assets};
@@ -79,6 +81,8 @@ fn build_rendering(app: &mut App) {
         .init_resource::<ShadeRequests>()
         .init_resource::<PreviousCaptures>()
         .init_resource::<DepthReaders>()
+        .init_resource::<OtherPasses>()
+        .init_resource::<CaptureOrders>()
         // Created anew after a lost device: they hold everything on the GPU.
         .init_gpu_resource::<CompositePipeline>()
         .init_gpu_resource::<SpecializedRenderPipelines<CompositePipeline>>()
@@ -96,6 +100,8 @@ fn build_rendering(app: &mut App) {
             (
                 continue_uploads.in_set(RenderSystems::PrepareAssets).after(prepare_assets::<GpuGaussianCapture>),
                 make_depth_readable.in_set(RenderSystems::PrepareViews),
+                // Batches of meshes end where captures are drawn.
+                place_captures.in_set(RenderSystems::Prepare).before(RenderSystems::PrepareResources),
                 prepare_active_lists.in_set(RenderSystems::PrepareResources),
                 (prepare_views, publish_statistics).chain().in_set(RenderSystems::PrepareBindGroups),
             ),
@@ -121,7 +127,13 @@ fn build_rendering(app: &mut App) {
                     .after(main_opaque_pass_3d)
                     .before(main_transparent_pass_3d)
                     .in_set(CaptureSystems::Draw),
-                draw_captures::<true>.after(main_transparent_pass_3d).in_set(CaptureSystems::DrawLate),
+                hide_front.after(main_opaque_pass_3d).before(main_transparent_pass_3d),
+                (show_front, draw_captures::<true>, draw_front)
+                    .chain()
+                    .after(main_transparent_pass_3d)
+                    // It draws over everything else that is transparent.
+                    .before(oit_resolve)
+                    .in_set(CaptureSystems::DrawLate),
             )
                 .in_set(Core3dSystems::MainPass),
         );

@@ -91,16 +91,20 @@ impl Scene<'_> {
 }
 
 impl Pipelines<'_> {
-    /// Returns the composite for a camera's target, and whether it blends in place.
+    /// Returns the composite for a camera's target, the one for its samples if it has several, and whether they blend in place.
     fn composite(
         &mut self,
         view: &ExtractedView,
         camera: &ExtractedCamera,
+        msaa: Msaa,
         settings: CaptureViewSettings,
-    ) -> (CachedRenderPipelineId, bool) {
+    ) -> (CachedRenderPipelineId, Option<CachedRenderPipelineId>, bool) {
         let encoded = camera.compositing_space == Some(CompositingSpace::Srgb);
-        let key = CompositeKey { format: view.target_format, encoded, blend_space: settings.blend_space };
-        (self.composites.specialize(&self.cache, &self.composite, key), key.blends_in_place())
+        let key = CompositeKey { format: view.target_format, encoded, blend_space: settings.blend_space, samples: 1 };
+        let composite = self.composites.specialize(&self.cache, &self.composite, key);
+        let multisampled = (msaa != Msaa::Off).then(|| CompositeKey { samples: msaa.samples(), ..key });
+        let composite_samples = multisampled.map(|key| self.composites.specialize(&self.cache, &self.composite, key));
+        (composite, composite_samples, key.blends_in_place())
     }
 
     fn write_depth(&mut self, msaa: Msaa, median: bool) -> CachedRenderPipelineId {
@@ -154,11 +158,10 @@ pub(super) fn prepare_views(
         let mut settings = scene.settings.0.get(&main).copied().unwrap_or_default();
         settings.depth = scene.depth_readers.resolve(&main, settings.depth);
         // Even without anything to draw, so that it is compiled while captures load.
-        let (composite, in_place) = pipelines.composite(view, camera, settings);
+        let (composite, composite_samples, in_place) = pipelines.composite(view, camera, msaa, settings);
         let state =
             views.0.entry(entity).or_insert_with(|| CaptureView::new(&device, &renderer.0, main.id(), composite));
-        (state.composite, state.in_place) = (composite, in_place);
-        state.late = settings.late;
+        (state.composite, state.composite_samples, state.in_place) = (composite, composite_samples, in_place);
         state.set_design(&renderer.0, settings.design);
         state.measure(measure, &device, &queue, &renderer.0);
         state.drawn.clear();

@@ -94,9 +94,6 @@ pub struct CaptureViewSettings {
     pub depth: DepthWrite,
     /// What is shown of captures. Default: [`DebugView::Color`].
     pub debug: DebugView,
-    /// Whether captures are drawn after transparent meshes even without multisampling. Cameras with Bevy's atmosphere need it, because the
-    /// atmosphere is drawn between opaque and transparent meshes and cannot be ordered against captures. Default: false.
-    pub late: bool,
     /// How captures are drawn; every design draws the same picture. Default: [`Design::Auto`], the fastest on this GPU.
     pub design: Design,
 }
@@ -104,8 +101,8 @@ pub struct CaptureViewSettings {
 /// Which depth of captures is written to the camera's depth buffer, at pixels where they hide more than half of the background.
 ///
 /// Post-processing that reads the depth buffer (depth of field, volumetric fog) then treats captures as surfaces. So do transparent
-/// meshes: captures cut them pixel by pixel. See [the order of a frame](crate::render#the-order-of-a-frame). Default:
-/// [`Auto`](Self::Auto).
+/// meshes: they are drawn after captures, which cut them pixel by pixel. See
+/// [the order of a frame](crate::render#the-order-of-a-frame). Default: [`Auto`](Self::Auto).
 ///
 /// # Examples
 ///
@@ -115,7 +112,7 @@ pub struct CaptureViewSettings {
 ///
 /// fn setup(mut commands: Commands) {
 ///     let settings = CaptureViewSettings { depth: DepthWrite::Median, ..default() };
-///     commands.spawn((Camera3d::default(), Msaa::Off, settings));
+///     commands.spawn((Camera3d::default(), settings));
 /// }
 /// # bevy::ecs::system::assert_is_system(setup);
 /// ```
