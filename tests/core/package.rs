@@ -98,6 +98,7 @@ fn scene(shape: &Shape, seed: u64) -> GaussianScene {
             ..TrainedWith::default()
         },
         playback: PlaybackHints { up: UpAxis::NegY, duration_seconds: 1.0 / 3.0 },
+        levels: Vec::new(),
     }
 }
 
