@@ -147,12 +147,12 @@ pub enum PackageError {
         reason: String,
     },
     /// A level of detail, which is a package itself, cannot be read or written.
-    #[error("level of detail {}: {source}", .index + 1)]
+    #[error("level of detail {}: {reason}", .index + 1)]
     Level {
         /// Its index, from 0.
         index: usize,
         /// What is wrong with it.
-        source: Box<Self>,
+        reason: Box<PackageError>,
     },
     /// The file could not be read or written.
     #[error(transparent)]

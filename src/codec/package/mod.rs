@@ -216,7 +216,7 @@ impl Room {
 
 /// Returns what names the level of detail, from 0, that an error is about.
 fn of_level(index: usize) -> impl FnOnce(PackageError) -> PackageError {
-    move |source| PackageError::Level { index, source: Box::new(source) }
+    move |reason| PackageError::Level { index, reason: Box::new(reason) }
 }
 
 /// Reads a package; only the options that replace stored values are used.
