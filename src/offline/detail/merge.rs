@@ -32,8 +32,8 @@ pub(super) fn merge(sliced: &Sliced, interval: [f32; 2], radius: f32, count: usi
     let Sliced { gaussians, harmonics } = sliced;
     let interval = interval.map(f64::from);
     let low_pass = f64::from(LOW_PASS) * pixel * pixel;
-    let seen = |(index, gaussian): (usize, &Gaussian)| Seen::of(index, gaussian, interval, low_pass);
-    let seen: Vec<Seen> = gaussians.iter().enumerate().filter_map(seen).collect();
+    let all = gaussians.iter().enumerate();
+    let seen: Vec<Seen<'_>> = all.filter_map(|(index, one)| Seen::of(index, one, interval, low_pass)).collect();
     let span = interval[1] - interval[0];
     let mut made = Trained {
         parameters: Parameters::default(),
@@ -270,7 +270,11 @@ fn opacity_of(thick: f64) -> f64 {
     let (mut low, mut high) = (0.0, f64::from(ALPHA_MAX));
     for _ in 0..48 {
         let middle = 0.5 * (low + high);
-        if thickness(middle) < thick { low = middle } else { high = middle }
+        if thickness(middle) < thick {
+            low = middle;
+        } else {
+            high = middle;
+        }
     }
     high
 }
