@@ -4,6 +4,7 @@
 //! module describes its tests; those that need a device are skipped where there is none, not even a software one.
 
 mod appearance;
+mod detail;
 mod fast;
 mod filter;
 mod fine_tune;

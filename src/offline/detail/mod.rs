@@ -24,8 +24,7 @@ use serde::Serialize;
 use std::sync::Arc;
 
 /// Sizes on the screen at which levels are compared, pixels: each about 1.4 times the one before.
-const SIZES: [f32; 14] =
-    [4.0, 6.0, 8.0, 11.0, 16.0, 23.0, 32.0, 45.0, 64.0, 91.0, 128.0, 181.0, 256.0, 362.0];
+const SIZES: [f32; 14] = [4.0, 6.0, 8.0, 11.0, 16.0, 23.0, 32.0, 45.0, 64.0, 91.0, 128.0, 181.0, 256.0, 362.0];
 /// How many times fewer Gaussians a level has than the one before.
 const COARSER: usize = 7;
 /// Gaussians for each square pixel of the size that a level is meant for.
