@@ -58,6 +58,8 @@ pub(super) struct Drawn {
     pub(super) appearance: Appearance,
     /// Whether the capture's temporal filter is used.
     pub(super) filtered: bool,
+    /// The level of detail; 0 is all Gaussians.
+    pub(super) level: usize,
 }
 
 /// Frames in a row without a visible capture after which a camera releases its GPU memory.
@@ -99,8 +101,9 @@ impl CaptureView {
         lists: &'a ActiveLists,
     ) -> Vec<Instance<'a>> {
         let instance = |drawn: &Drawn| {
-            let capture = captures.get(drawn.asset)?.capture()?;
-            let list = if drawn.filtered { lists.0.get(&drawn.entity) } else { None };
+            let capture = captures.get(drawn.asset)?.level(drawn.level)?;
+            // Levels of detail have no filter.
+            let list = if drawn.filtered && drawn.level == 0 { lists.0.get(&drawn.entity) } else { None };
             Some(Instance {
                 capture,
                 active: list.map(|placed| &placed.list),

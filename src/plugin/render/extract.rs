@@ -33,6 +33,8 @@ pub(super) struct ExtractedCapture {
     /// Whether its temporal filter is used.
     pub(super) filtered: bool,
     pub(super) appearance: Appearance,
+    /// The finest level of detail that is drawn.
+    pub(super) finest_level: u8,
     /// Whether any camera sees it.
     pub(super) seen: bool,
 }
@@ -75,6 +77,7 @@ pub(super) fn extract_captures(
             seconds: playback.time,
             filtered: settings.filter,
             appearance: settings.appearance(fade.copied().unwrap_or_default().0),
+            finest_level: settings.finest_level,
             seen: visibility.get(),
         };
         extracted.0.insert(entity.into(), placed);

@@ -9,6 +9,7 @@
 //! visibility   a capture's bounds at this time -> its Aabb           main world
 //! extract      captures, their times, poses and settings             main world -> render world
 //! upload       a loaded capture -> buffers on the GPU                once per asset, over several frames
+//! detail       how many Gaussians by the size on the screen          once per camera, placed capture and frame
 //! active       which Gaussians are active                            once per placed capture and segment, before all cameras
 //! prepare      a camera's lens and every capture's pose -> views     once per camera and frame, kept in capture_views
 //! draw         one compute pass, composite, write_depth              Core3d, after opaque meshes, before or after transparent ones
@@ -52,6 +53,7 @@
 mod active;
 mod capture_views;
 mod composite;
+mod detail;
 mod draw;
 mod extract;
 mod plugin;
@@ -66,6 +68,7 @@ mod view;
 mod visibility;
 mod write_depth;
 
+pub use detail::CaptureDetail;
 pub use draw::CaptureSystems;
 pub(crate) use plugin::CaptureRenderPlugin;
 pub use settings::{CaptureSettings, CaptureViewSettings, CropBox, DepthWrite};

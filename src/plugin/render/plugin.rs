@@ -5,6 +5,7 @@
 use super::active::{ActiveLists, prepare_active_lists, record_active_lists};
 use super::capture_views::CaptureViews;
 use super::composite::{CaptureShaders, CompositePipeline};
+use super::detail::{CaptureDetail, CaptureLevels, choose_levels, extract_detail};
 use super::draw::{CaptureSystems, draw_captures, record_captures};
 use super::extract::{ExtractedCaptures, ExtractedViewSettings, extract_captures, extract_view_settings};
 use super::prepare::{make_depth_readable, prepare_views};
@@ -37,6 +38,7 @@ impl Plugin for CaptureRenderPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<CaptureStatistics>()
             .init_resource::<CaptureUploadBudget>()
+            .init_resource::<CaptureDetail>()
             .register_required_components::<GaussianCapture3d, CaptureSettings>()
             .add_plugins(RenderAssetPlugin::<GpuGaussianCapture>::default())
             .add_systems(PostUpdate, update_bounds.in_set(VisibilitySystems::CalculateBounds));
@@ -60,6 +62,8 @@ fn build_rendering(app: &mut App) {
         .insert_resource(statistics)
         .insert_resource(uploads)
         .init_resource::<CaptureUploadBudget>()
+        .init_resource::<CaptureDetail>()
+        .init_resource::<CaptureLevels>()
         .init_resource::<ExtractedCaptures>()
         .init_resource::<ExtractedViewSettings>()
         // Created anew after a lost device: they hold everything on the GPU.
@@ -70,13 +74,13 @@ fn build_rendering(app: &mut App) {
         .init_gpu_resource::<CaptureViews>()
         .init_gpu_resource::<ActiveLists>()
         .add_systems(RenderStartup, init_renderer)
-        .add_systems(ExtractSchedule, (extract_captures, extract_view_settings, extract_upload_budget))
+        .add_systems(ExtractSchedule, (extract_captures, extract_view_settings, extract_upload_budget, extract_detail))
         .add_systems(
             Render,
             (
                 continue_uploads.in_set(RenderSystems::PrepareAssets).after(prepare_assets::<GpuGaussianCapture>),
                 make_depth_readable.in_set(RenderSystems::PrepareViews),
-                prepare_active_lists.in_set(RenderSystems::PrepareResources),
+                (choose_levels, prepare_active_lists).chain().in_set(RenderSystems::PrepareResources),
                 (prepare_views, publish_statistics).chain().in_set(RenderSystems::PrepareBindGroups),
             ),
         )

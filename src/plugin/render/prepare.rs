@@ -6,6 +6,7 @@
 use super::active::ActiveLists;
 use super::capture_views::{CaptureView, CaptureViews, Drawn};
 use super::composite::{CompositeKey, CompositePipeline};
+use super::detail::CaptureLevels;
 use super::extract::{ExtractedCaptures, ExtractedViewSettings};
 use super::renderer::CaptureRenderer;
 use super::settings::{CaptureViewSettings, DepthWrite};
@@ -35,6 +36,7 @@ pub(super) struct Scene<'w> {
     settings: Res<'w, ExtractedViewSettings>,
     captures: Res<'w, RenderAssets<GpuGaussianCapture>>,
     lists: Res<'w, ActiveLists>,
+    levels: Res<'w, CaptureLevels>,
 }
 
 /// The pipelines that depend on a camera's target.
@@ -51,6 +53,7 @@ impl Scene<'_> {
     /// Appends the captures that a camera sees to `drawn`, in the order of Bevy's list, which is the same in every frame.
     fn collect(
         &self,
+        viewer: Entity,
         lens: &CameraLens,
         view: &ExtractedView,
         size: UVec2,
@@ -64,7 +67,8 @@ impl Scene<'_> {
             let time = self.captures.get(placed.asset)?.time_at(placed.seconds)?;
             let view = lens.view(size, time, camera, placed.world_from_capture)?;
             let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
-            Some(Drawn { entity: *entity, asset, view, appearance, filtered })
+            let level = self.levels.of(viewer, *entity);
+            Some(Drawn { entity: *entity, asset, view, appearance, filtered, level })
         }));
     }
 }
@@ -137,7 +141,7 @@ pub(super) fn prepare_views(
         (state.is_shaded, state.shaded) = (false, None);
         let lens = drawable_lens(view, camera);
         if let Some(lens) = &lens {
-            scene.collect(lens, view, size, visible, &mut state.drawn);
+            scene.collect(entity, lens, view, size, visible, &mut state.drawn);
         }
         state.count_idle_frames();
         let Some(lens) = lens.filter(|_| state.sees_something()) else { continue };
