@@ -70,6 +70,7 @@ mod tests {
             tint: LinearRgba::new(0.123_45, 3.0, -1.0, 0.5),
             exposure: -20.123_4,
             crop: Some(crop),
+            finest_level: 3,
         };
         let context = egui::Context::default();
         for settings in [CaptureSettings::default(), odd] {

@@ -163,8 +163,8 @@ impl RenderAsset for GpuGaussianCapture {
         let whole = source.shared_scene();
         let levels = whole.levels.iter().map(|level| level.scene.clone());
         let upload = |scene| CaptureUpload::new(device.wgpu_device(), &renderer.0, scene);
-        let uploads: Result<Vec<_>, _> = std::iter::once(whole.clone()).chain(levels).map(upload).collect();
-        let next = match uploads {
+        let begun: Result<Vec<_>, _> = std::iter::once(whole.clone()).chain(levels).map(upload).collect();
+        let next = match begun {
             Ok(uploads) => Some(NextCapture { uploads, source }),
             Err(failure) => {
                 let failure = format!("{}: not drawn: {failure}", name());
