@@ -26,7 +26,8 @@ pub(super) fn show(ui: &mut egui::Ui, settings: CaptureSettings, bounds: Option<
         }
         ui.label("tint");
         if ui.button("as trained").clicked() {
-            edited = CaptureSettings { filter: edited.filter, crop: edited.crop, ..CaptureSettings::default() };
+            let CaptureSettings { filter, crop, finest_level, .. } = edited;
+            edited = CaptureSettings { filter, crop, finest_level, ..CaptureSettings::default() };
         }
     });
     let mut cropped = edited.crop.is_some();
