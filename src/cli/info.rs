@@ -232,7 +232,8 @@ fn section_table(info: &PackageInfo) -> Table {
 /// Returns a line about the levels of detail; `None` without any.
 fn levels(info: &PackageInfo) -> Option<String> {
     let sizes: Vec<String> = info.header.levels.iter().map(|level| level.pixels.to_string()).collect();
-    (!sizes.is_empty()).then(|| lines(&[("levels", format!("of detail, up to {} pixels on the screen", sizes.join(", ")))]))
+    let text = format!("of detail, up to {} pixels on the screen", sizes.join(", "));
+    (!sizes.is_empty()).then(|| lines(&[("levels", text)]))
 }
 
 fn package_json(info: &PackageInfo) -> Value {

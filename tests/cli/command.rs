@@ -152,7 +152,8 @@ fn a_package_knows_how_it_was_trained() {
 #[test]
 fn people_get_text() {
     const VERBS: [&str; 13] = [
-        "info", "convert", "render", "compare", "synth", "bench", "score", "prune", "mask", "eval", "ablate", "bake", "detail",
+        "info", "convert", "render", "compare", "synth", "bench", "score", "prune", "mask", "eval", "ablate", "bake",
+        "detail",
     ];
     let folder = folder();
     let path = scene(&folder, "50");

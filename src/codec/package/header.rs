@@ -10,8 +10,8 @@ use crate::gaussian::harmonics::{MAX_COEFFICIENTS, evaluated};
 use crate::scene::detail::check_sizes;
 use crate::scene::packed::{MAX_ENTRIES, MAX_STAGES};
 use crate::scene::{
-    ActiveSets, ColorDegrees, FilterKind, Form, GaussianScene, MAX_LEVELS, MAX_SEGMENTS, PackedColors, PlaybackHints, SceneForm,
-    Trained, TrainedWith,
+    ActiveSets, ColorDegrees, FilterKind, Form, GaussianScene, MAX_LEVELS, MAX_SEGMENTS, PackedColors, PlaybackHints,
+    SceneForm, Trained, TrainedWith,
 };
 use serde::{Deserialize, Serialize};
 
@@ -53,7 +53,7 @@ pub struct Header {
     pub trained_with: TrainedWith,
     /// How the capture is meant to be played.
     pub playback: PlaybackHints,
-    /// The levels of detail, finest first. Each is a section [`LEVEL`] of its own.
+    /// The levels of detail, finest first. Each is a section `level` of its own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub levels: Vec<StoredLevel>,
     /// The section table, in the order of the file.

@@ -77,7 +77,8 @@ impl Around {
             let angle = golden * (place as f32 + shift);
             let flat = (1.0 - z * z).max(0.0).sqrt();
             let direction = Vec3::new(flat * angle.cos(), flat * angle.sin(), z);
-            (0..times).map(move |k| (direction, first + (last - first) * ((k as f32 + 0.5 * shift + 0.25) / times as f32)))
+            let part = move |k: usize| (k as f32 + 0.5 * shift + 0.25) / times as f32;
+            (0..times).map(move |k| (direction, first + (last - first) * part(k)))
         })
     }
 }

@@ -135,7 +135,8 @@ pub(super) fn choose_levels(
         let Some(visible) = visible.get::<GaussianCapture3d>() else { continue };
         for (_, entity) in visible.iter_visible() {
             let Some(placed) = extracted.0.get(entity) else { continue };
-            let Some((own, bounds)) = captures.get(placed.asset).and_then(|uploaded| uploaded.detail()) else { continue };
+            let detail = captures.get(placed.asset).and_then(GpuGaussianCapture::detail);
+            let Some((own, bounds)) = detail else { continue };
             let pixels = size_on_screen(&view.clip_from_view, eye, size, &placed.world_from_capture, bounds) * factor;
             let before = levels.chosen.get(&(camera, *entity)).map(|(level, _)| *level);
             let level = choose(own, pixels, before).max(usize::from(placed.finest_level).min(own.len()));

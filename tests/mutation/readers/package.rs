@@ -8,7 +8,8 @@ use crate::change::{bytes, numbers, text};
 use crate::support::packed_scene;
 use crate::support::random::Random;
 use bevy_gs4d::codec::package::{
-    self, EnvironmentSize, FLOAT_PLANES, Header, MAGIC, PACKAGE, Section, StoredFilter, StoredForm, VERSION, WriteSettings,
+    self, EnvironmentSize, FLOAT_PLANES, Header, MAGIC, PACKAGE, Section, StoredFilter, StoredForm, VERSION,
+    WriteSettings,
 };
 use bevy_gs4d::gaussian::{Model, Parameters};
 use bevy_gs4d::offline::quantize::compress;
