@@ -6,8 +6,8 @@
 //! A package is a fixed start ([`MAGIC`], [`VERSION`], length and checksum of the header), a [`Header`] in RON, and the
 //! sections that the header lists. A section holds one attribute of a run of Gaussians, split into byte planes
 //! (`planes`), compressed and checksummed on its own. The order is geometry, first color coefficients, the other
-//! coefficients, temporal filter, environment map, levels of detail, each of which is a package itself. A reader skips what it does not know, unless the header lists it as
-//! required.
+//! coefficients, temporal filter, environment map, levels of detail, each of which is a package itself. A reader skips
+//! what it does not know, unless the header lists it as required.
 
 mod envelope;
 mod error;
