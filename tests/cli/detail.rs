@@ -14,7 +14,8 @@ fn levels_are_written_reported_and_left_out_by_other_verbs() {
         return;
     }
     let folder = folder();
-    let (input, out, changed) = (scene(&folder, "800"), folder.path().join("out.gs4d"), folder.path().join("next.gs4d"));
+    let input = scene(&folder, "800");
+    let [out, changed] = ["out.gs4d", "next.gs4d"].map(|name| folder.path().join(name));
     let quick = ["--levels", "1", "--min-psnr", "0", "--steps", "5", "--directions", "2", "--times", "1", "--json"];
     let mut command = arguments!["detail", &input, "-o", &out].to_vec();
     command.extend(quick.map(Into::into));
