@@ -110,9 +110,8 @@ fn read_vectors(
         cache: None,
     });
     let size = u64::from(SIZE.x * SIZE.y) * 16;
-    let buffer = |usage| {
-        device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false })
-    };
+    let buffer =
+        |usage| device.create_buffer(&wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false });
     let found = buffer(wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC);
     let copy = buffer(wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST);
     let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };

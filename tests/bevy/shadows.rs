@@ -12,7 +12,7 @@ use bevy::camera::visibility::{RenderLayers, ViewVisibility};
 use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, PointLightShadowMap};
 use bevy::prelude::*;
 use bevy_gs4d::gaussian::Gaussian;
-use bevy_gs4d::pbr::{CastsShadows, CaptureContactShadow, ShadowResolution};
+use bevy_gs4d::pbr::{CaptureContactShadow, CastsShadows, ShadowResolution};
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::render::CaptureSettings;
 use bevy_gs4d::scene::RuntimeScene;

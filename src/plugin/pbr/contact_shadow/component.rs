@@ -104,7 +104,8 @@ mod tests {
 
     #[test]
     fn it_fades_with_height() {
-        let at = |height: f32| SHADOW.beneath(Vec3::Y * (2.0 + height), Vec3::ONE).map_or(0.0, |ellipse| ellipse.strength);
+        let at =
+            |height: f32| SHADOW.beneath(Vec3::Y * (2.0 + height), Vec3::ONE).map_or(0.0, |ellipse| ellipse.strength);
         assert!((at(1.0) - 0.4).abs() < 1e-6, "half way up half of it is left");
         assert_eq!([at(2.0), at(9.0)], [0.0; 2], "nothing at twice the radius and above");
         assert_eq!(at(-0.5), 0.8, "a capture that is partly in the ground stands on it");
@@ -113,10 +114,9 @@ mod tests {
 
     #[test]
     fn broken_values_show_nothing() {
-        for broken in [
-            CaptureContactShadow { strength: f32::NAN, ..SHADOW },
-            CaptureContactShadow { ground: f32::NAN, ..SHADOW },
-        ] {
+        for broken in
+            [CaptureContactShadow { strength: f32::NAN, ..SHADOW }, CaptureContactShadow { ground: f32::NAN, ..SHADOW }]
+        {
             assert_eq!(broken.beneath(Vec3::Y * 2.0, Vec3::ONE), None, "{broken:?}");
         }
         assert_eq!(SHADOW.beneath(Vec3::Y * 2.0, Vec3::new(0.0, 1.0, 1.0)), None, "a flat box");

@@ -40,12 +40,8 @@ impl GpuSettings {
         drawn: impl Iterator<Item = &'a PlacedShading> + Clone,
     ) -> Self {
         let is_surrounded = drawn.clone().any(|placed| placed.has_environment);
-        let mut settings = Self {
-            size,
-            is_linear: u32::from(is_linear),
-            is_surrounded: u32::from(is_surrounded),
-            ..Self::default()
-        };
+        let mut settings =
+            Self { size, is_linear: u32::from(is_linear), is_surrounded: u32::from(is_surrounded), ..Self::default() };
         if drawn.clone().any(PlacedShading::is_shaded) {
             let shaded = drawn.clone().filter(|placed| placed.is_shaded());
             let others = drawn.clone().filter(|placed| !placed.is_shaded());
@@ -96,12 +92,8 @@ mod tests {
     use super::*;
     use glam::Affine3A;
 
-    const PLAIN: PlacedShading = PlacedShading {
-        cube_from_world: Some(Affine3A::IDENTITY),
-        has_environment: false,
-        shadows: None,
-        light: None,
-    };
+    const PLAIN: PlacedShading =
+        PlacedShading { cube_from_world: Some(Affine3A::IDENTITY), has_environment: false, shadows: None, light: None };
 
     fn lit(light: CaptureLight) -> PlacedShading {
         PlacedShading { light: Some(light), ..PLAIN }
