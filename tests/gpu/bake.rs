@@ -48,7 +48,7 @@ impl Capture {
     }
 
     /// Bakes to 15 kB. The colors of the scene are few, so that it compresses well until they are trained: the first package is too large.
-    fn bake(&self, out: &Path, engine: &mut Engine, progress: &mut Listener) -> Result<Baked, OfflineError> {
+    fn bake(&self, out: &Path, engine: &mut Engine, progress: &mut Listener) -> Result<Baked, String> {
         let settings = BakeSettings {
             checkpoint: self.path("scene.gs4d"),
             data: self.path("data"),
@@ -66,7 +66,7 @@ impl Capture {
             level: None,
             keep_work: false,
         };
-        bake(self.scene.clone(), &settings, engine, progress)
+        bake(self.scene.clone(), &settings, engine, progress).map_err(|error| error.to_string())
     }
 }
 
@@ -122,7 +122,7 @@ fn a_bake_that_ends_in_its_second_attempt_goes_on_there() {
     assert!(attempts > 0, "the first package is too large: {:?}", listener.notes);
 
     let mut listener = Listener { ends: true, ..Listener::default() };
-    let error = capture.bake(&out, &mut engine, &mut listener).expect_err("it is ended").to_string();
+    let error = capture.bake(&out, &mut engine, &mut listener).expect_err("it is ended");
     assert!(error.contains("the bake ends here"), "in the second attempt: {error}");
     assert!(!out.exists(), "there is no package yet");
 
