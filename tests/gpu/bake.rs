@@ -14,7 +14,7 @@ use bevy_gs4d::offline::score::ScoringSettings;
 use bevy_gs4d::offline::score::variant::Variant;
 use bevy_gs4d::offline::search::{Goal, ScoreChoice};
 use bevy_gs4d::offline::temporal_filter::KeyFrames;
-use bevy_gs4d::offline::{self, OfflineError, Progress};
+use bevy_gs4d::offline::{self, Progress};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{FilterKind, GaussianScene};
 use glam::{UVec2, Vec3};
