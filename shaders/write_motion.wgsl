@@ -1,5 +1,5 @@
-// write_motion: writes captures to the camera's motion vectors and to the depths of its prepass, where they hide more than half of what is
-// behind.
+// write_motion: writes captures to the camera's motion vectors and, with DEPTH, to the depths of its prepass, where they hide more than
+// half of what is behind.
 //
 // In: the captures' motions and transmittance, and their depths, for the pixels of the viewport. Out: motion vectors, as shares of the
 // viewport to the right and down; values for the depth test, which keeps them where nothing nearer has been drawn; the same for every
@@ -17,7 +17,9 @@
 
 struct Written {
     @location(0) motion: vec2<f32>,
+#ifdef DEPTH
     @builtin(frag_depth) depth: f32,
+#endif
 }
 
 @fragment
@@ -31,11 +33,15 @@ fn fragment(@builtin(position) position: vec4<f32>) -> Written {
     }
     let motion = textureLoad(motions, at, 0);
     let opacity = max(1.0 - motion.a, 1e-4);
+    var written: Written;
+    written.motion = motion.xy / opacity / vec2<f32>(viewport.zw);
+#ifdef DEPTH
 #ifdef MEDIAN
     let z = depth.y;
 #else
     let z = depth.x / opacity;
 #endif
-    let written = clamp((lens.x - lens.z * z) / (lens.w * z - lens.y), 0.0, 1.0);
-    return Written(motion.xy / opacity / vec2<f32>(viewport.zw), written);
+    written.depth = clamp((lens.x - lens.z * z) / (lens.w * z - lens.y), 0.0, 1.0);
+#endif
+    return written;
 }

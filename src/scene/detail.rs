@@ -81,7 +81,7 @@ mod tests {
     use crate::scene::Environment;
 
     fn empty() -> RuntimeScene {
-        RuntimeScene::sliced(Vec::new(), Harmonics::default())
+        RuntimeScene::sliced(Vec::new(), Harmonics { coefficients: 1, ..Harmonics::default() })
     }
 
     fn level(pixels: f32, scene: RuntimeScene) -> Level {

@@ -39,13 +39,14 @@ fn color_at(picture: &RgbaImage, x: u32, y: u32) -> Vec3 {
     Vec3::from(rgb(picture, x, y).map(f32::from)) / 255.0
 }
 
-/// Checks every pixel against a colour that follows from other pictures, except for their rounding and its own to 8 bits.
+/// Checks every pixel against a colour that follows from other pictures, except for their rounding and its own to 8 bits: in linear light
+/// half a step of a dark colour may become more.
 fn check_pixels(picture: &RgbaImage, expected: impl Fn(u32, u32) -> Vec3, what: &str) {
     for y in 0..picture.height() {
         for x in 0..picture.width() {
             let (seen, expected) = (color_at(picture, x, y) * 255.0, expected(x, y) * 255.0);
             let apart = (seen - expected).abs().max_element();
-            assert!(apart <= 2.0, "{what}: at {x}, {y} there is {seen}, {apart} from {expected}");
+            assert!(apart <= 2.5, "{what}: at {x}, {y} there is {seen}, {apart} from {expected}");
         }
     }
 }

@@ -228,6 +228,8 @@ fn the_panel_warns_of_captures_that_are_not_seen_and_cameras_that_cannot_draw() 
     let said = warnings(&app);
     assert!(matches!(&said[..], [said] if said.starts_with("eye: captures are drawn over")), "the lens: {said:?}");
     app.world_mut().entity_mut(camera).insert(Projection::default());
+    picture(&mut app, 0.0);
+    assert_eq!(warnings(&app), [""; 0], "a lens again");
 
     let handle = app.world().resource::<AssetServer>().load("there-is-none.gs4d");
     app.world_mut().spawn(GaussianCapture3d(handle));

@@ -7,13 +7,14 @@
 use crate::support::cpu_reference::SIZE;
 use crate::support::fixtures::{front, insert, lone, spawn, spawn_box};
 use crate::support::offscreen_app::{self, spawn_camera};
+use bevy::camera::RenderTarget;
 use bevy::camera::visibility::RenderLayers;
 use bevy::picking::backend::HitData;
 use bevy::picking::pointer::{Location, PointerAction, PointerId, PointerInput};
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_gs4d::prelude::*;
-use bevy_gs4d::testing::{self, Offscreen};
+use bevy_gs4d::testing;
 
 /// What the observers of [`watch`] have received.
 #[derive(Resource, Default)]
@@ -27,8 +28,6 @@ struct LastHit(Option<HitData>);
 fn app() -> Option<(App, Entity, Entity)> {
     let mut app = offscreen_app::app(SIZE)?;
     app.add_plugins(MeshPickingPlugin).init_resource::<Said>().init_resource::<LastHit>();
-    // Without a primary window Bevy casts no rays, whatever the target.
-    app.world_mut().spawn((Window::default(), PrimaryWindow));
     let camera = spawn_camera(&mut app, Msaa::Off, front());
     let capture = spawn(&mut app, &lone(Vec3::X), Transform::default());
     watch(&mut app, capture);
@@ -57,7 +56,9 @@ fn cube(app: &mut App, z: f32) -> Entity {
 
 /// Lets the pointer do something at a place, in pixels, and runs a frame.
 fn act(app: &mut App, position: Vec2, action: PointerAction) {
-    let target = app.world().resource::<Offscreen>().target().normalize(None).expect("a picture");
+    // Cameras have a window as their target, which no display shows.
+    let window = app.world_mut().query_filtered::<Entity, With<PrimaryWindow>>().single(app.world()).expect("a window");
+    let target = RenderTarget::default().normalize(Some(window)).expect("a target");
     app.world_mut().write_message(PointerInput::new(PointerId::Mouse, Location { target, position }, action));
     app.update();
 }

@@ -147,7 +147,7 @@ fn an_environment_map_is_fogged_as_what_is_infinitely_far() {
     spawn(&mut app, &RuntimeScene { environment: Some(map), ..behind }, ());
     let camera = spawn_camera(&mut app, Msaa::Off, front());
     let plain = rgb(&picture(&mut app, 0.0), MIDDLE.x, MIDDLE.y);
-    assert!(plain.iter().all(|value| *value > 150), "the map shows: {plain:?}");
+    assert!(plain.iter().all(|value| *value > 100), "the map shows: {plain:?}");
     let color = Color::srgb(0.2, 0.7, 0.3);
     let falloff = FogFalloff::Linear { start: 1000.0, end: 2000.0 };
     insert(&mut app, camera, DistanceFog { color, falloff, ..default() });
@@ -165,7 +165,7 @@ fn the_shadow_of_a_mesh_falls_on_a_capture_that_receives_it() {
     app.insert_resource(DirectionalLightShadowMap { size: 512 }).insert_resource(PointLightShadowMap { size: 256 });
     let capture = spawn(&mut app, &wall(), ());
     // Between the lamps and the middle of the wall, and not between that and the camera.
-    spawn_box(&mut app, Vec3::splat(0.6), Vec3::new(1.75, 0.0, 1.25), Color::BLACK, AlphaMode::Opaque);
+    spawn_box(&mut app, Vec3::splat(0.3), Vec3::new(1.75, 0.0, 1.25), Color::BLACK, AlphaMode::Opaque);
     spawn_camera(&mut app, Msaa::Off, front());
     let plain = picture(&mut app, 0.0);
     let place = Transform::from_xyz(3.5, 0.0, 2.5).looking_at(Vec3::ZERO, Vec3::Y);

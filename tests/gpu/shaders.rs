@@ -102,7 +102,8 @@ fn bevy_s_passes_are_valid_with_all_their_definitions() {
     let composite = ("composite", include_str!("../../shaders/composite.wgsl"), defines);
     let median = ["MEDIAN", "UNUSED", "UNUSED_TOO"];
     let write_depth = ("write_depth", include_str!("../../shaders/write_depth.wgsl"), median);
-    let write_motion = ("write_motion", include_str!("../../shaders/write_motion.wgsl"), median);
+    let motion = ["MEDIAN", "DEPTH", "UNUSED"];
+    let write_motion = ("write_motion", include_str!("../../shaders/write_motion.wgsl"), motion);
     let check = |(name, source, defines): (&str, &str, [&str; 3]), chosen: usize| {
         let chosen = defines.iter().enumerate().filter(|(index, _)| (chosen >> index) & 1 == 1);
         let shader_defs = chosen.map(|(_, define)| ((*define).to_owned(), ShaderDefValue::Bool(true))).collect();

@@ -1,31 +1,80 @@
 //! Order: what a camera draws of lit meshes besides opaque and transparent ones.
 //!
-//! In: Bevy's transmissive phase and its wireframes. Out: [`OtherPasses`], and transmissive meshes after the captures behind them.
+//! In: Bevy's transmissive phase and its wireframes; meshes that have moved. Out: [`OtherPasses`], and transmissive meshes after the captures
+//! behind them. Bevy 0.19 sorts a transparent mesh by the place where it was when it came into view, so places are brought up to date here.
 
 use crate::plugin::render::CaptureSystems;
 use crate::plugin::render::order::{OtherPass, OtherPasses};
 use bevy::app::App;
 use bevy::camera::Camera3d;
+use bevy::camera::primitives::Aabb;
+use bevy::core_pipeline::core_3d::{Transparent3d, TransparentSortingInfo3d};
 use bevy::core_pipeline::schedule::Core3d;
-use bevy::ecs::query::{Has, With};
+use bevy::ecs::entity::Entity;
+use bevy::ecs::query::{Changed, Has, With};
+use bevy::ecs::resource::Resource;
 use bevy::ecs::schedule::IntoScheduleConfigs;
 use bevy::ecs::system::{Query, Res, ResMut};
+use bevy::mesh::Mesh3d;
 use bevy::pbr::wireframe::Wireframe3d;
 use bevy::pbr::{ExtractedAtmosphere, Transmissive3d, main_transmissive_pass_3d};
+use bevy::render::Extract;
 use bevy::render::render_phase::{ViewBinnedRenderPhases, ViewSortedRenderPhases, sort_phase_system};
+use bevy::render::sync_world::MainEntity;
 use bevy::render::view::ExtractedView;
-use bevy::render::{Render, RenderApp, RenderSystems};
+use bevy::render::{ExtractSchedule, Render, RenderApp, RenderSystems};
+use bevy::transform::components::GlobalTransform;
+use glam::Vec3;
+
+/// The meshes that have moved since the frame before, and the centres of their bounds in the world.
+#[derive(Resource, Default)]
+struct MovedMeshes(Vec<(MainEntity, Vec3)>);
 
 /// Adds what the order of captures needs to the render world, if there is one.
 pub(super) fn build(app: &mut App) {
     let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
     render_app
         .init_resource::<OtherPasses>()
+        .init_resource::<MovedMeshes>()
+        .add_systems(ExtractSchedule, extract_moved_meshes)
         .configure_sets(Core3d, CaptureSystems::Draw.before(main_transmissive_pass_3d))
+        .add_systems(Render, update_centers.after(RenderSystems::Queue).before(RenderSystems::PhaseSort))
         .add_systems(
             Render,
             find_other_passes.in_set(RenderSystems::PhaseSort).after(sort_phase_system::<Transmissive3d>),
         );
+}
+
+fn extract_moved_meshes(
+    mut moved: ResMut<MovedMeshes>,
+    meshes: Extract<Query<(Entity, &GlobalTransform, &Aabb), (With<Mesh3d>, Changed<GlobalTransform>)>>,
+) {
+    moved.0.clear();
+    moved
+        .0
+        .extend(meshes.iter().map(|(mesh, place, bounds)| (mesh.into(), place.transform_point(bounds.center.into()))));
+}
+
+/// Gives the meshes that have moved their new places in the sorted phases, which keep meshes from frame to frame.
+fn update_centers(
+    moved: Res<MovedMeshes>,
+    mut transparent: ResMut<ViewSortedRenderPhases<Transparent3d>>,
+    mut transmissive: Option<ResMut<ViewSortedRenderPhases<Transmissive3d>>>,
+) {
+    let update = |info: &mut TransparentSortingInfo3d, center: Vec3| {
+        if let TransparentSortingInfo3d::Sorted { mesh_center, .. } = info {
+            *mesh_center = center;
+        }
+    };
+    for &(mesh, center) in &moved.0 {
+        let key = (Entity::PLACEHOLDER, mesh);
+        for phase in transparent.values_mut() {
+            phase.items.get_mut(&key).into_iter().for_each(|item| update(&mut item.sorting_info, center));
+        }
+        for phase in transmissive.iter_mut().flat_map(|phases| phases.values_mut()) {
+            phase.items.get_mut(&key).into_iter().for_each(|item| update(&mut item.sorting_info, center));
+        }
+    }
 }
 
 /// Finds the transmissive meshes and wireframes that each camera draws.

@@ -252,7 +252,7 @@ impl Passes<'_> {
         work: &WorkCounters,
     ) {
         let Some(pipeline) = view.write_motion.and_then(|id| self.cache.get_render_pipeline(id)) else { return };
-        let (Some(vectors), Some(prepass_depth)) = (&prepass.motion_vectors, &prepass.depth) else { return };
+        let Some(vectors) = &prepass.motion_vectors else { return };
         let (Some(motions), Some(depths)) = (view.renderer.motion(), view.renderer.depth()) else { return };
         let (Some(viewport), Some(distance)) = (view.bindings.viewport(), view.depth_bindings.lens()) else {
             return;
@@ -266,8 +266,8 @@ impl Passes<'_> {
         let mut pass = context.begin_tracked_render_pass(RenderPassDescriptor {
             label: Some("gs4d write_motion"),
             color_attachments: &[Some(vectors.get_attachment())],
-            depth_stencil_attachment: Some(RenderPassDepthStencilAttachment {
-                view: &prepass_depth.texture.default_view,
+            depth_stencil_attachment: prepass.depth.as_ref().map(|depth| RenderPassDepthStencilAttachment {
+                view: &depth.texture.default_view,
                 depth_ops: Some(depth_ops),
                 stencil_ops: None,
             }),

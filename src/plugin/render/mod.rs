@@ -55,8 +55,8 @@
 //! `pbr`, between 1 and the captures. Effects that read the depth buffer after the main pass (depth of field, volumetric fog) read the
 //! depths that [`DepthWrite`] wrote, by default for cameras that have such an effect.
 //!
-//! For cameras with a `MotionVectorPrepass` and a `DepthPrepass`, which temporal anti-aliasing and motion blur require, captures are then
-//! written into the textures of both: at pixels where they hide more than half of the background, the mean motion of their splats since the
+//! For cameras with a `MotionVectorPrepass`, which temporal anti-aliasing and motion blur require, captures are then written into its
+//! texture, and into that of a `DepthPrepass` if there is one: at pixels where they hide more than half of the background, the mean motion of their splats since the
 //! frame before, by the time of the capture, its transform and the camera, without jitter. Captures are never drawn with jitter: their
 //! splats are smooth without.
 //!

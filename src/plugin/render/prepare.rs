@@ -116,8 +116,8 @@ impl Pipelines<'_> {
         self.depth_writers.specialize(&self.cache, &self.write_depth, key)
     }
 
-    fn write_motion(&mut self, msaa: Msaa, median: bool) -> CachedRenderPipelineId {
-        let key = WriteMotionKey { samples: msaa.samples(), median };
+    fn write_motion(&mut self, msaa: Msaa, median: bool, depth: bool) -> CachedRenderPipelineId {
+        let key = WriteMotionKey { samples: msaa.samples(), median, depth };
         self.motion_writers.specialize(&self.cache, &self.write_motion, key)
     }
 }
@@ -185,7 +185,8 @@ pub(super) fn prepare_views(
         let instances = state.instances(&scene.captures, &scene.lists);
         let surrounded = instances.iter().any(|instance| instance.capture.has_environment());
         let opaque = opaque_depth(&lens, view, depth, msaa);
-        let has_motion = prepass.is_some_and(has_motion_vectors) && lens.distance.is_some();
+        let motion = prepass.filter(|prepass| prepass.motion_vectors.is_some() && lens.distance.is_some());
+        let has_motion = motion.is_some();
         let previous_pose = previous_pose.filter(|_| has_motion);
         let previous = previous_pose.map(|pose| scene.previous_views(&state.drawn, &pose));
         let parameters = ViewParameters {
@@ -212,16 +213,12 @@ pub(super) fn prepare_views(
         let median = writes_median(&settings, surrounded);
         let written = lens.distance.filter(|_| median.is_some() || has_motion);
         state.write_depth = written.and(median).map(|median| pipelines.write_depth(msaa, median));
-        state.write_motion = has_motion.then(|| pipelines.write_motion(msaa, median.unwrap_or(false)));
+        state.write_motion =
+            motion.map(|prepass| pipelines.write_motion(msaa, median.unwrap_or(false), prepass.depth.is_some()));
         if let Some(distance) = written {
             state.depth_bindings.set_lens(distance, 1, &device, &queue, renderer.0.work());
         }
     }
-}
-
-/// Returns whether a camera has motion vectors, and depths beside them, that captures can be written to.
-fn has_motion_vectors(prepass: &ViewPrepassTextures) -> bool {
-    prepass.motion_vectors.is_some() && prepass.depth.is_some()
 }
 
 /// Returns whether the depth that a camera asks for is the median one; `None` if it asks for none.

@@ -2,7 +2,7 @@
 //! post-processing that follows pixels from frame to frame.
 //!
 //! In: a view's captures (motions with transmittance, depths) and its lens. Out: pipeline and bind group for
-//! `shaders/write_motion.wgsl`, for cameras with Bevy's prepasses of depth and motion vectors.
+//! `shaders/write_motion.wgsl`, for cameras with Bevy's prepass of motion vectors.
 
 use super::composite::CaptureShaders;
 use crate::renderer::WorkCounters;
@@ -19,7 +19,7 @@ use bevy::render::render_resource::{
     RenderPipelineDescriptor, ShaderStages, SpecializedRenderPipeline, StencilState, TextureSampleType, VertexState,
 };
 use bevy::render::renderer::RenderDevice;
-use bevy::shader::Shader;
+use bevy::shader::{Shader, ShaderDefVal};
 use glam::{UVec4, Vec4};
 
 /// The parts that the pipelines for all prepasses share.
@@ -37,6 +37,8 @@ pub(super) struct WriteMotionKey {
     pub(super) samples: u32,
     /// Whether the median depth is written instead of the expected one.
     pub(super) median: bool,
+    /// Whether the prepass has a depth that others read.
+    pub(super) depth: bool,
 }
 
 impl FromWorld for WriteMotionPipeline {
@@ -58,11 +60,13 @@ impl SpecializedRenderPipeline for WriteMotionPipeline {
     fn specialize(&self, key: WriteMotionKey) -> RenderPipelineDescriptor {
         let target =
             ColorTargetState { format: MOTION_VECTOR_PREPASS_FORMAT, blend: None, write_mask: ColorWrites::ALL };
+        let median = key.median.then(|| ShaderDefVal::from("MEDIAN"));
+        let depth = key.depth.then(|| ShaderDefVal::from("DEPTH"));
         RenderPipelineDescriptor {
             label: Some("gs4d write_motion".into()),
             layout: vec![self.layout.clone()],
             vertex: self.vertex.clone(),
-            depth_stencil: Some(DepthStencilState {
+            depth_stencil: key.depth.then(|| DepthStencilState {
                 format: CORE_3D_DEPTH_FORMAT,
                 depth_write_enabled: Some(true),
                 // Reverse-z: nearer is greater.
@@ -73,7 +77,7 @@ impl SpecializedRenderPipeline for WriteMotionPipeline {
             multisample: MultisampleState { count: key.samples, ..MultisampleState::default() },
             fragment: Some(FragmentState {
                 shader: self.shader.clone(),
-                shader_defs: if key.median { vec!["MEDIAN".into()] } else { Vec::new() },
+                shader_defs: median.into_iter().chain(depth).collect(),
                 entry_point: Some("fragment".into()),
                 targets: vec![Some(target)],
             }),
