@@ -7,14 +7,12 @@
 use crate::support::cpu_reference::SIZE;
 use crate::support::fixtures::{front, insert, lone, spawn, spawn_box};
 use crate::support::offscreen_app::{self, spawn_camera};
-use bevy::camera::RenderTarget;
 use bevy::camera::visibility::RenderLayers;
 use bevy::picking::backend::HitData;
 use bevy::picking::pointer::{Location, PointerAction, PointerId, PointerInput};
 use bevy::prelude::*;
-use bevy::window::PrimaryWindow;
 use bevy_gs4d::prelude::*;
-use bevy_gs4d::testing;
+use bevy_gs4d::testing::{self, Offscreen};
 
 /// What the observers of [`watch`] have received.
 #[derive(Resource, Default)]
@@ -56,9 +54,7 @@ fn cube(app: &mut App, z: f32) -> Entity {
 
 /// Lets the pointer do something at a place, in pixels, and runs a frame.
 fn act(app: &mut App, position: Vec2, action: PointerAction) {
-    // Cameras have a window as their target, which no display shows.
-    let window = app.world_mut().query_filtered::<Entity, With<PrimaryWindow>>().single(app.world()).expect("a window");
-    let target = RenderTarget::default().normalize(Some(window)).expect("a target");
+    let target = app.world().resource::<Offscreen>().target().normalize(None).expect("a picture");
     app.world_mut().write_message(PointerInput::new(PointerId::Mouse, Location { target, position }, action));
     app.update();
 }
