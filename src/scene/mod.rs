@@ -5,7 +5,6 @@
 //! Gaussians may have.
 
 mod bounds;
-pub(crate) mod detail;
 mod environment;
 mod filter;
 mod form;
@@ -17,7 +16,6 @@ pub(crate) mod random;
 pub mod synth;
 
 pub use bounds::{Bounds, BoundsOverTime};
-pub use detail::{Level, MAX_LEVELS, pixels_across};
 pub use environment::Environment;
 pub use filter::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter, segment_of};
 pub use form::{ColorDegrees, Form, SceneForm, Sliced, Trained};
@@ -27,7 +25,6 @@ pub use provenance::{PlaybackHints, RotationConvention, TrainedCameras, TrainedW
 
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Model, SliceSettings};
 use crate::view::Background;
-use detail::check_levels;
 use glam::Vec3;
 
 /// A capture in memory.
@@ -43,8 +40,6 @@ pub struct GaussianScene {
     pub trained_with: TrainedWith,
     /// How it is meant to be played.
     pub playback: PlaybackHints,
-    /// The same capture of fewer Gaussians each, finest first; usually none.
-    pub levels: Vec<Level>,
 }
 
 /// A scene ready to draw.
@@ -60,8 +55,6 @@ pub struct RuntimeScene {
     pub trained_with: TrainedWith,
     /// How it is meant to be played.
     pub playback: PlaybackHints,
-    /// The same capture of fewer Gaussians each, finest first; usually none.
-    pub levels: Vec<Level>,
 }
 
 impl GaussianScene {
@@ -96,8 +89,7 @@ impl GaussianScene {
     /// A description of what does not fit.
     pub fn check(&self) -> Result<(), &'static str> {
         self.form.check_parts()?;
-        check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())?;
-        check_levels(&self.levels, &self.trained_with, self.environment.is_some())
+        check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())
     }
 
     /// Converts the scene for drawing: slices the Gaussians if they are in the trained form. Colors are moved, not
@@ -122,7 +114,6 @@ impl GaussianScene {
             filter: self.filter,
             trained_with: self.trained_with,
             playback: self.playback,
-            levels: self.levels.into_iter().map(Level::into_runtime).collect::<Result<_, _>>()?,
         })
     }
 }
@@ -137,7 +128,6 @@ impl RuntimeScene {
             filter: None,
             trained_with: TrainedWith::default(),
             playback: PlaybackHints::default(),
-            levels: Vec::new(),
         }
     }
 
@@ -173,15 +163,14 @@ impl RuntimeScene {
         self.form.color(index, direction, tau, self.trained_with.time_span())
     }
 
-    /// Checks that its parts fit together, as those of every loaded scene do: lengths, codes, the temporal filter, the
-    /// levels of detail, and that the environment map is finite. Then nothing is read beyond them, here or on a GPU.
+    /// Checks that its parts fit together, as those of every loaded scene do: lengths, codes, the temporal filter, and that
+    /// the environment map is finite. Then nothing is read beyond them, here or on a GPU.
     ///
     /// # Errors
     /// A description of what does not fit.
     pub fn check(&self) -> Result<(), &'static str> {
         self.form.check_parts()?;
-        check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())?;
-        check_levels(&self.levels, &self.trained_with, self.environment.is_some())
+        check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())
     }
 
     /// Returns the background that the capture was trained with: its environment map if it has one, else its color.
@@ -216,7 +205,6 @@ impl From<RuntimeScene> for GaussianScene {
             filter: scene.filter,
             trained_with: scene.trained_with,
             playback: scene.playback,
-            levels: scene.levels,
         }
     }
 }

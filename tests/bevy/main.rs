@@ -8,7 +8,6 @@ mod animation;
 mod app;
 mod assets;
 mod composition;
-mod detail;
 mod examples;
 mod glass;
 mod golden;

@@ -151,10 +151,8 @@ fn a_package_knows_how_it_was_trained() {
 
 #[test]
 fn people_get_text() {
-    const VERBS: [&str; 13] = [
-        "info", "convert", "render", "compare", "synth", "bench", "score", "prune", "mask", "eval", "ablate", "bake",
-        "detail",
-    ];
+    const VERBS: [&str; 12] =
+        ["info", "convert", "render", "compare", "synth", "bench", "score", "prune", "mask", "eval", "ablate", "bake"];
     let folder = folder();
     let path = scene(&folder, "50");
     let text = gs4d(&arguments!["info", &path]).text();

@@ -5,7 +5,6 @@
 
 mod appearance;
 mod bake;
-mod detail;
 mod fast;
 mod filter;
 mod fine_tune;
