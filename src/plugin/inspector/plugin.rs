@@ -263,7 +263,8 @@ impl Subject<'_, '_> {
                 label,
                 fault: CameraFault::of(&camera.clip_from_view(), space.copied()),
                 is_multisampled: msaa.is_some_and(|msaa| *msaa != Msaa::Off),
-                writes_depth: settings.is_some_and(|settings| settings.depth != DepthWrite::None),
+                writes_depth: settings
+                    .is_some_and(|settings| matches!(settings.depth, DepthWrite::Expected | DepthWrite::Median)),
             })
         });
         warnings::list(&captures.collect::<Vec<_>>(), &cameras.collect::<Vec<_>>())

@@ -44,8 +44,7 @@ pub(super) fn list(captures: &[PlacedCapture], cameras: &[PlacedCamera]) -> Vec<
         }
         if *is_multisampled && *writes_depth {
             warnings.push(format!(
-                "{label}: with multisampling, the written depth of captures comes after transparent meshes, and is the same for all \
-                 samples of a pixel; switch one of the two off if this shows"
+                "{label}: with multisampling, the written depth of captures is the same for all samples of a pixel; switch one of the two off if this shows"
             ));
         }
     }

@@ -100,9 +100,9 @@ pub struct CaptureViewSettings {
 
 /// Which depth of captures is written to the camera's depth buffer, at pixels where they hide more than half of the background.
 ///
-/// Post-processing that reads the depth buffer (depth of field, volumetric fog) then treats captures as surfaces. So do transparent
-/// meshes: they are drawn after captures, which cut them pixel by pixel. See
-/// [the order of a frame](crate::render#the-order-of-a-frame). Default: [`Auto`](Self::Auto).
+/// Post-processing that reads the depth buffer (depth of field, volumetric fog) then treats captures as surfaces. With
+/// [`Expected`](Self::Expected) and [`Median`](Self::Median) so do transparent meshes: they are drawn after captures, which cut them pixel
+/// by pixel. See [the order of a frame](crate::render#the-order-of-a-frame). Default: [`Auto`](Self::Auto).
 ///
 /// # Examples
 ///
