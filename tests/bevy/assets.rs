@@ -449,6 +449,24 @@ fn an_upright_capture_stands_whichever_axis_was_up_and_turns_about_the_vertical(
 }
 
 #[test]
+fn an_upright_capture_that_is_spawned_once_it_is_loaded_stands_in_the_same_update() {
+    let folder = folder();
+    let mut app = app(folder.path(), false);
+    let known = upright_of(&mut app, UpAxis::PosZ, Quat::IDENTITY);
+    app.update();
+    let capture = app.world().get::<GaussianCapture3d>(known).expect("just spawned").clone();
+    app.add_systems(Update, move |mut commands: Commands, mut spawned: Local<bool>| {
+        if !std::mem::replace(&mut *spawned, true) {
+            commands.spawn((capture.clone(), Upright));
+        }
+    });
+    app.update();
+    let mut all = app.world_mut().query_filtered::<&Transform, With<Upright>>();
+    let above: Vec<Vec3> = all.iter(app.world()).map(|transform| transform.rotation * Vec3::Z).collect();
+    assert!(above.len() == 2 && above.iter().all(|up| up.abs_diff_eq(Vec3::Y, 1e-5)), "both stand: {above:?}");
+}
+
+#[test]
 fn an_upright_capture_is_turned_once_and_again_for_another_capture() {
     let folder = folder();
     let mut app = app(folder.path(), false);

@@ -8,9 +8,10 @@ use super::state::{CaptureAssetSystems, CaptureState};
 use super::systems::{report_upload_failures, update_states};
 use super::uploads::Uploads;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d, stand_upright};
-use bevy::app::{App, Plugin, PreUpdate};
+use bevy::app::{App, Plugin, PostUpdate, PreUpdate};
 use bevy::asset::{AssetApp, AssetTrackingSystems};
 use bevy::ecs::schedule::IntoScheduleConfigs;
+use bevy::transform::TransformSystems;
 
 /// Loads captures. Part of [`GaussianCapturePlugin`](crate::GaussianCapturePlugin).
 #[derive(Debug, Default, Clone, Copy)]
@@ -28,6 +29,8 @@ impl Plugin for CaptureAssetPlugin {
             .configure_sets(PreUpdate, CaptureAssetSystems.after(AssetTrackingSystems))
             // Whoever hears that a capture is ready finds it upright.
             .add_systems(PreUpdate, (stand_upright, update_states).chain().in_set(CaptureAssetSystems))
+            // What is spawned in between with a capture that is there stands in its first picture.
+            .add_systems(PostUpdate, stand_upright.before(TransformSystems::Propagate))
             .add_systems(PreUpdate, report_upload_failures.after(CaptureAssetSystems));
     }
 }

@@ -51,7 +51,10 @@ impl Markers {
 
 /// Returns the markers on a stretch, in the order of play.
 pub(super) fn crossed<'a>(markers: &'a [Marker], leg: &Leg) -> Vec<&'a Marker> {
-    let mut crossed: Vec<&Marker> = markers.iter().filter(|marker| leg.passes(marker.time.into())).collect();
+    // In the precision of their times, or 0.4 would be later than the end of a step of 400 ms.
+    let [from, to] = [leg.from, leg.to].map(|time| f64::from(time as f32));
+    let rounded = Leg { from, to, inclusive: leg.inclusive };
+    let mut crossed: Vec<&Marker> = markers.iter().filter(|marker| rounded.passes(marker.time.into())).collect();
     crossed.sort_by(|a, b| a.time.total_cmp(&b.time));
     if leg.from > leg.to {
         crossed.reverse();
@@ -62,6 +65,14 @@ pub(super) fn crossed<'a>(markers: &'a [Marker], leg: &Leg) -> Vec<&'a Marker> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_marker_at_the_end_of_a_step_is_passed_in_it_and_not_again() {
+        let markers = Markers::new([(0.4, "end")]);
+        let count = |from, to| crossed(&markers.0, &Leg { from, to, inclusive: false }).len();
+        assert_eq!((count(0.0, 0.4), count(0.4, 0.8)), (1, 0), "forwards");
+        assert_eq!((count(0.8, 0.4), count(0.4, 0.0)), (1, 0), "backwards");
+    }
 
     #[test]
     fn markers_come_in_the_order_of_play() {
