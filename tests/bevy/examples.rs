@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
-const EXAMPLES: [&str; 5] = ["minimal", "play", "timeline", "walkthrough", "headless"];
+const EXAMPLES: [&str; 6] = ["minimal", "play", "scene", "timeline", "walkthrough", "headless"];
 
 /// Returns the path of an example: tests are in `deps`, beside `examples`.
 fn program(example: &str) -> PathBuf {
@@ -102,6 +102,11 @@ fn minimal_writes_pictures() {
 #[test]
 fn play_writes_pictures() {
     check("play", &[], 2);
+}
+
+#[test]
+fn scene_writes_pictures() {
+    check("scene", &[], 2);
 }
 
 #[test]
