@@ -4,10 +4,10 @@
 
 use super::active::ActiveLists;
 use super::composite::CompositeBindings;
+use super::kept::{IdleFrames, KeptGroup};
 use super::previous::CameraPose;
 use super::upload::GpuGaussianCapture;
 use super::write_depth::WriteDepthBindings;
-use super::write_motion::WriteMotionBindings;
 use crate::plugin::component::GaussianCapture;
 use crate::renderer::{Design, Instance, Renderer, ViewRenderer};
 use crate::view::{Appearance, View};
@@ -41,7 +41,7 @@ pub(crate) struct CaptureView {
     pub(super) depth_bindings: WriteDepthBindings,
     /// The pass that writes to the camera's motion vectors, if the camera has them, and what that pass binds.
     pub(super) write_motion: Option<CachedRenderPipelineId>,
-    pub(super) motion_bindings: WriteMotionBindings,
+    pub(super) motion_group: KeptGroup,
     /// The camera's pose in the last frame.
     pub(super) pose: Option<CameraPose>,
     /// Whether other systems work on the captures' picture before it reaches the target, in
@@ -51,8 +51,7 @@ pub(crate) struct CaptureView {
     pub(crate) shaded: Option<wgpu::TextureView>,
     /// Whether GPU times are measured.
     measured: bool,
-    /// Frames since the camera last saw a capture.
-    idle: u32,
+    idle: IdleFrames,
     /// The captures that the camera sees this frame; nothing is drawn while this is empty.
     pub(crate) drawn: Vec<Drawn>,
 }
@@ -81,9 +80,6 @@ impl Drawn {
     }
 }
 
-/// Frames in a row without a visible capture after which a camera releases its GPU memory.
-const RELEASE_AFTER_IDLE_FRAMES: u32 = 120;
-
 impl CaptureView {
     pub(super) fn new(
         device: &RenderDevice,
@@ -101,12 +97,12 @@ impl CaptureView {
             write_depth: None,
             depth_bindings: WriteDepthBindings::default(),
             write_motion: None,
-            motion_bindings: WriteMotionBindings::default(),
+            motion_group: KeptGroup::default(),
             pose: None,
             is_shaded: false,
             shaded: None,
             measured: false,
-            idle: 0,
+            idle: IdleFrames::default(),
             drawn: Vec::new(),
         }
     }
@@ -125,19 +121,13 @@ impl CaptureView {
         self.drawn.iter().filter_map(|drawn| drawn.instance(captures, lists)).collect()
     }
 
-    /// Counts a frame in which the camera sees a capture, or none. After [`RELEASE_AFTER_IDLE_FRAMES`] without one, GPU memory is
-    /// released.
+    /// Counts a frame in which the camera sees a capture, or none. After many without one, GPU memory is released.
     pub(super) fn count_idle_frames(&mut self) {
-        if self.sees_something() {
-            self.idle = 0;
-            return;
-        }
-        self.idle = self.idle.saturating_add(1);
-        if self.idle == RELEASE_AFTER_IDLE_FRAMES {
+        if self.idle.count(self.sees_something()) {
             self.renderer.release();
             self.bindings.forget();
             self.depth_bindings.forget();
-            self.motion_bindings.forget();
+            self.motion_group.forget();
         }
     }
 

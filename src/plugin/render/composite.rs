@@ -3,6 +3,7 @@
 //! In: a view target and a view's captures (colour and transmittance). Out: pipeline and bind group for
 //! `shaders/composite.wgsl`, which are created only when something has changed.
 
+use super::kept::KeptUniform;
 use crate::renderer::WorkCounters;
 use crate::view::BlendSpace;
 use bevy::asset::Handle;
@@ -14,7 +15,7 @@ use bevy::render::render_resource::{
     BindGroup, BindGroupEntries, BindGroupEntry, BindGroupLayoutDescriptor, BindGroupLayoutEntries, BindingResource,
     BlendState, ColorTargetState, ColorWrites, FragmentState, MultisampleState, PipelineCache,
     RenderPipelineDescriptor, ShaderStages, SpecializedRenderPipeline, TextureFormat, TextureSampleType, TextureView,
-    TextureViewId, UniformBuffer, VertexState,
+    TextureViewId, VertexState,
 };
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 use bevy::shader::{Shader, ShaderDefVal};
@@ -119,7 +120,7 @@ impl CompositePipeline {
 /// What one view binds. A view target alternates between two textures, so two bind groups are kept.
 #[derive(Default)]
 pub(super) struct CompositeBindings {
-    viewport: UniformBuffer<UVec4>,
+    viewport: KeptUniform<UVec4>,
     groups: Vec<CachedGroup>,
 }
 
@@ -144,14 +145,7 @@ impl CompositeBindings {
         queue: &RenderQueue,
         work: &WorkCounters,
     ) {
-        let first = self.viewport.buffer().is_none();
-        if first || *self.viewport.get() != viewport {
-            self.viewport.set(viewport);
-            self.viewport.write_buffer(device, queue);
-        }
-        if first {
-            work.add_created();
-        }
+        self.viewport.set(viewport, device, queue, work);
     }
 
     /// Returns the viewport's uniform, for other passes over the same view; `None` before the first

@@ -254,11 +254,12 @@ impl Passes<'_> {
         let Some(pipeline) = view.write_motion.and_then(|id| self.cache.get_render_pipeline(id)) else { return };
         let Some(vectors) = &prepass.motion_vectors else { return };
         let (Some(motions), Some(depths)) = (view.renderer.motion(), view.renderer.depth()) else { return };
-        let (Some(viewport), Some(distance)) = (view.bindings.viewport(), view.depth_bindings.lens()) else {
+        let (Some(viewport), Some(lens)) = (view.bindings.viewport(), view.depth_bindings.lens()) else {
             return;
         };
-        let (uniforms, targets) = ([viewport, distance], [motions, depths]);
-        let group = view.motion_bindings.group(&self.device, &self.cache, &self.write_motion, uniforms, targets, work);
+        let (textures, uniforms) = ([motions, depths], [viewport, lens]);
+        let create = || Some(self.write_motion.group(&self.device, &self.cache, textures, uniforms));
+        let group = view.motion_group.of(textures, work, create);
         let Some(group) = group else { return };
         let diagnostics = context.diagnostic_recorder();
         let diagnostics = diagnostics.as_deref();

@@ -76,6 +76,7 @@ mod depth_readers;
 mod draw;
 pub(crate) mod extract;
 mod fault;
+pub(crate) mod kept;
 pub(crate) mod order;
 mod plugin;
 mod prepare;

@@ -4,6 +4,7 @@
 //! for cameras that ask for it with [`DepthWrite`](super::DepthWrite), and for the shadow maps of lights.
 
 use super::composite::CaptureShaders;
+use super::kept::{KeptGroup, KeptUniform};
 use crate::renderer::WorkCounters;
 use bevy::asset::Handle;
 use bevy::core_pipeline::FullscreenShader;
@@ -14,7 +15,7 @@ use bevy::render::render_resource::binding_types::{texture_2d, uniform_buffer};
 use bevy::render::render_resource::{
     BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, BindingResource, CompareFunction,
     DepthBiasState, DepthStencilState, FragmentState, MultisampleState, PipelineCache, RenderPipelineDescriptor,
-    ShaderStages, ShaderType, SpecializedRenderPipeline, StencilState, TextureSampleType, UniformBuffer, VertexState,
+    ShaderStages, ShaderType, SpecializedRenderPipeline, StencilState, TextureSampleType, VertexState,
 };
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 use bevy::shader::Shader;
@@ -58,14 +59,7 @@ impl SpecializedRenderPipeline for WriteDepthPipeline {
             label: Some("gs4d write_depth".into()),
             layout: vec![self.layout.clone()],
             vertex: self.vertex.clone(),
-            depth_stencil: Some(DepthStencilState {
-                format: CORE_3D_DEPTH_FORMAT,
-                depth_write_enabled: Some(true),
-                // Reverse-z: nearer is greater.
-                depth_compare: Some(CompareFunction::GreaterEqual),
-                stencil: StencilState::default(),
-                bias: DepthBiasState::default(),
-            }),
+            depth_stencil: Some(nearest()),
             multisample: MultisampleState { count: key.samples, ..MultisampleState::default() },
             fragment: Some(FragmentState {
                 shader: self.shader.clone(),
@@ -88,14 +82,8 @@ struct DepthLens {
 /// What one view binds.
 #[derive(Default)]
 pub(crate) struct WriteDepthBindings {
-    lens: UniformBuffer<DepthLens>,
-    group: Option<CachedGroup>,
-}
-
-struct CachedGroup {
-    colors: wgpu::TextureView,
-    depths: wgpu::TextureView,
-    group: BindGroup,
+    lens: KeptUniform<DepthLens>,
+    group: KeptGroup,
 }
 
 impl WriteDepthBindings {
@@ -109,15 +97,7 @@ impl WriteDepthBindings {
         queue: &RenderQueue,
         work: &WorkCounters,
     ) {
-        let lens = DepthLens { distance, scale };
-        let first = self.lens.buffer().is_none();
-        if first || *self.lens.get() != lens {
-            self.lens.set(lens);
-            self.lens.write_buffer(device, queue);
-        }
-        if first {
-            work.add_created();
-        }
+        self.lens.set(DepthLens { distance, scale }, device, queue, work);
     }
 
     /// Returns the lens's uniform, for other passes over the same view; `None` before the first [`set_lens`](Self::set_lens).
@@ -127,7 +107,7 @@ impl WriteDepthBindings {
 
     /// Releases the targets that were bound.
     pub(crate) fn forget(&mut self) {
-        self.group = None;
+        self.group.forget();
     }
 
     /// Returns the bind group for the targets of a view; `None` before the first [`set_lens`](Self::set_lens).
@@ -140,13 +120,23 @@ impl WriteDepthBindings {
         [colors, depths]: [&wgpu::TextureView; 2],
         work: &WorkCounters,
     ) -> Option<&BindGroup> {
-        if self.group.as_ref().is_none_or(|known| known.colors != *colors || known.depths != *depths) {
+        let lens = &self.lens;
+        self.group.of([colors, depths], work, || {
             let layout = cache.get_bind_group_layout(&pipeline.layout);
-            let entries = BindGroupEntries::sequential((colors, depths, viewport, self.lens.binding()?));
-            let group = device.create_bind_group("gs4d write_depth", &layout, &entries);
-            work.add_created();
-            self.group = Some(CachedGroup { colors: colors.clone(), depths: depths.clone(), group });
-        }
-        self.group.as_ref().map(|known| &known.group)
+            let entries = BindGroupEntries::sequential((colors, depths, viewport, lens.binding()?));
+            Some(device.create_bind_group("gs4d write_depth", &layout, &entries))
+        })
+    }
+}
+
+/// Returns how captures are written to a depth buffer: where nothing nearer has been.
+pub(super) fn nearest() -> DepthStencilState {
+    DepthStencilState {
+        format: CORE_3D_DEPTH_FORMAT,
+        depth_write_enabled: Some(true),
+        // Reverse-z: nearer is greater.
+        depth_compare: Some(CompareFunction::GreaterEqual),
+        stencil: StencilState::default(),
+        bias: DepthBiasState::default(),
     }
 }

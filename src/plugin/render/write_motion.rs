@@ -5,18 +5,17 @@
 //! `shaders/write_motion.wgsl`, for cameras with Bevy's prepass of motion vectors.
 
 use super::composite::CaptureShaders;
-use crate::renderer::WorkCounters;
+use super::write_depth::nearest;
 use bevy::asset::Handle;
 use bevy::core_pipeline::FullscreenShader;
-use bevy::core_pipeline::core_3d::CORE_3D_DEPTH_FORMAT;
 use bevy::core_pipeline::prepass::MOTION_VECTOR_PREPASS_FORMAT;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::world::{FromWorld, World};
 use bevy::render::render_resource::binding_types::{texture_2d, uniform_buffer};
 use bevy::render::render_resource::{
     BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, BindingResource, ColorTargetState,
-    ColorWrites, CompareFunction, DepthBiasState, DepthStencilState, FragmentState, MultisampleState, PipelineCache,
-    RenderPipelineDescriptor, ShaderStages, SpecializedRenderPipeline, StencilState, TextureSampleType, VertexState,
+    ColorWrites, FragmentState, MultisampleState, PipelineCache,
+    RenderPipelineDescriptor, ShaderStages, SpecializedRenderPipeline, TextureSampleType, VertexState,
 };
 use bevy::render::renderer::RenderDevice;
 use bevy::shader::{Shader, ShaderDefVal};
@@ -66,14 +65,7 @@ impl SpecializedRenderPipeline for WriteMotionPipeline {
             label: Some("gs4d write_motion".into()),
             layout: vec![self.layout.clone()],
             vertex: self.vertex.clone(),
-            depth_stencil: key.depth.then(|| DepthStencilState {
-                format: CORE_3D_DEPTH_FORMAT,
-                depth_write_enabled: Some(true),
-                // Reverse-z: nearer is greater.
-                depth_compare: Some(CompareFunction::GreaterEqual),
-                stencil: StencilState::default(),
-                bias: DepthBiasState::default(),
-            }),
+            depth_stencil: key.depth.then(nearest),
             multisample: MultisampleState { count: key.samples, ..MultisampleState::default() },
             fragment: Some(FragmentState {
                 shader: self.shader.clone(),
@@ -86,41 +78,17 @@ impl SpecializedRenderPipeline for WriteMotionPipeline {
     }
 }
 
-/// What one view binds.
-#[derive(Default)]
-pub(super) struct WriteMotionBindings {
-    group: Option<CachedGroup>,
-}
-
-struct CachedGroup {
-    motions: wgpu::TextureView,
-    depths: wgpu::TextureView,
-    group: BindGroup,
-}
-
-impl WriteMotionBindings {
-    /// Releases the targets that were bound.
-    pub(super) fn forget(&mut self) {
-        self.group = None;
-    }
-
-    /// Returns the bind group for the targets of a view, its viewport and its lens.
+impl WriteMotionPipeline {
+    /// Creates the bind group of a view's motions and depths, its viewport and its lens.
     pub(super) fn group(
-        &mut self,
+        &self,
         device: &RenderDevice,
         cache: &PipelineCache,
-        pipeline: &WriteMotionPipeline,
-        [viewport, distance]: [BindingResource<'_>; 2],
         [motions, depths]: [&wgpu::TextureView; 2],
-        work: &WorkCounters,
-    ) -> Option<&BindGroup> {
-        if self.group.as_ref().is_none_or(|known| known.motions != *motions || known.depths != *depths) {
-            let layout = cache.get_bind_group_layout(&pipeline.layout);
-            let entries = BindGroupEntries::sequential((motions, depths, viewport, distance));
-            let group = device.create_bind_group("gs4d write_motion", &layout, &entries);
-            work.add_created();
-            self.group = Some(CachedGroup { motions: motions.clone(), depths: depths.clone(), group });
-        }
-        self.group.as_ref().map(|known| &known.group)
+        [viewport, lens]: [BindingResource<'_>; 2],
+    ) -> BindGroup {
+        let layout = cache.get_bind_group_layout(&self.layout);
+        let entries = BindGroupEntries::sequential((motions, depths, viewport, lens));
+        device.create_bind_group("gs4d write_motion", &layout, &entries)
     }
 }

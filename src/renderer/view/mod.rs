@@ -7,6 +7,7 @@
 mod bins;
 mod fast;
 mod motion;
+mod parameters;
 mod readback;
 mod record;
 mod resources;
@@ -15,75 +16,20 @@ mod sizes;
 use super::active::{drawn_count, most_drawn};
 use super::memory::{alignment_of, binding_limit};
 use super::pipelines::Renderer;
-use super::shaders::{Blending, ColorPrecision, FastVariant, Lists, Pixels};
-use super::timing::{MOTION_PASSES, PassTime, PassTimer, TIMED_FAST_PASSES, TIMED_PASSES};
-use super::{ActiveList, GpuCapture, GpuError, ViewStatistics, layout};
-use crate::view::tiles;
-use crate::view::{Appearance, Background, BlendSpace, DebugView, View};
+use super::shaders::{FastVariant, Lists, Pixels};
+use super::timing::{PassTime, PassTimer};
+use super::{GpuError, ViewStatistics, layout};
+use crate::view::{Appearance, Background, View, tiles};
 use bins::BinRoom;
 use glam::UVec2;
 use layout::{BLOCK, Counters, DEPTH_STEPS};
 use motion::MotionResources;
+pub use parameters::{Design, Instance, OpaqueDepth, ViewParameters};
 use readback::Readback;
 pub use resources::PassBuffers;
 use resources::Resources;
 use sizes::{Sizes, grown};
 use wgpu::{BufferUsages, TextureFormat};
-
-/// A capture in a view. The view includes the transform of the capture and the capture's own time.
-#[derive(Debug, Clone, Copy)]
-pub struct Instance<'a> {
-    /// The capture.
-    pub capture: &'a GpuCapture,
-    /// The list of the Gaussians that are drawn, prepared for the view's time and recorded before the view is; all are
-    /// drawn if `None`.
-    pub active: Option<&'a ActiveList>,
-    /// Camera and time, with the transform of the capture.
-    pub view: View,
-    /// Its opacity, light and crop.
-    pub appearance: Appearance,
-}
-
-/// The background and the opaque surfaces of a view, and how its captures are shown.
-#[derive(Debug, Clone, Copy)]
-pub struct ViewParameters<'a> {
-    /// What is behind the captures. Default: [`Background::None`].
-    pub background: Background,
-    /// The opaque surfaces that hide splats. If given, what is behind an environment map is hidden. Default: `None`.
-    pub opaque: Option<OpaqueDepth<'a>>,
-    /// The space in which the captures are blended. Default: [`BlendSpace::Encoded`].
-    pub blend_space: BlendSpace,
-    /// What is shown of the captures. Default: [`DebugView::Color`].
-    pub debug: DebugView,
-    /// Whether expected and median depth are computed; drawing is faster without. Default: `true`.
-    pub depths: bool,
-    /// Precision of the color target. Default: [`ColorPrecision::Single`].
-    pub precision: ColorPrecision,
-    /// The view of each instance one frame before, in their order: with its camera, its transform and its time of then. An instance without
-    /// one, or whose lens was of the other kind, has not moved. If given, [motions](ViewRenderer::motion) are computed. Default: `None`.
-    pub previous: Option<&'a [View]>,
-}
-
-impl Default for ViewParameters<'_> {
-    fn default() -> Self {
-        let (blend_space, debug, precision) = Default::default();
-        Self { background: Background::None, opaque: None, blend_space, debug, depths: true, precision, previous: None }
-    }
-}
-
-/// The depth of opaque surfaces that hide splats, pixel by pixel.
-#[derive(Debug, Clone, Copy)]
-pub struct OpaqueDepth<'a> {
-    /// A `Depth32Float` texture, 0 where there is no surface.
-    pub texture: &'a wgpu::TextureView,
-    /// Number of samples per pixel. A splat is hidden from the share of a pixel whose samples are in front of it.
-    pub samples: u32,
-    /// Corner of the view in the texture, pixels.
-    pub origin: UVec2,
-    /// From its depth `d` to camera space, `[a, b, c, e]` in `z = (a + b d) / (c + e d)`. Reverse-z with an infinite far plane is
-    /// `[near, 0, 0, 1]`.
-    pub distance: [f32; 4],
-}
 
 /// Working buffers, uniforms and targets of one view.
 #[derive(Debug)]
@@ -159,34 +105,6 @@ pub struct FinishedFrame<'a> {
     pub pairs: u32,
 }
 
-/// How a view is drawn. All draw the same picture.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
-pub enum Design {
-    /// [`Fast`](Self::Fast), but [`Reference`](Self::Reference) on software drivers, where it is faster, and in browsers, where the fast
-    /// design is untried.
-    #[default]
-    Auto,
-    /// Bins of splats, each sorted by one workgroup.
-    Fast,
-    /// Global sorts by depth and by tile, in the order of the original rasterizer.
-    Reference,
-}
-
-impl Design {
-    /// All designs, by name.
-    pub const NAMES: [(&'static str, Self); 3] =
-        [("auto", Self::Auto), ("fast", Self::Fast), ("reference", Self::Reference)];
-
-    /// Returns the names of the passes that are timed, in frames with motions or without.
-    pub(super) fn timed_passes(self, motions: bool) -> &'static [&'static str] {
-        let all = match self {
-            Self::Auto | Self::Fast => TIMED_FAST_PASSES,
-            Self::Reference => TIMED_PASSES,
-        };
-        if motions { all } else { &all[..all.len() - MOTION_PASSES] }
-    }
-}
-
 impl ViewRenderer {
     /// Creates a view without size; [`prepare`](Self::prepare) sets it.
     pub fn new(device: &wgpu::Device, renderer: &Renderer) -> Self {
@@ -243,7 +161,7 @@ impl ViewRenderer {
         parameters: &ViewParameters<'_>,
     ) -> Result<(), GpuError> {
         self.poll();
-        let (precision, blending) = (parameters.precision, blending(parameters));
+        let (precision, blending) = (parameters.precision, parameters.blending());
         self.pixels = Pixels { multisampled: blending.is_multisampled(), precision };
         self.has_depths = parameters.depths;
         let storages = instances.iter().map(|instance| instance.capture.storage);
@@ -589,22 +507,6 @@ impl ViewRenderer {
             motion.write(queue, &frame, instances, parameters.previous.unwrap_or_default(), self.alignment);
         }
         self.instance_uniforms = uniforms;
-    }
-}
-
-/// Returns what the fast design has to blend.
-fn blending(parameters: &ViewParameters<'_>) -> Blending {
-    let samples = parameters.opaque.map_or(0, |opaque| opaque.samples);
-    let color = match parameters.debug {
-        DebugView::Color | DebugView::Active | DebugView::Lifespan | DebugView::Velocity => !parameters.depths,
-        DebugView::Depth | DebugView::Overdraw => false,
-    };
-    match samples {
-        0 if color => Blending::Color,
-        1 if color => Blending::ColorBehindSurfaces,
-        _ if color => Blending::ColorBehindSamples,
-        0 | 1 => Blending::All,
-        _ => Blending::AllMultisampled,
     }
 }
 

@@ -6,7 +6,7 @@
 
 use super::record::mark;
 use super::resources::{Resources, pixel_group, texture_bytes};
-use super::{Design, Instance, ViewParameters, ViewRenderer, blending};
+use super::{Design, Instance, ViewParameters, ViewRenderer};
 use crate::renderer::GpuError;
 use crate::renderer::active::drawn_count;
 use crate::renderer::layout::{BACKGROUND_NONE, DEBUG_COLOR, FrameUniforms, InstanceUniforms, MotionUniforms};
@@ -62,7 +62,7 @@ impl ViewRenderer {
             let storages = instances.iter().map(|instance| instance.capture.storage);
             renderer.compile_motion(device, storages, self.design)?;
             let color = ViewParameters { depths: false, debug: DebugView::Color, ..*parameters };
-            let variant = FastVariant { blending: blending(&color), ..self.variant };
+            let variant = FastVariant { blending: color.blending(), ..self.variant };
             if self.design == Design::Fast {
                 renderer.compile_fast(device, std::iter::empty(), variant)?;
             }

@@ -9,6 +9,7 @@ use super::uniform::GpuSettings;
 use crate::plugin::render::CaptureStatistics;
 use crate::plugin::render::capture_views::{CaptureView, CaptureViews};
 use crate::plugin::render::extract::ExtractedViewSettings;
+use crate::plugin::render::kept::KeptUniform;
 use crate::plugin::render::shade_requests::ShadeRequests;
 use crate::renderer::WorkCounters;
 use crate::view::BlendSpace;
@@ -23,7 +24,7 @@ use bevy::platform::collections::HashMap;
 use bevy::render::diagnostic::RecordDiagnostics;
 use bevy::render::render_resource::{
     BindGroup, BindGroupEntries, CachedRenderPipelineId, Operations, PipelineCache, RenderPassColorAttachment,
-    RenderPassDescriptor, SpecializedRenderPipelines, UniformBuffer,
+    RenderPassDescriptor, SpecializedRenderPipelines,
 };
 use bevy::render::renderer::{RenderContext, RenderDevice, RenderQueue, ViewQuery};
 use bevy::render::view::ExtractedView;
@@ -35,7 +36,7 @@ pub(super) struct ShadeViews(HashMap<Entity, ShadeView>);
 /// State of one camera.
 struct ShadeView {
     pipeline: CachedRenderPipelineId,
-    settings: UniformBuffer<GpuSettings>,
+    settings: KeptUniform<GpuSettings>,
     /// Absent until something is shaded.
     targets: Option<Targets>,
 }
@@ -66,7 +67,7 @@ pub(super) fn prepare_shade(
     for (entity, view) in cameras.iter().filter(|(_, view)| may_need(view)) {
         let Some(&key) = keys.get(&view.retained_view_entity) else { continue };
         let pipeline = pipelines.specialize(&cache, &pipeline, key);
-        let new = || ShadeView { pipeline, settings: UniformBuffer::default(), targets: None };
+        let new = || ShadeView { pipeline, settings: KeptUniform::default(), targets: None };
         shades.0.entry(entity).or_insert_with(new).pipeline = pipeline;
     }
 }
@@ -143,14 +144,7 @@ impl Shading<'_> {
     fn targets<'a>(&self, shade: &'a mut ShadeView, view: &CaptureView, settings: GpuSettings) -> Option<&'a Targets> {
         let (colors, depths) = (view.renderer.color()?, view.renderer.depth()?);
         let work = self.statistics.work();
-        let first = shade.settings.buffer().is_none();
-        if first || *shade.settings.get() != settings {
-            shade.settings.set(settings);
-            shade.settings.write_buffer(&self.device, &self.queue);
-        }
-        if first {
-            work.add_created();
-        }
+        shade.settings.set(settings, &self.device, &self.queue, &work);
         if shade.targets.as_ref().is_none_or(|known| known.colors != *colors || known.depths != *depths) {
             let layout = self.cache.get_bind_group_layout(&self.pipeline.as_ref()?.layout);
             let entries = BindGroupEntries::sequential((colors, depths, shade.settings.binding()?));

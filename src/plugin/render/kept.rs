@@ -1,0 +1,73 @@
+//! What the passes of a view bind, kept from frame to frame: written or created again only when it has changed.
+//!
+//! In: a value, or two textures, of this frame. Out: a uniform buffer with the value, [`KeptUniform`]; a bind group of the textures,
+//! [`KeptGroup`]; the number of frames in which nothing was drawn, [`IdleFrames`].
+
+use crate::renderer::WorkCounters;
+use bevy::render::render_resource::encase::internal::WriteInto;
+use bevy::render::render_resource::{BindGroup, BindingResource, ShaderType, UniformBuffer};
+use bevy::render::renderer::{RenderDevice, RenderQueue};
+
+/// A uniform buffer.
+#[derive(Default)]
+pub(crate) struct KeptUniform<T: ShaderType + Default>(UniformBuffer<T>);
+
+impl<T: ShaderType + WriteInto + Default + PartialEq> KeptUniform<T> {
+    /// Writes the value if it has changed.
+    pub(crate) fn set(&mut self, value: T, device: &RenderDevice, queue: &RenderQueue, work: &WorkCounters) {
+        let first = self.0.buffer().is_none();
+        if first || *self.0.get() != value {
+            self.0.set(value);
+            self.0.write_buffer(device, queue);
+        }
+        if first {
+            work.add_created();
+        }
+    }
+
+    /// Returns the buffer; `None` before the first [`set`](Self::set).
+    pub(crate) fn binding(&self) -> Option<BindingResource<'_>> {
+        self.0.binding()
+    }
+}
+
+/// A bind group of two textures, and of buffers that stay.
+#[derive(Default)]
+pub(crate) struct KeptGroup(Option<([wgpu::TextureView; 2], BindGroup)>);
+
+impl KeptGroup {
+    /// Releases the textures.
+    pub(crate) fn forget(&mut self) {
+        self.0 = None;
+    }
+
+    /// Returns the bind group of these textures, which `create` makes if they are others than before; `None` if it cannot.
+    pub(crate) fn of(
+        &mut self,
+        textures: [&wgpu::TextureView; 2],
+        work: &WorkCounters,
+        create: impl FnOnce() -> Option<BindGroup>,
+    ) -> Option<&BindGroup> {
+        if self.0.as_ref().is_none_or(|(known, _)| known.each_ref() != textures) {
+            let group = create()?;
+            work.add_created();
+            self.0 = Some((textures.map(Clone::clone), group));
+        }
+        self.0.as_ref().map(|(_, group)| group)
+    }
+}
+
+/// Frames in a row in which a view has drawn nothing.
+#[derive(Debug, Default)]
+pub(crate) struct IdleFrames(u32);
+
+impl IdleFrames {
+    /// After so many, a view releases its GPU memory.
+    const MOST: u32 = 120;
+
+    /// Counts a frame. Returns whether the view should release its memory now.
+    pub(crate) fn count(&mut self, draws: bool) -> bool {
+        self.0 = if draws { 0 } else { self.0.saturating_add(1) };
+        self.0 == Self::MOST
+    }
+}
