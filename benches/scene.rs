@@ -1,10 +1,11 @@
 //! Wall-clock time of a Bevy app's frame in which a capture stands in a scene: what glass, fog, shadows and many copies cost.
 //!
 //! ```text
-//! cargo bench --features viewer,cli --bench scene -- [CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N]
+//! cargo bench --features viewer,cli --bench scene -- [CAPTURE] [--detailed CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N]
 //! ```
 //!
-//! In: a capture (default: the bundled one), a picture size (1280x720), frames for each measurement (300), rounds (3). Out: milliseconds of a frame for each scene, the median of the
+//! In: a capture (default: the bundled one) and the same with levels of detail (`gs4d detail`; without it those rows are left out), a
+//! picture size (1280x720), frames for each measurement (300), rounds (3). Out: milliseconds of a frame for each scene, the median of the
 //! rounds, how much longer it is than the scene that it is compared with, and the spread of the rounds. Default plugins, no window,
 //! rendering is pipelined, all apps take turns, and each measurement ends when the GPU has finished.
 
@@ -24,6 +25,7 @@ const WARM_UP: Duration = Duration::from_millis(600);
 
 struct Arguments {
     capture: PathBuf,
+    detailed: Option<PathBuf>,
     size: UVec2,
     frames: u32,
     rounds: usize,
@@ -42,12 +44,13 @@ enum Kind {
     Sun,
     Shadow,
     Crowd,
+    CrowdOfLevels,
 }
 
 use Kind::*;
 
 /// The scenes: a name, what stands there, the samples of the camera, and the scene that it is compared with.
-const SCENES: [(&str, Kind, Msaa, &str); 14] = [
+const SCENES: [(&str, Kind, Msaa, &str); 15] = [
     ("nothing", Nothing, Msaa::Off, "nothing"),
     ("capture", Capture, Msaa::Off, "nothing"),
     ("capture, two cameras", TwoViews, Msaa::Off, "capture"),
@@ -62,6 +65,7 @@ const SCENES: [(&str, Kind, Msaa, &str); 14] = [
     ("capture in the sun", Sun, Msaa::Off, "sun alone"),
     ("capture that casts a shadow", Shadow, Msaa::Off, "capture in the sun"),
     ("100 copies, 50 units away", Crowd, Msaa::Off, "nothing"),
+    ("the same with levels of detail", CrowdOfLevels, Msaa::Off, "nothing"),
 ];
 
 /// One scene, and the times of its frame in milliseconds, one for each round.
@@ -76,9 +80,11 @@ fn main() -> Result {
     let arguments = parse()?;
     let mut subjects = Vec::new();
     for (name, kind, msaa, compared) in SCENES {
-        // Bevy has one logger for all apps.
-        let app = app(&arguments, !subjects.is_empty(), kind, msaa)?;
-        subjects.push(Subject { name, compared, app, times: Vec::new() });
+        if kind != CrowdOfLevels || arguments.detailed.is_some() {
+            // Bevy has one logger for all apps.
+            let app = app(&arguments, !subjects.is_empty(), kind, msaa)?;
+            subjects.push(Subject { name, compared, app, times: Vec::new() });
+        }
     }
     for _ in 0..arguments.rounds {
         for subject in &mut subjects {
@@ -142,10 +148,11 @@ fn app(arguments: &Arguments, logged: bool, kind: Kind, msaa: Msaa) -> Result<Ap
     if kind == TwoViews {
         world.spawn((Camera3d::default(), Camera { order: -1, ..default() }, msaa, place));
     }
-    let handle = world.resource::<AssetServer>().load(arguments.capture.clone());
+    let file = if kind == CrowdOfLevels { arguments.detailed.as_ref() } else { None };
+    let handle = world.resource::<AssetServer>().load(file.unwrap_or(&arguments.capture).clone());
     match kind {
         Nothing | GlassAlone | SunAlone => {}
-        Crowd => {
+        Crowd | CrowdOfLevels => {
             let away = place.forward() * 50.0;
             for index in 0..100 {
                 let beside = place.right() * (3.0 * (index % 10) as f32 - 13.5);
@@ -183,6 +190,7 @@ fn run(app: &mut App, frames: u32) -> Result<Duration> {
 fn parse() -> Result<Arguments> {
     let mut parsed = Arguments {
         capture: concat!(env!("CARGO_MANIFEST_DIR"), "/assets/toybox.gs4d").into(),
+        detailed: None,
         size: UVec2::new(1280, 720),
         frames: 300,
         rounds: 3,
@@ -191,6 +199,7 @@ fn parse() -> Result<Arguments> {
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
         match argument.as_str() {
+            "--detailed" => parsed.detailed = Some(value()?.into()),
             "--size" => {
                 let text = value()?;
                 let (width, height) = text.split_once('x').ok_or("--size: not like 1280x720")?;

@@ -34,7 +34,7 @@ pub use crate::plugin::playback::{
 #[cfg(feature = "picking")]
 pub use crate::plugin::pointer::{CapturePickingCamera, CapturePickingSettings};
 pub use crate::plugin::render::{
-    CaptureSettings, CaptureStatistics, CaptureUploadBudget, CaptureViewSettings, CropBox, DepthWrite,
+    CaptureDetail, CaptureSettings, CaptureStatistics, CaptureUploadBudget, CaptureViewSettings, CropBox, DepthWrite,
 };
 pub use crate::plugin::stereo::{Eye, EyeTargets, StereoPlugin, StereoRig, spawn_stereo};
 pub use crate::view::{BlendSpace, DebugView};

@@ -106,7 +106,7 @@ impl Bake {
     pub fn run(&self) -> Result<Report, Failure> {
         let settings = self.settings(self.package.out()?);
         settings.check_files()?;
-        let scene = self.checkpoint.load(&self.input)?;
+        let scene = self.checkpoint.load_to_change(&self.input)?;
         let engine = &mut self.engine.open()?;
         let Baked { report, html, .. } = bake(scene, &settings, engine, &mut Bars::default())?;
         Ok(Report::new(report.json()?, in_short(&report, &html)))

@@ -129,7 +129,7 @@ impl Compress {
         let files = Files::default().reads_scene(&self.input).reads(&self.weights);
         let out = self.package.checked_out(self.views.add_to(files))?;
         let before = file_size(&self.input)?;
-        let scene = self.checkpoint.load(&self.input)?;
+        let scene = self.checkpoint.load_to_change(&self.input)?;
         let scene = scene.into_runtime().map_err(|error| Failure::at(&self.input, &error))?;
         let originals = self.originals(&scene, progress)?;
         let weights = self.weights.as_ref().map(|path| read_weights(path, scene.len())).transpose()?;

@@ -50,7 +50,7 @@ impl Convert {
         let out = self.package.checked_out(Files::default().reads_scene(&self.input))?;
         let before = file_size(&self.input)?;
         let settings = ConvertSettings { form: self.form, sh_degree: self.sh_degree, sh_degree_t: self.sh_degree_t };
-        let scene = convert(self.checkpoint.load(&self.input)?, &settings);
+        let scene = convert(self.checkpoint.load_to_change(&self.input)?, &settings);
         let scene = scene.map_err(|error| Failure::at(&self.input, &error))?;
         let after = self.package.save(&scene)?;
         let per_gaussian = after as f64 / scene.len().max(1) as f64;

@@ -130,7 +130,7 @@ impl FineTune {
     pub fn run(&self) -> Result<Report, Failure> {
         let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
         let work = Work::beside(out, ".tune")?;
-        let mut scene = self.checkpoint.load(&self.input)?;
+        let mut scene = self.checkpoint.load_to_change(&self.input)?;
         if let Some(background) = self.checkpoint.background {
             scene.trained_with.background = background;
         }

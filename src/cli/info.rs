@@ -103,6 +103,9 @@ impl Info {
         }
         let mut text = lines(&pairs);
         if let Some(info) = package {
+            if let Some(levels) = levels(info) {
+                text += &levels;
+            }
             text += &format!("\n{}", section_table(info));
         }
         let json = json!({
@@ -226,12 +229,20 @@ fn section_table(info: &PackageInfo) -> Table {
     table
 }
 
+/// Returns a line about the levels of detail; `None` without any.
+fn levels(info: &PackageInfo) -> Option<String> {
+    let sizes: Vec<String> = info.header.levels.iter().map(|level| level.pixels.to_string()).collect();
+    let text = format!("of detail, up to {} pixels on the screen", sizes.join(", "));
+    (!sizes.is_empty()).then(|| lines(&[("levels", text)]))
+}
+
 fn package_json(info: &PackageInfo) -> Value {
     json!({
         "version": info.version,
         "generator": info.header.generator,
         "intact": info.is_intact(),
         "damaged": info.damaged,
+        "levels": info.header.levels,
         "sections": info.header.sections,
     })
 }

@@ -59,7 +59,7 @@ impl Mask {
     /// engine.
     pub fn run(&self) -> Result<Report, Failure> {
         let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
-        let mut scene = self.checkpoint.load(&self.input)?;
+        let mut scene = self.checkpoint.load_to_change(&self.input)?;
         scene.filter = None;
         let by_views = needs_views(self.filter);
         let views = if by_views || self.every.is_some() { self.data.open(&scene.trained_with)? } else { Vec::new() };

@@ -13,6 +13,7 @@ mod bench;
 mod compare;
 mod compress;
 mod convert;
+mod detail;
 mod eval;
 mod failure;
 mod fine_tune;
@@ -66,6 +67,7 @@ enum Verb {
     Convert(convert::Convert),
     Render(render::Render),
     Compress(compress::Compress),
+    Detail(detail::Detail),
     Compare(compare::Compare),
     Synth(synth::Synth),
     Bench(bench::Bench),
@@ -86,6 +88,7 @@ impl Verb {
             Self::Convert(verb) => verb.run(),
             Self::Render(verb) => verb.run(),
             Self::Compress(verb) => verb.run(),
+            Self::Detail(verb) => verb.run(),
             Self::Compare(verb) => verb.run(),
             Self::Synth(verb) => verb.run(),
             Self::Bench(verb) => verb.run(),

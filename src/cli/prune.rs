@@ -72,7 +72,7 @@ impl Prune {
         let files = Files::default().reads_scene(&self.input).reads(&self.scores);
         let out = self.package.checked_out(self.data.add_to(files))?;
         let before = file_size(&self.input)?;
-        let scene = self.checkpoint.load(&self.input)?;
+        let scene = self.checkpoint.load_to_change(&self.input)?;
         let total = scene.len();
         let Pruned { scene, outcome, search } = self.prune(scene)?;
         let after = self.package.save(&scene)?;

@@ -80,7 +80,7 @@ impl Synth {
         let times: usize = text.parse().ok().filter(|&times| times > 0).ok_or_else(|| {
             Failure::new(format!("--grow {text}: expected the number of parts of each Gaussian, such as 37"))
         })?;
-        let scene = CheckpointArgs::default().load(capture)?;
+        let scene = CheckpointArgs::default().load_to_change(capture)?;
         let SceneForm::Trained(trained) = &scene.form else {
             let reason = "only Gaussians in the trained form can be grown: name a checkpoint or a package in that form";
             return Err(Failure::about(capture, reason));

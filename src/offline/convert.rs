@@ -30,12 +30,13 @@ pub struct ConvertSettings {
     pub sh_degree_t: Option<u32>,
 }
 
-/// Converts a scene to the form and the color degrees of the settings.
+/// Converts a scene to the form and the color degrees of the settings. Levels of detail are dropped: they are of the scene as it was.
 ///
 /// # Errors
 /// [`OfflineError::NotTrained`] if a scene in the runtime or the packed form is to become the trained form; a Gaussian
 /// that cannot be sliced.
 pub fn convert(mut scene: GaussianScene, settings: &ConvertSettings) -> Result<GaussianScene, OfflineError> {
+    scene.levels.clear();
     if settings.form == Some(TargetForm::Runtime) {
         scene = scene.unpacked();
     }

@@ -79,6 +79,11 @@ pub enum OfflineError {
     /// There is no score to choose from.
     #[error("there is no score to prune by")]
     NoScore,
+    /// An environment map is seen at every size.
+    #[error(
+        "has an environment map, which surrounds the camera: levels of detail are of captures that can be seen from afar"
+    )]
+    Surrounded,
     /// An orbit needs a scene with Gaussians.
     #[error("the scene has no Gaussians to go around")]
     NothingToOrbit,

@@ -15,6 +15,7 @@
 //! | [`temporal_filter`] | finds which Gaussians are active when |
 //! | [`fine_tune`](mod@fine_tune) | trains what is left, so that it makes up for what was removed |
 //! | [`quantize`], [`convert`] | changes the form that a scene is stored in |
+//! | [`detail`](mod@detail) | makes the same capture of fewer Gaussians, for pictures of few pixels |
 //! | [`bake`](mod@bake), [`report`] | runs all of it in order, resumable, and writes a report |
 //! | [`metrics`], [`evaluation`], [`fidelity`], [`comparison`] | measures how close pictures are |
 //! | [`ablation`] | tabulates what every score, ratio and filter costs |
@@ -27,6 +28,7 @@ pub mod bake;
 pub mod comparison;
 pub mod convert;
 pub mod dataset;
+pub mod detail;
 pub mod engine;
 mod error;
 pub mod evaluation;

@@ -45,6 +45,7 @@ pub fn select(scene: &GaussianScene, keep: &[u32]) -> GaussianScene {
         filter: scene.filter.as_ref().map(|filter| filter.select(keep)),
         trained_with: scene.trained_with.clone(),
         playback: scene.playback,
+        levels: Vec::new(),
     }
 }
 

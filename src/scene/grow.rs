@@ -11,7 +11,7 @@ use glam::{Vec3, Vec4};
 /// Splits each Gaussian into `times` with the same opacity and color. With `c = times^(-1/3)`, a part has `c` times the
 /// scales, and its 4D mean is `(mean, mean_t) + sqrt(1 - c²) L z`, with `L` the [factor](Parameters::factor) of the
 /// covariance and `z` standard normal: the mixture has the covariance of the Gaussian. A temporal filter, which is that of
-/// the whole Gaussians, is dropped. The same seed makes the same scene on every machine.
+/// the whole Gaussians, is dropped, and so are levels of detail. The same seed makes the same scene on every machine.
 ///
 /// # Errors
 /// The first Gaussian whose rotation has length zero or is not finite.
@@ -56,5 +56,6 @@ pub fn grow(
         filter: None,
         trained_with: scene.trained_with.clone(),
         playback: scene.playback,
+        levels: Vec::new(),
     })
 }

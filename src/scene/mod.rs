@@ -5,6 +5,7 @@
 //! Gaussians may have.
 
 mod bounds;
+pub(crate) mod detail;
 mod environment;
 mod filter;
 mod form;
@@ -16,6 +17,7 @@ pub(crate) mod random;
 pub mod synth;
 
 pub use bounds::{Bounds, BoundsOverTime};
+pub use detail::{Level, MAX_LEVELS, pixels_across};
 pub use environment::Environment;
 pub use filter::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter, segment_of};
 pub use form::{ColorDegrees, Form, SceneForm, Sliced, Trained};
@@ -25,6 +27,7 @@ pub use provenance::{PlaybackHints, RotationConvention, TrainedCameras, TrainedW
 
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Model, SliceSettings};
 use crate::view::Background;
+use detail::check_levels;
 use glam::Vec3;
 
 /// A capture in memory.
@@ -40,6 +43,8 @@ pub struct GaussianScene {
     pub trained_with: TrainedWith,
     /// How it is meant to be played.
     pub playback: PlaybackHints,
+    /// The same capture of fewer Gaussians each, finest first; usually none.
+    pub levels: Vec<Level>,
 }
 
 /// A scene ready to draw.
@@ -55,6 +60,8 @@ pub struct RuntimeScene {
     pub trained_with: TrainedWith,
     /// How it is meant to be played.
     pub playback: PlaybackHints,
+    /// The same capture of fewer Gaussians each, finest first; usually none.
+    pub levels: Vec<Level>,
 }
 
 impl GaussianScene {
@@ -89,7 +96,8 @@ impl GaussianScene {
     /// A description of what does not fit.
     pub fn check(&self) -> Result<(), &'static str> {
         self.form.check_parts()?;
-        check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())
+        check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())?;
+        check_levels(&self.levels, &self.trained_with, self.environment.is_some())
     }
 
     /// Converts the scene for drawing: slices the Gaussians if they are in the trained form. Colors are moved, not
@@ -114,6 +122,7 @@ impl GaussianScene {
             filter: self.filter,
             trained_with: self.trained_with,
             playback: self.playback,
+            levels: self.levels.into_iter().map(Level::into_runtime).collect::<Result<_, _>>()?,
         })
     }
 }
@@ -128,6 +137,7 @@ impl RuntimeScene {
             filter: None,
             trained_with: TrainedWith::default(),
             playback: PlaybackHints::default(),
+            levels: Vec::new(),
         }
     }
 
@@ -163,14 +173,15 @@ impl RuntimeScene {
         self.form.color(index, direction, tau, self.trained_with.time_span())
     }
 
-    /// Checks that its parts fit together, as those of every loaded scene do: lengths, codes, the temporal filter, and that
-    /// the environment map is finite. Then nothing is read beyond them, here or on a GPU.
+    /// Checks that its parts fit together, as those of every loaded scene do: lengths, codes, the temporal filter, the
+    /// levels of detail, and that the environment map is finite. Then nothing is read beyond them, here or on a GPU.
     ///
     /// # Errors
     /// A description of what does not fit.
     pub fn check(&self) -> Result<(), &'static str> {
         self.form.check_parts()?;
-        check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())
+        check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())?;
+        check_levels(&self.levels, &self.trained_with, self.environment.is_some())
     }
 
     /// Returns the background that the capture was trained with: its environment map if it has one, else its color.
@@ -205,6 +216,7 @@ impl From<RuntimeScene> for GaussianScene {
             filter: scene.filter,
             trained_with: scene.trained_with,
             playback: scene.playback,
+            levels: scene.levels,
         }
     }
 }

@@ -71,6 +71,7 @@ pub fn synthesize(settings: &SynthSettings) -> GaussianScene {
         filter: None,
         trained_with: TrainedWith::default(),
         playback: PlaybackHints { duration_seconds: settings.duration_seconds, ..PlaybackHints::default() },
+        levels: Vec::new(),
     }
 }
 

@@ -8,6 +8,7 @@ mod animation;
 mod app;
 mod assets;
 mod composition;
+mod detail;
 mod examples;
 mod glass;
 mod golden;

@@ -151,8 +151,10 @@ fn a_package_knows_how_it_was_trained() {
 
 #[test]
 fn people_get_text() {
-    const VERBS: [&str; 12] =
-        ["info", "convert", "render", "compare", "synth", "bench", "score", "prune", "mask", "eval", "ablate", "bake"];
+    const VERBS: [&str; 13] = [
+        "info", "convert", "render", "compare", "synth", "bench", "score", "prune", "mask", "eval", "ablate", "bake",
+        "detail",
+    ];
     let folder = folder();
     let path = scene(&folder, "50");
     let text = gs4d(&arguments!["info", &path]).text();

@@ -7,6 +7,7 @@ mod bake;
 mod command;
 mod compare;
 mod compress;
+mod detail;
 mod eval;
 // Faults are made with what Linux has: `/dev/full`, limits of a shell.
 #[cfg(target_os = "linux")]

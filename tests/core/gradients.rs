@@ -147,7 +147,7 @@ impl Case {
         };
         let form = SceneForm::Trained(trained.clone());
         let playback = PlaybackHints::default();
-        let scene = GaussianScene { form, environment: None, filter: None, trained_with, playback };
+        let scene = GaussianScene { form, environment: None, filter: None, trained_with, playback, levels: Vec::new() };
         scene.into_runtime_with(&self.slice).expect("valid Gaussians")
     }
 

@@ -8,11 +8,13 @@ use crate::support::package_parts::Parts;
 use bevy_gs4d::codec::package::{self, MAGIC, PackageError, PackageInfo, VERSION, WriteSettings};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics, Model, Parameters};
 use bevy_gs4d::scene::{
-    Environment, Form, GaussianScene, PlaybackHints, SceneForm, Sliced, Trained, TrainedCameras, TrainedWith, UpAxis,
+    Environment, Form, GaussianScene, Level, PlaybackHints, RuntimeScene, SceneForm, Sliced, Trained, TrainedCameras,
+    TrainedWith, UpAxis,
 };
 use bytemuck::{Zeroable, cast_slice};
 use proptest::prelude::*;
 use std::io::Cursor;
+use std::sync::Arc;
 
 /// Everything about a scene of the tests but its values.
 #[derive(Debug, Clone, Copy)]
@@ -98,6 +100,7 @@ fn scene(shape: &Shape, seed: u64) -> GaussianScene {
             ..TrainedWith::default()
         },
         playback: PlaybackHints { up: UpAxis::NegY, duration_seconds: 1.0 / 3.0 },
+        levels: Vec::new(),
     }
 }
 
@@ -567,5 +570,95 @@ fn scenes_that_contradict_themselves_are_not_written() {
     ] {
         let error = package::write(Vec::new(), &bad, &WriteSettings::default()).expect_err("must be refused");
         assert!(matches!(error, PackageError::Inconsistent(_)), "{error}");
+    }
+}
+
+/// Returns a scene with two levels of detail, of two Gaussians and of one.
+fn detailed() -> GaussianScene {
+    let level = |pixels, count| {
+        let shape = Shape { model: None, count, ..SMALL };
+        let scene = scene(&shape, 30 + count as u64);
+        let SceneForm::Ready(form) = scene.form else { panic!("the runtime form") };
+        let GaussianScene { environment, filter, trained_with, playback, .. } = scene;
+        let scene = RuntimeScene { form, environment, filter, trained_with, playback, levels: Vec::new() };
+        Level { pixels, scene: Arc::new(scene) }
+    };
+    GaussianScene { levels: vec![level(64.0, 2), level(8.0, 1)], ..scene(&SMALL, 31) }
+}
+
+#[test]
+fn levels_of_detail_survive_the_round_trip() {
+    let scene = detailed();
+    let file = pack(&scene);
+    let again = read(&file).expect("readable");
+    assert_same(&scene, &again);
+    assert_eq!(again.levels.len(), 2, "both levels");
+    for (a, b) in scene.levels.iter().zip(&again.levels) {
+        assert_eq!(a.pixels, b.pixels, "their sizes");
+        let [a, b] = [a, b].map(|level| GaussianScene::from(level.scene.as_ref().clone()));
+        assert_same(&a, &b);
+    }
+    assert!(file == pack(&again), "and the same file");
+    let info = inspect(&file).expect("readable");
+    assert_eq!(info.header.sections.iter().filter(|section| section.name == "level").count(), 2, "a section each");
+    assert!(info.header.requires.is_empty(), "readers that know of no levels show the rest");
+}
+
+#[test]
+fn a_reader_that_knows_no_levels_skips_them() {
+    let mut parts = Parts::of(&pack(&detailed()));
+    // As an older reader sees it: unknown sections, unknown fields.
+    while parts.header.contains("\"level\"") {
+        parts = parts.swap("\"level\"", "\"later\"");
+    }
+    let parts = parts.swap("    levels: [", "    later: [");
+    let scene = read(&parts.seal()).expect("readable");
+    assert!(scene.levels.is_empty(), "no levels");
+    assert_same(&scene, &GaussianScene { levels: Vec::new(), ..detailed() });
+}
+
+#[test]
+fn damaged_levels_are_refused() {
+    let good = Parts::of(&pack(&detailed()));
+    let last = good.bodies.len() - 1;
+    let with_level = |body: Vec<u8>| {
+        let mut parts = good.clone();
+        let entry = |body: &[u8]| {
+            format!("length: {}, raw_length: {}, crc32: {}", body.len(), body.len(), crc32fast::hash(body))
+        };
+        let (old, new) = (entry(&parts.bodies[last]), entry(&body));
+        parts.bodies[last] = body;
+        parts.swap(&old, &new).seal()
+    };
+    assert!(read(&with_level(good.bodies[last].clone())).is_ok(), "the level that is replaced below");
+    let nested = pack(&GaussianScene::from(RuntimeScene {
+        levels: vec![detailed().levels[1].clone()],
+        ..detailed().levels[0].scene.as_ref().clone()
+    }));
+    let other = TrainedWith { time_interval: [0.0, 9.0], ..TrainedWith::default() };
+    let other = GaussianScene { trained_with: other, ..scene(&Shape { model: None, count: 1, ..SMALL }, 5) };
+    let bodies = [
+        (nested, "levels"),
+        (pack(&scene(&SMALL, 5)), "trained form"),
+        (pack(&other), "time interval"),
+        (b"GS4D".to_vec(), "cut off"),
+        (Vec::new(), "not a .gs4d package"),
+    ];
+    for (body, expected) in bodies {
+        let message = read(&with_level(body)).expect_err("must be refused").to_string();
+        assert!(message.contains(expected), "{expected}: {message}");
+    }
+    let headers = [
+        ("(pixels: 64.0)", "(pixels: 8.0)"),
+        ("(pixels: 64.0)", "(pixels: inf)"),
+        ("(pixels: 8.0)", "(pixels: 0.0)"),
+        ("encoding: \"package\", first: 0", "encoding: \"package\", first: 1"),
+        ("encoding: \"package\", first: 0, count: 1", "encoding: \"package\", first: 0, count: 2"),
+        ("encoding: \"package\"", "encoding: \"parcel\""),
+        ("name: \"level\"", "name: \"gone\""),
+        ("    levels: [", "    gone: ["),
+    ];
+    for (from, to) in headers {
+        assert!(read(&good.clone().swap(from, to).seal()).is_err(), "{from} as {to}");
     }
 }

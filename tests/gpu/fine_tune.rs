@@ -69,6 +69,7 @@ fn gradients_are_those_of_the_original() {
             filter: None,
             trained_with: golden.scene.trained_with.clone(),
             playback: golden.scene.playback,
+            levels: Vec::new(),
         };
         let weights = |key: &str| golden::floats(&folder.join(expected[key].as_str().expect("a file")));
         let (color, depth, alpha) = (weights("w_color"), weights("w_depth"), weights("w_alpha"));

@@ -5,6 +5,7 @@
 
 mod appearance;
 mod bake;
+mod detail;
 mod fast;
 mod filter;
 mod fine_tune;

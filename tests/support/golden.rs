@@ -98,6 +98,7 @@ fn load_view(folder: &Path, scene_name: &str, json: &Value, view: &Value) -> Gol
         filter: None,
         trained_with,
         playback: PlaybackHints::default(),
+        levels: Vec::new(),
     }
     .into_runtime_with(&settings)
     .expect("golden scenes are valid");

@@ -4,6 +4,7 @@
 
 use super::values;
 use crate::cli::failure::Failure;
+use crate::cli::progress::note;
 use crate::codec::checkpoint::CheckpointOptions;
 use crate::codec::{self, package};
 use crate::gaussian::ShDirection;
@@ -81,6 +82,19 @@ impl CheckpointArgs {
             trained.raster_fov = self.raster_fov.unwrap_or(trained.raster_fov);
             trained.cameras = self.trained_cameras.unwrap_or(trained.cameras);
             trained.sh_direction = self.sh_direction.unwrap_or(trained.sh_direction);
+        }
+        Ok(scene)
+    }
+
+    /// Opens a checkpoint or a package to change it: as [`load`](Self::load), without levels of detail, which are of the scene as it is.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn load_to_change(&self, path: &Path) -> Result<GaussianScene, Failure> {
+        let mut scene = self.load(path)?;
+        if !scene.levels.is_empty() {
+            scene.levels.clear();
+            note(&format!("note: {}: levels of detail are left out; gs4d detail makes new ones", path.display()));
         }
         Ok(scene)
     }

@@ -76,7 +76,7 @@ pub fn read<R: Read + Seek>(
     let trained_with = options.trained_with(cfg_args, &file);
     let playback = options.playback(&trained_with);
     let form = SceneForm::Trained(Trained { parameters, harmonics });
-    Ok(GaussianScene { form, environment, filter: None, trained_with, playback })
+    Ok(GaussianScene { form, environment, filter: None, trained_with, playback, levels: Vec::new() })
 }
 
 /// Reads a checkpoint, and `cfg_args` in the same folder.

@@ -11,17 +11,19 @@ const FIXED: u64 = 20;
 /// Longest header read, bytes. A million Gaussians need a tenth of a megabyte.
 const HEADER_LIMIT: u64 = 16 << 20;
 
-/// Writes the fixed start and the header, after checking that [`read`] will accept both.
-pub(super) fn write(writer: &mut impl Write, header: &Header) -> Result<(), PackageError> {
+/// Writes the fixed start and the header, after checking that [`read`] will accept both. Returns the length of the whole file.
+pub(super) fn write(writer: &mut impl Write, header: &Header) -> Result<u64, PackageError> {
     let text = header.to_text()?;
     let length = text.len() as u64;
     check_length(length)?;
-    header.check(FIXED + length, header.end(FIXED + length))?;
+    let file_length = header.end(FIXED + length);
+    header.check(FIXED + length, file_length)?;
     writer.write_all(&MAGIC)?;
     writer.write_all(&VERSION.to_le_bytes())?;
     writer.write_all(&length.to_le_bytes())?;
     writer.write_all(&checksum(text.as_bytes()).to_le_bytes())?;
-    Ok(writer.write_all(text.as_bytes())?)
+    writer.write_all(text.as_bytes())?;
+    Ok(file_length)
 }
 
 /// Reads and checks the fixed start and the header. Also returns the length of the whole file; the reader is left at

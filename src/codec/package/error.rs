@@ -146,6 +146,14 @@ pub enum PackageError {
         /// What is wrong with it.
         reason: String,
     },
+    /// A level of detail, which is a package itself, cannot be read or written.
+    #[error("level of detail {}: {reason}", .index + 1)]
+    Level {
+        /// Its index, from 0.
+        index: usize,
+        /// What is wrong with it.
+        reason: Box<PackageError>,
+    },
     /// The file could not be read or written.
     #[error(transparent)]
     Io(#[from] std::io::Error),

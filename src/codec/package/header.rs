@@ -3,13 +3,15 @@
 //! In: a scene, or the RON text of a file. Out: a [`Header`] whose numbers have been checked against each other and
 //! against the length of the file, so that the code that follows can rely on them.
 
-use super::{PackageError, Section};
+use super::layout::Attribute;
+use super::{PACKAGE, PackageError, Section};
 use crate::gaussian::Model;
 use crate::gaussian::harmonics::{MAX_COEFFICIENTS, evaluated};
+use crate::scene::detail::check_sizes;
 use crate::scene::packed::{MAX_ENTRIES, MAX_STAGES};
 use crate::scene::{
-    ActiveSets, ColorDegrees, FilterKind, Form, GaussianScene, MAX_SEGMENTS, PackedColors, PlaybackHints, SceneForm,
-    Trained, TrainedWith,
+    ActiveSets, ColorDegrees, FilterKind, Form, GaussianScene, MAX_LEVELS, MAX_SEGMENTS, PackedColors, PlaybackHints,
+    SceneForm, Trained, TrainedWith,
 };
 use serde::{Deserialize, Serialize};
 
@@ -51,8 +53,21 @@ pub struct Header {
     pub trained_with: TrainedWith,
     /// How the capture is meant to be played.
     pub playback: PlaybackHints,
+    /// The levels of detail, finest first. Each is a section `level` of its own.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub levels: Vec<StoredLevel>,
     /// The section table, in the order of the file.
     pub sections: Vec<Section>,
+}
+
+/// The name of the sections of levels of detail.
+pub(super) const LEVEL: &str = "level";
+
+/// A level of detail, without its Gaussians.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct StoredLevel {
+    /// The largest size on the screen at which it is drawn, pixels.
+    pub pixels: f32,
 }
 
 /// The form in which the Gaussians are stored: a [`SceneForm`] without its values.
@@ -146,6 +161,7 @@ impl Header {
             }),
             trained_with: scene.trained_with.clone(),
             playback: scene.playback,
+            levels: scene.levels.iter().map(|level| StoredLevel { pixels: level.pixels }).collect(),
             sections: Vec::new(),
         };
         header.check_numbers()?;
@@ -192,15 +208,45 @@ impl Header {
         }
         self.check_numbers()?;
         let attributes = self.attributes();
-        let limit = RAW_PER_BYTE.saturating_mul(file_length).saturating_add(RAW_FLOOR).min(isize::MAX as u64);
+        let limit = unpacked_limit(file_length);
         let within = |raw: u64| if raw > limit { Err(PackageError::TooLarge { raw, limit }) } else { Ok(()) };
-        let scene = attributes.iter().fold(0u64, |sum, attribute| sum.saturating_add(attribute.memory()));
-        within(scene)?;
+        within(scene_memory(&attributes))?;
         attributes.iter().try_for_each(|attribute| attribute.check_sections(&self.sections))?;
+        within(self.unpacked())?;
+        self.check_level_sections()
+    }
+
+    /// Returns the bytes that reading takes, without levels of detail. The sections must have been checked.
+    pub(super) fn unpacked(&self) -> u64 {
+        let attributes = self.attributes();
         // Beside the scene, one section at a time is decompressed.
         let decoded = self.sections.iter().filter(|s| attributes.iter().any(|attribute| attribute.name == s.name));
         let largest = decoded.map(|section| section.raw_length as u64).max().unwrap_or_default();
-        within(scene.saturating_add(largest))
+        scene_memory(&attributes).saturating_add(largest)
+    }
+
+    /// Checks that each level of detail has its section, in order.
+    fn check_level_sections(&self) -> Result<(), PackageError> {
+        let mut next = 0;
+        for section in self.sections.iter().filter(|section| section.name == LEVEL) {
+            let name = section.name.clone();
+            if section.encoding != PACKAGE {
+                return Err(PackageError::UnknownEncoding { name, encoding: section.encoding.clone() });
+            }
+            if section.first != next || section.count != 1 || next == self.levels.len() {
+                let (found, count) = (section.first, section.count);
+                return Err(PackageError::SectionRange { name, found, count, expected: next });
+            }
+            if section.raw_length != section.length {
+                let (expected, found) = (section.length as u64, section.raw_length as u64);
+                return Err(PackageError::SectionLength { name, expected, found });
+            }
+            next += 1;
+        }
+        match next < self.levels.len() {
+            true => Err(PackageError::MissingSection { name: LEVEL.to_owned() }),
+            false => Ok(()),
+        }
     }
 
     /// Checks the numbers, without the sections.
@@ -229,6 +275,8 @@ impl Header {
             self.filter.is_none_or(|filter| (1..=MAX_SEGMENTS).contains(&filter.segments)),
             "a temporal filter of no segments, or far too many",
         )?;
+        sane(self.levels.len() <= MAX_LEVELS, "more levels of detail than a capture may have")?;
+        check_sizes(self.levels.iter().map(|level| level.pixels)).map_err(PackageError::Inconsistent)?;
         let duration = self.playback.duration_seconds;
         sane(duration.is_finite() && duration >= 0.0, "the playback duration must be a finite number, zero or above")
     }
@@ -256,4 +304,14 @@ impl Header {
             }
         }
     }
+}
+
+/// Returns the bytes that a package of this length may take when it is read.
+pub(super) fn unpacked_limit(file_length: u64) -> u64 {
+    RAW_PER_BYTE.saturating_mul(file_length).saturating_add(RAW_FLOOR).min(isize::MAX as u64)
+}
+
+/// Returns the bytes of the tables of all attributes.
+fn scene_memory(attributes: &[Attribute]) -> u64 {
+    attributes.iter().fold(0u64, |sum, attribute| sum.saturating_add(attribute.memory()))
 }

@@ -214,6 +214,7 @@ pub(super) fn blank(header: &Header) -> GaussianScene {
         }),
         trained_with: header.trained_with.clone(),
         playback: header.playback,
+        levels: Vec::new(),
     }
 }
 

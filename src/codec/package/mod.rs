@@ -6,8 +6,8 @@
 //! A package is a fixed start ([`MAGIC`], [`VERSION`], length and checksum of the header), a [`Header`] in RON, and the
 //! sections that the header lists. A section holds one attribute of a run of Gaussians, split into byte planes
 //! (`planes`), compressed and checksummed on its own. The order is geometry, first color coefficients, the other
-//! coefficients, temporal filter, environment map. A reader skips what it does not know, unless the header lists it as
-//! required.
+//! coefficients, temporal filter, environment map, levels of detail, each of which is a package itself. A reader skips
+//! what it does not know, unless the header lists it as required.
 
 mod envelope;
 mod error;
@@ -17,18 +17,20 @@ mod planes;
 mod section;
 
 pub use error::PackageError;
-pub use header::{EnvironmentSize, Header, StoredFilter, StoredForm};
-pub use section::{FLOAT_PLANES, Section};
+pub use header::{EnvironmentSize, Header, StoredFilter, StoredForm, StoredLevel};
+pub use section::{FLOAT_PLANES, PACKAGE, Section};
 
 use super::CodecErrorKind;
 use super::checkpoint::CheckpointOptions;
 use super::format::Format;
-use crate::scene::GaussianScene;
+use crate::scene::{GaussianScene, Level, RuntimeScene, SceneForm};
+use header::{LEVEL, unpacked_limit};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::fs::File;
-use std::io::{BufReader, Read, Seek, Write};
+use std::io::{BufReader, Cursor, Read, Seek, Write};
 use std::path::Path;
+use std::sync::Arc;
 
 /// The row of packages in the table of formats.
 pub const FORMAT: Format = Format {
@@ -106,9 +108,20 @@ pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSet
         .into_par_iter()
         .map(|(attribute, rows)| section::encode(layout::words(scene, attribute.name), &attribute, rows, level))
         .collect::<Result<Vec<_>, _>>()?;
-    let (sections, bodies): (Vec<_>, Vec<_>) = encoded.into_iter().unzip();
+    let (mut sections, mut bodies): (Vec<_>, Vec<_>) = encoded.into_iter().unzip();
+    let first_level = bodies.len();
+    for (index, level) in scene.levels.iter().enumerate() {
+        let mut body = Vec::new();
+        let inner = GaussianScene::from(level.scene.as_ref().clone());
+        write(&mut body, &inner, settings).map_err(of_level(index))?;
+        sections.push(section::of_package(LEVEL, index, &body));
+        bodies.push(body);
+    }
     header.sections = sections;
-    envelope::write(&mut writer, &header)?;
+    let mut room = Room::beside(&header, envelope::write(&mut writer, &header)?);
+    for (index, body) in bodies[first_level..].iter().enumerate() {
+        room.header_of_level(body).map_err(of_level(index))?;
+    }
     for body in bodies {
         section::write_body(&mut writer, &body)?;
     }
@@ -125,20 +138,85 @@ pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSet
 /// One [`PackageError`] for each kind of damage.
 pub fn read<R: Read + Seek>(reader: R) -> Result<GaussianScene, PackageError> {
     let mut reader = BufReader::new(reader);
-    let (header, _) = envelope::read(&mut reader)?;
+    let (header, file_length) = envelope::read(&mut reader)?;
+    let mut room = Room::beside(&header, file_length);
+    let mut levels = Vec::new();
+    let mut scene = read_sections(&mut reader, &header, &mut |body| {
+        let index = levels.len();
+        levels.push(room.level(body).map_err(of_level(index))?);
+        Ok(())
+    })?;
+    let sized = header.levels.iter().zip(levels);
+    scene.levels = sized.map(|(stored, scene)| Level { pixels: stored.pixels, scene: Arc::new(scene) }).collect();
+    scene.check().map_err(PackageError::Inconsistent)?;
+    Ok(scene)
+}
+
+/// Reads all sections of a package; `level` receives those of levels of detail.
+fn read_sections(
+    reader: &mut impl Read,
+    header: &Header,
+    level: &mut dyn FnMut(&[u8]) -> Result<(), PackageError>,
+) -> Result<GaussianScene, PackageError> {
     let attributes = header.attributes();
-    let mut scene = layout::blank(&header);
+    let mut scene = layout::blank(header);
     // Values go where the header says: the tables must be of that size.
     header.check_scene(&scene)?;
     let (mut body, mut planes) = (Vec::new(), Vec::new());
     for section in &header.sections {
-        section.read_body(&mut reader, &mut body)?;
+        section.read_body(reader, &mut body)?;
         if let Some(attribute) = attributes.iter().find(|a| a.name == section.name) {
             section.decode(&body, attribute, &mut planes, layout::words_mut(&mut scene, attribute.name))?;
+        } else if section.name == LEVEL {
+            level(&body)?;
         }
     }
-    scene.check().map_err(PackageError::Inconsistent)?;
     Ok(scene)
+}
+
+/// The bytes that a package and its levels of detail take when they are read, and how many they may.
+struct Room {
+    raw: u64,
+    limit: u64,
+}
+
+impl Room {
+    /// Returns the room beside the scene of a header, in a file of this length.
+    fn beside(header: &Header, file_length: u64) -> Self {
+        Self { raw: header.unpacked(), limit: unpacked_limit(file_length) }
+    }
+
+    /// Returns the header of a level of detail, for which there must be room. It has no levels itself.
+    fn header_of_level(&mut self, body: &[u8]) -> Result<(Header, u64), PackageError> {
+        let mut reader = Cursor::new(body);
+        let (header, _) = envelope::read(&mut reader)?;
+        if !header.levels.is_empty() {
+            return Err(PackageError::Inconsistent("a level of detail that has levels itself"));
+        }
+        self.raw = self.raw.saturating_add(header.unpacked());
+        match self.raw > self.limit {
+            true => Err(PackageError::TooLarge { raw: self.raw, limit: self.limit }),
+            false => Ok((header, reader.position())),
+        }
+    }
+
+    /// Reads a level of detail from the package that it is.
+    fn level(&mut self, body: &[u8]) -> Result<RuntimeScene, PackageError> {
+        let (header, start) = self.header_of_level(body)?;
+        let mut reader = Cursor::new(body);
+        reader.set_position(start);
+        let scene = read_sections(&mut reader, &header, &mut |_| Ok(()))?;
+        let SceneForm::Ready(form) = scene.form else {
+            return Err(PackageError::Inconsistent("a level of detail in the trained form"));
+        };
+        let GaussianScene { environment, filter, trained_with, playback, .. } = scene;
+        Ok(RuntimeScene { form, environment, filter, trained_with, playback, levels: Vec::new() })
+    }
+}
+
+/// Returns what names the level of detail, from 0, that an error is about.
+fn of_level(index: usize) -> impl FnOnce(PackageError) -> PackageError {
+    move |reason| PackageError::Level { index, reason: Box::new(reason) }
 }
 
 /// Reads a package; only the options that replace stored values are used.

@@ -11,14 +11,17 @@ use std::ops::Range;
 /// The encoding of lossless sections: byte planes of little-endian float32, compressed by zstd.
 pub const FLOAT_PLANES: &str = "f32-planes-zstd";
 
+/// The encoding of sections that are a package each, without compression of their own.
+pub const PACKAGE: &str = "package";
+
 /// One entry of the section table.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Section {
     /// The attribute it holds. Sections of unknown names are skipped.
     pub name: String,
-    /// Encoding of the body: [`FLOAT_PLANES`].
+    /// Encoding of the body: [`FLOAT_PLANES`] or [`PACKAGE`].
     pub encoding: String,
-    /// First row of the attribute: a Gaussian, or a value of the environment map.
+    /// First row of the attribute: a Gaussian, a value of the environment map, or a level of detail.
     pub first: usize,
     /// Number of rows.
     pub count: usize,
@@ -51,6 +54,19 @@ pub(super) fn encode(
         crc32: crc32fast::hash(&body),
     };
     Ok((section, body))
+}
+
+/// Returns the entry in the section table of a package inside the package, the one with this index of its name.
+pub(super) fn of_package(name: &str, index: usize, body: &[u8]) -> Section {
+    Section {
+        name: name.to_owned(),
+        encoding: PACKAGE.to_owned(),
+        first: index,
+        count: 1,
+        length: body.len(),
+        raw_length: body.len(),
+        crc32: crc32fast::hash(body),
+    }
 }
 
 /// Writes the length of a body, then the body.

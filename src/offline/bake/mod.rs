@@ -139,6 +139,7 @@ impl<'a> Bake<'a> {
         let BakeSettings { checkpoint, data, resolution, .. } = settings;
         let work = Work::beside(&settings.out, ".bake")?;
         scene.filter = None;
+        scene.levels.clear();
         let views = open_split(data, Split::Train, *resolution, &scene.trained_with, progress)?.views;
         let cameras = data.join(Split::Train.file_name());
         let files = Fingerprint::of_files(&[checkpoint, &cameras])?;

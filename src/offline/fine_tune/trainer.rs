@@ -131,11 +131,13 @@ impl<'a> Trainer<'a> {
     /// As [`new`](Self::new), and a device that cannot sum in this way.
     pub fn with_sums(
         headless: &'a mut Headless,
-        scene: GaussianScene,
+        mut scene: GaussianScene,
         mode: GradientMode,
         sums: GradientSums,
     ) -> Result<Self, TrainerError> {
         sums.check(headless)?;
+        // They are of the Gaussians as they were.
+        scene.levels.clear();
         let SceneForm::Trained(trained) = &scene.form else { return Err(TrainerError::NotTrained) };
         let model = trained.parameters.model();
         let records = records(&trained.parameters);

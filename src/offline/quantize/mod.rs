@@ -1,7 +1,7 @@
 //! Compression: from a scene ready to draw to the packed form.
 //!
 //! In: a [`RuntimeScene`] and [`CompressSettings`] (or a [`Quality`] that selects them). Out: a scene in the packed
-//! form, its Gaussians in Morton order, and a [`CompressReport`].
+//! form, its Gaussians in Morton order and without levels of detail, and a [`CompressReport`].
 //!
 //! 1. [`CompressSettings`] specify how much may be lost.
 //! 2. [`order`] sorts the Gaussians, so that neighbors share a box.
@@ -191,6 +191,7 @@ fn compress_by(
         environment: scene.environment,
         trained_with: scene.trained_with,
         playback: scene.playback,
+        levels: Vec::new(),
     };
     Ok((scene, report))
 }

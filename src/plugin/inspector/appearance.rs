@@ -26,7 +26,8 @@ pub(super) fn show(ui: &mut egui::Ui, settings: CaptureSettings, bounds: Option<
         }
         ui.label("tint");
         if ui.button("as trained").clicked() {
-            edited = CaptureSettings { filter: edited.filter, crop: edited.crop, ..CaptureSettings::default() };
+            let CaptureSettings { filter, crop, finest_level, .. } = edited;
+            edited = CaptureSettings { filter, crop, finest_level, ..CaptureSettings::default() };
         }
     });
     let mut cropped = edited.crop.is_some();
@@ -70,6 +71,7 @@ mod tests {
             tint: LinearRgba::new(0.123_45, 3.0, -1.0, 0.5),
             exposure: -20.123_4,
             crop: Some(crop),
+            finest_level: 3,
         };
         let context = egui::Context::default();
         for settings in [CaptureSettings::default(), odd] {

@@ -3,6 +3,7 @@
 //! In: [`ExtractedCaptures`]. Out: [`ActiveLists`], shared by all cameras, and written on the GPU before any of them draws, only when a
 //! capture has entered another segment of time.
 
+use super::detail::CaptureLevels;
 use super::extract::ExtractedCaptures;
 use super::renderer::CaptureRenderer;
 use super::upload::GpuGaussianCapture;
@@ -36,6 +37,7 @@ pub(super) fn prepare_active_lists(
     renderer: Option<Res<CaptureRenderer>>,
     extracted: Res<ExtractedCaptures>,
     captures: Res<RenderAssets<GpuGaussianCapture>>,
+    levels: Res<CaptureLevels>,
     mut lists: ResMut<ActiveLists>,
 ) {
     let _span = debug_span!("gs4d/lists").entered();
@@ -46,7 +48,8 @@ pub(super) fn prepare_active_lists(
         uploaded.is_some_and(|capture| placed.list.is_for(capture))
     });
     for (entity, shown) in &extracted.0 {
-        if !(shown.seen && shown.filtered) || shown.is_faded_out() {
+        // Levels of detail have no filter.
+        if !(shown.seen && shown.filtered) || shown.is_faded_out() || levels.is_coarse(entity) {
             continue;
         }
         let Some(uploaded) = captures.get(shown.asset) else { continue };

@@ -64,6 +64,8 @@ pub(crate) struct Drawn {
     pub(crate) appearance: Appearance,
     /// Whether the capture's temporal filter is used.
     pub(crate) filtered: bool,
+    /// The level of detail; 0 is all Gaussians.
+    pub(crate) level: usize,
 }
 
 impl Drawn {
@@ -73,8 +75,9 @@ impl Drawn {
         captures: &'a RenderAssets<GpuGaussianCapture>,
         lists: &'a ActiveLists,
     ) -> Option<Instance<'a>> {
-        let capture = captures.get(self.asset)?.capture()?;
-        let list = if self.filtered { lists.0.get(&self.entity) } else { None };
+        let capture = captures.get(self.asset)?.level(self.level)?;
+        // Levels of detail have no filter.
+        let list = if self.filtered && self.level == 0 { lists.0.get(&self.entity) } else { None };
         let active = list.map(|placed| &placed.list);
         Some(Instance { capture, active, view: self.view, appearance: self.appearance })
     }

@@ -36,6 +36,8 @@ pub(crate) struct ExtractedCapture {
     /// Whether its temporal filter is used.
     pub(crate) filtered: bool,
     pub(crate) appearance: Appearance,
+    /// The finest level of detail that is drawn.
+    pub(super) finest_level: u8,
     /// Whether any camera sees it, or may see what it does to lights.
     pub(crate) seen: bool,
 }
@@ -79,6 +81,7 @@ pub(crate) fn extract_captures(
             seconds: playback.time,
             filtered: settings.filter,
             appearance: settings.appearance(fade.copied().unwrap_or_default().0),
+            finest_level: settings.finest_level,
             seen: visibility.get(),
         };
         extracted.0.insert(entity.into(), placed);

@@ -9,6 +9,7 @@
 //! visibility   a capture's bounds at this time -> its Aabb           main world
 //! extract      captures, their times, poses and settings             main world -> render world; those before: previous
 //! upload       a loaded capture -> buffers on the GPU                once per asset, over several frames
+//! detail       how many Gaussians by the size on the screen          once per camera, placed capture and frame
 //! active       which Gaussians are active                            once per placed capture and segment, before all cameras
 //! prepare      a camera's lens and every capture's pose -> views     once per camera and frame, kept in capture_views
 //! order        what is drawn before captures, and what after them    once per camera and frame
@@ -73,6 +74,7 @@ mod active;
 pub(crate) mod capture_views;
 mod composite;
 mod depth_readers;
+mod detail;
 mod draw;
 pub(crate) mod extract;
 mod fault;
@@ -97,6 +99,7 @@ mod write_motion;
 pub(crate) use active::ActiveLists;
 #[cfg(feature = "pbr")]
 pub(crate) use capture_views::Drawn;
+pub use detail::CaptureDetail;
 pub use draw::CaptureSystems;
 #[cfg(feature = "pbr")]
 pub(crate) use extract::{ExtractedCaptures, extract_captures};

@@ -6,6 +6,7 @@ use super::active::{ActiveLists, prepare_active_lists, record_active_lists};
 use super::capture_views::CaptureViews;
 use super::composite::{CaptureShaders, CompositePipeline};
 use super::depth_readers::{DepthReaders, extract_depth_readers};
+use super::detail::{CaptureDetail, CaptureLevels, choose_levels, extract_detail};
 use super::draw::{CaptureSystems, draw_captures, draw_front, record_captures};
 use super::extract::{ExtractedCaptures, ExtractedViewSettings, extract_captures, extract_view_settings};
 use super::order::{CaptureOrders, OtherPasses, hide_front, place_captures, show_front};
@@ -43,6 +44,7 @@ impl Plugin for CaptureRenderPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<CaptureStatistics>()
             .init_resource::<CaptureUploadBudget>()
+            .init_resource::<CaptureDetail>()
             .register_required_components::<GaussianCapture3d, CaptureSettings>()
             .add_plugins(RenderAssetPlugin::<GpuGaussianCapture>::default())
             .add_systems(PostUpdate, update_bounds.in_set(VisibilitySystems::CalculateBounds));
@@ -76,6 +78,8 @@ fn build_rendering(app: &mut App) {
         .insert_resource(statistics)
         .insert_resource(uploads)
         .init_resource::<CaptureUploadBudget>()
+        .init_resource::<CaptureDetail>()
+        .init_resource::<CaptureLevels>()
         .init_resource::<ExtractedCaptures>()
         .init_resource::<ExtractedViewSettings>()
         .init_resource::<ShadeRequests>()
@@ -93,7 +97,7 @@ fn build_rendering(app: &mut App) {
         .init_gpu_resource::<CaptureViews>()
         .init_gpu_resource::<ActiveLists>()
         .add_systems(RenderStartup, init_renderer)
-        .add_systems(ExtractSchedule, (extract_captures, extract_view_settings, extract_upload_budget))
+        .add_systems(ExtractSchedule, (extract_captures, extract_view_settings, extract_upload_budget, extract_detail))
         .add_systems(ExtractSchedule, (keep_previous_captures.before(extract_captures), extract_depth_readers))
         .add_systems(
             Render,
@@ -102,7 +106,7 @@ fn build_rendering(app: &mut App) {
                 make_depth_readable.in_set(RenderSystems::PrepareViews),
                 // Batches of meshes end where captures are drawn.
                 place_captures.in_set(RenderSystems::Prepare).before(RenderSystems::PrepareResources),
-                prepare_active_lists.in_set(RenderSystems::PrepareResources),
+                (choose_levels, prepare_active_lists).chain().in_set(RenderSystems::PrepareResources),
                 (prepare_views, publish_statistics).chain().in_set(RenderSystems::PrepareBindGroups),
             ),
         )

@@ -7,6 +7,7 @@ use super::active::ActiveLists;
 use super::capture_views::{CaptureView, CaptureViews, Drawn};
 use super::composite::{CompositeKey, CompositePipeline};
 use super::depth_readers::DepthReaders;
+use super::detail::CaptureLevels;
 use super::extract::{ExtractedCaptures, ExtractedViewSettings};
 use super::fault::CameraFault;
 use super::previous::{CameraPose, PreviousCaptures};
@@ -44,6 +45,7 @@ pub(super) struct Scene<'w> {
     lists: Res<'w, ActiveLists>,
     previous: Res<'w, PreviousCaptures>,
     depth_readers: Res<'w, DepthReaders>,
+    levels: Res<'w, CaptureLevels>,
 }
 
 /// The pipelines that depend on a camera's target.
@@ -62,6 +64,7 @@ impl Scene<'_> {
     /// Appends the captures that a camera sees to `drawn`, in the order of Bevy's list, which is the same in every frame.
     fn collect(
         &self,
+        viewer: Entity,
         lens: &CameraLens,
         view: &ExtractedView,
         size: UVec2,
@@ -75,7 +78,8 @@ impl Scene<'_> {
             let time = self.captures.get(placed.asset)?.time_at(placed.seconds)?;
             let view = lens.view(size, time, camera, placed.world_from_capture)?;
             let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
-            Some(Drawn { entity: *entity, asset, view, appearance, filtered })
+            let level = self.levels.of(viewer, *entity);
+            Some(Drawn { entity: *entity, asset, view, appearance, filtered, level })
         }));
     }
 
@@ -168,7 +172,7 @@ pub(super) fn prepare_views(
         (state.is_shaded, state.shaded) = (false, None);
         let lens = drawable_lens(view, camera);
         if let Some(lens) = &lens {
-            scene.collect(lens, view, size, visible, &mut state.drawn);
+            scene.collect(entity, lens, view, size, visible, &mut state.drawn);
         }
         state.count_idle_frames();
         let pose = lens.map(|lens| CameraPose { lens, world_from_camera: view.world_from_view.affine() });

@@ -5,7 +5,7 @@
 use super::capture_views::CaptureViews;
 use super::statistics::CaptureStatistics;
 use super::upload::GpuGaussianCapture;
-use crate::renderer::{GpuCapture, ViewStatistics};
+use crate::renderer::ViewStatistics;
 use bevy::ecs::system::Res;
 use bevy::log::debug_span;
 use bevy::render::render_asset::RenderAssets;
@@ -28,7 +28,8 @@ pub(super) fn publish_statistics(
         };
         (view.camera, numbers)
     });
-    let uploaded = || captures.iter().filter_map(|(_, capture)| capture.capture());
+    let uploaded = captures.iter().filter(|(_, capture)| capture.capture().is_some()).count();
+    let bytes = captures.iter().map(|(_, capture)| capture.bytes()).sum();
     let uploading = captures.iter().filter(|(_, capture)| capture.bytes_left().is_some()).count();
-    statistics.update(numbers, uploaded().map(GpuCapture::bytes).sum(), uploaded().count(), uploading);
+    statistics.update(numbers, bytes, uploaded, uploading);
 }

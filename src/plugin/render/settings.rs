@@ -43,6 +43,9 @@ pub struct CaptureSettings {
     pub exposure: f32,
     /// The part of the capture that is drawn. Default: `None`, all of it.
     pub crop: Option<CropBox>,
+    /// The finest level of detail that is drawn, if the capture has levels: 1 is the first one made of fewer Gaussians; more than there are
+    /// is the coarsest. Default: 0, all Gaussians where the capture is large on the screen.
+    pub finest_level: u8,
 }
 
 /// A box in capture space, in capture units: Gaussians whose means are outside at the current time are not drawn.
@@ -135,7 +138,7 @@ pub enum DepthWrite {
 
 impl Default for CaptureSettings {
     fn default() -> Self {
-        Self { filter: true, opacity: 1.0, tint: LinearRgba::WHITE, exposure: 0.0, crop: None }
+        Self { filter: true, opacity: 1.0, tint: LinearRgba::WHITE, exposure: 0.0, crop: None, finest_level: 0 }
     }
 }
 

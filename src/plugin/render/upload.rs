@@ -9,7 +9,7 @@ use super::statistics::CaptureStatistics;
 use crate::plugin::asset::Uploads;
 use crate::plugin::component::GaussianCapture;
 use crate::renderer::{CaptureUpload, GpuCapture};
-use crate::scene::RuntimeScene;
+use crate::scene::{Bounds, Level, RuntimeScene};
 use bevy::asset::{AssetId, AssetServer};
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::lifetimeless::SRes;
@@ -57,21 +57,49 @@ pub struct GpuGaussianCapture {
 
 /// A capture that is whole on the GPU.
 struct ShownCapture {
-    gpu: GpuCapture,
+    /// All Gaussians, then each level of detail.
+    levels: Vec<GpuCapture>,
     /// What it was made of: while it is replaced, the asset is another.
     source: GaussianCapture,
 }
 
 /// A capture on its way to the GPU.
 struct NextCapture {
-    upload: CaptureUpload<Arc<RuntimeScene>>,
+    /// All Gaussians, then each level of detail.
+    uploads: Vec<CaptureUpload<Arc<RuntimeScene>>>,
     source: GaussianCapture,
+}
+
+impl NextCapture {
+    /// Returns the bytes that have not been uploaded.
+    fn bytes_left(&self) -> u64 {
+        self.uploads.iter().map(CaptureUpload::bytes_left).sum()
+    }
 }
 
 impl GpuGaussianCapture {
     /// Returns the buffers; `None` if the capture cannot be drawn.
     pub fn capture(&self) -> Option<&GpuCapture> {
-        self.shown.as_ref().map(|shown| &shown.gpu)
+        self.level(0)
+    }
+
+    /// Returns the buffers of a level of detail, or those of all Gaussians if there is no such level (0 is all Gaussians); `None` if the
+    /// capture cannot be drawn.
+    pub(super) fn level(&self, index: usize) -> Option<&GpuCapture> {
+        let levels = &self.shown.as_ref()?.levels;
+        levels.get(index).or(levels.first())
+    }
+
+    /// Returns the levels of detail of the capture that is drawn, and its bounds at all times; `None` if it has none.
+    pub(super) fn detail(&self) -> Option<(&[Level], Bounds)> {
+        let source = &self.shown.as_ref()?.source;
+        let levels = &source.scene().levels[..];
+        (!levels.is_empty()).then_some((levels, source.bounds()?))
+    }
+
+    /// Returns the bytes of its buffers.
+    pub(super) fn bytes(&self) -> u64 {
+        self.shown.iter().flat_map(|shown| &shown.levels).map(GpuCapture::bytes).sum()
     }
 
     /// Returns the timestamp at `seconds` since the start of the capture that is drawn, in its own unit of time; `None` if it cannot be
@@ -83,19 +111,24 @@ impl GpuGaussianCapture {
     /// Uploads no more than `bytes` of what will be shown, and shows it once it is whole. Returns how many bytes that were.
     fn advance(&mut self, queue: &RenderQueue, renderer: &CaptureRenderer, bytes: u64) -> u64 {
         let Some(mut next) = self.next.take() else { return 0 };
-        let written = next.upload.advance(queue, &renderer.0, bytes);
-        if next.upload.bytes_left() > 0 {
+        let mut written = 0;
+        for upload in &mut next.uploads {
+            if written < bytes {
+                written += upload.advance(queue, &renderer.0, bytes - written);
+            }
+        }
+        if next.bytes_left() > 0 {
             self.next = Some(next);
         } else {
-            let gpu = next.upload.finish(queue, &renderer.0);
-            self.shown = Some(Arc::new(ShownCapture { gpu, source: next.source }));
+            let levels = next.uploads.into_iter().map(|upload| upload.finish(queue, &renderer.0)).collect();
+            self.shown = Some(Arc::new(ShownCapture { levels, source: next.source }));
         }
         written
     }
 
     /// Returns the bytes that are missing until it is whole; `None` if it is, or will never be.
     pub(super) fn bytes_left(&self) -> Option<u64> {
-        self.next.as_ref().map(|next| next.upload.bytes_left())
+        self.next.as_ref().map(NextCapture::bytes_left)
     }
 }
 
@@ -127,8 +160,12 @@ impl RenderAsset for GpuGaussianCapture {
                 name()
             );
         }
-        let next = match CaptureUpload::new(device.wgpu_device(), &renderer.0, source.shared_scene()) {
-            Ok(upload) => Some(NextCapture { upload, source }),
+        let whole = source.shared_scene();
+        let levels = whole.levels.iter().map(|level| level.scene.clone());
+        let upload = |scene| CaptureUpload::new(device.wgpu_device(), &renderer.0, scene);
+        let begun: Result<Vec<_>, _> = std::iter::once(whole.clone()).chain(levels).map(upload).collect();
+        let next = match begun {
+            Ok(uploads) => Some(NextCapture { uploads, source }),
             Err(failure) => {
                 let failure = format!("{}: not drawn: {failure}", name());
                 error!("{failure}");

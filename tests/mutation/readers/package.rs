@@ -8,13 +8,17 @@ use crate::change::{bytes, numbers, text};
 use crate::support::packed_scene;
 use crate::support::random::Random;
 use bevy_gs4d::codec::package::{
-    self, EnvironmentSize, FLOAT_PLANES, Header, MAGIC, Section, StoredFilter, StoredForm, VERSION, WriteSettings,
+    self, EnvironmentSize, FLOAT_PLANES, Header, MAGIC, PACKAGE, Section, StoredFilter, StoredForm, VERSION,
+    WriteSettings,
 };
 use bevy_gs4d::gaussian::{Model, Parameters};
 use bevy_gs4d::offline::quantize::compress;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{Environment, FilterKind, GaussianScene, SceneForm, TemporalFilter, Trained};
+use bevy_gs4d::scene::{
+    Environment, FilterKind, GaussianScene, Level, RuntimeScene, SceneForm, TemporalFilter, Trained,
+};
 use std::io::Cursor;
+use std::sync::Arc;
 
 /// Most bytes of a section that is made to fit.
 const FITTED: usize = 1 << 20;
@@ -28,7 +32,7 @@ pub struct Packages {
 #[derive(Clone)]
 struct Parts {
     header: Header,
-    /// What each section decompresses to.
+    /// What each section decompresses to; a level of detail as it is.
     bodies: Vec<Vec<u8>>,
 }
 
@@ -90,7 +94,15 @@ fn scenes() -> Vec<GaussianScene> {
         let scene = packed_scene::scene(40, degree, degree_t);
         compress(scene, &packed_scene::settings(codebooks)).expect("a synthetic scene can be compressed").0
     };
+    let mut detailed = packed_scene::scene(40, 0, 0);
+    detailed.levels = [(64.0, 9), (8.0, 3)]
+        .map(|(pixels, count)| {
+            let scene = RuntimeScene { filter: None, ..packed_scene::scene(count, 0, 0) };
+            Level { pixels, scene: Arc::new(scene) }
+        })
+        .to_vec();
     vec![
+        detailed.into(),
         rotated,
         moving,
         still,
@@ -114,7 +126,10 @@ impl Parts {
         let mut bodies = Vec::new();
         for section in &header.sections {
             let (body, after) = rest[8..].split_at(section.length);
-            bodies.push(zstd::bulk::decompress(body, section.raw_length).expect("what was written can be read"));
+            bodies.push(match section.encoding == PACKAGE {
+                true => body.to_vec(),
+                false => zstd::bulk::decompress(body, section.raw_length).expect("what was written can be read"),
+            });
             rest = after;
         }
         Self { header, bodies }
@@ -199,11 +214,17 @@ impl Parts {
         }
         let sections = std::mem::take(&mut self.header.sections);
         let bodies = std::mem::take(&mut self.bodies);
+        let levels = sections.iter().zip(&bodies).filter(|(section, _)| section.encoding == PACKAGE);
+        let levels: Vec<_> = levels.map(|(section, body)| (section.clone(), body.clone())).collect();
         for (name, rows, width) in needed {
             let known = sections.iter().zip(&bodies).find(|(section, _)| section.name == name);
             let mut body = known.map(|(_, body)| body.clone()).unwrap_or_default();
             body.resize(rows * width * 4, 0);
             self.header.sections.push(section(name.to_owned(), rows));
+            self.bodies.push(body);
+        }
+        for (section, body) in levels {
+            self.header.sections.push(section);
             self.bodies.push(body);
         }
     }
@@ -213,7 +234,9 @@ impl Parts {
         let mut sections = Vec::new();
         for (section, planes) in self.header.sections.iter_mut().zip(&self.bodies) {
             let mut body = Vec::new();
-            if !planes.is_empty() {
+            if section.encoding == PACKAGE {
+                body.clone_from(planes);
+            } else if !planes.is_empty() {
                 body = zstd::bulk::compress(planes, 1).expect("memory can be written to");
             }
             if random.one_in(100) {
@@ -254,7 +277,13 @@ fn change_number(header: &mut Header, random: &mut Random) {
     const COEFFICIENTS: [usize; 14] = [0, 1, 2, 4, 5, 9, 10, 15, 16, 17, 32, 33, 48, 49];
     let any = random.one_in(5).then(|| numbers::whole(random));
     let small = |random: &mut Random| any.map_or(random.below(5) as u32, |any| any as u32);
-    match random.below(8) {
+    match random.below(9) {
+        8 => {
+            let at = random.below(header.levels.len());
+            if let Some(level) = header.levels.get_mut(at) {
+                level.pixels = numbers::float(random);
+            }
+        }
         0 => header.gaussians = any.map_or(*random.pick(&COUNTS), |any| any as usize),
         1 | 2 => header.coefficients = any.map_or(*random.pick(&COEFFICIENTS), |any| any as usize),
         3 => header.degree = small(random),

@@ -62,7 +62,7 @@ impl Casters<'_> {
         let time = self.captures.get(placed.asset)?.time_at(placed.seconds)?;
         let view = lens.view(size, time, &caster.bounds, caster.world_from_capture, caster.settings.bias)?;
         let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
-        Some(Drawn { entity: caster.entity, asset, view, appearance, filtered })
+        Some(Drawn { entity: caster.entity, asset, view, appearance, filtered, level: 0 })
     }
 }
 

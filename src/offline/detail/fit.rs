@@ -1,0 +1,70 @@
+//! Fitting: training few Gaussians to look like all of them.
+//!
+//! In: a scene in the trained form, [`Look`]s of all Gaussians. Out: the scene after some steps, over random backgrounds, so that what
+//! shows through it is trained too.
+
+use super::looks::Look;
+use crate::gaussian::GradientMode;
+use crate::offline::dataset::CoveredImage;
+use crate::offline::fine_tune::{GpuImage, Rates, Sample, Trainer};
+use crate::offline::{OfflineError, Progress};
+use crate::renderer::Headless;
+use crate::scene::GaussianScene;
+use crate::scene::random::Random;
+use crate::view::{Background, Frame};
+use glam::Vec3;
+
+/// Views of a step.
+const BATCH: usize = 4;
+/// Share of the rates that is left at the last step.
+const LAST_RATE: f64 = 0.05;
+/// Colors and opacities may change faster than in fine-tuning: the start is an estimate.
+const RATES: Rates = Rates { harmonics: 1e-3, color: 5e-3, ..Rates::OURS };
+
+/// Trains a scene. Begins the task "fitting".
+pub(super) fn fit(
+    headless: &mut Headless,
+    scene: GaussianScene,
+    looks: &[Look],
+    steps: usize,
+    progress: &mut dyn Progress,
+) -> Result<GaussianScene, OfflineError> {
+    if looks.is_empty() || steps == 0 {
+        return Ok(scene);
+    }
+    let mut trainer = Trainer::new(headless, scene, GradientMode::Exact)?;
+    let images = looks.iter().map(|look| trainer.upload(&covered(&look.frame)));
+    let images: Vec<GpuImage> = images.collect::<Result<_, _>>()?;
+    if let Some(largest) = looks.iter().max_by_key(|look| look.view.size.x) {
+        trainer.make_room(&largest.view)?;
+    }
+    progress.begin("fitting", steps);
+    let mut random = Random::new(1);
+    for step in 0..steps {
+        let mut batch = Vec::with_capacity(BATCH);
+        for _ in 0..BATCH {
+            let index = ((random.unit() * looks.len() as f32) as usize).min(looks.len() - 1);
+            let background = Background::Color([random.unit(), random.unit(), random.unit()]);
+            let (view, image) = (&looks[index].view, &images[index]);
+            batch.push(Sample { view, image, background, number: index as u32 });
+        }
+        // Structure, which the other part of the loss compares, is smaller than a few pixels.
+        trainer.accumulate(&batch, 0.0)?;
+        let factor = 1.0 - (1.0 - LAST_RATE) * step as f64 / steps as f64;
+        trainer.step(&RATES, factor, step + 1)?;
+        progress.advance();
+    }
+    progress.finish();
+    Ok(trainer.scene()?)
+}
+
+/// Returns the picture of a frame that was drawn over black, and what it covers.
+fn covered(frame: &Frame) -> CoveredImage {
+    let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
+    let texel = |(color, left): (&Vec3, &f32)| {
+        let [r, g, b] = color.to_array().map(byte);
+        [r, g, b, byte(1.0 - left)]
+    };
+    let texels = frame.picture.pixels.iter().zip(&frame.transmittance).map(texel).collect();
+    CoveredImage { size: frame.picture.size, texels, has_gaps: true }
+}

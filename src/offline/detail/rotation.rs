@@ -1,0 +1,122 @@
+//! A 4D covariance as the raw parameters of a Gaussian: scales and a pair of quaternions.
+//!
+//! In: a symmetric 4D matrix. Out: the standard deviations along its axes, the axis of most time last, and the quaternions of the rotation
+//! to them, as [`rotation_4d`] reads them.
+
+use crate::gaussian::rotation_4d;
+use glam::{DMat4, DVec4};
+
+/// A covariance, decomposed: `Q diag(s)² Qᵀ` with the rotation `Q` of the two quaternions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Axes {
+    /// Standard deviations.
+    pub scale: DVec4,
+    /// Left quaternion.
+    pub left: DVec4,
+    /// Right quaternion.
+    pub right: DVec4,
+}
+
+impl Axes {
+    /// Decomposes a covariance. Variances that rounding made negative, or 0, become `least`, a standard deviation.
+    pub fn of(covariance: DMat4, least: f64) -> Self {
+        let (values, mut axes) = eigen(covariance);
+        let mut scale = values.max(DVec4::splat(least * least)).map(f64::sqrt);
+        let most_time = (0..4).max_by(|&a, &b| axes.col(a).w.abs().total_cmp(&axes.col(b).w.abs())).unwrap_or(3);
+        let (time, last) = (axes.col(most_time), axes.w_axis);
+        *axes.col_mut(most_time) = last;
+        axes.w_axis = time;
+        (scale[most_time], scale.w) = (scale.w, scale[most_time]);
+        if axes.determinant() < 0.0 {
+            axes.x_axis = -axes.x_axis;
+        }
+        let (left, right) = quaternions(axes);
+        Self { scale, left, right }
+    }
+}
+
+/// Returns the pair of unit quaternions whose [`rotation_4d`] is the rotation given; the negated pair is the same rotation.
+///
+/// `rotation_4d` is linear in each quaternion, and its sixteen products of unit axes are orthogonal matrices of norm 2. The coordinates in
+/// that basis are therefore the products of the components of both quaternions.
+fn quaternions(rotation: DMat4) -> (DVec4, DVec4) {
+    let product = |i: usize, j: usize| {
+        let basis = rotation_4d(DVec4::AXES[i], DVec4::AXES[j]);
+        (0..4).map(|column| basis.col(column).dot(rotation.col(column))).sum::<f64>() * 0.25
+    };
+    let rows: [DVec4; 4] = std::array::from_fn(|i| DVec4::from_array(std::array::from_fn(|j| product(i, j))));
+    let longest = (0..4).max_by(|&a, &b| rows[a].length_squared().total_cmp(&rows[b].length_squared())).unwrap_or(0);
+    let right = rows[longest].normalize_or(DVec4::X);
+    let left = DVec4::from_array(rows.map(|row| row.dot(right)));
+    (left.normalize_or(DVec4::X), right)
+}
+
+/// Returns eigenvalues and eigenvectors (columns) of a symmetric matrix, by Jacobi rotations.
+fn eigen(mut a: DMat4) -> (DVec4, DMat4) {
+    let mut vectors = DMat4::IDENTITY;
+    // Convergence is quadratic: a dozen sweeps are more than enough.
+    for _ in 0..16 {
+        for (p, q) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
+            let off = a.col(q)[p];
+            if off.abs() <= 1e-300 {
+                continue;
+            }
+            let theta = (a.col(q)[q] - a.col(p)[p]) / (2.0 * off);
+            let sign = if theta < 0.0 { -1.0 } else { 1.0 };
+            let t = sign / (theta.abs() + (theta * theta + 1.0).sqrt());
+            let cos = (t * t + 1.0).sqrt().recip();
+            let sin = t * cos;
+            let mut turn = DMat4::IDENTITY;
+            turn.col_mut(p)[p] = cos;
+            turn.col_mut(q)[q] = cos;
+            turn.col_mut(q)[p] = sin;
+            turn.col_mut(p)[q] = -sin;
+            a = turn.transpose() * a * turn;
+            vectors *= turn;
+        }
+    }
+    (DVec4::new(a.x_axis.x, a.y_axis.y, a.z_axis.z, a.w_axis.w), vectors)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns pairs of unit quaternions.
+    fn pairs() -> Vec<(DVec4, DVec4)> {
+        let quaternion = |seed: f64| DVec4::new(seed.sin(), (2.3 * seed).cos(), (0.7 * seed).sin(), 0.2 - seed.cos());
+        let mut pairs: Vec<_> = (1..30)
+            .map(|i| (quaternion(f64::from(i)).normalize(), quaternion(f64::from(i) * 1.7 + 0.3).normalize()))
+            .collect();
+        pairs.extend([(DVec4::X, DVec4::X), (DVec4::Y, DVec4::W), (-DVec4::Z, DVec4::X)]);
+        pairs
+    }
+
+    #[test]
+    fn a_rotation_gives_its_quaternions_back() {
+        for (left, right) in pairs() {
+            let rotation = rotation_4d(left, right);
+            let (l, r) = quaternions(rotation);
+            assert!(rotation_4d(l, r).abs_diff_eq(rotation, 1e-12), "{left} and {right} became {l} and {r}");
+        }
+    }
+
+    #[test]
+    fn a_covariance_is_that_of_its_axes() {
+        for (left, right) in pairs() {
+            let factor = rotation_4d(left, right) * DMat4::from_diagonal(DVec4::new(0.01, 0.2, 0.05, 3.0));
+            let covariance = factor * factor.transpose();
+            let axes = Axes::of(covariance, 1e-9);
+            let again = rotation_4d(axes.left, axes.right) * DMat4::from_diagonal(axes.scale);
+            assert!((again * again.transpose()).abs_diff_eq(covariance, 1e-10), "{left} and {right}");
+            assert!((rotation_4d(axes.left, axes.right).determinant() - 1.0).abs() < 1e-9, "a proper rotation");
+        }
+    }
+
+    #[test]
+    fn flat_covariances_have_a_least_scale() {
+        let axes = Axes::of(DMat4::from_diagonal(DVec4::new(0.0, 4.0, -1e-20, 1.0)), 0.5);
+        assert_eq!(axes.scale.w, 1.0, "time is last");
+        assert!(axes.scale.min_element() >= 0.5 && axes.scale.max_element() == 2.0, "not {}", axes.scale);
+    }
+}

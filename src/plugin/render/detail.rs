@@ -1,0 +1,248 @@
+//! Detail: how many Gaussians of a capture a camera is shown, by the capture's size on the screen.
+//!
+//! In: extracted captures and cameras, the levels of detail of uploaded captures, [`CaptureDetail`]. Out: [`CaptureLevels`], the level of
+//! each capture for each camera. A level is kept while the size is near its limit, so that nothing flickers there.
+
+use super::extract::ExtractedCaptures;
+use super::statistics::CaptureStatistics;
+use super::upload::GpuGaussianCapture;
+use crate::plugin::component::GaussianCapture3d;
+use crate::scene::{Bounds, Level, pixels_across};
+use bevy::camera::{Camera3d, MainPassResolutionOverride};
+use bevy::ecs::entity::Entity;
+use bevy::ecs::query::With;
+use bevy::ecs::resource::Resource;
+use bevy::ecs::system::{Query, Res, ResMut};
+use bevy::log::debug_span;
+use bevy::platform::collections::HashMap;
+use bevy::render::Extract;
+use bevy::render::render_asset::RenderAssets;
+use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
+use bevy::render::view::{ExtractedView, RenderVisibleEntities};
+use glam::{Affine3A, Mat4, UVec2, Vec3, Vec4};
+use std::time::Duration;
+
+/// A coarser level is taken when the size on the screen is below its limit by this factor, and left at the limit itself.
+const SLACK: f32 = 0.8;
+/// How far the bias moves in a frame while the GPU time is not as wanted, and how far it may go, stops.
+const STEP: f32 = 1.0 / 64.0;
+const FARTHEST: f32 = 6.0;
+
+/// How much detail of captures is drawn: a resource.
+///
+/// Captures with levels of detail (`gs4d detail`) are drawn with fewer Gaussians where they are small on the screen.
+/// [`CaptureSettings::finest_level`](super::CaptureSettings::finest_level) limits it for one capture.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+/// use std::time::Duration;
+///
+/// /// On a slow GPU: less detail, as much less as four milliseconds ask for.
+/// fn hurry(mut detail: ResMut<CaptureDetail>, statistics: Res<CaptureStatistics>) {
+///     statistics.measure(true);
+///     detail.frame_time = Some(Duration::from_millis(4));
+/// }
+/// # bevy::ecs::system::assert_is_system(hurry);
+/// ```
+#[derive(Resource, Debug, Clone, Copy, Default, PartialEq)]
+pub struct CaptureDetail {
+    /// Stops of size: at −1 captures count as half as large on the screen as they are, so that coarser levels are drawn, at 1 as twice as
+    /// large. Default: 0, as measured when the levels were made.
+    pub bias: f32,
+    /// The GPU time that captures should take in a frame, all cameras together. While it is exceeded, the bias falls slowly below
+    /// [`bias`](Self::bias), and rises again when there is time left. Needs [`CaptureStatistics::measure`]. Default: `None`, no limit.
+    pub frame_time: Option<Duration>,
+}
+
+/// The level of each capture that has levels, for each camera that sees it. Level 0 is all Gaussians.
+#[derive(Resource, Default)]
+pub(super) struct CaptureLevels {
+    /// By the entities of the camera in the render world and of the capture in the main world; with whether it was seen this frame.
+    chosen: HashMap<(Entity, MainEntity), (usize, bool)>,
+    /// Whether any camera sees all Gaussians of a capture.
+    whole: MainEntityHashMap<bool>,
+    /// What is added to the bias to keep to the time, stops: at most 0.
+    steered: f32,
+}
+
+impl CaptureLevels {
+    /// Returns the level of a capture for a camera.
+    pub(super) fn of(&self, camera: Entity, capture: MainEntity) -> usize {
+        self.chosen.get(&(camera, capture)).map_or(0, |(level, _)| *level)
+    }
+
+    /// Returns whether cameras see a capture, but none sees all of its Gaussians.
+    pub(super) fn is_coarse(&self, capture: &MainEntity) -> bool {
+        self.whole.get(capture) == Some(&false)
+    }
+
+    /// Moves what is added to the bias towards the time that is wanted. Nothing changes while nothing is measured.
+    fn steer(&mut self, wanted: Option<Duration>, statistics: &CaptureStatistics) {
+        let Some(wanted) = wanted else {
+            self.steered = 0.0;
+            return;
+        };
+        let views = statistics.views();
+        let milliseconds: f64 = views.iter().flat_map(|(_, view)| &view.passes).map(|pass| pass.milliseconds).sum();
+        self.steered = steered(self.steered, milliseconds, wanted.as_secs_f64() * 1e3);
+    }
+}
+
+/// Returns the bias of the next frame, after one that took so many milliseconds; 0 is a frame that was not measured.
+fn steered(before: f32, milliseconds: f64, wanted: f64) -> f32 {
+    if milliseconds > wanted {
+        (before - STEP).max(-FARTHEST)
+    } else if milliseconds > 0.0 && milliseconds < wanted * f64::from(SLACK) {
+        (before + STEP).min(0.0)
+    } else {
+        before
+    }
+}
+
+/// Copies the resource to the render world.
+pub(super) fn extract_detail(mut extracted: ResMut<CaptureDetail>, detail: Extract<Res<CaptureDetail>>) {
+    *extracted = **detail;
+}
+
+type CameraSize =
+    (Entity, &'static ExtractedView, &'static RenderVisibleEntities, Option<&'static MainPassResolutionOverride>);
+
+/// Chooses the levels of this frame.
+pub(super) fn choose_levels(
+    extracted: Res<ExtractedCaptures>,
+    captures: Res<RenderAssets<GpuGaussianCapture>>,
+    detail: Res<CaptureDetail>,
+    statistics: Res<CaptureStatistics>,
+    cameras: Query<CameraSize, With<Camera3d>>,
+    mut levels: ResMut<CaptureLevels>,
+) {
+    let _span = debug_span!("gs4d/detail").entered();
+    let levels = &mut *levels;
+    levels.steer(detail.frame_time, &statistics);
+    levels.whole.clear();
+    levels.chosen.values_mut().for_each(|(_, seen)| *seen = false);
+    let factor = (detail.bias + levels.steered).exp2();
+    for (camera, view, visible, resolution) in &cameras {
+        let size = resolution.map_or(UVec2::new(view.viewport.z, view.viewport.w), |smaller| smaller.0);
+        let eye = Vec3::from(view.world_from_view.affine().translation);
+        let Some(visible) = visible.get::<GaussianCapture3d>() else { continue };
+        for (_, entity) in visible.iter_visible() {
+            let Some(placed) = extracted.0.get(entity) else { continue };
+            let detail = captures.get(placed.asset).and_then(GpuGaussianCapture::detail);
+            let Some((own, bounds)) = detail else { continue };
+            let pixels = size_on_screen(&view.clip_from_view, eye, size, &placed.world_from_capture, bounds) * factor;
+            let before = levels.chosen.get(&(camera, *entity)).map(|(level, _)| *level);
+            let level = choose(own, pixels, before).max(usize::from(placed.finest_level).min(own.len()));
+            levels.chosen.insert((camera, *entity), (level, true));
+            *levels.whole.entry(*entity).or_insert(false) |= level == 0;
+        }
+    }
+    levels.chosen.retain(|_, (_, seen)| *seen);
+}
+
+/// Returns the level to draw at a size on the screen, after level `before`, if the capture was seen before: the coarsest that is close
+/// enough. Without a level before there is nothing that could flicker.
+fn choose(levels: &[Level], pixels: f32, before: Option<usize>) -> usize {
+    // NaN is larger than any limit.
+    let fits = |level: usize, slack: f32| level == 0 || pixels <= levels[level - 1].pixels * slack;
+    let coarsest = |slack: f32| (0..=levels.len()).rev().find(|&level| fits(level, slack)).unwrap_or(0);
+    match before.filter(|&before| before <= levels.len() && fits(before, 1.0)) {
+        Some(before) => coarsest(SLACK).max(before),
+        None => coarsest(1.0),
+    }
+}
+
+/// Returns the size on the screen of bounds in a capture, pixels, of the sphere about them.
+fn size_on_screen(clip_from_view: &Mat4, eye: Vec3, size: UVec2, world_from_capture: &Affine3A, bounds: Bounds) -> f32 {
+    let size = size.as_vec2();
+    let focal = 0.5 * (clip_from_view.x_axis.x * size.x).max(clip_from_view.y_axis.y * size.y);
+    let axes = world_from_capture.matrix3;
+    let scale = axes.x_axis.length().max(axes.y_axis.length()).max(axes.z_axis.length());
+    let (center, radius) = (world_from_capture.transform_point3(bounds.center()), bounds.radius() * scale);
+    if clip_from_view.row(3) == Vec4::W {
+        // Parallel rays: the same at every distance.
+        2.0 * focal * radius
+    } else {
+        pixels_across(radius, eye.distance(center), focal)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gaussian::Harmonics;
+    use crate::scene::RuntimeScene;
+    use std::sync::Arc;
+
+    fn levels(sizes: &[f32]) -> Vec<Level> {
+        let scene = Arc::new(RuntimeScene::sliced(Vec::new(), Harmonics::default()));
+        sizes.iter().map(|&pixels| Level { pixels, scene: scene.clone() }).collect()
+    }
+
+    #[test]
+    fn the_coarsest_level_that_is_close_enough_is_drawn() {
+        let levels = levels(&[100.0, 40.0, 10.0]);
+        for (pixels, expected) in [(5.0, 3), (10.0, 3), (11.0, 2), (90.0, 1), (101.0, 0), (f32::INFINITY, 0)] {
+            assert_eq!(choose(&levels, pixels, None), expected, "at {pixels} pixels");
+        }
+        assert_eq!(choose(&levels, f32::NAN, None), 0, "no number is no reason to leave something out");
+        assert_eq!(choose(&[], 1.0, None), 0, "without levels");
+    }
+
+    #[test]
+    fn a_level_is_left_at_its_limit_and_taken_well_below() {
+        let levels = levels(&[100.0, 40.0]);
+        assert_eq!(choose(&levels, 41.0, Some(2)), 1, "finer at once");
+        assert_eq!(choose(&levels, 39.0, Some(1)), 1, "coarser not yet");
+        assert_eq!(choose(&levels, 31.0, Some(1)), 2, "but well below");
+        assert_eq!(choose(&levels, 39.0, Some(2)), 2, "where it stays");
+        assert_eq!(choose(&levels, 5.0, Some(0)), 2, "by several at once");
+        assert_eq!(choose(&levels, 500.0, Some(2)), 0, "and back");
+        assert_eq!(choose(&levels, 5.0, Some(9)), 2, "a level of another capture counts for nothing");
+    }
+
+    #[test]
+    fn oscillation_by_a_twentieth_changes_nothing_twice() {
+        let levels = levels(&[100.0, 40.0, 10.0]);
+        for middle in [8.0, 10.0, 12.5, 32.0, 40.0, 50.0, 80.0, 100.0, 125.0] {
+            let mut level = choose(&levels, middle, None);
+            let mut changes = 0;
+            for turn in 0..40 {
+                let pixels = middle * if turn % 2 == 0 { 1.05 } else { 0.95 };
+                let next = choose(&levels, pixels, Some(level));
+                changes += usize::from(next != level);
+                level = next;
+            }
+            assert!(changes <= 1, "{changes} changes about {middle} pixels");
+        }
+    }
+
+    #[test]
+    fn the_bias_follows_the_time() {
+        assert!(steered(0.0, 5.0, 4.0) < 0.0, "too slow");
+        assert!(steered(-1.0, 3.0, 4.0) > -1.0, "time left");
+        assert_eq!(steered(-1.0, 3.9, 4.0), -1.0, "as wanted");
+        assert_eq!(steered(-1.0, 0.0, 4.0), -1.0, "not measured");
+        assert_eq!(steered(0.0, 1.0, 4.0), 0.0, "never finer than asked for");
+        assert_eq!(steered(-FARTHEST, 9.0, 4.0), -FARTHEST, "nor without end");
+    }
+
+    #[test]
+    fn scale_and_lens_count() {
+        let lens = Mat4::perspective_infinite_reverse_rh(0.8, 2.0, 0.1);
+        let bounds = Bounds { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) };
+        let size = UVec2::new(400, 200);
+        let seen =
+            |scale: f32, eye: Vec3| size_on_screen(&lens, eye, size, &Affine3A::from_scale(Vec3::splat(scale)), bounds);
+        let near = seen(1.0, Vec3::Z * 100.0);
+        // 100 pixels are tan(0.4) of 100 units.
+        assert!((near - 3f32.sqrt() * 2.0 / 0.4f32.tan()).abs() < 0.05, "{near} pixels");
+        assert!((seen(2.0, Vec3::Z * 200.0) - near).abs() < 1e-3, "twice as large, twice as far");
+        let flat = Mat4::orthographic_rh(-2.0, 2.0, -1.0, 1.0, 10.0, 0.1);
+        let wide = size_on_screen(&flat, Vec3::Z * 9.0, size, &Affine3A::IDENTITY, bounds);
+        assert!((wide - 200.0 * 3f32.sqrt()).abs() < 0.1, "100 pixels for each unit: {wide}");
+    }
+}

@@ -1,0 +1,120 @@
+//! Levels of detail, measured on the GPU.
+//!
+//! In: a synthetic scene. Out: proof that a level is as close to all Gaussians as it says, in views that it was neither trained nor measured
+//! in, and that what is not close is not kept. Skipped where there is no GPU.
+
+use crate::support::gpu;
+use bevy_gs4d::gaussian::{Gaussian, Harmonics};
+use bevy_gs4d::offline::detail::{DetailSettings, detail};
+use bevy_gs4d::offline::{NoProgress, OfflineError};
+use bevy_gs4d::renderer::Headless;
+use bevy_gs4d::scene::{Bounds, Environment, Form, GaussianScene, RuntimeScene, SceneForm, pixels_across};
+use bevy_gs4d::view::{Background, Camera, Frame, RasterFov, View};
+use glam::{UVec2, Vec3};
+
+/// Settings that take seconds on a software driver.
+const QUICK: DetailSettings = DetailSettings { levels: 1, min_psnr: 45.0, steps: 0, directions: 4, times: 2 };
+
+/// Returns clumps of faint Gaussians far smaller than their distance, so that each clump can be one.
+fn clumps() -> GaussianScene {
+    let (mut gaussians, mut values) = (Vec::new(), Vec::new());
+    for clump in 0..20u32 {
+        let part = |step: f32| (clump as f32 * step).fract() - 0.5;
+        let middle = Vec3::new(part(0.618), part(0.414), part(0.732)) * 4.0;
+        for one in 0..7u32 {
+            let offset = Vec3::new((one as f32).sin(), (one as f32 * 1.3).cos(), (one as f32 * 2.1).sin()) * 1e-3;
+            gaussians.push(Gaussian {
+                mean: (middle + offset).to_array(),
+                mean_t: 0.5,
+                velocity: [0.05, 0.0, 0.0],
+                sigma_t: 0.8,
+                covariance: [0.02, 0.0, 0.0, 0.03, 0.0, 0.01],
+                opacity: 0.02,
+                padding: 0.0,
+            });
+            values.extend([part(0.3), part(0.5), part(0.7)]);
+        }
+    }
+    RuntimeScene::sliced(gaussians, Harmonics { coefficients: 1, degree: 0, degree_t: 0, values }).into()
+}
+
+/// Returns a view in which the sphere about a scene is `pixels` pixels across.
+fn view(scene: &RuntimeScene, direction: Vec3, time: f32, pixels: f32) -> View {
+    let bounds = Bounds::of(scene.iter(), scene.trained_with.time_interval).expect("something is drawn");
+    let distance = 30.0 * bounds.radius();
+    let focal = pixels / pixels_across(bounds.radius(), distance, 1.0);
+    let side = pixels.ceil();
+    let fov = 2.0 * (side / (2.0 * focal)).atan();
+    let eye = bounds.center() + direction.normalize() * distance;
+    Camera::look_at(eye, bounds.center(), Vec3::Z, fov, UVec2::splat(side as u32)).view(time, RasterFov::Corrected)
+}
+
+/// Returns the PSNR of two frames over black and white, the lower one.
+fn psnr(a: &Frame, b: &Frame) -> f64 {
+    let over = |frame: &Frame, at: usize, behind: f32| {
+        (frame.picture.pixels[at] + frame.transmittance[at] * behind).clamp(Vec3::ZERO, Vec3::ONE)
+    };
+    let of = |behind: f32| {
+        let count = a.picture.pixels.len();
+        let squares: f32 = (0..count).map(|at| (over(a, at, behind) - over(b, at, behind)).length_squared()).sum();
+        -10.0 * f64::from(squares / (3 * count) as f32).log10()
+    };
+    of(0.0).min(of(1.0))
+}
+
+fn draw(headless: &mut Headless, scene: &RuntimeScene, view: &View) -> Frame {
+    let capture = headless.upload(scene).expect("it fits");
+    headless.render(&capture, view, Background::Color([0.0; 3])).expect("it is drawn")
+}
+
+#[test]
+fn a_level_is_as_close_as_it_says() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let made = detail(&mut headless, clumps(), &QUICK, &mut NoProgress).expect("it has levels");
+    let [level] = &made.scene.levels[..] else { panic!("one level: {:?}", made.made) };
+    assert_eq!(level.scene.len(), 20, "a seventh of the Gaussians");
+    assert_eq!(made.made[0].pixels, Some(level.pixels), "as reported");
+    let full = made.scene.clone().into_runtime().expect("drawable");
+    for (direction, time) in [(Vec3::new(1.0, 0.4, 0.3), 0.2), (Vec3::new(-0.3, 1.0, -0.5), 0.9)] {
+        let view = view(&full, direction, time, level.pixels);
+        let found = psnr(&draw(&mut headless, &full, &view), &draw(&mut headless, &level.scene, &view));
+        // Other views than those that were measured may differ a little more.
+        assert!(found > 44.0, "{found} dB at {} pixels from {direction}", level.pixels);
+    }
+}
+
+#[test]
+fn training_brings_a_level_closer() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let mut scene = clumps();
+    let SceneForm::Ready(Form::Sliced(sliced)) = &mut scene.form else { panic!("they are sliced") };
+    sliced.gaussians.iter_mut().for_each(|gaussian| gaussian.opacity = 0.6);
+    let lowest = |headless: &mut Headless, steps: usize| {
+        let settings = DetailSettings { min_psnr: 0.0, steps, ..QUICK };
+        let made = detail(headless, scene.clone(), &settings, &mut NoProgress).expect("it has levels");
+        made.made[0].psnr[0].1
+    };
+    let (merged, trained) = (lowest(&mut headless, 0), lowest(&mut headless, 150));
+    assert!(trained > merged, "{trained} dB after training, {merged} dB before");
+}
+
+#[test]
+fn what_is_not_close_is_not_kept() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let strict = DetailSettings { min_psnr: 300.0, ..QUICK };
+    let made = detail(&mut headless, clumps(), &strict, &mut NoProgress).expect("it is measured");
+    assert!(made.scene.levels.is_empty() && made.made[0].pixels.is_none(), "no picture is that close");
+    assert_eq!(made.scene, clumps(), "and nothing else has changed");
+}
+
+#[test]
+fn surroundings_have_no_levels() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let environment = Some(Environment { width: 1, height: 1, texels: vec![0.5; 3] });
+    let around = GaussianScene { environment, ..clumps() };
+    let refused = detail(&mut headless, around, &QUICK, &mut NoProgress);
+    assert!(matches!(refused, Err(OfflineError::Surrounded)), "an environment map is seen at every size");
+    let nothing = RuntimeScene::sliced(Vec::new(), Harmonics::default());
+    let refused = detail(&mut headless, nothing.into(), &QUICK, &mut NoProgress);
+    assert!(matches!(refused, Err(OfflineError::NothingToOrbit)), "nothing is seen at any");
+}
