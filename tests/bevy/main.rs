@@ -39,4 +39,5 @@ mod support {
     pub mod playback_app;
     pub mod pth;
     pub mod skip;
+    pub mod spans;
 }

@@ -8,10 +8,10 @@ use crate::support::cpu_reference::{blob, scene};
 use crate::support::fixtures::{front, insert, spawn};
 use crate::support::no_gpu::no_gpu;
 use crate::support::offscreen_app::{FOV_Y, picture, spawn_camera};
+use crate::support::spans::has_recorded;
 use bevy::anti_alias::taa::TemporalAntiAliasing;
 use bevy::core_pipeline::prepass::{DepthPrepass, MotionVectorPrepass, ViewPrepassTextures};
 use bevy::core_pipeline::schedule::{Core3d, Core3dSystems};
-use bevy::diagnostic::DiagnosticsStore;
 use bevy::light::{FogVolume, VolumetricFog, VolumetricLight};
 use bevy::post_process::dof::{DepthOfField, DepthOfFieldMode};
 use bevy::post_process::motion_blur::MotionBlur;
@@ -395,8 +395,7 @@ fn depth_is_written_for_effects_that_read_it_and_for_no_other_camera() {
         picture(&mut app, 0.0);
         // Times come back some frames later.
         (0..30).for_each(|_| step(&mut app));
-        let known = app.world().resource::<DiagnosticsStore>();
-        Some(known.iter().any(|known| known.path().as_str().contains("gs4d/write_depth")))
+        Some(has_recorded(&app, "gs4d/write_depth"))
     };
     for (asked, effect, expected) in [
         (DepthWrite::Auto, false, false),
