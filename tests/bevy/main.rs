@@ -40,4 +40,5 @@ mod support {
     pub mod pth;
     pub mod skip;
     pub mod spans;
+    pub mod waiting;
 }
