@@ -3,9 +3,8 @@
 //! In: scenes of many splats in few tiles. Out: proof that both designs draw the same picture, from the first frame on. Skipped where
 //! there is no GPU.
 
-use crate::appearance::edge;
-use crate::render::depth_texture;
 use crate::support::gpu;
+use crate::support::surfaces::{depth_texture, edge};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::renderer::{ColorPrecision, Design, Headless, Instance, OpaqueDepth, ViewParameters};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};

@@ -33,4 +33,5 @@ mod support {
     pub mod packed_scene;
     pub mod passes;
     pub mod skip;
+    pub mod surfaces;
 }
