@@ -10,7 +10,7 @@ use crate::support::cpu_reference::{
     DURATION, SIZE, add, blob, difference, difference_between, eye, rgb, scene, view, view_of,
 };
 use crate::support::fixtures::{
-    BLACK, MIDDLE, check, crowd, front, insert, lone, orthographic, reference_picture, spawn, spawn_box,
+    BLACK, MIDDLE, check, crowd, front, insert, lone, orthographic, reference_picture, spawn, spawn_box, synthetic,
 };
 use crate::support::gpu;
 use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
@@ -26,8 +26,7 @@ use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::codec::checkpoint::CheckpointOptions;
 use bevy_gs4d::playback::{ClipFade, Playback, Repeat};
 use bevy_gs4d::render::{CaptureSettings, CaptureStatistics, CaptureViewSettings};
-use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{Environment, RuntimeScene, TemporalFilter};
+use bevy_gs4d::scene::{Environment, RuntimeScene};
 use bevy_gs4d::testing::{self, Offscreen};
 use bevy_gs4d::view::srgb::{decode, encode};
 use bevy_gs4d::view::{Appearance, Background, Camera as PinholeCamera, DebugView, Lens, Picture, RasterFov};
@@ -225,10 +224,7 @@ fn every_sample_count_cuts_captures_at_the_right_pixels_of_a_viewport() {
 
 /// Returns a synthetic scene with a filter of four segments, and without one.
 fn twice(count: usize, seed: u64) -> [RuntimeScene; 2] {
-    let settings = SynthSettings { count, seed, degree: 0, degree_t: 0, duration_seconds: DURATION };
-    let plain = synthesize(&settings).into_runtime().expect("synthetic scenes can be drawn");
-    let filter = TemporalFilter::support(plain.iter(), plain.trained_with.time_interval, 4);
-    [RuntimeScene { filter: Some(filter), ..plain.clone() }, plain]
+    [true, false].map(|filtered| synthetic(count, seed, filtered))
 }
 
 /// One app with everything in it twice, with a temporal filter and without, each for a camera of its own.
