@@ -68,15 +68,20 @@ pub fn view_of(camera: &Transform, entity: &Transform, size: UVec2, time: f32) -
     View::new(size, time, plain.world_to_camera * entity.to_matrix(), plain.projection, plain.tan_fov)
 }
 
-/// Returns the largest difference of any channel of any pixel, in 255ths.
-pub fn difference(picture: &RgbaImage, expected: &Picture) -> f32 {
+/// Returns how far each pixel is from the expected one, in 255ths, in the channel where that is most.
+pub fn differences(picture: &RgbaImage, expected: &Picture) -> Vec<f32> {
     assert_eq!(UVec2::from(picture.dimensions()), expected.size, "pictures of one size");
     let expected = expected.clamped();
-    let channel = |(pixel, expected): (&image::Rgba<u8>, &Vec3)| {
+    let apart = |(pixel, expected): (&image::Rgba<u8>, &Vec3)| {
         let [r, g, b, _] = pixel.0.map(f32::from);
         (Vec3::new(r, g, b) - *expected * 255.0).abs().max_element()
     };
-    picture.pixels().zip(&expected.pixels).map(channel).fold(0.0, f32::max)
+    picture.pixels().zip(&expected.pixels).map(apart).collect()
+}
+
+/// Returns the largest difference of any channel of any pixel, in 255ths.
+pub fn difference(picture: &RgbaImage, expected: &Picture) -> f32 {
+    differences(picture, expected).into_iter().fold(0.0, f32::max)
 }
 
 /// Returns the largest difference of any channel between two pictures, in 255ths.
