@@ -4,9 +4,8 @@
 //! the CPU reference, that every camera draws the captures that it should, from its own place, and that captures and
 //! meshes hide each other in the documented order. Skipped where there is no GPU, not even a software one.
 
-use crate::support::cpu_reference::{
-    DURATION, SIZE, blob, difference, difference_between, eye, rgb, scene, view, view_of,
-};
+use crate::support::blob::blob;
+use crate::support::cpu_reference::{DURATION, SIZE, difference, difference_between, eye, rgb, scene, view, view_of};
 use crate::support::fixtures::{
     BLACK, MIDDLE, check, crowd, debug_picture, front, insert, lone, orthographic, reference_picture, spawn, spawn_box,
 };

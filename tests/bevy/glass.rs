@@ -4,7 +4,8 @@
 //! is in front covers it, with the colours that follow from pictures of each alone, multisampled or not, HDR or not. Skipped where there
 //! is no GPU, not even a software one.
 
-use crate::support::cpu_reference::{SIZE, blob, difference_between, eye, rgb, scene};
+use crate::support::blob::blob;
+use crate::support::cpu_reference::{SIZE, difference_between, eye, rgb, scene};
 use crate::support::fixtures::{MIDDLE, crowd, front, insert, lone, spawn, spawn_box};
 use crate::support::offscreen_app::{app, picture, spawn_camera};
 use crate::support::skip::skip;

@@ -27,6 +27,7 @@ mod walkthrough;
 
 #[path = "../support"]
 mod support {
+    pub mod blob;
     pub mod cpu_reference;
     pub mod data;
     pub mod event_log;

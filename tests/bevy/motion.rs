@@ -4,7 +4,8 @@
 //! those of what they show, and that Bevy's effects treat them as surfaces in motion, with the settings of cameras as they are by default.
 //! Frames are counted, so that apps are never pipelined. Skipped where there is no GPU, not even a software one.
 
-use crate::support::cpu_reference::{blob, scene};
+use crate::support::blob::blob;
+use crate::support::cpu_reference::scene;
 use crate::support::fixtures::{front, insert, spawn};
 use crate::support::no_gpu::no_gpu;
 use crate::support::offscreen_app::{FOV_Y, picture, spawn_camera};

@@ -4,7 +4,8 @@
 //! shadows and dark rooms darken captures by the documented factors and only those that ask for it, and that other cameras pay nothing.
 //! Skipped where there is no GPU, not even a software one.
 
-use crate::support::cpu_reference::{SIZE, blob, difference_between, rgb, scene};
+use crate::support::blob::blob;
+use crate::support::cpu_reference::{SIZE, difference_between, rgb, scene};
 use crate::support::fixtures::{MIDDLE, front, insert, orthographic, spawn, spawn_box};
 use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
 use crate::support::spans::has_recorded;

@@ -5,7 +5,8 @@
 //! replaced without a gap and survive a restart of the renderer, and that a GPU that is too small and an invalid
 //! capture are reported. Skipped where there is no GPU.
 
-use crate::support::cpu_reference::{blob, scene};
+use crate::support::blob::blob;
+use crate::support::cpu_reference::scene;
 use crate::support::fixtures::synthetic;
 use crate::support::no_gpu::no_gpu;
 use crate::support::offscreen_app::{self, app, picture, spawn_camera};

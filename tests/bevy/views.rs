@@ -6,8 +6,9 @@
 //! the CPU reference, that temporal filters and the direction of play change no pixel, and that extreme values stay
 //! finite. Skipped where there is no GPU, not even a software one.
 
+use crate::support::blob::blob;
 use crate::support::cpu_reference::{
-    DURATION, SIZE, add, blob, difference, difference_between, eye, rgb, scene, view, view_of,
+    DURATION, SIZE, add, difference, difference_between, eye, rgb, scene, view, view_of,
 };
 use crate::support::fixtures::{
     BLACK, MIDDLE, check, crowd, front, insert, lone, orthographic, reference_picture, spawn, spawn_box, synthetic,

@@ -4,9 +4,10 @@
 //! In: synthetic scenes, the same for GPU and CPU. Out: proof that both draw the same, or that a pixel has the expected
 //! value.
 
+use crate::support::blob::blob;
 use crate::support::gpu;
 use crate::support::surfaces::edge;
-use bevy_gs4d::gaussian::{Gaussian, Harmonics};
+use bevy_gs4d::gaussian::Harmonics;
 use bevy_gs4d::reference::{Layer, render_layers};
 use bevy_gs4d::renderer::{Headless, Instance, OpaqueDepth, ViewParameters};
 use bevy_gs4d::scene::RuntimeScene;
@@ -33,18 +34,7 @@ fn view() -> View {
 
 /// Returns grey Gaussians at rest that are always active: mean, deviation, opacity.
 fn blobs(blobs: &[(Vec3, f32, f32)]) -> RuntimeScene {
-    let gaussian = |(mean, deviation, opacity): &(Vec3, f32, f32)| {
-        let variance = deviation * deviation;
-        Gaussian {
-            mean: mean.to_array(),
-            mean_t: 0.5,
-            velocity: [0.0; 3],
-            sigma_t: f32::INFINITY,
-            covariance: [variance, 0.0, 0.0, variance, 0.0, variance],
-            opacity: *opacity,
-            padding: 0.0,
-        }
-    };
+    let gaussian = |&(mean, deviation, opacity): &(Vec3, f32, f32)| blob(mean, Vec3::splat(deviation), opacity);
     let harmonics = Harmonics { coefficients: 1, degree: 0, degree_t: 0, values: vec![0.0; blobs.len() * 3] };
     RuntimeScene::sliced(blobs.iter().map(gaussian).collect(), harmonics)
 }

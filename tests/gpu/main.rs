@@ -22,6 +22,7 @@ mod shaders;
 
 #[path = "../support"]
 mod support {
+    pub mod blob;
     pub mod capture;
     pub mod dataset;
     pub mod golden;

@@ -21,20 +21,6 @@ pub fn add(app: &mut App, scene: &RuntimeScene) -> Handle<GaussianCapture> {
     app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(scene.clone()))
 }
 
-/// Returns a Gaussian at rest that is always active, with its standard deviations along the axes.
-pub fn blob(mean: Vec3, deviation: Vec3, opacity: f32) -> Gaussian {
-    let variance = deviation * deviation;
-    Gaussian {
-        mean: mean.to_array(),
-        mean_t: 0.5,
-        velocity: [0.0; 3],
-        sigma_t: f32::INFINITY,
-        covariance: [variance.x, 0.0, 0.0, variance.y, 0.0, variance.z],
-        opacity,
-        padding: 0.0,
-    }
-}
-
 /// Returns a scene of Gaussians and their colours, the same from every direction.
 pub fn scene(gaussians: &[(Gaussian, Vec3)]) -> RuntimeScene {
     // The first harmonic is 0.282; one half is added to colours.

@@ -3,7 +3,8 @@
 //! In: an app, scenes, components of their entities and cameras. Out: entities, and the comparison of the app's picture
 //! with that of the CPU reference, or of the renderer without Bevy.
 
-use crate::support::cpu_reference::{DURATION, SIZE, add, blob, difference, scene};
+use crate::support::blob::blob;
+use crate::support::cpu_reference::{DURATION, SIZE, add, difference, scene};
 use crate::support::offscreen_app::picture;
 use bevy::camera::ScalingMode;
 use bevy::prelude::*;
