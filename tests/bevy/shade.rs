@@ -5,7 +5,7 @@
 //! Skipped where there is no GPU, not even a software one.
 
 use crate::support::blob::blob;
-use crate::support::cpu_reference::{SIZE, difference_between, rgb, scene};
+use crate::support::cpu_reference::{SIZE, color, difference_between, rgb, scene};
 use crate::support::fixtures::{MIDDLE, front, insert, orthographic, spawn, spawn_box};
 use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
 use crate::support::spans::has_recorded;
@@ -69,13 +69,13 @@ fn each(app: &mut App, capture: Entity, mesh: Entity) -> [RgbaImage; 2] {
 
 /// Returns the linear light of a pixel.
 fn light(picture: &RgbaImage, x: u32) -> Vec3 {
-    decode(Vec3::from(rgb(picture, x, MIDDLE.y).map(f32::from)) / 255.0)
+    decode(color(picture, x, MIDDLE.y) / 255.0)
 }
 
 /// Checks that a pixel of the wall has the wall's light times `factor`.
 fn check(picture: &RgbaImage, x: u32, factor: Vec3, what: &str) {
     let expected = encode(decode(COLOR) * factor) * 255.0;
-    let seen = Vec3::from(rgb(picture, x, MIDDLE.y).map(f32::from));
+    let seen = color(picture, x, MIDDLE.y);
     assert!((seen - expected).abs().max_element() <= 3.0, "{what}: {seen}, not {expected}");
 }
 

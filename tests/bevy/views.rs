@@ -8,7 +8,7 @@
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{
-    DURATION, SIZE, add, difference, difference_between, eye, rgb, scene, view, view_of,
+    DURATION, SIZE, add, color, difference, difference_between, eye, rgb, scene, view, view_of,
 };
 use crate::support::fixtures::{
     BLACK, MIDDLE, check, crowd, front, insert, lone, orthographic, reference_picture, spawn, spawn_box, synthetic,
@@ -72,7 +72,7 @@ fn a_map_is_faded_tinted_and_lit_as_its_capture_is() {
     ];
     for (what, settings, fade, expected) in cases {
         insert(&mut app, entity, (settings, fade));
-        let seen = Vec3::from(rgb(&picture(&mut app, 0.0), MIDDLE.x, MIDDLE.y).map(f32::from));
+        let seen = color(&picture(&mut app, 0.0), MIDDLE.x, MIDDLE.y);
         let apart = (seen - expected * 255.0).abs().max_element();
         assert!(apart <= 2.0, "a map {what} shows as {seen}, {apart} / 255 from what it should");
     }

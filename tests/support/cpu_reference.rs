@@ -81,3 +81,8 @@ pub fn rgb(picture: &RgbaImage, x: u32, y: u32) -> [u8; 3] {
     let [r, g, b, _] = picture.get_pixel(x, y).0;
     [r, g, b]
 }
+
+/// Returns the colour of a pixel, in 255ths.
+pub fn color(picture: &RgbaImage, x: u32, y: u32) -> Vec3 {
+    Vec3::from(rgb(picture, x, y).map(f32::from))
+}
