@@ -1,35 +1,19 @@
 //! Wall-clock time of a Bevy app's frame in which a capture stands in a scene: what glass, fog, shadows and many copies cost.
 //!
 //! ```text
-//! cargo bench --features viewer,cli --bench scene -- [CAPTURE] [--detailed CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N]
+//! cargo bench --features viewer,cli --bench scene -- [CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N]
 //! ```
 //!
-//! In: a capture (default: the bundled one) and the same with levels of detail (`gs4d detail`; without it those rows are left out), a
-//! picture size (1280x720), frames for each measurement (300), rounds (3). Out: milliseconds of a frame for each scene, the median of the
+//! In: a capture (default: the bundled one), a picture size (1280x720), frames for each measurement (300), rounds (3). Out: milliseconds of a frame for each scene, the median of the
 //! rounds, how much longer it is than the scene that it is compared with, and the spread of the rounds. Default plugins, no window,
 //! rendering is pipelined, all apps take turns, and each measurement ends when the GPU has finished.
 
+mod common;
+
 use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap};
-use bevy::log::LogPlugin;
 use bevy::prelude::*;
-use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
-use bevy::render::renderer::RenderDevice;
-use bevy::time::TimeUpdateStrategy;
 use bevy_gs4d::prelude::*;
-use bevy_gs4d::testing;
-use std::path::PathBuf;
-use std::time::{Duration, Instant};
-
-/// A GPU that was idle runs slowly for a while.
-const WARM_UP: Duration = Duration::from_millis(600);
-
-struct Arguments {
-    capture: PathBuf,
-    detailed: Option<PathBuf>,
-    size: UVec2,
-    frames: u32,
-    rounds: usize,
-}
+use common::{Arguments, Times};
 
 /// What stands in the scene.
 #[derive(Clone, Copy, PartialEq)]
@@ -44,7 +28,7 @@ enum Kind {
     Sun,
     Shadow,
     Crowd,
-    CrowdOfLevels,
+    CrowdOfAll,
 }
 
 use Kind::*;
@@ -65,47 +49,22 @@ const SCENES: [(&str, Kind, Msaa, &str); 15] = [
     ("capture in the sun", Sun, Msaa::Off, "sun alone"),
     ("capture that casts a shadow", Shadow, Msaa::Off, "capture in the sun"),
     ("100 copies, 50 units away", Crowd, Msaa::Off, "nothing"),
-    ("the same with levels of detail", CrowdOfLevels, Msaa::Off, "nothing"),
+    ("the same without levels of detail", CrowdOfAll, Msaa::Off, "nothing"),
 ];
 
-/// One scene, and the times of its frame in milliseconds, one for each round.
-struct Subject {
-    name: &'static str,
-    compared: &'static str,
-    app: App,
-    times: Vec<f64>,
-}
-
 fn main() -> Result {
-    let arguments = parse()?;
-    let mut subjects = Vec::new();
-    for (name, kind, msaa, compared) in SCENES {
-        if kind != CrowdOfLevels || arguments.detailed.is_some() {
-            // Bevy has one logger for all apps.
-            let app = app(&arguments, !subjects.is_empty(), kind, msaa)?;
-            subjects.push(Subject { name, compared, app, times: Vec::new() });
-        }
+    let arguments = common::parse(UVec2::new(1280, 720), 300, |_, _| Ok(false))?;
+    let mut apps = Vec::new();
+    for (_, kind, msaa, _) in SCENES {
+        apps.push(app(&arguments, !apps.is_empty(), kind, msaa)?);
     }
-    for _ in 0..arguments.rounds {
-        for subject in &mut subjects {
-            let began = Instant::now();
-            while began.elapsed() < WARM_UP {
-                run(&mut subject.app, 10)?;
-            }
-            let took = run(&mut subject.app, arguments.frames)?;
-            subject.times.push(took.as_secs_f64() * 1e3 / f64::from(arguments.frames));
-        }
-    }
+    let measured = common::measure(&mut apps, &arguments)?;
     println!("{}, {}x{}", arguments.capture.display(), arguments.size.x, arguments.size.y);
     println!("{:<36} {:>9} {:>9} {:>15}  than", "scene", "frame ms", "more ms", "rounds ms");
     let mut known: Vec<(&str, f64)> = Vec::new();
-    for Subject { name, compared, times, .. } in &mut subjects {
-        times.sort_by(f64::total_cmp);
-        let time = times.get(times.len() / 2).copied().unwrap_or(f64::NAN);
+    for ((name, _, _, compared), Times { median: time, spread }) in SCENES.into_iter().zip(measured) {
         known.push((name, time));
-        let than = known.iter().find(|(name, _)| name == compared).map_or(f64::NAN, |(_, time)| *time);
-        let spread = times.first().zip(times.last());
-        let spread = spread.map_or(String::new(), |(low, high)| format!("{low:.3} - {high:.3}"));
+        let than = known.iter().find(|(name, _)| *name == compared).map_or(f64::NAN, |(_, time)| *time);
         println!("{name:<36} {time:>9.3} {:>9.3} {spread:>15}  {compared}", time - than);
     }
     Ok(())
@@ -113,10 +72,7 @@ fn main() -> Result {
 
 /// Returns an app with a camera and a scene; everything is loaded.
 fn app(arguments: &Arguments, logged: bool, kind: Kind, msaa: Msaa) -> Result<App> {
-    let mut app = testing::app_with(arguments.size, |plugins| {
-        let plugins = plugins.enable::<PipelinedRenderingPlugin>();
-        if logged { plugins.disable::<LogPlugin>() } else { plugins }
-    });
+    let mut app = common::app(arguments.size, logged, |plugins| plugins);
     app.add_plugins(GaussianCapturePlugin).insert_resource(DirectionalLightShadowMap { size: 1024 });
     let place = Transform::from_xyz(-3.0, 1.6, 2.0).looking_at(Vec3::ZERO, Vec3::Y);
     let camera = app.world_mut().spawn((Camera3d::default(), msaa, place)).id();
@@ -148,11 +104,12 @@ fn app(arguments: &Arguments, logged: bool, kind: Kind, msaa: Msaa) -> Result<Ap
     if kind == TwoViews {
         world.spawn((Camera3d::default(), Camera { order: -1, ..default() }, msaa, place));
     }
-    let file = if kind == CrowdOfLevels { arguments.detailed.as_ref() } else { None };
-    let handle = world.resource::<AssetServer>().load(file.unwrap_or(&arguments.capture).clone());
+    let handle = world.resource::<AssetServer>().load(arguments.capture.clone());
     match kind {
         Nothing | GlassAlone | SunAlone => {}
-        Crowd | CrowdOfLevels => {
+        Crowd | CrowdOfAll => {
+            let bias = if kind == CrowdOfAll { 16.0 } else { 0.0 };
+            world.insert_resource(CaptureDetail { bias, ..default() });
             let away = place.forward() * 50.0;
             for index in 0..100 {
                 let beside = place.right() * (3.0 * (index % 10) as f32 - 13.5);
@@ -168,50 +125,6 @@ fn app(arguments: &Arguments, logged: bool, kind: Kind, msaa: Msaa) -> Result<Ap
             }
         }
     }
-    testing::settle(&mut app)?;
-    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / 60.0)));
+    common::start(&mut app)?;
     Ok(app)
-}
-
-/// Runs the app for a number of frames, and returns the time until the GPU has finished them.
-fn run(app: &mut App, frames: u32) -> Result<Duration> {
-    let device = app.world().resource::<RenderDevice>().clone();
-    let began = Instant::now();
-    for _ in 0..frames {
-        app.update();
-        if app.should_exit().is_some() {
-            return Err("the app stopped".into());
-        }
-    }
-    device.wgpu_device().poll(wgpu::PollType::wait_indefinitely())?;
-    Ok(began.elapsed())
-}
-
-fn parse() -> Result<Arguments> {
-    let mut parsed = Arguments {
-        capture: concat!(env!("CARGO_MANIFEST_DIR"), "/assets/toybox.gs4d").into(),
-        detailed: None,
-        size: UVec2::new(1280, 720),
-        frames: 300,
-        rounds: 3,
-    };
-    let mut arguments = std::env::args().skip(1);
-    while let Some(argument) = arguments.next() {
-        let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
-        match argument.as_str() {
-            "--detailed" => parsed.detailed = Some(value()?.into()),
-            "--size" => {
-                let text = value()?;
-                let (width, height) = text.split_once('x').ok_or("--size: not like 1280x720")?;
-                parsed.size = UVec2::new(width.parse()?, height.parse()?);
-            }
-            "--frames" => parsed.frames = value()?.parse()?,
-            "--rounds" => parsed.rounds = value()?.parse()?,
-            // Cargo passes this one.
-            "--bench" => {}
-            option if option.starts_with('-') => return Err(format!("{option}: no such option").into()),
-            file => parsed.capture = file.into(),
-        }
-    }
-    Ok(parsed)
 }

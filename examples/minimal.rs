@@ -9,14 +9,13 @@
 
 #[path = "common/arguments.rs"]
 mod arguments;
+#[path = "common/show.rs"]
+mod show;
 
-use arguments::Arguments;
-use bevy::asset::UnapprovedPathMode;
 use bevy::prelude::*;
 use bevy_gs4d::component::Upright;
-use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin, testing};
+use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
 use std::path::PathBuf;
-use std::time::Duration;
 
 /// The capture that the command line names.
 #[derive(Resource)]
@@ -34,27 +33,8 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>, capture: Res<Capture>
 }
 
 fn main() -> Result {
-    let defaults = Arguments { file: "toybox.gs4d".into(), headless: None, frames: 8 };
-    let arguments = arguments::parse(defaults, |_, _| Ok(false))?;
-    let mut app = match arguments.headless {
-        Some(_) => testing::app(UVec2::new(640, 360)),
-        None => {
-            let mut app = App::new();
-            // A capture may be in any folder.
-            let files = AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..default() };
-            app.add_plugins(DefaultPlugins.set(files));
-            app
-        }
-    };
-    app.insert_resource(Capture(arguments::asset_path(&arguments.file)));
-    app.add_plugins(GaussianCapturePlugin).add_systems(Startup, setup);
-    match arguments.headless {
-        Some(folder) => {
-            arguments::save_pictures(&mut app, arguments.frames, Duration::from_secs_f64(1.0 / 30.0), &folder)
-        }
-        None => {
-            app.run();
-            Ok(())
-        }
-    }
+    // In a game: `App::new().add_plugins((DefaultPlugins, GaussianCapturePlugin)).add_systems(Startup, setup).run()`.
+    show::run(UVec2::new(640, 360), |app, capture| {
+        app.insert_resource(Capture(capture)).add_plugins(GaussianCapturePlugin).add_systems(Startup, setup);
+    })
 }

@@ -9,15 +9,13 @@
 
 #[path = "common/arguments.rs"]
 mod arguments;
+#[path = "common/show.rs"]
+mod show;
 
-use arguments::Arguments;
-use bevy::asset::UnapprovedPathMode;
 use bevy::light::CascadeShadowConfigBuilder;
 use bevy::prelude::*;
 use bevy_gs4d::prelude::*;
-use bevy_gs4d::testing;
 use std::path::PathBuf;
-use std::time::Duration;
 
 /// The colour of what is far away.
 const HAZE: Color = Color::srgb(0.62, 0.7, 0.78);
@@ -77,27 +75,8 @@ fn spawn_scene(
 }
 
 fn main() -> Result {
-    let defaults = Arguments { file: "toybox.gs4d".into(), headless: None, frames: 8 };
-    let arguments = arguments::parse(defaults, |_, _| Ok(false))?;
-    let mut app = match arguments.headless {
-        Some(_) => testing::app(UVec2::new(800, 450)),
-        None => {
-            let mut app = App::new();
-            // A capture may be in any folder.
-            let files = AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..default() };
-            app.add_plugins(DefaultPlugins.set(files));
-            app
-        }
-    };
-    app.insert_resource(Capture(arguments::asset_path(&arguments.file))).insert_resource(ClearColor(HAZE));
-    app.add_plugins(GaussianCapturePlugin).add_systems(Startup, (spawn_capture, spawn_scene));
-    match arguments.headless {
-        Some(folder) => {
-            arguments::save_pictures(&mut app, arguments.frames, Duration::from_secs_f64(1.0 / 30.0), &folder)
-        }
-        None => {
-            app.run();
-            Ok(())
-        }
-    }
+    show::run(UVec2::new(800, 450), |app, capture| {
+        app.insert_resource(Capture(capture)).insert_resource(ClearColor(HAZE));
+        app.add_plugins(GaussianCapturePlugin).add_systems(Startup, (spawn_capture, spawn_scene));
+    })
 }

@@ -305,7 +305,7 @@ fn project_one(index: u32, slot: u32) -> u32 {
     if !(radius <= 3.4e38) {
         return INVISIBLE;
     }
-    let opacity = g.opacity * marginal * instance.opacity;
+    let opacity = g.opacity * marginal * instance.opacity * compensation(j, vec3(a, b, c), det);
     let square = tiles_of(center, radius, vec2<f32>(instance.tiles));
     let tiles = contributing_tiles(square, center, vec2(a, c), det, opacity);
     // Written so that NaN is invisible.
@@ -337,6 +337,19 @@ fn project_one(index: u32, slot: u32) -> u32 {
     // Positive floats have the same order as their bits. Depths are taken from the near plane of an orthographic
     // camera, which may be behind it.
     return bitcast<u32>(select(q.z, q.z - instance.near, parallel));
+}
+
+// Returns the factor on the opacity of a splat that the low-pass makes larger than it was in training. `per_unit` is in pixels for each
+// camera unit.
+fn compensation(per_unit: vec2<f32>, covariance: vec3<f32>, det: f32) -> f32 {
+    let trained = instance.trained_variance * LOW_PASS * per_unit * per_unit;
+    let wider = max(LOW_PASS - trained, vec2(0.0));
+    if all(wider == vec2(0.0)) {
+        // Exactly, whatever the rounding.
+        return 1.0;
+    }
+    let before = (covariance.x - wider.x) * (covariance.z - wider.y) - covariance.y * covariance.y;
+    return sqrt(max(before, 0.0) / det);
 }
 
 fn debug_color(g: Gaussian, absent: bool) -> vec3<f32> {

@@ -41,6 +41,10 @@ pub struct Render {
     /// Folder for the pictures, made if it is not there.
     #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
+    /// Make Gaussians fainter where pictures have larger pixels than training had, as games do; the original does not. Needs a package that
+    /// tells the size of training pixels: `gs4d bake` and `gs4d detail --data` write it.
+    #[arg(long)]
+    antialias: bool,
     /// Write raw float32 pictures (.f32) too.
     #[arg(long)]
     raw: bool,
@@ -77,8 +81,12 @@ impl Render {
         let mut headless = headless?;
         let capture = headless.upload(&scene)?;
         let background = self.checkpoint.background.map_or(scene.trained_background(), Background::Color);
+        let trained_pixel = scene.trained_with.pixel.filter(|_| self.antialias);
+        if self.antialias && trained_pixel.is_none() {
+            return Err(Failure::about(&self.scene, "does not tell the size of training pixels: add it with gs4d detail --data DIR"));
+        }
         let with_view = |shot: Shot| {
-            let view = shot.view(&scene);
+            let view = shot.view(&scene).antialiased(trained_pixel);
             (shot, view)
         };
         let views: Vec<(Shot, View)> = shots.into_iter().map(with_view).collect();

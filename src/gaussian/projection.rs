@@ -8,7 +8,7 @@ use super::{Gaussian, MARGINAL_CUTOFF};
 use crate::view::View;
 use glam::{Mat3, Vec2, Vec3, Vec3Swizzles, Vec4};
 
-/// Added to both variances on the screen, pixels squared; the original does not compensate opacity for it.
+/// Added to both variances on the screen, pixels squared.
 pub const LOW_PASS: f32 = 0.3;
 /// Rays are clamped to this multiple of the field of view before the Jacobian is taken.
 pub(super) const FRUSTUM_CLAMP: f32 = 1.3;
@@ -24,7 +24,7 @@ pub struct Projected {
     pub covariance: Vec3,
     /// Inverse of the covariance: xx, xy, yy.
     pub conic: Vec3,
-    /// Opacity times marginal.
+    /// Opacity times marginal, times the compensation of the low-pass.
     pub opacity: f32,
     /// Conditional mean, capture space.
     pub mean: Vec3,
@@ -83,14 +83,29 @@ pub fn project_with(gaussian: &Gaussian, view: &View, clip: &[Vec4; 2]) -> Optio
     if !radius.is_finite() || tiles.is_empty() {
         return None;
     }
+    let per_unit = Vec2::new(jx.x, jy.y);
     Some(Projected {
         center,
         depth: q.z,
         covariance: Vec3::new(a, b, c),
         conic: Vec3::new(c, -b, a) / det,
-        opacity: gaussian.opacity * marginal,
+        opacity: gaussian.opacity * marginal * compensation(view, per_unit, Vec3::new(a, b, c), det),
         mean,
         radius: radius as u32,
         tiles,
     })
+}
+
+/// Returns the factor on the opacity of a splat that the low-pass makes larger than it was in training: the square root of the ratio of
+/// the determinants of its covariances, so that it covers as much as it did. The original has none, so that what is far away grows. 1 up
+/// to the size of a pixel in training, and in every view without anti-aliasing. `per_unit` is in pixels for each camera unit.
+fn compensation(view: &View, per_unit: Vec2, covariance: Vec3, det: f32) -> f32 {
+    let trained = view.trained_variance() * LOW_PASS * per_unit * per_unit;
+    let wider = (LOW_PASS - trained).max(Vec2::ZERO);
+    if wider == Vec2::ZERO {
+        // Exactly, whatever the rounding.
+        return 1.0;
+    }
+    let before = (covariance.x - wider.x) * (covariance.z - wider.y) - covariance.y * covariance.y;
+    (before.max(0.0) / det).sqrt()
 }

@@ -53,12 +53,14 @@ pub mod search;
 pub mod splits;
 mod subject;
 pub mod temporal_filter;
+mod trained_pixel;
 pub mod work;
 
 pub use error::OfflineError;
 pub use progress::{NoProgress, Progress};
 pub use save::{save, write_beside, write_png, write_settings};
 pub use subject::Subject;
+pub use trained_pixel::trained_pixel;
 
 use crate::gaussian::{Gaussian, InvalidGaussian, SliceSettings};
 use crate::scene::{Form, GaussianScene, SceneForm, Trained};

@@ -34,6 +34,9 @@ pub struct View {
     pub tan_fov: Vec2,
     /// Near limit in camera units: 0.2 capture units; for an orthographic camera, its near plane.
     pub near: f32,
+    /// Size of a pixel of the training views where they see the capture, capture units. Splats that are blurred by larger pixels than
+    /// these are made fainter by as much. Infinite: none is, as in the original.
+    pub trained_pixel: f32,
 }
 
 impl View {
@@ -51,6 +54,7 @@ impl View {
             tan_fov,
             // Depth grows by |row z| camera units for each capture unit along the viewing direction.
             near: NEAR * world_to_camera.row(2).truncate().length(),
+            trained_pixel: f32::INFINITY,
         }
     }
 
@@ -66,7 +70,20 @@ impl View {
             camera_position: inverse.z_axis.truncate().normalize().as_vec3(),
             tan_fov: Vec2::new(projection.x, projection.y).recip(),
             near,
+            trained_pixel: f32::INFINITY,
         }
+    }
+
+    /// Returns the view with anti-aliasing, given the size of a pixel of the training views (`None` if it is not known: without).
+    pub fn antialiased(self, trained_pixel: Option<f32>) -> Self {
+        Self { trained_pixel: trained_pixel.unwrap_or(f32::INFINITY), ..self }
+    }
+
+    /// Returns the variance that a variance of one training pixel squared has on the screen, at one pixel for each camera unit; at most
+    /// 1e20, which stands for infinity.
+    pub fn trained_variance(&self) -> f32 {
+        let pixel = self.trained_pixel * self.world_to_camera.row(2).truncate().length();
+        (pixel * pixel).min(1e20)
     }
 
     /// Returns the unit vector in capture space along which a point is seen.

@@ -4,14 +4,12 @@
 //! is behind them, and that transforms, viewports, multisampling and time have their documented effect. Skipped where
 //! there is no GPU, not even a software one.
 
-use crate::support::cpu_reference::{
-    DURATION, SIZE, add, blob, difference, difference_between, eye, rgb, scene, view, view_of,
-};
+use crate::support::cpu_reference::{DURATION, SIZE, difference, difference_between, eye, rgb, view, view_of};
+use crate::support::fixtures::{self, BLACK, lone, spawn, spawn_box};
 use crate::support::offscreen_app::{app, picture, spawn_camera};
 use bevy::camera::Viewport;
 use bevy::prelude::*;
 use bevy_gs4d::asset::GaussianCapture;
-use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::offline;
 use bevy_gs4d::playback::{Playback, Repeat};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene, Sliced};
@@ -20,40 +18,15 @@ use bevy_gs4d::view::Background;
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin, codec, reference};
 use std::time::Duration;
 
-const BLACK: Background = Background::Color([0.0; 3]);
+/// The colour of boxes.
+const GREEN: Color = Color::srgb(0.0, 1.0, 0.0);
 
-/// Returns overlapping Gaussians of all kinds of shapes; two of them move.
+/// Returns overlapping Gaussians of all kinds of shapes: one is tilted, two move.
 fn crowd() -> RuntimeScene {
-    let moving = |gaussian: Gaussian, velocity: [f32; 3]| Gaussian { velocity, sigma_t: 0.4, ..gaussian };
-    let tilted = Gaussian {
-        covariance: [0.09, 0.04, -0.02, 0.05, 0.01, 0.03],
-        ..blob(Vec3::new(-0.3, 0.2, 0.1), Vec3::ONE, 0.8)
-    };
-    scene(&[
-        (blob(Vec3::new(0.4, -0.1, 0.0), Vec3::new(0.3, 0.1, 0.2), 0.9), Vec3::new(0.9, 0.2, 0.1)),
-        (tilted, Vec3::new(0.1, 0.7, 0.3)),
-        (moving(blob(Vec3::new(0.0, 0.3, 0.5), Vec3::splat(0.15), 0.7), [0.9, -0.3, 0.2]), Vec3::new(0.2, 0.3, 1.0)),
-        (moving(blob(Vec3::new(0.2, -0.4, -0.6), Vec3::splat(0.3), 0.95), [-0.5, 0.4, 0.0]), Vec3::new(0.8, 0.8, 0.2)),
-        (blob(Vec3::new(-0.7, -0.5, -0.2), Vec3::new(0.05, 0.3, 0.05), 0.6), Vec3::splat(0.9)),
-    ])
-}
-
-/// Returns one red Gaussian at the origin.
-fn red() -> RuntimeScene {
-    scene(&[(blob(Vec3::ZERO, Vec3::splat(0.4), 0.98), Vec3::new(1.0, 0.0, 0.0))])
-}
-
-fn spawn(app: &mut App, scene: &RuntimeScene, transform: Transform) -> Entity {
-    let handle = add(app, scene);
-    app.world_mut().spawn((GaussianCapture3d(handle), Playback::paused_at(0.0), transform)).id()
-}
-
-/// Spawns an unlit green box.
-fn spawn_box(app: &mut App, size: Vec3, center: Vec3) {
-    let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(Cuboid::from_size(size));
-    let green = StandardMaterial { base_color: Color::srgb(0.0, 1.0, 0.0), unlit: true, ..default() };
-    let material = app.world_mut().resource_mut::<Assets<StandardMaterial>>().add(green);
-    app.world_mut().spawn((Mesh3d(mesh), MeshMaterial3d(material), Transform::from_translation(center)));
+    let mut scene = fixtures::crowd();
+    let tilted = &mut scene.form.as_sliced_mut().expect("sliced").gaussians[1];
+    tilted.covariance = [0.09, 0.04, -0.02, 0.05, 0.01, 0.03];
+    scene
 }
 
 #[test]
@@ -100,10 +73,10 @@ fn meshes_hide_what_is_behind_them_and_nothing_else() {
     let [left, right] = [SIZE.x / 2 - 8, SIZE.x / 2 + 8];
     for (depth, hides) in [(1.5, true), (-1.5, false)] {
         let Some(mut app) = app(SIZE) else { return };
-        spawn(&mut app, &red(), Transform::default());
+        spawn(&mut app, &lone(Vec3::X), Transform::default());
         spawn_camera(&mut app, Msaa::Off, front);
         // The right half of the view.
-        spawn_box(&mut app, Vec3::new(6.0, 12.0, 0.1), Vec3::new(3.0, 0.0, depth));
+        spawn_box(&mut app, Vec3::new(6.0, 12.0, 0.1), Vec3::new(3.0, 0.0, depth), GREEN, AlphaMode::Opaque);
         let picture = picture(&mut app, 0.0);
         let [[r, g, _], [x, y, _]] = [left, right].map(|x| rgb(&picture, x, SIZE.y / 2));
         assert!(r > 200 && g < 60, "beside the mesh the Gaussian shows, not {r}, {g}");
@@ -208,7 +181,7 @@ fn a_viewport_gets_its_own_view_and_leaves_the_rest_alone() {
     let viewport = Viewport { physical_position: corner, physical_size: size, ..default() };
     app.world_mut().entity_mut(camera).insert(Camera { viewport: Some(viewport), ..default() });
     // A mesh behind everything: its depth is read at the viewport's place, too.
-    spawn_box(&mut app, Vec3::new(40.0, 40.0, 0.1), Vec3::new(0.0, 0.0, -6.0));
+    spawn_box(&mut app, Vec3::new(40.0, 40.0, 0.1), Vec3::new(0.0, 0.0, -6.0), GREEN, AlphaMode::Opaque);
     let mut picture = picture(&mut app, 0.0);
     assert_eq!(rgb(&picture, 20, 20), [0, 0, 0], "outside the viewport the target is as cleared");
     let inside = image::imageops::crop(&mut picture, corner.x, corner.y, size.x, size.y).to_image();
@@ -221,9 +194,9 @@ fn a_viewport_gets_its_own_view_and_leaves_the_rest_alone() {
 #[test]
 fn hidden_and_flattened_captures_are_not_drawn() {
     let Some(mut app) = app(SIZE) else { return };
-    let hidden = spawn(&mut app, &red(), Transform::default());
+    let hidden = spawn(&mut app, &lone(Vec3::X), Transform::default());
     app.world_mut().entity_mut(hidden).insert(Visibility::Hidden);
-    spawn(&mut app, &red(), Transform::from_scale(Vec3::new(1.0, 0.0, 1.0)));
+    spawn(&mut app, &lone(Vec3::X), Transform::from_scale(Vec3::new(1.0, 0.0, 1.0)));
     spawn_camera(&mut app, Msaa::Off, eye());
     let nothing = picture(&mut app, 0.0);
     assert!(nothing.pixels().all(|pixel| pixel.0[0] == 0), "nothing red may show");

@@ -6,6 +6,7 @@
 
 use crate::support::event_log::{Observed, record, take_events};
 use crate::support::pth::Pth;
+use crate::support::waiting::{LOAD_TIMEOUT, wait_until};
 use bevy::app::SubApp;
 use bevy::asset::AssetLoadFailedEvent;
 use bevy::asset::io::memory::{Dir, MemoryAssetReader};
@@ -29,11 +30,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::mpsc::{self, Receiver};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
 use tempfile::TempDir;
-
-/// How long files may take to load.
-const LOAD_TIMEOUT: Duration = Duration::from_secs(60);
 
 /// Returns an app whose assets are in `folder`. It watches them only with `watch`, so that every other reload is an
 /// explicit one.
@@ -57,12 +54,7 @@ fn ready(entity: Entity, capture: &Handle<GaussianCapture>) -> String {
 
 /// Updates until `so` returns true, and twice more, so that late messages are not missed.
 fn wait(app: &mut App, what: &str, so: impl Fn(&App) -> bool) {
-    let start = Instant::now();
-    while !so(app) {
-        assert!(start.elapsed() < LOAD_TIMEOUT, "{what}: waited in vain");
-        std::thread::sleep(Duration::from_millis(2));
-        app.update();
-    }
+    wait_until(app, what, so, App::update);
     app.update();
     app.update();
 }

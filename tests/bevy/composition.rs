@@ -4,8 +4,9 @@
 //! the CPU reference, that every camera draws the captures that it should, from its own place, and that captures and
 //! meshes hide each other in the documented order. Skipped where there is no GPU, not even a software one.
 
+use crate::support::blob::blob;
 use crate::support::cpu_reference::{
-    DURATION, SIZE, blob, difference, difference_between, eye, rgb, scene, view, view_of,
+    DURATION, SIZE, color, difference, difference_between, eye, rgb, scene, view, view_of,
 };
 use crate::support::fixtures::{
     BLACK, MIDDLE, check, crowd, debug_picture, front, insert, lone, orthographic, reference_picture, spawn, spawn_box,
@@ -242,9 +243,9 @@ fn tonemapping_applies_to_captures_on_hdr_cameras_and_leaves_the_rest_alone() {
         for (x, y, trained) in as_trained.enumerate_pixels() {
             let toned = with.get_pixel(x, y);
             if let Some(curve) = curve {
-                let light = decode(Vec3::from(rgb(&as_trained, x, y).map(f32::from)) / 255.0);
+                let light = decode(color(&as_trained, x, y) / 255.0);
                 let expected = encode(curve(light)) * 255.0;
-                let off = (Vec3::from(rgb(&with, x, y).map(f32::from)) - expected).abs().max_element();
+                let off = (color(&with, x, y) - expected).abs().max_element();
                 assert!(off <= 2.0, "{tonemapping:?}: at {x}, {y} {trained:?} becomes {toned:?}, not {expected}");
             }
             if *trained == clear {

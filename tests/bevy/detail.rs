@@ -3,7 +3,8 @@
 //! In: a capture with levels made by hand, far away and near. Out: proof that the level follows the size on the screen without flicker, that
 //! settings limit it, and that captures without levels are drawn as they are. Skipped where there is no GPU.
 
-use crate::support::cpu_reference::{SIZE, add, blob, scene};
+use crate::support::blob::blob;
+use crate::support::cpu_reference::{SIZE, add, scene};
 use crate::support::offscreen_app::{app, picture, spawn_camera};
 use bevy::prelude::*;
 use bevy_gs4d::GaussianCapture3d;

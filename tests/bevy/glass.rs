@@ -4,7 +4,8 @@
 //! is in front covers it, with the colours that follow from pictures of each alone, multisampled or not, HDR or not. Skipped where there
 //! is no GPU, not even a software one.
 
-use crate::support::cpu_reference::{SIZE, blob, difference_between, eye, rgb, scene};
+use crate::support::blob::blob;
+use crate::support::cpu_reference::{SIZE, color, difference_between, eye, rgb, scene};
 use crate::support::fixtures::{MIDDLE, crowd, front, insert, lone, spawn, spawn_box};
 use crate::support::offscreen_app::{app, picture, spawn_camera};
 use crate::support::skip::skip;
@@ -36,7 +37,7 @@ fn spawn_pane(app: &mut App, opacity: f32, z: f32) -> Entity {
 }
 
 fn color_at(picture: &RgbaImage, x: u32, y: u32) -> Vec3 {
-    Vec3::from(rgb(picture, x, y).map(f32::from)) / 255.0
+    color(picture, x, y) / 255.0
 }
 
 /// Checks every pixel against a colour that follows from other pictures, except for their rounding and its own to 8 bits: in linear light

@@ -3,6 +3,7 @@
 //! In: the folder named by `GS4D_DATA`, with checkpoints, golden cameras (`.json`) and golden pictures (`.npz`). Out: the PSNR of
 //! every view, which must be that of rounding to 8 bits, and the worst pixels. Skipped without the folder, or without a GPU.
 
+use crate::support::cpu_reference::differences;
 use crate::support::offscreen_app::{app, picture, spawn_camera};
 use crate::support::{data, npz};
 use bevy::camera::RenderTarget;
@@ -89,16 +90,6 @@ fn pose(view: &GoldenView) -> Transform {
     let world_to_camera = Mat4::from_cols_array_2d(&view.world_to_camera_opencv).transpose();
     let flip = Mat4::from_diagonal(Vec4::new(1.0, -1.0, -1.0, 1.0));
     Transform::from_matrix((flip * world_to_camera).inverse())
-}
-
-/// Returns how far each pixel is from the expected one, in 255ths, in the channel where that is most.
-fn differences(picture: &RgbaImage, expected: &Picture) -> Vec<f32> {
-    assert_eq!(UVec2::from(picture.dimensions()), expected.size, "pictures of one size");
-    let apart = |(pixel, expected): (&image::Rgba<u8>, &Vec3)| {
-        let [r, g, b, _] = pixel.0.map(f32::from);
-        (Vec3::new(r, g, b) - (*expected).clamp(Vec3::ZERO, Vec3::ONE) * 255.0).abs().max_element()
-    };
-    picture.pixels().zip(&expected.pixels).map(apart).collect()
 }
 
 /// Returns the PSNR of 8-bit RGB against floats clamped to 0..1, dB.

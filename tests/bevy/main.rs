@@ -28,6 +28,7 @@ mod walkthrough;
 
 #[path = "../support"]
 mod support {
+    pub mod blob;
     pub mod cpu_reference;
     pub mod data;
     pub mod event_log;
@@ -40,4 +41,6 @@ mod support {
     pub mod playback_app;
     pub mod pth;
     pub mod skip;
+    pub mod spans;
+    pub mod waiting;
 }

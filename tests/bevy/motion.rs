@@ -4,14 +4,14 @@
 //! those of what they show, and that Bevy's effects treat them as surfaces in motion, with the settings of cameras as they are by default.
 //! Frames are counted, so that apps are never pipelined. Skipped where there is no GPU, not even a software one.
 
-use crate::support::cpu_reference::{blob, scene};
+use crate::support::blob::blob;
+use crate::support::cpu_reference::scene;
 use crate::support::fixtures::{front, insert, spawn};
-use crate::support::no_gpu::no_gpu;
-use crate::support::offscreen_app::{FOV_Y, picture, spawn_camera};
+use crate::support::offscreen_app::{FOV_Y, picture, spawn_camera, unpipelined_app};
+use crate::support::spans::has_recorded;
 use bevy::anti_alias::taa::TemporalAntiAliasing;
 use bevy::core_pipeline::prepass::{DepthPrepass, MotionVectorPrepass, ViewPrepassTextures};
 use bevy::core_pipeline::schedule::{Core3d, Core3dSystems};
-use bevy::diagnostic::DiagnosticsStore;
 use bevy::light::{FogVolume, VolumetricFog, VolumetricLight};
 use bevy::post_process::dof::{DepthOfField, DepthOfFieldMode};
 use bevy::post_process::motion_blur::MotionBlur;
@@ -20,7 +20,6 @@ use bevy::render::RenderApp;
 use bevy::render::diagnostic::RenderDiagnosticsPlugin;
 use bevy::render::gpu_readback::{Readback, ReadbackComplete};
 use bevy::render::renderer::{RenderContext, RenderDevice, ViewQuery};
-use bevy_gs4d::GaussianCapturePlugin;
 use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::render::{CaptureViewSettings, DepthWrite};
@@ -32,17 +31,6 @@ use std::sync::{Arc, Mutex};
 const SIZE: UVec2 = UVec2::new(64, 48);
 /// Frames after which an effect has its final strength.
 const FRAMES: u32 = 12;
-
-/// Returns an app without a window; `None` if there is no GPU to draw with, which is reported.
-fn app() -> Option<App> {
-    if !testing::has_gpu() {
-        no_gpu();
-        return None;
-    }
-    let mut app = testing::app(SIZE);
-    app.add_plugins(GaussianCapturePlugin).insert_resource(ClearColor(Color::BLACK));
-    Some(app)
-}
 
 /// Runs one frame.
 fn step(app: &mut App) {
@@ -180,7 +168,7 @@ fn motion_vectors_are_those_of_what_moves() {
         ("the camera moves", Vec3::ZERO, Vec3::ZERO, by_hand, -by_hand),
         ("both move together", Vec3::ZERO, by_hand, by_hand, Vec3::ZERO),
     ] {
-        let Some(mut app) = app() else { return };
+        let Some(mut app) = unpipelined_app(SIZE) else { return };
         let vectors = Vectors::of(&mut app);
         let entity = spawn(&mut app, &moving(in_time), ());
         let camera = spawn_camera(&mut app, Msaa::Off, front());
@@ -207,7 +195,7 @@ fn motion_vectors_are_those_of_what_moves() {
 
 #[test]
 fn a_jump_in_time_is_no_motion_and_the_rest_is_left_alone() {
-    let Some(mut app) = app() else { return };
+    let Some(mut app) = unpipelined_app(SIZE) else { return };
     let vectors = Vectors::of(&mut app);
     let entity = spawn(&mut app, &moving(Vec3::X), ());
     let camera = spawn_camera(&mut app, Msaa::Off, front());
@@ -289,7 +277,7 @@ fn apart(a: &[u8], b: &[u8]) -> f32 {
 
 /// Returns the picture of stripes that move to the right, with an effect on the camera.
 fn stripes_in_motion(along_y: bool, pixels: f32, forgets: bool, effect: impl Bundle) -> Option<Vec<u8>> {
-    let mut app = app()?;
+    let mut app = unpipelined_app(SIZE)?;
     if forgets {
         forget_motion(&mut app);
     }
@@ -342,7 +330,7 @@ fn depth_of_field_blurs_what_is_out_of_focus() {
     };
     let mut blurred = Vec::new();
     for place in [Transform::default(), far] {
-        let Some(mut app) = app() else { return };
+        let Some(mut app) = unpipelined_app(SIZE) else { return };
         spawn(&mut app, &stripes(true), place);
         let camera = spawn_camera(&mut app, Msaa::Off, front());
         let sharp = picture(&mut app, 0.0);
@@ -364,7 +352,7 @@ fn volumetric_fog_covers_the_farther_capture_more() {
     let far = Transform::from_xyz(0.0, 0.0, -40.0).with_scale(Vec3::splat(11.0));
     let mut light = Vec::new();
     for place in [Transform::default(), far] {
-        let Some(mut app) = app() else { return };
+        let Some(mut app) = unpipelined_app(SIZE) else { return };
         spawn(&mut app, &white(), place);
         let camera = spawn_camera(&mut app, Msaa::Off, front());
         let clear = picture(&mut app, 0.0).get_pixel(SIZE.x / 2, SIZE.y / 2).0[0];
@@ -384,7 +372,7 @@ fn volumetric_fog_covers_the_farther_capture_more() {
 #[test]
 fn depth_is_written_for_effects_that_read_it_and_for_no_other_camera() {
     let writes = |asked: DepthWrite, effect: bool| {
-        let mut app = app()?;
+        let mut app = unpipelined_app(SIZE)?;
         app.add_plugins(RenderDiagnosticsPlugin);
         spawn(&mut app, &white(), ());
         let camera = spawn_camera(&mut app, Msaa::Off, front());
@@ -395,8 +383,7 @@ fn depth_is_written_for_effects_that_read_it_and_for_no_other_camera() {
         picture(&mut app, 0.0);
         // Times come back some frames later.
         (0..30).for_each(|_| step(&mut app));
-        let known = app.world().resource::<DiagnosticsStore>();
-        Some(known.iter().any(|known| known.path().as_str().contains("gs4d/write_depth")))
+        Some(has_recorded(&app, "gs4d/write_depth"))
     };
     for (asked, effect, expected) in [
         (DepthWrite::Auto, false, false),

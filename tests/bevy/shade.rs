@@ -4,11 +4,12 @@
 //! shadows and dark rooms darken captures by the documented factors and only those that ask for it, and that other cameras pay nothing.
 //! Skipped where there is no GPU, not even a software one.
 
-use crate::support::cpu_reference::{SIZE, blob, difference_between, rgb, scene};
+use crate::support::blob::blob;
+use crate::support::cpu_reference::{SIZE, color, difference_between, rgb, scene};
 use crate::support::fixtures::{MIDDLE, front, insert, orthographic, spawn, spawn_box};
 use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
+use crate::support::spans::has_recorded;
 use bevy::camera::{Exposure, Hdr};
-use bevy::diagnostic::DiagnosticsStore;
 use bevy::light::{DirectionalLightShadowMap, PointLightShadowMap};
 use bevy::pbr::{DistanceFog, FogFalloff};
 use bevy::prelude::*;
@@ -68,19 +69,14 @@ fn each(app: &mut App, capture: Entity, mesh: Entity) -> [RgbaImage; 2] {
 
 /// Returns the linear light of a pixel.
 fn light(picture: &RgbaImage, x: u32) -> Vec3 {
-    decode(Vec3::from(rgb(picture, x, MIDDLE.y).map(f32::from)) / 255.0)
+    decode(color(picture, x, MIDDLE.y) / 255.0)
 }
 
 /// Checks that a pixel of the wall has the wall's light times `factor`.
 fn check(picture: &RgbaImage, x: u32, factor: Vec3, what: &str) {
     let expected = encode(decode(COLOR) * factor) * 255.0;
-    let seen = Vec3::from(rgb(picture, x, MIDDLE.y).map(f32::from));
+    let seen = color(picture, x, MIDDLE.y);
     assert!((seen - expected).abs().max_element() <= 3.0, "{what}: {seen}, not {expected}");
-}
-
-/// Returns whether the pass has been recorded so far.
-fn has_shaded(app: &App, pass: &str) -> bool {
-    app.world().resource::<DiagnosticsStore>().iter().any(|known| known.path().as_str().contains(pass))
 }
 
 #[test]
@@ -256,7 +252,7 @@ fn a_camera_without_any_of_it_has_no_further_pass() {
     // Spans arrive some frames later.
     let wait_for = |app: &mut App, pass: &str| {
         for _ in 0..100 {
-            if has_shaded(app, pass) {
+            if has_recorded(app, pass) {
                 return true;
             }
             app.update();
@@ -264,7 +260,7 @@ fn a_camera_without_any_of_it_has_no_further_pass() {
         false
     };
     assert!(wait_for(&mut app, "gs4d/composite"), "spans arrive");
-    assert!(!has_shaded(&app, "gs4d/shade"), "captures are not shaded");
+    assert!(!has_recorded(&app, "gs4d/shade"), "captures are not shaded");
     insert(&mut app, camera, fog(FogFalloff::Exponential { density: 0.5 }));
     assert!(difference_between(&picture(&mut app, 0.0), &plain) > 20, "fog shows");
     assert!(wait_for(&mut app, "gs4d/shade"), "in a pass of its own");

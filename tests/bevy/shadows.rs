@@ -5,7 +5,8 @@
 //! asked to, and that a contact shadow darkens the ground beneath its capture, not the capture and nothing far away. Skipped where there
 //! is no GPU, not even a software one.
 
-use crate::support::cpu_reference::{DURATION, blob, rgb, scene};
+use crate::support::blob::blob;
+use crate::support::cpu_reference::{DURATION, rgb, scene};
 use crate::support::fixtures::{insert, spawn};
 use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
 use bevy::camera::visibility::{RenderLayers, ViewVisibility};

@@ -5,7 +5,9 @@
 //! replaced without a gap and survive a restart of the renderer, and that a GPU that is too small and an invalid
 //! capture are reported. Skipped where there is no GPU.
 
-use crate::support::cpu_reference::{blob, scene};
+use crate::support::blob::blob;
+use crate::support::cpu_reference::scene;
+use crate::support::fixtures::synthetic;
 use crate::support::no_gpu::no_gpu;
 use crate::support::offscreen_app::{self, app, picture, spawn_camera};
 use bevy::asset::AssetId;
@@ -24,8 +26,7 @@ use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::render::{CaptureSettings, CaptureStatistics, CaptureUploadBudget, CaptureViewSettings, DepthWrite};
 use bevy_gs4d::renderer::{Design, WorkCounters};
-use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{Environment, RuntimeScene, TemporalFilter};
+use bevy_gs4d::scene::{Environment, RuntimeScene};
 use bevy_gs4d::testing::{self, Offscreen};
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
 use std::collections::VecDeque;
@@ -40,17 +41,6 @@ const STEP: Duration = Duration::from_millis(10);
 fn settings() -> WgpuSettings {
     let backends = if cfg!(target_os = "linux") { Backends::VULKAN } else { Backends::PRIMARY };
     WgpuSettings { backends: Some(backends), ..default() }
-}
-
-/// Returns two seconds of a moving scene with +z up, with a filter of half-second segments if `filtered`.
-fn synthetic(count: usize, seed: u64, filtered: bool) -> RuntimeScene {
-    let settings = SynthSettings { count, seed, degree: 0, degree_t: 0, duration_seconds: 2.0 };
-    let mut scene = synthesize(&settings).into_runtime().expect("synthetic scenes can be drawn");
-    if filtered {
-        let interval = scene.trained_with.time_interval;
-        scene.filter = Some(TemporalFilter::support(scene.iter(), interval, 4));
-    }
-    scene
 }
 
 /// Returns Gaussians of one color at rest at the origin.

@@ -4,6 +4,7 @@
 //! those of single cameras at the same moment, and that halves of one target and two targets show the same. Skipped where there is no
 //! GPU, not even a software one.
 
+use crate::support::blob::blob;
 use crate::support::cpu_reference::{DURATION, SIZE, add, difference_between, scene};
 use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
 use bevy::camera::RenderTarget;
@@ -26,17 +27,8 @@ const RIG: StereoRig = StereoRig { ipd: 0.2 };
 
 /// Returns a round Gaussian and its colour.
 fn splat(mean: Vec3, deviation: f32, velocity: Vec3, color: Vec3) -> (Gaussian, Vec3) {
-    let variance = deviation * deviation;
-    let gaussian = Gaussian {
-        mean: mean.to_array(),
-        mean_t: 0.0,
-        velocity: velocity.to_array(),
-        sigma_t: 10.0,
-        covariance: [variance, 0.0, 0.0, variance, 0.0, variance],
-        opacity: 0.9,
-        padding: 0.0,
-    };
-    (gaussian, color)
+    let at_rest = blob(mean, Vec3::splat(deviation), 0.9);
+    (Gaussian { mean_t: 0.0, velocity: velocity.to_array(), sigma_t: 10.0, ..at_rest }, color)
 }
 
 /// Returns one small white Gaussian near the origin that rises by 0.8 units over the time interval.

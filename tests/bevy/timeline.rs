@@ -5,6 +5,7 @@
 
 use crate::support::event_log::{debug, take_events};
 use crate::support::playback_app::{self, app, app_with, capture, change, get, pass};
+use crate::support::waiting::wait_until;
 use bevy::asset::{AssetLoadFailedEvent, LoadState};
 use bevy::prelude::*;
 use bevy_gs4d::codec::package::WriteSettings;
@@ -12,10 +13,6 @@ use bevy_gs4d::offline;
 use bevy_gs4d::playback::{Clip, ClipFade, Marker, Track};
 use bevy_gs4d::prelude::*;
 use std::path::Path;
-use std::time::{Duration, Instant};
-
-/// How long files may take to load.
-const LOAD_TIMEOUT: Duration = Duration::from_secs(60);
 
 /// Returns two tracks and three markers in six seconds, and their captures of two and four seconds.
 fn timeline(app: &mut App) -> (Timeline, [Handle<GaussianCapture>; 2]) {
@@ -254,14 +251,9 @@ fn app_in(folder: &Path) -> App {
     app(folder.to_str().expect("temporary folders have plain names"))
 }
 
-/// Updates until `so` returns true.
+/// Updates until `so` returns true; no time passes.
 fn wait(app: &mut App, what: &str, so: impl Fn(&App) -> bool) {
-    let start = Instant::now();
-    while !so(app) {
-        assert!(start.elapsed() < LOAD_TIMEOUT, "{what}: waited in vain");
-        std::thread::sleep(Duration::from_millis(2));
-        pass(app, 0.0);
-    }
+    wait_until(app, what, so, |app| pass(app, 0.0));
 }
 
 fn load(app: &App, name: &'static str) -> Handle<Timeline> {

@@ -6,11 +6,12 @@
 //! the CPU reference, that temporal filters and the direction of play change no pixel, and that extreme values stay
 //! finite. Skipped where there is no GPU, not even a software one.
 
+use crate::support::blob::blob;
 use crate::support::cpu_reference::{
-    DURATION, SIZE, add, blob, difference, difference_between, eye, rgb, scene, view, view_of,
+    DURATION, SIZE, add, color, difference, difference_between, eye, rgb, scene, view, view_of,
 };
 use crate::support::fixtures::{
-    BLACK, MIDDLE, check, crowd, front, insert, lone, orthographic, reference_picture, spawn, spawn_box,
+    BLACK, MIDDLE, check, crowd, front, insert, lone, orthographic, reference_picture, spawn, spawn_box, synthetic,
 };
 use crate::support::gpu;
 use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
@@ -26,8 +27,7 @@ use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::codec::checkpoint::CheckpointOptions;
 use bevy_gs4d::playback::{ClipFade, Playback, Repeat};
 use bevy_gs4d::render::{CaptureSettings, CaptureStatistics, CaptureViewSettings};
-use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
-use bevy_gs4d::scene::{Environment, RuntimeScene, TemporalFilter};
+use bevy_gs4d::scene::{Environment, RuntimeScene};
 use bevy_gs4d::testing::{self, Offscreen};
 use bevy_gs4d::view::srgb::{decode, encode};
 use bevy_gs4d::view::{Appearance, Background, Camera as PinholeCamera, DebugView, Lens, Picture, RasterFov};
@@ -72,7 +72,7 @@ fn a_map_is_faded_tinted_and_lit_as_its_capture_is() {
     ];
     for (what, settings, fade, expected) in cases {
         insert(&mut app, entity, (settings, fade));
-        let seen = Vec3::from(rgb(&picture(&mut app, 0.0), MIDDLE.x, MIDDLE.y).map(f32::from));
+        let seen = color(&picture(&mut app, 0.0), MIDDLE.x, MIDDLE.y);
         let apart = (seen - expected * 255.0).abs().max_element();
         assert!(apart <= 2.0, "a map {what} shows as {seen}, {apart} / 255 from what it should");
     }
@@ -225,10 +225,7 @@ fn every_sample_count_cuts_captures_at_the_right_pixels_of_a_viewport() {
 
 /// Returns a synthetic scene with a filter of four segments, and without one.
 fn twice(count: usize, seed: u64) -> [RuntimeScene; 2] {
-    let settings = SynthSettings { count, seed, degree: 0, degree_t: 0, duration_seconds: DURATION };
-    let plain = synthesize(&settings).into_runtime().expect("synthetic scenes can be drawn");
-    let filter = TemporalFilter::support(plain.iter(), plain.trained_with.time_interval, 4);
-    [RuntimeScene { filter: Some(filter), ..plain.clone() }, plain]
+    [true, false].map(|filtered| synthetic(count, seed, filtered))
 }
 
 /// One app with everything in it twice, with a temporal filter and without, each for a camera of its own.

@@ -5,11 +5,10 @@
 //! cannot be written are refused; that a package is as small as it was asked to be, or not there, and that a size which cannot be is refused
 //! at once.
 
+use crate::support::capture::Capture;
 use crate::support::command::{Run, arguments, gs4d};
+use crate::support::folders;
 use crate::support::no_gpu::no_gpu;
-use crate::support::{dataset, folders};
-use bevy_gs4d::codec::package::WriteSettings;
-use bevy_gs4d::offline;
 use bevy_gs4d::renderer::GpuContext;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Environment, GaussianScene};
@@ -17,13 +16,6 @@ use glam::{UVec2, Vec3};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
-use tempfile::TempDir;
-
-struct Capture {
-    folder: TempDir,
-    scene: PathBuf,
-    data: PathBuf,
-}
 
 /// Returns a scene and a dataset around `center`, which belongs to the scene if it is the origin.
 fn capture(center: Vec3, images: bool) -> Capture {
@@ -32,17 +24,12 @@ fn capture(center: Vec3, images: bool) -> Capture {
 
 /// As [`capture`], with this scene.
 fn capture_of(trained: GaussianScene, center: Vec3, images: bool) -> Capture {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let (scene, data) = (folder.path().join("scene.gs4d"), folder.path().join("data"));
-    offline::save(&scene, &trained, &WriteSettings::default()).expect("the folder can be written to");
-    let runtime = trained.into_runtime().expect("a synthetic scene can be drawn");
-    dataset::write(&data, &runtime, center, 4, 4, UVec2::splat(48), images);
-    Capture { folder, scene, data }
+    Capture::new(trained, center, 4, 4, UVec2::splat(48), images)
 }
 
 impl Capture {
     fn out(&self) -> PathBuf {
-        self.folder.path().join("out.gs4d")
+        self.path("out.gs4d")
     }
 
     /// Bakes on the CPU, without training, to a package of at most `bytes`.
@@ -96,7 +83,7 @@ fn a_bake_makes_a_smaller_package_and_says_what_it_cost() {
     let info = gs4d(&arguments!["info", &out, "--json"]).json();
     assert_eq!((&info["gaussians"], &info["package"]["intact"]), (&1200.into(), &true.into()), "a whole package");
 
-    let report: Value = serde_json::from_str(&read(&capture.folder.path().join("out.report.json"))).expect("JSON");
+    let report: Value = serde_json::from_str(&read(&capture.path("out.report.json"))).expect("JSON");
     assert_eq!(report, json, "what is printed is what is kept");
     for name in ["sections", "trials", "stages", "times", "choices", "filter_share"] {
         assert!(report[name].as_array().is_some_and(|list| !list.is_empty()), "{name} in {report}");
@@ -107,7 +94,7 @@ fn a_bake_makes_a_smaller_package_and_says_what_it_cost() {
     let psnr = |side: &str| report["evaluation"][side]["mean"]["psnr"].as_f64().expect("a number");
     assert!(psnr("before") > 60.0 && psnr("after") > 35.0, "its own pictures: {}", report["evaluation"]);
 
-    let html = read(&capture.folder.path().join("out.report.html"));
+    let html = read(&capture.path("out.report.html"));
     for title in [
         "Size by section",
         "Temporal variance",
@@ -234,7 +221,7 @@ fn a_package_that_stays_too_large_replaces_nothing_and_is_kept_aside() {
     run.must_fail("not even with a single Gaussian");
     run.must_fail("choose a lower quality or a larger size");
     assert_eq!(read(&out), "the one from before", "the old file stays");
-    let kept = capture.folder.path().join("out.gs4d.bake/too-large.gs4d");
+    let kept = capture.path("out.gs4d.bake/too-large.gs4d");
     run.must_fail(&kept.display().to_string());
     let bytes = fs::metadata(&kept).expect("it is kept").len();
     assert!(bytes > one, "{bytes} bytes are more than {one}");

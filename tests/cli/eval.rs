@@ -3,31 +3,22 @@
 //! In: a small synthetic scene and a dataset drawn from it by the CPU reference. Out: proof that the scene matches its
 //! own pictures, that missing data is named, and that the tables have the documented rows and columns.
 
+use crate::support::capture::Capture;
 use crate::support::command::{arguments, gs4d};
-use crate::support::dataset;
-use bevy_gs4d::codec::package::WriteSettings;
-use bevy_gs4d::offline;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use glam::{Mat4, UVec2, Vec3};
 use serde_json::json;
 use std::fs;
-use std::path::PathBuf;
-use tempfile::TempDir;
 
-/// Returns a folder with a scene and its own pictures, and the paths of both.
-fn capture(size: UVec2) -> (TempDir, PathBuf, PathBuf) {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let (scene, data) = (folder.path().join("scene.gs4d"), folder.path().join("data"));
+/// Returns a scene and its own pictures of that size.
+fn capture(size: UVec2) -> Capture {
     let trained = synthesize(&SynthSettings { count: 1500, ..SynthSettings::default() });
-    offline::save(&scene, &trained, &WriteSettings::default()).expect("the folder can be written to");
-    let runtime = trained.into_runtime().expect("a synthetic scene can be drawn");
-    dataset::write(&data, &runtime, Vec3::ZERO, 3, 3, size, true);
-    (folder, scene, data)
+    Capture::new(trained, Vec3::ZERO, 3, 3, size, true)
 }
 
 #[test]
 fn a_scene_matches_its_own_pictures() {
-    let (folder, scene, data) = capture(UVec2::new(192, 176));
+    let Capture { folder, scene, data } = capture(UVec2::new(192, 176));
     let pictures = folder.path().join("pictures");
     let json = gs4d(&arguments!["eval", &scene, "--data", &data, "--out", &pictures, "--json"]).json();
     assert_eq!((&json["split"], json["views"].as_array().map(Vec::len)), (&"test".into(), Some(6)), "the test views");
@@ -63,7 +54,7 @@ fn a_scene_matches_its_own_pictures() {
 
 #[test]
 fn what_is_missing_is_named() {
-    let (folder, scene, data) = capture(UVec2::splat(32));
+    let Capture { folder, scene, data } = capture(UVec2::splat(32));
     gs4d(&arguments!["eval", &scene, "--data", folder.path().join("nowhere")]).must_fail("transforms_test.json");
     gs4d(&arguments!["eval", &scene, "--data", &data, "--split", "val"]).must_fail("transforms_val.json");
     gs4d(&arguments!["eval", &scene, "--data", &data, "--metrics", "lpips"]).must_fail("lpips");
@@ -80,7 +71,7 @@ fn what_is_missing_is_named() {
 
 #[test]
 fn advice_names_no_option_that_the_verb_lacks() {
-    let (folder, scene, _) = capture(UVec2::splat(16));
+    let Capture { folder, scene, .. } = capture(UVec2::splat(16));
     let data = folder.path().join("sizeless");
     fs::create_dir(&data).expect("the folder can be written to");
     let frame = json!({ "file_path": "nothing", "time": 0, "transform_matrix": Mat4::IDENTITY.to_cols_array_2d() });
@@ -96,7 +87,7 @@ fn advice_names_no_option_that_the_verb_lacks() {
 
 #[test]
 fn an_ablation_has_every_row() {
-    let (folder, scene, data) = capture(UVec2::splat(48));
+    let Capture { folder, scene, data } = capture(UVec2::splat(48));
     let csv = folder.path().join("table.csv");
     let json = gs4d(&arguments![
         "ablate",

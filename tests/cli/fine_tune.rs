@@ -3,11 +3,10 @@
 //! In: a small synthetic scene, a dataset drawn from it, the scene pruned. Out: proof that training wins quality, that the result can be
 //! compressed on the way, and that wrong inputs are refused with nothing left behind. Skipped where there is no GPU.
 
+use crate::support::capture::Capture;
 use crate::support::command::{arguments, gs4d};
 use crate::support::no_gpu::no_gpu;
 use crate::support::{dataset, folders};
-use bevy_gs4d::codec::package::WriteSettings;
-use bevy_gs4d::offline;
 use bevy_gs4d::renderer::GpuContext;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use glam::{UVec2, Vec3};
@@ -28,12 +27,9 @@ fn lesson() -> Option<Lesson> {
         no_gpu();
         return None;
     }
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let [scene, pruned, data] = ["scene.gs4d", "pruned.gs4d", "data"].map(|name| folder.path().join(name));
     let trained = synthesize(&SynthSettings { count: 1000, ..SynthSettings::default() });
-    offline::save(&scene, &trained, &WriteSettings::default()).expect("the folder can be written to");
-    let runtime = trained.into_runtime().expect("a synthetic scene can be drawn");
-    dataset::write(&data, &runtime, Vec3::ZERO, 4, 4, UVec2::splat(48), true);
+    let Capture { folder, scene, data } = Capture::new(trained, Vec3::ZERO, 4, 4, UVec2::splat(48), true);
+    let pruned = folder.path().join("pruned.gs4d");
     gs4d(&arguments!["prune", &scene, "--data", &data, "--ratio", "0.5", "--variant", "energy", "-o", &pruned]).text();
     Some(Lesson { folder, scene, pruned, data })
 }

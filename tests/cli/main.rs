@@ -19,6 +19,7 @@ mod render;
 
 #[path = "../support"]
 mod support {
+    pub mod capture;
     pub mod command;
     pub mod data;
     pub mod dataset;

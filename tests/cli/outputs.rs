@@ -4,39 +4,17 @@
 //! outputs are told before anything is read, that what is replaced keeps its links and permissions, and that two runs do not disturb each
 //! other.
 
+use crate::support::capture::Capture;
 use crate::support::command::{arguments, folder, gs4d, scene};
-use crate::support::dataset;
 use crate::support::folders::contents;
-use bevy_gs4d::codec::package::WriteSettings;
-use bevy_gs4d::offline;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use glam::{UVec2, Vec3};
 use std::ffi::OsString;
 use std::fs::{self, File};
-use std::path::PathBuf;
-use tempfile::TempDir;
-
-/// A folder with a scene, `scene.gs4d`, and its own pictures, `data`.
-struct Capture {
-    folder: TempDir,
-    scene: PathBuf,
-    data: PathBuf,
-}
 
 fn capture() -> Capture {
-    let folder = folder();
-    let (scene, data) = (folder.path().join("scene.gs4d"), folder.path().join("data"));
     let trained = synthesize(&SynthSettings { count: 200, ..SynthSettings::default() });
-    offline::save(&scene, &trained, &WriteSettings::default()).expect("the folder can be written to");
-    let runtime = trained.into_runtime().expect("a synthetic scene can be drawn");
-    dataset::write(&data, &runtime, Vec3::ZERO, 4, 2, UVec2::splat(48), true);
-    Capture { folder, scene, data }
-}
-
-impl Capture {
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
+    Capture::new(trained, Vec3::ZERO, 4, 2, UVec2::splat(48), true)
 }
 
 #[test]

@@ -4,6 +4,7 @@
 //! In: scenes, files and pictures made here, `tests/golden/`, and the trained captures where `GS4D_DATA` names their
 //! folder. Out: one test binary. The header of each module describes its tests.
 
+mod antialias;
 mod checkpoint;
 mod checkpoint_poison;
 #[cfg(feature = "offline")]
@@ -26,6 +27,7 @@ mod score;
 
 #[path = "../support"]
 mod support {
+    pub mod blob;
     pub mod coded_scene;
     pub mod data;
     pub mod golden;

@@ -97,6 +97,7 @@ fn scene(shape: &Shape, seed: u64) -> GaussianScene {
             cameras: TrainedCameras::Intrinsics,
             iteration: 30_000,
             spatial_lr_scale: 4.43 / 3.0,
+            pixel: Some(0.0123),
             ..TrainedWith::default()
         },
         playback: PlaybackHints { up: UpAxis::NegY, duration_seconds: 1.0 / 3.0 },
@@ -538,6 +539,8 @@ fn senseless_switches_are_refused() {
         ("duration_seconds: 0.", "duration_seconds: -0."),
         ("time_interval: (-0.1, 2.7)", "time_interval: (-3e38, 3e38)"),
         ("spatial_lr_scale: 1.", "spatial_lr_scale: -1."),
+        ("pixel: Some(0.0123)", "pixel: Some(0.0)"),
+        ("pixel: Some(0.0123)", "pixel: Some(NaN)"),
         ("degree: 0", "degree: 4"),
     ] {
         let error = refusal(&parts.clone().swap(from, to).seal());

@@ -4,10 +4,12 @@
 //! In: synthetic scenes, the same for GPU and CPU. Out: proof that both draw the same, or that a pixel has the expected
 //! value.
 
+use crate::support::blob::blob;
 use crate::support::gpu;
-use bevy_gs4d::gaussian::{Gaussian, Harmonics};
+use crate::support::surfaces::edge;
+use bevy_gs4d::gaussian::Harmonics;
 use bevy_gs4d::reference::{Layer, render_layers};
-use bevy_gs4d::renderer::{GpuContext, Headless, Instance, OpaqueDepth, ViewParameters};
+use bevy_gs4d::renderer::{Headless, Instance, OpaqueDepth, ViewParameters};
 use bevy_gs4d::scene::RuntimeScene;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::view::srgb::decode;
@@ -32,18 +34,7 @@ fn view() -> View {
 
 /// Returns grey Gaussians at rest that are always active: mean, deviation, opacity.
 fn blobs(blobs: &[(Vec3, f32, f32)]) -> RuntimeScene {
-    let gaussian = |(mean, deviation, opacity): &(Vec3, f32, f32)| {
-        let variance = deviation * deviation;
-        Gaussian {
-            mean: mean.to_array(),
-            mean_t: 0.5,
-            velocity: [0.0; 3],
-            sigma_t: f32::INFINITY,
-            covariance: [variance, 0.0, 0.0, variance, 0.0, variance],
-            opacity: *opacity,
-            padding: 0.0,
-        }
-    };
+    let gaussian = |&(mean, deviation, opacity): &(Vec3, f32, f32)| blob(mean, Vec3::splat(deviation), opacity);
     let harmonics = Harmonics { coefficients: 1, degree: 0, degree_t: 0, values: vec![0.0; blobs.len() * 3] };
     RuntimeScene::sliced(blobs.iter().map(gaussian).collect(), harmonics)
 }
@@ -172,78 +163,6 @@ fn parallel_rays_show_far_and_near_at_one_size() {
     }
 }
 
-/// Returns a multisampled depth that is `near / distance` left of the middle, and 0 right of it, and the middle column, where half of the
-/// samples are covered. The edge leans by `slant` pictures' widths.
-pub fn edge(context: &GpuContext, size: UVec2, near: f32, distance: f32, slant: f32) -> (wgpu::Texture, u32) {
-    let GpuContext { device, queue, .. } = context;
-    let texture = device.create_texture(&wgpu::TextureDescriptor {
-        label: None,
-        size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 4,
-        dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Depth32Float,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
-    });
-    let column = size.x / 2;
-    // The edge goes through the middle of the column's pixels.
-    let end = (column as f32 + 0.5) / size.x as f32 * 2.0 - 1.0;
-    let source = format!(
-        "@vertex fn main(@builtin(vertex_index) i: u32) -> @builtin(position) vec4<f32> {{
-            let corner = vec2(f32(i & 1u), f32(i >> 1u));
-            let y = corner.y * 2.0 - 1.0;
-            return vec4(mix(-1.0, {end:?} + {slant:?} * y, corner.x), y, {:?}, 1.0);
-        }}",
-        near / distance
-    );
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: None,
-        source: wgpu::ShaderSource::Wgsl(source.into()),
-    });
-    let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: None,
-        layout: None,
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("main"),
-            compilation_options: Default::default(),
-            buffers: &[],
-        },
-        primitive: wgpu::PrimitiveState {
-            topology: wgpu::PrimitiveTopology::TriangleStrip,
-            ..wgpu::PrimitiveState::default()
-        },
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: wgpu::TextureFormat::Depth32Float,
-            depth_write_enabled: Some(true),
-            depth_compare: Some(wgpu::CompareFunction::Always),
-            stencil: Default::default(),
-            bias: Default::default(),
-        }),
-        multisample: wgpu::MultisampleState { count: 4, ..wgpu::MultisampleState::default() },
-        fragment: None,
-        multiview_mask: None,
-        cache: None,
-    });
-    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    {
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &view,
-                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
-                stencil_ops: None,
-            }),
-            ..Default::default()
-        });
-        pass.set_pipeline(&pipeline);
-        pass.draw(0..4, 0..1);
-    }
-    queue.submit([encoder.finish()]);
-    (texture, column)
-}
-
 #[test]
 fn multisampled_surfaces_hide_a_share_of_a_pixel() {
     let Some(mut headless) = gpu::headless() else { return };
@@ -360,4 +279,19 @@ fn what_is_active_in_vain_is_red() {
     assert_eq!(middle(DebugView::Color), (Vec3::ZERO, 1.0), "at 0.9 it does not show");
     let (color, _) = middle(DebugView::Active);
     assert!(color.x > color.y * 2.0, "but it is active: {color}");
+}
+
+#[test]
+fn anti_aliased_views_are_as_the_cpu_draws_them() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let scene = scene();
+    let far = Camera::look_at(Vec3::new(9.0, 5.0, 4.0), Vec3::ZERO, Vec3::Z, 0.8, SIZE).view(0.4, RasterFov::default());
+    let trained_pixel = Some(0.3 * far.camera_position.length() / far.focal().x);
+    let shown = Appearance::default();
+    let plain = both(&mut headless, &scene, far, shown, BlendSpace::Encoded);
+    let smooth = both(&mut headless, &scene, far.antialiased(trained_pixel), shown, BlendSpace::Encoded);
+    assert_same(&smooth, "pixels three times as large as in training");
+    let covered = |frame: &Frame| frame.transmittance.iter().map(|left| 1.0 - left).sum::<f32>();
+    let (before, after) = (covered(&plain[0]), covered(&smooth[0]));
+    assert!(after < 0.95 * before, "splats are fainter: {after} pixels are covered, {before} without");
 }

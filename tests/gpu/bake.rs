@@ -3,9 +3,10 @@
 //! In: a small synthetic scene, its own pictures as a dataset. Out: proof that a bake which ends in the second attempt goes on there, and ends as
 //! another. Skipped where there is no GPU.
 
-use crate::support::{dataset, gpu};
+use crate::support::capture::Capture;
+use crate::support::gpu;
 use bevy_gs4d::codec::CodecError;
-use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::offline::Progress;
 use bevy_gs4d::offline::bake::{BakeSettings, Baked, bake};
 use bevy_gs4d::offline::engine::Engine;
 use bevy_gs4d::offline::fine_tune::FineTuneSettings;
@@ -14,44 +15,26 @@ use bevy_gs4d::offline::score::ScoringSettings;
 use bevy_gs4d::offline::score::variant::Variant;
 use bevy_gs4d::offline::search::{Goal, ScoreChoice};
 use bevy_gs4d::offline::temporal_filter::KeyFrames;
-use bevy_gs4d::offline::{self, Progress};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{FilterKind, GaussianScene};
 use glam::{UVec2, Vec3};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use tempfile::TempDir;
 
 /// What is said of a package that is too large.
 const AGAIN: &str = "again with";
 
-/// A scene in a folder, with its dataset.
-struct Capture {
-    folder: TempDir,
-    scene: GaussianScene,
+fn scene() -> GaussianScene {
+    synthesize(&SynthSettings { count: 600, degree: 0, ..SynthSettings::default() })
 }
 
 impl Capture {
-    fn new() -> Self {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let scene = synthesize(&SynthSettings { count: 600, degree: 0, ..SynthSettings::default() });
-        let file = folder.path().join("scene.gs4d");
-        offline::save(&file, &scene, &WriteSettings::default()).expect("the folder can be written to");
-        let runtime = scene.clone().into_runtime().expect("a synthetic scene can be drawn");
-        dataset::write(&folder.path().join("data"), &runtime, Vec3::ZERO, 4, 4, UVec2::splat(48), true);
-        Self { folder, scene }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    /// Bakes to 15 kB. The colors of the scene are few, so that it compresses well until they are trained: the first package is too large.
+    /// Bakes [`scene`] to 15 kB. The colors of the scene are few, so that it compresses well until they are trained: the first package is too large.
     fn bake(&self, out: &Path, engine: &mut Engine, progress: &mut Listener) -> Result<Baked, String> {
         let settings = BakeSettings {
-            checkpoint: self.path("scene.gs4d"),
-            data: self.path("data"),
+            checkpoint: self.scene.clone(),
+            data: self.data.clone(),
             out: out.to_owned(),
             resolution: None,
             background: None,
@@ -66,7 +49,7 @@ impl Capture {
             level: None,
             keep_work: false,
         };
-        bake(self.scene.clone(), &settings, engine, progress).map_err(|error| error.to_string())
+        bake(scene(), &settings, engine, progress).map_err(|error| error.to_string())
     }
 }
 
@@ -114,7 +97,8 @@ impl Progress for Listener {
 #[test]
 fn a_bake_that_ends_in_its_second_attempt_goes_on_there() {
     let Some(headless) = gpu::headless() else { return };
-    let (capture, mut engine) = (Capture::new(), Engine::Gpu(Box::new(headless)));
+    let capture = Capture::new(scene(), Vec3::ZERO, 4, 4, UVec2::splat(48), true);
+    let mut engine = Engine::Gpu(Box::new(headless));
     let [whole_out, out] = ["whole.gs4d", "ended.gs4d"].map(|name| capture.path(name));
     let mut listener = Listener::default();
     let whole = capture.bake(&whole_out, &mut engine, &mut listener).expect("it can be baked");

@@ -3,9 +3,9 @@
 //! In: scenes of many splats in few tiles. Out: proof that both designs draw the same picture, from the first frame on. Skipped where
 //! there is no GPU.
 
-use crate::appearance::edge;
-use crate::render::depth_texture;
+use crate::support::blob::blob;
 use crate::support::gpu;
+use crate::support::surfaces::{depth_texture, edge};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::renderer::{ColorPrecision, Design, Headless, Instance, OpaqueDepth, ViewParameters};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
@@ -18,15 +18,8 @@ fn crowd(count: usize, layer: usize, deviation: f32) -> RuntimeScene {
     let gaussians = (0..count).map(|index| {
         let spread = |step: usize| (index * step % 97) as f32 / 97.0 - 0.5;
         let depth = (index / layer * 37 % 101) as f32 / 101.0;
-        Gaussian {
-            mean: [0.1 * spread(31), depth, 0.1 * spread(57)],
-            mean_t: 0.0,
-            velocity: [0.0; 3],
-            sigma_t: f32::INFINITY,
-            covariance: [deviation * deviation, 0.0, 0.0, deviation * deviation, 0.0, deviation * deviation],
-            opacity: 0.012,
-            padding: 0.0,
-        }
+        let mean = Vec3::new(0.1 * spread(31), depth, 0.1 * spread(57));
+        Gaussian { mean_t: 0.0, ..blob(mean, Vec3::splat(deviation), 0.012) }
     });
     let values = (0..count).flat_map(|index| [3, 5, 7].map(|step| (index * step % 11) as f32 / 11.0)).collect();
     RuntimeScene::sliced(gaussians.collect(), Harmonics { coefficients: 1, degree: 0, degree_t: 0, values })

@@ -23,6 +23,8 @@ mod shaders;
 
 #[path = "../support"]
 mod support {
+    pub mod blob;
+    pub mod capture;
     pub mod dataset;
     pub mod golden;
     pub mod gpu;
@@ -33,4 +35,5 @@ mod support {
     pub mod packed_scene;
     pub mod passes;
     pub mod skip;
+    pub mod surfaces;
 }

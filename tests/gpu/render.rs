@@ -3,6 +3,7 @@
 //! In: synthetic scenes. Out: proof that the GPU draws what the CPU reference draws, however the scene is divided,
 //! however many pairs it has, and whatever is in front of it.
 
+use crate::support::surfaces::depth_texture;
 use crate::support::{gpu, limited_device, packed_scene};
 use bevy_gs4d::gaussian::{Gaussian, Parameters};
 use bevy_gs4d::offline::quantize::compress;
@@ -533,34 +534,6 @@ fn read_color(context: &GpuContext, view: &ViewRenderer) -> Vec<[f32; 3]> {
     context.device.poll(wgpu::PollType::wait_indefinitely()).expect("the device finishes");
     let bytes = buffer.slice(..).get_mapped_range().to_vec();
     bytes.chunks_exact(16).map(|pixel| bytemuck::pod_read_unaligned(&pixel[..12])).collect()
-}
-
-/// Returns a depth texture with the same value everywhere.
-pub fn depth_texture(context: &GpuContext, size: UVec2, value: f32) -> wgpu::TextureView {
-    let texture = context.device.create_texture(&wgpu::TextureDescriptor {
-        label: None,
-        size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::Depth32Float,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
-    });
-    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-    let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    let depth_ops = wgpu::Operations { load: wgpu::LoadOp::Clear(value), store: wgpu::StoreOp::Store };
-    // A render pass that only clears.
-    drop(encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-            view: &view,
-            depth_ops: Some(depth_ops),
-            stencil_ops: None,
-        }),
-        ..Default::default()
-    }));
-    context.queue.submit([encoder.finish()]);
-    view
 }
 
 #[test]

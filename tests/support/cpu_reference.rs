@@ -21,20 +21,6 @@ pub fn add(app: &mut App, scene: &RuntimeScene) -> Handle<GaussianCapture> {
     app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(scene.clone()))
 }
 
-/// Returns a Gaussian at rest that is always active, with its standard deviations along the axes.
-pub fn blob(mean: Vec3, deviation: Vec3, opacity: f32) -> Gaussian {
-    let variance = deviation * deviation;
-    Gaussian {
-        mean: mean.to_array(),
-        mean_t: 0.5,
-        velocity: [0.0; 3],
-        sigma_t: f32::INFINITY,
-        covariance: [variance.x, 0.0, 0.0, variance.y, 0.0, variance.z],
-        opacity,
-        padding: 0.0,
-    }
-}
-
 /// Returns a scene of Gaussians and their colours, the same from every direction.
 pub fn scene(gaussians: &[(Gaussian, Vec3)]) -> RuntimeScene {
     // The first harmonic is 0.282; one half is added to colours.
@@ -68,15 +54,20 @@ pub fn view_of(camera: &Transform, entity: &Transform, size: UVec2, time: f32) -
     View::new(size, time, plain.world_to_camera * entity.to_matrix(), plain.projection, plain.tan_fov)
 }
 
-/// Returns the largest difference of any channel of any pixel, in 255ths.
-pub fn difference(picture: &RgbaImage, expected: &Picture) -> f32 {
+/// Returns how far each pixel is from the expected one, in 255ths, in the channel where that is most.
+pub fn differences(picture: &RgbaImage, expected: &Picture) -> Vec<f32> {
     assert_eq!(UVec2::from(picture.dimensions()), expected.size, "pictures of one size");
     let expected = expected.clamped();
-    let channel = |(pixel, expected): (&image::Rgba<u8>, &Vec3)| {
+    let apart = |(pixel, expected): (&image::Rgba<u8>, &Vec3)| {
         let [r, g, b, _] = pixel.0.map(f32::from);
         (Vec3::new(r, g, b) - *expected * 255.0).abs().max_element()
     };
-    picture.pixels().zip(&expected.pixels).map(channel).fold(0.0, f32::max)
+    picture.pixels().zip(&expected.pixels).map(apart).collect()
+}
+
+/// Returns the largest difference of any channel of any pixel, in 255ths.
+pub fn difference(picture: &RgbaImage, expected: &Picture) -> f32 {
+    differences(picture, expected).into_iter().fold(0.0, f32::max)
 }
 
 /// Returns the largest difference of any channel between two pictures, in 255ths.
@@ -89,4 +80,9 @@ pub fn difference_between(a: &RgbaImage, b: &RgbaImage) -> u8 {
 pub fn rgb(picture: &RgbaImage, x: u32, y: u32) -> [u8; 3] {
     let [r, g, b, _] = picture.get_pixel(x, y).0;
     [r, g, b]
+}
+
+/// Returns the colour of a pixel, in 255ths.
+pub fn color(picture: &RgbaImage, x: u32, y: u32) -> Vec3 {
+    Vec3::from(rgb(picture, x, y).map(f32::from))
 }

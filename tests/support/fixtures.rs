@@ -3,7 +3,8 @@
 //! In: an app, scenes, components of their entities and cameras. Out: entities, and the comparison of the app's picture
 //! with that of the CPU reference, or of the renderer without Bevy.
 
-use crate::support::cpu_reference::{SIZE, add, blob, difference, scene};
+use crate::support::blob::blob;
+use crate::support::cpu_reference::{DURATION, SIZE, add, difference, scene};
 use crate::support::offscreen_app::picture;
 use bevy::camera::ScalingMode;
 use bevy::prelude::*;
@@ -12,7 +13,8 @@ use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::reference::{self, Layer};
 use bevy_gs4d::renderer::{Headless, Instance, ViewParameters};
-use bevy_gs4d::scene::RuntimeScene;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{RuntimeScene, TemporalFilter};
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, DebugView, Picture, View};
 
 /// Black behind captures.
@@ -35,6 +37,17 @@ pub fn crowd() -> RuntimeScene {
 /// Returns one Gaussian at the origin.
 pub fn lone(color: Vec3) -> RuntimeScene {
     scene(&[(blob(Vec3::ZERO, Vec3::splat(0.4), 0.98), color)])
+}
+
+/// Returns two seconds of a moving scene with +z up, with a filter of half-second segments if `filtered`.
+pub fn synthetic(count: usize, seed: u64, filtered: bool) -> RuntimeScene {
+    let settings = SynthSettings { count, seed, degree: 0, degree_t: 0, duration_seconds: DURATION };
+    let mut scene = synthesize(&settings).into_runtime().expect("synthetic scenes can be drawn");
+    if filtered {
+        let interval = scene.trained_with.time_interval;
+        scene.filter = Some(TemporalFilter::support(scene.iter(), interval, 4));
+    }
+    scene
 }
 
 /// Spawns a capture, paused at its start, with further components.

@@ -18,11 +18,20 @@ pub const FOV_Y: f32 = 0.8;
 
 /// Returns an app without a window; `None` if there is no GPU to draw with, which is reported.
 pub fn app(size: UVec2) -> Option<App> {
+    if as_shipped() { app_with(size, shipped_plugins) } else { unpipelined_app(size) }
+}
+
+/// Returns the same, never as shipped, for tests that count frames.
+pub fn unpipelined_app(size: UVec2) -> Option<App> {
+    app_with(size, |plugins| plugins)
+}
+
+fn app_with(size: UVec2, adjust: fn(PluginGroupBuilder) -> PluginGroupBuilder) -> Option<App> {
     if !testing::has_gpu() {
         no_gpu();
         return None;
     }
-    let mut app = if as_shipped() { testing::app_with(size, shipped_plugins) } else { testing::app(size) };
+    let mut app = testing::app_with(size, adjust);
     app.add_plugins(GaussianCapturePlugin).insert_resource(ClearColor(Color::BLACK));
     Some(app)
 }

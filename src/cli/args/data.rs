@@ -29,6 +29,11 @@ pub struct DataArgs {
 }
 
 impl DataArgs {
+    /// Returns whether a folder is given.
+    pub fn is_given(&self) -> bool {
+        self.data.is_some()
+    }
+
     /// Adds the files of the folder, if one is given, to those that the verb reads.
     pub fn add_to(&self, files: Files) -> Files {
         self.data.iter().fold(files, |files, folder| files.reads_data(folder))

@@ -93,6 +93,7 @@ impl CheckpointOptions {
             force_sh_3d: self.force_sh_3d.unwrap_or(default.force_sh_3d),
             prefilter_var: self.prefilter_var.or(cfg.prefilter_var).unwrap_or(default.prefilter_var),
             iteration: file.iteration,
+            pixel: default.pixel,
             spatial_lr_scale: file.spatial_lr_scale,
         }
     }

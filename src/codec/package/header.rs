@@ -270,6 +270,10 @@ impl Header {
             trained.prefilter_var.is_finite() && trained.spatial_lr_scale.is_finite(),
             "a switch of training (prefilter_var or spatial_lr_scale) that is not finite",
         )?;
+        sane(
+            trained.pixel.is_none_or(|pixel| pixel.is_finite() && pixel > 0.0),
+            "a size of the training views' pixels that is not positive and finite",
+        )?;
         sane(trained.spatial_lr_scale >= 0.0, "a switch of training (spatial_lr_scale) that is negative")?;
         sane(
             self.filter.is_none_or(|filter| (1..=MAX_SEGMENTS).contains(&filter.segments)),

@@ -28,7 +28,7 @@ use super::search::{Goal, ScoreChoice};
 use super::splits::open_split;
 use super::temporal_filter::KeyFrames;
 use super::work::{Fingerprint, Work};
-use super::{OfflineError, Progress, Subject, sliced};
+use super::{OfflineError, Progress, Subject, sliced, trained_pixel};
 use crate::scene::{FilterKind, GaussianScene};
 use stages::Stages;
 use std::path::PathBuf;
@@ -145,7 +145,9 @@ impl<'a> Bake<'a> {
         let files = Fingerprint::of_files(&[checkpoint, &cameras])?;
         let read = format!("{:?} {:?} {resolution:?}", scene.trained_with, scene.playback);
         let fingerprint = files.and(env!("CARGO_PKG_VERSION")).and(&read);
-        let subject = Subject::new(checkpoint, scene, settings.background)?;
+        let mut subject = Subject::new(checkpoint, scene, settings.background)?;
+        let pixel = trained_pixel(&subject.runtime, &views);
+        (subject.scene.trained_with.pixel, subject.runtime.trained_with.pixel) = (pixel, pixel);
         Ok(Self { settings, engine, subject, views, work, fingerprint })
     }
 

@@ -1,7 +1,7 @@
 //! Fitting: training few Gaussians to look like all of them.
 //!
 //! In: a scene in the trained form, [`Look`]s of all Gaussians. Out: the scene after some steps, over random backgrounds, so that what
-//! shows through it is trained too.
+//! shows through it is trained too. It is drawn anti-aliased, as it will be; gradients take the factor on opacity as a constant.
 
 use super::looks::Look;
 use crate::gaussian::GradientMode;
@@ -11,7 +11,7 @@ use crate::offline::{OfflineError, Progress};
 use crate::renderer::Headless;
 use crate::scene::GaussianScene;
 use crate::scene::random::Random;
-use crate::view::{Background, Frame};
+use crate::view::{Background, Frame, View};
 use glam::Vec3;
 
 /// Views of a step.
@@ -32,11 +32,13 @@ pub(super) fn fit(
     if looks.is_empty() || steps == 0 {
         return Ok(scene);
     }
+    let trained_pixel = scene.trained_with.pixel;
+    let views: Vec<View> = looks.iter().map(|look| look.view.antialiased(trained_pixel)).collect();
     let mut trainer = Trainer::new(headless, scene, GradientMode::Exact)?;
-    let images = looks.iter().map(|look| trainer.upload(&covered(&look.frame)));
+    let images = looks.iter().map(|look| trainer.upload(&covered(&look.truth)));
     let images: Vec<GpuImage> = images.collect::<Result<_, _>>()?;
-    if let Some(largest) = looks.iter().max_by_key(|look| look.view.size.x) {
-        trainer.make_room(&largest.view)?;
+    if let Some(largest) = views.iter().max_by_key(|view| view.size.x) {
+        trainer.make_room(largest)?;
     }
     progress.begin("fitting", steps);
     let mut random = Random::new(1);
@@ -45,7 +47,7 @@ pub(super) fn fit(
         for _ in 0..BATCH {
             let index = ((random.unit() * looks.len() as f32) as usize).min(looks.len() - 1);
             let background = Background::Color([random.unit(), random.unit(), random.unit()]);
-            let (view, image) = (&looks[index].view, &images[index]);
+            let (view, image) = (&views[index], &images[index]);
             batch.push(Sample { view, image, background, number: index as u32 });
         }
         // Structure, which the other part of the loss compares, is smaller than a few pixels.

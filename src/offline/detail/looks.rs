@@ -1,18 +1,23 @@
 //! Looks: a capture seen from all around at one size on the screen, to fit fewer Gaussians to and to compare them with.
 //!
-//! In: the sphere about a capture, a size in pixels, numbers of directions and times. Out: [`Look`]s with the picture of all Gaussians; how
-//! close those of fewer come.
+//! In: the sphere about a capture, a size in pixels, numbers of directions and times. Out: [`Look`]s with the truth, which is all Gaussians
+//! in a picture of many times as many pixels, and with what they look like if they are drawn at that size; how close fewer come.
 
 use crate::offline::{OfflineError, Progress};
 use crate::renderer::{GpuCapture, Headless};
-use crate::scene::{Bounds, RuntimeScene, pixels_across};
-use crate::view::{Background, Camera, Frame, RasterFov, View};
+use crate::scene::{Bounds, RuntimeScene, TrainedWith, pixels_across};
+use crate::view::{Background, Camera, Frame, Picture, RasterFov, View};
 use glam::{UVec2, Vec2, Vec3};
+use serde::Serialize;
 
 /// Distance of the cameras from the middle of the sphere, radii.
 const DISTANCE: f32 = 10.0;
 /// Pixels around the sphere.
 const MARGIN: u32 = 2;
+/// Pixels across the sphere in the pictures that the truth is made of, at least: as many as in training.
+pub(super) const FINE: f32 = 512.0;
+/// Pixels of a screen, on which a level must not be seen to change.
+const SCREEN: f64 = 1280.0 * 720.0;
 /// Black: color as it is, and what shows through it.
 const BLACK: Background = Background::Color([0.0; 3]);
 
@@ -36,10 +41,27 @@ pub(super) struct Around {
 
 /// A view, and what all Gaussians look like in it.
 pub(super) struct Look {
+    /// The view, without anti-aliasing.
     pub view: View,
-    pub frame: Frame,
+    /// All Gaussians in a finer picture: each pixel is the mean of many.
+    pub truth: Frame,
+    /// All Gaussians, drawn at this size.
+    all: Frame,
     /// The corners of the capture's rectangle in the picture, the last one outside.
     rectangle: [UVec2; 2],
+}
+
+/// How close fewer Gaussians come to all of them at one size on the screen: in the view in which each is farthest.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Closeness {
+    /// The size, pixels.
+    pub pixels: f32,
+    /// PSNR against all Gaussians, drawn at this size, of a screen of 1280x720 pixels, dB; infinite (null in JSON) for equal pictures.
+    pub screen: f64,
+    /// PSNR against the truth inside the capture's rectangle, dB.
+    pub truth: f64,
+    /// The same of all Gaussians, drawn at this size.
+    pub all: f64,
 }
 
 impl Sphere {
@@ -88,7 +110,7 @@ pub(super) fn looks(
     headless: &mut Headless,
     capture: &GpuCapture,
     sphere: &Sphere,
-    interval: [f32; 2],
+    trained_with: &TrainedWith,
     around: Around,
     sizes: &[f32],
     progress: &mut dyn Progress,
@@ -97,10 +119,13 @@ pub(super) fn looks(
     let mut all = Vec::with_capacity(sizes.len());
     for &pixels in sizes {
         let mut own = Vec::new();
-        for (direction, time) in around.all(interval) {
+        for (direction, time) in around.all(trained_with.time_interval) {
             let view = sphere.view(direction, time, pixels);
-            let frame = headless.render(capture, &view, BLACK)?;
-            own.push(Look { view, frame, rectangle: rectangle(&view, &sphere.bounds) });
+            let shown = view.antialiased(trained_with.pixel);
+            let all = headless.render(capture, &shown, BLACK)?;
+            let times = (FINE / pixels).ceil().max(1.0) as u32;
+            let fine = headless.render(capture, &View { size: shown.size * times, ..shown }, BLACK)?;
+            own.push(Look { view, truth: shrunk(&fine, times), all, rectangle: rectangle(&view, &sphere.bounds) });
         }
         all.push(own);
         progress.advance();
@@ -109,34 +134,64 @@ pub(super) fn looks(
     Ok(all)
 }
 
-/// Returns the lowest PSNR of a capture in these views against all Gaussians, dB: inside the rectangle of the capture, over black or over
-/// white, whichever is lower.
-pub(super) fn worst_psnr(headless: &mut Headless, capture: &GpuCapture, looks: &[Look]) -> Result<f64, OfflineError> {
-    let mut worst = f64::INFINITY;
-    for look in looks {
-        let frame = headless.render(capture, &look.view, BLACK)?;
-        for behind in [0.0, 1.0] {
-            worst = worst.min(psnr_over(&look.frame, &frame, look.rectangle, behind));
+/// Returns a frame of which each pixel is the mean of `times` x `times` pixels.
+fn shrunk(fine: &Frame, times: u32) -> Frame {
+    let (size, width) = (fine.picture.size / times, fine.picture.size.x);
+    let (mut pixels, mut transmittance) = (Vec::new(), Vec::new());
+    let share = 1.0 / (times * times) as f32;
+    for (y, x) in (0..size.y).flat_map(|y| (0..size.x).map(move |x| (y, x))) {
+        let (mut color, mut left) = (Vec3::ZERO, 0.0);
+        for row in 0..times {
+            let first = ((y * times + row) * width + x * times) as usize;
+            let own = first..first + times as usize;
+            color += fine.picture.pixels[own.clone()].iter().sum::<Vec3>();
+            left += fine.transmittance[own].iter().sum::<f32>();
         }
+        pixels.push(color * share);
+        transmittance.push(left * share);
     }
-    Ok(worst)
+    let picture = Picture { size, pixels };
+    Frame { picture, transmittance, depth: Vec::new(), median_depth: Vec::new(), counts: fine.counts }
 }
 
-/// Returns the PSNR of two frames over a grey background inside a rectangle, values clamped to 0..1.
-fn psnr_over(a: &Frame, b: &Frame, [low, high]: [UVec2; 2], behind: f32) -> f64 {
+/// Returns how close a level comes to all Gaussians in views of one size. `trained_pixel` is that of the level.
+pub(super) fn closeness(
+    headless: &mut Headless,
+    level: &GpuCapture,
+    trained_pixel: Option<f32>,
+    pixels: f32,
+    looks: &[Look],
+) -> Result<Closeness, OfflineError> {
+    let farthest = f64::INFINITY;
+    let mut close = Closeness { pixels, screen: farthest, truth: farthest, all: farthest };
+    for look in looks {
+        let frame = headless.render(level, &look.view.antialiased(trained_pixel), BLACK)?;
+        let inside = (look.rectangle[1] - look.rectangle[0]).as_dvec2();
+        let psnr = |error: f64| -10.0 * error.log10();
+        let between = |a, b| square_error(a, b, look.rectangle);
+        let share = inside.x * inside.y / SCREEN;
+        close.screen = close.screen.min(psnr(between(&look.all, &frame) * share));
+        close.truth = close.truth.min(psnr(between(&look.truth, &frame)));
+        close.all = close.all.min(psnr(between(&look.truth, &look.all)));
+    }
+    Ok(close)
+}
+
+/// Returns the mean square error between two frames inside a rectangle, over black or over white, whichever is larger; values are clamped
+/// to 0..1.
+fn square_error(a: &Frame, b: &Frame, [low, high]: [UVec2; 2]) -> f64 {
     let width = a.picture.size.x;
-    let over = |frame: &Frame, at: usize| {
+    let over = |frame: &Frame, at: usize, behind: f32| {
         (frame.picture.pixels[at] + frame.transmittance[at] * behind).clamp(Vec3::ZERO, Vec3::ONE)
     };
-    let (mut squares, mut count) = (0.0, 0u32);
-    for y in low.y..high.y {
-        for x in low.x..high.x {
-            let at = (y * width + x) as usize;
-            squares += f64::from((over(a, at) - over(b, at)).length_squared());
-            count += 3;
+    let (mut squares, mut count) = ([0.0; 2], 0u32);
+    for at in (low.y..high.y).flat_map(|y| (low.x..high.x).map(move |x| (y * width + x) as usize)) {
+        for (sum, behind) in squares.iter_mut().zip([0.0, 1.0]) {
+            *sum += f64::from((over(a, at, behind) - over(b, at, behind)).length_squared());
         }
+        count += 3;
     }
-    -10.0 * (squares / f64::from(count.max(1))).log10()
+    squares[0].max(squares[1]) / f64::from(count.max(1))
 }
 
 /// Returns the rectangle of a box in a view: its corner, and the corner beyond it, at least one pixel apart.
@@ -174,6 +229,20 @@ mod tests {
             let focal = view.focal().x;
             assert!((pixels_across(sphere.radius, distance, focal) - pixels).abs() < 1e-3 * pixels, "{pixels} pixels");
         }
+    }
+
+    #[test]
+    fn a_shrunk_frame_is_the_mean_of_its_pixels() {
+        let size = UVec2::new(4, 2);
+        let pixels: Vec<Vec3> = (0..8).map(|at| Vec3::splat(at as f32)).collect();
+        let transmittance = vec![0.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0];
+        let counts = crate::view::Counts::default();
+        let picture = Picture { size, pixels };
+        let fine = Frame { picture, transmittance, depth: Vec::new(), median_depth: Vec::new(), counts };
+        let small = shrunk(&fine, 2);
+        assert_eq!(small.picture.size, UVec2::new(2, 1), "half of each side");
+        assert_eq!(small.picture.pixels, [Vec3::splat(2.5), Vec3::splat(4.5)], "means of four");
+        assert_eq!(small.transmittance, [0.5, 1.0], "of what shows through, too");
     }
 
     #[test]

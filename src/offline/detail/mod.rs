@@ -1,12 +1,15 @@
 //! Levels of detail: the same capture of fewer Gaussians, for pictures of few pixels.
 //!
-//! In: a scene, [`DetailSettings`]. Out: the scene with levels ([`Detailed`]), each with the size on the screen up to which no view of it
-//! is farther from all Gaussians than the settings allow.
+//! In: a scene, [`DetailSettings`]. Out: the scene with levels ([`Detailed`]), each with the size on the screen up to which it is drawn.
 //!
 //! 1. `merge` puts few Gaussians in place of many, with their moments in space and time; `rotation` makes raw parameters of these.
-//! 2. `fit` trains them on pictures of all Gaussians at the sizes for which they are meant. That matters: each splat is blurred to at least
-//!    half a pixel without becoming fainter, as in the original, so that many small ones together look larger and denser than they are.
-//! 3. `looks` compares them with all Gaussians, in other views, at one size after the other. A level that is close enough at none is not kept.
+//! 2. `fit` trains them on the truth at the sizes for which they are meant: on pictures of all Gaussians with many times as many pixels,
+//!    made smaller. All Gaussians drawn at such a size are far from that: each splat is blurred to at least half a pixel, as in the
+//!    original, so that many small ones look larger and denser than they are, and, made fainter for it ([anti-aliased]), thinner.
+//! 3. `looks` compares them in other views, at one size after the other. A level is drawn up to the size at which it is still as close to
+//!    the truth as all Gaussians are, and a screen on which it takes their place hardly changes. A level without such a size is not kept.
+//!
+//! [anti-aliased]: crate::view::View::antialiased
 
 mod fit;
 mod looks;
@@ -18,19 +21,24 @@ use super::{OfflineError, Progress};
 use crate::renderer::Headless;
 use crate::scene::{Form, GaussianScene, Level, MAX_LEVELS, RuntimeScene, SceneForm, Sliced, TrainedWith};
 use fit::fit;
-use looks::{Around, Look, Sphere, looks, worst_psnr};
+pub use looks::Closeness;
+use looks::{Around, FINE, Look, Sphere, closeness, looks};
 use merge::merge;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// Sizes on the screen at which levels are compared, pixels: each about 1.4 times the one before.
-const SIZES: [f32; 14] = [4.0, 6.0, 8.0, 11.0, 16.0, 23.0, 32.0, 45.0, 64.0, 91.0, 128.0, 181.0, 256.0, 362.0];
+/// Sizes on the screen at which levels are compared, pixels: each about a quarter more than the one before.
+const SIZES: [f32; 19] = [
+    4.0, 5.0, 6.3, 8.0, 10.0, 12.5, 16.0, 20.0, 25.0, 32.0, 40.0, 50.0, 63.0, 80.0, 100.0, 125.0, 160.0, 200.0, 250.0,
+];
 /// How many times fewer Gaussians a level has than the one before.
 const COARSER: usize = 7;
 /// Gaussians for each square pixel of the size that a level is meant for.
-const DENSITY: f32 = 10.0;
+const DENSITY: f32 = 0.5;
 /// Sizes that a level is trained at, parts of the one that it is meant for.
 const TRAINED_AT: [f32; 3] = [1.0, 0.7, 0.5];
+/// How many sizes below its limit a level must hold at, too. Below these it is the next level that is drawn.
+const SMALLER: usize = 2;
 /// Fewest Gaussians of a level.
 const FEWEST: usize = 8;
 
@@ -39,7 +47,7 @@ const FEWEST: usize = 8;
 pub struct DetailSettings {
     /// Levels to make, at most [`MAX_LEVELS`]; each has a seventh of the Gaussians of the one before. Default: 3.
     pub levels: usize,
-    /// Lowest PSNR of a view against all Gaussians, dB. Default: 45.
+    /// Lowest PSNR of a screen of 1280x720 pixels on which a level takes the place of all Gaussians, dB. Default: 45.
     pub min_psnr: f64,
     /// Steps of training of each level; 0 leaves it as it was merged. Default: 2000.
     pub steps: usize,
@@ -62,8 +70,8 @@ pub struct MadeLevel {
     pub gaussians: usize,
     /// The largest size on the screen at which it is drawn, pixels; `None` if it is not kept.
     pub pixels: Option<f32>,
-    /// The sizes at which it was compared, pixels, with the lowest PSNR of a view, dB; infinite (null in JSON) for equal pictures.
-    pub psnr: Vec<(f32, f64)>,
+    /// How close it is at each size.
+    pub measured: Vec<Closeness>,
 }
 
 /// A scene with levels of detail.
@@ -144,8 +152,7 @@ impl Maker<'_> {
         let DetailSettings { directions, times, .. } = *self.settings;
         let around = Around { directions: directions.max(1), times: times.max(1), shift };
         let capture = self.headless.upload(&self.full)?;
-        let interval = self.full.trained_with.time_interval;
-        looks(self.headless, &capture, &self.sphere, interval, around, sizes, progress)
+        looks(self.headless, &capture, &self.sphere, &self.full.trained_with, around, sizes, progress)
     }
 
     /// Makes a level of at most `count` Gaussians, and keeps it if it is close enough at some size.
@@ -166,37 +173,37 @@ impl Maker<'_> {
             environment: None,
             filter: None,
             // The temporal deviations that were merged contain the prefilter.
-            trained_with: TrainedWith { prefilter_var: -1.0, spatial_lr_scale: radius.into(), ..trained.clone() },
+            trained_with: TrainedWith {
+                prefilter_var: -1.0,
+                spatial_lr_scale: radius.into(),
+                // Anti-aliased in any case: levels are drawn where pixels are large.
+                pixel: Some(trained.pixel.unwrap_or(2.0 * radius / FINE)),
+                ..trained.clone()
+            },
             playback: self.full.playback,
             levels: Vec::new(),
         };
         if start.is_empty() {
-            return Ok(MadeLevel { gaussians: 0, pixels: None, psnr: Vec::new() });
+            return Ok(MadeLevel { gaussians: 0, pixels: None, measured: Vec::new() });
         }
         let sizes = TRAINED_AT.map(|part| (pixels * part).max(SIZES[0]));
         let shown: Vec<Look> = self.looks(&sizes, 0.0, progress)?.into_iter().flatten().collect();
         let fitted = fit(self.headless, start, &shown, self.settings.steps, progress)?.into_runtime()?;
         let level = self.stored(fitted)?;
         let capture = self.headless.upload(&level)?;
-        let mut psnr = Vec::new();
-        let mut largest = None;
+        let mut measured = Vec::new();
         for (&pixels, looks) in SIZES.iter().zip(compared) {
-            let worst = worst_psnr(self.headless, &capture, looks)?;
-            psnr.push((pixels, worst));
-            // NaN is not close.
-            if worst < self.settings.min_psnr || worst.is_nan() {
-                break;
-            }
-            largest = Some(pixels);
+            measured.push(closeness(self.headless, &capture, level.trained_with.pixel, pixels, looks)?);
         }
-        progress.note(&describe(level.len(), largest, &psnr));
+        let largest = largest(&measured, self.settings.min_psnr);
         let gaussians = level.len();
-        if let Some(pixels) = largest {
+        progress.note(&describe(gaussians, largest));
+        if let Some(Closeness { pixels, .. }) = largest {
             // A finer level that is drawn no longer than this one is of no use.
             self.levels.retain(|finer| finer.pixels > pixels);
             self.levels.push(Level { pixels, scene: Arc::new(level) });
         }
-        Ok(MadeLevel { gaussians, pixels: largest, psnr })
+        Ok(MadeLevel { gaussians, pixels: largest.map(|close| close.pixels), measured })
     }
 
     /// Returns a level in the form that is stored: packed if all Gaussians are.
@@ -211,11 +218,38 @@ impl Maker<'_> {
     }
 }
 
+/// Returns the largest size at which a level may be drawn: it holds there, and at the next smaller sizes. `None` if there is none.
+fn largest(measured: &[Closeness], min_psnr: f64) -> Option<Closeness> {
+    // NaN is not close.
+    let holds = |close: &Closeness| close.screen >= min_psnr && close.truth >= close.all;
+    let held = |&last: &usize| measured[last.saturating_sub(SMALLER)..=last].iter().all(holds);
+    (0..measured.len()).rev().find(held).map(|last| measured[last])
+}
+
 /// Returns a line about a level.
-fn describe(gaussians: usize, largest: Option<f32>, psnr: &[(f32, f64)]) -> String {
-    let last = psnr.last().map_or(String::new(), |(pixels, worst)| format!("; {worst:.1} dB at {pixels} pixels"));
+fn describe(gaussians: usize, largest: Option<Closeness>) -> String {
     match largest {
-        Some(pixels) => format!("{gaussians} Gaussians: up to {pixels} pixels{last}"),
-        None => format!("{gaussians} Gaussians: not close enough at any size{last}"),
+        Some(Closeness { pixels, screen, truth, all }) => format!(
+            "{gaussians} Gaussians: up to {pixels} pixels; there {screen:.1} dB on a screen, {truth:.1} dB to the truth (all: {all:.1} dB)"
+        ),
+        None => format!("{gaussians} Gaussians: not close enough at any size"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_level_holds_at_smaller_sizes_too() {
+        let close = |pixels, screen, truth, all| Closeness { pixels, screen, truth, all };
+        let good = |pixels| close(pixels, 50.0, 30.0, 20.0);
+        let limit = |measured: &[Closeness]| largest(measured, 45.0).map(|close| close.pixels);
+        assert_eq!(limit(&[good(4.0), good(6.0), close(8.0, 44.0, 30.0, 20.0)]), Some(6.0), "the screen changes");
+        assert_eq!(limit(&[good(4.0), good(6.0), close(8.0, 50.0, 19.0, 20.0)]), Some(6.0), "all are closer to the truth");
+        let gap = [good(4.0), close(6.0, 50.0, 19.0, 20.0), good(8.0), good(11.0), good(16.0), good(23.0)];
+        assert_eq!(limit(&gap), Some(23.0), "smaller sizes are those of other levels");
+        assert_eq!(limit(&gap[..4]), Some(4.0), "but not the next two");
+        assert_eq!(limit(&[close(4.0, f64::NAN, 1.0, 0.0)]), None, "no number is not close");
     }
 }

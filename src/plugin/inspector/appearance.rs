@@ -26,8 +26,8 @@ pub(super) fn show(ui: &mut egui::Ui, settings: CaptureSettings, bounds: Option<
         }
         ui.label("tint");
         if ui.button("as trained").clicked() {
-            let CaptureSettings { filter, crop, finest_level, .. } = edited;
-            edited = CaptureSettings { filter, crop, finest_level, ..CaptureSettings::default() };
+            let CaptureSettings { filter, crop, finest_level, antialias, .. } = edited;
+            edited = CaptureSettings { filter, crop, finest_level, antialias, ..CaptureSettings::default() };
         }
     });
     let mut cropped = edited.crop.is_some();
@@ -72,6 +72,7 @@ mod tests {
             exposure: -20.123_4,
             crop: Some(crop),
             finest_level: 3,
+            antialias: false,
         };
         let context = egui::Context::default();
         for settings in [CaptureSettings::default(), odd] {

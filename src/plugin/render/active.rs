@@ -48,8 +48,9 @@ pub(super) fn prepare_active_lists(
         uploaded.is_some_and(|capture| placed.list.is_for(capture))
     });
     for (entity, shown) in &extracted.0 {
-        // Levels of detail have no filter.
-        if !(shown.seen && shown.filtered) || shown.is_faded_out() || levels.is_coarse(entity) {
+        // Levels of detail have no filter. Lights are shown all Gaussians, whatever cameras see.
+        let is_coarse = levels.is_coarse(entity) && !shown.casts;
+        if !(shown.seen && shown.filtered) || shown.is_faded_out() || is_coarse {
             continue;
         }
         let Some(uploaded) = captures.get(shown.asset) else { continue };

@@ -36,10 +36,14 @@ pub(crate) struct ExtractedCapture {
     /// Whether its temporal filter is used.
     pub(crate) filtered: bool,
     pub(crate) appearance: Appearance,
+    /// Whether its Gaussians are made fainter where it is smaller than in training.
+    pub(super) antialias: bool,
     /// The finest level of detail that is drawn.
-    pub(super) finest_level: u8,
+    pub(crate) finest_level: u8,
     /// Whether any camera sees it, or may see what it does to lights.
     pub(crate) seen: bool,
+    /// Whether lights see it.
+    pub(crate) casts: bool,
 }
 
 impl ExtractedCapture {
@@ -80,9 +84,11 @@ pub(crate) fn extract_captures(
             center: bounds.map_or(transform.translation(), center),
             seconds: playback.time,
             filtered: settings.filter,
+            antialias: settings.antialias,
             appearance: settings.appearance(fade.copied().unwrap_or_default().0),
             finest_level: settings.finest_level,
             seen: visibility.get(),
+            casts: false,
         };
         extracted.0.insert(entity.into(), placed);
     }

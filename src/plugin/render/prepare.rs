@@ -75,10 +75,12 @@ impl Scene<'_> {
         let Some(visible) = visible.get::<GaussianCapture3d>() else { return };
         drawn.extend(visible.iter_visible().filter_map(|(_, entity)| {
             let placed = self.extracted.0.get(entity).filter(|placed| !placed.is_faded_out())?;
-            let time = self.captures.get(placed.asset)?.time_at(placed.seconds)?;
-            let view = lens.view(size, time, camera, placed.world_from_capture)?;
-            let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
+            let capture = self.captures.get(placed.asset)?;
+            let time = capture.time_at(placed.seconds)?;
             let level = self.levels.of(viewer, *entity);
+            let trained_pixel = if placed.antialias { capture.trained_pixel(level) } else { None };
+            let view = lens.view(size, time, camera, placed.world_from_capture)?.antialiased(trained_pixel);
+            let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
             Some(Drawn { entity: *entity, asset, view, appearance, filtered, level })
         }));
     }

@@ -46,6 +46,10 @@ pub struct CaptureSettings {
     /// The finest level of detail that is drawn, if the capture has levels: 1 is the first one made of fewer Gaussians; more than there are
     /// is the coarsest. Default: 0, all Gaussians where the capture is large on the screen.
     pub finest_level: u8,
+    /// Whether Gaussians are made fainter where the capture is smaller on the screen than in training, so that they cover no more than they
+    /// did; without it, what is far away grows fat. Needs the size of training pixels, which `gs4d bake` and `gs4d detail --data` write
+    /// into the package; other captures are drawn without it, as are shadows. Default: true.
+    pub antialias: bool,
 }
 
 /// A box in capture space, in capture units: Gaussians whose means are outside at the current time are not drawn.
@@ -138,7 +142,8 @@ pub enum DepthWrite {
 
 impl Default for CaptureSettings {
     fn default() -> Self {
-        Self { filter: true, opacity: 1.0, tint: LinearRgba::WHITE, exposure: 0.0, crop: None, finest_level: 0 }
+        let tint = LinearRgba::WHITE;
+        Self { filter: true, opacity: 1.0, tint, exposure: 0.0, crop: None, finest_level: 0, antialias: true }
     }
 }
 

@@ -97,6 +97,19 @@ impl GpuGaussianCapture {
         (!levels.is_empty()).then_some((levels, source.bounds()?))
     }
 
+    /// Returns the index of the coarsest level of detail; 0 is all Gaussians.
+    #[cfg(feature = "pbr")]
+    pub(crate) fn coarsest(&self) -> usize {
+        self.shown.as_ref().map_or(0, |shown| shown.levels.len().saturating_sub(1))
+    }
+
+    /// Returns the size of the pixels that a level of detail was trained with, capture units; `None` if it is not known.
+    pub(super) fn trained_pixel(&self, level: usize) -> Option<f32> {
+        let scene = self.shown.as_ref()?.source.scene();
+        let level = level.checked_sub(1).and_then(|index| scene.levels.get(index));
+        level.map_or(&scene.trained_with, |level| &level.scene.trained_with).pixel
+    }
+
     /// Returns the bytes of its buffers.
     pub(super) fn bytes(&self) -> u64 {
         self.shown.iter().flat_map(|shown| &shown.levels).map(GpuCapture::bytes).sum()

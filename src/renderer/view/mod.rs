@@ -5,6 +5,7 @@
 //! [`ViewRenderer::record`] records the frame.
 
 mod bins;
+mod design;
 mod fast;
 mod motion;
 mod parameters;
@@ -21,10 +22,11 @@ use super::timing::{PassTime, PassTimer};
 use super::{GpuError, ViewStatistics, layout};
 use crate::view::{Appearance, Background, View, tiles};
 use bins::BinRoom;
+pub use design::Design;
 use glam::UVec2;
 use layout::{BLOCK, Counters, DEPTH_STEPS};
 use motion::MotionResources;
-pub use parameters::{Design, Instance, OpaqueDepth, ViewParameters};
+pub use parameters::{Instance, OpaqueDepth, ViewParameters};
 use readback::Readback;
 pub use resources::PassBuffers;
 use resources::Resources;

@@ -1,10 +1,9 @@
 //! What a frame of a view is drawn from, besides the working state of the view.
 //!
 //! In: what the host knows of captures, cameras and surfaces. Out: [`Instance`]s and [`ViewParameters`] for
-//! [`ViewRenderer::prepare`](super::ViewRenderer::prepare), and the [`Design`] that draws them.
+//! [`ViewRenderer::prepare`](super::ViewRenderer::prepare).
 
 use crate::renderer::shaders::{Blending, ColorPrecision};
-use crate::renderer::timing::{MOTION_PASSES, TIMED_FAST_PASSES, TIMED_PASSES};
 use crate::renderer::{ActiveList, GpuCapture};
 use crate::view::{Appearance, Background, BlendSpace, DebugView, View};
 use glam::UVec2;
@@ -80,32 +79,4 @@ pub struct OpaqueDepth<'a> {
     /// From its depth `d` to camera space, `[a, b, c, e]` in `z = (a + b d) / (c + e d)`. Reverse-z with an infinite far plane is
     /// `[near, 0, 0, 1]`.
     pub distance: [f32; 4],
-}
-
-/// How a view is drawn. All draw the same picture.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
-pub enum Design {
-    /// [`Fast`](Self::Fast), but [`Reference`](Self::Reference) on software drivers, where it is faster, and in browsers, where the fast
-    /// design is untried.
-    #[default]
-    Auto,
-    /// Bins of splats, each sorted by one workgroup.
-    Fast,
-    /// Global sorts by depth and by tile, in the order of the original rasterizer.
-    Reference,
-}
-
-impl Design {
-    /// All designs, by name.
-    pub const NAMES: [(&'static str, Self); 3] =
-        [("auto", Self::Auto), ("fast", Self::Fast), ("reference", Self::Reference)];
-
-    /// Returns the names of the passes that are timed, in frames with motions or without.
-    pub(in crate::renderer) fn timed_passes(self, motions: bool) -> &'static [&'static str] {
-        let all = match self {
-            Self::Auto | Self::Fast => TIMED_FAST_PASSES,
-            Self::Reference => TIMED_PASSES,
-        };
-        if motions { all } else { &all[..all.len() - MOTION_PASSES] }
-    }
 }

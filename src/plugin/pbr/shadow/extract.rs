@@ -60,7 +60,7 @@ pub(super) fn extract_casters(
             (bounds.min.is_finite() && bounds.max.is_finite()).then(|| Aabb::from_min_max(bounds.min, bounds.max))
         };
         let Some(bounds) = bounds.copied().or_else(known) else { continue };
-        placed.seen = true;
+        (placed.seen, placed.casts) = (true, true);
         casters.0.push(Caster {
             entity,
             settings: *settings,

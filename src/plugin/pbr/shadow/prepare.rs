@@ -59,10 +59,12 @@ impl Casters<'_> {
     /// Returns what is drawn of one; `None` if nothing is.
     fn drawn(&self, caster: &Caster, lens: &LightLens, size: UVec2) -> Option<Drawn> {
         let placed = self.extracted.0.get(&caster.entity)?;
-        let time = self.captures.get(placed.asset)?.time_at(placed.seconds)?;
+        let capture = self.captures.get(placed.asset)?;
+        let time = capture.time_at(placed.seconds)?;
         let view = lens.view(size, time, &caster.bounds, caster.world_from_capture, caster.settings.bias)?;
         let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
-        Some(Drawn { entity: caster.entity, asset, view, appearance, filtered, level: 0 })
+        let level = usize::from(placed.finest_level).min(capture.coarsest());
+        Some(Drawn { entity: caster.entity, asset, view, appearance, filtered, level })
     }
 }
 

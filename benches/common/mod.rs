@@ -1,0 +1,134 @@
+//! Shared by the benchmarks that measure whole apps: their command line, apps that run as games do, and the rounds of measurements.
+//!
+//! In: `[CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N]` and the options of one benchmark; apps. Out: [`Arguments`], and the
+//! [`Times`] of each app's frame.
+
+use bevy::app::PluginGroupBuilder;
+use bevy::log::LogPlugin;
+use bevy::prelude::*;
+use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
+use bevy::render::renderer::RenderDevice;
+use bevy::time::TimeUpdateStrategy;
+use bevy_gs4d::testing;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// A GPU that was idle runs slowly for a while.
+const WARM_UP: Duration = Duration::from_millis(600);
+
+/// The arguments of a benchmark, or its defaults.
+pub struct Arguments {
+    pub capture: PathBuf,
+    pub size: UVec2,
+    /// For each measurement.
+    pub frames: u32,
+    pub rounds: usize,
+}
+
+/// Milliseconds of an app's frame.
+pub struct Times {
+    /// Of the rounds.
+    pub median: f64,
+    /// The shortest and the longest round.
+    pub spread: String,
+}
+
+/// Reads the command line; `size` and `frames` are defaults. `more` is called with each option that not all benchmarks have and with what
+/// returns its value, and returns whether it is an option of this benchmark.
+///
+/// # Errors
+/// An unknown option, an option without its value or with a wrong one.
+pub fn parse(
+    size: UVec2,
+    frames: u32,
+    mut more: impl FnMut(&str, &mut dyn FnMut() -> Result<String, String>) -> Result<bool>,
+) -> Result<Arguments> {
+    let capture = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/toybox.gs4d").into();
+    let mut parsed = Arguments { capture, size, frames, rounds: 3 };
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
+        match argument.as_str() {
+            "--size" => parsed.size = numbers(&value()?, 'x').map(UVec2::from).ok_or("--size: not like 640x480")?,
+            "--frames" => parsed.frames = value()?.parse().map_err(|_| "--frames: not a number")?,
+            "--rounds" => parsed.rounds = value()?.parse().map_err(|_| "--rounds: not a number")?,
+            // Cargo passes this one.
+            "--bench" => {}
+            option if option.starts_with('-') => {
+                if !more(option, &mut value)? {
+                    return Err(format!("{option}: no such option").into());
+                }
+            }
+            file => parsed.capture = file.into(),
+        }
+    }
+    Ok(parsed)
+}
+
+/// Returns exactly `N` numbers between separators.
+pub fn numbers<T: std::str::FromStr, const N: usize>(text: &str, separator: char) -> Option<[T; N]> {
+    let parts: Vec<T> = text.split(separator).map(|part| part.parse().ok()).collect::<Option<_>>()?;
+    parts.try_into().ok()
+}
+
+/// Returns an app without a window whose rendering is pipelined. Bevy has one logger for all apps: `logged` says whether there is one.
+pub fn app(size: UVec2, logged: bool, adjust: impl FnOnce(PluginGroupBuilder) -> PluginGroupBuilder) -> App {
+    testing::app_with(size, |plugins| {
+        let plugins = adjust(plugins).enable::<PipelinedRenderingPlugin>();
+        if logged { plugins.disable::<LogPlugin>() } else { plugins }
+    })
+}
+
+/// Waits until everything is loaded. From then on a frame is a 60th of a second, however long it takes.
+///
+/// # Errors
+/// Those of [`testing::settle`].
+pub fn start(app: &mut App) -> Result {
+    testing::settle(app)?;
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / 60.0)));
+    Ok(())
+}
+
+/// Measures the frames of all apps, which take turns in each round.
+///
+/// # Errors
+/// An app stops, or the GPU is lost.
+pub fn measure(apps: &mut [App], arguments: &Arguments) -> Result<Vec<Times>> {
+    let mut measured: Vec<Vec<f64>> = vec![Vec::new(); apps.len()];
+    for _ in 0..arguments.rounds {
+        for (app, times) in apps.iter_mut().zip(&mut measured) {
+            let began = Instant::now();
+            while began.elapsed() < WARM_UP {
+                run(app, 10)?;
+            }
+            let took = run(app, arguments.frames)?;
+            times.push(took.as_secs_f64() * 1e3 / f64::from(arguments.frames));
+        }
+    }
+    Ok(measured.into_iter().map(Times::of).collect())
+}
+
+impl Times {
+    fn of(mut rounds: Vec<f64>) -> Self {
+        rounds.sort_by(f64::total_cmp);
+        let spread = rounds.first().zip(rounds.last());
+        Self {
+            median: rounds.get(rounds.len() / 2).copied().unwrap_or(f64::NAN),
+            spread: spread.map_or(String::new(), |(low, high)| format!("{low:.3} - {high:.3}")),
+        }
+    }
+}
+
+/// Runs the app for a number of frames, and returns the time until the GPU has finished them.
+fn run(app: &mut App, frames: u32) -> Result<Duration> {
+    let device = app.world().resource::<RenderDevice>().clone();
+    let began = Instant::now();
+    for _ in 0..frames {
+        app.update();
+        if app.should_exit().is_some() {
+            return Err("the app stopped".into());
+        }
+    }
+    device.wgpu_device().poll(wgpu::PollType::wait_indefinitely())?;
+    Ok(began.elapsed())
+}

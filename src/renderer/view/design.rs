@@ -1,0 +1,33 @@
+//! Designs: the ways in which a view is drawn.
+//!
+//! In: nothing. Out: [`Design`], its names, and the passes of each that are timed.
+
+use crate::renderer::timing::{MOTION_PASSES, TIMED_FAST_PASSES, TIMED_PASSES};
+
+/// How a view is drawn. All draw the same picture.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
+pub enum Design {
+    /// [`Fast`](Self::Fast), but [`Reference`](Self::Reference) on software drivers, where it is faster, and in browsers, where the fast
+    /// design is untried.
+    #[default]
+    Auto,
+    /// Bins of splats, each sorted by one workgroup.
+    Fast,
+    /// Global sorts by depth and by tile, in the order of the original rasterizer.
+    Reference,
+}
+
+impl Design {
+    /// All designs, by name.
+    pub const NAMES: [(&'static str, Self); 3] =
+        [("auto", Self::Auto), ("fast", Self::Fast), ("reference", Self::Reference)];
+
+    /// Returns the names of the passes that are timed, in frames with motions or without.
+    pub(in crate::renderer) fn timed_passes(self, motions: bool) -> &'static [&'static str] {
+        let all = match self {
+            Self::Auto | Self::Fast => TIMED_FAST_PASSES,
+            Self::Reference => TIMED_PASSES,
+        };
+        if motions { all } else { &all[..all.len() - MOTION_PASSES] }
+    }
+}

@@ -1,0 +1,75 @@
+//! Anti-aliasing: views with larger pixels than training had.
+//!
+//! In: a disk of many small Gaussians, drawn by the CPU reference small, and large and made smaller. Out: proof that small pictures come far
+//! closer to the truth with anti-aliasing, and that in views like those of training it changes nothing.
+
+use crate::support::blob::blob;
+use bevy_gs4d::gaussian::Harmonics;
+use bevy_gs4d::reference::render;
+use bevy_gs4d::scene::RuntimeScene;
+use bevy_gs4d::view::{Background, Camera, Frame, RasterFov, View};
+use glam::{UVec2, Vec3};
+
+const BLACK: Background = Background::Color([0.0; 3]);
+/// Times that the side of a far picture is larger in the near one.
+const TIMES: u32 = 8;
+/// Distance of the camera, units; a near picture of 256 pixels is 0.1 of it wide.
+const DISTANCE: f32 = 40.0;
+/// Size of a pixel of the near picture, units.
+const PIXEL: f32 = 0.1 * DISTANCE / 256.0;
+
+/// Returns a disk of a radius of one unit, in rings, with gaps between its Gaussians: about a pixel of the near picture each.
+fn disk() -> RuntimeScene {
+    let mut gaussians = Vec::new();
+    for ring in 0..16 {
+        let radius = ring as f32 / 16.0;
+        let count = 1 + ring * 6;
+        for place in 0..count {
+            let angle = std::f32::consts::TAU * place as f32 / count as f32;
+            let mean = Vec3::new(radius * angle.cos(), radius * angle.sin(), 0.0);
+            gaussians.push(blob(mean, Vec3::splat(0.02), 0.8));
+        }
+    }
+    let values = vec![0.5; gaussians.len() * 3];
+    RuntimeScene::sliced(gaussians, Harmonics { coefficients: 1, degree: 0, degree_t: 0, values })
+}
+
+fn view(side: u32) -> View {
+    let eye = Vec3::new(0.0, 0.0, DISTANCE);
+    Camera::look_at(eye, Vec3::ZERO, Vec3::Y, 2.0 * 0.05f32.atan(), UVec2::splat(side)).view(0.5, RasterFov::Corrected)
+}
+
+/// Returns the mean square difference of a far picture from the means of the pixels of a near one.
+fn error(far: &Frame, near: &Frame) -> f32 {
+    let (side, wide) = (far.picture.size.x, near.picture.size.x);
+    let mut sum = 0.0;
+    for at in 0..side * side {
+        let corner = UVec2::new(at % side, at / side) * TIMES;
+        let within = (0..TIMES * TIMES).map(|k| (corner.y + k / TIMES) * wide + corner.x + k % TIMES);
+        let mean: Vec3 = within.map(|pixel| near.picture.pixels[pixel as usize]).sum::<Vec3>() / (TIMES * TIMES) as f32;
+        sum += (far.picture.pixels[at as usize] - mean).length_squared();
+    }
+    sum / (side * side) as f32
+}
+
+#[test]
+fn far_pictures_come_closer_to_the_truth() {
+    let disk = disk();
+    let near = render(&disk, &view(256), BLACK);
+    let far = view(256 / TIMES);
+    let [plain, smooth] = [far, far.antialiased(Some(PIXEL))].map(|view| error(&render(&disk, &view, BLACK), &near));
+    // 10 dB.
+    assert!(smooth < 0.1 * plain, "mean square error {smooth} with, {plain} without anti-aliasing");
+}
+
+#[test]
+fn views_like_those_of_training_stay_as_they_are() {
+    let disk = disk();
+    for side in [256, 512] {
+        let view = view(side);
+        let [plain, smooth] =
+            [view, view.antialiased(Some(1.01 * PIXEL))].map(|view| render(&disk, &view, BLACK).picture);
+        assert_eq!(plain, smooth, "{side} pixels, no larger than in training");
+    }
+    assert_eq!(view(9).antialiased(None), view(9), "nothing is known of the training");
+}

@@ -1,0 +1,101 @@
+//! Opaque surfaces in front of captures.
+//!
+//! In: their size and depth. Out: depth textures, of one sample or of four.
+
+use bevy_gs4d::renderer::GpuContext;
+use glam::UVec2;
+
+/// Returns a depth texture with the same value everywhere.
+pub fn depth_texture(context: &GpuContext, size: UVec2, value: f32) -> wgpu::TextureView {
+    let texture = texture(context, size, 1);
+    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+    let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let depth_ops = wgpu::Operations { load: wgpu::LoadOp::Clear(value), store: wgpu::StoreOp::Store };
+    // A render pass that only clears.
+    drop(encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+            view: &view,
+            depth_ops: Some(depth_ops),
+            stencil_ops: None,
+        }),
+        ..Default::default()
+    }));
+    context.queue.submit([encoder.finish()]);
+    view
+}
+
+/// Returns a multisampled depth that is `near / distance` left of the middle, and 0 right of it, and the middle column, where half of the
+/// samples are covered. The edge leans by `slant` pictures' widths.
+pub fn edge(context: &GpuContext, size: UVec2, near: f32, distance: f32, slant: f32) -> (wgpu::Texture, u32) {
+    let GpuContext { device, queue, .. } = context;
+    let texture = texture(context, size, 4);
+    let column = size.x / 2;
+    // The edge goes through the middle of the column's pixels.
+    let end = (column as f32 + 0.5) / size.x as f32 * 2.0 - 1.0;
+    let source = format!(
+        "@vertex fn main(@builtin(vertex_index) i: u32) -> @builtin(position) vec4<f32> {{
+            let corner = vec2(f32(i & 1u), f32(i >> 1u));
+            let y = corner.y * 2.0 - 1.0;
+            return vec4(mix(-1.0, {end:?} + {slant:?} * y, corner.x), y, {:?}, 1.0);
+        }}",
+        near / distance
+    );
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: None,
+        source: wgpu::ShaderSource::Wgsl(source.into()),
+    });
+    let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: None,
+        layout: None,
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: Some("main"),
+            compilation_options: Default::default(),
+            buffers: &[],
+        },
+        primitive: wgpu::PrimitiveState {
+            topology: wgpu::PrimitiveTopology::TriangleStrip,
+            ..wgpu::PrimitiveState::default()
+        },
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: wgpu::TextureFormat::Depth32Float,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::Always),
+            stencil: Default::default(),
+            bias: Default::default(),
+        }),
+        multisample: wgpu::MultisampleState { count: 4, ..wgpu::MultisampleState::default() },
+        fragment: None,
+        multiview_mask: None,
+        cache: None,
+    });
+    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &view,
+                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Store }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        pass.set_pipeline(&pipeline);
+        pass.draw(0..4, 0..1);
+    }
+    queue.submit([encoder.finish()]);
+    (texture, column)
+}
+
+fn texture(context: &GpuContext, size: UVec2, samples: u32) -> wgpu::Texture {
+    context.device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d { width: size.x, height: size.y, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: samples,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Depth32Float,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    })
+}
