@@ -46,6 +46,11 @@ impl PlaybackState {
         Self { jumps: self.jumps, warned_of: self.warned_of, ..Self::default() }
     }
 
+    /// Returns whether no time has passed yet since its first moment, or the one that was last sought.
+    pub(super) fn is_unplayed(&self) -> bool {
+        self.span.is_none() || self.fresh
+    }
+
     /// Returns the time, in seconds since the capture's start, without the rounding of
     /// [`Playback::time`](super::Playback::time).
     pub(super) fn seconds(&self) -> f64 {
