@@ -331,6 +331,26 @@ fn a_follower_in_a_circle_or_of_nothing_stands_until_it_can_follow() {
     assert_eq!(times(&app), [0.5, 0.5, 1.25], "out of the circle, and with a time that the game sets");
 }
 
+#[test]
+fn another_capture_on_the_same_entity_begins_anew_at_the_time_that_is_set() {
+    let mut app = app("assets");
+    let entity = spawn(&mut app, (Playback::default(), Markers::new([(0.5, "half")])));
+    let follower = spawn(&mut app, FollowsClock(entity));
+    pass(&mut app, 0.5);
+    take_events(&mut app);
+    let other = capture(&mut app, 2.0, 4);
+    app.world_mut().entity_mut(entity).insert(GaussianCapture3d(other));
+    pass(&mut app, 0.25);
+    assert_eq!(time(&app, entity), 0.75, "it plays on from the time that the game has left");
+    let started = vec![debug(&PlaybackStarted { entity })];
+    let jump = vec![debug(&PlaybackSeeked { entity: follower, from: 0.5, to: 0.75 })];
+    let expected = [started, crossed(entity, &[1]), reached(entity, &[(0.5, "half")]), jump].concat();
+    assert_eq!(take_events(&mut app), expected, "as something else, whose first moment counts");
+    pass(&mut app, 0.25);
+    let on = [crossed(entity, &[2]), crossed(follower, &[2])].concat();
+    assert_eq!(take_events(&mut app), on, "once");
+}
+
 /// Returns what a component lacks to be used in scenes, animations and inspectors; `None` if nothing.
 fn unknown<C: Component>(app: &App) -> Option<&'static str> {
     let registry = app.world().resource::<AppTypeRegistry>().read();

@@ -65,6 +65,7 @@ pub(super) fn advance_captures(
             Ok((_, handle, _, state, _)) if captures.contains(&handle.0) => (handle.0.id(), state.clone()),
             Ok(_) | Err(_) => continue,
         };
+        state.play_asset(id.untyped());
         let awaited = state.is_unplayed() && uploads.awaits(id);
         let shown = |clock: Entity| {
             let by_player = |(playback, state): (&Playback, &PlaybackState)| Shown::by_player(playback, state);

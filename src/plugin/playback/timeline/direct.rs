@@ -65,10 +65,11 @@ pub(in crate::plugin::playback) fn advance_timelines(
     let _span = debug_span!("gs4d/timelines").entered();
     let order = following.order(players.iter().map(|(entity, ..)| entity));
     for player in order {
-        let mut state = match players.get(player) {
-            Ok((_, handle, _, state, _)) if timelines.contains(&handle.0) => state.clone(),
+        let (id, mut state) = match players.get(player) {
+            Ok((_, handle, _, state, _)) if timelines.contains(&handle.0) => (handle.0.id(), state.clone()),
             Ok(_) | Err(_) => continue,
         };
+        state.play_asset(id.untyped());
         let shown = |leader: Entity| {
             let by_timeline = players.get(leader).ok().map(|(.., clock)| Shown::by_clock(clock));
             let by_clock = || clocks.get(leader).ok().map(Shown::by_clock);
