@@ -245,6 +245,24 @@ fn the_panel_warns_of_captures_that_are_not_seen_and_cameras_that_cannot_draw() 
 }
 
 #[test]
+fn warnings_are_found_while_the_panel_is_closed_and_without_a_camera() {
+    let Some((mut app, camera)) = inspected() else { return };
+    set_open(&mut app, false);
+    let entity = spawn_capture(&mut app, Playback::paused_at(0.5));
+    app.world_mut().entity_mut(entity).insert(Name::new("dancer"));
+    picture(&mut app, 0.0);
+    assert_eq!(warnings(&app), [""; 0], "a capture in front of the camera");
+    app.world_mut().entity_mut(entity).insert(Transform::from_xyz(0.0, 0.0, 500.0));
+    picture(&mut app, 0.0);
+    let said = warnings(&app);
+    assert!(matches!(&said[..], [said] if said.starts_with("dancer: no camera sees it")), "behind it: {said:?}");
+    app.world_mut().despawn(camera);
+    run(&mut app, 3, 0.0);
+    let said = warnings(&app);
+    assert!(matches!(&said[..], [said] if said.contains("no active Camera3d")), "with no camera: {said:?}");
+}
+
+#[test]
 fn a_debug_view_is_that_of_the_renderer_without_bevy() {
     let Some((mut app, camera)) = inspected() else { return };
     let Some(mut headless) = gpu::headless() else { return };

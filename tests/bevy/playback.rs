@@ -293,6 +293,26 @@ fn a_capture_has_markers_of_its_own() {
 }
 
 #[test]
+fn a_marker_at_either_end_of_a_loop_is_reached_from_there() {
+    const START: (f32, &str) = (0.0, "start");
+    const END: (f32, &str) = (2.0, "end");
+    for (speed, sought, expected) in [
+        (1.0, 2.0, vec![END, START]),
+        (1.0, 0.0, vec![START]),
+        (-1.0, 0.0, vec![START, END]),
+        (-1.0, 2.0, vec![END]),
+    ] {
+        let mut app = app("assets");
+        let playback = Playback { time: 1.0, speed, ..default() };
+        let entity = spawn(&mut app, (playback, Markers::new([START, END])));
+        pass(&mut app, 0.25);
+        change(&mut app, entity, |playback: &mut Playback| playback.seek(sought));
+        pass(&mut app, 0.25);
+        assert_eq!(markers_said(&mut app), reached(entity, &expected), "sought to {sought} s, at speed {speed}");
+    }
+}
+
+#[test]
 fn captures_follow_captures_in_chains() {
     let mut app = app("assets");
     let handle = capture(&mut app, 2.0, 4);
@@ -329,6 +349,26 @@ fn a_follower_in_a_circle_or_of_nothing_stands_until_it_can_follow() {
     app.world_mut().entity_mut(timeless).insert(Playback { time: 1.25, ..default() });
     pass(&mut app, 0.5);
     assert_eq!(times(&app), [0.5, 0.5, 1.25], "out of the circle, and with a time that the game sets");
+}
+
+#[test]
+fn another_capture_on_the_same_entity_begins_anew_at_the_time_that_is_set() {
+    let mut app = app("assets");
+    let entity = spawn(&mut app, (Playback::default(), Markers::new([(0.5, "half")])));
+    let follower = spawn(&mut app, FollowsClock(entity));
+    pass(&mut app, 0.5);
+    take_events(&mut app);
+    let other = capture(&mut app, 2.0, 4);
+    app.world_mut().entity_mut(entity).insert(GaussianCapture3d(other));
+    pass(&mut app, 0.25);
+    assert_eq!(time(&app, entity), 0.75, "it plays on from the time that the game has left");
+    let started = vec![debug(&PlaybackStarted { entity })];
+    let jump = vec![debug(&PlaybackSeeked { entity: follower, from: 0.5, to: 0.75 })];
+    let expected = [started, crossed(entity, &[1]), reached(entity, &[(0.5, "half")]), jump].concat();
+    assert_eq!(take_events(&mut app), expected, "as something else, whose first moment counts");
+    pass(&mut app, 0.25);
+    let on = [crossed(entity, &[2]), crossed(follower, &[2])].concat();
+    assert_eq!(take_events(&mut app), on, "once");
 }
 
 /// Returns what a component lacks to be used in scenes, animations and inspectors; `None` if nothing.

@@ -12,6 +12,7 @@ use bevy::picking::backend::HitData;
 use bevy::picking::pointer::{Location, PointerAction, PointerId, PointerInput};
 use bevy::prelude::*;
 use bevy_gs4d::prelude::*;
+use bevy_gs4d::scene::{FilterKind, RuntimeScene, TemporalFilter};
 use bevy_gs4d::testing::{self, Offscreen};
 
 /// What the observers of [`watch`] have received.
@@ -126,6 +127,20 @@ fn only_what_the_camera_draws_is_hit() {
     assert_eq!(clicked(&mut app), [capture], "which the camera sees now");
     insert(&mut app, capture, Visibility::Hidden);
     assert_eq!(clicked(&mut app), [Entity::PLACEHOLDER; 0], "hidden");
+}
+
+#[test]
+fn what_the_gpu_refuses_is_not_in_the_way() {
+    let Some((mut app, _, capture)) = app() else { return };
+    // The filter is that of a larger scene.
+    let filter = TemporalFilter::from_bits(FilterKind::Support, 1, 2, vec![0b11]);
+    let refused = RuntimeScene { filter: Some(filter), ..lone(Vec3::Y) };
+    let before = spawn(&mut app, &refused, Transform::from_xyz(0.0, 0.0, 1.0));
+    watch(&mut app, before);
+    testing::settle(&mut app).expect("the app runs");
+    let state = app.world().get::<CaptureState>(before).expect("a required component");
+    assert!(matches!(state, CaptureState::Failed(_)), "it is refused: {state:?}");
+    assert_eq!(clicked(&mut app), [capture], "nobody sees what is in front");
 }
 
 #[test]

@@ -201,11 +201,13 @@ fn a_capture_takes_the_light_of_the_surroundings() {
     insert(&mut app, capture, CaptureLight { amount: 0.75, ..default() });
     check(&picture(&mut app, 0.0), MIDDLE.x, Vec3::splat(0.25), "a dark room");
 
-    let white = GlobalAmbientLight { brightness: 300.0, ..default() };
-    app.insert_resource(white);
-    let exposure = Exposure::default().exposure();
+    let ambient = GlobalAmbientLight::default();
+    app.insert_resource(ambient.clone());
     insert(&mut app, capture, CaptureLight::default());
-    check(&picture(&mut app, 0.0), MIDDLE.x, Vec3::splat(300.0 * exposure), "ambient light");
+    check(&picture(&mut app, 0.0), MIDDLE.x, Vec3::ONE, "Bevy's own ambient light");
+    app.insert_resource(GlobalAmbientLight { brightness: 0.25 * ambient.brightness, ..ambient });
+    check(&picture(&mut app, 0.0), MIDDLE.x, Vec3::splat(0.25), "a quarter of it");
+    let exposure = Exposure::default().exposure();
 
     app.insert_resource(GlobalAmbientLight::NONE);
     let color = Color::linear_rgb(1.0, 0.5, 0.25);

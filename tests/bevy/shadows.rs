@@ -6,17 +6,19 @@
 //! is no GPU, not even a software one.
 
 use crate::support::blob::blob;
-use crate::support::cpu_reference::{DURATION, rgb, scene};
+use crate::support::cpu_reference::{DURATION, difference_between, rgb, scene};
 use crate::support::fixtures::{insert, spawn};
 use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
 use bevy::camera::visibility::{RenderLayers, ViewVisibility};
 use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, PointLightShadowMap};
 use bevy::prelude::*;
+use bevy_gs4d::GaussianCapture3d;
+use bevy_gs4d::asset::CaptureState;
 use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::pbr::{CaptureContactShadow, CastsShadows, ShadowResolution};
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::render::CaptureSettings;
-use bevy_gs4d::scene::RuntimeScene;
+use bevy_gs4d::scene::{FilterKind, RuntimeScene, TemporalFilter};
 use image::RgbaImage;
 use std::f32::consts::PI;
 
@@ -255,4 +257,28 @@ fn a_contact_shadow_darkens_the_ground_beneath_and_nothing_else() {
     picture(&mut app, 0.0);
     app.world_mut().despawn(capture);
     assert_eq!(meshes(&mut app), 1, "and with the capture");
+}
+
+#[test]
+fn only_a_capture_that_is_drawn_has_a_contact_shadow() {
+    let Some(mut app) = scenery(above(5.0), sun(Vec3::NEG_Y)) else { return };
+    let lit = picture(&mut app, 0.0);
+    let place = Transform::from_xyz(0.0, RADIUS, 0.0);
+    // The filter is that of a smaller scene.
+    let filter = TemporalFilter::from_bits(FilterKind::Support, 1, 2, vec![0b11]);
+    let refused = RuntimeScene { filter: Some(filter), ..ball(Vec3::ZERO) };
+    let refused = spawn(&mut app, &refused, (place, CaptureContactShadow { strength: 1.0, ..default() }));
+    let seen = picture(&mut app, 0.0);
+    let state = app.world().get::<CaptureState>(refused).expect("a required component");
+    assert!(matches!(state, CaptureState::Failed(_)), "the GPU refuses it: {state:?}");
+    assert_eq!(difference_between(&seen, &lit), 0, "so nothing of it is seen, its shadow included");
+    app.world_mut().despawn(refused);
+
+    let meshes = |app: &mut App| app.world_mut().query::<&Mesh3d>().iter(app.world()).count();
+    let capture = spawn(&mut app, &ball(Vec3::ZERO), (place, CaptureContactShadow::default()));
+    picture(&mut app, 0.0);
+    assert_eq!(meshes(&mut app), 2, "the floor and the shadow");
+    app.world_mut().entity_mut(capture).remove::<GaussianCapture3d>();
+    picture(&mut app, 0.0);
+    assert_eq!(meshes(&mut app), 1, "the shadow goes with what casts it");
 }

@@ -378,6 +378,29 @@ fn a_large_capture_is_uploaded_over_several_frames() {
 }
 
 #[test]
+fn a_capture_plays_from_its_first_picture_on() {
+    let Some(mut app) = app(SIZE) else { return };
+    spawn_camera(&mut app, Msaa::Off, eye());
+    testing::settle(&mut app).expect("the app draws without an error");
+    app.insert_resource(CaptureUploadBudget { bytes_per_frame: 64 << 10 });
+    let entity = spawn(&mut app, synthetic(5000, 9, true), Playback::default());
+    let time = |app: &App| app.world().get::<Playback>(entity).expect("still there").time;
+    let mut frames = 0;
+    while statistics(&app).uploaded_captures() == 0 {
+        assert_eq!(time(&app), 0.0, "in frame {frames} it is not drawn yet");
+        run(&mut app, 1);
+        frames += 1;
+        assert!(frames < 100, "it is whole at last");
+    }
+    assert!(frames > 2, "{frames} frames are too few to prove anything");
+    // With pipelined rendering, the next update has begun.
+    assert!(time(&app) <= STEP.as_secs_f32(), "its first picture is that of its start, not of {}", time(&app));
+    run(&mut app, 10);
+    let played = time(&app) / STEP.as_secs_f32();
+    assert!((9.5..11.5).contains(&played), "then it plays: {played} steps");
+}
+
+#[test]
 fn what_the_gpu_refuses_leaves_what_was_drawn_before() {
     let Some(mut app) = app(SIZE) else { return };
     let entity = spawn(&mut app, heap(1, Vec3::X), Playback::paused_at(0.0));

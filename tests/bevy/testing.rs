@@ -4,8 +4,8 @@
 //! In: apps with and without a renderer. Out: proof that time and keys arrive in the game's systems as in a game, and that whatever a
 //! display would show is in the picture. What draws is skipped where there is no GPU, not even a software one.
 
-use crate::support::cpu_reference::{SIZE, rgb};
-use crate::support::fixtures::{MIDDLE, front, lone, spawn};
+use crate::support::cpu_reference::{SIZE, add, rgb};
+use crate::support::fixtures::{MIDDLE, crowd, front, lone, spawn};
 use crate::support::offscreen_app::{app, picture, spawn_camera};
 use crate::support::playback_app::{self, get};
 use bevy::camera::{Hdr, RenderTarget};
@@ -15,7 +15,8 @@ use bevy::prelude::*;
 use bevy::window::{PrimaryWindow, WindowRef};
 use bevy_egui::{EguiContexts, EguiGlobalSettings, EguiPlugin, EguiPrimaryContextPass, PrimaryEguiContext, egui};
 use bevy_gs4d::asset::GaussianCapture;
-use bevy_gs4d::playback::Playback;
+use bevy_gs4d::playback::{Clip, Playback, Timeline, TimelinePlayer, Track};
+use bevy_gs4d::render::CaptureUploadBudget;
 use bevy_gs4d::testing::{self, Offscreen, TestingError};
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
 use std::time::Duration;
@@ -67,6 +68,24 @@ fn a_step_of_nothing_waits_for_captures_and_passes_no_time() {
     let loaded = app.world().resource::<Assets<GaussianCapture>>();
     assert_eq!(loaded.len(), 1, "the bundled capture has been loaded");
     assert_eq!(get::<Playback>(&app, entity).time, 0.0, "and is at its start");
+}
+
+#[test]
+fn a_picture_of_a_timeline_is_of_the_time_that_was_asked_for() {
+    let Some(mut app) = app(SIZE) else { return };
+    // A Gaussian in each frame.
+    app.insert_resource(CaptureUploadBudget { bytes_per_frame: 1 });
+    spawn_camera(&mut app, Msaa::Off, front());
+    let clips = [0.0, 1.0].map(|start| {
+        let capture = add(&mut app, &crowd());
+        Clip { capture, start, range: [0.0, 1.0], speed: 1.0, fade: [0.0; 2] }
+    });
+    let track = Track { name: "left".into(), clips: clips.to_vec() };
+    let timeline = Timeline::new(vec![track], Vec::new(), None).expect("makes sense");
+    let timeline = app.world_mut().resource_mut::<Assets<Timeline>>().add(timeline);
+    let player = app.world_mut().spawn(TimelinePlayer(timeline)).id();
+    picture(&mut app, 0.25);
+    assert_eq!(get::<Playback>(&app, player).time, 0.25, "it waits for the captures of all clips first");
 }
 
 #[test]

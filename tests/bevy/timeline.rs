@@ -239,6 +239,21 @@ fn a_timeline_follows_a_shared_clock() {
     assert_eq!(shown(&mut app, "left").1, 3.0, "the second clip");
 }
 
+#[test]
+fn another_timeline_on_the_same_player_begins_anew_at_the_time_that_is_set() {
+    let mut app = app("assets");
+    let (first, _) = timeline(&mut app);
+    let player = spawn(&mut app, first, Playback::default());
+    pass(&mut app, 1.0);
+    take_events(&mut app);
+    let (other, _) = timeline(&mut app);
+    let other = app.world_mut().resource_mut::<Assets<Timeline>>().add(other);
+    app.world_mut().entity_mut(player).insert(TimelinePlayer(other));
+    pass(&mut app, 0.5);
+    assert_eq!(said_by(&mut app, player), [debug(&PlaybackStarted { entity: player })], "it starts");
+    assert_eq!(get::<Playback>(&app, player).time, 1.5, "from the time that the game has left");
+}
+
 /// Returns a folder with a capture `two.gs4d` of two seconds.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");

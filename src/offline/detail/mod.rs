@@ -211,7 +211,7 @@ impl Maker<'_> {
         match &self.full.form {
             Form::Sliced(_) => Ok(level),
             Form::Packed(_) => {
-                let settings = CompressSettings::from(Quality::VisuallyLossless);
+                let settings = CompressSettings::suiting(Quality::Balanced, level.len());
                 Ok(compress(level, &settings)?.0.into_runtime()?)
             }
         }

@@ -1,7 +1,7 @@
 //! What becomes of loaded captures on the GPU.
 //!
 //! In: what the render world uploads: captures that are whole there, and why others cannot be. Out: [`Uploads`], shared by both worlds,
-//! from which the loading states of entities follow.
+//! from which the loading states of entities follow, and when playing begins.
 
 use crate::plugin::component::GaussianCapture;
 use bevy::asset::AssetId;
@@ -49,6 +49,12 @@ impl Uploads {
     /// Makes captures wait for their upload.
     pub(crate) fn expect(&self) {
         self.lock().expected = true;
+    }
+
+    /// Returns whether a capture that has been loaded is still on its way to the GPU, with no older version to be drawn meanwhile.
+    pub(crate) fn awaits(&self, capture: AssetId<GaussianCapture>) -> bool {
+        let states = self.lock();
+        !states.is_drawn(capture) && !states.failures.contains_key(&capture)
     }
 
     /// Notes that the upload of a capture begins. `is_drawn`: an earlier one is drawn until it ends.

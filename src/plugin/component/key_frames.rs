@@ -38,17 +38,19 @@ impl KeyFrames {
     /// Returns the indices of those after `from` (or at it, if `inclusive`) up to and including `to`, in the order of
     /// play: falling if `to` is before `from`. Both in seconds since the capture's start.
     pub(crate) fn within(&self, from: f64, to: f64, inclusive: bool) -> impl Iterator<Item = u32> + use<> {
-        let last = f64::from(self.segments);
-        let [from, to] = [from, to].map(|time| time / self.spacing());
-        let (low, high) = match (from <= to, inclusive) {
-            (true, false) => (from.floor() + 1.0, to.floor()),
-            (true, true) => (from.ceil(), to.floor()),
-            (false, false) => (to.ceil(), from.ceil() - 1.0),
-            (false, true) => (to.ceil(), from.floor()),
+        let this = *self;
+        // In the precision of their times: the quotient of a duration and the spacing may be just below the number of segments.
+        let [from, to] = [from, to].map(|time| f64::from(time as f32));
+        let [low, high] = [from.min(to), from.max(to)].map(|time| time / this.spacing());
+        let first = (low - 1.0).max(0.0) as u32;
+        let last = (high + 1.0).min(f64::from(this.segments)) as u32;
+        let count = if high < 0.0 { 0 } else { last.saturating_add(1).saturating_sub(first) };
+        let is_passed = move |index: &u32| {
+            let time = f64::from(this.time(*index));
+            let within = if from <= to { from < time && time <= to } else { to <= time && time < from };
+            within || inclusive && time == from
         };
-        let (low, high) = (low.max(0.0), high.min(last));
-        let count = if low <= high { (high - low) as u32 + 1 } else { 0 };
-        (0..count).map(move |step| if from <= to { low as u32 + step } else { high as u32 - step })
+        (0..count).map(move |step| if from <= to { first + step } else { last - step }).filter(is_passed)
     }
 }
 
@@ -78,5 +80,24 @@ mod tests {
         assert_eq!(within(1.0, 1.0, true), [2], "but where it is, if that counts");
         assert_eq!(within(-9.0, 9.0, false), [0, 1, 2, 3, 4], "never more than there are");
         assert_eq!(within(9.0, -9.0, false), [4, 3, 2, 1, 0], "never fewer than 0");
+        assert_eq!(within(-9.0, -5.0, true), [0; 0], "none before the first");
+        assert_eq!(within(9.0, 5.0, true), [0; 0], "nor after the last");
+    }
+
+    #[test]
+    fn a_key_frame_at_the_end_of_a_step_is_crossed_in_it_and_not_again() {
+        // Many of these durations, divided by the spacing, are below the number of segments.
+        for (segments, duration) in [(7, 1.2), (28, 1.2), (93, 1.0), (99, 2.0), (59, 3.0), (29, 5.0)] {
+            let key_frames = KeyFrames::new(segments, duration).expect("a filter");
+            let within = |from: f64, to: f64| key_frames.within(from, to, false).collect::<Vec<_>>();
+            let forwards: Vec<u32> = (1..=segments).collect();
+            let backwards: Vec<u32> = (0..segments).rev().collect();
+            let end = f64::from(duration);
+            assert_eq!(within(0.0, end), forwards, "{segments} in {duration} s: up to the last");
+            assert_eq!(within(end, 0.0), backwards, "{segments} in {duration} s: and back");
+            let times: Vec<f64> = (0..=segments).map(|index| f64::from(index) * end / f64::from(segments)).collect();
+            let in_steps: Vec<u32> = times.windows(2).flat_map(|step| within(step[0], step[1])).collect();
+            assert_eq!(in_steps, forwards, "{segments} in {duration} s: step by step");
+        }
     }
 }

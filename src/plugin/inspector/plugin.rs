@@ -1,6 +1,7 @@
 //! The plugin and the panel itself.
 //!
-//! In: captures, cameras, [`CaptureStatistics`]. Out: the panel. Only values that are edited in it are written back.
+//! In: captures, cameras, [`CaptureStatistics`]. Out: the panel, and its warnings, open or not. Only values that are edited in it are
+//! written back.
 
 use super::entity_selector::{self, Choice};
 use super::presentation::smoothed;
@@ -12,7 +13,7 @@ use crate::plugin::asset::CaptureState;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::Playback;
 use crate::plugin::render::{CameraFault, CaptureSettings, CaptureStatistics, CaptureViewSettings, DepthWrite};
-use bevy::app::{App, Plugin, PreUpdate, Update};
+use bevy::app::{App, Last, Plugin, PreUpdate, Update};
 use bevy::asset::{AssetServer, Assets};
 use bevy::camera::visibility::{InheritedVisibility, VisibleEntities};
 use bevy::camera::{Camera, Camera3d, CompositingSpace, RenderTarget};
@@ -34,6 +35,7 @@ use bevy_egui::{
     PrimaryEguiContext, egui, setup_primary_egui_context_system,
 };
 use std::any::TypeId;
+use std::collections::HashSet;
 
 /// Draws the panel that [the module](crate::inspector) describes at the right edge of the first camera's picture. It is open at first; F1
 /// closes and opens it.
@@ -59,7 +61,9 @@ impl Plugin for InspectorPlugin {
                     .before(WindowToEguiContextMap::on_egui_context_added_system),
             )
             .add_systems(Update, toggle.run_if(not(egui_wants_any_keyboard_input)))
-            .add_systems(EguiPrimaryContextPass, show_panel);
+            .add_systems(EguiPrimaryContextPass, show_panel)
+            // Cameras have found what they see.
+            .add_systems(Last, update_warnings);
     }
 }
 
@@ -97,7 +101,6 @@ fn show_panel(
     mut inspector: ResMut<Inspector>,
     mut subject: Subject,
     mut measuring: Local<Measuring>,
-    mut idle: Local<IdleTimes>,
     mut frame_seconds: Local<f32>,
 ) {
     *frame_seconds = smoothed(*frame_seconds, subject.time.delta_secs());
@@ -106,7 +109,6 @@ fn show_panel(
     if let Ok(context) = contexts.ctx_mut()
         && inspector.open
     {
-        edited.warnings = subject.warnings(&mut idle);
         let height = (context.content_rect().height() - 2.0 * MARGIN).max(MARGIN);
         let mut open = true;
         egui::Window::new("inspector")
@@ -130,6 +132,14 @@ fn show_panel(
     }
     measuring.follow(measures, &subject.statistics);
     inspector.set_if_neq(edited);
+}
+
+/// Keeps the warnings up to date, whether a camera draws the panel or not.
+fn update_warnings(subject: Subject, mut inspector: ResMut<Inspector>, mut idle: Local<IdleTimes>) {
+    let warnings = subject.warnings(&mut idle);
+    if inspector.warnings != warnings {
+        inspector.warnings = warnings;
+    }
 }
 
 type CaptureParts = (
@@ -249,11 +259,14 @@ impl Subject<'_, '_> {
             }
         }
         let idle = &*idle;
+        let class = TypeId::of::<GaussianCapture3d>();
+        let active = self.sights.iter().filter(|(camera, ..)| camera.is_active);
+        let seen: HashSet<Entity> = active.flat_map(|(_, visible, _)| visible.get(class).iter().copied()).collect();
         let captures = self.capture_choices().into_iter().filter_map(|Choice { entity, label }| {
             let (_, _, handle, state, _, settings) = self.captures.get(entity).ok()?;
             let shows = self.shown.get(entity).is_ok_and(|visibility| visibility.get());
             let idle = if settings.filter { idle.of(handle.0.id()) } else { &[] };
-            Some(PlacedCapture { label, state, shows, is_seen: self.is_seen(entity), idle })
+            Some(PlacedCapture { label, state, shows, is_seen: seen.contains(&entity), idle })
         });
         let cameras = self.camera_choices().into_iter().filter_map(|Choice { entity, label }| {
             let (camera, _, space) = self.sights.get(entity).ok()?;
@@ -268,12 +281,6 @@ impl Subject<'_, '_> {
             })
         });
         warnings::list(&captures.collect::<Vec<_>>(), &cameras.collect::<Vec<_>>())
-    }
-
-    /// Returns whether an active camera sees a capture.
-    fn is_seen(&self, capture: Entity) -> bool {
-        let class = TypeId::of::<GaussianCapture3d>();
-        self.sights.iter().any(|(camera, visible, _)| camera.is_active && visible.get(class).contains(&capture))
     }
 
     fn capture_choices(&self) -> Vec<Choice> {
@@ -306,6 +313,11 @@ fn section(ui: &mut egui::Ui, title: &str, open: bool, contents: impl FnOnce(&mu
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plugin::asset::CaptureAssetPlugin;
+    use crate::plugin::playback::PlaybackPlugin;
+    use crate::scene::synth::{SynthSettings, synthesize};
+    use bevy::MinimalPlugins;
+    use bevy::asset::AssetPlugin;
 
     #[test]
     fn the_key_opens_and_closes_the_panel() {
@@ -323,5 +335,22 @@ mod tests {
         app.world_mut().resource_mut::<Inspector>().key = KeyCode::KeyI;
         assert!(press(&mut app, KeyCode::F1), "another key was set");
         assert!(!press(&mut app, KeyCode::KeyI), "which closes it");
+    }
+
+    #[test]
+    fn warnings_need_neither_an_open_panel_nor_a_camera() {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, AssetPlugin::default(), CaptureAssetPlugin, PlaybackPlugin));
+        app.init_resource::<CaptureStatistics>().insert_resource(Inspector { open: false, ..Inspector::default() });
+        app.add_systems(Last, update_warnings);
+        let settings = SynthSettings { count: 20, degree: 0, ..SynthSettings::default() };
+        let scene = synthesize(&settings).into_runtime().expect("a synthetic scene can be drawn");
+        let handle = app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(scene));
+        app.world_mut().spawn((GaussianCapture3d(handle), CaptureSettings::default()));
+        app.update();
+        app.update();
+        let said = &app.world().resource::<Inspector>().warnings;
+        let is_told = matches!(&said[..], [said] if said.contains("there is no active Camera3d"));
+        assert!(is_told, "nobody draws the capture, nor the panel: {said:?}");
     }
 }

@@ -23,7 +23,7 @@ use bevy::input::keyboard::KeyCode;
 /// ```
 #[derive(Resource, Debug, Clone, PartialEq)]
 pub struct Inspector {
-    /// Whether the panel is drawn. A closed panel takes no time. Default: true.
+    /// Whether the panel is drawn. Of a closed panel only the warnings are kept up to date. Default: true.
     pub open: bool,
     /// The key that closes and opens it. Default: F1.
     pub key: KeyCode,
@@ -35,7 +35,7 @@ pub struct Inspector {
     pub fps: f32,
     /// A line of text at the end of the panel. Default: empty, which shows none.
     pub note: String,
-    /// What the panel warns of, at its top: written by the panel while it is open. Default: empty.
+    /// What the panel warns of, at its top: written at the end of each update in which it changes, open or not. Default: empty.
     pub warnings: Vec<String>,
 }
 

@@ -20,11 +20,11 @@ pub(super) struct Measuring {
 }
 
 impl Measuring {
-    /// Starts measuring when the section is opened, and stops when it is closed. Nothing is set in between, so that a game can measure, too.
+    /// Starts measuring when the section is opened, and stops when it is closed. What the game measures stays as it is.
     pub(super) fn follow(&mut self, open: bool, statistics: &CaptureStatistics) {
         if self.on != open {
             *self = Self { on: open, waited: 0 };
-            statistics.measure(open);
+            statistics.measure_for_panel(open);
         }
     }
 }
@@ -42,4 +42,25 @@ pub(super) fn show(ui: &mut egui::Ui, passes: &[PassTime], measuring: &mut Measu
         bar(ui, share(pass.milliseconds, sum), format!("{}: {:.3} ms", pass.name, pass.milliseconds));
     }
     ui.label(format!("sum: {sum:.3} ms"));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_panel_does_not_switch_off_what_the_game_measures() {
+        let (statistics, mut panel) = (CaptureStatistics::default(), Measuring::default());
+        statistics.measure(true);
+        for open in [true, false] {
+            panel.follow(open, &statistics);
+            assert!(statistics.is_measuring(), "the game still measures, open: {open}");
+        }
+        statistics.measure(false);
+        assert!(!statistics.is_measuring(), "until it stops");
+        for open in [true, false] {
+            panel.follow(open, &statistics);
+            assert_eq!(statistics.is_measuring(), open, "then it is measured while the section is open");
+        }
+    }
 }

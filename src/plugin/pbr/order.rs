@@ -3,6 +3,7 @@
 //! In: Bevy's transmissive phase and its wireframes; meshes that have moved. Out: [`OtherPasses`], and transmissive meshes after the captures
 //! behind them. Bevy 0.19 sorts a transparent mesh by the place where it was when it came into view, so places are brought up to date here.
 
+use crate::plugin::component::GaussianCapture3d;
 use crate::plugin::render::CaptureSystems;
 use crate::plugin::render::order::{OtherPass, OtherPasses};
 use bevy::app::App;
@@ -10,11 +11,12 @@ use bevy::camera::Camera3d;
 use bevy::camera::primitives::Aabb;
 use bevy::core_pipeline::core_3d::{Transparent3d, TransparentSortingInfo3d};
 use bevy::core_pipeline::schedule::Core3d;
+use bevy::ecs::change_detection::{DetectChanges, Ref};
 use bevy::ecs::entity::Entity;
-use bevy::ecs::query::{Changed, Has, With};
+use bevy::ecs::query::{Has, With};
 use bevy::ecs::resource::Resource;
 use bevy::ecs::schedule::IntoScheduleConfigs;
-use bevy::ecs::system::{Query, Res, ResMut};
+use bevy::ecs::system::{Local, Query, Res, ResMut};
 use bevy::mesh::Mesh3d;
 use bevy::pbr::wireframe::Wireframe3d;
 use bevy::pbr::{ExtractedAtmosphere, Transmissive3d, main_transmissive_pass_3d};
@@ -26,7 +28,8 @@ use bevy::render::{ExtractSchedule, Render, RenderApp, RenderSystems};
 use bevy::transform::components::GlobalTransform;
 use glam::Vec3;
 
-/// The meshes that have moved since the frame before, and the centres of their bounds in the world.
+/// The meshes that have moved since the frame before, and the centres of their bounds in the world. None while there are no captures, and all
+/// when there are captures again.
 #[derive(Resource, Default)]
 struct MovedMeshes(Vec<(MainEntity, Vec3)>);
 
@@ -47,12 +50,17 @@ pub(super) fn build(app: &mut App) {
 
 fn extract_moved_meshes(
     mut moved: ResMut<MovedMeshes>,
-    meshes: Extract<Query<(Entity, &GlobalTransform, &Aabb), (With<Mesh3d>, Changed<GlobalTransform>)>>,
+    mut follows: Local<bool>,
+    captures: Extract<Query<(), With<GaussianCapture3d>>>,
+    meshes: Extract<Query<(Entity, Ref<GlobalTransform>, &Aabb), With<Mesh3d>>>,
 ) {
     moved.0.clear();
-    moved
-        .0
-        .extend(meshes.iter().map(|(mesh, place, bounds)| (mesh.into(), place.transform_point(bounds.center.into()))));
+    let followed = std::mem::replace(&mut *follows, !captures.is_empty());
+    if !*follows {
+        return;
+    }
+    let stale = meshes.iter().filter(|(_, place, _)| !followed || place.is_changed());
+    moved.0.extend(stale.map(|(mesh, place, bounds)| (mesh.into(), place.transform_point(bounds.center.into()))));
 }
 
 /// Gives the meshes that have moved their new places in the sorted phases, which keep meshes from frame to frame.
@@ -61,6 +69,9 @@ fn update_centers(
     mut transparent: ResMut<ViewSortedRenderPhases<Transparent3d>>,
     mut transmissive: Option<ResMut<ViewSortedRenderPhases<Transmissive3d>>>,
 ) {
+    if moved.0.is_empty() {
+        return;
+    }
     let update = |info: &mut TransparentSortingInfo3d, center: Vec3| {
         if let TransparentSortingInfo3d::Sorted { mesh_center, .. } = info {
             *mesh_center = center;
@@ -96,5 +107,37 @@ fn find_other_passes(
             resolves_again: lines.is_some_and(|phase| !phase.is_empty()),
         };
         others.0.insert(camera, other);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy::ecs::world::World;
+    use bevy::render::MainWorld;
+
+    /// Extracts, and returns the places of the meshes that have moved, along x.
+    fn moved(render: &mut World) -> Vec<f32> {
+        render.run_system_cached(extract_moved_meshes).expect("both worlds are there");
+        render.resource::<MovedMeshes>().0.iter().map(|(_, center)| center.x).collect()
+    }
+
+    #[test]
+    fn meshes_are_followed_while_there_are_captures() {
+        let mut render = World::new();
+        render.init_resource::<MainWorld>();
+        render.init_resource::<MovedMeshes>();
+        let mut main = render.resource_mut::<MainWorld>();
+        let place = |x| GlobalTransform::from_xyz(x, 0.0, 0.0);
+        let [_, last] = [1.0, 2.0].map(|x| main.spawn((Mesh3d::default(), Aabb::default(), place(x))).id());
+        assert_eq!(moved(&mut render), [0.0; 0], "nothing needs them");
+        let capture = render.resource_mut::<MainWorld>().spawn(GaussianCapture3d::default()).id();
+        assert_eq!(moved(&mut render), [1.0, 2.0], "all that may have moved before");
+        assert_eq!(moved(&mut render), [0.0; 0], "and once");
+        render.resource_mut::<MainWorld>().entity_mut(last).insert(place(3.0));
+        assert_eq!(moved(&mut render), [3.0], "then those that move");
+        render.resource_mut::<MainWorld>().despawn(capture);
+        render.resource_mut::<MainWorld>().entity_mut(last).insert(place(4.0));
+        assert_eq!(moved(&mut render), [0.0; 0], "until the last capture has gone");
     }
 }

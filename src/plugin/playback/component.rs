@@ -16,6 +16,9 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// Code may set any field at any time; animations may set any field but `repeat`. Setting `time` is a seek: the time between is
 /// skipped, not played. To slow down or to reverse, set `speed`.
 ///
+/// Time begins with the first picture: until a capture has been loaded and is whole on the GPU, it stands at its first moment. Without a
+/// renderer, until it has been loaded.
+///
 /// # Examples
 ///
 /// ```

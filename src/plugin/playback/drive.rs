@@ -24,6 +24,16 @@ pub(super) enum Drive {
     Hold,
 }
 
+impl Drive {
+    /// Returns the same, but no time of the game while something is `awaited`. The clock that is followed waits for nobody.
+    pub(super) fn unless(self, awaited: bool) -> Self {
+        match self {
+            Self::By(_) if awaited => Self::By(0.0),
+            Self::By(_) | Self::Follow { .. } | Self::Hold => self,
+        }
+    }
+}
+
 /// What an entity shows to its followers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Shown {

@@ -16,7 +16,8 @@ use bevy::ecs::event::EntityEvent;
 use bevy::ecs::message::{Message, MessageWriter};
 use bevy::ecs::system::{Commands, SystemParam};
 
-/// An entity plays that did not before: it has been loaded, or [`playing`](super::Playback::playing) was set.
+/// An entity plays that did not before: its capture or timeline, or another one in its place, has been loaded, or
+/// [`playing`](super::Playback::playing) was set.
 ///
 /// # Examples
 ///

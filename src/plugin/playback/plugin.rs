@@ -43,3 +43,159 @@ impl Plugin for PlaybackPlugin {
             .add_systems(Last, warn_of_missing_handles);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plugin::asset::{CaptureAssetPlugin, Uploads};
+    use crate::plugin::component::GaussianCapture;
+    use crate::plugin::playback::{Clip, FollowsClock, Marker, Markers, PlaybackClock, TimelinePlayer, Track};
+    use crate::scene::synth::{SynthSettings, synthesize};
+    use bevy::MinimalPlugins;
+    use bevy::asset::{AssetPlugin, AssetServer, Assets, Handle};
+    use bevy::ecs::bundle::Bundle;
+    use bevy::ecs::entity::Entity;
+    use bevy::ecs::observer::On;
+    use bevy::ecs::resource::Resource;
+    use bevy::ecs::system::ResMut;
+    use bevy::time::TimeUpdateStrategy;
+    use std::io;
+    use std::sync::mpsc;
+    use std::time::{Duration, Instant};
+
+    /// How long a task may take.
+    const TIMEOUT: Duration = Duration::from_secs(60);
+
+    /// The names of the markers that have been reached.
+    #[derive(Resource, Default)]
+    struct Reached(Vec<String>);
+
+    /// Returns an app in which captures wait for uploads that the test ends.
+    fn app() -> (App, Uploads) {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, AssetPlugin::default(), CaptureAssetPlugin, PlaybackPlugin));
+        app.init_resource::<Reached>();
+        app.add_observer(|marker: On<MarkerReached>, mut reached: ResMut<Reached>| reached.0.push(marker.name.clone()));
+        let uploads = app.world().resource::<Uploads>().clone();
+        uploads.expect();
+        // The first update has no length.
+        pass(&mut app, 1);
+        (app, uploads)
+    }
+
+    /// Runs updates of a quarter of a second.
+    fn pass(app: &mut App, updates: usize) {
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(250)));
+        for _ in 0..updates {
+            app.update();
+        }
+    }
+
+    /// Adds a capture of two seconds.
+    fn capture(app: &mut App) -> Handle<GaussianCapture> {
+        let settings = SynthSettings { count: 20, degree: 0, duration_seconds: 2.0, ..SynthSettings::default() };
+        let scene = synthesize(&settings).into_runtime().expect("a synthetic scene can be drawn");
+        app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(scene))
+    }
+
+    fn spawn(app: &mut App, capture: &Handle<GaussianCapture>, bundle: impl Bundle) -> Entity {
+        app.world_mut().spawn((GaussianCapture3d(capture.clone()), bundle)).id()
+    }
+
+    /// Spawns the player of a timeline with one track for each capture, and a marker at its start.
+    fn spawn_timeline(app: &mut App, captures: &[&Handle<GaussianCapture>]) -> Entity {
+        let clip = |capture: &Handle<GaussianCapture>| Clip {
+            capture: capture.clone(),
+            start: 0.0,
+            range: [0.0, 2.0],
+            speed: 1.0,
+            fade: [0.0; 2],
+        };
+        let tracks = captures.iter().enumerate();
+        let tracks = tracks.map(|(index, capture)| Track { name: index.to_string(), clips: vec![clip(capture)] });
+        let markers = vec![Marker { time: 0.0, name: "start".into() }];
+        let timeline = Timeline::new(tracks.collect(), markers, None).expect("makes sense");
+        let timeline = app.world_mut().resource_mut::<Assets<Timeline>>().add(timeline);
+        app.world_mut().spawn(TimelinePlayer(timeline)).id()
+    }
+
+    fn time(app: &App, player: Entity) -> f32 {
+        app.world().get::<Playback>(player).expect("every player has one").time
+    }
+
+    fn reached(app: &App) -> &[String] {
+        &app.world().resource::<Reached>().0
+    }
+
+    #[test]
+    fn a_capture_stands_at_its_first_moment_until_it_is_drawn() {
+        let (mut app, uploads) = app();
+        let capture = capture(&mut app);
+        let player = spawn(&mut app, &capture, Markers::new([(0.0, "start"), (0.5, "middle")]));
+        let backwards = spawn(&mut app, &capture, Playback { speed: -1.0, time: 2.0, ..Playback::once() });
+        let follower = spawn(&mut app, &capture, FollowsClock(player));
+        let song = app.world_mut().spawn(PlaybackClock::default()).id();
+        let singer = spawn(&mut app, &capture, FollowsClock(song));
+        pass(&mut app, 3);
+        let times = |app: &App| [player, backwards, follower, singer].map(|entity| time(app, entity));
+        assert_eq!(times(&app), [0.0, 2.0, 0.0, 0.75], "only who follows a clock is where that is");
+        assert_eq!(reached(&app), [""; 0], "and no marker is passed unseen");
+        uploads.finish(capture.id());
+        pass(&mut app, 2);
+        assert_eq!(times(&app), [0.5, 1.5, 0.5, 1.25], "they play from there");
+        assert_eq!(reached(&app), ["start", "middle"], "past all markers");
+        uploads.begin(capture.id(), false);
+        pass(&mut app, 2);
+        assert_eq!(times(&app), [1.0, 1.0, 1.0, 1.75], "and go on while it is uploaded again");
+    }
+
+    #[test]
+    fn a_capture_that_the_gpu_refuses_plays_all_the_same() {
+        let (mut app, uploads) = app();
+        let capture = capture(&mut app);
+        let player = spawn(&mut app, &capture, ());
+        pass(&mut app, 1);
+        uploads.fail(capture.id(), "no room".into());
+        pass(&mut app, 2);
+        assert_eq!(time(&app, player), 0.5, "it waits for nothing");
+    }
+
+    #[test]
+    fn a_timeline_stands_at_its_start_until_all_its_captures_are_drawn() {
+        let (mut app, uploads) = app();
+        let [first, second] = [(); 2].map(|()| capture(&mut app));
+        let player = spawn_timeline(&mut app, &[&first, &second]);
+        pass(&mut app, 2);
+        uploads.finish(first.id());
+        pass(&mut app, 2);
+        assert_eq!((time(&app, player), reached(&app).len()), (0.0, 0), "one is missing");
+        uploads.finish(second.id());
+        pass(&mut app, 1);
+        assert_eq!(time(&app, player), 0.25, "all are there");
+        assert_eq!(reached(&app), ["start"], "and the marker at the start is reached");
+    }
+
+    #[test]
+    fn a_timeline_waits_for_what_is_loaded_and_not_for_what_has_failed() {
+        let (mut app, uploads) = app();
+        let there = capture(&mut app);
+        uploads.finish(there.id());
+        let (give_up, gate) = mpsc::channel::<io::Error>();
+        let load =
+            async move { Err::<GaussianCapture, _>(gate.recv_timeout(TIMEOUT).unwrap_or_else(io::Error::other)) };
+        let server = app.world().resource::<AssetServer>().clone();
+        let loading = server.add_async(load);
+        let player = spawn_timeline(&mut app, &[&there, &loading]);
+        pass(&mut app, 3);
+        assert_eq!(time(&app, player), 0.0, "one is still loaded");
+        give_up.send(io::Error::other("the disk is full")).expect("the task waits");
+        let began = Instant::now();
+        while !server.get_load_state(loading.id()).is_some_and(|state| state.is_failed()) {
+            assert!(began.elapsed() < TIMEOUT, "the failure is told");
+            app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
+            app.update();
+        }
+        pass(&mut app, 1);
+        assert_eq!(time(&app, player), 0.25, "it plays without the one that has failed");
+    }
+}

@@ -155,11 +155,12 @@ impl Travel {
         if self.is_returning(self.last) { self.span.length + into } else { into }
     }
 
-    /// Returns the stretches, in the order of play. A step longer than four passes yields only two to four.
+    /// Returns the stretches, in the order of play. A step longer than four passes yields only two to four of them, and perhaps the moment
+    /// where it began.
     pub(super) fn legs(&self) -> impl Iterator<Item = Leg> {
         let count = (self.last - self.first).abs() as u32;
         let direction = (self.last - self.first).signum();
-        (0..=count).map(move |index| {
+        let stretches = (0..=count).map(move |index| {
             let pass = self.first + direction * f64::from(index);
             let place = |phase| {
                 let into = self.within_pass(phase, pass);
@@ -167,7 +168,15 @@ impl Travel {
             };
             let inclusive = if index == 0 { self.inclusive } else { self.span.repeat.wraps() };
             Leg { from: place(self.from), to: place(self.to), inclusive }
-        })
+        });
+        self.left().map(|at| Leg { from: at, to: at, inclusive: true }).into_iter().chain(stretches)
+    }
+
+    /// Returns the end of a loop, in seconds since the capture's start, at which it stood, if that counts as passed: no stretch has it, since
+    /// the first one begins at the other end.
+    fn left(&self) -> Option<f64> {
+        let (phase, end) = if self.is_forward() { (self.span.length, self.span.end()) } else { (0.0, self.span.start) };
+        (self.inclusive && self.span.repeat.wraps() && self.from == phase).then_some(end)
     }
 
     /// Returns whether it passed the end of a loop and started over.
@@ -238,6 +247,19 @@ mod tests {
         let arrived = span.travel(1.5, 2.0, false);
         assert_eq!((legs(&arrived).len(), arrived.turns), (2, 1), "arriving at the end is the turn");
         assert_eq!(span.travel(arrived.phase(), 0.5, false).turns, 0, "leaving it is none");
+    }
+
+    #[test]
+    fn an_end_of_a_loop_that_was_sought_is_passed_before_the_other() {
+        let span = span(1.0, 3.0, Repeat::Loop);
+        let forwards = span.travel(2.0, 2.5, true);
+        assert_eq!(legs(&forwards), [(3.0, 3.0, true), (1.0, 1.5, true)], "forwards from the end");
+        assert_eq!(forwards.turns, 0, "which is no turn");
+        let backwards = span.travel(0.0, -0.5, true);
+        assert_eq!(legs(&backwards), [(1.0, 1.0, true), (3.0, 2.5, true)], "backwards from the start");
+        assert_eq!(legs(&span.travel(0.0, 0.5, true)), [(1.0, 1.5, true)], "forwards from the start there is but one");
+        assert_eq!(legs(&span.travel(2.0, 1.5, true)), [(3.0, 2.5, true)], "nor backwards from the end");
+        assert_eq!(legs(&span.travel(2.0, 2.5, false)), [(1.0, 1.5, false)], "nor where the end has been passed");
     }
 
     #[test]

@@ -3,12 +3,15 @@
 //! In: what [`advance`](super::advance) leaves after a step. Out: a [`PlaybackState`], which the next step continues.
 
 use super::span::Span;
+use bevy::asset::UntypedAssetId;
 use bevy::ecs::component::Component;
 use bevy::ecs::entity::Entity;
 
 /// The state of a [`Playback`](super::Playback) after the last step. Default: before the first step.
 #[derive(Component, Debug, Default, Clone)]
 pub(super) struct PlaybackState {
+    /// The capture or the timeline that is played; `None` before the first step.
+    asset: Option<UntypedAssetId>,
     /// How far it has played, without the rounding of [`Playback::time`](super::Playback::time).
     pub(super) phase: f64,
     /// The range that `phase` is measured in; `None` before the first step.
@@ -44,6 +47,18 @@ impl PlaybackState {
     /// Returns the state before the first step of something else on the same entity. Those that follow it see a jump.
     pub(super) fn anew(&self) -> Self {
         Self { jumps: self.jumps, warned_of: self.warned_of, ..Self::default() }
+    }
+
+    /// Begins [`anew`](Self::anew) if another asset than before is played. The time is the game's to set.
+    pub(super) fn play_asset(&mut self, asset: UntypedAssetId) {
+        if self.asset != Some(asset) {
+            *self = Self { asset: Some(asset), ..self.anew() };
+        }
+    }
+
+    /// Returns whether no time has passed yet since its first moment, or the one that was last sought.
+    pub(super) fn is_unplayed(&self) -> bool {
+        self.span.is_none() || self.fresh
     }
 
     /// Returns the time, in seconds since the capture's start, without the rounding of

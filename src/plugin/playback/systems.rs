@@ -10,6 +10,7 @@ use super::markers::Markers;
 use super::messages::Announcer;
 use super::state::PlaybackState;
 use super::timeline::{TimelinePlayer, TimelineTrack};
+use crate::plugin::asset::Uploads;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use bevy::asset::{AssetId, Assets};
 use bevy::ecs::change_detection::DetectChangesMut;
@@ -42,10 +43,12 @@ pub(super) fn run_clocks(time: Res<Time>, mut clocks: Query<&mut PlaybackClock>)
     }
 }
 
-/// Advances the playback of every capture that has been loaded, those that are followed before their followers.
+/// Advances the playback of every capture that has been loaded, those that are followed before their followers. It begins with the first
+/// picture: until then no time passes.
 pub(super) fn advance_captures(
     time: Res<Time>,
     captures: Res<Assets<GaussianCapture>>,
+    uploads: Res<Uploads>,
     following: Following,
     clocks: Query<&PlaybackClock>,
     others: Query<(&Playback, &PlaybackState), (Without<GaussianCapture3d>, Without<TimelinePlayer>)>,
@@ -58,17 +61,19 @@ pub(super) fn advance_captures(
     let _span = debug_span!("gs4d/playback").entered();
     let order = following.order(players.iter().map(|(entity, ..)| entity));
     for player in order {
-        let mut state = match players.get(player) {
-            Ok((_, handle, _, state, _)) if captures.contains(&handle.0) => state.clone(),
+        let (id, mut state) = match players.get(player) {
+            Ok((_, handle, _, state, _)) if captures.contains(&handle.0) => (handle.0.id(), state.clone()),
             Ok(_) | Err(_) => continue,
         };
+        state.play_asset(id.untyped());
+        let awaited = state.is_unplayed() && uploads.awaits(id);
         let shown = |clock: Entity| {
             let by_player = |(playback, state): (&Playback, &PlaybackState)| Shown::by_player(playback, state);
             let by_clock = clocks.get(clock).ok().map(Shown::by_clock);
             let by_capture = || players.get(clock).ok().map(|(_, _, playback, state, _)| by_player((playback, state)));
             by_clock.or_else(by_capture).or_else(|| others.get(clock).ok().map(by_player))
         };
-        let drive = following.drive(player, &time, shown, &mut state);
+        let drive = following.drive(player, &time, shown, &mut state).unless(awaited);
         let Ok((entity, handle, mut playback, mut kept, markers)) = players.get_mut(player) else { continue };
         let Some(capture) = captures.get(&handle.0) else { continue };
         let (next, progress) = state.advance(*playback, drive, capture.duration_seconds());

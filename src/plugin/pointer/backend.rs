@@ -3,6 +3,7 @@
 //! In: Bevy's map of rays, cameras and captures with their layers and `Pickable`. Out: one `PointerHits` for each ray that hits a capture.
 
 use super::settings::{CapturePickingCamera, CapturePickingSettings};
+use crate::plugin::asset::CaptureState;
 use crate::plugin::component::GaussianCapture3d;
 use crate::plugin::picking::CapturePicker;
 use bevy::camera::visibility::{RenderLayers, ViewVisibility};
@@ -22,7 +23,10 @@ pub(super) fn update_hits(
     settings: Res<CapturePickingSettings>,
     rays: Res<RayMap>,
     cameras: Query<(&Camera, Has<CapturePickingCamera>, Option<&RenderLayers>), With<Camera3d>>,
-    captures: Query<(&ViewVisibility, Option<&Pickable>, Option<&RenderLayers>), With<GaussianCapture3d>>,
+    captures: Query<
+        (&ViewVisibility, &CaptureState, Option<&Pickable>, Option<&RenderLayers>),
+        With<GaussianCapture3d>,
+    >,
     picker: CapturePicker,
     mut hits: MessageWriter<PointerHits>,
 ) {
@@ -37,14 +41,16 @@ pub(super) fn update_hits(
         }
         let layers = layers.cloned().unwrap_or_default();
         let takes_part = |capture: Entity| {
-            let Ok((visibility, pickable, its_layers)) = captures.get(capture) else { return false };
+            let Ok((visibility, state, pickable, its_layers)) = captures.get(capture) else { return false };
             // One that is not hoverable may still hide what is behind it.
             let matters = pickable.is_none_or(|pickable| pickable.is_hoverable || pickable.should_block_lower);
-            let is_seen = visibility.get() && layers.intersects(&its_layers.cloned().unwrap_or_default());
+            // One that is still uploaded, or that the GPU refuses, would be an invisible obstacle.
+            let is_drawn = visibility.get() && *state == CaptureState::Ready;
+            let is_seen = is_drawn && layers.intersects(&its_layers.cloned().unwrap_or_default());
             is_seen && matters && (pickable.is_some() || !settings.require_markers)
         };
         let blocks = |capture: Entity| {
-            let Ok((_, pickable, _)) = captures.get(capture) else { return false };
+            let Ok((_, _, pickable, _)) = captures.get(capture) else { return false };
             pickable.is_none_or(|pickable| pickable.should_block_lower)
         };
         let picks: Vec<(Entity, HitData)> = picker

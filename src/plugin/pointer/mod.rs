@@ -27,7 +27,8 @@
 //! point in the world; there is no normal; the extra data is the [`CaptureHit`](crate::picking::CaptureHit).
 //!
 //! `Pickable` on a capture has its usual meaning: `Pickable::IGNORE` lets pointers through. Hidden captures, those that no camera sees,
-//! and those on other `RenderLayers` are not hit. Of several cameras in one target, what the one with the highest order sees comes first.
+//! those on other `RenderLayers`, and those that are not [ready](crate::asset::CaptureState::Ready) are not hit. Of several cameras in one
+//! target, what the one with the highest order sees comes first.
 //!
 //! Each frame, every pointer casts one ray for each camera that it is over, on the CPU, at each capture whose box the ray meets. Where that is
 //! too much, let only some captures and cameras take part: [`CapturePickingSettings`].

@@ -32,6 +32,7 @@ pub struct CaptureStatistics(Arc<Mutex<Shared>>);
 #[derive(Debug, Default)]
 struct Shared {
     measure: bool,
+    measure_for_panel: bool,
     views: Vec<(Entity, ViewStatistics)>,
     capture_bytes: u64,
     uploaded_captures: usize,
@@ -43,9 +44,15 @@ struct Shared {
 
 impl CaptureStatistics {
     /// Starts or stops measuring the GPU time of each pass. The first times arrive some frames later; on a GPU without timestamps none
-    /// arrive. Default: not measured.
+    /// arrive. The inspector also measures while it shows these times. Default: not measured.
     pub fn measure(&self, on: bool) {
         self.lock().measure = on;
+    }
+
+    /// Starts or stops measuring for the inspector, whatever the game has asked for.
+    #[cfg(feature = "inspector")]
+    pub(crate) fn measure_for_panel(&self, on: bool) {
+        self.lock().measure_for_panel = on;
     }
 
     /// Returns the statistics of one camera, by its entity in the main world; `None` while it sees no capture and holds
@@ -89,8 +96,9 @@ impl CaptureStatistics {
         self.lock().renderer_missing = why;
     }
 
-    pub(super) fn is_measuring(&self) -> bool {
-        self.lock().measure
+    pub(crate) fn is_measuring(&self) -> bool {
+        let shared = self.lock();
+        shared.measure || shared.measure_for_panel
     }
 
     /// Replaces the numbers by those of a new frame: of each camera that sees captures or holds memory for them, the bytes and the

@@ -5,7 +5,7 @@
 
 use super::error::TestingError;
 use super::pipelines::{pipelines_are_ready, require_renderer, watch_pipelines};
-use crate::plugin::asset::CaptureState;
+use crate::plugin::asset::{CaptureState, Uploads};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::{Timeline, TimelinePlayer};
 use crate::plugin::render::CaptureStatistics;
@@ -157,9 +157,15 @@ fn missing(world: &mut World) -> Result<Vec<String>, TestingError> {
 /// Returns what of captures that have been loaded is not drawn yet.
 fn uploading(world: &mut World) -> Vec<String> {
     let mut spawned = world.query::<(&GaussianCapture3d, &CaptureState)>();
+    let players = players(world);
     let Some(loaded) = world.get_resource::<Assets<GaussianCapture>>() else { return Vec::new() };
     let waiting = spawned.iter(world).filter(|(_, state)| **state == CaptureState::Loading);
     let waiting = waiting.map(|(capture, _)| capture.0.id()).filter(|id| loaded.contains(*id));
+    // Those of later clips are on no entity yet, and timelines wait for them.
+    let uploads = world.get_resource::<Uploads>();
+    let is_awaited = |id: AssetId<GaussianCapture>| uploads.is_some_and(|uploads| uploads.awaits(id));
+    let clips = clips(world, &players).into_iter().filter(|id| loaded.contains(*id) && is_awaited(*id));
+    let waiting = waiting.chain(clips);
     // Of those that have changed, older versions are drawn.
     let changed = world.get_resource::<CaptureStatistics>().map_or(0, CaptureStatistics::uploading_captures);
     waiting.map(|id| id.to_string()).chain((changed > 0).then(|| format!("{changed} captures on their way"))).collect()
@@ -172,14 +178,25 @@ fn captures(world: &mut World) -> Vec<UntypedAssetId> {
 
 /// Returns the timelines that are needed, and the captures of those that have been loaded.
 fn timelines(world: &mut World) -> Vec<UntypedAssetId> {
+    let players = players(world);
+    let Some(timelines) = world.get_resource::<Assets<Timeline>>() else { return Vec::new() };
+    let mut absent = absent(world, clips(world, &players).into_iter());
+    absent.extend(players.iter().filter(|player| !timelines.contains(**player)).map(|player| player.untyped()));
+    absent
+}
+
+/// Returns the timelines that are played.
+fn players(world: &mut World) -> Vec<AssetId<Timeline>> {
     let mut players = world.query::<&TimelinePlayer>();
-    let players: Vec<AssetId<Timeline>> = players.iter(world).map(|player| player.0.id()).collect();
+    players.iter(world).map(|player| player.0.id()).collect()
+}
+
+/// Returns the captures of those timelines that have been loaded.
+fn clips(world: &World, players: &[AssetId<Timeline>]) -> Vec<AssetId<GaussianCapture>> {
     let Some(timelines) = world.get_resource::<Assets<Timeline>>() else { return Vec::new() };
     let loaded = players.iter().filter_map(|player| timelines.get(*player));
     let clips = loaded.flat_map(|timeline| timeline.tracks()).flat_map(|track| &track.clips);
-    let mut absent = absent(world, clips.map(|clip| clip.capture.id()));
-    absent.extend(players.iter().filter(|player| !timelines.contains(**player)).map(|player| player.untyped()));
-    absent
+    clips.map(|clip| clip.capture.id()).collect()
 }
 
 /// Returns those that are not among the assets.

@@ -12,7 +12,7 @@ use glam::{Affine3A, Vec3};
 ///
 /// The ellipse is inscribed in the capture's bounds, seen from above, follows them over time, and fades with the capture's opacity and as
 /// it rises above the ground. It needs no light, and costs as much as one small quad. It is drawn over opaque meshes (alpha-masked ones may cover it) and
-/// behind captures, by a child entity that is despawned with this component.
+/// behind captures, while the capture is drawn, by a child entity that is despawned with this component or the capture.
 ///
 /// # Examples
 ///

@@ -1,11 +1,13 @@
 //! Placing: the mesh of each contact shadow, under its capture.
 //!
-//! In: captures with a [`CaptureContactShadow`], their bounds in world space. Out: a child of each with a mesh, placed anew in every frame,
-//! and none of those without.
+//! In: captures with a [`CaptureContactShadow`], their bounds in world space. Out: a child of each with a mesh, placed anew in every frame
+//! and hidden while its capture is not drawn; and none of those without.
 
 use super::component::{CaptureContactShadow, Ellipse};
 use super::gradient::gradient;
 use super::material::{BlendedEarly, ContactShadowMaterial};
+use crate::plugin::asset::CaptureState;
+use crate::plugin::component::GaussianCapture3d;
 use crate::plugin::playback::ClipFade;
 use crate::plugin::render::CaptureSettings;
 use bevy::asset::{Assets, Handle};
@@ -36,7 +38,7 @@ pub(super) struct ContactShadowMesh {
 
 /// Spawns the meshes of new contact shadows and despawns those of removed ones.
 pub(super) fn spawn_contact_shadows(
-    captures: Query<(Entity, Option<&Children>), With<CaptureContactShadow>>,
+    captures: Query<(Entity, Option<&Children>), (With<CaptureContactShadow>, With<GaussianCapture3d>)>,
     shadows: Query<(Entity, &ChildOf), With<ContactShadowMesh>>,
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<ContactShadowMaterial>>,
@@ -85,6 +87,7 @@ fn black() -> ContactShadowMaterial {
 
 type Capture = (
     &'static CaptureContactShadow,
+    &'static CaptureState,
     &'static CaptureSettings,
     Option<&'static ClipFade>,
     &'static GlobalTransform,
@@ -112,7 +115,9 @@ pub(super) fn place_contact_shadows(
     mut commands: Commands,
 ) {
     for (entity, parent, mut mesh, mut place, mut visibility, material, shadow_layers) in &mut shadows {
-        let Ok((settings, capture, fade, transform, bounds, layers)) = captures.get(parent.parent()) else { continue };
+        let Ok((settings, state, capture, fade, transform, bounds, layers)) = captures.get(parent.parent()) else {
+            continue;
+        };
         let opacity = capture.appearance(fade.copied().unwrap_or_default().0).opacity.min(1.0);
         if shadow_layers != layers {
             let mut entity = commands.entity(entity);
@@ -121,6 +126,7 @@ pub(super) fn place_contact_shadows(
                 None => entity.try_remove::<RenderLayers>(),
             };
         }
+        let bounds = bounds.filter(|_| *state == CaptureState::Ready);
         let ellipse = bounds.and_then(|bounds| ellipse(settings, bounds, &transform.affine(), opacity));
         let shown = if ellipse.is_some() { Visibility::Inherited } else { Visibility::Hidden };
         visibility.set_if_neq(shown);

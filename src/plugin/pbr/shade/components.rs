@@ -2,9 +2,11 @@
 //!
 //! In: fields that any system or animation may set. Out: the same, for [`extract`](super::extract).
 
+use bevy::camera::Exposure;
 use bevy::color::LinearRgba;
 use bevy::ecs::component::Component;
 use bevy::ecs::reflect::ReflectComponent;
+use bevy::light::GlobalAmbientLight;
 use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 
@@ -46,8 +48,11 @@ pub struct ReceivesShadows {
 /// [`GaussianCapture3d`](crate::GaussianCapture3d).
 ///
 /// The linear light of the capture is multiplied by that of the surroundings: the mean of the camera's `EnvironmentMapLight`, in six
-/// directions, times its intensity, plus the ambient light, both at the camera's exposure. This is about what a white surface shows there,
-/// so that captures keep their trained colors where white meshes are white. Light probes, irradiance volumes and lamps do not count.
+/// directions, times its intensity, plus the ambient light, both at the camera's exposure. Light probes, irradiance volumes and lamps do not
+/// count.
+///
+/// By default a capture looks as trained under Bevy's own ambient light, brighter in a brighter room, and darker in a darker one. In a scene
+/// that an `EnvironmentMapLight` of full intensity lights, so that a white surface is white, set `reference: 1.0`.
 ///
 /// # Examples
 ///
@@ -66,9 +71,9 @@ pub struct ReceivesShadows {
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 pub struct CaptureLight {
-    /// The light of the surroundings under which the capture looks as trained: mean radiance times `EnvironmentMapLight::intensity`
-    /// (cd/m²), times the camera's exposure. At Bevy's default exposure 1 is about 1000 cd/m². Without a finite value above 0 the capture is not
-    /// changed. Default: 1.
+    /// The light of the surroundings under which the capture looks as trained: that of the ambient light, or mean radiance times
+    /// `EnvironmentMapLight::intensity` (cd/m²), times the camera's exposure. At Bevy's default exposure 1 is about 1000 cd/m². Without a finite
+    /// value above 0 the capture is not changed. Default: Bevy's default ambient light of 80 cd/m² at its default exposure, about 0.08.
     pub reference: f32,
     /// How much of the surroundings' light the capture takes, from 0 (none: it looks as trained) to 1. Default: 1.
     pub amount: f32,
@@ -82,6 +87,20 @@ impl Default for ReceivesShadows {
 
 impl Default for CaptureLight {
     fn default() -> Self {
-        Self { reference: 1.0, amount: 1.0 }
+        Self { reference: GlobalAmbientLight::default().brightness * Exposure::default().exposure(), amount: 1.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_light_is_that_of_an_app_that_sets_none() {
+        // 80 cd/m² at an exposure value of 9.7.
+        let expected = 80.0 * (-9.7f32).exp2() / 1.2;
+        let CaptureLight { reference, amount } = CaptureLight::default();
+        assert!((reference - expected).abs() < 1e-4, "a capture looks as trained under {expected}, not {reference}");
+        assert_eq!(amount, 1.0, "and takes all of the light");
     }
 }

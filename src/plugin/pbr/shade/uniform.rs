@@ -103,9 +103,10 @@ mod tests {
     fn captures_that_only_fog_changes_are_not_listed_alone() {
         let plain = GpuSettings::new(UVec2::ONE, false, [PLAIN, PLAIN].iter());
         assert_eq!(plain.count, 0, "nothing to tell apart");
-        let mixed = GpuSettings::new(UVec2::ONE, true, [PLAIN, lit(CaptureLight::default())].iter());
+        let light = CaptureLight { reference: 0.5, amount: 1.0 };
+        let mixed = GpuSettings::new(UVec2::ONE, true, [PLAIN, lit(light)].iter());
         assert_eq!((mixed.count, mixed.is_linear), (2, 1), "both, since they must be told apart");
-        assert_eq!(mixed.shadings[0].light, Vec4::new(1.0, 1.0, 0.02, 0.0), "those that are shaded come first");
+        assert_eq!(mixed.shadings[0].light, Vec4::new(1.0, 2.0, 0.02, 0.0), "those that are shaded come first");
         assert_eq!((mixed.shadings[1].light.x, mixed.shadings[1].tint.w), (0.0, 0.0), "the other stays as it is");
     }
 

@@ -6,13 +6,14 @@
 use super::asset::Timeline;
 use super::clip::Clip;
 use super::player::{ClipFade, Directed, TimelinePlayer, TimelineTrack};
+use crate::plugin::asset::Uploads;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::clock::{FollowsClock, PlaybackClock};
 use crate::plugin::playback::component::Playback;
 use crate::plugin::playback::drive::{Following, Shown};
 use crate::plugin::playback::messages::Announcer;
 use crate::plugin::playback::state::PlaybackState;
-use bevy::asset::Assets;
+use bevy::asset::{AssetServer, Assets, LoadState};
 use bevy::camera::visibility::Visibility;
 use bevy::ecs::change_detection::{DetectChangesMut, Mut};
 use bevy::ecs::entity::Entity;
@@ -48,9 +49,13 @@ pub(in crate::plugin::playback) fn bind_tracks(
 }
 
 /// Advances the playheads, those that are followed before their followers. Captures advance later: who follows one is a frame behind it.
+/// Playing begins once the captures of all clips can be drawn.
 pub(in crate::plugin::playback) fn advance_timelines(
     time: Res<Time>,
     timelines: Res<Assets<Timeline>>,
+    captures: Res<Assets<GaussianCapture>>,
+    uploads: Res<Uploads>,
+    server: Res<AssetServer>,
     following: Following,
     clocks: Query<&PlaybackClock, Without<TimelinePlayer>>,
     others: Query<(&Playback, &PlaybackState), Without<TimelinePlayer>>,
@@ -60,10 +65,11 @@ pub(in crate::plugin::playback) fn advance_timelines(
     let _span = debug_span!("gs4d/timelines").entered();
     let order = following.order(players.iter().map(|(entity, ..)| entity));
     for player in order {
-        let mut state = match players.get(player) {
-            Ok((_, handle, _, state, _)) if timelines.contains(&handle.0) => state.clone(),
+        let (id, mut state) = match players.get(player) {
+            Ok((_, handle, _, state, _)) if timelines.contains(&handle.0) => (handle.0.id(), state.clone()),
             Ok(_) | Err(_) => continue,
         };
+        state.play_asset(id.untyped());
         let shown = |leader: Entity| {
             let by_timeline = players.get(leader).ok().map(|(.., clock)| Shown::by_clock(clock));
             let by_clock = || clocks.get(leader).ok().map(Shown::by_clock);
@@ -73,8 +79,10 @@ pub(in crate::plugin::playback) fn advance_timelines(
         let drive = following.drive(player, &time, shown, &mut state);
         let Ok((entity, handle, mut playback, mut kept, mut clock)) = players.get_mut(player) else { continue };
         let Some(timeline) = timelines.get(&handle.0) else { continue };
+        let mut clips = timeline.tracks().iter().flat_map(|track| &track.clips);
+        let awaited = state.is_unplayed() && clips.any(|clip| awaits(clip, &captures, &uploads, &server));
         let jumps = state.jumps;
-        let (next, progress) = state.advance(*playback, drive, timeline.duration_seconds());
+        let (next, progress) = state.advance(*playback, drive.unless(awaited), timeline.duration_seconds());
         playback.set_if_neq(next);
         let mut shown = *clock;
         if state.jumps != jumps {
@@ -86,6 +94,15 @@ pub(in crate::plugin::playback) fn advance_timelines(
         clock.set_if_neq(shown);
         announcer.report(entity, &progress, |announcer, leg| announcer.markers(entity, timeline.markers(), leg));
     }
+}
+
+/// Returns whether a clip's capture is still on its way into memory or, for the first time, to the GPU. One that has failed is not.
+fn awaits(clip: &Clip, captures: &Assets<GaussianCapture>, uploads: &Uploads, server: &AssetServer) -> bool {
+    let id = clip.capture.id();
+    if captures.contains(id) {
+        return uploads.awaits(id);
+    }
+    matches!(server.get_load_state(id), Some(LoadState::NotLoaded | LoadState::Loading))
 }
 
 /// Gives every track's entity its clip, fade and visibility at this time.

@@ -19,7 +19,8 @@ use bevy::transform::components::Transform;
 ///
 /// Its [`Playback`] is the playhead: play, pause, seek, reverse and loop it like that of a capture, or let it
 /// [follow a clock](crate::playback::FollowsClock). Its own [`PlaybackClock`] shows the time of the playhead to its tracks. Other captures
-/// and timelines can follow the player, too.
+/// and timelines can follow the player, too. It begins to play once the captures of all clips can be drawn; one that has failed is not waited
+/// for.
 ///
 /// Each track is played by the child with the [`TimelineTrack`] of its name. For a track without such a child, one is spawned.
 ///
