@@ -83,7 +83,10 @@ impl Render {
         let background = self.checkpoint.background.map_or(scene.trained_background(), Background::Color);
         let trained_pixel = scene.trained_with.pixel.filter(|_| self.antialias);
         if self.antialias && trained_pixel.is_none() {
-            return Err(Failure::about(&self.scene, "does not tell the size of training pixels: add it with gs4d detail --data DIR"));
+            return Err(Failure::about(
+                &self.scene,
+                "does not tell the size of training pixels: add it with gs4d detail --data DIR",
+            ));
         }
         let with_view = |shot: Shot| {
             let view = shot.view(&scene).antialiased(trained_pixel);

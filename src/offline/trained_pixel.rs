@@ -52,6 +52,10 @@ mod tests {
         let found = trained_pixel(&scene, &views).expect("they look at it");
         assert!((found - 0.1).abs() < 1e-4, "{found}");
         assert_eq!(trained_pixel(&scene, &[]), None, "without views");
-        assert_eq!(trained_pixel(&RuntimeScene::sliced(Vec::new(), Harmonics::default()), &views), None, "without a scene");
+        assert_eq!(
+            trained_pixel(&RuntimeScene::sliced(Vec::new(), Harmonics::default()), &views),
+            None,
+            "without a scene"
+        );
     }
 }

@@ -1,16 +1,21 @@
-//! Levels of detail in headless apps.
+//! Captures that are small on the screen, in headless apps: levels of detail and anti-aliasing.
 //!
-//! In: a capture with levels made by hand, far away and near. Out: proof that the level follows the size on the screen without flicker, that
-//! settings limit it, and that captures without levels are drawn as they are. Skipped where there is no GPU.
+//! In: a capture with levels made by hand, and the bundled one, far away and near. Out: proof that the level follows the size on the screen
+//! without flicker, that settings limit it, that the bundled capture's levels hardly change a screen, that captures without levels are drawn
+//! as they are, and anti-aliased as the CPU reference draws them. Skipped where there is no GPU.
 
 use crate::support::blob::blob;
-use crate::support::cpu_reference::{SIZE, add, scene};
-use crate::support::offscreen_app::{app, picture, spawn_camera};
+use crate::support::cpu_reference::{SIZE, add, scene, view};
+use crate::support::fixtures::{check, insert, reference_picture, spawn, synthetic};
+use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
 use bevy::prelude::*;
 use bevy_gs4d::GaussianCapture3d;
+use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::render::{CaptureDetail, CaptureSettings, CaptureStatistics};
-use bevy_gs4d::scene::{Level, RuntimeScene};
+use bevy_gs4d::scene::{Level, RuntimeScene, TrainedWith};
+use bevy_gs4d::view::Appearance;
+use image::RgbaImage;
 use std::sync::Arc;
 
 /// Returns as many equal Gaussians.
@@ -102,4 +107,65 @@ fn a_capture_without_levels_is_drawn_as_it_is() {
     stage.set(CaptureSettings { finest_level: 2, ..default() });
     stage.app.insert_resource(CaptureDetail { bias: -4.0, ..default() });
     assert_eq!(stage.drawn_from(distance_of(8.0)), 100, "all Gaussians");
+}
+
+/// Returns the PSNR of two pictures, dB.
+fn psnr(a: &RgbaImage, b: &RgbaImage) -> f64 {
+    let (mut squares, mut count) = (0.0, 0u32);
+    for (a, b) in a.pixels().zip(b.pixels()) {
+        squares += a.0[..3].iter().zip(&b.0[..3]).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2)).sum::<f64>();
+        count += 3;
+    }
+    -10.0 * (squares / f64::from(count) / 255.0f64.powi(2)).log10()
+}
+
+#[test]
+fn the_bundled_captures_levels_hardly_change_a_screen() {
+    let size = UVec2::new(1280, 720);
+    let Some(mut app) = app(size) else { return };
+    let camera = spawn_camera(&mut app, Msaa::Off, Transform::default());
+    let handle = app.world().resource::<AssetServer>().load("toybox.gs4d");
+    app.world_mut().spawn((GaussianCapture3d(handle.clone()), Playback::paused_at(1.3)));
+    picture(&mut app, 0.0);
+    let (bounds, sizes) = {
+        let capture = app.world().resource::<Assets<GaussianCapture>>().get(&handle).expect("it has been loaded");
+        let sizes: Vec<f32> = capture.scene().levels.iter().map(|level| level.pixels).collect();
+        (capture.bounds().expect("it has Gaussians"), sizes)
+    };
+    assert_eq!(sizes.len(), 3, "the levels of the bundled capture");
+    let focal = size.y as f32 / (2.0 * (FOV_Y / 2.0).tan());
+    let drawn = |app: &App| app.world().resource::<CaptureStatistics>().view(camera).expect("it is seen").total;
+    let mut before = u32::MAX;
+    for pixels in sizes {
+        // Just below the limit.
+        let distance = 2.0 * focal * bounds.radius() / (0.99 * pixels);
+        let eye = bounds.center() + Vec3::new(0.5, -0.7, 0.4).normalize() * distance;
+        insert(&mut app, camera, Transform::from_translation(eye).looking_at(bounds.center(), Vec3::Z));
+        app.insert_resource(CaptureDetail { bias: 16.0, ..default() });
+        let all = picture(&mut app, 0.0);
+        app.insert_resource(CaptureDetail { bias: -0.4, ..default() });
+        let level = picture(&mut app, 0.0);
+        assert!(drawn(&app) < before, "{} Gaussians, {before} of the finer level", drawn(&app));
+        before = drawn(&app);
+        let found = psnr(&all, &level);
+        assert!(found >= 45.0, "{found} dB at {pixels} pixels");
+    }
+}
+
+#[test]
+fn captures_smaller_than_in_training_are_anti_aliased() {
+    let Some(mut app) = app(SIZE) else { return };
+    let trained_with = TrainedWith { pixel: Some(0.004), ..TrainedWith::default() };
+    let scene = RuntimeScene { trained_with, ..synthetic(500, 3, false) };
+    let pose = Transform::from_xyz(3.0, -5.0, 2.0).looking_at(Vec3::ZERO, Vec3::Y);
+    spawn_camera(&mut app, Msaa::Off, pose);
+    let capture = spawn(&mut app, &scene, ());
+    let plain = view(&pose, SIZE, 0.0);
+    let [smooth, fat] = [plain.antialiased(scene.trained_with.pixel), plain]
+        .map(|view| reference_picture(&scene, view, Appearance::default()));
+    let apart = smooth.pixels.iter().zip(&fat.pixels).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
+    assert!(apart > 0.1, "there is something to see: {apart}");
+    check(&mut app, &smooth, "anti-aliased");
+    insert(&mut app, capture, CaptureSettings { antialias: false, ..default() });
+    check(&mut app, &fat, "as the original");
 }

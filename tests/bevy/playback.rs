@@ -296,12 +296,9 @@ fn a_capture_has_markers_of_its_own() {
 fn a_marker_at_either_end_of_a_loop_is_reached_from_there() {
     const START: (f32, &str) = (0.0, "start");
     const END: (f32, &str) = (2.0, "end");
-    for (speed, sought, expected) in [
-        (1.0, 2.0, vec![END, START]),
-        (1.0, 0.0, vec![START]),
-        (-1.0, 0.0, vec![START, END]),
-        (-1.0, 2.0, vec![END]),
-    ] {
+    for (speed, sought, expected) in
+        [(1.0, 2.0, vec![END, START]), (1.0, 0.0, vec![START]), (-1.0, 0.0, vec![START, END]), (-1.0, 2.0, vec![END])]
+    {
         let mut app = app("assets");
         let playback = Playback { time: 1.0, speed, ..default() };
         let entity = spawn(&mut app, (playback, Markers::new([START, END])));

@@ -423,7 +423,9 @@ fn without_tonemapping_bevy_shows_what_the_command_renders() {
     let clear = [51u8, 102, 153];
     let background = Background::Color(clear.map(|value| f32::from(value) / 255.0));
     let capture = headless.upload(&scene).expect("it fits");
-    let frame = headless.render(&capture, &view(&pose, size, time), background).expect("it is drawn");
+    // As with `--antialias`.
+    let shown = view(&pose, size, time).antialiased(scene.trained_with.pixel);
+    let frame = headless.render(&capture, &shown, background).expect("it is drawn");
     let expected = frame.picture.to_rgb8();
     assert!(expected.pixels().filter(|pixel| pixel.0 != clear).count() > 2000, "the capture is in view");
 

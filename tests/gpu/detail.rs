@@ -55,7 +55,8 @@ fn screen_psnr(a: &Frame, b: &Frame) -> f64 {
         (frame.picture.pixels[at] + frame.transmittance[at] * behind).clamp(Vec3::ZERO, Vec3::ONE)
     };
     let of = |behind: f32| {
-        let squares: f32 = (0..a.picture.pixels.len()).map(|at| (over(a, at, behind) - over(b, at, behind)).length_squared()).sum();
+        let squares: f32 =
+            (0..a.picture.pixels.len()).map(|at| (over(a, at, behind) - over(b, at, behind)).length_squared()).sum();
         -10.0 * (f64::from(squares) / (3.0 * 1280.0 * 720.0)).log10()
     };
     of(0.0).min(of(1.0))

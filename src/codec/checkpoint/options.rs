@@ -130,6 +130,7 @@ pub fn describe(trained_with: &TrainedWith, playback: &PlaybackHints) -> Vec<(&'
         ("prefilter variance", if prefilter > 0.0 { prefilter.to_string() } else { "off".to_owned() }),
         ("iteration", trained_with.iteration.to_string()),
         ("spatial lr scale", trained_with.spatial_lr_scale.to_string()),
+        ("training pixel", trained_with.pixel.map_or("not known".to_owned(), |pixel| format!("{pixel} units"))),
         ("up", axis(playback.up).to_owned()),
         ("duration", format!("{} s", playback.duration_seconds)),
     ]

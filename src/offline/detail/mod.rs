@@ -28,9 +28,8 @@ use serde::Serialize;
 use std::sync::Arc;
 
 /// Sizes on the screen at which levels are compared, pixels: each about a quarter more than the one before.
-const SIZES: [f32; 19] = [
-    4.0, 5.0, 6.3, 8.0, 10.0, 12.5, 16.0, 20.0, 25.0, 32.0, 40.0, 50.0, 63.0, 80.0, 100.0, 125.0, 160.0, 200.0, 250.0,
-];
+const SIZES: [f32; 19] =
+    [4.0, 5.0, 6.3, 8.0, 10.0, 12.5, 16.0, 20.0, 25.0, 32.0, 40.0, 50.0, 63.0, 80.0, 100.0, 125.0, 160.0, 200.0, 250.0];
 /// How many times fewer Gaussians a level has than the one before.
 const COARSER: usize = 7;
 /// Gaussians for each square pixel of the size that a level is meant for.
@@ -246,7 +245,11 @@ mod tests {
         let good = |pixels| close(pixels, 50.0, 30.0, 20.0);
         let limit = |measured: &[Closeness]| largest(measured, 45.0).map(|close| close.pixels);
         assert_eq!(limit(&[good(4.0), good(6.0), close(8.0, 44.0, 30.0, 20.0)]), Some(6.0), "the screen changes");
-        assert_eq!(limit(&[good(4.0), good(6.0), close(8.0, 50.0, 19.0, 20.0)]), Some(6.0), "all are closer to the truth");
+        assert_eq!(
+            limit(&[good(4.0), good(6.0), close(8.0, 50.0, 19.0, 20.0)]),
+            Some(6.0),
+            "all are closer to the truth"
+        );
         let gap = [good(4.0), close(6.0, 50.0, 19.0, 20.0), good(8.0), good(11.0), good(16.0), good(23.0)];
         assert_eq!(limit(&gap), Some(23.0), "smaller sizes are those of other levels");
         assert_eq!(limit(&gap[..4]), Some(4.0), "but not the next two");

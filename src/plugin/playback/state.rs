@@ -11,7 +11,7 @@ use bevy::ecs::entity::Entity;
 #[derive(Component, Debug, Default, Clone)]
 pub(super) struct PlaybackState {
     /// The capture or the timeline that is played; `None` before the first step.
-    asset: Option<UntypedAssetId>,
+    pub(super) asset: Option<UntypedAssetId>,
     /// How far it has played, without the rounding of [`Playback::time`](super::Playback::time).
     pub(super) phase: f64,
     /// The range that `phase` is measured in; `None` before the first step.

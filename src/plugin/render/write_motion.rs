@@ -14,8 +14,8 @@ use bevy::ecs::world::{FromWorld, World};
 use bevy::render::render_resource::binding_types::{texture_2d, uniform_buffer};
 use bevy::render::render_resource::{
     BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, BindingResource, ColorTargetState,
-    ColorWrites, FragmentState, MultisampleState, PipelineCache,
-    RenderPipelineDescriptor, ShaderStages, SpecializedRenderPipeline, TextureSampleType, VertexState,
+    ColorWrites, FragmentState, MultisampleState, PipelineCache, RenderPipelineDescriptor, ShaderStages,
+    SpecializedRenderPipeline, TextureSampleType, VertexState,
 };
 use bevy::render::renderer::RenderDevice;
 use bevy::shader::{Shader, ShaderDefVal};
