@@ -17,9 +17,9 @@ use std::path::PathBuf;
 
 /// Add levels of detail: the same capture of fewer Gaussians, for where it is small on the screen.
 ///
-/// Each level is trained on the truth, which is pictures of all Gaussians with many more pixels, made smaller, and compared with it from
-/// all around, at several times and sizes. It is drawn up to the largest size at which it is as close to the truth as all Gaussians are,
-/// and its taking their place changes a screen by no less than --min-psnr; it is left out if there is none. With --data, all Gaussians are
+/// Each level is trained on pictures of all Gaussians, half on the truth, which has many more pixels and is made smaller. It is compared
+/// with both from all around, at several times and sizes, and drawn up to the largest size at which it is as close to the truth as all
+/// Gaussians are, within 0.5 dB, and its taking their place changes a screen by no less than --min-psnr; it is left out if there is none. With --data, all Gaussians are
 /// anti-aliased from then on where they are drawn smaller than in training. Needs a GPU; a software driver is enough.
 #[derive(clap::Args)]
 #[command(after_help = "\

@@ -127,6 +127,15 @@ const VERBS: [Verb; 10] = [
         files: PACKAGE,
         needs_gpu: true,
     },
+    Verb {
+        name: "detail",
+        arguments: |from, to| {
+            let few = arguments!["--levels", "1", "--steps", "2", "--directions", "1", "--times", "1"];
+            [on_data("detail", from), few.to_vec(), arguments!["-o", to.join("made.gs4d")].to_vec()].concat()
+        },
+        files: PACKAGE,
+        needs_gpu: true,
+    },
 ];
 
 /// Returns the arguments of a verb that looks at the training views of the scene.

@@ -35,7 +35,7 @@ pub(super) fn fit(
     let trained_pixel = scene.trained_with.pixel;
     let views: Vec<View> = looks.iter().map(|look| look.view.antialiased(trained_pixel)).collect();
     let mut trainer = Trainer::new(headless, scene, GradientMode::Exact)?;
-    let images = looks.iter().map(|look| trainer.upload(&covered(&look.truth)));
+    let images = looks.iter().map(|look| trainer.upload(&covered(&look.target())));
     let images: Vec<GpuImage> = images.collect::<Result<_, _>>()?;
     if let Some(largest) = views.iter().max_by_key(|view| view.size.x) {
         trainer.make_room(largest)?;

@@ -44,7 +44,7 @@ pub(super) struct Look {
     /// The view, without anti-aliasing.
     pub view: View,
     /// All Gaussians in a finer picture: each pixel is the mean of many.
-    pub truth: Frame,
+    truth: Frame,
     /// All Gaussians, drawn at this size.
     all: Frame,
     /// The corners of the capture's rectangle in the picture, the last one outside.
@@ -132,6 +132,20 @@ pub(super) fn looks(
     }
     progress.finish();
     Ok(all)
+}
+
+impl Look {
+    /// Returns what a level is trained on: the mean of the truth and of what it takes the place of.
+    pub fn target(&self) -> Frame {
+        let mut mean = self.truth.clone();
+        for (pixel, other) in mean.picture.pixels.iter_mut().zip(&self.all.picture.pixels) {
+            *pixel = (*pixel + *other) * 0.5;
+        }
+        for (left, other) in mean.transmittance.iter_mut().zip(&self.all.transmittance) {
+            *left = (*left + *other) * 0.5;
+        }
+        mean
+    }
 }
 
 /// Returns a frame of which each pixel is the mean of `times` x `times` pixels.

@@ -3,11 +3,12 @@
 //! In: a scene, [`DetailSettings`]. Out: the scene with levels ([`Detailed`]), each with the size on the screen up to which it is drawn.
 //!
 //! 1. `merge` puts few Gaussians in place of many, with their moments in space and time; `rotation` makes raw parameters of these.
-//! 2. `fit` trains them on the truth at the sizes for which they are meant: on pictures of all Gaussians with many times as many pixels,
-//!    made smaller. All Gaussians drawn at such a size are far from that: each splat is blurred to at least half a pixel, as in the
-//!    original, so that many small ones look larger and denser than they are, and, made fainter for it ([anti-aliased]), thinner.
-//! 3. `looks` compares them in other views, at one size after the other. A level is drawn up to the size at which it is still as close to
-//!    the truth as all Gaussians are, and a screen on which it takes their place hardly changes. A level without such a size is not kept.
+//! 2. `fit` trains them at the sizes for which they are meant, on the mean of two pictures: the truth, which is all Gaussians with many
+//!    times as many pixels, made smaller, and all Gaussians drawn at that size, whose place they take. These are far apart: each splat is
+//!    blurred to at least half a pixel, as in the original, so that many small ones look larger and denser than they are, and, made
+//!    fainter for it ([anti-aliased]), thinner.
+//! 3. `looks` compares them in other views, at one size after the other. A level is drawn up to the size at which it is still about as close
+//!    to the truth as all Gaussians are, and a screen on which it takes their place hardly changes. A level without such a size is not kept.
 //!
 //! [anti-aliased]: crate::view::View::antialiased
 
@@ -33,9 +34,11 @@ const SIZES: [f32; 19] =
 /// How many times fewer Gaussians a level has than the one before.
 const COARSER: usize = 7;
 /// Gaussians for each square pixel of the size that a level is meant for.
-const DENSITY: f32 = 0.5;
+const DENSITY: f32 = 0.2;
 /// Sizes that a level is trained at, parts of the one that it is meant for.
 const TRAINED_AT: [f32; 3] = [1.0, 0.7, 0.5];
+/// How much farther from the truth than all Gaussians a level may be, dB.
+const FARTHER: f64 = 0.5;
 /// How many sizes below its limit a level must hold at, too. Below these it is the next level that is drawn.
 const SMALLER: usize = 2;
 /// Fewest Gaussians of a level.
@@ -220,7 +223,7 @@ impl Maker<'_> {
 /// Returns the largest size at which a level may be drawn: it holds there, and at the next smaller sizes. `None` if there is none.
 fn largest(measured: &[Closeness], min_psnr: f64) -> Option<Closeness> {
     // NaN is not close.
-    let holds = |close: &Closeness| close.screen >= min_psnr && close.truth >= close.all;
+    let holds = |close: &Closeness| close.screen >= min_psnr && close.truth >= close.all - FARTHER;
     let held = |&last: &usize| measured[last.saturating_sub(SMALLER)..=last].iter().all(holds);
     (0..measured.len()).rev().find(held).map(|last| measured[last])
 }
