@@ -1,10 +1,10 @@
 //! Wall-clock time of a Bevy app's frame in which a capture stands in a scene: what glass, fog, shadows and many copies cost.
 //!
 //! ```text
-//! cargo bench --features viewer,cli --bench scene -- [CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N]
+//! cargo bench --features viewer,cli --bench scene -- [CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N] [--only WORD]
 //! ```
 //!
-//! In: a capture (default: the bundled one), a picture size (1280x720), frames for each measurement (300), rounds (3). Out: milliseconds of a frame for each scene, the median of the
+//! In: a capture (default: the bundled one), a picture size (1280x720), frames for each measurement (300), rounds (3), a word in the names of the scenes (all). Out: milliseconds of a frame for each scene, the median of the
 //! rounds, how much longer it is than the scene that it is compared with, and the spread of the rounds. Default plugins, no window,
 //! rendering is pipelined, all apps take turns, and each measurement ends when the GPU has finished.
 
@@ -49,20 +49,32 @@ const SCENES: [(&str, Kind, Msaa, &str); 15] = [
     ("capture in the sun", Sun, Msaa::Off, "sun alone"),
     ("capture that casts a shadow", Shadow, Msaa::Off, "capture in the sun"),
     ("100 copies, 50 units away", Crowd, Msaa::Off, "nothing"),
-    ("the same without levels of detail", CrowdOfAll, Msaa::Off, "nothing"),
+    ("100 copies without levels of detail", CrowdOfAll, Msaa::Off, "nothing"),
 ];
 
 fn main() -> Result {
-    let arguments = common::parse(UVec2::new(1280, 720), 300, |_, _| Ok(false))?;
+    let mut wanted = String::new();
+    let arguments = common::parse(UVec2::new(1280, 720), 300, |option, value| {
+        let is_own = option == "--only";
+        if is_own {
+            wanted = value()?;
+        }
+        Ok(is_own)
+    })?;
+    let is_wanted = |(name, ..): &(&str, Kind, Msaa, &str)| {
+        let names = |other: &str| other.contains(&wanted);
+        names(name) || SCENES.iter().any(|(other, .., than)| names(other) && than == name)
+    };
+    let scenes: Vec<_> = SCENES.into_iter().filter(is_wanted).collect();
     let mut apps = Vec::new();
-    for (_, kind, msaa, _) in SCENES {
+    for &(_, kind, msaa, _) in &scenes {
         apps.push(app(&arguments, !apps.is_empty(), kind, msaa)?);
     }
     let measured = common::measure(&mut apps, &arguments)?;
     println!("{}, {}x{}", arguments.capture.display(), arguments.size.x, arguments.size.y);
     println!("{:<36} {:>9} {:>9} {:>15}  than", "scene", "frame ms", "more ms", "rounds ms");
     let mut known: Vec<(&str, f64)> = Vec::new();
-    for ((name, _, _, compared), Times { median: time, spread }) in SCENES.into_iter().zip(measured) {
+    for ((name, _, _, compared), Times { median: time, spread }) in scenes.into_iter().zip(measured) {
         known.push((name, time));
         let than = known.iter().find(|(name, _)| *name == compared).map_or(f64::NAN, |(_, time)| *time);
         println!("{name:<36} {time:>9.3} {:>9.3} {spread:>15}  {compared}", time - than);

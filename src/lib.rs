@@ -26,7 +26,7 @@
 //!    restricted unpickler, [`codec::package`] with a checksum on every byte. [`codec::load`] tells the formats apart by their first
 //!    bytes; [`offline::save()`] writes a file whole or not at all.
 //! 2. [`scene`] is what a capture is: its Gaussians and their color in the trained, the sliced or the packed form, an environment map,
-//!    a temporal filter, the switches it was trained with, and how it is meant to be played.
+//!    a temporal filter, levels of detail, the switches it was trained with, and how it is meant to be played.
 //! 3. [`gaussian`] is the maths. [`Parameters::slice`](gaussian::Parameters::slice) makes the runtime form, once: a 3D Gaussian in
 //!    straight-line motion under an opacity envelope ([`Gaussian`](gaussian::Gaussian), 64 bytes, the layout of the GPU record too).
 //! 4. [`renderer::GpuCapture`] holds that form, or the packed one, in buffers. In Bevy, [`asset`] loads the file in the background and
@@ -90,7 +90,7 @@
 //! | [`codec`] | files | |
 //! | [`mod@reference`] | the renderer's passes on the CPU, as plain functions over slices | |
 //! | [`renderer`] | wgpu: buffers, pipelines, one frame of a view | `renderer` |
-//! | [`offline`] | training views, metrics, scores, pruning, quantization, reports: from a checkpoint to a small capture | `offline` |
+//! | [`offline`] | training views, metrics, scores, pruning, quantization, levels of detail, reports: from a checkpoint to a small capture | `offline` |
 //! | [`plugin`] | Bevy | `bevy` |
 //! | [`cli`] | the `gs4d` command: options and printing over [`offline`] | `cli` |
 //!

@@ -148,11 +148,10 @@ struct InstanceUniforms {
     per_thread: u32,
     // Of the fast renderer: tiles along each side of a bin (8 bits) and a number of the frame, splats a bin has room for, number of this part, number of parts.
     binning: vec4<u32>,
-    // Variance on the screen of one training pixel squared, at one pixel for each camera unit.
-    trained_variance: f32,
+    // Variances on the screen of one training pixel squared, at one pixel for each camera unit.
+    trained_variance: vec2<f32>,
     spare_x: f32,
     spare_y: f32,
-    spare_z: f32,
     // Rows of capture-to-crop-box; the box is from -1 to 1.
     crop_x: vec4<f32>,
     crop_y: vec4<f32>,

@@ -19,8 +19,9 @@ use std::path::PathBuf;
 ///
 /// Each level is trained on pictures of all Gaussians, half on the truth, which has many more pixels and is made smaller. It is compared
 /// with both from all around, at several times and sizes, and drawn up to the largest size at which it is as close to the truth as all
-/// Gaussians are, within 0.5 dB, and its taking their place changes a screen by no less than --min-psnr; it is left out if there is none. With --data, all Gaussians are
-/// anti-aliased from then on where they are drawn smaller than in training. Needs a GPU; a software driver is enough.
+/// Gaussians are, within 0.5 dB, and its taking their place changes a screen by no less than --min-psnr; it is left out if there is
+/// none. With --data, all Gaussians are anti-aliased from then on where they are drawn smaller than in training. Needs a GPU; a software
+/// driver is enough.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -28,9 +29,9 @@ Examples:
   gs4d detail capture.gs4d -o detailed.gs4d --levels 2 --min-psnr 40
   gs4d detail chkpnt30000.pth -o detailed.gs4d --steps 5000 --json
 
-A size on the screen is the diameter of the sphere about the capture, in pixels. The PSNR of a screen is that of 1280x720 pixels; to the
-truth it is that inside the rectangle of the capture; over black or white, whichever is lower, in the worst view. Other verbs that write
-packages leave levels out: this one comes last.")]
+A size on the screen is the diameter of the sphere about the capture, in pixels; levels are compared, and drawn, up
+to 250. The PSNR of a screen is that of 1280x720 pixels; to the truth it is that inside the rectangle of the capture; over black or white,
+whichever is lower, in the worst view. Other verbs that write packages leave levels out: this one comes last.")]
 pub struct Detail {
     /// The checkpoint or package to read. Levels that it has are replaced.
     #[arg(value_name = "IN")]
@@ -71,7 +72,10 @@ impl Detail {
         if self.data.is_given() {
             let views = self.data.open(&scene.trained_with)?;
             let whole = scene.clone().into_runtime().map_err(|error| Failure::at(&self.input, &error))?;
-            scene.trained_with.pixel = trained_pixel(&whole, &views);
+            let pixel = trained_pixel(&whole, &views);
+            let pixel =
+                pixel.ok_or_else(|| Failure::about(&self.input, "no training view looks at it: is --data its own?"))?;
+            scene.trained_with.pixel = Some(pixel);
         }
         let mut headless = self.renderer.open()?;
         let settings = DetailSettings {
@@ -81,7 +85,7 @@ impl Detail {
             directions: self.directions,
             times: self.times,
         };
-        let count = scene.len();
+        let (count, pixel) = (scene.len(), scene.trained_with.pixel);
         let made = detail(&mut headless, scene, &settings, &mut Bars::default());
         let made = made.map_err(|error| Failure::at(&self.input, &error))?;
         let written = self.package.save(&made.scene)?;
@@ -93,6 +97,7 @@ impl Detail {
         let kept = made.scene.levels.len();
         let facts = lines(&[
             ("Gaussians", count.to_string()),
+            ("training pixel", pixel.map_or("not known: give --data".to_owned(), |pixel| format!("{pixel} units"))),
             ("levels", format!("{kept} of {} kept, at {} dB", made.made.len(), self.min_psnr)),
             ("wrote", format!("{}, {}", out.display(), bytes(written))),
         ]);
@@ -101,6 +106,7 @@ impl Detail {
             "out": out.display().to_string(),
             "bytes_out": written,
             "gaussians": count,
+            "pixel": pixel,
             "min_psnr": self.min_psnr,
             "kept": kept,
             "levels": made.made,

@@ -75,12 +75,6 @@ impl Render {
             let scene = scene.into_runtime().map_err(|error| Failure::at(&self.scene, &error))?;
             Ok::<_, Failure>((scene, opening.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))))
         })?;
-        let shots = self.views.shots(&scene, 1)?;
-        files.writes_folder(&self.out, shots.iter().flat_map(|shot| self.paths(shot))).check()?;
-        fs::create_dir_all(&self.out).map_err(|error| Failure::at(&self.out, &error))?;
-        let mut headless = headless?;
-        let capture = headless.upload(&scene)?;
-        let background = self.checkpoint.background.map_or(scene.trained_background(), Background::Color);
         let trained_pixel = scene.trained_with.pixel.filter(|_| self.antialias);
         if self.antialias && trained_pixel.is_none() {
             return Err(Failure::about(
@@ -88,6 +82,12 @@ impl Render {
                 "does not tell the size of training pixels: add it with gs4d detail --data DIR",
             ));
         }
+        let shots = self.views.shots(&scene, 1)?;
+        files.writes_folder(&self.out, shots.iter().flat_map(|shot| self.paths(shot))).check()?;
+        fs::create_dir_all(&self.out).map_err(|error| Failure::at(&self.out, &error))?;
+        let mut headless = headless?;
+        let capture = headless.upload(&scene)?;
+        let background = self.checkpoint.background.map_or(scene.trained_background(), Background::Color);
         let with_view = |shot: Shot| {
             let view = shot.view(&scene).antialiased(trained_pixel);
             (shot, view)

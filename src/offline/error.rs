@@ -57,7 +57,7 @@ pub enum OfflineError {
     },
     /// Pictures are too large for the memory.
     #[error(
-        "pictures of {}x{} pixels need {:.1} GB of memory, and {:.1} GB are available: draw smaller ones",
+        "pictures of {}x{} pixels need {:.1} GB of memory, and {:.1} GB are available: draw smaller ones, or fewer at once",
         .size.x, .size.y, *.needed as f64 / 1e9, *.available as f64 / 1e9
     )]
     Memory {

@@ -1,23 +1,29 @@
 //! The size of the pixels that a capture was trained with.
 //!
-//! In: a scene, the views it was trained on. Out: the size of a pixel of these views at the far side of the scene's core, beyond which
-//! pictures are anti-aliased.
+//! In: a scene, the views it was trained on. Out: the largest size that a pixel of these views has at its Gaussians, beyond which pictures
+//! are anti-aliased.
 
 use super::dataset::TrainingView;
-use crate::scene::{Bounds, RuntimeScene};
+use crate::scene::RuntimeScene;
 use crate::view::RasterFov;
+use rayon::prelude::*;
 
-/// Returns the largest size, in capture units, that a pixel of the training views has at the far side of the core of a scene
-/// ([`Bounds::core`]), so that no training view of it has larger ones; `None` without Gaussians, or if no view looks at the scene.
+/// One in so many Gaussians may be farther away: some are strays.
+const STRAYS: usize = 100;
+
+/// Returns the largest size, in capture units, that a pixel of the training views has at the Gaussians of a scene, but for the farthest
+/// hundredth in each view, so that none of these is drawn otherwise there; `None` if no view has a Gaussian in front of it.
 pub fn trained_pixel(scene: &RuntimeScene, views: &[TrainingView]) -> Option<f32> {
-    let core = Bounds::core(scene.iter())?;
     let size_in = |view: &TrainingView| {
         let view = view.camera.view(view.time, RasterFov::Corrected);
-        let depth = view.world_to_camera.transform_point3(core.center()).z + core.radius();
-        depth / view.focal().min_element()
+        let depths = scene.iter().map(|gaussian| view.world_to_camera.transform_point3(gaussian.mean.into()).z);
+        let mut depths: Vec<f32> = depths.filter(|&depth| depth > view.near).collect();
+        let farthest = depths.len().checked_sub(1 + depths.len() / STRAYS)?;
+        let (_, depth, _) = depths.select_nth_unstable_by(farthest, f32::total_cmp);
+        Some(*depth / view.focal().min_element())
     };
-    let sizes = views.iter().map(size_in).filter(|pixel| pixel.is_finite() && *pixel > 0.0);
-    sizes.reduce(f32::max)
+    let sizes = views.par_iter().filter_map(size_in).filter(|pixel| pixel.is_finite() && *pixel > 0.0);
+    sizes.reduce_with(f32::max)
 }
 
 #[cfg(test)]
@@ -37,8 +43,8 @@ mod tests {
 
     #[test]
     fn the_farthest_view_tells_the_size() {
-        let at = |x: f32| Gaussian {
-            mean: [x, 0.0, 0.0],
+        let at = |y: f32| Gaussian {
+            mean: [0.0, y, 0.0],
             mean_t: 0.0,
             velocity: [0.0; 3],
             sigma_t: 1.0,

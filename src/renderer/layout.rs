@@ -200,10 +200,10 @@ pub struct InstanceUniforms {
     pub per_thread: u32,
     /// Of the fast renderer: tiles along each side of a bin (8 bits) and a number of the frame, splats a bin has room for, number of this part, number of parts.
     pub binning: [u32; 4],
-    /// Variance on the screen of one training pixel squared, at one pixel for each camera unit.
-    pub trained_variance: f32,
+    /// Variances on the screen of one training pixel squared, at one pixel for each camera unit.
+    pub trained_variance: [f32; 2],
     /// Unused.
-    pub padding: [f32; 3],
+    pub padding: [f32; 2],
     /// Rows of capture-to-crop-box: x.
     pub crop_x: [f32; 4],
     /// Row y.
@@ -294,7 +294,7 @@ impl InstanceUniforms {
             size: view.size.to_array(),
             tiles: view.tiles().to_array(),
             near: view.near,
-            trained_variance: view.trained_variance(),
+            trained_variance: view.trained_variance().to_array(),
             ..Self::zeroed()
         }
     }

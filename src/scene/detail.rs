@@ -10,7 +10,7 @@ use std::sync::Arc;
 /// Most levels of a scene.
 pub const MAX_LEVELS: usize = 8;
 
-/// A capture made of fewer Gaussians. It has neither levels nor an environment map.
+/// A capture made of fewer Gaussians. It has neither levels nor an environment map nor a temporal filter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Level {
     /// The largest size on the screen ([`pixels_across`]) at which it shows nearly the same as all Gaussians, pixels.
@@ -50,8 +50,9 @@ pub(super) fn check_levels(
     }
     check_sizes(levels.iter().map(|level| level.pixels))?;
     for level in levels {
-        if !level.scene.levels.is_empty() || level.scene.environment.is_some() {
-            return Err("a level of detail that has levels or an environment map itself");
+        let own = &level.scene;
+        if !own.levels.is_empty() || own.environment.is_some() || own.filter.is_some() {
+            return Err("a level of detail that has levels, an environment map or a temporal filter itself");
         }
         if level.scene.trained_with.time_interval != trained_with.time_interval {
             return Err("a level of detail of another time interval");
@@ -78,7 +79,7 @@ pub(crate) fn check_sizes(sizes: impl Iterator<Item = f32>) -> Result<(), &'stat
 mod tests {
     use super::*;
     use crate::gaussian::Harmonics;
-    use crate::scene::Environment;
+    use crate::scene::{Environment, TemporalFilter};
 
     fn empty() -> RuntimeScene {
         RuntimeScene::sliced(Vec::new(), Harmonics { coefficients: 1, ..Harmonics::default() })
@@ -111,6 +112,10 @@ mod tests {
             vec![level(0.0, empty())],
             vec![level(8.0, with(vec![level(4.0, empty())]))],
             vec![level(8.0, RuntimeScene { environment: Some(map.clone()), ..empty() })],
+            vec![level(
+                8.0,
+                RuntimeScene { filter: Some(TemporalFilter::support(empty().iter(), [0.0, 1.0], 2)), ..empty() },
+            )],
             vec![level(8.0, RuntimeScene { trained_with: other, ..empty() })],
             (0..=MAX_LEVELS).map(|index| level(64.0 - index as f32, empty())).collect(),
         ];

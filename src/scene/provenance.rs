@@ -31,8 +31,8 @@ pub struct TrainedWith {
     pub iteration: u64,
     /// Extent of the training cameras, the factor of positional learning rates. Default: 1.
     pub spatial_lr_scale: f64,
-    /// Size of a pixel of the training views at the far side of the capture, capture units: the largest of all views. Views of larger pixels
-    /// may be anti-aliased ([`View::antialiased`](crate::view::View::antialiased)). Default: `None`, not known.
+    /// Largest size of a pixel of the training views at the Gaussians that they see, capture units. Views of larger pixels may be
+    /// anti-aliased ([`View::antialiased`](crate::view::View::antialiased)). Default: `None`, not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pixel: Option<f32>,
 }

@@ -79,11 +79,14 @@ impl View {
         Self { trained_pixel: trained_pixel.unwrap_or(f32::INFINITY), ..self }
     }
 
-    /// Returns the variance that a variance of one training pixel squared has on the screen, at one pixel for each camera unit; at most
-    /// 1e20, which stands for infinity.
-    pub fn trained_variance(&self) -> f32 {
-        let pixel = self.trained_pixel * self.world_to_camera.row(2).truncate().length();
-        (pixel * pixel).min(1e20)
+    /// Returns the variances across and down the screen that a variance of one training pixel squared has at one pixel for each camera
+    /// unit; at most 1e20, which stands for infinity.
+    pub fn trained_variance(&self) -> Vec2 {
+        let along = |row| {
+            let pixel = self.trained_pixel * self.world_to_camera.row(row).truncate().length();
+            (pixel * pixel).min(1e20)
+        };
+        Vec2::new(along(0), along(1))
     }
 
     /// Returns the unit vector in capture space along which a point is seen.

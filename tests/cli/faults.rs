@@ -44,7 +44,7 @@ struct Verb {
 
 const PACKAGE: &[&str] = &["made.gs4d"];
 
-const VERBS: [Verb; 10] = [
+const VERBS: [Verb; 11] = [
     Verb {
         name: "convert",
         arguments: |from, to| arguments!["convert", from.join("scene.gs4d"), to.join("made.gs4d")].to_vec(),

@@ -107,6 +107,7 @@ fn mirrors() -> [Mirror; 17] {
             cropped,
             per_thread,
             binning,
+            trained_variance,
             crop_x,
             crop_y,
             crop_z,

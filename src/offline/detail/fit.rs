@@ -1,7 +1,7 @@
 //! Fitting: training few Gaussians to look like all of them.
 //!
 //! In: a scene in the trained form, [`Look`]s of all Gaussians. Out: the scene after some steps, over random backgrounds, so that what
-//! shows through it is trained too. It is drawn anti-aliased, as it will be; gradients take the factor on opacity as a constant.
+//! shows through it is trained too. It is drawn anti-aliased, as it will be; gradients are those without the factor on opacity.
 
 use super::looks::Look;
 use crate::gaussian::GradientMode;

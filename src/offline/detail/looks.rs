@@ -1,11 +1,13 @@
-//! Looks: a capture seen from all around at one size on the screen, to fit fewer Gaussians to and to compare them with.
+//! Looks: a capture seen from all around at one size on the screen, to fit fewer Gaussians to the mean of both pictures, and to compare
+//! them with each.
 //!
 //! In: the sphere about a capture, a size in pixels, numbers of directions and times. Out: [`Look`]s with the truth, which is all Gaussians
 //! in a picture of many times as many pixels, and with what they look like if they are drawn at that size; how close fewer come.
 
+use crate::offline::room::require;
 use crate::offline::{OfflineError, Progress};
 use crate::renderer::{GpuCapture, Headless};
-use crate::scene::{Bounds, RuntimeScene, TrainedWith, pixels_across};
+use crate::scene::{Bounds, RuntimeScene, pixels_across};
 use crate::view::{Background, Camera, Frame, Picture, RasterFov, View};
 use glam::{UVec2, Vec2, Vec3};
 use serde::Serialize;
@@ -16,6 +18,8 @@ const DISTANCE: f32 = 10.0;
 const MARGIN: u32 = 2;
 /// Pixels across the sphere in the pictures that the truth is made of, at least: as many as in training.
 pub(super) const FINE: f32 = 512.0;
+/// Bytes for each pixel of a look: color and transmittance of two frames.
+const FRAMES: u64 = 2 * 16;
 /// Pixels of a screen, on which a level must not be seen to change.
 const SCREEN: f64 = 1280.0 * 720.0;
 /// Black: color as it is, and what shows through it.
@@ -27,6 +31,8 @@ pub(super) struct Sphere {
     pub bounds: Bounds,
     pub center: Vec3,
     pub radius: f32,
+    /// The first and the last timestamp that is shown.
+    pub shown: [f32; 2],
 }
 
 /// Which views are taken.
@@ -72,7 +78,7 @@ impl Sphere {
         let shown = if scene.playback.duration_seconds > 0.0 { [first, last] } else { [first, first] };
         let bounds = Bounds::of(scene.iter(), shown)?;
         let (center, radius) = (bounds.center(), bounds.radius());
-        (center.is_finite() && radius.is_finite() && radius > 0.0).then_some(Self { bounds, center, radius })
+        (center.is_finite() && radius.is_finite() && radius > 0.0).then_some(Self { bounds, center, radius, shown })
     }
 
     /// Returns the view from a direction (of length 1, away from the center) in which the sphere is `pixels` pixels across.
@@ -110,19 +116,25 @@ pub(super) fn looks(
     headless: &mut Headless,
     capture: &GpuCapture,
     sphere: &Sphere,
-    trained_with: &TrainedWith,
+    trained_pixel: Option<f32>,
     around: Around,
     sizes: &[f32],
     progress: &mut dyn Progress,
 ) -> Result<Vec<Vec<Look>>, OfflineError> {
+    // Frames of all sizes together have less than three times the pixels of the largest.
+    let largest = sizes.iter().copied().fold(0.0, f32::max).ceil() as u32 + 2 * MARGIN;
+    let views = (around.directions * around.times) as u64;
+    require(UVec2::splat(largest), 3 * FRAMES * views)?;
     progress.begin("looking", sizes.len());
     let mut all = Vec::with_capacity(sizes.len());
     for &pixels in sizes {
         let mut own = Vec::new();
-        for (direction, time) in around.all(trained_with.time_interval) {
+        for (direction, time) in around.all(sphere.shown) {
             let view = sphere.view(direction, time, pixels);
-            let shown = view.antialiased(trained_with.pixel);
-            let all = headless.render(capture, &shown, BLACK)?;
+            let shown = view.antialiased(trained_pixel);
+            let mut all = headless.render(capture, &shown, BLACK)?;
+            // Depths are not compared.
+            (all.depth, all.median_depth) = (Vec::new(), Vec::new());
             let times = (FINE / pixels).ceil().max(1.0) as u32;
             let fine = headless.render(capture, &View { size: shown.size * times, ..shown }, BLACK)?;
             own.push(Look { view, truth: shrunk(&fine, times), all, rectangle: rectangle(&view, &sphere.bounds) });
@@ -231,7 +243,7 @@ mod tests {
 
     fn sphere() -> Sphere {
         let bounds = Bounds { min: Vec3::new(-1.0, -0.5, 0.0), max: Vec3::new(1.0, 0.5, 2.0) };
-        Sphere { bounds, center: bounds.center(), radius: bounds.radius() }
+        Sphere { bounds, center: bounds.center(), radius: bounds.radius(), shown: [0.0, 1.0] }
     }
 
     #[test]

@@ -39,7 +39,7 @@ const DENSITY: f32 = 0.2;
 const TRAINED_AT: [f32; 3] = [1.0, 0.7, 0.5];
 /// How much farther from the truth than all Gaussians a level may be, dB.
 const FARTHER: f64 = 0.5;
-/// How many sizes below its limit a level must hold at, too. Below these it is the next level that is drawn.
+/// How many sizes below its limit a level must be as close to the truth at, too. Below these it is mostly the next level that is drawn.
 const SMALLER: usize = 2;
 /// Fewest Gaussians of a level.
 const FEWEST: usize = 8;
@@ -141,6 +141,12 @@ impl Maker<'_> {
             progress.advance();
         }
         progress.finish();
+        for one in &mut made {
+            let is_kept = |pixels: &f32| {
+                self.levels.iter().any(|level| level.pixels == *pixels && level.scene.len() == one.gaussians)
+            };
+            one.pixels = one.pixels.filter(is_kept);
+        }
         Ok(made)
     }
 
@@ -154,7 +160,7 @@ impl Maker<'_> {
         let DetailSettings { directions, times, .. } = *self.settings;
         let around = Around { directions: directions.max(1), times: times.max(1), shift };
         let capture = self.headless.upload(&self.full)?;
-        looks(self.headless, &capture, &self.sphere, &self.full.trained_with, around, sizes, progress)
+        looks(self.headless, &capture, &self.sphere, self.full.trained_with.pixel, around, sizes, progress)
     }
 
     /// Makes a level of at most `count` Gaussians, and keeps it if it is close enough at some size.
@@ -224,7 +230,10 @@ impl Maker<'_> {
 fn largest(measured: &[Closeness], min_psnr: f64) -> Option<Closeness> {
     // NaN is not close.
     let holds = |close: &Closeness| close.screen >= min_psnr && close.truth >= close.all - FARTHER;
-    let held = |&last: &usize| measured[last.saturating_sub(SMALLER)..=last].iter().all(holds);
+    let unseen = |close: &Closeness| close.screen >= min_psnr;
+    let held = |&last: &usize| {
+        measured[..last].iter().all(unseen) && measured[last.saturating_sub(SMALLER)..=last].iter().all(holds)
+    };
     (0..measured.len()).rev().find(held).map(|last| measured[last])
 }
 

@@ -3,7 +3,7 @@
 //! In: its [`CaptureSettings`] and its bounds. Out: the settings as edited.
 
 use crate::plugin::render::{CaptureSettings, CropBox};
-use crate::scene::Bounds;
+use crate::scene::{Bounds, MAX_LEVELS};
 use bevy::color::LinearRgba;
 use bevy_egui::egui;
 use egui::{DragValue, Slider, SliderClamping};
@@ -30,6 +30,9 @@ pub(super) fn show(ui: &mut egui::Ui, settings: CaptureSettings, bounds: Option<
             edited = CaptureSettings { filter, crop, finest_level, antialias, ..CaptureSettings::default() };
         }
     });
+    ui.checkbox(&mut edited.antialias, "anti-aliased");
+    let levels = Slider::new(&mut edited.finest_level, 0..=MAX_LEVELS as u8).clamping(SliderClamping::Edits);
+    ui.add(levels.text("finest level"));
     let mut cropped = edited.crop.is_some();
     if ui.checkbox(&mut cropped, "crop box").changed() {
         edited.crop = cropped.then(|| crop_around(bounds));

@@ -26,6 +26,9 @@ use std::time::Duration;
 const SLACK: f32 = 0.8;
 /// How far the bias moves in a frame while the GPU time is not as wanted, and how far it may go, stops.
 const STEP: f32 = 1.0 / 64.0;
+/// The bias rises while the time wanted is more than this many times that taken: a finer level has seven times as many Gaussians, and must
+/// not be too slow again.
+const HEADROOM: f64 = 8.0;
 const FARTHEST: f32 = 6.0;
 
 /// How much detail of captures is drawn: a resource.
@@ -53,7 +56,7 @@ pub struct CaptureDetail {
     /// large. Default: 0, as measured when the levels were made.
     pub bias: f32,
     /// The GPU time that captures should take in a frame, all cameras together. While it is exceeded, the bias falls slowly below
-    /// [`bias`](Self::bias), and rises again when there is time left. Needs [`CaptureStatistics::measure`]. Default: `None`, no limit.
+    /// [`bias`](Self::bias), and rises again when an eighth of it is taken. Needs [`CaptureStatistics::measure`]. Default: `None`, no limit.
     pub frame_time: Option<Duration>,
 }
 
@@ -95,7 +98,7 @@ impl CaptureLevels {
 fn steered(before: f32, milliseconds: f64, wanted: f64) -> f32 {
     if milliseconds > wanted {
         (before - STEP).max(-FARTHEST)
-    } else if milliseconds > 0.0 && milliseconds < wanted * f64::from(SLACK) {
+    } else if milliseconds > 0.0 && milliseconds * HEADROOM < wanted {
         (before + STEP).min(0.0)
     } else {
         before
@@ -223,11 +226,26 @@ mod tests {
     #[test]
     fn the_bias_follows_the_time() {
         assert!(steered(0.0, 5.0, 4.0) < 0.0, "too slow");
-        assert!(steered(-1.0, 3.0, 4.0) > -1.0, "time left");
+        assert!(steered(-1.0, 0.4, 4.0) > -1.0, "time left");
         assert_eq!(steered(-1.0, 3.9, 4.0), -1.0, "as wanted");
+        assert_eq!(steered(-1.0, 0.6, 4.0), -1.0, "a finer level could take seven times as long");
         assert_eq!(steered(-1.0, 0.0, 4.0), -1.0, "not measured");
         assert_eq!(steered(0.0, 1.0, 4.0), 0.0, "never finer than asked for");
         assert_eq!(steered(-FARTHEST, 9.0, 4.0), -FARTHEST, "nor without end");
+    }
+
+    #[test]
+    fn keeping_to_the_time_settles() {
+        let levels = levels(&[100.0, 40.0]);
+        // All Gaussians take 5 ms, each level a seventh of the one before.
+        let (mut bias, mut level, mut changes) = (0.0, 0, 0);
+        for _ in 0..2000 {
+            bias = steered(bias, 5.0 / 7f64.powi(level as i32), 4.0);
+            let next = choose(&levels, 110.0 * f32::exp2(bias), Some(level));
+            changes += usize::from(next != level);
+            level = next;
+        }
+        assert_eq!((level, changes), (1, 1), "a coarser level once, which then stays");
     }
 
     #[test]

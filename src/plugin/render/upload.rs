@@ -104,7 +104,7 @@ impl GpuGaussianCapture {
     }
 
     /// Returns the size of the pixels that a level of detail was trained with, capture units; `None` if it is not known.
-    pub(super) fn trained_pixel(&self, level: usize) -> Option<f32> {
+    pub(crate) fn trained_pixel(&self, level: usize) -> Option<f32> {
         let scene = self.shown.as_ref()?.source.scene();
         let level = level.checked_sub(1).and_then(|index| scene.levels.get(index));
         level.map_or(&scene.trained_with, |level| &level.scene.trained_with).pixel

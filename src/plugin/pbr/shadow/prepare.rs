@@ -62,8 +62,11 @@ impl Casters<'_> {
         let capture = self.captures.get(placed.asset)?;
         let time = capture.time_at(placed.seconds)?;
         let view = lens.view(size, time, &caster.bounds, caster.world_from_capture, caster.settings.bias)?;
-        let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
         let level = usize::from(placed.finest_level).min(capture.coarsest());
+        // Levels of detail were trained with anti-aliasing.
+        let trained_pixel = if level > 0 { capture.trained_pixel(level) } else { None };
+        let view = view.antialiased(trained_pixel);
+        let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
         Some(Drawn { entity: caster.entity, asset, view, appearance, filtered, level })
     }
 }
