@@ -150,8 +150,7 @@ struct InstanceUniforms {
     binning: vec4<u32>,
     // Variances on the screen of one training pixel squared, at one pixel for each camera unit.
     trained_variance: vec2<f32>,
-    spare_x: f32,
-    spare_y: f32,
+    padding: vec2<f32>,
     // Rows of capture-to-crop-box; the box is from -1 to 1.
     crop_x: vec4<f32>,
     crop_y: vec4<f32>,

@@ -108,6 +108,7 @@ fn mirrors() -> [Mirror; 17] {
             per_thread,
             binning,
             trained_variance,
+            padding,
             crop_x,
             crop_y,
             crop_z,
