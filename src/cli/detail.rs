@@ -71,8 +71,7 @@ impl Detail {
         let mut scene = self.checkpoint.load(&self.input)?;
         if self.data.is_given() {
             let views = self.data.open(&scene.trained_with)?;
-            let whole = scene.clone().into_runtime().map_err(|error| Failure::at(&self.input, &error))?;
-            let pixel = trained_pixel(&whole, &views);
+            let pixel = trained_pixel(&scene, &views);
             let pixel =
                 pixel.ok_or_else(|| Failure::about(&self.input, "no training view looks at it: is --data its own?"))?;
             scene.trained_with.pixel = Some(pixel);

@@ -141,9 +141,7 @@ impl FineTune {
         let cameras = self.data.data.join(Split::Train.file_name());
         let fingerprint = Fingerprint::of_files(&[&self.input, &cameras])?;
         let fingerprint = fingerprint.and(&format!("{:?} {:?}", scene.trained_with, self.data.resolution));
-        let whole = scene.clone().into_runtime().map_err(|error| Failure::at(&self.input, &error))?;
-        scene.trained_with.pixel = trained_pixel(&whole, &views).or(scene.trained_with.pixel);
-        drop(whole);
+        scene.trained_with.pixel = trained_pixel(&scene, &views).or(scene.trained_with.pixel);
         let resume = Resume { work: &work, fingerprint, every: self.save_every };
         let deferred = interrupt::defer();
         let tuned = fine_tune(&mut headless, scene, &views, &self.settings(), Some(resume), progress)?;

@@ -14,6 +14,7 @@
 //! ```
 
 pub mod alpha;
+pub(crate) mod eigen;
 mod gradient;
 pub mod harmonics;
 pub mod overlap;
@@ -30,3 +31,6 @@ pub use slice::{Gaussian, InvalidGaussian, Lifespan, SliceSettings, rotation_4d}
 
 /// A Gaussian whose marginal is not above this is not drawn at that time (strict, as in the original).
 pub const MARGINAL_CUTOFF: f32 = 0.05;
+/// Temporal deviations from its mean after which a Gaussian is no longer drawn: the marginal falls to its cut-off at sqrt(−2 ln 0.05) =
+/// 2.4477.
+pub(crate) const LIFESPAN: f64 = 2.4478;

@@ -4,7 +4,7 @@
 //! are anti-aliased.
 
 use super::dataset::TrainingView;
-use crate::scene::RuntimeScene;
+use crate::scene::GaussianScene;
 use crate::view::RasterFov;
 use rayon::prelude::*;
 
@@ -13,10 +13,11 @@ const STRAYS: usize = 100;
 
 /// Returns the largest size, in capture units, that a pixel of the training views has at the Gaussians of a scene, but for the farthest
 /// hundredth in each view, so that none of these is drawn otherwise there; `None` if no view has a Gaussian in front of it.
-pub fn trained_pixel(scene: &RuntimeScene, views: &[TrainingView]) -> Option<f32> {
+pub fn trained_pixel(scene: &GaussianScene, views: &[TrainingView]) -> Option<f32> {
+    let means = scene.form.means();
     let size_in = |view: &TrainingView| {
         let view = view.camera.view(view.time, RasterFov::Corrected);
-        let depths = scene.iter().map(|gaussian| view.world_to_camera.transform_point3(gaussian.mean.into()).z);
+        let depths = means.iter().map(|&mean| view.world_to_camera.transform_point3(mean.into()).z);
         let mut depths: Vec<f32> = depths.filter(|&depth| depth > view.near).collect();
         let farthest = depths.len().checked_sub(1 + depths.len() / STRAYS)?;
         let (_, depth, _) = depths.select_nth_unstable_by(farthest, f32::total_cmp);
@@ -29,8 +30,8 @@ pub fn trained_pixel(scene: &RuntimeScene, views: &[TrainingView]) -> Option<f32
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gaussian::Gaussian;
-    use crate::gaussian::Harmonics;
+    use crate::gaussian::{Gaussian, Harmonics};
+    use crate::scene::RuntimeScene;
     use crate::view::Camera;
     use glam::{UVec2, Vec3};
     use std::path::PathBuf;
@@ -52,16 +53,13 @@ mod tests {
             opacity: 0.5,
             padding: 0.0,
         };
-        let scene = RuntimeScene::sliced(vec![at(-1.0), at(1.0)], Harmonics::default());
+        let scene = |gaussians| GaussianScene::from(RuntimeScene::sliced(gaussians, Harmonics::default()));
+        let two = scene(vec![at(-1.0), at(1.0)]);
         let views = [view_from(Vec3::new(0.0, -4.0, 0.0)), view_from(Vec3::new(0.0, -9.0, 0.0))];
         // 100 pixels are as wide as the depth: 9 to the middle, and one to the far side.
-        let found = trained_pixel(&scene, &views).expect("they look at it");
+        let found = trained_pixel(&two, &views).expect("they look at it");
         assert!((found - 0.1).abs() < 1e-4, "{found}");
-        assert_eq!(trained_pixel(&scene, &[]), None, "without views");
-        assert_eq!(
-            trained_pixel(&RuntimeScene::sliced(Vec::new(), Harmonics::default()), &views),
-            None,
-            "without a scene"
-        );
+        assert_eq!(trained_pixel(&two, &[]), None, "without views");
+        assert_eq!(trained_pixel(&scene(Vec::new()), &views), None, "without a scene");
     }
 }

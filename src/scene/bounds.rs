@@ -2,13 +2,11 @@
 //!
 //! In: runtime Gaussians. Out: [`Bounds`] and [`BoundsOverTime`] in capture space.
 
-use crate::gaussian::Gaussian;
+use crate::gaussian::{Gaussian, LIFESPAN};
 use glam::{DVec3, Vec3};
 
 /// Number of stretches of time, each with a box.
 const TIME_SPANS: usize = 32;
-/// The marginal falls to its cut-off of 0.05 at sqrt(−2 ln 0.05) = 2.4477 σ_t.
-const LIFESPAN: f64 = 2.4478;
 /// Relative margin of the boxes: more than the `f32` rounding of drawing.
 const ROUNDING: f64 = 1e-6;
 /// A time as close as this to the border of two stretches, in stretches, belongs to both.

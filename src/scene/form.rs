@@ -65,6 +65,14 @@ pub struct ColorDegrees {
 }
 
 impl SceneForm {
+    /// Returns the means of the Gaussians, capture space.
+    pub fn means(&self) -> Vec<[f32; 3]> {
+        match self {
+            Self::Trained(trained) => trained.parameters.mean.clone(),
+            Self::Ready(form) => form.iter().map(|gaussian| gaussian.mean).collect(),
+        }
+    }
+
     /// Returns the number of Gaussians.
     pub fn len(&self) -> usize {
         match self {

@@ -146,7 +146,7 @@ impl<'a> Bake<'a> {
         let read = format!("{:?} {:?} {resolution:?}", scene.trained_with, scene.playback);
         let fingerprint = files.and(env!("CARGO_PKG_VERSION")).and(&read);
         let mut subject = Subject::new(checkpoint, scene, settings.background)?;
-        let pixel = trained_pixel(&subject.runtime, &views);
+        let pixel = trained_pixel(&subject.scene, &views);
         (subject.scene.trained_with.pixel, subject.runtime.trained_with.pixel) = (pixel, pixel);
         Ok(Self { settings, engine, subject, views, work, fingerprint })
     }

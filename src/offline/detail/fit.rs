@@ -21,7 +21,7 @@ const LAST_RATE: f64 = 0.05;
 /// Colors and opacities may change faster than in fine-tuning: the start is an estimate.
 const RATES: Rates = Rates { harmonics: 1e-3, color: 5e-3, ..Rates::OURS };
 
-/// Trains a scene. Begins the task "fitting".
+/// Trains a scene on these looks, of which there is at least one. Begins the task "fitting".
 pub(super) fn fit(
     headless: &mut Headless,
     scene: GaussianScene,
@@ -29,9 +29,6 @@ pub(super) fn fit(
     steps: usize,
     progress: &mut dyn Progress,
 ) -> Result<GaussianScene, OfflineError> {
-    if looks.is_empty() || steps == 0 {
-        return Ok(scene);
-    }
     let trained_pixel = scene.trained_with.pixel;
     let views: Vec<View> = looks.iter().map(|look| look.view.antialiased(trained_pixel)).collect();
     let mut trainer = Trainer::new(headless, scene, GradientMode::Exact)?;

@@ -53,6 +53,8 @@ pub(super) struct Look {
     truth: Frame,
     /// All Gaussians, drawn at this size.
     all: Frame,
+    /// Mean square error between these two.
+    missing: f64,
     /// The corners of the capture's rectangle in the picture, the last one outside.
     rectangle: [UVec2; 2],
 }
@@ -137,7 +139,9 @@ pub(super) fn looks(
             (all.depth, all.median_depth) = (Vec::new(), Vec::new());
             let times = (FINE / pixels).ceil().max(1.0) as u32;
             let fine = headless.render(capture, &View { size: shown.size * times, ..shown }, BLACK)?;
-            own.push(Look { view, truth: shrunk(&fine, times), all, rectangle: rectangle(&view, &sphere.bounds) });
+            let (truth, rectangle) = (shrunk(&fine, times), rectangle(&view, &sphere.bounds));
+            let missing = square_error(&truth, &all, rectangle);
+            own.push(Look { view, truth, all, missing, rectangle });
         }
         all.push(own);
         progress.advance();
@@ -198,7 +202,7 @@ pub(super) fn closeness(
         let share = inside.x * inside.y / SCREEN;
         close.screen = close.screen.min(psnr(between(&look.all, &frame) * share));
         close.truth = close.truth.min(psnr(between(&look.truth, &frame)));
-        close.all = close.all.min(psnr(between(&look.truth, &look.all)));
+        close.all = close.all.min(psnr(look.missing));
     }
     Ok(close)
 }

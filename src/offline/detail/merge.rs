@@ -13,14 +13,12 @@ use super::rotation::Axes;
 use crate::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN};
 use crate::gaussian::harmonics::time_cosine;
 use crate::gaussian::projection::LOW_PASS;
-use crate::gaussian::{Gaussian, Harmonics, Parameters};
+use crate::gaussian::{Gaussian, Harmonics, LIFESPAN, Parameters};
 use crate::scene::{Sliced, Trained};
 use glam::{DMat3, DMat4, DVec3, DVec4};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// The marginal falls to its cut-off of 0.05 at sqrt(−2 ln 0.05) = 2.4477 σ_t.
-const LIFESPAN: f64 = 2.4478;
 /// Longest temporal deviation, lengths of the time interval: as good as present at every time.
 const LONGEST: f64 = 100.0;
 /// Coordinates of a Gaussian when sets are divided.

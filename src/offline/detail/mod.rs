@@ -194,10 +194,15 @@ impl Maker<'_> {
         if start.is_empty() {
             return Ok(MadeLevel { gaussians: 0, pixels: None, measured: Vec::new() });
         }
-        let sizes = TRAINED_AT.map(|part| (pixels * part).max(SIZES[0]));
-        let shown: Vec<Look> = self.looks(&sizes, 0.0, progress)?.into_iter().flatten().collect();
-        let fitted = fit(self.headless, start, &shown, self.settings.steps, progress)?.into_runtime()?;
-        let level = self.stored(fitted)?;
+        let fitted = match self.settings.steps {
+            0 => start,
+            steps => {
+                let sizes = TRAINED_AT.map(|part| (pixels * part).max(SIZES[0]));
+                let shown: Vec<Look> = self.looks(&sizes, 0.0, progress)?.into_iter().flatten().collect();
+                fit(self.headless, start, &shown, steps, progress)?
+            }
+        };
+        let level = self.stored(fitted.into_runtime()?)?;
         let capture = self.headless.upload(&level)?;
         let mut measured = Vec::new();
         for (&pixels, looks) in SIZES.iter().zip(compared) {

@@ -3,6 +3,7 @@
 //! In: a symmetric 4D matrix. Out: the standard deviations along its axes, the axis of most time last, and the quaternions of the rotation
 //! to them, as [`rotation_4d`] reads them.
 
+use crate::gaussian::eigen::eigen;
 use crate::gaussian::rotation_4d;
 use glam::{DMat4, DVec4};
 
@@ -49,33 +50,6 @@ fn quaternions(rotation: DMat4) -> (DVec4, DVec4) {
     let right = rows[longest].normalize_or(DVec4::X);
     let left = DVec4::from_array(rows.map(|row| row.dot(right)));
     (left.normalize_or(DVec4::X), right)
-}
-
-/// Returns eigenvalues and eigenvectors (columns) of a symmetric matrix, by Jacobi rotations.
-fn eigen(mut a: DMat4) -> (DVec4, DMat4) {
-    let mut vectors = DMat4::IDENTITY;
-    // Convergence is quadratic: a dozen sweeps are more than enough.
-    for _ in 0..16 {
-        for (p, q) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
-            let off = a.col(q)[p];
-            if off.abs() <= 1e-300 {
-                continue;
-            }
-            let theta = (a.col(q)[q] - a.col(p)[p]) / (2.0 * off);
-            let sign = if theta < 0.0 { -1.0 } else { 1.0 };
-            let t = sign / (theta.abs() + (theta * theta + 1.0).sqrt());
-            let cos = (t * t + 1.0).sqrt().recip();
-            let sin = t * cos;
-            let mut turn = DMat4::IDENTITY;
-            turn.col_mut(p)[p] = cos;
-            turn.col_mut(q)[q] = cos;
-            turn.col_mut(q)[p] = sin;
-            turn.col_mut(p)[q] = -sin;
-            a = turn.transpose() * a * turn;
-            vectors *= turn;
-        }
-    }
-    (DVec4::new(a.x_axis.x, a.y_axis.y, a.z_axis.z, a.w_axis.w), vectors)
 }
 
 #[cfg(test)]

@@ -4,7 +4,8 @@
 //! and which component is the largest; and back.
 
 use crate::gaussian::Gaussian;
-use glam::{DMat3, DQuat, DVec3, Mat3, Quat, Vec3};
+use crate::gaussian::eigen::eigen;
+use glam::{DMat3, DMat4, DQuat, DVec3, Mat3, Quat, Vec3};
 
 /// A covariance, decomposed.
 pub(super) struct Shape {
@@ -19,7 +20,8 @@ impl Shape {
     pub fn of(gaussian: &Gaussian, flattest: f64) -> Self {
         let [xx, xy, xz, yy, yz, zz] = gaussian.covariance.map(f64::from);
         let covariance = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
-        let (values, mut vectors) = eigen(covariance);
+        let (values, vectors) = eigen(DMat4::from_mat3(covariance));
+        let (values, mut vectors) = (values.truncate(), DMat3::from_mat4(vectors));
         if vectors.determinant() < 0.0 {
             vectors.z_axis = -vectors.z_axis;
         }
@@ -37,33 +39,6 @@ pub(super) fn covariance(scale: Vec3, rotation: Quat) -> [f32; 6] {
     let m = Mat3::from_quat(rotation) * Mat3::from_diagonal(scale);
     let Mat3 { x_axis: x, y_axis: y, z_axis: z } = m * m.transpose();
     [x.x, x.y, x.z, y.y, y.z, z.z]
-}
-
-/// Returns eigenvalues and eigenvectors (columns) of a symmetric matrix, by Jacobi rotations.
-fn eigen(mut a: DMat3) -> (DVec3, DMat3) {
-    let mut vectors = DMat3::IDENTITY;
-    // Convergence is quadratic: a dozen sweeps are more than enough.
-    for _ in 0..12 {
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            let off = a.col(q)[p];
-            if off.abs() <= 1e-300 {
-                continue;
-            }
-            let theta = (a.col(q)[q] - a.col(p)[p]) / (2.0 * off);
-            let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-            let t = if theta == 0.0 { 1.0 } else { t };
-            let cos = (t * t + 1.0).sqrt().recip();
-            let sin = t * cos;
-            let mut turn = DMat3::IDENTITY;
-            turn.col_mut(p)[p] = cos;
-            turn.col_mut(q)[q] = cos;
-            turn.col_mut(q)[p] = sin;
-            turn.col_mut(p)[q] = -sin;
-            a = turn.transpose() * a * turn;
-            vectors *= turn;
-        }
-    }
-    (DVec3::new(a.x_axis.x, a.y_axis.y, a.z_axis.z), vectors)
 }
 
 /// Returns the three smaller components in the order w, x, y, z, with the sign that makes the largest positive, and the
