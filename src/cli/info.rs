@@ -6,15 +6,17 @@ use super::args::{CheckpointArgs, file_size, is_package};
 use super::failure::Failure;
 use super::report::{Report, switches, switches_json};
 use super::table::{Table, bytes, lines};
-use crate::codec::package::{self, PackageInfo, StoredForm};
+use crate::codec::package::{self, PackageInfo, StoredForm, StoredLevel};
 use crate::codec::text::printable;
 use crate::gaussian::Model;
 use crate::offline::convert::form_name;
 use crate::scene::packed::MAX_STAGES;
-use crate::scene::{Bounds, ColorDegrees, GaussianScene, PlaybackHints, SceneForm, TrainedWith};
+use crate::scene::{Bounds, ColorDegrees, GaussianScene, Level, PlaybackHints, SceneForm, TrainedWith};
 use glam::Vec3;
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::HashMap;
+use std::fmt;
 use std::fs::File;
 use std::path::PathBuf;
 
@@ -45,6 +47,16 @@ struct Facts {
     environment: Option<[u32; 2]>,
     trained_with: TrainedWith,
     playback: PlaybackHints,
+    levels: Vec<LevelFacts>,
+}
+
+/// A level of detail, without its Gaussians.
+#[derive(Serialize)]
+struct LevelFacts {
+    /// The largest size on the screen at which it is drawn.
+    pixels: f32,
+    /// How many it has; `None` if the package is damaged.
+    gaussians: Option<usize>,
 }
 
 /// The bounds of the Gaussians.
@@ -103,9 +115,6 @@ impl Info {
         }
         let mut text = lines(&pairs);
         if let Some(info) = package {
-            if let Some(levels) = levels(info) {
-                text += &levels;
-            }
             text += &format!("\n{}", section_table(info));
         }
         let json = json!({
@@ -121,6 +130,7 @@ impl Info {
             "codebooks": facts.codebooks,
             "environment": facts.environment,
             "switches": switches_json(&facts.trained_with, &facts.playback),
+            "levels": facts.levels,
             "bounds": extent.as_ref().map(|extent| box_json(&extent.all)),
             "core": extent.as_ref().map(|extent| box_json(&extent.core)),
             "package": package.map(package_json),
@@ -145,6 +155,7 @@ impl Facts {
             environment: scene.environment.as_ref().map(|map| [map.width, map.height]),
             trained_with: scene.trained_with.clone(),
             playback: scene.playback,
+            levels: scene.levels.iter().map(LevelFacts::of_level).collect(),
         }
     }
 
@@ -165,6 +176,11 @@ impl Facts {
             environment: header.environment.map(|map| [map.width, map.height]),
             trained_with: header.trained_with.clone(),
             playback: header.playback,
+            levels: header
+                .levels
+                .iter()
+                .map(|&StoredLevel { pixels }| LevelFacts { pixels, gaussians: None })
+                .collect(),
         }
     }
 
@@ -187,7 +203,26 @@ impl Facts {
             ("environment", environment),
         ];
         pairs.extend(switches(&self.trained_with, &self.playback));
+        if !self.levels.is_empty() {
+            let levels: Vec<String> = self.levels.iter().map(LevelFacts::to_string).collect();
+            pairs.push(("levels of detail", levels.join(", ")));
+        }
         pairs
+    }
+}
+
+impl LevelFacts {
+    fn of_level(level: &Level) -> Self {
+        Self { pixels: level.pixels, gaussians: Some(level.scene.len()) }
+    }
+}
+
+impl fmt::Display for LevelFacts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.gaussians {
+            Some(gaussians) => write!(f, "{gaussians} Gaussians up to {} pixels", self.pixels),
+            None => write!(f, "up to {} pixels", self.pixels),
+        }
     }
 }
 
@@ -229,20 +264,12 @@ fn section_table(info: &PackageInfo) -> Table {
     table
 }
 
-/// Returns a line about the levels of detail; `None` without any.
-fn levels(info: &PackageInfo) -> Option<String> {
-    let sizes: Vec<String> = info.header.levels.iter().map(|level| level.pixels.to_string()).collect();
-    let text = format!("of detail, up to {} pixels on the screen", sizes.join(", "));
-    (!sizes.is_empty()).then(|| lines(&[("levels", text)]))
-}
-
 fn package_json(info: &PackageInfo) -> Value {
     json!({
         "version": info.version,
         "generator": info.header.generator,
         "intact": info.is_intact(),
         "damaged": info.damaged,
-        "levels": info.header.levels,
         "sections": info.header.sections,
     })
 }

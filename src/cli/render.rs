@@ -2,7 +2,7 @@
 //!
 //! In: a scene and views of it. Out: a folder of PNG files, and raw float32 ones with `--raw`.
 
-use super::args::{CheckpointArgs, RendererArgs, ViewArgs};
+use super::args::{CheckpointArgs, RendererArgs, ViewArgs, values};
 use super::failure::Failure;
 use super::interrupt::whole;
 use super::progress::Bars;
@@ -14,11 +14,13 @@ use crate::offline::orbit::Shot;
 use crate::offline::render::render_shots;
 use crate::offline::{OfflineError, write_beside, write_png};
 use crate::renderer::{GpuError, Storage};
+use crate::scene::{GaussianScene, MAX_LEVELS};
 use crate::view::{Background, Counts, Picture, View};
 use serde_json::{Value, json};
 use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Draw views of a scene as PNG files.
@@ -31,6 +33,7 @@ Examples:
   gs4d render capture.gs4d --cameras data/transforms_test.json --out frames
   gs4d render chkpnt30000.pth --orbit 120 --size 800x600 --out turn
   gs4d render capture.gs4d --cameras golden.json --raw --background 0,0,0 --out exact
+  gs4d render capture.gs4d --orbit 12 --size 100x100 --level 1 --out far
 
 Raw pictures (.f32): height x width x 3 little-endian float32 before any clamping.
 The background is the capture's own, its environment map if it has one, unless --background is given.")]
@@ -45,6 +48,9 @@ pub struct Render {
     /// tells the size of training pixels: `gs4d bake` and `gs4d detail --data` write it.
     #[arg(long)]
     antialias: bool,
+    /// Draw this level of detail in place of all Gaussians, anti-aliased; 1 is the finest.
+    #[arg(long, value_name = "N", value_parser = values::count(MAX_LEVELS as u64))]
+    level: Option<usize>,
     /// Write raw float32 pictures (.f32) too.
     #[arg(long)]
     raw: bool,
@@ -71,11 +77,11 @@ impl Render {
                 headless.compile_ahead(Storage::Coded)?;
                 Ok::<_, GpuError>(headless)
             });
-            let scene = self.checkpoint.load(&self.scene)?;
+            let scene = self.at_level(self.checkpoint.load(&self.scene)?)?;
             let scene = scene.into_runtime().map_err(|error| Failure::at(&self.scene, &error))?;
             Ok::<_, Failure>((scene, opening.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))))
         })?;
-        let trained_pixel = scene.trained_with.pixel.filter(|_| self.antialias);
+        let trained_pixel = scene.trained_with.pixel.filter(|_| self.antialias || self.level.is_some());
         if self.antialias && trained_pixel.is_none() {
             return Err(Failure::about(
                 &self.scene,
@@ -113,6 +119,19 @@ impl Render {
             "frames": frames,
         });
         Ok(Report::new(json, text))
+    }
+
+    /// Returns what is drawn of a scene: all of it, or the level that is asked for.
+    fn at_level(&self, mut scene: GaussianScene) -> Result<GaussianScene, Failure> {
+        let Some(level) = self.level else { return Ok(scene) };
+        let count = scene.levels.len();
+        match count {
+            0 => Err(Failure::about(&self.scene, "has no levels of detail: make them with gs4d detail")),
+            _ if level > count => {
+                Err(Failure::about(&self.scene, &format!("has no level of detail {level}; the coarsest is {count}")))
+            }
+            _ => Ok(Arc::unwrap_or_clone(scene.levels.swap_remove(level - 1).scene).into()),
+        }
     }
 
     fn frame(&self, (shot, view): &(Shot, View), counts: &Counts) -> Value {

@@ -21,10 +21,10 @@ pub struct DataArgs {
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Picture size [default: w and h of the camera file, else that of the first image found beside it, after --resolution].
-    #[arg(long, value_name = "WxH", value_parser = values::size)]
+    #[arg(long, value_name = "WxH", value_parser = values::size, requires = "data")]
     size: Option<UVec2>,
     /// Divisor of the picture size (1, 2, 3, 4, 8), -1 (at most 1600 wide) or a target width, as in training.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with = "size")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with = "size", requires = "data")]
     resolution: Option<i32>,
 }
 
