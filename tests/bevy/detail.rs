@@ -102,6 +102,24 @@ fn settings_limit_the_level() {
 }
 
 #[test]
+fn two_eyes_draw_the_same_level() {
+    let Some(mut stage) = Stage::of(&detailed()) else { return };
+    let second = spawn_camera(&mut stage.app, Msaa::Off, Transform::default());
+    insert(&mut stage.app, second, Camera { order: 1, ..default() });
+    let mut drawn = |first: f32, other: f32| {
+        let pose = Transform::from_xyz(0.1, 0.0, distance_of(other)).looking_at(Vec3::ZERO, Vec3::Y);
+        insert(&mut stage.app, second, pose);
+        let first = stage.drawn_from(distance_of(first));
+        let statistics = stage.app.world().resource::<CaptureStatistics>();
+        [first, statistics.view(second).expect("it is seen").total]
+    };
+    assert_eq!(drawn(61.0, 59.0), [100; 2], "the limit is between the eyes, and the finer level is drawn");
+    assert_eq!(drawn(59.0, 46.0), [100, 10], "a camera farther away has its own");
+    assert_eq!(drawn(59.0, 57.0), [100; 2], "nothing flickers when it comes near");
+    assert_eq!(drawn(46.0, 45.0), [10; 2], "both are well below");
+}
+
+#[test]
 fn a_capture_without_levels_is_drawn_as_it_is() {
     let Some(mut stage) = Stage::of(&heap(100)) else { return };
     stage.set(CaptureSettings { finest_level: 2, ..default() });

@@ -1,7 +1,8 @@
 //! Detail: how many Gaussians of a capture a camera is shown, by the capture's size on the screen.
 //!
 //! In: extracted captures and cameras, the levels of detail of uploaded captures, [`CaptureDetail`]. Out: [`CaptureLevels`], the level of
-//! each capture for each camera. A level is kept while the size is near its limit, so that nothing flickers there.
+//! each capture for each camera. A level is kept while the size is near its limit, so that nothing flickers there; cameras that see a
+//! capture at nearly the same size, such as two eyes, draw the same level.
 
 use super::extract::ExtractedCaptures;
 use super::statistics::CaptureStatistics;
@@ -24,6 +25,8 @@ use std::time::Duration;
 
 /// A coarser level is taken when the size on the screen is below its limit by this factor, and left at the limit itself.
 const SLACK: f32 = 0.8;
+/// Cameras that see a capture at sizes of no more than this ratio draw the same level. The eyes of a head do.
+const ALIKE: f32 = 1.1;
 /// How far the bias moves in a frame while the GPU time is not as wanted, and how far it may go, stops.
 const STEP: f32 = 1.0 / 64.0;
 /// The bias rises while the time wanted is more than this many times that taken: a finer level has seven times as many Gaussians, and must
@@ -67,6 +70,8 @@ pub(super) struct CaptureLevels {
     chosen: HashMap<(Entity, MainEntity), (usize, bool)>,
     /// Whether any camera sees all Gaussians of a capture.
     whole: MainEntityHashMap<bool>,
+    /// What is seen this frame; kept for its memory.
+    sights: Vec<Sight>,
     /// What is added to the bias to keep to the time, stops: at most 0.
     steered: f32,
 }
@@ -91,6 +96,29 @@ impl CaptureLevels {
         let views = statistics.views();
         let milliseconds: f64 = views.iter().flat_map(|(_, view)| &view.passes).map(|pass| pass.milliseconds).sum();
         self.steered = steered(self.steered, milliseconds, wanted.as_secs_f64() * 1e3);
+    }
+}
+
+/// A capture with levels, seen by a camera.
+#[derive(Clone, Copy)]
+struct Sight {
+    camera: Entity,
+    capture: MainEntity,
+    /// Its size on the screen, pixels.
+    pixels: f32,
+    /// The level of the last frame, if it was seen.
+    before: Option<usize>,
+}
+
+impl Sight {
+    /// Returns what decides on the level, of all cameras that see the capture at nearly this size: the largest size, and the finest level of
+    /// the last frame.
+    fn together(&self, same_capture: &[Self]) -> (f32, Option<usize>) {
+        let is_alike = |other: &&Self| other.pixels <= self.pixels * ALIKE && self.pixels <= other.pixels * ALIKE;
+        let alike = same_capture.iter().filter(is_alike);
+        let before = alike.clone().filter_map(|other| other.before).min();
+        // A size that is not a number is like no other, and stays what it is.
+        (alike.fold(self.pixels, |most, other| most.max(other.pixels)), before.or(self.before))
     }
 }
 
@@ -126,21 +154,32 @@ pub(super) fn choose_levels(
     let levels = &mut *levels;
     levels.steer(detail.frame_time, &statistics);
     levels.whole.clear();
+    levels.sights.clear();
     levels.chosen.values_mut().for_each(|(_, seen)| *seen = false);
     let factor = (detail.bias + levels.steered).exp2();
     for (camera, view, visible, resolution) in &cameras {
         let size = resolution.map_or(UVec2::new(view.viewport.z, view.viewport.w), |smaller| smaller.0);
         let eye = Vec3::from(view.world_from_view.affine().translation);
         let Some(visible) = visible.get::<GaussianCapture3d>() else { continue };
-        for (_, entity) in visible.iter_visible() {
-            let Some(placed) = extracted.0.get(entity) else { continue };
+        for (_, &capture) in visible.iter_visible() {
+            let Some(placed) = extracted.0.get(&capture) else { continue };
             let detail = captures.get(placed.asset).and_then(GpuGaussianCapture::detail);
-            let Some((own, bounds)) = detail else { continue };
+            let Some((_, bounds)) = detail else { continue };
             let pixels = size_on_screen(&view.clip_from_view, eye, size, &placed.world_from_capture, bounds) * factor;
-            let before = levels.chosen.get(&(camera, *entity)).map(|(level, _)| *level);
+            let before = levels.chosen.get(&(camera, capture)).map(|(level, _)| *level);
+            levels.sights.push(Sight { camera, capture, pixels, before });
+        }
+    }
+    levels.sights.sort_unstable_by_key(|sight| sight.capture.id());
+    for same in levels.sights.chunk_by(|a, b| a.capture == b.capture) {
+        let capture = same[0].capture;
+        let Some(placed) = extracted.0.get(&capture) else { continue };
+        let Some((own, _)) = captures.get(placed.asset).and_then(GpuGaussianCapture::detail) else { continue };
+        for sight in same {
+            let (pixels, before) = sight.together(same);
             let level = choose(own, pixels, before).max(usize::from(placed.finest_level).min(own.len()));
-            levels.chosen.insert((camera, *entity), (level, true));
-            *levels.whole.entry(*entity).or_insert(false) |= level == 0;
+            levels.chosen.insert((sight.camera, capture), (level, true));
+            *levels.whole.entry(capture).or_insert(false) |= level == 0;
         }
     }
     levels.chosen.retain(|_, (_, seen)| *seen);
@@ -221,6 +260,29 @@ mod tests {
             }
             assert!(changes <= 1, "{changes} changes about {middle} pixels");
         }
+    }
+
+    #[test]
+    fn cameras_at_nearly_the_same_size_decide_together() {
+        let sight = |pixels, before| Sight {
+            camera: Entity::PLACEHOLDER,
+            capture: MainEntity::from(Entity::PLACEHOLDER),
+            pixels,
+            before,
+        };
+        let seen = [
+            sight(99.0, Some(1)),
+            sight(101.0, Some(0)),
+            sight(50.0, Some(2)),
+            sight(f32::INFINITY, None),
+            sight(f32::NAN, Some(1)),
+        ];
+        let found = seen.map(|one| one.together(&seen));
+        assert_eq!(found[0], (101.0, Some(0)), "the finer of two eyes");
+        assert_eq!(found[0], found[1], "decides for both");
+        assert_eq!(found[2], (50.0, Some(2)), "a camera farther away decides for itself");
+        assert_eq!(found[3], (f32::INFINITY, None), "so does one inside the capture");
+        assert!(found[4].0.is_nan() && found[4].1 == Some(1), "no number is like no other: {:?}", found[4]);
     }
 
     #[test]
