@@ -1,4 +1,4 @@
-//! Captures among transparent things: glass, gizmos, wireframes and refraction before and behind them.
+//! Captures among transparent things: glass, gizmos, wireframes and refraction before and behind them, and the sky.
 //!
 //! In: small scenes made by hand and panes of glass, in headless apps. Out: proof that what is behind a capture shows through it and what
 //! is in front covers it, with the colours that follow from pictures of each alone, multisampled or not, HDR or not. Skipped where there
@@ -9,10 +9,13 @@ use crate::support::cpu_reference::{SIZE, color, difference_between, eye, rgb, s
 use crate::support::fixtures::{MIDDLE, crowd, front, insert, lone, spawn, spawn_box};
 use crate::support::offscreen_app::{app, picture, spawn_camera};
 use crate::support::skip::skip;
-use bevy::camera::{Hdr, Viewport};
+use bevy::camera::{Exposure, Hdr, Viewport};
+use bevy::core_pipeline::oit::OrderIndependentTransparencySettings;
+use bevy::light::{Atmosphere, atmosphere::ScatteringMedium, light_consts};
+use bevy::pbr::AtmosphereSettings;
 use bevy::pbr::wireframe::{Wireframe, WireframeColor, WireframePlugin};
 use bevy::prelude::*;
-use bevy::render::renderer::RenderDevice;
+use bevy::render::renderer::{RenderAdapterInfo, RenderDevice};
 use bevy::render::settings::WgpuFeatures;
 use bevy_gs4d::render::CaptureViewSettings;
 use bevy_gs4d::view::BlendSpace;
@@ -275,5 +278,60 @@ fn captures_show_through_transmissive_meshes_before_them_and_cover_those_behind(
         let [beside, over] = sides(&mut app);
         let apart = beside.iter().zip(over).map(|(a, b)| a.abs_diff(b)).max().unwrap_or_default();
         assert!(apart <= 3, "{msaa:?}: before the glass it is {over:?}, as {beside:?} beside it");
+    }
+}
+
+#[test]
+fn captures_stand_before_the_atmosphere() {
+    for msaa in [Msaa::Off, Msaa::Sample4] {
+        let Some(mut app) = app(SIZE) else { return };
+        let medium = app.world_mut().resource_mut::<Assets<ScatteringMedium>>().add(ScatteringMedium::default());
+        app.world_mut().spawn(Atmosphere::earth(medium));
+        let sun = DirectionalLight { illuminance: light_consts::lux::RAW_SUNLIGHT, ..default() };
+        app.world_mut().spawn((sun, Transform::default().looking_to(Vec3::new(0.0, -0.3, -1.0), Vec3::Y)));
+        let camera = spawn_camera(&mut app, msaa, front());
+        insert(&mut app, camera, Hdr);
+        let capture = spawn(&mut app, &lone(Vec3::X), ());
+        let alone = picture(&mut app, 0.0);
+        if app.world().resource::<RenderAdapterInfo>().device_type == wgpu::DeviceType::Cpu {
+            skip("Bevy's atmosphere crashes the software driver, without captures too");
+            return;
+        }
+        insert(&mut app, camera, (AtmosphereSettings::default(), Exposure { ev100: 13.0 }));
+        insert(&mut app, capture, Visibility::Hidden);
+        let sky = picture(&mut app, 0.0);
+        insert(&mut app, capture, Visibility::Inherited);
+        let both = picture(&mut app, 0.0);
+        let [r, g, b] = rgb(&sky, MIDDLE.x, 10);
+        assert!(b > 60 && b > r, "{msaa:?}: there is a sky: {r}, {g}, {b}");
+        assert_eq!(rgb(&both, 4, 10), rgb(&sky, 4, 10), "{msaa:?}: beside the capture is the sky");
+        let [seen, expected] = [&both, &alone].map(|picture| color(picture, MIDDLE.x, MIDDLE.y));
+        let apart = (seen - expected).abs().max_element();
+        // The capture lets 2 % through.
+        assert!(apart <= 8.0, "{msaa:?}: it covers the sky: {seen}, not {expected}");
+    }
+}
+
+#[test]
+fn order_independent_glass_shows_before_captures_and_hides_behind_them() {
+    let Some(mut app) = app(SIZE) else { return };
+    spawn(&mut app, &lone(Vec3::X), ());
+    let camera = spawn_camera(&mut app, Msaa::Off, front());
+    let pane = spawn_pane(&mut app, OPACITY, BEFORE);
+    // In the middle of the capture, and beside it.
+    let each = |app: &mut App| {
+        [BEFORE, BEHIND].map(|z| {
+            insert(app, pane, Transform::from_xyz(0.0, 0.0, z));
+            let picture = picture(app, 0.0);
+            [MIDDLE, UVec2::new(4, 10)].map(|place| color(&picture, place.x, place.y))
+        })
+    };
+    let ordered = each(&mut app);
+    insert(&mut app, camera, OrderIndependentTransparencySettings::default());
+    let resolved = each(&mut app);
+    for (seen, expected) in resolved.iter().flatten().zip(ordered.iter().flatten()) {
+        let apart = (*seen - *expected).abs().max_element();
+        // The capture lets 2 % of what is behind through, and its depth nothing.
+        assert!(apart <= 8.0, "{resolved:?}, not {ordered:?}");
     }
 }

@@ -7,6 +7,7 @@
 
 use super::settings::DepthWrite;
 use bevy::camera::Camera;
+use bevy::core_pipeline::oit::OrderIndependentTransparencySettings;
 use bevy::core_pipeline::prepass::MotionVectorPrepass;
 use bevy::ecs::query::With;
 use bevy::ecs::reflect::AppTypeRegistry;
@@ -17,7 +18,8 @@ use bevy::render::Extract;
 use bevy::render::sync_world::{MainEntity, MainEntityHashSet};
 use std::any::TypeId;
 
-/// Components of cameras whose effects read the depth buffer after the main pass, beside those that read motion vectors.
+/// Components of cameras whose effects read the depth buffer after the main pass, beside those that read motion vectors and
+/// order-independent transparency.
 const READERS: [&str; 2] = ["bevy_post_process::dof::DepthOfField", "bevy_light::volumetric::VolumetricFog"];
 
 /// Cameras that have such an effect.
@@ -50,7 +52,9 @@ pub(super) fn extract_depth_readers(
         }
     }
     let reads = |camera: &EntityRef<'_>| {
-        camera.contains::<MotionVectorPrepass>() || known.iter().flatten().any(|id| camera.contains_type_id(*id))
+        camera.contains::<MotionVectorPrepass>()
+            || camera.contains::<OrderIndependentTransparencySettings>()
+            || known.iter().flatten().any(|id| camera.contains_type_id(*id))
     };
     readers.0.clear();
     readers.0.extend(cameras.iter().filter(reads).map(|camera| MainEntity::from(camera.id())));

@@ -48,7 +48,8 @@
 //! Behind a transmissive mesh captures show refracted: if the centre of one in view is nearer than that of the nearest capture, captures
 //! are drawn between 1 and 2, and everything transparent after them. A capture in front of only some of these meshes is then seen as if it
 //! were behind them. A camera with Bevy's atmosphere draws captures after it, and so not through transmissive meshes, which hide what is
-//! behind them. With order-independent transparency, everything that takes part in it is drawn over captures.
+//! behind them. With order-independent transparency, everything that takes part in it is drawn after captures, and cut by the depths that
+//! they write for such cameras by default.
 //!
 //! Prepasses come first and do not contain captures; effects that read the depth prepass before the main pass (screen-space ambient
 //! occlusion and reflections) ignore captures. Distance fog, shadows of meshes and light of the scene reach captures in a pass of the module

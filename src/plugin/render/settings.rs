@@ -127,8 +127,8 @@ pub struct CaptureViewSettings {
 #[reflect(Default, Debug, Clone, PartialEq, Hash)]
 pub enum DepthWrite {
     /// [`Expected`](Self::Expected) for cameras with one of Bevy's effects that read depths after the main pass, [`None`](Self::None) for
-    /// others. These effects are `DepthOfField`, `VolumetricFog`, and everything with a `MotionVectorPrepass`: `TemporalAntiAliasing`,
-    /// `MotionBlur`. A game with an effect of its own chooses for itself.
+    /// others. These effects are `DepthOfField`, `VolumetricFog`, `OrderIndependentTransparencySettings`, and everything with a
+    /// `MotionVectorPrepass`: `TemporalAntiAliasing`, `MotionBlur`. A game with an effect of its own chooses for itself.
     #[default]
     Auto,
     /// No depth is written.
