@@ -4,9 +4,10 @@
 //! cargo bench --features viewer,cli --bench scene -- [CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N] [--only WORD]
 //! ```
 //!
-//! In: a capture (default: the bundled one), a picture size (1280x720), frames for each measurement (300), rounds (3), a word in the names of the scenes (all). Out: milliseconds of a frame for each scene, the median of the
-//! rounds, how much longer it is than the scene that it is compared with, and the spread of the rounds. Default plugins, no window,
-//! rendering is pipelined, all apps take turns, and each measurement ends when the GPU has finished.
+//! In: a capture (default: the bundled one), a picture size (1280x720), frames for each measurement (300), rounds (3), a word in the names
+//! of the scenes (all). Out: milliseconds of a frame for each scene, the median of the rounds, how much longer it is than the scene that it
+//! is compared with, and the spread of the rounds; then, measured in further frames, the GPU time of the captures' passes and the number of
+//! splats. Default plugins, no window, rendering is pipelined, all apps take turns, and each measurement ends when the GPU has finished.
 
 mod common;
 
@@ -72,14 +73,36 @@ fn main() -> Result {
     }
     let measured = common::measure(&mut apps, &arguments)?;
     println!("{}, {}x{}", arguments.capture.display(), arguments.size.x, arguments.size.y);
-    println!("{:<36} {:>9} {:>9} {:>15}  than", "scene", "frame ms", "more ms", "rounds ms");
+    println!(
+        "{:<36} {:>9} {:>9} {:>15} {:>9} {:>9}  than",
+        "scene", "frame ms", "more ms", "rounds ms", "GPU ms", "splats"
+    );
     let mut known: Vec<(&str, f64)> = Vec::new();
-    for ((name, _, _, compared), Times { median: time, spread }) in scenes.into_iter().zip(measured) {
+    let timed = scenes.into_iter().zip(&mut apps).zip(measured);
+    for (((name, _, _, compared), app), Times { median: time, spread }) in timed {
         known.push((name, time));
         let than = known.iter().find(|(name, _)| *name == compared).map_or(f64::NAN, |(_, time)| *time);
-        println!("{name:<36} {time:>9.3} {:>9.3} {spread:>15}  {compared}", time - than);
+        let (gpu, splats) = passes(app)?;
+        println!("{name:<36} {time:>9.3} {:>9.3} {spread:>15} {gpu:>9.4} {splats:>9}  {compared}", time - than);
     }
     Ok(())
+}
+
+/// Returns the GPU time of all passes for captures in a frame, milliseconds, the median of a hundred frames, and the number of splats.
+fn passes(app: &mut App) -> Result<(f64, u32)> {
+    let statistics = app.world().resource::<CaptureStatistics>().clone();
+    statistics.measure(true);
+    common::warm_up(app)?;
+    let (mut times, mut splats) = (Vec::new(), 0);
+    for _ in 0..100 {
+        common::run(app, 1)?;
+        let views = statistics.views();
+        times.push(views.iter().flat_map(|(_, view)| &view.passes).map(|pass| pass.milliseconds).sum::<f64>());
+        splats = views.iter().map(|(_, view)| view.visible).sum();
+    }
+    statistics.measure(false);
+    times.sort_by(f64::total_cmp);
+    Ok((times[times.len() / 2], splats))
 }
 
 /// Returns an app with a camera and a scene; everything is loaded.

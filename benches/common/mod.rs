@@ -97,10 +97,7 @@ pub fn measure(apps: &mut [App], arguments: &Arguments) -> Result<Vec<Times>> {
     let mut measured: Vec<Vec<f64>> = vec![Vec::new(); apps.len()];
     for _ in 0..arguments.rounds {
         for (app, times) in apps.iter_mut().zip(&mut measured) {
-            let began = Instant::now();
-            while began.elapsed() < WARM_UP {
-                run(app, 10)?;
-            }
+            warm_up(app)?;
             let took = run(app, arguments.frames)?;
             times.push(took.as_secs_f64() * 1e3 / f64::from(arguments.frames));
         }
@@ -119,8 +116,23 @@ impl Times {
     }
 }
 
+/// Runs the app until the GPU is as fast as it gets.
+///
+/// # Errors
+/// As [`measure`].
+pub fn warm_up(app: &mut App) -> Result {
+    let began = Instant::now();
+    while began.elapsed() < WARM_UP {
+        run(app, 10)?;
+    }
+    Ok(())
+}
+
 /// Runs the app for a number of frames, and returns the time until the GPU has finished them.
-fn run(app: &mut App, frames: u32) -> Result<Duration> {
+///
+/// # Errors
+/// As [`measure`].
+pub fn run(app: &mut App, frames: u32) -> Result<Duration> {
     let device = app.world().resource::<RenderDevice>().clone();
     let began = Instant::now();
     for _ in 0..frames {
