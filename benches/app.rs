@@ -14,10 +14,14 @@ mod common;
 
 use bevy::a11y::AccessibilityPlugin;
 use bevy::animation::AnimationPlugin;
+use bevy::anti_alias::AntiAliasPlugin;
 use bevy::app::PluginGroupBuilder;
 use bevy::input::InputPlugin;
 use bevy::light::LightPlugin;
 use bevy::pbr::PbrPlugin;
+use bevy::picking::input::PointerInputPlugin;
+use bevy::picking::{InteractionPlugin, PickingPlugin};
+use bevy::post_process::PostProcessPlugin;
 use bevy::prelude::*;
 use bevy::state::app::StatesPlugin;
 use bevy_gs4d::prelude::*;
@@ -80,6 +84,11 @@ fn few(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
         .disable::<InputPlugin>()
         .disable::<AccessibilityPlugin>()
         .disable::<StatesPlugin>()
+        .disable::<PointerInputPlugin>()
+        .disable::<PickingPlugin>()
+        .disable::<InteractionPlugin>()
+        .disable::<AntiAliasPlugin>()
+        .disable::<PostProcessPlugin>()
 }
 
 /// Returns an app with a camera and, if a design is given, a capture that plays and is drawn that way; everything is loaded.

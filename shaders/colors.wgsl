@@ -38,7 +38,7 @@ fn colors(
     @builtin(local_invocation_index) thread: u32,
 ) {
 #ifdef COPIED_INSTANCE
-    instance = instances[group.z];
+    instance = instances[group.z].uniforms;
 #endif
     let count = bins[BIN_COUNTERS + instance.binning.z];
     for (var first = group.x * SPLATS; first < count; first += groups.x * SPLATS) {

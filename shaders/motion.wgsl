@@ -54,7 +54,7 @@ fn motion(
     @builtin(local_invocation_index) thread: u32,
 ) {
 #ifdef COPIED_INSTANCE
-    instance = instances[group.z];
+    instance = instances[group.z].uniforms;
 #endif
     let count = bins[BIN_COUNTERS + instance.binning.z];
     for (var i = group.x * THREADS + thread; i < count; i += groups.x * THREADS) {
@@ -66,7 +66,7 @@ fn motion(
 @compute @workgroup_size(THREADS)
 fn motion(@builtin(global_invocation_id) id: vec3<u32>) {
 #ifdef COPIED_INSTANCE
-    instance = instances[id.z];
+    instance = instances[id.z].uniforms;
 #endif
     if id.x >= instance.count {
         return;

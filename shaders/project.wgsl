@@ -121,7 +121,7 @@ fn clear_own(thread: u32) {
 @compute @workgroup_size(256)
 fn project_bin(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
 #ifdef COPIED_INSTANCE
-    instance = instances[group.z];
+    instance = instances[group.z].uniforms;
 #endif
     if thread == 0u {
         atomicStore(&present_count, 0u);
@@ -229,7 +229,7 @@ fn project_and_bin(place: u32, count: u32, thread: u32) {
 @compute @workgroup_size(256)
 fn project(@builtin(global_invocation_id) id: vec3<u32>) {
 #ifdef COPIED_INSTANCE
-    instance = instances[id.z];
+    instance = instances[id.z].uniforms;
 #endif
     if id.x >= instance.count {
         return;

@@ -9,9 +9,14 @@
 #endif
 
 #ifdef COPIED_INSTANCE
-// For drivers that compile a pass anew for each dispatch if a branch depends on nothing but uniforms at constant places: the entry point
-// copies the instance from a place that is 0, which the compiler does not know.
-@group(0) @binding(0) var<uniform> instances: array<InstanceUniforms, 1>;
+// One dispatch for several instances of a capture, one for each z of its workgroups: the entry point copies the uniforms of its own. Also
+// for drivers that compile a pass anew for each dispatch if a branch depends on nothing but uniforms at constant places.
+struct InstanceSlot {
+    uniforms: InstanceUniforms,
+    // Up to 512 bytes, as far apart as dynamic offsets are.
+    padding: array<vec4<u32>, 13>,
+}
+@group(0) @binding(0) var<uniform> instances: array<InstanceSlot, 64>;
 var<private> instance: InstanceUniforms;
 #else
 @group(0) @binding(0) var<uniform> instance: InstanceUniforms;

@@ -20,16 +20,15 @@ pub struct Renderer {
     pub(super) activate_count: wgpu::ComputePipeline,
     pub(super) activate_scan: wgpu::ComputePipeline,
     pub(super) activate_write: wgpu::ComputePipeline,
-    /// The passes of the reference design, compiled when they are first used: `project`, indexed by how a capture is stored, in the
-    /// order of [`Storage::ALL`], `blend`, in the order of [`Pixels::ALL`], and the others.
-    project: [OnceLock<wgpu::ComputePipeline>; 3],
+    /// The passes of the reference design, compiled when they are first used: `project`, indexed by whether instances are copied and by
+    /// how a capture is stored, in the order of [`Storage::ALL`], `blend`, in the order of [`Pixels::ALL`], and the others.
+    project: [[OnceLock<wgpu::ComputePipeline>; 3]; 2],
     blend: [OnceLock<wgpu::ComputePipeline>; 4],
     reference: OnceLock<ReferencePasses>,
-    /// Passes of the fast renderer, each compiled when it is first used: `project_bin` and `colors`, indexed by how a capture is
-    /// stored, in the order of [`Storage::ALL`], `sort_bins`, in the order of [`Lists::ALL`], and `blend_blocks`, by
-    /// [`FastVariant::blend_index`].
-    project_bin: [OnceLock<wgpu::ComputePipeline>; 3],
-    colors: [OnceLock<wgpu::ComputePipeline>; 3],
+    /// Passes of the fast renderer, each compiled when it is first used: `project_bin` and `colors`, indexed as `project`, `sort_bins`, in
+    /// the order of [`Lists::ALL`], and `blend_blocks`, by [`FastVariant::blend_index`].
+    project_bin: [[OnceLock<wgpu::ComputePipeline>; 3]; 2],
+    colors: [[OnceLock<wgpu::ComputePipeline>; 3]; 2],
     sort_bins: [OnceLock<wgpu::ComputePipeline>; 3],
     blend_blocks: [OnceLock<wgpu::ComputePipeline>; FastVariant::BLENDS],
     /// `motion` of the reference design and of the fast one, compiled when it is first used, indexed by how a capture is stored, in the
@@ -41,8 +40,8 @@ pub struct Renderer {
     prefers_reference: bool,
     /// [`SUBGROUPS_OF_32`], or nothing.
     subgroups: &'static [&'static str],
-    /// [`COPIED_INSTANCE`], or nothing.
-    copied_instance: &'static [&'static str],
+    /// Whether threads copy the uniforms of their instance even if a dispatch draws no other: on software drivers.
+    copies_instance: bool,
     /// Bound instead of a list of active Gaussians if all are drawn.
     pub(super) no_list: wgpu::BindGroup,
     work: WorkCounters,
@@ -146,7 +145,7 @@ impl Renderer {
             } else {
                 &[]
             },
-            copied_instance: if software { COPIED_INSTANCE } else { &[] },
+            copies_instance: software,
             no_list: allocator.bind_group("gs4d no active list", &layouts.active, &[no_list.as_entire_binding()]),
             layouts,
             work,
@@ -178,20 +177,27 @@ impl Renderer {
         }
     }
 
-    /// Compiles the passes of the reference design for captures stored in these ways, unless they have been.
+    /// Returns the definitions of passes that read a capture, and the index of their pipelines. `batched`: a dispatch draws several
+    /// instances.
+    fn reading(&self, storage: Storage, batched: bool) -> (Vec<&'static str>, usize) {
+        let copied = batched || self.copies_instance;
+        ([storage.definitions(), if copied { COPIED_INSTANCE } else { &[] }].concat(), usize::from(copied))
+    }
+
+    /// Compiles the passes of the reference design for captures stored in these ways, several in a dispatch or one, unless they have been.
     ///
     /// # Errors
     /// When a shader does not compile.
     pub(super) fn compile_reference(
         &self,
         device: &wgpu::Device,
-        storages: impl Iterator<Item = Storage>,
+        drawn: impl Iterator<Item = (Storage, bool)>,
         pixels: Pixels,
     ) -> Result<(), GpuError> {
         let layouts = &self.layouts;
-        for storage in storages {
-            if self.project(storage).is_none() {
-                let definitions = [storage.definitions(), self.copied_instance].concat();
+        for (storage, batched) in drawn {
+            if self.project(storage, batched).is_none() {
+                let (definitions, copied) = self.reading(storage, batched);
                 let shader = module(device, "project", &definitions, self.checks)?;
                 let [geometry, color] = &layouts.captures[storage as usize];
                 let made = pipeline(
@@ -200,7 +206,7 @@ impl Renderer {
                     "project",
                     &[&layouts.project, geometry, &layouts.active, color].map(Some),
                 );
-                self.project[storage as usize].get_or_init(|| made);
+                self.project[copied][storage as usize].get_or_init(|| made);
             }
         }
         if self.reference().is_none() {
@@ -216,9 +222,9 @@ impl Renderer {
         Ok(())
     }
 
-    /// Returns `project` for captures stored in this way, if it has been compiled.
-    pub(super) fn project(&self, storage: Storage) -> Option<&wgpu::ComputePipeline> {
-        self.project[storage as usize].get()
+    /// Returns `project` for captures stored in this way, several in a dispatch or one, if it has been compiled.
+    pub(super) fn project(&self, storage: Storage, batched: bool) -> Option<&wgpu::ComputePipeline> {
+        self.project[usize::from(batched || self.copies_instance)][storage as usize].get()
     }
 
     /// Returns `blend` for pixels of this kind, if it has been compiled.
@@ -241,30 +247,30 @@ impl Renderer {
         design: Design,
         storage: Storage,
     ) -> Result<(), GpuError> {
-        let storages = std::iter::once(storage);
+        let drawn = std::iter::once((storage, false));
         match self.resolve(design) {
-            Design::Reference => self.compile_reference(device, storages, Pixels::default()),
+            Design::Reference => self.compile_reference(device, drawn, Pixels::default()),
             Design::Auto | Design::Fast => {
                 let lists = Lists::suiting(&device.limits(), 0);
-                self.compile_fast(device, storages, FastVariant { lists, ..FastVariant::default() })
+                self.compile_fast(device, drawn, FastVariant { lists, ..FastVariant::default() })
             }
         }
     }
 
-    /// Compiles the passes of the fast renderer for captures stored in these ways, unless they have been.
+    /// Compiles the passes of the fast renderer for captures stored in these ways, several in a dispatch or one, unless they have been.
     ///
     /// # Errors
     /// When a shader does not compile.
     pub(super) fn compile_fast(
         &self,
         device: &wgpu::Device,
-        storages: impl Iterator<Item = Storage>,
+        drawn: impl Iterator<Item = (Storage, bool)>,
         variant: FastVariant,
     ) -> Result<(), GpuError> {
         let layouts = &self.layouts;
-        for storage in storages {
-            if self.project_bin(storage).is_none() {
-                let definitions = [storage.definitions(), self.copied_instance].concat();
+        for (storage, batched) in drawn {
+            if self.project_bin(storage, batched).is_none() {
+                let (definitions, copied) = self.reading(storage, batched);
                 let shader = module(device, "project", &[BINNED, &definitions[..]].concat(), self.checks)?;
                 let [geometry, color] = &layouts.captures[storage as usize];
                 let made = pipeline(
@@ -273,11 +279,11 @@ impl Renderer {
                     "project_bin",
                     &[&layouts.project_bin, geometry, &layouts.active].map(Some),
                 );
-                self.project_bin[storage as usize].get_or_init(|| made);
+                self.project_bin[copied][storage as usize].get_or_init(|| made);
                 let shader = module(device, "colors", &definitions, self.checks)?;
                 let groups = [Some(&layouts.colors), Some(geometry), None, Some(color)];
                 let made = pipeline(device, &shader, "colors", &groups);
-                self.colors[storage as usize].get_or_init(|| made);
+                self.colors[copied][storage as usize].get_or_init(|| made);
             }
         }
         let lists = variant.lists;
@@ -310,7 +316,7 @@ impl Renderer {
         let binned = if fast { BINNED } else { &[] };
         for storage in storages {
             if self.motion(storage, design).is_none() {
-                let definitions = [binned, storage.definitions(), self.copied_instance].concat();
+                let definitions = [binned, &self.reading(storage, false).0[..]].concat();
                 let shader = module(device, "motion", &definitions, self.checks)?;
                 let [geometry, _] = &self.layouts.captures[storage as usize];
                 let groups = [&self.layouts.motion[usize::from(fast)], geometry, &self.layouts.active].map(Some);
@@ -326,14 +332,14 @@ impl Renderer {
         self.motion[usize::from(design != Design::Reference)][storage as usize].get()
     }
 
-    /// Returns `project_bin` for captures stored in this way, if it has been compiled.
-    pub(super) fn project_bin(&self, storage: Storage) -> Option<&wgpu::ComputePipeline> {
-        self.project_bin[storage as usize].get()
+    /// Returns `project_bin` for captures stored in this way, several in a dispatch or one, if it has been compiled.
+    pub(super) fn project_bin(&self, storage: Storage, batched: bool) -> Option<&wgpu::ComputePipeline> {
+        self.project_bin[usize::from(batched || self.copies_instance)][storage as usize].get()
     }
 
-    /// Returns `colors` for captures stored in this way, if it has been compiled.
-    pub(super) fn colors(&self, storage: Storage) -> Option<&wgpu::ComputePipeline> {
-        self.colors[storage as usize].get()
+    /// Returns `colors` for captures stored in this way, several in a dispatch or one, if it has been compiled.
+    pub(super) fn colors(&self, storage: Storage, batched: bool) -> Option<&wgpu::ComputePipeline> {
+        self.colors[usize::from(batched || self.copies_instance)][storage as usize].get()
     }
 
     /// Returns `sort_bins` for lists of this length, if it has been compiled.
@@ -372,7 +378,7 @@ impl Layouts {
     fn new(device: &wgpu::Device) -> Self {
         use Bind::{Depth, Depths, Read, Target, Uniform, UniformAt, Write};
         const FRAME: usize = size_of::<layout::FrameUniforms>();
-        const INSTANCE: Bind = UniformAt(size_of::<layout::InstanceUniforms>());
+        const INSTANCE: Bind = UniformAt((layout::INSTANCE_STRIDE * layout::INSTANCES_AT_ONCE) as usize);
         const BEFORE: Bind = UniformAt(size_of::<layout::MotionUniforms>());
         let new = |label, bindings: &[Bind]| group_layout(device, label, bindings);
         let pixel = |pixels: Pixels| {

@@ -118,8 +118,9 @@ pub const ATOMIC_SUMS: &[&str] = &["ATOMIC_SUMS"];
 /// Definitions of `project` as the first pass of the fast renderer, `project_bin`, and of `motion` there.
 pub const BINNED: &[&str] = &["BINNED"];
 
-/// Definitions of `project` and `colors` on software drivers: each thread copies the uniforms of its instance. Mesa's driver compiles a long
-/// shader again with the values of its uniforms if a branch depends on nothing else; version 22 does so whenever it is bound, and keeps all.
+/// Definitions of `project`, `project_bin` and `colors` for several instances in one dispatch: each thread copies the uniforms of its own. On
+/// software drivers those of one instance do, too, and `motion`: Mesa's driver compiles a long shader again with the values of its uniforms if
+/// a branch depends on nothing else; version 22 does so whenever it is bound, and keeps all.
 pub const COPIED_INSTANCE: &[&str] = &["COPIED_INSTANCE"];
 
 /// How many splats `sort_bins` sorts at once in workgroup memory. Shorter lists leave room for more workgroups; longer ones are sorted

@@ -1,7 +1,7 @@
-//! The fast renderer against the reference design, where its buffers and its workgroup memory are too small.
+//! The fast renderer against the reference design, where its buffers and its workgroup memory are too small, and many copies of a capture.
 //!
-//! In: scenes of many splats in few tiles. Out: proof that both designs draw the same picture, from the first frame on. Skipped where
-//! there is no GPU.
+//! In: scenes of many splats in few tiles. Out: proof that both designs draw the same picture, from the first frame on, and that copies
+//! which one dispatch draws look as those drawn one by one. Skipped where there is no GPU.
 
 use crate::support::blob::blob;
 use crate::support::gpu;
@@ -179,4 +179,50 @@ fn parts_of_very_many_gaussians_take_several_for_each_thread() {
     let found = first_frame(&mut headless, Design::Fast, &scene, &view);
     assert_same(&found, &expected, "300,000 Gaussians");
     assert_eq!(found.counts, expected.counts, "counts");
+}
+
+#[test]
+fn copies_of_a_capture_are_drawn_as_each_by_itself() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let synthetic = |seed| {
+        let settings = SynthSettings { count: 40, seed, ..SynthSettings::default() };
+        synthesize(&settings).into_runtime().expect("a scene that can be drawn")
+    };
+    let (scene, other) = (synthetic(1), synthetic(2));
+    let [copied, twin, other] = [&scene, &scene, &other].map(|scene| headless.upload(scene).expect("the scene fits"));
+    // More than one dispatch draws, about another capture; each at its own place, time and opacity.
+    let places = (0..150).map(|index| {
+        let (column, row) = (index % 15, index / 15);
+        let eye = Vec3::new(0.7 * column as f32 - 5.0, -9.0, 0.8 * row as f32 - 4.0);
+        let camera = Camera::look_at(eye, eye + Vec3::Y, Vec3::Z, 0.8, UVec2::new(150, 110));
+        let view = camera.view(0.2 + 0.004 * index as f32, RasterFov::Reference);
+        let opacity = 1.0 - 0.004 * index as f32;
+        (index, view, Appearance { opacity, ..Appearance::default() })
+    });
+    let places: Vec<_> = places.collect();
+    let instances = |alternate: bool| -> Vec<Instance<'_>> {
+        let capture = |index: usize| match index {
+            75 => &other,
+            _ if alternate && index % 2 == 1 => &twin,
+            _ => &copied,
+        };
+        let place = |&(index, view, appearance): &(usize, View, Appearance)| Instance {
+            capture: capture(index),
+            active: None,
+            view,
+            appearance,
+        };
+        places.iter().map(place).collect()
+    };
+    for (_, design) in Design::NAMES {
+        headless.set_design(design);
+        let [together, alone] = [false, true].map(|alternate| {
+            let parameters = ViewParameters { depths: false, ..ViewParameters::default() };
+            headless.render_all(&instances(alternate), &parameters).expect("the picture fits")
+        });
+        assert!(together.counts.visible > 2000, "{design:?}: they are seen: {:?}", together.counts);
+        assert_eq!(together.counts, alone.counts, "{design:?}: counts");
+        let difference = difference(&together, &alone);
+        assert!(difference <= 1e-6, "{design:?}: differs by {difference}");
+    }
 }

@@ -7,16 +7,16 @@ use bevy_gs4d::gaussian::projection::LOW_PASS;
 use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF};
 use bevy_gs4d::offline::fine_tune::NEIGHBORS;
 use bevy_gs4d::renderer::layout::{
-    self, Activation, AdamUniforms, BLOCK, Counters, DIGITS, FIRST_SEEN, FrameUniforms, InstanceUniforms, LossUniforms,
-    MotionUniforms, RoundingRecord, SortStep, SplatRecord, SplatShape, TermWeights, TiedColors, TrainedRecord,
-    TrainedScene, VisibleSplat,
+    self, Activation, AdamUniforms, BLOCK, Counters, DIGITS, FIRST_SEEN, FrameUniforms, INSTANCE_STRIDE,
+    INSTANCES_AT_ONCE, InstanceUniforms, LossUniforms, MotionUniforms, RoundingRecord, SortStep, SplatRecord,
+    SplatShape, TermWeights, TiedColors, TrainedRecord, TrainedScene, VisibleSplat,
 };
-use bevy_gs4d::renderer::shaders::{compose, pass_names};
+use bevy_gs4d::renderer::shaders::{COPIED_INSTANCE, compose, pass_names};
 use bevy_gs4d::view::TILE_SIZE;
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;
 use wgpu::naga::front::wgsl::parse_str;
-use wgpu::naga::{Expression, GlobalVariable, Literal, Module, StructMember, TypeInner};
+use wgpu::naga::{AddressSpace, ArraySize, Expression, GlobalVariable, Literal, Module, StructMember, TypeInner};
 
 /// A member: its name, where it begins, how many bytes it has.
 type Member = (String, usize, usize);
@@ -211,6 +211,19 @@ fn every_structure_has_the_same_members_in_the_same_places() {
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     assert_eq!(seen.len(), mirrors.len(), "every structure of the host is bound by some pass: {seen:?}");
+}
+
+#[test]
+fn instances_of_one_dispatch_are_as_far_apart_as_the_host_puts_them() {
+    for pass in ["project", "colors", "motion"] {
+        let module = compose(pass, COPIED_INSTANCE).expect("the pass composes");
+        let uniforms = module.global_variables.iter().filter(|(_, variable)| variable.space == AddressSpace::Uniform);
+        let arrays = uniforms.filter_map(|(_, variable)| match module.types[variable.ty].inner {
+            TypeInner::Array { size: ArraySize::Constant(count), stride, .. } => Some((count.get(), stride)),
+            _ => None,
+        });
+        assert_eq!(arrays.collect::<Vec<_>>(), [(INSTANCES_AT_ONCE, INSTANCE_STRIDE)], "{pass}");
+    }
 }
 
 #[test]

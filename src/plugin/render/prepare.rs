@@ -61,7 +61,8 @@ pub(super) struct Pipelines<'w> {
 }
 
 impl Scene<'_> {
-    /// Appends the captures that a camera sees to `drawn`, in the order of Bevy's list, which is the same in every frame.
+    /// Appends the captures that a camera sees to `drawn`: copies of one beside each other, which are drawn together, and otherwise in the
+    /// order of Bevy's list, which is the same in every frame.
     fn collect(
         &self,
         viewer: Entity,
@@ -84,6 +85,7 @@ impl Scene<'_> {
             let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
             Some(Drawn { entity: *entity, asset, view, appearance, filtered, level })
         }));
+        drawn.sort_by_key(|one| (one.asset, one.level));
     }
 
     /// Returns the view of each capture that is drawn one frame before, when the camera had this pose.

@@ -67,7 +67,7 @@ impl ViewRenderer {
         // project_bin
         let groups = |count: u32| count.div_ceil(256 * per_thread(count));
         self.project(
-            |storage| renderer.project_bin(storage),
+            |storage, batched| renderer.project_bin(storage, batched),
             renderer,
             &fast.project_bin[odd],
             groups,
@@ -90,7 +90,8 @@ impl ViewRenderer {
 
         // colors
         let groups = |count: u32| count.div_ceil(COLORS_OF_GROUP).min(COLOR_GROUPS);
-        self.project(|storage| renderer.colors(storage), renderer, &fast.colors[odd], groups, pass, instances);
+        let pipeline = |storage, batched| renderer.colors(storage, batched);
+        self.project(pipeline, renderer, &fast.colors[odd], groups, pass, instances);
         mark(timer, pass);
 
         // blend_blocks

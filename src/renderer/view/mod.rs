@@ -15,7 +15,7 @@ mod resources;
 mod sizes;
 
 use super::active::{drawn_count, most_drawn};
-use super::memory::{alignment_of, binding_limit};
+use super::memory::binding_limit;
 use super::pipelines::Renderer;
 use super::shaders::{FastVariant, Lists, Pixels};
 use super::timing::{PassTime, PassTimer};
@@ -24,7 +24,7 @@ use crate::view::{Appearance, Background, View, tiles};
 use bins::BinRoom;
 pub use design::Design;
 use glam::UVec2;
-use layout::{BLOCK, Counters, DEPTH_STEPS};
+use layout::{BLOCK, Counters, DEPTH_STEPS, INSTANCE_STRIDE};
 use motion::MotionResources;
 pub use parameters::{Instance, OpaqueDepth, ViewParameters};
 use readback::Readback;
@@ -36,8 +36,6 @@ use wgpu::{BufferUsages, TextureFormat};
 /// Working buffers, uniforms and targets of one view.
 #[derive(Debug)]
 pub struct ViewRenderer {
-    /// Alignment of dynamic uniform offsets.
-    alignment: u32,
     /// Number of slots of the frame prepared last, the size of its picture, and the tiles along each side of its bins.
     slots: u32,
     picture: UVec2,
@@ -111,11 +109,9 @@ impl ViewRenderer {
     /// Creates a view without size; [`prepare`](Self::prepare) sets it.
     pub fn new(device: &wgpu::Device, renderer: &Renderer) -> Self {
         let allocator = renderer.allocator(device);
-        let alignment = alignment_of::<layout::InstanceUniforms>(device);
         let counters = size_of::<Counters>() as u64;
         let depth = allocator.texture("gs4d no depth", UVec2::ONE, TextureFormat::Depth32Float);
         Self {
-            alignment,
             slots: 0,
             picture: UVec2::ONE,
             bin_side: 1,
@@ -129,7 +125,7 @@ impl ViewRenderer {
             oversized_frames: 0,
             instance_uniforms: Vec::new(),
             frame: allocator.buffer("gs4d frame", size_of::<layout::FrameUniforms>() as u64, BufferUsages::UNIFORM),
-            steps: allocator.buffer("gs4d steps", u64::from(alignment * 2 * DEPTH_STEPS), BufferUsages::UNIFORM),
+            steps: allocator.buffer("gs4d steps", u64::from(INSTANCE_STRIDE * 2 * DEPTH_STEPS), BufferUsages::UNIFORM),
             counters: allocator.buffer("gs4d counters", counters, BufferUsages::STORAGE | BufferUsages::COPY_SRC),
             arguments: allocator.buffer("gs4d arguments", 6 * 4, BufferUsages::STORAGE | BufferUsages::INDIRECT),
             no_depth: depth.create_view(&wgpu::TextureViewDescriptor::default()),
@@ -166,15 +162,16 @@ impl ViewRenderer {
         let (precision, blending) = (parameters.precision, parameters.blending());
         self.pixels = Pixels { multisampled: blending.is_multisampled(), precision };
         self.has_depths = parameters.depths;
-        let storages = instances.iter().map(|instance| instance.capture.storage);
+        let joined = instances.chunk_by(Instance::joins);
+        let drawn = joined.map(|joined| (joined[0].capture.storage, joined.len() > 1));
         let writes_depths = if self.design == Design::Reference {
-            renderer.compile_reference(device, storages, self.pixels)?;
+            renderer.compile_reference(device, drawn, self.pixels)?;
             true
         } else {
             let large_batches = bins::large_batches(&device.limits(), instances);
             let lists = Lists::suiting(&device.limits(), self.fullest_bin);
             self.variant = FastVariant { lists, blending, precision, large_batches };
-            renderer.compile_fast(device, storages, self.variant)?;
+            renderer.compile_fast(device, drawn, self.variant)?;
             blending.writes_depths()
         };
         if std::mem::take(&mut self.recorded) {
@@ -459,7 +456,7 @@ impl ViewRenderer {
                     ..capture
                 };
                 uniforms.extend_from_slice(bytemuck::bytes_of(&uniform));
-                uniforms.resize(uniforms.len().next_multiple_of(self.alignment as usize), 0);
+                uniforms.resize(uniforms.len().next_multiple_of(INSTANCE_STRIDE as usize), 0);
                 slot += count;
                 first_listed += part.count;
                 index += 1;
@@ -506,7 +503,7 @@ impl ViewRenderer {
         };
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
         if let Some(motion) = &self.motion {
-            motion.write(queue, &frame, instances, parameters.previous.unwrap_or_default(), self.alignment);
+            motion.write(queue, &frame, instances, parameters.previous.unwrap_or_default());
         }
         self.instance_uniforms = uniforms;
     }

@@ -9,7 +9,9 @@ use super::resources::{Resources, pixel_group, texture_bytes};
 use super::{Design, Instance, ViewParameters, ViewRenderer};
 use crate::renderer::GpuError;
 use crate::renderer::active::drawn_count;
-use crate::renderer::layout::{BACKGROUND_NONE, DEBUG_COLOR, FrameUniforms, InstanceUniforms, MotionUniforms};
+use crate::renderer::layout::{
+    BACKGROUND_NONE, DEBUG_COLOR, FrameUniforms, INSTANCE_STRIDE, INSTANCES_AT_ONCE, MotionUniforms,
+};
 use crate::renderer::memory::Allocator;
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::FastVariant;
@@ -92,7 +94,7 @@ impl ViewRenderer {
         made: &Resources,
         variant: FastVariant,
     ) -> MotionResources {
-        let parts = u64::from(made.sizes.parts) * u64::from(self.alignment);
+        let parts = u64::from(made.sizes.parts) * u64::from(INSTANCE_STRIDE);
         let before = allocator.buffer("gs4d frame before", parts, BufferUsages::UNIFORM);
         let frame = allocator.buffer("gs4d frame of motions", size_of::<FrameUniforms>() as u64, BufferUsages::UNIFORM);
         let texture = allocator.texture("gs4d motion", made.sizes.picture, made.pixels.precision.format());
@@ -101,7 +103,7 @@ impl ViewRenderer {
             let size = NonZeroU64::new(size as u64);
             BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size })
         };
-        let instance = uniform(&made.instances, size_of::<InstanceUniforms>());
+        let instance = uniform(&made.instances, (INSTANCE_STRIDE * INSTANCES_AT_ONCE) as usize);
         let uniforms = [instance, uniform(&before, size_of::<MotionUniforms>())];
         let splats = made.buffers.splats.as_entire_binding();
         let group = |index: usize, buffers: &[BindingResource<'_>]| {
@@ -146,7 +148,7 @@ impl ViewRenderer {
             pass.set_pipeline(pipeline);
             pass.set_bind_group(2, instance.active.map_or(&renderer.no_list, |active| &active.list), &[]);
             for (at, part) in instance.capture.parts.iter().enumerate() {
-                let offset = index * self.alignment;
+                let offset = index * INSTANCE_STRIDE;
                 pass.set_bind_group(0, &motion.motion[usize::from(self.odd)], &[offset, offset]);
                 pass.set_bind_group(1, &part.geometry, &[]);
                 let count = drawn_count(instance.capture, at, instance.active);
@@ -172,15 +174,8 @@ impl MotionResources {
         texture_bytes(&self.texture)
     }
 
-    /// Writes the uniforms, given those of the frame for colors. `alignment` is that of instances.
-    pub fn write(
-        &self,
-        queue: &wgpu::Queue,
-        frame: &FrameUniforms,
-        instances: &[Instance<'_>],
-        previous: &[View],
-        alignment: u32,
-    ) {
+    /// Writes the uniforms, given those of the frame for colors.
+    pub fn write(&self, queue: &wgpu::Queue, frame: &FrameUniforms, instances: &[Instance<'_>], previous: &[View]) {
         let frame = FrameUniforms { background_mode: BACKGROUND_NONE, debug: DEBUG_COLOR, ..*frame };
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
         let mut uniforms = Vec::new();
@@ -189,7 +184,7 @@ impl MotionResources {
             let before = MotionUniforms::new(known.unwrap_or(&instance.view));
             for _ in &instance.capture.parts {
                 uniforms.extend_from_slice(bytemuck::bytes_of(&before));
-                uniforms.resize(uniforms.len().next_multiple_of(alignment as usize), 0);
+                uniforms.resize(uniforms.len().next_multiple_of(INSTANCE_STRIDE as usize), 0);
             }
         }
         queue.write_buffer(&self.before, 0, &uniforms);

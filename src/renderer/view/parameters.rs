@@ -22,6 +22,18 @@ pub struct Instance<'a> {
     pub appearance: Appearance,
 }
 
+impl Instance<'_> {
+    /// Returns whether one dispatch can draw this instance and the next: they have the same Gaussians, in one part.
+    pub(super) fn joins(&self, next: &Self) -> bool {
+        let same_list = match (self.active, next.active) {
+            (None, None) => true,
+            (Some(a), Some(b)) => std::ptr::eq(a, b),
+            _ => false,
+        };
+        std::ptr::eq(self.capture, next.capture) && self.capture.parts.len() == 1 && same_list
+    }
+}
+
 /// The background and the opaque surfaces of a view, and how its captures are shown.
 #[derive(Debug, Clone, Copy)]
 pub struct ViewParameters<'a> {

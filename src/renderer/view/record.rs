@@ -5,7 +5,7 @@
 use super::resources::{Resources, tile_steps};
 use super::{Instance, ViewRenderer};
 use crate::renderer::active::drawn_count;
-use crate::renderer::layout::{BLOCK, DEPTH_STEPS, DIGITS};
+use crate::renderer::layout::{BLOCK, DEPTH_STEPS, DIGITS, INSTANCE_STRIDE, INSTANCES_AT_ONCE};
 use crate::renderer::pipelines::{ReferencePasses, Renderer};
 use crate::renderer::shaders::Storage;
 use crate::renderer::timing::PassTimer;
@@ -70,7 +70,7 @@ impl ViewRenderer {
     ) {
         // project
         let (Some(passes), Some(blend)) = (renderer.reference(), renderer.blend(self.pixels)) else { return };
-        let pipeline = |storage| renderer.project(storage);
+        let pipeline = |storage, batched| renderer.project(storage, batched);
         self.project(pipeline, renderer, &made.project, |count| count.div_ceil(256), pass, instances);
         mark(timer, pass);
 
@@ -118,11 +118,12 @@ impl ViewRenderer {
         mark(timer, pass);
     }
 
-    /// Records one dispatch of `project`, `project_bin` or `colors` for each part of each instance; `groups` returns the
-    /// number of workgroups for a number of Gaussians.
+    /// Records one dispatch of `project`, `project_bin` or `colors` for each part of each instance, or for several instances of the same
+    /// Gaussians; `groups` returns the number of workgroups for a number of Gaussians, and `pipeline` that for one instance or, if `true`, for
+    /// several.
     pub(super) fn project<'a>(
         &self,
-        pipeline: impl Fn(Storage) -> Option<&'a wgpu::ComputePipeline>,
+        pipeline: impl Fn(Storage, bool) -> Option<&'a wgpu::ComputePipeline>,
         renderer: &Renderer,
         group: &wgpu::BindGroup,
         groups: impl Fn(u32) -> u32,
@@ -130,17 +131,22 @@ impl ViewRenderer {
         instances: &[Instance<'_>],
     ) {
         let mut index = 0;
-        for instance in instances {
-            let Some(pipeline) = pipeline(instance.capture.storage) else { continue };
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(2, instance.active.map_or(&renderer.no_list, |active| &active.list), &[]);
-            for (at, part) in instance.capture.parts.iter().enumerate() {
-                pass.set_bind_group(0, group, &[index * self.alignment]);
-                pass.set_bind_group(1, &part.geometry, &[]);
-                pass.set_bind_group(3, &part.color, &[]);
-                let count = drawn_count(instance.capture, at, instance.active);
-                pass.dispatch_workgroups(groups(count), 1, 1);
-                index += 1;
+        for joined in instances.chunk_by(Instance::joins) {
+            // Neighbors of the same Gaussians: wgpu waits between two dispatches.
+            for batch in joined.chunks(INSTANCES_AT_ONCE as usize) {
+                let (instance, count) = (&batch[0], batch.len() as u32);
+                let Some(pipeline) = pipeline(instance.capture.storage, joined.len() > 1) else { continue };
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(2, instance.active.map_or(&renderer.no_list, |active| &active.list), &[]);
+                for (at, part) in instance.capture.parts.iter().enumerate() {
+                    pass.set_bind_group(0, group, &[index * INSTANCE_STRIDE]);
+                    pass.set_bind_group(1, &part.geometry, &[]);
+                    pass.set_bind_group(3, &part.color, &[]);
+                    let gaussians = drawn_count(instance.capture, at, instance.active);
+                    pass.dispatch_workgroups(groups(gaussians), 1, count);
+                    // Those that are drawn together have one part.
+                    index += count;
+                }
             }
         }
     }
@@ -161,7 +167,7 @@ impl ViewRenderer {
             Some(blocks) => pass.dispatch_workgroups(blocks, 1, 1),
             None => pass.dispatch_workgroups_indirect(&self.arguments, offset),
         };
-        pass.set_bind_group(0, group, &[step * self.alignment]);
+        pass.set_bind_group(0, group, &[step * INSTANCE_STRIDE]);
         pass.set_pipeline(&passes.sort_count);
         dispatch(pass);
         pass.set_pipeline(&passes.sort_scan);

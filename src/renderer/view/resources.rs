@@ -6,7 +6,9 @@
 use super::bins::FastResources;
 use super::sizes::Sizes;
 use super::{Design, ViewRenderer};
-use crate::renderer::layout::{self, BLOCK, DEPTH_STEPS, DIGIT_BITS, DIGITS, SortStep};
+use crate::renderer::layout::{
+    self, BLOCK, DEPTH_STEPS, DIGIT_BITS, DIGITS, INSTANCE_STRIDE, INSTANCES_AT_ONCE, SortStep,
+};
 use crate::renderer::memory::Allocator;
 use crate::renderer::pipelines::{Layouts, Renderer};
 use crate::renderer::shaders::Pixels;
@@ -85,8 +87,10 @@ impl ViewRenderer {
         let slot_blocks = slots.div_ceil(BLOCK);
         let stride = slot_blocks.max(pairs.div_ceil(BLOCK));
         let tiles = tiles(size);
+        // What is bound at the last one is as long as at the first.
+        let instance_slots = u64::from(parts + INSTANCES_AT_ONCE - 1);
         let instances =
-            allocator.buffer("gs4d instances", u64::from(parts) * u64::from(self.alignment), BufferUsages::UNIFORM);
+            allocator.buffer("gs4d instances", instance_slots * u64::from(INSTANCE_STRIDE), BufferUsages::UNIFORM);
         let splat_size = if fast { size_of::<layout::SplatShape>() } else { size_of::<layout::SplatRecord>() };
         let splats = storage("gs4d splats", slots, splat_size);
         // What only the reference design uses has no room with the fast one.
@@ -134,7 +138,7 @@ impl ViewRenderer {
         let instance = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
             buffer: &instances,
             offset: 0,
-            size: std::num::NonZeroU64::new(size_of::<layout::InstanceUniforms>() as u64),
+            size: std::num::NonZeroU64::new(u64::from(INSTANCE_STRIDE * INSTANCES_AT_ONCE)),
         });
         let fast = (self.design == Design::Fast).then(|| {
             let buffers = [&splats, &tile_ranges, &pair_splats[sorted]];
@@ -217,7 +221,7 @@ impl ViewRenderer {
 
     /// Writes the steps of both sorts: by all bits of the depth, then by the bits of the tile.
     fn write_steps(&self, queue: &wgpu::Queue, stride: u32) {
-        let mut bytes = vec![0; (self.alignment * 2 * DEPTH_STEPS) as usize];
+        let mut bytes = vec![0; (INSTANCE_STRIDE * 2 * DEPTH_STEPS) as usize];
         for index in 0..2 * DEPTH_STEPS {
             let source = match index {
                 0 => layout::SORT_SLOTS,
@@ -225,7 +229,7 @@ impl ViewRenderer {
                 _ => layout::SORT_PAIRS,
             };
             let step = SortStep { shift: (index % DEPTH_STEPS) * DIGIT_BITS, source, stride, padding: 0 };
-            let at = (index * self.alignment) as usize;
+            let at = (index * INSTANCE_STRIDE) as usize;
             bytes[at..at + size_of::<SortStep>()].copy_from_slice(bytemuck::bytes_of(&step));
         }
         queue.write_buffer(&self.steps, 0, &bytes);
