@@ -6,7 +6,7 @@
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{
-    DURATION, SIZE, color, difference, difference_between, eye, rgb, scene, view, view_of,
+    DURATION, SIZE, add, color, difference, difference_between, eye, rgb, scene, view, view_of,
 };
 use crate::support::fixtures::{
     BLACK, MIDDLE, check, crowd, debug_picture, front, insert, lone, orthographic, reference_picture, spawn, spawn_box,
@@ -19,6 +19,7 @@ use bevy::camera::{CameraProjection, Hdr, SubCameraView};
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::math::{Affine3A, Vec3A};
 use bevy::prelude::*;
+use bevy_gs4d::GaussianCapture3d;
 use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::playback::{ClipFade, Playback};
 use bevy_gs4d::reference::{self, Layer};
@@ -151,6 +152,24 @@ fn captures_in_one_view_keep_their_own_looks() {
         },
     ];
     check(&mut app, &reference::render_layers(&layers, BLACK, BlendSpace::Encoded).picture, "two captures");
+}
+
+#[test]
+fn splats_of_one_depth_blend_in_the_order_of_their_captures_and_not_of_their_assets() {
+    let color_of = |assets: [usize; 2]| {
+        let mut app = app(SIZE)?;
+        let colors = [Vec3::X, Vec3::Y];
+        let mut handles: Vec<_> = assets.iter().map(|&index| (index, add(&mut app, &lone(colors[index])))).collect();
+        handles.sort_by_key(|(index, _)| *index);
+        for (_, handle) in handles {
+            app.world_mut().spawn((GaussianCapture3d(handle), Playback::paused_at(0.0)));
+        }
+        spawn_camera(&mut app, Msaa::Off, front());
+        Some(rgb(&picture(&mut app, 0.0), MIDDLE.x, MIDDLE.y))
+    };
+    let Some(usual) = color_of([0, 1]) else { return };
+    assert!(usual[0].abs_diff(usual[1]) > 225, "one covers the other: {usual:?}");
+    assert_eq!(color_of([1, 0]), Some(usual), "the assets have come in the other order");
 }
 
 #[test]

@@ -68,6 +68,22 @@ pub(crate) struct Drawn {
     pub(crate) level: usize,
 }
 
+/// Puts the copies of each capture, of one level, beside the first of them, so that one dispatch draws them. Otherwise the order stays: it
+/// decides between splats of the same depth.
+pub(crate) fn group_copies(drawn: &mut [Drawn]) {
+    let mut grouped = 0;
+    while grouped < drawn.len() {
+        let first = (drawn[grouped].asset, drawn[grouped].level);
+        grouped += 1;
+        for next in grouped..drawn.len() {
+            if (drawn[next].asset, drawn[next].level) == first {
+                drawn[grouped..=next].rotate_right(1);
+                grouped += 1;
+            }
+        }
+    }
+}
+
 impl Drawn {
     /// Returns it as input of the renderer; `None` if the capture is no longer on the GPU.
     pub(crate) fn instance<'a>(
@@ -147,5 +163,32 @@ impl CaptureView {
             self.measured = on;
             self.renderer.measure(device.wgpu_device(), queue, renderer, on);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy::asset::uuid::Uuid;
+    use bevy::ecs::entity::Entity;
+    use glam::{Mat4, UVec2, Vec2, Vec4};
+
+    #[test]
+    fn copies_stand_together_and_nothing_else_moves() {
+        let view = View::new(UVec2::ONE, 0.0, Mat4::IDENTITY, Vec4::ONE, Vec2::ONE);
+        let one = |(number, (asset, level)): (u32, (u128, usize))| Drawn {
+            entity: Entity::from_raw_u32(number).expect("a small number").into(),
+            asset: AssetId::Uuid { uuid: Uuid::from_u128(asset) },
+            view,
+            appearance: Appearance::default(),
+            filtered: true,
+            level,
+        };
+        // The second asset has the smaller number; of the first there are two levels.
+        let assets = [(9, 0), (4, 0), (9, 1), (9, 0), (7, 0), (4, 0), (9, 1), (9, 0)];
+        let mut drawn: Vec<Drawn> = (0..).zip(assets).map(one).collect();
+        group_copies(&mut drawn);
+        let order: Vec<u32> = drawn.iter().map(|one| one.entity.id().index_u32()).collect();
+        assert_eq!(order, [0, 3, 7, 1, 5, 2, 6, 4], "each beside the first of its kind, in their order");
     }
 }

@@ -4,7 +4,7 @@
 //! everything that drawing needs written to the GPU. In the steady state nothing is created there.
 
 use super::active::ActiveLists;
-use super::capture_views::{CaptureView, CaptureViews, Drawn};
+use super::capture_views::{CaptureView, CaptureViews, Drawn, group_copies};
 use super::composite::{CompositeKey, CompositePipeline};
 use super::depth_readers::DepthReaders;
 use super::detail::CaptureLevels;
@@ -61,8 +61,8 @@ pub(super) struct Pipelines<'w> {
 }
 
 impl Scene<'_> {
-    /// Appends the captures that a camera sees to `drawn`: copies of one beside each other, which are drawn together, and otherwise in the
-    /// order of Bevy's list, which is the same in every frame.
+    /// Appends the captures that a camera sees to `drawn`, in the order of Bevy's list, which is the same in every frame, but copies beside each
+    /// other.
     fn collect(
         &self,
         viewer: Entity,
@@ -85,7 +85,7 @@ impl Scene<'_> {
             let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
             Some(Drawn { entity: *entity, asset, view, appearance, filtered, level })
         }));
-        drawn.sort_by_key(|one| (one.asset, one.level));
+        group_copies(drawn);
     }
 
     /// Returns the view of each capture that is drawn one frame before, when the camera had this pose.
