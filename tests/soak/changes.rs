@@ -58,7 +58,11 @@ impl Changes {
                 format!("a target of {}", self.state.size)
             }
             56..82 => self.change_camera(),
-            82..96 => self.change_settings(),
+            82..95 => self.change_settings(),
+            95 => {
+                self.state.coarse = !self.state.coarse;
+                format!("coarsest level of detail: {}", self.state.coarse)
+            }
             _ => self.second_camera(),
         }
     }

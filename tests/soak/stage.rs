@@ -78,6 +78,8 @@ impl Stage {
         if is_written && self.shown.shows_file() {
             self.app.world().resource::<AssetServer>().reload(self.file());
         }
+        let bias = if state.coarse { -16.0 } else { 16.0 };
+        self.app.insert_resource(CaptureDetail { bias, ..default() });
         self.resize(state.size);
         self.show_captures(&state.captures);
         self.show_cameras(&state.cameras);

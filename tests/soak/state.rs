@@ -18,6 +18,9 @@ pub struct State {
     pub size: UVec2,
     /// How often the file has been written anew.
     pub version: u64,
+    /// Whether captures are drawn at their coarsest level of detail, not with all Gaussians. In between, the level depends on the one before,
+    /// so that nothing flickers, and a new app may show another.
+    pub coarse: bool,
     pub captures: Vec<Placed>,
     pub cameras: Vec<Viewer>,
 }
@@ -75,7 +78,13 @@ pub enum Lens {
 impl Default for State {
     /// One camera, and nothing to see.
     fn default() -> Self {
-        Self { size: UVec2::splat(96), version: 0, captures: Vec::new(), cameras: vec![Viewer::default()] }
+        Self {
+            size: UVec2::splat(96),
+            version: 0,
+            coarse: false,
+            captures: Vec::new(),
+            cameras: vec![Viewer::default()],
+        }
     }
 }
 
