@@ -71,16 +71,17 @@ pub(crate) struct Drawn {
 /// Puts the copies of each capture, of one level, beside the first of them, so that one dispatch draws them. Otherwise the order stays: it
 /// decides between splats of the same depth.
 pub(crate) fn group_copies(drawn: &mut [Drawn]) {
-    let mut grouped = 0;
-    while grouped < drawn.len() {
-        let first = (drawn[grouped].asset, drawn[grouped].level);
-        grouped += 1;
-        for next in grouped..drawn.len() {
-            if (drawn[next].asset, drawn[next].level) == first {
-                drawn[grouped..=next].rotate_right(1);
+    let mut left = drawn;
+    while let Some(first) = left.first() {
+        let copies = (first.asset, first.level);
+        let mut grouped = 1;
+        for next in 1..left.len() {
+            if (left[next].asset, left[next].level) == copies {
+                left[grouped..=next].rotate_right(1);
                 grouped += 1;
             }
         }
+        left = &mut left[grouped..];
     }
 }
 
