@@ -1,7 +1,7 @@
 //! A capture on the GPU.
 //!
 //! In: a [`RuntimeScene`]. Out: buffers that live as long as the capture. Large captures are split into parts, so that
-//! no binding exceeds the limit of the device; a part is drawn by one dispatch of `project`.
+//! no binding exceeds the limit of the device; a part is drawn by one dispatch of `project`, copies of a capture of one part together.
 
 mod buffers;
 mod upload;
