@@ -6,8 +6,9 @@
 //!
 //! In: a capture (default: the bundled one), a picture size (1280x720), frames for each measurement (300), rounds (3), a word in the names
 //! of the scenes (all). Out: milliseconds of a frame for each scene, the median of the rounds, how much longer it is than the scene that it
-//! is compared with, and the spread of the rounds; then, measured in further frames, the GPU time of the captures' passes and the number of
-//! splats. Default plugins, no window, rendering is pipelined, all apps take turns, and each measurement ends when the GPU has finished.
+//! is compared with, and the spread of the rounds; then, measured in as many further frames, but at most 100, the GPU time of the captures'
+//! passes and the number of splats. Default plugins, no window, rendering is pipelined, all apps take turns, and each measurement ends when
+//! the GPU has finished.
 
 mod common;
 
@@ -82,19 +83,19 @@ fn main() -> Result {
     for (((name, _, _, compared), app), Times { median: time, spread }) in timed {
         known.push((name, time));
         let than = known.iter().find(|(name, _)| *name == compared).map_or(f64::NAN, |(_, time)| *time);
-        let (gpu, splats) = passes(app)?;
+        let (gpu, splats) = passes(app, arguments.frames.clamp(1, 100))?;
         println!("{name:<36} {time:>9.3} {:>9.3} {spread:>15} {gpu:>9.4} {splats:>9}  {compared}", time - than);
     }
     Ok(())
 }
 
-/// Returns the GPU time of all passes for captures in a frame, milliseconds, the median of a hundred frames, and the number of splats.
-fn passes(app: &mut App) -> Result<(f64, u32)> {
+/// Returns the GPU time of all passes for captures in a frame, milliseconds, the median of some frames, and the number of splats.
+fn passes(app: &mut App, frames: u32) -> Result<(f64, u32)> {
     let statistics = app.world().resource::<CaptureStatistics>().clone();
     statistics.measure(true);
     common::warm_up(app)?;
     let (mut times, mut splats) = (Vec::new(), 0);
-    for _ in 0..100 {
+    for _ in 0..frames {
         common::run(app, 1)?;
         let views = statistics.views();
         times.push(views.iter().flat_map(|(_, view)| &view.passes).map(|pass| pass.milliseconds).sum::<f64>());

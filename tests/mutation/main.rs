@@ -22,6 +22,7 @@ mod watch;
 
 #[path = "../support"]
 mod support {
+    pub mod allocations;
     pub mod dataset;
     pub mod packed_scene;
     pub mod pth;

@@ -24,6 +24,7 @@ mod state;
 
 #[path = "../support"]
 mod support {
+    pub mod allocations;
     pub mod coded_scene;
     pub mod random;
     pub mod skip;

@@ -1,23 +1,29 @@
 //! The memory of the process over a long time.
 //!
-//! In: its resident set, each time that the app holds no capture. Out: whether it stays as it is.
+//! In: what is allocated in Rust and the resident set, each time that the app holds no capture. Out: whether they stay as they are.
 
+use crate::support::allocations::ALLOCATED;
 use std::fs;
+use std::sync::atomic::Ordering;
 
-/// How much larger the median of the last quarter may be than that of the second, percent. In the first, every pipeline is compiled. What
-/// remains is the scatter of an allocator that is given many sizes.
-const GROWTH_PERCENT: u64 = 10;
+/// How much larger the medians of the last quarter may be than those of the second, percent. In the first, every pipeline is compiled.
+const GROWTH_PERCENT: [(&str, u64); 2] = [
+    ("allocated", 5),
+    // It also holds what the driver allocates, and the scatter of an allocator that is given many sizes.
+    ("resident", 10),
+];
 /// Fewer times say nothing.
 const LEAST: usize = 8;
 
-/// The resident set of the process, time after time.
+/// What is allocated in Rust and the resident set, bytes, time after time.
 #[derive(Default)]
-pub struct Memory(Vec<u64>);
+pub struct Memory([Vec<u64>; 2]);
 
 impl Memory {
-    /// Notes the resident set of now. Only Linux tells it.
+    /// Notes the memory of now.
     pub fn note(&mut self) {
-        self.0.extend(resident());
+        self.0[0].push(allocated());
+        self.0[1].extend(resident());
     }
 
     /// Returns what can be said about all of it.
@@ -25,22 +31,38 @@ impl Memory {
     /// # Errors
     /// The memory grows.
     pub fn verdict(&self) -> Result<String, String> {
-        let Some(last) = self.0.last() else { return Ok("memory not measured".to_owned()) };
-        let quarter = self.0.len() / 4;
-        if self.0.len() < LEAST {
-            return Ok(format!("{} MiB resident, too short to say whether it grows", last >> 20));
-        }
-        let [early, late] = [quarter, self.0.len() - quarter].map(|first| median(&self.0[first..first + quarter]));
-        let said = format!("resident {} MiB early, {} MiB late", early >> 20, late >> 20);
-        if late > early + early / 100 * GROWTH_PERCENT { Err(format!("memory grows: {said}")) } else { Ok(said) }
+        let said: Result<Vec<String>, String> =
+            GROWTH_PERCENT.iter().zip(&self.0).map(|(&(name, percent), noted)| verdict(name, noted, percent)).collect();
+        Ok(said?.join(", "))
     }
 }
 
-/// Returns the resident set in bytes.
+fn verdict(name: &str, noted: &[u64], percent: u64) -> Result<String, String> {
+    let Some(last) = noted.last() else { return Ok(format!("{name} not measured")) };
+    let quarter = noted.len() / 4;
+    if noted.len() < LEAST {
+        return Ok(format!("{name} {}, too short to say whether it grows", mebibytes(*last)));
+    }
+    let [early, late] = [quarter, noted.len() - quarter].map(|first| median(&noted[first..first + quarter]));
+    let said = format!("{name} {} early, {} late", mebibytes(early), mebibytes(late));
+    if late > early + early / 100 * percent { Err(format!("memory grows: {said}")) } else { Ok(said) }
+}
+
+/// Returns the bytes that are allocated in Rust.
+pub fn allocated() -> u64 {
+    ALLOCATED.load(Ordering::Relaxed) as u64
+}
+
+/// Returns the resident set in bytes. Only Linux tells it.
 pub fn resident() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
     line.split_whitespace().next()?.parse::<u64>().ok().map(|kibibytes| kibibytes << 10)
+}
+
+/// Returns a number of bytes for people.
+pub fn mebibytes(bytes: u64) -> String {
+    format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20))
 }
 
 fn median(values: &[u64]) -> u64 {

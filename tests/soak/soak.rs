@@ -5,7 +5,7 @@
 
 use crate::changes::Changes;
 use crate::checks;
-use crate::memory::{Memory, resident};
+use crate::memory::{Memory, allocated, mebibytes, resident};
 use crate::options::{Fresh, Options, Until};
 use crate::stage::Stage;
 use bevy_gs4d::testing;
@@ -83,8 +83,9 @@ fn change(options: &Options, until: Until, tail: &mut Tail) -> Result<String, St
         }
         if changes.is_check() {
             compare(options, changes.step, &mut stage, &mut compared)?;
-            let mebibytes = resident().unwrap_or_default() >> 20;
-            println!("step {}: as new, {mebibytes} MiB, {} s", changes.step, began.elapsed().as_secs());
+            let [allocated, resident] = [allocated(), resident().unwrap_or_default()].map(mebibytes);
+            let (step, seconds) = (changes.step, began.elapsed().as_secs());
+            println!("step {step}: as new, {allocated} allocated, {resident} resident, {seconds} s");
         } else if changes.is_clearing() {
             stage.wait_until_empty()?;
             memory.note();
