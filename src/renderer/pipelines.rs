@@ -180,8 +180,13 @@ impl Renderer {
     /// Returns the definitions of passes that read a capture, and the index of their pipelines. `batched`: a dispatch draws several
     /// instances.
     fn reading(&self, storage: Storage, batched: bool) -> (Vec<&'static str>, usize) {
-        let copied = batched || self.copies_instance;
-        ([storage.definitions(), if copied { COPIED_INSTANCE } else { &[] }].concat(), usize::from(copied))
+        let copied = self.copied(batched);
+        ([storage.definitions(), if copied == 1 { COPIED_INSTANCE } else { &[] }].concat(), copied)
+    }
+
+    /// Returns the index of pipelines of passes that read a capture: 1 for those that copy their instance first.
+    fn copied(&self, batched: bool) -> usize {
+        usize::from(batched || self.copies_instance)
     }
 
     /// Compiles the passes of the reference design for captures stored in these ways, several in a dispatch or one, unless they have been.
@@ -224,7 +229,7 @@ impl Renderer {
 
     /// Returns `project` for captures stored in this way, several in a dispatch or one, if it has been compiled.
     pub(super) fn project(&self, storage: Storage, batched: bool) -> Option<&wgpu::ComputePipeline> {
-        self.project[usize::from(batched || self.copies_instance)][storage as usize].get()
+        self.project[self.copied(batched)][storage as usize].get()
     }
 
     /// Returns `blend` for pixels of this kind, if it has been compiled.
@@ -334,12 +339,12 @@ impl Renderer {
 
     /// Returns `project_bin` for captures stored in this way, several in a dispatch or one, if it has been compiled.
     pub(super) fn project_bin(&self, storage: Storage, batched: bool) -> Option<&wgpu::ComputePipeline> {
-        self.project_bin[usize::from(batched || self.copies_instance)][storage as usize].get()
+        self.project_bin[self.copied(batched)][storage as usize].get()
     }
 
     /// Returns `colors` for captures stored in this way, several in a dispatch or one, if it has been compiled.
     pub(super) fn colors(&self, storage: Storage, batched: bool) -> Option<&wgpu::ComputePipeline> {
-        self.colors[usize::from(batched || self.copies_instance)][storage as usize].get()
+        self.colors[self.copied(batched)][storage as usize].get()
     }
 
     /// Returns `sort_bins` for lists of this length, if it has been compiled.
