@@ -48,6 +48,9 @@ finish() {
   fi
 }
 trap finish EXIT
+# Without these, a run that is stopped would end as if it had passed.
+trap 'exit 130' INT
+trap 'exit 143' TERM
 
 # Heads a step; `done_with` closes it.
 step() {
