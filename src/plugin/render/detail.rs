@@ -27,6 +27,8 @@ use std::time::Duration;
 const SLACK: f32 = 0.8;
 /// Cameras that see a capture at sizes of no more than this ratio draw the same level. The eyes of a head do.
 const ALIKE: f32 = 1.1;
+/// And those that drew the same level in the last frame, at sizes of no more than this ratio: who moves away from another does not flicker.
+const STILL_ALIKE: f32 = 1.2;
 /// How far the bias moves in a frame while the GPU time is not as wanted, and how far it may go, stops.
 const STEP: f32 = 1.0 / 64.0;
 /// The bias rises while the time wanted is more than this many times that taken: a finer level has seven times as many Gaussians, and must
@@ -114,7 +116,10 @@ impl Sight {
     /// Returns what decides on the level, of all cameras that see the capture at nearly this size: the largest size, and the finest level of
     /// the last frame.
     fn together(&self, same_capture: &[Self]) -> (f32, Option<usize>) {
-        let is_alike = |other: &&Self| other.pixels <= self.pixels * ALIKE && self.pixels <= other.pixels * ALIKE;
+        let is_alike = |other: &&Self| {
+            let ratio = if other.before == self.before && self.before.is_some() { STILL_ALIKE } else { ALIKE };
+            other.pixels <= self.pixels * ratio && self.pixels <= other.pixels * ratio
+        };
         let alike = same_capture.iter().filter(is_alike);
         let before = alike.clone().filter_map(|other| other.before).min();
         // A size that is not a number is like no other, and stays what it is.
@@ -283,6 +288,30 @@ mod tests {
         assert_eq!(found[2], (50.0, Some(2)), "a camera farther away decides for itself");
         assert_eq!(found[3], (f32::INFINITY, None), "so does one inside the capture");
         assert!(found[4].0.is_nan() && found[4].1 == Some(1), "no number is like no other: {:?}", found[4]);
+    }
+
+    #[test]
+    fn cameras_that_move_apart_and_back_do_not_flicker() {
+        let levels = levels(&[60.0]);
+        let (mut near, mut chosen) = (51.5, [Some(1), Some(0)]);
+        let mut changes = 0;
+        for _ in 0..10 {
+            let sights = [(47.0, chosen[0]), (near, chosen[1])].map(|(pixels, before)| Sight {
+                camera: Entity::PLACEHOLDER,
+                capture: MainEntity::from(Entity::PLACEHOLDER),
+                pixels,
+                before,
+            });
+            let now = sights.map(|sight| {
+                let (pixels, before) = sight.together(&sights);
+                Some(choose(&levels, pixels, before))
+            });
+            changes += usize::from(now != chosen);
+            chosen = now;
+            // Across the ratio at which cameras begin to decide together.
+            near = 103.5 - near;
+        }
+        assert_eq!((chosen, changes), ([Some(0), Some(0)], 1), "the finer level once, for both");
     }
 
     #[test]
