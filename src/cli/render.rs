@@ -14,13 +14,12 @@ use crate::offline::orbit::Shot;
 use crate::offline::render::render_shots;
 use crate::offline::{OfflineError, write_beside, write_png};
 use crate::renderer::{GpuError, Storage};
-use crate::scene::{GaussianScene, MAX_LEVELS};
+use crate::scene::{MAX_LEVELS, RuntimeScene};
 use crate::view::{Background, Counts, Picture, View};
 use serde_json::{Value, json};
 use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::Instant;
 
 /// Draw views of a scene as PNG files.
@@ -77,10 +76,11 @@ impl Render {
                 headless.compile_ahead(Storage::Coded)?;
                 Ok::<_, GpuError>(headless)
             });
-            let scene = self.at_level(self.checkpoint.load(&self.scene)?)?;
+            let scene = self.checkpoint.load(&self.scene)?;
             let scene = scene.into_runtime().map_err(|error| Failure::at(&self.scene, &error))?;
             Ok::<_, Failure>((scene, opening.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))))
         })?;
+        let drawn = self.drawn(&scene)?;
         let trained_pixel = scene.trained_with.pixel.filter(|_| self.antialias || self.level.is_some());
         if self.antialias && trained_pixel.is_none() {
             return Err(Failure::about(
@@ -92,7 +92,7 @@ impl Render {
         files.writes_folder(&self.out, shots.iter().flat_map(|shot| self.paths(shot))).check()?;
         fs::create_dir_all(&self.out).map_err(|error| Failure::at(&self.out, &error))?;
         let mut headless = headless?;
-        let capture = headless.upload(&scene)?;
+        let capture = headless.upload(drawn)?;
         let background = self.checkpoint.background.map_or(scene.trained_background(), Background::Color);
         let with_view = |shot: Shot| {
             let view = shot.view(&scene).antialiased(trained_pixel);
@@ -112,6 +112,7 @@ impl Render {
         text += &format!("\n{count} pictures in {}, {seconds:.1} s on {adapter}\n", self.out.display());
         let json = json!({
             "scene": self.scene.display().to_string(),
+            "level": self.level.unwrap_or(0),
             "out": self.out.display().to_string(),
             "adapter": adapter,
             "seconds": seconds,
@@ -122,7 +123,7 @@ impl Render {
     }
 
     /// Returns what is drawn of a scene: all of it, or the level that is asked for.
-    fn at_level(&self, mut scene: GaussianScene) -> Result<GaussianScene, Failure> {
+    fn drawn<'a>(&self, scene: &'a RuntimeScene) -> Result<&'a RuntimeScene, Failure> {
         let Some(level) = self.level else { return Ok(scene) };
         let count = scene.levels.len();
         match count {
@@ -130,7 +131,7 @@ impl Render {
             _ if level > count => {
                 Err(Failure::about(&self.scene, &format!("has no level of detail {level}; the coarsest is {count}")))
             }
-            _ => Ok(Arc::unwrap_or_clone(scene.levels.swap_remove(level - 1).scene).into()),
+            _ => Ok(&scene.levels[level - 1].scene),
         }
     }
 

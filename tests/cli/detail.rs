@@ -41,8 +41,11 @@ fn levels_are_written_reported_and_left_out_by_other_verbs() {
         command.extend(["--size", "64x64"].iter().chain(more).map(Into::into));
         gs4d(&command)
     };
-    let visible = |name, more: &[&str]| draw(name, &out, more).json()["frames"][0]["visible"].as_u64();
-    let [all, level] = [visible("all", &[]), visible("level", &["--level", "1"])];
+    let [(all, zero), (level, one)] = [("all", [].as_slice()), ("level", &["--level", "1"])].map(|(name, more)| {
+        let drawn = draw(name, &out, more).json();
+        (drawn["frames"][0]["visible"].as_u64(), drawn["level"].as_u64())
+    });
+    assert_eq!((zero, one), (Some(0), Some(1)), "the levels that are named");
     assert!(level > Some(0) && level <= Some(gaussians) && level < all, "{level:?} of {all:?}");
     draw("missing", &out, &["--level", "2"]).must_fail("has no level of detail 2; the coarsest is 1");
     draw("none", &changed, &["--level", "1"]).must_fail("gs4d detail");
