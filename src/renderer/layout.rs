@@ -135,11 +135,18 @@ pub struct TermWeights {
 }
 
 /// Bytes from the uniforms of one instance to those of the next, which are bound at dynamic offsets or as an array: `InstanceSlot` of the
-/// shaders. A multiple of every device's alignment.
+/// shaders. [`MotionUniforms`] and [`SortStep`]s are as far apart. A multiple of every device's alignment.
 pub const INSTANCE_STRIDE: u32 = 512;
 /// Instances that one dispatch may draw.
 pub const INSTANCES_AT_ONCE: u32 = 64;
-const _: () = assert!(size_of::<InstanceUniforms>() <= INSTANCE_STRIDE as usize, "uniforms fit their place");
+/// Bytes of their uniforms, which are bound together.
+pub const INSTANCES_BOUND: u32 = INSTANCE_STRIDE * INSTANCES_AT_ONCE;
+const _: () = assert!(
+    size_of::<InstanceUniforms>() <= INSTANCE_STRIDE as usize
+        && size_of::<MotionUniforms>() <= INSTANCE_STRIDE as usize
+        && size_of::<SortStep>() <= INSTANCE_STRIDE as usize,
+    "uniforms fit their place"
+);
 
 /// Input of `project` for one part of a capture in one view. An [`Instance`](super::Instance) may have several parts.
 #[repr(C)]

@@ -4,6 +4,7 @@
 //! captures.
 
 use super::bind::{Bind, group_layout, pipeline};
+use super::layout::INSTANCES_BOUND;
 use super::memory::Allocator;
 use super::shaders::{
     BINNED, COPIED_INSTANCE, FastVariant, Lists, Pixels, SUBGROUPS_OF_32, ShaderChecks, Storage, module,
@@ -383,7 +384,7 @@ impl Layouts {
     fn new(device: &wgpu::Device) -> Self {
         use Bind::{Depth, Depths, Read, Target, Uniform, UniformAt, Write};
         const FRAME: usize = size_of::<layout::FrameUniforms>();
-        const INSTANCE: Bind = UniformAt((layout::INSTANCE_STRIDE * layout::INSTANCES_AT_ONCE) as usize);
+        const INSTANCE: Bind = UniformAt(INSTANCES_BOUND as usize);
         const BEFORE: Bind = UniformAt(size_of::<layout::MotionUniforms>());
         let new = |label, bindings: &[Bind]| group_layout(device, label, bindings);
         let pixel = |pixels: Pixels| {
@@ -429,15 +430,20 @@ impl Layouts {
 
 fn check_limits(limits: &wgpu::Limits) -> Result<(), GpuError> {
     let needs = [
-        ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, 256),
-        ("max_compute_workgroup_size_x", limits.max_compute_workgroup_size_x, 256),
-        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 8),
+        ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup.into(), 256),
+        ("max_compute_workgroup_size_x", limits.max_compute_workgroup_size_x.into(), 256),
+        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage.into(), 8),
+        ("max_uniform_buffer_binding_size", limits.max_uniform_buffer_binding_size, INSTANCES_BOUND.into()),
         // Three arrays of `blend`, and those of its scan.
-        ("max_compute_workgroup_storage_size", limits.max_compute_workgroup_storage_size, 16 * 256 * 3 + 16 * 75),
+        (
+            "max_compute_workgroup_storage_size",
+            limits.max_compute_workgroup_storage_size.into(),
+            16 * 256 * 3 + 16 * 75,
+        ),
     ];
     for (what, found, needed) in needs {
         if found < needed {
-            return Err(GpuError::Limit { what, found: found.into(), needed: needed.into() });
+            return Err(GpuError::Limit { what, found, needed });
         }
     }
     Ok(())

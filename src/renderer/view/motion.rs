@@ -10,7 +10,7 @@ use super::{Design, Instance, ViewParameters, ViewRenderer};
 use crate::renderer::GpuError;
 use crate::renderer::active::drawn_count;
 use crate::renderer::layout::{
-    BACKGROUND_NONE, DEBUG_COLOR, FrameUniforms, INSTANCE_STRIDE, INSTANCES_AT_ONCE, MotionUniforms,
+    BACKGROUND_NONE, DEBUG_COLOR, FrameUniforms, INSTANCE_STRIDE, INSTANCES_BOUND, MotionUniforms,
 };
 use crate::renderer::memory::Allocator;
 use crate::renderer::pipelines::Renderer;
@@ -103,7 +103,7 @@ impl ViewRenderer {
             let size = NonZeroU64::new(size as u64);
             BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: 0, size })
         };
-        let instance = uniform(&made.instances, (INSTANCE_STRIDE * INSTANCES_AT_ONCE) as usize);
+        let instance = uniform(&made.instances, INSTANCES_BOUND as usize);
         let uniforms = [instance, uniform(&before, size_of::<MotionUniforms>())];
         let splats = made.buffers.splats.as_entire_binding();
         let group = |index: usize, buffers: &[BindingResource<'_>]| {

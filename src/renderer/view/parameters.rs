@@ -23,14 +23,10 @@ pub struct Instance<'a> {
 }
 
 impl Instance<'_> {
-    /// Returns whether one dispatch can draw this instance and the next: they have the same Gaussians, in one part.
+    /// Returns whether one dispatch can draw this instance and the next: all Gaussians of the same capture, in one part.
     pub(super) fn joins(&self, next: &Self) -> bool {
-        let same_list = match (self.active, next.active) {
-            (None, None) => true,
-            (Some(a), Some(b)) => std::ptr::eq(a, b),
-            _ => false,
-        };
-        std::ptr::eq(self.capture, next.capture) && self.capture.parts.len() == 1 && same_list
+        let draws_all = self.active.is_none() && next.active.is_none();
+        std::ptr::eq(self.capture, next.capture) && self.capture.parts.len() == 1 && draws_all
     }
 }
 

@@ -7,7 +7,7 @@ use super::bins::FastResources;
 use super::sizes::Sizes;
 use super::{Design, ViewRenderer};
 use crate::renderer::layout::{
-    self, BLOCK, DEPTH_STEPS, DIGIT_BITS, DIGITS, INSTANCE_STRIDE, INSTANCES_AT_ONCE, SortStep,
+    self, BLOCK, DEPTH_STEPS, DIGIT_BITS, DIGITS, INSTANCE_STRIDE, INSTANCES_AT_ONCE, INSTANCES_BOUND, SortStep,
 };
 use crate::renderer::memory::Allocator;
 use crate::renderer::pipelines::{Layouts, Renderer};
@@ -138,7 +138,7 @@ impl ViewRenderer {
         let instance = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
             buffer: &instances,
             offset: 0,
-            size: std::num::NonZeroU64::new(u64::from(INSTANCE_STRIDE * INSTANCES_AT_ONCE)),
+            size: std::num::NonZeroU64::new(u64::from(INSTANCES_BOUND)),
         });
         let fast = (self.design == Design::Fast).then(|| {
             let buffers = [&splats, &tile_ranges, &pair_splats[sorted]];
