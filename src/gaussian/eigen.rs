@@ -1,6 +1,6 @@
 //! Eigenvalues: the axes of a covariance in space, or in space and time.
 //!
-//! In: a symmetric matrix. Out: its variances along its axes, and these.
+//! In: a symmetric matrix. Out: its eigenvalues, which are variances, and its eigenvectors, the axes.
 
 use glam::{DMat4, DVec4};
 
@@ -8,7 +8,7 @@ use glam::{DMat4, DVec4};
 /// 3D matrix in the first three rows and columns is decomposed there.
 pub(crate) fn eigen(mut a: DMat4) -> (DVec4, DMat4) {
     let mut vectors = DMat4::IDENTITY;
-    // Convergence is quadratic: a dozen sweeps are more than enough.
+    // Convergence is quadratic: these sweeps are more than enough.
     for _ in 0..16 {
         for (p, q) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
             let off = a.col(q)[p];

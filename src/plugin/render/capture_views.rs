@@ -68,21 +68,19 @@ pub(crate) struct Drawn {
     pub(crate) level: usize,
 }
 
-/// Puts the copies of each capture, of one level, beside the first of them, so that one dispatch draws them. Otherwise the order stays: it
-/// decides between splats of the same depth.
+/// Puts the copies of each capture, of one level, beside the first of them, so that one dispatch draws those that have no list of active
+/// Gaussians. Otherwise the order stays: it decides between splats of the same depth.
 pub(crate) fn group_copies(drawn: &mut [Drawn]) {
-    let mut left = drawn;
-    while let Some(first) = left.first() {
-        let copies = (first.asset, first.level);
-        let mut grouped = 1;
-        for next in 1..left.len() {
-            if (left[next].asset, left[next].level) == copies {
-                left[grouped..=next].rotate_right(1);
-                grouped += 1;
-            }
-        }
-        left = &mut left[grouped..];
+    if drawn.len() < 3 {
+        return;
     }
+    let copies = |one: &Drawn| (one.asset, one.level);
+    let mut groups = HashMap::new();
+    for one in &*drawn {
+        let next = groups.len();
+        groups.entry(copies(one)).or_insert(next);
+    }
+    drawn.sort_by_key(|one| groups.get(&copies(one)).copied());
 }
 
 impl Drawn {

@@ -99,7 +99,7 @@ mod write_motion;
 #[cfg(feature = "pbr")]
 pub(crate) use active::ActiveLists;
 #[cfg(feature = "pbr")]
-pub(crate) use capture_views::Drawn;
+pub(crate) use capture_views::{Drawn, group_copies};
 pub use detail::CaptureDetail;
 pub use draw::CaptureSystems;
 #[cfg(feature = "pbr")]

@@ -61,8 +61,7 @@ pub(super) struct Pipelines<'w> {
 }
 
 impl Scene<'_> {
-    /// Appends the captures that a camera sees to `drawn`, in the order of Bevy's list, which is the same in every frame, but copies beside each
-    /// other.
+    /// Appends the captures that a camera sees to `drawn`, in the order of Bevy's list, but copies of one level beside each other.
     fn collect(
         &self,
         viewer: Entity,

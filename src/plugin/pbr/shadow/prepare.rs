@@ -9,6 +9,7 @@ use super::light_lens::LightLens;
 use super::light_views::{LightView, LightViews};
 use crate::plugin::render::{
     ActiveLists, CaptureRenderer, Drawn, ExtractedCaptures, GpuGaussianCapture, WriteDepthKey, WriteDepthPipeline,
+    group_copies,
 };
 use crate::renderer::{ColorPrecision, Instance, ViewParameters};
 use crate::view::{Background, BlendSpace, DebugView};
@@ -112,6 +113,7 @@ pub(super) fn prepare_light_views(
         if let Some(lens) = &lens {
             let drawn = within.iter().filter_map(|caster| casters.drawn(caster, lens, map / scale));
             state.drawn.extend(drawn);
+            group_copies(&mut state.drawn);
         }
         state.count_idle_frames();
         let Some(lens) = lens.filter(|_| !state.drawn.is_empty()) else { continue };
