@@ -4,8 +4,7 @@
 //! that time, ascending, part by part. `activate` writes them, only when the segment has changed.
 
 use super::capture::{Filter, GpuCapture};
-use super::layout::{Activation, BLOCK};
-use super::memory::alignment_of;
+use super::layout::{Activation, BLOCK, INSTANCE_STRIDE};
 use super::pipelines::Renderer;
 use wgpu::BufferUsages;
 
@@ -16,7 +15,6 @@ pub struct ActiveList {
     /// Segment of the time prepared last; `recorded` is whether the list holds it.
     segment: Option<u32>,
     recorded: bool,
-    alignment: u32,
     uniforms: wgpu::Buffer,
     activate: wgpu::BindGroup,
     /// Bind group of the list, which `project` reads.
@@ -28,10 +26,9 @@ impl ActiveList {
     pub fn new(device: &wgpu::Device, renderer: &Renderer, capture: &GpuCapture) -> Option<Self> {
         capture.filter.as_ref()?;
         let allocator = renderer.allocator(device);
-        let alignment = alignment_of::<Activation>(device);
         let count = (capture.len().max(1) as u64).next_multiple_of(u64::from(BLOCK));
         let parts = capture.parts.len().max(1) as u64;
-        let uniforms = allocator.buffer("gs4d activations", parts * u64::from(alignment), BufferUsages::UNIFORM);
+        let uniforms = allocator.buffer("gs4d activations", parts * u64::from(INSTANCE_STRIDE), BufferUsages::UNIFORM);
         let list = allocator.buffer("gs4d active list", count * 4, BufferUsages::STORAGE);
         let blocks = allocator.buffer("gs4d active blocks", count / u64::from(BLOCK) * 4, BufferUsages::STORAGE);
         let uniform = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
@@ -42,7 +39,7 @@ impl ActiveList {
         let resources = [uniform, list.as_entire_binding(), blocks.as_entire_binding()];
         let activate = allocator.bind_group("gs4d activate", &renderer.layouts.activate, &resources);
         let list = allocator.bind_group("gs4d active list", &renderer.layouts.active, &[list.as_entire_binding()]);
-        Some(Self { capture: capture.id, segment: None, recorded: false, alignment, uniforms, activate, list })
+        Some(Self { capture: capture.id, segment: None, recorded: false, uniforms, activate, list })
     }
 
     /// Returns whether it belongs to this upload of a capture; if not, create a new list.
@@ -61,7 +58,7 @@ impl ActiveList {
             let mut first = 0;
             for (index, part) in capture.parts.iter().enumerate() {
                 let activation = Activation { count: part.count, first, filter_mode: filter.mode, segment };
-                let at = index as u64 * u64::from(self.alignment);
+                let at = index as u64 * u64::from(INSTANCE_STRIDE);
                 queue.write_buffer(&self.uniforms, at, bytemuck::bytes_of(&activation));
                 first += part.count;
             }
@@ -81,7 +78,7 @@ impl ActiveList {
         for (index, part) in capture.parts.iter().enumerate() {
             let Some(filter) = &part.filter else { continue };
             let blocks = part.count.div_ceil(BLOCK);
-            pass.set_bind_group(0, &self.activate, &[index as u32 * self.alignment]);
+            pass.set_bind_group(0, &self.activate, &[index as u32 * INSTANCE_STRIDE]);
             pass.set_bind_group(1, filter, &[]);
             pass.set_pipeline(&renderer.activate_count);
             pass.dispatch_workgroups(blocks, 1, 1);

@@ -135,7 +135,7 @@ pub struct TermWeights {
 }
 
 /// Bytes from the uniforms of one instance to those of the next, which are bound at dynamic offsets or as an array: `InstanceSlot` of the
-/// shaders. [`MotionUniforms`] and [`SortStep`]s are as far apart. A multiple of every device's alignment.
+/// shaders. [`MotionUniforms`], [`SortStep`]s and [`Activation`]s are as far apart. A multiple of every device's alignment.
 pub const INSTANCE_STRIDE: u32 = 512;
 /// Instances that one dispatch may draw.
 pub const INSTANCES_AT_ONCE: u32 = 64;
@@ -144,7 +144,8 @@ pub const INSTANCES_BOUND: u32 = INSTANCE_STRIDE * INSTANCES_AT_ONCE;
 const _: () = assert!(
     size_of::<InstanceUniforms>() <= INSTANCE_STRIDE as usize
         && size_of::<MotionUniforms>() <= INSTANCE_STRIDE as usize
-        && size_of::<SortStep>() <= INSTANCE_STRIDE as usize,
+        && size_of::<SortStep>() <= INSTANCE_STRIDE as usize
+        && size_of::<Activation>() <= INSTANCE_STRIDE as usize,
     "uniforms fit their place"
 );
 

@@ -88,9 +88,3 @@ pub fn with_room<T>(device: &wgpu::Device, needed: u64, create: impl FnOnce() ->
 pub fn binding_limit(limits: &wgpu::Limits) -> u64 {
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
 }
-
-/// Returns the distance between uniforms of type `T` that are bound at a dynamic offset, bytes.
-pub fn alignment_of<T>(device: &wgpu::Device) -> u32 {
-    let least = device.limits().min_uniform_buffer_offset_alignment;
-    least.max(size_of::<T>() as u32).next_power_of_two()
-}
