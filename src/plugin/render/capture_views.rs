@@ -71,6 +71,7 @@ pub(crate) struct Drawn {
 /// Puts the copies of each capture, of one level, beside the first of them, so that one dispatch draws those that have no list of active
 /// Gaussians. Otherwise the order stays: it decides between splats of the same depth.
 pub(crate) fn group_copies(drawn: &mut [Drawn]) {
+    // Two stand beside each other anyway.
     if drawn.len() < 3 {
         return;
     }
