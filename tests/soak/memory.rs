@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering;
 
 /// How much larger the median of the last quarter may be than that of the second, percent. In the first, every pipeline is compiled. What
 /// remains of what is allocated is Bevy's: its clustering of lights keeps 40 bytes for each view and frame. The resident set also has what
-/// the driver allocates, and the scatter of an allocator that is given many sizes by many threads.
+/// the driver allocates for pipelines that are compiled late, and the scatter of an allocator that is given many sizes by many threads.
 const GROWTH_PERCENT: u64 = 10;
 /// Fewer times say nothing.
 const LEAST: usize = 8;

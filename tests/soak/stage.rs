@@ -7,7 +7,8 @@ use crate::checks;
 use crate::state::{Placed, Source, State, Viewer, scene};
 use bevy::core_pipeline::tonemapping::{DebandDither, Tonemapping};
 use bevy::prelude::*;
-use bevy::render::render_resource::Extent3d;
+use bevy::render::render_resource::{Extent3d, PollType};
+use bevy::render::renderer::{RenderDevice, RenderQueue};
 use bevy::time::TimeUpdateStrategy;
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
@@ -15,10 +16,11 @@ use bevy_gs4d::prelude::*;
 use bevy_gs4d::scene::GaussianScene;
 use bevy_gs4d::testing::{self, Offscreen};
 use image::RgbaImage;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
+use wgpu::SubmissionIndex;
 
 /// Size of the second camera's target, pixels.
 const SECOND_SIZE: UVec2 = UVec2::new(80, 60);
@@ -28,6 +30,9 @@ const STEP: Duration = Duration::from_millis(20);
 const TIMEOUT: Duration = Duration::from_secs(120);
 /// Updates after which a camera that sees nothing has given all of its memory back, and some more.
 const IDLE: usize = 130;
+/// Frames that the GPU may be behind, as where a window presents them. Without it an app is as far ahead as it gets, and wgpu keeps the
+/// command buffers of as many frames as have ever been on their way at once.
+const FRAMES_IN_FLIGHT: usize = 3;
 
 /// An app, and what it shows.
 pub struct Stage {
@@ -38,6 +43,8 @@ pub struct Stage {
     shown: State,
     captures: BTreeMap<u64, Entity>,
     cameras: Vec<(Entity, Offscreen)>,
+    /// The ends of the frames that the GPU may not have drawn yet.
+    in_flight: VecDeque<SubmissionIndex>,
 }
 
 impl Stage {
@@ -53,7 +60,8 @@ impl Stage {
         places.sort();
         let captures = order.iter().copied().zip(places).collect();
         let shown = State { captures: Vec::new(), cameras: Vec::new(), ..state.clone() };
-        let mut stage = Self { app, updates: 0, folder, shown, captures, cameras: Vec::new() };
+        let mut stage =
+            Self { app, updates: 0, folder, shown, captures, cameras: Vec::new(), in_flight: VecDeque::new() };
         stage.write_file(state)?;
         testing::settle(&mut stage.app).map_err(|error| error.to_string())?;
         // What has been logged until now is about the machine: that its driver is a software one.
@@ -95,6 +103,7 @@ impl Stage {
         self.app.insert_resource(TimeUpdateStrategy::ManualDuration(STEP));
         self.app.update();
         self.updates += 1;
+        self.wait_for_frame()?;
         checks::check_running(&self.app)
     }
 
@@ -137,6 +146,18 @@ impl Stage {
             return Ok(());
         }
         Err(format!("without a capture {bytes} bytes on the GPU, {uploads} uploads and {assets} assets are left"))
+    }
+
+    /// Waits until no more than [`FRAMES_IN_FLIGHT`] are.
+    fn wait_for_frame(&mut self) -> Result<(), String> {
+        let world = self.app.world();
+        let (device, queue) = (world.resource::<RenderDevice>(), world.resource::<RenderQueue>());
+        self.in_flight.push_back(queue.submit([]));
+        if self.in_flight.len() <= FRAMES_IN_FLIGHT {
+            return Ok(());
+        }
+        let wait = PollType::Wait { submission_index: self.in_flight.pop_front(), timeout: None };
+        device.poll(wait).map(|_| ()).map_err(|error| format!("the GPU does not finish: {error}"))
     }
 
     fn file(&self) -> PathBuf {
