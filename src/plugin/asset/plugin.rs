@@ -5,12 +5,13 @@
 use super::loader::{CheckpointLoader, PackageLoader};
 use super::messages::{CaptureFailed, CaptureReady};
 use super::state::{CaptureAssetSystems, CaptureState};
-use super::systems::{report_upload_failures, update_states};
+use super::systems::{any_upload_failure, report_upload_failures, update_states};
 use super::uploads::Uploads;
-use crate::plugin::component::{GaussianCapture, GaussianCapture3d, stand_upright};
+use crate::plugin::component::{GaussianCapture, GaussianCapture3d, Upright, stand_upright};
 use bevy::app::{App, Plugin, PostUpdate, PreUpdate};
 use bevy::asset::{AssetApp, AssetTrackingSystems};
 use bevy::ecs::schedule::IntoScheduleConfigs;
+use bevy::ecs::schedule::common_conditions::any_with_component;
 use bevy::transform::TransformSystems;
 
 /// Loads captures. Part of [`GaussianCapturePlugin`](crate::GaussianCapturePlugin).
@@ -28,9 +29,17 @@ impl Plugin for CaptureAssetPlugin {
             .add_message::<CaptureFailed>()
             .configure_sets(PreUpdate, CaptureAssetSystems.after(AssetTrackingSystems))
             // Whoever hears that a capture is ready finds it upright.
-            .add_systems(PreUpdate, (stand_upright, update_states).chain().in_set(CaptureAssetSystems))
+            .add_systems(
+                PreUpdate,
+                (stand_upright.run_if(any_with_component::<Upright>), update_states)
+                    .chain()
+                    .in_set(CaptureAssetSystems),
+            )
             // What is spawned in between with a capture that is there stands in its first picture.
-            .add_systems(PostUpdate, stand_upright.before(TransformSystems::Propagate))
-            .add_systems(PreUpdate, report_upload_failures.after(CaptureAssetSystems));
+            .add_systems(
+                PostUpdate,
+                stand_upright.run_if(any_with_component::<Upright>).before(TransformSystems::Propagate),
+            )
+            .add_systems(PreUpdate, report_upload_failures.run_if(any_upload_failure).after(CaptureAssetSystems));
     }
 }

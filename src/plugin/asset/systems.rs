@@ -127,6 +127,11 @@ fn describe(path: impl Display, error: &AssetLoadError) -> String {
     }
 }
 
+/// Returns whether any capture could not be uploaded.
+pub(super) fn any_upload_failure(uploads: Res<Uploads>) -> bool {
+    !uploads.lock().failures.is_empty()
+}
+
 /// Sends a message once for each attempt to upload a capture that failed, and sets the state of its entities, unless an older version of
 /// it is still drawn.
 pub(super) fn report_upload_failures(
@@ -135,9 +140,6 @@ pub(super) fn report_upload_failures(
     mut announcer: Announcer,
 ) {
     let mut uploads = uploads.lock();
-    if uploads.failures.is_empty() {
-        return;
-    }
     for (entity, capture, mut state) in &mut captures {
         let id = capture.0.id();
         let Some(failure) = uploads.failures.get(&id) else { continue };

@@ -41,7 +41,10 @@ pub(super) fn build(app: &mut App) {
         .init_resource::<MovedMeshes>()
         .add_systems(ExtractSchedule, extract_moved_meshes)
         .configure_sets(Core3d, CaptureSystems::Draw.before(main_transmissive_pass_3d))
-        .add_systems(Render, update_centers.after(RenderSystems::Queue).before(RenderSystems::PhaseSort))
+        .add_systems(
+            Render,
+            update_centers.run_if(any_moved).after(RenderSystems::Queue).before(RenderSystems::PhaseSort),
+        )
         .add_systems(
             Render,
             find_other_passes.in_set(RenderSystems::PhaseSort).after(sort_phase_system::<Transmissive3d>),
@@ -63,15 +66,16 @@ fn extract_moved_meshes(
     moved.0.extend(stale.map(|(mesh, place, bounds)| (mesh.into(), place.transform_point(bounds.center.into()))));
 }
 
+fn any_moved(moved: Res<MovedMeshes>) -> bool {
+    !moved.0.is_empty()
+}
+
 /// Gives the meshes that have moved their new places in the sorted phases, which keep meshes from frame to frame.
 fn update_centers(
     moved: Res<MovedMeshes>,
     mut transparent: ResMut<ViewSortedRenderPhases<Transparent3d>>,
     mut transmissive: Option<ResMut<ViewSortedRenderPhases<Transmissive3d>>>,
 ) {
-    if moved.0.is_empty() {
-        return;
-    }
     let update = |info: &mut TransparentSortingInfo3d, center: Vec3| {
         if let TransparentSortingInfo3d::Sorted { mesh_center, .. } = info {
             *mesh_center = center;

@@ -2,16 +2,19 @@
 //!
 //! In: an app with Bevy's `AssetPlugin` and `TimePlugin`. Out: the same app, in which clocks, timelines and captures advance.
 
+use super::clock::PlaybackClock;
 use super::component::Playback;
 use super::messages::{
     MarkerReached, PlaybackEnded, PlaybackLooped, PlaybackPaused, PlaybackSeeked, PlaybackStarted, SegmentBoundCrossed,
 };
 use super::systems::{PlaybackSystems, advance_captures, run_clocks, warn_of_missing_handles};
-use super::timeline::{Timeline, TimelineLoader, advance_timelines, bind_tracks, direct_tracks};
+use super::timeline::{Timeline, TimelineLoader, TimelinePlayer, advance_timelines, bind_tracks, direct_tracks};
 use crate::plugin::component::GaussianCapture3d;
 use bevy::app::{App, Last, Plugin, Update};
 use bevy::asset::AssetApp;
+use bevy::ecs::query::Changed;
 use bevy::ecs::schedule::IntoScheduleConfigs;
+use bevy::ecs::schedule::common_conditions::{any_match_filter, any_with_component};
 
 /// Plays captures and timelines. Part of [`GaussianCapturePlugin`](crate::GaussianCapturePlugin).
 #[derive(Debug, Default, Clone, Copy)]
@@ -34,13 +37,16 @@ impl Plugin for PlaybackPlugin {
             .add_systems(
                 Update,
                 (
-                    run_clocks.in_set(Clocks),
-                    (bind_tracks, advance_timelines, direct_tracks).chain().in_set(Timelines),
+                    run_clocks.run_if(any_with_component::<PlaybackClock>).in_set(Clocks),
+                    (bind_tracks, advance_timelines, direct_tracks)
+                        .chain()
+                        .run_if(any_with_component::<TimelinePlayer>)
+                        .in_set(Timelines),
                     advance_captures.in_set(Advance),
                 ),
             )
             // A handle may follow in the same frame.
-            .add_systems(Last, warn_of_missing_handles);
+            .add_systems(Last, warn_of_missing_handles.run_if(any_match_filter::<Changed<GaussianCapture3d>>));
     }
 }
 
@@ -49,7 +55,7 @@ mod tests {
     use super::*;
     use crate::plugin::asset::{CaptureAssetPlugin, Uploads};
     use crate::plugin::component::GaussianCapture;
-    use crate::plugin::playback::{Clip, FollowsClock, Marker, Markers, PlaybackClock, TimelinePlayer, Track};
+    use crate::plugin::playback::{Clip, FollowsClock, Marker, Markers, Track};
     use crate::scene::synth::{SynthSettings, synthesize};
     use bevy::MinimalPlugins;
     use bevy::asset::{AssetPlugin, AssetServer, Assets, Handle};

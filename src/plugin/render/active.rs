@@ -65,6 +65,11 @@ pub(super) fn prepare_active_lists(
     }
 }
 
+/// Returns whether any list must be written.
+pub(super) fn any_stale(lists: Res<ActiveLists>) -> bool {
+    lists.0.values().any(|placed| placed.stale)
+}
+
 /// Records `activate` for the lists that must be written, before the cameras.
 pub(super) fn record_active_lists(
     renderer: Option<Res<CaptureRenderer>>,
@@ -74,10 +79,6 @@ pub(super) fn record_active_lists(
 ) {
     let _span = debug_span!("gs4d/activate").entered();
     let Some(renderer) = renderer else { return };
-    // Most frames need no encoder.
-    if !lists.0.values().any(|placed| placed.stale) {
-        return;
-    }
     let diagnostics = context.diagnostic_recorder();
     let diagnostics = diagnostics.as_deref();
     let span = diagnostics.time_span(context.command_encoder(), "gs4d/activate");

@@ -14,6 +14,7 @@ use crate::view::{Appearance, View};
 use bevy::asset::AssetId;
 use bevy::ecs::entity::Entity;
 use bevy::ecs::resource::Resource;
+use bevy::ecs::system::Res;
 use bevy::platform::collections::HashMap;
 use bevy::render::render_asset::RenderAssets;
 use bevy::render::render_resource::CachedRenderPipelineId;
@@ -23,6 +24,11 @@ use bevy::render::sync_world::MainEntity;
 /// State of every camera that may see captures, by its entity in the render world.
 #[derive(Resource, Default)]
 pub(crate) struct CaptureViews(pub(crate) HashMap<Entity, CaptureView>);
+
+/// Returns whether other systems work on any camera's picture of captures before it reaches the target.
+pub(super) fn any_shaded(views: Res<CaptureViews>) -> bool {
+    views.0.values().any(|view| view.is_shaded)
+}
 
 /// State of one camera.
 pub(crate) struct CaptureView {

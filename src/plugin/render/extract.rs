@@ -3,6 +3,7 @@
 //! In (main world): entities with a loaded capture, their transform, playback and settings; the settings of cameras. Out (render
 //! world): [`ExtractedCaptures`] and [`ExtractedViewSettings`], by entity of the main world.
 
+use super::previous::PreviousCaptures;
 use super::settings::{CaptureSettings, CaptureViewSettings};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::{ClipFade, Playback};
@@ -11,6 +12,7 @@ use crate::view::Appearance;
 use bevy::asset::{AssetId, Assets};
 use bevy::camera::Camera;
 use bevy::camera::visibility::ViewVisibility;
+use bevy::ecs::change_detection::DetectChanges;
 use bevy::ecs::entity::Entity;
 use bevy::ecs::query::With;
 use bevy::ecs::resource::Resource;
@@ -67,12 +69,19 @@ type Placed = (
     Option<&'static ClipFade>,
 );
 
+/// Returns whether a resource of the main world has changed, or been added, since the last extraction.
+pub(super) fn has_changed<R: Resource>(resource: Extract<Res<R>>) -> bool {
+    resource.is_changed()
+}
+
 pub(crate) fn extract_captures(
     mut extracted: ResMut<ExtractedCaptures>,
+    mut previous: ResMut<PreviousCaptures>,
     assets: Extract<Res<Assets<GaussianCapture>>>,
     captures: Extract<Query<Placed>>,
 ) {
     let _span = debug_span!("gs4d/extract").entered();
+    previous.keep(&extracted);
     extracted.0.clear();
     for (entity, capture, settings, playback, transform, visibility, fade) in &captures {
         let Some(loaded) = assets.get(&capture.0) else { continue };

@@ -44,6 +44,16 @@ pub(super) struct CaptureOrders {
     hidden: Vec<((Entity, MainEntity), Transparent3d)>,
 }
 
+/// Returns whether any camera draws captures before transmissive meshes.
+pub(super) fn any_early(orders: Res<CaptureOrders>) -> bool {
+    orders.cameras.values().any(|order| order.early)
+}
+
+/// Returns whether any camera draws something transparent after captures.
+pub(super) fn any_front(orders: Res<CaptureOrders>) -> bool {
+    orders.cameras.values().any(|order| order.front.is_some())
+}
+
 /// When the captures of one camera are drawn.
 #[derive(Debug, Default, Clone, Copy)]
 pub(super) struct CaptureOrder {

@@ -2,22 +2,21 @@
 //!
 //! In: an app in which captures load and play. Out: the same app, in which captures are drawn if it has a renderer.
 
-use super::active::{ActiveLists, prepare_active_lists, record_active_lists};
-use super::capture_views::CaptureViews;
+use super::active::{ActiveLists, any_stale, prepare_active_lists, record_active_lists};
+use super::capture_views::{CaptureViews, any_shaded};
 use super::composite::{CaptureShaders, CompositePipeline};
 use super::depth_readers::{DepthReaders, extract_depth_readers};
 use super::detail::{CaptureDetail, CaptureLevels, choose_levels, extract_detail};
 use super::draw::{CaptureSystems, draw_captures, draw_front, record_captures};
-use super::extract::{ExtractedCaptures, ExtractedViewSettings, extract_captures, extract_view_settings};
-use super::order::{CaptureOrders, OtherPasses, hide_front, place_captures, show_front};
+use super::extract::{ExtractedCaptures, ExtractedViewSettings, extract_captures, extract_view_settings, has_changed};
+use super::order::{CaptureOrders, OtherPasses, any_early, any_front, hide_front, place_captures, show_front};
 use super::prepare::{make_depth_readable, prepare_views};
-use super::previous::{PreviousCaptures, keep_previous_captures};
-use super::publish::publish_statistics;
+use super::previous::PreviousCaptures;
 use super::renderer::init_renderer;
 use super::settings::CaptureSettings;
 use super::shade_requests::ShadeRequests;
 use super::statistics::CaptureStatistics;
-use super::upload::{CaptureUploadBudget, GpuGaussianCapture, continue_uploads, extract_upload_budget};
+use super::upload::{CaptureUploadBudget, GpuGaussianCapture, any_uploading, continue_uploads, extract_upload_budget};
 use super::visibility::update_bounds;
 use super::write_depth::WriteDepthPipeline;
 use super::write_motion::WriteMotionPipeline;
@@ -29,7 +28,7 @@ use bevy::camera::visibility::VisibilitySystems;
 use bevy::core_pipeline::core_3d::{main_opaque_pass_3d, main_transparent_pass_3d};
 use bevy::core_pipeline::oit::resolve::node::oit_resolve;
 use bevy::core_pipeline::schedule::{Core3d, Core3dSystems, camera_driver};
-use bevy::ecs::schedule::IntoScheduleConfigs;
+use bevy::ecs::schedule::{IntoScheduleConfigs, SystemCondition};
 use bevy::render::render_asset::{RenderAssetPlugin, prepare_assets};
 use bevy::render::render_resource::SpecializedRenderPipelines;
 use bevy::render::renderer::{RenderGraph, RenderGraphSystems};
@@ -97,21 +96,35 @@ fn build_rendering(app: &mut App) {
         .init_gpu_resource::<CaptureViews>()
         .init_gpu_resource::<ActiveLists>()
         .add_systems(RenderStartup, init_renderer)
-        .add_systems(ExtractSchedule, (extract_captures, extract_view_settings, extract_upload_budget, extract_detail))
-        .add_systems(ExtractSchedule, (keep_previous_captures.before(extract_captures), extract_depth_readers))
+        .add_systems(
+            ExtractSchedule,
+            (
+                extract_captures,
+                extract_view_settings,
+                extract_depth_readers,
+                extract_upload_budget.run_if(has_changed::<CaptureUploadBudget>),
+                extract_detail.run_if(has_changed::<CaptureDetail>),
+            ),
+        )
         .add_systems(
             Render,
             (
-                continue_uploads.in_set(RenderSystems::PrepareAssets).after(prepare_assets::<GpuGaussianCapture>),
+                continue_uploads
+                    .run_if(any_uploading)
+                    .in_set(RenderSystems::PrepareAssets)
+                    .after(prepare_assets::<GpuGaussianCapture>),
                 make_depth_readable.in_set(RenderSystems::PrepareViews),
                 // Batches of meshes end where captures are drawn.
                 place_captures.in_set(RenderSystems::Prepare).before(RenderSystems::PrepareResources),
                 (choose_levels, prepare_active_lists).chain().in_set(RenderSystems::PrepareResources),
-                (prepare_views, publish_statistics).chain().in_set(RenderSystems::PrepareBindGroups),
+                prepare_views.in_set(RenderSystems::PrepareBindGroups),
             ),
         )
         // Recorded, and therefore submitted, before the first camera.
-        .add_systems(RenderGraph, record_active_lists.in_set(RenderGraphSystems::Render).before(camera_driver))
+        .add_systems(
+            RenderGraph,
+            record_active_lists.run_if(any_stale).in_set(RenderGraphSystems::Render).before(camera_driver),
+        )
         .configure_sets(
             Core3d,
             CaptureSystems::Shade
@@ -120,19 +133,25 @@ fn build_rendering(app: &mut App) {
                 .before(CaptureSystems::DrawLate)
                 .in_set(Core3dSystems::MainPass),
         )
+        // Most cameras need one of these. A system that has nothing to do costs more than its condition: another thread may have to wake up.
         .add_systems(
             Core3d,
             (
                 record_captures
+                    .run_if(any_shaded)
                     .after(main_opaque_pass_3d)
                     .before(main_transparent_pass_3d)
                     .in_set(CaptureSystems::Record),
                 draw_captures::<false>
+                    .run_if(any_early)
                     .after(main_opaque_pass_3d)
                     .before(main_transparent_pass_3d)
                     .in_set(CaptureSystems::Draw),
-                hide_front.after(main_opaque_pass_3d).before(main_transparent_pass_3d),
-                (show_front, draw_captures::<true>, draw_front)
+                hide_front
+                    .run_if(any_front.or_else(any_shaded))
+                    .after(main_opaque_pass_3d)
+                    .before(main_transparent_pass_3d),
+                (show_front.run_if(any_front), draw_captures::<true>, draw_front.run_if(any_front))
                     .chain()
                     .after(main_transparent_pass_3d)
                     // It draws over everything else that is transparent.

@@ -11,6 +11,7 @@ use super::detail::CaptureLevels;
 use super::extract::{ExtractedCaptures, ExtractedViewSettings};
 use super::fault::CameraFault;
 use super::previous::{CameraPose, PreviousCaptures};
+use super::publish::publish_statistics;
 use super::renderer::CaptureRenderer;
 use super::settings::{CaptureViewSettings, DepthWrite};
 use super::shade_requests::ShadeRequests;
@@ -223,6 +224,7 @@ pub(super) fn prepare_views(
             state.depth_bindings.set_lens(distance, 1, &device, &queue, renderer.0.work());
         }
     }
+    publish_statistics(&statistics, &views, &scene.captures);
 }
 
 /// Returns whether the depth that a camera asks for is the median one; `None` if it asks for none.

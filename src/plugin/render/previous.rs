@@ -12,7 +12,6 @@ use crate::plugin::component::GaussianCapture;
 use crate::view::View;
 use bevy::asset::AssetId;
 use bevy::ecs::resource::Resource;
-use bevy::ecs::system::{Res, ResMut};
 use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
 use glam::Affine3A;
 
@@ -23,7 +22,7 @@ const STEPS: f32 = 8.0;
 
 /// The captures of the frame before. The memory is kept from frame to frame.
 #[derive(Resource, Default)]
-pub(super) struct PreviousCaptures(MainEntityHashMap<PreviousCapture>);
+pub(crate) struct PreviousCaptures(MainEntityHashMap<PreviousCapture>);
 
 struct PreviousCapture {
     asset: AssetId<GaussianCapture>,
@@ -40,18 +39,18 @@ pub(super) struct CameraPose {
     pub(super) world_from_camera: Affine3A,
 }
 
-/// Keeps the captures of the frame before, which are about to be extracted anew.
-pub(super) fn keep_previous_captures(mut previous: ResMut<PreviousCaptures>, extracted: Res<ExtractedCaptures>) {
-    previous.0.retain(|entity, _| extracted.0.contains_key(entity));
-    for (entity, placed) in &extracted.0 {
-        let ExtractedCapture { asset, world_from_capture, seconds, .. } = *placed;
-        let before = previous.0.get(entity).filter(|before| before.asset == asset);
-        let step = before.map_or(0.0, |before| seconds - before.seconds);
-        previous.0.insert(*entity, PreviousCapture { asset, world_from_capture, seconds, step });
-    }
-}
-
 impl PreviousCaptures {
+    /// Keeps the captures of the frame before, which are about to be extracted anew.
+    pub(super) fn keep(&mut self, extracted: &ExtractedCaptures) {
+        self.0.retain(|entity, _| extracted.0.contains_key(entity));
+        for (entity, placed) in &extracted.0 {
+            let ExtractedCapture { asset, world_from_capture, seconds, .. } = *placed;
+            let before = self.0.get(entity).filter(|before| before.asset == asset);
+            let step = before.map_or(0.0, |before| seconds - before.seconds);
+            self.0.insert(*entity, PreviousCapture { asset, world_from_capture, seconds, step });
+        }
+    }
+
     /// Returns the view of a capture one frame before: `now` is its view in this frame, `pose` the camera of then, `time_at` returns its
     /// timestamp for its seconds. What was not there then was where it is now.
     pub(super) fn view(

@@ -6,16 +6,15 @@ use super::capture_views::CaptureViews;
 use super::statistics::CaptureStatistics;
 use super::upload::GpuGaussianCapture;
 use crate::renderer::ViewStatistics;
-use bevy::ecs::system::Res;
 use bevy::log::debug_span;
 use bevy::render::render_asset::RenderAssets;
 use std::borrow::Cow;
 
 /// Copies the numbers of this frame to the main world.
 pub(super) fn publish_statistics(
-    statistics: Res<CaptureStatistics>,
-    views: Res<CaptureViews>,
-    captures: Res<RenderAssets<GpuGaussianCapture>>,
+    statistics: &CaptureStatistics,
+    views: &CaptureViews,
+    captures: &RenderAssets<GpuGaussianCapture>,
 ) {
     let _span = debug_span!("gs4d/statistics").entered();
     // A view that sees nothing any more may still hold memory.

@@ -202,6 +202,11 @@ pub(super) fn extract_upload_budget(
     *extracted = **budget;
 }
 
+/// Returns whether any capture is not whole.
+pub(super) fn any_uploading(captures: Res<RenderAssets<GpuGaussianCapture>>) -> bool {
+    captures.iter().any(|(_, capture)| capture.next.is_some())
+}
+
 /// Uploads more of the captures that are not whole, as much as the budget allows: first of those of which least is missing, so that
 /// something shows soon.
 pub(super) fn continue_uploads(
@@ -213,9 +218,6 @@ pub(super) fn continue_uploads(
 ) {
     let _span = debug_span!("gs4d/upload").entered();
     let Some(renderer) = renderer else { return };
-    if captures.iter().all(|(_, capture)| capture.next.is_none()) {
-        return;
-    }
     let mut waiting: Vec<_> = captures.iter_mut().filter(|(_, capture)| capture.next.is_some()).collect();
     waiting.sort_unstable_by_key(|(_, capture)| capture.bytes_left());
     let mut left = budget.bytes_per_frame.max(1);

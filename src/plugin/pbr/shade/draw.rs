@@ -33,6 +33,11 @@ use bevy::render::view::ExtractedView;
 #[derive(Resource, Default)]
 pub(super) struct ShadeViews(HashMap<Entity, ShadeView>);
 
+/// Returns whether the captures of any camera may be shaded.
+pub(super) fn any_shade_view(shades: Res<ShadeViews>) -> bool {
+    !shades.0.is_empty()
+}
+
 /// State of one camera.
 struct ShadeView {
     pipeline: CachedRenderPipelineId,

@@ -11,6 +11,7 @@ use bevy::asset::Assets;
 use bevy::camera::primitives::Aabb;
 use bevy::camera::visibility::{InheritedVisibility, RenderLayers};
 use bevy::ecs::entity::Entity;
+use bevy::ecs::query::With;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Query, Res, ResMut};
 use bevy::render::Extract;
@@ -20,6 +21,16 @@ use glam::Affine3A;
 /// The captures that cast shadows this frame. The memory is kept from frame to frame.
 #[derive(Resource, Default)]
 pub(super) struct ExtractedCasters(pub(super) Vec<Caster>);
+
+/// Returns whether any capture of the main world casts shadows.
+pub(super) fn any_casts(captures: Extract<Query<(), With<CastsShadows>>>) -> bool {
+    !captures.is_empty()
+}
+
+/// Returns whether any capture casts shadows.
+pub(super) fn any_caster(casters: Res<ExtractedCasters>) -> bool {
+    !casters.0.is_empty()
+}
 
 /// One capture that casts shadows.
 pub(super) struct Caster {

@@ -6,6 +6,7 @@ use crate::plugin::render::kept::{IdleFrames, KeptUniform};
 use crate::plugin::render::{Drawn, WriteDepthBindings};
 use crate::renderer::{Renderer, ViewRenderer, WorkCounters};
 use bevy::ecs::resource::Resource;
+use bevy::ecs::system::Res;
 use bevy::platform::collections::HashMap;
 use bevy::render::render_resource::CachedRenderPipelineId;
 use bevy::render::renderer::{RenderDevice, RenderQueue};
@@ -15,6 +16,11 @@ use glam::{UVec2, UVec4};
 /// State of every view of a light: a cascade for one camera, a face of a point light, a spot light.
 #[derive(Resource, Default)]
 pub(super) struct LightViews(pub(super) HashMap<RetainedViewEntity, LightView>);
+
+/// Returns whether any light may see captures.
+pub(super) fn any_light_view(views: Res<LightViews>) -> bool {
+    !views.0.is_empty()
+}
 
 /// State of one view.
 pub(super) struct LightView {

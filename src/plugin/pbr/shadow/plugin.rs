@@ -3,13 +3,13 @@
 //! In: an app in which captures are drawn and lights have shadow maps. Out: the same app, in which captures cast shadows.
 
 use super::draw::{cast_cascades, cast_shared};
-use super::extract::{ExtractedCasters, extract_casters};
-use super::light_views::LightViews;
+use super::extract::{ExtractedCasters, any_caster, any_casts, extract_casters};
+use super::light_views::{LightViews, any_light_view};
 use super::prepare::prepare_light_views;
 use crate::plugin::render::{ExtractedCaptures, extract_captures};
 use bevy::app::{App, Plugin};
 use bevy::core_pipeline::schedule::{Core3d, Core3dSystems};
-use bevy::ecs::schedule::IntoScheduleConfigs;
+use bevy::ecs::schedule::{IntoScheduleConfigs, SystemCondition};
 use bevy::pbr::{LATE_SHADOW_PASS, PbrPlugin, per_view_shadow_pass, shared_shadow_pass};
 use bevy::render::{ExtractSchedule, GpuResourceAppExt, Render, RenderApp, RenderSystems};
 
@@ -27,14 +27,18 @@ impl Plugin for CaptureShadowPlugin {
         render_app
             .init_resource::<ExtractedCasters>()
             .init_gpu_resource::<LightViews>()
-            .add_systems(ExtractSchedule, extract_casters.after(extract_captures))
-            .add_systems(Render, prepare_light_views.in_set(RenderSystems::PrepareBindGroups))
+            .add_systems(ExtractSchedule, extract_casters.run_if(any_casts.or_else(any_caster)).after(extract_captures))
+            .add_systems(
+                Render,
+                prepare_light_views.run_if(any_caster.or_else(any_light_view)).in_set(RenderSystems::PrepareBindGroups),
+            )
             .add_systems(
                 Core3d,
                 (
                     cast_cascades.after(per_view_shadow_pass::<LATE_SHADOW_PASS>),
                     cast_shared.after(shared_shadow_pass::<LATE_SHADOW_PASS>),
                 )
+                    .distributive_run_if(any_light_view)
                     .before(Core3dSystems::MainPass),
             );
     }
