@@ -133,6 +133,13 @@ prepare() {
   export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-${XDG_CACHE_HOME:-$HOME/.cache}/bevy_gs4d/target}"
   # Incremental builds only pay where one tree is built over and over.
   export CARGO_INCREMENTAL=0
+  # What another clone has built counts as built if its files are newer, but its tests look for their data in that clone.
+  if [ "$(cat "$CARGO_TARGET_DIR/clone" 2>/dev/null)" != "$PWD" ]; then
+    mkdir -p "$CARGO_TARGET_DIR"
+    cargo clean --quiet --locked --package bevy_gs4d
+    cargo clean --quiet --locked --package bevy_gs4d --release
+    printf '%s\n' "$PWD" >"$CARGO_TARGET_DIR/clone"
+  fi
   if [ -z "${XDG_RUNTIME_DIR:-}" ]; then
     mkdir -m 700 "$scratch/runtime"
     export XDG_RUNTIME_DIR="$scratch/runtime"
