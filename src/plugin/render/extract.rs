@@ -3,7 +3,6 @@
 //! In (main world): entities with a loaded capture, their transform, playback and settings; the settings of cameras. Out (render
 //! world): [`ExtractedCaptures`] and [`ExtractedViewSettings`], by entity of the main world.
 
-use super::previous::PreviousCaptures;
 use super::settings::{CaptureSettings, CaptureViewSettings};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::{ClipFade, Playback};
@@ -76,12 +75,10 @@ pub(super) fn has_changed<R: Resource>(resource: Extract<Res<R>>) -> bool {
 
 pub(crate) fn extract_captures(
     mut extracted: ResMut<ExtractedCaptures>,
-    mut previous: ResMut<PreviousCaptures>,
     assets: Extract<Res<Assets<GaussianCapture>>>,
     captures: Extract<Query<Placed>>,
 ) {
     let _span = debug_span!("gs4d/extract").entered();
-    previous.keep(&extracted);
     extracted.0.clear();
     for (entity, capture, settings, playback, transform, visibility, fade) in &captures {
         let Some(loaded) = assets.get(&capture.0) else { continue };

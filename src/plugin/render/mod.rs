@@ -7,11 +7,11 @@
 //! ```text
 //! renderer     compiles the pipelines                                once per device
 //! visibility   a capture's bounds at this time -> its Aabb           main world
-//! extract      captures, their times, poses and settings             main world -> render world; those before: previous
+//! extract      captures, their times, poses and settings             main world -> render world
 //! upload       a loaded capture -> buffers on the GPU                once per asset, over several frames
 //! detail       how many Gaussians by the size on the screen          once per camera, placed capture and frame
 //! active       which Gaussians are active                            once per placed capture and segment, before all cameras
-//! prepare      a camera's lens and every capture's pose -> views     once per camera and frame, kept in capture_views
+//! prepare      a camera's lens and every capture's pose -> views     once per camera and frame, kept in capture_views; then previous
 //! order        what is drawn before captures, and what after them    once per camera and frame
 //! draw         one compute pass, composite, write_depth, write_motion  Core3d, among transparent things
 //! publish      counts, times, memory -> statistics                   render world -> main world

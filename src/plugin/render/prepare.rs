@@ -44,7 +44,7 @@ pub(super) struct Scene<'w> {
     shade: Res<'w, ShadeRequests>,
     captures: Res<'w, RenderAssets<GpuGaussianCapture>>,
     lists: Res<'w, ActiveLists>,
-    previous: Res<'w, PreviousCaptures>,
+    previous: ResMut<'w, PreviousCaptures>,
     depth_readers: Res<'w, DepthReaders>,
     levels: Res<'w, CaptureLevels>,
 }
@@ -150,7 +150,7 @@ pub(super) fn prepare_views(
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
     renderer: Option<Res<CaptureRenderer>>,
-    scene: Scene,
+    mut scene: Scene,
     mut pipelines: Pipelines,
     statistics: Res<CaptureStatistics>,
     mut views: ResMut<CaptureViews>,
@@ -224,6 +224,7 @@ pub(super) fn prepare_views(
             state.depth_bindings.set_lens(distance, 1, &device, &queue, renderer.0.work());
         }
     }
+    scene.previous.keep(&scene.extracted);
     publish_statistics(&statistics, &views, &scene.captures);
 }
 

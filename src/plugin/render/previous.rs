@@ -1,6 +1,6 @@
 //! Previous: where captures and cameras were one frame before, and when.
 //!
-//! In: the captures of each frame, before they are replaced by those of the next; the pose of a camera. Out: the view of a capture one frame
+//! In: the captures of each frame, kept for the next; the pose of a camera. Out: the view of a capture one frame
 //! before, by which the renderer finds how far it has moved on the screen.
 //!
 //! Splats move with the time of their capture. After a jump in time (a seek, the start of a loop, a cut) they have no motion that could be
@@ -22,7 +22,7 @@ const STEPS: f32 = 8.0;
 
 /// The captures of the frame before. The memory is kept from frame to frame.
 #[derive(Resource, Default)]
-pub(crate) struct PreviousCaptures(MainEntityHashMap<PreviousCapture>);
+pub(super) struct PreviousCaptures(MainEntityHashMap<PreviousCapture>);
 
 struct PreviousCapture {
     asset: AssetId<GaussianCapture>,
@@ -40,7 +40,7 @@ pub(super) struct CameraPose {
 }
 
 impl PreviousCaptures {
-    /// Keeps the captures of the frame before, which are about to be extracted anew.
+    /// Keeps the captures of this frame for the next, once all views of it are prepared.
     pub(super) fn keep(&mut self, extracted: &ExtractedCaptures) {
         self.0.retain(|entity, _| extracted.0.contains_key(entity));
         for (entity, placed) in &extracted.0 {
