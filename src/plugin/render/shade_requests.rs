@@ -5,7 +5,6 @@
 
 use super::capture_views::Drawn;
 use bevy::ecs::resource::Resource;
-use bevy::ecs::system::Res;
 use bevy::render::sync_world::{MainEntity, MainEntityHashSet};
 
 /// Who asks for a shaded picture, by entity of the main world. Nobody, unless a system of the extract schedule writes it.
@@ -15,11 +14,6 @@ pub(crate) struct ShadeRequests {
     pub(crate) cameras: MainEntityHashSet,
     /// Captures, whichever camera sees them.
     pub(crate) captures: MainEntityHashSet,
-}
-
-/// Returns whether anybody asks.
-pub(crate) fn any_shade_request(requests: Res<ShadeRequests>) -> bool {
-    !(requests.cameras.is_empty() && requests.captures.is_empty())
 }
 
 impl ShadeRequests {

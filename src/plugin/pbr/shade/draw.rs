@@ -38,6 +38,11 @@ pub(super) fn any_shade_view(shades: Res<ShadeViews>) -> bool {
     !shades.0.is_empty()
 }
 
+/// Returns whether anybody asks for a shaded picture, or has asked and still has what it needs.
+pub(super) fn any_request(requests: Res<ShadeRequests>, shades: Res<ShadeViews>) -> bool {
+    !(requests.cameras.is_empty() && requests.captures.is_empty() && shades.0.is_empty())
+}
+
 /// State of one camera.
 struct ShadeView {
     pipeline: CachedRenderPipelineId,

@@ -3,15 +3,14 @@
 //! In: an app in which captures are drawn, Bevy's `PbrPlugin`. Out: the same app, in which fog, shadows and light reach captures. Without
 //! `PbrPlugin` nothing changes.
 
-use super::draw::{ShadeViews, any_shade_view, prepare_shade, shade_captures};
+use super::draw::{ShadeViews, any_request, any_shade_view, prepare_shade, shade_captures};
 use super::extract::{ExtractedShading, extract_shading};
 use super::pipeline::{ShadePipeline, ShadeShader, init_shade_pipeline};
 use crate::plugin::render::CaptureSystems;
-use crate::plugin::render::shade_requests::any_shade_request;
 use bevy::app::{App, Plugin};
 use bevy::asset::Assets;
 use bevy::core_pipeline::schedule::Core3d;
-use bevy::ecs::schedule::{IntoScheduleConfigs, SystemCondition};
+use bevy::ecs::schedule::IntoScheduleConfigs;
 use bevy::pbr::MeshPipelineSystems;
 use bevy::render::render_resource::SpecializedRenderPipelines;
 use bevy::render::{ExtractSchedule, GpuResourceAppExt, Render, RenderApp, RenderStartup, RenderSystems};
@@ -38,10 +37,7 @@ impl Plugin for ShadePlugin {
             .init_gpu_resource::<ShadeViews>()
             .add_systems(RenderStartup, init_shade_pipeline.after(MeshPipelineSystems))
             .add_systems(ExtractSchedule, extract_shading)
-            .add_systems(
-                Render,
-                prepare_shade.run_if(any_shade_request.or_else(any_shade_view)).in_set(RenderSystems::Prepare),
-            )
+            .add_systems(Render, prepare_shade.run_if(any_request).in_set(RenderSystems::Prepare))
             .add_systems(Core3d, shade_captures.run_if(any_shade_view).in_set(CaptureSystems::Shade));
     }
 }
