@@ -134,12 +134,12 @@ prepare() {
   # Incremental builds only pay where one tree is built over and over.
   export CARGO_INCREMENTAL=0
   # What another clone has built counts as built if its files are newer, but its tests look for their data in that clone.
-  if [ "$(cat "$CARGO_TARGET_DIR/clone" 2>/dev/null)" != "$PWD" ]; then
-    mkdir -p "$CARGO_TARGET_DIR"
-    cargo clean --quiet --locked --package bevy_gs4d
-    cargo clean --quiet --locked --package bevy_gs4d --release
-    printf '%s\n' "$PWD" >"$CARGO_TARGET_DIR/clone"
+  if [ -d "$CARGO_TARGET_DIR" ] && [ "$(cat "$CARGO_TARGET_DIR/clone" 2>/dev/null)" != "$PWD" ]; then
+    show cargo clean --locked --package bevy_gs4d
+    show cargo clean --locked --package bevy_gs4d --release
   fi
+  mkdir -p "$CARGO_TARGET_DIR"
+  printf '%s\n' "$PWD" >"$CARGO_TARGET_DIR/clone"
   if [ -z "${XDG_RUNTIME_DIR:-}" ]; then
     mkdir -m 700 "$scratch/runtime"
     export XDG_RUNTIME_DIR="$scratch/runtime"

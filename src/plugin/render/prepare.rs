@@ -157,7 +157,7 @@ pub(super) fn prepare_views(
     cameras: Query<CameraView, With<Camera3d>>,
 ) {
     let _span = debug_span!("gs4d/prepare").entered();
-    let Some(renderer) = renderer else { return };
+    let Some(renderer) = renderer else { return publish_statistics(&statistics, &views, &scene.captures) };
     let measure = statistics.is_measuring();
     views.0.retain(|&camera, _| cameras.contains(camera));
     for (entity, view, camera, depth, &msaa, visible, resolution, prepass) in &cameras {
