@@ -29,6 +29,12 @@ const BATCH: u32 = 128u;
 // Blocks of 8 x 4 pixels, one for each 32 threads.
 const BLOCKS: u32 = 8u;
 const LANES: u32 = 32u;
+// Splats that a thread blends without looking whether its pixel is opaque: the queues are multiples of it.
+#ifdef EIGHT_AT_ONCE
+const AT_ONCE: u32 = 8u;
+#else
+const AT_ONCE: u32 = 4u;
+#endif
 // Splats of a batch that each thread queues.
 const OWN_SPLATS: u32 = BATCH / LANES;
 const LOG2_E: f32 = 1.442695;
@@ -47,11 +53,16 @@ const LOG2_ALPHA_MAX: f32 = -0.014499569;
 // Center, conic xx and xy scaled for exp2; conic yy, log2 of opacity, red, green; blue, depth. The last changes no pixel.
 var<workgroup> batch_a: array<vec4<f32>, BATCH + 1u>;
 var<workgroup> batch_b: array<vec4<f32>, BATCH + 1u>;
+#ifdef EIGHT_AT_ONCE
+// As far apart as the others, so that they have the same addresses.
+var<workgroup> batch_c: array<vec4<f32>, BATCH + 1u>;
+#else
 var<workgroup> batch_c: array<vec2<f32>, BATCH + 1u>;
+#endif
 // Blocks that each splat of the batch reaches, one bit each.
 var<workgroup> reached: array<u32, BATCH>;
-// Splats of the batch that each block blends, in order.
-var<workgroup> queues: array<u32, BLOCKS * BATCH>;
+// Splats of the batch that each block blends, in order; after the last queue, what may be read ahead.
+var<workgroup> queues: array<u32, BLOCKS * BATCH + AT_ONCE>;
 #ifndef SUBGROUPS_OF_32
 // Number of splats that each thread queues.
 var<workgroup> queued_by: array<u32, THREADS>;
@@ -181,7 +192,11 @@ fn put_in_batch(splat: Splat, thread: u32) {
     let conic = vec3(-0.5, -1.0, -0.5) * LOG2_E * splat.conic;
     batch_a[thread] = vec4(splat.center, conic.xy);
     batch_b[thread] = vec4(conic.z, log2(splat.opacity), splat.color.xy);
+#ifdef EIGHT_AT_ONCE
+    batch_c[thread] = vec4(splat.color.z, splat.depth, 0.0, 0.0);
+#else
     batch_c[thread] = vec2(splat.color.z, splat.depth);
+#endif
     var blocks = 0u;
     if splat.opacity > 0.0 {
         blocks = blocks_reached(splat);
@@ -230,7 +245,7 @@ fn blocks_reached(splat: Splat) -> u32 {
     return blocks;
 }
 
-// Lists the splats of the batch that reach each block, in order. Returns their number, a multiple of four: the last may be
+// Lists the splats of the batch that reach each block, in order. Returns their number, a multiple of AT_ONCE: the last may be
 // BATCH, which changes no pixel.
 fn queue_splats(thread: u32) -> u32 {
     let block = thread / LANES;
@@ -265,7 +280,7 @@ fn queue_splats(thread: u32) -> u32 {
         }
     }
 #endif
-    let end = (total + 3u) & ~3u;
+    let end = (total + AT_ONCE - 1u) & ~(AT_ONCE - 1u);
     if total + lane < end {
         queues[queue + total + lane] = BATCH;
     }
@@ -279,6 +294,10 @@ fn batch_alpha(a: vec4<f32>, b: vec4<f32>, position: vec2<f32>) -> f32 {
     let exponent = (a.z * d.x + a.w * d.y) * d.x + (b.x * d.y * d.y + b.y);
     let shows = exponent >= LOG2_ALPHA_MIN && exponent <= b.y;
     return select(0.0, exp2(min(exponent, LOG2_ALPHA_MAX)), shows);
+}
+
+fn batch_color(i: u32) -> vec3<f32> {
+    return vec3(batch_b[i].zw, batch_c[i].x);
 }
 
 #ifdef DEPTHS
@@ -302,10 +321,6 @@ fn blend_four(pixel: ptr<function, Pixel>, alphas: vec4<f32>, four: vec4<u32>) {
     blend_or_skip(pixel, alphas.y, batch_color(four.y), depths.y);
     blend_or_skip(pixel, alphas.z, batch_color(four.z), depths.z);
     blend_or_skip(pixel, alphas.w, batch_color(four.w), depths.w);
-}
-
-fn batch_color(i: u32) -> vec3<f32> {
-    return vec3(batch_b[i].zw, batch_c[i].x);
 }
 #else
 // Color blended so far and transmittance left: 0 once the pixel is opaque, with `opaque_at` what it was then.
@@ -335,6 +350,52 @@ fn blend_one(sample: ptr<function, Sample>, alpha: f32, color: vec3<f32>) {
     (*sample).color += color * (alpha * (*sample).left);
 #endif
     (*sample).left = left;
+}
+#endif
+
+#ifdef EIGHT_AT_ONCE
+// Returns four splats of a queue.
+fn queued_four(at: u32) -> vec4<u32> {
+    return vec4(queues[at], queues[at + 1u], queues[at + 2u], queues[at + 3u]);
+}
+
+// Returns the alphas of four splats of the batch; 0 for those that are skipped or behind `limit`.
+fn batch_alphas(four: vec4<u32>, position: vec2<f32>, limit: f32) -> vec4<f32> {
+    let alphas = vec4(
+        batch_alpha(batch_a[four.x], batch_b[four.x], position),
+        batch_alpha(batch_a[four.y], batch_b[four.y], position),
+        batch_alpha(batch_a[four.z], batch_b[four.z], position),
+        batch_alpha(batch_a[four.w], batch_b[four.w], position),
+    );
+#ifdef OPAQUE
+    let depths = vec4(batch_c[four.x].y, batch_c[four.y].y, batch_c[four.z].y, batch_c[four.w].y);
+    return select(alphas, vec4(0.0), depths > vec4(limit));
+#else
+    return alphas;
+#endif
+}
+
+// Blends four splats of the batch. Returns whether the pixel is opaque.
+fn blend_four(sample: ptr<function, Sample>, alphas: vec4<f32>, four: vec4<u32>) -> bool {
+    // Fused, so that each splat waits for one instruction of the one before.
+    let left = (*sample).left;
+    let after_one = fma(-alphas.x, left, left);
+    let after_two = fma(-alphas.y, after_one, after_one);
+    let after_three = fma(-alphas.z, after_two, after_two);
+    let after_four = fma(-alphas.w, after_three, after_three);
+    if is_opaque(after_four) {
+        blend_one(sample, alphas.x, batch_color(four.x));
+        blend_one(sample, alphas.y, batch_color(four.y));
+        blend_one(sample, alphas.z, batch_color(four.z));
+        blend_one(sample, alphas.w, batch_color(four.w));
+        return (*sample).left == 0.0;
+    }
+    (*sample).color += batch_color(four.x) * (alphas.x * left);
+    (*sample).color += batch_color(four.y) * (alphas.y * after_one);
+    (*sample).color += batch_color(four.z) * (alphas.z * after_two);
+    (*sample).color += batch_color(four.w) * (alphas.w * after_three);
+    (*sample).left = after_four;
+    return false;
 }
 #endif
 
@@ -374,7 +435,11 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
         atomicStore(&finished, 0u);
         batch_a[BATCH] = vec4(0.0);
         batch_b[BATCH] = vec4(0.0, -1e9, 0.0, 0.0);
+#ifdef EIGHT_AT_ONCE
+        batch_c[BATCH] = vec4(0.0);
+#else
         batch_c[BATCH] = vec2(0.0);
+#endif
     }
     let range = workgroupUniformLoad(&own_range);
     let searching = range.x == NONE.x;
@@ -431,6 +496,28 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
         }
         let queue = block * BATCH;
         if !done {
+#ifdef EIGHT_AT_ONCE
+#ifndef OPAQUE
+            let limit = FAR;
+#endif
+            // The next of the queue are known before these are blended: in a small picture few threads have work while others wait.
+            var near = queued_four(queue);
+            var far = queued_four(queue + 4u);
+            for (var i = AT_ONCE; i <= queued; i += AT_ONCE) {
+                let next_near = queued_four(queue + i);
+                let next_far = queued_four(queue + i + 4u);
+                let near_alphas = batch_alphas(near, position, limit);
+                let far_alphas = batch_alphas(far, position, limit);
+                if blend_four(&sample, near_alphas, near) {
+                    break;
+                }
+                if blend_four(&sample, far_alphas, far) {
+                    break;
+                }
+                near = next_near;
+                far = next_far;
+            }
+#else
             for (var i = 0u; i < queued; i += 4u) {
                 // Four at a time: their exponentials do not wait for each other's blends.
                 let k = vec4(queues[queue + i], queues[queue + i + 1u], queues[queue + i + 2u], queues[queue + i + 3u]);
@@ -491,6 +578,7 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
                 }
 #endif
             }
+#endif
 #ifdef DEPTHS
             done = pixel.done;
 #else

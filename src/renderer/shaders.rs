@@ -234,6 +234,9 @@ pub const SUBGROUPS_OF_32: &[&str] = &["SUBGROUPS_OF_32"];
 /// Definitions of `blend_blocks` for small pictures.
 pub const LARGE_BATCHES: &[&str] = &["LARGE_BATCHES"];
 
+/// The same for [`Blending::Color`] and [`Blending::ColorBehindSurfaces`]: more splats of a pixel at once, as few threads have work.
+pub const EIGHT_AT_ONCE: &[&str] = &["LARGE_BATCHES", "EIGHT_AT_ONCE"];
+
 /// What `blend_blocks` writes, and what it heeds. The picture is the same where several can draw it; the first is the fastest.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Blending {
@@ -297,7 +300,11 @@ impl FastVariant {
 
     /// Returns the definitions of `blend_blocks`.
     pub fn blend_definitions(self) -> Vec<&'static str> {
-        let batches = if self.large_batches { LARGE_BATCHES } else { &[] };
+        let batches = match self.blending {
+            _ if !self.large_batches => &[],
+            Blending::Color | Blending::ColorBehindSurfaces => EIGHT_AT_ONCE,
+            _ => LARGE_BATCHES,
+        };
         [self.blending.definitions(), self.precision.definitions(), batches].concat()
     }
 

@@ -3,8 +3,8 @@
 //! In: the files of `shaders/`. Out: proof that each is known to the renderer and is valid WGSL that needs no optional capability.
 
 use bevy_gs4d::renderer::shaders::{
-    ATOMIC_SUMS, BINNED, Blending, COMPAT, COMPAT_WITHOUT_TIME, COPIED_INSTANCE, ColorPrecision, LARGE_BATCHES, Lists,
-    MULTISAMPLED, SUBGROUPS_OF_32, Storage, compose, pass_names,
+    ATOMIC_SUMS, BINNED, Blending, COMPAT, COMPAT_WITHOUT_TIME, COPIED_INSTANCE, ColorPrecision, EIGHT_AT_ONCE,
+    LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32, Storage, compose, pass_names,
 };
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
@@ -55,6 +55,9 @@ fn every_pass_composes_and_is_valid() {
         let half = ColorPrecision::Half.definitions();
         [&[][..], LARGE_BATCHES, SUBGROUPS_OF_32, half].map(|device| [blending.definitions(), device].concat())
     });
+    let eight = [Blending::Color, Blending::ColorBehindSurfaces].into_iter().flat_map(|blending| {
+        [&[][..], SUBGROUPS_OF_32].map(|device| [blending.definitions(), EIGHT_AT_ONCE, device].concat())
+    });
     let lists = Lists::ALL
         .into_iter()
         .flat_map(|lists| [&[][..], SUBGROUPS_OF_32].map(|device| [lists.definitions(), device].concat()));
@@ -68,6 +71,7 @@ fn every_pass_composes_and_is_valid() {
         .chain(binned)
         .chain(copied)
         .chain(blending)
+        .chain(eight)
         .chain(lists)
         .collect();
     let all = definitions.iter().flat_map(|definitions| pass_names().map(move |name| (name, &definitions[..])));
@@ -77,7 +81,9 @@ fn every_pass_composes_and_is_valid() {
 #[test]
 fn workgroup_memory_is_within_the_limits_that_are_asked_for() {
     let blending = Blending::ALL.map(|blending| ("blend_blocks", blending.definitions(), 16 * 1024));
-    let large = [("blend_blocks", [LARGE_BATCHES, Blending::All.definitions()].concat(), 32 * 1024)];
+    let large =
+        [[LARGE_BATCHES, Blending::All.definitions()], [EIGHT_AT_ONCE, Blending::ColorBehindSurfaces.definitions()]]
+            .map(|definitions| ("blend_blocks", definitions.concat(), 32 * 1024));
     let large = large.iter().map(|(name, definitions, limit)| (*name, &definitions[..], *limit));
     let sorting = Lists::ALL.map(|lists| ("sort_bins", lists.definitions(), lists.memory()));
     let binning = [("project", BINNED, 16 * 1024)];
