@@ -29,7 +29,7 @@ const BATCH: u32 = 128u;
 // Blocks of 8 x 4 pixels, one for each 32 threads.
 const BLOCKS: u32 = 8u;
 const LANES: u32 = 32u;
-// Splats that a thread blends without looking whether its pixel is opaque: the queues are multiples of it.
+// Splats whose alphas a thread computes at once: the queues are multiples of it.
 #ifdef EIGHT_AT_ONCE
 const AT_ONCE: u32 = 8u;
 #else
@@ -518,7 +518,7 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
                 far = next_far;
             }
 #else
-            for (var i = 0u; i < queued; i += 4u) {
+            for (var i = 0u; i < queued; i += AT_ONCE) {
                 // Four at a time: their exponentials do not wait for each other's blends.
                 let k = vec4(queues[queue + i], queues[queue + i + 1u], queues[queue + i + 2u], queues[queue + i + 3u]);
                 let b0 = batch_b[k.x];

@@ -1,17 +1,21 @@
 //! The fast renderer against the reference design, where its buffers and its workgroup memory are too small, and many copies of a capture.
 //!
-//! In: scenes of many splats in few tiles. Out: proof that both designs draw the same picture, from the first frame on, and that copies
-//! which one dispatch draws look as those drawn one by one. Skipped where there is no GPU.
+//! In: scenes of many splats in few tiles, the bundled capture. Out: proof that both designs draw the same picture, from the first frame
+//! on, and that copies which one dispatch draws look as those drawn one by one. Skipped where there is no GPU.
 
 use crate::support::blob::blob;
 use crate::support::gpu;
 use crate::support::surfaces::{depth_texture, edge};
+use bevy_gs4d::codec::checkpoint::CheckpointOptions;
+use bevy_gs4d::codec::load;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
+use bevy_gs4d::offline::metrics::psnr_pooled;
 use bevy_gs4d::renderer::{ColorPrecision, Design, Headless, Instance, OpaqueDepth, ViewParameters};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Form, RuntimeScene};
 use bevy_gs4d::view::{Appearance, Background, Camera, DebugView, Frame, RasterFov, View};
 use glam::{UVec2, Vec3};
+use std::path::Path;
 
 /// Faint Gaussians about the origin, behind each other in layers along the line of sight: `layer` Gaussians have one depth.
 fn crowd(count: usize, layer: usize, deviation: f32) -> RuntimeScene {
@@ -124,6 +128,30 @@ fn every_way_of_blending_shows_the_picture_of_the_reference() {
                 }
             }
         }
+    }
+}
+
+/// As benchmarks and cameras that need no depth draw a trained capture, in a small picture and in a large one.
+#[test]
+fn the_bundled_capture_without_depths_is_that_of_the_reference() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/toybox.gs4d");
+    let scene = load(&path, &CheckpointOptions::default()).expect("the bundled capture").into_runtime();
+    let scene = scene.expect("a scene that can be drawn");
+    let capture = headless.upload(&scene).expect("the scene fits");
+    for (size, time) in [(400, 0.1), (400, 0.6), (530, 0.3)] {
+        let camera = Camera::look_at(Vec3::new(-3.57, 1.3, 1.69), Vec3::ZERO, Vec3::Z, 0.8, UVec2::splat(size));
+        let view = camera.view(time, RasterFov::Reference);
+        let instances = [Instance { capture: &capture, active: None, view, appearance: Appearance::default() }];
+        let [expected, found] = [Design::Reference, Design::Fast].map(|design| {
+            headless.set_design(design);
+            let parameters = ViewParameters { depths: design == Design::Reference, ..ViewParameters::default() };
+            headless.render_all(&instances, &parameters).expect("the picture fits")
+        });
+        assert!(expected.counts.visible > 10_000, "the capture is there: {:?}", expected.counts);
+        let decibels = psnr_pooled(&found.picture, &expected.picture).expect("pictures of one size");
+        println!("{size}, {time}: {decibels:.1} dB, at most {:.1e}", difference(&found, &expected));
+        assert!(decibels >= 100.0, "{size}, {time}: {decibels} dB");
     }
 }
 
