@@ -187,7 +187,8 @@ impl Passes<'_> {
                 view: target.post_process_write().destination,
                 depth_slice: None,
                 resolve_target: None,
-                ops: Operations::default(),
+                // Every pixel is written: to clear them first would take time for nothing.
+                ops: Operations { load: LoadOp::Load, store: StoreOp::Store },
             },
             (false, true) => {
                 // Both textures have the same samples: what is read stays, and the samples are resolved into the other.
