@@ -9,6 +9,7 @@ use crate::support::blob::blob;
 use crate::support::cpu_reference::{DURATION, difference_between, rgb, scene};
 use crate::support::fixtures::{insert, spawn};
 use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
+use bevy::camera::Hdr;
 use bevy::camera::visibility::{RenderLayers, ViewVisibility};
 use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, PointLightShadowMap};
 use bevy::prelude::*;
@@ -245,18 +246,13 @@ fn a_contact_shadow_darkens_the_ground_beneath_and_nothing_else() {
     let [before, after] = both(Vec3::new(0.0, 0.15, 0.27));
     assert!(before > 60 && (before - after).abs() <= 6, "the capture stays {before}, and is not {after}");
 
-    let meshes = |app: &mut App| app.world_mut().query::<&Mesh3d>().iter(app.world()).count();
-    assert_eq!(meshes(&mut app), 2, "the floor and the shadow");
     insert(&mut app, capture, Transform::from_xyz(0.0, 9.0, 0.0));
     let away = picture(&mut app, 0.0);
     assert!((green(&away, Vec3::Z * 0.52) - green(&without, Vec3::Z * 0.52)).abs() <= 1, "far above there is none");
+    insert(&mut app, capture, Transform::from_xyz(0.0, RADIUS, 0.0));
+    assert_eq!(difference_between(&picture(&mut app, 0.0), &with), 0, "back on the ground it is as before");
     app.world_mut().entity_mut(capture).remove::<CaptureContactShadow>();
-    picture(&mut app, 0.0);
-    assert_eq!(meshes(&mut app), 1, "its mesh goes with the component");
-    insert(&mut app, capture, CaptureContactShadow::default());
-    picture(&mut app, 0.0);
-    app.world_mut().despawn(capture);
-    assert_eq!(meshes(&mut app), 1, "and with the capture");
+    assert_eq!(difference_between(&picture(&mut app, 0.0), &without), 0, "it goes with the component");
 }
 
 #[test]
@@ -274,11 +270,57 @@ fn only_a_capture_that_is_drawn_has_a_contact_shadow() {
     assert_eq!(difference_between(&seen, &lit), 0, "so nothing of it is seen, its shadow included");
     app.world_mut().despawn(refused);
 
-    let meshes = |app: &mut App| app.world_mut().query::<&Mesh3d>().iter(app.world()).count();
-    let capture = spawn(&mut app, &ball(Vec3::ZERO), (place, CaptureContactShadow::default()));
-    picture(&mut app, 0.0);
-    assert_eq!(meshes(&mut app), 2, "the floor and the shadow");
+    let shadow = CaptureContactShadow { strength: 1.0, ..default() };
+    let capture = spawn(&mut app, &ball(Vec3::ZERO), (place, shadow));
+    let seen = picture(&mut app, 0.0);
+    // Beside the ball, which hides the middle.
+    let ground = pixel_of(&above(5.0), Vec3::X * 0.6);
+    let [lit_ground, dark_ground] = [&lit, &seen].map(|picture| rgb(picture, ground.x, ground.y)[1]);
+    assert!(dark_ground + 10 < lit_ground, "the ground goes from {lit_ground} to {dark_ground}");
     app.world_mut().entity_mut(capture).remove::<GaussianCapture3d>();
-    picture(&mut app, 0.0);
-    assert_eq!(meshes(&mut app), 1, "the shadow goes with what casts it");
+    assert_eq!(difference_between(&picture(&mut app, 0.0), &lit), 0, "the shadow goes with what casts it");
+}
+
+#[test]
+fn every_camera_draws_the_same_contact_shadow() {
+    let fog = |camera: &mut EntityWorldMut, density| {
+        let falloff = FogFalloff::Exponential { density };
+        camera.insert(DistanceFog { color: Color::BLACK, falloff, ..default() });
+    };
+    let four_samples = |camera: &mut EntityWorldMut| {
+        camera.insert(Msaa::Sample4);
+    };
+    let high_range = |camera: &mut EntityWorldMut| {
+        camera.insert(Hdr);
+    };
+    // What the ground goes to, from the light that it would have, in 255ths.
+    let shown = |adjust: &dyn Fn(&mut EntityWorldMut), layer: usize| {
+        let mut app = scenery(above(5.0), sun(Vec3::NEG_Y))?;
+        let camera = app.world_mut().query_filtered::<Entity, With<Camera3d>>().single(app.world()).expect("one");
+        adjust(&mut app.world_mut().entity_mut(camera));
+        let place = Transform::from_xyz(0.0, RADIUS, 0.0);
+        let capture = spawn(&mut app, &ball(Vec3::ZERO), (place, RenderLayers::layer(layer)));
+        let ground = pixel_of(&above(5.0), Vec3::X * 0.6);
+        let [before, after] = [false, true].map(|shadow| {
+            if shadow {
+                insert(&mut app, capture, CaptureContactShadow { strength: 1.0, ..default() });
+            }
+            f32::from(rgb(&picture(&mut app, 0.0), ground.x, ground.y)[1])
+        });
+        Some(after * 255.0 / before)
+    };
+    let Some(plain) = shown(&|_| {}, 0) else { return };
+    assert!((20.0..225.0).contains(&plain), "beside the ball, the ground goes to {plain} of 255");
+    let same: [(&str, &dyn Fn(&mut EntityWorldMut)); 3] = [
+        ("four samples", &four_samples),
+        ("high dynamic range", &high_range),
+        ("clear air", &|camera| fog(camera, 0.0)),
+    ];
+    for (name, adjust) in same {
+        let Some(other) = shown(adjust, 0) else { return };
+        assert!((other - plain).abs() < 3.0, "{name}: {other} of 255, not {plain}");
+    }
+    let Some(foggy) = shown(&|camera| fog(camera, 0.2), 0) else { return };
+    assert!(plain + 10.0 < foggy && foggy < 250.0, "in fog, {foggy} of 255 is between {plain} and all");
+    assert_eq!(shown(&|_| {}, UNSEEN), Some(255.0), "a camera that does not see the layer draws none");
 }

@@ -12,7 +12,7 @@ use bevy::ecs::system::{Commands, Query, Res};
 use bevy::log::debug_span;
 
 /// Updates the boxes, after everything that advances playback and before Bevy decides which entities a camera sees.
-pub(crate) fn update_bounds(
+pub(super) fn update_bounds(
     captures: Res<Assets<GaussianCapture>>,
     mut placed: Query<(Entity, &GaussianCapture3d, &Playback, Option<&mut Aabb>)>,
     mut commands: Commands,

@@ -11,8 +11,8 @@ use glam::{Affine3A, Vec3};
 /// Darkens the ground beneath a capture: an optional component beside [`GaussianCapture3d`](crate::GaussianCapture3d).
 ///
 /// The ellipse is inscribed in the capture's bounds, seen from above, follows them over time, and fades with the capture's opacity and as
-/// it rises above the ground. It needs no light, and costs as much as one small quad. It is drawn over opaque meshes (alpha-masked ones may cover it) and
-/// behind captures, while the capture is drawn, by a child entity that is despawned with this component or the capture.
+/// it rises above the ground, and in fog. It needs no light, and costs as much as one small quad. It is drawn over opaque and alpha-masked
+/// meshes and behind captures, by every camera whose layers are those of the capture, while that is visible.
 ///
 /// # Examples
 ///

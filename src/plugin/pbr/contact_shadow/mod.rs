@@ -1,13 +1,24 @@
 //! Contact shadows: a soft dark ellipse on the ground beneath a capture, for a fraction of the cost of a cast shadow.
 //!
-//! In: captures with a [`CaptureContactShadow`] and their bounds at the current time. Out: a child entity of each with a flat mesh, which
-//! Bevy draws after opaque meshes and before captures.
+//! In: captures with a [`CaptureContactShadow`] and their bounds at the current time. Out: one render pass for each camera that sees one:
+//!
+//! ```text
+//! component    looks, and the ellipse for a capture's bounds         main world
+//! extract      the ellipses of this frame                            main world -> render world
+//! pipeline     one for each kind of target                           compiled in the background
+//! prepare      the ellipses that each camera sees, as it sees them   once per camera and frame
+//! draw         the pass `contact_shadow`                             Core3d, after opaque meshes and before captures
+//! ```
+//!
+//! Without contact shadows nothing of this runs. They are no meshes: Bevy would look after a material of their own in every frame of every
+//! app, and would draw blended ones over captures.
 
 mod component;
-mod gradient;
-mod material;
-mod place;
+mod draw;
+mod extract;
+mod pipeline;
 mod plugin;
+mod prepare;
 
 pub use component::CaptureContactShadow;
 pub(super) use plugin::ContactShadowPlugin;
