@@ -47,7 +47,10 @@ pub(super) fn build(app: &mut App) {
         )
         .add_systems(
             Render,
-            find_other_passes.in_set(RenderSystems::PhaseSort).after(sort_phase_system::<Transmissive3d>),
+            find_other_passes
+                .run_if(any_other_pass)
+                .in_set(RenderSystems::PhaseSort)
+                .after(sort_phase_system::<Transmissive3d>),
         );
 }
 
@@ -92,6 +95,16 @@ fn update_centers(
     }
 }
 
+/// Returns whether any camera draws transmissive meshes or wireframes, or did in the last frame.
+fn any_other_pass(
+    transmissive: Option<Res<ViewSortedRenderPhases<Transmissive3d>>>,
+    wireframes: Option<Res<ViewBinnedRenderPhases<Wireframe3d>>>,
+    others: Res<OtherPasses>,
+) -> bool {
+    let refracts = transmissive.is_some_and(|phases| phases.values().any(|phase| !phase.items.is_empty()));
+    refracts || wireframes.is_some_and(|phases| phases.values().any(|phase| !phase.is_empty())) || !others.0.is_empty()
+}
+
 /// Finds the transmissive meshes and wireframes that each camera draws.
 fn find_other_passes(
     transmissive: Option<Res<ViewSortedRenderPhases<Transmissive3d>>>,
@@ -110,7 +123,9 @@ fn find_other_passes(
             refracting: refracting.filter(|_| !has_sky),
             resolves_again: lines.is_some_and(|phase| !phase.is_empty()),
         };
-        others.0.insert(camera, other);
+        if other != OtherPass::default() {
+            others.0.insert(camera, other);
+        }
     }
 }
 

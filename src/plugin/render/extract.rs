@@ -100,6 +100,14 @@ pub(crate) fn extract_captures(
     }
 }
 
+/// Returns whether any camera of the main world has settings, or had in the last frame.
+pub(super) fn any_view_settings(
+    cameras: Extract<Query<(), With<CaptureViewSettings>>>,
+    extracted: Res<ExtractedViewSettings>,
+) -> bool {
+    !(cameras.is_empty() && extracted.0.is_empty())
+}
+
 pub(super) fn extract_view_settings(
     mut extracted: ResMut<ExtractedViewSettings>,
     cameras: Extract<Query<(Entity, &CaptureViewSettings), With<Camera>>>,

@@ -21,13 +21,13 @@ use bevy::render::renderer::ViewQuery;
 use bevy::render::sync_world::MainEntity;
 use bevy::render::view::{ExtractedView, RenderVisibleEntities, RetainedViewEntity};
 
-/// What cameras draw besides opaque and transparent things, as far as captures depend on it: written anew in every frame, before
-/// captures are placed.
+/// What cameras draw besides opaque and transparent things, as far as captures depend on it; cameras without any of it are missing.
+/// Written anew in every frame, before captures are placed.
 #[derive(Resource, Default)]
 pub(crate) struct OtherPasses(pub(crate) HashMap<RetainedViewEntity, OtherPass>);
 
 /// What one camera draws besides opaque and transparent things.
-#[derive(Debug, Default, Clone, Copy)]
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub(crate) struct OtherPass {
     /// Where the nearest mesh stands that shows, refracted, what has been drawn before it: in Bevy's measure, which grows towards the
     /// camera.
@@ -36,12 +36,21 @@ pub(crate) struct OtherPass {
     pub(crate) resolves_again: bool,
 }
 
-/// The order of every camera that sees captures, by its entity in the render world.
+/// The order of every camera that sees captures among other things to be ordered, by its entity in the render world.
 #[derive(Resource, Default)]
 pub(super) struct CaptureOrders {
     cameras: HashMap<Entity, CaptureOrder>,
     /// What is in front of captures, while it is not in the phase of the camera that is being drawn.
     hidden: Vec<((Entity, MainEntity), Transparent3d)>,
+}
+
+/// Returns whether there is anything for captures to be ordered with, or was in the last frame.
+pub(super) fn any_ordered(
+    phases: Res<ViewSortedRenderPhases<Transparent3d>>,
+    others: Res<OtherPasses>,
+    orders: Res<CaptureOrders>,
+) -> bool {
+    !(others.0.is_empty() && orders.cameras.is_empty() && phases.values().all(|phase| phase.items.is_empty()))
 }
 
 /// Returns whether any camera draws captures before transmissive meshes.
@@ -55,7 +64,7 @@ pub(super) fn any_front(orders: Res<CaptureOrders>) -> bool {
 }
 
 /// When the captures of one camera are drawn.
-#[derive(Debug, Default, Clone, Copy)]
+#[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub(super) struct CaptureOrder {
     /// Whether they are drawn before transmissive meshes, and so before everything transparent.
     pub(super) early: bool,
@@ -106,7 +115,10 @@ pub(super) fn place_captures(
         } else {
             mark_front(phase, camera, if writes_depth { f32::NEG_INFINITY } else { distance })
         };
-        orders.cameras.insert(camera, CaptureOrder { early, front, resolves_again: other.resolves_again });
+        let order = CaptureOrder { early, front, resolves_again: other.resolves_again };
+        if order != CaptureOrder::default() || !phase.items.is_empty() {
+            orders.cameras.insert(camera, order);
+        }
     }
 }
 

@@ -8,8 +8,12 @@ use super::composite::{CaptureShaders, CompositePipeline};
 use super::depth_readers::{DepthReaders, extract_depth_readers};
 use super::detail::{CaptureDetail, CaptureLevels, choose_levels, extract_detail};
 use super::draw::{CaptureSystems, draw_captures, draw_front, record_captures};
-use super::extract::{ExtractedCaptures, ExtractedViewSettings, extract_captures, extract_view_settings, has_changed};
-use super::order::{CaptureOrders, OtherPasses, any_early, any_front, hide_front, place_captures, show_front};
+use super::extract::{
+    ExtractedCaptures, ExtractedViewSettings, any_view_settings, extract_captures, extract_view_settings, has_changed,
+};
+use super::order::{
+    CaptureOrders, OtherPasses, any_early, any_front, any_ordered, hide_front, place_captures, show_front,
+};
 use super::prepare::{make_depth_readable, prepare_views};
 use super::previous::PreviousCaptures;
 use super::renderer::init_renderer;
@@ -100,7 +104,7 @@ fn build_rendering(app: &mut App) {
             ExtractSchedule,
             (
                 extract_captures,
-                extract_view_settings,
+                extract_view_settings.run_if(any_view_settings),
                 extract_depth_readers,
                 extract_upload_budget.run_if(has_changed::<CaptureUploadBudget>),
                 extract_detail.run_if(has_changed::<CaptureDetail>),
@@ -115,7 +119,10 @@ fn build_rendering(app: &mut App) {
                     .after(prepare_assets::<GpuGaussianCapture>),
                 make_depth_readable.in_set(RenderSystems::PrepareViews),
                 // Batches of meshes end where captures are drawn.
-                place_captures.in_set(RenderSystems::Prepare).before(RenderSystems::PrepareResources),
+                place_captures
+                    .run_if(any_ordered)
+                    .in_set(RenderSystems::Prepare)
+                    .before(RenderSystems::PrepareResources),
                 (choose_levels, prepare_active_lists).chain().in_set(RenderSystems::PrepareResources),
                 prepare_views.in_set(RenderSystems::PrepareBindGroups),
             ),

@@ -10,7 +10,7 @@ use bevy::asset::Assets;
 use bevy::camera::Camera3d;
 use bevy::camera::primitives::Aabb;
 use bevy::ecs::entity::Entity;
-use bevy::ecs::query::With;
+use bevy::ecs::query::{Or, With};
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Query, Res, ResMut};
 use bevy::pbr::{DistanceFog, MeshPipelineViewLayouts};
@@ -19,7 +19,7 @@ use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
 use bevy::transform::components::GlobalTransform;
 use glam::{Affine3A, Vec3, Vec3A};
 
-/// The captures of this frame. The memory is kept from frame to frame.
+/// The captures of this frame, if any is shaded. The memory is kept from frame to frame.
 #[derive(Resource, Default)]
 pub(super) struct ExtractedShading(pub(super) MainEntityHashMap<PlacedShading>);
 
@@ -48,6 +48,15 @@ type Placed = (
     Option<&'static ReceivesShadows>,
     Option<&'static CaptureLight>,
 );
+
+/// Returns whether anything of the main world asks for shading, or did in the last frame.
+pub(super) fn any_shading(
+    captures: Extract<Query<(), Or<(With<ReceivesShadows>, With<CaptureLight>)>>>,
+    foggy: Extract<Query<(), (With<DistanceFog>, With<Camera3d>)>>,
+    requests: Res<ShadeRequests>,
+) -> bool {
+    !(captures.is_empty() && foggy.is_empty() && requests.cameras.is_empty() && requests.captures.is_empty())
+}
 
 pub(super) fn extract_shading(
     lit: Option<Res<MeshPipelineViewLayouts>>,

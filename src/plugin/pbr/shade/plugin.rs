@@ -4,7 +4,7 @@
 //! `PbrPlugin` nothing changes.
 
 use super::draw::{ShadeViews, any_request, any_shade_view, prepare_shade, shade_captures};
-use super::extract::{ExtractedShading, extract_shading};
+use super::extract::{ExtractedShading, any_shading, extract_shading};
 use super::pipeline::{ShadePipeline, ShadeShader, init_shade_pipeline};
 use crate::plugin::render::CaptureSystems;
 use bevy::app::{App, Plugin};
@@ -36,7 +36,7 @@ impl Plugin for ShadePlugin {
             .init_gpu_resource::<SpecializedRenderPipelines<ShadePipeline>>()
             .init_gpu_resource::<ShadeViews>()
             .add_systems(RenderStartup, init_shade_pipeline.after(MeshPipelineSystems))
-            .add_systems(ExtractSchedule, extract_shading)
+            .add_systems(ExtractSchedule, extract_shading.run_if(any_shading))
             .add_systems(Render, prepare_shade.run_if(any_request).in_set(RenderSystems::Prepare))
             .add_systems(Core3d, shade_captures.run_if(any_shade_view).in_set(CaptureSystems::Shade));
     }
