@@ -19,7 +19,7 @@
 //!
 //! # The order of a frame
 //!
-//! 1. opaque and alpha-masked meshes, skybox
+//! 1. opaque and alpha-masked meshes, skybox; contact shadows
 //! 2. transmissive meshes; the atmosphere
 //! 3. gizmos, and transparent things behind captures, cut by the depth of 1 and 2
 //! 4. **captures**, cut by all depth so far
