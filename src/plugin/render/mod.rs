@@ -114,4 +114,4 @@ pub use upload::{CaptureUploadBudget, GpuGaussianCapture};
 #[cfg(feature = "pbr")]
 pub(crate) use view::CameraLens;
 #[cfg(feature = "pbr")]
-pub(crate) use write_depth::{WriteDepthBindings, WriteDepthKey, WriteDepthPipeline};
+pub(crate) use write_depth::{WriteDepthBindings, WriteDepthKey, WriteDepthPipeline, nearest};

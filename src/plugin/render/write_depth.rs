@@ -130,7 +130,7 @@ impl WriteDepthBindings {
 }
 
 /// Returns how captures are written to a depth buffer: where nothing nearer has been.
-pub(super) fn nearest() -> DepthStencilState {
+pub(crate) fn nearest() -> DepthStencilState {
     DepthStencilState {
         format: CORE_3D_DEPTH_FORMAT,
         depth_write_enabled: Some(true),

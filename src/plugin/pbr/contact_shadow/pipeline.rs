@@ -3,15 +3,15 @@
 //! In: the kind of a camera's target. Out: a pipeline for `shaders/pbr/contact_shadow.wgsl`, which binds nothing: all that it reads is in
 //! one vertex buffer of [`GpuEllipse`]s.
 
+use crate::plugin::render::nearest;
 use bevy::asset::Handle;
-use bevy::core_pipeline::core_3d::CORE_3D_DEPTH_FORMAT;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::world::{FromWorld, World};
 use bevy::mesh::VertexBufferLayout;
 use bevy::render::render_resource::{
-    BlendState, ColorTargetState, ColorWrites, CompareFunction, DepthBiasState, DepthStencilState, Face, FragmentState,
-    FrontFace, MultisampleState, PrimitiveState, PrimitiveTopology, RenderPipelineDescriptor,
-    SpecializedRenderPipeline, StencilState, TextureFormat, VertexFormat, VertexState, VertexStepMode,
+    BlendState, ColorTargetState, ColorWrites, DepthStencilState, Face, FragmentState, FrontFace, MultisampleState,
+    PrimitiveState, PrimitiveTopology, RenderPipelineDescriptor, SpecializedRenderPipeline, TextureFormat,
+    VertexFormat, VertexState, VertexStepMode,
 };
 use bevy::shader::Shader;
 use bytemuck::{Pod, Zeroable};
@@ -79,14 +79,7 @@ impl SpecializedRenderPipeline for ContactShadowPipeline {
                 cull_mode: Some(Face::Back),
                 ..PrimitiveState::default()
             },
-            depth_stencil: Some(DepthStencilState {
-                format: CORE_3D_DEPTH_FORMAT,
-                depth_write_enabled: Some(false),
-                // Reverse-z: nearer is greater.
-                depth_compare: Some(CompareFunction::GreaterEqual),
-                stencil: StencilState::default(),
-                bias: DepthBiasState::default(),
-            }),
+            depth_stencil: Some(DepthStencilState { depth_write_enabled: Some(false), ..nearest() }),
             multisample: MultisampleState { count: key.samples, ..MultisampleState::default() },
             fragment: Some(FragmentState {
                 shader: self.0.clone(),
