@@ -55,6 +55,9 @@ var<workgroup> group_pairs: array<vec4<u32>, THREADS / LANES>;
 var<workgroup> listed: atomic<u32>;
 var<workgroup> least: atomic<u32>;
 var<workgroup> greatest: atomic<u32>;
+// The same of all entries of a bin that is sorted in rounds.
+var<workgroup> least_of_all: atomic<u32>;
+var<workgroup> greatest_of_all: atomic<u32>;
 var<workgroup> own_count: u32;
 // Number of pairs of each tile with the list and with the bin; the first pair of the bin and the next of each tile.
 var<workgroup> totals: array<vec4<u32>, 4>;
@@ -62,8 +65,25 @@ var<workgroup> counted: array<u32, 16>;
 var<workgroup> first_pair: u32;
 var<workgroup> next_pairs: array<u32, 16>;
 
-// Lists entries `first` to `first + count` of the bin if `whole`, else those after `lower` and not after `upper`. Returns how
-// many there are; those that do not fit a round are not listed.
+// Entries of a bin that a thread takes at once.
+struct FourEntries {
+    keys: vec4<u32>,
+    words: vec4<u32>,
+}
+
+// Returns entries `i`, `i + THREADS`, .. of a bin of `count`, whose last stands for those after it. Loaded at once, so that a thread waits
+// for memory once.
+fn four_entries(first: u32, i: u32, count: u32) -> FourEntries {
+    let at = first + min(vec4(i) + THREADS * vec4(0u, 1u, 2u, 3u), vec4(count - 1u));
+    let a = bin_entries[at.x];
+    let b = bin_entries[at.y];
+    let c = bin_entries[at.z];
+    let d = bin_entries[at.w];
+    return FourEntries(vec4(a.x, b.x, c.x, d.x), vec4(a.y, b.y, c.y, d.y));
+}
+
+// Lists entries `first` to `first + count` of the bin if `whole`, else those after `lower` and not after `upper`, which fit a round. Returns
+// how many there are.
 fn collect(first: u32, count: u32, whole: bool, lower: vec2<u32>, upper: vec2<u32>, thread: u32) -> u32 {
     workgroupBarrier();
     if thread == 0u {
@@ -74,23 +94,23 @@ fn collect(first: u32, count: u32, whole: bool, lower: vec2<u32>, upper: vec2<u3
     workgroupBarrier();
     var low = 0xffffffffu;
     var high = 0u;
-    for (var i = thread; i < count; i += THREADS) {
-        let entry = bin_entries[first + i];
-        let place = vec2(entry.x, entry.y & SLOT_MASK);
-        var at = i;
-        if !whole {
-            if !is_after(place, lower) || is_after(place, upper) {
-                continue;
+    for (var begin = thread; begin < count; begin += 4u * THREADS) {
+        let four = four_entries(first, begin, count);
+        for (var k = 0u; k < 4u && begin + k * THREADS < count; k++) {
+            let key = four.keys[k];
+            if whole {
+                list[begin + k * THREADS] = key;
+            } else {
+                let place = vec2(key, four.words[k] & SLOT_MASK);
+                if !is_after(place, lower) || is_after(place, upper) {
+                    continue;
+                }
+                let at = atomicAdd(&listed, 1u);
+                list[at] = key;
+                list[ROUND + at] = four.words[k];
             }
-            at = atomicAdd(&listed, 1u);
-        }
-        low = min(low, entry.x);
-        high = max(high, entry.x);
-        if whole {
-            list[at] = entry.x;
-        } else if at < ROUND {
-            list[at] = entry.x;
-            list[ROUND + at] = entry.y;
+            low = min(low, key);
+            high = max(high, key);
         }
     }
 #ifdef SUBGROUPS_OF_32
@@ -109,12 +129,15 @@ fn collect(first: u32, count: u32, whole: bool, lower: vec2<u32>, upper: vec2<u3
 
 // The last place up to which the entries of a bin after `lower` fit a round.
 fn last_fitting(first: u32, count: u32, lower: vec2<u32>, thread: u32) -> vec2<u32> {
-    var search = begin_search(lower, workgroupUniformLoad(&least), workgroupUniformLoad(&greatest));
+    let least_key = max(lower.x, workgroupUniformLoad(&least_of_all));
+    var search = begin_search(lower, least_key, workgroupUniformLoad(&greatest_of_all));
     while !search.found {
         clear_intervals(thread);
-        for (var i = thread; i < count; i += THREADS) {
-            let entry = bin_entries[first + i];
-            count_candidate(search, vec2(entry.x, entry.y & SLOT_MASK));
+        for (var begin = thread; begin < count; begin += 4u * THREADS) {
+            let four = four_entries(first, begin, count);
+            for (var k = 0u; k < 4u && begin + k * THREADS < count; k++) {
+                count_candidate(search, vec2(four.keys[k], four.words[k] & SLOT_MASK));
+            }
         }
         search = next_search(search, ROUND, thread);
     }
@@ -227,8 +250,11 @@ fn sort_list(first: u32, count: u32, whole: bool, thread: u32) {
     }
     workgroupBarrier();
     if whole {
-        for (var i = thread; i < count; i += THREADS) {
-            list[atomicLoad(&places[i]) & 0xffffu] = bin_entries[first + i].y;
+        for (var begin = thread; begin < count; begin += 4u * THREADS) {
+            let four = four_entries(first, begin, count);
+            for (var k = 0u; k < 4u && begin + k * THREADS < count; k++) {
+                list[atomicLoad(&places[begin + k * THREADS]) & 0xffffu] = four.words[k];
+            }
         }
     } else {
         for (var i = thread; i < count; i += THREADS) {
@@ -406,20 +432,35 @@ fn count_all(thread: u32, start: bool) {
     workgroupBarrier();
 }
 
-// Reserves room for the pairs of all entries of a bin.
+// Reserves room for the pairs of all entries of a bin, and finds the least and the greatest of their keys.
 fn reserve_all(first: u32, count: u32, corner: vec2<u32>, thread: u32) {
+    if thread == 0u {
+        atomicStore(&least_of_all, 0xffffffffu);
+        atomicStore(&greatest_of_all, 0u);
+    }
+    workgroupBarrier();
+    var least_key = 0xffffffffu;
+    var greatest_key = 0u;
     // As many at once as the halves of words have room for.
     for (var begin = 0u; begin < count; begin += 32768u) {
+        let end = min(count, begin + 32768u);
         var low = vec4(0u);
         var high = vec4(0u);
-        for (var i = begin + thread; i < min(count, begin + 32768u); i += THREADS) {
-            let covered = tiles_covered(bin_entries[first + i].y);
-            low += halves(covered);
-            high += halves(covered >> 8u);
+        for (var i = begin + thread; i < end; i += 4u * THREADS) {
+            let four = four_entries(first, i, end);
+            for (var k = 0u; k < 4u && i + k * THREADS < end; k++) {
+                least_key = min(least_key, four.keys[k]);
+                greatest_key = max(greatest_key, four.keys[k]);
+                let covered = tiles_covered(four.words[k]);
+                low += halves(covered);
+                high += halves(covered >> 8u);
+            }
         }
         pairs_before(low, high, thread);
         count_all(thread, begin == 0u);
     }
+    atomicMin(&least_of_all, least_key);
+    atomicMax(&greatest_of_all, greatest_key);
     reserve(corner, thread);
 }
 
@@ -472,7 +513,7 @@ fn sort_bins(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     var done = 0u;
     while done < binned {
         var upper = NONE;
-        if collect(first, binned, false, lower, NONE, thread) > ROUND {
+        if binned - done > ROUND {
             upper = last_fitting(first, binned, lower, thread);
         }
         let count = collect(first, binned, false, lower, upper, thread);

@@ -15,6 +15,8 @@
 #import gs4d::bins::is_after
 
 const INTERVALS: u32 = 256u;
+// Intervals are summed in groups of as many by a thread each.
+const GROUPED: u32 = 16u;
 
 struct Search {
     // The place before all candidates, and the range of keys that is divided; of slots if many splats have one key.
@@ -29,6 +31,7 @@ struct Search {
 }
 
 var<workgroup> intervals: array<atomic<u32>, INTERVALS>;
+var<workgroup> grouped: array<u32, INTERVALS / GROUPED>;
 // The first interval that does not fit, and the number of candidates before it.
 var<workgroup> fitting: vec2<u32>;
 
@@ -62,9 +65,24 @@ fn count_candidate(search: Search, candidate: vec2<u32>) {
 // Returns the search with the result, or with the range that the next step divides.
 fn next_search(search: Search, room: u32, thread: u32) -> Search {
     workgroupBarrier();
+    if thread < INTERVALS / GROUPED {
+        var sum = 0u;
+        for (var i = 0u; i < GROUPED; i++) {
+            sum += atomicLoad(&intervals[thread * GROUPED + i]);
+        }
+        grouped[thread] = sum;
+    }
+    workgroupBarrier();
     if thread == 0u {
         var sum = 0u;
         var count = 0u;
+        for (; count < INTERVALS; count += GROUPED) {
+            let next = sum + grouped[count / GROUPED];
+            if next > room {
+                break;
+            }
+            sum = next;
+        }
         for (; count < INTERVALS; count++) {
             let next = sum + atomicLoad(&intervals[count]);
             if next > room {
