@@ -2,9 +2,8 @@
 // In: the visible splats, which `project_bin` listed; color coefficients, an instance. Out: the colors of the splats. CPU reference:
 // src/reference/project.rs.
 //
-// Several threads compute the shares of one color: there are too few visible splats for all threads of a large GPU. Whole coefficients
-// are read by neighboring threads, which reads whole lines; those of a codebook by whole subgroups, so that codebooks that a scene does
-// not have cost nothing.
+// Neighboring threads compute the shares of one color: there are too few visible splats for all threads of a large GPU, and what they read
+// lies side by side.
 #import gs4d::types::{VisibleSplat, BIN_COUNTERS, DEBUG_ACTIVE}
 #import gs4d::capture::instance
 #ifdef COPIED_INSTANCE
@@ -21,14 +20,6 @@ const SPLATS: u32 = THREADS / SHARES;
 // By slot.
 @group(0) @binding(3) var<storage, read_write> splat_colors: array<vec4<f32>>;
 
-#ifdef CODED_COLORS
-const NEXT_SHARE: u32 = SPLATS;
-const NEXT_SPLAT: u32 = 1u;
-#else
-const NEXT_SHARE: u32 = 1u;
-const NEXT_SPLAT: u32 = SHARES;
-#endif
-
 var<workgroup> shares: array<vec3<f32>, THREADS>;
 
 @compute @workgroup_size(THREADS)
@@ -42,8 +33,8 @@ fn colors(
 #endif
     let count = bins[BIN_COUNTERS + instance.binning.z];
     for (var first = group.x * SPLATS; first < count; first += groups.x * SPLATS) {
-        let own = first + thread / NEXT_SPLAT % SPLATS;
-        let share = thread / NEXT_SHARE % SHARES;
+        let own = first + thread / SHARES;
+        let share = thread % SHARES;
         var slot = 0u;
         var seen: vec3<f32>;
         if own < count {
@@ -56,7 +47,7 @@ fn colors(
         if own < count && share == 0u {
             var sum = shares[thread];
             for (var i = 1u; i < SHARES; i++) {
-                sum += shares[thread + i * NEXT_SHARE];
+                sum += shares[thread + i];
             }
             // The colors of some debug views are those of `project_bin`.
             splat_colors[slot] = vec4(select(finished_color(sum), seen, instance.debug >= DEBUG_ACTIVE), 0.0);

@@ -14,7 +14,7 @@
 #ifdef CODED_COLORS
 // Three words for each Gaussian.
 @group(3) @binding(0) var<storage, read> color_records: array<u32>;
-// Entries of a multiple of six four-vectors: 48 values of half precision for each time harmonic.
+// Entries of a multiple of six four-vectors: 48 values of half precision for each time harmonic, in the order of `coded_share`.
 @group(3) @binding(1) var<storage, read> codebooks: array<vec4<u32>>;
 #else
 @group(3) @binding(0) var<storage, read> harmonics: array<vec4<f32>>;
@@ -38,6 +38,13 @@ fn seen_color(index: u32, g: Gaussian, dt: f32) -> vec3<f32> {
     return finished_color(sum);
 }
 
+// Returns the basis values of the four coefficients of a share.
+fn basis_of(share: u32, direction: vec3<f32>) -> vec4<f32> {
+    let low = select(basis_first(direction), basis_second(direction), share == 1u);
+    let high = select(basis_third(direction), basis_fourth(direction), share == 3u);
+    return select(low, high, share >= 2u);
+}
+
 // Returns the factors of the time harmonics.
 fn time_factors(tau: f32) -> vec3<f32> {
     var times = vec3(1.0, 0.0, 0.0);
@@ -51,40 +58,27 @@ fn time_factors(tau: f32) -> vec3<f32> {
 }
 
 #ifdef CODED_COLORS
-// Returns a share of a color: that of one codebook, the first with the first coefficient, which is not in the codebooks.
+// Returns a share of a color: that of four of the sixteen coefficients of each time harmonic, from all codebooks, the first with the first
+// coefficient, which is not in the codebooks.
 fn color_share(share: u32, index: u32, direction: vec3<f32>, tau: f32) -> vec3<f32> {
     var sum = vec3(0.0);
     if share == 0u {
         sum = unpack_base(color_records[3u * index], ranges[2]) * 0.28209479 + 0.5;
     }
-    if share >= instance.stages {
-        return sum;
-    }
-    let b0 = basis_first(direction);
-    let b1 = basis_second(direction);
-    let b2 = basis_third(direction);
-    let b3 = basis_fourth(direction);
+    let basis = basis_of(share, direction);
     let times = time_factors(tau);
-    let codes = color_records[3u * index + 1u + share / 2u];
-    let code = (codes >> (16u * (share & 1u))) & 0xffffu;
-    let entry = (instance.first_entries[share] + code) * (instance.stride / 4u);
-    sum += coded_block(entry, b0, b1, b2, b3);
-    if instance.degree_t >= 1u {
-        sum += times.y * coded_block(entry + 6u, b0, b1, b2, b3);
-    }
-    if instance.degree_t >= 2u {
-        sum += times.z * coded_block(entry + 12u, b0, b1, b2, b3);
+    for (var stage = 0u; stage < instance.stages; stage++) {
+        let codes = color_records[3u * index + 1u + stage / 2u];
+        let code = (codes >> (16u * (stage & 1u))) & 0xffffu;
+        let entry = (instance.first_entries[stage] + code) * (instance.stride / 4u);
+        sum += coded_share(entry, share, basis, times);
     }
     return sum;
 }
 #else
 // Returns a share of a color: that of four of the sixteen coefficients of each time harmonic.
 fn color_share(share: u32, index: u32, direction: vec3<f32>, tau: f32) -> vec3<f32> {
-    let b0 = basis_first(direction);
-    let b1 = basis_second(direction);
-    let b2 = basis_third(direction);
-    let b3 = basis_fourth(direction);
-    let basis = select(select(b0, b1, share == 1u), select(b2, b3, share == 3u), share >= 2u);
+    let basis = basis_of(share, direction);
     var sum = vec3(select(0.0, 0.5, share == 0u));
     if instance.degree == 3u {
         let times = time_factors(tau);
@@ -105,17 +99,27 @@ fn color_share(share: u32, index: u32, direction: vec3<f32>, tau: f32) -> vec3<f
 #endif
 
 #ifdef CODED_COLORS
-// Returns the sum of the sixteen coefficients of one time harmonic, six four-vectors from `at`, times their basis values.
-fn coded_block(at: u32, b0: vec4<f32>, b1: vec4<f32>, b2: vec4<f32>, b3: vec4<f32>) -> vec3<f32> {
-    // All at once, to hide their latency.
-    let u = codebooks[at];
-    let v = codebooks[at + 1u];
-    let w = codebooks[at + 2u];
-    let x = codebooks[at + 3u];
-    let y = codebooks[at + 4u];
-    let z = codebooks[at + 5u];
-    return coded(u.xyz, vec3(u.w, v.xy), b0) + coded(vec3(v.zw, w.x), w.yzw, b1)
-        + coded(x.xyz, vec3(x.w, y.xy), b2) + coded(vec3(y.zw, z.x), z.yzw, b3);
+// Returns the share of an entry of a codebook: the sum of four coefficients of each time harmonic times their factors. The values of the four
+// shares take turns of four words, then of two: threads of one splat read neighboring words.
+fn coded_share(entry: u32, share: u32, basis: vec4<f32>, times: vec3<f32>) -> vec3<f32> {
+    let a = codebooks[entry + share];
+    if instance.degree_t == 0u {
+        return coded(a.xyz, vec3(a.w, last_pair(entry + 4u, share)), basis);
+    }
+    let b = codebooks[entry + 4u + share];
+    let c = codebooks[entry + 8u + share];
+    let sum = coded(a.xyz, vec3(a.w, b.xy), basis) + times.y * coded(vec3(b.zw, c.x), c.yzw, basis);
+    if instance.degree_t == 1u {
+        return sum;
+    }
+    let d = codebooks[entry + 12u + share];
+    return sum + times.z * coded(d.xyz, vec3(d.w, last_pair(entry + 16u, share)), basis);
+}
+
+// Returns two words of a share, of which there are those of all shares from `at` on.
+fn last_pair(at: u32, share: u32) -> vec2<u32> {
+    let both = codebooks[at + share / 2u];
+    return select(both.xy, both.zw, (share & 1u) == 1u);
 }
 
 // Returns the sum of four coefficients (six words of two values, RGB innermost) times their basis values.

@@ -103,6 +103,24 @@ pub(super) fn entry_words(colors: &CodedColors) -> usize {
     colors.words_per_entry().next_multiple_of(12) * 2
 }
 
+/// Coefficients of a share of a color and words of it that lie side by side, as in `coded_share` of the shaders.
+const SHARE_COEFFICIENTS: usize = 4;
+const SHARES: usize = 4;
+const SIDE_BY_SIDE: usize = 4;
+
+/// Returns where a value of an entry of `words` words is on the GPU, in values: RGB innermost, the shares of a color take turns of four words,
+/// then of the two that are left, if any.
+fn place_in_entry(index: usize, words: usize) -> usize {
+    let (harmonic, value) = (index / 48, index % 48);
+    let values = SHARE_COEFFICIENTS * 3;
+    let (share, own) = (value / values, harmonic * values + value % values);
+    let (word, half) = (own / 2, own % 2);
+    let whole = words / SHARES / SIDE_BY_SIDE * SIDE_BY_SIDE;
+    let turn = if word < whole { SIDE_BY_SIDE } else { words / SHARES - whole };
+    let at = word / SIDE_BY_SIDE * SIDE_BY_SIDE * SHARES + share * turn + word % SIDE_BY_SIDE;
+    2 * at + half
+}
+
 /// Creates the buffer of all codebooks.
 pub(super) fn codebooks(allocator: Allocator<'_>, colors: &CodedColors) -> Filling {
     let count = colors.codebooks.len() / colors.words_per_entry();
@@ -218,8 +236,9 @@ impl Filling {
                 let entries = form.coded_colors()?.all_entries().skip(records.start);
                 for ((words, scales), record) in entries.zip(to.chunks_exact_mut(size)) {
                     let halves = words.iter().zip(scales).flat_map(|(&word, scale)| CodedColors::values(word, scale));
-                    for (half, bytes) in halves.zip(record.chunks_exact_mut(2)) {
-                        bytes.copy_from_slice(&half.to_ne_bytes());
+                    for (index, half) in halves.enumerate() {
+                        let at = 2 * place_in_entry(index, size / 4);
+                        record[at..at + 2].copy_from_slice(&half.to_ne_bytes());
                     }
                 }
             }
@@ -252,5 +271,28 @@ impl Filling {
 fn each(records: Range<usize>, size: usize, to: &mut [u8], fill: impl Fn(usize, &mut [u8])) {
     for (index, record) in records.zip(to.chunks_exact_mut(size)) {
         fill(index, record);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_value_of_an_entry_has_a_place_of_its_own() {
+        for words in [24, 48, 72] {
+            let mut places: Vec<usize> = (0..2 * words).map(|index| place_in_entry(index, words)).collect();
+            places.sort_unstable();
+            assert!(places.iter().copied().eq(0..2 * words), "{words} words");
+        }
+    }
+
+    #[test]
+    fn shares_lie_side_by_side() {
+        // Red of the first coefficient of each share, then green of the third one of the last harmonic.
+        let first: Vec<usize> = (0..4).map(|share| place_in_entry(12 * share, 72)).collect();
+        assert_eq!(first, [0, 8, 16, 24]);
+        let last: Vec<usize> = (0..4).map(|share| place_in_entry(96 + 12 * share + 11, 72)).collect();
+        assert_eq!(last, [131, 135, 139, 143], "the last of two words");
     }
 }
