@@ -44,16 +44,21 @@ const FRUSTUM_CLAMP: f32 = 1.3;
 #endif
 
 #ifdef BINNED
-// Bins that a workgroup counts by itself before it reserves places for all of its splats at once.
+// Bins that a workgroup counts by itself before it reserves places for all of its splats at once. Fewer counters leave room for more
+// workgroups.
+#ifdef FEW_BINS
+const OWN_BINS: u32 = 512u;
+#else
 const OWN_BINS: u32 = 2048u;
+#endif
 // Bins into which a thread puts its splat by itself.
 const OWN_ENTRIES: u32 = 16u;
 const WIDE: u32 = 64u;
 
-// Gaussians of the workgroup that are present, of the part; the host gives it at most four for each thread.
-var<workgroup> present: array<u32, 1024>;
+// Gaussians of the workgroup that are present, counted from its first, two in each word; the host gives it at most four for each thread.
+var<workgroup> present: array<atomic<u32>, 512>;
 var<workgroup> present_count: atomic<u32>;
-var<workgroup> own: array<atomic<u32>, 2048>;
+var<workgroup> own: array<atomic<u32>, OWN_BINS>;
 var<workgroup> own_visible: atomic<u32>;
 var<workgroup> own_pairs: atomic<u32>;
 // Splats of more bins than OWN_ENTRIES, which all threads put into bins together: as far as there is room for them, tiles, depth key
@@ -131,26 +136,30 @@ fn project_bin(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
             atomicStore(&bins[4], 0u);
         }
     }
+    for (var i = thread; i < 128u * instance.per_thread; i += 256u) {
+        atomicStore(&present[i], 0u);
+    }
     workgroupBarrier();
     // Without those that are absent, few threads of the projection are idle.
-    for (var k = 0u; k < instance.per_thread; k++) {
-        let i = (group.x * instance.per_thread + k) * 256u + thread;
-        if i < instance.count && is_present(index_of(i)) {
-            present[atomicAdd(&present_count, 1u)] = i;
+    let first_of_group = group.x * instance.per_thread * 256u;
+    for (var i = thread; i < instance.per_thread * 256u; i += 256u) {
+        if first_of_group + i < instance.count && is_present(index_of(first_of_group + i)) {
+            let place = atomicAdd(&present_count, 1u);
+            atomicOr(&present[place / 2u], i << (16u * (place & 1u)));
         }
     }
     let count = workgroupUniformLoad(&present_count);
     for (var first = 0u; first < count; first += 256u) {
         clear_own(thread);
         workgroupBarrier();
-        project_and_bin(first + thread, count, thread);
+        project_and_bin(first_of_group, first + thread, count, thread);
         workgroupBarrier();
     }
 }
 
 // Projects the Gaussian at a place of those that are present, of which there are `count`, and puts it into its bins. All threads of the
 // workgroup enter.
-fn project_and_bin(place: u32, count: u32, thread: u32) {
+fn project_and_bin(first_of_group: u32, place: u32, count: u32, thread: u32) {
     let grid = bin_grid();
     let across = grid.x;
     let bin_count = grid.x * grid.y;
@@ -161,8 +170,9 @@ fn project_and_bin(place: u32, count: u32, thread: u32) {
     var index = 0u;
     var place_of_visible = 0u;
     if place < count {
-        slot = instance.first_slot + present[place];
-        index = index_of(present[place]);
+        let i = first_of_group + ((atomicLoad(&present[place / 2u]) >> (16u * (place & 1u))) & 0xffffu);
+        slot = instance.first_slot + i;
+        index = index_of(i);
         if project_one(index, slot) == INVISIBLE {
             covered = vec4(0u);
         } else {

@@ -7,7 +7,7 @@ use super::bind::{Bind, group_layout, pipeline};
 use super::layout::INSTANCES_BOUND;
 use super::memory::Allocator;
 use super::shaders::{
-    BINNED, COPIED_INSTANCE, FastVariant, Lists, Pixels, SUBGROUPS_OF_32, ShaderChecks, Storage, module,
+    BINNED, COPIED_INSTANCE, FEW_BINS, FastVariant, Lists, Pixels, SUBGROUPS_OF_32, ShaderChecks, Storage, module,
 };
 use super::view::Design;
 use super::work::WorkCounters;
@@ -26,9 +26,9 @@ pub struct Renderer {
     project: [[OnceLock<wgpu::ComputePipeline>; 3]; 2],
     blend: [OnceLock<wgpu::ComputePipeline>; 4],
     reference: OnceLock<ReferencePasses>,
-    /// Passes of the fast renderer, each compiled when it is first used: `project_bin` and `colors`, indexed as `project`, `sort_bins`, in
-    /// the order of [`Lists::ALL`], and `blend_blocks`, by [`FastVariant::blend_index`].
-    project_bin: [[OnceLock<wgpu::ComputePipeline>; 3]; 2],
+    /// Passes of the fast renderer, each compiled when it is first used: `project_bin`, by whether there are few bins, and `colors`, indexed as
+    /// `project`, `sort_bins`, in the order of [`Lists::ALL`], and `blend_blocks`, by [`FastVariant::blend_index`].
+    project_bin: [[[OnceLock<wgpu::ComputePipeline>; 3]; 2]; 2],
     colors: [[OnceLock<wgpu::ComputePipeline>; 3]; 2],
     sort_bins: [OnceLock<wgpu::ComputePipeline>; 3],
     blend_blocks: [OnceLock<wgpu::ComputePipeline>; FastVariant::BLENDS],
@@ -275,17 +275,16 @@ impl Renderer {
     ) -> Result<(), GpuError> {
         let layouts = &self.layouts;
         for (storage, batched) in drawn {
-            if self.project_bin(storage, batched).is_none() {
-                let (definitions, copied) = self.reading(storage, batched);
-                let shader = module(device, "project", &[BINNED, &definitions[..]].concat(), self.checks)?;
-                let [geometry, color] = &layouts.captures[storage as usize];
-                let made = pipeline(
-                    device,
-                    &shader,
-                    "project_bin",
-                    &[&layouts.project_bin, geometry, &layouts.active].map(Some),
-                );
-                self.project_bin[copied][storage as usize].get_or_init(|| made);
+            let (definitions, copied) = self.reading(storage, batched);
+            let [geometry, color] = &layouts.captures[storage as usize];
+            if self.project_bin(storage, batched, variant).is_none() {
+                let few = if variant.few_bins { FEW_BINS } else { &[] };
+                let shader = module(device, "project", &[BINNED, few, &definitions[..]].concat(), self.checks)?;
+                let groups = [&layouts.project_bin, geometry, &layouts.active].map(Some);
+                let made = pipeline(device, &shader, "project_bin", &groups);
+                self.project_bin[usize::from(variant.few_bins)][copied][storage as usize].get_or_init(|| made);
+            }
+            if self.colors(storage, batched).is_none() {
                 let shader = module(device, "colors", &definitions, self.checks)?;
                 let groups = [Some(&layouts.colors), Some(geometry), None, Some(color)];
                 let made = pipeline(device, &shader, "colors", &groups);
@@ -339,8 +338,13 @@ impl Renderer {
     }
 
     /// Returns `project_bin` for captures stored in this way, several in a dispatch or one, if it has been compiled.
-    pub(super) fn project_bin(&self, storage: Storage, batched: bool) -> Option<&wgpu::ComputePipeline> {
-        self.project_bin[self.copied(batched)][storage as usize].get()
+    pub(super) fn project_bin(
+        &self,
+        storage: Storage,
+        batched: bool,
+        variant: FastVariant,
+    ) -> Option<&wgpu::ComputePipeline> {
+        self.project_bin[usize::from(variant.few_bins)][self.copied(batched)][storage as usize].get()
     }
 
     /// Returns `colors` for captures stored in this way, several in a dispatch or one, if it has been compiled.

@@ -280,9 +280,16 @@ impl Blending {
     }
 }
 
-/// Which variants of its last passes a frame of the fast design needs.
+/// Definitions of `project_bin` for at most [`FEW_BINS_LIMIT`] bins.
+pub const FEW_BINS: &[&str] = &["FEW_BINS"];
+
+/// The largest number of bins that [`FEW_BINS`] has counters for.
+pub(super) const FEW_BINS_LIMIT: u32 = 512;
+
+/// Which variants of its passes a frame of the fast design needs.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct FastVariant {
+    pub few_bins: bool,
     pub lists: Lists,
     pub blending: Blending,
     pub precision: ColorPrecision,

@@ -4,7 +4,7 @@
 
 use bevy_gs4d::renderer::shaders::{
     ATOMIC_SUMS, BINNED, Blending, COMPAT, COMPAT_WITHOUT_TIME, COPIED_INSTANCE, ColorPrecision, EIGHT_AT_ONCE,
-    LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32, Storage, compose, pass_names,
+    FEW_BINS, LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32, Storage, compose, pass_names,
 };
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
@@ -50,7 +50,10 @@ fn every_pass_composes_and_is_valid() {
         capabilities.set(Capabilities::SHADER_FLOAT32_ATOMIC, uses(ATOMIC_SUMS));
         validate(name, &compose(name, definitions).map_err(|error| error.to_string())?, capabilities)
     };
-    let binned = Storage::ALL.map(|storage| [BINNED, storage.definitions()].concat());
+    let binned = Storage::ALL
+        .into_iter()
+        .flat_map(|storage| [&[][..], FEW_BINS].map(|few| [BINNED, few, storage.definitions()].concat()));
+    let binned: Vec<_> = binned.collect();
     let blending = Blending::ALL.into_iter().flat_map(|blending| {
         let half = ColorPrecision::Half.definitions();
         [&[][..], LARGE_BATCHES, SUBGROUPS_OF_32, half].map(|device| [blending.definitions(), device].concat())

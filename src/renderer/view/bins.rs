@@ -8,6 +8,7 @@ use super::{Instance, ViewRenderer};
 use crate::renderer::layout::{BIN_COUNTERS, VisibleSplat};
 use crate::renderer::memory::Allocator;
 use crate::renderer::pipelines::Renderer;
+use crate::renderer::shaders::FEW_BINS_LIMIT;
 use crate::view::tiles;
 use glam::UVec2;
 use wgpu::BufferUsages;
@@ -52,6 +53,14 @@ pub(super) fn bin_side(picture: UVec2, gaussians: u32) -> u32 {
     let enough_large = large >= FEW_LARGE_BINS && each <= FEW_GAUSSIANS;
     let limit = if each > CROWD { SMALL_BINS_OF_CROWD } else { SMALL_BINS };
     if enough_large || small > limit { 4 } else { 2 }
+}
+
+/// Gaussians from which on more workgroups of `project_bin` at once make it faster; with fewer it is no faster.
+const CROWDED: u32 = 1 << 20;
+
+/// Returns whether `project_bin` counts few bins, so that a GPU has room for more of its workgroups.
+pub(super) fn few_bins(picture: UVec2, side: u32, gaussians: u32) -> bool {
+    gaussians >= CROWDED && bin_grid(picture, side).element_product() <= FEW_BINS_LIMIT
 }
 
 /// Returns the number of bins across and down a picture.
@@ -198,6 +207,17 @@ mod tests {
             (1200, 10_000_000, 2),
         ] {
             assert_eq!(bin_side(UVec2::splat(size), gaussians), side, "{gaussians} Gaussians, {size} pixels");
+        }
+    }
+
+    #[test]
+    fn many_gaussians_in_few_bins_are_counted_by_small_workgroups() {
+        for (size, gaussians, few) in
+            [(400, 45_000, false), (1352, 3_000_000, true), (1352, 600_000, false), (4096, 3_000_000, false)]
+        {
+            let picture = UVec2::new(size, size * 3 / 4);
+            let side = bin_side(picture, gaussians);
+            assert_eq!(few_bins(picture, side, gaussians), few, "{gaussians} Gaussians, {size} pixels");
         }
     }
 

@@ -67,7 +67,7 @@ impl ViewRenderer {
         // project_bin
         let groups = |count: u32| count.div_ceil(256 * per_thread(count));
         self.project(
-            |storage, batched| renderer.project_bin(storage, batched),
+            |storage, batched| renderer.project_bin(storage, batched, self.variant),
             renderer,
             &fast.project_bin[odd],
             groups,

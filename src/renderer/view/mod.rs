@@ -160,6 +160,9 @@ impl ViewRenderer {
     ) -> Result<(), GpuError> {
         self.poll();
         let (precision, blending) = (parameters.precision, parameters.blending());
+        let picture = instances.first().map_or(self.picture, |instance| instance.view.size);
+        let total: usize = instances.iter().map(|instance| instance.capture.len()).sum();
+        let total = u32::try_from(total).unwrap_or(u32::MAX);
         self.pixels = Pixels { multisampled: blending.is_multisampled(), precision };
         self.has_depths = parameters.depths;
         let joined = instances.chunk_by(Instance::joins);
@@ -170,7 +173,8 @@ impl ViewRenderer {
         } else {
             let large_batches = bins::large_batches(&device.limits(), instances);
             let lists = Lists::suiting(&device.limits(), self.fullest_bin);
-            self.variant = FastVariant { lists, blending, precision, large_batches };
+            let few_bins = bins::few_bins(picture, bins::bin_side(picture, total), total);
+            self.variant = FastVariant { few_bins, lists, blending, precision, large_batches };
             renderer.compile_fast(device, drawn, self.variant)?;
             blending.writes_depths()
         };
@@ -179,13 +183,10 @@ impl ViewRenderer {
             self.frames = self.frames.wrapping_add(1);
         }
         let made = self.resources.as_ref().map(|resources| resources.sizes).unwrap_or_default();
-        let picture = instances.first().map_or(self.picture, |instance| instance.view.size);
         let limits = device.limits();
         if picture.min_element() == 0 || picture.max_element() > limits.max_texture_dimension_2d {
             return Err(GpuError::Size { width: picture.x, height: picture.y, limit: limits.max_texture_dimension_2d });
         }
-        let total: usize = instances.iter().map(|instance| instance.capture.len()).sum();
-        let total = u32::try_from(total).unwrap_or(u32::MAX);
         // As many as there will be at any time: another segment of a filter changes no buffer.
         let slots: usize = instances.iter().map(|instance| most_drawn(instance.capture, instance.active)).sum();
         let parts: usize = instances.iter().map(|instance| instance.capture.parts.len()).sum();
