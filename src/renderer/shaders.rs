@@ -284,7 +284,7 @@ impl Blending {
 pub const FEW_BINS: &[&str] = &["FEW_BINS"];
 
 /// The largest number of bins that [`FEW_BINS`] has counters for.
-pub(super) const FEW_BINS_LIMIT: u32 = 512;
+pub const FEW_BINS_LIMIT: u32 = 512;
 
 /// Which variants of its passes a frame of the fast design needs.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
