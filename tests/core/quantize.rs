@@ -103,6 +103,33 @@ fn roundings_are_what_compression_changes_of_each_gaussian() {
 }
 
 #[test]
+fn temporal_means_far_from_the_interval_cost_no_other_gaussian_its_place() {
+    let mut scene = RuntimeScene { filter: None, ..scene(4_000, 0, 0) };
+    let Form::Sliced(sliced) = &mut scene.form else { panic!("sliced") };
+    for (index, gaussian) in sliced.gaussians.iter_mut().enumerate() {
+        match index % 10 {
+            // Is there for long, and moves: at the same places as before.
+            0 => {
+                let away = [-250.0, 90.0, 400.0][index / 10 % 3];
+                for (mean, velocity) in gaussian.mean.iter_mut().zip(gaussian.velocity) {
+                    *mean += velocity * (away - gaussian.mean_t);
+                }
+                (gaussian.mean_t, gaussian.sigma_t) = (away, 300.0);
+            }
+            // Is never there.
+            1 => (gaussian.mean_t, gaussian.sigma_t) = (1e30, 0.1),
+            _ => {}
+        }
+    }
+    let (packed, _) = compress(scene.clone(), &settings(&[])).expect("it is compressed");
+    let packed = packed.into_runtime().expect("it can be drawn");
+    for time in [0.1, 0.5, 0.9] {
+        let found = psnr(&scene, &packed, &view(time));
+        assert!(found >= 47.0, "as geometry of balanced quality is otherwise: {found:.1} dB at {time}");
+    }
+}
+
+#[test]
 fn pictures_survive() {
     let scene = scene(20_000, 1, 0);
     let lowest = |settings: &CompressSettings| {

@@ -4,10 +4,12 @@
 //! form, its Gaussians in Morton order and without levels of detail, and a [`CompressReport`].
 //!
 //! 1. [`CompressSettings`] specify how much may be lost.
-//! 2. [`order`] sorts the Gaussians, so that neighbors share a box.
-//! 3. [`codebook`] trains the codebooks of color.
-//! 4. [`scene::packed`](crate::scene::packed) encodes the result as records.
+//! 2. `anchor` moves temporal means close to the time interval.
+//! 3. [`order`] sorts the Gaussians, so that neighbors share a box.
+//! 4. [`codebook`] trains the codebooks of color.
+//! 5. [`scene::packed`](crate::scene::packed) encodes the result as records.
 
+mod anchor;
 pub mod codebook;
 pub mod order;
 mod settings;
@@ -103,6 +105,7 @@ pub fn compress_with(
     settings: &CompressSettings,
     done: impl FnMut(),
 ) -> Result<(GaussianScene, CompressReport), CompressError> {
+    let scene = anchored(scene, settings);
     compress_by(scene, settings, |colors, weights, entries| Centers::train(colors, weights, entries, done))
 }
 
@@ -118,6 +121,7 @@ pub fn compress_tied(
     settings: &CompressSettings,
     books: &Centers,
 ) -> Result<(GaussianScene, CompressReport), CompressError> {
+    let scene = anchored(scene, settings);
     let Form::Sliced(sliced) = &scene.form else { return Err(CompressError::AlreadyPacked) };
     let order = morton_order(&sliced.gaussians);
     let codes = books.codes.iter().map(|codes| order.iter().map(|&index| codes[index as usize]).collect());
@@ -137,7 +141,15 @@ pub fn train_codebooks(scene: &RuntimeScene, settings: &CompressSettings) -> Res
     Ok(Centers::train(rest_of(&sliced.harmonics, &order), &weights, &settings.codebooks, || {}))
 }
 
-/// As [`compress`]; `train` returns the codebooks for rows of coefficients, their weights and the numbers of entries.
+/// Returns a scene whose temporal means are close to the time interval, if its geometry is quantized.
+fn anchored(mut scene: RuntimeScene, settings: &CompressSettings) -> RuntimeScene {
+    if let (Form::Sliced(sliced), Some(_)) = (&mut scene.form, &settings.geometry) {
+        anchor::move_near(&mut sliced.gaussians, scene.trained_with.time_interval);
+    }
+    scene
+}
+
+/// As [`compress`], for a scene that is [`anchored`]; `train` returns the codebooks for rows of coefficients, their weights and the numbers of entries.
 fn compress_by(
     scene: RuntimeScene,
     settings: &CompressSettings,

@@ -23,7 +23,7 @@ const FLATTEST: f32 = 1.0 / 16_384.0;
 pub struct Bits {
     /// Mean, per axis, within the box of its block; 1 to 16.
     pub mean: u32,
-    /// Temporal mean; 1 to 16.
+    /// Temporal mean, within two lengths of the time interval; 1 to 16. A larger range has more, up to 16.
     pub mean_t: u32,
     /// Displacement within one σ_t or the time interval, whichever is shorter, per axis; 2 to 16.
     pub velocity: u32,
@@ -53,7 +53,7 @@ impl PackedScene {
         let time = Span::of(gaussians.iter().map(|g| f64::from(g.mean_t)));
         let sigma = Span::of(gaussians.iter().filter(finite).map(|g| f64::from(g.sigma_t).ln()));
         let scale = Span::of(shapes.iter().flat_map(|shape| shape.log_scale.to_array()));
-        let quantizers = Quantizers::new(bits);
+        let quantizers = Quantizers::new(&Bits { mean_t: bits.mean_t + additional_bits(time, reach), ..*bits });
         let shared = SharedRanges {
             mean_t: time.range(quantizers.mean_t),
             log_sigma_t: sigma.range(quantizers.sigma_t),
@@ -171,6 +171,12 @@ impl Span {
     fn range(self, quantizer: Quantizer) -> [f32; 2] {
         [self.low as f32, (self.size * quantizer.stretch()) as f32]
     }
+}
+
+/// Returns the bits that temporal means in this range need so that they are no coarser than over two lengths of the time interval.
+fn additional_bits(time: Span, reach: f32) -> u32 {
+    let times = time.size / (2.0 * f64::from(reach));
+    if times.is_finite() { times.log2().ceil().clamp(0.0, 16.0) as u32 } else { 0 }
 }
 
 /// Quantizers of all attributes.

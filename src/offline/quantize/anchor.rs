@@ -1,0 +1,122 @@
+//! Temporal means near the time interval, for the packed form, which has one range for all of them.
+//!
+//! In: Gaussians, the time interval, timestamp units. Out: the same Gaussians at the same places at all times. Those whose temporal mean was
+//! far from the interval are nearly as opaque as before; those that are never drawn stay so.
+//!
+//! Such a Gaussian is seen on a flank of its marginal, where one nearer with the same value and slope in the middle of the interval differs
+//! in curvature alone. The temporal mean moves by whole intervals, since the time harmonics repeat after each. Colors are seen from the mean,
+//! which moves along: they change where that is much of the way to the camera.
+
+use crate::gaussian::{Gaussian, MARGINAL_CUTOFF};
+use rayon::prelude::*;
+
+/// Temporal means up to so many lengths of the time interval from its middle stay as they are.
+const FAR: f64 = 4.0;
+/// Others are moved no closer than to so many.
+const NEAR: f64 = 0.5;
+/// How much a marginal may change by its curvature, as a share of itself, if it may be as near as that allows.
+const CHANGE: f64 = 0.002;
+
+/// Moves temporal means that are far from the interval close to it.
+pub(super) fn move_near(gaussians: &mut [Gaussian], interval: [f32; 2]) {
+    let [start, end] = interval.map(f64::from);
+    let (middle, span) = (0.5 * (start + end), end - start);
+    // A still has no length.
+    if span > 0.0 {
+        gaussians.par_iter_mut().for_each(|gaussian| move_one(gaussian, middle, span));
+    }
+}
+
+fn move_one(gaussian: &mut Gaussian, middle: f64, span: f64) {
+    let away = f64::from(gaussian.mean_t) - middle;
+    let distance = away.abs();
+    if distance <= FAR * span {
+        return;
+    }
+    let sigma_t = f64::from(gaussian.sigma_t);
+    // At the ends of the interval, the logarithm of the marginal differs by an eighth of its slope times span² / near. A mean that is near
+    // has a small error of its velocity to go back.
+    let slope = distance / (sigma_t * sigma_t);
+    let nearest = (slope * span * span / (8.0 * CHANGE)).clamp(NEAR * span, (FAR - 1.0) * span);
+    // Exact but for distances that no interval makes a difference to.
+    let near = (distance - ((distance - nearest) / span).floor() * span).clamp(nearest, nearest + span);
+    let largest_marginal = (-0.5 * ((distance - 0.5 * span) / sigma_t).powi(2)).exp();
+    gaussian.mean_t = (middle + near.copysign(away)) as f32;
+    if largest_marginal <= f64::from(MARGINAL_CUTOFF) {
+        gaussian.opacity = 0.0;
+        return;
+    }
+    gaussian.sigma_t = (sigma_t * (near / distance).sqrt()) as f32;
+    let moved = (near - distance) * away.signum();
+    for (mean, velocity) in gaussian.mean.iter_mut().zip(gaussian.velocity) {
+        *mean = (f64::from(*mean) + f64::from(velocity) * moved) as f32;
+    }
+    // The ratio of the two marginals in the middle.
+    gaussian.opacity *= (-0.5 * distance * (distance - near) / (sigma_t * sigma_t)).exp() as f32;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gaussian(mean_t: f32, sigma_t: f32) -> Gaussian {
+        Gaussian {
+            mean: [1.0, 2.0, 3.0],
+            mean_t,
+            velocity: [0.1, -0.2, 0.0],
+            sigma_t,
+            covariance: [0.01, 0.0, 0.0, 0.01, 0.0, 0.01],
+            opacity: 0.9,
+            padding: 0.0,
+        }
+    }
+
+    fn moved(mean_t: f32, sigma_t: f32, interval: [f32; 2]) -> Gaussian {
+        let mut one = [gaussian(mean_t, sigma_t)];
+        move_near(&mut one, interval);
+        one[0]
+    }
+
+    #[test]
+    fn what_is_near_stays_as_it_is() {
+        for (mean_t, interval) in [(-3.4, [0.0, 1.0]), (0.5, [0.0, 1.0]), (25.0, [0.0, 6.0]), (900.0, [5.0, 5.0])] {
+            assert_eq!(moved(mean_t, 2.0, interval), gaussian(mean_t, 2.0), "{mean_t}");
+        }
+    }
+
+    #[test]
+    fn places_stay_and_opacities_nearly() {
+        for (mean_t, sigma_t, error) in [(150.0, 179.0, 2e-3), (-40.0, 30.0, 2e-3), (5.0, 3.0, 5e-3), (5e4, 1e5, 1e-4)]
+        {
+            let (before, after) = (gaussian(mean_t, sigma_t), moved(mean_t, sigma_t, [0.0, 1.0]));
+            assert!((after.mean_t - 0.5).abs() <= 4.0, "{mean_t} is moved to {}", after.mean_t);
+            let intervals = before.mean_t - after.mean_t;
+            assert!((intervals - intervals.round()).abs() < 0.01, "time harmonics repeat: {intervals}");
+            for time in [0.0, 0.3, 0.5, 1.0] {
+                let distance = before.mean_at(time).distance(after.mean_at(time));
+                assert!(distance < 1e-6 * mean_t.abs().max(1.0), "{mean_t} at {time}: {distance}");
+                let alpha = |gaussian: &Gaussian| gaussian.opacity * gaussian.marginal(time);
+                let (before, after) = (alpha(&before), alpha(&after));
+                assert!((before - after).abs() <= error, "{mean_t} at {time}: {before} is {after}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_never_drawn_stays_so() {
+        for mean_t in [-3e38, -7.0, 1e6] {
+            let after = moved(mean_t, 1.0, [0.0, 1.0]);
+            assert_eq!(after.opacity, 0.0, "{mean_t}");
+            assert!(after.check().is_ok(), "{mean_t}: {after:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_always_there_stays_so() {
+        let before = Gaussian { velocity: [0.0; 3], ..gaussian(1e6, f32::INFINITY) };
+        let mut after = [before];
+        move_near(&mut after, [0.0, 1.0]);
+        assert_eq!(after[0], Gaussian { mean_t: after[0].mean_t, ..before });
+        assert!(after[0].mean_t <= 4.5);
+    }
+}
