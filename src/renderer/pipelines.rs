@@ -275,9 +275,9 @@ impl Renderer {
     ) -> Result<(), GpuError> {
         let layouts = &self.layouts;
         for (storage, batched) in drawn {
-            let (definitions, copied) = self.reading(storage, batched);
             let [geometry, color] = &layouts.captures[storage as usize];
             if self.project_bin(storage, batched, variant).is_none() {
+                let (definitions, copied) = self.reading(storage, batched);
                 let few = if variant.few_bins { FEW_BINS } else { &[] };
                 let shader = module(device, "project", &[BINNED, few, &definitions[..]].concat(), self.checks)?;
                 let groups = [&layouts.project_bin, geometry, &layouts.active].map(Some);
@@ -285,6 +285,7 @@ impl Renderer {
                 self.project_bin[usize::from(variant.few_bins)][copied][storage as usize].get_or_init(|| made);
             }
             if self.colors(storage, batched).is_none() {
+                let (definitions, copied) = self.reading(storage, batched);
                 let shader = module(device, "colors", &definitions, self.checks)?;
                 let groups = [Some(&layouts.colors), Some(geometry), None, Some(color)];
                 let made = pipeline(device, &shader, "colors", &groups);

@@ -149,7 +149,8 @@ fn anchored(mut scene: RuntimeScene, settings: &CompressSettings) -> RuntimeScen
     scene
 }
 
-/// As [`compress`], for a scene that is [`anchored`]; `train` returns the codebooks for rows of coefficients, their weights and the numbers of entries.
+/// As [`compress`], for a scene that is [`anchored`]; `train` returns the codebooks for rows of coefficients, their weights and the numbers
+/// of entries.
 fn compress_by(
     scene: RuntimeScene,
     settings: &CompressSettings,

@@ -289,7 +289,7 @@ mod tests {
 
     #[test]
     fn shares_lie_side_by_side() {
-        // Red of the first coefficient of each share, then green of the third one of the last harmonic.
+        // Red of the first coefficient of each share, then blue of the last one of the last harmonic.
         let first: Vec<usize> = (0..4).map(|share| place_in_entry(12 * share, 72)).collect();
         assert_eq!(first, [0, 8, 16, 24]);
         let last: Vec<usize> = (0..4).map(|share| place_in_entry(96 + 12 * share + 11, 72)).collect();
