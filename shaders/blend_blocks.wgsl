@@ -472,15 +472,22 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
     var first = range.x;
     let own = select(end, thread, thread < BATCH);
     var next: Splat;
+#ifdef LARGE_BATCHES
     if !searching {
         next = load_pair(first + own, end);
     }
+#endif
     var more = searching || first < end;
     while more {
         if searching {
             lower = search_batch(lower, thread);
             next = load_found(thread % BATCH);
         }
+#ifndef LARGE_BATCHES
+        if !searching {
+            next = load_pair(first + own, end);
+        }
+#endif
         if thread < BATCH {
             put_in_batch(next, thread);
         }
@@ -491,8 +498,10 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
         } else {
             first += BATCH;
             more = first < end;
-            // Loaded while this batch is blended.
+#ifdef LARGE_BATCHES
+            // Loaded while this batch is blended. With small batches, other workgroups have work while this one waits.
             next = load_pair(first + own, end);
+#endif
         }
         let queue = block * BATCH;
         if !done {

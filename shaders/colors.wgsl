@@ -11,7 +11,12 @@
 #endif
 #import gs4d::color::{color_share, finished_color, SHARES}
 
+#ifdef CODED_COLORS
+// Each has many values of codebooks on the way: a workgroup of fewer has room earlier.
+const THREADS: u32 = 128u;
+#else
 const THREADS: u32 = 256u;
+#endif
 // Splats of a workgroup.
 const SPLATS: u32 = THREADS / SHARES;
 

@@ -24,8 +24,10 @@ const LIST: u32 = 1280u;
 // Splats of one round.
 const ROUND: u32 = LIST / 2u;
 const LANES: u32 = 32u;
-// Steps and buckets of the sort, one for each thread.
-const BUCKETS: u32 = THREADS;
+// Steps of the sort, one for each thread.
+const STEPS: u32 = THREADS;
+// Buckets of the sort, two for each thread: more of them leave fewer splats to compare.
+const BUCKETS: u32 = 2u * THREADS;
 
 @group(0) @binding(0) var<uniform> frame: FrameUniforms;
 // The counters of this frame, and those of the next, which are cleared.
@@ -36,15 +38,15 @@ const BUCKETS: u32 = THREADS;
 @group(0) @binding(5) var<storage, read_write> pair_splats: array<u32>;
 
 // First the depth keys of the list, in no order, and in rounds the second words of its entries from ROUND on; then the second
-// words, in order.
-var<workgroup> list: array<u32, LIST>;
+// words, in order. The last key is greater than all.
+var<workgroup> list: array<u32, LIST + 1u>;
 // Low half: first the place of a splat in its bucket, then its place in the order. High half: the index of the splat at this
-// place of all buckets.
-var<workgroup> places: array<atomic<u32>, LIST>;
+// place of all buckets; after the last, that of the last key.
+var<workgroup> places: array<atomic<u32>, LIST + 1u>;
 // Number of splats of each step, then of those before it.
-var<workgroup> steps: array<atomic<u32>, BUCKETS + 1u>;
-// Number of splats of each bucket, then its first place.
-var<workgroup> buckets: array<atomic<u32>, BUCKETS + 1u>;
+var<workgroup> steps: array<atomic<u32>, STEPS + 1u>;
+// Number of splats of each bucket, then its first place: two in each word.
+var<workgroup> buckets: array<atomic<u32>, BUCKETS / 2u + 1u>;
 #ifndef SUBGROUPS_OF_32
 var<workgroup> sums: array<u32, THREADS>;
 #endif
@@ -193,6 +195,17 @@ fn bucket_of(key: u32, low: u32, scale: f32, share: f32) -> u32 {
     return min(u32((f32(first) + step.y * f32(count)) * share), BUCKETS - 1u);
 }
 
+// Counts a splat of a bucket. Returns how many there were.
+fn count_in(bucket: u32) -> u32 {
+    let half = 16u * (bucket & 1u);
+    return (atomicAdd(&buckets[bucket / 2u], 1u << half) >> half) & 0xffffu;
+}
+
+// Returns the first place of a bucket.
+fn first_of(bucket: u32) -> u32 {
+    return (atomicLoad(&buckets[bucket / 2u]) >> (16u * (bucket & 1u))) & 0xffffu;
+}
+
 // Returns the second word of the entry of a splat in the list, as `collect` listed it.
 fn word_of(i: u32, first: u32, whole: bool) -> u32 {
     if whole {
@@ -205,8 +218,12 @@ fn word_of(i: u32, first: u32, whole: bool) -> u32 {
 fn sort_list(first: u32, count: u32, whole: bool, thread: u32) {
     atomicStore(&steps[thread], 0u);
     atomicStore(&buckets[thread], 0u);
+    if thread == 0u {
+        list[LIST] = 0xffffffffu;
+        atomicStore(&places[count], LIST << 16u);
+    }
     let low = workgroupUniformLoad(&least);
-    let scale = f32(BUCKETS - 1u) / max(f32(workgroupUniformLoad(&greatest) - low), 1.0);
+    let scale = f32(STEPS - 1u) / max(f32(workgroupUniformLoad(&greatest) - low), 1.0);
     let share = f32(BUCKETS) / f32(count);
     for (var i = thread; i < count; i += THREADS) {
         atomicAdd(&steps[u32(step_of(list[i], low, scale).x)], 1u);
@@ -215,34 +232,46 @@ fn sort_list(first: u32, count: u32, whole: bool, thread: u32) {
     let before_step = sum_before(atomicLoad(&steps[thread]), thread);
     atomicStore(&steps[thread], before_step);
     if thread == 0u {
-        atomicStore(&steps[BUCKETS], count);
-        atomicStore(&buckets[BUCKETS], count);
+        atomicStore(&steps[STEPS], count);
+        atomicStore(&buckets[BUCKETS / 2u], count);
     }
     workgroupBarrier();
     for (var i = thread; i < count; i += THREADS) {
-        atomicStore(&places[i], atomicAdd(&buckets[bucket_of(list[i], low, scale, share)], 1u));
+        atomicStore(&places[i], count_in(bucket_of(list[i], low, scale, share)));
     }
     workgroupBarrier();
-    let before_bucket = sum_before(atomicLoad(&buckets[thread]), thread);
-    atomicStore(&buckets[thread], before_bucket);
+    let two = atomicLoad(&buckets[thread]);
+    let before_two = sum_before((two & 0xffffu) + (two >> 16u), thread);
+    atomicStore(&buckets[thread], before_two * 0x10001u + (two << 16u));
     workgroupBarrier();
     for (var i = thread; i < count; i += THREADS) {
         let bucket = bucket_of(list[i], low, scale, share);
-        let place = atomicLoad(&buckets[bucket]) + (atomicLoad(&places[i]) & 0xffffu);
+        let place = first_of(bucket) + (atomicLoad(&places[i]) & 0xffffu);
         atomicOr(&places[place], i << 16u);
     }
     workgroupBarrier();
     for (var i = thread; i < count; i += THREADS) {
         let own = list[i];
         let bucket = bucket_of(own, low, scale, share);
-        let begin = atomicLoad(&buckets[bucket]);
-        let end = atomicLoad(&buckets[bucket + 1u]);
-        var place = begin;
-        for (var k = begin; k < end; k++) {
-            let other = atomicLoad(&places[k]) >> 16u;
-            let key = list[other];
-            if key < own || (key == own && other != i && comes_before(other, i, first, whole)) {
-                place++;
+        let begin = first_of(bucket);
+        let end = first_of(bucket + 1u);
+        // Two at a time, so that a thread waits for half as many. One after the last has a greater key.
+        var less = vec2(0u);
+        var same = vec2(0u);
+        for (var k = begin; k < end; k += 2u) {
+            let others = vec2(atomicLoad(&places[k]), atomicLoad(&places[k + 1u])) >> vec2(16u);
+            let keys = vec2(list[others.x], list[others.y]);
+            less += select(vec2(0u), vec2(1u), keys < vec2(own));
+            same += select(vec2(0u), vec2(1u), keys == vec2(own));
+        }
+        var place = begin + less.x + less.y;
+        // One of them is the splat itself.
+        if same.x + same.y > 1u {
+            for (var k = begin; k < end; k++) {
+                let other = atomicLoad(&places[k]) >> 16u;
+                if list[other] == own && other != i && comes_before(other, i, first, whole) {
+                    place++;
+                }
             }
         }
         // Only this thread changes this half; the others read the high one.
@@ -287,10 +316,17 @@ fn tiles_covered(word: u32) -> u32 {
     return columns * (rows & select(0x5u, 0x1111u, side() == 4u));
 }
 
-// Returns the first eight bits, two in each word.
-fn halves(bits: u32) -> vec4<u32> {
-    let number = vec4(0u, 2u, 4u, 6u);
-    return ((vec4(bits) >> number) & vec4(1u)) | (((vec4(bits) >> (number + 1u)) & vec4(1u)) << vec4(16u));
+// Returns sixteen bits, four in each word, a byte each. A thread adds up fewer than 256 of them.
+fn in_bytes(bits: u32) -> vec4<u32> {
+    let fours = (vec4(bits) >> vec4(0u, 4u, 8u, 12u)) & vec4(15u);
+    // Copies of the four bits, seven bits apart: one of each copy is the first of a byte.
+    return (fours * 0x00204081u) & vec4(0x01010101u);
+}
+
+// Returns the first two bytes of each of two words and the last two, two in each word.
+fn halves(bytes: vec2<u32>) -> vec4<u32> {
+    let pairs = vec4(bytes.x, bytes.x >> 16u, bytes.y, bytes.y >> 16u);
+    return (pairs & vec4(0xffu)) | ((pairs & vec4(0xff00u)) << vec4(8u));
 }
 
 // Returns the four numbers of two words.
@@ -327,11 +363,12 @@ fn sums_before(eight: vec4<u32>, number: u32, thread: u32) -> vec4<u32> {
     return before;
 }
 
-// Counts the pairs of the entries of a thread with all tiles of the bin: returns those of earlier threads, tiles 0 to 7 and 8 to 15.
-fn pairs_before(low: vec4<u32>, high: vec4<u32>, thread: u32) -> array<vec4<u32>, 2> {
-    var before = array(sums_before(low, 0u, thread), vec4(0u));
+// Counts the pairs of the entries of a thread with all tiles of the bin, a byte each: returns those of earlier threads, tiles 0 to 7 and 8
+// to 15, two in each word.
+fn pairs_before(own: vec4<u32>, thread: u32) -> array<vec4<u32>, 2> {
+    var before = array(sums_before(halves(own.xy), 0u, thread), vec4(0u));
     if side() == 4u {
-        before[1] = sums_before(high, 8u, thread);
+        before[1] = sums_before(halves(own.zw), 8u, thread);
     }
     return before;
 }
@@ -339,24 +376,23 @@ fn pairs_before(low: vec4<u32>, high: vec4<u32>, thread: u32) -> array<vec4<u32>
 // Reserves room for `counted` pairs of each tile of the bin with the first tile `corner`, and writes their ranges.
 fn reserve(corner: vec2<u32>, thread: u32) {
     let tiles = side() * side();
+    var before = 0u;
+    var total = 0u;
+    // Always sixteen, so that all are loaded at once.
+    for (var number = 0u; number < 16u; number++) {
+        let more = select(0u, counted[number], number < tiles);
+        before += select(0u, more, number < thread);
+        total += more;
+    }
     if thread == 0u {
-        var total = 0u;
-        for (var number = 0u; number < tiles; number++) {
-            total += counted[number];
-        }
         let first = atomicAdd(&next_bins[4], total);
         first_pair = select(NONE.x, first, first + total <= frame.pair_capacity);
     }
     let reserved = workgroupUniformLoad(&first_pair);
     if thread < tiles {
-        var first = reserved;
-        if reserved != NONE.x {
-            for (var number = 0u; number < thread; number++) {
-                first += counted[number];
-            }
-        }
-        next_pairs[thread] = first;
-        write_range(corner, thread, select(vec2(first, first + counted[thread]), NONE, reserved == NONE.x));
+        let own = select(reserved + before, NONE.x, reserved == NONE.x);
+        next_pairs[thread] = own;
+        write_range(corner, thread, select(vec2(own, own + counted[thread]), NONE, reserved == NONE.x));
     }
     workgroupBarrier();
 }
@@ -389,14 +425,11 @@ fn write_pairs(count: u32, corner: vec2<u32>, reserved: bool, thread: u32) {
     let each = (count + THREADS - 1u) / THREADS;
     let first = min(thread * each, count);
     let end = min(first + each, count);
-    var low = vec4(0u);
-    var high = vec4(0u);
+    var own = vec4(0u);
     for (var i = first; i < end; i++) {
-        let covered = tiles_covered(list[i]);
-        low += halves(covered);
-        high += halves(covered >> 8u);
+        own += in_bytes(tiles_covered(list[i]));
     }
-    let before = pairs_before(low, high, thread);
+    let before = pairs_before(own, thread);
     if !reserved {
         count_all(thread, true);
         reserve(corner, thread);
@@ -444,19 +477,16 @@ fn reserve_all(first: u32, count: u32, corner: vec2<u32>, thread: u32) {
     // As many at once as the halves of words have room for.
     for (var begin = 0u; begin < count; begin += 32768u) {
         let end = min(count, begin + 32768u);
-        var low = vec4(0u);
-        var high = vec4(0u);
+        var own = vec4(0u);
         for (var i = begin + thread; i < end; i += 4u * THREADS) {
             let four = four_entries(first, i, end);
             for (var k = 0u; k < 4u && i + k * THREADS < end; k++) {
                 least_key = min(least_key, four.keys[k]);
                 greatest_key = max(greatest_key, four.keys[k]);
-                let covered = tiles_covered(four.words[k]);
-                low += halves(covered);
-                high += halves(covered >> 8u);
+                own += in_bytes(tiles_covered(four.words[k]));
             }
         }
-        pairs_before(low, high, thread);
+        pairs_before(own, thread);
         count_all(thread, begin == 0u);
     }
     atomicMin(&least_of_all, least_key);

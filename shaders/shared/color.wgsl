@@ -65,15 +65,24 @@ fn color_share(share: u32, index: u32, direction: vec3<f32>, tau: f32) -> vec3<f
     if share == 0u {
         sum = unpack_base(color_records[3u * index], ranges[2]) * 0.28209479 + 0.5;
     }
+    if instance.stages == 0u {
+        return sum;
+    }
     let basis = basis_of(share, direction);
     let times = time_factors(tau);
-    for (var stage = 0u; stage < instance.stages; stage++) {
-        let codes = color_records[3u * index + 1u + stage / 2u];
-        let code = (codes >> (16u * (stage & 1u))) & 0xffffu;
-        let entry = (instance.first_entries[stage] + code) * (instance.stride / 4u);
-        sum += coded_share(entry, share, basis, times);
-    }
-    return sum;
+    let words = vec2(color_records[3u * index + 1u], color_records[3u * index + 2u]);
+    let codes = vec4(words.x & 0xffffu, words.x >> 16u, words.y & 0xffffu, words.y >> 16u);
+    // The first entry stands for those of codebooks that are not there.
+    let used = vec4(0u, 1u, 2u, 3u) < vec4(instance.stages);
+    let entries = select(vec4(0u), (instance.first_entries + codes) * (instance.stride / 4u), used);
+    // All are loaded before any is decoded: a thread waits for memory once.
+    let a = load_entry(entries.x, share);
+    let b = load_entry(entries.y, share);
+    let c = load_entry(entries.z, share);
+    let d = load_entry(entries.w, share);
+    let factors = select(vec4(0.0), vec4(1.0), used);
+    sum += factors.x * coded_share(a, share, basis, times) + factors.y * coded_share(b, share, basis, times);
+    return sum + factors.z * coded_share(c, share, basis, times) + factors.w * coded_share(d, share, basis, times);
 }
 #else
 // Returns a share of a color: that of four of the sixteen coefficients of each time harmonic.
@@ -99,27 +108,38 @@ fn color_share(share: u32, index: u32, direction: vec3<f32>, tau: f32) -> vec3<f
 #endif
 
 #ifdef CODED_COLORS
-// Returns the share of an entry of a codebook: the sum of four coefficients of each time harmonic times their factors. The values of the four
-// shares take turns of four words, then of two: threads of one splat read neighboring words.
-fn coded_share(entry: u32, share: u32, basis: vec4<f32>, times: vec3<f32>) -> vec3<f32> {
-    let a = codebooks[entry + share];
-    if instance.degree_t == 0u {
-        return coded(a.xyz, vec3(a.w, last_pair(entry + 4u, share)), basis);
-    }
-    let b = codebooks[entry + 4u + share];
-    let c = codebooks[entry + 8u + share];
-    let sum = coded(a.xyz, vec3(a.w, b.xy), basis) + times.y * coded(vec3(b.zw, c.x), c.yzw, basis);
-    if instance.degree_t == 1u {
-        return sum;
-    }
-    let d = codebooks[entry + 12u + share];
-    return sum + times.z * coded(d.xyz, vec3(d.w, last_pair(entry + 16u, share)), basis);
+// The share of an entry of a codebook: words of two values. What an entry lacks, because it has fewer time harmonics, is any of it.
+struct EntryShare {
+    a: vec4<u32>,
+    b: vec4<u32>,
+    c: vec4<u32>,
+    d: vec4<u32>,
+    e: vec4<u32>,
 }
 
-// Returns two words of a share, of which there are those of all shares from `at` on.
-fn last_pair(at: u32, share: u32) -> vec2<u32> {
-    let both = codebooks[at + share / 2u];
-    return select(both.xy, both.zw, (share & 1u) == 1u);
+// Returns the share of an entry. The values of the four shares take turns of four words, then of two: threads of one splat read neighboring
+// words.
+fn load_entry(entry: u32, share: u32) -> EntryShare {
+    let own = entry + share;
+    let pair = entry + share / 2u;
+    let timed = instance.degree_t >= 1u;
+    let twice = instance.degree_t >= 2u;
+    return EntryShare(
+        codebooks[own],
+        codebooks[select(pair, own, timed) + 4u],
+        codebooks[select(own, own + 8u, timed)],
+        codebooks[select(own, own + 12u, twice)],
+        codebooks[select(own, pair + 16u, twice)],
+    );
+}
+
+// Returns the sum of four coefficients of each time harmonic times their factors.
+fn coded_share(entry: EntryShare, share: u32, basis: vec4<f32>, times: vec3<f32>) -> vec3<f32> {
+    let second = (share & 1u) == 1u;
+    let pair = select(entry.b.xy, entry.b.zw, second && instance.degree_t == 0u);
+    return coded(entry.a.xyz, vec3(entry.a.w, pair), basis)
+        + times.y * coded(vec3(entry.b.zw, entry.c.x), entry.c.yzw, basis)
+        + times.z * coded(entry.d.xyz, vec3(entry.d.w, select(entry.e.xy, entry.e.zw, second)), basis);
 }
 
 // Returns the sum of four coefficients (six words of two values, RGB innermost) times their basis values.

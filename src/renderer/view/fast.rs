@@ -21,6 +21,7 @@ use super::sizes::Sizes;
 use super::{Instance, ViewRenderer};
 use crate::renderer::layout::{BIN_COUNTERS, Counters};
 use crate::renderer::pipelines::Renderer;
+use crate::renderer::shaders::Storage;
 use crate::renderer::timing::PassTimer;
 use crate::view::tiles;
 
@@ -32,10 +33,16 @@ pub(super) fn per_thread(count: u32) -> u32 {
     if count < MANY_GAUSSIANS { 1 } else { 4 }
 }
 
-/// Splats of a workgroup of `colors`.
-const COLORS_OF_GROUP: u32 = 64;
+/// Returns the number of splats of a workgroup of `colors`, which takes four threads for each.
+fn colors_of_group(storage: Storage) -> u32 {
+    match storage {
+        Storage::Coded => 32,
+        Storage::Sliced | Storage::Packed => 64,
+    }
+}
+
 /// The largest number of workgroups of `colors`, which go on until all visible splats have a color: enough for any GPU.
-const COLOR_GROUPS: u32 = 4096;
+const COLOR_GROUPS: u32 = 8192;
 
 impl ViewRenderer {
     /// Returns the counters of the frame prepared last, on the GPU, and where they are, in bytes.
@@ -65,7 +72,7 @@ impl ViewRenderer {
     ) {
         let odd = usize::from(self.odd);
         // project_bin
-        let groups = |count: u32| count.div_ceil(256 * per_thread(count));
+        let groups = |_, count: u32| count.div_ceil(256 * per_thread(count));
         self.project(
             |storage, batched| renderer.project_bin(storage, batched, self.variant),
             renderer,
@@ -89,7 +96,7 @@ impl ViewRenderer {
         mark(timer, pass);
 
         // colors
-        let groups = |count: u32| count.div_ceil(COLORS_OF_GROUP).min(COLOR_GROUPS);
+        let groups = |storage, count: u32| count.div_ceil(colors_of_group(storage)).min(COLOR_GROUPS);
         let pipeline = |storage, batched| renderer.colors(storage, batched);
         self.project(pipeline, renderer, &fast.colors[odd], groups, pass, instances);
         mark(timer, pass);

@@ -71,7 +71,7 @@ impl ViewRenderer {
         // project
         let (Some(passes), Some(blend)) = (renderer.reference(), renderer.blend(self.pixels)) else { return };
         let pipeline = |storage, batched| renderer.project(storage, batched);
-        self.project(pipeline, renderer, &made.project, |count| count.div_ceil(256), pass, instances);
+        self.project(pipeline, renderer, &made.project, |_, count| count.div_ceil(256), pass, instances);
         mark(timer, pass);
 
         // sort by depth: the first step drops the invisible splats and counts the others; the later steps are sized
@@ -119,14 +119,14 @@ impl ViewRenderer {
     }
 
     /// Records one dispatch of `project`, `project_bin` or `colors` for each part of each instance, or for several instances of the same
-    /// Gaussians; `groups` returns the number of workgroups for a number of Gaussians, and `pipeline` that for one instance or, if `true`, for
+    /// Gaussians; `groups` returns the number of workgroups for a number of Gaussians in a storage, and `pipeline` that for one instance or, if `true`, for
     /// several.
     pub(super) fn project<'a>(
         &self,
         pipeline: impl Fn(Storage, bool) -> Option<&'a wgpu::ComputePipeline>,
         renderer: &Renderer,
         group: &wgpu::BindGroup,
-        groups: impl Fn(u32) -> u32,
+        groups: impl Fn(Storage, u32) -> u32,
         pass: &mut wgpu::ComputePass<'_>,
         instances: &[Instance<'_>],
     ) {
@@ -143,7 +143,7 @@ impl ViewRenderer {
                     pass.set_bind_group(1, &part.geometry, &[]);
                     pass.set_bind_group(3, &part.color, &[]);
                     let gaussians = drawn_count(instance.capture, at, instance.active);
-                    pass.dispatch_workgroups(groups(gaussians), 1, count);
+                    pass.dispatch_workgroups(groups(instance.capture.storage, gaussians), 1, count);
                     // Those that are drawn together have one part.
                     index += count;
                 }
