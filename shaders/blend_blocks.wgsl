@@ -482,9 +482,10 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
         if searching {
             lower = search_batch(lower, thread);
             next = load_found(thread % BATCH);
+#ifdef LARGE_BATCHES
         }
-#ifndef LARGE_BATCHES
-        if !searching {
+#else
+        } else {
             next = load_pair(first + own, end);
         }
 #endif

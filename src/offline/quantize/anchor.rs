@@ -16,6 +16,8 @@ const FAR: f64 = 4.0;
 const NEAR: f64 = 0.5;
 /// How much a marginal may change by its curvature, as a share of itself, if it may be as near as that allows.
 const CHANGE: f64 = 0.002;
+/// Standard deviations in time of more lengths than so many differ little from longer ones. They share a range, too.
+const LONG: f64 = 1000.0;
 
 /// Moves temporal means that are far from the interval close to it.
 pub(super) fn move_near(gaussians: &mut [Gaussian], interval: [f32; 2]) {
@@ -44,15 +46,20 @@ fn move_one(gaussian: &mut Gaussian, middle: f64, span: f64) {
     gaussian.mean_t = (middle + near.copysign(away)) as f32;
     if largest_marginal <= f64::from(MARGINAL_CUTOFF) {
         gaussian.opacity = 0.0;
+        gaussian.sigma_t = sigma_t.min(LONG * span) as f32;
         return;
     }
-    gaussian.sigma_t = (sigma_t * (near / distance).sqrt()) as f32;
+    if sigma_t.is_finite() {
+        let sigma_near = (sigma_t * (near / distance).sqrt()).min(LONG * span);
+        gaussian.sigma_t = sigma_near as f32;
+        // The ratio of the two marginals in the middle.
+        let ratio = (0.5 * (near / sigma_near).powi(2) - 0.5 * (distance / sigma_t).powi(2)).exp();
+        gaussian.opacity = (gaussian.opacity * ratio as f32).min(1.0);
+    }
     let moved = (near - distance) * away.signum();
     for (mean, velocity) in gaussian.mean.iter_mut().zip(gaussian.velocity) {
         *mean = (f64::from(*mean) + f64::from(velocity) * moved) as f32;
     }
-    // The ratio of the two marginals in the middle.
-    gaussian.opacity *= (-0.5 * distance * (distance - near) / (sigma_t * sigma_t)).exp() as f32;
 }
 
 #[cfg(test)]
@@ -108,6 +115,17 @@ mod tests {
             let after = moved(mean_t, 1.0, [0.0, 1.0]);
             assert_eq!(after.opacity, 0.0, "{mean_t}");
             assert!(after.check().is_ok(), "{mean_t}: {after:?}");
+        }
+    }
+
+    #[test]
+    fn deviations_stay_close_to_a_very_short_interval() {
+        // One that is drawn all the time, one that is never drawn.
+        for (mean_t, sigma_t, opacity) in [(0.1, 0.2, 0.794), (7.0, 1.0, 0.0)] {
+            let after = moved(mean_t, sigma_t, [0.0, 1e-30]);
+            assert!(after.sigma_t <= 1.1e-27 && after.check().is_ok(), "{after:?}");
+            let shown = after.opacity * after.marginal(5e-31);
+            assert!((shown - opacity).abs() < 1e-3, "{mean_t}: {shown}");
         }
     }
 
