@@ -12,7 +12,7 @@
 #import gs4d::color::{color_share, finished_color, SHARES}
 
 #ifdef CODED_COLORS
-// Each has many values of codebooks on the way: a workgroup of fewer has room earlier.
+// Each waits for many values of codebooks: a smaller workgroup finds room beside `sort_bins` earlier.
 const THREADS: u32 = 128u;
 #else
 const THREADS: u32 = 256u;

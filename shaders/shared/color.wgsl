@@ -108,7 +108,7 @@ fn color_share(share: u32, index: u32, direction: vec3<f32>, tau: f32) -> vec3<f
 #endif
 
 #ifdef CODED_COLORS
-// The share of an entry of a codebook: words of two values. What an entry lacks, because it has fewer time harmonics, is any of it.
+// The share of an entry of a codebook: words of two values. If an entry has fewer time harmonics, other words of it stand for what it lacks.
 struct EntryShare {
     a: vec4<u32>,
     b: vec4<u32>,
