@@ -16,7 +16,7 @@ const FAR: f64 = 4.0;
 const NEAR: f64 = 0.5;
 /// How much a marginal may change by its curvature, as a share of itself, if it may be as near as that allows.
 const CHANGE: f64 = 0.002;
-/// Standard deviations in time of more lengths than so many differ little from longer ones. They share a range, too.
+/// Standard deviations in time become at most so many lengths of the interval, from where on they differ little: they have one range, too.
 const LONG: f64 = 1000.0;
 
 /// Moves temporal means that are far from the interval close to it.

@@ -33,7 +33,7 @@ pub(super) fn per_thread(count: u32) -> u32 {
     if count < MANY_GAUSSIANS { 1 } else { 4 }
 }
 
-/// Returns the number of splats of a workgroup of `colors`, which takes four threads for each.
+/// Returns the number of splats of a workgroup of `colors`, which takes four threads for each: `SPLATS` of the shader.
 fn colors_of_group(storage: Storage) -> u32 {
     match storage {
         Storage::Coded => 32,

@@ -119,8 +119,8 @@ impl ViewRenderer {
     }
 
     /// Records one dispatch of `project`, `project_bin` or `colors` for each part of each instance, or for several instances of the same
-    /// Gaussians; `groups` returns the number of workgroups for a number of Gaussians in a storage, and `pipeline` that for one instance or, if `true`, for
-    /// several.
+    /// Gaussians; `groups` returns the number of workgroups for a number of Gaussians in a storage, and `pipeline` that for one instance or,
+    /// if `true`, for several.
     pub(super) fn project<'a>(
         &self,
         pipeline: impl Fn(Storage, bool) -> Option<&'a wgpu::ComputePipeline>,
