@@ -50,31 +50,25 @@ const LOG2_ALPHA_MAX: f32 = -0.014499569;
 @group(1) @binding(3) var<storage, read> splat_colors: array<vec4<f32>>;
 @group(1) @binding(4) var<storage, read> visible: array<VisibleSplat>;
 
-// Center, conic xx and xy scaled for exp2; conic yy, log2 of opacity, red, green; blue, depth. The last changes no pixel.
+// Center, conic xx and xy scaled for exp2; conic yy, log2 of opacity, red, green; blue, depth, as far apart as the others, so that all
+// three have one address. The last changes no pixel.
 var<workgroup> batch_a: array<vec4<f32>, BATCH + 1u>;
 var<workgroup> batch_b: array<vec4<f32>, BATCH + 1u>;
-#ifdef EIGHT_AT_ONCE
-// As far apart as the others, so that they have the same addresses.
 var<workgroup> batch_c: array<vec4<f32>, BATCH + 1u>;
-#else
-var<workgroup> batch_c: array<vec2<f32>, BATCH + 1u>;
-#endif
 // Blocks that each splat of the batch reaches, one bit each.
 var<workgroup> reached: array<u32, BATCH>;
-// Splats of the batch that each block blends, in order; after the last queue, what may be read ahead.
+// Splats of the batch that each block blends, in order; after the last queue, what may be read ahead. While the splats of a batch are
+// searched: their depth keys, then, from BATCH on, their slots.
 var<workgroup> queues: array<u32, BLOCKS * BATCH + AT_ONCE>;
 #ifndef SUBGROUPS_OF_32
 // Number of splats that each thread queues.
 var<workgroup> queued_by: array<u32, THREADS>;
 #endif
 var<workgroup> finished: atomic<u32>;
-// What is found in all splats: depth keys, slots.
-var<workgroup> keys: array<u32, BATCH>;
-var<workgroup> slots: array<u32, BATCH>;
+// Of what is found in all splats: number, least and greatest depth key.
 var<workgroup> listed: atomic<u32>;
 var<workgroup> least: atomic<u32>;
 var<workgroup> greatest: atomic<u32>;
-var<workgroup> own_range: vec2<u32>;
 
 var<private> tile: vec2<u32>;
 
@@ -108,8 +102,8 @@ fn search(lower: vec2<u32>, upper: vec2<u32>, thread: u32) -> u32 {
         if found.y != NONE.y && is_after(found, lower) && !is_after(found, upper) {
             let place = atomicAdd(&listed, 1u);
             if place < BATCH {
-                keys[place] = found.x;
-                slots[place] = found.y;
+                queues[place] = found.x;
+                queues[BATCH + place] = found.y;
             }
             atomicMin(&least, found.x);
             atomicMax(&greatest, found.x);
@@ -145,16 +139,16 @@ fn search_batch(lower: vec2<u32>, thread: u32) -> vec2<u32> {
     var own = NONE;
     var place = 0u;
     if thread < count {
-        own = vec2(keys[thread], slots[thread]);
+        own = vec2(queues[thread], queues[BATCH + thread]);
         for (var i = 0u; i < count; i++) {
-            place += select(0u, 1u, is_after(own, vec2(keys[i], slots[i])));
+            place += select(0u, 1u, is_after(own, vec2(queues[i], queues[BATCH + i])));
         }
     }
     workgroupBarrier();
     if thread < count {
-        slots[place] = own.y;
+        queues[BATCH + place] = own.y;
     } else if thread < BATCH {
-        slots[thread] = NONE.y;
+        queues[BATCH + thread] = NONE.y;
     }
     workgroupBarrier();
     return upper;
@@ -172,8 +166,8 @@ fn load_pair(pair: u32, end: u32) -> Splat {
 // Returns the splat that `search_batch` found for a thread, one of opacity 0 if there is none.
 fn load_found(thread: u32) -> Splat {
     var splat: Splat;
-    if slots[thread] != NONE.y {
-        splat = load_splat(slots[thread]);
+    if queues[BATCH + thread] != NONE.y {
+        splat = load_splat(queues[BATCH + thread]);
     }
     return splat;
 }
@@ -192,11 +186,7 @@ fn put_in_batch(splat: Splat, thread: u32) {
     let conic = vec3(-0.5, -1.0, -0.5) * LOG2_E * splat.conic;
     batch_a[thread] = vec4(splat.center, conic.xy);
     batch_b[thread] = vec4(conic.z, log2(splat.opacity), splat.color.xy);
-#ifdef EIGHT_AT_ONCE
     batch_c[thread] = vec4(splat.color.z, splat.depth, 0.0, 0.0);
-#else
-    batch_c[thread] = vec2(splat.color.z, splat.depth);
-#endif
     var blocks = 0u;
     if splat.opacity > 0.0 {
         blocks = blocks_reached(splat);
@@ -229,6 +219,9 @@ fn blocks_reached(splat: Splat) -> u32 {
     let left = corner.x + vec2(0.0, 8.0);
     let right = left + 7.0;
     let near_x = clamp(vec2(0.0), left, right);
+    // On the line x = near_x the form minus the bound is (c.z * y + by_y) * y + at_x, on y = near_y the same with x and y exchanged.
+    let by_y = 2.0 * c.y * near_x;
+    let at_x = c.x * near_x * near_x - bound;
     var blocks = 0u;
     for (var row = 0u; row < 4u; row++) {
         let top = corner.y + f32(4u * row);
@@ -237,9 +230,11 @@ fn blocks_reached(splat: Splat) -> u32 {
         // The minimum of the form over a block lies on one of the two sides that face the center.
         let y = clamp(slope.x * near_x, vec2(top), vec2(bottom));
         let x = clamp(vec2(slope.y * near_y), left, right);
-        let on_x = (c.x * near_x + 2.0 * c.y * y) * near_x + c.z * y * y;
-        let on_y = (c.z * near_y + 2.0 * c.y * x) * near_y + c.x * x * x;
-        let hit = min(on_x, on_y) <= vec2(bound);
+        let on_x = fma(fma(vec2(c.z), y, by_y), y, at_x);
+        let by_x = 2.0 * c.y * near_y;
+        let at_y = c.z * near_y * near_y - bound;
+        let on_y = fma(fma(vec2(c.x), x, vec2(by_x)), x, vec2(at_y));
+        let hit = min(on_x, on_y) <= vec2(0.0);
         blocks |= (select(0u, 1u, hit.x) | select(0u, 2u, hit.y)) << (2u * row);
     }
     return blocks;
@@ -300,10 +295,34 @@ fn batch_color(i: u32) -> vec3<f32> {
     return vec3(batch_b[i].zw, batch_c[i].x);
 }
 
+// Returns four splats of a queue.
+fn queued_four(at: u32) -> vec4<u32> {
+    return vec4(queues[at], queues[at + 1u], queues[at + 2u], queues[at + 3u]);
+}
+
+// Returns the alphas of four splats of the batch: their exponentials do not wait for each other's blends.
+fn batch_alphas(four: vec4<u32>, position: vec2<f32>) -> vec4<f32> {
+    return vec4(
+        batch_alpha(batch_a[four.x], batch_b[four.x], position),
+        batch_alpha(batch_a[four.y], batch_b[four.y], position),
+        batch_alpha(batch_a[four.z], batch_b[four.z], position),
+        batch_alpha(batch_a[four.w], batch_b[four.w], position),
+    );
+}
+
+// Returns the colors of four splats of the batch.
+fn batch_colors(four: vec4<u32>) -> mat4x3<f32> {
+    return mat4x3(batch_color(four.x), batch_color(four.y), batch_color(four.z), batch_color(four.w));
+}
+
+fn batch_depths(four: vec4<u32>) -> vec4<f32> {
+    return vec4(batch_c[four.x].y, batch_c[four.y].y, batch_c[four.z].y, batch_c[four.w].y);
+}
+
 #ifdef DEPTHS
 // Blends four splats of the batch; those with alpha 0 are skipped.
 fn blend_four(pixel: ptr<function, Pixel>, alphas: vec4<f32>, four: vec4<u32>) {
-    let depths = vec4(batch_c[four.x].y, batch_c[four.y].y, batch_c[four.z].y, batch_c[four.w].y);
+    let depths = batch_depths(four);
     if any(depths > vec4((*pixel).limit)) {
         for (var i = 0u; i < 4u; i++) {
             if alphas[i] > 0.0 && !(*pixel).done {
@@ -351,32 +370,9 @@ fn blend_one(sample: ptr<function, Sample>, alpha: f32, color: vec3<f32>) {
 #endif
     (*sample).left = left;
 }
-#endif
 
-#ifdef EIGHT_AT_ONCE
-// Returns four splats of a queue.
-fn queued_four(at: u32) -> vec4<u32> {
-    return vec4(queues[at], queues[at + 1u], queues[at + 2u], queues[at + 3u]);
-}
-
-// Returns the alphas of four splats of the batch; 0 for those that are skipped or behind `limit`.
-fn batch_alphas(four: vec4<u32>, position: vec2<f32>, limit: f32) -> vec4<f32> {
-    let alphas = vec4(
-        batch_alpha(batch_a[four.x], batch_b[four.x], position),
-        batch_alpha(batch_a[four.y], batch_b[four.y], position),
-        batch_alpha(batch_a[four.z], batch_b[four.z], position),
-        batch_alpha(batch_a[four.w], batch_b[four.w], position),
-    );
-#ifdef OPAQUE
-    let depths = vec4(batch_c[four.x].y, batch_c[four.y].y, batch_c[four.z].y, batch_c[four.w].y);
-    return select(alphas, vec4(0.0), depths > vec4(limit));
-#else
-    return alphas;
-#endif
-}
-
-// Blends four splats of the batch. Returns whether the pixel is opaque.
-fn blend_four(sample: ptr<function, Sample>, alphas: vec4<f32>, four: vec4<u32>) -> bool {
+// Blends four splats of these alphas and colors, which are loaded before it is known whether the pixel is opaque. Returns whether it is.
+fn blend_four(sample: ptr<function, Sample>, alphas: vec4<f32>, colors: mat4x3<f32>) -> bool {
     // Fused, so that each splat waits for one instruction of the one before.
     let left = (*sample).left;
     let after_one = fma(-alphas.x, left, left);
@@ -384,16 +380,16 @@ fn blend_four(sample: ptr<function, Sample>, alphas: vec4<f32>, four: vec4<u32>)
     let after_three = fma(-alphas.z, after_two, after_two);
     let after_four = fma(-alphas.w, after_three, after_three);
     if is_opaque(after_four) {
-        blend_one(sample, alphas.x, batch_color(four.x));
-        blend_one(sample, alphas.y, batch_color(four.y));
-        blend_one(sample, alphas.z, batch_color(four.z));
-        blend_one(sample, alphas.w, batch_color(four.w));
+        blend_one(sample, alphas.x, colors[0]);
+        blend_one(sample, alphas.y, colors[1]);
+        blend_one(sample, alphas.z, colors[2]);
+        blend_one(sample, alphas.w, colors[3]);
         return (*sample).left == 0.0;
     }
-    (*sample).color += batch_color(four.x) * (alphas.x * left);
-    (*sample).color += batch_color(four.y) * (alphas.y * after_one);
-    (*sample).color += batch_color(four.z) * (alphas.z * after_two);
-    (*sample).color += batch_color(four.w) * (alphas.w * after_three);
+    (*sample).color += colors[0] * (alphas.x * left);
+    (*sample).color += colors[1] * (alphas.y * after_one);
+    (*sample).color += colors[2] * (alphas.z * after_two);
+    (*sample).color += colors[3] * (alphas.w * after_three);
     (*sample).left = after_four;
     return false;
 }
@@ -431,17 +427,13 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
 #endif
     tile = group.xy;
     if thread == 0u {
-        own_range = tile_ranges[tile.y * frame.tiles.x + tile.x];
         atomicStore(&finished, 0u);
         batch_a[BATCH] = vec4(0.0);
         batch_b[BATCH] = vec4(0.0, -1e9, 0.0, 0.0);
-#ifdef EIGHT_AT_ONCE
         batch_c[BATCH] = vec4(0.0);
-#else
-        batch_c[BATCH] = vec2(0.0);
-#endif
     }
-    let range = workgroupUniformLoad(&own_range);
+    let range = tile_ranges[group.y * frame.tiles.x + group.x];
+    workgroupBarrier();
     let searching = range.x == NONE.x;
     let end = range.y;
 
@@ -507,21 +499,23 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
         let queue = block * BATCH;
         if !done {
 #ifdef EIGHT_AT_ONCE
-#ifndef OPAQUE
-            let limit = FAR;
-#endif
             // The next of the queue are known before these are blended: in a small picture few threads have work while others wait.
             var near = queued_four(queue);
             var far = queued_four(queue + 4u);
             for (var i = AT_ONCE; i <= queued; i += AT_ONCE) {
                 let next_near = queued_four(queue + i);
                 let next_far = queued_four(queue + i + 4u);
-                let near_alphas = batch_alphas(near, position, limit);
-                let far_alphas = batch_alphas(far, position, limit);
-                if blend_four(&sample, near_alphas, near) {
+                var near_alphas = batch_alphas(near, position);
+                var far_alphas = batch_alphas(far, position);
+#ifdef OPAQUE
+                // The surface hides what is behind it.
+                near_alphas = select(near_alphas, vec4(0.0), batch_depths(near) > vec4(limit));
+                far_alphas = select(far_alphas, vec4(0.0), batch_depths(far) > vec4(limit));
+#endif
+                if blend_four(&sample, near_alphas, batch_colors(near)) {
                     break;
                 }
-                if blend_four(&sample, far_alphas, far) {
+                if blend_four(&sample, far_alphas, batch_colors(far)) {
                     break;
                 }
                 near = next_near;
@@ -529,62 +523,31 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
             }
 #else
             for (var i = 0u; i < queued; i += AT_ONCE) {
-                // Four at a time: their exponentials do not wait for each other's blends.
-                let k = vec4(queues[queue + i], queues[queue + i + 1u], queues[queue + i + 2u], queues[queue + i + 3u]);
-                let b0 = batch_b[k.x];
-                let b1 = batch_b[k.y];
-                let b2 = batch_b[k.z];
-                let b3 = batch_b[k.w];
-                var alphas = vec4(
-                    batch_alpha(batch_a[k.x], b0, position),
-                    batch_alpha(batch_a[k.y], b1, position),
-                    batch_alpha(batch_a[k.z], b2, position),
-                    batch_alpha(batch_a[k.w], b3, position),
-                );
+                let four = queued_four(queue + i);
+                var alphas = batch_alphas(four, position);
 #ifdef DEPTHS
-                blend_four(&pixel, alphas, k);
+                blend_four(&pixel, alphas, four);
                 if pixel.done {
                     break;
                 }
 #else
-                let c0 = vec3(b0.zw, batch_c[k.x].x);
-                let c1 = vec3(b1.zw, batch_c[k.y].x);
-                let c2 = vec3(b2.zw, batch_c[k.z].x);
-                let c3 = vec3(b3.zw, batch_c[k.w].x);
 #ifdef OPAQUE
-                let depths = vec4(batch_c[k.x].y, batch_c[k.y].y, batch_c[k.z].y, batch_c[k.w].y);
+                let depths = batch_depths(four);
 #ifdef MULTISAMPLED
                 if surfaces.y > limit && any(depths > vec4(limit)) {
-                    blend_cut(&sample, alphas.x, c0, depths.x, at);
-                    blend_cut(&sample, alphas.y, c1, depths.y, at);
-                    blend_cut(&sample, alphas.z, c2, depths.z, at);
-                    blend_cut(&sample, alphas.w, c3, depths.w, at);
+                    for (var j = 0u; j < 4u; j++) {
+                        blend_cut(&sample, alphas[j], batch_color(four[j]), depths[j], at);
+                    }
                     if sample.left == 0.0 {
                         break;
                     }
                     continue;
                 }
 #endif
-                // The surface hides what is behind it.
                 alphas = select(alphas, vec4(0.0), depths > vec4(limit));
 #endif
-                let passed = 1.0 - alphas;
-                let after_two = sample.left * passed.x * passed.y;
-                let after_four = after_two * passed.z * passed.w;
-                if is_opaque(after_four) {
-                    blend_one(&sample, alphas.x, c0);
-                    blend_one(&sample, alphas.y, c1);
-                    blend_one(&sample, alphas.z, c2);
-                    blend_one(&sample, alphas.w, c3);
-                    if sample.left == 0.0 {
-                        break;
-                    }
-                } else {
-                    sample.color += c0 * (alphas.x * sample.left);
-                    sample.color += c1 * (alphas.y * (sample.left * passed.x));
-                    sample.color += c2 * (alphas.z * after_two);
-                    sample.color += c3 * (alphas.w * (after_two * passed.z));
-                    sample.left = after_four;
+                if blend_four(&sample, alphas, batch_colors(four)) {
+                    break;
                 }
 #endif
             }
@@ -598,8 +561,8 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
                 atomicAdd(&finished, 1u);
             }
         }
-        if workgroupUniformLoad(&finished) == THREADS {
-            more = false;
+        if more {
+            more = workgroupUniformLoad(&finished) < THREADS;
         }
     }
 #ifdef DEPTHS

@@ -60,7 +60,6 @@ var<workgroup> greatest: atomic<u32>;
 // The same of all entries of a bin that is sorted in rounds.
 var<workgroup> least_of_all: atomic<u32>;
 var<workgroup> greatest_of_all: atomic<u32>;
-var<workgroup> own_count: u32;
 // Number of pairs of each tile with the list and with the bin; the first pair of the bin and the next of each tile.
 var<workgroup> totals: array<vec4<u32>, 4>;
 var<workgroup> counted: array<u32, 16>;
@@ -508,9 +507,9 @@ fn sort_bins(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     let capacity = frame.binning.y;
     let first_bin = BIN_COUNTERS + frame.binning.w;
     let bin = group.y * ((frame.tiles.x + side() - 1u) / side()) + group.x;
+    let binned = bins[first_bin + bin];
     if thread == 0u {
-        own_count = bins[first_bin + bin];
-        atomicMax(&next_bins[3], own_count);
+        atomicMax(&next_bins[3], binned);
         atomicStore(&next_bins[first_bin + bin], 0u);
         if bin == 0u {
             atomicStore(&next_bins[0], 0u);
@@ -523,7 +522,6 @@ fn sort_bins(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
             atomicStore(&next_bins[2], bins[0]);
         }
     }
-    let binned = workgroupUniformLoad(&own_count);
     let corner = side() * group.xy;
     if binned == 0u || binned > capacity {
         if thread < side() * side() {
