@@ -15,8 +15,8 @@ use bevy::ecs::change_detection::{DetectChanges, Ref};
 use bevy::ecs::entity::Entity;
 use bevy::ecs::query::{Has, With};
 use bevy::ecs::resource::Resource;
-use bevy::ecs::schedule::IntoScheduleConfigs;
-use bevy::ecs::system::{Local, Query, Res, ResMut};
+use bevy::ecs::schedule::{IntoScheduleConfigs, ScheduleConfigs, SystemCondition};
+use bevy::ecs::system::{Local, Query, Res, ResMut, ScheduleSystem};
 use bevy::mesh::Mesh3d;
 use bevy::pbr::wireframe::Wireframe3d;
 use bevy::pbr::{ExtractedAtmosphere, Transmissive3d, main_transmissive_pass_3d};
@@ -39,7 +39,7 @@ pub(super) fn build(app: &mut App) {
     render_app
         .init_resource::<OtherPasses>()
         .init_resource::<MovedMeshes>()
-        .add_systems(ExtractSchedule, extract_moved_meshes)
+        .add_systems(ExtractSchedule, extraction())
         .configure_sets(Core3d, CaptureSystems::Draw.before(main_transmissive_pass_3d))
         .add_systems(
             Render,
@@ -52,6 +52,16 @@ pub(super) fn build(app: &mut App) {
                 .in_set(RenderSystems::PhaseSort)
                 .after(sort_phase_system::<Transmissive3d>),
         );
+}
+
+/// Returns the extraction of the meshes that have moved: left out while there is no mesh, and none to forget.
+fn extraction() -> ScheduleConfigs<ScheduleSystem> {
+    extract_moved_meshes.run_if(any_mesh.or_else(any_moved))
+}
+
+/// Returns whether the main world has any mesh.
+fn any_mesh(meshes: Extract<Query<(), With<Mesh3d>>>) -> bool {
+    !meshes.is_empty()
 }
 
 fn extract_moved_meshes(
@@ -132,23 +142,25 @@ fn find_other_passes(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bevy::ecs::schedule::Schedule;
     use bevy::ecs::world::World;
     use bevy::render::MainWorld;
-
-    /// Extracts, and returns the places of the meshes that have moved, along x.
-    fn moved(render: &mut World) -> Vec<f32> {
-        render.run_system_cached(extract_moved_meshes).expect("both worlds are there");
-        render.resource::<MovedMeshes>().0.iter().map(|(_, center)| center.x).collect()
-    }
 
     #[test]
     fn meshes_are_followed_while_there_are_captures() {
         let mut render = World::new();
         render.init_resource::<MainWorld>();
         render.init_resource::<MovedMeshes>();
+        let mut schedule = Schedule::default();
+        schedule.add_systems(extraction());
+        // Extracts, and returns the places of the meshes that have moved, along x.
+        let mut moved = |render: &mut World| -> Vec<f32> {
+            schedule.run(render);
+            render.resource::<MovedMeshes>().0.iter().map(|(_, center)| center.x).collect()
+        };
         let mut main = render.resource_mut::<MainWorld>();
         let place = |x| GlobalTransform::from_xyz(x, 0.0, 0.0);
-        let [_, last] = [1.0, 2.0].map(|x| main.spawn((Mesh3d::default(), Aabb::default(), place(x))).id());
+        let meshes @ [_, last] = [1.0, 2.0].map(|x| main.spawn((Mesh3d::default(), Aabb::default(), place(x))).id());
         assert_eq!(moved(&mut render), [0.0; 0], "nothing needs them");
         let capture = render.resource_mut::<MainWorld>().spawn(GaussianCapture3d::default()).id();
         assert_eq!(moved(&mut render), [1.0, 2.0], "all that may have moved before");
@@ -158,5 +170,11 @@ mod tests {
         render.resource_mut::<MainWorld>().despawn(capture);
         render.resource_mut::<MainWorld>().entity_mut(last).insert(place(4.0));
         assert_eq!(moved(&mut render), [0.0; 0], "until the last capture has gone");
+        render.resource_mut::<MainWorld>().spawn(GaussianCapture3d::default());
+        assert_eq!(moved(&mut render), [1.0, 4.0], "and again from the next on");
+        for mesh in meshes {
+            render.resource_mut::<MainWorld>().despawn(mesh);
+        }
+        assert_eq!(moved(&mut render), [0.0; 0], "what has gone is forgotten");
     }
 }

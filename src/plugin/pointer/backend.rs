@@ -17,6 +17,11 @@ use bevy::picking::backend::ray::RayMap;
 use bevy::picking::backend::{HitData, PointerHits};
 use bevy::picking::{Pickable, PickingSettings};
 
+/// Returns whether any pointer is over a camera's target, in an app with Bevy's `PickingPlugin`.
+pub(super) fn any_ray(rays: Option<Res<RayMap>>) -> bool {
+    rays.is_some_and(|rays| rays.iter().next().is_some())
+}
+
 /// Casts the rays of this frame.
 pub(super) fn update_hits(
     picking: Res<PickingSettings>,

@@ -2,13 +2,11 @@
 //!
 //! In: an app in which captures play, Bevy's `PickingPlugin`. Out: the same app, in which pointers hit captures.
 
-use super::backend::update_hits;
+use super::backend::{any_ray, update_hits};
 use super::settings::CapturePickingSettings;
 use bevy::app::{App, Plugin, PreUpdate};
 use bevy::ecs::schedule::IntoScheduleConfigs;
-use bevy::ecs::schedule::common_conditions::resource_exists;
 use bevy::picking::PickingSystems;
-use bevy::picking::backend::ray::RayMap;
 
 /// Sends pointers' hits on captures, in apps with Bevy's `PickingPlugin`, whenever that is added. Part of
 /// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin).
@@ -18,6 +16,6 @@ pub(crate) struct CapturePointerPlugin;
 impl Plugin for CapturePointerPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<CapturePickingSettings>()
-            .add_systems(PreUpdate, update_hits.run_if(resource_exists::<RayMap>).in_set(PickingSystems::Backend));
+            .add_systems(PreUpdate, update_hits.run_if(any_ray).in_set(PickingSystems::Backend));
     }
 }

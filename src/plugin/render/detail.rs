@@ -146,6 +146,11 @@ pub(super) fn extract_detail(mut extracted: ResMut<CaptureDetail>, detail: Extra
 type CameraSize =
     (Entity, &'static ExtractedView, &'static RenderVisibleEntities, Option<&'static MainPassResolutionOverride>);
 
+/// Returns whether any capture has levels, or had in the last frame.
+pub(super) fn any_levels(captures: Res<RenderAssets<GpuGaussianCapture>>, levels: Res<CaptureLevels>) -> bool {
+    !levels.chosen.is_empty() || captures.iter().any(|(_, capture)| capture.detail().is_some())
+}
+
 /// Chooses the levels of this frame.
 pub(super) fn choose_levels(
     extracted: Res<ExtractedCaptures>,

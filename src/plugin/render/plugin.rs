@@ -6,7 +6,7 @@ use super::active::{ActiveLists, any_stale, prepare_active_lists, record_active_
 use super::capture_views::{CaptureViews, any_shaded};
 use super::composite::{CaptureShaders, CompositePipeline};
 use super::depth_readers::{DepthReaders, extract_depth_readers};
-use super::detail::{CaptureDetail, CaptureLevels, choose_levels, extract_detail};
+use super::detail::{CaptureDetail, CaptureLevels, any_levels, choose_levels, extract_detail};
 use super::draw::{CaptureSystems, draw_captures, draw_front, record_captures};
 use super::extract::{
     ExtractedCaptures, ExtractedViewSettings, any_view_settings, extract_captures, extract_view_settings, has_changed,
@@ -123,7 +123,9 @@ fn build_rendering(app: &mut App) {
                     .run_if(any_ordered)
                     .in_set(RenderSystems::Prepare)
                     .before(RenderSystems::PrepareResources),
-                (choose_levels, prepare_active_lists).chain().in_set(RenderSystems::PrepareResources),
+                (choose_levels.run_if(any_levels), prepare_active_lists)
+                    .chain()
+                    .in_set(RenderSystems::PrepareResources),
                 prepare_views.in_set(RenderSystems::PrepareBindGroups),
             ),
         )

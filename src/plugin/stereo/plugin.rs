@@ -11,6 +11,7 @@ use bevy::ecs::change_detection::DetectChangesMut;
 use bevy::ecs::hierarchy::Children;
 use bevy::ecs::query::With;
 use bevy::ecs::schedule::IntoScheduleConfigs;
+use bevy::ecs::schedule::common_conditions::any_with_component;
 use bevy::ecs::system::Query;
 use bevy::transform::TransformSystems;
 use bevy::transform::components::Transform;
@@ -39,8 +40,11 @@ impl Plugin for StereoPlugin {
         app.add_systems(
             PostUpdate,
             (
-                place_eyes.before(TransformSystems::Propagate),
-                fit_eyes.after(CameraUpdateSystems).before(VisibilitySystems::UpdateFrusta),
+                place_eyes.run_if(any_with_component::<StereoRig>).before(TransformSystems::Propagate),
+                fit_eyes
+                    .run_if(any_with_component::<SideBySide>)
+                    .after(CameraUpdateSystems)
+                    .before(VisibilitySystems::UpdateFrusta),
             ),
         );
     }
