@@ -1,14 +1,15 @@
 //! Wall-clock time of a whole Bevy app's frame, with a capture that plays and without one.
 //!
 //! ```text
-//! cargo bench --features viewer,cli --bench app -- [CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N] [--eye X,Y,Z]
+//! cargo bench --features viewer,cli --bench app -- [CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N] [--eye X,Y,Z] [--plugins SET]
 //! ```
 //!
-//! In: a capture (default: the bundled one), a picture size (640x480), a number of frames for each measurement (600), how often each is
-//! repeated (3), and an eye in capture space that looks at the origin with z up (-3.57,1.3,1.69). Out: for Bevy's default plugins and
-//! for the few that a capture needs, with one sample and with four, for no capture and for each [`Design`]: frames per second and
-//! milliseconds of a frame, the median of the rounds, how much longer the frame is than without a capture, and the spread of the rounds. Rendering is pipelined,
-//! there is no window, and each measurement ends when the GPU has finished.
+//! In: a capture (default: the bundled one), a picture size (640x480), a number of frames for each measurement (100), how often each is
+//! repeated (21), an eye in capture space that looks at the origin with z up (-3.57,1.3,1.69), and `default` or `minimal` (both). Out: for
+//! Bevy's default plugins and for the few that a capture needs, with one sample and with four, for no capture and for each [`Design`]:
+//! frames per second and milliseconds of a frame, the median of the rounds, and their spread; how much longer the frame is than without a
+//! capture, the median of the rounds' differences, and the range of the middle half of these. Rendering is pipelined, there is no window,
+//! and each measurement ends when the GPU has finished.
 
 mod common;
 
@@ -26,7 +27,7 @@ use bevy::prelude::*;
 use bevy::state::app::StatesPlugin;
 use bevy_gs4d::prelude::*;
 use bevy_gs4d::renderer::Design;
-use common::{Arguments, Times};
+use common::Arguments;
 
 /// What is measured: the set of plugins, the samples of the camera, how a capture is drawn if there is one.
 struct Subject {
@@ -37,14 +38,20 @@ struct Subject {
 
 fn main() -> Result {
     let mut eye = Vec3::new(-3.57, 1.3, 1.69);
-    let arguments = common::parse(UVec2::new(640, 480), 600, |option, value| {
-        if option == "--eye" {
-            eye = common::numbers(&value()?, ',').map(Vec3::from).ok_or("--eye: not like 1,2,3")?;
+    let mut wanted = None;
+    let arguments = common::parse(UVec2::new(640, 480), 100, 21, |option, value| {
+        match option {
+            "--eye" => eye = common::numbers(&value()?, ',').map(Vec3::from).ok_or("--eye: not like 1,2,3")?,
+            "--plugins" => wanted = Some(value()?),
+            _ => return Ok(false),
         }
-        Ok(option == "--eye")
+        Ok(true)
     })?;
     let (mut subjects, mut apps) = (Vec::new(), Vec::new());
     for (plugins, adjust) in [("default", all as fn(_) -> _), ("minimal", few)] {
+        if wanted.as_ref().is_some_and(|wanted| wanted != plugins) {
+            continue;
+        }
         for msaa in [Msaa::Off, Msaa::Sample4] {
             for design in [None, Some(Design::Reference), Some(Design::Fast)] {
                 apps.push(app(&arguments, eye, adjust, !apps.is_empty(), msaa, design)?);
@@ -52,20 +59,27 @@ fn main() -> Result {
             }
         }
     }
+    if apps.is_empty() {
+        return Err("--plugins: neither default nor minimal".into());
+    }
     let measured = common::measure(&mut apps, &arguments)?;
     println!("{}, {}x{}", arguments.capture.display(), arguments.size.x, arguments.size.y);
     println!(
-        "{:<8} {:>7} {:<10} {:>8} {:>9} {:>9} {:>15}",
-        "plugins", "samples", "capture", "FPS", "frame ms", "more ms", "rounds ms"
+        "{:<8} {:>7} {:<10} {:>8} {:>9} {:>15} {:>9} {:>15}",
+        "plugins", "samples", "capture", "FPS", "frame ms", "rounds ms", "more ms", "middle half"
     );
-    let mut without = f64::NAN;
-    for (Subject { plugins, samples, design }, Times { median: time, spread }) in subjects.into_iter().zip(measured) {
-        without = if design.is_none() { time } else { without };
+    let mut without = None;
+    for (Subject { plugins, samples, design }, times) in subjects.into_iter().zip(&measured) {
+        if design.is_none() {
+            without = Some(times);
+        }
+        let (more, middle) = times.more_than(without.unwrap_or(times));
         let name = Design::NAMES.iter().find(|(_, known)| Some(*known) == design).map_or("none", |(name, _)| name);
+        let time = times.median();
         println!(
-            "{plugins:<8} {samples:>7} {name:<10} {:>8.0} {time:>9.3} {:>9.3} {spread:>15}",
+            "{plugins:<8} {samples:>7} {name:<10} {:>8.0} {time:>9.3} {:>15} {more:>9.3} {middle:>15}",
             1e3 / time,
-            time - without
+            times.spread()
         );
     }
     Ok(())

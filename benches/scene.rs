@@ -4,11 +4,11 @@
 //! cargo bench --features viewer,cli --bench scene -- [CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N] [--only WORD]
 //! ```
 //!
-//! In: a capture (default: the bundled one), a picture size (1280x720), frames for each measurement (300), rounds (3), a word in the names
-//! of the scenes (all). Out: milliseconds of a frame for each scene, the median of the rounds, how much longer it is than the scene that it
-//! is compared with, and the spread of the rounds; then, measured in as many further frames, but at most 100, the GPU time of the captures'
-//! passes and the number of splats. Default plugins, no window, rendering is pipelined, all apps take turns, and each measurement ends when
-//! the GPU has finished.
+//! In: a capture (default: the bundled one), a picture size (1280x720), frames for each measurement (100), rounds (9), a word in the names
+//! of the scenes (all). Out: milliseconds of a frame for each scene, the median of the rounds, and their spread; how much longer it is than
+//! the scene that it is compared with, the median of the rounds' differences, and the range of the middle half of these; then, measured in as
+//! many further frames, but at most 100, the GPU time of the captures' passes and the number of splats. Default plugins, no window, rendering
+//! is pipelined, all apps take turns, and each measurement ends when the GPU has finished.
 
 mod common;
 
@@ -56,7 +56,7 @@ const SCENES: [(&str, Kind, Msaa, &str); 15] = [
 
 fn main() -> Result {
     let mut wanted = String::new();
-    let arguments = common::parse(UVec2::new(1280, 720), 300, |option, value| {
+    let arguments = common::parse(UVec2::new(1280, 720), 100, 9, |option, value| {
         let is_own = option == "--only";
         if is_own {
             wanted = value()?;
@@ -75,16 +75,21 @@ fn main() -> Result {
     let measured = common::measure(&mut apps, &arguments)?;
     println!("{}, {}x{}", arguments.capture.display(), arguments.size.x, arguments.size.y);
     println!(
-        "{:<36} {:>9} {:>9} {:>15} {:>9} {:>9}  than",
-        "scene", "frame ms", "more ms", "rounds ms", "GPU ms", "splats"
+        "{:<36} {:>9} {:>15} {:>9} {:>15} {:>9} {:>9}  than",
+        "scene", "frame ms", "rounds ms", "more ms", "middle half", "GPU ms", "splats"
     );
-    let mut known: Vec<(&str, f64)> = Vec::new();
-    let timed = scenes.into_iter().zip(&mut apps).zip(measured);
-    for (((name, _, _, compared), app), Times { median: time, spread }) in timed {
-        known.push((name, time));
-        let than = known.iter().find(|(name, _)| *name == compared).map_or(f64::NAN, |(_, time)| *time);
+    let mut known: Vec<(&str, &Times)> = Vec::new();
+    let timed = scenes.into_iter().zip(&mut apps).zip(&measured);
+    for (((name, _, _, compared), app), times) in timed {
+        known.push((name, times));
+        let than = known.iter().find(|(name, _)| *name == compared).map_or(times, |(_, times)| times);
+        let (more, middle) = times.more_than(than);
         let (gpu, splats) = passes(app, arguments.frames.clamp(1, 100))?;
-        println!("{name:<36} {time:>9.3} {:>9.3} {spread:>15} {gpu:>9.4} {splats:>9}  {compared}", time - than);
+        println!(
+            "{name:<36} {:>9.3} {:>15} {more:>9.3} {middle:>15} {gpu:>9.4} {splats:>9}  {compared}",
+            times.median(),
+            times.spread()
+        );
     }
     Ok(())
 }

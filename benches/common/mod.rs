@@ -15,6 +15,8 @@ use std::time::{Duration, Instant};
 
 /// A GPU that was idle runs slowly for a while.
 const WARM_UP: Duration = Duration::from_millis(600);
+/// The first frames of an app after those of another find nothing in the caches.
+const FIRST_FRAMES: u32 = 10;
 
 /// The arguments of a benchmark, or its defaults.
 pub struct Arguments {
@@ -25,15 +27,10 @@ pub struct Arguments {
     pub rounds: usize,
 }
 
-/// Milliseconds of an app's frame.
-pub struct Times {
-    /// Of the rounds.
-    pub median: f64,
-    /// The shortest and the longest round.
-    pub spread: String,
-}
+/// Milliseconds of an app's frame, one for each round.
+pub struct Times(Vec<f64>);
 
-/// Reads the command line; `size` and `frames` are defaults. `more` is called with each option that not all benchmarks have and with what
+/// Reads the command line; `size`, `frames` and `rounds` are defaults. `more` is called with each option that not all benchmarks have and with what
 /// returns its value, and returns whether it is an option of this benchmark.
 ///
 /// # Errors
@@ -41,10 +38,11 @@ pub struct Times {
 pub fn parse(
     size: UVec2,
     frames: u32,
+    rounds: usize,
     mut more: impl FnMut(&str, &mut dyn FnMut() -> Result<String, String>) -> Result<bool>,
 ) -> Result<Arguments> {
     let capture = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/toybox.gs4d").into();
-    let mut parsed = Arguments { capture, size, frames, rounds: 3 };
+    let mut parsed = Arguments { capture, size, frames, rounds };
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().ok_or_else(|| format!("{argument} needs a value"));
@@ -95,25 +93,44 @@ pub fn start(app: &mut App) -> Result {
 /// An app stops, or the GPU is lost.
 pub fn measure(apps: &mut [App], arguments: &Arguments) -> Result<Vec<Times>> {
     let mut measured: Vec<Vec<f64>> = vec![Vec::new(); apps.len()];
+    for app in apps.iter_mut() {
+        warm_up(app)?;
+    }
     for _ in 0..arguments.rounds {
         for (app, times) in apps.iter_mut().zip(&mut measured) {
-            warm_up(app)?;
+            run(app, FIRST_FRAMES)?;
             let took = run(app, arguments.frames)?;
             times.push(took.as_secs_f64() * 1e3 / f64::from(arguments.frames));
         }
     }
-    Ok(measured.into_iter().map(Times::of).collect())
+    Ok(measured.into_iter().map(Times).collect())
 }
 
 impl Times {
-    fn of(mut rounds: Vec<f64>) -> Self {
-        rounds.sort_by(f64::total_cmp);
-        let spread = rounds.first().zip(rounds.last());
-        Self {
-            median: rounds.get(rounds.len() / 2).copied().unwrap_or(f64::NAN),
-            spread: spread.map_or(String::new(), |(low, high)| format!("{low:.3} - {high:.3}")),
-        }
+    /// Returns the median of the rounds.
+    pub fn median(&self) -> f64 {
+        let [_, median, _] = quartiles(self.0.clone());
+        median
     }
+
+    /// Returns the shortest and the longest round, as text.
+    pub fn spread(&self) -> String {
+        let [low, high] = [f64::min, f64::max].map(|best| self.0.iter().copied().reduce(best).unwrap_or(f64::NAN));
+        format!("{low:.3} - {high:.3}")
+    }
+
+    /// Returns how much longer a frame is than one of another app that took turns with this: the median of the differences round by
+    /// round, and the range of the middle half of them, as text. What slows the machine for a while slows both apps of a round.
+    pub fn more_than(&self, other: &Self) -> (f64, String) {
+        let [low, median, high] = quartiles(self.0.iter().zip(&other.0).map(|(own, other)| own - other).collect());
+        (median, format!("{low:.3} - {high:.3}"))
+    }
+}
+
+/// Returns the quartiles; NaN of no values.
+fn quartiles(mut values: Vec<f64>) -> [f64; 3] {
+    values.sort_by(f64::total_cmp);
+    [1, 2, 3].map(|quarter| values.get(values.len() * quarter / 4).copied().unwrap_or(f64::NAN))
 }
 
 /// Runs the app until the GPU is as fast as it gets.
