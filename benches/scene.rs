@@ -82,8 +82,8 @@ fn main() -> Result {
     let timed = scenes.into_iter().zip(&mut apps).zip(&measured);
     for (((name, _, _, compared), app), times) in timed {
         known.push((name, times));
-        let than = known.iter().find(|(name, _)| *name == compared).map_or(times, |(_, times)| times);
-        let (more, middle) = times.more_than(than);
+        let than = known.iter().find(|(name, _)| *name == compared);
+        let (more, middle) = than.map_or((f64::NAN, String::new()), |(_, than)| times.more_than(than));
         let (gpu, splats) = passes(app, arguments.frames.clamp(1, 100))?;
         println!(
             "{name:<36} {:>9.3} {:>15} {more:>9.3} {middle:>15} {gpu:>9.4} {splats:>9}  {compared}",

@@ -30,8 +30,8 @@ pub struct Arguments {
 /// Milliseconds of an app's frame, one for each round.
 pub struct Times(Vec<f64>);
 
-/// Reads the command line; `size`, `frames` and `rounds` are defaults. `more` is called with each option that not all benchmarks have and with what
-/// returns its value, and returns whether it is an option of this benchmark.
+/// Reads the command line; `size`, `frames` and `rounds` are defaults. `more` is called with each option that not all benchmarks have and with
+/// what returns its value, and returns whether it is an option of this benchmark.
 ///
 /// # Errors
 /// An unknown option, an option without its value or with a wrong one.
