@@ -25,12 +25,14 @@ use crate::renderer::shaders::Storage;
 use crate::renderer::timing::PassTimer;
 use crate::view::tiles;
 
-/// Gaussians of a part from which on each thread of `project_bin` takes four: then there are enough of them for any GPU.
-const MANY_GAUSSIANS: u32 = 1 << 18;
-
-/// Returns the number of Gaussians that each thread of `project_bin` takes.
+/// Returns the number of Gaussians of a part that each thread of `project_bin` takes. Where many are absent, those that are present fill its
+/// workgroups better if each takes more of them, but small parts need as many workgroups as they can have.
 pub(super) fn per_thread(count: u32) -> u32 {
-    if count < MANY_GAUSSIANS { 1 } else { 4 }
+    match count >> 18 {
+        0 => 1,
+        1..4 => 2,
+        _ => 4,
+    }
 }
 
 /// Returns the number of splats of a workgroup of `colors`, which takes four threads for each: `SPLATS` of the shader.
