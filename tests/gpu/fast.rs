@@ -83,6 +83,20 @@ fn bins_that_overflow_lack_no_splat_in_the_first_frame() {
     }
 }
 
+#[test]
+fn bins_that_overflow_have_room_in_the_next_frame() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let (scene, view) = (crowd(6000, 1, 0.05), view(400));
+    let capture = headless.upload(&scene).expect("the scene fits");
+    headless.set_design(Design::Fast);
+    let mut bytes = |views: &[View]| headless.time(&capture, views, 0).expect("the picture fits").bytes;
+    // Views are drawn once each, and those of another call are forgotten.
+    let [first, second, again] = [1, 2, 1].map(|count| bytes(&vec![view; count]));
+    // 8 bytes for each place: of 169 bins, 4096 each at first, then for 6000 and half as many.
+    assert_eq!(second - first, 8 * 169 * (9000 - 4096), "bytes of the second frame");
+    assert_eq!(again, first, "bytes of the first frame once more");
+}
+
 /// Returns the largest difference of two pictures or their transmittance.
 fn difference(found: &Frame, expected: &Frame) -> f32 {
     let colors = found.picture.pixels.iter().zip(&expected.picture.pixels).map(|(a, b)| (*a - *b).abs().max_element());

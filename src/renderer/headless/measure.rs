@@ -35,7 +35,8 @@ impl Headless {
     pub fn time(&mut self, capture: &GpuCapture, views: &[View], frames: usize) -> Result<Timings, GpuError> {
         let parameters = &self.measured();
         let (mut counts, mut active_counts) = (Vec::new(), Vec::new());
-        // The warm-up also finds room for the pairs of every view.
+        // The warm-up also finds the room that every view needs, and nothing that another capture needed.
+        self.view.release();
         for view in views {
             let active = self.take_active(capture, view.time);
             let frame = self.render_all(&[instance(capture, active.as_ref(), view)], parameters);
@@ -92,8 +93,7 @@ impl Headless {
         let device = &self.context.device;
         let mut view = ViewRenderer::new(device, &self.renderer);
         view.set_design(&self.renderer, self.view.design());
-        // Room for what the warm-up counted.
-        view.make_room(self.view.pair_room());
+        view.make_room_of(&self.view);
         let filtered = self.filtered.then(|| ActiveList::new(device, &self.renderer, capture));
         Lane { view, active: filtered.flatten(), timer: None }
     }

@@ -141,16 +141,15 @@ impl Headless {
         let size = instances.first().map_or(UVec2::ONE, |instance| instance.view.size);
         self.require_readable(size, parameters.precision)?;
         let counters = self.submit(instances, parameters)?;
-        let pairs = self.view.pair_count(&counters);
         // This frame lacks nothing without, but later ones are faster with it.
-        self.view.make_room(pairs);
+        self.view.make_room(&counters);
         let (color, depth) = self.read_targets(size)?;
         Ok(Frame {
             picture: Picture { size, pixels: color.iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect() },
             transmittance: color.iter().map(|p| p[3]).collect(),
             depth: depth.iter().map(|p| p[0]).collect(),
             median_depth: depth.iter().map(|p| p[1]).collect(),
-            counts: Counts { visible: counters.visible, pairs },
+            counts: Counts { visible: counters.visible, pairs: self.view.pair_count(&counters) },
         })
     }
 
@@ -195,7 +194,7 @@ impl Headless {
                 let (needed, limit) = (u64::from(pairs) * 4, u64::from(limit) * 4);
                 return Err(GpuError::TooLarge { what: "the pairs of splats and tiles", needed, limit });
             }
-            self.view.make_room(pairs);
+            self.view.make_room(&counters);
         }
     }
 

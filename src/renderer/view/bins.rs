@@ -169,6 +169,11 @@ const FRAMES_OF_PEAK: u32 = 1200;
 const MUCH: u32 = 4;
 
 impl BinRoom {
+    /// Returns that of bins which should have room for that many splats.
+    pub fn of(wanted: u32) -> Self {
+        Self { wanted, ..Self::default() }
+    }
+
     /// Returns the number of splats that there should be room for.
     pub fn wanted(&self) -> u32 {
         self.wanted

@@ -335,23 +335,33 @@ impl ViewRenderer {
         })
     }
 
-    /// Makes the next [`prepare`](Self::prepare) allocate room for that many pairs and half as many more, if there is
+    /// Makes the next [`prepare`](Self::prepare) allocate room for frames with these counters and half as much more, where there is
     /// hardly enough and the device allows it.
-    pub(crate) fn make_room(&mut self, pairs: u32) {
+    pub(crate) fn make_room(&mut self, counters: &Counters) {
+        // Counts of a frame before the buffers were released say nothing of the next.
+        let Some(Sizes { pairs: capacity, entries, .. }) = self.resources.as_ref().map(|made| made.sizes) else {
+            return;
+        };
         // The buffers grow early, since counts arrive some frames late.
-        if pairs > self.pair_capacity() / 4 * 3 {
+        let pairs = self.pair_count(counters);
+        if pairs > capacity / 4 * 3 {
             self.pairs_wanted = pairs.saturating_add(pairs / 2);
         }
+        if self.design == Design::Fast {
+            self.bin_room.note(counters.pairs_wanted.saturating_mul(self.bin_count()), entries);
+        }
+    }
+
+    /// Makes the next [`prepare`](Self::prepare) allocate as much room as another view has, or will have with its next.
+    pub(crate) fn make_room_of(&mut self, other: &Self) {
+        self.pairs_wanted = other.pairs_wanted.max(other.pair_capacity());
+        let entries = other.resources.as_ref().map_or(0, |made| made.sizes.entries);
+        self.bin_room = BinRoom::of(other.bin_room.wanted().max(entries));
     }
 
     /// Returns the number of pairs for which there is room.
     pub(crate) fn pair_capacity(&self) -> u32 {
         self.resources.as_ref().map_or(0, |made| made.sizes.pairs)
-    }
-
-    /// Returns the number of pairs for which there is room, or will be with the next [`prepare`](Self::prepare).
-    pub(crate) fn pair_room(&self) -> u32 {
-        self.pairs_wanted.max(self.pair_capacity())
     }
 
     /// Returns the number of pairs of a frame with these counters, whether there was room for all of them or not.
@@ -407,15 +417,12 @@ impl ViewRenderer {
     fn poll(&mut self) {
         if let Some(counters) = self.readback.poll() {
             let counters: Counters = bytemuck::pod_read_unaligned(&counters);
-            let pairs = self.pair_count(&counters);
             self.statistics.visible = counters.visible;
-            self.statistics.pairs = pairs;
+            self.statistics.pairs = self.pair_count(&counters);
             if self.design == Design::Fast {
                 self.fullest_bin = counters.pairs_wanted;
-                let Some(sizes) = self.resources.as_ref().map(|made| made.sizes) else { return };
-                self.bin_room.note(self.fullest_bin.saturating_mul(self.bin_count()), sizes.entries);
             }
-            self.make_room(pairs);
+            self.make_room(&counters);
         }
         if let Some((timer, readback)) = &mut self.timing
             && let Some(timestamps) = readback.poll()
