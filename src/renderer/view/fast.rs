@@ -25,13 +25,17 @@ use crate::renderer::shaders::Storage;
 use crate::renderer::timing::PassTimer;
 use crate::view::tiles;
 
-/// Returns the number of Gaussians of a part that each thread of `project_bin` takes. Where many are absent, those that are present fill its
+/// Gaussians of a part from which on each thread of `project_bin` takes two, and four. Where many are absent, those that are present fill its
 /// workgroups better if each takes more of them, but small parts need as many workgroups as they can have.
+const MANY_GAUSSIANS: u32 = 1 << 18;
+const VERY_MANY_GAUSSIANS: u32 = 1 << 20;
+
+/// Returns the number of Gaussians that each thread of `project_bin` takes.
 pub(super) fn per_thread(count: u32) -> u32 {
-    match count >> 18 {
-        0 => 1,
-        1..4 => 2,
-        _ => 4,
+    match count {
+        0..MANY_GAUSSIANS => 1,
+        MANY_GAUSSIANS..VERY_MANY_GAUSSIANS => 2,
+        VERY_MANY_GAUSSIANS.. => 4,
     }
 }
 

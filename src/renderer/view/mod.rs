@@ -339,24 +339,22 @@ impl ViewRenderer {
     /// hardly enough and the device allows it.
     pub(crate) fn make_room(&mut self, counters: &Counters) {
         // Counts of a frame before the buffers were released say nothing of the next.
-        let Some(Sizes { pairs: capacity, entries, .. }) = self.resources.as_ref().map(|made| made.sizes) else {
-            return;
-        };
+        let Some(made) = self.resources.as_ref().map(|made| made.sizes) else { return };
         // The buffers grow early, since counts arrive some frames late.
         let pairs = self.pair_count(counters);
-        if pairs > capacity / 4 * 3 {
+        if pairs > made.pairs / 4 * 3 {
             self.pairs_wanted = pairs.saturating_add(pairs / 2);
         }
         if self.design == Design::Fast {
-            self.bin_room.note(counters.pairs_wanted.saturating_mul(self.bin_count()), entries);
+            self.bin_room.note(counters.pairs_wanted.saturating_mul(self.bin_count()), made.entries);
         }
     }
 
     /// Makes the next [`prepare`](Self::prepare) allocate as much room as another view has, or will have with its next.
     pub(crate) fn make_room_of(&mut self, other: &Self) {
-        self.pairs_wanted = other.pairs_wanted.max(other.pair_capacity());
-        let entries = other.resources.as_ref().map_or(0, |made| made.sizes.entries);
-        self.bin_room = BinRoom::of(other.bin_room.wanted().max(entries));
+        let made = other.resources.as_ref().map(|made| made.sizes).unwrap_or_default();
+        self.pairs_wanted = other.pairs_wanted.max(made.pairs);
+        self.bin_room = BinRoom::of(other.bin_room.wanted().max(made.entries));
     }
 
     /// Returns the number of pairs for which there is room.
