@@ -1,29 +1,29 @@
 //! `gs4d ablate CHECKPOINT --data DIR`: the cost of every score, prune ratio and temporal filter, in one table.
 //!
-//! In: a checkpoint, its training views, its test views with images. Out: one row for the whole scene, one for each filter, one for
+//! In: a checkpoint, its training views, validation views with images. Out: one row for the whole scene, one for each filter, one for
 //! each score at each ratio; nothing is trained.
 
-use super::args::{CheckpointArgs, EngineArgs, ScoringArgs, SplitArgs, score_choice, values};
+use super::args::{CheckpointArgs, EngineArgs, ScoringArgs, SplitArgs, ValidationArgs, score_choice, values};
 use super::failure::Failure;
 use super::interrupt;
 use super::progress::Bars;
 use super::report::Report;
 use super::table::{Table, lines};
 use crate::offline::ablation::{AblationRow, AblationSettings, ablate};
-use crate::offline::dataset::Split;
+use crate::offline::dataset::{Split, require_images};
 use crate::offline::files::Files;
 use crate::offline::metrics::ImageMetrics;
 use crate::offline::search::ScoreChoice;
-use crate::offline::splits::{SPLIT_NAMES, share, split_name};
+use crate::offline::splits::{Splits, subset};
 use crate::offline::temporal_filter::FILTER_NAMES;
-use crate::offline::{Subject, write_beside};
+use crate::offline::{OfflineError, Subject, write_beside};
 use crate::scene::{FilterKind, MAX_SEGMENTS};
 use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Tabulate what every score, prune ratio and temporal filter costs on the test views, without any training.
+/// Tabulate what every score, prune ratio and temporal filter costs on the validation views, without any training.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -39,9 +39,11 @@ pub struct Ablate {
     input: PathBuf,
     #[command(flatten)]
     data: SplitArgs,
-    /// The views that rows are measured on.
-    #[arg(long, value_name = "SPLIT", default_value = "test", value_parser = values::one_of(&SPLIT_NAMES))]
-    split: Split,
+    /// The views that rows are measured on. What is chosen by the table must not be measured on the test views afterwards if these made it.
+    #[arg(long, value_name = "SPLIT", default_value = "validation", value_parser = values::one_of(&MEASURED))]
+    split: Measured,
+    #[command(flatten)]
+    validation: ValidationArgs,
     /// Measure on this many of them, evenly spread [default: all].
     #[arg(long, value_name = "N", value_parser = values::count(1_000_000))]
     measured_views: Option<usize>,
@@ -82,13 +84,25 @@ impl Ablate {
         let start = Instant::now();
         let mut scene = self.checkpoint.load(&self.input)?;
         scene.filter = None;
-        let train = self.data.open(Split::Train, &scene.trained_with, progress)?.views;
-        let mut dataset = self.data.open(self.split, &scene.trained_with, progress)?;
-        dataset.views = share(dataset.views, self.measured_views);
-        dataset.require_images()?;
+        let (train, measured) = match self.split {
+            Measured::Validation => {
+                let Splits { train, validation, .. } =
+                    self.data.divide(self.validation, &scene.trained_with, progress)?;
+                if validation.is_empty() {
+                    return Err(OfflineError::NoValidation { what: "the table" }.into());
+                }
+                (train, validation)
+            }
+            Measured::Split(split) => (
+                self.data.open(Split::Train, &scene.trained_with, progress)?.views,
+                self.data.open(split, &scene.trained_with, progress)?.views,
+            ),
+        };
+        let measured = subset(measured, self.measured_views);
+        require_images(&measured)?;
         let subject = Subject::new(&self.input, scene, self.checkpoint.background)?;
         let mut engine = self.engine.open()?;
-        let rows = ablate(&mut engine, subject, train, &dataset.views, &self.settings(), progress)?;
+        let rows = ablate(&mut engine, subject, train, &measured, &self.settings(), progress)?;
         let seconds = start.elapsed().as_secs_f64();
 
         let mut table = Table::new(&HEADS);
@@ -96,10 +110,10 @@ impl Ablate {
         if let Some(path) = &self.csv {
             write_csv(path, &rows)?;
         }
-        let (views, split) = (dataset.views.len(), split_name(dataset.split));
+        let (views, split) = (measured.len(), self.split.name());
         let text = format!("{table}\n")
             + &lines(&[
-                ("views", format!("{views} of the {split} split of {}", self.data.data.display())),
+                ("views", format!("{views} of the {split} views of {}", self.data.data.display())),
                 ("time", format!("{seconds:.1} s on {}", engine.name())),
             ]);
         let json = json!({
@@ -123,6 +137,28 @@ impl Ablate {
             scores: self.variants.clone(),
             scoring: self.scoring.settings(),
         }
+    }
+}
+
+/// The views that rows are measured on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Measured {
+    /// The validation views, which are not scored.
+    Validation,
+    /// All views of a split.
+    Split(Split),
+}
+
+const MEASURED: [(&str, Measured); 4] = [
+    ("validation", Measured::Validation),
+    ("train", Measured::Split(Split::Train)),
+    ("test", Measured::Split(Split::Test)),
+    ("val", Measured::Split(Split::Val)),
+];
+
+impl Measured {
+    fn name(self) -> &'static str {
+        MEASURED.iter().find(|(_, measured)| *measured == self).map_or("", |(name, _)| name)
     }
 }
 

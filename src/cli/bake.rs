@@ -3,7 +3,9 @@
 //! In: a checkpoint, its training views. Out: a package `NAME.gs4d`, `NAME.report.json` and `NAME.report.html` beside
 //! it, and a summary of the report.
 
-use super::args::{CheckpointArgs, EngineArgs, PackageArgs, ScoringArgs, SplitArgs, score_choice, values};
+use super::args::{
+    CheckpointArgs, EngineArgs, PackageArgs, ScoringArgs, SplitArgs, ValidationArgs, score_choice, values,
+};
 use super::failure::Failure;
 use super::progress::Bars;
 use super::report::Report;
@@ -19,8 +21,8 @@ use std::path::{Path, PathBuf};
 
 /// Turn a trained checkpoint into a small, fast package: score, prune, fine-tune, mask, compress, evaluate, report.
 ///
-/// An interrupted bake goes on where it was, from the results in OUT.bake/; with other inputs or options it starts over where they
-/// matter.
+/// An interrupted bake resumes from the results in OUT.bake/. A stage runs again if any of its inputs has changed: the checkpoint, a camera,
+/// an image, a mask, an option, the version of gs4d.
 #[derive(clap::Args)]
 #[command(group = clap::ArgGroup::new("goal").args(["ratio", "keep", "max_loss", "target_size"]))]
 #[command(after_help = "\
@@ -31,8 +33,8 @@ Examples:
   gs4d bake n3v.pth --data data/n3v --time-interval 0,10 --max-loss 0.2 --every 20 -o n3v.gs4d
 
 Beside the package: OUT.report.html with plots and pictures (open it in a browser; it needs no network) and OUT.report.json.
-Cameras and times of the training views are enough with --ratio or --keep; --max-loss needs their images, too, and the report
-compares the test views only if theirs are there.")]
+Every choice is made on validation views, which nothing is trained on. The report compares the test views, which no choice looks at, if
+their images are there. Cameras and times of the training views are enough with --ratio or --keep; --max-loss needs their images, too.")]
 pub struct Bake {
     /// The checkpoint, or a package of it in the trained form.
     #[arg(value_name = "CHECKPOINT")]
@@ -41,14 +43,16 @@ pub struct Bake {
     package: PackageArgs,
     #[command(flatten)]
     data: SplitArgs,
+    #[command(flatten)]
+    validation: ValidationArgs,
     /// Share of the Gaussians to remove, 0 to 1.
     #[arg(long, value_name = "R", value_parser = values::share)]
     ratio: Option<f64>,
     /// Number of Gaussians to keep.
     #[arg(long, value_name = "N", value_parser = values::count(1_000_000_000))]
     keep: Option<usize>,
-    /// Keep as few as lose no more than this on held-out training views, dB [default: 0.1, unless another goal is given]. Where
-    /// the others are trained, the loss is that after a short training.
+    /// Keep as few as lose no more than this on the validation views, dB [default: 0.1, unless another goal is given]. Where the others are
+    /// trained, the loss is that after a short training.
     #[arg(long, value_name = "DB", value_parser = values::not_negative)]
     max_loss: Option<f64>,
     /// Make a package of at most this many megabytes (of 1,000,000 bytes). If that cannot be done, OUT stays as it was and the smallest
@@ -117,7 +121,7 @@ impl Bake {
             checkpoint: self.input.clone(),
             data: self.data.data.clone(),
             out: out.to_owned(),
-            resolution: self.data.resolution,
+            splits: self.data.options(self.validation.validation),
             background: self.checkpoint.background,
             goal: self.goal(),
             rounds: self.rounds,
@@ -133,6 +137,7 @@ impl Bake {
             }),
             quality: self.quality,
             level: self.package.level,
+            trust_images: self.validation.trust_images,
             keep_work: self.keep_work,
         }
     }

@@ -70,7 +70,7 @@ impl Detail {
         let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
         let mut scene = self.checkpoint.load(&self.input)?;
         if self.data.is_given() {
-            let views = self.data.open(&scene.trained_with)?;
+            let views = self.data.open(&scene.trained_with, &mut Bars::default())?;
             let pixel = trained_pixel(&scene, &views);
             let pixel =
                 pixel.ok_or_else(|| Failure::about(&self.input, "no training view looks at it: is --data its own?"))?;

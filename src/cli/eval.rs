@@ -14,7 +14,7 @@ use crate::offline::engine::Engine;
 use crate::offline::evaluation::evaluate_scene;
 use crate::offline::files::Files;
 use crate::offline::metrics::{Evaluation, ImageMetrics, MetricSet, ViewMetrics, side_by_side};
-use crate::offline::splits::{SPLIT_NAMES, share, split_name};
+use crate::offline::splits::{SPLIT_NAMES, split_name, subset};
 use crate::offline::{OfflineError, write_png};
 use crate::scene::TemporalFilter;
 use crate::view::{Background, Picture};
@@ -104,7 +104,7 @@ impl Eval {
             scene.filter = None;
         }
         let mut dataset = self.data.open(self.split, &scene.trained_with, progress)?;
-        dataset.views = share(dataset.views, self.views);
+        dataset.views = subset(dataset.views, self.views);
         dataset.require_images()?;
         if let Some(out) = &self.out {
             let pictures = dataset.views.iter().map(|view| picture_of(out, &view.name));

@@ -2,29 +2,30 @@
 //!
 //! In: a scene in the trained form, training views with their images. Out: a package in the trained form, and how its quality developed.
 
-use super::args::{CheckpointArgs, PackageArgs, RendererArgs, SplitArgs, values};
+use super::args::{CheckpointArgs, PackageArgs, RendererArgs, SplitArgs, ValidationArgs, values};
 use super::failure::Failure;
 use super::interrupt;
 use super::progress::Bars;
 use super::report::Report;
 use super::table::{Table, bytes, lines};
 use crate::gaussian::GradientMode;
-use crate::offline::dataset::Split;
-use crate::offline::engine::AdapterDescription;
+use crate::offline::belonging::require_belonging;
+use crate::offline::engine::{AdapterDescription, Engine};
 use crate::offline::files::Files;
 use crate::offline::fine_tune::{
-    Behind, CurvePoint, FineTuneSettings, FineTuned, GradientSums, Rates, Resume, Terms, fine_tune,
+    Behind, CurvePoint, FineTuneSettings, FineTuned, GradientSums, Rates, Resume, Terms, TrainingImages, fine_tune,
 };
 use crate::offline::quantize::Quality;
-use crate::offline::trained_pixel;
-use crate::offline::work::{Fingerprint, Work};
+use crate::offline::store::{Key, Store};
+use crate::offline::{OfflineError, trained_pixel};
 use serde_json::json;
 use std::path::PathBuf;
 
 /// Train a scene on its views, so that it makes up for what was pruned.
 ///
-/// The number of Gaussians stays. Some training views are held out; the parameters that show them best are kept. A run that was killed
-/// goes on where it was, from OUT.tune/. Ctrl-C ends the run and writes the best parameters so far; pressed again it stops at once.
+/// The number of Gaussians stays. The step with the best PSNR on the validation views is kept; with --validation none, the last. A run that was
+/// killed resumes from OUT.tune/ and ends at the same bytes. Ctrl-C ends the run and writes the best parameters so far; pressed again it stops
+/// at once.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -42,6 +43,8 @@ pub struct FineTune {
     package: PackageArgs,
     #[command(flatten)]
     data: SplitArgs,
+    #[command(flatten)]
+    validation: ValidationArgs,
     /// Number of steps.
     #[arg(long, value_name = "N", default_value = "5000", value_parser = values::count(100_000_000))]
     steps: usize,
@@ -78,10 +81,7 @@ pub struct FineTune {
     /// What is behind images that do not cover all pixels: a random color for each view, or that of training.
     #[arg(long, value_name = "WHAT", default_value = "random", value_parser = values::one_of(&BEHIND))]
     behind: Behind,
-    /// Training views to hold out, at most a quarter of all; 0 trains on all, and looks at the same.
-    #[arg(long, value_name = "N", default_value = "8")]
-    held_out: usize,
-    /// Steps between two evaluations on the held-out views.
+    /// Steps between two evaluations on the validation views.
     #[arg(long, value_name = "N", default_value = "500", value_parser = values::count(1_000_000))]
     evaluate_every: usize,
     /// Steps after which a temporal filter of the kind key-frame or interval is computed again.
@@ -130,42 +130,65 @@ impl FineTune {
     /// A scene or views that cannot be used, a package that cannot be written, a failure of the GPU.
     pub fn run(&self) -> Result<Report, Failure> {
         let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
-        let work = Work::beside(out, ".tune")?;
+        let store = Store::beside(out, ".tune")?;
         let mut scene = self.checkpoint.load_to_change(&self.input)?;
         if let Some(background) = self.checkpoint.background {
             scene.trained_with.background = background;
         }
         let (gaussians, progress) = (scene.len(), &mut Bars::default());
-        let views = self.data.open(Split::Train, &scene.trained_with, progress)?.views;
-        let mut headless = self.renderer.open()?;
-        let cameras = self.data.data.join(Split::Train.file_name());
-        let fingerprint = Fingerprint::of_files(&[&self.input, &cameras])?;
-        let fingerprint = fingerprint.and(&format!("{:?} {:?}", scene.trained_with, self.data.resolution));
+        let splits = self.data.divide(self.validation, &scene.trained_with, progress)?;
+        scene.trained_with.validation = Some(splits.to_string());
+        let views = splits.all_training(&scene.trained_with, progress)?;
         scene.trained_with.pixel = trained_pixel(&scene, &views).or(scene.trained_with.pixel);
-        let resume = Resume { work: &work, fingerprint, every: self.save_every };
+        let mut engine = Engine::Gpu(Box::new(self.renderer.open()?));
+        if !self.validation.trust_images {
+            let runtime = scene.clone().into_runtime()?;
+            require_belonging(&mut engine, &runtime, &views, runtime.trained_background())?;
+        }
+        let Engine::Gpu(mut headless) = engine else { return Err(OfflineError::NotTrained.into()) };
+        let images = TrainingImages::load(splits.train.clone(), &splits.validation, &scene.trained_with, progress)?;
+        let key = Key::of_files(&[&self.input])?
+            .with(Key::of_images(&splits.train)?)
+            .with(Key::of_images(&splits.validation)?)
+            .and(&format!("{:?} {:?} {:?}", scene.trained_with, splits.train, splits.validation))
+            .and(env!("CARGO_PKG_VERSION"));
+        let resume = Resume { store: &store, key, every: self.save_every };
         let deferred = interrupt::defer();
-        let tuned = fine_tune(&mut headless, scene, &views, &self.settings(), Some(resume), progress)?;
+        let tuned = fine_tune(&mut headless, scene, &images, &self.settings(), Some(resume), progress);
+        let (tuned, interrupted) = match tuned {
+            Err(OfflineError::Interrupted { tuned: Some(tuned) }) => (*tuned, true),
+            tuned => (tuned?, false),
+        };
         let size = self.package.save(&tuned.scene)?;
         drop(deferred);
-        if !tuned.interrupted {
-            work.remove()?;
+        if !interrupted {
+            store.remove()?;
         }
-        let FineTuned { curve, best, steps_per_second, held_out, faults, interrupted, .. } = &tuned;
-        let before = curve.first().map_or(f64::NAN, |point| point.psnr);
+        let FineTuned { curve, best, steps_per_second, validation, faults, .. } = &tuned;
+        // Compression changes the picture: the last point is that of the package.
+        let compressed = self.compress.and_then(|_| curve.last()).filter(|_| !interrupted);
+        let found = compressed.unwrap_or(best);
+        let before = curve.first().and_then(|point| point.psnr);
+        let decibels = |psnr: Option<f64>| psnr.map_or("not measured".to_owned(), |psnr| format!("{psnr:.3} dB"));
         let speed = steps_per_second.map_or("-".to_owned(), |speed| format!("{speed:.1}"));
         let mut pairs = vec![
-            (
-                "fine-tuned",
-                format!("{gaussians} Gaussians on {} views, {speed} steps a second", views.len() - held_out),
-            ),
+            ("fine-tuned", format!("{gaussians} Gaussians on {} views, {speed} steps a second", images.len())),
+            ("views", splits.to_string()),
             (
                 "PSNR",
-                format!("{:.3} dB at step {}, before {before:.3} dB ({held_out} held-out views)", best.psnr, best.step),
+                format!(
+                    "{} at step {}{}, before {} ({validation} validation views)",
+                    decibels(found.psnr),
+                    found.step,
+                    if compressed.is_some() { ", compressed" } else { "" },
+                    decibels(before)
+                ),
             ),
             ("wrote", format!("{}, {}", out.display(), bytes(size))),
         ];
-        if *interrupted {
-            pairs.push(("interrupted", "the best so far; the same command goes on where this ended".to_owned()));
+        if interrupted {
+            let form = if self.compress.is_some() { ", not compressed" } else { "" };
+            pairs.push(("interrupted", format!("wrote the best so far{form}; the same command resumes")));
         }
         if let Some(faults) = faults {
             pairs.push(("left out", format!("{} gradients that were not finite", faults.count)));
@@ -175,10 +198,13 @@ impl FineTune {
             "out": out.display().to_string(),
             "bytes_out": size,
             "gaussians": gaussians,
-            "views": views.len() - held_out,
-            "held_out": held_out,
+            "views": images.len(),
+            "validation": validation,
+            "split": splits.to_string(),
             "psnr_before": before,
             "best": best,
+            "psnr": found.psnr,
+            "compressed": compressed.is_some(),
             "curve": curve,
             "steps_per_second": steps_per_second,
             "interrupted": interrupted,
@@ -186,7 +212,7 @@ impl FineTune {
             "adapter": AdapterDescription::of(&headless),
         });
         let mut report = Report::new(json, format!("{}\n{}", lines(&pairs), curve_table(curve)));
-        report.interrupted = *interrupted;
+        report.interrupted = interrupted;
         Ok(report)
     }
 
@@ -207,7 +233,6 @@ impl FineTune {
             sparse: self.sparse,
             behind: self.behind,
             seed: self.seed,
-            held_out: self.held_out,
             evaluate_every: self.evaluate_every,
             patience: self.patience,
             refresh_filter: self.refresh_filter,
@@ -220,10 +245,10 @@ impl FineTune {
 }
 
 fn curve_table(curve: &[CurvePoint]) -> String {
-    let mut table = Table::new(&["step", "loss", "training dB", "held-out dB"]);
+    let mut table = Table::new(&["step", "loss", "training dB", "validation dB"]);
     let number = |value: Option<f64>, digits| value.map_or("-".to_owned(), |value| format!("{value:.digits$}"));
     for CurvePoint { step, loss, training_psnr, psnr } in curve {
-        table.row([step.to_string(), number(*loss, 5), number(*training_psnr, 2), format!("{psnr:.3}")]);
+        table.row([step.to_string(), number(*loss, 5), number(*training_psnr, 2), number(*psnr, 3)]);
     }
     table.to_string()
 }

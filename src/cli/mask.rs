@@ -62,7 +62,11 @@ impl Mask {
         let mut scene = self.checkpoint.load_to_change(&self.input)?;
         scene.filter = None;
         let by_views = needs_views(self.filter);
-        let views = if by_views || self.every.is_some() { self.data.open(&scene.trained_with)? } else { Vec::new() };
+        let views = if by_views || self.every.is_some() {
+            self.data.open(&scene.trained_with, &mut Bars::default())?
+        } else {
+            Vec::new()
+        };
         let keys = self.keys(&views)?;
         let mut engine = if by_views { self.engine.open()? } else { Engine::Cpu };
         let filter = filter(&mut engine, &scene, self.filter, keys, &views, &mut Bars::default());

@@ -3,7 +3,9 @@
 //! In: a scene, training views or a file of scores, the number to keep or the loss allowed. Out: a package of the
 //! remaining Gaussians, in their original order.
 
-use super::args::{CheckpointArgs, DataArgs, EngineArgs, PackageArgs, ScoringArgs, file_size, score_choice, values};
+use super::args::{
+    CheckpointArgs, DataArgs, EngineArgs, PackageArgs, ScoringArgs, ValidationArgs, file_size, score_choice, values,
+};
 use super::failure::Failure;
 use super::progress::Bars;
 use super::report::Report;
@@ -30,8 +32,9 @@ Examples:
   gs4d prune chkpnt30000.pth --scores energy.f32 --keep 45000 -o half.gs4d
   gs4d prune chkpnt30000.pth --data data/toybox --max-loss 0.1 --variant energy-removal -o small.gs4d
 
---max-loss looks for the smallest count whose PSNR, on training views that were not scored, falls by no more than that; it needs
-their images. `auto` prunes by ours (energy, removal, energy-removal) and by the paper's (full) and keeps the best.")]
+--max-loss looks for the smallest count whose PSNR on the validation views falls by no more than that; it needs their images. `auto` prunes
+by ours (energy, removal, energy-removal) and by the paper's (full) and keeps the best. The checkpoint was trained on the validation views,
+unless they are those of transforms_val.json: the loss is that against views which it knows.")]
 pub struct Prune {
     /// The checkpoint or package to prune.
     #[arg(value_name = "IN")]
@@ -44,7 +47,7 @@ pub struct Prune {
     /// Number of Gaussians to keep.
     #[arg(long, value_name = "N", value_parser = values::count(1_000_000_000))]
     keep: Option<usize>,
-    /// Keep as few as lose no more than this on held-out training views, dB.
+    /// Keep as few as lose no more than this on the validation views, dB.
     #[arg(long, value_name = "DB", value_parser = values::not_negative)]
     max_loss: Option<f64>,
     /// Prune by the scores in this file, as `gs4d score` writes them.
@@ -55,6 +58,8 @@ pub struct Prune {
     variant: ScoreChoice,
     #[command(flatten)]
     data: DataArgs,
+    #[command(flatten)]
+    validation: ValidationArgs,
     #[command(flatten)]
     scoring: ScoringArgs,
     #[command(flatten)]
@@ -118,11 +123,13 @@ impl Prune {
             (Some(count), Some(candidate)) => return Ok(Pruned::unchecked(&scene, candidate, count)),
             (_, given) => given,
         };
-        let views = self.data.open(&scene.trained_with)?;
+        let progress = &mut Bars::default();
+        let splits = self.data.divide(self.validation, &scene.trained_with, progress)?;
         let subject = Subject::new(&self.input, scene, self.checkpoint.background)?;
-        let settings = PruneSettings { goal, score: self.variant, scoring: self.scoring.settings() };
+        let (scoring, trust_images) = (self.scoring.settings(), self.validation.trust_images);
+        let settings = PruneSettings { goal, score: self.variant, scoring, trust_images };
         let engine = &mut self.engine.open()?;
-        Ok(prune_by_views(engine, subject, views, given, &settings, &mut Bars::default())?)
+        Ok(prune_by_views(engine, subject, &splits, given, &settings, progress)?)
     }
 }
 

@@ -3,13 +3,14 @@
 //! In: a checkpoint, cameras and times. Out: a file of one float32 for each Gaussian, or a folder with a file for each
 //! score.
 
-use super::args::{CheckpointArgs, DataArgs, EngineArgs, ScoringArgs, score_choice, values};
+use super::args::{CheckpointArgs, DataArgs, EngineArgs, ScoringArgs, ValidationArgs, score_choice, values};
 use super::failure::Failure;
 use super::interrupt;
 use super::progress::Bars;
 use super::report::Report;
 use super::table::{Table, lines};
 use crate::offline::Subject;
+use crate::offline::belonging::require_belonging;
 use crate::offline::files::Files;
 use crate::offline::score::variant::Variant;
 use crate::offline::score::write_scores;
@@ -22,7 +23,7 @@ use std::time::Instant;
 
 /// Score the Gaussians of a checkpoint by what they contribute to its training views.
 ///
-/// Cameras and times are enough; only `auto` also looks at the images of the views it holds out.
+/// Cameras and times are enough; only `auto` also looks at the images of the validation views.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -31,7 +32,7 @@ Examples:
   gs4d score chkpnt30000.pth --data data/toybox --out best.f32 --ratio 0.5 --views 200
 
 Scores are little-endian float32 in the checkpoint's order, the more the better. `auto` prunes by ours (energy, removal,
-energy-removal) and by the paper's (full), draws training views that were not scored, and keeps the best.")]
+energy-removal) and by the paper's (full), draws the validation views, which are not scored, and keeps the best.")]
 pub struct Score {
     /// The checkpoint, or a package of it in the trained form.
     #[arg(value_name = "CHECKPOINT")]
@@ -47,6 +48,8 @@ pub struct Score {
     ratio: f64,
     #[command(flatten)]
     data: DataArgs,
+    #[command(flatten)]
+    validation: ValidationArgs,
     #[command(flatten)]
     scoring: ScoringArgs,
     #[command(flatten)]
@@ -68,18 +71,26 @@ impl Score {
         let progress = &mut Bars::default();
         let scene = self.checkpoint.load(&self.input)?;
         let (auto, scoring) = (self.variant == ScoreChoice::Auto, self.scoring.settings());
-        let (scored, held_out) = scoring.split(self.data.open(&scene.trained_with)?, auto);
+        let (scored, validation) = if auto {
+            let splits = self.data.divide(self.validation, &scene.trained_with, progress)?;
+            (splits.train, splits.validation)
+        } else {
+            (self.data.open(&scene.trained_with, progress)?, Vec::new())
+        };
         let subject = Subject::new(&self.input, scene, self.checkpoint.background)?;
         let mut engine = self.engine.open()?;
         let start = Instant::now();
-        let scores = scoring.scores(&mut engine, &subject, &scored, progress)?;
+        if auto && !self.validation.trust_images {
+            require_belonging(&mut engine, &subject.runtime, &validation, subject.background)?;
+        }
+        let (scores, views) = scoring.scores(&mut engine, &subject, &scored, progress)?;
         let seconds = start.elapsed().as_secs_f64();
         let total = subject.scene.len();
         let mut found = candidates(self.variant, &scores)?;
         let (mut table, mut summary) = (String::new(), None);
         if auto {
             let Subject { runtime, background, .. } = subject;
-            let search = ScoreSearch::open(&mut engine, &held_out, &runtime, background, false, progress)?;
+            let search = ScoreSearch::open(&mut engine, &validation, &runtime, background, false, progress)?;
             let whole = GaussianScene::from(runtime);
             let outcome = search.best(&mut engine, &whole, found, Goal::Remove(self.ratio), progress)?;
             let in_short = search.summary(outcome.outcomes);
@@ -91,7 +102,7 @@ impl Score {
         let names: Vec<&str> = found.iter().map(|candidate| candidate.name.as_str()).collect();
         let text = lines(&[
             ("scored", format!("{total} Gaussians, {} of which contribute", scores.contributing())),
-            ("views", format!("{} in {seconds:.1} s on {}", scored.len(), engine.name())),
+            ("views", format!("{views} in {seconds:.1} s on {}", engine.name())),
             ("scores", names.join(", ")),
             ("written", self.out.display().to_string()),
         ]) + &table;
@@ -101,7 +112,7 @@ impl Score {
             "scores": names,
             "gaussians": total,
             "contributing": scores.contributing(),
-            "views": scored.len(),
+            "views": views,
             "seconds": seconds,
             "engine": engine.name(),
             "contest": summary,
@@ -150,5 +161,5 @@ pub fn search_table(search: &SearchSummary) -> String {
         let loss = psnr.zip(search.psnr_before).map(|(psnr, before)| before - psnr);
         table.row([outcome.score.clone(), outcome.kept.to_string(), decibels(psnr), decibels(loss)]);
     }
-    format!("{table}dB on {} held-out training views, {}\n", search.views, search.compared_with)
+    format!("{table}dB on {} validation views, {}\n", search.views, search.compared_with)
 }

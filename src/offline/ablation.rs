@@ -77,8 +77,7 @@ pub fn ablate(
     if ratios.is_empty() || scores.is_empty() {
         return Ok(table.rows);
     }
-    let (scored, _) = scoring.split(train, false);
-    let found = scoring.scores(table.engine, &subject, &scored, progress)?;
+    let (found, _) = scoring.scores(table.engine, &subject, &train, progress)?;
     drop(subject.scene);
     let variants = variants(scores, found.has_volume()).into_iter();
     let scores = variants.map(|variant| found.of(variant).map(|scores| (variant, scores)));

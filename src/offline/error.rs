@@ -4,12 +4,13 @@
 //! them unchanged, preceded by the name of the file if the error does not contain it.
 
 use super::dataset::DatasetError;
-use super::fine_tune::TrainerError;
+use super::fine_tune::{FineTuned, TrainerError};
 use super::metrics::SizeMismatch;
 use super::picture_file::PictureError;
 use super::quantize::CompressError;
 use super::score::ScoreError;
 use crate::codec::CodecError;
+use crate::codec::package::PackageError;
 use crate::gaussian::InvalidGaussian;
 use crate::renderer::GpuError;
 use glam::UVec2;
@@ -68,6 +69,19 @@ pub enum OfflineError {
         /// Bytes that the system can give.
         available: u64,
     },
+    /// The images to train on are too large for the memory.
+    #[error(
+        "{count} images to train on need {:.1} GB of memory, and {:.1} GB are available: give a --resolution, or fewer views",
+        *.needed as f64 / 1e9, *.available as f64 / 1e9
+    )]
+    Images {
+        /// Number of images.
+        count: usize,
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes that the system can give.
+        available: u64,
+    },
     /// Two folders have no two pictures of the same name.
     #[error("{} and {}: no two pictures with the same name before the extension", .a.display(), .b.display())]
     NoPairs {
@@ -76,6 +90,30 @@ pub enum OfflineError {
         /// The second folder.
         b: PathBuf,
     },
+    /// A choice needs validation views, and the dataset has none.
+    #[error(
+        "{what} needs validation views, and this dataset has too few cameras and times to hold some out unasked (or --validation none is \
+         given): give --validation cameras or times, add transforms_val.json, or name the score and the count"
+    )]
+    NoValidation {
+        /// What would be chosen.
+        what: &'static str,
+    },
+    /// The user has asked the work to end. What has been stored is kept, and the same command resumes from it.
+    #[error("interrupted; the same command resumes")]
+    Interrupted {
+        /// The best result so far, if the work was fine-tuning.
+        tuned: Option<Box<FineTuned>>,
+    },
+    /// The result of a stage cannot be read back from its own bytes.
+    #[error("the result of the stage {stage} cannot be read back: a defect of gs4d, please report it")]
+    Unreadable {
+        /// Name of the stage.
+        stage: &'static str,
+    },
+    /// A package cannot be written.
+    #[error(transparent)]
+    Package(#[from] PackageError),
     /// There is no score to choose from.
     #[error("there is no score to prune by")]
     NoScore,

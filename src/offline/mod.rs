@@ -6,7 +6,8 @@
 //!
 //! | module | what it does |
 //! |---|---|
-//! | [`dataset`], [`splits`] | reads training and test views, chooses among them |
+//! | [`dataset`], [`splits`] | reads views and divides them into training, validation and test views |
+//! | [`belonging`] | checks that images show the capture |
 //! | [`picture_file`] | decodes pictures, for all of the others |
 //! | [`engine`] | opens the GPU or the CPU reference |
 //! | [`score`] | sums what every Gaussian contributes to the training views |
@@ -20,11 +21,12 @@
 //! | [`metrics`], [`evaluation`], [`fidelity`], [`comparison`] | measures how close pictures are |
 //! | [`ablation`] | tabulates what every score, ratio and filter costs |
 //! | [`files`] | tells inputs from outputs, and what cannot be written, before anything is computed |
-//! | [`work`] | keeps the results of stages, from which interrupted work resumes |
+//! | [`stages`], [`store`], [`stored`] | run stages and keep their results, from which interrupted work resumes |
 //! | [`orbit`], [`render`] | draws a scene from all around, many pictures at a time |
 
 pub mod ablation;
 pub mod bake;
+pub mod belonging;
 pub mod comparison;
 pub mod convert;
 pub mod dataset;
@@ -51,10 +53,12 @@ mod save;
 pub mod score;
 pub mod search;
 pub mod splits;
+pub mod stages;
+pub mod store;
+pub mod stored;
 mod subject;
 pub mod temporal_filter;
 mod trained_pixel;
-pub mod work;
 
 pub use error::OfflineError;
 pub use progress::{NoProgress, Progress};

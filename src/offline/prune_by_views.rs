@@ -1,12 +1,13 @@
 //! Pruning a scene by its training views: scoring, the search for the best score, and the scene that is left.
 //!
-//! In: a scene, its training views, a [`Goal`]. Out: the scene with the Gaussians that score highest ([`Pruned`]).
+//! In: a scene, the views of its dataset, a [`Goal`]. Out: the scene with the Gaussians that score highest ([`Pruned`]).
 
-use super::dataset::TrainingView;
+use super::belonging::require_belonging;
 use super::engine::Engine;
 use super::prune::{highest, select};
 use super::score::ScoringSettings;
 use super::search::{Candidate, Goal, Outcome, ScoreChoice, ScoreSearch, SearchOutcome, SearchSummary, candidates};
+use super::splits::Splits;
 use super::{OfflineError, Progress, Subject};
 use crate::scene::GaussianScene;
 
@@ -19,6 +20,8 @@ pub struct PruneSettings {
     pub score: ScoreChoice,
     /// Settings of the scoring.
     pub scoring: ScoringSettings,
+    /// Whether images are compared without a check that they show the scene.
+    pub trust_images: bool,
 }
 
 /// A pruned scene, and how its Gaussians were selected.
@@ -40,33 +43,40 @@ impl Pruned {
     }
 }
 
-/// Prunes by the scores in `given` or, if it is `None`, by those that the settings select. Results are compared on
-/// views held out from scoring if the goal is a loss, or if the best score is to be found ([`ScoreChoice::Auto`]).
+/// Prunes by the scores in `given` or, if it is `None`, by those that the settings select. Results are compared on the
+/// validation views if the goal is a loss, or if the best score is to be found ([`ScoreChoice::Auto`]); scores then come
+/// from the other training views. If nothing is compared, they come from all training views.
 ///
 /// # Errors
-/// The goal is a loss and images of held-out views are missing; views that show nothing of the scene; a failure of the
-/// engine.
+/// The goal is a loss and images of validation views are missing or show something else; views that show nothing of the
+/// scene; no validation views although something is to be compared; a failure of the engine.
 pub fn prune_by_views(
     engine: &mut Engine,
     subject: Subject,
-    views: Vec<TrainingView>,
+    splits: &Splits,
     given: Option<Candidate>,
     settings: &PruneSettings,
     progress: &mut dyn Progress,
 ) -> Result<Pruned, OfflineError> {
     let count = settings.goal.count(subject.scene.len());
     let compared = count.is_none() || (given.is_none() && settings.score == ScoreChoice::Auto);
-    let (scored, held_out) = settings.scoring.split(views, compared);
+    let Subject { runtime, background, .. } = &subject;
     // Before scoring, so that missing images are reported at once.
     let search = if compared {
-        let Subject { runtime, background, .. } = &subject;
-        Some(ScoreSearch::open(engine, &held_out, runtime, *background, count.is_none(), progress)?)
+        if !settings.trust_images {
+            require_belonging(engine, runtime, &splits.validation, *background)?;
+        }
+        Some(ScoreSearch::open(engine, &splits.validation, runtime, *background, count.is_none(), progress)?)
     } else {
         None
     };
-    let found = match given {
-        Some(candidate) => vec![candidate],
-        None => candidates(settings.score, &settings.scoring.scores(engine, &subject, &scored, progress)?)?,
+    let found = match (given, compared) {
+        (Some(candidate), _) => vec![candidate],
+        (None, compared) => {
+            let all = if compared { None } else { Some(splits.all_training(&runtime.trained_with, progress)?) };
+            let views = all.as_ref().unwrap_or(&splits.train);
+            candidates(settings.score, &settings.scoring.scores(engine, &subject, views, progress)?.0)?
+        }
     };
     let Subject { scene, runtime, .. } = subject;
     match search {

@@ -3,6 +3,7 @@
 //! In: the size of a picture, bytes for each of its pixels. Out: an error that tells how much is needed and how much there is.
 
 use super::OfflineError;
+use super::dataset::TrainingView;
 use crate::renderer::Headless;
 use glam::UVec2;
 use std::fs;
@@ -15,6 +16,9 @@ pub(super) const PICTURE: u64 = 12 + 3;
 const READ_BACK: u64 = 2 * 16 + 3 * 8;
 /// Bytes for each pixel of the targets on the GPU: color and depths.
 const TARGETS: u64 = 16 + 8;
+
+/// Bytes for each pixel of a training image in memory: color and coverage.
+const TRAINING_IMAGE: u64 = 4;
 
 /// Bytes up to which the system is not asked.
 const LITTLE: u64 = 1 << 28;
@@ -30,6 +34,18 @@ pub(super) fn on_gpu(headless: &Headless) -> u64 {
 /// Checks that there is memory to draw a picture. Where the system does not tell how much there is, any picture passes.
 pub(super) fn require(size: UVec2, bytes_per_pixel: u64) -> Result<(), OfflineError> {
     require_of(size, bytes_per_pixel, || available(&fs::read_to_string("/proc/meminfo").ok()?))
+}
+
+/// Checks that there is memory for the images of these views, before any of them is loaded.
+pub(super) fn require_images<'a>(views: impl Iterator<Item = &'a TrainingView>) -> Result<(), OfflineError> {
+    let sizes = views.map(|view| view.camera.size.as_u64vec2().element_product());
+    let (count, pixels) = sizes.fold((0, 0u64), |(count, sum), pixels| (count + 1, sum.saturating_add(pixels)));
+    let needed = pixels.saturating_mul(TRAINING_IMAGE);
+    let there = || available(&fs::read_to_string("/proc/meminfo").ok()?);
+    match (needed > LITTLE).then(there).flatten() {
+        Some(available) if needed > available => Err(OfflineError::Images { count, needed, available }),
+        _ => Ok(()),
+    }
 }
 
 fn require_of(size: UVec2, bytes_per_pixel: u64, available: impl FnOnce() -> Option<u64>) -> Result<(), OfflineError> {

@@ -1,8 +1,7 @@
-//! The search for the score to prune by and for the number of Gaussians to keep, on training views held out from
-//! scoring.
+//! The search for the score to prune by and for the number of Gaussians to keep, on validation views.
 //!
-//! In: scores ([`Candidate`]), a [`Goal`], views that were not scored. Out: the best candidate, and the outcome of each
-//! of them ([`SearchOutcome`]).
+//! In: scores ([`Candidate`]), a [`Goal`], validation views. Out: the best candidate, and the outcome of each candidate
+//! ([`SearchOutcome`]).
 
 use super::dataset::{DatasetError, TrainingView};
 use super::engine::Engine;
@@ -20,7 +19,7 @@ use std::fmt;
 /// Which scores to try.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ScoreChoice {
-    /// The best of [`Variant::AUTO`] on held-out views.
+    /// The best of [`Variant::AUTO`] on the validation views.
     Auto,
     /// Every variant.
     All,
@@ -69,7 +68,7 @@ pub enum Goal {
     Keep(usize),
     /// All but this share, 0 to 1.
     Remove(f64),
-    /// The fewest whose PSNR on held-out training views is at most this much lower, dB.
+    /// The fewest whose PSNR on the validation views is at most this much lower, dB.
     MaxLoss(f64),
     /// As many as fit into a package of this many bytes.
     Size(u64),
@@ -109,7 +108,7 @@ pub struct Outcome {
     pub score: String,
     /// Gaussians kept.
     pub kept: usize,
-    /// PSNR on the held-out views, dB; `None` if it was not measured.
+    /// PSNR on the validation views, dB; `None` if it was not measured.
     pub psnr: Option<f64>,
     /// Every count tried, in order.
     pub trials: Vec<Trial>,
@@ -126,7 +125,7 @@ pub struct SearchOutcome {
     pub outcomes: Vec<Outcome>,
 }
 
-/// What pictures of the held-out views are compared with.
+/// What pictures of the validation views are compared with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ComparedWith {
     /// The images of the dataset.
@@ -153,7 +152,7 @@ impl Serialize for ComparedWith {
 /// The summary of a search.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SearchSummary {
-    /// Number of held-out views.
+    /// Number of validation views.
     pub views: usize,
     /// What they are compared with.
     pub compared_with: ComparedWith,
@@ -163,7 +162,7 @@ pub struct SearchSummary {
     pub candidates: Vec<Outcome>,
 }
 
-/// A search on held-out views.
+/// A search on validation views.
 #[derive(Debug)]
 pub struct ScoreSearch {
     evaluator: Evaluator,
@@ -172,27 +171,31 @@ pub struct ScoreSearch {
 }
 
 impl ScoreSearch {
-    /// Loads the images of the held-out views. If images are missing and not `required`, reports a note and compares
+    /// Loads the images of the validation views. If images are missing and not `required`, reports a note and compares
     /// with the pictures of the whole scene instead.
     ///
     /// # Errors
-    /// Images that are required and missing, or cannot be read; a failure of the engine.
+    /// No validation views, images that are required and missing, or cannot be read; a failure of the engine.
     pub fn open(
         engine: &mut Engine,
-        held_out: &[TrainingView],
+        validation: &[TrainingView],
         scene: &RuntimeScene,
         background: Background,
         required: bool,
         progress: &mut dyn Progress,
     ) -> Result<Self, OfflineError> {
-        match Evaluator::by_images(held_out, &scene.trained_with, background) {
+        if validation.is_empty() {
+            let what = if required { "the loss allowed" } else { "the best score" };
+            return Err(OfflineError::NoValidation { what });
+        }
+        match Evaluator::by_images(validation, &scene.trained_with, background) {
             Ok(evaluator) => {
                 let baseline = Some(evaluator.psnr(engine, scene)?);
                 Ok(Self { evaluator, baseline })
             }
             Err(error @ DatasetError::MissingImages { .. }) if !required => {
                 progress.note(&format!("note: {error}. Compared with what the whole scene shows instead"));
-                let evaluator = Evaluator::by_scene(engine, scene, held_out, background)?;
+                let evaluator = Evaluator::by_scene(engine, scene, validation, background)?;
                 Ok(Self { evaluator, baseline: None })
             }
             Err(error) => Err(error.into()),
@@ -225,7 +228,7 @@ impl ScoreSearch {
         Ok(SearchOutcome { candidate, best, outcomes })
     }
 
-    /// Returns the PSNR of a scene on the held-out views, dB.
+    /// Returns the PSNR of a scene on the validation views, dB.
     ///
     /// # Errors
     /// A failure of the engine.
@@ -233,7 +236,7 @@ impl ScoreSearch {
         self.evaluator.psnr(engine, scene)
     }
 
-    /// Returns the PSNR of the whole scene on the held-out views, dB; `None` if it is compared with itself.
+    /// Returns the PSNR of the whole scene on the validation views, dB; `None` if it is compared with itself.
     pub fn baseline(&self) -> Option<f64> {
         self.baseline
     }

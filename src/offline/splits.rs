@@ -1,13 +1,22 @@
-//! The splits of a dataset, limited to the time interval of a capture.
+//! The views of a dataset by purpose: training, validation, test.
 //!
-//! In: a dataset folder, a split, the settings the capture was trained with. Out: the views of that split inside the
-//! capture's time interval, or an even share of them.
+//! In: a dataset folder, how validation views are found, the settings that the capture was trained with. Out: one object
+//! ([`Splits`]) with the views to train on and those to validate on, inside the capture's time interval. Everything that
+//! chooses looks at the validation views alone, and nothing trains on them before the choice. Test views are opened by
+//! [`Splits::test`], for evaluations and reports.
 
-use super::dataset::selection::even_share;
+use super::OfflineError;
+use super::dataset::selection::even_subset;
+use super::dataset::validation::{HeldOut, Validation, hold_out};
 use super::dataset::{CameraOptions, Dataset, DatasetError, Split, TrainingView};
 use super::progress::Progress;
 use crate::scene::TrainedWith;
-use std::path::Path;
+use glam::UVec2;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Most validation views that are measured for a choice: an even subset of those held out.
+const MEASURED: usize = 24;
 
 /// Every split with its name.
 pub const SPLIT_NAMES: [(&str, Split); 3] = [("train", Split::Train), ("test", Split::Test), ("val", Split::Val)];
@@ -17,19 +26,143 @@ pub fn split_name(split: Split) -> &'static str {
     SPLIT_NAMES.iter().find(|(_, other)| *other == split).map_or("test", |(name, _)| name)
 }
 
+/// How the cameras of a dataset are read, and how its validation views are found. Default: as the files say.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct SplitOptions {
+    /// Picture size, pixels; `None` takes that of the files.
+    pub size: Option<UVec2>,
+    /// Divisor of the picture size or target width, as in training; `None` keeps the size.
+    pub resolution: Option<i32>,
+    /// How validation views are found.
+    pub validation: Validation,
+}
+
+/// The views of a dataset by purpose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Splits {
+    /// The views to train on, and to score with, before the choice.
+    pub train: Vec<TrainingView>,
+    /// The views that choices are made on: at most 24 of those held out. Empty if nothing could be held out.
+    pub validation: Vec<TrainingView>,
+    /// How the validation views were found.
+    pub by: Validation,
+    /// Views held out, measured or not.
+    pub held_out: usize,
+    folder: PathBuf,
+    options: SplitOptions,
+}
+
+impl Splits {
+    /// Opens the training split of a folder and divides it. Views outside the time interval are dropped, as in training.
+    ///
+    /// # Errors
+    /// A split that is missing or cannot be used, validation views that the dataset does not allow.
+    pub fn open(
+        folder: &Path,
+        options: &SplitOptions,
+        trained_with: &TrainedWith,
+        progress: &mut dyn Progress,
+    ) -> Result<Self, OfflineError> {
+        let views = open_split(folder, Split::Train, options, trained_with, progress)?.views;
+        let HeldOut { train, validation, by } = match Self::of_file(folder, options, trained_with, progress)? {
+            Some(validation) => HeldOut { train: views, validation, by: Validation::File },
+            None => hold_out(&views, options.validation).ok_or_else(|| {
+                let message = format!(
+                    "does not allow --validation {}: it has too few cameras or times, or no {}",
+                    options.validation,
+                    Split::Val.file_name()
+                );
+                OfflineError::at(folder, message)
+            })?,
+        };
+        let held_out = validation.len();
+        let validation = subset(validation, Some(MEASURED));
+        Ok(Self { train, validation, by, held_out, folder: folder.to_owned(), options: *options })
+    }
+
+    /// Returns the views of `transforms_val.json` if they are to be used: the file is there with its images, is wanted,
+    /// and is not what the original tests on.
+    fn of_file(
+        folder: &Path,
+        options: &SplitOptions,
+        trained_with: &TrainedWith,
+        progress: &mut dyn Progress,
+    ) -> Result<Option<Vec<TrainingView>>, OfflineError> {
+        let is_test = Split::Test.resolved(folder) == Split::Val;
+        let is_there = folder.join(Split::Val.file_name()).is_file();
+        let wanted = match options.validation {
+            Validation::File => true,
+            Validation::Auto => is_there && !is_test,
+            Validation::Cameras | Validation::Times | Validation::None => false,
+        };
+        if !wanted {
+            return Ok(None);
+        }
+        let dataset = open_split(folder, Split::Val, options, trained_with, progress)?;
+        match dataset.require_images() {
+            Ok(()) => Ok(Some(dataset.views)),
+            Err(error) if options.validation == Validation::File => Err(error.into()),
+            Err(error) => {
+                progress.note(&format!("note: {} is not used: {error}", Split::Val.file_name()));
+                Ok(None)
+            }
+        }
+    }
+
+    /// Returns every view that may be trained on once all choices have been made: those to train on and, unless they
+    /// come from a file of their own, those held out.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn all_training(
+        &self,
+        trained_with: &TrainedWith,
+        progress: &mut dyn Progress,
+    ) -> Result<Vec<TrainingView>, OfflineError> {
+        match self.by {
+            Validation::Cameras | Validation::Times => {
+                Ok(open_split(&self.folder, Split::Train, &self.options, trained_with, progress)?.views)
+            }
+            Validation::Auto | Validation::File | Validation::None => Ok(self.train.clone()),
+        }
+    }
+
+    /// Opens the test views, which no choice may look at.
+    ///
+    /// # Errors
+    /// A split that is missing or cannot be used.
+    pub fn test(&self, trained_with: &TrainedWith, progress: &mut dyn Progress) -> Result<Dataset, DatasetError> {
+        open_split(&self.folder, Split::Test, &self.options, trained_with, progress)
+    }
+}
+
+/// How the views were divided, for people.
+impl fmt::Display for Splits {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (train, held_out, measured) = (self.train.len(), self.held_out, self.validation.len());
+        let by = match self.by {
+            Validation::File => "of transforms_val.json",
+            Validation::Cameras => "of whole cameras held out",
+            Validation::Times => "of blocks of time held out",
+            Validation::Auto | Validation::None => return write!(f, "{train} views to train on, none to validate on"),
+        };
+        write!(f, "{train} views to train on, {held_out} to validate on {by}")?;
+        if measured < held_out { write!(f, " ({measured} measured)") } else { Ok(()) }
+    }
+}
+
 /// Opens a split. Views outside the time interval are dropped, as in training, and their number is reported as a note.
-/// `resolution` is a divisor of the picture size or a target width in pixels, as in training; `None` keeps the size.
 ///
 /// # Errors
 /// A split that is missing or cannot be used.
 pub fn open_split(
     folder: &Path,
     split: Split,
-    resolution: Option<i32>,
+    options: &SplitOptions,
     trained_with: &TrainedWith,
     progress: &mut dyn Progress,
 ) -> Result<Dataset, DatasetError> {
-    let options = CameraOptions { resolution, ..CameraOptions::default() };
+    let options = CameraOptions { size: options.size, resolution: options.resolution, time_interval: None };
     let all = Dataset::open(folder, split, &options)?;
     let [first, last] = trained_with.time_interval;
     let outside = all.views.iter().filter(|view| !(first..=last).contains(&view.time)).count();
@@ -44,10 +177,10 @@ pub fn open_split(
     Dataset::open(folder, split, &CameraOptions { time_interval: Some([first, last]), ..options })
 }
 
-/// Returns an even share of at most `count` views, in their order; `None` returns all.
-pub fn share(views: Vec<TrainingView>, count: Option<usize>) -> Vec<TrainingView> {
+/// Returns an even subset of at most `count` views, in their order; `None` returns all.
+pub fn subset(views: Vec<TrainingView>, count: Option<usize>) -> Vec<TrainingView> {
     match count {
-        Some(count) => even_share(&views, count).into_iter().map(|index| views[index].clone()).collect(),
+        Some(count) => even_subset(&views, count).into_iter().map(|index| views[index].clone()).collect(),
         None => views,
     }
 }

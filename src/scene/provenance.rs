@@ -35,6 +35,10 @@ pub struct TrainedWith {
     /// anti-aliased ([`View::antialiased`](crate::view::View::antialiased)). Default: `None`, not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pixel: Option<f32>,
+    /// How the views of the dataset were divided when the capture was fine-tuned or baked, for people: how many were trained on, and on which
+    /// the choices were made. Default: `None`, not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub validation: Option<String>,
 }
 
 impl Default for TrainedWith {
@@ -51,6 +55,7 @@ impl Default for TrainedWith {
             iteration: 0,
             spatial_lr_scale: 1.0,
             pixel: None,
+            validation: None,
         }
     }
 }

@@ -92,6 +92,8 @@ fn an_ablation_has_every_row() {
     let json = gs4d(&arguments![
         "ablate",
         &scene,
+        "--validation",
+        "cameras",
         "--data",
         &data,
         "--ratios",

@@ -94,7 +94,12 @@ const VERBS: [Verb; 11] = [
         name: "ablate",
         arguments: |from, to| {
             let few = arguments!["--variants", "energy", "--ratios", "0.5", "--filters", "support", "--engine", "cpu"];
-            [on_data("ablate", from), few.to_vec(), arguments!["--csv", to.join("made.csv")].to_vec()].concat()
+            [
+                on_data("ablate", from),
+                few.to_vec(),
+                arguments!["--validation", "cameras", "--csv", to.join("made.csv")].to_vec(),
+            ]
+            .concat()
         },
         files: &["made.csv"],
         needs_gpu: false,

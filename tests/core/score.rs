@@ -12,7 +12,7 @@ use bevy_gs4d::codec;
 use bevy_gs4d::codec::checkpoint::CheckpointOptions;
 use bevy_gs4d::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
 use bevy_gs4d::offline::NoProgress;
-use bevy_gs4d::offline::dataset::selection::{distinct_cameras, even_share, to_draw};
+use bevy_gs4d::offline::dataset::selection::{distinct_cameras, even_subset, to_draw};
 use bevy_gs4d::offline::dataset::{CameraOptions, Dataset, Split};
 use bevy_gs4d::offline::prune::{highest, kept_count, select};
 use bevy_gs4d::offline::score::variant::Variant;
@@ -322,7 +322,7 @@ fn overlap(a: &[f32], b: &[f32]) -> f64 {
 #[test]
 fn a_share_of_toybox_ranks_like_all_of_it() {
     let Some((folder, scene, dataset)) = capture("toybox", None) else { return };
-    let views: Vec<_> = even_share(&dataset.views, 40).into_iter().map(|i| dataset.views[i].clone()).collect();
+    let views: Vec<_> = even_subset(&dataset.views, 40).into_iter().map(|i| dataset.views[i].clone()).collect();
     let views = to_draw(&views, scene.trained_with.raster_fov);
     let scores = accumulate(&scene, &views, Background::Color([0.0; 3])).expect("toybox's own views");
     for (variant, array, least) in [(Variant::Spatial, "spatial", 0.855), (Variant::Sigma, "sigma", 0.97)] {

@@ -5,15 +5,13 @@
 
 use crate::support::{dataset, gpu};
 use bevy_gs4d::gaussian::{GradientMode, Parameters};
-use bevy_gs4d::offline::dataset::{Split, TrainingView};
-use bevy_gs4d::offline::fine_tune::{
-    FineTuneSettings, FineTuned, Rates, Resume, Sample, Trainer, TrainingImages, fine_tune,
-};
+use bevy_gs4d::offline::dataset::TrainingView;
+use bevy_gs4d::offline::fine_tune::{FineTuneSettings, Rates, Resume, Sample, Trainer, TrainingImages, fine_tune};
 use bevy_gs4d::offline::prune::select;
 use bevy_gs4d::offline::quantize::Quality;
-use bevy_gs4d::offline::splits::open_split;
-use bevy_gs4d::offline::work::{Fingerprint, Work};
-use bevy_gs4d::offline::{NoProgress, Progress};
+use bevy_gs4d::offline::splits::{SplitOptions, Splits};
+use bevy_gs4d::offline::store::{Key, Store};
+use bevy_gs4d::offline::{NoProgress, OfflineError, Progress};
 use bevy_gs4d::renderer::Headless;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Environment, FilterKind, GaussianScene, SceneForm, TemporalFilter, Trained};
@@ -28,6 +26,7 @@ struct Lesson {
     folder: TempDir,
     scene: GaussianScene,
     views: Vec<TrainingView>,
+    images: TrainingImages,
 }
 
 impl Lesson {
@@ -39,9 +38,12 @@ impl Lesson {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let runtime = scene.clone().into_runtime().expect("a synthetic scene can be drawn");
         let data = folder.path().join("data");
-        dataset::write(&data, &runtime, Vec3::ZERO, 3, 4, UVec2::splat(40), true);
-        let views = open_split(&data, Split::Train, None, &scene.trained_with, &mut NoProgress);
-        Self { scene, views: views.expect("it was just written").views, folder }
+        dataset::write(&data, &runtime, Vec3::ZERO, 4, 4, UVec2::splat(40), true);
+        let splits = Splits::open(&data, &SplitOptions::default(), &scene.trained_with, &mut NoProgress);
+        let splits = splits.expect("the dataset was just written");
+        let images =
+            TrainingImages::load(splits.train.clone(), &splits.validation, &scene.trained_with, &mut NoProgress);
+        Self { scene, images: images.expect("the images were just written"), views: splits.train, folder }
     }
 
     /// Returns the scene with darker colors and a filter.
@@ -51,8 +53,8 @@ impl Lesson {
         scene
     }
 
-    fn work(&self, name: &str) -> Work {
-        Work::beside(&self.folder.path().join(name), ".tune").expect("the folder can be written to")
+    fn store(&self, name: &str) -> Store {
+        Store::beside(&self.folder.path().join(name), ".tune").expect("the folder can be written to")
     }
 }
 
@@ -77,8 +79,7 @@ fn filter(kind: FilterKind) -> TemporalFilter {
 fn what_a_filter_leaves_out_is_not_trained() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
-    let images = TrainingImages::load(&lesson.views, 0, &lesson.scene.trained_with, &mut NoProgress);
-    assert_eq!(images.expect("they were just written").len(), 12, "all views");
+    assert_eq!(lesson.images.len(), 12, "the views of three of four cameras");
     let mut gradients = |scene: GaussianScene, view: &TrainingView| {
         let mut trainer = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("it can be trained");
         let image = trainer.upload(&view.load_covered().expect("it was just written")).expect("it fits");
@@ -110,15 +111,9 @@ fn a_filter_of_what_views_see_follows_the_gaussians_and_support_comes_last() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let mut run = |kind, refresh_filter| {
-        let settings = FineTuneSettings {
-            steps: 6,
-            held_out: 2,
-            evaluate_every: 3,
-            refresh_filter,
-            ..FineTuneSettings::default()
-        };
+        let settings = FineTuneSettings { steps: 6, evaluate_every: 3, refresh_filter, ..FineTuneSettings::default() };
         let scene = lesson.disturbed(Some(filter(kind)));
-        let tuned = fine_tune(&mut headless, scene, &lesson.views, &settings, None, &mut NoProgress);
+        let tuned = fine_tune(&mut headless, scene, &lesson.images, &settings, None, &mut NoProgress);
         let filter = tuned.expect("it can be trained").scene.filter.expect("it had one");
         assert_eq!((filter.kind, filter.segments, filter.count), (kind, 2, COUNT), "of the same kind");
         filter
@@ -166,18 +161,17 @@ fn colors_of_one_coefficient_are_compressed_without_codebooks() {
     let mut scene = lesson.disturbed(None);
     scene.form.truncate_colors(0, 0);
     let settings = FineTuneSettings { steps: 2, compress: Some((Quality::Balanced, 4)), ..FineTuneSettings::default() };
-    let tuned = fine_tune(&mut headless, scene, &lesson.views, &settings, None, &mut NoProgress);
+    let tuned = fine_tune(&mut headless, scene, &lesson.images, &settings, None, &mut NoProgress);
     let colors = tuned.expect("it can be compressed").scene.form.color_degrees();
     assert_eq!(colors.coefficients, 1, "nothing is added");
 }
 
 #[test]
-fn runs_that_were_interrupted_end_as_others() {
+fn an_interrupted_and_resumed_run_ends_as_an_uninterrupted_one() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let settings = FineTuneSettings {
         steps: 8,
-        held_out: 2,
         evaluate_every: 2,
         rates: Rates { mean: 2e-3, color: 1e-2, ..Rates::OURS },
         refresh_filter: 3,
@@ -186,20 +180,24 @@ fn runs_that_were_interrupted_end_as_others() {
         rounding: true,
         ..FineTuneSettings::default()
     };
-    let run = |headless: &mut Headless, work: &Work, progress: &mut dyn Progress| -> FineTuned {
-        let resume = Resume { work, fingerprint: Fingerprint(7), every: 1 };
+    let run = |headless: &mut Headless, store: &Store, progress: &mut dyn Progress| {
+        let resume = Resume { store, key: Key::of(b"inputs"), every: 2 };
         let scene = lesson.disturbed(Some(filter(FilterKind::KeyFrame)));
-        fine_tune(headless, scene, &lesson.views, &settings, Some(resume), progress).expect("it can be trained")
+        fine_tune(headless, scene, &lesson.images, &settings, Some(resume), progress)
     };
-    let whole = run(&mut headless, &lesson.work("whole"), &mut NoProgress);
-    assert!(!whole.interrupted, "nobody interrupts it");
-    for (task, left) in [("fine-tuning", 4), ("training codebooks", 2), ("training codebooks", 53)] {
-        let work = lesson.work(&format!("{task} {left}"));
-        let stopped = run(&mut headless, &work, &mut Interrupting { task, left, running: Vec::new() });
-        assert!(stopped.interrupted, "{task} is interrupted");
-        let resumed = run(&mut headless, &work, &mut NoProgress);
-        assert!(!resumed.interrupted && resumed.scene == whole.scene, "{task}: the same scene");
-        assert_eq!(resumed.best, whole.best, "{task}: the same quality");
+    let whole = run(&mut headless, &lesson.store("whole"), &mut NoProgress).expect("it can be trained");
+    for (task, left) in [("fine-tuning", 3), ("fine-tuning", 4), ("training codebooks", 2), ("training codebooks", 53)]
+    {
+        let store = lesson.store(&format!("{task} {left}"));
+        let stopped = run(&mut headless, &store, &mut Interrupting { task, left, running: Vec::new() });
+        let Err(OfflineError::Interrupted { tuned: Some(stopped) }) = stopped else {
+            panic!("{task}: an interrupted run is an error with the best result so far: {stopped:?}")
+        };
+        let made = whole.curve.iter().take(stopped.curve.len());
+        assert!(made.eq(&stopped.curve), "{task}: the interruption is no evaluation: {:?}", stopped.curve);
+        let resumed = run(&mut headless, &store, &mut NoProgress).expect("it can be trained");
+        assert!(resumed.scene == whole.scene, "{task}: the resumed run ends at the same scene");
+        assert_eq!((resumed.best, &resumed.curve), (whole.best, &whole.curve), "{task}: and the same curve");
     }
 }
 
@@ -209,8 +207,8 @@ fn the_last_steps_see_rounded_geometry_if_they_should() {
     let lesson = Lesson::new();
     let mut run = |rounding: bool, steps: usize| {
         let compress = Some((Quality::Small, steps));
-        let settings = FineTuneSettings { steps: 0, held_out: 2, compress, rounding, ..FineTuneSettings::default() };
-        let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.views, &settings, None, &mut NoProgress);
+        let settings = FineTuneSettings { steps: 0, compress, rounding, ..FineTuneSettings::default() };
+        let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.images, &settings, None, &mut NoProgress);
         tuned.expect("it can be trained").scene
     };
     assert!(run(true, 5) != run(false, 5), "steps on rounded geometry lead elsewhere");
@@ -241,11 +239,16 @@ fn captures_of_every_model_and_with_an_environment_map_are_trained() {
         change(&mut trained(&mut scene).parameters);
         scene.environment = environment;
         let lesson = Lesson::of(scene);
-        let settings = FineTuneSettings { steps: 20, held_out: 2, evaluate_every: 20, ..FineTuneSettings::default() };
-        let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.views, &settings, None, &mut NoProgress);
+        let settings = FineTuneSettings { steps: 20, evaluate_every: 20, ..FineTuneSettings::default() };
+        // Whether it learns at all is measured on the views that it learns from.
+        let (views, trained_with) = (lesson.views.clone(), &lesson.scene.trained_with);
+        let images = TrainingImages::load(views, &lesson.views, trained_with, &mut NoProgress);
+        let images = images.expect("the images were just written");
+        let tuned = fine_tune(&mut headless, lesson.disturbed(None), &images, &settings, None, &mut NoProgress);
         let tuned = tuned.unwrap_or_else(|error| panic!("{name}: {error}"));
         let [first, .., _] = tuned.curve[..] else { panic!("{name}: a curve") };
-        assert!(tuned.best.psnr > first.psnr + 0.5, "{name}: {:.2} to {:.2} dB", first.psnr, tuned.best.psnr);
+        let (before, after) = (first.psnr.expect("validation views"), tuned.best.psnr.expect("validation views"));
+        assert!(after > before + 0.5, "{name}: {before:.2} to {after:.2} dB");
         assert_eq!(tuned.scene.environment, lesson.scene.environment, "{name}: the map stays");
     }
 }
@@ -255,10 +258,8 @@ fn training_ends_early_when_it_no_longer_helps() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let rates = Rates { color: 0.0, harmonics: 0.0, opacity: 0.0, scale: 0.0, rotation: 0.0, mean: 0.0, mean_t: 0.0 };
-    let settings =
-        FineTuneSettings { steps: 50, held_out: 2, evaluate_every: 1, patience: Some(3), rates, ..Default::default() };
-    let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.views, &settings, None, &mut NoProgress);
+    let settings = FineTuneSettings { steps: 50, evaluate_every: 1, patience: Some(3), rates, ..Default::default() };
+    let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.images, &settings, None, &mut NoProgress);
     let tuned = tuned.expect("it can be trained");
     assert_eq!((tuned.curve.len(), tuned.best.step), (4, 0), "three evaluations without an improvement");
-    assert!(!tuned.interrupted, "nobody interrupted it");
 }

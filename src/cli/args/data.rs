@@ -4,13 +4,14 @@
 
 use super::values;
 use crate::cli::failure::Failure;
-use crate::offline::Progress;
-use crate::offline::dataset::{CameraOptions, Dataset, DatasetError, Split, TrainingView};
+use crate::offline::dataset::validation::Validation;
+use crate::offline::dataset::{Dataset, DatasetError, Split, TrainingView};
 use crate::offline::files::Files;
-use crate::offline::splits::open_split;
+use crate::offline::splits::{SplitOptions, Splits, open_split};
+use crate::offline::{OfflineError, Progress};
 use crate::scene::TrainedWith;
 use glam::UVec2;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Where the training views are.
 #[derive(clap::Args)]
@@ -39,21 +40,51 @@ impl DataArgs {
         self.data.iter().fold(files, |files, folder| files.reads_data(folder))
     }
 
-    /// Returns the training views within the capture's time interval.
+    /// Returns the training views within the capture's time interval, undivided.
     ///
     /// # Errors
     /// No folder is given, or it cannot be used.
-    pub fn open(&self, trained_with: &TrainedWith) -> Result<Vec<TrainingView>, Failure> {
-        let folder = self.data.as_ref().ok_or_else(|| {
-            Failure::new("this needs the training views: give --data DIR, the folder that the capture was trained on")
-        })?;
-        let options = CameraOptions {
-            size: self.size,
-            resolution: self.resolution,
-            time_interval: Some(trained_with.time_interval),
-        };
-        Ok(Dataset::open(folder, Split::Train, &options).map_err(or_give_size)?.views)
+    pub fn open(&self, trained_with: &TrainedWith, progress: &mut dyn Progress) -> Result<Vec<TrainingView>, Failure> {
+        let options = SplitOptions { size: self.size, resolution: self.resolution, validation: Validation::None };
+        Ok(open_split(self.folder()?, Split::Train, &options, trained_with, progress).map_err(or_give_size)?.views)
     }
+
+    /// Returns the views to train on and those to validate on.
+    ///
+    /// # Errors
+    /// No folder is given, or it cannot be used.
+    pub fn divide(
+        &self,
+        validation: ValidationArgs,
+        trained_with: &TrainedWith,
+        progress: &mut dyn Progress,
+    ) -> Result<Splits, Failure> {
+        let options = SplitOptions { size: self.size, resolution: self.resolution, validation: validation.validation };
+        let splits = Splits::open(self.folder()?, &options, trained_with, progress);
+        splits.map_err(|error| match error {
+            OfflineError::Dataset(error) => or_give_size(error),
+            error => error.into(),
+        })
+    }
+
+    fn folder(&self) -> Result<&Path, Failure> {
+        self.data.as_deref().ok_or_else(|| {
+            Failure::new("this needs the training views: give --data DIR, the folder that the capture was trained on")
+        })
+    }
+}
+
+/// How validation views are found.
+#[derive(Debug, Clone, Copy, clap::Args)]
+#[command(next_help_heading = "Validation")]
+pub struct ValidationArgs {
+    /// The views that every choice is made on, which nothing is trained on before: those of transforms_val.json (file), whole cameras, blocks
+    /// of time (times), or none; auto takes the first of these that the data allows.
+    #[arg(long, value_name = "VIEWS", default_value = "auto", value_parser = values::one_of(&Validation::NAMES))]
+    pub validation: Validation,
+    /// Skip the check that the images show the capture.
+    #[arg(long)]
+    pub trust_images: bool,
 }
 
 /// Returns the failure of a verb that takes `--size`.
@@ -92,6 +123,24 @@ impl SplitArgs {
         trained_with: &TrainedWith,
         progress: &mut dyn Progress,
     ) -> Result<Dataset, DatasetError> {
-        open_split(&self.data, split, self.resolution, trained_with, progress)
+        open_split(&self.data, split, &self.options(Validation::None), trained_with, progress)
+    }
+
+    /// Returns how the views are read and divided.
+    pub fn options(&self, validation: Validation) -> SplitOptions {
+        SplitOptions { size: None, resolution: self.resolution, validation }
+    }
+
+    /// Returns the views to train on and those to validate on.
+    ///
+    /// # Errors
+    /// A folder that cannot be used, or does not allow such validation views.
+    pub fn divide(
+        &self,
+        validation: ValidationArgs,
+        trained_with: &TrainedWith,
+        progress: &mut dyn Progress,
+    ) -> Result<Splits, OfflineError> {
+        Splits::open(&self.data, &self.options(validation.validation), trained_with, progress)
     }
 }

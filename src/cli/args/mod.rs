@@ -11,7 +11,7 @@ pub mod values;
 mod views;
 
 pub use checkpoint::{CheckpointArgs, is_package};
-pub use data::{DataArgs, SplitArgs};
+pub use data::{DataArgs, SplitArgs, ValidationArgs};
 pub use engine::{DesignArgs, EngineArgs, RendererArgs, RenderersArgs};
 pub use package::{PackageArgs, file_size};
 pub use scoring::{ScoringArgs, score_choice};

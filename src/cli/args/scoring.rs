@@ -22,12 +22,9 @@ pub fn score_choice(with_all: bool) -> impl TypedValueParser<Value = ScoreChoice
 #[derive(clap::Args)]
 #[command(next_help_heading = "Scoring")]
 pub struct ScoringArgs {
-    /// Score with an even share of N views [default: all].
+    /// Score with an even subset of N views [default: all].
     #[arg(long, value_name = "N", value_parser = values::count(10_000_000))]
     views: Option<usize>,
-    /// Training views that are kept out of scoring where results are compared, to compare them on; at most a quarter of all.
-    #[arg(long, value_name = "N", default_value = "24", value_parser = values::count(100_000))]
-    held_out: usize,
     /// Power of the volume in the paper's factor; 0 leaves it out.
     #[arg(long, value_name = "P", default_value = "0.1", value_parser = values::not_negative)]
     volume_power: f64,
@@ -40,6 +37,6 @@ impl ScoringArgs {
     /// Returns the settings of the library.
     pub fn settings(&self) -> ScoringSettings {
         let score = ScoreSettings { volume_power: self.volume_power, volume_rank: self.volume_rank };
-        ScoringSettings { views: self.views, held_out: self.held_out, score }
+        ScoringSettings { views: self.views, score }
     }
 }

@@ -94,6 +94,7 @@ impl CheckpointOptions {
             prefilter_var: self.prefilter_var.or(cfg.prefilter_var).unwrap_or(default.prefilter_var),
             iteration: file.iteration,
             pixel: default.pixel,
+            validation: default.validation,
             spatial_lr_scale: file.spatial_lr_scale,
         }
     }

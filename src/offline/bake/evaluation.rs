@@ -6,11 +6,11 @@
 use super::Bake;
 use crate::codec;
 use crate::codec::checkpoint::CheckpointOptions;
-use crate::offline::dataset::{Dataset, Split};
+use crate::offline::dataset::Dataset;
 use crate::offline::evaluation::evaluate_scene;
 use crate::offline::metrics::{Evaluation, MetricSet};
 use crate::offline::report::{Change, Sample};
-use crate::offline::splits::{open_split, split_name};
+use crate::offline::splits::split_name;
 use crate::offline::{OfflineError, Progress};
 use crate::scene::RuntimeScene;
 use crate::view::Picture;
@@ -71,8 +71,7 @@ impl Bake<'_> {
 
     /// Returns the test views; `None`, with a note, if they or any of their images are missing.
     fn test_views(&self, progress: &mut dyn Progress) -> Option<Dataset> {
-        let (settings, trained_with) = (self.settings, &self.subject.runtime.trained_with);
-        let dataset = open_split(&settings.data, Split::Test, settings.resolution, trained_with, progress);
+        let dataset = self.splits.test(&self.subject.runtime.trained_with, progress);
         match dataset.and_then(|dataset| dataset.require_images().map(|()| dataset)) {
             Ok(dataset) => Some(dataset),
             Err(error) => {

@@ -1,66 +1,77 @@
 //! The stage rounds of a bake: gradual pruning.
 //!
-//! In: the scores of all Gaussians, the number to keep. Out: the scene with that many. In several rounds, each removes the same share of what
-//! is left, trains the others for a while, and scores them again: what a Gaussian is worth depends on which others are left.
+//! In: the scores of all Gaussians, the Gaussians to keep. Out: the scene with as many. In several rounds, each removes the same fraction of
+//! the remaining Gaussians, trains the others for a while, and scores them again: the worth of a Gaussian depends on which others remain.
 
-use super::pruning::Pruning;
-use super::stages::Stages;
-use super::trials::Trials;
-use super::{Bake, Fingerprint, Stage};
-use crate::codec::package::{self, WriteSettings};
-use crate::offline::fine_tune::TrainingImages;
+use super::Bake;
+use super::tuning::short;
+use crate::offline::engine::Engine;
+use crate::offline::fine_tune::fine_tune;
 use crate::offline::prune::{highest, select};
 use crate::offline::score::variant::Variant;
-use crate::offline::{OfflineError, Subject};
+use crate::offline::stages::Stages;
+use crate::offline::store::Key;
+use crate::offline::{OfflineError, Progress, Subject};
 use crate::scene::GaussianScene;
-use std::io::Cursor;
 
 impl Bake<'_> {
-    /// Removes Gaussians in rounds, or all at once if there is one round or nothing is trained.
+    /// Removes Gaussians in rounds, or all at once if there is one round or nothing is trained. Returns the scene and its key, given that of
+    /// the choice.
     pub(super) fn thin(
         &mut self,
         stages: &mut Stages<'_>,
-        pruning: &Pruning,
-    ) -> Result<(GaussianScene, Fingerprint), OfflineError> {
-        const FILE: &str = "thinned.gs4d";
+        scores: &[f32],
+        score: &str,
+        kept: &[u32],
+        choice: Key,
+    ) -> Result<(GaussianScene, Key), OfflineError> {
         let rounds = self.settings.rounds;
-        let fingerprint = pruning.fingerprint.and(&format!("{} Gaussians", pruning.kept.len()));
-        let tunes = self.tunes().filter(|_| rounds > 1).cloned();
-        let Some((tuning, variant)) = tunes.zip(pruning.found.score.parse::<Variant>().ok()) else {
-            stages.note_left_out(Stage::Rounds, None);
-            return Ok((select(&self.subject.scene, &pruning.kept), fingerprint));
-        };
-        let fingerprint = fingerprint.and(&format!("{rounds} rounds of {tuning:?}"));
-        let Self { settings, engine, subject, views, work, .. } = self;
-        let stored = work.load(FILE, fingerprint).and_then(|bytes| package::read(Cursor::new(bytes)).ok());
-        let scene = stages.run(Stage::Rounds, stored, |progress| {
-            let (scored, _) = settings.scoring.split(views.clone(), true);
-            // What is held out later is never trained on.
-            let images = TrainingImages::load(views, tuning.held_out, &subject.scene.trained_with, progress)?;
-            let trials = Trials::new(images, &tuning);
-            let counts = counts(subject.scene.len(), pruning.kept.len(), rounds);
-            let mut scene = select(&subject.scene, &highest(&pruning.scores, counts[0]));
-            for &count in &counts[1..] {
-                let tuned = trials.tune(engine, scene, progress)?;
-                let subject = Subject::new(&settings.checkpoint, tuned, settings.background)?;
-                let scores = settings.scoring.scores(engine, &subject, &scored, progress)?.of(variant)?;
-                scene = select(&subject.scene, &highest(&scores, count));
-                progress.note(&format!("{count} Gaussians are left"));
+        let key = choice.with(self.scene_key).and(&format!("{} Gaussians", kept.len()));
+        match (self.tunes().filter(|_| rounds > 1), score.parse::<Variant>()) {
+            (Some(tuning), Ok(variant)) => {
+                let inputs = key.with(self.images_key).and(&format!("{rounds} rounds of {tuning:?} by {variant:?}"));
+                stages.run(
+                    "rounds",
+                    inputs,
+                    |_| true,
+                    |progress| self.remove_in_rounds(scores, variant, kept.len(), progress),
+                )
             }
-            let mut bytes = Vec::new();
-            let written = package::write(&mut bytes, &scene, &WriteSettings { level: 1 });
-            written.map_err(|error| OfflineError::at(&work.folder().join(FILE), error))?;
-            work.store(FILE, fingerprint, &bytes, progress)?;
-            Ok(scene)
-        })?;
-        Ok((scene, fingerprint))
+            _ => {
+                stages.leave_out("rounds", None);
+                Ok((select(&self.subject.scene, kept), key))
+            }
+        }
+    }
+
+    fn remove_in_rounds(
+        &mut self,
+        scores: &[f32],
+        variant: Variant,
+        keep: usize,
+        progress: &mut dyn Progress,
+    ) -> Result<GaussianScene, OfflineError> {
+        let counts = counts(self.subject.scene.len(), keep, self.settings.rounds);
+        let mut scene = select(&self.subject.scene, &highest(scores, counts[0]));
+        let images = self.images(progress)?;
+        let tuning = self.tunes().map(short).unwrap_or_default();
+        for &count in &counts[1..] {
+            if let Engine::Gpu(headless) = &mut *self.engine {
+                scene = fine_tune(headless, scene, &images, &tuning, None, progress)?.scene;
+            }
+            let subject = Subject::new(&self.settings.checkpoint, scene, self.settings.background)?;
+            let (scores, _) = self.settings.scoring.scores(self.engine, &subject, &self.splits.train, progress)?;
+            scene = select(&subject.scene, &highest(&scores.of(variant)?, count));
+            progress.note(&format!("{count} Gaussians remain"));
+        }
+        Ok(scene)
     }
 }
 
-/// Returns how many Gaussians each round leaves: the same share each time, `keep` at the end.
+/// Returns how many Gaussians remain after each round: the same fraction each time, `keep` at the end.
 fn counts(total: usize, keep: usize, rounds: usize) -> Vec<usize> {
-    let share = keep as f64 / total.max(1) as f64;
-    let left = |round: usize| (total as f64 * share.powf(round as f64 / rounds as f64)).round() as usize;
+    let fraction = keep as f64 / total.max(1) as f64;
+    let left = |round: usize| (total as f64 * fraction.powf(round as f64 / rounds as f64)).round() as usize;
     (1..rounds).map(left).chain([keep]).collect()
 }
 
@@ -69,9 +80,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_round_removes_the_same_share() {
-        assert_eq!(counts(8000, 1000, 3), [4000, 2000, 1000], "half of them");
+    fn every_round_removes_the_same_fraction() {
+        assert_eq!(counts(8000, 1000, 3), [4000, 2000, 1000], "half of them each time");
         assert_eq!(counts(90, 45, 1), [45], "all at once");
-        assert_eq!(counts(5, 0, 2), [0, 0], "nothing is left");
+        assert_eq!(counts(5, 0, 2), [0, 0], "no Gaussian remains");
     }
 }

@@ -1,37 +1,69 @@
 //! How many Gaussians fit into a package of a given size.
 //!
-//! In: a number of bytes, scores. Out: the number of Gaussians, as far as can be told before they are trained. Only a package that is small
-//! enough takes its place.
+//! In: a number of bytes, scores. Out: the number of Gaussians, as far as it can be known before they are trained; as long as the package is
+//! too large, fewer of them ([`Attempts`]).
 
-use super::Bake;
-use crate::codec::{CodecError, package};
+use super::{Bake, BakeSettings};
+use crate::codec::package;
 use crate::offline::prune::{highest, select};
 use crate::offline::quantize::{CompressSettings, compress};
 use crate::offline::search::Goal;
+use crate::offline::store::{Key, Store};
 use crate::offline::{OfflineError, Progress, sliced, write_beside, write_settings};
 use crate::scene::TemporalFilter;
-use std::fs::{self, File};
-use std::io;
-use std::path::Path;
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::io::Write;
+use std::path::PathBuf;
 
 /// Bytes of a Gaussian with which the search begins.
 const BYTES_OF_GAUSSIAN: u64 = 24;
 /// Packages that are tried before the bake.
 const TRIES: usize = 5;
-/// The share of the room for Gaussians that is aimed at: training changes how well a package compresses.
+/// The fraction of the room for Gaussians that is aimed at: training changes how well a package compresses.
 const AIM: f64 = 0.985;
-/// A package this much smaller, as a share of the size, is large enough.
+/// A package this much smaller, as a fraction of the size, is large enough.
 const NEAR: f64 = 0.97;
-/// Names of the package that was just made and of the smallest that was too large, in the folder of the bake.
-pub(super) const MADE: &str = "package.gs4d";
-pub(super) const TOO_LARGE: &str = "too-large.gs4d";
+/// Most packages that a bake makes.
+const ATTEMPTS: usize = 4;
+/// Name under which the attempts are stored.
+const FILE: &str = "attempts";
+
+/// The packages that a bake has made, which were too large.
+pub(super) struct Attempts {
+    key: Key,
+    /// Number of Gaussians to keep in the first.
+    first: usize,
+    made: Vec<Attempt>,
+}
+
+/// A package that was too large.
+#[derive(Serialize, Deserialize)]
+struct Attempt {
+    /// Number of Gaussians to keep in the next one.
+    next: usize,
+}
+
+impl Attempts {
+    /// Returns the attempts of an interrupted bake with the same inputs, or none.
+    pub fn load(store: &Store, key: Key, first: usize) -> Self {
+        let stored = store.load(FILE, key).and_then(|text| ron::de::from_bytes::<Vec<Attempt>>(&text).ok());
+        let made = stored.filter(|made| made.len() < ATTEMPTS && made.iter().all(|attempt| attempt.next < first));
+        Self { key, first, made: made.unwrap_or_default() }
+    }
+
+    /// Returns the number of Gaussians to keep.
+    pub fn count(&self) -> usize {
+        self.made.last().map_or(self.first, |last| last.next)
+    }
+}
 
 impl Bake<'_> {
-    /// Checks, before anything is computed, that there is room for what the package of this capture has whichever Gaussians are kept: the header
-    /// and the environment map. A filter and codebooks come with the Gaussians.
+    /// Checks, before anything is computed, that there is room for the parts of the package that do not depend on which Gaussians are kept: the
+    /// header and the environment map. A filter and codebooks come with the Gaussians.
     ///
     /// # Errors
-    /// There is none.
+    /// There is no room.
     pub(super) fn require_room(&self) -> Result<(), OfflineError> {
         let Goal::Size(limit) = self.settings.goal else { return Ok(()) };
         let least = self.size_of(&[])?;
@@ -74,20 +106,19 @@ impl Bake<'_> {
     }
 
     /// Returns the bytes of a package of these Gaussians as they are.
-    pub(super) fn size_of(&self, kept: &[u32]) -> Result<u64, OfflineError> {
-        let (settings, out) = (self.settings, &self.settings.out);
+    fn size_of(&self, kept: &[u32]) -> Result<u64, OfflineError> {
+        let settings = self.settings;
         let mut scene = select(&self.subject.scene, kept);
-        let segments = settings.key_frames.count(&self.views).max(2) as u32 - 1;
         let interval = scene.trained_with.time_interval;
-        scene.filter = Some(TemporalFilter::support(sliced(&scene)?.iter().copied(), interval, segments));
+        let gaussians = sliced(&scene)?.into_owned();
+        scene.filter = Some(TemporalFilter::support(gaussians.into_iter(), interval, self.key_frames() - 1));
         let options = match self.tunes() {
             Some(_) => CompressSettings::suiting(settings.quality, kept.len()),
             None => CompressSettings::from(settings.quality),
         };
         let (compressed, _) = compress(scene.into_runtime()?, &options)?;
         let mut bytes = Vec::new();
-        let written = package::write(&mut bytes, &compressed, &write_settings(&compressed.form, settings.level));
-        written.map_err(|error| OfflineError::at(out, error))?;
+        package::write(&mut bytes, &compressed, &write_settings(&compressed.form, settings.level))?;
         Ok(bytes.len() as u64)
     }
 
@@ -99,39 +130,57 @@ impl Bake<'_> {
         }
     }
 
-    /// Removes the packages in the folder of the bake, once there is one in its place.
-    pub(super) fn remove_made(&self) {
-        for name in [MADE, TOO_LARGE] {
-            // Most bakes leave neither.
-            let _ = fs::remove_file(self.work.folder().join(name));
-        }
+    /// Returns the key of everything that the sizes of packages depend on, given that of the choice.
+    pub(super) fn attempts_key(&self, choice: Key) -> Key {
+        let BakeSettings { rounds, filter, level, .. } = self.settings;
+        choice.and(&format!("attempts {rounds} {filter:?} {level:?} {:?}", self.tunes()))
     }
 
-    /// Returns the error that no package has been found that is small enough; `found` says what the smallest has.
-    pub(super) fn too_small(&self, limit: u64, found: &str) -> OfflineError {
+    /// Decides on fewer Gaussians, at least one, after a package that was too large.
+    ///
+    /// # Errors
+    /// It has been too large several times, or with a single Gaussian. The last package is then kept in the folder of the bake.
+    pub(super) fn keep_fewer(
+        &self,
+        attempts: &mut Attempts,
+        package: &[u8],
+        scores: &[f32],
+        progress: &mut dyn Progress,
+    ) -> Result<(), OfflineError> {
+        let (limit, size, before) = (self.limit(), package.len() as u64, attempts.count());
+        if attempts.made.len() + 1 == ATTEMPTS || before <= 1 {
+            let kept = self.kept_aside(package);
+            progress.uninterrupted(&mut || write_beside(&kept, |file| file.write_all(package)))?;
+            let single = if before <= 1 { "not even with a single Gaussian; " } else { "" };
+            let found = format!("{single}the last package that was made has {size} and is kept as {}", kept.display());
+            return Err(self.too_small(limit, &found));
+        }
+        let one = self.size_of(&highest(scores, 1))?;
+        let next = fitting(before, size, limit, one).clamp(1, before - 1);
+        progress.note(&format!("the package has {size} bytes, {limit} are allowed: again with {next} Gaussians"));
+        attempts.made.push(Attempt { next });
+        self.store.store(FILE, attempts.key, ron::to_string(&attempts.made)?.as_bytes(), progress)?;
+        Ok(())
+    }
+
+    /// Returns where a package that is too large is kept: in the folder of the bake, under a name that no other file has.
+    fn kept_aside(&self, package: &[u8]) -> PathBuf {
+        let folder = self.store.folder();
+        let names = std::iter::once("too-large.gs4d".to_owned()).chain((2..).map(|n| format!("too-large-{n}.gs4d")));
+        let is_free = |path: &PathBuf| !path.exists() || fs::read(path).is_ok_and(|bytes| bytes == package);
+        names.map(|name| folder.join(name)).find(is_free).unwrap_or_default()
+    }
+
+    /// Returns the error that no package has been found that is small enough; `found` describes the smallest.
+    fn too_small(&self, limit: u64, found: &str) -> OfflineError {
         let remedy = "choose a lower quality or a larger size; a file that was here before has not changed";
         let reason = format!("this capture does not fit into {limit} bytes: {found}; {remedy}");
         OfflineError::at(&self.settings.out, reason)
     }
 }
 
-/// Writes a package that was made elsewhere to its place, unless it has more bytes than are allowed: then returns how many.
-///
-/// # Errors
-/// A folder that cannot be written to, a full disk.
-pub(super) fn put_in_place(made: &Path, out: &Path, limit: u64) -> Result<Option<u64>, CodecError> {
-    let at_made = |error: io::Error| CodecError { path: made.to_owned(), kind: error.into() };
-    let mut file = File::open(made).map_err(at_made)?;
-    let size = file.metadata().map_err(at_made)?.len();
-    if size > limit {
-        return Ok(Some(size));
-    }
-    write_beside(out, |writer| io::copy(&mut file, writer).map(|_| ()))?;
-    Ok(None)
-}
-
 /// Returns the count at which a package that has `size` bytes with `count` Gaussians, and `one` with a single one, would have nearly `limit`.
-pub(super) fn fitting(count: usize, size: u64, limit: u64, one: u64) -> usize {
+fn fitting(count: usize, size: u64, limit: u64, one: u64) -> usize {
     let [room, used] = [limit, size].map(|bytes| bytes.saturating_sub(one) as f64);
     (count as f64 * AIM * room / used.max(1.0)) as usize
 }
@@ -144,21 +193,20 @@ mod tests {
     fn counts_follow_the_size() {
         assert_eq!(fitting(1000, 2000, 1000, 0), 492, "a little less than half");
         assert_eq!(fitting(1000, 500, 1000, 0), 1970, "a little less than twice");
-        assert_eq!(fitting(3, 1000, 10, 0), 0, "nothing fits");
-        assert_eq!(fitting(1000, 2900, 1900, 900), 492, "what one Gaussian needs, all of them need once");
-        assert_eq!(fitting(1, 901, 900, 900), 0, "a single one is too large");
+        assert_eq!(fitting(3, 1000, 10, 0), 0, "no Gaussian fits");
+        assert_eq!(fitting(1000, 2900, 1900, 900), 492, "the bytes of one Gaussian are needed once");
+        assert_eq!(fitting(1, 901, 900, 900), 0, "a single Gaussian is too large");
     }
 
     #[test]
-    fn a_package_that_is_too_large_replaces_nothing() {
+    fn attempts_of_other_inputs_are_not_resumed() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let [made, out] = ["made.gs4d", "out.gs4d"].map(|name| folder.path().join(name));
-        fs::write(&made, b"ten bytes.").expect("the folder can be written to");
-        fs::write(&out, b"before").expect("the folder can be written to");
-        let put = |limit| put_in_place(&made, &out, limit).expect("the folder can be written to");
-        assert_eq!(put(9), Some(10), "one byte too many");
-        assert_eq!(fs::read(&out).expect("it is there"), b"before", "the old package stays");
-        assert_eq!(put(10), None, "as many as are allowed");
-        assert_eq!(fs::read(&out).expect("it is there"), b"ten bytes.", "the new package");
+        let store = Store::beside(&folder.path().join("out.gs4d"), ".bake").expect("the folder can be made");
+        let (key, other) = (Key::of(b"these inputs"), Key::of(b"other inputs"));
+        let text = ron::to_string(&vec![Attempt { next: 30 }, Attempt { next: 20 }]).expect("attempts are text");
+        store.store(FILE, key, text.as_bytes(), &mut crate::offline::NoProgress).expect("the folder can be written to");
+        assert_eq!(Attempts::load(&store, key, 40).count(), 20, "the bake resumes with the count of the last attempt");
+        assert_eq!(Attempts::load(&store, other, 40).count(), 40, "other inputs begin with the first count");
+        assert_eq!(Attempts::load(&store, key, 25).count(), 25, "attempts that do not follow from the first count");
     }
 }

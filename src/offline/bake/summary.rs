@@ -1,11 +1,11 @@
 //! The stage report of a bake.
 //!
-//! In: the Gaussians before and after, the package, the trials, the test views. Out: the [`BakeReport`], and its two
+//! In: the Gaussians before and after, the package, the choices, the test views. Out: the [`BakeReport`], and its two
 //! files.
 
 use super::BakeSettings;
+use super::choice::Choice;
 use super::evaluation::Compared;
-use super::pruning::Found;
 use super::tuning::Tuning;
 use crate::codec::package;
 use crate::gaussian::Gaussian;
@@ -32,9 +32,7 @@ pub(super) struct Facts<'a> {
     pub before: &'a [Gaussian],
     pub after: &'a [Gaussian],
     pub filter: &'a TemporalFilter,
-    pub found: Found,
-    /// Rounds in which Gaussians were removed.
-    pub rounds: usize,
+    pub choice: Choice,
     pub tuning: Option<Tuning>,
     pub stages: Vec<StageTime>,
     pub compared: Option<Compared>,
@@ -70,7 +68,7 @@ impl Facts<'_> {
             activity: Change { before: Activity::of(self.before, &times), after: Activity::of(self.after, &times) },
             filter_share: Some(filter_shares(self.filter, interval, &times)),
             times,
-            trials: self.found.tried,
+            trials: self.choice.tried,
             fine_tuning: self.tuning.map(|tuning| tuning.curve).unwrap_or_default(),
             split,
             evaluation,
@@ -84,16 +82,17 @@ impl Facts<'_> {
         let goal = match self.settings.goal {
             Goal::Keep(count) => format!("keep {count}"),
             Goal::Remove(ratio) => format!("remove {:.1} %", ratio * 100.0),
-            Goal::MaxLoss(loss) => format!("lose at most {loss} dB on held-out training views"),
+            Goal::MaxLoss(loss) => format!("lose at most {loss} dB on validation views"),
             Goal::Size(bytes) => format!("at most {} MB", bytes as f64 / 1e6),
         };
         let quality = Quality::NAMES.iter().find(|(_, quality)| *quality == self.settings.quality);
         let (kind, filter) = (filter_name(self.filter.kind), self.filter);
         vec![
             pair("goal", goal),
-            pair("score", self.found.score.clone()),
-            pair("held-out views", self.found.held_out.clone()),
-            pair("rounds of pruning", if self.tuning.is_some() { self.rounds } else { 1 }.to_string()),
+            pair("score", self.choice.score.clone()),
+            pair("views", self.trained_with.validation.clone().unwrap_or_default()),
+            pair("validation views compared", self.choice.compared_with.clone()),
+            pair("rounds of pruning", if self.tuning.is_some() { self.settings.rounds } else { 1 }.to_string()),
             pair("fine-tuning", self.tuning.as_ref().map_or("none".to_owned(), in_words)),
             pair("temporal filter", format!("{kind}, {} key-frames", filter.segments + 1)),
             pair("active share", format!("{:.1} %", filter.active_share() * 100.0)),
@@ -102,11 +101,16 @@ impl Facts<'_> {
     }
 }
 
-/// Returns what fine-tuning has won.
+/// Returns the gain of fine-tuning.
 fn in_words(tuning: &Tuning) -> String {
-    let Tuning { curve, best, held_out } = tuning;
-    let before = curve.first().map_or(f64::NAN, |point| point.psnr);
-    format!("{} steps, {before:.2} to {:.2} dB on {held_out} held-out training views", best.step, best.psnr)
+    let Tuning { curve, best, validation } = tuning;
+    let steps = format!("{} steps", best.step);
+    match (curve.first().and_then(|point| point.psnr), best.psnr) {
+        (Some(before), Some(after)) => {
+            format!("{steps}, {before:.2} to {after:.2} dB on {validation} validation views")
+        }
+        _ => format!("{steps}, no validation views"),
+    }
 }
 
 /// Writes the report beside the package, as JSON and as an HTML page. Returns the paths of both.

@@ -15,6 +15,7 @@ mod error;
 mod lens;
 mod resample;
 pub mod selection;
+pub mod validation;
 mod view;
 
 use std::path::{Path, PathBuf};
@@ -54,7 +55,7 @@ impl Split {
     }
 
     /// Returns the split that the original uses in its place: folders whose name ends in `lego` are evaluated on `val`.
-    fn resolved(self, folder: &Path) -> Self {
+    pub(super) fn resolved(self, folder: &Path) -> Self {
         let lego = folder.file_name().is_some_and(|name| name.as_encoded_bytes().ends_with(b"lego"));
         if self == Self::Test && lego { Self::Val } else { self }
     }
@@ -90,8 +91,16 @@ impl Dataset {
     /// # Errors
     /// [`DatasetError::MissingImages`], naming the first few and how many.
     pub fn require_images(&self) -> Result<(), DatasetError> {
-        require_files(self.views.iter().flat_map(|view| [Some(&view.image), view.mask.as_ref()]).flatten())
+        require_images(&self.views)
     }
+}
+
+/// Checks that every image and mask of these views is on disk.
+///
+/// # Errors
+/// [`DatasetError::MissingImages`], naming the first few and how many.
+pub fn require_images(views: &[TrainingView]) -> Result<(), DatasetError> {
+    require_files(views.iter().flat_map(|view| [Some(&view.image), view.mask.as_ref()]).flatten())
 }
 
 /// Checks that all files exist; the error names the first few that do not.

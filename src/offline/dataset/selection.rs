@@ -1,7 +1,7 @@
 //! Selecting training views.
 //!
-//! In: the training views of a dataset. Out: an even share of them, held-out views, their distinct cameras, the number
-//! of their distinct times.
+//! In: the training views of a dataset. Out: an even subset of them, their distinct cameras, the number of their
+//! distinct times.
 
 use super::TrainingView;
 use crate::view::{Camera, Lens, RasterFov, View};
@@ -10,40 +10,25 @@ use std::collections::HashSet;
 /// The fraction of the golden ratio: the fractions of its multiples are evenly distributed between 0 and 1.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// Returns the indices of an even share of the views, ascending: one from each of `wanted` stretches of time, at a
-/// different place within each, so that neither times nor cameras are favoured. Returns all indices if there are no
+/// Returns the indices of an even subset of the views, ascending: one from each of `wanted` stretches of time, at a
+/// different place within each, so that neither times nor cameras are favored. Returns all indices if there are no
 /// more than `wanted`.
-pub fn even_share(views: &[TrainingView], wanted: usize) -> Vec<usize> {
+pub fn even_subset(views: &[TrainingView], wanted: usize) -> Vec<usize> {
     let count = views.len();
     let mut by_time: Vec<usize> = (0..count).collect();
     if wanted >= count {
         return by_time;
     }
     by_time.sort_by(|&a, &b| views[a].time.total_cmp(&views[b].time));
-    let mut share: Vec<usize> = (0..wanted)
+    let mut subset: Vec<usize> = (0..wanted)
         .map(|k| {
             let (first, end) = (k * count / wanted, (k + 1) * count / wanted);
             let place = ((k as f64 + 0.5) * GOLDEN).fract() * (end - first) as f64;
             by_time[first + (place as usize).min(end - first - 1)]
         })
         .collect();
-    share.sort_unstable();
-    share
-}
-
-/// Holds out an even share of the views. Returns the other views and those held out: at most `wanted`, and at most a
-/// quarter of all. With fewer than four views, or if `wanted` is 0, both parts are all of them.
-pub fn hold_out(views: &[TrainingView], wanted: usize) -> (Vec<TrainingView>, Vec<TrainingView>) {
-    let wanted = wanted.min(views.len() / 4);
-    if wanted == 0 {
-        return (views.to_vec(), views.to_vec());
-    }
-    let held: HashSet<usize> = even_share(views, wanted).into_iter().collect();
-    let part = |taken: bool| {
-        let chosen = views.iter().enumerate().filter(|(i, _)| held.contains(i) == taken);
-        chosen.map(|(_, view)| view.clone()).collect()
-    };
-    (part(false), part(true))
+    subset.sort_unstable();
+    subset
 }
 
 /// Returns every camera once, in order of appearance. Cameras with the same pose, size and lens are the same.
@@ -52,7 +37,7 @@ pub fn distinct_cameras(views: &[TrainingView]) -> Vec<Camera> {
     views.iter().map(|view| view.camera).filter(|camera| seen.insert(identity(camera))).collect()
 }
 
-fn identity(camera: &Camera) -> ([u32; 16], [u32; 2], [u32; 5]) {
+pub(super) fn identity(camera: &Camera) -> ([u32; 16], [u32; 2], [u32; 5]) {
     let (kind, a, b) = match camera.lens {
         Lens::Fov { tan } => (0.0, tan, glam::Vec2::ZERO),
         Lens::Intrinsics { focal, center } => (1.0, focal, center),
@@ -95,29 +80,19 @@ mod tests {
     }
 
     #[test]
-    fn a_share_is_even_in_time_and_among_cameras() {
+    fn a_subset_is_even_in_time_and_among_cameras() {
         let views = views();
         for wanted in [15, 24, 30, 40, 60, 100] {
-            let share = even_share(&views, wanted);
-            assert_eq!(share.len(), wanted, "as many as wanted");
-            assert!(share.is_sorted_by(|a, b| a < b), "ascending, none twice");
-            let times: HashSet<u32> = share.iter().map(|&i| views[i].time.to_bits()).collect();
-            let cameras: HashSet<usize> = share.iter().map(|i| i / 30).collect();
+            let subset = even_subset(&views, wanted);
+            assert_eq!(subset.len(), wanted, "as many as wanted");
+            assert!(subset.is_sorted_by(|a, b| a < b), "ascending, none twice");
+            let times: HashSet<u32> = subset.iter().map(|&i| views[i].time.to_bits()).collect();
+            let cameras: HashSet<usize> = subset.iter().map(|i| i / 30).collect();
             assert!(times.len() >= wanted.min(30) * 4 / 5, "{wanted} views have {} times", times.len());
             assert!(cameras.len() >= wanted.min(20) / 2, "{wanted} views have {} cameras", cameras.len());
         }
-        assert_eq!(even_share(&views, 600).len(), 600, "all");
-        assert_eq!(even_share(&views, 9000).len(), 600, "no more than there are");
-    }
-
-    #[test]
-    fn held_out_views_are_kept_apart() {
-        let views = views();
-        let (rest, held) = hold_out(&views, 24);
-        assert_eq!((rest.len(), held.len()), (576, 24), "two parts");
-        assert!(held.iter().all(|view| !rest.contains(view)), "no view in both");
-        let (rest, held) = hold_out(&views[..3], 24);
-        assert_eq!((rest.len(), held.len()), (3, 3), "nothing to spare");
+        assert_eq!(even_subset(&views, 600).len(), 600, "all");
+        assert_eq!(even_subset(&views, 9000).len(), 600, "no more than there are");
     }
 
     #[test]

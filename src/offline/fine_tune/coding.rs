@@ -53,8 +53,12 @@ impl Run<'_> {
         }
         progress.begin("training codebooks", steps);
         (0..step).for_each(|_| progress.advance());
-        self.trainer.totals()?;
-        while step < steps && !found.interrupted {
+        while step < steps {
+            if progress.is_interrupted() {
+                let Progressed { curve, best, pace } = &*found;
+                let found = Progressed { curve: curve.clone(), best: best.clone(), pace: *pace };
+                return Err(self.interrupted(found));
+            }
             // When follows from the step alone, and the state has what the last rounding changed: a resumed run draws the same.
             if let Some(bits) = &bits
                 && step > 0
@@ -65,10 +69,7 @@ impl Run<'_> {
             self.step(made + step, step + 1, RATE * decay(step, steps, self.settings.last_rate))?;
             step += 1;
             progress.advance();
-            found.interrupted = progress.is_interrupted();
-            if let Some(saves) = saves
-                && (saves.are_due(step) || found.interrupted)
-            {
+            if let Some(saves) = saves.filter(|saves| saves.are_due(step)) {
                 let Progressed { curve, best, .. } = &*found;
                 let state = self.trainer.state()?;
                 let checkpoint = Checkpoint { curve: curve.clone(), best: best.clone(), state, coded: Some(step) };
@@ -85,9 +86,8 @@ impl Run<'_> {
             // What is evaluated has the geometry of the package.
             self.trainer.round(bits)?;
         }
-        let totals = self.trainer.totals()?;
-        let (loss, training_psnr) = (Some(totals.loss), Some(totals.psnr));
-        let point = CurvePoint { step: made + step, loss, training_psnr, psnr: self.evaluate()? };
+        // The loss is not reported: its sums are of the steps since a resumed run began.
+        let point = CurvePoint { step: made + step, loss: None, training_psnr: None, psnr: self.evaluate()? };
         progress.note(&describe(&point, None));
         found.curve.push(point);
         Ok(compressed)

@@ -3,13 +3,12 @@
 //! In: a scene in the trained form, its training views with their images, [`FineTuneSettings`]. Out: the scene with the best parameters that
 //! were found ([`FineTuned`]), and how its quality developed. The number of Gaussians stays.
 //!
-//! Some training views are held out: they tell which parameters are the best. The loss is `0.8 L1 + 0.2 (1 − SSIM)`, with further [`Terms`]
+//! The best step is chosen on validation views, which are not trained on; without validation views, the last step is kept. The loss is `0.8 L1 + 0.2 (1 − SSIM)`, with further [`Terms`]
 //! if these have weights, the optimizer Adam (section 6 of the 4DGS model). Views, backgrounds and rates of a step follow from its number
 //! alone, so that a run which is resumed ends as one which was not interrupted, but for rounding if sums are [atomic](GradientSums::Atomic).
 //! If the scene is compressed, further steps train codebooks of color with everything else, on request on pictures of rounded geometry.
 
 mod adam;
-mod belonging;
 mod coding;
 mod loss;
 mod neighbors;
@@ -39,9 +38,8 @@ pub use targets::TrainingImages;
 pub use terms::{Regularization, Terms, regularization};
 pub use trainer::{Faults, GpuImage, Sample, Totals, Trainer, TrainerError};
 
-use super::dataset::TrainingView;
 use super::quantize::Quality;
-use super::work::{Fingerprint, Work};
+use super::store::{Key, Store};
 use super::{OfflineError, Progress};
 use crate::gaussian::GradientMode;
 use crate::renderer::Headless;
@@ -70,9 +68,7 @@ pub struct FineTuneSettings {
     pub behind: Behind,
     /// Seed of the order of views and of random backgrounds.
     pub seed: u64,
-    /// Training views that are not trained on; they tell which parameters are the best. Default: 8; at most a quarter of all are.
-    pub held_out: usize,
-    /// Steps between two evaluations on them. Default: 500.
+    /// Steps between two evaluations on the validation views. Default: 500.
     pub evaluate_every: usize,
     /// Evaluations without an improvement after which training ends. Default: `None`, all steps are made.
     pub patience: Option<usize>,
@@ -101,7 +97,6 @@ impl Default for FineTuneSettings {
             sparse: false,
             behind: Behind::default(),
             seed: 0,
-            held_out: 8,
             evaluate_every: 500,
             patience: None,
             refresh_filter: 1000,
@@ -122,8 +117,8 @@ pub struct CurvePoint {
     pub loss: Option<f64>,
     /// PSNR of these steps, all pixels together, dB; `None` before the first.
     pub training_psnr: Option<f64>,
-    /// PSNR on the held-out views, dB.
-    pub psnr: f64,
+    /// PSNR on the validation views, dB; `None` without validation views.
+    pub psnr: Option<f64>,
 }
 
 /// A scene after fine-tuning.
@@ -133,51 +128,34 @@ pub struct FineTuned {
     pub scene: GaussianScene,
     /// The quality before the first step, at every evaluation and at the end.
     pub curve: Vec<CurvePoint>,
-    /// The point with the best parameters.
+    /// The point with the best parameters: the highest PSNR on the validation views; without these, the last point.
     pub best: CurvePoint,
     /// Steps a second, of those made now, without evaluations; `None` if there were none.
     pub steps_per_second: Option<f64>,
-    /// Number of held-out views.
-    pub held_out: usize,
+    /// Number of validation views.
+    pub validation: usize,
     /// Gradients that were not finite and have been left out.
     pub faults: Option<Faults>,
-    /// Whether it ended before all steps were made because the user wanted it to.
-    pub interrupted: bool,
 }
 
 /// Where the state of training is stored, and what it depends on.
 #[derive(Debug, Clone, Copy)]
 pub struct Resume<'a> {
     /// The folder.
-    pub work: &'a Work,
+    pub store: &'a Store,
     /// Everything that the result depends on besides the settings.
-    pub fingerprint: Fingerprint,
+    pub key: Key,
     /// Steps between two states.
     pub every: usize,
 }
 
-/// Trains a scene on views. What its temporal filter leaves out is not drawn in training either; a filter of the kind support, which changes no
-/// picture, is computed again afterwards. Begins the tasks "loading images" and "fine-tuning".
+/// Trains a scene on images. What its temporal filter leaves out is not drawn in training either; a filter of the kind support, which
+/// changes no picture, is computed again afterwards. Begins the task "fine-tuning".
 ///
 /// # Errors
-/// A scene that is not in the trained form or does not fit the GPU, images that are missing or show something else, a lost device.
+/// A scene that is not in the trained form or does not fit the GPU, no images, a lost device; [`OfflineError::Interrupted`], with the best
+/// result so far, if the user has asked to end.
 pub fn fine_tune(
-    headless: &mut Headless,
-    scene: GaussianScene,
-    views: &[TrainingView],
-    settings: &FineTuneSettings,
-    resume: Option<Resume<'_>>,
-    progress: &mut dyn Progress,
-) -> Result<FineTuned, OfflineError> {
-    let images = TrainingImages::load(views, settings.held_out, &scene.trained_with, progress)?;
-    fine_tune_on(headless, scene, &images, settings, resume, progress)
-}
-
-/// As [`fine_tune`], on images that have been loaded. Begins the task "fine-tuning".
-///
-/// # Errors
-/// As [`fine_tune`].
-pub fn fine_tune_on(
     headless: &mut Headless,
     scene: GaussianScene,
     images: &TrainingImages,

@@ -4,9 +4,10 @@
 
 use super::run::Best;
 use super::{CurvePoint, TrainerState};
-use crate::offline::work::{Fingerprint, Work, bytes, words};
+use crate::offline::store::{Key, Store};
+use crate::offline::stored::{Stored, Text};
 use crate::offline::{OfflineError, Progress};
-use crate::scene::{FilterKind, TemporalFilter};
+use crate::scene::TemporalFilter;
 use serde::{Deserialize, Serialize};
 
 /// Name of the file.
@@ -22,78 +23,46 @@ pub(super) struct Checkpoint {
     pub coded: Option<usize>,
 }
 
-/// What comes before the buffers.
+/// The part of a checkpoint that is stored as text.
 #[derive(Serialize, Deserialize)]
 struct Head {
     curve: Vec<CurvePoint>,
     best: CurvePoint,
     coded: Option<usize>,
-    /// Of the state, then of the best.
-    states: [StateHead; 2],
 }
 
-/// The contents of a state: bytes of each buffer, then those of the neighbors and of the bits of the filter.
-#[derive(Serialize, Deserialize)]
-struct StateHead {
-    sizes: Vec<usize>,
-    filter: Option<FilterHead>,
+/// The sizes of the buffers, the buffers one after the other, the neighbors and the filter.
+type StoredState = (Text<Vec<usize>>, (Vec<u8>, (Vec<u8>, Option<TemporalFilter>)));
+
+fn stored_state(state: &TrainerState) -> StoredState {
+    let sizes = state.buffers.iter().map(Vec::len).collect();
+    (Text(sizes), (state.buffers.concat(), (state.neighbors.clone(), state.filter.clone())))
 }
 
-/// Kind, segments and Gaussians of a filter.
-type FilterHead = (FilterKind, u32, usize);
-
-/// Returns the head of a state, and its buffers.
-fn parts(state: &TrainerState) -> (StateHead, Vec<Vec<u8>>) {
-    let filter = state.filter.as_ref();
-    let bits = filter.map(|filter| bytes(&filter.to_bits()));
-    let buffers: Vec<_> = state.buffers.iter().chain([&state.neighbors]).cloned().chain(bits).collect();
-    let filter = filter.map(|filter| (filter.kind, filter.segments, filter.count));
-    (StateHead { sizes: buffers.iter().map(Vec::len).collect(), filter }, buffers)
-}
-
-/// Returns a state from the bytes after the head, and the bytes after the state; `None` if there are too few.
-fn state<'a>(head: &StateHead, mut rest: &'a [u8]) -> Option<(TrainerState, &'a [u8])> {
-    let mut state = TrainerState::default();
-    for &size in &head.sizes {
+/// Returns the state; `None` if the sizes are not those of the buffers.
+fn state((Text(sizes), (buffers, (neighbors, filter))): StoredState) -> Option<TrainerState> {
+    let mut state = TrainerState { buffers: Vec::new(), neighbors, filter };
+    let mut rest = &buffers[..];
+    for size in sizes {
         let (buffer, left) = rest.split_at_checked(size)?;
         state.buffers.push(buffer.to_vec());
         rest = left;
     }
-    if let Some((kind, segments, count)) = head.filter {
-        let bits = words(&state.buffers.pop()?);
-        let expected = TemporalFilter::words(count).checked_mul(segments as usize)?;
-        let filter = (bits.len() == expected).then(|| TemporalFilter::from_bits(kind, segments, count, bits));
-        state.filter = Some(filter?);
-    }
-    state.neighbors = state.buffers.pop()?;
-    Some((state, rest))
+    rest.is_empty().then_some(state)
 }
 
 impl Checkpoint {
     /// Stores it, whole or not at all.
-    pub fn store(
-        &self,
-        work: &Work,
-        fingerprint: Fingerprint,
-        progress: &mut dyn Progress,
-    ) -> Result<(), OfflineError> {
-        let ((state, buffers), (best, best_buffers)) = (parts(&self.state), parts(&self.best.state));
-        let head = Head { curve: self.curve.clone(), best: self.best.point, coded: self.coded, states: [state, best] };
-        let head = ron::to_string(&head)?;
-        let mut bytes = (head.len() as u64).to_le_bytes().to_vec();
-        bytes.extend_from_slice(head.as_bytes());
-        buffers.iter().chain(&best_buffers).for_each(|buffer| bytes.extend_from_slice(buffer));
-        Ok(work.store(FILE, fingerprint, &bytes, progress)?)
+    pub fn store(&self, store: &Store, key: Key, progress: &mut dyn Progress) -> Result<(), OfflineError> {
+        let head = Head { curve: self.curve.clone(), best: self.best.point, coded: self.coded };
+        let bytes = (Text(head), (stored_state(&self.state), stored_state(&self.best.state))).encode()?;
+        Ok(store.store(FILE, key, &bytes, progress)?)
     }
 
-    /// Returns what was stored with the same fingerprint; `None` if there is nothing, or if it is damaged.
-    pub fn load(work: &Work, fingerprint: Fingerprint) -> Option<Self> {
-        let bytes = work.load(FILE, fingerprint)?;
-        let (size, rest) = bytes.split_first_chunk()?;
-        let (head, rest) = rest.split_at_checked(usize::try_from(u64::from_le_bytes(*size)).ok()?)?;
-        let Head { curve, best, coded, states } = ron::de::from_bytes(head).ok()?;
-        let (state_of_run, rest) = state(&states[0], rest)?;
-        let (best_state, _) = state(&states[1], rest)?;
-        Some(Self { curve, best: Best { point: best, state: best_state }, state: state_of_run, coded })
+    /// Returns what was stored with the same key; `None` if there is nothing, or if it is damaged.
+    pub fn load(store: &Store, key: Key) -> Option<Self> {
+        let stored = Stored::decode(&store.load(FILE, key)?)?;
+        let (Text(Head { curve, best, coded }), (of_run, of_best)): (Text<Head>, (StoredState, StoredState)) = stored;
+        Some(Self { curve, best: Best { point: best, state: state(of_best)? }, state: state(of_run)?, coded })
     }
 }

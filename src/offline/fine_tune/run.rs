@@ -5,14 +5,14 @@
 use super::resume::Checkpoint;
 use super::schedule::{Schedule, decay};
 use super::targets::{Shot, TrainingImages};
-use super::{Behind, CurvePoint, FineTuneSettings, FineTuned, Resume, belonging};
+use super::{Behind, CurvePoint, FineTuneSettings, FineTuned, Resume};
 use super::{GpuImage, Sample, Trainer, TrainerState};
 use crate::offline::dataset::CoveredImage;
-use crate::offline::dataset::selection::even_share;
+use crate::offline::dataset::selection::even_subset;
 use crate::offline::metrics::{SizeMismatch, psnr};
 use crate::offline::score::GpuEngine;
+use crate::offline::store::Key;
 use crate::offline::temporal_filter::{needs_views, seen_filter};
-use crate::offline::work::Fingerprint;
 use crate::offline::{OfflineError, Progress, sliced};
 use crate::renderer::{Headless, ShaderChecks};
 use crate::scene::{GaussianScene, TemporalFilter};
@@ -55,7 +55,7 @@ pub(super) struct Run<'a> {
 #[derive(Clone, Copy)]
 pub(super) struct Saves<'a> {
     resume: Resume<'a>,
-    fingerprint: Fingerprint,
+    key: Key,
 }
 
 impl Saves<'_> {
@@ -65,7 +65,7 @@ impl Saves<'_> {
     }
 
     pub fn store(self, checkpoint: &Checkpoint, progress: &mut dyn Progress) -> Result<(), OfflineError> {
-        checkpoint.store(self.resume.work, self.fingerprint, progress)
+        checkpoint.store(self.resume.store, self.key, progress)
     }
 }
 
@@ -73,7 +73,6 @@ impl Saves<'_> {
 pub(super) struct Progressed {
     pub curve: Vec<CurvePoint>,
     pub best: Best,
-    pub interrupted: bool,
     /// Steps made now and seconds that they took.
     pub pace: (usize, f64),
 }
@@ -103,46 +102,33 @@ impl<'a> Run<'a> {
             && images.shots.iter().any(|shot| shot.image.has_gaps);
         let resident = resident_images(&trainer, &images.shots)?;
         let mut run = Self { trainer, settings, images, resident, background, random, support };
-        for index in even_share(&images.views, VIEWS_OF_ROOM) {
+        for index in even_subset(&images.views, VIEWS_OF_ROOM) {
             run.trainer.make_room(&images.shots[index].view)?;
         }
-        belonging::check(&mut run.trainer, &images.shots, run.background, &images.views)?;
         Ok(run)
     }
 
     /// Trains, and compresses if that is wanted.
     pub fn run(&mut self, resume: Option<Resume<'_>>, progress: &mut dyn Progress) -> Result<FineTuned, OfflineError> {
         let saves = resume.map(|resume| {
-            let fingerprint = resume.fingerprint.and(&format!("{:?}", self.settings));
-            Saves { resume, fingerprint }
+            let key = resume.key.and(&format!("{:?}", self.settings));
+            Saves { resume, key }
         });
-        let stored = saves.and_then(|saves| Checkpoint::load(saves.resume.work, saves.fingerprint));
+        let stored = saves.and_then(|saves| Checkpoint::load(saves.resume.store, saves.key));
         let stored = stored.filter(|stored| self.trainer.resume(&stored.best.state));
         let is_coded = |stored: &&Checkpoint| stored.coded.is_some();
         let mut found = match stored.as_ref().filter(is_coded) {
             Some(Checkpoint { curve, best, .. }) => {
-                Progressed { curve: curve.clone(), best: best.clone(), interrupted: false, pace: (0, 0.0) }
+                Progressed { curve: curve.clone(), best: best.clone(), pace: (0, 0.0) }
             }
             None => self.train(stored.clone(), saves, progress)?,
         };
-        let faults = self.trainer.faults()?;
         self.trainer.resume(&found.best.state);
         let scene = match self.settings.compress {
-            Some((quality, steps)) if !found.interrupted => {
-                self.compress(quality, steps, &mut found, stored, saves, progress)?
-            }
-            _ => self.scene()?,
+            Some((quality, steps)) => self.compress(quality, steps, &mut found, stored, saves, progress)?,
+            None => self.scene()?,
         };
-        let (steps, seconds) = found.pace;
-        Ok(FineTuned {
-            scene,
-            curve: found.curve,
-            best: found.best.point,
-            steps_per_second: (steps > 0).then(|| steps as f64 / seconds),
-            held_out: self.images.held_out.len(),
-            faults,
-            interrupted: found.interrupted,
-        })
+        self.finished(scene, found)
     }
 
     /// Makes the steps, from where a stored run ended.
@@ -157,7 +143,7 @@ impl<'a> Run<'a> {
         let stored = stored.filter(|stored| self.trainer.resume(&stored.state));
         let (mut curve, mut best) = match stored {
             Some(Checkpoint { curve, best, .. }) => {
-                progress.note(&format!("fine-tuning goes on after step {}", curve.last().map_or(0, |last| last.step)));
+                progress.note(&format!("fine-tuning resumes after step {}", curve.last().map_or(0, |last| last.step)));
                 (curve, best)
             }
             None => {
@@ -169,21 +155,25 @@ impl<'a> Run<'a> {
         let first = curve.last().map_or(0, |last| last.step);
         progress.begin("fine-tuning", settings.steps);
         (0..first).for_each(|_| progress.advance());
-        let (mut seconds, mut interrupted, mut told) = (0.0, false, false);
+        let (mut seconds, mut told) = (0.0, false);
         let mut start = Instant::now();
         let mut step = first;
-        while step < settings.steps && !interrupted {
+        while step < settings.steps && !is_over(settings, &curve, &best) {
+            // The state was stored at the last evaluation: a resumed run makes the steps since then again, and ends at the same bytes.
+            if progress.is_interrupted() {
+                let pace = (step - first, seconds + start.elapsed().as_secs_f64());
+                return Err(self.interrupted(Progressed { curve, best, pace }));
+            }
             self.step(step, step + 1, decay(step, settings.steps, settings.last_rate))?;
             step += 1;
             progress.advance();
-            interrupted = progress.is_interrupted();
             if !told && step.is_multiple_of(STEPS_OF_FAULTS) {
                 told = self.tell_faults(progress)?;
             }
             if step.is_multiple_of(settings.refresh_filter.max(1)) && step != settings.steps {
                 self.refresh_filter(progress)?;
             }
-            if !step.is_multiple_of(every) && step != settings.steps && !interrupted {
+            if !step.is_multiple_of(every) && step != settings.steps {
                 continue;
             }
             // Waits for the steps made so far.
@@ -194,27 +184,44 @@ impl<'a> Run<'a> {
             let speed = (step - first) as f64 / seconds;
             progress.note(&describe(&point, Some(speed)));
             curve.push(point);
-            if point.psnr > best.point.psnr {
+            if point.psnr > best.point.psnr || point.psnr.is_none() {
                 best = Best { point, state: self.trainer.state()? };
             }
             let goes_on = step < settings.steps || settings.compress.is_some();
-            if let Some(saves) = saves
-                && (saves.are_due(step) || interrupted)
-                && goes_on
-            {
+            if let Some(saves) = saves.filter(|saves| saves.are_due(step) && goes_on) {
                 let checkpoint = Checkpoint { curve, best, state: self.trainer.state()?, coded: None };
                 saves.store(&checkpoint, progress)?;
                 Checkpoint { curve, best, .. } = checkpoint;
             }
-            let waited = curve.iter().rev().take_while(|point| point.step > best.point.step).count();
-            if settings.patience.is_some_and(|patience| waited >= patience) {
-                progress.note(&format!("no better after {waited} evaluations: fine-tuning ends"));
-                break;
-            }
             start = Instant::now();
         }
+        if step < settings.steps {
+            progress.note(&format!(
+                "fine-tuning ends after step {step}: no evaluation has been better since step {}",
+                best.point.step
+            ));
+        }
         progress.finish();
-        Ok(Progressed { curve, best, interrupted, pace: (step - first, seconds) })
+        Ok(Progressed { curve, best, pace: (step - first, seconds) })
+    }
+
+    /// Returns the error of an interrupted run, with the best result so far.
+    pub(super) fn interrupted(&mut self, found: Progressed) -> OfflineError {
+        self.trainer.resume(&found.best.state);
+        let tuned = self.scene().and_then(|scene| self.finished(scene, found));
+        tuned.map_or_else(|error| error, |tuned| OfflineError::Interrupted { tuned: Some(Box::new(tuned)) })
+    }
+
+    fn finished(&self, scene: GaussianScene, found: Progressed) -> Result<FineTuned, OfflineError> {
+        let Progressed { curve, best, pace: (steps, seconds) } = found;
+        Ok(FineTuned {
+            scene,
+            curve,
+            best: best.point,
+            steps_per_second: (steps > 0).then(|| steps as f64 / seconds),
+            validation: self.images.validation.len(),
+            faults: self.trainer.faults()?,
+        })
     }
 
     /// Returns the scene as it is, with its filter.
@@ -267,9 +274,12 @@ impl<'a> Run<'a> {
         Ok(self.trainer.step(&settings.rates, factor, count)?)
     }
 
-    /// Returns the mean PSNR on the held-out views.
-    pub(super) fn evaluate(&mut self) -> Result<f64, OfflineError> {
-        mean_psnr(&mut self.trainer, &self.images.held_out, self.background)
+    /// Returns the PSNR on the validation views; `None` if there are none.
+    pub(super) fn evaluate(&mut self) -> Result<Option<f64>, OfflineError> {
+        match &self.images.validation[..] {
+            [] => Ok(None),
+            shots => mean_psnr(&mut self.trainer, shots, self.background).map(Some),
+        }
     }
 
     /// Reports the first gradient that was not finite. Returns whether there was one.
@@ -282,6 +292,12 @@ impl<'a> Run<'a> {
         ));
         Ok(true)
     }
+}
+
+/// Returns whether no evaluation has been better for as many as patience allows.
+fn is_over(settings: &FineTuneSettings, curve: &[CurvePoint], best: &Best) -> bool {
+    let waited = curve.iter().rev().take_while(|point| point.step > best.point.step).count();
+    settings.patience.is_some_and(|patience| waited >= patience)
 }
 
 /// The best parameters so far.
@@ -324,5 +340,6 @@ pub(super) fn describe(point: &CurvePoint, speed: Option<f64>) -> String {
     let loss = loss.map_or(String::new(), |loss| format!("loss {loss:.5}, "));
     let training = training_psnr.map_or(String::new(), |psnr| format!("training {psnr:.2} dB, "));
     let speed = speed.map_or(String::new(), |speed| format!(", {speed:.1} steps a second"));
-    format!("step {step}: {loss}{training}held-out {psnr:.3} dB{speed}")
+    let validation = psnr.map_or("no validation views".to_owned(), |psnr| format!("validation {psnr:.3} dB"));
+    format!("step {step}: {loss}{training}{validation}{speed}")
 }

@@ -2,15 +2,11 @@
 //!
 //! In: training views. Out: their images as one word for each pixel, decoded once, in parallel ([`TrainingImages`]).
 
-use crate::offline::dataset::selection::hold_out;
 use crate::offline::dataset::{CoveredImage, TrainingView};
-use crate::offline::{OfflineError, Progress};
+use crate::offline::{OfflineError, Progress, room};
 use crate::scene::TrainedWith;
 use crate::view::View;
 use rayon::prelude::*;
-
-/// Most bytes of images that are kept.
-const LIMIT: u64 = 32 << 30;
 
 /// Images that are decoded between two reports of progress.
 const AT_ONCE: usize = 16;
@@ -29,36 +25,23 @@ pub struct TrainingImages {
     /// The views that are trained on.
     pub(super) views: Vec<TrainingView>,
     pub(super) shots: Vec<Shot>,
-    /// The views that tell which parameters are the best.
-    pub(super) held_out: Vec<Shot>,
+    /// The views on which the best step is chosen.
+    pub(super) validation: Vec<Shot>,
 }
 
 impl TrainingImages {
-    /// Holds out an even share of the views, as [`FineTuneSettings::held_out`](super::FineTuneSettings::held_out) says, and loads the images of
-    /// all. Begins the task "loading images", twice.
+    /// Loads the images of the views to train on and of those to validate on, which may be none. Begins the task "loading
+    /// images", twice.
     ///
     /// # Errors
-    /// Images that are missing, damaged or, together, too large.
+    /// Images that are missing, damaged or, together, larger than the memory that is available.
     pub fn load(
-        views: &[TrainingView],
-        held_out: usize,
-        trained_with: &TrainedWith,
-        progress: &mut dyn Progress,
-    ) -> Result<Self, OfflineError> {
-        let (views, held_out) = hold_out(views, held_out);
-        Self::load_apart(views, &held_out, trained_with, progress)
-    }
-
-    /// As [`load`](Self::load), with views that have been held out.
-    ///
-    /// # Errors
-    /// As [`load`](Self::load).
-    pub fn load_apart(
         views: Vec<TrainingView>,
-        held_out: &[TrainingView],
+        validation: &[TrainingView],
         trained_with: &TrainedWith,
         progress: &mut dyn Progress,
     ) -> Result<Self, OfflineError> {
+        room::require_images([&views[..], validation].into_iter().flatten())?;
         let mut shots = |views: &[TrainingView]| -> Result<Vec<Shot>, OfflineError> {
             let images = load(views, progress)?;
             let shot = |(view, image): (&TrainingView, CoveredImage)| Shot {
@@ -68,8 +51,8 @@ impl TrainingImages {
             };
             Ok(views.iter().zip(images).map(shot).collect())
         };
-        let (shots, held_out) = (shots(&views)?, shots(held_out)?);
-        Ok(Self { views, shots, held_out })
+        let (shots, validation) = (shots(&views)?, shots(validation)?);
+        Ok(Self { views, shots, validation })
     }
 
     /// Returns the number of views that are trained on.
@@ -86,19 +69,8 @@ impl TrainingImages {
 /// Loads the images of all views. Begins the task "loading images".
 ///
 /// # Errors
-/// Images that are missing, damaged or, together, too large.
+/// Images that are missing or damaged.
 fn load(views: &[TrainingView], progress: &mut dyn Progress) -> Result<Vec<CoveredImage>, OfflineError> {
-    let bytes: u64 = views.iter().map(|view| 4 * u64::from(view.camera.size.x) * u64::from(view.camera.size.y)).sum();
-    if let (true, Some(view)) = (bytes > LIMIT, views.first()) {
-        let gigabytes = bytes >> 30;
-        return Err(OfflineError::at(
-            &view.image,
-            format!(
-                "is one of {} images of {gigabytes} GiB together: give a --resolution, or fewer views",
-                views.len()
-            ),
-        ));
-    }
     progress.begin("loading images", views.len());
     let mut images = Vec::with_capacity(views.len());
     for some in views.chunks(AT_ONCE) {

@@ -163,7 +163,7 @@ fn fine_tuning(report: &BakeReport) -> String {
         points: curve.iter().filter_map(|point| Some([point.step as f64, psnr(point)?])).collect(),
         dots: true,
     };
-    let series = vec![line("held-out views", |point| Some(point.psnr)), line("views trained on", |p| p.training_psnr)];
+    let series = vec![line("validation views", |point| point.psnr), line("views trained on", |p| p.training_psnr)];
     let chart = Chart { x: Axis::new("steps"), y: Axis::new("PSNR, dB"), series };
     plotted("Fine-tuning", "Training views, before compression. Those trained on are over random backgrounds.", &chart)
 }

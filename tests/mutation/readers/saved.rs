@@ -1,7 +1,7 @@
 //! The stored results of a bake.
 //!
-//! In: what a bake leaves in its folder. Out: one of its files with other contents, behind a header with the right fingerprint and checksum; the
-//! bake goes on from there, and a package that it writes must be one that can be read and drawn.
+//! In: what a bake leaves in its folder. Out: one of its files with other contents, behind a header with the right key and hash; the
+//! bake resumes from there, and a package that it writes must be one that can be read and drawn.
 //!
 //! An input is the name of the file, a line break, and its contents without the header.
 
@@ -19,6 +19,7 @@ use bevy_gs4d::offline::quantize::Quality;
 use bevy_gs4d::offline::score::ScoringSettings;
 use bevy_gs4d::offline::score::variant::Variant;
 use bevy_gs4d::offline::search::{Goal, ScoreChoice};
+use bevy_gs4d::offline::splits::SplitOptions;
 use bevy_gs4d::offline::temporal_filter::KeyFrames;
 use bevy_gs4d::offline::{self, NoProgress};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
@@ -28,10 +29,10 @@ use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
 
-/// Bytes of the header of a stored result: magic, version, fingerprint, checksum of the rest.
-const HEAD: usize = 16;
-/// Where the checksum is in it.
-const CHECKSUM: usize = 12;
+/// Bytes of the header of a stored result: magic, version, key of the inputs, hash of the body.
+const HEAD: usize = 72;
+/// Place of the hash in the header.
+const HASH: usize = 40;
 
 /// The reader of stored results.
 pub struct Saved {
@@ -57,7 +58,7 @@ impl Saved {
             checkpoint,
             data,
             out,
-            resolution: None,
+            splits: SplitOptions::default(),
             background: None,
             goal: Goal::Keep(30),
             rounds: 1,
@@ -68,6 +69,7 @@ impl Saved {
             fine_tune: None,
             quality: Quality::VisuallyLossless,
             level: Some(1),
+            trust_images: false,
             keep_work: true,
         };
         let mut saved = Self { _folder: folder, scene, settings, files: Vec::new(), package: Vec::new() };
@@ -101,7 +103,7 @@ impl Reader for Saved {
         let (name, file) = random.pick(&self.files);
         let (_, other) = random.pick(&self.files);
         let mut body = file[HEAD..].to_vec();
-        if name.ends_with(".ron") && !random.one_in(8) {
+        if name == "prune" && !random.one_in(8) {
             let words = String::from_utf8_lossy(&body).into_owned();
             body = text::change(&words, &words, random).into_bytes();
         } else if body.len() >= 4 && !random.one_in(4) {
@@ -125,8 +127,8 @@ impl Reader for Saved {
         for (known, file) in &self.files {
             let mut file = file.clone();
             if known.as_bytes() == name {
-                file.truncate(CHECKSUM);
-                file.extend(crc32fast::hash(body).to_le_bytes());
+                file.truncate(HASH);
+                file.extend(blake3::hash(body).as_bytes());
                 file.extend(body);
             }
             fs::write(folder.join(known), file).expect("the folder can be written to");

@@ -1,14 +1,14 @@
 //! The folder of intermediate results, from which interrupted work resumes.
 //!
-//! In: a fingerprint of everything that a result depends on, and the result as bytes. Out: the same bytes; `None`, so
-//! that the stage runs again, if the fingerprint is another or the bytes are damaged. One run at a time works in a folder.
-//!
-//! Each fingerprint includes that of the previous stage, so that a change invalidates all later results.
+//! In: a [`Key`] of everything that a result depends on, and the result as bytes. Out: the same bytes; `None`, so that
+//! the stage runs again, if the key is another or the bytes are damaged. One run at a time works in a folder.
 
+use super::dataset::TrainingView;
 use super::files::node;
 use super::part;
 use crate::codec::CodecError;
 use crate::offline::{Progress, write_beside};
+use rayon::prelude::*;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
@@ -17,74 +17,90 @@ use std::sync::Arc;
 /// First bytes of every stored result.
 const MAGIC: [u8; 4] = *b"GS4W";
 /// Version of the stored results: other versions count as absent.
-const VERSION: u32 = 1;
-/// Bytes of the header: magic, version, fingerprint, checksum of the body.
-const HEAD: usize = 16;
+const VERSION: u32 = 2;
+/// Bytes of a hash.
+const HASH: usize = 32;
+/// Bytes of the header: magic, version, key, hash of the body.
+const HEAD: usize = 8 + 2 * HASH;
 
 /// Name of the file that is locked while a run works in the folder.
 const LOCK: &str = "lock";
 /// Most attempts to lock it while runs that end remove it.
 const ATTEMPTS: usize = 100;
 
-/// A 32-bit checksum of everything that a result depends on.
+/// The identity of everything that a result depends on: a BLAKE3 hash of the contents of files, results and settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Fingerprint(pub u32);
+pub struct Key([u8; HASH]);
 
-impl Fingerprint {
-    /// Returns the fingerprint of the contents of these files, in this order.
+impl Key {
+    /// Returns the key of these bytes.
+    pub fn of(bytes: &[u8]) -> Self {
+        Self(*blake3::hash(bytes).as_bytes())
+    }
+
+    /// Returns the key of the contents of these files, in this order.
     ///
     /// # Errors
     /// The first file that cannot be read, by name.
     pub fn of_files(paths: &[&Path]) -> Result<Self, CodecError> {
-        let mut hasher = crc32fast::Hasher::new();
-        for path in paths {
-            hash_file(path, &mut hasher)
-                .map_err(|error| CodecError { path: path.to_path_buf(), kind: error.into() })?;
-        }
-        Ok(Self(hasher.finalize()))
+        let hashes: Vec<Self> = paths.par_iter().map(|path| Self::of_file(path)).collect::<Result<_, _>>()?;
+        Ok(hashes.into_iter().fold(Self::of(b"files"), Self::with))
     }
 
-    /// Returns the fingerprint of this one and of `settings`.
+    /// Returns the key of the contents of the images and masks of these views. A file that is missing counts as such.
+    ///
+    /// # Errors
+    /// The first file that cannot be read although it is there, by name.
+    pub fn of_images(views: &[TrainingView]) -> Result<Self, CodecError> {
+        let paths: Vec<&Path> = views
+            .iter()
+            .flat_map(|view| [Some(&view.image), view.mask.as_ref()])
+            .flatten()
+            .map(PathBuf::as_path)
+            .collect();
+        let hash = |path: &&Path| if path.is_file() { Self::of_file(path) } else { Ok(Self::of(b"missing")) };
+        let hashes: Vec<Self> = paths.par_iter().map(hash).collect::<Result<_, _>>()?;
+        Ok(hashes.into_iter().fold(Self::of(b"images"), Self::with))
+    }
+
+    /// Returns the key of the contents of a file: that of its bytes.
+    ///
+    /// # Errors
+    /// A file that cannot be read, by name.
+    pub fn of_file(path: &Path) -> Result<Self, CodecError> {
+        let mut hasher = blake3::Hasher::new();
+        let hashed = File::open(path).and_then(|file| hasher.update_reader(file).map(|_| ()));
+        hashed.map_err(|error| CodecError { path: path.to_owned(), kind: error.into() })?;
+        Ok(Self(*hasher.finalize().as_bytes()))
+    }
+
+    /// Returns the key of this one and of `other`.
+    pub fn with(self, other: Self) -> Self {
+        Self::of(&[self.0, other.0].concat())
+    }
+
+    /// Returns the key of this one and of `settings`.
     pub fn and(self, settings: &str) -> Self {
-        let mut hasher = crc32fast::Hasher::new();
-        hasher.update(&self.0.to_le_bytes());
-        hasher.update(settings.as_bytes());
-        Self(hasher.finalize())
+        self.with(Self::of(settings.as_bytes()))
     }
 }
 
-fn hash_file(path: &Path, hasher: &mut crc32fast::Hasher) -> io::Result<()> {
-    let mut file = File::open(path)?;
-    let mut length = 0u64;
-    let mut block = vec![0; 1 << 16];
-    loop {
-        let count = file.read(&mut block)?;
-        if count == 0 {
-            break;
-        }
-        length += count as u64;
-        hasher.update(&block[..count]);
-    }
-    // The length separates the files: their bytes are hashed one after the other.
-    hasher.update(&length.to_le_bytes());
-    Ok(())
-}
-
-/// The folder of intermediate results, for one run alone. Once the last clone is dropped, another run can work in it; if nothing is
-/// stored, the folder is removed then.
+/// The folder of intermediate results, for one run alone. Once the last clone is dropped, another run can work in it; if
+/// nothing is stored, the folder is removed then.
 #[derive(Debug, Clone)]
-pub struct Work(Arc<Held>);
+pub struct Store(Arc<Held>);
 
 /// A folder in which no other run works.
 #[derive(Debug)]
 struct Held {
     folder: PathBuf,
-    /// The file [`LOCK`]; always there until the folder is given back.
+    /// The file [`LOCK`]; `None` once the folder is released.
     lock: Option<File>,
 }
 
-impl Work {
-    /// Returns the folder beside the package `out` whose name ends in `ending` as well (`OUT.bake`), created if it does not exist.
+impl Store {
+    /// Returns the folder next to the package `out` with `ending` appended to its name (`OUT.bake`), created if it does
+    /// not exist.
     ///
     /// # Errors
     /// Another run works in the folder, or it cannot be created.
@@ -106,27 +122,21 @@ impl Work {
         &self.0.folder
     }
 
-    /// Returns a stored result; `None` if there is none, or if it is damaged or has another fingerprint.
-    pub fn load(&self, name: &str, fingerprint: Fingerprint) -> Option<Vec<u8>> {
+    /// Returns a stored result; `None` if there is none, or if it is damaged or has another key.
+    pub fn load(&self, name: &str, key: Key) -> Option<Vec<u8>> {
         let bytes = fs::read(self.folder().join(name)).ok()?;
         let (head, body) = bytes.split_at_checked(HEAD)?;
-        (head == self::head(fingerprint, body)).then(|| body.to_vec())
+        (head == self::head(key, body)).then(|| body.to_vec())
     }
 
     /// Stores a result, whole or not at all.
     ///
     /// # Errors
     /// A folder that cannot be written to, a full disk.
-    pub fn store(
-        &self,
-        name: &str,
-        fingerprint: Fingerprint,
-        body: &[u8],
-        progress: &mut dyn Progress,
-    ) -> Result<(), CodecError> {
+    pub fn store(&self, name: &str, key: Key, body: &[u8], progress: &mut dyn Progress) -> Result<(), CodecError> {
         progress.uninterrupted(&mut || {
             write_beside(&self.folder().join(name), |file| {
-                file.write_all(&head(fingerprint, body))?;
+                file.write_all(&head(key, body))?;
                 file.write_all(body)
             })
         })
@@ -147,7 +157,7 @@ impl Work {
 
 impl Drop for Held {
     fn drop(&mut self) {
-        // A run that begins now makes another lock: the folder is then not empty, and stays.
+        // A run that begins at this moment makes another lock file: the folder is then not empty, and stays.
         let _ = fs::remove_file(self.folder.join(LOCK));
         drop(self.lock.take());
         // `remove_dir` does not remove a folder that has contents.
@@ -190,23 +200,13 @@ fn is_stored(path: &Path) -> bool {
     read && start == MAGIC
 }
 
-fn head(fingerprint: Fingerprint, body: &[u8]) -> [u8; HEAD] {
+fn head(key: Key, body: &[u8]) -> [u8; HEAD] {
     let mut head = [0; HEAD];
     head[..4].copy_from_slice(&MAGIC);
     head[4..8].copy_from_slice(&VERSION.to_le_bytes());
-    head[8..12].copy_from_slice(&fingerprint.0.to_le_bytes());
-    head[12..].copy_from_slice(&crc32fast::hash(body).to_le_bytes());
+    head[8..8 + HASH].copy_from_slice(&key.0);
+    head[8 + HASH..].copy_from_slice(blake3::hash(body).as_bytes());
     head
-}
-
-/// Returns the little-endian bytes of words.
-pub fn bytes(words: &[u32]) -> Vec<u8> {
-    words.iter().flat_map(|word| word.to_le_bytes()).collect()
-}
-
-/// Returns the words of little-endian bytes. A remainder of fewer than four bytes is ignored.
-pub fn words(bytes: &[u8]) -> Vec<u32> {
-    bytes.as_chunks().0.iter().map(|&four| u32::from_le_bytes(four)).collect()
 }
 
 #[cfg(test)]
@@ -219,8 +219,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let out = folder.path().join("scene.gs4d");
         fs::write(&out, b"input").expect("the folder can be written to");
-        let inputs = Fingerprint::of_files(&[&out]).expect("the file is there");
-        let work = Work::beside(&out, ".bake").expect("the folder can be made");
+        let inputs = Key::of_files(&[&out]).expect("the file is there");
+        let work = Store::beside(&out, ".bake").expect("the folder can be made");
         let (settings, others) = (inputs.and("ratio 0.8"), inputs.and("ratio 0.5"));
         let stored = work.store("kept", settings, b"some bytes", &mut NoProgress);
         stored.expect("the folder can be written to");
@@ -242,9 +242,9 @@ mod tests {
     fn only_what_was_stored_is_removed() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let out = folder.path().join("scene.gs4d");
-        let work = Work::beside(&out, ".bake").expect("the folder can be made");
+        let work = Store::beside(&out, ".bake").expect("the folder can be made");
         let (path, foreign) = (work.folder().to_owned(), work.folder().join("notes.txt"));
-        work.store("kept", Fingerprint(1), b"some bytes", &mut NoProgress).expect("the folder can be written to");
+        work.store("kept", Key::of(b"inputs"), b"some bytes", &mut NoProgress).expect("the folder can be written to");
         fs::write(&foreign, b"mine").expect("the folder can be written to");
         work.remove().expect("the folder can be listed");
         let left: Vec<_> = fs::read_dir(&path).expect("the folder").flatten().map(|entry| entry.path()).collect();
@@ -255,17 +255,17 @@ mod tests {
     fn one_run_at_a_time_works_in_a_folder() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let out = folder.path().join("scene.gs4d");
-        let first = Work::beside(&out, ".bake").expect("the folder can be made");
-        let message = Work::beside(&out, ".bake").expect_err("the first is still there").to_string();
+        let first = Store::beside(&out, ".bake").expect("the folder can be made");
+        let message = Store::beside(&out, ".bake").expect_err("the first is still there").to_string();
         assert!(message.contains("scene.gs4d.bake: another run"), "folder and reason: {message}");
         let clone = first.clone();
         drop(first);
-        Work::beside(&out, ".bake").expect_err("a clone of the first is still there");
+        Store::beside(&out, ".bake").expect_err("a clone of the first is still there");
         drop(clone);
         assert!(!folder.path().join("scene.gs4d.bake").exists(), "nothing was stored");
-        Work::beside(&out, ".bake").expect("nobody works in it");
+        Store::beside(&out, ".bake").expect("nobody works in it");
         fs::write(folder.path().join("file.bake"), b"mine").expect("the folder can be written to");
-        Work::beside(&folder.path().join("file"), ".bake").expect_err("a file of that name");
+        Store::beside(&folder.path().join("file"), ".bake").expect_err("a file of that name");
     }
 
     #[test]
@@ -277,10 +277,10 @@ mod tests {
             path
         };
         let (ab, c, a, bc) = (file("ab", b"ab"), file("c", b"c"), file("a", b"a"), file("bc", b"bc"));
-        let of = |paths: &[&Path]| Fingerprint::of_files(paths).expect("the files are there");
+        let of = |paths: &[&Path]| Key::of_files(paths).expect("the files are there");
         assert_ne!(of(&[&ab, &c]), of(&[&a, &bc]), "borders between files count");
         assert_ne!(of(&[&ab, &c]), of(&[&c, &ab]), "and so does their order");
-        let gone = Fingerprint::of_files(&[&folder.path().join("gone")]).expect_err("not there").to_string();
+        let gone = Key::of_files(&[&folder.path().join("gone")]).expect_err("not there").to_string();
         assert!(gone.contains("gone"), "the file is named: {gone}");
     }
 }

@@ -1,0 +1,65 @@
+//! Whether the images of a dataset show a capture.
+//!
+//! In: a scene as it was read, before anything is removed from it, and its training views. Out: an error if the scene
+//! explains their images no better than those of other views.
+
+use super::OfflineError;
+use super::dataset::TrainingView;
+use super::dataset::selection::even_subset;
+use super::engine::Engine;
+use super::metrics::psnr_pooled;
+use crate::scene::RuntimeScene;
+use crate::view::{Background, Picture};
+use glam::Vec3;
+
+/// Views that are compared.
+const VIEWS: usize = 8;
+/// A scene this close to its images, dB, belongs to them in any case.
+const CLOSE: f64 = 20.0;
+/// How much closer the pictures must be to their own images than to others, dB.
+const CLOSER: f64 = 0.1;
+
+/// Checks that the pictures of some views are closer to their own images than to those of other views. Views whose image
+/// is missing are left out; with fewer than two views of one size nothing can be said, and every dataset passes.
+///
+/// # Errors
+/// Images that cannot be read or that show something else, a failure of the engine.
+pub fn require_belonging(
+    engine: &mut Engine,
+    scene: &RuntimeScene,
+    views: &[TrainingView],
+    background: Background,
+) -> Result<(), OfflineError> {
+    let there: Vec<TrainingView> = views.iter().filter(|view| view.image.is_file()).cloned().collect();
+    let chosen: Vec<&TrainingView> = even_subset(&there, VIEWS).into_iter().map(|index| &there[index]).collect();
+    let behind = match background {
+        Background::Color(color) => Vec3::from(color),
+        Background::None | Background::Environment => Vec3::ZERO,
+    };
+    let truth: Vec<Picture> =
+        chosen.iter().map(|view| Ok(view.load_covered()?.over(behind))).collect::<Result<_, OfflineError>>()?;
+    let mut drawing = engine.drawing(scene, background)?;
+    let (mut own, mut other, mut others) = (0.0, 0.0, 0);
+    for (index, view) in chosen.iter().enumerate() {
+        let picture = drawing.draw(&view.camera.view(view.time, scene.trained_with.raster_fov))?.clamped();
+        own += psnr_pooled(&truth[index], &picture)? / chosen.len() as f64;
+        for (_, image) in
+            truth.iter().enumerate().filter(|(place, image)| *place != index && image.size == picture.size)
+        {
+            other += psnr_pooled(image, &picture)?;
+            others += 1;
+        }
+    }
+    let other = other / f64::from(others.max(1));
+    match chosen.first() {
+        Some(view) if others > 0 && own < CLOSE && own < other + CLOSER => Err(OfflineError::at(
+            &view.image,
+            format!(
+                "and the other images do not show this capture: its pictures have {own:.1} dB against their own images and \
+                 {other:.1} dB against those of other views; is --data the folder that it was trained on? \
+                 --trust-images skips this check"
+            ),
+        )),
+        _ => Ok(()),
+    }
+}

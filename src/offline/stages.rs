@@ -1,0 +1,166 @@
+//! Stages that run one after the other, whose results are stored.
+//!
+//! In: for each stage, the [`Key`] of its inputs and the work. Out: its result, computed now or by an earlier run with
+//! the same inputs, and the key of that result for the stages after it; a task for all stages, a note and a duration for
+//! each. Loading, storing and cancelling are here and nowhere else.
+
+use super::report::StageTime;
+use super::store::{Key, Store};
+use super::stored::Stored;
+use super::{OfflineError, Progress};
+use std::time::Instant;
+
+/// Stages in progress.
+pub struct Stages<'a> {
+    store: &'a Store,
+    progress: &'a mut dyn Progress,
+    times: Vec<StageTime>,
+}
+
+impl<'a> Stages<'a> {
+    /// Begins a task of this many stages.
+    pub fn begin(task: &'static str, count: usize, store: &'a Store, progress: &'a mut dyn Progress) -> Self {
+        progress.begin(task, count);
+        Self { store, progress, times: Vec::new() }
+    }
+
+    /// Returns the result of a stage with these inputs: the stored one, or else that of `work`, which is stored under the
+    /// name of the stage. Also returns the key of the result. A result that has just been computed is returned as it will
+    /// be read, so that a resumed run continues from the same bytes. A stored result for which `fits` is false is computed again.
+    ///
+    /// # Errors
+    /// Those of `work`, a result that cannot be stored, [`OfflineError::Interrupted`] if the user has asked to end.
+    pub fn run<T: Stored>(
+        &mut self,
+        name: &'static str,
+        inputs: Key,
+        fits: impl Fn(&T) -> bool,
+        work: impl FnOnce(&mut dyn Progress) -> Result<T, OfflineError>,
+    ) -> Result<(T, Key), OfflineError> {
+        let start = Instant::now();
+        let stored = self.store.load(name, inputs).and_then(|body| Some((T::decode(&body)?, Key::of(&body))));
+        let stored = stored.filter(|(result, _)| fits(result));
+        let skipped = stored.is_some();
+        let result = match stored {
+            Some(stored) => stored,
+            None => {
+                self.cancellation()?;
+                let body = work(self.progress)?.encode()?;
+                let result = T::decode(&body).ok_or(OfflineError::Unreadable { stage: name })?;
+                self.store.store(name, inputs, &body, self.progress)?;
+                (result, Key::of(&body))
+            }
+        };
+        self.ended(name, start, skipped);
+        Ok(result)
+    }
+
+    /// Runs a stage whose result is not stored.
+    ///
+    /// # Errors
+    /// Those of `work`, [`OfflineError::Interrupted`] if the user has asked to end.
+    pub fn run_always<T>(
+        &mut self,
+        name: &'static str,
+        work: impl FnOnce(&mut dyn Progress) -> Result<T, OfflineError>,
+    ) -> Result<T, OfflineError> {
+        self.cancellation()?;
+        let start = Instant::now();
+        let result = work(self.progress)?;
+        self.ended(name, start, false);
+        Ok(result)
+    }
+
+    /// Leaves a stage out, with a note if there is a reason that the user should know.
+    pub fn leave_out(&mut self, name: &'static str, reason: Option<&str>) {
+        if let Some(reason) = reason {
+            self.progress.note(&format!("note: {name} is left out: {reason}"));
+        }
+        self.progress.advance();
+    }
+
+    /// Returns where progress is reported.
+    pub fn progress(&mut self) -> &mut dyn Progress {
+        self.progress
+    }
+
+    /// Returns the durations of the stages run so far.
+    pub fn times(&self) -> Vec<StageTime> {
+        self.times.clone()
+    }
+
+    /// Finishes the task.
+    pub fn finish(self) {
+        self.progress.finish();
+    }
+
+    fn cancellation(&self) -> Result<(), OfflineError> {
+        if self.progress.is_interrupted() { Err(OfflineError::Interrupted { tuned: None }) } else { Ok(()) }
+    }
+
+    fn ended(&mut self, name: &'static str, start: Instant, skipped: bool) {
+        let seconds = start.elapsed().as_secs_f64();
+        let duration = if skipped { "skipped, done before".to_owned() } else { format!("{seconds:.1} s") };
+        self.progress.note(&format!("{name}: {duration}"));
+        self.times.push(StageTime { name: name.to_owned(), seconds, skipped });
+        self.progress.advance();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::offline::NoProgress;
+
+    /// Asks to end from the beginning.
+    struct Interrupted;
+
+    impl Progress for Interrupted {
+        fn begin(&mut self, _task: &'static str, _steps: usize) {}
+
+        fn advance(&mut self) {}
+
+        fn finish(&mut self) {}
+
+        fn note(&mut self, _line: &str) {}
+
+        fn is_interrupted(&self) -> bool {
+            true
+        }
+    }
+
+    #[test]
+    fn a_stage_runs_once_for_each_input() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let store = Store::beside(&folder.path().join("scene.gs4d"), ".bake").expect("the folder can be made");
+        let run = |inputs: &[u8]| {
+            let mut runs = 0;
+            let mut progress = NoProgress;
+            let mut stages = Stages::begin("test", 1, &store, &mut progress);
+            let work = |_: &mut dyn Progress| {
+                runs += 1;
+                Ok(inputs.to_vec())
+            };
+            let (result, key) = stages.run("stage", Key::of(inputs), |_| true, work).expect("the work succeeds");
+            assert_eq!((result.as_slice(), key), (inputs, Key::of(inputs)), "the result and its key");
+            runs
+        };
+        assert_eq!(run(b"first"), 1, "nothing is stored");
+        assert_eq!(run(b"first"), 0, "the stored result has the same inputs");
+        assert_eq!(run(b"second"), 1, "the stored result has other inputs");
+    }
+
+    #[test]
+    fn an_interrupted_stage_is_an_error() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let store = Store::beside(&folder.path().join("scene.gs4d"), ".bake").expect("the folder can be made");
+        let mut interrupted = Interrupted;
+        let mut stages = Stages::begin("test", 1, &store, &mut interrupted);
+        let result = stages.run("stage", Key::of(b""), |_| true, |_| Ok(Vec::<u8>::new()));
+        assert!(matches!(result, Err(OfflineError::Interrupted { .. })), "the stage does not run");
+        assert!(
+            matches!(stages.run_always("other", |_| Ok(())), Err(OfflineError::Interrupted { .. })),
+            "nor does another"
+        );
+    }
+}
