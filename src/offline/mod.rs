@@ -12,7 +12,7 @@
 //! | [`engine`] | opens the GPU or the CPU reference |
 //! | [`score`] | sums what every Gaussian contributes to the training views |
 //! | [`prune`], [`prune_by_views`] | keeps the Gaussians that score highest |
-//! | [`search`], [`quality`] | finds the best score and the smallest count that a loss allows |
+//! | [`search`], [`trained_search`], [`quality`] | finds the best score and the smallest count that a loss allows |
 //! | [`temporal_filter`] | finds which Gaussians are active when |
 //! | [`fine_tune`](mod@fine_tune) | trains what is left, so that it makes up for what was removed |
 //! | [`quantize`], [`convert`] | changes the form that a scene is stored in |
@@ -39,6 +39,7 @@ pub mod files;
 pub mod fine_tune;
 pub mod metrics;
 pub mod orbit;
+mod package_size;
 mod part;
 pub mod picture_file;
 mod progress;
@@ -59,6 +60,7 @@ pub mod stored;
 mod subject;
 pub mod temporal_filter;
 mod trained_pixel;
+pub mod trained_search;
 
 pub use error::OfflineError;
 pub use progress::{NoProgress, Progress};

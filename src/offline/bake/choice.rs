@@ -7,21 +7,18 @@
 use super::Bake;
 use super::tuning::short;
 use crate::offline::engine::Engine;
-use crate::offline::fine_tune::{FineTuneSettings, TrainingImages, fine_tune};
-use crate::offline::prune::{highest, select};
-use crate::offline::quality::{Trial, smallest_count};
+use crate::offline::quality::Trial;
 use crate::offline::report::Tried;
 use crate::offline::search::{Candidate, Goal, ScoreChoice, ScoreSearch, candidates};
 use crate::offline::store::Key;
 use crate::offline::stored::{Stored, Text};
+use crate::offline::trained_search::TrainedSearch;
 use crate::offline::{OfflineError, Progress};
 use crate::scene::GaussianScene;
 use serde::{Deserialize, Serialize};
 
 /// Fractions of the Gaussians whose removal is measured for the report, whatever the goal.
 const SWEEP: [f64; 4] = [0.2, 0.5, 0.7, 0.85];
-/// The count that a loss allows is found to within this fraction of the count that pruning alone needs.
-const TOLERANCE: usize = 50;
 
 /// The scores of every candidate.
 pub(super) struct ScoreTable(Vec<Candidate>);
@@ -158,8 +155,8 @@ impl Bake<'_> {
         if let Some(settings) = self.tunes().filter(|_| depends_on_training).map(short) {
             let images = self.images(progress)?;
             let (engine, whole) = (&mut *self.engine, &self.subject.scene);
-            let mut trials = Trials { engine, images: &images, settings: &settings, whole, search: &search };
-            let chosen = trials.choose(candidates, goal, (best, kept), progress)?;
+            let mut trials = TrainedSearch { engine, images: &images, settings: &settings, whole, search: &search };
+            let chosen = trials.best(candidates, goal, (best, kept), progress)?;
             for (score, Trial { count, psnr }) in chosen.tried {
                 add(&format!("{score}, {} steps", settings.steps), count, psnr);
             }
@@ -167,85 +164,6 @@ impl Bake<'_> {
         }
         let compared_with = format!("{}, {}", summary.views, summary.compared_with);
         Ok(Text(Choice { score: best.name, kept, compared_with, tried }))
-    }
-}
-
-/// Short trainings of what different scores and counts leave.
-struct Trials<'a> {
-    engine: &'a mut Engine,
-    images: &'a TrainingImages,
-    settings: &'a FineTuneSettings,
-    whole: &'a GaussianScene,
-    search: &'a ScoreSearch,
-}
-
-/// The outcome of short trainings.
-struct Chosen {
-    candidate: Candidate,
-    kept: usize,
-    /// Name of the score, count and PSNR on the validation views.
-    tried: Vec<(String, Trial)>,
-}
-
-impl Trials<'_> {
-    /// Returns the PSNR on the validation views of a scene after a short training.
-    fn measure(&mut self, scene: GaussianScene, progress: &mut dyn Progress) -> Result<f64, OfflineError> {
-        let scene = match self.engine {
-            Engine::Gpu(headless) => fine_tune(headless, scene, self.images, self.settings, None, progress)?.scene,
-            Engine::Cpu => scene,
-        };
-        self.search.psnr(self.engine, &scene.into_runtime()?)
-    }
-
-    /// Trains the Gaussians that each candidate keeps, and searches for the smallest count if a loss decides. `alone` is the choice without
-    /// training. Begins the task "training trials".
-    ///
-    /// The loss is allowed against the whole scene as it was read, or after the same short training if that is worse: the checkpoint was
-    /// trained on the validation views, unless these come from a file of their own, and a scene that was not would never reach it.
-    fn choose(
-        &mut self,
-        candidates: &[Candidate],
-        goal: Goal,
-        alone: (Candidate, usize),
-        progress: &mut dyn Progress,
-    ) -> Result<Chosen, OfflineError> {
-        let (mut candidate, mut kept) = alone;
-        let (total, mut tried) = (self.whole.len(), Vec::new());
-        let steps = if matches!(goal, Goal::MaxLoss(_)) { TOLERANCE.ilog2() as usize + 2 } else { 0 };
-        progress.begin("training trials", steps + candidates.len());
-        let floor = match (goal, self.search.baseline()) {
-            (Goal::MaxLoss(loss), Some(baseline)) => {
-                let trained = self.measure(self.whole.clone(), progress)?;
-                progress.advance();
-                tried.push((candidate.name.clone(), Trial { count: total, psnr: trained }));
-                Some(baseline.min(trained) - loss)
-            }
-            _ => None,
-        };
-        // Where nothing is lost, scores do not differ.
-        let compared = if floor.is_some() { kept.div_ceil(2) } else { kept };
-        let mut best = f64::NEG_INFINITY;
-        let several = candidates.len() > 1;
-        for other in candidates.iter().filter(|_| several) {
-            let psnr = self.measure(select(self.whole, &highest(&other.scores, compared)), progress)?;
-            progress.advance();
-            tried.push((other.name.clone(), Trial { count: compared, psnr }));
-            if psnr > best {
-                (best, candidate) = (psnr, other.clone());
-            }
-        }
-        if let Some(floor) = floor {
-            let measure = |count| {
-                let psnr = self.measure(select(self.whole, &highest(&candidate.scores, count)), progress);
-                progress.advance();
-                psnr
-            };
-            let (fewest, measured) = smallest_count(kept, kept / TOLERANCE, floor, measure)?;
-            tried.extend(measured.into_iter().map(|trial| (candidate.name.clone(), trial)));
-            kept = fewest;
-        }
-        progress.finish();
-        Ok(Chosen { candidate, kept, tried })
     }
 }
 

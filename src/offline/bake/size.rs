@@ -5,6 +5,7 @@
 
 use super::{Bake, BakeSettings};
 use crate::codec::package;
+use crate::offline::package_size::{count_within, fitting};
 use crate::offline::prune::{highest, select};
 use crate::offline::quantize::{CompressSettings, compress};
 use crate::offline::search::Goal;
@@ -16,14 +17,6 @@ use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Bytes of a Gaussian with which the search begins.
-const BYTES_OF_GAUSSIAN: u64 = 24;
-/// Packages that are tried before the bake.
-const TRIES: usize = 5;
-/// The fraction of the room for Gaussians that is aimed at: training changes how well a package compresses.
-const AIM: f64 = 0.985;
-/// A package this much smaller, as a fraction of the size, is large enough.
-const NEAR: f64 = 0.97;
 /// Most packages that a bake makes.
 const ATTEMPTS: usize = 4;
 /// Name under which the attempts are stored.
@@ -73,8 +66,7 @@ impl Bake<'_> {
         Ok(())
     }
 
-    /// Returns how many of the Gaussians with the highest scores fit into a package of this many bytes, before they are trained. Begins the
-    /// task "finding the count".
+    /// Returns how many of the Gaussians with the highest scores fit into a package of this many bytes, before they are trained.
     ///
     /// # Errors
     /// Not even one Gaussian fits.
@@ -89,20 +81,7 @@ impl Bake<'_> {
         if one > limit {
             return Err(self.too_small(limit, &format!("a package of a single Gaussian has {one}")));
         }
-        let mut count = usize::try_from(limit / BYTES_OF_GAUSSIAN).map_or(total, |count| count.clamp(1, total.max(1)));
-        progress.begin("finding the count", TRIES);
-        for _ in 0..TRIES {
-            let size = self.size_of(&highest(scores, count))?;
-            progress.advance();
-            let whole = count == total && size <= limit;
-            let near = size <= limit && size as f64 >= NEAR * limit as f64;
-            if whole || near {
-                break;
-            }
-            count = fitting(count, size, limit, one).clamp(1, total.max(1));
-        }
-        progress.finish();
-        Ok(count)
+        count_within(limit, total, one, |count| self.size_of(&highest(scores, count)), progress)
     }
 
     /// Returns the bytes of a package of these Gaussians as they are.
@@ -179,24 +158,9 @@ impl Bake<'_> {
     }
 }
 
-/// Returns the count at which a package that has `size` bytes with `count` Gaussians, and `one` with a single one, would have nearly `limit`.
-fn fitting(count: usize, size: u64, limit: u64, one: u64) -> usize {
-    let [room, used] = [limit, size].map(|bytes| bytes.saturating_sub(one) as f64);
-    (count as f64 * AIM * room / used.max(1.0)) as usize
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn counts_follow_the_size() {
-        assert_eq!(fitting(1000, 2000, 1000, 0), 492, "a little less than half");
-        assert_eq!(fitting(1000, 500, 1000, 0), 1970, "a little less than twice");
-        assert_eq!(fitting(3, 1000, 10, 0), 0, "no Gaussian fits");
-        assert_eq!(fitting(1000, 2900, 1900, 900), 492, "the bytes of one Gaussian are needed once");
-        assert_eq!(fitting(1, 901, 900, 900), 0, "a single Gaussian is too large");
-    }
 
     #[test]
     fn attempts_of_other_inputs_are_not_resumed() {
