@@ -1,0 +1,69 @@
+//! The number of Gaussians whose package has a given size.
+//!
+//! In: a number of bytes, the size of the package of any number of Gaussians. Out: a number of Gaussians that nearly fills it.
+
+use super::{OfflineError, Progress};
+
+/// Bytes of a Gaussian with which the search begins.
+const BYTES_OF_GAUSSIAN: u64 = 24;
+/// Packages that are tried.
+const TRIES: usize = 5;
+/// The fraction of the room for Gaussians that is aimed at: training changes how well a package compresses.
+const AIM: f64 = 0.985;
+/// A package this much smaller, as a fraction of the size, is large enough.
+const NEAR: f64 = 0.97;
+
+/// Returns how many of `total` Gaussians fit into a package of `limit` bytes, given the size of a package of any number and that of a single
+/// Gaussian. Begins the task "finding the count".
+pub(super) fn count_within(
+    limit: u64,
+    total: usize,
+    one: u64,
+    size_of: impl Fn(usize) -> Result<u64, OfflineError>,
+    progress: &mut dyn Progress,
+) -> Result<usize, OfflineError> {
+    let mut count = usize::try_from(limit / BYTES_OF_GAUSSIAN).map_or(total, |count| count.clamp(1, total.max(1)));
+    progress.begin("finding the count", TRIES);
+    for _ in 0..TRIES {
+        let size = size_of(count)?;
+        progress.advance();
+        let whole = count == total && size <= limit;
+        let near = size <= limit && size as f64 >= NEAR * limit as f64;
+        if whole || near {
+            break;
+        }
+        count = fitting(count, size, limit, one).clamp(1, total.max(1));
+    }
+    progress.finish();
+    Ok(count)
+}
+
+/// Returns the count at which a package that has `size` bytes with `count` Gaussians, and `one` with a single one, would have nearly `limit`.
+pub(super) fn fitting(count: usize, size: u64, limit: u64, one: u64) -> usize {
+    let [room, used] = [limit, size].map(|bytes| bytes.saturating_sub(one) as f64);
+    (count as f64 * AIM * room / used.max(1.0)) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::offline::NoProgress;
+
+    #[test]
+    fn counts_follow_the_size() {
+        assert_eq!(fitting(1000, 2000, 1000, 0), 492, "a little less than half");
+        assert_eq!(fitting(1000, 500, 1000, 0), 1970, "a little less than twice");
+        assert_eq!(fitting(3, 1000, 10, 0), 0, "no Gaussian fits");
+        assert_eq!(fitting(1000, 2900, 1900, 900), 492, "the bytes of one Gaussian are needed once");
+        assert_eq!(fitting(1, 901, 900, 900), 0, "a single Gaussian is too large");
+    }
+
+    #[test]
+    fn a_package_of_the_found_count_nearly_fills_the_size() {
+        let size_of = |count: usize| Ok(500 + 20 * count as u64);
+        let count = count_within(100_000, 90_000, 520, size_of, &mut NoProgress).expect("sizes are known");
+        assert!((4825..=4975).contains(&count), "97 to 100 percent of the size: {count}");
+        let all = count_within(100_000, 300, 520, size_of, &mut NoProgress).expect("sizes are known");
+        assert_eq!(all, 300, "all Gaussians fit");
+    }
+}

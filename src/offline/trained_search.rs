@@ -1,0 +1,104 @@
+//! The search for the score to prune by and for the number of Gaussians to keep, where the remaining Gaussians are trained.
+//!
+//! In: scores, a [`Goal`], images to train on, a search on validation views. Out: the score and the count that are best after a short
+//! training, and every count tried ([`Chosen`]).
+
+use super::engine::Engine;
+use super::fine_tune::{FineTuneSettings, TrainingImages, fine_tune};
+use super::prune::{highest, select};
+use super::quality::{Trial, smallest_count};
+use super::search::{Candidate, Goal, ScoreSearch};
+use super::{OfflineError, Progress};
+use crate::scene::GaussianScene;
+
+/// The count that a loss allows is found to within this fraction of the count that pruning alone needs.
+const TOLERANCE: usize = 50;
+
+/// Short trainings of the Gaussians that different scores and counts keep.
+pub struct TrainedSearch<'a> {
+    /// Trains and draws.
+    pub engine: &'a mut Engine,
+    /// The images to train on.
+    pub images: &'a TrainingImages,
+    /// The settings of a short training.
+    pub settings: &'a FineTuneSettings,
+    /// The scene with all its Gaussians.
+    pub whole: &'a GaussianScene,
+    /// The search on the validation views.
+    pub search: &'a ScoreSearch,
+}
+
+/// The outcome of short trainings.
+pub struct Chosen {
+    /// The best score.
+    pub candidate: Candidate,
+    /// The number of Gaussians to keep.
+    pub kept: usize,
+    /// Name of the score, count and PSNR on the validation views.
+    pub tried: Vec<(String, Trial)>,
+}
+
+impl TrainedSearch<'_> {
+    /// Returns the PSNR on the validation views of a scene after a short training.
+    fn measure(&mut self, scene: GaussianScene, progress: &mut dyn Progress) -> Result<f64, OfflineError> {
+        let scene = match self.engine {
+            Engine::Gpu(headless) => fine_tune(headless, scene, self.images, self.settings, None, progress)?.scene,
+            Engine::Cpu => scene,
+        };
+        self.search.psnr(self.engine, &scene.into_runtime()?)
+    }
+
+    /// Trains the Gaussians that each candidate keeps, and searches for the smallest count if a loss decides. `alone` is the choice without
+    /// training. Begins the task "training trials".
+    ///
+    /// The loss is allowed against the whole scene as it was read, or after the same short training if that is worse: the checkpoint was
+    /// trained on the validation views, unless these come from a file of their own, and a scene that was not would never reach it.
+    ///
+    /// # Errors
+    /// A scene that cannot be trained, a failure of the engine.
+    pub fn best(
+        &mut self,
+        candidates: &[Candidate],
+        goal: Goal,
+        alone: (Candidate, usize),
+        progress: &mut dyn Progress,
+    ) -> Result<Chosen, OfflineError> {
+        let (mut candidate, mut kept) = alone;
+        let (total, mut tried) = (self.whole.len(), Vec::new());
+        let steps = if matches!(goal, Goal::MaxLoss(_)) { TOLERANCE.ilog2() as usize + 2 } else { 0 };
+        progress.begin("training trials", steps + candidates.len());
+        let floor = match (goal, self.search.baseline()) {
+            (Goal::MaxLoss(loss), Some(baseline)) => {
+                let trained = self.measure(self.whole.clone(), progress)?;
+                progress.advance();
+                tried.push((candidate.name.clone(), Trial { count: total, psnr: trained }));
+                Some(baseline.min(trained) - loss)
+            }
+            _ => None,
+        };
+        // Where nothing is lost, scores do not differ.
+        let compared = if floor.is_some() { kept.div_ceil(2) } else { kept };
+        let mut best = f64::NEG_INFINITY;
+        let several = candidates.len() > 1;
+        for other in candidates.iter().filter(|_| several) {
+            let psnr = self.measure(select(self.whole, &highest(&other.scores, compared)), progress)?;
+            progress.advance();
+            tried.push((other.name.clone(), Trial { count: compared, psnr }));
+            if psnr > best {
+                (best, candidate) = (psnr, other.clone());
+            }
+        }
+        if let Some(floor) = floor {
+            let measure = |count| {
+                let psnr = self.measure(select(self.whole, &highest(&candidate.scores, count)), progress);
+                progress.advance();
+                psnr
+            };
+            let (fewest, measured) = smallest_count(kept, kept / TOLERANCE, floor, measure)?;
+            tried.extend(measured.into_iter().map(|trial| (candidate.name.clone(), trial)));
+            kept = fewest;
+        }
+        progress.finish();
+        Ok(Chosen { candidate, kept, tried })
+    }
+}
