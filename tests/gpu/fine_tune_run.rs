@@ -251,6 +251,30 @@ fn captures_of_every_model_and_with_an_environment_map_are_trained() {
 }
 
 #[test]
+fn held_out_views_that_are_reproduced_exactly_do_not_keep_the_first_step() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let mut lesson = Lesson::new();
+    let settings = FineTuneSettings { steps: 20, held_out: 6, evaluate_every: 10, ..FineTuneSettings::default() };
+    let before = lesson.views.len();
+    // Cameras that look away from the scene, with black images.
+    let black = lesson.folder.path().join("black.png");
+    image::RgbImage::new(40, 40).save(&black).expect("the folder can be written to");
+    for index in 0..before {
+        let mut view = lesson.views[index].clone();
+        view.name = format!("black {index}");
+        view.image = black.clone();
+        let away = glam::Mat4::from_translation(Vec3::new(0.0, 0.0, -1000.0));
+        view.camera.world_to_camera = away * view.camera.world_to_camera;
+        lesson.views.push(view);
+    }
+    let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.views, &settings, None, &mut NoProgress);
+    let tuned = tuned.expect("it can be trained");
+    assert_eq!(tuned.held_out, 6, "a quarter of 24 views");
+    assert!(tuned.curve.iter().all(|point| point.psnr.is_finite()), "every PSNR is finite: {:?}", tuned.curve);
+    assert_eq!(tuned.best.step, 20, "training helps, and the last step is kept: {:?}", tuned.curve);
+}
+
+#[test]
 fn training_ends_early_when_it_no_longer_helps() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();

@@ -1,13 +1,13 @@
 //! The stage evaluate of a bake.
 //!
-//! In: the scene before pruning, the package on disk, the test views. Out: the metrics of both, and a few pictures
-//! ([`Compared`]).
+//! In: the scene before pruning, the package on disk, the test views. Out: the metrics of both, over the background of training and
+//! over a contrasting one, and a few pictures ([`Compared`]).
 
 use super::Bake;
 use crate::codec;
 use crate::codec::checkpoint::CheckpointOptions;
 use crate::offline::dataset::{Dataset, Split};
-use crate::offline::evaluation::evaluate_scene;
+use crate::offline::evaluation::{color_name, contrast, evaluate_scene};
 use crate::offline::metrics::{Evaluation, MetricSet};
 use crate::offline::report::{Change, Sample};
 use crate::offline::splits::{open_split, split_name};
@@ -17,6 +17,9 @@ use crate::view::Picture;
 
 /// Most views whose pictures are on the page.
 const SAMPLES: usize = 3;
+
+/// Difference of the package's PSNR over the two backgrounds above which a bake reports a note, dB.
+const LARGE_DIFFERENCE: f64 = 3.0;
 
 /// The test views, drawn before and after.
 pub(super) struct Compared {
@@ -42,24 +45,22 @@ impl Bake<'_> {
         let mut draw = |scene: &RuntimeScene| -> Result<(Evaluation, Vec<[Picture; 2]>), OfflineError> {
             let (mut index, mut kept) = (0, Vec::new());
             let (background, metrics) = (self.subject.background, MetricSet::ALL);
-            let evaluation = evaluate_scene(
-                self.engine,
-                scene,
-                &dataset.views,
-                background,
-                metrics,
-                progress,
-                |_, reference, picture| {
+            let views = &dataset.views;
+            let mut evaluation =
+                evaluate_scene(self.engine, scene, views, background, metrics, progress, |_, reference, picture| {
                     if sampled.contains(&index) {
                         kept.push([reference.clone(), picture.clone()]);
                     }
                     index += 1;
                     Ok(())
-                },
-            )?;
+                })?;
+            evaluation.contrast = contrast(self.engine, scene, views, background, &evaluation, progress)?;
             Ok((evaluation, kept))
         };
         let ((before, pictures), (after, pictures_after)) = (draw(&self.subject.runtime)?, draw(&after)?);
+        if let Some(note) = difference_of_backgrounds(&after) {
+            progress.note(&note);
+        }
         let pictures = pictures.into_iter().zip(pictures_after);
         let samples = sampled.iter().zip(pictures).map(|(&index, ([reference, before], [_, after]))| {
             let view = &dataset.views[index];
@@ -80,5 +81,50 @@ impl Bake<'_> {
                 None
             }
         }
+    }
+}
+
+/// Returns a note if the PSNR of the package over the two backgrounds differs much.
+fn difference_of_backgrounds(package: &Evaluation) -> Option<String> {
+    let contrast = package.contrast?;
+    let (first, second) = (package.mean.psnr_pooled, contrast.mean.psnr_pooled);
+    ((first - second).abs() > LARGE_DIFFERENCE).then(|| {
+        format!(
+            "note: the PSNR of the package is {first:.2} dB over {} and {second:.2} dB over {}: it has Gaussians that only one of the \
+             backgrounds shows, such as fog; a capture trained over random backgrounds has none",
+            color_name(package.background),
+            color_name(contrast.background),
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::offline::metrics::{Contrast, ImageMetrics, MeanMetrics};
+    use glam::{UVec2, Vec3};
+
+    /// Returns the metrics of a picture whose values differ by `difference` from its reference.
+    fn mean(difference: f32) -> MeanMetrics {
+        let picture = |value| Picture::filled(UVec2::splat(2), Vec3::splat(value));
+        let metrics = ImageMetrics::of(&picture(0.0), &picture(difference), MetricSet::PSNR).expect("the same size");
+        MeanMetrics::of(&[metrics]).expect("one view")
+    }
+
+    #[test]
+    fn a_psnr_that_depends_on_the_background_is_noted() {
+        let evaluation = |over_black: f32, over_white: f32| Evaluation {
+            background: [0.0; 3],
+            has_gaps: true,
+            views: Vec::new(),
+            mean: mean(over_black),
+            contrast: Some(Contrast { background: [1.0; 3], mean: mean(over_white) }),
+        };
+        let note = difference_of_backgrounds(&evaluation(0.01, 0.1)).expect("40 and 20 dB differ by more than 3 dB");
+        assert!(note.contains("40.00 dB over black and 20.00 dB over white"), "both figures are named: {note}");
+        assert!(difference_of_backgrounds(&evaluation(0.1, 0.01)).is_some(), "a lower PSNR over black is noted, too");
+        assert_eq!(difference_of_backgrounds(&evaluation(0.01, 0.013)), None, "2.3 dB are not noted");
+        let alone = Evaluation { contrast: None, ..evaluation(0.01, 0.1) };
+        assert_eq!(difference_of_backgrounds(&alone), None, "one background has no difference");
     }
 }

@@ -3,10 +3,11 @@
 //! In: a scene, views and images. Out: an error if the scene explains its images no better than those of other views.
 
 use super::Trainer;
-use super::run::psnr_of;
+use super::run::squared_error;
 use super::targets::Shot;
 use crate::offline::OfflineError;
 use crate::offline::dataset::TrainingView;
+use crate::offline::metrics::SquaredError;
 use crate::view::Background;
 
 /// Views that are looked at.
@@ -26,17 +27,17 @@ pub(super) fn check(
 ) -> Result<(), OfflineError> {
     let count = VIEWS.min(shots.len());
     let chosen: Vec<usize> = (0..count).map(|k| k * shots.len() / count.max(1)).collect();
-    let (mut own, mut other, mut others) = (0.0, 0.0, 0);
+    let (mut own, mut other, mut others) = (SquaredError::default(), SquaredError::default(), 0);
     for &index in &chosen {
-        own += psnr_of(trainer, &shots[index].view, &shots[index].image, background)? / count as f64;
+        own.merge(&squared_error(trainer, &shots[index].view, &shots[index].image, background)?);
         for &another in chosen.iter().filter(|&&another| another != index) {
             if shots[another].image.size == shots[index].image.size {
-                other += psnr_of(trainer, &shots[index].view, &shots[another].image, background)?;
+                other.merge(&squared_error(trainer, &shots[index].view, &shots[another].image, background)?);
                 others += 1;
             }
         }
     }
-    let other = other / f64::from(others.max(1));
+    let (own, other) = (own.psnr(), other.psnr());
     match files.first() {
         Some(view) if others > 0 && own < CLOSE && own < other + CLOSER => Err(OfflineError::at(
             &view.image,
