@@ -3,7 +3,7 @@
 //! In: interleaved bytes of 1 to 4 channels and two sizes. Out: the bytes at the other size. Equal to Pillow up to version 12
 //! (13 swaps the two passes for some shapes, which moves a few values by rounding).
 //!
-//! The filter is the cubic with a = −0.5, stretched by the reduction (antialiased). Weights are normalised, then rounded to 22-bit
+//! The filter is the cubic with a = −0.5, stretched by the reduction (antialiased). Weights are normalized, then rounded to 22-bit
 //! fixed point; a horizontal pass and a vertical one follow, each rounded and clipped to 8 bits. A side that keeps its length is not
 //! filtered.
 
