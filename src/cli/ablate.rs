@@ -12,7 +12,7 @@ use super::table::{Table, lines};
 use crate::offline::ablation::{AblationRow, AblationSettings, ablate};
 use crate::offline::dataset::{Split, require_images};
 use crate::offline::files::Files;
-use crate::offline::metrics::ImageMetrics;
+use crate::offline::metrics::MeanMetrics;
 use crate::offline::search::ScoreChoice;
 use crate::offline::splits::{Splits, subset};
 use crate::offline::temporal_filter::FILTER_NAMES;
@@ -165,7 +165,7 @@ impl Measured {
 const HEADS: [&str; 6] = ["row", "PSNR", "pooled", "SSIM", "Gaussians", "active share"];
 
 fn cells(row: &AblationRow, absent: &str) -> [String; 6] {
-    let ImageMetrics { psnr, psnr_pooled, ssim, .. } = row.metrics;
+    let MeanMetrics { psnr, psnr_pooled, ssim, .. } = row.metrics;
     let optional =
         |value: Option<f64>, digits: usize| value.map_or(absent.to_owned(), |value| format!("{value:.digits$}"));
     [

@@ -11,6 +11,7 @@ use super::progress::Bars;
 use super::report::Report;
 use super::table::{bytes, lines};
 use crate::offline::bake::{BakeSettings, Baked, bake};
+use crate::offline::evaluation::color_name;
 use crate::offline::fine_tune::{FineTuneSettings, GradientSums};
 use crate::offline::quantize::Quality;
 use crate::offline::report::{BakeReport, Change};
@@ -158,8 +159,13 @@ fn in_short(report: &BakeReport, page: &Path) -> String {
         ("Gaussians", format!("{} of {}", report.gaussians.after, report.gaussians.before)),
     ];
     if let Some(Change { before, after }) = &report.evaluation {
+        let contrasts = before.contrast.zip(after.contrast);
         let (before, after) = (before.mean, after.mean);
         pairs.push(("PSNR", format!("{:.3} dB, checkpoint {:.3} dB", after.psnr, before.psnr)));
+        if let Some((before, after)) = contrasts {
+            let (name, before, after) = (color_name(after.background), before.mean.psnr, after.mean.psnr);
+            pairs.push(("contrast", format!("{after:.3} dB over {name}, checkpoint {before:.3} dB")));
+        }
         if let (Some(before), Some(after)) = (before.ssim, after.ssim) {
             pairs.push(("SSIM", format!("{after:.4}, checkpoint {before:.4}")));
         }

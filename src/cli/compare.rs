@@ -1,7 +1,7 @@
 //! `gs4d compare A B`: compares pictures.
 //!
-//! In: two pictures, or two folders matched by file stem (8-bit, 16-bit or raw float32). Out: PSNR and SSIM of each pair and
-//! their means.
+//! In: two pictures, or two folders matched by file stem (8-bit, 16-bit or raw float32). Out: PSNR and SSIM of each pair and of
+//! all pairs together.
 
 use super::args::values;
 use super::failure::Failure;
@@ -9,7 +9,8 @@ use super::progress::Bars;
 use super::report::Report;
 use super::table::Table;
 use crate::offline::Progress;
-use crate::offline::comparison::{PairMetrics, Pairs};
+use crate::offline::comparison::Pairs;
+use crate::offline::metrics::{ImageMetrics, MeanMetrics};
 use glam::UVec2;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -25,8 +26,8 @@ Examples:
   gs4d compare frames truth
   gs4d compare frames/r_000.f32 other/r_000.f32 --size 400x400
 
-PSNR is the mean of the three channels' (as the original code reports it), pooled that of all values together; of equal
-pictures it is infinite: `inf`, null in JSON.")]
+PSNR is the mean of the three channels' (as the original code reports it; a channel without any error is left out), pooled that of
+all values together. PSNR of identical pictures is 200 dB; they are counted, and left out of the mean PSNR.")]
 pub struct Compare {
     /// A picture or a folder of pictures.
     #[arg(value_name = "A")]
@@ -50,30 +51,46 @@ impl Compare {
         let mut metrics = Vec::with_capacity(pairs.both.len());
         progress.begin("comparing", pairs.both.len());
         for pair in &pairs.both {
-            metrics.push(PairMetrics::of(pair, self.size)?);
+            metrics.push(pair.compare(self.size)?);
             progress.advance();
         }
         progress.finish();
-        let mean = PairMetrics::mean(&metrics);
+        let mean = MeanMetrics::of(&metrics);
         let rows = || pairs.both.iter().zip(&metrics);
         let mut table = Table::new(&["picture", "PSNR", "pooled", "SSIM"]);
         for (pair, metrics) in rows() {
-            table.row(cells(&pair.name, metrics));
+            let psnr = match metrics.identical {
+                true => "identical".to_owned(),
+                false => format!("{:.3}", metrics.psnr),
+            };
+            table.row(cells(&pair.name, psnr, metrics.psnr_pooled, metrics.ssim));
         }
-        if metrics.len() > 1 {
-            table.row(cells(&format!("mean of {}", metrics.len()), &mean));
+        if let Some(MeanMetrics { psnr, psnr_pooled, ssim, count, .. }) = mean.filter(|mean| mean.count > 1) {
+            table.row(cells(&format!("mean of {count}"), format!("{psnr:.3}"), psnr_pooled, ssim));
         }
         let mut text = table.to_string();
+        if let Some(sentence) = mean.and_then(|mean| mean.identical_in_words("pictures")) {
+            text += &format!("{sentence}\n");
+        }
         for (folder, names) in [(&self.a, &pairs.only_a), (&self.b, &pairs.only_b)] {
             if !names.is_empty() {
                 text += &format!("only in {}: {}\n", folder.display(), names.join(", "));
             }
         }
         let pictures: Vec<Value> = rows()
-            .map(|(pair, &PairMetrics { psnr, psnr_pooled, ssim })| {
-                json!({ "name": pair.name, "psnr": psnr, "psnr_pooled": psnr_pooled, "ssim": ssim })
+            .map(|(pair, &ImageMetrics { psnr, psnr_pooled, identical, ssim, .. })| {
+                json!({
+                    "name": pair.name,
+                    "psnr": psnr,
+                    "psnr_pooled": psnr_pooled,
+                    "identical": identical,
+                    "ssim": ssim,
+                })
             })
             .collect();
+        let mean = mean.map(|MeanMetrics { psnr, psnr_pooled, identical, ssim, .. }| {
+            json!({ "psnr": psnr, "psnr_pooled": psnr_pooled, "identical": identical, "ssim": ssim })
+        });
         let json = json!({
             "pictures": pictures,
             "mean": mean,
@@ -84,7 +101,6 @@ impl Compare {
     }
 }
 
-fn cells(name: &str, metrics: &PairMetrics) -> [String; 4] {
-    let PairMetrics { psnr, psnr_pooled, ssim } = metrics;
-    [name.to_owned(), format!("{psnr:.3}"), format!("{psnr_pooled:.3}"), format!("{ssim:.5}")]
+fn cells(name: &str, psnr: String, pooled: f64, ssim: Option<f64>) -> [String; 4] {
+    [name.to_owned(), psnr, format!("{pooled:.3}"), ssim.map_or("-".to_owned(), |ssim| format!("{ssim:.5}"))]
 }

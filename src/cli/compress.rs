@@ -12,6 +12,7 @@ use crate::codec::package;
 use crate::offline::Progress;
 use crate::offline::fidelity::Originals;
 use crate::offline::files::Files;
+use crate::offline::metrics::SquaredError;
 use crate::offline::quantize::{CompressSettings, Quality, compress_with};
 use crate::offline::score::read_weights;
 use crate::scene::RuntimeScene;
@@ -146,8 +147,8 @@ impl Compress {
             *sections.entry(&section.name).or_default() += section.length as u64;
         }
         let scene = scene.into_runtime().map_err(|error| Failure::at(out, &error))?;
-        let psnr = match &originals {
-            Some(originals) => originals.psnr(&mut self.engine.open()?, &scene, progress)?,
+        let errors = match &originals {
+            Some(originals) => originals.errors(&mut self.engine.open()?, &scene, progress)?,
             None => Vec::new(),
         };
 
@@ -167,10 +168,16 @@ impl Compress {
             bytes(report.memory_before as u64),
             bytes(report.memory_after as u64),
         );
+        let psnr: Vec<f64> = errors.iter().map(SquaredError::psnr).collect();
         if let Some(lowest) = psnr.iter().copied().reduce(f64::min) {
-            let mean = psnr.iter().sum::<f64>() / psnr.len() as f64;
-            text +=
-                &format!("PSNR to the original over {} views: mean {mean:.2} dB, lowest {lowest:.2} dB\n", psnr.len());
+            let all: SquaredError = errors.into_iter().collect();
+            let (views, pooled) = (psnr.len(), all.psnr());
+            text += &match all.is_identical() {
+                true => format!("{views} views are identical to the original\n"),
+                false => {
+                    format!("PSNR to the original over {views} views: {pooled:.2} dB, lowest {lowest:.2} dB\n")
+                }
+            };
         }
         let json = json!({
             "in": self.input.display().to_string(),

@@ -1,7 +1,7 @@
 //! `gs4d eval SCENE --data DIR`: compares a scene with the views of a dataset.
 //!
-//! In: a scene, a split with its images. Out: the metrics of every view and their means; with `--out` a picture for
-//! each view: reference, render, amplified difference.
+//! In: a scene, a split with its images. Out: the metrics of every view and of all views, over the background of training and over a
+//! contrasting one; with `--out` a picture for each view: reference, render, amplified difference.
 
 use super::args::{CheckpointArgs, DesignArgs, EngineArgs, SplitArgs, values};
 use super::failure::Failure;
@@ -11,9 +11,9 @@ use super::report::{Report, switches_json};
 use super::table::{Table, lines};
 use crate::offline::dataset::Split;
 use crate::offline::engine::Engine;
-use crate::offline::evaluation::evaluate_scene;
+use crate::offline::evaluation::{color_name, contrast, evaluate_scene, without_contrast};
 use crate::offline::files::Files;
-use crate::offline::metrics::{Evaluation, ImageMetrics, MetricSet, ViewMetrics, side_by_side};
+use crate::offline::metrics::{Evaluation, ImageMetrics, MeanMetrics, MetricSet, ViewMetrics, side_by_side};
 use crate::offline::splits::{SPLIT_NAMES, split_name, subset};
 use crate::offline::{OfflineError, write_png};
 use crate::scene::TemporalFilter;
@@ -26,7 +26,7 @@ use std::time::Instant;
 
 /// Measure how close a scene is to the views of a dataset, as the original evaluates.
 ///
-/// Renders are clamped to 0..1 and not rounded; images are composited and resampled as in training.
+/// Renders are clamped to 0..1 and not rounded. Images are resampled as in training; their gaps show the background.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -34,7 +34,10 @@ Examples:
   gs4d eval chkpnt30000.pth --data data/standup --resolution 2 --out compared
   gs4d eval capture.gs4d --data data/toybox --split train --views 60 --metrics psnr,ssim --no-filter --json
 
-PSNR is the mean of the three channels' (as the original reports it), pooled that of all values together. MS-SSIM needs
+PSNR is the mean of the three channels' (as the original reports it; a channel without any error is left out), pooled that of
+all values together: of a view, and in the last row of all views. PSNR of identical views is 200 dB; they are counted, and left out
+of the mean PSNR. Where images have gaps, PSNR is measured over a second background, too: white if that of training (or
+--background) is dark, else black. A background hides fog of its own color, and games lay captures over scenes. MS-SSIM needs
 pictures of at least 176 pixels a side. FLIP is 0 for equal pictures, 1 at most, seen at 67 pixels per degree.")]
 pub struct Eval {
     /// The package or checkpoint.
@@ -124,18 +127,22 @@ impl Eval {
             let (path, picture) = (picture_of(out, &view.name), side_by_side(reference, render, self.gain));
             Ok(interrupt::whole(|| write_png(&path, &picture))?)
         };
-        let evaluation = evaluate_scene(&mut engine, &scene, &dataset.views, background, metrics, progress, seen)?;
+        let views = &dataset.views;
+        let mut evaluation = evaluate_scene(&mut engine, &scene, views, background, metrics, progress, seen)?;
+        evaluation.contrast = contrast(&mut engine, &scene, views, background, &evaluation, progress)?;
         let seconds = start.elapsed().as_secs_f64();
 
         let (split, engine) = (split_name(dataset.split), engine.name());
         let filtered = scene.filter.as_ref().map(TemporalFilter::active_share);
         let active = filtered.map_or("none".to_owned(), |share| format!("{:.1} % active", share * 100.0));
         let mut text = format!("{}\n", table(&evaluation));
-        text += &lines(&[
+        let mut pairs = backgrounds(&evaluation);
+        pairs.extend([
             ("split", format!("{split} of {}", self.data.data.display())),
             ("filter", active),
             ("time", format!("{seconds:.1} s on {engine}")),
         ]);
+        text += &lines(&pairs);
         let json = json!({
             "scene": self.scene.display().to_string(),
             "data": self.data.data.display().to_string(),
@@ -143,6 +150,9 @@ impl Eval {
             "active_share": filtered,
             "views": evaluation.views,
             "mean": evaluation.mean,
+            "background": evaluation.background,
+            "has_gaps": evaluation.has_gaps,
+            "contrast": evaluation.contrast,
             "out": self.out.as_ref().map(|out| out.display().to_string()),
             "engine": engine,
             "seconds": seconds,
@@ -157,23 +167,41 @@ fn picture_of(out: &Path, view: &str) -> PathBuf {
     out.join(format!("{view}.png"))
 }
 
-/// Returns a table with a row for each view and one for the means, without columns for metrics that no view has.
+/// Returns the figures over both backgrounds, or why there is one only, and a sentence about identical views, as names and values.
+fn backgrounds(evaluation: &Evaluation) -> Vec<(&'static str, String)> {
+    let Evaluation { background, mean, contrast, .. } = evaluation;
+    let over = |color, mean: &MeanMetrics| {
+        format!("PSNR {:.3} dB, pooled {:.3} dB over {}", mean.psnr, mean.psnr_pooled, color_name(color))
+    };
+    let mut pairs = match contrast {
+        Some(contrast) => {
+            vec![("background", over(*background, mean)), ("contrast", over(contrast.background, &contrast.mean))]
+        }
+        None => vec![("background", without_contrast(evaluation).to_owned())],
+    };
+    pairs.extend(mean.identical_in_words("views").map(|words| ("identical", words)));
+    pairs
+}
+
+/// Returns a table with a row for each view and one for all views, without columns for metrics that no view has.
 fn table(evaluation: &Evaluation) -> Table {
     let all = || evaluation.views.iter().map(|view| &view.metrics);
-    let optional: [(&str, fn(&ImageMetrics) -> Option<f64>); 3] =
-        [("SSIM", |m| m.ssim), ("MS-SSIM", |m| m.ms_ssim), ("FLIP", |m| m.flip)];
-    let optional: Vec<_> = optional.into_iter().filter(|(_, of)| all().any(|m| of(m).is_some())).collect();
+    let optional: [(&str, fn(&ImageMetrics) -> Option<f64>, fn(&MeanMetrics) -> Option<f64>); 3] =
+        [("SSIM", |m| m.ssim, |m| m.ssim), ("MS-SSIM", |m| m.ms_ssim, |m| m.ms_ssim), ("FLIP", |m| m.flip, |m| m.flip)];
+    let optional: Vec<_> = optional.into_iter().filter(|(_, of, _)| all().any(|m| of(m).is_some())).collect();
     let heads: Vec<&str> =
-        ["view", "PSNR", "pooled"].into_iter().chain(optional.iter().map(|(name, _)| *name)).collect();
+        ["view", "PSNR", "pooled"].into_iter().chain(optional.iter().map(|(name, ..)| *name)).collect();
     let mut table = Table::new(&heads);
-    let mut row = |name: String, metrics: &ImageMetrics| {
-        let fixed = [name, format!("{:.3}", metrics.psnr), format!("{:.3}", metrics.psnr_pooled)];
-        let more = optional.iter().map(|(_, of)| of(metrics).map_or("-".to_owned(), |value| format!("{value:.5}")));
-        table.row(fixed.into_iter().chain(more));
+    let number = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.5}"));
+    let mut row = |name: String, psnr: String, pooled: f64, more: Vec<Option<f64>>| {
+        table.row([name, psnr, format!("{pooled:.3}")].into_iter().chain(more.into_iter().map(number)));
     };
-    for view in &evaluation.views {
-        row(view.name.clone(), &view.metrics);
+    for ViewMetrics { name, metrics, .. } in &evaluation.views {
+        let psnr = if metrics.identical { "identical".to_owned() } else { format!("{:.3}", metrics.psnr) };
+        row(name.clone(), psnr, metrics.psnr_pooled, optional.iter().map(|(_, of, _)| of(metrics)).collect());
     }
-    row(format!("mean of {}", evaluation.views.len()), &evaluation.mean);
+    let mean = &evaluation.mean;
+    let more = optional.iter().map(|(_, _, of)| of(mean)).collect();
+    row(format!("mean of {}", mean.count), format!("{:.3}", mean.psnr), mean.psnr_pooled, more);
     table
 }

@@ -6,7 +6,7 @@
 use super::dataset::TrainingView;
 use super::engine::Engine;
 use super::evaluation::evaluate_scene;
-use super::metrics::{ImageMetrics, MetricSet};
+use super::metrics::{MeanMetrics, MetricSet};
 use super::prune::{highest, kept_count, select};
 use super::score::ScoringSettings;
 use super::score::variant::Variant;
@@ -37,9 +37,9 @@ pub struct AblationSettings {
 pub struct AblationRow {
     /// What was tried, in words.
     pub row: String,
-    /// Means of the metrics over the measured views.
+    /// The metrics over the measured views.
     #[serde(flatten)]
-    pub metrics: ImageMetrics,
+    pub metrics: MeanMetrics,
     /// Number of Gaussians.
     pub gaussians: usize,
     /// Share of them that the filter leaves active, mean over its segments; `None` without a filter.

@@ -7,7 +7,7 @@ use super::OfflineError;
 use super::dataset::TrainingView;
 use super::dataset::selection::even_subset;
 use super::engine::Engine;
-use super::metrics::psnr_pooled;
+use super::metrics::SquaredError;
 use crate::scene::RuntimeScene;
 use crate::view::{Background, Picture};
 use glam::Vec3;
@@ -39,18 +39,18 @@ pub fn require_belonging(
     let truth: Vec<Picture> =
         chosen.iter().map(|view| Ok(view.load_covered()?.over(behind))).collect::<Result<_, OfflineError>>()?;
     let mut drawing = engine.drawing(scene, background)?;
-    let (mut own, mut other, mut others) = (0.0, 0.0, 0);
+    let (mut own, mut other, mut others) = (SquaredError::default(), SquaredError::default(), 0);
     for (index, view) in chosen.iter().enumerate() {
         let picture = drawing.draw(&view.camera.view(view.time, scene.trained_with.raster_fov))?.clamped();
-        own += psnr_pooled(&truth[index], &picture)? / chosen.len() as f64;
+        own.add(&truth[index], &picture)?;
         for (_, image) in
             truth.iter().enumerate().filter(|(place, image)| *place != index && image.size == picture.size)
         {
-            other += psnr_pooled(image, &picture)?;
+            other.add(image, &picture)?;
             others += 1;
         }
     }
-    let other = other / f64::from(others.max(1));
+    let (own, other) = (own.psnr(), other.psnr());
     match chosen.first() {
         Some(view) if others > 0 && own < CLOSE && own < other + CLOSER => Err(OfflineError::at(
             &view.image,

@@ -1,14 +1,13 @@
 //! Comparing pictures on disk.
 //!
 //! In: two pictures, or two folders matched by file stem (8-bit, 16-bit or raw float32). Out: the [`Pairs`] of
-//! pictures, and PSNR and SSIM of each ([`PairMetrics`]).
+//! pictures, and PSNR and SSIM of each ([`Pair::compare`]).
 
 use super::OfflineError;
-use super::metrics::{self, SizeMismatch};
+use super::metrics::{ImageMetrics, MetricSet};
 use super::picture_file;
 use crate::view::Picture;
 use glam::{UVec2, Vec3};
-use serde::Serialize;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::fs;
@@ -93,40 +92,18 @@ fn pictures(folder: &Path, with_raw: bool) -> Result<BTreeMap<OsString, PathBuf>
     Ok(found)
 }
 
-/// Metrics of two pictures, or the means over several pairs.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct PairMetrics {
-    /// PSNR in dB, mean of the three channels. Infinite (null in JSON) for equal pictures.
-    pub psnr: f64,
-    /// PSNR in dB of all values together.
-    pub psnr_pooled: f64,
-    /// SSIM, at most 1.
-    pub ssim: f64,
-}
-
-impl PairMetrics {
-    /// Compares two pictures on disk. Raw ones have `raw_size` pixels and are not clamped if both are raw; all other
+impl Pair {
+    /// Compares both pictures by PSNR and SSIM. Raw pictures have `raw_size` pixels and are not clamped if both are raw; all other
     /// pictures are clamped to 0..1.
     ///
     /// # Errors
     /// A picture that cannot be read, a raw one without `raw_size`, pictures of different sizes.
-    pub fn of(pair: &Pair, raw_size: Option<UVec2>) -> Result<Self, OfflineError> {
-        let (mut left, mut right) = (load(&pair.a, raw_size)?, load(&pair.b, raw_size)?);
-        if !(is_raw(&pair.a) && is_raw(&pair.b)) {
+    pub fn compare(&self, raw_size: Option<UVec2>) -> Result<ImageMetrics, OfflineError> {
+        let (mut left, mut right) = (load(&self.a, raw_size)?, load(&self.b, raw_size)?);
+        if !(is_raw(&self.a) && is_raw(&self.b)) {
             (left, right) = (left.clamped(), right.clamped());
         }
-        let mismatch = |error: SizeMismatch| OfflineError::at(&pair.b, error);
-        Ok(Self {
-            psnr: metrics::psnr(&left, &right).map_err(mismatch)?,
-            psnr_pooled: metrics::psnr_pooled(&left, &right).map_err(mismatch)?,
-            ssim: metrics::ssim(&left, &right).map_err(mismatch)?,
-        })
-    }
-
-    /// Returns the means over `all`; NaN if it is empty.
-    pub fn mean(all: &[Self]) -> Self {
-        let mean = |of: fn(&Self) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
-        Self { psnr: mean(|m| m.psnr), psnr_pooled: mean(|m| m.psnr_pooled), ssim: mean(|m| m.ssim) }
+        ImageMetrics::of(&left, &right, MetricSet::SSIM).map_err(|error| OfflineError::at(&self.b, error))
     }
 }
 

@@ -1,13 +1,17 @@
 //! Evaluating a scene on the views of a dataset.
 //!
-//! In: a scene, views with their images, an [`Engine`]. Out: an [`Evaluation`]; each picture is passed to the caller.
+//! In: a scene, views with their images, an [`Engine`]. Out: an [`Evaluation`] over one background; each picture is passed to the
+//! caller; then the same figures over a contrasting background ([`contrast`]).
 
 use super::dataset::TrainingView;
 use super::engine::Engine;
-use super::metrics::{Evaluation, EvaluationSettings, MetricSet, ViewMetrics, evaluate};
+use super::metrics::{Contrast, Evaluation, EvaluationSettings, MetricSet, ViewMetrics, evaluate};
 use super::{OfflineError, Progress};
 use crate::scene::RuntimeScene;
 use crate::view::{Background, Picture};
+
+/// Weights of red, green and blue in the luminance of a background, sRGB-encoded (Rec. 709).
+const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
 /// Draws every view of a scene, with the field of view that it was trained with, and compares it with its image.
 /// Transparent images are composited over the color of `background`, or over that of training if `background` has none.
@@ -41,4 +45,75 @@ pub fn evaluate_scene(
     )?;
     progress.finish();
     Ok(evaluation)
+}
+
+/// Evaluates the scene over the color that contrasts with `background`: fog that is invisible over a black background is visible over
+/// a white one. Pass the views and the background of `evaluation`. Returns `None` if no background is visible: the images have no gaps,
+/// or the background is an environment map. Begins the task "comparing" otherwise.
+///
+/// # Errors
+/// As [`evaluate_scene`].
+pub fn contrast(
+    engine: &mut Engine,
+    scene: &RuntimeScene,
+    views: &[TrainingView],
+    background: Background,
+    evaluation: &Evaluation,
+    progress: &mut dyn Progress,
+) -> Result<Option<Contrast>, OfflineError> {
+    let Background::Color(color) = background else { return Ok(None) };
+    if !evaluation.has_gaps {
+        return Ok(None);
+    }
+    let color = contrasting(color);
+    let background = Background::Color(color);
+    let over = evaluate_scene(engine, scene, views, background, MetricSet::PSNR, progress, |_, _, _| Ok(()))?;
+    Ok(Some(Contrast { background: color, mean: over.mean }))
+}
+
+/// Returns white for a color whose luminance is below 0.5, else black.
+fn contrasting(color: [f32; 3]) -> [f32; 3] {
+    let luminance: f32 = color.iter().zip(LUMINANCE).map(|(value, weight)| value * weight).sum();
+    [if luminance < 0.5 { 1.0 } else { 0.0 }; 3]
+}
+
+/// Returns the name of a background color: `black`, `white`, or its three values.
+pub(crate) fn color_name([red, green, blue]: [f32; 3]) -> String {
+    match [red, green, blue] {
+        [0.0, 0.0, 0.0] => "black".to_owned(),
+        [1.0, 1.0, 1.0] => "white".to_owned(),
+        _ => format!("{red},{green},{blue}"),
+    }
+}
+
+/// Returns why an evaluation has no contrasting background.
+pub(crate) fn without_contrast(evaluation: &Evaluation) -> &'static str {
+    match evaluation.has_gaps {
+        true => "PSNR is over the environment map of the scene, which covers the background",
+        false => "the images have no gaps: no background is visible behind them",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dark_colors_contrast_with_white_and_bright_ones_with_black() {
+        for (color, expected) in [
+            ([0.0; 3], [1.0; 3]),
+            ([0.49; 3], [1.0; 3]),
+            ([1.0, 0.0, 1.0], [1.0; 3]),
+            ([0.0, 1.0, 0.0], [0.0; 3]),
+            ([1.0; 3], [0.0; 3]),
+        ] {
+            assert_eq!(contrasting(color), expected, "the contrast of {color:?}");
+        }
+    }
+
+    #[test]
+    fn colors_are_named() {
+        let names = [[0.0; 3], [1.0; 3], [0.2, 0.5, 1.0]].map(color_name);
+        assert_eq!(names, ["black", "white", "0.2,0.5,1"], "names, else values");
+    }
 }

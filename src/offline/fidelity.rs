@@ -1,9 +1,9 @@
 //! Comparing a compressed scene with the original.
 //!
-//! In: the original scene, views, an [`Engine`]; then the compressed scene. Out: PSNR of each view.
+//! In: the original scene, views, an [`Engine`]; then the compressed scene. Out: the squared error of each view.
 
 use super::engine::Engine;
-use super::metrics::psnr_pooled;
+use super::metrics::SquaredError;
 use super::{OfflineError, Progress};
 use crate::scene::RuntimeScene;
 use crate::view::{Picture, View};
@@ -30,20 +30,20 @@ impl Originals {
         Ok(Self { views, pictures })
     }
 
-    /// Returns the PSNR of each view of `scene` against the original, dB, over all values of the pictures clamped to
-    /// 0..1; infinite for equal pictures. Begins the task "comparing".
+    /// Returns the squared error of each view of `scene` against the original; pictures are clamped to 0..1. Begins the task
+    /// "comparing".
     ///
     /// # Errors
     /// A failure of the engine.
-    pub fn psnr(
+    pub fn errors(
         &self,
         engine: &mut Engine,
         scene: &RuntimeScene,
         progress: &mut dyn Progress,
-    ) -> Result<Vec<f64>, OfflineError> {
+    ) -> Result<Vec<SquaredError>, OfflineError> {
         let found = pictures(engine, scene, &self.views, progress)?;
-        let psnr = |(a, b): (&Picture, &Picture)| psnr_pooled(&a.clamped(), &b.clamped()).map_err(OfflineError::from);
-        found.iter().zip(&self.pictures).map(psnr).collect()
+        let error = |(a, b): (&Picture, &Picture)| Ok(SquaredError::of(&a.clamped(), &b.clamped())?);
+        found.iter().zip(&self.pictures).map(error).collect()
     }
 }
 

@@ -59,6 +59,7 @@ pub mod store;
 pub mod stored;
 mod subject;
 pub mod temporal_filter;
+mod test_comparison;
 mod trained_pixel;
 pub mod trained_search;
 

@@ -5,12 +5,13 @@
 
 use super::OfflineError;
 use super::dataset::selection::to_draw;
-use super::dataset::{DatasetError, ImageMode, TrainingView};
+use super::dataset::{DatasetError, TrainingView};
 use super::engine::Engine;
-use super::metrics;
+use super::metrics::SquaredError;
 use super::prune::{highest, select};
 use crate::scene::{GaussianScene, RuntimeScene, TrainedWith};
 use crate::view::{Background, Picture, View};
+use glam::Vec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -23,8 +24,8 @@ pub struct Evaluator {
 }
 
 impl Evaluator {
-    /// Returns an evaluator that compares with the images of these training views, composited once
-    /// ([`ImageMode::Dataloader`]).
+    /// Returns an evaluator that compares with the images of these training views, over the color of `background`, or over that of
+    /// training if `background` has none.
     ///
     /// # Errors
     /// Images that are missing or cannot be decoded.
@@ -37,7 +38,7 @@ impl Evaluator {
             Background::Color(color) => color,
             Background::None | Background::Environment => trained_with.background,
         };
-        let load = |view: &TrainingView| view.load_image(behind, ImageMode::Dataloader).map(|image| image.picture);
+        let load = |view: &TrainingView| view.load_covered().map(|image| image.over(Vec3::from(behind)));
         let truth = views.par_iter().map(load).collect::<Result<Vec<_>, _>>()?;
         Ok(Self { views: to_draw(views, trained_with.raster_fov), truth, background })
     }
@@ -64,18 +65,18 @@ impl Evaluator {
         self.views.len()
     }
 
-    /// Returns the mean over the views of the mean PSNR of the three channels, dB; pictures are clamped to 0..1. NaN
-    /// without views.
+    /// Returns the PSNR of the squared error of all pixels, channels and views together, dB; pictures are clamped to 0..1. It is at
+    /// most [`MAX_PSNR`](super::metrics::MAX_PSNR), and NaN without views.
     ///
     /// # Errors
     /// A failure of the engine, or a picture of another size.
     pub fn psnr(&self, engine: &mut Engine, scene: &RuntimeScene) -> Result<f64, OfflineError> {
         let mut drawing = engine.drawing(scene, self.background)?;
-        let mut total = 0.0;
+        let mut error = SquaredError::default();
         for (view, truth) in self.views.iter().zip(&self.truth) {
-            total += metrics::psnr(&drawing.draw(view)?.clamped(), truth)?;
+            error.add(&drawing.draw(view)?.clamped(), truth)?;
         }
-        Ok(total / self.views.len() as f64)
+        Ok(error.psnr())
     }
 
     /// Returns the [`psnr`](Self::psnr) of the `count` Gaussians that score highest. Pass the scene in the runtime

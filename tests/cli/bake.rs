@@ -115,6 +115,38 @@ fn a_bake_makes_a_smaller_package_and_says_what_it_cost() {
 }
 
 #[test]
+fn a_package_that_looks_different_over_white_is_noted() {
+    let capture = capture(Vec3::ZERO, true);
+    // The images cover only what is bright: the rest of the scene is fog, which black hides.
+    for split in ["train", "test"] {
+        for name in folders::names(&capture.data.join(split)) {
+            let path = capture.data.join(split).join(name);
+            let mut image = image::open(&path).expect("a picture").into_rgba8();
+            image
+                .pixels_mut()
+                .filter(|pixel| pixel.0[..3].iter().all(|&value| value < 100))
+                .for_each(|pixel| pixel.0 = [0; 4]);
+            image.save(&path).expect("the folder can be written to");
+        }
+    }
+    let out = capture.out();
+    let arguments = arguments!["bake", &capture.scene, "--data", &capture.data, "--ratio", "0.2", "-o", &out, "--json"];
+    let run = gs4d(&[arguments.to_vec(), arguments!["--no-fine-tune", "--engine", "cpu"].to_vec()].concat());
+    let note =
+        run.err.lines().find(|line| line.contains("note: the PSNR of the package is")).unwrap_or_default().to_owned();
+    assert!(note.contains("dB over black and") && note.contains("dB over white"), "both are named: {}", run.err);
+    let report = run.json();
+    for side in ["before", "after"] {
+        let evaluation = &report["evaluation"][side];
+        let psnr = |figures: &Value| figures["psnr_pooled"].as_f64().expect("a number");
+        let (black, white) = (psnr(&evaluation["mean"]), psnr(&evaluation["contrast"]));
+        assert!(black > white + 3.0, "fog is visible over white: {black} and {white} dB of {side}");
+    }
+    let html = read(&capture.path("out.report.html"));
+    assert!(html.contains("PSNR over white, dB") && html.contains("it is black"), "both are on the page");
+}
+
+#[test]
 fn stages_that_are_done_are_not_done_again() {
     let capture = capture(Vec3::ZERO, true);
     let out = capture.out();

@@ -1,11 +1,10 @@
 //! `gs4d compare`, run as a user runs it.
 //!
-//! In: pictures of known values. Out: proof that the numbers are right and that what cannot be compared is named.
+//! In: pictures of known values. Out: proof that the numbers are right and that pictures that cannot be compared are named.
 
 use crate::support::command::{arguments, folder, gs4d};
 use bevy_gs4d::view::Picture;
 use glam::{UVec2, Vec3};
-use serde_json::Value;
 use std::fs;
 use tempfile::TempDir;
 
@@ -27,12 +26,23 @@ fn comparison_tells_equal_from_different() {
         let pictures = json["pictures"].as_array().expect("a list of pictures");
         pictures.iter().find(|row| row["name"] == name).expect("the picture is listed").clone()
     };
-    assert!(row("same")["psnr"].is_null(), "infinite");
+    assert_eq!((&row("same")["psnr"], &row("same")["identical"]), (&200.0.into(), &true.into()), "the cap, and a flag");
+    assert_eq!(row("other")["identical"], false, "these differ");
     assert!((row("same")["ssim"].as_f64().expect("a number") - 1.0).abs() < 1e-9, "identical");
     // 51 and 102 of 255: a difference of exactly one fifth.
     let psnr = row("other")["psnr"].as_f64().expect("a number");
     assert!((psnr - 13.979_4).abs() < 1e-3, "20 log10(5), not {psnr}");
-    assert_eq!(json["only_in_a"][0], "alone", "what has no partner is listed");
+    assert_eq!(json["only_in_a"][0], "alone", "a picture without a partner is listed");
+    let mean = &json["mean"];
+    assert_eq!(
+        (&mean["identical"], &mean["psnr"]),
+        (&1.into(), &psnr.into()),
+        "identical pictures are left out of the mean"
+    );
+    let pooled = mean["psnr_pooled"].as_f64().expect("a number");
+    assert!((pooled - psnr - 10.0 * 2f64.log10()).abs() < 1e-3, "half of the squared error: {pooled}");
+    let text = gs4d(&arguments!["compare", a.path(), b.path()]).text();
+    assert!(text.contains("1 of 2 pictures are identical and not part of the mean PSNR"), "it is said: {text}");
 
     let one = a.path().join("same.png");
     let text = gs4d(&arguments!["compare", &one, &b.path().join("other.png")]).text();
@@ -67,7 +77,7 @@ fn raw_pictures_need_their_size() {
     gs4d(&arguments!["compare", &path, &path]).must_fail("--size");
     gs4d(&arguments!["compare", &path, &path, "--size", "16x13"]).must_fail("a.f32");
     let json = gs4d(&arguments!["compare", &path, &path, "--size", "16x12", "--json"]).json();
-    assert_eq!(json["pictures"][0]["psnr_pooled"], Value::Null, "identical: infinite");
+    assert_eq!(json["pictures"][0]["psnr_pooled"], 200.0, "identical: the cap");
     let png = folder.path().join("a.png");
     picture.clamped().to_rgb8().save(&png).expect("the folder can be written to");
     let json = gs4d(&arguments!["compare", &path, &png, "--size", "16x12", "--json"]).json();

@@ -13,6 +13,8 @@ mod golden;
 mod gradients;
 mod grow;
 #[cfg(feature = "offline")]
+mod identical_views;
+#[cfg(feature = "offline")]
 mod loading;
 #[cfg(feature = "offline")]
 mod metrics;

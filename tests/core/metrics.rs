@@ -1,9 +1,11 @@
 //! Metrics of pictures.
 //!
 //! In: synthetic pictures. Out: proof that metrics equal values computed by hand and by independent float64
-//! implementations, and that pictures of different sizes are refused.
+//! implementations, that PSNR is finite, and that pictures of different sizes are refused.
 
-use bevy_gs4d::offline::metrics::{MS_SSIM_MIN_SIDE, SizeMismatch, flip, ms_ssim, psnr, psnr_pooled, ssim};
+use bevy_gs4d::offline::metrics::{
+    ImageMetrics, MAX_PSNR, MS_SSIM_MIN_SIDE, MetricSet, SizeMismatch, SquaredError, flip, ms_ssim, ssim,
+};
 use bevy_gs4d::view::Picture;
 use glam::{UVec2, Vec3};
 use proptest::prelude::*;
@@ -22,8 +24,8 @@ fn blocks(width: u32, height: u32) -> Picture {
     Picture { size: UVec2::new(width, height), pixels: (0..width * height).map(pixel).collect() }
 }
 
-fn mixed(a: &Picture, b: &Picture, share: f32) -> Picture {
-    let pixels = a.pixels.iter().zip(&b.pixels).map(|(p, q)| *p * (1.0 - share) + *q * share);
+fn mixed(a: &Picture, b: &Picture, fraction: f32) -> Picture {
+    let pixels = a.pixels.iter().zip(&b.pixels).map(|(p, q)| *p * (1.0 - fraction) + *q * fraction);
     Picture { size: a.size, pixels: pixels.collect() }
 }
 
@@ -35,28 +37,79 @@ fn close(value: f64, expected: f64, tolerance: f64) -> bool {
     (value - expected).abs() <= tolerance
 }
 
-#[test]
-fn psnr_is_averaged_over_channels_and_pooled_is_not() {
-    let black = Picture::filled(UVec2::new(4, 3), Vec3::ZERO);
-    let offset = Picture::filled(UVec2::new(4, 3), Vec3::new(0.1, 0.01, 0.001));
-    // 20, 40 and 60 dB per channel.
-    let mean = psnr(&black, &offset).expect("same size");
-    assert!(close(mean, 40.0, 1e-5), "{mean}");
-    let pooled = psnr_pooled(&black, &offset).expect("same size");
-    assert!(close(pooled, -10.0 * (0.010_101f64 / 3.0).log10(), 1e-5), "{pooled}");
+/// Returns the squared error of two pictures of one size.
+#[track_caller]
+fn error(a: &Picture, b: &Picture) -> SquaredError {
+    SquaredError::of(a, b).expect("same size")
 }
 
 #[test]
-fn identical_pictures_are_infinitely_close_and_fully_similar() {
+fn psnr_is_averaged_over_channels_and_pooled_psnr_is_not() {
+    let black = Picture::filled(UVec2::new(4, 3), Vec3::ZERO);
+    let offset = Picture::filled(UVec2::new(4, 3), Vec3::new(0.1, 0.01, 0.001));
+    // 20, 40 and 60 dB per channel.
+    let error = error(&black, &offset);
+    assert!(close(error.channel_psnr(), 40.0, 1e-5), "the mean of 20, 40 and 60 dB: {}", error.channel_psnr());
+    assert!(close(error.mean_squared_error(), 0.010_101 / 3.0, 1e-9), "the mean of three channels");
+    assert!(close(error.psnr(), -10.0 * (0.010_101f64 / 3.0).log10(), 1e-5), "of that mean: {}", error.psnr());
+}
+
+#[test]
+fn identical_pictures_have_the_largest_psnr_and_are_told_apart() {
     let a = pattern(23, 17, 0);
-    assert_eq!(psnr(&a, &a), Ok(f64::INFINITY), "no error in any channel");
-    assert_eq!(psnr_pooled(&a, &a), Ok(f64::INFINITY), "no error at all");
+    let same = error(&a, &a);
+    assert_eq!((same.channel_psnr(), same.psnr()), (MAX_PSNR, MAX_PSNR), "the cap, which is finite");
+    assert!(same.is_identical(), "no value differs");
     assert_eq!(ssim(&a, &a), Ok(1.0), "exactly one");
+    let metrics = ImageMetrics::of(&a, &a, MetricSet::PSNR).expect("same size");
+    assert!(metrics.identical && metrics.psnr == MAX_PSNR, "metrics say so: {metrics:?}");
+    // The smallest difference of floats: above 160 dB, and not identical.
+    let mut b = a.clone();
+    b.pixels[5].x = f32::from_bits(b.pixels[5].x.to_bits() + 1);
+    let almost = error(&a, &b);
+    assert!(!almost.is_identical(), "one value differs");
+    assert!((160.0..MAX_PSNR).contains(&almost.psnr()), "below the cap: {}", almost.psnr());
+    let tiny = error(&gray(0.0), &gray(1e-12));
+    assert_eq!((tiny.is_identical(), tiny.psnr()), (false, MAX_PSNR), "an error of 1e-24 counts as 1e-20");
+    let none = SquaredError::default();
+    assert!(!none.is_identical() && none.psnr().is_nan(), "no pictures have no PSNR");
+}
+
+#[test]
+fn an_identical_channel_is_left_out_of_the_mean_of_the_channels() {
+    let offset = Picture::filled(UVec2::splat(8), Vec3::new(0.1, 0.0, 0.001));
+    let error = error(&gray(0.0), &offset);
+    assert!(close(error.channel_psnr(), 40.0, 1e-5), "the mean of 20 and 60 dB: {}", error.channel_psnr());
+    assert!(close(error.psnr(), -10.0 * (0.010_001f64 / 3.0).log10(), 1e-5), "three channels are pooled");
+}
+
+#[test]
+fn merged_errors_equal_the_error_of_one_larger_picture() {
+    let (a, b) = (pattern(12, 8, 0), pattern(12, 8, 3));
+    let (c, d) = (pattern(12, 5, 1), blocks(12, 5));
+    let stacked = |top: &Picture, bottom: &Picture| {
+        let pixels = [&top.pixels[..], &bottom.pixels].concat();
+        Picture { size: UVec2::new(12, 13), pixels }
+    };
+    let whole = error(&stacked(&a, &c), &stacked(&b, &d));
+    let mut added = error(&a, &b);
+    added.add(&c, &d).expect("same size");
+    let collected: SquaredError = [error(&a, &b), error(&c, &d)].into_iter().collect();
+    for parts in [added, collected] {
+        assert!(close(parts.psnr(), whole.psnr(), 1e-9), "pooled: {} and {}", parts.psnr(), whole.psnr());
+        assert!(close(parts.channel_psnr(), whole.channel_psnr(), 1e-9), "by channel");
+    }
+    // Twenty pictures of one error and four without: 24 / 20 in the mean, 0.79 dB.
+    let mut all: SquaredError = std::iter::repeat_n(error(&gray(0.5), &gray(0.6)), 20).collect();
+    let before = all.psnr();
+    (0..4).for_each(|_| all.add(&gray(0.0), &gray(0.0)).expect("same size"));
+    assert!(close(all.psnr() - before, 10.0 * 1.2f64.log10(), 1e-9), "identical pictures change PSNR by a constant");
+    assert!(all.add(&a, &c).is_err() && close(all.psnr() - before, 10.0 * 1.2f64.log10(), 1e-9), "nothing is added");
 }
 
 #[test]
 fn nothing_is_clamped() {
-    let value = psnr(&gray(0.0), &gray(10.0)).expect("same size");
+    let value = error(&gray(0.0), &gray(10.0)).channel_psnr();
     assert!(close(value, -20.0, 1e-9), "an error of ten is -20 dB, got {value}");
 }
 
@@ -65,12 +118,11 @@ fn values_equal_an_independent_implementation() {
     let (a, n) = (pattern(23, 17, 0), pattern(23, 17, 3));
     let b = mixed(&a, &n, 0.25);
     let expected = [
-        (psnr(&a, &b), 19.791447065582492),
-        (psnr_pooled(&a, &b), 19.791445079419375),
-        (ssim(&a, &b), 0.9420089934323176),
+        (error(&a, &b).channel_psnr(), 19.791447065582492),
+        (error(&a, &b).psnr(), 19.791445079419375),
+        (ssim(&a, &b).expect("same size"), 0.9420089934323176),
     ];
     for (value, expected) in expected {
-        let value = value.expect("same size");
         assert!(close(value, expected, 1e-5), "{value} instead of {expected}");
     }
     let unlike = ssim(&a, &n).expect("same size");
@@ -106,7 +158,7 @@ fn similarity_at_five_scales_equals_an_independent_implementation() {
     assert!(close(least_value, 0.9455034368401481, 1e-5), "one window at the coarsest scale: {least_value}");
     assert!(close(value(&a, &a), 1.0, 1e-12), "identical");
     let negative = Picture { size: a.size, pixels: a.pixels.iter().map(|p| Vec3::ONE - *p).collect() };
-    assert_eq!(value(&a, &negative), 0.0, "what is opposite counts as nothing");
+    assert_eq!(value(&a, &negative), 0.0, "negative structure counts as 0");
     let small = blocks(MS_SSIM_MIN_SIDE, MS_SSIM_MIN_SIDE - 1);
     assert_eq!(ms_ssim(&small, &small), Ok(None), "too few pixels for five scales");
 }
@@ -129,29 +181,28 @@ fn flip_equals_an_independent_implementation() {
 }
 
 #[test]
-fn flip_of_flat_pictures_is_the_difference_of_colour_alone() {
+fn flip_of_flat_pictures_is_the_difference_of_color_alone() {
     let flat = |color| Picture::filled(UVec2::new(12, 9), color);
     let value = |a, b| flip(&flat(a), &flat(b)).expect("same size");
     assert_eq!(value(Vec3::splat(0.3), Vec3::splat(0.3)), 0.0, "identical");
     assert!(close(value(Vec3::Y, Vec3::Z), 1.0, 1e-9), "green and blue are farthest apart");
     assert!(close(value(Vec3::ZERO, Vec3::ONE), 0.9673797618501423, 1e-6), "black and white");
-    assert!(close(value(Vec3::splat(0.5), Vec3::splat(0.6)), 0.2850130525308668, 1e-5), "two greys");
+    assert!(close(value(Vec3::splat(0.5), Vec3::splat(0.6)), 0.2850130525308668, 1e-5), "two grays");
 }
 
 #[test]
 fn pictures_of_other_sizes_are_refused() {
     let (a, b) = (pattern(4, 6, 0), pattern(6, 4, 0));
     let mismatch = SizeMismatch { first: UVec2::new(4, 6), second: UVec2::new(6, 4) };
-    assert_eq!(psnr(&a, &b), Err(mismatch), "as many pixels, other shape");
-    assert_eq!(psnr_pooled(&a, &b), Err(mismatch), "pooled");
+    assert_eq!(SquaredError::of(&a, &b), Err(mismatch), "as many pixels, other shape");
     assert_eq!(ssim(&a, &b), Err(mismatch), "similarity");
     assert_eq!(ms_ssim(&a, &b), Err(mismatch), "similarity at five scales");
     assert_eq!(flip(&a, &b), Err(mismatch), "flip");
     assert!(mismatch.to_string().contains("4x6") && mismatch.to_string().contains("6x4"), "{mismatch}");
     let empty = Picture { size: UVec2::ZERO, pixels: Vec::new() };
-    assert!(psnr(&empty, &empty).is_err() && ssim(&empty, &empty).is_err(), "no pixels, no number");
+    assert!(SquaredError::of(&empty, &empty).is_err() && ssim(&empty, &empty).is_err(), "no pixels, no number");
     let short = Picture { size: a.size, pixels: Vec::new() };
-    assert!(psnr(&a, &short).is_err() && ssim(&short, &a).is_err(), "fewer pixels than the size says");
+    assert!(SquaredError::of(&a, &short).is_err() && ssim(&short, &a).is_err(), "fewer pixels than the size says");
 }
 
 /// Generates two pictures of the same small random size.
@@ -171,12 +222,16 @@ fn two_pictures() -> impl Strategy<Value = (Picture, Picture)> {
 proptest! {
     #[test]
     fn metrics_are_symmetric_and_bounded((a, b) in two_pictures()) {
-        prop_assert_eq!(psnr(&a, &b), psnr(&b, &a));
+        let (error, mirrored) = (SquaredError::of(&a, &b).expect("same size"), SquaredError::of(&b, &a).expect("same size"));
+        prop_assert_eq!(error, mirrored);
         prop_assert_eq!(ssim(&a, &b), ssim(&b, &a));
         let similarity = ssim(&a, &b).expect("same size");
         prop_assert!((-1.0..=1.0 + 1e-12).contains(&similarity), "{}", similarity);
-        let (mean, pooled) = (psnr(&a, &b).expect("same size"), psnr_pooled(&a, &b).expect("same size"));
-        prop_assert!(mean >= pooled - 1e-9, "{} below {}", mean, pooled);
+        let (mean, pooled) = (error.channel_psnr(), error.psnr());
+        prop_assert!(mean.is_finite() && pooled.is_finite(), "{} and {} are finite", mean, pooled);
+        // Holds where no channel is identical, and is left out.
+        let differs = a.pixels.iter().zip(&b.pixels).fold(Vec3::ZERO, |sum, (p, q)| sum + (*p - *q).abs());
+        prop_assert!(differs.min_element() == 0.0 || mean >= pooled - 1e-9, "{} below {}", mean, pooled);
         let (there, back) = (flip(&a, &b).expect("same size"), flip(&b, &a).expect("same size"));
         prop_assert!((there - back).abs() < 1e-12, "{} and {}", there, back);
         prop_assert!((0.0..=1.0 + 1e-9).contains(&there), "{}", there);

@@ -10,7 +10,7 @@ use bevy_gs4d::codec::{self, package};
 use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::offline::convert::{ConvertSettings, TargetForm, convert};
 use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions};
-use bevy_gs4d::offline::metrics::psnr_pooled;
+use bevy_gs4d::offline::metrics::SquaredError;
 use bevy_gs4d::offline::quantize::order::morton_order;
 use bevy_gs4d::offline::quantize::{CompressError, CompressSettings, Quality, compress, roundings};
 use bevy_gs4d::reference;
@@ -28,7 +28,7 @@ fn pack(scene: &GaussianScene) -> Vec<u8> {
 
 fn psnr(a: &RuntimeScene, b: &RuntimeScene, view: &View) -> f64 {
     let [a, b] = [a, b].map(|scene| reference::render(scene, view, BLACK).picture.clamped());
-    psnr_pooled(&a, &b).expect("the same size")
+    SquaredError::of(&a, &b).expect("the same size").psnr()
 }
 
 /// Returns the order in which a scene is packed.

@@ -9,7 +9,7 @@ use crate::support::surfaces::{depth_texture, edge};
 use bevy_gs4d::codec::checkpoint::CheckpointOptions;
 use bevy_gs4d::codec::load;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
-use bevy_gs4d::offline::metrics::psnr_pooled;
+use bevy_gs4d::offline::metrics::SquaredError;
 use bevy_gs4d::renderer::{ColorPrecision, Design, Headless, Instance, OpaqueDepth, ViewParameters};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Form, RuntimeScene};
@@ -163,7 +163,8 @@ fn the_bundled_capture_without_depths_is_that_of_the_reference() {
             headless.render_all(&instances, &parameters).expect("the picture fits")
         });
         assert!(expected.counts.visible > 10_000, "the capture is there: {:?}", expected.counts);
-        let decibels = psnr_pooled(&found.picture, &expected.picture).expect("pictures of one size");
+        let error = SquaredError::of(&found.picture, &expected.picture).expect("pictures of one size");
+        let decibels = error.psnr();
         println!("{size}, {time}: {decibels:.1} dB, at most {:.1e}", difference(&found, &expected));
         assert!(decibels >= 100.0, "{size}, {time}: {decibels} dB");
     }

@@ -11,7 +11,7 @@ use bevy_gs4d::offline::fine_tune::{
     GpuImage, GradientSums, Moments, NEIGHBORS, Rates, Sample, Terms, Trainer, adam, loss, neighbors, opacity_mask,
     regularization,
 };
-use bevy_gs4d::offline::metrics::psnr;
+use bevy_gs4d::offline::metrics::SquaredError;
 use bevy_gs4d::offline::quantize::{CompressSettings, compress};
 use bevy_gs4d::renderer::Headless;
 use bevy_gs4d::scene::packed::encode::Bits;
@@ -516,9 +516,9 @@ fn training_on_rounded_geometry_makes_up_for_it() {
         let scene = trainer.scene().expect("it can be read");
         let pictures = packed_pictures(&mut headless, scene, &lesson.views);
         let quality = |(picture, image): (&Picture, &CoveredImage)| {
-            psnr(&picture.clamped(), &image.over(Vec3::from(BEHIND))).expect("the same size")
+            SquaredError::of(&picture.clamped(), &image.over(Vec3::from(BEHIND))).expect("the same size")
         };
-        pictures.iter().zip(&lesson.images).map(quality).sum::<f64>() / 6.0
+        pictures.iter().zip(&lesson.images).map(quality).collect::<SquaredError>().psnr()
     };
     let (with, without) = (quality_after(true), quality_after(false));
     println!("packed: {with:.2} dB, {without:.2} dB without rounding in training");

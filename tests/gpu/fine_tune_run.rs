@@ -254,6 +254,34 @@ fn captures_of_every_model_and_with_an_environment_map_are_trained() {
 }
 
 #[test]
+fn validation_views_that_are_reproduced_exactly_do_not_keep_the_first_step() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new();
+    let settings = FineTuneSettings { steps: 20, evaluate_every: 10, ..FineTuneSettings::default() };
+    // Cameras that look away from the scene, with black images.
+    let black = lesson.folder.path().join("black.png");
+    image::RgbImage::new(40, 40).save(&black).expect("the folder can be written to");
+    let mut validation = lesson.views.clone();
+    for index in 0..lesson.views.len() {
+        let mut view = lesson.views[index].clone();
+        view.name = format!("black {index}");
+        view.image = black.clone();
+        let away = glam::Mat4::from_translation(Vec3::new(0.0, 0.0, -1000.0));
+        view.camera.world_to_camera = away * view.camera.world_to_camera;
+        validation.push(view);
+    }
+    let (views, trained_with) = (lesson.views.clone(), &lesson.scene.trained_with);
+    let images = TrainingImages::load(views, &validation, trained_with, &mut NoProgress);
+    let images = images.expect("the images were just written");
+    let tuned = fine_tune(&mut headless, lesson.disturbed(None), &images, &settings, None, &mut NoProgress);
+    let tuned = tuned.expect("it can be trained");
+    assert_eq!(tuned.validation, 24, "twelve views of the scene and twelve black ones");
+    let finite = |psnr: Option<f64>| psnr.is_some_and(f64::is_finite);
+    assert!(tuned.curve.iter().all(|point| finite(point.psnr)), "every PSNR is finite: {:?}", tuned.curve);
+    assert_eq!(tuned.best.step, 20, "training helps, and the last step is kept: {:?}", tuned.curve);
+}
+
+#[test]
 fn training_ends_early_when_it_no_longer_helps() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();

@@ -9,7 +9,6 @@
 
 mod choice;
 mod compression;
-mod evaluation;
 mod rounds;
 mod size;
 mod summary;
@@ -29,6 +28,7 @@ use super::splits::{SplitOptions, Splits};
 use super::stages::Stages;
 use super::store::{Key, Store};
 use super::temporal_filter::KeyFrames;
+use super::test_comparison::compare_test_views;
 use super::{OfflineError, Progress, Subject, sliced, trained_pixel};
 use crate::scene::{FilterKind, GaussianScene, TemporalFilter};
 use choice::{Choice, ScoreTable};
@@ -217,7 +217,9 @@ impl<'a> Bake<'a> {
             }
             self.keep_fewer(&mut attempts, &package.0, scores, stages.progress())?;
         };
-        let compared = stages.run_always("evaluate", |progress| self.compare(progress))?;
+        let compared = stages.run_always("evaluate", |progress| {
+            compare_test_views(self.engine, &self.subject, &self.splits, &self.settings.out, progress)
+        })?;
         let times = stages.times();
         let before = sliced(&self.subject.scene)?;
         let baked = stages.run_always("report", |progress| {

@@ -5,7 +5,6 @@
 
 use super::BakeSettings;
 use super::choice::Choice;
-use super::evaluation::Compared;
 use super::tuning::Tuning;
 use crate::codec::package;
 use crate::gaussian::Gaussian;
@@ -15,6 +14,7 @@ use crate::offline::report::{
 };
 use crate::offline::search::Goal;
 use crate::offline::temporal_filter::filter_name;
+use crate::offline::test_comparison::Compared;
 use crate::offline::{OfflineError, Progress, write_beside};
 use crate::scene::{TemporalFilter, TrainedWith};
 use std::ffi::OsString;

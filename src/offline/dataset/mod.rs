@@ -1,6 +1,6 @@
 //! Training views: the cameras, times and images that a capture is trained on and compared with.
 //!
-//! In: a folder or a single camera file. Out: [`TrainingView`]s in file order, and their images with the values the original trains on.
+//! In: a folder or a single camera file. Out: [`TrainingView`]s in file order, and their images with coverage ([`CoveredImage`]).
 //!
 //! | form | file | cameras |
 //! |---|---|---|
@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 
 pub use camera_file::{CameraFile, CameraOptions};
 pub use error::{DatasetError, FrameProblem};
-pub use view::{CoveredImage, ImageMode, TrainingImage, TrainingView};
+pub use view::{CoveredImage, TrainingView};
 
 /// The longest side of a picture that is accepted, in pixels.
 pub const MAX_SIDE: u32 = 16_384;

@@ -4,6 +4,7 @@
 //! In: the sphere about a capture, a size in pixels, numbers of directions and times. Out: [`Look`]s with the truth, which is all Gaussians
 //! in a picture of many times as many pixels, and with what they look like if they are drawn at that size; how close fewer come.
 
+use crate::offline::metrics::decibels;
 use crate::offline::room::require;
 use crate::offline::{OfflineError, Progress};
 use crate::renderer::{GpuCapture, Headless};
@@ -64,7 +65,7 @@ pub(super) struct Look {
 pub struct Closeness {
     /// The size, pixels.
     pub pixels: f32,
-    /// PSNR against all Gaussians, drawn at this size, of a screen of 1280x720 pixels, dB; infinite (null in JSON) for equal pictures.
+    /// PSNR against all Gaussians, drawn at this size, of a screen of 1280x720 pixels, dB; at most [`MAX_PSNR`](crate::offline::metrics::MAX_PSNR).
     pub screen: f64,
     /// PSNR against the truth inside the capture's rectangle, dB.
     pub truth: f64,
@@ -197,12 +198,11 @@ pub(super) fn closeness(
     for look in looks {
         let frame = headless.render(level, &look.view.antialiased(trained_pixel), BLACK)?;
         let inside = (look.rectangle[1] - look.rectangle[0]).as_dvec2();
-        let psnr = |error: f64| -10.0 * error.log10();
         let between = |a, b| square_error(a, b, look.rectangle);
         let share = inside.x * inside.y / SCREEN;
-        close.screen = close.screen.min(psnr(between(&look.all, &frame) * share));
-        close.truth = close.truth.min(psnr(between(&look.truth, &frame)));
-        close.all = close.all.min(psnr(look.missing));
+        close.screen = close.screen.min(decibels(between(&look.all, &frame) * share));
+        close.truth = close.truth.min(decibels(between(&look.truth, &frame)));
+        close.all = close.all.min(decibels(look.missing));
     }
     Ok(close)
 }

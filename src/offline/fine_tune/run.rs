@@ -9,7 +9,7 @@ use super::{Behind, CurvePoint, FineTuneSettings, FineTuned, Resume};
 use super::{GpuImage, Sample, Trainer, TrainerState};
 use crate::offline::dataset::CoveredImage;
 use crate::offline::dataset::selection::even_subset;
-use crate::offline::metrics::{SizeMismatch, psnr};
+use crate::offline::metrics::SquaredError;
 use crate::offline::score::GpuEngine;
 use crate::offline::store::Key;
 use crate::offline::temporal_filter::{needs_views, seen_filter};
@@ -274,12 +274,13 @@ impl<'a> Run<'a> {
         Ok(self.trainer.step(&settings.rates, factor, count)?)
     }
 
-    /// Returns the PSNR on the validation views; `None` if there are none.
+    /// Returns the PSNR in dB of the squared error of all pixels, channels and validation views together; `None` without validation views.
     pub(super) fn evaluate(&mut self) -> Result<Option<f64>, OfflineError> {
-        match &self.images.validation[..] {
-            [] => Ok(None),
-            shots => mean_psnr(&mut self.trainer, shots, self.background).map(Some),
+        let mut error = SquaredError::default();
+        for shot in &self.images.validation {
+            error.merge(&squared_error(&mut self.trainer, &shot.view, &shot.image, self.background)?);
         }
+        Ok((!self.images.validation.is_empty()).then(|| error.psnr()))
     }
 
     /// Reports the first gradient that was not finite. Returns whether there was one.
@@ -307,24 +308,15 @@ pub(super) struct Best {
     pub state: TrainerState,
 }
 
-/// Returns the mean over views of the PSNR against their images, as evaluations compute it.
-fn mean_psnr(trainer: &mut Trainer<'_>, shots: &[Shot], background: Background) -> Result<f64, OfflineError> {
-    let mut sum = 0.0;
-    for shot in shots {
-        sum += psnr_of(trainer, &shot.view, &shot.image, background)?;
-    }
-    Ok(sum / shots.len().max(1) as f64)
-}
-
-pub(super) fn psnr_of(
+/// Returns the squared error of a view against an image over the background; the picture is clamped to 0..1.
+fn squared_error(
     trainer: &mut Trainer<'_>,
     view: &View,
     image: &CoveredImage,
     background: Background,
-) -> Result<f64, OfflineError> {
+) -> Result<SquaredError, OfflineError> {
     let picture = trainer.draw(view, background)?.picture.clamped();
-    let found: Result<f64, SizeMismatch> = psnr(&image.over(behind(background)), &picture);
-    Ok(found?)
+    Ok(SquaredError::of(&image.over(behind(background)), &picture)?)
 }
 
 /// Returns the color behind an image that does not cover all pixels.

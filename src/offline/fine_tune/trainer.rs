@@ -29,6 +29,7 @@ use super::view_buffers::ViewBuffers;
 use crate::gaussian::harmonics::evaluated;
 use crate::gaussian::{GradientMode, InvalidGaussian, Model};
 use crate::offline::dataset::CoveredImage;
+use crate::offline::metrics::decibels;
 use crate::offline::quantize::CompressError;
 use crate::renderer::layout::{AdamUniforms, FIRST_SEEN, LossUniforms, TrainedScene};
 use crate::renderer::memory::binding_limit;
@@ -416,7 +417,7 @@ impl<'a> Trainer<'a> {
         let [loss, _, squares, views]: [f32; 4] = bytemuck::pod_read_unaligned(&bytes);
         self.headless.context().queue.write_buffer(&self.totals, 0, &[0; 16]);
         let each = 1.0 / f64::from(views.max(1.0));
-        let psnr = -10.0 * (f64::from(squares) * each).log10();
+        let psnr = decibels(f64::from(squares) * each);
         Ok(Totals { loss: f64::from(loss) * each, psnr, views: views as u64 })
     }
 

@@ -1,18 +1,17 @@
 //! Metrics of a scene over the views of a dataset.
 //!
 //! In: training views with their images and a closure that draws a view. Out: an [`Evaluation`], the metrics of each
-//! view and their means, as the original evaluates: renders are clamped, not rounded, and images are loaded as in
-//! training.
+//! view and of all views together. As in the original, renders are clamped and not rounded.
 
 use glam::{UVec2, Vec3};
 use serde::Serialize;
 
-use super::{SizeMismatch, flip, ms_ssim, psnr, psnr_pooled, ssim};
-use crate::offline::dataset::{DatasetError, ImageMode, TrainingView};
+use super::{MAX_PSNR, SizeMismatch, SquaredError, flip, ms_ssim, ssim};
+use crate::offline::dataset::{DatasetError, TrainingView};
 use crate::scene::TrainedWith;
 use crate::view::{Picture, RasterFov, View};
 
-/// Which metrics to compute beside PSNR. Each takes longer than the one before.
+/// Which metrics to compute in addition to PSNR. Each takes longer than the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MetricSet {
     /// Structural similarity.
@@ -32,48 +31,102 @@ impl MetricSet {
     pub const ALL: Self = Self { ssim: true, ms_ssim: true, flip: true };
 }
 
-/// Metrics of a render, or the means over several. A metric that was not computed is `None`.
+/// Metrics of a picture against its reference. A metric that was not computed is `None`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ImageMetrics {
-    /// PSNR in dB, mean of the three channels. Infinite (null in JSON) for equal pictures.
+    /// PSNR in dB, mean of the three channels ([`SquaredError::channel_psnr`]).
     pub psnr: f64,
     /// PSNR in dB of all values together.
     pub psnr_pooled: f64,
+    /// Whether the pictures are identical.
+    pub identical: bool,
     /// SSIM, at most 1.
     pub ssim: Option<f64>,
     /// MS-SSIM, 0 to 1; also `None` if a side is shorter than [`MS_SSIM_MIN_SIDE`](super::MS_SSIM_MIN_SIDE).
     pub ms_ssim: Option<f64>,
     /// Mean FLIP, 0 (same) to 1.
     pub flip: Option<f64>,
+    /// The squared error that the PSNR is computed from.
+    #[serde(skip)]
+    pub error: SquaredError,
 }
 
 impl ImageMetrics {
-    /// Compares a render, clamped to 0..1 first, with the reference.
+    /// Compares a picture with its reference.
     ///
     /// # Errors
     /// [`SizeMismatch`] if the pictures do not have the same size, or are empty.
-    pub fn of(reference: &Picture, render: &Picture, wanted: MetricSet) -> Result<Self, SizeMismatch> {
-        let render = render.clamped();
+    pub fn of(reference: &Picture, picture: &Picture, wanted: MetricSet) -> Result<Self, SizeMismatch> {
+        let error = SquaredError::of(reference, picture)?;
         Ok(Self {
-            psnr: psnr(reference, &render)?,
-            psnr_pooled: psnr_pooled(reference, &render)?,
-            ssim: wanted.ssim.then(|| ssim(reference, &render)).transpose()?,
-            ms_ssim: if wanted.ms_ssim { ms_ssim(reference, &render)? } else { None },
-            flip: wanted.flip.then(|| flip(reference, &render)).transpose()?,
+            psnr: error.channel_psnr(),
+            psnr_pooled: error.psnr(),
+            identical: error.is_identical(),
+            ssim: wanted.ssim.then(|| ssim(reference, picture)).transpose()?,
+            ms_ssim: if wanted.ms_ssim { ms_ssim(reference, picture)? } else { None },
+            flip: wanted.flip.then(|| flip(reference, picture)).transpose()?,
+            error,
         })
     }
+}
 
-    /// Returns the means; a metric that is `None` in any of `all` is `None`. Returns `None` if `all` is empty.
-    pub fn mean(all: &[Self]) -> Option<Self> {
-        let count = all.len() as f64;
-        let mean = |of: fn(&Self) -> Option<f64>| all.iter().map(of).sum::<Option<f64>>().map(|sum| sum / count);
-        Some(Self {
-            psnr: mean(|l| Some(l.psnr)).filter(|_| !all.is_empty())?,
-            psnr_pooled: mean(|l| Some(l.psnr_pooled))?,
-            ssim: mean(|l| l.ssim),
-            ms_ssim: mean(|l| l.ms_ssim),
-            flip: mean(|l| l.flip),
-        })
+/// Metrics over several pictures. A metric that any picture lacks is `None`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MeanMetrics {
+    /// The figure of the literature, dB: the mean of [`ImageMetrics::psnr`] over the pictures that are not identical to their
+    /// references; [`MAX_PSNR`] if all are.
+    pub psnr: f64,
+    /// PSNR in dB of the squared error of all values of all pictures together. Choices are made by it.
+    pub psnr_pooled: f64,
+    /// Number of pictures that are identical to their references.
+    pub identical: usize,
+    /// Mean SSIM.
+    pub ssim: Option<f64>,
+    /// Mean MS-SSIM.
+    pub ms_ssim: Option<f64>,
+    /// Mean FLIP.
+    pub flip: Option<f64>,
+    /// Number of pictures.
+    #[serde(skip)]
+    pub count: usize,
+}
+
+impl MeanMetrics {
+    /// Returns the metrics over `all`; `None` if it is empty.
+    pub fn of(all: &[ImageMetrics]) -> Option<Self> {
+        let count = all.len();
+        let mean = |of: fn(&ImageMetrics) -> Option<f64>| {
+            all.iter().map(of).sum::<Option<f64>>().map(|sum| sum / count as f64)
+        };
+        let differing = all.iter().filter(|metrics| !metrics.identical);
+        let identical = count - differing.clone().count();
+        let psnr = match count - identical {
+            0 => MAX_PSNR,
+            differing_count => differing.map(|metrics| metrics.psnr).sum::<f64>() / differing_count as f64,
+        };
+        let error: SquaredError = all.iter().map(|metrics| metrics.error).collect();
+        let mean = Self {
+            psnr,
+            psnr_pooled: error.psnr(),
+            identical,
+            ssim: mean(|metrics| metrics.ssim),
+            ms_ssim: mean(|metrics| metrics.ms_ssim),
+            flip: mean(|metrics| metrics.flip),
+            count,
+        };
+        (count > 0).then_some(mean)
+    }
+
+    /// Returns a sentence about identical pictures, called `noun` in the plural; `None` if there are none.
+    pub fn identical_in_words(&self, noun: &str) -> Option<String> {
+        let Self { identical, count, .. } = *self;
+        match identical {
+            0 => None,
+            _ if identical == count => {
+                Some(format!("all {count} {noun} are identical: PSNR is capped at {MAX_PSNR} dB"))
+            }
+            _ => Some(format!("{identical} of {count} {noun} are identical and not part of the mean PSNR")),
+        }
     }
 }
 
@@ -92,19 +145,33 @@ pub struct ViewMetrics {
 /// Metrics of a scene over the views of a dataset.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Evaluation {
+    /// Color behind pixels that an image does not cover, RGB, 0 to 1.
+    pub background: [f32; 3],
+    /// Whether an image has a pixel that it does not cover.
+    pub has_gaps: bool,
     /// Every view, in the order of the dataset.
     pub views: Vec<ViewMetrics>,
-    /// The means over the views.
-    pub mean: ImageMetrics,
+    /// The metrics over all views.
+    pub mean: MeanMetrics,
+    /// The same over a contrasting background; `None` if that was not measured, or if no background is visible.
+    pub contrast: Option<Contrast>,
 }
 
-/// How images are loaded, views drawn and both compared.
+/// Metrics over a background that contrasts with the one of training.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Contrast {
+    /// The background, RGB, 0 to 1.
+    pub background: [f32; 3],
+    /// The metrics over all views.
+    #[serde(flatten)]
+    pub mean: MeanMetrics,
+}
+
+/// How views are drawn and compared with their images.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EvaluationSettings {
-    /// Background of transparent images, RGB, 0 to 1.
+    /// Color behind pixels that an image does not cover, RGB, 0 to 1.
     pub background: [f32; 3],
-    /// Which of the original's two ways of loading images is used.
-    pub images: ImageMode,
     /// Which field of view determines the footprints.
     pub raster_fov: RasterFov,
     /// Which metrics to compute.
@@ -112,12 +179,9 @@ pub struct EvaluationSettings {
 }
 
 impl EvaluationSettings {
-    /// Returns settings with the background and the field of view that the capture was trained with. Transparent images
-    /// are composited once ([`ImageMode::Dataloader`]), as for the figures that captures are compared with; the
-    /// in-memory mode of training multiplies them by alpha twice.
+    /// Returns settings with the background and the field of view that the capture was trained with.
     pub fn of(trained: &TrainedWith, metrics: MetricSet) -> Self {
-        let images = ImageMode::Dataloader;
-        Self { background: trained.background, images, raster_fov: trained.raster_fov, metrics }
+        Self { background: trained.background, raster_fov: trained.raster_fov, metrics }
     }
 }
 
@@ -136,17 +200,20 @@ where
     E: From<DatasetError> + From<SizeMismatch>,
 {
     let mut all = Vec::with_capacity(views.len());
+    let mut has_gaps = false;
     for view in views {
-        let reference = view.load_image(settings.background, settings.images)?.picture;
+        let image = view.load_covered()?;
+        has_gaps |= image.has_gaps;
+        let reference = image.over(Vec3::from(settings.background));
         let render = draw(&view.camera.view(view.time, settings.raster_fov))?;
-        let metrics = ImageMetrics::of(&reference, &render, settings.metrics)?;
+        let metrics = ImageMetrics::of(&reference, &render.clamped(), settings.metrics)?;
         let measured = ViewMetrics { name: view.name.clone(), time: view.time, metrics };
         seen(&measured, &reference, &render)?;
         all.push(measured);
     }
     let metrics: Vec<ImageMetrics> = all.iter().map(|view| view.metrics).collect();
-    let mean = ImageMetrics::mean(&metrics).ok_or(SizeMismatch { first: UVec2::ZERO, second: UVec2::ZERO })?;
-    Ok(Evaluation { views: all, mean })
+    let mean = MeanMetrics::of(&metrics).ok_or(SizeMismatch { first: UVec2::ZERO, second: UVec2::ZERO })?;
+    Ok(Evaluation { background: settings.background, has_gaps, views: all, mean, contrast: None })
 }
 
 /// Returns reference, render and their difference times `gain`, side by side. Both must have the same size.
@@ -164,18 +231,43 @@ pub fn side_by_side(reference: &Picture, render: &Picture, gain: f32) -> Picture
 mod tests {
     use super::*;
 
-    fn metrics(psnr: f64, ssim: Option<f64>) -> ImageMetrics {
-        ImageMetrics { psnr, psnr_pooled: psnr, ssim, ms_ssim: None, flip: None }
+    /// Returns the metrics of a picture whose channels differ by `difference` from black.
+    fn metrics(difference: f32, ssim: Option<f64>) -> ImageMetrics {
+        let picture = |value| Picture::filled(UVec2::splat(4), Vec3::splat(value));
+        let metrics = ImageMetrics::of(&picture(0.0), &picture(difference), MetricSet::PSNR).expect("the same size");
+        ImageMetrics { ssim, ..metrics }
     }
 
     #[test]
-    fn means_leave_out_what_some_view_lacks() {
-        let mean = ImageMetrics::mean(&[metrics(30.0, Some(0.9)), metrics(40.0, Some(0.7))]).expect("two views");
-        assert_eq!((mean.psnr, mean.ms_ssim), (35.0, None), "mean of two, nothing of none");
-        assert!(mean.ssim.is_some_and(|ssim| (ssim - 0.8).abs() < 1e-12), "mean of two: {mean:?}");
-        let partial = ImageMetrics::mean(&[metrics(30.0, Some(0.9)), metrics(40.0, None)]).expect("two views");
+    fn a_mean_needs_the_metric_of_every_view() {
+        let mean = MeanMetrics::of(&[metrics(0.1, Some(0.9)), metrics(0.01, Some(0.7))]).expect("two views");
+        assert!((mean.psnr - 30.0).abs() < 1e-5, "the mean of 20 and 40 dB: {mean:?}");
+        let pooled = -10.0 * (0.010_1f64 / 2.0).log10();
+        assert!((mean.psnr_pooled - pooled).abs() < 1e-5, "the PSNR of the mean squared error: {mean:?}");
+        assert!(mean.ssim.is_some_and(|ssim| (ssim - 0.8).abs() < 1e-12), "the mean of two: {mean:?}");
+        assert_eq!(mean.ms_ssim, None, "no view has MS-SSIM");
+        let partial = MeanMetrics::of(&[metrics(0.1, Some(0.9)), metrics(0.01, None)]).expect("two views");
         assert_eq!(partial.ssim, None, "a mean over fewer views would mislead");
-        assert_eq!(ImageMetrics::mean(&[]), None, "no views");
+        assert_eq!(MeanMetrics::of(&[]), None, "there is no mean of no views");
+    }
+
+    #[test]
+    fn identical_views_are_counted_and_not_part_of_the_mean_psnr() {
+        let views = [metrics(0.0, None), metrics(0.1, None), metrics(0.01, None)];
+        let mean = MeanMetrics::of(&views).expect("three views");
+        assert_eq!(mean.identical, 1, "one view is identical");
+        assert!((mean.psnr - 30.0).abs() < 1e-5, "the mean of the other two: {mean:?}");
+        let pooled = -10.0 * (0.010_1f64 / 3.0).log10();
+        assert!((mean.psnr_pooled - pooled).abs() < 1e-5, "all three are pooled: {mean:?}");
+        let words = mean.identical_in_words("views").expect("one view is identical");
+        assert!(words.starts_with("1 of 3 views are identical"), "the count is reported: {words}");
+        let all = MeanMetrics::of(&views[..1]).expect("one view");
+        assert_eq!((all.psnr, all.psnr_pooled), (MAX_PSNR, MAX_PSNR), "PSNR of identical views alone is the cap");
+        assert_eq!(
+            MeanMetrics::of(&views[1..]).expect("two views").identical_in_words("views"),
+            None,
+            "none is identical"
+        );
     }
 
     #[test]

@@ -3,9 +3,9 @@
 //! In: two pictures, sRGB-encoded, values 0 to 1. Out: the mean of their FLIP map, 0 (same) to 1, seen at 67 pixels per degree: a 4K
 //! monitor 0.7 m wide from 0.7 m away.
 //!
-//! Two measures are combined. Colour: the pictures filtered by the contrast sensitivity of the eye (in YCxCz), compared
+//! Two measures are combined. Color: the pictures filtered by the contrast sensitivity of the eye (in YCxCz), compared
 //! in a Hunt-adjusted L\*a\*b\* by the HyAB distance. Features: edges and points of the luminance, which make a
-//! difference of colour more visible.
+//! difference of color more visible.
 
 use std::f64::consts::{PI, SQRT_2};
 use std::ops::{Add, Mul};
@@ -28,7 +28,7 @@ const SENSITIVITY: [(DVec3, DVec3); 2] = [
 const WIDEST: f64 = 0.04;
 /// Width of the eye's edge detector, in degrees from peak to trough.
 const DETECTOR_WIDTH: f64 = 0.082;
-/// Exponent of the difference of colour, and the bend of its scale: this share of the largest difference maps to
+/// Exponent of the difference of color, and the bend of its scale: this fraction of the largest difference maps to
 /// `BEND_TO`.
 const COLOR_EXPONENT: f64 = 0.7;
 const BEND_AT: f64 = 0.4;
@@ -53,7 +53,7 @@ pub fn flip(reference: &Picture, test: &Picture) -> Result<f64, SizeMismatch> {
 
 /// A picture after the filters of the eye.
 struct Seen {
-    /// Filtered colours, Hunt-adjusted L\*a\*b\*.
+    /// Filtered colors, Hunt-adjusted L\*a\*b\*.
     colors: Vec<DVec3>,
     /// Strength of edges and of points.
     features: Vec<DVec2>,
@@ -97,7 +97,7 @@ fn sensitivity(height: DVec3, spread: DVec3) -> (Vec<DVec3>, DVec3) {
     (gaussian(spread), amplitude(height, spread) / total.sum::<DVec3>())
 }
 
-/// Returns the strength of edges (x) and points (y) of the luminance of opponent colours.
+/// Returns the strength of edges (x) and points (y) of the luminance of opponent colors.
 fn features(opponent: &[DVec3], width: usize) -> Vec<DVec2> {
     let deviation = 0.5 * DETECTOR_WIDTH * PIXELS_PER_DEGREE;
     let radius = (3.0 * deviation).ceil() as i32;
@@ -145,7 +145,7 @@ where
         .fold(T::default(), |sum, (i, &weight)| sum + weight * at((center + i).saturating_sub(radius).min(length - 1)))
 }
 
-/// Converts an sRGB-encoded colour to linear RGB.
+/// Converts an sRGB-encoded color to linear RGB.
 fn linear(color: DVec3) -> DVec3 {
     color.map(|v| if v > 0.04045 { ((v + 0.055) / 1.055).powf(2.4) } else { v / 12.92 })
 }
@@ -182,7 +182,7 @@ fn lab(color: DVec3) -> DVec3 {
     DVec3::new(116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z))
 }
 
-/// Applies the Hunt effect: colours look stronger the lighter they are.
+/// Applies the Hunt effect: colors look stronger the lighter they are.
 fn hunt(lab: DVec3) -> DVec3 {
     let strength = 0.01 * lab.x;
     DVec3::new(lab.x, strength * lab.y, strength * lab.z)
@@ -193,7 +193,7 @@ fn hyab(a: DVec3, b: DVec3) -> f64 {
     difference.x.abs() + difference.y.hypot(difference.z)
 }
 
-/// Returns the largest difference of colour, between green and blue, with its exponent.
+/// Returns the largest difference of color, between green and blue, with its exponent.
 fn largest_distance() -> f64 {
     hyab(hunt(lab(DVec3::Y)), hunt(lab(DVec3::Z))).powf(COLOR_EXPONENT)
 }
@@ -231,6 +231,6 @@ mod tests {
     fn opponent_colors_turn_back() {
         let color = DVec3::new(0.2, 0.7, 0.4);
         assert!(from_opponent(opponent(color)).abs_diff_eq(color, 1e-12), "there and back");
-        assert!(opponent(DVec3::ONE).abs_diff_eq(DVec3::new(100.0, 0.0, 0.0), 1e-12), "white has no colour");
+        assert!(opponent(DVec3::ONE).abs_diff_eq(DVec3::new(100.0, 0.0, 0.0), 1e-12), "white has no color");
     }
 }

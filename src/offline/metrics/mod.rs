@@ -2,7 +2,7 @@
 //!
 //! In: two [`Picture`]s of the same size, values 0 to 1 (nothing is clamped here: clamp a rendering with
 //! [`Picture::clamped`] first, as the original evaluation does). Out: one number, which is not finite if a pixel is
-//! not. [`evaluate()`] computes them for every view of a dataset.
+//! not. Every PSNR derives from a [`SquaredError`]. [`evaluate()`] computes the metrics for every view of a dataset.
 
 mod evaluate;
 mod flip;
@@ -10,10 +10,13 @@ mod ms_ssim;
 mod psnr;
 mod ssim;
 
-pub use evaluate::{Evaluation, EvaluationSettings, ImageMetrics, MetricSet, ViewMetrics, evaluate, side_by_side};
+pub use evaluate::{
+    Contrast, Evaluation, EvaluationSettings, ImageMetrics, MeanMetrics, MetricSet, ViewMetrics, evaluate, side_by_side,
+};
 pub use flip::flip;
 pub use ms_ssim::{MS_SSIM_MIN_SIDE, ms_ssim};
-pub use psnr::{psnr, psnr_pooled};
+pub(crate) use psnr::decibels;
+pub use psnr::{MAX_PSNR, SquaredError};
 pub use ssim::{similarity_slopes, ssim};
 
 use glam::UVec2;

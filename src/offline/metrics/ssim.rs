@@ -87,7 +87,7 @@ pub(super) fn gaussian_window() -> [f64; WINDOW] {
     weights.map(|weight| weight / sum)
 }
 
-/// Returns the positions from `0..length` under the window centred on `center`, with their weights; values beyond them
+/// Returns the positions from `0..length` under the window centered on `center`, with their weights; values beyond them
 /// count as zero.
 fn inside(window: &[f64; WINDOW], center: usize, length: usize) -> impl Iterator<Item = (usize, f64)> {
     let taps = window.iter().enumerate();

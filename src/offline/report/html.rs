@@ -5,7 +5,8 @@
 use super::super::fine_tune::CurvePoint;
 use super::plot::{Axis, Chart, Series, bars};
 use super::{BakeReport, Sample};
-use crate::offline::metrics::ImageMetrics;
+use crate::offline::evaluation::{color_name, without_contrast};
+use crate::offline::metrics::MeanMetrics;
 use crate::view::Picture;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -96,7 +97,7 @@ fn in_short(report: &BakeReport) -> String {
     ];
     if let Some(evaluation) = &report.evaluation {
         let (before, after) = (&evaluation.before.mean, &evaluation.after.mean);
-        let mut metric = |name: &str, digits: usize, of: fn(&ImageMetrics) -> Option<f64>| {
+        let mut metric = |name: &str, digits: usize, of: fn(&MeanMetrics) -> Option<f64>| {
             if let (Some(before), Some(after)) = (of(before), of(after)) {
                 rows.push(row(name, format!("{before:.digits$}"), format!("{after:.digits$}")));
             }
@@ -106,10 +107,32 @@ fn in_short(report: &BakeReport) -> String {
         metric("SSIM", 4, |l| l.ssim);
         metric("MS-SSIM", 4, |l| l.ms_ssim);
         metric("FLIP (0 is best)", 4, |l| l.flip);
+        if let (Some(before), Some(after)) = (evaluation.before.contrast, evaluation.after.contrast) {
+            let (over, before, after) = (color_name(after.background), before.mean, after.mean);
+            let mut metric = |name: &str, before: f64, after: f64| {
+                rows.push(row(&format!("{name} over {over}, dB"), format!("{before:.2}"), format!("{after:.2}")));
+            };
+            metric("PSNR", before.psnr, after.psnr);
+            metric("PSNR pooled", before.psnr_pooled, after.psnr_pooled);
+        }
     }
     let about = match (&report.evaluation, &report.split) {
         (Some(evaluation), Some(split)) => {
-            format!("Metrics: means over the {} views of the {split} split.", evaluation.after.views.len())
+            let after = &evaluation.after;
+            let behind = match after.contrast {
+                Some(_) => format!("Where no background is named, it is {}.", color_name(after.background)),
+                None => format!("One background: {}.", without_contrast(after)),
+            };
+            let identical = |name: &str, mean: &MeanMetrics| {
+                mean.identical_in_words("views").map_or(String::new(), |words| format!(" Of the {name}, {words}."))
+            };
+            format!(
+                "Metrics: means over the {} views of the {split} split; pooled is the PSNR of all values of all views together. \
+                 {behind}{}{}",
+                after.views.len(),
+                identical("checkpoint", &evaluation.before.mean),
+                identical("package", &after.mean),
+            )
         }
         _ => "Metrics were not measured: the images of the test split are not there.".to_owned(),
     };

@@ -6,7 +6,7 @@
 use std::fs;
 
 use bevy_gs4d::offline::dataset::{
-    CameraFile, CameraOptions, Dataset, DatasetError, ImageMode, MAX_SIDE, Split, TrainingView,
+    CameraFile, CameraOptions, CoveredImage, Dataset, DatasetError, MAX_SIDE, Split, TrainingView,
 };
 use bevy_gs4d::offline::picture_file::PictureError;
 use bevy_gs4d::view::Camera;
@@ -16,16 +16,20 @@ use serde_json::json;
 
 use super::{Folder, frame, noise, resolution_option, transforms, with};
 
-// The results of numpy and Pillow 9.5 for `rgba_noise(13 * 9, 4)` and, for the mask, for `noise(13 * 9, 5)`, at 6x4.
+// The results of numpy and Pillow for `rgba_noise(13 * 9, 4)` and, for the mask, for `noise(13 * 9, 5)`, at 6x4.
 #[rustfmt::skip]
-const IN_MEMORY_BLACK: [u8; 96] = [
-    100, 157, 85, 89, 125, 170, 65, 124, 92, 152, 70, 102, 140, 106, 129, 122, 92, 127, 21, 94, 71, 100, 82, 96, 131,
-    146, 110, 184, 103, 157, 102, 172, 80, 131, 102, 145, 76, 102, 120, 150, 105, 92, 80, 130, 133, 171, 77, 178, 116,
-    90, 81, 157, 171, 134, 127, 140, 120, 98, 139, 150, 106, 111, 136, 165, 136, 65, 60, 97, 95, 107, 91, 109, 76, 15,
-    73, 83, 73, 105, 95, 152, 121, 112, 55, 111, 98, 65, 61, 70, 99, 19, 96, 103, 135, 151, 148, 136,
+const OVER_BLACK: [u8; 72] = [
+    38, 59, 32, 74, 102, 51, 48, 72, 32, 86, 66, 78, 38, 52, 13, 39, 59, 63, 99, 107, 81, 96, 136, 93, 60, 89, 65,
+    47, 59, 71, 55, 50, 45, 94, 128, 60, 92, 80, 60, 108, 89, 82, 92, 78, 96, 71, 80, 92, 69, 41, 32, 57, 56, 48,
+    38, 17, 45, 59, 71, 72, 62, 60, 34, 32, 20, 22, 44, 11, 44, 89, 86, 88,
 ];
 #[rustfmt::skip]
-const DATALOADER_WHITE: [u8; 72] = [
+const COVERAGE: [u8; 24] = [
+    89, 124, 102, 122, 94, 96, 184, 172, 145, 150, 130, 178, 157, 140, 150, 165, 97, 109, 83, 152, 111, 70, 103,
+    136,
+];
+#[rustfmt::skip]
+const OVER_WHITE: [u8; 72] = [
     204, 225, 199, 207, 233, 183, 200, 225, 185, 219, 199, 212, 199, 214, 174, 198, 218, 221, 170, 178, 152, 179, 219,
     176, 171, 199, 175, 151, 163, 176, 180, 175, 169, 166, 200, 132, 190, 179, 158, 222, 203, 197, 195, 183, 202, 160,
     169, 181, 227, 200, 190, 202, 202, 193, 209, 187, 216, 162, 174, 175, 204, 204, 178, 217, 205, 208, 194, 164, 197,
@@ -67,33 +71,52 @@ fn unit(bytes: &[u8]) -> Vec<f32> {
     bytes.iter().map(|&byte| f32::from(byte) / 255.0).collect()
 }
 
-#[test]
-fn transparent_images_are_multiplied_by_alpha_twice_in_memory() {
-    let folder = Folder::new();
-    let loaded = noise_view(&folder, false).load_image([0.0; 3], ImageMode::InMemory).expect("an image");
-    assert_eq!(loaded.picture.size, UVec2::new(6, 4), "13x9 at resolution 2, halves to even");
-    let rgba = unit(&IN_MEMORY_BLACK);
-    let colors: Vec<_> = rgba.chunks(4).map(|p| Vec3::new(p[0] * p[3], p[1] * p[3], p[2] * p[3])).collect();
-    assert_eq!(loaded.picture.pixels, colors, "Pillow's bytes, times alpha");
-    assert_eq!(loaded.alpha, Some(rgba.chunks(4).map(|p| p[3]).collect()), "Pillow's alpha");
+/// Returns the colors of an image, 3 bytes a pixel, and its coverage.
+fn bytes(image: &CoveredImage) -> (Vec<u8>, Vec<u8>) {
+    let colors = image.texels.iter().flat_map(|texel| texel[..3].to_vec());
+    (colors.collect(), image.texels.iter().map(|texel| texel[3]).collect())
 }
 
 #[test]
-fn dataloader_mode_composites_once() {
+fn transparent_images_are_multiplied_by_alpha_once() {
     let folder = Folder::new();
-    let loaded = noise_view(&folder, false).load_image([1.0; 3], ImageMode::Dataloader).expect("an image");
-    let colors: Vec<_> = unit(&DATALOADER_WHITE).chunks(3).map(Vec3::from_slice).collect();
-    assert_eq!(loaded.picture.pixels, colors, "over white, Pillow's bytes");
-    assert_eq!(loaded.alpha, None, "no alpha");
+    let image = noise_view(&folder, false).load_covered().expect("an image");
+    assert_eq!(image.size, UVec2::new(6, 4), "13x9 at resolution 2, halves to even");
+    assert_eq!(
+        bytes(&image),
+        (OVER_BLACK.to_vec(), COVERAGE.to_vec()),
+        "Pillow's bytes over black, and Pillow's alpha"
+    );
+    assert!(image.has_gaps, "some pixels are not covered");
+    let over_black: Vec<_> = unit(&OVER_BLACK).chunks(3).map(Vec3::from_slice).collect();
+    assert_eq!(image.over(Vec3::ZERO).pixels, over_black, "exactly the bytes over black");
+    let over_white: Vec<_> = unit(&OVER_WHITE).chunks(3).map(Vec3::from_slice).collect();
+    let found = image.over(Vec3::ONE).pixels;
+    // Noise overshoots in the bicubic filter, and is clipped where the composite is not.
+    let farthest = found.iter().zip(&over_white).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
+    assert!(farthest < 5.5 / 255.0, "an image that is composited over white before: {farthest}");
+    let mean = found.iter().zip(&over_white).map(|(a, b)| (*a - *b).element_sum()).sum::<f32>() / 72.0;
+    assert!(mean.abs() < 1.0 / 255.0, "the mean differs by rounding: {mean}");
 }
 
 #[test]
 fn masks_are_coverage_and_not_multiplied_in() {
     let folder = Folder::new();
-    let plain = noise_view(&folder, false).load_image([0.0; 3], ImageMode::InMemory).expect("an image");
-    let masked = noise_view(&folder, true).load_image([0.0; 3], ImageMode::InMemory).expect("an image");
-    assert_eq!(masked.picture, plain.picture, "the image is already multiplied by its mask");
-    assert_eq!(masked.alpha, Some(unit(&MASK)), "the mask, resampled");
+    let masked = noise_view(&folder, true).load_covered().expect("an image");
+    assert_eq!(bytes(&masked), (OVER_BLACK.to_vec(), MASK.to_vec()), "the image as it is, and the mask resampled");
+    let background = Vec3::new(0.2, 0.4, 0.6);
+    let (color, covered) = (unit(&OVER_BLACK[..3]), unit(&MASK[..1]));
+    let expected = Vec3::from_slice(&color) + (1.0 - covered[0]) * background;
+    let found = masked.over(background).pixel(0, 0);
+    assert!(found.abs_diff_eq(expected, 1e-6), "the background fills what the mask leaves: {found} and {expected}");
+}
+
+#[test]
+fn an_image_that_is_brighter_than_its_mask_is_clamped() {
+    let image = CoveredImage { size: UVec2::ONE, texels: vec![[140, 100, 0, 128]], has_gaps: true };
+    let found = image.over(Vec3::ONE).pixel(0, 0);
+    assert_eq!(found.x, 1.0, "140 + 127 of 255 is at most 1");
+    assert!((found.y - 227.0 / 255.0).abs() < 1e-6, "100 + 127 of 255: {found}");
 }
 
 #[test]
@@ -102,13 +125,13 @@ fn opaque_images_of_the_right_size_survive_exactly() {
     folder.write_rgb("a.png", 16, 16);
     let path = folder.write_json("transforms_test.json", &json!({"camera_angle_x": 0.8, "frames": [frame("a")]}));
     let view = CameraFile::load(&path, &CameraOptions::default()).expect("a valid camera file").remove(0);
-    let loaded = view.load_image([0.3, 0.6, 0.9], ImageMode::InMemory).expect("an image");
+    let loaded = view.load_covered().expect("an image");
     let colors: Vec<_> = unit(&noise(16 * 16 * 3, 7)).chunks(3).map(Vec3::from_slice).collect();
-    assert_eq!(loaded.picture.pixels, colors, "every byte as it was");
-    assert_eq!(loaded.alpha, None, "everything covered");
+    assert_eq!(loaded.over(Vec3::new(0.3, 0.6, 0.9)).pixels, colors, "every byte as it was, over any background");
+    assert!(!loaded.has_gaps, "every pixel is covered");
     let oversized =
         TrainingView { camera: Camera { size: UVec2::new(MAX_SIDE + 1, 1), ..view.camera }, ..view.clone() };
-    let error = oversized.load_image([0.0; 3], ImageMode::InMemory).expect_err("too wide");
+    let error = oversized.load_covered().expect_err("too wide");
     assert!(matches!(error, DatasetError::Size { .. }), "{error}");
 }
 
@@ -123,7 +146,7 @@ fn missing_images_are_counted_and_the_first_ones_named() {
     for part in ["9 of 10", "r_001.png", "and 5 more"] {
         assert!(error.contains(part), "{part} is not in: {error}");
     }
-    let error = dataset.views[3].load_image([0.0; 3], ImageMode::InMemory).expect_err("missing").to_string();
+    let error = dataset.views[3].load_covered().expect_err("missing").to_string();
     assert!(error.contains("r_003.png"), "{error}");
     for (i, _) in frames.iter().enumerate() {
         folder.write_rgb(&format!("r_{i:03}.png"), 4, 4);
@@ -138,7 +161,7 @@ fn damaged_images_are_errors_that_name_them() {
     let bytes = fs::read(&view.image).expect("the image");
     for damaged in [&bytes[..bytes.len() / 2], &bytes[..20], b"", b"GIF89a"] {
         folder.write("a.png", damaged);
-        let error = view.load_image([0.0; 3], ImageMode::InMemory).expect_err("damaged");
+        let error = view.load_covered().expect_err("damaged");
         assert!(matches!(error, DatasetError::Image { .. }) && error.to_string().contains("a.png"), "{error}");
     }
 }
@@ -155,7 +178,7 @@ fn jpegs_that_are_not_whole_are_refused() {
     let folder = Folder::new();
     folder.write_rgb("a.jpg", 40, 40);
     let view = view_of(&folder, "a.jpg", 40);
-    assert!(view.load_image([0.0; 3], ImageMode::InMemory).is_ok(), "the whole image");
+    assert!(view.load_covered().is_ok(), "the whole image");
     let bytes = fs::read(&view.image).expect("the image");
     for length in [bytes.len() - 2, bytes.len() - 20, bytes.len() / 2] {
         for end in [&[][..], &[0xff, 0xd9]] {
@@ -163,10 +186,9 @@ fn jpegs_that_are_not_whole_are_refused() {
                 continue;
             }
             folder.write("a.jpg", [&bytes[..length], end].concat());
-            let error = view.load_image([0.0; 3], ImageMode::InMemory).expect_err("cut off");
+            let error = view.load_covered().expect_err("cut off");
             let incomplete = matches!(error, DatasetError::Image(PictureError::Incomplete { .. }));
             assert!(incomplete && error.to_string().contains("a.jpg"), "{length} bytes, then {end:?}: {error}");
-            assert!(view.load_covered().is_err(), "{length} bytes: not to train on, either");
         }
     }
 }
@@ -176,17 +198,17 @@ fn images_far_larger_than_the_camera_file_says_are_not_decoded() {
     let folder = Folder::new();
     let view = view_of(&folder, "a.png", 8);
     folder.write_rgb("a.png", 32, 32);
-    assert!(view.load_image([0.0; 3], ImageMode::InMemory).is_ok(), "four times as large is scaled");
+    assert!(view.load_covered().is_ok(), "four times as large is scaled");
     for (width, height) in [(33, 8), (8, 33), (300, 300)] {
         folder.write_rgb("a.png", width, height);
-        let error = view.load_image([0.0; 3], ImageMode::InMemory).expect_err("too large");
+        let error = view.load_covered().expect_err("too large");
         assert!(matches!(error, DatasetError::Image(PictureError::TooLarge { .. })), "{width} x {height}: {error}");
         let message = error.to_string();
         assert!(message.contains("a.png") && message.contains(&width.to_string()), "{message}");
     }
     let halved = TrainingView { camera: Camera { size: UVec2::splat(1), ..view.camera }, ..view };
     folder.write_rgb("a.png", 8, 8);
-    assert!(halved.load_image([0.0; 3], ImageMode::InMemory).is_ok(), "the camera's own size does not count");
+    assert!(halved.load_covered().is_ok(), "the camera's own size does not count");
 }
 
 #[test]
@@ -198,7 +220,7 @@ fn masks_have_the_same_limits() {
     let with_mask = with(with(with_mask, "/w", json!(8)), "/h", json!(8));
     let path = folder.write_json("transforms_test.json", &with_mask);
     let view = CameraFile::load(&path, &CameraOptions::default()).expect("a valid camera file").remove(0);
-    let message = view.load_image([0.0; 3], ImageMode::InMemory).expect_err("too large").to_string();
+    let message = view.load_covered().expect_err("too large").to_string();
     assert!(message.contains("m.jpg") && message.contains("40 x 40"), "{message}");
 }
 
@@ -218,7 +240,7 @@ fn claiming(folder: &Folder, side: u32) -> Vec<u8> {
 fn a_camera_file_cannot_ask_for_any_size() {
     let folder = Folder::new();
     folder.write("a.png", claiming(&folder, MAX_SIDE));
-    let error = view_of(&folder, "a.png", MAX_SIDE).load_image([0.0; 3], ImageMode::InMemory).expect_err("too much");
+    let error = view_of(&folder, "a.png", MAX_SIDE).load_covered().expect_err("too much");
     assert!(matches!(error, DatasetError::Image(PictureError::FarTooLarge { .. })), "{error}");
     let without_size = json!({"camera_angle_x": 0.8, "frames": [frame("a.png")]});
     let path = folder.write_json("transforms_test.json", &without_size);

@@ -8,8 +8,9 @@ use crate::change::jpeg::Segment;
 use crate::change::png::Chunk;
 use crate::change::{bytes, jpeg, numbers, png};
 use crate::support::random::Random;
-use bevy_gs4d::offline::comparison::{Pair, PairMetrics};
-use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, ImageMode, TrainingView};
+use bevy_gs4d::offline::comparison::Pair;
+use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, TrainingView};
+use bevy_gs4d::offline::metrics::ImageMetrics;
 use bevy_gs4d::view::{Camera, Picture};
 use glam::{Mat4, UVec2, Vec3};
 use image::RgbImage;
@@ -81,23 +82,15 @@ impl Reader for Pictures {
             image: path.clone(),
             mask: Some(path),
         };
-        let loaded = [ImageMode::InMemory, ImageMode::Dataloader].map(|mode| view.load_image([0.2, 0.5, 1.0], mode));
         let covered = view.load_covered();
         let cameras = self.folder.path().join("cameras.json");
         let sized = CameraFile::load(&cameras, &CameraOptions::default());
-        let mut pictures = Vec::new();
-        for image in loaded {
-            match image {
-                Ok(image) => pictures.push(image.picture),
-                Err(error) if covered.is_ok() => return Err(format!("is read in one way and not in another: {error}")),
-                Err(error) => return Ok(Outcome::Refused(error.to_string())),
-            }
-        }
-        match (covered, sized) {
-            (Ok(covered), Ok(_)) => pictures.push(covered.over(Vec3::ZERO)),
-            (Err(error), _) => return Err(format!("is read in one way and not in another: {error}")),
+        let image = match (covered, sized) {
+            (Ok(image), Ok(_)) => image,
+            (Err(error), _) => return Ok(Outcome::Refused(error.to_string())),
             (_, Err(error)) => return Err(format!("is read although its size is not: {error}")),
-        }
+        };
+        let pictures = [Vec3::ZERO, Vec3::new(0.2, 0.5, 1.0)].map(|background| image.over(background));
         pictures.iter().try_for_each(check).map(|()| Outcome::Accepted)
     }
 }
@@ -150,10 +143,12 @@ impl Reader for RawPictures {
     fn read(&self, bytes: &[u8]) -> Result<Outcome, String> {
         let (a, b) = (self.file("one.f32"), self.file("other.f32"));
         fs::write(&b, bytes).expect("the folder can be written to");
-        match PairMetrics::of(&Pair { name: "raw".to_owned(), a, b }, Some(SIZE)) {
-            Ok(metrics) if metrics.psnr.is_nan() || metrics.psnr_pooled.is_nan() || metrics.ssim.is_nan() => {
-                Err(format!("is compared as {metrics:?}"))
-            }
+        let pair = Pair { name: "raw".to_owned(), a, b };
+        let is_finite = |metrics: &ImageMetrics| {
+            [Some(metrics.psnr), Some(metrics.psnr_pooled), metrics.ssim].into_iter().flatten().all(f64::is_finite)
+        };
+        match pair.compare(Some(SIZE)) {
+            Ok(metrics) if !is_finite(&metrics) => Err(format!("is compared as {metrics:?}")),
             Ok(_) => Ok(Outcome::Accepted),
             Err(error) => Ok(Outcome::Refused(error.to_string())),
         }
