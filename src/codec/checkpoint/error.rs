@@ -3,6 +3,7 @@
 //! In: a problem found by the reader. Out: a message of one line that names the problem and, if there is one, the
 //! remedy. [`CodecError`](crate::codec::CodecError) adds the path.
 
+use crate::codec::options::InvalidOption;
 use std::io;
 
 /// Why a checkpoint was not read.
@@ -139,11 +140,6 @@ pub enum CheckpointError {
         at: usize,
     },
     /// An invalid option.
-    #[error("option {name}: {reason}")]
-    Option {
-        /// Name of the option.
-        name: &'static str,
-        /// What is wrong with it.
-        reason: String,
-    },
+    #[error(transparent)]
+    Option(#[from] InvalidOption),
 }

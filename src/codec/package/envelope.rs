@@ -2,8 +2,16 @@
 //!
 //! In: a [`Header`]. Out: magic, version, length, checksum and RON text; and back, checked against the real length of the file.
 
-use super::{Header, MAGIC, PackageError, VERSION};
+use super::error::PackageError;
+use super::header::Header;
 use std::io::{self, Read, Seek, SeekFrom, Write};
+
+/// The first bytes of every package.
+pub const MAGIC: [u8; 4] = *b"GS4D";
+
+/// The format version written, and the only one read. It increases when an old reader could no longer read the fixed
+/// start or the header; smaller changes are listed in [`Header::requires`].
+pub const VERSION: u32 = 1;
 
 /// Bytes before the header: magic, version, header length, checksum.
 const FIXED: u64 = 20;

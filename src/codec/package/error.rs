@@ -3,6 +3,7 @@
 //! In: a problem found by the reader or writer. Out: a [`PackageError`], whose message names the problem and what
 //! helps.
 
+use crate::codec::options::InvalidOption;
 use crate::codec::text::printable;
 
 /// Why a package cannot be read or written. [`CodecError`](crate::codec::CodecError) adds the path.
@@ -154,6 +155,9 @@ pub enum PackageError {
         /// What is wrong with it.
         reason: Box<PackageError>,
     },
+    /// An option that is invalid or contradicts the stored Gaussians.
+    #[error(transparent)]
+    Option(#[from] InvalidOption),
     /// The file could not be read or written.
     #[error(transparent)]
     Io(#[from] std::io::Error),

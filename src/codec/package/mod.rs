@@ -9,44 +9,33 @@
 //! coefficients, temporal filter, environment map, levels of detail, each of which is a package itself. A reader skips
 //! what it does not know, unless the header lists it as required.
 
+mod attribute;
+mod check;
 mod envelope;
 mod error;
 mod header;
 mod layout;
+mod options;
 mod planes;
 mod section;
 
+pub use envelope::{MAGIC, VERSION};
 pub use error::PackageError;
 pub use header::{EnvironmentSize, Header, StoredFilter, StoredForm, StoredLevel};
 pub use section::{FLOAT_PLANES, PACKAGE, Section};
 
-use super::CodecErrorKind;
-use super::checkpoint::CheckpointOptions;
-use super::format::Format;
+use super::options::ReadOptions;
 use crate::scene::{GaussianScene, Level, RuntimeScene, SceneForm};
-use header::{LEVEL, unpacked_limit};
+use attribute::Attribute;
+use check::unpacked_limit;
+use header::LEVEL;
 use rayon::prelude::*;
 use serde::Serialize;
-use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek, Write};
-use std::path::Path;
 use std::sync::Arc;
 
-/// The row of packages in the table of formats.
-pub const FORMAT: Format = Format {
-    name: "a package (.gs4d)",
-    extensions: &["gs4d"],
-    magic: &MAGIC,
-    read: read_file,
-    write: Some(write_scene),
-};
-
-/// The first bytes of every package.
-pub const MAGIC: [u8; 4] = *b"GS4D";
-
-/// The format version written, and the only one read. It increases when an old reader could no longer read the fixed
-/// start or the header; smaller changes are listed in [`Header::requires`].
-pub const VERSION: u32 = 1;
+/// Extensions of packages, without the dot.
+pub const EXTENSIONS: &[&str] = &["gs4d"];
 
 /// Largest number of Gaussians per section: small enough to decode one at a time in little memory, large enough to
 /// compress well.
@@ -97,10 +86,11 @@ impl PackageInfo {
 /// [`PackageError::Inconsistent`] for a scene whose parts do not fit together, [`PackageError::TooLarge`] for one that
 /// compresses so well that a reader would take it for a decompression bomb, and errors of the writer.
 pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), PackageError> {
-    let mut header = Header::of(scene)?;
+    let mut header = Header::of(scene);
+    header.check_writable(scene)?;
     let level = settings.level.clamp(1, 19);
     let is_packed = matches!(header.form, StoredForm::Packed { .. });
-    let rows = |attribute: &layout::Attribute| {
+    let rows = |attribute: &Attribute| {
         if is_packed && attribute.width <= PACKED_WORDS { PACKED_ROWS_PER_SECTION } else { ROWS_PER_SECTION }
     };
     let runs: Vec<_> = header.attributes().into_iter().flat_map(|a| a.runs(rows(&a))).collect();
@@ -219,16 +209,15 @@ fn of_level(index: usize) -> impl FnOnce(PackageError) -> PackageError {
     move |reason| PackageError::Level { index, reason: Box::new(reason) }
 }
 
-/// Reads a package; only the options that replace stored values are used.
-fn read_file(_: &Path, file: BufReader<File>, options: &CheckpointOptions) -> Result<GaussianScene, CodecErrorKind> {
+/// Reads a scene as [`read`] does, and replaces its settings by the options that are given.
+///
+/// # Errors
+/// As [`read`]; options that are invalid or contradict the stored Gaussians.
+pub(super) fn read_with<R: Read + Seek>(reader: R, options: &ReadOptions) -> Result<GaussianScene, PackageError> {
     options.check()?;
-    let mut scene = read(file)?;
-    options.override_stored(&mut scene);
+    let mut scene = read(reader)?;
+    options::apply(options, &mut scene)?;
     Ok(scene)
-}
-
-fn write_scene(writer: &mut dyn Write, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), CodecErrorKind> {
-    Ok(write(writer, scene, settings)?)
 }
 
 /// Reads the header and verifies every checksum, without building the scene.

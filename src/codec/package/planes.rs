@@ -3,7 +3,7 @@
 //! In: rows of 32-bit words. Out: their lowest bytes, then their second ones, and so on; within each plane one
 //! component after the other (`xxxx yyyy zzzz`), so that similar bytes are adjacent; and back.
 
-use super::layout::Attribute;
+use super::attribute::Attribute;
 use std::ops::Range;
 
 /// Rows processed at a time, few enough that they stay in the cache, whatever their width.

@@ -2,8 +2,9 @@
 //!
 //! In: words of a scene. Out: a zstd frame of their byte planes and the entry in the section table; and back, checked.
 
-use super::layout::Attribute;
-use super::{PackageError, planes};
+use super::attribute::Attribute;
+use super::error::PackageError;
+use super::planes;
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
 use std::ops::Range;

@@ -4,8 +4,7 @@
 //! ([`Compared`]).
 
 use super::Bake;
-use crate::codec;
-use crate::codec::checkpoint::CheckpointOptions;
+use crate::codec::{self, ReadOptions};
 use crate::offline::dataset::{Dataset, Split};
 use crate::offline::evaluation::evaluate_scene;
 use crate::offline::metrics::{Evaluation, MetricSet};
@@ -33,7 +32,7 @@ impl Bake<'_> {
     /// missing.
     pub(super) fn compare(&mut self, progress: &mut dyn Progress) -> Result<Option<Compared>, OfflineError> {
         let out = &self.settings.out;
-        let after = codec::load(out, &CheckpointOptions::default())?.into_runtime();
+        let after = codec::load(out, &ReadOptions::default())?.into_runtime();
         let after = after.map_err(|error| OfflineError::at(out, error))?;
         let Some(dataset) = self.test_views(progress) else { return Ok(None) };
         let count = dataset.views.len();
