@@ -3,8 +3,9 @@
 //! In: a [`Gaussian`] and a [`View`]. Out: [`Projected`]; `None` if the Gaussian is not drawn. The steps and their
 //! order are those of the original rasterizer, and of `shaders/project.wgsl`.
 
+use super::lifespan::MARGINAL_CUTOFF;
 use super::overlap::{TileRect, tiles_of};
-use super::{Gaussian, MARGINAL_CUTOFF};
+use super::slice::Gaussian;
 use crate::view::View;
 use glam::{Mat3, Vec2, Vec3, Vec3Swizzles, Vec4};
 

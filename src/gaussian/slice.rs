@@ -2,7 +2,8 @@
 //!
 //! In: raw [`Parameters`]. Out: one [`Gaussian`] each, activated, in capture space, computed in double precision.
 
-use super::{Model, Parameters};
+use super::lifespan::Lifespan;
+use super::parameters::{Model, Parameters};
 use glam::{DMat3, DMat4, DQuat, DVec3, DVec4, Vec3};
 use rayon::prelude::*;
 
@@ -26,23 +27,6 @@ pub struct Gaussian {
     pub opacity: f32,
     /// Unused; zero.
     pub padding: f32,
-}
-
-/// When a Gaussian is there: its envelope in time.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lifespan {
-    /// Temporal mean μ_t, timestamp units.
-    pub mean_t: f32,
-    /// Temporal standard deviation σ_t, timestamp units; infinite if the Gaussian is present at every time.
-    pub sigma_t: f32,
-}
-
-impl Lifespan {
-    /// Returns the unnormalized marginal at `time`, in (0, 1]: the factor on the opacity.
-    pub fn marginal(self, time: f32) -> f32 {
-        let z = (time - self.mean_t) * self.sigma_t.recip();
-        (-0.5 * z * z).exp()
-    }
 }
 
 impl Gaussian {

@@ -13,6 +13,7 @@
 //! (`renderer::Storage::of`), and the form in the header of a package (`codec::package::StoredForm::of`).
 
 use super::packed::{CodedColors, PackedColors, PackedScene};
+use super::sliced::Sliced;
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Lifespan, Model, Parameters, SliceSettings};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -42,15 +43,6 @@ pub enum Form {
     Sliced(Sliced),
     /// Quantized: smaller, and drawn without unpacking.
     Packed(PackedScene),
-}
-
-/// Sliced Gaussians and their color.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Sliced {
-    /// The Gaussians: activated, capture space.
-    pub gaussians: Vec<Gaussian>,
-    /// Their color.
-    pub harmonics: Harmonics,
 }
 
 /// Number of coefficients and degrees of the color of a form.

@@ -3,9 +3,10 @@
 //! In: a [`PackedScene`]. Out: any one Gaussian or color, or all of them as [`Sliced`].
 
 use super::lanes::{self, ALWAYS, AT_REST, BlockRanges, FARTHEST, LANE_MAX, LANES, SharedRanges};
-use super::{PackedColors, PackedScene, shape};
+use super::scene::{PackedColors, PackedScene};
+use super::shape;
 use crate::gaussian::{Gaussian, Lifespan};
-use crate::scene::Sliced;
+use crate::scene::sliced::Sliced;
 use glam::{Quat, Vec3};
 use std::f32::consts::FRAC_1_SQRT_2;
 

@@ -4,9 +4,9 @@
 //! packed already. Out: a [`PackedScene`]. An attribute of fewer than 16 bits leaves the low bits of its lanes zero,
 //! which costs nothing on disk; the largest splats keep all 16, since their errors are the most visible.
 
-use super::lanes::{self, ALWAYS, AT_REST, BlockRanges, FARTHEST, LANE_MAX, SharedRanges};
+use super::lanes::{self, ALWAYS, AT_REST, BLOCK, BlockRanges, FARTHEST, LANE_MAX, SharedRanges};
+use super::scene::{PackedColors, PackedScene};
 use super::shape::{Shape, smallest_three};
-use super::{BLOCK, PackedColors, PackedScene};
 use crate::gaussian::Gaussian;
 use crate::scene::Bounds;
 use rayon::prelude::*;

@@ -6,8 +6,8 @@
 //! Differences are added to what may have any value. A shape is turned and stretched instead: the difference of two covariances, added to
 //! that of a flat Gaussian which has turned a little since, would leave a negative variance.
 
-use super::PackedScene;
 use super::lanes::SharedRanges;
+use super::scene::PackedScene;
 use super::shape::Shape;
 use crate::gaussian::Gaussian;
 use glam::{DMat3, DVec3, Mat3, Vec3};
