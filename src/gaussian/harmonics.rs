@@ -5,7 +5,7 @@
 
 use glam::Vec3;
 
-/// The largest color: huge coefficients and texels stay finite, and so do pictures. As in `shaders/shared/appearance.wgsl`.
+/// The largest color, so that pictures of huge coefficients and texels are finite. As in `shaders/shared/appearance.wgsl`.
 pub const BRIGHTEST: f32 = 1e30;
 
 /// Color coefficients of `N` Gaussians.
@@ -35,7 +35,7 @@ pub enum ShDirection {
 /// Most coefficients per Gaussian and channel: 16 spatial ones for each of three blocks of time.
 pub const MAX_COEFFICIENTS: usize = 48;
 
-/// π with the digits of the original rasterizer.
+/// π, with the digits of the original rasterizer.
 #[expect(clippy::approx_constant, reason = "the original's literal, digit for digit")]
 const PI: f64 = 3.14159265;
 

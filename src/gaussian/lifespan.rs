@@ -3,7 +3,7 @@
 //! In: a temporal mean and deviation, a time. Out: the marginal at that time; the limits below which a Gaussian is not
 //! drawn.
 
-/// A Gaussian whose marginal is not above this is not drawn at that time (strict, as in the original).
+/// A Gaussian is drawn only at times at which its marginal is above this value (strict, as in the original).
 pub const MARGINAL_CUTOFF: f32 = 0.05;
 
 /// Distance in time from the temporal mean at which the marginal falls to [`MARGINAL_CUTOFF`], in temporal deviations:

@@ -10,7 +10,7 @@
 //! ```text
 //! mean(t)     = μ + (c/v)(t − μ_t)          a constant velocity c/v
 //! covariance  = A − c cᵀ/v                  independent of t
-//! marginal(t) = exp(−½ (t − μ_t)²/v)        opacity is multiplied by it
+//! marginal(t) = exp(−½ (t − μ_t)²/v)        a factor on the opacity
 //! ```
 
 pub mod alpha;

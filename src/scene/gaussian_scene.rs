@@ -17,13 +17,13 @@ pub struct GaussianScene {
     pub form: SceneForm,
     /// The environment map, if the capture has one.
     pub environment: Option<Environment>,
-    /// Which Gaussians are active in each segment of time; if `None`, all are.
+    /// The Gaussians that are active in each segment of time; all if `None`.
     pub filter: Option<TemporalFilter>,
-    /// The switches it was trained with, which drawing must repeat.
+    /// The settings it was trained with, which drawing must repeat.
     pub trained_with: TrainedWith,
     /// How it is meant to be played.
     pub playback: PlaybackHints,
-    /// The same capture of fewer Gaussians each, finest first; usually none.
+    /// Levels of detail, which have fewer Gaussians, finest first; usually none.
     pub levels: Vec<Level>,
 }
 
@@ -56,7 +56,7 @@ impl GaussianScene {
     /// Checks that its parts fit together, as [`RuntimeScene::check`] does.
     ///
     /// # Errors
-    /// A description of what does not fit.
+    /// A description of the first part that does not fit.
     pub fn check(&self) -> Result<(), &'static str> {
         self.form.check_parts()?;
         check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())?;

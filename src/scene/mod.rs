@@ -1,4 +1,4 @@
-//! A capture in memory: its Gaussians and their color, an environment map, and how it was trained and is played.
+//! A capture in memory: its Gaussians and their color, an environment map, and its settings of training and playback.
 //!
 //! In: the result of a codec. Out: a [`GaussianScene`] that can be stored, or a [`RuntimeScene`] that can be drawn,
 //! which [`into_runtime`](GaussianScene::into_runtime) returns. They differ in the [forms](SceneForm) that their

@@ -21,20 +21,21 @@ pub struct RuntimeScene {
     pub form: Form,
     /// The environment map, if the capture has one.
     pub environment: Option<Environment>,
-    /// Which Gaussians are active in each segment of time; if `None`, all are.
+    /// The Gaussians that are active in each segment of time; all if `None`.
     pub filter: Option<TemporalFilter>,
-    /// The switches it was trained with.
+    /// The settings it was trained with.
     pub trained_with: TrainedWith,
     /// How it is meant to be played.
     pub playback: PlaybackHints,
-    /// The same capture of fewer Gaussians each, finest first; usually none.
+    /// Levels of detail, which have fewer Gaussians, finest first; usually none.
     pub levels: Vec<Level>,
 }
 
-/// A capture made of fewer Gaussians. It has neither levels nor an environment map nor a temporal filter.
+/// A level of detail: a capture of fewer Gaussians, without levels, environment map and temporal filter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Level {
-    /// The largest size on the screen ([`pixels_across`]) at which it shows nearly the same as all Gaussians, pixels.
+    /// The largest size on the screen ([`pixels_across`](super::pixels_across)) at which it looks nearly the same as all
+    /// Gaussians, pixels.
     pub pixels: f32,
     /// Its Gaussians and their color. The time interval is that of the capture. Shared, because it does not change.
     pub scene: Arc<RuntimeScene>,
@@ -87,10 +88,11 @@ impl RuntimeScene {
     }
 
     /// Checks that its parts fit together, as those of every loaded scene do: lengths, codes, the temporal filter, the
-    /// levels of detail, and that the environment map is finite. Then nothing is read beyond them, here or on a GPU.
+    /// levels of detail, and that the environment map is finite. No index of a checked scene is out of range, here or on
+    /// a GPU.
     ///
     /// # Errors
-    /// A description of what does not fit.
+    /// A description of the first part that does not fit.
     pub fn check(&self) -> Result<(), &'static str> {
         self.form.check_parts()?;
         check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())?;
@@ -160,9 +162,13 @@ mod tests {
     }
 
     #[test]
-    fn levels_that_do_not_fit_are_refused() {
+    fn inconsistent_levels_are_refused() {
         let with = |levels| RuntimeScene { levels, ..empty() };
-        assert_eq!(with(vec![level(64.0, empty()), level(8.0, empty())]).check(), Ok(()), "finest first");
+        assert_eq!(
+            with(vec![level(64.0, empty()), level(8.0, empty())]).check(),
+            Ok(()),
+            "levels of decreasing size are accepted"
+        );
         let map = Environment { width: 1, height: 1, texels: vec![0.0; 3] };
         let other = TrainedWith { time_interval: [0.0, 2.0], ..TrainedWith::default() };
         let bad = [
@@ -181,9 +187,9 @@ mod tests {
             (0..=MAX_LEVELS).map(|index| level(64.0 - index as f32, empty())).collect(),
         ];
         for (index, levels) in bad.into_iter().enumerate() {
-            assert!(with(levels).check().is_err(), "levels {index}");
+            assert!(with(levels).check().is_err(), "the levels with index {index} are refused");
         }
         let surrounded = RuntimeScene { environment: Some(map), ..with(vec![level(8.0, empty())]) };
-        assert!(surrounded.check().is_err(), "an environment map is seen at every size");
+        assert!(surrounded.check().is_err(), "levels of a capture with an environment map are refused");
     }
 }

@@ -64,9 +64,9 @@ pub enum CheckpointError {
         /// The opcode.
         code: u8,
     },
-    /// A Python object that no checkpoint of the trainer contains. Nothing was run.
+    /// A Python object that no checkpoint of the trainer contains. No code of the file was run.
     #[error(
-        "data.pkl, byte {offset}: the file asks for the Python object `{name}`, which no 4DGS checkpoint needs; refused"
+        "data.pkl, byte {offset}: the file names the Python object `{name}`, which no 4DGS checkpoint needs; refused"
     )]
     Global {
         /// Offset in bytes from the start of `data.pkl`.
@@ -89,7 +89,7 @@ pub enum CheckpointError {
         /// The kind of value that is expected.
         expected: &'static str,
     },
-    /// A tensor does not have the shape that the others require.
+    /// A tensor does not have the shape that the other tensors require.
     #[error("slot {index} ({name}) has shape {found:?}, expected {expected}")]
     Shape {
         /// Index in the state tuple, from 0.

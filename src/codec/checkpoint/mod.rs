@@ -83,7 +83,7 @@ pub(super) fn read_file(
     file: BufReader<File>,
     options: &ReadOptions,
 ) -> Result<GaussianScene, CheckpointError> {
-    read(file, options, cfg_args::beside(path).as_deref())
+    read(file, options, cfg_args::read_for(path).as_deref())
 }
 
 /// Returns the convention of a file for which none is given. Code whose backward pass never wrote the time blocks is

@@ -18,7 +18,7 @@ const RAW_FLOOR: u64 = 64 << 20;
 /// Further uncompressed bytes allowed for each byte of the file. Trained captures need 1.2.
 const RAW_PER_BYTE: u64 = 256;
 
-/// Most sections that are read. The writer makes fewer of a hundred million Gaussians.
+/// Largest number of sections that is read. The writer makes fewer for a hundred million Gaussians.
 const MAX_SECTIONS: usize = 1 << 16;
 
 impl Header {
@@ -56,7 +56,7 @@ impl Header {
     /// Returns the bytes that reading takes, without levels of detail. The sections must have been checked.
     pub(super) fn unpacked(&self) -> u64 {
         let attributes = self.attributes();
-        // Beside the scene, one section at a time is decompressed.
+        // In addition to the scene, one section at a time is decompressed.
         let decoded = self.sections.iter().filter(|s| attributes.iter().any(|attribute| attribute.name == s.name));
         let largest = decoded.map(|section| section.raw_length as u64).max().unwrap_or_default();
         scene_memory(&attributes).saturating_add(largest)
@@ -102,16 +102,16 @@ impl Header {
             first.is_finite() && first < last && (last - first).is_finite(),
             "the time interval must be two finite numbers, the first below the second, and not infinitely far apart",
         )?;
-        sane(trained.background.iter().all(|c| c.is_finite()), "a background colour that is not finite")?;
+        sane(trained.background.iter().all(|c| c.is_finite()), "a background color that is not finite")?;
         sane(
             trained.prefilter_var.is_finite() && trained.spatial_lr_scale.is_finite(),
-            "a switch of training (prefilter_var or spatial_lr_scale) that is not finite",
+            "a training setting (prefilter_var or spatial_lr_scale) that is not finite",
         )?;
         sane(
             trained.pixel.is_none_or(|pixel| pixel.is_finite() && pixel > 0.0),
             "a size of the training views' pixels that is not positive and finite",
         )?;
-        sane(trained.spatial_lr_scale >= 0.0, "a switch of training (spatial_lr_scale) that is negative")?;
+        sane(trained.spatial_lr_scale >= 0.0, "a training setting (spatial_lr_scale) that is negative")?;
         sane(
             self.filter.is_none_or(|filter| (1..=MAX_SEGMENTS).contains(&filter.segments)),
             "a temporal filter of no segments, or far too many",
@@ -122,13 +122,13 @@ impl Header {
         sane(duration.is_finite() && duration >= 0.0, "the playback duration must be a finite number, zero or above")
     }
 
-    /// Checks the numbers of color: degrees that exist, and as many coefficients as they need. In codebooks there are
-    /// no others.
+    /// Checks the numbers of color: valid degrees, and at least as many coefficients as they need; exactly as many in
+    /// codebooks.
     fn check_color(&self) -> Result<(), PackageError> {
         let (found, degree, degree_t) = (self.coefficients, self.degree, self.degree_t);
         if degree > 3 || degree_t > 2 || found > MAX_COEFFICIENTS {
             return Err(PackageError::Inconsistent(
-                "colour must have a degree of 0 to 3, a time degree of 0 to 2 and at most 48 coefficients",
+                "color must have a degree of 0 to 3, a time degree of 0 to 2 and at most 48 coefficients",
             ));
         }
         let needed = evaluated(degree, degree_t);

@@ -34,8 +34,8 @@ pub(super) fn write(writer: &mut impl Write, header: &Header) -> Result<u64, Pac
     Ok(file_length)
 }
 
-/// Reads and checks the fixed start and the header. Also returns the length of the whole file; the reader is left at
-/// the first section.
+/// Reads and checks the fixed start and the header. Also returns the length of the whole file; the reader is then
+/// positioned at the first section.
 pub(super) fn read(reader: &mut (impl Read + Seek)) -> Result<(Header, u64), PackageError> {
     let file_length = reader.seek(SeekFrom::End(0))?;
     reader.rewind()?;

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 /// The header of a package. Fields that a reader does not know are ignored.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Header {
-    /// The program that wrote the package, for people.
+    /// The program that wrote the package, for display.
     #[serde(default)]
     pub generator: String,
     /// Features that a reader must know to read the package correctly. A reader refuses those it does not know.
@@ -39,7 +39,7 @@ pub struct Header {
     /// The temporal filter, if there is one.
     #[serde(default)]
     pub filter: Option<StoredFilter>,
-    /// The switches the capture was trained with.
+    /// The settings the capture was trained with.
     pub trained_with: TrainedWith,
     /// How the capture is meant to be played.
     pub playback: PlaybackHints,
@@ -74,7 +74,7 @@ pub enum StoredForm {
     Sliced,
     /// Sliced and quantized.
     Packed {
-        /// Entries of each codebook of color; `None` if the coefficients are whole.
+        /// Number of entries of each codebook of color; `None` if the coefficients are whole.
         codebooks: Option<[u32; MAX_STAGES]>,
     },
 }
@@ -101,7 +101,7 @@ impl StoredForm {
 /// The temporal filter, without its sets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredFilter {
-    /// How the sets were computed.
+    /// The method by which the sets were computed.
     pub kind: FilterKind,
     /// Number of segments of time.
     pub segments: u32,

@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn joining_undoes_splitting_and_leaves_the_rest_alone() {
+    fn joining_reverses_splitting_and_keeps_the_other_columns() {
         let attribute = Attribute { name: "sh_rest", rows: 300, stride: 7, offset: 2, width: 5 };
         let words: Vec<u32> = (0..300 * 7).map(|i: u32| i.wrapping_mul(2_654_435_761)).collect();
         let mut joined = vec![u32::MAX; words.len()];

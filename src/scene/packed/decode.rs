@@ -44,7 +44,7 @@ impl PackedScene {
         }
     }
 
-    /// Decodes when one Gaussian is there, and nothing else of it.
+    /// Decodes the opacity envelope of one Gaussian in time, and no other attribute.
     ///
     /// # Panics
     /// If `index` is out of range.
@@ -52,7 +52,7 @@ impl PackedScene {
         lifespan(&lanes::unpack(self.records[index]), &SharedRanges::read(&self.ranges))
     }
 
-    /// Decodes the scales of one Gaussian, and the rotation of the axes that they are along.
+    /// Decodes the scales of one Gaussian, and the rotation of its axes.
     pub(super) fn shape(&self, index: usize) -> (Vec3, Quat) {
         let record = lanes::unpack(self.records[index]);
         let shared = SharedRanges::read(&self.ranges);

@@ -9,7 +9,7 @@
 //! | `lanes.rs` | the position and the range of each value in a record, for the encoder and the decoder |
 //! | `encode.rs` | from Gaussians to records and ranges |
 //! | `decode.rs` | from records and ranges to Gaussians and colors |
-//! | `rounding.rs` | what packing changes of a Gaussian |
+//! | `rounding.rs` | the change of a Gaussian by packing |
 //! | `shape.rs` | a covariance as scales and a rotation, and back |
 //! | `colors.rs` | colors by codebook, and back |
 

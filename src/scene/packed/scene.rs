@@ -54,11 +54,11 @@ impl PackedScene {
         SHARED_RANGES + BLOCK_RANGES * count.div_ceil(BLOCK)
     }
 
-    /// Checks that the records, ranges and colors fit together and every code has an entry, so that nothing is read
-    /// beside them, here or on a GPU.
+    /// Checks that the records, ranges and colors fit together and every code has an entry, so that no index is out of
+    /// range, here or on a GPU.
     ///
     /// # Errors
-    /// A description of what does not fit.
+    /// A description of the first part that does not fit.
     pub fn check(&self) -> Result<(), &'static str> {
         if self.ranges.len() != Self::range_count(self.len()) {
             return Err("the ranges do not fit the number of Gaussians");
@@ -67,11 +67,11 @@ impl PackedScene {
             return Err("a range that is not finite");
         }
         if !self.records.par_iter().all(|&record| lanes::left_out(record) < 4) {
-            return Err("a rotation that leaves out a component which is none of the four");
+            return Err("a rotation that leaves out a component other than the four");
         }
         match &self.colors {
             PackedColors::Whole(harmonics) if harmonics.is_consistent(self.len()) => Ok(()),
-            PackedColors::Whole(_) => Err("its colours are those of another number of Gaussians"),
+            PackedColors::Whole(_) => Err("its colors are those of another number of Gaussians"),
             PackedColors::Coded(colors) => colors.check(self.len()),
         }
     }
