@@ -13,7 +13,7 @@ use std::path::PathBuf;
 pub struct CodecError {
     /// The file.
     pub path: PathBuf,
-    /// What is wrong with it.
+    /// The reason.
     pub kind: CodecErrorKind,
 }
 

@@ -48,7 +48,7 @@ pub struct ReadOptions {
 pub struct InvalidOption {
     /// Name of the option.
     pub name: &'static str,
-    /// What is wrong with its value.
+    /// Why its value is refused.
     pub reason: String,
 }
 

@@ -77,7 +77,8 @@ impl AddAssign for SplatGradient {
     }
 }
 
-/// The gradient of a loss with respect to the raw parameters of one Gaussian; zero for those that its model lacks.
+/// The gradient of a loss with respect to the raw parameters of one Gaussian; zero for parameters that its model
+/// lacks.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ParameterGradient {
     /// With respect to the mean μ.

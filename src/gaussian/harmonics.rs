@@ -53,7 +53,7 @@ impl Harmonics {
         &self.values[index * self.coefficients * 3..][..self.coefficients * 3]
     }
 
-    /// Lowers the degrees to at most those given and frees the coefficients that are no longer evaluated.
+    /// Lowers the degrees to at most the degrees given and frees the coefficients that are no longer evaluated.
     pub fn truncate(&mut self, degree: u32, degree_t: u32) {
         self.degree = self.degree.min(degree);
         self.degree_t = if self.degree == 3 { self.degree_t.min(degree_t) } else { 0 };

@@ -166,7 +166,7 @@ impl Gaussian {
     /// to 1.
     ///
     /// # Errors
-    /// A description of what is wrong.
+    /// A description of the problem.
     pub fn check(&self) -> Result<(), &'static str> {
         let finite = |values: &[f32]| values.iter().all(|v| v.is_finite());
         if !finite(&self.mean) {

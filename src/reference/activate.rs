@@ -18,7 +18,7 @@ mod tests {
     fn the_list_contains_exactly_the_active_gaussians() {
         let (segments, count) = (3, 70);
         let words = TemporalFilter::words(count) * segments as usize;
-        // Some bits of each word; those beyond the last Gaussian have no meaning.
+        // Some bits of each word; bits beyond the last Gaussian have no meaning.
         let bits: Vec<u32> = (0..words as u32).map(|word| 0x9e37_79b9u32.rotate_left(5 * word)).collect();
         let intervals = (0..count as u32).map(|index| (index % 3) | ((index % 4) << 16)).collect();
         for sets in [ActiveSets::Bits(bits), ActiveSets::Intervals(intervals)] {

@@ -141,7 +141,7 @@ impl TemporalFilter {
         }
     }
 
-    /// Returns the number of active Gaussians among those in the range `own`, for each segment. `own` begins at a
+    /// Returns the number of active Gaussians among the Gaussians in the range `own`, for each segment. `own` begins at a
     /// multiple of 32.
     ///
     /// # Panics

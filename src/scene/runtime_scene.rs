@@ -1,6 +1,6 @@
 //! A scene ready to draw, and its levels of detail.
 //!
-//! In: Gaussians in a form that is drawn, and what belongs to a capture. Out: a [`RuntimeScene`], which returns its
+//! In: Gaussians in a form that is drawn, and the other parts of a capture. Out: a [`RuntimeScene`], which returns its
 //! Gaussians and colors; an error if its parts do not fit together. A [`Level`] is a scene of fewer Gaussians.
 
 use super::detail::{MAX_LEVELS, check_sizes};

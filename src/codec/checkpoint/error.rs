@@ -53,7 +53,7 @@ pub enum CheckpointError {
     Pickle {
         /// Offset in bytes from the start of `data.pkl`.
         offset: usize,
-        /// What is wrong.
+        /// The reason.
         reason: String,
     },
     /// An opcode that no checkpoint of the trainer contains.
@@ -74,7 +74,7 @@ pub enum CheckpointError {
         /// Module and name, as in the pickle.
         name: String,
     },
-    /// The objects in the file are not those of the 4DGS trainer.
+    /// The objects in the file are not the state of the 4DGS trainer.
     #[error("{0}")]
     Layout(String),
     /// A slot of the state tuple holds the wrong kind of value.
@@ -108,7 +108,7 @@ pub enum CheckpointError {
         index: usize,
         /// Name of the attribute in the trainer.
         name: &'static str,
-        /// What is wrong.
+        /// The reason.
         reason: String,
     },
     /// The values of a tensor could not be read, or do not match their checksum.

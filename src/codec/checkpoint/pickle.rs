@@ -148,9 +148,9 @@ mod op {
     pub const LONG_BINGET: u8 = b'j';
 }
 
-/// Largest number of axes of a tensor; those that are read have at most three.
+/// Largest number of axes of a tensor; tensors that are read have at most three.
 const AXES: usize = 8;
-/// Largest length in bytes of a numpy scalar in its text form, in which a byte takes one or two.
+/// Largest length in bytes of a numpy scalar in its text form, which has one or two bytes for each byte of the scalar.
 const SCALAR_TEXT: usize = 16;
 
 /// The stack machine that interprets a pickle.

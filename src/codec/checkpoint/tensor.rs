@@ -29,7 +29,7 @@ impl Tensor<'_> {
     /// Checks that the tensor lies within its storage, and returns its number of values.
     ///
     /// # Errors
-    /// A description of what is wrong.
+    /// A description of the problem.
     pub(super) fn check(&self) -> Result<u64, &'static str> {
         let beyond = "reaches beyond the end of its storage";
         let count = self.size.iter().try_fold(1u64, |product, &size| product.checked_mul(size)).ok_or(beyond)?;

@@ -20,7 +20,7 @@ pub struct Header {
     /// The program that wrote the package, for display.
     #[serde(default)]
     pub generator: String,
-    /// Features that a reader must know to read the package correctly. A reader refuses those it does not know.
+    /// Features that a reader must know to read the package correctly. A reader refuses unknown features.
     #[serde(default)]
     pub requires: Vec<String>,
     /// The form of the Gaussians.
@@ -121,7 +121,7 @@ pub struct EnvironmentSize {
     pub height: u32,
 }
 
-/// The field that is parsed before all others.
+/// The field that is parsed before the other fields.
 #[derive(Deserialize)]
 struct Requirements {
     #[serde(default)]

@@ -12,15 +12,23 @@ use crate::scene::GaussianScene;
 /// The first option that the stored Gaussians depend on and whose value is not the stored one.
 pub(super) fn apply(options: &ReadOptions, scene: &mut GaussianScene) -> Result<(), InvalidOption> {
     let stored = &mut scene.trained_with;
-    let differing = [
-        ("time interval", options.time_interval.is_some_and(|given| given != stored.time_interval)),
-        ("rotation convention", options.rotation_convention.is_some_and(|given| given != stored.rotation_convention)),
-        ("force SH 3D", options.force_sh_3d.is_some_and(|given| given != stored.force_sh_3d)),
-        ("prefilter variance", options.prefilter_var.is_some_and(|given| given != stored.prefilter_var)),
+    let differs = [
+        ("time interval", "time-interval", options.time_interval.is_some_and(|given| given != stored.time_interval)),
+        (
+            "rotation convention",
+            "rotation-convention",
+            options.rotation_convention.is_some_and(|given| given != stored.rotation_convention),
+        ),
+        ("force SH 3D", "force-sh-3d", options.force_sh_3d.is_some_and(|given| given != stored.force_sh_3d)),
+        (
+            "prefilter variance",
+            "prefilter-var",
+            options.prefilter_var.is_some_and(|given| given != stored.prefilter_var),
+        ),
     ];
-    if let Some((name, _)) = differing.into_iter().find(|(_, differs)| *differs) {
-        let reason = "the package was made with another value: convert its checkpoint again with this option";
-        return Err(InvalidOption { name, reason: reason.to_owned() });
+    if let Some((name, argument, _)) = differs.into_iter().find(|(_, _, differs)| *differs) {
+        let remedy = format!("convert its checkpoint again, with gs4d convert --{argument}");
+        return Err(InvalidOption { name, reason: format!("the package was made with another value; {remedy}") });
     }
     stored.background = options.background.unwrap_or(stored.background);
     stored.raster_fov = options.raster_fov.unwrap_or(stored.raster_fov);
@@ -60,10 +68,14 @@ mod tests {
         let found = (trained.background, trained.raster_fov, trained.cameras, trained.sh_direction);
         let expected = ([0.25; 3], RasterFov::Corrected, TrainedCameras::Intrinsics, ShDirection::Displaced);
         assert_eq!(found, expected, "the training settings are replaced");
-        assert_eq!((changed.playback.up, changed.playback.duration_seconds), (UpAxis::NegY, 3.0), "playback settings");
+        assert_eq!(
+            (changed.playback.up, changed.playback.duration_seconds),
+            (UpAxis::NegY, 3.0),
+            "the playback settings are replaced"
+        );
         let mut same = scene();
         apply(&ReadOptions::default(), &mut same).expect("no option is given");
-        assert_eq!(same, scene(), "without options nothing changes");
+        assert_eq!(same, scene(), "without options the scene is unchanged");
     }
 
     #[test]

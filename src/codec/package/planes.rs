@@ -6,7 +6,7 @@
 use super::attribute::Attribute;
 use std::ops::Range;
 
-/// Rows processed at a time, few enough that they stay in the cache, whatever their width.
+/// Rows processed at a time, few enough that they stay in the cache for any width.
 const TILE: usize = 64;
 
 /// Returns the planes of some rows of an attribute within the table `words`.
