@@ -147,7 +147,8 @@ fn cover(extents: &mut [Extent], gaussian: &Gaussian, [start, end]: [f64; 2]) {
     let reach = reach + ROUNDING * (mean.abs() + velocity.abs() * farthest + reach);
     let length = (end - start) / extents.len() as f64;
     let stretch = |time: f64| (((time - start) / length) as usize).min(extents.len() - 1);
-    for index in stretch(first)..=stretch(last) {
+    let drawn_in = stretch(first)..=stretch(last);
+    for index in drawn_in {
         let from = first.max(start + index as f64 * length);
         let to = last.min(start + (index + 1) as f64 * length);
         for time in [from, to] {

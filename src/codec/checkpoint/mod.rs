@@ -1,7 +1,6 @@
 //! Checkpoints (`.pth`) of the original 4DGS trainer, read without Python.
 //!
-//! In: a seekable file, [`ReadOptions`](crate::codec::ReadOptions), and the text of `cfg_args`. Out: a
-//! [`GaussianScene`] in the trained form.
+//! In: a seekable file, [`ReadOptions`], and the text of `cfg_args`. Out: a [`GaussianScene`] in the trained form.
 //!
 //! ```text
 //! Archive   the zip: its entries, none of which may be compressed or beyond the end of the file
