@@ -2,11 +2,13 @@
 //!
 //! In: a file. Out: its properties, its bounds, and for packages every section and whether its checksum is right.
 
-use super::args::{CheckpointArgs, file_size, is_package};
+use super::args::{CheckpointArgs, file_size};
 use super::failure::Failure;
 use super::report::{Report, switches, switches_json};
 use super::table::{Table, bytes, lines};
-use crate::codec::package::{self, PackageInfo, StoredForm, StoredLevel};
+use crate::codec;
+use crate::codec::format::Format;
+use crate::codec::package::{PackageInfo, StoredForm, StoredLevel};
 use crate::codec::text::printable;
 use crate::gaussian::Model;
 use crate::offline::convert::form_name;
@@ -17,7 +19,6 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::HashMap;
 use std::fmt;
-use std::fs::File;
 use std::path::PathBuf;
 
 /// Show what a checkpoint (.pth) or package (.gs4d) holds, and verify every checksum of a package.
@@ -74,12 +75,12 @@ impl Info {
     /// The file cannot be read. Damaged sections and Gaussians that cannot be drawn are a report with a failure.
     pub fn run(&self) -> Result<Report, Failure> {
         let size = file_size(&self.file)?;
-        let package = if is_package(&self.file) { Some(self.inspect()?) } else { None };
+        let (format, package) = codec::inspect(&self.file)?;
         if let Some(info) = package.as_ref().filter(|info| !info.is_intact()) {
             let (damaged, all) = (info.damaged.len(), info.header.sections.len());
             let message = format!("{damaged} of {all} sections are damaged; copy or download the package again");
             let failure = Failure::about(&self.file, &message);
-            return Ok(self.report(size, &Facts::of_package(info), package.as_ref(), None, Some(failure)));
+            return Ok(self.report(size, format, &Facts::of_package(info), package.as_ref(), None, Some(failure)));
         }
         let scene = self.checkpoint.load(&self.file)?;
         let facts = Facts::of_scene(&scene);
@@ -91,24 +92,21 @@ impl Info {
             }
             Err(error) => (None, Some(Failure::at(&self.file, &error))),
         };
-        Ok(self.report(size, &facts, package.as_ref(), extent, failure))
-    }
-
-    fn inspect(&self) -> Result<PackageInfo, Failure> {
-        let file = File::open(&self.file).map_err(|error| Failure::at(&self.file, &error))?;
-        package::inspect(file).map_err(|error| Failure::at(&self.file, &error))
+        Ok(self.report(size, format, &facts, package.as_ref(), extent, failure))
     }
 
     fn report(
         &self,
         size: u64,
+        format: Format,
         facts: &Facts,
         package: Option<&PackageInfo>,
         extent: Option<Extent>,
         failure: Option<Failure>,
     ) -> Report {
-        let format = package.map_or("checkpoint".to_owned(), |info| format!("package, version {}", info.version));
-        let mut pairs = vec![("file", self.file.display().to_string()), ("format", format), ("size", bytes(size))];
+        let version = package.map(|info| format!(", version {}", info.version)).unwrap_or_default();
+        let name = format!("{}{version}", format.id);
+        let mut pairs = vec![("file", self.file.display().to_string()), ("format", name), ("size", bytes(size))];
         pairs.extend(facts.pairs());
         if let Some(Extent { all, core }) = &extent {
             pairs.extend([("bounds", corners(all)), ("middle", corners(core))]);
@@ -119,7 +117,7 @@ impl Info {
         }
         let json = json!({
             "file": self.file.display().to_string(),
-            "format": if package.is_some() { "package" } else { "checkpoint" },
+            "format": format.id,
             "bytes": size,
             "gaussians": facts.gaussians,
             "form": facts.form,

@@ -1,9 +1,8 @@
 //! Errors of reading and writing files, with the path of the file.
 //!
-//! In: a codec's own error. Out: a [`CodecError`], displayed as `PATH: reason`.
+//! In: the error of a format. Out: a [`CodecError`], displayed as `PATH: reason`.
 
 use super::checkpoint::CheckpointError;
-use super::format;
 use super::package::PackageError;
 use std::io;
 use std::path::PathBuf;
@@ -14,7 +13,7 @@ use std::path::PathBuf;
 pub struct CodecError {
     /// The file.
     pub path: PathBuf,
-    /// What is wrong with it.
+    /// The reason.
     pub kind: CodecErrorKind,
 }
 
@@ -24,9 +23,9 @@ pub enum CodecErrorKind {
     /// The system could not open, read or write the file.
     #[error(transparent)]
     Io(#[from] io::Error),
-    /// The file does not start like any format that can be read.
-    #[error("{}", format::none_of_them())]
-    UnknownFormat,
+    /// The file does not start like a file of any known format; the message names the known formats.
+    #[error("{0}")]
+    UnknownFormat(String),
     /// A checkpoint that cannot be read.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),

@@ -1,6 +1,6 @@
 //! Alpha: the opacity of a splat at a pixel, and the step that blends it.
 //!
-//! In: conic and opacity of a splat, the offset of a pixel from its center, the transmittance left at the pixel. Out:
+//! In: conic and opacity of a splat, the offset of a pixel from its center, the remaining transmittance of the pixel. Out:
 //! its alpha, or the result of blending it ([`BlendStep`]), as the original rasterizer computes them. The CPU reference
 //! of `shaders/shared/alpha.wgsl`; picking uses [`visible`] too.
 
@@ -18,7 +18,7 @@ pub const TRANSMITTANCE_MIN: f32 = 1e-4;
 pub enum BlendStep {
     /// The splat is skipped: its alpha is too small.
     Skip,
-    /// Blending stops: neither this splat nor any after it is blended.
+    /// Blending stops: neither this splat nor a later one is blended.
     Stop,
     /// The splat is blended.
     Blend {
@@ -29,7 +29,7 @@ pub enum BlendStep {
     },
 }
 
-/// Blends one splat over a pixel that has `transmittance` left. The other arguments are those of [`alpha_at`].
+/// Blends one splat over a pixel with the remaining `transmittance`. The other arguments are those of [`alpha_at`].
 pub fn blend_step(conic: Vec3, opacity: f32, offset: Vec2, transmittance: f32) -> BlendStep {
     let Some(alpha) = alpha_at(conic, opacity, offset) else { return BlendStep::Skip };
     let left = transmittance * (1.0 - alpha);
@@ -55,7 +55,7 @@ pub fn visible(alpha: f32) -> Option<f32> {
 }
 
 /// Returns the largest squared Mahalanobis distance from its center at which a splat of this opacity is not skipped;
-/// negative if it always is.
+/// negative if the splat is always skipped.
 ///
 /// `opacity · exp(−½ d²) ≥ 1/255` needs `d² ≤ 2 ln(255 opacity)`.
 pub fn reach_squared(opacity: f32) -> f32 {
@@ -70,27 +70,38 @@ mod tests {
     const CONIC: Vec3 = Vec3::new(1.0, 0.0, 1.0);
 
     #[test]
-    fn a_splat_is_skipped_blended_or_stopped_before() {
+    fn a_blend_step_skips_blends_or_stops() {
         let step = |opacity, offset, transmittance| blend_step(CONIC, opacity, offset, transmittance);
         assert_eq!(
             step(0.5, Vec2::ZERO, 0.5),
             BlendStep::Blend { weight: 0.25, transmittance: 0.25 },
-            "half of the half that is left"
+            "half of the remaining transmittance is the weight"
         );
-        assert_eq!(step(0.003, Vec2::ZERO, 1.0), BlendStep::Skip, "an opacity below 1/255");
-        assert_eq!(step(1.0, Vec2::new(0.0, 3.4), 1.0), BlendStep::Skip, "too far away");
-        assert_eq!(step(1.0, Vec2::ZERO, 0.005), BlendStep::Stop, "a hundredth of it is less than 1e-4");
+        assert_eq!(step(0.003, Vec2::ZERO, 1.0), BlendStep::Skip, "an alpha below 1/255 is skipped");
+        assert_eq!(step(1.0, Vec2::new(0.0, 3.4), 1.0), BlendStep::Skip, "a splat too far away is skipped");
+        assert_eq!(
+            step(1.0, Vec2::ZERO, 0.005),
+            BlendStep::Stop,
+            "blending stops before the transmittance falls below 1e-4"
+        );
         let saddle = Vec3::new(1.0, 2.0, 1.0);
-        assert_eq!(alpha_at(saddle, 0.5, Vec2::new(1.0, -1.0)), None, "a power above 0");
+        assert_eq!(alpha_at(saddle, 0.5, Vec2::new(1.0, -1.0)), None, "a positive exponent is skipped");
     }
 
     #[test]
-    fn alpha_ends_where_it_can_reach_no_farther() {
+    fn a_splat_is_skipped_beyond_its_reach() {
         for opacity in [0.005, 0.1, 1.0] {
             let reach = reach_squared(opacity).sqrt();
-            assert!(alpha_at(CONIC, opacity, Vec2::X * reach * 0.999).is_some(), "inside, at opacity {opacity}");
-            assert_eq!(alpha_at(CONIC, opacity, Vec2::X * reach * 1.001), None, "outside, at opacity {opacity}");
+            assert!(
+                alpha_at(CONIC, opacity, Vec2::X * reach * 0.999).is_some(),
+                "blended inside its reach, at opacity {opacity}"
+            );
+            assert_eq!(
+                alpha_at(CONIC, opacity, Vec2::X * reach * 1.001),
+                None,
+                "skipped outside its reach, at opacity {opacity}"
+            );
         }
-        assert!(reach_squared(0.003) < 0.0, "what is always skipped reaches nowhere");
+        assert!(reach_squared(0.003) < 0.0, "a splat that is always skipped has a negative reach");
     }
 }

@@ -5,7 +5,7 @@
 //! to its splat ([`SplatGradient`]). Out: the gradient with respect to each raw parameter ([`ParameterGradient`]), in
 //! double precision: back through color, projection, slice and activation, as in sections 7.2 to 7.5 of the 4DGS model.
 //!
-//! Decisions are constant: what is not drawn, which rays and colors are clamped. `g_x` is the gradient with respect to
+//! Decisions are held constant: which Gaussians are not drawn, and which rays and colors are clamped. `g_x` is the gradient with respect to
 //! `x`.
 
 use super::projection::{FRUSTUM_CLAMP, LOW_PASS};
@@ -15,19 +15,19 @@ use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 use std::f64::consts::TAU;
 use std::ops::AddAssign;
 
-/// Which gradient is computed. Default: [`Exact`](Self::Exact).
+/// The gradient that is computed. Default: [`Exact`](Self::Exact).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum GradientMode {
     /// The derivative of the picture, with all decisions held fixed.
     #[default]
     Exact,
-    /// What the original's backward pass returns, with the deviations of section 7.5 of the 4DGS model: only to repeat
-    /// its training.
+    /// The gradient of the original's backward pass, with the deviations of section 7.5 of the 4DGS model: only to
+    /// repeat its training.
     Compat,
 }
 
-/// How the view was drawn, and which gradient is computed.
+/// The settings with which the view was drawn, and the gradient that is computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GradientSettings {
     /// Settings with which the Gaussians were sliced.
@@ -39,13 +39,13 @@ pub struct GradientSettings {
     /// Whether the capture was trained without temporal harmonics although it is 4D. Matters to
     /// [`Compat`](GradientMode::Compat) only.
     pub force_sh_3d: bool,
-    /// Which gradient is computed.
+    /// The gradient that is computed.
     pub mode: GradientMode,
 }
 
 impl GradientSettings {
     /// Returns whether the color's gradient is taken in the direction of the conditional mean and flows through the
-    /// slice; if not, it is that of the mean μ alone (deviation 3 of section 7.5).
+    /// slice; otherwise it is that of the mean μ alone (deviation 3 of section 7.5).
     fn is_displaced(&self) -> bool {
         self.sh_direction == ShDirection::Displaced || self.mode == GradientMode::Compat
     }
@@ -77,7 +77,8 @@ impl AddAssign for SplatGradient {
     }
 }
 
-/// The gradient of a loss with respect to the raw parameters of one Gaussian; zero for those that its model lacks.
+/// The gradient of a loss with respect to the raw parameters of one Gaussian; zero for parameters that its model
+/// lacks.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ParameterGradient {
     /// With respect to the mean μ.
@@ -135,8 +136,8 @@ pub fn parameter_gradient(
     gradient
 }
 
-/// Returns the gradient with respect to the raw parameters of the Gaussian at `index`, from that of a loss on what no view
-/// changes: with respect to its velocity c/v and to its peak opacity. Coefficients of color are left out.
+/// Returns the gradient with respect to the raw parameters of the Gaussian at `index`, from that of a loss that does not
+/// depend on a view: with respect to its velocity c/v and its peak opacity. Coefficients of color are omitted.
 ///
 /// # Panics
 /// As [`parameter_gradient`].
@@ -151,8 +152,8 @@ pub fn slice_gradient(parameters: &Parameters, index: usize, velocity: DVec3, op
 
 /// A Gaussian at the time of a view, activated and sliced in double precision (section 2 of the 4DGS model).
 ///
-/// All models are one here: a 3D rotation is the 4D rotation by two equal quaternions, which leaves time alone, and a
-/// Gaussian that is present at every time is always at its temporal mean.
+/// All models have one form here: a 3D rotation is the 4D rotation by two equal quaternions, which does not change time,
+/// and a Gaussian that is present at every time is always at its temporal mean.
 struct Moment {
     model: Model,
     /// Mean μ, capture space.
@@ -309,7 +310,7 @@ fn through_projection(gaussian: &Moment, view: &View, mode: GradientMode, splat:
         g_q += DVec2::select(free, g_ray, DVec2::ZERO).extend(0.0);
         g_q.z -= (focal.x * g_jx.x + focal.y * g_jy.y) / squared + 2.0 * ray.dot(g_ray);
         if mode == GradientMode::Exact {
-            // A clamped ray still gets longer with depth.
+            // The length of a clamped ray still depends on depth.
             g_q.z += ray.dot(DVec2::select(free, DVec2::ZERO, g_ray));
         }
     }
@@ -326,7 +327,7 @@ fn through_projection(gaussian: &Moment, view: &View, mode: GradientMode, splat:
     (g_covariance, g_mean)
 }
 
-/// Gradients of what the color depends on.
+/// Gradients with respect to the inputs of the color.
 struct ColorGradient {
     /// With respect to all coefficients.
     harmonics: Vec<f64>,
@@ -336,7 +337,7 @@ struct ColorGradient {
     point: DVec3,
 }
 
-/// Returns the gradients with respect to what the color depends on: section 7.3 of the 4DGS model.
+/// Returns the gradients with respect to the inputs of the color: section 7.3 of the 4DGS model.
 fn through_color(
     gaussian: &Moment,
     harmonics: &Harmonics,
@@ -382,7 +383,7 @@ fn through_color(
     };
     let mean_t = match settings.mode {
         GradientMode::Exact => (1..=last).map(slope_t).sum::<f64>(),
-        // Of the wrong sign, and only that of the last harmonic.
+        // The original has the wrong sign, and only the last harmonic.
         GradientMode::Compat if last > 0 => -slope_t(last),
         GradientMode::Compat => 0.0,
     };
@@ -414,7 +415,7 @@ fn through_slice(
 ) -> ParameterGradient {
     let Moment { model, dt, coupling: c, variance_t: v, variance_marginal, marginal, opacity, .. } = *gaussian;
     let compat = settings.mode == GradientMode::Compat;
-    // Without a 4D rotation the original lets no gradient through the marginal, and leaves it out of the opacity's.
+    // Without a 4D rotation the original has no gradient through the marginal, and omits it as a factor on that of the opacity.
     let ignores_marginal = compat && model != Model::Rotated4d;
     let (g_opacity, g_exponent) = if ignores_marginal {
         (g_splat_opacity, 0.0)
@@ -425,7 +426,7 @@ fn through_slice(
     let g_variance = g_exponent * dt * dt / (2.0 * variance_marginal * variance_marginal);
     let g_mean_t = g_exponent * dt / variance_marginal - g_mean.dot(c) / v;
     let shape = through_sigma(gaussian, g_covariance, g_mean * dt, g_variance);
-    // The original leaves out the modifier.
+    // The original omits the modifier.
     let modifier = if compat { f64::from(settings.slice.scale_modifier) } else { 1.0 };
     ParameterGradient {
         mean: g_mean.to_array(),
@@ -543,18 +544,24 @@ mod tests {
     use crate::gaussian::harmonics;
 
     #[test]
-    fn the_basis_is_that_of_the_color_and_its_slopes_are_its_derivatives() {
+    fn the_basis_matches_the_color_and_its_slopes_are_its_derivatives() {
         let direction = DVec3::new(0.36, -0.48, 0.8);
         let (values, slopes) = basis(direction);
         for (k, (single, double)) in harmonics::basis(direction.as_vec3()).into_iter().zip(values).enumerate() {
-            assert!((f64::from(single) - double).abs() < 1e-6, "value {k}: {double} is {single}");
+            assert!(
+                (f64::from(single) - double).abs() < 1e-6,
+                "value {k}: {double} in double, {single} in single precision"
+            );
         }
         let step = 1e-5;
         for (i, axis) in DVec3::AXES.into_iter().enumerate() {
             let (before, after) = (basis(direction - axis * step).0, basis(direction + axis * step).0);
             for (k, slope) in slopes.iter().enumerate() {
                 let quotient = (after[k] - before[k]) / (2.0 * step);
-                assert!((slope[i] - quotient).abs() < 1e-8, "slope {k} along axis {i}: {slope} is {quotient}");
+                assert!(
+                    (slope[i] - quotient).abs() < 1e-8,
+                    "slope {k} along axis {i}: {slope}, difference quotient {quotient}"
+                );
             }
         }
     }

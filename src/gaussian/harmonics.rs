@@ -5,7 +5,7 @@
 
 use glam::Vec3;
 
-/// The largest color: huge coefficients and texels stay finite, and so do pictures. As in `shaders/shared/appearance.wgsl`.
+/// The largest color, so that pictures of huge coefficients and texels are finite. As in `shaders/shared/appearance.wgsl`.
 pub const BRIGHTEST: f32 = 1e30;
 
 /// Color coefficients of `N` Gaussians.
@@ -35,7 +35,7 @@ pub enum ShDirection {
 /// Most coefficients per Gaussian and channel: 16 spatial ones for each of three blocks of time.
 pub const MAX_COEFFICIENTS: usize = 48;
 
-/// π with the digits of the original rasterizer.
+/// π, with the digits of the original rasterizer.
 #[expect(clippy::approx_constant, reason = "the original's literal, digit for digit")]
 const PI: f64 = 3.14159265;
 
@@ -53,7 +53,7 @@ impl Harmonics {
         &self.values[index * self.coefficients * 3..][..self.coefficients * 3]
     }
 
-    /// Lowers the degrees to at most those given and frees the coefficients that are no longer evaluated.
+    /// Lowers the degrees to at most the degrees given and frees the coefficients that are no longer evaluated.
     pub fn truncate(&mut self, degree: u32, degree_t: u32) {
         self.degree = self.degree.min(degree);
         self.degree_t = if self.degree == 3 { self.degree_t.min(degree_t) } else { 0 };

@@ -10,13 +10,14 @@
 //! ```text
 //! mean(t)     = μ + (c/v)(t − μ_t)          a constant velocity c/v
 //! covariance  = A − c cᵀ/v                  independent of t
-//! marginal(t) = exp(−½ (t − μ_t)²/v)        opacity is multiplied by it
+//! marginal(t) = exp(−½ (t − μ_t)²/v)        a factor on the opacity
 //! ```
 
 pub mod alpha;
 pub(crate) mod eigen;
 mod gradient;
 pub mod harmonics;
+mod lifespan;
 pub mod overlap;
 mod parameters;
 pub mod projection;
@@ -26,11 +27,7 @@ pub use gradient::{
     GradientMode, GradientSettings, ParameterGradient, SplatGradient, parameter_gradient, slice_gradient,
 };
 pub use harmonics::{Harmonics, ShDirection};
+pub(crate) use lifespan::LIFESPAN;
+pub use lifespan::{Lifespan, MARGINAL_CUTOFF};
 pub use parameters::{Model, Parameters};
-pub use slice::{Gaussian, InvalidGaussian, Lifespan, SliceSettings, rotation_4d};
-
-/// A Gaussian whose marginal is not above this is not drawn at that time (strict, as in the original).
-pub const MARGINAL_CUTOFF: f32 = 0.05;
-/// Temporal deviations from its mean after which a Gaussian is no longer drawn: the marginal falls to its cut-off at sqrt(−2 ln 0.05) =
-/// 2.4477.
-pub(crate) const LIFESPAN: f64 = 2.4478;
+pub use slice::{Gaussian, InvalidGaussian, SliceSettings, rotation_4d};

@@ -56,7 +56,7 @@ pub fn tiles_of(center: Vec2, radius: f32, grid: UVec2) -> TileRect {
 /// on the screen (xx, xy, yy) in pixels squared.
 ///
 /// [`reach_squared`] gives an ellipse `dᵀ conic d ≤ e`, whose bounding box is `|dx| ≤ sqrt(e · xx)`,
-/// `|dy| ≤ sqrt(e · yy)`. Leaving out the other tiles changes no pixel: `blend` would skip the splat there.
+/// `|dy| ≤ sqrt(e · yy)`. Omitting the other tiles changes no pixel: `blend` would skip the splat there.
 pub fn contributing_tiles(tiles: TileRect, center: Vec2, covariance: Vec3, opacity: f32) -> TileRect {
     let Vec3 { x: xx, y: xy, z: yy } = covariance;
     if Mat2::from_cols_array(&[xx, xy, xy, yy]).determinant() <= 0.0 {
@@ -94,10 +94,10 @@ mod tests {
         let rect = TileRect { low: UVec2::new(2, 1), high: UVec2::new(4, 3) };
         let tiles: Vec<UVec2> = rect.tiles().collect();
         assert_eq!(tiles, [[2, 1], [3, 1], [2, 2], [3, 2]].map(UVec2::from), "row by row");
-        assert_eq!(rect.count(), 4, "as many as are listed");
+        assert_eq!(rect.count(), 4, "the count is the number of listed tiles");
         let grid = UVec2::new(5, 3);
         for tile in tiles {
-            assert_eq!(tile_at(tile_index(tile, grid), grid), tile, "the index leads back");
+            assert_eq!(tile_at(tile_index(tile, grid), grid), tile, "the tile follows from its index");
         }
         for empty in [TileRect::EMPTY, TileRect { low: UVec2::new(3, 0), high: UVec2::new(2, 4) }] {
             assert!(empty.is_empty() && empty.count() == 0 && empty.tiles().next().is_none(), "{empty:?} is empty");
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn tiles_left_out_have_no_visible_pixel() {
+    fn omitted_tiles_have_no_visible_pixel() {
         let (center, grid) = (Vec2::new(61.3, 40.9), UVec2::splat(8));
         let square = tiles_of(center, 60.0, grid);
         for covariance in [Vec3::new(9.0, 0.0, 9.0), Vec3::new(400.0, -90.0, 30.0), Vec3::new(0.5, 0.1, 120.0)] {
@@ -113,14 +113,14 @@ mod tests {
             let conic = Vec3::new(yy, -xy, xx) / (xx * yy - xy * xy);
             for opacity in [0.003, 0.005, 0.1, 1.0] {
                 let part = contributing_tiles(square, center, covariance, opacity);
-                assert!(part.count() < square.count(), "something is left out at opacity {opacity}");
-                assert_eq!(part.is_empty(), opacity < 0.0039, "alpha reaches 1/255 from opacity 1/255 on");
+                assert!(part.count() < square.count(), "some tiles are omitted at opacity {opacity}");
+                assert_eq!(part.is_empty(), opacity < 0.0039, "without tiles exactly if the opacity is below 1/255");
                 let inside = |tile: UVec2| tile.cmpge(part.low).all() && tile.cmplt(part.high).all();
                 for tile in square.tiles().filter(|&tile| !inside(tile)) {
                     let pixels = (0..TILE_SIZE * TILE_SIZE).map(|i| tile_at(i, UVec2::splat(TILE_SIZE)));
                     for pixel in pixels.map(|within| tile * TILE_SIZE + within) {
                         let alpha = alpha_at(conic, opacity, center - pixel.as_vec2());
-                        assert_eq!(alpha, None, "pixel {pixel} at opacity {opacity}");
+                        assert_eq!(alpha, None, "the splat is skipped at pixel {pixel}, at opacity {opacity}");
                     }
                 }
             }

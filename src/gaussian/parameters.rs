@@ -25,7 +25,7 @@ pub struct Parameters {
     pub opacity_logit: Vec<f32>,
 }
 
-/// Which of the three models of the original code the parameters belong to.
+/// The model of the original code that the parameters belong to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Model {
     /// Plain 3D Gaussians (`gaussian_dim` 3): present at every time, at rest.

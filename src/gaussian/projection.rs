@@ -3,8 +3,9 @@
 //! In: a [`Gaussian`] and a [`View`]. Out: [`Projected`]; `None` if the Gaussian is not drawn. The steps and their
 //! order are those of the original rasterizer, and of `shaders/project.wgsl`.
 
+use super::lifespan::MARGINAL_CUTOFF;
 use super::overlap::{TileRect, tiles_of};
-use super::{Gaussian, MARGINAL_CUTOFF};
+use super::slice::Gaussian;
 use crate::view::View;
 use glam::{Mat3, Vec2, Vec3, Vec3Swizzles, Vec4};
 
@@ -97,13 +98,14 @@ pub fn project_with(gaussian: &Gaussian, view: &View, clip: &[Vec4; 2]) -> Optio
 }
 
 /// Returns the factor on the opacity of a splat that the low-pass makes larger than it was in training: the square root of the ratio of
-/// the determinants of its covariances, so that it covers as much as it did. The original has none, so that what is far away grows. 1 up
-/// to the size of a pixel in training, and in every view without anti-aliasing. `per_unit` is in pixels for each camera unit.
+/// the determinants of its covariances, so that the integral of its alpha stays the same. The original has no such factor, so that
+/// distant captures look thicker. The factor is 1 up to the size of a pixel in training, and in every view without anti-aliasing.
+/// `per_unit` is in pixels per camera unit.
 fn compensation(view: &View, per_unit: Vec2, covariance: Vec3, det: f32) -> f32 {
     let trained = view.trained_variance() * LOW_PASS * per_unit * per_unit;
     let wider = (LOW_PASS - trained).max(Vec2::ZERO);
     if wider == Vec2::ZERO {
-        // Exactly, whatever the rounding.
+        // Exactly 1, without rounding errors.
         return 1.0;
     }
     let before = (covariance.x - wider.x) * (covariance.z - wider.y) - covariance.y * covariance.y;

@@ -2,7 +2,8 @@
 //!
 //! In: raw [`Parameters`]. Out: one [`Gaussian`] each, activated, in capture space, computed in double precision.
 
-use super::{Model, Parameters};
+use super::lifespan::Lifespan;
+use super::parameters::{Model, Parameters};
 use glam::{DMat3, DMat4, DQuat, DVec3, DVec4, Vec3};
 use rayon::prelude::*;
 
@@ -28,25 +29,8 @@ pub struct Gaussian {
     pub padding: f32,
 }
 
-/// When a Gaussian is there: its envelope in time.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lifespan {
-    /// Temporal mean μ_t, timestamp units.
-    pub mean_t: f32,
-    /// Temporal standard deviation σ_t, timestamp units; infinite if the Gaussian is present at every time.
-    pub sigma_t: f32,
-}
-
-impl Lifespan {
-    /// Returns the unnormalized marginal at `time`, in (0, 1]: the factor on the opacity.
-    pub fn marginal(self, time: f32) -> f32 {
-        let z = (time - self.mean_t) * self.sigma_t.recip();
-        (-0.5 * z * z).exp()
-    }
-}
-
 impl Gaussian {
-    /// Returns when it is there.
+    /// Returns its opacity envelope in time.
     pub fn lifespan(&self) -> Lifespan {
         Lifespan { mean_t: self.mean_t, sigma_t: self.sigma_t }
     }
@@ -84,7 +68,7 @@ impl Default for SliceSettings {
 pub struct InvalidGaussian {
     /// Its index in the file, from 0.
     pub index: usize,
-    /// What is wrong with it.
+    /// Why it cannot be drawn.
     pub reason: &'static str,
 }
 
@@ -100,7 +84,7 @@ impl Parameters {
     pub fn slice(&self, settings: &SliceSettings) -> Result<Vec<Gaussian>, InvalidGaussian> {
         let model = self.model();
         let all: Vec<_> = (0..self.len()).into_par_iter().map(|i| self.slice_one(i, model, settings)).collect();
-        // In order, so that it is the first Gaussian that is named.
+        // Collected in order, so that the error names the first invalid Gaussian.
         all.into_iter().collect()
     }
 
@@ -182,7 +166,7 @@ impl Gaussian {
     /// to 1.
     ///
     /// # Errors
-    /// A description of what is wrong.
+    /// A description of the problem.
     pub fn check(&self) -> Result<(), &'static str> {
         let finite = |values: &[f32]| values.iter().all(|v| v.is_finite());
         if !finite(&self.mean) {
@@ -250,10 +234,10 @@ mod tests {
     }
 
     #[test]
-    fn equal_quaternions_do_not_move() {
+    fn equal_quaternions_give_a_gaussian_at_rest() {
         let q = [0.3, -0.5, 0.2, 0.8];
         let still = one(q, q).slice(&SliceSettings::default()).expect("valid")[0];
-        assert!(Vec3::from(still.velocity).length() < 1e-6, "no space-time coupling");
+        assert!(Vec3::from(still.velocity).length() < 1e-6, "no coupling of space and time");
         let spun = Parameters { rotation_l: vec![[q[0], -q[3], -q[2], -q[1]]], rotation_r: vec![], ..one(q, q) };
         let plain = spun.slice(&SliceSettings::default()).expect("valid")[0];
         for (a, b) in still.covariance.iter().zip(plain.covariance) {
@@ -262,18 +246,24 @@ mod tests {
     }
 
     #[test]
-    fn poison_is_named() {
+    fn invalid_parameters_are_refused_with_the_attribute_named() {
         let good = one([1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]);
         let reason = |p: Parameters| p.slice(&SliceSettings::default()).expect_err("must be refused").reason;
-        assert!(reason(Parameters { mean: vec![[f32::NAN, 0.0, 0.0]], ..good.clone() }).contains("mean"), "NaN mean");
+        assert!(
+            reason(Parameters { mean: vec![[f32::NAN, 0.0, 0.0]], ..good.clone() }).contains("mean"),
+            "a NaN mean is refused"
+        );
         assert!(
             reason(Parameters { rotation_l: vec![[0.0; 4]], ..good.clone() }).contains("length zero"),
-            "zero quaternion"
+            "a quaternion of length zero is refused"
         );
         assert!(
             reason(Parameters { log_scale: vec![[200.0, 0.0, 0.0]], ..good.clone() }).contains("scale"),
-            "huge scale"
+            "a huge scale is refused"
         );
-        assert!(reason(Parameters { opacity_logit: vec![f32::NAN], ..good }).contains("opacity"), "NaN opacity");
+        assert!(
+            reason(Parameters { opacity_logit: vec![f32::NAN], ..good }).contains("opacity"),
+            "a NaN opacity is refused"
+        );
     }
 }

@@ -10,8 +10,7 @@ use super::metrics::{Evaluation, MetricSet};
 use super::report::{Change, Sample};
 use super::splits::{Splits, split_name};
 use super::{OfflineError, Progress, Subject};
-use crate::codec;
-use crate::codec::checkpoint::CheckpointOptions;
+use crate::codec::{self, ReadOptions};
 use crate::scene::RuntimeScene;
 use crate::view::Picture;
 use std::path::Path;
@@ -40,7 +39,7 @@ pub(super) fn compare_test_views(
     out: &Path,
     progress: &mut dyn Progress,
 ) -> Result<Option<Compared>, OfflineError> {
-    let after = codec::load(out, &CheckpointOptions::default())?.into_runtime();
+    let after = codec::load(out, &ReadOptions::default())?.into_runtime();
     let after = after.map_err(|error| OfflineError::at(out, error))?;
     let Some(dataset) = test_views(subject, splits, progress) else { return Ok(None) };
     let count = dataset.views.len();

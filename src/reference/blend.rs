@@ -46,7 +46,7 @@ pub fn blend(
     }
 }
 
-/// Returns what is behind all Gaussians at pixel `(x, y)`, in the blend space.
+/// Returns the color behind all Gaussians at pixel `(x, y)`, in the blend space.
 pub fn behind(
     view: &View,
     background: Background,

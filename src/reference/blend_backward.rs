@@ -4,8 +4,8 @@
 //! In: splats and their lists by tile, the background, and the gradient with respect to every pixel. Out: one
 //! [`SplatGradient`] for each splat; for a scene in the trained form, one [`ParameterGradient`] for each Gaussian.
 //!
-//! A pixel is walked front to back twice: for the sum of all that it shows, then for the gradients, which need the part
-//! of that sum behind the splat. Section 7.1 of the 4DGS model has the same from back to front.
+//! Each pixel is traversed front to back twice: for the sum over all its splats, then for the gradients, which need the
+//! part of that sum behind the splat. Section 7.1 of the 4DGS model traverses it from back to front.
 
 use super::{Layer, Pair, Splat, TileLists, behind, project, tile_lists};
 use crate::gaussian::alpha::{ALPHA_MAX, BlendStep, blend_step};
@@ -25,7 +25,7 @@ pub struct PixelGradients<'a> {
     pub color: &'a [Vec3],
     /// With respect to the expected depth `Σ z α T`.
     pub depth: &'a [f32],
-    /// With respect to alpha, one minus the transmittance that is left.
+    /// With respect to alpha, one minus the remaining transmittance.
     pub alpha: &'a [f32],
 }
 
@@ -104,11 +104,11 @@ pub fn blend_backward(
     gradients
 }
 
-/// The gradient with respect to what a pixel accumulates.
+/// The gradient with respect to the accumulated values of a pixel.
 struct Pixel {
     color: DVec3,
     depth: f64,
-    /// With respect to the transmittance that is left, which alpha and the background depend on.
+    /// With respect to the remaining transmittance, which alpha and the background depend on.
     transmittance: f64,
 }
 
@@ -129,7 +129,7 @@ fn blend_pixel_backward(
     mode: GradientMode,
     parts: &mut [SplatGradient],
 ) {
-    // Weights times their gradients: of all splats and the background, then of those behind the current one.
+    // Weights times their gradients: of all splats and the background, then of the splats behind the current one.
     let mut behind = 0.0;
     let left = walk(splats, pairs, at, |_, splat, blended| behind += pixel.of_weight(splat) * blended.weight());
     behind += pixel.transmittance * left;
@@ -174,7 +174,7 @@ impl Blended {
 }
 
 /// Calls `each` for every splat that is blended at a pixel, front to back, with the index of its pair, and returns the
-/// transmittance that is left. Decisions are those of `blend`, in single precision; values are in double precision.
+/// remaining transmittance. Decisions are those of `blend`, in single precision; values are in double precision.
 fn walk(splats: &[Splat], pairs: &[Pair], at: UVec2, mut each: impl FnMut(usize, &Splat, &Blended)) -> f64 {
     let (mut left, mut transmittance) = (1.0f32, 1.0f64);
     for (index, pair) in pairs.iter().enumerate() {

@@ -1,14 +1,14 @@
-//! `motion`: how far each splat has moved on the screen since the frame before; CPU reference of `shaders/motion.wgsl`.
+//! `motion`: the motion of each splat on the screen since the previous frame; CPU reference of `shaders/motion.wgsl`.
 //!
-//! In: a [`Layer`] with its splats, and its view one frame before. Out: one motion for each Gaussian, which
+//! In: a [`Layer`] with its splats, and its view in the previous frame. Out: one motion for each Gaussian, which
 //! [`blend`](super::blend()) blends in place of a color.
 
 use super::{Layer, Splat};
 use crate::view::View;
 use glam::Vec2;
 
-/// Returns the motion of every splat in pixels, to the right and down; 0 for an invisible one, and for one that was not in front of the
-/// camera.
+/// Returns the motion of every splat in pixels, to the right and down; 0 for an invisible splat, and for a splat that was not in front
+/// of the camera in the previous frame.
 pub fn motion(layer: &Layer<'_>, splats: &[Splat], previous: &View) -> Vec<Vec2> {
     let [clip_x, clip_y] = previous.clip_rows();
     let size = layer.view.size.as_vec2();

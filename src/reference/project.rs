@@ -43,7 +43,7 @@ impl Splat {
     }
 }
 
-/// Projects every Gaussian of the scene. Those that its filter, if it has one, leaves inactive are invisible.
+/// Projects every Gaussian of the scene. Gaussians that its temporal filter leaves inactive are invisible.
 pub fn project(layer: &Layer<'_>, space: BlendSpace) -> Vec<Splat> {
     let Layer { scene, view, .. } = layer;
     let clip = view.clip_rows();

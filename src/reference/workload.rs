@@ -1,4 +1,4 @@
-//! How much there is to blend in a view.
+//! The amount of blending in a view.
 //!
 //! In: a scene and a view. Out: [`Workload`], means over its pixels.
 
@@ -15,7 +15,7 @@ use rayon::prelude::*;
 pub struct Workload {
     /// Splats of the pixel's tile, up to the one that makes the pixel opaque.
     pub evaluated: f64,
-    /// Those that change the pixel.
+    /// Splats that change the pixel.
     pub contributing: f64,
 }
 
@@ -58,7 +58,7 @@ mod tests {
     use crate::view::{Camera, RasterFov};
     use glam::Vec3;
 
-    /// Returns a scene of opaque Gaussians behind each other, far larger than the view.
+    /// Returns a scene of Gaussians of this opacity behind each other, far larger than the view.
     fn walls(count: usize, opacity: f32) -> RuntimeScene {
         let gaussians = (0..count).map(|i| Gaussian {
             mean: [0.0, i as f32, 0.0],
@@ -80,10 +80,14 @@ mod tests {
 
     #[test]
     fn every_splat_counts_until_a_pixel_is_opaque() {
-        assert_eq!(of(&walls(5, 0.1)), Workload { evaluated: 5.0, contributing: 5.0 }, "none is opaque");
-        assert_eq!(of(&walls(5, 0.001)).contributing, 0.0, "too faint to show");
-        // Each leaves a hundredth; the third would leave less than a ten-thousandth, so that the pixel stops before it.
+        assert_eq!(
+            of(&walls(5, 0.1)),
+            Workload { evaluated: 5.0, contributing: 5.0 },
+            "all are blended while the pixel is transparent"
+        );
+        assert_eq!(of(&walls(5, 0.001)).contributing, 0.0, "splats with an alpha below 1/255 do not contribute");
+        // Each splat leaves a hundredth of the transmittance; the third would leave less than 1e-4, so blending stops before it.
         let found = of(&walls(50, 1.0));
-        assert!(found.contributing < 4.0 && found.evaluated < 4.0, "opaque: {found:?}");
+        assert!(found.contributing < 4.0 && found.evaluated < 4.0, "blending stops at an opaque pixel: {found:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! Bounding boxes of a capture, over its whole time interval and over stretches of it.
+//! Bounding boxes of a capture, over its whole time interval and over stretches of that interval.
 //!
 //! In: runtime Gaussians. Out: [`Bounds`] and [`BoundsOverTime`] in capture space.
 
@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 const TIME_SPANS: usize = 32;
 /// Relative margin of the boxes: more than the `f32` rounding of drawing.
 const ROUNDING: f64 = 1e-6;
-/// A time as close as this to the border of two stretches, in stretches, belongs to both.
+/// Distance from the border of two stretches, in stretches, within which a time belongs to both.
 const BORDER: f64 = 1e-6;
 
 /// An axis-aligned box in capture space.
@@ -23,7 +23,7 @@ pub struct Bounds {
 
 impl Bounds {
     /// Returns the box that holds three standard deviations of every Gaussian wherever it is drawn within `interval`;
-    /// `None` if nothing is drawn. Gaussians that cannot be drawn ([`Gaussian::check`]) are ignored.
+    /// `None` if no Gaussian is drawn. Gaussians that cannot be drawn ([`Gaussian::check`]) are ignored.
     pub fn of(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2]) -> Option<Self> {
         BoundsOverTime::with_stretches(gaussians, interval, 1).map(|bounds| bounds.whole)
     }
@@ -45,7 +45,7 @@ impl Bounds {
         Some(Self { min, max })
     }
 
-    /// Returns the box around both.
+    /// Returns the box around both boxes.
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
@@ -89,14 +89,14 @@ impl Bounds {
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoundsOverTime {
     interval: [f32; 2],
-    /// The box of each stretch; `None` if nothing is drawn in it. At least one stretch.
+    /// The box of each stretch; `None` if no Gaussian is drawn in it. At least one stretch.
     stretches: Vec<Option<Bounds>>,
     whole: Bounds,
 }
 
 impl BoundsOverTime {
     /// Returns the boxes that hold three standard deviations of every Gaussian wherever it is drawn, for 32 stretches
-    /// of `interval` (one, if the interval has no length); `None` if nothing is drawn. Gaussians that cannot be drawn
+    /// of `interval` (one, if the interval has no length); `None` if no Gaussian is drawn. Gaussians that cannot be drawn
     /// ([`Gaussian::check`]) are ignored.
     pub fn of(gaussians: impl Iterator<Item = Gaussian>, interval: [f32; 2]) -> Option<Self> {
         Self::with_stretches(gaussians, interval, TIME_SPANS)
@@ -113,14 +113,14 @@ impl BoundsOverTime {
         Some(Self { interval, stretches, whole })
     }
 
-    /// Returns the box around everything that is drawn at any time.
+    /// Returns the box around all Gaussians that are drawn at any time.
     pub fn whole(&self) -> Bounds {
         self.whole
     }
 
-    /// Returns the box around everything that is drawn in the stretch that contains `time`, a timestamp of the capture
-    /// (around both stretches at a border); `None` if nothing is drawn. A time outside the interval counts as its
-    /// nearer end.
+    /// Returns the box around all Gaussians that are drawn in the stretch that contains `time`, a timestamp of the
+    /// capture (around both stretches at a border); `None` if no Gaussian is drawn. A time outside the interval is
+    /// clamped to it.
     pub fn at(&self, time: f32) -> Option<Bounds> {
         let [start, end] = self.interval.map(f64::from);
         let place = (f64::from(time) - start) / (end - start) * self.stretches.len() as f64;
@@ -147,8 +147,8 @@ fn cover(extents: &mut [Extent], gaussian: &Gaussian, [start, end]: [f64; 2]) {
     let reach = reach + ROUNDING * (mean.abs() + velocity.abs() * farthest + reach);
     let length = (end - start) / extents.len() as f64;
     let stretch = |time: f64| (((time - start) / length) as usize).min(extents.len() - 1);
-    let stay = stretch(first)..=stretch(last);
-    for index in stay {
+    let drawn_in = stretch(first)..=stretch(last);
+    for index in drawn_in {
         let from = first.max(start + index as f64 * length);
         let to = last.min(start + (index + 1) as f64 * length);
         for time in [from, to] {
@@ -174,8 +174,9 @@ impl Extent {
 
     /// Returns the box; `None` if it is empty. Coordinates beyond the range of `f32` are clamped to it.
     fn bounds(self) -> Option<Bounds> {
-        let said = |corner: DVec3| corner.clamp(DVec3::splat(f32::MIN.into()), DVec3::splat(f32::MAX.into())).as_vec3();
-        (self.min.x <= self.max.x).then(|| Bounds { min: said(self.min), max: said(self.max) })
+        let clamped =
+            |corner: DVec3| corner.clamp(DVec3::splat(f32::MIN.into()), DVec3::splat(f32::MAX.into())).as_vec3();
+        (self.min.x <= self.max.x).then(|| Bounds { min: clamped(self.min), max: clamped(self.max) })
     }
 }
 
@@ -187,7 +188,7 @@ mod tests {
     use proptest::collection::vec;
     use proptest::prelude::*;
 
-    /// A round Gaussian.
+    /// Returns a round Gaussian.
     fn gaussian(mean: Vec3, velocity: Vec3, mean_t: f32, sigma_t: f32, scale: f32) -> Gaussian {
         let variance = scale * scale;
         Gaussian {
@@ -201,7 +202,7 @@ mod tests {
         }
     }
 
-    /// Runs along x from 0 to 10 within the interval [0, 1].
+    /// Returns a Gaussian that moves along x from 0 to 10 within the interval [0, 1].
     fn runner() -> Gaussian {
         gaussian(Vec3::new(5.0, 0.0, 0.0), Vec3::new(10.0, 0.0, 0.0), 0.5, f32::INFINITY, 0.01)
     }
@@ -214,7 +215,7 @@ mod tests {
         outer.min.cmple(inner.min).all() && outer.max.cmpge(inner.max).all()
     }
 
-    /// Gaussians of all kinds: flashes and some that are always there, at rest and fast, points and large ones.
+    /// Generates Gaussians that are short-lived or permanent, at rest or fast, points or large.
     fn any_gaussian() -> impl Strategy<Value = Gaussian> {
         let lifespan = prop_oneof![1e-6f32..0.01, 0.01f32..3.0, Just(f32::INFINITY)];
         (uniform3(-50.0f32..50.0), uniform3(-30.0f32..30.0), -1.0f32..2.0, lifespan, 0.0f32..2.0).prop_map(
@@ -226,73 +227,77 @@ mod tests {
         #![proptest_config(ProptestConfig { cases: 512, failure_persistence: None, ..ProptestConfig::default() })]
 
         #[test]
-        fn what_is_drawn_lies_within_the_box_of_its_time(
+        fn drawn_gaussians_are_inside_the_box_of_the_time(
             gaussians in vec(any_gaussian(), 1..12),
             start in -1.0f32..1.0,
             span in 0.01f32..4.0,
             moments in vec(0.0f32..=1.0, 20),
         ) {
             let bounds = over_time(&gaussians, [start, start + span]);
-            // The borders between stretches, too.
+            // The borders between stretches are tested too.
             let borders = (0..=TIME_SPANS).map(|index| index as f32 / TIME_SPANS as f32);
             for time in moments.into_iter().chain(borders).map(|moment| start + moment * span) {
                 for gaussian in gaussians.iter().filter(|gaussian| gaussian.marginal(time) > MARGINAL_CUTOFF) {
                     let (mean, reach) = (gaussian.mean_at(time), 3.0 * gaussian.covariance[0].sqrt());
                     let drawn = Bounds { min: mean - reach, max: mean + reach };
-                    let bounds = bounds.as_ref().expect("something is drawn");
-                    let now = bounds.at(time).expect("something is drawn now");
-                    prop_assert!(holds(now, drawn), "at {time}, {drawn:?} is not within {now:?}");
-                    prop_assert!(holds(bounds.whole(), now), "nor is the whole less than a part");
+                    let bounds = bounds.as_ref().expect("a Gaussian is drawn");
+                    let now = bounds.at(time).expect("a Gaussian is drawn at this time");
+                    prop_assert!(holds(now, drawn), "at {time}, {drawn:?} is inside {now:?}");
+                    prop_assert!(holds(bounds.whole(), now), "the whole box contains the box at {time}");
                 }
             }
         }
     }
 
     #[test]
-    fn a_stretch_is_not_the_whole() {
+    fn the_box_of_a_stretch_is_smaller_than_the_whole_box() {
         let bounds = over_time(&[runner()], [0.0, 1.0]).expect("drawn");
-        assert!(bounds.whole().max.x - bounds.whole().min.x > 10.0, "it runs ten units");
+        assert!(bounds.whole().max.x - bounds.whole().min.x > 10.0, "the whole box contains a motion of ten units");
         for time in [0.0, 0.3, 0.5, 1.0] {
-            let now = bounds.at(time).expect("always there");
+            let now = bounds.at(time).expect("drawn at every time");
             let [length, most] = [now.max.x - now.min.x, 2.0 * 10.0 / TIME_SPANS as f32 + 0.07];
-            assert!(length < most, "at {time} the box is {length} long, but two stretches are {most}");
+            assert!(length < most, "at {time} the box is {length} long; two stretches are {most}");
         }
-        assert_eq!(bounds.at(-9.0), bounds.at(0.0), "before the start is the start");
-        assert_eq!(bounds.at(f32::INFINITY), bounds.at(1.0), "after the end is the end");
-        assert_eq!(bounds.at(f32::NAN), bounds.at(0.0), "no number is the start");
+        assert_eq!(bounds.at(-9.0), bounds.at(0.0), "a time before the start is clamped to the start");
+        assert_eq!(bounds.at(f32::INFINITY), bounds.at(1.0), "a time after the end is clamped to the end");
+        assert_eq!(bounds.at(f32::NAN), bounds.at(0.0), "NaN is treated as the start");
     }
 
     #[test]
-    fn at_a_border_both_stretches_count() {
+    fn the_box_at_a_border_covers_both_stretches() {
         let bounds = over_time(&[runner()], [0.0, 1.0]).expect("drawn");
         let step = 1.0 / TIME_SPANS as f32;
-        let [before, border, after] = [0.5, 1.0, 1.5].map(|place| bounds.at(place * step).expect("always there"));
-        assert_eq!(border, before.union(after), "the box about both");
+        let [before, border, after] =
+            [0.5, 1.0, 1.5].map(|place| bounds.at(place * step).expect("drawn at every time"));
+        assert_eq!(border, before.union(after), "the box around both stretches");
     }
 
     #[test]
-    fn where_nothing_is_drawn_there_is_no_box() {
+    fn a_time_at_which_no_gaussian_is_drawn_has_no_box() {
         let flash = gaussian(Vec3::ZERO, Vec3::ZERO, 0.5, 0.01, 0.1);
-        let bounds = over_time(&[flash], [0.0, 1.0]).expect("drawn once");
-        assert_eq!(bounds.at(0.1), None, "before the flash");
-        assert_eq!(bounds.at(0.5), Some(bounds.whole()), "at the flash");
-        assert_eq!(over_time(&[flash], [2.0, 3.0]), None, "never within the interval");
-        assert_eq!(over_time(&[], [0.0, 1.0]), None, "an empty scene");
+        let bounds = over_time(&[flash], [0.0, 1.0]).expect("drawn at one time");
+        assert_eq!(bounds.at(0.1), None, "no Gaussian is drawn before the flash");
+        assert_eq!(bounds.at(0.5), Some(bounds.whole()), "the flash is drawn at its temporal mean");
+        assert_eq!(over_time(&[flash], [2.0, 3.0]), None, "no Gaussian is drawn within the interval");
+        assert_eq!(over_time(&[], [0.0, 1.0]), None, "an empty scene has no box");
     }
 
     #[test]
-    fn a_still_has_one_stretch() {
+    fn an_interval_of_length_zero_has_one_stretch() {
         let bounds = over_time(&[runner()], [0.25, 0.25]).expect("drawn");
-        assert_eq!(bounds.stretches.len(), 1, "an interval without a length");
+        assert_eq!(bounds.stretches.len(), 1, "an interval of length zero has one stretch");
         for time in [0.0, 0.25, 1.0] {
             assert_eq!(bounds.at(time), Some(bounds.whole()), "the same box at {time}");
         }
         let [low, high] = [bounds.whole().min.x, bounds.whole().max.x];
-        assert!(low < 2.5 && high > 2.5 && high - low < 0.1, "where it is at that moment: {low} to {high}");
+        assert!(
+            low < 2.5 && high > 2.5 && high - low < 0.1,
+            "the box is around the position at that time: {low} to {high}"
+        );
     }
 
     #[test]
-    fn poison_does_not_spread() {
+    fn gaussians_that_cannot_be_drawn_are_ignored() {
         let good = runner();
         let expected = over_time(&[good], [0.0, 1.0]);
         for poison in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
@@ -304,26 +309,29 @@ mod tests {
                 Gaussian { sigma_t: -poison.abs(), ..good },
             ];
             for bad in poisoned {
-                assert_eq!(over_time(&[bad, good, bad], [0.0, 1.0]), expected, "as if {bad:?} were not there");
-                assert_eq!(over_time(&[bad], [0.0, 1.0]), None, "alone, nothing is there: {bad:?}");
+                assert_eq!(over_time(&[bad, good, bad], [0.0, 1.0]), expected, "{bad:?} is ignored");
+                assert_eq!(over_time(&[bad], [0.0, 1.0]), None, "{bad:?} alone has no box");
             }
         }
         let far = Gaussian { velocity: [f32::MAX, f32::MIN, 0.0], ..good };
         let bounds = over_time(&[far], [0.0, 10.0]).expect("drawn");
-        assert!(bounds.whole().min.is_finite() && bounds.whole().max.is_finite(), "far away is still a number");
+        assert!(
+            bounds.whole().min.is_finite() && bounds.whole().max.is_finite(),
+            "a box of extreme coordinates is finite"
+        );
     }
 
     #[test]
-    fn a_ray_comes_in_where_the_box_begins() {
+    fn a_ray_enters_the_box_at_its_surface() {
         let unit = Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE };
         let entry = |origin: [f32; 3], direction: [f32; 3]| unit.entry(origin.into(), direction.into());
-        assert_eq!(entry([0.0, 0.0, -5.0], [0.0, 0.0, 2.0]), Some(2.0), "in lengths of the direction");
-        assert_eq!(entry([0.5, 0.5, 0.5], [1.0, 0.0, 0.0]), Some(0.0), "from inside");
-        assert_eq!(entry([0.0, 0.0, 5.0], [0.0, 0.0, 2.0]), None, "behind");
-        assert_eq!(entry([0.0, 1.5, -5.0], [0.0, 0.0, 1.0]), None, "beside, parallel to a side");
-        assert_eq!(entry([-3.0, 0.0, 0.0], [1.0, 1.0, 0.0]), None, "past a corner");
-        assert_eq!(entry([-2.0, -1.0, 0.0], [1.0, 1.0, 0.0]), Some(1.0), "through the next corner");
+        assert_eq!(entry([0.0, 0.0, -5.0], [0.0, 0.0, 2.0]), Some(2.0), "the distance is in lengths of the direction");
+        assert_eq!(entry([0.5, 0.5, 0.5], [1.0, 0.0, 0.0]), Some(0.0), "a ray from inside enters at distance 0");
+        assert_eq!(entry([0.0, 0.0, 5.0], [0.0, 0.0, 2.0]), None, "a box behind the origin is missed");
+        assert_eq!(entry([0.0, 1.5, -5.0], [0.0, 0.0, 1.0]), None, "a ray outside and parallel to a side misses");
+        assert_eq!(entry([-3.0, 0.0, 0.0], [1.0, 1.0, 0.0]), None, "a ray past a corner misses");
+        assert_eq!(entry([-2.0, -1.0, 0.0], [1.0, 1.0, 0.0]), Some(1.0), "a ray through a corner enters there");
         let grown = unit.scaled(2.0);
-        assert_eq!((grown.min, grown.max), (Vec3::splat(-2.0), Vec3::splat(2.0)), "twice the size");
+        assert_eq!((grown.min, grown.max), (Vec3::splat(-2.0), Vec3::splat(2.0)), "the box has twice the size");
     }
 }

@@ -48,7 +48,7 @@ impl Environment {
     /// Checks that there is a finite value for each channel of each texel.
     ///
     /// # Errors
-    /// A description of what is wrong.
+    /// A description of the problem.
     pub fn check(&self) -> Result<(), &'static str> {
         let texels = self.width.checked_mul(self.height).filter(|&texels| texels > 0);
         if texels.and_then(|texels| (texels as usize).checked_mul(3)) != Some(self.texels.len()) {

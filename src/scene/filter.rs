@@ -1,13 +1,13 @@
-//! The temporal filter: which Gaussians are active in each segment of time.
+//! The temporal filter: the Gaussians that are active in each segment of time.
 //!
 //! In: key-frames at even spacing over the time interval and, for each segment between two of them, a set of Gaussians. Out:
-//! [`TemporalFilter`], stored as bits or as intervals, whichever is smaller; drawing skips what is not active.
+//! [`TemporalFilter`], stored as bits or as intervals, whichever is smaller; drawing skips inactive Gaussians.
 
 use crate::gaussian::{Gaussian, MARGINAL_CUTOFF};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// How the sets of a filter were computed. Default: [`Support`](Self::Support).
+/// The method by which the sets of a filter were computed. Default: [`Support`](Self::Support).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FilterKind {
@@ -94,7 +94,7 @@ impl TemporalFilter {
     /// Checks that it is a filter of `count` Gaussians, and that intervals end within its segments.
     ///
     /// # Errors
-    /// A description of what does not fit.
+    /// A description of the first part that does not fit.
     pub fn check(&self, count: usize) -> Result<(), &'static str> {
         let fits = match &self.sets {
             ActiveSets::Bits(bits) => Self::words(count).checked_mul(self.segments as usize) == Some(bits.len()),
@@ -141,7 +141,7 @@ impl TemporalFilter {
         }
     }
 
-    /// Returns the number of active Gaussians among those in the range `own`, for each segment. `own` begins at a
+    /// Returns the number of active Gaussians among the Gaussians in the range `own`, for each segment. `own` begins at a
     /// multiple of 32.
     ///
     /// # Panics
@@ -175,9 +175,9 @@ impl TemporalFilter {
         }
     }
 
-    /// Returns the share of active Gaussians, the mean over all segments; 1 for an empty scene.
+    /// Returns the fraction of active Gaussians, the mean over all segments; 1 for an empty scene.
     pub fn active_share(&self) -> f64 {
-        // A filter from a file may have so many segments that asking for each Gaussian in each of them would not end.
+        // A filter from a file may have so many segments that a test of each Gaussian in each segment would not end.
         let active: u64 = self.active_counts(0..self.count).into_iter().map(u64::from).sum();
         let all = self.count * self.segments as usize;
         if all == 0 { 1.0 } else { active as f64 / all as f64 }
@@ -273,33 +273,41 @@ mod tests {
                     let drawn = gaussian.marginal(time) > MARGINAL_CUTOFF;
                     assert!(
                         !drawn || filter.is_active(segment, index),
-                        "{index} is drawn at {time} and must be active"
+                        "Gaussian {index} is drawn at {time} and must be active"
                     );
                 }
             }
-            assert_eq!(filter.active_share() < 1.0, segments > 1, "with several segments, something rests in each");
+            assert_eq!(filter.active_share() < 1.0, segments > 1, "with several segments, some Gaussians are inactive");
         }
     }
 
     #[test]
-    fn both_ways_to_store_say_the_same() {
+    fn bits_and_intervals_store_the_same_sets() {
         let gaussians: Vec<_> = (0..70).map(|i| gaussian(i as f32 / 70.0, 0.05)).collect();
         let filter = TemporalFilter::support(gaussians.into_iter(), [0.0, 1.0], 40);
         assert!(matches!(filter.sets, ActiveSets::Intervals(_)), "forty segments are smaller as intervals");
         let bits = TemporalFilter { sets: ActiveSets::Bits(filter.to_bits()), ..filter.clone() };
         assert_eq!(bits.to_bits(), filter.to_bits(), "the same sets");
         let each = (0..40).map(|segment| (0..70).filter(|&i| filter.is_active(segment, i)).count()).sum::<usize>();
-        assert_eq!((filter.active_share(), bits.active_share()), (each as f64 / 2800.0, each as f64 / 2800.0), "share");
+        assert_eq!(
+            (filter.active_share(), bits.active_share()),
+            (each as f64 / 2800.0, each as f64 / 2800.0),
+            "the fraction of active Gaussians"
+        );
         let back = TemporalFilter::from_bits(FilterKind::Support, 40, 70, filter.to_bits());
-        assert_eq!(back, filter, "intervals are found again");
+        assert_eq!(back, filter, "bits are stored as intervals again");
         for own in [0..70, 0..64, 64..70, 32..33] {
             let counts = filter.active_counts(own.clone());
             let expected = |segment| own.clone().filter(|&i| filter.is_active(segment, i)).count() as u32;
-            assert_eq!(counts, (0..40).map(expected).collect::<Vec<_>>(), "counted one by one, {own:?}");
-            assert_eq!(counts, bits.active_counts(own), "and counted alike");
+            assert_eq!(
+                counts,
+                (0..40).map(expected).collect::<Vec<_>>(),
+                "the counts of {own:?} are those of single tests"
+            );
+            assert_eq!(counts, bits.active_counts(own), "bits give the same counts");
         }
         let keep: Vec<u32> = (0..70).step_by(3).collect();
         let (a, b) = (filter.select(&keep), bits.select(&keep));
-        assert_eq!(a.to_bits(), b.to_bits(), "selected alike");
+        assert_eq!(a.to_bits(), b.to_bits(), "both forms select the same sets");
     }
 }

@@ -13,6 +13,7 @@
 //! (`renderer::Storage::of`), and the form in the header of a package (`codec::package::StoredForm::of`).
 
 use super::packed::{CodedColors, PackedColors, PackedScene};
+use super::sliced::Sliced;
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian, Lifespan, Model, Parameters, SliceSettings};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -42,15 +43,6 @@ pub enum Form {
     Sliced(Sliced),
     /// Quantized: smaller, and drawn without unpacking.
     Packed(PackedScene),
-}
-
-/// Sliced Gaussians and their color.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Sliced {
-    /// The Gaussians: activated, capture space.
-    pub gaussians: Vec<Gaussian>,
-    /// Their color.
-    pub harmonics: Harmonics,
 }
 
 /// Number of coefficients and degrees of the color of a form.
@@ -102,7 +94,7 @@ impl SceneForm {
         }
     }
 
-    /// Returns the same as [`harmonics`](Self::harmonics), mutable.
+    /// Returns the harmonics, mutable; `None` if the colors are coded.
     pub fn harmonics_mut(&mut self) -> Option<&mut Harmonics> {
         match self {
             Self::Trained(trained) => Some(&mut trained.harmonics),
@@ -118,7 +110,7 @@ impl SceneForm {
         }
     }
 
-    /// Lowers the degrees of its color to at most those given and drops the coefficients that are no longer evaluated.
+    /// Lowers the degrees of its color to at most the degrees given and removes the coefficients that are no longer evaluated.
     pub fn truncate_colors(&mut self, degree: u32, degree_t: u32) {
         match self {
             Self::Trained(Trained { harmonics, .. })
@@ -158,7 +150,7 @@ impl SceneForm {
             && let Some(bad) = harmonics.values.iter().position(|value| !value.is_finite())
         {
             let index = bad / (harmonics.coefficients * 3);
-            return Err(InvalidGaussian { index, reason: "a colour coefficient that is not finite" });
+            return Err(InvalidGaussian { index, reason: "a color coefficient that is not finite" });
         }
         Ok(form)
     }
@@ -199,7 +191,7 @@ impl Form {
         }
     }
 
-    /// Returns when one Gaussian is there. Of a packed one nothing else is decoded.
+    /// Returns the opacity envelope of one Gaussian in time. No other attribute of a packed Gaussian is decoded.
     ///
     /// # Panics
     /// If `index` is out of range.
@@ -235,7 +227,7 @@ impl Form {
         }
     }
 
-    /// Returns the same as [`harmonics`](Self::harmonics), mutable.
+    /// Returns the harmonics, mutable; `None` if the colors are coded.
     pub fn harmonics_mut(&mut self) -> Option<&mut Harmonics> {
         match self {
             Self::Sliced(Sliced { harmonics, .. })
@@ -274,7 +266,7 @@ impl Form {
         }
     }
 
-    /// Returns the same as [`as_sliced`](Self::as_sliced), mutable.
+    /// Returns the Gaussians in single precision and their harmonics, mutable; `None` if they are packed.
     pub fn as_sliced_mut(&mut self) -> Option<&mut Sliced> {
         match self {
             Self::Sliced(sliced) => Some(sliced),
@@ -310,7 +302,7 @@ impl Form {
 }
 
 fn check_colors(harmonics: &Harmonics, count: usize) -> Result<(), &'static str> {
-    if harmonics.is_consistent(count) { Ok(()) } else { Err("its colours are those of another number of Gaussians") }
+    if harmonics.is_consistent(count) { Ok(()) } else { Err("its colors are those of another number of Gaussians") }
 }
 
 impl ColorDegrees {

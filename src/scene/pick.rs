@@ -1,16 +1,16 @@
 //! Picking: the Gaussian that a ray hits.
 //!
-//! In: a ray in capture space, a time, and which Gaussians count ([`PickSettings`]). Out: a [`Pick`]; `None` if the ray
+//! In: a ray in capture space, and [`PickSettings`] with the time and the Gaussians that can be hit. Out: a [`Pick`]; `None` if the ray
 //! hits nothing.
 //!
 //! Along a ray every Gaussian is a Gaussian of one dimension. With the conditional mean `m` and covariance `Σ` at time `t`, the
 //! ray's origin `o`, its unit direction `w` and two unit vectors `u`, `v` across it:
 //!
 //! ```text
-//! q     = [u v]ᵀ (m − o)                     where the mean is, across the ray
+//! q     = [u v]ᵀ (m − o)                     offset of the mean across the ray
 //! S     = [u v]ᵀ Σ [u v] + ε 1               the covariance across the ray
 //! D²    = qᵀ S⁻¹ q                           smallest squared Mahalanobis distance of the ray to the mean
-//! depth = wᵀ (m − o) − wᵀ Σ [u v] S⁻¹ q      where on the ray that is: its densest point
+//! depth = wᵀ (m − o) − wᵀ Σ [u v] S⁻¹ q      position of that point on the ray: the densest point
 //! alpha = min(0.99, opacity · marginal(t) · exp(−½ D²))
 //! ```
 //!
@@ -34,7 +34,7 @@ use rayon::prelude::*;
 /// ε in parts of the trace of Σ: 2⁻²².
 const LEAST_VARIANCE: f64 = 1.0 / (1u32 << 22) as f64;
 
-/// At what time a ray is cast, and which Gaussians count.
+/// The time at which a ray is cast, and the Gaussians that it can hit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PickSettings {
     /// Timestamp, in the capture's unit. Default: 0.
@@ -70,8 +70,8 @@ pub struct Pick {
 }
 
 impl RuntimeScene {
-    /// Returns what the ray from `origin` along `direction` (of any length), both in capture space, hits. The formula
-    /// is in [`scene::pick`](crate::scene::pick).
+    /// Returns the Gaussian that the ray from `origin` along `direction` (of any length), both in capture space, hits. The
+    /// formula is in [`scene::pick`](crate::scene::pick).
     ///
     /// `None` if the ray hits nothing, and for an invalid ray: a direction of length zero, or numbers that are not
     /// finite. A Gaussian whose densest point on the ray lies behind the origin is not hit.
@@ -167,9 +167,9 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
 
-        /// Computes the same numbers another way: by the inverse of the covariance and a search along the ray.
+        /// Computes the same numbers independently: by the inverse of the covariance and a search along the ray.
         #[test]
-        fn depth_and_alpha_are_those_of_the_densest_point(
+        fn depth_and_alpha_match_a_search_for_the_densest_point(
             factors in prop::array::uniform9(-0.5f64..0.5),
             mean in uniform3(-1.0f32..1.0),
             target in uniform3(-0.5f32..0.5),
@@ -206,10 +206,10 @@ mod tests {
             match ray.cross(&gaussian, &PickSettings { time: 0.5, ..PickSettings::default() }) {
                 // Rounding of the covariance to f32 and ε are some 1e-6 of it, and its condition is below 200.
                 Some(crossing) => {
-                    prop_assert!((crossing.depth - low).abs() < 1e-3, "depth {} is {low}", crossing.depth);
-                    prop_assert!((f64::from(crossing.alpha) - alpha).abs() < 1e-3, "alpha {} is {alpha}", crossing.alpha);
+                    prop_assert!((crossing.depth - low).abs() < 1e-3, "depth {}, expected {low}", crossing.depth);
+                    prop_assert!((f64::from(crossing.alpha) - alpha).abs() < 1e-3, "alpha {}, expected {alpha}", crossing.alpha);
                 }
-                None => prop_assert!(alpha < f64::from(ALPHA_MIN) + 1e-5, "an alpha of {alpha} is not nothing"),
+                None => prop_assert!(alpha < f64::from(ALPHA_MIN) + 1e-5, "an alpha of {alpha} is visible"),
             }
         }
     }

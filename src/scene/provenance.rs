@@ -1,4 +1,4 @@
-//! How a capture was trained and is meant to be played: the scalars that are not tensors.
+//! The settings with which a capture was trained and is meant to be played.
 //!
 //! In: options of a command, `cfg_args`, or a package's header. Out: [`TrainedWith`] and [`PlaybackHints`], stored in every
 //! package so that drawing needs no options.
@@ -7,7 +7,7 @@ use crate::gaussian::ShDirection;
 use crate::view::RasterFov;
 use serde::{Deserialize, Serialize};
 
-/// The switches a capture was trained with. Drawing must use the same to match the original.
+/// The settings a capture was trained with. Drawing must use the same settings to match the original.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct TrainedWith {
@@ -17,11 +17,11 @@ pub struct TrainedWith {
     pub background: [f32; 3],
     /// Convention of the rotations *in the source file*; in memory they are always flipped. Default: flipped.
     pub rotation_convention: RotationConvention,
-    /// Which field of view shaped the footprints. Default: reference.
+    /// Field of view that shaped the footprints. Default: reference.
     pub raster_fov: RasterFov,
-    /// What kind of cameras took the training views. Default: cameras with a field of view.
+    /// Kind of cameras that took the training views. Default: cameras with a field of view.
     pub cameras: TrainedCameras,
-    /// Which mean gives the viewing direction of color. Default: canonical.
+    /// Mean that gives the viewing direction of color. Default: canonical.
     pub sh_direction: ShDirection,
     /// Whether only the first 16 coefficients are evaluated, whatever is stored. Default: `false`.
     pub force_sh_3d: bool,

@@ -32,7 +32,7 @@ impl Default for SynthSettings {
 
 /// Number of balls over the ground.
 const BALLS: usize = 7;
-/// Share of the Gaussians that form the ground, in percent.
+/// Percentage of the Gaussians that form the ground.
 const GROUND_PERCENT: usize = 40;
 /// Value of the first spherical harmonic: a stored coefficient is `color − 0.5` divided by it.
 const SH_C0: f32 = 0.282_094_79;
@@ -44,7 +44,7 @@ pub fn synthesize(settings: &SynthSettings) -> GaussianScene {
     harmonics.degree_t = if harmonics.degree == 3 { settings.degree_t.min(2) } else { 0 };
     harmonics.coefficients = harmonics.evaluated();
     let mut parameters = Parameters::default();
-    // Surface per Gaussian shrinks with their number, so that any count covers the scene alike.
+    // The surface of each Gaussian shrinks with their number, so that any number covers the scene equally.
     let spacing = (8.0 / settings.count.max(1) as f32).sqrt();
     for index in 0..settings.count {
         let ground = index % 100 < GROUND_PERCENT;
@@ -95,7 +95,7 @@ fn ball_point(ball: usize, random: &mut Random) -> (Vec3, Vec3, Motion) {
     (motion(0.0), color, Box::new(motion))
 }
 
-/// Returns a pair of quaternions: equal ones give a Gaussian at rest, a twist between them one that moves. Their
+/// Returns a pair of quaternions: equal quaternions give a Gaussian at rest, different ones a Gaussian that moves. Their
 /// components are reversed so that the 3D part is the rotation `turn`.
 fn rotations(ground: bool, random: &mut Random) -> ([f32; 4], [f32; 4]) {
     let [a, b, c] = if ground {

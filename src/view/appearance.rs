@@ -28,7 +28,7 @@ pub enum BlendSpace {
     Linear,
 }
 
-/// What a view shows of its captures. Default: [`Color`](Self::Color).
+/// The quantity that a view shows of its captures. Default: [`Color`](Self::Color).
 ///
 /// # Examples
 ///
@@ -38,7 +38,7 @@ pub enum BlendSpace {
 ///
 /// // On a camera: false colors for the number of splats at each pixel.
 /// let settings = CaptureViewSettings { debug: DebugView::Overdraw, ..CaptureViewSettings::default() };
-/// assert_eq!(settings.blend_space, BlendSpace::Encoded, "the rest stays as it is");
+/// assert_eq!(settings.blend_space, BlendSpace::Encoded, "the other settings keep their defaults");
 /// # }
 /// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -50,7 +50,7 @@ pub enum DebugView {
     Depth,
     /// Number of splats blended at each pixel, from black (0) through blue, green and yellow to red (64 or more).
     Overdraw,
-    /// Every Gaussian that is active in the temporal filter's current segment: green if it is visible at this time, red if it is not.
+    /// Every Gaussian that is active in the temporal filter's current segment: green if it is visible at this time, else red.
     Active,
     /// The standard deviation in time `σ_t`: blue for an instant, red for the whole duration.
     Lifespan,
@@ -58,7 +58,7 @@ pub enum DebugView {
     Velocity,
 }
 
-/// What is behind all Gaussians.
+/// The background behind all Gaussians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Background {
     /// No background: the picture is premultiplied, for a compositor.
@@ -128,9 +128,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_default_appearance_changes_no_bit() {
+    fn the_default_appearance_keeps_colors_unchanged() {
         let color = Vec3::new(0.1, 0.7, 1.3);
-        assert_eq!(Appearance::default().color(color, BlendSpace::Encoded), color, "as trained");
+        assert_eq!(Appearance::default().color(color, BlendSpace::Encoded), color, "the color is as trained");
         assert!(Appearance::default().shows(Vec3::splat(1e9)), "nothing is cropped");
     }
 
@@ -139,24 +139,24 @@ mod tests {
         let appearance = Appearance { light: Vec3::new(2.0, 1.0, 0.0), ..Appearance::default() };
         let color = Vec3::splat(0.5);
         let linear = appearance.color(color, BlendSpace::Linear);
-        assert!(linear.abs_diff_eq(decode(color) * appearance.light, 1e-6), "in linear light");
+        assert!(linear.abs_diff_eq(decode(color) * appearance.light, 1e-6), "linear light is multiplied");
         assert!(
             decode(appearance.color(color, BlendSpace::Encoded)).abs_diff_eq(linear, 1e-5),
-            "and encoded, the same"
+            "the encoded color decodes to the same light"
         );
         assert!(
             decode(encode(Vec3::new(0.001, 0.3, 4.0))).abs_diff_eq(Vec3::new(0.001, 0.3, 4.0), 1e-5),
-            "one undoes the other"
+            "decoding is the inverse of encoding"
         );
     }
 
     #[test]
     fn a_crop_box_keeps_the_means_inside() {
-        // Half a unit about (1, 0, 0).
+        // A box of half a unit in each direction around (1, 0, 0).
         let crop = Affine3A::from_scale(Vec3::splat(2.0)) * Affine3A::from_translation(-Vec3::X);
         let appearance = Appearance { crop: Some(crop), ..Appearance::default() };
-        assert!(appearance.shows(Vec3::new(1.4, 0.4, -0.4)), "inside");
-        assert!(!appearance.shows(Vec3::new(1.6, 0.0, 0.0)), "outside");
-        assert!(!appearance.shows(Vec3::NAN), "nowhere");
+        assert!(appearance.shows(Vec3::new(1.4, 0.4, -0.4)), "a mean inside the box is shown");
+        assert!(!appearance.shows(Vec3::new(1.6, 0.0, 0.0)), "a mean outside the box is not shown");
+        assert!(!appearance.shows(Vec3::NAN), "a mean that is not a number is not shown");
     }
 }

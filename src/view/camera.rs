@@ -17,7 +17,7 @@ pub struct Camera {
     pub lens: Lens,
 }
 
-/// How a camera's lens is described. The original treats the two descriptions differently ([`RasterFov`]).
+/// The description of a camera's lens. The original treats the two descriptions differently ([`RasterFov`]).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Lens {
     /// A *FoV camera*: tangents of half the horizontal and vertical field of view, centered.
@@ -34,7 +34,7 @@ pub enum Lens {
     },
 }
 
-/// Which field of view shapes the footprints of splats seen by an intrinsics camera. Default:
+/// The field of view that shapes the footprints of splats seen by an intrinsics camera. Default:
 /// [`Reference`](Self::Reference).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]

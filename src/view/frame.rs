@@ -10,12 +10,12 @@ use super::Picture;
 pub struct Frame {
     /// Color `C + T · background`, unclamped, in the blend space.
     pub picture: Picture,
-    /// Transmittance T left after the last splat blended, per pixel, row by row.
+    /// Transmittance T after the last splat blended, per pixel, row by row.
     pub transmittance: Vec<f32>,
     /// Expected depth `Σ z α T` in camera units, not divided by `1 − T`, per pixel.
     pub depth: Vec<f32>,
-    /// Median depth in camera units, per pixel: that of the splat at which T falls to one half or below; 0 if it never
-    /// does.
+    /// Median depth in camera units, per pixel: that of the splat at which T falls to one half or below; 0 if T stays
+    /// above one half.
     pub median_depth: Vec<f32>,
     /// Amount of work.
     pub counts: Counts,

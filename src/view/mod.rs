@@ -8,7 +8,7 @@ mod camera;
 mod frame;
 mod picture;
 pub mod srgb;
-#[expect(clippy::module_inception, reason = "the type `View` has its file, as the others have")]
+#[expect(clippy::module_inception, reason = "the type `View` has its own file, like the other types")]
 mod view;
 
 pub use appearance::{Appearance, Background, BlendSpace, DebugView, Lighting};

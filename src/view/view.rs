@@ -34,8 +34,8 @@ pub struct View {
     pub tan_fov: Vec2,
     /// Near limit in camera units: 0.2 capture units; for an orthographic camera, its near plane.
     pub near: f32,
-    /// Size of a pixel of the training views where they see the capture, capture units. Splats that are blurred by larger pixels than
-    /// these are made fainter by as much. Infinite: none is, as in the original.
+    /// Size of a pixel of the training views where they see the capture, capture units. The opacity of
+    /// splats that larger pixels blur is reduced accordingly. Infinite: no reduction, as in the original.
     pub trained_pixel: f32,
 }
 
@@ -74,13 +74,13 @@ impl View {
         }
     }
 
-    /// Returns the view with anti-aliasing, given the size of a pixel of the training views (`None` if it is not known: without).
+    /// Returns the view with anti-aliasing, given the size of a pixel of the training views (`None`, not known: without anti-aliasing).
     pub fn antialiased(self, trained_pixel: Option<f32>) -> Self {
         Self { trained_pixel: trained_pixel.unwrap_or(f32::INFINITY), ..self }
     }
 
-    /// Returns the variances across and down the screen that a variance of one training pixel squared has at one pixel for each camera
-    /// unit; at most 1e20, which stands for infinity.
+    /// Returns the variances across and down the screen of a variance of one training pixel squared, at a scale of one pixel per
+    /// camera unit; at most 1e20, which stands for infinity.
     pub fn trained_variance(&self) -> Vec2 {
         let along = |row| {
             let pixel = self.trained_pixel * self.world_to_camera.row(row).truncate().length();
@@ -89,7 +89,7 @@ impl View {
         Vec2::new(along(0), along(1))
     }
 
-    /// Returns the unit vector in capture space along which a point is seen.
+    /// Returns the viewing direction of a point, a unit vector in capture space.
     pub fn direction_to(&self, point: Vec3) -> Vec3 {
         if self.orthographic { self.camera_position } else { (point - self.camera_position).normalize() }
     }

@@ -18,7 +18,7 @@ use bevy::tasks::block_on;
 use bevy_gs4d::asset::{
     CaptureFailed, CaptureReady, CaptureSaveError, CaptureState, GaussianCapture, PackageSaver, PackageSaverSettings,
 };
-use bevy_gs4d::codec::checkpoint::CheckpointOptions;
+use bevy_gs4d::codec::ReadOptions;
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::offline;
 use bevy_gs4d::prelude::Upright;
@@ -383,7 +383,7 @@ fn checkpoints_take_from_cfg_args_what_settings_leave_open() {
     let folder = checkpoints();
     let mut app = app(folder.path(), false);
     let server = app.world().resource::<AssetServer>().clone();
-    let settings = |options: &mut CheckpointOptions| options.background = Some([0.25; 3]);
+    let settings = |options: &mut ReadOptions| options.background = Some([0.25; 3]);
     let captures: [Handle<GaussianCapture>; 3] = [
         server.load("without/a.pth"),
         server.load("with/a.pth"),

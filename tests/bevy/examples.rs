@@ -5,9 +5,8 @@
 //! there is no GPU, not even a software one.
 
 use crate::support::no_gpu::no_gpu;
-use bevy_gs4d::codec;
-use bevy_gs4d::codec::checkpoint::CheckpointOptions;
 use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::offline;
 use bevy_gs4d::scene::GaussianScene;
 use bevy_gs4d::testing::has_gpu;
@@ -136,7 +135,7 @@ fn invisible() -> TempDir {
     let (from, to) = (Path::new(ROOT).join("assets"), folder.path().join("assets"));
     std::fs::create_dir(&to).expect("the folder can be written to");
     std::fs::copy(from.join("demo.timeline.ron"), to.join("demo.timeline.ron")).expect("the timeline can be copied");
-    let scene = codec::load(&from.join("toybox.gs4d"), &CheckpointOptions::default()).expect("the bundled capture");
+    let scene = codec::load(&from.join("toybox.gs4d"), &ReadOptions::default()).expect("the bundled capture");
     let mut scene = scene.unpacked().into_runtime().expect("it can be drawn");
     for gaussian in &mut scene.form.as_sliced_mut().expect("unpacked").gaussians {
         gaussian.opacity = 0.0;

@@ -9,7 +9,7 @@ use crate::support::{data, npz};
 use bevy::camera::RenderTarget;
 use bevy::prelude::*;
 use bevy_gs4d::asset::GaussianCapture;
-use bevy_gs4d::codec::checkpoint::CheckpointOptions;
+use bevy_gs4d::codec::ReadOptions;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::view::Picture;
 use bevy_gs4d::{GaussianCapture3d, codec};
@@ -61,7 +61,7 @@ fn check(checkpoint: &str, golden: &str) {
     let Some(mut app) = app(size) else { return };
     let [r, g, b] = background;
     app.insert_resource(ClearColor(Color::srgb(r, g, b)));
-    let scene = codec::load(&folder.join(checkpoint), &CheckpointOptions::default()).expect("a readable checkpoint");
+    let scene = codec::load(&folder.join(checkpoint), &ReadOptions::default()).expect("a readable checkpoint");
     let capture = GaussianCapture::new(scene.into_runtime().expect("a drawable capture"));
     let seconds: Vec<f32> = views.iter().map(|view| capture.seconds_at(view.time)).collect();
     let handle = app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(capture);

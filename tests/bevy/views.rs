@@ -24,7 +24,7 @@ use bevy::render::render_resource::{Extent3d, TextureFormat};
 use bevy::render::renderer::{RenderAdapter, RenderDevice};
 use bevy::render::settings::WgpuFeatures;
 use bevy_gs4d::asset::GaussianCapture;
-use bevy_gs4d::codec::checkpoint::CheckpointOptions;
+use bevy_gs4d::codec::ReadOptions;
 use bevy_gs4d::playback::{ClipFade, Playback, Repeat};
 use bevy_gs4d::render::{CaptureSettings, CaptureStatistics, CaptureViewSettings};
 use bevy_gs4d::scene::{Environment, RuntimeScene};
@@ -414,7 +414,7 @@ fn without_tonemapping_bevy_shows_what_the_command_renders() {
     let Some(mut app) = app(size) else { return };
     let Some(mut headless) = gpu::headless() else { return };
     let package = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/toybox.gs4d");
-    let scene = codec::load(&package, &CheckpointOptions::default()).expect("a readable package");
+    let scene = codec::load(&package, &ReadOptions::default()).expect("a readable package");
     let scene = scene.into_runtime().expect("a drawable capture");
     let pose = Transform::from_xyz(2.5, -3.0, 1.5).looking_at(Vec3::ZERO, Vec3::Z);
     let seconds = 1.3;

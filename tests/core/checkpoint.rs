@@ -6,19 +6,19 @@
 use crate::support::data;
 use crate::support::golden;
 use crate::support::pth::{self, Pth};
-use bevy_gs4d::codec;
-use bevy_gs4d::codec::checkpoint::{self, CheckpointError, CheckpointOptions, describe};
+use bevy_gs4d::codec::checkpoint::{self, CheckpointError, describe};
+use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::gaussian::{Harmonics, Model, Parameters};
 use bevy_gs4d::scene::{GaussianScene, RotationConvention, SceneForm, Trained, TrainedCameras, UpAxis};
 use serde_json::Value;
 use std::io::Cursor;
 
-fn read_with(pth: &Pth, options: &CheckpointOptions) -> Result<GaussianScene, CheckpointError> {
+fn read_with(pth: &Pth, options: &ReadOptions) -> Result<GaussianScene, CheckpointError> {
     checkpoint::read(Cursor::new(pth.bytes()), options, None)
 }
 
 fn read(pth: &Pth) -> GaussianScene {
-    read_with(pth, &CheckpointOptions::default()).expect("a valid checkpoint")
+    read_with(pth, &ReadOptions::default()).expect("a valid checkpoint")
 }
 
 fn trained(scene: &GaussianScene) -> &Trained {
@@ -65,7 +65,7 @@ fn golden_checkpoints_hold_the_golden_scenes() {
         let json: Value = serde_json::from_slice(&json).expect("valid JSON");
         for dialect in ["torch1.12", "torch2"] {
             let path = golden::folder().join("checkpoints").join(format!("{name}_{dialect}.pth"));
-            let scene = codec::load(&path, &CheckpointOptions::default()).expect("a golden checkpoint");
+            let scene = codec::load(&path, &ReadOptions::default()).expect("a golden checkpoint");
             let found = parameters(&scene);
             let context = format!("{name}, {dialect}");
             assert_eq!(found.model(), model, "{context}: model");
@@ -113,8 +113,7 @@ fn golden_checkpoints_hold_the_golden_scenes() {
 #[test]
 fn unflipped_rotations_are_converted_on_request() {
     let pth = Pth::rotating(3, 48);
-    let unflipped =
-        CheckpointOptions { rotation_convention: Some(RotationConvention::Unflipped), ..CheckpointOptions::default() };
+    let unflipped = ReadOptions { rotation_convention: Some(RotationConvention::Unflipped), ..ReadOptions::default() };
     let (before, after) = (read(&pth), read_with(&pth, &unflipped).expect("valid"));
     let mut expected = parameters(&before).clone();
     expected.flip_rotations();
@@ -129,8 +128,7 @@ fn time_blocks_never_written_mean_unflipped() {
     for sh in pth.storages[2].chunks_exact_mut(47 * 3) {
         sh[45..].fill(0.0);
     }
-    let flipped =
-        CheckpointOptions { rotation_convention: Some(RotationConvention::Flipped), ..CheckpointOptions::default() };
+    let flipped = ReadOptions { rotation_convention: Some(RotationConvention::Flipped), ..ReadOptions::default() };
     let given = read_with(&pth, &flipped).expect("valid");
     assert_eq!(given.trained_with.rotation_convention, RotationConvention::Flipped, "an option wins");
     let guessed = read(&pth);
@@ -158,7 +156,7 @@ fn entries_beyond_the_known_ones_are_ignored() {
     still.slots.drain(8..10);
     still.slots.truncate(11);
     still.slots.push(pth::NONE.to_vec());
-    assert!(read_with(&still, &CheckpointOptions::default()).is_err(), "slot 11 must be the learning-rate scale");
+    assert!(read_with(&still, &ReadOptions::default()).is_err(), "slot 11 must be the learning-rate scale");
     still.slots[11] = pth::float(2.5);
     let scene = read(&still);
     assert_eq!(scene.model(), Some(Model::Static3d), "12 entries");
@@ -194,12 +192,12 @@ fn an_empty_capture_is_valid() {
 #[test]
 fn degrees_and_coefficients_fit_together() {
     let mut legacy = Pth::rotating(2, 33);
-    assert!(read_with(&legacy, &CheckpointOptions::default()).is_err(), "time degree 2 needs 48 coefficients");
+    assert!(read_with(&legacy, &ReadOptions::default()).is_err(), "time degree 2 needs 48 coefficients");
     legacy.slots[18] = pth::int(0);
     let scene = read(&legacy);
     assert_eq!((harmonics(&scene).coefficients, harmonics(&scene).evaluated()), (33, 16), "the legacy table");
 
-    let forced = CheckpointOptions { force_sh_3d: Some(true), ..CheckpointOptions::default() };
+    let forced = ReadOptions { force_sh_3d: Some(true), ..ReadOptions::default() };
     let scene = read_with(&Pth::rotating(2, 48), &forced).expect("valid");
     assert_eq!((harmonics(&scene).degree_t, harmonics(&scene).coefficients), (0, 48), "stored, but not evaluated");
     let scene = read_with(&Pth::rotating(2, 16), &forced).expect("16 are enough without time blocks");
@@ -214,10 +212,9 @@ fn degrees_and_coefficients_fit_together() {
 #[test]
 fn options_win_over_cfg_args_over_defaults() {
     let bytes = Pth::rotating(1, 48).bytes();
-    let read = |options: &CheckpointOptions, cfg: Option<&str>| {
-        checkpoint::read(Cursor::new(&bytes), options, cfg).expect("valid")
-    };
-    let none = CheckpointOptions::default();
+    let read =
+        |options: &ReadOptions, cfg: Option<&str>| checkpoint::read(Cursor::new(&bytes), options, cfg).expect("valid");
+    let none = ReadOptions::default();
     let cfg = Some("Namespace(sh_degree=3, white_background=True, prefilter_var=0.5)");
     let plain = read(&none, None);
     assert_eq!(plain.trained_with.background, [0.0; 3], "default background");
@@ -226,7 +223,7 @@ fn options_win_over_cfg_args_over_defaults() {
     let from_cfg = read(&none, cfg);
     assert_eq!(from_cfg.trained_with.background, [1.0; 3], "cfg_args over the default");
     assert_eq!(from_cfg.trained_with.prefilter_var, 0.5, "cfg_args over the default");
-    let given = CheckpointOptions {
+    let given = ReadOptions {
         background: Some([0.25; 3]),
         prefilter_var: Some(-1.0),
         time_interval: Some([-1.0, 9.0]),
@@ -243,7 +240,7 @@ fn options_win_over_cfg_args_over_defaults() {
 
 #[test]
 fn a_still_lasts_no_time() {
-    let options = CheckpointOptions { duration_seconds: Some(0.0), ..CheckpointOptions::default() };
+    let options = ReadOptions { duration_seconds: Some(0.0), ..ReadOptions::default() };
     let scene = read_with(&Pth::rotating(1, 48), &options).expect("a duration of nothing is one");
     assert_eq!(scene.playback.duration_seconds, 0.0, "as it was given");
 }
@@ -251,12 +248,12 @@ fn a_still_lasts_no_time() {
 #[test]
 fn options_without_sense_are_refused() {
     let pth = Pth::rotating(1, 48);
-    let none = CheckpointOptions::default();
+    let none = ReadOptions::default();
     for (name, options) in [
-        ("time interval", CheckpointOptions { time_interval: Some([1.0, 1.0]), ..none.clone() }),
-        ("time interval", CheckpointOptions { time_interval: Some([0.0, f32::NAN]), ..none.clone() }),
-        ("background", CheckpointOptions { background: Some([0.0, f32::INFINITY, 0.0]), ..none.clone() }),
-        ("duration", CheckpointOptions { duration_seconds: Some(-1.0), ..none.clone() }),
+        ("time interval", ReadOptions { time_interval: Some([1.0, 1.0]), ..none.clone() }),
+        ("time interval", ReadOptions { time_interval: Some([0.0, f32::NAN]), ..none.clone() }),
+        ("background", ReadOptions { background: Some([0.0, f32::INFINITY, 0.0]), ..none.clone() }),
+        ("duration", ReadOptions { duration_seconds: Some(-1.0), ..none.clone() }),
     ] {
         let message = read_with(&pth, &options).expect_err("must be refused").to_string();
         assert!(message.contains(name), "{message}");
@@ -272,7 +269,7 @@ fn cfg_args_beside_the_file_counts() {
     let name = "chkpnt30000.pth";
     let path = folder.path().join(name);
     std::fs::write(&path, Pth::rotating(1, 48).bytes()).expect("the folder can be written to");
-    let background = || codec::load(&path, &CheckpointOptions::default()).expect("valid").trained_with.background;
+    let background = || codec::load(&path, &ReadOptions::default()).expect("valid").trained_with.background;
     assert_eq!(background(), [0.0; 3], "nothing beside it");
     std::fs::write(folder.path().join("cfg_args"), "Namespace(white_background=True)").expect("can be written to");
     assert_eq!(background(), [1.0; 3], "cfg_args beside it");
@@ -282,7 +279,7 @@ fn cfg_args_beside_the_file_counts() {
 fn real_captures_load() {
     let Some(data) = data::data() else { return };
     for file in ["toybox/toybox_chkpnt.pth", "standup/standup_chkpnt.pth"] {
-        let scene = codec::load(&data.join(file), &CheckpointOptions::default()).expect("a real capture");
+        let scene = codec::load(&data.join(file), &ReadOptions::default()).expect("a real capture");
         assert_eq!((scene.len(), harmonics(&scene).coefficients), (90_000, 48), "{file}");
         assert_eq!(scene.model(), Some(Model::Rotated4d), "{file}");
         assert_eq!((harmonics(&scene).degree, harmonics(&scene).degree_t), (3, 2), "{file}");

@@ -4,7 +4,8 @@
 //! never with a panic and never read as a wrong scene.
 
 use crate::support::pth::{self, Pth};
-use bevy_gs4d::codec::checkpoint::{self, CheckpointError, CheckpointOptions};
+use bevy_gs4d::codec::ReadOptions;
+use bevy_gs4d::codec::checkpoint::{self, CheckpointError};
 use bevy_gs4d::scene::GaussianScene;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -12,7 +13,7 @@ use proptest::sample::{Index, select};
 use std::io::Cursor;
 
 fn read(bytes: &[u8]) -> Result<GaussianScene, CheckpointError> {
-    checkpoint::read(Cursor::new(bytes), &CheckpointOptions::default(), None)
+    checkpoint::read(Cursor::new(bytes), &ReadOptions::default(), None)
 }
 
 /// Checks that the file is refused with a message that contains all of `words`.

@@ -6,9 +6,8 @@
 
 use crate::support::data::data;
 use crate::support::own_process::run_alone;
-use bevy_gs4d::codec;
-use bevy_gs4d::codec::checkpoint::CheckpointOptions;
 use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::offline;
 use bevy_gs4d::scene::GaussianScene;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
@@ -47,7 +46,7 @@ fn check(path: &Path) {
     let size = path.metadata().expect("the file is there").len() as usize;
     let before = NOW.load(Ordering::Relaxed);
     PEAK.store(before, Ordering::Relaxed);
-    let scene = codec::load(path, &CheckpointOptions::default()).expect("the file can be read");
+    let scene = codec::load(path, &ReadOptions::default()).expect("the file can be read");
     let scene = scene.into_runtime().expect("the scene can be drawn");
     let peak = PEAK.load(Ordering::Relaxed) - before;
     let factor = peak as f64 / size as f64;
@@ -78,7 +77,7 @@ fn real_captures_load_in_three_times_their_size() {
         for file in ["toybox/toybox_chkpnt.pth", "standup/standup_chkpnt.pth"] {
             let path = data.join(file);
             check(&path);
-            check_package(&codec::load(&path, &CheckpointOptions::default()).expect("the file can be read"));
+            check_package(&codec::load(&path, &ReadOptions::default()).expect("the file can be read"));
         }
     });
 }

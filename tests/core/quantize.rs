@@ -5,7 +5,7 @@
 
 use crate::support::data;
 use crate::support::packed_scene::{BLACK, scene, settings, view};
-use bevy_gs4d::codec::checkpoint::CheckpointOptions;
+use bevy_gs4d::codec::ReadOptions;
 use bevy_gs4d::codec::{self, package};
 use bevy_gs4d::gaussian::Gaussian;
 use bevy_gs4d::offline::convert::{ConvertSettings, TargetForm, convert};
@@ -319,8 +319,7 @@ fn every_flipped_bit_of_a_packed_package_is_noticed() {
 fn real_captures_reach_the_balanced_targets() {
     let Some(data) = data::data() else { return };
     // As in the demo: 45,000 Gaussians; the larger captures take minutes in a build without optimisation.
-    let scene =
-        codec::load(&data.join("toybox/toybox_45k.pth"), &CheckpointOptions::default()).expect("the checkpoint");
+    let scene = codec::load(&data.join("toybox/toybox_45k.pth"), &ReadOptions::default()).expect("the checkpoint");
     let scene = scene.into_runtime().expect("drawable");
     let (packed, _) = compress(scene.clone(), &CompressSettings::from(Quality::Balanced)).expect("it is compressed");
     let mut bytes = Vec::new();

@@ -8,8 +8,7 @@
 use crate::support::data::data;
 use crate::support::npy;
 use crate::support::skip::skip;
-use bevy_gs4d::codec;
-use bevy_gs4d::codec::checkpoint::CheckpointOptions;
+use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
 use bevy_gs4d::offline::NoProgress;
 use bevy_gs4d::offline::dataset::selection::{distinct_cameras, even_subset, to_draw};
@@ -282,7 +281,7 @@ fn filters_contain_one_another() {
 fn capture(name: &str, resolution: Option<i32>) -> Option<(PathBuf, GaussianScene, Dataset)> {
     let folder = data()?.join(name);
     let path = folder.join(format!("{name}_chkpnt.pth"));
-    let scene = codec::load(&path, &CheckpointOptions::default()).expect("the checkpoint");
+    let scene = codec::load(&path, &ReadOptions::default()).expect("the checkpoint");
     let options = CameraOptions { resolution, ..CameraOptions::default() };
     let dataset = Dataset::open(&folder, Split::Train, &options).expect("the training views");
     Some((folder, scene, dataset))

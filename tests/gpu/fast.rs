@@ -6,7 +6,7 @@
 use crate::support::blob::blob;
 use crate::support::gpu;
 use crate::support::surfaces::{depth_texture, edge};
-use bevy_gs4d::codec::checkpoint::CheckpointOptions;
+use bevy_gs4d::codec::ReadOptions;
 use bevy_gs4d::codec::load;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::offline::metrics::SquaredError;
@@ -150,7 +150,7 @@ fn every_way_of_blending_shows_the_picture_of_the_reference() {
 fn the_bundled_capture_without_depths_is_that_of_the_reference() {
     let Some(mut headless) = gpu::headless() else { return };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/toybox.gs4d");
-    let scene = load(&path, &CheckpointOptions::default()).expect("the bundled capture").into_runtime();
+    let scene = load(&path, &ReadOptions::default()).expect("the bundled capture").into_runtime();
     let scene = scene.expect("a scene that can be drawn");
     let capture = headless.upload(&scene).expect("the scene fits");
     for (size, time) in [(400, 0.1), (400, 0.6), (530, 0.3)] {

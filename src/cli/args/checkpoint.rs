@@ -5,13 +5,10 @@
 use super::values;
 use crate::cli::failure::Failure;
 use crate::cli::progress::note;
-use crate::codec::checkpoint::CheckpointOptions;
-use crate::codec::{self, package};
+use crate::codec::{self, ReadOptions};
 use crate::gaussian::ShDirection;
-use crate::scene::{GaussianScene, RotationConvention, TrainedCameras, TrainedWith, UpAxis};
+use crate::scene::{GaussianScene, RotationConvention, TrainedCameras, UpAxis};
 use crate::view::RasterFov;
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 /// What a checkpoint does not say about itself.
@@ -75,15 +72,7 @@ impl CheckpointArgs {
     /// # Errors
     /// Errors of the codec; options that contradict the training settings in a package.
     pub fn load(&self, path: &Path) -> Result<GaussianScene, Failure> {
-        let mut scene = codec::load(path, &self.options())?;
-        if is_package(path) {
-            self.check_against(&scene.trained_with).map_err(|message| Failure::about(path, &message))?;
-            let trained = &mut scene.trained_with;
-            trained.raster_fov = self.raster_fov.unwrap_or(trained.raster_fov);
-            trained.cameras = self.trained_cameras.unwrap_or(trained.cameras);
-            trained.sh_direction = self.sh_direction.unwrap_or(trained.sh_direction);
-        }
-        Ok(scene)
+        Ok(codec::load(path, &self.options())?)
     }
 
     /// Opens a checkpoint or a package to change it: as [`load`](Self::load), without levels of detail, which are of the scene as it is.
@@ -99,8 +88,8 @@ impl CheckpointArgs {
         Ok(scene)
     }
 
-    fn options(&self) -> CheckpointOptions {
-        CheckpointOptions {
+    fn options(&self) -> ReadOptions {
+        ReadOptions {
             time_interval: self.time_interval,
             background: self.background,
             rotation_convention: self.rotation_convention,
@@ -113,29 +102,4 @@ impl CheckpointArgs {
             duration_seconds: self.duration,
         }
     }
-
-    /// Checks that the options that a package cannot change any more are those it was written with.
-    fn check_against(&self, stored: &TrainedWith) -> Result<(), String> {
-        let differing = [
-            ("--time-interval", self.time_interval.is_some_and(|given| given != stored.time_interval)),
-            (
-                "--rotation-convention",
-                self.rotation_convention.is_some_and(|given| given != stored.rotation_convention),
-            ),
-            ("--force-sh-3d", self.force_sh_3d && !stored.force_sh_3d),
-            ("--prefilter-var", self.prefilter_var.is_some_and(|given| given != stored.prefilter_var)),
-        ];
-        match differing.into_iter().find(|(_, differs)| *differs) {
-            Some((option, _)) => Err(format!(
-                "this package was made with another {option}: convert its checkpoint again with that option"
-            )),
-            None => Ok(()),
-        }
-    }
-}
-
-/// Returns whether a file starts with the magic bytes of a package.
-pub fn is_package(path: &Path) -> bool {
-    let mut magic = [0; package::MAGIC.len()];
-    File::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok() && magic == package::MAGIC
 }

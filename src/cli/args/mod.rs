@@ -10,7 +10,7 @@ mod scoring;
 pub mod values;
 mod views;
 
-pub use checkpoint::{CheckpointArgs, is_package};
+pub use checkpoint::CheckpointArgs;
 pub use data::{DataArgs, SplitArgs, ValidationArgs};
 pub use engine::{DesignArgs, EngineArgs, RendererArgs, RenderersArgs};
 pub use package::{PackageArgs, file_size};

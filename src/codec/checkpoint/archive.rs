@@ -10,7 +10,7 @@ use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use zip::read::{ArchiveOffset, Config};
 use zip::{CompressionMethod, ZipArchive};
 
-/// Largest size of `data.pkl` in bytes. Real ones have some 5,000, whatever the number of Gaussians.
+/// Largest size of `data.pkl` in bytes. In real checkpoints it has about 5,000, for any number of Gaussians.
 const PICKLE_LIMIT: u64 = 1 << 20;
 /// Bytes read at once.
 const BUFFER: usize = 1 << 16;
@@ -228,7 +228,7 @@ fn read_values(reader: &mut impl BufRead, values: &mut [f32]) -> io::Result<()> 
     Ok(())
 }
 
-/// Returns a name from the file in a form that can be shown.
+/// Returns a name from the file, made safe to print.
 fn printable(name: &[u8]) -> String {
     text::printable(&String::from_utf8_lossy(name))
 }

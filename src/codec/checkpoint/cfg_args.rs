@@ -7,17 +7,17 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// Largest number of bytes read of the file, which has some 300.
+/// Largest number of bytes that is read of the file, which has about 300.
 const LIMIT: u64 = 1 << 16;
 
 /// Returns the text of the file in the folder of a checkpoint; `None` if it cannot be read, since it is optional.
-pub(super) fn beside(checkpoint: &Path) -> Option<String> {
+pub(super) fn read_for(checkpoint: &Path) -> Option<String> {
     let mut text = Vec::new();
     File::open(checkpoint.with_file_name("cfg_args")).ok()?.take(LIMIT).read_to_end(&mut text).ok()?;
     Some(String::from_utf8_lossy(&text).into_owned())
 }
 
-/// The entries of `cfg_args` that are used; `None` if absent or not understood.
+/// The entries of `cfg_args` that are used; `None` if absent or invalid.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct CfgArgs {
     /// Whether the background in training was white instead of black.
@@ -68,15 +68,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn entries_in_quotes_do_not_count() {
+    fn entries_in_quotes_and_brackets_are_ignored() {
         let text = r#"Namespace(sh_degree=3, source_path='/a, white_background=True, \'b', model_path="it's", loaded_pth='',
             extra=[1, (2, 3)], white_background=False, eval=True, prefilter_var=0.25)"#;
         let expected = CfgArgs { white_background: Some(false), prefilter_var: Some(0.25) };
-        assert_eq!(CfgArgs::parse(text), expected, "only the entries at the top count");
+        assert_eq!(CfgArgs::parse(text), expected, "only the outermost entries are used");
     }
 
     #[test]
-    fn what_is_not_understood_stays_out() {
+    fn unknown_values_are_ignored() {
         for text in [
             "",
             "Namespace(",
@@ -84,7 +84,7 @@ mod tests {
             "Namespace(white_background=1, prefilter_var=inf)",
             "Namespace(')",
         ] {
-            assert_eq!(CfgArgs::parse(text), CfgArgs::default(), "{text}");
+            assert_eq!(CfgArgs::parse(text), CfgArgs::default(), "no entry is used from {text}");
         }
     }
 }

@@ -3,6 +3,7 @@
 //! In: a problem found by the reader. Out: a message of one line that names the problem and, if there is one, the
 //! remedy. [`CodecError`](crate::codec::CodecError) adds the path.
 
+use crate::codec::options::InvalidOption;
 use std::io;
 
 /// Why a checkpoint was not read.
@@ -52,7 +53,7 @@ pub enum CheckpointError {
     Pickle {
         /// Offset in bytes from the start of `data.pkl`.
         offset: usize,
-        /// What is wrong.
+        /// The reason.
         reason: String,
     },
     /// An opcode that no checkpoint of the trainer contains.
@@ -63,9 +64,9 @@ pub enum CheckpointError {
         /// The opcode.
         code: u8,
     },
-    /// A Python object that no checkpoint of the trainer contains. Nothing was run.
+    /// A Python object that no checkpoint of the trainer contains. No code of the file was run.
     #[error(
-        "data.pkl, byte {offset}: the file asks for the Python object `{name}`, which no 4DGS checkpoint needs; refused"
+        "data.pkl, byte {offset}: the file names the Python object `{name}`, which no 4DGS checkpoint needs; refused"
     )]
     Global {
         /// Offset in bytes from the start of `data.pkl`.
@@ -73,7 +74,7 @@ pub enum CheckpointError {
         /// Module and name, as in the pickle.
         name: String,
     },
-    /// The objects in the file are not those of the 4DGS trainer.
+    /// The objects in the file are not the state of the 4DGS trainer.
     #[error("{0}")]
     Layout(String),
     /// A slot of the state tuple holds the wrong kind of value.
@@ -88,7 +89,7 @@ pub enum CheckpointError {
         /// The kind of value that is expected.
         expected: &'static str,
     },
-    /// A tensor does not have the shape that the others require.
+    /// A tensor does not have the shape that the other tensors require.
     #[error("slot {index} ({name}) has shape {found:?}, expected {expected}")]
     Shape {
         /// Index in the state tuple, from 0.
@@ -107,7 +108,7 @@ pub enum CheckpointError {
         index: usize,
         /// Name of the attribute in the trainer.
         name: &'static str,
-        /// What is wrong.
+        /// The reason.
         reason: String,
     },
     /// The values of a tensor could not be read, or do not match their checksum.
@@ -139,11 +140,6 @@ pub enum CheckpointError {
         at: usize,
     },
     /// An invalid option.
-    #[error("option {name}: {reason}")]
-    Option {
-        /// Name of the option.
-        name: &'static str,
-        /// What is wrong with it.
-        reason: String,
-    },
+    #[error(transparent)]
+    Option(#[from] InvalidOption),
 }

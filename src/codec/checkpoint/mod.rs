@@ -1,6 +1,6 @@
 //! Checkpoints (`.pth`) of the original 4DGS trainer, read without Python.
 //!
-//! In: a seekable file, [`CheckpointOptions`], and the text of `cfg_args`. Out: a [`GaussianScene`] in the trained form.
+//! In: a seekable file, [`ReadOptions`], and the text of `cfg_args`. Out: a [`GaussianScene`] in the trained form.
 //!
 //! ```text
 //! Archive   the zip: its entries, none of which may be compressed or beyond the end of the file
@@ -18,10 +18,9 @@ mod state;
 mod tensor;
 
 pub use error::CheckpointError;
-pub use options::{CheckpointOptions, describe};
+pub use options::describe;
 
-use super::CodecErrorKind;
-use super::format::Format;
+use super::options::ReadOptions;
 use crate::gaussian::{Harmonics, Model};
 use crate::scene::{GaussianScene, RotationConvention, SceneForm, Trained};
 use archive::Archive;
@@ -32,15 +31,11 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
-/// The row of checkpoints in the table of formats.
-pub const FORMAT: Format = Format {
-    name: "a checkpoint of the 4DGS trainer (.pth, a zip archive)",
-    extensions: &["pth"],
-    // A zip archive that is not empty.
-    magic: b"PK\x03\x04",
-    read: read_file,
-    write: None,
-};
+/// Extensions of checkpoints, without the dot.
+pub const EXTENSIONS: &[&str] = &["pth"];
+
+/// The first bytes of every checkpoint, which is a zip archive that is not empty.
+pub const MAGIC: [u8; 4] = *b"PK\x03\x04";
 
 /// Reads a checkpoint. `cfg_args` is the text of the file of that name in the same folder; `None` if there is none.
 ///
@@ -51,7 +46,7 @@ pub const FORMAT: Format = Format {
 /// Invalid options; a damaged or foreign file; values that are not finite, quaternions of length zero.
 pub fn read<R: Read + Seek>(
     reader: R,
-    options: &CheckpointOptions,
+    options: &ReadOptions,
     cfg_args: Option<&str>,
 ) -> Result<GaussianScene, CheckpointError> {
     options.check()?;
@@ -73,15 +68,22 @@ pub fn read<R: Read + Seek>(
         iteration: state.iteration,
         spatial_lr_scale: state.spatial_lr_scale,
     };
-    let trained_with = options.trained_with(cfg_args, &file);
-    let playback = options.playback(&trained_with);
+    let trained_with = options::trained_with(options, cfg_args, &file);
+    let playback = options::playback(options, &trained_with);
     let form = SceneForm::Trained(Trained { parameters, harmonics });
     Ok(GaussianScene { form, environment, filter: None, trained_with, playback, levels: Vec::new() })
 }
 
 /// Reads a checkpoint, and `cfg_args` in the same folder.
-fn read_file(path: &Path, file: BufReader<File>, options: &CheckpointOptions) -> Result<GaussianScene, CodecErrorKind> {
-    Ok(read(file, options, cfg_args::beside(path).as_deref())?)
+///
+/// # Errors
+/// As [`read`].
+pub(super) fn read_file(
+    path: &Path,
+    file: BufReader<File>,
+    options: &ReadOptions,
+) -> Result<GaussianScene, CheckpointError> {
+    read(file, options, cfg_args::read_for(path).as_deref())
 }
 
 /// Returns the convention of a file for which none is given. Code whose backward pass never wrote the time blocks is

@@ -35,7 +35,7 @@ pub(super) enum Value<'a> {
 }
 
 impl Value<'_> {
-    /// Returns what it is, for messages.
+    /// Returns the kind of the value, for messages.
     pub(super) fn kind(&self) -> &'static str {
         match self {
             Self::None => "None",
@@ -148,9 +148,9 @@ mod op {
     pub const LONG_BINGET: u8 = b'j';
 }
 
-/// Largest number of axes of a tensor; those that are read have at most three.
+/// Largest number of axes of a tensor; tensors that are read have at most three.
 const AXES: usize = 8;
-/// Largest length in bytes of a numpy scalar in its text form, in which a byte takes one or two.
+/// Largest length in bytes of a numpy scalar in its text form, which has one or two bytes for each byte of the scalar.
 const SCALAR_TEXT: usize = 16;
 
 /// The stack machine that interprets a pickle.
@@ -221,7 +221,7 @@ impl<'a> Machine<'a> {
             op::SETITEMS => {
                 let items = self.pop_to_mark()?;
                 if items.len() % 2 != 0 || !matches!(self.value(self.top()?), Value::Dict) {
-                    return Err(self.error("items that do not go into a dictionary"));
+                    return Err(self.error("items without a dictionary to add them to"));
                 }
             }
             op::GLOBAL => {
@@ -357,7 +357,7 @@ impl<'a> Machine<'a> {
     }
 
     fn recall(&mut self, index: u32) -> Result<(), CheckpointError> {
-        let id = *self.memo.get(&index).ok_or_else(|| self.error(format!("nothing was remembered as {index}")))?;
+        let id = *self.memo.get(&index).ok_or_else(|| self.error(format!("the memo has no value {index}")))?;
         self.stack.push(id);
         Ok(())
     }
@@ -365,7 +365,7 @@ impl<'a> Machine<'a> {
     fn expect_list(&self) -> Result<(), CheckpointError> {
         match self.value(self.top()?) {
             Value::List => Ok(()),
-            other => Err(self.error(format!("items that go into {}, not a list", other.kind()))),
+            other => Err(self.error(format!("items to be added to {}, not a list", other.kind()))),
         }
     }
 
@@ -404,7 +404,7 @@ impl<'a> Machine<'a> {
     /// Evaluates a call of `callable` and pushes the result.
     fn reduce(&mut self, callable: Id, arguments: Id) -> Result<(), CheckpointError> {
         let (&Value::Global(global), Value::Tuple(arguments)) = (self.value(callable), self.value(arguments)) else {
-            return Err(self.error("a call of something that cannot be called"));
+            return Err(self.error("a call of a value that is not a function"));
         };
         let result = match (global, arguments.as_slice()) {
             (Global::RebuildParameter, &[data, _, _]) if matches!(self.value(data), Value::Tensor(_)) => {
@@ -455,7 +455,7 @@ impl<'a> Machine<'a> {
         Some(Value::Float(value))
     }
 
-    /// Returns bytes, which protocol 2 writes as a text of the first 256 characters.
+    /// Returns bytes, which protocol 2 writes as a text of characters below 256.
     fn encode(&self, text: Id, encoding: Id) -> Option<Value<'a>> {
         match (self.value(text), self.value(encoding)) {
             (&Value::Text(text), Value::Text("latin1")) if text.len() <= SCALAR_TEXT => {
@@ -478,7 +478,7 @@ mod tests {
     #[test]
     fn foreign_objects_are_refused_by_name() {
         let message = refusal(b"\x80\x02cos\nsystem\n(X\x02\x00\x00\x00lstR.");
-        assert!(message.contains("`os system`"), "{message}");
+        assert!(message.contains("`os system`"), "the object is named: {message}");
         let message = refusal(b"\x80\x02cos\n\x1b[2Jsystem\n.");
         assert!(!message.contains('\x1b'), "control characters are escaped: {message}");
     }
@@ -486,11 +486,14 @@ mod tests {
     #[test]
     fn foreign_opcodes_are_refused_by_name() {
         let message = refusal(b"\x80\x02(S'ls'\nios\nsystem\n.");
-        assert!(message.contains("0x53") && message.contains("byte 3"), "{message}");
+        assert!(
+            message.contains("0x53") && message.contains("byte 3"),
+            "the opcode and its offset are named: {message}"
+        );
     }
 
     #[test]
-    fn the_stack_does_not_run_dry() {
+    fn popping_an_empty_pickle_stack_is_an_error() {
         for bytes in [
             &b"\x80\x02."[..],
             b"\x80\x02t.",
@@ -500,7 +503,7 @@ mod tests {
             b"\x80\x02q\x00.",
             b"\x80\x02h\x07.",
         ] {
-            assert!(Pickle::parse(bytes).is_err(), "{bytes:?} takes what is not there");
+            assert!(Pickle::parse(bytes).is_err(), "{bytes:?} pops a value or a mark that is not on the stack");
         }
     }
 

@@ -15,9 +15,9 @@ const COEFFICIENTS: u64 = 48;
 /// Largest number of texels along an edge of an environment map.
 const ENVIRONMENT_EDGE: u64 = 16_384;
 
-/// A checkpoint's state: scalars as values, tensors not yet read.
+/// The state of a checkpoint: scalars as values, tensors not yet read.
 pub(super) struct State<'p> {
-    /// Which of the three models.
+    /// The model of the original code.
     pub model: Model,
     /// Number of Gaussians.
     pub count: usize,
@@ -174,7 +174,8 @@ impl<'p> State<'p> {
         Ok(parameters)
     }
 
-    /// Reads the color coefficients: the first from one tensor, the others from another, interleaved per Gaussian.
+    /// Reads the color coefficients: the first coefficient from one tensor, the others from another, interleaved per
+    /// Gaussian.
     ///
     /// # Errors
     /// Tensors of other shapes or that cannot be read, too few coefficients for the active degrees, a value that is not finite.

@@ -29,7 +29,7 @@ impl Tensor<'_> {
     /// Checks that the tensor lies within its storage, and returns its number of values.
     ///
     /// # Errors
-    /// A description of what is wrong.
+    /// A description of the problem.
     pub(super) fn check(&self) -> Result<u64, &'static str> {
         let beyond = "reaches beyond the end of its storage";
         let count = self.size.iter().try_fold(1u64, |product, &size| product.checked_mul(size)).ok_or(beyond)?;
@@ -46,7 +46,7 @@ impl Tensor<'_> {
         Ok(count)
     }
 
-    /// Returns whether the values lie one after another, the last axis innermost.
+    /// Returns whether the values are stored one after another, the last axis innermost.
     pub(super) fn is_contiguous(&self) -> bool {
         let mut expected = 1;
         self.size.iter().zip(&self.stride).rev().all(|(&size, &stride)| {
@@ -56,7 +56,7 @@ impl Tensor<'_> {
         })
     }
 
-    /// Returns the index in the storage of the value with the number `at`, counted with the last axis innermost.
+    /// Returns the index in the storage of the value with the index `at`, counted with the last axis innermost.
     pub(super) fn place(&self, mut at: u64) -> u64 {
         let mut place = self.offset;
         for (&size, &stride) in self.size.iter().zip(&self.stride).rev() {
@@ -76,22 +76,32 @@ mod tests {
     }
 
     #[test]
-    fn no_index_leaves_the_storage() {
-        assert_eq!(tensor(6, 0, &[2, 3], &[3, 1]).check(), Ok(6), "exactly filled");
-        assert_eq!(tensor(7, 1, &[2, 3], &[3, 1]).check(), Ok(6), "moved by one");
-        assert!(tensor(6, 1, &[2, 3], &[3, 1]).check().is_err(), "one too far");
-        assert!(tensor(6, 0, &[2, 3], &[4, 1]).check().is_err(), "too wide a stride");
-        assert!(tensor(6, 0, &[1 << 40, 3], &[0, 0]).check().is_err(), "expanded to any size");
-        assert!(tensor(u64::MAX, 0, &[1 << 40, 1 << 40], &[1, 1]).check().is_err(), "a product that overflows");
-        assert!(tensor(u64::MAX, 9, &[3, 3], &[1 << 63, 1]).check().is_err(), "a place that overflows");
-        assert_eq!(tensor(0, 0, &[0, 1 << 40], &[1, 1]).check(), Ok(0), "an empty one");
+    fn a_tensor_that_reaches_beyond_its_storage_is_refused() {
+        assert_eq!(tensor(6, 0, &[2, 3], &[3, 1]).check(), Ok(6), "a storage that is exactly filled");
+        assert_eq!(tensor(7, 1, &[2, 3], &[3, 1]).check(), Ok(6), "an offset of one");
+        assert!(tensor(6, 1, &[2, 3], &[3, 1]).check().is_err(), "an offset too large by one");
+        assert!(tensor(6, 0, &[2, 3], &[4, 1]).check().is_err(), "a stride that is too large");
+        assert!(
+            tensor(6, 0, &[1 << 40, 3], &[0, 0]).check().is_err(),
+            "strides of zero, which expand a value to any size"
+        );
+        assert!(
+            tensor(u64::MAX, 0, &[1 << 40, 1 << 40], &[1, 1]).check().is_err(),
+            "a number of values that overflows"
+        );
+        assert!(tensor(u64::MAX, 9, &[3, 3], &[1 << 63, 1]).check().is_err(), "an index that overflows");
+        assert_eq!(tensor(0, 0, &[0, 1 << 40], &[1, 1]).check(), Ok(0), "an empty tensor");
     }
 
     #[test]
     fn places_follow_the_strides() {
         let transposed = tensor(6, 0, &[2, 3], &[1, 2]);
         assert!(!transposed.is_contiguous(), "the first axis is innermost");
-        assert_eq!((0..6).map(|at| transposed.place(at)).collect::<Vec<_>>(), [0, 2, 4, 1, 3, 5], "read by rows");
+        assert_eq!(
+            (0..6).map(|at| transposed.place(at)).collect::<Vec<_>>(),
+            [0, 2, 4, 1, 3, 5],
+            "the indices of a transposed tensor"
+        );
         assert!(tensor(6, 0, &[2, 1, 3], &[3, 99, 1]).is_contiguous(), "the stride of a single row is never used");
     }
 }

@@ -2,8 +2,16 @@
 //!
 //! In: a [`Header`]. Out: magic, version, length, checksum and RON text; and back, checked against the real length of the file.
 
-use super::{Header, MAGIC, PackageError, VERSION};
+use super::error::PackageError;
+use super::header::Header;
 use std::io::{self, Read, Seek, SeekFrom, Write};
+
+/// The first bytes of every package.
+pub const MAGIC: [u8; 4] = *b"GS4D";
+
+/// The format version written, and the only one read. It increases when an old reader could no longer read the fixed
+/// start or the header; smaller changes are listed in [`Header::requires`].
+pub const VERSION: u32 = 1;
 
 /// Bytes before the header: magic, version, header length, checksum.
 const FIXED: u64 = 20;
@@ -26,8 +34,8 @@ pub(super) fn write(writer: &mut impl Write, header: &Header) -> Result<u64, Pac
     Ok(file_length)
 }
 
-/// Reads and checks the fixed start and the header. Also returns the length of the whole file; the reader is left at
-/// the first section.
+/// Reads and checks the fixed start and the header. Also returns the length of the whole file; the reader is then
+/// positioned at the first section.
 pub(super) fn read(reader: &mut (impl Read + Seek)) -> Result<(Header, u64), PackageError> {
     let file_length = reader.seek(SeekFrom::End(0))?;
     reader.rewind()?;

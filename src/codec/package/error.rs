@@ -1,8 +1,9 @@
 //! Errors of reading and writing packages.
 //!
-//! In: a problem found by the reader or writer. Out: a [`PackageError`], whose message names the problem and what
-//! helps.
+//! In: a problem found by the reader or writer. Out: a [`PackageError`], whose message names the problem and the
+//! remedy.
 
+use crate::codec::options::InvalidOption;
 use crate::codec::text::printable;
 
 /// Why a package cannot be read or written. [`CodecError`](crate::codec::CodecError) adds the path.
@@ -34,7 +35,7 @@ pub enum PackageError {
         /// Number of bytes.
         count: u64,
     },
-    /// A header longer than any package needs.
+    /// A header that is longer than any package needs.
     #[error("a header of {length} bytes is longer than the {limit} allowed: the package is damaged")]
     HeaderTooLong {
         /// Length in the file.
@@ -43,7 +44,7 @@ pub enum PackageError {
         limit: u64,
     },
     /// The checksum of the header is wrong.
-    #[error("the header is damaged (its checksum does not hold); copy or download the package again")]
+    #[error("the header is damaged (its checksum does not match); copy or download the package again")]
     HeaderChecksum,
     /// The header is intact but cannot be parsed.
     #[error("the header cannot be understood: {}", printable(.0))]
@@ -59,7 +60,7 @@ pub enum PackageError {
     Inconsistent(&'static str),
     /// A section of color has another number of coefficients than the degrees need.
     #[error(
-        "section `{section}` has {found} colour coefficients, and degree {degree} with time degree {degree_t} needs \
+        "section `{section}` has {found} color coefficients, and degree {degree} with time degree {degree_t} needs \
          {needed}: damaged, or not written by gs4d"
     )]
     Coefficients {
@@ -74,7 +75,7 @@ pub enum PackageError {
         /// Time degree in the header.
         degree_t: u32,
     },
-    /// More sections than any scene is divided into.
+    /// More sections than any scene needs.
     #[error("{found} sections are more than the {limit} allowed: the package is damaged, or not written by gs4d")]
     TooManySections {
         /// Number of sections in the header.
@@ -85,19 +86,19 @@ pub enum PackageError {
     /// The scene is far larger than the file could hold.
     #[error("{raw} bytes to unpack from a package that may take {limit}: damaged, or a decompression bomb")]
     TooLarge {
-        /// Bytes of the scene that the header describes, with its largest section decompressed beside it.
+        /// Bytes of the scene that the header describes, and of its largest section decompressed.
         raw: u64,
         /// Bytes allowed for a file of this length.
         limit: u64,
     },
-    /// The sections of an attribute do not hold every row.
+    /// The sections of an attribute do not contain every row.
     #[error("section `{name}` is missing, or ends early")]
     MissingSection {
         /// Name of the attribute.
         name: String,
     },
     /// A section does not continue where the one before it ended.
-    #[error("section `{name}` starts at {found} and holds {count}, which does not follow on the {expected} before it")]
+    #[error("section `{name}` starts at {found} and holds {count}, which does not follow the {expected} before it")]
     SectionRange {
         /// Name of the attribute.
         name: String,
@@ -131,7 +132,7 @@ pub enum PackageError {
     },
     /// The checksum of a section is wrong.
     #[error(
-        "section `{}` is damaged (its checksum does not hold); copy or download the package again",
+        "section `{}` is damaged (its checksum does not match); copy or download the package again",
         printable(.name)
     )]
     SectionChecksum {
@@ -143,7 +144,7 @@ pub enum PackageError {
     SectionBody {
         /// Name of the section.
         name: String,
-        /// What is wrong with it.
+        /// The cause.
         reason: String,
     },
     /// A level of detail, which is a package itself, cannot be read or written.
@@ -151,9 +152,12 @@ pub enum PackageError {
     Level {
         /// Its index, from 0.
         index: usize,
-        /// What is wrong with it.
+        /// The cause.
         reason: Box<PackageError>,
     },
+    /// An option that is invalid or contradicts the stored Gaussians.
+    #[error(transparent)]
+    Option(#[from] InvalidOption),
     /// The file could not be read or written.
     #[error(transparent)]
     Io(#[from] std::io::Error),

@@ -1,36 +1,26 @@
 //! The header: the contents of a package and their location.
 //!
-//! In: a scene, or the RON text of a file. Out: a [`Header`] whose numbers have been checked against each other and
-//! against the length of the file, so that the code that follows can rely on them.
+//! In: a scene, or the RON text of a file. Out: a [`Header`], its RON text, and the [`Attribute`]s that it describes, in
+//! the order of the file. `check.rs` has its checks.
 
-use super::layout::Attribute;
-use super::{PACKAGE, PackageError, Section};
-use crate::gaussian::Model;
-use crate::gaussian::harmonics::{MAX_COEFFICIENTS, evaluated};
-use crate::scene::detail::check_sizes;
-use crate::scene::packed::{MAX_ENTRIES, MAX_STAGES};
+use super::attribute::Attribute;
+use super::error::PackageError;
+use super::section::Section;
+use crate::gaussian::{Gaussian, Model};
+use crate::scene::packed::{COLOR_WORDS, MAX_STAGES, RECORD_WORDS};
 use crate::scene::{
-    ActiveSets, ColorDegrees, FilterKind, Form, GaussianScene, MAX_LEVELS, MAX_SEGMENTS, PackedColors, PlaybackHints,
-    SceneForm, Trained, TrainedWith,
+    ActiveSets, ColorDegrees, FilterKind, Form, GaussianScene, PackedColors, PackedScene, PlaybackHints, SceneForm,
+    TemporalFilter, Trained, TrainedWith,
 };
 use serde::{Deserialize, Serialize};
-
-/// Uncompressed bytes that a package of any length may hold.
-const RAW_FLOOR: u64 = 64 << 20;
-
-/// Further uncompressed bytes allowed for each byte of the file. Trained captures need 1.2.
-const RAW_PER_BYTE: u64 = 256;
-
-/// Most sections that are read. The writer makes fewer of a hundred million Gaussians.
-const MAX_SECTIONS: usize = 1 << 16;
 
 /// The header of a package. Fields that a reader does not know are ignored.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Header {
-    /// The program that wrote the package, for people.
+    /// The program that wrote the package, for display.
     #[serde(default)]
     pub generator: String,
-    /// Features that a reader must know to read the package correctly. A reader refuses those it does not know.
+    /// Features that a reader must know to read the package correctly. A reader refuses unknown features.
     #[serde(default)]
     pub requires: Vec<String>,
     /// The form of the Gaussians.
@@ -49,7 +39,7 @@ pub struct Header {
     /// The temporal filter, if there is one.
     #[serde(default)]
     pub filter: Option<StoredFilter>,
-    /// The switches the capture was trained with.
+    /// The settings the capture was trained with.
     pub trained_with: TrainedWith,
     /// How the capture is meant to be played.
     pub playback: PlaybackHints,
@@ -84,7 +74,7 @@ pub enum StoredForm {
     Sliced,
     /// Sliced and quantized.
     Packed {
-        /// Entries of each codebook of color; `None` if the coefficients are whole.
+        /// Number of entries of each codebook of color; `None` if the coefficients are whole.
         codebooks: Option<[u32; MAX_STAGES]>,
     },
 }
@@ -111,7 +101,7 @@ impl StoredForm {
 /// The temporal filter, without its sets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoredFilter {
-    /// How the sets were computed.
+    /// The method by which the sets were computed.
     pub kind: FilterKind,
     /// Number of segments of time.
     pub segments: u32,
@@ -131,7 +121,7 @@ pub struct EnvironmentSize {
     pub height: u32,
 }
 
-/// The field that is parsed before all others.
+/// The field that is parsed before the other fields.
 #[derive(Deserialize)]
 struct Requirements {
     #[serde(default)]
@@ -140,12 +130,12 @@ struct Requirements {
 
 impl Header {
     /// Returns the header of a scene, without sections.
-    pub(super) fn of(scene: &GaussianScene) -> Result<Self, PackageError> {
+    pub(super) fn of(scene: &GaussianScene) -> Self {
         let form = StoredForm::of(&scene.form);
         let ColorDegrees { coefficients, degree, degree_t } = scene.form.color_degrees();
         let used = [matches!(form, StoredForm::Packed { .. }), scene.filter.is_some()];
         let requires = FEATURES.iter().zip(used).filter(|(_, used)| *used).map(|(name, _)| (*name).to_owned());
-        let header = Self {
+        Self {
             generator: concat!("bevy_gs4d ", env!("CARGO_PKG_VERSION")).to_owned(),
             requires: requires.collect(),
             form,
@@ -163,11 +153,7 @@ impl Header {
             playback: scene.playback,
             levels: scene.levels.iter().map(|level| StoredLevel { pixels: level.pixels }).collect(),
             sections: Vec::new(),
-        };
-        header.check_numbers()?;
-        header.check_scene(scene)?;
-        scene.check().map_err(PackageError::Inconsistent)?;
-        Ok(header)
+        }
     }
 
     /// Returns the RON text: one line for each field and each section.
@@ -192,130 +178,78 @@ impl Header {
         self.sections.iter().fold(start, |end, s| end.saturating_add(8).saturating_add(s.length as u64))
     }
 
-    /// Checks that the sections, from `start` on, fill a file of `file_length` bytes and hold every attribute once, and
-    /// that all numbers are valid. Afterwards the sizes of [`attributes`](Self::attributes) can be allocated.
-    pub(super) fn check(&self, start: u64, file_length: u64) -> Result<(), PackageError> {
-        let expected = self.end(start);
-        if expected > file_length {
-            return Err(PackageError::Truncated { expected, found: file_length });
-        }
-        if expected < file_length {
-            return Err(PackageError::TrailingBytes { count: file_length - expected });
-        }
-        let found = self.sections.len();
-        if found > MAX_SECTIONS {
-            return Err(PackageError::TooManySections { found, limit: MAX_SECTIONS });
-        }
-        self.check_numbers()?;
-        let attributes = self.attributes();
-        let limit = unpacked_limit(file_length);
-        let within = |raw: u64| if raw > limit { Err(PackageError::TooLarge { raw, limit }) } else { Ok(()) };
-        within(scene_memory(&attributes))?;
-        attributes.iter().try_for_each(|attribute| attribute.check_sections(&self.sections))?;
-        within(self.unpacked())?;
-        self.check_level_sections()
-    }
-
-    /// Returns the bytes that reading takes, without levels of detail. The sections must have been checked.
-    pub(super) fn unpacked(&self) -> u64 {
-        let attributes = self.attributes();
-        // Beside the scene, one section at a time is decompressed.
-        let decoded = self.sections.iter().filter(|s| attributes.iter().any(|attribute| attribute.name == s.name));
-        let largest = decoded.map(|section| section.raw_length as u64).max().unwrap_or_default();
-        scene_memory(&attributes).saturating_add(largest)
-    }
-
-    /// Checks that each level of detail has its section, in order.
-    fn check_level_sections(&self) -> Result<(), PackageError> {
-        let mut next = 0;
-        for section in self.sections.iter().filter(|section| section.name == LEVEL) {
-            let name = section.name.clone();
-            if section.encoding != PACKAGE {
-                return Err(PackageError::UnknownEncoding { name, encoding: section.encoding.clone() });
+    /// Returns the attributes of a scene with these numbers, in the order in which their sections are written.
+    pub(super) fn attributes(&self) -> Vec<Attribute> {
+        let rows = self.gaussians;
+        let alone = |name, width| Attribute { name, rows, stride: width, offset: 0, width };
+        let record = size_of::<Gaussian>() / 4;
+        let within = |name, offset, width| Attribute { name, rows, stride: record, offset, width };
+        let mut attributes: Vec<Attribute> = match self.form {
+            StoredForm::Trained { model } => {
+                let timed = model != Model::Static3d;
+                let pairs = model == Model::Rotated4d;
+                [
+                    Some(alone("mean", 3)),
+                    timed.then(|| alone("mean_t", 1)),
+                    Some(alone("log_scale", 3)),
+                    timed.then(|| alone("log_scale_t", 1)),
+                    Some(alone("rotation_l", 4)),
+                    pairs.then(|| alone("rotation_r", 4)),
+                    Some(alone("opacity_logit", 1)),
+                ]
+                .into_iter()
+                .flatten()
+                .collect()
             }
-            if section.first != next || section.count != 1 || next == self.levels.len() {
-                let (found, count) = (section.first, section.count);
-                return Err(PackageError::SectionRange { name, found, count, expected: next });
+            StoredForm::Sliced => vec![
+                within("mean", 0, 3),
+                within("mean_t", 3, 1),
+                within("velocity", 4, 3),
+                within("sigma_t", 7, 1),
+                within("covariance", 8, 6),
+                within("opacity", 14, 1),
+            ],
+            StoredForm::Packed { .. } => {
+                let lanes = |name, offset, width| Attribute { name, rows, stride: RECORD_WORDS, offset, width };
+                let ranges = PackedScene::range_count(rows);
+                vec![
+                    lanes("packed_mean", 0, 2),
+                    lanes("packed_motion", 2, 2),
+                    lanes("packed_shape", 4, 4),
+                    Attribute { name: "packed_ranges", rows: ranges, stride: 4, offset: 0, width: 4 },
+                ]
             }
-            if section.raw_length != section.length {
-                let (expected, found) = (section.length as u64, section.raw_length as u64);
-                return Err(PackageError::SectionLength { name, expected, found });
-            }
-            next += 1;
-        }
-        match next < self.levels.len() {
-            true => Err(PackageError::MissingSection { name: LEVEL.to_owned() }),
-            false => Ok(()),
-        }
-    }
-
-    /// Checks the numbers, without the sections.
-    fn check_numbers(&self) -> Result<(), PackageError> {
-        let trained = &self.trained_with;
-        let [first, last] = trained.time_interval;
-        let sane = |condition: bool, otherwise: &'static str| {
-            if condition { Ok(()) } else { Err(PackageError::Inconsistent(otherwise)) }
         };
-        self.check_color()?;
-        sane(
-            self.environment.is_none_or(|e| e.width.checked_mul(e.height).is_some_and(|texels| texels > 0)),
-            "an environment map with no texels, or far too many",
-        )?;
-        sane(
-            first.is_finite() && first < last && (last - first).is_finite(),
-            "the time interval must be two finite numbers, the first below the second, and not infinitely far apart",
-        )?;
-        sane(trained.background.iter().all(|c| c.is_finite()), "a background colour that is not finite")?;
-        sane(
-            trained.prefilter_var.is_finite() && trained.spatial_lr_scale.is_finite(),
-            "a switch of training (prefilter_var or spatial_lr_scale) that is not finite",
-        )?;
-        sane(
-            trained.pixel.is_none_or(|pixel| pixel.is_finite() && pixel > 0.0),
-            "a size of the training views' pixels that is not positive and finite",
-        )?;
-        sane(trained.spatial_lr_scale >= 0.0, "a switch of training (spatial_lr_scale) that is negative")?;
-        sane(
-            self.filter.is_none_or(|filter| (1..=MAX_SEGMENTS).contains(&filter.segments)),
-            "a temporal filter of no segments, or far too many",
-        )?;
-        sane(self.levels.len() <= MAX_LEVELS, "more levels of detail than a capture may have")?;
-        check_sizes(self.levels.iter().map(|level| level.pixels)).map_err(PackageError::Inconsistent)?;
-        let duration = self.playback.duration_seconds;
-        sane(duration.is_finite() && duration >= 0.0, "the playback duration must be a finite number, zero or above")
-    }
-
-    /// Checks the numbers of color: degrees that exist, and as many coefficients as they need. In codebooks there are
-    /// no others.
-    fn check_color(&self) -> Result<(), PackageError> {
-        let (found, degree, degree_t) = (self.coefficients, self.degree, self.degree_t);
-        if degree > 3 || degree_t > 2 || found > MAX_COEFFICIENTS {
-            return Err(PackageError::Inconsistent(
-                "colour must have a degree of 0 to 3, a time degree of 0 to 2 and at most 48 coefficients",
-            ));
-        }
-        let needed = evaluated(degree, degree_t);
-        let refused = |section| Err(PackageError::Coefficients { section, found, needed, degree, degree_t });
-        match self.form {
-            StoredForm::Packed { codebooks: Some(entries) } => {
-                if entries.iter().any(|&entries| entries > MAX_ENTRIES) {
-                    return Err(PackageError::Inconsistent("section `codebooks` has more entries than 16-bit codes"));
-                }
-                if found == needed { Ok(()) } else { refused("codebooks") }
+        let stride = self.coefficients.saturating_mul(3);
+        let color = |name, offset, width| Attribute { name, rows, stride, offset, width };
+        if let StoredForm::Packed { codebooks: Some(entries) } = self.form {
+            let stages = entries.iter().filter(|&&entries| entries > 0).count();
+            let total = entries.iter().fold(0usize, |sum, &entries| sum.saturating_add(entries as usize));
+            let words = stride.div_ceil(4);
+            let record = |name, offset, width| Attribute { name, rows, stride: COLOR_WORDS, offset, width };
+            attributes.push(record("color_base", 0, 1));
+            if stages > 0 {
+                attributes.push(record("color_codes", 1, stages.div_ceil(2)));
+                attributes.push(Attribute { name: "codebooks", rows: total, stride: words, offset: 0, width: words });
+                let scales = stages * words;
+                attributes.push(Attribute { name: "codebook_scales", rows: scales, stride: 4, offset: 0, width: 4 });
             }
-            StoredForm::Trained { .. } | StoredForm::Sliced | StoredForm::Packed { codebooks: None } => {
-                if found >= needed { Ok(()) } else { refused(if found == 0 { "sh_dc" } else { "sh_rest" }) }
+        } else {
+            attributes.push(color("sh_dc", 0, 3));
+            if stride > 3 {
+                attributes.push(color("sh_rest", 3, stride - 3));
             }
         }
+        if let Some(filter) = self.filter {
+            let words = TemporalFilter::words(rows).saturating_mul(filter.segments as usize);
+            let rows = if filter.bits { words } else { rows };
+            attributes.push(Attribute { name: "filter", rows, stride: 1, offset: 0, width: 1 });
+        }
+        if let Some(size) = self.environment {
+            let texels = (size.width as usize).saturating_mul(size.height as usize);
+            let rows = texels.saturating_mul(3);
+            attributes.push(Attribute { name: "environment", rows, stride: 1, offset: 0, width: 1 });
+        }
+        attributes
     }
-}
-
-/// Returns the bytes that a package of this length may take when it is read.
-pub(super) fn unpacked_limit(file_length: u64) -> u64 {
-    RAW_PER_BYTE.saturating_mul(file_length).saturating_add(RAW_FLOOR).min(isize::MAX as u64)
-}
-
-/// Returns the bytes of the tables of all attributes.
-fn scene_memory(attributes: &[Attribute]) -> u64 {
-    attributes.iter().fold(0u64, |sum, attribute| sum.saturating_add(attribute.memory()))
 }

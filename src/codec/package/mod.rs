@@ -1,61 +1,50 @@
 //! The package format `.gs4d`: written once, loaded often, with a checksum on every byte.
 //!
-//! In: a [`GaussianScene`]. Out: a file; and the same scene again, bit for bit. `docs/format.md` describes the layout
+//! In: a [`GaussianScene`]. Out: a file; and from the file the same scene, bit for bit. `docs/format.md` describes the layout
 //! byte by byte.
 //!
 //! A package is a fixed start ([`MAGIC`], [`VERSION`], length and checksum of the header), a [`Header`] in RON, and the
 //! sections that the header lists. A section holds one attribute of a run of Gaussians, split into byte planes
 //! (`planes`), compressed and checksummed on its own. The order is geometry, first color coefficients, the other
 //! coefficients, temporal filter, environment map, levels of detail, each of which is a package itself. A reader skips
-//! what it does not know, unless the header lists it as required.
+//! unknown sections, and refuses a package whose header requires an unknown feature.
 
+mod attribute;
+mod check;
 mod envelope;
 mod error;
 mod header;
 mod layout;
+mod options;
 mod planes;
 mod section;
 
+pub use envelope::{MAGIC, VERSION};
 pub use error::PackageError;
 pub use header::{EnvironmentSize, Header, StoredFilter, StoredForm, StoredLevel};
 pub use section::{FLOAT_PLANES, PACKAGE, Section};
 
-use super::CodecErrorKind;
-use super::checkpoint::CheckpointOptions;
-use super::format::Format;
+use super::options::ReadOptions;
 use crate::scene::{GaussianScene, Level, RuntimeScene, SceneForm};
-use header::{LEVEL, unpacked_limit};
+use attribute::Attribute;
+use check::unpacked_limit;
+use header::LEVEL;
 use rayon::prelude::*;
 use serde::Serialize;
-use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek, Write};
-use std::path::Path;
 use std::sync::Arc;
 
-/// The row of packages in the table of formats.
-pub const FORMAT: Format = Format {
-    name: "a package (.gs4d)",
-    extensions: &["gs4d"],
-    magic: &MAGIC,
-    read: read_file,
-    write: Some(write_scene),
-};
-
-/// The first bytes of every package.
-pub const MAGIC: [u8; 4] = *b"GS4D";
-
-/// The format version written, and the only one read. It increases when an old reader could no longer read the fixed
-/// start or the header; smaller changes are listed in [`Header::requires`].
-pub const VERSION: u32 = 1;
+/// Extensions of packages, without the dot.
+pub const EXTENSIONS: &[&str] = &["gs4d"];
 
 /// Largest number of Gaussians per section: small enough to decode one at a time in little memory, large enough to
 /// compress well.
 const ROWS_PER_SECTION: usize = 1 << 14;
 
-/// The same for records of the packed form, whose columns compress best in one piece.
+/// Largest number of Gaussians per section of records of the packed form, whose columns compress best in one piece.
 const PACKED_ROWS_PER_SECTION: usize = 1 << 20;
 
-/// Largest width, in words, of an attribute to which that applies.
+/// Largest width, in words, of an attribute with [`PACKED_ROWS_PER_SECTION`] rows per section.
 const PACKED_WORDS: usize = 8;
 
 /// How a package is written.
@@ -94,13 +83,14 @@ impl PackageInfo {
 /// Writes a scene without loss. The same scene and settings give the same bytes.
 ///
 /// # Errors
-/// [`PackageError::Inconsistent`] for a scene whose parts do not fit together, [`PackageError::TooLarge`] for one that
-/// compresses so well that a reader would take it for a decompression bomb, and errors of the writer.
+/// [`PackageError::Inconsistent`] for a scene whose parts do not fit together, [`PackageError::TooLarge`] for a scene that
+/// compresses so well that a reader would refuse it as a decompression bomb, and errors of the writer.
 pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), PackageError> {
-    let mut header = Header::of(scene)?;
+    let mut header = Header::of(scene);
+    header.check_writable(scene)?;
     let level = settings.level.clamp(1, 19);
     let is_packed = matches!(header.form, StoredForm::Packed { .. });
-    let rows = |attribute: &layout::Attribute| {
+    let rows = |attribute: &Attribute| {
         if is_packed && attribute.width <= PACKED_WORDS { PACKED_ROWS_PER_SECTION } else { ROWS_PER_SECTION }
     };
     let runs: Vec<_> = header.attributes().into_iter().flat_map(|a| a.runs(rows(&a))).collect();
@@ -118,7 +108,7 @@ pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSet
         bodies.push(body);
     }
     header.sections = sections;
-    let mut room = Room::beside(&header, envelope::write(&mut writer, &header)?);
+    let mut room = Room::of(&header, envelope::write(&mut writer, &header)?);
     for (index, body) in bodies[first_level..].iter().enumerate() {
         room.header_of_level(body).map_err(of_level(index))?;
     }
@@ -139,7 +129,7 @@ pub fn write<W: Write>(mut writer: W, scene: &GaussianScene, settings: &WriteSet
 pub fn read<R: Read + Seek>(reader: R) -> Result<GaussianScene, PackageError> {
     let mut reader = BufReader::new(reader);
     let (header, file_length) = envelope::read(&mut reader)?;
-    let mut room = Room::beside(&header, file_length);
+    let mut room = Room::of(&header, file_length);
     let mut levels = Vec::new();
     let mut scene = read_sections(&mut reader, &header, &mut |body| {
         let index = levels.len();
@@ -152,7 +142,7 @@ pub fn read<R: Read + Seek>(reader: R) -> Result<GaussianScene, PackageError> {
     Ok(scene)
 }
 
-/// Reads all sections of a package; `level` receives those of levels of detail.
+/// Reads all sections of a package; `level` receives the sections of levels of detail.
 fn read_sections(
     reader: &mut impl Read,
     header: &Header,
@@ -160,7 +150,7 @@ fn read_sections(
 ) -> Result<GaussianScene, PackageError> {
     let attributes = header.attributes();
     let mut scene = layout::blank(header);
-    // Values go where the header says: the tables must be of that size.
+    // Values are written at positions from the header: the tables must have the sizes of the header.
     header.check_scene(&scene)?;
     let (mut body, mut planes) = (Vec::new(), Vec::new());
     for section in &header.sections {
@@ -174,19 +164,20 @@ fn read_sections(
     Ok(scene)
 }
 
-/// The bytes that a package and its levels of detail take when they are read, and how many they may.
+/// The bytes that a package and its levels of detail take when they are read, and their limit.
 struct Room {
     raw: u64,
     limit: u64,
 }
 
 impl Room {
-    /// Returns the room beside the scene of a header, in a file of this length.
-    fn beside(header: &Header, file_length: u64) -> Self {
+    /// Returns the bytes of the scene of a header, and the limit for a file of this length.
+    fn of(header: &Header, file_length: u64) -> Self {
         Self { raw: header.unpacked(), limit: unpacked_limit(file_length) }
     }
 
-    /// Returns the header of a level of detail, for which there must be room. It has no levels itself.
+    /// Returns the header of a level of detail, and the position after it. The level must be within the limit and have no
+    /// levels itself.
     fn header_of_level(&mut self, body: &[u8]) -> Result<(Header, u64), PackageError> {
         let mut reader = Cursor::new(body);
         let (header, _) = envelope::read(&mut reader)?;
@@ -200,7 +191,7 @@ impl Room {
         }
     }
 
-    /// Reads a level of detail from the package that it is.
+    /// Reads a level of detail, which is a package.
     fn level(&mut self, body: &[u8]) -> Result<RuntimeScene, PackageError> {
         let (header, start) = self.header_of_level(body)?;
         let mut reader = Cursor::new(body);
@@ -214,21 +205,20 @@ impl Room {
     }
 }
 
-/// Returns what names the level of detail, from 0, that an error is about.
+/// Returns a function that adds the index of a level of detail, from 0, to an error.
 fn of_level(index: usize) -> impl FnOnce(PackageError) -> PackageError {
     move |reason| PackageError::Level { index, reason: Box::new(reason) }
 }
 
-/// Reads a package; only the options that replace stored values are used.
-fn read_file(_: &Path, file: BufReader<File>, options: &CheckpointOptions) -> Result<GaussianScene, CodecErrorKind> {
+/// Reads a scene as [`read`] does, and replaces its settings by the options that are given.
+///
+/// # Errors
+/// As [`read`]; options that are invalid or contradict the stored Gaussians.
+pub(super) fn read_with<R: Read + Seek>(reader: R, options: &ReadOptions) -> Result<GaussianScene, PackageError> {
     options.check()?;
-    let mut scene = read(file)?;
-    options.override_stored(&mut scene);
+    let mut scene = read(reader)?;
+    options::apply(options, &mut scene)?;
     Ok(scene)
-}
-
-fn write_scene(writer: &mut dyn Write, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), CodecErrorKind> {
-    Ok(write(writer, scene, settings)?)
 }
 
 /// Reads the header and verifies every checksum, without building the scene.

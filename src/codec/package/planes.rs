@@ -3,10 +3,10 @@
 //! In: rows of 32-bit words. Out: their lowest bytes, then their second ones, and so on; within each plane one
 //! component after the other (`xxxx yyyy zzzz`), so that similar bytes are adjacent; and back.
 
-use super::layout::Attribute;
+use super::attribute::Attribute;
 use std::ops::Range;
 
-/// Rows processed at a time, few enough that they stay in the cache, whatever their width.
+/// Rows processed at a time, few enough that they stay in the cache for any width.
 const TILE: usize = 64;
 
 /// Returns the planes of some rows of an attribute within the table `words`.
@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn joining_undoes_splitting_and_leaves_the_rest_alone() {
+    fn joining_reverses_splitting_and_keeps_the_other_columns() {
         let attribute = Attribute { name: "sh_rest", rows: 300, stride: 7, offset: 2, width: 5 };
         let words: Vec<u32> = (0..300 * 7).map(|i: u32| i.wrapping_mul(2_654_435_761)).collect();
         let mut joined = vec![u32::MAX; words.len()];

@@ -2,8 +2,9 @@
 //!
 //! In: words of a scene. Out: a zstd frame of their byte planes and the entry in the section table; and back, checked.
 
-use super::layout::Attribute;
-use super::{PackageError, planes};
+use super::attribute::Attribute;
+use super::error::PackageError;
+use super::planes;
 use serde::{Deserialize, Serialize};
 use std::io::{Read, Write};
 use std::ops::Range;
@@ -11,7 +12,7 @@ use std::ops::Range;
 /// The encoding of lossless sections: byte planes of little-endian float32, compressed by zstd.
 pub const FLOAT_PLANES: &str = "f32-planes-zstd";
 
-/// The encoding of sections that are a package each, without compression of their own.
+/// The encoding of sections that contain a package each, without further compression.
 pub const PACKAGE: &str = "package";
 
 /// One entry of the section table.
@@ -56,7 +57,8 @@ pub(super) fn encode(
     Ok((section, body))
 }
 
-/// Returns the entry in the section table of a package inside the package, the one with this index of its name.
+/// Returns the entry in the section table of a package inside the package, with this index among the sections of its
+/// name.
 pub(super) fn of_package(name: &str, index: usize, body: &[u8]) -> Section {
     Section {
         name: name.to_owned(),

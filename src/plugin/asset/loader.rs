@@ -1,10 +1,11 @@
 //! Loaders: from files of an asset source to captures.
 //!
-//! In: the bytes of a file named `*.gs4d` or `*.pth` and, for a checkpoint, `cfg_args` beside it and the [`CheckpointOptions`] for what
-//! neither contains (`load_builder().with_settings(|options: &mut CheckpointOptions| ..)` or a `.meta` file). Out: a
+//! In: the bytes of a file named `*.gs4d` or `*.pth` and, for a checkpoint, `cfg_args` beside it and the [`ReadOptions`] for what
+//! neither contains (`load_builder().with_settings(|options: &mut ReadOptions| ..)` or a `.meta` file). Out: a
 //! [`GaussianCapture`] or a [`CaptureLoadError`], to which Bevy adds the path.
 
-use crate::codec::checkpoint::{self, CheckpointError, CheckpointOptions};
+use crate::codec::ReadOptions;
+use crate::codec::checkpoint::{self, CheckpointError};
 use crate::codec::package::{self, PackageError};
 use crate::gaussian::InvalidGaussian;
 use crate::plugin::component::GaussianCapture;
@@ -50,7 +51,7 @@ impl AssetLoader for PackageLoader {
     }
 
     fn extensions(&self) -> &[&str] {
-        package::FORMAT.extensions
+        package::EXTENSIONS
     }
 }
 
@@ -63,13 +64,13 @@ pub struct CheckpointLoader;
 
 impl AssetLoader for CheckpointLoader {
     type Asset = GaussianCapture;
-    type Settings = CheckpointOptions;
+    type Settings = ReadOptions;
     type Error = CaptureLoadError;
 
     async fn load(
         &self,
         reader: &mut dyn Reader,
-        settings: &CheckpointOptions,
+        settings: &ReadOptions,
         context: &mut LoadContext<'_>,
     ) -> Result<GaussianCapture, CaptureLoadError> {
         let cfg_args = cfg_args_beside(context).await;
@@ -78,7 +79,7 @@ impl AssetLoader for CheckpointLoader {
     }
 
     fn extensions(&self) -> &[&str] {
-        checkpoint::FORMAT.extensions
+        checkpoint::EXTENSIONS
     }
 }
 

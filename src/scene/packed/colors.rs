@@ -51,7 +51,7 @@ impl CodedColors {
         let values = base.as_flattened().iter();
         let (low, high) = values.fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
         let (low, size) = if low > high { (0.0, 0.0) } else { (low, high - low) };
-        // Fewer bits use fewer of the 1024 values, the first and the last included.
+        // With fewer bits, a subset of the 1024 values is used, with the first and the last value.
         let levels = ((1u32 << bits.clamp(1, 10)) - 1) as f32;
         let place = |value: f32| {
             let level = if size > 0.0 { ((value - low) / size * levels).round() } else { 0.0 };
@@ -110,8 +110,8 @@ impl CodedColors {
         rest
     }
 
-    /// Returns the values of the four bytes of a word of an entry; `scale` is the value of a byte of 127. They have half precision, which is
-    /// finer than the bytes, so that a GPU need not compute them for each color.
+    /// Returns the values of the four bytes of a word of an entry; `scale` is the value of a byte of 127. They have half
+    /// precision, which is finer than the bytes; a GPU stores them, and does not compute them for each color.
     pub fn values(word: u32, scale: &[f32; 4]) -> [f16; 4] {
         let bytes = word.to_le_bytes();
         std::array::from_fn(|i| {
@@ -165,12 +165,12 @@ impl CodedColors {
     /// Checks that the parts fit together for `count` Gaussians and every code has an entry.
     pub(super) fn check(&self, count: usize) -> Result<(), &'static str> {
         if self.degree > 3 || self.degree_t > 2 {
-            return Err("a degree of colour that does not exist");
+            return Err("a degree of color that does not exist");
         }
         let words = self.words_per_entry();
         let total: u64 = self.entries.iter().map(|&entries| u64::from(entries)).sum();
         if self.records.len() != count {
-            return Err("its colours are those of another number of Gaussians");
+            return Err("its colors are those of another number of Gaussians");
         }
         if self.entries.len() > MAX_STAGES || self.entries.iter().any(|&entries| entries > MAX_ENTRIES) {
             return Err("more codebooks, or more entries in one, than a record has codes for");
@@ -187,8 +187,8 @@ impl CodedColors {
         if self.records.par_iter().all(fits) { Ok(()) } else { Err("a code beyond its codebook") }
     }
 
-    /// Lowers the degrees to at most those given and drops what is no longer evaluated from the codebooks. At degree 0
-    /// they have nothing left, and are dropped too.
+    /// Lowers the degrees to at most the degrees given and removes the coefficients that are no longer evaluated from the
+    /// codebooks. At degree 0 the codebooks would be empty, and are removed too.
     pub fn truncate(&mut self, degree: u32, degree_t: u32) {
         let (all, before) = (self.coefficients(), self.words_per_entry());
         self.degree = self.degree.min(degree);
@@ -202,7 +202,7 @@ impl CodedColors {
             self.records.iter_mut().for_each(|record| record[1..].fill(0));
             return;
         }
-        // What does not fill the last word of an entry is 0.
+        // The unused bytes of the last word of an entry are 0.
         let used = 4 - (after * 4 - kept * 3);
         let mut codebooks = Vec::with_capacity(self.codebooks.len() / before * after);
         for entry in self.codebooks.chunks_exact(before) {

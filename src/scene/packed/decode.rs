@@ -3,9 +3,10 @@
 //! In: a [`PackedScene`]. Out: any one Gaussian or color, or all of them as [`Sliced`].
 
 use super::lanes::{self, ALWAYS, AT_REST, BlockRanges, FARTHEST, LANE_MAX, LANES, SharedRanges};
-use super::{PackedColors, PackedScene, shape};
+use super::scene::{PackedColors, PackedScene};
+use super::shape;
 use crate::gaussian::{Gaussian, Lifespan};
-use crate::scene::Sliced;
+use crate::scene::sliced::Sliced;
 use glam::{Quat, Vec3};
 use std::f32::consts::FRAC_1_SQRT_2;
 
@@ -43,7 +44,7 @@ impl PackedScene {
         }
     }
 
-    /// Decodes when one Gaussian is there, and nothing else of it.
+    /// Decodes the opacity envelope of one Gaussian in time, and no other attribute.
     ///
     /// # Panics
     /// If `index` is out of range.
@@ -51,7 +52,7 @@ impl PackedScene {
         lifespan(&lanes::unpack(self.records[index]), &SharedRanges::read(&self.ranges))
     }
 
-    /// Decodes the scales of one Gaussian, and the rotation of the axes that they are along.
+    /// Decodes the scales of one Gaussian, and the rotation of its axes.
     pub(super) fn shape(&self, index: usize) -> (Vec3, Quat) {
         let record = lanes::unpack(self.records[index]);
         let shared = SharedRanges::read(&self.ranges);

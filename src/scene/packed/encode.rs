@@ -4,16 +4,16 @@
 //! packed already. Out: a [`PackedScene`]. An attribute of fewer than 16 bits leaves the low bits of its lanes zero,
 //! which costs nothing on disk; the largest splats keep all 16, since their errors are the most visible.
 
-use super::lanes::{self, ALWAYS, AT_REST, BlockRanges, FARTHEST, LANE_MAX, SharedRanges};
+use super::lanes::{self, ALWAYS, AT_REST, BLOCK, BlockRanges, FARTHEST, LANE_MAX, SharedRanges};
+use super::scene::{PackedColors, PackedScene};
 use super::shape::{Shape, smallest_three};
-use super::{BLOCK, PackedColors, PackedScene};
 use crate::gaussian::Gaussian;
 use crate::scene::Bounds;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// Smallest scale that is stored, as a fraction of the radius of [`Bounds::core`]; smaller ones are raised to it.
+/// Smallest scale that is stored, as a fraction of the radius of [`Bounds::core`]; smaller scales are raised to it.
 /// Trained captures have scales a thousand times smaller, which are not visible and would waste half the range. This
 /// floor has no visible effect up to 100 dB.
 const FLATTEST: f32 = 1.0 / 16_384.0;
@@ -37,7 +37,7 @@ pub struct Bits {
     pub opacity: u32,
     /// Base color, per channel, where colors are coded; 1 to 10.
     pub base: u32,
-    /// Share of the Gaussians, those with the largest splats, that keep 16 bits for scale, rotation and mean; 0 to 1.
+    /// Fraction of the Gaussians, those with the largest splats, that keep 16 bits for scale, rotation and mean; 0 to 1.
     pub escape: f32,
 }
 
@@ -173,7 +173,8 @@ impl Span {
     }
 }
 
-/// Returns the bits that temporal means in this range need so that they are no coarser than over two lengths of the time interval.
+/// Returns the additional bits of temporal means in this range with which they are no coarser than over two lengths of the time
+/// interval.
 fn additional_bits(time: Span, reach: f32) -> u32 {
     let times = time.size / (2.0 * f64::from(reach));
     if times.is_finite() { times.log2().ceil().clamp(0.0, 16.0) as u32 } else { 0 }
@@ -220,8 +221,8 @@ impl Quantizers {
 }
 
 /// Returns for each Gaussian whether its splats are among the largest and most opaque.
-fn largest(gaussians: &[Gaussian], shapes: &[Shape], share: f32) -> Vec<bool> {
-    let count = ((gaussians.len() as f32 * share.clamp(0.0, 1.0)).round() as usize).min(gaussians.len());
+fn largest(gaussians: &[Gaussian], shapes: &[Shape], fraction: f32) -> Vec<bool> {
+    let count = ((gaussians.len() as f32 * fraction.clamp(0.0, 1.0)).round() as usize).min(gaussians.len());
     let size = |(gaussian, shape): (&Gaussian, &Shape)| {
         shape.log_scale.max_element() + f64::from(gaussian.opacity).max(1e-6).ln()
     };

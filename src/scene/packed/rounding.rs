@@ -1,18 +1,18 @@
-//! What packing changes of a Gaussian, so that one which moves on can be drawn as if it were packed.
+//! The change of a Gaussian by packing, so that training can draw a Gaussian that moves as if it were packed.
 //!
-//! In: a packed scene, the Gaussian that a record was encoded from. Out: its [`Rounding`], which takes that Gaussian to what is decoded, and
-//! one close to it to something as close. CPU reference of `shaders/rounding.wgsl`.
+//! In: a packed scene, the Gaussian that a record was encoded from. Out: its [`Rounding`], which maps that Gaussian to the decoded one, and
+//! a Gaussian close to it to one close to the decoded one. CPU reference of `shaders/rounding.wgsl`.
 //!
-//! Differences are added to what may have any value. A shape is turned and stretched instead: the difference of two covariances, added to
-//! that of a flat Gaussian which has turned a little since, would leave a negative variance.
+//! A difference is added to each attribute that may have any value. A shape is rotated and stretched instead: the difference of two
+//! covariances, added to the covariance of a flat Gaussian that has rotated a little since, would result in a negative variance.
 
-use super::PackedScene;
 use super::lanes::SharedRanges;
+use super::scene::PackedScene;
 use super::shape::Shape;
 use crate::gaussian::Gaussian;
 use glam::{DMat3, DVec3, Mat3, Vec3};
 
-/// What packing changes of one Gaussian.
+/// The change of one Gaussian by packing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rounding {
     /// Added to the mean, capture units.
@@ -23,17 +23,17 @@ pub struct Rounding {
     pub velocity: Vec3,
     /// Factor on `1/σ_t`; 1 if σ_t is infinite.
     pub rate: f32,
-    /// Added to the variance along every axis before `shape`, capture units squared. It is that of the smallest scale that is stored: what
-    /// is flatter has been raised to it, and would need any factor otherwise.
+    /// Added to the variance along every axis before `shape`, capture units squared. It is the variance of the smallest stored scale, to
+    /// which smaller scales have been raised; without it their factors would be unbounded.
     pub variance: f32,
-    /// Turns and stretches the shape: of the covariance C and the added variance V it makes `shape (C + V) shapeᵀ`.
+    /// Rotates and stretches the shape: from the covariance C and the added variance V to `shape (C + V) shapeᵀ`.
     pub shape: Mat3,
     /// Added to the opacity, which stays between 0 and 1.
     pub opacity: f32,
 }
 
 impl Rounding {
-    /// Returns a Gaussian as it is with these changes.
+    /// Returns a Gaussian with these changes.
     pub fn apply(&self, gaussian: &Gaussian) -> Gaussian {
         let [xx, xy, xz, yy, yz, zz] = gaussian.covariance;
         let covariance = Mat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
@@ -52,14 +52,14 @@ impl Rounding {
 }
 
 impl PackedScene {
-    /// Returns what packing has changed of the Gaussian with this index, which was encoded from `gaussian`.
+    /// Returns the change by packing of the Gaussian with this index, which was encoded from `gaussian`.
     ///
     /// # Panics
     /// If `index` is out of range.
     pub fn rounding(&self, index: usize, gaussian: &Gaussian) -> Rounding {
         let decoded = self.gaussian(index);
         let (scale, rotation) = self.shape(index);
-        // The encoder took the same shape apart: its axes are in the order of the decoded ones.
+        // The encoder decomposed the same covariance: its axes are in the order of the decoded axes.
         let own = Shape::of(gaussian, 0.0);
         let [smallest, _] = SharedRanges::read(&self.ranges).log_scale;
         let variance = (2.0 * smallest).exp();
@@ -91,7 +91,7 @@ mod tests {
     const COARSE: Bits =
         Bits { mean: 6, mean_t: 6, velocity: 5, sigma_t: 5, scale: 4, rotation: 4, opacity: 4, base: 8, escape: 0.02 };
 
-    /// Returns Gaussians of many shapes, needles and ones without any thickness among them; every fourth is always there.
+    /// Returns Gaussians of many shapes, including needles and disks of no thickness; every fourth is present at every time.
     fn gaussians() -> Vec<Gaussian> {
         let mut random = Random::new(3);
         let mut three = |low: f32, high: f32| [(); 3].map(|()| random.in_range(low, high));
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rounding_takes_its_gaussian_to_what_is_decoded() {
+    fn a_rounding_maps_its_gaussian_to_the_decoded_gaussian() {
         let gaussians = gaussians();
         let packed = packed(&gaussians);
         let mut far = 0;
@@ -138,20 +138,27 @@ mod tests {
             let (found, expected) = (packed.rounding(index, gaussian).apply(gaussian), packed.gaussian(index));
             let values = |g: &Gaussian| [&g.mean[..], &[g.mean_t], &g.velocity, &[g.opacity]].concat();
             let apart = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-            assert!(apart(&values(&found), &values(&expected)) < 1e-6, "{index}: {found:?} is {expected:?}");
-            assert_eq!(found.sigma_t.is_finite(), expected.sigma_t.is_finite(), "{index}: always there or not");
+            assert!(apart(&values(&found), &values(&expected)) < 1e-6, "{index}: {found:?}, expected {expected:?}");
+            assert_eq!(
+                found.sigma_t.is_finite(),
+                expected.sigma_t.is_finite(),
+                "{index}: σ_t is infinite in both or in neither"
+            );
             if expected.sigma_t.is_finite() {
-                assert!((found.sigma_t / expected.sigma_t - 1.0).abs() < 1e-6, "{index}: {found:?} is {expected:?}");
+                assert!(
+                    (found.sigma_t / expected.sigma_t - 1.0).abs() < 1e-6,
+                    "{index}: {found:?}, expected {expected:?}"
+                );
             }
             let shapes = apart(&found.covariance, &expected.covariance);
-            assert!(shapes < 1e-5 * size(&expected), "{index}: {found:?} is {expected:?}");
+            assert!(shapes < 1e-5 * size(&expected), "{index}: {found:?}, expected {expected:?}");
             far += usize::from(apart(&gaussian.covariance, &expected.covariance) > 0.05 * size(&expected));
         }
-        assert!(far > 300, "so few bits change the shapes: {far}");
+        assert!(far > 300, "with so few bits most shapes change: {far}");
     }
 
     #[test]
-    fn a_gaussian_that_has_turned_and_shrunk_keeps_a_shape() {
+    fn the_rounding_of_a_rotated_and_scaled_gaussian_leaves_no_negative_variance() {
         let gaussians = gaussians();
         let packed = packed(&gaussians);
         let change = DMat3::from_quat(Quat::from_rotation_x(0.05).as_dquat()) * DMat3::from_diagonal(DVec3::splat(0.8));
@@ -172,8 +179,11 @@ mod tests {
             });
             let least = least.fold(f64::INFINITY, f64::min);
             let (before, after) = (size(gaussian), size(&found));
-            assert!(least > -1e-5 * f64::from(after), "{index}: a variance of {least:e}, and {after:e} together");
-            assert!((0.25..4.0).contains(&(after / before)), "{index}: {after:e} was {before:e}");
+            assert!(
+                least > -1e-5 * f64::from(after),
+                "{index}: the smallest variance is {least:e}, their sum {after:e}"
+            );
+            assert!((0.25..4.0).contains(&(after / before)), "{index}: the size changes from {before:e} to {after:e}");
         }
     }
 }

@@ -8,7 +8,8 @@ use crate::change::archive::{self, Entry};
 use crate::change::{bytes, numbers, pickle};
 use crate::support::pth::{self, Pth};
 use crate::support::random::Random;
-use bevy_gs4d::codec::checkpoint::{self, CheckpointOptions};
+use bevy_gs4d::codec::ReadOptions;
+use bevy_gs4d::codec::checkpoint;
 use std::io::{Cursor, Read};
 use zip::ZipArchive;
 
@@ -38,7 +39,7 @@ impl Reader for Checkpoints {
     }
 
     fn read(&self, bytes: &[u8]) -> Result<Outcome, String> {
-        match checkpoint::read(Cursor::new(bytes), &CheckpointOptions::default(), None) {
+        match checkpoint::read(Cursor::new(bytes), &ReadOptions::default(), None) {
             Ok(scene) => accepted::check(scene),
             Err(error) => Ok(Outcome::Refused(error.to_string())),
         }

@@ -10,9 +10,8 @@ use crate::accepted;
 use crate::change::{bytes, numbers, text};
 use crate::support::dataset;
 use crate::support::random::Random;
-use bevy_gs4d::codec;
-use bevy_gs4d::codec::checkpoint::CheckpointOptions;
 use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::offline::bake::{BakeSettings, bake};
 use bevy_gs4d::offline::engine::Engine;
 use bevy_gs4d::offline::quantize::Quality;
@@ -137,7 +136,7 @@ impl Reader for Saved {
         fs::write(out, &self.package).expect("the folder can be written to");
         match self.bake() {
             Ok(()) => {
-                let scene = codec::load(out, &CheckpointOptions::default());
+                let scene = codec::load(out, &ReadOptions::default());
                 accepted::check(scene.map_err(|error| format!("leads to a package that cannot be read: {error}"))?)
             }
             Err(error) => Ok(Outcome::Refused(error.to_string())),

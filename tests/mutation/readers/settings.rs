@@ -8,9 +8,8 @@ use crate::accepted;
 use crate::change::{bytes, text};
 use crate::support::packed_scene;
 use crate::support::random::Random;
-use bevy_gs4d::codec;
-use bevy_gs4d::codec::checkpoint::CheckpointOptions;
 use bevy_gs4d::codec::package::WriteSettings;
+use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::offline;
 use bevy_gs4d::scene::GaussianScene;
 use std::fs;
@@ -47,7 +46,7 @@ impl Folder {
     }
 
     /// Reads a file with these options and checks the scene.
-    fn read(&self, name: &str, options: &CheckpointOptions) -> Result<Outcome, String> {
+    fn read(&self, name: &str, options: &ReadOptions) -> Result<Outcome, String> {
         match codec::load(&self.file(name), options) {
             Ok(scene) => accepted::check(scene),
             Err(error) => Ok(Outcome::Refused(error.to_string())),
@@ -74,7 +73,7 @@ impl Reader for CfgArgs {
 
     fn read(&self, bytes: &[u8]) -> Result<Outcome, String> {
         fs::write(self.folder.file("cfg_args"), bytes).expect("the folder can be written to");
-        self.folder.read("chkpnt.pth", &CheckpointOptions::default())
+        self.folder.read("chkpnt.pth", &ReadOptions::default())
     }
 }
 
@@ -98,7 +97,7 @@ impl Reader for Options {
     }
 
     fn read(&self, bytes: &[u8]) -> Result<Outcome, String> {
-        let options: CheckpointOptions = match ron::de::from_bytes(bytes) {
+        let options: ReadOptions = match ron::de::from_bytes(bytes) {
             Ok(options) => options,
             Err(error) => return Ok(Outcome::Refused(error.to_string())),
         };

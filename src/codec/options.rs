@@ -1,0 +1,84 @@
+//! Options of reading a file: settings that the file may not contain.
+//!
+//! In: values from a command line or a loader's settings. Out: [`ReadOptions`] with valid values, which each format
+//! interprets; an [`InvalidOption`] for a value that is invalid or contradicts the file.
+
+use crate::gaussian::ShDirection;
+use crate::scene::{RotationConvention, TrainedCameras, UpAxis};
+use crate::view::RasterFov;
+use serde::{Deserialize, Serialize};
+
+/// How a capture was trained and is meant to be played, where the file does not say so or the user decides otherwise.
+///
+/// A checkpoint contains none of these settings: a field that is `None` is taken from `cfg_args` in the folder of the
+/// checkpoint, else from the default. A package contains all of them: a field that is given replaces the stored value;
+/// for a field that the Gaussians of the package depend on (`time_interval`, `rotation_convention`, `force_sh_3d`,
+/// `prefilter_var`), a value other than the stored one is an error.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ReadOptions {
+    /// First and last timestamp of training. Default: 0, 1.
+    pub time_interval: Option<[f32; 2]>,
+    /// Background color in the blend space. Default: black, or white according to `cfg_args`.
+    pub background: Option<[f32; 3]>,
+    /// Convention of the rotations in the file. Default: flipped, unless the file is certainly unflipped (all
+    /// coefficients of the time blocks zero at time degree 2).
+    pub rotation_convention: Option<RotationConvention>,
+    /// Field of view that shaped the footprints. Default: reference.
+    pub raster_fov: Option<RasterFov>,
+    /// Kind of cameras that took the training views. Default: intrinsics if there is an environment map, else field of
+    /// view.
+    pub cameras: Option<TrainedCameras>,
+    /// Mean that gives the viewing direction of color. Default: canonical.
+    pub sh_direction: Option<ShDirection>,
+    /// Whether only the first 16 coefficients are evaluated. Default: `false`.
+    pub force_sh_3d: Option<bool>,
+    /// Added to the temporal variance in the marginal, if positive. Default: the value in `cfg_args`, else −1.
+    pub prefilter_var: Option<f32>,
+    /// The axis that points up. Default: +Z.
+    pub up: Option<UpAxis>,
+    /// Seconds of one pass through the time interval; 0 for a still. Default: the length of the interval, as if its unit
+    /// were the second.
+    pub duration_seconds: Option<f32>,
+}
+
+/// An option whose value is invalid or contradicts the file.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("option {name}: {reason}")]
+pub struct InvalidOption {
+    /// Name of the option.
+    pub name: &'static str,
+    /// Why its value is refused.
+    pub reason: String,
+}
+
+impl ReadOptions {
+    /// Checks the values given.
+    ///
+    /// # Errors
+    /// The first invalid value: a time interval that is not positive, a negative duration, a number that is not finite.
+    pub fn check(&self) -> Result<(), InvalidOption> {
+        let refuse = |name, reason: String| Err(InvalidOption { name, reason });
+        if let Some([first, last]) = self.time_interval
+            && !(first.is_finite() && last > first && (last - first).is_finite())
+        {
+            return refuse("time interval", format!("{first},{last} is not a first and a later last timestamp"));
+        }
+        if let Some(color) = self.background
+            && !color.iter().all(|channel| channel.is_finite())
+        {
+            return refuse("background", format!("{color:?} is not a finite color"));
+        }
+        if let Some(variance) = self.prefilter_var
+            && !variance.is_finite()
+        {
+            return refuse("prefilter variance", format!("{variance} is not finite"));
+        }
+        if let Some(seconds) = self.duration_seconds
+            && !(seconds.is_finite() && seconds >= 0.0)
+        {
+            return refuse("duration", format!("{seconds} is not a number of seconds, zero or above"));
+        }
+        Ok(())
+    }
+}

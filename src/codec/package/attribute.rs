@@ -1,0 +1,38 @@
+//! Attributes: the columns of a scene that sections hold.
+//!
+//! In: the place of a column in a table of words. Out: its [`Attribute`], with its size in memory and in a file, and its
+//! runs of rows.
+
+use std::ops::Range;
+
+/// One attribute of all Gaussians: a column of a table of words.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Attribute {
+    /// Name of its sections.
+    pub name: &'static str,
+    /// Rows of the table: Gaussians, or values of the environment map.
+    pub rows: usize,
+    /// Number of words from one row to the next in memory.
+    pub stride: usize,
+    /// First word of the attribute within a row.
+    pub offset: usize,
+    /// Number of words of the attribute in a row.
+    pub width: usize,
+}
+
+impl Attribute {
+    /// Returns the bytes of its table in memory, which are counted for the first of the attributes in that table.
+    pub fn memory(&self) -> u64 {
+        if self.offset > 0 { 0 } else { (self.rows as u64).saturating_mul(self.stride as u64).saturating_mul(4) }
+    }
+
+    /// Returns the uncompressed bytes of `rows` rows.
+    pub fn raw_length(&self, rows: usize) -> u64 {
+        (rows as u64).saturating_mul(self.width as u64 * 4)
+    }
+
+    /// Returns its rows in runs of at most `length`.
+    pub fn runs(self, length: usize) -> impl Iterator<Item = (Self, Range<usize>)> {
+        (0..self.rows).step_by(length).map(move |first| (self, first..self.rows.min(first.saturating_add(length))))
+    }
+}

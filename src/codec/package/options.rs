@@ -1,0 +1,108 @@
+//! Options on a package, which contains all settings itself.
+//!
+//! In: [`ReadOptions`] and the scene of a package. Out: the scene with the settings that are given; an error for an
+//! option that contradicts the stored Gaussians.
+
+use crate::codec::options::{InvalidOption, ReadOptions};
+use crate::scene::GaussianScene;
+
+/// Replaces the stored settings by the options that are given.
+///
+/// # Errors
+/// The first option that the stored Gaussians depend on and whose value is not the stored one.
+pub(super) fn apply(options: &ReadOptions, scene: &mut GaussianScene) -> Result<(), InvalidOption> {
+    let stored = &mut scene.trained_with;
+    let differs = [
+        ("time interval", "time-interval", options.time_interval.is_some_and(|given| given != stored.time_interval)),
+        (
+            "rotation convention",
+            "rotation-convention",
+            options.rotation_convention.is_some_and(|given| given != stored.rotation_convention),
+        ),
+        ("force SH 3D", "force-sh-3d", options.force_sh_3d.is_some_and(|given| given != stored.force_sh_3d)),
+        (
+            "prefilter variance",
+            "prefilter-var",
+            options.prefilter_var.is_some_and(|given| given != stored.prefilter_var),
+        ),
+    ];
+    if let Some((name, argument, _)) = differs.into_iter().find(|(_, _, differs)| *differs) {
+        let remedy = format!("convert its checkpoint again, with gs4d convert --{argument}");
+        return Err(InvalidOption { name, reason: format!("the package was made with another value; {remedy}") });
+    }
+    stored.background = options.background.unwrap_or(stored.background);
+    stored.raster_fov = options.raster_fov.unwrap_or(stored.raster_fov);
+    stored.cameras = options.cameras.unwrap_or(stored.cameras);
+    stored.sh_direction = options.sh_direction.unwrap_or(stored.sh_direction);
+    scene.playback.up = options.up.unwrap_or(scene.playback.up);
+    scene.playback.duration_seconds = options.duration_seconds.unwrap_or(scene.playback.duration_seconds);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gaussian::ShDirection;
+    use crate::scene::synth::{SynthSettings, synthesize};
+    use crate::scene::{RotationConvention, TrainedCameras, UpAxis};
+    use crate::view::RasterFov;
+
+    fn scene() -> GaussianScene {
+        synthesize(&SynthSettings { count: 1, ..SynthSettings::default() })
+    }
+
+    #[test]
+    fn options_replace_the_stored_settings() {
+        let options = ReadOptions {
+            background: Some([0.25; 3]),
+            raster_fov: Some(RasterFov::Corrected),
+            cameras: Some(TrainedCameras::Intrinsics),
+            sh_direction: Some(ShDirection::Displaced),
+            up: Some(UpAxis::NegY),
+            duration_seconds: Some(3.0),
+            ..ReadOptions::default()
+        };
+        let mut changed = scene();
+        apply(&options, &mut changed).expect("no option contradicts the scene");
+        let trained = &changed.trained_with;
+        let found = (trained.background, trained.raster_fov, trained.cameras, trained.sh_direction);
+        let expected = ([0.25; 3], RasterFov::Corrected, TrainedCameras::Intrinsics, ShDirection::Displaced);
+        assert_eq!(found, expected, "the training settings are replaced");
+        assert_eq!(
+            (changed.playback.up, changed.playback.duration_seconds),
+            (UpAxis::NegY, 3.0),
+            "the playback settings are replaced"
+        );
+        let mut same = scene();
+        apply(&ReadOptions::default(), &mut same).expect("no option is given");
+        assert_eq!(same, scene(), "without options the scene is unchanged");
+    }
+
+    #[test]
+    fn options_that_contradict_the_stored_gaussians_are_refused() {
+        let none = ReadOptions::default();
+        for (name, options) in [
+            ("time interval", ReadOptions { time_interval: Some([0.0, 2.0]), ..none.clone() }),
+            (
+                "rotation convention",
+                ReadOptions { rotation_convention: Some(RotationConvention::Unflipped), ..none.clone() },
+            ),
+            ("force SH 3D", ReadOptions { force_sh_3d: Some(true), ..none.clone() }),
+            ("prefilter variance", ReadOptions { prefilter_var: Some(0.5), ..none.clone() }),
+        ] {
+            let mut scene = scene();
+            let error = apply(&options, &mut scene).expect_err("the stored value is another");
+            assert_eq!(error.name, name, "the error names the option");
+        }
+        let mut stored = scene();
+        let trained = &stored.trained_with;
+        let same = ReadOptions {
+            time_interval: Some(trained.time_interval),
+            rotation_convention: Some(trained.rotation_convention),
+            force_sh_3d: Some(trained.force_sh_3d),
+            prefilter_var: Some(trained.prefilter_var),
+            ..none
+        };
+        assert_eq!(apply(&same, &mut stored), Ok(()), "the stored values are accepted");
+    }
+}

@@ -1,0 +1,110 @@
+//! A capture in memory, as it is stored.
+//!
+//! In: the result of a codec. Out: a [`GaussianScene`], checked; converted for drawing, a [`RuntimeScene`].
+
+use super::environment::Environment;
+use super::filter::TemporalFilter;
+use super::form::{Form, SceneForm};
+use super::provenance::{PlaybackHints, TrainedWith};
+use super::runtime_scene::{Level, RuntimeScene, check_around, check_levels};
+use crate::gaussian::{InvalidGaussian, Model, SliceSettings};
+use std::sync::Arc;
+
+/// A capture in memory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GaussianScene {
+    /// The Gaussians and their color.
+    pub form: SceneForm,
+    /// The environment map, if the capture has one.
+    pub environment: Option<Environment>,
+    /// The Gaussians that are active in each segment of time; all if `None`.
+    pub filter: Option<TemporalFilter>,
+    /// The settings it was trained with, which drawing must repeat.
+    pub trained_with: TrainedWith,
+    /// How it is meant to be played.
+    pub playback: PlaybackHints,
+    /// Levels of detail, which have fewer Gaussians, finest first; usually none.
+    pub levels: Vec<Level>,
+}
+
+impl GaussianScene {
+    /// Returns the number of Gaussians.
+    pub fn len(&self) -> usize {
+        self.form.len()
+    }
+
+    /// Returns whether there is no Gaussian.
+    pub fn is_empty(&self) -> bool {
+        self.form.is_empty()
+    }
+
+    /// Returns the model of the trained form; `None` for the other forms, which do not contain it.
+    pub fn model(&self) -> Option<Model> {
+        self.form.model()
+    }
+
+    /// Returns the scene with packed Gaussians decoded to the sliced form; other forms are returned unchanged.
+    /// Quantization errors remain.
+    pub fn unpacked(self) -> Self {
+        let form = match self.form {
+            SceneForm::Ready(Form::Packed(packed)) => SceneForm::Ready(Form::Sliced(packed.unpack())),
+            form @ (SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_))) => form,
+        };
+        Self { form, ..self }
+    }
+
+    /// Checks that its parts fit together, as [`RuntimeScene::check`] does.
+    ///
+    /// # Errors
+    /// A description of the first part that does not fit.
+    pub fn check(&self) -> Result<(), &'static str> {
+        self.form.check_parts()?;
+        check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())?;
+        check_levels(&self.levels, &self.trained_with, self.environment.is_some())
+    }
+
+    /// Converts the scene for drawing: slices the Gaussians if they are in the trained form. Colors are moved, not
+    /// copied.
+    ///
+    /// # Errors
+    /// The first Gaussian that cannot be drawn, or has a color coefficient that is not finite.
+    pub fn into_runtime(self) -> Result<RuntimeScene, InvalidGaussian> {
+        let prefilter_var = self.trained_with.prefilter_var;
+        self.into_runtime_with(&SliceSettings { prefilter_var, ..SliceSettings::default() })
+    }
+
+    /// Converts as [`into_runtime`](Self::into_runtime) does, with slice settings other than the scene's own. They
+    /// apply to the trained form only.
+    ///
+    /// # Errors
+    /// The first Gaussian that cannot be drawn, or has a color coefficient that is not finite.
+    pub fn into_runtime_with(self, settings: &SliceSettings) -> Result<RuntimeScene, InvalidGaussian> {
+        Ok(RuntimeScene {
+            form: self.form.into_ready(settings)?,
+            environment: self.environment,
+            filter: self.filter,
+            trained_with: self.trained_with,
+            playback: self.playback,
+            levels: self.levels.into_iter().map(checked_level).collect::<Result<_, _>>()?,
+        })
+    }
+}
+
+impl From<RuntimeScene> for GaussianScene {
+    fn from(scene: RuntimeScene) -> Self {
+        Self {
+            form: SceneForm::Ready(scene.form),
+            environment: scene.environment,
+            filter: scene.filter,
+            trained_with: scene.trained_with,
+            playback: scene.playback,
+            levels: scene.levels,
+        }
+    }
+}
+
+/// Returns a level of detail, after checking that each of its Gaussians can be drawn.
+fn checked_level(level: Level) -> Result<Level, InvalidGaussian> {
+    let scene = GaussianScene::from(Arc::unwrap_or_clone(level.scene)).into_runtime()?;
+    Ok(Level { scene: Arc::new(scene), ..level })
+}

@@ -1,0 +1,195 @@
+//! A scene ready to draw, and its levels of detail.
+//!
+//! In: Gaussians in a form that is drawn, and the other parts of a capture. Out: a [`RuntimeScene`], which returns its
+//! Gaussians and colors; an error if its parts do not fit together. A [`Level`] is a scene of fewer Gaussians.
+
+use super::detail::{MAX_LEVELS, check_sizes};
+use super::environment::Environment;
+use super::filter::TemporalFilter;
+use super::form::Form;
+use super::provenance::{PlaybackHints, TrainedWith};
+use super::sliced::Sliced;
+use crate::gaussian::{Gaussian, Harmonics};
+use crate::view::Background;
+use glam::Vec3;
+use std::sync::Arc;
+
+/// A scene ready to draw.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RuntimeScene {
+    /// The Gaussians and their color.
+    pub form: Form,
+    /// The environment map, if the capture has one.
+    pub environment: Option<Environment>,
+    /// The Gaussians that are active in each segment of time; all if `None`.
+    pub filter: Option<TemporalFilter>,
+    /// The settings it was trained with.
+    pub trained_with: TrainedWith,
+    /// How it is meant to be played.
+    pub playback: PlaybackHints,
+    /// Levels of detail, which have fewer Gaussians, finest first; usually none.
+    pub levels: Vec<Level>,
+}
+
+/// A level of detail: a capture of fewer Gaussians, without levels, environment map and temporal filter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Level {
+    /// The largest size on the screen ([`pixels_across`](super::pixels_across)) at which it looks nearly the same as all
+    /// Gaussians, pixels.
+    pub pixels: f32,
+    /// Its Gaussians and their color. The time interval is that of the capture. Shared, because it does not change.
+    pub scene: Arc<RuntimeScene>,
+}
+
+impl RuntimeScene {
+    /// Creates a scene of sliced Gaussians and their color, without environment map and filter, with default
+    /// [`TrainedWith`] and [`PlaybackHints`].
+    pub fn sliced(gaussians: Vec<Gaussian>, harmonics: Harmonics) -> Self {
+        Self {
+            form: Form::Sliced(Sliced { gaussians, harmonics }),
+            environment: None,
+            filter: None,
+            trained_with: TrainedWith::default(),
+            playback: PlaybackHints::default(),
+            levels: Vec::new(),
+        }
+    }
+
+    /// Returns the number of Gaussians.
+    pub fn len(&self) -> usize {
+        self.form.len()
+    }
+
+    /// Returns whether there is no Gaussian.
+    pub fn is_empty(&self) -> bool {
+        self.form.is_empty()
+    }
+
+    /// Returns one Gaussian, decoded if it is packed.
+    ///
+    /// # Panics
+    /// If `index` is out of range.
+    pub fn gaussian(&self, index: usize) -> Gaussian {
+        self.form.gaussian(index)
+    }
+
+    /// Returns all Gaussians in order.
+    pub fn iter(&self) -> impl Iterator<Item = Gaussian> + '_ {
+        self.form.iter()
+    }
+
+    /// Returns the color of one Gaussian seen along the unit vector `direction` from the camera, with
+    /// `tau = mean_t − time`; see [`Harmonics::color`].
+    ///
+    /// # Panics
+    /// If `index` is out of range.
+    pub fn color(&self, index: usize, direction: Vec3, tau: f32) -> Vec3 {
+        self.form.color(index, direction, tau, self.trained_with.time_span())
+    }
+
+    /// Checks that its parts fit together, as those of every loaded scene do: lengths, codes, the temporal filter, the
+    /// levels of detail, and that the environment map is finite. No index of a checked scene is out of range, here or on
+    /// a GPU.
+    ///
+    /// # Errors
+    /// A description of the first part that does not fit.
+    pub fn check(&self) -> Result<(), &'static str> {
+        self.form.check_parts()?;
+        check_around(self.len(), self.filter.as_ref(), self.environment.as_ref())?;
+        check_levels(&self.levels, &self.trained_with, self.environment.is_some())
+    }
+
+    /// Returns the background that the capture was trained with: its environment map if it has one, else its color.
+    pub fn trained_background(&self) -> Background {
+        match self.environment {
+            Some(_) => Background::Environment,
+            None => Background::Color(self.trained_with.background),
+        }
+    }
+
+    /// Returns the bytes of Gaussians and colors in memory.
+    pub fn size(&self) -> usize {
+        self.form.size()
+    }
+}
+
+/// Checks the parts of a scene of `count` Gaussians other than its form and its levels.
+pub(super) fn check_around(
+    count: usize,
+    filter: Option<&TemporalFilter>,
+    environment: Option<&Environment>,
+) -> Result<(), &'static str> {
+    filter.map_or(Ok(()), |filter| filter.check(count))?;
+    environment.map_or(Ok(()), Environment::check)
+}
+
+/// Checks the levels of a scene: their sizes, finest first, and that each fits the scene.
+pub(super) fn check_levels(
+    levels: &[Level],
+    trained_with: &TrainedWith,
+    has_environment: bool,
+) -> Result<(), &'static str> {
+    if levels.len() > MAX_LEVELS {
+        return Err("more levels of detail than a capture may have");
+    }
+    if has_environment && !levels.is_empty() {
+        return Err("levels of detail of a capture with an environment map, which surrounds the camera");
+    }
+    check_sizes(levels.iter().map(|level| level.pixels))?;
+    for level in levels {
+        let own = &level.scene;
+        if !own.levels.is_empty() || own.environment.is_some() || own.filter.is_some() {
+            return Err("a level of detail that has levels, an environment map or a temporal filter itself");
+        }
+        if level.scene.trained_with.time_interval != trained_with.time_interval {
+            return Err("a level of detail of another time interval");
+        }
+        level.scene.check()?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn empty() -> RuntimeScene {
+        RuntimeScene::sliced(Vec::new(), Harmonics { coefficients: 1, ..Harmonics::default() })
+    }
+
+    fn level(pixels: f32, scene: RuntimeScene) -> Level {
+        Level { pixels, scene: Arc::new(scene) }
+    }
+
+    #[test]
+    fn inconsistent_levels_are_refused() {
+        let with = |levels| RuntimeScene { levels, ..empty() };
+        assert_eq!(
+            with(vec![level(64.0, empty()), level(8.0, empty())]).check(),
+            Ok(()),
+            "levels of decreasing size are accepted"
+        );
+        let map = Environment { width: 1, height: 1, texels: vec![0.0; 3] };
+        let other = TrainedWith { time_interval: [0.0, 2.0], ..TrainedWith::default() };
+        let bad = [
+            vec![level(8.0, empty()), level(64.0, empty())],
+            vec![level(8.0, empty()), level(8.0, empty())],
+            vec![level(f32::NAN, empty())],
+            vec![level(f32::INFINITY, empty())],
+            vec![level(0.0, empty())],
+            vec![level(8.0, with(vec![level(4.0, empty())]))],
+            vec![level(8.0, RuntimeScene { environment: Some(map.clone()), ..empty() })],
+            vec![level(
+                8.0,
+                RuntimeScene { filter: Some(TemporalFilter::support(empty().iter(), [0.0, 1.0], 2)), ..empty() },
+            )],
+            vec![level(8.0, RuntimeScene { trained_with: other, ..empty() })],
+            (0..=MAX_LEVELS).map(|index| level(64.0 - index as f32, empty())).collect(),
+        ];
+        for (index, levels) in bad.into_iter().enumerate() {
+            assert!(with(levels).check().is_err(), "the levels with index {index} are refused");
+        }
+        let surrounded = RuntimeScene { environment: Some(map), ..with(vec![level(8.0, empty())]) };
+        assert!(surrounded.check().is_err(), "levels of a capture with an environment map are refused");
+    }
+}
