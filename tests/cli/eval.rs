@@ -8,8 +8,8 @@ use crate::support::capture::Capture;
 use crate::support::command::{arguments, gs4d};
 use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, TrainingView};
 use bevy_gs4d::reference;
-use bevy_gs4d::scene::RuntimeScene;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{Environment, RuntimeScene};
 use bevy_gs4d::view::{Background, RasterFov};
 use glam::{Mat4, UVec2, Vec3};
 use image::{GrayImage, Luma, Rgb, RgbImage, Rgba, RgbaImage};
@@ -185,6 +185,23 @@ fn identical_views_are_counted_and_left_out_of_the_mean() {
     let text = gs4d(&arguments!["eval", &scene, "--data", &data, "--metrics", "psnr", "--engine", "cpu"]).text();
     assert!(text.contains("1 of 7 views are identical and not part of the mean PSNR"), "it is said: {text}");
     assert!(text.contains("the images have no gaps"), "why there is one background: {text}");
+}
+
+#[test]
+fn an_environment_map_has_no_contrasting_background() {
+    let mut trained = synthesize(&SynthSettings { count: 200, ..SynthSettings::default() });
+    let texels = (0..3 * 8 * 4).map(|i| i as f32 / 95.0).collect();
+    trained.environment = Some(Environment { width: 8, height: 4, texels });
+    let Capture { folder: _folder, scene, data } = Capture::new(trained, Vec3::ZERO, 2, 2, UVec2::splat(32), true);
+    let path = data.join("test/c00_00.png");
+    let mut image = image::open(&path).expect("a picture").into_rgba8();
+    image.put_pixel(3, 3, Rgba([0; 4]));
+    image.save(&path).expect("the folder can be written to");
+    let fixed = arguments!["eval", &scene, "--data", &data, "--metrics", "psnr", "--engine", "cpu"];
+    let json = gs4d(&[fixed.to_vec(), arguments!["--json"].to_vec()].concat()).json();
+    assert_eq!((&json["has_gaps"], &json["contrast"]), (&true.into(), &Value::Null), "no second background");
+    let text = gs4d(&fixed).text();
+    assert!(text.contains("over the environment map of the scene"), "a line says why: {text}");
 }
 
 #[test]

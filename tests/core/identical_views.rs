@@ -70,7 +70,10 @@ impl Setup {
     fn choose(&self, evaluator: &Evaluator, loss: f64) -> (usize, f64) {
         let engine = &mut Engine::Cpu;
         let baseline = evaluator.psnr(engine, &self.runtime).expect("it can be drawn");
-        let psnr = |count| evaluator.psnr_of_highest(&mut Engine::Cpu, &self.scene, &self.scores, count);
+        let psnr = |count| {
+            let psnr = evaluator.psnr_of_highest(&mut Engine::Cpu, &self.scene, &self.scores, count);
+            psnr.map_err(|error| error.to_string())
+        };
         let (count, trials) = smallest_count(COUNT, 1, baseline - loss, psnr).expect("it can be drawn");
         assert!(baseline.is_finite() && trials.iter().all(|trial| trial.psnr.is_finite()), "{baseline}: {trials:?}");
         (count, baseline)
