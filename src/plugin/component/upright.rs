@@ -3,8 +3,8 @@
 //! In: an entity with [`Upright`], the up direction of its capture. Out: the same entity with its transform turned, once the capture is
 //! loaded.
 
-use super::GaussianCapture3d;
 use super::capture::GaussianCapture;
+use super::capture_3d::GaussianCapture3d;
 use bevy::asset::Assets;
 use bevy::ecs::component::Component;
 use bevy::ecs::query::With;

@@ -45,6 +45,8 @@
 //! ```
 
 mod error;
+mod gpu;
+mod headless;
 mod keys;
 mod offscreen;
 mod pipelines;
@@ -54,9 +56,11 @@ mod waiting;
 mod window;
 
 pub use error::TestingError;
+pub use gpu::has_gpu;
+pub use headless::{app, app_with};
 pub use image::{Rgba32FImage, RgbaImage};
 pub use keys::{press, release, tap};
-pub use offscreen::{Offscreen, app, app_with, has_gpu};
+pub use offscreen::Offscreen;
 pub use readback::{picture, pictures, read, read_hdr, save};
 pub use stepping::step;
 pub use waiting::{settle, wait_for};

@@ -4,7 +4,7 @@
 //! with pipelined rendering the render world is on another thread and cannot be accessed.
 
 use super::error::TestingError;
-use super::offscreen::has_gpu;
+use super::gpu::has_gpu;
 use bevy::app::App;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::schedule::IntoScheduleConfigs;
