@@ -1,6 +1,6 @@
 //! The component that places a capture in the world.
 //!
-//! In: the handle of a [`GaussianCapture`]. Out: an entity that every `Camera3d` that sees it draws once the asset is loaded.
+//! In: the handle of a [`GaussianCapture`]. Out: an entity that each `Camera3d` with the entity in view draws once the asset is loaded.
 
 use super::capture::GaussianCapture;
 use bevy::asset::{AssetId, Handle};
@@ -14,11 +14,11 @@ use bevy::transform::components::Transform;
 /// Places a capture in the world.
 ///
 /// The entity's transform (translation, rotation, any scale) maps capture space to the world. Most captures have +z up:
-/// [`Upright`](super::Upright) stands them upright. A perspective camera draws nothing that is nearer than 0.2 units *of the capture*, as in training; an orthographic camera
-/// draws from its near plane on.
+/// [`Upright`](super::Upright) stands them upright. A perspective camera draws no Gaussian nearer than 0.2 units *of the capture*, as in training; an orthographic
+/// camera draws from its near plane on.
 ///
 /// [`Visibility`], `RenderLayers` and frustum culling decide which cameras draw the capture, as they do for meshes. The entity's
-/// `Aabb` encloses what is drawn at the current time. A capture with an environment map surrounds every camera: it has no `Aabb`
+/// `Aabb` encloses the Gaussians drawn at the current time. A capture with an environment map surrounds every camera: it has no `Aabb`
 /// and is never culled.
 ///
 /// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) also requires [`CaptureState`](crate::asset::CaptureState),

@@ -12,7 +12,7 @@ pub fn has_gpu() -> bool {
     *FOUND.get_or_init(|| !GpuContext::adapters().is_empty())
 }
 
-/// Returns the backends to use. Without DX12 among them, wgpu needs no extra dispatch to validate each indirect one.
+/// Returns the backends to use. Linux uses Vulkan alone. Without DX12, wgpu needs no extra dispatch to validate each indirect dispatch.
 pub(super) fn backends() -> Backends {
     if cfg!(target_os = "linux") { Backends::VULKAN } else { Backends::PRIMARY }
 }

@@ -14,7 +14,7 @@ use glam::UVec2;
 pub struct Offscreen {
     /// The picture on the GPU: RGBA, 8 bits each, sRGB-encoded; or in [HDR](Self::hdr).
     pub image: Handle<Image>,
-    /// Its width and height in pixels.
+    /// Width and height in pixels.
     pub size: UVec2,
 }
 
@@ -25,7 +25,7 @@ impl Offscreen {
         Self::of(images, size, TextureFormat::Rgba8UnormSrgb)
     }
 
-    /// Creates a picture in HDR: RGBA in linear light, 16 bits of float each, as bright as the camera makes it;
+    /// Creates a picture in HDR: RGBA in linear light, 16-bit floats, not clamped;
     /// [`read_hdr`](super::read_hdr) returns it. Cameras that draw into it need [`Hdr`](bevy::camera::Hdr). `size` as in
     /// [`new`](Self::new).
     ///
