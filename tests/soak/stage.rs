@@ -271,7 +271,7 @@ pub fn add(app: &mut App, capture: GaussianCapture) -> Handle<GaussianCapture> {
     app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(capture)
 }
 
-/// Spawns a camera whose pixels are compared: no tonemapping, no dithering.
+/// Spawns a camera without tonemapping and dithering, so that its pixels can be compared.
 pub fn spawn_camera(app: &mut App, target: &Offscreen, viewer: &Viewer) -> Entity {
     let camera = (Camera3d::default(), target.target(), Tonemapping::None, DebandDither::Disabled);
     app.world_mut().spawn((camera, components(viewer))).id()
