@@ -1,18 +1,18 @@
-# What `.ci/run` and `.ci/full` share. In: to be sourced by one of them. Out: the root of the clone as working directory, what the machine
-# lacks installed, functions for steps, lints and tests, and at the end a summary and the exit code.
+# Common code of `.ci/run` and `.ci/full`. In: one of these scripts, which sources this file. Out: the root of the clone as working directory,
+# missing programs installed, functions for steps, lints and tests, and at the end a summary and the exit code.
 #
-# CARGO_TARGET_DIR  where to build; default: a folder of the user's cache, outside the clone, used again by the next run
-# GS4D_DATA         folder of the trained captures; default: ../shared/data where that exists, else their tests skip themselves
+# CARGO_TARGET_DIR  build folder; default: a folder of the user's cache, outside the clone, which the next run uses again
+# GS4D_DATA         folder of the trained captures; default: ../shared/data if it exists, else the tests that need captures are skipped
 #
-# Tests add what they skip to the file that GS4D_SKIPPED names, which is set here; the summary counts it.
+# Tests add a line for each skipped test to the file that GS4D_SKIPPED names, which is set here; the summary counts these lines.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 exec </dev/null
 
-# The features that can be built by themselves, those with Bevy apart. `default` is `bevy`; `openxr` is not tested.
+# The features that can be built separately, without and with Bevy. `default` implies `bevy`; `openxr` is not tested.
 without_bevy=(renderer offline cli)
 with_bevy=(bevy pbr picking testing inspector viewer)
-# Every test, example and document needs no more than these.
+# The features that all tests, examples and documents together need.
 everything=viewer,cli
 
 scratch=$(mktemp -d)
@@ -21,9 +21,10 @@ began=0
 summary=()
 export GS4D_SKIPPED="$scratch/skipped"
 
-# Lists why tests were skipped, or parts of them, and how many each time; a test that ran twice counts once. In: `skipped: NAME: reason`.
+# Lists the reasons of skipped tests, and of skipped parts of tests, with their counts; a test that ran twice counts once. In: lines
+# `skipped: NAME: reason`.
 skips() {
-  printf '    tests skipped, or parts of them:\n'
+  printf '    skipped tests and parts of tests, by reason:\n'
   if [ -s "$GS4D_SKIPPED" ]; then
     sort -u "$GS4D_SKIPPED" | sed 's/^skipped: [^ ]*: //' | sort | uniq -c | sort -rn
   else
@@ -36,46 +37,46 @@ finish() {
   printf '\n==> Summary\n'
   for line in ${summary[@]+"${summary[@]}"}; do printf '    %s\n' "$line"; done
   if [ -s "$scratch/results" ]; then
-    printf '    the last line of each test binary:\n'
+    printf '    the result of each test binary:\n'
     cat "$scratch/results"
     skips
   fi
   rm -rf "$scratch"
   if [ "$status" -eq 0 ]; then
-    printf '    all of it holds, after %d s\n' "$SECONDS"
+    printf '    passed, after %d s\n' "$SECONDS"
   else
     printf '    FAILED: %s, after %d s\n' "$current" "$SECONDS"
   fi
 }
 trap finish EXIT
-# Without these, a run that is stopped would end as if it had passed.
+# Without these traps, an interrupted run would exit with success.
 trap 'exit 130' INT
 trap 'exit 143' TERM
 
-# Heads a step; `done_with` closes it.
+# Begins a step and prints its heading; `done_with` ends the step.
 step() {
   current=$1
   began=$SECONDS
   printf '\n==> %s (at %d s)\n' "$current" "$SECONDS"
 }
 
-# Notes the time that the step took, and a remark if one is given.
+# Adds the time of the step to the summary, with an optional remark.
 done_with() {
   summary+=("$(printf '%5d s  %s%s' "$((SECONDS - began))" "$current" "${1:+: $1}")")
 }
 
-# Shows a command and runs it.
+# Prints a command and runs it.
 show() {
   printf '    $ %s\n' "$*"
   "$@"
 }
 
-# Lints the crate with one set of features and no other; `''` is none. More arguments go to cargo.
+# Lints the crate with the given features only; `''` is no feature. Further arguments are passed to cargo.
 lint() {
   show cargo clippy --locked --no-default-features --features "$1" "${@:2}" -- -D warnings
 }
 
-# Runs tests, and keeps the line with which each binary ends.
+# Runs tests, and records the result line of each test binary.
 tests() {
   local status=0
   show cargo test --locked "$@" | tee "$scratch/tests" || status=$?
@@ -83,18 +84,18 @@ tests() {
   return "$status"
 }
 
-# How many of the tests just run have passed.
+# Prints the number of passed tests of the last call of `tests`.
 passed() {
   awk '/^test result: ok/ { sum += $4 } END { print sum + 0, "passed" }' "$scratch/tests"
 }
 
-# Lists the crates that a build with these features consists of, on this machine, each with its version.
+# Lists the crates, with versions, of a build with the given features on this machine.
 crates() {
   cargo tree --locked --no-default-features --features "$1" --edges normal,build --prefix none --format '{p}' |
     cut -d ' ' -f 1,2 | sort -u
 }
 
-# Makes a subcommand of cargo available in this version: the installed one whichever it is, else one of our own.
+# Makes a subcommand of cargo available: any installed version, else the given version, installed into the build folder.
 tool() {
   local folder="$CARGO_TARGET_DIR/tools"
   command -v "$1" >/dev/null && return
@@ -111,10 +112,10 @@ has_vulkan_driver() {
     compgen -G '/usr/share/vulkan/icd.d/*.json' >/dev/null || compgen -G '/etc/vulkan/icd.d/*.json' >/dev/null
 }
 
-# Installs what is missing and says what there is: the first step.
+# The first step: installs missing programs, and prints the build folder and the captures in use.
 prepare() {
   local missing=()
-  step 'What the machine has'
+  step 'Preparation of the machine'
   command -v cc >/dev/null || missing+=(gcc libc6-dev)
   has_vulkan_driver || missing+=(mesa-vulkan-drivers libvulkan1)
   if [ ${#missing[@]} -gt 0 ] && command -v apt-get >/dev/null; then
@@ -131,9 +132,9 @@ prepare() {
     cargo clippy --version >/dev/null 2>&1 || show rustup component add clippy
   fi
   export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-${XDG_CACHE_HOME:-$HOME/.cache}/bevy_gs4d/target}"
-  # Incremental builds only pay where one tree is built over and over.
+  # Incremental builds only save time if one tree is built repeatedly.
   export CARGO_INCREMENTAL=0
-  # What another clone has built counts as built if its files are newer, but its tests look for their data in that clone.
+  # Cargo would reuse builds of another clone whose files are newer, but those tests read their data from that clone.
   if [ -d "$CARGO_TARGET_DIR" ] && [ "$(cat "$CARGO_TARGET_DIR/clone" 2>/dev/null)" != "$PWD" ]; then
     show cargo clean --locked --package bevy_gs4d
     show cargo clean --locked --package bevy_gs4d --release
@@ -153,7 +154,7 @@ prepare() {
   if [ -n "${GS4D_DATA:-}" ]; then
     captures="on the trained captures in $GS4D_DATA"
   else
-    captures='without trained captures: their tests skip themselves (GS4D_DATA is not set)'
+    captures='without trained captures: tests that need them are skipped (GS4D_DATA is not set)'
   fi
   printf 'tests run %s\n' "$captures"
   done_with

@@ -1,15 +1,15 @@
-//! Wall-clock time of a whole Bevy app's frame, with a capture that plays and without one.
+//! Wall-clock time of a whole Bevy app's frame, with a playing capture and without a capture.
 //!
 //! ```text
 //! cargo bench --features viewer,cli --bench app -- [CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N] [--eye X,Y,Z] [--plugins SET]
 //! ```
 //!
-//! In: a capture (default: the bundled one), a picture size (640x480), a number of frames for each measurement (100), how often each is
-//! repeated (21), an eye in capture space that looks at the origin with z up (-3.57,1.3,1.69), and `default` or `minimal` (both). Out: for
-//! Bevy's default plugins and for the few that a capture needs, with one sample and with four, for no capture and for each [`Design`]:
-//! frames per second and milliseconds of a frame, the median of the rounds, and their spread; how much longer the frame is than without a
-//! capture, the median of the rounds' differences, and the range of the middle half of these. Rendering is pipelined, there is no window,
-//! and each measurement ends when the GPU has finished.
+//! In: a capture (default: the bundled capture), a picture size (640x480), the number of frames of a measurement (100), the number of rounds
+//! (21), an eye in capture space that looks at the origin with z up (-3.57,1.3,1.69), and `default` or `minimal` (both). Out: for Bevy's
+//! default plugins and for the minimal plugins that a capture needs, with one sample and with four, without a capture and with each
+//! [`Design`]: frames per second and milliseconds of a frame (median of the rounds), the spread of the rounds, the additional time compared
+//! with the frame without a capture (median of the rounds' differences), and the range of the middle half of these differences. Rendering is
+//! pipelined, there is no window, and each measurement ends when the GPU has finished.
 
 mod common;
 
@@ -29,7 +29,7 @@ use bevy_gs4d::prelude::*;
 use bevy_gs4d::renderer::Design;
 use common::Arguments;
 
-/// What is measured: the set of plugins, the samples of the camera, how a capture is drawn if there is one.
+/// A measured app: the set of plugins, the samples of the camera, and the design that draws the capture, `None` without a capture.
 struct Subject {
     plugins: &'static str,
     samples: u32,
@@ -89,7 +89,7 @@ fn all(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
     plugins
 }
 
-/// Leaves out what a capture does not need.
+/// Disables plugins that a capture does not need.
 fn few(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
     plugins
         .disable::<PbrPlugin>()
@@ -105,7 +105,7 @@ fn few(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
         .disable::<PostProcessPlugin>()
 }
 
-/// Returns an app with a camera and, if a design is given, a capture that plays and is drawn that way; everything is loaded.
+/// Returns an app with a camera and, if a design is given, a playing capture drawn with that design. All assets are loaded.
 fn app(
     arguments: &Arguments,
     eye: Vec3,

@@ -1,12 +1,12 @@
-//! CPU time of a frame: the crate's own systems in a headless Bevy app, by their spans.
+//! CPU time of a frame: the spans of the crate's own systems in a headless Bevy app.
 //!
 //! ```text
 //! cargo bench --features viewer,cli --bench frame -- [CAPTURE] [FRAMES]
 //! ```
 //!
-//! In: a capture (default: the bundled one) that plays before one camera, a number of frames (default: 600). Out: a
-//! line for each span: how often it is entered in a frame, its median, and its 95th percentile, microseconds; then the
-//! sum over a frame. Bevy's own systems and the GPU are not included.
+//! In: a capture (default: the bundled capture) that plays in front of one camera, a number of frames (default: 600). Out: a
+//! line for each span: entries per frame, median and 95th percentile in microseconds; then the sum over a frame. Bevy's own
+//! systems and the GPU are not included.
 
 use bevy::log::tracing::span::Id;
 use bevy::log::tracing::subscriber::Interest;
@@ -26,7 +26,7 @@ use std::time::{Duration, Instant};
 /// Number of entries and total time of each span of the crate since the last reset.
 static SPENT: Mutex<BTreeMap<&'static str, (u32, Duration)>> = Mutex::new(BTreeMap::new());
 
-/// Measures spans by their name.
+/// A layer that measures spans by name.
 struct Stopwatch;
 
 struct Entered(Instant);
@@ -63,7 +63,7 @@ fn stopwatch(_: &mut App) -> Option<BoxedLayer> {
 }
 
 fn main() -> Result {
-    // Cargo passes options of its own.
+    // Cargo passes additional options.
     let mut arguments = std::env::args().skip(1).filter(|argument| !argument.starts_with("--"));
     let bundled = || format!("{}/assets/toybox.gs4d", env!("CARGO_MANIFEST_DIR"));
     let capture = PathBuf::from(arguments.next().unwrap_or_else(bundled));
@@ -102,7 +102,7 @@ fn main() -> Result {
     Ok(())
 }
 
-/// Returns the median and the 95th percentile, microseconds.
+/// Returns the median and the 95th percentile in microseconds.
 fn quantiles(mut times: Vec<Duration>) -> [f64; 2] {
     times.sort();
     [times.len() / 2, times.len() * 95 / 100].map(|at| times.get(at).copied().unwrap_or_default().as_secs_f64() * 1e6)

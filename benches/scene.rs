@@ -1,14 +1,15 @@
-//! Wall-clock time of a Bevy app's frame in which a capture stands in a scene: what glass, fog, shadows and many copies cost.
+//! Wall-clock time of a Bevy app's frame with a capture in a scene: the cost of glass, fog, shadows and many copies.
 //!
 //! ```text
 //! cargo bench --features viewer,cli --bench scene -- [CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N] [--only WORD]
 //! ```
 //!
-//! In: a capture (default: the bundled one), a picture size (1280x720), frames for each measurement (100), rounds (9), a word in the names
-//! of the scenes (all). Out: milliseconds of a frame for each scene, the median of the rounds, and their spread; how much longer it is than
-//! the scene that it is compared with, the median of the rounds' differences, and the range of the middle half of these; then, measured in as
-//! many further frames, but at most 100, the GPU time of the captures' passes and the number of splats. Default plugins, no window, rendering
-//! is pipelined, all apps take turns, and each measurement ends when the GPU has finished.
+//! In: a capture (default: the bundled capture), a picture size (1280x720), the number of frames of a measurement (100), the number of rounds
+//! (9), a word in the names of the scenes to measure (all scenes). Out: for each scene milliseconds of a frame (median of the rounds), the
+//! spread of the rounds, the additional time compared with the scene that the last column names (median of the rounds' differences), and the
+//! range of the middle half of these differences; then, from the same number of further frames but at most 100, the GPU time of the captures'
+//! passes and the number of splats. Default plugins, no window, pipelined rendering; all apps take turns, and each measurement ends when the
+//! GPU has finished.
 
 mod common;
 
@@ -17,7 +18,7 @@ use bevy::prelude::*;
 use bevy_gs4d::prelude::*;
 use common::{Arguments, Times};
 
-/// What stands in the scene.
+/// The contents of a scene.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Nothing,
@@ -35,7 +36,7 @@ enum Kind {
 
 use Kind::*;
 
-/// The scenes: a name, what stands there, the samples of the camera, and the scene that it is compared with.
+/// The scenes: a name, the contents, the samples of the camera, and the name of the scene for comparison.
 const SCENES: [(&str, Kind, Msaa, &str); 15] = [
     ("nothing", Nothing, Msaa::Off, "nothing"),
     ("capture", Capture, Msaa::Off, "nothing"),
@@ -94,7 +95,7 @@ fn main() -> Result {
     Ok(())
 }
 
-/// Returns the GPU time of all passes for captures in a frame, milliseconds, the median of some frames, and the number of splats.
+/// Returns the GPU time of all passes for captures in a frame, in milliseconds (median of `frames` frames), and the number of splats.
 fn passes(app: &mut App, frames: u32) -> Result<(f64, u32)> {
     let statistics = app.world().resource::<CaptureStatistics>().clone();
     statistics.measure(true);
@@ -111,7 +112,7 @@ fn passes(app: &mut App, frames: u32) -> Result<(f64, u32)> {
     Ok((times[times.len() / 2], splats))
 }
 
-/// Returns an app with a camera and a scene; everything is loaded.
+/// Returns an app with a camera and a scene. All assets are loaded.
 fn app(arguments: &Arguments, logged: bool, kind: Kind, msaa: Msaa) -> Result<App> {
     let mut app = common::app(arguments.size, logged, |plugins| plugins);
     app.add_plugins(GaussianCapturePlugin).insert_resource(DirectionalLightShadowMap { size: 1024 });
@@ -153,9 +154,9 @@ fn app(arguments: &Arguments, logged: bool, kind: Kind, msaa: Msaa) -> Result<Ap
             world.insert_resource(CaptureDetail { bias, ..default() });
             let away = place.forward() * 50.0;
             for index in 0..100 {
-                let beside = place.right() * (3.0 * (index % 10) as f32 - 13.5);
-                let above = place.up() * (2.0 * (index / 10) as f32 - 9.0);
-                let at = Transform::from_translation(place.translation + away + beside + above);
+                let right = place.right() * (3.0 * (index % 10) as f32 - 13.5);
+                let up = place.up() * (2.0 * (index / 10) as f32 - 9.0);
+                let at = Transform::from_translation(place.translation + away + right + up);
                 world.spawn((GaussianCapture3d(handle.clone()), Upright, at));
             }
         }

@@ -1,4 +1,4 @@
-//! Shared by the benchmarks that measure whole apps: their command line, apps that run as games do, and the rounds of measurements.
+//! Common code of the benchmarks that measure whole apps: the command line, apps that run like games, and the rounds of measurements.
 //!
 //! In: `[CAPTURE] [--size WIDTHxHEIGHT] [--frames N] [--rounds N]` and the options of one benchmark; apps. Out: [`Arguments`], and the
 //! [`Times`] of each app's frame.
@@ -13,16 +13,16 @@ use bevy_gs4d::testing;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// A GPU that was idle runs slowly for a while.
+/// Warm-up time: an idle GPU has a low clock rate at first.
 const WARM_UP: Duration = Duration::from_millis(600);
-/// The first frames of an app after those of another find nothing in the caches.
+/// Number of frames before each measurement: after frames of another app, the caches are cold.
 const FIRST_FRAMES: u32 = 10;
 
 /// The arguments of a benchmark, or its defaults.
 pub struct Arguments {
     pub capture: PathBuf,
     pub size: UVec2,
-    /// For each measurement.
+    /// Number of frames of each measurement.
     pub frames: u32,
     pub rounds: usize,
 }
@@ -30,11 +30,11 @@ pub struct Arguments {
 /// Milliseconds of an app's frame, one for each round.
 pub struct Times(Vec<f64>);
 
-/// Reads the command line; `size`, `frames` and `rounds` are defaults. `more` is called with each option that not all benchmarks have and with
-/// what returns its value, and returns whether it is an option of this benchmark.
+/// Parses the command line; `size`, `frames` and `rounds` are defaults. `more` is called with each option that is not common to all benchmarks
+/// and with a function that returns the option's value; it returns whether this benchmark has the option.
 ///
 /// # Errors
-/// An unknown option, an option without its value or with a wrong one.
+/// An unknown option, an option without a value or with an invalid value.
 pub fn parse(
     size: UVec2,
     frames: u32,
@@ -50,7 +50,7 @@ pub fn parse(
             "--size" => parsed.size = numbers(&value()?, 'x').map(UVec2::from).ok_or("--size: not like 640x480")?,
             "--frames" => parsed.frames = value()?.parse().map_err(|_| "--frames: not a number")?,
             "--rounds" => parsed.rounds = value()?.parse().map_err(|_| "--rounds: not a number")?,
-            // Cargo passes this one.
+            // Cargo passes this option.
             "--bench" => {}
             option if option.starts_with('-') => {
                 if !more(option, &mut value)? {
@@ -63,13 +63,13 @@ pub fn parse(
     Ok(parsed)
 }
 
-/// Returns exactly `N` numbers between separators.
+/// Parses exactly `N` numbers between separators.
 pub fn numbers<T: std::str::FromStr, const N: usize>(text: &str, separator: char) -> Option<[T; N]> {
     let parts: Vec<T> = text.split(separator).map(|part| part.parse().ok()).collect::<Option<_>>()?;
     parts.try_into().ok()
 }
 
-/// Returns an app without a window whose rendering is pipelined. Bevy has one logger for all apps: `logged` says whether there is one.
+/// Returns an app without a window, with pipelined rendering. Bevy has one logger for all apps: `logged` is whether it is already installed.
 pub fn app(size: UVec2, logged: bool, adjust: impl FnOnce(PluginGroupBuilder) -> PluginGroupBuilder) -> App {
     testing::app_with(size, |plugins| {
         let plugins = adjust(plugins).enable::<PipelinedRenderingPlugin>();
@@ -77,10 +77,10 @@ pub fn app(size: UVec2, logged: bool, adjust: impl FnOnce(PluginGroupBuilder) ->
     })
 }
 
-/// Waits until everything is loaded. From then on a frame is a 60th of a second, however long it takes.
+/// Waits until all assets are loaded. Afterwards each update advances time by a 60th of a second, independent of its wall-clock time.
 ///
 /// # Errors
-/// Those of [`testing::settle`].
+/// The errors of [`testing::settle`].
 pub fn start(app: &mut App) -> Result {
     testing::settle(app)?;
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / 60.0)));
@@ -119,24 +119,24 @@ impl Times {
         format!("{low:.3} - {high:.3}")
     }
 
-    /// Returns how much longer a frame is than one of another app that took turns with this: the median of the differences round by
-    /// round, and the range of the middle half of them, as text. What slows the machine for a while slows both apps of a round.
+    /// Returns the additional frame time compared with another app that took turns with this app: the median of the rounds' differences, and
+    /// the range of the middle half of the differences, as text. A temporary slowdown of the machine affects both apps of a round.
     pub fn more_than(&self, other: &Self) -> (f64, String) {
         let [low, median, high] = quartiles(self.0.iter().zip(&other.0).map(|(own, other)| own - other).collect());
         (median, format!("{low:.3} - {high:.3}"))
     }
 }
 
-/// Returns the quartiles; NaN of no values.
+/// Returns the quartiles; NaN without values.
 fn quartiles(mut values: Vec<f64>) -> [f64; 3] {
     values.sort_by(f64::total_cmp);
     [1, 2, 3].map(|quarter| values.get(values.len() * quarter / 4).copied().unwrap_or(f64::NAN))
 }
 
-/// Runs the app until the GPU is as fast as it gets.
+/// Runs the app until the GPU has reached its full clock rate.
 ///
 /// # Errors
-/// As [`measure`].
+/// The errors of [`measure`].
 pub fn warm_up(app: &mut App) -> Result {
     let began = Instant::now();
     while began.elapsed() < WARM_UP {
@@ -148,7 +148,7 @@ pub fn warm_up(app: &mut App) -> Result {
 /// Runs the app for a number of frames, and returns the time until the GPU has finished them.
 ///
 /// # Errors
-/// As [`measure`].
+/// The errors of [`measure`].
 pub fn run(app: &mut App, frames: u32) -> Result<Duration> {
     let device = app.world().resource::<RenderDevice>().clone();
     let began = Instant::now();

@@ -1,7 +1,7 @@
 //! Captures among the particles of `bevy_hanabi`, in headless apps.
 //!
-//! In: a capture of one opaque splat, and an effect of one particle before or behind it. Out: proof that the particle hides the capture or
-//! is hidden by it, multisampled or not, in HDR or not. Skipped where there is no GPU, not even a software one.
+//! In: a capture of one opaque splat, and an effect of one particle in front of it or behind it. Out: a test that the particle hides the
+//! capture or is hidden by it, with and without multisampling, with and without HDR. Skipped without a GPU (a software driver counts).
 
 use bevy::camera::Hdr;
 use bevy::core_pipeline::tonemapping::Tonemapping;
@@ -19,7 +19,7 @@ use std::time::Duration;
 
 const SIZE: UVec2 = UVec2::new(160, 120);
 
-/// Returns a red splat at the origin, nearly opaque in its middle.
+/// Returns a capture of one red splat at the origin, nearly opaque in its middle.
 fn red() -> GaussianCapture {
     let splat = Gaussian {
         mean: [0.0; 3],
@@ -30,13 +30,13 @@ fn red() -> GaussianCapture {
         opacity: 0.98,
         padding: 0.0,
     };
-    // The first harmonic is 0.282; one half is added to colors.
+    // The first harmonic is 0.282; the evaluation adds one half to colors.
     let values = [1.0, 0.0, 0.0].map(|color: f32| (color - 0.5) / 0.282_094_79).to_vec();
     let harmonics = Harmonics { coefficients: 1, degree: 0, degree_t: 0, values };
     GaussianCapture::new(RuntimeScene::sliced(vec![splat], harmonics))
 }
 
-/// Returns an effect of one green particle, half a unit wide, that stays where it is.
+/// Returns an effect of one green particle at rest, half a unit wide.
 fn green() -> EffectAsset {
     let writer = ExprWriter::new();
     let start = |attribute, value| SetAttributeModifier::new(attribute, value);
@@ -65,7 +65,7 @@ fn seen(msaa: Msaa, hdr: bool, z: f32) -> RgbaImage {
         camera.insert(Hdr);
     }
     let mut picture = || testing::picture(&mut app, Duration::from_millis(50)).expect("the app draws without an error");
-    // Particles are spawned, and their pipelines compiled, over some frames.
+    // Spawning particles and compiling their pipelines takes some frames.
     (0..5).for_each(|_| drop(picture()));
     picture()
 }
@@ -79,8 +79,8 @@ fn particles_and_captures_hide_each_other() {
     for (msaa, hdr) in [(Msaa::Off, false), (Msaa::Sample4, false), (Msaa::Off, true), (Msaa::Sample4, true)] {
         let middle = |z| seen(msaa, hdr, z).get_pixel(SIZE.x / 2, SIZE.y / 2).0;
         let [r, g, b, _] = middle(2.0);
-        assert!(r < 20 && g > 235 && b < 20, "{msaa:?}, HDR {hdr}: a particle before the capture: {r}, {g}, {b}");
+        assert!(r < 20 && g > 235 && b < 20, "{msaa:?}, HDR {hdr}: a particle in front hides the capture: {r}, {g}, {b}");
         let [r, g, b, _] = middle(-2.0);
-        assert!(r > 235 && g < 50 && b < 20, "{msaa:?}, HDR {hdr}: a particle behind it: {r}, {g}, {b}");
+        assert!(r > 235 && g < 50 && b < 20, "{msaa:?}, HDR {hdr}: the capture hides a particle behind it: {r}, {g}, {b}");
     }
 }

@@ -1,7 +1,7 @@
-//! Changes at random.
+//! Random changes of a state.
 //!
-//! In: a seed. Out: a [`State`] after each step and a few words about it, which follow from the seed and the number of the step alone: so
-//! does what a new app must show.
+//! In: a seed. Out: a [`State`] after each step and a description of the change. Both depend on the seed and the number of the step only, so
+//! that a new app can reproduce the state.
 
 use crate::state::{Form, Lens, Placed, Source, State, Viewer};
 use crate::support::random::Random;
@@ -11,21 +11,21 @@ use bevy_gs4d::render::{CaptureSettings, DepthWrite};
 use bevy_gs4d::renderer::Design;
 use std::f32::consts::TAU;
 
-/// After so many steps time stands still, and the app is compared with a new one.
+/// Number of steps from one check to the next. At a check all captures are paused, and the app is compared with a new app.
 const CHECK: u64 = 50;
-/// Most captures at once.
+/// Largest number of captures.
 const CAPTURES: usize = 6;
-/// Sizes of the first camera's target, pixels.
+/// Sizes of the first camera's target in pixels.
 const SIZES: [UVec2; 5] =
     [UVec2::new(96, 96), UVec2::new(64, 48), UVec2::new(131, 70), UVec2::new(16, 16), UVec2::new(300, 20)];
 
 /// The changes of a seed.
 pub struct Changes {
     random: Random,
-    /// Number of steps made.
+    /// Number of steps so far.
     pub step: u64,
     pub state: State,
-    /// Number of captures made.
+    /// Number of captures so far.
     made: u64,
 }
 
@@ -34,7 +34,7 @@ impl Changes {
         Self { random: Random::new(seed), step: 0, state: State::default(), made: 0 }
     }
 
-    /// Makes the next change, and says which.
+    /// Makes the next change, and returns its description.
     pub fn advance(&mut self) -> String {
         self.step += 1;
         if self.is_check() {
@@ -67,17 +67,17 @@ impl Changes {
         }
     }
 
-    /// Returns whether the app is to be compared after this step.
+    /// Returns whether the app is compared with a new app after this step.
     pub fn is_check(&self) -> bool {
         self.step.is_multiple_of(CHECK)
     }
 
-    /// Returns whether nothing is left after this step: that after each second check.
+    /// Returns whether this step removes all captures: the step after every second check.
     pub fn is_clearing(&self) -> bool {
         self.step % (2 * CHECK) == CHECK + 1
     }
 
-    /// Stops every capture somewhere.
+    /// Pauses every capture at a random time.
     fn hold(&mut self) -> String {
         for capture in &mut self.state.captures {
             capture.playback = Playback::paused_at(2.0 * unit(&mut self.random));
@@ -141,7 +141,7 @@ impl Changes {
         let (what, pose) = (self.random.below(26), pose(&mut self.random));
         let index = self.random.below(self.state.cameras.len());
         let camera = &mut self.state.cameras[index];
-        let said = match what {
+        let change = match what {
             0..3 => {
                 camera.msaa = if camera.msaa == Msaa::Off { Msaa::Sample4 } else { Msaa::Off };
                 format!("{:?}", camera.msaa)
@@ -163,7 +163,7 @@ impl Changes {
                 format!("to {}", pose.translation)
             }
         };
-        format!("camera {index}: {said}")
+        format!("camera {index}: {change}")
     }
 
     fn second_camera(&mut self) -> String {
@@ -175,24 +175,24 @@ impl Changes {
         "two cameras".to_owned()
     }
 
-    /// Returns one of the captures, if there is any.
+    /// Returns a random capture; `None` if there is none.
     fn pick(&mut self) -> Option<&mut Placed> {
         let index = self.random.below(self.state.captures.len());
         self.state.captures.get_mut(index)
     }
 }
 
-/// Returns a number from 0 to 1.
+/// Returns a random number from 0 to 1.
 pub fn unit(random: &mut Random) -> f32 {
     (random.bits() >> 40) as f32 / (1 << 24) as f32
 }
 
-/// Returns a point of the cube from −1 to 1.
+/// Returns a random point of the cube from −1 to 1.
 pub fn spread(random: &mut Random) -> Vec3 {
     Vec3::from([(); 3].map(|()| 2.0 * unit(random) - 1.0))
 }
 
-/// Returns the pose of a camera: among the captures, close to them, around them or far away.
+/// Returns a random pose of a camera: among the captures, close to them, around them or far away.
 fn pose(random: &mut Random) -> Transform {
     let distance = [0.3, 1.2, 3.0, 3.0, 8.0, 300.0][random.below(6)];
     let place = distance * spread(random);

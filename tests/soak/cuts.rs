@@ -1,12 +1,12 @@
-//! Cuts: from one frame to the next another place, another moment, another camera, another capture.
+//! Cuts: from one frame to the next, the camera's pose and the time change; some cuts also change the camera, the design or the captures.
 //!
-//! In: a seed and a number of cuts. Out: the closing line, if the first frame after each cut shows what the frames after it show; else the
-//! first cut after which it does not.
+//! In: a seed and a number of cuts. Out: the closing line, if the first frame after each cut equals the frames after it; else the first cut
+//! for which it does not.
 //!
-//! A view has room for 65,536 pairs of splats and tiles, or for two of each Gaussian, before it has counted any, and for half as many more
-//! than it has counted (`renderer`, "Room"). Every tenth cut goes close to a crowd of large, faint splats with more pairs than that, and every
-//! second of these has a new camera or another design, whose room is that of a new view. A frame with more pairs than there can have been
-//! room for is counted; a run without any fails.
+//! A view has room for 65,536 pairs of splats and tiles, or for two pairs per Gaussian, before it has counted pairs, and for 1.5 times the
+//! counted pairs afterwards (`renderer`, "Room"). Every tenth cut goes close to a crowd of large, faint splats with more pairs, and every
+//! second of these cuts has a new camera or another design, whose room is that of a new view. A frame with more pairs than the largest
+//! possible room is counted as overflowing; a run without such a frame fails.
 
 use crate::changes::{spread, unit};
 use crate::checks::{self, difference, shows_something};
@@ -27,31 +27,33 @@ use std::mem;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-/// Rows of this width need no padding when they are read back.
+/// Size of the picture in pixels. Rows of this width are read back without padding.
 const SIZE: UVec2 = UVec2::new(256, 192);
-/// What two frames may be apart, 255ths: without room a tile is blended in other steps, whose sums are rounded otherwise.
+/// Largest allowed difference between two frames, in 255ths: a tile without room is blended in other steps, whose sums are rounded
+/// differently.
 const APART: u8 = 1;
-/// Splats for which a view has room before it has counted any.
+/// Number of pairs for which a view has room before it has counted pairs.
 const FIRST_ROOM: u32 = 1 << 16;
-/// Updates of a cut that needs room, until frames are drawn in it; of any other; of a new capture, until it is whole.
+/// Numbers of updates after a cut: after a cut close to the crowd, until frames have room; after other cuts; after a new capture, until its
+/// upload is complete.
 const UPDATES: [usize; 3] = [4, 2, 10];
-/// Bytes of captures that are uploaded in a frame, so that a new one takes several.
+/// Bytes of captures that are uploaded in a frame, so that the upload of a new capture takes several frames.
 const BUDGET: u64 = 48 << 10;
-/// Captures beside the crowd, at most.
+/// Largest number of captures in addition to the crowd.
 const OTHERS: usize = 3;
 
-/// What a step has done, and the frames since.
+/// A cut and the frames after it.
 #[derive(Default)]
 struct Cut {
     number: u64,
-    /// Whether the frames may be as before until a new capture is whole.
+    /// Whether frames may equal those before the cut until the upload of a new capture is complete.
     appears: bool,
-    /// Whether the first of them had more pairs than room.
+    /// Whether the first frame had more pairs than room.
     overflows: bool,
     frames: Vec<Vec<u8>>,
 }
 
-/// An app that is cut.
+/// An app in which cuts are made.
 struct Cutter {
     app: App,
     random: Random,
@@ -60,15 +62,15 @@ struct Cutter {
     crowd: Entity,
     others: VecDeque<Entity>,
     arrived: Arc<Mutex<Vec<Vec<u8>>>>,
-    /// The most pairs that the view can have room for.
+    /// The largest number of pairs for which the view can have room.
     room: u32,
     updates: u64,
 }
 
-/// Cuts so often.
+/// Makes `cuts` cuts.
 ///
 /// # Errors
-/// What does not hold, and after which cut.
+/// The first defect and the number of its cut.
 pub fn run(seed: u64, cuts: u64) -> Result<String, String> {
     println!("cuts: seed {seed}");
     let began = Instant::now();
@@ -76,12 +78,12 @@ pub fn run(seed: u64, cuts: u64) -> Result<String, String> {
     let (mut overflowing, mut worst, mut shown) = (0, 0, 0);
     let (mut last, mut before) = (Cut::default(), Vec::new());
     for number in 1..=cuts + 1 {
-        let said = |defect: String| format!("{defect}\n    again: --seed {seed} --cuts {number}");
-        let next = cutter.cut(number).map_err(said)?;
+        let reproducible = |defect: String| format!("{defect}\n    again: --seed {seed} --cuts {number}");
+        let next = cutter.cut(number).map_err(reproducible)?;
         let mut frames = next.frames.into_iter();
         // The last frame of a cut arrives after the first update of the next.
         last.frames.extend(frames.next());
-        worst = worst.max(judge(&last, &before).map_err(said)?);
+        worst = worst.max(judge(&last, &before).map_err(reproducible)?);
         before = last.frames.pop().unwrap_or_default();
         overflowing += u64::from(last.overflows);
         shown += u64::from(shows_something(&before));
@@ -91,7 +93,9 @@ pub fn run(seed: u64, cuts: u64) -> Result<String, String> {
         }
     }
     if overflowing == 0 || 2 * shown < cuts {
-        return Err(format!("nothing is proved: {overflowing} frames lacked room, {shown} of {cuts} show something"));
+        return Err(format!(
+            "the run tests too little: {overflowing} frames lacked room, {shown} of {cuts} pictures are not empty"
+        ));
     }
     let (updates, seconds) = (cutter.updates, began.elapsed().as_secs());
     Ok(format!(
@@ -100,14 +104,14 @@ pub fn run(seed: u64, cuts: u64) -> Result<String, String> {
     ))
 }
 
-/// Returns the largest difference of any frame of a cut from its last. `before` is the last frame of the cut before.
+/// Returns the largest difference between the last frame of a cut and its other frames. `before` is the last frame of the cut before.
 fn judge(cut: &Cut, before: &[u8]) -> Result<u8, String> {
     let Some((last, frames)) = cut.frames.split_last() else { return Ok(0) };
     let as_before = |frame: &&Vec<u8>| cut.appears && difference(frame, before) <= APART;
     let absent = frames.iter().take_while(as_before).count();
     let apart = frames[absent..].iter().map(|frame| difference(frame, last)).max().unwrap_or_default();
     if apart > APART {
-        return Err(format!("a frame after cut {} is {apart} of 255 apart from the last", cut.number));
+        return Err(format!("a frame after cut {} differs by {apart} of 255 from the last frame", cut.number));
     }
     Ok(apart)
 }
@@ -134,7 +138,7 @@ impl Cutter {
         Ok(cutter)
     }
 
-    /// Cuts, and returns the frames that have arrived since: first the last one of the cut before.
+    /// Makes a cut, and returns the frames that have arrived since. The first of them is the last frame of the cut before.
     fn cut(&mut self, number: u64) -> Result<Cut, String> {
         let close = number % 10 == 9;
         let mut appears = None;
@@ -163,12 +167,12 @@ impl Cutter {
         }
         let frames = mem::take(&mut *self.arrived.lock().unwrap_or_else(PoisonError::into_inner));
         if frames.len() != updates {
-            return Err(format!("{} frames have arrived of {updates} updates", frames.len()));
+            return Err(format!("{} frames arrived in {updates} updates", frames.len()));
         }
         Ok(Cut { number, appears: appears.is_some(), overflows: close && self.pairs() > room, frames })
     }
 
-    /// Goes to another place and another moment, `close` to the crowd or not. With `renew` the view is a new one.
+    /// Moves the camera, `close` to the crowd or far from it, and sets all captures to other times. `renew` makes the view a new one.
     fn go(&mut self, close: bool, renew: bool) {
         let distance = if close { 0.8 + 1.6 * unit(&mut self.random) } else { 8.0 + 30.0 * unit(&mut self.random) };
         let place = distance * spread(&mut self.random).normalize_or(Vec3::X);
@@ -194,7 +198,7 @@ impl Cutter {
         }
     }
 
-    /// Spawns a capture beside the crowd.
+    /// Spawns a capture near the crowd.
     fn spawn_other(&mut self) -> Entity {
         let form = [Form::Single, Form::Filtered, Form::Packed][self.random.below(3)];
         let pose = Transform::from_translation(spread(&mut self.random));
@@ -225,7 +229,7 @@ impl Cutter {
     }
 }
 
-/// Returns Gaussians that are large, and so faint that the farthest shows, too.
+/// Returns large Gaussians, so faint that the farthest is also visible.
 fn crowd() -> RuntimeScene {
     let settings = SynthSettings { count: 3000, seed: 2, degree: 0, degree_t: 0, duration_seconds: 2.0 };
     let mut scene = synthesize(&settings).into_runtime().expect("synthetic scenes can be drawn");

@@ -1,17 +1,18 @@
-//! A soak of the plugin, and cuts: whatever a game does with captures, an app draws what a new one would, from the first frame on.
+//! The soak test of the plugin, and the test of cuts: after any sequence of changes to captures and cameras, an app draws the same pictures
+//! as a new app in the same state, from the first frame on.
 //!
-//! In: a seed. Out: a program that changes an app with captures at random, and cuts another, tells the first defect and how to have it
-//! again, and ends with a line of counts for each; exit code 1 if there was a defect. `docs/reliability.md` lists what is watched. It does
-//! nothing where there is no GPU, not even a software one.
+//! In: a seed. Out: a program that changes an app with captures at random, and cuts in another app. It prints the first defect with the
+//! options that reproduce it, and at the end a line of counts for each of the two tests; the exit code is 1 after a defect.
+//! `docs/reliability.md` lists the checks. Without a GPU (a software driver counts) the program skips both tests.
 //!
 //! ```sh
-//! cargo test --features viewer,cli --test soak                             # a few of both, always the same
+//! cargo test --features viewer,cli --test soak                             # 100 changes and 40 cuts of seed 1
 //! cargo test --release --features viewer,cli --test soak -- --seed 7 --minutes 60
 //! cargo test --release --features viewer,cli --test soak -- --seed 7 --cuts 10000
-//! cargo test --features viewer,cli --test soak -- --seed 7 --steps 1234    # as far as a defect
+//! cargo test --features viewer,cli --test soak -- --seed 7 --steps 1234    # up to a defect
 //! ```
 //!
-//! What is changed follows from the seed and the number of the change, and from nothing else; when files arrive does not.
+//! The changes depend on the seed and the number of the change only. The times at which files are loaded vary between runs.
 
 mod changes;
 mod checks;

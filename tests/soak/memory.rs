@@ -1,66 +1,66 @@
-//! The memory of the process over a long time.
+//! The memory of the process over a long run.
 //!
-//! In: what is allocated in Rust and the resident set, each time that the app holds no capture. Out: whether they stay as they are.
+//! In: the bytes allocated in Rust and the resident set, each time that the app has no capture. Out: whether they grow.
 
 use crate::support::allocations::ALLOCATED;
 use std::fs;
 use std::sync::atomic::Ordering;
 
-/// How much larger the median of the last quarter may be than that of the third, percent. The resident set is as large as it gets after some
-/// 800 changes, which on a busy machine are half of five minutes: it has what the driver allocates for pipelines that are compiled late, and
-/// the scatter of an allocator that is given many sizes by many threads. What remains of what is allocated is Bevy's: its clustering of lights
+/// Largest growth of the median from the third to the last quarter, percent. The resident set reaches its final size after about 800 changes,
+/// which on a busy machine take half of five minutes: it contains the driver's allocations for pipelines that are compiled late, and varies
+/// because the allocator serves many sizes from many threads. The remaining growth of allocated bytes is Bevy's: its clustering of lights
 /// keeps 40 bytes for each view and frame.
 const GROWTH_PERCENT: u64 = 5;
-/// Fewer times say nothing.
+/// Smallest number of values for a verdict.
 const LEAST: usize = 8;
 
-/// What is allocated in Rust and the resident set, bytes, time after time.
+/// The bytes allocated in Rust and the resident set in bytes, in the order of measurement.
 #[derive(Default)]
 pub struct Memory([Vec<u64>; 2]);
 
 impl Memory {
-    /// Notes the memory of now.
-    pub fn note(&mut self) {
+    /// Records the current memory.
+    pub fn record(&mut self) {
         self.0[0].push(allocated());
         self.0[1].extend(resident());
     }
 
-    /// Returns what can be said about all of it.
+    /// Returns a text about the allocated bytes and the resident set.
     ///
     /// # Errors
-    /// The memory grows.
+    /// The allocated bytes or the resident set grow.
     pub fn verdict(&self) -> Result<String, String> {
-        let said: Result<Vec<String>, String> =
-            ["allocated", "resident"].iter().zip(&self.0).map(|(name, noted)| verdict(name, noted)).collect();
-        Ok(said?.join(", "))
+        let texts: Result<Vec<String>, String> =
+            ["allocated", "resident"].iter().zip(&self.0).map(|(name, values)| verdict(name, values)).collect();
+        Ok(texts?.join(", "))
     }
 }
 
-fn verdict(name: &str, noted: &[u64]) -> Result<String, String> {
-    let Some(last) = noted.last() else { return Ok(format!("{name} not measured")) };
-    let quarter = noted.len() / 4;
-    if noted.len() < LEAST {
-        return Ok(format!("{name} {}, too short to say whether it grows", mebibytes(*last)));
+fn verdict(name: &str, values: &[u64]) -> Result<String, String> {
+    let Some(last) = values.last() else { return Ok(format!("{name} not measured")) };
+    let quarter = values.len() / 4;
+    if values.len() < LEAST {
+        return Ok(format!("{name} {}, run too short for a verdict on growth", mebibytes(*last)));
     }
     let [early, late] =
-        [noted.len() - 2 * quarter, noted.len() - quarter].map(|first| median(&noted[first..first + quarter]));
-    let said = format!("{name} {} in the third quarter, {} in the last", mebibytes(early), mebibytes(late));
-    if late > early + early / 100 * GROWTH_PERCENT { Err(format!("memory grows: {said}")) } else { Ok(said) }
+        [values.len() - 2 * quarter, values.len() - quarter].map(|first| median(&values[first..first + quarter]));
+    let text = format!("{name} {} in the third quarter, {} in the last", mebibytes(early), mebibytes(late));
+    if late > early + early / 100 * GROWTH_PERCENT { Err(format!("memory grows: {text}")) } else { Ok(text) }
 }
 
-/// Returns the bytes that are allocated in Rust.
+/// Returns the number of bytes allocated in Rust.
 pub fn allocated() -> u64 {
     ALLOCATED.load(Ordering::Relaxed) as u64
 }
 
-/// Returns the resident set in bytes. Only Linux tells it.
+/// Returns the resident set in bytes; `None` on systems other than Linux.
 pub fn resident() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
     line.split_whitespace().next()?.parse::<u64>().ok().map(|kibibytes| kibibytes << 10)
 }
 
-/// Returns a number of bytes for people.
+/// Formats a number of bytes in MiB.
 pub fn mebibytes(bytes: u64) -> String {
     format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20))
 }

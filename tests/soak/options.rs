@@ -1,66 +1,66 @@
 //! The command line.
 //!
-//! In: the arguments of the process, among them those that are meant for the usual test harness. Out: [`Options`].
+//! In: the arguments of the process, including arguments for the default test harness. Out: [`Options`].
 
 use clap::Parser;
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Changes and cuts unless the command line asks for some: those of a plain `cargo test`.
+/// Numbers of changes and cuts without options, as in a plain `cargo test`.
 const STEPS: u64 = 100;
 const CUTS: u64 = 40;
 
-/// Arguments of the usual test harness, which `cargo test -- ARGUMENTS` hands to every test binary.
+/// Arguments of the default test harness, which `cargo test -- ARGUMENTS` passes to every test binary.
 const FOREIGN: [&str; 6] = ["--nocapture", "--no-capture", "--show-output", "--quiet", "-q", "--exact"];
 
-/// Changes a Bevy app with captures at random, and watches what it draws and what it holds.
+/// Changes a Bevy app with captures at random, and checks its pictures, its log and its memory.
 #[derive(Parser)]
 #[command(name = "soak")]
 pub struct Options {
     /// Seed of all changes and cuts.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Change an app for this time.
+    /// Change an app for this number of minutes.
     #[arg(long, value_name = "M", conflicts_with = "steps")]
     minutes: Option<u64>,
-    /// Change an app so often.
+    /// Number of changes.
     #[arg(long, value_name = "N")]
     steps: Option<u64>,
-    /// Begin with what is shown after so many changes: a defect may need fewer than led to it.
+    /// Begin with the state after this number of changes: a defect may need only the last changes.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub from: u64,
-    /// Folder for the pictures that are not those of a new app, beside those.
+    /// Folder for pictures that differ from those of a new app, and for the pictures of the new app.
     #[arg(long, value_name = "DIR")]
     pub keep: Option<PathBuf>,
-    /// Cut so often, in another app.
+    /// Number of cuts, in another app.
     #[arg(long, value_name = "N")]
     cuts: Option<u64>,
-    /// Draw what an app should show after so many changes into a folder: a check starts this.
+    /// Draw the state after this number of changes into a folder. Each check starts the program with this option.
     #[arg(long, value_name = "N", hide = true, requires = "pictures")]
     fresh: Option<u64>,
-    /// The captures by number, in the order in which they are drawn.
+    /// The numbers of the captures, in the order in which they are drawn.
     #[arg(long, value_name = "N,..", hide = true, value_delimiter = ',')]
     order: Vec<u64>,
-    /// The folder.
+    /// Folder for the pictures of `fresh`.
     #[arg(long, value_name = "DIR", hide = true)]
     pictures: Option<PathBuf>,
-    /// Parts of the names of tests.
+    /// Parts of the names of tests to run.
     #[arg(hide = true)]
     filters: Vec<String>,
 }
 
-/// What a new app is to draw for a check.
+/// The pictures that a new app draws for a check.
 pub struct Fresh {
     /// Number of changes.
     pub step: u64,
-    /// The captures by number, in the order in which they are drawn.
+    /// The numbers of the captures, in the order in which they are drawn.
     pub order: Vec<u64>,
-    /// Where to write the pictures.
+    /// Folder for the pictures.
     pub folder: PathBuf,
 }
 
-/// When the changes end.
+/// The end of the changes.
 #[derive(Clone, Copy)]
 pub struct Until {
     pub steps: u64,
@@ -77,13 +77,13 @@ impl Options {
         Self::parse_from(std::env::args_os().filter(|argument| !foreign(argument)))
     }
 
-    /// Returns what is to be drawn for a check; `None` if this process is not one.
+    /// Returns the pictures to draw for a check; `None` if this process was not started by a check.
     pub fn fresh(&self) -> Option<Fresh> {
         let (order, folder) = (self.order.clone(), self.pictures.clone()?);
         self.fresh.map(|step| Fresh { step, order, folder })
     }
 
-    /// Returns when the changes end; `None` if none are wanted.
+    /// Returns the end of the changes; `None` if no changes are to be made.
     pub fn changes(&self) -> Option<Until> {
         let until = match (self.minutes, self.steps, self.cuts) {
             (Some(minutes), ..) => Until { steps: u64::MAX, time: Duration::from_secs(minutes.saturating_mul(60)) },
@@ -94,7 +94,7 @@ impl Options {
         self.wants("soak::changes").then_some(until)
     }
 
-    /// Returns the number of cuts; `None` if none are wanted.
+    /// Returns the number of cuts; `None` if no cuts are to be made.
     pub fn cuts(&self) -> Option<u64> {
         let plain = self.minutes.is_none() && self.steps.is_none();
         self.cuts.or(plain.then_some(CUTS)).filter(|_| self.wants("soak::cuts"))

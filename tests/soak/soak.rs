@@ -1,7 +1,7 @@
-//! An app that is changed at random for long.
+//! The soak test: an app that is changed at random.
 //!
-//! In: a seed, and when to end. Out: the closing line, if its pictures are those of new apps in the same state, its log is free of warnings
-//! and its memory is given back; else the first defect, with how to have it again.
+//! In: a seed and the end of the test. Out: the closing line, if the app's pictures equal those of new apps in the same state, its log has no
+//! warnings and its memory is freed; else the first defect, with the options that reproduce it.
 
 use crate::changes::Changes;
 use crate::checks;
@@ -15,24 +15,24 @@ use std::env;
 use std::process::Command;
 use std::time::Instant;
 
-/// Changes that are told with a defect: the last ones.
-const TOLD: usize = 20;
+/// Number of last changes that are printed with a defect.
+const PRINTED: usize = 20;
 
-/// The last changes. They are told if something does not hold, a panic included.
+/// The last changes. Dropping it prints them after a defect, including a panic.
 struct Tail {
     seed: u64,
     step: u64,
-    said: VecDeque<String>,
+    changes: VecDeque<String>,
     /// Whether the end was reached without a defect.
     holds: bool,
 }
 
 impl Tail {
-    fn note(&mut self, step: u64, said: String) {
+    fn record(&mut self, step: u64, change: String) {
         self.step = step;
-        self.said.push_back(format!("{step}: {said}"));
-        if self.said.len() > TOLD {
-            self.said.pop_front();
+        self.changes.push_back(format!("{step}: {change}"));
+        if self.changes.len() > PRINTED {
+            self.changes.pop_front();
         }
     }
 }
@@ -40,13 +40,13 @@ impl Tail {
 impl Drop for Tail {
     fn drop(&mut self) {
         if !self.holds {
-            self.said.iter().for_each(|said| println!("    {said}"));
+            self.changes.iter().for_each(|change| println!("    {change}"));
             println!("    again: --seed {} --steps {}", self.seed, self.step);
         }
     }
 }
 
-/// What has been compared.
+/// Counts of comparisons.
 #[derive(Default)]
 struct Compared {
     checks: u64,
@@ -54,12 +54,12 @@ struct Compared {
     shown: u64,
 }
 
-/// Changes an app until the end.
+/// Changes an app until the end of the test.
 ///
 /// # Errors
-/// What does not hold.
+/// The first defect.
 pub fn run(options: &Options, until: Until) -> Result<String, String> {
-    let mut tail = Tail { seed: options.seed, step: 0, said: VecDeque::new(), holds: false };
+    let mut tail = Tail { seed: options.seed, step: 0, changes: VecDeque::new(), holds: false };
     let line = change(options, until, &mut tail)?;
     tail.holds = true;
     Ok(line)
@@ -75,8 +75,8 @@ fn change(options: &Options, until: Until, tail: &mut Tail) -> Result<String, St
     let mut stage = Stage::new(&changes.state, &[])?;
     let (mut memory, mut compared) = (Memory::default(), Compared::default());
     while changes.step < until.steps && (began.elapsed() < until.time || !changes.is_check()) {
-        let said = changes.advance();
-        tail.note(changes.step, said);
+        let change = changes.advance();
+        tail.record(changes.step, change);
         stage.show(&changes.state)?;
         for _ in 0..=changes.step % 3 {
             stage.update()?;
@@ -85,30 +85,30 @@ fn change(options: &Options, until: Until, tail: &mut Tail) -> Result<String, St
             compare(options, changes.step, &mut stage, &mut compared)?;
             let [allocated, resident] = [allocated(), resident().unwrap_or_default()].map(mebibytes);
             let (step, seconds) = (changes.step, began.elapsed().as_secs());
-            println!("step {step}: as new, {allocated} allocated, {resident} resident, {seconds} s");
+            println!("step {step}: equal to a new app, {allocated} allocated, {resident} resident, {seconds} s");
         } else if changes.is_clearing() {
             stage.wait_until_empty()?;
-            memory.note();
+            memory.record();
         }
     }
     let Compared { checks, pictures, shown } = compared;
     if checks > 0 && shown == 0 {
-        return Err("no picture showed anything".to_owned());
+        return Err("all compared pictures are empty".to_owned());
     }
     let (steps, updates, seconds) = (changes.step, stage.updates, began.elapsed().as_secs());
     Ok(format!(
-        "soak: {steps} changes, {updates} updates, {checks} checks, {pictures} pictures as of new apps, \
+        "soak: {steps} changes, {updates} updates, {checks} checks, {pictures} pictures equal to those of new apps, \
          {shown} not empty; {}; {seconds} s",
         memory.verdict()?
     ))
 }
 
-/// Compares all pictures of an app with those of a new one, in a process of its own: what a process has left behind, on either side, must
-/// not matter.
+/// Compares all pictures of an app with those of a new app in a separate process, so that the state of one process cannot affect the pictures
+/// of the other.
 fn compare(options: &Options, step: u64, stage: &mut Stage, compared: &mut Compared) -> Result<(), String> {
     let seen = stage.pictures()?;
     let folder = tempfile::tempdir().map_err(|error| format!("no temporary folder: {error}"))?;
-    let program = env::current_exe().map_err(|error| format!("this program is not found: {error}"))?;
+    let program = env::current_exe().map_err(|error| format!("the path of this program is unknown: {error}"))?;
     let order: Vec<String> = stage.order().iter().map(u64::to_string).collect();
     let mut command = Command::new(program);
     command.args([format!("--seed={}", options.seed), format!("--fresh={step}")]).arg("--pictures").arg(folder.path());
@@ -117,8 +117,8 @@ fn compare(options: &Options, step: u64, stage: &mut Stage, compared: &mut Compa
     }
     let output = command.output().map_err(|error| format!("{command:?}: {error}"))?;
     if !output.status.success() {
-        let said = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
-        return Err(format!("a new app in the same state fails: {said}"));
+        let text = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+        return Err(format!("a new app in the same state fails: {text}"));
     }
     for (index, seen) in seen.iter().enumerate() {
         let path = folder.path().join(format!("{index}.png"));
@@ -138,10 +138,10 @@ fn compare(options: &Options, step: u64, stage: &mut Stage, compared: &mut Compa
     Ok(())
 }
 
-/// Draws what an app should show after some changes, in this process, which has drawn nothing else.
+/// Draws the state after some changes in a new app and writes its pictures. The process draws no other state.
 ///
 /// # Errors
-/// What keeps it from being drawn.
+/// The state cannot be drawn, or the pictures cannot be written.
 pub fn draw_fresh(seed: u64, fresh: &Fresh) -> Result<(), String> {
     let mut changes = Changes::new(seed);
     while changes.step < fresh.step {

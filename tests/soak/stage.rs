@@ -1,6 +1,6 @@
 //! An app that shows a state.
 //!
-//! In: a [`State`] after the other. Out: an app in which as little as possible is changed from one to the next, as a game does it, and its
+//! In: a sequence of [`State`]s. Out: an app to which only the differences from one state to the next are applied, as in a game, and its
 //! pictures.
 
 use crate::checks;
@@ -22,37 +22,37 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use wgpu::SubmissionIndex;
 
-/// Size of the second camera's target, pixels.
+/// Size of the second camera's target in pixels.
 const SECOND_SIZE: UVec2 = UVec2::new(80, 60);
 /// Time from one update to the next.
 const STEP: Duration = Duration::from_millis(20);
-/// How long a file may take to be loaded again.
+/// Longest time for a file to be loaded again.
 const TIMEOUT: Duration = Duration::from_secs(120);
-/// Updates after which a camera that sees nothing has given all of its memory back, and some more.
+/// Number of updates after which a camera without a capture has freed all of its memory, with a margin.
 const IDLE: usize = 130;
-/// Frames that the GPU may be behind, as where a window presents them. Without it an app is as far ahead as it gets, and wgpu keeps the
-/// command buffers of as many frames as have ever been on their way at once.
+/// Largest number of frames that the GPU may be behind, as with a window. Without this limit the CPU would run ahead, and wgpu keeps the
+/// command buffers of the largest number of frames that were ever in flight at once.
 const FRAMES_IN_FLIGHT: usize = 3;
 
-/// An app, and what it shows.
+/// An app and the state that it shows.
 pub struct Stage {
     app: App,
-    /// Number of updates, without those of taking pictures.
+    /// Number of updates, without the updates for pictures.
     pub updates: u64,
     folder: TempDir,
     shown: State,
     captures: BTreeMap<u64, Entity>,
     cameras: Vec<(Entity, Offscreen)>,
-    /// The ends of the frames that the GPU may not have drawn yet.
+    /// The submissions at the ends of the frames that the GPU may not have finished.
     in_flight: VecDeque<SubmissionIndex>,
 }
 
 impl Stage {
-    /// Starts an app that shows nothing of a state yet. `order` has the numbers of captures that are to be drawn in this order, should
-    /// splats have the same depth.
+    /// Starts an app for a state, without its captures and cameras. `order` has the numbers of the captures in the order in which their splats
+    /// of equal depth are drawn.
     ///
     /// # Errors
-    /// What is wrong with the app.
+    /// The app cannot be started, or logs a message about captures.
     pub fn new(state: &State, order: &[u64]) -> Result<Self, String> {
         let mut app = checks::app(state.size);
         let folder = tempfile::tempdir().map_err(|error| format!("no temporary folder: {error}"))?;
@@ -64,9 +64,9 @@ impl Stage {
             Self { app, updates: 0, folder, shown, captures, cameras: Vec::new(), in_flight: VecDeque::new() };
         stage.write_file(state)?;
         testing::settle(&mut stage.app).map_err(|error| error.to_string())?;
-        // What has been logged until now is about the machine: that its driver is a software one.
+        // Other messages up to here are about the machine, such as a software driver.
         let logged = checks::take_logged();
-        let own: Vec<&String> = logged.iter().filter(|said| said.contains("capture")).collect();
+        let own: Vec<&String> = logged.iter().filter(|message| message.contains("capture")).collect();
         if own.is_empty() { Ok(stage) } else { Err(format!("logged at the start: {own:?}")) }
     }
 
@@ -76,7 +76,7 @@ impl Stage {
     /// A file that cannot be written, or is not loaded again.
     pub fn show(&mut self, state: &State) -> Result<(), String> {
         let is_written = self.shown.version != state.version;
-        // Of two loads at a time the older may end last.
+        // Of two concurrent loads the older may end last.
         if is_written || !state.shows_file() {
             self.wait_for_file()?;
         }
@@ -98,7 +98,7 @@ impl Stage {
     /// Runs one update.
     ///
     /// # Errors
-    /// What does not hold after it.
+    /// A condition of [`checks::check_running`] is violated after the update.
     pub fn update(&mut self) -> Result<(), String> {
         self.app.insert_resource(TimeUpdateStrategy::ManualDuration(STEP));
         self.app.update();
@@ -110,7 +110,7 @@ impl Stage {
     /// Returns the pictures of all cameras once everything has been loaded and drawn.
     ///
     /// # Errors
-    /// What keeps them from being drawn.
+    /// The pictures cannot be drawn, or a check fails.
     pub fn pictures(&mut self) -> Result<Vec<RgbaImage>, String> {
         self.wait_for_file()?;
         let failed = |error: testing::TestingError| error.to_string();
@@ -123,17 +123,17 @@ impl Stage {
         Ok(pictures)
     }
 
-    /// Returns the numbers of the captures in the order in which they are drawn: that of their entities.
+    /// Returns the numbers of the captures in the order in which they are drawn: the order of their entities.
     pub fn order(&self) -> Vec<u64> {
         let mut order: Vec<(Entity, u64)> = self.captures.iter().map(|(number, entity)| (*entity, *number)).collect();
         order.sort();
         order.into_iter().map(|(_, number)| number).collect()
     }
 
-    /// Waits until nothing is left of captures that have been removed.
+    /// Waits until removed captures have freed their memory.
     ///
     /// # Errors
-    /// What is left.
+    /// The bytes, uploads and assets that remain.
     pub fn wait_until_empty(&mut self) -> Result<(), String> {
         for _ in 0..IDLE {
             self.update()?;
@@ -148,7 +148,7 @@ impl Stage {
         Err(format!("without a capture {bytes} bytes on the GPU, {uploads} uploads and {assets} assets are left"))
     }
 
-    /// Waits until no more than [`FRAMES_IN_FLIGHT`] are.
+    /// Waits until at most [`FRAMES_IN_FLIGHT`] frames are in flight.
     fn wait_for_frame(&mut self) -> Result<(), String> {
         let world = self.app.world();
         let (device, queue) = (world.resource::<RenderDevice>(), world.resource::<RenderQueue>());
@@ -164,13 +164,13 @@ impl Stage {
         self.folder.path().join("changing.gs4d")
     }
 
-    /// Writes the file, whole or not at all.
+    /// Writes the file completely or not at all.
     fn write_file(&self, state: &State) -> Result<(), String> {
         let scene = GaussianScene::from(state.file_scene());
         offline::save(&self.file(), &scene, &WriteSettings { level: 1 }).map_err(|error| error.to_string())
     }
 
-    /// Updates until the file that was written last has been loaded, if a capture shows it.
+    /// Updates the app until the newest version of the file has been loaded, if a capture shows the file.
     fn wait_for_file(&mut self) -> Result<(), String> {
         if !self.shown.shows_file() {
             return Ok(());
@@ -182,7 +182,7 @@ impl Stage {
         };
         while !is_loaded(&self.app) {
             if began.elapsed() > TIMEOUT {
-                return Err("a file that has changed is not loaded again".to_owned());
+                return Err("a changed file was not loaded again in time".to_owned());
             }
             self.update()?;
         }
@@ -195,7 +195,12 @@ impl Stage {
         }
         let image = self.app.world().resource::<Offscreen>().image.clone();
         let extent = Extent3d { width: size.x, height: size.y, ..default() };
-        self.app.world_mut().resource_mut::<Assets<Image>>().get_mut(&image).expect("it is the app's").resize(extent);
+        self.app
+            .world_mut()
+            .resource_mut::<Assets<Image>>()
+            .get_mut(&image)
+            .expect("the app has this image")
+            .resize(extent);
         self.app.insert_resource(Offscreen { image, size });
     }
 
@@ -218,7 +223,7 @@ impl Stage {
             let mut entity = self.app.world_mut().entity_mut(entity);
             if before.playback != placed.playback {
                 let mut playback = placed.playback;
-                // The app has let time pass since: only a seek sets it.
+                // The app has advanced the time since: only a seek sets it.
                 if playback.time == before.playback.time
                     && let Some(now) = entity.get::<Playback>()
                 {
@@ -261,12 +266,12 @@ impl Stage {
     }
 }
 
-/// Puts a capture among the assets.
+/// Adds a capture to the assets.
 pub fn add(app: &mut App, capture: GaussianCapture) -> Handle<GaussianCapture> {
     app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(capture)
 }
 
-/// Spawns a camera whose pixels are compared: no tonemapping, no dithering.
+/// Spawns a camera without tonemapping and dithering, so that its pixels can be compared.
 pub fn spawn_camera(app: &mut App, target: &Offscreen, viewer: &Viewer) -> Entity {
     let camera = (Camera3d::default(), target.target(), Tonemapping::None, DebandDither::Disabled);
     app.world_mut().spawn((camera, components(viewer))).id()

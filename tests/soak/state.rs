@@ -1,7 +1,7 @@
-//! What an app should show, as plain data.
+//! The state of an app, as plain data.
 //!
-//! In: nothing; [`changes`](crate::changes) make one state from another. Out: a [`State`], which a [`Stage`](crate::stage::Stage) brings
-//! into an app, and the scenes of its captures.
+//! In: nothing; [`changes`](crate::changes) makes one state from another. Out: a [`State`], which a [`Stage`](crate::stage::Stage) applies
+//! to an app, and the scenes of its captures.
 
 use crate::support::coded_scene::coded_scene;
 use bevy::camera::ScalingMode;
@@ -11,15 +11,15 @@ use bevy_gs4d::render::{CaptureSettings, CaptureViewSettings};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{RuntimeScene, TemporalFilter};
 
-/// Captures and cameras, in the order in which they came.
+/// Captures and cameras, in the order in which they were added.
 #[derive(Debug, Clone)]
 pub struct State {
-    /// Size of the first camera's target, pixels.
+    /// Size of the first camera's target in pixels.
     pub size: UVec2,
-    /// How often the file has been written anew.
+    /// Version of the file: the number of times that it has been rewritten.
     pub version: u64,
-    /// Whether captures are drawn at their coarsest level of detail, not with all Gaussians. In between, the level depends on the one before,
-    /// so that nothing flickers, and a new app may show another.
+    /// Whether captures are drawn at their coarsest level of detail instead of with all Gaussians. Levels in between are not tested: they
+    /// depend on the level of the frame before, to avoid flicker, and may differ in a new app.
     pub coarse: bool,
     pub captures: Vec<Placed>,
     pub cameras: Vec<Viewer>,
@@ -28,32 +28,32 @@ pub struct State {
 /// A capture in the world.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Placed {
-    /// Its number, which no other gets.
+    /// The unique number of the capture.
     pub number: u64,
     pub source: Source,
     pub pose: Transform,
-    /// As it was when it was last changed: the app lets time pass.
+    /// The playback at its last change. The app has advanced it since.
     pub playback: Playback,
     pub settings: CaptureSettings,
 }
 
-/// Where a capture comes from.
+/// The source of a capture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Source {
-    /// The capture of the examples.
+    /// The capture of the examples, `assets/toybox.gs4d`.
     Bundled,
-    /// The file that is written anew and loaded again.
+    /// The file that is rewritten and loaded again.
     File,
-    /// Memory: a form, and a seed.
+    /// A scene in memory, from a form and a seed.
     Made(Form, u64),
 }
 
-/// The form of a scene that is made here.
+/// The form of a scene in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
     Single,
     Filtered,
-    /// With a filter and codebooks.
+    /// Packed, with a filter and codebooks.
     Packed,
 }
 
@@ -71,12 +71,12 @@ pub struct Viewer {
 pub enum Lens {
     Perspective,
     Orthographic,
-    /// One that captures cannot be drawn for: its depth is not reversed.
+    /// A projection with which captures cannot be drawn: its depth is not reversed.
     Unusable,
 }
 
 impl Default for State {
-    /// One camera, and nothing to see.
+    /// Returns a state with one camera and no capture.
     fn default() -> Self {
         Self {
             size: UVec2::splat(96),
@@ -94,7 +94,7 @@ impl State {
         self.captures.iter().any(|capture| capture.source == Source::File)
     }
 
-    /// Returns what the file holds.
+    /// Returns the scene in the file.
     pub fn file_scene(&self) -> RuntimeScene {
         scene(Form::Filtered, 1000 + self.version)
     }
@@ -119,7 +119,7 @@ impl Lens {
     }
 }
 
-/// Returns a scene of two seconds; another seed is another scene.
+/// Returns a scene of two seconds from a form and a seed.
 pub fn scene(form: Form, seed: u64) -> RuntimeScene {
     let count = 400 + (seed % 7 * 200) as usize;
     if form == Form::Packed {

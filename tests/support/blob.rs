@@ -1,11 +1,11 @@
-//! Gaussians made by hand.
+//! Single Gaussians for tests.
 //!
-//! In: a place, a size, an opacity. Out: a Gaussian that tests change as they need.
+//! In: a mean, standard deviations, an opacity. Out: a Gaussian whose other fields tests may change.
 
 use bevy_gs4d::gaussian::Gaussian;
 use glam::Vec3;
 
-/// Returns a Gaussian at rest that is always active, with its standard deviations along the axes.
+/// Returns a Gaussian at rest that is active at all times, with standard deviations along the axes.
 pub fn blob(mean: Vec3, deviation: Vec3, opacity: f32) -> Gaussian {
     let variance = deviation * deviation;
     Gaussian {

@@ -1,6 +1,6 @@
-//! A capture to be baked, trained and evaluated: a scene with its own pictures, in a temporary folder.
+//! A capture for tests of baking, training and evaluation: a scene and a dataset of its pictures, in a temporary folder.
 //!
-//! In: a scene, how many pictures there are and from where. Out: a folder with `scene.gs4d` and the dataset `data`.
+//! In: a scene, the number of cameras and times, the center of the cameras. Out: a folder with `scene.gs4d` and the dataset `data`.
 
 use crate::support::dataset;
 use bevy_gs4d::codec::package::WriteSettings;
@@ -10,7 +10,7 @@ use glam::{UVec2, Vec3};
 use std::path::PathBuf;
 use tempfile::TempDir;
 
-/// The folder, which goes with this, and what is in it.
+/// The folder, which is removed when this value is dropped, and the paths in it.
 pub struct Capture {
     pub folder: TempDir,
     pub scene: PathBuf,
@@ -18,7 +18,8 @@ pub struct Capture {
 }
 
 impl Capture {
-    /// Writes both. The cameras and their times are those of [`dataset::write`]; the data belong to the scene if `center` is the origin.
+    /// Writes the scene and the dataset, with the cameras and times of [`dataset::write`]. The dataset matches the scene if `center` is the
+    /// origin.
     pub fn new(trained: GaussianScene, center: Vec3, cameras: usize, times: usize, size: UVec2, images: bool) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let (scene, data) = (folder.path().join("scene.gs4d"), folder.path().join("data"));

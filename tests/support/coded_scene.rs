@@ -1,15 +1,15 @@
-//! Packed scenes with colors by codebook, put together by hand.
+//! Packed scenes with two color codebooks of fixed values.
 //!
-//! In: a number of Gaussians, degrees of color. Out: a scene as compression would make it, with two codebooks.
+//! In: a number of Gaussians, degrees of color. Out: a packed scene as after compression, with two codebooks.
 
 use bevy_gs4d::scene::packed::encode::Bits;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{CodedColors, Form, PackedColors, PackedScene, RuntimeScene, TemporalFilter};
 
-/// Entries of each codebook.
+/// Number of codewords of each codebook.
 const ENTRIES: usize = 5;
 
-/// Bits of the geometry.
+/// Numbers of bits of the packed values.
 const BITS: Bits =
     Bits { mean: 12, mean_t: 10, velocity: 9, sigma_t: 8, scale: 9, rotation: 9, opacity: 8, base: 8, escape: 0.05 };
 

@@ -8,10 +8,10 @@ use std::path::PathBuf;
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
-/// The command, as it was built for the tests.
+/// Path of the command that was built for the tests.
 pub const GS4D: &str = env!("CARGO_BIN_EXE_gs4d");
 
-/// A run that has ended.
+/// The result of a finished run.
 pub struct Run {
     pub code: Option<i32>,
     pub out: String,
@@ -24,32 +24,32 @@ pub fn gs4d<S: AsRef<OsStr>>(arguments: &[S]) -> Run {
 }
 
 impl Run {
-    /// Returns the run that a process was.
+    /// Returns the run with the output of a process.
     pub fn of(output: &Output) -> Self {
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
         Self { code: output.status.code(), out: text(&output.stdout), err: text(&output.stderr) }
     }
 
-    /// Returns the text of a run that must have succeeded.
+    /// Returns the standard output. The run must have succeeded.
     pub fn text(self) -> String {
-        assert_eq!(self.code, Some(0), "the command works: {}", self.err);
+        assert_eq!(self.code, Some(0), "the command succeeds: {}", self.err);
         self.out
     }
 
-    /// Returns the one JSON document of a run that must have succeeded.
+    /// Returns the JSON document on the standard output. The run must have succeeded.
     pub fn json(self) -> Value {
         serde_json::from_str(&self.text()).expect("exactly one JSON document")
     }
 
-    /// Checks that it failed with an error that names `name`.
+    /// Checks that the run failed with an error that names `name`.
     pub fn must_fail(&self, name: &str) {
-        assert_eq!(self.code, Some(2), "{name}: exit code 2; stdout {} stderr {}", self.out, self.err);
-        assert!(self.err.contains("error:") && self.err.contains(name), "{name} is named: {}", self.err);
-        assert!(!self.err.contains("panicked"), "{name}: no panic: {}", self.err);
+        assert_eq!(self.code, Some(2), "{name}: the exit code is 2; stdout {} stderr {}", self.out, self.err);
+        assert!(self.err.contains("error:") && self.err.contains(name), "the error names {name}: {}", self.err);
+        assert!(!self.err.contains("panicked"), "{name}: the command does not panic: {}", self.err);
     }
 }
 
-/// Arguments from paths and words.
+/// Builds an array of arguments from paths and words.
 macro_rules! arguments {
     ($($argument:expr),* $(,)?) => { [$(std::ffi::OsString::from($argument)),*] };
 }
@@ -60,7 +60,7 @@ pub fn folder() -> TempDir {
     tempfile::tempdir().expect("a temporary folder")
 }
 
-/// Writes a synthetic scene of `count` Gaussians as `scene.gs4d` in this folder. Returns its path.
+/// Writes a synthetic scene of `count` Gaussians as `scene.gs4d` into `folder`. Returns its path.
 pub fn scene(folder: &TempDir, count: &str) -> PathBuf {
     let path = folder.path().join("scene.gs4d");
     gs4d(&arguments!["synth", &path, "--count", count]).text();

@@ -1,4 +1,4 @@
-//! The real captures.
+//! The trained captures.
 //!
 //! In: the environment variable `GS4D_DATA`. Out: the folder that it names.
 

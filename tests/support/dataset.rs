@@ -1,7 +1,7 @@
-//! A dataset made of a scene's own pictures.
+//! A dataset of pictures of a scene.
 //!
-//! In: a scene and a folder. Out: `transforms_train.json` and `transforms_test.json` in that folder and the images they name, drawn by the
-//! CPU reference and rounded to 8 bits.
+//! In: a scene and a folder. Out: `transforms_train.json` and `transforms_test.json` in the folder, and the images that they name, drawn by
+//! the CPU reference and rounded to 8 bits.
 
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::RuntimeScene;
@@ -15,8 +15,8 @@ use std::path::Path;
 /// Horizontal field of view, radians.
 const FOV: f32 = 0.7;
 
-/// Writes both splits: `cameras` on a circle around `center`, each at every one of `times` times of [0, 1]; the test split has two
-/// cameras between those. With `images`, they are drawn.
+/// Writes both splits: `cameras` cameras on a circle around `center`, each at `times` times from 0 to 1; the test split has two cameras at
+/// other angles. The images are drawn if `images` is true.
 pub fn write(
     folder: &Path,
     scene: &RuntimeScene,
@@ -37,7 +37,8 @@ pub fn write(
                 let time = time as f32 / (times - 1) as f32;
                 frames.push(frame(&camera_at, &name, time));
                 let path = folder.join(format!("{name}.png"));
-                fs::create_dir_all(path.parent().expect("inside a folder")).expect("the folder can be written to");
+                fs::create_dir_all(path.parent().expect("the path has a folder"))
+                    .expect("the folder can be written to");
                 if images {
                     let view = camera_at.view(time, scene.trained_with.raster_fov);
                     let picture = reference::render(scene, &view, scene.trained_background()).picture;
@@ -51,7 +52,7 @@ pub fn write(
     }
 }
 
-/// Returns one frame of the Blender form: OpenGL axes.
+/// Returns one frame in the Blender format, with OpenGL axes.
 fn frame(camera: &Camera, name: &str, time: f32) -> Value {
     let to_world = camera.world_to_camera.inverse() * glam::Mat4::from_diagonal(Vec4::new(1.0, -1.0, -1.0, 1.0));
     let rows: Vec<[f32; 4]> = (0..4).map(|row| to_world.row(row).to_array()).collect();

@@ -1,7 +1,7 @@
 //! Captures placed in headless apps, and meshes among them.
 //!
-//! In: an app, scenes, components of their entities and cameras. Out: entities, and the comparison of the app's picture
-//! with that of the CPU reference, or of the renderer without Bevy.
+//! In: an app, scenes, components of their entities and cameras. Out: entities, and the comparison of the app's picture with the picture of
+//! the CPU reference, or of the renderer without Bevy.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{DURATION, SIZE, add, difference, scene};
@@ -17,12 +17,12 @@ use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{RuntimeScene, TemporalFilter};
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, DebugView, Picture, View};
 
-/// Black behind captures.
+/// A black background.
 pub const BLACK: Background = Background::Color([0.0; 3]);
-/// The pixel in the middle, or its neighbour.
+/// The pixel in the middle of a picture.
 pub const MIDDLE: UVec2 = UVec2::new(SIZE.x / 2, SIZE.y / 2);
 
-/// Returns overlapping Gaussians; two of them move.
+/// Returns a scene of five overlapping Gaussians, two of which move.
 pub fn crowd() -> RuntimeScene {
     let moving = |gaussian: Gaussian, velocity: [f32; 3]| Gaussian { velocity, sigma_t: 0.4, ..gaussian };
     scene(&[
@@ -34,12 +34,12 @@ pub fn crowd() -> RuntimeScene {
     ])
 }
 
-/// Returns one Gaussian at the origin.
+/// Returns a scene of one Gaussian at the origin.
 pub fn lone(color: Vec3) -> RuntimeScene {
     scene(&[(blob(Vec3::ZERO, Vec3::splat(0.4), 0.98), color)])
 }
 
-/// Returns two seconds of a moving scene with +z up, with a filter of half-second segments if `filtered`.
+/// Returns a moving scene of two seconds with +z up, with a filter of half-second segments if `filtered`.
 pub fn synthetic(count: usize, seed: u64, filtered: bool) -> RuntimeScene {
     let settings = SynthSettings { count, seed, degree: 0, degree_t: 0, duration_seconds: DURATION };
     let mut scene = synthesize(&settings).into_runtime().expect("synthetic scenes can be drawn");
@@ -50,7 +50,7 @@ pub fn synthetic(count: usize, seed: u64, filtered: bool) -> RuntimeScene {
     scene
 }
 
-/// Spawns a capture, paused at its start, with further components.
+/// Spawns a capture, paused at its start, with the components of `bundle`.
 pub fn spawn(app: &mut App, scene: &RuntimeScene, bundle: impl Bundle) -> Entity {
     let handle = add(app, scene);
     app.world_mut().spawn((GaussianCapture3d(handle), Playback::paused_at(0.0), bundle)).id()
@@ -61,10 +61,10 @@ pub fn insert(app: &mut App, entity: Entity, bundle: impl Bundle) {
     app.world_mut().entity_mut(entity).insert(bundle);
 }
 
-/// Checks that the app's picture is `expected`, except for rounding to 8 bits and the GPU's arithmetic.
+/// Checks that the app's picture equals `expected` up to the rounding to 8 bits and the GPU's arithmetic.
 pub fn check(app: &mut App, expected: &Picture, what: &str) {
     let apart = difference(&picture(app, 0.0), expected);
-    assert!(apart <= 2.0, "{what}: Bevy and the CPU reference are {apart} / 255 apart");
+    assert!(apart <= 2.0, "{what}: Bevy and the CPU reference differ by {apart} / 255");
 }
 
 /// Returns the CPU reference's picture of one capture over black.
@@ -74,10 +74,10 @@ pub fn reference_picture(scene: &RuntimeScene, view: View, appearance: Appearanc
 
 /// Returns a debug view of one capture over black, as the renderer draws it without Bevy.
 pub fn debug_picture(headless: &mut Headless, scene: &RuntimeScene, view: View, debug: DebugView) -> Picture {
-    let capture = headless.upload(scene).expect("it fits");
+    let capture = headless.upload(scene).expect("the scene fits on the GPU");
     let instance = Instance { capture: &capture, active: None, view, appearance: Appearance::default() };
     let parameters = ViewParameters { background: BLACK, debug, ..ViewParameters::default() };
-    headless.render_all(&[instance], &parameters).expect("it is drawn").picture
+    headless.render_all(&[instance], &parameters).expect("the scene is drawn").picture
 }
 
 /// Returns the pose of a camera that looks straight at the origin from four units away.
@@ -85,13 +85,13 @@ pub fn front() -> Transform {
     Transform::from_xyz(0.0, 0.0, 4.0)
 }
 
-/// Returns a projection for pictures three units high.
+/// Returns an orthographic projection with a view three units high.
 pub fn orthographic() -> OrthographicProjection {
     let scaling_mode = ScalingMode::FixedVertical { viewport_height: 3.0 };
     OrthographicProjection { scaling_mode, ..OrthographicProjection::default_3d() }
 }
 
-/// Spawns an unlit box of one colour.
+/// Spawns an unlit box of one color.
 pub fn spawn_box(app: &mut App, size: Vec3, center: Vec3, color: Color, alpha_mode: AlphaMode) -> Entity {
     let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(Cuboid::from_size(size));
     let material = StandardMaterial { base_color: color, unlit: true, alpha_mode, ..default() };

@@ -18,11 +18,11 @@ pub struct GoldenView {
     pub scene: RuntimeScene,
     pub view: View,
     pub background: Background,
-    /// The output of the original: planar colour, depth, alpha.
+    /// The output of the original code: planar color, depth, alpha.
     pub color: Vec<f32>,
     pub depth: Vec<f32>,
     pub alpha: Vec<f32>,
-    /// Pixels where a decision is too close to call.
+    /// Pixels at which a value is too close to a threshold, as a flag for each pixel.
     pub ambiguous: Vec<u8>,
 }
 
@@ -46,10 +46,10 @@ pub fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden")
 }
 
-/// Returns every view of every golden scene: sixteen.
+/// Returns the sixteen views of all golden scenes.
 pub fn all_views() -> Vec<GoldenView> {
     let views: Vec<_> = SCENES.iter().flat_map(|scene| load(scene)).collect();
-    assert_eq!(views.len(), 16, "five scenes have sixteen views");
+    assert_eq!(views.len(), 16, "the five scenes have sixteen views");
     views
 }
 
@@ -60,9 +60,9 @@ pub fn floats(path: &Path) -> Vec<f32> {
 
 fn load(name: &str) -> Vec<GoldenView> {
     let folder = folder().join(name);
-    let text = std::fs::read_to_string(folder.join("scene.json")).expect("scene.json");
-    let json: Value = serde_json::from_str(&text).expect("JSON");
-    let views = json["views"].as_array().expect("views");
+    let text = std::fs::read_to_string(folder.join("scene.json")).expect("scene.json can be read");
+    let json: Value = serde_json::from_str(&text).expect("scene.json is JSON");
+    let views = json["views"].as_array().expect("scene.json has views");
     views.iter().map(|view| load_view(&folder, name, &json, view)).collect()
 }
 
@@ -75,7 +75,7 @@ fn load_view(folder: &Path, scene_name: &str, json: &Value, view: &Value) -> Gol
     let span = number("time_span", 1.0) as f32;
     let trained_with = TrainedWith {
         time_interval: [0.0, span],
-        background: serde_json::from_value(option("bg")).expect("bg"),
+        background: serde_json::from_value(option("bg")).expect("the background is a color"),
         sh_direction: if option("sh_dir") == "displaced" { ShDirection::Displaced } else { ShDirection::Canonical },
         prefilter_var: number("prefilter_var", -1.0) as f32,
         ..TrainedWith::default()
@@ -85,7 +85,7 @@ fn load_view(folder: &Path, scene_name: &str, json: &Value, view: &Value) -> Gol
     let flat = option("force_sh_3d") == true || number("gaussian_dim", 4.0) == 3.0 || harmonics.degree < 3;
     harmonics.degree_t = if flat { 0 } else { number("sh_degree_t", 0.0) as u32 };
     let environment = json["env_file"].as_str().map(|file| {
-        let side = json["env_res"].as_u64().expect("env_res") as u32;
+        let side = json["env_res"].as_u64().expect("env_res is a number") as u32;
         Environment { width: side, height: side, texels: floats(&folder.join(file)) }
     });
     let settings = SliceSettings {
@@ -102,21 +102,21 @@ fn load_view(folder: &Path, scene_name: &str, json: &Value, view: &Value) -> Gol
     }
     .into_runtime_with(&settings)
     .expect("golden scenes are valid");
-    let camera: CameraEntry = serde_json::from_value(view["camera"].clone()).expect("camera");
-    let file = |key: &str| folder.join(view[key].as_str().expect("file"));
+    let camera: CameraEntry = serde_json::from_value(view["camera"].clone()).expect("the view has a camera");
+    let file = |key: &str| folder.join(view[key].as_str().expect("the view names its files"));
     GoldenView {
-        name: format!("{scene_name}/{}", view["name"].as_str().expect("name")),
+        name: format!("{scene_name}/{}", view["name"].as_str().expect("the view has a name")),
         background: scene.trained_background(),
         scene,
         view: make_view(&camera),
         color: floats(&file("color_file")),
         depth: floats(&file("depth_file")),
         alpha: floats(&file("alpha_file")),
-        ambiguous: std::fs::read(file("ambiguous_file")).expect("ambiguous"),
+        ambiguous: std::fs::read(file("ambiguous_file")).expect("the flags of ambiguous pixels can be read"),
     }
 }
 
-/// Returns the raw tensors of a golden scene, and its colour with the full degrees.
+/// Returns the raw tensors of a golden scene, and its colors with all degrees.
 pub fn raw_scene(json: &Value) -> (Parameters, Harmonics) {
     let raw = &json["raw"];
     fn get<T: serde::de::DeserializeOwned + Default>(raw: &Value, key: &str) -> T {
@@ -157,15 +157,18 @@ fn make_view(entry: &CameraEntry) -> View {
     let view = Camera { world_to_camera: rows(&entry.view), size, lens }.view(entry.timestamp, raster_fov);
     let full = rows(&entry.full);
     for (ours, theirs) in view.clip_rows().into_iter().zip([full.row(0), full.row(1)]) {
-        assert!(ours.abs_diff_eq(theirs, 1e-5), "projection {ours} is {theirs}");
+        assert!(ours.abs_diff_eq(theirs, 1e-5), "the projection {ours} equals the stored {theirs}");
     }
-    assert!(view.camera_position.abs_diff_eq(entry.campos.into(), 1e-5), "camera position");
-    assert!(view.tan_fov.abs_diff_eq(tan, 1e-6), "tangents {} are {tan}", view.tan_fov);
+    assert!(
+        view.camera_position.abs_diff_eq(entry.campos.into(), 1e-5),
+        "the camera position equals the stored position"
+    );
+    assert!(view.tan_fov.abs_diff_eq(tan, 1e-6), "the tangents {} equal the stored {tan}", view.tan_fov);
     view
 }
 
-/// Returns the largest absolute differences: of colour, depth and alpha outside the ambiguous pixels, and of colour and alpha inside,
-/// where a splat at the threshold may count or not.
+/// Returns the largest absolute differences: of color, depth and alpha outside of the ambiguous pixels, and of color or alpha in ambiguous
+/// pixels, where a splat at a threshold may or may not count.
 pub fn differences(golden: &GoldenView, frame: &Frame) -> ([f32; 3], f32) {
     let count = golden.alpha.len();
     let (mut clear, mut ambiguous) = ([0.0f32; 3], 0.0f32);

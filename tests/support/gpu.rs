@@ -1,11 +1,11 @@
 //! A GPU for tests.
 //!
-//! In: the usual adapter. Out: a renderer on it, with shader checks on as long as debug assertions are.
+//! In: the default adapter. Out: a renderer on that adapter, with shader checks on in builds with debug assertions.
 
 use crate::support::no_gpu::no_gpu;
 use bevy_gs4d::renderer::{GpuContext, Headless, ShaderChecks};
 
-/// As the plugin chooses them: a build as shipped does not check.
+/// Shader checks as in the plugin: a release build has none.
 pub const CHECKS: ShaderChecks = if cfg!(debug_assertions) { ShaderChecks::On } else { ShaderChecks::Off };
 
 /// Returns a renderer; `None` if there is no adapter, which is reported.

@@ -1,12 +1,12 @@
-//! A device with low limits, on which small scenes are as large as huge ones are elsewhere.
+//! A device with low limits, on which small scenes reach the limits that huge scenes reach on other devices.
 //!
-//! In: the usual adapter. Out: a renderer on it whose storage buffer bindings end at [`BINDING`] bytes.
+//! In: the default adapter. Out: a renderer on that adapter with storage buffer bindings of at most [`BINDING`] bytes.
 
 use crate::support::no_gpu::no_gpu;
 use bevy_gs4d::renderer::{GpuContext, Headless, ShaderChecks};
 use pollster::block_on;
 
-/// Most bytes that can be bound.
+/// Largest storage buffer binding in bytes.
 pub const BINDING: u64 = 1 << 21;
 
 /// Returns a renderer with shader checks on; `None` if there is no adapter, which is reported.
@@ -29,7 +29,7 @@ pub fn headless() -> Option<Headless> {
         required_limits: limits,
         ..Default::default()
     }))
-    .expect("less than the adapter can do");
+    .expect("the limits are below those of the adapter");
     let context = GpuContext { device, queue, info: adapter.get_info() };
     Some(Headless::new(context, ShaderChecks::On).expect("the passes compile"))
 }

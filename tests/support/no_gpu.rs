@@ -1,10 +1,10 @@
-//! Tests that need a GPU, where there is none.
+//! The report of tests that need a GPU on a machine without one.
 //!
-//! In: nothing. Out: the one report of it.
+//! In: nothing. Out: the same reason for all of these tests.
 
 use crate::support::skip::skip;
 
 /// Reports that the test, or a part of it, does not run because there is no GPU.
 pub fn no_gpu() {
-    skip("no GPU, not even a software one");
+    skip("no GPU and no software driver");
 }

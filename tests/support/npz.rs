@@ -10,15 +10,15 @@ use std::path::Path;
 /// Reads the pictures.
 pub fn pictures(path: &Path, array: &str) -> Vec<Picture> {
     let (header, bytes) = npy::array(path, array);
-    assert!(header.contains("'fortran_order': False"), "rows are innermost: {header}");
+    assert!(header.contains("'fortran_order': False"), "the array is in C order: {header}");
     let values: Vec<f32> = if header.contains("'<f4'") {
         bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
     } else {
-        assert!(header.contains("'<f2'"), "float32 or float16: {header}");
+        assert!(header.contains("'<f2'"), "the type is float32 or float16: {header}");
         bytes.chunks_exact(2).map(|b| from_half(u16::from_le_bytes([b[0], b[1]]))).collect()
     };
     let [views, channels, height, width] = shape(&header);
-    assert_eq!((channels, values.len()), (3, views * 3 * height * width), "as many values as the shape says");
+    assert_eq!((channels, values.len()), (3, views * 3 * height * width), "the number of values matches the shape");
     let plane = height * width;
     let picture = |view: &[f32]| Picture {
         size: UVec2::new(width as u32, height as u32),
@@ -29,10 +29,10 @@ pub fn pictures(path: &Path, array: &str) -> Vec<Picture> {
 
 /// Returns the four numbers after `'shape': (`.
 fn shape(header: &str) -> [usize; 4] {
-    let (_, rest) = header.split_once("'shape': (").expect("a shape");
-    let (inside, _) = rest.split_once(')').expect("a closed shape");
+    let (_, rest) = header.split_once("'shape': (").expect("the header has a shape");
+    let (inside, _) = rest.split_once(')').expect("the shape is closed");
     let numbers: Vec<usize> = inside.split(',').filter_map(|number| number.trim().parse().ok()).collect();
-    numbers.try_into().expect("four dimensions")
+    numbers.try_into().expect("the array has four dimensions")
 }
 
 /// Converts from IEEE half precision, except infinities and NaN.

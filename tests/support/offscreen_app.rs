@@ -1,6 +1,6 @@
 //! Headless Bevy apps for tests.
 //!
-//! In: the size of a picture. Out: an app that draws into one without a window, a camera for it, and the picture.
+//! In: the size of a picture. Out: an app that draws into a picture without a window, a camera of the app, and the picture.
 
 use crate::support::no_gpu::no_gpu;
 use bevy::app::PluginGroupBuilder;
@@ -16,12 +16,12 @@ use std::time::Duration;
 /// Vertical field of view of every test camera, radians.
 pub const FOV_Y: f32 = 0.8;
 
-/// Returns an app without a window; `None` if there is no GPU to draw with, which is reported.
+/// Returns an app without a window; without a GPU, reports the skipped test and returns `None`.
 pub fn app(size: UVec2) -> Option<App> {
     if as_shipped() { app_with(size, shipped_plugins) } else { unpipelined_app(size) }
 }
 
-/// Returns the same, never as shipped, for tests that count frames.
+/// Returns the app of [`app`] without pipelined rendering, also with `GS4D_AS_SHIPPED`, for tests that count frames.
 pub fn unpipelined_app(size: UVec2) -> Option<App> {
     app_with(size, |plugins| plugins)
 }
@@ -36,8 +36,7 @@ fn app_with(size: UVec2, adjust: fn(PluginGroupBuilder) -> PluginGroupBuilder) -
     Some(app)
 }
 
-/// Returns whether apps run as a game ships them: shaders unchecked, pipelined rendering on, pipelines compiled in the
-/// background.
+/// Returns whether apps run as shipped games do: without shader checks, with pipelined rendering, with pipelines compiled in the background.
 fn as_shipped() -> bool {
     let wanted = std::env::var_os("GS4D_AS_SHIPPED").is_some();
     assert!(!wanted || !cfg!(debug_assertions), "GS4D_AS_SHIPPED needs a build without debug assertions");
@@ -50,7 +49,7 @@ fn shipped_plugins(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
         .set(RenderPlugin { synchronous_pipeline_compilation: false, ..default() })
 }
 
-/// Spawns a camera whose pixels are compared: no tonemapping, no dithering.
+/// Spawns a camera without tonemapping and dithering, so that its pixels can be compared.
 pub fn spawn_camera(app: &mut App, msaa: Msaa, transform: Transform) -> Entity {
     let target = app.world().resource::<Offscreen>().target();
     let lens = Projection::Perspective(PerspectiveProjection { fov: FOV_Y, ..default() });
@@ -58,7 +57,7 @@ pub fn spawn_camera(app: &mut App, msaa: Msaa, transform: Transform) -> Entity {
     app.world_mut().spawn((Camera3d::default(), target, msaa, lens, appearance, transform)).id()
 }
 
-/// Returns the picture after `seconds` more.
+/// Returns the picture after another `seconds` seconds.
 pub fn picture(app: &mut App, seconds: f32) -> RgbaImage {
     testing::picture(app, Duration::from_secs_f32(seconds)).expect("the app draws without an error")
 }

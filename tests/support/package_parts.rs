@@ -1,10 +1,10 @@
-//! Packages taken apart, changed and sealed again.
+//! Packages that are split into parts, changed and written again.
 //!
-//! In: the bytes of a package. Out: its header as text and its bodies; and a package of them whose checksum is right.
+//! In: the bytes of a package. Out: the header as text and the bodies of the sections; and a package of these parts with a valid checksum.
 
 use bevy_gs4d::codec::package::{MAGIC, VERSION};
 
-/// A package in its parts. `seal` puts them together, with the right checksum of the current header.
+/// The parts of a package. [`seal`](Self::seal) joins them, with the checksum of the current header.
 #[derive(Clone)]
 pub struct Parts {
     pub header: String,
@@ -12,7 +12,7 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// Takes a package apart.
+    /// Splits a package into its parts.
     pub fn of(file: &[u8]) -> Self {
         let number = |at: usize| u64::from_le_bytes(file[at..at + 8].try_into().expect("eight bytes")) as usize;
         let mut at = 20 + number(8);
@@ -26,7 +26,7 @@ impl Parts {
         Self { header, bodies }
     }
 
-    /// Puts the parts together.
+    /// Joins the parts to a package.
     pub fn seal(&self) -> Vec<u8> {
         let mut start = MAGIC.to_vec();
         start.extend(VERSION.to_le_bytes());
@@ -40,9 +40,9 @@ impl Parts {
         file
     }
 
-    /// Replaces the first such text of the header.
+    /// Replaces the first occurrence of `from` in the header.
     pub fn swap(mut self, from: &str, to: &str) -> Self {
-        assert!(self.header.contains(from), "the header holds {from:?}:\n{}", self.header);
+        assert!(self.header.contains(from), "the header contains {from:?}:\n{}", self.header);
         self.header = self.header.replacen(from, to, 1);
         self
     }

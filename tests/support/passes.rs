@@ -1,6 +1,6 @@
-//! One pass at a time, on a bare device.
+//! Single passes, on a device without a renderer.
 //!
-//! In: the name of a pass, and buffers under the names that its shader gives them. Out: what a dispatch leaves in those buffers.
+//! In: the name of a pass, and buffers by their names in its shader. Out: the contents of these buffers after a dispatch.
 
 use crate::support::no_gpu::no_gpu;
 use bevy_gs4d::renderer::{GpuContext, shaders};
@@ -14,7 +14,7 @@ use wgpu::{BufferBindingType, BufferUsages};
 /// A device without a renderer.
 pub struct Gpu(GpuContext);
 
-/// A compiled pass. Every dispatch binds all that the shader declares.
+/// A compiled pass. Every dispatch binds all buffers that the shader declares.
 pub struct Pass<'a> {
     gpu: &'a GpuContext,
     resources: Vec<Resource>,
@@ -35,7 +35,7 @@ impl Gpu {
         GpuContext::headless(None).map(Self).map_err(|_| no_gpu()).ok()
     }
 
-    /// Returns a buffer of these values, or of some zeros if there are none, so that it can be bound.
+    /// Returns a buffer with the given values. Without values, the buffer has 64 zero bytes, so that it can be bound.
     pub fn buffer<T: Pod>(&self, values: &[T]) -> wgpu::Buffer {
         let contents: &[u8] = if values.is_empty() { &[0; 64] } else { bytemuck::cast_slice(values) };
         self.0.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -45,7 +45,7 @@ impl Gpu {
         })
     }
 
-    /// Reads a buffer.
+    /// Reads the values of a buffer.
     pub fn read<T: Pod>(&self, buffer: &wgpu::Buffer) -> Vec<T> {
         let GpuContext { device, queue, .. } = &self.0;
         let copy = device.create_buffer(&wgpu::BufferDescriptor {
@@ -63,7 +63,7 @@ impl Gpu {
         bytes.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect()
     }
 
-    /// Compiles every entry point of a pass. Its bindings, buffers all of them, are what naga finds.
+    /// Compiles every entry point of a pass. The bindings, all of which are buffers, are those that naga finds in the shader.
     pub fn pass(&self, name: &str) -> Pass<'_> {
         let device = &self.0.device;
         let module = shaders::compose(name, &[]).expect("the pass composes");
@@ -71,7 +71,7 @@ impl Gpu {
         let mut groups: BTreeMap<u32, Vec<wgpu::BindGroupLayoutEntry>> = BTreeMap::new();
         for (_, variable) in module.global_variables.iter() {
             let (Some(at), Some(name)) = (variable.binding, variable.name.clone()) else { continue };
-            // Those of libraries have a suffix.
+            // Names from imported modules have a suffix.
             let name = name.split("X_naga_oil_mod_X").next().unwrap_or_default().to_owned();
             groups.entry(at.group).or_default().push(layout_entry(at.binding, variable.space));
             resources.push(Resource { group: at.group, binding: at.binding, name });
@@ -95,7 +95,7 @@ impl Gpu {
                 layout: Some(&layout),
                 module: &shader,
                 entry_point: Some(&entry),
-                // As the renderer has it.
+                // As in the renderer.
                 compilation_options: wgpu::PipelineCompilationOptions {
                     zero_initialize_workgroup_memory: false,
                     ..Default::default()
@@ -109,12 +109,12 @@ impl Gpu {
 }
 
 impl Pass<'_> {
-    /// Runs that many workgroups of an entry point.
+    /// Dispatches `workgroups` workgroups of an entry point.
     pub fn dispatch(&self, entry: &str, workgroups: u32, buffers: &[(&str, &wgpu::Buffer)]) {
         let GpuContext { device, queue, .. } = self.gpu;
         let bound = |resource: &Resource| {
             let buffer = buffers.iter().find(|(name, _)| *name == resource.name);
-            let (_, buffer) = buffer.unwrap_or_else(|| panic!("a buffer for `{}`", resource.name));
+            let (_, buffer) = buffer.unwrap_or_else(|| panic!("no buffer is given for `{}`", resource.name));
             wgpu::BindGroupEntry { binding: resource.binding, resource: buffer.as_entire_binding() }
         };
         let group = |(layout, index): (&wgpu::BindGroupLayout, u32)| {

@@ -1,6 +1,6 @@
 //! Apps without a renderer, in which captures play and every playback event is recorded.
 //!
-//! In: captures of a given length with key-frames, steps of time. Out: the state of playback, and events in [`event_log`].
+//! In: captures of a given duration with key-frames, time steps. Out: the playback components, and events in [`event_log`].
 //!
 //! [`event_log`]: super::event_log
 
@@ -12,16 +12,16 @@ use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{FilterKind, GaussianScene, TemporalFilter};
 use std::time::Duration;
 
-/// Returns an app whose time advances only by [`pass`]. Its assets are in `folder`.
+/// Returns an app whose time advances only by [`pass`], with assets in `folder`.
 pub fn app(folder: &str) -> App {
     app_with(AssetPlugin { file_path: folder.into(), ..default() })
 }
 
-/// Returns the same with any assets.
+/// Returns the app of [`app`] with other settings of `AssetPlugin`.
 pub fn app_with(assets: AssetPlugin) -> App {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, assets, GaussianCapturePlugin));
-    // Steps longer than Bevy's quarter of a second are wanted, too.
+    // Tests also make steps longer than Bevy's limit of a quarter of a second.
     app.world_mut().resource_mut::<Time<Virtual>>().set_max_delta(Duration::MAX);
     record::<PlaybackStarted>(&mut app, Last);
     record::<PlaybackPaused>(&mut app, Last);
@@ -30,18 +30,18 @@ pub fn app_with(assets: AssetPlugin) -> App {
     record::<MarkerReached>(&mut app, Last);
     record::<PlaybackLooped>(&mut app, Last);
     record::<PlaybackEnded>(&mut app, Last);
-    // The first update has no length, whatever the strategy.
+    // No time passes in the first update, with any strategy.
     pass(&mut app, 0.0);
     app
 }
 
-/// Runs one update, `seconds` after the last.
+/// Runs one update that advances time by `seconds`.
 pub fn pass(app: &mut App, seconds: f64) {
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(seconds)));
     app.update();
 }
 
-/// Returns a scene of `seconds` whose filter has `segments` segments.
+/// Returns a scene of `seconds` seconds with a filter of `segments` segments.
 pub fn scene(seconds: f32, segments: u32) -> GaussianScene {
     let count = 20;
     let settings = SynthSettings { count, degree: 0, duration_seconds: seconds, ..SynthSettings::default() };
@@ -50,18 +50,18 @@ pub fn scene(seconds: f32, segments: u32) -> GaussianScene {
     GaussianScene { filter: Some(filter), ..synthesize(&settings) }
 }
 
-/// Adds the same to the assets.
+/// Adds a capture of [`scene`] to the assets.
 pub fn capture(app: &mut App, seconds: f32, segments: u32) -> Handle<GaussianCapture> {
     let scene = scene(seconds, segments).into_runtime().expect("a synthetic scene can be drawn");
     app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(scene))
 }
 
-/// Returns the component of an entity.
+/// Returns a copy of a component of an entity.
 pub fn get<C: Component + Clone>(app: &App, entity: Entity) -> C {
     app.world().get::<C>(entity).expect("the entity has this component").clone()
 }
 
-/// Changes the component of an entity.
+/// Changes a component of an entity.
 pub fn change<C: Component<Mutability = bevy::ecs::component::Mutable>>(
     app: &mut App,
     entity: Entity,

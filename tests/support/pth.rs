@@ -1,4 +1,4 @@
-//! Crafted checkpoints, for tests: pickles put together from fragments, and the zip archive around them.
+//! Checkpoints for tests: pickles joined from fragments, and the zip archive around them.
 //!
 //! In: slots as pickle fragments, storages as values. Out: the bytes of a `.pth` file. Fragments do not use the memo, so they can be
 //! joined in any order.
@@ -7,13 +7,13 @@ use std::io::{Cursor, Write};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-/// `None`.
+/// The fragment of `None`.
 pub const NONE: &[u8] = b"N";
 
-/// A checkpoint that can be spoilt before it is written.
+/// A checkpoint whose parts tests can replace by invalid ones before it is written.
 #[derive(Clone)]
 pub struct Pth {
-    /// The state tuple, one pickle fragment each.
+    /// The elements of the state tuple, each a pickle fragment.
     pub slots: Vec<Vec<u8>>,
     /// Values of the storages, by key.
     pub storages: Vec<Vec<f32>>,
@@ -24,7 +24,7 @@ impl Pth {
     /// 2.
     pub fn rotating(count: usize, k: usize) -> Self {
         let mut pth = Self { slots: vec![NONE.to_vec(); 19], storages: Vec::new() };
-        // Statistics and optimiser state have no storage here: reading them fails.
+        // Statistics and optimizer state have no storage here: reading them fails.
         let unread = tensor(999, 1, 0, &[1], &[1]);
         pth.slots[7..11].fill(unread);
         pth.slots[0] = int(3);
@@ -45,7 +45,7 @@ impl Pth {
         ];
         for (slot, size) in shapes {
             let length: usize = size.iter().product();
-            // Neither zero nor equal to its neighbours.
+            // No value is zero or equal to its neighbors.
             let values = (0..length).map(|i| ((i * 37 + slot) % 101) as f32 * 0.02 - 0.999).collect();
             pth.set(slot, size, values);
         }
@@ -59,7 +59,7 @@ impl Pth {
         self.storages.push(values);
     }
 
-    /// Returns the pickle: the pair of state tuple and iteration 30,000.
+    /// Returns the pickle: a pair of the state tuple and the iteration 30,000.
     pub fn pickle(&self) -> Vec<u8> {
         let mut pickle = b"\x80\x02".to_vec();
         pickle.extend(tuple(&[tuple(&self.slots), int(30_000)]));
@@ -67,12 +67,12 @@ impl Pth {
         pickle
     }
 
-    /// Returns the file.
+    /// Returns the bytes of the file.
     pub fn bytes(&self) -> Vec<u8> {
         self.bytes_with(&self.pickle())
     }
 
-    /// Returns the file, with another pickle in place of its own.
+    /// Returns the bytes of the file with the given pickle.
     pub fn bytes_with(&self, pickle: &[u8]) -> Vec<u8> {
         let mut entries = vec![("archive/data.pkl".to_owned(), pickle.to_vec())];
         for (key, values) in self.storages.iter().enumerate() {
@@ -89,40 +89,40 @@ pub fn archive(entries: &[(String, Vec<u8>)]) -> Vec<u8> {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
     for (name, bytes) in entries {
-        zip.start_file(name, options).expect("a short name");
+        zip.start_file(name, options).expect("the name is short");
         zip.write_all(bytes).expect("memory can be written to");
     }
-    zip.finish().expect("a complete archive").into_inner()
+    zip.finish().expect("memory can be written to").into_inner()
 }
 
-/// Returns an int.
+/// Returns the fragment of an int.
 pub fn int(value: usize) -> Vec<u8> {
     let value = i32::try_from(value).expect("tests use small numbers");
     [&b"J"[..], &value.to_le_bytes()].concat()
 }
 
-/// Returns a float.
+/// Returns the fragment of a float.
 pub fn float(value: f64) -> Vec<u8> {
     [&b"G"[..], &value.to_be_bytes()].concat()
 }
 
-/// Returns a bool.
+/// Returns the fragment of a bool.
 pub fn flag(value: bool) -> Vec<u8> {
     vec![if value { 0x88 } else { 0x89 }]
 }
 
-/// Returns a text.
+/// Returns the fragment of a text.
 pub fn text(value: &str) -> Vec<u8> {
     let length = u32::try_from(value.len()).expect("tests use short texts");
     [&b"X"[..], &length.to_le_bytes()[..], value.as_bytes()].concat()
 }
 
-/// Returns a tuple.
+/// Returns the fragment of a tuple.
 pub fn tuple(items: &[Vec<u8>]) -> Vec<u8> {
     [&b"("[..], &items.concat()[..], b"t"].concat()
 }
 
-/// Returns a tensor as torch rebuilds it: a view of the storage `key`, whose declared length is `count` values.
+/// Returns the fragment of a tensor as torch writes it: a view of the storage `key`, which declares a length of `count` values.
 pub fn tensor(key: usize, count: usize, offset: usize, size: &[usize], stride: &[usize]) -> Vec<u8> {
     let ints = |values: &[usize]| tuple(&values.iter().map(|&value| int(value)).collect::<Vec<_>>());
     let class = b"ctorch\nFloatStorage\n".to_vec();

@@ -1,6 +1,6 @@
 //! Opaque surfaces in front of captures.
 //!
-//! In: their size and depth. Out: depth textures, of one sample or of four.
+//! In: the size and depth of a surface. Out: depth textures, with one sample or four samples.
 
 use bevy_gs4d::renderer::GpuContext;
 use glam::UVec2;
@@ -11,7 +11,7 @@ pub fn depth_texture(context: &GpuContext, size: UVec2, value: f32) -> wgpu::Tex
     let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
     let mut encoder = context.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     let depth_ops = wgpu::Operations { load: wgpu::LoadOp::Clear(value), store: wgpu::StoreOp::Store };
-    // A render pass that only clears.
+    // A render pass that only clears the texture.
     drop(encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
             view: &view,
@@ -24,13 +24,13 @@ pub fn depth_texture(context: &GpuContext, size: UVec2, value: f32) -> wgpu::Tex
     view
 }
 
-/// Returns a multisampled depth that is `near / distance` left of the middle, and 0 right of it, and the middle column, where half of the
-/// samples are covered. The edge leans by `slant` pictures' widths.
+/// Returns a multisampled depth texture, and the index of its middle column. The depth is `near / distance` left of the middle and 0 right of
+/// it; in the middle column half of the samples are covered. `slant` shifts the edge, in picture widths over the picture height.
 pub fn edge(context: &GpuContext, size: UVec2, near: f32, distance: f32, slant: f32) -> (wgpu::Texture, u32) {
     let GpuContext { device, queue, .. } = context;
     let texture = texture(context, size, 4);
     let column = size.x / 2;
-    // The edge goes through the middle of the column's pixels.
+    // The edge runs through the centers of the column's pixels.
     let end = (column as f32 + 0.5) / size.x as f32 * 2.0 - 1.0;
     let source = format!(
         "@vertex fn main(@builtin(vertex_index) i: u32) -> @builtin(position) vec4<f32> {{

@@ -1,18 +1,18 @@
-//! Waiting for what other threads do, such as loading files.
+//! Waiting for the work of other threads, such as loading files.
 //!
-//! In: an app, how it is updated, what is waited for. Out: an app in which it has happened.
+//! In: an app, a function that updates it, a condition. Out: the app once the condition holds.
 
 use bevy::prelude::*;
 use std::time::{Duration, Instant};
 
-/// How long files may take to load.
+/// Longest time for files to load.
 pub const LOAD_TIMEOUT: Duration = Duration::from_secs(60);
 
-/// Updates the app until `so` returns true.
+/// Updates the app until `so` returns true. Panics with `what` after [`LOAD_TIMEOUT`].
 pub fn wait_until(app: &mut App, what: &str, so: impl Fn(&App) -> bool, update: impl Fn(&mut App)) {
     let start = Instant::now();
     while !so(app) {
-        assert!(start.elapsed() < LOAD_TIMEOUT, "{what}: waited in vain");
+        assert!(start.elapsed() < LOAD_TIMEOUT, "{what}: the condition holds before the time limit");
         std::thread::sleep(Duration::from_millis(2));
         update(app);
     }

@@ -1,8 +1,8 @@
 //! Loaders: from files of an asset source to captures.
 //!
-//! In: the bytes of a file named `*.gs4d` or `*.pth` and, for a checkpoint, `cfg_args` beside it and the [`ReadOptions`] for what
-//! neither contains (`load_builder().with_settings(|options: &mut ReadOptions| ..)` or a `.meta` file). Out: a
-//! [`GaussianCapture`] or a [`CaptureLoadError`], to which Bevy adds the path.
+//! In: the bytes of a file named `*.gs4d` or `*.pth`. For a checkpoint, also the file `cfg_args` in the same folder, and
+//! [`ReadOptions`] with the values that neither file contains (`load_builder().with_settings(|options: &mut ReadOptions| ..)`
+//! or a `.meta` file). Out: a [`GaussianCapture`] or a [`CaptureLoadError`], to which Bevy adds the path.
 
 use crate::codec::ReadOptions;
 use crate::codec::checkpoint::{self, CheckpointError};
@@ -23,10 +23,10 @@ pub enum CaptureLoadError {
     /// The bytes are not an intact package.
     #[error(transparent)]
     Package(#[from] PackageError),
-    /// The bytes are not a checkpoint that can be read.
+    /// The bytes are not a readable checkpoint.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    /// The file is intact but holds a Gaussian that cannot be drawn.
+    /// The file is intact but contains a Gaussian that cannot be drawn.
     #[error(transparent)]
     Gaussian(#[from] InvalidGaussian),
 }
@@ -57,8 +57,8 @@ impl AssetLoader for PackageLoader {
 
 /// Loads checkpoints of the original code, `.pth`, as [`GaussianCapture`]s. Errors: [`CaptureLoadError`].
 ///
-/// What the settings leave open is taken from `cfg_args`, the file that the trainer writes into the same folder, if it is there. It is then
-/// a dependency of the checkpoint: when it changes, both are loaded again.
+/// Values that the settings do not give are read from `cfg_args`, the file that the trainer writes into the same folder, if it exists.
+/// `cfg_args` is then a dependency of the checkpoint: when `cfg_args` changes, the checkpoint is loaded again.
 #[derive(Debug, Default, TypePath)]
 pub struct CheckpointLoader;
 
@@ -73,7 +73,7 @@ impl AssetLoader for CheckpointLoader {
         settings: &ReadOptions,
         context: &mut LoadContext<'_>,
     ) -> Result<GaussianCapture, CaptureLoadError> {
-        let cfg_args = cfg_args_beside(context).await;
+        let cfg_args = read_cfg_args(context).await;
         let scene = checkpoint::read(Cursor::new(bytes(reader).await?), settings, cfg_args.as_deref())?;
         Ok(GaussianCapture::new(scene.into_runtime()?))
     }
@@ -83,16 +83,16 @@ impl AssetLoader for CheckpointLoader {
     }
 }
 
-/// Returns the text of `cfg_args` in the folder of a checkpoint; `None` if there is none, or it cannot be read.
-async fn cfg_args_beside(context: &mut LoadContext<'_>) -> Option<String> {
+/// Returns the text of `cfg_args` in the folder of a checkpoint; `None` if the file does not exist or cannot be read.
+async fn read_cfg_args(context: &mut LoadContext<'_>) -> Option<String> {
     let checkpoint = context.path();
-    let beside = AssetPath::from(checkpoint.path().with_file_name("cfg_args"));
-    let path = beside.with_source(checkpoint.source().clone_owned());
+    let cfg_args = AssetPath::from(checkpoint.path().with_file_name("cfg_args"));
+    let path = cfg_args.with_source(checkpoint.source().clone_owned());
     let text = context.read_asset_bytes(path).await.ok()?;
     Some(String::from_utf8_lossy(&text).into_owned())
 }
 
-/// Reads the whole file, because both formats are read out of order.
+/// Reads the whole file: both decoders seek in it.
 async fn bytes(reader: &mut dyn Reader) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     reader.read_to_end(&mut bytes).await?;

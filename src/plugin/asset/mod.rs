@@ -1,7 +1,7 @@
 //! Captures as Bevy assets.
 //!
 //! In: the bytes of a `.gs4d` package or a `.pth` checkpoint, from any Bevy asset source. Out: a [`GaussianCapture`], decoded on
-//! the asset task pool and shared by any number of entities; on each of those a [`CaptureState`], and messages when it changes.
+//! the asset task pool and shared by any number of entities; on each entity a [`CaptureState`], and messages when it changes.
 //!
 //! ```text
 //! file ──▶ PackageLoader, CheckpointLoader ──▶ GaussianCapture ──▶ PackageSaver ──▶ file
@@ -9,15 +9,15 @@
 //!                      │ fails                        │ is loaded, or loaded again
 //!                      ▼                 fails        ▼
 //!                CaptureFailed ◀─────────────── upload to the GPU
-//!                                                     │ is whole
+//!                                                     │ is complete
 //!                                                     ▼
 //!                                               CaptureReady             and CaptureState on the entity
 //! ```
 //!
-//! Loading runs off the main thread, and uploading is spread over frames: neither blocks one. When a file changes that Bevy watches, or a
-//! game calls `AssetServer::reload`, the old capture is drawn until the new one is on the GPU, and stays if the new one is broken or does
-//! not fit. A capture is dropped with its last handle, and its memory on the GPU with it. Without a renderer captures are ready once they
-//! are loaded.
+//! Loading runs off the main thread, and uploading is spread over frames: neither blocks a frame. When a file changes that Bevy watches, or
+//! a game calls `AssetServer::reload`, the old capture is drawn until the new one is on the GPU. If the new capture is invalid or does not
+//! fit, the old one stays. A capture and its GPU memory are freed with its last handle. Without a renderer, captures are ready once they are
+//! loaded.
 
 mod loader;
 mod messages;

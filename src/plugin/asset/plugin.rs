@@ -1,4 +1,4 @@
-//! The plugin of assets: the loaders, the loading state of entities, and its messages.
+//! The asset plugin: the loaders, the loading state of entities, and its messages.
 //!
 //! In: an app with Bevy's `AssetPlugin`. Out: the same app, in which captures load and every entity with one has a [`CaptureState`].
 
@@ -28,14 +28,14 @@ impl Plugin for CaptureAssetPlugin {
             .add_message::<CaptureReady>()
             .add_message::<CaptureFailed>()
             .configure_sets(PreUpdate, CaptureAssetSystems.after(AssetTrackingSystems))
-            // Whoever hears that a capture is ready finds it upright.
+            // A capture stands upright before `CaptureReady` is sent.
             .add_systems(
                 PreUpdate,
                 (stand_upright.run_if(any_with_component::<Upright>), update_states)
                     .chain()
                     .in_set(CaptureAssetSystems),
             )
-            // What is spawned in between with a capture that is there stands in its first picture.
+            // An entity spawned during this frame with a loaded capture stands upright in its first frame.
             .add_systems(
                 PostUpdate,
                 stand_upright.run_if(any_with_component::<Upright>).before(TransformSystems::Propagate),

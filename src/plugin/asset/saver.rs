@@ -13,7 +13,7 @@ use bevy::asset::{AssetPath, AsyncWriteExt};
 use bevy::reflect::TypePath;
 use serde::{Deserialize, Serialize};
 
-/// Saves captures as packages, `.gs4d`, without loss. While one is saved, its scene is in memory twice. Errors:
+/// Saves captures as packages, `.gs4d`, without loss. While a capture is saved, its scene is in memory twice. Errors:
 /// [`CaptureSaveError`].
 ///
 /// # Examples
@@ -30,7 +30,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Default, Clone, Copy, TypePath)]
 pub struct PackageSaver;
 
-/// How a package is written.
+/// Settings for writing a package.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PackageSaverSettings {

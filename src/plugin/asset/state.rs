@@ -1,6 +1,6 @@
 //! The loading state of an entity's capture.
 //!
-//! In: what the systems of [`CaptureAssetSystems`] find. Out: [`CaptureState`], a component that games read.
+//! In: results of the systems in [`CaptureAssetSystems`]. Out: [`CaptureState`], a component that games read.
 
 use bevy::ecs::component::Component;
 use bevy::ecs::reflect::ReflectComponent;
@@ -27,13 +27,13 @@ use bevy::reflect::std_traits::ReflectDefault;
 #[derive(Component, Reflect, Debug, Default, Clone, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 pub enum CaptureState {
-    /// Not loaded, or not whole on the GPU yet. Nothing is drawn.
+    /// Not loaded, or not completely uploaded to the GPU. Nothing is drawn.
     #[default]
     Loading,
     /// Loaded and drawn; without a renderer, loaded. While another version is loaded and uploaded, the old one is drawn.
     Ready,
-    /// Could not be loaded or uploaded, for this reason: file, fault and, if there is one, remedy.
-    /// `AssetServer::reload`, or a change of a file that Bevy watches, loads it again.
+    /// Could not be loaded or uploaded. The text names the file, the fault and, if there is one, the remedy.
+    /// `AssetServer::reload`, or a change of a file that Bevy watches, loads the capture again.
     Failed(String),
 }
 
@@ -53,6 +53,6 @@ impl CaptureState {
     }
 }
 
-/// The set of the systems that update each [`CaptureState`] and send its messages: in `PreUpdate`, after assets have been tracked.
+/// The set of the systems that update each [`CaptureState`] and send its messages: in `PreUpdate`, after Bevy's `AssetTrackingSystems`.
 #[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
 pub struct CaptureAssetSystems;

@@ -1,11 +1,11 @@
-//! The systems that keep loading states up to date.
+//! The systems that update loading states.
 //!
-//! In: the handle of a [`GaussianCapture3d`], what Bevy's asset server reports about it, and what becomes of it on the GPU. Out:
+//! In: the handle of a [`GaussianCapture3d`], its load state in Bevy's asset server, and its upload state. Out:
 //! [`CaptureState`], and the messages [`CaptureReady`](super::messages::CaptureReady) and
 //! [`CaptureFailed`](super::messages::CaptureFailed).
 //!
-//! A capture among the assets that is drawn is ready, whatever the server reports: when a capture that has been loaded fails to load
-//! again, the server reports it as failed, but Bevy keeps the old one.
+//! A capture that is among the assets and drawn is ready, independent of the server's load state: when a reload of a loaded capture fails,
+//! the server reports the capture as failed, but Bevy keeps the old one.
 
 use super::loader::CaptureLoadError;
 use super::messages::Announcer;
@@ -31,37 +31,37 @@ pub(super) fn update_states(
     uploads: Res<Uploads>,
     mut captures: Query<(Entity, Ref<GaussianCapture3d>, &mut CaptureState)>,
     mut announcer: Announcer,
-    mut told: Local<Told>,
+    mut reported: Local<ReportedFailures>,
 ) {
     let _span = debug_span!("gs4d/states").entered();
     let mut changed: HashSet<AssetId<GaussianCapture>> = HashSet::new();
     for change in changes.read() {
         match change {
-            AssetEvent::Added { id } => told.succeeded(*id),
+            AssetEvent::Added { id } => reported.clear(*id),
             AssetEvent::Modified { id } => {
-                told.succeeded(*id);
+                reported.clear(*id);
                 changed.insert(*id);
             }
-            AssetEvent::Removed { id } => told.succeeded(*id),
+            AssetEvent::Removed { id } => reported.clear(*id),
             AssetEvent::Unused { .. } | AssetEvent::LoadedWithDependencies { .. } => {}
         }
     }
     let mut failed: HashMap<AssetId<GaussianCapture>, String> = HashMap::new();
     for failure in failures.read() {
         let error = describe(&failure.path, &failure.error);
-        if told.is_new(failure.id, &error) {
+        if reported.is_new(failure.id, &error) {
             failed.insert(failure.id, error);
         }
     }
     let mut uploads = uploads.lock();
-    // A capture that changes is ready again once the new one is drawn.
+    // A changed capture is ready again once its new version is drawn.
     if let Some(finished) = uploads.take_finished() {
         changed = finished;
     }
     for (entity, capture, mut state) in &mut captures {
         let id = capture.0.id();
         if loaded.contains(id) && !uploads.is_drawn(id) {
-            // A failed upload is reported elsewhere, but not a failure to load the capture again.
+            // `report_upload_failures` reports failed uploads, but not failed reloads.
             if !uploads.failures.contains_key(&id) {
                 state.set_if_neq(CaptureState::Loading);
             }
@@ -73,7 +73,7 @@ pub(super) fn update_states(
                 state.set_if_neq(CaptureState::Ready);
                 announcer.ready(entity, id);
             }
-            // Loading it again failed.
+            // The reload failed; the old version is drawn.
             if let Some(error) = failed.get(&id) {
                 announcer.failed(entity, error.clone());
             }
@@ -95,28 +95,28 @@ pub(super) fn update_states(
     }
 }
 
-/// What has been told of failures to load. Bevy repeats a failed reload at once, watched files may change several times in one save, and
-/// a game may try again every second: a failure is told once, until the capture loads or fails in another way.
+/// The failures to load that have been reported. Bevy repeats a failed reload immediately, a watched file may change several times in one
+/// save, and a game may try again every second: each failure is reported once, until the capture loads or fails with another error.
 #[derive(Default)]
-pub(super) struct Told(HashMap<AssetId<GaussianCapture>, String>);
+pub(super) struct ReportedFailures(HashMap<AssetId<GaussianCapture>, String>);
 
-impl Told {
-    /// Records that a capture has been loaded, or is gone.
-    fn succeeded(&mut self, id: AssetId<GaussianCapture>) {
+impl ReportedFailures {
+    /// Forgets the failure of a capture that has been loaded or removed.
+    fn clear(&mut self, id: AssetId<GaussianCapture>) {
         self.0.remove(&id);
     }
 
-    /// Records a failure. Returns whether it has not been told yet.
+    /// Records a failure. Returns whether it has not been reported yet.
     fn is_new(&mut self, id: AssetId<GaussianCapture>, error: &str) -> bool {
-        self.0.insert(id, error.to_owned()).is_none_or(|told| told != error)
+        self.0.insert(id, error.to_owned()).is_none_or(|last| last != error)
     }
 }
 
-/// Returns file, fault and remedy, without the names of loaders and types that Bevy puts before them.
+/// Returns the file, the fault and the remedy, without the names of loaders and types with which Bevy's message begins.
 fn describe(path: impl Display, error: &AssetLoadError) -> String {
     match error {
         AssetLoadError::AssetReaderError(AssetReaderError::NotFound(file)) => format!(
-            "{path}: there is no file {}; check the name, and that it lies in the folder of the app's assets",
+            "{path}: there is no file {}; check the name, and that the file is in the folder of the app's assets",
             file.display()
         ),
         AssetLoadError::AssetLoaderError(error) => match error.error().downcast_ref::<CaptureLoadError>() {
@@ -132,8 +132,8 @@ pub(super) fn any_upload_failure(uploads: Res<Uploads>) -> bool {
     !uploads.lock().failures.is_empty()
 }
 
-/// Sends a message once for each attempt to upload a capture that failed, and sets the state of its entities, unless an older version of
-/// it is still drawn.
+/// Sends a message once for each failed attempt to upload a capture, and sets the state of its entities unless an older version of the
+/// capture is still drawn.
 pub(super) fn report_upload_failures(
     uploads: Res<Uploads>,
     mut captures: Query<(Entity, &GaussianCapture3d, &mut CaptureState)>,
@@ -156,13 +156,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_failure_is_told_once_until_something_changes() {
-        let mut told = Told::default();
+    fn a_failure_is_reported_once_until_the_error_changes_or_loading_succeeds() {
+        let mut reported = ReportedFailures::default();
         let id = AssetId::default();
-        let mut is_new = |error| told.is_new(id, error);
-        assert_eq!(["cut off"; 3].map(&mut is_new), [true, false, false], "however often it is tried");
-        assert_eq!(["gone", "gone", "cut off"].map(&mut is_new), [true, false, true], "another one is told");
-        told.succeeded(id);
-        assert!(told.is_new(id, "cut off"), "and the same one after a success");
+        let mut is_new = |error| reported.is_new(id, error);
+        assert_eq!(["cut off"; 3].map(&mut is_new), [true, false, false], "a repeated error is reported once");
+        assert_eq!(["gone", "gone", "cut off"].map(&mut is_new), [true, false, true], "another error is reported");
+        reported.clear(id);
+        assert!(reported.is_new(id, "cut off"), "after a success the same error is reported again");
     }
 }

@@ -1,7 +1,7 @@
-//! What becomes of loaded captures on the GPU.
+//! The upload state of loaded captures.
 //!
-//! In: what the render world uploads: captures that are whole there, and why others cannot be. Out: [`Uploads`], shared by both worlds,
-//! from which the loading states of entities follow, and when playing begins.
+//! In: the render world's reports: captures whose upload is complete, and the errors of failed uploads. Out: [`Uploads`], shared by both
+//! worlds, which decides the loading states of entities and when playback begins.
 
 use crate::plugin::component::GaussianCapture;
 use bevy::asset::AssetId;
@@ -9,18 +9,18 @@ use bevy::ecs::resource::Resource;
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What becomes of loaded captures on the GPU. The main and the render world share it.
+/// The upload state of loaded captures. The main and the render world share it.
 #[derive(Resource, Debug, Clone, Default)]
 pub struct Uploads(Arc<Mutex<UploadStates>>);
 
 /// The uploads of all captures.
 #[derive(Debug, Default)]
 pub(super) struct UploadStates {
-    /// Whether there is a render world that uploads captures. If not, they are ready once they have been loaded.
+    /// Whether a render world uploads captures. Without one, captures are ready once they have been loaded.
     expected: bool,
-    /// Captures that are drawn, as they are or as they were before they changed.
+    /// Captures that are drawn: their current version, or the one before a change.
     drawn: HashSet<AssetId<GaussianCapture>>,
-    /// Captures whose upload has ended since this was last taken.
+    /// Captures whose upload has ended since the last [`take_finished`](Self::take_finished).
     finished: HashSet<AssetId<GaussianCapture>>,
     pub(super) failures: HashMap<AssetId<GaussianCapture>, UploadFailure>,
 }
@@ -34,12 +34,12 @@ pub(super) struct UploadFailure {
 }
 
 impl UploadStates {
-    /// Returns whether a capture that has been loaded is also drawn.
+    /// Returns whether a loaded capture is drawn.
     pub(super) fn is_drawn(&self, capture: AssetId<GaussianCapture>) -> bool {
         !self.expected || self.drawn.contains(&capture)
     }
 
-    /// Returns the captures whose upload has ended since the last call; `None` if nothing is uploaded.
+    /// Returns the captures whose upload has ended since the last call; `None` without a render world that uploads captures.
     pub(super) fn take_finished(&mut self) -> Option<HashSet<AssetId<GaussianCapture>>> {
         self.expected.then(|| std::mem::take(&mut self.finished))
     }
@@ -51,13 +51,13 @@ impl Uploads {
         self.lock().expected = true;
     }
 
-    /// Returns whether a capture that has been loaded is still on its way to the GPU, with no older version to be drawn meanwhile.
+    /// Returns whether a loaded capture is still being uploaded and no older version of it is drawn.
     pub(crate) fn awaits(&self, capture: AssetId<GaussianCapture>) -> bool {
         let states = self.lock();
         !states.is_drawn(capture) && !states.failures.contains_key(&capture)
     }
 
-    /// Notes that the upload of a capture begins. `is_drawn`: an earlier one is drawn until it ends.
+    /// Records that the upload of a capture begins. `is_drawn`: whether an earlier version is drawn until the upload ends.
     pub(crate) fn begin(&self, capture: AssetId<GaussianCapture>, is_drawn: bool) {
         let mut states = self.lock();
         states.failures.remove(&capture);
@@ -68,19 +68,19 @@ impl Uploads {
         }
     }
 
-    /// Notes that a capture is whole on the GPU.
+    /// Records that the upload of a capture is complete.
     pub(crate) fn finish(&self, capture: AssetId<GaussianCapture>) {
         let mut states = self.lock();
         states.drawn.insert(capture);
         states.finished.insert(capture);
     }
 
-    /// Notes that the upload that has begun cannot go on.
+    /// Records that the upload of a capture has failed.
     pub(crate) fn fail(&self, capture: AssetId<GaussianCapture>, error: String) {
         self.lock().failures.insert(capture, UploadFailure { error, reported: false });
     }
 
-    /// Forgets a capture that is no longer loaded.
+    /// Removes a capture that is no longer loaded.
     pub(crate) fn forget(&self, capture: AssetId<GaussianCapture>) {
         let mut states = self.lock();
         states.drawn.remove(&capture);

@@ -43,7 +43,7 @@ impl GaussianCapture {
         {
             return capture;
         }
-        // A still never leaves its first moment.
+        // A still shows its first moment only.
         let shown = [0.0, f32::INFINITY].map(|seconds| capture.time_at(seconds));
         capture.bounds = BoundsOverTime::of(capture.scene.iter(), shown).map(Arc::new);
         capture
@@ -54,18 +54,18 @@ impl GaussianCapture {
         &self.scene
     }
 
-    /// Returns the scene, shared.
+    /// Returns a shared pointer to the scene.
     pub(crate) fn shared_scene(&self) -> Arc<RuntimeScene> {
         self.scene.clone()
     }
 
-    /// Returns the box about everything that is drawn at any time, in capture space; `None` for an empty capture.
+    /// Returns the box that encloses all Gaussians at all times, in capture space; `None` for an empty capture.
     pub fn bounds(&self) -> Option<Bounds> {
         self.bounds.as_ref().map(|bounds| bounds.whole())
     }
 
-    /// Returns the box about everything that is drawn at `seconds` since the start, and up to a 32nd of the duration earlier and later,
-    /// in capture space; `None` if nothing is drawn then.
+    /// Returns the box that encloses the Gaussians drawn at `seconds` since the start, and up to a 32nd of the duration earlier and later,
+    /// in capture space; `None` if no Gaussian is drawn then.
     pub fn bounds_at(&self, seconds: f32) -> Option<Bounds> {
         self.bounds.as_ref()?.at(self.time_at(seconds))
     }
@@ -128,17 +128,17 @@ mod tests {
     #[test]
     fn seconds_map_onto_the_time_interval() {
         let capture = capture([-0.5, 1.5], 4.0);
-        assert_eq!(capture.time_at(0.0), -0.5, "the start is T0");
-        assert_eq!(capture.time_at(4.0), 1.5, "the end is T1");
-        assert_eq!(capture.time_at(9.0), 1.5, "beyond the end is the end");
-        assert_eq!(capture.time_at(f32::NAN), -0.5, "no number is the start");
-        assert_eq!(capture.seconds_at(capture.time_at(1.0)), 1.0, "and back");
+        assert_eq!(capture.time_at(0.0), -0.5, "0 s is the first timestamp");
+        assert_eq!(capture.time_at(4.0), 1.5, "the duration is the last timestamp");
+        assert_eq!(capture.time_at(9.0), 1.5, "times beyond the end are clamped to the end");
+        assert_eq!(capture.time_at(f32::NAN), -0.5, "NaN counts as 0 s");
+        assert_eq!(capture.seconds_at(capture.time_at(1.0)), 1.0, "seconds_at is the inverse of time_at");
     }
 
     #[test]
     fn a_still_stays_at_its_first_moment() {
-        assert_eq!(capture([0.25, 1.0], 0.0).time_at(3.0), 0.25, "no duration, no motion");
-        assert_eq!(capture([0.25, 1.0], f32::INFINITY).duration_seconds(), 0.0, "an endless capture is a still");
+        assert_eq!(capture([0.25, 1.0], 0.0).time_at(3.0), 0.25, "a duration of 0 shows the first timestamp");
+        assert_eq!(capture([0.25, 1.0], f32::INFINITY).duration_seconds(), 0.0, "an infinite duration counts as 0");
     }
 
     #[test]
@@ -154,17 +154,23 @@ mod tests {
         };
         let empty = capture([0.0, 1.0], 1.0);
         let capture = with(vec![runner], [0.0, 8.0], 2.0);
-        let x = |seconds| capture.bounds_at(seconds).expect("always there").center().x;
+        let x = |seconds| capture.bounds_at(seconds).expect("the Gaussian is active at all times").center().x;
         assert!(x(0.0) < 0.2 && x(2.0) > 7.8, "from {} to {} in two seconds", x(0.0), x(2.0));
-        assert!(capture.bounds().is_some_and(|all| all.min.x < 0.0 && all.max.x > 8.0), "the whole way");
+        assert!(
+            capture.bounds().is_some_and(|all| all.min.x < 0.0 && all.max.x > 8.0),
+            "the bounds of all times enclose the whole path"
+        );
         let still = with(vec![runner], [3.0, 8.0], 0.0);
-        assert_eq!(still.bounds_at(1.0), still.bounds(), "a still does not move");
-        assert!(still.bounds().is_some_and(|all| all.min.x > 2.9 && all.max.x < 3.1), "and stays at its first moment");
+        assert_eq!(still.bounds_at(1.0), still.bounds(), "the bounds of a still do not depend on time");
+        assert!(
+            still.bounds().is_some_and(|all| all.min.x > 2.9 && all.max.x < 3.1),
+            "a still is bounded at its first moment"
+        );
         assert_eq!(empty.bounds_at(0.0), None, "an empty capture has no bounds");
     }
 
     #[test]
-    fn a_packed_scene_that_does_not_fit_together_has_no_bounds() {
+    fn an_inconsistent_packed_scene_has_no_bounds() {
         let packed = PackedScene {
             records: vec![[0; RECORD_WORDS]],
             ranges: Vec::new(),
@@ -172,7 +178,7 @@ mod tests {
         };
         let empty = RuntimeScene::sliced(Vec::new(), Harmonics::default());
         let scene = RuntimeScene { form: Form::Packed(packed), ..empty };
-        assert_eq!(GaussianCapture::new(scene).bounds(), None, "its Gaussian is not decoded without its ranges");
+        assert_eq!(GaussianCapture::new(scene).bounds(), None, "a record without a range is not decoded");
     }
 
     #[test]

@@ -1,67 +1,16 @@
 //! The capture asset and the component that places it in the world: every other module of the plugin builds on these.
 //!
-//! In: a scene in memory, a handle. Out: a [`GaussianCapture`] that entities share, and an entity that every `Camera3d` that sees it
-//! draws once the asset is loaded. The other components of such an entity (loading state, playback, settings) are registered as
+//! In: a scene in memory, a handle. Out: a [`GaussianCapture`] that entities share, and an entity with a [`GaussianCapture3d`], which
+//! cameras draw once the asset is loaded. The other components of such an entity (loading state, playback, settings) are registered as
 //! required components by the plugins that own them.
 
 mod capture;
+mod capture_3d;
 mod key_frames;
 mod upright;
 
 pub use capture::GaussianCapture;
+pub use capture_3d::GaussianCapture3d;
 pub use key_frames::KeyFrames;
 pub use upright::Upright;
 pub(crate) use upright::stand_upright;
-
-use bevy::asset::{AssetId, Handle};
-use bevy::camera::visibility::{Visibility, VisibilityClass, add_visibility_class};
-use bevy::ecs::component::Component;
-use bevy::ecs::reflect::ReflectComponent;
-use bevy::reflect::Reflect;
-use bevy::reflect::std_traits::ReflectDefault;
-use bevy::transform::components::Transform;
-
-/// Places a capture in the world.
-///
-/// The entity's transform (translation, rotation, any scale) maps capture space to the world. Most captures have +z up: [`Upright`] stands
-/// them upright. A perspective camera draws nothing that is nearer than 0.2 units *of the capture*, as in training; an orthographic camera
-/// draws from its near plane on.
-///
-/// [`Visibility`], `RenderLayers` and frustum culling decide which cameras draw the capture, as they do for meshes. The entity's
-/// `Aabb` encloses what is drawn at the current time. A capture with an environment map surrounds every camera: it has no `Aabb`
-/// and is never culled.
-///
-/// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) also requires [`CaptureState`](crate::asset::CaptureState),
-/// [`Playback`](crate::playback::Playback) and [`CaptureSettings`](crate::render::CaptureSettings): they are inserted with their
-/// defaults unless they are spawned along.
-///
-/// Default: a handle of no asset, with which nothing is drawn. An entity that keeps it is told of in the log, once.
-///
-/// # Examples
-///
-/// ```
-/// use bevy::prelude::*;
-/// use bevy_gs4d::prelude::*;
-///
-/// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
-///     commands.spawn((GaussianCapture3d(assets.load("toybox.gs4d")), Upright, Transform::from_xyz(0.0, 0.0, -2.0)));
-/// }
-/// # bevy::ecs::system::assert_is_system(setup);
-/// ```
-#[derive(Component, Reflect, Debug, Default, Clone, PartialEq, Eq)]
-#[reflect(Component, Default, Debug, Clone, PartialEq)]
-#[require(Transform, Visibility, VisibilityClass)]
-#[component(on_add = add_visibility_class::<GaussianCapture3d>)]
-pub struct GaussianCapture3d(pub Handle<GaussianCapture>);
-
-impl From<Handle<GaussianCapture>> for GaussianCapture3d {
-    fn from(handle: Handle<GaussianCapture>) -> Self {
-        Self(handle)
-    }
-}
-
-impl From<&GaussianCapture3d> for AssetId<GaussianCapture> {
-    fn from(capture: &GaussianCapture3d) -> Self {
-        capture.0.id()
-    }
-}

@@ -3,8 +3,8 @@
 //! In: an entity with [`Upright`], the up direction of its capture. Out: the same entity with its transform turned, once the capture is
 //! loaded.
 
-use super::GaussianCapture3d;
 use super::capture::GaussianCapture;
+use super::capture_3d::GaussianCapture3d;
 use bevy::asset::Assets;
 use bevy::ecs::component::Component;
 use bevy::ecs::query::With;
@@ -15,14 +15,14 @@ use bevy::reflect::std_traits::ReflectDefault;
 use bevy::transform::components::Transform;
 use glam::Quat;
 
-/// Stands a capture upright, whichever axis its dataset has as up: beside a [`GaussianCapture3d`].
+/// Stands a capture upright, whichever axis its dataset has as up. Add it to an entity with a [`GaussianCapture3d`].
 ///
-/// When the capture has been loaded, the entity's [`Transform`] is turned by [`GaussianCapture::upright`], once, before anything is drawn:
-/// `rotation` becomes the rotation that the game has set, multiplied by that. What the game sets turns the capture that already stands, so that
-/// `Transform::from_rotation(Quat::from_rotation_y(..))` turns it about the vertical. When the entity is given another capture, or its file
-/// changes, only the difference between their up directions is applied.
+/// When the capture has been loaded, and before it is first drawn, the entity's [`Transform`] is turned once by
+/// [`GaussianCapture::upright`]: `rotation` becomes the rotation set by the game, multiplied by `upright`. The game's rotation therefore
+/// acts on the upright capture: `Transform::from_rotation(Quat::from_rotation_y(..))` turns it about the vertical. When the entity's handle
+/// or the capture's file changes, only the difference between the old and the new up direction is applied.
 ///
-/// Rendering, picking, bounds and children see an ordinary transform. A game that sets `rotation` again later replaces all of it: turn the
+/// Rendering, picking, bounds and children use the transform as usual. A game that sets `rotation` again later replaces all of it: turn the
 /// entity by `rotate`, or turn a parent.
 ///
 /// # Examples
@@ -47,7 +47,7 @@ pub struct Upright;
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 pub(crate) struct Turned(Quat);
 
-/// Turns what has been loaded, or has another capture than before.
+/// Turns each entity whose capture has been loaded, or whose capture has another up direction than before.
 pub(crate) fn stand_upright(
     captures: Res<Assets<GaussianCapture>>,
     mut placed: Query<(&GaussianCapture3d, &mut Transform, &mut Turned), With<Upright>>,

@@ -1,6 +1,6 @@
-//! Appearance: how one capture is drawn.
+//! The section "appearance": the settings with which one capture is drawn.
 //!
-//! In: its [`CaptureSettings`] and its bounds. Out: the settings as edited.
+//! In: the capture's [`CaptureSettings`] and bounds. Out: the edited settings.
 
 use crate::plugin::render::{CaptureSettings, CropBox};
 use crate::scene::{Bounds, MAX_LEVELS};
@@ -9,7 +9,7 @@ use bevy_egui::egui;
 use egui::{DragValue, Slider, SliderClamping};
 use glam::{Quat, Vec3};
 
-/// Draws the section. `bounds`, in capture space, is the size of a new crop box.
+/// Draws the section. `bounds`, in capture space, gives the size of a new crop box.
 pub(super) fn show(ui: &mut egui::Ui, settings: CaptureSettings, bounds: Option<Bounds>) -> CaptureSettings {
     let mut edited = settings;
     ui.checkbox(&mut edited.filter, "temporal filter");
@@ -19,7 +19,7 @@ pub(super) fn show(ui: &mut egui::Ui, settings: CaptureSettings, bounds: Option<
     ui.add(exposure.max_decimals(2).suffix(" stops").text("exposure"));
     ui.horizontal(|ui| {
         let mut rgb = [edited.tint.red, edited.tint.green, edited.tint.blue];
-        // The colour picker rounds even colours that are not edited.
+        // The color picker also rounds colors that are not edited.
         if ui.color_edit_button_rgb(&mut rgb).changed() {
             let [red, green, blue] = rgb;
             edited.tint = LinearRgba { red, green, blue, ..edited.tint };
@@ -38,19 +38,19 @@ pub(super) fn show(ui: &mut egui::Ui, settings: CaptureSettings, bounds: Option<
         edited.crop = cropped.then(|| crop_around(bounds));
     }
     if let Some(crop) = &mut edited.crop {
-        axes(ui, "centre", &mut crop.center, f32::NEG_INFINITY);
+        axes(ui, "center", &mut crop.center, f32::NEG_INFINITY);
         axes(ui, "half size", &mut crop.half_size, 0.0);
     }
     edited
 }
 
-/// Returns the box about the whole capture.
+/// Returns the box that encloses the whole capture.
 fn crop_around(bounds: Option<Bounds>) -> CropBox {
     let (center, half_size) = bounds.map_or((Vec3::ZERO, Vec3::ONE), |b| (b.center(), (b.max - b.min) * 0.5));
     CropBox { center, half_size, rotation: Quat::IDENTITY }
 }
 
-/// Draws three values that can be dragged, none below `least`.
+/// Draws three drag values with the lower limit `least`.
 fn axes(ui: &mut egui::Ui, name: &str, vector: &mut Vec3, least: f32) {
     ui.horizontal(|ui| {
         for value in [&mut vector.x, &mut vector.y, &mut vector.z] {
@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_that_are_not_edited_stay_as_they_are() {
+    fn drawing_the_section_changes_no_setting() {
         let crop = CropBox { center: Vec3::splat(0.123_45), half_size: Vec3::splat(-1.0), rotation: Quat::IDENTITY };
         let odd = CaptureSettings {
             filter: false,
@@ -83,15 +83,23 @@ mod tests {
                 let mut edited = settings;
                 let output = context.run_ui(egui::RawInput::default(), |ui| edited = show(ui, edited, None));
                 output.drop_without_applying_deltas();
-                assert_eq!(edited, settings, "drawing the section is no edit");
+                assert_eq!(edited, settings, "drawing the section changes no setting");
             }
         }
     }
 
     #[test]
-    fn a_new_crop_box_holds_the_whole_capture() {
+    fn a_new_crop_box_encloses_the_whole_capture() {
         let crop = crop_around(Some(Bounds { min: Vec3::new(-1.0, 0.0, 2.0), max: Vec3::new(3.0, 1.0, 4.0) }));
-        assert_eq!(crop.center - crop.half_size, Vec3::new(-1.0, 0.0, 2.0), "its smallest corner");
-        assert_eq!(crop.center + crop.half_size, Vec3::new(3.0, 1.0, 4.0), "its largest corner");
+        assert_eq!(
+            crop.center - crop.half_size,
+            Vec3::new(-1.0, 0.0, 2.0),
+            "the smallest corner of the crop box is that of the bounds"
+        );
+        assert_eq!(
+            crop.center + crop.half_size,
+            Vec3::new(3.0, 1.0, 4.0),
+            "the largest corner of the crop box is that of the bounds"
+        );
     }
 }

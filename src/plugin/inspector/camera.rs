@@ -1,6 +1,6 @@
-//! View: how one camera draws captures.
+//! The section "view": the settings with which one camera draws captures.
 //!
-//! In: a camera's [`CaptureViewSettings`], multisampling and tonemapping. Out: these as edited.
+//! In: a camera's [`CaptureViewSettings`], multisampling and tonemapping. Out: the edited values.
 
 use super::listed::Listed;
 use crate::plugin::render::CaptureViewSettings;
@@ -18,7 +18,7 @@ pub(super) fn show(ui: &mut egui::Ui, settings: CaptureViewSettings) -> CaptureV
     edited
 }
 
-/// Draws whether meshes are multisampled.
+/// Draws the check box for multisampling.
 pub(super) fn show_msaa(ui: &mut egui::Ui, msaa: Msaa) -> Msaa {
     let mut on = msaa != Msaa::Off;
     let touched = ui.checkbox(&mut on, "multisampling").changed();
@@ -36,7 +36,7 @@ pub(super) fn show_tonemapping(ui: &mut egui::Ui, tonemapping: Tonemapping) -> T
     edited
 }
 
-/// Draws a list of the values of an enum, of which one is chosen.
+/// Draws a drop-down list of the values of an enum.
 fn choice<T: Listed>(ui: &mut egui::Ui, label: &str, value: &mut T) {
     egui::ComboBox::from_label(label).selected_text(value.name()).show_ui(ui, |ui| {
         for &option in T::ALL {

@@ -1,6 +1,6 @@
 //! The enums whose values the panel lists.
 //!
-//! In: the modes of playing and drawing. Out: all values of each, in the order of the list, and their names.
+//! In: the enums of playback and drawing. Out: all values of each enum, in the order of its list, and their names.
 
 use crate::plugin::playback::Repeat;
 use crate::plugin::render::DepthWrite;
@@ -35,7 +35,7 @@ impl Listed for DebugView {
 
     fn name(self) -> &'static str {
         match self {
-            Self::Color => "colour",
+            Self::Color => "color",
             Self::Depth => "depth",
             Self::Overdraw => "overdraw",
             Self::Active => "active",
@@ -115,7 +115,7 @@ mod tests {
     use bevy::reflect::{TypeInfo, Typed};
     use std::collections::HashSet;
 
-    /// Returns whether a list has every value of its enum, each with a name of its own.
+    /// Returns whether a list has every value of its enum and each value has a unique name.
     fn is_complete<T: Listed + Typed>() -> bool {
         let TypeInfo::Enum(known) = T::type_info() else { return false };
         let names: HashSet<&str> = T::ALL.iter().map(|value| value.name()).collect();
@@ -124,10 +124,10 @@ mod tests {
 
     #[test]
     fn every_value_is_listed() {
-        assert!(is_complete::<Repeat>(), "modes of playing");
-        assert!(is_complete::<DebugView>(), "debug views");
-        assert!(is_complete::<BlendSpace>(), "blend spaces");
-        assert!(is_complete::<DepthWrite>(), "written depths");
-        assert!(is_complete::<Tonemapping>(), "tonemapping");
+        assert!(is_complete::<Repeat>(), "every repeat mode is listed");
+        assert!(is_complete::<DebugView>(), "every debug view is listed");
+        assert!(is_complete::<BlendSpace>(), "every blend space is listed");
+        assert!(is_complete::<DepthWrite>(), "every mode of writing depth is listed");
+        assert!(is_complete::<Tonemapping>(), "every tonemapping is listed");
     }
 }

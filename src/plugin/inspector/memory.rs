@@ -1,4 +1,4 @@
-//! Memory: the bytes of captures and of a view on the GPU.
+//! The section "memory": the bytes of captures and of a view on the GPU.
 //!
 //! In: [`CaptureStatistics`] and the statistics of a view. Out: lines of text.
 
@@ -7,7 +7,7 @@ use crate::plugin::render::CaptureStatistics;
 use crate::renderer::ViewStatistics;
 use bevy_egui::egui;
 
-/// Draws the section. `view` is the camera that is shown, once it has drawn something.
+/// Draws the section. `view` has the statistics of the shown camera, `None` before it has drawn a capture.
 pub(super) fn show(ui: &mut egui::Ui, statistics: &CaptureStatistics, view: Option<&ViewStatistics>) {
     let (captures, scenes) = (statistics.uploaded_captures(), statistics.capture_bytes());
     ui.label(format!("captures: {} in {captures}", presentation::bytes(scenes)));

@@ -13,16 +13,16 @@
 //!
 //! | section | shows and sets |
 //! |---|---|
-//! | warnings | captures that failed to load, that no camera sees or that have times without active Gaussians; cameras that cannot draw them |
-//! | capture | which capture is shown, and its state of loading, with the reason if that failed |
-//! | playback | play and pause, steps of a frame, the time under the marks of the key-frames, speed, repeat, range |
+//! | warnings | captures that failed to load, that no camera sees or that have times without active Gaussians; cameras that cannot draw captures |
+//! | capture | the selected capture and its loading state, with the reason of a failure |
+//! | playback | play and pause, steps of one frame, the time below the marks of the key-frames, speed, repeat, range |
 //! | appearance | the capture's temporal filter, opacity, tint, exposure and crop box |
 //! | view | the camera's debug view, blend space, written depth, multisampling and tonemapping |
 //! | counts | Gaussians in total, active and visible, pairs, and the frame rate |
 //! | memory | bytes of captures and of this view on the GPU |
 //! | GPU time | milliseconds of each pass, measured only while the section is open |
 //!
-//! Values that are not edited stay as they are: an open panel marks no component as changed and does not seek.
+//! An open panel in which no value is edited marks no component as changed and does not seek.
 
 mod appearance;
 mod camera;

@@ -1,6 +1,6 @@
-//! Playback: when a capture is shown.
+//! The section "playback": the time of one capture.
 //!
-//! In: its [`Playback`], its duration and key-frames. Out: the playback as edited.
+//! In: the capture's [`Playback`], duration and key-frames. Out: the edited playback.
 
 use super::listed::Listed;
 use super::presentation::mark_positions;
@@ -10,12 +10,12 @@ use bevy_egui::egui;
 use egui::{DragValue, Slider, SliderClamping};
 use std::ops::RangeInclusive;
 
-/// Width of the number beside a slider, points.
+/// Width of the number next to a slider, points.
 const NUMBER_WIDTH: f32 = 76.0;
 /// Height of the strip of key-frame marks, points.
 const STRIP_HEIGHT: f32 = 10.0;
 
-/// Draws the section. `fps` is the frame rate of steps, in frames per second.
+/// Draws the section. `fps` is the frame rate of the step buttons, in frames per second.
 pub(super) fn show(ui: &mut egui::Ui, playback: Playback, capture: &GaussianCapture, fps: &mut f32) -> Playback {
     let mut edited = playback;
     let duration = capture.duration_seconds();
@@ -41,15 +41,16 @@ fn buttons(ui: &mut egui::Ui, playback: &mut Playback, duration: f32, fps: &mut 
         if ui.button("back").on_hover_text("one frame back").clicked() {
             playback.step(-1, *fps, duration);
         }
-        if ui.button("on").on_hover_text("one frame on").clicked() {
+        if ui.button("on").on_hover_text("one frame forward").clicked() {
             playback.step(1, *fps, duration);
         }
         let rate = DragValue::new(fps).range(1.0..=240.0).clamp_existing_to_range(false);
-        ui.add(rate.speed(0.25).max_decimals(2).suffix(" fps")).on_hover_text("frames a second that steps go by");
+        ui.add(rate.speed(0.25).max_decimals(2).suffix(" fps"))
+            .on_hover_text("frame rate of the steps, in frames per second");
     });
 }
 
-/// Draws the time, under the marks of the key-frames.
+/// Draws the time slider below the marks of the key-frames.
 fn scrub(ui: &mut egui::Ui, playback: &mut Playback, capture: &GaussianCapture, duration: f32) {
     ui.scope(|ui| {
         ui.spacing_mut().slider_width = (ui.available_width() - NUMBER_WIDTH).max(40.0);
@@ -62,7 +63,7 @@ fn scrub(ui: &mut egui::Ui, playback: &mut Playback, capture: &GaussianCapture, 
     });
 }
 
-/// Draws the range that is played and the key-frames of the filter, over the slider's rail.
+/// Draws the played range and the filter's key-frames above the slider's rail.
 fn strip(ui: &mut egui::Ui, playback: &Playback, capture: &GaussianCapture, duration: f32) {
     let size = egui::vec2(ui.spacing().slider_width, STRIP_HEIGHT);
     let (bounds, response) = ui.allocate_exact_size(size, egui::Sense::hover());
@@ -128,7 +129,7 @@ fn seconds(value: &mut f32, range: RangeInclusive<f32>) -> DragValue<'_> {
     DragValue::new(value).range(range).clamp_existing_to_range(false).speed(0.01).max_decimals(3).suffix(" s")
 }
 
-/// Returns an end of the range, in seconds: clamped to the capture; `own`, the capture's own end, if it is NaN.
+/// Returns one end of the range in seconds, clamped to the capture. NaN becomes `own`, the capture's own end.
 fn within(seconds: f32, own: f32, duration: f32) -> f32 {
     if seconds.is_nan() { own } else { seconds.clamp(0.0, duration) }
 }
@@ -160,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn values_that_are_not_edited_stay_as_they_are() {
+    fn drawing_the_section_changes_no_playback() {
         let odd = Playback { time: 0.123_45, speed: 7.123_4, start: 0.1, end: 1.234_5, ..Playback::default() };
         let outside = Playback { time: 9.0, start: -1.0, end: 5.0, ..Playback::default() };
         let inverted = Playback { time: -3.0, start: 1.5, end: 0.5, ..Playback::default() };
@@ -169,7 +170,7 @@ mod tests {
             for duration in [2.0, 0.0] {
                 for _ in 0..3 {
                     let edited = pass(&context, Vec::new(), playback, &capture(duration));
-                    assert_eq!(edited, playback, "drawing the section is no edit of {duration} s");
+                    assert_eq!(edited, playback, "drawing the section of a capture of {duration} s changes nothing");
                 }
             }
         }
@@ -191,15 +192,15 @@ mod tests {
             assert_eq!(
                 playback,
                 Playback { playing, ..Playback::default() },
-                "a click turns playing round and no more"
+                "a click toggles playing and changes no other field"
             );
         }
     }
 
     #[test]
-    fn the_ends_of_the_range_are_shown_where_they_count() {
-        assert_eq!(within(f32::INFINITY, 2.0, 2.0), 2.0, "beyond the end is the end");
-        assert_eq!(within(-1.0, 0.0, 2.0), 0.0, "before the start is the start");
-        assert_eq!(within(f32::NAN, 2.0, 2.0), 2.0, "no number is the capture's own end");
+    fn the_shown_ends_of_the_range_are_clamped_to_the_capture() {
+        assert_eq!(within(f32::INFINITY, 2.0, 2.0), 2.0, "an infinite end is the capture's end");
+        assert_eq!(within(-1.0, 0.0, 2.0), 0.0, "a negative start is the capture's start");
+        assert_eq!(within(f32::NAN, 2.0, 2.0), 2.0, "NaN is the capture's own end");
     }
 }

@@ -1,7 +1,7 @@
-//! The plugin and the panel itself.
+//! The plugin and the panel.
 //!
-//! In: captures, cameras, [`CaptureStatistics`]. Out: the panel, and its warnings, open or not. Only values that are edited in it are
-//! written back.
+//! In: captures, cameras, [`CaptureStatistics`]. Out: the panel, and its warnings, also while the panel is closed. Only edited values are
+//! written to components.
 
 use super::entity_selector::{self, Choice};
 use super::presentation::smoothed;
@@ -37,11 +37,11 @@ use bevy_egui::{
 use std::any::TypeId;
 use std::collections::HashSet;
 
-/// Draws the panel that [the module](crate::inspector) describes at the right edge of the first camera's picture. It is open at first; F1
-/// closes and opens it.
+/// Draws the panel that [the module](crate::inspector) describes at the right edge of the first camera's picture. The panel is initially
+/// open; F1 closes and opens it.
 ///
-/// Add it after `DefaultPlugins` and [`GaussianCapturePlugin`](crate::GaussianCapturePlugin). It adds `EguiPlugin` unless that has
-/// been added before. It works without a window, too. When the panel's camera is despawned, another one draws the panel, unless
+/// Add it after `DefaultPlugins` and [`GaussianCapturePlugin`](crate::GaussianCapturePlugin). It adds `EguiPlugin` unless the app already
+/// has it. It also works without a window. When the panel's camera is despawned, another camera draws the panel, unless
 /// [`EguiGlobalSettings::auto_create_primary_context`] is off.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct InspectorPlugin;
@@ -56,13 +56,13 @@ impl Plugin for InspectorPlugin {
                 PreUpdate,
                 move_context
                     .in_set(EguiPreUpdateSet::InitContexts)
-                    // After bevy_egui has created its context, or there would be two.
+                    // After bevy_egui has created its context: otherwise the app would have two.
                     .after(setup_primary_egui_context_system)
                     .before(WindowToEguiContextMap::on_egui_context_added_system),
             )
             .add_systems(Update, toggle.run_if(not(egui_wants_any_keyboard_input)))
             .add_systems(EguiPrimaryContextPass, show_panel)
-            // Cameras have found what they see.
+            // In `Last`, the visible entities of cameras are known.
             .add_systems(Last, update_warnings);
     }
 }
@@ -73,8 +73,8 @@ fn toggle(keys: Res<ButtonInput<KeyCode>>, mut inspector: ResMut<Inspector>) {
     }
 }
 
-/// Moves the panel to another camera when its own has been despawned, which `bevy_egui` does not do: preferably to one that draws into a
-/// window.
+/// Moves the panel to another camera when its own camera has been despawned, which `bevy_egui` does not do. Prefers a camera that draws
+/// into a window.
 fn move_context(
     settings: Res<EguiGlobalSettings>,
     contexts: Query<(), With<PrimaryEguiContext>>,
@@ -113,7 +113,7 @@ fn show_panel(
         let mut open = true;
         egui::Window::new("inspector")
             .open(&mut open)
-            // Fading would stop while time stands still.
+            // Fading would stop while no time passes.
             .fade_in(false)
             .fixed_size([WIDTH, height])
             .anchor(egui::Align2::RIGHT_TOP, [-MARGIN, MARGIN])
@@ -134,7 +134,7 @@ fn show_panel(
     inspector.set_if_neq(edited);
 }
 
-/// Keeps the warnings up to date, whether a camera draws the panel or not.
+/// Updates the warnings, also while no camera draws the panel.
 fn update_warnings(subject: Subject, mut inspector: ResMut<Inspector>, mut idle: Local<IdleTimes>) {
     let warnings = subject.warnings(&mut idle);
     if inspector.warnings != warnings {
@@ -159,7 +159,7 @@ type CameraParts = (
     Option<&'static mut Tonemapping>,
 );
 
-/// What a camera sees, and how.
+/// A camera's visible entities and compositing space.
 type Sight = (&'static Camera, &'static VisibleEntities, Option<&'static CompositingSpace>);
 
 /// The captures and cameras that the panel shows.
@@ -201,7 +201,7 @@ impl Subject<'_, '_> {
         });
     }
 
-    /// Draws the sections of one camera. Returns whether GPU time is to be measured.
+    /// Draws the sections of one camera. Returns whether the section "GPU time" is open, which needs measurements.
     fn show_camera(
         &mut self,
         ui: &mut egui::Ui,
@@ -251,7 +251,7 @@ impl Subject<'_, '_> {
         }
     }
 
-    /// Returns what is wrong with captures and active cameras.
+    /// Returns the warnings about captures and active cameras.
     fn warnings(&self, idle: &mut IdleTimes) -> Vec<String> {
         for (_, _, handle, ..) in self.captures.iter() {
             if let Some(capture) = self.loaded.get(&handle.0) {
@@ -299,13 +299,13 @@ impl Subject<'_, '_> {
     }
 }
 
-/// Sorts by entity: the order of queries changes whenever an entity gets another component.
+/// Sorts choices by entity: the order of a query changes whenever a component is inserted.
 fn in_order(mut choices: Vec<Choice>) -> Vec<Choice> {
     choices.sort_by_key(|choice| choice.entity);
     choices
 }
 
-/// Draws a section that can be folded, and returns whether it is open.
+/// Draws a collapsible section, and returns whether it is open.
 fn section(ui: &mut egui::Ui, title: &str, open: bool, contents: impl FnOnce(&mut egui::Ui)) -> bool {
     egui::CollapsingHeader::new(title).default_open(open).show(ui, contents).body_returned.is_some()
 }
@@ -331,10 +331,10 @@ mod tests {
             app.world().resource::<Inspector>().open
         };
         assert!(!press(&mut app, KeyCode::F1), "F1 closes the panel");
-        assert!(press(&mut app, KeyCode::F1), "and opens it");
+        assert!(press(&mut app, KeyCode::F1), "F1 opens the closed panel");
         app.world_mut().resource_mut::<Inspector>().key = KeyCode::KeyI;
-        assert!(press(&mut app, KeyCode::F1), "another key was set");
-        assert!(!press(&mut app, KeyCode::KeyI), "which closes it");
+        assert!(press(&mut app, KeyCode::F1), "F1 has no effect after another key was set");
+        assert!(!press(&mut app, KeyCode::KeyI), "the new key closes the panel");
     }
 
     #[test]
@@ -349,8 +349,8 @@ mod tests {
         app.world_mut().spawn((GaussianCapture3d(handle), CaptureSettings::default()));
         app.update();
         app.update();
-        let said = &app.world().resource::<Inspector>().warnings;
-        let is_told = matches!(&said[..], [said] if said.contains("there is no active Camera3d"));
-        assert!(is_told, "nobody draws the capture, nor the panel: {said:?}");
+        let warnings = &app.world().resource::<Inspector>().warnings;
+        let is_reported = matches!(&warnings[..], [one] if one.contains("there is no active Camera3d"));
+        assert!(is_reported, "the missing camera is reported: {warnings:?}");
     }
 }

@@ -1,6 +1,6 @@
-//! Numbers as the panel presents them.
+//! Formatting of the panel's numbers.
 //!
-//! In: counts, bytes, times. Out: text for people, shares for bars, positions for marks.
+//! In: counts, bytes, times. Out: text, fractions for bars, positions for marks.
 
 /// Formats a count in groups of three digits: `1,234,567`.
 pub(super) fn count(number: u64) -> String {
@@ -15,7 +15,7 @@ pub(super) fn count(number: u64) -> String {
     text
 }
 
-/// Formats bytes in the largest unit that leaves at least one: `512 B`, `1.5 MiB`.
+/// Formats bytes in the largest unit in which the value is at least 1: `512 B`, `1.5 MiB`.
 pub(super) fn bytes(number: u64) -> String {
     const UNITS: [&str; 5] = ["KiB", "MiB", "GiB", "TiB", "PiB"];
     if number < 1024 {
@@ -31,8 +31,8 @@ pub(super) fn bytes(number: u64) -> String {
     format!("{value:.1} {}", UNITS[unit])
 }
 
-/// Returns the share of a part in a whole, from 0 to 1; 0 if the whole is 0.
-pub(super) fn share(part: f64, whole: f64) -> f32 {
+/// Returns the quotient of a part and a whole, clamped to 0 to 1; 0 if the whole is 0.
+pub(super) fn fraction(part: f64, whole: f64) -> f32 {
     if whole > 0.0 { (part / whole).clamp(0.0, 1.0) as f32 } else { 0.0 }
 }
 
@@ -45,19 +45,19 @@ pub(super) fn frame_rate(seconds: f32) -> String {
     }
 }
 
-/// Returns the mean of about the last twenty values, given the `mean` before and the newest value. A `mean` of 0 means
-/// that there is none yet.
+/// Returns the mean of about the last twenty values, from the previous `mean` and the newest value. A previous `mean` of 0 means that
+/// there is no value yet.
 pub(super) fn smoothed(mean: f32, value: f32) -> f32 {
     if mean > 0.0 { mean + (value - mean) * 0.05 } else { value }
 }
 
-/// Returns the positions between `left` and `right` of marks at rising `times` of `duration` seconds. Of marks that
-/// would touch, only the first is kept.
+/// Returns the positions between `left` and `right` of marks at ascending `times` in a duration of `duration` seconds. Of marks closer
+/// than two points, only the first is kept.
 pub(super) fn mark_positions(times: impl Iterator<Item = f32>, duration: f32, left: f32, right: f32) -> Vec<f32> {
     const APART: f32 = 2.0;
     let mut positions: Vec<f32> = Vec::new();
     for time in times {
-        let position = left + (right - left) * share(time.into(), duration.into());
+        let position = left + (right - left) * fraction(time.into(), duration.into());
         if positions.last().is_none_or(|last| position - last >= APART) {
             positions.push(position);
         }
@@ -70,14 +70,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_are_grouped_from_the_right() {
+    fn counts_are_grouped_in_three_digits() {
         for (number, text) in [(0, "0"), (999, "999"), (1000, "1,000"), (12_345, "12,345"), (1_234_567, "1,234,567")] {
-            assert_eq!(count(number), text, "{number} in groups");
+            assert_eq!(count(number), text, "{number} is grouped from the right");
         }
     }
 
     #[test]
-    fn bytes_take_the_largest_unit_that_fits() {
+    fn bytes_use_the_largest_unit_with_a_value_of_at_least_one() {
         let cases = [
             (0, "0 B"),
             (1023, "1023 B"),
@@ -88,33 +88,33 @@ mod tests {
             (u64::MAX, "16384.0 PiB"),
         ];
         for (number, text) in cases {
-            assert_eq!(bytes(number), text, "{number} bytes");
+            assert_eq!(bytes(number), text, "{number} bytes are formatted");
         }
     }
 
     #[test]
-    fn shares_of_nothing_are_nothing() {
-        assert_eq!(share(1.0, 4.0), 0.25, "a quarter");
-        assert_eq!(share(5.0, 4.0), 1.0, "never more than all");
-        assert_eq!(share(0.0, 0.0), 0.0, "of nothing, nothing");
-        assert_eq!(share(f64::NAN, 0.0), 0.0, "whatever the part is");
+    fn fractions_are_clamped_and_zero_for_an_empty_whole() {
+        assert_eq!(fraction(1.0, 4.0), 0.25, "1 of 4 is a quarter");
+        assert_eq!(fraction(5.0, 4.0), 1.0, "a fraction is at most 1");
+        assert_eq!(fraction(0.0, 0.0), 0.0, "a fraction of 0 is 0");
+        assert_eq!(fraction(f64::NAN, 0.0), 0.0, "a NaN part of 0 is 0");
     }
 
     #[test]
-    fn the_frame_rate_settles_on_what_frames_take() {
+    fn the_smoothed_frame_time_converges_to_a_constant_frame_time() {
         let mean = (0..200).fold(0.0, |mean, _| smoothed(mean, 0.02));
-        assert_eq!(frame_rate(mean), "50.0 frames/s, 20.0 ms", "the same frame time all along");
-        assert_eq!(frame_rate(0.0), "no time passes", "no rate without time");
+        assert_eq!(frame_rate(mean), "50.0 frames/s, 20.0 ms", "a constant frame time is its own mean");
+        assert_eq!(frame_rate(0.0), "no time passes", "a frame time of 0 has no rate");
     }
 
     #[test]
-    fn marks_lie_in_proportion_and_never_touch() {
+    fn marks_are_proportional_and_at_least_two_points_apart() {
         let times = [0.0, 0.5, 1.0, 2.0];
         let positions = mark_positions(times.into_iter(), 2.0, 10.0, 110.0);
-        assert_eq!(positions, [10.0, 35.0, 60.0, 110.0], "from end to end");
+        assert_eq!(positions, [10.0, 35.0, 60.0, 110.0], "positions are proportional to times");
         let crowded = mark_positions((0..=10_000).map(|index| index as f32 * 1e-4), 1.0, 0.0, 100.0);
-        assert!(crowded.len() <= 51, "{} marks on 100 points would touch", crowded.len());
-        assert!(crowded.windows(2).all(|pair| pair[1] - pair[0] >= 2.0), "each stands by itself");
-        assert_eq!(mark_positions([0.0].into_iter(), 0.0, 5.0, 9.0), [5.0], "a still has its one moment at the start");
+        assert!(crowded.len() <= 51, "at most 51 marks fit on 100 points, not {}", crowded.len());
+        assert!(crowded.windows(2).all(|pair| pair[1] - pair[0] >= 2.0), "marks are at least two points apart");
+        assert_eq!(mark_positions([0.0].into_iter(), 0.0, 5.0, 9.0), [5.0], "the mark of a still is at the left end");
     }
 }

@@ -1,6 +1,6 @@
 //! The settings of the panel.
 //!
-//! In: fields that any system may set. Out: [`Inspector`], a resource that the panel reads, and writes when it is used.
+//! In: fields that any system may set. Out: [`Inspector`], a resource that the panel reads and, on input, writes.
 
 use bevy::ecs::entity::Entity;
 use bevy::ecs::resource::Resource;
@@ -23,19 +23,20 @@ use bevy::input::keyboard::KeyCode;
 /// ```
 #[derive(Resource, Debug, Clone, PartialEq)]
 pub struct Inspector {
-    /// Whether the panel is drawn. Of a closed panel only the warnings are kept up to date. Default: true.
+    /// Whether the panel is drawn. While it is closed, only [`warnings`](Self::warnings) are updated. Default: true.
     pub open: bool,
-    /// The key that closes and opens it. Default: F1.
+    /// The key that closes and opens the panel. Default: F1.
     pub key: KeyCode,
-    /// The entity whose capture is shown. While it is `None`, or without a capture, the first capture is shown. Default: `None`.
+    /// The entity whose capture is shown. If `None`, or if the entity has no capture, the first capture is shown. Default: `None`.
     pub selected: Option<Entity>,
-    /// The camera whose view is shown. While it is `None`, or not a `Camera3d`, the first camera is shown. Default: `None`.
+    /// The camera whose view is shown. If `None`, or if the entity is not a `Camera3d`, the first camera is shown. Default: `None`.
     pub camera: Option<Entity>,
-    /// Frame rate of the buttons that step, in frames per second. Default: 30.
+    /// Frame rate of the step buttons, in frames per second. Default: 30.
     pub fps: f32,
-    /// A line of text at the end of the panel. Default: empty, which shows none.
+    /// A line of text at the end of the panel. Default: empty, which draws no line.
     pub note: String,
-    /// What the panel warns of, at its top: written at the end of each update in which it changes, open or not. Default: empty.
+    /// The warnings at the top of the panel. Written at the end of each update in which they change, also while the panel is closed.
+    /// Default: empty.
     pub warnings: Vec<String>,
 }
 

@@ -1,15 +1,15 @@
-//! GPU time: how long each pass takes.
+//! The section "GPU time": the time of each pass.
 //!
-//! In: whether the section is open, the passes that have been measured. Out: bars; and measuring switched on while the section is open,
-//! because it takes some time itself.
+//! In: whether the section is open, the measured passes. Out: bars. Measuring is on only while the section is open, because it takes time
+//! itself.
 
 use super::counts::bar;
-use super::presentation::share;
+use super::presentation::fraction;
 use crate::plugin::render::CaptureStatistics;
 use crate::renderer::PassTime;
 use bevy_egui::egui;
 
-/// Frames without a measurement after which the GPU is taken to have no timestamps.
+/// Number of frames without a measurement after which the panel reports that the GPU has no timestamps.
 const MOST_FRAMES_WAITED: u32 = 60;
 
 /// Whether the panel measures, and for how many frames without a result.
@@ -20,7 +20,7 @@ pub(super) struct Measuring {
 }
 
 impl Measuring {
-    /// Starts measuring when the section is opened, and stops when it is closed. What the game measures stays as it is.
+    /// Starts measuring when the section is opened, and stops when it is closed. Measurements that the game has started continue.
     pub(super) fn follow(&mut self, open: bool, statistics: &CaptureStatistics) {
         if self.on != open {
             *self = Self { on: open, waited: 0 };
@@ -29,7 +29,7 @@ impl Measuring {
     }
 }
 
-/// Draws the section for a view that draws captures.
+/// Draws the section of a view that draws captures.
 pub(super) fn show(ui: &mut egui::Ui, passes: &[PassTime], measuring: &mut Measuring) {
     if passes.is_empty() {
         measuring.waited = measuring.waited.saturating_add(1);
@@ -39,7 +39,7 @@ pub(super) fn show(ui: &mut egui::Ui, passes: &[PassTime], measuring: &mut Measu
     }
     let sum: f64 = passes.iter().map(|pass| pass.milliseconds).sum();
     for pass in passes {
-        bar(ui, share(pass.milliseconds, sum), format!("{}: {:.3} ms", pass.name, pass.milliseconds));
+        bar(ui, fraction(pass.milliseconds, sum), format!("{}: {:.3} ms", pass.name, pass.milliseconds));
     }
     ui.label(format!("sum: {sum:.3} ms"));
 }
@@ -49,18 +49,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_panel_does_not_switch_off_what_the_game_measures() {
+    fn closing_the_section_does_not_stop_measurements_of_the_game() {
         let (statistics, mut panel) = (CaptureStatistics::default(), Measuring::default());
         statistics.measure(true);
         for open in [true, false] {
             panel.follow(open, &statistics);
-            assert!(statistics.is_measuring(), "the game still measures, open: {open}");
+            assert!(statistics.is_measuring(), "the game's measurement continues, open: {open}");
         }
         statistics.measure(false);
-        assert!(!statistics.is_measuring(), "until it stops");
+        assert!(!statistics.is_measuring(), "measuring ends when the game stops it");
         for open in [true, false] {
             panel.follow(open, &statistics);
-            assert_eq!(statistics.is_measuring(), open, "then it is measured while the section is open");
+            assert_eq!(statistics.is_measuring(), open, "the panel measures only while the section is open");
         }
     }
 }

@@ -1,6 +1,6 @@
-//! Warnings: why less is seen than was meant.
+//! The section "warnings": reasons why captures are not visible.
 //!
-//! In: what is known of every capture and every camera. Out: a list of texts, each naming what it is about, and the remedy.
+//! In: the state of every capture and every camera. Out: a list of texts, each with the name of the capture or camera and the remedy.
 
 use crate::plugin::asset::CaptureState;
 use crate::plugin::component::GaussianCapture;
@@ -12,19 +12,19 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, Weak};
 
-/// A capture, as far as it can be the reason of a warning.
+/// The state of a capture that warnings depend on.
 pub(super) struct PlacedCapture<'a> {
     pub(super) label: String,
     pub(super) state: &'a CaptureState,
-    /// Whether its [`Visibility`](bevy::camera::visibility::Visibility) lets it show.
+    /// Whether its [`Visibility`](bevy::camera::visibility::Visibility) is on.
     pub(super) shows: bool,
-    /// Whether an active camera sees it.
+    /// Whether an active camera has the capture in view.
     pub(super) is_seen: bool,
-    /// The times at which its temporal filter, if it is used, leaves no Gaussian active, in seconds since its start.
+    /// The times at which the temporal filter, if it is on, leaves no Gaussian active, in seconds since the capture's start.
     pub(super) idle: &'a [Range<f32>],
 }
 
-/// A camera, likewise.
+/// The state of a camera that warnings depend on.
 pub(super) struct PlacedCamera {
     pub(super) label: String,
     pub(super) fault: Option<CameraFault>,
@@ -32,7 +32,7 @@ pub(super) struct PlacedCamera {
     pub(super) writes_depth: bool,
 }
 
-/// Returns the warnings about all captures and all active cameras, in their order.
+/// Returns the warnings about all captures, then about all active cameras, in the given order.
 pub(super) fn list(captures: &[PlacedCapture], cameras: &[PlacedCamera]) -> Vec<String> {
     let mut warnings = Vec::new();
     for capture in captures {
@@ -44,7 +44,7 @@ pub(super) fn list(captures: &[PlacedCapture], cameras: &[PlacedCamera]) -> Vec<
         }
         if *is_multisampled && *writes_depth {
             warnings.push(format!(
-                "{label}: with multisampling, the written depth of captures is the same for all samples of a pixel; switch one of the two off if this shows"
+                "{label}: with multisampling, the written depth of captures is the same for all samples of a pixel; switch one of the two off if this is visible"
             ));
         }
     }
@@ -61,15 +61,14 @@ fn about_capture(capture: &PlacedCapture, without_cameras: bool, warnings: &mut 
             if without_cameras {
                 warnings.push(format!("{label}: there is no active Camera3d"));
             } else if capture.shows && !capture.is_seen {
-                warnings.push(format!(
-                    "{label}: no camera sees it: it is outside their views, or on other render layers than they are"
-                ));
+                warnings
+                    .push(format!("{label}: no camera sees it: it is outside their views, or on other render layers"));
             }
             if let Some((first, more)) = capture.idle.split_first() {
                 let others = if more.is_empty() { "" } else { ", and at other times" };
                 warnings.push(format!(
-                    "{label}: no Gaussian is active from {:.2} s to {:.2} s{others}; switch its temporal filter off, or make it anew \
-                     with gs4d mask",
+                    "{label}: no Gaussian is active from {:.2} s to {:.2} s{others}; switch its temporal filter off, or create \
+                     the filter again with gs4d mask",
                     first.start, first.end
                 ));
             }
@@ -77,7 +76,7 @@ fn about_capture(capture: &PlacedCapture, without_cameras: bool, warnings: &mut 
     }
 }
 
-/// Draws the list; nothing if it is empty.
+/// Draws the list and a separator; draws nothing if the list is empty.
 pub(super) fn show(ui: &mut egui::Ui, warnings: &[String]) {
     for warning in warnings {
         ui.colored_label(ui.visuals().warn_fg_color, warning.as_str());
@@ -87,12 +86,12 @@ pub(super) fn show(ui: &mut egui::Ui, warnings: &[String]) {
     }
 }
 
-/// The times at which captures have no active Gaussians, found once for each scene.
+/// The times at which captures have no active Gaussians, computed once for each scene.
 #[derive(Default)]
 pub(super) struct IdleTimes(HashMap<AssetId<GaussianCapture>, (Weak<RuntimeScene>, Vec<Range<f32>>)>);
 
 impl IdleTimes {
-    /// Finds those of a capture, unless they are known.
+    /// Computes the times of a capture, unless they are known for its current scene.
     pub(super) fn find(&mut self, id: AssetId<GaussianCapture>, capture: &GaussianCapture) {
         let is_known = |(scene, _): &(Weak<RuntimeScene>, _)| std::ptr::eq(scene.as_ptr(), capture.scene());
         if !self.0.get(&id).is_some_and(is_known) {
@@ -101,13 +100,13 @@ impl IdleTimes {
         }
     }
 
-    /// Returns those that have been found.
+    /// Returns the times of a capture for which [`find`](Self::find) was called.
     pub(super) fn of(&self, id: AssetId<GaussianCapture>) -> &[Range<f32>] {
         self.0.get(&id).map(|(_, idle)| idle.as_slice()).unwrap_or_default()
     }
 }
 
-/// Returns the longest stretches of segments without an active Gaussian, in seconds since the start. A still has none.
+/// Returns the ranges of consecutive segments without an active Gaussian, in seconds since the start. A still has none.
 fn idle_times(capture: &GaussianCapture) -> Vec<Range<f32>> {
     let scene = capture.scene();
     let filter = scene.filter.as_ref().filter(|filter| filter.check(scene.len()).is_ok());
@@ -151,19 +150,23 @@ mod tests {
     }
 
     #[test]
-    fn of_what_is_right_there_is_nothing_to_say() {
+    fn valid_captures_and_cameras_have_no_warnings() {
         let loading = CaptureState::Loading;
         let captures = [seen(&READY), PlacedCapture { is_seen: false, ..seen(&loading) }];
-        assert_eq!(list(&captures, &[plain()]), [""; 0], "one that is seen, one that is still loading");
+        assert_eq!(list(&captures, &[plain()]), [""; 0], "a visible capture and a loading capture have no warning");
         let hidden = PlacedCapture { shows: false, is_seen: false, ..seen(&READY) };
-        assert_eq!(list(&[hidden], &[plain()]), [""; 0], "one that is hidden on purpose");
+        assert_eq!(list(&[hidden], &[plain()]), [""; 0], "a hidden capture has no warning");
         let multisampled = PlacedCamera { is_multisampled: true, ..plain() };
         let written = PlacedCamera { writes_depth: true, ..plain() };
-        assert_eq!(list(&[], &[multisampled, written]), [""; 0], "cameras with one of the two");
+        assert_eq!(
+            list(&[], &[multisampled, written]),
+            [""; 0],
+            "multisampling alone and written depth alone have no warning"
+        );
     }
 
     #[test]
-    fn everything_that_is_wrong_is_named() {
+    fn each_fault_has_one_warning() {
         let failed = CaptureState::Failed("broken.gs4d: copy it again".into());
         let idle = [0.5..1.0, 1.5..2.0];
         let captures = [
@@ -176,7 +179,7 @@ mod tests {
             PlacedCamera { fault: Some(CameraFault::Oklab), ..plain() },
             PlacedCamera { is_multisampled: true, writes_depth: true, ..plain() },
         ];
-        let said = list(&captures, &cameras);
+        let warnings = list(&captures, &cameras);
         let expected = [
             "broken.gs4d: copy it again",
             "dancer.gs4d: no camera sees it",
@@ -185,28 +188,28 @@ mod tests {
             "eye: captures are not drawn",
             "eye: with multisampling",
         ];
-        assert_eq!(said.len(), expected.len(), "one for each fault: {said:?}");
-        for (said, expected) in said.iter().zip(expected) {
-            assert!(said.starts_with(expected), "{said:?} begins with {expected:?}");
+        assert_eq!(warnings.len(), expected.len(), "each fault has one warning: {warnings:?}");
+        for (warning, expected) in warnings.iter().zip(expected) {
+            assert!(warning.starts_with(expected), "{warning:?} begins with {expected:?}");
         }
-        let lonely = list(&[PlacedCapture { is_seen: false, ..seen(&READY) }], &[]);
-        assert!(matches!(&lonely[..], [said] if said.contains("Camera3d")), "without a camera: {lonely:?}");
+        let alone = list(&[PlacedCapture { is_seen: false, ..seen(&READY) }], &[]);
+        assert!(matches!(&alone[..], [one] if one.contains("Camera3d")), "the missing camera is reported: {alone:?}");
     }
 
     #[test]
-    fn idle_times_are_found_once_and_again_for_another_scene() {
+    fn idle_times_are_computed_once_for_each_scene() {
         let id = AssetId::default();
         let mut idle = IdleTimes::default();
-        assert!(idle.of(id).is_empty(), "before anybody has looked");
+        assert!(idle.of(id).is_empty(), "no times are known before the first computation");
         let gaps = capture(&[1, 0, 0, 3, 0]);
         idle.find(id, &gaps);
-        let [first, last] = idle.of(id) else { panic!("two stretches, not {:?}", idle.of(id)) };
+        let [first, last] = idle.of(id) else { panic!("two ranges expected, not {:?}", idle.of(id)) };
         let apart = |range: &Range<f32>, from: f32, to: f32| (range.start - from).abs().max((range.end - to).abs());
-        assert!(apart(first, 0.4, 1.2) < 1e-6, "segments that touch are one stretch: {first:?}");
-        assert!(apart(last, 1.6, 2.0) < 1e-6, "up to the end: {last:?}");
+        assert!(apart(first, 0.4, 1.2) < 1e-6, "adjacent segments form one range: {first:?}");
+        assert!(apart(last, 1.6, 2.0) < 1e-6, "the last range ends with the capture: {last:?}");
         idle.find(id, &gaps);
-        assert_eq!(idle.of(id).len(), 2, "and so they stay");
+        assert_eq!(idle.of(id).len(), 2, "the times of a known scene do not change");
         idle.find(id, &capture(&[1, 1]));
-        assert!(idle.of(id).is_empty(), "the file has changed, and all is well");
+        assert!(idle.of(id).is_empty(), "the times of a changed scene are computed again");
     }
 }

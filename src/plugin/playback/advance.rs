@@ -1,30 +1,29 @@
 //! One step of a playback.
 //!
-//! In: a [`Playback`] with the changes of the game, its [`PlaybackState`], and a [`Drive`]. Out: the playback as it is
-//! drawn, and a [`Progress`]: what happened during the step.
+//! In: a [`Playback`] with the changes of the game, its [`PlaybackState`], and a [`Drive`]. Out: the playback after the step, whose time is
+//! drawn, and a [`Progress`] with the events of the step.
 
 use super::component::Playback;
 use super::drive::Drive;
 use super::span::{Span, Travel};
 use super::state::{Follow, PlaybackState};
 
-/// What happened in a step.
+/// The events of a step.
 #[derive(Debug, Default, Clone, PartialEq)]
 pub(super) struct Progress {
     pub(super) started: bool,
     pub(super) paused: bool,
-    /// The times before and after a jump because the game, or the clock that is followed, sought, in seconds; `None`
-    /// without one.
+    /// The times before and after a seek by the game or by the followed clock, in seconds; `None` without a seek.
     pub(super) seeked: Option<[f32; 2]>,
-    /// Whether this moment does not continue the one before: the first one, and seeks.
+    /// Whether the time does not continue from the step before: in the first step, and after seeks.
     pub(super) jumped: bool,
     pub(super) travel: Option<Travel>,
     pub(super) ended: bool,
 }
 
 impl PlaybackState {
-    /// Advances a playback of a capture that lasts `duration` seconds by one step. Returns the playback after it, and
-    /// what happened.
+    /// Advances a playback of a capture that lasts `duration` seconds by one step. Returns the playback after the step, and the events of
+    /// the step.
     pub(super) fn advance(&mut self, mut now: Playback, drive: Drive, duration: f32) -> (Playback, Progress) {
         let span = now.span(duration);
         let was_at_end = self.is_at_end_of_loop();
@@ -46,7 +45,7 @@ impl PlaybackState {
             self.follow = None;
         }
         (self.time, self.returning, self.playing) = (now.time, now.returning, now.playing);
-        // Starting over is a jump: followers do not play backwards to the start.
+        // A wrap counts as a jump, so that followers do not play backwards to the start.
         let wrapped = progress.travel.is_some_and(|travel| travel.wraps() || was_at_end && travel.is_forward());
         if progress.jumped || wrapped {
             self.jumps = self.jumps.wrapping_add(1);
@@ -54,15 +53,15 @@ impl PlaybackState {
         (now, progress)
     }
 
-    /// Compares the playback with its state after the last step: the game has set whatever differs.
+    /// Compares the playback with its state after the last step: different fields have been set by the game.
     fn notice(&mut self, now: &mut Playback, span: &Span, drive: Drive) -> Progress {
         now.time = span.clamped(now.time);
         let following = matches!(drive, Drive::Follow { .. });
         let first = self.span.is_none();
-        // A range that has changed may move the time, which is no seek.
+        // A changed range may move the time; this is not a seek.
         let turned = span.repeat().turns_round() && now.returning != self.returning;
         let moved = now.time != span.clamped(self.time) || turned;
-        // A clock that is followed sets the time; setting it otherwise is not a seek.
+        // A follower takes its time from the clock; a time set by the game is not a seek.
         let seeked = !first && moved && !(following && now.playing);
         if self.span != Some(*span) {
             self.follow = None;
@@ -70,7 +69,7 @@ impl PlaybackState {
             self.phase = span.phase(now.time, now.returning);
         }
         let started = now.playing && !self.playing;
-        // Played at the end, it starts over, unless the clock says where it is.
+        // A playback that is started at its end restarts, unless it follows a clock.
         let is_over = span.is_over(span.phase(now.time, now.returning), now.speed > 0.0);
         let restarts = started && is_over && now.speed != 0.0 && !span.is_still() && matches!(drive, Drive::By(_));
         if restarts {
@@ -90,7 +89,7 @@ impl PlaybackState {
         }
     }
 
-    /// Plays `delta` seconds of the game's time.
+    /// Advances by `delta` seconds of the game's time.
     fn run(&mut self, now: &mut Playback, span: &Span, delta: f64, progress: &mut Progress) {
         let to = self.phase + delta * f64::from(now.speed);
         if !to.is_finite() || to == self.phase {
@@ -104,7 +103,7 @@ impl PlaybackState {
         progress.travel = Some(travel);
     }
 
-    /// Plays, or jumps, to the time of a shared clock.
+    /// Plays or jumps to the time of a shared clock.
     fn follow(&mut self, now: &mut Playback, span: &Span, next: Follow, progress: &mut Progress) {
         let before = self.follow.replace(next);
         match before {
@@ -120,7 +119,7 @@ impl PlaybackState {
                 self.go(now, span, next.phase, next.phase);
                 self.fresh = true;
                 self.over = span.is_over(next.phase, now.speed >= 0.0);
-                // The first moment is not a seek.
+                // The first step is not a seek.
                 if !progress.jumped && now.time != self.time {
                     progress.seeked = Some([self.time, now.time]);
                 }
@@ -143,7 +142,7 @@ mod tests {
     use crate::plugin::playback::repeat::Repeat;
     use bevy::ecs::entity::Entity;
 
-    /// A playback of two seconds with its memory.
+    /// A playback of a capture of two seconds, with its state.
     struct Player(Playback, PlaybackState);
 
     impl Player {
@@ -163,156 +162,179 @@ mod tests {
     }
 
     #[test]
-    fn start_pause_and_seek_are_noticed_once() {
+    fn start_pause_and_seek_are_reported_once() {
         let mut player = Player::new(Playback::default());
         let first = player.step(Drive::By(0.25));
-        assert!(first.started && first.seeked.is_none(), "the first step starts, and does not seek");
-        assert!(!player.step(Drive::By(0.25)).started, "the second one does not start again");
+        assert!(first.started && first.seeked.is_none(), "the first step is a start and not a seek");
+        assert!(!player.step(Drive::By(0.25)).started, "the second step is not a start");
         player.0.pause();
-        assert!(player.step(Drive::By(0.25)).paused, "a pause");
-        assert_eq!(player.step(Drive::By(0.25)), Progress::default(), "nothing happens while paused");
+        assert!(player.step(Drive::By(0.25)).paused, "a pause is reported");
+        assert_eq!(player.step(Drive::By(0.25)), Progress::default(), "a paused step has no events");
         player.0.seek(1.25);
-        assert_eq!(player.step(Drive::By(0.25)).seeked, Some([0.5, 1.25]), "but a seek");
+        assert_eq!(player.step(Drive::By(0.25)).seeked, Some([0.5, 1.25]), "a seek while paused is reported");
         player.0.play();
-        assert!(player.step(Drive::By(0.25)).started, "and a start");
-        assert_eq!(player.0.time, 1.5, "from there");
+        assert!(player.step(Drive::By(0.25)).started, "a start after a pause is reported");
+        assert_eq!(player.0.time, 1.5, "playback continues from the sought time");
     }
 
     #[test]
-    fn the_end_comes_once_and_is_no_pause() {
+    fn the_end_is_reported_once_and_not_as_a_pause() {
         let mut player = Player::new(Playback { repeat: Repeat::Once, ..Playback::default() });
         player.step(Drive::By(1.5));
         let end = player.step(Drive::By(1.5));
-        assert!(end.ended && !player.0.playing, "it ends");
-        assert_eq!(player.step(Drive::By(1.5)), Progress::default(), "and that is all");
+        assert!(end.ended && !player.0.playing, "playback ends and stops");
+        assert_eq!(player.step(Drive::By(1.5)), Progress::default(), "steps after the end have no events");
         player.0.play();
         let again = player.step(Drive::By(1.5));
-        assert_eq!((again.seeked, again.started), (Some([2.0, 0.0]), true), "played at the end, it starts over");
-        assert!(!again.ended, "which is no end");
-        assert_eq!(player.0.time, 1.5, "from its beginning");
+        assert_eq!((again.seeked, again.started), (Some([2.0, 0.0]), true), "a start at the end seeks to the start");
+        assert!(!again.ended, "a restart is not an end");
+        assert_eq!(player.0.time, 1.5, "the restart plays from the start");
         player.0.seek(9.0);
         player.0.pause();
-        assert_eq!(player.step(Drive::By(0.0)).seeked, Some([1.5, 2.0]), "sought beyond the end, it is there");
+        assert_eq!(player.step(Drive::By(0.0)).seeked, Some([1.5, 2.0]), "a seek beyond the end goes to the end");
         (player.0.speed, player.0.offset) = (-1.0, 0.5);
         player.0.play();
-        assert_eq!(player.step(Drive::By(0.5)).seeked, None, "backwards it has not ended");
-        assert!(player.step(Drive::By(9.0)).ended, "until it is at the start");
+        assert_eq!(player.step(Drive::By(0.5)).seeked, None, "backwards, the out point is not an end");
+        assert!(player.step(Drive::By(9.0)).ended, "backwards, playback ends at the start");
         player.0.play();
         player.0.end = 2.0;
-        assert_eq!(player.step(Drive::By(0.0)).seeked, Some([0.0, 1.5]), "from where it starts over by its offset");
+        assert_eq!(
+            player.step(Drive::By(0.0)).seeked,
+            Some([0.0, 1.5]),
+            "backwards, a restart begins the offset before the out point"
+        );
         let stopped = Playback { time: 2.0, speed: 0.0, repeat: Repeat::Once, ..Playback::default() };
         let mut player = Player::new(stopped);
         player.step(Drive::By(1.0));
-        assert_eq!(player.0, stopped, "at speed 0 it stands at its end");
+        assert_eq!(player.0, stopped, "speed 0 at the end does not restart");
     }
 
     #[test]
-    fn small_steps_add_up_without_rounding() {
+    fn small_steps_add_up_without_rounding_error() {
         let mut player = Player::new(Playback::default());
         for _ in 0..60_000 {
             player.step(Drive::By(1.0 / 60.0));
         }
         let off = player.0.time.min(2.0 - player.0.time);
-        assert!(off < 1e-6, "1000 s in 60 steps a second end where a loop does, not {off} s beside it");
+        assert!(off < 1e-6, "1000 s in steps of 1/60 s are whole loops of 2 s, but the time is {off} s off");
     }
 
     #[test]
-    fn a_clock_decides_where_its_followers_are() {
+    fn a_clock_sets_the_time_of_its_followers() {
         let mut player = Player::new(Playback { time: 1.75, ..Playback::default() });
         let first = player.follow(10.5, 0);
-        assert!(first.started && first.seeked.is_none() && player.0.time == 0.5, "at once");
+        assert!(
+            first.started && first.seeked.is_none() && player.0.time == 0.5,
+            "the first step sets the time of the clock"
+        );
         player.0.time = 1.9;
-        assert_eq!(player.follow(11.0, 0).seeked, None, "what else sets the time does not count");
-        assert_eq!(player.0.time, 1.0, "where the clock is");
-        assert_eq!(player.follow(12.5, 0).travel.map(|travel| travel.turns), Some(1), "it loops");
-        assert_eq!(player.follow(13.0, 1).seeked, Some([0.5, 1.0]), "a jump of the clock is a seek");
+        assert_eq!(player.follow(11.0, 0).seeked, None, "a time set by the game is not a seek");
+        assert_eq!(player.0.time, 1.0, "the time is that of the clock");
+        assert_eq!(player.follow(12.5, 0).travel.map(|travel| travel.turns), Some(1), "passing the end is one turn");
+        assert_eq!(player.follow(13.0, 1).seeked, Some([0.5, 1.0]), "a jump of the clock is reported as a seek");
         player.0.speed = -1.0;
-        assert_eq!(player.follow(13.0, 1).seeked, None, "half a loop from either end is the same moment");
+        assert_eq!(player.follow(13.0, 1).seeked, None, "a changed speed that leads to the same time is not a seek");
         player.0.pause();
         player.follow(14.5, 1);
-        assert_eq!(player.0.time, 1.0, "a pause holds one follower");
+        assert_eq!(player.0.time, 1.0, "a paused follower keeps its time");
         player.0.play();
         player.follow(14.75, 1);
-        assert_eq!(player.0.time, 1.25, "and it falls in again");
+        assert_eq!(player.0.time, 1.25, "a follower that plays again takes the time of the clock");
         player.follow(f64::NAN, 1);
-        assert_eq!(player.0.time, 1.25, "a clock that shows no number is waited for");
+        assert_eq!(player.0.time, 1.25, "the time is kept while the clock shows NaN");
     }
 
     #[test]
-    fn a_follower_ends_whenever_the_clock_passes_its_end() {
+    fn a_follower_ends_each_time_the_clock_passes_its_end() {
         let mut player = Player::new(Playback { repeat: Repeat::Once, offset: -1.0, ..Playback::default() });
         player.follow(0.0, 0);
-        assert_eq!(player.0.time, 0.0, "before its beginning it waits there");
+        assert_eq!(player.0.time, 0.0, "before its start a follower stays at its start");
         player.follow(2.0, 0);
-        assert_eq!(player.0.time, 1.0, "the offset is a second");
-        assert!(player.follow(3.5, 0).ended && player.0.playing, "at its end it still follows");
-        assert!(!player.follow(4.0, 0).ended, "it ends once");
-        assert!(!player.follow(2.0, 0).ended && player.0.time == 1.0, "the clock may run backwards");
-        assert!(player.follow(3.0, 0).ended, "and forwards again");
+        assert_eq!(player.0.time, 1.0, "an offset of -1 delays the follower by one second");
+        assert!(player.follow(3.5, 0).ended && player.0.playing, "a follower at its end keeps following");
+        assert!(!player.follow(4.0, 0).ended, "beyond the end no further end is reported");
+        assert!(!player.follow(2.0, 0).ended && player.0.time == 1.0, "the follower plays backwards with the clock");
+        assert!(player.follow(3.0, 0).ended, "passing the end again is reported again");
     }
 
     #[test]
-    fn a_moment_sought_counts_as_passed_when_it_is_played_from() {
+    fn a_sought_time_is_passed_when_playback_continues() {
         let mut player = Player::new(Playback::default());
         let passes =
             |progress: &Progress, time| progress.travel.is_some_and(|travel| travel.legs().any(|leg| leg.passes(time)));
-        assert!(passes(&player.step(Drive::By(0.5)), 0.0), "the beginning, when it starts there");
-        assert!(!passes(&player.step(Drive::By(0.5)), 0.5), "never twice");
+        assert!(passes(&player.step(Drive::By(0.5)), 0.0), "the first step passes the start");
+        assert!(!passes(&player.step(Drive::By(0.5)), 0.5), "a step does not pass the end of the step before");
         player.0.seek(1.5);
-        assert!(passes(&player.step(Drive::By(0.25)), 1.5), "where it was sought");
+        assert!(passes(&player.step(Drive::By(0.25)), 1.5), "a step after a seek passes the sought time");
         player.0.seek(0.25);
         player.0.pause();
-        assert!(!passes(&player.step(Drive::By(0.25)), 0.25), "not while paused");
+        assert!(!passes(&player.step(Drive::By(0.25)), 0.25), "a paused step passes no time");
         player.0.play();
-        assert!(passes(&player.step(Drive::By(0.25)), 0.25), "but then");
+        assert!(passes(&player.step(Drive::By(0.25)), 0.25), "the sought time is passed once playback continues");
     }
 
     #[test]
-    fn the_end_of_a_loop_can_be_sought_but_not_played_to() {
+    fn the_end_of_a_loop_is_reached_by_a_seek_only() {
         let mut player = Player::new(Playback { start: 0.1, end: 1.9, ..Playback::default() });
         player.step(Drive::By(1.8));
-        assert!((player.1.seconds() - 0.1).abs() < 1e-6, "played to its end, it is at {}", player.1.seconds());
+        assert!(
+            (player.1.seconds() - 0.1).abs() < 1e-6,
+            "a loop played to its end is at its start, not at {}",
+            player.1.seconds()
+        );
         player.0.pause();
         player.0.seek(1.9);
         player.step(Drive::By(1.0));
-        assert!((player.1.seconds() - 1.9).abs() < 1e-6, "sought, it is at its end, not at {}", player.1.seconds());
-        assert!(player.1.is_at_end_of_loop(), "and knows it");
+        assert!(
+            (player.1.seconds() - 1.9).abs() < 1e-6,
+            "a seek to the end is at the end, not at {}",
+            player.1.seconds()
+        );
+        assert!(player.1.is_at_end_of_loop(), "the state reports the end of the loop");
         player.0.play();
         player.step(Drive::By(0.25));
-        assert!((player.1.seconds() - 0.35).abs() < 1e-6, "from there it starts over: {}", player.1.seconds());
-        assert!(!player.1.is_at_end_of_loop(), "no longer at the end");
+        assert!(
+            (player.1.seconds() - 0.35).abs() < 1e-6,
+            "from its end a loop continues at its start: {}",
+            player.1.seconds()
+        );
+        assert!(!player.1.is_at_end_of_loop(), "the state no longer reports the end of the loop");
     }
 
     #[test]
-    fn infinite_times_are_the_ends() {
+    fn infinite_times_are_clamped_to_the_ends() {
         for drive in [Drive::By(0.0), Drive::Hold] {
             let mut player = Player::new(Playback { speed: -1.0, ..Playback::default() });
             player.step(drive);
             player.0.replay();
-            assert_eq!(player.step(drive).seeked, Some([0.0, 2.0]), "backwards it is replayed from the end");
-            assert_eq!(player.0.time, 2.0, "and stands there until time goes by, {drive:?}");
+            assert_eq!(player.step(drive).seeked, Some([0.0, 2.0]), "backwards, replay seeks to the end");
+            assert_eq!(player.0.time, 2.0, "without elapsed time the playback stays at the end, {drive:?}");
             player.0.seek(f32::NEG_INFINITY);
             player.step(drive);
-            assert_eq!(player.0.time, 0.0, "the other end");
+            assert_eq!(player.0.time, 0.0, "negative infinity is the start");
         }
     }
 
     #[test]
-    fn times_are_those_of_the_range() {
+    fn times_are_clamped_to_the_range() {
         let mut player = Player::new(Playback { start: 0.5, end: 1.5, ..Playback::paused_at(9.0) });
-        assert_eq!(player.step(Drive::By(0.0)).seeked, None, "the first moment is no seek");
-        assert_eq!(player.0.time, 1.5, "but in the range");
+        assert_eq!(player.step(Drive::By(0.0)).seeked, None, "clamping in the first step is not a seek");
+        assert_eq!(player.0.time, 1.5, "the first time is clamped to the out point");
         player.0.seek(-3.0);
-        assert_eq!(player.step(Drive::By(0.0)).seeked, Some([1.5, 0.5]), "a seek says where it has arrived");
+        assert_eq!(player.step(Drive::By(0.0)).seeked, Some([1.5, 0.5]), "a seek reports the clamped time");
         player.0.seek(0.25);
-        assert_eq!(player.step(Drive::By(0.0)).seeked, None, "which is where it was");
+        assert_eq!(
+            player.step(Drive::By(0.0)).seeked,
+            None,
+            "a seek that is clamped to the current time is not reported"
+        );
         player.0.start = 1.0;
-        assert_eq!(player.step(Drive::By(0.0)).seeked, None, "nor is a range that leaves it behind");
-        assert_eq!(player.0.time, 1.0, "the range is where it is");
+        assert_eq!(player.step(Drive::By(0.0)).seeked, None, "a moved in point is not a seek");
+        assert_eq!(player.0.time, 1.0, "the time is clamped to the new in point");
     }
 
     #[test]
-    fn followers_of_a_player_see_its_jumps() {
+    fn jumps_of_a_player_are_counted_for_its_followers() {
         let mut player = Player::new(Playback::default());
         let mut jumps = |change: fn(&mut Playback), delta| {
             let before = player.1.jumps;
@@ -320,19 +342,19 @@ mod tests {
             player.step(Drive::By(delta));
             player.1.jumps - before
         };
-        assert_eq!(jumps(|_| (), 0.25), 1, "the first moment");
-        assert_eq!(jumps(|_| (), 0.5), 0, "time that passes");
-        assert_eq!(jumps(|playback| playback.seek(1.75), 0.125), 1, "a seek");
-        assert_eq!(jumps(|_| (), 0.5), 1, "a loop");
-        assert_eq!(jumps(|playback| playback.repeat = Repeat::PingPong, 1.75), 0, "not a turn");
+        assert_eq!(jumps(|_| (), 0.25), 1, "the first step is a jump");
+        assert_eq!(jumps(|_| (), 0.5), 0, "elapsed time is not a jump");
+        assert_eq!(jumps(|playback| playback.seek(1.75), 0.125), 1, "a seek is a jump");
+        assert_eq!(jumps(|_| (), 0.5), 1, "a wrap is a jump");
+        assert_eq!(jumps(|playback| playback.repeat = Repeat::PingPong, 1.75), 0, "a turn of ping-pong is not a jump");
     }
 
     #[test]
-    fn a_range_that_changes_is_no_seek() {
+    fn a_changed_range_is_not_a_seek() {
         let mut player = Player::new(Playback::default());
         player.step(Drive::By(0.75));
         player.0.end = 1.0;
-        assert_eq!(player.step(Drive::By(0.5)).seeked, None, "the game moved the out point, not the time");
-        assert_eq!(player.0.time, 0.25, "and the new range is played");
+        assert_eq!(player.step(Drive::By(0.5)).seeked, None, "a moved out point is not a seek");
+        assert_eq!(player.0.time, 0.25, "playback wraps at the new out point");
     }
 }

@@ -1,7 +1,7 @@
 //! Clocks that several captures share.
 //!
-//! In: the game's time, or seconds set by hand from an audio player or the network. Out: a [`PlaybackClock`] that every
-//! [`Playback`](super::Playback) with [`FollowsClock`] follows, whenever it was spawned or loaded.
+//! In: the game's time, or seconds that the game sets from an audio player or the network. Out: a [`PlaybackClock`] that every
+//! [`Playback`](super::Playback) with [`FollowsClock`] follows, independent of when it was spawned or loaded.
 
 use bevy::ecs::component::Component;
 use bevy::ecs::entity::Entity;
@@ -9,7 +9,7 @@ use bevy::ecs::reflect::ReflectComponent;
 use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 
-/// A clock on an entity of its own. Its followers show exactly the time of the clock, so that they cannot drift apart.
+/// A clock on a separate entity. Its followers show exactly the time of the clock, so that they cannot drift apart.
 ///
 /// # Examples
 ///
@@ -31,20 +31,20 @@ use bevy::reflect::std_traits::ReflectDefault;
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 pub struct PlaybackClock {
-    /// The time it shows, in seconds. Neither rounded nor wrapped: its followers do that. Default: 0.
+    /// The time of the clock, in seconds. Neither rounded nor wrapped: followers wrap it. Default: 0.
     pub seconds: f64,
     /// Seconds of the clock per second of the game; negative runs backwards. Used with [`ClockSource::Game`] only. Default: 1.
     pub speed: f32,
-    /// Whether it runs. Used with [`ClockSource::Game`] only. Default: true.
+    /// Whether the clock runs. Used with [`ClockSource::Game`] only. Default: true.
     pub running: bool,
-    /// What moves it. Default: [`ClockSource::Game`].
+    /// The source of the clock's time. Default: [`ClockSource::Game`].
     pub source: ClockSource,
-    /// Number of its jumps. When this changes, followers [seek](super::PlaybackSeeked) to the time it shows; otherwise they play the
-    /// time between, which crosses bounds of segments and markers. Default: 0.
+    /// Number of the clock's jumps. When the number changes, followers [seek](super::PlaybackSeeked) to the clock's time; otherwise they
+    /// play the time in between, which crosses segment bounds and markers. Default: 0.
     pub jumps: u32,
 }
 
-/// What moves a clock. Default: [`Game`](Self::Game).
+/// The source of a clock's time. Default: [`Game`](Self::Game).
 #[derive(Reflect, Debug, Default, Clone, Copy, PartialEq, Eq, Hash)]
 #[reflect(Default, Debug, Clone, PartialEq)]
 pub enum ClockSource {
@@ -59,13 +59,15 @@ pub enum ClockSource {
 /// capture or a [`TimelinePlayer`](super::TimelinePlayer).
 ///
 /// The playback's time is then the clock's time multiplied by the playback's own `speed`, plus its `offset`, within its range and repeated as
-/// its `repeat` specifies; setting `time` has no effect. A paused follower stands still and continues at the clock's time when it plays again.
+/// its `repeat` specifies; setting `time` has no effect. A paused follower keeps its time and continues at the clock's time when it plays
+/// again.
 ///
-/// The time of a followed `Playback` is its `time`; when that seeks or starts over, followers seek. The followed may itself follow: whoever is
-/// followed advances first. Only timelines that follow a capture show its time of the frame before, because timelines advance before captures.
+/// The time of a followed `Playback` is its `time`; when that playback seeks or wraps, followers seek. A followed entity may itself follow
+/// another: followed entities advance before their followers. Only timelines that follow a capture show the capture's time of the frame
+/// before, because timelines advance before captures.
 ///
-/// If the other entity does not exist or shows no time, or if entities follow each other in a circle, the follower stands still, and the
-/// log says so once.
+/// If the other entity does not exist or has no time, or if entities follow each other in a circle, the follower's time does not advance,
+/// and the log has one warning.
 ///
 /// # Examples
 ///
@@ -98,18 +100,19 @@ impl PlaybackClock {
         Self { source: ClockSource::Manual, ..Self::default() }
     }
 
-    /// Sets the clock to `seconds`, as time that has passed: followers play the time between.
+    /// Sets the clock to `seconds` as elapsed time: followers play the time in between.
     pub fn set(&mut self, seconds: f64) {
         self.seconds = seconds;
     }
 
-    /// Jumps to `seconds`: followers seek.
+    /// Jumps to `seconds`: followers seek to that time.
     pub fn seek(&mut self, seconds: f64) {
         self.seconds = seconds;
         self.jumps = self.jumps.wrapping_add(1);
     }
 
-    /// Advances by `delta` seconds of the game, if the game moves the clock and it runs. A speed that is not finite holds it.
+    /// Advances by `delta` seconds of the game's time, if the source is [`ClockSource::Game`] and the clock runs. A clock whose speed is not
+    /// finite does not advance.
     pub fn advance(&mut self, delta: f64) {
         let runs = match self.source {
             ClockSource::Game => self.running,
@@ -127,33 +130,33 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_clock_recovers_from_a_speed_that_is_no_number() {
+    fn a_clock_does_not_advance_at_a_speed_that_is_not_finite() {
         let mut clock = PlaybackClock { seconds: 1.0, ..PlaybackClock::default() };
         for speed in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             clock.speed = speed;
             clock.advance(0.5);
             clock.advance(0.0);
-            assert_eq!(clock.seconds, 1.0, "at speed {speed} it stands");
+            assert_eq!(clock.seconds, 1.0, "the clock does not advance at speed {speed}");
         }
         clock.speed = 2.0;
         clock.advance(0.5);
-        assert_eq!(clock.seconds, 2.0, "and then it runs");
+        assert_eq!(clock.seconds, 2.0, "the clock runs again at a finite speed");
     }
 
     #[test]
-    fn a_clock_of_the_game_runs_and_one_set_by_hand_does_not() {
+    fn game_time_moves_game_clocks_and_not_manual_clocks() {
         let mut clock = PlaybackClock { speed: -0.5, ..PlaybackClock::default() };
         clock.advance(2.0);
-        assert_eq!(clock.seconds, -1.0, "backwards at half speed");
+        assert_eq!(clock.seconds, -1.0, "speed -0.5 runs backwards at half speed");
         clock.running = false;
         clock.advance(2.0);
-        assert_eq!(clock.seconds, -1.0, "stopped");
+        assert_eq!(clock.seconds, -1.0, "a stopped clock does not advance");
         let mut manual = PlaybackClock::manual();
         manual.advance(2.0);
-        assert_eq!(manual.seconds, 0.0, "only by hand");
+        assert_eq!(manual.seconds, 0.0, "game time does not move a manual clock");
         manual.set(3.0);
-        assert_eq!((manual.seconds, manual.jumps), (3.0, 0), "time passes");
+        assert_eq!((manual.seconds, manual.jumps), (3.0, 0), "set is not a jump");
         manual.seek(1.0);
-        assert_eq!((manual.seconds, manual.jumps), (1.0, 1), "or jumps");
+        assert_eq!((manual.seconds, manual.jumps), (1.0, 1), "seek is a jump");
     }
 }

@@ -1,4 +1,4 @@
-//! The component by which a game plays a capture or a timeline.
+//! The component with which a game plays a capture or a timeline.
 //!
 //! In: play, pause, seek, and fields that any system or animation may set. Out: a [`Playback`], whose time is drawn.
 
@@ -16,8 +16,8 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// Code may set any field at any time; animations may set any field but `repeat`. Setting `time` is a seek: the time between is
 /// skipped, not played. To slow down or to reverse, set `speed`.
 ///
-/// Time begins with the first picture: until a capture has been loaded and is whole on the GPU, it stands at its first moment. Without a
-/// renderer, until it has been loaded.
+/// Time begins with the first drawn frame: until a capture has been loaded and completely uploaded to the GPU, it stays at its first moment.
+/// Without a renderer, until it has been loaded.
 ///
 /// # Examples
 ///
@@ -25,7 +25,7 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// use bevy_gs4d::prelude::*;
 ///
 /// let mut playback = Playback { speed: 0.5, ..Playback::once() };
-/// // The plugin does this once a frame; here by hand, for a capture of 2 s.
+/// // The plugin does this once a frame; here the call is explicit, for a capture of 2 s.
 /// playback.advance(1.0, 2.0);
 /// assert_eq!(playback.time, 0.5, "a second at half speed");
 /// playback.reverse();
@@ -36,25 +36,25 @@ use bevy::reflect::std_traits::ReflectDefault;
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[require(PlaybackState)]
 pub struct Playback {
-    /// Seconds since the capture's start. The plugin clamps it to the range from `start` to `end`, unless that is empty: seeking beyond
-    /// an end goes to that end. Default: 0.
+    /// Seconds since the capture's start. The plugin clamps the time to the range from `start` to `end`, unless the range is empty: seeking
+    /// beyond an end goes to that end. Default: 0.
     pub time: f32,
     /// Seconds of the capture per second of the clock; negative plays backwards. Default: 1.
     pub speed: f32,
     /// Whether time advances. Default: true.
     pub playing: bool,
-    /// What happens at the end of the range. Default: [`Repeat::Loop`].
+    /// The behavior at the end of the range. Default: [`Repeat::Loop`].
     pub repeat: Repeat,
-    /// The in point: the first moment that is played, in seconds since the capture's start. Default: 0.
+    /// The in point: the first played moment, in seconds since the capture's start. Default: 0.
     pub start: f32,
-    /// The out point: the last moment that is played, in seconds since the capture's start. Beyond the capture's end it is that end. An
-    /// empty range stands still. Default: infinite.
+    /// The out point: the last played moment, in seconds since the capture's start, clamped to the capture's end. Time does not advance in
+    /// an empty range. Default: infinite.
     pub end: f32,
-    /// Where in the range playback is when a [shared clock](super::FollowsClock) shows 0, and where [`replay`](Self::replay) begins:
+    /// The position in the range when a [shared clock](super::FollowsClock) is at 0, and the position where [`replay`](Self::replay) begins:
     /// seconds of the capture from the beginning of the range, in the direction of play. If negative, a follower with [`Repeat::Once`]
-    /// waits at the beginning until the clock has caught up, and `replay` begins at the beginning. Default: 0.
+    /// waits at the beginning until the clock reaches it, and `replay` begins at the beginning. Default: 0.
     pub offset: f32,
-    /// Whether [`Repeat::PingPong`] is on its way back; always false with other modes. Default: false.
+    /// Whether [`Repeat::PingPong`] plays its returning pass; always false with other modes. Default: false.
     pub returning: bool,
 }
 
@@ -74,7 +74,7 @@ impl Default for Playback {
 }
 
 impl Playback {
-    /// Returns a playback that plays once, and stops at the end.
+    /// Returns a playback that plays once and stops at the end.
     ///
     /// # Examples
     ///
@@ -87,7 +87,7 @@ impl Playback {
         Self { repeat: Repeat::Once, ..Self::default() }
     }
 
-    /// Returns a playback that turns round at each end.
+    /// Returns a playback that reverses at each end.
     ///
     /// # Examples
     ///
@@ -105,41 +105,41 @@ impl Playback {
         Self { time: seconds, playing: false, ..Self::default() }
     }
 
-    /// Lets time advance. At the end at which it has stopped, or would stop at once, it plays from the beginning, as
-    /// [`replay`](Self::replay) does; followers of a clock go where the clock is.
+    /// Starts to play. A playback that has stopped at its end, or would stop there immediately, plays from the beginning, as with
+    /// [`replay`](Self::replay); a follower of a clock goes to the clock's time.
     pub fn play(&mut self) {
         self.playing = true;
     }
 
-    /// Holds time.
+    /// Stops time.
     pub fn pause(&mut self) {
         self.playing = false;
     }
 
-    /// [Plays](Self::play) if paused, pauses if playing.
+    /// [Plays](Self::play) a paused playback, pauses a running one.
     pub fn toggle(&mut self) {
         self.playing = !self.playing;
     }
 
-    /// Goes to `seconds` since the start. Does not play or pause.
+    /// Goes to `seconds` since the start. Does not change [`playing`](Self::playing).
     pub fn seek(&mut self, seconds: f32) {
         self.time = seconds;
     }
 
-    /// Reverses the direction of play, at the same time.
+    /// Reverses the direction of play. The time stays the same.
     pub fn reverse(&mut self) {
         self.speed = -self.speed;
     }
 
     /// Plays from the beginning: from `offset` after the in point or, if `speed` is negative, backwards from `offset` before the out
-    /// point. With the default out point, which is infinite, `offset` has no effect backwards.
+    /// point. Backwards, `offset` has no effect with the default out point, which is infinite.
     pub fn replay(&mut self) {
         self.time = if self.speed < 0.0 { self.end - self.offset } else { self.start + self.offset };
         self.returning = false;
         self.playing = true;
     }
 
-    /// Returns the range that is played of a capture that lasts `duration` seconds.
+    /// Returns the played range of a capture that lasts `duration` seconds.
     pub(super) fn span(&self, duration: f32) -> Span {
         Span::new([self.start, self.end], self.repeat, duration)
     }

@@ -1,7 +1,7 @@
-//! What advances a playback: the game's time, or another entity that it follows.
+//! The source of a playback's time: the game's time, or another entity that the playback follows.
 //!
-//! In: an entity's [`FollowsClock`], if it has one, what the entities that can be followed show, and Bevy's time. Out: the order in which
-//! players advance, each after the one that it follows; a [`Drive`] for each, and a warning for one that cannot follow.
+//! In: an entity's optional [`FollowsClock`], the times of the entities that can be followed, and Bevy's time. Out: the order in which
+//! players advance, each after the entity that it follows; a [`Drive`] for each player, and a warning for a player that cannot follow.
 
 use super::clock::{FollowsClock, PlaybackClock};
 use super::component::Playback;
@@ -13,19 +13,19 @@ use bevy::log::warn;
 use bevy::time::Time;
 use std::fmt;
 
-/// What advances a playback in one step.
+/// The source of a playback's time in one step.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Drive {
-    /// This many seconds have passed.
+    /// The number of elapsed seconds.
     By(f64),
-    /// The clock that is followed shows this many seconds, after this many jumps.
+    /// The time of the followed clock in seconds, and the number of its jumps.
     Follow { clock: Entity, seconds: f64, jumps: u32 },
-    /// There is no clock to follow: time stands still.
+    /// There is no clock to follow: no time passes.
     Hold,
 }
 
 impl Drive {
-    /// Returns the same, but no time of the game while something is `awaited`. The clock that is followed waits for nobody.
+    /// Returns the same drive, with no elapsed time while a capture is `awaited`. A followed clock does not wait.
     pub(super) fn unless(self, awaited: bool) -> Self {
         match self {
             Self::By(_) if awaited => Self::By(0.0),
@@ -34,7 +34,7 @@ impl Drive {
     }
 }
 
-/// What an entity shows to its followers.
+/// The time of an entity, for its followers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Shown {
     seconds: f64,
@@ -46,21 +46,21 @@ impl Shown {
         Self { seconds: clock.seconds, jumps: clock.jumps }
     }
 
-    /// Returns the time of a player. One that has not advanced yet, or never does, shows what the game has set.
+    /// Returns the time of a player. Before its first step, this is the time that the game has set.
     pub(super) fn by_player(playback: &Playback, state: &PlaybackState) -> Self {
         let seconds = if state.span.is_some() { state.seconds() } else { playback.time.into() };
         Self { seconds, jumps: state.jumps }
     }
 }
 
-/// Why an entity cannot follow another.
+/// The reason why an entity cannot follow another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Obstacle {
-    /// The other does not exist.
+    /// The other entity does not exist.
     Missing,
-    /// It shows no time.
+    /// The other entity has no time.
     Timeless,
-    /// It follows, perhaps through others, itself.
+    /// The entities follow each other in a circle.
     Circle,
 }
 
@@ -68,13 +68,13 @@ impl fmt::Display for Obstacle {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Missing => "which does not exist: spawn it first, or remove FollowsClock",
-            Self::Timeless => "which shows no time: follow an entity with a PlaybackClock or a Playback",
-            Self::Circle => "which follows, perhaps through others, an entity of a circle: let one of them follow none",
+            Self::Timeless => "which has no time: follow an entity with a PlaybackClock or a Playback",
+            Self::Circle => "which leads to a circle of followers: remove FollowsClock from an entity of the circle",
         })
     }
 }
 
-/// Who follows whom, among all players.
+/// The players and the entities that they follow.
 #[derive(SystemParam)]
 pub(super) struct Following<'w, 's> {
     follows: Query<'w, 's, &'static FollowsClock, With<Playback>>,
@@ -82,8 +82,8 @@ pub(super) struct Following<'w, 's> {
 }
 
 impl Following<'_, '_> {
-    /// Returns the players in an order in which each comes after the one that it follows; otherwise as given. Those that follow in a
-    /// circle come last.
+    /// Returns the players in an order in which each comes after the player that it follows, otherwise in the given order. Players that
+    /// follow in a circle come last.
     pub(super) fn order(&self, players: impl Iterator<Item = Entity>) -> Vec<Entity> {
         let mut order: Vec<(usize, Entity)> =
             players.map(|player| (self.distance(player).unwrap_or(usize::MAX), player)).collect();
@@ -91,7 +91,7 @@ impl Following<'_, '_> {
         order.into_iter().map(|(_, player)| player).collect()
     }
 
-    /// Returns what advances a player. `shown` returns what an entity shows, `None` if it shows no time.
+    /// Returns the source of a player's time. `shown` returns the time of an entity, `None` if the entity has no time.
     pub(super) fn drive(
         &self,
         player: Entity,
@@ -111,7 +111,7 @@ impl Following<'_, '_> {
             }
             Err(obstacle) => {
                 if state.warned_of.replace(clock) != Some(clock) {
-                    warn!("{player} stands still: it follows {clock}, {obstacle}");
+                    warn!("{player} does not advance: it follows {clock}, {obstacle}");
                 }
                 Drive::Hold
             }
@@ -123,15 +123,15 @@ impl Following<'_, '_> {
         shown(clock).ok_or(reason)
     }
 
-    /// Returns through how many others a player follows; `None` if that never ends.
+    /// Returns the number of entities in the chain that a player follows; `None` for a circle.
     fn distance(&self, player: Entity) -> Option<usize> {
         steps(player, |player| Some(self.follows.get(player).ok()?.0))
     }
 }
 
-/// Returns the number of steps from `start` until `next` returns `None`; `None` if it never does.
+/// Returns the number of steps from `start` until `next` returns `None`; `None` if the steps lead into a circle.
 fn steps<T: Copy + PartialEq>(start: T, next: impl Fn(T) -> Option<T>) -> Option<usize> {
-    // In a circle, the one that is twice as fast meets the other.
+    // In a circle, the fast position meets the slow position (Floyd).
     let (mut slow, mut fast, mut steps) = (start, start, 0);
     loop {
         let Some(first) = next(fast) else { return Some(steps) };
@@ -149,11 +149,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_chain_ends_and_a_circle_does_not() {
+    fn a_chain_has_a_length_and_a_circle_has_none() {
         let along = |next: &'static [Option<usize>]| move |start: usize| steps(start, |at| next[at]);
         let chain = along(&[None, Some(0), Some(1), Some(2), Some(3)]);
-        assert_eq!([0, 1, 2, 3, 4].map(chain), [0, 1, 2, 3, 4].map(Some), "one more for each link");
+        assert_eq!(
+            [0, 1, 2, 3, 4].map(chain),
+            [0, 1, 2, 3, 4].map(Some),
+            "the length of a chain is its number of links"
+        );
         let circle = along(&[Some(1), Some(2), Some(0), Some(0), Some(4)]);
-        assert_eq!([0, 1, 2, 3, 4].map(circle), [None; 5], "in a circle, on the way into one, and following oneself");
+        assert_eq!(
+            [0, 1, 2, 3, 4].map(circle),
+            [None; 5],
+            "a circle, a chain into a circle and a self-reference have no length"
+        );
     }
 }

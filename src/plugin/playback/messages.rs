@@ -1,10 +1,10 @@
 //! The messages about playing.
 //!
-//! In: what happened to an entity in a step. Out: each message twice: to be read by a system with a `MessageReader`, and as an event on
-//! that entity, to be observed: `commands.entity(capture).observe(|ended: On<PlaybackEnded>| ..)`.
+//! In: the events of a step of an entity. Out: each message in two ways: as a message for a `MessageReader`, and as an event on the entity
+//! for observers: `commands.entity(capture).observe(|ended: On<PlaybackEnded>| ..)`.
 //!
 //! The entity has a [`Playback`](super::Playback): a capture or a [`TimelinePlayer`](super::TimelinePlayer). The events of one entity
-//! in one frame are triggered in this order: seeked, started, paused, bounds of segments, markers, looped, ended.
+//! in one frame are triggered in this order: seeked, started, paused, segment bounds, markers, looped, ended.
 
 use super::advance::Progress;
 use super::markers::{Marker, crossed};
@@ -16,7 +16,7 @@ use bevy::ecs::event::EntityEvent;
 use bevy::ecs::message::{Message, MessageWriter};
 use bevy::ecs::system::{Commands, SystemParam};
 
-/// An entity plays that did not before: its capture or timeline, or another one in its place, has been loaded, or
+/// An entity starts to play: its first or another capture or timeline has been loaded, or
 /// [`playing`](super::Playback::playing) was set.
 ///
 /// # Examples
@@ -69,12 +69,12 @@ pub struct PlaybackSeeked {
     pub to: f32,
 }
 
-/// A bound between two segments of a capture's temporal filter, or at the first one's start or the last one's end, was crossed, or
-/// reached, while playing. These bounds are the filter's key-frames ([`GaussianCapture::key_frames`]); they have nothing to do with those of
-/// an animation. For moments that the game defines, put [`Markers`] on the capture.
+/// A bound between two segments of a capture's temporal filter, the start of the first segment or the end of the last one was crossed or
+/// reached while playing. These bounds are the filter's key-frames ([`GaussianCapture::key_frames`]); they are independent of the keyframes
+/// of an animation. For times that the game defines, put [`Markers`] on the capture.
 ///
-/// A bound at the time of a seek counts once playing continues from there. A step that is longer than four passes of a loop sends
-/// the bounds of two to four of them.
+/// A bound at the time of a seek is crossed once playback continues. A step that is longer than four passes of a loop sends the bounds of
+/// two to four passes.
 ///
 /// [`GaussianCapture::key_frames`]: crate::asset::GaussianCapture::key_frames
 /// [`Markers`]: super::Markers
@@ -96,14 +96,14 @@ pub struct PlaybackSeeked {
 pub struct SegmentBoundCrossed {
     /// The capture.
     pub entity: Entity,
-    /// The bound, counted from 0: segment `index` begins there, and the one before ends.
+    /// The bound, counted from 0: segment `index` begins there, and segment `index - 1` ends.
     pub index: u32,
-    /// Its time, in seconds since the capture's start.
+    /// The bound's time, in seconds since the capture's start.
     pub time: f32,
 }
 
-/// A marker of a timeline, or of a capture with [`Markers`](super::Markers), was crossed, or reached, while playing. Seeks and long steps
-/// count as for [`SegmentBoundCrossed`].
+/// A marker of a timeline, or of a capture with [`Markers`](super::Markers), was crossed or reached while playing. Seeks and long steps are
+/// treated as for [`SegmentBoundCrossed`].
 ///
 /// # Examples
 ///
@@ -124,11 +124,11 @@ pub struct MarkerReached {
     pub entity: Entity,
     /// The marker's name.
     pub name: String,
-    /// Its time, in seconds since the start of the timeline or the capture.
+    /// The marker's time, in seconds since the start of the timeline or the capture.
     pub time: f32,
 }
 
-/// An entity reached an end of its range and starts over, or turns round.
+/// An entity reached an end of its range and starts over or reverses.
 ///
 /// # Examples
 ///
@@ -149,11 +149,11 @@ pub struct MarkerReached {
 pub struct PlaybackLooped {
     /// The entity that loops.
     pub entity: Entity,
-    /// How often it reached an end in this step: 1 unless the step is longer than the range.
+    /// Number of times that an end was reached in this step: 1 unless the step is longer than the range.
     pub turns: u32,
 }
 
-/// An entity has played once and stopped, or the clock that it follows has carried it to its end.
+/// An entity has played once and stopped, or a follower has reached its end.
 ///
 /// # Examples
 ///
@@ -187,8 +187,7 @@ pub(super) struct Announcer<'w, 's> {
 }
 
 impl Announcer<'_, '_> {
-    /// Sends what happened in a step. `crossed` sends the bounds of segments and the markers on a stretch that
-    /// was played.
+    /// Sends the messages about a step. `crossed` sends the segment bounds and the markers on a played stretch.
     pub(super) fn report(&mut self, entity: Entity, progress: &Progress, mut crossed: impl FnMut(&mut Self, &Leg)) {
         if let Some([from, to]) = progress.seeked {
             send(&mut self.commands, &mut self.seeked, PlaybackSeeked { entity, from, to });
@@ -210,7 +209,7 @@ impl Announcer<'_, '_> {
         }
     }
 
-    /// Sends the bounds of segments on a stretch that was played.
+    /// Sends the segment bounds on a played stretch.
     pub(super) fn bounds(&mut self, entity: Entity, key_frames: &KeyFrames, leg: &Leg) {
         for index in key_frames.within(leg.from, leg.to, leg.inclusive) {
             let crossed = SegmentBoundCrossed { entity, index, time: key_frames.time(index) };
@@ -218,7 +217,7 @@ impl Announcer<'_, '_> {
         }
     }
 
-    /// Sends the markers on a stretch that was played.
+    /// Sends the markers on a played stretch.
     pub(super) fn markers(&mut self, entity: Entity, markers: &[Marker], leg: &Leg) {
         for Marker { time, name } in crossed(markers, leg) {
             let reached = MarkerReached { entity, name: name.clone(), time: *time };

@@ -1,8 +1,8 @@
-//! Playback: which time of a capture is shown.
+//! Playback: the time of each capture.
 //!
-//! In: Bevy's [`Time`](bevy::time::Time) (the virtual clock: pausing and scaling it pauses and scales captures) and what a game
+//! In: Bevy's [`Time`](bevy::time::Time) (the virtual clock: pausing and scaling it pauses and scales captures) and the values that a game
 //! sets on a [`Playback`], a shared [`PlaybackClock`] or a [`TimelinePlayer`]. Out: `Playback::time`, advanced once a frame in
-//! [`PlaybackSystems::Advance`], which drawing reads; messages and observable events about what happened.
+//! [`PlaybackSystems::Advance`], which the renderer reads; messages and observable events about playback.
 //!
 //! ```text
 //! Time ──▶ PlaybackClock ◀── audio, network            Clocks
@@ -14,11 +14,12 @@
 //!  Time ──────────────────────▶ Playback::time         Advance
 //! ```
 //!
-//! A playback follows a clock or another player ([`FollowsClock`]); [`Markers`] give one capture the named moments that a timeline has.
+//! A playback can follow a clock or another player ([`FollowsClock`]). [`Markers`] are named times of one capture, like the markers of a
+//! timeline.
 //!
 //! Bevy's own animations may animate any field of a [`Playback`] but `repeat` through `animated_field!(Playback::speed)`. They run in
-//! `PostUpdate`: the `time` that they set on a capture is drawn in the same frame; other fields, and every field of a
-//! [`TimelinePlayer`]'s playback, take effect in the next frame.
+//! `PostUpdate`: a `time` set on a capture is drawn in the same frame; other fields, and all fields of a [`TimelinePlayer`]'s playback, take
+//! effect in the next frame.
 
 mod advance;
 mod clock;

@@ -1,4 +1,4 @@
-//! The plugin of playback: which system runs when.
+//! The playback plugin: the order of its systems.
 //!
 //! In: an app with Bevy's `AssetPlugin` and `TimePlugin`. Out: the same app, in which clocks, timelines and captures advance.
 
@@ -45,7 +45,7 @@ impl Plugin for PlaybackPlugin {
                     advance_captures.in_set(Advance),
                 ),
             )
-            // A handle may follow in the same frame.
+            // The game may still set a handle in the same frame.
             .add_systems(Last, warn_of_missing_handles.run_if(any_match_filter::<Changed<GaussianCapture3d>>));
     }
 }
@@ -55,7 +55,9 @@ mod tests {
     use super::*;
     use crate::plugin::asset::{CaptureAssetPlugin, Uploads};
     use crate::plugin::component::GaussianCapture;
-    use crate::plugin::playback::{Clip, FollowsClock, Marker, Markers, Track};
+    use crate::plugin::playback::clock::FollowsClock;
+    use crate::plugin::playback::markers::{Marker, Markers};
+    use crate::plugin::playback::timeline::{Clip, Track};
     use crate::scene::synth::{SynthSettings, synthesize};
     use bevy::MinimalPlugins;
     use bevy::asset::{AssetPlugin, AssetServer, Assets, Handle};
@@ -69,14 +71,14 @@ mod tests {
     use std::sync::mpsc;
     use std::time::{Duration, Instant};
 
-    /// How long a task may take.
+    /// Longest time for a task.
     const TIMEOUT: Duration = Duration::from_secs(60);
 
-    /// The names of the markers that have been reached.
+    /// The names of the reached markers.
     #[derive(Resource, Default)]
     struct Reached(Vec<String>);
 
-    /// Returns an app in which captures wait for uploads that the test ends.
+    /// Returns an app in which captures wait for uploads, and the uploads, which the test completes.
     fn app() -> (App, Uploads) {
         let mut app = App::new();
         app.add_plugins((MinimalPlugins, AssetPlugin::default(), CaptureAssetPlugin, PlaybackPlugin));
@@ -84,7 +86,7 @@ mod tests {
         app.add_observer(|marker: On<MarkerReached>, mut reached: ResMut<Reached>| reached.0.push(marker.name.clone()));
         let uploads = app.world().resource::<Uploads>().clone();
         uploads.expect();
-        // The first update has no length.
+        // No time passes in the first update.
         pass(&mut app, 1);
         (app, uploads)
     }
@@ -120,13 +122,13 @@ mod tests {
         let tracks = captures.iter().enumerate();
         let tracks = tracks.map(|(index, capture)| Track { name: index.to_string(), clips: vec![clip(capture)] });
         let markers = vec![Marker { time: 0.0, name: "start".into() }];
-        let timeline = Timeline::new(tracks.collect(), markers, None).expect("makes sense");
+        let timeline = Timeline::new(tracks.collect(), markers, None).expect("the timeline is valid");
         let timeline = app.world_mut().resource_mut::<Assets<Timeline>>().add(timeline);
         app.world_mut().spawn(TimelinePlayer(timeline)).id()
     }
 
     fn time(app: &App, player: Entity) -> f32 {
-        app.world().get::<Playback>(player).expect("every player has one").time
+        app.world().get::<Playback>(player).expect("every player has a playback").time
     }
 
     fn reached(app: &App) -> &[String] {
@@ -134,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn a_capture_stands_at_its_first_moment_until_it_is_drawn() {
+    fn a_capture_stays_at_its_first_moment_until_it_is_drawn() {
         let (mut app, uploads) = app();
         let capture = capture(&mut app);
         let player = spawn(&mut app, &capture, Markers::new([(0.0, "start"), (0.5, "middle")]));
@@ -144,45 +146,45 @@ mod tests {
         let singer = spawn(&mut app, &capture, FollowsClock(song));
         pass(&mut app, 3);
         let times = |app: &App| [player, backwards, follower, singer].map(|entity| time(app, entity));
-        assert_eq!(times(&app), [0.0, 2.0, 0.0, 0.75], "only who follows a clock is where that is");
-        assert_eq!(reached(&app), [""; 0], "and no marker is passed unseen");
+        assert_eq!(times(&app), [0.0, 2.0, 0.0, 0.75], "only the follower of a clock advances");
+        assert_eq!(reached(&app), [""; 0], "no marker is reached before the first drawn frame");
         uploads.finish(capture.id());
         pass(&mut app, 2);
-        assert_eq!(times(&app), [0.5, 1.5, 0.5, 1.25], "they play from there");
-        assert_eq!(reached(&app), ["start", "middle"], "past all markers");
+        assert_eq!(times(&app), [0.5, 1.5, 0.5, 1.25], "after the upload all captures advance");
+        assert_eq!(reached(&app), ["start", "middle"], "playback reaches all markers");
         uploads.begin(capture.id(), false);
         pass(&mut app, 2);
-        assert_eq!(times(&app), [1.0, 1.0, 1.0, 1.75], "and go on while it is uploaded again");
+        assert_eq!(times(&app), [1.0, 1.0, 1.0, 1.75], "captures advance while the capture is uploaded again");
     }
 
     #[test]
-    fn a_capture_that_the_gpu_refuses_plays_all_the_same() {
+    fn a_capture_whose_upload_fails_still_plays() {
         let (mut app, uploads) = app();
         let capture = capture(&mut app);
         let player = spawn(&mut app, &capture, ());
         pass(&mut app, 1);
         uploads.fail(capture.id(), "no room".into());
         pass(&mut app, 2);
-        assert_eq!(time(&app, player), 0.5, "it waits for nothing");
+        assert_eq!(time(&app, player), 0.5, "playback does not wait for a failed upload");
     }
 
     #[test]
-    fn a_timeline_stands_at_its_start_until_all_its_captures_are_drawn() {
+    fn a_timeline_stays_at_its_start_until_all_its_captures_are_drawn() {
         let (mut app, uploads) = app();
         let [first, second] = [(); 2].map(|()| capture(&mut app));
         let player = spawn_timeline(&mut app, &[&first, &second]);
         pass(&mut app, 2);
         uploads.finish(first.id());
         pass(&mut app, 2);
-        assert_eq!((time(&app, player), reached(&app).len()), (0.0, 0), "one is missing");
+        assert_eq!((time(&app, player), reached(&app).len()), (0.0, 0), "the timeline waits for the second capture");
         uploads.finish(second.id());
         pass(&mut app, 1);
-        assert_eq!(time(&app, player), 0.25, "all are there");
-        assert_eq!(reached(&app), ["start"], "and the marker at the start is reached");
+        assert_eq!(time(&app, player), 0.25, "the timeline advances once all captures are uploaded");
+        assert_eq!(reached(&app), ["start"], "the marker at the start is reached");
     }
 
     #[test]
-    fn a_timeline_waits_for_what_is_loaded_and_not_for_what_has_failed() {
+    fn a_timeline_waits_for_captures_that_load_and_not_for_failed_ones() {
         let (mut app, uploads) = app();
         let there = capture(&mut app);
         uploads.finish(there.id());
@@ -193,15 +195,15 @@ mod tests {
         let loading = server.add_async(load);
         let player = spawn_timeline(&mut app, &[&there, &loading]);
         pass(&mut app, 3);
-        assert_eq!(time(&app, player), 0.0, "one is still loaded");
-        give_up.send(io::Error::other("the disk is full")).expect("the task waits");
+        assert_eq!(time(&app, player), 0.0, "the timeline waits for the capture that is still loading");
+        give_up.send(io::Error::other("the disk is full")).expect("the task receives the error");
         let began = Instant::now();
         while !server.get_load_state(loading.id()).is_some_and(|state| state.is_failed()) {
-            assert!(began.elapsed() < TIMEOUT, "the failure is told");
+            assert!(began.elapsed() < TIMEOUT, "the failed load state arrives in time");
             app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
             app.update();
         }
         pass(&mut app, 1);
-        assert_eq!(time(&app, player), 0.25, "it plays without the one that has failed");
+        assert_eq!(time(&app, player), 0.25, "the timeline plays without the failed capture");
     }
 }

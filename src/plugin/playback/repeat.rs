@@ -1,11 +1,11 @@
-//! What happens at the end of the range that is played.
+//! The repeat modes: the behavior at the end of the played range.
 //!
-//! In: a game's choice. Out: [`Repeat`], and the properties of its modes on which the arithmetic of playing depends.
+//! In: a mode. Out: [`Repeat`], and the properties of its modes that the arithmetic of playback uses.
 
 use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 
-/// What happens when the range has been played to its end.
+/// The behavior when the range has been played to its end.
 ///
 /// Default: [`Loop`](Self::Loop).
 ///
@@ -14,7 +14,7 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// ```
 /// use bevy_gs4d::prelude::*;
 ///
-/// /// Half a second before the end of a capture of 2 s, a second passes.
+/// /// Returns the time one second after 1.5 s in a capture of 2 s.
 /// fn time_after(repeat: Repeat) -> f32 {
 ///     let mut playback = Playback { time: 1.5, repeat, ..Playback::default() };
 ///     playback.advance(1.0, 2.0);
@@ -23,17 +23,17 @@ use bevy::reflect::std_traits::ReflectDefault;
 ///
 /// assert_eq!(time_after(Repeat::Once), 2.0, "stopped at the end");
 /// assert_eq!(time_after(Repeat::Loop), 0.5, "started over");
-/// assert_eq!(time_after(Repeat::PingPong), 1.5, "turned round");
+/// assert_eq!(time_after(Repeat::PingPong), 1.5, "reversed at the end");
 /// ```
 #[derive(Reflect, Debug, Default, Clone, Copy, PartialEq, Eq, Hash)]
 #[reflect(Default, Debug, Clone, PartialEq)]
 pub enum Repeat {
-    /// Stops: at the last moment of the range, or at its first one when played backwards.
+    /// Stops at the last moment of the range; played backwards, at the first.
     Once,
-    /// Starts over. The end of the range is its start.
+    /// Starts over. The end of the range is the same moment as its start.
     #[default]
     Loop,
-    /// Ping-pong: turns round at each end of the range.
+    /// Reverses at each end of the range.
     PingPong,
 }
 

@@ -1,6 +1,6 @@
 //! The state of a playback from frame to frame.
 //!
-//! In: what [`advance`](super::advance) leaves after a step. Out: a [`PlaybackState`], which the next step continues.
+//! In: the result of a step of [`advance`](super::advance). Out: a [`PlaybackState`], from which the next step continues.
 
 use super::span::Span;
 use bevy::asset::UntypedAssetId;
@@ -10,30 +10,29 @@ use bevy::ecs::entity::Entity;
 /// The state of a [`Playback`](super::Playback) after the last step. Default: before the first step.
 #[derive(Component, Debug, Default, Clone)]
 pub(super) struct PlaybackState {
-    /// The capture or the timeline that is played; `None` before the first step.
+    /// The played capture or timeline; `None` before the first step.
     pub(super) asset: Option<UntypedAssetId>,
-    /// How far it has played, without the rounding of [`Playback::time`](super::Playback::time).
+    /// The reached phase, without the rounding of [`Playback::time`](super::Playback::time).
     pub(super) phase: f64,
-    /// The range that `phase` is measured in; `None` before the first step.
+    /// The range to which `phase` belongs; `None` before the first step.
     pub(super) span: Option<Span>,
-    /// `time`, `returning` and `playing` of the playback after the last step: if they differ now, the game has set
-    /// them.
+    /// `time`, `returning` and `playing` of the playback after the last step: if the playback's fields differ, the game has set them.
     pub(super) time: f32,
     pub(super) returning: bool,
     pub(super) playing: bool,
-    /// Whether nothing has been played since the last jump: the moment jumped to has not been passed yet.
+    /// Whether no time has been played since the last jump: the target of the jump has not been passed yet.
     pub(super) fresh: bool,
-    /// Whether a shared clock has carried it to its end.
+    /// Whether a follower has reached its end.
     pub(super) over: bool,
     /// The last step along a shared clock.
     pub(super) follow: Option<Follow>,
-    /// Number of its jumps, for those that follow it: seeks, and passes of a loop, which end where they do not begin.
+    /// Number of jumps, for followers: seeks, and wraps of a loop.
     pub(super) jumps: u32,
-    /// The entity that it should follow and cannot, of which the log has been told.
+    /// The entity that cannot be followed and for which a warning has been logged.
     pub(super) warned_of: Option<Entity>,
 }
 
-/// A step along a shared clock. While everything but `phase` stays the same, time passes; otherwise it jumps.
+/// A step along a shared clock. While all fields except `phase` stay the same, time elapses; a change of another field is a jump.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Follow {
     pub(super) clock: Entity,
@@ -44,19 +43,19 @@ pub(super) struct Follow {
 }
 
 impl PlaybackState {
-    /// Returns the state before the first step of something else on the same entity. Those that follow it see a jump.
-    pub(super) fn anew(&self) -> Self {
+    /// Returns the state before the first step of another asset on the same entity. Its first step is a jump for followers.
+    pub(super) fn restarted(&self) -> Self {
         Self { jumps: self.jumps, warned_of: self.warned_of, ..Self::default() }
     }
 
-    /// Begins [`anew`](Self::anew) if another asset than before is played. The time is the game's to set.
+    /// [Restarts](Self::restarted) if another asset than before is played. Does not change the time.
     pub(super) fn play_asset(&mut self, asset: UntypedAssetId) {
         if self.asset != Some(asset) {
-            *self = Self { asset: Some(asset), ..self.anew() };
+            *self = Self { asset: Some(asset), ..self.restarted() };
         }
     }
 
-    /// Returns whether no time has passed yet since its first moment, or the one that was last sought.
+    /// Returns whether no time has been played since the first step or the last seek.
     pub(super) fn is_unplayed(&self) -> bool {
         self.span.is_none() || self.fresh
     }
@@ -65,14 +64,14 @@ impl PlaybackState {
     /// [`Playback::time`](super::Playback::time).
     pub(super) fn seconds(&self) -> f64 {
         match self.span {
-            // Reached by a seek: playing never stops at the end of a loop.
+            // Only a seek leads to the end of a loop: playback wraps there.
             Some(span) if self.is_at_end(&span) => span.end(),
             Some(span) => span.exact(self.phase),
             None => 0.0,
         }
     }
 
-    /// Returns whether it is at the end of a loop, from where playing continues at the start.
+    /// Returns whether the time is at the end of a loop, from where playback continues at the start.
     pub(super) fn is_at_end_of_loop(&self) -> bool {
         self.span.is_some_and(|span| span.repeat().wraps() && self.is_at_end(&span))
     }

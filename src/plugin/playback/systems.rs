@@ -1,7 +1,7 @@
 //! The systems that advance clocks and captures.
 //!
 //! In: Bevy's time, shared clocks, and the duration of each loaded capture. Out: [`Playback::time`] of every entity with a capture,
-//! and messages about what happened; a warning for each entity that was given no capture.
+//! and messages about playback; a warning for each entity without the handle of a capture.
 
 use super::clock::PlaybackClock;
 use super::component::Playback;
@@ -24,16 +24,16 @@ use bevy::time::Time;
 /// Sets of playback systems in `Update`, in this order.
 #[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
 pub enum PlaybackSystems {
-    /// Clocks of the game advance. Set manual clocks `.before` this.
+    /// Clocks with [`ClockSource::Game`](super::ClockSource::Game) advance. Set manual clocks `.before` this set.
     Clocks,
     /// Timelines advance and set up their tracks.
     Timelines,
-    /// Captures advance. Systems `.before` this set can change by how much; systems `.after` it see the time that will be drawn, and may
-    /// still change it.
+    /// Captures advance. Systems `.before` this set can change the speed; systems `.after` it read the time that will be drawn, and may still
+    /// change it.
     Advance,
 }
 
-/// Advances the clocks that the game's time moves.
+/// Advances the clocks with [`ClockSource::Game`](super::ClockSource::Game).
 pub(super) fn run_clocks(time: Res<Time>, mut clocks: Query<&mut PlaybackClock>) {
     let _span = debug_span!("gs4d/clocks").entered();
     for mut clock in &mut clocks {
@@ -43,8 +43,8 @@ pub(super) fn run_clocks(time: Res<Time>, mut clocks: Query<&mut PlaybackClock>)
     }
 }
 
-/// Advances the playback of every capture that has been loaded, those that are followed before their followers. It begins with the first
-/// picture: until then no time passes.
+/// Advances the playback of every loaded capture, followed captures before their followers. No time passes before the first drawn frame of a
+/// capture.
 pub(super) fn advance_captures(
     time: Res<Time>,
     captures: Res<Assets<GaussianCapture>>,
@@ -78,7 +78,7 @@ pub(super) fn advance_captures(
         let Some(capture) = captures.get(&handle.0) else { continue };
         let (next, progress) = state.advance(*playback, drive, capture.duration_seconds());
         *kept = state;
-        // A playback that stands still is not marked as changed.
+        // A playback that does not change is not marked as changed.
         playback.set_if_neq(next);
         let key_frames = capture.key_frames();
         announcer.report(entity, &progress, |announcer, leg| {
@@ -92,20 +92,20 @@ pub(super) fn advance_captures(
     }
 }
 
-/// Warns of each entity that was given the handle of no asset. Tracks get theirs from their timeline.
+/// Logs a warning for each entity with the default handle. Tracks get their handles from their timeline.
 pub(super) fn warn_of_missing_handles(
     captures: Res<Assets<GaussianCapture>>,
     changed: Query<(Entity, &GaussianCapture3d), (Changed<GaussianCapture3d>, Without<TimelineTrack>)>,
 ) {
     for entity in without_handle(&captures, &changed) {
         warn!(
-            "{entity} has a GaussianCapture3d with the handle of no asset, so that nothing is drawn: give it the handle \
-             that AssetServer::load or Assets::add returns"
+            "{entity} has a GaussianCapture3d with the default handle, which has no asset, so that nothing is drawn: set the \
+             handle that AssetServer::load or Assets::add returns"
         );
     }
 }
 
-/// Returns the entities whose handle is the default one, under which no asset has been inserted.
+/// Returns the entities with the default handle, unless an asset has been inserted under that handle.
 fn without_handle<F: QueryFilter>(
     captures: &Assets<GaussianCapture>,
     placed: &Query<(Entity, &GaussianCapture3d), F>,
@@ -122,18 +122,18 @@ mod tests {
     use bevy::ecs::system::RunSystemOnce;
 
     #[test]
-    fn entities_without_a_handle_are_told() {
+    fn entities_with_the_default_handle_are_found() {
         let mut app = App::new();
         app.init_resource::<Assets<GaussianCapture>>();
         let reserved: Handle<GaussianCapture> = app.world().resource::<Assets<GaussianCapture>>().reserve_handle();
         let without = app.world_mut().spawn(GaussianCapture3d::default()).id();
         app.world_mut().spawn(GaussianCapture3d(reserved));
         app.world_mut().spawn(TimelineTrack::default());
-        let told = |captures: Res<Assets<GaussianCapture>>,
+        let find = |captures: Res<Assets<GaussianCapture>>,
                     placed: Query<(Entity, &GaussianCapture3d), Without<TimelineTrack>>| {
             without_handle(&captures, &placed)
         };
-        let told = app.world_mut().run_system_once(told).expect("the assets are there");
-        assert_eq!(told, [without], "not one that is loading, nor a track, whose timeline gives it one");
+        let found = app.world_mut().run_system_once(find).expect("the system's resources exist");
+        assert_eq!(found, [without], "an entity with a reserved handle and a track are not found");
     }
 }

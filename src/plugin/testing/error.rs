@@ -12,13 +12,13 @@ pub enum TestingError {
     /// The machine has no GPU adapter: a reason to skip a test, not to fail it.
     #[error("no GPU adapter: install a Vulkan driver (mesa-vulkan-drivers has one in software)")]
     NoGpu,
-    /// The machine has a GPU adapter, but the app has no renderer that can be watched.
+    /// The machine has a GPU adapter, but the app has no renderer whose pipelines can be monitored.
     #[error(
         "the app has no renderer: make it with bevy_gs4d::testing::app, or add Bevy's RenderPlugin; with PipelinedRenderingPlugin, \
          settle the app before anything else finishes its plugins"
     )]
     NoRenderer,
-    /// A plugin is missing without which what was asked for has no effect.
+    /// A plugin is missing that the called function needs.
     #[error("the app has no {plugin}: add it before the app first runs")]
     NoPlugin {
         /// The plugin.
@@ -27,15 +27,15 @@ pub enum TestingError {
     /// The app has no [`Offscreen`](super::Offscreen).
     #[error("the app has no picture to draw into; make it with bevy_gs4d::testing::app")]
     NotOffscreen,
-    /// An HDR picture was read as one of 8 bits, or the other way round.
+    /// An HDR picture was read as one of 8 bits, or a picture of 8 bits as one in HDR.
     #[error("this picture has {pixels}: read it with bevy_gs4d::testing::{remedy}")]
     Format {
-        /// What its pixels are.
+        /// The pixel format, in words.
         pixels: &'static str,
         /// The function that reads it.
         remedy: &'static str,
     },
-    /// An asset that is waited for cannot be loaded.
+    /// An asset that the app waits for cannot be loaded.
     #[error(transparent)]
     Asset(Arc<AssetLoadError>),
     /// A plugin, an asset or a shader is not ready in time.
@@ -43,7 +43,7 @@ pub enum TestingError {
     Slow {
         /// The time waited, in seconds.
         seconds: u64,
-        /// What is missing.
+        /// The plugin, assets or shaders that are not ready.
         what: String,
     },
     /// A shader or a pipeline does not compile.

@@ -14,7 +14,7 @@ use bevy::input::keyboard::{Key, KeyCode, KeyboardInput, NativeKey};
 use bevy::window::PrimaryWindow;
 use std::time::Duration;
 
-/// Holds a key down from the next update on, until [`release`]. In that update it is `just_pressed`.
+/// Presses a key: from the next update until [`release`] the key is down. In the next update it is `just_pressed`.
 ///
 /// # Errors
 /// An app without Bevy's `InputPlugin`.
@@ -22,7 +22,7 @@ pub fn press(app: &mut App, key: KeyCode) -> Result<(), TestingError> {
     send(app, key, ButtonState::Pressed)
 }
 
-/// Lets a key go: in the next update it is `just_released`.
+/// Releases a key: in the next update it is `just_released`.
 ///
 /// # Errors
 /// An app without Bevy's `InputPlugin`.
@@ -30,10 +30,10 @@ pub fn release(app: &mut App, key: KeyCode) -> Result<(), TestingError> {
     send(app, key, ButtonState::Released)
 }
 
-/// Holds a key down for one update, and lets it go in another. No time passes in either.
+/// Presses a key for one update and releases it in the next. No time passes in either update.
 ///
 /// # Errors
-/// An app without Bevy's `InputPlugin`; one that asks to exit.
+/// An app without Bevy's `InputPlugin`; an app that asks to exit.
 pub fn tap(app: &mut App, key: KeyCode) -> Result<(), TestingError> {
     start(app)?;
     press(app, key)?;

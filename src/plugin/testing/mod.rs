@@ -1,7 +1,7 @@
 //! Pictures of a Bevy app without a window: for tests of games, and for examples that write files.
 //!
 //! In: an app from [`app`], whose cameras draw into an [`Offscreen`] instead of the primary window. Out: pictures, each
-//! at an exact time: time advances only by the steps that are asked for. A software driver of Vulkan is enough.
+//! at an exact time: time advances only by the requested steps. A software driver of Vulkan is enough.
 //!
 //! # Render a Bevy app to an image in ten lines
 //!
@@ -21,10 +21,10 @@
 //! # Ok::<(), testing::TestingError>(())
 //! ```
 //!
-//! [`picture`] waits until every capture and timeline in the world has been loaded; [`wait_for`] adds other assets of a game. Without any
-//! GPU, everything that draws returns [`TestingError::NoGpu`]: a test can print it and return.
+//! [`picture`] waits until every capture and timeline in the world has been loaded; [`wait_for`] adds other assets of a game. Without a
+//! GPU, every function that draws returns [`TestingError::NoGpu`]: a test can print this error and return.
 //!
-//! # Play a game without looking at it
+//! # Play a game without drawing it
 //!
 //! [`step`] advances time frame by frame, [`press`], [`release`] and [`tap`] use the keyboard. Neither needs a GPU:
 //!
@@ -45,6 +45,8 @@
 //! ```
 
 mod error;
+mod gpu;
+mod headless;
 mod keys;
 mod offscreen;
 mod pipelines;
@@ -54,9 +56,11 @@ mod waiting;
 mod window;
 
 pub use error::TestingError;
+pub use gpu::has_gpu;
+pub use headless::{app, app_with};
 pub use image::{Rgba32FImage, RgbaImage};
 pub use keys::{press, release, tap};
-pub use offscreen::{Offscreen, app, app_with, has_gpu};
+pub use offscreen::Offscreen;
 pub use readback::{picture, pictures, read, read_hdr, save};
 pub use stepping::step;
 pub use waiting::{settle, wait_for};

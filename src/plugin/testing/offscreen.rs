@@ -1,33 +1,20 @@
-//! The app without a window.
+//! The picture that an app draws into, instead of a window.
 //!
-//! In: the size of a picture. Out: an app with Bevy's default plugins that draws into a picture, and in which time stands still.
+//! In: the size of a picture, and whether it is in HDR. Out: an [`Offscreen`], which is the target of cameras.
 
-use super::window::add_window;
-use crate::renderer::GpuContext;
-use bevy::DefaultPlugins;
-use bevy::app::{App, PluginGroup, PluginGroupBuilder};
-use bevy::asset::{AssetPlugin, Assets, Handle, UnapprovedPathMode};
+use bevy::asset::{Assets, Handle};
 use bevy::camera::RenderTarget;
 use bevy::ecs::resource::Resource;
 use bevy::image::Image;
-use bevy::log::{DEFAULT_FILTER, LogPlugin};
-use bevy::render::RenderPlugin;
-use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
 use bevy::render::render_resource::{TextureFormat, TextureUsages};
-use bevy::render::settings::{Backends, RenderCreation, WgpuSettings};
-use bevy::time::{Time, TimeUpdateStrategy, Virtual};
-use bevy::window::{ExitCondition, WindowPlugin};
-use bevy::winit::WinitPlugin;
 use glam::UVec2;
-use std::sync::OnceLock;
-use std::time::Duration;
 
-/// A picture that cameras draw into. [`app`] inserts one as a resource, for all cameras whose target is the primary window.
+/// A picture that cameras draw into. [`app`](super::app) inserts one as a resource, for all cameras whose target is the primary window.
 #[derive(Resource, Debug, Clone)]
 pub struct Offscreen {
     /// The picture on the GPU: RGBA, 8 bits each, sRGB-encoded; or in [HDR](Self::hdr).
     pub image: Handle<Image>,
-    /// Its width and height in pixels.
+    /// Width and height in pixels.
     pub size: UVec2,
 }
 
@@ -38,7 +25,7 @@ impl Offscreen {
         Self::of(images, size, TextureFormat::Rgba8UnormSrgb)
     }
 
-    /// Creates a picture in HDR: RGBA in linear light, 16 bits of float each, as bright as the camera makes it;
+    /// Creates a picture in HDR: RGBA in linear light, 16-bit floats, not clamped;
     /// [`read_hdr`](super::read_hdr) returns it. Cameras that draw into it need [`Hdr`](bevy::camera::Hdr). `size` as in
     /// [`new`](Self::new).
     ///
@@ -67,55 +54,9 @@ impl Offscreen {
         Self { image: images.add(image), size }
     }
 
-    /// Returns the target for cameras, beside their `Camera3d`. Cameras of the primary window get that of the app's own picture
-    /// automatically.
+    /// Returns the render target to insert on the entity of a `Camera3d`. Cameras of the primary window draw into the app's own picture
+    /// without it.
     pub fn target(&self) -> RenderTarget {
         RenderTarget::Image(self.image.clone().into())
     }
-}
-
-/// Returns whether this machine has a GPU adapter; a software driver counts.
-pub fn has_gpu() -> bool {
-    static FOUND: OnceLock<bool> = OnceLock::new();
-    *FOUND.get_or_init(|| !GpuContext::adapters().is_empty())
-}
-
-/// Returns an app with Bevy's `DefaultPlugins`, without a window, with time standing still, and with an [`Offscreen`] of `size` pixels.
-///
-/// Add plugins, resources and systems to it as to any app; [`picture`](super::picture) runs it. Cameras whose target is the primary window
-/// draw into the picture, one over the other in their order: a user interface, or a `Camera2d` over the scene, is in it, too. The window
-/// is an entity that no display shows. Without a GPU nothing is drawn and everything else works.
-pub fn app(size: UVec2) -> App {
-    app_with(size, |plugins| plugins)
-}
-
-/// Like [`app`], for games that set or disable some of the `DefaultPlugins`: `adjust` gets the group as [`app`] would add it.
-pub fn app_with(size: UVec2, adjust: impl FnOnce(PluginGroupBuilder) -> PluginGroupBuilder) -> App {
-    let settings = WgpuSettings { backends: has_gpu().then(backends), ..WgpuSettings::default() };
-    let plugins = DefaultPlugins
-        .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..WindowPlugin::default() })
-        // Bevy logs a read-back that is abandoned as a warning.
-        .set(LogPlugin { filter: format!("{DEFAULT_FILTER},bevy_render::gpu_readback=error"), ..LogPlugin::default() })
-        .set(AssetPlugin { unapproved_path_mode: UnapprovedPathMode::Allow, ..AssetPlugin::default() })
-        .set(RenderPlugin {
-            render_creation: RenderCreation::Automatic(Box::new(settings)),
-            synchronous_pipeline_compilation: true,
-            ..RenderPlugin::default()
-        })
-        .disable::<WinitPlugin>()
-        // Without pipelining, a picture belongs to the update that drew it.
-        .disable::<PipelinedRenderingPlugin>();
-    let mut app = App::new();
-    app.add_plugins(adjust(plugins)).insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
-    // Bevy's default would cut steps to a quarter of a second.
-    app.world_mut().get_resource_or_init::<Time<Virtual>>().set_max_delta(Duration::MAX);
-    let offscreen = Offscreen::new(&mut app.world_mut().get_resource_or_init::<Assets<Image>>(), size);
-    add_window(&mut app, &offscreen);
-    app.insert_resource(offscreen);
-    app
-}
-
-/// Returns the backends to use. Without DX12 among them, wgpu needs no extra dispatch to validate each indirect one.
-fn backends() -> Backends {
-    if cfg!(target_os = "linux") { Backends::VULKAN } else { Backends::PRIMARY }
 }

@@ -1,10 +1,10 @@
-//! Whether the pipelines of an app are compiled, as seen from the main world.
+//! The compile state of an app's pipelines, for the main world.
 //!
 //! In: the pipeline cache of the render world, after every frame. Out: [`PipelineReport`], which both worlds share:
-//! with pipelined rendering the render world is on another thread and cannot be accessed.
+//! with pipelined rendering the render world is on another thread and the main world cannot access it.
 
 use super::error::TestingError;
-use super::offscreen::has_gpu;
+use super::gpu::has_gpu;
 use bevy::app::App;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::schedule::IntoScheduleConfigs;
@@ -14,7 +14,7 @@ use bevy::render::{Render, RenderApp, RenderSystems};
 use bevy::shader::ShaderCacheError;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The pipelines as of the newest frame that has been drawn.
+/// The state of all pipelines after the newest drawn frame.
 #[derive(Resource, Clone, Default)]
 struct PipelineReport(Arc<Mutex<State>>);
 
@@ -27,7 +27,7 @@ enum State {
     Failed(String),
 }
 
-/// Starts reporting, before the app's first update, if the app has a renderer.
+/// Adds the report to an app that has a renderer. Call this before the app's first update.
 pub(super) fn watch_pipelines(app: &mut App) {
     if app.world().contains_resource::<PipelineReport>() {
         return;
@@ -71,7 +71,7 @@ fn report_pipelines(report: Res<PipelineReport>, cache: Option<Res<PipelineCache
 fn state_of(cache: &PipelineCache) -> State {
     for pipeline in cache.pipelines() {
         match &pipeline.state {
-            // Bevy tries these again: the shader is still being loaded.
+            // Bevy compiles these again later: the shader is still being loaded.
             CachedPipelineState::Err(
                 ShaderCacheError::ShaderNotLoaded(_) | ShaderCacheError::ShaderImportNotYetAvailable,
             ) => return State::Waiting,

@@ -1,6 +1,6 @@
-//! Taking pictures.
+//! Pictures of an app, read back from the GPU.
 //!
-//! In: an app, and a step of time. Out: the picture that its cameras draw after that step, in memory or as a PNG file.
+//! In: an app and a time step. Out: the picture that the app's cameras draw after that step, in memory or as a PNG file.
 
 use super::error::TestingError;
 use super::offscreen::Offscreen;
@@ -23,26 +23,26 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Longest time that a read-back may take: not a number of updates, since a GPU that is busy for others may be slow to answer.
+/// Longest time that a read-back may take. A limit in updates would fail on a GPU that is busy with the work of other processes.
 const READBACK: Duration = Duration::from_secs(60);
 
-/// Waits until all assets are loaded, advances time by `step` in one update, and returns the picture of that time: of the app's own
-/// [`Offscreen`].
+/// Waits until all assets are loaded, advances time by `step` in one update, and returns the picture in the app's own [`Offscreen`] at
+/// that time.
 ///
 /// # Errors
-/// Those of [`settle`]; an app without [`Offscreen`], or with one in HDR; a read-back from the GPU that fails.
+/// The errors of [`settle`]; an app without [`Offscreen`], or with an [`Offscreen`] in HDR; a read-back from the GPU that fails.
 pub fn picture(app: &mut App, step: Duration) -> Result<RgbaImage, TestingError> {
     require_renderer(app)?;
     let offscreen = app.world().get_resource::<Offscreen>().cloned().ok_or(TestingError::NotOffscreen)?;
     load(app)?;
     advance(app, step)?;
     settle(app)?;
-    // The game may have resized it.
+    // The game may have replaced or resized the picture.
     let offscreen = app.world().get_resource::<Offscreen>().cloned().unwrap_or(offscreen);
     read(app, &offscreen)
 }
 
-/// Returns another picture as it was last drawn, at the time of the last [`picture`] or [`step`](super::step).
+/// Returns a picture as it was last drawn, at the time of the last [`picture`] or [`step`](super::step).
 ///
 /// # Errors
 /// Errors of drawing; a picture in HDR; a read-back from the GPU that fails.
@@ -54,8 +54,8 @@ pub fn read(app: &mut App, offscreen: &Offscreen) -> Result<RgbaImage, TestingEr
     RgbaImage::from_raw(size.x, size.y, pixels(app, offscreen, 4)?).ok_or(TestingError::Readback)
 }
 
-/// Returns a picture in HDR as it was last drawn: RGBA in linear light, not clamped, as the camera wrote it. A camera's tonemapping comes
-/// before that; with `Tonemapping::None` there is none.
+/// Returns a picture in HDR as it was last drawn: RGBA in linear light, not clamped. The camera's tonemapping has been applied;
+/// `Tonemapping::None` applies none.
 ///
 /// # Errors
 /// Errors of drawing; a picture that was not made by [`Offscreen::hdr`]; a read-back from the GPU that fails.
@@ -75,7 +75,7 @@ fn is_hdr(app: &App, offscreen: &Offscreen) -> bool {
     image.is_some_and(|image| image.texture_descriptor.format == TextureFormat::Rgba16Float)
 }
 
-/// Returns the pixels of a picture, of so many bytes each.
+/// Returns the pixels of a picture, row by row without padding. `bytes` is the size of a pixel.
 fn pixels(app: &mut App, offscreen: &Offscreen, bytes: usize) -> Result<Vec<u8>, TestingError> {
     require_renderer(app)?;
     start(app)?;
@@ -101,17 +101,18 @@ fn wait(app: &mut App, arrived: &Mutex<Option<Vec<u8>>>) -> Result<Vec<u8>, Test
     Err(TestingError::Readback)
 }
 
-/// Removes the padding of a texture that was read back, with so many bytes a pixel: its rows are padded to a multiple of 256 bytes.
+/// Removes the row padding of a texture that was read back: its rows are padded to a multiple of 256 bytes. `bytes` is the size of a
+/// pixel.
 fn unpadded(data: &[u8], size: UVec2, bytes: usize) -> Vec<u8> {
     let row = size.x as usize * bytes;
     data.chunks(row.next_multiple_of(256)).flat_map(|padded| padded.iter().take(row).copied()).collect()
 }
 
-/// Takes `frames` pictures, `step` apart and the first without a step, and writes them into `folder` as `0000.png`, `0001.png` and so on.
-/// Returns their paths.
+/// Writes `frames` pictures into `folder` as `0000.png`, `0001.png` and so on, and returns their paths. The first shows the current time,
+/// each further picture is `step` later.
 ///
 /// # Errors
-/// Those of [`picture`] and [`save`].
+/// The errors of [`picture`] and [`save`].
 pub fn pictures(app: &mut App, folder: &Path, frames: u32, step: Duration) -> Result<Vec<PathBuf>, TestingError> {
     let digits = frames.to_string().len().max(4);
     let mut paths = Vec::new();
@@ -124,7 +125,7 @@ pub fn pictures(app: &mut App, folder: &Path, frames: u32, step: Duration) -> Re
     Ok(paths)
 }
 
-/// Writes a picture as PNG, whole or not at all, and creates the folder if there is none.
+/// Writes a picture as a PNG file, completely or not at all, and creates the folder if it does not exist.
 ///
 /// # Errors
 /// A folder that cannot be created or written to, a full disk.
@@ -144,7 +145,7 @@ fn write_png(picture: &RgbaImage, path: &Path) -> io::Result<()> {
     let partial = path.with_extension("png.part");
     let written = std::fs::write(&partial, png).and_then(|()| std::fs::rename(&partial, path));
     if written.is_err() {
-        // Removing may fail, too; the first error is the one to report.
+        // A failure to remove the partial file is ignored: the first error is returned.
         std::fs::remove_file(&partial).ok();
     }
     written
@@ -155,14 +156,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_lose_their_padding_and_nothing_else() {
+    fn only_the_row_padding_is_removed() {
         let size = UVec2::new(3, 2);
         let mut padded = vec![0; 512];
         padded[..12].copy_from_slice(&[1; 12]);
         padded[256..268].copy_from_slice(&[2; 12]);
         let expected: Vec<u8> = [[1; 12], [2; 12]].concat();
-        assert_eq!(unpadded(&padded, size, 4), expected, "the rows, one after the other");
-        assert_eq!(unpadded(&[7; 512], UVec2::new(64, 2), 4), [7; 512], "rows of 256 bytes have none");
-        assert_eq!(unpadded(&[7; 512], UVec2::new(32, 2), 8), [7; 512], "nor have those of larger pixels");
+        assert_eq!(unpadded(&padded, size, 4), expected, "12 bytes of each row remain");
+        assert_eq!(unpadded(&[7; 512], UVec2::new(64, 2), 4), [7; 512], "rows of 256 bytes have no padding");
+        assert_eq!(unpadded(&[7; 512], UVec2::new(32, 2), 8), [7; 512], "rows of 32 pixels of 8 bytes have no padding");
     }
 }

@@ -1,6 +1,6 @@
-//! Time without pictures.
+//! Time steps without pictures.
 //!
-//! In: an app, and a time to pass. Out: the same app, that much later.
+//! In: an app and a duration. Out: the same app after that duration.
 
 use super::error::TestingError;
 use super::waiting::{load, update};
@@ -8,19 +8,19 @@ use bevy::app::App;
 use bevy::time::{TimePlugin, TimeUpdateStrategy};
 use std::time::Duration;
 
-/// Time that one update of [`step`] advances, but for the last: a frame of most displays.
+/// Duration of each update of [`step`] except the last: one frame at 60 Hz.
 const FRAME: Duration = Duration::from_nanos(16_666_667);
 
-/// Waits until all assets are loaded, and advances the app by exactly `duration`: in updates of a 60th of a second, and a last one of what
-/// is left. Then time stands still.
+/// Waits until all assets are loaded and advances the app by exactly `duration`, in updates of a 60th of a second and a shorter last
+/// update. No time passes afterwards.
 ///
-/// Systems run as often as in a game. [`picture`](super::picture) makes the whole step in one update instead. Needs no GPU; any app with
-/// Bevy's `TimePlugin` will do. The game's own clock may be paused or slowed down meanwhile, as ever.
+/// Systems run as often as in a game at 60 Hz; [`picture`](super::picture) makes the whole step in one update instead. Needs no GPU, only an
+/// app with Bevy's `TimePlugin`. Pausing or scaling `Time<Virtual>` works as in a game.
 ///
 /// # Errors
 /// An app without `TimePlugin`; an asset that cannot be loaded, or not within two minutes; errors of drawing.
 pub fn step(app: &mut App, duration: Duration) -> Result<(), TestingError> {
-    // While assets are loaded, no time passes in other apps than our own, either.
+    // No time passes while assets are loaded, also in apps that `testing::app` did not create.
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
     load(app)?;
     let mut left = duration;

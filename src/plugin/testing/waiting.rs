@@ -1,7 +1,7 @@
-//! Running an app until everything is drawn.
+//! Running an app until all assets are drawn.
 //!
-//! In: an app, and hooks that return the assets it still needs. Out: the same app with those loaded and uploaded, every pipeline
-//! compiled, and no time passed.
+//! In: an app, and hooks that return the assets it still needs. Out: the same app with these assets loaded and uploaded and every pipeline
+//! compiled. No time has passed.
 
 use super::error::TestingError;
 use super::pipelines::{pipelines_are_ready, require_renderer, watch_pipelines};
@@ -15,16 +15,16 @@ use bevy::ecs::resource::Resource;
 use bevy::ecs::world::World;
 use std::time::{Duration, Instant};
 
-/// How long plugins, assets and pipelines may take to get ready, to load and to compile.
+/// Longest time for plugins to get ready, for assets to load and for pipelines to compile.
 const LOAD_TIMEOUT: Duration = Duration::from_secs(120);
-/// Number of updates after which everything that has been loaded and uploaded is drawn, in buffers that grow by the counts of an earlier
-/// frame.
+/// Number of updates after which all uploaded captures are drawn completely. Buffers grow by the counts of an earlier frame, so a first
+/// frame may lack room.
 const SETTLING: usize = 3;
 
-/// Returns the assets that are needed and not loaded yet.
+/// A function that returns the assets that are needed and not loaded yet.
 type Hook = fn(&mut World) -> Vec<UntypedAssetId>;
 
-/// The hooks that return what to wait for.
+/// The hooks that return the assets to wait for.
 #[derive(Resource, Clone)]
 struct Awaited(Vec<Hook>);
 
@@ -34,8 +34,9 @@ impl Default for Awaited {
     }
 }
 
-/// Makes [`settle`] and everything that takes pictures wait for more than captures and timelines: for each asset that `missing` returns,
-/// until it no longer returns it or the asset server no longer tracks it. An asset that cannot be loaded is an error.
+/// Makes [`settle`] and all functions that take pictures wait for further assets besides captures and timelines: for each asset that
+/// `missing` returns, until `missing` no longer returns it or the asset server no longer tracks it. An asset that cannot be loaded is an
+/// error.
 ///
 /// # Examples
 ///
@@ -56,7 +57,7 @@ pub fn wait_for(app: &mut App, missing: fn(&mut World) -> Vec<UntypedAssetId>) {
     app.world_mut().get_resource_or_init::<Awaited>().0.push(missing);
 }
 
-/// Runs the app until every capture and timeline in its world has been loaded and everything is drawn.
+/// Runs the app until every capture and timeline in its world is loaded and drawn.
 ///
 /// # Errors
 /// [`TestingError::NoGpu`]; an app without a renderer, or without [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) though it has
@@ -69,7 +70,7 @@ pub fn settle(app: &mut App) -> Result<(), TestingError> {
         for _ in 0..SETTLING {
             update(app)?;
         }
-        // What has been loaded may need pipelines that are compiled in the background, and may have changed.
+        // Loaded assets may need pipelines that are compiled in the background, and captures may have changed.
         if pipelines_are_ready(app)? && uploading(app.world_mut()).is_empty() {
             return Ok(());
         }
@@ -147,28 +148,28 @@ fn missing(world: &mut World) -> Result<Vec<String>, TestingError> {
             Some(LoadState::NotLoaded | LoadState::Loading) => {
                 missing.push(server.get_path(id).map_or_else(|| id.to_string(), |path| path.to_string()));
             }
-            // Removed by the game, or not loaded by the server: it will never be ready.
+            // The game has removed the asset, or the server does not load it: it will never be ready.
             Some(LoadState::Loaded) | None => {}
         }
     }
     Ok(missing)
 }
 
-/// Returns what of captures that have been loaded is not drawn yet.
+/// Returns the names of loaded captures that are not drawn yet.
 fn uploading(world: &mut World) -> Vec<String> {
     let mut spawned = world.query::<(&GaussianCapture3d, &CaptureState)>();
     let players = players(world);
     let Some(loaded) = world.get_resource::<Assets<GaussianCapture>>() else { return Vec::new() };
     let waiting = spawned.iter(world).filter(|(_, state)| **state == CaptureState::Loading);
     let waiting = waiting.map(|(capture, _)| capture.0.id()).filter(|id| loaded.contains(*id));
-    // Those of later clips are on no entity yet, and timelines wait for them.
+    // Captures of later clips are on no entity yet, and timelines wait for them.
     let uploads = world.get_resource::<Uploads>();
     let is_awaited = |id: AssetId<GaussianCapture>| uploads.is_some_and(|uploads| uploads.awaits(id));
     let clips = clips(world, &players).into_iter().filter(|id| loaded.contains(*id) && is_awaited(*id));
     let waiting = waiting.chain(clips);
-    // Of those that have changed, older versions are drawn.
+    // Of changed captures, the older version is drawn.
     let changed = world.get_resource::<CaptureStatistics>().map_or(0, CaptureStatistics::uploading_captures);
-    waiting.map(|id| id.to_string()).chain((changed > 0).then(|| format!("{changed} captures on their way"))).collect()
+    waiting.map(|id| id.to_string()).chain((changed > 0).then(|| format!("{changed} changed captures"))).collect()
 }
 
 fn captures(world: &mut World) -> Vec<UntypedAssetId> {
@@ -176,7 +177,7 @@ fn captures(world: &mut World) -> Vec<UntypedAssetId> {
     absent(world, spawned.iter(world).map(|capture| capture.0.id()))
 }
 
-/// Returns the timelines that are needed, and the captures of those that have been loaded.
+/// Returns the timelines that are needed, and the captures that loaded timelines need.
 fn timelines(world: &mut World) -> Vec<UntypedAssetId> {
     let players = players(world);
     let Some(timelines) = world.get_resource::<Assets<Timeline>>() else { return Vec::new() };
@@ -191,7 +192,7 @@ fn players(world: &mut World) -> Vec<AssetId<Timeline>> {
     players.iter(world).map(|player| player.0.id()).collect()
 }
 
-/// Returns the captures of those timelines that have been loaded.
+/// Returns the captures of the loaded timelines among `players`.
 fn clips(world: &World, players: &[AssetId<Timeline>]) -> Vec<AssetId<GaussianCapture>> {
     let Some(timelines) = world.get_resource::<Assets<Timeline>>() else { return Vec::new() };
     let loaded = players.iter().filter_map(|player| timelines.get(*player));
@@ -199,7 +200,7 @@ fn clips(world: &World, players: &[AssetId<Timeline>]) -> Vec<AssetId<GaussianCa
     clips.map(|clip| clip.capture.id()).collect()
 }
 
-/// Returns those that are not among the assets.
+/// Returns the captures that are not among the assets.
 fn absent(world: &World, captures: impl Iterator<Item = AssetId<GaussianCapture>>) -> Vec<UntypedAssetId> {
     let Some(loaded) = world.get_resource::<Assets<GaussianCapture>>() else { return Vec::new() };
     captures.filter(|capture| !loaded.contains(*capture)).map(AssetId::untyped).collect()
@@ -222,21 +223,21 @@ mod tests {
     }
 
     #[test]
-    fn a_plugin_that_is_never_ready_is_not_waited_for_forever() {
+    fn waiting_for_a_plugin_that_is_never_ready_ends_with_an_error() {
         let mut app = App::new();
         app.add_plugins((MinimalPlugins, Endless));
         let waited = finish_plugins(&mut app, Duration::from_millis(5));
-        assert!(matches!(waited, Err(TestingError::Slow { .. })), "it is given up: {waited:?}");
+        assert!(matches!(waited, Err(TestingError::Slow { .. })), "waiting ends after the limit: {waited:?}");
     }
 
     #[test]
-    fn plugins_are_finished_once_however_far_they_are() {
+    fn finishing_plugins_again_changes_nothing() {
         let mut app = App::new();
         app.add_plugins(MinimalPlugins);
         app.finish();
         for _ in 0..2 {
-            finish_plugins(&mut app, LOAD_TIMEOUT).expect("they are ready");
-            assert_eq!(app.plugins_state(), PluginsState::Cleaned, "nothing is left to do");
+            finish_plugins(&mut app, LOAD_TIMEOUT).expect("all plugins are ready");
+            assert_eq!(app.plugins_state(), PluginsState::Cleaned, "all plugins are finished and cleaned up");
         }
     }
 }

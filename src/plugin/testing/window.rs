@@ -1,10 +1,11 @@
 //! The window of an app without a window.
 //!
-//! In: cameras whose target is the primary window. Out: a primary window that no display shows, as large as the [`Offscreen`], and that
-//! picture as these cameras' target from the end of each update, when the frame is extracted and drawn, to the start of the next.
+//! In: cameras whose target is the primary window. Out: a primary window that no display shows, as large as the [`Offscreen`]; and the
+//! [`Offscreen`] as the target of these cameras from the end of each update, when the frame is extracted and drawn, to the start of the
+//! next update.
 //!
-//! To everything that runs in between they are cameras of the window. Bevy draws a user interface with the last of those unless told
-//! otherwise, and sends the pointer's events to them.
+//! During an update these cameras have the window as their target. Bevy draws a user interface with the last camera of the window by
+//! default, and sends pointer events to the cameras of the window.
 
 use super::offscreen::Offscreen;
 use bevy::app::{App, First, Last, PostUpdate};
@@ -21,11 +22,11 @@ use bevy::ecs::system::{Query, Res, ResMut};
 use bevy::image::Image;
 use bevy::window::{PrimaryWindow, Window, WindowRef, WindowResized, WindowResolution};
 
-/// The cameras that draw into a picture instead of the window, with their own targets and the picture.
+/// The cameras that currently draw into a picture instead of the window: each with its own target and the picture.
 #[derive(Resource, Default)]
 struct Lent(Vec<(Entity, RenderTarget, AssetId<Image>)>);
 
-/// Adds the window, unless the game's own plugins have added one, and the systems that draw its cameras into the [`Offscreen`].
+/// Adds a window, unless the game's own plugins have added one, and the systems that make its cameras draw into the [`Offscreen`].
 pub(super) fn add_window(app: &mut App, offscreen: &Offscreen) {
     let world = app.world_mut();
     let is_there = world.query_filtered::<Entity, With<PrimaryWindow>>().iter(world).next().is_some();
@@ -34,12 +35,12 @@ pub(super) fn add_window(app: &mut App, offscreen: &Offscreen) {
         world.spawn((Window { resolution, ..Window::default() }, PrimaryWindow));
     }
     app.init_resource::<Lent>()
-        .add_systems(First, give_back)
+        .add_systems(First, restore)
         .add_systems(PostUpdate, fit_window.run_if(resource_exists::<Offscreen>).before(CameraUpdateSystems))
         .add_systems(Last, lend.run_if(resource_exists::<Offscreen>));
 }
 
-/// Makes the window as large as the picture, whatever the game sets, and says so as a display would.
+/// Resizes the window to the size of the picture, also after the game has resized it, and sends [`WindowResized`] as a display would.
 fn fit_window(
     offscreen: Res<Offscreen>,
     mut windows: Query<(Entity, &mut Window), With<PrimaryWindow>>,
@@ -57,7 +58,7 @@ fn fit_window(
     }
 }
 
-/// Gives the cameras of the window the picture as their target. No change is marked: the game has made none.
+/// Sets the picture as the target of the window's cameras, without marking the component as changed: the game did not change it.
 fn lend(
     offscreen: Res<Offscreen>,
     windows: Query<(), With<PrimaryWindow>>,
@@ -77,8 +78,8 @@ fn lend(
     }
 }
 
-/// Gives the cameras their own targets back, but for those that have been given another one since.
-fn give_back(mut targets: Query<&mut RenderTarget>, mut lent: ResMut<Lent>) {
+/// Restores the cameras' own targets, except where the game has set another target since.
+fn restore(mut targets: Query<&mut RenderTarget>, mut lent: ResMut<Lent>) {
     for (camera, own, picture) in lent.0.drain(..) {
         if let Ok(mut target) = targets.get_mut(camera)
             && target.as_image().map(Handle::id) == Some(picture)

@@ -1,6 +1,6 @@
 //! The timeline in memory: tracks of clips, and markers.
 //!
-//! In: tracks and markers, in any order. Out: a valid [`Timeline`], in order of time, or an [`InvalidTimeline`].
+//! In: tracks and markers, in any order. Out: a valid [`Timeline`], sorted by time, or an [`InvalidTimeline`].
 
 use super::clip::{Clip, TOUCH, is_time};
 use super::error::InvalidTimeline;
@@ -9,7 +9,7 @@ use bevy::asset::{Asset, VisitAssetDependencies};
 use bevy::reflect::TypePath;
 use std::collections::HashSet;
 
-/// Which captures play when: an asset. Play it with a [`TimelinePlayer`](super::TimelinePlayer).
+/// The times at which captures play: an asset. Play it with a [`TimelinePlayer`](super::TimelinePlayer).
 ///
 /// # Examples
 ///
@@ -22,7 +22,7 @@ use std::collections::HashSet;
 /// let clip = Clip { capture, start: 1.0, range: [0.0, 4.0], speed: 2.0, fade: [0.5, 0.0] };
 /// let track = Track { name: "left".into(), clips: vec![clip] };
 /// let timeline = Timeline::new(vec![track], vec![Marker { time: 2.0, name: "cut".into() }], None)?;
-/// assert_eq!(timeline.duration_seconds(), 3.0, "from 1 s on, four seconds of the capture at twice the speed");
+/// assert_eq!(timeline.duration_seconds(), 3.0, "four seconds of the capture at twice the speed, starting at 1 s");
 /// # Ok::<(), InvalidTimeline>(())
 /// ```
 #[derive(Asset, TypePath, Debug, Clone, PartialEq)]
@@ -36,15 +36,15 @@ pub struct Timeline {
 /// Clips that play one after the other on one entity.
 #[derive(VisitAssetDependencies, Debug, Clone, PartialEq)]
 pub struct Track {
-    /// The name of the [`TimelineTrack`](super::TimelineTrack) that plays it; unique in the timeline.
+    /// The name of the [`TimelineTrack`](super::TimelineTrack) that plays the track; unique in the timeline.
     pub name: String,
-    /// Its clips, which may touch but not overlap.
+    /// The clips of the track, which may touch but not overlap.
     #[dependency]
     pub clips: Vec<Clip>,
 }
 
 impl Timeline {
-    /// Creates a timeline that lasts until its last clip or marker or, if given, for `duration` seconds.
+    /// Creates a timeline that lasts until the end of its last clip or marker or, if given, for `duration` seconds.
     ///
     /// # Errors
     /// The first invalid track, clip, marker or duration.
@@ -91,25 +91,25 @@ impl Timeline {
         &self.markers
     }
 
-    /// Returns its duration in seconds.
+    /// Returns the duration of the timeline in seconds.
     pub fn duration_seconds(&self) -> f32 {
         self.duration
     }
 
-    /// Returns the track with a name; `None` if there is none.
+    /// Returns the track named `name`; `None` if there is none.
     pub fn track(&self, name: &str) -> Option<&Track> {
         self.tracks.iter().find(|track| track.name == name)
     }
 }
 
 impl Track {
-    /// Returns the last clip that has begun at `time`, in seconds of the timeline, whether it still plays or not;
-    /// before the first clip, the first. `None` if the track has no clip.
+    /// Returns the last clip that has begun at `time`, in seconds of the timeline, also if the clip has ended; before the first clip, the
+    /// first. `None` if the track has no clip.
     pub fn clip_at(&self, time: f64) -> Option<&Clip> {
         self.clips.iter().rev().find(|clip| clip.has_begun(time)).or(self.clips.first())
     }
 
-    /// Checks the clips and sorts them. Returns when the last one ends, in seconds of the timeline.
+    /// Checks the clips and sorts them. Returns the end of the last clip, in seconds of the timeline.
     fn check(&mut self) -> Result<f32, InvalidTimeline> {
         for (index, clip) in self.clips.iter().enumerate() {
             clip.check(&self.name, index + 1)?;
@@ -147,50 +147,51 @@ mod tests {
     }
 
     fn refused(clips: Vec<Clip>) -> String {
-        Timeline::new(vec![track("left", clips)], Vec::new(), None).expect_err("makes no sense").to_string()
+        Timeline::new(vec![track("left", clips)], Vec::new(), None).expect_err("the clips are invalid").to_string()
     }
 
     #[test]
-    fn a_timeline_is_put_in_order_and_lasts_until_all_is_over() {
+    fn a_timeline_is_sorted_and_lasts_until_its_last_clip_or_marker() {
         let clips = vec![clip(2.0, [0.0, 1.0], 1.0), clip(0.0, [0.0, 4.0], 2.0)];
         let markers = [(3.5, "b"), (0.5, "a")].map(|(time, name)| Marker { time, name: name.into() });
-        let timeline = Timeline::new(vec![track("left", clips)], markers.to_vec(), None).expect("makes sense");
+        let timeline =
+            Timeline::new(vec![track("left", clips)], markers.to_vec(), None).expect("the timeline is valid");
         let starts: Vec<f32> = timeline.tracks()[0].clips.iter().map(|clip| clip.start).collect();
-        assert_eq!(starts, [0.0, 2.0], "clips by start; those that touch do not overlap");
-        assert_eq!(timeline.markers()[0].name, "a", "markers by time");
-        assert_eq!(timeline.duration_seconds(), 3.5, "until the last marker");
-        let longer = Timeline::new(timeline.tracks.clone(), Vec::new(), Some(9.0)).expect("makes sense");
-        assert_eq!(longer.duration_seconds(), 9.0, "or as long as given");
+        assert_eq!(starts, [0.0, 2.0], "clips are sorted by start, and touching clips do not overlap");
+        assert_eq!(timeline.markers()[0].name, "a", "markers are sorted by time");
+        assert_eq!(timeline.duration_seconds(), 3.5, "the timeline lasts until its last marker");
+        let longer = Timeline::new(timeline.tracks.clone(), Vec::new(), Some(9.0)).expect("the timeline is valid");
+        assert_eq!(longer.duration_seconds(), 9.0, "a given duration is used");
     }
 
     #[test]
-    fn the_clip_of_a_moment_is_the_last_that_has_begun() {
+    fn the_clip_at_a_time_is_the_last_that_has_begun() {
         let clips = vec![clip(1.0, [0.0, 1.0], 1.0), clip(3.0, [2.0, 3.0], 1.0)];
-        let timeline = Timeline::new(vec![track("left", clips)], Vec::new(), None).expect("makes sense");
-        let track = timeline.track("left").expect("there it is");
+        let timeline = Timeline::new(vec![track("left", clips)], Vec::new(), None).expect("the timeline is valid");
+        let track = timeline.track("left").expect("the timeline has this track");
         let at = |time| track.clip_at(time).map(|clip| (clip.start, clip.shows(time, 4.0)));
-        assert_eq!(at(0.0), Some((1.0, false)), "before the first, the first, unseen");
-        assert_eq!(at(1.0), Some((1.0, true)), "from its start");
-        assert_eq!(at(2.0), Some((1.0, false)), "until its end");
-        assert_eq!(at(3.5), Some((3.0, true)), "the second");
-        assert_eq!(at(4.0), Some((3.0, true)), "what ends with the timeline stays");
-        assert!(timeline.track("right").is_none(), "no such track");
+        assert_eq!(at(0.0), Some((1.0, false)), "before the first clip, the first clip is hidden");
+        assert_eq!(at(1.0), Some((1.0, true)), "a clip is shown at its start");
+        assert_eq!(at(2.0), Some((1.0, false)), "a clip is hidden at its end");
+        assert_eq!(at(3.5), Some((3.0, true)), "the second clip is shown at its time");
+        assert_eq!(at(4.0), Some((3.0, true)), "a clip that ends with the timeline is shown at its end");
+        assert!(timeline.track("right").is_none(), "an unknown name has no track");
     }
 
     #[test]
-    fn a_gap_that_is_rounding_does_not_flash() {
+    fn a_gap_by_rounding_is_not_visible() {
         let clips = vec![clip(0.0, [0.0, 2.0], 1.0), clip(2.000_05, [0.0, 1.0], 1.0), clip(3.01, [0.0, 1.0], 1.0)];
-        let timeline = Timeline::new(vec![track("left", clips)], Vec::new(), None).expect("makes sense");
-        let track = timeline.track("left").expect("there it is");
+        let timeline = Timeline::new(vec![track("left", clips)], Vec::new(), None).expect("the timeline is valid");
+        let track = timeline.track("left").expect("the timeline has this track");
         let shown = |time| track.clip_at(time).is_some_and(|clip| clip.shows(time, 9.0));
         for time in [1.999_99, 2.0, 2.000_02, 2.000_06, 3.0] {
-            assert!(shown(time), "something is seen at {time} s");
+            assert!(shown(time), "a clip is shown at {time} s");
         }
-        assert!(!shown(3.005), "but in a gap that is meant nothing is");
+        assert!(!shown(3.005), "no clip is shown in an intended gap");
     }
 
     #[test]
-    fn what_makes_no_sense_is_named() {
+    fn errors_name_the_invalid_part() {
         let good = clip(0.0, [0.0, 1.0], 1.0);
         let cases = [
             (clip(f32::NAN, [0.0, 1.0], 1.0), "clip 2: start is NaN"),
@@ -207,18 +208,22 @@ mod tests {
         ];
         for (bad, expected) in cases {
             let message = refused(vec![good.clone(), bad]);
-            assert!(message.contains(expected) && message.contains("\"left\""), "{message} should contain {expected}");
+            assert!(message.contains(expected) && message.contains("\"left\""), "{message} contains {expected}");
         }
         let twice = vec![track("left", vec![good.clone()]), track("left", Vec::new())];
-        let message = Timeline::new(twice, Vec::new(), None).expect_err("one name").to_string();
-        assert!(message.contains("two tracks are named \"left\""), "{message}");
+        let message = Timeline::new(twice, Vec::new(), None).expect_err("two tracks have one name").to_string();
+        assert!(message.contains("two tracks are named \"left\""), "the name is in the message: {message}");
         let late = vec![Marker { time: -1.0, name: "cut".into() }];
-        let message = Timeline::new(Vec::new(), late, None).expect_err("before the start").to_string();
-        assert!(message.contains("marker 1 (\"cut\")"), "{message}");
-        assert_eq!(Timeline::new(Vec::new(), Vec::new(), None), Err(InvalidTimeline::Empty), "nothing to play");
+        let message = Timeline::new(Vec::new(), late, None).expect_err("a negative time is invalid").to_string();
+        assert!(message.contains("marker 1 (\"cut\")"), "the marker is in the message: {message}");
+        assert_eq!(
+            Timeline::new(Vec::new(), Vec::new(), None),
+            Err(InvalidTimeline::Empty),
+            "an empty timeline is invalid"
+        );
         for given in [0.5, f32::NAN, f32::INFINITY] {
             let short = Timeline::new(vec![track("left", vec![good.clone()])], Vec::new(), Some(given));
-            assert!(matches!(short, Err(InvalidTimeline::Duration { .. })), "{given} s are not enough");
+            assert!(matches!(short, Err(InvalidTimeline::Duration { .. })), "a duration of {given} s is invalid");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! A clip: a part of a capture, at a time of a timeline.
 //!
-//! In: a capture, a range of it, its start and its speed. Out: whether the clip is shown at a time and its fade, and
-//! the [`Playback`] that shows it.
+//! In: a capture, a range of the capture, a start and a speed. Out: whether the clip is shown at a time, its fade, and the [`Playback`] of
+//! its entity.
 
 use super::error::InvalidTimeline;
 use crate::plugin::component::GaussianCapture;
@@ -15,34 +15,34 @@ pub struct Clip {
     /// The capture.
     #[dependency]
     pub capture: Handle<GaussianCapture>,
-    /// When the clip begins, in seconds of the timeline: 0 or later.
+    /// The start of the clip, in seconds of the timeline: 0 or later.
     pub start: f32,
-    /// The first and the last moment of the capture that are played, in seconds of the capture. Beyond the capture's end its last moment
-    /// stands still; backwards, the clip begins with that.
+    /// The first and the last played moment, in seconds of the capture. Beyond the capture's end, its last moment is shown; a backward clip
+    /// begins with it.
     pub range: [f32; 2],
-    /// Seconds of the capture per second of the timeline; negative plays from the last moment to the first. Never 0.
+    /// Seconds of the capture per second of the timeline; negative plays from the last moment to the first. Not 0.
     pub speed: f32,
     /// Durations of fading in and fading out, in seconds of the timeline; 0 for none.
     pub fade: [f32; 2],
 }
 
-/// Seconds by which clips that follow each other may overlap or lie apart, because speeds and ends are rounded. A clip begins this much
-/// early, so that no such gap is visible.
+/// Seconds by which consecutive clips may overlap or be apart, because speeds and ends are rounded. A clip is shown this much early, so that
+/// no such gap is visible.
 pub(super) const TOUCH: f32 = 1e-4;
 
 impl Clip {
-    /// Returns how long it plays, in seconds of the timeline.
+    /// Returns the duration of the clip, in seconds of the timeline.
     pub fn duration(&self) -> f32 {
         (self.range[1] - self.range[0]) / self.speed.abs()
     }
 
-    /// Returns when it ends, in seconds of the timeline.
+    /// Returns the end of the clip, in seconds of the timeline.
     pub fn end(&self) -> f32 {
         self.start + self.duration()
     }
 
-    /// Returns whether it is shown at `time`, in seconds of the timeline: from its start until just before its end, and
-    /// at its end if the timeline, which lasts `duration` seconds, ends there, too.
+    /// Returns whether the clip is shown at `time`, in seconds of the timeline: from its start until just before its end, and at its end if
+    /// the timeline, which lasts `duration` seconds, also ends there.
     pub fn shows(&self, time: f64, duration: f32) -> bool {
         let end = f64::from(self.end());
         self.has_begun(time) && (time < end || self.end() >= duration - TOUCH && time <= f64::from(duration))
@@ -52,23 +52,23 @@ impl Clip {
         f64::from(self.start) - f64::from(TOUCH) <= time
     }
 
-    /// Returns the factor on its opacity at `time`, in seconds of the timeline: 0 to 1.
+    /// Returns the factor on the clip's opacity at `time`, in seconds of the timeline: 0 to 1.
     pub fn fade_at(&self, time: f64) -> f32 {
-        let share = |passed: f64, fade: f32| {
+        let fraction = |passed: f64, fade: f32| {
             if fade > 0.0 { (passed / f64::from(fade)).clamp(0.0, 1.0) as f32 } else { 1.0 }
         };
         let (start, end) = (f64::from(self.start), f64::from(self.end()));
-        share(time - start, self.fade[0]).min(share(end - time, self.fade[1]))
+        fraction(time - start, self.fade[0]).min(fraction(end - time, self.fade[1]))
     }
 
-    /// Returns the playback that shows this clip while it follows the timeline's clock. `duration` is that of the
-    /// capture in seconds, `None` until it has been loaded.
+    /// Returns the playback that shows this clip while it follows the timeline's clock. `duration` is the duration of the capture in
+    /// seconds, `None` until the capture has been loaded.
     pub(super) fn playback(&self, duration: Option<f32>) -> Playback {
         let ([start, end], backwards) = (self.range, self.speed < 0.0);
-        // Without it, playback would begin at the capture's end at once.
+        // Without this offset, playback would begin at the capture's end immediately.
         let beyond = duration.filter(|_| backwards).map_or(0.0, |duration| (end - duration).max(0.0));
         Playback {
-            // Stays if the whole clip lies beyond the capture, whose end is then drawn.
+            // If the whole clip is beyond the capture, this time stays and the capture's end is drawn.
             time: if backwards { end } else { start },
             start,
             end,
@@ -79,7 +79,7 @@ impl Clip {
         }
     }
 
-    /// Checks its numbers. `track` and `clip` name it in errors.
+    /// Checks the numbers of the clip. `track` and `clip` name the clip in errors.
     pub(super) fn check(&self, track: &str, clip: usize) -> Result<(), InvalidTimeline> {
         let ([first, last], [fade_in, fade_out]) = (self.range, self.fade);
         let numbers = [
@@ -125,25 +125,29 @@ mod tests {
     }
 
     #[test]
-    fn a_clip_lasts_as_its_speed_says() {
-        assert_eq!(clip(1.0, [0.5, 2.5], 1.0).end(), 3.0, "as long as its range");
-        assert_eq!(clip(1.0, [0.5, 2.5], -0.5).end(), 5.0, "backwards at half speed, twice as long");
+    fn the_duration_of_a_clip_depends_on_its_speed() {
+        assert_eq!(clip(1.0, [0.5, 2.5], 1.0).end(), 3.0, "at speed 1 a clip lasts as long as its range");
+        assert_eq!(clip(1.0, [0.5, 2.5], -0.5).end(), 5.0, "at speed -0.5 a clip lasts twice as long");
     }
 
     #[test]
-    fn a_clip_that_reaches_beyond_its_capture_waits_at_its_end() {
+    fn a_backward_clip_beyond_its_capture_waits_at_the_capture_s_end() {
         let backwards = clip(2.0, [0.0, 5.0], -2.0);
-        assert_eq!(backwards.playback(Some(4.0)).offset, -5.0, "a second of the capture that is not there");
-        assert_eq!(backwards.playback(Some(9.0)).offset, -4.0, "within its capture it begins at once");
-        assert_eq!(backwards.playback(None).offset, -4.0, "until the capture has been loaded");
-        assert_eq!(clip(2.0, [0.0, 5.0], 2.0).playback(Some(4.0)).offset, -4.0, "forwards, the end comes last");
+        assert_eq!(
+            backwards.playback(Some(4.0)).offset,
+            -5.0,
+            "a backward clip waits for the missing second of the capture"
+        );
+        assert_eq!(backwards.playback(Some(9.0)).offset, -4.0, "a clip within its capture does not wait");
+        assert_eq!(backwards.playback(None).offset, -4.0, "a clip whose capture is not loaded does not wait");
+        assert_eq!(clip(2.0, [0.0, 5.0], 2.0).playback(Some(4.0)).offset, -4.0, "a forward clip does not wait");
     }
 
     #[test]
     fn fades_rise_and_fall_within_the_clip() {
         let faded = Clip { fade: [0.5, 1.0], ..clip(1.0, [0.0, 4.0], 2.0) };
         let fades = [0.0, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 9.0].map(|time| faded.fade_at(time));
-        assert_eq!(fades, [0.0, 0.0, 0.5, 1.0, 1.0, 0.5, 0.0, 0.0], "in, full, out");
-        assert_eq!(clip(1.0, [0.0, 4.0], 2.0).fade_at(1.0), 1.0, "without fades it is all there");
+        assert_eq!(fades, [0.0, 0.0, 0.5, 1.0, 1.0, 0.5, 0.0, 0.0], "the fades in and out are linear");
+        assert_eq!(clip(1.0, [0.0, 4.0], 2.0).fade_at(1.0), 1.0, "a clip without fades has the factor 1");
     }
 }

@@ -1,7 +1,7 @@
 //! The systems that play timelines.
 //!
-//! In: loaded timelines and their players. Out: an entity for each track, with the capture, playback, fade and visibility of its clip at
-//! this time.
+//! In: loaded timelines and their players. Out: an entity for each track, with the capture, playback, fade and visibility of the track's
+//! clip at the current time.
 
 use super::asset::Timeline;
 use super::clip::Clip;
@@ -23,7 +23,7 @@ use bevy::ecs::system::{Commands, Query, Res};
 use bevy::log::debug_span;
 use bevy::time::Time;
 
-/// Gives every track an entity that follows the player's clock.
+/// Spawns an entity for every track without one, and makes the entities follow the player's clock.
 pub(in crate::plugin::playback) fn bind_tracks(
     timelines: Res<Assets<Timeline>>,
     players: Query<(Entity, &TimelinePlayer, Option<&Children>)>,
@@ -48,8 +48,8 @@ pub(in crate::plugin::playback) fn bind_tracks(
     }
 }
 
-/// Advances the playheads, those that are followed before their followers. Captures advance later: who follows one is a frame behind it.
-/// Playing begins once the captures of all clips can be drawn.
+/// Advances the playheads, followed players before their followers. Captures advance later: a timeline that follows a capture is one frame
+/// behind. Playback begins once the captures of all clips can be drawn.
 pub(in crate::plugin::playback) fn advance_timelines(
     time: Res<Time>,
     timelines: Res<Assets<Timeline>>,
@@ -96,7 +96,7 @@ pub(in crate::plugin::playback) fn advance_timelines(
     }
 }
 
-/// Returns whether a clip's capture is still on its way into memory or, for the first time, to the GPU. One that has failed is not.
+/// Returns whether a clip's capture is being loaded, or uploaded for the first time. A failed capture is not awaited.
 fn awaits(clip: &Clip, captures: &Assets<GaussianCapture>, uploads: &Uploads, server: &AssetServer) -> bool {
     let id = clip.capture.id();
     if captures.contains(id) {
@@ -105,7 +105,7 @@ fn awaits(clip: &Clip, captures: &Assets<GaussianCapture>, uploads: &Uploads, se
     matches!(server.get_load_state(id), Some(LoadState::NotLoaded | LoadState::Loading))
 }
 
-/// Gives every track's entity its clip, fade and visibility at this time.
+/// Sets the clip, fade and visibility of every track's entity at the current time.
 pub(in crate::plugin::playback) fn direct_tracks(
     timelines: Res<Assets<Timeline>>,
     captures: Res<Assets<GaussianCapture>>,
@@ -134,7 +134,7 @@ pub(in crate::plugin::playback) fn direct_tracks(
 /// The components that change with the clip.
 type Actor<'a> = (&'a mut Directed, &'a mut GaussianCapture3d, &'a mut Playback, &'a mut PlaybackState);
 
-/// Gives an entity its clip if that has changed. `loaded` is the clip's capture, `None` until it has been loaded.
+/// Sets the clip of an entity if the clip has changed. `loaded` is the clip's capture, `None` until it has been loaded.
 fn cast(
     (mut directed, mut capture, mut playback, mut state): (
         Mut<Directed>,
@@ -149,11 +149,11 @@ fn cast(
     if directed.0.as_ref() != Some(clip) {
         capture.set_if_neq(GaussianCapture3d(clip.capture.clone()));
         playback.set_if_neq(wanted);
-        // A clip begins anew; it is not a seek from where the last one ended.
-        *state = state.anew();
+        // The start of a clip is not a seek from the end of the clip before.
+        *state = state.restarted();
         directed.0 = Some(clip.clone());
     } else if playback.offset != wanted.offset {
-        // How far the clip reaches beyond its capture is known only once that is loaded.
+        // The offset depends on the capture's duration, which is unknown until the capture is loaded.
         playback.offset = wanted.offset;
     }
 }

@@ -1,29 +1,31 @@
-//! Why a timeline is invalid.
+//! The errors of an invalid timeline.
 //!
-//! In: the checks of [`asset`](super::asset) and [`clip`](super::clip). Out: [`InvalidTimeline`], whose text names the place, the fault and
-//! the remedy.
+//! In: the checks of [`asset`](super::asset) and [`clip`](super::clip). Out: [`InvalidTimeline`], whose text names the track, the clip or
+//! the marker, the fault and the remedy.
 
-/// Why a timeline is invalid. Clips and markers are counted from 1, in the order in which they are written.
+/// The reason why a timeline is invalid. Clips and markers are counted from 1, in the order in which they are written.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum InvalidTimeline {
-    /// It has nothing to play.
+    /// The timeline is empty.
     #[error("the timeline has neither clips nor markers nor a duration; give it at least one clip")]
     Empty,
-    /// Two tracks have one name.
-    #[error("two tracks are named {0:?}; a track's name says which entity plays it, so give each its own")]
+    /// Two tracks have the same name.
+    #[error(
+        "two tracks are named {0:?}; a track's name selects the entity that plays it, so give each track a unique name"
+    )]
     SameName(String),
     /// A number is out of its range.
     #[error("track {track:?}, clip {clip}: {field} is {value}, but must be {must}")]
     Number {
         /// The track's name.
         track: String,
-        /// The clip.
+        /// The number of the clip.
         clip: usize,
         /// The field's name, as in files.
         field: &'static str,
-        /// Its value.
+        /// The field's value.
         value: f32,
-        /// What it must be.
+        /// The condition on the value.
         must: &'static str,
     },
     /// A clip fades in and out for longer than it lasts.
@@ -33,9 +35,9 @@ pub enum InvalidTimeline {
     Fades {
         /// The track's name.
         track: String,
-        /// The clip.
+        /// The number of the clip.
         clip: usize,
-        /// Both fades together, in seconds.
+        /// The sum of both fades, in seconds.
         fades: f32,
         /// The clip's duration, in seconds of the timeline.
         lasts: f32,
@@ -47,23 +49,23 @@ pub enum InvalidTimeline {
     Overlap {
         /// The track's name.
         track: String,
-        /// The clip that starts earlier.
+        /// The number of the clip that starts earlier.
         first: usize,
-        /// When it ends, in seconds of the timeline.
+        /// The end of the first clip, in seconds of the timeline.
         end: f32,
-        /// The clip that starts before that.
+        /// The number of the clip that starts before `end`.
         second: usize,
-        /// When it starts, in seconds of the timeline.
+        /// The start of the second clip, in seconds of the timeline.
         start: f32,
     },
     /// A marker's time is out of its range.
     #[error("marker {marker} ({name:?}): time is {time}, but must be 0 or later, in seconds")]
     MarkerTime {
-        /// The marker.
+        /// The number of the marker.
         marker: usize,
-        /// Its name.
+        /// The marker's name.
         name: String,
-        /// Its time, in seconds of the timeline.
+        /// The marker's time, in seconds of the timeline.
         time: f32,
     },
     /// The given duration is shorter than the clips and markers.

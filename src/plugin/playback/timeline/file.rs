@@ -1,7 +1,7 @@
 //! The timeline as a file.
 //!
-//! In: the text of a `*.timeline.ron`, as the [module](super) describes. Out: a [`Timeline`] whose captures have begun to load, or a
-//! [`TimelineError`], to which Bevy adds the path.
+//! In: the text of a `*.timeline.ron`, in the format that the [module](super) describes. Out: a [`Timeline`] whose captures have begun to
+//! load, or a [`TimelineError`], to which Bevy adds the path.
 
 use super::asset::{Timeline, Track};
 use super::clip::Clip;
@@ -28,7 +28,7 @@ pub enum TimelineError {
     Path {
         /// The path, as written.
         path: String,
-        /// What is wrong with it.
+        /// The fault of the path.
         reason: ParseAssetPathError,
     },
     /// A capture's path is empty, absolute, or leads out of the asset folder.
@@ -115,7 +115,7 @@ fn normal_speed() -> f32 {
     1.0
 }
 
-/// Reads the text of a file. `load` returns the handle of a capture.
+/// Parses the text of a file. `load` returns the handle of a capture.
 fn read(
     bytes: &[u8],
     mut load: impl FnMut(AssetPath<'static>) -> Handle<GaussianCapture>,
@@ -140,7 +140,7 @@ fn read(
     Ok(Timeline::new(tracks, markers, file.duration)?)
 }
 
-/// Parses the path of a capture. Bevy would panic at one that leads out of the asset folder.
+/// Parses the path of a capture. Rejects paths that lead out of the asset folder, at which Bevy would panic.
 fn asset_path(path: &str) -> Result<AssetPath<'static>, TimelineError> {
     let parsed = AssetPath::try_parse(path).map_err(|reason| TimelineError::Path { path: path.to_owned(), reason })?;
     if parsed.path().as_os_str().is_empty() || parsed.is_unapproved() {
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_says_what_a_timeline_is() {
+    fn a_file_is_read_with_its_defaults() {
         let text = r#"(
             tracks: [
                 (name: "left", clips: [
@@ -174,27 +174,38 @@ mod tests {
             loaded.push(path.to_string());
             Handle::default()
         })
-        .expect("a timeline");
-        assert_eq!(loaded, ["toybox.gs4d", "more/toybox.gs4d"], "both captures are loaded");
+        .expect("the timeline is valid");
+        assert_eq!(loaded, ["toybox.gs4d", "more/toybox.gs4d"], "the captures of both clips are loaded");
         let clips = &timeline.tracks()[0].clips;
-        assert_eq!((clips[0].range, clips[0].speed, clips[0].fade), ([0.5, 2.5], 1.0, [0.0; 2]), "what is left out");
-        assert_eq!((clips[1].range, clips[1].speed, clips[1].fade), ([0.0, 1.0], -0.5, [0.5, 0.25]), "what is not");
-        assert_eq!(timeline.markers(), [Marker { time: 2.0, name: "cut".into() }], "a marker");
-        assert_eq!(timeline.duration_seconds(), 10.0, "a duration");
+        assert_eq!(
+            (clips[0].range, clips[0].speed, clips[0].fade),
+            ([0.5, 2.5], 1.0, [0.0; 2]),
+            "fields that are left out have their defaults"
+        );
+        assert_eq!(
+            (clips[1].range, clips[1].speed, clips[1].fade),
+            ([0.0, 1.0], -0.5, [0.5, 0.25]),
+            "given fields are read"
+        );
+        assert_eq!(timeline.markers(), [Marker { time: 2.0, name: "cut".into() }], "the marker is read");
+        assert_eq!(timeline.duration_seconds(), 10.0, "the duration is read");
     }
 
     #[test]
-    fn broken_text_is_refused_with_its_place() {
+    fn errors_of_invalid_text_have_line_and_column() {
         for text in
             ["", "(", "(tracks: 3)", "(trakcs: [])", "\u{1f4a5}", "(tracks: [(name: \"a\", clips: [(start: 0)])])"]
         {
-            let message = read_text(text).expect_err("no timeline").to_string();
-            assert!(message.contains("line and column 1:"), "{text:?}: {message}");
+            let message = read_text(text).expect_err("the text is invalid").to_string();
+            assert!(message.contains("line and column 1:"), "the error of {text:?} has its position: {message}");
         }
         let message = read_text("(tracks: [(name: \"a\", clips: [(capture: \"x\", start: 0, out: 1, sped: 2)])])");
-        let message = message.expect_err("a field too many").to_string();
-        assert!(message.contains("sped") && message.contains("speed"), "the field and those there are: {message}");
-        assert!(read(&[0xff, 0xfe, b'('], |_| Handle::default()).is_err(), "not even text");
+        let message = message.expect_err("the field is unknown").to_string();
+        assert!(
+            message.contains("sped") && message.contains("speed"),
+            "the unknown field and the known fields are named: {message}"
+        );
+        assert!(read(&[0xff, 0xfe, b'('], |_| Handle::default()).is_err(), "bytes that are not UTF-8 are an error");
     }
 
     #[test]
@@ -203,15 +214,21 @@ mod tests {
         {
             let clip = format!("(capture: {path:?}, start: 0, out: 1)");
             let refused = read_text(&format!("(tracks: [(name: \"a\", clips: [{clip}])])"));
-            let message = refused.expect_err("no path of a capture").to_string();
-            assert!(message.contains(&format!("{path:?}")), "{message} names {path:?}");
+            let message = refused.expect_err("the path is invalid").to_string();
+            assert!(message.contains(&format!("{path:?}")), "the error names {path:?}: {message}");
         }
     }
 
     #[test]
-    fn what_makes_no_sense_is_refused() {
+    fn invalid_timelines_are_refused() {
         let refused = read_text("(tracks: [(name: \"a\", clips: [(capture: \"x.gs4d\", start: 0, in: 2, out: 1)])])");
-        assert!(matches!(refused, Err(TimelineError::Invalid(InvalidTimeline::Number { .. }))), "{refused:?}");
-        assert!(matches!(read_text("()"), Err(TimelineError::Invalid(InvalidTimeline::Empty))), "an empty timeline");
+        assert!(
+            matches!(refused, Err(TimelineError::Invalid(InvalidTimeline::Number { .. }))),
+            "out before in is invalid: {refused:?}"
+        );
+        assert!(
+            matches!(read_text("()"), Err(TimelineError::Invalid(InvalidTimeline::Empty))),
+            "an empty timeline is invalid"
+        );
     }
 }

@@ -1,8 +1,8 @@
-//! Timelines: which captures play when.
+//! Timelines: the times at which captures play.
 //!
 //! In: a file named `*.timeline.ron`, or a [`Timeline`] created in code, on a [`TimelinePlayer`]. Out: an entity for
-//! each track, whose capture, playback, fade and visibility follow the player; and a message for every marker that is
-//! reached.
+//! each track, whose capture, playback, fade and visibility follow the player; and a message for every reached
+//! marker.
 //!
 //! ```ron
 //! (
@@ -18,9 +18,9 @@
 //! )
 //! ```
 //!
-//! Paths are those of `AssetServer::load`. `in` and `out` are seconds of the capture, `start` and `time` of the timeline. A clip
+//! Paths are paths of `AssetServer::load`. `in` and `out` are seconds of the capture, `start` and `time` of the timeline. A clip
 //! lasts `(out - in) / |speed|`; the clips of a track may touch but not overlap: to cross-fade, use two tracks. The timeline lasts
-//! until the last clip or marker, or longer: `duration: 10.0`.
+//! until its last clip or marker; `duration: 10.0` makes it longer.
 
 mod asset;
 mod clip;

@@ -1,6 +1,6 @@
 //! The components of a timeline in the world.
 //!
-//! In: a handle to a [`Timeline`] on an entity. Out: that entity as the clock and the parent of one child for each track.
+//! In: a handle to a [`Timeline`] on an entity. Out: this entity as a clock and as the parent of one child for each track.
 
 use super::asset::Timeline;
 use super::clip::Clip;
@@ -17,14 +17,14 @@ use bevy::transform::components::Transform;
 
 /// Plays a timeline.
 ///
-/// Its [`Playback`] is the playhead: play, pause, seek, reverse and loop it like that of a capture, or let it
-/// [follow a clock](crate::playback::FollowsClock). Its own [`PlaybackClock`] shows the time of the playhead to its tracks. Other captures
-/// and timelines can follow the player, too. It begins to play once the captures of all clips can be drawn; one that has failed is not waited
-/// for.
+/// The player's [`Playback`] is the playhead: play, pause, seek, reverse and loop it like the playback of a capture, or let it
+/// [follow a clock](crate::playback::FollowsClock). The player's [`PlaybackClock`] has the time of the playhead, for its tracks. Other
+/// captures and timelines can also follow the player. It begins to play once the captures of all clips can be drawn; failed captures are
+/// not awaited.
 ///
-/// Each track is played by the child with the [`TimelineTrack`] of its name. For a track without such a child, one is spawned.
+/// Each track is played by the child with the [`TimelineTrack`] of its name. A child is spawned for a track without one.
 ///
-/// Default: a handle of no asset, with which nothing plays.
+/// Default: a handle without an asset; nothing plays.
 ///
 /// # Examples
 ///
@@ -44,7 +44,7 @@ pub struct TimelinePlayer(pub Handle<Timeline>);
 
 /// Names the track that sets this entity's capture, playback, fade and visibility: a track of the timeline on the parent entity.
 ///
-/// Spawn it yourself, as a child of the [`TimelinePlayer`], to choose its transform and its other components. Default: the empty name.
+/// To choose the transform and other components of a track's entity, spawn it as a child of the [`TimelinePlayer`]. Default: the empty name.
 ///
 /// # Examples
 ///
@@ -63,8 +63,8 @@ pub struct TimelinePlayer(pub Handle<Timeline>);
 #[require(GaussianCapture3d, ClipFade, Directed)]
 pub struct TimelineTrack(pub String);
 
-/// A factor on a capture's opacity, from 0 to 1, beside that of its [`CaptureSettings`](crate::render::CaptureSettings): a timeline's fades
-/// set it. Default: 1.
+/// A factor on a capture's opacity, from 0 to 1, in addition to the opacity of its [`CaptureSettings`](crate::render::CaptureSettings). A
+/// timeline's fades set it. Default: 1.
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 pub struct ClipFade(pub f32);
@@ -75,6 +75,6 @@ impl Default for ClipFade {
     }
 }
 
-/// The clip that a track's entity plays; `None` before its first.
+/// The clip that a track's entity plays; `None` before its first clip.
 #[derive(Component, Debug, Default)]
 pub(in crate::plugin::playback) struct Directed(pub(super) Option<Clip>);

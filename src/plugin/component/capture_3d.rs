@@ -1,0 +1,59 @@
+//! The component that places a capture in the world.
+//!
+//! In: the handle of a [`GaussianCapture`]. Out: an entity that each `Camera3d` with the entity in view draws once the asset is loaded.
+
+use super::capture::GaussianCapture;
+use bevy::asset::{AssetId, Handle};
+use bevy::camera::visibility::{Visibility, VisibilityClass, add_visibility_class};
+use bevy::ecs::component::Component;
+use bevy::ecs::reflect::ReflectComponent;
+use bevy::reflect::Reflect;
+use bevy::reflect::std_traits::ReflectDefault;
+use bevy::transform::components::Transform;
+
+/// Places a capture in the world.
+///
+/// The entity's transform (translation, rotation, any scale) maps capture space to the world. Most captures have +z up:
+/// [`Upright`](super::Upright) stands them upright. A perspective camera draws no Gaussian nearer than 0.2 units *of the capture*, as in training; an orthographic
+/// camera draws from its near plane on.
+///
+/// [`Visibility`], `RenderLayers` and frustum culling decide which cameras draw the capture, as they do for meshes. The entity's
+/// `Aabb` encloses the Gaussians drawn at the current time. A capture with an environment map surrounds every camera: it has no `Aabb`
+/// and is never culled.
+///
+/// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) also requires [`CaptureState`](crate::asset::CaptureState),
+/// [`Playback`](crate::playback::Playback) and [`CaptureSettings`](crate::render::CaptureSettings): they are inserted with their
+/// defaults unless the game spawns them together with this component.
+///
+/// Default: a handle of no asset, with which nothing is drawn. A warning in the log names an entity that keeps this handle, once.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_gs4d::prelude::*;
+///
+/// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
+///     commands.spawn((GaussianCapture3d(assets.load("toybox.gs4d")), Upright, Transform::from_xyz(0.0, 0.0, -2.0)));
+/// }
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
+#[derive(Component, Reflect, Debug, Default, Clone, PartialEq, Eq)]
+#[reflect(Component, Default, Debug, Clone, PartialEq)]
+// Saved scenes name the component by this path.
+#[type_path = "bevy_gs4d::plugin::component"]
+#[require(Transform, Visibility, VisibilityClass)]
+#[component(on_add = add_visibility_class::<GaussianCapture3d>)]
+pub struct GaussianCapture3d(pub Handle<GaussianCapture>);
+
+impl From<Handle<GaussianCapture>> for GaussianCapture3d {
+    fn from(handle: Handle<GaussianCapture>) -> Self {
+        Self(handle)
+    }
+}
+
+impl From<&GaussianCapture3d> for AssetId<GaussianCapture> {
+    fn from(capture: &GaussianCapture3d) -> Self {
+        capture.0.id()
+    }
+}
