@@ -26,7 +26,7 @@ use bevy_egui::input::{egui_wants_any_keyboard_input, egui_wants_any_pointer_inp
 use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::component::Upright;
 use bevy_gs4d::inspector::{Inspector, InspectorPlugin};
-use bevy_gs4d::picking::CapturePicker;
+use bevy_gs4d::picker::CapturePicker;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::testing::{self, Offscreen};
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};

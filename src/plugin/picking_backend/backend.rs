@@ -5,7 +5,7 @@
 use super::settings::{CapturePickingCamera, CapturePickingSettings};
 use crate::plugin::asset::CaptureState;
 use crate::plugin::component::GaussianCapture3d;
-use crate::plugin::picking::CapturePicker;
+use crate::plugin::picker::CapturePicker;
 use bevy::camera::visibility::{RenderLayers, ViewVisibility};
 use bevy::camera::{Camera, Camera3d};
 use bevy::ecs::entity::Entity;

@@ -21,10 +21,10 @@
 //! App::new().add_plugins((DefaultPlugins, GaussianCapturePlugin)).add_systems(Startup, setup).run();
 //! ```
 //!
-//! A pointer hits what [`CapturePicker`](crate::picking::CapturePicker) hits: the Gaussian at which half of the light along the ray is
+//! A pointer hits what [`CapturePicker`](crate::picker::CapturePicker) hits: the Gaussian at which half of the light along the ray is
 //! absorbed. The depth of a hit is its distance along the ray, in world units, as that of Bevy's mesh picking: with Bevy's
 //! `MeshPickingPlugin` meshes in front of a capture take its events, and captures in front of a mesh take those of the mesh. The position is the
-//! point in the world; there is no normal; the extra data is the [`CaptureHit`](crate::picking::CaptureHit).
+//! point in the world; there is no normal; the extra data is the [`CaptureHit`](crate::picker::CaptureHit).
 //!
 //! `Pickable` on a capture has its usual meaning: `Pickable::IGNORE` lets pointers through. Hidden captures, those that no camera sees,
 //! those on other `RenderLayers`, and those that are not [ready](crate::asset::CaptureState::Ready) are not hit. Of several cameras in one
@@ -37,5 +37,5 @@ mod backend;
 mod plugin;
 mod settings;
 
-pub(crate) use plugin::CapturePointerPlugin;
+pub(crate) use plugin::CapturePickingPlugin;
 pub use settings::{CapturePickingCamera, CapturePickingSettings};

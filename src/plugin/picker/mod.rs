@@ -6,7 +6,7 @@
 //!
 //! ```no_run
 //! # use bevy::prelude::*;
-//! use bevy_gs4d::picking::CapturePicker;
+//! use bevy_gs4d::picker::CapturePicker;
 //!
 //! #[derive(Component)]
 //! struct Marker;
@@ -27,6 +27,6 @@
 //! `Camera::viewport_to_world` returns the ray under the cursor. A ray costs a few arithmetic operations for each Gaussian of every
 //! capture whose box it meets, on all cores: cast a few each frame, not one for each pixel.
 
-mod picker;
+mod capture_picker;
 
-pub use picker::{CaptureHit, CapturePicker};
+pub use capture_picker::{CaptureHit, CapturePicker};

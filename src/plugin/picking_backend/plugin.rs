@@ -11,9 +11,9 @@ use bevy::picking::PickingSystems;
 /// Sends pointers' hits on captures, in apps with Bevy's `PickingPlugin`, whenever that is added. Part of
 /// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin).
 #[derive(Debug, Default, Clone, Copy)]
-pub(crate) struct CapturePointerPlugin;
+pub(crate) struct CapturePickingPlugin;
 
-impl Plugin for CapturePointerPlugin {
+impl Plugin for CapturePickingPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<CapturePickingSettings>()
             .add_systems(PreUpdate, update_hits.run_if(any_ray).in_set(PickingSystems::Backend));
