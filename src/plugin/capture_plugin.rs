@@ -15,8 +15,8 @@ use bevy::time::Time;
 /// need no component for captures.
 ///
 /// # Panics
-/// When it is added twice, or before the plugins that it needs: Bevy's `AssetPlugin` and, if the app has one, `RenderPlugin`; and when the
-/// app starts without `TimePlugin`. The message names the remedy.
+/// If the plugin is added twice, or before the plugins that it needs (Bevy's `AssetPlugin` and, if the app has one, `RenderPlugin`), or if
+/// the app starts without `TimePlugin`. The message names the remedy.
 ///
 /// # Examples
 ///
@@ -33,7 +33,7 @@ impl Plugin for GaussianCapturePlugin {
     fn build(&self, app: &mut App) {
         assert!(
             !app.is_plugin_added::<Self>(),
-            "GaussianCapturePlugin was added twice: remove one of them. Another plugin of the game may add it, too"
+            "GaussianCapturePlugin was added twice: remove one of the two. Another plugin of the game may also add it"
         );
         assert!(
             app.world().contains_resource::<AssetServer>(),
@@ -58,7 +58,7 @@ impl Plugin for GaussianCapturePlugin {
         );
     }
 
-    /// A second one is refused by [`build`](Self::build), which says what to do.
+    /// [`build`](Self::build) rejects a second plugin with a message that names the remedy.
     fn is_unique(&self) -> bool {
         false
     }

@@ -17,9 +17,10 @@
 //! * [`stereo`]: two eyes on one head
 //! * `picking_backend` (feature `picking`): pointer events on captures
 //! * `inspector` (feature `inspector`): a panel that shows and edits captures
-//! * `testing` (feature `testing`): apps without a window, drawn into pictures
+//! * `testing` (feature `testing`): apps without a window, rendered to pictures
 //!
-//! [`GaussianCapturePlugin`] adds all of them to an app but the inspector, which has a plugin of its own. Picking needs none, testing neither.
+//! [`GaussianCapturePlugin`] adds all of them to an app except the inspector, which has its own plugin. `picker` and `testing` need no
+//! plugin.
 
 pub mod asset;
 mod capture_plugin;

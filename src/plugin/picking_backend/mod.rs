@@ -1,7 +1,7 @@
 //! Pointer events on captures: a backend of Bevy's `bevy_picking`.
 //!
 //! In: the rays of pointers through cameras, and the captures that those cameras see. Out: `PointerHits`, from which Bevy makes
-//! `On<Pointer<Click>>`, `Over`, `Out`, `Drag` and the others, on captures as on meshes.
+//! `On<Pointer<Click>>`, `Over`, `Out`, `Drag` and the other events, on captures as on meshes.
 //!
 //! ```no_run
 //! use bevy::prelude::*;
@@ -21,17 +21,17 @@
 //! App::new().add_plugins((DefaultPlugins, GaussianCapturePlugin)).add_systems(Startup, setup).run();
 //! ```
 //!
-//! A pointer hits what [`CapturePicker`](crate::picker::CapturePicker) hits: the Gaussian at which half of the light along the ray is
-//! absorbed. The depth of a hit is its distance along the ray, in world units, as that of Bevy's mesh picking: with Bevy's
-//! `MeshPickingPlugin` meshes in front of a capture take its events, and captures in front of a mesh take those of the mesh. The position is the
-//! point in the world; there is no normal; the extra data is the [`CaptureHit`](crate::picker::CaptureHit).
+//! A pointer hits the same Gaussian as [`CapturePicker`](crate::picker::CapturePicker): the one at which half of the light along the ray is
+//! absorbed. The depth of a hit is its distance along the ray in world units, as in Bevy's mesh picking. With Bevy's `MeshPickingPlugin`,
+//! meshes in front of a capture take its events, and captures in front of a mesh take the events of the mesh. The position of a hit is its
+//! point in world space, it has no normal, and its extra data is the [`CaptureHit`](crate::picker::CaptureHit).
 //!
-//! `Pickable` on a capture has its usual meaning: `Pickable::IGNORE` lets pointers through. Hidden captures, those that no camera sees,
-//! those on other `RenderLayers`, and those that are not [ready](crate::asset::CaptureState::Ready) are not hit. Of several cameras in one
-//! target, what the one with the highest order sees comes first.
+//! `Pickable` on a capture has its usual meaning: `Pickable::IGNORE` lets pointers through. Four kinds of captures are not hit: hidden
+//! ones, ones that no camera sees, ones on other `RenderLayers`, and ones that are not [ready](crate::asset::CaptureState::Ready). If
+//! several cameras draw into one target, hits of the camera with the highest order come first.
 //!
-//! Each frame, every pointer casts one ray for each camera that it is over, on the CPU, at each capture whose box the ray meets. Where that is
-//! too much, let only some captures and cameras take part: [`CapturePickingSettings`].
+//! Each frame, every pointer casts one ray per camera under it. Each ray is tested on the CPU against each capture whose box it meets. If
+//! this costs too much, [`CapturePickingSettings`] restricts picking to marked captures and cameras.
 
 mod backend;
 mod plugin;
