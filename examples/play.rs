@@ -1,5 +1,5 @@
 //! Plays a capture in a window, with a lit ball standing in it: the ball hides what is behind it, and is hidden by what is in front of
-//! it. The panel on the right plays, crops and tints the capture, counts and times what is drawn, and shows it in false colours.
+//! it. The panel on the right plays, crops and tints the capture, counts and times what is drawn, and shows it in false colors.
 //!
 //! ```text
 //! cargo run --release --features viewer --example play -- [CAPTURE] [--headless FOLDER] [--frames N]
@@ -26,7 +26,7 @@ use bevy_egui::input::{egui_wants_any_keyboard_input, egui_wants_any_pointer_inp
 use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::component::Upright;
 use bevy_gs4d::inspector::{Inspector, InspectorPlugin};
-use bevy_gs4d::picking::CapturePicker;
+use bevy_gs4d::picker::CapturePicker;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::testing::{self, Offscreen};
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
@@ -102,7 +102,7 @@ fn setup(
         Camera3d::default(),
         // Captures are no smoother for multisampling.
         Msaa::Off,
-        // Colours of the capture as trained.
+        // Colors of the capture as trained.
         Tonemapping::None,
         Orbit { center: Vec3::ZERO, distance: 4.0, yaw: 0.6, pitch: 0.3 },
     ));

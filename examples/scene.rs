@@ -17,7 +17,7 @@ use bevy::prelude::*;
 use bevy_gs4d::prelude::*;
 use std::path::PathBuf;
 
-/// The colour of what is far away.
+/// The color of what is far away.
 const HAZE: Color = Color::srgb(0.62, 0.7, 0.78);
 /// Height of the floor.
 const FLOOR: f32 = -0.85;

@@ -104,7 +104,7 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>, show: Res<Show>) {
         Camera3d::default(),
         // Captures are no smoother for multisampling. Opaque meshes, such as the ball, cut them with it, too, sample by sample.
         Msaa::Off,
-        // Colours of the captures as trained.
+        // Colors of the captures as trained.
         Tonemapping::None,
         Orbit { center: Vec3::ZERO, distance: 4.0, yaw: 0.3, pitch: 0.3 },
     ));

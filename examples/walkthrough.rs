@@ -53,11 +53,11 @@ use teleport::Teleport;
 
 /// Size of the picture of one eye without a window, pixels.
 const EYE: UVec2 = UVec2::new(480, 480);
-/// Half the diagonal to which a capture is scaled, metres.
+/// Half the diagonal to which a capture is scaled, meters.
 const CAPTURE_RADIUS: f32 = 1.5;
 /// Time between pictures.
 const STEP: Duration = Duration::from_nanos(1_000_000_000 / 30);
-/// Distances between the eyes that the key I selects in turn, metres.
+/// Distances between the eyes that the key I selects in turn, meters.
 const DISTANCES: [f32; 4] = [0.064, 0.070, 0.0, 0.058];
 
 #[derive(Resource)]
@@ -170,7 +170,7 @@ fn spawn_body(mut commands: Commands, targets: Res<Targets>) {
 
 /// Returns the settings of every eye, ours and a headset's.
 fn eye_settings() -> impl Bundle {
-    // Captures are no smoother for multisampling. Their colours stay as trained.
+    // Captures are no smoother for multisampling. Their colors stay as trained.
     (Msaa::Off, Tonemapping::None)
 }
 

@@ -99,8 +99,8 @@
 //! * [`codec`] and [`mod@reference`] lie side by side: one reads files, the other draws, and neither needs the other.
 //! * [`plugin`] lies beside [`offline`] and does not use it, so that a game compiles neither datasets nor metrics. What both need lies
 //!   further in.
-//! * [`plugin`] has rings of its own, `component ▶ asset ▶ playback ▶ render ▶ pbr, picking, stereo ▶ pointer, inspector, testing`, of
-//!   which `pbr`, `pointer` (feature `picking`), `inspector` and `testing` are features. The crate root re-exports them: a game writes `bevy_gs4d::playback`.
+//! * [`plugin`] has rings of its own, `component ▶ asset ▶ playback ▶ render ▶ pbr, picker, stereo ▶ picking_backend, inspector, testing`, of
+//!   which `pbr`, `picking_backend` (feature `picking`), `inspector` and `testing` are features. The crate root re-exports them: a game writes `bevy_gs4d::playback`.
 //! * A picture is a [`Picture`](view::Picture), not an `Image`: Bevy and the crate `image` have an `Image` each, and one file may need
 //!   all three.
 //! * `score` is a pass of the offline half, not of a frame: its CPU reference and its pipelines are in [`mod@offline::score`], a client of
@@ -108,7 +108,7 @@
 //!
 //! # Around it, for games
 //!
-//! [`asset`] reports what happens to files that are loaded and reloaded. [`picking`] finds the Gaussian under a ray. [`stereo`] gives a
+//! [`asset`] reports what happens to files that are loaded and reloaded. [`picker`] finds the Gaussian under a ray. [`stereo`] gives a
 //! head two eyes. [`inspector`] is a panel that shows and changes all of this, [`testing`] renders an app to pictures without a window.
 //! The guide, `docs/guide.md`, goes through them in the order in which a game meets them.
 //!
@@ -132,7 +132,7 @@
 //! | none | [`view`], [`gaussian`], [`scene`], [`codec`], [`mod@reference`]: no GPU, no Bevy | |
 //! | `renderer` | [`renderer`], on wgpu | |
 //! | `offline` | [`offline`] | `renderer` |
-//! | `bevy` (default) | [`plugin`]: [`asset`], [`playback`], [`render`], [`picking`], [`stereo`]; [`prelude`] | `renderer` |
+//! | `bevy` (default) | [`plugin`]: [`asset`], [`playback`], [`render`], [`picker`], [`stereo`]; [`prelude`] | `renderer` |
 //! | `pbr` (default) | [`pbr`]: captures among Bevy's lit meshes | `bevy` |
 //! | `picking` (default) | pointer events on captures | `bevy` |
 //! | `cli` | [`cli`], the `gs4d` command; never compiles Bevy | `offline` |

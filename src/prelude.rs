@@ -26,13 +26,13 @@ pub use crate::plugin::asset::{CaptureFailed, CaptureReady, CaptureState};
 pub use crate::plugin::component::{GaussianCapture, GaussianCapture3d, Upright};
 #[cfg(feature = "pbr")]
 pub use crate::plugin::pbr::{CaptureContactShadow, CaptureLight, CastsShadows, ReceivesShadows, ShadowResolution};
-pub use crate::plugin::picking::{CaptureHit, CapturePicker};
+pub use crate::plugin::picker::{CaptureHit, CapturePicker};
+#[cfg(feature = "picking")]
+pub use crate::plugin::picking_backend::{CapturePickingCamera, CapturePickingSettings};
 pub use crate::plugin::playback::{
     FollowsClock, MarkerReached, Markers, Playback, PlaybackClock, PlaybackEnded, PlaybackLooped, PlaybackPaused,
     PlaybackSeeked, PlaybackStarted, Repeat, SegmentBoundCrossed, Timeline, TimelinePlayer, TimelineTrack,
 };
-#[cfg(feature = "picking")]
-pub use crate::plugin::pointer::{CapturePickingCamera, CapturePickingSettings};
 pub use crate::plugin::render::{
     CaptureDetail, CaptureSettings, CaptureStatistics, CaptureUploadBudget, CaptureViewSettings, CropBox, DepthWrite,
 };

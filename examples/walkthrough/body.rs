@@ -7,11 +7,11 @@ use bevy::prelude::*;
 use bevy_gs4d::stereo::StereoRig;
 use std::f32::consts::FRAC_PI_6;
 
-/// Height of the head above the floor, metres.
+/// Height of the head above the floor, meters.
 pub const EYE_HEIGHT: f32 = 1.6;
 /// Where the body stands at first.
 pub const START: Transform = Transform::from_xyz(0.0, 0.0, 3.3);
-/// Speed of walking, metres per second.
+/// Speed of walking, meters per second.
 const SPEED: f32 = 1.5;
 /// How quickly walking starts and stops, per second.
 const EAGERNESS: f32 = 8.0;

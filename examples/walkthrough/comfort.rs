@@ -11,7 +11,7 @@ use bevy::mesh::{Indices, PrimitiveTopology};
 use bevy::prelude::*;
 use std::f32::consts::TAU;
 
-/// Distance from the eye, metres: behind the near plane (a headset's is at 0.1), before everything else.
+/// Distance from the eye, meters: behind the near plane (a headset's is at 0.1), before everything else.
 const DISTANCE: f32 = 0.15;
 /// The ring's radii as tangents of the angle from the middle, and how much they hide, while it is closed.
 const RADII: [(f32, f32); 3] = [(0.45, 0.0), (0.75, 1.0), (12.0, 1.0)];
@@ -20,9 +20,9 @@ const OPEN: f32 = 4.0;
 const SEGMENTS: u32 = 48;
 /// Seconds until the ring is closed, and until it is open.
 const EASE: f32 = 0.25;
-/// Metres and radians per second at which it closes entirely.
+/// Meters and radians per second at which it closes entirely.
 const FAST: f32 = 0.8;
-/// Metres and radians per second above which a motion is a jump: a teleport or a snap turn.
+/// Meters and radians per second above which a motion is a jump: a teleport or a snap turn.
 const JUMP: [f32; 2] = [12.0, 10.0];
 
 /// A camera that is one of the eyes; 0 is the left one.
@@ -200,7 +200,7 @@ mod tests {
         assert_eq!(motion(before, (Vec3::ZERO, FRAC_PI_6), FRAME), 0.0, "a snap turn");
     }
 
-    /// Returns whether the ring shows, and how large it is for its distance, after the body has gone `step` metres in
+    /// Returns whether the ring shows, and how large it is for its distance, after the body has gone `step` meters in
     /// each of `frames` frames.
     fn walk(app: &mut App, step: f32, frames: usize) -> (bool, f32) {
         for _ in 0..frames {

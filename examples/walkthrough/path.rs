@@ -22,7 +22,7 @@ const RECORDING: &str = "recorded.path.ron";
 pub struct Pose {
     /// Seconds.
     time: f32,
-    /// Metres, y up.
+    /// Meters, y up.
     position: [f32; 3],
     /// Radians about the vertical, to the left.
     yaw: f32,

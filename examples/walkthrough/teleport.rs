@@ -6,13 +6,13 @@ use super::body::{Body, Head, Moves};
 use super::path::{follow, walking};
 use bevy::prelude::*;
 
-/// Radius of the floor, metres.
+/// Radius of the floor, meters.
 pub const FLOOR_RADIUS: f32 = 8.0;
-/// Speed of the throw, metres per second.
+/// Speed of the throw, meters per second.
 const THROW: f32 = 6.0;
-/// Gravity, metres per second squared.
+/// Gravity, meters per second squared.
 const GRAVITY: f32 = 9.8;
-/// From the head to the hand that throws, metres.
+/// From the head to the hand that throws, meters.
 const HAND: Vec3 = Vec3::new(0.15, -0.3, -0.1);
 /// Seconds until the view is dark, and until it is not.
 const FADE: f32 = 0.12;

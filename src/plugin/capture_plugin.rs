@@ -47,7 +47,7 @@ impl Plugin for GaussianCapturePlugin {
         #[cfg(feature = "pbr")]
         app.add_plugins(super::pbr::CapturePbrPlugin);
         #[cfg(feature = "picking")]
-        app.add_plugins(super::pointer::CapturePointerPlugin);
+        app.add_plugins(super::picking_backend::CapturePickingPlugin);
     }
 
     fn finish(&self, app: &mut App) {

@@ -5,7 +5,7 @@
 //! only modules before it:
 //!
 //! ```text
-//! component ──▶ asset ──▶ playback ──▶ render ──▶ pbr, picking, stereo ──▶ pointer, inspector, testing
+//! component ──▶ asset ──▶ playback ──▶ render ──▶ pbr, picker, stereo ──▶ picking_backend, inspector, testing
 //! ```
 //!
 //! * [`component`]: the capture asset, and the component that places it in the world
@@ -13,11 +13,11 @@
 //! * [`playback`]: the time of each capture; shared clocks and timelines
 //! * [`render`]: drawing captures into the targets of cameras, and their settings
 //! * `pbr` (feature `pbr`): captures among Bevy's lit meshes
-//! * [`picking`]: the Gaussian that a ray hits
+//! * [`picker`]: the Gaussian that a ray hits
 //! * [`stereo`]: two eyes on one head
-//! * `pointer` (feature `picking`): pointer events on captures
+//! * `picking_backend` (feature `picking`): pointer events on captures
 //! * `inspector` (feature `inspector`): a panel that shows and edits captures
-//! * * `testing` (feature `testing`): apps without a window, rendered to pictures
+//! * `testing` (feature `testing`): apps without a window, rendered to pictures
 //!
 //! [`GaussianCapturePlugin`] adds all of them to an app except the inspector, which has its own plugin. `picker` and `testing` need no
 //! plugin.
@@ -29,10 +29,10 @@ pub mod component;
 pub mod inspector;
 #[cfg(feature = "pbr")]
 pub mod pbr;
-pub mod picking;
-pub mod playback;
+pub mod picker;
 #[cfg(feature = "picking")]
-pub mod pointer;
+pub mod picking_backend;
+pub mod playback;
 pub mod render;
 pub mod stereo;
 #[cfg(feature = "testing")]

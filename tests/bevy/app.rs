@@ -18,7 +18,7 @@ use bevy_gs4d::view::Background;
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin, codec, reference};
 use std::time::Duration;
 
-/// The colour of boxes.
+/// The color of boxes.
 const GREEN: Color = Color::srgb(0.0, 1.0, 0.0);
 
 /// Returns overlapping Gaussians of all kinds of shapes: one is tilted, two move.
@@ -44,7 +44,7 @@ fn bevy_draws_what_the_cpu_twin_draws() {
 }
 
 #[test]
-fn a_capture_blends_over_the_clear_colour_as_encoded_values() {
+fn a_capture_blends_over_the_clear_color_as_encoded_values() {
     let Some(mut app) = app(SIZE) else { return };
     let scene = crowd();
     spawn(&mut app, &scene, Transform::default());
@@ -52,11 +52,11 @@ fn a_capture_blends_over_the_clear_colour_as_encoded_values() {
     app.insert_resource(ClearColor(Color::srgb(0.2, 0.5, 0.9)));
     let expected = reference::render(&scene, &view(&eye(), SIZE, 0.0), Background::Color([0.2, 0.5, 0.9])).picture;
     let apart = difference(&picture(&mut app, 0.0), &expected);
-    assert!(apart <= 2.0, "over a colour Bevy and the CPU reference are {apart} / 255 apart");
+    assert!(apart <= 2.0, "over a color Bevy and the CPU reference are {apart} / 255 apart");
 }
 
 #[test]
-fn an_hdr_camera_shows_the_same_colours() {
+fn an_hdr_camera_shows_the_same_colors() {
     let Some(mut app) = app(SIZE) else { return };
     let scene = crowd();
     spawn(&mut app, &scene, Transform::default());

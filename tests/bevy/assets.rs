@@ -324,7 +324,7 @@ fn a_capture_goes_with_its_last_handle() {
     assert_eq!(captures(&app).len(), 0, "now it is not");
 }
 
-/// Returns a capture with colours over time and a filter.
+/// Returns a capture with colors over time and a filter.
 fn dressed() -> RuntimeScene {
     let scene = synthetic(200);
     let runtime = scene.clone().into_runtime().expect("a synthetic scene can be drawn");

@@ -1,4 +1,4 @@
-//! Captures among everything else in a Bevy frame: appearance, cameras, visibility, depth, colour.
+//! Captures among everything else in a Bevy frame: appearance, cameras, visibility, depth, color.
 //!
 //! In: small scenes made by hand, in headless apps. Out: proof that opacity, light, crop and blend spaces are those of
 //! the CPU reference, that every camera draws the captures that it should, from its own place, and that captures and
@@ -460,7 +460,7 @@ fn transparent_meshes_are_drawn_in_the_documented_order() {
     let cases = [
         (Msaa::Off, perspective(), none, 1.5, true),
         (Msaa::Off, perspective(), none, -1.5, false),
-        // The one Gaussian's depth is that of its centre.
+        // The one Gaussian's depth is that of its center.
         (Msaa::Off, perspective(), median, 0.1, true),
         (Msaa::Off, perspective(), median, -0.1, false),
         (Msaa::Off, perspective(), expected, 0.1, true),

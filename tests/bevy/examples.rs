@@ -85,7 +85,7 @@ fn check(example: &str, options: &[&str], expected: usize) {
     assert_eq!(pictures.len(), expected, "{example} writes as many pictures as it is asked for");
     for picture in &pictures {
         let first = picture.get_pixel(0, 0);
-        assert!(picture.pixels().any(|pixel| pixel != first), "{example} shows more than one colour");
+        assert!(picture.pixels().any(|pixel| pixel != first), "{example} shows more than one color");
     }
     for pair in pictures.windows(2) {
         let share = differing(&pair[0], &pair[1]);

@@ -1,7 +1,7 @@
 //! Captures among transparent things: glass, gizmos, wireframes and refraction before and behind them, and the sky.
 //!
 //! In: small scenes made by hand and panes of glass, in headless apps. Out: proof that what is behind a capture shows through it and what
-//! is in front covers it, with the colours that follow from pictures of each alone, multisampled or not, HDR or not. Skipped where there
+//! is in front covers it, with the colors that follow from pictures of each alone, multisampled or not, HDR or not. Skipped where there
 //! is no GPU, not even a software one.
 
 use crate::support::blob::blob;
@@ -26,7 +26,7 @@ use image::RgbaImage;
 const SMALL: UVec2 = UVec2::new(96, 72);
 /// What is behind everything.
 const WALL: Color = Color::srgb(0.3, 0.6, 0.2);
-/// The colour of the glass, sRGB-encoded, and its opacity.
+/// The color of the glass, sRGB-encoded, and its opacity.
 const GLASS: Vec3 = Vec3::new(0.1, 0.4, 0.9);
 const OPACITY: f32 = 0.5;
 /// Places of a pane before and behind captures at the origin, seen from [`front`].
@@ -43,8 +43,8 @@ fn color_at(picture: &RgbaImage, x: u32, y: u32) -> Vec3 {
     color(picture, x, y) / 255.0
 }
 
-/// Checks every pixel against a colour that follows from other pictures, except for their rounding and its own to 8 bits: in linear light
-/// half a step of a dark colour may become more.
+/// Checks every pixel against a color that follows from other pictures, except for their rounding and its own to 8 bits: in linear light
+/// half a step of a dark color may become more.
 fn check_pixels(picture: &RgbaImage, expected: impl Fn(u32, u32) -> Vec3, what: &str) {
     for y in 0..picture.height() {
         for x in 0..picture.width() {
@@ -138,10 +138,10 @@ fn the_captures_of_a_view_have_the_place_of_the_nearest() {
 }
 
 #[test]
-fn a_capture_whose_centre_is_behind_the_camera_is_behind_glass() {
+fn a_capture_whose_center_is_behind_the_camera_is_behind_glass() {
     let Some(mut app) = app(SIZE) else { return };
     let heap = |z: f32| (blob(Vec3::Z * z, Vec3::splat(0.4), 0.98), Vec3::X);
-    // The centre is ten units from the origin, the camera four.
+    // The center is ten units from the origin, the camera four.
     spawn(&mut app, &scene(&[heap(0.0), heap(20.0)]), ());
     spawn_camera(&mut app, Msaa::Sample4, front());
     spawn_pane(&mut app, OPACITY, BEFORE);

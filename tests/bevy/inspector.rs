@@ -275,7 +275,7 @@ fn a_debug_view_is_that_of_the_renderer_without_bevy() {
         app.world_mut().entity_mut(camera).insert(CaptureViewSettings { debug, ..default() });
         let seen = picture(&mut app, 0.0);
         let share = changed(&as_trained, &seen, 0..SIZE.x);
-        assert!(share > 0.01, "{debug:?} must not look like colour: {share} of the picture differs");
+        assert!(share > 0.01, "{debug:?} must not look like color: {share} of the picture differs");
         let shown = capture();
         let view = view(&place(), SIZE, shown.time_at(0.5));
         let apart = difference(&seen, &debug_picture(&mut headless, shown.scene(), view, debug));

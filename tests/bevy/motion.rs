@@ -43,7 +43,7 @@ fn pixels_of_unit(distance: f32) -> f32 {
     SIZE.y as f32 / (2.0 * distance * (FOV_Y / 2.0).tan())
 }
 
-/// Returns a plane at z = 0 that fills the view of [`front`], in stripes of two greys: along y, or along x.
+/// Returns a plane at z = 0 that fills the view of [`front`], in stripes of two grays: along y, or along x.
 fn stripes(along_y: bool) -> RuntimeScene {
     let spots: Vec<(Gaussian, Vec3)> = (-22..=22)
         .flat_map(|column| (-12..=12).map(move |row| (column, row)))
@@ -289,7 +289,7 @@ fn stripes_in_motion(along_y: bool, pixels: f32, forgets: bool, effect: impl Bun
 
 #[test]
 fn temporal_anti_aliasing_does_not_smear_what_moves() {
-    // Less than half a stripe, so that the history of another place is another colour.
+    // Less than half a stripe, so that the history of another place is another color.
     let [Some(sharp), Some(with), Some(without)] = [
         stripes_in_motion(true, 2.0, false, ()),
         stripes_in_motion(true, 2.0, false, TemporalAntiAliasing::default()),

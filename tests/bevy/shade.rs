@@ -1,6 +1,6 @@
 //! Fog, shadows of meshes and the light of the surroundings on captures.
 //!
-//! In: flat captures made by hand beside meshes of the same colour, in headless apps. Out: proof that fog is that of Bevy's meshes, that
+//! In: flat captures made by hand beside meshes of the same color, in headless apps. Out: proof that fog is that of Bevy's meshes, that
 //! shadows and dark rooms darken captures by the documented factors and only those that ask for it, and that other cameras pay nothing.
 //! Skipped where there is no GPU, not even a software one.
 
@@ -21,7 +21,7 @@ use bevy_gs4d::view::srgb::{decode, encode};
 use bevy_gs4d::view::{BlendSpace, DebugView};
 use image::RgbaImage;
 
-/// The colour of walls, sRGB-encoded.
+/// The color of walls, sRGB-encoded.
 const COLOR: Vec3 = Vec3::new(0.6, 0.4, 0.8);
 
 /// Returns a flat wall through the origin, opaque to less than an 8-bit step all over the picture: three splats of the opacity 0.95 let
@@ -40,7 +40,7 @@ fn fog(falloff: FogFalloff) -> DistanceFog {
     DistanceFog { color: Color::srgba(0.2, 0.7, 0.3, 0.9), falloff, ..default() }
 }
 
-/// Returns a fog of each kind that changes colours a lot at a distance of four.
+/// Returns a fog of each kind that changes colors a lot at a distance of four.
 fn fogs() -> [(&'static str, DistanceFog); 5] {
     let linear = FogFalloff::Linear { start: 1.0, end: 8.0 };
     let glowing = DistanceFog {
@@ -149,7 +149,7 @@ fn an_environment_map_is_fogged_as_what_is_infinitely_far() {
     insert(&mut app, camera, DistanceFog { color, falloff, ..default() });
     let seen = rgb(&picture(&mut app, 0.0), MIDDLE.x, MIDDLE.y);
     for (value, expected) in seen.into_iter().zip([51, 179, 77]) {
-        assert!(value.abs_diff(expected) <= 2, "the fog's colour, not {seen:?}");
+        assert!(value.abs_diff(expected) <= 2, "the fog's color, not {seen:?}");
     }
 }
 
@@ -241,7 +241,7 @@ fn debug_views_are_not_shaded() {
     insert(&mut app, camera, CaptureViewSettings { debug: DebugView::Depth, ..default() });
     let plain = picture(&mut app, 0.0);
     insert(&mut app, camera, fog(FogFalloff::Exponential { density: 0.5 }));
-    assert_eq!(difference_between(&picture(&mut app, 0.0), &plain), 0, "depths are not colours");
+    assert_eq!(difference_between(&picture(&mut app, 0.0), &plain), 0, "depths are not colors");
 }
 
 #[test]

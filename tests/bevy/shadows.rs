@@ -33,7 +33,7 @@ const UNSEEN: usize = 1;
 fn ball(velocity: Vec3) -> RuntimeScene {
     let count = 2000;
     let gaussian = |index: u32| {
-        // A spiral of points, all as far from their neighbours. Half of the light is lost a bit further out than they are.
+        // A spiral of points, all as far from their neighbors. Half of the light is lost a bit further out than they are.
         let z = 1.0 - 2.0 * (index as f32 + 0.5) / count as f32;
         let angle = PI * (3.0 - 5f32.sqrt()) * index as f32;
         let place = (Vec2::from_angle(angle) * (1.0 - z * z).sqrt()).extend(z) * (0.9 * RADIUS);

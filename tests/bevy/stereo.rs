@@ -25,7 +25,7 @@ use image::imageops::crop_imm;
 /// Far more than people have, so that disparity is many pixels.
 const RIG: StereoRig = StereoRig { ipd: 0.2 };
 
-/// Returns a round Gaussian and its colour.
+/// Returns a round Gaussian and its color.
 fn splat(mean: Vec3, deviation: f32, velocity: Vec3, color: Vec3) -> (Gaussian, Vec3) {
     let at_rest = blob(mean, Vec3::splat(deviation), 0.9);
     (Gaussian { mean_t: 0.0, velocity: velocity.to_array(), sigma_t: 10.0, ..at_rest }, color)

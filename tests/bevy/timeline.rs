@@ -210,7 +210,7 @@ fn a_child_with_the_name_of_a_track_plays_it() {
     let player = spawn(&mut app, timeline, Playback::default());
     let place = Transform::from_xyz(1.0, 2.0, 3.0);
     let mine = app.world_mut().spawn((TimelineTrack("right".into()), place, ChildOf(player))).id();
-    let stray = app.world_mut().spawn((TimelineTrack("centre".into()), ChildOf(player))).id();
+    let stray = app.world_mut().spawn((TimelineTrack("center".into()), ChildOf(player))).id();
     pass(&mut app, 1.5);
     assert_eq!(track(&mut app, "right"), mine, "none is spawned beside it");
     assert_eq!((shown(&mut app, "right"), get::<Transform>(&app, mine)), ((true, 0.5, 0.5), place), "in its place");

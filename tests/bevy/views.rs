@@ -39,7 +39,7 @@ use std::path::Path;
 /// For tests that need many pictures.
 const SMALL: UVec2 = UVec2::new(96, 72);
 
-/// Returns a grey map all around, and a Gaussian that no camera of these tests sees.
+/// Returns a gray map all around, and a Gaussian that no camera of these tests sees.
 fn surrounded() -> RuntimeScene {
     let map = Environment { width: 8, height: 4, texels: vec![0.5; 8 * 4 * 3] };
     let far = scene(&[(blob(Vec3::NEG_X * 9.0, Vec3::splat(0.4), 0.98), Vec3::X)]);
@@ -89,7 +89,7 @@ fn a_map_has_no_hole_where_rays_miss_its_sphere() {
     let picture = picture(&mut app, 0.0);
     // NaN would be black. Towards the poles the map fades to half.
     let darkest = picture.pixels().flat_map(|pixel| pixel.0).min();
-    assert!(darkest > Some(20), "every pixel has a colour; the darkest is {darkest:?}");
+    assert!(darkest > Some(20), "every pixel has a color; the darkest is {darkest:?}");
     let middle = rgb(&picture, MIDDLE.x, MIDDLE.y);
     assert!(middle.iter().all(|value| value.abs_diff(128) <= 2), "in the middle it is the map's: {middle:?}");
 }
@@ -142,7 +142,7 @@ fn a_sub_view_is_that_part_of_the_whole() {
     let expected = part(&reference_picture(&scene, whole, Appearance::default()), offset, size);
     assert!(expected.pixel(72, 20).x > 0.3, "the long splat is in view: {}", expected.pixel(72, 20));
 
-    // The same pixels behind a lens that is off-centre.
+    // The same pixels behind a lens that is off-center.
     let lens = Lens::Intrinsics { focal: whole.focal(), center: SIZE.as_vec2() / 2.0 - offset.as_vec2() };
     let pinhole = PinholeCamera { world_to_camera: whole.world_to_camera, size, lens };
     let sub = pinhole.view(0.0, RasterFov::Corrected);
@@ -385,7 +385,7 @@ fn an_orthographic_camera_shows_what_is_near_brighter_as_depth() {
     let [near, far] = [MIDDLE.x - 35, MIDDLE.x + 35].map(|x| rgb(&picture, x, MIDDLE.y));
     assert!(far[0] > 20, "what is far is dim, not black: {far:?}");
     assert!(near[0].saturating_sub(far[0]) > 10, "what is near is brighter: {near:?}, not {far:?}");
-    assert!([near, far].iter().all(|[r, g, b]| r == g && g == b), "depth is grey: {near:?}, {far:?}");
+    assert!([near, far].iter().all(|[r, g, b]| r == g && g == b), "depth is gray: {near:?}, {far:?}");
 }
 
 #[test]
@@ -403,7 +403,7 @@ fn extreme_exposure_is_white_and_finite() {
     assert_eq!(rgb(&picture, MIDDLE.x, MIDDLE.y), [255; 3], "the capture is white");
     let corner = rgb(&picture, 2, 2);
     let apart = corner.iter().zip([51u8, 76, 102]).map(|(seen, clear)| seen.abs_diff(clear)).max();
-    assert!(apart <= Some(1), "where it is not, the clear colour shows: {corner:?}");
+    assert!(apart <= Some(1), "where it is not, the clear color shows: {corner:?}");
     let halves = testing::read_hdr(&mut app, &halves).expect("the second camera's picture");
     assert!(halves.as_raw().iter().all(|value| value.is_finite()), "every value of the HDR target is finite");
 }

@@ -28,7 +28,7 @@ use bevy::render::{ExtractSchedule, Render, RenderApp, RenderSystems};
 use bevy::transform::components::GlobalTransform;
 use glam::Vec3;
 
-/// The meshes that have moved since the frame before, and the centres of their bounds in the world. None while there are no captures, and all
+/// The meshes that have moved since the frame before, and the centers of their bounds in the world. None while there are no captures, and all
 /// when there are captures again.
 #[derive(Resource, Default)]
 struct MovedMeshes(Vec<(MainEntity, Vec3)>);

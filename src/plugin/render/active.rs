@@ -1,7 +1,7 @@
-//! Active lists: which Gaussians are active in the segments of temporal filters, once for each placed capture and frame.
+//! Active lists: the Gaussians that are active in the current segment of a temporal filter, one list per placed capture.
 //!
-//! In: [`ExtractedCaptures`]. Out: [`ActiveLists`], shared by all cameras, and written on the GPU before any of them draws, only when a
-//! capture has entered another segment of time.
+//! In: [`ExtractedCaptures`]. Out: [`ActiveLists`], shared by all cameras. A list is written on the GPU before any camera draws, and only
+//! when its capture has entered another segment.
 
 use super::detail::CaptureLevels;
 use super::extract::ExtractedCaptures;
@@ -26,11 +26,11 @@ pub(crate) struct ActiveLists(pub(super) MainEntityHashMap<PlacedList>);
 pub(super) struct PlacedList {
     pub(super) list: ActiveList,
     asset: AssetId<GaussianCapture>,
-    /// Whether it must be written for another segment.
+    /// Whether the list must be rewritten for another segment.
     stale: bool,
 }
 
-/// Creates the lists of new captures, drops those of removed ones, and moves the others to the current segment.
+/// Creates the lists of new captures, drops the lists of removed captures, and moves the remaining lists to the current segment.
 pub(super) fn prepare_active_lists(
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
@@ -48,7 +48,7 @@ pub(super) fn prepare_active_lists(
         uploaded.is_some_and(|capture| placed.list.is_for(capture))
     });
     for (entity, shown) in &extracted.0 {
-        // Levels of detail have no filter. Lights are shown all Gaussians, whatever cameras see.
+        // Levels of detail have no filter. Lights draw all Gaussians, whatever level cameras draw.
         let is_coarse = levels.is_coarse(entity) && !shown.casts;
         if !(shown.seen && shown.filtered) || shown.is_faded_out() || is_coarse {
             continue;
@@ -70,7 +70,7 @@ pub(super) fn any_stale(lists: Res<ActiveLists>) -> bool {
     lists.0.values().any(|placed| placed.stale)
 }
 
-/// Records `activate` for the lists that must be written, before the cameras.
+/// Records `activate` for the stale lists, before the cameras.
 pub(super) fn record_active_lists(
     renderer: Option<Res<CaptureRenderer>>,
     captures: Res<RenderAssets<GpuGaussianCapture>>,

@@ -1,6 +1,6 @@
 //! The state of every camera that may see captures, kept from frame to frame.
 //!
-//! In: what [`prepare`](super::prepare) finds that a camera sees. Out: [`CaptureViews`], which drawing and statistics read.
+//! In: the captures that [`prepare`](super::prepare) finds for each camera. Out: [`CaptureViews`], read by drawing and statistics.
 
 use super::active::ActiveLists;
 use super::composite::CompositeBindings;
@@ -25,7 +25,7 @@ use bevy::render::sync_world::MainEntity;
 #[derive(Resource, Default)]
 pub(crate) struct CaptureViews(pub(crate) HashMap<Entity, CaptureView>);
 
-/// Returns whether other systems work on any camera's picture of captures before it reaches the target.
+/// Returns whether other systems change the captures' picture of any camera before it reaches the target.
 pub(super) fn any_shaded(views: Res<CaptureViews>) -> bool {
     views.0.values().any(|view| view.is_shaded)
 }
@@ -35,25 +35,25 @@ pub(crate) struct CaptureView {
     /// The camera's entity in the main world.
     pub(super) camera: Entity,
     pub(crate) renderer: ViewRenderer,
-    /// The composite into the camera's target, and what it binds.
+    /// The pipeline of the composite into the camera's target.
     pub(super) composite: CachedRenderPipelineId,
     /// The composite into every sample of a multisampled target.
     pub(super) composite_samples: Option<CachedRenderPipelineId>,
-    /// Whether it blends with the target where that is, instead of reading it.
+    /// Whether the composite blends in place by hardware, instead of reading the target.
     pub(super) in_place: bool,
     pub(super) bindings: CompositeBindings,
-    /// The pass that writes to the camera's depth buffer, if the camera asks for it, and what that pass binds.
+    /// The pipeline that writes to the camera's depth buffer, if the camera requests it.
     pub(super) write_depth: Option<CachedRenderPipelineId>,
     pub(super) depth_bindings: WriteDepthBindings,
-    /// The pass that writes to the camera's motion vectors, if the camera has them, and what that pass binds.
+    /// The pipeline that writes to the camera's motion vectors, if the camera has them.
     pub(super) write_motion: Option<CachedRenderPipelineId>,
     pub(super) motion_group: KeptGroup,
-    /// The camera's pose in the last frame.
+    /// The camera's pose in the previous frame.
     pub(super) pose: Option<CameraPose>,
-    /// Whether other systems work on the captures' picture before it reaches the target, in
+    /// Whether other systems change the captures' picture before it reaches the target, in
     /// [`CaptureSystems::Shade`](super::CaptureSystems).
     pub(crate) is_shaded: bool,
-    /// What they made of it, which the composite takes instead of the renderer's colour.
+    /// The changed picture, which the composite uses instead of the renderer's color.
     pub(crate) shaded: Option<wgpu::TextureView>,
     /// Whether GPU times are measured.
     measured: bool,
@@ -74,10 +74,10 @@ pub(crate) struct Drawn {
     pub(crate) level: usize,
 }
 
-/// Puts the copies of each capture, of one level, beside the first of them, so that one dispatch draws those that have no list of active
-/// Gaussians. Otherwise the order stays: it decides between splats of the same depth.
+/// Moves the copies of each capture at one level next to the first copy, so that one dispatch draws all copies without a list of active
+/// Gaussians. The order is otherwise kept, since it decides between splats of the same depth.
 pub(crate) fn group_copies(drawn: &mut [Drawn]) {
-    // Two stand beside each other anyway.
+    // Two captures are always adjacent.
     if drawn.len() < 3 {
         return;
     }
@@ -91,7 +91,7 @@ pub(crate) fn group_copies(drawn: &mut [Drawn]) {
 }
 
 impl Drawn {
-    /// Returns it as input of the renderer; `None` if the capture is no longer on the GPU.
+    /// Returns the capture as input of the renderer; `None` if the capture is no longer on the GPU.
     pub(crate) fn instance<'a>(
         &self,
         captures: &'a RenderAssets<GpuGaussianCapture>,
@@ -132,7 +132,7 @@ impl CaptureView {
         }
     }
 
-    /// Returns whether it draws anything this frame.
+    /// Returns whether the camera draws a capture this frame.
     pub(crate) fn sees_something(&self) -> bool {
         !self.drawn.is_empty()
     }
@@ -146,7 +146,7 @@ impl CaptureView {
         self.drawn.iter().filter_map(|drawn| drawn.instance(captures, lists)).collect()
     }
 
-    /// Counts a frame in which the camera sees a capture, or none. After many without one, GPU memory is released.
+    /// Counts a frame, with or without a visible capture. After many frames without one, releases the GPU memory.
     pub(super) fn count_idle_frames(&mut self) {
         if self.idle.count(self.sees_something()) {
             self.renderer.release();
@@ -156,7 +156,7 @@ impl CaptureView {
         }
     }
 
-    /// Sets how captures are drawn. The renderer no longer measures after a change.
+    /// Sets the design of the renderer. A change stops measuring.
     pub(super) fn set_design(&mut self, renderer: &Renderer, design: Design) {
         let before = self.renderer.design();
         self.renderer.set_design(renderer, design);
@@ -180,7 +180,7 @@ mod tests {
     use glam::{Mat4, UVec2, Vec2, Vec4};
 
     #[test]
-    fn copies_stand_together_and_nothing_else_moves() {
+    fn copies_are_grouped_and_the_order_is_otherwise_kept() {
         let view = View::new(UVec2::ONE, 0.0, Mat4::IDENTITY, Vec4::ONE, Vec2::ONE);
         let one = |(number, (asset, level)): (u32, (u128, usize))| Drawn {
             entity: Entity::from_raw_u32(number).expect("a small number").into(),
@@ -190,11 +190,11 @@ mod tests {
             filtered: true,
             level,
         };
-        // The second asset has the smaller number; of the first there are two levels.
+        // The second asset has the smaller identifier; the first asset occurs at two levels.
         let assets = [(9, 0), (4, 0), (9, 1), (9, 0), (7, 0), (4, 0), (9, 1), (9, 0)];
         let mut drawn: Vec<Drawn> = (0..).zip(assets).map(one).collect();
         group_copies(&mut drawn);
         let order: Vec<u32> = drawn.iter().map(|one| one.entity.id().index_u32()).collect();
-        assert_eq!(order, [0, 3, 7, 1, 5, 2, 6, 4], "each beside the first of its kind, in their order");
+        assert_eq!(order, [0, 3, 7, 1, 5, 2, 6, 4], "copies follow the first copy in their original order");
     }
 }

@@ -1,7 +1,7 @@
-//! Composite: draws captures over what the camera has drawn so far, through Bevy's pipeline cache.
+//! Composite: draws captures over the camera's target, through Bevy's pipeline cache.
 //!
-//! In: a view target and a view's captures (colour and transmittance). Out: pipeline and bind group for
-//! `shaders/composite.wgsl`, which are created only when something has changed.
+//! In: a view target and a view's captures (color and transmittance). Out: pipeline and bind group for `shaders/composite.wgsl`, created
+//! only when one of the inputs has changed.
 
 use super::kept::KeptUniform;
 use crate::renderer::WorkCounters;
@@ -27,14 +27,14 @@ pub(super) struct CaptureShaders {
     pub(super) composite: Handle<Shader>,
     pub(super) write_depth: Handle<Shader>,
     pub(super) write_motion: Handle<Shader>,
-    /// The library that composite imports: nothing reads the handle, but the import resolves only as long as it is held.
+    /// The library that `composite.wgsl` imports. The handle is never read, but the import resolves only while it is held.
     pub(super) _srgb: Handle<Shader>,
 }
 
 /// The parts that the pipelines for all targets share.
 #[derive(Resource)]
 pub(super) struct CompositePipeline {
-    /// Captures, viewport, and the target so far if the composite reads it.
+    /// Bindings of the composite in place: captures and viewport.
     layout: BindGroupLayoutDescriptor,
     reading: BindGroupLayoutDescriptor,
     vertex: VertexState,
@@ -49,13 +49,13 @@ pub(super) struct CompositeKey {
     pub(super) encoded: bool,
     /// The space in which captures have been blended, and are blended with the target.
     pub(super) blend_space: BlendSpace,
-    /// Samples of the target that is written. What is read has one.
+    /// Samples of the target that is written. The texture that is read has one.
     pub(super) samples: u32,
 }
 
 impl CompositeKey {
-    /// Returns whether captures are blended in the space of the target, so that the hardware does it, in place. Otherwise the target is
-    /// read, and written to another texture.
+    /// Returns whether captures are blended in the space of the target, so that hardware blending in place is right. Otherwise the target
+    /// is read, and the result is written to another texture.
     pub(super) fn blends_in_place(self) -> bool {
         self.encoded == (self.blend_space == BlendSpace::Encoded)
     }
@@ -117,7 +117,7 @@ impl CompositePipeline {
     }
 }
 
-/// What one view binds. A view target alternates between two textures, so two bind groups are kept.
+/// The bindings of one view. A view target alternates between two textures, so two bind groups are kept.
 #[derive(Default)]
 pub(super) struct CompositeBindings {
     viewport: KeptUniform<UVec4>,
@@ -125,19 +125,19 @@ pub(super) struct CompositeBindings {
 }
 
 struct CachedGroup {
-    /// The target so far, if it is read.
+    /// The target texture, if it is read.
     source: Option<TextureViewId>,
     captures: wgpu::TextureView,
     group: BindGroup,
 }
 
 impl CompositeBindings {
-    /// Releases the targets that were bound.
+    /// Releases the bound targets.
     pub(super) fn forget(&mut self) {
         self.groups.clear();
     }
 
-    /// Writes the corner and size of the viewport, pixels of the target, if they have changed.
+    /// Writes the corner and size of the viewport in pixels of the target, if they have changed.
     pub(super) fn set_viewport(
         &mut self,
         viewport: UVec4,
@@ -154,8 +154,8 @@ impl CompositeBindings {
         self.viewport.binding()
     }
 
-    /// Returns the bind group that reads `captures` and `source`, the target so far, unless they are blended in place; `None` before
-    /// the first [`set_viewport`](Self::set_viewport).
+    /// Returns the bind group that reads `captures` and, unless they are blended in place, the target texture `source`; `None` before the
+    /// first [`set_viewport`](Self::set_viewport).
     pub(super) fn group(
         &mut self,
         device: &RenderDevice,
@@ -178,7 +178,7 @@ impl CompositeBindings {
                     None => create(&BindGroupEntries::sequential((captures, viewport))),
                 };
                 work.add_created();
-                // Both textures of the target are created together: if one is new, so is the other.
+                // Both textures of the target are created together, so a new `captures` makes both bind groups stale.
                 if self.groups.len() >= 2 || self.groups.iter().any(|known| known.captures != *captures) {
                     self.groups.clear();
                 }

@@ -1,9 +1,9 @@
-//! Depth readers: which cameras have effects that read depths after the main pass.
+//! Depth readers: the cameras with effects that read depths after the main pass.
 //!
 //! In (main world): cameras with all their components. Out (render world): [`DepthReaders`], for which
 //! [`DepthWrite::Auto`](super::DepthWrite::Auto) writes depths.
 //!
-//! Most of these effects belong to crates that this one does not depend on: they are found by the paths of their types.
+//! Most of these effects belong to crates that this crate does not depend on; their components are found by type path.
 
 use super::settings::DepthWrite;
 use bevy::camera::Camera;
@@ -18,16 +18,16 @@ use bevy::render::Extract;
 use bevy::render::sync_world::{MainEntity, MainEntityHashSet};
 use std::any::TypeId;
 
-/// Components of cameras whose effects read the depth buffer after the main pass, beside those that read motion vectors and
-/// order-independent transparency.
+/// Type paths of camera components whose effects read the depth buffer after the main pass. Effects that read motion vectors and
+/// order-independent transparency are found by type.
 const READERS: [&str; 2] = ["bevy_post_process::dof::DepthOfField", "bevy_light::volumetric::VolumetricFog"];
 
-/// Cameras that have such an effect.
+/// Cameras with an effect that reads depths after the main pass.
 #[derive(Resource, Default)]
 pub(super) struct DepthReaders(MainEntityHashSet);
 
 impl DepthReaders {
-    /// Returns which depth is written for a camera that asks for this one: never [`DepthWrite::Auto`].
+    /// Returns the depth to write for a camera with this setting: never [`DepthWrite::Auto`].
     pub(super) fn resolve(&self, camera: &MainEntity, asked: DepthWrite) -> DepthWrite {
         match asked {
             DepthWrite::Auto if self.0.contains(camera) => DepthWrite::Expected,
@@ -37,7 +37,7 @@ impl DepthReaders {
     }
 }
 
-/// Finds those cameras.
+/// Finds the cameras with an effect that reads depths.
 pub(super) fn extract_depth_readers(
     mut readers: ResMut<DepthReaders>,
     mut known: Local<[Option<TypeId>; READERS.len()]>,
@@ -45,7 +45,7 @@ pub(super) fn extract_depth_readers(
     cameras: Extract<Query<EntityRef, With<Camera>>>,
 ) {
     if known.contains(&None) {
-        // A game without an effect may not have its type either.
+        // The type is not registered in a game without the effect.
         let registry = registry.read();
         for (id, path) in known.iter_mut().zip(READERS) {
             *id = registry.get_with_type_path(path).map(|found| found.type_id());

@@ -1,8 +1,8 @@
-//! Detail: how many Gaussians of a capture a camera is shown, by the capture's size on the screen.
+//! Detail: chooses the level of detail of each capture for each camera by its size on the screen.
 //!
 //! In: extracted captures and cameras, the levels of detail of uploaded captures, [`CaptureDetail`]. Out: [`CaptureLevels`], the level of
-//! each capture for each camera. A level is kept while the size is near its limit, so that nothing flickers there; cameras that see a
-//! capture at nearly the same size, such as two eyes, draw the same level.
+//! each capture for each camera. A level is kept while the size is near its limit, which avoids flicker; cameras that see a capture at
+//! nearly the same size, such as two eyes, draw the same level.
 
 use super::extract::ExtractedCaptures;
 use super::statistics::CaptureStatistics;
@@ -23,17 +23,18 @@ use bevy::render::view::{ExtractedView, RenderVisibleEntities};
 use glam::{Affine3A, Mat4, UVec2, Vec3, Vec4};
 use std::time::Duration;
 
-/// A coarser level is taken when the size on the screen is below its limit by this factor, and left at the limit itself.
+/// A coarser level is chosen when the size on the screen is below this factor times its limit, and left at the limit itself.
 const SLACK: f32 = 0.8;
-/// Cameras that see a capture at sizes of no more than this ratio draw the same level. The eyes of a head do.
+/// Cameras draw the same level of a capture if the ratio of its sizes on their screens is at most this, as for two eyes.
 const ALIKE: f32 = 1.1;
-/// And those that drew the same level in the last frame, at sizes of no more than this ratio: who moves away from another does not flicker.
+/// The same ratio for cameras that drew the same level in the previous frame: larger, so that cameras that move apart do not flicker.
 const STILL_ALIKE: f32 = 1.2;
-/// How far the bias moves in a frame while the GPU time is not as wanted, and how far it may go, stops.
+/// Change of the bias per frame while the GPU time is off target, in stops.
 const STEP: f32 = 1.0 / 64.0;
-/// The bias rises while the time wanted is more than this many times that taken: a finer level has seven times as many Gaussians, and must
-/// not be too slow again.
+/// The bias rises while the target time is more than this many times the measured time: a finer level has seven times as many Gaussians and
+/// must not exceed the target again.
 const HEADROOM: f64 = 8.0;
+/// The lowest bias is minus this many stops.
 const FARTHEST: f32 = 6.0;
 
 /// How much detail of captures is drawn: a resource.
@@ -48,7 +49,7 @@ const FARTHEST: f32 = 6.0;
 /// use bevy_gs4d::prelude::*;
 /// use std::time::Duration;
 ///
-/// /// On a slow GPU: less detail, as much less as four milliseconds ask for.
+/// /// Lowers the detail on a slow GPU until captures take at most four milliseconds.
 /// fn hurry(mut detail: ResMut<CaptureDetail>, statistics: Res<CaptureStatistics>) {
 ///     statistics.measure(true);
 ///     detail.frame_time = Some(Duration::from_millis(4));
@@ -57,24 +58,26 @@ const FARTHEST: f32 = 6.0;
 /// ```
 #[derive(Resource, Debug, Clone, Copy, Default, PartialEq)]
 pub struct CaptureDetail {
-    /// Stops of size: at −1 captures count as half as large on the screen as they are, so that coarser levels are drawn, at 1 as twice as
+    /// Bias on the size on the screen, in stops: at −1 captures count as half as large, so that coarser levels are drawn; at 1 as twice as
     /// large. Default: 0, as measured when the levels were made.
     pub bias: f32,
-    /// The GPU time that captures should take in a frame, all cameras together. While it is exceeded, the bias falls slowly below
-    /// [`bias`](Self::bias), and rises again when an eighth of it is taken. Needs [`CaptureStatistics::measure`]. Default: `None`, no limit.
+    /// Target of the GPU time of captures per frame, summed over all cameras. While it is exceeded, the bias falls slowly below
+    /// [`bias`](Self::bias); it rises again when the measured time is below an eighth of the target. Needs [`CaptureStatistics::measure`].
+    /// Default: `None`, no limit.
     pub frame_time: Option<Duration>,
 }
 
 /// The level of each capture that has levels, for each camera that sees it. Level 0 is all Gaussians.
 #[derive(Resource, Default)]
 pub(super) struct CaptureLevels {
-    /// By the entities of the camera in the render world and of the capture in the main world; with whether it was seen this frame.
+    /// Level, and whether the capture was seen this frame, by the camera's entity in the render world and the capture's entity in the main
+    /// world.
     chosen: HashMap<(Entity, MainEntity), (usize, bool)>,
     /// Whether any camera sees all Gaussians of a capture.
     whole: MainEntityHashMap<bool>,
-    /// What is seen this frame; kept for its memory.
+    /// The sights of this frame. The memory is kept from frame to frame.
     sights: Vec<Sight>,
-    /// What is added to the bias to keep to the time, stops: at most 0.
+    /// Added to the bias to meet the target time, in stops: at most 0.
     steered: f32,
 }
 
@@ -89,7 +92,7 @@ impl CaptureLevels {
         self.whole.get(capture) == Some(&false)
     }
 
-    /// Moves what is added to the bias towards the time that is wanted. Nothing changes while nothing is measured.
+    /// Updates `steered` towards the target time. It stays the same while no pass is measured.
     fn steer(&mut self, wanted: Option<Duration>, statistics: &CaptureStatistics) {
         let Some(wanted) = wanted else {
             self.steered = 0.0;
@@ -106,15 +109,15 @@ impl CaptureLevels {
 struct Sight {
     camera: Entity,
     capture: MainEntity,
-    /// Its size on the screen, pixels.
+    /// The capture's size on the screen, in pixels.
     pixels: f32,
-    /// The level of the last frame, if it was seen.
+    /// The level in the previous frame, if the capture was seen.
     before: Option<usize>,
 }
 
 impl Sight {
-    /// Returns what decides on the level, of all cameras that see the capture at nearly this size: the largest size, and the finest level of
-    /// the last frame.
+    /// Returns the largest size and the finest previous level among all cameras that see the capture at nearly this size. They decide on
+    /// the level.
     fn together(&self, same_capture: &[Self]) -> (f32, Option<usize>) {
         let is_alike = |other: &&Self| {
             let ratio = if other.before == self.before && self.before.is_some() { STILL_ALIKE } else { ALIKE };
@@ -122,12 +125,12 @@ impl Sight {
         };
         let alike = same_capture.iter().filter(is_alike);
         let before = alike.clone().filter_map(|other| other.before).min();
-        // A size that is not a number is like no other, and stays what it is.
+        // NaN matches no other size and is kept.
         (alike.fold(self.pixels, |most, other| most.max(other.pixels)), before.or(self.before))
     }
 }
 
-/// Returns the bias of the next frame, after one that took so many milliseconds; 0 is a frame that was not measured.
+/// Returns the bias of the next frame after a frame of so many milliseconds; 0 milliseconds stands for an unmeasured frame.
 fn steered(before: f32, milliseconds: f64, wanted: f64) -> f32 {
     if milliseconds > wanted {
         (before - STEP).max(-FARTHEST)
@@ -146,7 +149,7 @@ pub(super) fn extract_detail(mut extracted: ResMut<CaptureDetail>, detail: Extra
 type CameraSize =
     (Entity, &'static ExtractedView, &'static RenderVisibleEntities, Option<&'static MainPassResolutionOverride>);
 
-/// Returns whether any capture has levels, or had in the last frame.
+/// Returns whether any capture has levels, or had levels in the previous frame.
 pub(super) fn any_levels(captures: Res<RenderAssets<GpuGaussianCapture>>, levels: Res<CaptureLevels>) -> bool {
     !levels.chosen.is_empty() || captures.iter().any(|(_, capture)| capture.detail().is_some())
 }
@@ -195,10 +198,10 @@ pub(super) fn choose_levels(
     levels.chosen.retain(|_, (_, seen)| *seen);
 }
 
-/// Returns the level to draw at a size on the screen, after level `before`, if the capture was seen before: the coarsest that is close
-/// enough. Without a level before there is nothing that could flicker.
+/// Returns the coarsest level that is accurate enough at a size on the screen. `before` is the previous level, which is kept near its
+/// limit; it is `None` if the capture was not seen in the previous frame.
 fn choose(levels: &[Level], pixels: f32, before: Option<usize>) -> usize {
-    // NaN is larger than any limit.
+    // NaN counts as larger than any limit.
     let fits = |level: usize, slack: f32| level == 0 || pixels <= levels[level - 1].pixels * slack;
     let coarsest = |slack: f32| (0..=levels.len()).rev().find(|&level| fits(level, slack)).unwrap_or(0);
     match before.filter(|&before| before <= levels.len() && fits(before, 1.0)) {
@@ -207,7 +210,7 @@ fn choose(levels: &[Level], pixels: f32, before: Option<usize>) -> usize {
     }
 }
 
-/// Returns the size on the screen of bounds in a capture, pixels, of the sphere about them.
+/// Returns the size on the screen, in pixels, of the sphere around the bounds of a capture.
 fn size_on_screen(clip_from_view: &Mat4, eye: Vec3, size: UVec2, world_from_capture: &Affine3A, bounds: Bounds) -> f32 {
     let size = size.as_vec2();
     let focal = 0.5 * (clip_from_view.x_axis.x * size.x).max(clip_from_view.y_axis.y * size.y);
@@ -215,7 +218,7 @@ fn size_on_screen(clip_from_view: &Mat4, eye: Vec3, size: UVec2, world_from_capt
     let scale = axes.x_axis.length().max(axes.y_axis.length()).max(axes.z_axis.length());
     let (center, radius) = (world_from_capture.transform_point3(bounds.center()), bounds.radius() * scale);
     if clip_from_view.row(3) == Vec4::W {
-        // Parallel rays: the same at every distance.
+        // Parallel rays: the size is the same at every distance.
         2.0 * focal * radius
     } else {
         pixels_across(radius, eye.distance(center), focal)
@@ -235,29 +238,29 @@ mod tests {
     }
 
     #[test]
-    fn the_coarsest_level_that_is_close_enough_is_drawn() {
+    fn the_coarsest_accurate_level_is_chosen() {
         let levels = levels(&[100.0, 40.0, 10.0]);
         for (pixels, expected) in [(5.0, 3), (10.0, 3), (11.0, 2), (90.0, 1), (101.0, 0), (f32::INFINITY, 0)] {
             assert_eq!(choose(&levels, pixels, None), expected, "at {pixels} pixels");
         }
-        assert_eq!(choose(&levels, f32::NAN, None), 0, "no number is no reason to leave something out");
-        assert_eq!(choose(&[], 1.0, None), 0, "without levels");
+        assert_eq!(choose(&levels, f32::NAN, None), 0, "all Gaussians are drawn at a size of NaN");
+        assert_eq!(choose(&[], 1.0, None), 0, "a capture without levels is drawn whole");
     }
 
     #[test]
-    fn a_level_is_left_at_its_limit_and_taken_well_below() {
+    fn a_coarser_level_is_chosen_well_below_its_limit_and_left_at_it() {
         let levels = levels(&[100.0, 40.0]);
-        assert_eq!(choose(&levels, 41.0, Some(2)), 1, "finer at once");
-        assert_eq!(choose(&levels, 39.0, Some(1)), 1, "coarser not yet");
-        assert_eq!(choose(&levels, 31.0, Some(1)), 2, "but well below");
-        assert_eq!(choose(&levels, 39.0, Some(2)), 2, "where it stays");
-        assert_eq!(choose(&levels, 5.0, Some(0)), 2, "by several at once");
-        assert_eq!(choose(&levels, 500.0, Some(2)), 0, "and back");
-        assert_eq!(choose(&levels, 5.0, Some(9)), 2, "a level of another capture counts for nothing");
+        assert_eq!(choose(&levels, 41.0, Some(2)), 1, "a finer level is chosen at the limit");
+        assert_eq!(choose(&levels, 39.0, Some(1)), 1, "no coarser level just below its limit");
+        assert_eq!(choose(&levels, 31.0, Some(1)), 2, "a coarser level well below its limit");
+        assert_eq!(choose(&levels, 39.0, Some(2)), 2, "the coarser level is kept just below its limit");
+        assert_eq!(choose(&levels, 5.0, Some(0)), 2, "several levels coarser in one step");
+        assert_eq!(choose(&levels, 500.0, Some(2)), 0, "several levels finer in one step");
+        assert_eq!(choose(&levels, 5.0, Some(9)), 2, "a previous level that does not exist is ignored");
     }
 
     #[test]
-    fn oscillation_by_a_twentieth_changes_nothing_twice() {
+    fn an_oscillation_of_five_percent_changes_the_level_at_most_once() {
         let levels = levels(&[100.0, 40.0, 10.0]);
         for middle in [8.0, 10.0, 12.5, 32.0, 40.0, 50.0, 80.0, 100.0, 125.0] {
             let mut level = choose(&levels, middle, None);
@@ -273,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_at_nearly_the_same_size_decide_together() {
+    fn cameras_with_nearly_the_same_size_share_a_level() {
         let sight = |pixels, before| Sight {
             camera: Entity::PLACEHOLDER,
             capture: MainEntity::from(Entity::PLACEHOLDER),
@@ -288,11 +291,11 @@ mod tests {
             sight(f32::NAN, Some(1)),
         ];
         let found = seen.map(|one| one.together(&seen));
-        assert_eq!(found[0], (101.0, Some(0)), "the finer of two eyes");
-        assert_eq!(found[0], found[1], "decides for both");
-        assert_eq!(found[2], (50.0, Some(2)), "a camera farther away decides for itself");
-        assert_eq!(found[3], (f32::INFINITY, None), "so does one inside the capture");
-        assert!(found[4].0.is_nan() && found[4].1 == Some(1), "no number is like no other: {:?}", found[4]);
+        assert_eq!(found[0], (101.0, Some(0)), "the larger size and the finer level of two eyes");
+        assert_eq!(found[0], found[1], "both eyes get the same level");
+        assert_eq!(found[2], (50.0, Some(2)), "a camera farther away decides alone");
+        assert_eq!(found[3], (f32::INFINITY, None), "a camera inside the capture decides alone");
+        assert!(found[4].0.is_nan() && found[4].1 == Some(1), "NaN matches no other size: {:?}", found[4]);
     }
 
     #[test]
@@ -313,27 +316,31 @@ mod tests {
             });
             changes += usize::from(now != chosen);
             chosen = now;
-            // Across the ratio at which cameras begin to decide together.
+            // Alternates across the ratio at which cameras share a level.
             near = 103.5 - near;
         }
-        assert_eq!((chosen, changes), ([Some(0), Some(0)], 1), "the finer level once, for both");
+        assert_eq!((chosen, changes), ([Some(0), Some(0)], 1), "both cameras change once, to the finer level");
     }
 
     #[test]
-    fn the_bias_follows_the_time() {
-        assert!(steered(0.0, 5.0, 4.0) < 0.0, "too slow");
-        assert!(steered(-1.0, 0.4, 4.0) > -1.0, "time left");
-        assert_eq!(steered(-1.0, 3.9, 4.0), -1.0, "as wanted");
-        assert_eq!(steered(-1.0, 0.6, 4.0), -1.0, "a finer level could take seven times as long");
-        assert_eq!(steered(-1.0, 0.0, 4.0), -1.0, "not measured");
-        assert_eq!(steered(0.0, 1.0, 4.0), 0.0, "never finer than asked for");
-        assert_eq!(steered(-FARTHEST, 9.0, 4.0), -FARTHEST, "nor without end");
+    fn the_bias_follows_the_gpu_time() {
+        assert!(steered(0.0, 5.0, 4.0) < 0.0, "the bias falls above the target time");
+        assert!(steered(-1.0, 0.4, 4.0) > -1.0, "the bias rises far below the target time");
+        assert_eq!(steered(-1.0, 3.9, 4.0), -1.0, "the bias is kept at the target time");
+        assert_eq!(
+            steered(-1.0, 0.6, 4.0),
+            -1.0,
+            "the bias is kept if a level with seven times as many Gaussians would exceed the target"
+        );
+        assert_eq!(steered(-1.0, 0.0, 4.0), -1.0, "the bias is kept without a measurement");
+        assert_eq!(steered(0.0, 1.0, 4.0), 0.0, "the bias does not rise above 0");
+        assert_eq!(steered(-FARTHEST, 9.0, 4.0), -FARTHEST, "the bias does not fall below its minimum");
     }
 
     #[test]
-    fn keeping_to_the_time_settles() {
+    fn the_level_settles_under_a_time_limit() {
         let levels = levels(&[100.0, 40.0]);
-        // All Gaussians take 5 ms, each level a seventh of the one before.
+        // All Gaussians take 5 ms, each level a seventh of the time of the finer level.
         let (mut bias, mut level, mut changes) = (0.0, 0, 0);
         for _ in 0..2000 {
             bias = steered(bias, 5.0 / 7f64.powi(level as i32), 4.0);
@@ -341,11 +348,11 @@ mod tests {
             changes += usize::from(next != level);
             level = next;
         }
-        assert_eq!((level, changes), (1, 1), "a coarser level once, which then stays");
+        assert_eq!((level, changes), (1, 1), "one change to a coarser level, then none");
     }
 
     #[test]
-    fn scale_and_lens_count() {
+    fn size_on_screen_follows_scale_distance_and_lens() {
         let lens = Mat4::perspective_infinite_reverse_rh(0.8, 2.0, 0.1);
         let bounds = Bounds { min: Vec3::splat(-1.0), max: Vec3::splat(1.0) };
         let size = UVec2::new(400, 200);
@@ -353,8 +360,11 @@ mod tests {
             |scale: f32, eye: Vec3| size_on_screen(&lens, eye, size, &Affine3A::from_scale(Vec3::splat(scale)), bounds);
         let near = seen(1.0, Vec3::Z * 100.0);
         // 100 pixels are tan(0.4) of 100 units.
-        assert!((near - 3f32.sqrt() * 2.0 / 0.4f32.tan()).abs() < 0.05, "{near} pixels");
-        assert!((seen(2.0, Vec3::Z * 200.0) - near).abs() < 1e-3, "twice as large, twice as far");
+        assert!((near - 3f32.sqrt() * 2.0 / 0.4f32.tan()).abs() < 0.05, "{near} pixels at a distance of 100");
+        assert!(
+            (seen(2.0, Vec3::Z * 200.0) - near).abs() < 1e-3,
+            "a capture twice as large and twice as far has the same size"
+        );
         let flat = Mat4::orthographic_rh(-2.0, 2.0, -1.0, 1.0, 10.0, 0.1);
         let wide = size_on_screen(&flat, Vec3::Z * 9.0, size, &Affine3A::IDENTITY, bounds);
         assert!((wide - 200.0 * 3f32.sqrt()).abs() < 0.1, "100 pixels for each unit: {wide}");

@@ -1,8 +1,8 @@
-//! Draw: captures into a camera's target, in Bevy's `Core3d` schedule.
+//! Draw: draws captures into a camera's target, in Bevy's `Core3d` schedule.
 //!
 //! In: the camera's view, prepared by [`prepare`](super::prepare), and its [`order`](super::order). Out: one compute pass, the composite
-//! and, if the camera asks for it, `write_depth` and `write_motion`, recorded; then what is transparent and in front. If other systems work
-//! on the captures' picture before it reaches the target, the compute pass is recorded before them.
+//! and, if the camera requests it, `write_depth` and `write_motion`; then the transparent items in front. If other systems change the
+//! captures' picture before it reaches the target, the compute pass is recorded before them.
 
 use super::active::ActiveLists;
 use super::capture_views::{CaptureView, CaptureViews};
@@ -34,13 +34,13 @@ use bevy::render::view::{ExtractedView, Msaa, ViewDepthTexture, ViewTarget};
 /// Sets of systems in the render world's `Core3d` schedule, for ordering.
 #[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
 pub enum CaptureSystems {
-    /// The renderer draws captures into a picture of their own, after opaque meshes, if [`Shade`](Self::Shade) needs it.
+    /// Draws captures into a separate picture after opaque meshes, if [`Shade`](Self::Shade) needs it.
     Record,
-    /// That picture is changed before it reaches the target.
+    /// Changes the separate picture before it reaches the target.
     Shade,
-    /// Captures that a transmissive mesh stands in front of are drawn, after opaque meshes and before transmissive ones.
+    /// Draws captures behind a transmissive mesh, after opaque meshes and before transmissive meshes.
     Draw,
-    /// All other captures are drawn, after the transparent things behind them and before those in front of them.
+    /// Draws all other captures, after the transparent items behind them and before the transparent items in front of them.
     DrawLate,
 }
 
@@ -54,7 +54,7 @@ pub(super) struct Passes<'w> {
     write_motion: Res<'w, WriteMotionPipeline>,
 }
 
-/// Draws the captures of one camera into a picture of their own, if others work on it before the composite.
+/// Draws the captures of one camera into a separate picture, if other systems change it before the composite.
 pub(super) fn record_captures(
     camera: ViewQuery<()>,
     renderer: Option<Res<CaptureRenderer>>,
@@ -70,7 +70,7 @@ pub(super) fn record_captures(
     }
 }
 
-/// Draws the captures of one camera. Registered twice: before transmissive meshes, and after the transparent things behind captures.
+/// Draws the captures of one camera. Registered twice: before transmissive meshes, and after the transparent items behind captures.
 pub(super) fn draw_captures<const LATE: bool>(
     camera: ViewQuery<(&ViewTarget, &ViewDepthTexture, &Msaa, Option<&ViewPrepassTextures>)>,
     renderer: Option<Res<CaptureRenderer>>,
@@ -103,7 +103,7 @@ pub(super) fn draw_captures<const LATE: bool>(
     }
 }
 
-/// Draws what is transparent and in front of the captures of one camera, in the way of Bevy's own pass.
+/// Draws the transparent items in front of the captures of one camera, as Bevy's own pass does.
 pub(super) fn draw_front(
     world: &World,
     camera: ViewQuery<(
@@ -135,13 +135,13 @@ pub(super) fn draw_front(
         pass.set_camera_viewport(&viewport);
     }
     if let Err(failure) = phase.render_range(&mut pass, world, entity, front..) {
-        error!("transparent things in front of captures are not drawn: {failure}");
+        error!("transparent items in front of captures are not drawn: {failure}");
     }
     span.end(&mut pass);
 }
 
 impl Passes<'_> {
-    /// Returns whether there is anything to draw. Without the composite the work would stay invisible.
+    /// Returns whether the view has captures and its composite is compiled. Without the composite, captures would not be visible.
     fn can_draw(&self, view: &CaptureView) -> bool {
         let mut composites = [Some(view.composite), view.composite_samples].into_iter().flatten();
         view.sees_something() && composites.all(|id| self.cache.get_render_pipeline(id).is_some())
@@ -164,7 +164,7 @@ impl Passes<'_> {
         span.end(context.command_encoder());
     }
 
-    /// Draws captures over the target; over each of its samples with `into_samples`, so that later passes can resolve them again.
+    /// Draws captures over the target; with `into_samples` over each of its samples, so that later passes can resolve the samples again.
     fn composite(
         &self,
         view: &mut CaptureView,
@@ -173,7 +173,7 @@ impl Passes<'_> {
         context: &mut RenderContext,
         work: &WorkCounters,
     ) {
-        // Fetched before `post_process_write` swaps the target's textures: from then on, the other one must be written.
+        // Fetched before `post_process_write` swaps the target's textures: afterwards the other texture must be written.
         let id = if into_samples { view.composite_samples } else { Some(view.composite) };
         let Some(pipeline) = id.and_then(|id| self.cache.get_render_pipeline(id)) else { return };
         let Some(color) = view.shaded.as_ref().or(view.renderer.color()) else { return };
@@ -187,11 +187,11 @@ impl Passes<'_> {
                 view: target.post_process_write().destination,
                 depth_slice: None,
                 resolve_target: None,
-                // Every pixel is written: to clear them first would take time for nothing.
+                // Every pixel is written, so clearing first would waste time.
                 ops: Operations { load: LoadOp::Load, store: StoreOp::Store },
             },
             (false, true) => {
-                // Both textures have the same samples: what is read stays, and the samples are resolved into the other.
+                // Both textures use the same samples: the texture that is read is kept, and the samples are resolved into the other one.
                 target.post_process_write();
                 target.get_color_attachment()
             }
@@ -213,7 +213,7 @@ impl Passes<'_> {
         span.end(&mut pass);
     }
 
-    /// Writes captures into the depth buffer, if the camera asks for it.
+    /// Writes captures into the depth buffer, if the camera requests it.
     fn write_depth(
         &self,
         view: &mut CaptureView,

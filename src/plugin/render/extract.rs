@@ -1,4 +1,4 @@
-//! Extract: the captures and the cameras' settings of this frame.
+//! Extract: copies the captures and the cameras' settings of this frame.
 //!
 //! In (main world): entities with a loaded capture, their transform, playback and settings; the settings of cameras. Out (render
 //! world): [`ExtractedCaptures`] and [`ExtractedViewSettings`], by entity of the main world.
@@ -22,7 +22,7 @@ use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
 use bevy::transform::components::GlobalTransform;
 use glam::{Affine3A, Vec3};
 
-/// The captures of this frame, seen by a camera or not. The memory is kept from frame to frame.
+/// The captures of this frame, including captures that no camera sees. The memory is kept from frame to frame.
 #[derive(Resource, Default)]
 pub(crate) struct ExtractedCaptures(pub(crate) MainEntityHashMap<ExtractedCapture>);
 
@@ -30,31 +30,31 @@ pub(crate) struct ExtractedCaptures(pub(crate) MainEntityHashMap<ExtractedCaptur
 pub(crate) struct ExtractedCapture {
     pub(crate) asset: AssetId<GaussianCapture>,
     pub(crate) world_from_capture: Affine3A,
-    /// The centre of its bounds at this time, in the world.
+    /// The center of its bounds at this time, in world space.
     pub(super) center: Vec3,
     /// Seconds since the capture's start.
     pub(crate) seconds: f32,
     /// Whether its temporal filter is used.
     pub(crate) filtered: bool,
     pub(crate) appearance: Appearance,
-    /// Whether its Gaussians are made fainter where it is smaller than in training.
+    /// Whether its Gaussians are made fainter where they are smaller on the screen than in training.
     pub(super) antialias: bool,
     /// The finest level of detail that is drawn.
     pub(crate) finest_level: u8,
-    /// Whether any camera sees it, or may see what it does to lights.
+    /// Whether any camera sees it, or may see its shadow.
     pub(crate) seen: bool,
-    /// Whether lights see it.
+    /// Whether it casts shadows.
     pub(crate) casts: bool,
 }
 
 impl ExtractedCapture {
-    /// Returns whether nothing of it shows, wherever it is seen from.
+    /// Returns whether its opacity is 0, so that it is not visible from anywhere.
     pub(crate) fn is_faded_out(&self) -> bool {
         self.appearance.opacity <= 0.0
     }
 }
 
-/// How cameras draw captures, for those with settings.
+/// The settings of cameras that have a [`CaptureViewSettings`].
 #[derive(Resource, Default)]
 pub(crate) struct ExtractedViewSettings(pub(crate) MainEntityHashMap<CaptureViewSettings>);
 
@@ -100,7 +100,7 @@ pub(crate) fn extract_captures(
     }
 }
 
-/// Returns whether any camera of the main world has settings, or had in the last frame.
+/// Returns whether any camera of the main world has settings, or had settings in the previous frame.
 pub(super) fn any_view_settings(
     cameras: Extract<Query<(), With<CaptureViewSettings>>>,
     extracted: Res<ExtractedViewSettings>,

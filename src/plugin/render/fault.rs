@@ -1,24 +1,25 @@
-//! Faults of cameras: what keeps one from drawing captures as it draws meshes.
+//! Faults of cameras: the reasons why a camera cannot draw captures as it draws meshes.
 //!
-//! In: its projection matrix and compositing space. Out: a [`CameraFault`], to be logged, and shown in the inspector.
+//! In: a camera's projection matrix and compositing space. Out: a [`CameraFault`], which is logged and shown in the inspector.
 
 use super::view::CameraLens;
 use bevy::camera::CompositingSpace;
 use glam::Mat4;
 
-/// What keeps a camera from drawing captures as it draws meshes; the text names the remedy. It is logged once, and shown by the inspector.
+/// The reason why a camera cannot draw captures as it draws meshes. The text names the remedy. It is logged once and shown by the
+/// inspector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum CameraFault {
     /// Colors are composited in Oklab.
     #[error("captures are not drawn for a camera with CompositingSpace::Oklab: use Srgb or Linear")]
     Oklab,
-    /// The projection has no lens.
+    /// The projection is not a supported perspective or orthographic projection.
     #[error(
         "captures are not drawn for a camera whose projection is skewed, mirrored or not reversed in depth: use Bevy's perspective or \
          orthographic projection, or Projection::custom with a matrix like theirs"
     )]
     Projection,
-    /// The depth of meshes also depends on the place in the picture.
+    /// The depth of meshes also depends on the position in the picture.
     #[error(
         "captures are drawn over meshes, not behind them, and write no depth, for a camera with its own near clip plane: leave \
          PerspectiveProjection::near_clip_plane as it is, or draw captures with another camera"
@@ -27,8 +28,8 @@ pub enum CameraFault {
 }
 
 impl CameraFault {
-    /// Returns the gravest fault of a camera with this projection matrix (`Camera::clip_from_view`) and this component, if it has it;
-    /// `None` if captures are drawn as they should be.
+    /// Returns the most severe fault of a camera with this projection matrix (`Camera::clip_from_view`) and this compositing space, if the
+    /// component is present; `None` if captures are drawn correctly.
     pub fn of(clip_from_view: &Mat4, space: Option<CompositingSpace>) -> Option<Self> {
         if space == Some(CompositingSpace::Oklab) {
             return Some(Self::Oklab);
@@ -48,28 +49,32 @@ mod tests {
     use glam::Vec3;
 
     #[test]
-    fn bevy_s_own_projections_have_no_fault() {
+    fn projections_of_bevy_have_no_fault_except_in_oklab() {
         let lenses = [
             PerspectiveProjection::default().get_clip_from_view(),
             OrthographicProjection::default_3d().get_clip_from_view(),
         ];
         for lens in lenses {
             for space in [None, Some(CompositingSpace::Srgb), Some(CompositingSpace::Linear)] {
-                assert_eq!(CameraFault::of(&lens, space), None, "in {space:?}");
+                assert_eq!(CameraFault::of(&lens, space), None, "no fault in {space:?}");
             }
             let oklab = CameraFault::of(&lens, Some(CompositingSpace::Oklab));
-            assert_eq!(oklab, Some(CameraFault::Oklab), "but in Oklab nothing is drawn");
+            assert_eq!(oklab, Some(CameraFault::Oklab), "captures are not drawn in Oklab");
         }
     }
 
     #[test]
-    fn other_projections_are_named() {
+    fn unsupported_projections_are_faults() {
         let mut skewed = OrthographicProjection::default_3d().get_clip_from_view();
         skewed.z_axis.x = 0.1;
-        assert_eq!(CameraFault::of(&skewed, None), Some(CameraFault::Projection), "rays at a slant");
+        assert_eq!(
+            CameraFault::of(&skewed, None),
+            Some(CameraFault::Projection),
+            "a skewed projection is not supported"
+        );
         let plane = Vec3::new(0.1, 0.0, -1.0).normalize().extend(-0.4);
         let oblique = PerspectiveProjection { near_clip_plane: plane, ..PerspectiveProjection::default() };
         let fault = CameraFault::of(&oblique.get_clip_from_view(), None);
-        assert_eq!(fault, Some(CameraFault::NearPlane), "a near plane of its own");
+        assert_eq!(fault, Some(CameraFault::NearPlane), "an oblique near plane is reported");
     }
 }

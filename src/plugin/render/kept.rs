@@ -1,7 +1,7 @@
-//! What the passes of a view bind, kept from frame to frame: written or created again only when it has changed.
+//! Bindings of the passes of a view, kept from frame to frame and written or created again only after a change.
 //!
 //! In: a value, or two textures, of this frame. Out: a uniform buffer with the value, [`KeptUniform`]; a bind group of the textures,
-//! [`KeptGroup`]; the number of frames in which nothing was drawn, [`IdleFrames`].
+//! [`KeptGroup`]; the number of frames without a drawn capture, [`IdleFrames`].
 
 use crate::renderer::WorkCounters;
 use bevy::render::render_resource::encase::internal::WriteInto;
@@ -31,7 +31,7 @@ impl<T: ShaderType + WriteInto + Default + PartialEq> KeptUniform<T> {
     }
 }
 
-/// A bind group of two textures, and of buffers that stay.
+/// A bind group of two textures and of buffers that do not change.
 #[derive(Default)]
 pub(crate) struct KeptGroup(Option<([wgpu::TextureView; 2], BindGroup)>);
 
@@ -41,7 +41,7 @@ impl KeptGroup {
         self.0 = None;
     }
 
-    /// Returns the bind group of these textures, which `create` makes if they are others than before; `None` if it cannot.
+    /// Returns the bind group of these textures. If the textures have changed, `create` makes a new one; `None` if `create` fails.
     pub(crate) fn of(
         &mut self,
         textures: [&wgpu::TextureView; 2],
@@ -57,12 +57,12 @@ impl KeptGroup {
     }
 }
 
-/// Frames in a row in which a view has drawn nothing.
+/// Consecutive frames in which a view has drawn no capture.
 #[derive(Debug, Default)]
 pub(crate) struct IdleFrames(u32);
 
 impl IdleFrames {
-    /// After so many, a view releases its GPU memory.
+    /// After this many frames, a view releases its GPU memory.
     const MOST: u32 = 120;
 
     /// Counts a frame. Returns whether the view should release its memory now.

@@ -1,19 +1,19 @@
 //! Captures in Bevy's frame.
 //!
-//! In: entities with a [`GaussianCapture3d`](crate::GaussianCapture3d) and `Camera3d`s, perspective or orthographic. Out: pixels in
-//! every such camera's target, of the captures that it sees. The drawing itself is [`crate::renderer`], which is independent of Bevy;
-//! this module connects the two:
+//! In: entities with a [`GaussianCapture3d`](crate::GaussianCapture3d) and `Camera3d`s, perspective or orthographic. Out: the captures that
+//! each camera sees, drawn into its target. [`crate::renderer`], which is independent of Bevy, does the drawing; this module connects it to
+//! Bevy:
 //!
 //! ```text
 //! renderer     compiles the pipelines                                once per device
 //! visibility   a capture's bounds at this time -> its Aabb           main world
 //! extract      captures, their times, poses and settings             main world -> render world
 //! upload       a loaded capture -> buffers on the GPU                once per asset, over several frames
-//! detail       how many Gaussians by the size on the screen          once per camera, placed capture and frame
-//! active       which Gaussians are active                            once per placed capture and segment, before all cameras
-//! prepare      a camera's lens and every capture's pose -> views     once per camera and frame, kept in capture_views; then previous
-//! order        what is drawn before captures, and what after them    once per camera and frame
-//! draw         one compute pass, composite, write_depth, write_motion  Core3d, among transparent things
+//! detail       level of detail by the size on the screen             once per camera, placed capture and frame
+//! active       the lists of active Gaussians                         once per placed capture and segment, before all cameras
+//! prepare      a camera's lens and the poses of captures -> views    once per camera and frame, kept in capture_views; then previous
+//! order        transparent items before and after captures           once per camera and frame
+//! draw         one compute pass, composite, write_depth, write_motion Core3d, among transparent items
 //! publish      counts, times, memory -> statistics                   render world -> main world
 //! ```
 //!
@@ -21,35 +21,35 @@
 //!
 //! 1. opaque and alpha-masked meshes, skybox; contact shadows
 //! 2. transmissive meshes; the atmosphere
-//! 3. gizmos, and transparent things behind captures, cut by the depth of 1 and 2
-//! 4. **captures**, cut by all depth so far
-//! 5. **captures' depth and motion**, if asked for
-//! 6. transparent things in front of captures, cut by all depth so far
+//! 3. gizmos, and transparent items behind captures, depth-tested against 1 and 2
+//! 4. **captures**, depth-tested against all depth so far
+//! 5. **captures' depth and motion**, if requested
+//! 6. transparent items in front of captures, depth-tested against all depth so far
 //! 7. wireframes
 //! 8. post-processing, tonemapping
 //!
-//! With or without multisampling, HDR or not, and without a setting: Bevy sorts its transparent phase (blended materials, particles of
-//! other plugins) by the distance of each item's centre, and captures have a place in it. All captures of a view are drawn at once,
-//! since their Gaussians interleave: at the centre of the bounds of the nearest one, however faint it is. One whose centre is behind the
-//! camera, as in a room, counts as the farthest; an item at the same distance is behind. What is behind is in the target before captures
-//! are blended with it, so soft edges are as over anything opaque. As between meshes, one distance for each is too little where they reach
-//! through each other, or for a capture all around the camera. With [`DepthWrite::Median`] or `Expected` all transparent things are therefore drawn after
-//! captures, which cut them pixel by pixel where they hide more than half of what is behind; elsewhere, as in smoke, what is behind is
-//! drawn over them.
+//! The order is the same with and without multisampling and HDR, and needs no setting. Bevy sorts its transparent phase (blended materials,
+//! particles of other plugins) by the distance of the center of each item, and captures have a place in this order. All captures of a view
+//! are drawn at once, since their Gaussians interleave. Their place is the center of the bounds of the nearest capture, however faint that
+//! capture is. A capture whose center is behind the camera, such as a room around it, counts as the farthest; an item at the same distance
+//! is behind it. Items behind captures are in the target before captures are blended with it, so soft edges blend with them as with opaque
+//! meshes. As for meshes, one distance per object is not enough where objects interpenetrate or a capture surrounds the camera. With
+//! [`DepthWrite::Median`] or `Expected`, all transparent items are therefore drawn after captures and depth-tested per pixel against the
+//! pixels where captures hide more than half of the background; at fainter pixels, as in smoke, items behind captures are drawn over them.
 //!
-//! What this costs: nothing while no transparent thing is in front, and another render pass otherwise. Multisampled captures are drawn
-//! into the resolved picture, or, if something is in front or a wireframe is drawn, into every sample, so that these can be resolved
-//! again. Opaque and alpha-masked meshes hide them by as many samples of a pixel as they cover; at such an edge the mean of the pixel's
-//! samples shows through a capture. Captures need no multisampling themselves.
+//! This order costs nothing while no transparent item is in front of captures, and one more render pass otherwise. On a multisampled
+//! target, captures are drawn into the resolved picture or, if an item in front or a wireframe follows, into every sample, so that the
+//! samples can be resolved again. Opaque and alpha-masked meshes hide captures by the fraction of samples that they cover in a pixel; at
+//! such an edge the mean of the pixel's samples shows through a capture. Captures themselves need no multisampling.
 //!
-//! Gizmos write depth, so captures hide them, or are hidden, pixel by pixel; if captures are shaded (fog, shadows), they have been
-//! recorded earlier, and gizmos are drawn over them. Wireframes are drawn over captures, unless these write depth.
+//! Gizmos write depth, so captures and gizmos hide each other per pixel. Shaded captures (fog, shadows) are recorded before the gizmos, so
+//! gizmos are drawn over them. Wireframes are drawn over captures, unless these write depth.
 //!
-//! Behind a transmissive mesh captures show refracted: if the centre of one in view is nearer than that of the nearest capture, captures
-//! are drawn between 1 and 2, and everything transparent after them. A capture in front of only some of these meshes is then seen as if it
-//! were behind them. A camera with Bevy's atmosphere draws captures after it, and so not through transmissive meshes, which hide what is
-//! behind them. With order-independent transparency, everything that takes part in it is drawn after captures, and cut by the depths that
-//! they write for such cameras by default.
+//! Captures behind a transmissive mesh appear refracted: if the center of a transmissive mesh in view is nearer than the center of the
+//! nearest capture, captures are drawn between 1 and 2, and all transparent items after them. A capture in front of only some of these
+//! meshes is then drawn as if it were behind them. A camera with Bevy's atmosphere draws captures after the atmosphere. Captures are then
+//! not visible through transmissive meshes, which hide the captures behind them. With order-independent transparency, all items that take
+//! part in it are drawn after captures and depth-tested against the depths that captures write for such cameras by default.
 //!
 //! Prepasses come first and do not contain captures; effects that read the depth prepass before the main pass (screen-space ambient
 //! occlusion and reflections) ignore captures. Distance fog, shadows of meshes and light of the scene reach captures in a pass of the module
@@ -57,19 +57,18 @@
 //! depths that [`DepthWrite`] wrote, by default for cameras that have such an effect.
 //!
 //! For cameras with a `MotionVectorPrepass`, which temporal anti-aliasing and motion blur require, captures are then written into its
-//! texture, and into that of a `DepthPrepass` if there is one: at pixels where they hide more than half of the background, the mean motion of their splats since the
-//! frame before, by the time of the capture, its transform and the camera, without jitter. Captures are never drawn with jitter: their
-//! splats are smooth without.
+//! texture, and into the texture of a `DepthPrepass` if there is one. The value, at pixels where captures hide more than half of the
+//! background, is the mean motion of their splats since the previous frame, from the time and transform of the capture and from the camera,
+//! without jitter. Captures are never drawn with jitter: their splats are already smooth.
 //!
-//! A perspective camera whose depth can be read draws the environment map of a capture behind everything; of several maps in one view, it
-//! draws that of one capture. Entities with `NoCpuCulling` are not drawn: captures are culled on the CPU.
+//! A perspective camera whose depth can be read draws the environment map of a capture behind all else; if several captures in one view
+//! have maps, it draws only one of the maps. Entities with `NoCpuCulling` are not drawn: captures are culled on the CPU.
 //!
-//! # Colour
+//! # Color
 //!
-//! Blending happens in the space captures were trained in, sRGB-encoded values, unless the camera's [`CaptureViewSettings`] ask for
-//! linear light. On cameras with `Hdr` tonemapping comes afterwards and applies to captures as to everything else; with
-//! `Tonemapping::None` captures keep their trained colours. Without `Hdr` Bevy tonemaps meshes in their own shaders and nothing else:
-//! captures keep their trained colours with any tonemapping.
+//! Blending happens in the space captures were trained in, sRGB-encoded values, unless the camera's [`CaptureViewSettings`] ask for linear
+//! light. On cameras with `Hdr`, tonemapping follows and applies to captures as to meshes; with `Tonemapping::None` captures keep their
+//! trained colors. Without `Hdr`, Bevy tonemaps only meshes, in their own shaders: captures keep their trained colors with any tonemapping.
 
 mod active;
 pub(crate) mod capture_views;

@@ -1,7 +1,7 @@
-//! Order: which transparent things of a camera are drawn before captures, and which after them.
+//! Order: splits the transparent items of a camera into items before and items after captures.
 //!
-//! In: Bevy's transparent phase, sorted; the captures that a camera sees; what [`OtherPasses`] says of the rest of its passes. Out:
-//! [`CaptureOrders`], which [`draw`](super::draw) follows. What stands in front of captures is taken out of the phase while Bevy draws it.
+//! In: Bevy's transparent phase, sorted; the captures that a camera sees; its [`OtherPasses`]. Out: [`CaptureOrders`], which
+//! [`draw`](super::draw) follows. Items in front of captures are taken out of the phase while Bevy draws it.
 
 use super::capture_views::CaptureViews;
 use super::extract::{ExtractedCaptures, ExtractedViewSettings};
@@ -21,30 +21,29 @@ use bevy::render::renderer::ViewQuery;
 use bevy::render::sync_world::MainEntity;
 use bevy::render::view::{ExtractedView, RenderVisibleEntities, RetainedViewEntity};
 
-/// What cameras draw besides opaque and transparent things, as far as captures depend on it; cameras without any of it are missing.
-/// Written anew in every frame, before captures are placed.
+/// The other passes of cameras that captures depend on; cameras without such passes have no entry. Rewritten in every frame, before
+/// captures are ordered.
 #[derive(Resource, Default)]
 pub(crate) struct OtherPasses(pub(crate) HashMap<RetainedViewEntity, OtherPass>);
 
-/// What one camera draws besides opaque and transparent things.
+/// The passes of one camera besides its opaque and transparent items.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub(crate) struct OtherPass {
-    /// Where the nearest mesh stands that shows, refracted, what has been drawn before it: in Bevy's measure, which grows towards the
-    /// camera.
+    /// Distance of the nearest mesh that refracts the picture behind it, in Bevy's measure, which grows towards the camera.
     pub(crate) refracting: Option<f32>,
-    /// Whether the samples of a multisampled target are resolved again after transparent things.
+    /// Whether the samples of a multisampled target are resolved again after transparent items.
     pub(crate) resolves_again: bool,
 }
 
-/// The order of every camera that sees captures among other things to be ordered, by its entity in the render world.
+/// The order of every camera that sees captures and items to order them with, by its entity in the render world.
 #[derive(Resource, Default)]
 pub(super) struct CaptureOrders {
     cameras: HashMap<Entity, CaptureOrder>,
-    /// What is in front of captures, while it is not in the phase of the camera that is being drawn.
+    /// The items in front of captures while they are taken out of the phase of the camera that is being drawn.
     hidden: Vec<((Entity, MainEntity), Transparent3d)>,
 }
 
-/// Returns whether there is anything for captures to be ordered with, or was in the last frame.
+/// Returns whether any item must be ordered with captures, or had to be in the previous frame.
 pub(super) fn any_ordered(
     phases: Res<ViewSortedRenderPhases<Transparent3d>>,
     others: Res<OtherPasses>,
@@ -58,24 +57,24 @@ pub(super) fn any_early(orders: Res<CaptureOrders>) -> bool {
     orders.cameras.values().any(|order| order.early)
 }
 
-/// Returns whether any camera draws something transparent after captures.
+/// Returns whether any camera draws transparent items after captures.
 pub(super) fn any_front(orders: Res<CaptureOrders>) -> bool {
     orders.cameras.values().any(|order| order.front.is_some())
 }
 
-/// When the captures of one camera are drawn.
+/// The place of the captures of one camera in its passes.
 #[derive(Debug, Default, Clone, Copy, PartialEq)]
 pub(super) struct CaptureOrder {
-    /// Whether they are drawn before transmissive meshes, and so before everything transparent.
+    /// Whether captures are drawn before transmissive meshes, and therefore before all transparent items.
     pub(super) early: bool,
-    /// The first item of the transparent phase that is drawn after them; `None` if all are drawn before, or captures are
+    /// Index of the first item of the transparent phase that is drawn after captures; `None` if all items are drawn before, or captures are
     /// [early](Self::early).
     pub(super) front: Option<usize>,
     resolves_again: bool,
 }
 
 impl CaptureOrders {
-    /// Returns the order of a camera; of one without captures, that of a camera without anything transparent.
+    /// Returns the order of a camera. A camera without an entry has the order of a camera without transparent items.
     pub(super) fn of(&self, camera: Entity) -> CaptureOrder {
         self.cameras.get(&camera).copied().unwrap_or_default()
     }
@@ -88,8 +87,8 @@ impl CaptureOrder {
     }
 }
 
-/// Finds the place of each camera's captures among its transparent things, which have been sorted but not batched: that of the nearest
-/// capture's centre. If captures are asked to write depth, everything that has a place is in front of them, and depth decides.
+/// Finds the place of each camera's captures among its transparent items, which have been sorted but not batched: the center of the nearest
+/// capture. If captures write depth by request, all sorted items are drawn after them, and the depth test decides.
 pub(super) fn place_captures(
     captures: Res<ExtractedCaptures>,
     settings: Res<ExtractedViewSettings>,
@@ -122,8 +121,9 @@ pub(super) fn place_captures(
     }
 }
 
-/// Returns where the nearest capture stands that a camera sees, by the centre of its bounds: in Bevy's measure, which is 0 at the camera
-/// and grows towards it. A centre behind the camera, as of a room, says nothing: what is in the room is before its walls.
+/// Returns the distance of the nearest capture that a camera sees, by the center of its bounds, in Bevy's measure, which is 0 at the camera
+/// and grows towards it. A capture whose center is behind the camera, such as a room, counts as the farthest: items in the room are in
+/// front of its walls.
 fn nearest(captures: &ExtractedCaptures, view: &ExtractedView, visible: &RenderVisibleEntities) -> Option<f32> {
     let rangefinder = view.rangefinder3d();
     let placed = visible.get::<GaussianCapture3d>()?.iter_visible().filter_map(|(_, entity)| captures.0.get(entity));
@@ -132,18 +132,18 @@ fn nearest(captures: &ExtractedCaptures, view: &ExtractedView, visible: &RenderV
     distances.map(|distance| if distance < 0.0 { distance } else { f32::NEG_INFINITY }).reduce(f32::max)
 }
 
-/// Inserts an item that draws nothing before the first that is nearer than `distance`, if there is one, and returns its index. Bevy
-/// draws neighbours together if it can, but not across it.
+/// Inserts an empty item before the first item that is nearer than `distance`, if there is one, and returns its index. Bevy batches
+/// neighboring items, but not across the empty item.
 fn mark_front(phase: &mut SortedRenderPhase<Transparent3d>, camera: Entity, distance: f32) -> Option<usize> {
     let front = phase.items.values().position(|item| item.distance > distance)?;
-    // No mesh is that entity's.
+    // No mesh has this key.
     let key = (camera, MainEntity::from(Entity::PLACEHOLDER));
     let mark = Transparent3d {
         sorting_info: TransparentSortingInfo3d::AlwaysOnTop,
         distance,
         pipeline: CachedRenderPipelineId::INVALID,
         entity: key,
-        // Not asked for an empty range.
+        // Not called for an empty range.
         draw_function: DrawFunctionId(0),
         batch_range: 0..0,
         extra_index: PhaseItemExtraIndex::None,
@@ -154,7 +154,7 @@ fn mark_front(phase: &mut SortedRenderPhase<Transparent3d>, camera: Entity, dist
     Some(front)
 }
 
-/// Takes what is in front of one camera's captures out of its transparent phase, until [`show_front`].
+/// Takes the items in front of one camera's captures out of its transparent phase, until [`show_front`].
 pub(super) fn hide_front(
     camera: ViewQuery<&ExtractedView, With<Camera3d>>,
     views: Res<CaptureViews>,
@@ -169,7 +169,8 @@ pub(super) fn hide_front(
     let Some(seen) = views.0.get(&entity).filter(|seen| seen.sees_something() && !order.early) else { return };
     let mut front = marked.unwrap_or(phase.items.len());
     if seen.is_shaded {
-        // Gizmos come first and write depth, by which captures are cut; but these have been recorded before.
+        // Gizmos come first and write depth for the depth test of captures, but shaded captures have been recorded before. So gizmos are
+        // drawn after them.
         let is_on_top = |item: &&Transparent3d| matches!(item.sorting_info, TransparentSortingInfo3d::AlwaysOnTop);
         for _ in 0..phase.items.values().take(front).take_while(is_on_top).count() {
             phase.items.move_index(0, marked.unwrap_or(phase.items.len()) - 1);
@@ -180,7 +181,7 @@ pub(super) fn hide_front(
     order.front = (!hidden.is_empty()).then_some(front);
 }
 
-/// Puts back what [`hide_front`] has taken out, at its end.
+/// Appends the items that [`hide_front`] took out of the phase.
 pub(super) fn show_front(
     camera: ViewQuery<&ExtractedView, With<Camera3d>>,
     mut phases: ResMut<ViewSortedRenderPhases<Transparent3d>>,

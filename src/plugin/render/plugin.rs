@@ -1,6 +1,6 @@
-//! The plugin of rendering: which system runs in which world and when.
+//! The plugin of rendering: adds the systems to the schedules of both worlds.
 //!
-//! In: an app in which captures load and play. Out: the same app, in which captures are drawn if it has a renderer.
+//! In: an app in which captures load and play. Out: the same app; captures are drawn if it has a renderer.
 
 use super::active::{ActiveLists, any_stale, prepare_active_lists, record_active_lists};
 use super::capture_views::{CaptureViews, any_shaded};
@@ -90,7 +90,7 @@ fn build_rendering(app: &mut App) {
         .init_resource::<DepthReaders>()
         .init_resource::<OtherPasses>()
         .init_resource::<CaptureOrders>()
-        // Created anew after a lost device: they hold everything on the GPU.
+        // Created again after a lost device: these resources hold all GPU objects.
         .init_gpu_resource::<CompositePipeline>()
         .init_gpu_resource::<SpecializedRenderPipelines<CompositePipeline>>()
         .init_gpu_resource::<WriteDepthPipeline>()
@@ -118,7 +118,7 @@ fn build_rendering(app: &mut App) {
                     .in_set(RenderSystems::PrepareAssets)
                     .after(prepare_assets::<GpuGaussianCapture>),
                 make_depth_readable.in_set(RenderSystems::PrepareViews),
-                // Batches of meshes end where captures are drawn.
+                // Before batching: batches of meshes must end where captures are drawn.
                 place_captures
                     .run_if(any_ordered)
                     .in_set(RenderSystems::Prepare)
@@ -142,7 +142,7 @@ fn build_rendering(app: &mut App) {
                 .before(CaptureSystems::DrawLate)
                 .in_set(Core3dSystems::MainPass),
         )
-        // Most cameras need one of these. A system that has nothing to do costs more than its condition: another thread may have to wake up.
+        // Most cameras need one of these systems. An idle system costs more than its condition, since another thread may have to wake up.
         .add_systems(
             Core3d,
             (
@@ -163,7 +163,7 @@ fn build_rendering(app: &mut App) {
                 (show_front.run_if(any_front), draw_captures::<true>, draw_front.run_if(any_front))
                     .chain()
                     .after(main_transparent_pass_3d)
-                    // It draws over everything else that is transparent.
+                    // It draws over all other transparent items.
                     .before(oit_resolve)
                     .in_set(CaptureSystems::DrawLate),
             )
@@ -171,7 +171,7 @@ fn build_rendering(app: &mut App) {
         );
 }
 
-/// Adds the shaders of the passes that go through Bevy's pipeline cache; `None` if the app has no shader assets.
+/// Adds the shaders of the passes that use Bevy's pipeline cache; `None` if the app has no shader assets.
 fn add_shaders(app: &mut App) -> Option<CaptureShaders> {
     let mut shaders = app.world_mut().get_resource_mut::<Assets<Shader>>()?;
     let mut add = |source: &'static str, path: &str| shaders.add(Shader::from_wgsl(source, path));

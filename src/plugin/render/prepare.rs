@@ -1,7 +1,7 @@
-//! Prepare: for each camera, the captures it sees and the renderer's working buffers.
+//! Prepare: collects the captures that each camera sees and prepares the renderer's working buffers.
 //!
-//! In: [`ExtractedCaptures`], Bevy's extracted cameras with their visible entities and depth textures. Out: [`CaptureViews`], with
-//! everything that drawing needs written to the GPU. In the steady state nothing is created there.
+//! In: [`ExtractedCaptures`], Bevy's extracted cameras with their visible entities and depth textures. Out: [`CaptureViews`], with all
+//! inputs of drawing written to the GPU. In the steady state no GPU object is created.
 
 use super::active::ActiveLists;
 use super::capture_views::{CaptureView, CaptureViews, Drawn, group_copies};
@@ -36,7 +36,7 @@ use bevy::render::renderer::{RenderDevice, RenderQueue};
 use bevy::render::view::{ExtractedView, Msaa, RenderVisibleEntities, ViewDepthTexture};
 use glam::{UVec2, UVec4};
 
-/// Everything that can be drawn this frame.
+/// The captures of this frame, and the settings that decide how they are drawn.
 #[derive(SystemParam)]
 pub(super) struct Scene<'w> {
     extracted: Res<'w, ExtractedCaptures>,
@@ -62,7 +62,7 @@ pub(super) struct Pipelines<'w> {
 }
 
 impl Scene<'_> {
-    /// Appends the captures that a camera sees to `drawn`, in the order of Bevy's list, but copies of one level beside each other.
+    /// Appends the captures that a camera sees to `drawn`, in the order of Bevy's list, with copies of one level grouped.
     fn collect(
         &self,
         viewer: Entity,
@@ -88,7 +88,7 @@ impl Scene<'_> {
         group_copies(drawn);
     }
 
-    /// Returns the view of each capture that is drawn one frame before, when the camera had this pose.
+    /// Returns the view of each drawn capture in the previous frame, when the camera had this pose.
     fn previous_views(&self, drawn: &[Drawn], pose: &CameraPose) -> Vec<View> {
         let before = |one: &Drawn| {
             let Some(placed) = self.extracted.0.get(&one.entity) else { return one.view };
@@ -100,7 +100,8 @@ impl Scene<'_> {
 }
 
 impl Pipelines<'_> {
-    /// Returns the composite for a camera's target, the one for its samples if it has several, and whether they blend in place.
+    /// Returns the composite pipeline for a camera's target, the one for its samples if it is multisampled, and whether they blend in
+    /// place.
     fn composite(
         &mut self,
         view: &ExtractedView,
@@ -166,7 +167,7 @@ pub(super) fn prepare_views(
         let main = view.retained_view_entity.main_entity;
         let mut settings = scene.settings.0.get(&main).copied().unwrap_or_default();
         settings.depth = scene.depth_readers.resolve(&main, settings.depth);
-        // Even without anything to draw, so that it is compiled while captures load.
+        // Requested even without captures, so that the pipeline is compiled while captures load.
         let (composite, composite_samples, in_place) = pipelines.composite(view, camera, msaa, settings);
         let state =
             views.0.entry(entity).or_insert_with(|| CaptureView::new(&device, &renderer.0, main.id(), composite));
@@ -183,7 +184,7 @@ pub(super) fn prepare_views(
         let pose = lens.map(|lens| CameraPose { lens, world_from_camera: view.world_from_view.affine() });
         let previous_pose = std::mem::replace(&mut state.pose, pose).or(pose);
         let Some(lens) = lens.filter(|_| state.sees_something()) else { continue };
-        // What debug views show is not light.
+        // Debug views do not show light, so they are not shaded.
         state.is_shaded = settings.debug == DebugView::Color && scene.shade.want(main, &state.drawn);
         let viewport = UVec4::new(view.viewport.x, view.viewport.y, size.x, size.y);
         state.bindings.set_viewport(viewport, &device, &queue, renderer.0.work());
@@ -201,7 +202,7 @@ pub(super) fn prepare_views(
             blend_space: settings.blend_space,
             debug: settings.debug,
             depths: settings.depth != DepthWrite::None || state.is_shaded || has_motion,
-            // Bevy's own targets have no more.
+            // Bevy's own targets have no higher precision.
             precision: ColorPrecision::Half,
             previous: previous.as_deref(),
         };
@@ -211,7 +212,7 @@ pub(super) fn prepare_views(
             state.drawn.clear();
         } else if state.renderer.is_short_of_room() {
             warn_once!(
-                "captures are drawn whole but slowly: a camera has more pairs of splats and tiles than this GPU has room for; draw \
+                "captures are drawn whole but slowly: a camera has more pairs of splats and tiles than fit on this GPU; draw \
                  fewer or smaller Gaussians, or a smaller picture"
             );
         }
@@ -228,10 +229,10 @@ pub(super) fn prepare_views(
     publish_statistics(&statistics, &views, &scene.captures);
 }
 
-/// Returns whether the depth that a camera asks for is the median one; `None` if it asks for none.
+/// Returns whether the depth that a camera requests is the median depth; `None` if it requests no depth.
 fn writes_median(settings: &CaptureViewSettings, surrounded: bool) -> Option<bool> {
     match settings.depth {
-        // Automatic depths have been resolved.
+        // `Auto` has been resolved by [`DepthReaders`].
         DepthWrite::Auto | DepthWrite::None => None,
         // Expected depths are divided by the captures' opacity, which an environment map and some debug views hide.
         DepthWrite::Expected => Some(surrounded || hides_opacity(settings.debug)),
@@ -247,11 +248,10 @@ fn hides_opacity(debug: DebugView) -> bool {
     }
 }
 
-/// Returns the lens of a camera that captures can be drawn for; `None`, with a warning the first time, for other
-/// cameras.
+/// Returns the lens of a camera; `None` if captures cannot be drawn for it. Each fault is logged once.
 fn drawable_lens(view: &ExtractedView, camera: &ExtractedCamera) -> Option<CameraLens> {
     let fault = CameraFault::of(&view.clip_from_view, camera.compositing_space);
-    // Each once, by a statement of its own.
+    // `warn_once!` logs once per statement, so each fault has its own.
     match fault {
         Some(CameraFault::Oklab) => warn_once!("{}", CameraFault::Oklab),
         Some(CameraFault::Projection) => warn_once!("{}", CameraFault::Projection),
@@ -261,7 +261,7 @@ fn drawable_lens(view: &ExtractedView, camera: &ExtractedCamera) -> Option<Camer
     CameraLens::of(&view.clip_from_view).filter(|_| fault != Some(CameraFault::Oklab))
 }
 
-/// Returns the depth of opaque meshes; `None` if it cannot be read.
+/// Returns the depth texture of opaque meshes; `None` if it cannot be read.
 fn opaque_depth<'a>(
     lens: &CameraLens,
     view: &ExtractedView,

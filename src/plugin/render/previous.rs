@@ -1,10 +1,10 @@
-//! Previous: where captures and cameras were one frame before, and when.
+//! Previous: the poses and times of captures and cameras in the previous frame.
 //!
-//! In: the captures of each frame, kept for the next; the pose of a camera. Out: the view of a capture one frame
-//! before, by which the renderer finds how far it has moved on the screen.
+//! In: the captures of each frame, kept for the next frame; the pose of a camera. Out: the view of a capture in the previous frame, from
+//! which the renderer computes the motion on the screen.
 //!
-//! Splats move with the time of their capture. After a jump in time (a seek, the start of a loop, a cut) they have no motion that could be
-//! seen: the transform of the capture and the camera still have theirs.
+//! Splats move with the time of their capture. A jump in time (a seek, the start of a loop, a cut) is no visible motion, so only the
+//! transform of the capture and the camera contribute.
 
 use super::extract::{ExtractedCapture, ExtractedCaptures};
 use super::view::CameraLens;
@@ -15,24 +15,25 @@ use bevy::ecs::resource::Resource;
 use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
 use glam::Affine3A;
 
-/// Seconds of a capture in one frame from which on its time has jumped: Bevy's longest step of time, at the normal speed.
+/// A longer step of the capture's time in one frame, in seconds, is a jump: Bevy's longest time step at normal speed.
 const LONGEST_STEP: f32 = 0.25;
-/// A step is a jump, too, if it is longer than this many of the one before: shorter loops have none.
+/// A step is also a jump if it is longer than this many times the previous step, as at the end of a short loop.
 const STEPS: f32 = 8.0;
 
-/// The captures of the frame before. The memory is kept from frame to frame.
+/// The captures of the previous frame. The memory is kept from frame to frame.
 #[derive(Resource, Default)]
 pub(super) struct PreviousCaptures(MainEntityHashMap<PreviousCapture>);
 
 struct PreviousCapture {
     asset: AssetId<GaussianCapture>,
     world_from_capture: Affine3A,
-    /// Seconds since the capture's start, and by how much that was more than in the frame before it.
+    /// Seconds since the capture's start.
     seconds: f32,
+    /// Change of `seconds` in that frame.
     step: f32,
 }
 
-/// Where a camera is, and its lens, without the jitter of temporal anti-aliasing.
+/// Pose and lens of a camera, without the jitter of temporal anti-aliasing.
 #[derive(Clone, Copy)]
 pub(super) struct CameraPose {
     pub(super) lens: CameraLens,
@@ -40,7 +41,7 @@ pub(super) struct CameraPose {
 }
 
 impl PreviousCaptures {
-    /// Keeps the captures of this frame for the next, once all views of it are prepared.
+    /// Keeps the captures of this frame for the next frame. Called after all views of this frame are prepared.
     pub(super) fn keep(&mut self, extracted: &ExtractedCaptures) {
         self.0.retain(|entity, _| extracted.0.contains_key(entity));
         for (entity, placed) in &extracted.0 {
@@ -51,8 +52,9 @@ impl PreviousCaptures {
         }
     }
 
-    /// Returns the view of a capture one frame before: `now` is its view in this frame, `pose` the camera of then, `time_at` returns its
-    /// timestamp for its seconds. What was not there then was where it is now.
+    /// Returns the view of a capture in the previous frame. `now` is its view in this frame, `pose` the camera's pose in the previous
+    /// frame, and `time_at` converts seconds to the capture's timestamp. A capture that did not exist in the previous frame counts as
+    /// unmoved.
     pub(super) fn view(
         &self,
         entity: &MainEntity,
@@ -69,7 +71,7 @@ impl PreviousCaptures {
     }
 }
 
-/// Returns whether a step of so many seconds, after one of `before`, is a jump.
+/// Returns whether a step of so many seconds, after a step of `before`, is a jump.
 fn is_jump(step: f32, before: f32) -> bool {
     let most = if before == 0.0 { LONGEST_STEP } else { LONGEST_STEP.min(STEPS * before.abs()) };
     step.is_nan() || step.abs() > most
@@ -80,7 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn steps_are_told_from_jumps() {
+    fn long_steps_of_time_are_jumps() {
         for (step, before, jump) in [
             (0.016, 0.016, false),
             (0.0, 0.016, false),

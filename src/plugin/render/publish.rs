@@ -1,6 +1,6 @@
-//! Publish: the numbers of a frame, from the render world to [`CaptureStatistics`].
+//! Publish: copies the numbers of a frame from the render world to [`CaptureStatistics`].
 //!
-//! In: the views that were prepared, and all uploaded captures. Out: updated [`CaptureStatistics`].
+//! In: the prepared views and all uploaded captures. Out: updated [`CaptureStatistics`].
 
 use super::capture_views::CaptureViews;
 use super::statistics::CaptureStatistics;
@@ -17,7 +17,7 @@ pub(super) fn publish_statistics(
     captures: &RenderAssets<GpuGaussianCapture>,
 ) {
     let _span = debug_span!("gs4d/statistics").entered();
-    // A view that sees nothing any more may still hold memory.
+    // A view that no longer sees a capture may still hold memory.
     let shown = views.0.values().filter(|view| view.sees_something() || view.renderer.statistics().bytes > 0);
     let numbers = shown.map(|view| {
         let all = view.renderer.statistics();

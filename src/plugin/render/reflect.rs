@@ -47,23 +47,23 @@ mod tests {
     use bevy::reflect::{FromReflect, GetPath, PartialReflect, TypePath};
 
     #[test]
-    fn a_camera_s_choices_can_be_read_and_set_by_path() {
+    fn camera_settings_can_be_set_by_reflection_path() {
         let mut settings = CaptureViewSettings::default();
         *settings.path_mut::<DebugView>("debug").expect("a field") = DebugView::Velocity;
-        assert_eq!(settings.debug, DebugView::Velocity, "set through reflection");
-        assert_eq!(BlendSpace::Linear.variant_name(), "Linear", "variants have their names");
-        assert_eq!(BlendSpace::type_path(), "bevy_gs4d::view::BlendSpace", "and the type its own");
+        assert_eq!(settings.debug, DebugView::Velocity, "the field is set through reflection");
+        assert_eq!(BlendSpace::Linear.variant_name(), "Linear", "variants have reflected names");
+        assert_eq!(BlendSpace::type_path(), "bevy_gs4d::view::BlendSpace", "the type path is the public path");
     }
 
     #[test]
-    fn choices_survive_a_round_trip_through_reflection() {
+    fn camera_settings_survive_a_round_trip_through_reflection() {
         let settings = CaptureViewSettings { blend_space: BlendSpace::Linear, ..CaptureViewSettings::default() };
         let copy = CaptureViewSettings::from_reflect(settings.to_dynamic().as_ref());
-        assert_eq!(copy, Some(settings), "as it was");
+        assert_eq!(copy, Some(settings), "the copy equals the original");
         for (name, design) in Design::NAMES {
             let settings = CaptureViewSettings { design, ..CaptureViewSettings::default() };
             let copy = CaptureViewSettings::from_reflect(settings.to_dynamic().as_ref());
-            assert_eq!(copy, Some(settings), "{name}, as it was");
+            assert_eq!(copy, Some(settings), "the copy equals the original with {name}");
         }
     }
 }

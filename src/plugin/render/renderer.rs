@@ -1,7 +1,7 @@
 //! The renderer's pipelines, as a resource of the render world.
 //!
-//! In: Bevy's render device, once when rendering starts and again after a lost device. Out: [`CaptureRenderer`], or the reason why there
-//! is none, in [`CaptureStatistics`].
+//! In: Bevy's render device, once when rendering starts and again after a lost device. Out: [`CaptureRenderer`], or the reason for its
+//! absence in [`CaptureStatistics`].
 
 use super::statistics::CaptureStatistics;
 use crate::renderer::{Renderer, ShaderChecks};

@@ -1,4 +1,4 @@
-//! The settings of drawing: how a capture is drawn, and how a camera draws captures.
+//! Settings of drawing, per capture and per camera.
 //!
 //! In: fields that any system or animation may set. Out: an [`Appearance`] for the renderer, and the settings of a camera.
 
@@ -37,18 +37,18 @@ pub struct CaptureSettings {
     pub filter: bool,
     /// Factor on every Gaussian's opacity, from 0 (invisible) to 1. A timeline's fade is a further factor. Default: 1.
     pub opacity: f32,
-    /// Factor on the linear light of each channel; alpha is not used. Default: white, which changes nothing.
+    /// Factor on the linear light of each channel; alpha is not used. Default: white, a factor of 1.
     pub tint: LinearRgba,
     /// Exposure in stops: each doubles the linear light. Default: 0.
     pub exposure: f32,
     /// The part of the capture that is drawn. Default: `None`, all of it.
     pub crop: Option<CropBox>,
-    /// The finest level of detail that is drawn, if the capture has levels: 1 is the first one made of fewer Gaussians; more than there are
-    /// is the coarsest. Default: 0, all Gaussians where the capture is large on the screen.
+    /// The finest level of detail that is drawn, if the capture has levels: 0 is all Gaussians, 1 the first level with fewer Gaussians; a
+    /// number above the coarsest level selects the coarsest. Default: 0.
     pub finest_level: u8,
-    /// Whether Gaussians are made fainter where the capture is smaller on the screen than in training, so that they cover no more than they
-    /// did; without it, what is far away grows fat. Needs the size of training pixels, which `gs4d bake` and `gs4d detail --data` write
-    /// into the package; other captures are drawn without it, as are shadows. Default: true.
+    /// Whether Gaussians are made fainter where they are smaller on the screen than in training, so that they cover no more than in
+    /// training; without it, distant Gaussians appear too large. Needs the size of training pixels, which `gs4d bake` and
+    /// `gs4d detail --data` write into the package; shadows and captures without it are drawn without anti-aliasing. Default: true.
     pub antialias: bool,
 }
 
@@ -70,15 +70,15 @@ pub struct CaptureSettings {
 #[derive(Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Default, Debug, Clone, PartialEq)]
 pub struct CropBox {
-    /// Its centre. Default: the origin.
+    /// Center of the box. Default: the origin.
     pub center: Vec3,
-    /// Half the lengths of its sides. An infinite one does not crop; a negative one counts as 0. Default: 1 on each axis.
+    /// Half the lengths of its sides. An infinite length does not crop; a negative length counts as 0. Default: 1 on each axis.
     pub half_size: Vec3,
-    /// Its rotation about its centre. Default: none.
+    /// Its rotation about its center. Default: none.
     pub rotation: Quat,
 }
 
-/// How a camera draws captures: an optional component beside `Camera3d`. Without it the defaults apply.
+/// How a camera draws captures: an optional component next to `Camera3d`. Without it the defaults apply.
 ///
 /// # Examples
 ///
@@ -97,19 +97,19 @@ pub struct CropBox {
 pub struct CaptureViewSettings {
     /// The space in which Gaussians are blended with each other and with the background. Default: [`BlendSpace::Encoded`], as trained.
     pub blend_space: BlendSpace,
-    /// Which depth of captures is written to the camera's depth buffer. Default: [`DepthWrite::Auto`], one if an effect reads it.
+    /// Which depth of captures is written to the camera's depth buffer. Default: [`DepthWrite::Auto`], a depth only if an effect reads it.
     pub depth: DepthWrite,
-    /// What is shown of captures. Default: [`DebugView::Color`].
+    /// The quantity that is shown. Default: [`DebugView::Color`].
     pub debug: DebugView,
-    /// How captures are drawn; every design draws the same picture. Default: [`Design::Auto`], the fastest on this GPU.
+    /// The renderer's design; every design draws the same picture. Default: [`Design::Auto`], the fastest on this GPU.
     pub design: Design,
 }
 
 /// Which depth of captures is written to the camera's depth buffer, at pixels where they hide more than half of the background.
 ///
 /// Post-processing that reads the depth buffer (depth of field, volumetric fog) then treats captures as surfaces. With
-/// [`Expected`](Self::Expected) and [`Median`](Self::Median) so do transparent meshes: they are drawn after captures, which cut them pixel
-/// by pixel. See [the order of a frame](crate::render#the-order-of-a-frame). Default: [`Auto`](Self::Auto).
+/// [`Expected`](Self::Expected) and [`Median`](Self::Median), transparent meshes are drawn after captures and depth-tested against them per
+/// pixel. See [the order of a frame](crate::render#the-order-of-a-frame). Default: [`Auto`](Self::Auto).
 ///
 /// # Examples
 ///
@@ -127,16 +127,16 @@ pub struct CaptureViewSettings {
 #[reflect(Default, Debug, Clone, PartialEq, Hash)]
 pub enum DepthWrite {
     /// [`Expected`](Self::Expected) for cameras with one of Bevy's effects that read depths after the main pass, [`None`](Self::None) for
-    /// others. These effects are `DepthOfField`, `VolumetricFog`, `OrderIndependentTransparencySettings`, and everything with a
-    /// `MotionVectorPrepass`: `TemporalAntiAliasing`, `MotionBlur`. A game with an effect of its own chooses for itself.
+    /// others. These effects are `DepthOfField`, `VolumetricFog`, `OrderIndependentTransparencySettings`, and all effects with a
+    /// `MotionVectorPrepass`: `TemporalAntiAliasing`, `MotionBlur`. A game with its own depth effect must set the depth.
     #[default]
     Auto,
     /// No depth is written.
     None,
-    /// The mean depth of the splats at a pixel, weighted as their colours are: smooth, but between surfaces where several are visible. For
-    /// captures with an environment map, and with [`DebugView::Overdraw`], the median is written instead.
+    /// The mean depth of the splats at a pixel, with the weights of their colors: smooth, but between surfaces where several surfaces are
+    /// visible. For captures with an environment map, and with [`DebugView::Overdraw`], the median is written instead.
     Expected,
-    /// The depth at which half of the light is absorbed: on a surface, but with steps.
+    /// The depth at which half of the light is absorbed: always on a surface, but with discontinuities.
     Median,
 }
 
@@ -168,16 +168,16 @@ impl CaptureSettings {
 }
 
 impl CropBox {
-    /// Returns whether a point of capture space is inside. A box contains every point if its centre is not finite or
+    /// Returns whether a point of capture space is inside. A box contains every point if its center is not finite or
     /// its rotation has the length 0.
     pub fn contains(&self, point: Vec3) -> bool {
         self.cube_from_capture().is_none_or(|cube| cube.transform_point3(point).abs().max_element() <= 1.0)
     }
 
-    /// Returns the transform from capture space to the cube from −1 to 1; `None` if the box has no finite centre or
+    /// Returns the transform from capture space to the cube from −1 to 1; `None` if the box has no finite center or
     /// rotation.
     fn cube_from_capture(&self) -> Option<Affine3A> {
-        // A side of length 0 contains nothing, but must not divide by zero.
+        // A side of length 0 must not divide by zero.
         let scale = self.half_size.max(Vec3::splat(1e-12)).recip();
         let matrix = Mat3::from_diagonal(scale) * Mat3::from_quat(self.rotation.normalize()).transpose();
         let cube = Affine3A::from_mat3_translation(matrix, matrix * -self.center);
@@ -196,51 +196,55 @@ mod tests {
     use std::f32::consts::FRAC_PI_4;
 
     #[test]
-    fn the_default_changes_nothing() {
-        assert_eq!(CaptureSettings::default().appearance(1.0), Appearance::default(), "as trained");
-    }
-
-    #[test]
-    fn light_is_tint_times_two_to_the_stops() {
-        let settings =
-            CaptureSettings { tint: LinearRgba::rgb(1.0, 0.5, 0.0), exposure: 1.0, ..CaptureSettings::default() };
-        assert_eq!(settings.appearance(1.0).light, Vec3::new(2.0, 1.0, 0.0), "one stop doubles");
-    }
-
-    #[test]
-    fn fades_multiply_and_nonsense_is_nothing() {
-        let half = CaptureSettings { opacity: 0.5, ..CaptureSettings::default() };
-        assert_eq!(half.appearance(0.5).opacity, 0.25, "half of a half");
-        let broken = CaptureSettings { opacity: f32::NAN, exposure: f32::INFINITY, ..CaptureSettings::default() };
-        let appearance = broken.appearance(1.0);
-        assert_eq!((appearance.opacity, appearance.light), (0.0, Vec3::ZERO), "no number counts as 0");
+    fn default_settings_draw_captures_as_trained() {
         assert_eq!(
-            CaptureSettings { opacity: -1.0, ..half }.appearance(1.0).opacity,
-            0.0,
-            "nothing is less than nothing"
+            CaptureSettings::default().appearance(1.0),
+            Appearance::default(),
+            "the default appearance is that of the training"
         );
     }
 
     #[test]
-    fn a_turned_box_holds_what_is_inside() {
+    fn light_is_tint_times_two_to_the_power_of_exposure() {
+        let settings =
+            CaptureSettings { tint: LinearRgba::rgb(1.0, 0.5, 0.0), exposure: 1.0, ..CaptureSettings::default() };
+        assert_eq!(settings.appearance(1.0).light, Vec3::new(2.0, 1.0, 0.0), "one stop doubles the light");
+    }
+
+    #[test]
+    fn fades_multiply_and_invalid_values_count_as_zero() {
+        let half = CaptureSettings { opacity: 0.5, ..CaptureSettings::default() };
+        assert_eq!(half.appearance(0.5).opacity, 0.25, "the fade multiplies the opacity");
+        let broken = CaptureSettings { opacity: f32::NAN, exposure: f32::INFINITY, ..CaptureSettings::default() };
+        let appearance = broken.appearance(1.0);
+        assert_eq!((appearance.opacity, appearance.light), (0.0, Vec3::ZERO), "NaN and infinity count as 0");
+        assert_eq!(
+            CaptureSettings { opacity: -1.0, ..half }.appearance(1.0).opacity,
+            0.0,
+            "a negative opacity counts as 0"
+        );
+    }
+
+    #[test]
+    fn a_rotated_box_contains_the_points_inside_it() {
         let turned = CropBox {
             center: Vec3::X,
             half_size: Vec3::new(2.0, 0.5, f32::INFINITY),
             rotation: Quat::from_rotation_z(FRAC_PI_4),
         };
-        assert!(turned.contains(Vec3::new(2.0, 1.0, 0.0)), "along its long side");
-        assert!(!turned.contains(Vec3::new(2.0, -1.0, 0.0)), "across it");
+        assert!(turned.contains(Vec3::new(2.0, 1.0, 0.0)), "a point along the long side is inside");
+        assert!(!turned.contains(Vec3::new(2.0, -1.0, 0.0)), "a point across the long side is outside");
         assert!(turned.contains(Vec3::new(1.0, 0.0, -1e6)), "an infinite side does not crop");
-        assert!(!turned.contains(Vec3::new(3.0, 2.0, 0.0)), "beyond its end");
+        assert!(!turned.contains(Vec3::new(3.0, 2.0, 0.0)), "a point beyond the end is outside");
     }
 
     #[test]
-    fn degenerate_boxes_do_not_break() {
+    fn negative_sides_are_empty_and_invalid_boxes_crop_nothing() {
         let empty = CropBox { half_size: Vec3::new(1.0, -1.0, 1.0), ..CropBox::default() };
-        assert!(!empty.contains(Vec3::Y * 0.1), "a negative side holds nothing");
+        assert!(!empty.contains(Vec3::Y * 0.1), "a box with a negative side contains no point");
         let broken = CropBox { center: Vec3::NAN, ..CropBox::default() };
-        assert!(broken.contains(Vec3::ONE * 9.0), "an invalid box crops nothing");
+        assert!(broken.contains(Vec3::ONE * 9.0), "a box with a NaN center crops nothing");
         let unturned = CropBox { rotation: Quat::from_xyzw(0.0, 0.0, 0.0, 0.0), ..CropBox::default() };
-        assert!(unturned.contains(Vec3::ONE * 9.0), "nor does one without a rotation");
+        assert!(unturned.contains(Vec3::ONE * 9.0), "a box with a zero rotation crops nothing");
     }
 }

@@ -1,18 +1,18 @@
-//! Shade requests: the cameras and captures for which others work on the captures' picture before it reaches the target.
+//! Shade requests: the cameras and captures whose picture other systems change before it reaches the target.
 //!
-//! In: what is found during extraction, in every frame. Out: [`ShadeRequests`], by which [`prepare`](super::prepare) decides for each
-//! camera whether there is something between [`CaptureSystems::Record`](super::CaptureSystems) and the composite, and depths for it.
+//! In: requests of systems of the extract schedule, in every frame. Out: [`ShadeRequests`], from which [`prepare`](super::prepare) decides
+//! for each camera whether [`CaptureSystems::Shade`](super::CaptureSystems) needs a separate picture and depths.
 
 use super::capture_views::Drawn;
 use bevy::ecs::resource::Resource;
 use bevy::render::sync_world::{MainEntity, MainEntityHashSet};
 
-/// Who asks for a shaded picture, by entity of the main world. Nobody, unless a system of the extract schedule writes it.
+/// The requests for a shaded picture, by entity of the main world. Empty unless a system of the extract schedule writes it.
 #[derive(Resource, Default)]
 pub(crate) struct ShadeRequests {
-    /// Cameras, whichever captures they see.
+    /// Cameras whose picture is shaded for any capture.
     pub(crate) cameras: MainEntityHashSet,
-    /// Captures, whichever camera sees them.
+    /// Captures that are shaded in any camera.
     pub(crate) captures: MainEntityHashSet,
 }
 

@@ -1,4 +1,4 @@
-//! Statistics: what drawing captures costs, for panels and tests.
+//! Statistics: counts, times and memory of drawing captures, for panels and tests.
 //!
 //! In: the counts and times of the render world. Out: [`CaptureStatistics`], a resource that both worlds share.
 
@@ -8,7 +8,7 @@ use bevy::ecs::resource::Resource;
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What drawing captures costs, as of the newest frame that the render world has prepared: a resource.
+/// Counts, GPU times and memory of drawing captures in the newest frame that the render world has prepared: a resource.
 ///
 /// Clones share the numbers. Default: no views, no captures, nothing measured.
 ///
@@ -38,18 +38,18 @@ struct Shared {
     uploaded_captures: usize,
     uploading_captures: usize,
     renderer_missing: Option<String>,
-    /// Kept when the renderer is created anew after a lost device.
+    /// Kept when the renderer is created again after a lost device.
     work: WorkCounters,
 }
 
 impl CaptureStatistics {
-    /// Starts or stops measuring the GPU time of each pass. The first times arrive some frames later; on a GPU without timestamps none
+    /// Starts or stops measuring the GPU time of each pass. The first times arrive some frames later; on a GPU without timestamps no times
     /// arrive. The inspector also measures while it shows these times. Default: not measured.
     pub fn measure(&self, on: bool) {
         self.lock().measure = on;
     }
 
-    /// Starts or stops measuring for the inspector, whatever the game has asked for.
+    /// Starts or stops measuring for the inspector, independently of [`measure`](Self::measure).
     #[cfg(feature = "inspector")]
     pub(crate) fn measure_for_panel(&self, on: bool) {
         self.lock().measure_for_panel = on;
@@ -77,17 +77,17 @@ impl CaptureStatistics {
         self.lock().uploaded_captures
     }
 
-    /// Returns the number of captures that are on their way to the GPU, those included of which an older version is drawn.
+    /// Returns the number of captures that are being uploaded to the GPU, including captures of which an older version is drawn.
     pub fn uploading_captures(&self) -> usize {
         self.lock().uploading_captures
     }
 
-    /// Returns the counters of what has been created, uploaded and recorded on the GPU so far. Clones share the counters.
+    /// Returns the counters of objects created, bytes uploaded and work recorded on the GPU so far. Clones share the counters.
     pub fn work(&self) -> WorkCounters {
         self.lock().work.clone()
     }
 
-    /// Returns why no capture is drawn at all, which is what this GPU or app lacks; `None` if captures can be drawn.
+    /// Returns the reason why no capture can be drawn on this GPU or in this app; `None` if captures can be drawn.
     pub fn renderer_missing(&self) -> Option<String> {
         self.lock().renderer_missing.clone()
     }
@@ -101,8 +101,8 @@ impl CaptureStatistics {
         shared.measure || shared.measure_for_panel
     }
 
-    /// Replaces the numbers by those of a new frame: of each camera that sees captures or holds memory for them, the bytes and the
-    /// count of all uploaded captures, and the count of those that are being uploaded.
+    /// Replaces the numbers by the numbers of a new frame: the statistics of each camera that sees captures or holds memory for them, the
+    /// bytes and count of all uploaded captures, and the count of captures that are being uploaded.
     pub(super) fn update<'a>(
         &self,
         views: impl Iterator<Item = (Entity, Cow<'a, ViewStatistics>)> + Clone,
@@ -124,7 +124,7 @@ impl CaptureStatistics {
         shared.uploading_captures = uploading_captures;
     }
 
-    /// Locks the numbers. After a panic of another holder they are still valid, if old.
+    /// Locks the numbers. After a panic of another holder they are outdated but valid.
     fn lock(&self) -> MutexGuard<'_, Shared> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

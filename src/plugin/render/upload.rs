@@ -1,8 +1,8 @@
-//! Upload: from a loaded capture to its buffers on the GPU, once per asset (and again when it changes or the device was lost).
+//! Upload: copies a loaded capture to buffers on the GPU, once per asset, and again after a change or a lost device.
 //!
-//! In: [`GaussianCapture`], and how much may be uploaded in a frame. Out: [`GpuGaussianCapture`] in `RenderAssets`, drawn once it is whole,
-//! and its state in [`Uploads`], which becomes messages. A capture that changes is drawn as it was until the new one is whole, and stays if
-//! the GPU refuses the new one.
+//! In: [`GaussianCapture`] and the upload budget of a frame. Out: [`GpuGaussianCapture`] in `RenderAssets`, drawn once it is complete, and
+//! its state in [`Uploads`], which is sent as messages. After a change, the old version is drawn until the new one is complete, and kept if
+//! the GPU rejects the new one.
 
 use super::renderer::CaptureRenderer;
 use super::statistics::CaptureStatistics;
@@ -20,9 +20,9 @@ use bevy::render::render_asset::{PrepareAssetError, RenderAsset, RenderAssets};
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 use std::sync::Arc;
 
-/// How much of captures is uploaded to the GPU in one frame: a resource.
+/// The number of bytes of captures that may be uploaded to the GPU in one frame: a resource.
 ///
-/// A capture of 100 MB is then drawn some frames after it has been loaded, and none of these frames is much longer than others.
+/// A capture of 100 MB is drawn some frames after it has been loaded, and none of these frames is much longer than the others.
 ///
 /// # Examples
 ///
@@ -30,7 +30,7 @@ use std::sync::Arc;
 /// use bevy::prelude::*;
 /// use bevy_gs4d::prelude::*;
 ///
-/// /// Behind a loading screen frames may be long.
+/// /// Removes the limit, for example behind a loading screen, where frames may be long.
 /// fn hurry(mut budget: ResMut<CaptureUploadBudget>) {
 ///     budget.bytes_per_frame = u64::MAX;
 /// }
@@ -38,7 +38,7 @@ use std::sync::Arc;
 /// ```
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CaptureUploadBudget {
-    /// Bytes of all captures together; one Gaussian is uploaded in any case. Default: 16 MiB.
+    /// Bytes per frame, summed over all captures; at least one Gaussian is uploaded. Default: 16 MiB.
     pub bytes_per_frame: u64,
 }
 
@@ -48,22 +48,22 @@ impl Default for CaptureUploadBudget {
     }
 }
 
-/// A capture on the GPU; empty until it is whole, and if it could not be uploaded, which has then been logged and reported.
+/// A capture on the GPU. It is empty until the upload is complete, and if the upload failed; a failure is logged and reported.
 pub struct GpuGaussianCapture {
     shown: Option<Arc<ShownCapture>>,
-    /// What will be shown instead.
+    /// The version that will replace it.
     next: Option<NextCapture>,
 }
 
-/// A capture that is whole on the GPU.
+/// A capture whose upload is complete.
 struct ShownCapture {
     /// All Gaussians, then each level of detail.
     levels: Vec<GpuCapture>,
-    /// What it was made of: while it is replaced, the asset is another.
+    /// The source of these buffers, which may be older than the asset.
     source: GaussianCapture,
 }
 
-/// A capture on its way to the GPU.
+/// A capture that is being uploaded.
 struct NextCapture {
     /// All Gaussians, then each level of detail.
     uploads: Vec<CaptureUpload<Arc<RuntimeScene>>>,
@@ -90,7 +90,7 @@ impl GpuGaussianCapture {
         levels.get(index).or(levels.first())
     }
 
-    /// Returns the levels of detail of the capture that is drawn, and its bounds at all times; `None` if it has none.
+    /// Returns the levels of detail and the bounds over all times of the drawn capture; `None` if it has no levels.
     pub(super) fn detail(&self) -> Option<(&[Level], Bounds)> {
         let source = &self.shown.as_ref()?.source;
         let levels = &source.scene().levels[..];
@@ -103,25 +103,24 @@ impl GpuGaussianCapture {
         self.shown.as_ref().map_or(0, |shown| shown.levels.len().saturating_sub(1))
     }
 
-    /// Returns the size of the pixels that a level of detail was trained with, capture units; `None` if it is not known.
+    /// Returns the size of the training pixels of a level of detail in capture units; `None` if it is unknown.
     pub(crate) fn trained_pixel(&self, level: usize) -> Option<f32> {
         let scene = self.shown.as_ref()?.source.scene();
         let level = level.checked_sub(1).and_then(|index| scene.levels.get(index));
         level.map_or(&scene.trained_with, |level| &level.scene.trained_with).pixel
     }
 
-    /// Returns the bytes of its buffers.
+    /// Returns the size of the buffers in bytes.
     pub(super) fn bytes(&self) -> u64 {
         self.shown.iter().flat_map(|shown| &shown.levels).map(GpuCapture::bytes).sum()
     }
 
-    /// Returns the timestamp at `seconds` since the start of the capture that is drawn, in its own unit of time; `None` if it cannot be
-    /// drawn.
+    /// Returns the timestamp of the drawn capture at `seconds` since its start, in its own unit of time; `None` if it cannot be drawn.
     pub(crate) fn time_at(&self, seconds: f32) -> Option<f32> {
         self.shown.as_ref().map(|shown| shown.source.time_at(seconds))
     }
 
-    /// Uploads no more than `bytes` of what will be shown, and shows it once it is whole. Returns how many bytes that were.
+    /// Uploads at most `bytes` of the next version, and shows it once it is complete. Returns the number of uploaded bytes.
     fn advance(&mut self, queue: &RenderQueue, renderer: &CaptureRenderer, bytes: u64) -> u64 {
         let Some(mut next) = self.next.take() else { return 0 };
         let mut written = 0;
@@ -139,7 +138,7 @@ impl GpuGaussianCapture {
         written
     }
 
-    /// Returns the bytes that are missing until it is whole; `None` if it is, or will never be.
+    /// Returns the bytes that remain to be uploaded; `None` if no upload is in progress.
     pub(super) fn bytes_left(&self) -> Option<u64> {
         self.next.as_ref().map(NextCapture::bytes_left)
     }
@@ -147,7 +146,7 @@ impl GpuGaussianCapture {
 
 impl RenderAsset for GpuGaussianCapture {
     type SourceAsset = GaussianCapture;
-    // No `byte_len`: with a limit of bytes for each frame, Bevy removes the old upload before it prepares the new one.
+    // `byte_len` is not implemented: with a byte limit per frame, Bevy removes the old upload before it prepares the new one.
     type Param =
         (SRes<RenderDevice>, SRes<AssetServer>, SRes<Uploads>, SRes<CaptureStatistics>, Option<SRes<CaptureRenderer>>);
 
@@ -161,7 +160,7 @@ impl RenderAsset for GpuGaussianCapture {
         let shown = previous.and_then(|previous| previous.shown.clone());
         uploads.begin(id, shown.is_some());
         let Some(renderer) = renderer else {
-            // It has been logged, once for all captures.
+            // The failure has already been logged once for all captures.
             let why = statistics.renderer_missing().unwrap_or_else(|| "there is no renderer".into());
             uploads.fail(id, format!("{}: not drawn: {why}", name()));
             return Ok(Self { shown, next: None });
@@ -202,13 +201,12 @@ pub(super) fn extract_upload_budget(
     *extracted = **budget;
 }
 
-/// Returns whether any capture is not whole.
+/// Returns whether any capture is being uploaded.
 pub(super) fn any_uploading(captures: Res<RenderAssets<GpuGaussianCapture>>) -> bool {
     captures.iter().any(|(_, capture)| capture.next.is_some())
 }
 
-/// Uploads more of the captures that are not whole, as much as the budget allows: first of those of which least is missing, so that
-/// something shows soon.
+/// Continues the uploads within the budget. Captures with the fewest remaining bytes come first, so that a capture shows soon.
 pub(super) fn continue_uploads(
     queue: Res<RenderQueue>,
     renderer: Option<Res<CaptureRenderer>>,

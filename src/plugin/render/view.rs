@@ -1,7 +1,7 @@
-//! Views: Bevy's camera and an entity's transform in the renderer's terms.
+//! Views: converts Bevy's camera and an entity's transform to the renderer's conventions.
 //!
-//! In: a projection matrix (Bevy's: y up, looking along −z, reverse-z), the poses of a camera and of a capture. Out: a
-//! [`CameraLens`], and a [`View`] (y down, looking along +z) that leads from capture space straight to camera space.
+//! In: a projection matrix (Bevy's: y up, looking along −z, reverse-z), the poses of a camera and of a capture. Out: a [`CameraLens`], and
+//! a [`View`] (y down, looking along +z) that maps capture space directly to camera space.
 
 use crate::view::View;
 use glam::{Affine3A, DMat3, DMat4, DVec4, Mat4, UVec2, Vec2, Vec4};
@@ -10,32 +10,31 @@ use glam::{Affine3A, DMat3, DMat4, DVec4, Mat4, UVec2, Vec2, Vec4};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CameraLens {
     rays: Rays,
-    /// How the depth buffer's value `d` gives depth in camera space: `z = (x + y d) / (z + w d)`. `None` if it also
-    /// depends on the place in the picture.
+    /// How the depth buffer's value `d` gives depth in camera space: `z = (x + y d) / (z + w d)`. `None` if the depth also depends on the
+    /// position in the picture.
     pub(crate) distance: Option<Vec4>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Rays {
-    /// From one point.
+    /// Rays from one point.
     Pinhole {
         /// `P00, P11, P02, P12`, as in [`View::projection`].
         projection: Vec4,
         /// Tangents of half the true field of view.
         tan_fov: Vec2,
     },
-    /// Parallel ones.
+    /// Parallel rays.
     Parallel {
         /// `P00, P11, P03, P13`.
         projection: Vec4,
-        /// Depth of the near plane, camera units.
+        /// Depth of the near plane in camera units.
         near: f32,
     },
 }
 
 impl CameraLens {
-    /// Returns the lens behind a projection matrix; `None` for one that is skewed, mirrored or, with parallel rays, not
-    /// reversed in depth.
+    /// Returns the lens of a projection matrix; `None` for a matrix that is skewed, mirrored or, with parallel rays, not reversed in depth.
     pub(crate) fn of(clip_from_view: &Mat4) -> Option<Self> {
         let [x, y, _, _] = columns(clip_from_view);
         if !clip_from_view.is_finite() || (x.y, y.x) != (0.0, 0.0) || x.x <= 0.0 || y.y <= 0.0 {
@@ -60,7 +59,7 @@ impl CameraLens {
         // ndc y = (y.y y + z.y depth) / depth.
         let projection = Vec4::new(x.x, y.y, -z.x, z.y);
         let rays = Rays::Pinhole { projection, tan_fov: Vec2::new(x.x.recip(), y.y.recip()) };
-        // d = (w.z − z.z depth) / depth; z.z is 0 if the far plane is infinitely far.
+        // d = (w.z − z.z depth) / depth; z.z is 0 for an infinite far plane.
         let plain = (x.z, y.z) == (0.0, 0.0) && w.z > 0.0 && z.z >= 0.0;
         Some(Self { rays, distance: plain.then_some(Vec4::new(w.z, 0.0, z.z, 1.0)) })
     }
@@ -123,14 +122,14 @@ mod tests {
         Mat4::perspective_infinite_reverse_rh(fov_y, SIZE.x as f32 / SIZE.y as f32, 0.1)
     }
 
-    /// Returns a projection for a picture of 4 x 3 units, 0.5 to 50 units away and off its middle.
+    /// Returns an off-center projection for a picture of 4 x 3 units with depths from 0.5 to 50.
     fn orthographic() -> Mat4 {
         let area = Rect::new(-1.0, -2.0, 3.0, 1.0);
         OrthographicProjection { near: 0.5, far: 50.0, area, ..OrthographicProjection::default_3d() }
             .get_clip_from_view()
     }
 
-    /// Returns where the renderer puts a point: normalised device coordinates with y down.
+    /// Returns the renderer's normalized device coordinates of a point, with y down.
     fn seen(view: &View, point: Vec3) -> Vec2 {
         let depth = view.world_to_camera.transform_point3(point).z;
         let [x, y] = view.clip_rows();
@@ -138,14 +137,14 @@ mod tests {
         Vec2::new(x.dot(point.extend(1.0)), y.dot(point.extend(1.0))) / divisor
     }
 
-    /// Returns where Bevy puts it, likewise.
+    /// Returns Bevy's normalized device coordinates of a point, with y down.
     fn seen_by_bevy(clip_from_view: Mat4, camera: Affine3A, point: Vec3) -> Vec2 {
         let clip = clip_from_view * Mat4::from(camera.inverse()) * point.extend(1.0);
         Vec2::new(clip.x, -clip.y) / clip.w
     }
 
     #[test]
-    fn a_bevy_camera_is_the_same_camera_as_ours() {
+    fn a_bevy_camera_equals_the_camera_of_this_crate() {
         let (eye, target) = (Vec3::new(1.0, 2.0, 4.0), Vec3::new(0.2, 0.1, -0.3));
         let fov_x = 2.0 * ((0.7f32 / 2.0).tan() * 4.0 / 3.0).atan();
         let ours = Camera::look_at(eye, target, Vec3::Y, fov_x, SIZE).view(0.3, RasterFov::Corrected);
@@ -154,12 +153,12 @@ mod tests {
         assert!(theirs.world_to_camera.abs_diff_eq(ours.world_to_camera, 1e-5), "poses agree");
         assert!(theirs.projection.abs_diff_eq(ours.projection, 1e-5), "projections agree");
         assert!(theirs.tan_fov.abs_diff_eq(ours.tan_fov, 1e-5), "fields of view agree");
-        assert!(theirs.camera_position.abs_diff_eq(eye, 1e-5), "camera centres agree");
+        assert!(theirs.camera_position.abs_diff_eq(eye, 1e-5), "camera centers agree");
         assert_eq!(lens.distance, Some(Vec4::new(0.1, 0.0, 0.0, 1.0)), "the depth texture holds near / depth");
     }
 
     #[test]
-    fn points_land_where_bevy_puts_them() {
+    fn points_project_to_the_same_place_as_in_bevy() {
         let mut off_center = perspective(0.9);
         off_center.z_axis.x = 0.15;
         off_center.z_axis.y = -0.25;
@@ -180,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn depth_leads_back_to_distance() {
+    fn depth_buffer_values_convert_to_depths_and_back() {
         let finite = Mat4::perspective_rh(0.9, 1.5, 40.0, 0.2);
         let bevy_s = PerspectiveProjection { near: 0.3, ..PerspectiveProjection::default() }.get_clip_from_view();
         for (name, projection) in [("infinite", bevy_s), ("finite far plane", finite), ("orthographic", orthographic())]
@@ -190,7 +189,7 @@ mod tests {
                 let clip = projection * Vec4::new(0.3, -0.2, -depth, 1.0);
                 let d = clip.z / clip.w;
                 let back = (distance.x + distance.y * d) / (distance.z + distance.w * d);
-                assert!((back - depth).abs() < 1e-4 * depth, "{name}: {depth} comes back as {back}");
+                assert!((back - depth).abs() < 1e-4 * depth, "{name}: depth {depth} converts back to {back}");
                 let buffer = (distance.x - distance.z * depth) / (distance.w * depth - distance.y);
                 assert!((buffer - d).abs() < 1e-6, "{name}: {depth} is written as {buffer}, Bevy writes {d}");
             }
@@ -198,32 +197,32 @@ mod tests {
     }
 
     #[test]
-    fn an_orthographic_camera_begins_at_its_near_plane() {
+    fn an_orthographic_lens_has_the_near_plane_of_the_projection() {
         let lens = CameraLens::of(&orthographic()).expect("a lens");
         let camera = bevy_camera(Vec3::ZERO, Vec3::NEG_Z);
         let view = lens.view(SIZE, 0.0, camera, Affine3A::IDENTITY).expect("not flat");
-        assert!((view.near - 0.5).abs() < 1e-4, "half a unit away, not {}", view.near);
+        assert!((view.near - 0.5).abs() < 1e-4, "the near plane is at 0.5, not {}", view.near);
         let behind = OrthographicProjection { near: -5.0, ..OrthographicProjection::default_3d() };
         let view =
             CameraLens::of(&behind.get_clip_from_view()).and_then(|l| l.view(SIZE, 0.0, camera, Affine3A::IDENTITY));
-        assert!((view.expect("a view").near + 5.0).abs() < 1e-3, "or five behind it");
+        assert!((view.expect("a view").near + 5.0).abs() < 1e-3, "the near plane may be behind the camera, at -5");
     }
 
     #[test]
-    fn other_projections_have_no_lens() {
+    fn unsupported_projections_have_no_lens() {
         let forward = Mat4::orthographic_rh(-1.0, 1.0, -1.0, 1.0, 0.1, 10.0);
-        assert_eq!(CameraLens::of(&forward), None, "orthographic, near first");
-        assert_eq!(CameraLens::of(&Mat4::NAN), None, "not a number");
+        assert_eq!(CameraLens::of(&forward), None, "orthographic without reversed depth");
+        assert_eq!(CameraLens::of(&Mat4::NAN), None, "a matrix of NaN");
         let mut skewed = orthographic();
         skewed.z_axis.x = 0.1;
-        assert_eq!(CameraLens::of(&skewed), None, "parallel rays at a slant");
+        assert_eq!(CameraLens::of(&skewed), None, "skewed parallel rays");
         let mut mirrored = perspective(0.7);
         mirrored.x_axis.x = -mirrored.x_axis.x;
         assert_eq!(CameraLens::of(&mirrored), None, "mirrored");
         let plane = Vec3::new(0.1, 0.0, -1.0).normalize().extend(-0.4);
         let oblique = PerspectiveProjection { near_clip_plane: plane, ..PerspectiveProjection::default() };
         let lens = CameraLens::of(&oblique.get_clip_from_view()).expect("still a pinhole");
-        assert_eq!(lens.distance, None, "but its depth depends on the place, too");
+        assert_eq!(lens.distance, None, "its depth also depends on the position in the picture");
     }
 
     #[test]
@@ -231,9 +230,13 @@ mod tests {
         let lens = CameraLens::of(&perspective(0.7)).expect("a pinhole");
         let camera = bevy_camera(Vec3::Z, Vec3::ZERO);
         let view = |model| lens.view(SIZE, 0.0, camera, model);
-        assert_eq!(view(Affine3A::from_scale(Vec3::new(1.0, 0.0, 1.0))), None, "scaled to nothing");
-        assert_eq!(view(Affine3A::from_translation(Vec3::NAN)), None, "not a number");
-        assert!(view(Affine3A::from_scale(Vec3::splat(1e-3))).is_some(), "small is not flat");
-        assert_eq!(lens.view(UVec2::new(0, 9), 0.0, camera, Affine3A::IDENTITY), None, "no pixels");
+        assert_eq!(view(Affine3A::from_scale(Vec3::new(1.0, 0.0, 1.0))), None, "a scale of 0 has no view");
+        assert_eq!(view(Affine3A::from_translation(Vec3::NAN)), None, "a translation of NaN has no view");
+        assert!(view(Affine3A::from_scale(Vec3::splat(1e-3))).is_some(), "a small scale has a view");
+        assert_eq!(
+            lens.view(UVec2::new(0, 9), 0.0, camera, Affine3A::IDENTITY),
+            None,
+            "a picture without pixels has no view"
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! Visibility: the bounds of each placed capture at its current time, for frustum culling.
+//! Visibility: updates the bounds of each placed capture at its current time, for frustum culling.
 //!
 //! In: loaded captures and their playback. Out: an `Aabb` on each entity, in capture space, written only when it changes.
 
@@ -11,7 +11,7 @@ use bevy::ecs::entity::Entity;
 use bevy::ecs::system::{Commands, Query, Res};
 use bevy::log::debug_span;
 
-/// Updates the boxes, after everything that advances playback and before Bevy decides which entities a camera sees.
+/// Updates the boxes. Runs after playback has advanced and before Bevy decides which entities a camera sees.
 pub(super) fn update_bounds(
     captures: Res<Assets<GaussianCapture>>,
     mut placed: Query<(Entity, &GaussianCapture3d, &Playback, Option<&mut Aabb>)>,
@@ -35,8 +35,8 @@ pub(super) fn update_bounds(
     }
 }
 
-/// Returns the box at `seconds` since the start. `None`, so that it is never culled, for a capture with an environment
-/// map, which every camera sees, and for one of which nothing is drawn.
+/// Returns the box at `seconds` since the start. `None` for a capture with an environment map, which every camera sees, and for a capture
+/// without finite bounds; such captures are never culled.
 fn aabb_at(capture: &GaussianCapture, seconds: f32) -> Option<Aabb> {
     if capture.scene().environment.is_some() {
         return None;

@@ -1,7 +1,7 @@
-//! `write_depth`: writes the depth of captures to a depth buffer, for passes that come after them.
+//! `write_depth`: writes the depth of captures to a depth buffer, for later passes.
 //!
-//! In: a view's captures (colour, transmittance, depths) and its lens. Out: pipeline and bind group for `shaders/write_depth.wgsl`,
-//! for cameras that ask for it with [`DepthWrite`](super::DepthWrite), and for the shadow maps of lights.
+//! In: a view's captures (color, transmittance, depths) and its lens. Out: pipeline and bind group for `shaders/write_depth.wgsl`, for
+//! cameras that request it with [`DepthWrite`](super::DepthWrite), and for the shadow maps of lights.
 
 use super::composite::CaptureShaders;
 use super::kept::{KeptGroup, KeptUniform};
@@ -72,14 +72,14 @@ impl SpecializedRenderPipeline for WriteDepthPipeline {
     }
 }
 
-/// How the captures' depths are written: as in `shaders/write_depth.wgsl`.
+/// Conversion of the captures' depths. Mirrors `Lens` in `shaders/write_depth.wgsl`.
 #[derive(ShaderType, Debug, Default, Clone, Copy, PartialEq)]
 struct DepthLens {
     distance: Vec4,
     scale: u32,
 }
 
-/// What one view binds.
+/// The bindings of one view.
 #[derive(Default)]
 pub(crate) struct WriteDepthBindings {
     lens: KeptUniform<DepthLens>,
@@ -87,8 +87,8 @@ pub(crate) struct WriteDepthBindings {
 }
 
 impl WriteDepthBindings {
-    /// Writes how the lens maps depth, `n0 n1 m0 m1` as in [`OpaqueDepth`](crate::renderer::OpaqueDepth), and how many pixels of the
-    /// depth buffer a pixel of the captures is wide and high, if they have changed.
+    /// Writes how the lens maps depth, `n0 n1 m0 m1` as in [`OpaqueDepth`](crate::renderer::OpaqueDepth), and the side of a pixel of the
+    /// captures in pixels of the depth buffer, if they have changed.
     pub(crate) fn set_lens(
         &mut self,
         distance: Vec4,
@@ -105,7 +105,7 @@ impl WriteDepthBindings {
         self.lens.binding()
     }
 
-    /// Releases the targets that were bound.
+    /// Releases the bound targets.
     pub(crate) fn forget(&mut self) {
         self.group.forget();
     }
@@ -129,7 +129,7 @@ impl WriteDepthBindings {
     }
 }
 
-/// Returns how captures are written to a depth buffer: where nothing nearer has been.
+/// Returns the depth state that writes captures only where they are nearest.
 pub(crate) fn nearest() -> DepthStencilState {
     DepthStencilState {
         format: CORE_3D_DEPTH_FORMAT,

@@ -1,4 +1,4 @@
-//! `write_motion`: writes the motion of captures to the camera's motion vectors, and their depth to that of its prepass, for
+//! `write_motion`: writes the motion of captures to the camera's motion vectors, and their depth to the depth of its prepass, for
 //! post-processing that follows pixels from frame to frame.
 //!
 //! In: a view's captures (motions with transmittance, depths) and its lens. Out: pipeline and bind group for
@@ -36,7 +36,7 @@ pub(super) struct WriteMotionKey {
     pub(super) samples: u32,
     /// Whether the median depth is written instead of the expected one.
     pub(super) median: bool,
-    /// Whether the prepass has a depth that others read.
+    /// Whether the prepass has a depth texture.
     pub(super) depth: bool,
 }
 

@@ -31,7 +31,7 @@ use bevy::transform::components::Transform;
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[require(Transform, Visibility)]
 pub struct StereoRig {
-    /// Distance between the eyes in world units, which are metres for a true sense of size. With 0 both eyes see the same; a number that is
+    /// Distance between the eyes in world units, which are meters for a true sense of size. With 0 both eyes see the same; a number that is
     /// not finite leaves the eyes where they are. Default: 0.064, the mean of adults.
     pub ipd: f32,
 }

@@ -30,12 +30,12 @@ const PLUGIN: &Order = &[
     ("asset", &["component"]),
     ("playback", &["component", "asset"]),
     ("render", &["component", "asset", "playback"]),
-    ("picking", &["component", "asset", "playback", "render"]),
+    ("picker", &["component", "asset", "playback", "render"]),
     ("pbr", &["component", "asset", "playback", "render"]),
     ("stereo", &["component", "asset", "playback", "render"]),
-    ("pointer", &["component", "asset", "playback", "render", "picking"]),
-    ("inspector", &["component", "asset", "playback", "render", "pbr", "picking", "stereo"]),
-    ("testing", &["component", "asset", "playback", "render", "picking", "stereo"]),
+    ("picking_backend", &["component", "asset", "playback", "render", "picker"]),
+    ("inspector", &["component", "asset", "playback", "render", "pbr", "picker", "stereo"]),
+    ("testing", &["component", "asset", "playback", "render", "picker", "stereo"]),
 ];
 
 /// Folders whose files must not use each other in a circle. A `mod.rs` is ignored: it re-exports what the others

@@ -52,7 +52,7 @@ impl GpuSettings {
             if drawn.count() > MOST_SHADINGS {
                 warn_once!(
                     "a camera sees more than {MOST_SHADINGS} captures, of which some receive shadows or light: of the others, some \
-                     are shaded as their neighbours are"
+                     are shaded as their neighbors are"
                 );
             }
         }

@@ -98,7 +98,7 @@ mod tests {
         Affine3A::from_rotation_translation(Quat::from_euler(EulerRot::YXZ, 0.4, -0.9, 0.2), eye)
     }
 
-    /// Returns normalised device coordinates with y down, and the value that is written to the map.
+    /// Returns normalized device coordinates with y down, and the value that is written to the map.
     fn drawn(lens: &LightLens, view: &View, point: Vec3) -> (Vec2, f32) {
         let depth = view.world_to_camera.transform_point3(point).z;
         let [x, y] = view.clip_rows();

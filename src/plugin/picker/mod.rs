@@ -1,4 +1,4 @@
-//! Picking: which capture a ray hits, which of its Gaussians, and where.
+//! Picker: finds the capture, the Gaussian and the point that a ray hits.
 //!
 //! In: a ray in the world, and all visible captures, at their current times, with their temporal filter, opacity, fade and crop. Out: a
 //! [`CaptureHit`], found by [`RuntimeScene::pick`](crate::scene::RuntimeScene::pick): the Gaussian at which half of the light along the
@@ -6,7 +6,7 @@
 //!
 //! ```no_run
 //! # use bevy::prelude::*;
-//! use bevy_gs4d::picking::CapturePicker;
+//! use bevy_gs4d::picker::CapturePicker;
 //!
 //! #[derive(Component)]
 //! struct Marker;
@@ -24,9 +24,9 @@
 //! }
 //! ```
 //!
-//! `Camera::viewport_to_world` returns the ray under the cursor. A ray costs a few arithmetic operations for each Gaussian of every
-//! capture whose box it meets, on all cores: cast a few each frame, not one for each pixel.
+//! `Camera::viewport_to_world` returns the ray under the cursor. A ray costs a few arithmetic operations per Gaussian of every capture
+//! whose box it meets, on all cores: cast a few rays per frame, not one per pixel.
 
-mod picker;
+mod capture_picker;
 
-pub use picker::{CaptureHit, CapturePicker};
+pub use capture_picker::{CaptureHit, CapturePicker};

@@ -7,7 +7,7 @@ use bevy::ecs::system::RunSystemOnce;
 use bevy::prelude::*;
 use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
-use bevy_gs4d::picking::{CaptureHit, CapturePicker};
+use bevy_gs4d::picker::{CaptureHit, CapturePicker};
 use bevy_gs4d::playback::{ClipFade, Playback};
 use bevy_gs4d::render::{CaptureSettings, CropBox};
 use bevy_gs4d::scene::{FilterKind, RuntimeScene, TemporalFilter};

@@ -1,6 +1,6 @@
-//! Which cameras and captures take part in pointer events.
+//! Settings of the picking backend: which cameras and captures take part in pointer events.
 //!
-//! In: a game's choice. Out: [`CapturePickingSettings`] and [`CapturePickingCamera`].
+//! In: fields and markers that a game sets. Out: [`CapturePickingSettings`] and [`CapturePickingCamera`].
 
 use bevy::ecs::component::Component;
 use bevy::ecs::reflect::{ReflectComponent, ReflectResource};
@@ -19,7 +19,7 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
 ///     commands.spawn((Camera3d::default(), CapturePickingCamera));
 ///     commands.spawn((GaussianCapture3d(assets.load("button.gs4d")), Pickable::default()));
-///     // No ray is cast at this one.
+///     // No ray is cast at this capture.
 ///     commands.spawn(GaussianCapture3d(assets.load("stage.gs4d")));
 /// }
 ///
@@ -28,7 +28,7 @@ use bevy::reflect::std_traits::ReflectDefault;
 #[derive(Resource, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[reflect(Resource, Default, Debug, Clone, PartialEq)]
 pub struct CapturePickingSettings {
-    /// Whether rays are cast only through cameras with a [`CapturePickingCamera`], and only at captures with Bevy's `Pickable`. Default:
+    /// Whether rays are cast only through cameras with a [`CapturePickingCamera`] and only at captures with Bevy's `Pickable`. Default:
     /// false.
     pub require_markers: bool,
 }

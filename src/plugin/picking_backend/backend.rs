@@ -1,11 +1,11 @@
-//! The backend: from rays of pointers to hits.
+//! The backend: turns the rays of pointers into hits.
 //!
-//! In: Bevy's map of rays, cameras and captures with their layers and `Pickable`. Out: one `PointerHits` for each ray that hits a capture.
+//! In: Bevy's map of rays; cameras and captures with their layers and `Pickable`. Out: one `PointerHits` for each ray that hits a capture.
 
 use super::settings::{CapturePickingCamera, CapturePickingSettings};
 use crate::plugin::asset::CaptureState;
 use crate::plugin::component::GaussianCapture3d;
-use crate::plugin::picking::CapturePicker;
+use crate::plugin::picker::CapturePicker;
 use bevy::camera::visibility::{RenderLayers, ViewVisibility};
 use bevy::camera::{Camera, Camera3d};
 use bevy::ecs::entity::Entity;
@@ -22,7 +22,7 @@ pub(super) fn any_ray(rays: Option<Res<RayMap>>) -> bool {
     rays.is_some_and(|rays| rays.iter().next().is_some())
 }
 
-/// Casts the rays of this frame.
+/// Casts the rays of this frame and writes their hits.
 pub(super) fn update_hits(
     picking: Res<PickingSettings>,
     settings: Res<CapturePickingSettings>,
@@ -47,9 +47,9 @@ pub(super) fn update_hits(
         let layers = layers.cloned().unwrap_or_default();
         let takes_part = |capture: Entity| {
             let Ok((visibility, state, pickable, its_layers)) = captures.get(capture) else { return false };
-            // One that is not hoverable may still hide what is behind it.
+            // A capture that is not hoverable may still block the captures behind it.
             let matters = pickable.is_none_or(|pickable| pickable.is_hoverable || pickable.should_block_lower);
-            // One that is still uploaded, or that the GPU refuses, would be an invisible obstacle.
+            // A capture that is still being uploaded, or that the GPU rejected, would be an invisible obstacle.
             let is_drawn = visibility.get() && *state == CaptureState::Ready;
             let is_seen = is_drawn && layers.intersects(&its_layers.cloned().unwrap_or_default());
             is_seen && matters && (pickable.is_some() || !settings.require_markers)

@@ -1,6 +1,6 @@
-//! The picker: rays of the world against placed captures.
+//! The picker: intersects rays in world space with placed captures.
 //!
-//! In: the components of captures, their assets. Out: [`CapturePicker`], a system parameter.
+//! In: the components and assets of captures. Out: [`CapturePicker`], a system parameter.
 
 use crate::gaussian::alpha::reach_squared;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
@@ -24,7 +24,7 @@ use glam::Vec3;
 /// use bevy::prelude::*;
 /// use bevy_gs4d::prelude::*;
 ///
-/// /// The means of Gaussians are in capture space, hits in the world.
+/// /// Describes a hit. Means of Gaussians are in capture space, hit points in world space.
 /// fn describe(hit: &CaptureHit, captures: &Assets<GaussianCapture>, placed: &Query<&GaussianCapture3d>) -> Option<String> {
 ///     let capture = captures.get(&placed.get(hit.entity).ok()?.0)?;
 ///     let gaussian = capture.scene().iter().nth(hit.gaussian)?;
@@ -45,8 +45,8 @@ pub struct CaptureHit {
 
 /// Casts rays at captures: a system parameter.
 ///
-/// Captures are where their [`GlobalTransform`] places them, which Bevy updates in `PostUpdate`. The parameter reads [`Playback`],
-/// [`CaptureSettings`] and [`GlobalTransform`] of captures: to change them in the same system, use a `ParamSet`.
+/// [`GlobalTransform`] places the captures; Bevy updates it in `PostUpdate`. The parameter reads [`Playback`], [`CaptureSettings`] and
+/// [`GlobalTransform`] of captures: to change these components in the same system, use a `ParamSet`.
 ///
 /// # Examples
 ///
@@ -54,7 +54,7 @@ pub struct CaptureHit {
 /// use bevy::prelude::*;
 /// use bevy_gs4d::prelude::*;
 ///
-/// /// Logs what is in front of the camera.
+/// /// Logs the Gaussian in front of the camera.
 /// fn aim(picker: CapturePicker, camera: Single<&GlobalTransform, With<Camera3d>>) {
 ///     let ray = Ray3d::new(camera.translation(), camera.forward());
 ///     if let Some(hit) = picker.cast(ray) {
@@ -80,14 +80,14 @@ type Placed = (
 );
 
 impl CapturePicker<'_, '_> {
-    /// Returns the nearest hit of all captures that are loaded and not hidden, whether a camera sees them or not; `None` if the ray hits
-    /// none. Captures are tested one by one: the ray passes through two that absorb half of the light only together.
+    /// Returns the nearest hit among all captures that are loaded and not hidden, whether a camera sees them or not; `None` if the ray hits
+    /// none. Each capture is tested alone: the ray passes through two captures that absorb half of the light only together.
     pub fn cast(&self, ray: Ray3d) -> Option<CaptureHit> {
         self.cast_through(ray, |_, visibility| visibility.get(), |_| true).first().copied()
     }
 
-    /// Returns the hits of all captures that `takes_part` lets take part, nearest first, down to the nearest of those that hide what is
-    /// behind them, which `blocks` says.
+    /// Returns the hits of all captures for which `takes_part` is true, nearest first, up to and including the nearest capture for which
+    /// `blocks` is true.
     pub(crate) fn cast_through(
         &self,
         ray: Ray3d,
@@ -124,7 +124,7 @@ impl CapturePicker<'_, '_> {
         if affine.matrix3.determinant() == 0.0 {
             return None;
         }
-        // Distances in the world equal distances in the capture measured in lengths of the transformed direction.
+        // A world distance equals the distance in capture space divided by the length of the transformed direction.
         let from_world = affine.inverse();
         let origin = from_world.transform_point3(ray.origin);
         let direction = from_world.transform_vector3(*ray.direction);
@@ -144,9 +144,8 @@ impl CapturePicker<'_, '_> {
     }
 }
 
-/// Returns how much farther than three standard deviations, which bounds enclose, an alpha can reach 1/255: to `sqrt(2
-/// ln(255 opacity))`, 3.33 for a peak of 1. A box that encloses three of every Gaussian, scaled by this, encloses that
-/// many of each.
+/// Returns the factor on a box of three standard deviations (as bounds are) beyond which no alpha reaches 1/255:
+/// `sqrt(2 ln(255 opacity)) / 3`. The radius is 3.33 standard deviations for a peak of 1.
 fn reach(opacity: f32) -> f32 {
     reach_squared(opacity.max(1.0)).sqrt() / 3.0
 }
