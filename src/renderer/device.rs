@@ -2,7 +2,7 @@
 //!
 //! In: the adapter wanted, if any. Out: a [`GpuContext`]. Inside Bevy the renderer uses Bevy's device instead.
 
-use super::GpuError;
+use super::error::GpuError;
 use pollster::block_on;
 
 /// A device, its queue and its adapter.

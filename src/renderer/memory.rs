@@ -3,7 +3,7 @@
 //! In: a device, sizes and usages. Out: buffers, textures and bind groups, each counted; the limits that sizes are
 //! checked against; an error where memory runs out.
 
-use super::GpuError;
+use super::error::GpuError;
 use super::work::WorkCounters;
 use glam::UVec2;
 use pollster::block_on;

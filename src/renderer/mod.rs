@@ -45,6 +45,7 @@
 mod active;
 pub mod bind;
 mod capture;
+mod design;
 mod device;
 mod error;
 mod headless;
@@ -59,6 +60,7 @@ mod work;
 
 pub use active::ActiveList;
 pub use capture::{CaptureUpload, GpuCapture};
+pub use design::Design;
 pub use device::GpuContext;
 pub use error::GpuError;
 pub use headless::Headless;
@@ -66,5 +68,5 @@ pub use pipelines::Renderer;
 pub use shaders::{ColorPrecision, ShaderChecks, Storage};
 pub use statistics::ViewStatistics;
 pub use timing::{PassTime, Timings};
-pub use view::{Design, FinishedFrame, Instance, OpaqueDepth, PassBuffers, ViewParameters, ViewRenderer};
+pub use view::{FinishedFrame, Instance, OpaqueDepth, PassBuffers, ViewParameters, ViewRenderer};
 pub use work::WorkCounters;

@@ -4,14 +4,14 @@
 //! captures.
 
 use super::bind::{Bind, group_layout, pipeline};
-use super::layout::INSTANCES_BOUND;
+use super::design::Design;
+use super::error::GpuError;
+use super::layout::{self, INSTANCES_BOUND};
 use super::memory::Allocator;
 use super::shaders::{
     BINNED, COPIED_INSTANCE, FEW_BINS, FastVariant, Lists, Pixels, SUBGROUPS_OF_32, ShaderChecks, Storage, module,
 };
-use super::view::Design;
 use super::work::WorkCounters;
-use super::{GpuError, layout};
 use std::sync::OnceLock;
 
 /// All pipelines and bind group layouts of a device.

@@ -2,7 +2,7 @@
 //!
 //! In: the name of a pass. Out: a naga module, or a wgpu shader module. The files are compiled into the binary.
 
-use super::GpuError;
+use super::error::GpuError;
 use crate::scene::{Form, PackedColors, PackedScene};
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::borrow::Cow;

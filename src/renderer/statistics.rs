@@ -2,7 +2,7 @@
 //!
 //! In: counters and timestamps read back from the GPU. Out: [`ViewStatistics`].
 
-use super::PassTime;
+use super::timing::PassTime;
 
 /// Work of a view in a frame. What the GPU counts belongs to the newest frame whose counters have arrived, some frames
 /// ago.

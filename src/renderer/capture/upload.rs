@@ -3,9 +3,10 @@
 //! In: a [`RuntimeScene`], and how many bytes at a time. Out: a [`GpuCapture`], once it is whole. Its buffers are created at first; what
 //! takes time with a large capture, converting and copying, is done in pieces.
 
-use super::GpuCapture;
 use super::buffers::Filling;
-use crate::renderer::{GpuError, Renderer};
+use super::gpu_capture::GpuCapture;
+use crate::renderer::error::GpuError;
+use crate::renderer::pipelines::Renderer;
 use crate::scene::RuntimeScene;
 use std::borrow::Borrow;
 
@@ -59,5 +60,21 @@ impl<S: Borrow<RuntimeScene>> CaptureUpload<S> {
     pub fn finish(mut self, queue: &wgpu::Queue, renderer: &Renderer) -> GpuCapture {
         self.advance(queue, renderer, u64::MAX);
         self.capture
+    }
+}
+
+impl GpuCapture {
+    /// Uploads a scene, all of it at once; a [`CaptureUpload`] does it piece by piece.
+    ///
+    /// # Errors
+    /// When the environment map, or the smallest part of the Gaussians, is larger than the device can bind, or the
+    /// parts of the scene do not fit together.
+    pub fn upload(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        renderer: &Renderer,
+        scene: &RuntimeScene,
+    ) -> Result<Self, GpuError> {
+        Ok(CaptureUpload::new(device, renderer, scene)?.finish(queue, renderer))
     }
 }

@@ -3,11 +3,14 @@
 //! In: a capture and views of it. Out: [`Timings`]. GPU times are measured while several frames are recorded for each submit and the host
 //! does not wait, as a GPU that is idle between frames lowers its clock.
 
-use super::{Headless, instance, texel_bytes};
+use super::render::{Headless, instance, texel_bytes};
 use crate::renderer::active::ActiveList;
+use crate::renderer::capture::GpuCapture;
+use crate::renderer::device::GpuContext;
+use crate::renderer::error::GpuError;
 use crate::renderer::memory::with_room;
 use crate::renderer::timing::{PassTime, PassTimer, Timings, median};
-use crate::renderer::{GpuCapture, GpuContext, GpuError, ViewParameters, ViewRenderer};
+use crate::renderer::view::{ViewParameters, ViewRenderer};
 use crate::view::{Background, Counts, View};
 use std::time::{Duration, Instant};
 

@@ -3,22 +3,17 @@
 //! In: the size of a picture and the number of splats in all bins to have room for. Out: [`FastResources`], the
 //! counters and entries of bins of a few tiles, and the bind groups of the passes over them. Pictures of any size up to that share them.
 
-use super::sizes::Sizes;
-use super::{Instance, ViewRenderer};
-use crate::renderer::layout::{BIN_COUNTERS, VisibleSplat};
-use crate::renderer::memory::Allocator;
-use crate::renderer::pipelines::Renderer;
+use super::parameters::Instance;
 use crate::renderer::shaders::FEW_BINS_LIMIT;
 use crate::view::tiles;
 use glam::UVec2;
-use wgpu::BufferUsages;
 
 /// Buffers and bind groups of the fast renderer.
 #[derive(Debug)]
 pub(super) struct FastResources {
     /// Counters of even and of odd frames.
     pub bins: [wgpu::Buffer; 2],
-    /// One [`VisibleSplat`] for each slot.
+    /// One [`VisibleSplat`](crate::renderer::layout::VisibleSplat) for each slot.
     pub visible: wgpu::Buffer,
     /// Color of each slot.
     pub splat_colors: wgpu::Buffer,
@@ -32,7 +27,7 @@ pub(super) struct FastResources {
 }
 
 /// Bytes of the color of a splat.
-const COLOR_BYTES: u64 = 16;
+pub(super) const COLOR_BYTES: u64 = 16;
 
 /// Bins of 2 x 2 tiles up to which they are better: a GPU is idle with fewer of 4 x 4. Those of so many Gaussians are too long to be sorted at
 /// once, and are small up to as many as a workgroup of `project_bin` counts by itself.
@@ -44,7 +39,7 @@ const FEW_LARGE_BINS: u32 = 128;
 const FEW_GAUSSIANS: u32 = 300;
 
 /// Tiles along each side of small and of large bins.
-const SIDES: [u32; 2] = [2, 4];
+pub(super) const SIDES: [u32; 2] = [2, 4];
 
 /// Returns the number of tiles along each side of a bin, 2 or 4, by the size of the picture and the number of all Gaussians.
 pub(super) fn bin_side(picture: UVec2, gaussians: u32) -> u32 {
@@ -93,65 +88,6 @@ pub(super) fn first_guess(picture: UVec2, side: u32, slots: u32) -> u32 {
     let bins = bin_grid(picture, side).element_product();
     let share = (slots / FIRST_SHARE).clamp(FIRST_CAPACITY, FIRST_OF_TILE * side * side);
     bins.saturating_mul(slots.min(share).max(256))
-}
-
-impl ViewRenderer {
-    /// Returns the number of bins across and down the picture that is prepared.
-    pub(super) fn bin_grid(&self) -> UVec2 {
-        bin_grid(self.picture, self.bin_side)
-    }
-
-    /// Returns the number of bins of the picture that is prepared.
-    pub(super) fn bin_count(&self) -> u32 {
-        self.bin_grid().element_product()
-    }
-
-    /// Creates bins, with room for that many splats in all of them together.
-    pub(super) fn make_fast(
-        &self,
-        renderer: &Renderer,
-        allocator: &Allocator<'_>,
-        sizes: Sizes,
-        instance: wgpu::BindingResource<'_>,
-        [splats, tile_ranges, pair_splats]: [&wgpu::Buffer; 3],
-    ) -> FastResources {
-        // As many as there can be.
-        let count = u64::from(bin_grid(sizes.picture, SIDES[0]).element_product());
-        let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
-        let counters = count + u64::from(BIN_COUNTERS + sizes.parts);
-        let bins = [(); 2].map(|()| allocator.buffer("gs4d bins", 4 * counters, usage));
-        let entries_size = 8 * u64::from(sizes.entries.max(1));
-        let entries = allocator.buffer("gs4d bin entries", entries_size, BufferUsages::STORAGE);
-        let slots = u64::from(sizes.slots);
-        let visible = allocator.buffer("gs4d visible", size_of::<VisibleSplat>() as u64 * slots, BufferUsages::STORAGE);
-        let splat_colors = allocator.buffer("gs4d splat colors", COLOR_BYTES * slots, BufferUsages::STORAGE);
-        let bytes = 2 * bins[0].size() + entries_size + visible.size() + splat_colors.size();
-        let layouts = &renderer.layouts;
-        let buffers = [visible.clone(), splat_colors.clone()];
-        let [splats, entries, visible] = [splats, &entries, &visible].map(wgpu::Buffer::as_entire_binding);
-        let splat_colors = splat_colors.as_entire_binding();
-        let [even, odd] = bins.each_ref().map(wgpu::Buffer::as_entire_binding);
-        let (ranges, pairs) = (tile_ranges.as_entire_binding(), pair_splats.as_entire_binding());
-        let both = [[&even, &odd], [&odd, &even]];
-        let project_bin = both.map(|[now, _]| {
-            let resources = [instance.clone(), splats.clone(), now.clone(), entries.clone(), visible.clone()];
-            allocator.bind_group("gs4d project_bin", &layouts.project_bin, &resources)
-        });
-        let sort_bins = both.map(|[now, next]| {
-            let frame = self.frame.as_entire_binding();
-            let lists = [entries.clone(), ranges.clone(), pairs.clone()];
-            let resources = [frame, now.clone(), next.clone()].into_iter().chain(lists).chain([visible.clone()]);
-            allocator.bind_group("gs4d sort_bins", &layouts.sort_bins, &resources.collect::<Vec<_>>())
-        });
-        let colors = both.map(|[now, _]| {
-            let resources = [instance.clone(), now.clone(), visible.clone(), splat_colors.clone()];
-            allocator.bind_group("gs4d colors", &layouts.colors, &resources)
-        });
-        let blend_blocks = [ranges, pairs, splats, splat_colors, visible];
-        let blend_blocks = allocator.bind_group("gs4d blend_blocks", &layouts.blend_blocks, &blend_blocks);
-        let [visible, splat_colors] = buffers;
-        FastResources { bytes, bins, visible, splat_colors, project_bin, sort_bins, colors, blend_blocks }
-    }
 }
 
 /// The room that bins should have: how many splats all of them together must hold if each holds as many as the fullest.

@@ -15,11 +15,10 @@
 //! colors have the others.
 
 use super::bins::FastResources;
-use super::record::mark;
+use super::dispatch::mark;
+use super::parameters::Instance;
 use super::resources::Resources;
-use super::sizes::Sizes;
-use super::{Instance, ViewRenderer};
-use crate::renderer::layout::{BIN_COUNTERS, Counters};
+use super::view_renderer::ViewRenderer;
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::Storage;
 use crate::renderer::timing::PassTimer;
@@ -51,21 +50,6 @@ fn colors_of_group(storage: Storage) -> u32 {
 const COLOR_GROUPS: u32 = 8192;
 
 impl ViewRenderer {
-    /// Returns the counters of the frame prepared last, on the GPU, and where they are, in bytes.
-    pub(in crate::renderer) fn counters(&self) -> (&wgpu::Buffer, u64) {
-        let first = u64::from(BIN_COUNTERS) * 4 - size_of::<Counters>() as u64;
-        let fast = self.resources.as_ref().and_then(|made| made.fast.as_ref());
-        // `sort_bins` writes them beside those of the next frame.
-        fast.map_or((&self.counters, 0), |fast| (&fast.bins[usize::from(!self.odd)], first))
-    }
-
-    /// Returns the uniform `binning` of a part in the frame that is prepared.
-    pub(super) fn binning(&self, sizes: &Sizes, part: u32) -> [u32; 4] {
-        // Never 0, which is the stamp of a new buffer.
-        let frame = self.frames % 0xffff + 1;
-        [self.bin_side | (frame << 8), sizes.entries / self.bin_count(), part, sizes.parts]
-    }
-
     /// Records the passes of the fast design.
     pub(super) fn record_fast(
         &self,

@@ -3,8 +3,9 @@
 //! In: what the host knows of captures, cameras and surfaces. Out: [`Instance`]s and [`ViewParameters`] for
 //! [`ViewRenderer::prepare`](super::ViewRenderer::prepare).
 
+use crate::renderer::active::ActiveList;
+use crate::renderer::capture::GpuCapture;
 use crate::renderer::shaders::{Blending, ColorPrecision};
-use crate::renderer::{ActiveList, GpuCapture};
 use crate::view::{Appearance, Background, BlendSpace, DebugView, View};
 use glam::UVec2;
 

@@ -2,6 +2,8 @@
 //!
 //! In: what a frame needs. Out: [`Sizes`], by which buffers and targets are created.
 
+use crate::renderer::layout::BLOCK;
+use crate::renderer::memory::binding_limit;
 use glam::UVec2;
 
 /// What the resources of a view have room for.
@@ -31,6 +33,14 @@ pub(super) fn grown(made: UVec2, needed: UVec2, limit: u32) -> UVec2 {
     }
     let steps = needed.map(|side| side.next_multiple_of(PICTURE_STEP).min(limit));
     UVec2::select(needed.cmple(made), made, steps)
+}
+
+/// Returns the number of pairs that fit one binding and one dispatch.
+pub(crate) fn max_pairs(device: &wgpu::Device) -> u32 {
+    let limits = device.limits();
+    let bound = u32::try_from(binding_limit(&limits) / 4).unwrap_or(u32::MAX);
+    // One workgroup processes a block of them.
+    bound.min(limits.max_compute_workgroups_per_dimension.saturating_mul(BLOCK))
 }
 
 #[cfg(test)]

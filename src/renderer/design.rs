@@ -2,7 +2,7 @@
 //!
 //! In: nothing. Out: [`Design`], its names, and the passes of each that are timed.
 
-use crate::renderer::timing::{MOTION_PASSES, TIMED_FAST_PASSES, TIMED_PASSES};
+use super::timing::{MOTION_PASSES, TIMED_FAST_PASSES, TIMED_PASSES};
 
 /// How a view is drawn. All draw the same picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -23,7 +23,7 @@ impl Design {
         [("auto", Self::Auto), ("fast", Self::Fast), ("reference", Self::Reference)];
 
     /// Returns the names of the passes that are timed, in frames with motions or without.
-    pub(in crate::renderer) fn timed_passes(self, motions: bool) -> &'static [&'static str] {
+    pub(super) fn timed_passes(self, motions: bool) -> &'static [&'static str] {
         let all = match self {
             Self::Auto | Self::Fast => TIMED_FAST_PASSES,
             Self::Reference => TIMED_PASSES,
