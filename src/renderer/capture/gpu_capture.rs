@@ -1,7 +1,8 @@
 //! A capture on the GPU.
 //!
-//! In: a [`RuntimeScene`]. Out: buffers that live as long as the capture. Large captures are split into parts, so that
-//! no binding exceeds the limit of the device; a part is drawn by one dispatch of `project`, copies of a capture of one part together.
+//! In: a [`RuntimeScene`]. Out: [`GpuCapture`], whose buffers live as long as the capture. Large captures are split into parts, so that
+//! no binding exceeds the limit of the device. One dispatch of `project` draws a part; instances of a capture of a single part are drawn
+//! by one dispatch.
 
 use super::buffers::{self, Filling};
 use crate::gaussian::ShDirection;
@@ -21,7 +22,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub struct GpuCapture {
     pub(in crate::renderer) parts: Vec<Part>,
     pub(in crate::renderer) environment: Option<EnvironmentBuffer>,
-    /// How its Gaussians and colors are stored.
+    /// Storage of its Gaussians and colors.
     pub(in crate::renderer) storage: Storage,
     /// Identifies this upload within the process.
     pub(in crate::renderer) id: u64,
@@ -33,30 +34,30 @@ pub struct GpuCapture {
     len: usize,
 }
 
-/// A range of Gaussians that fits one binding.
+/// A range of Gaussians that fits into one binding.
 #[derive(Debug)]
 pub(in crate::renderer) struct Part {
     pub count: u32,
     pub geometry: wgpu::BindGroup,
     pub color: wgpu::BindGroup,
-    /// The buffers of both.
+    /// The buffers of geometry and color.
     buffers: Vec<wgpu::Buffer>,
-    /// Its share of the filter, if there is one.
+    /// The active sets of the Gaussians of this part, if there is a filter.
     pub filter: Option<wgpu::BindGroup>,
 }
 
-/// The filter, as the host needs it.
+/// The data of a temporal filter that the host needs.
 #[derive(Debug)]
 pub(in crate::renderer) struct Filter {
     /// `FILTER_*`.
     pub mode: u32,
     segments: u32,
     interval: [f32; 2],
-    /// Active Gaussians, part by part and segment by segment.
+    /// Number of active Gaussians, part by part and segment by segment.
     counts: Vec<u32>,
     /// Bytes of its buffers.
     bytes: u64,
-    /// Active Gaussians of all parts in the segment with most of them.
+    /// Largest number of active Gaussians of all parts in any segment.
     pub most: u32,
 }
 
@@ -97,7 +98,7 @@ pub(in crate::renderer) struct EnvironmentBuffer {
 }
 
 impl GpuCapture {
-    /// Creates the buffers of a scene. They are still to be filled.
+    /// Creates the buffers of a scene, which are filled later.
     pub(super) fn allocate(
         device: &wgpu::Device,
         renderer: &Renderer,
@@ -168,7 +169,7 @@ impl GpuCapture {
         Ok((capture, fillings))
     }
 
-    /// Creates the buffers of a temporal filter of as many Gaussians, in place of those of another. They are still to be filled.
+    /// Replaces the buffers of the temporal filter by buffers of another filter of the same number of Gaussians, which are filled later.
     fn allocate_filter(
         &mut self,
         allocator: Allocator<'_>,
@@ -187,7 +188,7 @@ impl GpuCapture {
         }
         let bytes = fillings.iter().map(|filling| filling.buffer.size()).sum();
         self.filter = Some(Filter::new(filter, interval, &self.parts, bytes));
-        // Lists of another filter are not those of this one.
+        // Active lists of the previous filter become invalid.
         self.id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
         fillings
     }
@@ -195,7 +196,7 @@ impl GpuCapture {
     /// Replaces the temporal filter, for clients that change the Gaussians. `interval` is the time interval of the capture.
     ///
     /// # Errors
-    /// A filter of another number of Gaussians.
+    /// When the filter has another number of Gaussians.
     pub fn replace_filter(
         &mut self,
         device: &wgpu::Device,
@@ -205,7 +206,7 @@ impl GpuCapture {
         interval: [f32; 2],
     ) -> Result<(), GpuError> {
         if filter.count != self.len {
-            return Err(GpuError::Scene("the temporal filter is of another number of Gaussians"));
+            return Err(GpuError::Scene("the temporal filter has another number of Gaussians"));
         }
         for sets in self.allocate_filter(renderer.allocator(device), renderer, filter, interval) {
             sets.fill_filter(queue, filter);
@@ -218,28 +219,28 @@ impl GpuCapture {
         self.len
     }
 
-    /// Returns whether there is no Gaussian.
+    /// Returns whether the capture has no Gaussians.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Returns whether it has an environment map.
+    /// Returns whether the capture has an environment map.
     pub fn has_environment(&self) -> bool {
         self.environment.is_some()
     }
 
-    /// Returns whether it has a temporal filter.
+    /// Returns whether the capture has a temporal filter.
     pub fn has_filter(&self) -> bool {
         self.filter.is_some()
     }
 
-    /// Returns the bytes of its buffers on the GPU.
+    /// Returns the bytes of the capture's buffers on the GPU.
     pub fn bytes(&self) -> u64 {
         self.bytes + self.filter.as_ref().map_or(0, |filter| filter.bytes)
     }
 
-    /// Returns the buffers of records, lifespans and color coefficients, for passes of clients that write them; `None` if the capture is not
-    /// in single precision or has several parts.
+    /// Returns the buffers of records, lifespans and color coefficients, for passes of clients that write them. Returns `None` if the capture
+    /// is packed or has several parts.
     pub fn writable(&self) -> Option<[&wgpu::Buffer; 3]> {
         match (&self.parts[..], self.storage) {
             ([Part { buffers, .. }], Storage::Sliced) => buffers.iter().collect::<Vec<_>>().try_into().ok(),
@@ -247,12 +248,12 @@ impl GpuCapture {
         }
     }
 
-    /// Returns the bind group of its geometry, if it has one part, for passes of clients.
+    /// Returns the bind group of the geometry, for passes of clients. Returns `None` if the capture has several parts.
     pub fn geometry(&self) -> Option<&wgpu::BindGroup> {
         if let [part] = &self.parts[..] { Some(&part.geometry) } else { None }
     }
 
-    /// Returns `view` with the values that are the same for all parts of a capture and in all views.
+    /// Returns `view` with the color and time settings of the capture.
     pub(in crate::renderer) fn instance(&self, view: &layout::InstanceUniforms) -> layout::InstanceUniforms {
         layout::InstanceUniforms {
             degree: self.settings.degree,

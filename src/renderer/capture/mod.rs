@@ -1,6 +1,6 @@
 //! Captures on the GPU.
 //!
-//! In: a [`RuntimeScene`](crate::scene::RuntimeScene). Out: [`GpuCapture`], uploaded at once or piece by piece ([`CaptureUpload`]).
+//! In: a [`RuntimeScene`](crate::scene::RuntimeScene). Out: [`GpuCapture`], uploaded at once or in chunks ([`CaptureUpload`]).
 
 mod buffers;
 mod gpu_capture;

@@ -18,14 +18,14 @@ use crate::scene::{RuntimeScene, TemporalFilter};
 use crate::view::{Appearance, Background, Counts, Frame, Picture, View};
 use glam::{UVec2, Vec3};
 
-/// A renderer with a device of its own and one view.
+/// A renderer with its own device and one view.
 #[derive(Debug)]
 pub struct Headless {
     pub(super) context: GpuContext,
     pub(super) renderer: Renderer,
     pub(super) view: ViewRenderer,
     pub(super) filtered: bool,
-    /// Whether frames that are measured have depths.
+    /// Whether measured frames have depths.
     pub(super) depths: bool,
     pub(super) precision: ColorPrecision,
     /// The list of the capture drawn last.
@@ -33,10 +33,10 @@ pub struct Headless {
 }
 
 impl Headless {
-    /// Creates a renderer on that device and compiles its passes.
+    /// Creates a renderer on the device and compiles its passes.
     ///
     /// # Errors
-    /// When the device cannot run them.
+    /// When the device cannot run the passes.
     pub fn new(context: GpuContext, checks: ShaderChecks) -> Result<Self, GpuError> {
         let renderer = Renderer::new(&context.device, checks)?;
         let view = ViewRenderer::new(&context.device, &renderer);
@@ -56,7 +56,7 @@ impl Headless {
         &self.context
     }
 
-    /// Returns the counters of what has been created, uploaded and recorded so far.
+    /// Returns the counters of resources created, bytes uploaded and lists recorded so far.
     pub fn work(&self) -> &WorkCounters {
         self.renderer.work()
     }
@@ -66,12 +66,12 @@ impl Headless {
         self.renderer.allocator(&self.context.device)
     }
 
-    /// Chooses how views are drawn. Default: [`Design::Auto`].
+    /// Sets the design with which views are drawn. Default: [`Design::Auto`].
     pub fn set_design(&mut self, design: Design) {
         self.view.set_design(&self.renderer, design);
     }
 
-    /// Compiles what the first frame of a capture stored in this way would compile: for clients that load it at the same time.
+    /// Compiles the passes that the first frame of a capture with this storage needs, for clients that load the capture at the same time.
     ///
     /// # Errors
     /// When a shader does not compile.
@@ -79,7 +79,7 @@ impl Headless {
         self.renderer.compile_ahead(&self.context.device, self.design(), storage)
     }
 
-    /// Returns how views are drawn: never [`Design::Auto`].
+    /// Returns the design with which views are drawn: never [`Design::Auto`].
     pub fn design(&self) -> Design {
         self.view.design()
     }
@@ -103,13 +103,13 @@ impl Headless {
     /// Uploads a scene.
     ///
     /// # Errors
-    /// As [`GpuCapture::upload`], and too little memory.
+    /// As [`GpuCapture::upload`], and when the device has too little memory.
     pub fn upload(&self, scene: &RuntimeScene) -> Result<GpuCapture, GpuError> {
         let GpuContext { device, queue, .. } = &self.context;
         with_room(device, scene.size() as u64, || GpuCapture::upload(device, queue, &self.renderer, scene))?
     }
 
-    /// Returns the list of the Gaussians that the filter of a capture leaves active at a time, for
+    /// Returns the list of the Gaussians that are active at a time according to the filter of a capture, for
     /// [`render_all`](Self::render_all); `None` if the capture has no filter.
     pub fn active(&self, capture: &GpuCapture, time: f32) -> Option<ActiveList> {
         let GpuContext { device, queue, .. } = &self.context;
@@ -121,7 +121,7 @@ impl Headless {
     /// Draws one capture as trained.
     ///
     /// # Errors
-    /// When the picture does not fit the device or the device is lost.
+    /// When the picture exceeds a limit of the device or the device is lost.
     pub fn render(&mut self, capture: &GpuCapture, view: &View, background: Background) -> Result<Frame, GpuError> {
         let parameters = ViewParameters { background, ..ViewParameters::default() };
         let active = self.take_active(capture, view.time);
@@ -130,8 +130,8 @@ impl Headless {
         frame
     }
 
-    /// Draws several captures into one picture, in order of depth, cut by opaque surfaces if given. Depths are empty if the parameters
-    /// ask for none.
+    /// Draws several captures into one picture, in order of depth and behind opaque surfaces if given. Depths are empty if the parameters
+    /// disable them.
     ///
     /// # Errors
     /// As [`render`](Self::render).
@@ -143,7 +143,7 @@ impl Headless {
         let size = instances.first().map_or(UVec2::ONE, |instance| instance.view.size);
         self.require_readable(size, parameters.precision)?;
         let counters = self.submit(instances, parameters)?;
-        // This frame lacks nothing without, but later ones are faster with it.
+        // This frame is complete, but later frames are faster with a larger capacity.
         self.view.make_room(&counters);
         let (color, depth) = self.read_targets(size)?;
         Ok(Frame {
@@ -155,8 +155,8 @@ impl Headless {
         })
     }
 
-    /// Returns the list for this capture at that time, that of the last call if it belongs to the capture; `None`
-    /// without a filter. The caller stores it in `active` again after use.
+    /// Takes the list in `active` if it belongs to this capture, or creates a new one, and activates it for a time. Returns `None` without a
+    /// filter. The caller stores the list in `active` after use.
     pub(super) fn take_active(&mut self, capture: &GpuCapture, time: f32) -> Option<ActiveList> {
         if !self.filtered {
             return None;
@@ -176,12 +176,12 @@ impl Headless {
         }
     }
 
-    /// Draws all Gaussians of one capture, without its filter, and leaves the results on the GPU: all pairs are in the lists.
+    /// Draws all Gaussians of one capture, without its filter. The results stay on the GPU; the lists contain all pairs.
     ///
     /// # Errors
-    /// As [`render`](Self::render), and if the device has no room for the pairs.
+    /// As [`render`](Self::render), and if the pairs exceed the limits of the device.
     pub fn draw(&mut self, capture: &GpuCapture, view: &View, background: Background) -> Result<(), GpuError> {
-        // Its buffers are what clients read.
+        // Clients read the buffers of this design.
         self.set_design(Design::Reference);
         let parameters = ViewParameters { background, ..ViewParameters::default() };
         let instances = [instance(capture, None, view)];
@@ -200,8 +200,8 @@ impl Headless {
         }
     }
 
-    /// Records a frame of one capture, with its filter, without waiting for it. The lists lack the pairs for which there is no room, the
-    /// picture does not; earlier frames make room for those of later ones. Submit the encoder before the next frame is recorded.
+    /// Records a frame of one capture, with its filter, without waiting for it. The picture is complete, but the lists omit pairs beyond the
+    /// capacity, which grows from frame to frame. Submit the encoder before the next frame is recorded.
     ///
     /// # Errors
     /// As [`render`](Self::render).
@@ -243,18 +243,18 @@ impl Headless {
         self.renderer.capture_layouts()
     }
 
-    /// Returns the bind group to use instead of a list of active Gaussians when all are drawn.
+    /// Returns the bind group to use instead of a list of active Gaussians when all Gaussians are drawn.
     pub fn no_list(&self) -> &wgpu::BindGroup {
         &self.renderer.no_list
     }
 
     /// Returns the bind group of the list of the Gaussians that were active in the frame [recorded](Self::record) last; without a filter,
-    /// that of no list.
+    /// [`no_list`](Self::no_list).
     pub fn recorded_list(&self) -> &wgpu::BindGroup {
         self.active.as_ref().map_or(&self.renderer.no_list, |active| &active.list)
     }
 
-    /// Returns the resources of the last frame on the GPU; `None` before the first.
+    /// Returns the resources of the last frame on the GPU; `None` before the first frame.
     pub fn finished(&self) -> Option<FinishedFrame<'_>> {
         self.view.finished()
     }
@@ -272,7 +272,7 @@ impl Headless {
         Ok(bytemuck::pod_read_unaligned(&counters))
     }
 
-    /// Prepares a frame, for whose targets there may be too little memory.
+    /// Prepares a frame. Too little memory for its targets is an error.
     fn prepare(&mut self, instances: &[Instance<'_>], parameters: &ViewParameters<'_>) -> Result<(), GpuError> {
         let GpuContext { device, queue, .. } = &self.context;
         let size = instances.first().map_or(UVec2::ONE, |instance| instance.view.size);
@@ -280,7 +280,7 @@ impl Headless {
         let prepare = || self.view.prepare(device, queue, &self.renderer, instances, parameters);
         let prepared = with_room(device, needed, prepare);
         if prepared.is_err() {
-            // Not all that was made can be used.
+            // Some of the created resources may be invalid.
             self.view.release();
         }
         prepared?
@@ -310,8 +310,8 @@ impl Headless {
         Ok((colors, bytemuck::pod_collect_to_vec(&depths)))
     }
 
-    /// Returns the motion of each pixel of the last frame since the one before, as [`ViewRenderer::motion`] describes it; nothing if
-    /// that was drawn without [`previous`](ViewParameters::previous) views.
+    /// Returns the motion of each pixel between the previous frame and the last frame, as described in [`ViewRenderer::motion`]; empty if the
+    /// last frame was drawn without [`previous`](ViewParameters::previous) views.
     ///
     /// # Errors
     /// When the device is lost.
@@ -331,7 +331,7 @@ impl Headless {
         }
     }
 
-    /// Returns the texels, without the padding of rows.
+    /// Returns the texels of a texture, without the padding of rows.
     fn read_texture(&self, texture: &wgpu::Texture, size: UVec2) -> Result<Vec<u8>, GpuError> {
         let GpuContext { device, queue, .. } = &self.context;
         let row = size.x * texture.format().block_copy_size(None).unwrap_or(0);
@@ -351,7 +351,7 @@ impl Headless {
         Ok(bytes.chunks_exact(padded as usize).flat_map(|padded| &padded[..row as usize]).copied().collect())
     }
 
-    /// Copies the first `size` bytes of a buffer to the host and waits for them.
+    /// Copies the first `size` bytes of a buffer to the host, waits for them and returns them.
     ///
     /// # Errors
     /// When the device is lost.
@@ -368,11 +368,11 @@ impl Headless {
         self.read(&buffer)
     }
 
-    /// Waits for a buffer that can be mapped and copies it.
+    /// Maps a buffer, waits for the GPU and returns the bytes.
     fn read(&self, buffer: &wgpu::Buffer) -> Result<Vec<u8>, GpuError> {
         let (sender, receiver) = std::sync::mpsc::channel();
         buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
-            // The receiver waits below; if it is gone, the result is not needed.
+            // Sending fails only if the receiver below is dropped; the result is not needed then.
             let _ = sender.send(result);
         });
         self.wait()?;
@@ -387,7 +387,7 @@ impl Headless {
     }
 }
 
-/// Returns the instance of one capture as trained.
+/// Returns the instance of a capture with the default appearance: as trained.
 pub(super) fn instance<'a>(capture: &'a GpuCapture, active: Option<&'a ActiveList>, view: &View) -> Instance<'a> {
     Instance { capture, active, view: *view, appearance: Appearance::default() }
 }
