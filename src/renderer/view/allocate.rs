@@ -40,13 +40,13 @@ impl ViewRenderer {
         let slot_blocks = slots.div_ceil(BLOCK);
         let stride = slot_blocks.max(pairs.div_ceil(BLOCK));
         let tiles = tiles(size);
-        // What is bound at the last one is as long as at the first.
+        // A binding at the last instance has the same length as at the first.
         let instance_slots = u64::from(parts + INSTANCES_AT_ONCE - 1);
         let instances =
             allocator.buffer("gs4d instances", instance_slots * u64::from(INSTANCE_STRIDE), BufferUsages::UNIFORM);
         let splat_size = if fast { size_of::<layout::SplatShape>() } else { size_of::<layout::SplatRecord>() };
         let splats = storage("gs4d splats", slots, splat_size);
-        // What only the reference design uses has no room with the fast one.
+        // Buffers that only the reference design uses have a single element in the fast design.
         let sorting = |label, count: u32| storage(label, if fast { 1 } else { count }, 4);
         let depth_keys = sorting("gs4d depth keys", slots);
         let keys = [(); 2].map(|()| sorting("gs4d sort keys", slots));
@@ -109,7 +109,7 @@ impl ViewRenderer {
                 &[instance, splats.as_entire_binding(), depth_keys.as_entire_binding()],
             ),
             sort_depth: [
-                // The values of the first step are the indices, so the buffer bound for them is not read.
+                // The values of the first step are the slots themselves, so the buffer bound for the values is not read.
                 sort(&depth_keys, &order[1], &keys[0], &order[0]),
                 sort(&keys[0], &order[0], &keys[1], &order[1]),
                 sort(&keys[1], &order[1], &keys[0], &order[0]),
@@ -172,7 +172,7 @@ impl ViewRenderer {
         }
     }
 
-    /// Creates bins, with room for that many splats in all of them together.
+    /// Creates the bins of the fast design, with `sizes.entries` entries in all bins together.
     fn make_fast(
         &self,
         renderer: &Renderer,
@@ -181,7 +181,7 @@ impl ViewRenderer {
         instance: wgpu::BindingResource<'_>,
         [splats, tile_ranges, pair_splats]: [&wgpu::Buffer; 3],
     ) -> FastResources {
-        // As many as there can be.
+        // The largest number of bins of a picture of this size.
         let count = u64::from(bin_grid(sizes.picture, SIDES[0]).element_product());
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
         let counters = count + u64::from(BIN_COUNTERS + sizes.parts);
@@ -219,7 +219,7 @@ impl ViewRenderer {
         FastResources { bytes, bins, visible, splat_colors, project_bin, sort_bins, colors, blend_blocks }
     }
 
-    /// Writes the steps of both sorts: by all bits of the depth, then by the bits of the tile.
+    /// Writes the uniforms of the steps of both sorts: by all bits of the depth, then by the bits of the tile.
     fn write_steps(&self, queue: &wgpu::Queue, stride: u32) {
         let mut bytes = vec![0; (INSTANCE_STRIDE * 2 * DEPTH_STEPS) as usize];
         for index in 0..2 * DEPTH_STEPS {

@@ -1,4 +1,4 @@
-//! Dispatches that several parts of a frame share.
+//! Dispatches of both designs over the parts of instances.
 //!
 //! In: a prepared view, its instances and a pipeline. Out: one dispatch for each part of each instance; timestamps between passes.
 
@@ -11,9 +11,9 @@ use crate::renderer::shaders::Storage;
 use crate::renderer::timing::PassTimer;
 
 impl ViewRenderer {
-    /// Records one dispatch of `project`, `project_bin` or `colors` for each part of each instance, or for several instances of the same
-    /// Gaussians; `groups` returns the number of workgroups for a number of Gaussians in a storage, and `pipeline` that for one instance or,
-    /// if `true`, for several.
+    /// Records one dispatch of `project`, `project_bin` or `colors` for each part of each instance, or for several consecutive instances of
+    /// the same Gaussians. `groups` returns the number of workgroups for a storage and a number of Gaussians; `pipeline` returns the pipeline
+    /// for a storage and one or (`true`) several instances.
     pub(super) fn project<'a>(
         &self,
         pipeline: impl Fn(Storage, bool) -> Option<&'a wgpu::ComputePipeline>,
@@ -25,7 +25,7 @@ impl ViewRenderer {
     ) {
         let mut index = 0;
         for joined in instances.chunk_by(Instance::joins) {
-            // Neighbors of the same Gaussians: wgpu waits between two dispatches.
+            // Consecutive instances of the same Gaussians in one dispatch: wgpu inserts a barrier between two dispatches.
             for batch in joined.chunks(INSTANCES_AT_ONCE as usize) {
                 let (instance, count) = (&batch[0], batch.len() as u32);
                 let Some(pipeline) = pipeline(instance.capture.storage, joined.len() > 1) else { continue };
@@ -37,7 +37,7 @@ impl ViewRenderer {
                     pass.set_bind_group(3, &part.color, &[]);
                     let gaussians = drawn_count(instance.capture, at, instance.active);
                     pass.dispatch_workgroups(groups(instance.capture.storage, gaussians), 1, count);
-                    // Those that are drawn together have one part.
+                    // Instances that are drawn together have one part.
                     index += count;
                 }
             }

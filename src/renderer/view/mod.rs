@@ -1,7 +1,7 @@
 //! One view on the GPU: its working buffers, its targets, and the frame.
 //!
 //! In: captures with a [`View`](crate::view::View) each, a background, the depth of opaque surfaces. Out: a texture of
-//! color and transmittance and one of expected and median depth. [`ViewRenderer::prepare`] sizes and fills the buffers,
+//! color and transmittance and a texture of expected and median depth. [`ViewRenderer::prepare`] sizes and fills the buffers,
 //! [`ViewRenderer::record`] records the frame.
 mod allocate;
 mod bins;

@@ -1,8 +1,7 @@
-//! Motions: how far what a view shows has moved on the screen since the frame before.
+//! The resources of motions: the screen-space motion of each pixel since the previous frame.
 //!
-//! In: a prepared view, and the view of each instance one frame before. Out: [`MotionResources`], and two dispatches at the end of the frame:
-//! `motion` puts the motions of splats in place of their colors, which have been blended, and the last pass of the design blends them into
-//! a target of their own, over the same lists. Without views of the frame before there are neither.
+//! In: the resources of a view, and the view of each instance in the previous frame. Out: [`MotionResources`]: the target of motions, its
+//! uniforms and its bind groups. Frames without views of the previous frame have no motions.
 
 use super::parameters::Instance;
 use super::resources::{Resources, pixel_group, texture_bytes};
@@ -16,22 +15,22 @@ use crate::view::View;
 use std::num::NonZeroU64;
 use wgpu::{BindingResource, BufferUsages};
 
-/// The target of motions, and what its passes bind.
+/// The target of motions, and the bind groups of its passes.
 #[derive(Debug)]
 pub(super) struct MotionResources {
     pub texture: wgpu::Texture,
     pub view: wgpu::TextureView,
-    /// The values of the frame, without background and debug view.
+    /// The uniforms of the frame, without background and debug view.
     frame: wgpu::Buffer,
-    /// One [`MotionUniforms`] for each part, as far apart as the uniforms of instances.
+    /// One [`MotionUniforms`] for each part, with the stride of the uniforms of instances.
     before: wgpu::Buffer,
     /// Bind groups of even and of odd frames.
     pub motion: [wgpu::BindGroup; 2],
     pub pixel: wgpu::BindGroup,
-    /// What the bind group of the pixels was created for.
+    /// Opaque depth and environment map of the bind group of the pixels.
     opaque: wgpu::TextureView,
     environment: wgpu::Buffer,
-    /// How the fast design blends motions: without depths.
+    /// The variant with which the fast design blends motions: without depths.
     pub variant: FastVariant,
 }
 
@@ -83,7 +82,7 @@ impl MotionResources {
         texture_bytes(&self.texture)
     }
 
-    /// Writes the uniforms, given those of the frame for colors.
+    /// Writes the uniforms, given the uniforms `frame` of the frame and the `previous` views.
     pub fn write(&self, queue: &wgpu::Queue, frame: &FrameUniforms, instances: &[Instance<'_>], previous: &[View]) {
         let frame = FrameUniforms { background_mode: BACKGROUND_NONE, debug: DEBUG_COLOR, ..*frame };
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));

@@ -13,13 +13,13 @@ use crate::renderer::pipelines::Renderer;
 use crate::renderer::timing::PassTimer;
 use crate::view::tiles;
 
-/// Gaussians of a workgroup.
+/// Gaussians per workgroup of `motion`.
 const GROUP: u32 = 256;
-/// The largest number of workgroups of the fast design, which go on until all visible splats have a motion: enough for any GPU.
+/// The largest number of workgroups of `motion` in the fast design, which loop over the visible splats: enough to occupy any GPU.
 const MOST_GROUPS: u32 = 4096;
 
 impl ViewRenderer {
-    /// Records the passes of motions, after all others of the frame, if it has motions.
+    /// Records the passes of motions, after all other passes of the frame, if the frame has motions.
     pub(super) fn record_motion(
         &self,
         renderer: &Renderer,
@@ -52,7 +52,7 @@ impl ViewRenderer {
         }
         mark(timer, pass);
 
-        // blend or blend_blocks. The former writes the depths once more, the same.
+        // blend or blend_blocks. `blend` writes the same depths again.
         let tiles = tiles(self.picture);
         pass.set_pipeline(blend);
         pass.set_bind_group(0, &motion.pixel, &[]);

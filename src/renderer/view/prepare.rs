@@ -18,13 +18,13 @@ use crate::renderer::timing::PassTime;
 use crate::view::DebugView;
 use glam::UVec2;
 
-/// Buffers that are more than this factor too large, for more than this number of frames, are replaced.
+/// Buffers that are too large by more than this factor, for more than this number of frames, are replaced.
 const OVERSIZE_FACTOR: u32 = 4;
 const RELEASE_AFTER_IDLE_FRAMES: u32 = 120;
 
 impl ViewRenderer {
     /// Sizes the buffers for the instances and for the pairs that earlier frames counted, and writes the uniforms. Call
-    /// it before the queue is submitted. In the steady state it creates nothing.
+    /// it before the queue is submitted. In the steady state it creates no resources.
     ///
     /// All instances must have views of the same size and lens.
     ///
@@ -67,7 +67,7 @@ impl ViewRenderer {
         if picture.min_element() == 0 || picture.max_element() > limits.max_texture_dimension_2d {
             return Err(GpuError::Size { width: picture.x, height: picture.y, limit: limits.max_texture_dimension_2d });
         }
-        // As many as there will be at any time: another segment of a filter changes no buffer.
+        // The maximum over time, so that another segment of a filter does not change the buffers.
         let slots: usize = instances.iter().map(|instance| most_drawn(instance.capture, instance.active)).sum();
         let parts: usize = instances.iter().map(|instance| instance.capture.parts.len()).sum();
         let splat = size_of::<layout::SplatRecord>() as u64;
@@ -75,7 +75,7 @@ impl ViewRenderer {
             Design::Reference => binding_limit(&limits),
             Design::Auto | Design::Fast => binding_limit(&limits).min(u64::from(bins::MAX_SLOTS) * splat),
         };
-        // The largest buffer per slot holds splats.
+        // The buffer of splats has the largest elements per slot.
         let needed = (slots as u64).next_multiple_of(u64::from(BLOCK)) * splat;
         if needed > limit {
             return Err(GpuError::TooLarge { what: "the splats", needed, limit });
@@ -90,7 +90,7 @@ impl ViewRenderer {
         self.short_of_room = self.statistics.pairs > most || in_bins > most / 2;
         let entries = |picture| match self.design {
             Design::Reference => 0,
-            // Twice as many bytes as for pairs.
+            // An entry has twice as many bytes as a pair.
             Design::Auto | Design::Fast => {
                 self.bin_room.wanted().max(bins::first_guess(picture, self.bin_side, slots)).min(most / 2)
             }
@@ -132,7 +132,7 @@ impl ViewRenderer {
         Ok(())
     }
 
-    /// Creates what the motions of a frame need, unless it has been; releases it if the frame has none.
+    /// Creates the resources of motions if the frame has motions and they do not exist; releases them if it has none.
     fn prepare_motion(
         &mut self,
         device: &wgpu::Device,
@@ -157,7 +157,7 @@ impl ViewRenderer {
                 self.motion = Some(motion);
             }
         }
-        // Frames with motions have more passes.
+        // Frames with motions have more timed passes.
         if self.timing.as_ref().is_some_and(|(timer, _)| timer.passes() != self.timed_passes()) {
             self.measure(device, queue, renderer, false);
             self.measure(device, queue, renderer, true);
@@ -165,8 +165,8 @@ impl ViewRenderer {
         Ok(())
     }
 
-    /// Returns the sizes to allocate. Sizes grow from frame to frame, but buffers that have been far too large for a
-    /// while are reduced. `exact` is what the frame needs, with `guess` pairs, `grown` the same with room for pictures to come.
+    /// Returns the sizes to allocate. Sizes grow from frame to frame, but buffers that have been far too large for some frames are reduced.
+    /// `exact` are the sizes that the frame needs, with `guess` pairs; `grown` are the same sizes with a reserve for larger pictures.
     fn kept_sizes(&mut self, made: Sizes, exact: Sizes, grown: Sizes, guess: u32) -> Sizes {
         let counted = self.statistics.pairs.saturating_add(self.statistics.pairs / 2).max(1 << 16);
         let oversized = made.slots / OVERSIZE_FACTOR > exact.slots

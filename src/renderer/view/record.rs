@@ -1,6 +1,6 @@
-//! The frame: one compute pass, recorded in the order of the table in [`crate::renderer`].
+//! Recording of a frame.
 //!
-//! In: a prepared view and the instances it was prepared for. Out: commands.
+//! In: a prepared view and the instances for which it was prepared. Out: one compute pass, in the order of the table in [`crate::renderer`].
 
 use super::parameters::Instance;
 use super::view_renderer::ViewRenderer;
@@ -33,7 +33,7 @@ impl ViewRenderer {
         let Some(made) = &self.resources else { return };
         let fast = made.fast.as_ref();
         if let Some(fast) = fast.filter(|_| self.cleared_bins != self.bin_count()) {
-            // The frame before has only cleared as many as it had.
+            // The previous frame has cleared only its own number of bins.
             for bins in &fast.bins {
                 encoder.clear_buffer(bins, 0, None);
             }

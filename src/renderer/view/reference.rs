@@ -27,8 +27,8 @@ impl ViewRenderer {
         self.project(pipeline, renderer, &made.project, |_, count| count.div_ceil(256), pass, instances);
         mark(timer, pass);
 
-        // sort by depth: the first step drops the invisible splats and counts the others; the later steps are sized
-        // by that count.
+        // sort by depth: the first step drops the invisible splats and counts the visible splats; the later steps are sized
+        // by this count.
         for step in 0..DEPTH_STEPS {
             let group = &made.sort_depth[if step == 0 { 0 } else { 2 - (step as usize % 2) }];
             let blocks = (step == 0).then(|| self.slots.div_ceil(BLOCK));
@@ -71,7 +71,7 @@ impl ViewRenderer {
         mark(timer, pass);
     }
 
-    /// Records one step of `sort`. `blocks` is the number of workgroups if the host knows it; otherwise the dispatch is
+    /// Records one step of `sort`. `blocks` is the number of workgroups; if it is unknown on the host, the dispatch is
     /// indirect, at `offset` of the arguments.
     fn sort_step(
         &self,

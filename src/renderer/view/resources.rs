@@ -1,7 +1,7 @@
 //! The resources of a view whose sizes depend on the view or the captures, and the bind groups over them.
 //!
-//! In: sizes, the opaque depth and the environment map. Out: [`Resources`], created again only when the sizes change; for another depth or
-//! map only the bind group of the pixels is.
+//! In: buffers and textures. Out: [`Resources`], which are created again only when the sizes change. Another opaque depth or environment map
+//! replaces only the bind group of the pixels.
 
 use super::bins::FastResources;
 use super::sizes::Sizes;
@@ -25,12 +25,12 @@ pub(super) struct Resources {
     pub color_view: wgpu::TextureView,
     pub depth: wgpu::Texture,
     pub depth_view: wgpu::TextureView,
-    /// What the bind group of the pixels was created for: opaque depth, environment map. The targets are of these pixels.
+    /// Opaque depth and environment map of the bind group of the pixels, and the variant of the pixel passes that write the targets.
     pub opaque: wgpu::TextureView,
     pub environment: wgpu::Buffer,
     pub pixels: Pixels,
     pub project: wgpu::BindGroup,
-    /// Bind groups from the projected keys into the first pair of buffers, from there into the second, and back.
+    /// Bind groups of the steps: from the projected keys into the first pair of buffers, from the first into the second, and back.
     pub sort_depth: [wgpu::BindGroup; 3],
     pub sort_tiles: [wgpu::BindGroup; 2],
     pub arguments: wgpu::BindGroup,
@@ -38,7 +38,7 @@ pub(super) struct Resources {
     pub ranges: wgpu::BindGroup,
     pub pixel: wgpu::BindGroup,
     pub blend: wgpu::BindGroup,
-    /// Buffers and bind groups of the fast renderer.
+    /// Buffers and bind groups of the fast design.
     pub fast: Option<FastResources>,
 }
 
@@ -53,14 +53,15 @@ pub struct PassBuffers {
     pub splats: wgpu::Buffer,
     /// Slots of the visible splats, by depth.
     pub order: wgpu::Buffer,
-    /// First pair of each visible splat, in that order.
+    /// First pair of each visible splat, by depth.
     pub offsets: wgpu::Buffer,
-    /// Depth key of each slot; [`INVISIBLE`](crate::renderer::layout::INVISIBLE) for one without a splat.
+    /// Depth key of each slot; [`INVISIBLE`](crate::renderer::layout::INVISIBLE) for a slot without a splat.
     pub depth_keys: wgpu::Buffer,
 }
 
 impl Resources {
-    /// Binds an opaque depth and an environment map, unless they are bound. While a window is dragged, the depth is another in each frame.
+    /// Binds an opaque depth and an environment map, unless they are bound. While a window is resized, the depth texture changes in every
+    /// frame.
     pub(super) fn bind_pixel(
         &mut self,
         allocator: Allocator<'_>,
@@ -78,7 +79,7 @@ impl Resources {
     }
 }
 
-/// Creates the bind group of the pixels: opaque depth, color, depth.
+/// Creates the bind group of the pixels. `views` are the opaque depth and the targets of color and depth.
 pub(super) fn pixel_group(
     allocator: Allocator<'_>,
     layout: &wgpu::BindGroupLayout,
@@ -97,7 +98,7 @@ pub(super) fn texture_bytes(texture: &wgpu::Texture) -> u64 {
     u64::from(texture.width()) * u64::from(texture.height()) * u64::from(texel)
 }
 
-/// Returns the number of steps that sort by tile.
+/// Returns the number of steps of the sort by tile.
 pub(super) fn tile_steps(size: UVec2) -> u32 {
     let tiles = tiles(size);
     (u32::BITS - (tiles.x * tiles.y - 1).leading_zeros()).div_ceil(DIGIT_BITS)

@@ -73,7 +73,7 @@ impl ViewRenderer {
             pair_capacity: made.sizes.pairs,
             background_mode: mode,
             opaque_samples: opaque.map_or(0, |depth| depth.samples),
-            // With opaque depth a compositor follows: the map must hide what is behind it.
+            // With opaque depth the picture is composited later: the environment map must hide the surfaces behind it.
             background: [color[0], color[1], color[2], if opaque.is_some() { 0.0 } else { 1.0 }],
             projection: view.projection.to_array(),
             world_x: column(0),
@@ -84,7 +84,7 @@ impl ViewRenderer {
             opaque_distance: opaque.map_or([0.0; 4], |depth| depth.distance),
             environment_lighting: layout::lighting_mode(&appearance, parameters.blend_space),
             debug: layout::debug_mode(parameters.debug),
-            // Two capture units.
+            // A depth of two capture units.
             debug_depth: 2.0 * view.world_to_camera.row(2).truncate().length(),
             environment_opacity: appearance.opacity.clamp(0.0, 1.0),
             binning: self.binning(&made.sizes, 0),
@@ -96,7 +96,7 @@ impl ViewRenderer {
         self.instance_uniforms = uniforms;
     }
 
-    /// Returns the uniform `binning` of a part in the frame that is prepared.
+    /// Returns the uniform `binning` of a part in the prepared frame.
     fn binning(&self, sizes: &Sizes, part: u32) -> [u32; 4] {
         // Never 0, which is the stamp of a new buffer.
         let frame = self.frames % 0xffff + 1;

@@ -29,22 +29,22 @@ pub struct ViewRenderer {
     /// Number of frames that have been recorded.
     pub(super) frames: u32,
     pub(super) recorded: bool,
-    /// The kind of its pixels, and how the fast design draws it, in the frame prepared last.
+    /// The variants of the pixel passes and of the passes of the fast design in the frame prepared last.
     pub(super) pixels: Pixels,
     pub(super) variant: FastVariant,
     /// Number of splats of the fullest bin of an earlier frame.
     pub(super) fullest_bin: u32,
-    /// Number of bins that the frame recorded last has cleared for the next.
+    /// Number of bins that the frame recorded last has cleared for the next frame.
     pub(super) cleared_bins: u32,
     pub(super) has_depths: bool,
-    /// Number of pairs for which an earlier frame wanted room, and whether that is more than the device has.
+    /// Number of pairs that earlier frames need, and whether a frame exceeded the limits of the device.
     pub(super) pairs_wanted: u32,
     pub(super) short_of_room: bool,
-    /// The room that the bins of the fast design should have.
+    /// The wanted capacity of the bins of the fast design.
     pub(super) bin_room: BinRoom,
     /// Number of successive frames for which the buffers have been far too large.
     pub(super) oversized_frames: u32,
-    /// Bytes of the instance uniforms of a frame, kept for their memory.
+    /// Bytes of the instance uniforms of a frame, kept to reuse the allocation.
     pub(super) instance_uniforms: Vec<u8>,
     pub(super) frame: wgpu::Buffer,
     pub(super) steps: wgpu::Buffer,
@@ -54,11 +54,11 @@ pub struct ViewRenderer {
     pub(super) no_environment: wgpu::Buffer,
     pub(super) readback: Readback,
     pub(super) statistics: ViewStatistics,
-    /// Timestamps, if they are measured and the device has them.
+    /// Timestamps, if GPU time is measured and the device supports timestamps.
     pub(super) timing: Option<(PassTimer, Readback)>,
-    /// Everything whose size depends on the view or the captures.
+    /// Resources whose sizes depend on the view or the captures.
     pub(super) resources: Option<Resources>,
-    /// What motions need besides, in frames with motions.
+    /// Resources of motions, in frames with motions.
     pub(super) motion: Option<MotionResources>,
 }
 
@@ -77,9 +77,9 @@ pub struct FinishedFrame<'a> {
     pub color: &'a wgpu::TextureView,
     /// Expected and median depth, `Rg32Float`.
     pub depth: &'a wgpu::TextureView,
-    /// Number of splats for which the buffers have room.
+    /// Capacity of the buffers in splats.
     pub slots: u32,
-    /// Number of pairs for which the buffers have room.
+    /// Capacity of the buffers in pairs.
     pub pairs: u32,
 }
 
@@ -121,24 +121,24 @@ impl ViewRenderer {
         }
     }
 
-    /// Returns the color `C` (premultiplied, in the blend space) and transmittance, as precise as
-    /// [asked for](ViewParameters::precision). The picture begins at the first texel; the texture may be larger, since pictures of several
-    /// sizes share it. `None` before the first [`prepare`](Self::prepare).
+    /// Returns the color `C` (premultiplied, in the blend space) and transmittance, in the precision of
+    /// [`ViewParameters`](crate::renderer::ViewParameters::precision). The picture begins at the first texel; the texture may be larger, since
+    /// it is reused for pictures of several sizes. `None` before the first [`prepare`](Self::prepare).
     pub fn color(&self) -> Option<&wgpu::TextureView> {
         self.resources.as_ref().map(|made| &made.color_view)
     }
 
     /// Returns the camera-space depth: `Rg32Float`. Red is the expected depth `Σ z α T`, not divided by `1 − T`; green
-    /// the median depth, that of the splat at which T falls to one half or below, 0 if it never does. The texture is as large as
-    /// that of the [color](Self::color). `None` before the first [`prepare`](Self::prepare), and if the last was without
-    /// [`depths`](ViewParameters::depths).
+    /// the median depth, the depth of the splat at which T falls to one half or below, 0 if it never does. The texture has the size of
+    /// the texture of [color](Self::color). `None` before the first [`prepare`](Self::prepare), and if the last call was without
+    /// [`depths`](crate::renderer::ViewParameters::depths).
     pub fn depth(&self) -> Option<&wgpu::TextureView> {
         self.resources.as_ref().filter(|_| self.has_depths).map(|made| &made.depth_view)
     }
 
-    /// Returns the motion since the frame before, blended as colors are: red and green are `Σ m α T`, not divided by `1 − T`, with `m` in
-    /// pixels to the right and down; alpha is T. Format and size are those of the [color](Self::color). `None` if the last
-    /// [`prepare`](Self::prepare) was without [`previous`](ViewParameters::previous) views.
+    /// Returns the motion since the previous frame, blended like colors: red and green are `Σ m α T`, not divided by `1 − T`, with `m` in
+    /// pixels to the right and down; alpha is T. Format and size are the same as for [color](Self::color). `None` if the last
+    /// [`prepare`](Self::prepare) was without [`previous`](crate::renderer::ViewParameters::previous) views.
     pub fn motion(&self) -> Option<&wgpu::TextureView> {
         self.motion.as_ref().map(|motion| &motion.view)
     }
@@ -159,8 +159,8 @@ impl ViewRenderer {
         }
     }
 
-    /// Chooses how the view is drawn from the next [`prepare`](Self::prepare) on. Default: [`Design::Auto`]. GPU time is no longer
-    /// [measured](Self::measure) after a change.
+    /// Sets the design with which the view is drawn from the next [`prepare`](Self::prepare) on. Default: [`Design::Auto`]. A change ends the
+    /// [measurement](Self::measure) of GPU time.
     pub fn set_design(&mut self, renderer: &Renderer, design: Design) {
         let design = renderer.resolve(design);
         if self.design != design {
@@ -170,12 +170,12 @@ impl ViewRenderer {
         }
     }
 
-    /// Returns how the view is drawn: never [`Design::Auto`].
+    /// Returns the design with which the view is drawn: never [`Design::Auto`].
     pub fn design(&self) -> Design {
         self.design
     }
 
-    /// Returns the work of the view.
+    /// Returns counts and times of the view.
     pub fn statistics(&self) -> &ViewStatistics {
         &self.statistics
     }
@@ -204,12 +204,12 @@ impl ViewRenderer {
         })
     }
 
-    /// Makes the next [`prepare`](Self::prepare) allocate room for frames with these counters and half as much more, where there is
-    /// hardly enough and the device allows it.
+    /// Makes the next [`prepare`](Self::prepare) increase the capacities of pairs and bins to 1.5 times these counters if they exceed three
+    /// quarters of the capacities, within the limits of the device.
     pub(crate) fn make_room(&mut self, counters: &Counters) {
-        // Counts of a frame before the buffers were released say nothing of the next.
+        // Counts from before the release of the buffers are ignored.
         let Some(made) = self.resources.as_ref().map(|made| made.sizes) else { return };
-        // The buffers grow early, since counts arrive some frames late.
+        // The buffers grow before they are full, since counts arrive some frames late.
         let pairs = self.pair_count(counters);
         if pairs > made.pairs / 4 * 3 {
             self.pairs_wanted = pairs.saturating_add(pairs / 2);
@@ -219,19 +219,20 @@ impl ViewRenderer {
         }
     }
 
-    /// Makes the next [`prepare`](Self::prepare) allocate as much room as another view has, or will have with its next.
+    /// Makes the next [`prepare`](Self::prepare) allocate the capacities of another view, or the larger capacities that the other view's next
+    /// `prepare` allocates.
     pub(crate) fn make_room_of(&mut self, other: &Self) {
         let made = other.resources.as_ref().map(|made| made.sizes).unwrap_or_default();
         self.pairs_wanted = other.pairs_wanted.max(made.pairs);
         self.bin_room = BinRoom::of(other.bin_room.wanted().max(made.entries));
     }
 
-    /// Returns the number of pairs for which there is room.
+    /// Returns the capacity in pairs.
     pub(crate) fn pair_capacity(&self) -> u32 {
         self.resources.as_ref().map_or(0, |made| made.sizes.pairs)
     }
 
-    /// Returns the number of pairs of a frame with these counters, whether there was room for all of them or not.
+    /// Returns the number of pairs of a frame with these counters, written or not.
     pub(crate) fn pair_count(&self, counters: &Counters) -> u32 {
         match self.design {
             Design::Auto | Design::Fast => counters.pairs,
@@ -239,8 +240,8 @@ impl ViewRenderer {
         }
     }
 
-    /// Returns whether the newest frame whose counters have arrived had more pairs, or splats in its bins, than this device has room for.
-    /// Such frames lack nothing, but they are slow, and stay so: a frame that only lacks the room that it is going to get is not meant.
+    /// Returns whether the newest frame whose counters have arrived had more pairs, or splats in its bins, than the limits of this device
+    /// allow. Such frames are complete, but permanently slow. Frames that only exceed the current capacity, which grows, do not count.
     pub fn is_short_of_room(&self) -> bool {
         self.short_of_room
     }
@@ -271,11 +272,11 @@ impl ViewRenderer {
         self.bin_grid().element_product()
     }
 
-    /// Returns the counters of the frame prepared last, on the GPU, and where they are, in bytes.
+    /// Returns the buffer of the counters of the frame prepared last, and their offset in bytes.
     pub(in crate::renderer) fn counters(&self) -> (&wgpu::Buffer, u64) {
         let first = u64::from(BIN_COUNTERS) * 4 - size_of::<Counters>() as u64;
         let fast = self.resources.as_ref().and_then(|made| made.fast.as_ref());
-        // `sort_bins` writes them beside those of the next frame.
+        // `sort_bins` writes them into the buffer of the next frame's counters.
         fast.map_or((&self.counters, 0), |fast| (&fast.bins[usize::from(!self.odd)], first))
     }
 }
