@@ -1,12 +1,12 @@
-// adam: one step of the optimizer Adam, for four values by each thread.
-// In: gradients summed over the views of a batch, moments, rates. Out: parameters and moments; the gradients are 0 again. What no view of
-// the batch shows stays as it is, if that is asked for. CPU reference: src/offline/fine_tune/adam.rs.
+// adam: one step of the Adam optimizer; each thread updates a four-vector.
+// In: gradients summed over the views of a batch, moments, learning rates. Out: updated parameters and moments, gradients reset to zero. In
+// sparse mode, Gaussians that are invisible in all views of the batch are unchanged. CPU reference: src/offline/fine_tune/adam.rs.
 #import gs4d::types::AdamUniforms
 
 const DECAY_1: f32 = 0.9;
 const DECAY_2: f32 = 0.999;
 const EPSILON: f32 = 1e-15;
-// As in `project_backward`.
+// The same value as in `project_backward`.
 const FIRST_SEEN: u32 = 3u;
 
 @group(0) @binding(0) var<uniform> settings: AdamUniforms;
@@ -14,10 +14,10 @@ const FIRST_SEEN: u32 = 3u;
 @group(0) @binding(2) var<storage, read_write> gradients: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read_write> first_moments: array<vec4<f32>>;
 @group(0) @binding(4) var<storage, read_write> second_moments: array<vec4<f32>>;
-// What `project_backward` notes: from FIRST_SEEN on 1 for each Gaussian that a view of the batch shows.
+// Written by `project_backward`: from FIRST_SEEN on, one word for each Gaussian: 1 if it is visible in a view of the batch.
 @group(0) @binding(5) var<storage, read> notes: array<u32>;
 
-// Each Gaussian has `stride` four-vectors; the rates of the first few are their own, those of the others are the last.
+// Each Gaussian has `stride` four-vectors. The first four have their own rates; all others use the last rate.
 @compute @workgroup_size(256)
 fn adam(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     for (var i = id.x; i < settings.count * settings.stride; i += groups.x * 256u) {

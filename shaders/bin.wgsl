@@ -1,7 +1,7 @@
 // bin: writes one pair for each overlap of a splat with a tile, in order of depth.
 // In: splats and their order. Out: pairs (tile, splat), their number and the size of the dispatches over them. `count`
 // sums the tiles of blocks of splats, `scan` sums the blocks, `offset` computes the first pair of each splat, and
-// `emit` writes one pair per thread, so that a large splat does not delay the others. CPU reference:
+// `emit` writes one pair per thread, so that a large splat does not delay other splats. CPU reference:
 // src/reference/bin.rs.
 #import gs4d::types::{Counters, FrameUniforms, SplatRecord}
 #import gs4d::scan::{exclusive_scan, saturating_add, scan_total}

@@ -1,10 +1,10 @@
 // blend: front to back over each tile of 16 x 16 pixels, one workgroup each.
 // In: tile ranges, pairs, splats, the depth of opaque surfaces, the background. Out: color and transmittance, expected and median
-// depth. Each sample of a multisampled depth hides what is behind it from its share of the pixel. CPU reference:
+// depth. Each sample of a multisampled depth hides the splats behind it in its fraction of the pixel. CPU reference:
 // src/reference/blend.rs.
 //
-// If there was no room for all pairs, those of the nearest splats are in the lists. A tile then goes on through the other splats, in their
-// order, and blends those that cover it, which gives the same picture.
+// If the buffer is too small for all pairs, the lists contain the pairs of the nearest splats. After its list, a tile then searches the
+// remaining splats in depth order and blends the splats that cover it. The picture is the same.
 #import gs4d::types::{Counters, SplatRecord}
 #import gs4d::records::read_splat
 #import gs4d::alpha::alpha_at
@@ -26,7 +26,7 @@ const BATCH: u32 = 256u;
 var<workgroup> batch_a: array<vec4<f32>, 256>;
 var<workgroup> batch_b: array<vec3<f32>, 256>;
 var<workgroup> batch_c: array<vec3<f32>, 256>;
-// Number of pixels of this tile that need no more splats.
+// Number of finished pixels of this tile.
 var<workgroup> finished: atomic<u32>;
 
 fn put_in_batch(place: u32, slot: u32) {
@@ -36,7 +36,7 @@ fn put_in_batch(place: u32, slot: u32) {
     batch_c[place] = splat.color;
 }
 
-// Blends the first `count` splats of the batch into a pixel, until it is done.
+// Blends the first `count` splats of the batch into a pixel and stops when the pixel is finished.
 fn blend_batch(pixel: ptr<function, Pixel>, count: u32, position: vec2<f32>) {
     if !(*pixel).done {
         for (var i = 0u; i < count; i++) {
@@ -58,7 +58,7 @@ fn blend_batch(pixel: ptr<function, Pixel>, count: u32, position: vec2<f32>) {
     }
 }
 
-// Returns the place in the order of the first splat that lacks a pair.
+// Returns the index in depth order of the first splat with a pair that was not written.
 fn first_without_room() -> u32 {
     var low = 0u;
     var high = counters.visible;
@@ -73,8 +73,8 @@ fn first_without_room() -> u32 {
     return low;
 }
 
-// Whether a splat covers a tile and there was no room for their pair. `first` is the first pair of the splat, less if there are more than
-// can be counted.
+// Returns whether a splat covers a tile and their pair was not written. `first` is the first pair of the splat, or the largest 32-bit number
+// if the count of pairs overflowed.
 fn lacks_pair(slot: u32, first: u32, tile: vec2<u32>) -> bool {
     let low = splats[slot].shape.w;
     let high = splats[slot].color.w;
@@ -98,7 +98,7 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
         atomicAdd(&finished, 1u);
     }
     for (var first = range.x; first < range.y; first += BATCH) {
-        // No thread changes `finished` between these barriers, so all threads leave together.
+        // No thread changes `finished` between these barriers, so all threads exit the loop together.
         workgroupBarrier();
         if atomicLoad(&finished) == BATCH {
             break;
@@ -112,7 +112,7 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
     }
     if counters.pairs < counters.pairs_wanted {
         for (var first = first_without_room(); first < counters.visible; first += BATCH) {
-            // As above: the next barrier is the first of the scan.
+            // All threads exit the loop together: the next barrier is the first barrier of the scan.
             workgroupBarrier();
             if atomicLoad(&finished) == BATCH {
                 break;

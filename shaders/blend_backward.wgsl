@@ -1,29 +1,29 @@
-// blend_backward: the gradient of a loss with respect to the splats of a view, without float atomics unless with ATOMIC_SUMS.
-// In: what `blend` read and wrote, and the gradient of the loss with respect to each pixel. Out: for each pair of splat and tile, sums over
-// the pixels of the tile. `place` writes the first pair of each splat; `pairs` sums every pair, one workgroup for each tile. With ATOMIC_SUMS
-// it adds these sums to those of the splat, in whatever order, and `place` is not needed.
+// blend_backward: the gradient of a loss with respect to the splats of a view. Only the ATOMIC_SUMS variant uses float atomics.
+// In: the inputs and outputs of `blend`, and the gradient of the loss with respect to each pixel. Out: for each pair of splat and tile, sums
+// over the pixels of the tile. `place` writes the first pair of each splat; `pairs` computes the sums of every pair, one workgroup for each
+// tile. With ATOMIC_SUMS, `pairs` adds these sums to the sums of the splat, in no fixed order, and `place` is not needed.
 // CPU reference: src/reference/blend_backward.rs; equations: section 7.1 of the 4DGS model.
 //
-// A pixel is walked front to back, as `blend` does, so that it stops at the same splat. What is behind a splat is the finished pixel
-// less what has been blended so far.
+// The splats of a pixel are visited front to back, as in `blend`, so that both stop at the same splat. The color behind a splat is the
+// finished color minus the color blended so far.
 #import gs4d::alpha::{is_opaque, is_skipped, left_behind, ALPHA_MAX}
 #import gs4d::tile::{pixel_of, tile_index}
 #import gs4d::pairs::{frame, pair_of, pair_splats, place_pairs, splats, tile_ranges}
 #import gs4d::records::read_splat
 
 const PIXELS: u32 = 256u;
-// Number of splats whose terms are summed at once, and of sums for each.
+// Number of splats whose terms are summed at once, and number of sums per splat.
 const BATCH: u32 = 8u;
 const SUMS: u32 = 10u;
-// Number of splats that are loaded at once, a multiple of BATCH: one after the other, each would wait for memory.
+// Number of splats that are loaded at once, a multiple of BATCH. Loading them one by one would add a memory latency for each.
 const CHUNK: u32 = 64u;
 
 // The color that `blend` wrote, with the background, and the transmittance.
 @group(0) @binding(7) var color: texture_2d<f32>;
 // Expected and median depth.
 @group(0) @binding(8) var depth: texture_2d<f32>;
-// SUMS values for each pair, or for each splat: with d from pixel to center, w = alpha T and q = alpha dL/dalpha, the sums of q dx, q dy,
-// q dx^2, q dx dy, q dy^2, q, and of w times the gradient of the pixel's red, green, blue and depth.
+// SUMS values for each pair, or for each splat with ATOMIC_SUMS. With d from pixel to center, w = alpha T and q = alpha dL/dalpha: the sums
+// of q dx, q dy, q dx^2, q dx dy, q dy^2, q, and of w times the gradient of the pixel's red, green, blue and depth.
 #ifdef ATOMIC_SUMS
 @group(1) @binding(1) var<storage, read_write> splat_gradients: array<atomic<f32>>;
 #else
@@ -34,17 +34,17 @@ const CHUNK: u32 = 64u;
 // Gradient with respect to the expected depth of each pixel.
 @group(1) @binding(3) var<storage, read> depth_gradients: array<f32>;
 
-// Of the chunk: center, opacity, depth; conic; color; the pair or the splat whose sums are written.
+// For each splat of the chunk: center, opacity, depth; conic; color; the index of the pair or the splat to which its sums belong.
 var<workgroup> places: array<vec4<f32>, CHUNK>;
 var<workgroup> conics: array<vec3<f32>, CHUNK>;
 var<workgroup> colors: array<vec3<f32>, CHUNK>;
 var<workgroup> chunk_places: array<u32, CHUNK>;
-// Of the batch: w and q of each pixel, splat by splat; then their sums over eight pixels.
+// For the batch: w and q of each pixel, splat by splat; then their sums over eight pixels.
 var<workgroup> weights: array<f32, 2048>;
 var<workgroup> terms: array<f32, 2048>;
 // Gradients with respect to red, green, blue and depth.
 var<workgroup> own_gradients: array<vec4<f32>, 256>;
-// Number of pixels of this tile that need no more splats.
+// Number of finished pixels of this tile.
 var<workgroup> finished: atomic<u32>;
 
 @compute @workgroup_size(256)
@@ -59,7 +59,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
     let range = tile_ranges[tile_index(tile.xy, frame.tiles.x)];
     var gradient = vec4(0.0);
     var by_opacity = 0.0;
-    // Gradient-weighted sum of what is behind the splats blended so far.
+    // Gradient-weighted sum of the color, depth and opacity behind the splats blended so far.
     var behind = 0.0;
     var transmittance = 1.0;
     var done = !all(at < frame.size);
@@ -118,7 +118,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
 #ifdef COMPAT
                     term = peak * slope;
 #else
-                    // A clamped alpha does not change.
+                    // The derivative of a clamped alpha is zero.
                     term = select(peak * slope, 0.0, peak > ALPHA_MAX);
 #endif
                     transmittance = left;
@@ -168,7 +168,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
             }
             let written = chunk_places[in_chunk + splat] * SUMS + k;
 #ifdef ATOMIC_SUMS
-            // Many splats of a tile are in none of its pixels.
+            // Many splats of a tile contribute to none of its pixels.
             if sum != 0.0 {
                 atomicAdd(&splat_gradients[written], sum);
             }
@@ -176,7 +176,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
             pair_gradients[written] = sum;
 #endif
         }
-        // All pairs that follow change nothing.
+        // All pixels are finished: the remaining pairs contribute nothing.
         if over {
 #ifndef ATOMIC_SUMS
             for (var i = first + BATCH + thread; i < range.y; i += PIXELS) {

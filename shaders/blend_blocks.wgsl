@@ -1,10 +1,10 @@
-// blend_blocks: blends the splats of one tile, one workgroup each: the last pass of the fast renderer.
+// blend_blocks: blends the splats of one tile, one workgroup per tile; the last pass of the fast design.
 // In: the list of the tile that `sort_bins` wrote, splats, the depth of opaque surfaces, the background. Out: color and
 // transmittance, with DEPTHS also expected and median depth. CPU reference: src/reference/blend.rs.
 //
-// The list is read in batches: each thread takes one splat and finds the blocks of 8 x 4 pixels that it reaches; each block
-// queues its own splats, and its 32 threads blend them. If there was no room for the list, all splats are searched for the
-// nearest ones of each batch instead, which gives the same picture.
+// The list is read in batches: each thread loads one splat and finds the blocks of 8 x 4 pixels that it can contribute to; each block
+// queues its own splats, and its 32 threads blend them. If the list was not written for lack of space, all splats are searched for the
+// nearest splats of each batch instead. The picture is the same.
 #import gs4d::types::{SplatShape, VisibleSplat}
 #import gs4d::records::{read_shape, Splat}
 #import gs4d::bins::{depth_order, is_after, stamp, FIRST, NONE, STAMP_MASK}
@@ -20,7 +20,8 @@
 #import gs4d::tile::{energy_of, TILE_SIZE}
 
 const THREADS: u32 = 256u;
-// Splats that are blended at once: more make fewer waits for the slowest block, fewer leave room for more workgroups.
+// Splats per batch. Larger batches wait less often for the slowest block; smaller batches need less workgroup memory, so that more
+// workgroups run at the same time.
 #ifdef LARGE_BATCHES
 const BATCH: u32 = 256u;
 #else
@@ -29,7 +30,7 @@ const BATCH: u32 = 128u;
 // Blocks of 8 x 4 pixels, one for each 32 threads.
 const BLOCKS: u32 = 8u;
 const LANES: u32 = 32u;
-// Splats whose alphas a thread computes at once: the queues are multiples of it.
+// Splats whose alphas a thread computes at once. Queue lengths are multiples of this number.
 #ifdef EIGHT_AT_ONCE
 const AT_ONCE: u32 = 8u;
 #else
@@ -42,37 +43,37 @@ const LOG2_E: f32 = 1.442695;
 const LOG2_ALPHA_MIN: f32 = -7.9943534;
 const LOG2_ALPHA_MAX: f32 = -0.014499569;
 
-// First and last + 1 pair of each tile; NONE if there was no room for them.
+// First and last + 1 pair of each tile; NONE if the pairs were not written for lack of space.
 @group(1) @binding(0) var<storage, read> tile_ranges: array<vec2<u32>>;
 @group(1) @binding(1) var<storage, read> pair_splats: array<u32>;
-// By slot, like their colors.
+// Indexed by slot, like `splat_colors`.
 @group(1) @binding(2) var<storage, read> splats: array<SplatShape>;
 @group(1) @binding(3) var<storage, read> splat_colors: array<vec4<f32>>;
 @group(1) @binding(4) var<storage, read> visible: array<VisibleSplat>;
 
-// Center, conic xx and xy scaled for exp2; conic yy, log2 of opacity, red, green; blue, depth, as far apart as the others, so that all
-// three have one address. The last changes no pixel.
+// batch_a: center, conic xx and xy scaled for exp2. batch_b: conic yy, log2 of opacity, red, green. batch_c: blue and depth, padded to the
+// same stride, so that one address serves all three arrays. The last element is a splat that is skipped at every pixel.
 var<workgroup> batch_a: array<vec4<f32>, BATCH + 1u>;
 var<workgroup> batch_b: array<vec4<f32>, BATCH + 1u>;
 var<workgroup> batch_c: array<vec4<f32>, BATCH + 1u>;
-// Blocks that each splat of the batch reaches, one bit each.
+// Blocks that each splat of the batch can contribute to, one bit per block.
 var<workgroup> reached: array<u32, BATCH>;
-// Splats of the batch that each block blends, in order; after the last queue, what may be read ahead. While the splats of a batch are
-// searched: their depth keys, then, from BATCH on, their slots.
+// Splats of the batch that each block blends, in order, and AT_ONCE elements of padding for reads ahead. During a search: the depth keys of
+// the splats found and, from BATCH on, their slots.
 var<workgroup> queues: array<u32, BLOCKS * BATCH + AT_ONCE>;
 #ifndef SUBGROUPS_OF_32
 // Number of splats that each thread queues.
 var<workgroup> queued_by: array<u32, THREADS>;
 #endif
 var<workgroup> finished: atomic<u32>;
-// Of what is found in all splats: number, least and greatest depth key.
+// Number of splats found by a search, and their least and greatest depth keys.
 var<workgroup> listed: atomic<u32>;
 var<workgroup> least: atomic<u32>;
 var<workgroup> greatest: atomic<u32>;
 
 var<private> tile: vec2<u32>;
 
-// Returns the depth key and slot of a visible splat; NONE if it is of another frame or does not cover this tile.
+// Returns the depth key and slot of a visible splat; NONE if it belongs to another frame or does not cover this tile.
 fn splat_of_tile(i: u32) -> vec2<u32> {
     let words = visible[i].words.zw;
     if any((words & vec2(STAMP_MASK)) != stamp(frame.binning.x >> 8u)) {
@@ -87,8 +88,7 @@ fn splat_of_tile(i: u32) -> vec2<u32> {
     return vec2(depth_order(splats[slot].place.w), slot);
 }
 
-// Lists the splats of this tile after `lower` and not after `upper`, in no order. Returns how many there are; those that do not
-// fit a batch are not listed.
+// Lists the splats of this tile after `lower` and not after `upper`, unordered. Returns their number; at most BATCH are listed.
 fn search(lower: vec2<u32>, upper: vec2<u32>, thread: u32) -> u32 {
     workgroupBarrier();
     if thread == 0u {
@@ -112,7 +112,7 @@ fn search(lower: vec2<u32>, upper: vec2<u32>, thread: u32) -> u32 {
     return workgroupUniformLoad(&listed);
 }
 
-// The last place up to which the splats of this tile after `lower` fit a batch.
+// Returns the last position up to which the splats of this tile after `lower` fit into a batch.
 fn last_fitting(lower: vec2<u32>, thread: u32) -> vec2<u32> {
     var nearest = begin_search(lower, workgroupUniformLoad(&least), workgroupUniformLoad(&greatest));
     while !nearest.found {
@@ -128,8 +128,8 @@ fn last_fitting(lower: vec2<u32>, thread: u32) -> vec2<u32> {
     return nearest.last;
 }
 
-// Lists the nearest splats of this tile after `lower` that fit a batch, in order. Returns their last place; NONE after the
-// last splat.
+// Lists the nearest splats of this tile after `lower` that fit into a batch, in depth order. Returns the position of the last; NONE if no
+// splat remains.
 fn search_batch(lower: vec2<u32>, thread: u32) -> vec2<u32> {
     var upper = NONE;
     if search(lower, NONE, thread) > BATCH {
@@ -154,7 +154,7 @@ fn search_batch(lower: vec2<u32>, thread: u32) -> vec2<u32> {
     return upper;
 }
 
-// Returns the splat of a pair, one of opacity 0 from `end` on.
+// Returns the splat of a pair; a splat of opacity 0 from `end` on.
 fn load_pair(pair: u32, end: u32) -> Splat {
     var splat: Splat;
     if pair < end {
@@ -163,7 +163,7 @@ fn load_pair(pair: u32, end: u32) -> Splat {
     return splat;
 }
 
-// Returns the splat that `search_batch` found for a thread, one of opacity 0 if there is none.
+// Returns the splat that `search_batch` found for a thread; a splat of opacity 0 if there is none.
 fn load_found(thread: u32) -> Splat {
     var splat: Splat;
     if queues[BATCH + thread] != NONE.y {
@@ -181,7 +181,7 @@ fn corner_of(block: u32) -> vec2<u32> {
     return vec2(block % (TILE_SIZE / 8u) * 8u, block / (TILE_SIZE / 8u) * 4u);
 }
 
-// Makes a splat part of the batch.
+// Writes the splat of a thread into the batch.
 fn put_in_batch(splat: Splat, thread: u32) {
     let conic = vec3(-0.5, -1.0, -0.5) * LOG2_E * splat.conic;
     batch_a[thread] = vec4(splat.center, conic.xy);
@@ -199,21 +199,21 @@ fn place_of(i: u32) -> u32 {
     return i;
 }
 #else
-// Splats 0, 8, 16, .. first, so that the threads of `queue_splats` read from different banks.
+// Orders splats 0, 8, 16, .. first, so that the threads of `queue_splats` read from different banks.
 fn place_of(i: u32) -> u32 {
     return i % OWN_SPLATS * LANES + i / OWN_SPLATS;
 }
 #endif
 
-// Returns the blocks of 8 x 4 pixels where the alpha of a splat can reach 1/255, one bit each, with room for rounding.
+// Returns the blocks of 8 x 4 pixels where the alpha of a splat can reach 1/255, one bit per block, with a margin for rounding.
 fn blocks_reached(splat: Splat) -> u32 {
     let c = splat.conic;
-    // Written so that NaN, which is no ellipse, reaches everything.
+    // The negated comparison is true for NaN: a conic that is no ellipse counts for every block.
     if !(c.x * c.z > c.y * c.y) {
         return 0xffu;
     }
     let bound = energy_of(splat.opacity) * 1.001 + 0.02;
-    // On the line x = 1 the quadratic form is least at y = slope.x, on y = 1 at x = slope.y.
+    // On the line x = 1 the quadratic form has its minimum at y = slope.x, on y = 1 at x = slope.y.
     let slope = vec2(-c.y / c.z, -c.y / c.x);
     let corner = vec2<f32>(tile * TILE_SIZE) - splat.center;
     let left = corner.x + vec2(0.0, 8.0);
@@ -240,8 +240,8 @@ fn blocks_reached(splat: Splat) -> u32 {
     return blocks;
 }
 
-// Lists the splats of the batch that reach each block, in order. Returns their number, a multiple of AT_ONCE: the last may be
-// BATCH, which changes no pixel.
+// Lists the splats of the batch that can contribute to each block, in order. Returns their number, rounded up to a multiple of AT_ONCE: the
+// queue is padded with BATCH, a splat that is skipped at every pixel.
 fn queue_splats(thread: u32) -> u32 {
     let block = thread / LANES;
     let lane = thread % LANES;
@@ -283,7 +283,7 @@ fn queue_splats(thread: u32) -> u32 {
     return end;
 }
 
-// Returns the alpha of a splat of the batch, as alpha_at does, with the conic scaled for exp2; 0 if it is skipped.
+// Returns the alpha of a splat of the batch, as `alpha_at`, with the conic scaled for exp2; 0 if the splat is skipped.
 fn batch_alpha(a: vec4<f32>, b: vec4<f32>, position: vec2<f32>) -> f32 {
     let d = a.xy - position;
     let exponent = (a.z * d.x + a.w * d.y) * d.x + (b.x * d.y * d.y + b.y);
@@ -300,7 +300,7 @@ fn queued_four(at: u32) -> vec4<u32> {
     return vec4(queues[at], queues[at + 1u], queues[at + 2u], queues[at + 3u]);
 }
 
-// Returns the alphas of four splats of the batch: their exponentials do not wait for each other's blends.
+// Returns the alphas of four splats of the batch. Computed before blending, the four exponentials are independent of each other.
 fn batch_alphas(four: vec4<u32>, position: vec2<f32>) -> vec4<f32> {
     return vec4(
         batch_alpha(batch_a[four.x], batch_b[four.x], position),
@@ -320,7 +320,7 @@ fn batch_depths(four: vec4<u32>) -> vec4<f32> {
 }
 
 #ifdef DEPTHS
-// Blends four splats of the batch; those with alpha 0 are skipped.
+// Blends four splats of the batch; splats with alpha 0 are skipped.
 fn blend_four(pixel: ptr<function, Pixel>, alphas: vec4<f32>, four: vec4<u32>) {
     let depths = batch_depths(four);
     if any(depths > vec4((*pixel).limit)) {
@@ -342,19 +342,19 @@ fn blend_four(pixel: ptr<function, Pixel>, alphas: vec4<f32>, four: vec4<u32>) {
     blend_or_skip(pixel, alphas.w, batch_color(four.w), depths.w);
 }
 #else
-// Color blended so far and transmittance left: 0 once the pixel is opaque, with `opaque_at` what it was then.
+// Color blended so far and remaining transmittance: `left` is 0 once the pixel is opaque, and `opaque_at` is its transmittance before that.
 struct Sample {
     color: vec3<f32>,
     left: f32,
     opaque_at: f32,
 #ifdef MULTISAMPLED
-    // Number of samples whose surface has been passed, and their summed transmittance.
+    // Number of samples whose surface is in front of the current splat, and their summed transmittance.
     hidden: u32,
     hidden_left: f32,
 #endif
 }
 
-// Blends a splat; one with alpha 0 is skipped, and a pixel that is opaque stays as it is.
+// Blends a splat. A splat with alpha 0 is skipped; an opaque pixel is unchanged.
 fn blend_one(sample: ptr<function, Sample>, alpha: f32, color: vec3<f32>) {
     let left = (*sample).left * (1.0 - alpha);
     if is_opaque(left) {
@@ -371,9 +371,9 @@ fn blend_one(sample: ptr<function, Sample>, alpha: f32, color: vec3<f32>) {
     (*sample).left = left;
 }
 
-// Blends four splats of these alphas and colors, which are loaded before it is known whether the pixel is opaque. Returns whether it is.
+// Blends four splats with these alphas and colors, which are loaded before the test for opacity. Returns whether the pixel is opaque.
 fn blend_four(sample: ptr<function, Sample>, alphas: vec4<f32>, colors: mat4x3<f32>) -> bool {
-    // Fused, so that each splat waits for one instruction of the one before.
+    // Fused multiply-adds: each splat depends on one instruction of the previous splat.
     let left = (*sample).left;
     let after_one = fma(-alphas.x, left, left);
     let after_two = fma(-alphas.y, after_one, after_one);
@@ -397,7 +397,7 @@ fn blend_four(sample: ptr<function, Sample>, alphas: vec4<f32>, colors: mat4x3<f
 
 #ifdef MULTISAMPLED
 #ifndef DEPTHS
-// Blends a splat into a pixel whose samples have different surfaces, after the nearest of them.
+// Blends a splat behind the nearest surface into a pixel whose samples have different surfaces.
 fn blend_cut(sample: ptr<function, Sample>, alpha: f32, color: vec3<f32>, depth: f32, at: vec2<u32>) {
     if alpha == 0.0 || (*sample).left == 0.0 {
         return;
@@ -458,9 +458,9 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
         atomicAdd(&finished, 1u);
     }
 
-    // The last place that has been blended, for a search.
+    // The position of the last blended splat, for a search.
     var lower = FIRST;
-    // The first pair of the batch. Threads without a splat of it have none of the next either.
+    // The first pair of the batch. Threads from BATCH on load no splats.
     var first = range.x;
     let own = select(end, thread, thread < BATCH);
     var next: Splat;
@@ -492,14 +492,15 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
             first += BATCH;
             more = first < end;
 #ifdef LARGE_BATCHES
-            // Loaded while this batch is blended. With small batches, other workgroups have work while this one waits.
+            // Loaded while this batch is blended. With small batches, other workgroups run while this one waits for memory.
             next = load_pair(first + own, end);
 #endif
         }
         let queue = block * BATCH;
         if !done {
 #ifdef EIGHT_AT_ONCE
-            // The next of the queue are known before these are blended: in a small picture few threads have work while others wait.
+            // The next splats of the queue are loaded before the current ones are blended: in a small picture too few threads run to hide the
+            // memory latency.
             var near = queued_four(queue);
             var far = queued_four(queue + 4u);
             for (var i = AT_ONCE; i <= queued; i += AT_ONCE) {
@@ -508,7 +509,7 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
                 var near_alphas = batch_alphas(near, position);
                 var far_alphas = batch_alphas(far, position);
 #ifdef OPAQUE
-                // The surface hides what is behind it.
+                // The surface hides the splats behind it.
                 near_alphas = select(near_alphas, vec4(0.0), batch_depths(near) > vec4(limit));
                 far_alphas = select(far_alphas, vec4(0.0), batch_depths(far) > vec4(limit));
 #endif

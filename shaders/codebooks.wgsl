@@ -1,21 +1,23 @@
-// codebooks: color coefficients that are sums of entries of codebooks, in training.
-// In: the entries of each Gaussian; for `collect` the gradients of the coefficients, for `expand` the entries. Out: the gradients of the
-// entries, each summed over its Gaussians in a fixed order; the coefficients. The first coefficient of each Gaussian is its own.
+// codebooks: training of color coefficients that are sums of codebook entries.
+// In: the codes of each Gaussian. `collect` reads the gradients of the coefficients and writes the gradients of the entries, each summed over
+// its Gaussians in a fixed order. `expand` reads the entries and writes the coefficients. The first coefficient of each Gaussian is not in
+// the codebooks.
 // CPU reference: `CodedColors::rest` of src/scene/packed/colors.rs.
 #import gs4d::types::TiedColors
 
 @group(0) @binding(0) var<uniform> tied: TiedColors;
-// Entries of each Gaussian, one for each codebook.
+// Codes of each Gaussian: the index of its entry in each codebook.
 @group(0) @binding(1) var<storage, read> codes: array<u32>;
-// First member of each entry, and the end; the members: Gaussians.
+// Index of the first member of each entry, then the number of all members.
 @group(0) @binding(2) var<storage, read> firsts: array<u32>;
+// Gaussians that use each entry.
 @group(0) @binding(3) var<storage, read> members: array<u32>;
 @group(0) @binding(4) var<storage, read> entries: array<vec4<f32>>;
 @group(0) @binding(5) var<storage, read_write> coefficients: array<vec4<f32>>;
 @group(0) @binding(6) var<storage, read> coefficient_gradients: array<vec4<f32>>;
 @group(0) @binding(7) var<storage, read_write> entry_gradients: array<vec4<f32>>;
 
-// Which values of a four-vector are of codebooks.
+// Returns 1 for the components of a four-vector that come from the codebooks, 0 for the others.
 fn shared_values(place: u32) -> vec4<f32> {
     return select(vec4(1.0), vec4(0.0, 0.0, 0.0, 1.0), place == 0u);
 }

@@ -1,9 +1,9 @@
-// colors: the colors of the visible splats of one part: the third pass of the fast renderer.
+// colors: the colors of the visible splats of one part; the third pass of the fast design.
 // In: the visible splats, which `project_bin` listed; color coefficients, an instance. Out: the colors of the splats. CPU reference:
 // src/reference/project.rs.
 //
-// Neighboring threads compute the shares of one color: there are too few visible splats for all threads of a large GPU, and what they read
-// lies side by side.
+// SHARES neighboring threads compute the partial sums (shares) of one color: there are too few visible splats to occupy all threads of a
+// large GPU, and the coefficients that these threads read are contiguous.
 #import gs4d::types::{VisibleSplat, BIN_COUNTERS, DEBUG_ACTIVE}
 #import gs4d::capture::instance
 #ifdef COPIED_INSTANCE
@@ -12,7 +12,7 @@
 #import gs4d::color::{color_share, finished_color, SHARES}
 
 #ifdef CODED_COLORS
-// Each waits for many values of codebooks: a smaller workgroup finds room beside `sort_bins` earlier.
+// Each thread waits for many codebook values: a smaller workgroup is scheduled earlier while `sort_bins` runs.
 const THREADS: u32 = 128u;
 #else
 const THREADS: u32 = 256u;
@@ -22,7 +22,7 @@ const SPLATS: u32 = THREADS / SHARES;
 
 @group(0) @binding(1) var<storage, read> bins: array<u32>;
 @group(0) @binding(2) var<storage, read> visible: array<VisibleSplat>;
-// By slot.
+// Indexed by slot.
 @group(0) @binding(3) var<storage, read_write> splat_colors: array<vec4<f32>>;
 
 var<workgroup> shares: array<vec3<f32>, THREADS>;
@@ -54,7 +54,7 @@ fn colors(
             for (var i = 1u; i < SHARES; i++) {
                 sum += shares[thread + i];
             }
-            // The colors of some debug views are those of `project_bin`.
+            // In some debug views `project_bin` computes the colors.
             splat_colors[slot] = vec4(select(finished_color(sum), seen, instance.debug >= DEBUG_ACTIVE), 0.0);
         }
         workgroupBarrier();

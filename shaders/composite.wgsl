@@ -1,12 +1,12 @@
-// composite: blends the captures of a view over what the camera has drawn so far.
+// composite: blends the captures of a view over the current contents of the view target.
 //
 // In: the captures' color and transmittance (premultiplied, in their blend space, linear or sRGB-encoded) for the pixels of the viewport;
-// with READ_TARGET the view target so far. Out: the view target. Blending is done in the captures' blend space: a target in the same space
-// is blended in place; one in the other space is read, linear with ENCODE_TARGET, otherwise sRGB-encoded, and written to another texture.
-// With KEEP_SAMPLES what is read is the mean of a pixel's samples, and each sample is written, or keeps its value where there is no splat.
+// with READ_TARGET the view target. Out: the view target. Blending is done in the captures' blend space. A target in the same space is
+// blended in place. A target in the other space (linear with ENCODE_TARGET, otherwise sRGB-encoded) is read, and the result is written to
+// another texture. With KEEP_SAMPLES the mean of a pixel's samples is read; all its samples are written where there is a splat.
 #import gs4d::srgb
 
-// The largest half float: an infinite pixel would spread through bloom.
+// The largest half-precision number: an infinite pixel would spread through bloom.
 const BRIGHTEST: f32 = 65504.0;
 
 @group(0) @binding(0) var captures: texture_2d<f32>;
@@ -15,7 +15,7 @@ const BRIGHTEST: f32 = 65504.0;
 #ifdef READ_TARGET
 @group(0) @binding(2) var source: texture_2d<f32>;
 
-// The transfer functions, mirrored below 0, so that they are inverses of each other there too.
+// The transfer functions, mirrored for negative values, so that they are inverses of each other there too.
 fn encode(linear: vec3<f32>) -> vec3<f32> {
     return sign(linear) * srgb::encode(abs(linear));
 }
@@ -53,7 +53,7 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
     }
     let front = textureLoad(captures, pixel - viewport.xy, 0);
     let transmittance = front.a;
-    // Where there is no splat, the target is unchanged, to the bit.
+    // Where there is no splat, the target is unchanged bit for bit.
     if transmittance >= 1.0 && all(front.rgb == vec3(0.0)) {
 #ifdef KEEP_SAMPLES
         discard;

@@ -1,19 +1,20 @@
-// loss: how far a picture is from its image, and the gradient with respect to each pixel.
-// In: color over the background and transmittance, the image. Out: (1 - share) L1 + share (1 - SSIM) + weight mask of the view, and its
-// gradient. The mask is the mean over pixels of -(1 - coverage) log(1 - opacity): where the image covers nothing there should be nothing.
-// `similarity` writes the derivatives of SSIM with respect to the windowed means; `gradient` spreads them over the windows and adds L1, with
-// sums for each tile; `total` adds these to the sums of all views so far. CPU reference: src/offline/fine_tune/loss.rs.
+// loss: the loss of a rendered picture against its training image, and the gradient with respect to each pixel.
+// In: color over the background and transmittance, the image. Out: (1 - s) L1 + s (1 - SSIM) + w mask of the view, with s the similarity
+// share and w the mask weight, and its gradient. The mask is the mean over pixels of -(1 - coverage) log(1 - opacity): it penalizes opacity
+// where the image has no coverage. `similarity` writes the derivatives of SSIM with respect to the windowed means; `gradient` convolves them
+// with the window, adds L1 and writes sums for each tile; `total` adds these to the sums of all views so far. CPU reference:
+// src/offline/fine_tune/loss.rs.
 //
 // SSIM: 11 x 11 Gaussian window of deviation 1.5, zeros beyond the border, channel by channel, mean over pixels and channels.
 #import gs4d::types::{LossUniforms}
 
 const RADIUS: u32 = 5u;
 const SIDE: u32 = 16u;
-// Side of a tile with the windows of its border.
+// Side of a tile with a border of RADIUS pixels.
 const REACH: u32 = 26u;
 const C1: f32 = 0.0001;
 const C2: f32 = 0.0009;
-// The mask clamps opacity to this distance from 0 and 1.
+// The mask clamps opacity to the interval from MARGIN to 1 - MARGIN.
 const MARGIN: f32 = 1e-6;
 
 @group(0) @binding(0) var<uniform> loss: LossUniforms;
@@ -22,14 +23,14 @@ const MARGIN: f32 = 1e-6;
 @group(0) @binding(2) var<storage, read_write> slopes: array<vec4<f32>>;
 // Gradient with respect to red, green, blue and opacity of each pixel.
 @group(0) @binding(3) var<storage, read_write> pixel_gradients: array<vec4<f32>>;
-// Of each tile: sums of the absolute difference, of SSIM, of the squared difference of the clamped colors and of the mask.
+// For each tile: sums of the absolute difference, of SSIM, of the squared difference of the clamped colors and of the mask.
 @group(0) @binding(4) var<storage, read_write> tile_sums: array<vec4<f32>>;
 // Loss, absolute difference, squared difference and number of views so far.
 @group(0) @binding(5) var<storage, read_write> totals: array<vec4<f32>>;
 // Color times coverage, coverage: one byte each.
 @group(1) @binding(0) var<storage, read> image: array<u32>;
 
-// Both pictures with the border, then three maps at a time; sums over rows.
+// Picture and image with the border, then three maps at a time; sums over rows.
 var<workgroup> field: array<vec3<f32>, 676>;
 var<workgroup> rows_a: array<vec3<f32>, 416>;
 var<workgroup> rows_b: array<vec2<f32>, 416>;
@@ -58,7 +59,7 @@ fn coverage_at(at: vec2<i32>) -> f32 {
     return unpack4x8unorm(image[index_of(at)]).w;
 }
 
-// Returns the place of an element of the field in the picture.
+// Returns the pixel of the picture that an element of `field` belongs to.
 fn place_of(tile: vec2<u32>, i: u32) -> vec2<i32> {
     return vec2<i32>(tile * SIDE + vec2(i % REACH, i / REACH)) - i32(RADIUS);
 }
@@ -160,7 +161,7 @@ fn gradient(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_in
         let pixels = f32(loss.size.x * loss.size.y);
         let gradient = (1.0 - loss.similarity_share) * sign(difference) - loss.similarity_share * by_similarity;
         let left = clamp(rendered.w, MARGIN, 1.0 - MARGIN);
-        // A clamped opacity does not change.
+        // The derivative of a clamped opacity is zero.
         let by_opacity = select(0.0, loss.mask_weight * uncovered / left, left == rendered.w);
         pixel_gradients[index_of(at)] =
             vec4(gradient * loss.share / (3.0 * pixels), by_opacity * loss.share / pixels);

@@ -1,6 +1,6 @@
-// motion: how far each visible splat of one part has moved on the screen since the frame before.
-// In: splats, their Gaussians, the view one frame before. Out: motions, in pixels to the right and down, in place of the colors of the
-// splats, which have been blended: the last pass runs again and blends them as it has blended colors. CPU reference:
+// motion: the screen-space motion of each visible splat of one part since the previous frame.
+// In: splats, their Gaussians, the view of the previous frame. Out: motions, in pixels to the right and down. They overwrite the colors of
+// the splats, which have been blended: the last pass runs again and blends motions as it blended colors. CPU reference:
 // src/reference/motion.rs.
 #import gs4d::types::MotionUniforms
 #import gs4d::capture::{instance, load_gaussian}
@@ -21,28 +21,28 @@ const THREADS: u32 = 256u;
 @group(0) @binding(2) var<storage, read> bins: array<u32>;
 @group(0) @binding(3) var<storage, read> visible: array<VisibleSplat>;
 @group(0) @binding(4) var<storage, read> splats: array<SplatShape>;
-// By slot.
+// Indexed by slot.
 @group(0) @binding(5) var<storage, read_write> splat_colors: array<vec4<f32>>;
 #else
 @group(0) @binding(2) var<storage, read> depth_keys: array<u32>;
 @group(0) @binding(3) var<storage, read_write> splats: array<SplatRecord>;
 #endif
 
-// Returns the motion of the splat of a Gaussian, whose center is there now.
+// Returns the motion of the splat of a Gaussian, given the center of the splat in this frame.
 fn motion_of(index: u32, center: vec2<f32>) -> vec2<f32> {
     let g = load_gaussian(index);
     let mean = vec4(g.mean + g.velocity * (before.time - g.mean_t), 1.0);
     let depth = dot(before.camera_z, mean);
-    // Written so that NaN has no motion; nor has what was not on the screen.
+    // The negated comparison is true for NaN. A Gaussian behind the near limit in the previous frame has no motion either.
     if !(depth > before.near) {
         return vec2(0.0);
     }
     let parallel = instance.orthographic != 0u;
     let ndc = vec2(dot(before.clip_x, mean), dot(before.clip_y, mean)) / select(depth + 1e-7, 1.0, parallel);
     let size = vec2<f32>(instance.size);
-    // As `project` places it.
+    // The same formula as in `project`.
     let center_before = ((ndc + 1.0) * size - 1.0) * 0.5;
-    // What comes from outside the picture has no place in the one before: the whole picture is far enough.
+    // The motion of splats that enter from outside the picture is clamped to the size of the picture.
     return clamp(center - center_before, -size, size);
 }
 
@@ -76,7 +76,7 @@ fn motion(@builtin(global_invocation_id) id: vec3<u32>) {
         return;
     }
     let moved = motion_of(index_of(id.x), splats[slot].place.xy);
-    // The last word is of the tiles.
+    // The last word contains tile coordinates and is unchanged.
     splats[slot].color = vec4(bitcast<vec2<u32>>(moved), 0u, splats[slot].color.w);
 }
 #endif

@@ -32,9 +32,9 @@ const FRUSTUM_CLAMP: f32 = 1.3;
 
 #ifdef BINNED
 @group(0) @binding(1) var<storage, read_write> splats: array<SplatShape>;
-// Counters, see BIN_COUNTERS; then the number of visible splats of each part; then the number of splats of each bin.
+// Counters (see BIN_COUNTERS), then the number of visible splats of each part, then the number of splats of each bin.
 @group(0) @binding(2) var<storage, read_write> bins: array<atomic<u32>>;
-// Bin by bin: the depth key of a splat, and its slot with the tiles of the bin that it covers.
+// Bin by bin: the depth key of a splat, and a word with its slot and the tiles of the bin that it covers.
 @group(0) @binding(3) var<storage, read_write> bin_entries: array<vec2<u32>>;
 // The visible splats of each part, from its first slot on.
 @group(0) @binding(4) var<storage, read_write> visible: array<VisibleSplat>;
@@ -44,30 +44,30 @@ const FRUSTUM_CLAMP: f32 = 1.3;
 #endif
 
 #ifdef BINNED
-// Bins that a workgroup counts by itself before it reserves places for all of its splats at once. Fewer counters leave room for more
-// workgroups.
+// Bins whose splats a workgroup counts in workgroup memory before it reserves entries for all of them at once. Fewer counters allow more
+// workgroups to run at the same time.
 #ifdef FEW_BINS
 const OWN_BINS: u32 = 512u;
 #else
 const OWN_BINS: u32 = 2048u;
 #endif
-// Bins into which a thread puts its splat by itself.
+// Largest number of bins into which a single thread writes its splat, unless `wide` is full.
 const OWN_ENTRIES: u32 = 16u;
 const WIDE: u32 = 64u;
 
-// Gaussians of the workgroup that are present, counted from its first, two in each word; the host gives it at most four for each thread.
+// Indices of the workgroup's Gaussians that are present, relative to its first, two per word. The host assigns at most four Gaussians to
+// each thread.
 var<workgroup> present: array<atomic<u32>, 512>;
 var<workgroup> present_count: atomic<u32>;
 var<workgroup> own: array<atomic<u32>, OWN_BINS>;
 var<workgroup> own_visible: atomic<u32>;
 var<workgroup> own_pairs: atomic<u32>;
-// Splats of more bins than OWN_ENTRIES, which all threads put into bins together: as far as there is room for them, tiles, depth key
-// and slot.
+// Splats in more than OWN_ENTRIES bins, at most WIDE, which all threads write into bins together: tiles, depth key and slot.
 var<workgroup> wide: array<vec4<u32>, WIDE>;
 var<workgroup> wide_count: atomic<u32>;
-// Number of visible splats of the part before those of the workgroup.
+// Index in the part's list of the first visible splat of the workgroup.
 var<workgroup> visible_before: u32;
-// Of the splat that project_one made: tiles, first and last + 1; depth; how it is seen, as in VisibleSplat.
+// Output of `project_one`: first and last + 1 tile; depth; `seen` of VisibleSplat.
 var<private> covered: vec4<u32>;
 var<private> covered_depth: f32;
 var<private> covered_seen: vec4<f32>;
@@ -82,7 +82,7 @@ fn bin_grid() -> vec2<u32> {
     return (instance.tiles + side() - 1u) / side();
 }
 
-// Returns the counter of the first bin.
+// Returns the index of the counter of the first bin.
 fn first_bin() -> u32 {
     return BIN_COUNTERS + instance.binning.w;
 }
@@ -92,7 +92,7 @@ fn bins_of(tiles: vec4<u32>) -> vec4<u32> {
     return vec4(tiles.xy, tiles.zw + side() - 1u) / side();
 }
 
-// Puts a splat into one of its bins: into its place among those of the workgroup if they have been counted, else of all.
+// Writes a splat into one of its bins. `by_group`: the workgroup has reserved entries for its splats; otherwise one entry is reserved now.
 fn put_in_bin(x: u32, y: u32, tiles: vec4<u32>, key: u32, slot: u32, by_group: bool) {
     let bin = y * bin_grid().x + x;
     let capacity = instance.binning.y;
@@ -110,7 +110,7 @@ fn put_in_bin(x: u32, y: u32, tiles: vec4<u32>, key: u32, slot: u32, by_group: b
     }
 }
 
-// Clears what a workgroup counts.
+// Clears the counters of a workgroup.
 fn clear_own(thread: u32) {
     let grid = bin_grid();
     for (var i = thread; i < min(grid.x * grid.y, OWN_BINS); i += 256u) {
@@ -140,7 +140,7 @@ fn project_bin(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
         atomicStore(&present[i], 0u);
     }
     workgroupBarrier();
-    // Without those that are absent, few threads of the projection are idle.
+    // Absent Gaussians are removed first, so that few threads of the projection are idle.
     let first_of_group = group.x * instance.per_thread * 256u;
     for (var i = thread; i < instance.per_thread * 256u; i += 256u) {
         if first_of_group + i < instance.count && is_present(index_of(first_of_group + i)) {
@@ -157,8 +157,8 @@ fn project_bin(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
     }
 }
 
-// Projects the Gaussian at a place of those that are present, of which there are `count`, and puts it into its bins. All threads of the
-// workgroup enter.
+// Projects the Gaussian at index `place` of the `count` Gaussians that are present, and writes its splat into its bins. All threads of the
+// workgroup must call this function.
 fn project_and_bin(first_of_group: u32, place: u32, count: u32, thread: u32) {
     let grid = bin_grid();
     let across = grid.x;
@@ -249,14 +249,14 @@ fn project(@builtin(global_invocation_id) id: vec3<u32>) {
 }
 #endif
 
-// Returns the temporal marginal of a Gaussian `dt` after its mean, not yet cut.
+// Returns the temporal marginal of a Gaussian `dt` after its temporal mean, without the cut-off.
 fn marginal_of(dt: f32, inverse_sigma_t: f32) -> f32 {
     let z = dt * inverse_sigma_t;
     return exp(-0.5 * z * z);
 }
 
 #ifdef BINNED
-// Whether a Gaussian may show at the time of the instance.
+// Returns whether a Gaussian may be visible at the time of the instance.
 fn is_present(index: u32) -> bool {
     let lifespan = load_lifespan(index);
     return marginal_of(instance.time - lifespan.x, lifespan.y) > MARGINAL_CUTOFF || instance.debug == DEBUG_ACTIVE;
@@ -265,7 +265,7 @@ fn is_present(index: u32) -> bool {
 
 // Writes the splat of a Gaussian into its slot and returns its depth key.
 fn project_one(index: u32, slot: u32) -> u32 {
-    // Half of the record is enough to drop an absent Gaussian.
+    // The lifespan is enough to reject an absent Gaussian.
     let lifespan = load_lifespan(index);
     let dt = instance.time - lifespan.x;
     var marginal = marginal_of(dt, lifespan.y);
@@ -280,7 +280,7 @@ fn project_one(index: u32, slot: u32) -> u32 {
     let mean = vec4(g.mean + g.velocity * dt, 1.0);
     if instance.cropped != 0u {
         let place = vec3(dot(instance.crop_x, mean), dot(instance.crop_y, mean), dot(instance.crop_z, mean));
-        // Written so that NaN is outside.
+        // The negated comparison is true for NaN, which counts as outside.
         if !all(abs(place) <= vec3(1.0)) {
             return INVISIBLE;
         }
@@ -294,7 +294,7 @@ fn project_one(index: u32, slot: u32) -> u32 {
     let ndc = vec2(dot(instance.clip_x, mean), dot(instance.clip_y, mean)) / select(q.z + 1e-7, 1.0, parallel);
     let center = ((ndc + 1.0) * size - 1.0) * 0.5;
 
-    // The nesting of min and max matters: with the field-of-view sentinel the limits are negative.
+    // The nesting of min and max is significant: with the field-of-view sentinel the limits are negative.
     let limit = FRUSTUM_CLAMP * instance.reach;
     let ray = select(min(limit, max(-limit, q.xy / q.z)), vec2(0.0), parallel);
     let j = instance.focal / select(q.z, 1.0, parallel);
@@ -311,14 +311,14 @@ fn project_one(index: u32, slot: u32) -> u32 {
     }
     let mid = 0.5 * (a + c);
     let radius = ceil(3.0 * sqrt(mid + sqrt(max(0.1, mid * mid - det))));
-    // Neither infinite nor NaN.
+    // The negated comparison rejects infinity and NaN.
     if !(radius <= 3.4e38) {
         return INVISIBLE;
     }
     let opacity = g.opacity * marginal * instance.opacity * compensation(j, vec3(a, b, c), det);
     let square = tiles_of(center, radius, vec2<f32>(instance.tiles));
     let tiles = contributing_tiles(square, center, vec2(a, c), det, opacity);
-    // Written so that NaN is invisible.
+    // The negated comparison is true for NaN, which counts as invisible.
     if !(tiles.z > tiles.x && tiles.w > tiles.y) {
         return INVISIBLE;
     }
@@ -344,18 +344,18 @@ fn project_one(index: u32, slot: u32) -> u32 {
     }
     splats[slot] = record_of(Splat(center, opacity, q.z, conic, color), pack_tiles(tiles));
 #endif
-    // Positive floats have the same order as their bits. Depths are taken from the near plane of an orthographic
-    // camera, which may be behind it.
+    // Positive floats have the same order as their bits. For an orthographic camera, depths are measured from the near plane, which may be
+    // behind the camera.
     return bitcast<u32>(select(q.z, q.z - instance.near, parallel));
 }
 
-// Returns the factor on the opacity of a splat that the low-pass makes larger than it was in training. `per_unit` is in pixels for each
-// camera unit.
+// Returns the factor on the opacity of a splat that compensates for a low-pass that is wider than it was in training. `per_unit` is in
+// pixels per camera unit.
 fn compensation(per_unit: vec2<f32>, covariance: vec3<f32>, det: f32) -> f32 {
     let trained = instance.trained_variance * LOW_PASS * per_unit * per_unit;
     let wider = max(LOW_PASS - trained, vec2(0.0));
     if all(wider == vec2(0.0)) {
-        // Exactly, whatever the rounding.
+        // Exactly 1, independent of rounding.
         return 1.0;
     }
     let before = (covariance.x - wider.x) * (covariance.z - wider.y) - covariance.y * covariance.y;
@@ -364,12 +364,12 @@ fn compensation(per_unit: vec2<f32>, covariance: vec3<f32>, det: f32) -> f32 {
 
 fn debug_color(g: Gaussian, absent: bool) -> vec3<f32> {
     if instance.debug == DEBUG_VELOCITY {
-        // Distance over the whole time interval; one unit is halfway to full color.
+        // Distance moved over the whole time interval; a distance of one unit is half saturated.
         let distance = g.velocity * instance.time_span;
         return 0.5 + 0.5 * distance / (1.0 + length(distance));
     }
     if instance.debug == DEBUG_LIFESPAN {
-        // A tenth of the time interval is in the middle.
+        // A deviation of a tenth of the time interval is in the middle of the scale.
         return heat(0.25 + 0.75 / (1.0 + 0.1 * instance.time_span * g.inverse_sigma_t));
     }
     return select(vec3(0.1, 0.8, 0.2), vec3(0.9, 0.1, 0.1), absent);

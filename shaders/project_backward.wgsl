@@ -1,5 +1,5 @@
-// project_backward: from the gradients of splats to those of the raw parameters: projection, slice, color and activations.
-// In: what `project` read and wrote, the sums of `blend_backward`. Out: the gradients of this view, added to those of the batch so far.
+// project_backward: converts gradients of splats to gradients of raw parameters, through projection, slice, color and activations.
+// In: the inputs and outputs of `project`, the sums of `blend_backward`. Out: the gradients of this view, added to the gradients of the batch.
 // CPU reference: src/gaussian/gradient.rs; equations: sections 7.2 to 7.4 of the 4DGS model. COMPAT: as the original computes them, with
 // the deviations of section 7.5. ATOMIC_SUMS: `blend_backward` has summed over the pairs of each splat.
 #import gs4d::types::{SplatRecord, TrainedRecord, TrainedScene, INVISIBLE}
@@ -11,13 +11,13 @@
 #import gs4d::trained::{opacity_of, outer, slice_of, STATIC_3D, UNROTATED_4D}
 #import gs4d::slice_backward::{is_finite, is_finite_slice, through_slice}
 
-// As in `project`.
+// The same values as in `project`.
 const FRUSTUM_CLAMP: f32 = 1.3;
 const LOW_PASS: f32 = 0.3;
 const TAU: f32 = 6.2831853;
-// As in `blend_backward`.
+// The same value as in `blend_backward`.
 const SUMS: u32 = 10u;
-// Place of the first Gaussian in the notes.
+// Index of the first Gaussian in `notes`.
 const FIRST_SEEN: u32 = 3u;
 
 @group(0) @binding(1) var<uniform> scene: TrainedScene;
@@ -29,8 +29,8 @@ const FIRST_SEEN: u32 = 3u;
 @group(3) @binding(1) var<storage, read> harmonics: array<vec4<f32>>;
 @group(3) @binding(2) var<storage, read_write> trained_gradients: array<TrainedRecord>;
 @group(3) @binding(3) var<storage, read_write> harmonic_gradients: array<vec4<f32>>;
-// Gradients that are not finite so far: their number, one more than the index of the Gaussian and the number of the view of the first.
-// Then a word for each Gaussian: 1 if a view of the batch shows it.
+// Number of gradients that are not finite so far; for the first of them the index of the Gaussian plus one and the number of the view. Then
+// one word for each Gaussian: 1 if it is visible in a view of the batch.
 @group(3) @binding(4) var<storage, read_write> notes: array<atomic<u32>>;
 
 // Sums over the pairs of a splat, see `blend_backward`.
@@ -64,7 +64,7 @@ fn sums_of(slot: u32) -> Sums {
     return sums;
 }
 
-// What the color passes on: gradients with respect to the direction and to the time since the frame.
+// Gradients of the color with respect to the viewing direction and to the time from the frame to the mean.
 struct ColorSlope {
     direction: vec3<f32>,
     time: f32,
@@ -100,7 +100,7 @@ fn color_backward(index: u32, g: vec3<f32>, d: vec3<f32>, tau: f32) -> ColorSlop
             let present = vec4<f32>(vec4(0u, 1u, 2u, 3u) + 4u * group < vec4(coefficients));
             basis *= present;
             let at = index * instance.stride + 12u * n + 3u * group;
-            // One or four of the coefficients are present: those of degree 2 end with one.
+            // One or four coefficients of a group are present: degree 2 has nine coefficients.
             let u = harmonics[at];
             var v = vec4(0.0);
             var w = vec4(0.0);
@@ -115,7 +115,7 @@ fn color_backward(index: u32, g: vec3<f32>, d: vec3<f32>, tau: f32) -> ColorSlop
             var b = factor * basis;
 #ifdef COMPAT
 #ifndef WITHOUT_TIME
-            // The original takes the constant basis for the second coefficient.
+            // The original uses the constant basis function for the second coefficient.
             if group == 0u && n == 0u && coefficients > 1u {
                 b.y = 0.28209479;
             }
@@ -171,7 +171,7 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
     let by_opacity = sums.opacity / splat.opacity;
     let by_color = select(vec3(0.0), sums.color, splat.color > vec3(0.0));
 
-    // Section 7.2: as in `project`.
+    // Section 7.2: the projection, as in `project`.
     let q = vec3(dot(instance.camera_x, at), dot(instance.camera_y, at), dot(instance.camera_z, at));
     let limit = FRUSTUM_CLAMP * instance.reach;
     let free = q.xy / q.z;
@@ -202,7 +202,7 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
     var by_z = -j.x / q.z * dot(by_mx, instance.camera_x.xyz) - j.y / q.z * dot(by_my, instance.camera_y.xyz)
         - 2.0 * dot(ray, by_ray);
 #ifndef COMPAT
-    // A clamped ray moves with the depth.
+    // The point of a clamped ray moves with the depth.
     by_z += dot(ray * by_ray, vec2<f32>(is_clamped));
 #endif
     let by_q = vec3(select(by_ray, vec2(0.0), is_clamped), by_z + sums.depth);
@@ -272,7 +272,7 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
     }
 }
 
-// Notes a gradient that is not finite; it is left out.
+// Counts a gradient that is not finite, which is left out.
 fn report(index: u32) {
     if atomicAdd(&notes[0], 1u) == 0u {
         atomicStore(&notes[1], index + 1u);

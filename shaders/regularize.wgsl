@@ -1,22 +1,22 @@
-// regularize: the terms of the loss that depend on Gaussians alone: motion, motion unlike that of neighbors, opacity.
+// regularize: the terms of the loss that depend on Gaussians alone: motion, difference of motion from neighbors (rigidity), opacity.
 // In: raw parameters, their slice, the neighbors of each Gaussian. Out: the gradients of the terms with respect to the raw parameters, added
-// to those of the batch. CPU reference: src/offline/fine_tune/terms.rs, where the terms are defined.
+// to the gradients of the batch. CPU reference: src/offline/fine_tune/terms.rs, which defines the terms.
 #import gs4d::types::{GaussianRecord, TermWeights, TrainedRecord, TrainedScene}
 #import gs4d::trained::{opacity_of, slice_of, ROTATED_4D}
 #import gs4d::slice_backward::{is_finite_slice, through_slice}
 
-// Neighbors of each Gaussian, itself included.
+// Neighbors of each Gaussian, including itself.
 const NEIGHBORS: u32 = 20u;
 // The weight of a neighbor is exp(-FALLOFF distance).
 const FALLOFF: f32 = 100.0;
-// A shorter vector has no direction; its square would have no digits.
+// A shorter vector counts as zero: its square underflows.
 const LEAST_LENGTH: f32 = 1e-15;
 
 @group(0) @binding(0) var<uniform> scene: TrainedScene;
 @group(0) @binding(1) var<uniform> weights: TermWeights;
 @group(0) @binding(2) var<storage, read> trained: array<TrainedRecord>;
 @group(0) @binding(3) var<storage, read> gaussians: array<GaussianRecord>;
-// NEIGHBORS indices for each Gaussian. Not read unless the rigid term has a weight.
+// NEIGHBORS indices for each Gaussian. Read only if the rigid term has a weight.
 @group(0) @binding(4) var<storage, read> neighbors: array<u32>;
 @group(0) @binding(5) var<storage, read_write> trained_gradients: array<TrainedRecord>;
 
@@ -53,7 +53,7 @@ fn regularize(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let sliced = slice_of(raw, scene.model);
     let shape = through_slice(raw, scene.model, sliced, mat3x3<f32>(), by_velocity, 0.0);
-    // As in `project_backward`, what is not finite is left out.
+    // As in `project_backward`, gradients that are not finite are left out.
     if is_finite_slice(shape) {
         let before = trained_gradients[index];
         trained_gradients[index] = TrainedRecord(

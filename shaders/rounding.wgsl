@@ -1,5 +1,5 @@
-// rounding: from Gaussians as they are trained to what a package would hold of them, for the last steps of training.
-// In: the records that `slice` wrote, what rounding changes of each. Out: the same records, rounded. CPU reference:
+// rounding: replaces trained Gaussians by the values that a package stores of them, for the last steps of training.
+// In: the records that `slice` wrote, the change that rounding makes to each. Out: the same records, rounded. CPU reference:
 // src/scene/packed/rounding.rs.
 #import gs4d::types::{GaussianRecord, RoundingRecord, TrainedScene}
 #import gs4d::trained::diagonal
@@ -17,7 +17,7 @@ fn rounding(@builtin(global_invocation_id) id: vec3<u32>) {
     let g = gaussians[id.x];
     let own = roundings[id.x];
     let mean = g.mean + own.mean;
-    // A factor keeps a Gaussian that is present at every time, whose rate is 0, and every other rate positive.
+    // A factor keeps an inverse_sigma_t of 0 (a Gaussian that is present at every time) at 0, and every other inverse_sigma_t positive.
     let velocity = vec4(g.velocity.xyz + own.velocity.xyz, g.velocity.w * own.velocity.w);
     let a = g.covariance_a;
     let b = g.covariance_b;

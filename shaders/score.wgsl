@@ -1,8 +1,8 @@
 // score: the contribution of each Gaussian to a view, without float atomics.
-// In: what `blend` reads. Out: for each slot, sums over pixels of c = alpha T (contribution) and c^2 (energy), and the
+// In: the inputs and the output of `blend`. Out: for each slot, sums over pixels of c = alpha T (contribution) and c^2 (energy), and the
 // sum over pixels and channels of (c (color - behind))^2 (removal). `place` writes the first pair of each splat;
-// `pairs` sums every pair over its tile, one workgroup each; `gather` sums the pairs of each slot in a fixed order, so
-// that the result is the same on every run. CPU reference: src/offline/score/reference.rs.
+// `pairs` sums every pair over its tile, one workgroup per tile; `gather` sums the pairs of each slot in a fixed order, so
+// that the result is the same in every run. CPU reference: src/offline/score/reference.rs.
 #import gs4d::alpha::{alpha_at, is_opaque, is_skipped, left_behind}
 #import gs4d::tile::{pixel_of, tile_count, tile_index}
 #import gs4d::types::INVISIBLE
@@ -19,11 +19,11 @@ const BATCH: u32 = 8u;
 @group(1) @binding(1) var<storage, read_write> pair_scores: array<vec4<f32>>;
 @group(1) @binding(2) var<storage, read_write> scores: array<vec4<f32>>;
 
-// Of the batch: c and the squared removal of each pixel, splat by splat; then their sums over eight pixels.
+// For the batch: c and the squared removal of each pixel, splat by splat; then their sums over eight pixels.
 var<workgroup> contribution: array<f32, 2048>;
 var<workgroup> removal: array<f32, 2048>;
 var<workgroup> partial: array<vec3<f32>, 256>;
-// Number of pixels of this tile that need no more splats.
+// Number of finished pixels of this tile.
 var<workgroup> finished: atomic<u32>;
 
 @compute @workgroup_size(256)
@@ -65,7 +65,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
     let range = tile_ranges[tile_index(tile.xy, frame.tiles.x)];
     let inside = all(at < frame.size);
 
-    // What is behind each splat follows from the finished pixel.
+    // The color behind a splat is computed from the finished pixel.
     var total = vec3(0.0);
     if inside {
         total = textureLoad(color, at, 0).xyz;
@@ -113,7 +113,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
             }
             pair_scores[pair_of(pair_splats[first + thread], tile.xy)] = vec4(sum, 0.0);
         }
-        // All pairs that follow contribute nothing, so their sums are set to 0.
+        // All pixels are finished: the remaining pairs contribute nothing.
         if over {
             for (var i = first + BATCH + thread; i < range.y; i += PIXELS) {
                 pair_scores[pair_of(pair_splats[i], tile.xy)] = vec4(0.0);

@@ -1,4 +1,4 @@
-// slice: from the trained form to the runtime form, for the step of training that follows.
+// slice: converts Gaussians from the trained form to the runtime form, once per training step.
 // In: raw parameters. Out: the records that `project` reads. CPU reference: src/gaussian/slice.rs, in double precision.
 #import gs4d::types::{GaussianRecord, TrainedRecord, TrainedScene}
 #import gs4d::trained::{opacity_of, slice_of, ROTATED_4D, STATIC_3D}

@@ -1,7 +1,7 @@
 // sort: one step of a stable radix sort by four bits, for any subgroup size.
 // In: keys and values. Out: both, ordered by the digit at `sort_step.shift`; equal digits keep their order. `count`
-// counts a block of 2048 keys, `scan` sums the counts of all blocks, and `scatter` ranks the keys of a block again and
-// moves them. `visible` writes how many keys the first step kept. CPU reference: src/reference/sort.rs.
+// counts the digits of a block of 2048 keys, `scan` sums the counts of all blocks, and `scatter` ranks the keys of a block and
+// moves them. `visible` writes the number of keys that the first step kept. CPU reference: src/reference/sort.rs.
 #import gs4d::types::{Counters, FrameUniforms, SortStep, INVISIBLE, SORT_SLOTS, SORT_VISIBLE}
 #import gs4d::scan::{exclusive_scan, scan_total}
 
@@ -24,7 +24,7 @@ const NO_DIGIT: u32 = 16u;
 var<workgroup> counts: array<u32, 2176>;
 // Their sums over 16 threads.
 var<workgroup> groups: array<u32, 128>;
-// Where each digit of this block begins in the output.
+// Index in the output of the first key of this block with each digit.
 var<workgroup> starts: array<u32, 16>;
 
 fn key_count() -> u32 {
@@ -45,7 +45,7 @@ fn digit_of(at: u32, count: u32) -> u32 {
     return (key >> sort_step.shift) & 15u;
 }
 
-// Four-bit counters of this thread's keys: digits 0-7 in x, 8-15 in y. Eight keys fit.
+// Adds a key to four-bit counters of this thread's keys: digits 0-7 in x, 8-15 in y. A thread has at most eight keys.
 fn add_digit(packed: vec2<u32>, digit: u32) -> vec2<u32> {
     let one = 1u << (4u * (digit & 7u));
     return packed + select(vec2(0u, one), vec2(one, 0u), digit < 8u);
@@ -55,7 +55,7 @@ fn get_digit(packed: vec2<u32>, digit: u32) -> u32 {
     return (select(packed.y, packed.x, digit < 8u) >> (4u * (digit & 7u))) & 15u;
 }
 
-// Counts this thread's digits and sums them over groups of 16 threads; leaves both in workgroup memory.
+// Counts this thread's digits and sums the counts over groups of 16 threads; both are in workgroup memory afterwards.
 fn count_block(block: u32, thread: u32) {
     let count = key_count();
     let first = block * BLOCK + thread * KEYS_PER_THREAD;
@@ -116,7 +116,7 @@ fn scan(@builtin(workgroup_id) digit: vec3<u32>, @builtin(local_invocation_index
     }
 }
 
-// Writes the number of visible splats, and the number of blocks of the later steps, after the scan of the first step.
+// Writes the number of visible splats and the dispatch size of the later steps, after the scan of the first step.
 @compute @workgroup_size(1)
 fn visible() {
     var sum = 0u;
@@ -139,7 +139,7 @@ fn scatter(@builtin(workgroup_id) block: vec3<u32>, @builtin(local_invocation_in
         }
         starts[thread] = start;
     }
-    // Counts become ranks: the number of keys of the same digit in the threads before.
+    // Replaces counts by ranks: the number of keys of the same digit in earlier threads.
     if thread < 128u {
         let d = thread / 16u;
         var sum = 0u;

@@ -1,16 +1,16 @@
-// sort_bins: sorts the splats of one bin by depth, one workgroup each: the second pass of the fast renderer.
-// In: the bins that `project_bin` filled, in no order. Out: the pairs of each tile in order of depth, then slot, and the range of each
-// tile; the counters of the next frame, cleared. If there is no room for the splats of a bin or for the pairs of its tiles, their
+// sort_bins: sorts the splats of one bin by depth, one workgroup per bin; the second pass of the fast design.
+// In: the unordered bins that `project_bin` filled. Out: the pairs of each tile in order of depth, then slot, and the range of each
+// tile; the counters of the next frame, cleared. If the buffers are too small for the splats of a bin or for the pairs of its tiles, their
 // ranges are NONE: `blend_blocks` searches all splats instead.
 //
 // The list is sorted in workgroup memory: into buckets, then by rank in each bucket. Most depths of a bin may be close together, so
-// the splats are counted in steps of equal width first, and the buckets are chosen so that each has about as many splats. A list
-// that does not fit is sorted in rounds of half as many splats, the nearest first.
+// the splats are first counted in a histogram of equal steps of depth, and the buckets are chosen to have about equal numbers of splats. A
+// list longer than LIST is sorted in rounds of ROUND splats, the nearest first.
 #import gs4d::types::{FrameUniforms, BIN_COUNTERS}
 #import gs4d::bins::{is_after, FIRST, NONE, SLOT_MASK}
 #import gs4d::nearest::{begin_search, clear_intervals, count_candidate, next_search}
 
-// Splats that are sorted at once.
+// Largest number of splats that are sorted at once.
 #ifdef LONG_LISTS
 const THREADS: u32 = 512u;
 const LIST: u32 = 5120u;
@@ -21,12 +21,12 @@ const LIST: u32 = 2304u;
 const THREADS: u32 = 256u;
 const LIST: u32 = 1280u;
 #endif
-// Splats of one round.
+// Largest number of splats of one round.
 const ROUND: u32 = LIST / 2u;
 const LANES: u32 = 32u;
-// Steps of the sort, one for each thread.
+// Steps of the histogram of depths, one for each thread.
 const STEPS: u32 = THREADS;
-// Buckets of the sort, two for each thread: more of them leave fewer splats to compare.
+// Buckets of the sort, two for each thread. More buckets mean fewer comparisons.
 const BUCKETS: u32 = 2u * THREADS;
 
 @group(0) @binding(0) var<uniform> frame: FrameUniforms;
@@ -37,15 +37,15 @@ const BUCKETS: u32 = 2u * THREADS;
 @group(0) @binding(4) var<storage, read_write> tile_ranges: array<vec2<u32>>;
 @group(0) @binding(5) var<storage, read_write> pair_splats: array<u32>;
 
-// First the depth keys of the list, in no order, and in rounds the second words of its entries from ROUND on; then the second
-// words, in order. The last key is greater than all.
+// Before sorting: the depth keys of the list, unordered; in rounds also the second words of its entries, from ROUND on. After sorting: the
+// second words, in order. The key at LIST is greater than all others.
 var<workgroup> list: array<u32, LIST + 1u>;
-// Low half: first the place of a splat in its bucket, then its place in the order. High half: the index of the splat at this
-// place of all buckets; after the last, that of the last key.
+// Low half: the index of a splat in its bucket, then its rank in the order. High half: the splat at this index of all buckets, followed by
+// LIST.
 var<workgroup> places: array<atomic<u32>, LIST + 1u>;
-// Number of splats of each step, then of those before it.
+// Number of splats of each step, then number of splats in earlier steps.
 var<workgroup> steps: array<atomic<u32>, STEPS + 1u>;
-// Number of splats of each bucket, then its first place: two in each word.
+// Number of splats of each bucket, then the index of its first splat: two buckets per word.
 var<workgroup> buckets: array<atomic<u32>, BUCKETS / 2u + 1u>;
 #ifndef SUBGROUPS_OF_32
 var<workgroup> sums: array<u32, THREADS>;
@@ -57,23 +57,23 @@ var<workgroup> group_pairs: array<vec4<u32>, THREADS / LANES>;
 var<workgroup> listed: atomic<u32>;
 var<workgroup> least: atomic<u32>;
 var<workgroup> greatest: atomic<u32>;
-// The same of all entries of a bin that is sorted in rounds.
+// Least and greatest key of all entries of a bin that is sorted in rounds.
 var<workgroup> least_of_all: atomic<u32>;
 var<workgroup> greatest_of_all: atomic<u32>;
-// Number of pairs of each tile with the list and with the bin; the first pair of the bin and the next of each tile.
+// Number of pairs of each tile in the list, and in the bin; the first pair of the bin, and the next pair of each tile.
 var<workgroup> totals: array<vec4<u32>, 4>;
 var<workgroup> counted: array<u32, 16>;
 var<workgroup> first_pair: u32;
 var<workgroup> next_pairs: array<u32, 16>;
 
-// Entries of a bin that a thread takes at once.
+// Four entries of a bin, which a thread loads at once.
 struct FourEntries {
     keys: vec4<u32>,
     words: vec4<u32>,
 }
 
-// Returns entries `i`, `i + THREADS`, .. of a bin of `count`, whose last stands for those after it. Loaded at once, so that a thread waits
-// for memory once.
+// Returns entries `i`, `i + THREADS`, .. of a bin of `count` entries; indices are clamped to the last. The entries are loaded at once, so that
+// a thread waits for memory once.
 fn four_entries(first: u32, i: u32, count: u32) -> FourEntries {
     let at = first + min(vec4(i) + THREADS * vec4(0u, 1u, 2u, 3u), vec4(count - 1u));
     let a = bin_entries[at.x];
@@ -83,8 +83,8 @@ fn four_entries(first: u32, i: u32, count: u32) -> FourEntries {
     return FourEntries(vec4(a.x, b.x, c.x, d.x), vec4(a.y, b.y, c.y, d.y));
 }
 
-// Lists entries `first` to `first + count` of the bin if `whole`, else those after `lower` and not after `upper`, which fit a round. Returns
-// how many there are.
+// Lists all entries from `first` to `first + count` if `whole`, otherwise the entries after `lower` and not after `upper`, which fit into a
+// round. Returns their number.
 fn collect(first: u32, count: u32, whole: bool, lower: vec2<u32>, upper: vec2<u32>, thread: u32) -> u32 {
     workgroupBarrier();
     if thread == 0u {
@@ -128,7 +128,7 @@ fn collect(first: u32, count: u32, whole: bool, lower: vec2<u32>, upper: vec2<u3
     return workgroupUniformLoad(&listed);
 }
 
-// The last place up to which the entries of a bin after `lower` fit a round.
+// Returns the last position up to which the entries of a bin after `lower` fit into a round.
 fn last_fitting(first: u32, count: u32, lower: vec2<u32>, thread: u32) -> vec2<u32> {
     let least_key = max(lower.x, workgroupUniformLoad(&least_of_all));
     var search = begin_search(lower, least_key, workgroupUniformLoad(&greatest_of_all));
@@ -145,7 +145,7 @@ fn last_fitting(first: u32, count: u32, lower: vec2<u32>, thread: u32) -> vec2<u
     return search.last;
 }
 
-// Returns the sum of the values of all threads before this one. Two numbers below 65536 in one value do not disturb each other.
+// Returns the sum of the values of all threads before this one. A value may hold two 16-bit numbers whose sums stay below 65536.
 fn sum_before(value: u32, thread: u32) -> u32 {
     var sum = 0u;
 #ifdef SUBGROUPS_OF_32
@@ -180,13 +180,13 @@ fn sum_before(value: u32, thread: u32) -> u32 {
     return sum;
 }
 
-// Returns the step of a key, and how far in it the key is.
+// Returns the step of a key, and the position of the key in the step from 0 to 1.
 fn step_of(key: u32, low: u32, scale: f32) -> vec2<f32> {
     let at = f32(key - low) * scale;
     return vec2(floor(at), fract(at));
 }
 
-// Returns the bucket of a key; greater keys have the same or greater buckets.
+// Returns the bucket of a key. It increases monotonically with the key.
 fn bucket_of(key: u32, low: u32, scale: f32, share: f32) -> u32 {
     let step = step_of(key, low, scale);
     let first = atomicLoad(&steps[u32(step.x)]);
@@ -194,13 +194,13 @@ fn bucket_of(key: u32, low: u32, scale: f32, share: f32) -> u32 {
     return min(u32((f32(first) + step.y * f32(count)) * share), BUCKETS - 1u);
 }
 
-// Counts a splat of a bucket. Returns how many there were.
+// Adds a splat to the count of a bucket. Returns the previous count.
 fn count_in(bucket: u32) -> u32 {
     let half = 16u * (bucket & 1u);
     return (atomicAdd(&buckets[bucket / 2u], 1u << half) >> half) & 0xffffu;
 }
 
-// Returns the first place of a bucket.
+// Returns the index of the first splat of a bucket.
 fn first_of(bucket: u32) -> u32 {
     return (atomicLoad(&buckets[bucket / 2u]) >> (16u * (bucket & 1u))) & 0xffffu;
 }
@@ -213,7 +213,7 @@ fn word_of(i: u32, first: u32, whole: bool) -> u32 {
     return list[ROUND + i];
 }
 
-// Sorts the first `count` of the list: it becomes the second words of their entries, in order.
+// Sorts the first `count` keys of the list and replaces them by the second words of their entries, in order.
 fn sort_list(first: u32, count: u32, whole: bool, thread: u32) {
     atomicStore(&steps[thread], 0u);
     atomicStore(&buckets[thread], 0u);
@@ -254,7 +254,7 @@ fn sort_list(first: u32, count: u32, whole: bool, thread: u32) {
         let bucket = bucket_of(own, low, scale, share);
         let begin = first_of(bucket);
         let end = first_of(bucket + 1u);
-        // Two at a time, so that a thread waits for half as many. One after the last has a greater key.
+        // Two at a time, which halves the number of waits for memory. The element after the last has a greater key.
         var less = vec2(0u);
         var same = vec2(0u);
         for (var k = begin; k < end; k += 2u) {
@@ -264,7 +264,7 @@ fn sort_list(first: u32, count: u32, whole: bool, thread: u32) {
             same += select(vec2(0u), vec2(1u), keys == vec2(own));
         }
         var place = begin + less.x + less.y;
-        // One of them is the splat itself.
+        // The splat itself is one of the equal keys.
         if same.x + same.y > 1u {
             for (var k = begin; k < end; k++) {
                 let other = atomicLoad(&places[k]) >> 16u;
@@ -273,7 +273,7 @@ fn sort_list(first: u32, count: u32, whole: bool, thread: u32) {
                 }
             }
         }
-        // Only this thread changes this half; the others read the high one.
+        // Only this thread writes the low half; other threads read the high half.
         atomicStore(&places[i], (atomicLoad(&places[i]) & 0xffff0000u) | place);
     }
     workgroupBarrier();
@@ -292,7 +292,7 @@ fn sort_list(first: u32, count: u32, whole: bool, thread: u32) {
     workgroupBarrier();
 }
 
-// Whether one of two splats of the same depth comes before the other: by slot.
+// Returns whether splat `a` comes before splat `b` of the same depth: the order of their slots.
 fn comes_before(a: u32, b: u32, first: u32, whole: bool) -> bool {
     return (word_of(a, first, whole) & SLOT_MASK) < (word_of(b, first, whole) & SLOT_MASK);
 }
@@ -302,12 +302,12 @@ fn side() -> u32 {
     return frame.binning.x & 0xffu;
 }
 
-// Returns a tile of a bin; they are numbered row by row.
+// Returns the coordinates of a tile in its bin. Tiles are numbered row by row.
 fn tile_in_bin(number: u32) -> vec2<u32> {
     return vec2(number % side(), number / side());
 }
 
-// Returns the tiles of a bin that an entry covers, one bit each.
+// Returns the tiles of a bin that an entry covers, one bit per tile.
 fn tiles_covered(word: u32) -> u32 {
     let columns = (1u << (((word >> 28u) & 3u) + 1u)) - (1u << ((word >> 24u) & 3u));
     let rows = (1u << (side() * ((word >> 30u) + 1u))) - (1u << (side() * ((word >> 26u) & 3u)));
@@ -315,25 +315,25 @@ fn tiles_covered(word: u32) -> u32 {
     return columns * (rows & select(0x5u, 0x1111u, side() == 4u));
 }
 
-// Returns sixteen bits, four in each word, a byte each. A thread adds up fewer than 256 of them.
+// Expands sixteen bits to sixteen bytes, four per word. A thread sums fewer than 256 of them.
 fn in_bytes(bits: u32) -> vec4<u32> {
     let fours = (vec4(bits) >> vec4(0u, 4u, 8u, 12u)) & vec4(15u);
-    // Copies of the four bits, seven bits apart: one of each copy is the first of a byte.
+    // Four copies of the four bits, seven bits apart: bit k of copy k is the lowest bit of byte k.
     return (fours * 0x00204081u) & vec4(0x01010101u);
 }
 
-// Returns the first two bytes of each of two words and the last two, two in each word.
+// Expands the eight bytes of two words to 16-bit numbers, two per word.
 fn halves(bytes: vec2<u32>) -> vec4<u32> {
     let pairs = vec4(bytes.x, bytes.x >> 16u, bytes.y, bytes.y >> 16u);
     return (pairs & vec4(0xffu)) | ((pairs & vec4(0xff00u)) << vec4(8u));
 }
 
-// Returns the four numbers of two words.
+// Returns the four 16-bit numbers of two words.
 fn quarters(low: u32, high: u32) -> vec4<u32> {
     return vec4(low & 0xffffu, low >> 16u, high & 0xffffu, high >> 16u);
 }
 
-// Returns the sums of eight small numbers, two in each word, over all threads before this one. The sums over all threads become those of
+// Returns the sums of eight 16-bit numbers, two per word, over all threads before this one. Writes the sums over all threads to the totals of
 // tiles `number` to `number + 8`.
 fn sums_before(eight: vec4<u32>, number: u32, thread: u32) -> vec4<u32> {
     var before: vec4<u32>;
@@ -362,8 +362,8 @@ fn sums_before(eight: vec4<u32>, number: u32, thread: u32) -> vec4<u32> {
     return before;
 }
 
-// Counts the pairs of the entries of a thread with all tiles of the bin, a byte each: returns those of earlier threads, tiles 0 to 7 and 8
-// to 15, two in each word.
+// Returns the number of pairs of earlier threads with each tile of the bin, two per word: tiles 0 to 7, then 8 to 15. `own` is the number of
+// pairs of this thread, one byte per tile.
 fn pairs_before(own: vec4<u32>, thread: u32) -> array<vec4<u32>, 2> {
     var before = array(sums_before(halves(own.xy), 0u, thread), vec4(0u));
     if side() == 4u {
@@ -377,7 +377,7 @@ fn reserve(corner: vec2<u32>, thread: u32) {
     let tiles = side() * side();
     var before = 0u;
     var total = 0u;
-    // Always sixteen, so that all are loaded at once.
+    // A constant count, so that all sixteen are loaded at once.
     for (var number = 0u; number < 16u; number++) {
         let more = select(0u, counted[number], number < tiles);
         before += select(0u, more, number < thread);
@@ -403,7 +403,7 @@ fn write_range(corner: vec2<u32>, number: u32, range: vec2<u32>) {
     }
 }
 
-// Writes a pair with each of four tiles that `bits` has a bit of, and moves its place on.
+// Writes a pair for each of four tiles whose bit is set in `bits`, and advances the index of the next pair of the tile.
 fn put_pairs(pairs: ptr<function, vec4<u32>>, bits: u32, slot: u32) {
     let hit = (vec4(bits) >> vec4(0u, 1u, 2u, 3u)) & vec4(1u);
     for (var k = 0u; k < 4u; k++) {
@@ -414,12 +414,12 @@ fn put_pairs(pairs: ptr<function, vec4<u32>>, bits: u32, slot: u32) {
     *pairs += hit;
 }
 
-// Returns the places of the next pairs of four tiles.
+// Returns the indices of the next pairs of four tiles.
 fn next_four(number: u32) -> vec4<u32> {
     return vec4(next_pairs[number], next_pairs[number + 1u], next_pairs[number + 2u], next_pairs[number + 3u]);
 }
 
-// Writes the pairs of the sorted list with all tiles of a bin, after reserving room for them if there is none.
+// Writes the pairs of the sorted list with all tiles of a bin. Reserves space for them first unless `reserved`.
 fn write_pairs(count: u32, corner: vec2<u32>, reserved: bool, thread: u32) {
     let each = (count + THREADS - 1u) / THREADS;
     let first = min(thread * each, count);
@@ -455,7 +455,7 @@ fn write_pairs(count: u32, corner: vec2<u32>, reserved: bool, thread: u32) {
     }
 }
 
-// Adds the sums of `pairs_before` to the pairs that are counted, or starts with them.
+// Adds the totals of `pairs_before` to the number of pairs of each tile. `start`: the number is reset first.
 fn count_all(thread: u32, start: bool) {
     if thread < side() * side() {
         let more = totals[thread / 4u][thread % 4u];
@@ -464,7 +464,7 @@ fn count_all(thread: u32, start: bool) {
     workgroupBarrier();
 }
 
-// Reserves room for the pairs of all entries of a bin, and finds the least and the greatest of their keys.
+// Reserves space for the pairs of all entries of a bin, and finds the least and the greatest key.
 fn reserve_all(first: u32, count: u32, corner: vec2<u32>, thread: u32) {
     if thread == 0u {
         atomicStore(&least_of_all, 0xffffffffu);
@@ -473,7 +473,7 @@ fn reserve_all(first: u32, count: u32, corner: vec2<u32>, thread: u32) {
     workgroupBarrier();
     var least_key = 0xffffffffu;
     var greatest_key = 0u;
-    // As many at once as the halves of words have room for.
+    // In chunks whose counts fit into 16 bits.
     for (var begin = 0u; begin < count; begin += 32768u) {
         let end = min(count, begin + 32768u);
         var own = vec4(0u);
@@ -536,7 +536,7 @@ fn sort_bins(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
         return;
     }
     reserve_all(first, binned, corner, thread);
-    // The last place that has been sorted, and the number of entries up to there.
+    // The last position that has been sorted, and the number of entries up to it.
     var lower = FIRST;
     var done = 0u;
     while done < binned {

@@ -1,11 +1,12 @@
 // contact_shadow: darkens the ground beneath captures.
 //
-// In: for each shadow its ellipse, as the images of the unit disk's middle and of its axes x and z, clip space, and its look: strength and
-// softness, both from 0 to 1. Out: black over the view target, where the depth so far is not nearer. Each is a strip of four vertices.
+// In: for each shadow its ellipse, as the images in clip space of the center and of the x and z axes of the unit disk, and its look: strength
+// and softness, both from 0 to 1. Out: black blended over the view target where the depth test passes. Each shadow is a strip of four
+// vertices.
 
 struct Vertex {
     @builtin(position) clip: vec4<f32>,
-    // In the plane of the disk, whose radius is 1.
+    // Position in the plane of the disk, whose radius is 1.
     @location(0) place: vec2<f32>,
     @location(1) @interpolate(flat) look: vec2<f32>,
 }
@@ -26,7 +27,7 @@ fn vertex(
 @fragment
 fn fragment(vertex: Vertex) -> @location(0) vec4<f32> {
     let distance = length(vertex.place);
-    // The hardest edge is as wide as a pixel.
+    // The hardest edge is one pixel wide.
     let softness = max(vertex.look.y, fwidth(distance));
     return vec4(vec3(0.0), vertex.look.x * smoothstep(0.0, softness, 1.0 - distance));
 }

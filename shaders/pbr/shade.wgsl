@@ -1,7 +1,7 @@
-// shade: what the scene around captures does to them: its light, the shadows of its meshes, its fog.
+// shade: applies the surrounding scene to captures: ambient light, shadows of meshes, fog.
 //
 // In: the captures' color and transmittance (premultiplied, in their blend space) and their depths, for the pixels of the viewport; the
-// lights, shadow maps and fog of Bevy's view (groups 0 and 1). Out: the same picture, shaded; transmittance stays.
+// lights, shadow maps and fog of Bevy's view (groups 0 and 1). Out: the same picture, shaded; transmittance is unchanged.
 #import gs4d::srgb
 #import bevy_pbr::mesh_view_bindings as view_bindings
 #import bevy_pbr::mesh_view_types as view_types
@@ -11,30 +11,30 @@
 #import bevy_pbr::fog::{linear_fog, exponential_fog, exponential_squared_fog, atmospheric_fog}
 #endif
 
-// The largest half float: an infinite pixel would spread through bloom.
+// The largest half-precision number: an infinite pixel would spread through bloom.
 const BRIGHTEST: f32 = 65504.0;
-// Depth of what is infinitely far, camera units: any fog has reached its full strength there.
+// Depth that stands for infinity, camera units: any fog has its full strength there.
 const FAR: f32 = 1e6;
 
-// How one capture is shaded. The same as GpuShading in src/plugin/pbr/shade/uniform.rs.
+// Shading settings of one capture, identical to GpuShading in src/plugin/pbr/shade/uniform.rs.
 struct Shading {
-    // Rows of the transform from the world to the cube from -1 to 1 about the capture.
+    // Rows of the transform from the world to the cube from -1 to 1 that bounds the capture.
     cube_from_world: array<vec4<f32>, 3>,
-    // Linear color of what is in full shadow; w is 1 if the capture receives shadows.
+    // Linear color factor in full shadow; w is 1 if the capture receives shadows.
     tint: vec4<f32>,
-    // How much of the scene's light the capture takes; one over the light it was trained in; offset towards lights, world units.
+    // x: weight of the scene's light; y: reciprocal of the light during training; z: offset towards lights, world units.
     light: vec4<f32>,
 }
 
-// The same as GpuSettings there.
+// Identical to GpuSettings in the same file.
 struct Settings {
-    // Pixels of the captures' picture.
+    // Size of the captures' picture, pixels.
     size: vec2<u32>,
-    // How many shadings there are.
+    // Number of shadings.
     count: u32,
     // Whether the blend space is linear light.
     is_linear: u32,
-    // Whether an environment map surrounds the captures: where it shows through, it is part of their opacity but not of their depth.
+    // Whether an environment map surrounds the captures. It contributes to their opacity but not to their depth.
     is_surrounded: u32,
     shadings: array<Shading, #{MOST_SHADINGS}>,
 }
@@ -44,7 +44,7 @@ struct Settings {
 @group(2) @binding(1) var depths: texture_2d<f32>;
 @group(2) @binding(2) var<uniform> settings: Settings;
 
-// A point that captures show.
+// A point on the visible surface of captures.
 struct Point {
     world: vec3<f32>,
     // Along the camera's z axis: negative in front of it.
@@ -54,7 +54,7 @@ struct Point {
     is_environment: bool,
 }
 
-// The transfer functions, mirrored below 0.
+// The transfer functions, mirrored for negative values.
 fn to_linear(color: vec3<f32>) -> vec3<f32> {
     if settings.is_linear != 0u {
         return color;
@@ -69,7 +69,7 @@ fn to_blend_space(color: vec3<f32>) -> vec3<f32> {
     return sign(color) * srgb::encode(abs(color));
 }
 
-// Returns the point of view space at depth z behind a place of the picture, normalized device coordinates.
+// Returns the point of view space at depth z behind a position in the picture, normalized device coordinates.
 fn view_position(place: vec2<f32>, z: f32) -> vec3<f32> {
     let lens = view_bindings::view.clip_from_view;
     let scale = vec2(lens[0][0], lens[1][1]);
@@ -97,8 +97,8 @@ fn point_at(position: vec2<f32>, alpha: f32) -> Point {
     return point;
 }
 
-// Returns the shading of the capture that shows a point: the one in whose box the point lies deepest, since the picture does not say. The
-// environment map belongs to the one with the largest box.
+// Returns the shading of the capture at a point. The picture does not contain the index of the capture: the capture in whose box the point
+// lies deepest is used. The environment map belongs to the capture with the largest box.
 fn shading_of(point: Point) -> u32 {
     var best = 0u;
     var least = 0.0;
@@ -116,7 +116,7 @@ fn shading_of(point: Point) -> u32 {
     return best;
 }
 
-// Returns the light of the surroundings, as a white surface shows it at the camera's exposure.
+// Returns the ambient light that a white surface reflects, at the camera's exposure.
 fn surrounding_light() -> vec3<f32> {
     var light = view_bindings::lights.ambient_color.rgb;
 #ifdef ENVIRONMENT_MAP
@@ -150,12 +150,12 @@ fn irradiance(direction: vec3<f32>) -> vec3<f32> {
 }
 #endif
 
-// Returns what is left of a color under a light that is visible by a share.
+// Returns the color factor under a light of which a fraction `visibility` arrives.
 fn darkened(tint: vec3<f32>, visibility: f32) -> vec3<f32> {
     return mix(tint, vec3(1.0), visibility);
 }
 
-// Returns the factor of all lights that cast shadows. A capture has no normals: each light is taken to meet it head-on.
+// Returns the color factor of all lights that cast shadows. A capture has no normals: every light counts as perpendicular to the surface.
 fn shadow(point: Point, tint: vec3<f32>, bias: f32) -> vec3<f32> {
     var factor = vec3(1.0);
     for (var i = 0u; i < view_bindings::lights.n_directional_lights; i++) {
@@ -181,7 +181,7 @@ fn shadow(point: Point, tint: vec3<f32>, bias: f32) -> vec3<f32> {
         let squared = dot(ray, ray);
         let toward = ray * inverseSqrt(max(squared, 1e-12));
         let place = vec4(point.world + bias * toward, 1.0);
-        // The window by which Bevy ends lights at their range; without the falloff inside it, since shadows are about contrast.
+        // The window with which Bevy ends lights at their range, without the falloff inside the range: shadows are a contrast.
         let share = squared * (*light).color_inverse_square_range.w;
         let window = saturate(1.0 - share * share);
         var weight = window * window;
@@ -197,7 +197,7 @@ fn shadow(point: Point, tint: vec3<f32>, bias: f32) -> vec3<f32> {
     return factor;
 }
 
-// Returns how much of a spot light's cone a direction towards the light meets.
+// Returns the intensity of a spot light's cone in a direction towards the light, from 0 to 1.
 fn spot_cone(id: u32, toward: vec3<f32>) -> f32 {
     let light = &view_bindings::clustered_lights.data[id];
     let packed = (*light).light_custom_data;
@@ -260,7 +260,7 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
         }
     }
 #ifndef DISTANCE_FOG
-    // What nothing changes stays as it is, to the bit.
+    // An unshaded pixel is unchanged bit for bit.
     if all(factor == vec3(1.0)) {
         return picture;
     }

@@ -5,19 +5,19 @@
 const ALPHA_MIN: f32 = 1.0 / 255.0;
 // 1 / ALPHA_MIN.
 const INVERSE_ALPHA_MIN: f32 = 255.0;
-// Alpha is clamped to this from above.
+// Upper bound of alpha.
 const ALPHA_MAX: f32 = 0.99;
-// Blending stops at a pixel before its transmittance would fall below this.
+// Blending of a pixel stops before the splat that would reduce its transmittance below this value.
 const TRANSMITTANCE_MIN: f32 = 1e-4;
 
-// The blending step, front to back, for a pixel that has `transmittance` left:
+// The blending step, front to back, for a pixel with `transmittance`:
 //
-//     let alpha = alpha_at(..);                          if is_skipped(alpha) the splat changes nothing,
-//     let left = left_behind(transmittance, alpha);      if is_opaque(left) the pixel stops before the splat,
+//     let alpha = alpha_at(..);                          if is_skipped(alpha), the splat is skipped,
+//     let left = left_behind(transmittance, alpha);      if is_opaque(left), the pixel is finished without the splat,
 //     color += alpha * transmittance * splat's color;    transmittance = left.
 //
-// Separate functions, because a single one that returns which of the three cases applies makes `blend` a seventh
-// slower.
+// These are separate functions because a single function that returns which of the three cases applies makes `blend`
+// a seventh slower.
 
 // Returns the alpha of a splat at a pixel; `offset` is the vector from the pixel to the splat's center, pixels.
 // Negative if the falloff would exceed 1.

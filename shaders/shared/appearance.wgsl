@@ -4,7 +4,7 @@
 #import gs4d::srgb::{decode, encode}
 #import gs4d::types::{LIGHTING_AS_TRAINED, LIGHTING_ENCODED}
 
-// As in src/gaussian/harmonics.rs.
+// The same value as in src/gaussian/harmonics.rs.
 const BRIGHTEST: f32 = 1e30;
 
 // Returns a trained color with the light applied, in the blend space.

@@ -1,5 +1,5 @@
 // The Gaussians of one part of a capture and the instance in which they are drawn, for the passes that read them. In: an index. Out: a
-// Gaussian, whole or packed (PACKED_GEOMETRY).
+// Gaussian, read in single precision or unpacked (PACKED_GEOMETRY).
 #define_import_path gs4d::capture
 
 #import gs4d::types::{GaussianRecord, InstanceUniforms}
@@ -9,11 +9,11 @@
 #endif
 
 #ifdef COPIED_INSTANCE
-// One dispatch for several instances of a capture, one for each z of its workgroups: the entry point copies the uniforms of its own. Also
-// for drivers that compile a pass anew for each dispatch if a branch depends on nothing but uniforms at constant places.
+// One dispatch for several instances of a capture, one for each z of its workgroups: the entry point copies the uniforms of its instance.
+// Also for drivers that recompile a pass for each dispatch if a branch depends only on uniforms at constant offsets.
 struct InstanceSlot {
     uniforms: InstanceUniforms,
-    // Up to 512 bytes, as far apart as dynamic offsets are.
+    // Padding to 512 bytes, the distance of dynamic offsets.
     padding: array<vec4<u32>, 13>,
 }
 @group(0) @binding(0) var<uniform> instances: array<InstanceSlot, 64>;
@@ -27,10 +27,10 @@ var<private> instance: InstanceUniforms;
 @group(1) @binding(1) var<storage, read> ranges: array<vec4<f32>>;
 #else
 @group(1) @binding(0) var<storage, read> gaussians: array<GaussianRecord>;
-// mean_t and inverse_sigma_t of each Gaussian once more: most of a long capture is absent, and only this is read of what is.
+// A copy of mean_t and inverse_sigma_t of each Gaussian: most Gaussians of a long capture are absent, and of those only the copy is read.
 @group(1) @binding(1) var<storage, read> lifespans: array<vec2<f32>>;
 #endif
-// The list that `activate` writes; not read without a filter.
+// The list that `activate` writes; read only with a filter.
 @group(2) @binding(0) var<storage, read> active_list: array<u32>;
 
 // Returns the index of the Gaussian of a slot of this part.
@@ -46,7 +46,7 @@ fn load_lifespan(index: u32) -> vec2<f32> {
 #ifdef PACKED_GEOMETRY
     return unpack_lifespan(records[2u * index], ranges[0]);
 #else
-    // A list has few absent ones, and its Gaussians are far apart: their records are read in any case.
+    // A list contains few absent Gaussians, and they are scattered in memory: the records are read anyway.
     if instance.listed != 0u {
         return vec2(gaussians[index].mean.w, gaussians[index].velocity.w);
     }
@@ -65,7 +65,7 @@ fn load_gaussian(index: u32) -> Gaussian {
 #endif
 }
 
-// Returns the direction from which a Gaussian is seen in the view of the instance, `dt` after its mean.
+// Returns the direction from which the instance's camera sees a Gaussian `dt` after its temporal mean.
 fn viewing_direction(g: Gaussian, dt: f32) -> vec3<f32> {
     if instance.orthographic != 0u {
         return instance.camera_position;

@@ -1,5 +1,8 @@
-// The color of a Gaussian from its spherical and temporal harmonics, whole or by codebook (CODED_COLORS). In: the Gaussian and its
-// index, the time since its mean. Out: its color in the blend space.
+// The color of a Gaussian from its spherical and temporal harmonics, stored whole or by codebook (CODED_COLORS). In: the Gaussian, its
+// index and the time since its temporal mean. Out: its color in the blend space.
+//
+// A color is a sum of SHARES partial sums. Each partial sum, called share here and in src/renderer/capture/buffers.rs, has four of the
+// sixteen coefficients of each time harmonic.
 #define_import_path gs4d::color
 
 #import gs4d::records::Gaussian
@@ -14,16 +17,16 @@
 #ifdef CODED_COLORS
 // Three words for each Gaussian.
 @group(3) @binding(0) var<storage, read> color_records: array<u32>;
-// Entries of a multiple of six four-vectors: 48 values of half precision for each time harmonic, in the order of `coded_share`.
+// Entries of a multiple of six four-vectors: 48 half-precision values for each time harmonic, in the order of `coded_share`.
 @group(3) @binding(1) var<storage, read> codebooks: array<vec4<u32>>;
 #else
 @group(3) @binding(0) var<storage, read> harmonics: array<vec4<f32>>;
 #endif
 
-// A color is the sum of this many shares, which several threads can compute.
+// Number of partial sums of a color. In `colors`, each thread computes one.
 const SHARES: u32 = 4u;
 
-// Returns the color from the sum of all shares, in the blend space.
+// Returns the color in the blend space from the sum of all shares.
 fn finished_color(sum: vec3<f32>) -> vec3<f32> {
     return lit(clamp(sum, vec3(0.0), vec3(BRIGHTEST)), instance.lighting, instance.light);
 }
@@ -58,8 +61,7 @@ fn time_factors(tau: f32) -> vec3<f32> {
 }
 
 #ifdef CODED_COLORS
-// Returns a share of a color: that of four of the sixteen coefficients of each time harmonic, from all codebooks, the first with the first
-// coefficient, which is not in the codebooks.
+// Returns a share of a color, summed over all codebooks. The first share includes the first coefficient, which is not in the codebooks.
 fn color_share(share: u32, index: u32, direction: vec3<f32>, tau: f32) -> vec3<f32> {
     var sum = vec3(0.0);
     if share == 0u {
@@ -72,10 +74,10 @@ fn color_share(share: u32, index: u32, direction: vec3<f32>, tau: f32) -> vec3<f
     let times = time_factors(tau);
     let words = vec2(color_records[3u * index + 1u], color_records[3u * index + 2u]);
     let codes = vec4(words.x & 0xffffu, words.x >> 16u, words.y & 0xffffu, words.y >> 16u);
-    // The first entry stands for those of codebooks that are not there.
+    // Unused codebooks read the first entry, with factor 0.
     let used = vec4(0u, 1u, 2u, 3u) < vec4(instance.stages);
     let entries = select(vec4(0u), (instance.first_entries + codes) * (instance.stride / 4u), used);
-    // All are loaded before any is decoded: a thread waits for memory once.
+    // All entries are loaded before any entry is decoded: a thread waits for memory once.
     let a = load_entry(entries.x, share);
     let b = load_entry(entries.y, share);
     let c = load_entry(entries.z, share);
@@ -85,7 +87,7 @@ fn color_share(share: u32, index: u32, direction: vec3<f32>, tau: f32) -> vec3<f
     return sum + factors.z * coded_share(c, share, basis, times) + factors.w * coded_share(d, share, basis, times);
 }
 #else
-// Returns a share of a color: that of four of the sixteen coefficients of each time harmonic.
+// Returns a share of a color.
 fn color_share(share: u32, index: u32, direction: vec3<f32>, tau: f32) -> vec3<f32> {
     let basis = basis_of(share, direction);
     var sum = vec3(select(0.0, 0.5, share == 0u));
@@ -108,7 +110,8 @@ fn color_share(share: u32, index: u32, direction: vec3<f32>, tau: f32) -> vec3<f
 #endif
 
 #ifdef CODED_COLORS
-// The share of an entry of a codebook: words of two values. If an entry has fewer time harmonics, other words of it stand for what it lacks.
+// The share of a codebook entry: words of two values. If an entry has fewer time harmonics, other words of the entry fill the missing ones;
+// their factors are 0.
 struct EntryShare {
     a: vec4<u32>,
     b: vec4<u32>,
@@ -117,8 +120,8 @@ struct EntryShare {
     e: vec4<u32>,
 }
 
-// Returns the share of an entry. The values of the four shares take turns of four words, then of two: threads of one splat read neighboring
-// words.
+// Returns the share of an entry. The words of the four shares are interleaved in groups of four, then of two, so that the threads of one
+// splat read neighboring words.
 fn load_entry(entry: u32, share: u32) -> EntryShare {
     let own = entry + share;
     let pair = entry + share / 2u;

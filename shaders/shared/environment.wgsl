@@ -7,7 +7,7 @@ const RADIUS: f32 = 60.0;
 // sphere.
 fn environment_texel(origin: vec3<f32>, direction: vec3<f32>, size: vec2<u32>) -> vec2<f32> {
     let along = dot(origin, direction);
-    // Rays from outside may miss the sphere: then the point of the ray nearest to it is used.
+    // Rays from outside may miss the sphere: then the point of the ray nearest to the sphere is used.
     let reach = -along + sqrt(max(along * along - (dot(origin, origin) - RADIUS * RADIUS), 0.0));
     let hit = origin + direction * reach;
     let u = atan2(hit.y, hit.x) / 6.2831853 + 0.5;

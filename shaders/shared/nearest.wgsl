@@ -1,6 +1,6 @@
-// The nearest of many splats that fit a list, by counting splats in intervals of the order of blending (depth key, slot).
-// In: for each step, the candidates. Out: the last place up to which those after `lower` fit. At least one does, as no two have the
-// same slot.
+// Selection of the nearest splats that fit into a list, by counting splats in intervals of the order of blending (depth key, slot).
+// In: for each step, the candidates. Out: the last position up to which the candidates after `lower` fit. At least one candidate fits, as
+// slots are unique.
 //
 //     var search = begin_search(lower, least, greatest);
 //     while !search.found {
@@ -9,17 +9,17 @@
 //         search = next_search(search, room, thread);
 //     }
 //
-// Every thread of the workgroup must call these, but for count_candidate.
+// Every thread of the workgroup must call these functions, except count_candidate.
 #define_import_path gs4d::nearest
 
 #import gs4d::bins::is_after
 
 const INTERVALS: u32 = 256u;
-// Intervals are summed in groups of as many by a thread each.
+// Intervals are summed in groups of this number, one thread per group.
 const GROUPED: u32 = 16u;
 
 struct Search {
-    // The place before all candidates, and the range of keys that is divided; of slots if many splats have one key.
+    // The position before all candidates, and the range that is divided: of depth keys, or of slots if more splats than fit have key `key`.
     lower: vec2<u32>,
     low: u32,
     high: u32,
@@ -32,10 +32,10 @@ struct Search {
 
 var<workgroup> intervals: array<atomic<u32>, INTERVALS>;
 var<workgroup> grouped: array<u32, INTERVALS / GROUPED>;
-// The first interval that does not fit, and the number of candidates before it.
+// The first interval that does not fit, and the number of candidates in earlier intervals.
 var<workgroup> fitting: vec2<u32>;
 
-// Starts the search among the candidates after `lower`, which have keys from `low` to `high`.
+// Returns the initial search among the candidates after `lower`, which have keys from `low` to `high`.
 fn begin_search(lower: vec2<u32>, low: u32, high: u32) -> Search {
     return Search(lower, low, high, false, 0u, false, vec2(0u));
 }
@@ -102,7 +102,7 @@ fn next_search(search: Search, room: u32, thread: u32) -> Search {
         next.found = true;
         next.last = select(vec2(last, 0xffffffffu), vec2(search.key, last), search.by_slot);
     } else if bits == 0u {
-        // More splats than fit have one depth: they are told apart by slot.
+        // More splats than fit have the same depth: the search continues by slot.
         next.by_slot = true;
         next.key = start;
         next.low = 0u;

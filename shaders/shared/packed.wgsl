@@ -5,7 +5,7 @@
 #import gs4d::records::Gaussian
 
 const LANE_MAX: f32 = 65535.0;
-// Number of Gaussians in a block, which share the range of their means.
+// Number of Gaussians in a block. The means of a block have a common range.
 const PACKED_BLOCK: u32 = 256u;
 const SHARED_RANGES: u32 = 3u;
 const BLOCK_RANGES: u32 = 2u;

@@ -1,5 +1,5 @@
-// The sorted pairs of a finished frame, for passes that write something for each: `score` and `blend_backward`. Their results are in the order
-// in which `bin` made the pairs, where those of one splat are next to each other.
+// The sorted pairs of a finished frame, for passes that write results for each pair: `score` and `blend_backward`. The results are in the
+// order in which `bin` emitted the pairs: the pairs of one splat are contiguous.
 #define_import_path gs4d::pairs
 
 #import gs4d::tile::pair_of_tile
@@ -15,7 +15,7 @@
 // First pair of each slot.
 @group(1) @binding(0) var<storage, read_write> first_pairs: array<u32>;
 
-// Writes the first pair of a splat, the visible ones in order of depth.
+// Writes the first pair of visible splat `i` in depth order.
 fn place_pairs(i: u32) {
     if i < counters.visible {
         first_pairs[order[i]] = offsets[i];

@@ -1,5 +1,5 @@
-// A pixel on its way from front to back: the surfaces that cut it, the splats that are blended into it, what is behind.
-// Used by `blend` and `blend_blocks`, which differ in how they find the splats. CPU reference: src/reference/blend.rs.
+// Blending of one pixel front to back: opaque surfaces, splats, background. Used by `blend` and `blend_blocks`, which differ in how they find
+// the splats. CPU reference: src/reference/blend.rs.
 #define_import_path gs4d::pixel
 
 #import gs4d::types::{FrameUniforms, BACKGROUND_COLOR, BACKGROUND_ENVIRONMENT, DEBUG_DEPTH, DEBUG_OVERDRAW}
@@ -8,9 +8,9 @@
 #import gs4d::environment::environment_texel
 
 const FAR: f32 = 3.4e38;
-// Number of blended splats at the end of the scale of overdraw.
+// Number of blended splats at the upper end of the overdraw scale.
 const OVERDRAW_MAX: f32 = 64.0;
-// Loops over samples have this bound, so that they are unrolled: software drivers end all loops of a thread after 65,535 turns.
+// Loops over samples have this constant bound, so that they are unrolled: software drivers end all loops of a thread after 65,535 iterations.
 #ifdef MULTISAMPLED
 const SAMPLES_MAX: u32 = 8u;
 #else
@@ -48,11 +48,11 @@ struct Pixel {
     median: f32,
     // Number of splats blended.
     blended: u32,
-    // Number of samples whose surface has been passed, their summed transmittance, and the depth of the next surface.
+    // Number of samples whose surface is in front of the current splat, their summed transmittance, and the depth of the next surface.
     hidden: u32,
     hidden_transmittance: f32,
     limit: f32,
-    // Whether no further splat changes it.
+    // Whether the pixel is finished: no further splat changes it.
     done: bool,
 }
 
@@ -63,8 +63,8 @@ fn begin_pixel(at: vec2<u32>) -> Pixel {
     return Pixel(vec3(0.0), 1.0, 0.0, 0.0, 0u, 0u, 0.0, next_limit(-FAR), !inside);
 }
 
-// Passes the surfaces in front of a splat at this depth, the nearest that has not been blended: they hide it and all
-// that follow.
+// Passes the surfaces in front of a splat at this depth, the nearest splat that has not been blended: in their samples these surfaces hide
+// this splat and all later splats.
 fn pass_surfaces(pixel: ptr<function, Pixel>, depth: f32) {
     let passed = passed_limits(depth);
     (*pixel).hidden_transmittance += f32(passed - (*pixel).hidden) * (*pixel).transmittance;
@@ -93,7 +93,7 @@ fn blend_splat(pixel: ptr<function, Pixel>, alpha: f32, color: vec3<f32>, depth:
     (*pixel).blended++;
 }
 
-// As blend_splat, without a branch: an alpha of 0 skips the splat, and a pixel that is done stays as it is.
+// Blends a splat as `blend_splat`, without a branch: a splat with alpha 0 is skipped, a finished pixel is unchanged.
 fn blend_or_skip(pixel: ptr<function, Pixel>, alpha: f32, color: vec3<f32>, depth: f32) {
     let before = (*pixel).transmittance;
     let left = left_behind(before, alpha);
@@ -107,12 +107,12 @@ fn blend_or_skip(pixel: ptr<function, Pixel>, alpha: f32, color: vec3<f32>, dept
     (*pixel).blended += select(0u, 1u, taken);
 }
 
-// Writes the pixel, over what is behind.
+// Writes the pixel over the background.
 fn finish_pixel(pixel: Pixel, at: vec2<u32>) {
     if !all(at < frame.size) {
         return;
     }
-    // Transmittance where there is no surface, and the mean over all samples.
+    // Transmittance of the samples without a surface, and the mean over all samples.
     let behind = pixel.transmittance * open_share();
     let transmittance = (pixel.hidden_transmittance + f32(samples - pixel.hidden) * pixel.transmittance) / f32(samples);
     if frame.debug == DEBUG_DEPTH {
@@ -127,7 +127,7 @@ fn finish_pixel(pixel: Pixel, at: vec2<u32>) {
     textureStore(depth_out, at, vec4(pixel.depth, pixel.median, 0.0, 0.0));
 }
 
-// Writes the color of a pixel, without depths, over what is behind. `behind` is the transmittance where there is no surface.
+// Writes the color of a pixel over the background, without depths. `behind` is the transmittance of the samples without a surface.
 fn write_color(color: vec3<f32>, transmittance: f32, behind: f32, at: vec2<u32>) {
     textureStore(color_out, at, over_background(color, transmittance, behind, at));
 }
@@ -155,7 +155,7 @@ fn surface_range(pixel: vec2<u32>, inside: bool) -> vec2<f32> {
     return range;
 }
 
-// Returns the number of samples of a pixel whose surface is before `depth`; with FAR, of those that have a surface.
+// Returns the number of samples of a pixel whose surface is nearer than `depth`; with FAR, the number of samples that have a surface.
 fn samples_before(pixel: vec2<u32>, depth: f32) -> u32 {
     var before = 0u;
     for (var i = 0u; i < sample_count(); i++) {
@@ -173,21 +173,21 @@ fn surface_depth(pixel: vec2<u32>, inside: bool) -> f32 {
 }
 #endif
 
-// Returns color and transmittance over the background. `behind` is the transmittance where there is no surface.
+// Returns color and transmittance over the background. `behind` is the transmittance of the samples without a surface.
 fn over_background(color: vec3<f32>, transmittance: f32, behind: f32, at: vec2<u32>) -> vec4<f32> {
     if frame.background_mode == BACKGROUND_COLOR {
         return vec4(color + transmittance * frame.background.xyz, transmittance);
     }
     if frame.background_mode == BACKGROUND_ENVIRONMENT && behind > 0.0 {
         let shown = behind * frame.environment_opacity;
-        // background.w: factor on the transmittance behind the map, 0 or 1.
+        // background.w: factor on the transmittance behind the environment map, 0 or 1.
         let left = transmittance - shown * (1.0 - frame.background.w);
         return vec4(color + shown * environment_color(vec2<f32>(at)), left);
     }
     return vec4(color, transmittance);
 }
 
-// Returns the brightness of a depth, premultiplied: near is bright.
+// Returns the brightness of a depth, premultiplied: near depths are bright.
 fn debug_depth(depth: f32, opacity: f32) -> f32 {
     if opacity <= 0.0 {
         return 0.0;
@@ -220,7 +220,7 @@ fn distance_of(depth: f32) -> f32 {
     return select(FAR, (d.x + d.y * depth) / (d.z + d.w * depth), depth > 0.0);
 }
 
-// Returns the share of the samples without a surface.
+// Returns the fraction of the samples without a surface.
 fn open_share() -> f32 {
     var open = 0u;
     for (var i = 0u; i < SAMPLES_MAX; i++) {
@@ -229,7 +229,7 @@ fn open_share() -> f32 {
     return f32(open) / f32(samples);
 }
 
-// Returns the depth of the nearest surface that is not before `depth`.
+// Returns the depth of the nearest surface that is not nearer than `depth`.
 fn next_limit(depth: f32) -> f32 {
     var nearest = FAR;
     for (var i = 0u; i < SAMPLES_MAX; i++) {
@@ -238,7 +238,7 @@ fn next_limit(depth: f32) -> f32 {
     return nearest;
 }
 
-// Returns the number of samples whose surface is before `depth`.
+// Returns the number of samples whose surface is nearer than `depth`.
 fn passed_limits(depth: f32) -> u32 {
     var passed = 0u;
     for (var i = 0u; i < SAMPLES_MAX; i++) {
@@ -263,7 +263,7 @@ fn environment_color(position: vec2<f32>) -> vec3<f32> {
     return lit(color, frame.environment_lighting, frame.background.xyz);
 }
 
-// Returns a texel, black outside the texture: the seam fades, as in the original.
+// Returns a texel, black outside the texture: colors fade to black at the seam, as in the original.
 fn environment_at(texel: vec2<f32>) -> vec3<f32> {
     let size = frame.environment_size;
     if any(texel < vec2(0.0)) || any(texel >= vec2<f32>(size)) {

@@ -1,5 +1,5 @@
-// Gaussians and splats, and their records in storage. Drivers move each member of a structure in storage by itself: records have members of
-// four words, so that each move is as wide as it can be.
+// Gaussians and splats, and their records in storage. Drivers load and store each member of a structure separately: records have members of
+// four words, the widest access.
 #define_import_path gs4d::records
 
 #import gs4d::types::{GaussianRecord, SplatRecord, SplatShape}
@@ -49,7 +49,7 @@ fn read_splat(record: SplatRecord) -> Splat {
     return splat_of(record.place, bitcast<vec3<f32>>(record.shape.xyz), bitcast<vec3<f32>>(record.color.xyz));
 }
 
-// Returns a splat of the fast renderer, whose color is elsewhere.
+// Returns a splat of the fast design, which stores colors in a separate buffer.
 fn read_shape(shape: SplatShape, color: vec3<f32>) -> Splat {
     return splat_of(shape.place, shape.conic.xyz, color);
 }
@@ -58,7 +58,7 @@ fn splat_of(place: vec4<f32>, conic: vec3<f32>, color: vec3<f32>) -> Splat {
     return Splat(place.xy, place.z, place.w, conic, color);
 }
 
-// `tiles` are x0, y0 and x1, y1 (ends excluded), 16 bits each.
+// Returns the record of a splat. `tiles` are x0, y0 and x1, y1 (ends excluded), 16 bits each.
 fn record_of(splat: Splat, tiles: vec2<u32>) -> SplatRecord {
     return SplatRecord(
         vec4(splat.center, splat.opacity, splat.depth),

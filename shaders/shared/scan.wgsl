@@ -3,14 +3,15 @@
 
 // 16 groups of 16, padded so that groups start in different banks.
 var<workgroup> scan_values: array<u32, 272>;
-// Their sums; the last entry is the total.
+// The sums of the groups; the last element is the total.
 var<workgroup> scan_groups: array<u32, 17>;
 
 fn saturating_add(a: u32, b: u32) -> u32 {
     return select(a + b, 0xffffffffu, a + b < a);
 }
 
-// Every thread of the workgroup must call this. It starts with a barrier, so that it can be called again.
+// Returns the sum of the values of all threads before this one. Every thread of the workgroup must call this function. It starts with a
+// barrier, so that it can be called repeatedly.
 fn exclusive_scan(value: u32, thread: u32) -> u32 {
     let slot = thread + thread / 16u;
     workgroupBarrier();

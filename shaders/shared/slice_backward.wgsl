@@ -1,5 +1,5 @@
-// From the gradients of a sliced Gaussian to those of its raw scales and rotations, for the passes that train. CPU reference: `through_sigma`
-// of src/gaussian/gradient.rs; equations: section 7.4 of the 4DGS model.
+// Converts the gradients of a sliced Gaussian to the gradients of its raw scales and rotations, for the training passes. CPU reference:
+// `through_sigma` of src/gaussian/gradient.rs; equations: section 7.4 of the 4DGS model.
 #define_import_path gs4d::slice_backward
 
 #import gs4d::types::TrainedRecord
@@ -12,8 +12,8 @@ struct SliceGradient {
     rotation_r: vec4<f32>,
 }
 
-// Returns them from those with respect to the conditional covariance (symmetric), the velocity c / v and the temporal variance v. `sliced`
-// is the slice of `raw`.
+// Returns the gradients with respect to raw scales and rotations, given the gradients with respect to the conditional covariance
+// (symmetric), the velocity c / v and the temporal variance v. `sliced` is the slice of `raw`.
 fn through_slice(
     raw: TrainedRecord,
     model: u32,
@@ -30,7 +30,7 @@ fn through_slice(
         let x = 2.0 * (by_covariance * turn);
         var by_log_scale = vec4(squares.xyz * vec3(dot(x[0], turn[0]), dot(x[1], turn[1]), dot(x[2], turn[2])), 0.0);
         if model != STATIC_3D {
-            // The temporal scale is the variance.
+            // In this model the temporal scale is the temporal variance.
             by_log_scale.w = by_variance * sliced.v;
         }
         let by_turn = mat3x3(x[0] * squares.x, x[1] * squares.y, x[2] * squares.z);
@@ -62,7 +62,7 @@ fn through_slice(
 }
 
 fn is_finite(v: vec4<f32>) -> bool {
-    // Written so that NaN is not finite.
+    // The comparison is false for NaN.
     return all(abs(v) <= vec4(3.4e38));
 }
 
@@ -70,12 +70,13 @@ fn is_finite_slice(gradient: SliceGradient) -> bool {
     return is_finite(gradient.log_scale) && is_finite(gradient.rotation_l) && is_finite(gradient.rotation_r);
 }
 
-// Returns the gradient of a raw quaternion from that of its unit quaternion.
+// Returns the gradient with respect to a raw quaternion, given the gradient with respect to its unit quaternion.
 fn raw_rotation(raw: vec4<f32>, unit: vec4<f32>, gradient: vec4<f32>) -> vec4<f32> {
     return (gradient - unit * dot(unit, gradient)) / length(raw);
 }
 
-// Returns the gradients with respect to l and r from those of the matrices L and R; see left_matrix. Matrices are m[column][row].
+// `left_gradient` and `right_gradient` return the gradients with respect to l and r, given the gradients with respect to the matrices L and
+// R of `left_matrix` and `right_matrix`. Matrices are m[column][row].
 fn left_gradient(h: mat4x4<f32>) -> vec4<f32> {
     return vec4(
         h[0][0] + h[1][1] + h[2][2] + h[3][3],
@@ -94,7 +95,7 @@ fn right_gradient(k: mat4x4<f32>) -> vec4<f32> {
     );
 }
 
-// Returns the gradient with respect to a unit quaternion from that of its rotation matrix g[column][row].
+// Returns the gradient with respect to a unit quaternion, given the gradient g[column][row] with respect to its rotation matrix.
 fn rotation_gradient(q: vec4<f32>, g: mat3x3<f32>) -> vec4<f32> {
     let w = q.x;
     let x = q.y;

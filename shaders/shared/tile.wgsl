@@ -8,7 +8,7 @@
 // Side of a tile in pixels.
 const TILE_SIZE: u32 = 16u;
 
-// Returns the tiles that the original assigns: those of the square of +-`radius` pixels around `center`, clamped to the
+// Returns the tiles that the original assigns: the tiles of the square of +-`radius` pixels around `center`, clamped to the
 // grid.
 fn tiles_of(center: vec2<f32>, radius: f32, grid: vec2<f32>) -> vec4<f32> {
     let side = f32(TILE_SIZE);
@@ -17,7 +17,7 @@ fn tiles_of(center: vec2<f32>, radius: f32, grid: vec2<f32>) -> vec4<f32> {
     return vec4(low, high);
 }
 
-// Returns the part of `tiles` where alpha can reach 1/255, empty if it never does; `blend` would skip the rest.
+// Returns the part of `tiles` where alpha can reach 1/255, possibly empty; `blend` would skip the splat in the other tiles.
 // `variance` is xx and yy of the covariance on the screen, `det` the determinant of the covariance.
 fn contributing_tiles(
     tiles: vec4<f32>,
@@ -26,7 +26,7 @@ fn contributing_tiles(
     det: f32,
     opacity: f32,
 ) -> vec4<f32> {
-    // Written so that NaN takes this branch too.
+    // The negated comparison is true for NaN.
     if !(det > 0.0) {
         return tiles;
     }
@@ -57,7 +57,7 @@ fn tile_count(low: u32, high: u32) -> u32 {
     return tile_columns(low, high) * ((high >> 16u) - (low >> 16u));
 }
 
-// Whether a rectangle contains a tile.
+// Returns whether a rectangle contains a tile.
 fn covers_tile(low: u32, high: u32, tile: vec2<u32>) -> bool {
     return all(tile >= vec2(low & 0xffffu, low >> 16u)) && all(tile < vec2(high & 0xffffu, high >> 16u));
 }
@@ -73,7 +73,7 @@ fn pair_of_tile(low: u32, high: u32, tile: vec2<u32>) -> u32 {
     return (tile.y - (low >> 16u)) * tile_columns(low, high) + tile.x - (low & 0xffffu);
 }
 
-// Returns the index of a tile in a grid of that many columns, row by row.
+// Returns the index of a tile in a grid with `columns` columns, row by row.
 fn tile_index(tile: vec2<u32>, columns: u32) -> u32 {
     return tile.y * columns + tile.x;
 }
@@ -83,7 +83,7 @@ fn pixel_of(tile: vec2<u32>, thread: u32) -> vec2<u32> {
     return tile * TILE_SIZE + vec2(thread % TILE_SIZE, thread / TILE_SIZE);
 }
 
-// Twice the negative exponent down to which a splat shows: the bound of its quadratic form.
+// Returns the bound of the quadratic form of a splat within which alpha reaches 1/255.
 fn energy_of(opacity: f32) -> f32 {
     return 2.0 * log(opacity * INVERSE_ALPHA_MIN);
 }

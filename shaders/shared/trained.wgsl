@@ -8,7 +8,7 @@ const STATIC_3D: u32 = 0u;
 const UNROTATED_4D: u32 = 1u;
 const ROTATED_4D: u32 = 2u;
 
-// The 4D rotation Q = L R of the unit quaternions l and r.
+// `left_matrix` and `right_matrix` return the factors L and R of the 4D rotation Q = L R of the unit quaternions l and r.
 fn left_matrix(l: vec4<f32>) -> mat4x4<f32> {
     return mat4x4(
         vec4(l.x, -l.y, l.z, -l.w),
@@ -27,7 +27,7 @@ fn right_matrix(r: vec4<f32>) -> mat4x4<f32> {
     );
 }
 
-// The ordinary rotation matrix of a unit quaternion.
+// Returns the 3D rotation matrix of a unit quaternion.
 fn rotation_3d(q: vec4<f32>) -> mat3x3<f32> {
     let w = q.x;
     let v = q.yzw;
@@ -38,14 +38,14 @@ fn rotation_3d(q: vec4<f32>) -> mat3x3<f32> {
     );
 }
 
-// A Gaussian sliced: conditional covariance, its covariance with time c, temporal variance v (without the prefilter).
+// A sliced Gaussian: conditional covariance, covariance of position with time c, temporal variance v (without the prefilter).
 struct Sliced {
     covariance: mat3x3<f32>,
     c: vec3<f32>,
     v: f32,
 }
 
-// The columns of M = Q S are those of the rotation times the scales; the covariance is M transpose(M).
+// Returns the slice of a Gaussian. The columns of M = Q S are the columns of the rotation times the scales; the covariance is M transpose(M).
 fn slice_of(trained: TrainedRecord, model: u32) -> Sliced {
     let scale = exp(trained.log_scale.xyz);
     let l = normalize(trained.rotation_l);

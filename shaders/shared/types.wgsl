@@ -18,7 +18,7 @@ struct GaussianRecord {
 struct TrainedRecord {
     // Mean, mean_t.
     mean: vec4<f32>,
-    // Logarithms of the scales, the last in time.
+    // Logarithms of the scales; w: of the temporal scale.
     log_scale: vec4<f32>,
     rotation_l: vec4<f32>,
     rotation_r: vec4<f32>,
@@ -26,13 +26,13 @@ struct TrainedRecord {
     opacity_logit: vec4<f32>,
 }
 
-// What packing changes of one Gaussian. Input of `rounding`.
+// The change that packing makes to one Gaussian. Input of `rounding`.
 struct RoundingRecord {
     // Added to the mean and to mean_t.
     mean: vec4<f32>,
     // Added to the velocity; w: factor on inverse_sigma_t.
     velocity: vec4<f32>,
-    // Columns of the matrix that turns and stretches its shape. w: added to its variances before that.
+    // Columns of the matrix that transforms the covariance. w: added to the variances before that.
     shape_x: vec4<f32>,
     // w: added to the opacity.
     shape_y: vec4<f32>,
@@ -40,7 +40,7 @@ struct RoundingRecord {
     shape_z: vec4<f32>,
 }
 
-// The scene that is trained, and the number of a view.
+// Settings of the trained scene, and the number of a view.
 struct TrainedScene {
     count: u32,
     // 0: static, 1: without 4D rotation, 2: with it.
@@ -52,13 +52,13 @@ struct TrainedScene {
 
 // Input of `loss` for one view.
 struct LossUniforms {
-    // Behind the image where it is not covered.
+    // Background color behind the image where its coverage is below 1.
     background: vec4<f32>,
     size: vec2<u32>,
     tiles: vec2<u32>,
-    // Share of the view in the loss of the batch.
+    // Weight of the view in the loss of the batch.
     share: f32,
-    // Share of SSIM in the loss of the view.
+    // Weight of SSIM in the loss of the view, from 0 to 1.
     similarity_share: f32,
     // Weight of the opacity mask.
     mask_weight: f32,
@@ -78,24 +78,24 @@ struct TiedColors {
 
 // Input of `adam` for one buffer.
 struct AdamUniforms {
-    // Of the first four four-vectors of each Gaussian, and of the others.
+    // Learning rates of the first four four-vectors of each Gaussian, and of all others.
     rates: array<vec4<f32>, 5>,
-    // 1 / (1 - decay^step) of the first moment, and the root of it of the second.
+    // 1 / (1 - decay^step) of the first moment, and the square root of this value of the second moment.
     correction: vec2<f32>,
     count: u32,
     // Four-vectors of each Gaussian.
     stride: u32,
-    // 1: only Gaussians that a view of the batch shows are stepped; three unused.
+    // x = 1: only Gaussians that are visible in a view of the batch are updated; yzw unused.
     sparse: vec4<u32>,
 }
 
 // Input of `regularize`: the weights of its terms for each Gaussian.
 struct TermWeights {
-    // Of the length of its velocity.
+    // Weight of the length of its velocity.
     motion: f32,
-    // Of the length of the difference from the velocity of a neighbor at the same place.
+    // Weight of the length of the difference between its velocity and the velocity of a neighbor at the same position.
     rigid: f32,
-    // Of its opacity.
+    // Weight of its opacity.
     opacity: f32,
     padding: u32,
 }
@@ -144,11 +144,12 @@ struct InstanceUniforms {
     debug: u32,
     // 1: only Gaussians whose mean is inside the crop box are drawn.
     cropped: u32,
-    // Gaussians that each thread of `project_bin` takes.
+    // Gaussians per thread of `project_bin`.
     per_thread: u32,
-    // Of the fast renderer: tiles along each side of a bin (8 bits) and a number of the frame, splats a bin has room for, number of this part, number of parts.
+    // Fast design. x: tiles along each side of a bin (8 bits) and frame number; y: capacity of a bin in splats; z: index of this part;
+    // w: number of parts.
     binning: vec4<u32>,
-    // Variances on the screen of one training pixel squared, at one pixel for each camera unit.
+    // Screen-space variances of one training pixel squared, at one pixel per camera unit.
     trained_variance: vec2<f32>,
     padding: vec2<f32>,
     // Rows of capture-to-crop-box; the box is from -1 to 1.
@@ -157,7 +158,7 @@ struct InstanceUniforms {
     crop_z: vec4<f32>,
 }
 
-// The view of one part of a capture one frame before.
+// The view of one part of a capture in the previous frame.
 struct MotionUniforms {
     // Rows x and y of projection times capture-to-camera.
     clip_x: vec4<f32>,
@@ -182,7 +183,7 @@ const DEBUG_VELOCITY: u32 = 5u;
 
 // Input of `activate` for one part of a capture.
 struct Activation {
-    // Number of Gaussians in this part, and its first entry in the list.
+    // Number of Gaussians in this part, and first entry of this part in the list.
     count: u32,
     first: u32,
     // FILTER_*
@@ -200,7 +201,7 @@ const INVISIBLE: u32 = 0xffffffffu;
 struct FrameUniforms {
     size: vec2<u32>,
     tiles: vec2<u32>,
-    // Splat slots in use, drawn or not.
+    // Splat slots in use, whether their splats are visible or not.
     slots: u32,
     pair_capacity: u32,
     // BACKGROUND_*
@@ -211,7 +212,7 @@ struct FrameUniforms {
     background: vec4<f32>,
     // P00, P11, P02, P12.
     projection: vec4<f32>,
-    // Columns of camera-to-world of the instance with the environment; w: its camera position.
+    // Columns of camera-to-world of the instance with the environment map; w: its camera position.
     world_x: vec4<f32>,
     world_y: vec4<f32>,
     world_z: vec4<f32>,
@@ -224,10 +225,10 @@ struct FrameUniforms {
     environment_lighting: u32,
     // DEBUG_*
     debug: u32,
-    // Depth that is shown half as bright as depth 0.
+    // Depth that the debug view shows half as bright as depth 0.
     debug_depth: f32,
     environment_opacity: f32,
-    // As in InstanceUniforms.
+    // The same as in InstanceUniforms.
     binning: vec4<u32>,
 }
 
@@ -245,7 +246,7 @@ struct SplatRecord {
     color: vec4<u32>,
 }
 
-// A splat of the fast renderer, without its color. See records.wgsl.
+// A splat of the fast design, without its color. See records.wgsl.
 struct SplatShape {
     // Center, opacity, depth.
     place: vec4<f32>,
@@ -253,9 +254,9 @@ struct SplatShape {
     conic: vec4<f32>,
 }
 
-// What the fast renderer notes of a visible splat besides.
+// Further data of a visible splat in the fast design.
 struct VisibleSplat {
-    // Direction from which it is seen, or its color in some debug views; time from the frame to its mean.
+    // Viewing direction, or color in some debug views; time from the frame to the temporal mean.
     seen: vec4<f32>,
     // Slot, index of the Gaussian; tiles x0 and y0, x1 and y1 (ends excluded), 16 bits each.
     words: vec4<u32>,
@@ -265,7 +266,7 @@ struct Counters {
     visible: u32,
     // Number of pairs written: never above the capacity.
     pairs: u32,
-    // Number of pairs that there would be with room for all.
+    // Number of pairs of the frame, written or not.
     pairs_wanted: u32,
     padding: u32,
 }
@@ -275,16 +276,16 @@ struct SortStep {
     shift: u32,
     // SORT_*
     source: u32,
-    // Number of blocks for which the histogram has room, per digit.
+    // Capacity of the histogram in blocks, per digit.
     stride: u32,
     padding: u32,
 }
 
-// All slots; the invisible ones are left out, and the value of a key is its index.
+// All slots: invisible slots are left out, and the value of a key is its slot.
 const SORT_SLOTS: u32 = 0u;
 const SORT_VISIBLE: u32 = 1u;
 const SORT_PAIRS: u32 = 2u;
 
-// Counters of the fast renderer before those of parts and bins: pairs of this frame; then of the frame before: visible splats, pairs,
-// splats of the fullest bin, pairs written.
+// Number of counters of the fast design before the counters of parts and bins: pairs of this frame; then visible splats, pairs, splats of
+// the fullest bin and pairs written of the previous frame.
 const BIN_COUNTERS: u32 = 5u;

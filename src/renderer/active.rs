@@ -1,7 +1,7 @@
 //! The list of active Gaussians of one placed capture, shared by all views that draw it.
 //!
 //! In: a capture with a temporal filter and a time. Out: the indices of the Gaussians that are active in the segment of
-//! that time, ascending, part by part. `activate` writes them, only when the segment has changed.
+//! that time, ascending, part by part. `activate` writes them only when the segment has changed.
 
 use super::capture::{Filter, GpuCapture};
 use super::layout::{Activation, BLOCK, INSTANCE_STRIDE};
@@ -12,7 +12,7 @@ use wgpu::BufferUsages;
 #[derive(Debug)]
 pub struct ActiveList {
     capture: u64,
-    /// Segment of the time prepared last; `recorded` is whether the list holds it.
+    /// Segment of the time prepared last; `recorded`: whether the list of this segment has been recorded.
     segment: Option<u32>,
     recorded: bool,
     uniforms: wgpu::Buffer,
@@ -22,7 +22,7 @@ pub struct ActiveList {
 }
 
 impl ActiveList {
-    /// Creates an empty list; `None` if the capture has no filter.
+    /// Creates an empty list; returns `None` if the capture has no filter.
     pub fn new(device: &wgpu::Device, renderer: &Renderer, capture: &GpuCapture) -> Option<Self> {
         capture.filter.as_ref()?;
         let allocator = renderer.allocator(device);
@@ -42,7 +42,7 @@ impl ActiveList {
         Some(Self { capture: capture.id, segment: None, recorded: false, uniforms, activate, list })
     }
 
-    /// Returns whether it belongs to this upload of a capture; if not, create a new list.
+    /// Returns whether the list belongs to this upload of a capture. If not, create a new list.
     pub fn is_for(&self, capture: &GpuCapture) -> bool {
         self.capture == capture.id
     }
@@ -66,7 +66,7 @@ impl ActiveList {
         !self.recorded
     }
 
-    /// Records `activate`, unless the list is that of the current segment already.
+    /// Records `activate`, unless the list of the current segment has been recorded.
     pub fn record(&mut self, renderer: &Renderer, encoder: &mut wgpu::CommandEncoder, capture: &GpuCapture) {
         if self.recorded {
             return;
@@ -95,7 +95,7 @@ impl ActiveList {
     }
 }
 
-/// Returns the number of Gaussians of a part of a capture that are drawn: those of the list if there is one, else all.
+/// Returns the number of Gaussians of a part of a capture that are drawn: the active Gaussians with a list, otherwise all.
 pub(super) fn drawn_count(capture: &GpuCapture, part: usize, active: Option<&ActiveList>) -> u32 {
     match (&capture.filter, active) {
         (Some(filter), Some(active)) => active.count(filter, part),
@@ -103,7 +103,7 @@ pub(super) fn drawn_count(capture: &GpuCapture, part: usize, active: Option<&Act
     }
 }
 
-/// Returns the largest number of Gaussians of a capture that are drawn at any one time.
+/// Returns the largest number of Gaussians of a capture that are drawn at any time.
 pub(super) fn most_drawn(capture: &GpuCapture, active: Option<&ActiveList>) -> usize {
     match (&capture.filter, active) {
         (Some(filter), Some(_)) => filter.most as usize,

@@ -10,7 +10,7 @@ use std::num::NonZeroU64;
 pub enum Bind {
     /// Uniform buffer of this many bytes.
     Uniform(usize),
-    /// The same, at an offset given with the dispatch.
+    /// Uniform buffer of this many bytes, at an offset given with the dispatch.
     UniformAt(usize),
     /// Storage buffer that is read.
     Read,
@@ -58,7 +58,7 @@ impl Bind {
     }
 }
 
-/// Creates a compute pipeline with these bind group layouts; `None` for a group that the shader does not use.
+/// Creates a compute pipeline with these bind group layouts. `None` stands for a group that the shader does not use.
 pub fn pipeline(
     device: &wgpu::Device,
     module: &wgpu::ShaderModule,

@@ -1,8 +1,8 @@
-//! A device that is not Bevy's, for commands and tests.
+//! A device for commands and tests, outside Bevy.
 //!
-//! In: the adapter wanted, if any. Out: a [`GpuContext`]. Inside Bevy the renderer uses Bevy's device instead.
+//! In: the name or index of an adapter, if any. Out: a [`GpuContext`]. Inside Bevy the renderer uses Bevy's device instead.
 
-use super::GpuError;
+use super::error::GpuError;
 use pollster::block_on;
 
 /// A device, its queue and its adapter.
@@ -17,11 +17,11 @@ pub struct GpuContext {
 }
 
 impl GpuContext {
-    /// Opens a device on the adapter whose index or part of whose name is `wanted`; on the one with the highest
-    /// performance if `None`.
+    /// Opens a device on the adapter with index `wanted` or with a name that contains `wanted`; if `None`, on the adapter with the highest
+    /// performance.
     ///
     /// # Errors
-    /// When there is no such adapter (the message names the packages to install) or it does not provide a device.
+    /// When there is no such adapter (the message names the packages to install) or the adapter does not provide a device.
     pub fn headless(wanted: Option<&str>) -> Result<Self, GpuError> {
         let adapter = match wanted {
             Some(wanted) => choose(wanted)?,
@@ -32,7 +32,7 @@ impl GpuContext {
             .map_err(|error| GpuError::NoAdapter { reason: error.to_string() })?,
         };
         let info = adapter.get_info();
-        // Timestamps are for benchmarks, subgroups for the fast renderer, float atomics for training; nothing is needed.
+        // Timestamps are for benchmarks, subgroups for the fast design, float atomics for training. All are optional.
         let timestamps = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES;
         let wanted_features = timestamps | wgpu::Features::SUBGROUP | wgpu::Features::SHADER_FLOAT32_ATOMIC;
         let (device, queue) = block_on(adapter.request_device(&wgpu::DeviceDescriptor {

@@ -8,7 +8,7 @@
 pub enum GpuError {
     /// No adapter at all.
     #[error(
-        "no GPU adapter found ({reason}). Install a Vulkan driver; without a graphics card the software driver does: \
+        "no GPU adapter found ({reason}). Install a Vulkan driver; without a graphics card the software driver is sufficient: \
          `apt-get install mesa-vulkan-drivers libvulkan1` on Debian and Ubuntu"
     )]
     NoAdapter {
@@ -16,7 +16,7 @@ pub enum GpuError {
         reason: String,
     },
     /// No adapter with the name or index asked for.
-    #[error("no GPU adapter matches `{wanted}`; there are: {found}")]
+    #[error("no GPU adapter matches `{wanted}`; available adapters: {found}")]
     AdapterNotFound {
         /// Name or index asked for.
         wanted: String,
@@ -24,7 +24,7 @@ pub enum GpuError {
         found: String,
     },
     /// The adapter does not provide a device.
-    #[error("the GPU adapter `{adapter}` gives no device: {reason}")]
+    #[error("the GPU adapter `{adapter}` provides no device: {reason}")]
     NoDevice {
         /// Name of the adapter.
         adapter: String,
@@ -82,8 +82,8 @@ pub enum GpuError {
         /// Largest side.
         limit: u32,
     },
-    /// A scene whose parts do not fit together.
-    #[error("{0}: such a scene was not loaded from a file but put together wrongly")]
+    /// A scene with inconsistent parts.
+    #[error("{0}: the scene was not loaded from a file but assembled with inconsistent parts")]
     Scene(&'static str),
     /// The device was lost or a read-back failed.
     #[error("the GPU did not finish: {0}")]

@@ -37,23 +37,23 @@ pub struct TrainedRecord {
     pub opacity_logit: [f32; 4],
 }
 
-/// What packing changes of one Gaussian. Input of `rounding`.
+/// The change that packing makes to one Gaussian. Input of `rounding`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct RoundingRecord {
-    /// Added to the mean and to the temporal mean.
+    /// Offset of the mean and of the temporal mean.
     pub mean: [f32; 4],
-    /// Added to the velocity; factor on the reciprocal of the temporal deviation.
+    /// Offset of the velocity; factor on the reciprocal of the temporal deviation.
     pub velocity: [f32; 4],
-    /// Column x of the matrix that turns and stretches the shape; what is added to the variances before that.
+    /// Column x of the matrix that transforms the covariance; offset of the variances before that.
     pub shape_x: [f32; 4],
-    /// Column y; what is added to the opacity.
+    /// Column y; offset of the opacity.
     pub shape_y: [f32; 4],
     /// Column z; one unused.
     pub shape_z: [f32; 4],
 }
 
-/// The scene that is trained, and the number of a view.
+/// Settings of the trained scene, and the number of a view.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct TrainedScene {
@@ -71,15 +71,15 @@ pub struct TrainedScene {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct LossUniforms {
-    /// Behind the image where it is not covered.
+    /// Background color behind the image where its coverage is below 1.
     pub background: [f32; 4],
     /// Picture size, pixels.
     pub size: [u32; 2],
     /// Tiles across and down.
     pub tiles: [u32; 2],
-    /// Share of the view in the loss of the batch.
+    /// Weight of the view in the loss of the batch.
     pub share: f32,
-    /// Share of SSIM in the loss of the view.
+    /// Weight of SSIM in the loss of the view, from 0 to 1.
     pub similarity_share: f32,
     /// Weight of the opacity mask.
     pub mask_weight: f32,
@@ -105,48 +105,48 @@ pub struct TiedColors {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct AdamUniforms {
-    /// Rates of the first four four-vectors of each Gaussian, and of the others.
+    /// Learning rates of the first four four-vectors of each Gaussian, and of all others.
     pub rates: [[f32; 4]; 5],
-    /// `1 / (1 - decay^step)` of the first moment, and the root of it of the second.
+    /// `1 / (1 - decay^step)` of the first moment, and the square root of this value of the second moment.
     pub correction: [f32; 2],
     /// Number of Gaussians.
     pub count: u32,
     /// Four-vectors of each Gaussian.
     pub stride: u32,
-    /// 1: only Gaussians that a view of the batch shows are stepped; three unused.
+    /// 1: only Gaussians that are visible in a view of the batch are updated; three unused.
     pub sparse: [u32; 4],
 }
 
-/// Place of the first Gaussian in the notes of `project_backward`, after three words about gradients that are not finite.
+/// Index of the first Gaussian in the `notes` of `project_backward`, after three words about gradients that are not finite.
 pub const FIRST_SEEN: u32 = 3;
 
 /// Input of `regularize`: the weights of its terms for each Gaussian.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct TermWeights {
-    /// Of the length of its velocity.
+    /// Weight of the length of its velocity.
     pub motion: f32,
-    /// Of the length of the difference from the velocity of a neighbor at the same place.
+    /// Weight of the length of the difference between its velocity and the velocity of a neighbor at the same position.
     pub rigid: f32,
-    /// Of its opacity.
+    /// Weight of its opacity.
     pub opacity: f32,
     /// Unused.
     pub padding: u32,
 }
 
-/// Bytes from the uniforms of one instance to those of the next, which are bound at dynamic offsets or as an array: `InstanceSlot` of the
-/// shaders. [`MotionUniforms`], [`SortStep`]s and [`Activation`]s are as far apart. A multiple of every device's alignment.
+/// Stride in bytes of the uniforms of instances, which are bound at dynamic offsets or as an array (`InstanceSlot` of the shaders), and of
+/// [`MotionUniforms`], [`SortStep`]s and [`Activation`]s. A multiple of the alignment of every device.
 pub const INSTANCE_STRIDE: u32 = 512;
 /// Instances that one dispatch may draw.
 pub const INSTANCES_AT_ONCE: u32 = 64;
-/// Bytes of their uniforms, which are bound together.
+/// Bytes of the uniforms of [`INSTANCES_AT_ONCE`] instances, which are bound together.
 pub const INSTANCES_BOUND: u32 = INSTANCE_STRIDE * INSTANCES_AT_ONCE;
 const _: () = assert!(
     size_of::<InstanceUniforms>() <= INSTANCE_STRIDE as usize
         && size_of::<MotionUniforms>() <= INSTANCE_STRIDE as usize
         && size_of::<SortStep>() <= INSTANCE_STRIDE as usize
         && size_of::<Activation>() <= INSTANCE_STRIDE as usize,
-    "uniforms fit their place"
+    "uniforms fit their stride"
 );
 
 /// Input of `project` for one part of a capture in one view. An [`Instance`](super::Instance) may have several parts.
@@ -189,7 +189,7 @@ pub struct InstanceUniforms {
     pub displaced: u32,
     /// Near limit, camera units.
     pub near: f32,
-    /// Length of the capture's time interval, in its unit.
+    /// Length of the capture's time interval, in the capture's unit.
     pub time_span: f32,
     /// 1: the Gaussians of the active list are drawn; 0: all.
     pub listed: u32,
@@ -211,11 +211,12 @@ pub struct InstanceUniforms {
     pub debug: u32,
     /// 1: only Gaussians whose mean is inside the crop box are drawn.
     pub cropped: u32,
-    /// Gaussians that each thread of `project_bin` takes.
+    /// Gaussians per thread of `project_bin`.
     pub per_thread: u32,
-    /// Of the fast renderer: tiles along each side of a bin (8 bits) and a number of the frame, splats a bin has room for, number of this part, number of parts.
+    /// Fast design: tiles along each side of a bin (8 bits) and frame number; capacity of a bin in splats; index of this part; number of
+    /// parts.
     pub binning: [u32; 4],
-    /// Variances on the screen of one training pixel squared, at one pixel for each camera unit.
+    /// Screen-space variances of one training pixel squared, at one pixel per camera unit.
     pub trained_variance: [f32; 2],
     /// Unused.
     pub padding: [f32; 2],
@@ -227,7 +228,7 @@ pub struct InstanceUniforms {
     pub crop_z: [f32; 4],
 }
 
-/// The view of one part of a capture one frame before. Input of `motion`.
+/// The view of one part of a capture in the previous frame. Input of `motion`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct MotionUniforms {
@@ -246,7 +247,7 @@ pub struct MotionUniforms {
 }
 
 impl MotionUniforms {
-    /// Creates the values that follow from a view.
+    /// Creates the uniforms of a view.
     pub fn new(view: &View) -> Self {
         let [clip_x, clip_y] = view.clip_rows();
         Self {
@@ -277,12 +278,12 @@ pub struct Activation {
     pub first: u32,
     /// `FILTER_*`.
     pub filter_mode: u32,
-    /// Segment of time that is drawn.
+    /// Segment of the time that is drawn.
     pub segment: u32,
 }
 
 impl InstanceUniforms {
-    /// Creates the values that follow from a view and an appearance; slots and color settings are zero.
+    /// Creates the uniforms of a view and an appearance; slots and color settings are zero.
     pub fn new(view: &View, appearance: &Appearance, space: BlendSpace, debug: DebugView) -> Self {
         let m = view.world_to_camera;
         let [clip_x, clip_y] = view.clip_rows();
@@ -325,13 +326,13 @@ pub struct FrameUniforms {
     pub tiles: [u32; 2],
     /// Splat slots in use.
     pub slots: u32,
-    /// Number of pairs for which there is room.
+    /// Capacity of the buffers of pairs.
     pub pair_capacity: u32,
     /// `BACKGROUND_*`.
     pub background_mode: u32,
     /// Samples per pixel of the opaque depth; 0 if there is none.
     pub opaque_samples: u32,
-    /// Color, or the factor on the light of an environment map; w: factor on the transmittance behind a map, 0 or 1.
+    /// Color, or the factor on the light of an environment map; w: factor on the transmittance behind the environment map, 0 or 1.
     pub background: [f32; 4],
     /// `P00, P11, P02, P12`.
     pub projection: [f32; 4],
@@ -347,19 +348,19 @@ pub struct FrameUniforms {
     pub opaque_origin: [u32; 2],
     /// From opaque depth `d` to camera space: `z = (x + y d) / (z + w d)`.
     pub opaque_distance: [f32; 4],
-    /// How the colors of the environment map are changed: `LIGHTING_*`.
+    /// Lighting of the environment map: `LIGHTING_*`.
     pub environment_lighting: u32,
     /// `DEBUG_*`.
     pub debug: u32,
-    /// Depth that is shown half as bright as depth 0, camera units.
+    /// Depth that the debug view shows half as bright as depth 0, camera units.
     pub debug_depth: f32,
     /// Opacity of the environment map, from 0 to 1.
     pub environment_opacity: f32,
-    /// As in [`InstanceUniforms`].
+    /// The same as in [`InstanceUniforms`].
     pub binning: [u32; 4],
 }
 
-/// Returns how an appearance changes colors, as in the shaders: `LIGHTING_*`.
+/// Returns the lighting of an appearance as a constant of the shaders: `LIGHTING_*`.
 pub fn lighting_mode(appearance: &Appearance, space: BlendSpace) -> u32 {
     match appearance.lighting(space) {
         Lighting::AsTrained => LIGHTING_AS_TRAINED,
@@ -368,7 +369,7 @@ pub fn lighting_mode(appearance: &Appearance, space: BlendSpace) -> u32 {
     }
 }
 
-/// Returns a debug view as in the shaders: `DEBUG_*`.
+/// Returns a debug view as a constant of the shaders: `DEBUG_*`.
 pub fn debug_mode(debug: DebugView) -> u32 {
     match debug {
         DebugView::Color => DEBUG_COLOR,
@@ -380,31 +381,31 @@ pub fn debug_mode(debug: DebugView) -> u32 {
     }
 }
 
-/// Colors.
+/// Debug view of colors, the default.
 pub const DEBUG_COLOR: u32 = 0;
-/// Expected depth.
+/// Debug view of the expected depth.
 pub const DEBUG_DEPTH: u32 = 1;
-/// Splats per pixel.
+/// Debug view of the number of splats per pixel.
 pub const DEBUG_OVERDRAW: u32 = 2;
-/// Gaussians that the filter leaves active.
+/// Debug view of the Gaussians that are active according to the filter.
 pub const DEBUG_ACTIVE: u32 = 3;
-/// Deviation in time.
+/// Debug view of temporal deviations.
 pub const DEBUG_LIFESPAN: u32 = 4;
-/// Motion.
+/// Debug view of velocities.
 pub const DEBUG_VELOCITY: u32 = 5;
 
-/// Sets of bits.
+/// A filter of one bit for each Gaussian and segment.
 pub const FILTER_BITS: u32 = 1;
-/// Intervals of segments.
+/// A filter of one interval of segments for each Gaussian.
 pub const FILTER_INTERVALS: u32 = 2;
 /// Depth key of a slot without a splat.
 pub const INVISIBLE: u32 = u32::MAX;
 
-/// No background: a compositor follows.
+/// No background: the picture is composited later.
 pub const BACKGROUND_NONE: u32 = 0;
-/// One color.
+/// A background of one color.
 pub const BACKGROUND_COLOR: u32 = 1;
-/// The environment map.
+/// The environment map as background.
 pub const BACKGROUND_ENVIRONMENT: u32 = 2;
 
 /// A splat: a Gaussian sliced at a time and projected to a view, with its color.
@@ -427,7 +428,7 @@ pub struct SplatRecord {
     pub tiles_high: u32,
 }
 
-/// A splat of the fast renderer, without its color.
+/// A splat of the fast design, without its color.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct SplatShape {
@@ -437,25 +438,25 @@ pub struct SplatShape {
     pub conic: [f32; 4],
 }
 
-/// What the fast renderer notes of a visible splat besides.
+/// Further data of a visible splat in the fast design.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct VisibleSplat {
-    /// Direction from which it is seen, or its color in some debug views; time from the frame to its mean.
+    /// Viewing direction, or color in some debug views; time from the frame to the temporal mean.
     pub seen: [f32; 4],
     /// Slot, index of the Gaussian; tiles x0 and y0, x1 and y1 (excluded), 16 bits each.
     pub words: [u32; 4],
 }
 
-/// Numbers that the GPU counts.
+/// Counters that the GPU writes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
 pub struct Counters {
     /// Number of visible splats.
     pub visible: u32,
-    /// Number of pairs written; of the fast renderer, of all pairs.
+    /// Reference design: number of pairs written. Fast design: number of pairs of the frame, written or not.
     pub pairs: u32,
-    /// Number of pairs that there would be with room for all; of the fast renderer, of splats in the fullest bin.
+    /// Reference design: number of pairs of the frame, written or not. Fast design: number of splats in the fullest bin.
     pub pairs_wanted: u32,
     /// Unused.
     pub padding: u32,
@@ -469,19 +470,19 @@ pub struct SortStep {
     pub shift: u32,
     /// `SORT_*`.
     pub source: u32,
-    /// Number of blocks for which the histogram has room, per digit.
+    /// Capacity of the histogram in blocks, per digit.
     pub stride: u32,
     /// Unused.
     pub padding: u32,
 }
 
-/// All slots; the invisible ones are left out.
+/// Sorts all slots and leaves out invisible slots.
 pub const SORT_SLOTS: u32 = 0;
-/// The visible splats.
+/// Sorts the visible splats.
 pub const SORT_VISIBLE: u32 = 1;
-/// The pairs.
+/// Sorts the pairs.
 pub const SORT_PAIRS: u32 = 2;
 
-/// Counters of the fast renderer before those of parts and bins: pairs of this frame; then the [`Counters`] of the frame before, the
-/// last of which is the number of pairs written.
+/// Number of counters of the fast design before the counters of parts and bins: pairs of this frame, then the [`Counters`] of the previous
+/// frame, the last of which is the number of pairs written.
 pub const BIN_COUNTERS: u32 = 5;

@@ -3,18 +3,18 @@
 //! In: a device, sizes and usages. Out: buffers, textures and bind groups, each counted; the limits that sizes are
 //! checked against; an error where memory runs out.
 
-use super::GpuError;
+use super::error::GpuError;
 use super::work::WorkCounters;
 use glam::UVec2;
 use pollster::block_on;
 use wgpu::{BufferUsages, TextureFormat};
 
-/// A device on which resources are created and counted.
+/// Creates resources on a device and counts them.
 #[derive(Debug, Clone, Copy)]
 pub struct Allocator<'a> {
     /// The device.
     pub device: &'a wgpu::Device,
-    /// Counts what is created.
+    /// Counts the resources created.
     pub work: &'a WorkCounters,
 }
 
@@ -30,7 +30,7 @@ impl Allocator<'_> {
         })
     }
 
-    /// Creates a texture that passes write and later ones read; a depth texture is only read.
+    /// Creates a texture that passes write and later passes read. A depth texture is only read.
     pub fn texture(self, label: &str, size: UVec2, format: TextureFormat) -> wgpu::Texture {
         let usage = if format == TextureFormat::Depth32Float {
             wgpu::TextureUsages::TEXTURE_BINDING
@@ -67,10 +67,11 @@ impl Allocator<'_> {
     }
 }
 
-/// Runs `create`, which takes `needed` bytes or more. Memory that the device does not have is an error then, not a panic of wgpu.
+/// Runs `create`, which allocates `needed` bytes or more. If the device has too little memory, an error is returned, instead of a panic of
+/// wgpu.
 ///
 /// # Errors
-/// The device has no memory left, or refuses what is made of a resource without memory.
+/// The device has no memory left, or rejects an object that uses a resource without memory.
 pub fn with_room<T>(device: &wgpu::Device, needed: u64, create: impl FnOnce() -> T) -> Result<T, GpuError> {
     let refused = device.push_error_scope(wgpu::ErrorFilter::Validation);
     let lacking = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
@@ -84,7 +85,7 @@ pub fn with_room<T>(device: &wgpu::Device, needed: u64, create: impl FnOnce() ->
     }
 }
 
-/// Returns the size of the largest storage buffer that can be created and bound whole, bytes.
+/// Returns the size of the largest storage buffer that can be created and bound as a whole, bytes.
 pub fn binding_limit(limits: &wgpu::Limits) -> u64 {
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
 }

@@ -1,17 +1,16 @@
 //! The pipelines: one [`Renderer`] for each device.
 //!
-//! In: a device. Out: the compiled passes and the bind group layouts that they share with the buffers of views and
-//! captures.
+//! In: a device. Out: the compiled passes, and the bind group layouts of the passes, for the buffers of views and captures.
 
 use super::bind::{Bind, group_layout, pipeline};
-use super::layout::INSTANCES_BOUND;
+use super::design::Design;
+use super::error::GpuError;
+use super::layout::{self, INSTANCES_BOUND};
 use super::memory::Allocator;
 use super::shaders::{
     BINNED, COPIED_INSTANCE, FEW_BINS, FastVariant, Lists, Pixels, SUBGROUPS_OF_32, ShaderChecks, Storage, module,
 };
-use super::view::Design;
 use super::work::WorkCounters;
-use super::{GpuError, layout};
 use std::sync::OnceLock;
 
 /// All pipelines and bind group layouts of a device.
@@ -21,29 +20,29 @@ pub struct Renderer {
     pub(super) activate_count: wgpu::ComputePipeline,
     pub(super) activate_scan: wgpu::ComputePipeline,
     pub(super) activate_write: wgpu::ComputePipeline,
-    /// The passes of the reference design, compiled when they are first used: `project`, indexed by whether instances are copied and by
-    /// how a capture is stored, in the order of [`Storage::ALL`], `blend`, in the order of [`Pixels::ALL`], and the others.
+    /// Passes of the reference design, compiled on first use: `project`, indexed by whether instances are copied and by the storage of the
+    /// capture (order of [`Storage::ALL`]), `blend` (order of [`Pixels::ALL`]), and the passes between them.
     project: [[OnceLock<wgpu::ComputePipeline>; 3]; 2],
     blend: [OnceLock<wgpu::ComputePipeline>; 4],
     reference: OnceLock<ReferencePasses>,
-    /// Passes of the fast renderer, each compiled when it is first used: `project_bin`, by whether there are few bins, and `colors`, indexed as
-    /// `project`, `sort_bins`, in the order of [`Lists::ALL`], and `blend_blocks`, by [`FastVariant::blend_index`].
+    /// Passes of the fast design, each compiled on first use: `project_bin`, indexed by whether there are few bins and then as `project`,
+    /// `colors`, indexed as `project`, `sort_bins` (order of [`Lists::ALL`]), and `blend_blocks` (by [`FastVariant::blend_index`]).
     project_bin: [[[OnceLock<wgpu::ComputePipeline>; 3]; 2]; 2],
     colors: [[OnceLock<wgpu::ComputePipeline>; 3]; 2],
     sort_bins: [OnceLock<wgpu::ComputePipeline>; 3],
     blend_blocks: [OnceLock<wgpu::ComputePipeline>; FastVariant::BLENDS],
-    /// `motion` of the reference design and of the fast one, compiled when it is first used, indexed by how a capture is stored, in the
-    /// order of [`Storage::ALL`].
+    /// `motion` of the reference design and of the fast design, compiled on first use, indexed by the storage of the capture (order of
+    /// [`Storage::ALL`]).
     motion: [[OnceLock<wgpu::ComputePipeline>; 3]; 2],
     checks: ShaderChecks,
-    /// Whether [`Design::Auto`] is the reference design: for a software driver, where it is faster, and in browsers, where the fast one
-    /// is untried.
+    /// Whether [`Design::Auto`] is the reference design: on software drivers, where it is faster, and in browsers, where the fast design is
+    /// untested.
     prefers_reference: bool,
-    /// [`SUBGROUPS_OF_32`], or nothing.
+    /// [`SUBGROUPS_OF_32`], or empty if the subgroup size of the device is not always 32.
     subgroups: &'static [&'static str],
-    /// Whether threads copy the uniforms of their instance even if a dispatch draws no other: on software drivers.
+    /// Whether threads copy the uniforms of their instance even in a dispatch of a single instance: on software drivers.
     copies_instance: bool,
-    /// Bound instead of a list of active Gaussians if all are drawn.
+    /// Bound instead of a list of active Gaussians if all Gaussians are drawn.
     pub(super) no_list: wgpu::BindGroup,
     work: WorkCounters,
 }
@@ -91,7 +90,7 @@ pub(super) struct Layouts {
     pub filter: wgpu::BindGroupLayout,
     pub active: wgpu::BindGroupLayout,
     pub project: wgpu::BindGroupLayout,
-    /// Geometry and color, indexed by how a capture is stored, in the order of [`Storage::ALL`].
+    /// Geometry and color, indexed by the storage of the capture (order of [`Storage::ALL`]).
     pub captures: [[wgpu::BindGroupLayout; 2]; 3],
     pub sort: wgpu::BindGroupLayout,
     pub arguments: wgpu::BindGroupLayout,
@@ -104,12 +103,13 @@ pub(super) struct Layouts {
     pub sort_bins: wgpu::BindGroupLayout,
     pub colors: wgpu::BindGroupLayout,
     pub blend_blocks: wgpu::BindGroupLayout,
-    /// Of the reference design and of the fast one.
+    /// `motion` of the reference design and of the fast design.
     pub motion: [wgpu::BindGroupLayout; 2],
 }
 
 impl Renderer {
-    /// Compiles the passes that both designs need, and creates the layouts of all; others are compiled when a view first needs them.
+    /// Compiles the passes that both designs need, and creates the layouts of all passes. The other passes are compiled when a view first
+    /// needs them.
     ///
     /// # Errors
     /// When a limit of the device is too low for the passes, or a shader does not compile.
@@ -153,12 +153,12 @@ impl Renderer {
         })
     }
 
-    /// Returns the renderer with these counters in place of its own: for one that is created again after a lost device.
+    /// Returns the renderer with these counters instead of its own: for a renderer that replaces another after a lost device.
     pub fn counting(self, work: WorkCounters) -> Self {
         Self { work, ..self }
     }
 
-    /// Returns the counters of what has been created, uploaded and recorded for this renderer.
+    /// Returns the counters of resources created, bytes uploaded and lists recorded for this renderer.
     pub fn work(&self) -> &WorkCounters {
         &self.work
     }
@@ -169,7 +169,7 @@ impl Renderer {
         Allocator { device, work: &self.work }
     }
 
-    /// Returns [`Design::Fast`] or [`Design::Reference`]: what a design is on this device.
+    /// Resolves [`Design::Auto`] for this device: returns [`Design::Fast`] or [`Design::Reference`].
     pub(super) fn resolve(&self, design: Design) -> Design {
         match design {
             Design::Auto if self.prefers_reference => Design::Reference,
@@ -178,19 +178,20 @@ impl Renderer {
         }
     }
 
-    /// Returns the definitions of passes that read a capture, and the index of their pipelines. `batched`: a dispatch draws several
+    /// Returns the shader definitions of passes that read a capture, and the index of their pipelines. `batched`: a dispatch draws several
     /// instances.
     fn reading(&self, storage: Storage, batched: bool) -> (Vec<&'static str>, usize) {
         let copied = self.copied(batched);
         ([storage.definitions(), if copied == 1 { COPIED_INSTANCE } else { &[] }].concat(), copied)
     }
 
-    /// Returns the index of pipelines of passes that read a capture: 1 for those that copy their instance first.
+    /// Returns the index of pipelines of passes that read a capture: 1 for pipelines that copy their instance first.
     fn copied(&self, batched: bool) -> usize {
         usize::from(batched || self.copies_instance)
     }
 
-    /// Compiles the passes of the reference design for captures stored in these ways, several in a dispatch or one, unless they have been.
+    /// Compiles the passes of the reference design that are not compiled yet, for these storages and for one or (`true`) several instances in
+    /// a dispatch.
     ///
     /// # Errors
     /// When a shader does not compile.
@@ -228,7 +229,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Returns `project` for captures stored in this way, several in a dispatch or one, if it has been compiled.
+    /// Returns `project` for this storage, for one or several instances in a dispatch, if it has been compiled.
     pub(super) fn project(&self, storage: Storage, batched: bool) -> Option<&wgpu::ComputePipeline> {
         self.project[self.copied(batched)][storage as usize].get()
     }
@@ -243,7 +244,7 @@ impl Renderer {
         self.reference.get()
     }
 
-    /// Compiles what a first frame of captures stored in this way would compile, as far as it is known.
+    /// Compiles the passes that the first frame of captures with this storage needs, as far as they are known.
     ///
     /// # Errors
     /// When a shader does not compile.
@@ -263,7 +264,8 @@ impl Renderer {
         }
     }
 
-    /// Compiles the passes of the fast renderer for captures stored in these ways, several in a dispatch or one, unless they have been.
+    /// Compiles the passes of the fast design that are not compiled yet, for these storages and for one or (`true`) several instances in a
+    /// dispatch.
     ///
     /// # Errors
     /// When a shader does not compile.
@@ -308,7 +310,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Compiles `motion` of a design for captures stored in these ways, unless it has been.
+    /// Compiles `motion` of a design for these storages, unless it is compiled.
     ///
     /// # Errors
     /// When the shader does not compile.
@@ -333,12 +335,12 @@ impl Renderer {
         Ok(())
     }
 
-    /// Returns `motion` of a design for captures stored in this way, if it has been compiled.
+    /// Returns `motion` of a design for this storage, if it has been compiled.
     pub(super) fn motion(&self, storage: Storage, design: Design) -> Option<&wgpu::ComputePipeline> {
         self.motion[usize::from(design != Design::Reference)][storage as usize].get()
     }
 
-    /// Returns `project_bin` for captures stored in this way, several in a dispatch or one, if it has been compiled.
+    /// Returns `project_bin` for this storage, for one or several instances in a dispatch, if it has been compiled.
     pub(super) fn project_bin(
         &self,
         storage: Storage,
@@ -348,7 +350,7 @@ impl Renderer {
         self.project_bin[usize::from(variant.few_bins)][self.copied(batched)][storage as usize].get()
     }
 
-    /// Returns `colors` for captures stored in this way, several in a dispatch or one, if it has been compiled.
+    /// Returns `colors` for this storage, for one or several instances in a dispatch, if it has been compiled.
     pub(super) fn colors(&self, storage: Storage, batched: bool) -> Option<&wgpu::ComputePipeline> {
         self.colors[self.copied(batched)][storage as usize].get()
     }
@@ -368,8 +370,7 @@ impl Renderer {
         [&self.layouts.captures[Storage::Sliced as usize][0], &self.layouts.active]
     }
 
-    /// Creates the bind groups of the geometry and the color of one part of a capture, the buffers in the order of the shaders'
-    /// bindings.
+    /// Creates the bind groups of the geometry and the color of one part of a capture. The buffers are in the order of the shaders' bindings.
     pub(super) fn capture_bind_groups(
         &self,
         device: &wgpu::Device,
@@ -420,8 +421,9 @@ impl Layouts {
             blend: new("gs4d blend", &[Read, Read, Read, Read, Read, Read]),
             pixel: Pixels::ALL.map(pixel),
             project_bin: new("gs4d project_bin", &[INSTANCE, Write, Write, Write, Write]),
-            // The shader does not read the last, the list of the visible splats: so everything that `project_bin` wrote and `colors` reads
-            // is made visible before `sort_bins`, not between the two, and they run at the same time.
+            // The shader does not read the last buffer, the list of the visible splats. Because it is bound, the memory barrier for the
+            // buffers that `project_bin` writes and `colors` reads comes before `sort_bins`, not between `sort_bins` and `colors`, so that
+            // these two run at the same time.
             sort_bins: new("gs4d sort_bins", &[Uniform(FRAME), Read, Write, Read, Write, Write, Read]),
             colors: new("gs4d colors", &[INSTANCE, Read, Read, Write]),
             blend_blocks: new("gs4d blend_blocks", &[Read, Read, Read, Read, Read]),
@@ -439,7 +441,7 @@ fn check_limits(limits: &wgpu::Limits) -> Result<(), GpuError> {
         ("max_compute_workgroup_size_x", limits.max_compute_workgroup_size_x.into(), 256),
         ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage.into(), 8),
         ("max_uniform_buffer_binding_size", limits.max_uniform_buffer_binding_size, INSTANCES_BOUND.into()),
-        // Three arrays of `blend`, and those of its scan.
+        // Three arrays of `blend`, and the arrays of its scan.
         (
             "max_compute_workgroup_storage_size",
             limits.max_compute_workgroup_storage_size.into(),

@@ -2,14 +2,14 @@
 //!
 //! In: the name of a pass. Out: a naga module, or a wgpu shader module. The files are compiled into the binary.
 
-use super::GpuError;
+use super::error::GpuError;
 use crate::scene::{Form, PackedColors, PackedScene};
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::borrow::Cow;
 use std::sync::{Mutex, PoisonError};
 use wgpu::naga::valid::Capabilities;
 
-/// Libraries, each before those that import it.
+/// Libraries, each before the libraries that import it.
 const LIBRARIES: &[(&str, &str)] = &[
     ("types", include_str!("../../shaders/shared/types.wgsl")),
     ("records", include_str!("../../shaders/shared/records.wgsl")),
@@ -54,7 +54,7 @@ const PASSES: &[(&str, &str)] = &[
     ("adam", include_str!("../../shaders/adam.wgsl")),
 ];
 
-/// Whether shaders check their array indices and loops, which can cost much time. Default: [`Off`](Self::Off).
+/// Whether shaders check their array indices and loops at run time, which can be slow. Default: [`Off`](Self::Off).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum ShaderChecks {
     /// No checks: every index is bounded by construction.
@@ -69,7 +69,7 @@ pub fn pass_names() -> impl Iterator<Item = &'static str> {
     PASSES.iter().map(|(name, _)| *name)
 }
 
-/// How a capture is stored, and so how `project` and `colors` read it: a [`Form`] without its values.
+/// How a capture is stored, and therefore how `project` and `colors` read it: a [`Form`] without its values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Storage {
     /// Single precision.
@@ -84,7 +84,7 @@ impl Storage {
     /// All kinds of storage.
     pub const ALL: [Self; 3] = [Self::Sliced, Self::Packed, Self::Coded];
 
-    /// Returns how a form is stored.
+    /// Returns the storage of a form.
     pub fn of(form: &Form) -> Self {
         match form {
             Form::Sliced(_) => Self::Sliced,
@@ -93,7 +93,7 @@ impl Storage {
         }
     }
 
-    /// Returns the shader definitions with which `project` and `colors` read it.
+    /// Returns the shader definitions with which `project` and `colors` read a capture with this storage.
     pub fn definitions(self) -> &'static [&'static str] {
         match self {
             Self::Sliced => &[],
@@ -106,33 +106,33 @@ impl Storage {
 /// The definition of `blend` for multisampled opaque depth.
 pub const MULTISAMPLED: &[&str] = &["MULTISAMPLED"];
 
-/// Definitions of `blend_backward` and `project_backward` that compute what the original does, with its deviations.
+/// Definitions of `blend_backward` and `project_backward` that reproduce the gradients of the original, including its deviations.
 pub const COMPAT: &[&str] = &["COMPAT"];
 
-/// The same of captures whose color does not depend on time.
+/// Like [`COMPAT`], for captures whose color does not depend on time.
 pub const COMPAT_WITHOUT_TIME: &[&str] = &["COMPAT", "WITHOUT_TIME"];
 
-/// The definition of `blend_backward` and `project_backward` that sums by float atomics, for devices that have them.
+/// The definition of `blend_backward` and `project_backward` that sums by float atomics, for devices that support them.
 pub const ATOMIC_SUMS: &[&str] = &["ATOMIC_SUMS"];
 
-/// Definitions of `project` as the first pass of the fast renderer, `project_bin`, and of `motion` there.
+/// Definitions of the passes of the fast design in `project` (`project_bin`) and in `motion`.
 pub const BINNED: &[&str] = &["BINNED"];
 
-/// Definitions of `project`, `project_bin` and `colors` for several instances in one dispatch: each thread copies the uniforms of its own. On
-/// software drivers those of one instance do, too, and `motion`: Mesa's driver compiles a long shader again with the values of its uniforms if
-/// a branch depends on nothing else; version 22 does so whenever it is bound, and keeps all.
+/// Definitions of `project`, `project_bin` and `colors` for several instances in one dispatch: each thread copies the uniforms of its
+/// instance. On software drivers, dispatches of a single instance and `motion` use them too: if a branch depends on uniforms alone, Mesa's
+/// driver recompiles a long shader with the values of the uniforms; version 22 does so at every bind, and keeps all variants.
 pub const COPIED_INSTANCE: &[&str] = &["COPIED_INSTANCE"];
 
-/// How many splats `sort_bins` sorts at once in workgroup memory. Shorter lists leave room for more workgroups; longer ones are sorted
-/// in rounds.
+/// Capacity of the list of splats that `sort_bins` sorts in workgroup memory. With a small capacity, more workgroups run at the same time;
+/// bins with more splats are sorted in rounds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Lists {
-    /// 1280, by 256 threads: for every device.
+    /// 1280 splats, 256 threads: for every device.
     #[default]
     Short,
-    /// 2304, by 512 threads.
+    /// 2304 splats, 512 threads.
     Medium,
-    /// 5120, by 512 threads.
+    /// 5120 splats, 512 threads.
     Long,
 }
 
@@ -149,7 +149,7 @@ impl Lists {
         }
     }
 
-    /// Returns the largest number of bytes of workgroup memory that it may take.
+    /// Returns an upper bound of the workgroup memory of `sort_bins` with these lists, bytes.
     pub fn memory(self) -> u32 {
         match self {
             Self::Short => 16 * 1024,
@@ -158,7 +158,7 @@ impl Lists {
         }
     }
 
-    /// Returns the length for a device and the number of splats of the fullest bin.
+    /// Returns the length that suits a device and the number of splats of the fullest bin.
     pub(super) fn suiting(limits: &wgpu::Limits, fullest: u32) -> Self {
         let memory = limits.max_compute_workgroup_storage_size;
         let threads = limits.max_compute_workgroup_size_x.min(limits.max_compute_invocations_per_workgroup);
@@ -234,10 +234,12 @@ pub const SUBGROUPS_OF_32: &[&str] = &["SUBGROUPS_OF_32"];
 /// Definitions of `blend_blocks` for small pictures.
 pub const LARGE_BATCHES: &[&str] = &["LARGE_BATCHES"];
 
-/// The same for [`Blending::Color`] and [`Blending::ColorBehindSurfaces`]: more splats of a pixel at once, as few threads have work.
+/// Definitions of `blend_blocks` for small pictures with [`Blending::Color`] and [`Blending::ColorBehindSurfaces`]: each thread processes more
+/// splats of its pixel at once, since few threads run.
 pub const EIGHT_AT_ONCE: &[&str] = &["LARGE_BATCHES", "EIGHT_AT_ONCE"];
 
-/// What `blend_blocks` writes, and what it heeds. The picture is the same where several can draw it; the first is the fastest.
+/// The outputs of `blend_blocks` and the opaque surfaces that it supports. If several variants can draw a picture, the results are the same;
+/// the first is the fastest.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Blending {
     /// Color, without opaque surfaces.
@@ -249,7 +251,7 @@ pub enum Blending {
     /// Color and depths, opaque surfaces, every debug view.
     #[default]
     All,
-    /// The same with a multisampled depth of opaque surfaces.
+    /// Color and depths, multisampled opaque surfaces, every debug view.
     AllMultisampled,
 }
 
@@ -283,10 +285,10 @@ impl Blending {
 /// Definitions of `project_bin` for at most [`FEW_BINS_LIMIT`] bins.
 pub const FEW_BINS: &[&str] = &["FEW_BINS"];
 
-/// The largest number of bins that [`FEW_BINS`] has counters for.
+/// The number of counters of bins with [`FEW_BINS`].
 pub const FEW_BINS_LIMIT: u32 = 512;
 
-/// Which variants of its passes a frame of the fast design needs.
+/// The variants of the passes of a frame of the fast design.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct FastVariant {
     pub few_bins: bool,
@@ -300,7 +302,7 @@ impl FastVariant {
     /// Number of variants of `blend_blocks`.
     pub const BLENDS: usize = 4 * Blending::ALL.len();
 
-    /// Returns the number of its `blend_blocks`.
+    /// Returns the index of its `blend_blocks`, below [`BLENDS`](Self::BLENDS).
     pub fn blend_index(self) -> usize {
         (self.blending as usize * 2 + self.precision as usize) * 2 + usize::from(self.large_batches)
     }
@@ -320,8 +322,9 @@ impl FastVariant {
     }
 }
 
-/// Returns the naga module of a pass, imports resolved, validated, with these definitions: those of a [`Storage`] and [`COPIED_INSTANCE`] for
-/// `project`, `colors` and `motion`, none, [`MULTISAMPLED`] or those of a [`ColorPrecision`] for `blend`, those of the fast renderer's passes, none for the others.
+/// Returns the validated naga module of a pass with resolved imports and these definitions: the definitions of a [`Storage`] and
+/// [`COPIED_INSTANCE`] for `project`, `colors` and `motion`, [`MULTISAMPLED`] and the definitions of a [`ColorPrecision`] for `blend`, the
+/// definitions of the passes of the fast design, none for other passes.
 ///
 /// # Errors
 /// When there is no such pass or it does not compile.
@@ -339,7 +342,7 @@ pub fn compose(name: &str, definitions: &[&str]) -> Result<wgpu::naga::Module, G
     };
     let mut composer = COMPOSERS[composer].lock().unwrap_or_else(PoisonError::into_inner);
     if composer.is_none() {
-        // WebGPU has values of half precision in words.
+        // WebGPU supports half-precision values packed into words.
         *composer = Some(with_libraries(Capabilities::SHADER_FLOAT16_IN_FLOAT32 | optional)?);
     }
     let Some(composer) = composer.as_mut() else {
@@ -367,7 +370,7 @@ fn with_libraries(capabilities: Capabilities) -> Result<Composer, GpuError> {
     Ok(composer)
 }
 
-/// Creates the shader module of a pass, as [`compose`] composes it.
+/// Creates the shader module of a pass from the result of [`compose`].
 ///
 /// # Errors
 /// As [`compose`].
@@ -389,7 +392,7 @@ pub fn module(
 
 #[expect(unsafe_code, reason = "wgpu marks shaders without run-time checks as unsafe")]
 fn trusted(device: &wgpu::Device, descriptor: wgpu::ShaderModuleDescriptor<'_>) -> wgpu::ShaderModule {
-    // SAFETY: the shaders are ours. Each index is below a count that the host sized the buffer by (slots, pair capacity, tiles,
+    // SAFETY: the shaders are part of this crate. Each index is below a count by which the host sized the buffer (slots, pair capacity, tiles,
     // blocks), and each loop ends at such a count.
     unsafe { device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked()) }
 }

@@ -1,16 +1,15 @@
-//! The amount of work of a view.
+//! Counts and times of the frames of a view.
 //!
 //! In: counters and timestamps read back from the GPU. Out: [`ViewStatistics`].
 
-use super::PassTime;
+use super::timing::PassTime;
 
-/// Work of a view in a frame. What the GPU counts belongs to the newest frame whose counters have arrived, some frames
-/// ago.
+/// Counts and times of a view. Counts of the GPU belong to the newest frame whose counters have arrived, some frames ago.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ViewStatistics {
     /// Number of Gaussians of all captures in the view.
     pub total: u32,
-    /// Number of them that the temporal filters leave active.
+    /// Number of these Gaussians that are active according to the temporal filters.
     pub active: u32,
     /// Number of splats that cover at least one tile.
     pub visible: u32,

@@ -1,15 +1,15 @@
-//! GPU time of a frame and of its passes, by timestamps.
+//! GPU time of a frame and of its passes, measured by timestamps.
 //!
-//! In: a device with timestamps. Out: [`Timings`]: medians over many frames, views and times.
+//! In: a device with timestamps. Out: the intervals between timestamps; [`Timings`], medians over many frames, views and times.
 
 use super::memory::Allocator;
 use crate::view::Counts;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Names of the timed passes of a frame, in order, with the reference design. The last [`MOTION_PASSES`] are those of motions.
+/// Names of the timed passes of a frame of the reference design, in order. The last [`MOTION_PASSES`] are the passes of motions.
 pub(super) const TIMED_PASSES: &[&str] =
     &["project", "sort (depth)", "bin", "sort (tile)", "ranges", "blend", "motion", "blend (motion)"];
-/// The same with the fast design.
+/// Names of the timed passes of a frame of the fast design, in the same way.
 pub(super) const TIMED_FAST_PASSES: &[&str] =
     &["project_bin", "sort_bins", "colors", "blend_blocks", "motion", "blend_blocks (motion)"];
 /// Number of passes that only a frame with motions has.
@@ -18,22 +18,22 @@ pub(super) const MOTION_PASSES: usize = 2;
 /// Medians over the frames of a benchmark.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Timings {
-    /// Each pass, in frame order. Measured in separate frames, since timestamps between passes cost some time
-    /// themselves; empty if the device has no timestamps inside passes.
+    /// Each pass, in frame order, measured in separate frames since timestamps between passes take time; empty if the device has no
+    /// timestamps inside passes.
     pub passes: Vec<PassTime>,
     /// Median GPU time of the whole compute pass; `None` if the device has no timestamps.
     pub frame_milliseconds: Option<f64>,
-    /// Median wall-clock time from submitting a frame to its end, one at a time.
+    /// Median wall-clock time from submitting a frame to its end, with one frame in flight.
     pub wall_milliseconds: f64,
-    /// Wall-clock time for each frame with many in flight, several recorded for each submit.
+    /// Wall-clock time per frame with many frames in flight and several frames per submit.
     pub pipelined_milliseconds: f64,
-    /// CPU time in which a frame is prepared and recorded, without its submit.
+    /// CPU time to prepare and record a frame, without its submit.
     pub encode_milliseconds: f64,
     /// Bytes of the buffers and targets of a view.
     pub bytes: u64,
-    /// Gaussians that are active, a median.
+    /// Median number of active Gaussians.
     pub active: u32,
-    /// Median amount of work in a frame.
+    /// Median counts of a frame.
     pub counts: Counts,
     /// Number of frames measured.
     pub frames: usize,
@@ -48,7 +48,7 @@ pub struct PassTime {
     pub milliseconds: f64,
 }
 
-/// Timestamps of one frame: either around it, or after each of its passes.
+/// Timestamps of one frame: either around the frame, or after each of its passes.
 #[derive(Debug)]
 pub(super) struct PassTimer {
     queries: wgpu::QuerySet,
@@ -60,7 +60,7 @@ pub(super) struct PassTimer {
 }
 
 impl PassTimer {
-    /// Creates a timer around frames, or after each of these passes; `None` if the device does not support it.
+    /// Creates a timer of whole frames, or of these passes if not empty; returns `None` if the device does not support it.
     pub fn new(allocator: Allocator<'_>, queue: &wgpu::Queue, passes: &'static [&'static str]) -> Option<Self> {
         let inside = !passes.is_empty();
         let device = allocator.device;
@@ -129,7 +129,7 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// Number of timestamps of a frame in which these passes are timed.
+/// Returns the number of timestamps of a frame in which these passes are timed.
 fn timestamps(passes: &[&str]) -> u32 {
     if passes.is_empty() { 2 } else { passes.len() as u32 + 1 }
 }

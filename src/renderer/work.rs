@@ -1,12 +1,11 @@
-//! Counters of the work done for a renderer.
+//! Counters of resources created, bytes uploaded and lists recorded for a renderer.
 //!
-//! In: every resource created, byte uploaded and list recorded. Out: [`WorkCounters`], with which a test can check that
-//! nothing is done twice.
+//! In: calls from the code that creates, uploads and records. Out: [`WorkCounters`], with which a test can check that no work is repeated.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What has been created, uploaded and recorded for a renderer so far. Clones share the counters.
+/// Numbers of resources created, bytes uploaded and lists recorded for a renderer so far. Clones refer to the same counters.
 #[derive(Debug, Clone, Default)]
 pub struct WorkCounters(Arc<Counts>);
 
@@ -28,7 +27,7 @@ impl WorkCounters {
         self.0.uploaded.load(Ordering::Relaxed)
     }
 
-    /// Returns the number of lists of active Gaussians recorded: runs of `activate`.
+    /// Returns the number of lists of active Gaussians recorded: the number of runs of `activate`.
     pub fn activated(&self) -> u64 {
         self.0.activated.load(Ordering::Relaxed)
     }

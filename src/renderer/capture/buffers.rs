@@ -1,7 +1,7 @@
 //! The buffers of a capture, which `project` and `activate` read.
 //!
 //! In: the [`Form`] of a scene, its filter and its environment map, and a range of its Gaussians. Out: storage buffers in the order of the
-//! shader's bindings, which are filled piece by piece. Packed scenes are uploaded without unpacking.
+//! shader's bindings, which are filled in chunks. Packed scenes are uploaded without unpacking.
 
 use crate::gaussian::Gaussian;
 use crate::renderer::memory::Allocator;
@@ -9,15 +9,15 @@ use crate::scene::packed::{BLOCK, BLOCK_RANGES, COLOR_WORDS, RECORD_WORDS, SHARE
 use crate::scene::{ActiveSets, CodedColors, Environment, Form, PackedColors, RuntimeScene, TemporalFilter};
 use std::ops::Range;
 
-/// Bytes that are converted and written together: there is no second copy of all of them on the host.
+/// Largest number of bytes that are converted and written at once. It limits the memory of converted records on the host.
 const BYTES_AT_ONCE: u64 = 1 << 20;
 
-/// A buffer of records, and how many of them have been written.
+/// A buffer of records and the number of records written.
 #[derive(Debug)]
 pub(super) struct Filling {
     pub buffer: wgpu::Buffer,
     content: Content,
-    /// The Gaussians that it is about.
+    /// The range of Gaussians in the buffer.
     own: Range<usize>,
     /// Bytes of a record.
     size: usize,
@@ -27,31 +27,31 @@ pub(super) struct Filling {
     done: usize,
 }
 
-/// What a buffer holds.
+/// The content of a buffer.
 #[derive(Debug, Clone, Copy)]
 enum Content {
     /// Gaussians, with `1/σ_t` in place of `σ_t`: zero instead of infinity.
     Gaussians,
-    /// `mean_t` and `1/σ_t`, once more.
+    /// A copy of `mean_t` and `1/σ_t`.
     Lifespans,
     /// The coefficients that are evaluated, padded to whole four-vectors per Gaussian.
     Harmonics,
     /// Packed geometry.
     Records,
-    /// Shared ranges, then those of the blocks.
+    /// The ranges of all Gaussians, then the ranges of each block.
     Ranges,
     /// Colors by codebook.
     ColorRecords,
     /// All codebooks, entry by entry.
     Codebooks,
-    /// The words of each segment in turn, or one word of interval for each Gaussian.
+    /// The words of all Gaussians, segment after segment; or one word with an interval for each Gaussian.
     Filter,
     /// The texels of the environment map.
     Environment,
 }
 
-/// Returns the bytes of one Gaussian in the largest buffer. `stride` is the number of four-vectors of whole
-/// coefficients per Gaussian.
+/// Returns the bytes of one Gaussian in the largest buffer. `stride` is the number of four-vectors per Gaussian if coefficients are stored
+/// whole.
 pub(super) fn largest_record(form: &Form, stride: usize) -> u64 {
     let whole = stride * size_of::<[f32; 4]>();
     let (geometry, color) = match form {
@@ -67,7 +67,7 @@ pub(super) fn largest_record(form: &Form, stride: usize) -> u64 {
     geometry.max(color) as u64
 }
 
-/// Creates the buffers of the geometry of some Gaussians, the first at a multiple of a block.
+/// Creates the buffers of the geometry of the Gaussians in `own`, which starts at a multiple of a block.
 pub(super) fn geometry(allocator: Allocator<'_>, form: &Form, own: Range<usize>) -> Vec<Filling> {
     let new = |label, content, size, count| Filling::new(allocator, label, content, own.clone(), size, count);
     match form {
@@ -85,7 +85,7 @@ pub(super) fn geometry(allocator: Allocator<'_>, form: &Form, own: Range<usize>)
     }
 }
 
-/// Creates the buffer of the color of some Gaussians, without codebooks. `stride` as for [`largest_record`].
+/// Creates the buffer of the colors of the Gaussians in `own`, without codebooks. `stride` as for [`largest_record`].
 pub(super) fn color(allocator: Allocator<'_>, form: &Form, own: Range<usize>, stride: usize) -> Filling {
     let count = own.len();
     match form.coded_colors() {
@@ -97,19 +97,19 @@ pub(super) fn color(allocator: Allocator<'_>, form: &Form, own: Range<usize>, st
     }
 }
 
-/// Returns the words of one entry of a codebook on the GPU: 48 values of half precision for each time harmonic, whatever the spatial
-/// degree.
+/// Returns the words of one codebook entry on the GPU: 48 half-precision values for each time harmonic, independent of the spatial degree.
 pub(super) fn entry_words(colors: &CodedColors) -> usize {
     colors.words_per_entry().next_multiple_of(12) * 2
 }
 
-/// Coefficients of a share of a color and words of it that lie side by side, as in `coded_share` of the shaders.
+/// Coefficients of a share (a partial sum) of a color, number of shares, and words of one share that are contiguous: as in `coded_share` of
+/// the shaders.
 const SHARE_COEFFICIENTS: usize = 4;
 const SHARES: usize = 4;
 const SIDE_BY_SIDE: usize = 4;
 
-/// Returns where a value of an entry of `words` words is on the GPU, in values: RGB innermost, the shares of a color take turns of four words,
-/// then of the two that are left, if any.
+/// Returns the index on the GPU of a value of an entry of `words` words. RGB is innermost; the words of the shares of a color are interleaved
+/// in groups of four words, then in groups of the remaining two, if any.
 fn place_in_entry(index: usize, words: usize) -> usize {
     let (harmonic, value) = (index / 48, index % 48);
     let values = SHARE_COEFFICIENTS * 3;
@@ -127,7 +127,7 @@ pub(super) fn codebooks(allocator: Allocator<'_>, colors: &CodedColors) -> Filli
     Filling::new(allocator, "gs4d codebooks", Content::Codebooks, 0..0, entry_words(colors) * 4, count)
 }
 
-/// Creates the buffer of the sets of some Gaussians, the first at a multiple of 32.
+/// Creates the buffer of the active sets of the Gaussians in `own`, which starts at a multiple of 32.
 pub(super) fn filter(allocator: Allocator<'_>, filter: &TemporalFilter, own: Range<usize>) -> Filling {
     let count = match &filter.sets {
         ActiveSets::Bits(_) => own_words(&own).len() * filter.segments as usize,
@@ -141,13 +141,13 @@ pub(super) fn environment(allocator: Allocator<'_>, map: &Environment) -> Fillin
     Filling::new(allocator, "gs4d environment", Content::Environment, 0..0, size_of::<f32>(), map.texels.len())
 }
 
-/// Returns the words of these Gaussians in a set of bits.
+/// Returns the range of words of these Gaussians in a bit set.
 fn own_words(own: &Range<usize>) -> Range<usize> {
     own.start / 32..own.end.div_ceil(32)
 }
 
 impl Filling {
-    /// Creates a buffer. It is written through the queue: mapping would panic on a device that has just been lost.
+    /// Creates a buffer. It is filled through the queue, since mapping would panic on a lost device.
     fn new(
         allocator: Allocator<'_>,
         label: &str,
@@ -172,12 +172,12 @@ impl Filling {
         (self.count - self.done) as u64 * self.size as u64
     }
 
-    /// Writes no more than `bytes` of what is left, but one record in any case, and returns how many bytes that were. `chunk` is memory
-    /// that is used again.
+    /// Writes at most `bytes` of the remaining bytes, but at least one record, and returns the number of bytes written. `chunk` is scratch
+    /// memory.
     pub fn fill(&mut self, queue: &wgpu::Queue, scene: &RuntimeScene, bytes: u64, chunk: &mut Vec<u8>) -> u64 {
         let most = (bytes.min(BYTES_AT_ONCE) / self.size as u64).max(1) as usize;
         let records = self.done..self.count.min(self.done + most);
-        // What is not filled is zero.
+        // Padding is zero.
         chunk.clear();
         chunk.resize(records.len() * self.size, 0);
         self.convert(scene, records.clone(), chunk);
@@ -186,14 +186,14 @@ impl Filling {
         chunk.len() as u64
     }
 
-    /// Writes all sets of another filter of as many Gaussians.
+    /// Writes all active sets of another filter of the same number of Gaussians.
     pub fn fill_filter(&self, queue: &wgpu::Queue, filter: &TemporalFilter) {
         let mut words = vec![0; self.count * self.size];
         self.convert_filter(filter, 0..self.count, &mut words);
         queue.write_buffer(&self.buffer, 0, &words);
     }
 
-    /// Converts some of its records. `None` if they are not of this scene's form.
+    /// Converts a range of records. Returns `None` if the buffer does not belong to the form of this scene.
     fn convert(&self, scene: &RuntimeScene, records: Range<usize>, to: &mut [u8]) -> Option<()> {
         let form = &scene.form;
         let own = self.own.start + records.start..self.own.start + records.end;
@@ -279,20 +279,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_value_of_an_entry_has_a_place_of_its_own() {
+    fn values_of_an_entry_have_distinct_indices() {
         for words in [24, 48, 72] {
             let mut places: Vec<usize> = (0..2 * words).map(|index| place_in_entry(index, words)).collect();
             places.sort_unstable();
-            assert!(places.iter().copied().eq(0..2 * words), "{words} words");
+            assert!(places.iter().copied().eq(0..2 * words), "the indices are a permutation, {words} words");
         }
     }
 
     #[test]
-    fn shares_lie_side_by_side() {
-        // Red of the first coefficient of each share, then blue of the last one of the last harmonic.
+    fn words_of_the_shares_are_interleaved() {
+        // Red of the first coefficient of each share, then blue of the last coefficient of the last harmonic.
         let first: Vec<usize> = (0..4).map(|share| place_in_entry(12 * share, 72)).collect();
-        assert_eq!(first, [0, 8, 16, 24]);
+        assert_eq!(first, [0, 8, 16, 24], "groups of four words");
         let last: Vec<usize> = (0..4).map(|share| place_in_entry(96 + 12 * share + 11, 72)).collect();
-        assert_eq!(last, [131, 135, 139, 143], "the last of two words");
+        assert_eq!(last, [131, 135, 139, 143], "the last value of groups of two words");
     }
 }

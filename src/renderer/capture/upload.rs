@@ -1,31 +1,32 @@
-//! The upload of a capture, over as many frames as it should take.
+//! The upload of a capture, at once or distributed over several frames.
 //!
-//! In: a [`RuntimeScene`], and how many bytes at a time. Out: a [`GpuCapture`], once it is whole. Its buffers are created at first; what
-//! takes time with a large capture, converting and copying, is done in pieces.
+//! In: a [`RuntimeScene`], and the number of bytes per step. Out: a complete [`GpuCapture`]. Its buffers are created at the beginning. The
+//! records are converted and copied in chunks, which can take long for a large capture.
 
-use super::GpuCapture;
 use super::buffers::Filling;
-use crate::renderer::{GpuError, Renderer};
+use super::gpu_capture::GpuCapture;
+use crate::renderer::error::GpuError;
+use crate::renderer::pipelines::Renderer;
 use crate::scene::RuntimeScene;
 use std::borrow::Borrow;
 
-/// A capture on its way to the GPU. `S` is the scene, or a pointer to it.
+/// An upload of a capture in progress. `S` is the scene, or a pointer to it.
 #[derive(Debug)]
 pub struct CaptureUpload<S> {
     scene: S,
     capture: GpuCapture,
-    /// What is not whole yet; the last is filled first.
+    /// Buffers that are not complete; the last is filled first.
     fillings: Vec<Filling>,
-    /// Memory of the piece that is being converted.
+    /// Scratch memory for the conversion of a chunk.
     chunk: Vec<u8>,
 }
 
 impl<S: Borrow<RuntimeScene>> CaptureUpload<S> {
-    /// Creates the buffers of a scene, and uploads nothing yet.
+    /// Creates the buffers of a scene, without uploading data.
     ///
     /// # Errors
     /// When the environment map, or the smallest part of the Gaussians, is larger than the device can bind, or the
-    /// parts of the scene do not fit together.
+    /// parts of the scene are inconsistent.
     pub fn new(device: &wgpu::Device, renderer: &Renderer, scene: S) -> Result<Self, GpuError> {
         let (capture, fillings) = GpuCapture::allocate(device, renderer, scene.borrow())?;
         Ok(Self { scene, capture, fillings, chunk: Vec::new() })
@@ -36,8 +37,8 @@ impl<S: Borrow<RuntimeScene>> CaptureUpload<S> {
         self.fillings.iter().map(Filling::bytes_left).sum()
     }
 
-    /// Uploads no more than `bytes` of what is left, but the record of one Gaussian in any case. Returns how many bytes
-    /// that were: 0 if it was whole already.
+    /// Uploads at most `bytes` of the remaining bytes, but at least the record of one Gaussian. Returns the number of bytes uploaded: 0 if the
+    /// capture was complete.
     pub fn advance(&mut self, queue: &wgpu::Queue, renderer: &Renderer, bytes: u64) -> u64 {
         let mut written = 0;
         while let Some(filling) = self.fillings.last_mut() {
@@ -55,9 +56,25 @@ impl<S: Borrow<RuntimeScene>> CaptureUpload<S> {
         written
     }
 
-    /// Uploads all that is left, and returns the capture.
+    /// Uploads all remaining bytes, and returns the capture.
     pub fn finish(mut self, queue: &wgpu::Queue, renderer: &Renderer) -> GpuCapture {
         self.advance(queue, renderer, u64::MAX);
         self.capture
+    }
+}
+
+impl GpuCapture {
+    /// Uploads a whole scene at once. [`CaptureUpload`] uploads it in chunks.
+    ///
+    /// # Errors
+    /// When the environment map, or the smallest part of the Gaussians, is larger than the device can bind, or the
+    /// parts of the scene are inconsistent.
+    pub fn upload(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        renderer: &Renderer,
+        scene: &RuntimeScene,
+    ) -> Result<Self, GpuError> {
+        Ok(CaptureUpload::new(device, renderer, scene)?.finish(queue, renderer))
     }
 }

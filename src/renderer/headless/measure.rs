@@ -1,23 +1,26 @@
-//! How fast a capture is drawn.
+//! Measurement of the time to draw a capture.
 //!
-//! In: a capture and views of it. Out: [`Timings`]. GPU times are measured while several frames are recorded for each submit and the host
-//! does not wait, as a GPU that is idle between frames lowers its clock.
+//! In: a capture and views of it. Out: [`Timings`]. GPU times are measured with several frames per submit and without waiting on the host,
+//! since a GPU that is idle between frames lowers its clock.
 
-use super::{Headless, instance, texel_bytes};
+use super::render::{Headless, instance, texel_bytes};
 use crate::renderer::active::ActiveList;
+use crate::renderer::capture::GpuCapture;
+use crate::renderer::device::GpuContext;
+use crate::renderer::error::GpuError;
 use crate::renderer::memory::with_room;
 use crate::renderer::timing::{PassTime, PassTimer, Timings, median};
-use crate::renderer::{GpuCapture, GpuContext, GpuError, ViewParameters, ViewRenderer};
+use crate::renderer::view::{ViewParameters, ViewRenderer};
 use crate::view::{Background, Counts, View};
 use std::time::{Duration, Instant};
 
-/// Frames that are recorded for each submit, each with buffers of its own.
+/// Frames per submit, each with its own buffers.
 const FRAMES_PER_SUBMIT: usize = 4;
 
-/// How long frames are drawn before any is measured: a GPU takes part of a second to raise its clocks.
+/// Time during which frames are drawn before the measurement: a GPU needs a fraction of a second to raise its clocks.
 const WARM_UP: Duration = Duration::from_millis(600);
 
-/// Everything that one of the frames of a submit needs for itself.
+/// The resources of one of the frames of a submit.
 struct Lane {
     view: ViewRenderer,
     active: Option<ActiveList>,
@@ -25,17 +28,17 @@ struct Lane {
 }
 
 impl Headless {
-    /// Measures frames over the views given, in turn, `frames` of each kind after a warm-up.
+    /// Measures frames that cycle through `views`: `frames` frames for each kind of measurement, after a warm-up.
     ///
     /// # Panics
-    /// If there are frames to measure but no views.
+    /// If `views` is empty but `frames` is not 0.
     ///
     /// # Errors
     /// As [`render`](Self::render).
     pub fn time(&mut self, capture: &GpuCapture, views: &[View], frames: usize) -> Result<Timings, GpuError> {
         let parameters = &self.measured();
         let (mut counts, mut active_counts) = (Vec::new(), Vec::new());
-        // The warm-up also finds the room that every view needs, and nothing that another capture needed.
+        // The warm-up also finds the capacity that every view needs; the capacity for another capture is released first.
         self.view.release();
         for view in views {
             let active = self.take_active(capture, view.time);
@@ -79,7 +82,7 @@ impl Headless {
         })
     }
 
-    /// Returns how the frames are drawn.
+    /// Returns the parameters of the measured frames.
     fn measured(&self) -> ViewParameters<'static> {
         ViewParameters {
             background: Background::Color([0.0; 3]),
@@ -98,7 +101,8 @@ impl Headless {
         Lane { view, active: filtered.flatten(), timer: None }
     }
 
-    /// Draws frames without waiting, if passes are given with timestamps: after each of them, or around frames if there are none.
+    /// Draws frames without waiting. With `passes`, timestamps are written: after each of these passes, or around frames if `passes` is
+    /// empty.
     fn run(
         &self,
         lanes: &mut [Lane],
@@ -143,7 +147,7 @@ impl Headless {
         Ok(())
     }
 
-    /// Records one frame with an encoder of its own; its timestamps are copied to the given place.
+    /// Records one frame with its own encoder. Its timestamps are copied to the given buffer and offset.
     fn encode(
         &self,
         lane: &mut Lane,
@@ -169,12 +173,12 @@ impl Headless {
     }
 }
 
-/// Frames that were drawn without waiting.
+/// Times of frames that were drawn without waiting.
 struct Run {
-    /// Milliseconds of each frame, or of each of its passes; empty if the device has no such timestamps.
+    /// Milliseconds of each frame, or of each of its passes; empty without timestamps.
     frames: Vec<Vec<f64>>,
     /// Wall-clock time of a frame.
     wall_milliseconds: f64,
-    /// CPU time in which a frame is prepared and recorded.
+    /// CPU time to prepare and record a frame.
     encode_milliseconds: f64,
 }

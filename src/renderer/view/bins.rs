@@ -1,24 +1,19 @@
-//! The bins of the fast renderer.
+//! The bins of the fast design.
 //!
-//! In: the size of a picture and the number of splats in all bins to have room for. Out: [`FastResources`], the
-//! counters and entries of bins of a few tiles, and the bind groups of the passes over them. Pictures of any size up to that share them.
+//! In: the size of a picture, the number of Gaussians and counts of earlier frames. Out: the size of bins in tiles and their capacity, the
+//! variants of the passes that depend on them, and [`FastResources`], the counters and entries of bins and the bind groups of the passes.
 
-use super::sizes::Sizes;
-use super::{Instance, ViewRenderer};
-use crate::renderer::layout::{BIN_COUNTERS, VisibleSplat};
-use crate::renderer::memory::Allocator;
-use crate::renderer::pipelines::Renderer;
+use super::parameters::Instance;
 use crate::renderer::shaders::FEW_BINS_LIMIT;
 use crate::view::tiles;
 use glam::UVec2;
-use wgpu::BufferUsages;
 
-/// Buffers and bind groups of the fast renderer.
+/// Buffers and bind groups of the fast design, for pictures of any size up to [`Sizes::picture`](super::sizes::Sizes::picture).
 #[derive(Debug)]
 pub(super) struct FastResources {
     /// Counters of even and of odd frames.
     pub bins: [wgpu::Buffer; 2],
-    /// One [`VisibleSplat`] for each slot.
+    /// One [`VisibleSplat`](crate::renderer::layout::VisibleSplat) for each slot.
     pub visible: wgpu::Buffer,
     /// Color of each slot.
     pub splat_colors: wgpu::Buffer,
@@ -32,21 +27,22 @@ pub(super) struct FastResources {
 }
 
 /// Bytes of the color of a splat.
-const COLOR_BYTES: u64 = 16;
+pub(super) const COLOR_BYTES: u64 = 16;
 
-/// Bins of 2 x 2 tiles up to which they are better: a GPU is idle with fewer of 4 x 4. Those of so many Gaussians are too long to be sorted at
-/// once, and are small up to as many as a workgroup of `project_bin` counts by itself.
+/// Up to [`SMALL_BINS`] bins of 2 x 2 tiles, small bins are faster: bins of 4 x 4 tiles would be too few to occupy a GPU. With more than
+/// [`CROWD`] Gaussians per large bin, large bins are too long to be sorted at once, and the limit is [`SMALL_BINS_OF_CROWD`], the number of
+/// bins that a workgroup of `project_bin` counts in workgroup memory.
 const SMALL_BINS: u32 = 1024;
 const CROWD: u32 = 1 << 14;
 const SMALL_BINS_OF_CROWD: u32 = 2048;
-/// Bins of 4 x 4 tiles from which on they occupy a GPU if they have few Gaussians each.
+/// From [`FEW_LARGE_BINS`] bins of 4 x 4 tiles on, large bins occupy a GPU if they have at most [`FEW_GAUSSIANS`] Gaussians each.
 const FEW_LARGE_BINS: u32 = 128;
 const FEW_GAUSSIANS: u32 = 300;
 
 /// Tiles along each side of small and of large bins.
-const SIDES: [u32; 2] = [2, 4];
+pub(super) const SIDES: [u32; 2] = [2, 4];
 
-/// Returns the number of tiles along each side of a bin, 2 or 4, by the size of the picture and the number of all Gaussians.
+/// Returns the number of tiles along each side of a bin, 2 or 4, for a picture size and a number of Gaussians.
 pub(super) fn bin_side(picture: UVec2, gaussians: u32) -> u32 {
     let [small, large] = SIDES.map(|side| bin_grid(picture, side).element_product());
     let each = gaussians / large;
@@ -55,10 +51,10 @@ pub(super) fn bin_side(picture: UVec2, gaussians: u32) -> u32 {
     if enough_large || small > limit { 4 } else { 2 }
 }
 
-/// Gaussians from which on more workgroups of `project_bin` at once make it faster; with fewer it is no faster.
+/// Number of Gaussians from which on `project_bin` is faster if more of its workgroups run at the same time.
 const CROWDED: u32 = 1 << 20;
 
-/// Returns whether `project_bin` counts few bins, so that a GPU has room for more of its workgroups.
+/// Returns whether `project_bin` uses the variant with few counters of bins, so that more of its workgroups run at the same time.
 pub(super) fn few_bins(picture: UVec2, side: u32, gaussians: u32) -> bool {
     gaussians >= CROWDED && bin_grid(picture, side).element_product() <= FEW_BINS_LIMIT
 }
@@ -68,119 +64,60 @@ pub(super) fn bin_grid(picture: UVec2, side: u32) -> UVec2 {
     tiles(picture).map(|tiles| tiles.div_ceil(side))
 }
 
-/// The largest number of slots that the entries of bins have bits for.
+/// The largest number of slots that fits into the bits of a bin entry.
 pub(super) const MAX_SLOTS: u32 = 1 << 24;
 
-/// Pictures of up to this number of tiles leave the GPU idle: there is room for large batches of `blend_blocks`.
+/// Pictures of up to this number of tiles do not occupy the GPU, so that large batches of `blend_blocks` are faster.
 const FEW_TILES: u32 = 1024;
-/// Workgroup memory that they need, bytes.
+/// Workgroup memory of large batches, bytes.
 const LARGE_BATCHES_MEMORY: u32 = 32 * 1024;
 
-/// Returns whether `blend_blocks` takes large batches.
+/// Returns whether `blend_blocks` uses large batches.
 pub(super) fn large_batches(limits: &wgpu::Limits, instances: &[Instance<'_>]) -> bool {
     let few = instances.first().is_some_and(|instance| tiles(instance.view.size).element_product() <= FEW_TILES);
     few && limits.max_compute_workgroup_storage_size >= LARGE_BATCHES_MEMORY
 }
 
-/// Splats of a bin for which there is room at first: this many, or a share of all Gaussians, but no more than this many for each tile. Few
-/// bins of few captures have more.
+/// Initial capacity of a bin in splats: all Gaussians divided by [`FIRST_DIVISOR`], but at least [`FIRST_CAPACITY`] and at most
+/// [`FIRST_OF_TILE`] for each tile. Few bins of few captures exceed it.
 const FIRST_CAPACITY: u32 = 4096;
-const FIRST_SHARE: u32 = 16;
+const FIRST_DIVISOR: u32 = 16;
 const FIRST_OF_TILE: u32 = 1024;
 
-/// Returns the number of splats for which all bins together have room before any has been counted.
+/// Returns the initial capacity in splats of all bins together, before any splats have been counted.
 pub(super) fn first_guess(picture: UVec2, side: u32, slots: u32) -> u32 {
     let bins = bin_grid(picture, side).element_product();
-    let share = (slots / FIRST_SHARE).clamp(FIRST_CAPACITY, FIRST_OF_TILE * side * side);
-    bins.saturating_mul(slots.min(share).max(256))
+    let capacity = (slots / FIRST_DIVISOR).clamp(FIRST_CAPACITY, FIRST_OF_TILE * side * side);
+    bins.saturating_mul(slots.min(capacity).max(256))
 }
 
-impl ViewRenderer {
-    /// Returns the number of bins across and down the picture that is prepared.
-    pub(super) fn bin_grid(&self) -> UVec2 {
-        bin_grid(self.picture, self.bin_side)
-    }
-
-    /// Returns the number of bins of the picture that is prepared.
-    pub(super) fn bin_count(&self) -> u32 {
-        self.bin_grid().element_product()
-    }
-
-    /// Creates bins, with room for that many splats in all of them together.
-    pub(super) fn make_fast(
-        &self,
-        renderer: &Renderer,
-        allocator: &Allocator<'_>,
-        sizes: Sizes,
-        instance: wgpu::BindingResource<'_>,
-        [splats, tile_ranges, pair_splats]: [&wgpu::Buffer; 3],
-    ) -> FastResources {
-        // As many as there can be.
-        let count = u64::from(bin_grid(sizes.picture, SIDES[0]).element_product());
-        let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
-        let counters = count + u64::from(BIN_COUNTERS + sizes.parts);
-        let bins = [(); 2].map(|()| allocator.buffer("gs4d bins", 4 * counters, usage));
-        let entries_size = 8 * u64::from(sizes.entries.max(1));
-        let entries = allocator.buffer("gs4d bin entries", entries_size, BufferUsages::STORAGE);
-        let slots = u64::from(sizes.slots);
-        let visible = allocator.buffer("gs4d visible", size_of::<VisibleSplat>() as u64 * slots, BufferUsages::STORAGE);
-        let splat_colors = allocator.buffer("gs4d splat colors", COLOR_BYTES * slots, BufferUsages::STORAGE);
-        let bytes = 2 * bins[0].size() + entries_size + visible.size() + splat_colors.size();
-        let layouts = &renderer.layouts;
-        let buffers = [visible.clone(), splat_colors.clone()];
-        let [splats, entries, visible] = [splats, &entries, &visible].map(wgpu::Buffer::as_entire_binding);
-        let splat_colors = splat_colors.as_entire_binding();
-        let [even, odd] = bins.each_ref().map(wgpu::Buffer::as_entire_binding);
-        let (ranges, pairs) = (tile_ranges.as_entire_binding(), pair_splats.as_entire_binding());
-        let both = [[&even, &odd], [&odd, &even]];
-        let project_bin = both.map(|[now, _]| {
-            let resources = [instance.clone(), splats.clone(), now.clone(), entries.clone(), visible.clone()];
-            allocator.bind_group("gs4d project_bin", &layouts.project_bin, &resources)
-        });
-        let sort_bins = both.map(|[now, next]| {
-            let frame = self.frame.as_entire_binding();
-            let lists = [entries.clone(), ranges.clone(), pairs.clone()];
-            let resources = [frame, now.clone(), next.clone()].into_iter().chain(lists).chain([visible.clone()]);
-            allocator.bind_group("gs4d sort_bins", &layouts.sort_bins, &resources.collect::<Vec<_>>())
-        });
-        let colors = both.map(|[now, _]| {
-            let resources = [instance.clone(), now.clone(), visible.clone(), splat_colors.clone()];
-            allocator.bind_group("gs4d colors", &layouts.colors, &resources)
-        });
-        let blend_blocks = [ranges, pairs, splats, splat_colors, visible];
-        let blend_blocks = allocator.bind_group("gs4d blend_blocks", &layouts.blend_blocks, &blend_blocks);
-        let [visible, splat_colors] = buffers;
-        FastResources { bytes, bins, visible, splat_colors, project_bin, sort_bins, colors, blend_blocks }
-    }
-}
-
-/// The room that bins should have: how many splats all of them together must hold if each holds as many as the fullest.
+/// The wanted capacity of all bins together, in splats: the number of bins times the number of splats in the fullest bin, and a reserve.
 #[derive(Debug, Default)]
 pub(super) struct BinRoom {
     wanted: u32,
-    /// The most that a frame has needed since this was reset, and the number of frames.
+    /// The largest capacity that a frame has needed since the last reset, and the number of frames since then.
     peak: u32,
     frames: u32,
 }
 
-/// Frames over which the most that one needs is found.
+/// Number of frames over which the largest needed capacity is determined.
 const FRAMES_OF_PEAK: u32 = 1200;
-/// Room is given back if so many times less would have been enough.
+/// The capacity is reduced if it is too large by more than this factor.
 const MUCH: u32 = 4;
 
 impl BinRoom {
-    /// Returns that of bins which should have room for that many splats.
+    /// Creates the capacity with this initial number of wanted splats.
     pub fn of(wanted: u32) -> Self {
         Self { wanted, ..Self::default() }
     }
 
-    /// Returns the number of splats that there should be room for.
+    /// Returns the wanted capacity in splats.
     pub fn wanted(&self) -> u32 {
         self.wanted
     }
 
-    /// Notes what a frame has needed, with room for `capacity`. A frame that lacks room is slow, so it grows early, and is only given
-    /// back after many frames that did not need it.
+    /// Processes the capacity that a frame needed, and the `capacity` that it had. A frame that exceeds its capacity is slow: the wanted
+    /// capacity grows before it is exceeded, and is reduced only after many frames that did not need it.
     pub fn note(&mut self, needed: u32, capacity: u32) {
         let with_reserve = |needed: u32| needed.saturating_add(needed / 2);
         if needed > capacity / 4 * 3 {
@@ -202,7 +139,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bins_are_small_where_large_ones_would_be_few_or_crowded() {
+    fn bins_are_small_if_large_bins_are_few_or_crowded() {
         for (size, gaussians, side) in [
             (400, 45_000, 2),
             (800, 45_000, 4),
@@ -227,30 +164,30 @@ mod tests {
     }
 
     #[test]
-    fn room_grows_before_it_is_lacking() {
+    fn capacity_grows_before_it_is_exceeded() {
         let mut room = BinRoom::default();
         room.note(700, 1000);
-        assert_eq!(room.wanted(), 0, "there is enough");
+        assert_eq!(room.wanted(), 0, "70 % of the capacity does not grow it");
         room.note(800, 1000);
-        assert_eq!(room.wanted(), 1200, "half as much again");
+        assert_eq!(room.wanted(), 1200, "80 % of the capacity grows it to 1.5 times the need");
     }
 
     #[test]
-    fn views_that_take_turns_keep_the_room_of_the_fullest() {
+    fn alternating_views_keep_the_capacity_of_the_fullest_view() {
         let mut room = BinRoom::default();
         for frame in 0..10 * FRAMES_OF_PEAK {
             room.note(if frame % 60 == 0 { 9000 } else { 10 }, room.wanted().max(1000));
         }
-        assert_eq!(room.wanted(), 13_500, "a frame every second needs it");
+        assert_eq!(room.wanted(), 13_500, "every sixtieth frame needs this capacity");
     }
 
     #[test]
-    fn room_that_nothing_needs_is_given_back() {
+    fn unneeded_capacity_is_reduced() {
         let mut room = BinRoom::default();
         room.note(9000, 1000);
         for _ in 0..2 * FRAMES_OF_PEAK {
             room.note(100, room.wanted());
         }
-        assert_eq!(room.wanted(), 150, "as much as is needed, and a reserve");
+        assert_eq!(room.wanted(), 150, "the need and a reserve of one half");
     }
 }

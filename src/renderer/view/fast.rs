@@ -1,36 +1,36 @@
-//! The fast renderer of a view: four dispatches instead of the global sorts.
+//! The passes of the fast design: four dispatches instead of the global sorts.
 //!
-//! In: what the reference design takes: instances, sizes, the bind group of the pixels. Out: the same picture.
+//! In: a prepared view and its instances. Out: the passes, recorded into the compute pass of the frame. They draw the same picture as the
+//! reference design.
 //!
 //! | pass | reads | writes |
 //! |---|---|---|
-//! | `project_bin` | active list, Gaussians | splats, list of the visible ones, bins of a few tiles, in no order |
+//! | `project_bin` | active list, Gaussians | splats, list of the visible splats, unordered bins of a few tiles |
 //! | `sort_bins` | bins | pairs of each tile, in order of depth |
 //! | `colors` | visible splats, color coefficients | colors of splats |
 //! | `blend_blocks` | pairs, splats and their colors, opaque depth | color and transmittance, expected and median depth |
 //!
-//! `sort_bins` and `colors` do not depend on each other and run at the same time, if each frame has an encoder of its own: wgpu waits
-//! between two passes of an encoder for each buffer that the second writes and an earlier one used. So the counters of even and odd
-//! frames are separate buffers, and so are splats and their colors. The bins are sorted first, as that takes few threads for long: the
-//! colors have the others.
+//! `sort_bins` and `colors` do not depend on each other and run at the same time, if each frame has its own encoder: wgpu inserts a barrier
+//! between two passes of an encoder for each buffer that the second pass writes and an earlier pass used. Therefore the counters of even and
+//! odd frames are in separate buffers, and so are splats and their colors. The bins are sorted first, since `sort_bins` occupies few threads
+//! for a long time: `colors` uses the remaining threads.
 
 use super::bins::FastResources;
-use super::record::mark;
+use super::dispatch::mark;
+use super::parameters::Instance;
 use super::resources::Resources;
-use super::sizes::Sizes;
-use super::{Instance, ViewRenderer};
-use crate::renderer::layout::{BIN_COUNTERS, Counters};
+use super::view_renderer::ViewRenderer;
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::Storage;
 use crate::renderer::timing::PassTimer;
 use crate::view::tiles;
 
-/// Gaussians of a part from which on each thread of `project_bin` takes two, and four. Where many are absent, those that are present fill its
-/// workgroups better if each takes more of them, but small parts need as many workgroups as they can have.
+/// Number of Gaussians of a part from which on each thread of `project_bin` processes two, and four Gaussians. If many Gaussians are absent,
+/// workgroups of more Gaussians are better utilized, but small parts need as many workgroups as possible.
 const MANY_GAUSSIANS: u32 = 1 << 18;
 const VERY_MANY_GAUSSIANS: u32 = 1 << 20;
 
-/// Returns the number of Gaussians that each thread of `project_bin` takes.
+/// Returns the number of Gaussians per thread of `project_bin`.
 pub(super) fn per_thread(count: u32) -> u32 {
     match count {
         0..MANY_GAUSSIANS => 1,
@@ -39,7 +39,7 @@ pub(super) fn per_thread(count: u32) -> u32 {
     }
 }
 
-/// Returns the number of splats of a workgroup of `colors`, which takes four threads for each: `SPLATS` of the shader.
+/// Returns the number of splats per workgroup of `colors`, four threads per splat: `SPLATS` of the shader.
 fn colors_of_group(storage: Storage) -> u32 {
     match storage {
         Storage::Coded => 32,
@@ -47,25 +47,10 @@ fn colors_of_group(storage: Storage) -> u32 {
     }
 }
 
-/// The largest number of workgroups of `colors`, which go on until all visible splats have a color: enough for any GPU.
+/// The largest number of workgroups of `colors`, which loop over the visible splats: enough to occupy any GPU.
 const COLOR_GROUPS: u32 = 8192;
 
 impl ViewRenderer {
-    /// Returns the counters of the frame prepared last, on the GPU, and where they are, in bytes.
-    pub(in crate::renderer) fn counters(&self) -> (&wgpu::Buffer, u64) {
-        let first = u64::from(BIN_COUNTERS) * 4 - size_of::<Counters>() as u64;
-        let fast = self.resources.as_ref().and_then(|made| made.fast.as_ref());
-        // `sort_bins` writes them beside those of the next frame.
-        fast.map_or((&self.counters, 0), |fast| (&fast.bins[usize::from(!self.odd)], first))
-    }
-
-    /// Returns the uniform `binning` of a part in the frame that is prepared.
-    pub(super) fn binning(&self, sizes: &Sizes, part: u32) -> [u32; 4] {
-        // Never 0, which is the stamp of a new buffer.
-        let frame = self.frames % 0xffff + 1;
-        [self.bin_side | (frame << 8), sizes.entries / self.bin_count(), part, sizes.parts]
-    }
-
     /// Records the passes of the fast design.
     pub(super) fn record_fast(
         &self,

@@ -1,10 +1,11 @@
-//! What a frame of a view is drawn from, besides the working state of the view.
+//! The parameters of a frame of a view.
 //!
-//! In: what the host knows of captures, cameras and surfaces. Out: [`Instance`]s and [`ViewParameters`] for
+//! In: captures, cameras and surfaces. Out: [`Instance`]s and [`ViewParameters`] for
 //! [`ViewRenderer::prepare`](super::ViewRenderer::prepare).
 
+use crate::renderer::active::ActiveList;
+use crate::renderer::capture::GpuCapture;
 use crate::renderer::shaders::{Blending, ColorPrecision};
-use crate::renderer::{ActiveList, GpuCapture};
 use crate::view::{Appearance, Background, BlendSpace, DebugView, View};
 use glam::UVec2;
 
@@ -13,17 +14,17 @@ use glam::UVec2;
 pub struct Instance<'a> {
     /// The capture.
     pub capture: &'a GpuCapture,
-    /// The list of the Gaussians that are drawn, prepared for the view's time and recorded before the view is; all are
-    /// drawn if `None`.
+    /// The list of the Gaussians that are drawn, prepared for the view's time and recorded before the view. If `None`, all Gaussians are
+    /// drawn.
     pub active: Option<&'a ActiveList>,
     /// Camera and time, with the transform of the capture.
     pub view: View,
-    /// Its opacity, light and crop.
+    /// Opacity, light and crop of the capture.
     pub appearance: Appearance,
 }
 
 impl Instance<'_> {
-    /// Returns whether one dispatch can draw this instance and the next: all Gaussians of the same capture, in one part.
+    /// Returns whether one dispatch can draw this instance and the next: both draw all Gaussians of the same capture, which has one part.
     pub(super) fn joins(&self, next: &Self) -> bool {
         let draws_all = self.active.is_none() && next.active.is_none();
         std::ptr::eq(self.capture, next.capture) && self.capture.parts.len() == 1 && draws_all
@@ -33,20 +34,21 @@ impl Instance<'_> {
 /// The background and the opaque surfaces of a view, and how its captures are shown.
 #[derive(Debug, Clone, Copy)]
 pub struct ViewParameters<'a> {
-    /// What is behind the captures. Default: [`Background::None`].
+    /// The background behind the captures. Default: [`Background::None`].
     pub background: Background,
-    /// The opaque surfaces that hide splats. If given, what is behind an environment map is hidden. Default: `None`.
+    /// The opaque surfaces that hide splats. If given, an environment map hides the picture behind it. Default: `None`.
     pub opaque: Option<OpaqueDepth<'a>>,
     /// The space in which the captures are blended. Default: [`BlendSpace::Encoded`].
     pub blend_space: BlendSpace,
-    /// What is shown of the captures. Default: [`DebugView::Color`].
+    /// The quantity of the captures that is shown. Default: [`DebugView::Color`].
     pub debug: DebugView,
-    /// Whether expected and median depth are computed; drawing is faster without. Default: `true`.
+    /// Whether expected and median depth are computed; drawing without depths is faster. Default: `true`.
     pub depths: bool,
     /// Precision of the color target. Default: [`ColorPrecision::Single`].
     pub precision: ColorPrecision,
-    /// The view of each instance one frame before, in their order: with its camera, its transform and its time of then. An instance without
-    /// one, or whose lens was of the other kind, has not moved. If given, [motions](super::ViewRenderer::motion) are computed. Default: `None`.
+    /// The view of each instance in the previous frame, in the order of the instances, with camera, transform and time of that frame. An
+    /// instance without a previous view, or with another kind of lens in the previous frame, has no motion. If given,
+    /// [motions](super::ViewRenderer::motion) are computed. Default: `None`.
     pub previous: Option<&'a [View]>,
 }
 
@@ -58,7 +60,7 @@ impl Default for ViewParameters<'_> {
 }
 
 impl ViewParameters<'_> {
-    /// Returns what the fast design has to blend.
+    /// Returns the variant of `blend_blocks` that these parameters need.
     pub(super) fn blending(&self) -> Blending {
         let samples = self.opaque.map_or(0, |opaque| opaque.samples);
         let color = match self.debug {
@@ -80,11 +82,11 @@ impl ViewParameters<'_> {
 pub struct OpaqueDepth<'a> {
     /// A `Depth32Float` texture, 0 where there is no surface.
     pub texture: &'a wgpu::TextureView,
-    /// Number of samples per pixel. A splat is hidden from the share of a pixel whose samples are in front of it.
+    /// Number of samples per pixel. A splat is hidden in the fraction of a pixel whose samples are in front of it.
     pub samples: u32,
     /// Corner of the view in the texture, pixels.
     pub origin: UVec2,
-    /// From its depth `d` to camera space, `[a, b, c, e]` in `z = (a + b d) / (c + e d)`. Reverse-z with an infinite far plane is
+    /// From texture depth `d` to camera space: `[a, b, c, e]` in `z = (a + b d) / (c + e d)`. Reverse-z with an infinite far plane is
     /// `[near, 0, 0, 1]`.
     pub distance: [f32; 4],
 }

@@ -1,12 +1,12 @@
 //! Asynchronous read-back of buffers from the GPU.
 //!
-//! In: copies recorded into a frame. Out: their bytes, some frames later. While one copy is in progress no other is
+//! In: copies recorded into a frame. Out: the copied bytes, some frames later. While a copy is in progress, no other copy is
 //! started.
 
 use crate::renderer::memory::Allocator;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A buffer that is copied into, mapped and read, in turn.
+/// A buffer that is repeatedly filled by a copy, mapped and read.
 #[derive(Debug)]
 pub(super) struct Readback {
     buffer: wgpu::Buffer,
@@ -15,11 +15,11 @@ pub(super) struct Readback {
 
 #[derive(Debug)]
 enum State {
-    /// Free to be copied into.
+    /// No copy is in progress.
     Idle,
-    /// A recorded frame copies into it.
+    /// A recorded frame copies into the buffer.
     Recorded,
-    /// Being mapped.
+    /// The buffer is being mapped.
     Mapping(Arc<Mutex<Arrival>>),
 }
 
@@ -42,7 +42,7 @@ impl Readback {
         matches!(self.state, State::Idle)
     }
 
-    /// Records a copy from the beginning of `source` that fills the buffer, unless one is in progress.
+    /// Records a copy from `source`, starting at `offset`, that fills the buffer, unless a copy is in progress.
     pub fn copy(&mut self, encoder: &mut wgpu::CommandEncoder, source: &wgpu::Buffer, offset: u64) {
         if self.is_idle() {
             encoder.copy_buffer_to_buffer(source, offset, &self.buffer, 0, self.buffer.size());
@@ -50,8 +50,8 @@ impl Readback {
         }
     }
 
-    /// Advances by one state; returns the bytes if they have arrived, else `None`. Call it once a frame, before the
-    /// next is recorded.
+    /// Advances by one state; returns the bytes if they have arrived, otherwise `None`. Call it once per frame, before the
+    /// frame is recorded.
     pub fn poll(&mut self) -> Option<Vec<u8>> {
         let arrival = match &self.state {
             State::Idle => return None,
@@ -67,13 +67,13 @@ impl Readback {
                 self.state = State::Idle;
                 Some(bytes)
             }
-            // It will not be used again: views are created again on the next device.
+            // The buffer is not used again: views are created again on the next device.
             Arrival::Lost => None,
         }
     }
 
-    /// Starts to map the buffer. The bytes are copied in the callback: later the device may have been lost, and reading
-    /// the buffer would panic.
+    /// Starts to map the buffer. The callback copies the bytes: later the device may be lost, and reading the buffer would
+    /// panic.
     fn map(&self) -> Arc<Mutex<Arrival>> {
         let arrival = Arc::new(Mutex::new(Arrival::Expected));
         let (buffer, to) = (self.buffer.clone(), arrival.clone());

@@ -1,14 +1,14 @@
-//! Designs: the ways in which a view is drawn.
+//! The designs: sequences of passes that draw a view.
 //!
-//! In: nothing. Out: [`Design`], its names, and the passes of each that are timed.
+//! In: nothing. Out: [`Design`], the names of the designs, and the timed passes of each design.
 
-use crate::renderer::timing::{MOTION_PASSES, TIMED_FAST_PASSES, TIMED_PASSES};
+use super::timing::{MOTION_PASSES, TIMED_FAST_PASSES, TIMED_PASSES};
 
-/// How a view is drawn. All draw the same picture.
+/// The sequence of passes that draws a view. All designs draw the same picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Design {
     /// [`Fast`](Self::Fast), but [`Reference`](Self::Reference) on software drivers, where it is faster, and in browsers, where the fast
-    /// design is untried.
+    /// design is untested.
     #[default]
     Auto,
     /// Bins of splats, each sorted by one workgroup.
@@ -23,7 +23,7 @@ impl Design {
         [("auto", Self::Auto), ("fast", Self::Fast), ("reference", Self::Reference)];
 
     /// Returns the names of the passes that are timed, in frames with motions or without.
-    pub(in crate::renderer) fn timed_passes(self, motions: bool) -> &'static [&'static str] {
+    pub(super) fn timed_passes(self, motions: bool) -> &'static [&'static str] {
         let all = match self {
             Self::Auto | Self::Fast => TIMED_FAST_PASSES,
             Self::Reference => TIMED_PASSES,

@@ -1,0 +1,276 @@
+//! A capture on the GPU.
+//!
+//! In: a [`RuntimeScene`]. Out: [`GpuCapture`], whose buffers live as long as the capture. Large captures are split into parts, so that
+//! no binding exceeds the limit of the device. One dispatch of `project` draws a part; instances of a capture of a single part are drawn
+//! by one dispatch.
+
+use super::buffers::{self, Filling};
+use crate::gaussian::ShDirection;
+use crate::gaussian::harmonics::evaluated;
+use crate::renderer::error::GpuError;
+use crate::renderer::layout::{self, BLOCK};
+use crate::renderer::memory::{Allocator, binding_limit};
+use crate::renderer::pipelines::Renderer;
+use crate::renderer::shaders::Storage;
+use crate::scene::packed::MAX_STAGES;
+use crate::scene::{ActiveSets, CodedColors, ColorDegrees, RuntimeScene, TemporalFilter, segment_of};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A capture on the GPU: its Gaussians, color and environment map in buffers, in as many parts as the binding limit
+/// requires.
+#[derive(Debug)]
+pub struct GpuCapture {
+    pub(in crate::renderer) parts: Vec<Part>,
+    pub(in crate::renderer) environment: Option<EnvironmentBuffer>,
+    /// Storage of its Gaussians and colors.
+    pub(in crate::renderer) storage: Storage,
+    /// Identifies this upload within the process.
+    pub(in crate::renderer) id: u64,
+    pub(in crate::renderer) filter: Option<Filter>,
+    /// Bytes of its buffers, without the filter.
+    bytes: u64,
+    /// Color and time settings of the [`layout::InstanceUniforms`]; the rest is zero.
+    settings: layout::InstanceUniforms,
+    len: usize,
+}
+
+/// A range of Gaussians that fits into one binding.
+#[derive(Debug)]
+pub(in crate::renderer) struct Part {
+    pub count: u32,
+    pub geometry: wgpu::BindGroup,
+    pub color: wgpu::BindGroup,
+    /// The buffers of geometry and color.
+    buffers: Vec<wgpu::Buffer>,
+    /// The active sets of the Gaussians of this part, if there is a filter.
+    pub filter: Option<wgpu::BindGroup>,
+}
+
+/// The data of a temporal filter that the host needs.
+#[derive(Debug)]
+pub(in crate::renderer) struct Filter {
+    /// `FILTER_*`.
+    pub mode: u32,
+    segments: u32,
+    interval: [f32; 2],
+    /// Number of active Gaussians, part by part and segment by segment.
+    counts: Vec<u32>,
+    /// Bytes of its buffers.
+    bytes: u64,
+    /// Largest number of active Gaussians of all parts in any segment.
+    pub most: u32,
+}
+
+impl Filter {
+    fn new(filter: &TemporalFilter, interval: [f32; 2], parts: &[Part], bytes: u64) -> Self {
+        let mut counts = Vec::with_capacity(parts.len() * filter.segments as usize);
+        let mut first = 0;
+        for part in parts {
+            let own = first..first + part.count as usize;
+            counts.extend(filter.active_counts(own.clone()));
+            first = own.end;
+        }
+        let mode = match filter.sets {
+            ActiveSets::Bits(_) => layout::FILTER_BITS,
+            ActiveSets::Intervals(_) => layout::FILTER_INTERVALS,
+        };
+        let segments = filter.segments as usize;
+        let of_all_parts = |segment: usize| counts.iter().skip(segment).step_by(segments.max(1)).sum::<u32>();
+        let most = (0..segments).map(of_all_parts).max().unwrap_or_default();
+        Self { mode, segments: filter.segments, interval, counts, bytes, most }
+    }
+
+    /// Returns the segment of a time, in the capture's unit.
+    pub fn segment_of(&self, time: f32) -> u32 {
+        segment_of(time, self.interval, self.segments)
+    }
+
+    /// Returns the number of active Gaussians of a part in a segment.
+    pub fn count(&self, part: usize, segment: u32) -> u32 {
+        self.counts.get(part * self.segments as usize + segment as usize).copied().unwrap_or_default()
+    }
+}
+
+#[derive(Debug)]
+pub(in crate::renderer) struct EnvironmentBuffer {
+    pub buffer: wgpu::Buffer,
+    pub size: [u32; 2],
+}
+
+impl GpuCapture {
+    /// Creates the buffers of a scene, which are filled later.
+    pub(super) fn allocate(
+        device: &wgpu::Device,
+        renderer: &Renderer,
+        scene: &RuntimeScene,
+    ) -> Result<(Self, Vec<Filling>), GpuError> {
+        scene.check().map_err(GpuError::Scene)?;
+        let allocator = renderer.allocator(device);
+        let form = &scene.form;
+        let storage = Storage::of(form);
+        let ColorDegrees { degree, degree_t, .. } = form.color_degrees();
+        let stride = (evaluated(degree, degree_t) * 3).div_ceil(4);
+        let limits = device.limits();
+        if let Some(map) = &scene.environment {
+            let (needed, limit) = (size_of_val(map.texels.as_slice()) as u64, binding_limit(&limits));
+            if needed > limit {
+                return Err(GpuError::TooLarge { what: "the environment map", needed, limit });
+            }
+        }
+        let bits = scene.filter.as_ref().map_or(0, |filter| u64::from(filter.segments).div_ceil(8));
+        let record = buffers::largest_record(form, stride).max(bits);
+        let threads = u64::from(limits.max_compute_workgroups_per_dimension) * 256;
+        // A multiple of the block that one workgroup of `activate` processes.
+        let per_part = ((binding_limit(&limits) / record).min(threads) as usize / BLOCK as usize) * BLOCK as usize;
+        if per_part == 0 {
+            let (needed, limit) = (record * u64::from(BLOCK), binding_limit(&limits));
+            return Err(GpuError::TooLarge { what: "the Gaussians", needed, limit });
+        }
+        let mut parts = Vec::new();
+        let mut fillings = Vec::new();
+        let codebooks = form.coded_colors().map(|colors| buffers::codebooks(allocator, colors));
+        for first in (0..scene.len()).step_by(per_part) {
+            let own = first..(first + per_part).min(scene.len());
+            let geometry = buffers::geometry(allocator, form, own.clone());
+            let color = buffers::color(allocator, form, own.clone(), stride);
+            let buffer = |filling: &Filling| filling.buffer.clone();
+            let colors = [&color].into_iter().chain(&codebooks).map(buffer).collect();
+            let both: [Vec<wgpu::Buffer>; 2] = [geometry.iter().map(buffer).collect(), colors];
+            let [geometry_group, color_group] =
+                renderer.capture_bind_groups(device, storage, both.each_ref().map(|all| &all[..]));
+            fillings.extend(geometry);
+            fillings.push(color);
+            let (count, buffers) = (own.len() as u32, both.concat());
+            parts.push(Part { count, geometry: geometry_group, color: color_group, buffers, filter: None });
+        }
+        fillings.extend(codebooks);
+        let environment = scene.environment.as_ref().map(|map| {
+            let texels = buffers::environment(allocator, map);
+            let buffer = texels.buffer.clone();
+            fillings.push(texels);
+            EnvironmentBuffer { buffer, size: [map.width, map.height] }
+        });
+        let bytes = fillings.iter().map(|filling| filling.buffer.size()).sum();
+        let settings = layout::InstanceUniforms {
+            degree,
+            degree_t: if degree == 3 { degree_t } else { 0 },
+            stride: form.coded_colors().map_or(stride, buffers::entry_words) as u32,
+            stages: form.coded_colors().map_or(0, |colors| colors.entries.len() as u32),
+            first_entries: form.coded_colors().map(first_entries).unwrap_or_default(),
+            displaced: u32::from(scene.trained_with.sh_direction == ShDirection::Displaced),
+            time_span: scene.trained_with.time_span(),
+            ..bytemuck::Zeroable::zeroed()
+        };
+        let id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
+        let mut capture = Self { parts, environment, storage, id, filter: None, bytes, settings, len: scene.len() };
+        if let Some(filter) = &scene.filter {
+            fillings.extend(capture.allocate_filter(allocator, renderer, filter, scene.trained_with.time_interval));
+        }
+        Ok((capture, fillings))
+    }
+
+    /// Replaces the buffers of the temporal filter by buffers of another filter of the same number of Gaussians, which are filled later.
+    fn allocate_filter(
+        &mut self,
+        allocator: Allocator<'_>,
+        renderer: &Renderer,
+        filter: &TemporalFilter,
+        interval: [f32; 2],
+    ) -> Vec<Filling> {
+        let (mut first, mut fillings) = (0, Vec::with_capacity(self.parts.len()));
+        for part in &mut self.parts {
+            let end = first + part.count as usize;
+            let sets = buffers::filter(allocator, filter, first..end);
+            let resources = [sets.buffer.as_entire_binding()];
+            part.filter = Some(allocator.bind_group("gs4d filter", &renderer.layouts.filter, &resources));
+            fillings.push(sets);
+            first = end;
+        }
+        let bytes = fillings.iter().map(|filling| filling.buffer.size()).sum();
+        self.filter = Some(Filter::new(filter, interval, &self.parts, bytes));
+        // Active lists of the previous filter become invalid.
+        self.id = NEXT_ID.fetch_add(1, Ordering::Relaxed);
+        fillings
+    }
+
+    /// Replaces the temporal filter, for clients that change the Gaussians. `interval` is the time interval of the capture.
+    ///
+    /// # Errors
+    /// When the filter has another number of Gaussians.
+    pub fn replace_filter(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        renderer: &Renderer,
+        filter: &TemporalFilter,
+        interval: [f32; 2],
+    ) -> Result<(), GpuError> {
+        if filter.count != self.len {
+            return Err(GpuError::Scene("the temporal filter has another number of Gaussians"));
+        }
+        for sets in self.allocate_filter(renderer.allocator(device), renderer, filter, interval) {
+            sets.fill_filter(queue, filter);
+        }
+        Ok(())
+    }
+
+    /// Returns the number of Gaussians.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Returns whether the capture has no Gaussians.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Returns whether the capture has an environment map.
+    pub fn has_environment(&self) -> bool {
+        self.environment.is_some()
+    }
+
+    /// Returns whether the capture has a temporal filter.
+    pub fn has_filter(&self) -> bool {
+        self.filter.is_some()
+    }
+
+    /// Returns the bytes of the capture's buffers on the GPU.
+    pub fn bytes(&self) -> u64 {
+        self.bytes + self.filter.as_ref().map_or(0, |filter| filter.bytes)
+    }
+
+    /// Returns the buffers of records, lifespans and color coefficients, for passes of clients that write them. Returns `None` if the capture
+    /// is packed or has several parts.
+    pub fn writable(&self) -> Option<[&wgpu::Buffer; 3]> {
+        match (&self.parts[..], self.storage) {
+            ([Part { buffers, .. }], Storage::Sliced) => buffers.iter().collect::<Vec<_>>().try_into().ok(),
+            _ => None,
+        }
+    }
+
+    /// Returns the bind group of the geometry, for passes of clients. Returns `None` if the capture has several parts.
+    pub fn geometry(&self) -> Option<&wgpu::BindGroup> {
+        if let [part] = &self.parts[..] { Some(&part.geometry) } else { None }
+    }
+
+    /// Returns `view` with the color and time settings of the capture.
+    pub(in crate::renderer) fn instance(&self, view: &layout::InstanceUniforms) -> layout::InstanceUniforms {
+        layout::InstanceUniforms {
+            degree: self.settings.degree,
+            degree_t: self.settings.degree_t,
+            stride: self.settings.stride,
+            displaced: self.settings.displaced,
+            stages: self.settings.stages,
+            first_entries: self.settings.first_entries,
+            time_span: self.settings.time_span,
+            ..*view
+        }
+    }
+}
+
+static NEXT_ID: AtomicU64 = AtomicU64::new(0);
+
+/// Returns the index of the first entry of each codebook among all entries.
+fn first_entries(colors: &CodedColors) -> [u32; MAX_STAGES] {
+    std::array::from_fn(|stage| colors.entries.iter().take(stage).sum())
+}

@@ -1,0 +1,210 @@
+//! The preparation of a frame: pipelines, sizes, resources and uniforms.
+//!
+//! In: instances and [`ViewParameters`], and the counters of earlier frames. Out: a [`ViewRenderer`] that can be recorded.
+
+use super::bins;
+use super::motion::MotionResources;
+use super::parameters::{Instance, ViewParameters};
+use super::sizes::{Sizes, grown, max_pairs};
+use super::view_renderer::ViewRenderer;
+use crate::renderer::active::{drawn_count, most_drawn};
+use crate::renderer::design::Design;
+use crate::renderer::error::GpuError;
+use crate::renderer::layout::{self, BLOCK, Counters};
+use crate::renderer::memory::binding_limit;
+use crate::renderer::pipelines::Renderer;
+use crate::renderer::shaders::{FastVariant, Lists, Pixels};
+use crate::renderer::timing::PassTime;
+use crate::view::DebugView;
+use glam::UVec2;
+
+/// Buffers that are too large by more than this factor, for more than this number of frames, are replaced.
+const OVERSIZE_FACTOR: u32 = 4;
+const RELEASE_AFTER_IDLE_FRAMES: u32 = 120;
+
+impl ViewRenderer {
+    /// Sizes the buffers for the instances and for the pairs that earlier frames counted, and writes the uniforms. Call
+    /// it before the queue is submitted. In the steady state it creates no resources.
+    ///
+    /// All instances must have views of the same size and lens.
+    ///
+    /// # Errors
+    /// When the picture or a buffer would be larger than the device allows.
+    pub fn prepare(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        renderer: &Renderer,
+        instances: &[Instance<'_>],
+        parameters: &ViewParameters<'_>,
+    ) -> Result<(), GpuError> {
+        self.poll();
+        let (precision, blending) = (parameters.precision, parameters.blending());
+        let picture = instances.first().map_or(self.picture, |instance| instance.view.size);
+        let total: usize = instances.iter().map(|instance| instance.capture.len()).sum();
+        let total = u32::try_from(total).unwrap_or(u32::MAX);
+        self.pixels = Pixels { multisampled: blending.is_multisampled(), precision };
+        self.has_depths = parameters.depths;
+        let joined = instances.chunk_by(Instance::joins);
+        let drawn = joined.map(|joined| (joined[0].capture.storage, joined.len() > 1));
+        let writes_depths = if self.design == Design::Reference {
+            renderer.compile_reference(device, drawn, self.pixels)?;
+            true
+        } else {
+            let large_batches = bins::large_batches(&device.limits(), instances);
+            let lists = Lists::suiting(&device.limits(), self.fullest_bin);
+            let few_bins = bins::few_bins(picture, bins::bin_side(picture, total), total);
+            self.variant = FastVariant { few_bins, lists, blending, precision, large_batches };
+            renderer.compile_fast(device, drawn, self.variant)?;
+            blending.writes_depths()
+        };
+        if std::mem::take(&mut self.recorded) {
+            self.odd = !self.odd;
+            self.frames = self.frames.wrapping_add(1);
+        }
+        let made = self.resources.as_ref().map(|resources| resources.sizes).unwrap_or_default();
+        let limits = device.limits();
+        if picture.min_element() == 0 || picture.max_element() > limits.max_texture_dimension_2d {
+            return Err(GpuError::Size { width: picture.x, height: picture.y, limit: limits.max_texture_dimension_2d });
+        }
+        // The maximum over time, so that another segment of a filter does not change the buffers.
+        let slots: usize = instances.iter().map(|instance| most_drawn(instance.capture, instance.active)).sum();
+        let parts: usize = instances.iter().map(|instance| instance.capture.parts.len()).sum();
+        let splat = size_of::<layout::SplatRecord>() as u64;
+        let limit = match self.design {
+            Design::Reference => binding_limit(&limits),
+            Design::Auto | Design::Fast => binding_limit(&limits).min(u64::from(bins::MAX_SLOTS) * splat),
+        };
+        // The buffer of splats has the largest elements per slot.
+        let needed = (slots as u64).next_multiple_of(u64::from(BLOCK)) * splat;
+        if needed > limit {
+            return Err(GpuError::TooLarge { what: "the splats", needed, limit });
+        }
+        let slots = slots as u32;
+        // A first guess; the counters of later frames correct it.
+        let guess = total.saturating_mul(2).min(slots.saturating_mul(6)).max(1 << 16);
+        let most = max_pairs(device);
+        let pairs = self.pairs_wanted.max(guess).min(most);
+        (self.picture, self.bin_side) = (picture, bins::bin_side(picture, total));
+        let in_bins = self.fullest_bin.saturating_mul(self.bin_count());
+        self.short_of_room = self.statistics.pairs > most || in_bins > most / 2;
+        let entries = |picture| match self.design {
+            Design::Reference => 0,
+            // An entry has twice as many bytes as a pair.
+            Design::Auto | Design::Fast => {
+                self.bin_room.wanted().max(bins::first_guess(picture, self.bin_side, slots)).min(most / 2)
+            }
+        };
+        let needed = |picture| Sizes {
+            slots: slots.next_multiple_of(BLOCK).max(BLOCK),
+            pairs,
+            entries: entries(picture),
+            parts: (parts as u32).max(1),
+            picture,
+            depths: if writes_depths { picture } else { UVec2::ONE },
+        };
+        let [exact, grown] = [picture, grown(made.picture, picture, limits.max_texture_dimension_2d)].map(needed);
+        let sizes = self.kept_sizes(made, exact, grown, guess);
+        let environment = instances.iter().find_map(|i| Some((i, i.capture.environment.as_ref()?)));
+        let opaque = parameters.opaque.filter(|opaque| opaque.samples > 0);
+        let opaque_view = opaque.map_or(&self.no_depth, |depth| depth.texture).clone();
+        let environment_buffer = environment.map_or(&self.no_environment, |(_, map)| &map.buffer).clone();
+        match &mut self.resources {
+            Some(made) if made.sizes == sizes && made.pixels == self.pixels => {
+                let allocator = renderer.allocator(device);
+                made.bind_pixel(allocator, &renderer.layouts, &self.frame, opaque_view, environment_buffer);
+            }
+            _ => {
+                self.odd = false;
+                self.motion = None;
+                self.resources = Some(self.make(device, queue, renderer, sizes, opaque_view, environment_buffer));
+            }
+        }
+        let active =
+            |i: &Instance<'_>| (0..i.capture.parts.len()).map(|at| drawn_count(i.capture, at, i.active)).sum::<u32>();
+        self.slots = instances.iter().map(active).sum();
+        self.prepare_motion(device, queue, renderer, instances, parameters)?;
+        self.statistics.bytes = self.resources.as_ref().map_or(0, |made| made.bytes)
+            + self.motion.as_ref().map_or(0, MotionResources::bytes);
+        self.statistics.total = total;
+        self.statistics.active = self.slots;
+        self.write_uniforms(queue, instances, parameters, environment.map(|(i, m)| (i.view, i.appearance, m.size)));
+        Ok(())
+    }
+
+    /// Creates the resources of motions if the frame has motions and they do not exist; releases them if it has none.
+    fn prepare_motion(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        renderer: &Renderer,
+        instances: &[Instance<'_>],
+        parameters: &ViewParameters<'_>,
+    ) -> Result<(), GpuError> {
+        let known = self.motion.take();
+        if parameters.previous.is_some() {
+            let storages = instances.iter().map(|instance| instance.capture.storage);
+            renderer.compile_motion(device, storages, self.design)?;
+            let color = ViewParameters { depths: false, debug: DebugView::Color, ..*parameters };
+            let variant = FastVariant { blending: color.blending(), ..self.variant };
+            if self.design == Design::Fast {
+                renderer.compile_fast(device, std::iter::empty(), variant)?;
+            }
+            if let Some(made) = &self.resources {
+                let allocator = renderer.allocator(device);
+                let mut motion = known.unwrap_or_else(|| MotionResources::new(renderer, allocator, made, variant));
+                motion.update(renderer, allocator, made, variant);
+                self.motion = Some(motion);
+            }
+        }
+        // Frames with motions have more timed passes.
+        if self.timing.as_ref().is_some_and(|(timer, _)| timer.passes() != self.timed_passes()) {
+            self.measure(device, queue, renderer, false);
+            self.measure(device, queue, renderer, true);
+        }
+        Ok(())
+    }
+
+    /// Returns the sizes to allocate. Sizes grow from frame to frame, but buffers that have been far too large for some frames are reduced.
+    /// `exact` are the sizes that the frame needs, with `guess` pairs; `grown` are the same sizes with a reserve for larger pictures.
+    fn kept_sizes(&mut self, made: Sizes, exact: Sizes, grown: Sizes, guess: u32) -> Sizes {
+        let counted = self.statistics.pairs.saturating_add(self.statistics.pairs / 2).max(1 << 16);
+        let oversized = made.slots / OVERSIZE_FACTOR > exact.slots
+            || made.pairs / OVERSIZE_FACTOR > guess.max(counted)
+            || made.entries / OVERSIZE_FACTOR > exact.entries
+            || made.picture.element_product() / OVERSIZE_FACTOR > exact.picture.element_product();
+        self.oversized_frames = if oversized { self.oversized_frames + 1 } else { 0 };
+        if self.oversized_frames > RELEASE_AFTER_IDLE_FRAMES {
+            self.oversized_frames = 0;
+            self.pairs_wanted = counted;
+            return Sizes { pairs: guess.max(counted), ..exact };
+        }
+        Sizes {
+            slots: made.slots.max(grown.slots),
+            pairs: made.pairs.max(grown.pairs),
+            entries: made.entries.max(grown.entries),
+            parts: made.parts.max(grown.parts),
+            picture: grown.picture,
+            depths: grown.depths,
+        }
+    }
+
+    /// Processes the counters and timestamps of earlier frames that have arrived.
+    fn poll(&mut self) {
+        if let Some(counters) = self.readback.poll() {
+            let counters: Counters = bytemuck::pod_read_unaligned(&counters);
+            self.statistics.visible = counters.visible;
+            self.statistics.pairs = self.pair_count(&counters);
+            if self.design == Design::Fast {
+                self.fullest_bin = counters.pairs_wanted;
+            }
+            self.make_room(&counters);
+        }
+        if let Some((timer, readback)) = &mut self.timing
+            && let Some(timestamps) = readback.poll()
+        {
+            let named = timer.passes().iter().zip(timer.intervals(&timestamps));
+            self.statistics.passes = named.map(|(&name, milliseconds)| PassTime { name, milliseconds }).collect();
+        }
+    }
+}

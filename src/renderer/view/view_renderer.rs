@@ -1,0 +1,282 @@
+//! The state of one view on the GPU: its working buffers, its targets and its statistics.
+//!
+//! In: a device and a [`Renderer`]. Out: [`ViewRenderer`] with its settings and results. `prepare` and `record` fill and record the frame.
+
+use super::bins::{self, BinRoom};
+use super::motion::MotionResources;
+use super::readback::Readback;
+use super::resources::{PassBuffers, Resources};
+use crate::renderer::design::Design;
+use crate::renderer::layout::{self, BIN_COUNTERS, Counters, DEPTH_STEPS, INSTANCE_STRIDE};
+use crate::renderer::pipelines::Renderer;
+use crate::renderer::shaders::{FastVariant, Pixels};
+use crate::renderer::statistics::ViewStatistics;
+use crate::renderer::timing::PassTimer;
+use glam::UVec2;
+use wgpu::{BufferUsages, TextureFormat};
+
+/// Working buffers, uniforms and targets of one view.
+#[derive(Debug)]
+pub struct ViewRenderer {
+    /// Number of slots of the frame prepared last, the size of its picture, and the tiles along each side of its bins.
+    pub(super) slots: u32,
+    pub(super) picture: UVec2,
+    pub(super) bin_side: u32,
+    /// Never [`Design::Auto`].
+    pub(super) design: Design,
+    /// Whether the counters of odd frames are used, and whether the frame prepared last has been recorded.
+    pub(super) odd: bool,
+    /// Number of frames that have been recorded.
+    pub(super) frames: u32,
+    pub(super) recorded: bool,
+    /// The variants of the pixel passes and of the passes of the fast design in the frame prepared last.
+    pub(super) pixels: Pixels,
+    pub(super) variant: FastVariant,
+    /// Number of splats of the fullest bin of an earlier frame.
+    pub(super) fullest_bin: u32,
+    /// Number of bins that the frame recorded last has cleared for the next frame.
+    pub(super) cleared_bins: u32,
+    pub(super) has_depths: bool,
+    /// Number of pairs that earlier frames need, and whether a frame exceeded the limits of the device.
+    pub(super) pairs_wanted: u32,
+    pub(super) short_of_room: bool,
+    /// The wanted capacity of the bins of the fast design.
+    pub(super) bin_room: BinRoom,
+    /// Number of successive frames for which the buffers have been far too large.
+    pub(super) oversized_frames: u32,
+    /// Bytes of the instance uniforms of a frame, kept to reuse the allocation.
+    pub(super) instance_uniforms: Vec<u8>,
+    pub(super) frame: wgpu::Buffer,
+    pub(super) steps: wgpu::Buffer,
+    pub(super) counters: wgpu::Buffer,
+    pub(super) arguments: wgpu::Buffer,
+    pub(super) no_depth: wgpu::TextureView,
+    pub(super) no_environment: wgpu::Buffer,
+    pub(super) readback: Readback,
+    pub(super) statistics: ViewStatistics,
+    /// Timestamps, if GPU time is measured and the device supports timestamps.
+    pub(super) timing: Option<(PassTimer, Readback)>,
+    /// Resources whose sizes depend on the view or the captures.
+    pub(super) resources: Option<Resources>,
+    /// Resources of motions, in frames with motions.
+    pub(super) motion: Option<MotionResources>,
+}
+
+/// Resources of a finished frame on the GPU, for further passes of clients: scoring, a backward pass.
+#[derive(Debug, Clone, Copy)]
+pub struct FinishedFrame<'a> {
+    /// Uniform buffer: one [`layout::FrameUniforms`].
+    pub frame: &'a wgpu::Buffer,
+    /// Uniform buffer: begins with one [`layout::InstanceUniforms`], of the first part of the first instance.
+    pub instances: &'a wgpu::Buffer,
+    /// Storage buffer: one [`layout::Counters`].
+    pub counters: &'a wgpu::Buffer,
+    /// Buffers that the passes have written. After a frame with motions, colors of splats are their motions.
+    pub buffers: &'a PassBuffers,
+    /// Color over the background and transmittance, `Rgba32Float`. May be larger than the picture, like the depth.
+    pub color: &'a wgpu::TextureView,
+    /// Expected and median depth, `Rg32Float`.
+    pub depth: &'a wgpu::TextureView,
+    /// Capacity of the buffers in splats.
+    pub slots: u32,
+    /// Capacity of the buffers in pairs.
+    pub pairs: u32,
+}
+
+impl ViewRenderer {
+    /// Creates a view without size; [`prepare`](Self::prepare) sets it.
+    pub fn new(device: &wgpu::Device, renderer: &Renderer) -> Self {
+        let allocator = renderer.allocator(device);
+        let counters = size_of::<Counters>() as u64;
+        let depth = allocator.texture("gs4d no depth", UVec2::ONE, TextureFormat::Depth32Float);
+        Self {
+            slots: 0,
+            picture: UVec2::ONE,
+            bin_side: 1,
+            design: renderer.resolve(Design::Auto),
+            odd: false,
+            frames: 0,
+            recorded: false,
+            pairs_wanted: 0,
+            short_of_room: false,
+            bin_room: BinRoom::default(),
+            oversized_frames: 0,
+            instance_uniforms: Vec::new(),
+            frame: allocator.buffer("gs4d frame", size_of::<layout::FrameUniforms>() as u64, BufferUsages::UNIFORM),
+            steps: allocator.buffer("gs4d steps", u64::from(INSTANCE_STRIDE * 2 * DEPTH_STEPS), BufferUsages::UNIFORM),
+            counters: allocator.buffer("gs4d counters", counters, BufferUsages::STORAGE | BufferUsages::COPY_SRC),
+            arguments: allocator.buffer("gs4d arguments", 6 * 4, BufferUsages::STORAGE | BufferUsages::INDIRECT),
+            no_depth: depth.create_view(&wgpu::TextureViewDescriptor::default()),
+            no_environment: allocator.buffer("gs4d no environment", 16, BufferUsages::STORAGE),
+            readback: Readback::new(allocator, "gs4d counter readback", counters),
+            statistics: ViewStatistics::default(),
+            timing: None,
+            pixels: Pixels::default(),
+            variant: FastVariant::default(),
+            fullest_bin: 0,
+            cleared_bins: 0,
+            has_depths: true,
+            resources: None,
+            motion: None,
+        }
+    }
+
+    /// Returns the color `C` (premultiplied, in the blend space) and transmittance, in the precision of
+    /// [`ViewParameters`](crate::renderer::ViewParameters::precision). The picture begins at the first texel; the texture may be larger, since
+    /// it is reused for pictures of several sizes. `None` before the first [`prepare`](Self::prepare).
+    pub fn color(&self) -> Option<&wgpu::TextureView> {
+        self.resources.as_ref().map(|made| &made.color_view)
+    }
+
+    /// Returns the camera-space depth: `Rg32Float`. Red is the expected depth `Σ z α T`, not divided by `1 − T`; green
+    /// the median depth, the depth of the splat at which T falls to one half or below, 0 if it never does. The texture has the size of
+    /// the texture of [color](Self::color). `None` before the first [`prepare`](Self::prepare), and if the last call was without
+    /// [`depths`](crate::renderer::ViewParameters::depths).
+    pub fn depth(&self) -> Option<&wgpu::TextureView> {
+        self.resources.as_ref().filter(|_| self.has_depths).map(|made| &made.depth_view)
+    }
+
+    /// Returns the motion since the previous frame, blended like colors: red and green are `Σ m α T`, not divided by `1 − T`, with `m` in
+    /// pixels to the right and down; alpha is T. Format and size are the same as for [color](Self::color). `None` if the last
+    /// [`prepare`](Self::prepare) was without [`previous`](crate::renderer::ViewParameters::previous) views.
+    pub fn motion(&self) -> Option<&wgpu::TextureView> {
+        self.motion.as_ref().map(|motion| &motion.view)
+    }
+
+    /// Sets whether GPU time is measured from the next frame on, pass by pass. Results arrive in
+    /// [`statistics`](Self::statistics) some frames later; there are none if the device has no timestamps inside
+    /// passes.
+    pub fn measure(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, renderer: &Renderer, on: bool) {
+        if !on {
+            self.timing = None;
+            self.statistics.passes.clear();
+        } else if self.timing.is_none() {
+            let allocator = renderer.allocator(device);
+            self.timing = PassTimer::new(allocator, queue, self.timed_passes()).map(|timer| {
+                let size = timer.resolved().size();
+                (timer, Readback::new(allocator, "gs4d timestamp readback", size))
+            });
+        }
+    }
+
+    /// Sets the design with which the view is drawn from the next [`prepare`](Self::prepare) on. Default: [`Design::Auto`]. A change ends the
+    /// [measurement](Self::measure) of GPU time.
+    pub fn set_design(&mut self, renderer: &Renderer, design: Design) {
+        let design = renderer.resolve(design);
+        if self.design != design {
+            self.design = design;
+            self.timing = None;
+            self.release();
+        }
+    }
+
+    /// Returns the design with which the view is drawn: never [`Design::Auto`].
+    pub fn design(&self) -> Design {
+        self.design
+    }
+
+    /// Returns counts and times of the view.
+    pub fn statistics(&self) -> &ViewStatistics {
+        &self.statistics
+    }
+
+    /// Returns the textures behind [`color`](Self::color) and [`depth`](Self::depth).
+    pub(crate) fn textures(&self) -> Option<(&wgpu::Texture, Option<&wgpu::Texture>)> {
+        self.resources.as_ref().map(|made| (&made.color, self.has_depths.then_some(&made.depth)))
+    }
+
+    /// Returns the texture behind [`motion`](Self::motion), and the size of the picture in it.
+    pub(crate) fn motion_texture(&self) -> Option<(&wgpu::Texture, UVec2)> {
+        self.motion.as_ref().map(|motion| (&motion.texture, self.picture))
+    }
+
+    /// Returns the resources of the frame recorded last; `None` before the first [`prepare`](Self::prepare).
+    pub fn finished(&self) -> Option<FinishedFrame<'_>> {
+        self.resources.as_ref().map(|made| FinishedFrame {
+            frame: &self.frame,
+            instances: &made.instances,
+            counters: &self.counters,
+            buffers: &made.buffers,
+            color: &made.color_view,
+            depth: &made.depth_view,
+            slots: made.sizes.slots,
+            pairs: made.sizes.pairs,
+        })
+    }
+
+    /// Makes the next [`prepare`](Self::prepare) increase the capacities of pairs and bins to 1.5 times these counters if they exceed three
+    /// quarters of the capacities, within the limits of the device.
+    pub(crate) fn make_room(&mut self, counters: &Counters) {
+        // Counts from before the release of the buffers are ignored.
+        let Some(made) = self.resources.as_ref().map(|made| made.sizes) else { return };
+        // The buffers grow before they are full, since counts arrive some frames late.
+        let pairs = self.pair_count(counters);
+        if pairs > made.pairs / 4 * 3 {
+            self.pairs_wanted = pairs.saturating_add(pairs / 2);
+        }
+        if self.design == Design::Fast {
+            self.bin_room.note(counters.pairs_wanted.saturating_mul(self.bin_count()), made.entries);
+        }
+    }
+
+    /// Makes the next [`prepare`](Self::prepare) allocate the capacities of another view, or the larger capacities that the other view's next
+    /// `prepare` allocates.
+    pub(crate) fn make_room_of(&mut self, other: &Self) {
+        let made = other.resources.as_ref().map(|made| made.sizes).unwrap_or_default();
+        self.pairs_wanted = other.pairs_wanted.max(made.pairs);
+        self.bin_room = BinRoom::of(other.bin_room.wanted().max(made.entries));
+    }
+
+    /// Returns the capacity in pairs.
+    pub(crate) fn pair_capacity(&self) -> u32 {
+        self.resources.as_ref().map_or(0, |made| made.sizes.pairs)
+    }
+
+    /// Returns the number of pairs of a frame with these counters, written or not.
+    pub(crate) fn pair_count(&self, counters: &Counters) -> u32 {
+        match self.design {
+            Design::Auto | Design::Fast => counters.pairs,
+            Design::Reference => counters.pairs_wanted,
+        }
+    }
+
+    /// Returns whether the newest frame whose counters have arrived had more pairs, or splats in its bins, than the limits of this device
+    /// allow. Such frames are complete, but permanently slow. Frames that only exceed the current capacity, which grows, do not count.
+    pub fn is_short_of_room(&self) -> bool {
+        self.short_of_room
+    }
+
+    /// Frees the working buffers and targets; the next [`prepare`](Self::prepare) creates them again.
+    pub fn release(&mut self) {
+        self.resources = None;
+        self.motion = None;
+        self.pairs_wanted = 0;
+        self.short_of_room = false;
+        self.bin_room = BinRoom::default();
+        self.fullest_bin = 0;
+        self.statistics = ViewStatistics::default();
+    }
+
+    /// Returns the names of the passes that are timed.
+    pub(super) fn timed_passes(&self) -> &'static [&'static str] {
+        self.design.timed_passes(self.motion.is_some())
+    }
+
+    /// Returns the number of bins across and down the picture that is prepared.
+    pub(super) fn bin_grid(&self) -> UVec2 {
+        bins::bin_grid(self.picture, self.bin_side)
+    }
+
+    /// Returns the number of bins of the picture that is prepared.
+    pub(super) fn bin_count(&self) -> u32 {
+        self.bin_grid().element_product()
+    }
+
+    /// Returns the buffer of the counters of the frame prepared last, and their offset in bytes.
+    pub(in crate::renderer) fn counters(&self) -> (&wgpu::Buffer, u64) {
+        let first = u64::from(BIN_COUNTERS) * 4 - size_of::<Counters>() as u64;
+        let fast = self.resources.as_ref().and_then(|made| made.fast.as_ref());
+        // `sort_bins` writes them into the buffer of the next frame's counters.
+        fast.map_or((&self.counters, 0), |fast| (&fast.bins[usize::from(!self.odd)], first))
+    }
+}
