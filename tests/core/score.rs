@@ -3,11 +3,10 @@
 //!
 //! In: synthetic scenes; with `GS4D_DATA` set, toybox and standup. Out: proof that the CPU reference of `score` is
 //! right pixel by pixel, that scores are related as defined, that pruning keeps the right Gaussians, and that masks and
-//! filters contain one another. `GS4D_SLOW=1` adds the comparison over all training views.
+//! filters contain one another. The comparisons over all training views take minutes: `.ci/full` runs them by name.
 
 use crate::support::data::data;
 use crate::support::npy;
-use crate::support::skip::skip;
 use bevy_gs4d::codec;
 use bevy_gs4d::codec::checkpoint::CheckpointOptions;
 use bevy_gs4d::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
@@ -333,22 +332,12 @@ fn a_share_of_toybox_ranks_like_all_of_it() {
     }
 }
 
-fn slow() -> bool {
-    let slow = std::env::var_os("GS4D_SLOW").is_some_and(|value| value == "1");
-    if !slow {
-        skip("GS4D_SLOW is not 1: scores over all training views take minutes");
-    }
-    slow
-}
-
 /// Compares every score over all views of both captures. The last two of `scores.npz` are estimates from random
 /// pictures, whose own noise leaves an overlap of 0.92 to 0.95 of the highest fifth.
 #[test]
-fn scores_rank_as_the_yardstick_does() {
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
+fn scores_over_all_views_rank_as_the_independent_scores_do() {
     for (name, resolution) in [("toybox", None), ("standup", Some(2))] {
-        if !slow() {
-            return;
-        }
         let Some((folder, scene, dataset)) = capture(name, resolution) else { return };
         let views = to_draw(&dataset.views, scene.trained_with.raster_fov);
         let scores = accumulate(&scene, &views, Background::Color([0.0; 3])).expect("its own views");
@@ -370,11 +359,9 @@ fn scores_rank_as_the_yardstick_does() {
 }
 
 #[test]
-fn key_frame_masks_are_those_of_the_yardstick() {
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
+fn key_frame_masks_match_the_independent_masks() {
     for (name, resolution, keys) in [("toybox", None, 11), ("standup", Some(2), 6)] {
-        if !slow() {
-            return;
-        }
         let Some((folder, scene, dataset)) = capture(name, resolution) else { return };
         let runtime = scene.into_runtime().expect("a valid checkpoint");
         let cameras = distinct_cameras(&dataset.views);
