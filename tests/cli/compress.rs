@@ -53,11 +53,11 @@ fn steps_of_color_are_finite_and_leave_colors_finite() {
         let fixed = arguments!["compress", &input, &out, "--verify", "0", "--quality", "visually-lossless"].to_vec();
         gs4d(&[fixed, arguments!["--color-step", step].to_vec()].concat())
     };
-    for step in ["1e308", "inf", "nan"] {
+    for step in ["1e308", "inf", "nan", "-1", "1e-45", "1.1e-38", "1e-60"] {
         compress(step).must_fail("--color-step");
         assert!(!out.exists(), "{step}: nothing is written");
     }
-    for step in ["1e-45", "3e38", "0"] {
+    for step in ["1.2e-38", "3e38", "0"] {
         compress(step).text();
         let info = gs4d(&arguments!["info", &out, "--json"]).json();
         assert_eq!(info["package"]["intact"], true, "{step}: a package that can be read");
