@@ -3,18 +3,21 @@
 //! In: a synthetic scene; with `GS4D_DATA` set, the trained captures. Out: proof that pictures are written and frames timed, and that
 //! renders match the original's. Skipped where there is no GPU.
 
+use crate::support::capture::Capture;
 use crate::support::command::{arguments, folder, gs4d, scene};
 use crate::support::data::data;
+use crate::support::folders::contents;
 use crate::support::no_gpu::no_gpu;
 use crate::support::npz;
 use crate::support::skip::skip;
 use bevy_gs4d::offline::metrics;
 use bevy_gs4d::renderer::GpuContext;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::view::Picture;
 use glam::{UVec2, Vec3};
 use serde_json::Value;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Returns whether there is a GPU; that there is none is reported.
 fn has_gpu() -> bool {
@@ -49,6 +52,26 @@ fn pictures_are_drawn_and_written() {
     let alike = gs4d(&arguments!["compare", &frames, &frames, "--size", "64x48", "--json"]).json();
     assert_eq!(alike["pictures"].as_array().map(Vec::len), Some(3), "raw pictures go before others of their name");
     assert!(alike["mean"]["psnr"].is_null(), "equal to themselves");
+}
+
+#[test]
+fn images_of_a_camera_file_are_written_only_if_none_of_them_exists() {
+    if !has_gpu() {
+        return;
+    }
+    let trained = synthesize(&SynthSettings { count: 200, ..SynthSettings::default() });
+    let capture = Capture::new(trained, Vec3::ZERO, 4, 2, UVec2::splat(48), true);
+    let (cameras, out) = (capture.data.join("transforms_test.json"), capture.data.join("test"));
+    let render = || gs4d(&arguments!["render", &capture.scene, "--cameras", &cameras, "--out", &out]);
+    let images: Vec<PathBuf> = contents(&out).into_keys().collect();
+    assert_eq!(images.len(), 4, "two test cameras at two times");
+    for image in &images {
+        render().must_fail("the input itself");
+        fs::remove_file(image).expect("the folder can be written to");
+    }
+    render().text();
+    assert_eq!(contents(&out).into_keys().collect::<Vec<_>>(), images, "the images that the camera file names");
+    render().must_fail("the input itself");
 }
 
 #[test]
