@@ -190,6 +190,43 @@ fn images_far_larger_than_the_camera_file_says_are_not_decoded() {
 }
 
 #[test]
+fn images_of_another_aspect_ratio_are_refused() {
+    let folder = Folder::new();
+    let json = json!({"camera_angle_x": 0.8, "w": 40, "h": 30, "frames": [frame("a.png")]});
+    let json = with(json, "/frames/0/mask_path", json!("m.png"));
+    let path = folder.write_json("transforms_test.json", &json);
+    let load = |options: &CameraOptions| CameraFile::load(&path, options).expect("a valid camera file").remove(0);
+    let view = load(&CameraOptions::default());
+    // Scaled to a side of the other size, the other side differs by at most one pixel.
+    let similar = [(40, 30), (80, 60), (80, 61), (79, 60), (41, 30), (40, 29), (20, 15), (13, 10), (13, 9), (160, 116)];
+    let different = [(40, 32), (42, 30), (30, 40), (80, 64), (80, 57), (20, 13), (160, 115), (1, 30), (40, 1)];
+    let sizes = similar.map(|size| (size, true)).into_iter().chain(different.map(|size| (size, false)));
+    for ((width, height), accepted) in sizes {
+        for (changed, other) in [("a.png", "m.png"), ("m.png", "a.png")] {
+            folder.write_rgb(changed, width, height);
+            folder.write_rgb(other, 40, 30);
+            for error in [view.load_image([0.0; 3], ImageMode::InMemory).err(), view.load_covered().err()] {
+                let what = format!("{changed} of {width} x {height}");
+                let Some(error) = error else {
+                    assert!(accepted, "{what} must be refused");
+                    continue;
+                };
+                assert!(!accepted && matches!(error, DatasetError::Aspect { .. }), "{what}: {error}");
+                for part in [changed, &format!("{width} x {height}"), "40 x 30", "crop"] {
+                    assert!(error.to_string().contains(part), "{what}: {part:?} is not in: {error}");
+                }
+            }
+        }
+    }
+    // A size that is asked for may have another aspect ratio: that of the images counts.
+    folder.write_rgb("a.png", 80, 60);
+    folder.write_rgb("m.png", 40, 30);
+    let square = load(&CameraOptions { size: Some(UVec2::splat(16)), ..CameraOptions::default() });
+    let loaded = square.load_image([0.0; 3], ImageMode::InMemory).expect("an image of the right aspect ratio");
+    assert_eq!(loaded.picture.size, UVec2::splat(16), "the requested size");
+}
+
+#[test]
 fn masks_have_the_same_limits() {
     let folder = Folder::new();
     folder.write_rgb("a.png", 8, 8);

@@ -69,6 +69,14 @@ fn transforms() -> Value {
     json!({"camera_angle_x": 0.8, "w": 800, "h": 400, "frames": [frame("./a")]})
 }
 
+/// Returns a golden file of one view, 640x400.
+fn golden() -> Value {
+    json!({"background": [0, 0, 0], "views": [{
+        "file": "./images/c04_f20.jpg", "time": 0.5, "width": 640, "height": 400, "fl_x": 320.0, "fl_y": 400.0,
+        "cx": 320.0, "cy": 200.0, "world_to_camera_opencv": [[1, 0, 0, 4], [0, 1, 0, 5], [0, 0, 1, 6], [0, 0, 0, 1]],
+    }]})
+}
+
 /// Returns the JSON with the value at a pointer replaced, or added to an object.
 fn with(mut json: Value, pointer: &str, value: Value) -> Value {
     let (parent, key) = pointer.rsplit_once('/').expect("a JSON pointer");
@@ -221,10 +229,7 @@ fn frames_outside_the_interval_are_dropped() {
 
 #[test]
 fn golden_views_are_fov_cameras_of_their_own_size() {
-    let golden = json!({"background": [0, 0, 0], "views": [{
-        "file": "./images/c04_f20.jpg", "time": 0.5, "width": 640, "height": 400, "fl_x": 320.0, "fl_y": 400.0,
-        "cx": 320.0, "cy": 200.0, "world_to_camera_opencv": [[1, 0, 0, 4], [0, 1, 0, 5], [0, 0, 1, 6], [0, 0, 0, 1]],
-    }]});
+    let golden = golden();
     for options in [CameraOptions::default(), resolution_option(2)] {
         let view = load_one(&golden, &options);
         assert_eq!((view.name.as_str(), view.time), ("c04_f20", 0.5), "name and time");

@@ -39,7 +39,7 @@ impl Cameras {
         let transforms = fs::read_to_string(folder.path().join("transforms_test.json")).expect("just written");
         let transforms: Value = serde_json::from_str(&transforms).expect("a camera file");
         let mut intrinsics = transforms.clone();
-        for (name, value) in [("fl_x", 60.0), ("fl_y", 61.0), ("cx", 20.0), ("cy", 15.0)] {
+        for (name, value) in [("fl_x", 60.0), ("fl_y", 61.0), ("cx", 20.0), ("cy", 15.0), ("k1", 0.0)] {
             intrinsics[name] = json!(value);
         }
         for frame in intrinsics["frames"].as_array_mut().expect("frames") {
@@ -48,7 +48,7 @@ impl Cameras {
         let pose = json!([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 3], [0, 0, 0, 1]]);
         let golden = json!({ "views": [{
             "file": "./images/a.jpg", "time": 0.5, "width": 40, "height": 30, "fl_x": 60.0, "fl_y": 61.0,
-            "world_to_camera_opencv": pose,
+            "cx": 20.0, "cy": 15.0, "world_to_camera_opencv": pose,
         }] });
         let seeds = Vec::from([transforms, intrinsics, golden].map(|seed| seed.to_string()));
         Self { folder, scene, seeds }
