@@ -53,7 +53,7 @@ fn steps_of_color_are_finite_and_leave_colors_finite() {
         let fixed = arguments!["compress", &input, &out, "--verify", "0", "--quality", "visually-lossless"].to_vec();
         gs4d(&[fixed, arguments!["--color-step", step].to_vec()].concat())
     };
-    for step in ["1e308", "inf", "nan", "-1", "1e-45", "1.1e-38", "1e-60"] {
+    for step in ["1e308", "inf", "nan", "1e-45", "1.1e-38", "1e-60"] {
         compress(step).must_fail("--color-step");
         assert!(!out.exists(), "{step}: nothing is written");
     }
