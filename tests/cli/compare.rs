@@ -1,6 +1,6 @@
 //! `gs4d compare`, run as a user runs it.
 //!
-//! In: pictures of known values. Out: proof that the numbers are right and that what cannot be compared is named.
+//! In: pictures of known values. Out: proof that the numbers are right and that pictures that cannot be compared are named.
 
 use crate::support::command::{arguments, folder, gs4d};
 use bevy_gs4d::view::Picture;
@@ -10,7 +10,7 @@ use std::fs;
 use tempfile::TempDir;
 
 #[test]
-fn comparison_tells_equal_from_different() {
+fn metrics_of_equal_and_different_pictures_are_right() {
     let (a, b) = (folder(), folder());
     let size = UVec2::new(24, 16);
     let save = |folder: &TempDir, name: &str, value: f32| {
@@ -32,7 +32,7 @@ fn comparison_tells_equal_from_different() {
     // 51 and 102 of 255: a difference of exactly one fifth.
     let psnr = row("other")["psnr"].as_f64().expect("a number");
     assert!((psnr - 13.979_4).abs() < 1e-3, "20 log10(5), not {psnr}");
-    assert_eq!(json["only_in_a"][0], "alone", "what has no partner is listed");
+    assert_eq!(json["only_in_a"][0], "alone", "a picture of one folder only is listed");
 
     let one = a.path().join("same.png");
     let text = gs4d(&arguments!["compare", &one, &b.path().join("other.png")]).text();
@@ -44,7 +44,7 @@ fn comparison_tells_equal_from_different() {
 }
 
 #[test]
-fn pictures_that_are_not_whole_are_named() {
+fn truncated_pictures_are_named() {
     let folder = folder();
     let (png, jpg) = (folder.path().join("a.png"), folder.path().join("b.jpg"));
     let picture = Picture::filled(UVec2::new(64, 48), Vec3::new(0.2, 0.5, 0.8)).to_rgb8();
@@ -59,7 +59,7 @@ fn pictures_that_are_not_whole_are_named() {
 }
 
 #[test]
-fn raw_pictures_need_their_size() {
+fn raw_pictures_need_a_size() {
     let folder = folder();
     let path = folder.path().join("a.f32");
     let picture = Picture::filled(UVec2::new(16, 12), Vec3::new(-0.5, 0.5, 1.5));

@@ -22,8 +22,8 @@ fn blocks(width: u32, height: u32) -> Picture {
     Picture { size: UVec2::new(width, height), pixels: (0..width * height).map(pixel).collect() }
 }
 
-fn mixed(a: &Picture, b: &Picture, share: f32) -> Picture {
-    let pixels = a.pixels.iter().zip(&b.pixels).map(|(p, q)| *p * (1.0 - share) + *q * share);
+fn mixed(a: &Picture, b: &Picture, fraction: f32) -> Picture {
+    let pixels = a.pixels.iter().zip(&b.pixels).map(|(p, q)| *p * (1.0 - fraction) + *q * fraction);
     Picture { size: a.size, pixels: pixels.collect() }
 }
 
@@ -47,7 +47,7 @@ fn psnr_is_averaged_over_channels_and_pooled_is_not() {
 }
 
 #[test]
-fn identical_pictures_are_infinitely_close_and_fully_similar() {
+fn identical_pictures_have_infinite_psnr_and_an_ssim_of_one() {
     let a = pattern(23, 17, 0);
     assert_eq!(psnr(&a, &a), Ok(f64::INFINITY), "no error in any channel");
     assert_eq!(psnr_pooled(&a, &a), Ok(f64::INFINITY), "no error at all");
@@ -55,7 +55,7 @@ fn identical_pictures_are_infinitely_close_and_fully_similar() {
 }
 
 #[test]
-fn nothing_is_clamped() {
+fn values_beyond_one_are_not_clamped() {
     let value = psnr(&gray(0.0), &gray(10.0)).expect("same size");
     assert!(close(value, -20.0, 1e-9), "an error of ten is -20 dB, got {value}");
 }
@@ -73,8 +73,8 @@ fn values_equal_an_independent_implementation() {
         let value = value.expect("same size");
         assert!(close(value, expected, 1e-5), "{value} instead of {expected}");
     }
-    let unlike = ssim(&a, &n).expect("same size");
-    assert!(close(unlike, 0.223360054258584, 1e-6), "{unlike}");
+    let different = ssim(&a, &n).expect("same size");
+    assert!(close(different, 0.223360054258584, 1e-6), "{different}");
 }
 
 #[test]
@@ -106,7 +106,7 @@ fn similarity_at_five_scales_equals_an_independent_implementation() {
     assert!(close(least_value, 0.9455034368401481, 1e-5), "one window at the coarsest scale: {least_value}");
     assert!(close(value(&a, &a), 1.0, 1e-12), "identical");
     let negative = Picture { size: a.size, pixels: a.pixels.iter().map(|p| Vec3::ONE - *p).collect() };
-    assert_eq!(value(&a, &negative), 0.0, "what is opposite counts as nothing");
+    assert_eq!(value(&a, &negative), 0.0, "negative similarity counts as 0");
     let small = blocks(MS_SSIM_MIN_SIDE, MS_SSIM_MIN_SIDE - 1);
     assert_eq!(ms_ssim(&small, &small), Ok(None), "too few pixels for five scales");
 }
@@ -129,13 +129,13 @@ fn flip_equals_an_independent_implementation() {
 }
 
 #[test]
-fn flip_of_flat_pictures_is_the_difference_of_colour_alone() {
+fn flip_of_flat_pictures_is_the_difference_of_color_alone() {
     let flat = |color| Picture::filled(UVec2::new(12, 9), color);
     let value = |a, b| flip(&flat(a), &flat(b)).expect("same size");
     assert_eq!(value(Vec3::splat(0.3), Vec3::splat(0.3)), 0.0, "identical");
     assert!(close(value(Vec3::Y, Vec3::Z), 1.0, 1e-9), "green and blue are farthest apart");
     assert!(close(value(Vec3::ZERO, Vec3::ONE), 0.9673797618501423, 1e-6), "black and white");
-    assert!(close(value(Vec3::splat(0.5), Vec3::splat(0.6)), 0.2850130525308668, 1e-5), "two greys");
+    assert!(close(value(Vec3::splat(0.5), Vec3::splat(0.6)), 0.2850130525308668, 1e-5), "two grays");
 }
 
 #[test]
@@ -149,9 +149,9 @@ fn pictures_of_other_sizes_are_refused() {
     assert_eq!(flip(&a, &b), Err(mismatch), "flip");
     assert!(mismatch.to_string().contains("4x6") && mismatch.to_string().contains("6x4"), "{mismatch}");
     let empty = Picture { size: UVec2::ZERO, pixels: Vec::new() };
-    assert!(psnr(&empty, &empty).is_err() && ssim(&empty, &empty).is_err(), "no pixels, no number");
+    assert!(psnr(&empty, &empty).is_err() && ssim(&empty, &empty).is_err(), "pictures without pixels have no metrics");
     let short = Picture { size: a.size, pixels: Vec::new() };
-    assert!(psnr(&a, &short).is_err() && ssim(&short, &a).is_err(), "fewer pixels than the size says");
+    assert!(psnr(&a, &short).is_err() && ssim(&short, &a).is_err(), "fewer pixels than the size has");
 }
 
 /// Generates two pictures of the same small random size.

@@ -88,7 +88,7 @@ fn dataloader_mode_composites_once() {
 }
 
 #[test]
-fn masks_are_coverage_and_not_multiplied_in() {
+fn masks_are_returned_as_coverage_and_not_multiplied() {
     let folder = Folder::new();
     let plain = noise_view(&folder, false).load_image([0.0; 3], ImageMode::InMemory).expect("an image");
     let masked = noise_view(&folder, true).load_image([0.0; 3], ImageMode::InMemory).expect("an image");
@@ -97,14 +97,14 @@ fn masks_are_coverage_and_not_multiplied_in() {
 }
 
 #[test]
-fn opaque_images_of_the_right_size_survive_exactly() {
+fn opaque_images_of_the_right_size_are_unchanged() {
     let folder = Folder::new();
     folder.write_rgb("a.png", 16, 16);
     let path = folder.write_json("transforms_test.json", &json!({"camera_angle_x": 0.8, "frames": [frame("a")]}));
     let view = CameraFile::load(&path, &CameraOptions::default()).expect("a valid camera file").remove(0);
     let loaded = view.load_image([0.3, 0.6, 0.9], ImageMode::InMemory).expect("an image");
     let colors: Vec<_> = unit(&noise(16 * 16 * 3, 7)).chunks(3).map(Vec3::from_slice).collect();
-    assert_eq!(loaded.picture.pixels, colors, "every byte as it was");
+    assert_eq!(loaded.picture.pixels, colors, "every byte is unchanged");
     assert_eq!(loaded.alpha, None, "everything covered");
     let oversized =
         TrainingView { camera: Camera { size: UVec2::new(MAX_SIDE + 1, 1), ..view.camera }, ..view.clone() };
@@ -119,7 +119,7 @@ fn missing_images_are_counted_and_the_first_ones_named() {
     folder.write_json("transforms_train.json", &with(transforms(), "/frames", json!(frames)));
     folder.write_rgb("r_000.png", 4, 4);
     let dataset = Dataset::open(folder.path(), Split::Train, &CameraOptions::default()).expect("cameras suffice");
-    let error = dataset.require_images().expect_err("nine are missing").to_string();
+    let error = dataset.require_images().expect_err("nine images are missing").to_string();
     for part in ["9 of 10", "r_001.png", "and 5 more"] {
         assert!(error.contains(part), "{part} is not in: {error}");
     }
@@ -128,7 +128,7 @@ fn missing_images_are_counted_and_the_first_ones_named() {
     for (i, _) in frames.iter().enumerate() {
         folder.write_rgb(&format!("r_{i:03}.png"), 4, 4);
     }
-    assert!(dataset.require_images().is_ok(), "all are there now");
+    assert!(dataset.require_images().is_ok(), "no image is missing");
 }
 
 #[test]
@@ -151,7 +151,7 @@ fn view_of(folder: &Folder, image: &str, size: u32) -> TrainingView {
 }
 
 #[test]
-fn jpegs_that_are_not_whole_are_refused() {
+fn truncated_jpegs_are_refused() {
     let folder = Folder::new();
     folder.write_rgb("a.jpg", 40, 40);
     let view = view_of(&folder, "a.jpg", 40);
@@ -166,7 +166,7 @@ fn jpegs_that_are_not_whole_are_refused() {
             let error = view.load_image([0.0; 3], ImageMode::InMemory).expect_err("cut off");
             let incomplete = matches!(error, DatasetError::Image(PictureError::Incomplete { .. }));
             assert!(incomplete && error.to_string().contains("a.jpg"), "{length} bytes, then {end:?}: {error}");
-            assert!(view.load_covered().is_err(), "{length} bytes: not to train on, either");
+            assert!(view.load_covered().is_err(), "{length} bytes: refused as a training image, too");
         }
     }
 }
@@ -176,7 +176,7 @@ fn images_far_larger_than_the_camera_file_says_are_not_decoded() {
     let folder = Folder::new();
     let view = view_of(&folder, "a.png", 8);
     folder.write_rgb("a.png", 32, 32);
-    assert!(view.load_image([0.0; 3], ImageMode::InMemory).is_ok(), "four times as large is scaled");
+    assert!(view.load_image([0.0; 3], ImageMode::InMemory).is_ok(), "an image four times as large is scaled");
     for (width, height) in [(33, 8), (8, 33), (300, 300)] {
         folder.write_rgb("a.png", width, height);
         let error = view.load_image([0.0; 3], ImageMode::InMemory).expect_err("too large");
@@ -186,7 +186,7 @@ fn images_far_larger_than_the_camera_file_says_are_not_decoded() {
     }
     let halved = TrainingView { camera: Camera { size: UVec2::splat(1), ..view.camera }, ..view };
     folder.write_rgb("a.png", 8, 8);
-    assert!(halved.load_image([0.0; 3], ImageMode::InMemory).is_ok(), "the camera's own size does not count");
+    assert!(halved.load_image([0.0; 3], ImageMode::InMemory).is_ok(), "the size of the camera does not matter");
 }
 
 #[test]
@@ -227,7 +227,7 @@ fn images_of_another_aspect_ratio_are_refused() {
 }
 
 #[test]
-fn masks_have_the_same_limits() {
+fn masks_have_the_limits_of_images() {
     let folder = Folder::new();
     folder.write_rgb("a.png", 8, 8);
     folder.write_rgb("m.jpg", 40, 40);
@@ -239,11 +239,11 @@ fn masks_have_the_same_limits() {
     assert!(message.contains("m.jpg") && message.contains("40 x 40"), "{message}");
 }
 
-/// Returns a PNG of one pixel whose header says that it has `side` times `side`.
+/// Returns a PNG of one pixel whose header gives `side` for width and height.
 fn claiming(folder: &Folder, side: u32) -> Vec<u8> {
     folder.write_rgb("one.png", 1, 1);
     let mut bytes = fs::read(folder.path().join("one.png")).expect("the image");
-    // The header's chunk follows the signature: length, name, width, height, five bytes, checksum.
+    // The chunk of the header follows the signature: length, name, width, height, five bytes, checksum.
     bytes[16..20].copy_from_slice(&side.to_be_bytes());
     bytes[20..24].copy_from_slice(&side.to_be_bytes());
     let checksum = crc32fast::hash(&bytes[12..29]);
@@ -252,13 +252,14 @@ fn claiming(folder: &Folder, side: u32) -> Vec<u8> {
 }
 
 #[test]
-fn a_camera_file_cannot_ask_for_any_size() {
+fn the_size_in_a_camera_file_is_limited() {
     let folder = Folder::new();
     folder.write("a.png", claiming(&folder, MAX_SIDE));
-    let error = view_of(&folder, "a.png", MAX_SIDE).load_image([0.0; 3], ImageMode::InMemory).expect_err("too much");
+    let error =
+        view_of(&folder, "a.png", MAX_SIDE).load_image([0.0; 3], ImageMode::InMemory).expect_err("too many pixels");
     assert!(matches!(error, DatasetError::Image(PictureError::FarTooLarge { .. })), "{error}");
     let without_size = json!({"camera_angle_x": 0.8, "frames": [frame("a.png")]});
     let path = folder.write_json("transforms_test.json", &without_size);
-    let error = CameraFile::load(&path, &CameraOptions::default()).expect_err("no size to go by");
+    let error = CameraFile::load(&path, &CameraOptions::default()).expect_err("the size is unknown");
     assert!(matches!(error, DatasetError::Image(_)) && error.to_string().contains("a.png"), "{error}");
 }

@@ -15,7 +15,7 @@ use super::{Folder, golden, identity, lens_values, load, resolution_option, tran
 use crate::support::skip::skip;
 
 #[test]
-fn wrong_entries_are_errors_that_name_file_frame_and_reason() {
+fn invalid_entries_are_errors_that_name_file_frame_and_reason() {
     let singular = json!([[1, 0, 0, 0], [2, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]);
     let projective = json!([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 1, 1]]);
     let three_rows = json!([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]);
@@ -140,12 +140,12 @@ fn paths_with_control_characters_are_refused_and_shown_escaped() {
         let changed = with(transforms(), pointer, json!(path));
         let message = load(&changed, &CameraOptions::default()).expect_err(pointer).to_string();
         assert!(message.contains("control characters"), "{message}");
-        assert!(!message.contains(['\u{1b}', '\n']), "nothing that a terminal obeys: {message:?}");
+        assert!(!message.contains(['\u{1b}', '\n']), "no control characters: {message:?}");
     }
 }
 
 #[test]
-fn wrong_files_are_errors_that_name_them() {
+fn invalid_files_are_errors_that_name_them() {
     let folder = Folder::new();
     let cases = [
         (r#"{"frames": []}"#, "empty"),
@@ -200,7 +200,7 @@ fn folders_that_are_not_utf8_work() {
     }
     let path = folder.write(name.join("transforms_test.json"), transforms().to_string());
     let views = CameraFile::load(&path, &CameraOptions::default()).expect("a valid camera file");
-    assert_eq!(views[0].image, path.with_file_name("./a.png"), "the folder's bytes are kept");
+    assert_eq!(views[0].image, path.with_file_name("./a.png"), "the bytes of the folder name are kept");
 }
 
 /// Generates any small JSON value.
@@ -216,7 +216,7 @@ fn any_json() -> impl Strategy<Value = Value> {
     leaf.prop_recursive(2, 16, 4, |inner| proptest::collection::vec(inner, 0..5).prop_map(Value::from))
 }
 
-/// Checks what holds for every file: a usable list of views, or an error that names the file.
+/// Checks that the outcome is a usable list of views, or an error that names the file.
 fn check_outcome(outcome: Result<Vec<TrainingView>, DatasetError>) -> Result<(), TestCaseError> {
     match outcome {
         Ok(views) => {

@@ -1,6 +1,6 @@
 //! Camera files.
 //!
-//! In: camera files of every form. Out: files with numbers, names and structures that are wrong; the cameras that are accepted draw a scene.
+//! In: camera files of every form. Out: files with wrong numbers, names and structures; accepted cameras draw a scene.
 
 use super::{Outcome, Reader};
 use crate::accepted;
@@ -82,7 +82,7 @@ impl Reader for Cameras {
 }
 
 impl Cameras {
-    /// Checks what holds for every file that is accepted, and draws some of its views.
+    /// Checks the views of an accepted file, and draws some of them.
     fn check(&self, views: &[TrainingView]) -> Result<(), String> {
         let mut names = HashSet::new();
         for view in views {

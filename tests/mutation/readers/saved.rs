@@ -1,7 +1,7 @@
 //! The stored results of a bake.
 //!
-//! In: what a bake leaves in its folder. Out: one of its files with other contents, behind a header with the right fingerprint and checksum; the
-//! bake goes on from there, and a package that it writes must be one that can be read and drawn.
+//! In: the files of a bake in its work folder. Out: one of the files with other contents, after a header with the right fingerprint and checksum;
+//! the bake resumes from it, and a package that it writes must be readable and drawable.
 //!
 //! An input is the name of the file, a line break, and its contents without the header.
 
@@ -30,7 +30,7 @@ use tempfile::TempDir;
 
 /// Bytes of the header of a stored result: magic, version, fingerprint, checksum of the rest.
 const HEAD: usize = 16;
-/// Where the checksum is in it.
+/// Offset of the checksum in the header.
 const CHECKSUM: usize = 12;
 
 /// The reader of stored results.
@@ -39,13 +39,13 @@ pub struct Saved {
     _folder: TempDir,
     scene: GaussianScene,
     settings: BakeSettings,
-    /// What a bake has left: name and bytes of each file.
+    /// Name and bytes of each file that the bake wrote.
     files: Vec<(String, Vec<u8>)>,
     package: Vec<u8>,
 }
 
 impl Saved {
-    /// Bakes a scene and keeps what is left.
+    /// Bakes a scene and keeps its stored results.
     pub fn new() -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let [checkpoint, data, out] = ["scene.gs4d", "data", "out.gs4d"].map(|name| folder.path().join(name));
@@ -79,7 +79,7 @@ impl Saved {
                 saved.files.push((entry.file_name().to_string_lossy().into_owned(), bytes));
             }
         }
-        // Folders list their files in any order.
+        // The order of files in a folder is not defined.
         saved.files.sort();
         saved.package = fs::read(&saved.settings.out).expect("the package is there");
         saved
