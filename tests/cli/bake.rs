@@ -40,14 +40,14 @@ impl Capture {
         gs4d(&[fixed.to_vec(), plain.map(Into::into).collect()].concat())
     }
 
-    /// Returns the bytes of a package without Gaussians, which the error of a bake to a tiny size names.
+    /// Returns the bytes of a package without Gaussians, which the error of a bake to 100 bytes names.
     fn bytes_of_none(&self) -> u64 {
         let refused = self.bake_to_size(100.0, &[]);
         refused.must_fail("without Gaussians has ");
         number_after(&refused.err, "without Gaussians has ")
     }
 
-    /// Returns the bytes of a package of the Gaussian with the highest score, which the error of a bake to half a byte more than none names.
+    /// Returns the bytes of a package of the Gaussian with the highest score, which the error of a bake names if only an empty package fits.
     fn bytes_of_one(&self) -> u64 {
         let refused = self.bake_to_size(self.bytes_of_none() as f64 + 0.5, &[]);
         refused.must_fail("a single Gaussian has ");
