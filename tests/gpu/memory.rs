@@ -42,7 +42,7 @@ fn compiled_in_turn(headless: &mut Headless, scene: &RuntimeScene) -> [u64; 2] {
 
 #[test]
 fn a_software_driver_compiles_no_shader_after_the_first_pictures() {
-    // In a process of its own: other tests compile shaders at the same time.
+    // In a separate process: other tests compile shaders at the same time.
     run_alone("memory::a_software_driver_compiles_no_shader_after_the_first_pictures", || {
         let Some(mut headless) = gpu::headless() else { return };
         if headless.context().info.device_type != wgpu::DeviceType::Cpu {

@@ -125,7 +125,7 @@ fn the_motion_of_a_splat_matches_the_pinhole_model() {
     // Pixels per unit at this distance.
     let scale = now.focal().x / distance;
     let cases = [
-        ("nothing moves", camera(0.0).view(0.0, RasterFov::Reference), 0.0),
+        ("neither Gaussian nor camera moves", camera(0.0).view(0.0, RasterFov::Reference), 0.0),
         ("the Gaussian moves right", camera(0.0).view(-0.1, RasterFov::Reference), 0.1 * scale),
         ("the camera moves right", camera(-0.1).view(0.0, RasterFov::Reference), -0.1 * scale),
         ("Gaussian and camera move right", camera(-0.1).view(-0.1, RasterFov::Reference), 0.0),
