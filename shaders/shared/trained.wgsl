@@ -1,5 +1,5 @@
 // The trained form: raw parameters as the optimizer stores them. CPU reference: src/gaussian/slice.rs. Axes are x, y, z, t; quaternions
-// are (w, x, y, z), rotations those of the flipped convention.
+// are (w, x, y, z), rotations use the flipped convention.
 #define_import_path gs4d::trained
 
 #import gs4d::types::TrainedRecord

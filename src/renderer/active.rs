@@ -1,4 +1,4 @@
-//! The list of active Gaussians of one placed capture, shared by all views that draw it.
+//! The list of active Gaussians of one placed capture, common to all views that draw the capture.
 //!
 //! In: a capture with a temporal filter and a time. Out: the indices of the Gaussians that are active in the segment of
 //! that time, ascending, part by part. `activate` writes them only when the segment has changed.
@@ -47,8 +47,8 @@ impl ActiveList {
         self.capture == capture.id
     }
 
-    /// Sets the time, in the capture's unit. Returns whether the list must be [recorded](Self::record) before it is
-    /// drawn.
+    /// Sets the time, in the capture's unit. Returns whether the list must be [recorded](Self::record) before the capture
+    /// is drawn.
     pub fn prepare(&mut self, queue: &wgpu::Queue, capture: &GpuCapture, time: f32) -> bool {
         let Some(filter) = &capture.filter else { return false };
         let segment = filter.segment_of(time);

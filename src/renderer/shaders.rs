@@ -178,7 +178,7 @@ pub enum ColorPrecision {
     /// `Rgba32Float`: 16 bytes for each pixel.
     #[default]
     Single,
-    /// `Rgba16Float`: 8 bytes, for targets with no more than that.
+    /// `Rgba16Float`: 8 bytes for each pixel, for targets of half precision.
     Half,
 }
 
@@ -200,7 +200,7 @@ impl ColorPrecision {
     }
 }
 
-/// How the pixels of a view are read and written: what the layout of their bindings depends on.
+/// The variant of the pixel passes, which determines the layout of their bindings.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Pixels {
     /// Whether the opaque depth is multisampled.
@@ -244,9 +244,9 @@ pub const EIGHT_AT_ONCE: &[&str] = &["LARGE_BATCHES", "EIGHT_AT_ONCE"];
 pub enum Blending {
     /// Color, without opaque surfaces.
     Color,
-    /// Color, cut by opaque surfaces.
+    /// Color, hidden by opaque surfaces.
     ColorBehindSurfaces,
-    /// Color, cut by opaque surfaces with several samples for each pixel.
+    /// Color, hidden by opaque surfaces with several samples per pixel.
     ColorBehindSamples,
     /// Color and depths, opaque surfaces, every debug view.
     #[default]

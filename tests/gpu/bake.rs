@@ -1,4 +1,4 @@
-//! Bakes that train, to a size that the first package exceeds.
+//! Bakes with training, to a size that the first package exceeds.
 //!
 //! In: a small synthetic scene, its own pictures as a dataset. Out: proof that a bake which is killed in its second attempt resumes there, and
 //! ends at the same bytes. Skipped where there is no GPU.
@@ -23,7 +23,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What is said of a package that is too large.
+/// Words of the note about a package that is too large.
 const AGAIN: &str = "again with";
 
 fn scene() -> GaussianScene {
@@ -31,7 +31,7 @@ fn scene() -> GaussianScene {
 }
 
 impl Capture {
-    /// Bakes [`scene`] to 15 kB. The colors of the scene are few, so that it compresses well until they are trained: the first package is too large.
+    /// Bakes [`scene`] to 15 kB. The scene has few colors and compresses well until its colors are trained: the first package is too large.
     fn bake(&self, out: &Path, engine: &mut Engine, progress: &mut Listener) -> Result<Baked, String> {
         let settings = BakeSettings {
             checkpoint: self.scene.clone(),
@@ -55,7 +55,7 @@ impl Capture {
     }
 }
 
-/// Keeps what a bake says, and may end it: right after the first state of training that is stored once a package was too large.
+/// Keeps the notes of a bake. If `ends`, interrupts the bake after the first training state that is stored after a package was too large.
 #[derive(Default)]
 struct Listener {
     ends: bool,
@@ -65,7 +65,7 @@ struct Listener {
 }
 
 impl Listener {
-    /// Returns how often these words have been said.
+    /// Returns the number of notes with these words.
     fn count(&self, words: &str) -> usize {
         self.notes.iter().filter(|line| line.contains(words)).count()
     }
@@ -89,7 +89,7 @@ impl Progress for Listener {
     fn uninterrupted(&mut self, write: &mut dyn FnMut() -> Result<(), CodecError>) -> Result<(), CodecError> {
         write()?;
         if self.ends && self.count(AGAIN) > 0 && self.running.last() == Some(&"fine-tuning") {
-            let kind = io::Error::other("the bake ends here").into();
+            let kind = io::Error::other("interrupted by the test").into();
             return Err(CodecError { path: PathBuf::from("state"), kind });
         }
         Ok(())
@@ -103,22 +103,22 @@ fn a_bake_killed_in_its_second_attempt_resumes_there() {
     let mut engine = Engine::Gpu(Box::new(headless));
     let [whole_out, out] = ["whole.gs4d", "ended.gs4d"].map(|name| capture.path(name));
     let mut listener = Listener::default();
-    let whole = capture.bake(&whole_out, &mut engine, &mut listener).expect("it can be baked");
+    let whole = capture.bake(&whole_out, &mut engine, &mut listener).expect("the uninterrupted bake succeeds");
     let attempts = listener.count(AGAIN);
     assert!(attempts > 0, "the first package is too large: {:?}", listener.notes);
 
     let mut listener = Listener { ends: true, ..Listener::default() };
-    let error = capture.bake(&out, &mut engine, &mut listener).expect_err("it is ended");
-    assert!(error.contains("the bake ends here"), "in the second attempt: {error}");
-    assert!(!out.exists(), "there is no package yet");
+    let error = capture.bake(&out, &mut engine, &mut listener).expect_err("the bake is interrupted");
+    assert!(error.contains("interrupted by the test"), "the bake ends in the second attempt: {error}");
+    assert!(!out.exists(), "an interrupted bake writes no package");
 
     let mut listener = Listener::default();
-    let resumed = capture.bake(&out, &mut engine, &mut listener).expect("it can be baked");
+    let resumed = capture.bake(&out, &mut engine, &mut listener).expect("the resumed bake succeeds");
     let notes = &listener.notes;
-    assert_eq!(listener.count("fine-tuning resumes after step 2"), 1, "not from the first step: {notes:?}");
-    assert_eq!(listener.count(AGAIN), attempts - 1, "one package less is too large: {notes:?}");
-    let bytes = |path: &Path| fs::read(path).expect("the package is there");
-    assert!(bytes(&out) == bytes(&whole_out), "the same package as without an end");
-    assert_eq!(resumed.report.gaussians, whole.report.gaussians, "of as many Gaussians");
-    assert!(!capture.path("ended.gs4d.bake").exists(), "no state of any attempt is left");
+    assert_eq!(listener.count("fine-tuning resumes after step 2"), 1, "training resumes after step 2: {notes:?}");
+    assert_eq!(listener.count(AGAIN), attempts - 1, "the first attempt is not repeated: {notes:?}");
+    let bytes = |path: &Path| fs::read(path).expect("the package exists");
+    assert!(bytes(&out) == bytes(&whole_out), "the package equals the package of the uninterrupted bake");
+    assert_eq!(resumed.report.gaussians, whole.report.gaussians, "both reports have the same number of Gaussians");
+    assert!(!capture.path("ended.gs4d.bake").exists(), "the states of all attempts are removed");
 }

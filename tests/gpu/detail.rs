@@ -1,7 +1,7 @@
 //! Levels of detail, measured on the GPU.
 //!
-//! In: a synthetic scene. Out: proof that a level changes a screen as little as it says, in views that it was neither trained nor measured
-//! in, and that what is not close is not kept. Skipped where there is no GPU.
+//! In: a synthetic scene. Out: proof that a level has the promised PSNR in views in which it was neither trained nor measured, and that levels
+//! below the wanted PSNR are dropped. Skipped where there is no GPU.
 
 use crate::support::gpu;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
@@ -15,7 +15,8 @@ use glam::{UVec2, Vec3};
 /// Settings that take seconds on a software driver.
 const QUICK: DetailSettings = DetailSettings { levels: 1, min_psnr: 45.0, steps: 0, directions: 4, times: 2 };
 
-/// Returns clumps of faint Gaussians far smaller than their distance, so that each clump can be one.
+/// Returns a scene of clumps of faint Gaussians. The clumps are far smaller than their distances, so that each can be merged into one
+/// Gaussian.
 fn clumps() -> GaussianScene {
     let (mut gaussians, mut values) = (Vec::new(), Vec::new());
     for clump in 0..20u32 {
@@ -38,7 +39,7 @@ fn clumps() -> GaussianScene {
     RuntimeScene::sliced(gaussians, Harmonics { coefficients: 1, degree: 0, degree_t: 0, values }).into()
 }
 
-/// Returns a view in which the sphere about a scene is `pixels` pixels across.
+/// Returns a view in which the bounding sphere of a scene has a diameter of `pixels` pixels.
 fn view(scene: &RuntimeScene, direction: Vec3, time: f32, pixels: f32) -> View {
     let bounds = Bounds::of(scene.iter(), scene.trained_with.time_interval).expect("something is drawn");
     let distance = 30.0 * bounds.radius();
@@ -49,7 +50,7 @@ fn view(scene: &RuntimeScene, direction: Vec3, time: f32, pixels: f32) -> View {
     Camera::look_at(eye, bounds.center(), Vec3::Z, fov, UVec2::splat(side as u32)).view(time, RasterFov::Corrected)
 }
 
-/// Returns the PSNR of a screen of 1280x720 pixels with two such frames on it, over black and white, the lower one.
+/// Returns the PSNR between two frames as parts of a screen of 1280x720 pixels: the lower value of black and white background.
 fn screen_psnr(a: &Frame, b: &Frame) -> f64 {
     let over = |frame: &Frame, at: usize, behind: f32| {
         (frame.picture.pixels[at] + frame.transmittance[at] * behind).clamp(Vec3::ZERO, Vec3::ONE)
@@ -68,56 +69,56 @@ fn draw(headless: &mut Headless, scene: &RuntimeScene, view: &View) -> Frame {
 }
 
 #[test]
-fn a_level_changes_a_screen_as_little_as_it_says() {
+fn a_level_has_the_promised_psnr_in_other_views() {
     let Some(mut headless) = gpu::headless() else { return };
-    let made = detail(&mut headless, clumps(), &QUICK, &mut NoProgress).expect("it has levels");
-    let [level] = &made.scene.levels[..] else { panic!("one level: {:?}", made.made) };
-    assert_eq!(level.scene.len(), 20, "a seventh of the Gaussians");
-    assert_eq!(made.made[0].pixels, Some(level.pixels), "as reported");
+    let made = detail(&mut headless, clumps(), &QUICK, &mut NoProgress).expect("levels can be made");
+    let [level] = &made.scene.levels[..] else { panic!("expected one level: {:?}", made.made) };
+    assert_eq!(level.scene.len(), 20, "the level has a seventh of the Gaussians");
+    assert_eq!(made.made[0].pixels, Some(level.pixels), "the report has the size of the level");
     let full = made.scene.clone().into_runtime().expect("drawable");
     for (direction, time) in [(Vec3::new(1.0, 0.4, 0.3), 0.2), (Vec3::new(-0.3, 1.0, -0.5), 0.9)] {
         let view = view(&full, direction, time, level.pixels);
         let smooth = view.antialiased(level.scene.trained_with.pixel);
         let found = screen_psnr(&draw(&mut headless, &full, &view), &draw(&mut headless, &level.scene, &smooth));
-        // Other views than those that were measured may differ a little more.
+        // A tolerance of 1 dB for views that were not measured.
         assert!(found > 44.0, "{found} dB at {} pixels from {direction}", level.pixels);
     }
 }
 
 #[test]
-fn training_brings_a_level_closer() {
+fn training_increases_the_psnr_of_a_level() {
     let Some(mut headless) = gpu::headless() else { return };
     let mut scene = clumps();
-    let SceneForm::Ready(Form::Sliced(sliced)) = &mut scene.form else { panic!("they are sliced") };
+    let SceneForm::Ready(Form::Sliced(sliced)) = &mut scene.form else { panic!("the clumps are sliced") };
     sliced.gaussians.iter_mut().for_each(|gaussian| gaussian.opacity = 0.6);
     let lowest = |headless: &mut Headless, steps: usize| {
         let settings = DetailSettings { min_psnr: 0.0, steps, ..QUICK };
-        let made = detail(headless, scene.clone(), &settings, &mut NoProgress).expect("it has levels");
-        // The size that 20 Gaussians are meant for.
+        let made = detail(headless, scene.clone(), &settings, &mut NoProgress).expect("levels can be made");
+        // The size in pixels for a level of 20 Gaussians.
         let measured = made.made[0].measured.iter().find(|close| close.pixels == 10.0);
-        measured.expect("it is measured at that size").truth
+        measured.expect("the level is measured at 10 pixels").truth
     };
     let (merged, trained) = (lowest(&mut headless, 0), lowest(&mut headless, 150));
     assert!(trained > merged, "{trained} dB after training, {merged} dB before");
 }
 
 #[test]
-fn what_is_not_close_is_not_kept() {
+fn levels_below_the_minimum_psnr_are_dropped() {
     let Some(mut headless) = gpu::headless() else { return };
     let strict = DetailSettings { min_psnr: 300.0, ..QUICK };
-    let made = detail(&mut headless, clumps(), &strict, &mut NoProgress).expect("it is measured");
-    assert!(made.scene.levels.is_empty() && made.made[0].pixels.is_none(), "no picture is that close");
-    assert_eq!(made.scene, clumps(), "and nothing else has changed");
+    let made = detail(&mut headless, clumps(), &strict, &mut NoProgress).expect("levels can be measured");
+    assert!(made.scene.levels.is_empty() && made.made[0].pixels.is_none(), "no level has a PSNR of 300 dB");
+    assert_eq!(made.scene, clumps(), "the scene is unchanged");
 }
 
 #[test]
-fn surroundings_have_no_levels() {
+fn scenes_with_environment_map_or_without_gaussians_have_no_levels() {
     let Some(mut headless) = gpu::headless() else { return };
     let environment = Some(Environment { width: 1, height: 1, texels: vec![0.5; 3] });
     let around = GaussianScene { environment, ..clumps() };
     let refused = detail(&mut headless, around, &QUICK, &mut NoProgress);
-    assert!(matches!(refused, Err(OfflineError::Surrounded)), "an environment map is seen at every size");
+    assert!(matches!(refused, Err(OfflineError::Surrounded)), "a scene with an environment map is refused");
     let nothing = RuntimeScene::sliced(Vec::new(), Harmonics::default());
     let refused = detail(&mut headless, nothing.into(), &QUICK, &mut NoProgress);
-    assert!(matches!(refused, Err(OfflineError::NothingToOrbit)), "nothing is seen at any");
+    assert!(matches!(refused, Err(OfflineError::NothingToOrbit)), "a scene without Gaussians is refused");
 }

@@ -1,7 +1,7 @@
-//! The fast renderer against the reference design, where its buffers and its workgroup memory are too small, and many copies of a capture.
+//! The fast design against the reference design: scenes that exceed its buffers or its workgroup memory, and many copies of a capture.
 //!
-//! In: scenes of many splats in few tiles, the bundled capture. Out: proof that both designs draw the same picture, from the first frame
-//! on, and that copies which one dispatch draws look as those drawn one by one. Skipped where there is no GPU.
+//! In: scenes of many splats in few tiles, the bundled capture. Out: proof that both designs draw the same picture from the first frame on,
+//! and that copies drawn by one dispatch equal copies drawn by separate dispatches. Skipped where there is no GPU.
 
 use crate::support::blob::blob;
 use crate::support::gpu;
@@ -17,7 +17,7 @@ use bevy_gs4d::view::{Appearance, Background, Camera, DebugView, Frame, RasterFo
 use glam::{UVec2, Vec3};
 use std::path::Path;
 
-/// Faint Gaussians about the origin, behind each other in layers along the line of sight: `layer` Gaussians have one depth.
+/// Returns a scene of faint Gaussians near the origin, in layers along the line of sight: `layer` Gaussians have the same depth.
 fn crowd(count: usize, layer: usize, deviation: f32) -> RuntimeScene {
     let gaussians = (0..count).map(|index| {
         let spread = |step: usize| (index * step % 97) as f32 / 97.0 - 0.5;
@@ -34,7 +34,7 @@ fn view(size: u32) -> View {
         .view(0.0, RasterFov::Reference)
 }
 
-/// Draws a scene with a renderer that has drawn nothing before.
+/// Draws a scene after the release of all buffers.
 fn first_frame(headless: &mut Headless, design: Design, scene: &RuntimeScene, view: &View) -> Frame {
     // A change of design releases all buffers.
     for (_, other) in Design::NAMES {
@@ -62,16 +62,16 @@ fn lists_longer_than_workgroup_memory_are_drawn_in_order() {
     for (count, layer) in [(3000, 1), (5000, 50), (6000, 6000)] {
         let (scene, view) = (crowd(count, layer, 0.05), view(64));
         let expected = first_frame(&mut headless, Design::Reference, &scene, &view);
-        assert!(expected.counts.pairs as usize > 4 * 2048, "tiles have more splats than fit: {:?}", expected.counts);
+        assert!(expected.counts.pairs as usize > 4 * 2048, "the lists exceed workgroup memory: {:?}", expected.counts);
         let found = first_frame(&mut headless, Design::Fast, &scene, &view);
         assert_same(&found, &expected, &format!("{count} splats in layers of {layer}"));
     }
 }
 
 #[test]
-fn bins_that_overflow_lack_no_splat_in_the_first_frame() {
+fn overflowing_bins_are_drawn_completely_in_the_first_frame() {
     let Some(mut headless) = gpu::headless() else { return };
-    // Bins of 2 x 2 tiles have room for 4096 splats at first, and a few hold all of these.
+    // The initial capacity of bins of 2 x 2 tiles is 4096 splats; some bins contain all 6000 splats.
     let (scene, view) = (crowd(6000, 1, 0.05), view(400));
     let expected = first_frame(&mut headless, Design::Reference, &scene, &view);
     let found = first_frame(&mut headless, Design::Fast, &scene, &view);
@@ -79,25 +79,25 @@ fn bins_that_overflow_lack_no_splat_in_the_first_frame() {
     let capture = headless.upload(&scene).expect("the scene fits");
     for number in 2..6 {
         let found = headless.render(&capture, &view, Background::Color([0.1, 0.2, 0.3])).expect("the picture fits");
-        assert_same(&found, &expected, &format!("frame {number}, with more room"));
+        assert_same(&found, &expected, &format!("frame {number}, with larger bins"));
     }
 }
 
 #[test]
-fn bins_that_overflow_have_room_in_the_next_frame() {
+fn overflowing_bins_grow_in_the_next_frame() {
     let Some(mut headless) = gpu::headless() else { return };
     let (scene, view) = (crowd(6000, 1, 0.05), view(400));
     let capture = headless.upload(&scene).expect("the scene fits");
     headless.set_design(Design::Fast);
     let mut bytes = |views: &[View]| headless.time(&capture, views, 0).expect("the picture fits").bytes;
-    // Views are drawn once each, and those of another call are forgotten.
+    // Each call draws each view once, and releases the buffers first.
     let [first, second, again] = [1, 2, 1].map(|count| bytes(&vec![view; count]));
-    // 8 bytes for each place: of 169 bins, 4096 each at first, then for 6000 and half as many.
-    assert_eq!(second - first, 8 * 169 * (9000 - 4096), "bytes of the second frame");
-    assert_eq!(again, first, "bytes of the first frame once more");
+    // 8 bytes per entry, 169 bins: first 4096 entries each, then 1.5 * 6000.
+    assert_eq!(second - first, 8 * 169 * (9000 - 4096), "the second frame has larger bins");
+    assert_eq!(again, first, "the first frame of another call has the initial capacity");
 }
 
-/// Returns the largest difference of two pictures or their transmittance.
+/// Returns the largest difference between two frames in color and transmittance.
 fn difference(found: &Frame, expected: &Frame) -> f32 {
     let colors = found.picture.pixels.iter().zip(&expected.picture.pixels).map(|(a, b)| (*a - *b).abs().max_element());
     let left = found.transmittance.iter().zip(&expected.transmittance).map(|(a, b)| (a - b).abs());
@@ -105,7 +105,7 @@ fn difference(found: &Frame, expected: &Frame) -> f32 {
 }
 
 #[test]
-fn every_way_of_blending_shows_the_picture_of_the_reference() {
+fn every_variant_of_blending_matches_the_reference_design() {
     let Some(mut headless) = gpu::headless() else { return };
     let scene = synthesize(&SynthSettings { count: 4_000, ..SynthSettings::default() });
     let scene = scene.into_runtime().expect("a scene that can be drawn");
@@ -127,27 +127,27 @@ fn every_way_of_blending_shows_the_picture_of_the_reference() {
                 let parameters = ViewParameters { background, opaque, debug, ..ViewParameters::default() };
                 headless.set_design(Design::Reference);
                 let expected = headless.render_all(&instances, &parameters).expect("the picture fits");
-                assert!(expected.counts.visible > 1000, "something is there");
+                assert!(expected.counts.visible > 1000, "the scene is visible: {:?}", expected.counts);
                 headless.set_design(Design::Fast);
                 for depths in [true, false] {
                     let parameters = ViewParameters { depths, ..parameters };
                     let found = headless.render_all(&instances, &parameters).expect("the picture fits");
                     let samples = opaque.map_or(0, |opaque| opaque.samples);
                     let what = format!("{debug:?}, samples of the surface {samples}, depths {depths}");
-                    assert_eq!(found.depth.is_empty(), !depths, "{what}: depths");
+                    assert_eq!(found.depth.is_empty(), !depths, "{what}: depths are present if enabled");
                     let difference = difference(&found, &expected);
                     println!("{what}: {difference:.1e}");
                     assert!(difference <= 1e-5, "{what}: differs by {difference}");
-                    assert_eq!(found.counts, expected.counts, "{what}: counts");
+                    assert_eq!(found.counts, expected.counts, "{what}: the counts are the same");
                 }
             }
         }
     }
 }
 
-/// As benchmarks and cameras that need no depth draw a trained capture, in a small picture and in a large one.
+/// A trained capture drawn without depths, as by benchmarks and cameras that need no depth, in small and large pictures.
 #[test]
-fn the_bundled_capture_without_depths_is_that_of_the_reference() {
+fn the_bundled_capture_without_depths_matches_the_reference_design() {
     let Some(mut headless) = gpu::headless() else { return };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/toybox.gs4d");
     let scene = load(&path, &ReadOptions::default()).expect("the bundled capture").into_runtime();
@@ -166,12 +166,12 @@ fn the_bundled_capture_without_depths_is_that_of_the_reference() {
         let error = SquaredError::of(&found.picture, &expected.picture).expect("pictures of one size");
         let decibels = error.psnr();
         println!("{size}, {time}: {decibels:.1} dB, at most {:.1e}", difference(&found, &expected));
-        assert!(decibels >= 100.0, "{size}, {time}: {decibels} dB");
+        assert!(decibels >= 100.0, "{size} pixels at {time}: PSNR {decibels} dB, expected at least 100");
     }
 }
 
 #[test]
-fn colors_of_half_precision_are_those_of_single_precision_rounded() {
+fn half_precision_colors_are_rounded_single_precision_colors() {
     let Some(mut headless) = gpu::headless() else { return };
     let (scene, view) = (crowd(2000, 7, 0.05), view(130));
     let capture = headless.upload(&scene).expect("the scene fits");
@@ -184,33 +184,33 @@ fn colors_of_half_precision_are_those_of_single_precision_rounded() {
         });
         let (step, most) = (difference(&half, &single), single.picture.pixels.iter().map(|p| p.max_element()));
         let most = most.fold(1.0, f32::max);
-        // Ten bits after the leading one; drivers may round towards zero.
+        // Half precision has ten fraction bits; drivers may round towards zero.
         println!("{design:?}: half differs by {step:.1e} of {most:.1e}");
-        assert!(step <= most * 2.0_f32.powi(-10), "{design:?}: differs by {step}");
-        assert!(step > 0.0, "{design:?}: it is another precision");
-        assert_eq!(half.depth, single.depth, "{design:?}: depths");
+        assert!(step <= most * 2.0_f32.powi(-10), "{design:?}: half precision differs by {step}");
+        assert!(step > 0.0, "{design:?}: half precision is used");
+        assert_eq!(half.depth, single.depth, "{design:?}: depths do not depend on the precision of color");
     }
 }
 
 #[test]
 fn pictures_of_many_tiles_have_larger_bins() {
     let Some(mut headless) = gpu::headless() else { return };
-    // 8281 tiles: bins of 2 x 2 would be too many.
+    // 8281 tiles are too many for bins of 2 x 2 tiles.
     let (scene, view) = (crowd(500, 1, 0.1), view(1456));
     let expected = first_frame(&mut headless, Design::Reference, &scene, &view);
     let found = first_frame(&mut headless, Design::Fast, &scene, &view);
     assert_same(&found, &expected, "1456 x 1456");
-    assert_eq!(found.counts, expected.counts, "counts");
+    assert_eq!(found.counts, expected.counts, "the counts are the same");
 }
 
 #[test]
-fn parts_of_very_many_gaussians_take_several_for_each_thread() {
+fn large_parts_with_several_gaussians_per_thread_match_the_reference_design() {
     let Some(mut headless) = gpu::headless() else { return };
-    // From a million on, `project_bin` counts few bins.
+    // From a million Gaussians on, `project_bin` uses the variant for few bins.
     for (count, shown) in [(300_000, 97), (1_100_000, 397)] {
         let (mut scene, view) = (crowd(count, 1000, 0.02), view(256));
         let Form::Sliced(sliced) = &mut scene.form else { panic!("single precision") };
-        // Some are seen, some are behind the camera, some are absent: whole workgroups of each kind too.
+        // Some Gaussians are visible, some are behind the camera, some are absent; also whole workgroups of each kind.
         for (index, gaussian) in sliced.gaussians.iter_mut().enumerate() {
             if index % 3 == 0 || (100_000..120_000).contains(&index) {
                 (gaussian.mean_t, gaussian.sigma_t) = (10.0, 0.1);
@@ -220,23 +220,23 @@ fn parts_of_very_many_gaussians_take_several_for_each_thread() {
             }
         }
         let expected = first_frame(&mut headless, Design::Reference, &scene, &view);
-        assert!(expected.counts.visible > 2000, "something is there: {:?}", expected.counts);
+        assert!(expected.counts.visible > 2000, "the scene is visible: {:?}", expected.counts);
         let found = first_frame(&mut headless, Design::Fast, &scene, &view);
         assert_same(&found, &expected, &format!("{count} Gaussians"));
-        assert_eq!(found.counts, expected.counts, "counts");
+        assert_eq!(found.counts, expected.counts, "{count} Gaussians: the counts are the same");
     }
 }
 
 #[test]
-fn copies_of_a_capture_are_drawn_as_each_by_itself() {
+fn copies_drawn_by_one_dispatch_equal_copies_drawn_separately() {
     let Some(mut headless) = gpu::headless() else { return };
     let synthetic = |seed| {
         let settings = SynthSettings { count: 40, seed, ..SynthSettings::default() };
         synthesize(&settings).into_runtime().expect("a scene that can be drawn")
     };
     let (scene, other) = (synthetic(1), synthetic(2));
-    let [copied, twin, other] = [&scene, &scene, &other].map(|scene| headless.upload(scene).expect("the scene fits"));
-    // More than one dispatch draws, about another capture; each at its own place, time and opacity.
+    let [copied, same, other] = [&scene, &scene, &other].map(|scene| headless.upload(scene).expect("the scene fits"));
+    // More copies than one dispatch draws, with another capture between them; each at its own place, time and opacity.
     let places = (0..150).map(|index| {
         let (column, row) = (index % 15, index / 15);
         let eye = Vec3::new(0.7 * column as f32 - 5.0, -9.0, 0.8 * row as f32 - 4.0);
@@ -249,7 +249,7 @@ fn copies_of_a_capture_are_drawn_as_each_by_itself() {
     let instances = |alternate: bool| -> Vec<Instance<'_>> {
         let capture = |index: usize| match index {
             75 => &other,
-            _ if alternate && index % 2 == 1 => &twin,
+            _ if alternate && index % 2 == 1 => &same,
             _ => &copied,
         };
         let place = |&(index, view, appearance): &(usize, View, Appearance)| Instance {
@@ -266,9 +266,9 @@ fn copies_of_a_capture_are_drawn_as_each_by_itself() {
             let parameters = ViewParameters { depths: false, ..ViewParameters::default() };
             headless.render_all(&instances(alternate), &parameters).expect("the picture fits")
         });
-        assert!(together.counts.visible > 2000, "{design:?}: they are seen: {:?}", together.counts);
-        assert_eq!(together.counts, alone.counts, "{design:?}: counts");
+        assert!(together.counts.visible > 2000, "{design:?}: the copies are visible: {:?}", together.counts);
+        assert_eq!(together.counts, alone.counts, "{design:?}: the counts are the same");
         let difference = difference(&together, &alone);
-        assert!(difference <= 1e-6, "{design:?}: differs by {difference}");
+        assert!(difference <= 1e-6, "{design:?}: pictures differ by {difference}");
     }
 }

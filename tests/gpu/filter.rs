@@ -1,7 +1,7 @@
 //! The temporal filter on the GPU.
 //!
-//! In: synthetic scenes with filters of both kinds of storage. Out: proof that inactive Gaussians are not drawn and
-//! that nothing else changes. Skipped where there is no GPU.
+//! In: synthetic scenes with filters of both storage kinds. Out: proof that exactly the inactive Gaussians are not
+//! drawn. Skipped where there is no GPU.
 
 use crate::support::gpu;
 use bevy_gs4d::reference;
@@ -35,7 +35,7 @@ fn view(time: f32) -> View {
     Camera::look_at(eye, Vec3::ZERO, Vec3::Z, 0.9, UVec2::new(90, 61)).view(time, RasterFov::Reference)
 }
 
-/// Returns times in order and back again: the segment changes, stays, and returns.
+/// Returns ascending and descending times: the segment changes, stays the same, and returns to an earlier segment.
 fn times() -> impl Iterator<Item = f32> {
     [0.0, 0.05, 0.11, 0.112, 0.5, 0.93, 1.0, 0.5, 0.0, -0.3, 1.4].into_iter()
 }
@@ -51,19 +51,19 @@ fn draw(headless: &mut Headless, scene: &RuntimeScene, time: f32) -> Frame {
 }
 
 #[test]
-fn support_changes_no_bit() {
+fn a_filter_by_support_does_not_change_the_picture() {
     let Some(mut headless) = gpu::headless() else { return };
     let whole = scene(5_000, 3);
     let filtered = with_support(&whole);
-    let share = filtered.filter.as_ref().expect("a filter").active_share();
-    assert!(share < 0.9, "the filter leaves something out: {share} is active");
+    let fraction = filtered.filter.as_ref().expect("a filter").active_share();
+    assert!(fraction < 0.9, "some Gaussians are inactive: the active fraction is {fraction}");
     let [a, b, c] = [&whole, &filtered, &as_bits(&filtered)].map(|scene| headless.upload(scene).expect("it fits"));
     for time in times() {
         let expected = headless.render(&a, &view(time), BLACK).expect("it is drawn");
         for capture in [&b, &c] {
             let frame = headless.render(capture, &view(time), BLACK).expect("it is drawn");
-            assert_eq!(frame.counts, expected.counts, "at {time}: as many splats and pairs");
-            assert!(bits_of(&frame) == bits_of(&expected), "at {time}: bit for bit the same");
+            assert_eq!(frame.counts, expected.counts, "at {time}: the same numbers of splats and pairs");
+            assert!(bits_of(&frame) == bits_of(&expected), "at {time}: the picture is the same bit for bit");
         }
     }
 }
@@ -72,7 +72,7 @@ fn support_changes_no_bit() {
 fn inactive_gaussians_are_not_drawn() {
     let Some(mut headless) = gpu::headless() else { return };
     let whole = scene(3_000, 5);
-    // Every third Gaussian is active in even segments, the others in odd ones, which intervals cannot represent.
+    // Every third Gaussian is active in even segments, all others in odd segments, which intervals cannot represent.
     let words = TemporalFilter::words(3_000);
     let mut bits = vec![0u32; words * SEGMENTS as usize];
     for segment in 0..SEGMENTS as usize {
@@ -81,7 +81,7 @@ fn inactive_gaussians_are_not_drawn() {
         }
     }
     let filter = TemporalFilter::from_bits(FilterKind::KeyFrame, SEGMENTS, 3_000, bits);
-    assert!(matches!(filter.sets, ActiveSets::Bits(_)), "sets with pauses are bits");
+    assert!(matches!(filter.sets, ActiveSets::Bits(_)), "active sets with gaps are stored as bits");
     let filtered = RuntimeScene { filter: Some(filter), ..whole.clone() };
     let capture = headless.upload(&filtered).expect("it fits");
     for time in times() {
@@ -90,21 +90,21 @@ fn inactive_gaussians_are_not_drawn() {
         assert_eq!(frame.counts.visible, expected.counts.visible, "at {time}: the same splats as on the CPU");
         let apart = frame.picture.pixels.iter().zip(&expected.picture.pixels);
         let apart = apart.map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
-        assert!(apart <= 1e-3, "at {time}: {apart} apart from the CPU reference");
+        assert!(apart <= 1e-3, "at {time}: colors differ by {apart} from the CPU reference");
     }
     let all = draw(&mut headless, &whole, 0.5);
     let some = headless.render(&capture, &view(0.5), BLACK).expect("it is drawn");
     assert!(some.counts.visible < all.counts.visible, "fewer splats than without the filter");
     headless.use_filters(false);
     let unfiltered = headless.render(&capture, &view(0.5), BLACK).expect("it is drawn");
-    assert!(bits_of(&unfiltered) == bits_of(&all), "switched off, everything is drawn");
+    assert!(bits_of(&unfiltered) == bits_of(&all), "with filters switched off, all Gaussians are drawn");
     headless.use_filters(true);
     let again = headless.render(&capture, &view(0.5), BLACK).expect("it is drawn");
-    assert!(bits_of(&again) == bits_of(&some), "switched on again, the list is made again");
+    assert!(bits_of(&again) == bits_of(&some), "with filters switched on again, the list is recorded again");
 }
 
 #[test]
-fn captures_with_and_without_a_filter_share_a_view() {
+fn captures_with_and_without_a_filter_are_drawn_in_one_view() {
     let Some(mut headless) = gpu::headless() else { return };
     let (a, b) = (scene(2_000, 7), scene(2_500, 8));
     let filtered = with_support(&a);
@@ -116,7 +116,7 @@ fn captures_with_and_without_a_filter_share_a_view() {
             |capture, active, time| Instance { capture, active, view: view(time), appearance: Appearance::default() };
         let expected = [instance(&plain, None, time), instance(&other, None, late), instance(&plain, None, late)];
         let expected = headless.render_all(&expected, &parameters).expect("it is drawn");
-        // The same capture twice, at different times: each place has a list of its own.
+        // The same capture twice, at different times: each instance has its own list.
         let [now, then] = [time, late].map(|time| headless.active(&filtered, time));
         let mixed = [
             instance(&filtered, now.as_ref(), time),
@@ -124,14 +124,14 @@ fn captures_with_and_without_a_filter_share_a_view() {
             instance(&filtered, then.as_ref(), late),
         ];
         let mixed = headless.render_all(&mixed, &parameters).expect("it is drawn");
-        assert!(bits_of(&mixed) == bits_of(&expected), "at {time} and {late}: bit for bit the same");
-        assert!(previous != Some(bits_of(&mixed)), "time moves the picture");
+        assert!(bits_of(&mixed) == bits_of(&expected), "at {time} and {late}: the picture is the same bit for bit");
+        assert!(previous != Some(bits_of(&mixed)), "the picture changes with time");
         previous = Some(bits_of(&mixed));
     }
 }
 
 #[test]
-fn a_view_has_room_for_the_gaussians_that_are_active_at_one_time() {
+fn the_capacity_of_a_view_is_the_maximum_of_active_gaussians() {
     let Some(mut headless) = gpu::headless() else { return };
     let whole = scene(20_000, 8);
     // A ninth of the Gaussians in each segment.
@@ -149,10 +149,13 @@ fn a_view_has_room_for_the_gaussians_that_are_active_at_one_time() {
         let expected = reference::render(&filtered, &view(time), BLACK);
         assert_eq!(frame.counts.visible, expected.counts.visible, "at {time}: the same splats as on the CPU");
         let slots = headless.finished().expect("a frame").slots;
-        assert!((2_222..6_000).contains(&slots), "at {time}: room for {slots} splats, of which 2222 can be there");
-        assert_eq!(*made.get_or_insert(slots), slots, "at {time}: as much as at any other time");
+        assert!((2_222..6_000).contains(&slots), "at {time}: a capacity of {slots} splats for 2222 active Gaussians");
+        assert_eq!(*made.get_or_insert(slots), slots, "at {time}: the capacity does not depend on time");
     }
     headless.use_filters(false);
     headless.render(&capture, &view(0.5), BLACK).expect("it is drawn");
-    assert!(headless.finished().expect("a frame").slots >= 20_000, "without the filter, for all");
+    assert!(
+        headless.finished().expect("a frame").slots >= 20_000,
+        "without the filter, the capacity fits all Gaussians"
+    );
 }

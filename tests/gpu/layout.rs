@@ -1,6 +1,6 @@
-//! Structures and constants that the shaders and the host's code both define.
+//! Structures and constants that both the shaders and the host define.
 //!
-//! In: the composed passes, as naga lays them out. Out: proof that every structure and shared constant is the same on both sides.
+//! In: the composed passes with naga's layout. Out: proof that every structure and constant is the same in the shaders and on the host.
 
 use bevy_gs4d::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
 use bevy_gs4d::gaussian::projection::LOW_PASS;
@@ -18,7 +18,7 @@ use std::mem::offset_of;
 use wgpu::naga::front::wgsl::parse_str;
 use wgpu::naga::{AddressSpace, ArraySize, Expression, GlobalVariable, Literal, Module, StructMember, TypeInner};
 
-/// A member: its name, where it begins, how many bytes it has.
+/// A member of a structure: name, offset and size in bytes.
 type Member = (String, usize, usize);
 
 /// A structure of the host.
@@ -46,17 +46,17 @@ macro_rules! mirror {
     };
 }
 
-/// Returns a mirror whose members on the GPU are those of the host in pieces of four words.
+/// Returns a mirror whose bytes are divided into members of four words on the GPU.
 fn in_fours<const N: usize>(mirror: Mirror, name: &'static str, members: [&str; N]) -> Mirror {
     assert!(
         mirror.members.iter().all(|(_, at, size)| at / 16 == (at + size - 1) / 16 || at % 16 == 0),
-        "no member straddles"
+        "no member of `{name}` crosses a boundary of four words"
     );
     let pieces = members.into_iter().take(mirror.size / 16).enumerate();
     Mirror { name, size: mirror.size, members: pieces.map(|(i, member)| (member.to_owned(), 16 * i, 16)).collect() }
 }
 
-/// Returns the mirror of the Gaussian, which on the GPU has the reciprocal of the temporal deviation.
+/// Returns the mirror of the Gaussian, which has the reciprocal of the temporal deviation on the GPU.
 fn gaussian() -> Mirror {
     let mirror = mirror!(Gaussian { mean, mean_t, velocity, sigma_t, covariance, opacity, padding });
     in_fours(mirror, "GaussianRecord", ["mean", "velocity", "covariance_a", "covariance_b"])
@@ -151,7 +151,7 @@ fn mirrors() -> [Mirror; 17] {
     ]
 }
 
-/// Returns the name without what naga_oil appends to imported ones.
+/// Returns a name without the suffix that naga_oil appends to imported names.
 fn plain(name: &str) -> &str {
     name.split("X_naga_oil").next().unwrap_or(name)
 }
@@ -161,12 +161,12 @@ fn modules() -> BTreeMap<&'static str, Module> {
     pass_names().map(|name| (name, compose(name, &[]).expect("the pass composes"))).collect()
 }
 
-/// A structure that the host fills or reads, as a pass lays it out.
+/// A structure that the host writes or reads, with the layout of a pass.
 struct Shared {
     name: String,
     size: usize,
     members: Vec<Member>,
-    /// Distance from one to the next, where they come in an array.
+    /// Stride, if the binding is an array of structures.
     stride: Option<usize>,
 }
 
@@ -190,7 +190,7 @@ fn shared(module: &Module) -> Vec<Shared> {
 }
 
 #[test]
-fn every_structure_has_the_same_members_in_the_same_places() {
+fn structures_have_the_same_members_at_the_same_offsets() {
     let mirrors = mirrors();
     let mut seen = BTreeSet::new();
     let mut wrong = Vec::new();
@@ -202,19 +202,22 @@ fn every_structure_has_the_same_members_in_the_same_places() {
             };
             seen.insert(mirror.name);
             if mirror.size != size || stride.is_some_and(|stride| stride != size) {
-                wrong.push(format!("{pass}: `{name}` has {size} bytes, apart {stride:?}, the host's {}", mirror.size));
+                wrong.push(format!(
+                    "{pass}: `{name}` has {size} bytes, stride {stride:?}; on the host {} bytes",
+                    mirror.size
+                ));
             }
             if mirror.members != members {
-                wrong.push(format!("{pass}: `{name}` is\n  {members:?}, the host's\n  {:?}", mirror.members));
+                wrong.push(format!("{pass}: `{name}` is\n  {members:?}, on the host\n  {:?}", mirror.members));
             }
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    assert_eq!(seen.len(), mirrors.len(), "every structure of the host is bound by some pass: {seen:?}");
+    assert_eq!(seen.len(), mirrors.len(), "every structure of the host is bound by a pass: {seen:?}");
 }
 
 #[test]
-fn instances_of_one_dispatch_are_as_far_apart_as_the_host_puts_them() {
+fn the_array_of_instances_has_the_count_and_stride_of_the_host() {
     for pass in ["project", "colors", "motion"] {
         let module = compose(pass, COPIED_INSTANCE).expect("the pass composes");
         let uniforms = module.global_variables.iter().filter(|(_, variable)| variable.space == AddressSpace::Uniform);
@@ -222,31 +225,32 @@ fn instances_of_one_dispatch_are_as_far_apart_as_the_host_puts_them() {
             TypeInner::Array { size: ArraySize::Constant(count), stride, .. } => Some((count.get(), stride)),
             _ => None,
         });
-        assert_eq!(arrays.collect::<Vec<_>>(), [(INSTANCES_AT_ONCE, INSTANCE_STRIDE)], "{pass}");
+        let expected = [(INSTANCES_AT_ONCE, INSTANCE_STRIDE)];
+        assert_eq!(arrays.collect::<Vec<_>>(), expected, "{pass}: count and stride of the array of instances");
     }
 }
 
 #[test]
-fn members_of_the_host_leave_no_gap() {
+fn structures_of_the_host_have_no_padding_between_members() {
     for mirror in mirrors() {
         let bytes: usize = mirror.members.iter().map(|(_, _, size)| size).sum();
-        assert_eq!(bytes, mirror.size, "`{}` is compared whole", mirror.name);
+        assert_eq!(bytes, mirror.size, "the members of `{}` cover all its bytes", mirror.name);
     }
 }
 
-/// Returns the value of a constant, in double precision, which represents every u32 and f32.
+/// Returns the value of a constant in double precision, which represents every u32 and f32.
 fn constant(module: &Module, name: &str) -> f64 {
     let found = module.constants.iter().find(|(_, constant)| constant.name.as_deref() == Some(name));
     let (_, constant) = found.unwrap_or_else(|| panic!("there is no constant `{name}`"));
     match module.global_expressions[constant.init] {
         Expression::Literal(Literal::F32(value)) => value.into(),
         Expression::Literal(Literal::U32(value)) => value.into(),
-        ref other => panic!("`{name}` is not a plain number: {other:?}"),
+        ref other => panic!("`{name}` is not a literal: {other:?}"),
     }
 }
 
 #[test]
-fn constants_of_the_passes_are_those_of_the_host() {
+fn constants_of_the_passes_match_the_host() {
     let modules = modules();
     let threads = 256;
     let expected: [(&str, &str, f64); 17] = [
@@ -270,13 +274,13 @@ fn constants_of_the_passes_are_those_of_the_host() {
     ];
     for (pass, name, value) in expected {
         let found = constant(&modules[pass], name);
-        assert!(found == value, "{name} of {pass} is {found}, the host's {value}");
+        assert!(found == value, "{name} of {pass} is {found}, on the host {value}");
     }
 }
 
 #[test]
-fn constants_of_the_libraries_are_those_of_the_host() {
-    // These import from each other alone: one after the other and without their directives they are plain WGSL.
+fn constants_of_the_libraries_match_the_host() {
+    // These libraries import only each other: concatenated without directives, they are plain WGSL.
     let sources = [
         include_str!("../../shaders/shared/types.wgsl"),
         include_str!("../../shaders/shared/alpha.wgsl"),
@@ -317,6 +321,6 @@ fn constants_of_the_libraries_are_those_of_the_host() {
     let floats = floats.map(|(name, value)| (name, f64::from(value)));
     for (name, value) in integers.into_iter().chain(floats) {
         let found = constant(&libraries, name);
-        assert!(found == value, "{name} is {found}, the host's {value}");
+        assert!(found == value, "{name} is {found}, on the host {value}");
     }
 }

@@ -1,7 +1,7 @@
-//! The renderer without Bevy, and the shaders on their own.
+//! Tests of the renderer without Bevy, and of individual shaders.
 //!
-//! In: scenes and buffers made here, `tests/golden/`, the files of `shaders/`. Out: one test binary. The header of each
-//! module describes its tests; those that need a device are skipped where there is none, not even a software one.
+//! In: scenes and buffers made by the tests, `tests/golden/`, the files of `shaders/`. Out: one test binary. The header of each
+//! module describes its tests. Tests that need a device are skipped where there is none, not even a software driver.
 
 mod appearance;
 mod bake;

@@ -1,7 +1,7 @@
-//! The memory of a process that draws picture after picture.
+//! The memory of a process that draws many pictures.
 //!
-//! In: synthetic scenes, drawn at one time after another. Out: proof that a software driver, whose compiled shaders are memory of the process,
-//! compiles none after the first pictures. Skipped on hardware.
+//! In: synthetic scenes, drawn at many times. Out: proof that a software driver, whose compiled shaders are in the memory of the process,
+//! compiles no shader after the first pictures. Skipped on hardware.
 
 use crate::support::gpu;
 use crate::support::own_process::run_alone;
@@ -12,7 +12,7 @@ use bevy_gs4d::renderer::{Design, Headless};
 use bevy_gs4d::scene::RuntimeScene;
 use std::fs;
 
-/// Bytes of this process that are code, but of no file: what a driver has compiled.
+/// Returns the bytes of executable memory of this process without a file: code compiled by a driver.
 fn compiled() -> u64 {
     let maps = fs::read_to_string("/proc/self/maps").expect("Linux lists the memory of a process");
     let code = maps.lines().filter_map(|line| {
@@ -28,7 +28,7 @@ fn compiled() -> u64 {
     code.sum()
 }
 
-/// Draws a scene at times of the first half of [0, 1], then at others of the second. Returns the compiled bytes after each half.
+/// Draws a scene at times of the first half of [0, 1], then of the second half. Returns the compiled bytes after each half.
 fn compiled_in_turn(headless: &mut Headless, scene: &RuntimeScene) -> [u64; 2] {
     let capture = headless.upload(scene).expect("it fits");
     [0.0, 0.5].map(|first| {
@@ -41,12 +41,12 @@ fn compiled_in_turn(headless: &mut Headless, scene: &RuntimeScene) -> [u64; 2] {
 }
 
 #[test]
-fn a_software_driver_compiles_nothing_after_the_first_pictures() {
-    // The tests beside it would compile at the same time.
-    run_alone("memory::a_software_driver_compiles_nothing_after_the_first_pictures", || {
+fn a_software_driver_compiles_no_shader_after_the_first_pictures() {
+    // In a separate process: other tests compile shaders at the same time.
+    run_alone("memory::a_software_driver_compiles_no_shader_after_the_first_pictures", || {
         let Some(mut headless) = gpu::headless() else { return };
         if headless.context().info.device_type != wgpu::DeviceType::Cpu {
-            return skip("hardware compiles to memory of its own");
+            return skip("the compiled code of hardware is not in the memory of the process");
         }
         let (coded, _) = compress(scene(600, 3, 2), &settings(&[16, 8])).expect("it is compressed");
         let scenes = [("sliced", scene(600, 3, 2)), ("coded", coded.into_runtime().expect("drawable"))];
@@ -54,8 +54,8 @@ fn a_software_driver_compiles_nothing_after_the_first_pictures() {
             headless.set_design(design);
             for (name, scene) in &scenes {
                 let [before, after] = compiled_in_turn(&mut headless, scene);
-                assert!(before > 0, "what is compiled is found");
-                assert_eq!(before, after, "{name}, {design:?}: no picture needs a shader of its own");
+                assert!(before > 0, "compiled code is found");
+                assert_eq!(before, after, "{name}, {design:?}: later pictures compile no shader");
             }
         }
     });

@@ -1,7 +1,7 @@
 //! Motions on the GPU.
 //!
-//! In: scenes in motion, seen from two places at two times. Out: proof that the GPU's motions are those of the CPU reference and of the
-//! pinhole, and that colors do not change by them. Skipped where there is no GPU.
+//! In: moving scenes, seen from two places at two times. Out: proof that the GPU's motions match the CPU reference and the pinhole model, and
+//! that motions do not change colors. Skipped where there is no GPU.
 
 use crate::support::gpu;
 use crate::support::packed_scene::{scene, settings};
@@ -15,7 +15,7 @@ use glam::{UVec2, Vec2, Vec3};
 
 const DESIGNS: [Design; 2] = [Design::Reference, Design::Fast];
 
-/// Returns the view from a place to the side, at a time of [0, 1].
+/// Returns the view from a place displaced by `aside`, at a time of [0, 1].
 fn view(aside: f32, time: f32) -> View {
     let eye = Vec3::new(1.9 + aside, -1.2, 1.1);
     Camera::look_at(eye, Vec3::ZERO, Vec3::Z, 0.9, UVec2::new(120, 90)).view(time, RasterFov::Reference)
@@ -25,7 +25,7 @@ fn as_trained() -> Appearance {
     Appearance::default()
 }
 
-/// Returns the motions of the CPU reference, blended, with transmittance.
+/// Returns the blended motions of the CPU reference, with transmittance.
 fn expected(scene: &RuntimeScene, now: View, before: &View) -> Vec<(Vec2, f32)> {
     let layer = Layer { scene, view: now, appearance: as_trained() };
     let mut splats = reference::project(&layer, BlendSpace::Encoded);
@@ -44,14 +44,14 @@ fn expected(scene: &RuntimeScene, now: View, before: &View) -> Vec<(Vec2, f32)> 
 fn motion_matches_the_cpu_reference() {
     let Some(mut headless) = gpu::headless() else { return };
     let whole = scene(3_000, 1, 0);
-    let (packed, _) = compress(whole.clone(), &settings(&[16])).expect("it is compressed");
+    let (packed, _) = compress(whole.clone(), &settings(&[16])).expect("the scene can be compressed");
     let packed = packed.into_runtime().expect("drawable");
     let (now, before) = (view(0.0, 0.4), view(0.05, 0.37));
     let previous = [before];
     for (name, scene) in [("sliced", &whole), ("packed", &packed)] {
         let expected = expected(scene, now, &before);
         let most = expected.iter().map(|(motion, _)| motion.abs().max_element()).fold(0.0, f32::max);
-        assert!(most > 1.0, "{name}: something moves by more than a pixel: {most}");
+        assert!(most > 1.0, "{name}: the largest motion is more than a pixel: {most}");
         for design in DESIGNS {
             headless.set_design(design);
             let capture = headless.upload(scene).expect("it fits");
@@ -67,17 +67,17 @@ fn motion_matches_the_cpu_reference() {
             });
             let worst = apart.clone().fold(0.0, f32::max);
             let far = apart.filter(|apart| *apart > 1e-3).count();
-            // Where float rounding decides whether a splat counts, a pixel may differ by more.
-            assert!(far <= 20 && worst <= 0.05, "{name}, {design:?}: {far} pixels differ, the worst by {worst}");
+            // A pixel may differ by more if rounding decides whether a splat is blended.
+            assert!(far <= 20 && worst <= 0.05, "{name}, {design:?}: {far} pixels differ, at most by {worst}");
             let left = found.iter().zip(&frame.transmittance).map(|(motion, left)| (motion[3] - left).abs());
             let apart = left.fold(0.0, f32::max);
-            assert!(apart <= 2e-4, "{name}, {design:?}: transmittance and that of the colors are {apart} apart");
+            assert!(apart <= 2e-4, "{name}, {design:?}: transmittances of motions and colors differ by {apart}");
         }
     }
 }
 
 #[test]
-fn colors_and_depths_do_not_change_by_motions() {
+fn motions_do_not_change_colors_and_depths() {
     let Some(mut headless) = gpu::headless() else { return };
     let capture = headless.upload(&scene(3_000, 1, 0)).expect("it fits");
     let instances = [Instance { capture: &capture, active: None, view: view(0.0, 0.4), appearance: as_trained() }];
@@ -89,15 +89,15 @@ fn colors_and_depths_do_not_change_by_motions() {
             let with = ViewParameters { previous: Some(&previous), ..without };
             let [plain, moving, again] =
                 [&without, &with, &without].map(|one| headless.render_all(&instances, one).expect("it is drawn"));
-            assert!(plain.counts.visible > 500, "something is seen");
-            assert_eq!(moving, plain, "{design:?}, {precision:?}, depths {depths}: to the bit");
-            assert_eq!(again, plain, "{design:?}, {precision:?}, depths {depths}: and afterwards");
-            assert!(headless.read_motion().expect("it is read back").is_empty(), "{design:?}: no motions are left");
+            assert!(plain.counts.visible > 500, "the scene is visible: {:?}", plain.counts);
+            assert_eq!(moving, plain, "{design:?}, {precision:?}, depths {depths}: the same frame with motions");
+            assert_eq!(again, plain, "{design:?}, {precision:?}, depths {depths}: the same frame after motions");
+            assert!(headless.read_motion().expect("it is read back").is_empty(), "{design:?}: motions are released");
         }
     }
 }
 
-/// Returns one opaque Gaussian at the origin, which moves to the right by one unit in the whole time.
+/// Returns a scene of one opaque Gaussian at the origin that moves to the right by one unit per unit of time.
 fn lone() -> RuntimeScene {
     let gaussian = Gaussian {
         mean: [0.0; 3],
@@ -113,7 +113,7 @@ fn lone() -> RuntimeScene {
 }
 
 #[test]
-fn a_splat_moves_as_a_pinhole_sees_it() {
+fn the_motion_of_a_splat_matches_the_pinhole_model() {
     let Some(mut headless) = gpu::headless() else { return };
     let capture = headless.upload(&lone()).expect("it fits");
     let (size, distance) = (UVec2::splat(65), 3.0);
@@ -122,13 +122,13 @@ fn a_splat_moves_as_a_pinhole_sees_it() {
         Camera::look_at(eye, Vec3::new(aside, 0.0, 0.0), Vec3::Z, 0.8, size)
     };
     let now = camera(0.0).view(0.0, RasterFov::Reference);
-    // Pixels for each unit at that distance.
+    // Pixels per unit at this distance.
     let scale = now.focal().x / distance;
     let cases = [
-        ("nothing moves", camera(0.0).view(0.0, RasterFov::Reference), 0.0),
+        ("neither Gaussian nor camera moves", camera(0.0).view(0.0, RasterFov::Reference), 0.0),
         ("the Gaussian moves right", camera(0.0).view(-0.1, RasterFov::Reference), 0.1 * scale),
         ("the camera moves right", camera(-0.1).view(0.0, RasterFov::Reference), -0.1 * scale),
-        ("both do, together", camera(-0.1).view(-0.1, RasterFov::Reference), 0.0),
+        ("Gaussian and camera move right", camera(-0.1).view(-0.1, RasterFov::Reference), 0.0),
     ];
     for design in DESIGNS {
         headless.set_design(design);
@@ -139,16 +139,16 @@ fn a_splat_moves_as_a_pinhole_sees_it() {
             headless.render_all(&[instance], &parameters).expect("it is drawn");
             let motions = headless.read_motion().expect("it is read back");
             let [x, y, _, left] = motions[(size.y / 2 * size.x + size.x / 2) as usize];
-            assert!(left < 0.1, "{what}: the splat is in the middle: {left}");
+            assert!(left < 0.1, "{what}: the splat covers the middle pixel: transmittance {left}");
             let found = Vec2::new(x, y) / (1.0 - left);
             let apart = (found - Vec2::new(*expected, 0.0)).abs().max_element();
-            assert!(apart <= 0.01, "{what}, {design:?}: {found}, not {expected}");
+            assert!(apart <= 0.01, "{what}, {design:?}: motion {found}, expected {expected}");
         }
     }
 }
 
 #[test]
-fn motions_cost_nothing_until_they_are_asked_for_and_nothing_is_created_twice() {
+fn resources_of_motions_are_created_once_and_only_for_frames_with_motions() {
     let Some(mut headless) = gpu::headless() else { return };
     let capture = headless.upload(&lone()).expect("it fits");
     let view = view(0.0, 0.0);
@@ -163,9 +163,9 @@ fn motions_cost_nothing_until_they_are_asked_for_and_nothing_is_created_twice() 
             headless.work().created()
         };
         let before = [created(&without), created(&without)];
-        assert_eq!(before[0], before[1], "{design:?}: a second frame creates nothing");
+        assert_eq!(before[0], before[1], "{design:?}: a second frame creates no resources");
         let after = [created(&with), created(&with)];
         assert!(after[0] > before[1], "{design:?}: motions need a target");
-        assert_eq!(after[0], after[1], "{design:?}: and create it once");
+        assert_eq!(after[0], after[1], "{design:?}: the target of motions is created once");
     }
 }

@@ -1,6 +1,6 @@
 //! The packed form on the GPU.
 //!
-//! In: synthetic scenes, packed. Out: proof that the GPU reads them as the CPU does. Skipped where there is no GPU.
+//! In: packed synthetic scenes. Out: proof that the GPU decodes them like the CPU reference. Skipped where there is no GPU.
 
 use crate::support::gpu;
 use crate::support::packed_scene::{BLACK, scene, settings, view};
@@ -10,7 +10,7 @@ use bevy_gs4d::renderer::GpuError;
 use bevy_gs4d::scene::{CodedColors, Form, PackedColors, PackedScene};
 
 #[test]
-fn the_gpu_reads_the_packed_form_as_the_cpu_does() {
+fn packed_scenes_match_the_cpu_reference() {
     let Some(mut headless) = gpu::headless() else { return };
     for (degree, degree_t, codebooks) in
         [(3, 2, &[64, 32, 16, 8][..]), (3, 2, &[]), (3, 1, &[50]), (2, 0, &[16, 16]), (1, 0, &[8]), (0, 0, &[2])]
@@ -26,24 +26,25 @@ fn the_gpu_reads_the_packed_form_as_the_cpu_does() {
             let worst = apart.clone().fold(0.0, f32::max);
             let far = apart.filter(|apart| *apart > 1e-3).count();
             let what = format!("degree {degree} and {degree_t}, {codebooks:?}, at {time}");
-            // Where float rounding decides whether a splat counts, a pixel may differ by more.
-            assert!(far <= 20 && worst <= 0.05, "{what}: {far} pixels differ, the worst by {worst}");
-            assert!(found.counts.visible > 500, "something is seen");
+            // A pixel may differ by more if rounding decides whether a splat is blended.
+            assert!(far <= 20 && worst <= 0.05, "{what}: {far} pixels differ, at most by {worst}");
+            assert!(found.counts.visible > 500, "{what}: the scene is visible: {:?}", found.counts);
         }
     }
 }
 
+/// Damages the codebook colors of a scene.
 fn coded(packed: &mut PackedScene, spoil: impl FnOnce(&mut CodedColors)) {
-    let PackedColors::Coded(colors) = &mut packed.colors else { panic!("its colors are coded") };
+    let PackedColors::Coded(colors) = &mut packed.colors else { panic!("the colors are coded") };
     spoil(colors);
 }
 
 #[test]
-fn scenes_that_would_be_read_beyond_their_parts_are_not_uploaded() {
+fn inconsistent_packed_scenes_are_not_uploaded() {
     let Some(headless) = gpu::headless() else { return };
     let (packed, _) = compress(scene(600, 2, 0), &settings(&[16, 8])).expect("it is compressed");
     let good = packed.into_runtime().expect("drawable");
-    assert!(headless.upload(&good).is_ok(), "the scene that is spoilt below");
+    assert!(headless.upload(&good).is_ok(), "the undamaged scene is uploaded");
     let spoils: [fn(&mut PackedScene); 4] = [
         |packed| packed.ranges.truncate(4),
         |packed| packed.records.truncate(256),
@@ -52,8 +53,8 @@ fn scenes_that_would_be_read_beyond_their_parts_are_not_uploaded() {
     ];
     for (index, spoil) in spoils.into_iter().enumerate() {
         let mut bad = good.clone();
-        let Form::Packed(packed) = &mut bad.form else { panic!("it is packed") };
+        let Form::Packed(packed) = &mut bad.form else { panic!("the scene is packed") };
         spoil(packed);
-        assert!(matches!(headless.upload(&bad), Err(GpuError::Scene(_))), "scene {index} is refused");
+        assert!(matches!(headless.upload(&bad), Err(GpuError::Scene(_))), "damaged scene {index} is refused");
     }
 }

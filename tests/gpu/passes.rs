@@ -1,7 +1,7 @@
-//! Each pass on its own, against its CPU reference.
+//! Individual passes against their CPU references.
 //!
-//! In: buffers filled by hand, output buffers filled with an arbitrary value. Out: proof that the GPU writes what the
-//! functions of [`reference`] return. `blend`, which needs textures, is compared as part of whole frames.
+//! In: input buffers made by the tests, output buffers filled with an arbitrary value. Out: proof that the GPU writes the results of the
+//! functions of [`reference`]. `blend`, which needs textures, is compared as part of whole frames. Skipped where there is no GPU.
 
 use crate::support::passes::{Gpu, Pass};
 use bevy_gs4d::gaussian::Gaussian;
@@ -20,7 +20,7 @@ use std::fmt::{Debug, Display};
 /// The value of buffers that have not been written.
 const RUBBISH: u32 = 0xdead_beef;
 
-/// Returns random numbers, the same everywhere.
+/// Returns pseudorandom numbers that are the same on every platform.
 fn noise(count: usize, seed: u32) -> Vec<u32> {
     let mut state = seed;
     let next = || {
@@ -31,11 +31,11 @@ fn noise(count: usize, seed: u32) -> Vec<u32> {
     std::iter::repeat_with(next).take(count).collect()
 }
 
-/// Reports the first difference instead of printing all of both.
+/// Checks that two lists are equal. On failure, only the first difference is printed.
 fn assert_same<T: PartialEq + Debug>(found: &[T], expected: &[T], what: impl Display) {
-    assert_eq!(found.len(), expected.len(), "{what}: the length");
+    assert_eq!(found.len(), expected.len(), "{what}: the lengths are equal");
     if let Some(at) = found.iter().zip(expected).position(|(a, b)| a != b) {
-        panic!("{what}: at {at} of {} is {:?}, expected {:?}", found.len(), found[at], expected[at]);
+        panic!("{what}: element {at} of {} is {:?}, expected {:?}", found.len(), found[at], expected[at]);
     }
 }
 
@@ -50,7 +50,7 @@ struct Sort<'a> {
     histogram: wgpu::Buffer,
     /// Keys and values before a step.
     from: [wgpu::Buffer; 2],
-    /// And after it; then they change places.
+    /// Keys and values after a step; `from` and `to` are swapped then.
     to: [wgpu::Buffer; 2],
 }
 
@@ -72,7 +72,7 @@ impl<'a> Sort<'a> {
         }
     }
 
-    /// Orders by one digit.
+    /// Sorts by one digit.
     fn step(&mut self, shift: u32, source: u32, blocks: u32) {
         let step = self.gpu.buffer(&[SortStep { shift, source, stride: self.stride, padding: 0 }]);
         let buffers = [
@@ -101,7 +101,7 @@ impl<'a> Sort<'a> {
     }
 }
 
-/// Sorts slots by their keys, all steps, and compares with the reference.
+/// Sorts slots by their keys in all steps, and compares the order with the CPU reference.
 fn check_sort_by_depth(gpu: &Gpu, pass: &Pass<'_>, keys: &[u32], what: impl Display) {
     let counters = Counters { visible: RUBBISH, ..Counters::default() };
     let mut sort = Sort::new(gpu, pass, keys, &vec![RUBBISH; keys.len()], counters);
@@ -110,10 +110,10 @@ fn check_sort_by_depth(gpu: &Gpu, pass: &Pass<'_>, keys: &[u32], what: impl Disp
     reference::sort(&mut expected, |&slot| keys[slot as usize]);
 
     let visible = gpu.read::<Counters>(&sort.counters)[0].visible;
-    assert_eq!(visible as usize, expected.len(), "{what}: visible slots");
+    assert_eq!(visible as usize, expected.len(), "{what}: the number of visible slots");
     let arguments: Vec<u32> = gpu.read(&sort.arguments);
     let blocks = visible.div_ceil(BLOCK);
-    assert_eq!(arguments, [blocks, 1, 1, RUBBISH, RUBBISH, RUBBISH], "{what}: blocks of the steps to come");
+    assert_eq!(arguments, [blocks, 1, 1, RUBBISH, RUBBISH, RUBBISH], "{what}: the dispatch size of the later steps");
     for step in 1..DEPTH_STEPS {
         sort.step(step * DIGIT_BITS, layout::SORT_VISIBLE, blocks);
     }
@@ -124,7 +124,7 @@ fn check_sort_by_depth(gpu: &Gpu, pass: &Pass<'_>, keys: &[u32], what: impl Disp
 }
 
 #[test]
-fn sort_orders_by_depth_keeps_equal_keys_in_order_and_drops_the_invisible() {
+fn sort_by_depth_is_stable_and_drops_invisible_slots() {
     let Some(gpu) = Gpu::new() else { return };
     let pass = gpu.pass("sort");
     for count in [0, 1, 2047, 2048, 2049, 100_000] {
@@ -138,7 +138,7 @@ fn sort_orders_by_depth_keeps_equal_keys_in_order_and_drops_the_invisible() {
                 "a third invisible",
                 random.iter().map(|&key| if key.is_multiple_of(3) { INVISIBLE } else { key }).collect(),
             ),
-            ("nothing visible", vec![INVISIBLE; count]),
+            ("all invisible", vec![INVISIBLE; count]),
         ];
         for (kind, keys) in kinds {
             check_sort_by_depth(&gpu, &pass, &keys, format_args!("{count} slots, {kind}"));
@@ -150,11 +150,11 @@ fn sort_orders_by_depth_keeps_equal_keys_in_order_and_drops_the_invisible() {
 fn sort_scans_more_blocks_than_a_workgroup_has_threads() {
     let Some(gpu) = Gpu::new() else { return };
     let count = 256 * BLOCK as usize + 76_543;
-    check_sort_by_depth(&gpu, &gpu.pass("sort"), &noise(count, 2), "very many slots");
+    check_sort_by_depth(&gpu, &gpu.pass("sort"), &noise(count, 2), "more than 256 blocks");
 }
 
 #[test]
-fn sort_by_tile_keeps_the_order_of_depth_and_touches_pairs_only() {
+fn sort_by_tile_is_stable_and_changes_only_the_pairs() {
     let Some(gpu) = Gpu::new() else { return };
     let pass = gpu.pass("sort");
     let capacity = 6_000;
@@ -172,24 +172,24 @@ fn sort_by_tile_keeps_the_order_of_depth_and_touches_pairs_only() {
         let [keys, values] = lists(&pairs);
         let counters = Counters { pairs: count as u32, visible: RUBBISH, ..Counters::default() };
         let mut sort = Sort::new(&gpu, &pass, &keys, &values, counters);
-        // Nine bits tell 300 tiles apart.
+        // 300 tiles need nine bits.
         for step in 0..3 {
             sort.step(step * DIGIT_BITS, layout::SORT_PAIRS, (count as u32).div_ceil(BLOCK));
         }
         reference::sort(&mut pairs, |pair| pair.tile);
         let [found, expected] = [sort.pairs(), lists(&pairs)];
-        assert_same(&found[0], &expected[0], format_args!("{count} pairs: tiles"));
-        assert_same(&found[1], &expected[1], format_args!("{count} pairs: splats"));
+        assert_same(&found[0], &expected[0], format_args!("{count} pairs: the tiles"));
+        assert_same(&found[1], &expected[1], format_args!("{count} pairs: the splats"));
     }
 }
 
-/// Returns a splat of which only the tiles matter.
+/// Returns a splat that covers these tiles; all other values are arbitrary.
 fn splat([x0, y0, x1, y1]: [u32; 4]) -> Splat {
     let tiles = TileRect { low: UVec2::new(x0, y0), high: UVec2::new(x1, y1) };
     Splat { center: Vec2::ZERO, conic: Vec3::ZERO, opacity: 1.0, color: Vec3::ZERO, depth: 1.0, tiles }
 }
 
-/// Returns splats of which most are small and one in a hundred covers the whole grid.
+/// Returns random splats: most are small, one in a hundred covers the whole grid.
 fn random_splats(count: usize, grid: UVec2) -> Vec<Splat> {
     let random = noise(4 * count, 4);
     let one = |r: &[u32]| {
@@ -202,7 +202,7 @@ fn random_splats(count: usize, grid: UVec2) -> Vec<Splat> {
     random.chunks_exact(4).map(one).collect()
 }
 
-/// Returns the indices of three in four of `count` splats, shuffled.
+/// Returns the shuffled indices of three quarters of `count` splats.
 fn random_order(count: usize) -> Vec<u32> {
     let random = noise(count, 5);
     let mut order: Vec<u32> = (0..count as u32).filter(|&i| !random[i as usize].is_multiple_of(4)).collect();
@@ -210,10 +210,10 @@ fn random_order(count: usize) -> Vec<u32> {
     order
 }
 
-/// Bins with room for `capacity` pairs, and compares. `expected` are the pairs, as many of them as fit; `wanted` is
-/// their number with room for all.
+/// Runs `bin` with a capacity of `capacity` pairs, and compares. `expected` are at least the pairs that fit; `wanted` is the number of all
+/// pairs.
 fn check_bin(gpu: &Gpu, splats: &[Splat], order: &[u32], grid: UVec2, capacity: u32, expected: &[Pair], wanted: u32) {
-    let what = format!("{} splats, room for {capacity} of {wanted} pairs", order.len());
+    let what = format!("{} splats, capacity {capacity} of {wanted} pairs", order.len());
     let pass = gpu.pass("bin");
     let rubbish = |count: u32| gpu.buffer(&vec![RUBBISH; count as usize]);
     let record = |splat: &Splat| {
@@ -225,7 +225,7 @@ fn check_bin(gpu: &Gpu, splats: &[Splat], order: &[u32], grid: UVec2, capacity: 
     let counters = Counters { visible, pairs: RUBBISH, pairs_wanted: RUBBISH, padding: 0 };
     let [frame, counters] = [gpu.buffer(&[frame]), gpu.buffer(&[counters])];
     let [arguments, offsets] = [rubbish(6), rubbish(slots + slots.div_ceil(BLOCK))];
-    // More than there may be, to see that it is left alone.
+    // Larger than the capacity, to check that the rest is unchanged.
     let [pair_tiles, pair_splats] = [rubbish(capacity + 100), rubbish(capacity + 100)];
     let splats = gpu.buffer(&splats.iter().map(record).collect::<Vec<_>>());
     let order = gpu.buffer(order);
@@ -246,20 +246,21 @@ fn check_bin(gpu: &Gpu, splats: &[Splat], order: &[u32], grid: UVec2, capacity: 
     pass.dispatch("emit", pairs.div_ceil(BLOCK), &buffers);
 
     let counted = gpu.read::<Counters>(&counters)[0];
-    assert_eq!((counted.pairs_wanted, counted.pairs), (wanted, pairs), "{what}: pairs counted");
-    assert_eq!(counted.visible, visible, "{what}: what `sort` counted is left");
+    assert_eq!((counted.pairs_wanted, counted.pairs), (wanted, pairs), "{what}: the numbers of pairs");
+    assert_eq!(counted.visible, visible, "{what}: the number of visible splats is unchanged");
     let arguments: Vec<u32> = gpu.read(&arguments);
-    assert_eq!(arguments, [RUBBISH, RUBBISH, RUBBISH, pairs.div_ceil(BLOCK), 1, 1], "{what}: blocks of pairs");
+    let sizes = [RUBBISH, RUBBISH, RUBBISH, pairs.div_ceil(BLOCK), 1, 1];
+    assert_eq!(arguments, sizes, "{what}: the dispatch size for the pairs");
     let [tiles, splats] = [gpu.read::<u32>(&pair_tiles), gpu.read::<u32>(&pair_splats)];
     let found: Vec<Pair> = tiles.iter().zip(&splats).map(|(&tile, &splat)| Pair { tile, splat }).collect();
     let (made, beyond) = found.split_at(pairs as usize);
     assert_same(made, &expected[..pairs as usize], &what);
     let untouched = Pair { tile: RUBBISH, splat: RUBBISH };
-    assert!(beyond.iter().all(|pair| *pair == untouched), "{what}: nothing is written beyond the pairs");
+    assert!(beyond.iter().all(|pair| *pair == untouched), "{what}: the buffers are unchanged after the last pair");
 }
 
 #[test]
-fn bin_makes_the_pairs_of_the_twin() {
+fn bin_matches_the_cpu_reference() {
     let Some(gpu) = Gpu::new() else { return };
     let grid = UVec2::new(40, 30);
     for count in [0, 1, 2, 2731, 7_000] {
@@ -271,7 +272,7 @@ fn bin_makes_the_pairs_of_the_twin() {
 }
 
 #[test]
-fn bin_without_room_keeps_the_nearest_pairs_and_says_how_many_there_would_be() {
+fn bin_beyond_its_capacity_writes_the_nearest_pairs_and_counts_all() {
     let Some(gpu) = Gpu::new() else { return };
     let grid = UVec2::new(40, 30);
     let (splats, order) = (random_splats(3_000, grid), random_order(3_000));
@@ -295,23 +296,23 @@ fn bin_scans_more_blocks_than_a_workgroup_has_threads() {
 }
 
 #[test]
-fn bin_saturates_instead_of_wrapping_round() {
+fn the_number_of_pairs_saturates_in_bin() {
     let Some(gpu) = Gpu::new() else { return };
-    // Two splats over all of this grid have more pairs than 32 bits count; here there are three blocks of them.
+    // Two splats that cover this grid have more than 2^32 pairs; here are three blocks of such splats.
     let grid = UVec2::splat(u16::MAX.into());
     let capacity = 10_000;
     let near = random_splats(10, UVec2::splat(20));
     let huge = vec![splat([0, 0, grid.x, grid.y]); 3 * BLOCK as usize];
     let order: Vec<u32> = (0..(near.len() + huge.len()) as u32).collect();
     let mut expected = reference::bin(&near, &order[..near.len()], grid);
-    // The first of the huge ones, row by row, takes all that is left.
+    // The pairs of the first huge splat, row by row, fill the remaining capacity.
     let first = Pair { tile: 0, splat: near.len() as u32 };
     expected.extend((0..capacity).map(|tile| Pair { tile, ..first }));
     check_bin(&gpu, &[near, huge].concat(), &order, grid, capacity, &expected, u32::MAX);
 }
 
 #[test]
-fn ranges_are_those_of_the_twin() {
+fn ranges_match_the_cpu_reference() {
     let Some(gpu) = Gpu::new() else { return };
     let pass = gpu.pass("ranges");
     let grid = UVec2::new(23, 14);
@@ -328,7 +329,7 @@ fn ranges_are_those_of_the_twin() {
         let expected = reference::ranges(&pairs, grid);
         let expected: Vec<[u32; 2]> = expected.iter().map(|range| [range.start as u32, range.end as u32]).collect();
         let mut tiles: Vec<u32> = pairs.iter().map(|pair| pair.tile).collect();
-        // Left over from a frame with more pairs.
+        // Pairs of an earlier frame that had more pairs.
         tiles.extend([3; 50]);
         let buffers = [
             ("frame", &gpu.buffer(&[FrameUniforms { tiles: grid.to_array(), ..FrameUniforms::zeroed() }])),
@@ -342,7 +343,7 @@ fn ranges_are_those_of_the_twin() {
 }
 
 #[test]
-fn project_makes_the_splats_of_the_twin() {
+fn project_matches_the_cpu_reference() {
     let Some(gpu) = Gpu::new() else { return };
     let settings = SynthSettings { count: 3_000, ..SynthSettings::default() };
     let scene = synthesize(&settings).into_runtime().expect("a scene that can be drawn");
@@ -368,7 +369,7 @@ fn project_makes_the_splats_of_the_twin() {
         ("gaussians", &gpu.buffer(&scene.iter().map(record).collect::<Vec<_>>())),
         ("lifespans", &gpu.buffer(&scene.iter().map(|g| [g.mean_t, g.sigma_t.recip()]).collect::<Vec<_>>())),
         ("harmonics", &gpu.buffer(&scene.form.harmonics().expect("whole").values)),
-        // Without a filter these are not read.
+        // Not read without a filter.
         ("active_list", &gpu.buffer(&[RUBBISH])),
     ];
     gpu.pass("project").dispatch("project", count.div_ceil(256), &buffers);
@@ -376,7 +377,7 @@ fn project_makes_the_splats_of_the_twin() {
     let splats: Vec<SplatRecord> = gpu.read(buffers[1].1);
     let keys: Vec<u32> = gpu.read(buffers[2].1);
     let (unused, keys) = keys.split_at(first_slot as usize);
-    assert!(unused.iter().all(|key| *key == RUBBISH), "slots of others are left alone");
+    assert!(unused.iter().all(|key| *key == RUBBISH), "slots of other instances are unchanged");
     let expected =
         reference::project(&Layer { scene: &scene, view, appearance: Appearance::default() }, BlendSpace::Encoded);
     let (mut both, mut on_the_edge) = (0, 0);
@@ -398,10 +399,10 @@ fn project_makes_the_splats_of_the_twin() {
             ("color", Vec3::from(splat.color).distance(wanted.color), 1e-4),
         ];
         for (what, apart, limit) in differences {
-            assert!(apart <= limit, "Gaussian {i}: {what} is {apart} off: {splat:?}, expected {wanted:?}");
+            assert!(apart <= limit, "Gaussian {i}: {what} differs by {apart}: {splat:?}, expected {wanted:?}");
         }
-        assert_eq!(keys[i], splat.depth.to_bits(), "Gaussian {i}: the key is the depth");
+        assert_eq!(keys[i], splat.depth.to_bits(), "Gaussian {i}: the key has the bits of the depth");
     }
-    assert!(both >= 1_000, "{both} of {count} Gaussians are visible");
-    assert!(on_the_edge <= 6, "{on_the_edge} Gaussians have other tiles: rounding alone does not explain that");
+    assert!(both >= 1_000, "{both} of {count} Gaussians are visible, expected at least 1000");
+    assert!(on_the_edge <= 6, "{on_the_edge} Gaussians have other tiles, more than rounding explains");
 }

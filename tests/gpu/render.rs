@@ -1,7 +1,7 @@
 //! Whole frames on the GPU: properties that hold for any scene, camera and device.
 //!
-//! In: synthetic scenes. Out: proof that the GPU draws what the CPU reference draws, however the scene is divided,
-//! however many pairs it has, and whatever is in front of it.
+//! In: synthetic scenes. Out: proof that frames match the CPU reference, independent of the division of the scene into captures and parts,
+//! of the number of pairs and of opaque surfaces. Skipped where there is no GPU.
 
 use crate::support::surfaces::depth_texture;
 use crate::support::{gpu, limited_device, packed_scene};
@@ -25,8 +25,8 @@ const BACKGROUND: Background = Background::Color(COLOR);
 const SIZE: UVec2 = UVec2::new(200, 150);
 /// The camera of most tests; the scene lies between 1.5 and 4 units away.
 const EYE: Vec3 = Vec3::new(2.2, 1.1, 1.4);
-/// Pairs that a view has room for before it has seen any.
-const FIRST_ROOM: u32 = 1 << 16;
+/// Initial capacity of a view in pairs.
+const FIRST_CAPACITY: u32 = 1 << 16;
 
 fn trained(count: usize) -> GaussianScene {
     synthesize(&SynthSettings { count, ..SynthSettings::default() })
@@ -45,7 +45,7 @@ fn swollen(count: usize, factor: f32) -> RuntimeScene {
     scene
 }
 
-/// Returns some of the Gaussians of a scene.
+/// Returns a scene of a range of the Gaussians of another scene.
 fn part(scene: &RuntimeScene, range: Range<usize>) -> RuntimeScene {
     let mut part = scene.clone();
     let Sliced { gaussians, harmonics } = part.form.as_sliced_mut().expect("sliced");
@@ -55,7 +55,7 @@ fn part(scene: &RuntimeScene, range: Range<usize>) -> RuntimeScene {
     part
 }
 
-/// Returns a scene and one bright Gaussian more.
+/// Returns a scene with one additional bright Gaussian.
 fn with(scene: &RuntimeScene, gaussian: Gaussian) -> RuntimeScene {
     let mut more = scene.clone();
     let Sliced { gaussians, harmonics } = more.form.as_sliced_mut().expect("sliced");
@@ -72,17 +72,17 @@ fn project(scene: &RuntimeScene, view: &View) -> Vec<Splat> {
     reference::project(&Layer { scene, view: *view, appearance: Appearance::default() }, BlendSpace::Encoded)
 }
 
-/// Returns a capture as trained, all of it.
+/// Returns an instance of a capture with the default appearance, without a filter.
 fn instance<'a>(capture: &'a GpuCapture, view: &View) -> Instance<'a> {
     Instance { capture, active: None, view: *view, appearance: Appearance::default() }
 }
 
-/// Returns parameters for frames over the background, with nothing in front.
+/// Returns parameters for frames over the background, without opaque surfaces.
 fn parameters() -> ViewParameters<'static> {
     ViewParameters { background: BACKGROUND, ..ViewParameters::default() }
 }
 
-/// Draws several captures on the CPU, cut behind a depth.
+/// Draws the splats of several captures up to a depth on the CPU.
 fn expected_frame(instances: &[(&RuntimeScene, View)], limit: f32) -> Frame {
     let splats: Vec<Splat> = instances.iter().flat_map(|(scene, view)| project(scene, view)).collect();
     let drawn = |splat: &Splat| splat.is_visible() && splat.depth <= limit;
@@ -98,14 +98,14 @@ fn expected_frame(instances: &[(&RuntimeScene, View)], limit: f32) -> Frame {
 
 fn assert_finite(frame: &Frame, what: &str) {
     let numbers = frame.transmittance.iter().chain(&frame.depth).all(|value| value.is_finite());
-    assert!(numbers && frame.picture.pixels.iter().all(|pixel| pixel.is_finite()), "{what}: a value is not finite");
+    assert!(numbers && frame.picture.pixels.iter().all(|pixel| pixel.is_finite()), "{what}: all values are finite");
 }
 
-/// Checks that frames agree within 1e-3 (depths 5e-3), except for one pixel in two hundred, and those within fifty times as much: the two
-/// sides round differently, and here and there a splat's alpha lies on 1/255, its last tile is one farther, or two splats at the same depth
-/// change places.
+/// Checks that frames agree within 1e-3 (depths 5e-3), except for one pixel in two hundred, which agree within fifty times as much. GPU and
+/// CPU round differently: in a few pixels the alpha of a splat is close to 1/255, a splat covers one tile more, or two splats at the same
+/// depth are exchanged.
 fn assert_close(found: &Frame, expected: &Frame, what: &str) {
-    assert_eq!(found.picture.size, expected.picture.size, "{what}: size");
+    assert_eq!(found.picture.size, expected.picture.size, "{what}: the sizes are equal");
     assert_finite(found, what);
     let apart: Vec<f32> = (0..expected.depth.len())
         .map(|i| {
@@ -116,20 +116,20 @@ fn assert_close(found: &Frame, expected: &Frame, what: &str) {
         .collect();
     let worst = apart.iter().copied().fold(0.0, f32::max);
     let beyond = apart.iter().filter(|apart| **apart > 1e-3).count();
-    assert!(beyond * 200 <= apart.len(), "{what}: {beyond} of {} pixels differ, the worst by {worst}", apart.len());
-    assert!(worst <= 0.05, "{what}: the worst of {beyond} pixels that differ does so by {worst}");
+    assert!(beyond * 200 <= apart.len(), "{what}: {beyond} of {} pixels differ, at most by {worst}", apart.len());
+    assert!(worst <= 0.05, "{what}: {beyond} pixels differ, at most by {worst}, expected at most by 0.05");
 }
 
-/// As [`assert_close`]; also checks that the counts agree.
+/// Checks that frames agree as in [`assert_close`], and that their counts agree.
 fn assert_equivalent(found: &Frame, expected: &Frame, what: &str) {
     assert_close(found, expected, what);
     let (a, b) = (found.counts, expected.counts);
-    assert!(a.visible.abs_diff(b.visible) <= 3, "{what}: {} splats are visible, not {}", a.visible, b.visible);
-    assert!(a.pairs.abs_diff(b.pairs) <= 10 + b.pairs / 500, "{what}: there are {} pairs, not {}", a.pairs, b.pairs);
+    assert!(a.visible.abs_diff(b.visible) <= 3, "{what}: {} visible splats, expected {}", a.visible, b.visible);
+    assert!(a.pairs.abs_diff(b.pairs) <= 10 + b.pairs / 500, "{what}: {} pairs, expected {}", a.pairs, b.pairs);
 }
 
 #[test]
-fn the_gpu_draws_what_the_cpu_twin_draws() {
+fn frames_match_the_cpu_reference() {
     let Some(mut headless) = gpu::headless() else { return };
     let scene = scene(3_000);
     let capture = headless.upload(&scene).expect("upload");
@@ -140,14 +140,14 @@ fn the_gpu_draws_what_the_cpu_twin_draws() {
                 let frame = headless.render(&capture, &view, BACKGROUND).expect("render");
                 let what = format!("{size} from {eye} at {time}");
                 assert_equivalent(&frame, &reference::render(&scene, &view, BACKGROUND), &what);
-                assert!(frame.counts.visible > 500, "{what}: only {} splats are visible", frame.counts.visible);
+                assert!(frame.counts.visible > 500, "{what}: the scene is visible: {:?}", frame.counts);
             }
         }
     }
 }
 
 #[test]
-fn every_degree_of_colour_is_drawn() {
+fn every_degree_of_color_matches_the_cpu_reference() {
     let Some(mut headless) = gpu::headless() else { return };
     for (degree, degree_t) in [(0, 0), (1, 0), (2, 0), (3, 0), (3, 1), (3, 2)] {
         let settings = SynthSettings { count: 500, degree, degree_t, ..SynthSettings::default() };
@@ -163,66 +163,66 @@ fn every_degree_of_colour_is_drawn() {
 #[test]
 fn shader_checks_do_not_change_the_picture() {
     let Some(mut checked) = gpu::headless() else { return };
-    let context = GpuContext::headless(None).expect("there is one, as the line above shows");
+    let context = GpuContext::headless(None).expect("a device exists, as the line above shows");
     let mut unchecked = Headless::new(context, ShaderChecks::Off).expect("the passes compile");
     let (scene, view) = (scene(3_000), look_from(EYE, SIZE, 0.5));
     let [with, without] = [&mut checked, &mut unchecked].map(|headless| {
         let capture = headless.upload(&scene).expect("upload");
         headless.render(&capture, &view, BACKGROUND).expect("render")
     });
-    assert_equivalent(&without, &with, "without checks");
+    assert_equivalent(&without, &with, "without shader checks");
 }
 
 #[test]
-fn frames_repeat_to_the_bit() {
+fn frames_are_reproducible_bit_for_bit() {
     let Some(mut headless) = gpu::headless() else { return };
     let (scene, view) = (scene(3_000), look_from(EYE, SIZE, 0.5));
     let capture = headless.upload(&scene).expect("upload");
     let first = headless.render(&capture, &view, BACKGROUND).expect("render");
     let other = look_from(-EYE, UVec2::new(33, 17), 0.1);
     headless.render(&capture, &other, Background::None).expect("render");
-    assert!(headless.render(&capture, &view, BACKGROUND).expect("render") == first, "nothing is left of other frames");
+    assert!(headless.render(&capture, &view, BACKGROUND).expect("render") == first, "other frames have no effect");
 }
 
 #[test]
-fn a_filter_holds_whatever_was_drawn_before() {
+fn a_filter_applies_independent_of_earlier_frames() {
     let Some(mut headless) = gpu::headless() else { return };
     let (all, view) = (scene(3_000), look_from(EYE, SIZE, 0.5));
     let every_other = (0..3_000).map(|i| if i % 2 == 0 { 0 } else { 1 }).collect();
     let sets = ActiveSets::Intervals(every_other);
     let filter = TemporalFilter { kind: FilterKind::Support, segments: 1, count: 3_000, sets };
-    let mut thinned = all.clone();
-    let Sliced { gaussians, harmonics } = thinned.form.as_sliced_mut().expect("sliced");
+    let mut halved = all.clone();
+    let Sliced { gaussians, harmonics } = halved.form.as_sliced_mut().expect("sliced");
     let colors = harmonics.values.chunks_exact(harmonics.coefficients * 3);
     harmonics.values = colors.step_by(2).flatten().copied().collect();
     *gaussians = all.iter().step_by(2).collect();
     let filtered = RuntimeScene { filter: Some(filter), ..all.clone() };
-    let [all, thinned, filtered] = [&all, &thinned, &filtered].map(|scene| headless.upload(scene).expect("upload"));
-    let expected = headless.render(&thinned, &view, BACKGROUND).expect("render");
+    let [all, halved, filtered] = [&all, &halved, &filtered].map(|scene| headless.upload(scene).expect("upload"));
+    let expected = headless.render(&halved, &view, BACKGROUND).expect("render");
     for (before, capture) in
-        [("itself", &filtered), ("a larger capture without a filter", &all), ("nothing new", &filtered)]
+        [("the same capture", &filtered), ("a capture without a filter", &all), ("the same capture again", &filtered)]
     {
         headless.render(capture, &view, BACKGROUND).expect("render");
         let frame = headless.render(&filtered, &view, BACKGROUND).expect("render");
-        assert!(frame == expected, "after {before} others than the active Gaussians show");
+        assert!(frame == expected, "after {before}, exactly the active Gaussians are drawn");
     }
 }
 
 #[test]
-fn without_gaussians_the_background_shows() {
+fn a_scene_without_gaussians_shows_the_background() {
     let Some(mut headless) = gpu::headless() else { return };
     let empty = scene(0);
     let capture = headless.upload(&empty).expect("upload");
     let view = look_from(EYE, UVec2::new(33, 17), 0.5);
     let frame = headless.render(&capture, &view, BACKGROUND).expect("render");
-    assert!(frame == reference::render(&empty, &view, BACKGROUND), "the reference draws the same");
+    assert!(frame == reference::render(&empty, &view, BACKGROUND), "the frame matches the CPU reference");
     assert!(frame.picture.pixels.iter().all(|pixel| *pixel == Vec3::from(COLOR)), "every pixel is background");
-    assert!(frame.transmittance.iter().all(|left| *left == 1.0), "nothing is in front of it");
-    assert_eq!(frame.counts, Counts::default(), "no work");
+    assert!(frame.transmittance.iter().all(|left| *left == 1.0), "every transmittance is 1");
+    assert_eq!(frame.counts, Counts::default(), "there are no splats and no pairs");
 }
 
 #[test]
-fn what_is_not_there_changes_no_bit() {
+fn absent_and_transparent_gaussians_do_not_change_the_picture() {
     let Some(mut headless) = gpu::headless() else { return };
     let (scene, view) = (scene(1_000), look_from(EYE, SIZE, 0.5));
     let capture = headless.upload(&scene).expect("upload");
@@ -241,44 +241,44 @@ fn what_is_not_there_changes_no_bit() {
     for (i, gaussian) in absent.into_iter().enumerate() {
         let capture = headless.upload(&with(&scene, gaussian)).expect("upload");
         let frame = headless.render(&capture, &view, BACKGROUND).expect("render");
-        assert!(frame == alone, "Gaussian {i} shows, though it is not there");
+        assert!(frame == alone, "Gaussian {i} is absent and does not change the frame");
     }
     let just_there = Gaussian { mean_t: 0.4, sigma_t: 0.1 / 2.44, ..present };
     let capture = headless.upload(&with(&scene, just_there)).expect("upload");
     let frame = headless.render(&capture, &view, BACKGROUND).expect("render");
-    assert_eq!(frame.counts.visible, alone.counts.visible + 1, "one that is just there counts");
+    assert_eq!(frame.counts.visible, alone.counts.visible + 1, "a Gaussian just above the cut-off is visible");
     let expected = reference::render(&with(&scene, just_there), &view, BACKGROUND);
-    assert_equivalent(&frame, &expected, "one that is just there");
-    // Where something of the background is to be seen; an opacity of 0.9 times a marginal of 0.051.
+    assert_equivalent(&frame, &expected, "a Gaussian just above the cut-off");
+    // In pixels with some transmittance: an opacity of 0.9 times a marginal of 0.051.
     let pairs = frame.transmittance.iter().zip(&alone.transmittance).filter(|(_, before)| **before > 0.01);
     let most = pairs.map(|(left, before)| 1.0 - left / before).fold(0.0, f32::max);
-    assert!((0.03..0.047).contains(&most), "and takes 0.046 of the light at its middle, not {most}");
+    assert!((0.03..0.047).contains(&most), "its largest alpha is {most}, expected 0.046");
 }
 
 #[test]
-fn long_before_and_after_nothing_of_a_lively_scene_is_left() {
+fn a_dynamic_scene_is_empty_at_distant_times() {
     let Some(mut headless) = gpu::headless() else { return };
     let scene = scene(1_000);
     let capture = headless.upload(&scene).expect("upload");
     for time in [-1e6, 1e6] {
         let frame = headless.render(&capture, &look_from(EYE, SIZE, time), BACKGROUND).expect("render");
-        assert_eq!(frame.counts, Counts::default(), "no splat at {time}");
-        assert_finite(&frame, "long ago");
+        assert_eq!(frame.counts, Counts::default(), "no splat is visible at {time}");
+        assert_finite(&frame, &format!("at {time}"));
     }
 }
 
 #[test]
-fn two_captures_are_one_scene() {
+fn parts_of_a_scene_drawn_together_equal_the_scene() {
     let Some(mut headless) = gpu::headless() else { return };
     let (scene, view) = (scene(3_000), look_from(EYE, SIZE, 0.5));
     let whole = headless.upload(&scene).expect("upload");
     let whole = headless.render(&whole, &view, BACKGROUND).expect("render");
-    // An empty one between them takes no slots.
+    // An empty capture between them has no slots.
     let cuts = [(0, 1_234), (1_234, 1_234), (1_234, 3_000)];
     let parts = cuts.map(|(first, last)| headless.upload(&part(&scene, first..last)).expect("upload"));
     let instances = parts.each_ref().map(|capture| instance(capture, &view));
     let frame = headless.render_all(&instances, &parameters()).expect("render");
-    assert!(frame == whole, "captures interleave as if they were one");
+    assert!(frame == whole, "the splats of all captures are blended in one order");
 }
 
 #[test]
@@ -306,18 +306,18 @@ fn a_capture_larger_than_a_binding_is_drawn_in_parts() {
     let (scene, view) = (scene(5_000), look_from(EYE, SIZE, 0.5));
     assert!(
         size_of_val(&scene.form.harmonics().expect("whole").values[..]) as u64 > limited_device::BINDING,
-        "colour does not fit one binding"
+        "the color coefficients exceed one binding"
     );
     let [whole, parts] = [&mut headless, &mut limited].map(|headless| {
         let capture = headless.upload(&scene).expect("upload");
         assert_eq!(capture.len(), scene.len(), "all Gaussians are uploaded");
         headless.render(&capture, &view, BACKGROUND).expect("render")
     });
-    assert!(whole == parts, "parts are drawn as the whole");
+    assert!(whole == parts, "a capture in parts equals the whole capture");
 }
 
 #[test]
-fn what_does_not_fit_the_device_is_refused_and_does_no_harm() {
+fn frames_beyond_the_limits_of_a_device_are_refused_without_side_effects() {
     let Some(mut limited) = limited_device::headless() else { return };
     let scene = scene(1_000);
     let view = look_from(EYE, SIZE, 0.5);
@@ -338,23 +338,24 @@ fn what_does_not_fit_the_device_is_refused_and_does_no_harm() {
         let refused = limited.render(&capture, &look_from(EYE, size, 0.5), BACKGROUND).expect_err("no such picture");
         assert!(matches!(refused, GpuError::Size { .. }), "{size}: {refused}");
     }
-    assert!(limited.render(&capture, &view, BACKGROUND).expect("render") == before, "what fits is drawn as before");
+    assert!(limited.render(&capture, &view, BACKGROUND).expect("render") == before, "later frames are unchanged");
 }
 
-/// Returns a scene, a view from afar, and a view so close that the room for pairs of the first guess is far too small.
+/// Returns a scene, a view from afar, and a view so close that its pairs exceed the initial capacity.
 fn afar_and_close() -> (RuntimeScene, View, View) {
     (swollen(3_000, 5.0), look_from(20.0 * EYE, UVec2::new(64, 48), 0.5), look_from(EYE, UVec2::new(240, 180), 0.5))
 }
 
 #[test]
-fn a_close_up_makes_room_for_its_pairs() {
+fn the_capacity_of_pairs_grows_for_a_close_view() {
     let Some(mut headless) = gpu::headless() else { return };
     let (scene, afar, close) = afar_and_close();
     let capture = headless.upload(&scene).expect("upload");
     for (view, grows) in [(&afar, false), (&close, true), (&afar, false), (&close, true)] {
         let frame = headless.render(&capture, view, BACKGROUND).expect("render");
-        assert_eq!(frame.counts.pairs > FIRST_ROOM, grows, "{} pairs", frame.counts.pairs);
-        assert_equivalent(&frame, &reference::render(&scene, view, BACKGROUND), "after growing");
+        let pairs = frame.counts.pairs;
+        assert_eq!(pairs > FIRST_CAPACITY, grows, "{pairs} pairs exceed the initial capacity only in the close view");
+        assert_equivalent(&frame, &reference::render(&scene, view, BACKGROUND), &format!("{pairs} pairs"));
     }
 }
 
@@ -375,21 +376,21 @@ fn draw_frame(
     device.poll(wgpu::PollType::wait_indefinitely()).expect("the device finishes");
 }
 
-/// Returns the largest difference of the picture of a view from another.
+/// Returns the largest difference between the colors of a view and of a frame.
 fn difference(context: &GpuContext, view: &ViewRenderer, expected: &Frame) -> f32 {
     let pixels = read_color(context, view).into_iter().zip(&expected.picture.pixels);
     pixels.map(|(a, b)| (Vec3::from(a) - *b).abs().max_element()).fold(0.0, f32::max)
 }
 
 #[test]
-fn a_view_draws_all_pairs_before_it_has_room_for_them() {
+fn frames_that_exceed_the_capacity_of_pairs_are_complete() {
     let Some(mut headless) = gpu::headless() else { return };
     let (scene, _, close) = afar_and_close();
     let capture = headless.upload(&scene).expect("upload");
     let renderer = Renderer::new(&headless.context().device, ShaderChecks::On).expect("the passes compile");
     for design in [Design::Reference, Design::Fast] {
         headless.set_design(design);
-        // A later frame: the first one has made room.
+        // The second frame has the capacity that the first frame needed.
         headless.render(&capture, &close, BACKGROUND).expect("render");
         let expected = headless.render(&capture, &close, BACKGROUND).expect("render");
         let GpuContext { device, queue, .. } = headless.context();
@@ -397,20 +398,21 @@ fn a_view_draws_all_pairs_before_it_has_room_for_them() {
         let mut view = ViewRenderer::new(device, &renderer);
         view.set_design(&renderer, design);
         let instances = [instance(&capture, &close)];
-        // The first frame counts, the second asks for the count, the third has it.
+        // The first frame counts, the second starts the read-back of the counts, the third has them.
         for frame in 0..3 {
             draw_frame(headless.context(), &renderer, &mut view, &instances, BACKGROUND);
             let room = view.finished().expect("a frame").pairs;
-            assert_eq!(room >= expected.counts.pairs, frame == 2, "{design:?}, frame {frame}: room for {room} pairs");
+            let grown = room >= expected.counts.pairs;
+            assert_eq!(grown, frame == 2, "{design:?}, frame {frame}: the capacity is {room} pairs");
             let apart = difference(headless.context(), &view, &expected);
-            assert!(apart < 1e-4, "{design:?}, frame {frame}, with room for {room} pairs: {apart} apart");
+            assert!(apart < 1e-4, "{design:?}, frame {frame}, capacity {room} pairs: colors differ by {apart}");
         }
-        assert!(!view.is_short_of_room(), "{design:?}: the device has room");
+        assert!(!view.is_short_of_room(), "{design:?}: the pairs are within the limits of the device");
     }
 }
 
 #[test]
-fn what_a_device_has_no_room_for_is_drawn_all_the_same() {
+fn frames_with_more_pairs_than_the_device_allows_are_complete() {
     let Some(mut headless) = gpu::headless() else { return };
     let Some(mut limited) = limited_device::headless() else { return };
     let (scene, view) = (swollen(6_000, 10.0), look_from(EYE, UVec2::new(400, 300), 0.5));
@@ -424,12 +426,12 @@ fn what_a_device_has_no_room_for_is_drawn_all_the_same() {
                 .collect::<Vec<_>>()
         });
         let pairs = expected[0].counts.pairs;
-        assert!(u64::from(pairs) * 4 > limited_device::BINDING, "{pairs} pairs are more than a binding holds");
+        assert!(u64::from(pairs) * 4 > limited_device::BINDING, "{pairs} pairs exceed a binding");
         for (frame, found) in found.iter().enumerate() {
-            assert_eq!(found.counts, expected[0].counts, "{design:?}, frame {frame}: counts");
+            assert_eq!(found.counts, expected[0].counts, "{design:?}, frame {frame}: the counts are equal");
             let pixels = found.picture.pixels.iter().zip(&expected[0].picture.pixels);
             let apart = pixels.map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
-            assert!(apart < 1e-4, "{design:?}, frame {frame}: {apart} apart");
+            assert!(apart < 1e-4, "{design:?}, frame {frame}: colors differ by {apart}");
         }
     }
     let GpuContext { device, queue, .. } = limited.context();
@@ -439,19 +441,19 @@ fn what_a_device_has_no_room_for_is_drawn_all_the_same() {
     for _ in 0..4 {
         draw_frame(limited.context(), &renderer, &mut crowded, &[instance(&capture, &view)], BACKGROUND);
     }
-    assert!(crowded.is_short_of_room(), "and that it stays slow can be told");
+    assert!(crowded.is_short_of_room(), "the view reports that its pairs exceed the limits of the device");
 }
 
 #[test]
-fn what_is_uploaded_in_pieces_is_what_is_uploaded_at_once() {
-    const PIECE: u64 = 10_000;
+fn a_capture_uploaded_in_chunks_equals_a_capture_uploaded_at_once() {
+    const CHUNK: u64 = 10_000;
     let Some(headless) = gpu::headless() else { return };
     let GpuContext { device, queue, .. } = headless.context();
     let renderer = Renderer::new(device, ShaderChecks::On).expect("the passes compile");
     let view = look_from(EYE, UVec2::new(64, 48), 0.4);
     let draw = |capture: &GpuCapture| {
-        let mut active = ActiveList::new(device, &renderer, capture).expect("it has a filter");
-        assert!(active.prepare(queue, capture, view.time), "the list is new");
+        let mut active = ActiveList::new(device, &renderer, capture).expect("the capture has a filter");
+        assert!(active.prepare(queue, capture, view.time), "a new list must be recorded");
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         active.record(&renderer, &mut encoder, capture);
         queue.submit([encoder.finish()]);
@@ -470,31 +472,31 @@ fn what_is_uploaded_in_pieces_is_what_is_uploaded_at_once() {
         let scene = RuntimeScene { environment: Some(map.clone()), ..scene };
         let at_once = GpuCapture::upload(device, queue, &renderer, &scene).expect("it fits");
         let mut upload = CaptureUpload::new(device, &renderer, &scene).expect("it fits");
-        let (all, mut pieces) = (upload.bytes_left(), 0);
+        let (all, mut chunks) = (upload.bytes_left(), 0);
         while upload.bytes_left() > 0 {
-            let written = upload.advance(queue, &renderer, PIECE);
-            assert!((1..=PIECE).contains(&written), "{form}: {written} bytes in a piece");
-            pieces += 1;
+            let written = upload.advance(queue, &renderer, CHUNK);
+            assert!((1..=CHUNK).contains(&written), "{form}: a chunk has {written} bytes, expected 1 to {CHUNK}");
+            chunks += 1;
         }
-        assert!(pieces >= all.div_ceil(PIECE), "{form}: {all} bytes in {pieces} pieces");
-        let in_pieces = upload.finish(queue, &renderer);
-        assert_eq!(in_pieces.bytes(), all, "{form}: all of it");
-        assert!(draw(&in_pieces) == draw(&at_once), "{form}: the pictures differ");
+        assert!(chunks >= all.div_ceil(CHUNK), "{form}: {all} bytes need more than {chunks} chunks");
+        let in_chunks = upload.finish(queue, &renderer);
+        assert_eq!(in_chunks.bytes(), all, "{form}: all bytes are uploaded");
+        assert!(draw(&in_chunks) == draw(&at_once), "{form}: the pictures are equal");
     }
 }
 
 #[test]
-fn a_picture_that_grows_pixel_by_pixel_needs_new_buffers_now_and_then() {
+fn a_picture_that_grows_step_by_step_needs_few_new_buffers() {
     let Some(mut headless) = gpu::headless() else { return };
     let scene = scene(500);
     let capture = headless.upload(&scene).expect("upload");
     for design in [Design::Reference, Design::Fast] {
         headless.set_design(design);
         let (mut created, mut changes) = (headless.work().created(), 0);
-        // Wider and higher, and back again.
+        // Growing, then shrinking.
         for step in (0..40).chain((0..40).rev()) {
             let view = look_from(EYE, UVec2::new(90 + 2 * step, 70 + step), 0.5);
-            // As in a window, the surfaces are another texture each time, which takes a bind group. There are none.
+            // As in a resized window, each frame has another depth texture, which needs a bind group. The texture contains no surfaces.
             let surfaces = depth_texture(headless.context(), view.size, 0.0);
             let distance = [0.1, 0.0, 0.0, 1.0];
             let opaque = OpaqueDepth { texture: &surfaces, samples: 1, origin: UVec2::ZERO, distance };
@@ -507,15 +509,15 @@ fn a_picture_that_grows_pixel_by_pixel_needs_new_buffers_now_and_then() {
                 assert_equivalent(&frame, &expected, &format!("{design:?}, {}", view.size));
             }
         }
-        assert!((1..=6).contains(&changes), "{design:?}: buffers have been made {changes} times");
+        assert!((1..=6).contains(&changes), "{design:?}: buffers are created {changes} times, expected 1 to 6");
     }
 }
 
-/// Reads red, green and blue of every pixel; rows must need no padding.
+/// Reads red, green and blue of every pixel of a texture whose rows need no padding.
 fn read_color(context: &GpuContext, view: &ViewRenderer) -> Vec<[f32; 3]> {
     let texture = view.color().expect("a frame was prepared").texture();
     let (size, row) = (texture.size(), texture.width() * 16);
-    assert_eq!(row % wgpu::COPY_BYTES_PER_ROW_ALIGNMENT, 0, "rows without padding");
+    assert_eq!(row % wgpu::COPY_BYTES_PER_ROW_ALIGNMENT, 0, "rows need no padding");
     let buffer = context.device.create_buffer(&wgpu::BufferDescriptor {
         label: None,
         size: u64::from(row) * u64::from(size.height),
@@ -537,7 +539,7 @@ fn read_color(context: &GpuContext, view: &ViewRenderer) -> Vec<[f32; 3]> {
 }
 
 #[test]
-fn opaque_surfaces_hide_what_is_behind_them() {
+fn opaque_surfaces_hide_splats_behind_them() {
     let Some(mut headless) = gpu::headless() else { return };
     let (scene, view) = (scene(3_000), look_from(EYE, SIZE, 0.5));
     let capture = headless.upload(&scene).expect("upload");
@@ -558,18 +560,19 @@ fn opaque_surfaces_hide_what_is_behind_them() {
         let cut = cut_at(depth);
         assert_close(&cut, &expected, &what);
         let shown = expected.counts.visible;
-        assert!(shown > 100 && shown + 100 < all.counts.visible, "{what}: it lies within the scene, {shown} in front");
-        assert_eq!(cut.counts, all.counts, "{what}: the cut is per pixel, after the counting");
+        let total = all.counts.visible;
+        assert!(shown > 100 && shown + 100 < total, "{what} divides the scene: {shown} of {total} splats are in front");
+        assert_eq!(cut.counts, all.counts, "{what}: the surface does not change the counts");
     }
-    assert!(cut_at(0.0) == all, "infinitely far away is no surface");
+    assert!(cut_at(0.0) == all, "depth 0 is no surface");
     let hidden = cut_at(1.0);
-    assert!(hidden.transmittance.iter().all(|left| *left == 1.0), "a surface at the near plane hides everything");
+    assert!(hidden.transmittance.iter().all(|left| *left == 1.0), "a surface at the near plane hides all splats");
     let again = headless.render_all(&instances, &parameters()).expect("render");
-    assert!(again == all, "without the surface everything is back");
+    assert!(again == all, "without a surface, the frame is the same as before");
 }
 
 #[test]
-fn poison_is_refused_before_it_reaches_the_gpu() {
+fn invalid_gaussians_are_refused_before_upload() {
     let poisons: [(&str, fn(&mut Parameters)); 8] = [
         ("mean", |p| p.mean[7][1] = f32::NAN),
         ("temporal mean", |p| p.mean_t[7] = f32::NEG_INFINITY),
@@ -585,7 +588,10 @@ fn poison_is_refused_before_it_reaches_the_gpu() {
         let SceneForm::Trained(trained) = &mut scene.form else { panic!("synthetic scenes are in the trained form") };
         poison(&mut trained.parameters);
         let error = scene.into_runtime().expect_err(reason);
-        assert!(error.index == 7 && error.reason.contains(reason), "{reason}: {error}");
+        assert!(
+            error.index == 7 && error.reason.contains(reason),
+            "the error names Gaussian 7 and its {reason}: {error}"
+        );
     }
     let poisons: [(&str, fn(&mut Sliced)); 7] = [
         ("temporal scale", |s| s.gaussians[7].sigma_t = 0.0),
@@ -594,28 +600,31 @@ fn poison_is_refused_before_it_reaches_the_gpu() {
         ("scale", |s| s.gaussians[7].covariance[5] = f32::INFINITY),
         ("opacity", |s| s.gaussians[7].opacity = 1.5),
         ("opacity", |s| s.gaussians[7].opacity = f32::NAN),
-        ("colour", |s| s.harmonics.values[7 * 48 * 3 + 5] = f32::INFINITY),
+        ("coefficient", |s| s.harmonics.values[7 * 48 * 3 + 5] = f32::INFINITY),
     ];
     for (reason, poison) in poisons {
         let mut scene = scene(20);
         poison(scene.form.as_sliced_mut().expect("sliced"));
         let error = GaussianScene::from(scene).into_runtime().expect_err(reason);
-        assert!(error.index == 7 && error.reason.contains(reason), "{reason}: {error}");
+        assert!(
+            error.index == 7 && error.reason.contains(reason),
+            "the error names Gaussian 7 and its {reason}: {error}"
+        );
     }
 }
 
-/// Returns a scene in which every tenth Gaussian has another scale along one axis, or along all three.
+/// Returns a scene in which every tenth Gaussian has this scale along the first `axes` axes.
 fn extreme(scale: f32, axes: usize) -> RuntimeScene {
     let mut scene = trained(500);
     let SceneForm::Trained(trained) = &mut scene.form else { panic!("synthetic scenes are in the trained form") };
     for log_scale in trained.parameters.log_scale.iter_mut().step_by(10) {
         log_scale[..axes].fill(scale.ln());
     }
-    scene.into_runtime().expect("extreme, but finite")
+    scene.into_runtime().expect("the scales are finite")
 }
 
 #[test]
-fn extreme_scales_leave_no_hole_in_the_picture() {
+fn extreme_scales_do_not_produce_non_finite_pixels() {
     let Some(mut headless) = gpu::headless() else { return };
     let view = look_from(EYE, SIZE, 0.5);
     for scale in [1e-20, 1e10, 1e18] {

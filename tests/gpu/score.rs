@@ -11,7 +11,7 @@ use bevy_gs4d::view::{Background, Camera, RasterFov};
 use glam::{UVec2, Vec3};
 
 #[test]
-fn score_matches_reference() {
+fn score_matches_the_cpu_reference() {
     let Some(mut headless) = gpu::headless() else { return };
     let settings = SynthSettings { count: 4_000, degree: 1, ..SynthSettings::default() };
     let scene = synthesize(&settings).into_runtime().expect("synthetic scenes are valid");
@@ -29,16 +29,19 @@ fn score_matches_reference() {
         ];
         for (name, found, expected) in columns {
             let total: f32 = expected.iter().sum();
-            assert!(total > 0.1, "{name} at {time}: something is seen");
+            assert!(total > 0.1, "{name} at {time}: the scene is visible, sum {total}");
             let apart: f32 = found.iter().zip(expected.iter()).map(|(a, b)| (a - b).abs()).sum();
-            assert!(apart <= 1e-3 * total, "{name} at {time}: {apart} apart in {total}");
+            assert!(apart <= 1e-3 * total, "{name} at {time}: sums differ by {apart} in total, expected sum {total}");
             for (index, (found, expected)) in found.iter().zip(expected.iter()).enumerate() {
-                // An alpha that lies on 1/255 counts on one side only: in some pixels of a Gaussian.
+                // An alpha close to 1/255 may be skipped by one side only, in some pixels of a Gaussian.
                 let apart = (found - expected).abs();
-                assert!(apart <= 1e-2 * *expected + 0.02, "{name} at {time}: of {index} {found}, not {expected}");
+                assert!(
+                    apart <= 1e-2 * *expected + 0.02,
+                    "{name} at {time}: Gaussian {index} has {found}, expected {expected}"
+                );
             }
         }
         let again = engine.score(&view, Want::Removal).expect("it is scored");
-        assert!(again == found, "at {time}: the same on every run");
+        assert!(again == found, "at {time}: a second run has the same result");
     }
 }

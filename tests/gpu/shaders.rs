@@ -1,6 +1,7 @@
-//! Every shader on its own, without a device.
+//! Validation of every shader, without a device.
 //!
-//! In: the files of `shaders/`. Out: proof that each is known to the renderer and is valid WGSL that needs no optional capability.
+//! In: the files of `shaders/`. Out: proof that each file is known to the renderer and is valid WGSL, and that only the variants for devices
+//! with optional capabilities need these capabilities.
 
 use bevy_gs4d::renderer::shaders::{
     ATOMIC_SUMS, BINNED, Blending, COMPAT, COMPAT_WITHOUT_TIME, COPIED_INSTANCE, ColorPrecision, EIGHT_AT_ONCE,
@@ -12,7 +13,7 @@ use std::path::Path;
 use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
 use wgpu::naga::{AddressSpace, Module};
 
-/// Validates a module that may use no optional capability but these.
+/// Validates a module that may use only these optional capabilities.
 fn validate(name: &str, module: &Module, capabilities: Capabilities) -> Result<(), String> {
     Validator::new(ValidationFlags::all(), capabilities)
         .validate(module)
@@ -20,25 +21,25 @@ fn validate(name: &str, module: &Module, capabilities: Capabilities) -> Result<(
         .map_err(|error| format!("{name}: {error:?}"))
 }
 
-/// Fails once, with everything that is wrong.
+/// Fails with a list of all failures, if there are any.
 fn report(failures: Vec<String>) {
-    assert!(failures.is_empty(), "{} shaders are wrong:\n{}", failures.len(), failures.join("\n"));
+    assert!(failures.is_empty(), "{} shaders are invalid:\n{}", failures.len(), failures.join("\n"));
 }
 
 #[test]
-fn every_shader_file_is_a_pass_or_one_of_bevy_s() {
+fn every_shader_file_is_a_pass_of_the_renderer_or_of_the_plugin() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
     let files = std::fs::read_dir(folder).expect("the folder of shaders").map(|entry| entry.expect("an entry").path());
     let shaders = files.filter(|path| path.extension().is_some_and(|ending| ending == "wgsl"));
     let mut names: BTreeSet<String> =
         shaders.filter_map(|path| Some(path.file_stem()?.to_string_lossy().into_owned())).collect();
     for name in ["composite", "write_depth", "write_motion"] {
-        assert!(names.remove(name), "{name} is there");
+        assert!(names.remove(name), "the file of {name} exists");
     }
     let passes: BTreeSet<String> = pass_names().map(str::to_owned).collect();
     assert!(!passes.is_empty(), "there are passes");
-    assert_eq!(passes, names, "the passes are the files");
-    assert_eq!(passes.len(), pass_names().count(), "no pass has the name of another");
+    assert_eq!(passes, names, "each pass has a file and each file is a pass");
+    assert_eq!(passes.len(), pass_names().count(), "names of passes are unique");
 }
 
 #[test]
@@ -82,7 +83,7 @@ fn every_pass_composes_and_is_valid() {
 }
 
 #[test]
-fn workgroup_memory_is_within_the_limits_that_are_asked_for() {
+fn workgroup_memory_is_within_the_required_limits() {
     let blending = Blending::ALL.map(|blending| ("blend_blocks", blending.definitions(), 16 * 1024));
     let large =
         [[LARGE_BATCHES, Blending::All.definitions()], [EIGHT_AT_ONCE, Blending::ColorBehindSurfaces.definitions()]]
@@ -94,19 +95,19 @@ fn workgroup_memory_is_within_the_limits_that_are_asked_for() {
         let module = compose(name, definitions).expect("the pass composes");
         let shared = module.global_variables.iter().filter(|(_, v)| v.space == AddressSpace::WorkGroup);
         let bytes: u32 = shared.map(|(_, v)| module.types[v.ty].inner.size(module.to_ctx()).next_multiple_of(16)).sum();
-        assert!(bytes <= limit, "{name} with {definitions:?} needs {bytes} bytes, and {limit} may be used");
-        assert!(2 * bytes > limit, "{name} with {definitions:?} is counted: {bytes} bytes");
+        assert!(bytes <= limit, "{name} with {definitions:?} uses {bytes} bytes, the limit is {limit}");
+        assert!(2 * bytes > limit, "{name} with {definitions:?} uses more than half of the limit, found {bytes} bytes");
     }
 }
 
 #[test]
-fn an_unknown_pass_is_named() {
-    let message = compose("no such pass", &[]).expect_err("there is none").to_string();
-    assert!(message.contains("no such pass"), "{message}");
+fn the_error_for_an_unknown_pass_contains_its_name() {
+    let message = compose("no such pass", &[]).expect_err("the pass does not exist").to_string();
+    assert!(message.contains("no such pass"), "the message contains the name: {message}");
 }
 
 #[test]
-fn bevy_s_passes_are_valid_with_all_their_definitions() {
+fn passes_of_the_plugin_are_valid_with_all_combinations_of_definitions() {
     let defines = ["READ_TARGET", "ENCODE_TARGET", "KEEP_SAMPLES"];
     let composite = ("composite", include_str!("../../shaders/composite.wgsl"), defines);
     let median = ["MEDIAN", "UNUSED", "UNUSED_TOO"];

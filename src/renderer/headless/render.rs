@@ -1,7 +1,7 @@
 //! Drawing without a window: for commands, scoring and tests.
 //!
-//! In: scenes and views. Out: [`Frame`]s on the host, or [`Timings`](crate::renderer::Timings). Each call waits for the GPU; within a
-//! frame nothing is read back.
+//! In: scenes and views. Out: [`Frame`]s on the host, or [`Timings`](crate::renderer::Timings). Most calls wait for the GPU; there is no
+//! read-back within a frame.
 
 use crate::renderer::active::ActiveList;
 use crate::renderer::capture::GpuCapture;
@@ -286,7 +286,7 @@ impl Headless {
         prepared?
     }
 
-    /// Checks that a picture can be read back, before it is drawn.
+    /// Checks before drawing that a picture of this size can be read back.
     fn require_readable(&self, size: UVec2, precision: ColorPrecision) -> Result<(), GpuError> {
         let row = u64::from(size.x) * texel_bytes(precision);
         let needed = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT.into()) * u64::from(size.y);

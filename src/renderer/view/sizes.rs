@@ -17,7 +17,7 @@ pub(super) struct Sizes {
     pub parts: u32,
     /// Size of the largest picture, pixels.
     pub picture: UVec2,
-    /// Size of the target of depths: that of the largest picture, or one pixel if none are written.
+    /// Size of the target of depths: the size of the largest picture, or one pixel if depths are not written.
     pub depths: UVec2,
 }
 

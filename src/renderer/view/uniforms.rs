@@ -98,7 +98,7 @@ impl ViewRenderer {
 
     /// Returns the uniform `binning` of a part in the prepared frame.
     fn binning(&self, sizes: &Sizes, part: u32) -> [u32; 4] {
-        // Never 0, which is the stamp of a new buffer.
+        // Never 0: the stamp of a new buffer is 0.
         let frame = self.frames % 0xffff + 1;
         [self.bin_side | (frame << 8), sizes.entries / self.bin_count(), part, sizes.parts]
     }
