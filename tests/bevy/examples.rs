@@ -73,7 +73,7 @@ fn read(folder: &Path) -> Vec<RgbaImage> {
     paths.iter().map(|path| image::open(path).expect("a whole picture").into_rgba8()).collect()
 }
 
-/// Returns the share of pixels that differ between two pictures.
+/// Returns the fraction of pixels that differ between two pictures.
 fn differing(a: &RgbaImage, b: &RgbaImage) -> f64 {
     assert_eq!(a.dimensions(), b.dimensions(), "pictures of one size");
     let differ = a.pixels().zip(b.pixels()).filter(|(a, b)| a != b).count();
@@ -89,8 +89,8 @@ fn check(example: &str, options: &[&str], expected: usize) {
         assert!(picture.pixels().any(|pixel| pixel != first), "{example} shows more than one color");
     }
     for pair in pictures.windows(2) {
-        let share = differing(&pair[0], &pair[1]);
-        assert!(share > 0.001, "{example} shows something that moves: {share} of the picture changes");
+        let fraction = differing(&pair[0], &pair[1]);
+        assert!(fraction > 0.001, "{example} shows something that moves: {fraction} of the picture changes");
     }
 }
 
@@ -153,9 +153,9 @@ fn captures_are_to_be_seen() {
         let roots = [Path::new(ROOT), invisible.path()];
         // In the first picture the timeline's capture has not faded in.
         let [Some(seen), Some(unseen)] = roots.map(|root| pictures(root, example, &[], 4)) else { return };
-        let share = differing(&seen[3], &unseen[3]);
-        assert!(share > 0.01, "{example} shows its captures: without them {share} of the picture differs");
-        assert!(share < 0.9, "and other things, too, which stay: {share} of the picture differs");
+        let fraction = differing(&seen[3], &unseen[3]);
+        assert!(fraction > 0.01, "{example} shows its captures: without them {fraction} of the picture differs");
+        assert!(fraction < 0.9, "and other things, too, which stay: {fraction} of the picture differs");
     }
 }
 

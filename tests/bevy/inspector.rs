@@ -80,14 +80,14 @@ fn run(app: &mut App, updates: usize, seconds: f32) {
     }
 }
 
-/// Returns the share of pixels of some columns that differ.
+/// Returns the fraction of pixels of some columns that differ.
 fn changed(a: &RgbaImage, b: &RgbaImage, columns: Range<u32>) -> f64 {
     let all = f64::from(columns.end - columns.start) * f64::from(SIZE.y);
     let differs = |&(x, y): &(u32, u32)| a.get_pixel(x, y) != b.get_pixel(x, y);
     columns.flat_map(|x| (0..SIZE.y).map(move |y| (x, y))).filter(differs).count() as f64 / all
 }
 
-/// Returns the color that most pixels of some columns have, and their share.
+/// Returns the color that most pixels of some columns have, and their fraction.
 fn commonest(picture: &RgbaImage, columns: Range<u32>) -> ([u8; 3], f64) {
     let all = f64::from(columns.end - columns.start) * f64::from(SIZE.y);
     let mut counts: HashMap<[u8; 3], u32> = HashMap::new();
@@ -108,9 +108,9 @@ fn the_panel_covers_its_edge_of_the_picture_and_nothing_else() {
     let closed = picture(&mut app, 0.0);
     let covered = changed(&open, &closed, PANEL);
     assert!(covered > 0.5, "the panel changes most of what it covers, not {covered}");
-    let ([r, g, b], share) = commonest(&open, PANEL);
+    let ([r, g, b], fraction) = commonest(&open, PANEL);
     let is_dark_gray = r == g && g == b && (10..70).contains(&r);
-    assert!(is_dark_gray && share > 0.3, "the panel's ground is dark gray: {share} of it is {r}, {g}, {b}");
+    assert!(is_dark_gray && fraction > 0.3, "the panel's ground is dark gray: {fraction} of it is {r}, {g}, {b}");
     assert_eq!(changed(&open, &closed, BESIDE), 0.0, "and nothing beside it");
     set_open(&mut app, true);
     assert_eq!(changed(&open, &picture(&mut app, 0.0), 0..SIZE.x), 0.0, "open again, it is the same");
@@ -274,8 +274,8 @@ fn a_debug_view_is_that_of_the_renderer_without_bevy() {
     for debug in [DebugView::Depth, DebugView::Overdraw, DebugView::Lifespan, DebugView::Velocity] {
         app.world_mut().entity_mut(camera).insert(CaptureViewSettings { debug, ..default() });
         let seen = picture(&mut app, 0.0);
-        let share = changed(&as_trained, &seen, 0..SIZE.x);
-        assert!(share > 0.01, "{debug:?} must not look like color: {share} of the picture differs");
+        let fraction = changed(&as_trained, &seen, 0..SIZE.x);
+        assert!(fraction > 0.01, "{debug:?} must not look like color: {fraction} of the picture differs");
         let shown = capture();
         let view = view(&place(), SIZE, shown.time_at(0.5));
         let apart = difference(&seen, &debug_picture(&mut headless, shown.scene(), view, debug));

@@ -98,7 +98,7 @@ fn count(mask: &[bool]) -> usize {
     mask.iter().filter(|pixel| **pixel).count()
 }
 
-/// Returns the share of the pixels of either mask that are in both.
+/// Returns the fraction of the pixels of either mask that are in both.
 fn overlap(a: &[bool], b: &[bool]) -> f32 {
     let pairs = || a.iter().zip(b);
     let both = pairs().filter(|(a, b)| **a && **b).count();
@@ -129,8 +129,8 @@ fn check_shadows(name: &str, app: &mut App, places: &[Transform], layer: usize, 
         spawn(app, &scene, (*place, layer.clone(), CastsShadows::default()));
     }
     let shadow = darkened(&lit, &picture(app, 0.0));
-    let share = overlap(&shadow, &expected);
-    assert!(share >= least, "{name}: {share} of the shadows of captures and meshes overlap");
+    let fraction = overlap(&shadow, &expected);
+    assert!(fraction >= least, "{name}: {fraction} of the shadows of captures and meshes overlap");
 }
 
 #[test]
