@@ -1,5 +1,4 @@
-//! Playback in Bevy apps: which events are sent and when, shared clocks, the game's time, and reflection of the
-//! components.
+//! Playback in Bevy apps: events, shared clocks, the game's time, and reflection of the components.
 //!
 //! In: captures of two seconds with key-frames every half second. Out: proof that times are right and that every change sends its event.
 //! Needs neither a GPU nor a window.

@@ -76,7 +76,7 @@ fn light(picture: &RgbaImage, x: u32) -> Vec3 {
 fn check(picture: &RgbaImage, x: u32, factor: Vec3, what: &str) {
     let expected = encode(decode(COLOR) * factor) * 255.0;
     let seen = color(picture, x, MIDDLE.y);
-    assert!((seen - expected).abs().max_element() <= 3.0, "{what}: {seen}, not {expected}");
+    assert!((seen - expected).abs().max_element() <= 3.0, "{what}: the pixel is {seen}, not {expected}");
 }
 
 #[test]

@@ -181,7 +181,7 @@ fn can_sample(app: &App, msaa: Msaa) -> bool {
 #[test]
 fn depth_tests_use_the_right_pixels_of_a_viewport_for_every_sample_count() {
     let Some(mut app) = app(SIZE) else { return };
-    // Larger than the viewport.
+    // A Gaussian larger than the viewport.
     spawn(&mut app, &scene(&[(blob(Vec3::ZERO, Vec3::new(2.0, 2.0, 0.1), 0.98), Vec3::X)]), ());
     let (corner, size) = (UVec2::new(37, 21), UVec2::new(120, 90));
     let viewport = Some(Viewport { physical_position: corner, physical_size: size, ..default() });
@@ -284,7 +284,7 @@ impl Both {
             (without.total, without.total),
             "{what}: both cameras have the same Gaussians"
         );
-        assert_eq!(with.active < with.total, filters, "{what}: {} of {} are active", with.active, with.total);
+        assert_eq!(with.active < with.total, filters, "{what}: {} of {} Gaussians are active", with.active, with.total);
     }
 }
 

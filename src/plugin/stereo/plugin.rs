@@ -17,7 +17,7 @@ use bevy::transform::components::Transform;
 use glam::UVec2;
 
 /// Keeps the eyes of every [`StereoRig`] at their distance, and [side-by-side](SideBySide) eyes in their halves of the target. Part of
-/// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin); adding it again changes nothing.
+/// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin); adding it again has no effect.
 ///
 /// # Examples
 ///
@@ -133,7 +133,7 @@ mod tests {
             app.world().get::<GlobalTransform>(stereo.eyes[eye]).expect("an eye has a place").translation()
         };
         app.update();
-        // Turned to the left by a right angle, the head's +x axis is the world's −z.
+        // After a turn by 90 degrees to the left, the head's +x axis is the world's −z axis.
         assert!(place(&app, 0).abs_diff_eq(Vec3::new(1.0, 2.0, 3.25), 1e-6), "the left eye is at {}", place(&app, 0));
         assert!(place(&app, 1).abs_diff_eq(Vec3::new(1.0, 2.0, 2.75), 1e-6), "the right eye is at {}", place(&app, 1));
         for (ipd, expected) in [(0.1, 2.95), (f32::NAN, 2.95), (0.0, 3.0)] {

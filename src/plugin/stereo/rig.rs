@@ -42,7 +42,7 @@ impl Default for StereoRig {
     }
 }
 
-/// Which eye a camera is.
+/// The eye that a camera draws for.
 ///
 /// # Examples
 ///
@@ -50,7 +50,7 @@ impl Default for StereoRig {
 /// use bevy::prelude::*;
 /// use bevy_gs4d::prelude::*;
 ///
-/// /// Shows the depth of captures to the right eye alone.
+/// /// Shows the depth view only to the right eye.
 /// fn setup(eyes: Query<(Entity, &Eye)>, mut commands: Commands) {
 ///     for (camera, eye) in &eyes {
 ///         let debug = match eye {
@@ -129,7 +129,8 @@ pub struct Stereo {
     pub eyes: [Entity; 2],
 }
 
-/// Spawns a head with two eyes, and returns their entities. The left eye is drawn first: its camera has the order 0, the right one's 1.
+/// Spawns a head with two eyes, and returns their entities. The left eye is drawn first: its camera has the order 0, the right camera the
+/// order 1.
 ///
 /// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) keeps the eyes at their positions.
 ///

@@ -92,13 +92,13 @@ mod tests {
 
     #[test]
     fn the_ellipse_is_inscribed_in_the_bounds() {
-        let ellipse = SHADOW.beneath(Vec3::new(3.0, 2.0, -1.0), Vec3::new(0.5, 1.0, 0.25)).expect("it shows");
+        let ellipse = SHADOW.beneath(Vec3::new(3.0, 2.0, -1.0), Vec3::new(0.5, 1.0, 0.25)).expect("a visible ellipse");
         let edge = ellipse.world_from_disk.transform_point3(Vec3::X);
         assert!(edge.abs_diff_eq(Vec3::new(3.5, 1.0, -1.0), 0.01), "the edge is at the side of the box, not at {edge}");
         assert!(edge.y > 1.0, "the ellipse is just above the ground");
         assert_eq!(ellipse.strength, 0.8, "a capture on the ground has the full strength");
         let soft = CaptureContactShadow { softness: 1.0, ..SHADOW };
-        let soft = soft.beneath(Vec3::new(3.0, 2.0, -1.0), Vec3::new(0.5, 1.0, 0.25)).expect("it shows");
+        let soft = soft.beneath(Vec3::new(3.0, 2.0, -1.0), Vec3::new(0.5, 1.0, 0.25)).expect("a visible ellipse");
         let edge = soft.world_from_disk.transform_point3(Vec3::X);
         assert!((edge.x - 4.0).abs() < 1e-5, "half of a soft edge is outside the bounds: {edge}");
     }

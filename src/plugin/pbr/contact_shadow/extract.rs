@@ -93,7 +93,7 @@ mod tests {
         let upright = Affine3A::from_rotation_translation(Quat::from_rotation_x(-FRAC_PI_2), Vec3::new(2.0, 0.0, 1.0));
         let settings = CaptureContactShadow { softness: 0.0, ..CaptureContactShadow::default() };
         let beneath = |opacity| ellipse(&settings, &bounds, &upright, opacity);
-        let ellipse = beneath(1.0).expect("it stands on the ground");
+        let ellipse = beneath(1.0).expect("an ellipse beneath a capture on the ground");
         let [middle, edge] = [Vec3::ZERO, Vec3::X].map(|at| ellipse.world_from_disk.transform_point3(at));
         assert!(
             middle.abs_diff_eq(Vec3::new(2.0, 0.0, 1.0), 0.01),
@@ -103,7 +103,7 @@ mod tests {
             edge.abs_diff_eq(Vec3::new(2.5, 0.0, 1.0), 0.01),
             "the ellipse is as wide as the capture, not up to {edge}"
         );
-        let half = beneath(0.5).expect("half of it shows");
+        let half = beneath(0.5).expect("an ellipse at half opacity");
         assert!(
             (half.strength - 0.5 * ellipse.strength).abs() < 1e-6,
             "the strength follows the opacity of the capture"

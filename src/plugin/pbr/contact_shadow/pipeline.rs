@@ -31,7 +31,7 @@ impl GpuEllipse {
         [VertexFormat::Float32x4, VertexFormat::Float32x4, VertexFormat::Float32x4, VertexFormat::Float32x2];
 }
 
-/// The shader, kept alive for the render world.
+/// The handle of the shader, kept in the render world so that the asset stays loaded.
 #[derive(Resource)]
 pub(super) struct ContactShadowShader(pub(super) Handle<Shader>);
 

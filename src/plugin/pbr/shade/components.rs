@@ -62,7 +62,7 @@ pub struct ReceivesShadows {
 /// use bevy_gs4d::prelude::*;
 ///
 /// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
-///     // Half of the way from the trained light to that of the room.
+///     // Halfway between the trained light and the light of the room.
 ///     let light = CaptureLight { amount: 0.5, ..default() };
 ///     commands.spawn((GaussianCapture3d(assets.load("toybox.gs4d")), light));
 /// }

@@ -19,7 +19,7 @@ use bevy::shader::{Shader, ShaderDefVal};
 /// The format of the shaded picture, equal to the format of the captures' picture.
 pub(super) const FORMAT: TextureFormat = TextureFormat::Rgba16Float;
 
-/// The shader, kept alive for the render world.
+/// The handle of the shader, kept in the render world so that the asset stays loaded.
 #[derive(Resource)]
 pub(super) struct ShadeShader(pub(super) Handle<Shader>);
 
