@@ -1,4 +1,4 @@
-//! Renders a capture into PNG files, without a window or a display: a camera orbits it once while it plays once.
+//! Renders a capture to PNG files without a window or a display: a camera orbits the capture once while it plays once.
 //!
 //! ```text
 //! cargo run --release --features viewer --example headless -- [CAPTURE] [--headless FOLDER] [--frames N] [--size WIDTHxHEIGHT]
@@ -44,7 +44,7 @@ fn main() -> Result {
     let captures = app.world().resource::<Assets<GaussianCapture>>();
     let duration = captures.iter().next().map_or(0.0, |(_, capture)| capture.duration_seconds());
     let step = Duration::try_from_secs_f32(duration / arguments.frames.max(1) as f32)
-        .map_err(|error| format!("a capture of {duration} s cannot be cut into pictures: {error}"))?;
+        .map_err(|error| format!("a capture of {duration} s cannot be divided into pictures: {error}"))?;
     common::save_pictures(&mut app, arguments.frames, step, &arguments.headless.unwrap_or_default())
 }
 
@@ -59,7 +59,7 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>, capture: Res<Capture>
     commands.spawn((
         Camera3d::default(),
         Msaa::Off,
-        // Pixels as trained.
+        // Pixels keep their trained colors.
         Tonemapping::None,
         DebandDither::Disabled,
     ));

@@ -1,11 +1,11 @@
-//! A window with a capture that plays: the least code that is needed, in `setup`.
+//! A window with a playing capture. The function `setup` is the minimum code of a game.
 //!
 //! ```text
 //! cargo run --release --features viewer --example minimal -- [CAPTURE] [--headless FOLDER] [--frames N]
 //! ```
 //!
-//! There are no keys. With `--headless FOLDER`, or where there is no display, it writes N (8) pictures, a 30th of a second apart, to
-//! FOLDER (`out`) instead.
+//! There are no keys. With `--headless FOLDER`, or without a display, it writes N (8) pictures, a 30th of a second apart, to FOLDER (`out`)
+//! instead.
 
 #[path = "common/arguments.rs"]
 mod arguments;
@@ -17,16 +17,16 @@ use bevy_gs4d::component::Upright;
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
 use std::path::PathBuf;
 
-/// The capture that the command line names.
+/// The asset path of the capture on the command line.
 #[derive(Resource)]
 struct Capture(PathBuf);
 
 fn setup(mut commands: Commands, assets: Res<AssetServer>, capture: Res<Capture>) {
-    // Most captures have +z up, Bevy +y.
+    // `Upright` turns the capture's up axis (+z in most captures) to Bevy's +y.
     commands.spawn((GaussianCapture3d(assets.load(capture.0.clone())), Upright));
     commands.spawn((
         Camera3d::default(),
-        // Captures are no smoother for multisampling.
+        // Captures need no multisampling.
         Msaa::Off,
         Transform::from_xyz(2.5, 1.5, 3.0).looking_at(Vec3::ZERO, Vec3::Y),
     ));

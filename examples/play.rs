@@ -1,17 +1,17 @@
-//! Plays a capture in a window, with a lit ball standing in it: the ball hides what is behind it, and is hidden by what is in front of
-//! it. The panel on the right plays, crops and tints the capture, counts and times what is drawn, and shows it in false colors.
+//! Plays a capture in a window, with a lit ball in its middle: the ball hides the splats behind it, and splats in front hide the ball. The
+//! panel on the right plays, crops and tints the capture, shows counts and GPU times, and switches to debug views.
 //!
 //! ```text
 //! cargo run --release --features viewer --example play -- [CAPTURE] [--headless FOLDER] [--frames N]
 //! ```
 //!
-//! * drag with the left button: go round; wheel: nearer and farther
+//! * drag with the left button: orbit; wheel: nearer and farther
 //! * click: mark the Gaussian there; the panel names it
-//! * space: play and pause; left and right: a frame back and on, at the panel's frame rate
+//! * space: play and pause; left and right: one frame back and forward, at the panel's frame rate
 //! * F1: close and open the panel
-//! * drop a `.gs4d` or `.pth` on the window: play that; if it cannot be read, the panel shows the reason
+//! * drop a `.gs4d` or `.pth` on the window: play that file; if it cannot be read, the panel shows the reason
 //!
-//! With `--headless FOLDER`, or where there is no display, it writes N (8) pictures to FOLDER (`out`) instead, without the panel.
+//! With `--headless FOLDER`, or without a display, it writes N (8) pictures to FOLDER (`out`) instead, without the panel.
 
 mod common;
 #[path = "common/controls.rs"]
@@ -41,11 +41,11 @@ struct Capture(PathBuf);
 #[derive(Component)]
 struct Ball;
 
-/// The ball at the point that a click has hit.
+/// The small ball at the point that a click hit.
 #[derive(Component)]
 struct Marker;
 
-/// Most pixels that the mouse may move while a button is down for it to count as a click.
+/// Maximum motion of the mouse during a click, in pixels.
 const CLICK: f32 = 4.0;
 
 fn main() -> Result {
@@ -100,9 +100,9 @@ fn setup(
     ));
     let mut camera = commands.spawn((
         Camera3d::default(),
-        // Captures are no smoother for multisampling.
+        // Captures need no multisampling.
         Msaa::Off,
-        // Colors of the capture as trained.
+        // The capture keeps its trained colors.
         Tonemapping::None,
         Orbit { center: Vec3::ZERO, distance: 4.0, yaw: 0.6, pitch: 0.3 },
     ));
@@ -111,7 +111,7 @@ fn setup(
     }
 }
 
-/// Points the camera at a capture that has just been loaded, and puts the ball into its middle.
+/// Points the camera at a newly loaded capture, and places the ball at its center.
 fn frame_capture(
     captures: Res<Assets<GaussianCapture>>,
     mut framed: Local<Option<AssetId<GaussianCapture>>>,
@@ -145,7 +145,7 @@ fn keys(
     }
 }
 
-/// Marks the point that a click hits, and names the Gaussian in the panel.
+/// Marks the point that a click hits, and shows the Gaussian's number in the panel.
 fn pick(
     buttons: Res<ButtonInput<MouseButton>>,
     motion: Res<AccumulatedMouseMotion>,
@@ -168,7 +168,7 @@ fn pick(
     let (mut place, mut visibility) = marker.into_inner();
     let Some(hit) = ray.and_then(|ray| picker.cast(ray)) else {
         *visibility = Visibility::Hidden;
-        inspector.note = "nothing is there".into();
+        inspector.note = "no Gaussian at this point".into();
         return;
     };
     *visibility = Visibility::Visible;

@@ -1,11 +1,11 @@
-//! A capture among meshes: fog, glass in front and behind, a sun whose shadows the capture casts and receives.
+//! A capture among meshes: fog, glass in front of and behind the capture, and a sun for which the capture casts and receives shadows.
 //!
 //! ```text
 //! cargo run --release --features viewer --example scene -- [CAPTURE] [--headless FOLDER] [--frames N]
 //! ```
 //!
-//! There are no keys. With `--headless FOLDER`, or where there is no display, it writes N (8) pictures, a 30th of a second apart, to
-//! FOLDER (`out`) instead.
+//! There are no keys. With `--headless FOLDER`, or without a display, it writes N (8) pictures, a 30th of a second apart, to FOLDER (`out`)
+//! instead.
 
 #[path = "common/arguments.rs"]
 mod arguments;
@@ -17,12 +17,12 @@ use bevy::prelude::*;
 use bevy_gs4d::prelude::*;
 use std::path::PathBuf;
 
-/// The color of what is far away.
+/// The color of fog and background.
 const HAZE: Color = Color::srgb(0.62, 0.7, 0.78);
 /// Height of the floor.
 const FLOOR: f32 = -0.85;
 
-/// The capture that the command line names.
+/// The asset path of the capture on the command line.
 #[derive(Resource)]
 struct Capture(PathBuf);
 
@@ -40,7 +40,7 @@ fn spawn_scene(
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
 ) {
-    // Nothing about captures has to be set on a camera.
+    // A camera needs no component for captures.
     commands.spawn((
         Camera3d::default(),
         Transform::from_xyz(-2.6, 1.7, 3.2).looking_at(Vec3::Y * 0.05, Vec3::Y),

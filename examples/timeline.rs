@@ -1,18 +1,17 @@
-//! One capture twice and a flying ball, cut together by a timeline: `assets/demo.timeline.ron` defines when captures play, fade and
-//! reverse, and the ball's own animation follows the same playhead. The file may be changed while it plays.
+//! One capture twice and a flying ball, directed by a timeline: `assets/demo.timeline.ron` defines when captures play, fade and reverse,
+//! and the ball's animation follows the same playhead. The file is reloaded when it changes.
 //!
 //! ```text
 //! cargo run --release --features viewer --example timeline -- [TIMELINE] [--headless FOLDER] [--frames N]
 //! ```
 //!
-//! * click or drag in the panel below: scrub. Its bars are clips (red: backwards), their cut corners fades, the short marks
-//!   key-frames, of captures and of the ball's animation; the flags are markers
-//! * space: play and pause; left and right: a 30th of a second back and on; R: reverse; Home: to the start. The panel has buttons
-//!   for the same
-//! * drag elsewhere with the left button: go round; wheel: nearer and farther
+//! * click or drag in the panel below: scrub. Bars are clips (red: backwards), their cut corners are fades, short marks are key-frames of
+//!   captures and of the ball's animation, and flags are markers
+//! * space: play and pause; left and right: a 30th of a second back and forward; R: reverse; Home: to the start. The panel has buttons for
+//!   the same actions
+//! * drag elsewhere with the left button: orbit; wheel: nearer and farther
 //!
-//! With `--headless FOLDER`, or where there is no display, it writes N (8) pictures, a 30th of a second apart, to FOLDER (`out`)
-//! instead.
+//! With `--headless FOLDER`, or without a display, it writes N (8) pictures, a 30th of a second apart, to FOLDER (`out`) instead.
 
 #[path = "timeline/chart.rs"]
 mod chart;
@@ -35,11 +34,11 @@ use controls::{follow, mouse};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// The timeline to play.
+/// The asset path of the timeline.
 #[derive(Resource)]
 struct Show(PathBuf);
 
-/// The last marker, for the panel.
+/// The name of the last marker, for the panel.
 #[derive(Resource, Default)]
 struct LastMarker(String);
 
@@ -47,14 +46,14 @@ struct LastMarker(String);
 #[derive(Component)]
 struct Flight(AnimationNodeIndex);
 
-/// Where the ball is at its key-frames.
+/// Positions of the ball at its key-frames.
 const WAY: [Vec3; 4] =
     [Vec3::new(-1.5, 0.9, 0.6), Vec3::new(0.0, 0.4, -0.8), Vec3::new(1.5, 0.9, 0.6), Vec3::new(0.0, 1.2, 1.0)];
-/// Seconds after which the ball is where it began.
+/// Duration of the ball's loop, in seconds.
 const FLIGHT_SECONDS: f32 = 4.0;
-/// Pictures, and steps by hand, for each second.
+/// Pictures, and manual steps, per second.
 const FPS: f32 = 30.0;
-/// More key-frames than this are not marked: a timeline may be of any length.
+/// Maximum number of marked key-frames, since a timeline may have any length.
 const MOST_MARKS: u32 = 1000;
 
 fn main() -> Result {
@@ -94,7 +93,7 @@ fn scene(app: &mut App, show: Show) {
 
 fn setup(mut commands: Commands, assets: Res<AssetServer>, show: Res<Show>) {
     let timeline = TimelinePlayer(assets.load(show.0.clone()));
-    // The tracks are spawned here so that they can be placed; without them the player would spawn its own.
+    // The tracks are spawned here to give them transforms; otherwise the player would spawn them.
     commands.spawn((timeline, children![TimelineTrack("left".into()), TimelineTrack("right".into())]));
     commands.spawn((
         DirectionalLight { illuminance: 4000.0, ..default() },
@@ -102,15 +101,15 @@ fn setup(mut commands: Commands, assets: Res<AssetServer>, show: Res<Show>) {
     ));
     commands.spawn((
         Camera3d::default(),
-        // Captures are no smoother for multisampling. Opaque meshes, such as the ball, cut them with it, too, sample by sample.
+        // Captures need no multisampling. With multisampling, opaque meshes such as the ball would hide captures per sample.
         Msaa::Off,
-        // Colors of the captures as trained.
+        // Captures keep their trained colors.
         Tonemapping::None,
         Orbit { center: Vec3::ZERO, distance: 4.0, yaw: 0.3, pitch: 0.3 },
     ));
 }
 
-/// Spawns a ball that one of Bevy's animations moves.
+/// Spawns a ball with one of Bevy's animations.
 fn setup_ball(
     mut commands: Commands,
     mut meshes: ResMut<Assets<Mesh>>,
@@ -125,7 +124,7 @@ fn setup_ball(
     clip.add_curve_to_target(target, AnimatableCurve::new(animated_field!(Transform::translation), curve));
     let (graph, node) = AnimationGraph::from_clip(clips.add(clip));
     let mut player = AnimationPlayer::default();
-    // The timeline moves it.
+    // The timeline's clock sets its time.
     player.play(node).pause();
     let ball = commands
         .spawn((
@@ -139,7 +138,7 @@ fn setup_ball(
     Ok(())
 }
 
-/// Lets the ball follow the timeline's clock.
+/// Sets the time of the ball's animation to the timeline's clock.
 fn fly(clock: Single<&PlaybackClock, With<TimelinePlayer>>, ball: Single<(&mut AnimationPlayer, &Flight)>) {
     let (mut player, flight) = ball.into_inner();
     if let Some(animation) = player.animation_mut(flight.0) {
@@ -154,7 +153,7 @@ fn report(mut markers: MessageReader<MarkerReached>, mut last: ResMut<LastMarker
     }
 }
 
-/// Puts the captures side by side, upright, and points the camera at both, as soon as one has been loaded.
+/// Places the captures side by side, upright, and points the camera at both, once the first capture is loaded.
 fn arrange(
     captures: Res<Assets<GaussianCapture>>,
     mut tracks: Query<(&TimelineTrack, &GaussianCapture3d, &mut Transform)>,
@@ -210,7 +209,7 @@ fn panel(
     window.anchor(egui::Align2::CENTER_BOTTOM, [0.0, -12.0]).show(contexts.ctx_mut()?, |ui| {
         let Some(timeline) = timelines.get(&handle.0) else {
             let failed = assets.load_state(&handle.0).is_failed();
-            ui.label(if failed { "not a timeline that can be read; the log says why" } else { "loading ..." });
+            ui.label(if failed { "the timeline cannot be read; the log has the reason" } else { "loading ..." });
             return;
         };
         ui.horizontal(|ui| {
@@ -223,10 +222,10 @@ fn panel(
             if ui.button(if playback.playing { "pause" } else { "play" }).clicked() {
                 playback.toggle();
             }
-            if ui.button("on").clicked() {
+            if ui.button("forward").clicked() {
                 playback.step(1, FPS, timeline.duration_seconds());
             }
-            if ui.button("turn round").clicked() {
+            if ui.button("reverse").clicked() {
                 playback.reverse();
             }
             ui.label(format!("{:.2} s of {:.2} s", playback.time, timeline.duration_seconds()));
@@ -240,7 +239,7 @@ fn panel(
     Ok(())
 }
 
-/// Returns the times when the ball is at its key-frames, in seconds of the timeline.
+/// Returns the times of the ball's key-frames, in seconds of the timeline.
 fn flight_key_frames(timeline: &Timeline) -> Vec<f32> {
     let spacing = FLIGHT_SECONDS / WAY.len() as f32;
     let count = (timeline.duration_seconds() / spacing) as u32;

@@ -1,24 +1,24 @@
-//! Walks about in a capture as in virtual reality: both eyes side by side, a body that walks and teleports, and black that closes in
-//! from the edges of the view while it moves, against motion sickness.
+//! Walks around a capture as in virtual reality: both eyes side by side, a body that walks and teleports, and a vignette that closes while
+//! the body moves, against motion sickness.
 //!
 //! ```text
 //! cargo run --release --features viewer --example walkthrough -- \
 //!     [CAPTURE] [--path FILE] [--two-targets] [--headless FOLDER] [--frames N]
 //! ```
 //!
-//! * drag with the left button: look around; W, A, S, D: walk; Q and E: turn by 30 degrees at once
-//! * hold T or the right button: aim at the floor; let go: teleport there
-//! * V: the closing edges on and off; I: another distance between the eyes (64, 70, 0 and 58 mm)
-//! * P: follow the recorded path, or stop; R: record a path, and again R: write it to `recorded.path.ron`
+//! * drag with the left button: look around; W, A, S, D: walk; Q and E: turn by 30 degrees in one step
+//! * hold T or the right button: aim at the floor; release: teleport there
+//! * V: vignette on and off; I: next distance between the eyes (64, 70, 0 and 58 mm)
+//! * P: follow the recorded path, or stop; R: start recording a path; R again: write it to `recorded.path.ron`
 //!
-//! `--path FILE` follows the path of a file at once; without it, P follows that of `assets/walkthrough.path.ron`. With `--two-targets`
-//! each eye draws into its own target, and the window shows that of the left eye alone.
+//! `--path FILE` follows the path in a file from the start; without it, P follows the path in `assets/walkthrough.path.ron`. With
+//! `--two-targets` each eye draws into its own target, and the window shows only the left eye.
 //!
-//! With `--headless FOLDER`, or where there is no display, it follows the recorded path and writes N (8) pictures, a 30th of a second
-//! apart, to FOLDER (`out`) instead: both eyes in one, or with `--two-targets` two for each moment.
+//! With `--headless FOLDER`, or without a display, it follows the recorded path and writes N (8) pictures, a 30th of a second apart, to
+//! FOLDER (`out`) instead: both eyes in one picture, or with `--two-targets` two pictures for each time.
 //!
-//! Built with the feature `openxr`, it draws for a headset, on which it has not been tried: the wearer moves the head, keys and mouse do
-//! the rest. Without a headset it prints that there is none and shows the window.
+//! Built with the feature `openxr`, it draws for a headset, which has not been tested: the headset tracks the head, and keys and mouse move
+//! the body. Without a headset it prints a message and shows the window.
 
 #[path = "common/arguments.rs"]
 mod arguments;
@@ -51,13 +51,13 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use teleport::Teleport;
 
-/// Size of the picture of one eye without a window, pixels.
+/// Size of the picture of one eye without a window, in pixels.
 const EYE: UVec2 = UVec2::new(480, 480);
-/// Half the diagonal to which a capture is scaled, meters.
+/// Half of the diagonal to which a capture is scaled, in meters.
 const CAPTURE_RADIUS: f32 = 1.5;
 /// Time between pictures.
 const STEP: Duration = Duration::from_nanos(1_000_000_000 / 30);
-/// Distances between the eyes that the key I selects in turn, meters.
+/// Distances between the eyes that the key I cycles through, in meters.
 const DISTANCES: [f32; 4] = [0.064, 0.070, 0.0, 0.058];
 
 #[derive(Resource)]
@@ -107,7 +107,7 @@ fn main() -> Result {
     }
 }
 
-/// Adds the scene, with or without a window, and the path. `playing`: whether it is followed from the start.
+/// Adds the scene, with or without a window, and the path. `playing`: whether the path is followed from the start.
 fn scene(app: &mut App, capture: Capture, path: HeadPath, playing: bool) {
     app.add_plugins((GaussianCapturePlugin, ComfortPlugin))
         .insert_resource(capture)
@@ -119,7 +119,7 @@ fn scene(app: &mut App, capture: Capture, path: HeadPath, playing: bool) {
         .add_systems(Update, (arrange, path::follow.in_set(Moves)));
 }
 
-/// Adds a body with our own eyes. Returns the target of the right eye if it has its own.
+/// Adds a body with a stereo rig. Returns the target of the right eye if it has a separate one.
 fn stand(app: &mut App, two_targets: bool) -> Option<Offscreen> {
     let right = two_targets.then(|| Offscreen::new(&mut app.world_mut().resource_mut::<Assets<Image>>(), EYE));
     let window = RenderTarget::default();
@@ -168,13 +168,13 @@ fn spawn_body(mut commands: Commands, targets: Res<Targets>) {
     commands.spawn((Body::default(), START, Visibility::default())).add_child(stereo.head);
 }
 
-/// Returns the settings of every eye, ours and a headset's.
+/// Returns the camera settings of every eye, of the stereo rig or of a headset.
 fn eye_settings() -> impl Bundle {
-    // Captures are no smoother for multisampling. Their colors stay as trained.
+    // Captures need no multisampling, and keep their trained colors.
     (Msaa::Off, Tonemapping::None)
 }
 
-/// Stands a capture that has just been loaded on the floor, at a size that one can walk around.
+/// Places a newly loaded capture on the floor, at a size to walk around.
 fn arrange(
     captures: Res<Assets<GaussianCapture>>,
     capture: Single<(&GaussianCapture3d, &mut Transform)>,
@@ -203,7 +203,7 @@ fn switches(keys: Res<ButtonInput<KeyCode>>, mut comfort: ResMut<Comfort>, rig: 
     }
 }
 
-/// Renders two pictures for each time, as [`save_pictures`] renders one.
+/// Renders a pair of pictures for each time, as [`save_pictures`] renders one picture.
 fn save_pairs(app: &mut App, right: &Offscreen, count: u32, folder: &Path) -> Result {
     for index in 0..count {
         let step = if index == 0 { Duration::ZERO } else { STEP };

@@ -8,10 +8,10 @@ use bevy_gs4d::testing;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// The source of the example that this is compiled into, whose first lines are its help.
+/// The source of the compiled example. Its header is the text of `--help`.
 const SOURCE: &str = include_str!(concat!("../", env!("CARGO_CRATE_NAME"), ".rs"));
 
-/// The arguments of an example, or its defaults.
+/// The parsed arguments of an example, or its defaults.
 pub struct Arguments {
     pub file: String,
     /// The folder for pictures; `None` for a window.
@@ -19,8 +19,8 @@ pub struct Arguments {
     pub frames: u32,
 }
 
-/// Reads the command line. `more` is called with each option that not all examples have and the arguments after it, and
-/// returns whether it is an option of this example. Without a display, pictures are written in any case.
+/// Reads the command line. `more` is called with each option that is not common to all examples and with the following arguments; it
+/// returns whether the option belongs to this example. Without a display, pictures are written even without `--headless`.
 ///
 /// # Errors
 /// An unknown option, an option without its value, more than one file.
@@ -44,10 +44,10 @@ pub fn parse(
             }
             option if option.starts_with('-') => {
                 if !more(option, &mut arguments)? {
-                    return Err(format!("{option}: no such option; --help names them all").into());
+                    return Err(format!("{option}: no such option; --help lists all options").into());
                 }
             }
-            _ if files == 1 => return Err(format!("{argument}: one file is enough").into()),
+            _ if files == 1 => return Err(format!("{argument}: more than one file; name one file").into()),
             _ => {
                 parsed.file = argument;
                 files += 1;
@@ -64,7 +64,7 @@ pub fn parse(
 /// Returns the argument after an option.
 ///
 /// # Errors
-/// There is none.
+/// The option is the last argument.
 pub fn value(option: &str, what: &str, arguments: &mut dyn Iterator<Item = String>) -> Result<String> {
     Ok(arguments.next().ok_or_else(|| format!("{option} needs {what}"))?)
 }

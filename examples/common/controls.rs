@@ -1,6 +1,6 @@
-//! Shared by the examples with an orbiting camera and a window: arguments and the mouse.
+//! Shared by the examples with an orbiting camera and a window: arguments and mouse input.
 //!
-//! In: the command line, mouse input. Out: the file to show and the folder for pictures; orbiting cameras.
+//! In: the command line, mouse input. Out: the file to show and the folder for pictures; the poses of orbiting cameras.
 
 use crate::common::Orbit;
 use crate::common::arguments::{Arguments, parse};
@@ -15,7 +15,7 @@ pub fn arguments(file: &str) -> Result<Arguments> {
     parse(Arguments { file: file.into(), headless: None, frames: 8 }, |_, _| Ok(false))
 }
 
-/// Moves cameras to their places on the orbit.
+/// Moves cameras to their positions on the orbit.
 pub fn follow(mut cameras: Query<(&Orbit, &mut Transform)>) {
     for (orbit, mut transform) in &mut cameras {
         *transform = orbit.transform();

@@ -10,18 +10,19 @@ use bevy::prelude::*;
 use bevy_gs4d::asset::GaussianCapture;
 use bevy_gs4d::scene::Bounds;
 
-/// A camera that circles a point.
+/// A camera that orbits a point.
 #[derive(Component, Debug, Clone, Copy)]
 pub struct Orbit {
     pub center: Vec3,
     pub distance: f32,
-    /// Angles in radians: around, and up.
+    /// Angle around the vertical, in radians.
     pub yaw: f32,
+    /// Angle upwards, in radians.
     pub pitch: f32,
 }
 
 impl Orbit {
-    /// Returns an orbit from which the core of a capture that stands upright at the origin is visible.
+    /// Returns an orbit that shows the core of a capture standing upright at the origin.
     pub fn around(capture: &GaussianCapture) -> Self {
         let core = Bounds::core(capture.scene().iter());
         let (center, radius) = core.map_or((Vec3::ZERO, 1.0), |core| (core.center(), core.radius().max(0.1)));

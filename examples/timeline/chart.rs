@@ -1,7 +1,7 @@
-//! The chart of a timeline: which clips play when, and the playhead.
+//! The chart of a timeline: its clips, key-frames, markers and playhead.
 //!
-//! In: a timeline, its captures, the key-frames of an animation beside them. Out: bars, marks and flags in an egui panel, and the
-//! time that is pointed at.
+//! In: a timeline, its captures, the key-frames of an animation. Out: bars, marks and flags in an egui panel, and the time under the
+//! pointer.
 
 use bevy::prelude::*;
 use bevy_egui::egui::{Align2, Color32, FontId, Painter, Rect, Sense, Shape, Stroke, Ui, pos2, vec2};
@@ -20,7 +20,7 @@ pub struct Chart<'a> {
     pub animation: (&'a str, &'a [f32]),
 }
 
-/// The places of rows and times on the screen.
+/// The positions of rows and times on the screen.
 struct Scale {
     bounds: Rect,
     duration: f32,
@@ -35,7 +35,7 @@ impl Scale {
         ((x - self.bounds.left() - LABELS) / self.width() * self.duration).clamp(0.0, self.duration)
     }
 
-    /// Returns the bar from one time to another in a row; row 0 has the flags of markers.
+    /// Returns the bar between two times in a row; row 0 has the flags of markers.
     fn bar(&self, row: usize, from: f32, to: f32) -> Rect {
         let top = self.bounds.top() + ROW * row as f32;
         Rect::from_x_y_ranges(self.x(from)..=self.x(to), top + 2.0..=top + ROW - 2.0)
@@ -47,7 +47,7 @@ impl Scale {
 }
 
 impl Chart<'_> {
-    /// Draws it with the playhead at `time`. Returns the time that is pointed at while a button is down.
+    /// Draws the chart with the playhead at `time`. Returns the time under the pointer while a button is down.
     pub fn show(&self, ui: &mut Ui, time: f32) -> Option<f32> {
         let tracks = self.timeline.tracks();
         let size = vec2(WIDTH, ROW * (tracks.len() as f32 + 2.0));
@@ -86,7 +86,7 @@ impl Chart<'_> {
     }
 }
 
-/// Draws a bar whose corners are cut off by its fades.
+/// Draws a bar with corners cut off by its fades.
 fn draw_clip(painter: &Painter, scale: &Scale, row: usize, clip: &Clip, ground: Color32) {
     let bar = scale.bar(row, clip.start, clip.end());
     let color = if clip.speed < 0.0 { Color32::DARK_RED } else { Color32::DARK_BLUE };
@@ -108,7 +108,7 @@ fn marks(painter: &Painter, scale: &Scale, row: Rect, moments: &[f32]) {
     }
 }
 
-/// Returns the times when a clip shows key-frames of its capture, in seconds of the timeline.
+/// Returns the times at which a clip shows key-frames of its capture, in seconds of the timeline.
 fn key_frames(clip: &Clip, captures: &Assets<GaussianCapture>) -> Vec<f32> {
     let [first, last] = clip.range;
     let Some(key_frames) = captures.get(&clip.capture).and_then(|capture| capture.key_frames()) else {

@@ -1,4 +1,4 @@
-//! The body: what walks, turns and carries the head.
+//! The body: walks, turns and carries the head.
 //!
 //! In: mouse and keys. Out: the transforms of body and head.
 
@@ -7,24 +7,24 @@ use bevy::prelude::*;
 use bevy_gs4d::stereo::StereoRig;
 use std::f32::consts::FRAC_PI_6;
 
-/// Height of the head above the floor, meters.
+/// Height of the head above the floor, in meters.
 pub const EYE_HEIGHT: f32 = 1.6;
-/// Where the body stands at first.
+/// Start pose of the body.
 pub const START: Transform = Transform::from_xyz(0.0, 0.0, 3.3);
-/// Speed of walking, meters per second.
+/// Walking speed, in meters per second.
 const SPEED: f32 = 1.5;
-/// How quickly walking starts and stops, per second.
+/// Rate at which the velocity approaches the wanted one, per second.
 const EAGERNESS: f32 = 8.0;
-/// Rotation for a motion of the mouse, radians per pixel.
+/// Rotation per motion of the mouse, in radians per pixel.
 const SENSITIVITY: f32 = 0.004;
 
-/// Stands on the floor and turns about the vertical only: the space in which a headset tracks the head, or a body in its place.
+/// The body: it stands on the floor and turns only about the vertical. With a headset, it is the tracking space of the head.
 #[derive(Component, Default)]
 pub struct Body {
     velocity: Vec3,
 }
 
-/// The viewpoint, from which aiming begins: the middle of our eyes, or one eye of a headset.
+/// The viewpoint for walking and aiming: the head of the stereo rig, or one eye of a headset.
 #[derive(Component)]
 pub struct Head;
 
@@ -32,7 +32,7 @@ pub struct Head;
 #[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Moves;
 
-/// Turns the body and tilts the head with the mouse. The wearer of a headset tilts the head.
+/// Turns the body and, without a headset, tilts the head with the mouse.
 pub fn look_around(
     buttons: Res<ButtonInput<MouseButton>>,
     motion: Res<AccumulatedMouseMotion>,
@@ -67,7 +67,7 @@ pub fn walk(
     place.translation += body.velocity * seconds;
 }
 
-/// Turns by 30 degrees at once, about the head, because a smooth turn may cause motion sickness.
+/// Turns the body by 30 degrees about the head in one step, because a smooth turn may cause motion sickness.
 pub fn snap_turn(
     keys: Res<ButtonInput<KeyCode>>,
     mut body: Single<&mut Transform, With<Body>>,
@@ -97,9 +97,12 @@ mod tests {
             app.update();
             let turned = *app.world().get::<Transform>(entity).expect("a body");
             let [before, after] = [body, turned].map(|body| (body * head).translation);
-            assert!(before.abs_diff_eq(after, 1e-5), "the head stays at {before} and is at {after}");
+            assert!(before.abs_diff_eq(after, 1e-5), "the head moved from {before} to {after}");
             let turn = turned.rotation * body.rotation.inverse();
-            assert!(turn.abs_diff_eq(Quat::from_rotation_y(angle), 1e-5), "by 30 degrees, and not by {turn}");
+            assert!(
+                turn.abs_diff_eq(Quat::from_rotation_y(angle), 1e-5),
+                "the body turned by {turn}, not by 30 degrees"
+            );
         }
     }
 }

@@ -1,6 +1,6 @@
-//! Comfort: black in front of the eyes, which closes in from the edges while the body moves, and covers the view while it teleports.
+//! Comfort: a vignette that closes while the body moves, and a black curtain that covers the view during a teleport.
 //!
-//! In: the motion of the body. Out: for each eye a ring and a curtain, meshes that only this eye sees.
+//! In: the motion of the body. Out: for each eye a ring (the vignette) and a curtain, meshes that only this eye sees.
 
 use super::body::{Body, Moves};
 use super::path::wrapped;
@@ -11,21 +11,21 @@ use bevy::mesh::{Indices, PrimitiveTopology};
 use bevy::prelude::*;
 use std::f32::consts::TAU;
 
-/// Distance from the eye, meters: behind the near plane (a headset's is at 0.1), before everything else.
+/// Distance from the eye in meters: behind the near plane (0.1 for a headset), in front of the scene.
 const DISTANCE: f32 = 0.15;
-/// The ring's radii as tangents of the angle from the middle, and how much they hide, while it is closed.
+/// Radii of the closed ring, as tangents of the angle from the view direction, with the opacity at each radius.
 const RADII: [(f32, f32); 3] = [(0.45, 0.0), (0.75, 1.0), (12.0, 1.0)];
 /// Factor on the ring's size just before it disappears.
 const OPEN: f32 = 4.0;
 const SEGMENTS: u32 = 48;
-/// Seconds until the ring is closed, and until it is open.
+/// Time in which the ring closes or opens, in seconds.
 const EASE: f32 = 0.25;
-/// Meters and radians per second at which it closes entirely.
+/// Speed at which the ring closes fully, in meters or radians per second.
 const FAST: f32 = 0.8;
-/// Meters and radians per second above which a motion is a jump: a teleport or a snap turn.
+/// Speeds in meters and radians per second above which a motion is a jump: a teleport or a snap turn.
 const JUMP: [f32; 2] = [12.0, 10.0];
 
-/// A camera that is one of the eyes; 0 is the left one.
+/// The index of an eye's camera; 0 is the left eye.
 #[derive(Component)]
 pub struct EyeView(pub usize);
 
@@ -35,7 +35,7 @@ struct Ring;
 #[derive(Component)]
 struct Curtain;
 
-/// Whether the edges close, and how far they are closed, 0 to 1.
+/// Whether the vignette is on, and how far it is closed, from 0 to 1.
 #[derive(Resource)]
 pub struct Comfort {
     pub vignette: bool,
@@ -74,7 +74,7 @@ impl FromWorld for Cloth {
     }
 }
 
-/// Adds everything for comfort. Add it after `DefaultPlugins`.
+/// Adds rings and curtains to all eyes. Add it after `DefaultPlugins`.
 pub struct ComfortPlugin;
 
 impl Plugin for ComfortPlugin {
@@ -85,7 +85,7 @@ impl Plugin for ComfortPlugin {
     }
 }
 
-/// Returns a ring about the −z axis, at distance 1: clear inside, black outside.
+/// Returns a ring around the −z axis at distance 1: clear inside, black outside.
 fn ring() -> Mesh {
     let (mut positions, mut colors, mut indices) = (Vec::new(), Vec::new(), Vec::new());
     for (radius, alpha) in RADII {
@@ -111,7 +111,7 @@ fn ring() -> Mesh {
         .with_inserted_indices(Indices::U32(indices))
 }
 
-/// Gives every new eye its own ring and curtain, on a layer of its own.
+/// Adds a ring and a curtain to every new eye, on a separate render layer.
 fn hang(mut commands: Commands, cloth: Res<Cloth>, eyes: Query<(Entity, &EyeView), Added<EyeView>>) {
     for (eye, view) in &eyes {
         let layer = 1 + view.0;
@@ -125,7 +125,7 @@ fn hang(mut commands: Commands, cloth: Res<Cloth>, eyes: Query<(Entity, &EyeView
     }
 }
 
-/// Closes the rings while the body moves or turns, and opens them while it stands.
+/// Closes the rings while the body moves or turns, and opens them while it is at rest.
 fn close(
     time: Res<Time>,
     body: Option<Single<&Transform, With<Body>>>,
@@ -147,7 +147,7 @@ fn close(
     }
 }
 
-/// Returns the motion from one place and direction to another in `seconds`: 0 for none or a jump, 1 from [`FAST`] on.
+/// Returns the strength of a motion between two poses in `seconds`: 0 at rest or for a jump, 1 from [`FAST`] on.
 fn motion(before: (Vec3, f32), now: (Vec3, f32), seconds: f32) -> f32 {
     let (speed, turn) = (before.0.distance(now.0) / seconds, wrapped(now.1 - before.1).abs() / seconds);
     if speed > JUMP[0] || turn > JUMP[1] { 0.0 } else { (speed.max(turn) / FAST).min(1.0) }
@@ -182,26 +182,26 @@ mod tests {
     const FRAME: f32 = 1.0 / 60.0;
 
     #[test]
-    fn walking_and_turning_are_motion() {
+    fn walking_and_turning_close_the_vignette() {
         let still = (Vec3::new(1.0, 0.0, 2.0), 0.5);
-        assert_eq!(motion(still, still, FRAME), 0.0, "who stands does not move");
+        assert_eq!(motion(still, still, FRAME), 0.0, "a body at rest has no motion");
         let walked = (still.0 + Vec3::X * 1.5 * FRAME, still.1);
-        assert_eq!(motion(still, walked, FRAME), 1.0, "walking closes the edges");
+        assert_eq!(motion(still, walked, FRAME), 1.0, "walking closes the vignette");
         let slow = motion(still, (still.0 + Vec3::X * 0.4 * FRAME, still.1), FRAME);
-        assert!((slow - 0.5).abs() < 1e-3, "half as fast as what closes them, {slow}");
+        assert!((slow - 0.5).abs() < 1e-3, "half of the full speed closes it by half, not by {slow}");
         let turned = motion((still.0, PI - 0.01), (still.0, 0.01 - PI), FRAME);
-        assert_eq!(turned, 1.0, "turning does, too, also past half a turn");
+        assert_eq!(turned, 1.0, "turning across the angle of half a turn closes the vignette");
     }
 
     #[test]
-    fn a_jump_is_no_motion() {
+    fn a_jump_does_not_close_the_vignette() {
         let before = (Vec3::ZERO, 0.0);
-        assert_eq!(motion(before, (Vec3::new(2.0, 0.0, -1.0), 0.0), FRAME), 0.0, "a teleport");
-        assert_eq!(motion(before, (Vec3::ZERO, FRAC_PI_6), FRAME), 0.0, "a snap turn");
+        assert_eq!(motion(before, (Vec3::new(2.0, 0.0, -1.0), 0.0), FRAME), 0.0, "a teleport is a jump");
+        assert_eq!(motion(before, (Vec3::ZERO, FRAC_PI_6), FRAME), 0.0, "a snap turn is a jump");
     }
 
-    /// Returns whether the ring shows, and how large it is for its distance, after the body has gone `step` meters in
-    /// each of `frames` frames.
+    /// Returns whether the ring is visible, and its size relative to its distance, after the body has moved `step` meters in each of
+    /// `frames` frames.
     fn walk(app: &mut App, step: f32, frames: usize) -> (bool, f32) {
         for _ in 0..frames {
             let mut body = app.world_mut().query_filtered::<&mut Transform, With<Body>>();
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn the_edges_close_while_the_body_walks_and_open_when_it_stands() {
+    fn the_vignette_closes_while_the_body_walks_and_opens_at_rest() {
         let mut app = App::new();
         app.add_plugins((MinimalPlugins, AssetPlugin::default()));
         app.init_asset::<Mesh>().init_asset::<StandardMaterial>().init_resource::<Teleport>();
@@ -222,11 +222,11 @@ mod tests {
         app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_millis(50)));
         app.world_mut().spawn((Body::default(), Transform::default()));
         app.world_mut().spawn((EyeView(0), Transform::default()));
-        assert!(!walk(&mut app, 0.0, 3).0, "at rest nothing is in the way");
+        assert!(!walk(&mut app, 0.0, 3).0, "the ring is hidden at rest");
         let (shows, size) = walk(&mut app, 0.05, 10);
-        assert!(shows && (size - 1.0).abs() < 1e-3, "half a second of walking closes them, to {size}");
-        assert!(!walk(&mut app, 0.0, 10).0, "half a second of rest opens them");
+        assert!(shows && (size - 1.0).abs() < 1e-3, "half a second of walking closes the ring, not to {size}");
+        assert!(!walk(&mut app, 0.0, 10).0, "half a second of rest opens the ring");
         app.world_mut().resource_mut::<Comfort>().vignette = false;
-        assert!(!walk(&mut app, 0.05, 10).0, "unless it is switched off");
+        assert!(!walk(&mut app, 0.05, 10).0, "the ring stays hidden while the vignette is off");
     }
 }

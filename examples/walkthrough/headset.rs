@@ -1,6 +1,7 @@
 //! A headset, with the feature `openxr`.
 //!
-//! In: an app without plugins, and Bevy's. Out: the app with them and, if there is a headset, a body and eyes that are its wearer's.
+//! In: an app without plugins, and Bevy's plugins. Out: the app with these plugins and, if there is a headset, a tracked body and the eyes
+//! of the headset.
 
 use bevy::app::PluginGroupBuilder;
 use bevy::prelude::*;
@@ -12,7 +13,7 @@ pub fn add_plugins(app: &mut App, plugins: PluginGroupBuilder) -> bool {
     false
 }
 
-/// Adds the plugins and those for OpenXR; returns whether there is a headset.
+/// Adds the plugins and the plugins of OpenXR; returns whether there is a headset.
 #[cfg(feature = "openxr")]
 pub fn add_plugins(app: &mut App, plugins: PluginGroupBuilder) -> bool {
     worn::add_plugins(app, plugins)
@@ -33,7 +34,7 @@ mod worn {
     use bevy_mod_xr::session::XrTrackingRoot;
 
     pub fn add_plugins(app: &mut App, plugins: PluginGroupBuilder) -> bool {
-        // Without pipelining the pose of the head is the newest.
+        // Without pipelining, frames use the newest pose of the head.
         app.add_plugins(add_xr_plugins(plugins.disable::<PipelinedRenderingPlugin>()));
         let found = app.world().contains_resource::<OxrInstance>();
         if found {
@@ -43,17 +44,17 @@ mod worn {
                 .add_systems(Startup, give_body)
                 .add_systems(Update, give_eyes);
         } else {
-            eprintln!("no OpenXR runtime or no headset: both eyes go side by side into the window");
+            eprintln!("no OpenXR runtime or no headset: the window shows both eyes side by side");
         }
         found
     }
 
-    /// Makes the space that the headset is tracked in the body, which walks and teleports.
+    /// Makes the tracking space of the headset the body, which walks and teleports.
     fn give_body(mut commands: Commands, root: Single<Entity, With<XrTrackingRoot>>) {
         commands.entity(*root).insert((Body::default(), START));
     }
 
-    /// Inserts the settings of eyes on the headset's cameras, which have lenses and poses already.
+    /// Inserts the eye settings into the headset's cameras, which already have lenses and poses.
     fn give_eyes(mut commands: Commands, eyes: Query<(Entity, &XrCamera), Added<XrCamera>>) {
         for (entity, camera) in &eyes {
             let mut eye = commands.entity(entity);

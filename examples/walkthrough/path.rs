@@ -1,6 +1,6 @@
-//! A recorded path of the head: following it, and recording it.
+//! A path of the head: follows a recorded path, and records one.
 //!
-//! In: a RON file of poses, or the moving head. Out: the transforms of body and head at any time, or a file.
+//! In: a RON file of poses, or the moving head. Out: the transforms of body and head at each time, or a file.
 
 use super::body::{Body, EYE_HEIGHT, Head};
 use super::teleport::Teleport;
@@ -13,10 +13,10 @@ use std::path::Path;
 
 /// Seconds between recorded poses.
 const SPACING: f32 = 0.1;
-/// Where recordings are written.
+/// The file that recordings are written to.
 const RECORDING: &str = "recorded.path.ron";
 
-/// The pose of the head at a time.
+/// A pose of the head.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pose {
@@ -42,12 +42,12 @@ impl Pose {
     }
 }
 
-/// Poses in the order of time, at least one.
+/// Poses in order of time, at least one.
 #[derive(Resource)]
 pub struct HeadPath(Vec<Pose>);
 
 impl HeadPath {
-    /// Reads the path of a file, or the bundled one.
+    /// Reads a path from a file, or the bundled path.
     ///
     /// # Errors
     /// A file that cannot be read or is not a valid path.
@@ -70,7 +70,7 @@ impl HeadPath {
         let mut before: Option<Pose> = None;
         for (number, pose) in (1..).zip(&mut poses) {
             if !pose.time.is_finite() || !pose.values().iter().all(|value| value.is_finite()) {
-                return Err(format!("pose {number}: everything must be a finite number"));
+                return Err(format!("pose {number}: every value must be a finite number"));
             }
             if let Some(before) = before {
                 if pose.time <= before.time {
@@ -87,8 +87,8 @@ impl HeadPath {
         self.0.last().map_or(0.0, |pose| pose.time)
     }
 
-    /// Returns the pose at a time: along a smooth curve through the poses, which starts and ends at rest; constant
-    /// before and after it.
+    /// Returns the pose at a time, on a smooth curve through the poses. The curve starts and ends at rest, and is constant before and
+    /// after.
     fn at(&self, seconds: f32) -> Pose {
         let Some(last) = self.0.len().checked_sub(1).filter(|last| *last > 0) else { return self.0[0] };
         let next = self.0.partition_point(|pose| pose.time <= seconds).clamp(1, last);
@@ -110,31 +110,31 @@ impl HeadPath {
     }
 }
 
-/// Evaluates the cubic from one value to another with given slopes at both ends; `s` from 0 to 1.
+/// Evaluates the cubic between two values with given slopes at both ends; `s` is from 0 to 1.
 fn hermite(s: f32, [a, b]: [f32; 2], [from, to]: [f32; 2]) -> f32 {
     let (s2, s3) = (s * s, s * s * s);
     let rise = 3.0 * s2 - 2.0 * s3;
     a * (1.0 - rise) + b * rise + from * (s3 - 2.0 * s2 + s) + to * (s3 - s2)
 }
 
-/// Returns an angle as one from −π to π.
+/// Returns an angle wrapped to −π to π.
 pub fn wrapped(angle: f32) -> f32 {
     (angle + PI).rem_euclid(TAU) - PI
 }
 
-/// How far along the path the head is.
+/// The state of following the path.
 #[derive(Resource)]
 pub struct PathPlayer {
     pub playing: bool,
     pub seconds: f32,
 }
 
-/// Returns whether the body is free: no path is followed.
+/// Returns whether the body can walk: no path is being followed.
 pub fn walking(player: Res<PathPlayer>) -> bool {
     !player.playing
 }
 
-/// Starts to follow the path from its beginning, or stops, when P is pressed.
+/// Starts following the path from its start, or stops, when P is pressed.
 pub fn start(keys: Res<ButtonInput<KeyCode>>, mut player: ResMut<PathPlayer>, mut teleport: ResMut<Teleport>) {
     if keys.just_pressed(KeyCode::KeyP) {
         *player = PathPlayer { playing: !player.playing, seconds: 0.0 };
@@ -179,7 +179,7 @@ pub fn record(
         match recorder.poses.take() {
             Some(poses) => save(&poses),
             None => {
-                info!("recording; R ends it");
+                info!("recording; R stops the recording");
                 *recorder = Recorder { poses: Some(Vec::new()), seconds: 0.0 };
             }
         }
@@ -192,7 +192,7 @@ pub fn record(
     }
 }
 
-/// Returns the text of poses, as [`HeadPath::read`] reads it.
+/// Returns poses as text for [`HeadPath::read`].
 fn text(poses: &[Pose]) -> Result<String, String> {
     let lines = ron::ser::PrettyConfig::default().depth_limit(1);
     ron::ser::to_string_pretty(poses, lines).map_err(|error| error.to_string())
@@ -201,7 +201,7 @@ fn text(poses: &[Pose]) -> Result<String, String> {
 fn save(poses: &[Pose]) {
     let written = text(poses).and_then(|text| std::fs::write(RECORDING, text).map_err(|error| error.to_string()));
     match written {
-        Ok(()) => info!("{} poses in {RECORDING}: --path {RECORDING} goes that way", poses.len()),
+        Ok(()) => info!("{} poses in {RECORDING}: --path {RECORDING} follows them", poses.len()),
         Err(error) => error!("{RECORDING}: {error}"),
     }
 }
@@ -216,32 +216,32 @@ mod tests {
     }
 
     #[test]
-    fn a_recorded_path_reads_back() {
+    fn a_recorded_path_survives_a_round_trip() {
         let ways = [(Vec3::new(0.5, 1.6, 3.0), 0.7, -0.3), (Vec3::new(1.5, 1.5, -2.0), -1.2, 0.4), (Vec3::Y, 0.0, 0.0)];
         let poses: Vec<Pose> = (0u8..)
             .zip(ways)
             .map(|(step, (place, yaw, pitch))| Pose::of(f32::from(step), &head(place, yaw, pitch)))
             .collect();
-        let path = HeadPath::read(&text(&poses).expect("poses can be written")).expect("and read");
-        assert_eq!(path.duration(), 2.0, "as long as it took");
+        let path = HeadPath::read(&text(&poses).expect("poses can be written")).expect("written poses can be read");
+        assert_eq!(path.duration(), 2.0, "the path has the duration of the recording");
         for (pose, (place, yaw, pitch)) in poses.iter().zip(ways) {
             let read = path.at(pose.time);
             let [x, y, z, read_yaw, read_pitch] = read.values();
             assert!(place.abs_diff_eq(Vec3::new(x, y, z), 1e-5), "at {} s the head is at {place}", pose.time);
             let off = (read_yaw - yaw).abs().max((read_pitch - pitch).abs());
-            assert!(off < 1e-5, "in the same direction: {off} radians off");
+            assert!(off < 1e-5, "at {} s the direction is {off} radians off", pose.time);
         }
     }
 
     #[test]
-    fn a_path_that_makes_no_sense_names_its_pose() {
+    fn errors_of_an_invalid_path_name_the_pose() {
         let pose = |time: &str| format!("(time: {time}, position: (0.0, 1.6, 0.0), yaw: 0.0, pitch: 0.0)");
         let refused = |second: &str| HeadPath::read(&format!("[{}, {}]", pose("0.0"), pose(second))).err();
-        assert!(refused("1.0").is_none(), "in the order of time");
+        assert!(refused("1.0").is_none(), "poses in order of time are valid");
         for time in ["0.0", "-1.0", "NaN", "inf"] {
             let message = refused(time).unwrap_or_default();
-            assert!(message.contains("pose 2"), "{time} s for the second pose: {message:?}");
+            assert!(message.contains("pose 2"), "the error for a second pose at {time} s names it: {message:?}");
         }
-        assert!(HeadPath::read("[]").is_err(), "no pose is no path");
+        assert!(HeadPath::read("[]").is_err(), "a path without poses is an error");
     }
 }

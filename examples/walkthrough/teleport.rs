@@ -1,20 +1,20 @@
-//! Teleporting: aim at the floor along the path of a thrown object, let go, and arrive after a moment of darkness.
+//! Teleporting: the key is held to aim at the floor along a ballistic curve and released to teleport, during a fade to black.
 //!
-//! In: the pose of the head, keys and buttons. Out: another place of the body, the darkness of the view, and dots that show the aim.
+//! In: the pose of the head, keys and buttons. Out: a new position of the body, the darkness of the view, and dots that show the aim.
 
 use super::body::{Body, Head, Moves};
 use super::path::{follow, walking};
 use bevy::prelude::*;
 
-/// Radius of the floor, meters.
+/// Radius of the floor, in meters.
 pub const FLOOR_RADIUS: f32 = 8.0;
-/// Speed of the throw, meters per second.
+/// Speed of the throw, in meters per second.
 const THROW: f32 = 6.0;
-/// Gravity, meters per second squared.
+/// Gravity, in meters per second squared.
 const GRAVITY: f32 = 9.8;
-/// From the head to the hand that throws, meters.
+/// Offset from the head to the start of the throw, in meters.
 const HAND: Vec3 = Vec3::new(0.15, -0.3, -0.1);
-/// Seconds until the view is dark, and until it is not.
+/// Time of a fade to or from black, in seconds.
 const FADE: f32 = 0.12;
 const DOTS: u32 = 12;
 
@@ -23,7 +23,7 @@ const DOTS: u32 = 12;
 pub enum Teleport {
     #[default]
     Idle,
-    /// At this place; `None` if the aim misses the floor.
+    /// Aiming at this position; `None` if the aim misses the floor.
     Aiming(Option<Vec3>),
     Leaving {
         to: Vec3,
@@ -35,7 +35,7 @@ pub enum Teleport {
 }
 
 impl Teleport {
-    /// Returns the darkness of the view, 0 to 1.
+    /// Returns the darkness of the view, from 0 to 1.
     pub fn dark(&self) -> f32 {
         match self {
             Self::Idle | Self::Aiming(_) => 0.0,
@@ -43,7 +43,7 @@ impl Teleport {
         }
     }
 
-    /// Stops aiming. A teleport that has begun is completed.
+    /// Stops aiming. A teleport that has started is completed.
     pub fn stop_aiming(&mut self) {
         if matches!(self, Self::Aiming(_)) {
             *self = Self::Idle;
@@ -51,7 +51,7 @@ impl Teleport {
     }
 }
 
-/// A throw.
+/// The ballistic curve of the aim.
 struct Throw {
     from: Vec3,
     velocity: Vec3,
@@ -66,13 +66,13 @@ impl Throw {
         self.from + self.velocity * seconds - Vec3::Y * (GRAVITY / 2.0 * seconds * seconds)
     }
 
-    /// Returns the seconds until it meets the height of the floor.
+    /// Returns the time until the curve reaches the height of the floor, in seconds.
     fn flight(&self) -> f32 {
         let up = self.velocity.y;
         (up + (up * up + 2.0 * GRAVITY * self.from.y.max(0.0)).sqrt()) / GRAVITY
     }
 
-    /// Returns where it meets the floor; `None` beyond the floor's edge.
+    /// Returns the point where the curve reaches the floor; `None` beyond the floor's edge.
     fn landing(&self) -> Option<Vec3> {
         let place = self.at(self.flight()).with_y(0.0);
         (place.length() < FLOOR_RADIUS).then_some(place)
@@ -83,7 +83,7 @@ impl Throw {
 #[derive(Component)]
 pub struct Marker;
 
-/// A dot at this share of the flight.
+/// A dot at this fraction of the flight.
 #[derive(Component)]
 pub struct Dot(f32);
 
@@ -97,19 +97,19 @@ pub fn setup(
     commands.spawn((Marker, Mesh3d(meshes.add(Cylinder::new(0.25, 0.02))), material.clone(), Visibility::Hidden));
     let dot = meshes.add(Sphere::new(0.02));
     for index in 1..=DOTS {
-        let share = Dot(index as f32 / DOTS as f32);
-        commands.spawn((share, Mesh3d(dot.clone()), material.clone(), Visibility::Hidden));
+        let dot_on_curve = Dot(index as f32 / DOTS as f32);
+        commands.spawn((dot_on_curve, Mesh3d(dot.clone()), material.clone(), Visibility::Hidden));
     }
 }
 
-/// Adds aiming by keys, and the teleport that follows. While a recorded path is followed there is no aiming, but a
-/// teleport that has begun is completed, or the view would stay dark.
+/// Adds aiming by keys and the teleport. Aiming is disabled while a recorded path is followed, but a teleport that has started is
+/// completed, since the view would otherwise stay dark.
 pub fn plugin(app: &mut App) {
     app.add_systems(Update, (aim.run_if(walking), travel).chain().before(follow).in_set(Moves))
         .add_systems(Update, show.after(Moves));
 }
 
-/// Aims while T or the right button is held; letting go starts the teleport.
+/// Aims while T or the right button is held; the release starts the teleport.
 fn aim(
     keys: Res<ButtonInput<KeyCode>>,
     buttons: Res<ButtonInput<MouseButton>>,
@@ -126,7 +126,7 @@ fn aim(
     teleport.set_if_neq(next);
 }
 
-/// Darkens the view, puts the head above the place, and brightens the view again.
+/// Fades the view to black, moves the head above the target, and fades the view in again.
 fn travel(
     time: Res<Time>,
     head: Single<&GlobalTransform, With<Head>>,
@@ -147,7 +147,7 @@ fn travel(
     teleport.set_if_neq(next);
 }
 
-/// Places marker and dots along the aim.
+/// Places the marker and the dots along the aim.
 fn show(
     teleport: Res<Teleport>,
     head: Single<&GlobalTransform, With<Head>>,
@@ -174,11 +174,12 @@ mod tests {
     use super::*;
     use std::time::Duration;
 
-    /// Returns an app with a body, its head above a place beside it, and a teleport.
+    /// Start position of the body; [`HEAD`] is not above it.
     const BODY: Vec3 = Vec3::new(1.0, 0.0, 0.0);
     const HEAD: Vec3 = Vec3::new(1.5, 1.6, 0.5);
     const TARGET: Vec3 = Vec3::new(3.0, 0.0, -1.0);
 
+    /// Returns an app with a body, its head, and a teleport in the given state.
     fn app(teleport: Teleport) -> App {
         let mut app = App::new();
         app.init_resource::<Time>()
@@ -212,38 +213,41 @@ mod tests {
     }
 
     #[test]
-    fn travel_goes_dark_arrives_and_clears() {
+    fn a_teleport_fades_out_moves_the_body_and_fades_in() {
         let mut app = app(Teleport::Leaving { to: TARGET, dark: 0.0 });
         let half = pass(&mut app, 0.5).dark();
-        assert!((half - 0.5).abs() < 1e-3 && body(&mut app) == BODY, "half dark, {half}, and still there");
-        assert_eq!(pass(&mut app, 0.6).dark(), 1.0, "all dark");
+        assert!(
+            (half - 0.5).abs() < 1e-3 && body(&mut app) == BODY,
+            "after half of the fade the view is half dark, not {half}, and the body has not moved"
+        );
+        assert_eq!(pass(&mut app, 0.6).dark(), 1.0, "the view is black when the body moves");
         let expected = BODY + (TARGET - HEAD).with_y(0.0);
-        assert!(body(&mut app).abs_diff_eq(expected, 1e-6), "the head is above the place, the body at {expected}");
+        assert!(body(&mut app).abs_diff_eq(expected, 1e-6), "the head is above the target, the body at {expected}");
         let brighter = pass(&mut app, 0.25).dark();
-        assert!((brighter - 0.75).abs() < 1e-3, "it gets brighter: {brighter}");
-        assert_eq!(pass(&mut app, 0.8), Teleport::Idle, "until all is seen");
-        assert!(body(&mut app).abs_diff_eq(expected, 1e-6), "from the new place");
+        assert!((brighter - 0.75).abs() < 1e-3, "the view fades in to a darkness of 0.75, not {brighter}");
+        assert_eq!(pass(&mut app, 0.8), Teleport::Idle, "the teleport ends after the fade");
+        assert!(body(&mut app).abs_diff_eq(expected, 1e-6), "the body stays at the target");
     }
 
     #[test]
-    fn a_recorded_way_that_begins_meanwhile_does_not_stay_dark() {
+    fn a_teleport_is_completed_when_a_recorded_path_starts() {
         let mut app = app(Teleport::Leaving { to: TARGET, dark: 0.5 });
         press(&mut app, KeyCode::KeyP);
         pass(&mut app, 0.25);
-        assert!(app.world().resource::<PathPlayer>().playing, "the way has begun");
+        assert!(app.world().resource::<PathPlayer>().playing, "the path is being followed");
         for _ in 0..8 {
             pass(&mut app, 0.25);
         }
-        assert_eq!(*app.world().resource::<Teleport>(), Teleport::Idle, "and is seen");
+        assert_eq!(*app.world().resource::<Teleport>(), Teleport::Idle, "the teleport is completed");
     }
 
     #[test]
-    fn aiming_ends_when_a_recorded_way_begins() {
+    fn aiming_ends_when_a_recorded_path_starts() {
         let mut app = app(Teleport::Idle);
         press(&mut app, KeyCode::KeyT);
-        assert!(matches!(pass(&mut app, 0.25), Teleport::Aiming(_)), "T aims");
+        assert!(matches!(pass(&mut app, 0.25), Teleport::Aiming(_)), "holding T aims");
         press(&mut app, KeyCode::KeyP);
-        assert_eq!(pass(&mut app, 0.25), Teleport::Idle, "P ends it");
-        assert_eq!(pass(&mut app, 0.25), Teleport::Idle, "though T is still held");
+        assert_eq!(pass(&mut app, 0.25), Teleport::Idle, "P stops aiming");
+        assert_eq!(pass(&mut app, 0.25), Teleport::Idle, "aiming stays off while T is held");
     }
 }

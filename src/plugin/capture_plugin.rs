@@ -33,7 +33,7 @@ impl Plugin for GaussianCapturePlugin {
     fn build(&self, app: &mut App) {
         assert!(
             !app.is_plugin_added::<Self>(),
-            "GaussianCapturePlugin was added twice: remove one of the two. Another plugin of the game may also add it"
+            "GaussianCapturePlugin was added twice: remove one of them. Another plugin of the game may also add it"
         );
         assert!(
             app.world().contains_resource::<AssetServer>(),

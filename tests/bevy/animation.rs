@@ -1,4 +1,4 @@
-//! Playback animated by Bevy's own animations.
+//! Playback animated by Bevy's animations.
 //!
 //! In: an `AnimationClip` with curves over fields of a `Playback`. Out: proof that playback follows the curves. Needs
 //! neither a GPU nor a window.
@@ -10,13 +10,13 @@ use bevy::prelude::*;
 use bevy_gs4d::playback::{Clip, Track};
 use bevy_gs4d::prelude::*;
 
-/// Spawns a capture of four seconds whose playback an animation of two seconds animates.
+/// Spawns a capture of four seconds, with its playback animated for two seconds.
 fn spawn(app: &mut App, playback: Playback, curve: impl AnimationCurve) -> Entity {
     let capture = capture(app, 4.0, 4);
     animate(app, (GaussianCapture3d(capture), playback), curve)
 }
 
-/// Spawns an entity that an animation of two seconds animates.
+/// Spawns an entity with an animation of two seconds.
 fn animate(app: &mut App, bundle: impl Bundle, curve: impl AnimationCurve) -> Entity {
     let target = AnimationTargetId::from_name(&Name::new("capture"));
     let mut clip = AnimationClip::default();
@@ -28,7 +28,7 @@ fn animate(app: &mut App, bundle: impl Bundle, curve: impl AnimationCurve) -> En
     player.play(node);
     let entity = app.world_mut().spawn((bundle, target)).id();
     app.world_mut().entity_mut(entity).insert((AnimatedBy(entity), player, AnimationGraphHandle(graph)));
-    // Bevy prepares the graph.
+    // Bevy prepares the animation graph in these updates.
     pass(app, 0.0);
     pass(app, 0.0);
     entity
@@ -53,10 +53,10 @@ fn an_animation_can_scrub_a_capture() {
     });
     pass(&mut app, 0.25);
     pass(&mut app, 0.25);
-    assert_eq!(get::<Playback>(&app, entity).time, 2.0, "with the animation paused it stands");
+    assert_eq!(get::<Playback>(&app, entity).time, 2.0, "playback stands still while the animation is paused");
     let said = take_events(&mut app);
-    assert_eq!(said.len(), 5, "to 3 and four times on: {said:?}");
-    assert!(said.iter().all(|message| message.starts_with("PlaybackSeeked")), "all are seeks: {said:?}");
+    assert_eq!(said.len(), 5, "one event for the start at 3 s and four for the steps: {said:?}");
+    assert!(said.iter().all(|message| message.starts_with("PlaybackSeeked")), "every event is a seek: {said:?}");
 }
 
 #[test]
@@ -69,8 +69,12 @@ fn an_animation_can_slow_a_capture_down() {
         pass(&mut app, 1.0 / 32.0);
     }
     let playback = get::<Playback>(&app, entity);
-    assert!((playback.time - 1.0).abs() < 0.05, "a speed from 1 to 0 in two seconds plays one, not {}", playback.time);
-    assert!(playback.speed < 0.05, "and ends slow, not at {}", playback.speed);
+    assert!(
+        (playback.time - 1.0).abs() < 0.05,
+        "a speed from 1 to 0 in two seconds plays one second, not {}",
+        playback.time
+    );
+    assert!(playback.speed < 0.05, "the speed ends near 0, not at {}", playback.speed);
 }
 
 #[test]
@@ -85,9 +89,9 @@ fn an_animation_can_pause_a_capture() {
     for _ in 0..7 {
         pass(&mut app, 0.25);
     }
-    assert_eq!(get::<Playback>(&app, entity).time, 1.0, "it plays for a second");
+    assert_eq!(get::<Playback>(&app, entity).time, 1.0, "the capture plays for one second");
     let paused = debug(&PlaybackPaused { entity });
-    assert_eq!(take_events(&mut app).iter().filter(|said| **said == paused).count(), 1, "and is paused once");
+    assert_eq!(take_events(&mut app).iter().filter(|said| **said == paused).count(), 1, "one pause event is sent");
 }
 
 #[test]
@@ -99,9 +103,9 @@ fn an_animation_can_move_the_out_point() {
     for _ in 0..6 {
         pass(&mut app, 0.25);
     }
-    assert_eq!(get::<Playback>(&app, entity).time, 1.5, "not yet at the end that comes towards it");
+    assert_eq!(get::<Playback>(&app, entity).time, 1.5, "playback has not reached the moving out point");
     pass(&mut app, 0.25);
-    assert_eq!(get::<Playback>(&app, entity).time, 0.25, "past it, it is back at the start");
+    assert_eq!(get::<Playback>(&app, entity).time, 0.25, "playback loops to the start after the out point");
 }
 
 #[test]
@@ -110,7 +114,7 @@ fn an_animation_can_scrub_a_timeline() {
     app.add_plugins(AnimationPlugin);
     let clip = Clip { capture: capture(&mut app, 4.0, 4), start: 0.0, range: [0.0, 4.0], speed: 1.0, fade: [0.0; 2] };
     let track = Track { name: "left".into(), clips: vec![clip] };
-    let timeline = Timeline::new(vec![track], Vec::new(), None).expect("makes sense");
+    let timeline = Timeline::new(vec![track], Vec::new(), None).expect("a valid timeline");
     let timeline = app.world_mut().resource_mut::<Assets<Timeline>>().add(timeline);
     let curve = AnimatableCurve::new(animated_field!(Playback::time), ramp(3.0, 1.0));
     let player = animate(&mut app, (TimelinePlayer(timeline), Playback::paused_at(0.0)), curve);
@@ -120,7 +124,7 @@ fn an_animation_can_scrub_a_timeline() {
         pass(&mut app, 0.25);
         assert_eq!(get::<Playback>(&app, player).time, expected, "the curve's value, in the same frame");
         let shown = tracks.single(app.world()).expect("one track").time;
-        assert_eq!(shown, before, "which the track shows one frame later");
+        assert_eq!(shown, before, "the track follows one frame later");
         before = expected;
     }
 }

@@ -1,8 +1,7 @@
-//! Captures in real Bevy apps without a window: what is drawn, where, and when.
+//! Captures in Bevy apps without a window: pixels, transforms, viewports and time.
 //!
-//! In: small scenes made by hand. Out: proof that Bevy's pixels are those of the CPU reference, that meshes hide what
-//! is behind them, and that transforms, viewports, multisampling and time have their documented effect. Skipped where
-//! there is no GPU, not even a software one.
+//! In: small scenes made by hand. Out: proof that Bevy's pixels equal the CPU reference, that meshes hide the splats behind them, and that
+//! transforms, viewports, multisampling and time have their documented effect. Skipped without a GPU; a software driver is enough.
 
 use crate::support::cpu_reference::{DURATION, SIZE, difference, difference_between, eye, rgb, view, view_of};
 use crate::support::fixtures::{self, BLACK, lone, spawn, spawn_box};
@@ -21,7 +20,7 @@ use std::time::Duration;
 /// The color of boxes.
 const GREEN: Color = Color::srgb(0.0, 1.0, 0.0);
 
-/// Returns overlapping Gaussians of all kinds of shapes: one is tilted, two move.
+/// Returns overlapping Gaussians of different shapes: one is tilted, two move.
 fn crowd() -> RuntimeScene {
     let mut scene = fixtures::crowd();
     let tilted = &mut scene.form.as_sliced_mut().expect("sliced").gaussians[1];
@@ -30,7 +29,7 @@ fn crowd() -> RuntimeScene {
 }
 
 #[test]
-fn bevy_draws_what_the_cpu_twin_draws() {
+fn pixels_match_the_cpu_reference() {
     let Some(mut app) = app(SIZE) else { return };
     let scene = crowd();
     let entity = spawn(&mut app, &scene, Transform::default());
@@ -39,7 +38,7 @@ fn bevy_draws_what_the_cpu_twin_draws() {
         app.world_mut().entity_mut(entity).insert(Playback::paused_at(time * DURATION));
         let expected = reference::render(&scene, &view(&eye(), SIZE, time), BLACK).picture;
         let apart = difference(&picture(&mut app, 0.0), &expected);
-        assert!(apart <= 2.0, "at {time} Bevy and the CPU reference are {apart} / 255 apart");
+        assert!(apart <= 2.0, "at time {time} Bevy and the CPU reference differ by {apart} / 255");
     }
 }
 
@@ -52,11 +51,11 @@ fn a_capture_blends_over_the_clear_color_as_encoded_values() {
     app.insert_resource(ClearColor(Color::srgb(0.2, 0.5, 0.9)));
     let expected = reference::render(&scene, &view(&eye(), SIZE, 0.0), Background::Color([0.2, 0.5, 0.9])).picture;
     let apart = difference(&picture(&mut app, 0.0), &expected);
-    assert!(apart <= 2.0, "over a color Bevy and the CPU reference are {apart} / 255 apart");
+    assert!(apart <= 2.0, "over a clear color Bevy and the CPU reference differ by {apart} / 255");
 }
 
 #[test]
-fn an_hdr_camera_shows_the_same_colors() {
+fn an_hdr_camera_has_the_same_colors() {
     let Some(mut app) = app(SIZE) else { return };
     let scene = crowd();
     spawn(&mut app, &scene, Transform::default());
@@ -64,11 +63,11 @@ fn an_hdr_camera_shows_the_same_colors() {
     app.world_mut().entity_mut(camera).insert(bevy::camera::Hdr);
     let expected = reference::render(&scene, &view(&eye(), SIZE, 0.0), BLACK).picture;
     let apart = difference(&picture(&mut app, 0.0), &expected);
-    assert!(apart <= 2.0, "through an HDR target Bevy and the CPU reference are {apart} / 255 apart");
+    assert!(apart <= 2.0, "with an HDR target Bevy and the CPU reference differ by {apart} / 255");
 }
 
 #[test]
-fn meshes_hide_what_is_behind_them_and_nothing_else() {
+fn meshes_hide_only_the_splats_behind_them() {
     let front = Transform::from_xyz(0.0, 0.0, 4.0);
     let [left, right] = [SIZE.x / 2 - 8, SIZE.x / 2 + 8];
     for (depth, hides) in [(1.5, true), (-1.5, false)] {
@@ -79,11 +78,11 @@ fn meshes_hide_what_is_behind_them_and_nothing_else() {
         spawn_box(&mut app, Vec3::new(6.0, 12.0, 0.1), Vec3::new(3.0, 0.0, depth), GREEN, AlphaMode::Opaque);
         let picture = picture(&mut app, 0.0);
         let [[r, g, _], [x, y, _]] = [left, right].map(|x| rgb(&picture, x, SIZE.y / 2));
-        assert!(r > 200 && g < 60, "beside the mesh the Gaussian shows, not {r}, {g}");
+        assert!(r > 200 && g < 60, "next to the mesh the pixel shows the Gaussian, not {r}, {g}");
         if hides {
             assert_eq!((x, y), (0, 255), "a mesh in front hides the Gaussian");
         } else {
-            assert!(x > 200 && y < 60, "a mesh behind is hidden by the Gaussian, not {x}, {y}");
+            assert!(x > 200 && y < 60, "the Gaussian hides a mesh behind it, not {x}, {y}");
         }
     }
 }
@@ -102,10 +101,10 @@ fn a_transform_moves_positions_and_shapes() {
     let picture = picture(&mut app, 0.0);
     let expected = reference::render(&scene, &view_of(&eye(), &entity, SIZE, 0.0), BLACK).picture;
     let apart = difference(&picture, &expected);
-    assert!(apart <= 2.0, "the reference with the transform in its view is {apart} / 255 apart");
+    assert!(apart <= 2.0, "Bevy and the reference with the transform in its view differ by {apart} / 255");
     let expected = reference::render(&moved(&scene, &entity), &view(&eye(), SIZE, 0.0), BLACK).picture;
     let apart = difference(&picture, &expected);
-    assert!(apart <= 2.0, "the reference with every Gaussian transformed is {apart} / 255 apart");
+    assert!(apart <= 2.0, "Bevy and the reference with transformed Gaussians differ by {apart} / 255");
 }
 
 /// Returns the scene with every Gaussian transformed.
@@ -124,7 +123,7 @@ fn moved(scene: &RuntimeScene, transform: &Transform) -> RuntimeScene {
 }
 
 #[test]
-fn turning_the_entity_is_turning_the_camera_back() {
+fn rotating_the_entity_equals_rotating_the_camera_back() {
     let turn =
         Transform::from_rotation(Quat::from_euler(EulerRot::XYZ, 0.5, 1.9, -0.3)).with_translation(Vec3::X * 0.3);
     let back = Transform::from_matrix(turn.to_matrix().inverse() * eye().to_matrix());
@@ -135,13 +134,13 @@ fn turning_the_entity_is_turning_the_camera_back() {
         Some(picture(&mut app, 0.0))
     });
     let [Some(turned), Some(moved)] = pictures else { return };
-    assert!(rgb(&turned, SIZE.x / 2, SIZE.y / 2) != [0; 3], "something is seen");
+    assert!(rgb(&turned, SIZE.x / 2, SIZE.y / 2) != [0; 3], "the capture is in the picture");
     let apart = difference_between(&turned, &moved);
-    assert!(apart <= 2, "the two are {apart} / 255 apart");
+    assert!(apart <= 2, "the two pictures differ by {apart} / 255");
 }
 
 #[test]
-fn two_captures_interleave_as_one() {
+fn two_halves_of_a_scene_draw_as_one_capture() {
     let Some(mut app) = app(SIZE) else { return };
     let whole = crowd();
     let part = |keep: fn(usize) -> bool| {
@@ -157,22 +156,22 @@ fn two_captures_interleave_as_one() {
     spawn_camera(&mut app, Msaa::Off, eye());
     let expected = reference::render(&whole, &view(&eye(), SIZE, 0.0), BLACK).picture;
     let apart = difference(&picture(&mut app, 0.0), &expected);
-    assert!(apart <= 2.0, "two halves and the whole are {apart} / 255 apart");
+    assert!(apart <= 2.0, "two halves and the whole scene differ by {apart} / 255");
 }
 
 #[test]
-fn a_multisampled_camera_shows_the_capture_too() {
+fn a_multisampled_camera_draws_the_capture() {
     let Some(mut app) = app(SIZE) else { return };
     let scene = crowd();
     spawn(&mut app, &scene, Transform::default());
     spawn_camera(&mut app, Msaa::Sample4, eye());
     let expected = reference::render(&scene, &view(&eye(), SIZE, 0.0), BLACK).picture;
     let apart = difference(&picture(&mut app, 0.0), &expected);
-    assert!(apart <= 2.0, "without meshes multisampling changes nothing, yet they are {apart} / 255 apart");
+    assert!(apart <= 2.0, "without meshes multisampling has no effect, yet the pictures differ by {apart} / 255");
 }
 
 #[test]
-fn a_viewport_gets_its_own_view_and_leaves_the_rest_alone() {
+fn a_viewport_has_its_own_view_and_the_rest_stays_clear() {
     let Some(mut app) = app(SIZE) else { return };
     let (corner, size) = (UVec2::new(60, 30), UVec2::new(100, 90));
     let scene = crowd();
@@ -180,15 +179,15 @@ fn a_viewport_gets_its_own_view_and_leaves_the_rest_alone() {
     let camera = spawn_camera(&mut app, Msaa::Off, eye());
     let viewport = Viewport { physical_position: corner, physical_size: size, ..default() };
     app.world_mut().entity_mut(camera).insert(Camera { viewport: Some(viewport), ..default() });
-    // A mesh behind everything: its depth is read at the viewport's place, too.
+    // A mesh behind the capture: its depth must be read with the viewport's offset.
     spawn_box(&mut app, Vec3::new(40.0, 40.0, 0.1), Vec3::new(0.0, 0.0, -6.0), GREEN, AlphaMode::Opaque);
     let mut picture = picture(&mut app, 0.0);
-    assert_eq!(rgb(&picture, 20, 20), [0, 0, 0], "outside the viewport the target is as cleared");
+    assert_eq!(rgb(&picture, 20, 20), [0, 0, 0], "outside the viewport the target keeps the clear color");
     let inside = image::imageops::crop(&mut picture, corner.x, corner.y, size.x, size.y).to_image();
     let background = Background::Color([0.0, 1.0, 0.0]);
     let expected = reference::render(&scene, &view(&eye(), size, 0.0), background).picture;
     let apart = difference(&inside, &expected);
-    assert!(apart <= 2.0, "inside it Bevy and the CPU reference are {apart} / 255 apart");
+    assert!(apart <= 2.0, "inside the viewport Bevy and the CPU reference differ by {apart} / 255");
 }
 
 #[test]
@@ -199,9 +198,12 @@ fn hidden_and_flattened_captures_are_not_drawn() {
     spawn(&mut app, &lone(Vec3::X), Transform::from_scale(Vec3::new(1.0, 0.0, 1.0)));
     spawn_camera(&mut app, Msaa::Off, eye());
     let nothing = picture(&mut app, 0.0);
-    assert!(nothing.pixels().all(|pixel| pixel.0[0] == 0), "nothing red may show");
+    assert!(nothing.pixels().all(|pixel| pixel.0[0] == 0), "a hidden and a flattened capture are not drawn");
     app.world_mut().entity_mut(hidden).insert(Visibility::Inherited);
-    assert!(rgb(&picture(&mut app, 0.0), SIZE.x / 2, SIZE.y / 2)[0] > 200, "until it is shown again");
+    assert!(
+        rgb(&picture(&mut app, 0.0), SIZE.x / 2, SIZE.y / 2)[0] > 200,
+        "the capture is drawn after it is shown again"
+    );
 }
 
 #[test]
@@ -215,22 +217,23 @@ fn playback_follows_the_clock() {
     // Half a second of two is a quarter of the interval from 0 to 1.
     let expected = reference::render(&scene, &view(&eye(), SIZE, 0.25), BLACK).picture;
     let apart = difference(&picture(&mut app, 0.5), &expected);
-    assert!(apart <= 2.0, "after half a second Bevy and the CPU reference are {apart} / 255 apart");
+    assert!(apart <= 2.0, "after half a second Bevy and the CPU reference differ by {apart} / 255");
     let time = |app: &App| app.world().get::<Playback>(entity).expect("still there").time;
-    assert_eq!(time(&app), 0.5, "the clock stands at half a second");
+    assert_eq!(time(&app), 0.5, "playback is at half a second");
 
     app.world_mut().resource_mut::<Time<Virtual>>().pause();
     picture(&mut app, 0.25);
-    assert_eq!(time(&app), 0.5, "with the virtual clock paused, so is playback");
+    assert_eq!(time(&app), 0.5, "playback pauses with the virtual clock");
     app.world_mut().resource_mut::<Time<Virtual>>().unpause();
     picture(&mut app, 1.75);
-    assert_eq!(time(&app), 0.25, "past the end it starts over");
+    assert_eq!(time(&app), 0.25, "playback loops at the end");
     let once = Playback { repeat: Repeat::Once, ..Playback::default() };
     app.world_mut().entity_mut(entity).insert(once);
     picture(&mut app, 5.0);
     assert_eq!(
         *app.world().get::<Playback>(entity).expect("still there"),
-        Playback { time: DURATION, playing: false, ..once }
+        Playback { time: DURATION, playing: false, ..once },
+        "playback without repeat stops at the end"
     );
 }
 
@@ -252,16 +255,16 @@ fn a_package_loads_from_a_folder_and_a_broken_one_is_an_error() {
     spawn_camera(&mut app, Msaa::Off, eye());
     let expected = reference::render(&scene, &view(&eye(), SIZE, 0.0), BLACK).picture;
     let apart = difference(&picture(&mut app, 0.0), &expected);
-    assert!(apart <= 2.0, "the loaded capture and its scene are {apart} / 255 apart");
+    assert!(apart <= 2.0, "the loaded capture and its scene differ by {apart} / 255");
 
     let handle: Handle<GaussianCapture> = app.world().resource::<AssetServer>().load(broken);
     app.world_mut().entity_mut(entity).insert(GaussianCapture3d(handle));
-    let failure = testing::settle(&mut app).expect_err("a flipped bit is noticed").to_string();
+    let failure = testing::settle(&mut app).expect_err("a flipped bit is an error").to_string();
     assert!(failure.contains("broken.gs4d"), "the message names the file: {failure}");
 }
 
 #[test]
-fn the_plugin_does_without_a_renderer() {
+fn captures_play_in_an_app_without_a_renderer() {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, AssetPlugin::default(), GaussianCapturePlugin));
     let handle = app.world_mut().resource_mut::<Assets<GaussianCapture>>().add(GaussianCapture::new(crowd()));
@@ -271,7 +274,7 @@ fn the_plugin_does_without_a_renderer() {
         app.update();
     }
     let time = app.world().get::<Playback>(entity).expect("a required component").time;
-    assert!((0.29..0.41).contains(&time), "captures play without being drawn: {time}");
+    assert!((0.29..0.41).contains(&time), "captures play without a renderer: {time}");
 }
 
 #[test]
@@ -283,18 +286,18 @@ fn pictures_are_taken_at_even_steps_from_the_start() {
     spawn_camera(&mut app, Msaa::Off, eye());
     let paths = testing::pictures(&mut app, folder.path(), 3, Duration::from_millis(250)).expect("the app draws");
     let taken: Vec<_> = paths.iter().map(|path| image::open(path).expect("a whole picture").into_rgba8()).collect();
-    assert_eq!(taken.len(), 3, "as many as asked for");
+    assert_eq!(taken.len(), 3, "the requested number of pictures");
     for (index, taken) in (0u8..).zip(&taken) {
         let time = 0.25 * f32::from(index);
         app.world_mut().entity_mut(entity).insert(Playback::paused_at(time));
         let apart = difference_between(taken, &picture(&mut app, 0.0));
-        assert_eq!(apart, 0, "picture {index} and that of {time} s are {apart} / 255 apart");
+        assert_eq!(apart, 0, "picture {index} and the picture at {time} s differ by {apart} / 255");
     }
-    assert!(difference_between(&taken[0], &taken[2]) > 10, "while something moves");
+    assert!(difference_between(&taken[0], &taken[2]) > 10, "the pictures show motion");
 }
 
 #[test]
-fn what_is_waited_for_and_cannot_be_loaded_is_named() {
+fn settling_names_a_required_asset_that_fails_to_load() {
     #[derive(Resource)]
     struct Poster(Handle<Image>);
 
@@ -303,14 +306,14 @@ fn what_is_waited_for_and_cannot_be_loaded_is_named() {
     app.insert_resource(poster);
     testing::wait_for(&mut app, |world| vec![world.resource::<Poster>().0.id().untyped()]);
     let failure = testing::settle(&mut app).expect_err("there is no such file");
-    assert!(matches!(failure, TestingError::Asset(_)), "it cannot be loaded: {failure}");
+    assert!(matches!(failure, TestingError::Asset(_)), "the error is a load error: {failure}");
     assert!(failure.to_string().contains("there-is-none.png"), "{failure} names the file");
 }
 
 #[test]
-fn without_something_to_draw_into_there_is_no_picture() {
+fn a_picture_without_an_offscreen_target_is_an_error() {
     let Some(mut app) = app(SIZE) else { return };
     app.world_mut().remove_resource::<Offscreen>();
     let refused = testing::picture(&mut app, Duration::ZERO);
-    assert!(matches!(refused, Err(TestingError::NotOffscreen)), "{:?} says so", refused.err());
+    assert!(matches!(refused, Err(TestingError::NotOffscreen)), "{:?} names the missing target", refused.err());
 }

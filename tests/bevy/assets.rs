@@ -32,8 +32,7 @@ use std::sync::mpsc::{self, Receiver};
 use std::sync::{Arc, Mutex, PoisonError};
 use tempfile::TempDir;
 
-/// Returns an app whose assets are in `folder`. It watches them only with `watch`, so that every other reload is an
-/// explicit one.
+/// Returns an app whose assets are in `folder`. It watches the files only with `watch`; all other reloads are explicit.
 fn app(folder: &Path, watch: bool) -> App {
     let assets = AssetPlugin {
         file_path: folder.to_str().expect("temporary folders have plain names").into(),
@@ -52,7 +51,7 @@ fn ready(entity: Entity, capture: &Handle<GaussianCapture>) -> String {
     format!("{:?}", CaptureReady { entity, capture: capture.id() })
 }
 
-/// Updates until `so` returns true, and twice more, so that late messages are not missed.
+/// Updates until `so` returns true, and then twice more to receive late messages.
 fn wait(app: &mut App, what: &str, so: impl Fn(&App) -> bool) {
     wait_until(app, what, so, App::update);
     app.update();
@@ -67,8 +66,8 @@ fn reload(app: &App, name: &'static str) {
     app.world().resource::<AssetServer>().reload(name);
 }
 
-/// Loads a file again, which fails, until Bevy no longer tries: once if there is no file, twice if it is broken.
-/// Otherwise its last try might read what a test writes next.
+/// Reloads a file that fails, until Bevy has made all `times` attempts: one for a missing file, two for a broken file. A later attempt
+/// could otherwise read the file that a test writes next.
 fn attempt(app: &mut App, name: &'static str, times: usize) {
     let failures = |app: &App| app.world().resource::<Failures>().0;
     let enough = failures(app) + times;
@@ -76,7 +75,7 @@ fn attempt(app: &mut App, name: &'static str, times: usize) {
     wait(app, "failing", |app| failures(app) >= enough);
 }
 
-/// The number of attempts to load that have failed.
+/// The number of failed attempts to load.
 #[derive(Resource, Default)]
 struct Failures(usize);
 
@@ -136,15 +135,15 @@ fn a_capture_is_ready_once_it_has_been_loaded() {
     let mut app = app(folder.path(), false);
     let capture = load(&app, "good.gs4d");
     let entity = spawn(&mut app, &capture);
-    assert_eq!(state(&app, entity), CaptureState::Loading, "as long as nobody has looked");
+    assert_eq!(state(&app, entity), CaptureState::Loading, "the state is Loading before the first update");
     wait(&mut app, "loading", |app| is_ready(app, entity));
-    assert_eq!(count(&app, &capture), 50, "the capture is there");
-    assert_eq!(take_events(&mut app), [ready(entity, &capture)], "said once");
+    assert_eq!(count(&app, &capture), 50, "the capture has been loaded");
+    assert_eq!(take_events(&mut app), [ready(entity, &capture)], "one message is sent");
     let second = spawn(&mut app, &capture);
     app.update();
     app.update();
-    assert_eq!(state(&app, second), CaptureState::Ready, "another entity has nothing to wait for");
-    assert_eq!(take_events(&mut app), [ready(second, &capture)], "and only this one is told");
+    assert_eq!(state(&app, second), CaptureState::Ready, "another entity with the capture is ready at once");
+    assert_eq!(take_events(&mut app), [ready(second, &capture)], "the message is sent only for the new entity");
 }
 
 /// An asset source whose files can be read only once the test has opened the gate.
@@ -156,8 +155,7 @@ struct Gated {
 
 impl AssetReader for Gated {
     async fn read<'a>(&'a self, path: &'a Path) -> Result<impl Reader + 'a, AssetReaderError> {
-        // A read on the main thread waits until the timeout, and the test fails. A failed test drops the sender, which
-        // opens the gate.
+        // A read on the main thread would wait until the timeout and fail the test. A failed test drops the sender, which opens the gate.
         let _ = self.gate.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(LOAD_TIMEOUT);
         self.files.read(path).await
     }
@@ -176,7 +174,7 @@ impl AssetReader for Gated {
 }
 
 #[test]
-fn a_game_goes_on_while_a_capture_loads() {
+fn updates_do_not_wait_for_a_loading_capture() {
     let folder = folder();
     write(folder.path(), "slow.gs4d", 50);
     let files = Dir::default();
@@ -190,11 +188,11 @@ fn a_game_goes_on_while_a_capture_loads() {
     let entity = spawn(&mut app, &capture);
     for frame in 0..50 {
         app.update();
-        assert_eq!(state(&app, entity), CaptureState::Loading, "frame {frame} does not wait for it");
+        assert_eq!(state(&app, entity), CaptureState::Loading, "the capture is still loading in frame {frame}");
     }
     open.send(()).expect("the reader waits");
     wait(&mut app, "loading", |app| is_ready(app, entity));
-    assert_eq!(count(&app, &capture), 50, "all of it");
+    assert_eq!(count(&app, &capture), 50, "all Gaussians are loaded");
 }
 
 #[test]
@@ -212,15 +210,15 @@ fn failures_name_the_file_and_the_remedy() {
         let entity = spawn(&mut app, &capture);
         wait(&mut app, name, |app| matches!(state(app, entity), CaptureState::Failed(_)));
         let CaptureState::Failed(error) = state(&app, entity) else { panic!("{name} has failed") };
-        assert!(error.starts_with(name) && error.contains(fault), "{error:?} names {name} and says {fault:?}");
-        assert!(!error.contains("loader"), "without what a player need not know: {error:?}");
+        assert!(error.starts_with(name) && error.contains(fault), "{error:?} names {name} and contains {fault:?}");
+        assert!(!error.contains("loader"), "the error does not mention asset loaders: {error:?}");
         let failed = |entity| format!("{:?}", CaptureFailed { entity, error: error.clone() });
-        assert_eq!(take_events(&mut app), [failed(entity)], "said once");
+        assert_eq!(take_events(&mut app), [failed(entity)], "one failure is sent");
         let late = spawn(&mut app, &capture);
         app.update();
         app.update();
-        assert_eq!(state(&app, late), CaptureState::Failed(error.clone()), "who comes later hears of it, too");
-        assert_eq!(take_events(&mut app), [failed(late)], "and nobody else");
+        assert_eq!(state(&app, late), CaptureState::Failed(error.clone()), "an entity spawned later has failed, too");
+        assert_eq!(take_events(&mut app), [failed(late)], "the failure is sent only for the new entity");
     }
 }
 
@@ -234,17 +232,17 @@ fn a_repaired_file_can_be_loaded_again() {
     take_events(&mut app);
     for _ in 0..3 {
         attempt(&mut app, "late.gs4d", 1);
-        assert_eq!(take_events(&mut app), [""; 0], "what is known is not told again");
-        assert!(matches!(state(&app, entity), CaptureState::Failed(_)), "it has failed all the same");
+        assert_eq!(take_events(&mut app), [""; 0], "the same failure is not sent again");
+        assert!(matches!(state(&app, entity), CaptureState::Failed(_)), "the state is still Failed");
     }
     write_broken(folder.path(), "late.gs4d");
     attempt(&mut app, "late.gs4d", 2);
     let said = take_events(&mut app);
-    assert!(said.len() == 1 && !said[0].contains("check the name"), "another fault is another message: {said:?}");
+    assert!(said.len() == 1 && !said[0].contains("check the name"), "a different failure is sent: {said:?}");
     write(folder.path(), "late.gs4d", 50);
     reload(&app, "late.gs4d");
     wait(&mut app, "loading", |app| is_ready(app, entity));
-    assert_eq!(take_events(&mut app), [ready(entity, &capture)], "now it is there");
+    assert_eq!(take_events(&mut app), [ready(entity, &capture)], "the repaired file is ready");
 }
 
 #[test]
@@ -256,28 +254,28 @@ fn a_state_follows_the_handle() {
     let [one, two] = ["one.gs4d", "two.gs4d"].map(|name| load(&app, name));
     let entity = spawn(&mut app, &one);
     wait(&mut app, "both", |app| count(app, &one) > 0 && count(app, &two) > 0);
-    assert_eq!(take_events(&mut app), [ready(entity, &one)], "the first");
+    assert_eq!(take_events(&mut app), [ready(entity, &one)], "the first capture is ready");
     app.world_mut().entity_mut(entity).insert(GaussianCapture3d(two.clone()));
     app.update();
     app.update();
     assert_eq!(
         (state(&app, entity), take_events(&mut app)),
         (CaptureState::Ready, vec![ready(entity, &two)]),
-        "the second"
+        "the second capture is ready"
     );
     app.world_mut().entity_mut(entity).insert(GaussianCapture3d::default());
     app.update();
     app.update();
-    assert_eq!(state(&app, entity), CaptureState::Loading, "one that is not there");
-    assert_eq!(take_events(&mut app), [""; 0], "of which there is nothing to say");
+    assert_eq!(state(&app, entity), CaptureState::Loading, "a missing capture counts as loading");
+    assert_eq!(take_events(&mut app), [""; 0], "no message is sent for a missing capture");
     app.world_mut().entity_mut(entity).insert(GaussianCapture3d(one.clone()));
     app.update();
     app.update();
-    assert_eq!(take_events(&mut app), [ready(entity, &one)], "the first again");
+    assert_eq!(take_events(&mut app), [ready(entity, &one)], "the first capture is ready again");
 }
 
 #[test]
-fn a_file_that_changes_is_shown_and_one_that_breaks_is_not() {
+fn a_changed_file_replaces_the_capture_and_a_broken_one_does_not() {
     let folder = folder();
     write(folder.path(), "baked.gs4d", 50);
     let mut app = app(folder.path(), false);
@@ -289,24 +287,24 @@ fn a_file_that_changes_is_shown_and_one_that_breaks_is_not() {
     write(folder.path(), "baked.gs4d", 70);
     reload(&app, "baked.gs4d");
     wait(&mut app, "the new one", |app| count(app, &capture) == 70);
-    assert_eq!(state(&app, entity), CaptureState::Ready, "ready as before");
-    assert_eq!(take_events(&mut app), [ready(entity, &capture)], "ready again");
+    assert_eq!(state(&app, entity), CaptureState::Ready, "the state stays Ready during a reload");
+    assert_eq!(take_events(&mut app), [ready(entity, &capture)], "the reloaded capture is ready");
 
     write_broken(folder.path(), "baked.gs4d");
     attempt(&mut app, "baked.gs4d", 2);
-    assert_eq!((state(&app, entity), count(&app, &capture)), (CaptureState::Ready, 70), "the old one goes on");
+    assert_eq!((state(&app, entity), count(&app, &capture)), (CaptureState::Ready, 70), "the previous capture is kept");
     let said_now = take_events(&mut app);
     let failed = said_now.iter().all(|said| said.contains("CaptureFailed") && said.contains("baked.gs4d"));
-    assert!(said_now.len() == 1 && failed, "{said_now:?} is one failure that names the file");
+    assert!(said_now.len() == 1 && failed, "one failure that names the file: {said_now:?}");
 
     write(folder.path(), "baked.gs4d", 90);
     reload(&app, "baked.gs4d");
     wait(&mut app, "the repaired one", |app| count(app, &capture) == 90);
-    assert_eq!(take_events(&mut app), [ready(entity, &capture)], "and ready once more");
+    assert_eq!(take_events(&mut app), [ready(entity, &capture)], "the repaired capture is ready");
 }
 
 #[test]
-fn a_capture_goes_with_its_last_handle() {
+fn a_capture_is_dropped_with_its_last_handle() {
     let folder = folder();
     write(folder.path(), "good.gs4d", 50);
     let mut app = app(folder.path(), false);
@@ -317,11 +315,11 @@ fn a_capture_goes_with_its_last_handle() {
     app.world_mut().despawn(entities[0]);
     app.update();
     app.update();
-    assert_eq!(captures(&app).len(), 1, "it is still wanted");
+    assert_eq!(captures(&app).len(), 1, "a capture with a handle is kept");
     app.world_mut().despawn(entities[1]);
     app.update();
     app.update();
-    assert_eq!(captures(&app).len(), 0, "now it is not");
+    assert_eq!(captures(&app).len(), 0, "a capture without handles is dropped");
 }
 
 /// Returns a capture with colors over time and a filter.
@@ -339,7 +337,7 @@ fn save(app: &App, capture: &GaussianCapture) -> Result<(), SaveAssetError> {
 }
 
 #[test]
-fn what_is_saved_is_loaded_as_it_was() {
+fn a_saved_capture_loads_bit_for_bit() {
     let folder = folder();
     let mut app = app(folder.path(), false);
     let made = GaussianCapture::new(dressed());
@@ -347,25 +345,25 @@ fn what_is_saved_is_loaded_as_it_was() {
     let capture = load(&app, "made.gs4d");
     let entity = spawn(&mut app, &capture);
     wait(&mut app, "loading", |app| is_ready(app, entity));
-    assert!(scene(&app, &capture) == Some(made.scene()), "the same scene, bit for bit");
+    assert!(scene(&app, &capture) == Some(made.scene()), "the loaded scene equals the saved scene, bit for bit");
 }
 
 #[test]
-fn what_cannot_be_saved_is_an_error() {
+fn saving_an_inconsistent_scene_is_an_error() {
     let folder = folder();
     let app = app(folder.path(), false);
     let mut broken = dressed();
     broken.form.as_sliced_mut().expect("sliced").harmonics.values.pop();
     let Err(SaveAssetError::SaverError(error)) = save(&app, &GaussianCapture::new(broken)) else {
-        panic!("a scene whose parts do not fit together is refused")
+        panic!("saving an inconsistent scene is an error")
     };
     let typed = error.downcast_ref::<CaptureSaveError>();
-    assert!(matches!(typed, Some(CaptureSaveError::Package(_))), "{error} says that the package cannot hold it");
+    assert!(matches!(typed, Some(CaptureSaveError::Package(_))), "the error is a package error: {error}");
 }
 
 const WHITE: &str = "Namespace(sh_degree=3, white_background=True, prefilter_var=0.25)";
 
-/// Returns a folder with a checkpoint without `cfg_args`, and two with.
+/// Returns a folder with one checkpoint without `cfg_args` and two checkpoints with it.
 fn checkpoints() -> TempDir {
     let folder = folder();
     let bytes = Pth::rotating(3, 48).bytes();
@@ -379,7 +377,7 @@ fn checkpoints() -> TempDir {
 }
 
 #[test]
-fn checkpoints_take_from_cfg_args_what_settings_leave_open() {
+fn settings_override_cfg_args_and_cfg_args_override_defaults() {
     let folder = checkpoints();
     let mut app = app(folder.path(), false);
     let server = app.world().resource::<AssetServer>().clone();
@@ -396,7 +394,7 @@ fn checkpoints_take_from_cfg_args_what_settings_leave_open() {
         (trained_with.background, trained_with.prefilter_var)
     });
     let expected = [([0.0; 3], -1.0), ([1.0; 3], 0.25), ([0.25; 3], 0.25)];
-    assert_eq!(trained, expected, "without the file the defaults, with it what it says, but settings win");
+    assert_eq!(trained, expected, "defaults without cfg_args, values of cfg_args, and settings over cfg_args");
 }
 
 #[test]
@@ -407,10 +405,10 @@ fn a_checkpoint_is_loaded_again_when_its_cfg_args_change() {
     let entity = spawn(&mut app, &capture);
     let background = |app: &App| scene(app, &capture).map(|scene| scene.trained_with.background);
     wait(&mut app, "loading", |app| is_ready(app, entity));
-    assert_eq!(background(&app), Some([1.0; 3]), "white");
+    assert_eq!(background(&app), Some([1.0; 3]), "the background of cfg_args is white");
     fs::write(folder.path().join("with/cfg_args"), "Namespace(white_background=False)").expect("the file");
     wait(&mut app, "the change", |app| background(app) == Some([0.0; 3]));
-    assert!(is_ready(&app, entity), "and it shows");
+    assert!(is_ready(&app, entity), "the reloaded checkpoint is ready");
 }
 
 fn upright_of(app: &mut App, up: UpAxis, rotation: Quat) -> Entity {
@@ -425,7 +423,7 @@ fn rotation(app: &App, entity: Entity) -> Quat {
 }
 
 #[test]
-fn an_upright_capture_stands_whichever_axis_was_up_and_turns_about_the_vertical() {
+fn upright_turns_every_up_axis_to_y_and_keeps_the_rotation_of_the_game() {
     let folder = folder();
     let mut app = app(folder.path(), false);
     let turn = Quat::from_rotation_y(0.7);
@@ -435,13 +433,16 @@ fn an_upright_capture_stands_whichever_axis_was_up_and_turns_about_the_vertical(
         app.update();
         let [straight, turned] = [straight, turned].map(|entity| rotation(&app, entity));
         let above = turned * up.vector();
-        assert!(above.abs_diff_eq(Vec3::Y, 1e-5), "{up:?} of the capture points up, not to {above}");
-        assert!(turned.abs_diff_eq(turn * straight, 1e-5), "the game's rotation turns what stands, {up:?}");
+        assert!(above.abs_diff_eq(Vec3::Y, 1e-5), "{up:?} of the capture points to +y, not to {above}");
+        assert!(
+            turned.abs_diff_eq(turn * straight, 1e-5),
+            "the game's rotation applies after the upright rotation, {up:?}"
+        );
     }
 }
 
 #[test]
-fn an_upright_capture_that_is_spawned_once_it_is_loaded_stands_in_the_same_update() {
+fn an_upright_capture_spawned_after_loading_is_turned_in_the_same_update() {
     let folder = folder();
     let mut app = app(folder.path(), false);
     let known = upright_of(&mut app, UpAxis::PosZ, Quat::IDENTITY);
@@ -455,11 +456,14 @@ fn an_upright_capture_that_is_spawned_once_it_is_loaded_stands_in_the_same_updat
     app.update();
     let mut all = app.world_mut().query_filtered::<&Transform, With<Upright>>();
     let above: Vec<Vec3> = all.iter(app.world()).map(|transform| transform.rotation * Vec3::Z).collect();
-    assert!(above.len() == 2 && above.iter().all(|up| up.abs_diff_eq(Vec3::Y, 1e-5)), "both stand: {above:?}");
+    assert!(
+        above.len() == 2 && above.iter().all(|up| up.abs_diff_eq(Vec3::Y, 1e-5)),
+        "both captures are upright: {above:?}"
+    );
 }
 
 #[test]
-fn an_upright_capture_is_turned_once_and_again_for_another_capture() {
+fn an_upright_capture_is_turned_once_per_capture() {
     let folder = folder();
     let mut app = app(folder.path(), false);
     let entity = upright_of(&mut app, UpAxis::PosZ, Quat::IDENTITY);
@@ -470,24 +474,24 @@ fn an_upright_capture_is_turned_once_and_again_for_another_capture() {
     let upright = Quat::from_rotation_arc(Vec3::Z, Vec3::Y);
     for _ in 0..3 {
         app.update();
-        assert!(rotation(&app, entity).abs_diff_eq(turn * upright, 1e-5), "what the game turns stays turned");
+        assert!(rotation(&app, entity).abs_diff_eq(turn * upright, 1e-5), "a rotation by the game is kept");
     }
     let capture = app.world().get::<GaussianCapture3d>(other).expect("just spawned").clone();
     app.world_mut().entity_mut(entity).insert(capture);
     app.update();
     let above = rotation(&app, entity) * Vec3::NEG_Y;
-    assert!(above.abs_diff_eq(Vec3::Y, 1e-5), "another capture with another axis stands, too, not at {above}");
+    assert!(above.abs_diff_eq(Vec3::Y, 1e-5), "another capture with another up axis is turned upright, not to {above}");
 }
 
 #[test]
 #[should_panic(expected = "GaussianCapturePlugin needs Bevy's AssetPlugin, which was not added before it")]
-fn without_assets_the_plugin_names_the_remedy() {
+fn adding_the_plugin_without_assets_names_the_remedy() {
     App::new().add_plugins((MinimalPlugins, GaussianCapturePlugin));
 }
 
 #[test]
 #[should_panic(expected = "GaussianCapturePlugin was added twice: remove one of them")]
-fn twice_the_plugin_names_the_remedy() {
+fn adding_the_plugin_twice_names_the_remedy() {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, AssetPlugin::default(), GaussianCapturePlugin));
     app.add_plugins(GaussianCapturePlugin);
@@ -495,14 +499,14 @@ fn twice_the_plugin_names_the_remedy() {
 
 #[test]
 #[should_panic(expected = "GaussianCapturePlugin needs Bevy's TimePlugin")]
-fn without_time_the_plugin_names_the_remedy() {
+fn an_app_without_time_names_the_remedy() {
     let mut app = App::new();
     app.add_plugins((TaskPoolPlugin::default(), AssetPlugin::default(), GaussianCapturePlugin));
     app.finish();
 }
 
 #[test]
-fn stereo_may_be_added_again_before_and_after() {
+fn the_stereo_plugin_may_be_added_before_or_after() {
     for before in [true, false] {
         let mut app = App::new();
         app.add_plugins((MinimalPlugins, AssetPlugin::default()));
@@ -512,13 +516,13 @@ fn stereo_may_be_added_again_before_and_after() {
             app.add_plugins((GaussianCapturePlugin, StereoPlugin));
         }
         app.update();
-        assert!(app.is_plugin_added::<StereoPlugin>(), "the game's plugin is accepted");
+        assert!(app.is_plugin_added::<StereoPlugin>(), "adding the stereo plugin again is allowed");
     }
 }
 
 #[test]
 #[should_panic(expected = "Bevy's RenderPlugin was added after GaussianCapturePlugin")]
-fn with_a_late_renderer_the_plugin_names_the_remedy() {
+fn a_renderer_added_too_late_names_the_remedy() {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, AssetPlugin::default(), GaussianCapturePlugin));
     // As RenderPlugin does.

@@ -1,8 +1,8 @@
-//! Captures among everything else in a Bevy frame: appearance, cameras, visibility, depth, color.
+//! Captures in a Bevy frame with meshes and cameras: appearance, visibility, depth, color.
 //!
-//! In: small scenes made by hand, in headless apps. Out: proof that opacity, light, crop and blend spaces are those of
-//! the CPU reference, that every camera draws the captures that it should, from its own place, and that captures and
-//! meshes hide each other in the documented order. Skipped where there is no GPU, not even a software one.
+//! In: small scenes made by hand, in headless apps. Out: proof that opacity, light, crop and blend spaces match the CPU reference, that
+//! every camera draws the captures of its layers from its own pose, and that captures and meshes hide each other in the documented order.
+//! Skipped without a GPU; a software driver is enough.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{
@@ -35,7 +35,7 @@ fn red() -> RuntimeScene {
 }
 
 #[test]
-fn opacity_light_and_crop_are_those_of_the_twin() {
+fn opacity_light_and_crop_match_the_cpu_reference() {
     let Some(mut app) = app(SIZE) else { return };
     let scene = crowd();
     let entity = spawn(&mut app, &scene, ());
@@ -64,13 +64,13 @@ fn opacity_light_and_crop_are_those_of_the_twin() {
         let expected = reference_picture(&scene, view(&eye(), SIZE, 0.0), appearance);
         let changes = expected.pixels.iter().zip(&plain.pixels).map(|(a, b)| (*a - *b).abs().max_element());
         let most = changes.fold(0.0, f32::max);
-        assert!(most > 0.1, "{what} changes far more than may be wrong: {most}");
+        assert!(most > 0.1, "{what} changes the picture by more than the tolerance: {most}");
         check(&mut app, &expected, what);
     }
 }
 
 #[test]
-fn a_timeline_s_fade_is_a_factor_on_opacity() {
+fn the_fade_of_a_timeline_multiplies_the_opacity() {
     let Some(mut app) = app(SIZE) else { return };
     let scene = crowd();
     let half = CaptureSettings { opacity: 0.5, ..default() };
@@ -78,7 +78,7 @@ fn a_timeline_s_fade_is_a_factor_on_opacity() {
     spawn_camera(&mut app, Msaa::Off, eye());
     let expected =
         reference_picture(&scene, view(&eye(), SIZE, 0.0), Appearance { opacity: 0.25, ..Appearance::default() });
-    check(&mut app, &expected, "half of a half");
+    check(&mut app, &expected, "an opacity of 0.5 with a fade of 0.5");
 }
 
 #[test]
@@ -88,8 +88,8 @@ fn a_red_tint_leaves_only_red() {
     spawn(&mut app, &lone(Vec3::new(0.6, 0.7, 0.8)), CaptureSettings { tint, ..default() });
     spawn_camera(&mut app, Msaa::Off, eye());
     let picture = picture(&mut app, 0.0);
-    assert!(rgb(&picture, MIDDLE.x, MIDDLE.y)[0] > 130, "red stays");
-    assert!(picture.pixels().all(|pixel| pixel.0[1..3] == [0, 0]), "and nothing else does");
+    assert!(rgb(&picture, MIDDLE.x, MIDDLE.y)[0] > 130, "the red channel stays");
+    assert!(picture.pixels().all(|pixel| pixel.0[1..3] == [0, 0]), "green and blue are 0");
 }
 
 #[test]
@@ -104,17 +104,17 @@ fn a_stop_doubles_linear_light() {
         decode(Vec3::splat(value / 255.0 / 0.98)).x
     };
     let (before, after) = (light(0.0), light(1.0));
-    // Half a step of 8 bits is 1.3 % of the light of an encoded 0.4, and less of the brighter one.
-    assert!((after / before - 2.0).abs() < 0.05, "{before} becomes {after}");
+    // Half an 8-bit step is 1.3 % of the light of an encoded 0.4, and less of the brighter value.
+    assert!((after / before - 2.0).abs() < 0.05, "one stop doubles the light: {before} becomes {after}");
 }
 
 #[test]
-fn a_crop_box_hides_exactly_what_is_outside() {
+fn a_crop_box_hides_exactly_the_gaussians_outside_it() {
     let Some(mut app) = app(SIZE) else { return };
     let crop = CropBox { half_size: Vec3::new(0.42, 1.0, f32::INFINITY), ..default() };
     let whole = crowd();
     let inside: Vec<bool> = whole.iter().map(|gaussian| crop.contains(gaussian.mean_at(0.0))).collect();
-    assert!(inside.contains(&true) && inside.contains(&false), "some are inside and some are not: {inside:?}");
+    assert!(inside.contains(&true) && inside.contains(&false), "the box contains some of the Gaussians: {inside:?}");
     spawn(&mut app, &whole, CaptureSettings { crop: Some(crop), ..default() });
     spawn_camera(&mut app, Msaa::Off, eye());
     let mut kept = whole.clone();
@@ -125,12 +125,12 @@ fn a_crop_box_hides_exactly_what_is_outside() {
     check(
         &mut app,
         &reference_picture(&kept, view(&eye(), SIZE, 0.0), Appearance::default()),
-        "the scene without what is outside",
+        "the scene without the Gaussians outside the box",
     );
 }
 
 #[test]
-fn captures_in_one_view_keep_their_own_looks() {
+fn captures_in_one_view_have_their_own_settings() {
     let Some(mut app) = app(SIZE) else { return };
     let place = Transform::from_xyz(0.3, 0.1, -0.2).with_rotation(Quat::from_rotation_y(0.8));
     let (near, far) = (crowd(), red());
@@ -155,7 +155,7 @@ fn captures_in_one_view_keep_their_own_looks() {
 }
 
 #[test]
-fn splats_of_one_depth_blend_in_the_order_of_their_captures_and_not_of_their_assets() {
+fn splats_of_equal_depth_blend_in_the_order_of_entities_not_of_assets() {
     let color_of = |assets: [usize; 2]| {
         let mut app = app(SIZE)?;
         let colors = [Vec3::X, Vec3::Y];
@@ -168,12 +168,12 @@ fn splats_of_one_depth_blend_in_the_order_of_their_captures_and_not_of_their_ass
         Some(rgb(&picture(&mut app, 0.0), MIDDLE.x, MIDDLE.y))
     };
     let Some(usual) = color_of([0, 1]) else { return };
-    assert!(usual[0].abs_diff(usual[1]) > 225, "one covers the other: {usual:?}");
-    assert_eq!(color_of([1, 0]), Some(usual), "the assets have come in the other order");
+    assert!(usual[0].abs_diff(usual[1]) > 225, "one splat covers the other: {usual:?}");
+    assert_eq!(color_of([1, 0]), Some(usual), "the order of the assets has no effect");
 }
 
 #[test]
-fn blend_spaces_are_those_of_the_twin_on_every_kind_of_target() {
+fn blend_spaces_match_the_cpu_reference_on_every_kind_of_target() {
     let clear = Vec3::new(0.2, 0.5, 0.9);
     for (target, hdr, space) in
         [("8 bits", false, None), ("HDR", true, None), ("sRGB-encoded", false, Some(CompositingSpace::Srgb))]
@@ -202,7 +202,7 @@ fn blend_spaces_are_those_of_the_twin_on_every_kind_of_target() {
 }
 
 #[test]
-fn every_design_draws_the_same_among_meshes() {
+fn every_design_draws_the_same_picture_among_meshes() {
     for (msaa, depth) in [
         (Msaa::Off, DepthWrite::None),
         (Msaa::Sample4, DepthWrite::None),
@@ -219,14 +219,18 @@ fn every_design_draws_the_same_among_meshes() {
         };
         let [reference, fast, again] = [Design::Reference, Design::Fast, Design::Reference].map(&mut drawn);
         let apart = difference_between(&fast, &reference);
-        assert!(apart <= 1, "{msaa:?}, {depth:?}: {apart} of 255 apart");
-        assert_eq!(difference_between(&again, &reference), 0, "{msaa:?}, {depth:?}: and back");
+        assert!(apart <= 1, "{msaa:?}, {depth:?}: the designs differ by {apart} / 255");
+        assert_eq!(
+            difference_between(&again, &reference),
+            0,
+            "{msaa:?}, {depth:?}: the reference design draws the same picture again"
+        );
     }
 }
 
 #[test]
-fn tonemapping_applies_to_captures_on_hdr_cameras_and_leaves_the_rest_alone() {
-    // What Bevy documents of two of them; the others are tables or long formulas.
+fn tonemapping_applies_to_captures_only_on_hdr_cameras() {
+    // The formulas that Bevy documents for two methods; the others are tables or long formulas.
     let reinhard: fn(Vec3) -> Vec3 = |light| light / (light + 1.0);
     let of_luminance: fn(Vec3) -> Vec3 = |light| light / (1.0 + light.dot(Vec3::new(0.2126, 0.7152, 0.0722)));
     let Some(mut app) = app(SIZE) else { return };
@@ -236,7 +240,7 @@ fn tonemapping_applies_to_captures_on_hdr_cameras_and_leaves_the_rest_alone() {
     let as_trained = picture(&mut app, 0.0);
     insert(&mut app, camera, Tonemapping::TonyMcMapface);
     let apart = difference_between(&picture(&mut app, 0.0), &as_trained);
-    assert_eq!(apart, 0, "without HDR Bevy tonemaps meshes in their shaders and nothing else");
+    assert_eq!(apart, 0, "without HDR Bevy tonemaps only meshes, in their shaders");
     insert(&mut app, camera, Hdr);
     let all = [
         (Tonemapping::Reinhard, Some(reinhard)),
@@ -269,20 +273,20 @@ fn tonemapping_applies_to_captures_on_hdr_cameras_and_leaves_the_rest_alone() {
             }
             if *trained == clear {
                 let off = apart(toned, without.get_pixel(x, y));
-                assert!(off <= 1, "{tonemapping:?}: at {x}, {y} no splat is, and {off} / 255 change");
+                assert!(off <= 1, "{tonemapping:?}: at {x}, {y} without a splat the pixel changes by {off} / 255");
             } else if apart(trained, &clear) > 30 {
                 covered += 1;
                 changed += usize::from(apart(toned, trained) > 2);
             }
         }
         assert!(covered > 1000, "the capture is in the picture: it covers {covered} pixels");
-        // The least is 72 %, that of TonyMcMapface.
+        // The smallest fraction is 72 %, with TonyMcMapface.
         assert!(5 * changed > 3 * covered, "{tonemapping:?} changes {changed} of {covered} pixels of the capture");
     }
 }
 
 #[test]
-fn every_camera_sees_the_captures_of_its_layers() {
+fn every_camera_draws_the_captures_of_its_layers() {
     let Some(mut app) = app(SIZE) else { return };
     let blue = lone(Vec3::Z);
     spawn(&mut app, &red(), ());
@@ -295,11 +299,11 @@ fn every_camera_sees_the_captures_of_its_layers() {
     check(&mut app, &reference_picture(&red(), view(&eye(), SIZE, 0.0), appearance), "layer 0");
     let seen = testing::read(&mut app, &second).expect("the second camera's picture");
     let apart = difference(&seen, &reference_picture(&blue, view(&eye(), SIZE, 0.0), appearance));
-    assert!(apart <= 2.0, "layer 1: Bevy and the CPU reference are {apart} / 255 apart");
+    assert!(apart <= 2.0, "layer 1: Bevy and the CPU reference differ by {apart} / 255");
 }
 
 #[test]
-fn a_second_camera_sorts_for_itself() {
+fn a_second_camera_sorts_splats_from_its_own_pose() {
     let Some(mut app) = app(SIZE) else { return };
     let scene = crowd();
     spawn(&mut app, &scene, ());
@@ -309,14 +313,14 @@ fn a_second_camera_sorts_for_itself() {
     let camera = spawn_camera(&mut app, Msaa::Off, behind);
     insert(&mut app, camera, second.target());
     check(&mut app, &reference_picture(&scene, view(&eye(), SIZE, 0.0), Appearance::default()), "from the front");
-    // The app stands still: the same frame, seen by the other camera.
+    // No time has passed: the same frame from the other camera.
     let seen = testing::read(&mut app, &second).expect("the second camera's picture");
     let apart = difference(&seen, &reference_picture(&scene, view(&behind, SIZE, 0.0), Appearance::default()));
-    assert!(apart <= 2.0, "from behind: Bevy and the CPU reference are {apart} / 255 apart");
+    assert!(apart <= 2.0, "from behind: Bevy and the CPU reference differ by {apart} / 255");
 }
 
 #[test]
-fn a_capture_is_culled_by_where_it_is_at_the_moment() {
+fn a_capture_is_culled_by_its_bounds_at_the_current_time() {
     let Some(mut app) = app(SIZE) else { return };
     // Forty units away at the start, at the origin at the end.
     let coming = Gaussian { velocity: [40.0, 0.0, 0.0], ..blob(Vec3::NEG_X * 20.0, Vec3::splat(0.4), 0.98) };
@@ -325,27 +329,27 @@ fn a_capture_is_culled_by_where_it_is_at_the_moment() {
     let seen = |app: &App| app.world().get::<ViewVisibility>(entity).expect("a required component").get();
     let bounds = |app: &App| *app.world().get::<Aabb>(entity).expect("kept by the plugin");
     let away = picture(&mut app, 0.0);
-    assert!(!seen(&app), "out of view");
+    assert!(!seen(&app), "the capture is out of view");
     assert!(bounds(&app).max().x < -10.0, "the box is far to the left: {:?}", bounds(&app));
-    assert!(away.pixels().all(|pixel| pixel.0[..3] == [0, 0, 0]), "nothing shows");
+    assert!(away.pixels().all(|pixel| pixel.0[..3] == [0, 0, 0]), "a culled capture is not drawn");
     insert(&mut app, entity, Playback::paused_at(DURATION));
     let here = picture(&mut app, 0.0);
-    assert!(seen(&app), "in view");
+    assert!(seen(&app), "the capture is in view");
     let bounds = bounds(&app);
     assert!(
         bounds.min().x < 0.0 && bounds.max().x > 0.0 && bounds.min().x > -30.0,
-        "the box has come along: {bounds:?}"
+        "the box has moved with the Gaussian: {bounds:?}"
     );
-    assert!(rgb(&here, MIDDLE.x, MIDDLE.y)[0] > 200, "it shows");
+    assert!(rgb(&here, MIDDLE.x, MIDDLE.y)[0] > 200, "the capture is drawn");
 }
 
 #[test]
-fn what_must_not_be_culled_is_not() {
+fn no_frustum_culling_and_environment_maps_prevent_culling() {
     let Some(mut app) = app(SIZE) else { return };
     let behind = Transform::from_xyz(-9.0, 0.0, 0.0);
     let plain = spawn(&mut app, &red(), behind);
     let kept = spawn(&mut app, &red(), (behind, NoFrustumCulling));
-    // All its Gaussians are behind the camera, too, but its map is not.
+    // Its Gaussians are also behind the camera, but its map surrounds the camera.
     let map = Environment { width: 8, height: 4, texels: vec![0.5; 8 * 4 * 3] };
     let far = scene(&[(blob(Vec3::NEG_X * 9.0, Vec3::splat(0.4), 0.98), Vec3::X)]);
     let around = spawn(&mut app, &RuntimeScene { environment: Some(map), ..far }, ());
@@ -353,14 +357,14 @@ fn what_must_not_be_culled_is_not() {
     let picture = picture(&mut app, 0.0);
     let seen = |entity| app.world().get::<ViewVisibility>(entity).expect("a required component").get();
     assert!(!seen(plain), "a capture behind the camera is culled");
-    assert!(seen(kept), "unless it says that it must not be");
-    assert!(seen(around), "or is all around");
-    assert!(app.world().get::<Aabb>(around).is_none(), "and so has no box");
-    assert!(rgb(&picture, MIDDLE.x, MIDDLE.y).iter().all(|value| *value > 100), "its map shows");
+    assert!(seen(kept), "a capture with NoFrustumCulling is not culled");
+    assert!(seen(around), "a capture with an environment map is not culled");
+    assert!(app.world().get::<Aabb>(around).is_none(), "a capture with an environment map has no box");
+    assert!(rgb(&picture, MIDDLE.x, MIDDLE.y).iter().all(|value| *value > 100), "the environment map is drawn");
 }
 
 #[test]
-fn an_orthographic_camera_is_that_of_the_twin() {
+fn an_orthographic_camera_matches_the_cpu_reference() {
     let Some(mut app) = app(SIZE) else { return };
     let scene = crowd();
     spawn(&mut app, &scene, ());
@@ -374,13 +378,13 @@ fn an_orthographic_camera_is_that_of_the_twin() {
     check(&mut app, &reference_picture(&scene, view, Appearance::default()), "parallel rays");
 }
 
-/// A perspective with a finite far plane, as games with their own projections have.
+/// A perspective projection with a finite far plane, as in games with their own projections.
 #[derive(Debug, Clone)]
 struct FiniteFar(PerspectiveProjection);
 
 impl CameraProjection for FiniteFar {
     fn get_clip_from_view(&self) -> Mat4 {
-        // Near and far change places: depth is reversed.
+        // Near and far are swapped: depth is reversed.
         Mat4::perspective_rh(self.0.fov, self.0.aspect_ratio, self.0.far, self.0.near)
     }
 
@@ -406,7 +410,7 @@ fn finite_far() -> Projection {
 }
 
 #[test]
-fn a_finite_far_plane_changes_nothing_in_a_capture() {
+fn a_finite_far_plane_does_not_change_captures() {
     let Some(mut app) = app(SIZE) else { return };
     let scene = crowd();
     spawn(&mut app, &scene, ());
@@ -416,7 +420,7 @@ fn a_finite_far_plane_changes_nothing_in_a_capture() {
 }
 
 #[test]
-fn meshes_cut_captures_for_every_kind_of_camera() {
+fn captures_are_depth_tested_against_meshes_for_every_kind_of_camera() {
     let Some(mut app) = app(SIZE) else { return };
     spawn(&mut app, &red(), ());
     let camera = spawn_camera(&mut app, Msaa::Off, front());
@@ -436,11 +440,11 @@ fn meshes_cut_captures_for_every_kind_of_camera() {
             insert(&mut app, half, Transform::from_xyz(3.0, 0.0, depth));
             let picture = picture(&mut app, 0.0);
             let [[r, g, _], [x, y, _]] = [MIDDLE.x - 8, MIDDLE.x + 8].map(|x| rgb(&picture, x, MIDDLE.y));
-            assert!(r > 200 && g < 60, "{name}, {depth}: beside the mesh the capture shows, not {r}, {g}");
+            assert!(r > 200 && g < 60, "{name}, {depth}: next to the mesh the pixel shows the capture, not {r}, {g}");
             if hides {
                 assert_eq!((x, y), (0, 255), "{name}: a mesh at {depth} hides the capture");
             } else {
-                assert!(x > 200 && y < 60, "{name}: the capture hides a mesh at {depth}, yet {x}, {y} show");
+                assert!(x > 200 && y < 60, "{name}: the capture hides a mesh at {depth}, but the pixel is {x}, {y}");
             }
         }
     }
@@ -456,11 +460,11 @@ fn transparent_meshes_are_drawn_in_the_documented_order() {
     let perspective = || Projection::Perspective(PerspectiveProjection { fov: FOV_Y, ..default() });
     let parallel = || Projection::Orthographic(orthographic());
     let [none, expected, median] = [DepthWrite::None, DepthWrite::Expected, DepthWrite::Median];
-    // What the camera is, where the pane stands, and whether it is seen before the capture.
+    // The camera, the depth setting, the position of the pane, and whether the pane is in front.
     let cases = [
         (Msaa::Off, perspective(), none, 1.5, true),
         (Msaa::Off, perspective(), none, -1.5, false),
-        // The one Gaussian's depth is that of its center.
+        // The depth of the single Gaussian is the depth of its center.
         (Msaa::Off, perspective(), median, 0.1, true),
         (Msaa::Off, perspective(), median, -0.1, false),
         (Msaa::Off, perspective(), expected, 0.1, true),
@@ -487,12 +491,12 @@ fn transparent_meshes_are_drawn_in_the_documented_order() {
         } else {
             assert!(r > 200 && b < 60, "{name}: the capture is over the pane, not {r}, {b}");
         }
-        assert!(rgb(&picture, 10, 10)[2] > 150, "{name}: beside the capture the pane shows");
+        assert!(rgb(&picture, 10, 10)[2] > 150, "{name}: next to the capture the pane is visible");
     }
 }
 
 #[test]
-fn debug_views_are_those_of_the_renderer_without_bevy() {
+fn debug_views_match_the_renderer_without_bevy() {
     let Some(mut app) = app(SIZE) else { return };
     let Some(mut headless) = gpu::headless() else { return };
     let scene = crowd();
@@ -505,33 +509,37 @@ fn debug_views_are_those_of_the_renderer_without_bevy() {
         let picture = picture(&mut app, 0.0);
         let expected = debug_picture(&mut headless, &scene, view(&eye(), SIZE, 0.0), debug);
         let apart = difference(&picture, &expected);
-        assert!(apart <= 2.0, "{debug:?}: with Bevy and without it, pictures are {apart} / 255 apart");
+        assert!(apart <= 2.0, "{debug:?}: pictures with and without Bevy differ by {apart} / 255");
         for other in &seen {
-            assert!(difference_between(&picture, other) > 10, "{debug:?} is another picture");
+            assert!(difference_between(&picture, other) > 10, "{debug:?} differs from the other debug views");
         }
         seen.push(picture);
     }
 }
 
 #[test]
-fn statistics_count_what_each_camera_sees() {
+fn statistics_count_the_gaussians_of_each_camera() {
     let Some(mut app) = app(SIZE) else { return };
     let entity = spawn(&mut app, &crowd(), ());
     let camera = spawn_camera(&mut app, Msaa::Off, eye());
-    // Counts arrive some frames late.
+    // Counts arrive some frames later.
     for _ in 0..3 {
         picture(&mut app, 0.0);
     }
     let statistics = app.world().resource::<CaptureStatistics>().clone();
-    assert_eq!(statistics.renderer_missing(), None, "everything is there");
-    assert_eq!(statistics.uploaded_captures(), 1, "one capture");
-    assert!(statistics.capture_bytes() >= 5 * 64, "five Gaussians of 64 bytes at least");
+    assert_eq!(statistics.renderer_missing(), None, "the renderer is available");
+    assert_eq!(statistics.uploaded_captures(), 1, "one capture is uploaded");
+    assert!(statistics.capture_bytes() >= 5 * 64, "at least 64 bytes for each of five Gaussians");
     let view = statistics.view(camera).expect("the camera sees it");
-    assert_eq!((view.total, view.visible), (5, 5), "all five show");
-    assert!(view.pairs >= 5 && view.bytes > 0, "each in a tile, in buffers: {view:?}");
-    assert_eq!(statistics.views(), [(camera, view)], "and no other camera does");
+    assert_eq!((view.total, view.visible), (5, 5), "all five Gaussians are visible");
+    assert!(view.pairs >= 5 && view.bytes > 0, "at least one pair per splat, and buffers: {view:?}");
+    assert_eq!(statistics.views(), [(camera, view)], "only this camera draws captures");
     insert(&mut app, entity, Visibility::Hidden);
     picture(&mut app, 0.0);
     let hidden = statistics.view(camera).expect("its buffers are kept for a while");
-    assert_eq!((hidden.total, hidden.active, hidden.visible, hidden.pairs), (0, 0, 0, 0), "nobody sees what is hidden");
+    assert_eq!(
+        (hidden.total, hidden.active, hidden.visible, hidden.pairs),
+        (0, 0, 0, 0),
+        "all counts are 0 for a hidden capture"
+    );
 }

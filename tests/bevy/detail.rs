@@ -1,8 +1,8 @@
 //! Captures that are small on the screen, in headless apps: levels of detail and anti-aliasing.
 //!
-//! In: a capture with levels made by hand, and the bundled one, far away and near. Out: proof that the level follows the size on the screen
-//! without flicker, that settings limit it, that the bundled capture's levels hardly change a screen, that captures without levels are drawn
-//! as they are, and anti-aliased as the CPU reference draws them. Skipped where there is no GPU.
+//! In: a capture with levels made by hand, and the bundled capture, far away and near. Out: proof that the level follows the size on the
+//! screen without flicker, that settings limit the level, that the bundled capture's levels reach 45 dB, that captures without levels are
+//! drawn whole, and that anti-aliasing matches the CPU reference. Skipped without a GPU.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{SIZE, add, scene, view};
@@ -18,12 +18,12 @@ use bevy_gs4d::view::Appearance;
 use image::RgbaImage;
 use std::sync::Arc;
 
-/// Returns as many equal Gaussians.
+/// Returns `count` equal Gaussians.
 fn heap(count: usize) -> RuntimeScene {
     scene(&vec![(blob(Vec3::ZERO, Vec3::splat(0.3), 0.5), Vec3::new(0.9, 0.3, 0.1)); count])
 }
 
-/// Returns 100 Gaussians with levels of 10, up to 60 pixels, and of 2, up to 12 pixels.
+/// Returns 100 Gaussians with a level of 10 up to 60 pixels and a level of 2 up to 12 pixels.
 fn detailed() -> RuntimeScene {
     let level = |pixels, count| Level { pixels, scene: Arc::new(heap(count)) };
     RuntimeScene { levels: vec![level(60.0, 10), level(12.0, 2)], ..heap(100) }
@@ -45,7 +45,7 @@ impl Stage {
         Some(Self { app, camera, capture })
     }
 
-    /// Returns the number of Gaussians that are drawn from a distance.
+    /// Returns the number of Gaussians drawn from a distance.
     fn drawn_from(&mut self, distance: f32) -> u32 {
         let pose = Transform::from_xyz(0.0, 0.0, distance).looking_at(Vec3::ZERO, Vec3::Y);
         self.app.world_mut().entity_mut(self.camera).insert(pose);
@@ -59,8 +59,8 @@ impl Stage {
     }
 }
 
-/// Returns the distance from which a heap is so many pixels across: three deviations of 0.3 in each direction are a sphere of radius 1.56,
-/// and 150 pixels are 0.8 radians high.
+/// Returns the distance at which a heap has this size in pixels: a box of three standard deviations of 0.3 has a sphere of radius 1.56, and
+/// the height of 150 pixels is 0.8 radians.
 fn distance_of(pixels: f32) -> f32 {
     let (radius, focal) = (0.9 * 3f32.sqrt(), 75.0 / 0.4f32.tan());
     radius * (1.0 + (2.0 * focal / pixels).powi(2)).sqrt()
@@ -69,10 +69,10 @@ fn distance_of(pixels: f32) -> f32 {
 #[test]
 fn a_capture_far_away_is_drawn_with_few_gaussians() {
     let Some(mut stage) = Stage::of(&detailed()) else { return };
-    assert_eq!(stage.drawn_from(distance_of(100.0)), 100, "near by all of them");
-    assert_eq!(stage.drawn_from(distance_of(40.0)), 10, "farther away a level");
-    assert_eq!(stage.drawn_from(distance_of(8.0)), 2, "far away the coarsest");
-    assert_eq!(stage.drawn_from(distance_of(100.0)), 100, "and back");
+    assert_eq!(stage.drawn_from(distance_of(100.0)), 100, "all Gaussians near the camera");
+    assert_eq!(stage.drawn_from(distance_of(40.0)), 10, "level 1 farther away");
+    assert_eq!(stage.drawn_from(distance_of(8.0)), 2, "the coarsest level far away");
+    assert_eq!(stage.drawn_from(distance_of(100.0)), 100, "all Gaussians again near the camera");
 }
 
 #[test]
@@ -83,9 +83,9 @@ fn a_level_does_not_flicker_at_its_limit() {
         let pixels = 60.0 * if turn % 2 == 0 { 1.05 } else { 0.95 };
         seen.push(stage.drawn_from(distance_of(pixels)));
     }
-    assert_eq!(seen, [100; 8], "it stays fine until it is well below the limit");
-    assert_eq!(stage.drawn_from(distance_of(45.0)), 10, "where it is");
-    assert_eq!(stage.drawn_from(distance_of(57.0)), 10, "and stays coarse up to the limit");
+    assert_eq!(seen, [100; 8], "the finer level is kept just below the limit");
+    assert_eq!(stage.drawn_from(distance_of(45.0)), 10, "the coarser level is drawn well below the limit");
+    assert_eq!(stage.drawn_from(distance_of(57.0)), 10, "the coarser level is kept up to the limit");
 }
 
 #[test]
@@ -93,12 +93,12 @@ fn settings_limit_the_level() {
     let Some(mut stage) = Stage::of(&detailed()) else { return };
     for (finest_level, expected) in [(1, 10), (2, 2), (200, 2), (0, 100)] {
         stage.set(CaptureSettings { finest_level, ..default() });
-        assert_eq!(stage.drawn_from(distance_of(100.0)), expected, "no finer than level {finest_level}");
+        assert_eq!(stage.drawn_from(distance_of(100.0)), expected, "with the finest level {finest_level}");
     }
     stage.app.insert_resource(CaptureDetail { bias: -1.5, ..default() });
-    assert_eq!(stage.drawn_from(distance_of(100.0)), 10, "100 pixels count as 35");
+    assert_eq!(stage.drawn_from(distance_of(100.0)), 10, "with a bias of -1.5, 100 pixels count as 35");
     stage.app.insert_resource(CaptureDetail::default());
-    assert_eq!(stage.drawn_from(distance_of(100.0)), 100, "and as 100 again");
+    assert_eq!(stage.drawn_from(distance_of(100.0)), 100, "without a bias, 100 pixels count as 100");
 }
 
 #[test]
@@ -113,21 +113,21 @@ fn two_eyes_draw_the_same_level() {
         let statistics = stage.app.world().resource::<CaptureStatistics>();
         [first, statistics.view(second).expect("it is seen").total]
     };
-    assert_eq!(drawn(61.0, 59.0), [100; 2], "the limit is between the eyes, and the finer level is drawn");
-    assert_eq!(drawn(59.0, 46.0), [100, 10], "a camera farther away has its own");
-    assert_eq!(drawn(59.0, 57.0), [100; 2], "nothing flickers when it comes near");
-    assert_eq!(drawn(46.0, 45.0), [10; 2], "both are well below");
+    assert_eq!(drawn(61.0, 59.0), [100; 2], "with the limit between the eyes, both draw the finer level");
+    assert_eq!(drawn(59.0, 46.0), [100, 10], "a camera farther away has its own level");
+    assert_eq!(drawn(59.0, 57.0), [100; 2], "the level does not change when the camera comes near");
+    assert_eq!(drawn(46.0, 45.0), [10; 2], "both cameras are well below the limit");
 }
 
 #[test]
-fn a_capture_without_levels_is_drawn_as_it_is() {
+fn a_capture_without_levels_is_drawn_whole() {
     let Some(mut stage) = Stage::of(&heap(100)) else { return };
     stage.set(CaptureSettings { finest_level: 2, ..default() });
     stage.app.insert_resource(CaptureDetail { bias: -4.0, ..default() });
-    assert_eq!(stage.drawn_from(distance_of(8.0)), 100, "all Gaussians");
+    assert_eq!(stage.drawn_from(distance_of(8.0)), 100, "all Gaussians are drawn");
 }
 
-/// Returns the PSNR of two pictures, dB.
+/// Returns the PSNR of two pictures in dB.
 fn psnr(a: &RgbaImage, b: &RgbaImage) -> f64 {
     let (mut squares, mut count) = (0.0, 0u32);
     for (a, b) in a.pixels().zip(b.pixels()) {
@@ -138,7 +138,7 @@ fn psnr(a: &RgbaImage, b: &RgbaImage) -> f64 {
 }
 
 #[test]
-fn the_bundled_captures_levels_hardly_change_a_screen() {
+fn levels_of_the_bundled_capture_reach_45_db() {
     let size = UVec2::new(1280, 720);
     let Some(mut app) = app(size) else { return };
     let camera = spawn_camera(&mut app, Msaa::Off, Transform::default());
@@ -163,10 +163,10 @@ fn the_bundled_captures_levels_hardly_change_a_screen() {
         let all = picture(&mut app, 0.0);
         app.insert_resource(CaptureDetail { bias: -0.4, ..default() });
         let level = picture(&mut app, 0.0);
-        assert!(drawn(&app) < before, "{} Gaussians, {before} of the finer level", drawn(&app));
+        assert!(drawn(&app) < before, "a coarser level has fewer Gaussians: {}, the finer level {before}", drawn(&app));
         before = drawn(&app);
         let found = psnr(&all, &level);
-        assert!(found >= 45.0, "{found} dB at {pixels} pixels");
+        assert!(found >= 45.0, "the level has {found} dB at {pixels} pixels, less than 45 dB");
     }
 }
 
@@ -182,8 +182,8 @@ fn captures_smaller_than_in_training_are_anti_aliased() {
     let [smooth, fat] = [plain.antialiased(scene.trained_with.pixel), plain]
         .map(|view| reference_picture(&scene, view, Appearance::default()));
     let apart = smooth.pixels.iter().zip(&fat.pixels).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
-    assert!(apart > 0.05, "there is something to see: {apart}");
+    assert!(apart > 0.05, "anti-aliasing changes the picture: {apart}");
     check(&mut app, &smooth, "anti-aliased");
     insert(&mut app, capture, CaptureSettings { antialias: false, ..default() });
-    check(&mut app, &fat, "as the original");
+    check(&mut app, &fat, "without anti-aliasing");
 }

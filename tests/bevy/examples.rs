@@ -1,8 +1,8 @@
 //! The examples as programs: the pictures that they write without a window, and their errors for wrong arguments.
 //!
-//! In: the examples that `cargo test` has built beside the tests. Out: proof that each exits with success and writes as
-//! many pictures as it is asked for, that these show captures, and that the captures move. Drawing is skipped where
-//! there is no GPU, not even a software one.
+//! In: the examples that `cargo test` has built with the tests. Out: proof that each example exits with success and writes the requested
+//! number of pictures, that the pictures show captures, and that the captures move. Tests that draw are skipped without a GPU; a software
+//! driver is enough.
 
 use crate::support::no_gpu::no_gpu;
 use bevy_gs4d::codec::package::WriteSettings;
@@ -17,10 +17,10 @@ use tempfile::TempDir;
 
 const EXAMPLES: [&str; 6] = ["minimal", "play", "scene", "timeline", "walkthrough", "headless"];
 
-/// Returns the path of an example: tests are in `deps`, beside `examples`.
+/// Returns the path of an example: tests are in the folder `deps` next to `examples`.
 fn program(example: &str) -> PathBuf {
-    let test = std::env::current_exe().expect("tests know where they are");
-    let folder = test.ancestors().nth(2).expect("tests are in a folder of the target folder").join("examples");
+    let test = std::env::current_exe().expect("the path of the test binary");
+    let folder = test.ancestors().nth(2).expect("tests are in a subfolder of the target folder").join("examples");
     let program = folder.join(format!("{example}{}", std::env::consts::EXE_SUFFIX));
     assert!(
         program.is_file(),
@@ -44,8 +44,7 @@ fn run_with(root: &Path, example: &str, arguments: &[&str]) -> Output {
     command.output().unwrap_or_else(|error| panic!("{example} can be started: {error}"))
 }
 
-/// Returns the pictures of `frames` moments that an example writes without a window, in the order of their names;
-/// `None` if there is no GPU.
+/// Returns the pictures of `frames` times that an example writes without a window, in order of their names; `None` if there is no GPU.
 fn pictures(root: &Path, example: &str, options: &[&str], frames: usize) -> Option<Vec<RgbaImage>> {
     if !has_gpu() {
         no_gpu();
@@ -57,7 +56,7 @@ fn pictures(root: &Path, example: &str, options: &[&str], frames: usize) -> Opti
     let output = run_with(root, example, &[&["--headless", target_name, "--frames", &count][..], options].concat());
     let said = [&output.stdout, &output.stderr].map(|said| String::from_utf8_lossy(said).into_owned()).concat();
     assert!(output.status.success(), "{example} ended with {}:\n{said}", output.status);
-    assert!(said.contains(target_name), "{example} says where the pictures are:\n{said}");
+    assert!(said.contains(target_name), "{example} prints the folder of the pictures:\n{said}");
     Some(read(&target))
 }
 
@@ -67,29 +66,29 @@ fn read(folder: &Path) -> Vec<RgbaImage> {
     paths.sort();
     assert!(
         paths.iter().all(|path| path.extension().is_some_and(|end| end == "png")),
-        "nothing but pictures: {paths:?}"
+        "all files are pictures: {paths:?}"
     );
-    paths.iter().map(|path| image::open(path).expect("a whole picture").into_rgba8()).collect()
+    paths.iter().map(|path| image::open(path).expect("a readable picture").into_rgba8()).collect()
 }
 
-/// Returns the share of pixels that differ between two pictures.
+/// Returns the fraction of pixels that differ between two pictures.
 fn differing(a: &RgbaImage, b: &RgbaImage) -> f64 {
-    assert_eq!(a.dimensions(), b.dimensions(), "pictures of one size");
+    assert_eq!(a.dimensions(), b.dimensions(), "the pictures have the same size");
     let differ = a.pixels().zip(b.pixels()).filter(|(a, b)| a != b).count();
     differ as f64 / f64::from(a.width() * a.height())
 }
 
-/// Draws two moments and checks the pictures.
+/// Draws two times and checks the pictures.
 fn check(example: &str, options: &[&str], expected: usize) {
     let Some(pictures) = pictures(Path::new(ROOT), example, options, 2) else { return };
-    assert_eq!(pictures.len(), expected, "{example} writes as many pictures as it is asked for");
+    assert_eq!(pictures.len(), expected, "{example} writes the requested number of pictures");
     for picture in &pictures {
         let first = picture.get_pixel(0, 0);
-        assert!(picture.pixels().any(|pixel| pixel != first), "{example} shows more than one color");
+        assert!(picture.pixels().any(|pixel| pixel != first), "the picture of {example} has more than one color");
     }
     for pair in pictures.windows(2) {
-        let share = differing(&pair[0], &pair[1]);
-        assert!(share > 0.001, "{example} shows something that moves: {share} of the picture changes");
+        let fraction = differing(&pair[0], &pair[1]);
+        assert!(fraction > 0.001, "the picture of {example} changes over time: {fraction} of the pixels");
     }
 }
 
@@ -128,8 +127,7 @@ fn headless_writes_pictures() {
     check("headless", &["--size", "200x120"], 2);
 }
 
-/// Returns a folder with the assets of the crate, except that the capture is entirely transparent. It is as long and as
-/// large as before, so that everything else is the same.
+/// Returns a folder with the assets of the crate, except that the capture is fully transparent. Its duration and bounds are unchanged.
 fn invisible() -> TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (from, to) = (Path::new(ROOT).join("assets"), folder.path().join("assets"));
@@ -146,20 +144,20 @@ fn invisible() -> TempDir {
 }
 
 #[test]
-fn captures_are_to_be_seen() {
+fn pictures_show_the_captures() {
     let invisible = invisible();
     for example in EXAMPLES {
         let roots = [Path::new(ROOT), invisible.path()];
-        // In the first picture the timeline's capture has not faded in.
+        // In the first picture the timeline's capture has not yet faded in.
         let [Some(seen), Some(unseen)] = roots.map(|root| pictures(root, example, &[], 4)) else { return };
-        let share = differing(&seen[3], &unseen[3]);
-        assert!(share > 0.01, "{example} shows its captures: without them {share} of the picture differs");
-        assert!(share < 0.9, "and other things, too, which stay: {share} of the picture differs");
+        let fraction = differing(&seen[3], &unseen[3]);
+        assert!(fraction > 0.01, "{example} shows its captures: without them {fraction} of the pixels differ");
+        assert!(fraction < 0.9, "{example} also shows other objects: {fraction} of the pixels differ");
     }
 }
 
 #[test]
-fn a_file_that_is_missing_is_named() {
+fn errors_name_a_missing_file() {
     if !has_gpu() {
         no_gpu();
         return;
@@ -171,18 +169,18 @@ fn a_file_that_is_missing_is_named() {
         let file = if example == "timeline" { "there-is-none.timeline.ron" } else { "there-is-none.gs4d" };
         let output = run(example, &["--headless", target_name, "--frames", "1", file]);
         let said = String::from_utf8_lossy(&output.stderr);
-        assert!(!output.status.success(), "{example} without its file is an error");
+        assert!(!output.status.success(), "{example} fails without its file");
         assert!(
             said.lines().any(|line| line.starts_with("Error") && line.contains(file)),
-            "{example} names it:\n{said}"
+            "{example} names the file:\n{said}"
         );
         assert!(!said.contains("panicked"), "{example} does not panic:\n{said}");
-        assert!(!target.exists(), "{example} writes nothing");
+        assert!(!target.exists(), "{example} writes no pictures");
     }
 }
 
 #[test]
-fn wrong_arguments_are_named() {
+fn errors_name_wrong_arguments() {
     for example in EXAMPLES {
         for (arguments, named) in [
             (&["--nonsense"][..], "--nonsense"),
@@ -192,14 +190,14 @@ fn wrong_arguments_are_named() {
         ] {
             let output = run(example, arguments);
             let said = String::from_utf8_lossy(&output.stderr);
-            assert!(!output.status.success(), "{example} {arguments:?} is an error");
-            assert!(said.contains(named), "{example} {arguments:?} names what is wrong:\n{said}");
+            assert!(!output.status.success(), "{example} {arguments:?} fails");
+            assert!(said.contains(named), "{example} {arguments:?} names the wrong argument:\n{said}");
         }
     }
 }
 
 #[test]
-fn help_says_what_there_is_to_see_and_how_to_call_it() {
+fn help_lists_options_and_the_command() {
     for example in EXAMPLES {
         let output = run(example, &["--help"]);
         let said = String::from_utf8_lossy(&output.stdout);

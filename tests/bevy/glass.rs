@@ -1,8 +1,8 @@
-//! Captures among transparent things: glass, gizmos, wireframes and refraction before and behind them, and the sky.
+//! Captures among transparent items: glass, gizmos, wireframes and refraction in front of and behind them, and the sky.
 //!
-//! In: small scenes made by hand and panes of glass, in headless apps. Out: proof that what is behind a capture shows through it and what
-//! is in front covers it, with the colors that follow from pictures of each alone, multisampled or not, HDR or not. Skipped where there
-//! is no GPU, not even a software one.
+//! In: small scenes made by hand and panes of glass, in headless apps. Out: proof that items behind a capture show through it and items in
+//! front cover it, with the colors computed from pictures of each alone, with and without multisampling and HDR. Skipped without a GPU; a
+//! software driver is enough.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{SIZE, color, difference_between, eye, rgb, scene};
@@ -22,18 +22,18 @@ use bevy_gs4d::view::BlendSpace;
 use bevy_gs4d::view::srgb::{decode, encode};
 use image::RgbaImage;
 
-/// For tests that need many pictures.
+/// Picture size of tests that need many pictures.
 const SMALL: UVec2 = UVec2::new(96, 72);
-/// What is behind everything.
+/// The clear color.
 const WALL: Color = Color::srgb(0.3, 0.6, 0.2);
 /// The color of the glass, sRGB-encoded, and its opacity.
 const GLASS: Vec3 = Vec3::new(0.1, 0.4, 0.9);
 const OPACITY: f32 = 0.5;
-/// Places of a pane before and behind captures at the origin, seen from [`front`].
+/// Positions of a pane in front of and behind captures at the origin, seen from [`front`].
 const BEFORE: f32 = 2.0;
 const BEHIND: f32 = -2.0;
 
-/// Spawns a pane over the whole view.
+/// Spawns a pane that covers the view.
 fn spawn_pane(app: &mut App, opacity: f32, z: f32) -> Entity {
     let color = Color::srgba(GLASS.x, GLASS.y, GLASS.z, opacity);
     spawn_box(app, Vec3::new(12.0, 12.0, 0.01), Vec3::Z * z, color, AlphaMode::Blend)
@@ -43,14 +43,14 @@ fn color_at(picture: &RgbaImage, x: u32, y: u32) -> Vec3 {
     color(picture, x, y) / 255.0
 }
 
-/// Checks every pixel against a color that follows from other pictures, except for their rounding and its own to 8 bits: in linear light
-/// half a step of a dark color may become more.
+/// Checks every pixel against a color computed from other pictures. The tolerance covers the rounding of all pictures to 8 bits, which
+/// linear light amplifies for dark colors.
 fn check_pixels(picture: &RgbaImage, expected: impl Fn(u32, u32) -> Vec3, what: &str) {
     for y in 0..picture.height() {
         for x in 0..picture.width() {
             let (seen, expected) = (color_at(picture, x, y) * 255.0, expected(x, y) * 255.0);
             let apart = (seen - expected).abs().max_element();
-            assert!(apart <= 2.5, "{what}: at {x}, {y} there is {seen}, {apart} from {expected}");
+            assert!(apart <= 2.5, "{what}: pixel {x}, {y} is {seen}, which differs by {apart} from {expected}");
         }
     }
 }
@@ -82,7 +82,7 @@ fn glass_and_captures_blend_in_the_order_of_their_distance() {
         insert(&mut app, capture, Visibility::Hidden);
         let glass = picture(&mut app, 0.0);
         insert(&mut app, capture, Visibility::Inherited);
-        // In the blend space of captures: the light that they add, and their transmittance.
+        // In the blend space of captures: their added light and their transmittance.
         let is_linear = blend_space == BlendSpace::Linear;
         let to: fn(Vec3) -> Vec3 = if is_linear { decode } else { |color| color };
         let from: fn(Vec3) -> Vec3 = if is_linear { encode } else { |color| color };
@@ -105,7 +105,7 @@ fn glass_and_captures_blend_in_the_order_of_their_distance() {
 }
 
 #[test]
-fn captures_between_two_panes_are_between_them() {
+fn captures_between_two_panes_cover_the_rear_one_only() {
     for msaa in [Msaa::Off, Msaa::Sample4] {
         let Some(mut app) = app(SIZE) else { return };
         spawn(&mut app, &lone(Vec3::X), ());
@@ -114,16 +114,19 @@ fn captures_between_two_panes_are_between_them() {
         spawn_box(&mut app, Vec3::new(12.0, 12.0, 0.01), Vec3::Z * BEHIND, green, AlphaMode::Blend);
         spawn_pane(&mut app, OPACITY, BEFORE);
         let picture = picture(&mut app, 0.0);
-        // Red and blue; the pane in front has some of both, too, and of green as much as over black.
+        // Red and blue; the front pane also adds some of both, and as much green as over black.
         let [r, g, b] = rgb(&picture, MIDDLE.x, MIDDLE.y);
-        assert!(r > 170 && b > 150 && g < 90, "{msaa:?}: the green pane is hidden, the blue one is not: {r}, {g}, {b}");
+        assert!(
+            r > 170 && b > 150 && g < 90,
+            "{msaa:?}: the capture hides the green pane and not the blue one: {r}, {g}, {b}"
+        );
         let beside = rgb(&picture, 10, 10);
-        assert!(beside[0] < 40 && beside[1] > 140, "{msaa:?}: beside the capture both show: {beside:?}");
+        assert!(beside[0] < 40 && beside[1] > 140, "{msaa:?}: next to the capture both panes are visible: {beside:?}");
     }
 }
 
 #[test]
-fn the_captures_of_a_view_have_the_place_of_the_nearest() {
+fn all_captures_of_a_view_are_ordered_at_the_nearest_one() {
     let Some(mut app) = app(SIZE) else { return };
     spawn(&mut app, &lone(Vec3::X), Transform::from_xyz(0.0, 0.0, -1.0));
     let near = spawn(&mut app, &lone(Vec3::X), Transform::from_xyz(0.0, 0.0, 1.0));
@@ -131,14 +134,14 @@ fn the_captures_of_a_view_have_the_place_of_the_nearest() {
     spawn_pane(&mut app, OPACITY, 0.0);
     let blue = |app: &mut App| rgb(&picture(app, 0.0), MIDDLE.x, MIDDLE.y)[2];
     let both = blue(&mut app);
-    assert!(both < 60, "the pane is behind both, not {both}");
+    assert!(both < 60, "the pane is behind both captures, not {both}");
     insert(&mut app, near, Visibility::Hidden);
     let far = blue(&mut app);
-    assert!(far > 150, "and in front of the other alone, not {far}");
+    assert!(far > 150, "the pane is in front of the farther capture alone, not {far}");
 }
 
 #[test]
-fn a_capture_whose_center_is_behind_the_camera_is_behind_glass() {
+fn a_capture_with_its_center_behind_the_camera_is_behind_glass() {
     let Some(mut app) = app(SIZE) else { return };
     let heap = |z: f32| (blob(Vec3::Z * z, Vec3::splat(0.4), 0.98), Vec3::X);
     // The center is ten units from the origin, the camera four.
@@ -146,11 +149,11 @@ fn a_capture_whose_center_is_behind_the_camera_is_behind_glass() {
     spawn_camera(&mut app, Msaa::Sample4, front());
     spawn_pane(&mut app, OPACITY, BEFORE);
     let [r, _, b] = rgb(&picture(&mut app, 0.0), MIDDLE.x, MIDDLE.y);
-    assert!(r > 170 && b > 150, "the pane is over what is seen of the capture, not {r}, {b}");
+    assert!(r > 170 && b > 150, "the pane is over the capture, not {r}, {b}");
 }
 
 #[test]
-fn glass_that_nobody_sees_changes_no_pixel() {
+fn fully_transparent_glass_changes_no_pixel() {
     for (msaa, hdr) in [(Msaa::Off, false), (Msaa::Sample4, false), (Msaa::Off, true), (Msaa::Sample4, true)] {
         let Some(mut app) = app(SMALL) else { return };
         app.insert_resource(ClearColor(WALL));
@@ -165,13 +168,13 @@ fn glass_that_nobody_sees_changes_no_pixel() {
         for (place, z) in [("in front", BEFORE), ("behind", BEHIND)] {
             insert(&mut app, pane, Transform::from_xyz(0.0, 0.0, z));
             let apart = difference_between(&picture(&mut app, 0.0), &without);
-            assert!(apart <= 1, "{msaa:?}, HDR {hdr}: clear glass {place} changes {apart} / 255");
+            assert!(apart <= 1, "{msaa:?}, HDR {hdr}: clear glass {place} changes pixels by {apart} / 255");
         }
     }
 }
 
 #[test]
-fn glass_before_captures_keeps_to_the_viewport() {
+fn glass_in_front_of_captures_is_drawn_only_in_the_viewport() {
     let Some(mut app) = app(SIZE) else { return };
     let (corner, size) = (UVec2::new(60, 30), UVec2::new(100, 90));
     spawn(&mut app, &lone(Vec3::X), ());
@@ -182,13 +185,13 @@ fn glass_before_captures_keeps_to_the_viewport() {
     let picture = picture(&mut app, 0.0);
     let middle = corner + size / 2;
     let [r, _, b] = rgb(&picture, middle.x, middle.y);
-    assert!(r > 170 && b > 150, "the pane is over the capture in the middle of the viewport, not {r}, {b}");
-    assert_eq!(rgb(&picture, 20, 20), [0, 0, 0], "outside the target is as cleared");
-    assert!(rgb(&picture, corner.x + 2, corner.y + 2)[2] > 150, "in its corner the pane is");
+    assert!(r > 170 && b > 150, "the pane is over the capture at the center of the viewport, not {r}, {b}");
+    assert_eq!(rgb(&picture, 20, 20), [0, 0, 0], "outside the viewport the target keeps the clear color");
+    assert!(rgb(&picture, corner.x + 2, corner.y + 2)[2] > 150, "the pane reaches the corner of the viewport");
 }
 
 #[test]
-fn gizmos_and_captures_hide_each_other_pixel_by_pixel() {
+fn gizmos_and_captures_hide_each_other_per_pixel() {
     #[derive(Resource)]
     struct Place(f32);
 
@@ -201,7 +204,7 @@ fn gizmos_and_captures_hide_each_other_pixel_by_pixel() {
         app.world_mut().resource_mut::<GizmoConfigStore>().config_mut::<DefaultGizmoConfigGroup>().0.line.width = 6.0;
         spawn(&mut app, &lone(Vec3::X), ());
         spawn_camera(&mut app, msaa, front());
-        // Whether a pane in front makes captures come before a part of the phase.
+        // With a pane in front, a part of the transparent phase is drawn after captures.
         for glass in [false, true] {
             if glass {
                 spawn_pane(&mut app, 0.0, BEFORE);
@@ -211,16 +214,16 @@ fn gizmos_and_captures_hide_each_other_pixel_by_pixel() {
                 let picture = picture(&mut app, 0.0);
                 let [r, g, _] = rgb(&picture, MIDDLE.x, MIDDLE.y);
                 let name = format!("{msaa:?}, glass {glass}, a line at {z}");
-                assert_eq!(g > 200, shows, "{name}: its green is {g}");
-                assert_eq!(r > 200, !shows, "{name}: the capture's red is {r}");
-                assert!(rgb(&picture, 10, MIDDLE.y)[1] > 200, "{name}: beside the capture it shows");
+                assert_eq!(g > 200, shows, "{name}: the green of the line is {g}");
+                assert_eq!(r > 200, !shows, "{name}: the red of the capture is {r}");
+                assert!(rgb(&picture, 10, MIDDLE.y)[1] > 200, "{name}: the line is visible next to the capture");
             }
         }
     }
 }
 
 #[test]
-fn wireframes_leave_captures_in_multisampled_pictures() {
+fn wireframes_keep_captures_in_multisampled_pictures() {
     let Some(mut app) = app(SIZE) else { return };
     app.add_plugins(WireframePlugin::default());
     spawn(&mut app, &lone(Vec3::X), ());
@@ -241,13 +244,13 @@ fn wireframes_leave_captures_in_multisampled_pictures() {
     for x in MIDDLE.x - 20..MIDDLE.x {
         let [seen, expected] = [&with, &without].map(|picture| rgb(picture, x, MIDDLE.y));
         let apart = seen.iter().zip(expected).map(|(a, b)| a.abs_diff(b)).max().unwrap_or_default();
-        assert!(apart <= 1, "at {x} the capture is {seen:?}, not {expected:?}");
+        assert!(apart <= 1, "column {x} of the capture is {seen:?}, not {expected:?}");
     }
-    assert!(rgb(&with, MIDDLE.x, MIDDLE.y)[0] > 200, "and it is there");
+    assert!(rgb(&with, MIDDLE.x, MIDDLE.y)[0] > 200, "the capture is in the picture");
 }
 
 #[test]
-fn captures_show_through_transmissive_meshes_before_them_and_cover_those_behind() {
+fn captures_show_through_transmissive_meshes_in_front_and_cover_those_behind() {
     for msaa in [Msaa::Off, Msaa::Sample4] {
         let Some(mut app) = app(SIZE) else { return };
         spawn(&mut app, &lone(Vec3::ONE), ());
@@ -265,24 +268,31 @@ fn captures_show_through_transmissive_meshes_before_them_and_cover_those_behind(
         let (size, center) = (Vec3::new(6.0, 12.0, 0.01), Vec3::new(3.0, 0.0, 1.5));
         let pane = spawn_box(&mut app, size, center, Color::BLACK, AlphaMode::Opaque);
         insert(&mut app, pane, MeshMaterial3d(glass));
-        // As far from the middle on both sides: the Gaussian is as bright at either.
+        // At equal distances from the center, where the Gaussian has the same brightness.
         let sides = |app: &mut App| {
             let picture = picture(app, 0.0);
             [MIDDLE.x - 9, MIDDLE.x + 8].map(|x| rgb(&picture, x, MIDDLE.y))
         };
         let [beside, [r, g, b]] = sides(&mut app);
-        assert!(beside.iter().all(|value| *value > 200), "{msaa:?}: beside the glass the capture is white: {beside:?}");
-        assert!(g.abs_diff(beside[1]) <= 3, "{msaa:?}: through the glass its green is {g}, not {}", beside[1]);
-        assert!(r < 30 && b < 30, "{msaa:?}: and nothing else of it shows: {r}, {b}");
+        assert!(
+            beside.iter().all(|value| *value > 200),
+            "{msaa:?}: next to the glass the capture is white: {beside:?}"
+        );
+        assert!(
+            g.abs_diff(beside[1]) <= 3,
+            "{msaa:?}: through the glass the green of the capture is {g}, not {}",
+            beside[1]
+        );
+        assert!(r < 30 && b < 30, "{msaa:?}: the green glass absorbs red and blue: {r}, {b}");
         insert(&mut app, pane, Transform::from_xyz(3.0, 0.0, -1.5));
         let [beside, over] = sides(&mut app);
         let apart = beside.iter().zip(over).map(|(a, b)| a.abs_diff(b)).max().unwrap_or_default();
-        assert!(apart <= 3, "{msaa:?}: before the glass it is {over:?}, as {beside:?} beside it");
+        assert!(apart <= 3, "{msaa:?}: in front of the glass the capture is {over:?}, next to it {beside:?}");
     }
 }
 
 #[test]
-fn captures_stand_before_the_atmosphere() {
+fn captures_are_drawn_over_the_atmosphere() {
     for msaa in [Msaa::Off, Msaa::Sample4] {
         let Some(mut app) = app(SIZE) else { return };
         let medium = app.world_mut().resource_mut::<Assets<ScatteringMedium>>().add(ScatteringMedium::default());
@@ -303,22 +313,22 @@ fn captures_stand_before_the_atmosphere() {
         insert(&mut app, capture, Visibility::Inherited);
         let both = picture(&mut app, 0.0);
         let [r, g, b] = rgb(&sky, MIDDLE.x, 10);
-        assert!(b > 60 && b > r, "{msaa:?}: there is a sky: {r}, {g}, {b}");
-        assert_eq!(rgb(&both, 4, 10), rgb(&sky, 4, 10), "{msaa:?}: beside the capture is the sky");
+        assert!(b > 60 && b > r, "{msaa:?}: the sky is blue: {r}, {g}, {b}");
+        assert_eq!(rgb(&both, 4, 10), rgb(&sky, 4, 10), "{msaa:?}: the sky is unchanged next to the capture");
         let [seen, expected] = [&both, &alone].map(|picture| color(picture, MIDDLE.x, MIDDLE.y));
         let apart = (seen - expected).abs().max_element();
-        // The capture lets 2 % through.
-        assert!(apart <= 8.0, "{msaa:?}: it covers the sky: {seen}, not {expected}");
+        // The capture transmits 2 %.
+        assert!(apart <= 8.0, "{msaa:?}: the capture covers the sky: {seen}, not {expected}");
     }
 }
 
 #[test]
-fn order_independent_glass_shows_before_captures_and_hides_behind_them() {
+fn order_independent_glass_is_depth_tested_against_captures() {
     let Some(mut app) = app(SIZE) else { return };
     spawn(&mut app, &lone(Vec3::X), ());
     let camera = spawn_camera(&mut app, Msaa::Off, front());
     let pane = spawn_pane(&mut app, OPACITY, BEFORE);
-    // In the middle of the capture, and beside it.
+    // At the center of the capture, and next to it.
     let each = |app: &mut App| {
         [BEFORE, BEHIND].map(|z| {
             insert(app, pane, Transform::from_xyz(0.0, 0.0, z));
@@ -331,7 +341,7 @@ fn order_independent_glass_shows_before_captures_and_hides_behind_them() {
     let resolved = each(&mut app);
     for (seen, expected) in resolved.iter().flatten().zip(ordered.iter().flatten()) {
         let apart = (*seen - *expected).abs().max_element();
-        // The capture lets 2 % of what is behind through, and its depth nothing.
-        assert!(apart <= 8.0, "{resolved:?}, not {ordered:?}");
+        // The capture transmits 2 % of the background, but its depth hides the glass fully.
+        assert!(apart <= 8.0, "order-independent glass gives {resolved:?}, sorted glass {ordered:?}");
     }
 }

@@ -1,8 +1,7 @@
 //! The Bevy plugin, in apps without a window, and the examples as programs.
 //!
-//! In: scenes made here, `assets/`, and the trained captures where `GS4D_DATA` names their folder. Out: one test
-//! binary. The header of each module describes its tests; those that draw are skipped where there is no GPU, not even a
-//! software one.
+//! In: scenes made here, `assets/`, and the trained captures where `GS4D_DATA` names their folder. Out: one test binary. The header of each
+//! module describes its tests. Tests that draw are skipped without a GPU; a software driver is enough.
 
 mod animation;
 mod app;

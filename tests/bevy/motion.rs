@@ -1,8 +1,8 @@
 //! Captures in post-processing: motion vectors, temporal anti-aliasing, motion blur, depth of field, volumetric fog.
 //!
-//! In: flat captures made by hand, which stand still or move by the same distance in each frame. Out: proof that their motion vectors are
-//! those of what they show, and that Bevy's effects treat them as surfaces in motion, with the settings of cameras as they are by default.
-//! Frames are counted, so that apps are never pipelined. Skipped where there is no GPU, not even a software one.
+//! In: flat captures made by hand, which are at rest or move by the same distance in each frame. Out: proof that their motion vectors are
+//! correct, and that Bevy's effects treat captures as moving surfaces with default camera settings. The tests count frames, so rendering is
+//! not pipelined. Skipped without a GPU; a software driver is enough.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::scene;
@@ -27,7 +27,7 @@ use bevy_gs4d::scene::RuntimeScene;
 use bevy_gs4d::testing::{self, Offscreen};
 use std::sync::{Arc, Mutex};
 
-/// Rows of this width are not padded when they are read back.
+/// Rows of this width have no padding when they are read back.
 const SIZE: UVec2 = UVec2::new(64, 48);
 /// Frames after which an effect has its final strength.
 const FRAMES: u32 = 12;
@@ -38,12 +38,12 @@ fn step(app: &mut App) {
     assert!(app.should_exit().is_none(), "the app draws without an error");
 }
 
-/// Returns how many pixels one unit at that distance from the camera has.
+/// Returns the size in pixels of one unit at this distance from the camera.
 fn pixels_of_unit(distance: f32) -> f32 {
     SIZE.y as f32 / (2.0 * distance * (FOV_Y / 2.0).tan())
 }
 
-/// Returns a plane at z = 0 that fills the view of [`front`], in stripes of two grays: along y, or along x.
+/// Returns a plane at z = 0 that fills the view of [`front`], with stripes of two grays along y or along x.
 fn stripes(along_y: bool) -> RuntimeScene {
     let spots: Vec<(Gaussian, Vec3)> = (-22..=22)
         .flat_map(|column| (-12..=12).map(move |row| (column, row)))
@@ -61,7 +61,7 @@ fn white() -> RuntimeScene {
     scene(&[(blob(Vec3::ZERO, Vec3::new(20.0, 20.0, 0.002), 0.98), Vec3::ONE)])
 }
 
-/// Motion vectors and depths of the prepass of the frame drawn last, on their way to the host.
+/// Motion vectors and prepass depths of the last frame, in a buffer that the host can map.
 #[derive(Resource, Clone, Default)]
 struct Vectors(Arc<Mutex<Option<(wgpu::Device, wgpu::Buffer)>>>);
 
@@ -79,7 +79,7 @@ fn read_vectors(@builtin(global_invocation_id) id: vec3<u32>) {
 }
 ";
 
-/// Copies the camera's motion vectors and the depths of its prepass, once captures are in them: Bevy's textures cannot be copied.
+/// Copies the camera's motion vectors and prepass depths by a shader after captures are drawn, since Bevy's textures have no copy usage.
 fn read_vectors(
     camera: ViewQuery<&ViewPrepassTextures>,
     device: Res<RenderDevice>,
@@ -122,11 +122,11 @@ fn read_vectors(
         pass.dispatch_workgroups(SIZE.x.div_ceil(8), SIZE.y.div_ceil(8), 1);
     }
     encoder.copy_buffer_to_buffer(&found, 0, &copy, 0, size);
-    *vectors.0.lock().expect("no panic before") = Some((device.clone(), copy));
+    *vectors.0.lock().expect("the lock is not poisoned") = Some((device.clone(), copy));
 }
 
 impl Vectors {
-    /// Adds the copying to an app.
+    /// Adds the copy to an app.
     fn of(app: &mut App) -> Self {
         let vectors = Self::default();
         let render_app = app.get_sub_app_mut(RenderApp).expect("a renderer");
@@ -136,9 +136,9 @@ impl Vectors {
         vectors
     }
 
-    /// Returns motion, as a share of the picture, and depth at a pixel of the frame drawn last.
+    /// Returns the motion, as a fraction of the picture, and the depth at a pixel of the last frame.
     fn at(&self, x: u32, y: u32) -> (Vec2, f32) {
-        let (device, buffer) = self.0.lock().expect("no panic before").take().expect("a frame has been drawn");
+        let (device, buffer) = self.0.lock().expect("the lock is not poisoned").take().expect("a frame has been drawn");
         buffer.slice(..).map_async(wgpu::MapMode::Read, |mapped| mapped.expect("the copy can be mapped"));
         device.poll(wgpu::PollType::wait_indefinitely()).expect("the device finishes");
         let bytes = buffer.slice(..).get_mapped_range().to_vec();
@@ -155,7 +155,7 @@ fn moving(velocity: Vec3) -> RuntimeScene {
 }
 
 #[test]
-fn motion_vectors_are_those_of_what_moves() {
+fn motion_vectors_follow_splats_entities_and_cameras() {
     let middle = SIZE / 2;
     // Two seconds are one unit of time.
     let seconds = 0.05;
@@ -187,33 +187,33 @@ fn motion_vectors_are_those_of_what_moves() {
         let expected = Vec2::new(expected.x, -expected.y) * pixels_of_unit(4.0);
         let apart = (pixels - expected).abs().max_element();
         let bound = (0.02 * expected.length()).max(0.1);
-        assert!(apart <= bound, "{what}: by {pixels} pixels, not by {expected}");
+        assert!(apart <= bound, "{what}: the motion is {pixels} pixels, not {expected}");
         // Bevy's near plane is at 0.1.
         assert!((depth - 0.1 / 4.0).abs() < 1e-3, "{what}: the depth of the prepass is {depth}");
     }
 }
 
 #[test]
-fn a_jump_in_time_is_no_motion_and_the_rest_is_left_alone() {
+fn a_jump_in_time_writes_no_motion() {
     let Some(mut app) = unpipelined_app(SIZE) else { return };
     let vectors = Vectors::of(&mut app);
     let entity = spawn(&mut app, &moving(Vec3::X), ());
     let camera = spawn_camera(&mut app, Msaa::Off, front());
     insert(&mut app, camera, (DepthPrepass, MotionVectorPrepass));
     testing::settle(&mut app).expect("the app runs");
-    // The splat is half a unit aside at the middle of its two seconds.
+    // After one of two seconds the splat has moved by half a unit.
     insert(&mut app, entity, Playback::paused_at(1.0));
     step(&mut app);
     let aside = SIZE.x / 2 + (0.5 * pixels_of_unit(4.0)) as u32;
     let (found, depth) = vectors.at(aside, SIZE.y / 2);
-    assert!(depth > 0.0, "the splat is there");
-    assert!((found * SIZE.as_vec2()).abs().max_element() < 0.05, "it has not moved: {found}");
+    assert!(depth > 0.0, "the splat is at its new position");
+    assert!((found * SIZE.as_vec2()).abs().max_element() < 0.05, "the motion of the splat is 0: {found}");
     step(&mut app);
     let (found, depth) = vectors.at(1, 1);
-    assert_eq!((found, depth), (Vec2::ZERO, 0.0), "where no splat is, nothing is written");
+    assert_eq!((found, depth), (Vec2::ZERO, 0.0), "pixels without splats are not written");
 }
 
-/// Makes an app forget its motion vectors before post-processing, as if captures wrote none.
+/// Clears the motion vectors before post-processing, as if captures wrote none.
 fn forget_motion(app: &mut App) {
     fn forget(camera: ViewQuery<&ViewPrepassTextures>, mut context: RenderContext) {
         let Some(vectors) = &camera.into_inner().motion_vectors else { return };
@@ -231,7 +231,7 @@ fn forget_motion(app: &mut App) {
     render_app.add_systems(Core3d, forget.after(Core3dSystems::MainPass).before(Core3dSystems::EarlyPostProcess));
 }
 
-/// Returns the picture of one frame of an app in which a capture moves to the right by that many pixels in each.
+/// Returns the picture of one frame of an app in which a capture moves to the right by this many pixels per frame.
 fn picture_in_motion(app: &mut App, entity: Entity, pixels: f32) -> Vec<u8> {
     testing::settle(app).expect("the app runs");
     let place = |app: &mut App, frame: u32| {
@@ -245,14 +245,14 @@ fn picture_in_motion(app: &mut App, entity: Entity, pixels: f32) -> Vec<u8> {
     let taken = Arc::new(Mutex::new(None));
     let sink = taken.clone();
     let store = move |event: On<ReadbackComplete>| {
-        // The first is of the frame in which it was asked for.
-        sink.lock().expect("no panic before").get_or_insert_with(|| event.data.clone());
+        // The first read-back is the frame of the request.
+        sink.lock().expect("the lock is not poisoned").get_or_insert_with(|| event.data.clone());
     };
     let image = app.world().resource::<Offscreen>().image.clone();
     app.world_mut().spawn(Readback::texture(image)).observe(store);
     for frame in FRAMES..FRAMES + 200 {
         place(app, frame);
-        if let Some(picture) = taken.lock().expect("no panic before").take() {
+        if let Some(picture) = taken.lock().expect("the lock is not poisoned").take() {
             return picture;
         }
     }
@@ -275,7 +275,7 @@ fn apart(a: &[u8], b: &[u8]) -> f32 {
     differences.iter().sum::<f32>() / differences.len() as f32
 }
 
-/// Returns the picture of stripes that move to the right, with an effect on the camera.
+/// Returns the picture of stripes moving to the right, with an effect on the camera.
 fn stripes_in_motion(along_y: bool, pixels: f32, forgets: bool, effect: impl Bundle) -> Option<Vec<u8>> {
     let mut app = unpipelined_app(SIZE)?;
     if forgets {
@@ -288,8 +288,8 @@ fn stripes_in_motion(along_y: bool, pixels: f32, forgets: bool, effect: impl Bun
 }
 
 #[test]
-fn temporal_anti_aliasing_does_not_smear_what_moves() {
-    // Less than half a stripe, so that the history of another place is another color.
+fn temporal_anti_aliasing_does_not_smear_moving_captures() {
+    // Less than half a stripe, so that the history at a wrong position has another color.
     let [Some(sharp), Some(with), Some(without)] = [
         stripes_in_motion(true, 2.0, false, ()),
         stripes_in_motion(true, 2.0, false, TemporalAntiAliasing::default()),
@@ -298,8 +298,8 @@ fn temporal_anti_aliasing_does_not_smear_what_moves() {
         return;
     };
     let [with, without] = [with, without].map(|picture| apart(&picture, &sharp));
-    assert!(without > 3.0, "without motion vectors stripes smear: by {without} / 255");
-    assert!(2.0 * with <= without, "with them by {with} / 255, without by {without} / 255");
+    assert!(without > 3.0, "without motion vectors stripes smear by {without} / 255");
+    assert!(2.0 * with <= without, "motion vectors halve the smear: {with} / 255 with them, {without} / 255 without");
 }
 
 #[test]
@@ -314,13 +314,16 @@ fn motion_blur_follows_the_motion() {
         return;
     };
     let [across, along] = [apart(&across, &sharp_across), apart(&along, &sharp_along)];
-    assert!(across > 5.0, "stripes across the motion are blurred: by {across} / 255");
-    assert!(along < across / 3.0, "those along it far less: by {along} / 255, the others by {across} / 255");
+    assert!(across > 5.0, "stripes across the motion are blurred by {across} / 255");
+    assert!(
+        along < across / 3.0,
+        "stripes along the motion are blurred less: by {along} / 255, across by {across} / 255"
+    );
 }
 
 #[test]
-fn depth_of_field_blurs_what_is_out_of_focus() {
-    // As large in the picture at either distance.
+fn depth_of_field_blurs_captures_out_of_focus() {
+    // The capture has the same size in the picture at both distances.
     let far = Transform::from_xyz(0.0, 0.0, -40.0).with_scale(Vec3::splat(11.0));
     let focus = DepthOfField {
         mode: DepthOfFieldMode::Gaussian,
@@ -339,16 +342,16 @@ fn depth_of_field_blurs_what_is_out_of_focus() {
         let by_default = changed(picture(&mut app, 0.0));
         insert(&mut app, camera, CaptureViewSettings { depth: DepthWrite::Expected, ..default() });
         let asked_for = changed(picture(&mut app, 0.0));
-        assert!((by_default - asked_for).abs() <= 0.01, "by default as if depth were asked for");
+        assert!((by_default - asked_for).abs() <= 0.01, "the default depth setting equals DepthWrite::Expected");
         blurred.push(by_default);
     }
-    let [near, far] = blurred[..] else { panic!("two distances") };
-    assert!(near <= 2.0, "a capture in focus stays as it is: {near} / 255");
-    assert!(far > 10.0, "one far behind is blurred: {far} / 255");
+    let [near, far] = blurred[..] else { panic!("two distances are tested") };
+    assert!(near <= 2.0, "a capture in focus is unchanged: {near} / 255");
+    assert!(far > 10.0, "a capture far behind the focus is blurred: {far} / 255");
 }
 
 #[test]
-fn volumetric_fog_covers_the_farther_capture_more() {
+fn volumetric_fog_darkens_a_farther_capture_more() {
     let far = Transform::from_xyz(0.0, 0.0, -40.0).with_scale(Vec3::splat(11.0));
     let mut light = Vec::new();
     for place in [Transform::default(), far] {
@@ -357,20 +360,20 @@ fn volumetric_fog_covers_the_farther_capture_more() {
         let camera = spawn_camera(&mut app, Msaa::Off, front());
         let clear = picture(&mut app, 0.0).get_pixel(SIZE.x / 2, SIZE.y / 2).0[0];
         assert!(clear > 200, "without fog the capture is white: {clear}");
-        // Dark fog, so that it only absorbs; Bevy has none without a light.
+        // Dark fog only absorbs light; Bevy draws no fog without a light.
         insert(&mut app, camera, VolumetricFog { ambient_intensity: 0.0, ..default() });
         app.world_mut().spawn((FogVolume::default(), Transform::from_scale(Vec3::splat(200.0))));
         let dark = DirectionalLight { illuminance: 0.0, shadow_maps_enabled: true, ..default() };
         app.world_mut().spawn((dark, VolumetricLight));
         light.push(picture(&mut app, 0.0).get_pixel(SIZE.x / 2, SIZE.y / 2).0[0]);
     }
-    let [near, far] = light[..] else { panic!("two distances") };
-    assert!(near > 100, "little fog is in front of the near one: {near}");
-    assert!(u32::from(far) * 2 < u32::from(near), "much in front of the far one: {far}, the near one {near}");
+    let [near, far] = light[..] else { panic!("two distances are tested") };
+    assert!(near > 100, "fog darkens the near capture little: {near}");
+    assert!(u32::from(far) * 2 < u32::from(near), "fog darkens the far capture more: {far}, the near one {near}");
 }
 
 #[test]
-fn depth_is_written_for_effects_that_read_it_and_for_no_other_camera() {
+fn depth_is_written_only_for_cameras_with_effects_that_read_it() {
     let writes = |asked: DepthWrite, effect: bool| {
         let mut app = unpipelined_app(SIZE)?;
         app.add_plugins(RenderDiagnosticsPlugin);
@@ -381,7 +384,7 @@ fn depth_is_written_for_effects_that_read_it_and_for_no_other_camera() {
             insert(&mut app, camera, (DepthPrepass, MotionVectorPrepass));
         }
         picture(&mut app, 0.0);
-        // Times come back some frames later.
+        // Times arrive some frames later.
         (0..30).for_each(|_| step(&mut app));
         Some(has_recorded(&app, "gs4d/write_depth"))
     };
@@ -392,6 +395,6 @@ fn depth_is_written_for_effects_that_read_it_and_for_no_other_camera() {
         (DepthWrite::None, true, false),
     ] {
         let Some(found) = writes(asked, effect) else { return };
-        assert_eq!(found, expected, "{asked:?}, with an effect: {effect}");
+        assert_eq!(found, expected, "whether depth is written with {asked:?}, with an effect: {effect}");
     }
 }

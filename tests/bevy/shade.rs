@@ -1,8 +1,8 @@
 //! Fog, shadows of meshes and the light of the surroundings on captures.
 //!
-//! In: flat captures made by hand beside meshes of the same color, in headless apps. Out: proof that fog is that of Bevy's meshes, that
-//! shadows and dark rooms darken captures by the documented factors and only those that ask for it, and that other cameras pay nothing.
-//! Skipped where there is no GPU, not even a software one.
+//! In: flat captures made by hand and meshes of the same color, in headless apps. Out: proof that fog equals the fog of Bevy's meshes, that
+//! shadows and dark rooms darken captures with the components by the documented factors, and that other cameras have no extra pass. Skipped
+//! without a GPU; a software driver is enough.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{SIZE, color, difference_between, rgb, scene};
@@ -24,8 +24,8 @@ use image::RgbaImage;
 /// The color of walls, sRGB-encoded.
 const COLOR: Vec3 = Vec3::new(0.6, 0.4, 0.8);
 
-/// Returns a flat wall through the origin, opaque to less than an 8-bit step all over the picture: three splats of the opacity 0.95 let
-/// 0.000125 through, and blending ends at 0.0001.
+/// Returns a flat wall through the origin that is opaque to less than an 8-bit step: three splats with an opacity of 0.95 transmit
+/// 0.000125, and blending ends at 0.0001.
 fn wall() -> RuntimeScene {
     scene(&[(blob(Vec3::ZERO, Vec3::new(30.0, 30.0, 1e-3), 0.95), COLOR); 3])
 }
@@ -40,7 +40,7 @@ fn fog(falloff: FogFalloff) -> DistanceFog {
     DistanceFog { color: Color::srgba(0.2, 0.7, 0.3, 0.9), falloff, ..default() }
 }
 
-/// Returns a fog of each kind that changes colors a lot at a distance of four.
+/// Returns a fog of each kind that changes colors strongly at a distance of 4.
 fn fogs() -> [(&'static str, DistanceFog); 5] {
     let linear = FogFalloff::Linear { start: 1.0, end: 8.0 };
     let glowing = DistanceFog {
@@ -58,7 +58,7 @@ fn fogs() -> [(&'static str, DistanceFog); 5] {
     ]
 }
 
-/// Returns pictures of the capture alone, and of the mesh alone.
+/// Returns a picture of the capture alone and a picture of the mesh alone.
 fn each(app: &mut App, capture: Entity, mesh: Entity) -> [RgbaImage; 2] {
     [(Visibility::Inherited, Visibility::Hidden), (Visibility::Hidden, Visibility::Inherited)].map(|(first, second)| {
         insert(app, capture, first);
@@ -76,11 +76,11 @@ fn light(picture: &RgbaImage, x: u32) -> Vec3 {
 fn check(picture: &RgbaImage, x: u32, factor: Vec3, what: &str) {
     let expected = encode(decode(COLOR) * factor) * 255.0;
     let seen = color(picture, x, MIDDLE.y);
-    assert!((seen - expected).abs().max_element() <= 3.0, "{what}: {seen}, not {expected}");
+    assert!((seen - expected).abs().max_element() <= 3.0, "{what}: the pixel is {seen}, not {expected}");
 }
 
 #[test]
-fn fog_is_that_of_a_mesh_at_the_same_place() {
+fn fog_equals_the_fog_of_a_mesh_at_the_same_position() {
     let Some(mut app) = app(SIZE) else { return };
     let capture = spawn(&mut app, &wall(), ());
     let mesh = spawn_mesh_wall(&mut app);
@@ -89,14 +89,14 @@ fn fog_is_that_of_a_mesh_at_the_same_place() {
     app.world_mut().spawn((sun, Transform::default().looking_to(Vec3::new(-0.2, -0.1, 1.0), Vec3::Y)));
     let [plain, mesh_alone] = each(&mut app, capture, mesh);
     let apart = difference_between(&plain, &mesh_alone);
-    assert!(apart <= 2, "without fog they are {apart} / 255 apart");
+    assert!(apart <= 2, "without fog the capture and the mesh differ by {apart} / 255");
     for (what, fog) in fogs() {
         insert(&mut app, camera, fog);
         let [fogged, expected] = each(&mut app, capture, mesh);
         let apart = difference_between(&fogged, &expected);
-        assert!(apart <= 2, "{what}: the capture and the mesh are {apart} / 255 apart");
+        assert!(apart <= 2, "{what}: the capture and the mesh differ by {apart} / 255");
         let changed = difference_between(&fogged, &plain);
-        assert!(changed > 20, "{what}: the fog changes only {changed} / 255");
+        assert!(changed > 20, "{what}: the fog changes the picture by only {changed} / 255");
     }
 }
 
@@ -114,9 +114,9 @@ fn fog_is_the_same_for_every_kind_of_camera() {
         insert(&mut app, camera, (lens, fog(FogFalloff::Exponential { density: 0.2 })));
         let [fogged, expected] = each(&mut app, capture, mesh);
         let apart = difference_between(&fogged, &expected);
-        assert!(apart <= 2, "{what}: the capture and the mesh are {apart} / 255 apart");
+        assert!(apart <= 2, "{what}: the capture and the mesh differ by {apart} / 255");
         let middle = light(&expected, MIDDLE.x).distance(decode(COLOR));
-        assert!(middle > 0.05, "{what}: there is fog, {middle}");
+        assert!(middle > 0.05, "{what}: the fog is visible, {middle}");
     }
 }
 
@@ -129,38 +129,38 @@ fn fog_is_the_same_in_every_blend_space_and_on_hdr_targets() {
     let encoded = picture(&mut app, 0.0);
     insert(&mut app, camera, CaptureViewSettings { blend_space: BlendSpace::Linear, ..default() });
     let apart = difference_between(&picture(&mut app, 0.0), &encoded);
-    assert!(apart <= 2, "linear and encoded blending are {apart} / 255 apart");
+    assert!(apart <= 2, "linear and encoded blending differ by {apart} / 255");
     insert(&mut app, camera, Hdr);
     let apart = difference_between(&picture(&mut app, 0.0), &encoded);
-    assert!(apart <= 2, "HDR and 8 bits are {apart} / 255 apart");
+    assert!(apart <= 2, "HDR and 8 bits differ by {apart} / 255");
 }
 
 #[test]
-fn an_environment_map_is_fogged_as_what_is_infinitely_far() {
+fn fog_treats_an_environment_map_as_infinitely_far() {
     let Some(mut app) = app(SIZE) else { return };
     let map = Environment { width: 8, height: 4, texels: vec![0.9; 8 * 4 * 3] };
     let behind = scene(&[(blob(Vec3::Z * 9.0, Vec3::splat(0.4), 0.98), Vec3::X)]);
     spawn(&mut app, &RuntimeScene { environment: Some(map), ..behind }, ());
     let camera = spawn_camera(&mut app, Msaa::Off, front());
     let plain = rgb(&picture(&mut app, 0.0), MIDDLE.x, MIDDLE.y);
-    assert!(plain.iter().all(|value| *value > 100), "the map shows: {plain:?}");
+    assert!(plain.iter().all(|value| *value > 100), "the environment map is drawn: {plain:?}");
     let color = Color::srgb(0.2, 0.7, 0.3);
     let falloff = FogFalloff::Linear { start: 1000.0, end: 2000.0 };
     insert(&mut app, camera, DistanceFog { color, falloff, ..default() });
     let seen = rgb(&picture(&mut app, 0.0), MIDDLE.x, MIDDLE.y);
     for (value, expected) in seen.into_iter().zip([51, 179, 77]) {
-        assert!(value.abs_diff(expected) <= 2, "the fog's color, not {seen:?}");
+        assert!(value.abs_diff(expected) <= 2, "the pixel has the color of the fog, not {seen:?}");
     }
 }
 
 #[test]
-fn the_shadow_of_a_mesh_falls_on_a_capture_that_receives_it() {
+fn a_mesh_casts_its_shadow_on_a_capture_with_receives_shadows() {
     let tint = LinearRgba::rgb(0.2, 0.3, 0.4);
     let in_shadow = Vec3::new(0.2, 0.3, 0.4);
     let Some(mut app) = app(SIZE) else { return };
     app.insert_resource(DirectionalLightShadowMap { size: 512 }).insert_resource(PointLightShadowMap { size: 256 });
     let capture = spawn(&mut app, &wall(), ());
-    // Between the lamps and the middle of the wall, and not between that and the camera.
+    // Between the lights and the center of the wall, but not between the wall and the camera.
     spawn_box(&mut app, Vec3::splat(0.3), Vec3::new(1.75, 0.0, 1.25), Color::BLACK, AlphaMode::Opaque);
     spawn_camera(&mut app, Msaa::Off, front());
     let plain = picture(&mut app, 0.0);
@@ -178,26 +178,30 @@ fn the_shadow_of_a_mesh_falls_on_a_capture_that_receives_it() {
         insert(&mut app, lamp, Visibility::Inherited);
         app.world_mut().entity_mut(capture).remove::<ReceivesShadows>();
         let apart = difference_between(&picture(&mut app, 0.0), &plain);
-        assert_eq!(apart, 0, "{what}: without the component nothing changes");
+        assert_eq!(apart, 0, "{what}: without the component the picture is unchanged");
         insert(&mut app, capture, ReceivesShadows { tint, ..default() });
         let shadowed = picture(&mut app, 0.0);
         check(&shadowed, MIDDLE.x, in_shadow, &format!("{what}, in the shadow"));
-        check(&shadowed, left, Vec3::ONE, &format!("{what}, beside it"));
+        check(&shadowed, left, Vec3::ONE, &format!("{what}, outside the shadow"));
         insert(&mut app, lamp, Visibility::Hidden);
     }
     let apart = difference_between(&picture(&mut app, 0.0), &plain);
-    assert_eq!(apart, 0, "without a lamp there is no shadow, to the bit");
+    assert_eq!(apart, 0, "without a light the picture is bit-identical");
 }
 
 #[test]
-fn a_capture_takes_the_light_of_the_surroundings() {
+fn capture_light_multiplies_by_the_light_of_the_surroundings() {
     let Some(mut app) = app(SIZE) else { return };
     app.insert_resource(GlobalAmbientLight::NONE);
     let capture = spawn(&mut app, &wall(), ());
     let camera = spawn_camera(&mut app, Msaa::Off, front());
     let plain = picture(&mut app, 0.0);
     insert(&mut app, capture, CaptureLight { amount: 0.0, ..default() });
-    assert_eq!(difference_between(&picture(&mut app, 0.0), &plain), 0, "nothing of it, to the bit");
+    assert_eq!(
+        difference_between(&picture(&mut app, 0.0), &plain),
+        0,
+        "an amount of 0 leaves the picture bit-identical"
+    );
     insert(&mut app, capture, CaptureLight { amount: 0.75, ..default() });
     check(&picture(&mut app, 0.0), MIDDLE.x, Vec3::splat(0.25), "a dark room");
 
@@ -206,7 +210,7 @@ fn a_capture_takes_the_light_of_the_surroundings() {
     insert(&mut app, capture, CaptureLight::default());
     check(&picture(&mut app, 0.0), MIDDLE.x, Vec3::ONE, "Bevy's own ambient light");
     app.insert_resource(GlobalAmbientLight { brightness: 0.25 * ambient.brightness, ..ambient });
-    check(&picture(&mut app, 0.0), MIDDLE.x, Vec3::splat(0.25), "a quarter of it");
+    check(&picture(&mut app, 0.0), MIDDLE.x, Vec3::splat(0.25), "a quarter of Bevy's ambient light");
     let exposure = Exposure::default().exposure();
 
     app.insert_resource(GlobalAmbientLight::NONE);
@@ -219,7 +223,7 @@ fn a_capture_takes_the_light_of_the_surroundings() {
 }
 
 #[test]
-fn captures_beside_each_other_keep_their_own_light() {
+fn neighboring_captures_have_separate_light() {
     let Some(mut app) = app(SIZE) else { return };
     app.insert_resource(GlobalAmbientLight::NONE);
     let ball = |x: f32| scene(&[(blob(Vec3::X * x, Vec3::splat(0.15), 0.98), Vec3::splat(0.8))]);
@@ -227,10 +231,10 @@ fn captures_beside_each_other_keep_their_own_light() {
     spawn(&mut app, &ball(1.0), ());
     spawn_camera(&mut app, Msaa::Off, front());
     let picture = picture(&mut app, 0.0);
-    // One unit beside the middle, four away: 0.44 of half the width.
+    // One unit off-center at a distance of 4: 0.44 of half the width.
     let [left, right] = [56, 144].map(|x| rgb(&picture, x, MIDDLE.y)[0]);
-    assert!(left <= 2, "the one that takes the light of a dark room is dark: {left}");
-    assert!(right > 190, "the other shines: {right}");
+    assert!(left <= 2, "the capture with CaptureLight is dark in a dark room: {left}");
+    assert!(right > 190, "the other capture is not darkened: {right}");
 }
 
 #[test]
@@ -241,17 +245,17 @@ fn debug_views_are_not_shaded() {
     insert(&mut app, camera, CaptureViewSettings { debug: DebugView::Depth, ..default() });
     let plain = picture(&mut app, 0.0);
     insert(&mut app, camera, fog(FogFalloff::Exponential { density: 0.5 }));
-    assert_eq!(difference_between(&picture(&mut app, 0.0), &plain), 0, "depths are not colors");
+    assert_eq!(difference_between(&picture(&mut app, 0.0), &plain), 0, "fog does not change a debug view");
 }
 
 #[test]
-fn a_camera_without_any_of_it_has_no_further_pass() {
+fn a_camera_without_shading_has_no_shade_pass() {
     let Some(mut app) = app(SIZE) else { return };
     app.add_plugins(RenderDiagnosticsPlugin);
     let capture = spawn(&mut app, &wall(), ());
     let camera = spawn_camera(&mut app, Msaa::Off, front());
     let plain = picture(&mut app, 0.0);
-    // Spans arrive some frames later.
+    // Diagnostic spans arrive some frames later.
     let wait_for = |app: &mut App, pass: &str| {
         for _ in 0..100 {
             if has_recorded(app, pass) {
@@ -261,14 +265,14 @@ fn a_camera_without_any_of_it_has_no_further_pass() {
         }
         false
     };
-    assert!(wait_for(&mut app, "gs4d/composite"), "spans arrive");
-    assert!(!has_recorded(&app, "gs4d/shade"), "captures are not shaded");
+    assert!(wait_for(&mut app, "gs4d/composite"), "the span of the composite arrives");
+    assert!(!has_recorded(&app, "gs4d/shade"), "no shade pass without fog");
     insert(&mut app, camera, fog(FogFalloff::Exponential { density: 0.5 }));
-    assert!(difference_between(&picture(&mut app, 0.0), &plain) > 20, "fog shows");
-    assert!(wait_for(&mut app, "gs4d/shade"), "in a pass of its own");
+    assert!(difference_between(&picture(&mut app, 0.0), &plain) > 20, "fog changes the picture");
+    assert!(wait_for(&mut app, "gs4d/shade"), "a shade pass with fog");
     app.world_mut().entity_mut(camera).remove::<DistanceFog>();
-    assert_eq!(difference_between(&picture(&mut app, 0.0), &plain), 0, "without it the picture is as it was");
+    assert_eq!(difference_between(&picture(&mut app, 0.0), &plain), 0, "without fog the picture is as before");
     insert(&mut app, capture, Visibility::Hidden);
     let hidden = picture(&mut app, 0.0);
-    assert!(hidden.pixels().all(|pixel| pixel.0[..3] == [0, 0, 0]), "and nothing is left of hidden captures");
+    assert!(hidden.pixels().all(|pixel| pixel.0[..3] == [0, 0, 0]), "hidden captures are not drawn");
 }

@@ -1,10 +1,9 @@
-//! Views of captures in Bevy apps: environment maps behind them, parts of pictures, shared and resized targets, time in
-//! both directions, and the pictures of the command.
+//! Views of captures in Bevy apps: environment maps, sub views, shared and resized targets, reverse playback, and comparison with the
+//! command.
 //!
-//! In: small scenes made by hand, synthetic ones and the capture of the examples, in headless apps. Out: proof that
-//! environment maps have the appearance of their captures and no holes, that parts of pictures and targets are those of
-//! the CPU reference, that temporal filters and the direction of play change no pixel, and that extreme values stay
-//! finite. Skipped where there is no GPU, not even a software one.
+//! In: small scenes made by hand, synthetic scenes and the bundled capture, in headless apps. Out: proof that environment maps follow the
+//! settings of their captures and have no holes, that sub views and parts of targets match the CPU reference, that temporal filters and the
+//! direction of playback change no pixel, and that extreme values stay finite. Skipped without a GPU; a software driver is enough.
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{
@@ -36,10 +35,10 @@ use image::RgbaImage;
 use image::imageops::crop_imm;
 use std::path::Path;
 
-/// For tests that need many pictures.
+/// Picture size of tests that need many pictures.
 const SMALL: UVec2 = UVec2::new(96, 72);
 
-/// Returns a gray map all around, and a Gaussian that no camera of these tests sees.
+/// Returns a gray environment map, and a Gaussian that no camera of these tests sees.
 fn surrounded() -> RuntimeScene {
     let map = Environment { width: 8, height: 4, texels: vec![0.5; 8 * 4 * 3] };
     let far = scene(&[(blob(Vec3::NEG_X * 9.0, Vec3::splat(0.4), 0.98), Vec3::X)]);
@@ -52,7 +51,7 @@ fn ahead() -> Transform {
 }
 
 #[test]
-fn a_map_is_faded_tinted_and_lit_as_its_capture_is() {
+fn opacity_tint_and_exposure_apply_to_the_environment_map() {
     let Some(mut app) = app(SIZE) else { return };
     app.insert_resource(ClearColor(Color::srgb(0.0, 0.0, 1.0)));
     let entity = spawn(&mut app, &surrounded(), ());
@@ -66,7 +65,7 @@ fn a_map_is_faded_tinted_and_lit_as_its_capture_is() {
         ("tinted", CaptureSettings { tint: red, ..settings }, ClipFade(1.0), lit(Vec3::X)),
         ("a stop brighter", CaptureSettings { exposure: 1.0, ..settings }, ClipFade(1.0), lit(Vec3::splat(2.0))),
         // Encoded values are blended.
-        ("of half its opacity", half, ClipFade(1.0), 0.5 * lit(Vec3::ONE) + 0.5 * Vec3::Z),
+        ("at half opacity", half, ClipFade(1.0), 0.5 * lit(Vec3::ONE) + 0.5 * Vec3::Z),
         ("without opacity", gone, ClipFade(1.0), Vec3::Z),
         ("faded out by a timeline", settings, ClipFade(0.0), Vec3::Z),
     ];
@@ -74,15 +73,15 @@ fn a_map_is_faded_tinted_and_lit_as_its_capture_is() {
         insert(&mut app, entity, (settings, fade));
         let seen = color(&picture(&mut app, 0.0), MIDDLE.x, MIDDLE.y);
         let apart = (seen - expected * 255.0).abs().max_element();
-        assert!(apart <= 2.0, "a map {what} shows as {seen}, {apart} / 255 from what it should");
+        assert!(apart <= 2.0, "a map {what} is {seen}, which differs by {apart} / 255");
     }
 }
 
 #[test]
-fn a_map_has_no_hole_where_rays_miss_its_sphere() {
+fn an_environment_map_has_no_hole_where_rays_miss_its_sphere() {
     let Some(mut app) = app(SIZE) else { return };
     spawn(&mut app, &surrounded(), ());
-    // Far outside, and the sphere is not in view.
+    // Far outside, with the sphere out of view.
     let aside = Transform::from_xyz(0.0, 400.0, 0.0).looking_to(Vec3::X, Vec3::Z);
     let camera = spawn_camera(&mut app, Msaa::Off, aside);
     insert(&mut app, camera, Hdr);
@@ -91,11 +90,11 @@ fn a_map_has_no_hole_where_rays_miss_its_sphere() {
     let darkest = picture.pixels().flat_map(|pixel| pixel.0).min();
     assert!(darkest > Some(20), "every pixel has a color; the darkest is {darkest:?}");
     let middle = rgb(&picture, MIDDLE.x, MIDDLE.y);
-    assert!(middle.iter().all(|value| value.abs_diff(128) <= 2), "in the middle it is the map's: {middle:?}");
+    assert!(middle.iter().all(|value| value.abs_diff(128) <= 2), "the center has the color of the map: {middle:?}");
 }
 
 #[test]
-fn a_map_needs_one_point_of_view_and_the_depth_of_meshes() {
+fn an_environment_map_needs_a_pinhole_and_the_depth_of_meshes() {
     let Some(mut app) = app(SIZE) else { return };
     app.insert_resource(ClearColor(Color::srgb(0.0, 0.0, 1.0)));
     spawn(&mut app, &surrounded(), ());
@@ -110,7 +109,7 @@ fn a_map_needs_one_point_of_view_and_the_depth_of_meshes() {
         insert(&mut app, camera, projection);
         let picture = picture(&mut app, 0.0);
         let empty = picture.pixels().all(|pixel| pixel.0[..3] == [0, 0, 255]);
-        assert!(empty, "a camera with {what} shows what is behind, not {:?}", rgb(&picture, MIDDLE.x, MIDDLE.y));
+        assert!(empty, "a camera with {what} shows the clear color, not {:?}", rgb(&picture, MIDDLE.x, MIDDLE.y));
     }
 }
 
@@ -120,38 +119,42 @@ fn part(whole: &Picture, offset: UVec2, size: UVec2) -> Picture {
     Picture { size, pixels: (0..size.y).flat_map(row).collect() }
 }
 
-/// Returns the largest difference of any channel of any pixel, in 255ths.
+/// Returns the largest difference over all channels and pixels, in 255ths.
 fn apart(picture: &Picture, expected: &Picture) -> f32 {
-    assert_eq!(picture.size, expected.size, "pictures of one size");
+    assert_eq!(picture.size, expected.size, "the pictures have the same size");
     let channel = |(pixel, expected): (&Vec3, &Vec3)| (*pixel - *expected).abs().max_element() * 255.0;
     picture.pixels.iter().zip(&expected.pixels).map(channel).fold(0.0, f32::max)
 }
 
 #[test]
-fn a_sub_view_is_that_part_of_the_whole() {
-    // Of whole tiles: a splat ends with the last one that its three standard deviations touch.
+fn a_sub_view_equals_its_part_of_the_whole_picture() {
+    // The borders of the part are borders of tiles or of the picture: a splat ends at the last tile that its three standard deviations
+    // touch.
     let (offset, size) = (UVec2::new(112, 32), UVec2::new(88, 96));
     let Some(mut app) = app(size) else { return };
     let Some(mut headless) = gpu::headless() else { return };
-    // One of them near the right edge and long in depth: its footprint depends on the angle that it is seen at.
+    // The first Gaussian is near the right edge and long in depth: its footprint depends on the viewing angle.
     let scene = scene(&[
         (blob(Vec3::new(1.9, 0.5, 0.0), Vec3::new(0.05, 0.05, 0.8), 0.9), Vec3::new(0.9, 0.3, 0.1)),
         (blob(Vec3::new(0.9, -0.3, 0.4), Vec3::new(0.2, 0.1, 0.3), 0.8), Vec3::new(0.1, 0.6, 0.9)),
     ]);
     let whole = view(&front(), SIZE, 0.0);
     let expected = part(&reference_picture(&scene, whole, Appearance::default()), offset, size);
-    assert!(expected.pixel(72, 20).x > 0.3, "the long splat is in view: {}", expected.pixel(72, 20));
+    assert!(expected.pixel(72, 20).x > 0.3, "the long splat is in the sub view: {}", expected.pixel(72, 20));
 
-    // The same pixels behind a lens that is off-center.
+    // The same pixels with an off-center lens.
     let lens = Lens::Intrinsics { focal: whole.focal(), center: SIZE.as_vec2() / 2.0 - offset.as_vec2() };
     let pinhole = PinholeCamera { world_to_camera: whole.world_to_camera, size, lens };
     let sub = pinhole.view(0.0, RasterFov::Corrected);
     let difference = apart(&reference_picture(&scene, sub, Appearance::default()), &expected);
-    assert!(difference <= 2.0, "the CPU reference's part and its whole are {difference} / 255 apart");
+    assert!(difference <= 2.0, "the sub view and the whole picture of the CPU reference differ by {difference} / 255");
     let capture = headless.upload(&scene).expect("it fits");
     let drawn = headless.render(&capture, &sub, BLACK).expect("it is drawn").picture;
     let difference = apart(&drawn, &expected);
-    assert!(difference <= 2.0, "the GPU's part and the reference's whole are {difference} / 255 apart");
+    assert!(
+        difference <= 2.0,
+        "the sub view of the GPU and the whole picture of the CPU reference differ by {difference} / 255"
+    );
 
     // Bevy culls by the frustum of the whole target, not of the part.
     spawn(&mut app, &scene, NoFrustumCulling);
@@ -161,7 +164,7 @@ fn a_sub_view_is_that_part_of_the_whole() {
     check(&mut app, &expected, "a sub view");
 }
 
-/// Returns whether this GPU supports so many samples.
+/// Returns whether this GPU supports the sample count.
 fn can_sample(app: &App, msaa: Msaa) -> bool {
     let world = app.sub_app(RenderApp).world();
     let (adapter, device) = (world.resource::<RenderAdapter>(), world.resource::<RenderDevice>());
@@ -170,15 +173,15 @@ fn can_sample(app: &App, msaa: Msaa) -> bool {
         let features = adapter.get_texture_format_features(format);
         features.flags.sample_count_supported(msaa.samples())
     };
-    // Every device has the first two, and others if it has been asked for them.
+    // Every device supports these two counts; others need the feature.
     let everywhere = matches!(msaa, Msaa::Off | Msaa::Sample4);
     everywhere || specific && supported(TextureFormat::Depth32Float) && supported(TextureFormat::Rgba8UnormSrgb)
 }
 
 #[test]
-fn every_sample_count_cuts_captures_at_the_right_pixels_of_a_viewport() {
+fn depth_tests_use_the_right_pixels_of_a_viewport_for_every_sample_count() {
     let Some(mut app) = app(SIZE) else { return };
-    // Larger than the viewport.
+    // A Gaussian larger than the viewport.
     spawn(&mut app, &scene(&[(blob(Vec3::ZERO, Vec3::new(2.0, 2.0, 0.1), 0.98), Vec3::X)]), ());
     let (corner, size) = (UVec2::new(37, 21), UVec2::new(120, 90));
     let viewport = Some(Viewport { physical_position: corner, physical_size: size, ..default() });
@@ -203,11 +206,11 @@ fn every_sample_count_cuts_captures_at_the_right_pixels_of_a_viewport() {
             let is_red = |[r, g, b]: [u8; 3]| r > 200 && g < 60 && b < 60;
             for (left, up) in [(1, 1), (0, 1), (1, 0)] {
                 let seen = rgb(&picture, middle.x - left, middle.y - up);
-                assert!(is_red(seen), "{name}: {left} left and {up} up of its corner is {seen:?}");
+                assert!(is_red(seen), "{name}: the pixel {left} left of and {up} above the mesh's corner is {seen:?}");
             }
             let seen = rgb(&picture, middle.x, middle.y);
             let right = if hides { seen == [0, 255, 0] } else { is_red(seen) };
-            assert!(right, "{name}: its first pixel is {seen:?}");
+            assert!(right, "{name}: the first pixel of the mesh is {seen:?}");
             // The other quarters reach to the edges of the viewport.
             let edges = [
                 ([corner.x, 40], [corner.x - 1, 40]),
@@ -216,19 +219,23 @@ fn every_sample_count_cuts_captures_at_the_right_pixels_of_a_viewport() {
                 ([60, last.y], [60, last.y + 1]),
             ];
             for ([x, y], [u, v]) in edges {
-                assert!(rgb(&picture, x, y)[0] > 60, "{name}: inside the viewport, at {x}, {y}, the capture shows");
-                assert_eq!(rgb(&picture, u, v), [0, 0, 0], "{name}: outside, at {u}, {v}, nothing does");
+                assert!(rgb(&picture, x, y)[0] > 60, "{name}: inside the viewport, at {x}, {y}, the capture is drawn");
+                assert_eq!(
+                    rgb(&picture, u, v),
+                    [0, 0, 0],
+                    "{name}: outside the viewport, at {u}, {v}, the target is black"
+                );
             }
         }
     }
 }
 
-/// Returns a synthetic scene with a filter of four segments, and without one.
+/// Returns a synthetic scene with a filter of four segments, and the same scene without a filter.
 fn twice(count: usize, seed: u64) -> [RuntimeScene; 2] {
     [true, false].map(|filtered| synthetic(count, seed, filtered))
 }
 
-/// One app with everything in it twice, with a temporal filter and without, each for a camera of its own.
+/// An app with each capture twice, with and without a temporal filter, and a camera for each variant.
 struct Both {
     app: App,
     cameras: [Entity; 2],
@@ -264,21 +271,25 @@ impl Both {
         }
     }
 
-    /// Checks that both cameras see the same and, if filters are on, that one of them does not project every Gaussian.
+    /// Checks that both cameras draw the same picture and, if filters are on, that the first camera has inactive Gaussians.
     fn check(&mut self, what: &str, filters: bool) {
         let filtered = picture(&mut self.app, 0.0);
         let plain = testing::read(&mut self.app, &self.plain).expect("the second camera's picture");
-        assert!(plain.pixels().any(|pixel| pixel.0[..3] != [0, 0, 0]), "{what}: something shows");
-        assert_eq!(difference_between(&filtered, &plain), 0, "{what}: with the filter and without, in 255ths");
+        assert!(plain.pixels().any(|pixel| pixel.0[..3] != [0, 0, 0]), "{what}: the capture is drawn");
+        assert_eq!(difference_between(&filtered, &plain), 0, "{what}: the filter changes no pixel");
         let statistics = self.app.world().resource::<CaptureStatistics>();
-        let [with, without] = self.cameras.map(|camera| statistics.view(camera).expect("it sees captures"));
-        assert_eq!((with.total, without.active), (without.total, without.total), "{what}: the same Gaussians");
-        assert_eq!(with.active < with.total, filters, "{what}: {} of {} are active", with.active, with.total);
+        let [with, without] = self.cameras.map(|camera| statistics.view(camera).expect("the camera draws captures"));
+        assert_eq!(
+            (with.total, without.active),
+            (without.total, without.total),
+            "{what}: both cameras have the same Gaussians"
+        );
+        assert_eq!(with.active < with.total, filters, "{what}: {} of {} Gaussians are active", with.active, with.total);
     }
 }
 
 #[test]
-fn a_filter_changes_no_pixel_whatever_happens_to_its_capture() {
+fn a_filter_changes_no_pixel_after_any_change_of_its_capture() {
     let Some(mut both) = Both::new() else { return };
     let [first, other] = [(400, 1), (300, 2)].map(|(count, seed)| both.add(&twice(count, seed)));
     let placed = both.place(&first, 0.1, Transform::default());
@@ -309,7 +320,7 @@ fn a_filter_changes_no_pixel_whatever_happens_to_its_capture() {
 }
 
 #[test]
-fn a_resized_target_shows_captures_at_its_new_size() {
+fn captures_are_drawn_at_the_new_size_of_a_resized_target() {
     let Some(mut app) = app(SIZE) else { return };
     let scene = crowd();
     spawn(&mut app, &scene, ());
@@ -317,7 +328,7 @@ fn a_resized_target_shows_captures_at_its_new_size() {
     let image = app.world().resource::<Offscreen>().image.clone();
     for size in [SIZE, UVec2::new(120, 100), UVec2::new(230, 160), SIZE] {
         let extent = Extent3d { width: size.x, height: size.y, ..default() };
-        app.world_mut().resource_mut::<Assets<Image>>().get_mut(&image).expect("it is the app's").resize(extent);
+        app.world_mut().resource_mut::<Assets<Image>>().get_mut(&image).expect("the image of the app").resize(extent);
         app.insert_resource(Offscreen { image: image.clone(), size });
         let expected = reference_picture(&scene, view(&eye(), size, 0.0), Appearance::default());
         check(&mut app, &expected, &format!("{} x {}", size.x, size.y));
@@ -325,7 +336,7 @@ fn a_resized_target_shows_captures_at_its_new_size() {
 }
 
 #[test]
-fn two_cameras_share_a_target_and_each_half_is_its_own() {
+fn two_cameras_draw_into_halves_of_one_target() {
     let Some(mut app) = app(SIZE) else { return };
     let scene = crowd();
     let place = Transform::from_xyz(0.2, -0.1, 0.3).with_rotation(Quat::from_rotation_y(0.6));
@@ -344,16 +355,16 @@ fn two_cameras_share_a_target_and_each_half_is_its_own() {
         let seen = crop_imm(&picture, order * half.x, 0, half.x, half.y).to_image();
         let expected = reference_picture(&scene, view_of(&pose, &place, half, 0.0), Appearance::default());
         let apart = difference(&seen, &expected);
-        assert!(apart <= 2.0, "half {order}: Bevy and the CPU reference are {apart} / 255 apart");
+        assert!(apart <= 2.0, "half {order}: Bevy and the CPU reference differ by {apart} / 255");
     }
 }
 
 #[test]
-fn reverse_and_ping_pong_show_the_pictures_of_forward() {
+fn reverse_and_ping_pong_match_forward_playback() {
     let Some(mut app) = app(SMALL) else { return };
     spawn_camera(&mut app, Msaa::Off, eye());
     let capture = add(&mut app, &crowd());
-    // From the start, a quarter of the duration from picture to picture.
+    // Pictures at steps of a quarter of the duration.
     let mut play = |playback: Playback, steps: usize| -> Vec<RgbaImage> {
         let entity = app.world_mut().spawn((GaussianCapture3d(capture.clone()), playback)).id();
         let pictures = (0..steps).map(|_| picture(&mut app, DURATION / 4.0)).collect();
@@ -361,19 +372,19 @@ fn reverse_and_ping_pong_show_the_pictures_of_forward() {
         pictures
     };
     let forward = play(Playback::default(), 3);
-    assert!(forward[0] != forward[1] && forward[1] != forward[2], "something moves");
+    assert!(forward[0] != forward[1] && forward[1] != forward[2], "the pictures of forward playback differ");
     let mut reverse = play(Playback { speed: -1.0, ..default() }, 3);
     reverse.reverse();
-    assert!(reverse == forward, "backwards, from the end");
+    assert!(reverse == forward, "reverse playback from the end matches forward playback");
     let to_and_fro = play(Playback { repeat: Repeat::PingPong, ..default() }, 7);
-    assert!(to_and_fro[..3] == forward[..], "to");
+    assert!(to_and_fro[..3] == forward[..], "ping-pong matches forward playback before the turn");
     let mut fro = to_and_fro[4..].to_vec();
     fro.reverse();
-    assert!(fro == forward, "and fro");
+    assert!(fro == forward, "ping-pong matches forward playback after the turn");
 }
 
 #[test]
-fn an_orthographic_camera_shows_what_is_near_brighter_as_depth() {
+fn the_depth_view_of_an_orthographic_camera_is_brighter_for_near_splats() {
     let Some(mut app) = app(SIZE) else { return };
     let ball = |x, z| (blob(Vec3::new(x, 0.0, z), Vec3::splat(0.2), 0.98), Vec3::ONE);
     spawn(&mut app, &scene(&[ball(-0.7, 0.5), ball(0.7, -1.5)]), ());
@@ -383,19 +394,19 @@ fn an_orthographic_camera_shows_what_is_near_brighter_as_depth() {
     let picture = picture(&mut app, 0.0);
     // Three units are 150 pixels high.
     let [near, far] = [MIDDLE.x - 35, MIDDLE.x + 35].map(|x| rgb(&picture, x, MIDDLE.y));
-    assert!(far[0] > 20, "what is far is dim, not black: {far:?}");
-    assert!(near[0].saturating_sub(far[0]) > 10, "what is near is brighter: {near:?}, not {far:?}");
+    assert!(far[0] > 20, "the far splat is dim, not black: {far:?}");
+    assert!(near[0].saturating_sub(far[0]) > 10, "the near splat is brighter: {near:?}, the far one {far:?}");
     assert!([near, far].iter().all(|[r, g, b]| r == g && g == b), "depth is gray: {near:?}, {far:?}");
 }
 
 #[test]
-fn extreme_exposure_is_white_and_finite() {
+fn extreme_exposure_draws_white_and_finite_values() {
     let Some(mut app) = app(SIZE) else { return };
     app.insert_resource(ClearColor(Color::srgb_u8(51, 76, 102)));
     spawn(&mut app, &lone(Vec3::splat(0.8)), CaptureSettings { exposure: 120.0, ..default() });
     let camera = spawn_camera(&mut app, Msaa::Off, front());
     insert(&mut app, camera, Hdr);
-    // A second camera's target keeps what the first one's rounds to 8 bits.
+    // The target of a second camera keeps half floats, which the first one rounds to 8 bits.
     let halves = Offscreen::hdr(&mut app.world_mut().resource_mut::<Assets<Image>>(), SIZE);
     let second = spawn_camera(&mut app, Msaa::Off, front());
     insert(&mut app, second, (Hdr, halves.target()));
@@ -403,13 +414,13 @@ fn extreme_exposure_is_white_and_finite() {
     assert_eq!(rgb(&picture, MIDDLE.x, MIDDLE.y), [255; 3], "the capture is white");
     let corner = rgb(&picture, 2, 2);
     let apart = corner.iter().zip([51u8, 76, 102]).map(|(seen, clear)| seen.abs_diff(clear)).max();
-    assert!(apart <= Some(1), "where it is not, the clear color shows: {corner:?}");
+    assert!(apart <= Some(1), "pixels without the capture have the clear color: {corner:?}");
     let halves = testing::read_hdr(&mut app, &halves).expect("the second camera's picture");
     assert!(halves.as_raw().iter().all(|value| value.is_finite()), "every value of the HDR target is finite");
 }
 
 #[test]
-fn without_tonemapping_bevy_shows_what_the_command_renders() {
+fn without_tonemapping_bevy_matches_the_command() {
     let size = UVec2::new(160, 120);
     let Some(mut app) = app(size) else { return };
     let Some(mut headless) = gpu::headless() else { return };
@@ -443,6 +454,6 @@ fn without_tonemapping_bevy_shows_what_the_command_renders() {
             seen.0.iter().zip(expected.0).map(|(seen, expected)| seen.abs_diff(expected)).max()
         };
         let apart = picture.pixels().zip(expected.pixels()).filter_map(channel).max();
-        assert!(apart <= Some(1), "{target}: Bevy and the command are {apart:?} / 255 apart");
+        assert!(apart <= Some(1), "{target}: Bevy and the command differ by {apart:?} / 255");
     }
 }

@@ -1,17 +1,16 @@
-//! The unit tests of the example `walkthrough`, which Cargo does not run: it builds examples, but runs no tests in
-//! them.
+//! The unit tests of the example `walkthrough`, included here because Cargo builds examples without running their tests.
 //!
-//! In: bodies, heads and keys. Out: proof that walking, turning, teleporting and recorded paths work, and that the view
-//! closes in as comfort requires. Needs neither a GPU nor a window.
+//! In: bodies, heads and keys. Out: proof that walking, turning, teleporting and recorded paths work, and that the vignette closes during
+//! motion. Needs neither a GPU nor a window.
 
 #[path = "../../examples/walkthrough/body.rs"]
-#[expect(dead_code, reason = "the example uses the rest")]
+#[expect(dead_code, reason = "only the example uses the remaining items")]
 mod body;
 #[path = "../../examples/walkthrough/comfort.rs"]
 mod comfort;
 #[path = "../../examples/walkthrough/path.rs"]
-#[expect(dead_code, reason = "the example uses the rest")]
+#[expect(dead_code, reason = "only the example uses the remaining items")]
 mod path;
 #[path = "../../examples/walkthrough/teleport.rs"]
-#[expect(dead_code, reason = "the example uses the rest")]
+#[expect(dead_code, reason = "only the example uses the remaining items")]
 mod teleport;

@@ -1,7 +1,8 @@
-//! Order: what a camera draws of lit meshes besides opaque and transparent ones.
+//! Order: finds the transmissive meshes and wireframes that a camera draws.
 //!
-//! In: Bevy's transmissive phase and its wireframes; meshes that have moved. Out: [`OtherPasses`], and transmissive meshes after the captures
-//! behind them. Bevy 0.19 sorts a transparent mesh by the place where it was when it came into view, so places are brought up to date here.
+//! In: Bevy's transmissive phase and wireframes; meshes that have moved. Out: [`OtherPasses`], which places captures before the
+//! transmissive meshes in front of them. Bevy 0.19 sorts a transparent mesh by its position when it came into view, so this module also
+//! updates the positions of moved meshes.
 
 use crate::plugin::component::GaussianCapture3d;
 use crate::plugin::render::CaptureSystems;
@@ -28,12 +29,12 @@ use bevy::render::{ExtractSchedule, Render, RenderApp, RenderSystems};
 use bevy::transform::components::GlobalTransform;
 use glam::Vec3;
 
-/// The meshes that have moved since the frame before, and the centers of their bounds in the world. None while there are no captures, and all
-/// when there are captures again.
+/// The meshes that have moved since the previous frame, with the centers of their bounds in world space. Empty while there are no captures;
+/// all meshes in the first frame with captures.
 #[derive(Resource, Default)]
 struct MovedMeshes(Vec<(MainEntity, Vec3)>);
 
-/// Adds what the order of captures needs to the render world, if there is one.
+/// Adds the systems and resources of this module to the render world, if there is one.
 pub(super) fn build(app: &mut App) {
     let Some(render_app) = app.get_sub_app_mut(RenderApp) else { return };
     render_app
@@ -54,7 +55,7 @@ pub(super) fn build(app: &mut App) {
         );
 }
 
-/// Returns the extraction of the meshes that have moved: left out while there is no mesh, and none to forget.
+/// Returns the extraction of the meshes that have moved. It is skipped while there are no meshes and no moved meshes to clear.
 fn extraction() -> ScheduleConfigs<ScheduleSystem> {
     extract_moved_meshes.run_if(any_mesh.or_else(any_moved))
 }
@@ -83,7 +84,7 @@ fn any_moved(moved: Res<MovedMeshes>) -> bool {
     !moved.0.is_empty()
 }
 
-/// Gives the meshes that have moved their new places in the sorted phases, which keep meshes from frame to frame.
+/// Writes the new positions of moved meshes to the sorted phases, which keep meshes from frame to frame.
 fn update_centers(
     moved: Res<MovedMeshes>,
     mut transparent: ResMut<ViewSortedRenderPhases<Transparent3d>>,
@@ -105,7 +106,7 @@ fn update_centers(
     }
 }
 
-/// Returns whether any camera draws transmissive meshes or wireframes, or did in the last frame.
+/// Returns whether any camera draws transmissive meshes or wireframes, or drew them in the previous frame.
 fn any_other_pass(
     transmissive: Option<Res<ViewSortedRenderPhases<Transmissive3d>>>,
     wireframes: Option<Res<ViewBinnedRenderPhases<Wireframe3d>>>,
@@ -129,7 +130,7 @@ fn find_other_passes(
         let lines = wireframes.as_ref().and_then(|phases| phases.get(&camera));
         let refracting = meshes.and_then(|phase| phase.items.values().map(|item| item.distance).reduce(f32::max));
         let other = OtherPass {
-            // Bevy draws the sky before or after transmissive meshes, and over what writes no depth.
+            // Bevy draws the sky before or after transmissive meshes, and over captures that write no depth.
             refracting: refracting.filter(|_| !has_sky),
             resolves_again: lines.is_some_and(|phase| !phase.is_empty()),
         };
@@ -147,13 +148,13 @@ mod tests {
     use bevy::render::MainWorld;
 
     #[test]
-    fn meshes_are_followed_while_there_are_captures() {
+    fn moved_meshes_are_extracted_while_there_are_captures() {
         let mut render = World::new();
         render.init_resource::<MainWorld>();
         render.init_resource::<MovedMeshes>();
         let mut schedule = Schedule::default();
         schedule.add_systems(extraction());
-        // Extracts, and returns the places of the meshes that have moved, along x.
+        // Extracts, and returns the x positions of the meshes that have moved.
         let mut moved = |render: &mut World| -> Vec<f32> {
             schedule.run(render);
             render.resource::<MovedMeshes>().0.iter().map(|(_, center)| center.x).collect()
@@ -161,20 +162,20 @@ mod tests {
         let mut main = render.resource_mut::<MainWorld>();
         let place = |x| GlobalTransform::from_xyz(x, 0.0, 0.0);
         let meshes @ [_, last] = [1.0, 2.0].map(|x| main.spawn((Mesh3d::default(), Aabb::default(), place(x))).id());
-        assert_eq!(moved(&mut render), [0.0; 0], "nothing needs them");
+        assert_eq!(moved(&mut render), [0.0; 0], "no mesh is extracted without captures");
         let capture = render.resource_mut::<MainWorld>().spawn(GaussianCapture3d::default()).id();
-        assert_eq!(moved(&mut render), [1.0, 2.0], "all that may have moved before");
-        assert_eq!(moved(&mut render), [0.0; 0], "and once");
+        assert_eq!(moved(&mut render), [1.0, 2.0], "all meshes are extracted with the first capture");
+        assert_eq!(moved(&mut render), [0.0; 0], "unmoved meshes are extracted once");
         render.resource_mut::<MainWorld>().entity_mut(last).insert(place(3.0));
-        assert_eq!(moved(&mut render), [3.0], "then those that move");
+        assert_eq!(moved(&mut render), [3.0], "a moved mesh is extracted");
         render.resource_mut::<MainWorld>().despawn(capture);
         render.resource_mut::<MainWorld>().entity_mut(last).insert(place(4.0));
-        assert_eq!(moved(&mut render), [0.0; 0], "until the last capture has gone");
+        assert_eq!(moved(&mut render), [0.0; 0], "no mesh is extracted after the last capture is despawned");
         render.resource_mut::<MainWorld>().spawn(GaussianCapture3d::default());
-        assert_eq!(moved(&mut render), [1.0, 4.0], "and again from the next on");
+        assert_eq!(moved(&mut render), [1.0, 4.0], "all meshes are extracted again with the next capture");
         for mesh in meshes {
             render.resource_mut::<MainWorld>().despawn(mesh);
         }
-        assert_eq!(moved(&mut render), [0.0; 0], "what has gone is forgotten");
+        assert_eq!(moved(&mut render), [0.0; 0], "despawned meshes are not extracted");
     }
 }

@@ -1,6 +1,6 @@
-//! The plugin of everything that joins captures and lit meshes.
+//! The plugin that combines captures with lit meshes.
 //!
-//! In: an app in which captures are drawn. Out: the same app with the parts of this folder.
+//! In: an app in which captures are drawn. Out: the same app with the order among lit meshes, shading, cast shadows and contact shadows.
 
 use super::contact_shadow::ContactShadowPlugin;
 use super::order;
@@ -8,7 +8,7 @@ use super::shade::ShadePlugin;
 use super::shadow::CaptureShadowPlugin;
 use bevy::app::{App, Plugin};
 
-/// Joins captures and lit meshes. Part of [`GaussianCapturePlugin`](crate::GaussianCapturePlugin).
+/// Combines captures with lit meshes. Part of [`GaussianCapturePlugin`](crate::GaussianCapturePlugin).
 #[derive(Debug, Default, Clone, Copy)]
 pub(crate) struct CapturePbrPlugin;
 

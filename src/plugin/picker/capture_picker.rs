@@ -39,7 +39,7 @@ pub struct CaptureHit {
     pub gaussian: usize,
     /// Distance from the ray's origin, in world units.
     pub distance: f32,
-    /// The point on the ray at that distance, in the world.
+    /// The point on the ray at this distance, in world space.
     pub point: Vec3,
 }
 

@@ -21,7 +21,7 @@ use bevy::render::renderer::{RenderDevice, RenderQueue};
 use bevy::shader::{Shader, ShaderDefVal};
 use glam::UVec4;
 
-/// The shaders of this folder, kept alive for the render world.
+/// Handles of the shaders of this folder, kept in the render world so that the assets stay loaded.
 #[derive(Resource)]
 pub(super) struct CaptureShaders {
     pub(super) composite: Handle<Shader>,

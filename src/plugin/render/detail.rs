@@ -37,7 +37,7 @@ const HEADROOM: f64 = 8.0;
 /// The lowest bias is minus this many stops.
 const FARTHEST: f32 = 6.0;
 
-/// How much detail of captures is drawn: a resource.
+/// The detail at which captures are drawn: a resource.
 ///
 /// Captures with levels of detail (`gs4d detail`) are drawn with fewer Gaussians where they are small on the screen.
 /// [`CaptureSettings::finest_level`](super::CaptureSettings::finest_level) limits it for one capture.
@@ -73,7 +73,7 @@ pub(super) struct CaptureLevels {
     /// Level, and whether the capture was seen this frame, by the camera's entity in the render world and the capture's entity in the main
     /// world.
     chosen: HashMap<(Entity, MainEntity), (usize, bool)>,
-    /// Whether any camera sees all Gaussians of a capture.
+    /// Whether any camera draws all Gaussians of a capture.
     whole: MainEntityHashMap<bool>,
     /// The sights of this frame. The memory is kept from frame to frame.
     sights: Vec<Sight>,
@@ -87,7 +87,7 @@ impl CaptureLevels {
         self.chosen.get(&(camera, capture)).map_or(0, |(level, _)| *level)
     }
 
-    /// Returns whether cameras see a capture, but none sees all of its Gaussians.
+    /// Returns whether cameras see a capture, but no camera draws all of its Gaussians.
     pub(super) fn is_coarse(&self, capture: &MainEntity) -> bool {
         self.whole.get(capture) == Some(&false)
     }
@@ -241,7 +241,7 @@ mod tests {
     fn the_coarsest_accurate_level_is_chosen() {
         let levels = levels(&[100.0, 40.0, 10.0]);
         for (pixels, expected) in [(5.0, 3), (10.0, 3), (11.0, 2), (90.0, 1), (101.0, 0), (f32::INFINITY, 0)] {
-            assert_eq!(choose(&levels, pixels, None), expected, "at {pixels} pixels");
+            assert_eq!(choose(&levels, pixels, None), expected, "the level at {pixels} pixels");
         }
         assert_eq!(choose(&levels, f32::NAN, None), 0, "all Gaussians are drawn at a size of NaN");
         assert_eq!(choose(&[], 1.0, None), 0, "a capture without levels is drawn whole");
@@ -271,7 +271,7 @@ mod tests {
                 changes += usize::from(next != level);
                 level = next;
             }
-            assert!(changes <= 1, "{changes} changes about {middle} pixels");
+            assert!(changes <= 1, "{changes} changes of the level around {middle} pixels, at most one expected");
         }
     }
 

@@ -13,7 +13,7 @@
 //! active       the lists of active Gaussians                         once per placed capture and segment, before all cameras
 //! prepare      a camera's lens and the poses of captures -> views    once per camera and frame, kept in capture_views; then previous
 //! order        transparent items before and after captures           once per camera and frame
-//! draw         one compute pass, composite, write_depth, write_motion Core3d, among transparent items
+//! draw         one compute pass, composite, write_depth, write_motion  Core3d, among transparent items
 //! publish      counts, times, memory -> statistics                   render world -> main world
 //! ```
 //!

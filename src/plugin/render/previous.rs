@@ -94,7 +94,7 @@ mod tests {
             (0.3, 0.3, true),
             (f32::NAN, 0.016, true),
         ] {
-            assert_eq!(is_jump(step, before), jump, "{step} s after {before} s");
+            assert_eq!(is_jump(step, before), jump, "whether a step of {step} s after {before} s is a jump");
         }
     }
 }

@@ -11,7 +11,7 @@ use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 use glam::{Affine3A, Mat3, Quat, Vec3};
 
-/// How a capture is drawn: on every [`GaussianCapture3d`](crate::GaussianCapture3d).
+/// How a capture is drawn: a required component of every [`GaussianCapture3d`](crate::GaussianCapture3d).
 ///
 /// An opacity, or a factor on light, that is negative or not finite counts as 0.
 ///

@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Counts, GPU times and memory of drawing captures in the newest frame that the render world has prepared: a resource.
 ///
-/// Clones share the numbers. Default: no views, no captures, nothing measured.
+/// Clones share the numbers. Default: no views, no captures, no measurement.
 ///
 /// # Examples
 ///

@@ -173,7 +173,7 @@ mod tests {
                 CameraLens::of(&projection).and_then(|lens| lens.view(SIZE, 0.0, camera, model)).expect("a view");
             for point in [Vec3::ZERO, Vec3::new(0.3, 0.2, -0.1), Vec3::new(-0.4, 0.1, 0.5)] {
                 let expected = seen_by_bevy(projection, camera, model.transform_point3(point));
-                assert!(seen(&view, point).abs_diff_eq(expected, 1e-5), "{point} must be seen at {expected}");
+                assert!(seen(&view, point).abs_diff_eq(expected, 1e-5), "{point} is projected to {expected}");
             }
         }
     }
@@ -191,7 +191,7 @@ mod tests {
                 let back = (distance.x + distance.y * d) / (distance.z + distance.w * d);
                 assert!((back - depth).abs() < 1e-4 * depth, "{name}: depth {depth} converts back to {back}");
                 let buffer = (distance.x - distance.z * depth) / (distance.w * depth - distance.y);
-                assert!((buffer - d).abs() < 1e-6, "{name}: {depth} is written as {buffer}, Bevy writes {d}");
+                assert!((buffer - d).abs() < 1e-6, "{name}: depth {depth} converts to {buffer}, Bevy's value is {d}");
             }
         }
     }
@@ -218,7 +218,7 @@ mod tests {
         assert_eq!(CameraLens::of(&skewed), None, "skewed parallel rays");
         let mut mirrored = perspective(0.7);
         mirrored.x_axis.x = -mirrored.x_axis.x;
-        assert_eq!(CameraLens::of(&mirrored), None, "mirrored");
+        assert_eq!(CameraLens::of(&mirrored), None, "a mirrored projection");
         let plane = Vec3::new(0.1, 0.0, -1.0).normalize().extend(-0.4);
         let oblique = PerspectiveProjection { near_clip_plane: plane, ..PerspectiveProjection::default() };
         let lens = CameraLens::of(&oblique.get_clip_from_view()).expect("still a pinhole");

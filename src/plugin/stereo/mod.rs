@@ -1,8 +1,8 @@
-//! Stereo: a head with two eyes, for views side by side and for pairs of pictures.
+//! Stereo: a head with two eyes, for side-by-side views and for pairs of pictures.
 //!
 //! In: a [`StereoRig`] on the head's entity, and the targets of its eyes ([`EyeTargets`]). Out: two cameras, children of the head, at the
-//! right distance and, side by side, each with its half of the target. Captures need no support for stereo: each eye is a camera like
-//! any other, and everything that does not depend on the camera (time, which Gaussians are active) is computed once for all cameras.
+//! given distance and, for side-by-side views, each with its half of the target. Captures need no special support for stereo: each eye is
+//! an ordinary camera, and all work that does not depend on the camera (time, active Gaussians) is done once for all cameras.
 //!
 //! Both eyes look straight ahead through symmetric frusta, so that distant points are at the same place in both pictures. A point
 //! at depth `z` is `focal length · ipd / z` pixels further right in the picture of the left eye.
@@ -25,7 +25,7 @@
 //! App::new().add_plugins((DefaultPlugins, GaussianCapturePlugin)).add_systems(Startup, setup).run();
 //! ```
 //!
-//! A headset has its own cameras, with its own lenses; this module is for screens and pictures.
+//! A headset has its own cameras and lenses; this module is for screens and pictures.
 
 mod plugin;
 mod rig;

@@ -1,7 +1,6 @@
-//! The plugin of stereo: the places and viewports of eyes.
+//! The plugin of stereo: updates the positions and viewports of eyes.
 //!
-//! In: rigs, and the sizes of the eyes' targets. Out: the eyes' transforms, viewports and aspect ratios, updated in the frame in which
-//! anything has changed.
+//! In: rigs, and the sizes of the eyes' targets. Out: the eyes' transforms, viewports and aspect ratios, updated in the frame of a change.
 
 use super::rig::{Eye, SideBySide, StereoRig};
 use bevy::app::{App, Plugin, PostUpdate};
@@ -17,8 +16,8 @@ use bevy::transform::TransformSystems;
 use bevy::transform::components::Transform;
 use glam::UVec2;
 
-/// Keeps the eyes of every [`StereoRig`] at their distance, and those that draw [side by side](SideBySide) in their halves. Part of
-/// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin); adding it again changes nothing.
+/// Keeps the eyes of every [`StereoRig`] at their distance, and [side-by-side](SideBySide) eyes in their halves of the target. Part of
+/// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin); adding it again has no effect.
 ///
 /// # Examples
 ///
@@ -49,7 +48,7 @@ impl Plugin for StereoPlugin {
         );
     }
 
-    /// A second one does nothing.
+    /// A second plugin has no effect.
     fn is_unique(&self) -> bool {
         false
     }
@@ -65,8 +64,8 @@ fn place_eyes(rigs: Query<(&StereoRig, &Children)>, mut eyes: Query<(&Eye, &mut 
     }
 }
 
-/// Sets the viewports. Runs after Bevy has updated the target's size, and does for a changed viewport what Bevy would
-/// do one frame later.
+/// Sets the viewports. Runs after Bevy has updated the target's size, and updates the projection of a changed viewport, which Bevy would do
+/// one frame later.
 fn fit_eyes(mut eyes: Query<(&Eye, &mut Camera, &mut Projection), With<SideBySide>>) {
     for (eye, mut camera, mut projection) in &mut eyes {
         let Some((corner, size)) = camera.physical_target_size().and_then(|target| half(*eye, target)) else {
@@ -106,14 +105,14 @@ mod tests {
     use std::f32::consts::FRAC_PI_2;
 
     #[test]
-    fn halves_are_alike_and_do_not_overlap() {
+    fn halves_have_equal_sizes_and_do_not_overlap() {
         for (width, right) in [(200, 100), (201, 101), (2, 1)] {
             let halves = Eye::BOTH.map(|eye| half(eye, UVec2::new(width, 50)).expect("there are two halves"));
             let size = UVec2::new(width / 2, 50);
-            assert_eq!(halves, [(UVec2::ZERO, size), (UVec2::new(right, 0), size)], "of {width} columns");
+            assert_eq!(halves, [(UVec2::ZERO, size), (UVec2::new(right, 0), size)], "the halves of {width} columns");
         }
-        assert_eq!(half(Eye::Right, UVec2::new(1, 50)), None, "one column cannot be halved");
-        assert_eq!(half(Eye::Left, UVec2::ZERO), None, "nor can a window that is not shown");
+        assert_eq!(half(Eye::Right, UVec2::new(1, 50)), None, "one column has no halves");
+        assert_eq!(half(Eye::Left, UVec2::ZERO), None, "an empty target has no halves");
     }
 
     fn spawn(app: &mut App, rig: StereoRig) -> Stereo {
@@ -124,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn eyes_stand_half_the_distance_beside_the_head() {
+    fn eyes_are_half_the_distance_to_each_side_of_the_head() {
         let mut app = App::new();
         app.add_plugins((TransformPlugin, StereoPlugin));
         let stereo = spawn(&mut app, StereoRig { ipd: 0.5 });
@@ -134,18 +133,22 @@ mod tests {
             app.world().get::<GlobalTransform>(stereo.eyes[eye]).expect("an eye has a place").translation()
         };
         app.update();
-        // Turned to the left by a right angle, the head's +x axis is the world's −z.
+        // After a turn by 90 degrees to the left, the head's +x axis is the world's −z axis.
         assert!(place(&app, 0).abs_diff_eq(Vec3::new(1.0, 2.0, 3.25), 1e-6), "the left eye is at {}", place(&app, 0));
         assert!(place(&app, 1).abs_diff_eq(Vec3::new(1.0, 2.0, 2.75), 1e-6), "the right eye is at {}", place(&app, 1));
         for (ipd, expected) in [(0.1, 2.95), (f32::NAN, 2.95), (0.0, 3.0)] {
             app.world_mut().entity_mut(stereo.head).insert(StereoRig { ipd });
             app.update();
-            assert!((place(&app, 1).z - expected).abs() < 1e-6, "at {ipd} the right eye is at {}", place(&app, 1));
+            assert!(
+                (place(&app, 1).z - expected).abs() < 1e-6,
+                "with a distance of {ipd} the right eye is at {}",
+                place(&app, 1)
+            );
         }
     }
 
     #[test]
-    fn adding_it_twice_changes_nothing() {
+    fn adding_the_plugin_twice_adds_its_systems_once() {
         let systems = |times| {
             let mut app = App::new();
             for _ in 0..times {
@@ -153,7 +156,7 @@ mod tests {
             }
             app.get_schedule(PostUpdate).map_or(0, |schedule| schedule.graph().systems.len())
         };
-        assert_eq!(systems(2), systems(1), "the systems run once");
+        assert_eq!(systems(2), systems(1), "the systems are added once");
     }
 
     #[test]
@@ -164,7 +167,7 @@ mod tests {
         for size in [UVec2::new(200, 100), UVec2::new(301, 50), UVec2::new(64, 400)] {
             for eye in stereo.eyes {
                 let mut camera = app.world_mut().get_mut::<Camera>(eye).expect("an eye is a camera");
-                // As Bevy learns it, and in the same frame.
+                // As Bevy sets it, in the same frame.
                 camera.computed.target_info = Some(RenderTargetInfo { physical_size: size, scale_factor: 1.0 });
             }
             app.update();
@@ -172,11 +175,15 @@ mod tests {
                 let camera = app.world().get::<Camera>(entity).expect("an eye is a camera");
                 let viewport = camera.viewport.as_ref().expect("half of the target");
                 let found = (viewport.physical_position, viewport.physical_size);
-                assert_eq!(Some(found), half(eye, size), "{eye:?} of {size}");
+                assert_eq!(Some(found), half(eye, size), "viewport of {eye:?} in {size}");
                 let projection = app.world().get::<Projection>(entity).expect("an eye has a lens");
-                let Projection::Perspective(lens) = projection else { panic!("a perspective one") };
-                assert_eq!(lens.aspect_ratio, found.1.x as f32 / found.1.y as f32, "{eye:?} of {size}");
-                assert_eq!(camera.computed.clip_from_view, projection.get_clip_from_view(), "{eye:?} of {size}");
+                let Projection::Perspective(lens) = projection else { panic!("the projection is a perspective") };
+                assert_eq!(lens.aspect_ratio, found.1.x as f32 / found.1.y as f32, "aspect ratio of {eye:?} in {size}");
+                assert_eq!(
+                    camera.computed.clip_from_view,
+                    projection.get_clip_from_view(),
+                    "matrix of {eye:?} in {size}"
+                );
             }
         }
     }

@@ -13,8 +13,8 @@ use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 use bevy::transform::components::Transform;
 
-/// A head. [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) places its children with an [`Eye`] on either side of it; the game
-/// sets its own transform.
+/// A head. [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) places its children with an [`Eye`] on both sides of it; the game sets
+/// the transform of the head.
 ///
 /// # Examples
 ///
@@ -31,8 +31,8 @@ use bevy::transform::components::Transform;
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 #[require(Transform, Visibility)]
 pub struct StereoRig {
-    /// Distance between the eyes in world units, which are meters for a true sense of size. With 0 both eyes see the same; a number that is
-    /// not finite leaves the eyes where they are. Default: 0.064, the mean of adults.
+    /// Distance between the eyes in world units, which are meters for a true sense of size. With 0 both eyes see the same picture; a value
+    /// that is not finite does not move the eyes. Default: 0.064, the mean of adults.
     pub ipd: f32,
 }
 
@@ -42,7 +42,7 @@ impl Default for StereoRig {
     }
 }
 
-/// Which eye a camera is.
+/// The eye that a camera draws for.
 ///
 /// # Examples
 ///
@@ -50,7 +50,7 @@ impl Default for StereoRig {
 /// use bevy::prelude::*;
 /// use bevy_gs4d::prelude::*;
 ///
-/// /// Shows the depth of captures to the right eye alone.
+/// /// Shows the depth view only to the right eye.
 /// fn setup(eyes: Query<(Entity, &Eye)>, mut commands: Commands) {
 ///     for (camera, eye) in &eyes {
 ///         let debug = match eye {
@@ -77,7 +77,7 @@ impl Eye {
     /// Both eyes, the left one first.
     pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
 
-    /// Returns −1 for the left eye, +1 for the right one: its place on the head's x axis, in halves of the distance between the eyes.
+    /// Returns −1 for the left eye and +1 for the right eye: its position on the head's x axis, in halves of the distance between the eyes.
     pub fn side(self) -> f32 {
         match self {
             Self::Left => -1.0,
@@ -86,8 +86,8 @@ impl Eye {
     }
 }
 
-/// On an eye: it draws into its half of the target, the left eye into the left half, and follows the target's size. If the width is
-/// odd, neither eye draws the column in the middle.
+/// Makes an eye draw into its half of the target, the left eye into the left half, and follow the target's size. If the width is odd,
+/// neither eye draws the column in the middle.
 #[derive(Component, Reflect, Debug, Default, Clone, Copy, PartialEq, Eq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 pub struct SideBySide;
@@ -114,24 +114,25 @@ pub struct SideBySide;
 /// ```
 #[derive(Debug, Clone)]
 pub enum EyeTargets {
-    /// Both into one target, each into its half.
+    /// Both eyes draw into one target, each into its half.
     SideBySide(RenderTarget),
-    /// Each into its own target, the left eye's first.
+    /// Each eye draws into its own target; the left eye's target comes first.
     Separate([RenderTarget; 2]),
 }
 
 /// The entities that [`spawn_stereo`] has spawned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stereo {
-    /// The entity with the [`StereoRig`]. Insert its transform, or make it a child.
+    /// The entity with the [`StereoRig`]. Set its transform, or make it a child of another entity.
     pub head: Entity,
-    /// The cameras of the eyes, the left one first. Insert further components of cameras, the same for both.
+    /// The cameras of the eyes, the left one first. Insert further camera components into both eyes.
     pub eyes: [Entity; 2],
 }
 
-/// Spawns a head with two eyes, and returns their entities. The left eye is drawn first: its camera has the order 0, the right one's 1.
+/// Spawns a head with two eyes, and returns their entities. The left eye is drawn first: its camera has the order 0, the right camera the
+/// order 1.
 ///
-/// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) keeps the eyes in their places.
+/// [`GaussianCapturePlugin`](crate::GaussianCapturePlugin) keeps the eyes at their positions.
 ///
 /// # Examples
 ///

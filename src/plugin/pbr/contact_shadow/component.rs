@@ -1,6 +1,6 @@
-//! The contact shadow of a capture: its looks and where the ground is.
+//! The contact shadow of a capture: strength, softness and height of the ground.
 //!
-//! In: fields that any system or animation may set. Out: the ellipse for the bounds of a capture.
+//! In: fields that any system or animation may set. Out: the ellipse beneath the bounds of a capture.
 
 use bevy::ecs::component::Component;
 use bevy::ecs::reflect::ReflectComponent;
@@ -8,11 +8,11 @@ use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 use glam::{Affine3A, Vec3};
 
-/// Darkens the ground beneath a capture: an optional component beside [`GaussianCapture3d`](crate::GaussianCapture3d).
+/// Darkens the ground beneath a capture: an optional component next to [`GaussianCapture3d`](crate::GaussianCapture3d).
 ///
-/// The ellipse is inscribed in the capture's bounds, seen from above, follows them over time, and fades with the capture's opacity and as
-/// it rises above the ground, and in fog. It needs no light, and costs as much as one small quad. It is drawn over opaque and alpha-masked
-/// meshes and behind captures, by every camera whose layers are those of the capture, while that is visible.
+/// The ellipse is inscribed in the capture's bounds seen from above and follows them over time. It fades with the capture's opacity, with
+/// the height above the ground, and in fog. It needs no light, and costs as much as one small quad. It is drawn over opaque and
+/// alpha-masked meshes and behind captures, by every camera whose layers intersect the capture's, while the capture is visible.
 ///
 /// # Examples
 ///
@@ -29,9 +29,9 @@ use glam::{Affine3A, Vec3};
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 pub struct CaptureContactShadow {
-    /// How much light it takes from the middle, from 0 to 1. Default: 0.6.
+    /// Fraction of the light that it removes at the center, from 0 to 1. Default: 0.6.
     pub strength: f32,
-    /// The width of its edge as a share of its radius, from 0 (hard) to 1. Half of the edge lies outside of the bounds. Default: 0.8.
+    /// The width of its edge as a fraction of its radius, from 0 (hard) to 1. Half of the edge lies outside the bounds. Default: 0.8.
     pub softness: f32,
     /// Height of the ground, y in world space. Default: 0.
     pub ground: f32,
@@ -46,28 +46,29 @@ impl Default for CaptureContactShadow {
 /// An ellipse on the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Ellipse {
-    /// From the unit disk in the plane y = 0.
+    /// Transform from the unit disk in the plane y = 0.
     pub(super) world_from_disk: Affine3A,
-    /// What it takes from the light, from 0 to 1.
+    /// Fraction of the light that it removes, from 0 to 1.
     pub(super) strength: f32,
 }
 
 impl CaptureContactShadow {
     /// Returns the softness, from 0 to 1.
     pub(super) fn softness(&self) -> f32 {
-        share(self.softness)
+        unit(self.softness)
     }
 
-    /// Returns the ellipse beneath a box in world space; `None` if the box is below the ground or so far above it that nothing shows.
+    /// Returns the ellipse beneath a box in world space; `None` if the box is below the ground or too high above it to cast a visible
+    /// shadow.
     pub(super) fn beneath(&self, center: Vec3, half_size: Vec3) -> Option<Ellipse> {
         let above = center.y - half_size.y - self.ground;
         let reach = half_size.x.max(half_size.z);
-        // Gone at a height of its own width.
+        // The strength is 0 at a height of its own width.
         let fade = 1.0 - above.max(0.0) / (2.0 * reach);
-        let strength = share(self.strength) * share(fade);
-        // Half of the edge is outside.
+        let strength = unit(self.strength) * unit(fade);
+        // Half of the edge is outside the bounds.
         let radius = half_size / (1.0 - 0.5 * self.softness());
-        // Enough above the ground for the depth test.
+        // Far enough above the ground to pass the depth test.
         let place = Vec3::new(center.x, self.ground + 0.005 * reach, center.z);
         let scale = Vec3::new(radius.x, 1.0, radius.z);
         let is_buried = center.y + half_size.y < self.ground;
@@ -78,8 +79,8 @@ impl CaptureContactShadow {
     }
 }
 
-/// Returns a value between 0 and 1; 0 for one that is no number.
-fn share(value: f32) -> f32 {
+/// Returns a value clamped to 0 and 1; 0 for NaN.
+fn unit(value: f32) -> f32 {
     if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) }
 }
 
@@ -91,35 +92,35 @@ mod tests {
 
     #[test]
     fn the_ellipse_is_inscribed_in_the_bounds() {
-        let ellipse = SHADOW.beneath(Vec3::new(3.0, 2.0, -1.0), Vec3::new(0.5, 1.0, 0.25)).expect("it shows");
+        let ellipse = SHADOW.beneath(Vec3::new(3.0, 2.0, -1.0), Vec3::new(0.5, 1.0, 0.25)).expect("a visible ellipse");
         let edge = ellipse.world_from_disk.transform_point3(Vec3::X);
-        assert!(edge.abs_diff_eq(Vec3::new(3.5, 1.0, -1.0), 0.01), "the edge is that of the box, not {edge}");
-        assert!(edge.y > 1.0, "just above the ground");
-        assert_eq!(ellipse.strength, 0.8, "on the ground it is as strong as it gets");
+        assert!(edge.abs_diff_eq(Vec3::new(3.5, 1.0, -1.0), 0.01), "the edge is at the side of the box, not at {edge}");
+        assert!(edge.y > 1.0, "the ellipse is just above the ground");
+        assert_eq!(ellipse.strength, 0.8, "a capture on the ground has the full strength");
         let soft = CaptureContactShadow { softness: 1.0, ..SHADOW };
-        let soft = soft.beneath(Vec3::new(3.0, 2.0, -1.0), Vec3::new(0.5, 1.0, 0.25)).expect("it shows");
+        let soft = soft.beneath(Vec3::new(3.0, 2.0, -1.0), Vec3::new(0.5, 1.0, 0.25)).expect("a visible ellipse");
         let edge = soft.world_from_disk.transform_point3(Vec3::X);
-        assert!((edge.x - 4.0).abs() < 1e-5, "a soft edge is as far outside as inside: {edge}");
+        assert!((edge.x - 4.0).abs() < 1e-5, "half of a soft edge is outside the bounds: {edge}");
     }
 
     #[test]
-    fn it_fades_with_height() {
+    fn the_strength_falls_with_height() {
         let at =
             |height: f32| SHADOW.beneath(Vec3::Y * (2.0 + height), Vec3::ONE).map_or(0.0, |ellipse| ellipse.strength);
-        assert!((at(1.0) - 0.4).abs() < 1e-6, "half way up half of it is left");
-        assert_eq!([at(2.0), at(9.0)], [0.0; 2], "nothing at twice the radius and above");
-        assert_eq!(at(-0.5), 0.8, "a capture that is partly in the ground stands on it");
-        assert_eq!(at(-2.5), 0.0, "one that is below has none");
+        assert!((at(1.0) - 0.4).abs() < 1e-6, "at half of the fading height the strength is halved");
+        assert_eq!([at(2.0), at(9.0)], [0.0; 2], "no shadow at a height of twice the radius and above");
+        assert_eq!(at(-0.5), 0.8, "a capture partly in the ground has the full strength");
+        assert_eq!(at(-2.5), 0.0, "a capture below the ground has no shadow");
     }
 
     #[test]
-    fn broken_values_show_nothing() {
+    fn invalid_values_have_no_ellipse() {
         for broken in
             [CaptureContactShadow { strength: f32::NAN, ..SHADOW }, CaptureContactShadow { ground: f32::NAN, ..SHADOW }]
         {
-            assert_eq!(broken.beneath(Vec3::Y * 2.0, Vec3::ONE), None, "{broken:?}");
+            assert_eq!(broken.beneath(Vec3::Y * 2.0, Vec3::ONE), None, "{broken:?} has no ellipse");
         }
-        assert_eq!(SHADOW.beneath(Vec3::Y * 2.0, Vec3::new(0.0, 1.0, 1.0)), None, "a flat box");
-        assert_eq!(SHADOW.beneath(Vec3::NAN, Vec3::ONE), None, "nowhere");
+        assert_eq!(SHADOW.beneath(Vec3::Y * 2.0, Vec3::new(0.0, 1.0, 1.0)), None, "a flat box has no ellipse");
+        assert_eq!(SHADOW.beneath(Vec3::NAN, Vec3::ONE), None, "a box at NaN has no ellipse");
     }
 }

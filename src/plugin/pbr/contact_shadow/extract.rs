@@ -1,4 +1,4 @@
-//! Extract: the contact shadows of this frame.
+//! Extract: copies the contact shadows of this frame.
 //!
 //! In (main world): captures with a [`CaptureContactShadow`], their bounds, visibility and layers. Out (render world):
 //! [`ExtractedContactShadows`].
@@ -17,7 +17,7 @@ use bevy::render::Extract;
 use bevy::transform::components::GlobalTransform;
 use glam::Affine3A;
 
-/// The contact shadows of this frame, seen by a camera or not. The memory is kept from frame to frame.
+/// The contact shadows of this frame, including shadows that no camera sees. The memory is kept from frame to frame.
 #[derive(Resource, Default)]
 pub(super) struct ExtractedContactShadows(pub(super) Vec<PlacedShadow>);
 
@@ -25,7 +25,7 @@ pub(super) struct ExtractedContactShadows(pub(super) Vec<PlacedShadow>);
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct PlacedShadow {
     pub(super) ellipse: Ellipse,
-    /// From 0 to 1.
+    /// Softness of the edge, from 0 to 1.
     pub(super) softness: f32,
     pub(super) layers: RenderLayers,
 }
@@ -35,7 +35,7 @@ pub(super) fn any_contact_shadow(captures: Extract<Query<(), With<CaptureContact
     !captures.is_empty()
 }
 
-/// Returns whether there was a contact shadow in this frame or, when nothing has been extracted yet, in the last one.
+/// Returns whether there is a contact shadow in this frame or, before the extraction, in the previous frame.
 pub(super) fn any_extracted(shadows: Res<ExtractedContactShadows>) -> bool {
     !shadows.0.is_empty()
 }
@@ -51,7 +51,7 @@ type Placed = (
     Option<&'static RenderLayers>,
 );
 
-/// Extracts what shows. A shadow may be seen by a camera that does not see its capture.
+/// Extracts the visible contact shadows. A camera may see a shadow without its capture.
 pub(super) fn extract_contact_shadows(
     mut extracted: ResMut<ExtractedContactShadows>,
     captures: Extract<Query<Placed, With<GaussianCapture3d>>>,
@@ -67,7 +67,7 @@ pub(super) fn extract_contact_shadows(
     extracted.0.extend(shadows);
 }
 
-/// Returns the ellipse beneath a capture's bounds; `None` if nothing of it shows.
+/// Returns the ellipse beneath a capture's bounds; `None` if it is not visible.
 fn ellipse(
     settings: &CaptureContactShadow,
     bounds: &Aabb,
@@ -87,18 +87,27 @@ mod tests {
     use std::f32::consts::FRAC_PI_2;
 
     #[test]
-    fn a_turned_capture_has_its_shadow_flat_on_the_ground() {
-        // One unit wide, long and three high in its own space, where z is up.
+    fn the_ellipse_of_a_rotated_capture_is_flat_on_the_ground() {
+        // One unit wide and long, three units high, in capture space with z up.
         let bounds = Aabb::from_min_max(Vec3::new(-0.5, -0.5, 0.0), Vec3::new(0.5, 0.5, 3.0));
         let upright = Affine3A::from_rotation_translation(Quat::from_rotation_x(-FRAC_PI_2), Vec3::new(2.0, 0.0, 1.0));
         let settings = CaptureContactShadow { softness: 0.0, ..CaptureContactShadow::default() };
         let beneath = |opacity| ellipse(&settings, &bounds, &upright, opacity);
-        let ellipse = beneath(1.0).expect("it stands on the ground");
+        let ellipse = beneath(1.0).expect("an ellipse beneath a capture on the ground");
         let [middle, edge] = [Vec3::ZERO, Vec3::X].map(|at| ellipse.world_from_disk.transform_point3(at));
-        assert!(middle.abs_diff_eq(Vec3::new(2.0, 0.0, 1.0), 0.01), "it is beneath, not at {middle}");
-        assert!(edge.abs_diff_eq(Vec3::new(2.5, 0.0, 1.0), 0.01), "and as wide as the capture, not up to {edge}");
-        let half = beneath(0.5).expect("half of it shows");
-        assert!((half.strength - 0.5 * ellipse.strength).abs() < 1e-6, "it is as transparent as the capture");
-        assert_eq!(beneath(0.0), None, "and hidden with it");
+        assert!(
+            middle.abs_diff_eq(Vec3::new(2.0, 0.0, 1.0), 0.01),
+            "the ellipse is beneath the capture, not at {middle}"
+        );
+        assert!(
+            edge.abs_diff_eq(Vec3::new(2.5, 0.0, 1.0), 0.01),
+            "the ellipse is as wide as the capture, not up to {edge}"
+        );
+        let half = beneath(0.5).expect("an ellipse at half opacity");
+        assert!(
+            (half.strength - 0.5 * ellipse.strength).abs() < 1e-6,
+            "the strength follows the opacity of the capture"
+        );
+        assert_eq!(beneath(0.0), None, "a transparent capture has no ellipse");
     }
 }

@@ -1,17 +1,18 @@
 //! Contact shadows: a soft dark ellipse on the ground beneath a capture, for a fraction of the cost of a cast shadow.
 //!
-//! In: captures with a [`CaptureContactShadow`] and their bounds at the current time. Out: one render pass for each camera that sees one:
+//! In: captures with a [`CaptureContactShadow`] and their bounds at the current time. Out: one render pass for each camera that sees a
+//! contact shadow:
 //!
 //! ```text
-//! component    looks, and the ellipse for a capture's bounds         main world
+//! component    settings, and the ellipse for a capture's bounds      main world
 //! extract      the ellipses of this frame                            main world -> render world
-//! pipeline     one for each kind of target                           compiled in the background
-//! prepare      the ellipses that each camera sees, as it sees them   once per camera and frame
+//! pipeline     one pipeline for each kind of target                  compiled in the background
+//! prepare      the ellipses that each camera sees, in clip space     once per camera and frame
 //! draw         the pass `contact_shadow`                             Core3d, after opaque meshes and before captures
 //! ```
 //!
-//! Without contact shadows nothing of this runs. They are no meshes: Bevy would look after a material of their own in every frame of every
-//! app, and would draw blended ones over captures.
+//! Without contact shadows none of these systems runs. Contact shadows are not meshes with a custom material: Bevy would process the
+//! material in every frame of every app, and would draw blended meshes over captures.
 
 mod component;
 mod draw;

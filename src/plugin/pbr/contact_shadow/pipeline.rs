@@ -1,7 +1,7 @@
 //! The pipeline of the pass `contact_shadow`, through Bevy's pipeline cache.
 //!
-//! In: the kind of a camera's target. Out: a pipeline for `shaders/pbr/contact_shadow.wgsl`, which binds nothing: all that it reads is in
-//! one vertex buffer of [`GpuEllipse`]s.
+//! In: the kind of a camera's target. Out: a pipeline for `shaders/pbr/contact_shadow.wgsl`, which has no bind group: its only input is one
+//! vertex buffer of [`GpuEllipse`]s.
 
 use crate::plugin::render::nearest;
 use bevy::asset::Handle;
@@ -16,11 +16,11 @@ use bevy::render::render_resource::{
 use bevy::shader::Shader;
 use bytemuck::{Pod, Zeroable};
 
-/// One contact shadow, as one camera sees it: as in `shaders/pbr/contact_shadow.wgsl`.
+/// One contact shadow in the clip space of one camera. Mirrors the vertex input of `shaders/pbr/contact_shadow.wgsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct GpuEllipse {
-    /// Where the axes x and z of the unit disk, and its middle, are in clip space.
+    /// The axes x and z of the unit disk and its center, in clip space.
     pub(super) axes: [[f32; 4]; 3],
     /// Strength and softness, from 0 to 1.
     pub(super) look: [f32; 2],
@@ -31,11 +31,11 @@ impl GpuEllipse {
         [VertexFormat::Float32x4, VertexFormat::Float32x4, VertexFormat::Float32x4, VertexFormat::Float32x2];
 }
 
-/// The shader, kept alive for the render world.
+/// The handle of the shader, kept in the render world so that the asset stays loaded.
 #[derive(Resource)]
 pub(super) struct ContactShadowShader(pub(super) Handle<Shader>);
 
-/// The part that the pipelines for all targets share.
+/// The shader that the pipelines for all targets share.
 #[derive(Resource)]
 pub(super) struct ContactShadowPipeline(Handle<Shader>);
 
@@ -45,7 +45,7 @@ pub(super) struct ContactShadowKey {
     /// Format and samples of the target.
     pub(super) format: TextureFormat,
     pub(super) samples: u32,
-    /// Whether the camera's projection mirrors.
+    /// Whether the camera's projection mirrors the picture.
     pub(super) mirrored: bool,
 }
 

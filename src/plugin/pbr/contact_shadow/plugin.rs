@@ -1,4 +1,4 @@
-//! The plugin of contact shadows: which system runs when.
+//! The plugin of contact shadows: adds the systems to their schedules.
 //!
 //! In: an app in which captures are drawn. Out: the same app with contact shadows.
 
@@ -33,7 +33,7 @@ impl Plugin for ContactShadowPlugin {
         render_app
             .insert_resource(ContactShadowShader(shader))
             .init_resource::<ExtractedContactShadows>()
-            // Created anew after a lost device: they hold everything on the GPU.
+            // Created again after a lost device: these resources hold all GPU objects.
             .init_gpu_resource::<ContactShadowPipeline>()
             .init_gpu_resource::<SpecializedRenderPipelines<ContactShadowPipeline>>()
             .init_gpu_resource::<ContactShadowViews>()

@@ -1,4 +1,4 @@
-//! Prepare: for each camera, the contact shadows that it sees.
+//! Prepare: finds the contact shadows that each camera sees.
 //!
 //! In: [`ExtractedContactShadows`]; Bevy's extracted cameras with their layers and fog. Out: [`ContactShadowViews`], whose buffer is
 //! written to the GPU.
@@ -27,14 +27,14 @@ use std::ops::Range;
 #[derive(Resource)]
 pub(super) struct ContactShadowViews {
     pub(super) ellipses: RawBufferVec<GpuEllipse>,
-    /// Those that see any, by their entities in the render world.
+    /// The cameras that see a contact shadow, by entity in the render world.
     pub(super) cameras: HashMap<Entity, ContactShadowView>,
 }
 
 /// The contact shadows of one camera.
 pub(super) struct ContactShadowView {
     pub(super) pipeline: CachedRenderPipelineId,
-    /// Which of the ellipses.
+    /// The range of its ellipses in the buffer.
     pub(super) ellipses: Range<u32>,
 }
 
@@ -44,7 +44,7 @@ impl Default for ContactShadowViews {
     }
 }
 
-/// Returns whether any camera sees a contact shadow, or did in the last frame that had one.
+/// Returns whether any camera sees a contact shadow, or saw one when they were last prepared.
 pub(super) fn any_view(views: Res<ContactShadowViews>) -> bool {
     !views.cameras.is_empty()
 }
@@ -85,23 +85,23 @@ pub(super) fn prepare_contact_shadows(
     views.ellipses.write_buffer(&device, &queue);
 }
 
-/// Returns a contact shadow as a camera sees it.
+/// Returns a contact shadow in a camera's clip space, attenuated by fog.
 fn seen(shadow: &PlacedShadow, clip_from_world: &Mat4, eye: Vec3, fog: Option<&DistanceFog>) -> GpuEllipse {
     let world_from_disk = shadow.ellipse.world_from_disk;
     let clip_from_disk = *clip_from_world * Mat4::from(world_from_disk);
-    // What fog adds to the ground is not in the shadow.
+    // The light of the fog in front of the ground is not shadowed.
     let clear = fog.map_or(1.0, |fog| clearness(fog, eye.distance(world_from_disk.translation.into())));
     let axes = [clip_from_disk.x_axis, clip_from_disk.z_axis, clip_from_disk.w_axis];
     GpuEllipse { axes: axes.map(|axis| axis.to_array()), look: [shadow.ellipse.strength * clear, shadow.softness] }
 }
 
-/// Returns the share of the light from a distance that fog lets through, as in Bevy's shaders.
+/// Returns the fraction of the light from a distance that fog transmits, as in Bevy's shaders.
 fn clearness(fog: &DistanceFog, distance: f32) -> f32 {
     let amount = match fog.falloff {
         FogFalloff::Linear { start, end } => 1.0 - ((end - distance) / (end - start)).clamp(0.0, 1.0),
         FogFalloff::Exponential { density } => 1.0 - (-distance * density).exp(),
         FogFalloff::ExponentialSquared { density } => 1.0 - (-(distance * density).powi(2)).exp(),
-        // Of the three colors, their mean.
+        // The mean over the three color channels.
         FogFalloff::Atmospheric { extinction, .. } => 1.0 - (-distance * extinction).exp().element_sum() / 3.0,
     };
     1.0 - amount * fog.color.alpha()
@@ -122,9 +122,9 @@ mod tests {
         assert_eq!(
             [1.0, 4.0, 9.0].map(|at| clearness(linear(), 1.0, at)),
             [1.0, 0.5, 0.0],
-            "from its start to its end"
+            "linear fog hides the shadow between its start and end"
         );
-        assert_eq!(clearness(linear(), 0.5, 9.0), 0.5, "thin fog hides half of it at most");
+        assert_eq!(clearness(linear(), 0.5, 9.0), 0.5, "fog with an alpha of 0.5 hides at most half of the shadow");
         let half = 2f32.ln();
         let others = [
             FogFalloff::Exponential { density: half / 3.0 },
@@ -134,7 +134,7 @@ mod tests {
         for falloff in others {
             let name = format!("{falloff:?}");
             let left = clearness(falloff, 1.0, 3.0);
-            assert!((left - 0.5).abs() < 1e-6, "{name}: {left} of the shadow is left, not half");
+            assert!((left - 0.5).abs() < 1e-6, "{name}: {left} of the shadow remains, not half");
         }
     }
 }

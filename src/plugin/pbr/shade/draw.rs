@@ -1,7 +1,7 @@
-//! Draw: the pass `shade`, in Bevy's `Core3d` schedule.
+//! Draw: records the pass `shade` in Bevy's `Core3d` schedule.
 //!
-//! In: cameras whose captures are to be shaded, with the captures' picture and depths. Out: for each such camera a pipeline, kept while it
-//! may be needed, and a shaded picture, which the composite takes instead of the captures' own.
+//! In: cameras whose captures are shaded, with the captures' picture and depths. Out: for each such camera a pipeline, kept while it may be
+//! needed, and a shaded picture, which the composite uses instead of the original one.
 
 use super::extract::ExtractedShading;
 use super::pipeline::{FORMAT, ShadePipeline};
@@ -38,7 +38,7 @@ pub(super) fn any_shade_view(shades: Res<ShadeViews>) -> bool {
     !shades.0.is_empty()
 }
 
-/// Returns whether anybody asks for a shaded picture, or has asked and still has what it needs.
+/// Returns whether there is a request for a shaded picture, or state of an earlier request.
 pub(super) fn any_request(requests: Res<ShadeRequests>, shades: Res<ShadeViews>) -> bool {
     !(requests.cameras.is_empty() && requests.captures.is_empty() && shades.0.is_empty())
 }
@@ -47,11 +47,11 @@ pub(super) fn any_request(requests: Res<ShadeRequests>, shades: Res<ShadeViews>)
 struct ShadeView {
     pipeline: CachedRenderPipelineId,
     settings: KeptUniform<GpuSettings>,
-    /// Absent until something is shaded.
+    /// Absent until captures are shaded.
     targets: Option<Targets>,
 }
 
-/// The shaded picture, and what its pass binds.
+/// The shaded picture, and the bindings of its pass.
 struct Targets {
     colors: wgpu::TextureView,
     depths: wgpu::TextureView,
@@ -59,7 +59,7 @@ struct Targets {
     group: BindGroup,
 }
 
-/// Finds the pipeline of every camera that may need one, even without anything to draw, so that it is compiled while captures load.
+/// Requests the pipeline of every camera that may need one, even without captures, so that it is compiled while captures load.
 pub(super) fn prepare_shade(
     pipeline: Option<Res<ShadePipeline>>,
     keys: Option<Res<ViewKeyCache>>,
@@ -82,7 +82,7 @@ pub(super) fn prepare_shade(
     }
 }
 
-/// What shading needs beside the views.
+/// The resources of shading, except the views.
 #[derive(SystemParam)]
 pub(super) struct Shading<'w> {
     device: Res<'w, RenderDevice>,
@@ -94,7 +94,7 @@ pub(super) struct Shading<'w> {
     statistics: Res<'w, CaptureStatistics>,
 }
 
-/// Shades the captures of one camera. Without a pipeline, while it is being compiled, they are drawn as they are.
+/// Shades the captures of one camera. While the pipeline is being compiled, captures are drawn unshaded.
 pub(super) fn shade_captures(
     camera: ViewQuery<(&ExtractedView, &MeshViewBindGroup)>,
     shading: Shading,
@@ -131,7 +131,7 @@ pub(super) fn shade_captures(
         multiview_mask: None,
     });
     let span = diagnostics.pass_span(&mut pass, "gs4d/shade");
-    // The picture may be larger than the view.
+    // The texture may be larger than the view.
     pass.set_scissor_rect(0, 0, settings.size.x, settings.size.y);
     pass.set_render_pipeline(pipeline);
     pass.set_bind_group(0, &bound.main, &bound.main_offsets);
@@ -143,14 +143,15 @@ pub(super) fn shade_captures(
 }
 
 impl Shading<'_> {
-    /// Returns how a view is shaded; `None` if it draws nothing.
+    /// Returns the shading settings of a view; `None` if it draws no capture.
     fn settings(&self, view: &CaptureView, blend_space: BlendSpace) -> Option<GpuSettings> {
         let size = view.drawn.first()?.view.size;
         let drawn = view.drawn.iter().filter_map(|drawn| self.extracted.0.get(&drawn.entity));
         Some(GpuSettings::new(size, blend_space == BlendSpace::Linear, drawn))
     }
 
-    /// Writes how a view is shaded, if it has changed, and returns the shaded picture, created anew if the captures' picture has been.
+    /// Writes the shading settings of a view if they have changed, and returns the shaded picture, which is created again if the captures'
+    /// picture has changed.
     fn targets<'a>(&self, shade: &'a mut ShadeView, view: &CaptureView, settings: GpuSettings) -> Option<&'a Targets> {
         let (colors, depths) = (view.renderer.color()?, view.renderer.depth()?);
         let work = self.statistics.work();
@@ -166,7 +167,7 @@ impl Shading<'_> {
         shade.targets.as_ref()
     }
 
-    /// Creates a picture as large as the captures' own.
+    /// Creates a picture of the size of the captures' picture.
     fn picture(&self, colors: &wgpu::TextureView, work: &WorkCounters) -> wgpu::TextureView {
         let texture = self.device.wgpu_device().create_texture(&wgpu::TextureDescriptor {
             label: Some("gs4d shaded"),

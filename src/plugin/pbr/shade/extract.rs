@@ -1,4 +1,4 @@
-//! Extract: where captures are and how they are shaded, and which cameras have fog.
+//! Extract: copies the boxes and shading of captures, and finds the cameras with fog.
 //!
 //! In (main world): captures with their boxes, [`ReceivesShadows`] and [`CaptureLight`]; cameras with `DistanceFog`. Out (render world):
 //! [`ExtractedShading`] and [`ShadeRequests`], by entity of the main world.
@@ -19,14 +19,15 @@ use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
 use bevy::transform::components::GlobalTransform;
 use glam::{Affine3A, Vec3, Vec3A};
 
-/// The captures of this frame, if any is shaded. The memory is kept from frame to frame.
+/// The captures of this frame, if any capture is shaded. The memory is kept from frame to frame.
 #[derive(Resource, Default)]
 pub(super) struct ExtractedShading(pub(super) MainEntityHashMap<PlacedShading>);
 
-/// Where a capture is and how it is shaded.
+/// The box of a capture and its shading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PlacedShading {
-    /// From the world to the cube from −1 to 1 about what is drawn; `None` if the capture surrounds every camera or is not drawn.
+    /// Transform from world space that maps the capture's box to the cube from −1 to 1; `None` if the capture surrounds every camera or is
+    /// not drawn.
     pub(super) cube_from_world: Option<Affine3A>,
     pub(super) has_environment: bool,
     pub(super) shadows: Option<ReceivesShadows>,
@@ -34,7 +35,7 @@ pub(super) struct PlacedShading {
 }
 
 impl PlacedShading {
-    /// Returns whether anything but fog changes it.
+    /// Returns whether shadows or light change it, not only fog.
     pub(super) fn is_shaded(&self) -> bool {
         self.shadows.is_some() || self.light.is_some()
     }
@@ -49,7 +50,7 @@ type Placed = (
     Option<&'static CaptureLight>,
 );
 
-/// Returns whether anything of the main world asks for shading, or did in the last frame.
+/// Returns whether a capture or camera of the main world needs shading, or needed it in the previous frame.
 pub(super) fn any_shading(
     captures: Extract<Query<(), Or<(With<ReceivesShadows>, With<CaptureLight>)>>>,
     foggy: Extract<Query<(), (With<DistanceFog>, With<Camera3d>)>>,
@@ -69,7 +70,7 @@ pub(super) fn extract_shading(
     extracted.0.clear();
     requests.cameras.clear();
     requests.captures.clear();
-    // Without Bevy's `PbrPlugin` there is nothing to shade with.
+    // Without Bevy's `PbrPlugin` the pass has no pipeline.
     if lit.is_none() {
         return;
     }
@@ -89,9 +90,10 @@ pub(super) fn extract_shading(
     }
 }
 
-/// Returns the transform that makes a box in capture space the cube from −1 to 1; `None` for a flattened or broken one.
+/// Returns the transform from world space that maps a box in capture space to the cube from −1 to 1; `None` for a flattened or invalid
+/// transform.
 fn cube_from_world(bounds: &Aabb, world_from_capture: Affine3A) -> Option<Affine3A> {
-    // Nothing of it is drawn, and nothing leads back to it.
+    // A flattened capture is not drawn, and its transform has no inverse.
     if world_from_capture.matrix3.determinant() == 0.0 {
         return None;
     }
@@ -109,7 +111,7 @@ mod tests {
     use glam::Quat;
 
     #[test]
-    fn corners_of_a_placed_box_become_those_of_the_cube() {
+    fn corners_of_a_placed_box_map_to_corners_of_the_cube() {
         let bounds = Aabb::from_min_max(Vec3::new(-1.0, 0.0, 2.0), Vec3::new(3.0, 1.0, 2.5));
         let world_from_capture = Affine3A::from_scale_rotation_translation(
             Vec3::new(2.0, 1.0, 0.5),
@@ -118,14 +120,22 @@ mod tests {
         );
         let cube = cube_from_world(&bounds, world_from_capture).expect("not flat");
         let corner = |point| cube.transform_point3(world_from_capture.transform_point3(point));
-        assert!(corner(Vec3::new(-1.0, 0.0, 2.0)).abs_diff_eq(-Vec3::ONE, 1e-4), "the lowest corner");
-        assert!(corner(Vec3::new(3.0, 1.0, 2.5)).abs_diff_eq(Vec3::ONE, 1e-4), "the highest");
+        assert!(corner(Vec3::new(-1.0, 0.0, 2.0)).abs_diff_eq(-Vec3::ONE, 1e-4), "the lowest corner maps to -1");
+        assert!(corner(Vec3::new(3.0, 1.0, 2.5)).abs_diff_eq(Vec3::ONE, 1e-4), "the highest corner maps to 1");
     }
 
     #[test]
-    fn a_broken_transform_has_no_cube() {
+    fn an_invalid_transform_has_no_cube() {
         let bounds = Aabb::from_min_max(Vec3::ZERO, Vec3::ONE);
-        assert_eq!(cube_from_world(&bounds, Affine3A::from_translation(Vec3::NAN)), None, "not a number");
-        assert_eq!(cube_from_world(&bounds, Affine3A::from_scale(Vec3::new(1.0, 0.0, 1.0))), None, "flattened");
+        assert_eq!(
+            cube_from_world(&bounds, Affine3A::from_translation(Vec3::NAN)),
+            None,
+            "a translation of NaN has no cube"
+        );
+        assert_eq!(
+            cube_from_world(&bounds, Affine3A::from_scale(Vec3::new(1.0, 0.0, 1.0))),
+            None,
+            "a flattened box has no cube"
+        );
     }
 }

@@ -1,7 +1,7 @@
 //! The pipeline of the pass `shade`, through Bevy's pipeline cache.
 //!
-//! In: the kind of a view (which of Bevy's bindings it has, how its shadows are filtered). Out: a pipeline for `shaders/pbr/shade.wgsl`,
-//! which binds what Bevy's meshes bind, and a layout for the rest.
+//! In: the kind of a view (its bindings of Bevy, its shadow filter). Out: a pipeline for `shaders/pbr/shade.wgsl` with the view bindings of
+//! Bevy's meshes, and a layout for the remaining bindings.
 
 use super::uniform::{GpuSettings, MOST_SHADINGS};
 use bevy::asset::Handle;
@@ -16,24 +16,24 @@ use bevy::render::render_resource::{
 };
 use bevy::shader::{Shader, ShaderDefVal};
 
-/// The format of the shaded picture: that of the captures' own.
+/// The format of the shaded picture, equal to the format of the captures' picture.
 pub(super) const FORMAT: TextureFormat = TextureFormat::Rgba16Float;
 
-/// The shader, kept alive for the render world.
+/// The handle of the shader, kept in the render world so that the asset stays loaded.
 #[derive(Resource)]
 pub(super) struct ShadeShader(pub(super) Handle<Shader>);
 
 /// The parts that the pipelines for all views share; absent without Bevy's `PbrPlugin`.
 #[derive(Resource)]
 pub(super) struct ShadePipeline {
-    /// Captures, their depths, and how they are shaded.
+    /// Layout of the captures' picture, their depths and the shading settings.
     pub(super) layout: BindGroupLayoutDescriptor,
     view_layouts: MeshPipelineViewLayouts,
     vertex: VertexState,
     shader: Handle<Shader>,
 }
 
-/// Creates what all pipelines share, if there is what Bevy's meshes bind.
+/// Creates the parts that all pipelines share, if the app has the view layouts of Bevy's meshes.
 pub(super) fn init_shade_pipeline(
     mut commands: Commands,
     view_layouts: Option<Res<MeshPipelineViewLayouts>>,
@@ -73,7 +73,7 @@ impl SpecializedRenderPipeline for ShadePipeline {
     }
 }
 
-/// Returns the definitions with which Bevy's shader libraries declare what a view binds.
+/// Returns the shader definitions with which Bevy's shader libraries declare the bindings of a view.
 fn shader_defs(key: MeshPipelineKey, view: &MeshPipelineViewLayout) -> Vec<ShaderDefVal> {
     let filter = key.intersection(MeshPipelineKey::SHADOW_FILTER_METHOD_RESERVED_BITS);
     let filter = if filter == MeshPipelineKey::SHADOW_FILTER_METHOD_TEMPORAL {
@@ -91,7 +91,8 @@ fn shader_defs(key: MeshPipelineKey, view: &MeshPipelineViewLayout) -> Vec<Shade
     if key.contains(MeshPipelineViewLayoutKey::ENVIRONMENT_MAP) {
         defs.push("ENVIRONMENT_MAP".into());
     }
-    // What the device and Bevy's features add shows only in the layout: the sampler of soft shadows, and arrays of environment maps.
+    // Bindings that depend on the device and on Bevy's features are visible only in the layout: the sampler of soft shadows, and arrays of
+    // environment maps.
     if view.main_layout.entries.iter().any(|entry| entry.binding == 4) {
         defs.push("PCSS_SAMPLERS_AVAILABLE".into());
     }

@@ -1,7 +1,7 @@
-//! The plugin of shading: which system runs when.
+//! The plugin of shading: adds the systems to their schedules.
 //!
-//! In: an app in which captures are drawn, Bevy's `PbrPlugin`. Out: the same app, in which fog, shadows and light reach captures. Without
-//! `PbrPlugin` nothing changes.
+//! In: an app in which captures are drawn, with Bevy's `PbrPlugin`. Out: the same app, in which fog, shadows and light change captures.
+//! Without `PbrPlugin` captures are not shaded.
 
 use super::draw::{ShadeViews, any_request, any_shade_view, prepare_shade, shade_captures};
 use super::extract::{ExtractedShading, any_shading, extract_shading};
@@ -32,7 +32,7 @@ impl Plugin for ShadePlugin {
         render_app
             .insert_resource(shader)
             .init_resource::<ExtractedShading>()
-            // Created anew after a lost device: they hold everything on the GPU.
+            // Created again after a lost device: these resources hold all GPU objects.
             .init_gpu_resource::<SpecializedRenderPipelines<ShadePipeline>>()
             .init_gpu_resource::<ShadeViews>()
             .add_systems(RenderStartup, init_shade_pipeline.after(MeshPipelineSystems))

@@ -1,6 +1,6 @@
-//! What the pass `shade` is told about a view: the mirror of the structures of `shaders/pbr/shade.wgsl`.
+//! The uniform of the pass `shade` for a view. Mirrors the structures of `shaders/pbr/shade.wgsl`.
 //!
-//! In: the captures that a camera draws, and how each is shaded. Out: [`GpuSettings`].
+//! In: the captures that a camera draws, with their shading. Out: [`GpuSettings`].
 
 use super::components::{CaptureLight, ReceivesShadows};
 use super::extract::PlacedShading;
@@ -8,13 +8,13 @@ use bevy::log::warn_once;
 use bevy::render::render_resource::ShaderType;
 use glam::{Mat4, UVec2, Vec4};
 
-/// Captures of one view that are told apart.
+/// Maximum number of captures of one view with separate shading.
 pub(super) const MOST_SHADINGS: usize = 16;
 
-/// A distance from the middle of a cube that is larger than any other: that of what has no box.
+/// Distance from the center of a cube for captures without a box: larger than the distance of any box.
 const BEYOND_ALL_BOXES: f32 = 1e30;
 
-/// How one capture is shaded. Mirrors `Shading`.
+/// The shading of one capture. Mirrors `Shading`.
 #[derive(ShaderType, Debug, Default, Clone, Copy, PartialEq)]
 pub(super) struct GpuShading {
     cube_from_world: [Vec4; 3],
@@ -22,7 +22,7 @@ pub(super) struct GpuShading {
     light: Vec4,
 }
 
-/// How a view is shaded. Mirrors `Settings`.
+/// The shading of a view. Mirrors `Settings`.
 #[derive(ShaderType, Debug, Default, Clone, Copy, PartialEq)]
 pub(super) struct GpuSettings {
     pub(super) size: UVec2,
@@ -33,7 +33,7 @@ pub(super) struct GpuSettings {
 }
 
 impl GpuSettings {
-    /// Creates the settings of a view of these captures. Captures that nothing but fog changes are listed only beside others.
+    /// Creates the settings of a view of these captures. Captures that only fog changes are listed only together with shaded captures.
     pub(super) fn new<'a>(
         size: UVec2,
         is_linear: bool,
@@ -51,8 +51,8 @@ impl GpuSettings {
             }
             if drawn.count() > MOST_SHADINGS {
                 warn_once!(
-                    "a camera sees more than {MOST_SHADINGS} captures, of which some receive shadows or light: of the others, some \
-                     are shaded as their neighbors are"
+                    "a camera sees more than {MOST_SHADINGS} captures, of which some receive shadows or light: some of the others \
+                     are shaded like their neighbors; show fewer captures at once"
                 );
             }
         }
@@ -100,42 +100,53 @@ mod tests {
     }
 
     #[test]
-    fn captures_that_only_fog_changes_are_not_listed_alone() {
+    fn captures_changed_only_by_fog_are_listed_only_with_shaded_ones() {
         let plain = GpuSettings::new(UVec2::ONE, false, [PLAIN, PLAIN].iter());
-        assert_eq!(plain.count, 0, "nothing to tell apart");
+        assert_eq!(plain.count, 0, "no capture is listed without a shaded capture");
         let light = CaptureLight { reference: 0.5, amount: 1.0 };
         let mixed = GpuSettings::new(UVec2::ONE, true, [PLAIN, lit(light)].iter());
-        assert_eq!((mixed.count, mixed.is_linear), (2, 1), "both, since they must be told apart");
-        assert_eq!(mixed.shadings[0].light, Vec4::new(1.0, 2.0, 0.02, 0.0), "those that are shaded come first");
-        assert_eq!((mixed.shadings[1].light.x, mixed.shadings[1].tint.w), (0.0, 0.0), "the other stays as it is");
+        assert_eq!((mixed.count, mixed.is_linear), (2, 1), "both captures are listed");
+        assert_eq!(mixed.shadings[0].light, Vec4::new(1.0, 2.0, 0.02, 0.0), "the shaded capture comes first");
+        assert_eq!(
+            (mixed.shadings[1].light.x, mixed.shadings[1].tint.w),
+            (0.0, 0.0),
+            "the unshaded capture has neither light nor shadow"
+        );
     }
 
     #[test]
-    fn more_captures_than_places_are_cut_off_at_the_plain_end() {
+    fn unshaded_captures_are_dropped_beyond_the_maximum() {
         let mut drawn = vec![PLAIN; 40];
         drawn[39] = lit(CaptureLight::default());
         let settings = GpuSettings::new(UVec2::ONE, false, drawn.iter());
-        assert_eq!(settings.count as usize, MOST_SHADINGS, "as many as there is room for");
-        assert_eq!(settings.shadings[0].light.x, 1.0, "the one that matters among them");
+        assert_eq!(settings.count as usize, MOST_SHADINGS, "the list is full");
+        assert_eq!(settings.shadings[0].light.x, 1.0, "the shaded capture is listed first");
     }
 
     #[test]
-    fn nonsense_changes_nothing() {
+    fn invalid_light_settings_have_no_effect() {
         for reference in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             let shading = GpuShading::new(&lit(CaptureLight { reference, amount: 1.0 }));
-            assert_eq!(shading.light.x, 0.0, "with a reference of {reference}");
+            assert_eq!(shading.light.x, 0.0, "no light with a reference of {reference}");
         }
         let shading = GpuShading::new(&lit(CaptureLight { amount: f32::NAN, ..CaptureLight::default() }));
-        assert_eq!(shading.light.x, 0.0, "nor does no number");
+        assert_eq!(shading.light.x, 0.0, "no light with an amount of NaN");
         let shading = GpuShading::new(&lit(CaptureLight { amount: 9.0, ..CaptureLight::default() }));
-        assert_eq!(shading.light.x, 1.0, "more than all is all");
+        assert_eq!(shading.light.x, 1.0, "an amount above 1 counts as 1");
     }
 
     #[test]
-    fn what_has_no_box_is_beyond_all_boxes() {
+    fn captures_without_a_box_are_beyond_all_boxes() {
         let boundless = GpuShading::new(&PlacedShading { cube_from_world: None, has_environment: true, ..PLAIN });
-        assert!(boundless.cube_from_world.iter().all(|row| row.w == BEYOND_ALL_BOXES), "at any place");
+        assert!(
+            boundless.cube_from_world.iter().all(|row| row.w == BEYOND_ALL_BOXES),
+            "every point is outside a capture without a box"
+        );
         let surrounded = PlacedShading { has_environment: true, ..PLAIN };
-        assert_eq!(GpuSettings::new(UVec2::ONE, false, [surrounded].iter()).is_surrounded, 1, "and its map is known");
+        assert_eq!(
+            GpuSettings::new(UVec2::ONE, false, [surrounded].iter()).is_surrounded,
+            1,
+            "an environment map marks the view as surrounded"
+        );
     }
 }

@@ -1,20 +1,20 @@
-//! Which captures cast shadows.
+//! The component that makes a capture cast shadows.
 //!
-//! In: a component on a capture. Out: how its shadows are drawn.
+//! In: fields that any system or animation may set. Out: resolution and bias of the capture's shadows.
 
 use bevy::ecs::component::Component;
 use bevy::ecs::reflect::ReflectComponent;
 use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
 
-/// Makes a capture cast shadows: an optional component beside [`GaussianCapture3d`](crate::GaussianCapture3d).
+/// Makes a capture cast shadows: an optional component next to [`GaussianCapture3d`](crate::GaussianCapture3d).
 ///
-/// It casts those of every light with shadow maps, whether a camera sees the capture or not, at the capture's current time, with its
-/// opacity, crop and temporal filter. Hidden captures cast none, and those of other `RenderLayers` than the light's neither.
+/// The capture casts a shadow for every light with shadow maps, whether a camera sees the capture or not, at its current time, with its
+/// opacity, crop and temporal filter. Hidden captures, and captures on `RenderLayers` that the light does not have, cast no shadows.
 ///
-/// Captures cast no shadows without it, since each shadow costs up to one more view of the capture, as large as the shadow map at its
-/// [`resolution`](Self::resolution): for a directional light one for each cascade and camera (four by default), for a point light six, for
-/// a spot light one. Views whose part of the world the capture does not reach cost nothing.
+/// Without this component captures cast no shadows, since each shadow costs up to one more view of the capture, as large as the shadow map
+/// at its [`resolution`](Self::resolution): for a directional light one for each cascade and camera (four by default), for a point light
+/// six, for a spot light one. Views that do not contain the capture cost nothing.
 ///
 /// # Examples
 ///
@@ -31,12 +31,12 @@ use bevy::reflect::std_traits::ReflectDefault;
 #[derive(Component, Reflect, Debug, Clone, Copy, PartialEq)]
 #[reflect(Component, Default, Debug, Clone, PartialEq)]
 pub struct CastsShadows {
-    /// How finely the capture is drawn for shadows. Captures in the same view of a light are all drawn as the finest of them. Default:
-    /// [`ShadowResolution::Half`].
+    /// Resolution at which the capture is drawn for shadows. All captures in one view of a light are drawn at the finest of their
+    /// resolutions. Default: [`ShadowResolution::Half`].
     pub resolution: ShadowResolution,
-    /// How far the shadow begins behind the capture's surface, seen from the light, as a share of the diagonal of its bounds; one that is
-    /// negative or not finite counts as 0. With too little, captures that receive shadows darken their own lit side; with too much, light
-    /// leaks between a capture and the ground that it stands on. Default: 0.02.
+    /// Distance of the shadow behind the capture's surface, seen from the light, as a fraction of the diagonal of its bounds; a value that
+    /// is negative or not finite counts as 0. If the bias is too small, captures that receive shadows darken their own lit side; if it is
+    /// too large, light leaks between a capture and the ground below it. Default: 0.02.
     pub bias: f32,
 }
 
@@ -46,7 +46,7 @@ impl Default for CastsShadows {
     }
 }
 
-/// The share of a shadow map's width and height at which captures are drawn into it. Default: [`Half`](Self::Half).
+/// The fraction of a shadow map's width and height at which captures are drawn into it. Default: [`Half`](Self::Half).
 ///
 /// # Examples
 ///
@@ -59,17 +59,17 @@ impl Default for CastsShadows {
 #[derive(Reflect, Debug, Default, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[reflect(Default, Debug, Clone, PartialEq, Hash)]
 pub enum ShadowResolution {
-    /// All of it.
+    /// The full width and height.
     Full,
-    /// One half, with a quarter of the pixels.
+    /// One half: a quarter of the pixels.
     #[default]
     Half,
-    /// One quarter, with a sixteenth of the pixels.
+    /// One quarter: a sixteenth of the pixels.
     Quarter,
 }
 
 impl ShadowResolution {
-    /// Returns the number of texels along one side of a pixel.
+    /// Returns the side of a pixel in texels of the map.
     pub(super) fn scale(self) -> u32 {
         match self {
             Self::Full => 1,

@@ -1,7 +1,6 @@
-//! Draw: captures into the shadow maps of lights, in Bevy's `Core3d` schedule, after meshes.
+//! Draw: draws captures into the shadow maps of lights, in Bevy's `Core3d` schedule, after meshes.
 //!
-//! In: the views of lights, prepared by [`prepare`](super::prepare). Out: one compute pass and `write_depth` into the map, recorded for
-//! each.
+//! In: the views of lights, prepared by [`prepare`](super::prepare). Out: for each view one compute pass and `write_depth` into the map.
 
 use super::light_views::LightViews;
 use crate::plugin::render::{ActiveLists, CaptureRenderer, GpuGaussianCapture, WriteDepthPipeline};
@@ -16,7 +15,7 @@ use bevy::render::render_resource::{PipelineCache, RenderPassDescriptor, StoreOp
 use bevy::render::renderer::{RenderContext, RenderDevice, ViewQuery};
 use bevy::render::view::ExtractedView;
 
-/// The views of lights, and what drawing into them needs.
+/// The views of lights, and the resources of drawing into them.
 #[derive(SystemParam)]
 pub(super) struct Casting<'w> {
     device: Res<'w, RenderDevice>,

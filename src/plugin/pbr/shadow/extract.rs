@@ -1,7 +1,7 @@
-//! Extract: the captures that cast shadows.
+//! Extract: copies the captures that cast shadows.
 //!
-//! In (main world): captures with [`CastsShadows`], their bounds and layers; the captures that have been extracted. Out (render
-//! world): [`ExtractedCasters`], and their active lists kept up to date, whether a camera sees them or not.
+//! In (main world): captures with [`CastsShadows`], their bounds and layers; the extracted captures. Out (render world):
+//! [`ExtractedCasters`]; the extracted captures marked as casters, so that their active lists are updated even if no camera sees them.
 
 use super::casts::CastsShadows;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
@@ -36,7 +36,7 @@ pub(super) fn any_caster(casters: Res<ExtractedCasters>) -> bool {
 pub(super) struct Caster {
     pub(super) entity: MainEntity,
     pub(super) settings: CastsShadows,
-    /// What encloses it at its current time, in capture space.
+    /// Its bounds at the current time, in capture space.
     pub(super) bounds: Aabb,
     pub(super) world_from_capture: Affine3A,
     pub(super) layers: RenderLayers,
@@ -65,7 +65,7 @@ pub(super) fn extract_casters(
         else {
             continue;
         };
-        // A capture with an environment map is never culled by cameras, but its Gaussians are somewhere.
+        // A capture with an environment map has no box, since cameras never cull it, but its Gaussians have bounds.
         let known = || {
             let bounds = assets.get(&capture.0)?.bounds_at(playback.time)?;
             (bounds.min.is_finite() && bounds.max.is_finite()).then(|| Aabb::from_min_max(bounds.min, bounds.max))

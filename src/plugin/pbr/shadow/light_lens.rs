@@ -1,7 +1,7 @@
-//! Lens of a light: a view of its shadow map in the renderer's terms.
+//! Lens of a light: converts the view of a shadow map to the renderer's conventions.
 //!
-//! In: the projection and pose with which Bevy draws meshes into the map, the bounds of captures. Out: [`LightLens`], which makes
-//! [`View`]s of captures, pushed away from the light by their bias.
+//! In: the projection and pose with which Bevy draws meshes into the map, and the bounds of captures. Out: [`LightLens`], which creates
+//! [`View`]s of captures, moved away from the light by their bias.
 
 use crate::plugin::render::CameraLens;
 use crate::view::View;
@@ -12,17 +12,17 @@ use glam::{Affine3A, Mat4, UVec2, Vec3, Vec3A, Vec4};
 pub(super) struct LightLens {
     lens: CameraLens,
     world_from_light: Affine3A,
-    /// Whether its rays are parallel.
+    /// Whether the light's rays are parallel.
     parallel: bool,
-    /// How the map's value `d` gives depth: as in [`CameraLens::distance`].
+    /// Conversion of the map's value `d` to depth, as in [`CameraLens::distance`].
     pub(super) distance: Vec4,
 }
 
 impl LightLens {
-    /// Returns the lens of a light that draws the captures with these bounds; `None` for a projection that no light of Bevy has.
+    /// Returns the lens of a light for captures with these bounds; `None` for a projection that no light of Bevy has.
     ///
-    /// The near plane of parallel rays moves back to the first of the captures: like meshes, they cast shadows from before Bevy's near
-    /// plane, too.
+    /// With parallel rays, the near plane moves back to the first capture: like meshes, captures in front of Bevy's near plane also cast
+    /// shadows.
     pub(super) fn of<'a>(
         clip_from_light: &Mat4,
         world_from_light: Affine3A,
@@ -41,7 +41,7 @@ impl LightLens {
         let back = -captures.map(first).fold(0.0, f32::min);
         let [x, y, z, w] =
             [clip_from_light.x_axis, clip_from_light.y_axis, clip_from_light.z_axis, clip_from_light.w_axis];
-        // The same rays, from depth 0 on: a depth buffer's value of 1 there, and one less for each unit.
+        // The same rays with the near plane at depth 0: the depth value is 1 there and decreases by 1 per unit.
         let lens = CameraLens::of(&Mat4::from_cols(x, y, Vec4::Z, Vec4::new(w.x, w.y, 1.0, 1.0)))?;
         // d = w.z − z.z (depth − back).
         let distance = Vec4::new(w.z + z.z * back, -1.0, z.z, 0.0);
@@ -49,8 +49,9 @@ impl LightLens {
         Some(Self { lens, world_from_light, parallel, distance })
     }
 
-    /// Returns the view of a capture that is pushed away from the light by a share of the diagonal of its bounds. Its outline on the
-    /// map stays as it is. `size` in pixels, `time` in the capture's unit. `None` if the transforms flatten the capture or are not finite.
+    /// Returns the view of a capture that is moved away from the light by the fraction `bias` of the diagonal of its bounds. Its outline on
+    /// the map does not change. `size` in pixels, `time` in the capture's unit. `None` if the transforms flatten the capture or are not
+    /// finite.
     pub(super) fn view(
         &self,
         size: UVec2,
@@ -66,7 +67,7 @@ impl LightLens {
         let push = if self.parallel {
             Affine3A::from_translation((-self.world_from_light.matrix3.z_axis * by).into())
         } else {
-            // Everything that is larger by the factor by which it is further away looks the same.
+            // Scaling about the light moves the capture away and keeps its outline.
             let light = Vec3::from(self.world_from_light.translation);
             let distance = Vec3::from(world_from_capture.transform_point3a(bounds.center)).distance(light);
             let scale = Vec3::splat(1.0 + by / distance.max(by).max(f32::MIN_POSITIVE));
@@ -83,7 +84,7 @@ mod tests {
 
     const SIZE: UVec2 = UVec2::new(64, 64);
 
-    /// Returns a box of 1 x 2 x 3 units about the origin.
+    /// Returns a box of 1 x 2 x 3 units around the origin.
     fn bounds() -> Aabb {
         Aabb::from_min_max(Vec3::new(-0.5, -1.0, -1.5), Vec3::new(0.5, 1.0, 1.5))
     }
@@ -98,7 +99,7 @@ mod tests {
         Affine3A::from_rotation_translation(Quat::from_euler(EulerRot::YXZ, 0.4, -0.9, 0.2), eye)
     }
 
-    /// Returns normalized device coordinates with y down, and the value that is written to the map.
+    /// Returns normalized device coordinates with y down, and the depth value written to the map.
     fn drawn(lens: &LightLens, view: &View, point: Vec3) -> (Vec2, f32) {
         let depth = view.world_to_camera.transform_point3(point).z;
         let [x, y] = view.clip_rows();
@@ -118,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn captures_are_drawn_where_and_as_deep_as_meshes() {
+    fn captures_have_the_positions_and_depths_of_meshes() {
         let placed = Affine3A::from_rotation_translation(Quat::from_rotation_x(0.7), Vec3::new(0.3, -0.2, 0.1));
         let spot = Mat4::perspective_infinite_reverse_rh(1.2, 1.0, 0.1);
         let forward = -pose(Vec3::ZERO).matrix3.z_axis;
@@ -132,15 +133,15 @@ mod tests {
                 let (place, depth) = drawn(&lens, &view, point);
                 let (expected, deep) = drawn_by_bevy(projection, light, placed.transform_point3(point));
                 assert!(place.abs_diff_eq(expected, 1e-4), "{name}: {point} is at {place}, not {expected}");
-                assert!((depth - deep).abs() < 1e-5, "{name}: {point} is {depth} deep, not {deep}");
+                assert!((depth - deep).abs() < 1e-5, "{name}: the depth value of {point} is {depth}, not {deep}");
                 let distance = view.world_to_camera.transform_point3(point).z;
-                assert!(distance >= view.near - 1e-4, "{name}: and not before the near plane, {distance}");
+                assert!(distance >= view.near - 1e-4, "{name}: {point} is in front of the near plane, at {distance}");
             }
         }
     }
 
     #[test]
-    fn a_bias_pushes_away_and_keeps_the_outline() {
+    fn a_bias_moves_the_capture_away_and_keeps_its_outline() {
         let diagonal = Vec3::new(1.0, 2.0, 3.0).length();
         let spot = Mat4::perspective_infinite_reverse_rh(1.2, 1.0, 0.1);
         let forward = -pose(Vec3::ZERO).matrix3.z_axis;
@@ -151,18 +152,18 @@ mod tests {
             let [near, far, broken] = [view(0.0), view(0.1), view(f32::NAN)];
             let depth = |view: &View| view.world_to_camera.transform_point3(Vec3::ZERO).z;
             let pushed = depth(&far) - depth(&near);
-            assert!((pushed - 0.1 * diagonal).abs() < 1e-4, "{name}: the middle is pushed by {pushed}");
-            assert_eq!(near, broken, "{name}: a bias that is no number pushes nothing");
+            assert!((pushed - 0.1 * diagonal).abs() < 1e-4, "{name}: the center is moved by {pushed}");
+            assert_eq!(near, broken, "{name}: a bias of NaN counts as 0");
             for corner in [bounds().min(), bounds().max()] {
                 let [(before, _), (after, _)] = [&near, &far].map(|view| drawn(&lens, view, corner.into()));
-                assert!(before.abs_diff_eq(after, 1e-4), "{name}: {corner} stays at {before}, yet it is at {after}");
+                assert!(before.abs_diff_eq(after, 1e-4), "{name}: {corner} moved from {before} to {after} on the map");
             }
         }
     }
 
     #[test]
-    fn other_projections_are_no_lights() {
+    fn unsupported_projections_have_no_light_lens() {
         let none = LightLens::of(&Mat4::NAN, pose(Vec3::ZERO), [].into_iter());
-        assert!(none.is_none(), "not a number");
+        assert!(none.is_none(), "a projection of NaN has no lens");
     }
 }

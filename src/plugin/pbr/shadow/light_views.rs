@@ -1,6 +1,6 @@
 //! The state of every view of a light into which captures are drawn, kept from frame to frame.
 //!
-//! In: what [`prepare`](super::prepare) finds in the view. Out: [`LightViews`], which drawing reads.
+//! In: the captures that [`prepare`](super::prepare) finds in each view. Out: [`LightViews`], read by drawing.
 
 use crate::plugin::render::kept::{IdleFrames, KeptUniform};
 use crate::plugin::render::{Drawn, WriteDepthBindings};
@@ -17,7 +17,7 @@ use glam::{UVec2, UVec4};
 #[derive(Resource, Default)]
 pub(super) struct LightViews(pub(super) HashMap<RetainedViewEntity, LightView>);
 
-/// Returns whether any light may see captures.
+/// Returns whether any view of a light has state.
 pub(super) fn any_light_view(views: Res<LightViews>) -> bool {
     !views.0.is_empty()
 }
@@ -25,13 +25,13 @@ pub(super) fn any_light_view(views: Res<LightViews>) -> bool {
 /// State of one view.
 pub(super) struct LightView {
     pub(super) renderer: ViewRenderer,
-    /// The map's corner, which is 0, and its size.
+    /// Corner (0) and size of the map.
     pub(super) viewport: KeptUniform<UVec4>,
     pub(super) depth_bindings: WriteDepthBindings,
     pub(super) write_depth: CachedRenderPipelineId,
-    /// The captures in it this frame; nothing is drawn while this is empty.
+    /// The captures in the view this frame; nothing is drawn while this is empty.
     pub(super) drawn: Vec<Drawn>,
-    /// Whether Bevy draws it this frame.
+    /// Whether Bevy draws the view this frame.
     pub(super) live: bool,
     idle: IdleFrames,
 }
@@ -55,7 +55,7 @@ impl LightView {
         self.viewport.set(viewport, device, queue, work);
     }
 
-    /// Counts a frame with a capture in the view, or without one. After many without one, GPU memory is released.
+    /// Counts a frame, with or without a capture in the view. After many frames without one, releases the GPU memory.
     pub(super) fn count_idle_frames(&mut self) {
         if self.idle.count(!self.drawn.is_empty()) {
             self.renderer.release();

@@ -1,4 +1,4 @@
-//! The plugin of shadows that captures cast: which system runs in which world and when.
+//! The plugin of shadows that captures cast: adds the systems to their schedules.
 //!
 //! In: an app in which captures are drawn and lights have shadow maps. Out: the same app, in which captures cast shadows.
 

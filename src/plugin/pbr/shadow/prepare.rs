@@ -1,7 +1,7 @@
-//! Prepare: for each view of a light, the captures in it and the renderer's working buffers.
+//! Prepare: collects the captures in each view of a light and prepares the renderer's working buffers.
 //!
-//! In: [`ExtractedCasters`], the views of lights whose shadow maps Bevy draws this frame. Out: [`LightViews`], with everything that
-//! drawing needs written to the GPU. In the steady state nothing is created there.
+//! In: [`ExtractedCasters`], the views of lights whose shadow maps Bevy draws this frame. Out: [`LightViews`], with all inputs of drawing
+//! written to the GPU. In the steady state no GPU object is created.
 
 use super::casts::ShadowResolution;
 use super::extract::{Caster, ExtractedCasters};
@@ -26,7 +26,7 @@ use bevy::render::renderer::{RenderDevice, RenderQueue};
 use bevy::render::view::ExtractedView;
 use glam::UVec2;
 
-/// What is drawn of captures for a shadow: nothing but depths is used.
+/// The parameters of drawing captures for a shadow: only depths are used.
 const PARAMETERS: ViewParameters<'static> = ViewParameters {
     background: Background::None,
     opaque: None,
@@ -37,7 +37,7 @@ const PARAMETERS: ViewParameters<'static> = ViewParameters {
     previous: None,
 };
 
-/// Everything that can cast a shadow this frame.
+/// The captures that cast shadows this frame.
 #[derive(SystemParam)]
 pub(super) struct Casters<'w> {
     casters: Res<'w, ExtractedCasters>,
@@ -47,7 +47,7 @@ pub(super) struct Casters<'w> {
 }
 
 impl Casters<'_> {
-    /// Returns those that reach into a view of a light, in the same order in every frame.
+    /// Returns the captures that reach into a view of a light, in the same order in every frame.
     fn within(&self, frustum: &Frustum, layers: &RenderLayers) -> Vec<&Caster> {
         // Bevy has moved the near planes of directional lights to infinity.
         let reaches = |caster: &&Caster| {
@@ -57,7 +57,7 @@ impl Casters<'_> {
         self.casters.0.iter().filter(reaches).collect()
     }
 
-    /// Returns what is drawn of one; `None` if nothing is.
+    /// Returns one capture as drawn for a light; `None` if it is not drawn.
     fn drawn(&self, caster: &Caster, lens: &LightLens, size: UVec2) -> Option<Drawn> {
         let placed = self.extracted.0.get(&caster.entity)?;
         let capture = self.captures.get(placed.asset)?;
@@ -130,7 +130,7 @@ pub(super) fn prepare_light_views(
     views.0.retain(|_, state| state.live);
 }
 
-/// Returns the number of texels along one side of a pixel, for the finest of the resolutions, so that pixels cover the map exactly.
+/// Returns the side of a pixel in texels for the finest of the resolutions, reduced until it divides the size of the map.
 fn scale(map: UVec2, resolutions: impl Iterator<Item = ShadowResolution>) -> u32 {
     let wanted = resolutions.min().unwrap_or_default().scale();
     let divides = |scale: &u32| map % *scale == UVec2::ZERO;
@@ -143,12 +143,12 @@ mod tests {
     use ShadowResolution::{Full, Half, Quarter};
 
     #[test]
-    fn the_finest_resolution_that_covers_the_map_is_taken() {
+    fn the_finest_resolution_is_used_and_divides_the_map() {
         let map = UVec2::splat(512);
-        assert_eq!(scale(map, [Quarter, Half].into_iter()), 2, "the finer of two");
-        assert_eq!(scale(map, [Quarter, Full].into_iter()), 1, "texel by texel");
-        assert_eq!(scale(map, [Quarter].into_iter()), 4, "alone");
-        assert_eq!(scale(UVec2::splat(514), [Quarter].into_iter()), 2, "a map that four does not divide");
-        assert_eq!(scale(UVec2::splat(513), [Quarter].into_iter()), 1, "nor two");
+        assert_eq!(scale(map, [Quarter, Half].into_iter()), 2, "the finer of two resolutions");
+        assert_eq!(scale(map, [Quarter, Full].into_iter()), 1, "one pixel per texel");
+        assert_eq!(scale(map, [Quarter].into_iter()), 4, "a single resolution");
+        assert_eq!(scale(UVec2::splat(514), [Quarter].into_iter()), 2, "a map size that 4 does not divide");
+        assert_eq!(scale(UVec2::splat(513), [Quarter].into_iter()), 1, "a map size that 2 does not divide");
     }
 }
