@@ -9,7 +9,7 @@ use pollster::block_on;
 /// Largest storage buffer binding in bytes.
 pub const BINDING: u64 = 1 << 21;
 
-/// Returns a renderer with shader checks on; `None` if there is no adapter, which is reported.
+/// Returns a renderer with shader checks on; without an adapter, reports the skipped test and returns `None`.
 pub fn headless() -> Option<Headless> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
         backends: wgpu::Backends::PRIMARY,

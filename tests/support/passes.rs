@@ -30,7 +30,7 @@ struct Resource {
 }
 
 impl Gpu {
-    /// Returns a device; `None` if there is no adapter, which is reported.
+    /// Returns a device; without an adapter, reports the skipped test and returns `None`.
     pub fn new() -> Option<Self> {
         GpuContext::headless(None).map(Self).map_err(|_| no_gpu()).ok()
     }

@@ -57,3 +57,15 @@ impl From<&GaussianCapture3d> for AssetId<GaussianCapture> {
         capture.0.id()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy::reflect::TypePath;
+
+    #[test]
+    fn the_type_path_does_not_depend_on_the_file() {
+        let path = "bevy_gs4d::plugin::component::GaussianCapture3d";
+        assert_eq!(GaussianCapture3d::type_path(), path, "the path is the one in saved scenes");
+    }
+}

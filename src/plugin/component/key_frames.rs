@@ -61,7 +61,11 @@ mod tests {
     #[test]
     fn key_frames_lie_at_even_spacing_from_end_to_end() {
         let key_frames = KeyFrames::new(4, 2.0).expect("four segments");
-        assert_eq!(key_frames.times().collect::<Vec<_>>(), [0.0, 0.5, 1.0, 1.5, 2.0], "both ends included");
+        assert_eq!(
+            key_frames.times().collect::<Vec<_>>(),
+            [0.0, 0.5, 1.0, 1.5, 2.0],
+            "the first key-frame is at the start and the last at the end"
+        );
         assert_eq!(KeyFrames::new(4, 0.0), None, "a still has no key-frames");
         assert_eq!(KeyFrames::new(0, 2.0), None, "a filter without segments has no key-frames");
     }
@@ -93,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn a_key_frame_at_the_end_of_a_step_is_crossed_in_it_and_not_again() {
+    fn a_key_frame_at_the_end_of_a_step_is_crossed_in_that_step_only() {
         // For many of these pairs, the duration divided by the spacing is below the number of segments.
         for (segments, duration) in [(7, 1.2), (28, 1.2), (93, 1.0), (99, 2.0), (59, 3.0), (29, 5.0)] {
             let key_frames = KeyFrames::new(segments, duration).expect("a filter");

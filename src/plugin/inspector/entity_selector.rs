@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn names_come_before_paths_and_numbers() {
+    fn labels_prefer_names_to_paths_and_paths_to_numbers() {
         let entity = choice(3).entity;
         let label = |name, path: Option<&str>| Choice::new(entity, name, path.map(str::to_owned), "capture").label;
         assert_eq!(label(Some("stage"), Some("a.gs4d")), "stage", "the name comes first");

@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn a_backward_clip_beyond_its_capture_waits_at_the_capture_s_end() {
+    fn a_backward_clip_waits_for_the_seconds_beyond_its_capture() {
         let backwards = clip(2.0, [0.0, 5.0], -2.0);
         assert_eq!(
             backwards.playback(Some(4.0)).offset,
