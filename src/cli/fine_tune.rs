@@ -55,13 +55,13 @@ pub struct FineTune {
     #[arg(long, value_name = "RATES", default_value = "ours", value_parser = values::one_of(&RATES))]
     rates: Rates,
     /// Factor that the rates fall to; 1 keeps them as they are.
-    #[arg(long, value_name = "FACTOR", default_value = "0.05", value_parser = values::share)]
+    #[arg(long, value_name = "FACTOR", default_value = "0.2", value_parser = values::share)]
     last_rate: f64,
     /// Factor on the rates of the means.
     #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = values::not_negative)]
     mean_rate: f64,
-    /// Share of SSIM in the loss; the rest is L1.
-    #[arg(long, value_name = "SHARE", default_value = "0.2", value_parser = values::share)]
+    /// Weight of SSIM in the loss, 0 to 1; the rest is L1.
+    #[arg(long, value_name = "WEIGHT", default_value = "0.1", value_parser = values::share)]
     similarity: f64,
     /// Weight of opacity where images cover nothing, in the loss: the original's opacity mask.
     #[arg(long, value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]

@@ -3,7 +3,7 @@
 //! In: a scene in the trained form, its training views with their images, [`FineTuneSettings`]. Out: the scene with the best parameters that
 //! were found ([`FineTuned`]), and how its quality developed. The number of Gaussians stays.
 //!
-//! The best step is chosen on validation views, which are not trained on; without validation views, the last step is kept. The loss is `0.8 L1 + 0.2 (1 − SSIM)`, with further [`Terms`]
+//! The best step is chosen on validation views, which are not trained on; without validation views, the last step is kept. The loss is `0.9 L1 + 0.1 (1 − SSIM)` unless set otherwise, with further [`Terms`]
 //! if these have weights, the optimizer Adam (section 6 of the 4DGS model). Views, backgrounds and rates of a step follow from its number
 //! alone, so that a run which is resumed ends as one which was not interrupted, but for rounding if sums are [atomic](GradientSums::Atomic).
 //! If the scene is compressed, further steps train codebooks of color with everything else, on request on pictures of rounded geometry.
@@ -56,9 +56,9 @@ pub struct FineTuneSettings {
     pub batch: usize,
     /// Rates of the optimizer at first.
     pub rates: Rates,
-    /// Factor on the rates at the end, which they fall to. Default: 0.05; 1 keeps them.
+    /// Factor on the rates at the end, which they fall to. Default: 0.2; 1 keeps them.
     pub last_rate: f64,
-    /// Share of SSIM in the loss. Default: 0.2.
+    /// Weight of SSIM in the loss; the weight of L1 is the rest. Default: 0.1; the original's is 0.2.
     pub similarity_share: f64,
     /// Weights of further terms of the loss. Default: 0.
     pub terms: Terms,
@@ -91,8 +91,8 @@ impl Default for FineTuneSettings {
             steps: 5000,
             batch: 2,
             rates: Rates::OURS,
-            last_rate: 0.05,
-            similarity_share: 0.2,
+            last_rate: 0.2,
+            similarity_share: 0.1,
             terms: Terms::default(),
             sparse: false,
             behind: Behind::default(),
