@@ -64,15 +64,19 @@ fn sums_of(slot: u32) -> Sums {
     return sums;
 }
 
-// Gradients of the color with respect to the viewing direction and to the time from the frame to the mean.
+// What the color passes on: gradients with respect to the direction and to the time since the frame, and whether those of the coefficients
+// are finite.
 struct ColorSlope {
     direction: vec3<f32>,
     time: f32,
+    finite_coefficients: bool,
 }
 
-// Adds the gradients of the coefficients of one Gaussian. `g` is the gradient of the color, `tau` the time from the frame to the mean.
-fn color_backward(index: u32, g: vec3<f32>, d: vec3<f32>, tau: f32) -> ColorSlope {
-    var slope = ColorSlope(vec3(0.0), 0.0);
+// Computes the gradients of the coefficients of one Gaussian, and adds them if `is_added`. `g` is the gradient of the color, `tau` the time
+// from the frame to the mean.
+fn color_backward(index: u32, g: vec3<f32>, d: vec3<f32>, tau: f32, is_added: bool) -> ColorSlope {
+    var slope = ColorSlope(vec3(0.0), 0.0, true);
+    let largest = max(max(abs(g.x), abs(g.y)), abs(g.z));
     let coefficients = (instance.degree + 1u) * (instance.degree + 1u);
     for (var n = 0u; n <= instance.degree_t; n++) {
         var factor = 1.0;
@@ -121,10 +125,13 @@ fn color_backward(index: u32, g: vec3<f32>, d: vec3<f32>, tau: f32) -> ColorSlop
             }
 #endif
 #endif
-            harmonic_gradients[at] += vec4(b.x * g, b.y * g.x);
-            if present.w > 0.0 {
-                harmonic_gradients[at + 1u] += vec4(b.y * g.yz, b.z * g.xy);
-                harmonic_gradients[at + 2u] += vec4(b.z * g.z, b.w * g);
+            slope.finite_coefficients = slope.finite_coefficients && is_finite(b * largest);
+            if is_added {
+                harmonic_gradients[at] += vec4(b.x * g, b.y * g.x);
+                if present.w > 0.0 {
+                    harmonic_gradients[at + 1u] += vec4(b.y * g.yz, b.z * g.xy);
+                    harmonic_gradients[at + 2u] += vec4(b.z * g.z, b.w * g);
+                }
             }
         }
         if n > 0u {
@@ -223,7 +230,7 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let far = distance(seen, instance.camera_position);
     let direction = (seen - instance.camera_position) / far;
-    let slope = color_backward(index, by_color, direction, -dt);
+    let slope = color_backward(index, by_color, direction, -dt, false);
     let by_point = (slope.direction - direction * dot(direction, slope.direction)) / far;
     var by_mean_t = slope.time;
     var by_seen = by_point;
@@ -258,7 +265,9 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
     let shape = through_slice(raw, scene.model, sliced, by_covariance, dt * by_mean, by_variance);
     let by_raw_mean = vec4(by_mean + by_seen, by_mean_t);
     let by_logit = vec4(by_peak * opacity * (1.0 - opacity), 0.0, 0.0, 0.0);
-    if is_finite(by_raw_mean) && is_finite_slice(shape) && is_finite(by_logit) {
+    let finite_geometry = is_finite(by_raw_mean) && is_finite_slice(shape) && is_finite(by_logit);
+    if finite_geometry && slope.finite_coefficients {
+        color_backward(index, by_color, direction, -dt, true);
         let before = trained_gradients[index];
         trained_gradients[index] = TrainedRecord(
             before.mean + by_raw_mean,

@@ -52,13 +52,13 @@ impl Files {
         self
     }
 
-    /// Adds a camera file, the images that it names, and those of the dataset in the same folder.
+    /// Adds a camera file, the existing images that it names, and those of the dataset in the same folder.
     pub fn reads_cameras(mut self, path: &Path) -> Self {
         self.add_cameras(path);
         self.reads_data(folder_of(path))
     }
 
-    /// Adds the camera files of a dataset folder, and the images and masks that they name.
+    /// Adds the camera files of a dataset folder, and the existing images and masks that they name.
     pub fn reads_data(mut self, folder: &Path) -> Self {
         for split in Split::ALL {
             self.add_cameras(&folder.join(split.file_name()));
@@ -71,8 +71,9 @@ impl Files {
         // Of any size: paths do not depend on it. What is wrong with the file is told when it is read.
         let options = CameraOptions { size: Some(UVec2::ONE), ..CameraOptions::default() };
         for view in CameraFile::load(path, &options).unwrap_or_default() {
-            self.inputs.push(view.image);
-            self.inputs.extend(view.mask);
+            // An image that does not exist is no input: the same name may be an output.
+            let images = [Some(view.image), view.mask].into_iter().flatten();
+            self.inputs.extend(images.filter(|image| !matches!(image.try_exists(), Ok(false))));
         }
     }
 

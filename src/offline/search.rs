@@ -9,6 +9,7 @@ use super::prune::kept_count;
 use super::quality::{Evaluator, Trial, smallest_count};
 use super::score::variant::Variant;
 use super::score::{ScoreError, Scores};
+use super::stored::{Stored, Text};
 use super::{OfflineError, Progress};
 use crate::scene::{GaussianScene, RuntimeScene};
 use crate::view::Background;
@@ -49,6 +50,27 @@ pub struct Candidate {
     pub name: String,
     /// The score of each Gaussian.
     pub scores: Vec<f32>,
+}
+
+/// The names, then the scores of all candidates one after the other.
+impl Stored for Vec<Candidate> {
+    fn encode(&self) -> Result<Vec<u8>, OfflineError> {
+        let names: Vec<String> = self.iter().map(|candidate| candidate.name.clone()).collect();
+        let values: Vec<f32> = self.iter().flat_map(|candidate| candidate.scores.iter().copied()).collect();
+        (Text(names), values).encode()
+    }
+
+    fn decode(bytes: &[u8]) -> Option<Self> {
+        let (Text(names), values): (Text<Vec<String>>, Vec<f32>) = Stored::decode(bytes)?;
+        let count = values.len().checked_div(names.len()).filter(|count| count * names.len() == values.len())?;
+        let scores = |index: usize| values[index * count..][..count].to_vec();
+        Some(names.into_iter().enumerate().map(|(index, name)| Candidate { name, scores: scores(index) }).collect())
+    }
+}
+
+/// Returns the scores of this name.
+pub fn of_name<'a>(candidates: &'a [Candidate], name: &str) -> Option<&'a [f32]> {
+    candidates.iter().find(|candidate| candidate.name == name).map(|candidate| &candidate.scores[..])
 }
 
 /// Returns the candidates that a choice stands for.
@@ -286,6 +308,16 @@ mod tests {
         assert_eq!(Goal::Keep(9).compare(&sharp, &small), Ordering::Less, "the higher PSNR");
         assert_eq!(Goal::MaxLoss(2.0).compare(&sharp, &small), Ordering::Greater, "the smaller count");
         assert_eq!(Goal::Keep(9).compare(&outcome(9, None), &small), Ordering::Greater, "unknown comes last");
+    }
+
+    #[test]
+    fn candidates_are_read_as_they_were_written() {
+        let candidate = |name: &str, scores: &[f32]| Candidate { name: name.to_owned(), scores: scores.to_vec() };
+        let all = vec![candidate("energy", &[1.0, 2.0]), candidate("full", &[0.5, 0.0])];
+        let read = Vec::<Candidate>::decode(&all.encode().expect("candidates can be stored")).expect("the same bytes");
+        assert_eq!(read, all, "names and values");
+        assert_eq!(of_name(&read, "full"), Some(&[0.5, 0.0][..]), "a score by its name");
+        assert_eq!(of_name(&read, "removal"), None, "a score that was not computed");
     }
 
     #[test]

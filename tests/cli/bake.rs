@@ -2,8 +2,8 @@
 //!
 //! In: a small synthetic scene and a dataset drawn from it by the CPU reference. Out: proof that the package is smaller
 //! and both reports are written, that finished stages are not repeated, and that data of another capture and paths that
-//! cannot be written are refused; that a package is as small as it was asked to be, or not there, and that a size which cannot be is refused
-//! at once.
+//! cannot be written are refused; that a package has at most the requested size or is not written, and that an impossible size is refused
+//! before scoring.
 
 use crate::support::capture::Capture;
 use crate::support::command::{Run, arguments, gs4d};
@@ -40,14 +40,14 @@ impl Capture {
         gs4d(&[fixed.to_vec(), plain.map(Into::into).collect()].concat())
     }
 
-    /// Returns the bytes of a package without Gaussians, which a bake to an absurd size names.
+    /// Returns the bytes of a package without Gaussians, which the error of a bake to 100 bytes names.
     fn bytes_of_none(&self) -> u64 {
         let refused = self.bake_to_size(100.0, &[]);
         refused.must_fail("without Gaussians has ");
         number_after(&refused.err, "without Gaussians has ")
     }
 
-    /// Returns the bytes of a package of the Gaussian with the highest score, which a bake to hardly more names.
+    /// Returns the bytes of a package of the Gaussian with the highest score, which the error of a bake names if only an empty package fits.
     fn bytes_of_one(&self) -> u64 {
         let refused = self.bake_to_size(self.bytes_of_none() as f64 + 0.5, &[]);
         refused.must_fail("a single Gaussian has ");
@@ -71,28 +71,32 @@ fn read(path: &Path) -> String {
 }
 
 #[test]
-fn a_bake_makes_a_smaller_package_and_says_what_it_cost() {
+fn a_bake_writes_a_smaller_package_and_both_reports() {
     let capture = capture(Vec3::ZERO, true);
     let out = capture.out();
     let json =
         gs4d(&arguments!["bake", &capture.scene, "--data", &capture.data, "--ratio", "0.4", "-o", &out, "--json"])
             .json();
-    assert_eq!(json["gaussians"]["after"], 1200, "2000 less 40 percent");
-    let bytes = |path: &Path| fs::metadata(path).expect("the file is there").len();
-    assert!(bytes(&out) < bytes(&capture.scene), "smaller");
+    assert_eq!(json["gaussians"]["after"], 1200, "60 % of 2000");
+    let bytes = |path: &Path| fs::metadata(path).expect("the file exists").len();
+    assert!(bytes(&out) < bytes(&capture.scene), "the package is smaller than the scene");
     let info = gs4d(&arguments!["info", &out, "--json"]).json();
-    assert_eq!((&info["gaussians"], &info["package"]["intact"]), (&1200.into(), &true.into()), "a whole package");
+    assert_eq!((&info["gaussians"], &info["package"]["intact"]), (&1200.into(), &true.into()), "an intact package");
 
     let report: Value = serde_json::from_str(&read(&capture.path("out.report.json"))).expect("JSON");
-    assert_eq!(report, json, "what is printed is what is kept");
+    assert_eq!(report, json, "the printed report is the written one");
     for name in ["sections", "trials", "stages", "times", "choices", "filter_share"] {
         assert!(report[name].as_array().is_some_and(|list| !list.is_empty()), "{name} in {report}");
     }
     assert_eq!(report["variances"]["borders"].as_array().map(Vec::len), Some(41), "a histogram");
-    assert_eq!(report["activity"]["after"]["overlap"][0], 1.0, "the first set agrees with itself");
+    assert_eq!(report["activity"]["after"]["overlap"][0], 1.0, "the overlap of the first set with itself");
     assert_eq!(report["bytes"]["after"], bytes(&out), "the size of the package");
     let psnr = |side: &str| report["evaluation"][side]["mean"]["psnr"].as_f64().expect("a number");
-    assert!(psnr("before") > 60.0 && psnr("after") > 35.0, "its own pictures: {}", report["evaluation"]);
+    assert!(
+        psnr("before") > 60.0 && psnr("after") > 35.0,
+        "the dataset has the pictures of the scene: {}",
+        report["evaluation"]
+    );
 
     let html = read(&capture.path("out.report.html"));
     for title in [
@@ -103,14 +107,14 @@ fn a_bake_makes_a_smaller_package_and_says_what_it_cost() {
         "PSNR against prune ratio",
         "Views",
     ] {
-        assert!(html.contains(title), "{title} is on the page");
+        assert!(html.contains(title), "the page has {title}");
     }
     assert!(html.matches("<svg").count() >= 5 && html.contains("data:image/png;base64,"), "plots and pictures");
-    assert!(!html.contains("://") && !html.contains("src=\"/"), "nothing is loaded from elsewhere");
+    assert!(!html.contains("://") && !html.contains("src=\"/"), "the page loads no other file");
     assert_eq!(
         capture.left(),
         ["data", "out.gs4d", "out.report.html", "out.report.json", "scene.gs4d"],
-        "nothing else"
+        "no other files"
     );
 }
 
@@ -147,7 +151,7 @@ fn a_package_that_looks_different_over_white_is_noted() {
 }
 
 #[test]
-fn stages_that_are_done_are_not_done_again() {
+fn finished_stages_are_skipped() {
     let capture = capture(Vec3::ZERO, true);
     let out = capture.out();
     let bake = |more: &[&str]| {
@@ -158,23 +162,23 @@ fn stages_that_are_done_are_not_done_again() {
     };
     let skipped = |log: &str, stage: &str| log.contains(&format!("{stage}: skipped"));
     let first = bake(&["--ratio", "0.5"]);
-    assert!(!first.contains("skipped"), "everything is new: {first}");
-    let package = fs::read(&out).expect("the package is there");
+    assert!(!first.contains("skipped"), "the first run skips no stage: {first}");
+    let package = fs::read(&out).expect("the package exists");
     let again = bake(&["--ratio", "0.5"]);
     for stage in ["score", "prune", "mask", "compress"] {
         assert!(skipped(&again, stage), "{stage}: {again}");
     }
-    assert_eq!(fs::read(&out).expect("still there"), package, "the same package");
+    assert_eq!(fs::read(&out).expect("the package still exists"), package, "the same package");
     let other = bake(&["--ratio", "0.3"]);
     assert!(skipped(&other, "score") && !skipped(&other, "prune") && !skipped(&other, "compress"), "{other}");
-    fs::remove_file(&out).expect("the package is there");
+    fs::remove_file(&out).expect("the package exists");
     let lost = bake(&["--ratio", "0.3"]);
     assert!(skipped(&lost, "prune") && skipped(&lost, "compress"), "a lost package is written from its stage: {lost}");
     assert!(out.is_file(), "the package is there again");
 }
 
 #[test]
-fn a_loss_decides_how_many_stay() {
+fn the_allowed_loss_determines_the_number_of_gaussians() {
     let capture = capture(Vec3::ZERO, true);
     let bake = |loss: &str| {
         let fixed = arguments![
@@ -195,12 +199,12 @@ fn a_loss_decides_how_many_stay() {
 }
 
 #[test]
-fn what_cannot_be_baked_is_refused() {
+fn data_of_another_capture_and_bad_outputs_are_refused() {
     let elsewhere = capture(Vec3::splat(1000.0), true);
     let out = elsewhere.out();
     gs4d(&arguments!["bake", &elsewhere.scene, "--data", &elsewhere.data, "--ratio", "0.5", "-o", &out])
         .must_fail("no Gaussian contributes");
-    assert!(!out.exists(), "nothing is written");
+    assert!(!out.exists(), "no output is written");
 
     let capture = capture(Vec3::ZERO, false);
     let inside_a_file = capture.scene.join("out.gs4d");
@@ -222,46 +226,49 @@ fn what_cannot_be_baked_is_refused() {
         "--json",
     ])
     .json();
-    assert!(report["evaluation"].is_null() && report["gaussians"]["after"] == 1000, "cameras suffice: {report}");
+    assert!(
+        report["evaluation"].is_null() && report["gaussians"]["after"] == 1000,
+        "a bake without images has no evaluation: {report}"
+    );
 }
 
 #[test]
-fn a_size_decides_how_many_stay() {
+fn the_target_size_determines_the_number_of_gaussians() {
     let capture = capture(Vec3::ZERO, true);
     let out = capture.out();
     let fixed = arguments!["bake", &capture.scene, "--data", &capture.data, "-o", &out, "--variant", "energy"];
     let bake = |size: &str| gs4d(&[fixed.to_vec(), arguments!["--target-size", size, "--json"].to_vec()].concat());
     let json = bake("0.05").json();
     let (bytes, kept) = (json["bytes"]["after"].as_u64(), json["gaussians"]["after"].as_u64());
-    assert!(bytes.is_some_and(|bytes| (40_000..=50_000).contains(&bytes)), "at most 50 kB, and nearly: {bytes:?}");
+    assert!(bytes.is_some_and(|bytes| (40_000..=50_000).contains(&bytes)), "between 40 and 50 kB: {bytes:?}");
     assert!(kept.is_some_and(|kept| (100..1990).contains(&kept)), "fewer Gaussians: {kept:?}");
     let all = bake("5").json();
-    assert_eq!(all["gaussians"]["after"], 2000, "all fit");
-    let before = fs::read(&out).expect("the package is there");
+    assert_eq!(all["gaussians"]["after"], 2000, "every Gaussian fits into 5 MB");
+    let before = fs::read(&out).expect("the package exists");
     bake("0.0001").must_fail("does not fit");
-    assert_eq!(fs::read(&out).expect("still there"), before, "nothing is replaced");
+    assert_eq!(fs::read(&out).expect("the package still exists"), before, "the package is not replaced");
 }
 
 #[test]
-fn a_package_that_stays_too_large_replaces_nothing_and_is_kept_aside() {
+fn a_package_that_stays_too_large_is_kept_in_the_work_folder() {
     let capture = capture(Vec3::ZERO, true);
     let out = capture.out();
     let one = capture.bytes_of_one();
-    fs::write(&out, b"the one from before").expect("the folder can be written to");
-    // The count is found with the support filter: the name of this one is longer, so that not even one Gaussian fits in the end.
+    fs::write(&out, b"the old package").expect("the folder can be written to");
+    // The count is found with the support filter; the name of the key-frame filter is longer, so that not even one Gaussian fits.
     let run = capture.bake_to_size(one as f64 + 0.5, &["--filter", "key-frame"]);
     run.must_fail("does not fit");
     run.must_fail("not even with a single Gaussian");
     run.must_fail("choose a lower quality or a larger size");
-    assert_eq!(read(&out), "the one from before", "the old file stays");
+    assert_eq!(read(&out), "the old package", "the old package stays");
     let kept = capture.path("out.gs4d.bake/too-large.gs4d");
     run.must_fail(&kept.display().to_string());
-    let bytes = fs::metadata(&kept).expect("it is kept").len();
+    let bytes = fs::metadata(&kept).expect("the package is kept").len();
     assert!(bytes > one, "{bytes} bytes are more than {one}");
     assert_eq!(number_after(&run.err, "package that was made has "), bytes, "its size is named: {}", run.err);
     let info = gs4d(&arguments!["info", &kept, "--json"]).json();
-    assert_eq!((&info["gaussians"], &info["package"]["intact"]), (&1.into(), &true.into()), "a whole package");
-    assert_eq!(capture.left(), ["data", "out.gs4d", "out.gs4d.bake", "scene.gs4d"], "no report of it");
+    assert_eq!((&info["gaussians"], &info["package"]["intact"]), (&1.into(), &true.into()), "an intact package");
+    assert_eq!(capture.left(), ["data", "out.gs4d", "out.gs4d.bake", "scene.gs4d"], "no report is written");
     capture.bake_to_size(5e6, &[]).text();
     assert_eq!(
         capture.left(),
@@ -270,7 +277,7 @@ fn a_package_that_stays_too_large_replaces_nothing_and_is_kept_aside() {
     );
 }
 
-/// Returns a capture with an environment map, of values that hardly compress.
+/// Returns a capture with an environment map that does not compress well.
 fn surrounded() -> Capture {
     let mut trained = synthesize(&SynthSettings { count: 2000, degree: 0, ..SynthSettings::default() });
     let (width, height) = (128, 64);
@@ -281,34 +288,34 @@ fn surrounded() -> Capture {
 }
 
 #[test]
-fn a_size_below_what_every_package_needs_is_refused_before_anything_is_scored() {
+fn a_size_below_that_of_an_empty_package_is_refused_before_scoring() {
     let capture = surrounded();
     let none = capture.bytes_of_none();
-    assert!(none > 20_000, "it counts the environment map: {none}");
+    assert!(none > 20_000, "the size includes the environment map: {none}");
     let refused = capture.bake_to_size(none as f64 - 0.5, &[]);
     refused.must_fail(&format!("does not fit into {} bytes: a package without Gaussians has {none};", none - 1));
-    assert!(!refused.err.contains("score:"), "nothing is scored: {}", refused.err);
-    assert_eq!(capture.left(), ["data", "scene.gs4d"], "nothing is left");
+    assert!(!refused.err.contains("score:"), "no view is scored: {}", refused.err);
+    assert_eq!(capture.left(), ["data", "scene.gs4d"], "no file is left");
     let one = capture.bytes_of_one();
     assert!((none..none + 5000).contains(&one), "a Gaussian needs little more: {one} after {none}");
 }
 
 #[test]
-fn what_all_gaussians_need_counts_once() {
+fn parts_shared_by_all_gaussians_count_once_for_the_target_size() {
     let capture = surrounded();
     let one = capture.bytes_of_one();
-    assert!(one > 20_000, "most of it is the environment map: {one}");
+    assert!(one > 20_000, "most bytes are those of the environment map: {one}");
     let limit = one + 10_000;
     let run = capture.bake_to_size(limit as f64 + 0.5, &["--json"]);
-    assert!(!run.err.contains("again with"), "found before the package is made: {}", run.err);
+    assert!(!run.err.contains("again with"), "the count is found in one attempt: {}", run.err);
     let json = run.json();
     let (bytes, kept) = (json["bytes"]["after"].as_u64(), json["gaussians"]["after"].as_u64());
-    assert!(bytes.is_some_and(|bytes| (one..=limit).contains(&bytes)), "it fits: {bytes:?} of {limit}");
-    assert!(kept.is_some_and(|kept| (100..1500).contains(&kept)), "with as many as there is room for: {kept:?}");
+    assert!(bytes.is_some_and(|bytes| (one..=limit).contains(&bytes)), "within the target size: {bytes:?} of {limit}");
+    assert!(kept.is_some_and(|kept| (100..1500).contains(&kept)), "as many Gaussians as fit: {kept:?}");
 }
 
 #[test]
-fn sizes_and_rounds_that_mean_nothing_are_refused() {
+fn invalid_sizes_and_rounds_are_refused() {
     let bake = |option: String| gs4d(&arguments!["bake", "scene.gs4d", "--data", "data", "-o", "out.gs4d", option]);
     for size in ["0", "-1", "nan", "inf", "1e-60", "small"] {
         bake(format!("--target-size={size}")).must_fail("--target-size");
@@ -317,7 +324,7 @@ fn sizes_and_rounds_that_mean_nothing_are_refused() {
 }
 
 #[test]
-fn scores_are_judged_after_training_and_pruning_may_take_rounds() {
+fn with_training_scores_are_compared_after_training_and_pruning_may_take_rounds() {
     if GpuContext::headless(None).is_err() {
         return no_gpu();
     }
@@ -336,12 +343,15 @@ fn scores_are_judged_after_training_and_pruning_may_take_rounds() {
     let tried: Vec<Value> = trained(&gradual);
     assert!(tried.len() >= 2 && tried.iter().all(|trial| trial["kept"] == 500), "every score is tried: {tried:?}");
     let best = |a: &&Value, b: &&Value| a["psnr"].as_f64().partial_cmp(&b["psnr"].as_f64()).expect("numbers");
-    let winner = tried.iter().max_by(best).expect("there are some")["variant"].clone();
+    let winner = tried.iter().max_by(best).expect("at least one trial")["variant"].clone();
     let score = gradual["choices"].as_array().and_then(|all| all.iter().find(|pair| pair[0] == "score")).expect("one");
     assert_eq!(winner, format!("{}, 6 steps", score[1].as_str().expect("a name")), "the best after training");
     let stages = gradual["stages"].as_array().expect("a list");
-    assert!(stages.iter().any(|stage| stage["name"] == "rounds"), "gradual: {stages:?}");
+    assert!(stages.iter().any(|stage| stage["name"] == "rounds"), "pruning in two rounds: {stages:?}");
     let loss = bake(["--max-loss", "8"], "1");
     assert!(trained(&loss).len() > 4, "counts are tried after training: {}", loss["trials"]);
-    assert!(loss["stages"].as_array().expect("a list").iter().all(|stage| stage["name"] != "rounds"), "at once");
+    assert!(
+        loss["stages"].as_array().expect("a list").iter().all(|stage| stage["name"] != "rounds"),
+        "no rounds by default"
+    );
 }

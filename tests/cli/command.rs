@@ -1,7 +1,7 @@
-//! The `gs4d` command, run as a user runs it: inspecting captures, converting them, all errors of a command line, readers that end early.
+//! The `gs4d` command, run as a user runs it: inspecting captures, converting them, all errors of a command line, closed pipes.
 //!
-//! In: command lines, whole and damaged files. Out: proof that exit codes, what is printed and what is written are right, and that
-//! nothing panics.
+//! In: command lines, intact and damaged files. Out: proof that exit codes, reports and written files are right, and that no command
+//! panics.
 
 use crate::support::command::{arguments, folder, gs4d, scene};
 use crate::support::package_parts::Parts;
@@ -13,11 +13,11 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 #[test]
-fn conversion_keeps_what_it_should() {
+fn conversion_changes_only_what_its_options_name() {
     let folder = folder();
     let trained = scene(&folder, "700");
     let info = gs4d(&arguments!["info", &trained, "--json"]).json();
-    assert_eq!(info["gaussians"], 700, "the count asked for");
+    assert_eq!(info["gaussians"], 700, "the requested count");
     assert_eq!(
         (&info["form"], &info["degree"], &info["degree_t"]),
         (&"trained".into(), &3.into(), &2.into()),
@@ -26,8 +26,8 @@ fn conversion_keeps_what_it_should() {
 
     let copy = folder.path().join("copy.gs4d");
     gs4d(&arguments!["convert", &trained, &copy]).text();
-    let bytes = |path: &Path| fs::read(path).expect("the package is there");
-    assert_eq!(bytes(&trained), bytes(&copy), "a plain conversion changes nothing");
+    let bytes = |path: &Path| fs::read(path).expect("the package exists");
+    assert_eq!(bytes(&trained), bytes(&copy), "a conversion without options copies the package");
 
     let small = folder.path().join("small.gs4d");
     let converted = gs4d(&arguments![
@@ -46,45 +46,48 @@ fn conversion_keeps_what_it_should() {
         &small,
     ])
     .json();
-    assert_eq!(converted["bytes_out"], bytes(&small).len(), "the size that is printed");
+    assert_eq!(converted["bytes_out"], bytes(&small).len(), "the printed size");
     let info = gs4d(&arguments!["info", &small, "--json"]).json();
     assert_eq!(
         (&info["form"], &info["degree"], &info["coefficients"]),
         (&"runtime".into(), &0.into(), &1.into()),
-        "small"
+        "the converted package"
     );
     assert_eq!(info["switches"]["playback"]["up"], "neg_y", "the axis is stored");
     assert_eq!(info["switches"]["trained_with"]["background"][1], 0.5, "the background is stored");
-    assert_eq!(info["package"]["intact"], true, "checksums hold");
+    assert_eq!(info["package"]["intact"], true, "checksums are right");
 
     let back = folder.path().join("back.gs4d");
     gs4d(&arguments!["convert", &small, &back, "--form", "trained"]).must_fail("small.gs4d");
-    assert!(!back.exists(), "nothing is written");
+    assert!(!back.exists(), "no output is written");
 }
 
 #[test]
-fn coded_colours_are_described_and_lowered() {
+fn coded_colors_are_described_and_lowered() {
     let folder = folder();
     let demo = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/toybox.gs4d");
     let info = gs4d(&arguments!["info", &demo, "--json"]).json();
     let figures = |info: &Value| [&info["degree"], &info["degree_t"], &info["coefficients"]].map(Value::clone);
-    assert_eq!(figures(&info), [3, 2, 48].map(Value::from), "those of the bundled capture");
-    assert_eq!(info["codebooks"], Value::from(vec![1024; 4]), "and its codebooks");
+    assert_eq!(figures(&info), [3, 2, 48].map(Value::from), "the degrees of the bundled capture");
+    assert_eq!(info["codebooks"], Value::from(vec![1024; 4]), "its codebooks");
     let text = gs4d(&arguments!["info", &demo]).text();
-    assert!(text.contains("degree 3, time degree 2, 48 coefficients, coded by 4 codebooks"), "for people: {text}");
+    assert!(
+        text.contains("degree 3, time degree 2, 48 coefficients, coded by 4 codebooks"),
+        "the text has the degrees: {text}"
+    );
 
     let [coded, plain] = ["coded.gs4d", "plain.gs4d"].map(|name| folder.path().join(name));
     gs4d(&arguments!["compress", scene(&folder, "300"), &coded, "--codebooks", "16,16", "--verify", "0"]).text();
     gs4d(&arguments!["convert", &coded, &plain, "--sh-degree", "0"]).text();
     let info = gs4d(&arguments!["info", &plain, "--json"]).json();
-    assert_eq!(figures(&info), [0, 0, 1].map(Value::from), "as asked for");
+    assert_eq!(figures(&info), [0, 0, 1].map(Value::from), "the requested degree");
     assert_eq!(info["form"], "packed", "still packed");
-    let bytes = |path: &Path| fs::metadata(path).expect("the package is there").len();
+    let bytes = |path: &Path| fs::metadata(path).expect("the package exists").len();
     assert!(bytes(&plain) < bytes(&coded), "without codebooks it is smaller");
 }
 
 #[test]
-fn a_still_lasts_no_time() {
+fn a_duration_of_zero_is_stored() {
     let folder = folder();
     let (moving, still) = (scene(&folder, "50"), folder.path().join("still.gs4d"));
     gs4d(&arguments!["convert", &moving, &still, "--duration", "0"]).text();
@@ -94,10 +97,10 @@ fn a_still_lasts_no_time() {
 }
 
 #[test]
-fn sections_are_listed_once_however_many_there_are() {
+fn sections_of_one_name_are_listed_once() {
     let folder = folder();
     let path = scene(&folder, "50");
-    let mut parts = Parts::of(&fs::read(&path).expect("the package is there"));
+    let mut parts = Parts::of(&fs::read(&path).expect("the package exists"));
     // Two names in turn, then many of their own; sections of unknown names may claim any length.
     let names = (0..20_000).flat_map(|i| ["even".to_owned(), "odd".to_owned(), format!("x{i}")]);
     let rest = "encoding: \"y\", first: 0, count: 0, length: 0, raw_length: 18446744073709551615, crc32: 0";
@@ -112,15 +115,18 @@ fn sections_are_listed_once_however_many_there_are() {
     let rows = |start: &str| text.lines().filter(|line| line.starts_with(start)).count();
     assert_eq!((rows("even "), rows("odd "), rows("x")), (1, 1, 20_000), "one row for each name");
     let even = text.lines().find(|line| line.starts_with("even ")).expect("a row");
-    assert!(even.split_whitespace().eq(["even", "20000", "0", "18446744073709551615", "hold"]), "all parts: {even}");
-    assert!(text.contains("sh_rest"), "and those that are known: {text}");
+    assert!(
+        even.split_whitespace().eq(["even", "20000", "0", "18446744073709551615", "hold"]),
+        "the row sums all sections of the name: {even}"
+    );
+    assert!(text.contains("sh_rest"), "known sections are listed: {text}");
 }
 
 #[test]
-fn nothing_in_a_file_is_obeyed_by_the_terminal() {
+fn control_characters_of_a_file_are_escaped() {
     let folder = folder();
     let path = scene(&folder, "50");
-    let parts = Parts::of(&fs::read(&path).expect("the package is there"));
+    let parts = Parts::of(&fs::read(&path).expect("the package exists"));
     let name = r#""\u{1b}[2J\u{9b}1m\nerror: fake""#;
     let section = format!("(name: {name}, encoding: \"y\", first: 0, count: 0, length: 0, raw_length: 0, crc32: 0)");
     let mut unknown = parts.clone().swap("sections: [\n", &format!("sections: [\n{section},\n"));
@@ -135,14 +141,17 @@ fn nothing_in_a_file_is_obeyed_by_the_terminal() {
             assert_eq!(run.code, Some(code), "{options:?}: {}", run.err);
             assert!(is_plain(&run.out) && is_plain(&run.err), "{options:?}: {:?} {:?}", run.out, run.err);
             let is_fake = |line: &str| line.starts_with("error: fake");
-            assert!(!run.out.lines().chain(run.err.lines()).any(is_fake), "{options:?}: no line of its own");
+            assert!(
+                !run.out.lines().chain(run.err.lines()).any(is_fake),
+                "{options:?}: the name does not make a line of its own"
+            );
             assert!((run.out + &run.err).contains("[2J"), "{options:?}: the name is shown");
         }
     }
 }
 
 #[test]
-fn a_package_knows_how_it_was_trained() {
+fn training_options_are_refused_for_a_package() {
     let folder = folder();
     let path = scene(&folder, "50");
     gs4d(&arguments!["info", &path, "--time-interval", "0,10"]).must_fail("--time-interval");
@@ -150,7 +159,7 @@ fn a_package_knows_how_it_was_trained() {
 }
 
 #[test]
-fn people_get_text() {
+fn reports_are_text_without_json() {
     const VERBS: [&str; 13] = [
         "info", "convert", "render", "compare", "synth", "bench", "score", "prune", "mask", "eval", "ablate", "bake",
         "detail",
@@ -162,14 +171,14 @@ fn people_get_text() {
         assert!(text.contains(expected), "{expected} in {text}");
     }
     for verb in VERBS {
-        assert!(gs4d(&[verb, "--help"]).text().contains("Examples:"), "{verb} explains itself");
+        assert!(gs4d(&[verb, "--help"]).text().contains("Examples:"), "{verb} --help has examples");
     }
 }
 
 #[test]
 fn damaged_files_are_named() {
     let folder = folder();
-    let good = fs::read(scene(&folder, "300")).expect("the package is there");
+    let good = fs::read(scene(&folder, "300")).expect("the package exists");
     let flipped = |at: usize| {
         let mut bytes = good.clone();
         bytes[at] ^= 0x10;
@@ -192,9 +201,9 @@ fn damaged_files_are_named() {
         gs4d(&arguments!["info", &path]).must_fail(name);
         gs4d(&arguments!["convert", &path, &out]).must_fail(name);
         gs4d(&arguments!["bench", &path, "--frames", "1"]).must_fail(name);
-        assert!(!out.exists(), "{name}: nothing is written");
+        assert!(!out.exists(), "{name}: no output is written");
         let json = gs4d(&arguments!["info", &path, "--json"]);
-        let document: Value = serde_json::from_str(&json.out).expect("one JSON document for a failure, too");
+        let document: Value = serde_json::from_str(&json.out).expect("one JSON document for a failure");
         assert!(document["error"].as_str().is_some_and(|error| error.contains(name)), "{name} in {document}");
     }
 }
@@ -203,13 +212,13 @@ fn damaged_files_are_named() {
 fn bad_paths_are_named() {
     let folder = folder();
     let path = scene(&folder, "50");
-    let before = fs::read(&path).expect("the package is there");
+    let before = fs::read(&path).expect("the package exists");
     let nowhere = folder.path().join("nowhere.pth");
     gs4d(&arguments!["info", &nowhere]).must_fail("nowhere.pth");
     gs4d(&arguments!["convert", &path, &path]).must_fail("scene.gs4d");
     let roundabout = folder.path().join(".").join("scene.gs4d");
     gs4d(&arguments!["convert", &path, &roundabout]).must_fail("scene.gs4d");
-    assert_eq!(fs::read(&path).expect("still there"), before, "the input is as it was");
+    assert_eq!(fs::read(&path).expect("the file still exists"), before, "the input is unchanged");
 
     let inside_a_file = path.join("out.gs4d");
     gs4d(&arguments!["convert", &path, &inside_a_file]).must_fail("out.gs4d");
@@ -218,7 +227,7 @@ fn bad_paths_are_named() {
     gs4d(&arguments!["convert", &path, &nowhere]).must_fail("nowhere.pth");
     gs4d(&arguments!["compare", &path, folder.path()]).must_fail("scene.gs4d");
     let left = fs::read_dir(folder.path()).expect("the folder").count();
-    assert_eq!(left, 1, "no file stays behind");
+    assert_eq!(left, 1, "no other file is left");
 }
 
 #[cfg(target_os = "linux")]
@@ -231,7 +240,7 @@ fn paths_need_not_be_unicode() {
     gs4d(&arguments!["synth", &path, "--count", "20"]).text();
     let grown = folder.path().join("grown.gs4d");
     let made = gs4d(&arguments!["synth", &grown, "--grow", "3", &path, "--json"]).json();
-    assert_eq!(made["gaussians"], 60, "three for each");
+    assert_eq!(made["gaussians"], 60, "three parts for each Gaussian");
     gs4d(&arguments!["synth", &path, "--grow", "3", &path]).must_fail("the input itself");
     let info = gs4d(&arguments!["info", &path, "--json"]).json();
     assert_eq!(info["gaussians"], 20, "read back");
@@ -259,7 +268,7 @@ fn usage_errors_name_the_option() {
 }
 
 #[test]
-fn errors_of_usage_are_json_if_asked_for() {
+fn errors_of_usage_are_json_with_the_option() {
     for (arguments, name) in [
         (&["info", "--json"][..], "FILE"),
         (&["frobnicate", "--json"], "frobnicate"),
@@ -268,19 +277,19 @@ fn errors_of_usage_are_json_if_asked_for() {
     ] {
         let run = gs4d(arguments);
         run.must_fail(name);
-        let document: Value = serde_json::from_str(&run.out).expect("one JSON document for an error of usage, too");
+        let document: Value = serde_json::from_str(&run.out).expect("one JSON document for an error of usage");
         let error = document["error"].as_str().expect("an error");
         assert!(error.contains(name) && !error.contains("Usage") && !error.contains('\n'), "{name} in short: {error}");
     }
     let text = gs4d(&["info"]);
     text.must_fail("FILE");
-    assert!(text.out.is_empty() && text.err.contains("Usage: gs4d info"), "people see how it is used: {}", text.err);
+    assert!(text.out.is_empty() && text.err.contains("Usage: gs4d info"), "the text has the usage: {}", text.err);
     let help = gs4d(&["info", "--help", "--json"]).text();
-    assert!(help.contains("Examples:"), "help is no error");
+    assert!(help.contains("Examples:"), "help is printed");
 }
 
 #[test]
-fn errors_of_the_system_are_put_in_words() {
+fn errors_of_the_system_are_described_with_a_remedy() {
     let folder = folder();
     let run = gs4d(&arguments!["info", folder.path().join("nowhere.gs4d"), "--json"]);
     run.must_fail("nowhere.gs4d: there is no such file or folder");
@@ -289,7 +298,7 @@ fn errors_of_the_system_are_put_in_words() {
     assert!(error.contains("check the path") && !error.contains("os error"), "the same in JSON: {error}");
 }
 
-/// Runs the command while nobody reads its standard output. Returns exit code and standard error.
+/// Runs the command with its standard output closed at the other end. Returns exit code and standard error.
 fn unread(arguments: &[OsString]) -> (Option<i32>, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_gs4d"));
     command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -300,7 +309,7 @@ fn unread(arguments: &[OsString]) -> (Option<i32>, String) {
 }
 
 #[test]
-fn a_reader_that_ends_early_is_not_told_of() {
+fn closed_pipes_are_not_an_error_of_reports() {
     let folder = folder();
     let path = scene(&folder, "300");
     let quiet = |code: i32| (Some(code), String::new());
@@ -308,6 +317,10 @@ fn a_reader_that_ends_early_is_not_told_of() {
     assert_eq!(unread(&arguments!["info", &path, "--json"]), quiet(0), "JSON");
     assert_eq!(unread(&arguments!["info", "--help"]), quiet(0), "help");
     if cfg!(target_os = "linux") {
-        assert_eq!(unread(&arguments!["convert", &path, "/dev/stdout"]), quiet(2), "a package that nobody has read");
+        assert_eq!(
+            unread(&arguments!["convert", &path, "/dev/stdout"]),
+            quiet(2),
+            "a package written to a closed pipe"
+        );
     }
 }

@@ -9,7 +9,7 @@ use std::fs;
 use tempfile::TempDir;
 
 #[test]
-fn comparison_tells_equal_from_different() {
+fn metrics_of_equal_and_different_pictures_are_right() {
     let (a, b) = (folder(), folder());
     let size = UVec2::new(24, 16);
     let save = |folder: &TempDir, name: &str, value: f32| {
@@ -54,7 +54,7 @@ fn comparison_tells_equal_from_different() {
 }
 
 #[test]
-fn pictures_that_are_not_whole_are_named() {
+fn truncated_pictures_are_named() {
     let folder = folder();
     let (png, jpg) = (folder.path().join("a.png"), folder.path().join("b.jpg"));
     let picture = Picture::filled(UVec2::new(64, 48), Vec3::new(0.2, 0.5, 0.8)).to_rgb8();
@@ -69,7 +69,7 @@ fn pictures_that_are_not_whole_are_named() {
 }
 
 #[test]
-fn raw_pictures_need_their_size() {
+fn raw_pictures_need_a_size() {
     let folder = folder();
     let path = folder.path().join("a.f32");
     let picture = Picture::filled(UVec2::new(16, 12), Vec3::new(-0.5, 0.5, 1.5));

@@ -1,7 +1,7 @@
 //! `gs4d detail`, run as a user runs it.
 //!
-//! In: a small synthetic scene. Out: proof that the package has the levels that the report names, that `gs4d render` draws each of them, that
-//! verbs which change a scene say that they leave them out, and that a size without a dataset is refused. Skipped where there is no GPU.
+//! In: a small synthetic scene. Out: proof that the package has the levels that the report names, that `gs4d render` draws each level,
+//! that verbs which change a scene report that levels are left out, and that a size without a dataset is refused. Skipped where there is no GPU.
 
 use crate::support::command::{arguments, folder, gs4d, scene};
 use crate::support::no_gpu::no_gpu;
@@ -21,16 +21,16 @@ fn levels_are_written_reported_and_left_out_by_other_verbs() {
     let mut command = arguments!["detail", &input, "-o", &out].to_vec();
     command.extend(quick.map(Into::into));
     let report = gs4d(&command).json();
-    assert_eq!(report["kept"], 1, "anything is close enough: {report}");
+    assert_eq!(report["kept"], 1, "every level meets a PSNR of 0: {report}");
     let gaussians = report["levels"][0]["gaussians"].as_u64().expect("a number");
-    assert!((1..=114).contains(&gaussians), "a seventh of 800: {gaussians}");
+    assert!((1..=114).contains(&gaussians), "at most a seventh of 800: {gaussians}");
     let info = gs4d(&arguments!["info", &out, "--json"]).json();
     for fact in ["pixels", "gaussians"] {
-        assert_eq!(info["levels"][0][fact], report["levels"][0][fact], "{fact}, as reported");
+        assert_eq!(info["levels"][0][fact], report["levels"][0][fact], "{fact} are those of the report");
     }
-    assert_eq!(info["gaussians"], 800, "and all Gaussians");
+    assert_eq!(info["gaussians"], 800, "the scene has all Gaussians");
     let run = gs4d(&arguments!["mask", &out, "-o", &changed]);
-    assert!(run.err.contains("levels of detail are left out"), "which is said: {}", run.err);
+    assert!(run.err.contains("levels of detail are left out"), "the report says that levels are left out: {}", run.err);
     run.text();
     let info = gs4d(&arguments!["info", &changed, "--json"]).json();
     assert_eq!(info["levels"].as_array().map(Vec::len), Some(0), "no levels of another scene");
@@ -45,7 +45,7 @@ fn levels_are_written_reported_and_left_out_by_other_verbs() {
         let drawn = draw(name, &out, more).json();
         (drawn["frames"][0]["visible"].as_u64(), drawn["level"].as_u64())
     });
-    assert_eq!((zero, one), (Some(0), Some(1)), "the levels that are named");
+    assert_eq!((zero, one), (Some(0), Some(1)), "the requested levels");
     assert!(level > Some(0) && level <= Some(gaussians) && level < all, "{level:?} of {all:?}");
     draw("missing", &out, &["--level", "2"]).must_fail("has no level of detail 2; the coarsest is 1");
     draw("none", &changed, &["--level", "1"]).must_fail("gs4d detail");
@@ -59,6 +59,6 @@ fn a_size_without_a_dataset_is_refused() {
         let mut command = arguments!["detail", &input, "-o", &out].to_vec();
         command.extend(option.map(Into::into));
         gs4d(&command).must_fail("--data");
-        assert!(!out.exists(), "nothing is written");
+        assert!(!out.exists(), "no output is written");
     }
 }

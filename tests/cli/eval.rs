@@ -31,7 +31,7 @@ fn a_scene_matches_its_own_pictures() {
     assert_eq!((&json["split"], json["views"].as_array().map(Vec::len)), (&"test".into(), Some(6)), "the test views");
     let mean = |name: &str| json["mean"][name].as_f64().unwrap_or_else(|| panic!("{name} in {json}"));
     assert!(mean("psnr") > 60.0 && mean("psnr_pooled") > 60.0, "only the rounding to 8 bits differs: {}", json["mean"]);
-    assert!(mean("ssim") > 0.9995 && mean("ms_ssim") > 0.9995, "alike: {}", json["mean"]);
+    assert!(mean("ssim") > 0.9995 && mean("ms_ssim") > 0.9995, "nearly 1: {}", json["mean"]);
     assert!((0.0..0.01).contains(&mean("flip")), "hardly any difference: {}", json["mean"]);
     let name = json["views"][0]["name"].as_str().expect("a name");
     let picture = image::open(pictures.join(format!("{name}.png"))).expect("a picture").into_rgb8();
@@ -210,19 +210,19 @@ fn missing_data_is_named() {
     gs4d(&arguments!["eval", &scene, "--data", folder.path().join("nowhere")]).must_fail("transforms_test.json");
     gs4d(&arguments!["eval", &scene, "--data", &data, "--split", "val"]).must_fail("transforms_val.json");
     gs4d(&arguments!["eval", &scene, "--data", &data, "--metrics", "lpips"]).must_fail("lpips");
-    // A JPEG that is cut off, whatever its name.
+    // A truncated JPEG with the extension of a PNG.
     let (cut, jpeg) = (data.join("test/c00_01.png"), folder.path().join("whole.jpg"));
     image::open(&cut).expect("a picture").into_rgb8().save(&jpeg).expect("the folder can be written to");
     let whole = fs::read(&jpeg).expect("a picture");
     fs::write(&cut, &whole[..whole.len() - 2]).expect("the folder can be written to");
     gs4d(&arguments!["eval", &scene, "--data", &data]).must_fail("c00_01.png");
-    fs::remove_file(cut).expect("the picture is there");
+    fs::remove_file(cut).expect("the picture exists");
     gs4d(&arguments!["eval", &scene, "--data", &data]).must_fail("c00_01.png");
     gs4d(&arguments!["eval", &scene]).must_fail("--data");
 }
 
 #[test]
-fn advice_names_no_option_that_the_verb_lacks() {
+fn errors_name_only_options_of_the_verb() {
     let Capture { folder, scene, .. } = capture(UVec2::splat(16));
     let data = folder.path().join("sizeless");
     fs::create_dir(&data).expect("the folder can be written to");
@@ -267,7 +267,10 @@ fn an_ablation_has_every_row() {
     let psnr = |name: &str| row(name)["psnr"].as_f64().expect("a number");
     assert!(psnr("vanilla") > 60.0, "its own pictures");
     assert_eq!(row("filter only, support, 5 key-frames")["psnr"], row("vanilla")["psnr"], "support changes no pixel");
-    assert!(row("filter only, support, 5 key-frames")["active_share"].as_f64().is_some_and(|s| s < 1.0), "some rest");
+    assert!(
+        row("filter only, support, 5 key-frames")["active_share"].as_f64().is_some_and(|s| s < 1.0),
+        "some Gaussians are inactive"
+    );
     assert_eq!(row("prune 60% energy")["gaussians"], 600, "1500 less 60 percent");
     assert!(psnr("prune 20% energy") > psnr("prune 60% energy"), "fewer Gaussians have a lower PSNR");
     let lines = fs::read_to_string(&csv).expect("the table is there");

@@ -1,7 +1,7 @@
 //! Faults while a verb writes: killed at any moment, a folder that cannot be written to, a full disk, closed pipes, two at once.
 //!
-//! In: every verb that writes, on small inputs made here. Out: proof that inputs stay as they are, that an output is absent, the one from
-//! before, or whole and readable, and that the next good run leaves nothing else behind. Verbs that need a GPU are skipped where there is none.
+//! In: every verb that writes, on small inputs made here. Out: proof that inputs are unchanged, that an output is absent, unchanged
+//! or complete and readable, and that the next run without a fault leaves no other files. Verbs that need a GPU are skipped where there is none.
 //!
 //! `GS4D_KILLS` is how often each verb is killed, for long runs: 4 times if it is not set.
 
@@ -29,15 +29,15 @@ use tempfile::TempDir;
 
 /// Gaussians of the scene.
 const COUNT: usize = 600;
-/// What is in the place of each output before a run. It can be read as none of them.
-const OLD: &[u8] = b"the one from before";
+/// Contents of each output before a run. No reader accepts it.
+const OLD: &[u8] = b"the old file";
 
 /// A verb that writes.
 struct Verb {
     name: &'static str,
     /// Its arguments, given the folder of the inputs and that of the outputs.
     arguments: fn(&Path, &Path) -> Vec<OsString>,
-    /// What it writes.
+    /// The files that it writes.
     files: &'static [&'static str],
     needs_gpu: bool,
 }
@@ -143,7 +143,7 @@ const VERBS: [Verb; 11] = [
     },
 ];
 
-/// Returns the arguments of a verb that looks at the training views of the scene.
+/// Returns the arguments of a verb that uses the training views of the scene.
 fn on_data(verb: &str, from: &Path) -> Vec<OsString> {
     arguments![verb, from.join("scene.gs4d"), "--data", from.join("data")].to_vec()
 }
@@ -186,7 +186,7 @@ impl Stage {
         let possible = VERBS.into_iter().filter(move |verb| gpu || !verb.needs_gpu);
         possible.map(move |verb| {
             let out = self.folder.path().join(verb.name);
-            fs::create_dir(&out).expect("each verb has its own folder");
+            fs::create_dir(&out).expect("the folder of the verb does not exist");
             Act { verb, stage: self, out }
         })
     }
@@ -218,42 +218,42 @@ impl Act<'_> {
         command
     }
 
-    /// Returns what all its files have in their names.
+    /// Returns the word that the names of all its files begin with.
     fn word(&self) -> &'static str {
         self.verb.files[0].split(['.', '_']).next().unwrap_or_default()
     }
 
-    /// Puts something else in the place of each output.
+    /// Writes the old contents to each output.
     fn put_old(&self) {
         for file in self.verb.files {
             fs::write(self.out.join(file), OLD).expect("the folder can be written to");
         }
     }
 
-    /// Checks that the inputs are as they were, and each output the old one or whole.
+    /// Checks that the inputs are unchanged, and that each output is the old one or complete.
     fn check(&self, context: &str) {
         let context = format!("{} {context}", self.verb.name);
         for file in self.verb.files {
             let bytes = fs::read(self.out.join(file)).unwrap_or_else(|error| panic!("{context}: {file}: {error}"));
             let whole = bytes == OLD || is_whole(file, &bytes);
-            assert!(whole, "{context}: {file} is neither the old one nor whole, {} bytes", bytes.len());
+            assert!(whole, "{context}: {file} is the old file or a complete one, {} bytes", bytes.len());
         }
         self.check_inputs(&context);
     }
 
     fn check_inputs(&self, context: &str) {
         let now = contents(&self.stage.folder.path().join("inputs"));
-        assert!(now == self.stage.inputs, "{context}: the inputs are as they were");
+        assert!(now == self.stage.inputs, "{context}: the inputs are unchanged");
     }
 
-    /// Checks that every output is whole and new, and that there is nothing else in the folder.
+    /// Checks that every output is complete and new, and that the folder has no other file.
     fn check_whole(&self, context: &str) {
         let context = format!("{} {context}", self.verb.name);
         for file in self.verb.files {
             let bytes = fs::read(self.out.join(file)).unwrap_or_else(|error| panic!("{context}: {file}: {error}"));
-            assert!(is_whole(file, &bytes), "{context}: {file} is whole, {} bytes", bytes.len());
+            assert!(is_whole(file, &bytes), "{context}: {file} is complete, {} bytes", bytes.len());
         }
-        assert_eq!(names(&self.out), self.verb.files, "{context}: the outputs and nothing else");
+        assert_eq!(names(&self.out), self.verb.files, "{context}: only the outputs");
         self.check_inputs(&context);
     }
 
@@ -278,14 +278,14 @@ impl Act<'_> {
     }
 }
 
-/// Returns whether the bytes of an output are all there.
+/// Returns whether an output is complete.
 fn is_whole(name: &str, bytes: &[u8]) -> bool {
     match Path::new(name).extension().and_then(OsStr::to_str) {
         Some("gs4d") => package::read(Cursor::new(bytes)).is_ok(),
         Some("png") => image::load_from_memory(bytes).is_ok(),
         Some("json") => serde_json::from_slice::<Value>(bytes).is_ok(),
         Some("html") => bytes.ends_with(b"</html>\n"),
-        // Heads, the whole scene, one filter, one ratio.
+        // The header, the whole scene, one filter, one ratio.
         Some("csv") => bytes.ends_with(b"\n") && bytes.iter().filter(|&&byte| byte == b'\n').count() == 4,
         _ if name.starts_with("orbit") => bytes.len() == 64 * 48 * 12,
         _ => bytes.len() == 4 * COUNT,
@@ -309,7 +309,7 @@ fn end(child: &mut Child, asking: bool) {
 }
 
 #[test]
-fn killed_at_any_moment_a_verb_leaves_its_output_old_or_whole() {
+fn killed_verbs_leave_their_outputs_old_or_complete() {
     let (stage, mut random) = (Stage::new(), Random::new(11));
     for act in stage.acts() {
         let start = Instant::now();
@@ -334,24 +334,24 @@ fn killed_at_any_moment_a_verb_leaves_its_output_old_or_whole() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_to_is_named_and_left_alone() {
+fn a_folder_that_cannot_be_written_to_is_named_and_unchanged() {
     let stage = Stage::new();
     for act in stage.acts() {
         act.put_old();
         let before = contents(&act.out);
-        fs::set_permissions(&act.out, Permissions::from_mode(0o555)).expect("the folder is ours");
-        // Permissions do not hold root back; in this folder nobody can make a file.
+        fs::set_permissions(&act.out, Permissions::from_mode(0o555)).expect("permissions can be set");
+        // Root may write in spite of permissions; in /proc no user can create a file.
         let holds = File::create(act.out.join("probe")).is_err();
         let out = if holds { act.out.as_path() } else { Path::new("/proc") };
         let run = gs4d(&act.arguments(out));
-        fs::set_permissions(&act.out, Permissions::from_mode(0o755)).expect("the folder is ours");
+        fs::set_permissions(&act.out, Permissions::from_mode(0o755)).expect("permissions can be set");
         if !holds {
-            fs::remove_file(act.out.join("probe")).expect("it was made just now");
+            fs::remove_file(act.out.join("probe")).expect("the file exists");
         }
         let written_to = if holds { act.word() } else { "/proc" };
         run.must_fail(written_to);
         act.check("without a folder to write to");
-        assert!(contents(&act.out) == before, "{} changes nothing there", act.verb.name);
+        assert!(contents(&act.out) == before, "{} changes no file of the folder", act.verb.name);
         act.run_well("once it can write");
     }
 }
@@ -361,7 +361,7 @@ fn a_full_disk_is_named_and_the_old_output_stays() {
     let stage = Stage::new();
     for act in stage.acts() {
         act.run_well("at first");
-        let size = |file: &&str| fs::metadata(act.out.join(file)).expect("it was made just now").len();
+        let size = |file: &&str| fs::metadata(act.out.join(file)).expect("the file exists").len();
         let largest = act.verb.files.iter().map(size).max();
         // Blocks of 512 bytes or of 1024: full from the start, and in the middle of a file. Drivers of GPUs may keep memory in files.
         let limits: &[&str] = match largest {
@@ -384,45 +384,45 @@ fn a_full_disk_is_named_and_the_old_output_stays() {
         act.run_well("once there is room");
 
         let device = act.out.join(act.verb.files[0]);
-        fs::remove_file(&device).expect("it was made just now");
+        fs::remove_file(&device).expect("the file exists");
         symlink("/dev/full", &device).expect("the folder can be written to");
         let run = Run::of(&act.command().output().expect("the command starts"));
         assert_eq!(run.code, Some(2), "{} to a full device: {}", act.verb.name, run.err);
         assert!(run.err.contains("error:") && !run.err.contains("panicked"), "{}: {}", act.verb.name, run.err);
         assert!(device.is_symlink(), "{}: the link to the device stays", act.verb.name);
         act.check_inputs(act.verb.name);
-        fs::remove_file(&device).expect("it is there");
+        fs::remove_file(&device).expect("the file exists");
         act.run_well("to a file again");
     }
 }
 
 #[test]
-fn closed_pipes_do_not_cost_the_output() {
+fn closed_pipes_do_not_affect_the_output() {
     let stage = Stage::new();
     for act in stage.acts() {
         act.put_old();
         let mut child = act.start();
         drop((child.stdout.take(), child.stderr.take()));
         let status = child.wait().expect("the process ends");
-        assert!(status.success(), "{} with nobody at the other end: {status}", act.verb.name);
-        act.check_whole("with nobody at the other end");
+        assert!(status.success(), "{} with closed pipes: {status}", act.verb.name);
+        act.check_whole("with closed pipes");
 
         act.put_old();
         let status = act.in_shell("exec >&- 2>&-", "").status().expect("the shell starts");
-        assert!(status.success(), "{} with nothing to print to: {status}", act.verb.name);
-        act.check_whole("with nothing to print to");
+        assert!(status.success(), "{} without standard output: {status}", act.verb.name);
+        act.check_whole("without standard output");
 
         act.put_old();
         let full = File::options().write(true).open("/dev/full").expect("a device of Linux");
         let output = act.command().stdout(full).stderr(Stdio::piped()).output().expect("the command starts");
         let run = Run::of(&output);
-        assert_eq!(run.code, Some(2), "{} says that its report is lost: {}", act.verb.name, run.err);
+        assert_eq!(run.code, Some(2), "{} fails if its report is lost: {}", act.verb.name, run.err);
         act.check_whole("with a report that is lost");
     }
 }
 
 #[test]
-fn two_at_once_leave_one_whole_output() {
+fn two_runs_at_once_leave_one_complete_output() {
     let stage = Stage::new();
     for act in stage.acts() {
         for _ in 0..2 {
@@ -432,12 +432,12 @@ fn two_at_once_leave_one_whole_output() {
             let [one, other] = &runs;
             let worked = runs.iter().any(|run| run.code == Some(0));
             assert!(worked, "{}: one of two works: {} {}", act.verb.name, one.err, other.err);
-            // The other may have been told to wait for its turn.
+            // The other run may be refused while the first one works.
             for refused in runs.iter().filter(|run| run.code != Some(0)) {
                 refused.must_fail(act.word());
             }
-            act.check_whole("beside another");
+            act.check_whole("with two runs at once");
         }
-        act.run_well("alone again");
+        act.run_well("after two runs at once");
     }
 }

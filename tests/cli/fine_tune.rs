@@ -1,7 +1,7 @@
 //! `gs4d finetune`, run as a user runs it on a scene's own pictures.
 //!
-//! In: a small synthetic scene, a dataset drawn from it, the scene pruned. Out: proof that training wins quality, that the result can be
-//! compressed on the way, and that wrong inputs are refused with nothing left behind. Skipped where there is no GPU.
+//! In: a small synthetic scene, a dataset drawn from it, the scene pruned. Out: proof that training raises quality, that the result can be
+//! compressed in the same run, and that wrong inputs are refused and leave no files. Skipped where there is no GPU.
 
 use crate::support::capture::Capture;
 use crate::support::command::{arguments, gs4d};
@@ -21,7 +21,7 @@ struct Lesson {
     data: PathBuf,
 }
 
-/// Returns a scene, the same with fewer Gaussians, and its pictures; `None` if there is no GPU.
+/// Returns a scene, the pruned scene and the pictures of the scene; `None` if there is no GPU.
 fn lesson() -> Option<Lesson> {
     if GpuContext::headless(None).is_err() {
         no_gpu();
@@ -45,7 +45,7 @@ impl Lesson {
 }
 
 #[test]
-fn training_wins_back_what_pruning_lost() {
+fn training_raises_the_quality_of_a_pruned_scene() {
     let Some(lesson) = lesson() else { return };
     let out = lesson.path("tuned.gs4d");
     let steps = ["--steps", "120", "--evaluate-every", "60", "--json"];
@@ -59,7 +59,7 @@ fn training_wins_back_what_pruning_lost() {
     let (before, best) = (json["psnr_before"].as_f64(), json["best"]["psnr"].as_f64());
     assert!(best > before.map(|before| before + 2.0), "{best:?} dB after {before:?}");
     assert_eq!(json["curve"].as_array().map(Vec::len), Some(3), "before, halfway, at the end");
-    assert_eq!(lesson.left(), ["data", "pruned.gs4d", "scene.gs4d", "tuned.gs4d"], "no state is left");
+    assert_eq!(lesson.left(), ["data", "pruned.gs4d", "scene.gs4d", "tuned.gs4d"], "no state file is left");
     let info = gs4d(&arguments!["info", &out, "--json"]).json();
     assert_eq!((info["gaussians"].as_u64(), info["form"].as_str()), (Some(500), Some("trained")), "{info}");
     let small = lesson.path("small.gs4d");
@@ -74,11 +74,11 @@ fn training_wins_back_what_pruning_lost() {
         let found = gs4d(&arguments!["eval", scene, "--data", &lesson.data, "--metrics", "psnr", "--json"]).json();
         found["mean"]["psnr"].as_f64().expect("a number")
     };
-    assert!(psnr(&small) > psnr(&lesson.pruned) + 1.0, "better than before, and smaller");
+    assert!(psnr(&small) > psnr(&lesson.pruned) + 1.0, "the compressed result is better than the pruned scene");
 }
 
 #[test]
-fn atomic_sums_train_or_name_what_is_missing() {
+fn atomic_sums_train_or_are_refused_with_a_remedy() {
     let Some(lesson) = lesson() else { return };
     let (out, before) = (lesson.path("out.gs4d"), lesson.left());
     let command = arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &out, "--steps", "2"];
@@ -88,13 +88,13 @@ fn atomic_sums_train_or_name_what_is_missing() {
         assert_eq!(info["gaussians"].as_u64(), Some(500), "it is trained: {info}");
     } else {
         run.must_fail("--sums deterministic");
-        assert_eq!(lesson.left(), before, "nothing is left");
+        assert_eq!(lesson.left(), before, "no file is left");
     }
     gs4d(&[command.to_vec(), arguments!["--sums", "sorted"].to_vec()].concat()).must_fail("--sums");
 }
 
 #[test]
-fn what_cannot_be_trained_is_refused_and_nothing_is_left() {
+fn invalid_inputs_of_training_are_refused_and_leave_no_files() {
     let Some(lesson) = lesson() else { return };
     let out = lesson.path("out.gs4d");
     let before = lesson.left();
@@ -104,7 +104,7 @@ fn what_cannot_be_trained_is_refused_and_nothing_is_left() {
         gs4d(&arguments!["finetune", scene, "--data", data, "-o", &out, "--steps", "2"])
     };
     run(&packed, &lesson.data).must_fail("trained form");
-    fs::remove_file(&packed).expect("it is there");
+    fs::remove_file(&packed).expect("the file exists");
     run(&lesson.pruned, &lesson.path("nowhere")).must_fail("nowhere");
     gs4d(&arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &lesson.pruned]).must_fail("itself");
     let weighted = arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &out, "--rigid-weight=-1"];
@@ -116,10 +116,10 @@ fn what_cannot_be_trained_is_refused_and_nothing_is_left() {
     let elsewhere = lesson.path("elsewhere");
     dataset::write(&elsewhere, &other, Vec3::new(0.0, 0.0, 40.0), 4, 4, UVec2::splat(48), true);
     run(&lesson.pruned, &elsewhere).must_fail("do not show this capture");
-    fs::remove_dir_all(&elsewhere).expect("it is there");
+    fs::remove_dir_all(&elsewhere).expect("the file exists");
     let image = lesson.data.join("train/c01_02.png");
-    fs::remove_file(&image).expect("it is there");
+    fs::remove_file(&image).expect("the file exists");
     run(&lesson.pruned, &lesson.data).must_fail("c01_02.png");
-    assert_eq!(lesson.left(), before, "nothing is left");
-    assert!(lesson.scene.is_file(), "the scene is there");
+    assert_eq!(lesson.left(), before, "no file is left");
+    assert!(lesson.scene.is_file(), "the scene exists");
 }

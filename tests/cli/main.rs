@@ -9,7 +9,7 @@ mod compare;
 mod compress;
 mod detail;
 mod eval;
-// Faults are made with what Linux has: `/dev/full`, limits of a shell.
+// Faults need `/dev/full` and the limits of a shell, which Linux has.
 #[cfg(target_os = "linux")]
 mod faults;
 mod fine_tune;

@@ -1,8 +1,8 @@
-//! What verbs write, run as a user runs them.
+//! The outputs of verbs, run as a user runs them.
 //!
-//! In: a small synthetic scene, a dataset drawn from it, outputs of every kind. Out: proof that no verb writes over what it reads, that bad
-//! outputs are told before anything is read, that what is replaced keeps its links and permissions, and that two runs do not disturb each
-//! other.
+//! In: a small synthetic scene, a dataset drawn from it, outputs of every kind. Out: proof that no verb writes over an input, that bad
+//! outputs are refused before any input is read, that replaced files keep their links and permissions, and that two runs do not disturb
+//! each other.
 
 use crate::support::capture::Capture;
 use crate::support::command::{arguments, folder, gs4d, scene};
@@ -18,7 +18,7 @@ fn capture() -> Capture {
 }
 
 #[test]
-fn no_verb_writes_over_what_it_reads() {
+fn no_verb_writes_over_an_input() {
     let capture = capture();
     let (scene, data) = (&capture.scene, &capture.data);
     let [scores, settings] = ["scores.f32", "cfg_args"].map(|name| capture.path(name));
@@ -52,12 +52,12 @@ fn no_verb_writes_over_what_it_reads() {
     for command in commands {
         gs4d(&command).must_fail("the input itself");
     }
-    assert!(contents(capture.folder.path()) == before, "every file is as it was");
+    assert!(contents(capture.folder.path()) == before, "every file is unchanged");
 }
 
 #[cfg(unix)]
 #[test]
-fn links_lead_to_no_input_and_to_no_other_output() {
+fn links_to_inputs_and_to_other_outputs_are_refused() {
     use std::os::unix::fs::symlink;
     let capture = capture();
     let [hard, soft, report, out] =
@@ -70,11 +70,11 @@ fn links_lead_to_no_input_and_to_no_other_output() {
     }
     symlink("out.gs4d", &report).expect("the folder can be written to");
     gs4d(&arguments!["bake", &capture.scene, "--data", &capture.data, "-o", &out]).must_fail("written twice");
-    assert!(!out.exists(), "nothing is written");
+    assert!(!out.exists(), "no output is written");
 }
 
 #[test]
-fn a_bad_output_is_told_before_anything_is_read() {
+fn a_bad_output_is_refused_before_any_input_is_read() {
     let folder = folder();
     let path = |name: &str| folder.path().join(name);
     let (nothing, no_data) = (path("nothing.pth"), path("nothing"));
@@ -83,14 +83,14 @@ fn a_bad_output_is_told_before_anything_is_read() {
         fs::create_dir(path(&format!("folder.{extension}"))).expect("the folder can be written to");
         let kept = path(&format!("kept.{extension}"));
         fs::write(&kept, "contents").expect("the folder can be written to");
-        let mut permissions = kept.metadata().expect("it is there").permissions();
+        let mut permissions = kept.metadata().expect("the file exists").permissions();
         permissions.set_readonly(true);
-        fs::set_permissions(&kept, permissions).expect("it is ours");
+        fs::set_permissions(&kept, permissions).expect("permissions can be set");
     }
     let refused = |command: Vec<OsString>, reason: &str| {
         let run = gs4d(&command);
         run.must_fail(reason);
-        assert!(!run.err.contains("nothing"), "{command:?}: the output is told first: {}", run.err);
+        assert!(!run.err.contains("nothing"), "{command:?}: the error is about the output: {}", run.err);
     };
     let of = |extension: &str| {
         [
@@ -126,36 +126,40 @@ fn a_bad_output_is_told_before_anything_is_read() {
 
 #[cfg(unix)]
 #[test]
-fn what_is_replaced_keeps_its_links_and_permissions() {
+fn replaced_files_keep_their_links_and_permissions() {
     use std::os::unix::fs::{PermissionsExt, symlink};
     let folder = folder();
     let input = scene(&folder, "50");
     let (out, link) = (folder.path().join("out.gs4d"), folder.path().join("link.gs4d"));
     fs::write(&out, "contents").expect("the folder can be written to");
-    fs::set_permissions(&out, fs::Permissions::from_mode(0o640)).expect("it is ours");
+    fs::set_permissions(&out, fs::Permissions::from_mode(0o640)).expect("permissions can be set");
     symlink("out.gs4d", &link).expect("the folder can be written to");
     gs4d(&arguments!["convert", &input, &link]).text();
-    assert!(link.is_symlink(), "the link is still one");
-    assert_eq!(fs::read(&out).expect("it is there"), fs::read(&input).expect("it is there"), "what it leads to is new");
-    let mode = out.metadata().expect("it is there").permissions().mode() & 0o777;
-    assert_eq!(mode, 0o640, "the permissions are as before");
+    assert!(link.is_symlink(), "the link is still a link");
+    assert_eq!(
+        fs::read(&out).expect("the file exists"),
+        fs::read(&input).expect("the file exists"),
+        "the target of the link is replaced"
+    );
+    let mode = out.metadata().expect("the file exists").permissions().mode() & 0o777;
+    assert_eq!(mode, 0o640, "the permissions are unchanged");
 }
 
 #[test]
-fn what_killed_runs_left_is_removed() {
+fn temporary_files_of_killed_runs_are_removed() {
     let folder = folder();
     let input = scene(&folder, "50");
     let [killed, live] = [".gs4d-killed.part", ".gs4d-live.part"].map(|name| folder.path().join(name));
     fs::write(&killed, "some bytes").expect("the folder can be written to");
     let writing = File::create(&live).expect("the folder can be written to");
-    writing.lock().expect("nobody else has locked it");
+    writing.lock().expect("the file is not locked");
     gs4d(&arguments!["convert", &input, folder.path().join("out.gs4d")]).text();
-    assert!(!killed.exists(), "nobody writes this one");
-    assert!(live.exists(), "this one is being written");
+    assert!(!killed.exists(), "the file of a killed run is removed");
+    assert!(live.exists(), "a locked file is still being written");
 }
 
 #[test]
-fn a_bake_removes_only_what_it_has_written() {
+fn a_bake_removes_only_files_that_it_has_written() {
     let capture = capture();
     let (out, work) = (capture.path("out.gs4d"), capture.path("out.gs4d.bake"));
     let bake = |more: &[&str]| {
@@ -168,23 +172,23 @@ fn a_bake_removes_only_what_it_has_written() {
     fs::write(&notes, "mine").expect("the folder can be written to");
     bake(&[]);
     let left = contents(&work);
-    assert_eq!(left.keys().collect::<Vec<_>>(), [&notes], "the file of somebody else, and no other");
-    fs::remove_file(&notes).expect("it is there");
+    assert_eq!(left.keys().collect::<Vec<_>>(), [&notes], "only the foreign file is left");
+    fs::remove_file(&notes).expect("the file exists");
     bake(&[]);
-    assert!(!work.exists(), "an empty folder goes");
+    assert!(!work.exists(), "the empty folder is removed");
 }
 
 #[test]
-fn two_runs_to_one_output_do_not_share_their_folder() {
+fn a_second_run_to_the_same_output_is_refused() {
     let capture = capture();
     let out = capture.path("out.gs4d");
     for (verb, name) in [("bake", "out.gs4d.bake"), ("finetune", "out.gs4d.tune")] {
         let lock = capture.path(name).join("lock");
         fs::create_dir(capture.path(name)).expect("the folder can be written to");
         let running = File::create(&lock).expect("the folder can be written to");
-        running.lock().expect("nobody else has locked it");
+        running.lock().expect("the file is not locked");
         let run = gs4d(&arguments![verb, &capture.scene, "--data", &capture.data, "-o", &out]);
         run.must_fail(&format!("{name}: another run of gs4d works in this folder"));
-        assert!(lock.exists() && !out.exists(), "{verb}: the folder is as it was, and nothing is written");
+        assert!(lock.exists() && !out.exists(), "{verb}: the lock stays and no output is written");
     }
 }

@@ -24,8 +24,8 @@ struct Bench {
 }
 
 impl Bench {
-    /// Writes the scene and its data. `images`: whether the training images exist; `astray`: whether the cameras see
-    /// nothing of the scene.
+    /// Writes the scene and its data. `images`: whether the training images exist; `astray`: whether the cameras look
+    /// away from the scene.
     fn new(images: bool, astray: bool) -> Self {
         let bench = Self { folder: tempfile::tempdir().expect("a temporary folder") };
         gs4d(&arguments!["synth", bench.path("scene.gs4d"), "--count", COUNT.to_string(), "--seed", "5", "--json"])
@@ -66,12 +66,12 @@ impl Bench {
 }
 
 fn floats(path: String) -> Vec<f32> {
-    let bytes = fs::read(PathBuf::from(path)).expect("the file is there");
+    let bytes = fs::read(PathBuf::from(path)).expect("the file exists");
     bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
 }
 
 #[test]
-fn every_score_is_written_in_one_go() {
+fn every_score_is_written_by_one_run() {
     let bench = Bench::new(false, false);
     let out = bench.path("scores");
     let json = bench.run("score", &["--variant", "all", "--out", &out]).json();
@@ -85,14 +85,18 @@ fn every_score_is_written_in_one_go() {
     }
     let single = bench.path("energy.f32");
     bench.run("score", &["--variant", "energy", "--out", &single]).json();
-    assert_eq!(floats(single), floats(bench.path("scores/energy.f32")), "alone and among all");
+    assert_eq!(
+        floats(single),
+        floats(bench.path("scores/energy.f32")),
+        "the same scores if only one variant is written"
+    );
     let few = bench.run("score", &["--variant", "full", "--views", "5", "--out", &bench.path("few.f32")]).json();
-    assert_eq!(few["views"], 5, "a share of the views");
+    assert_eq!(few["views"], 5, "the requested number of views");
     bench.run("score", &["--variant", "full", "--out", &out]).must_fail("is a folder");
 }
 
 #[test]
-fn auto_keeps_the_best_of_what_it_tried() {
+fn auto_keeps_the_best_of_the_scores_it_tries() {
     let bench = Bench::new(true, false);
     let json = bench.run("prune", &["--ratio", "0.4", "-o", &bench.path("pruned.gs4d")]).json();
     assert_eq!(json["gaussians"], 240, "six of ten");
@@ -104,11 +108,11 @@ fn auto_keeps_the_best_of_what_it_tried() {
     assert_eq!(psnr(named), best, "and is named");
     assert_eq!(json["contest"]["views"], 1, "the views of one camera are held out");
     let info = gs4d(&arguments!["info", bench.path("pruned.gs4d"), "--json"]).json();
-    assert_eq!((&info["gaussians"], &info["form"]), (&240.into(), &"trained".into()), "what was written");
+    assert_eq!((&info["gaussians"], &info["form"]), (&240.into(), &"trained".into()), "the written package");
 }
 
 #[test]
-fn a_loss_decides_the_count() {
+fn the_allowed_loss_determines_the_number_of_gaussians() {
     let bench = Bench::new(true, false);
     let prune = |loss: &str| {
         let out = bench.path("pruned.gs4d");
@@ -127,18 +131,18 @@ fn a_loss_decides_the_count() {
 }
 
 #[test]
-fn images_are_missed_only_where_they_are_needed() {
+fn missing_images_are_an_error_only_if_they_are_needed() {
     let bench = Bench::new(false, false);
     let out = bench.path("pruned.gs4d");
     let auto = bench.run("prune", &["--ratio", "0.5", "-o", &out]);
-    assert!(auto.err.contains("images are missing"), "said: {}", auto.err);
-    assert_eq!(auto.json()["contest"]["compared_with"], "against the whole scene", "compared with itself");
+    assert!(auto.err.contains("images are missing"), "missing images are reported: {}", auto.err);
+    assert_eq!(auto.json()["contest"]["compared_with"], "against the whole scene", "compared with the whole scene");
     bench.run("prune", &["--max-loss", "0.1", "-o", &out]).must_fail("images are missing");
     gs4d(&arguments!["prune", bench.path("scene.gs4d"), "--ratio", "0.5", "-o", &out]).must_fail("--data");
 }
 
 #[test]
-fn images_that_are_cut_off_are_not_compared_with() {
+fn truncated_images_are_refused() {
     let bench = Bench::new(true, false);
     for view in 0..VIEWS {
         let (png, jpeg) = (bench.path(&format!("r_{view:02}.png")), bench.path("whole.jpg"));
@@ -148,11 +152,11 @@ fn images_that_are_cut_off_are_not_compared_with() {
     }
     let out = bench.path("pruned.gs4d");
     bench.run("prune", &["--ratio", "0.5", "-o", &out]).must_fail("r_");
-    assert!(!PathBuf::from(out).exists(), "nothing is written");
+    assert!(!PathBuf::from(out).exists(), "no output is written");
 }
 
 #[test]
-fn a_score_file_must_fit() {
+fn a_score_file_must_have_a_finite_score_for_each_gaussian() {
     let bench = Bench::new(false, false);
     let (scores, out) = (bench.path("scores.f32"), bench.path("pruned.gs4d"));
     let mut values: Vec<f32> = (0..COUNT).map(|i| i as f32).collect();
@@ -172,18 +176,18 @@ fn a_score_file_must_fit() {
 }
 
 #[test]
-fn filters_report_what_is_active() {
+fn filters_report_their_active_fraction() {
     let bench = Bench::new(false, false);
-    let share = |filter: &str| {
+    let active = |filter: &str| {
         let options = ["--filter", filter, "--key-frames", "5", "-o", &bench.path("filtered.gs4d")];
         let json = bench.run("mask", &options).json();
-        assert_eq!((&json["segments"], &json["filter"]), (&4.into(), &filter.into()), "what was asked for");
+        assert_eq!((&json["segments"], &json["filter"]), (&4.into(), &filter.into()), "the requested filter");
         assert_eq!(json["overlap"].as_array().map(Vec::len), Some(3), "between four segments");
-        json["active_share"].as_f64().expect("a share")
+        json["active_share"].as_f64().expect("a number")
     };
-    let (key_frame, interval, support) = (share("key-frame"), share("interval"), share("support"));
+    let (key_frame, interval, support) = (active("key-frame"), active("interval"), active("support"));
     assert!(key_frame > 0.0 && key_frame <= interval && interval <= support, "{key_frame} {interval} {support}");
-    assert!(support < 1.0, "something rests");
+    assert!(support < 1.0, "some Gaussians are inactive");
     let every = bench.run("mask", &["--every", "3", "-o", &bench.path("filtered.gs4d")]).json();
     assert_eq!(every["key_frames"], 5, "twelve times, every third");
     let alone = arguments!["mask", bench.path("scene.gs4d"), "-o", bench.path("filtered.gs4d"), "--json"];
@@ -191,12 +195,12 @@ fn filters_report_what_is_active() {
 }
 
 #[test]
-fn data_of_another_capture_is_not_used() {
+fn data_of_another_capture_is_refused() {
     let bench = Bench::new(false, true);
     let out = bench.path("out.gs4d");
     let belong = "does this data belong to the checkpoint?";
     bench.run("score", &["--variant", "energy", "--out", &bench.path("out.f32")]).must_fail(belong);
     bench.run("prune", &["--variant", "full", "--ratio", "0.5", "-o", &out]).must_fail(belong);
     bench.run("mask", &["--filter", "key-frame", "-o", &out]).must_fail(belong);
-    assert!(!PathBuf::from(out).exists(), "nothing is written");
+    assert!(!PathBuf::from(out).exists(), "no output is written");
 }

@@ -3,20 +3,23 @@
 //! In: a synthetic scene; with `GS4D_DATA` set, the trained captures. Out: proof that pictures are written and frames timed, and that
 //! renders match the original's. Skipped where there is no GPU.
 
+use crate::support::capture::Capture;
 use crate::support::command::{arguments, folder, gs4d, scene};
 use crate::support::data::data;
+use crate::support::folders::contents;
 use crate::support::no_gpu::no_gpu;
 use crate::support::npz;
 use crate::support::skip::skip;
 use bevy_gs4d::offline::metrics::SquaredError;
 use bevy_gs4d::renderer::GpuContext;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::view::Picture;
 use glam::{UVec2, Vec3};
 use serde_json::Value;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Returns whether there is a GPU; that there is none is reported.
+/// Returns whether there is a GPU; reports if there is none.
 fn has_gpu() -> bool {
     let some = !GpuContext::adapters().is_empty();
     if !some {
@@ -37,14 +40,14 @@ fn pictures_are_drawn_and_written() {
     ])
     .json();
     let list = json["frames"].as_array().expect("a list of frames");
-    assert_eq!(list.len(), 3, "as many as asked for");
-    assert_eq!((&list[0]["time"], &list[2]["time"]), (&0.0.into(), &1.0.into()), "time runs through the interval");
+    assert_eq!(list.len(), 3, "the requested number of pictures");
+    assert_eq!((&list[0]["time"], &list[2]["time"]), (&0.0.into(), &1.0.into()), "the pictures span the time interval");
     for index in 0..3 {
         let raw = raw_picture(&frames.join(format!("orbit_{index:04}.f32")), UVec2::new(64, 48));
         let png = image::open(frames.join(format!("orbit_{index:04}.png"))).expect("a picture").into_rgb8();
-        assert_eq!(png, raw.to_rgb8(), "both are the same picture");
+        assert_eq!(png, raw.to_rgb8(), "the PNG is the raw picture in 8 bits");
         let lit = raw.pixels.iter().filter(|pixel| pixel.max_element() > 0.1).count();
-        assert!(lit > 64 * 48 / 50, "the scene is in the picture: {lit} pixels");
+        assert!(lit > 64 * 48 / 50, "the picture shows the scene: {lit} pixels");
     }
     let alike = gs4d(&arguments!["compare", &frames, &frames, "--size", "64x48", "--json"]).json();
     assert_eq!(alike["pictures"].as_array().map(Vec::len), Some(3), "raw pictures go before others of their name");
@@ -53,6 +56,26 @@ fn pictures_are_drawn_and_written() {
         alike["pictures"].as_array().map(|list| list.len() as u64),
         "equal to themselves"
     );
+}
+
+#[test]
+fn images_of_a_camera_file_are_written_only_if_none_of_them_exists() {
+    if !has_gpu() {
+        return;
+    }
+    let trained = synthesize(&SynthSettings { count: 200, ..SynthSettings::default() });
+    let capture = Capture::new(trained, Vec3::ZERO, 4, 2, UVec2::splat(48), true);
+    let (cameras, out) = (capture.data.join("transforms_test.json"), capture.data.join("test"));
+    let render = || gs4d(&arguments!["render", &capture.scene, "--cameras", &cameras, "--out", &out]);
+    let images: Vec<PathBuf> = contents(&out).into_keys().collect();
+    assert_eq!(images.len(), 4, "two test cameras at two times");
+    for image in &images {
+        render().must_fail("the input itself");
+        fs::remove_file(image).expect("the folder can be written to");
+    }
+    render().text();
+    assert_eq!(contents(&out).into_keys().collect::<Vec<_>>(), images, "the images that the camera file names");
+    render().must_fail("the input itself");
 }
 
 #[test]
@@ -71,13 +94,13 @@ fn pictures_that_do_not_fit_are_refused_before_they_are_drawn() {
         let run = gs4d(&arguments!["render", &path, "--orbit", "1", "--size", size, "--out", &frames]);
         run.must_fail("smaller");
         let told = run.err.contains("GB are available") || run.err.contains(&format!("{bytes} bytes"));
-        assert!(told, "{size}: how much is needed: {}", run.err);
-        assert!(!frames.join("orbit_0000.png").exists(), "{size}: nothing is drawn");
+        assert!(told, "{size}: the error has the needed memory: {}", run.err);
+        assert!(!frames.join("orbit_0000.png").exists(), "{size}: no picture is written");
     }
 }
 
 #[test]
-fn benchmarks_measure() {
+fn bench_reports_times_and_counts() {
     if !has_gpu() {
         return;
     }
@@ -100,28 +123,28 @@ fn benchmarks_measure() {
         ["--renderer", "fast,reference", "--filter", "on,off", "--form", "stored,fp32", "--rounds", "2", "--json"];
     let json = bench(&ways).json();
     let rows = json["rows"].as_array().expect("rows");
-    assert_eq!(rows.len(), 8, "every way");
+    assert_eq!(rows.len(), 8, "every combination");
     let counts: Vec<_> = rows.iter().map(|row| &row["timings"]["counts"]).collect();
-    assert!(counts.iter().all(|found| *found == counts[0]), "the same work: {counts:?}");
+    assert!(counts.iter().all(|found| *found == counts[0]), "the same counts in every row: {counts:?}");
     assert!(rows.iter().all(|row| row["rounds"]["count"] == 2), "two rounds");
     assert!(bench(&[]).text().contains("frame, many in flight"), "a table");
     gs4d(&arguments!["bench", &path, "--adapter", "no such card"]).must_fail("no such card");
 }
 
 fn raw_picture(path: &Path, size: UVec2) -> Picture {
-    let bytes = fs::read(path).expect("the raw picture is there");
+    let bytes = fs::read(path).expect("the raw picture exists");
     assert_eq!(bytes.len(), size.x as usize * size.y as usize * 12, "height x width x 3 float32");
     let values: Vec<f32> = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
     Picture { size, pixels: values.chunks_exact(3).map(Vec3::from_slice).collect() }
 }
 
 #[test]
-fn real_captures_match_the_original() {
+fn trained_captures_match_the_original() {
     let Some(data) = data() else { return };
     if !has_gpu() {
         return;
     }
-    // 3 dB less than the worst view has; standup's pictures are of half precision.
+    // The limits are 3 dB below the worst view; the pictures of standup are of half precision.
     for (checkpoint, golden, least) in [
         ("toybox/toybox_chkpnt.pth", "toybox/golden_vanilla", 105.0),
         ("toybox/toybox_4dgs1k.pth", "toybox/golden_4dgs1k", 97.0),
@@ -133,7 +156,7 @@ fn real_captures_match_the_original() {
         let scene = data.join(checkpoint);
         gs4d(&arguments!["render", &scene, "--raw", "--cameras", &cameras, "--out", out.path()]).text();
         let views: Value =
-            serde_json::from_slice(&fs::read(&cameras).expect("the cameras are there")).expect("cameras are JSON");
+            serde_json::from_slice(&fs::read(&cameras).expect("the camera file exists")).expect("cameras are JSON");
         let truth = npz::pictures(&data.join(format!("{golden}.npz")), "images");
         let views = views["views"].as_array().expect("a list of views");
         assert_eq!(views.len(), truth.len(), "{golden}: a picture for each view");
@@ -147,7 +170,7 @@ fn real_captures_match_the_original() {
             let found = format!("{checkpoint} {}: {psnr:.2} dB, worst {worst:.1e}, {beyond} pixels", name.display());
             println!("{found}");
             assert!(psnr >= least, "{found}: {least} dB at least");
-            // Here and there a splat's alpha lies on 1/255, and counts on one side only.
+            // In some pixels an alpha is within rounding of 1/255, and is blended by one of the two only.
             assert!(worst <= 1e-2 && beyond <= 16, "{found} beyond 1e-3");
         }
     }

@@ -1,7 +1,7 @@
 //! Anti-aliasing: views with larger pixels than training had.
 //!
-//! In: a disk of many small Gaussians, drawn by the CPU reference small, and large and made smaller. Out: proof that small pictures come far
-//! closer to the truth with anti-aliasing, and that in views like those of training it changes nothing.
+//! In: a disk of many small Gaussians, drawn by the CPU reference in a small picture and in a large one that is averaged down. Out: proof that
+//! small pictures are much closer to the averages with anti-aliasing, and that views with pixels of training size do not change.
 
 use crate::support::blob::blob;
 use bevy_gs4d::gaussian::Harmonics;
@@ -11,14 +11,14 @@ use bevy_gs4d::view::{Background, Camera, Frame, RasterFov, View};
 use glam::{UVec2, Vec3};
 
 const BLACK: Background = Background::Color([0.0; 3]);
-/// Times that the side of a far picture is larger in the near one.
+/// Ratio of the side of the near picture to that of the far picture.
 const TIMES: u32 = 8;
 /// Distance of the camera, units; a near picture of 256 pixels is 0.1 of it wide.
 const DISTANCE: f32 = 40.0;
 /// Size of a pixel of the near picture, units.
 const PIXEL: f32 = 0.1 * DISTANCE / 256.0;
 
-/// Returns a disk of a radius of one unit, in rings, with gaps between its Gaussians: about a pixel of the near picture each.
+/// Returns a disk of a radius of one unit, in rings, with gaps between its Gaussians; each is about a pixel of the near picture.
 fn disk() -> RuntimeScene {
     let mut gaussians = Vec::new();
     for ring in 0..16 {
@@ -53,7 +53,7 @@ fn error(far: &Frame, near: &Frame) -> f32 {
 }
 
 #[test]
-fn far_pictures_come_closer_to_the_truth() {
+fn antialiasing_brings_far_pictures_closer_to_the_mean_of_near_ones() {
     let disk = disk();
     let near = render(&disk, &view(256), BLACK);
     let far = view(256 / TIMES);
@@ -63,7 +63,7 @@ fn far_pictures_come_closer_to_the_truth() {
 }
 
 #[test]
-fn views_like_those_of_training_stay_as_they_are() {
+fn antialiasing_does_not_change_views_with_pixels_of_training_size() {
     let disk = disk();
     for side in [256, 512] {
         let view = view(side);
@@ -71,5 +71,5 @@ fn views_like_those_of_training_stay_as_they_are() {
             [view, view.antialiased(Some(1.01 * PIXEL))].map(|view| render(&disk, &view, BLACK).picture);
         assert_eq!(plain, smooth, "{side} pixels, no larger than in training");
     }
-    assert_eq!(view(9).antialiased(None), view(9), "nothing is known of the training");
+    assert_eq!(view(9).antialiased(None), view(9), "a view stays as it is if the size of training pixels is unknown");
 }

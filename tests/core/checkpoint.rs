@@ -1,7 +1,7 @@
 //! Reading checkpoints of the original trainer.
 //!
 //! In: the checkpoints in `tests/golden/`, crafted ones and, with `GS4D_DATA` set, those of trained captures. Out:
-//! proof that they are read as the scenes that they were written from.
+//! proof that each is read as the scene that it was written from.
 
 use crate::support::data;
 use crate::support::golden;
@@ -123,25 +123,33 @@ fn unflipped_rotations_are_converted_on_request() {
 }
 
 #[test]
-fn time_blocks_never_written_mean_unflipped() {
+fn coefficients_of_time_that_are_all_zero_mean_unflipped_rotations() {
     let mut pth = Pth::rotating(3, 48);
     for sh in pth.storages[2].chunks_exact_mut(47 * 3) {
         sh[45..].fill(0.0);
     }
     let flipped = ReadOptions { rotation_convention: Some(RotationConvention::Flipped), ..ReadOptions::default() };
     let given = read_with(&pth, &flipped).expect("valid");
-    assert_eq!(given.trained_with.rotation_convention, RotationConvention::Flipped, "an option wins");
+    assert_eq!(given.trained_with.rotation_convention, RotationConvention::Flipped, "an option overrides the guess");
     let guessed = read(&pth);
-    assert_eq!(guessed.trained_with.rotation_convention, RotationConvention::Unflipped, "zeros tell");
+    assert_eq!(
+        guessed.trained_with.rotation_convention,
+        RotationConvention::Unflipped,
+        "zeros mean unflipped rotations"
+    );
     let mut expected = parameters(&given).clone();
     expected.flip_rotations();
-    assert_eq!(*parameters(&guessed), expected, "and the rotations are converted");
+    assert_eq!(*parameters(&guessed), expected, "the rotations are converted");
 
     pth.storages[2][140] = 1e-9;
-    assert_eq!(read(&pth).trained_with.rotation_convention, RotationConvention::Flipped, "one value was written");
+    assert_eq!(read(&pth).trained_with.rotation_convention, RotationConvention::Flipped, "one value is not zero");
     pth.storages[2][140] = 0.0;
     pth.slots[18] = pth::int(1);
-    assert_eq!(read(&pth).trained_with.rotation_convention, RotationConvention::Flipped, "zeros prove nothing yet");
+    assert_eq!(
+        read(&pth).trained_with.rotation_convention,
+        RotationConvention::Flipped,
+        "zeros at a low degree do not mean unflipped rotations"
+    );
 }
 
 #[test]
@@ -166,10 +174,10 @@ fn entries_beyond_the_known_ones_are_ignored() {
 }
 
 #[test]
-fn strides_and_offsets_are_honoured() {
+fn strides_and_offsets_are_respected() {
     let mut pth = Pth::rotating(2, 48);
     let mean = parameters(&read(&pth)).mean.clone();
-    // Column-major, behind five other values and before two.
+    // Column-major, after five other values and before two.
     let mut storage = vec![f32::NAN; 5];
     storage.extend((0..6).map(|i| mean[i % 2][i / 2]));
     storage.extend([9.0; 2]);
@@ -186,7 +194,7 @@ fn strides_and_offsets_are_honoured() {
 #[test]
 fn an_empty_capture_is_valid() {
     let scene = read(&Pth::rotating(0, 48));
-    assert!(scene.is_empty() && harmonics(&scene).is_consistent(0), "no Gaussian, no colour");
+    assert!(scene.is_empty() && harmonics(&scene).is_consistent(0), "no Gaussian, no color");
 }
 
 #[test]
@@ -210,7 +218,7 @@ fn degrees_and_coefficients_fit_together() {
 }
 
 #[test]
-fn options_win_over_cfg_args_over_defaults() {
+fn options_override_cfg_args_and_cfg_args_override_defaults() {
     let bytes = Pth::rotating(1, 48).bytes();
     let read =
         |options: &ReadOptions, cfg: Option<&str>| checkpoint::read(Cursor::new(&bytes), options, cfg).expect("valid");
@@ -235,18 +243,21 @@ fn options_win_over_cfg_args_over_defaults() {
     assert_eq!(scene.trained_with.prefilter_var, -1.0, "an option over cfg_args");
     assert_eq!((scene.playback.up, scene.playback.duration_seconds), (UpAxis::NegY, 10.0), "ten seconds long");
     let lines = describe(&scene.trained_with, &scene.playback);
-    assert!(lines.contains(&("background", "0.25, 0.25, 0.25".to_owned())), "what was chosen is described: {lines:?}");
+    assert!(
+        lines.contains(&("background", "0.25, 0.25, 0.25".to_owned())),
+        "the chosen background is described: {lines:?}"
+    );
 }
 
 #[test]
-fn a_still_lasts_no_time() {
+fn a_duration_of_zero_is_read() {
     let options = ReadOptions { duration_seconds: Some(0.0), ..ReadOptions::default() };
-    let scene = read_with(&Pth::rotating(1, 48), &options).expect("a duration of nothing is one");
-    assert_eq!(scene.playback.duration_seconds, 0.0, "as it was given");
+    let scene = read_with(&Pth::rotating(1, 48), &options).expect("a duration of zero is valid");
+    assert_eq!(scene.playback.duration_seconds, 0.0, "the given duration");
 }
 
 #[test]
-fn options_without_sense_are_refused() {
+fn invalid_options_are_refused() {
     let pth = Pth::rotating(1, 48);
     let none = ReadOptions::default();
     for (name, options) in [
@@ -261,7 +272,7 @@ fn options_without_sense_are_refused() {
 }
 
 #[test]
-fn cfg_args_beside_the_file_counts() {
+fn cfg_args_in_the_folder_of_the_checkpoint_is_read() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     #[cfg(unix)]
     let name = <std::ffi::OsStr as std::os::unix::ffi::OsStrExt>::from_bytes(b"chkpnt\xff30000.pth");
@@ -270,16 +281,16 @@ fn cfg_args_beside_the_file_counts() {
     let path = folder.path().join(name);
     std::fs::write(&path, Pth::rotating(1, 48).bytes()).expect("the folder can be written to");
     let background = || codec::load(&path, &ReadOptions::default()).expect("valid").trained_with.background;
-    assert_eq!(background(), [0.0; 3], "nothing beside it");
+    assert_eq!(background(), [0.0; 3], "no cfg_args in the folder");
     std::fs::write(folder.path().join("cfg_args"), "Namespace(white_background=True)").expect("can be written to");
-    assert_eq!(background(), [1.0; 3], "cfg_args beside it");
+    assert_eq!(background(), [1.0; 3], "cfg_args in the folder");
 }
 
 #[test]
-fn real_captures_load() {
+fn trained_captures_load() {
     let Some(data) = data::data() else { return };
     for file in ["toybox/toybox_chkpnt.pth", "standup/standup_chkpnt.pth"] {
-        let scene = codec::load(&data.join(file), &ReadOptions::default()).expect("a real capture");
+        let scene = codec::load(&data.join(file), &ReadOptions::default()).expect("a trained capture");
         assert_eq!((scene.len(), harmonics(&scene).coefficients), (90_000, 48), "{file}");
         assert_eq!(scene.model(), Some(Model::Rotated4d), "{file}");
         assert_eq!((harmonics(&scene).degree, harmonics(&scene).degree_t), (3, 2), "{file}");

@@ -7,22 +7,22 @@ use bevy_gs4d::gaussian::projection;
 use bevy_gs4d::reference;
 use serde_json::Value;
 
-/// The CPU reference computes in f32 as the original does: some units in the last place of a sum, and 1/255 where a decision is too close
-/// to call. The largest differences are 9e-7 of colour, 3e-6 of depth, 8e-7 of alpha.
+/// The CPU reference computes in f32 as the original does: sums differ by some units in the last place, and pixels where a decision is within
+/// rounding by 1/255. The largest differences are 9e-7 of color, 3e-6 of depth, 8e-7 of alpha.
 #[test]
-fn cpu_twin_matches_the_original() {
+fn the_cpu_reference_matches_the_original() {
     for golden in golden::all_views() {
         let frame = reference::render(&golden.scene, &golden.view, golden.background);
         let ([color, depth, alpha], ambiguous) = golden::differences(&golden, &frame);
-        println!("{:32} colour {color:.1e} depth {depth:.1e} alpha {alpha:.1e} ambiguous {ambiguous:.1e}", golden.name);
-        assert!(color <= 5e-6, "{}: colour differs by {color}", golden.name);
+        println!("{:32} color {color:.1e} depth {depth:.1e} alpha {alpha:.1e} ambiguous {ambiguous:.1e}", golden.name);
+        assert!(color <= 5e-6, "{}: color differs by {color}", golden.name);
         assert!(depth <= 2e-5, "{}: depth differs by {depth}", golden.name);
         assert!(alpha <= 5e-6, "{}: alpha differs by {alpha}", golden.name);
         assert!(ambiguous <= 1.0 / 255.0, "{}: ambiguous pixels differ by {ambiguous}", golden.name);
     }
 }
 
-/// Returns what the original has computed for each Gaussian of a view.
+/// Returns the radii, tile rectangles and visibility that the original computes for each Gaussian of a view.
 fn gaussians(golden: &GoldenView) -> Value {
     let (scene, name) = golden.name.split_once('/').expect("a scene and a view");
     let text = std::fs::read_to_string(golden::folder().join(scene).join("scene.json")).expect("scene.json");

@@ -133,7 +133,7 @@ impl Case {
         }
     }
 
-    /// Settings other than those of training.
+    /// Returns the case with settings other than those of training.
     fn with_slice_settings(self) -> Self {
         Self { slice: SliceSettings { scale_modifier: 0.8, prefilter_var: 0.02 }, ..self }
     }
@@ -182,7 +182,7 @@ impl Case {
         Some((after - before) / (high - low))
     }
 
-    /// Asserts that no decision is near: all Gaussians are blended at all pixels, with no clamp, and keep their order.
+    /// Asserts that no decision changes within a step: all Gaussians are blended at all pixels, with no clamp, and keep their order.
     fn assert_smooth(&self) {
         let scene = self.scene(&self.trained);
         let layer = Layer { scene: &scene, view: self.view, appearance: Appearance::default() };
@@ -209,7 +209,7 @@ impl Case {
 struct Kind {
     name: &'static str,
     components: usize,
-    /// Of a Gaussian and a component; `None` if the model does not have it.
+    /// Returns the value of a Gaussian and a component; `None` if the model does not have it.
     value: fn(&mut Trained, usize, usize) -> Option<&mut f32>,
     gradient: fn(&ParameterGradient, usize) -> f64,
 }
@@ -287,8 +287,8 @@ fn coefficient(trained: &mut Trained, index: usize, k: usize, channel: usize) ->
     trained.harmonics.values.get_mut(3 * (COEFFICIENTS * index + k) + channel)
 }
 
-/// Large enough that rounding in single precision does not count, small enough that curvature does not: here both are
-/// below a thousandth of the gradient.
+/// Step of the differences: the errors by rounding in single precision and by curvature are both below a thousandth of
+/// the gradient.
 const STEP: f32 = 0.01;
 
 /// Asserts that the gradients are the difference quotients, up to a hundredth of the norm of each kind.

@@ -1,6 +1,6 @@
 //! Growing a capture.
 //!
-//! In: a synthetic scene. Out: proof that the parts of a Gaussian have its mean and covariance together, and its color and opacity.
+//! In: a synthetic scene. Out: proof that the parts of a Gaussian together have its mean and covariance, and each its color and opacity.
 
 use bevy_gs4d::scene::grow::grow;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
@@ -29,7 +29,7 @@ fn parts_have_the_mean_and_the_covariance_of_the_whole() {
     let whole = trained(&scene);
     let grown = grow(&scene, whole, TIMES, 7).expect("rotations are valid");
     let parts = trained(&grown);
-    assert_eq!(grown.len(), 5 * TIMES, "as many parts as asked for");
+    assert_eq!(grown.len(), 5 * TIMES, "the requested number of parts");
     for index in 0..5 {
         let factor = whole.parameters.factor(index).expect("valid");
         let expected = factor * factor.transpose();
@@ -45,7 +45,7 @@ fn parts_have_the_mean_and_the_covariance_of_the_whole() {
             middle += offset / TIMES as f64;
             assert_eq!(parts.parameters.opacity_logit[at], whole.parameters.opacity_logit[index], "opacity");
         }
-        // In units of the Gaussian itself: a unit matrix, and no offset.
+        // In units of the Gaussian: the identity matrix, and no offset.
         let relative = inverse * sum * inverse.transpose();
         let error = (relative - DMat4::IDENTITY).to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
         assert!(error < 0.12, "Gaussian {index}: the covariance is {error} off, {expected}");
@@ -63,5 +63,5 @@ fn the_same_seed_makes_the_same_scene() {
     assert!(again(1) == again(1), "the same seed");
     assert!(again(1) != again(2), "another seed");
     let single = grow(&scene, trained(&scene), 1, 1).expect("rotations are valid");
-    assert!(single == scene, "one part is the whole");
+    assert!(single == scene, "a single part is the Gaussian itself");
 }

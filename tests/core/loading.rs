@@ -1,8 +1,8 @@
 //! Memory that loading takes.
 //!
-//! In: a synthetic package, and with `GS4D_DATA` set a real checkpoint and the package made from it. Out: proof that a capture is
-//! ready to be drawn without more than three times the size of its file having been allocated at any moment. The allocator counts for
-//! all threads of the process, so that each of these tests runs in a process of its own.
+//! In: a synthetic package, and with `GS4D_DATA` set a real checkpoint and the package made from it. Out: proof that loading a
+//! capture until it can be drawn never allocates more than three times the size of its file. The allocator counts for all threads of
+//! the process, so that each of these tests runs in its own process.
 
 use crate::support::data::data;
 use crate::support::own_process::run_alone;
@@ -25,7 +25,7 @@ static PEAK: AtomicUsize = AtomicUsize::new(0);
 static ALLOCATOR: Counting = Counting;
 
 #[expect(unsafe_code, reason = "an allocator cannot be written without")]
-// SAFETY: both functions hand the caller's promises on to `System` and return what it returns.
+// SAFETY: both functions pass the arguments to `System` under the contract of the caller and return its result.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let now = NOW.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
@@ -51,9 +51,9 @@ fn check(path: &Path) {
     let peak = PEAK.load(Ordering::Relaxed) - before;
     let factor = peak as f64 / size as f64;
     assert!(factor < 3.0, "{}: {factor:.2} times {size} bytes are allocated at the peak", path.display());
-    // The counting works: what was loaded is in memory.
+    // The count includes at least the scene itself.
     let held = scene.size();
-    assert!(held > 0 && peak >= held, "{}: the peak of {peak} bytes holds the scene's {held}", path.display());
+    assert!(held > 0 && peak >= held, "{}: the peak of {peak} bytes includes the {held} of the scene", path.display());
 }
 
 fn check_package(scene: &GaussianScene) {

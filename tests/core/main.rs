@@ -26,6 +26,8 @@ mod rings;
 mod scene_parts;
 #[cfg(feature = "offline")]
 mod score;
+#[cfg(feature = "offline")]
+mod score_formula;
 
 #[path = "../support"]
 mod support {

@@ -125,8 +125,8 @@ fn values_equal_an_independent_implementation() {
     for (value, expected) in expected {
         assert!(close(value, expected, 1e-5), "{value} instead of {expected}");
     }
-    let unlike = ssim(&a, &n).expect("same size");
-    assert!(close(unlike, 0.223360054258584, 1e-6), "{unlike}");
+    let different = ssim(&a, &n).expect("same size");
+    assert!(close(different, 0.223360054258584, 1e-6), "{different}");
 }
 
 #[test]
@@ -158,7 +158,7 @@ fn similarity_at_five_scales_equals_an_independent_implementation() {
     assert!(close(least_value, 0.9455034368401481, 1e-5), "one window at the coarsest scale: {least_value}");
     assert!(close(value(&a, &a), 1.0, 1e-12), "identical");
     let negative = Picture { size: a.size, pixels: a.pixels.iter().map(|p| Vec3::ONE - *p).collect() };
-    assert_eq!(value(&a, &negative), 0.0, "negative structure counts as 0");
+    assert_eq!(value(&a, &negative), 0.0, "negative similarity counts as 0");
     let small = blocks(MS_SSIM_MIN_SIDE, MS_SSIM_MIN_SIDE - 1);
     assert_eq!(ms_ssim(&small, &small), Ok(None), "too few pixels for five scales");
 }

@@ -1,7 +1,7 @@
 //! The package format, tested through its public functions.
 //!
 //! In: scenes made here, and packages taken apart, changed and sealed again. Out: proof that files store scenes without
-//! loss, that every damage is noticed, and that additions of a newer writer are skipped.
+//! loss, that every damage is detected, and that additions of a newer writer are skipped.
 
 use crate::support::coded_scene::coded_scene;
 use crate::support::package_parts::Parts;
@@ -16,7 +16,7 @@ use proptest::prelude::*;
 use std::io::Cursor;
 use std::sync::Arc;
 
-/// Everything about a scene of the tests but its values.
+/// The shape of a scene: counts, form and degrees, without values.
 #[derive(Debug, Clone, Copy)]
 struct Shape {
     /// The model of a trained form, or the runtime form.
@@ -167,12 +167,12 @@ fn refusal(file: &[u8]) -> PackageError {
     let inspected = inspect(file);
     assert!(
         !inspected.is_ok_and(|info| info.is_intact()) || matches!(error, PackageError::SectionBody { .. }),
-        "inspection finds it too, unless only decompressing shows it: {error}"
+        "inspection detects it too, unless only decompressing does: {error}"
     );
     error
 }
 
-/// Puts another body in place of one, with the right length and checksum.
+/// Replaces the body of a section; length and checksum in the header are right.
 fn replace_body(mut parts: Parts, index: usize, body: Vec<u8>) -> Parts {
     let old = std::mem::replace(&mut parts.bodies[index], body);
     let entry =
@@ -182,7 +182,7 @@ fn replace_body(mut parts: Parts, index: usize, body: Vec<u8>) -> Parts {
     parts.swap(&from, &to)
 }
 
-/// Puts one section of `count` rows in place of all those of a name.
+/// Replaces all sections of a name by one of `count` rows.
 fn put(mut parts: Parts, name: &str, count: usize, raw: &[u8]) -> Parts {
     let body = zstd::bulk::compress(raw, 1).expect("compressible");
     let (length, raw_length, crc32) = (body.len(), raw.len(), crc32fast::hash(&body));
@@ -224,13 +224,13 @@ proptest! {
         let scene = scene(&shape, seed);
         let file = pack(&scene);
         assert_same(&scene, &read(&file).expect("a package just written can be read"));
-        prop_assert!(inspect(&file).expect("and inspected").is_intact(), "all checksums hold");
+        prop_assert!(inspect(&file).expect("a package just written can be inspected").is_intact(), "all checksums hold");
     }
 
     #[test]
-    fn random_bytes_never_panic(mut bytes in proptest::collection::vec(any::<u8>(), 0..400), dressed: bool) {
-        if dressed {
-            // Looks like a package as far as the header's length.
+    fn random_bytes_never_panic(mut bytes in proptest::collection::vec(any::<u8>(), 0..400), with_magic: bool) {
+        if with_magic {
+            // The first 16 bytes are those of a package with a header of 40 bytes.
             bytes.splice(..bytes.len().min(4), MAGIC);
             bytes.splice(4..bytes.len().min(16), [1, 0, 0, 0, 40, 0, 0, 0, 0, 0, 0, 0]);
         }
@@ -248,8 +248,8 @@ proptest! {
         let end = parts.header.len().min(at + drop);
         parts.header.replace_range(at..end, &String::from_utf8(with).expect("ASCII"));
         let file = parts.seal();
-        // A package with a changed number may still be valid: then both ways of reading it agree.
-        prop_assert!(read(&file).is_err() || inspect(&file).is_ok_and(|info| info.is_intact()), "the two agree");
+        // A package with a changed number may still be valid: then reading and inspecting it agree.
+        prop_assert!(read(&file).is_err() || inspect(&file).is_ok_and(|info| info.is_intact()), "inspecting accepts every package that can be read");
     }
 
     #[test]
@@ -259,14 +259,14 @@ proptest! {
         let at = at.index(body.len());
         body[at] ^= with;
         match read(&replace_body(parts, section, body).seal()) {
-            Ok(scene) => prop_assert_eq!(scene.len(), SMALL.count, "still as many Gaussians"),
+            Ok(scene) => prop_assert_eq!(scene.len(), SMALL.count, "the number of Gaussians is unchanged"),
             Err(error) => prop_assert!(matches!(error, PackageError::SectionBody { .. }), "{error}"),
         }
     }
 }
 
 #[test]
-fn long_scenes_survive_in_several_sections() {
+fn long_scenes_are_split_into_sections_and_read_without_loss() {
     for (model, count) in [(None, 70_000), (Some(Model::Rotated4d), 16_384), (Some(Model::Static3d), 16_385)] {
         let shape = Shape { model, count, coefficients: 5, degrees: (1, 0), environment: Some((151, 77)) };
         let scene = scene(&shape, 3);
@@ -274,21 +274,21 @@ fn long_scenes_survive_in_several_sections() {
         assert_same(&scene, &read(&file).expect("readable"));
         let info = inspect(&file).expect("readable");
         let means = info.header.sections.iter().filter(|s| s.name == "mean").count();
-        assert_eq!(means, count.div_ceil(16_384), "runs of at most 16384 Gaussians");
+        assert_eq!(means, count.div_ceil(16_384), "sections of at most 16384 Gaussians");
     }
 }
 
 #[test]
-fn geometry_comes_before_colour_and_surroundings() {
+fn geometry_comes_before_color_and_the_environment_map() {
     let info = inspect(&pack(&scene(&Shape { environment: Some((2, 1)), ..SMALL }, 4))).expect("readable");
     let names: Vec<_> = info.header.sections.iter().map(|s| s.name.as_str()).collect();
     let geometry = ["mean", "mean_t", "log_scale", "log_scale_t", "rotation_l", "rotation_r", "opacity_logit"];
     assert_eq!(names[..7], geometry, "geometry first");
-    assert_eq!(names[7..], ["sh_dc", "sh_rest", "environment"], "then colour, then parameters");
+    assert_eq!(names[7..], ["sh_dc", "sh_rest", "environment"], "then color, then the environment map");
 }
 
 #[test]
-fn an_empty_scene_survives() {
+fn an_empty_scene_is_read_without_loss() {
     for model in [None, Some(Model::Static3d)] {
         let scene = scene(&Shape { model, count: 0, environment: Some((1, 1)), ..SMALL }, 5);
         assert_same(&scene, &read(&pack(&scene)).expect("readable"));
@@ -302,20 +302,20 @@ fn the_same_scene_gives_the_same_bytes() {
 }
 
 #[test]
-fn every_flipped_bit_is_noticed() {
+fn every_flipped_bit_is_detected() {
     let mut file = pack(&scene(&Shape { model: None, environment: Some((1, 1)), ..SMALL }, 7));
     for bit in 0..file.len() * 8 {
         file[bit / 8] ^= 1 << (bit % 8);
         assert!(read(&file).is_err(), "bit {} of byte {} while reading", bit % 8, bit / 8);
-        let noticed = !inspect(&file).is_ok_and(|info| info.is_intact());
-        assert!(noticed, "bit {} of byte {} while inspecting", bit % 8, bit / 8);
+        let detected = !inspect(&file).is_ok_and(|info| info.is_intact());
+        assert!(detected, "bit {} of byte {} while inspecting", bit % 8, bit / 8);
         file[bit / 8] ^= 1 << (bit % 8);
     }
-    assert!(read(&file).is_ok(), "all bits are back in place");
+    assert!(read(&file).is_ok(), "the unchanged file is read");
 }
 
 #[test]
-fn truncation_at_every_length_is_noticed() {
+fn truncation_at_every_length_is_detected() {
     let file = pack(&scene(&SMALL, 8));
     for length in 0..file.len() {
         let error = refusal(&file[..length]);
@@ -329,7 +329,7 @@ fn truncation_at_every_length_is_noticed() {
 }
 
 #[test]
-fn trailing_bytes_are_noticed() {
+fn trailing_bytes_are_detected() {
     let mut file = pack(&scene(&SMALL, 9));
     file.push(0);
     assert!(matches!(refusal(&file), PackageError::TrailingBytes { count: 1 }), "one byte too many");
@@ -342,12 +342,12 @@ fn damaged_sections_are_named() {
     let last = file.len() - 1;
     file[last] ^= 0x10;
     assert!(matches!(refusal(&file), PackageError::SectionChecksum { name } if name == "sh_rest"), "the last section");
-    let info = inspect(&file).expect("the header is whole");
-    assert_eq!(info.damaged, [info.header.sections.len() - 1], "the last section alone");
+    let info = inspect(&file).expect("the header is intact");
+    assert_eq!(info.damaged, [info.header.sections.len() - 1], "only the last section is damaged");
 }
 
 #[test]
-fn what_a_newer_writer_adds_is_skipped() {
+fn additions_of_a_newer_writer_are_skipped() {
     let scene = scene(&SMALL, 11);
     let field = "mood: bright(hue: Some((0.5, -1e-3)), tags: [\"a\", 'b'], more: {1: inf}),";
     // The checksum is that of "123456789" in every CRC-32 table.
@@ -360,15 +360,18 @@ fn what_a_newer_writer_adds_is_skipped() {
     let mut file = parts.seal();
     assert_same(&scene, &read(&file).expect("unknown fields and sections are skipped"));
     let info = inspect(&file).expect("readable");
-    assert!(info.is_intact() && info.header.sections[7].name == "masks", "the unknown section is listed and whole");
+    assert!(info.is_intact() && info.header.sections[7].name == "masks", "the unknown section is listed and intact");
 
-    let at = file.windows(9).position(|w| w == b"123456789").expect("the body is there");
+    let at = file.windows(9).position(|w| w == b"123456789").expect("the body is in the file");
     file[at] ^= 1;
-    assert!(matches!(refusal(&file), PackageError::SectionChecksum { name } if name == "masks"), "and is verified");
+    assert!(
+        matches!(refusal(&file), PackageError::SectionChecksum { name } if name == "masks"),
+        "the checksum of the unknown section is verified"
+    );
 }
 
 #[test]
-fn what_is_too_new_is_refused_by_name() {
+fn unknown_versions_features_and_encodings_are_refused_by_name() {
     let file = pack(&scene(&SMALL, 12));
     let mut newer = file.clone();
     newer[4] = 2;
@@ -418,7 +421,7 @@ fn huge_numbers_are_refused_before_anything_is_allocated() {
 }
 
 #[test]
-fn bombs_are_refused() {
+fn decompression_bombs_are_refused() {
     let parts = Parts::of(&pack(&scene(&SMALL, 14)));
     for length in [35, 37, 100_000_000] {
         let bomb = zstd::bulk::compress(&vec![0; length], 3).expect("compressible");
@@ -427,22 +430,25 @@ fn bombs_are_refused() {
     }
     let gaussians = vec![Gaussian::zeroed(); 3_000_000];
     let harmonics = Harmonics { coefficients: 1, values: vec![0.0; 9_000_000], ..Harmonics::default() };
-    let all_alike = SceneForm::Ready(Form::Sliced(Sliced { gaussians, harmonics }));
-    let vast = GaussianScene { form: all_alike, ..scene(&SMALL, 15) };
-    let error = package::write(Vec::new(), &vast, &WriteSettings { level: 1 }).expect_err("nobody could read it");
-    assert!(matches!(error, PackageError::TooLarge { .. }), "what reads as a bomb is not written: {error}");
+    let identical = SceneForm::Ready(Form::Sliced(Sliced { gaussians, harmonics }));
+    let vast = GaussianScene { form: identical, ..scene(&SMALL, 15) };
+    let error = package::write(Vec::new(), &vast, &WriteSettings { level: 1 }).expect_err("readers would refuse it");
+    assert!(
+        matches!(error, PackageError::TooLarge { .. }),
+        "a package that readers refuse as a bomb is not written: {error}"
+    );
 }
 
 #[test]
-fn a_section_counts_beside_the_scene_it_is_unpacked_into() {
+fn the_memory_limit_counts_a_section_and_the_scene_together() {
     let count = 90_000;
     let harmonics = Harmonics { coefficients: 48, values: vec![0.0; count * 144], ..Harmonics::default() };
     let sliced = Sliced { gaussians: vec![Gaussian::zeroed(); count], harmonics };
     let scene = GaussianScene { form: SceneForm::Ready(Form::Sliced(sliced)), ..scene(&SMALL, 19) };
     let mut file = Vec::new();
-    package::write(&mut file, &scene, &WriteSettings { level: 1 }).expect("in small sections it fits");
-    assert_eq!(read(&file).expect("and can be read").len(), count, "every Gaussian");
-    // All in one section, which would be in memory twice.
+    package::write(&mut file, &scene, &WriteSettings { level: 1 }).expect("small sections are within the limit");
+    assert_eq!(read(&file).expect("it can be read").len(), count, "every Gaussian");
+    // One section with all coefficients would be in memory twice.
     let error = refusal(&put(Parts::of(&file), "sh_rest", count, &vec![0; count * 47 * 12]).seal());
     assert!(matches!(error, PackageError::TooLarge { .. }), "{error}");
 }
@@ -453,14 +459,14 @@ fn too_many_sections_are_refused() {
     let nothing = "(name: \"x\", encoding: \"y\", first: 0, count: 0, length: 0, raw_length: 0, crc32: 0),\n";
     parts.bodies.splice(0..0, vec![Vec::new(); 1 << 16]);
     let file = parts.swap("sections: [\n", &format!("sections: [\n{}", nothing.repeat(1 << 16))).seal();
-    assert!(matches!(refusal(&file), PackageError::TooManySections { .. }), "one more than any scene needs");
+    assert!(matches!(refusal(&file), PackageError::TooManySections { .. }), "more sections than any scene needs");
 }
 
 #[test]
 fn codebooks_have_the_coefficients_of_their_degrees() {
     let scene = GaussianScene::from(coded_scene(40, 3, 0));
     let parts = Parts::of(&pack(&scene));
-    assert!(read(&parts.seal()).expect("as it was written") == scene, "the same scene");
+    assert!(read(&parts.seal()).expect("the unchanged package") == scene, "the same scene");
     // Seventeen coefficients for sixteen, in sections of the right length: thirteen words in place of twelve.
     let parts = parts.swap("coefficients: 16", "coefficients: 17");
     let parts = put(parts, "codebooks", 10, &[0; 10 * 13 * 4]);
@@ -482,20 +488,21 @@ fn codebooks_have_no_more_entries_than_codes() {
 fn environment_maps_are_finite() {
     let scene = scene(&Shape { environment: Some((2, 3)), ..SMALL }, 21);
     let file = put(Parts::of(&pack(&scene)), "environment", 18, &[0xff; 72]).seal();
-    let message = read(&file).expect_err("not a number, eighteen times").to_string();
+    let message = read(&file).expect_err("texels of NaN").to_string();
     assert!(message.contains("environment"), "{message}");
     let mut bad = scene;
     bad.environment.as_mut().expect("a map").texels[4] = f32::INFINITY;
-    let error = package::write(Vec::new(), &bad, &WriteSettings::default()).expect_err("nor is such a map written");
+    let error = package::write(Vec::new(), &bad, &WriteSettings::default())
+        .expect_err("a map that is not finite is not written");
     assert!(matches!(error, PackageError::Inconsistent(_)), "{error}");
 }
 
 #[test]
-fn a_still_lasts_no_time() {
+fn a_duration_of_zero_is_read_without_loss() {
     let mut still = scene(&SMALL, 22);
     still.playback.duration_seconds = 0.0;
     let read = read(&pack(&still)).expect("a package just written can be read");
-    assert_eq!(read.playback.duration_seconds, 0.0, "as it was written");
+    assert_eq!(read.playback.duration_seconds, 0.0, "the written duration");
 }
 
 #[test]
@@ -513,12 +520,12 @@ fn names_from_the_file_are_shown_escaped() {
     ];
     for parts in files {
         let message = read(&parts.seal()).expect_err("must be refused").to_string();
-        assert!(!message.contains(['\u{1b}', '\n']), "nothing that a terminal obeys: {message:?}");
+        assert!(!message.contains(['\u{1b}', '\n']), "no control characters: {message:?}");
     }
 }
 
 #[test]
-fn sections_must_hold_every_gaussian_once() {
+fn sections_must_contain_every_gaussian_once() {
     let parts = Parts::of(&pack(&scene(&SMALL, 16)));
     let error = refusal(&parts.clone().swap("name: \"mean_t\"", "name: \"mean_x\"").seal());
     assert!(matches!(&error, PackageError::MissingSection { name } if name == "mean_t"), "{error}");
@@ -529,7 +536,7 @@ fn sections_must_hold_every_gaussian_once() {
 }
 
 #[test]
-fn senseless_switches_are_refused() {
+fn invalid_training_settings_are_refused() {
     let parts = Parts::of(&pack(&scene(&SMALL, 17)));
     for (from, to) in [
         ("time_interval: (-0.1, 2.7)", "time_interval: (2.7, 2.7)"),
@@ -555,7 +562,7 @@ fn senseless_switches_are_refused() {
 }
 
 #[test]
-fn scenes_that_contradict_themselves_are_not_written() {
+fn inconsistent_scenes_are_not_written() {
     let good = scene(&SMALL, 18);
     let SceneForm::Trained(Trained { parameters, harmonics }) = good.form.clone() else { panic!("a trained form") };
     let short = Parameters { log_scale: Vec::new(), ..parameters.clone() };
@@ -590,7 +597,7 @@ fn detailed() -> GaussianScene {
 }
 
 #[test]
-fn levels_of_detail_survive_the_round_trip() {
+fn levels_of_detail_are_read_without_loss() {
     let scene = detailed();
     let file = pack(&scene);
     let again = read(&file).expect("readable");
@@ -601,16 +608,16 @@ fn levels_of_detail_survive_the_round_trip() {
         let [a, b] = [a, b].map(|level| GaussianScene::from(level.scene.as_ref().clone()));
         assert_same(&a, &b);
     }
-    assert!(file == pack(&again), "and the same file");
+    assert!(file == pack(&again), "writing them again gives the same file");
     let info = inspect(&file).expect("readable");
     assert_eq!(info.header.sections.iter().filter(|section| section.name == "level").count(), 2, "a section each");
-    assert!(info.header.requires.is_empty(), "readers that know of no levels show the rest");
+    assert!(info.header.requires.is_empty(), "readers without levels of detail can read the scene");
 }
 
 #[test]
-fn a_reader_that_knows_no_levels_skips_them() {
+fn readers_without_levels_of_detail_skip_them() {
     let mut parts = Parts::of(&pack(&detailed()));
-    // As an older reader sees it: unknown sections, unknown fields.
+    // To an older reader, sections and fields of levels are unknown.
     while parts.header.contains("\"level\"") {
         parts = parts.swap("\"level\"", "\"later\"");
     }
@@ -633,7 +640,7 @@ fn damaged_levels_are_refused() {
         parts.bodies[last] = body;
         parts.swap(&old, &new).seal()
     };
-    assert!(read(&with_level(good.bodies[last].clone())).is_ok(), "the level that is replaced below");
+    assert!(read(&with_level(good.bodies[last].clone())).is_ok(), "the level that the cases below replace");
     let nested = pack(&GaussianScene::from(RuntimeScene {
         levels: vec![detailed().levels[1].clone()],
         ..detailed().levels[0].scene.as_ref().clone()

@@ -1,7 +1,7 @@
 //! Picking: the Gaussian that a ray hits.
 //!
 //! In: Gaussians placed by hand, and a column of them with its render by the CPU reference. Out: proof that a ray hits the Gaussian that
-//! it should, where it should, and respects what is set.
+//! it should, where it should, and respects the settings.
 
 use bevy_gs4d::gaussian::alpha::alpha_at;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
@@ -25,7 +25,7 @@ fn still(mean: Vec3, covariance: [f32; 6], opacity: f32) -> Gaussian {
     }
 }
 
-/// Returns a round one on the z axis.
+/// Returns a round Gaussian on the z axis.
 fn ball(z: f32, opacity: f32) -> Gaussian {
     still(Vec3::new(0.0, 0.0, z), [0.01, 0.0, 0.0, 0.01, 0.0, 0.01], opacity)
 }
@@ -51,87 +51,98 @@ fn a_ray_hits_a_gaussian_where_it_is_densest() {
     assert_eq!(
         pick,
         Pick { gaussian: 0, distance: 2.5, point: Vec3::new(0.0, 0.0, 5.0) },
-        "in the direction's lengths"
+        "the distance is in lengths of the direction"
     );
-    let beside = scene.pick(Vec3::new(0.05, 0.0, 0.0), Vec3::Z, &PickSettings::default()).expect("near the middle");
-    assert!((beside.distance - 5.0).abs() < 1e-5, "a round one is densest beside its mean, not at {}", beside.distance);
+    let offset = scene.pick(Vec3::new(0.05, 0.0, 0.0), Vec3::Z, &PickSettings::default()).expect("near the middle");
+    assert!(
+        (offset.distance - 5.0).abs() < 1e-5,
+        "a round Gaussian is densest at the depth of its mean, not at {}",
+        offset.distance
+    );
 }
 
 #[test]
-fn rays_that_hit_nothing_say_so() {
+fn rays_that_hit_no_gaussian_return_none() {
     let scene = scene(&[ball(5.0, 0.9)]);
     let misses = [
-        (Vec3::new(1.0, 0.0, 0.0), Vec3::Z, "beside"),
-        (Vec3::ZERO, Vec3::NEG_Z, "the other way"),
-        (Vec3::new(0.0, 0.0, 5.01), Vec3::Z, "from just behind its middle"),
+        (Vec3::new(1.0, 0.0, 0.0), Vec3::Z, "a parallel ray"),
+        (Vec3::ZERO, Vec3::NEG_Z, "the opposite direction"),
+        (Vec3::new(0.0, 0.0, 5.01), Vec3::Z, "an origin just behind the center"),
         (Vec3::ZERO, Vec3::ZERO, "no direction"),
-        (Vec3::ZERO, Vec3::NAN, "no number for a direction"),
-        (Vec3::new(f32::INFINITY, 0.0, 0.0), Vec3::Z, "from nowhere"),
+        (Vec3::ZERO, Vec3::NAN, "a direction of NaN"),
+        (Vec3::new(f32::INFINITY, 0.0, 0.0), Vec3::Z, "an infinite origin"),
     ];
     for (origin, direction, what) in misses {
         assert_eq!(scene.pick(origin, direction, &PickSettings::default()), None, "{what}");
     }
     assert_eq!(hit(&[]), None, "an empty scene");
-    assert_eq!(hit(&[ball(5.0, 0.49)]), None, "too faint to be hit");
+    assert_eq!(hit(&[ball(5.0, 0.49)]), None, "an opacity below the threshold");
 }
 
 #[test]
-fn the_first_that_leaves_less_than_half_is_hit() {
-    assert_eq!(hit(&[ball(7.0, 0.9), ball(5.0, 0.9)]), Some((1, 5.0)), "the one in front, whatever its index");
+fn the_gaussian_that_lowers_transmittance_below_one_half_is_hit() {
+    assert_eq!(hit(&[ball(7.0, 0.9), ball(5.0, 0.9)]), Some((1, 5.0)), "the Gaussian in front, whatever its index");
     assert_eq!(hit(&[ball(7.0, 0.9), ball(5.0, 0.4)]), Some((0, 7.0)), "through a faint one");
     assert_eq!(hit(&[ball(7.0, 0.3), ball(5.0, 0.3), ball(6.0, 0.3)]), Some((2, 6.0)), "the second leaves 0.49 of 1");
     let settings = PickSettings { threshold: 0.05, ..PickSettings::default() };
     let first = pick(&[ball(7.0, 0.9), ball(5.0, 0.1)], &settings).map(|pick| pick.gaussian);
-    assert_eq!(first, Some(1), "with a lower threshold, the faint one");
-    assert_eq!(hit(&[ball(5.0, 0.9), ball(5.0, 0.9)]), Some((0, 5.0)), "equal ones keep their order");
+    assert_eq!(first, Some(1), "with a lower threshold the faint Gaussian is hit");
+    assert_eq!(hit(&[ball(5.0, 0.9), ball(5.0, 0.9)]), Some((0, 5.0)), "Gaussians at the same depth keep their order");
 }
 
 #[test]
-fn what_is_set_is_respected() {
+fn settings_of_a_pick_are_respected() {
     let pair = [ball(5.0, 0.9), ball(7.0, 0.9)];
     let hit = |settings: PickSettings| pick(&pair, &settings).map(|pick| pick.gaussian);
     let base = PickSettings::default();
     assert_eq!(hit(PickSettings { max_distance: 4.0, ..base }), None, "both are farther");
-    assert_eq!(hit(PickSettings { opacity: 0.5, ..base }), Some(1), "half as opaque, both are needed");
+    assert_eq!(
+        hit(PickSettings { opacity: 0.5, ..base }),
+        Some(1),
+        "at half the opacity, both together are hit at the second"
+    );
     assert_eq!(hit(PickSettings { opacity: 0.0, ..base }), None, "faded out");
     let far = Affine3A::from_scale_rotation_translation(Vec3::ONE, Quat::IDENTITY, Vec3::new(0.0, 0.0, 7.5));
     assert_eq!(hit(PickSettings { crop: Some(far.inverse()), ..base }), Some(1), "the first is cropped");
     let nowhere = Affine3A::from_scale(Vec3::NAN);
-    assert_eq!(hit(PickSettings { crop: Some(nowhere), ..base }), None, "no box holds nothing");
-    assert_eq!(hit(PickSettings { time: f32::NAN, ..base }), None, "at no time nothing is there");
+    assert_eq!(hit(PickSettings { crop: Some(nowhere), ..base }), None, "a crop box of NaN contains no Gaussian");
+    assert_eq!(hit(PickSettings { time: f32::NAN, ..base }), None, "a time of NaN");
 }
 
 #[test]
 fn a_moving_gaussian_is_hit_where_it_is() {
     let mover = Gaussian { velocity: [0.0, 0.0, 4.0], sigma_t: 0.3, ..ball(5.0, 0.9) };
     let distance = |time| pick(&[mover], &PickSettings { time, ..PickSettings::default() }).map(|pick| pick.distance);
-    assert_eq!(distance(0.5), Some(5.0), "at its own time");
+    assert_eq!(distance(0.5), Some(5.0), "at its temporal mean");
     assert_eq!(distance(0.75), Some(6.0), "a quarter later");
-    assert_eq!(distance(0.1), None, "its marginal of 0.41 leaves too little of it");
+    assert_eq!(distance(0.1), None, "a marginal of 0.41 makes it too faint");
     let crosser = Gaussian { velocity: [4.0, 0.0, 0.0], sigma_t: f32::INFINITY, ..ball(5.0, 0.9) };
     let hits = |time| pick(&[crosser], &PickSettings { time, ..PickSettings::default() }).is_some();
     assert!(hits(0.5) && !hits(0.75), "it has moved out of the ray");
     let opaque = Gaussian { sigma_t: 0.1, opacity: 1.0, ..mover };
     let settings = PickSettings { threshold: 0.04, ..PickSettings::default() };
     let there = |time| pick(&[opaque], &PickSettings { time, ..settings }).is_some();
-    assert!(there(0.5 + 0.244) && !there(0.5 + 0.246), "a marginal of 0.05 is not there, though 0.04 would do");
+    assert!(
+        there(0.5 + 0.244) && !there(0.5 + 0.246),
+        "a Gaussian with a marginal of at most 0.05 is absent, even with a threshold of 0.04"
+    );
 }
 
 #[test]
-fn the_filter_is_respected() {
+fn gaussians_that_the_filter_leaves_out_are_not_hit() {
     let mut scene = scene(&[ball(5.0, 0.9), ball(7.0, 0.9)]);
-    // In the first half of the time both, then only the second.
+    // Both are active in the first half of the time interval, only the second one after it.
     scene.filter = Some(TemporalFilter::from_bits(FilterKind::Support, 2, 2, vec![0b11, 0b10]));
     let hit = |time, use_filter| {
         let settings = PickSettings { time, use_filter, ..PickSettings::default() };
         scene.pick(Vec3::ZERO, Vec3::Z, &settings).map(|pick| pick.gaussian)
     };
-    assert_eq!((hit(0.25, true), hit(0.75, true)), (Some(0), Some(1)), "what is not active is not there");
+    assert_eq!((hit(0.25, true), hit(0.75, true)), (Some(0), Some(1)), "inactive Gaussians are not hit");
     assert_eq!(hit(0.75, false), Some(0), "unless the filter is not used");
 }
 
 #[test]
-fn what_is_absent_is_not_even_decoded() {
+fn absent_gaussians_are_not_decoded() {
     let brief = |z, mean_t| Gaussian { mean_t, sigma_t: 0.01 * z, ..ball(z, 0.9) };
     let gaussians = [brief(5.0, 0.3), brief(7.0, 0.4)];
     let bits = Bits {
@@ -152,10 +163,10 @@ fn what_is_absent_is_not_even_decoded() {
         let settings = PickSettings { time, ..PickSettings::default() };
         scene.pick(Vec3::ZERO, Vec3::Z, &settings).map(|pick| pick.gaussian)
     };
-    assert_eq!((pick(&packed, 0.3), pick(&packed, 0.9)), (Some(0), None), "there, and long gone");
+    assert_eq!((pick(&packed, 0.3), pick(&packed, 0.9)), (Some(0), None), "present at its temporal mean, absent later");
     // Without the ranges of its block a Gaussian cannot be decoded.
     packed.ranges.truncate(SHARED_RANGES);
-    assert_eq!(pick(&packed, 0.9), None, "its time alone says that it is not there");
+    assert_eq!(pick(&packed, 0.9), None, "its temporal mean and deviation are enough to know that it is absent");
 }
 
 #[test]
@@ -168,23 +179,23 @@ fn flat_gaussians_are_hit() {
     assert!((slanted.point.z - 5.0).abs() < 1e-4, "on the disc, not at {}", slanted.point);
     let edge = pick(Vec3::new(-3.0, 0.0, 5.0), Vec3::X).expect("exactly from its edge");
     assert!((edge.distance - 3.0).abs() < 1e-4, "at its middle, not at {}", edge.distance);
-    assert_eq!(pick(Vec3::new(-3.0, 0.0, 5.002), Vec3::X), None, "a hundredth of its width above, there is nothing");
+    assert_eq!(pick(Vec3::new(-3.0, 0.0, 5.002), Vec3::X), None, "a ray a hundredth of its width above misses");
     let needle = still(Vec3::new(0.0, 0.0, 5.0), [0.0, 0.0, 0.0, 0.0, 0.0, 0.04], 0.9);
     assert_eq!(hit(&[needle]), Some((0, 5.0)), "a needle, exactly from its tip");
     assert_eq!(hit(&[still(Vec3::new(0.0, 0.0, 5.0), [0.0; 6], 0.9)]), None, "a point has no extent");
 }
 
 #[test]
-fn what_is_no_covariance_or_no_number_is_not_hit() {
+fn gaussians_with_an_invalid_covariance_or_mean_are_not_hit() {
     let good = ball(7.0, 0.9);
     for covariance in
         [[f32::NAN; 6], [f32::INFINITY; 6], [-0.01, 0.0, 0.0, -0.01, 0.0, -0.01], [0.01, 0.05, 0.0, 0.01, 0.0, 0.01]]
     {
         let bad = Gaussian { covariance, ..ball(5.0, 0.9) };
-        assert_eq!(hit(&[bad, good]), Some((1, 7.0)), "{covariance:?} is passed");
+        assert_eq!(hit(&[bad, good]), Some((1, 7.0)), "{covariance:?} is skipped");
     }
     let nowhere = Gaussian { mean: [f32::NAN; 3], ..ball(5.0, 0.9) };
-    assert_eq!(hit(&[nowhere, good]), Some((1, 7.0)), "a mean that is no number is passed");
+    assert_eq!(hit(&[nowhere, good]), Some((1, 7.0)), "a mean of NaN is skipped");
 }
 
 /// Returns ten Gaussians one behind the other, of about the same size on the screen, spread over it.
@@ -212,8 +223,8 @@ fn is_close(splats: &[Splat], x: u32, y: u32) -> bool {
 }
 
 /// Splats are affine approximations and have a low-pass, so that their alphas are not exactly those along the ray: for
-/// this scene, transmittances are up to 0.032 apart. Pixels where one of them is within 0.04 of one half could go
-/// either way and are not compared; at all others both must hit the same Gaussian. Depths are those of different points
+/// this scene, transmittances are up to 0.032 apart. Pixels where a transmittance is within 0.04 of one half are
+/// not compared; at all other pixels both must hit the same Gaussian. Depths are those of different points
 /// (the splat's mean, the densest point).
 #[test]
 fn the_median_of_the_reference_render_is_hit() {
@@ -238,5 +249,5 @@ fn the_median_of_the_reference_render_is_hit() {
         }
         compared += 1;
     }
-    assert!(compared > 900 && hits > 400, "a test of {compared} pixels with {hits} hits says little");
+    assert!(compared > 900 && hits > 400, "{compared} pixels are compared, {hits} of them hit a Gaussian");
 }

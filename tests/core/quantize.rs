@@ -37,7 +37,7 @@ fn order(scene: &RuntimeScene) -> Vec<u32> {
 }
 
 /// Returns each Gaussian of the scene with its packed form, matched by Morton order.
-fn beside(scene: &RuntimeScene, packed: &RuntimeScene) -> Vec<(Gaussian, Gaussian)> {
+fn matched(scene: &RuntimeScene, packed: &RuntimeScene) -> Vec<(Gaussian, Gaussian)> {
     let order = order(scene);
     order.iter().enumerate().map(|(to, &from)| (scene.gaussian(from as usize), packed.gaussian(to))).collect()
 }
@@ -63,17 +63,17 @@ fn every_attribute_stays_within_its_step() {
         let (packed, _) = compress(scene.clone(), &settings).expect("it is compressed");
         let packed = packed.into_runtime().expect("it can be drawn");
         let step = |bits: u32, range: f32| 0.51 * range / ((1u32 << bits) - 1) as f32 + 2e-6 * range.max(1.0);
-        for (a, b) in beside(&scene, &packed) {
+        for (a, b) in matched(&scene, &packed) {
             for axis in 0..3 {
                 assert!((a.mean[axis] - b.mean[axis]).abs() <= step(bits.mean, 2.4), "mean {a:?} {b:?}");
             }
             assert!((a.mean_t - b.mean_t).abs() <= step(bits.mean_t, 1.2), "temporal mean {a:?} {b:?}");
             assert!((a.opacity - b.opacity).abs() <= step(bits.opacity, 1.0), "opacity {a:?} {b:?}");
-            assert_eq!(a.sigma_t.is_finite(), b.sigma_t.is_finite(), "always there or not");
+            assert_eq!(a.sigma_t.is_finite(), b.sigma_t.is_finite(), "present at every time in both or in neither");
             if a.sigma_t.is_finite() {
                 assert!((a.sigma_t.ln() - b.sigma_t.ln()).abs() <= step(bits.sigma_t, 5.0), "deviation {a:?} {b:?}");
             } else {
-                assert_eq!(b.velocity, [0.0; 3], "at rest");
+                assert_eq!(b.velocity, [0.0; 3], "no velocity");
             }
             let size = a.covariance[0] + a.covariance[3] + a.covariance[5];
             let apart = a.covariance.iter().zip(b.covariance).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
@@ -84,7 +84,7 @@ fn every_attribute_stays_within_its_step() {
 }
 
 #[test]
-fn roundings_are_what_compression_changes_of_each_gaussian() {
+fn roundings_are_the_changes_of_each_gaussian_by_compression() {
     let (scene, settings) = (scene(2_000, 0, 0), settings(&[]));
     let gaussians = &scene.form.as_sliced().expect("sliced").gaussians;
     let bits = settings.geometry.expect("it has bits");
@@ -103,12 +103,12 @@ fn roundings_are_what_compression_changes_of_each_gaussian() {
 }
 
 #[test]
-fn temporal_means_far_from_the_interval_cost_no_other_gaussian_its_place() {
+fn temporal_means_far_from_the_interval_do_not_lower_the_precision_of_other_gaussians() {
     let mut scene = RuntimeScene { filter: None, ..scene(4_000, 0, 0) };
     let Form::Sliced(sliced) = &mut scene.form else { panic!("sliced") };
     for (index, gaussian) in sliced.gaussians.iter_mut().enumerate() {
         match index % 10 {
-            // Is there for long, and moves: at the same places as before.
+            // A long lifespan with motion: the same positions within the interval.
             0 => {
                 let away = [-250.0, 90.0, 400.0][index / 10 % 3];
                 for (mean, velocity) in gaussian.mean.iter_mut().zip(gaussian.velocity) {
@@ -116,7 +116,7 @@ fn temporal_means_far_from_the_interval_cost_no_other_gaussian_its_place() {
                 }
                 (gaussian.mean_t, gaussian.sigma_t) = (away, 300.0);
             }
-            // Is never there.
+            // Absent during the whole interval.
             1 => (gaussian.mean_t, gaussian.sigma_t) = (1e30, 0.1),
             _ => {}
         }
@@ -125,12 +125,12 @@ fn temporal_means_far_from_the_interval_cost_no_other_gaussian_its_place() {
     let packed = packed.into_runtime().expect("it can be drawn");
     for time in [0.1, 0.5, 0.9] {
         let found = psnr(&scene, &packed, &view(time));
-        assert!(found >= 47.0, "as geometry of balanced quality is otherwise: {found:.1} dB at {time}");
+        assert!(found >= 47.0, "the PSNR of balanced geometry: {found:.1} dB at {time}");
     }
 }
 
 #[test]
-fn pictures_survive() {
+fn compression_keeps_pictures_within_the_promised_psnr() {
     let scene = scene(20_000, 1, 0);
     let lowest = |settings: &CompressSettings| {
         let (packed, _) = compress(scene.clone(), settings).expect("it is compressed");
@@ -138,22 +138,22 @@ fn pictures_survive() {
         [0.05, 0.4, 0.9].map(|time| psnr(&scene, &packed, &view(time))).into_iter().fold(f64::INFINITY, f64::min)
     };
     let geometry = lowest(&settings(&[]));
-    assert!(geometry >= 47.0, "balanced geometry, whole colours: {geometry:.1} dB");
+    assert!(geometry >= 47.0, "balanced geometry, colors without codebooks: {geometry:.1} dB");
     let balanced = lowest(&CompressSettings::from(Quality::Balanced));
     assert!(balanced >= 44.0 && balanced >= geometry - 4.0, "balanced: {balanced:.1} dB, geometry alone {geometry:.1}");
     let exact = lowest(&CompressSettings::from(Quality::VisuallyLossless));
     assert!(exact >= 55.0, "visually lossless: {exact:.1} dB");
     let coded = [&[256][..], &[256, 256], &[256, 256, 256]].map(|codebooks| lowest(&settings(codebooks)));
-    assert!(coded.is_sorted(), "each codebook brings colours closer, random ones too: {coded:.1?} dB");
-    assert!(balanced > coded[2], "the quality's own codebooks are better: {balanced:.1} and {coded:.1?} dB");
+    assert!(coded.is_sorted(), "each further codebook raises the PSNR, even of random colors: {coded:.1?} dB");
+    assert!(balanced > coded[2], "the codebooks of the quality are better: {balanced:.1} and {coded:.1?} dB");
     let (_, report) = compress(scene.clone(), &settings(&[256, 256])).expect("it is compressed");
     assert!(report.memory_after < report.memory_before / 2, "half the memory or less: {report:?}");
 }
 
 #[test]
-fn the_filter_moves_with_its_gaussians() {
+fn the_filter_follows_the_order_of_the_gaussians() {
     let mut scene = scene(2_000, 0, 0);
-    // A support filter would be computed anew.
+    // A support filter would be computed again.
     scene.filter = scene.filter.map(|filter| TemporalFilter { kind: FilterKind::KeyFrame, ..filter });
     let (packed, _) = compress(scene.clone(), &settings(&[])).expect("it is compressed");
     let order = order(&scene);
@@ -166,21 +166,21 @@ fn the_filter_moves_with_its_gaussians() {
 }
 
 #[test]
-fn a_support_filter_still_changes_no_picture() {
+fn a_support_filter_of_a_packed_scene_changes_no_picture() {
     let (packed, _) = compress(scene(3_000, 0, 0), &settings(&[])).expect("it is compressed");
     let filtered = packed.into_runtime().expect("it can be drawn");
-    let share = filtered.filter.as_ref().map_or(1.0, TemporalFilter::active_share);
-    assert!(share < 0.95, "some rest: {share}");
+    let active = filtered.filter.as_ref().map_or(1.0, TemporalFilter::active_share);
+    assert!(active < 0.95, "some Gaussians are inactive: {active}");
     let free = RuntimeScene { filter: None, ..filtered.clone() };
     for step in 0..=27 {
         let view = view(step as f32 / 27.0);
         let [with, without] = [&filtered, &free].map(|scene| reference::render(scene, &view, BLACK).picture);
-        assert!(with == without, "at {}: nothing that is seen rests", view.time);
+        assert!(with == without, "at {}: every visible Gaussian is active", view.time);
     }
 }
 
 #[test]
-fn velocities_outlast_the_rounding_of_lifespans() {
+fn velocities_do_not_depend_on_the_bits_of_lifespans() {
     let scene = scene(3_000, 0, 0);
     let coarse = Bits {
         mean: 16,
@@ -197,14 +197,14 @@ fn velocities_outlast_the_rounding_of_lifespans() {
     let (packed, _) = compress(scene.clone(), &settings).expect("it is compressed");
     let packed = packed.into_runtime().expect("it can be drawn");
     let fastest = scene.iter().map(|g| Vec3::from(g.velocity).length()).fold(0.0, f32::max);
-    for (a, b) in beside(&scene, &packed).into_iter().filter(|(a, _)| a.sigma_t.is_finite()) {
+    for (a, b) in matched(&scene, &packed).into_iter().filter(|(a, _)| a.sigma_t.is_finite()) {
         let apart = (Vec3::from(a.velocity) - Vec3::from(b.velocity)).length();
         assert!(apart <= 2e-3 * fastest, "{a:?} {b:?}");
     }
 }
 
 #[test]
-fn what_does_not_fit_is_refused() {
+fn packed_scenes_and_invalid_codebooks_are_refused() {
     let small = scene(100, 1, 0);
     let (packed, _) = compress(small.clone(), &settings(&[8])).expect("it is compressed");
     let again = compress(packed.into_runtime().expect("drawable"), &settings(&[8]));
@@ -223,11 +223,11 @@ fn values_that_the_packed_form_cannot_hold_are_refused() {
     let gaussians = &mut far.form.as_sliced_mut().expect("sliced").gaussians;
     (gaussians[7].mean, gaussians[8].mean) = ([3e38; 3], [-3e38; 3]);
     bright.form.as_sliced_mut().expect("sliced").harmonics.values[..2].copy_from_slice(&[3e38, -3e38]);
-    for (what, scene) in [("means", far), ("colours", bright)] {
+    for (what, scene) in [("means", far), ("colors", bright)] {
         let refused = compress(scene, &settings(&[8]));
         assert!(matches!(refused, Err(CompressError::Range(_))), "{what} that are too far apart");
     }
-    for color_step in [f32::INFINITY, f32::NAN, -1.0] {
+    for color_step in [f32::INFINITY, f32::NAN, -1.0, f32::from_bits(1), f32::MIN_POSITIVE.next_down()] {
         let refused = compress(scene(50, 1, 0), &CompressSettings { color_step, ..settings(&[]) });
         assert!(matches!(refused, Err(CompressError::ColorStep(_))), "a step of {color_step}");
     }
@@ -236,7 +236,7 @@ fn values_that_the_packed_form_cannot_hold_are_refused() {
 #[test]
 fn steps_of_any_size_leave_colors_finite() {
     let scene = scene(300, 1, 0);
-    for color_step in [f32::from_bits(1), f32::MIN_POSITIVE, f32::MAX] {
+    for color_step in [f32::MIN_POSITIVE, f32::MAX] {
         let settings = CompressSettings { color_step, ..settings(&[]) };
         let (packed, _) = compress(scene.clone(), &settings).expect("it is compressed");
         packed.into_runtime().unwrap_or_else(|error| panic!("a step of {color_step}: {error}"));
@@ -244,13 +244,13 @@ fn steps_of_any_size_leave_colors_finite() {
 }
 
 #[test]
-fn degrees_of_coded_colours_can_be_lowered() {
+fn degrees_of_coded_colors_can_be_lowered() {
     let (packed, _) = compress(scene(500, 3, 2), &settings(&[16, 16])).expect("it is compressed");
     let lowered = |degree, degree_t| {
         let settings = ConvertSettings { form: None, sh_degree: degree, sh_degree_t: degree_t };
         convert(packed.clone(), &settings).expect("it is converted")
     };
-    assert!(lowered(None, None) == packed, "nothing is asked for, nothing is lost");
+    assert!(lowered(None, None) == packed, "without options the scene is unchanged");
     for (degree, degree_t, coefficients) in [(Some(0), None, 1), (Some(2), None, 9), (None, Some(1), 32)] {
         let converted = lowered(degree, degree_t);
         assert_eq!(converted.form.color_degrees().coefficients, coefficients, "{degree:?} and {degree_t:?}");
@@ -258,24 +258,24 @@ fn degrees_of_coded_colours_can_be_lowered() {
     }
     let runtime = ConvertSettings { form: Some(TargetForm::Runtime), ..ConvertSettings::default() };
     let degrees = convert(lowered(Some(1), None), &runtime).expect("it can be unpacked").form.color_degrees();
-    assert_eq!((degrees.degree, degrees.coefficients), (1, 4), "what was lowered stays low");
+    assert_eq!((degrees.degree, degrees.coefficients), (1, 4), "unpacking keeps the lowered degree");
 }
 
 #[test]
-fn few_gaussians_are_no_trouble() {
+fn scenes_of_few_gaussians_are_compressed() {
     for count in [0, 1, 2, 255, 256, 257] {
         let scene = scene(count, 3, 2);
         for codebooks in [&[][..], &[16, 16, 16, 16]] {
             let (packed, _) = compress(scene.clone(), &settings(codebooks)).expect("it is compressed");
             let read = package::read(Cursor::new(pack(&packed))).expect("it can be read");
             assert_eq!(read, packed, "{count} Gaussians, bit for bit");
-            assert_eq!(read.into_runtime().expect("drawable").len(), count, "none is lost");
+            assert_eq!(read.into_runtime().expect("drawable").len(), count, "every Gaussian");
         }
     }
 }
 
 #[test]
-fn packages_hold_the_packed_form_bit_for_bit() {
+fn packages_store_the_packed_form_bit_for_bit() {
     for (degree, degree_t, codebooks) in
         [(3, 2, &[32, 16, 8][..]), (2, 0, &[16]), (1, 0, &[]), (0, 0, &[4]), (3, 1, &[9, 9, 9, 9])]
     {
@@ -283,13 +283,13 @@ fn packages_hold_the_packed_form_bit_for_bit() {
         let bytes = pack(&packed);
         let read = package::read(Cursor::new(&bytes)).expect("it can be read");
         assert_eq!(read, packed, "degree {degree} and {degree_t}");
-        let info = package::inspect(Cursor::new(&bytes)).expect("it can be looked into");
+        let info = package::inspect(Cursor::new(&bytes)).expect("it can be inspected");
         assert_eq!(info.header.requires, ["packed", "filter"], "older readers must refuse it");
         let back = read.unpacked();
         let is_sliced = matches!(back.form, SceneForm::Ready(Form::Sliced(_)));
         assert!(is_sliced && back.len() == 700, "it can be unpacked");
         let is_consistent = back.form.harmonics().is_some_and(|harmonics| harmonics.is_consistent(700));
-        assert!(is_consistent, "with all its colours");
+        assert!(is_consistent, "every coefficient is present");
     }
 }
 
@@ -299,13 +299,13 @@ fn unpacking_changes_no_picture() {
     let unpacked = packed.clone().unpacked().into_runtime().expect("drawable");
     let packed = packed.into_runtime().expect("drawable");
     for time in [0.1, 0.7] {
-        let seen = psnr(&packed, &unpacked, &view(time));
-        assert!(seen >= 100.0, "at {time}: {seen:.1} dB");
+        let found = psnr(&packed, &unpacked, &view(time));
+        assert!(found >= 100.0, "at {time}: {found:.1} dB");
     }
 }
 
 #[test]
-fn every_flipped_bit_of_a_packed_package_is_noticed() {
+fn every_flipped_bit_of_a_packed_package_is_detected() {
     let (packed, _) = compress(scene(40, 1, 0), &settings(&[4, 2])).expect("it is compressed");
     let bytes = pack(&packed);
     for bit in 0..bytes.len() * 8 {
@@ -316,15 +316,15 @@ fn every_flipped_bit_of_a_packed_package_is_noticed() {
 }
 
 #[test]
-fn real_captures_reach_the_balanced_targets() {
+fn a_trained_capture_reaches_the_targets_of_the_balanced_quality() {
     let Some(data) = data::data() else { return };
-    // As in the demo: 45,000 Gaussians; the larger captures take minutes in a build without optimisation.
+    // As in the demo: 45,000 Gaussians; the larger captures take minutes in a build without optimization.
     let scene = codec::load(&data.join("toybox/toybox_45k.pth"), &ReadOptions::default()).expect("the checkpoint");
     let scene = scene.into_runtime().expect("drawable");
     let (packed, _) = compress(scene.clone(), &CompressSettings::from(Quality::Balanced)).expect("it is compressed");
     let mut bytes = Vec::new();
     package::write(&mut bytes, &packed, &package::WriteSettings { level: 19 }).expect("it can be written");
-    let info = package::inspect(Cursor::new(&bytes)).expect("it can be looked into");
+    let info = package::inspect(Cursor::new(&bytes)).expect("it can be inspected");
     let books = |name: &str| name.starts_with("codebook");
     let (codebooks, rest): (Vec<_>, Vec<_>) = info.header.sections.iter().partition(|section| books(&section.name));
     let size = |sections: &[&package::Section]| sections.iter().map(|section| section.length).sum::<usize>();
@@ -336,7 +336,7 @@ fn real_captures_reach_the_balanced_targets() {
     assert_eq!(size_of_val(&records.records[..]), 45_000 * 32, "32 bytes each");
     let views = CameraFile::load(&data.join("toybox/golden_45k.json"), &CameraOptions::default()).expect("cameras");
     for shot in views {
-        let seen = psnr(&scene, &packed, &shot.camera.view(shot.time, RasterFov::Reference));
-        assert!(seen >= 48.0, "{}: {seen:.2} dB, where `Quality::Balanced` promises 48", shot.name);
+        let found = psnr(&scene, &packed, &shot.camera.view(shot.time, RasterFov::Reference));
+        assert!(found >= 48.0, "{}: {found:.2} dB, but `Quality::Balanced` promises 48", shot.name);
     }
 }

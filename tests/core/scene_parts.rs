@@ -1,7 +1,7 @@
 //! Scenes whose parts do not fit together, and colors by codebook whose degrees are lowered.
 //!
-//! In: scenes put together by hand, rightly and wrongly. Out: proof that `RuntimeScene::check` finds what does not fit, so that
-//! nothing is read beyond it, and that lowering degrees changes no other coefficient.
+//! In: scenes made here, consistent and inconsistent. Out: proof that `RuntimeScene::check` refuses every inconsistent scene, so that
+//! no index is out of range, and that lowering degrees changes no other coefficient.
 
 use crate::support::coded_scene::coded_scene;
 use bevy_gs4d::codec::package::{self, PackageError, WriteSettings};
@@ -37,7 +37,7 @@ fn shorten<T>(values: &mut Vec<T>) {
     values.pop();
 }
 
-/// Puts intervals into the filter, of which one Gaussian has the one given.
+/// Replaces the sets of the filter by intervals; the last Gaussian has the given one.
 fn interval(scene: &mut RuntimeScene, first: u32, last: u32) {
     let filter = scene.filter.as_mut().expect("a filter");
     let mut intervals = vec![0; COUNT];
@@ -50,7 +50,7 @@ fn whole(scene: &mut RuntimeScene, coefficients: usize, degree: u32, values: usi
     packed(scene).colors = PackedColors::Whole(harmonics);
 }
 
-/// A wrong scene: a word of the complaint about it, and what is wrong.
+/// An inconsistent scene: a word of the error, and the change.
 type Wrong = (&'static str, fn(&mut RuntimeScene));
 
 const WRONG: [Wrong; 27] = [
@@ -84,8 +84,8 @@ const WRONG: [Wrong; 27] = [
 ];
 
 #[test]
-fn what_fits_together_is_accepted() {
-    assert_eq!(good().check(), Ok(()), "as compression makes it");
+fn consistent_scenes_are_accepted() {
+    assert_eq!(good().check(), Ok(()), "a compressed scene");
     let edits: [fn(&mut RuntimeScene); 4] = [
         |scene| interval(scene, 3, 8),
         |scene| interval(scene, 1, 0),
@@ -95,21 +95,21 @@ fn what_fits_together_is_accepted() {
     for edit in edits {
         let mut scene = good();
         edit(&mut scene);
-        assert_eq!(scene.check(), Ok(()), "another scene that fits");
+        assert_eq!(scene.check(), Ok(()), "a changed scene that is consistent");
     }
     let empty = RuntimeScene::sliced(Vec::new(), Harmonics { coefficients: 1, ..Harmonics::default() });
     assert_eq!(empty.check(), Ok(()), "no Gaussians");
 }
 
 #[test]
-fn what_does_not_fit_together_is_refused() {
-    for (index, (word, spoil)) in WRONG.into_iter().enumerate() {
+fn inconsistent_scenes_are_refused() {
+    for (index, (word, change)) in WRONG.into_iter().enumerate() {
         let mut scene = good();
-        spoil(&mut scene);
+        change(&mut scene);
         let reason = scene.check().expect_err(word);
         assert!(reason.contains(word), "{index}: {word} is not in: {reason}");
         let written = package::write(Vec::new(), &GaussianScene::from(scene), &WriteSettings::default());
-        assert!(written.is_err(), "{index}: nor is it written: {reason}");
+        assert!(written.is_err(), "{index}: the scene is not written: {reason}");
     }
 }
 
@@ -119,8 +119,8 @@ fn numbers_that_overflow_when_they_are_decoded_are_named() {
     // The second block begins with Gaussian 256; ranges are finite, but not their sum.
     packed(&mut scene).ranges[5] = [f32::MAX; 4];
     packed(&mut scene).ranges[6] = [f32::MAX; 4];
-    assert_eq!(scene.check(), Ok(()), "its parts fit");
-    let error = GaussianScene::from(scene).into_runtime().expect_err("its Gaussians cannot be drawn");
+    assert_eq!(scene.check(), Ok(()), "the parts are consistent");
+    let error = GaussianScene::from(scene).into_runtime().expect_err("some Gaussian cannot be drawn");
     assert!((256..512).contains(&error.index), "{error}");
 }
 
@@ -134,16 +134,19 @@ fn lower_degrees_keep_the_other_coefficients() {
             assert_eq!(lowered.check(), Ok(()), "{degree} and {degree_t} to {low} and {low_t}");
             let mut file = Vec::new();
             package::write(&mut file, &lowered, &WriteSettings { level: 1 }).expect("it can be written");
-            assert!(package::read(Cursor::new(&file)).expect("and read") == lowered, "every bit");
+            assert!(package::read(Cursor::new(&file)).expect("it can be read") == lowered, "every bit");
             let mut expected = scene.clone().unpacked();
             expected.form.truncate_colors(low, low_t);
-            assert!(lowered.unpacked() == expected, "{degree} and {degree_t} to {low} and {low_t}: the others stay");
+            assert!(
+                lowered.unpacked() == expected,
+                "{degree} and {degree_t} to {low} and {low_t}: the other coefficients stay"
+            );
         }
     }
 }
 
 #[test]
-fn a_package_that_cannot_be_read_is_not_written() {
+fn inconsistent_packages_are_not_written() {
     let mut scene = good();
     packed(&mut scene).ranges[0][1] = f32::INFINITY;
     let error = package::write(Vec::new(), &GaussianScene::from(scene), &WriteSettings::default());

@@ -3,11 +3,10 @@
 //!
 //! In: synthetic scenes; with `GS4D_DATA` set, toybox and standup. Out: proof that the CPU reference of `score` is
 //! right pixel by pixel, that scores are related as defined, that pruning keeps the right Gaussians, and that masks and
-//! filters contain one another. `GS4D_SLOW=1` adds the comparison over all training views.
+//! filters contain one another. The comparisons over all training views take minutes: `.ci/full` runs them by name.
 
 use crate::support::data::data;
 use crate::support::npy;
-use crate::support::skip::skip;
 use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
 use bevy_gs4d::offline::NoProgress;
@@ -64,7 +63,7 @@ fn close(a: f64, b: f64, relative: f64) -> bool {
 }
 
 #[test]
-fn contributions_are_what_the_background_loses() {
+fn contributions_sum_to_the_covered_part_of_the_background() {
     for count in [200, 3000] {
         let scene = runtime(count);
         for view in views() {
@@ -111,25 +110,25 @@ fn brute_force(scene: &RuntimeScene, view: &View) -> Vec<[f64; 2]> {
 }
 
 #[test]
-fn shortcuts_skip_nothing_that_counts() {
+fn scores_equal_those_without_shortcuts() {
     let scene = runtime(2000);
     for view in views() {
         let score = score(&scene, &view, BACKGROUND, Want::Removal);
         let expected = brute_force(&scene, &view);
-        assert!(expected.iter().any(|[contribution, _]| *contribution > 0.0), "something is seen");
+        assert!(expected.iter().any(|[contribution, _]| *contribution > 0.0), "some Gaussian contributes");
         for (index, [contribution, energy]) in expected.into_iter().enumerate() {
             let found = [f64::from(score.contribution[index]), f64::from(score.energy[index])];
             assert!(
                 close(found[0], contribution, 1e-5) && close(found[1], energy, 1e-5),
                 "{index}: {found:?} instead of {contribution}, {energy}"
             );
-            assert_eq!(found[0] > 0.0, contribution > 0.0, "{index}: blended anywhere at all");
+            assert_eq!(found[0] > 0.0, contribution > 0.0, "{index}: blended into a pixel in both or in neither");
         }
     }
 }
 
 #[test]
-fn removal_is_the_change_of_the_picture() {
+fn removal_is_the_squared_change_of_the_picture_without_the_gaussian() {
     let scene = faint(150);
     for view in [view(0.3, 0.2), view(2.0, 0.7)] {
         let whole = render(&scene, &view, BACKGROUND);
@@ -147,12 +146,12 @@ fn removal_is_the_change_of_the_picture() {
             assert!(close(removal, change, 2e-3), "{index}: {removal} instead of {change}");
             seen += usize::from(change > 1e-4);
         }
-        assert!(seen > 20, "the test sees enough of the scene: {seen}");
+        assert!(seen > 20, "removal of more than 20 Gaussians changes the picture: {seen}");
     }
 }
 
 #[test]
-fn scores_depend_neither_on_threads_nor_on_what_is_wanted() {
+fn scores_do_not_depend_on_the_number_of_threads_or_the_wanted_sums() {
     let (scene, view) = (runtime(3000), view(1.0, 0.4));
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
@@ -162,7 +161,7 @@ fn scores_depend_neither_on_threads_nor_on_what_is_wanted() {
     assert_eq!(alone, on(3), "the same bits");
     let less = score(&scene, &view, BACKGROUND, Want::Contribution);
     assert_eq!((&less.contribution, &less.energy), (&alone.contribution, &alone.energy), "the same sums");
-    assert!(less.removal.is_empty() && alone.removal.len() == 3000, "removal only where wanted");
+    assert!(less.removal.is_empty() && alone.removal.len() == 3000, "removal is computed only if it is wanted");
 }
 
 /// Returns all scores of a scene over some views.
@@ -177,7 +176,7 @@ fn accumulate(scene: &GaussianScene, views: &[View], background: Background) -> 
 fn scores_are_related_as_defined() {
     let scene = synth(1500);
     let scores = accumulate(&scene, &views(), BACKGROUND).expect("views of the scene");
-    let of = |variant| scores.of(variant).expect("a trained scene tells all");
+    let of = |variant| scores.of(variant).expect("a trained scene has every score");
     let all = Variant::ALL.map(of);
     let at = |variant: Variant, index: usize| {
         let place = Variant::ALL.iter().position(|v| *v == variant).expect("a variant");
@@ -211,19 +210,19 @@ fn the_runtime_form_has_scores_without_volume() {
 }
 
 #[test]
-fn data_of_another_capture_is_said() {
+fn views_of_another_capture_are_an_error() {
     let scene = synth(300);
     let away = Camera::look_at(Vec3::X * 5.0, Vec3::X * 9.0, Vec3::Z, 0.5, SIZE);
     let elsewhere = accumulate(&scene, &[away.view(0.5, RasterFov::Reference)], BACKGROUND);
-    let message = elsewhere.expect_err("nothing is seen").to_string();
+    let message = elsewhere.expect_err("no Gaussian contributes").to_string();
     assert!(message.contains("does this data belong to the checkpoint?"), "{message}");
     assert!(matches!(accumulate(&scene, &[], BACKGROUND), Err(ScoreError::NoViews)), "no views at all");
 }
 
 #[test]
-fn the_highest_are_kept_in_order() {
-    assert_eq!(highest(&[1.0, 5.0, 3.0, 5.0, 0.0, 3.0], 3), [1, 2, 3], "ties go to the earlier");
-    assert_eq!(highest(&[1.0, 2.0], 9), [0, 1], "no more than there are");
+fn the_highest_scores_are_kept_in_the_order_of_the_scene() {
+    assert_eq!(highest(&[1.0, 5.0, 3.0, 5.0, 0.0, 3.0], 3), [1, 2, 3], "of equal scores the first is kept");
+    assert_eq!(highest(&[1.0, 2.0], 9), [0, 1], "at most all scores");
     assert_eq!((kept_count(90_000, 0.8), kept_count(90_000, 0.85)), (18_000, 13_500), "rounded");
     assert_eq!((kept_count(5, 0.5), kept_count(7, 1.0), kept_count(7, 0.0)), (3, 0, 7), "the ends");
 
@@ -233,20 +232,20 @@ fn the_highest_are_kept_in_order() {
     let keep = highest(&scores, 150);
     let lowest = keep.iter().map(|&i| scores[i as usize]).fold(f32::INFINITY, f32::min);
     let better = scores.iter().filter(|score| **score > lowest).count();
-    assert!(better < 150 && keep.is_sorted(), "nothing better is left out");
-    // Pruning and slicing may change places.
+    assert!(better < 150 && keep.is_sorted(), "no Gaussian with a higher score is removed");
+    // Pruning before slicing and after it give the same scene.
     let one_way = select(&scene, &keep).into_runtime().expect("valid");
     let other_way = select(&scene.into_runtime().expect("valid").into(), &keep);
-    assert_eq!(GaussianScene::from(one_way), other_way, "both forms alike, colour and filter included");
+    assert_eq!(GaussianScene::from(one_way), other_way, "the same Gaussians, colors and filter");
 }
 
 #[test]
-fn what_no_view_blends_can_go() {
+fn removing_gaussians_that_are_never_blended_changes_no_picture() {
     let scene = faint(2000);
     let view = view(1.0, 0.3);
     let score = score(&scene, &view, BACKGROUND, Want::Contribution);
     let used = score.contribution.iter().filter(|c| **c > 0.0).count();
-    assert!(used > 100 && used < 1900, "some are seen, some are not: {used}");
+    assert!(used > 100 && used < 1900, "between 100 and 1900 of 2000 Gaussians are blended: {used}");
     let before = render(&scene, &view, BACKGROUND);
     let kept = select(&scene.into(), &highest(&score.contribution, used)).into_runtime().expect("valid");
     let after = render(&kept, &view, BACKGROUND);
@@ -254,7 +253,7 @@ fn what_no_view_blends_can_go() {
 }
 
 #[test]
-fn filters_contain_one_another() {
+fn key_frame_filters_are_within_interval_filters_and_those_within_support_filters() {
     let (scene, count, segments) = (runtime(1200), 1200, 6);
     let cameras = [camera(0.0), camera(2.0), camera(4.0)];
     let times = key_times([0.0, 1.0], segments + 1);
@@ -266,9 +265,9 @@ fn filters_contain_one_another() {
     let interval = interval_filter(&mut engine, &masks, &between, [0.0, 1.0], count, &mut NoProgress).expect("views");
     let support = TemporalFilter::support(scene.iter(), [0.0, 1.0], segments);
     let within = |a: &TemporalFilter, b: &TemporalFilter| a.to_bits().iter().zip(b.to_bits()).all(|(a, b)| a & !b == 0);
-    assert!(within(&key_frame, &interval) && within(&interval, &support), "each holds the one before");
-    assert!(key_frame.active_share() < interval.active_share(), "some come and go between key-frames");
-    // What a view between key-frames blends is active then.
+    assert!(within(&key_frame, &interval) && within(&interval, &support), "each filter contains the one before it");
+    assert!(key_frame.active_share() < interval.active_share(), "some Gaussians are active only between key-frames");
+    // Gaussians that a view between key-frames blends are active at its time.
     for view in &between {
         let seen = engine.score(view, Want::Contribution).expect("a score").contribution;
         let segment = interval.segment_of(view.time, [0.0, 1.0]);
@@ -309,7 +308,7 @@ fn spearman(a: &[f32], b: &[f32]) -> f64 {
     product(&a, &b) / (product(&a, &a) * product(&b, &b)).sqrt()
 }
 
-/// Returns the share of the highest fifth that both have in common.
+/// Returns the fraction of the highest fifth that both have in common.
 fn overlap(a: &[f32], b: &[f32]) -> f64 {
     let count = kept_count(a.len(), 0.8);
     let (a, b) = (highest(a, count), highest(b, count));
@@ -319,47 +318,37 @@ fn overlap(a: &[f32], b: &[f32]) -> f64 {
 /// Scores from a fifteenth of the views correlate with those from all views. The independent implementation reaches
 /// 0.861 and 0.973.
 #[test]
-fn a_share_of_toybox_ranks_like_all_of_it() {
+fn scores_over_a_fifteenth_of_the_views_of_toybox_rank_as_over_all() {
     let Some((folder, scene, dataset)) = capture("toybox", None) else { return };
     let views: Vec<_> = even_subset(&dataset.views, 40).into_iter().map(|i| dataset.views[i].clone()).collect();
     let views = to_draw(&views, scene.trained_with.raster_fov);
-    let scores = accumulate(&scene, &views, Background::Color([0.0; 3])).expect("toybox's own views");
+    let scores = accumulate(&scene, &views, Background::Color([0.0; 3])).expect("views of toybox");
     for (variant, array, least) in [(Variant::Spatial, "spatial", 0.855), (Variant::Sigma, "sigma", 0.97)] {
-        let theirs = floats(&folder.join("scores.npz"), array);
-        let alike = spearman(&scores.of(variant).expect("a trained scene"), &theirs);
+        let expected = floats(&folder.join("scores.npz"), array);
+        let alike = spearman(&scores.of(variant).expect("a trained scene"), &expected);
         println!("{variant}: {alike:.4}");
         assert!(alike >= least, "{variant}: rank correlation {alike}");
     }
 }
 
-fn slow() -> bool {
-    let slow = std::env::var_os("GS4D_SLOW").is_some_and(|value| value == "1");
-    if !slow {
-        skip("GS4D_SLOW is not 1: scores over all training views take minutes");
-    }
-    slow
-}
-
 /// Compares every score over all views of both captures. The last two of `scores.npz` are estimates from random
-/// pictures, whose own noise leaves an overlap of 0.92 to 0.95 of the highest fifth.
+/// pictures, whose noise limits the overlap to a range of 0.92 to 0.95 of the highest fifth.
 #[test]
-fn scores_rank_as_the_yardstick_does() {
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
+fn scores_over_all_views_rank_as_the_independent_scores_do() {
     for (name, resolution) in [("toybox", None), ("standup", Some(2))] {
-        if !slow() {
-            return;
-        }
         let Some((folder, scene, dataset)) = capture(name, resolution) else { return };
         let views = to_draw(&dataset.views, scene.trained_with.raster_fov);
-        let scores = accumulate(&scene, &views, Background::Color([0.0; 3])).expect("its own views");
+        let scores = accumulate(&scene, &views, Background::Color([0.0; 3])).expect("views of the capture");
         for variant in Variant::ALL.into_iter().filter(|variant| *variant != Variant::EnergyRemoval) {
             let estimated = matches!(variant, Variant::Energy | Variant::Removal);
             let array = variant.name().replace('-', "_") + if estimated { "_estimate" } else { "" };
-            let theirs = floats(&folder.join("scores.npz"), &array);
+            let expected = floats(&folder.join("scores.npz"), &array);
             let ours = scores.of(variant).expect("a trained scene");
             let floor = if estimated { 1e-3 } else { f32::NEG_INFINITY };
-            let pairs = ours.iter().zip(&theirs).filter(|(_, theirs)| **theirs > floor);
+            let pairs = ours.iter().zip(&expected).filter(|(_, expected)| **expected > floor);
             let (a, b): (Vec<f32>, Vec<f32>) = pairs.map(|(a, b)| (*a, *b)).unzip();
-            let (alike, both) = (spearman(&a, &b), overlap(&ours, &theirs));
+            let (alike, both) = (spearman(&a, &b), overlap(&ours, &expected));
             println!("{name} {variant}: {alike:.6}, {both:.4}");
             let least = if estimated { (0.98, 0.915) } else { (0.999, 0.99) };
             assert!(alike >= least.0, "{name} {variant}: rank correlation {alike}");
@@ -369,11 +358,9 @@ fn scores_rank_as_the_yardstick_does() {
 }
 
 #[test]
-fn key_frame_masks_are_those_of_the_yardstick() {
+#[ignore = "takes minutes; `.ci/full` runs it by name"]
+fn key_frame_masks_match_the_independent_masks() {
     for (name, resolution, keys) in [("toybox", None, 11), ("standup", Some(2), 6)] {
-        if !slow() {
-            return;
-        }
         let Some((folder, scene, dataset)) = capture(name, resolution) else { return };
         let runtime = scene.into_runtime().expect("a valid checkpoint");
         let cameras = distinct_cameras(&dataset.views);
@@ -381,18 +368,18 @@ fn key_frame_masks_are_those_of_the_yardstick() {
         let (times, count) = (key_times([0.0, 1.0], keys), runtime.len());
         let raster_fov = runtime.trained_with.raster_fov;
         let masks = key_frame_masks(&mut engine, &cameras, raster_fov, &times, count, &mut NoProgress).expect("masks");
-        let theirs = values(&folder.join("masks.npz"), "vanilla", "|u1");
+        let expected = values(&folder.join("masks.npz"), "vanilla", "|u1");
         let row = count.div_ceil(8);
-        assert_eq!(theirs.len(), row * masks.len(), "as many masks");
+        assert_eq!(expected.len(), row * masks.len(), "one mask for each key-frame");
         let bit = |bytes: &[u8], i: usize| u32::from(bytes[i / 8] >> (i % 8) & 1);
         let differing: usize = masks
             .iter()
-            .zip(theirs.chunks(row))
-            .map(|(ours, theirs)| (0..count).filter(|&i| ours[i / 32] >> (i % 32) & 1 != bit(theirs, i)).count())
+            .zip(expected.chunks(row))
+            .map(|(ours, expected)| (0..count).filter(|&i| ours[i / 32] >> (i % 32) & 1 != bit(expected, i)).count())
             .sum();
-        let share = differing as f64 / (count * masks.len()) as f64;
-        println!("{name}: {:.4} % of bits differ", share * 100.0);
-        assert!(share <= 0.005, "{name}: {share} of all bits differ");
+        let fraction = differing as f64 / (count * masks.len()) as f64;
+        println!("{name}: {:.4} % of bits differ", fraction * 100.0);
+        assert!(fraction <= 0.005, "{name}: a fraction of {fraction} of all bits differs");
     }
 }
 

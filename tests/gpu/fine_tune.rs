@@ -669,3 +669,57 @@ fn gradients_that_are_not_finite_are_left_out_and_reported() {
     assert!(all.iter().all(|(_, values)| values.iter().all(|value| value.is_finite())), "nothing is lost");
     assert_ne!(scene, lesson.scene, "the others are trained");
 }
+
+/// Returns a scene and a view of it in which a Gaussian is seen from its own mean, which it has left: its color has no direction, 0 / 0.
+fn without_direction(lesson: &Lesson) -> (GaussianScene, View) {
+    let (mut scene, time) = (lesson.moving(), 0.5);
+    let change = |scene: &mut GaussianScene, mean: Vec3| {
+        let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
+        parameters.mean[7] = mean.to_array();
+        parameters.mean_t[7] = time - 0.8;
+        (parameters.log_scale[7], parameters.log_scale_t[7]) = ([0.1f32.ln(); 3], 2f32.ln());
+        (parameters.rotation_l[7], parameters.rotation_r[7]) = ([0.36, 0.93, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]);
+    };
+    let eye = Vec3::new(0.0, 0.0, 3.0);
+    change(&mut scene, eye);
+    let target = scene.clone().into_runtime().expect("it can be drawn").gaussian(7).mean_at(time);
+    assert!(target.distance(eye) > 1.0, "it has moved away: {target}");
+    let view = Camera::look_at(eye, target, Vec3::Y, 0.8, UVec2::new(70, 54)).view(time, RasterFov::Reference);
+    change(&mut scene, view.camera_position);
+    (scene, view)
+}
+
+#[test]
+fn a_gaussian_whose_gradient_is_not_finite_is_left_out_with_its_color() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new(&mut headless);
+    let (count, depths) = (70 * 54, vec![0.0; 70 * 54]);
+    let mut strong = vec![[0.0; 4]; count];
+    // Gradients of color of this size are finite, those of shapes are not.
+    strong[27 * 70 + 35] = [1e37, 1e37, 1e37, 0.0];
+    let (undirected, at_mean) = without_direction(&lesson);
+    let cases = [
+        ("a large gradient", lesson.moving(), lesson.views[0], strong),
+        ("no direction", undirected, at_mean, vec![[1e-3; 4]; count]),
+    ];
+    for (what, scene, view, pixels) in cases {
+        let mut trainer = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("it can be trained");
+        trainer.accumulate_pixels(&view, Background::None, &pixels, &depths).expect("it is drawn");
+        let gradients = trainer.gradients().expect("they can be read");
+        let faults = trainer.faults().expect("they can be read").expect("a gradient that is not finite is counted");
+        println!("{what}: {faults:?}");
+        assert!(what != "no direction" || faults.gaussian == 7, "{what}: {faults:?}");
+        let all = tensors(&trained(&gradients).parameters, &trained(&gradients).harmonics);
+        for (name, values) in &all {
+            assert!(values.iter().all(|value| value.is_finite()), "{what}: {name} is finite");
+        }
+        let has = |name: &str, index: usize| {
+            let (_, values) = all.iter().find(|(own, _)| *own == name).expect("a tensor");
+            let stride = values.len() / 400;
+            values[index * stride..][..stride].iter().any(|&value| value != 0.0)
+        };
+        let only_color = (0..400).filter(|&index| has("harmonics", index) && !has("opacity_logit", index));
+        assert_eq!(only_color.collect::<Vec<_>>(), [0; 0], "{what}: Gaussians with a gradient of color alone");
+        assert!(!has("harmonics", faults.gaussian as usize), "{what}: the reported Gaussian is left out");
+    }
+}

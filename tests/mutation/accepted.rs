@@ -1,4 +1,4 @@
-//! What holds for every scene that a reader accepts.
+//! Checks of every scene that a reader accepts.
 //!
 //! In: a scene. Out: whether it was drawn ([`Outcome`]), or the defect: a value of a picture that is not finite, or a file written from it that
 //! cannot be read or is another scene.
@@ -18,7 +18,7 @@ use std::io::Cursor;
 const DRAWN: usize = 4096;
 /// Most Gaussians of a scene that is compressed.
 const COMPRESSED: usize = 512;
-/// Size of the pictures from around, pixels.
+/// Size of the pictures from cameras around the scene, pixels.
 const SIZE: UVec2 = UVec2::new(24, 16);
 
 /// Checks a scene as it was read. One that cannot be drawn counts as refused.
@@ -41,7 +41,7 @@ pub fn check(scene: GaussianScene) -> Result<Outcome, String> {
     Ok(Outcome::Drawn)
 }
 
-/// Returns the package of a scene; `None` if it compresses so well that a reader would take it for a bomb.
+/// Returns the package of a scene; `None` if it compresses so well that readers would refuse it as a bomb.
 fn pack(scene: &GaussianScene) -> Result<Option<Vec<u8>>, PackageError> {
     let mut file = Vec::new();
     match package::write(&mut file, scene, &WriteSettings { level: 1 }) {
@@ -51,8 +51,8 @@ fn pack(scene: &GaussianScene) -> Result<Option<Vec<u8>>, PackageError> {
     }
 }
 
-/// Checks that a scene can be written, and that the file holds the same scene. Writing is deterministic and loses nothing, so that the
-/// bytes tell, those of NaNs too.
+/// Checks that a scene can be written, and that the file holds the same scene. Writing is deterministic and without loss, so that
+/// bytes are compared, including those of NaNs.
 fn rewrite(scene: &GaussianScene) -> Result<(), String> {
     let written =
         |scene: &GaussianScene| pack(scene).map_err(|error| format!("is accepted and cannot be written: {error}"));
@@ -61,7 +61,7 @@ fn rewrite(scene: &GaussianScene) -> Result<(), String> {
     if written(&again)? == Some(file) { Ok(()) } else { Err("is written and read as another scene".to_owned()) }
 }
 
-/// Compresses a scene. Where that is not refused, what is written must be readable and drawable.
+/// Compresses a scene. If compression accepts it, the written package must be readable and drawable.
 pub fn compress_and_read(scene: &RuntimeScene, codebooks: &[usize]) -> Result<(), String> {
     let Ok((compressed, _)) = compress(scene.clone(), &settings(codebooks)) else { return Ok(()) };
     let Ok(Some(file)) = pack(&compressed) else { return Ok(()) };
@@ -71,12 +71,13 @@ pub fn compress_and_read(scene: &RuntimeScene, codebooks: &[usize]) -> Result<()
     draw(&again).map_err(|defect| format!("is compressed, and {defect}"))
 }
 
-/// Draws a scene in the middle of its time from where synthetic scenes are seen, and at its first, middle and last moment from around itself.
+/// Draws a scene from the camera of synthetic scenes at the middle of its time, and from cameras around the scene at its first, middle and
+/// last time.
 pub fn draw(scene: &RuntimeScene) -> Result<(), String> {
     let [first, last] = scene.trained_with.time_interval;
     let middle = 0.5 * first + 0.5 * last;
     check_frame(&reference::render(scene, &packed_scene::view(middle), BLACK), middle)?;
-    // A scene without Gaussians has no surroundings.
+    // A scene without Gaussians has no bounds to place cameras around.
     for shot in orbit(scene, 3, SIZE).unwrap_or_default() {
         if !shot.camera.world_to_camera.is_finite() {
             return Err("the cameras around it are not finite".to_owned());

@@ -1,8 +1,8 @@
-//! Changed files for every reader: whatever a file contains, reading it ends, soon, in an error or in something that can be drawn.
+//! Changed files for every reader: whatever a file contains, reading it ends within a time limit with an error or a drawable scene.
 //!
 //! In: the files of `tests/corpus/`, then seeds made here by the crate's own writers and changed: valid containers around wrong contents,
-//! and noise. Out: a program that gives them to the readers under watch, tells every defect and how to have it again, and ends with a line of
-//! counts; exit code 1 if there was a defect. `docs/reliability.md` lists what is watched.
+//! and noise. Out: a program that runs the readers on them, reports every defect with a command that repeats it, and ends with a line of
+//! counts; exit code 1 if there was a defect. `docs/reliability.md` lists the checks.
 //!
 //! ```sh
 //! cargo test --features viewer,cli --test mutation                        # the corpus and a few inputs, always the same
@@ -10,7 +10,7 @@
 //! cargo test --features viewer,cli --test mutation -- --seed 7 --reader package --input 1234
 //! ```
 //!
-//! An input follows from the seed, its reader and its number, and from nothing else.
+//! An input depends only on the seed, its reader and its number.
 
 mod accepted;
 mod change;
@@ -62,7 +62,7 @@ fn main() -> ExitCode {
     if trials.close() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// Gives each reader its corpus, then as many inputs as are wanted, all readers in turn.
+/// Runs each reader on its corpus, then on the requested number of inputs, all readers in turn.
 fn give_all(trials: &mut Trials, readers: &[(&Kind, Arc<dyn Reader>)], options: &Options) {
     let start = Instant::now();
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus");
@@ -85,7 +85,7 @@ fn give_all(trials: &mut Trials, readers: &[(&Kind, Arc<dyn Reader>)], options: 
     }
 }
 
-/// Gives one input and prints what becomes of it.
+/// Runs a reader on one input and prints the outcome.
 fn give_one(trials: &mut Trials, readers: &[(&Kind, Arc<dyn Reader>)], seed: u64, number: u64) {
     for (kind, reader) in readers {
         let outcome = trials.give(kind, reader, input(kind, reader.as_ref(), seed, number));
@@ -93,7 +93,7 @@ fn give_one(trials: &mut Trials, readers: &[(&Kind, Arc<dyn Reader>)], seed: u64
     }
 }
 
-/// Gives a file, or each file of a folder, and prints what becomes of it.
+/// Runs a reader on a file, or on each file of a folder, and prints the outcomes.
 fn give_files(trials: &mut Trials, readers: &[(&Kind, Arc<dyn Reader>)], path: &Path) {
     for (kind, reader) in readers {
         for input in files(path) {
@@ -110,8 +110,8 @@ fn input(kind: &Kind, reader: &dyn Reader, seed: u64, number: u64) -> Input {
     Input { name: number.to_string(), bytes: reader.input(&mut random), accepted: None }
 }
 
-/// Returns a file, or the files of a folder by name, as inputs. Their names say what must become of them: those that begin with `refused-`
-/// must be refused, those with `accepted-` accepted.
+/// Returns a file, or the files of a folder by name, as inputs. Files whose names begin with `refused-` must be
+/// refused, files whose names begin with `accepted-` accepted.
 fn files(path: &Path) -> Vec<Input> {
     let mut paths: Vec<PathBuf> = match fs::read_dir(path) {
         Ok(entries) => entries.map(|entry| entry.expect("the folder can be listed").path()).collect(),

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 static START: AtomicUsize = AtomicUsize::new(0);
 
-/// Begins to count anew.
+/// Starts a new count.
 pub fn begin() {
     let now = ALLOCATED.load(Ordering::Relaxed);
     START.store(now, Ordering::Relaxed);

@@ -1,6 +1,6 @@
 //! The command line.
 //!
-//! In: the arguments of the process, among them those that are meant for the usual test harness. Out: [`Options`].
+//! In: the arguments of the process, including those of the usual test harness. Out: [`Options`].
 
 use clap::Parser;
 use std::ffi::OsString;
@@ -13,14 +13,14 @@ const INPUTS: u64 = 60;
 /// Arguments of the usual test harness, which `cargo test -- ARGUMENTS` hands to every test binary.
 const FOREIGN: [&str; 6] = ["--nocapture", "--no-capture", "--show-output", "--quiet", "-q", "--exact"];
 
-/// Gives changed files to every reader and watches what becomes of them.
+/// Runs every reader on changed files and checks the outcomes.
 #[derive(Parser)]
 #[command(name = "mutation")]
 pub struct Options {
     /// Seed of all inputs.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Number of inputs of each reader [default: 60; with --seconds as many as there is time for].
+    /// Number of inputs of each reader [default: 60; with --seconds, as many as the time allows].
     #[arg(long, value_name = "N")]
     inputs: Option<u64>,
     /// End after this time.
@@ -35,7 +35,7 @@ pub struct Options {
     /// Only this file, as an input of the one reader given.
     #[arg(long, value_name = "FILE", requires = "reader", conflicts_with = "input")]
     pub file: Option<PathBuf>,
-    /// Folder for the inputs that show a defect, and for the one that runs, should it end the process.
+    /// Folder for the inputs that show a defect, and for the current input in case that it ends the process.
     #[arg(long, value_name = "DIR")]
     pub keep: Option<PathBuf>,
     /// List the readers.
@@ -63,7 +63,7 @@ impl Options {
         filtered && (self.reader.is_empty() || self.reader.iter().any(|wanted| wanted == reader))
     }
 
-    /// Returns the name of a reader that was asked for and is not among `known`.
+    /// Returns the name of a requested reader that is not among `known`.
     pub fn unknown_reader(&self, known: &[&str]) -> Option<&str> {
         self.reader.iter().map(String::as_str).find(|wanted| !known.contains(wanted))
     }

@@ -1,7 +1,7 @@
-//! The inputs given so far, and what was found.
+//! The inputs read so far, and the defects found.
 //!
-//! In: inputs, one after the other. Out: counts for each reader, a line for each new kind of defect with how to have it again, and the inputs
-//! themselves in a folder if one is given.
+//! In: inputs, one after the other. Out: counts for each reader, a line for each new kind of defect with the command that repeats it, and the
+//! inputs in a folder if one is given.
 
 use crate::readers::{Kind, Outcome, Reader};
 use crate::watch::{Seen, watch};
@@ -12,15 +12,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Inputs of one kind of defect that are told and kept; the others are only counted.
+/// Inputs of one kind of defect that are reported and kept; further ones are only counted.
 const TOLD: usize = 3;
 
-/// What has been given to the readers.
+/// The inputs that the readers have read.
 pub struct Trials {
     seed: u64,
     keep: Option<PathBuf>,
     rows: Vec<Row>,
-    /// How often each kind of defect was seen.
+    /// Number of inputs with each kind of defect.
     kinds: HashMap<String, usize>,
 }
 
@@ -48,7 +48,7 @@ struct Row {
 }
 
 impl Trials {
-    /// Begins with nothing. `keep` is a folder for inputs, made if it is not there.
+    /// Returns trials without inputs. `keep` is a folder for inputs, created if it does not exist.
     pub fn new(seed: u64, keep: Option<PathBuf>) -> Self {
         if let Some(folder) = &keep {
             fs::create_dir_all(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
@@ -56,11 +56,11 @@ impl Trials {
         Self { seed, keep, rows: Vec::new(), kinds: HashMap::new() }
     }
 
-    /// Gives an input to a reader and counts what becomes of it. Returns that, or `None` if the reader does not come to an end.
+    /// Runs a reader on an input and counts the outcome. Returns the outcome; `None` if the reader does not end.
     pub fn give(&mut self, kind: &Kind, reader: &Arc<dyn Reader>, input: Input) -> Option<Result<Outcome, String>> {
         let name = format!("{} {}", kind.name, input.name);
         let bytes: Arc<[u8]> = input.bytes.into();
-        // Should the process end, this is the input that ended it.
+        // If the process ends, this is the input that ended it.
         self.write(&format!("{}.running", kind.name), &bytes);
         let Seen { outcome, time, memory, stuck } = watch(&name, reader, &bytes);
         let outcome = outcome.and_then(|outcome| as_expected(outcome, input.accepted));
@@ -87,7 +87,7 @@ impl Trials {
         if stuck { None } else { Some(outcome) }
     }
 
-    /// Prints a defect and keeps its input, unless the same was seen before.
+    /// Prints a defect and keeps its input, unless the kind of defect is known.
     fn tell(&mut self, kind: &Kind, input: &str, defect: &str, bytes: &[u8]) {
         let general: String = defect.chars().filter(|c| !c.is_ascii_digit()).take(160).collect();
         let seen = self.kinds.entry(format!("{}: {general}", kind.name)).or_default();
@@ -123,7 +123,7 @@ impl Trials {
         &mut self.rows[index]
     }
 
-    /// Prints the counts, those of all readers together in the last line. Returns whether no defect was found.
+    /// Prints the counts, with the sums over all readers in the last line. Returns whether no defect was found.
     pub fn close(&self) -> bool {
         let mut all = Row { reader: "all", ..Row::default() };
         for row in &self.rows {
@@ -135,7 +135,7 @@ impl Trials {
             all.defects += row.defects;
             all.slowest = all.slowest.max(row.slowest.clone());
             all.most = all.most.max(row.most.clone());
-            // Nothing runs any more.
+            // No input is running any more.
             if let Some(folder) = &self.keep {
                 let _ = fs::remove_file(folder.join(format!("{}.running", row.reader)));
             }

@@ -1,10 +1,10 @@
-//! One input under watch.
+//! A reader run on one input, with limits.
 //!
-//! In: a reader and the bytes to read. Out: what became of them ([`Seen`]): refused or accepted, or the defect: a panic, too much time or
-//! memory, a message that would change the terminal, whatever the reader itself finds wrong with what it accepted.
+//! In: a reader and the bytes to read. Out: the outcome ([`Seen`]): refused or accepted, or a defect: a panic, too much time or memory, a
+//! message with control characters, or a defect that the reader finds in its result.
 //!
-//! Each input has a thread of its own, whose stack is that of any thread: a reader that recurses without an end ends the process, and the
-//! system's message names the thread, which is named after the input.
+//! Each input is read on its own thread with a stack of the usual size: endless recursion ends the process, and the message of the system
+//! names the thread, which is named after the input.
 
 use crate::memory;
 use crate::readers::{Outcome, Reader};
@@ -14,11 +14,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Stack of the thread that reads: what Rust gives to threads, among them those that load assets.
+/// Stack of the thread that reads: the default of Rust, which threads that load assets have, too.
 const STACK: usize = 2 << 20;
-/// The longest that an input may take, with all that is done with what was accepted.
+/// The longest time that an input may take, including the checks of an accepted result.
 const TIME: Duration = Duration::from_secs(2);
-/// When an input is given up.
+/// Time after which an input is given up.
 const STUCK: Duration = Duration::from_secs(60);
 /// The most memory that an input may take, bytes.
 const MEMORY: usize = 1 << 30;
@@ -28,14 +28,14 @@ const REQUEST: usize = 512 << 20;
 /// The first panic since an input began.
 static PANIC: Mutex<Option<String>> = Mutex::new(None);
 
-/// What became of an input.
+/// The outcome of an input.
 pub struct Seen {
-    /// What became of it; or the defect.
+    /// The outcome, or the defect.
     pub outcome: Result<Outcome, String>,
     pub time: Duration,
     /// Bytes, at the peak.
     pub memory: usize,
-    /// Whether it still runs, so that nothing can be measured any more.
+    /// Whether it is still running, so that further measurements are not valid.
     pub stuck: bool,
 }
 
@@ -57,7 +57,7 @@ fn last_panic() -> Option<String> {
     PANIC.lock().unwrap_or_else(PoisonError::into_inner).take()
 }
 
-/// Gives an input to a reader. `name` is that of the input.
+/// Runs a reader on an input. `name` is the name of the input.
 pub fn watch(name: &str, reader: &Arc<dyn Reader>, bytes: &Arc<[u8]>) -> Seen {
     let (sender, receiver) = mpsc::channel();
     let (reader, bytes) = (Arc::clone(reader), Arc::clone(bytes));
@@ -66,7 +66,7 @@ pub fn watch(name: &str, reader: &Arc<dyn Reader>, bytes: &Arc<[u8]>) -> Seen {
     let start = Instant::now();
     let read = move || {
         let outcome = panic::catch_unwind(AssertUnwindSafe(|| reader.read(&bytes)));
-        // Nobody waits any longer for an input that was given up.
+        // The receiver is gone if the input was given up.
         let _ = sender.send(outcome.ok());
     };
     let builder = thread::Builder::new().name(name.to_owned()).stack_size(STACK);
@@ -86,7 +86,7 @@ pub fn watch(name: &str, reader: &Arc<dyn Reader>, bytes: &Arc<[u8]>) -> Seen {
     Seen { outcome, time, memory: peak, stuck }
 }
 
-/// Returns the outcome if it took no more than it may.
+/// Returns the outcome if it is within the limits of time and memory.
 fn within_bounds(outcome: Outcome, time: Duration, peak: usize, largest: usize) -> Result<Outcome, String> {
     if let Outcome::Refused(message) = &outcome
         && let Some(control) = message.chars().find(|c| c.is_control())

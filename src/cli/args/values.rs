@@ -53,9 +53,13 @@ pub fn not_negative(text: &str) -> Result<f64, String> {
     value.ok_or_else(|| "expected a number, zero or above".to_owned())
 }
 
-/// Parses a number, not below zero, that single precision can hold.
+/// Parses 0, or a number above it that is a normal number of single precision.
 pub fn step(text: &str) -> Result<f32, String> {
-    number(text).ok().filter(|value| *value >= 0.0).ok_or_else(|| "expected a number, zero or above".to_owned())
+    let value = text.trim().parse::<f64>().ok().filter(|value| *value >= 0.0);
+    let usable = value.map(|value| (value, value as f32)).filter(|(value, step)| *value == 0.0 || step.is_normal());
+    usable
+        .map(|(_, step)| step)
+        .ok_or_else(|| format!("expected 0, or a number from {:e} to {:e}", f32::MIN_POSITIVE, f32::MAX))
 }
 
 /// Parses `WxH` in pixels.

@@ -3,7 +3,7 @@
 //! In: the scores of all Gaussians, the Gaussians to keep. Out: the scene with as many. In several rounds, each removes the same fraction of
 //! the remaining Gaussians, trains the others for a while, and scores them again: the worth of a Gaussian depends on which others remain.
 
-use super::Bake;
+use super::inputs::Inputs;
 use super::tuning::short;
 use crate::offline::engine::Engine;
 use crate::offline::fine_tune::fine_tune;
@@ -14,58 +14,56 @@ use crate::offline::store::Key;
 use crate::offline::{OfflineError, Progress, Subject};
 use crate::scene::GaussianScene;
 
-impl Bake<'_> {
-    /// Removes Gaussians in rounds, or all at once if there is one round or nothing is trained. Returns the scene and its key, given that of
-    /// the choice.
-    pub(super) fn thin(
-        &mut self,
-        stages: &mut Stages<'_>,
-        scores: &[f32],
-        score: &str,
-        kept: &[u32],
-        choice: Key,
-    ) -> Result<(GaussianScene, Key), OfflineError> {
-        let rounds = self.settings.rounds;
-        let key = choice.with(self.scene_key).and(&format!("{} Gaussians", kept.len()));
-        match (self.tunes().filter(|_| rounds > 1), score.parse::<Variant>()) {
-            (Some(tuning), Ok(variant)) => {
-                let inputs = key.with(self.images_key).and(&format!("{rounds} rounds of {tuning:?} by {variant:?}"));
-                stages.run(
-                    "rounds",
-                    inputs,
-                    |_| true,
-                    |progress| self.remove_in_rounds(scores, variant, kept.len(), progress),
-                )
-            }
-            _ => {
-                stages.leave_out("rounds", None);
-                Ok((select(&self.subject.scene, kept), key))
-            }
+/// Removes Gaussians in rounds, or all at once if there is one round or nothing is trained. Returns the scene and its key, given that of
+/// the choice.
+pub(super) fn thin(
+    inputs: &mut Inputs<'_>,
+    stages: &mut Stages<'_>,
+    scores: &[f32],
+    score: &str,
+    kept: &[u32],
+    choice: Key,
+) -> Result<(GaussianScene, Key), OfflineError> {
+    let rounds = inputs.settings.rounds;
+    let key = choice.with(inputs.scene_key).and(&format!("{} Gaussians", kept.len()));
+    match (inputs.tunes().filter(|_| rounds > 1), score.parse::<Variant>()) {
+        (Some(tuning), Ok(variant)) => {
+            let key = key.with(inputs.images_key).and(&format!("{rounds} rounds of {tuning:?} by {variant:?}"));
+            stages.run(
+                "rounds",
+                key,
+                |_| true,
+                |progress| remove_in_rounds(inputs, scores, variant, kept.len(), progress),
+            )
+        }
+        _ => {
+            stages.leave_out("rounds", None);
+            Ok((select(&inputs.subject.scene, kept), key))
         }
     }
+}
 
-    fn remove_in_rounds(
-        &mut self,
-        scores: &[f32],
-        variant: Variant,
-        keep: usize,
-        progress: &mut dyn Progress,
-    ) -> Result<GaussianScene, OfflineError> {
-        let counts = counts(self.subject.scene.len(), keep, self.settings.rounds);
-        let mut scene = select(&self.subject.scene, &highest(scores, counts[0]));
-        let images = self.images(progress)?;
-        let tuning = self.tunes().map(short).unwrap_or_default();
-        for &count in &counts[1..] {
-            if let Engine::Gpu(headless) = &mut *self.engine {
-                scene = fine_tune(headless, scene, &images, &tuning, None, progress)?.scene;
-            }
-            let subject = Subject::new(&self.settings.checkpoint, scene, self.settings.background)?;
-            let (scores, _) = self.settings.scoring.scores(self.engine, &subject, &self.splits.train, progress)?;
-            scene = select(&subject.scene, &highest(&scores.of(variant)?, count));
-            progress.note(&format!("{count} Gaussians remain"));
+fn remove_in_rounds(
+    inputs: &mut Inputs<'_>,
+    scores: &[f32],
+    variant: Variant,
+    keep: usize,
+    progress: &mut dyn Progress,
+) -> Result<GaussianScene, OfflineError> {
+    let counts = counts(inputs.subject.scene.len(), keep, inputs.settings.rounds);
+    let mut scene = select(&inputs.subject.scene, &highest(scores, counts[0]));
+    let images = inputs.images(progress)?;
+    let tuning = inputs.tunes().map(short).unwrap_or_default();
+    for &count in &counts[1..] {
+        if let Engine::Gpu(headless) = &mut *inputs.engine {
+            scene = fine_tune(headless, scene, &images, &tuning, None, progress)?.scene;
         }
-        Ok(scene)
+        let subject = Subject::new(&inputs.settings.checkpoint, scene, inputs.settings.background)?;
+        let (scores, _) = inputs.settings.scoring.scores(inputs.engine, &subject, &inputs.splits.train, progress)?;
+        scene = select(&subject.scene, &highest(&scores.of(variant)?, count));
+        progress.note(&format!("{count} Gaussians remain"));
     }
+    Ok(scene)
 }
 
 /// Returns how many Gaussians remain after each round: the same fraction each time, `keep` at the end.

@@ -3,7 +3,8 @@
 //! In: a number of bytes, scores. Out: the number of Gaussians, as far as it can be known before they are trained; as long as the package is
 //! too large, fewer of them ([`Attempts`]).
 
-use super::{Bake, BakeSettings};
+use super::inputs::Inputs;
+use super::settings::BakeSettings;
 use crate::codec::package;
 use crate::offline::package_size::{count_within, fitting};
 use crate::offline::prune::{highest, select};
@@ -38,8 +39,14 @@ struct Attempt {
 }
 
 impl Attempts {
-    /// Returns the attempts of an interrupted bake with the same inputs, or none.
-    pub fn load(store: &Store, key: Key, first: usize) -> Self {
+    /// Returns the attempts of an interrupted bake with the same inputs, or none, given the key of the choice.
+    pub fn load(inputs: &Inputs<'_>, choice: Key, first: usize) -> Self {
+        let BakeSettings { rounds, filter, level, .. } = inputs.settings;
+        let key = choice.and(&format!("attempts {rounds} {filter:?} {level:?} {:?}", inputs.tunes()));
+        Self::of(&inputs.store, key, first)
+    }
+
+    fn of(store: &Store, key: Key, first: usize) -> Self {
         let stored = store.load(FILE, key).and_then(|text| ron::de::from_bytes::<Vec<Attempt>>(&text).ok());
         let made = stored.filter(|made| made.len() < ATTEMPTS && made.iter().all(|attempt| attempt.next < first));
         Self { key, first, made: made.unwrap_or_default() }
@@ -49,113 +56,97 @@ impl Attempts {
     pub fn count(&self) -> usize {
         self.made.last().map_or(self.first, |last| last.next)
     }
-}
-
-impl Bake<'_> {
-    /// Checks, before anything is computed, that there is room for the parts of the package that do not depend on which Gaussians are kept: the
-    /// header and the environment map. A filter and codebooks come with the Gaussians.
-    ///
-    /// # Errors
-    /// There is no room.
-    pub(super) fn require_room(&self) -> Result<(), OfflineError> {
-        let Goal::Size(limit) = self.settings.goal else { return Ok(()) };
-        let least = self.size_of(&[])?;
-        if least > limit {
-            return Err(self.too_small(limit, &format!("a package without Gaussians has {least}")));
-        }
-        Ok(())
-    }
-
-    /// Returns how many of the Gaussians with the highest scores fit into a package of this many bytes, before they are trained.
-    ///
-    /// # Errors
-    /// Not even one Gaussian fits.
-    pub(super) fn count_of_size(
-        &self,
-        limit: u64,
-        scores: &[f32],
-        progress: &mut dyn Progress,
-    ) -> Result<usize, OfflineError> {
-        let total = self.subject.scene.len();
-        let one = self.size_of(&highest(scores, 1))?;
-        if one > limit {
-            return Err(self.too_small(limit, &format!("a package of a single Gaussian has {one}")));
-        }
-        count_within(limit, total, one, |count| self.size_of(&highest(scores, count)), progress)
-    }
-
-    /// Returns the bytes of a package of these Gaussians as they are.
-    fn size_of(&self, kept: &[u32]) -> Result<u64, OfflineError> {
-        let settings = self.settings;
-        let mut scene = select(&self.subject.scene, kept);
-        let interval = scene.trained_with.time_interval;
-        let gaussians = sliced(&scene)?.into_owned();
-        scene.filter = Some(TemporalFilter::support(gaussians.into_iter(), interval, self.key_frames() - 1));
-        let options = match self.tunes() {
-            Some(_) => CompressSettings::suiting(settings.quality, kept.len()),
-            None => CompressSettings::from(settings.quality),
-        };
-        let (compressed, _) = compress(scene.into_runtime()?, &options)?;
-        let mut bytes = Vec::new();
-        package::write(&mut bytes, &compressed, &write_settings(&compressed.form, settings.level))?;
-        Ok(bytes.len() as u64)
-    }
-
-    /// Returns the most bytes that the package may have.
-    pub(super) fn limit(&self) -> u64 {
-        match self.settings.goal {
-            Goal::Size(limit) => limit,
-            Goal::Keep(_) | Goal::Remove(_) | Goal::MaxLoss(_) => u64::MAX,
-        }
-    }
-
-    /// Returns the key of everything that the sizes of packages depend on, given that of the choice.
-    pub(super) fn attempts_key(&self, choice: Key) -> Key {
-        let BakeSettings { rounds, filter, level, .. } = self.settings;
-        choice.and(&format!("attempts {rounds} {filter:?} {level:?} {:?}", self.tunes()))
-    }
 
     /// Decides on fewer Gaussians, at least one, after a package that was too large.
     ///
     /// # Errors
     /// It has been too large several times, or with a single Gaussian. The last package is then kept in the folder of the bake.
     pub(super) fn keep_fewer(
-        &self,
-        attempts: &mut Attempts,
+        &mut self,
+        inputs: &Inputs<'_>,
         package: &[u8],
         scores: &[f32],
         progress: &mut dyn Progress,
     ) -> Result<(), OfflineError> {
-        let (limit, size, before) = (self.limit(), package.len() as u64, attempts.count());
-        if attempts.made.len() + 1 == ATTEMPTS || before <= 1 {
-            let kept = self.kept_aside(package);
+        let (limit, size, before) = (inputs.limit(), package.len() as u64, self.count());
+        if self.made.len() + 1 == ATTEMPTS || before <= 1 {
+            let kept = kept_aside(inputs, package);
             progress.uninterrupted(&mut || write_beside(&kept, |file| file.write_all(package)))?;
             let single = if before <= 1 { "not even with a single Gaussian; " } else { "" };
             let found = format!("{single}the last package that was made has {size} and is kept as {}", kept.display());
-            return Err(self.too_small(limit, &found));
+            return Err(too_small(inputs, limit, &found));
         }
-        let one = self.size_of(&highest(scores, 1))?;
+        let one = size_of(inputs, &highest(scores, 1))?;
         let next = fitting(before, size, limit, one).clamp(1, before - 1);
         progress.note(&format!("the package has {size} bytes, {limit} are allowed: again with {next} Gaussians"));
-        attempts.made.push(Attempt { next });
-        self.store.store(FILE, attempts.key, ron::to_string(&attempts.made)?.as_bytes(), progress)?;
+        self.made.push(Attempt { next });
+        inputs.store.store(FILE, self.key, ron::to_string(&self.made)?.as_bytes(), progress)?;
         Ok(())
     }
+}
 
-    /// Returns where a package that is too large is kept: in the folder of the bake, under a name that no other file has.
-    fn kept_aside(&self, package: &[u8]) -> PathBuf {
-        let folder = self.store.folder();
-        let names = std::iter::once("too-large.gs4d".to_owned()).chain((2..).map(|n| format!("too-large-{n}.gs4d")));
-        let is_free = |path: &PathBuf| !path.exists() || fs::read(path).is_ok_and(|bytes| bytes == package);
-        names.map(|name| folder.join(name)).find(is_free).unwrap_or_default()
+/// Checks, before anything is computed, that there is room for the parts of the package that do not depend on which Gaussians are kept: the
+/// header and the environment map. A filter and codebooks come with the Gaussians.
+///
+/// # Errors
+/// There is no room.
+pub(super) fn require_room(inputs: &Inputs<'_>) -> Result<(), OfflineError> {
+    let Goal::Size(limit) = inputs.settings.goal else { return Ok(()) };
+    let least = size_of(inputs, &[])?;
+    if least > limit {
+        return Err(too_small(inputs, limit, &format!("a package without Gaussians has {least}")));
     }
+    Ok(())
+}
 
-    /// Returns the error that no package has been found that is small enough; `found` describes the smallest.
-    fn too_small(&self, limit: u64, found: &str) -> OfflineError {
-        let remedy = "choose a lower quality or a larger size; a file that was here before has not changed";
-        let reason = format!("this capture does not fit into {limit} bytes: {found}; {remedy}");
-        OfflineError::at(&self.settings.out, reason)
+/// Returns how many of the Gaussians with the highest scores fit into a package of this many bytes, before they are trained.
+///
+/// # Errors
+/// Not even one Gaussian fits.
+pub(super) fn count_of_size(
+    inputs: &Inputs<'_>,
+    limit: u64,
+    scores: &[f32],
+    progress: &mut dyn Progress,
+) -> Result<usize, OfflineError> {
+    let total = inputs.subject.scene.len();
+    let one = size_of(inputs, &highest(scores, 1))?;
+    if one > limit {
+        return Err(too_small(inputs, limit, &format!("a package of a single Gaussian has {one}")));
     }
+    count_within(limit, total, one, |count| size_of(inputs, &highest(scores, count)), progress)
+}
+
+/// Returns the bytes of a package of these Gaussians as they are.
+fn size_of(inputs: &Inputs<'_>, kept: &[u32]) -> Result<u64, OfflineError> {
+    let settings = inputs.settings;
+    let mut scene = select(&inputs.subject.scene, kept);
+    let interval = scene.trained_with.time_interval;
+    let gaussians = sliced(&scene)?.into_owned();
+    scene.filter = Some(TemporalFilter::support(gaussians.into_iter(), interval, inputs.key_frames() - 1));
+    let options = match inputs.tunes() {
+        Some(_) => CompressSettings::suiting(settings.quality, kept.len()),
+        None => CompressSettings::from(settings.quality),
+    };
+    let (compressed, _) = compress(scene.into_runtime()?, &options)?;
+    let mut bytes = Vec::new();
+    package::write(&mut bytes, &compressed, &write_settings(&compressed.form, settings.level))?;
+    Ok(bytes.len() as u64)
+}
+
+/// Returns where a package that is too large is kept: in the folder of the bake, under a name that no other file has.
+fn kept_aside(inputs: &Inputs<'_>, package: &[u8]) -> PathBuf {
+    let folder = inputs.store.folder();
+    let names = std::iter::once("too-large.gs4d".to_owned()).chain((2..).map(|n| format!("too-large-{n}.gs4d")));
+    let is_free = |path: &PathBuf| !path.exists() || fs::read(path).is_ok_and(|bytes| bytes == package);
+    names.map(|name| folder.join(name)).find(is_free).unwrap_or_default()
+}
+
+/// Returns the error that no package has been found that is small enough; `found` describes the smallest.
+fn too_small(inputs: &Inputs<'_>, limit: u64, found: &str) -> OfflineError {
+    let remedy = "choose a lower quality or a larger size; a file that was here before has not changed";
+    let reason = format!("this capture does not fit into {limit} bytes: {found}; {remedy}");
+    OfflineError::at(&inputs.settings.out, reason)
 }
 
 #[cfg(test)]
@@ -169,8 +160,8 @@ mod tests {
         let (key, other) = (Key::of(b"these inputs"), Key::of(b"other inputs"));
         let text = ron::to_string(&vec![Attempt { next: 30 }, Attempt { next: 20 }]).expect("attempts are text");
         store.store(FILE, key, text.as_bytes(), &mut crate::offline::NoProgress).expect("the folder can be written to");
-        assert_eq!(Attempts::load(&store, key, 40).count(), 20, "the bake resumes with the count of the last attempt");
-        assert_eq!(Attempts::load(&store, other, 40).count(), 40, "other inputs begin with the first count");
-        assert_eq!(Attempts::load(&store, key, 25).count(), 25, "attempts that do not follow from the first count");
+        assert_eq!(Attempts::of(&store, key, 40).count(), 20, "the bake resumes with the count of the last attempt");
+        assert_eq!(Attempts::of(&store, other, 40).count(), 40, "other inputs begin with the first count");
+        assert_eq!(Attempts::of(&store, key, 25).count(), 25, "attempts that do not follow from the first count");
     }
 }

@@ -1,13 +1,13 @@
 //! The stage report of a bake.
 //!
-//! In: the Gaussians before and after, the package, the choices, the test views. Out: the [`BakeReport`], and its two
-//! files.
+//! In: the Gaussians before and after, the package, the choices, the test views. Out: the [`BakeReport`].
 
-use super::BakeSettings;
 use super::choice::Choice;
+use super::settings::BakeSettings;
 use super::tuning::Tuning;
 use crate::codec::package;
 use crate::gaussian::Gaussian;
+use crate::offline::OfflineError;
 use crate::offline::quantize::Quality;
 use crate::offline::report::{
     Activity, BakeReport, Change, SectionSize, StageTime, VarianceHistogram, even_times, filter_shares,
@@ -15,12 +15,9 @@ use crate::offline::report::{
 use crate::offline::search::Goal;
 use crate::offline::temporal_filter::filter_name;
 use crate::offline::test_comparison::Compared;
-use crate::offline::{OfflineError, Progress, write_beside};
 use crate::scene::{TemporalFilter, TrainedWith};
-use std::ffi::OsString;
 use std::fs::{self, File};
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Number of times at which the active sets are computed.
 const TIMES: usize = 61;
@@ -111,34 +108,6 @@ fn in_words(tuning: &Tuning) -> String {
         }
         _ => format!("{steps}, no validation views"),
     }
-}
-
-/// Writes the report beside the package, as JSON and as an HTML page. Returns the paths of both.
-///
-/// # Errors
-/// A folder that cannot be written to, a full disk.
-pub(super) fn write(
-    report: &BakeReport,
-    out: &Path,
-    progress: &mut dyn Progress,
-) -> Result<[PathBuf; 2], OfflineError> {
-    let paths = paths(out);
-    for (path, text) in paths.iter().zip([format!("{:#}\n", report.json()?), report.html()]) {
-        progress.uninterrupted(&mut || write_beside(path, |file| file.write_all(text.as_bytes())))?;
-    }
-    Ok(paths)
-}
-
-/// Returns the paths of the report beside a package, as JSON and as an HTML page.
-pub(super) fn paths(out: &Path) -> [PathBuf; 2] {
-    [".report.json", ".report.html"].map(|ending| beside(out, ending))
-}
-
-/// Returns the path with `ending` in place of its extension: `scene.report.json` beside `scene.gs4d`.
-fn beside(out: &Path, ending: &str) -> PathBuf {
-    let mut name: OsString = out.file_stem().unwrap_or_default().to_owned();
-    name.push(ending);
-    out.with_file_name(name)
 }
 
 fn file_size(path: &Path) -> Result<u64, OfflineError> {

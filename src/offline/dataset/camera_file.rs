@@ -11,7 +11,7 @@ use glam::{DMat3, DMat4, DVec2, DVec4, Mat4, UVec2};
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::lens::{LensEntries, OriginalLens, checked_size, reduced};
+use super::lens::{LensEntries, OriginalLens, check_centered, check_pinhole, checked_size, reduced};
 use super::{DatasetError, FrameProblem, MAX_SIDE, Split, TrainingView};
 use crate::codec::text::is_obeyed;
 use crate::offline::picture_file;
@@ -61,7 +61,7 @@ struct TransformsFrame {
     mask_path: Option<String>,
 }
 
-/// One golden view. Its principal point is always the center and is not read.
+/// One golden view. Its principal point is the center.
 #[derive(Deserialize)]
 #[serde(expecting = "an object")]
 struct GoldenFrame {
@@ -72,6 +72,8 @@ struct GoldenFrame {
     height: f64,
     fl_x: f64,
     fl_y: f64,
+    cx: Option<f64>,
+    cy: Option<f64>,
     world_to_camera_opencv: [[f64; 4]; 4],
 }
 
@@ -142,9 +144,12 @@ impl CameraFile {
     fn frames(&self) -> Result<Vec<Frame>, DatasetError> {
         let shared = LensEntries::deserialize(&self.json)
             .map_err(|reason| DatasetError::Json { path: self.path.clone(), reason })?;
-        let parse = |entry| match self.form {
-            Form::Transforms => transforms_frame(entry, &shared),
-            Form::Golden => golden_frame(entry),
+        let parse = |entry| {
+            check_pinhole(entry, &self.json)?;
+            match self.form {
+                Form::Transforms => transforms_frame(entry, &shared),
+                Form::Golden => golden_frame(entry),
+            }
         };
         self.entries()
             .iter()
@@ -262,6 +267,8 @@ fn transforms_frame(entry: &Value, shared: &LensEntries) -> Result<Frame, FrameP
 
 fn golden_frame(entry: &Value) -> Result<Frame, FrameProblem> {
     let frame = GoldenFrame::deserialize(entry).map_err(FrameProblem::Malformed)?;
+    check_centered("cx", frame.cx, frame.width)?;
+    check_centered("cy", frame.cy, frame.height)?;
     let tangents = DVec2::new(frame.width / (2.0 * frame.fl_x), frame.height / (2.0 * frame.fl_y));
     Ok(Frame {
         file: frame.file,

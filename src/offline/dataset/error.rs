@@ -117,6 +117,20 @@ pub enum DatasetError {
         /// How many were looked for.
         total: usize,
     },
+    /// An image or a mask has another shape than the pictures of the camera file, so that it would be stretched.
+    #[error(
+        "{}: {} x {} pixels do not have the aspect ratio of the pictures of the camera file, {} x {}: crop it to that aspect ratio, or \
+         correct the size in the camera file (without one, it is that of the first image)",
+        .path.display(), .size.x, .size.y, .expected.x, .expected.y
+    )]
+    Aspect {
+        /// The image or the mask.
+        path: PathBuf,
+        /// Its width and height, pixels.
+        size: UVec2,
+        /// Width and height according to the camera file, pixels.
+        expected: UVec2,
+    },
     /// An image cannot be decoded, or is larger than the camera file says.
     #[error(transparent)]
     Image(#[from] PictureError),
@@ -146,6 +160,30 @@ pub enum FrameProblem {
     /// The values of the lens are not those of a camera.
     #[error("the lens cannot be used: focal lengths must be above 0 and every value finite (in float32)")]
     Lens,
+    /// An entry describes a picture that is not that of a pinhole camera.
+    #[error(
+        "{entry} is not 0, and a distorted picture cannot be used: {UNDISTORT}; then remove {entry}, or set it to 0"
+    )]
+    Distorted {
+        /// Name of the entry.
+        entry: &'static str,
+    },
+    /// The camera model is not a pinhole camera.
+    #[error("camera_model is \"{0}\", and only pinhole cameras can be used: {UNDISTORT}; then write PINHOLE")]
+    CameraModel(String),
+    /// The principal point of a golden view is not the center of the picture.
+    #[error(
+        "{entry} is {found}, and golden views have their principal point at the center, {center}: write the views as a transforms file, \
+         whose fl_x, fl_y, cx and cy are used"
+    )]
+    PrincipalPoint {
+        /// Name of the entry: `cx` or `cy`.
+        entry: &'static str,
+        /// Its value, pixels.
+        found: f64,
+        /// Half the width or half the height, pixels.
+        center: f64,
+    },
     /// A number that follows from the lens and the pose is not finite.
     #[error(
         "the projection of camera {0:?} is not finite: check its focal lengths and principal point, or its field of view, \
@@ -161,6 +199,9 @@ pub enum FrameProblem {
         height: f64,
     },
 }
+
+/// The remedy for pictures of a lens that is not a pinhole.
+const UNDISTORT: &str = "undistort the images first, as COLMAP's image_undistorter does";
 
 /// Prints some of `total` paths.
 struct Listing<'a>(&'a [PathBuf], usize);

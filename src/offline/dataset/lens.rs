@@ -1,16 +1,46 @@
 //! Picture sizes and lenses of training views.
 //!
 //! In: sizes, focal lengths and angles of a camera file, in pixels of the original pictures, and the requested size or
-//! resolution. Out: the size to render at and the [`Lens`] for it.
+//! resolution. Out: the size to render at and the [`Lens`] for it, or an error for a lens that is not a pinhole.
 
 use glam::{DVec2, UVec2};
 use serde::Deserialize;
+use serde_json::Value;
 
 use super::{DatasetError, FrameProblem, MAX_SIDE};
+use crate::codec::text::printable;
 use crate::view::{Camera, Lens};
 
 /// The largest width with `--resolution -1`, pixels.
 const AUTOMATIC_WIDTH: f64 = 1600.0;
+
+/// Entries of camera files that distort the picture unless they are 0, `false` or lists of zeros: radial and tangential coefficients as
+/// COLMAP, OpenCV and nerfstudio name them, a fisheye lens, an f-theta lens, and a rolling shutter as instant-ngp names them.
+const DISTORTING: [&str; 16] = [
+    "k1",
+    "k2",
+    "k3",
+    "k4",
+    "k5",
+    "k6",
+    "p1",
+    "p2",
+    "distortion_params",
+    "is_fisheye",
+    "rolling_shutter",
+    "ftheta_p0",
+    "ftheta_p1",
+    "ftheta_p2",
+    "ftheta_p3",
+    "ftheta_p4",
+];
+
+/// The entry that names the camera model, and the models that are pinhole cameras if every coefficient is 0.
+const CAMERA_MODEL: &str = "camera_model";
+const PINHOLES: [&str; 3] = ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV"];
+
+/// Largest distance of the principal point of a golden view from the center of the picture, pixels: that of a rounded decimal number.
+const CENTERED: f64 = 1e-3;
 
 /// The camera entries of a file or of one of its frames.
 #[derive(Debug, Clone, Copy, Default, Deserialize)]
@@ -85,6 +115,40 @@ impl OriginalLens {
         };
         let usable = positive.is_finite() && positive.min_element() > 0.0 && offset.is_finite();
         if usable { Ok(lens) } else { Err(FrameProblem::Lens) }
+    }
+}
+
+/// Checks that a frame is the picture of a pinhole camera. An entry of the frame replaces that of the whole file; `null` is no entry.
+pub(super) fn check_pinhole(frame: &Value, file: &Value) -> Result<(), FrameProblem> {
+    let entry = |name| [frame, file].into_iter().filter_map(|from| from.get(name)).find(|value| !value.is_null());
+    if let Some(model) = entry(CAMERA_MODEL) {
+        let is_pinhole = |model: &str| PINHOLES.iter().any(|name| model.eq_ignore_ascii_case(name));
+        if !model.as_str().is_some_and(is_pinhole) {
+            let shown = model.as_str().map_or_else(|| model.to_string(), str::to_owned);
+            return Err(FrameProblem::CameraModel(printable(&shown)));
+        }
+    }
+    match DISTORTING.into_iter().find(|name| entry(name).is_some_and(|value| !is_zero(value))) {
+        Some(entry) => Err(FrameProblem::Distorted { entry }),
+        None => Ok(()),
+    }
+}
+
+fn is_zero(value: &Value) -> bool {
+    match value {
+        Value::Null | Value::Bool(false) => true,
+        Value::Number(number) => number.as_f64() == Some(0.0),
+        Value::Array(values) => values.iter().all(is_zero),
+        Value::Bool(true) | Value::String(_) | Value::Object(_) => false,
+    }
+}
+
+/// Checks that a coordinate of the principal point, if given, is half the side of the picture.
+pub(super) fn check_centered(entry: &'static str, found: Option<f64>, side: f64) -> Result<(), FrameProblem> {
+    let center = side / 2.0;
+    match found {
+        Some(found) if (found - center).abs() > CENTERED => Err(FrameProblem::PrincipalPoint { entry, found, center }),
+        _ => Ok(()),
     }
 }
 

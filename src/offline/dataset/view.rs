@@ -28,7 +28,7 @@ pub struct TrainingView {
     /// Timestamp, in the capture's unit.
     pub time: f32,
     /// Size of the image as the camera file, or else the first image, says, pixels. An image with a side of more than four
-    /// times that is not decoded.
+    /// times that is not decoded, and one of another aspect ratio is not used.
     pub original: UVec2,
     /// Path of the image, which may not exist.
     pub image: PathBuf,
@@ -93,8 +93,22 @@ impl TrainingView {
     /// Decodes the image or the mask.
     fn decode(&self, path: &Path) -> Result<DynamicImage, DatasetError> {
         let largest = self.original.saturating_mul(UVec2::splat(LARGER)).min(UVec2::splat(MAX_SIDE));
-        Ok(picture_file::open(path, largest)?)
+        let image = picture_file::open(path, largest)?;
+        let (size, expected) = (UVec2::new(image.width(), image.height()), self.original);
+        if has_aspect_of(size, expected) {
+            Ok(image)
+        } else {
+            Err(DatasetError::Aspect { path: path.to_owned(), size, expected })
+        }
     }
+}
+
+/// Returns whether one of two sizes, scaled to the width or the height of the other, differs from it by at most one pixel: a scaled
+/// picture has rounded sides.
+fn has_aspect_of(a: UVec2, b: UVec2) -> bool {
+    let [ax, ay, bx, by] = [a.x, a.y, b.x, b.y].map(u64::from);
+    // Scaled to the width of a, the height of b differs by |ax · by − ay · bx| / bx; the other three are alike.
+    (ax * by).abs_diff(ay * bx) <= ax.max(ay).max(bx).max(by)
 }
 
 /// Multiplies RGB by alpha in double precision, and truncates to 8 bits.

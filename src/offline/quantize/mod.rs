@@ -55,7 +55,7 @@ pub enum CompressError {
     #[error("at most {MAX_STAGES} codebooks of 1 to 65536 entries each, not {0:?}")]
     Codebooks(Vec<usize>),
     /// Colors cannot be rounded to multiples of this.
-    #[error("colours cannot be rounded to multiples of {0}: it must be a number, zero or above")]
+    #[error("colors cannot be rounded to multiples of {0:?}: the step must be 0, or a number from {least:e} up", least = f32::MIN_POSITIVE)]
     ColorStep(f32),
     /// The values of the scene have too large a range.
     #[error(
@@ -162,7 +162,7 @@ fn compress_by(
         return Err(CompressError::Codebooks(books.clone()));
     }
     let step = settings.color_step;
-    if !step.is_finite() || step < 0.0 {
+    if step != 0.0 && !(step.is_normal() && step > 0.0) {
         return Err(CompressError::ColorStep(step));
     }
     let mut report = CompressReport { gaussians: scene.len(), memory_before: scene.size(), ..Default::default() };

@@ -47,7 +47,7 @@ pub struct CompressSettings {
     /// Number of entries of each codebook of color, at most four; without any, every coefficient is kept.
     pub codebooks: Vec<usize>,
     /// Without codebooks, coefficients are rounded to multiples of this, so that they compress; 0 keeps them as they
-    /// are.
+    /// are. A step above 0 must be a normal number: multiples of a subnormal one are not accurate.
     pub color_step: f32,
     /// Weight of each Gaussian's color, not negative, in the order of the scene; `None` weighs by opacity.
     #[serde(skip)]

@@ -2,10 +2,12 @@
 //!
 //! In: the results of the stages of a bake. Out: a [`BakeReport`], as JSON and as one self-contained HTML page.
 
+mod files;
 mod html;
 mod plot;
 mod temporal;
 
+pub use files::{report_paths, write_report};
 pub use plot::{Axis, Chart, Series, bars};
 pub use temporal::{Activity, VarianceHistogram, even_times, filter_shares};
 

@@ -47,7 +47,7 @@ fn toybox_test_split_is_read() {
     assert_eq!(dataset.views.len(), 60, "two cameras of thirty frames");
     assert_eq!((dataset.views[0].name.as_str(), dataset.views[0].time), ("c04_f00", 0.0), "the first frame");
     assert!(dataset.views.iter().all(|view| view.camera.size == UVec2::splat(400)), "400x400 everywhere");
-    assert!(dataset.require_images().is_ok(), "images and masks are all there");
+    assert!(dataset.require_images().is_ok(), "every image and mask exists");
     for golden in ["golden_vanilla.json", "golden_4dgs1k.json", "golden_45k.json"] {
         assert_golden_cameras(&folder, golden, &CameraOptions::default());
     }
@@ -59,7 +59,7 @@ fn toybox_test_split_is_read() {
 }
 
 #[test]
-fn standup_at_resolution_two_equals_the_originals_values() {
+fn standup_at_resolution_two_has_the_values_of_the_original() {
     let Some(folder) = capture("standup") else { return };
     let options = resolution_option(2);
     let dataset = Dataset::open(&folder, Split::Test, &options).expect("a dataset");
@@ -80,6 +80,6 @@ fn standup_training_cameras_need_no_training_images() {
     let dataset = Dataset::open(&folder, Split::Train, &resolution_option(2)).expect("cameras");
     assert_eq!(dataset.views.len(), 150, "every training camera");
     assert_eq!(dataset.views[0].camera.size, UVec2::splat(400), "the size comes from the test images");
-    let error = dataset.require_images().expect_err("the training images are not there").to_string();
+    let error = dataset.require_images().expect_err("the training images do not exist").to_string();
     assert!(error.contains("150 of 150"), "{error}");
 }

@@ -100,7 +100,7 @@ fn transparent_images_are_multiplied_by_alpha_once() {
 }
 
 #[test]
-fn masks_are_coverage_and_not_multiplied_in() {
+fn masks_are_returned_as_coverage_and_not_multiplied() {
     let folder = Folder::new();
     let masked = noise_view(&folder, true).load_covered().expect("an image");
     assert_eq!(bytes(&masked), (OVER_BLACK.to_vec(), MASK.to_vec()), "the image as it is, and the mask resampled");
@@ -120,7 +120,7 @@ fn an_image_that_is_brighter_than_its_mask_is_clamped() {
 }
 
 #[test]
-fn opaque_images_of_the_right_size_survive_exactly() {
+fn opaque_images_of_the_right_size_are_unchanged() {
     let folder = Folder::new();
     folder.write_rgb("a.png", 16, 16);
     let path = folder.write_json("transforms_test.json", &json!({"camera_angle_x": 0.8, "frames": [frame("a")]}));
@@ -142,7 +142,7 @@ fn missing_images_are_counted_and_the_first_ones_named() {
     folder.write_json("transforms_train.json", &with(transforms(), "/frames", json!(frames)));
     folder.write_rgb("r_000.png", 4, 4);
     let dataset = Dataset::open(folder.path(), Split::Train, &CameraOptions::default()).expect("cameras suffice");
-    let error = dataset.require_images().expect_err("nine are missing").to_string();
+    let error = dataset.require_images().expect_err("nine images are missing").to_string();
     for part in ["9 of 10", "r_001.png", "and 5 more"] {
         assert!(error.contains(part), "{part} is not in: {error}");
     }
@@ -151,7 +151,7 @@ fn missing_images_are_counted_and_the_first_ones_named() {
     for (i, _) in frames.iter().enumerate() {
         folder.write_rgb(&format!("r_{i:03}.png"), 4, 4);
     }
-    assert!(dataset.require_images().is_ok(), "all are there now");
+    assert!(dataset.require_images().is_ok(), "no image is missing");
 }
 
 #[test]
@@ -174,7 +174,7 @@ fn view_of(folder: &Folder, image: &str, size: u32) -> TrainingView {
 }
 
 #[test]
-fn jpegs_that_are_not_whole_are_refused() {
+fn truncated_jpegs_are_refused() {
     let folder = Folder::new();
     folder.write_rgb("a.jpg", 40, 40);
     let view = view_of(&folder, "a.jpg", 40);
@@ -212,7 +212,42 @@ fn images_far_larger_than_the_camera_file_says_are_not_decoded() {
 }
 
 #[test]
-fn masks_have_the_same_limits() {
+fn images_of_another_aspect_ratio_are_refused() {
+    let folder = Folder::new();
+    let json = json!({"camera_angle_x": 0.8, "w": 40, "h": 30, "frames": [frame("a.png")]});
+    let json = with(json, "/frames/0/mask_path", json!("m.png"));
+    let path = folder.write_json("transforms_test.json", &json);
+    let load = |options: &CameraOptions| CameraFile::load(&path, options).expect("a valid camera file").remove(0);
+    let view = load(&CameraOptions::default());
+    // Scaled to a side of the other size, the other side differs by at most one pixel.
+    let similar = [(40, 30), (80, 60), (80, 61), (79, 60), (41, 30), (40, 29), (20, 15), (13, 10), (13, 9), (160, 116)];
+    let different = [(40, 32), (42, 30), (30, 40), (80, 64), (80, 57), (20, 13), (160, 115), (1, 30), (40, 1)];
+    let sizes = similar.map(|size| (size, true)).into_iter().chain(different.map(|size| (size, false)));
+    for ((width, height), accepted) in sizes {
+        for (changed, other) in [("a.png", "m.png"), ("m.png", "a.png")] {
+            folder.write_rgb(changed, width, height);
+            folder.write_rgb(other, 40, 30);
+            let what = format!("{changed} of {width} x {height}");
+            let Err(error) = view.load_covered() else {
+                assert!(accepted, "{what} must be refused");
+                continue;
+            };
+            assert!(!accepted && matches!(error, DatasetError::Aspect { .. }), "{what}: {error}");
+            for part in [changed, &format!("{width} x {height}"), "40 x 30", "crop"] {
+                assert!(error.to_string().contains(part), "{what}: {part:?} is not in: {error}");
+            }
+        }
+    }
+    // A size that is asked for may have another aspect ratio: that of the images counts.
+    folder.write_rgb("a.png", 80, 60);
+    folder.write_rgb("m.png", 40, 30);
+    let square = load(&CameraOptions { size: Some(UVec2::splat(16)), ..CameraOptions::default() });
+    let loaded = square.load_covered().expect("an image of the right aspect ratio");
+    assert_eq!(loaded.size, UVec2::splat(16), "the requested size");
+}
+
+#[test]
+fn masks_have_the_limits_of_images() {
     let folder = Folder::new();
     folder.write_rgb("a.png", 8, 8);
     folder.write_rgb("m.jpg", 40, 40);
@@ -224,11 +259,11 @@ fn masks_have_the_same_limits() {
     assert!(message.contains("m.jpg") && message.contains("40 x 40"), "{message}");
 }
 
-/// Returns a PNG of one pixel whose header says that it has `side` times `side`.
+/// Returns a PNG of one pixel whose header gives `side` for width and height.
 fn claiming(folder: &Folder, side: u32) -> Vec<u8> {
     folder.write_rgb("one.png", 1, 1);
     let mut bytes = fs::read(folder.path().join("one.png")).expect("the image");
-    // The header's chunk follows the signature: length, name, width, height, five bytes, checksum.
+    // The chunk of the header follows the signature: length, name, width, height, five bytes, checksum.
     bytes[16..20].copy_from_slice(&side.to_be_bytes());
     bytes[20..24].copy_from_slice(&side.to_be_bytes());
     let checksum = crc32fast::hash(&bytes[12..29]);
@@ -237,13 +272,13 @@ fn claiming(folder: &Folder, side: u32) -> Vec<u8> {
 }
 
 #[test]
-fn a_camera_file_cannot_ask_for_any_size() {
+fn the_size_in_a_camera_file_is_limited() {
     let folder = Folder::new();
     folder.write("a.png", claiming(&folder, MAX_SIDE));
     let error = view_of(&folder, "a.png", MAX_SIDE).load_covered().expect_err("too much");
     assert!(matches!(error, DatasetError::Image(PictureError::FarTooLarge { .. })), "{error}");
     let without_size = json!({"camera_angle_x": 0.8, "frames": [frame("a.png")]});
     let path = folder.write_json("transforms_test.json", &without_size);
-    let error = CameraFile::load(&path, &CameraOptions::default()).expect_err("no size to go by");
+    let error = CameraFile::load(&path, &CameraOptions::default()).expect_err("the size is unknown");
     assert!(matches!(error, DatasetError::Image(_)) && error.to_string().contains("a.png"), "{error}");
 }

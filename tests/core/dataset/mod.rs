@@ -69,6 +69,14 @@ fn transforms() -> Value {
     json!({"camera_angle_x": 0.8, "w": 800, "h": 400, "frames": [frame("./a")]})
 }
 
+/// Returns a golden file of one view, 640x400.
+fn golden() -> Value {
+    json!({"background": [0, 0, 0], "views": [{
+        "file": "./images/c04_f20.jpg", "time": 0.5, "width": 640, "height": 400, "fl_x": 320.0, "fl_y": 400.0,
+        "cx": 320.0, "cy": 200.0, "world_to_camera_opencv": [[1, 0, 0, 4], [0, 1, 0, 5], [0, 0, 1, 6], [0, 0, 0, 1]],
+    }]})
+}
+
 /// Returns the JSON with the value at a pointer replaced, or added to an object.
 fn with(mut json: Value, pointer: &str, value: Value) -> Value {
     let (parent, key) = pointer.rsplit_once('/').expect("a JSON pointer");
@@ -118,9 +126,9 @@ fn opengl_pose_becomes_opencv_world_to_camera() {
     let pose = json!([[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]);
     let view = load_one(&with(transforms(), "/frames/0/transform_matrix", pose), &CameraOptions::default());
     let expected = Mat4::from_cols(Vec4::X, -Vec4::Y, -Vec4::Z, Vec4::new(-1.0, 2.0, 3.0, 1.0));
-    assert_eq!(view.camera.world_to_camera, expected, "y and z turn round");
+    assert_eq!(view.camera.world_to_camera, expected, "y and z are negated");
     let ahead = view.camera.world_to_camera.transform_point3(Vec3::new(1.0, 2.0, 0.0));
-    assert_eq!(ahead, Vec3::new(0.0, 0.0, 3.0), "three units ahead, along OpenGL's -z");
+    assert_eq!(ahead, Vec3::new(0.0, 0.0, 3.0), "three units ahead, along −z of OpenGL");
 }
 
 #[test]
@@ -137,7 +145,7 @@ fn frames_keep_order_names_times_and_paths() {
     assert_eq!(times, [0.0, 0.25, 0.0, 0.0], "0 where no time is given");
     let images = ["./test/r_000.png", "images/c04.JPG", "cam00/frame.001.png", "other/r_000.png"];
     for (view, image) in views.iter().zip(images) {
-        assert_eq!(view.image, folder.path().join(image), "beside the camera file");
+        assert_eq!(view.image, folder.path().join(image), "next to the camera file");
     }
     assert_eq!(views[1].mask, Some(folder.path().join("./masks/c04.png")), "mask_path");
     assert_eq!(views[0].mask, None, "no mask_path");
@@ -161,7 +169,7 @@ fn intrinsics_follow_resolution_and_size() {
     assert_lens(&load_one(&shared, &resolution_option(2)), false, &[450.0, 440.0, 205.0, 95.0]);
     let stretched = load_one(&shared, &size_option(400, 100));
     assert_lens(&stretched, false, &[450.0, 220.0, 205.0, 47.5]);
-    assert_eq!(stretched.camera.size, UVec2::new(400, 100), "the size asked for");
+    assert_eq!(stretched.camera.size, UVec2::new(400, 100), "the requested size");
     let per_frame = with(shared, "/frames/0/fl_x", json!(1000));
     assert_lens(&load_one(&per_frame, &CameraOptions::default()), false, &[1000.0, 880.0, 410.0, 190.0]);
     let incomplete = with(transforms(), "/fl_x", json!(900));
@@ -169,7 +177,7 @@ fn intrinsics_follow_resolution_and_size() {
 }
 
 #[test]
-fn picture_size_is_found_where_it_is_given() {
+fn the_picture_size_comes_from_the_option_the_file_or_the_first_image() {
     let frames_only = json!({"camera_angle_x": 0.8, "frames": [frame("missing"), frame("b")]});
     let folder = Folder::new();
     let test = folder.write_json("transforms_test.json", &frames_only);
@@ -180,7 +188,7 @@ fn picture_size_is_found_where_it_is_given() {
     assert!(error.contains("add them") && error.contains("transforms_test.json"), "{error}");
     assert_eq!(sizes(&size_option(70, 50)).expect("a size"), [UVec2::new(70, 50); 2], "the option");
 
-    // A sibling split with an image, behind a sibling that is not JSON.
+    // A sibling split with an image, after a sibling that is not JSON.
     folder.write("transforms_val.json", "{");
     folder.write_json("transforms_train.json", &json!({"frames": [frame("c")]}));
     folder.write_rgb("c.png", 40, 24);
@@ -189,16 +197,16 @@ fn picture_size_is_found_where_it_is_given() {
     folder.write_rgb("b.png", 20, 10);
     assert_eq!(sizes(&CameraOptions::default()).expect("a size"), [UVec2::new(20, 10); 2], "the first image found");
     assert_eq!(sizes(&resolution_option(2)).expect("a size"), [UVec2::new(10, 5); 2], "after the resolution");
-    assert_eq!(sizes(&size_option(70, 50)).expect("a size"), [UVec2::new(70, 50); 2], "the option comes first");
+    assert_eq!(sizes(&size_option(70, 50)).expect("a size"), [UVec2::new(70, 50); 2], "the option has precedence");
 
     let per_frame = with(with(frames_only, "/frames/0/w", json!(64.0)), "/frames/0/h", json!(32));
     folder.write_json("transforms_test.json", &per_frame);
     let expected = [UVec2::new(64, 32), UVec2::new(20, 10)];
-    assert_eq!(sizes(&CameraOptions::default()).expect("a size"), expected, "one frame says its own");
+    assert_eq!(sizes(&CameraOptions::default()).expect("a size"), expected, "one frame has its own size");
 }
 
 #[test]
-fn an_unreadable_image_matters_only_where_it_must_give_the_size() {
+fn an_unreadable_image_is_an_error_only_if_the_size_depends_on_it() {
     let folder = Folder::new();
     let path = folder.write_json("transforms_test.json", &json!({"camera_angle_x": 0.8, "frames": [frame("a")]}));
     folder.write("a.png", "not an image");
@@ -213,32 +221,33 @@ fn frames_outside_the_interval_are_dropped() {
     let json = with(transforms(), "/frames", json!(frames));
     let interval = |start, end| CameraOptions { time_interval: Some([start, end]), ..Default::default() };
     let times = |options| load(&json, &options).map(|views| views.iter().map(|view| view.time).collect::<Vec<_>>());
-    assert_eq!(times(CameraOptions::default()).expect("views").len(), 4, "no interval, nothing dropped");
+    assert_eq!(times(CameraOptions::default()).expect("views").len(), 4, "without an interval no frame is dropped");
     assert_eq!(times(interval(0.5, 1.0)).expect("views"), [0.5, 1.0], "ends included");
-    let error = times(interval(2.0, 3.0)).expect_err("nothing left").to_string();
+    let error = times(interval(2.0, 3.0)).expect_err("no frame is left").to_string();
     assert!(error.contains("2,3") && error.contains("0 to 1.5"), "{error}");
 }
 
 #[test]
 fn golden_views_are_fov_cameras_of_their_own_size() {
-    let golden = json!({"background": [0, 0, 0], "views": [{
-        "file": "./images/c04_f20.jpg", "time": 0.5, "width": 640, "height": 400, "fl_x": 320.0, "fl_y": 400.0,
-        "cx": 320.0, "cy": 200.0, "world_to_camera_opencv": [[1, 0, 0, 4], [0, 1, 0, 5], [0, 0, 1, 6], [0, 0, 0, 1]],
-    }]});
+    let golden = golden();
     for options in [CameraOptions::default(), resolution_option(2)] {
         let view = load_one(&golden, &options);
         assert_eq!((view.name.as_str(), view.time), ("c04_f20", 0.5), "name and time");
-        assert_eq!(view.camera.size, UVec2::new(640, 400), "used as it is");
-        assert_eq!(view.camera.world_to_camera, Mat4::from_translation(Vec3::new(4.0, 5.0, 6.0)), "no axes turned");
+        assert_eq!(view.camera.size, UVec2::new(640, 400), "the size is not reduced");
+        assert_eq!(
+            view.camera.world_to_camera,
+            Mat4::from_translation(Vec3::new(4.0, 5.0, 6.0)),
+            "the axes are not changed"
+        );
         assert_lens(&view, true, &[1.0, 0.5]);
     }
     let other = load_one(&golden, &size_option(64, 64));
-    assert_eq!(other.camera.size, UVec2::new(64, 64), "the size asked for");
+    assert_eq!(other.camera.size, UVec2::new(64, 64), "the requested size");
     assert_lens(&other, true, &[1.0, 0.5]);
 }
 
 #[test]
-fn lego_is_tested_on_its_val_split() {
+fn the_test_split_of_lego_is_val() {
     let folder = Folder::new();
     for (split, name) in [("test", "t"), ("val", "v"), ("train", "n")] {
         for scene in ["lego", "hook"] {
@@ -250,7 +259,7 @@ fn lego_is_tested_on_its_val_split() {
         let dataset = Dataset::open(&folder.path().join(scene), split, &CameraOptions::default()).expect("a dataset");
         dataset.views[0].name.clone()
     };
-    assert_eq!(first("lego", Split::Test), "v", "val stands in for test");
+    assert_eq!(first("lego", Split::Test), "v", "val replaces test");
     assert_eq!(first("lego", Split::Train), "n", "train stays");
     assert_eq!(first("hook", Split::Test), "t", "other scenes have their own test set");
 }

@@ -11,11 +11,11 @@ use glam::UVec2;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
-use super::{Folder, identity, lens_values, load, resolution_option, transforms, with};
+use super::{Folder, golden, identity, lens_values, load, resolution_option, transforms, with};
 use crate::support::skip::skip;
 
 #[test]
-fn wrong_entries_are_errors_that_name_file_frame_and_reason() {
+fn invalid_entries_are_errors_that_name_file_frame_and_reason() {
     let singular = json!([[1, 0, 0, 0], [2, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]);
     let projective = json!([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 1, 1]]);
     let three_rows = json!([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]);
@@ -62,18 +62,90 @@ fn cameras_that_project_to_infinity_are_named() {
 }
 
 #[test]
+fn distorted_pictures_are_refused_by_the_name_of_the_entry() {
+    let refused = |json: &Value, parts: &[&str], what: &str| {
+        let message = load(json, &CameraOptions::default()).expect_err(what).to_string();
+        for part in [&["transforms_test.json", "frame 0", "undistort"], parts].concat() {
+            assert!(message.contains(part), "{what}: {part:?} is not in: {message}");
+        }
+    };
+    let entries = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "rolling_shutter", "ftheta_p0", "ftheta_p4"];
+    for name in [&entries[..], &["distortion_params", "is_fisheye"]].concat() {
+        for place in ["", "/frames/0"] {
+            let pointer = format!("{place}/{name}");
+            for value in [json!(0.01), json!(-1e-3), json!([0, 0, 0.1]), json!(true), json!("none"), json!({"a": 0})] {
+                let what = format!("{pointer} is {value}");
+                refused(&with(transforms(), &pointer, value), &[&format!("{name} is not 0")], &what);
+            }
+            for value in [json!(0), json!(-0.0), json!([0, 0.0, 0]), json!([]), json!(false), Value::Null] {
+                let what = format!("{pointer} is {value}");
+                assert!(load(&with(transforms(), &pointer, value), &CameraOptions::default()).is_ok(), "{what}");
+            }
+        }
+    }
+    // An entry of a frame replaces that of the file.
+    let own = with(with(transforms(), "/k1", json!(0.1)), "/frames/0/k1", json!(0));
+    assert!(load(&own, &CameraOptions::default()).is_ok(), "the frame has no distortion");
+    let own = with(with(transforms(), "/k1", json!(0)), "/frames/0/k1", json!(0.1));
+    refused(&own, &["k1 is not 0"], "the frame is distorted");
+}
+
+#[test]
+fn camera_models_that_are_no_pinhole_are_refused() {
+    for place in ["", "/frames/0"] {
+        let of = |model: Value| with(transforms(), &format!("{place}/camera_model"), model);
+        for model in ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "pinhole"] {
+            assert!(load(&of(json!(model)), &CameraOptions::default()).is_ok(), "{model} without coefficients");
+        }
+        let distorted = with(of(json!("OPENCV")), "/k2", json!(0.01));
+        let message = load(&distorted, &CameraOptions::default()).expect_err("a coefficient").to_string();
+        assert!(message.contains("k2 is not 0"), "OPENCV with a coefficient: {message}");
+        for model in [json!("OPENCV_FISHEYE"), json!("EQUIRECTANGULAR"), json!(""), json!("a\u{1b}[2J"), json!(3)] {
+            let message = load(&of(model.clone()), &CameraOptions::default()).expect_err("no pinhole").to_string();
+            let shown = model.as_str().unwrap_or("3").replace('\u{1b}', "\\u{1b}");
+            for part in ["transforms_test.json", "camera_model", &shown, "undistort"] {
+                assert!(message.contains(part), "{model}: {part:?} is not in: {message}");
+            }
+            assert!(!message.contains('\u{1b}'), "control characters are escaped: {message:?}");
+        }
+    }
+}
+
+#[test]
+fn golden_views_are_refused_if_they_are_distorted_or_off_center() {
+    let changed = |name: &str, value: Value| with(golden(), &format!("/views/0/{name}"), value);
+    for (name, value, reason) in [
+        ("cx", json!(310.0), "cx is 310, and golden views have their principal point at the center, 320"),
+        ("cy", json!(201), "cy is 201"),
+        ("cy", json!(-1e300), "cy is -1"),
+        ("cx", json!("left"), "left"),
+        ("k1", json!(0.1), "k1 is not 0"),
+        ("camera_model", json!("OPENCV_FISHEYE"), "OPENCV_FISHEYE"),
+    ] {
+        let message = load(&changed(name, value), &CameraOptions::default()).expect_err(name).to_string();
+        for part in ["frame 0", reason] {
+            assert!(message.contains(part), "{name}: {part:?} is not in: {message}");
+        }
+    }
+    for (name, value) in [("cx", json!(320.0004)), ("cy", Value::Null), ("k1", json!(0))] {
+        let what = format!("{name} is {value}");
+        assert!(load(&changed(name, value), &CameraOptions::default()).is_ok(), "{what}");
+    }
+}
+
+#[test]
 fn paths_with_control_characters_are_refused_and_shown_escaped() {
     let path = "a\u{1b}[2J\nb";
     for pointer in ["/frames/0/file_path", "/frames/0/mask_path"] {
         let changed = with(transforms(), pointer, json!(path));
         let message = load(&changed, &CameraOptions::default()).expect_err(pointer).to_string();
         assert!(message.contains("control characters"), "{message}");
-        assert!(!message.contains(['\u{1b}', '\n']), "nothing that a terminal obeys: {message:?}");
+        assert!(!message.contains(['\u{1b}', '\n']), "no control characters: {message:?}");
     }
 }
 
 #[test]
-fn wrong_files_are_errors_that_name_them() {
+fn invalid_files_are_errors_that_name_them() {
     let folder = Folder::new();
     let cases = [
         (r#"{"frames": []}"#, "empty"),
@@ -128,7 +200,7 @@ fn folders_that_are_not_utf8_work() {
     }
     let path = folder.write(name.join("transforms_test.json"), transforms().to_string());
     let views = CameraFile::load(&path, &CameraOptions::default()).expect("a valid camera file");
-    assert_eq!(views[0].image, path.with_file_name("./a.png"), "the folder's bytes are kept");
+    assert_eq!(views[0].image, path.with_file_name("./a.png"), "the bytes of the folder name are kept");
 }
 
 /// Generates any small JSON value.
@@ -144,7 +216,7 @@ fn any_json() -> impl Strategy<Value = Value> {
     leaf.prop_recursive(2, 16, 4, |inner| proptest::collection::vec(inner, 0..5).prop_map(Value::from))
 }
 
-/// Checks what holds for every file: a usable list of views, or an error that names the file.
+/// Checks that the outcome is a usable list of views, or an error that names the file.
 fn check_outcome(outcome: Result<Vec<TrainingView>, DatasetError>) -> Result<(), TestCaseError> {
     match outcome {
         Ok(views) => {
@@ -165,8 +237,8 @@ fn check_outcome(outcome: Result<Vec<TrainingView>, DatasetError>) -> Result<(),
 proptest! {
     #[test]
     fn random_values_anywhere_never_panic(
-        file in proptest::sample::subsequence(vec!["camera_angle_x", "w", "h", "fl_x", "fl_y", "cx", "cy"], 0..5),
-        entry in proptest::sample::subsequence(vec!["file_path", "transform_matrix", "time", "mask_path", "w", "fl_x", "cy"], 0..3),
+        file in proptest::sample::subsequence(vec!["camera_angle_x", "w", "h", "fl_x", "fl_y", "cx", "cy", "k1", "camera_model"], 0..5),
+        entry in proptest::sample::subsequence(vec!["file_path", "transform_matrix", "time", "mask_path", "w", "fl_x", "cy", "distortion_params"], 0..3),
         values in proptest::collection::vec(any_json(), 8),
     ) {
         let mut json = transforms();

@@ -1,6 +1,6 @@
 //! Zip archives of stored entries, and changes to them.
 //!
-//! In: entries. Out: an archive whose directory is right, except where an entry says something else about itself.
+//! In: entries. Out: an archive whose directory is right, except for the fields that an entry overrides.
 
 use super::{bytes, change_list, numbers};
 use crate::support::random::Random;
@@ -10,21 +10,21 @@ use crate::support::random::Random;
 pub struct Entry {
     pub name: String,
     pub body: Vec<u8>,
-    /// What both headers say: how it is packed, 0 as it is; bit 0 of the flags, encrypted.
+    /// Compression method in both headers, 0 for none; bit 0 of the flags, encrypted.
     method: u16,
     flags: u16,
-    /// What the headers say instead of the truth: checksum, packed size, size, offset of the local header.
+    /// Overrides of the headers: checksum, compressed size, size, offset of the local header.
     claims: [Option<u32>; 4],
 }
 
 impl Entry {
-    /// Returns an entry whose headers say the truth.
+    /// Returns an entry whose headers are right.
     pub fn new(name: String, body: Vec<u8>) -> Self {
         Self { name, body, ..Self::default() }
     }
 }
 
-/// Changes the list of entries, what one of them says about itself, or its name.
+/// Changes the list of entries, a field of the headers of an entry, or its name.
 pub fn change(entries: &mut Vec<Entry>, others: &[Entry], random: &mut Random) {
     let at = random.below(entries.len());
     let Some(entry) = entries.get_mut(at).filter(|_| !random.one_in(3)) else {

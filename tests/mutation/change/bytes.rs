@@ -1,6 +1,6 @@
-//! Changes to bytes that know nothing of what they mean.
+//! Changes to bytes without regard to their format.
 //!
-//! In: bytes, those of another seed. Out: bits flipped, numbers overwritten, parts left out, repeated, put in from the other.
+//! In: bytes, those of another seed. Out: bits flipped, numbers overwritten, parts removed, repeated, or inserted from the other seed.
 
 use super::numbers;
 use crate::support::random::Random;

@@ -5,7 +5,7 @@
 use super::{bytes, change_list, numbers};
 use crate::support::random::Random;
 
-/// A segment: its marker, its contents without the length, and what follows it up to the next marker: the entropy-coded pixels.
+/// A segment: its marker, its contents without the length, and the entropy-coded pixels that follow it up to the next marker.
 #[derive(Clone)]
 pub struct Segment {
     marker: u8,
@@ -18,7 +18,7 @@ const FRAME: u8 = 0xc0;
 /// The marker of a scan, whose pixels follow.
 const SCAN: u8 = 0xda;
 
-/// Cuts a file that is right. The pixels end at the end of the file, whose marker belongs to them.
+/// Splits a valid file into segments. The pixels end at the end of the file, including its end marker.
 pub fn segments(file: &[u8]) -> Vec<Segment> {
     let mut segments = Vec::new();
     // After the marker at the start.
@@ -45,7 +45,7 @@ pub fn change(segments: &mut Vec<Segment>, others: &[Segment], random: &mut Rand
                 }
             }
             6 => {
-                // After how many units the pixels begin anew.
+                // The restart interval: number of units after which decoding restarts.
                 let body = (numbers::whole(random) as u16).to_be_bytes().to_vec();
                 segments.insert(at, Segment { marker: 0xdd, body, after: Vec::new() });
             }
@@ -54,7 +54,7 @@ pub fn change(segments: &mut Vec<Segment>, others: &[Segment], random: &mut Rand
     }
 }
 
-/// Changes the contents of a segment, the pixels after it, or what it is.
+/// Changes the contents of a segment, the pixels after it, or its marker.
 fn change_segment(segment: &mut Segment, random: &mut Random) {
     match random.below(3) {
         0 => bytes::change(&mut segment.body, &[], random),

@@ -1,6 +1,6 @@
-//! Changes to files, by what they are made of.
+//! Changes to files, by their format.
 //!
-//! In: a seed, another seed, random numbers. Out: a file that is wrong somewhere.
+//! In: a seed, another seed, random numbers. Out: a file with errors.
 
 pub mod archive;
 pub mod bytes;
@@ -19,12 +19,12 @@ impl Random {
         self.below(count) == 0
     }
 
-    /// Returns one of the items, of which there must be some.
+    /// Returns one of the items, at least one.
     pub fn pick<'a, T>(&mut self, items: &'a [T]) -> &'a T {
         &items[self.below(items.len())]
     }
 
-    /// Returns a part of `0..length`, more often short than long.
+    /// Returns a range within `0..length`, more often short than long.
     pub fn part(&mut self, length: usize) -> Range<usize> {
         let start = self.below(length + 1);
         let left = length - start;

@@ -4,7 +4,7 @@
 
 use crate::support::random::Random;
 
-/// Returns a float: not a number, infinite, tiny, as large as possible, small, or any at all.
+/// Returns a float: not a number, infinite, tiny, as large as possible, small, or any float.
 pub fn float(random: &mut Random) -> f32 {
     const ENDS: [f32; 20] = [
         0.0,
@@ -35,7 +35,7 @@ pub fn float(random: &mut Random) -> f32 {
     }
 }
 
-/// Returns a whole number: at a power of two or beside it, as large as possible, or any at all.
+/// Returns a whole number: at a power of two or next to it, as large as possible, or any number.
 pub fn whole(random: &mut Random) -> u64 {
     match random.below(6) {
         0 => random.bits(),

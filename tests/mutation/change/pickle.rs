@@ -1,6 +1,6 @@
 //! Changes to pickles, opcode by opcode.
 //!
-//! In: a pickle of protocol 2, that of another seed. Out: a pickle whose opcodes have whole arguments, most of the time, and make little sense.
+//! In: a pickle of protocol 2, that of another seed. Out: a pickle whose opcodes mostly have complete arguments, in a meaningless order.
 
 use super::{bytes, change_list, numbers};
 use crate::support::pth;
@@ -35,7 +35,7 @@ fn change_once(opcodes: &mut Vec<Vec<u8>>, others: &[Vec<u8>], random: &mut Rand
                 opcodes.insert(at, any(random));
             }
             1 => {
-                // Nested deeply, or a stack as high.
+                // Deep nesting, or a deep stack.
                 let code = *random.pick(b"(\x85]N)");
                 opcodes.insert(random.below(opcodes.len()), vec![code; *random.pick(&[1, 100, 100_000, 900_000])]);
             }

@@ -5,7 +5,7 @@
 use super::{bytes, change_list, numbers};
 use crate::support::random::Random;
 
-/// A chunk: its type, its contents; those of `IDAT` before they are packed.
+/// A chunk: its type and contents; those of `IDAT` before compression.
 #[derive(Clone)]
 pub struct Chunk {
     kind: [u8; 4],
@@ -58,7 +58,7 @@ pub fn change(chunks: &mut Vec<Chunk>, others: &[Chunk], random: &mut Random) {
     }
 }
 
-/// Changes one number of the header: a side, the depth, the color type, how it is packed, filtered or interlaced.
+/// Changes one number of the header: a side, the depth, the color type, compression, filter or interlacing.
 fn change_header(chunks: &mut [Chunk], random: &mut Random) {
     let header = chunks.iter_mut().find(|chunk| chunk.kind == *b"IHDR" && chunk.body.len() >= 13);
     let Some(Chunk { body, .. }) = header else { return };

@@ -1,7 +1,7 @@
 //! Changes to texts that consist of brackets, commas, names and values: JSON, RON, and the `Namespace(..)` of Python.
 //!
-//! In: a text, that of another seed. Out: a text whose brackets still match, most of the time, with a value replaced by one of another type or
-//! size, an item left out, repeated, moved or taken from the other text, or brackets nested deeply.
+//! In: a text, that of another seed. Out: a text whose brackets mostly match, with a value replaced by one of another type or size, an item
+//! removed, repeated, moved or taken from the other text, or deeply nested brackets.
 
 use super::bytes::MOST;
 use super::numbers;
@@ -9,7 +9,7 @@ use crate::support::random::Random;
 use std::iter::repeat_n;
 use std::ops::Range;
 
-/// Most pieces that are put in at once.
+/// Most pieces that are inserted at once.
 const PIECES: usize = 200_000;
 
 /// Makes one to three changes.
@@ -66,7 +66,7 @@ fn swap(pieces: &mut Vec<String>, one: &Range<usize>, other: &Range<usize>) {
     }
 }
 
-/// Returns a value that is no number: a text, a name, an empty list.
+/// Returns a value that is not a number: a text, a name, an empty list.
 fn value(random: &mut Random) -> String {
     const VALUES: [&str; 32] = [
         r#""""#,
@@ -108,7 +108,7 @@ fn value(random: &mut Random) -> String {
     (*random.pick(&VALUES)).to_owned()
 }
 
-/// Cuts a text: quoted texts, words and numbers, spaces, and single signs.
+/// Splits a text into quoted texts, words and numbers, spaces, and single characters.
 fn pieces(text: &str) -> Vec<String> {
     let mut pieces = Vec::new();
     let mut rest = text;
@@ -130,7 +130,7 @@ fn is_word(c: char) -> bool {
     c.is_alphanumeric() || matches!(c, '_' | '+' | '-' | '.')
 }
 
-/// Returns the length of the text in quotes that a text begins with.
+/// Returns the length of the quoted text at the start of a text.
 fn quoted(text: &str, quote: char) -> usize {
     let mut escaped = false;
     for (at, c) in text.char_indices().skip(1) {
@@ -148,7 +148,7 @@ fn values(pieces: &[String]) -> Vec<usize> {
     (0..pieces.len()).filter(|&at| is_value(&pieces[at])).collect()
 }
 
-/// Returns what lies between the brackets and commas of every pair of brackets, inner ones included.
+/// Returns the items between the brackets and commas of every pair of brackets, including inner pairs.
 fn items(pieces: &[String]) -> Vec<Range<usize>> {
     let (mut open, mut items) = (Vec::new(), Vec::new());
     for (at, piece) in pieces.iter().enumerate() {

@@ -1,6 +1,6 @@
 //! Camera files.
 //!
-//! In: camera files of every form. Out: files with numbers, names and structures that are wrong; the cameras that are accepted draw a scene.
+//! In: camera files of every form. Out: files with wrong numbers, names and structures; accepted cameras draw a scene.
 
 use super::{Outcome, Reader};
 use crate::accepted;
@@ -39,7 +39,7 @@ impl Cameras {
         let transforms = fs::read_to_string(folder.path().join("transforms_test.json")).expect("just written");
         let transforms: Value = serde_json::from_str(&transforms).expect("a camera file");
         let mut intrinsics = transforms.clone();
-        for (name, value) in [("fl_x", 60.0), ("fl_y", 61.0), ("cx", 20.0), ("cy", 15.0)] {
+        for (name, value) in [("fl_x", 60.0), ("fl_y", 61.0), ("cx", 20.0), ("cy", 15.0), ("k1", 0.0)] {
             intrinsics[name] = json!(value);
         }
         for frame in intrinsics["frames"].as_array_mut().expect("frames") {
@@ -48,7 +48,7 @@ impl Cameras {
         let pose = json!([[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 3], [0, 0, 0, 1]]);
         let golden = json!({ "views": [{
             "file": "./images/a.jpg", "time": 0.5, "width": 40, "height": 30, "fl_x": 60.0, "fl_y": 61.0,
-            "world_to_camera_opencv": pose,
+            "cx": 20.0, "cy": 15.0, "world_to_camera_opencv": pose,
         }] });
         let seeds = Vec::from([transforms, intrinsics, golden].map(|seed| seed.to_string()));
         Self { folder, scene, seeds }
@@ -82,7 +82,7 @@ impl Reader for Cameras {
 }
 
 impl Cameras {
-    /// Checks what holds for every file that is accepted, and draws some of its views.
+    /// Checks the views of an accepted file, and draws some of them.
     fn check(&self, views: &[TrainingView]) -> Result<(), String> {
         let mut names = HashSet::new();
         for view in views {

@@ -1,6 +1,6 @@
 //! Checkpoints.
 //!
-//! In: crafted checkpoints of every model. Out: archives whose directory and checksums are right around pickles and tensors that are not.
+//! In: crafted checkpoints of every model. Out: archives with a right directory and right checksums, and wrong pickles and tensors.
 
 use super::{Outcome, Reader};
 use crate::accepted;
@@ -46,8 +46,8 @@ impl Reader for Checkpoints {
     }
 }
 
-/// Returns a checkpoint of the model that rotates in 4D, one with an environment map and few coefficients, one that does not rotate, and a
-/// static one.
+/// Returns a checkpoint of the rotated 4D model, one with an environment map and few coefficients, one of the unrotated 4D model, and one of
+/// the static model.
 pub fn checkpoints() -> Vec<Pth> {
     let rotating = Pth::rotating(5, 48);
     let mut surrounded = Pth::rotating(3, 16);

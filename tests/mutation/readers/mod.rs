@@ -1,8 +1,8 @@
 //! The readers, and how their inputs are made.
 //!
-//! In: random numbers. Out: the bytes of a file for one reader, and what became of them. `KINDS` lists the readers.
+//! In: random numbers. Out: the bytes of a file for one reader, and the outcome of reading them. `KINDS` lists the readers.
 //!
-//! Two are not here: timelines (`*.timeline.ron`), which only a Bevy app can load, and the state of fine-tuning, which needs a GPU. Both are
+//! Two readers are not included: timelines (`*.timeline.ron`), which only a Bevy app can load, and the state of fine-tuning, which needs a GPU. Both are
 //! RON or bytes behind a checksum, whose tests are `plugin/playback/timeline/file.rs` and `offline/work.rs`.
 
 mod cameras;
@@ -16,7 +16,7 @@ mod settings;
 use crate::support::random::Random;
 use std::sync::Arc;
 
-/// What became of an input.
+/// The outcome of an input.
 #[derive(Debug)]
 pub enum Outcome {
     /// It was refused, with this message.
@@ -35,21 +35,21 @@ pub trait Reader: Send + Sync {
     /// Reads an input.
     ///
     /// # Errors
-    /// A defect: what was accepted and should not have been.
+    /// A defect: an input that is accepted although it is wrong.
     fn read(&self, bytes: &[u8]) -> Result<Outcome, String>;
 }
 
-/// A reader to be made.
+/// A kind of reader.
 pub struct Kind {
     /// Its name, on the command line and of its folder in `tests/corpus/`.
     pub name: &'static str,
-    /// What it reads.
+    /// A description of the files that it reads.
     pub about: &'static str,
     /// Extension of its inputs.
     pub extension: &'static str,
-    /// It takes each input whose number is a multiple of this: more than 1 where an input takes long.
+    /// The reader reads each input whose number is a multiple of this: more than 1 for slow readers.
     pub share: u64,
-    /// Makes it.
+    /// Makes the reader.
     pub make: fn() -> Arc<dyn Reader>,
 }
 
@@ -78,7 +78,7 @@ pub static KINDS: [Kind; 9] = [
     },
     Kind {
         name: "cfg-args",
-        about: "cfg_args beside a checkpoint",
+        about: "cfg_args in the folder of a checkpoint",
         extension: "txt",
         share: 1,
         make: || Arc::new(settings::CfgArgs::new()),
@@ -113,7 +113,7 @@ pub static KINDS: [Kind; 9] = [
     },
     Kind {
         name: "saved",
-        about: "stored results of a bake, from which it goes on",
+        about: "stored results of a bake, from which it resumes",
         extension: "saved",
         share: 10,
         make: || Arc::new(saved::Saved::new()),

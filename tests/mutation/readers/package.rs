@@ -1,6 +1,6 @@
 //! Packages.
 //!
-//! In: small scenes in every form. Out: packages whose checksums, lengths and compression are right around a header and sections that are not.
+//! In: small scenes in every form. Out: packages with right checksums, lengths and compression, and a wrong header or wrong sections.
 
 use super::{Outcome, Reader};
 use crate::accepted;
@@ -28,11 +28,11 @@ pub struct Packages {
     seeds: Vec<Parts>,
 }
 
-/// A package in its parts.
+/// The parts of a package.
 #[derive(Clone)]
 struct Parts {
     header: Header,
-    /// What each section decompresses to; a level of detail as it is.
+    /// The decompressed bytes of each section; those of a level of detail as stored.
     bodies: Vec<Vec<u8>>,
 }
 
@@ -69,7 +69,7 @@ impl Reader for Packages {
     }
 }
 
-/// Returns a small scene of every form, with and without what a scene may have.
+/// Returns a small scene of every form, with and without each optional part.
 fn scenes() -> Vec<GaussianScene> {
     let forty = SynthSettings { count: 40, ..SynthSettings::default() };
     let synth = |degree, degree_t| synthesize(&SynthSettings { degree, degree_t, ..forty });
@@ -120,7 +120,7 @@ impl Parts {
     fn of(scene: &GaussianScene) -> Self {
         let mut file = Vec::new();
         package::write(&mut file, scene, &WriteSettings::default()).expect("seeds can be written");
-        let header = package::inspect(Cursor::new(&file)).expect("what was written can be read").header;
+        let header = package::inspect(Cursor::new(&file)).expect("a package just written can be read").header;
         let length: usize = header.sections.iter().map(|section| 8 + section.length).sum();
         let mut rest = &file[file.len() - length..];
         let mut bodies = Vec::new();
@@ -128,7 +128,7 @@ impl Parts {
             let (body, after) = rest[8..].split_at(section.length);
             bodies.push(match section.encoding == PACKAGE {
                 true => body.to_vec(),
-                false => zstd::bulk::decompress(body, section.raw_length).expect("what was written can be read"),
+                false => zstd::bulk::decompress(body, section.raw_length).expect("a package just written can be read"),
             });
             rest = after;
         }
@@ -197,7 +197,7 @@ impl Parts {
         }
     }
 
-    /// Adds sections that no reader knows: a few, or very many.
+    /// Adds sections of unknown names: a few, or very many.
     fn add_unknown(&mut self, random: &mut Random) {
         for number in 0..*random.pick(&[1, 3, 10_000]) {
             let name = format!("x{number}");
@@ -206,7 +206,7 @@ impl Parts {
         }
     }
 
-    /// Makes the sections those that the header needs, as large as it needs them, so that a reader comes to the contents.
+    /// Replaces the sections by those that the header requires, with the required sizes, so that a reader reads their contents.
     fn fit(&mut self) {
         let needed = layout(&self.header);
         if needed.iter().any(|&(_, rows, width)| rows.saturating_mul(width).saturating_mul(4) > FITTED) {
@@ -229,7 +229,7 @@ impl Parts {
         }
     }
 
-    /// Returns the file: bodies compressed, lengths and checksums right, most of the time; the text of the header changed now and then.
+    /// Returns the file: with compressed bodies, mostly right lengths and checksums, and sometimes a changed text of the header.
     fn seal(mut self, other: &Header, random: &mut Random) -> Vec<u8> {
         let mut sections = Vec::new();
         for (section, planes) in self.header.sections.iter_mut().zip(&self.bodies) {
@@ -260,7 +260,7 @@ impl Parts {
     }
 }
 
-/// Returns an entry of the table of sections, whose lengths follow when the file is made.
+/// Returns an entry of the table of sections, whose lengths are set when the file is written.
 fn section(name: String, count: usize) -> Section {
     Section { name, encoding: FLOAT_PLANES.to_owned(), first: 0, count, length: 0, raw_length: 0, crc32: 0 }
 }
@@ -271,7 +271,7 @@ fn in_words(header: &Header) -> String {
     ron::ser::to_string_pretty(header, config).expect("a header can be written as text")
 }
 
-/// Changes a number that decides about the size of the scene, or its form.
+/// Changes a number that determines the size of the scene, or its form.
 fn change_number(header: &mut Header, random: &mut Random) {
     const COUNTS: [usize; 12] = [0, 1, 2, 31, 32, 33, 39, 41, 255, 256, 257, 1000];
     const COEFFICIENTS: [usize; 14] = [0, 1, 2, 4, 5, 9, 10, 15, 16, 17, 32, 33, 48, 49];
@@ -316,7 +316,7 @@ fn form(random: &mut Random) -> StoredForm {
     }
 }
 
-/// Changes how the capture was trained or is played, or what a reader must know.
+/// Changes the training settings, the playback hints or the required features.
 fn change_switch(header: &mut Header, random: &mut Random) {
     let trained = &mut header.trained_with;
     match random.below(9) {
@@ -335,7 +335,7 @@ fn change_switch(header: &mut Header, random: &mut Random) {
     }
 }
 
-/// Returns the sections that a header needs, in order: name, rows, words of a row. `docs/format.md` has the same in words.
+/// Returns the sections that a header needs, in order: name, rows, words of a row. `docs/format.md` describes them.
 fn layout(header: &Header) -> Vec<(&'static str, usize, usize)> {
     let (count, coefficients) = (header.gaussians, header.coefficients);
     let mut sections: Vec<(&'static str, usize, usize)> = match header.form {

@@ -1,7 +1,7 @@
 //! Pictures.
 //!
-//! In: small PNG and JPEG files of several kinds, and raw pictures. Out: files whose chunks and segments have right lengths and checksums around
-//! sizes, tables and pixels that are not; each is read as image and mask, in every way that training images are.
+//! In: small PNG and JPEG files of several kinds, and raw pictures. Out: files whose chunks and segments have right lengths and checksums, with
+//! wrong sizes, tables and pixels; each is read as image and mask, in every way that training images are read.
 
 use super::{Outcome, Reader};
 use crate::change::jpeg::Segment;
@@ -20,7 +20,7 @@ use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
 
-/// Size that pictures are read at, which is not their own.
+/// Size that pictures are scaled to; the seeds have other sizes.
 const SIZE: UVec2 = UVec2::new(12, 9);
 
 /// The reader of training images.
@@ -113,7 +113,7 @@ pub struct RawPictures {
 }
 
 impl RawPictures {
-    /// Makes the picture that others are compared with.
+    /// Makes the reference picture of the comparisons.
     pub fn new() -> Self {
         let raw = Self { folder: tempfile::tempdir().expect("a temporary folder") };
         let picture = Picture::filled(SIZE, Vec3::new(0.2, 0.5, 0.9));

@@ -39,13 +39,13 @@ pub struct Saved {
     _folder: TempDir,
     scene: GaussianScene,
     settings: BakeSettings,
-    /// What a bake has left: name and bytes of each file.
+    /// Name and bytes of each file that the bake wrote.
     files: Vec<(String, Vec<u8>)>,
     package: Vec<u8>,
 }
 
 impl Saved {
-    /// Bakes a scene and keeps what is left.
+    /// Bakes a scene and keeps its stored results.
     pub fn new() -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let [checkpoint, data, out] = ["scene.gs4d", "data", "out.gs4d"].map(|name| folder.path().join(name));
@@ -80,7 +80,7 @@ impl Saved {
                 saved.files.push((entry.file_name().to_string_lossy().into_owned(), bytes));
             }
         }
-        // Folders list their files in any order.
+        // The order of files in a folder is not defined.
         saved.files.sort();
         saved.package = fs::read(&saved.settings.out).expect("the package is there");
         saved

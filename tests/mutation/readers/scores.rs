@@ -1,6 +1,6 @@
-//! Files of scores: to prune by, and to weigh colors by.
+//! Files of scores: for pruning, and as weights of colors.
 //!
-//! In: scores of a scene. Out: files of other lengths and values; the scene pruned and compressed by those that are accepted.
+//! In: scores of a scene. Out: files of other lengths and values; accepted files prune and compress the scene.
 
 use super::{Outcome, Reader};
 use crate::accepted;
@@ -68,7 +68,7 @@ impl Reader for ScoreFiles {
 }
 
 impl ScoreFiles {
-    /// Compresses the scene with these weights. Where that is not refused, what is written must be readable and drawable.
+    /// Compresses the scene with these weights. If compression accepts them, the written package must be readable and drawable.
     fn compress_by(&self, weights: Vec<f32>) -> Result<(), String> {
         let settings = CompressSettings { weights: Some(weights), ..packed_scene::settings(&[4, 4]) };
         let Ok((compressed, _)) = compress(self.scene.clone(), &settings) else { return Ok(()) };

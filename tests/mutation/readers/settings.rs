@@ -1,6 +1,6 @@
-//! What a checkpoint does not say about itself: `cfg_args` beside it, and the options in RON.
+//! Settings that a checkpoint does not contain: `cfg_args` in its folder, and the options in RON.
 //!
-//! In: texts as the trainer and a loader's settings have them. Out: changed texts, read together with a checkpoint and a package that are right.
+//! In: texts of the trainer and of the settings of a loader. Out: changed texts, read together with a valid checkpoint and a valid package.
 
 use super::checkpoint::checkpoints;
 use super::{Outcome, Reader};

@@ -1,0 +1,118 @@
+//! What the stages of a bake share.
+//!
+//! In: a scene, [`BakeSettings`]. Out: the views of its dataset, divided; the folder of results; the keys of the contents of all inputs.
+
+use super::settings::BakeSettings;
+use crate::offline::belonging::require_belonging;
+use crate::offline::dataset::TrainingView;
+use crate::offline::engine::Engine;
+use crate::offline::fine_tune::{FineTuneSettings, TrainingImages};
+use crate::offline::search::Goal;
+use crate::offline::splits::Splits;
+use crate::offline::store::{Key, Store};
+use crate::offline::{OfflineError, Progress, Subject, trained_pixel};
+use crate::scene::{GaussianScene, MAX_SEGMENTS, SceneForm};
+use std::sync::Arc;
+
+/// What the stages of a bake share.
+pub(super) struct Inputs<'a> {
+    pub settings: &'a BakeSettings,
+    pub engine: &'a mut Engine,
+    pub subject: Subject,
+    pub splits: Splits,
+    /// Every training view, those held out included.
+    pub views: Vec<TrainingView>,
+    pub store: Store,
+    /// The contents of the checkpoint, and how it was read.
+    pub scene_key: Key,
+    /// The cameras and times of the training and the validation views.
+    pub cameras_key: Key,
+    /// The contents of the images of these views.
+    pub images_key: Key,
+    /// These images, once a stage has needed them.
+    images: Option<Arc<TrainingImages>>,
+}
+
+impl<'a> Inputs<'a> {
+    /// Reads the dataset and checks it against the scene.
+    ///
+    /// # Errors
+    /// Views or images that cannot be used, another bake to the same package, a failure of the engine.
+    pub fn open(
+        mut scene: GaussianScene,
+        settings: &'a BakeSettings,
+        engine: &'a mut Engine,
+        progress: &mut dyn Progress,
+    ) -> Result<Self, OfflineError> {
+        let BakeSettings { checkpoint, data, splits: options, .. } = settings;
+        let store = Store::beside(&settings.out, ".bake")?;
+        scene.filter = None;
+        scene.levels.clear();
+        let splits = Splits::open(data, options, &scene.trained_with, progress)?;
+        progress.note(&splits.to_string());
+        let views = splits.all_training(&scene.trained_with, progress)?;
+        scene.trained_with.validation = Some(splits.to_string());
+        let read = format!("{:?} {:?} {:?}", scene.trained_with, scene.playback, settings.background);
+        let scene_key = Key::of_files(&[checkpoint])?.and(env!("CARGO_PKG_VERSION")).and(&read);
+        let cameras_key = Key::of(format!("{:?} {:?}", splits.train, splits.validation).as_bytes());
+        let images_key = Key::of_images(&splits.train)?.with(Key::of_images(&splits.validation)?);
+        let mut subject = Subject::new(checkpoint, scene, settings.background)?;
+        let pixel = trained_pixel(&subject.scene, &views);
+        (subject.scene.trained_with.pixel, subject.runtime.trained_with.pixel) = (pixel, pixel);
+        if !settings.trust_images {
+            require_belonging(engine, &subject.runtime, &views, subject.background)?;
+        }
+        let inputs =
+            Self { settings, engine, subject, splits, views, store, scene_key, cameras_key, images_key, images: None };
+        if let (Some(tuning), Engine::Gpu(headless)) = (inputs.tunes(), &*inputs.engine) {
+            tuning.sums.check(headless)?;
+        }
+        Ok(inputs)
+    }
+
+    /// Returns the images to train and to validate on, which are loaded once.
+    pub fn images(&mut self, progress: &mut dyn Progress) -> Result<Arc<TrainingImages>, OfflineError> {
+        if let Some(images) = &self.images {
+            return Ok(images.clone());
+        }
+        let Splits { train, validation, .. } = &self.splits;
+        let images = TrainingImages::load(train.clone(), validation, &self.subject.scene.trained_with, progress)?;
+        Ok(self.images.insert(Arc::new(images)).clone())
+    }
+
+    /// Returns the settings of training; `None` if the remaining Gaussians are not trained.
+    pub fn tunes(&self) -> Option<&FineTuneSettings> {
+        let can = matches!(self.engine, Engine::Gpu(_)) && self.obstacle().is_none();
+        self.settings.fine_tune.as_ref().filter(|_| can)
+    }
+
+    /// Returns why the stage is left out although the settings ask for it; `None` if they do not.
+    pub fn reason_to_leave_out(&self) -> Option<String> {
+        self.settings.fine_tune.as_ref()?;
+        let software = "it needs a GPU; --engine gpu takes one with a software driver, slowly".to_owned();
+        Some(self.obstacle().unwrap_or(software))
+    }
+
+    /// Returns why the scene cannot be trained; `None` if it can be.
+    fn obstacle(&self) -> Option<String> {
+        if !matches!(self.subject.scene.form, SceneForm::Trained(_)) {
+            return Some("the scene is not in the trained form".to_owned());
+        }
+        let missing = self.views.iter().find(|view| !view.image.is_file())?;
+        Some(format!("{} is missing", missing.image.display()))
+    }
+
+    /// Returns the number of key-frames of the filter.
+    pub fn key_frames(&self) -> u32 {
+        let count = self.settings.key_frames.count(&self.views);
+        u32::try_from(count).unwrap_or(u32::MAX).clamp(2, MAX_SEGMENTS + 1)
+    }
+
+    /// Returns the most bytes that the package may have.
+    pub fn limit(&self) -> u64 {
+        match self.settings.goal {
+            Goal::Size(limit) => limit,
+            Goal::Keep(_) | Goal::Remove(_) | Goal::MaxLoss(_) => u64::MAX,
+        }
+    }
+}
