@@ -3,7 +3,7 @@
 //! In: random numbers. Out: the bytes of a file for one reader, and the outcome of reading them. `KINDS` lists the readers.
 //!
 //! Two readers are not included: timelines (`*.timeline.ron`), which only a Bevy app can load, and the state of fine-tuning, which needs a GPU. Both are
-//! RON or bytes behind a checksum, whose tests are `plugin/playback/timeline/file.rs` and `offline/work.rs`.
+//! RON or bytes behind a checksum, whose tests are `plugin/playback/timeline/file.rs` and `offline/store.rs`.
 
 mod cameras;
 mod checkpoint;
