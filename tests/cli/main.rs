@@ -13,6 +13,8 @@ mod eval;
 #[cfg(target_os = "linux")]
 mod faults;
 mod fine_tune;
+#[cfg(target_os = "linux")]
+mod kills;
 mod outputs;
 mod prune;
 mod render;
