@@ -12,7 +12,7 @@ use crate::renderer::{GpuError, Headless};
 use glam::UVec2;
 use wgpu::BufferUsages;
 
-/// What the passes after the picture need besides the parameters.
+/// Buffers of the passes after the picture, and the sums over views.
 #[derive(Debug)]
 pub(super) struct Backward {
     sums: GradientSums,
@@ -27,8 +27,8 @@ impl Backward {
         Self { sums, totals: headless.allocator().buffer("gs4d totals", 16, usage), view: None }
     }
 
-    /// Returns the buffers for the frame of this size that has been recorded, which are created unless they fit; `None` before the first
-    /// frame.
+    /// Returns the buffers for the frame that was recorded last, which has this size; `None` before the first frame. Creates them only if
+    /// sizes have changed.
     pub fn fit(
         &mut self,
         headless: &Headless,

@@ -1,6 +1,7 @@
-//! What a run of fine-tuning has found so far.
+//! The best parameters of a run of fine-tuning, and its curve.
 //!
-//! In: points of the curve, states of training. Out: [`Best`] and [`Progressed`], which both phases continue.
+//! In: points of the curve, states of training. Out: [`Best`] and [`Progressed`], which the first phase begins and
+//! the last phase completes.
 
 use super::outcome::CurvePoint;
 use super::state::TrainerState;

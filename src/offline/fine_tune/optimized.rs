@@ -1,6 +1,6 @@
 //! Parameters on the GPU, with what the optimizer knows of each.
 //!
-//! In: a buffer of values. Out: [`Optimized`]: the same with gradients and moments, as `adam` takes them; the pass `adam`, recorded.
+//! In: a buffer of values. Out: [`Optimized`]: the same with gradients and moments, as `adam` takes them; commands of the pass `adam`.
 
 use super::adam::correction;
 use super::passes::Passes;
@@ -46,7 +46,7 @@ impl Optimized {
         Self { values, gradients, moments, settings, group, count, stride }
     }
 
-    /// Records the step number `step`, from 1. A sparse step leaves Gaussians as they are that were not seen.
+    /// Records step number `step`, counted from 1. A sparse step skips Gaussians that no view has shown.
     pub fn record_step(
         &self,
         queue: &wgpu::Queue,
@@ -78,12 +78,12 @@ impl Optimized {
         [&self.values, first, second]
     }
 
-    /// Returns the values as they are.
+    /// Reads the values.
     pub fn read_values(&self, headless: &Headless) -> Result<Vec<u8>, GpuError> {
         headless.copy_out(&self.values, self.values.size())
     }
 
-    /// Returns the gradients accumulated since the last step.
+    /// Reads the gradients accumulated since the last step.
     pub fn read_gradients(&self, headless: &Headless) -> Result<Vec<u8>, GpuError> {
         headless.copy_out(&self.gradients, self.gradients.size())
     }

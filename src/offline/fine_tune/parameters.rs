@@ -1,7 +1,7 @@
 //! The parameters of a scene that is trained, on the GPU.
 //!
-//! In: raw parameters and color coefficients of a scene, the buffers of its capture. Out: [`ParameterBuffers`]: the same with gradients,
-//! moments and notes; the pass `slice`, recorded.
+//! In: raw parameters of a scene, the buffers of its capture. Out: [`ParameterBuffers`]: parameters and color coefficients with gradients,
+//! moments and notes; commands of the pass `slice`.
 
 use super::optimized::Optimized;
 use super::passes::Passes;
@@ -14,7 +14,7 @@ use wgpu::BufferUsages;
 /// Bytes of the notes of `project_backward` about gradients that are not finite, before a word for each Gaussian.
 const FAULT_BYTES: u64 = 4 * FIRST_SEEN as u64;
 
-/// Raw parameters and color coefficients, with what the passes of training know of them.
+/// Raw parameters and color coefficients, with their gradients, moments and notes.
 #[derive(Debug)]
 pub(super) struct ParameterBuffers {
     pub geometry: Optimized,
@@ -23,7 +23,7 @@ pub(super) struct ParameterBuffers {
     pub scene_settings: wgpu::Buffer,
     /// Gradients that were not finite; which Gaussians the views since the last step have shown.
     pub notes: wgpu::Buffer,
-    /// Parameters and gradients, for `project_backward`.
+    /// Bind group of parameters and gradients, for `project_backward`.
     pub group: wgpu::BindGroup,
     settings: TrainedScene,
     slice: wgpu::BindGroup,
@@ -40,8 +40,8 @@ pub(super) fn scene_settings(model: Model, count: u32, prefilter_var: f32) -> Tr
 }
 
 impl ParameterBuffers {
-    /// Uploads raw parameters; color coefficients, of `stride` four-vectors for each Gaussian, are trained in the buffer of the capture. The
-    /// buffers of the capture are Gaussians, lifespans and coefficients.
+    /// Uploads raw parameters. The three buffers of the capture hold Gaussians, lifespans and color coefficients; the coefficients, `stride`
+    /// four-vectors for each Gaussian, are trained in place.
     pub fn new(
         headless: &Headless,
         passes: &Passes,
@@ -93,7 +93,7 @@ impl ParameterBuffers {
         pass.dispatch_workgroups(self.count().div_ceil(256), 1, 1);
     }
 
-    /// Records that no Gaussian has been seen.
+    /// Records that the notes about seen Gaussians are cleared.
     pub fn forget_seen(&self, encoder: &mut wgpu::CommandEncoder) {
         encoder.clear_buffer(&self.notes, FAULT_BYTES, None);
     }

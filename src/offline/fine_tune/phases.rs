@@ -1,6 +1,6 @@
 //! Fine-tuning: its phases, one after the other.
 //!
-//! In: a scene, training images and settings, on request a state to resume from. Out: the scene with the best parameters.
+//! In: a scene, training images and settings, optionally a stored state. Out: the scene with the best parameters.
 
 use super::best::Progressed;
 use super::coding::compress;

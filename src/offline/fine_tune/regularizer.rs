@@ -24,7 +24,7 @@ pub(super) struct Regularizer {
 }
 
 impl Regularizer {
-    /// Compiles the pass for terms with these weights. `gaussians` are the sliced ones.
+    /// Compiles the pass for terms with these weights. `gaussians` is the buffer of sliced Gaussians.
     ///
     /// # Errors
     /// A shader that does not compile.
@@ -61,7 +61,8 @@ impl Regularizer {
         Ok(Self { regularize, group, neighbors, searched: false, search_every })
     }
 
-    /// Searches for the neighbors of all Gaussians as they are, before the first step and again as often as the terms say.
+    /// Searches for the neighbors of all Gaussians at their current means if the search is due: before the first step, then after every
+    /// [`Terms::search_every`] steps. Does nothing if no term needs neighbors.
     ///
     /// # Errors
     /// A lost device.
@@ -75,14 +76,14 @@ impl Regularizer {
         Ok(())
     }
 
-    /// Records that the gradients of the terms are added to those of so many Gaussians.
+    /// Records that the gradients of the terms are added to those of `count` Gaussians.
     pub fn record(&self, pass: &mut wgpu::ComputePass<'_>, count: u32) {
         pass.set_pipeline(&self.regularize);
         pass.set_bind_group(0, &self.group, &[]);
         pass.dispatch_workgroups(count.div_ceil(64), 1, 1);
     }
 
-    /// Replaces the neighbors of all Gaussians if these are of the same size.
+    /// Replaces the neighbors of all Gaussians by those of a state, if it has as many.
     pub fn resume(&mut self, headless: &Headless, neighbors: &[u8]) {
         if self.neighbors.size() == neighbors.len() as u64 {
             self.set_neighbors(headless, neighbors);

@@ -37,7 +37,7 @@ pub(super) struct Rounder {
 }
 
 impl Rounder {
-    /// Compiles the pass, which changes the Gaussians and lifespans of a capture.
+    /// Compiles the pass, which changes the sliced Gaussians and lifespans of a capture in place.
     ///
     /// # Errors
     /// A shader that does not compile.
@@ -60,7 +60,7 @@ impl Rounder {
         Ok(Self { rounding, group, changes })
     }
 
-    /// Replaces what rounding changes of each Gaussian.
+    /// Writes the changes of all Gaussians.
     pub fn write(&self, queue: &wgpu::Queue, changes: &[RoundingRecord]) {
         queue.write_buffer(&self.changes, 0, bytemuck::cast_slice(changes));
     }
@@ -73,7 +73,7 @@ impl Rounder {
     }
 }
 
-/// Packs the Gaussians of a scene with these raw parameters, by the rules of compression. Returns what that changes of each.
+/// Returns the differences that packing by the rules of compression makes to each Gaussian of these raw parameters.
 ///
 /// # Errors
 /// Gaussians that the packed form cannot hold.

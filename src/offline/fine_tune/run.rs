@@ -1,6 +1,6 @@
-//! A run of fine-tuning: what its phases are made of.
+//! A run of fine-tuning: its scene on the GPU, images and settings, and the operations that both phases use.
 //!
-//! In: a scene, views and settings. Out: one step, one evaluation, the scene as it is, the result of a run.
+//! In: a scene, views and settings. Out: one step, one evaluation, the trained scene, the result of a run.
 
 use super::best::Progressed;
 use super::outcome::FineTuned;
@@ -87,7 +87,7 @@ impl<'a> Run<'a> {
         tuned.map_or_else(|error| error, |tuned| OfflineError::Interrupted { tuned: Some(Box::new(tuned)) })
     }
 
-    /// Returns the result of a run that ends with this scene.
+    /// Returns the result of a run whose final scene is given.
     pub(super) fn finished(&self, scene: GaussianScene, found: Progressed) -> Result<FineTuned, OfflineError> {
         let Progressed { curve, best, pace: (steps, seconds) } = found;
         Ok(FineTuned {

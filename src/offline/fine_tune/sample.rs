@@ -1,4 +1,4 @@
-//! What a step of training sees: images on the GPU and views.
+//! The images and views of a training step.
 //!
 //! In: images to train on. Out: [`GpuImage`], bound for the pass `loss`, and [`Sample`], one with its view.
 

@@ -1,6 +1,6 @@
 //! The settings of fine-tuning.
 //!
-//! In: nothing. Out: [`FineTuneSettings`] with defaults.
+//! In: the choices of a caller. Out: [`FineTuneSettings`], with a default for each.
 
 use super::schedule::{Behind, Rates};
 use super::sums::GradientSums;

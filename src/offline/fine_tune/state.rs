@@ -1,4 +1,4 @@
-//! The state of training, from which training goes on to the bit.
+//! The state of training. Resumed training gives the same result to the bit.
 //!
 //! In: the bytes of buffers on the GPU, read by a trainer. Out: [`TrainerState`].
 
@@ -17,7 +17,7 @@ pub struct TrainerState {
 }
 
 impl TrainerState {
-    /// Returns whether the state is of buffers of the same sizes, and its neighbors are of so many Gaussians.
+    /// Returns whether the buffers have the sizes of these on the GPU, and every neighbor is one of `count` Gaussians.
     pub(super) fn fits(&self, buffers: &[&wgpu::Buffer], count: u32) -> bool {
         let fits = |(bytes, buffer): (&Vec<u8>, &&wgpu::Buffer)| bytes.len() as u64 == buffer.size();
         let neighbors: Vec<u32> = bytemuck::pod_collect_to_vec(&self.neighbors);

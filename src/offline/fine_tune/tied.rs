@@ -88,7 +88,7 @@ impl Tied {
         Ok(Self { entries, group, books })
     }
 
-    /// Records that the gradients of coefficients are collected as those of their entries.
+    /// Records that the gradients of entries become the sums over the coefficients that use them.
     pub fn record_collect(&self, pass: &mut wgpu::ComputePass<'_>, passes: &Passes) {
         pass.set_pipeline(&passes.collect);
         pass.set_bind_group(0, &self.group, &[]);

@@ -1,4 +1,4 @@
-//! What the passes of training report.
+//! Sums over views and invalid gradients, as the passes of training report them.
 //!
 //! In: the sums that `loss` writes, the notes that `project_backward` writes. Out: [`Totals`] and [`Faults`].
 

@@ -136,7 +136,7 @@ impl<'a> Trainer<'a> {
         self.headless
     }
 
-    /// Returns the renderer, for other work between steps.
+    /// Returns the renderer, for scoring between steps.
     pub(super) fn headless_mut(&mut self) -> &mut Headless {
         self.headless
     }
@@ -469,7 +469,7 @@ impl<'a> Trainer<'a> {
         self.headless.context().queue.submit([encoder.finish()]);
     }
 
-    /// Computes the coefficients from entries of codebooks, if colors are tied.
+    /// Computes the coefficients from the entries of codebooks, if colors are tied.
     fn expand(&self) {
         if let Some(tied) = &self.tied {
             let color = &self.parameters.color;

@@ -1,6 +1,6 @@
 //! The first phase of a run: its steps, evaluations and states.
 //!
-//! In: a run, on request a state to resume from. Out: the best parameters, and the curve that led to them.
+//! In: a run, optionally a stored state. Out: the best parameters, and the curve up to the last step.
 
 use super::best::{Best, Progressed};
 use super::outcome::CurvePoint;

@@ -1,6 +1,6 @@
 //! The buffers of training that depend on the size of the picture and of the renderer's buffers.
 //!
-//! In: the frame that was recorded last. Out: [`ViewBuffers`]; the passes after the picture, recorded.
+//! In: the frame that was recorded last. Out: [`ViewBuffers`]; commands of the passes after the picture.
 
 use super::parameters::ParameterBuffers;
 use super::passes::Passes;
@@ -36,7 +36,7 @@ pub(super) struct ViewBuffers {
 }
 
 impl ViewBuffers {
-    /// Creates the buffers for a frame of this size. Gradients are summed as `summed` says, losses into `totals`.
+    /// Creates the buffers for a frame of this size. Losses are added to `totals`.
     pub fn new(
         headless: &Headless,
         passes: &Passes,
@@ -109,12 +109,12 @@ impl ViewBuffers {
         })
     }
 
-    /// Returns whether the buffers are those for a frame of this size.
+    /// Returns whether the buffers were created for the resources of this frame and this size.
     pub fn fits(&self, frame: &FinishedFrame<'_>, size: UVec2) -> bool {
         self.size == size && self.splats == frame.buffers.splats && self.color == *frame.color
     }
 
-    /// Records the passes after the picture; with an image, that of its loss.
+    /// Records the passes after the picture, with the pass `loss` if there is an image.
     pub fn record(
         &self,
         encoder: &mut wgpu::CommandEncoder,
