@@ -3,10 +3,11 @@
 //!
 //! In: a run with the best parameters. Out: the scene in the packed form, and its quality before colors are rounded.
 
-use super::CurvePoint;
-use super::resume::Checkpoint;
+use super::best::Progressed;
+use super::outcome::CurvePoint;
+use super::resume::{Checkpoint, Saves};
 use super::rounding::steps_between;
-use super::run::{Progressed, Run, Saves, describe};
+use super::run::Run;
 use super::schedule::decay;
 use crate::offline::quantize::{self, CompressSettings, Quality, compress_tied, train_codebooks};
 use crate::offline::{OfflineError, Progress};
@@ -15,81 +16,77 @@ use crate::scene::GaussianScene;
 /// Factor on the rates while codebooks are trained.
 const RATE: f64 = 0.5;
 
-impl Run<'_> {
-    /// Codes the colors by codebooks whose number of entries follows that of the Gaussians, trains these and everything else for some more
-    /// steps, on pictures of geometry as it will be packed, and compresses the result. A stored run goes on where it ended.
-    pub(super) fn compress(
-        &mut self,
-        quality: Quality,
-        steps: usize,
-        found: &mut Progressed,
-        stored: Option<Checkpoint>,
-        saves: Option<Saves<'_>>,
-        progress: &mut dyn Progress,
-    ) -> Result<GaussianScene, OfflineError> {
-        let made = self.settings.steps;
-        self.trainer.forget_moments();
-        let scene = self.trainer.scene()?.into_runtime()?;
-        let settings = CompressSettings::suiting(quality, scene.len());
-        // Codebooks hold all coefficients but the first.
-        let coded = scene.form.as_sliced().is_some_and(|sliced| sliced.harmonics.evaluated() > 1);
-        let steps = if settings.codebooks.is_empty() || !coded { 0 } else { steps };
-        let bits = settings.geometry.filter(|_| self.settings.rounding && steps > 0);
-        let between = steps_between(scene.len());
-        let mut step = 0;
-        if steps > 0 {
-            // The same scene gives the same codes: they are not stored.
-            self.trainer.tie(train_codebooks(&scene, &settings)?)?;
-            if let Some(bits) = &bits {
-                self.trainer.round(bits)?;
-            }
-            let stored = stored.and_then(|stored| Some((stored.coded?, stored.state)));
-            if let Some((coded, state)) = stored
-                && self.trainer.resume(&state)
-            {
-                progress.note(&format!("the codebooks go on after step {coded}"));
-                step = coded;
-            }
-        }
-        progress.begin("training codebooks", steps);
-        (0..step).for_each(|_| progress.advance());
-        while step < steps {
-            if progress.is_interrupted() {
-                let Progressed { curve, best, pace } = &*found;
-                let found = Progressed { curve: curve.clone(), best: best.clone(), pace: *pace };
-                return Err(self.interrupted(found));
-            }
-            // When follows from the step alone, and the state has what the last rounding changed: a resumed run draws the same.
-            if let Some(bits) = &bits
-                && step > 0
-                && step.is_multiple_of(between)
-            {
-                self.trainer.round(bits)?;
-            }
-            self.step(made + step, step + 1, RATE * decay(step, steps, self.settings.last_rate))?;
-            step += 1;
-            progress.advance();
-            if let Some(saves) = saves.filter(|saves| saves.are_due(step)) {
-                let Progressed { curve, best, .. } = &*found;
-                let state = self.trainer.state()?;
-                let checkpoint = Checkpoint { curve: curve.clone(), best: best.clone(), state, coded: Some(step) };
-                saves.store(&checkpoint, progress)?;
-            }
-        }
-        progress.finish();
-        let scene = self.scene()?.into_runtime()?;
-        let (compressed, _) = match self.trainer.codebooks()? {
-            Some(books) => compress_tied(scene, &settings, &books)?,
-            None => quantize::compress(scene, &settings)?,
-        };
+/// Codes the colors by codebooks whose number of entries follows that of the Gaussians, trains these and everything else for some more
+/// steps, on pictures of geometry as it will be packed, and compresses the result. A stored run goes on where it ended.
+pub(super) fn compress(
+    run: &mut Run<'_>,
+    quality: Quality,
+    steps: usize,
+    found: &mut Progressed,
+    stored: Option<Checkpoint>,
+    saves: Option<Saves<'_>>,
+    progress: &mut dyn Progress,
+) -> Result<GaussianScene, OfflineError> {
+    let made = run.settings.steps;
+    run.trainer.forget_moments();
+    let scene = run.trainer.scene()?.into_runtime()?;
+    let settings = CompressSettings::suiting(quality, scene.len());
+    // Codebooks hold all coefficients but the first.
+    let coded = scene.form.as_sliced().is_some_and(|sliced| sliced.harmonics.evaluated() > 1);
+    let steps = if settings.codebooks.is_empty() || !coded { 0 } else { steps };
+    let bits = settings.geometry.filter(|_| run.settings.rounding && steps > 0);
+    let between = steps_between(scene.len());
+    let mut step = 0;
+    if steps > 0 {
+        // The same scene gives the same codes: they are not stored.
+        run.trainer.tie(train_codebooks(&scene, &settings)?)?;
         if let Some(bits) = &bits {
-            // What is evaluated has the geometry of the package.
-            self.trainer.round(bits)?;
+            run.trainer.round(bits)?;
         }
-        // The loss is not reported: its sums are of the steps since a resumed run began.
-        let point = CurvePoint { step: made + step, loss: None, training_psnr: None, psnr: self.evaluate()? };
-        progress.note(&describe(&point, None));
-        found.curve.push(point);
-        Ok(compressed)
+        let stored = stored.and_then(|stored| Some((stored.coded?, stored.state)));
+        if let Some((coded, state)) = stored
+            && run.trainer.resume(&state)
+        {
+            progress.note(&format!("the codebooks go on after step {coded}"));
+            step = coded;
+        }
     }
+    progress.begin("training codebooks", steps);
+    (0..step).for_each(|_| progress.advance());
+    while step < steps {
+        if progress.is_interrupted() {
+            return Err(run.interrupted(found.clone()));
+        }
+        // When follows from the step alone, and the state has what the last rounding changed: a resumed run draws the same.
+        if let Some(bits) = &bits
+            && step > 0
+            && step.is_multiple_of(between)
+        {
+            run.trainer.round(bits)?;
+        }
+        run.step(made + step, step + 1, RATE * decay(step, steps, run.settings.last_rate))?;
+        step += 1;
+        progress.advance();
+        if let Some(saves) = saves.filter(|saves| saves.are_due(step)) {
+            let Progressed { curve, best, .. } = &*found;
+            let state = run.trainer.state()?;
+            let checkpoint = Checkpoint { curve: curve.clone(), best: best.clone(), state, coded: Some(step) };
+            saves.store(&checkpoint, progress)?;
+        }
+    }
+    progress.finish();
+    let scene = run.scene()?.into_runtime()?;
+    let (compressed, _) = match run.trainer.codebooks()? {
+        Some(books) => compress_tied(scene, &settings, &books)?,
+        None => quantize::compress(scene, &settings)?,
+    };
+    if let Some(bits) = &bits {
+        // What is evaluated has the geometry of the package.
+        run.trainer.round(bits)?;
+    }
+    // The loss is not reported: its sums are of the steps since a resumed run began.
+    let point = CurvePoint { step: made + step, loss: None, training_psnr: None, psnr: run.evaluate()? };
+    progress.note(&point.describe(None));
+    found.curve.push(point);
+    Ok(compressed)
 }

@@ -1,20 +1,24 @@
 //! Parameters on the GPU, with what the optimizer knows of each.
 //!
-//! In: a buffer of values. Out: [`Optimized`]: the same with gradients and moments, as `adam` takes them.
+//! In: a buffer of values. Out: [`Optimized`]: the same with gradients and moments, as `adam` takes them; commands of the pass `adam`.
 
+use super::adam::correction;
 use super::passes::Passes;
-use crate::renderer::Headless;
 use crate::renderer::layout::AdamUniforms;
+use crate::renderer::{GpuError, Headless};
 use wgpu::BufferUsages;
+
+/// Most workgroups of `adam`, and of `expand`, which writes the values of the same buffers.
+pub(super) const ADAM_GROUPS: u32 = 4096;
 
 /// One kind of parameters on the GPU, with what the optimizer knows of each.
 #[derive(Debug)]
 pub(super) struct Optimized {
     pub values: wgpu::Buffer,
     pub gradients: wgpu::Buffer,
-    pub moments: [wgpu::Buffer; 2],
-    pub settings: wgpu::Buffer,
-    pub group: wgpu::BindGroup,
+    moments: [wgpu::Buffer; 2],
+    settings: wgpu::Buffer,
+    group: wgpu::BindGroup,
     /// Number of Gaussians or entries, and four-vectors of each.
     pub count: u32,
     pub stride: u32,
@@ -40,5 +44,47 @@ impl Optimized {
         let resources = buffers.map(wgpu::Buffer::as_entire_binding);
         let group = allocator.bind_group("gs4d adam", &passes.adam_group, &resources);
         Self { values, gradients, moments, settings, group, count, stride }
+    }
+
+    /// Records step number `step`, counted from 1. A sparse step skips Gaussians that no view has shown.
+    pub fn record_step(
+        &self,
+        queue: &wgpu::Queue,
+        pass: &mut wgpu::ComputePass<'_>,
+        passes: &Passes,
+        rates: [[f32; 4]; 5],
+        step: usize,
+        sparse: bool,
+    ) {
+        let Self { count, stride, .. } = *self;
+        let sparse = [u32::from(sparse), 0, 0, 0];
+        let settings = AdamUniforms { rates, correction: correction(step), count, stride, sparse };
+        queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&settings));
+        pass.set_pipeline(&passes.adam);
+        pass.set_bind_group(0, &self.group, &[]);
+        pass.dispatch_workgroups((count * stride).div_ceil(256).min(ADAM_GROUPS), 1, 1);
+    }
+
+    /// Records that all moments become 0.
+    pub fn forget_moments(&self, encoder: &mut wgpu::CommandEncoder) {
+        for moments in &self.moments {
+            encoder.clear_buffer(moments, 0, None);
+        }
+    }
+
+    /// Returns the buffers of a state: values, first and second moments.
+    pub fn stored(&self) -> [&wgpu::Buffer; 3] {
+        let [first, second] = &self.moments;
+        [&self.values, first, second]
+    }
+
+    /// Reads the values.
+    pub fn read_values(&self, headless: &Headless) -> Result<Vec<u8>, GpuError> {
+        headless.copy_out(&self.values, self.values.size())
+    }
+
+    /// Reads the gradients accumulated since the last step.
+    pub fn read_gradients(&self, headless: &Headless) -> Result<Vec<u8>, GpuError> {
+        headless.copy_out(&self.gradients, self.gradients.size())
     }
 }

@@ -2,8 +2,10 @@
 //!
 //! In: the curve so far, the best parameters, parameters and moments. Out: the same, if they are of the same settings and whole.
 
-use super::run::Best;
-use super::{CurvePoint, TrainerState};
+use super::best::Best;
+use super::outcome::CurvePoint;
+use super::settings::FineTuneSettings;
+use super::state::TrainerState;
 use crate::offline::store::{Key, Store};
 use crate::offline::stored::{Stored, Text};
 use crate::offline::{OfflineError, Progress};
@@ -12,6 +14,17 @@ use serde::{Deserialize, Serialize};
 
 /// Name of the file.
 const FILE: &str = "fine-tune.state";
+
+/// Where the state of training is stored, and what it depends on.
+#[derive(Debug, Clone, Copy)]
+pub struct Resume<'a> {
+    /// The folder.
+    pub store: &'a Store,
+    /// Everything that the result depends on besides the settings.
+    pub key: Key,
+    /// Steps between two states.
+    pub every: usize,
+}
 
 /// What a run needs to go on.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,16 +66,45 @@ fn state((Text(sizes), (buffers, (neighbors, filter))): StoredState) -> Option<T
 
 impl Checkpoint {
     /// Stores it, whole or not at all.
-    pub fn store(&self, store: &Store, key: Key, progress: &mut dyn Progress) -> Result<(), OfflineError> {
+    fn store(&self, store: &Store, key: Key, progress: &mut dyn Progress) -> Result<(), OfflineError> {
         let head = Head { curve: self.curve.clone(), best: self.best.point, coded: self.coded };
         let bytes = (Text(head), (stored_state(&self.state), stored_state(&self.best.state))).encode()?;
         Ok(store.store(FILE, key, &bytes, progress)?)
     }
 
     /// Returns what was stored with the same key; `None` if there is nothing, or if it is damaged.
-    pub fn load(store: &Store, key: Key) -> Option<Self> {
+    fn load(store: &Store, key: Key) -> Option<Self> {
         let stored = Stored::decode(&store.load(FILE, key)?)?;
         let (Text(Head { curve, best, coded }), (of_run, of_best)): (Text<Head>, (StoredState, StoredState)) = stored;
         Some(Self { curve, best: Best { point: best, state: state(of_best)? }, state: state(of_run)?, coded })
+    }
+}
+
+/// Where a run stores its state.
+#[derive(Clone, Copy)]
+pub(super) struct Saves<'a> {
+    resume: Resume<'a>,
+    key: Key,
+}
+
+impl<'a> Saves<'a> {
+    /// Returns where a run with these settings stores its state.
+    pub fn new(resume: Resume<'a>, settings: &FineTuneSettings) -> Self {
+        Self { resume, key: resume.key.and(&format!("{settings:?}")) }
+    }
+
+    /// Returns whether the state is stored after this step.
+    pub fn are_due(self, step: usize) -> bool {
+        step.is_multiple_of(self.resume.every.max(1))
+    }
+
+    /// Stores a checkpoint.
+    pub fn store(self, checkpoint: &Checkpoint, progress: &mut dyn Progress) -> Result<(), OfflineError> {
+        checkpoint.store(self.resume.store, self.key, progress)
+    }
+
+    /// Returns the checkpoint that was stored; `None` if there is none.
+    pub fn load(self) -> Option<Checkpoint> {
+        Checkpoint::load(self.resume.store, self.key)
     }
 }

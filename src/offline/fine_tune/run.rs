@@ -1,31 +1,29 @@
-//! A run of fine-tuning: its steps, evaluations and states.
+//! A run of fine-tuning: its scene on the GPU, images and settings, and the operations that both phases use.
 //!
-//! In: a scene, views and settings. Out: the best parameters, and the curve that led to them.
+//! In: a scene, views and settings. Out: one step, one evaluation, the trained scene, the result of a run.
 
-use super::resume::Checkpoint;
-use super::schedule::{Schedule, decay};
+use super::best::Progressed;
+use super::outcome::FineTuned;
+use super::sample::{GpuImage, Sample};
+use super::schedule::{Behind, Schedule};
+use super::settings::FineTuneSettings;
 use super::targets::{Shot, TrainingImages};
-use super::{Behind, CurvePoint, FineTuneSettings, FineTuned, Resume};
-use super::{GpuImage, Sample, Trainer, TrainerState};
+use super::trainer::Trainer;
 use crate::offline::dataset::CoveredImage;
 use crate::offline::dataset::selection::even_subset;
 use crate::offline::metrics::SquaredError;
 use crate::offline::score::GpuEngine;
-use crate::offline::store::Key;
 use crate::offline::temporal_filter::{needs_views, seen_filter};
 use crate::offline::{OfflineError, Progress, sliced};
 use crate::renderer::{Headless, ShaderChecks};
 use crate::scene::{GaussianScene, TemporalFilter};
 use crate::view::{Background, View};
 use glam::Vec3;
-use std::time::Instant;
 
 /// Views that are drawn before the first step, so that there is room for the pairs of all.
 const VIEWS_OF_ROOM: usize = 64;
 /// Most bytes of images that stay on the GPU.
 const RESIDENT_BYTES: usize = 512 << 20;
-/// Steps between two looks at gradients that are not finite.
-const STEPS_OF_FAULTS: usize = 50;
 
 /// Uploads images, as many as have room.
 fn resident_images(trainer: &Trainer<'_>, shots: &[Shot]) -> Result<Vec<GpuImage>, OfflineError> {
@@ -49,32 +47,6 @@ pub(super) struct Run<'a> {
     random: bool,
     /// Segments of the scene's filter of the kind support, which changes no picture: it is left out of training and computed afterwards.
     support: Option<u32>,
-}
-
-/// Where a run stores its state.
-#[derive(Clone, Copy)]
-pub(super) struct Saves<'a> {
-    resume: Resume<'a>,
-    key: Key,
-}
-
-impl Saves<'_> {
-    /// Returns whether the state is stored after this step.
-    pub fn are_due(self, step: usize) -> bool {
-        step.is_multiple_of(self.resume.every.max(1))
-    }
-
-    pub fn store(self, checkpoint: &Checkpoint, progress: &mut dyn Progress) -> Result<(), OfflineError> {
-        checkpoint.store(self.resume.store, self.key, progress)
-    }
-}
-
-/// What a run has found.
-pub(super) struct Progressed {
-    pub curve: Vec<CurvePoint>,
-    pub best: Best,
-    /// Steps made now and seconds that they took.
-    pub pace: (usize, f64),
 }
 
 impl<'a> Run<'a> {
@@ -108,103 +80,6 @@ impl<'a> Run<'a> {
         Ok(run)
     }
 
-    /// Trains, and compresses if that is wanted.
-    pub fn run(&mut self, resume: Option<Resume<'_>>, progress: &mut dyn Progress) -> Result<FineTuned, OfflineError> {
-        let saves = resume.map(|resume| {
-            let key = resume.key.and(&format!("{:?}", self.settings));
-            Saves { resume, key }
-        });
-        let stored = saves.and_then(|saves| Checkpoint::load(saves.resume.store, saves.key));
-        let stored = stored.filter(|stored| self.trainer.resume(&stored.best.state));
-        let is_coded = |stored: &&Checkpoint| stored.coded.is_some();
-        let mut found = match stored.as_ref().filter(is_coded) {
-            Some(Checkpoint { curve, best, .. }) => {
-                Progressed { curve: curve.clone(), best: best.clone(), pace: (0, 0.0) }
-            }
-            None => self.train(stored.clone(), saves, progress)?,
-        };
-        self.trainer.resume(&found.best.state);
-        let scene = match self.settings.compress {
-            Some((quality, steps)) => self.compress(quality, steps, &mut found, stored, saves, progress)?,
-            None => self.scene()?,
-        };
-        self.finished(scene, found)
-    }
-
-    /// Makes the steps, from where a stored run ended.
-    fn train(
-        &mut self,
-        stored: Option<Checkpoint>,
-        saves: Option<Saves<'_>>,
-        progress: &mut dyn Progress,
-    ) -> Result<Progressed, OfflineError> {
-        let settings = self.settings;
-        let every = settings.evaluate_every.max(1);
-        let stored = stored.filter(|stored| self.trainer.resume(&stored.state));
-        let (mut curve, mut best) = match stored {
-            Some(Checkpoint { curve, best, .. }) => {
-                progress.note(&format!("fine-tuning resumes after step {}", curve.last().map_or(0, |last| last.step)));
-                (curve, best)
-            }
-            None => {
-                let point = CurvePoint { step: 0, loss: None, training_psnr: None, psnr: self.evaluate()? };
-                progress.note(&describe(&point, None));
-                (vec![point], Best { point, state: self.trainer.state()? })
-            }
-        };
-        let first = curve.last().map_or(0, |last| last.step);
-        progress.begin("fine-tuning", settings.steps);
-        (0..first).for_each(|_| progress.advance());
-        let (mut seconds, mut told) = (0.0, false);
-        let mut start = Instant::now();
-        let mut step = first;
-        while step < settings.steps && !is_over(settings, &curve, &best) {
-            // The state was stored at the last evaluation: a resumed run makes the steps since then again, and ends at the same bytes.
-            if progress.is_interrupted() {
-                let pace = (step - first, seconds + start.elapsed().as_secs_f64());
-                return Err(self.interrupted(Progressed { curve, best, pace }));
-            }
-            self.step(step, step + 1, decay(step, settings.steps, settings.last_rate))?;
-            step += 1;
-            progress.advance();
-            if !told && step.is_multiple_of(STEPS_OF_FAULTS) {
-                told = self.tell_faults(progress)?;
-            }
-            if step.is_multiple_of(settings.refresh_filter.max(1)) && step != settings.steps {
-                self.refresh_filter(progress)?;
-            }
-            if !step.is_multiple_of(every) && step != settings.steps {
-                continue;
-            }
-            // Waits for the steps made so far.
-            let totals = self.trainer.totals()?;
-            seconds += start.elapsed().as_secs_f64();
-            let (loss, training_psnr) = (Some(totals.loss), Some(totals.psnr));
-            let point = CurvePoint { step, loss, training_psnr, psnr: self.evaluate()? };
-            let speed = (step - first) as f64 / seconds;
-            progress.note(&describe(&point, Some(speed)));
-            curve.push(point);
-            if point.psnr > best.point.psnr || point.psnr.is_none() {
-                best = Best { point, state: self.trainer.state()? };
-            }
-            let goes_on = step < settings.steps || settings.compress.is_some();
-            if let Some(saves) = saves.filter(|saves| saves.are_due(step) && goes_on) {
-                let checkpoint = Checkpoint { curve, best, state: self.trainer.state()?, coded: None };
-                saves.store(&checkpoint, progress)?;
-                Checkpoint { curve, best, .. } = checkpoint;
-            }
-            start = Instant::now();
-        }
-        if step < settings.steps {
-            progress.note(&format!(
-                "fine-tuning ends after step {step}: no evaluation has been better since step {}",
-                best.point.step
-            ));
-        }
-        progress.finish();
-        Ok(Progressed { curve, best, pace: (step - first, seconds) })
-    }
-
     /// Returns the error of an interrupted run, with the best result so far.
     pub(super) fn interrupted(&mut self, found: Progressed) -> OfflineError {
         self.trainer.resume(&found.best.state);
@@ -212,7 +87,8 @@ impl<'a> Run<'a> {
         tuned.map_or_else(|error| error, |tuned| OfflineError::Interrupted { tuned: Some(Box::new(tuned)) })
     }
 
-    fn finished(&self, scene: GaussianScene, found: Progressed) -> Result<FineTuned, OfflineError> {
+    /// Returns the result of a run whose final scene is given.
+    pub(super) fn finished(&self, scene: GaussianScene, found: Progressed) -> Result<FineTuned, OfflineError> {
         let Progressed { curve, best, pace: (steps, seconds) } = found;
         Ok(FineTuned {
             scene,
@@ -235,13 +111,13 @@ impl<'a> Run<'a> {
     }
 
     /// Computes the temporal filter again from the Gaussians as they are, if it is used in training.
-    fn refresh_filter(&mut self, progress: &mut dyn Progress) -> Result<(), OfflineError> {
+    pub(super) fn refresh_filter(&mut self, progress: &mut dyn Progress) -> Result<(), OfflineError> {
         let mut scene = self.trainer.scene()?;
         let Some(TemporalFilter { kind, segments, .. }) = scene.filter.take() else { return Ok(()) };
         let runtime = scene.into_runtime()?;
         let background = runtime.trained_background();
         let filter = {
-            let mut scorer = GpuEngine::new(self.trainer.headless, &runtime, background, ShaderChecks::Off)?;
+            let mut scorer = GpuEngine::new(self.trainer.headless_mut(), &runtime, background, ShaderChecks::Off)?;
             seen_filter(&mut scorer, &runtime, kind, segments + 1, &self.images.views, progress)?
         };
         Ok(self.trainer.set_filter(filter)?)
@@ -284,7 +160,7 @@ impl<'a> Run<'a> {
     }
 
     /// Reports the first gradient that was not finite. Returns whether there was one.
-    fn tell_faults(&self, progress: &mut dyn Progress) -> Result<bool, OfflineError> {
+    pub(super) fn tell_faults(&self, progress: &mut dyn Progress) -> Result<bool, OfflineError> {
         let Some(faults) = self.trainer.faults()? else { return Ok(false) };
         let view = self.images.shots.get(faults.view as usize).map_or("", |shot| shot.name.as_str());
         progress.note(&format!(
@@ -293,19 +169,6 @@ impl<'a> Run<'a> {
         ));
         Ok(true)
     }
-}
-
-/// Returns whether no evaluation has been better for as many as patience allows.
-fn is_over(settings: &FineTuneSettings, curve: &[CurvePoint], best: &Best) -> bool {
-    let waited = curve.iter().rev().take_while(|point| point.step > best.point.step).count();
-    settings.patience.is_some_and(|patience| waited >= patience)
-}
-
-/// The best parameters so far.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Best {
-    pub point: CurvePoint,
-    pub state: TrainerState,
 }
 
 /// Returns the squared error of a view against an image over the background; the picture is clamped to 0..1.
@@ -325,13 +188,4 @@ fn behind(background: Background) -> Vec3 {
         Background::Color(color) => Vec3::from(color),
         Background::None | Background::Environment => Vec3::ZERO,
     }
-}
-
-pub(super) fn describe(point: &CurvePoint, speed: Option<f64>) -> String {
-    let CurvePoint { step, loss, training_psnr, psnr } = point;
-    let loss = loss.map_or(String::new(), |loss| format!("loss {loss:.5}, "));
-    let training = training_psnr.map_or(String::new(), |psnr| format!("training {psnr:.2} dB, "));
-    let speed = speed.map_or(String::new(), |speed| format!(", {speed:.1} steps a second"));
-    let validation = psnr.map_or("no validation views".to_owned(), |psnr| format!("validation {psnr:.3} dB"));
-    format!("step {step}: {loss}{training}{validation}{speed}")
 }

@@ -2,7 +2,7 @@
 //!
 //! In: a choice, a renderer. Out: the shader definitions of `blend_backward` and `project_backward`; an error if the device cannot do it.
 
-use super::TrainerError;
+use super::trainer_error::TrainerError;
 use crate::renderer::Headless;
 use crate::renderer::shaders::ATOMIC_SUMS;
 

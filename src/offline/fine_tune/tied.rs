@@ -2,11 +2,13 @@
 //!
 //! In: codebooks for the colors of the scene that is trained. Out: the codebooks after some steps.
 
-use super::optimized::Optimized;
-use super::trainer::{ADAM_GROUPS, Trainer, TrainerError};
+use super::optimized::{ADAM_GROUPS, Optimized};
+use super::parameters::ParameterBuffers;
+use super::passes::Passes;
+use super::trainer_error::TrainerError;
 use crate::offline::quantize::codebook::Centers;
-use crate::renderer::GpuError;
 use crate::renderer::layout::TiedColors;
+use crate::renderer::{GpuError, Headless};
 use ndarray::Array2;
 use wgpu::BufferUsages;
 
@@ -14,19 +16,24 @@ use wgpu::BufferUsages;
 #[derive(Debug)]
 pub(super) struct Tied {
     pub entries: Optimized,
-    pub group: wgpu::BindGroup,
+    group: wgpu::BindGroup,
     /// Codes, and the number of entries of each codebook.
-    pub books: Centers,
+    books: Centers,
 }
 
-impl Trainer<'_> {
-    /// Makes all color coefficients but the first of each Gaussian sums of entries of codebooks, which are trained in their place. Rows are
-    /// Gaussians.
+impl Tied {
+    /// Uploads codebooks for all color coefficients but the first of each Gaussian. Rows are Gaussians.
     ///
     /// # Errors
     /// Codebooks of other Gaussians or coefficients.
-    pub fn tie(&mut self, books: Centers) -> Result<(), TrainerError> {
-        let (count, stride) = (self.capture.len(), self.color.stride);
+    pub fn new(
+        headless: &Headless,
+        passes: &Passes,
+        parameters: &ParameterBuffers,
+        books: Centers,
+    ) -> Result<Self, TrainerError> {
+        let ParameterBuffers { color, notes, .. } = parameters;
+        let (count, stride) = (color.count as usize, color.stride);
         let sizes: Vec<usize> = books.entries.iter().map(|book| book.nrows()).collect();
         let fits = |(codes, size): (&Vec<u32>, &usize)| {
             codes.len() == count && codes.iter().all(|&code| (code as usize) < *size)
@@ -59,8 +66,8 @@ impl Trainer<'_> {
         for own in &members {
             firsts.push(firsts.last().copied().unwrap_or_default() + own.len() as u32);
         }
-        let allocator = self.headless.allocator();
-        let queue = &self.headless.context().queue;
+        let allocator = headless.allocator();
+        let queue = &headless.context().queue;
         let filled = |label, bytes: &[u8], usage| {
             let made = allocator.buffer(label, bytes.len().max(16) as u64, usage);
             queue.write_buffer(&made, 0, bytes);
@@ -73,43 +80,40 @@ impl Trainer<'_> {
         let firsts = filled("gs4d first members", bytemuck::cast_slice(&firsts), storage);
         let members = filled("gs4d members", bytemuck::cast_slice(&members.concat()), storage);
         let values = filled("gs4d entries", bytemuck::cast_slice(&values), storage);
-        let entries = Optimized::new(self.headless, &self.passes, &self.notes, values, total as u32, stride);
+        let entries = Optimized::new(headless, passes, notes, values, total as u32, stride);
         let Optimized { values, gradients, .. } = &entries;
-        let buffers =
-            [&settings, &codes, &firsts, &members, values, &self.color.values, &self.color.gradients, gradients];
-        let group = allocator.bind_group(
-            "gs4d tied colors",
-            &self.passes.tied_group,
-            &buffers.map(wgpu::Buffer::as_entire_binding),
-        );
-        let tied = Tied { entries, group, books };
-        let mut encoder = self.encoder("gs4d expand");
-        self.expand(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()), &tied);
-        queue.submit([encoder.finish()]);
-        self.tied = Some(tied);
-        Ok(())
+        let buffers = [&settings, &codes, &firsts, &members, values, &color.values, &color.gradients, gradients];
+        let group =
+            allocator.bind_group("gs4d tied colors", &passes.tied_group, &buffers.map(wgpu::Buffer::as_entire_binding));
+        Ok(Self { entries, group, books })
+    }
+
+    /// Records that the gradients of entries become the sums over the coefficients that use them.
+    pub fn record_collect(&self, pass: &mut wgpu::ComputePass<'_>, passes: &Passes) {
+        pass.set_pipeline(&passes.collect);
+        pass.set_bind_group(0, &self.group, &[]);
+        pass.dispatch_workgroups(self.entries.count, 1, 1);
     }
 
     /// Records that the coefficients become the sums of their entries.
-    pub(super) fn expand(&self, pass: &mut wgpu::ComputePass<'_>, tied: &Tied) {
-        let values = self.color.count * self.color.stride;
-        pass.set_pipeline(&self.passes.expand);
-        pass.set_bind_group(0, &tied.group, &[]);
+    pub fn record_expand(&self, pass: &mut wgpu::ComputePass<'_>, passes: &Passes, color: &Optimized) {
+        let values = color.count * color.stride;
+        pass.set_pipeline(&passes.expand);
+        pass.set_bind_group(0, &self.group, &[]);
         pass.dispatch_workgroups(values.div_ceil(256).min(ADAM_GROUPS), 1, 1);
     }
 
-    /// Returns the codebooks as they are; `None` unless colors are [tied](Self::tie).
+    /// Returns the codebooks as they are.
     ///
     /// # Errors
     /// A lost device.
-    pub fn codebooks(&self) -> Result<Option<Centers>, GpuError> {
-        let Some(Tied { entries, books, .. }) = &self.tied else { return Ok(None) };
-        let values: Vec<f32> = bytemuck::pod_collect_to_vec(&self.read(&entries.values)?);
-        let mut books = books.clone();
+    pub fn codebooks(&self, headless: &Headless) -> Result<Centers, GpuError> {
+        let values: Vec<f32> = bytemuck::pod_collect_to_vec(&self.entries.read_values(headless)?);
+        let mut books = self.books.clone();
         let rows = books.entries.iter_mut().flat_map(|book| book.rows_mut());
-        for (entry, mut row) in values.chunks_exact(entries.stride as usize * 4).zip(rows) {
+        for (entry, mut row) in values.chunks_exact(self.entries.stride as usize * 4).zip(rows) {
             row.iter_mut().zip(&entry[3..]).for_each(|(to, from)| *to = *from);
         }
-        Ok(Some(books))
+        Ok(books)
     }
 }

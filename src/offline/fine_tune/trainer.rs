@@ -1,6 +1,6 @@
 //! Training on the GPU, with the renderer's own passes.
 //!
-//! In: a scene in the trained form, views with their images. Out: the scene after some steps. Nothing is added without order, so that every
+//! In: a scene in the trained form, views with their images. Out: the scene after some steps, its gradients, its state. Nothing is added without order, so that every
 //! run gives the same result, unless [sums](GradientSums) are atomic.
 //!
 //! | pass | reads | writes |
@@ -15,106 +15,54 @@
 //! | `adam` | gradients, moments | parameters; of Gaussians that were seen only, if steps are [sparse](Trainer::set_sparse) |
 //! | `codebooks` | gradients of coefficients; entries | gradients of entries; coefficients, once colors are [tied](Trainer::tie) |
 
-use super::adam::correction;
+use super::backward::Backward;
 use super::optimized::Optimized;
+use super::parameters::{ParameterBuffers, scene_settings};
 use super::passes::Passes;
-use super::records::records;
+use super::records::{records, set_harmonics, set_parameters};
 use super::regularizer::Regularizer;
-use super::rounding::Rounder;
+use super::rounding::{Rounder, changes};
+use super::sample::{GpuImage, Sample};
 use super::schedule::Rates;
+use super::state::TrainerState;
 use super::sums::GradientSums;
 use super::terms::Terms;
 use super::tied::Tied;
-use super::view_buffers::ViewBuffers;
+use super::totals::{Faults, Totals};
+use super::trainer_error::TrainerError;
 use crate::gaussian::harmonics::evaluated;
-use crate::gaussian::{GradientMode, InvalidGaussian, Model};
+use crate::gaussian::{GradientMode, Model};
 use crate::offline::dataset::CoveredImage;
-use crate::offline::metrics::decibels;
-use crate::offline::quantize::CompressError;
-use crate::renderer::layout::{AdamUniforms, FIRST_SEEN, LossUniforms, TrainedScene};
+use crate::offline::quantize::codebook::Centers;
+use crate::renderer::layout::{LossUniforms, TrainedRecord};
 use crate::renderer::memory::binding_limit;
 use crate::renderer::shaders::{COMPAT, COMPAT_WITHOUT_TIME};
 use crate::renderer::{GpuCapture, GpuError, Headless, ShaderChecks};
-use crate::scene::{GaussianScene, SceneForm, TemporalFilter};
+use crate::scene::packed::encode::Bits;
+use crate::scene::{GaussianScene, SceneForm, TemporalFilter, Trained};
 use crate::view::{Background, Frame, View};
-use glam::UVec2;
 use std::collections::VecDeque;
-use wgpu::BufferUsages;
 
 /// Steps that may be submitted before the first of them has finished.
 const STEPS_IN_FLIGHT: usize = 4;
-/// Bytes of the notes of `project_backward` about gradients that are not finite, before a word for each Gaussian.
-const FAULT_BYTES: u64 = 4 * FIRST_SEEN as u64;
-/// Most workgroups of `adam`.
-pub(super) const ADAM_GROUPS: u32 = 4096;
 
 /// A scene that is trained.
 #[derive(Debug)]
 pub struct Trainer<'a> {
-    pub(super) headless: &'a mut Headless,
-    pub(super) passes: Passes,
-    pub(super) capture: GpuCapture,
+    headless: &'a mut Headless,
+    passes: Passes,
+    capture: GpuCapture,
     /// What is not trained: switches, coefficients that are not evaluated.
-    pub(super) scene: GaussianScene,
-    model: Model,
-    pub(super) geometry: Optimized,
-    pub(super) color: Optimized,
-    pub(super) scene_settings: wgpu::Buffer,
-    slice: wgpu::BindGroup,
-    parameters: wgpu::BindGroup,
-    /// Gradients that were not finite; which Gaussians the views since the last step have shown.
-    pub(super) notes: wgpu::Buffer,
-    pub(super) totals: wgpu::Buffer,
-    pub(super) tied: Option<Tied>,
-    pub(super) terms: Terms,
-    pub(super) regularizer: Option<Regularizer>,
-    pub(super) rounder: Option<Rounder>,
+    scene: GaussianScene,
+    parameters: ParameterBuffers,
+    backward: Backward,
+    tied: Option<Tied>,
+    /// Weight of the term of the mask.
+    mask_weight: f32,
+    regularizer: Option<Regularizer>,
+    rounder: Option<Rounder>,
     sparse: bool,
-    pub(super) sums: GradientSums,
-    pub(super) view: Option<ViewBuffers>,
     in_flight: VecDeque<wgpu::SubmissionIndex>,
-}
-
-/// An image on the GPU.
-#[derive(Debug)]
-pub struct GpuImage {
-    size: UVec2,
-    group: wgpu::BindGroup,
-}
-
-/// One view of a batch.
-#[derive(Debug, Clone, Copy)]
-pub struct Sample<'a> {
-    /// Camera and time.
-    pub view: &'a View,
-    /// What it should look like, in the size of the view.
-    pub image: &'a GpuImage,
-    /// Behind the scene, and behind the image if it is a color.
-    pub background: Background,
-    /// Number of the view, for reports.
-    pub number: u32,
-}
-
-/// Sums over the views since the last report.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Totals {
-    /// Mean loss, without the terms of Gaussians alone.
-    pub loss: f64,
-    /// PSNR of all pixels together, dB.
-    pub psnr: f64,
-    /// Number of views.
-    pub views: u64,
-}
-
-/// Gradients that were not finite and have been left out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Faults {
-    /// Their number.
-    pub count: u32,
-    /// The Gaussian and the view of the first.
-    pub gaussian: u32,
-    /// Number of that view.
-    pub view: u32,
 }
 
 impl<'a> Trainer<'a> {
@@ -162,49 +110,21 @@ impl<'a> Trainer<'a> {
         }
         let capture = headless.upload(&runtime)?;
         let Some(writable) = capture.writable() else { return Err(TrainerError::Empty) };
-        let [gaussians, lifespans, harmonics] = writable.map(wgpu::Buffer::clone);
-        let allocator = headless.allocator();
-        let queue = &headless.context().queue;
-        let storage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
-        let raw = allocator.buffer("gs4d trained", size_of_val(&records[..]) as u64, storage);
-        queue.write_buffer(&raw, 0, bytemuck::cast_slice(&records));
-        let notes = allocator.buffer("gs4d notes", FAULT_BYTES + 4 * u64::from(count), storage);
-        let geometry = Optimized::new(headless, &passes, &notes, raw, count, 5);
-        let color = Optimized::new(headless, &passes, &notes, harmonics, count, stride);
-        let uniform = BufferUsages::UNIFORM;
-        let scene_settings = allocator.buffer("gs4d trained scene", size_of::<TrainedScene>() as u64, uniform);
-        let totals = allocator.buffer("gs4d totals", 16, storage);
-        let slice = allocator.bind_group(
-            "gs4d slice",
-            &passes.slice_group,
-            &[&scene_settings, &geometry.values, &gaussians, &lifespans].map(wgpu::Buffer::as_entire_binding),
-        );
-        let buffers = [&geometry.values, &color.values, &geometry.gradients, &color.gradients, &notes];
-        let parameters = allocator.bind_group(
-            "gs4d parameters",
-            &passes.parameters_group,
-            &buffers.map(wgpu::Buffer::as_entire_binding),
-        );
-        let mut trainer = Self {
+        let settings = scene_settings(model, count, scene.trained_with.prefilter_var);
+        let parameters = ParameterBuffers::new(headless, &passes, settings, &records, stride, writable);
+        let backward = Backward::new(headless, sums);
+        let trainer = Self {
             headless,
             passes,
             capture,
             scene,
-            model,
-            geometry,
-            color,
-            scene_settings,
-            slice,
             parameters,
-            notes,
-            totals,
+            backward,
             tied: None,
-            terms: Terms::default(),
+            mask_weight: 0.0,
             regularizer: None,
             rounder: None,
             sparse: false,
-            sums,
-            view: None,
             in_flight: VecDeque::new(),
         };
         trainer.slice();
@@ -213,6 +133,11 @@ impl<'a> Trainer<'a> {
 
     /// Returns the adapter's description and the device.
     pub fn headless(&self) -> &Headless {
+        self.headless
+    }
+
+    /// Returns the renderer, for scoring between steps.
+    pub(super) fn headless_mut(&mut self) -> &mut Headless {
         self.headless
     }
 
@@ -237,16 +162,26 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// An image that does not fit one binding of the device.
     pub fn upload(&self, image: &CoveredImage) -> Result<GpuImage, GpuError> {
-        let bytes: &[u8] = bytemuck::cast_slice(&image.texels);
-        let (needed, limit) = (bytes.len() as u64, binding_limit(&self.headless.context().device.limits()));
-        if needed > limit || needed == 0 {
-            return Err(GpuError::TooLarge { what: "an image", needed, limit });
+        GpuImage::new(self.headless, &self.passes, image)
+    }
+
+    /// Sets the weights of further terms of the loss, which are 0 at first.
+    ///
+    /// # Errors
+    /// A weight that is negative or not a number, a shader that does not compile.
+    pub fn set_terms(&mut self, terms: Terms) -> Result<(), TrainerError> {
+        if let Some((term, weight)) = terms.wrong() {
+            return Err(TrainerError::Weight { term, weight });
         }
-        let allocator = self.headless.allocator();
-        let buffer = allocator.buffer("gs4d image", needed, BufferUsages::STORAGE);
-        self.headless.context().queue.write_buffer(&buffer, 0, bytes);
-        let group = allocator.bind_group("gs4d image", &self.passes.image_group, &[buffer.as_entire_binding()]);
-        Ok(GpuImage { size: image.size, group })
+        self.regularizer = match terms.is_regularizing() {
+            true => {
+                let Some([gaussians, ..]) = self.capture.writable() else { return Err(TrainerError::Empty) };
+                Some(Regularizer::new(self.headless, &self.parameters, gaussians, &terms)?)
+            }
+            false => None,
+        };
+        self.mask_weight = terms.mask as f32;
+        Ok(())
     }
 
     /// Adds the gradients of the loss of a batch, each view with the same share.
@@ -254,16 +189,16 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// A picture or pairs that do not fit the GPU, an image of another size than its view.
     pub fn accumulate(&mut self, batch: &[Sample<'_>], similarity_share: f64) -> Result<(), GpuError> {
+        let Self { headless, passes, capture, parameters, backward, mask_weight, .. } = self;
         let share = 1.0 / batch.len().max(1) as f32;
         for sample in batch {
             if sample.image.size != sample.view.size {
                 return Err(GpuError::Scene("an image to train on has another size than its view"));
             }
-            let mut encoder = self.encoder("gs4d view");
-            self.headless.record(&mut encoder, &self.capture, sample.view, sample.background)?;
-            self.fit(sample.view.size)?;
-            let Some(buffers) = &self.view else { continue };
-            let queue = &self.headless.context().queue;
+            let mut encoder = encoder(headless, "gs4d view");
+            headless.record(&mut encoder, capture, sample.view, sample.background)?;
+            let Some(buffers) = backward.fit(headless, passes, parameters, sample.view.size)? else { continue };
+            let queue = &headless.context().queue;
             let [r, g, b] = match sample.background {
                 Background::Color(color) => color,
                 Background::None | Background::Environment => [0.0; 3],
@@ -274,12 +209,12 @@ impl<'a> Trainer<'a> {
                 tiles: sample.view.tiles().to_array(),
                 share,
                 similarity_share: similarity_share as f32,
-                mask_weight: self.terms.mask as f32,
+                mask_weight: *mask_weight,
                 padding: 0,
             };
             queue.write_buffer(&buffers.loss_settings, 0, bytemuck::bytes_of(&settings));
-            self.write_scene(sample.number);
-            self.record_backward(&mut encoder, buffers, sample.view, Some(sample.image));
+            parameters.write_scene(queue, sample.number);
+            buffers.record(&mut encoder, headless, passes, capture, parameters, Some(sample.image));
             queue.submit([encoder.finish()]);
         }
         Ok(())
@@ -296,57 +231,29 @@ impl<'a> Trainer<'a> {
         pixels: &[[f32; 4]],
         depths: &[f32],
     ) -> Result<(), GpuError> {
-        self.headless.draw(&self.capture, view, background)?;
-        self.fit(view.size)?;
-        let Some(buffers) = &self.view else { return Ok(()) };
-        let queue = &self.headless.context().queue;
+        let Self { headless, passes, capture, parameters, backward, .. } = self;
+        headless.draw(capture, view, background)?;
+        let Some(buffers) = backward.fit(headless, passes, parameters, view.size)? else { return Ok(()) };
+        let queue = &headless.context().queue;
         queue.write_buffer(&buffers.pixel_gradients, 0, bytemuck::cast_slice(pixels));
         queue.write_buffer(&buffers.depth_gradients, 0, bytemuck::cast_slice(depths));
-        self.write_scene(0);
-        let mut encoder = self.encoder("gs4d view");
-        self.record_backward(&mut encoder, buffers, view, None);
+        parameters.write_scene(queue, 0);
+        let mut encoder = encoder(headless, "gs4d view");
+        buffers.record(&mut encoder, headless, passes, capture, parameters, None);
         queue.submit([encoder.finish()]);
         Ok(())
     }
 
-    /// Records the passes after the picture; with an image, that of its loss.
-    fn record_backward(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        buffers: &ViewBuffers,
-        view: &View,
-        image: Option<&GpuImage>,
-    ) {
-        let Some(frame) = self.headless.finished() else { return };
-        let (tiles, passes) = (view.tiles(), &self.passes);
-        if self.sums == GradientSums::Atomic {
-            encoder.clear_buffer(&buffers.gradients, 0, None);
-        }
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-        if let Some(image) = image {
-            pass.set_bind_group(0, &buffers.loss, &[]);
-            pass.set_bind_group(1, &image.group, &[]);
-            pass.set_pipeline(&passes.similarity);
-            pass.dispatch_workgroups(tiles.x, tiles.y, 1);
-            pass.set_pipeline(&passes.gradient);
-            pass.dispatch_workgroups(tiles.x, tiles.y, 1);
-            pass.set_pipeline(&passes.total);
-            pass.dispatch_workgroups(1, 1, 1);
-        }
-        pass.set_bind_group(0, &buffers.blended, &[]);
-        pass.set_bind_group(1, &buffers.sums, &[]);
-        if self.sums == GradientSums::Deterministic {
-            pass.set_pipeline(&passes.place);
-            pass.dispatch_workgroups(frame.slots.div_ceil(256), 1, 1);
-        }
-        pass.set_pipeline(&passes.pairs);
-        pass.dispatch_workgroups(tiles.x, tiles.y, 1);
-        pass.set_pipeline(&passes.project_backward);
-        pass.set_bind_group(0, &buffers.splat_gradients, &[]);
-        pass.set_bind_group(1, self.capture.geometry(), &[]);
-        pass.set_bind_group(2, self.headless.recorded_list(), &[]);
-        pass.set_bind_group(3, &self.parameters, &[]);
-        pass.dispatch_workgroups((self.capture.len() as u32).div_ceil(64), 1, 1);
+    /// Adds the gradients of the terms that depend on Gaussians alone to those of the batch of a step, from 0. Neighbors are searched for
+    /// before the first and again as often as the terms say.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn accumulate_terms(&mut self, step: usize) -> Result<(), GpuError> {
+        let Some(regularizer) = &mut self.regularizer else { return Ok(()) };
+        regularizer.search(self.headless, &self.parameters, step)?;
+        submit(self.headless, "gs4d terms", |pass| regularizer.record(pass, self.parameters.count()));
+        Ok(())
     }
 
     /// Sets whether a step leaves Gaussians as they are, with their moments, that no view of its batch shows. Default: `false`. Entries of
@@ -360,42 +267,35 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// A lost device.
     pub fn step(&mut self, rates: &Rates, factor: f64, step: usize) -> Result<(), GpuError> {
-        let scale = self.scene.trained_with.spatial_lr_scale;
+        let Self { headless, passes, parameters, tied, sparse, .. } = &*self;
+        let ParameterBuffers { geometry, color, .. } = parameters;
         let colors = rates.of_harmonics(factor);
-        let sparse = u32::from(self.sparse);
-        let mut rated = vec![(&self.geometry, rates.of_parameters(scale, factor), sparse)];
-        match &self.tied {
+        let geometry_rates = rates.of_parameters(self.scene.trained_with.spatial_lr_scale, factor);
+        let mut rated = vec![(geometry, geometry_rates, *sparse)];
+        match tied {
             // The first coefficient of each Gaussian is its own; entries are of many.
             Some(tied) => rated.extend([
-                (&self.color, Rates { harmonics: 0.0, ..*rates }.of_harmonics(factor), sparse),
-                (&tied.entries, [colors[1]; 5], 0),
+                (color, Rates { harmonics: 0.0, ..*rates }.of_harmonics(factor), *sparse),
+                (&tied.entries, [colors[1]; 5], false),
             ]),
-            None => rated.push((&self.color, colors, sparse)),
+            None => rated.push((color, colors, *sparse)),
         }
-        let queue = &self.headless.context().queue;
-        let mut encoder = self.encoder("gs4d step");
+        let queue = &headless.context().queue;
+        let mut encoder = encoder(headless, "gs4d step");
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            if let Some(Tied { entries, group, .. }) = &self.tied {
-                pass.set_pipeline(&self.passes.collect);
-                pass.set_bind_group(0, group, &[]);
-                pass.dispatch_workgroups(entries.count, 1, 1);
+            if let Some(tied) = tied {
+                tied.record_collect(&mut pass, passes);
             }
-            pass.set_pipeline(&self.passes.adam);
             for (optimized, rates, sparse) in rated {
-                let Optimized { count, stride, .. } = *optimized;
-                let sparse = [sparse, 0, 0, 0];
-                let settings = AdamUniforms { rates, correction: correction(step), count, stride, sparse };
-                queue.write_buffer(&optimized.settings, 0, bytemuck::bytes_of(&settings));
-                pass.set_bind_group(0, &optimized.group, &[]);
-                pass.dispatch_workgroups((count * stride).div_ceil(256).min(ADAM_GROUPS), 1, 1);
+                optimized.record_step(queue, &mut pass, passes, rates, step, sparse);
             }
-            if let Some(tied) = &self.tied {
-                self.expand(&mut pass, tied);
+            if let Some(tied) = tied {
+                tied.record_expand(&mut pass, passes, color);
             }
             self.record_slice(&mut pass);
         }
-        encoder.clear_buffer(&self.notes, FAULT_BYTES, None);
+        parameters.forget_seen(&mut encoder);
         let index = queue.submit([encoder.finish()]);
         self.in_flight.push_back(index);
         if self.in_flight.len() > STEPS_IN_FLIGHT
@@ -413,12 +313,7 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// A lost device.
     pub fn totals(&mut self) -> Result<Totals, GpuError> {
-        let bytes = self.headless.copy_out(&self.totals, 16)?;
-        let [loss, _, squares, views]: [f32; 4] = bytemuck::pod_read_unaligned(&bytes);
-        self.headless.context().queue.write_buffer(&self.totals, 0, &[0; 16]);
-        let each = 1.0 / f64::from(views.max(1.0));
-        let psnr = decibels(f64::from(squares) * each);
-        Ok(Totals { loss: f64::from(loss) * each, psnr, views: views as u64 })
+        self.backward.totals(self.headless)
     }
 
     /// Returns the gradients that were not finite so far; `None` if there were none.
@@ -426,9 +321,7 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// A lost device.
     pub fn faults(&self) -> Result<Option<Faults>, GpuError> {
-        let bytes = self.headless.copy_out(&self.notes, FAULT_BYTES)?;
-        let [count, gaussian, view]: [u32; 3] = bytemuck::pod_read_unaligned(&bytes);
-        Ok((count > 0).then(|| Faults { count, gaussian: gaussian.saturating_sub(1), view }))
+        self.parameters.faults(self.headless)
     }
 
     /// Replaces the temporal filter.
@@ -441,81 +334,172 @@ impl<'a> Trainer<'a> {
         Ok(())
     }
 
-    pub(super) fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
-        let label = wgpu::CommandEncoderDescriptor { label: Some(label) };
-        self.headless.context().device.create_command_encoder(&label)
+    /// Makes all color coefficients but the first of each Gaussian sums of entries of codebooks, which are trained in their place. Rows are
+    /// Gaussians.
+    ///
+    /// # Errors
+    /// Codebooks of other Gaussians or coefficients.
+    pub fn tie(&mut self, books: Centers) -> Result<(), TrainerError> {
+        self.tied = Some(Tied::new(self.headless, &self.passes, &self.parameters, books)?);
+        self.expand();
+        Ok(())
     }
 
-    fn write_scene(&self, view: u32) {
-        let settings = TrainedScene {
-            count: self.capture.len() as u32,
-            model: match self.model {
-                Model::Static3d => 0,
-                Model::Unrotated4d => 1,
-                Model::Rotated4d => 2,
-            },
-            prefilter_var: self.scene.trained_with.prefilter_var,
-            view,
+    /// Returns the codebooks as they are; `None` unless colors are [tied](Self::tie).
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn codebooks(&self) -> Result<Option<Centers>, GpuError> {
+        self.tied.as_ref().map(|tied| tied.codebooks(self.headless)).transpose()
+    }
+
+    /// Packs the Gaussians as they are, by the rules of compression, and draws them from now on with what that changes of each: now as the
+    /// package would be drawn, after further steps as far from the parameters as now. Parameters and their gradients are not rounded; terms
+    /// of the loss that depend on Gaussians alone see them rounded too.
+    ///
+    /// # Errors
+    /// Gaussians that the packed form cannot hold, a shader that does not compile, a lost device.
+    pub fn round(&mut self, bits: &Bits) -> Result<(), TrainerError> {
+        let SceneForm::Trained(Trained { parameters, .. }) = &self.scene.form else {
+            return Err(TrainerError::NotTrained);
         };
-        self.headless.context().queue.write_buffer(&self.scene_settings, 0, bytemuck::bytes_of(&settings));
+        let mut parameters = parameters.clone();
+        let trained: Vec<TrainedRecord> =
+            bytemuck::pod_collect_to_vec(&self.parameters.geometry.read_values(self.headless)?);
+        set_parameters(&mut parameters, &trained);
+        let changes = changes(&parameters, &self.scene.trained_with, bits)?;
+        let rounder = match self.rounder.take() {
+            Some(rounder) => rounder,
+            None => {
+                let Some([gaussians, lifespans, _]) = self.capture.writable() else { return Err(TrainerError::Empty) };
+                Rounder::new(self.headless, &self.parameters, [gaussians, lifespans])?
+            }
+        };
+        rounder.write(&self.headless.context().queue, &changes);
+        self.rounder = Some(rounder);
+        self.slice();
+        Ok(())
     }
 
-    /// Records that the parameters are sliced, and rounded if geometry is.
-    fn record_slice(&self, pass: &mut wgpu::ComputePass<'_>) {
-        let groups = (self.capture.len() as u32).div_ceil(256);
-        pass.set_pipeline(&self.passes.slice);
-        pass.set_bind_group(0, &self.slice, &[]);
-        pass.dispatch_workgroups(groups, 1, 1);
-        if let Some(rounder) = &self.rounder {
-            rounder.record(pass, groups);
+    /// Returns the scene as it is.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn scene(&self) -> Result<GaussianScene, GpuError> {
+        let ParameterBuffers { geometry, color, .. } = &self.parameters;
+        let (records, values) = (geometry.read_values(self.headless)?, color.read_values(self.headless)?);
+        Ok(self.with(&records, &values))
+    }
+
+    /// Returns the gradients accumulated since the last step, as raw parameters and color coefficients.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn gradients(&self) -> Result<GaussianScene, GpuError> {
+        let ParameterBuffers { geometry, color, .. } = &self.parameters;
+        let (records, values) = (geometry.read_gradients(self.headless)?, color.read_gradients(self.headless)?);
+        let mut gradients = self.with(&records, &values);
+        if let SceneForm::Trained(Trained { harmonics, .. }) = &mut gradients.form {
+            let (used, own) = (harmonics.evaluated() * 3, harmonics.coefficients * 3);
+            // Coefficients that are not evaluated change nothing.
+            harmonics.values.chunks_exact_mut(own.max(1)).for_each(|values| values[used..].fill(0.0));
+        }
+        Ok(gradients)
+    }
+
+    /// Returns the scene with these records and color coefficients, as they are on the GPU.
+    fn with(&self, records: &[u8], values: &[u8]) -> GaussianScene {
+        let mut scene = self.scene.clone();
+        if let SceneForm::Trained(Trained { parameters, harmonics }) = &mut scene.form {
+            let records: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(records);
+            set_parameters(parameters, &records);
+            let stride = self.parameters.color.stride as usize * 4;
+            set_harmonics(harmonics, &bytemuck::pod_collect_to_vec::<u8, f32>(values), stride);
+        }
+        scene
+    }
+
+    /// Returns parameters, moments and neighbors, to resume from.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn state(&self) -> Result<TrainerState, GpuError> {
+        let read = |buffer: &wgpu::Buffer| self.headless.copy_out(buffer, buffer.size());
+        let buffers = self.stored().into_iter().map(read).collect::<Result<_, _>>()?;
+        let neighbors = self.regularizer.as_ref().map(|regularizer| regularizer.neighbors(self.headless));
+        let neighbors = neighbors.transpose()?.unwrap_or_default();
+        Ok(TrainerState { buffers, neighbors, filter: self.scene.filter.clone() })
+    }
+
+    /// Replaces parameters, moments and filter by those of [`state`](Self::state), and neighbors if it has some that are needed. Returns
+    /// whether they are of as many Gaussians, of as many entries if colors are tied, and rounded if these are; if not, nothing is replaced.
+    pub fn resume(&mut self, state: &TrainerState) -> bool {
+        if !state.fits(&self.stored(), self.parameters.count()) {
+            return false;
+        }
+        if state.filter != self.scene.filter
+            && state.filter.clone().is_none_or(|filter| self.set_filter(filter).is_err())
+        {
+            return false;
+        }
+        for (bytes, buffer) in state.buffers.iter().zip(self.stored()) {
+            self.headless.context().queue.write_buffer(buffer, 0, bytes);
+        }
+        if let Some(regularizer) = &mut self.regularizer {
+            regularizer.resume(self.headless, &state.neighbors);
+        }
+        self.expand();
+        self.slice();
+        true
+    }
+
+    /// Returns the buffers of a state, in its order.
+    fn stored(&self) -> Vec<&wgpu::Buffer> {
+        let ParameterBuffers { geometry, color, .. } = &self.parameters;
+        let all = [Some(geometry), Some(color), self.tied.as_ref().map(|tied| &tied.entries)];
+        let optimized = all.into_iter().flatten().flat_map(Optimized::stored);
+        optimized.chain(self.rounder.as_ref().map(|rounder| &rounder.changes)).collect()
+    }
+
+    /// Sets all moments to 0, as before the first step.
+    pub fn forget_moments(&mut self) {
+        let mut encoder = encoder(self.headless, "gs4d moments");
+        self.parameters.geometry.forget_moments(&mut encoder);
+        self.parameters.color.forget_moments(&mut encoder);
+        self.headless.context().queue.submit([encoder.finish()]);
+    }
+
+    /// Computes the coefficients from the entries of codebooks, if colors are tied.
+    fn expand(&self) {
+        if let Some(tied) = &self.tied {
+            let color = &self.parameters.color;
+            submit(self.headless, "gs4d expand", |pass| tied.record_expand(pass, &self.passes, color));
         }
     }
 
     /// Slices the parameters.
-    pub(super) fn slice(&mut self) {
-        self.write_scene(0);
-        let mut encoder = self.encoder("gs4d slice");
-        self.record_slice(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
-        self.headless.context().queue.submit([encoder.finish()]);
+    fn slice(&self) {
+        self.parameters.write_scene(&self.headless.context().queue, 0);
+        submit(self.headless, "gs4d slice", |pass| self.record_slice(pass));
+    }
+
+    /// Records that the parameters are sliced, and rounded if geometry is.
+    fn record_slice(&self, pass: &mut wgpu::ComputePass<'_>) {
+        self.parameters.record_slice(pass, &self.passes);
+        if let Some(rounder) = &self.rounder {
+            rounder.record(pass, self.parameters.count().div_ceil(256));
+        }
     }
 }
 
-/// Why a scene cannot be trained.
-#[derive(Debug, thiserror::Error)]
-pub enum TrainerError {
-    /// The scene has lost its raw parameters.
-    #[error("only the trained form can be fine-tuned: give the checkpoint, or a package written with --form trained")]
-    NotTrained,
-    /// Codebooks of another scene.
-    #[error("the codebooks are not of the colors of this scene")]
-    Codebooks,
-    /// The packed form cannot hold the scene.
-    #[error(transparent)]
-    Compress(#[from] CompressError),
-    /// A term of the loss cannot have this weight.
-    #[error("the weight of the term {term} is {weight}: it must be a number, zero or above")]
-    Weight {
-        /// The term.
-        term: &'static str,
-        /// Its weight.
-        weight: f64,
-    },
-    /// The device has no float atomics.
-    #[error(
-        "the adapter `{adapter}` cannot add floating-point numbers atomically: sum gradients with --sums deterministic, or choose another \
-         one with --adapter"
-    )]
-    NoAtomics {
-        /// Name of the adapter.
-        adapter: String,
-    },
-    /// There is nothing to train.
-    #[error("there are no Gaussians to fine-tune")]
-    Empty,
-    /// A Gaussian cannot be drawn.
-    #[error(transparent)]
-    Invalid(#[from] InvalidGaussian),
-    /// The GPU cannot train the scene.
-    #[error(transparent)]
-    Gpu(#[from] GpuError),
+fn encoder(headless: &Headless, label: &str) -> wgpu::CommandEncoder {
+    let label = wgpu::CommandEncoderDescriptor { label: Some(label) };
+    headless.context().device.create_command_encoder(&label)
+}
+
+/// Submits one compute pass.
+fn submit(headless: &Headless, label: &str, record: impl FnOnce(&mut wgpu::ComputePass<'_>)) {
+    let mut encoder = encoder(headless, label);
+    record(&mut encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default()));
+    headless.context().queue.submit([encoder.finish()]);
 }

@@ -1,12 +1,15 @@
 //! The buffers of training that depend on the size of the picture and of the renderer's buffers.
 //!
-//! In: the frame that was recorded last. Out: [`ViewBuffers`], created anew only if sizes have changed.
+//! In: the frame that was recorded last. Out: [`ViewBuffers`]; commands of the passes after the picture.
 
+use super::parameters::ParameterBuffers;
+use super::passes::Passes;
+use super::sample::GpuImage;
 use super::sums::GradientSums;
-use super::trainer::Trainer;
-use crate::renderer::layout::{InstanceUniforms, LossUniforms, TILE_SIZE};
+use crate::renderer::layout::{InstanceUniforms, LossUniforms};
 use crate::renderer::memory::binding_limit;
-use crate::renderer::{FinishedFrame, GpuError};
+use crate::renderer::{FinishedFrame, GpuCapture, GpuError, Headless};
+use crate::view::tiles;
 use glam::UVec2;
 use wgpu::BufferUsages;
 
@@ -20,33 +23,32 @@ pub(super) struct ViewBuffers {
     splats: wgpu::Buffer,
     color: wgpu::TextureView,
     size: UVec2,
+    summed: GradientSums,
     pub loss_settings: wgpu::Buffer,
     pub pixel_gradients: wgpu::Buffer,
     pub depth_gradients: wgpu::Buffer,
     /// Those of pairs, or of splats if sums are atomic.
-    pub gradients: wgpu::Buffer,
-    pub loss: wgpu::BindGroup,
-    pub blended: wgpu::BindGroup,
-    pub sums: wgpu::BindGroup,
-    pub splat_gradients: wgpu::BindGroup,
+    gradients: wgpu::Buffer,
+    loss: wgpu::BindGroup,
+    blended: wgpu::BindGroup,
+    sums: wgpu::BindGroup,
+    splat_gradients: wgpu::BindGroup,
 }
 
-impl Trainer<'_> {
-    /// Creates what depends on the sizes of the frame that has been recorded, unless it has been.
-    pub(super) fn fit(&mut self, size: UVec2) -> Result<(), GpuError> {
-        let Some(frame) = self.headless.finished() else { return Ok(()) };
-        let fits =
-            |made: &ViewBuffers| made.size == size && made.splats == frame.buffers.splats && made.color == *frame.color;
-        if !self.view.as_ref().is_some_and(fits) {
-            self.view = Some(self.make(&frame, size)?);
-        }
-        Ok(())
-    }
-
-    fn make(&self, frame: &FinishedFrame<'_>, size: UVec2) -> Result<ViewBuffers, GpuError> {
-        let (allocator, passes) = (self.headless.allocator(), &self.passes);
+impl ViewBuffers {
+    /// Creates the buffers for a frame of this size. Losses are added to `totals`.
+    pub fn new(
+        headless: &Headless,
+        passes: &Passes,
+        parameters: &ParameterBuffers,
+        totals: &wgpu::Buffer,
+        summed: GradientSums,
+        frame: &FinishedFrame<'_>,
+        size: UVec2,
+    ) -> Result<Self, GpuError> {
+        let allocator = headless.allocator();
         let limit = binding_limit(&allocator.device.limits());
-        let (what, count) = match self.sums {
+        let (what, count) = match summed {
             GradientSums::Deterministic => ("the gradients of pairs", frame.pairs),
             GradientSums::Atomic => ("the gradients of splats", frame.slots),
         };
@@ -55,7 +57,7 @@ impl Trainer<'_> {
             return Err(GpuError::TooLarge { what, needed, limit });
         }
         let pixels = u64::from(size.x) * u64::from(size.y);
-        let tiles = u64::from(size.x.div_ceil(TILE_SIZE)) * u64::from(size.y.div_ceil(TILE_SIZE));
+        let tiles = tiles(size).as_u64vec2().element_product();
         let storage = |label, size| allocator.buffer(label, size, BufferUsages::STORAGE);
         let settings = size_of::<LossUniforms>() as u64;
         let loss_settings = allocator.buffer("gs4d loss settings", settings, BufferUsages::UNIFORM);
@@ -68,7 +70,7 @@ impl Trainer<'_> {
         let gradients = storage("gs4d gradients of splats", needed);
         let color = wgpu::BindingResource::TextureView(frame.color);
         let whole = wgpu::Buffer::as_entire_binding;
-        let written = [&slopes, &pixel_gradients, &tile_sums, &self.totals].map(whole);
+        let written = [&slopes, &pixel_gradients, &tile_sums, totals].map(whole);
         let loss = [vec![whole(&loss_settings), color.clone()], written.to_vec()].concat();
         let buffers = frame.buffers;
         let read = [
@@ -88,12 +90,14 @@ impl Trainer<'_> {
             offset: 0,
             size: std::num::NonZeroU64::new(size_of::<InstanceUniforms>() as u64),
         });
-        let splats = [&self.scene_settings, &buffers.splats, &buffers.depth_keys, &first_pairs, &gradients].map(whole);
+        let splats =
+            [&parameters.scene_settings, &buffers.splats, &buffers.depth_keys, &first_pairs, &gradients].map(whole);
         let splat_gradients = [vec![instance], splats.to_vec()].concat();
-        Ok(ViewBuffers {
+        Ok(Self {
             splats: buffers.splats.clone(),
             color: frame.color.clone(),
             size,
+            summed,
             loss: allocator.bind_group("gs4d loss", &passes.loss_group, &loss),
             blended: allocator.bind_group("gs4d blended", &passes.blended_group, &blended),
             sums: allocator.bind_group("gs4d sums", &passes.sums_group, &sums),
@@ -103,5 +107,52 @@ impl Trainer<'_> {
             depth_gradients,
             gradients,
         })
+    }
+
+    /// Returns whether the buffers were created for the resources of this frame and this size.
+    pub fn fits(&self, frame: &FinishedFrame<'_>, size: UVec2) -> bool {
+        self.size == size && self.splats == frame.buffers.splats && self.color == *frame.color
+    }
+
+    /// Records the passes after the picture, with the pass `loss` if there is an image.
+    pub fn record(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        headless: &Headless,
+        passes: &Passes,
+        capture: &GpuCapture,
+        parameters: &ParameterBuffers,
+        image: Option<&GpuImage>,
+    ) {
+        let Some(frame) = headless.finished() else { return };
+        let tiles = tiles(self.size);
+        if self.summed == GradientSums::Atomic {
+            encoder.clear_buffer(&self.gradients, 0, None);
+        }
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        if let Some(image) = image {
+            pass.set_bind_group(0, &self.loss, &[]);
+            pass.set_bind_group(1, &image.group, &[]);
+            pass.set_pipeline(&passes.similarity);
+            pass.dispatch_workgroups(tiles.x, tiles.y, 1);
+            pass.set_pipeline(&passes.gradient);
+            pass.dispatch_workgroups(tiles.x, tiles.y, 1);
+            pass.set_pipeline(&passes.total);
+            pass.dispatch_workgroups(1, 1, 1);
+        }
+        pass.set_bind_group(0, &self.blended, &[]);
+        pass.set_bind_group(1, &self.sums, &[]);
+        if self.summed == GradientSums::Deterministic {
+            pass.set_pipeline(&passes.place);
+            pass.dispatch_workgroups(frame.slots.div_ceil(256), 1, 1);
+        }
+        pass.set_pipeline(&passes.pairs);
+        pass.dispatch_workgroups(tiles.x, tiles.y, 1);
+        pass.set_pipeline(&passes.project_backward);
+        pass.set_bind_group(0, &self.splat_gradients, &[]);
+        pass.set_bind_group(1, capture.geometry(), &[]);
+        pass.set_bind_group(2, headless.recorded_list(), &[]);
+        pass.set_bind_group(3, &parameters.group, &[]);
+        pass.dispatch_workgroups(parameters.count().div_ceil(64), 1, 1);
     }
 }

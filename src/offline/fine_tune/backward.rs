@@ -1,0 +1,52 @@
+//! The passes after the picture, which add the gradients of a view to those of a batch.
+//!
+//! In: a recorded frame, an image or the gradients of pixels. Out: [`Backward`]: the buffers of the frame, which are created only if sizes
+//! have changed, and the sums over views.
+
+use super::parameters::ParameterBuffers;
+use super::passes::Passes;
+use super::sums::GradientSums;
+use super::totals::Totals;
+use super::view_buffers::ViewBuffers;
+use crate::renderer::{GpuError, Headless};
+use glam::UVec2;
+use wgpu::BufferUsages;
+
+/// Buffers of the passes after the picture, and the sums over views.
+#[derive(Debug)]
+pub(super) struct Backward {
+    sums: GradientSums,
+    totals: wgpu::Buffer,
+    view: Option<ViewBuffers>,
+}
+
+impl Backward {
+    /// Creates the sums over views, which are 0.
+    pub fn new(headless: &Headless, sums: GradientSums) -> Self {
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
+        Self { sums, totals: headless.allocator().buffer("gs4d totals", 16, usage), view: None }
+    }
+
+    /// Returns the buffers for the frame that was recorded last, which has this size; `None` before the first frame. Creates them only if
+    /// sizes have changed.
+    pub fn fit(
+        &mut self,
+        headless: &Headless,
+        passes: &Passes,
+        parameters: &ParameterBuffers,
+        size: UVec2,
+    ) -> Result<Option<&ViewBuffers>, GpuError> {
+        let Some(frame) = headless.finished() else { return Ok(self.view.as_ref()) };
+        if !self.view.as_ref().is_some_and(|made| made.fits(&frame, size)) {
+            self.view = Some(ViewBuffers::new(headless, passes, parameters, &self.totals, self.sums, &frame, size)?);
+        }
+        Ok(self.view.as_ref())
+    }
+
+    /// Returns the sums over the views since the last call, and begins new ones.
+    pub fn totals(&self, headless: &Headless) -> Result<Totals, GpuError> {
+        let bytes = headless.copy_out(&self.totals, 16)?;
+        headless.context().queue.write_buffer(&self.totals, 0, &[0; 16]);
+        Ok(Totals::of(bytemuck::pod_read_unaligned(&bytes)))
+    }
+}

@@ -1,0 +1,70 @@
+//! The settings of fine-tuning.
+//!
+//! In: the choices of a caller. Out: [`FineTuneSettings`], with a default for each.
+
+use super::schedule::{Behind, Rates};
+use super::sums::GradientSums;
+use super::terms::Terms;
+use crate::gaussian::GradientMode;
+use crate::offline::quantize::Quality;
+
+/// Settings of fine-tuning.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FineTuneSettings {
+    /// Number of steps. Default: 5000.
+    pub steps: usize,
+    /// Views of each step. Default: 2.
+    pub batch: usize,
+    /// Rates of the optimizer at first.
+    pub rates: Rates,
+    /// Factor on the rates at the end, which they fall to. Default: 0.2; 1 keeps them.
+    pub last_rate: f64,
+    /// Weight of SSIM in the loss; the weight of L1 is the rest. Default: 0.1; the original's is 0.2.
+    pub similarity_share: f64,
+    /// Weights of further terms of the loss. Default: 0.
+    pub terms: Terms,
+    /// Whether a step leaves Gaussians as they are that none of its views shows. Default: `false`.
+    pub sparse: bool,
+    /// What is behind images that do not cover all of their pixels.
+    pub behind: Behind,
+    /// Seed of the order of views and of random backgrounds.
+    pub seed: u64,
+    /// Steps between two evaluations on the validation views. Default: 500.
+    pub evaluate_every: usize,
+    /// Evaluations without an improvement after which training ends. Default: `None`, all steps are made.
+    pub patience: Option<usize>,
+    /// Steps after which a temporal filter that depends on what views see is computed again. Default: 1000.
+    pub refresh_filter: usize,
+    /// Whether gradients are those of the original, with its deviations.
+    pub mode: GradientMode,
+    /// How gradients are summed. Default: in a fixed order.
+    pub sums: GradientSums,
+    /// How the result is compressed, and the number of further steps in which the codebooks of color are trained; `None` leaves the scene in
+    /// the trained form.
+    pub compress: Option<(Quality, usize)>,
+    /// Whether these further steps see geometry as the package will hold it, rounded. Default: `false`; it pays with few bits.
+    pub rounding: bool,
+}
+
+impl Default for FineTuneSettings {
+    fn default() -> Self {
+        Self {
+            steps: 5000,
+            batch: 2,
+            rates: Rates::OURS,
+            last_rate: 0.2,
+            similarity_share: 0.1,
+            terms: Terms::default(),
+            sparse: false,
+            behind: Behind::default(),
+            seed: 0,
+            evaluate_every: 500,
+            patience: None,
+            refresh_filter: 1000,
+            mode: GradientMode::default(),
+            sums: GradientSums::default(),
+            compress: None,
+            rounding: false,
+        }
+    }
+}

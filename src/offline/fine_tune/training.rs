@@ -1,0 +1,95 @@
+//! The first phase of a run: its steps, evaluations and states.
+//!
+//! In: a run, optionally a stored state. Out: the best parameters, and the curve up to the last step.
+
+use super::best::{Best, Progressed};
+use super::outcome::CurvePoint;
+use super::resume::{Checkpoint, Saves};
+use super::run::Run;
+use super::schedule::decay;
+use super::settings::FineTuneSettings;
+use crate::offline::{OfflineError, Progress};
+use std::time::Instant;
+
+/// Steps between two looks at gradients that are not finite.
+const STEPS_OF_FAULTS: usize = 50;
+
+/// Makes the steps, from where a stored run ended.
+pub(super) fn train(
+    run: &mut Run<'_>,
+    stored: Option<Checkpoint>,
+    saves: Option<Saves<'_>>,
+    progress: &mut dyn Progress,
+) -> Result<Progressed, OfflineError> {
+    let settings = run.settings;
+    let every = settings.evaluate_every.max(1);
+    let stored = stored.filter(|stored| run.trainer.resume(&stored.state));
+    let (mut curve, mut best) = match stored {
+        Some(Checkpoint { curve, best, .. }) => {
+            progress.note(&format!("fine-tuning resumes after step {}", curve.last().map_or(0, |last| last.step)));
+            (curve, best)
+        }
+        None => {
+            let point = CurvePoint { step: 0, loss: None, training_psnr: None, psnr: run.evaluate()? };
+            progress.note(&point.describe(None));
+            (vec![point], Best { point, state: run.trainer.state()? })
+        }
+    };
+    let first = curve.last().map_or(0, |last| last.step);
+    progress.begin("fine-tuning", settings.steps);
+    (0..first).for_each(|_| progress.advance());
+    let (mut seconds, mut told) = (0.0, false);
+    let mut start = Instant::now();
+    let mut step = first;
+    while step < settings.steps && !is_over(settings, &curve, &best) {
+        // The state was stored at the last evaluation: a resumed run makes the steps since then again, and ends at the same bytes.
+        if progress.is_interrupted() {
+            let pace = (step - first, seconds + start.elapsed().as_secs_f64());
+            return Err(run.interrupted(Progressed { curve, best, pace }));
+        }
+        run.step(step, step + 1, decay(step, settings.steps, settings.last_rate))?;
+        step += 1;
+        progress.advance();
+        if !told && step.is_multiple_of(STEPS_OF_FAULTS) {
+            told = run.tell_faults(progress)?;
+        }
+        if step.is_multiple_of(settings.refresh_filter.max(1)) && step != settings.steps {
+            run.refresh_filter(progress)?;
+        }
+        if !step.is_multiple_of(every) && step != settings.steps {
+            continue;
+        }
+        // Waits for the steps made so far.
+        let totals = run.trainer.totals()?;
+        seconds += start.elapsed().as_secs_f64();
+        let (loss, training_psnr) = (Some(totals.loss), Some(totals.psnr));
+        let point = CurvePoint { step, loss, training_psnr, psnr: run.evaluate()? };
+        let speed = (step - first) as f64 / seconds;
+        progress.note(&point.describe(Some(speed)));
+        curve.push(point);
+        if point.psnr > best.point.psnr || point.psnr.is_none() {
+            best = Best { point, state: run.trainer.state()? };
+        }
+        let goes_on = step < settings.steps || settings.compress.is_some();
+        if let Some(saves) = saves.filter(|saves| saves.are_due(step) && goes_on) {
+            let checkpoint = Checkpoint { curve, best, state: run.trainer.state()?, coded: None };
+            saves.store(&checkpoint, progress)?;
+            Checkpoint { curve, best, .. } = checkpoint;
+        }
+        start = Instant::now();
+    }
+    if step < settings.steps {
+        progress.note(&format!(
+            "fine-tuning ends after step {step}: no evaluation has been better since step {}",
+            best.point.step
+        ));
+    }
+    progress.finish();
+    Ok(Progressed { curve, best, pace: (step - first, seconds) })
+}
+
+/// Returns whether no evaluation has been better for as many as patience allows.
+fn is_over(settings: &FineTuneSettings, curve: &[CurvePoint], best: &Best) -> bool {
+    let waited = curve.iter().rev().take_while(|point| point.step > best.point.step).count();
+    settings.patience.is_some_and(|patience| waited >= patience)
+}
