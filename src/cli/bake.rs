@@ -63,8 +63,8 @@ pub struct Bake {
     /// Remove the others in so many rounds, with training and scoring between, if what is left is trained.
     #[arg(long, value_name = "N", default_value = "4", value_parser = values::count(100))]
     rounds: usize,
-    /// Prune by this score; auto tries ours and the paper's, each with a short training where the others are trained.
-    #[arg(long, value_name = "SCORE", default_value = "auto", value_parser = score_choice(false))]
+    /// Prune by this score; auto tries ours and the paper's, each with a short training where the remaining Gaussians are trained.
+    #[arg(long, value_name = "SCORE", default_value = "energy-removal", value_parser = score_choice(false))]
     variant: ScoreChoice,
     /// Which temporal filter.
     #[arg(long, value_name = "FILTER", default_value = "support", value_parser = values::one_of(&FILTER_NAMES))]
@@ -89,7 +89,7 @@ pub struct Bake {
     batch: usize,
     /// Sum the gradients of fine-tuning in a fixed order, the same in every run, or by atomic additions, which differ by rounding and need
     /// an adapter with float atomics.
-    #[arg(long, value_name = "HOW", default_value = "deterministic", conflicts_with = "no_fine_tune",
+    #[arg(long, help_heading = "Experimental", value_name = "HOW", default_value = "deterministic", conflicts_with = "no_fine_tune",
         value_parser = values::one_of(&GradientSums::NAMES))]
     sums: GradientSums,
     /// Leave the intermediate results in OUT.bake/ when all is done.

@@ -5,7 +5,7 @@
 
 use super::args::{CheckpointArgs, RenderersArgs, ViewArgs, values};
 use super::failure::Failure;
-use super::progress::note;
+use super::note::note;
 use super::report::{Report, switches_json};
 use super::table::{Table, bytes};
 use crate::offline::engine::AdapterDescription;

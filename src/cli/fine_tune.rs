@@ -64,19 +64,19 @@ pub struct FineTune {
     #[arg(long, value_name = "WEIGHT", default_value = "0.1", value_parser = values::share)]
     similarity: f64,
     /// Weight of opacity where images cover nothing, in the loss: the original's opacity mask.
-    #[arg(long, value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
+    #[arg(long, help_heading = "Experimental", value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
     mask_weight: f64,
     /// Weight of motion: the mean length of 0.1 times the velocity, in the loss.
-    #[arg(long, value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
+    #[arg(long, help_heading = "Experimental", value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
     motion_weight: f64,
     /// Weight of motion unlike that of the 20 nearest Gaussians, in the loss: the original's rigid term.
-    #[arg(long, value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
+    #[arg(long, help_heading = "Experimental", value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
     rigid_weight: f64,
     /// Weight of the mean opacity, in the loss: what is not needed fades, so that more can be pruned.
-    #[arg(long, value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
+    #[arg(long, help_heading = "Experimental", value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
     opacity_weight: f64,
     /// In each step leave Gaussians as they are, with what the optimizer knows of them, that none of its views shows.
-    #[arg(long)]
+    #[arg(long, help_heading = "Experimental")]
     sparse: bool,
     /// What is behind images that do not cover all pixels: a random color for each view, or that of training.
     #[arg(long, value_name = "WHAT", default_value = "random", value_parser = values::one_of(&BEHIND))]
@@ -101,14 +101,14 @@ pub struct FineTune {
     gradients: GradientMode,
     /// Sum gradients in a fixed order, the same in every run, or by atomic additions, which differ by rounding and need an adapter with
     /// float atomics.
-    #[arg(long, value_name = "HOW", default_value = "deterministic", value_parser = values::one_of(&GradientSums::NAMES))]
+    #[arg(long, help_heading = "Experimental", value_name = "HOW", default_value = "deterministic", value_parser = values::one_of(&GradientSums::NAMES))]
     sums: GradientSums,
     /// Compress the result: code its colors by codebooks, whose sizes follow the number of Gaussians, and train these as well. The package
     /// is as that of `gs4d compress`, and loses less.
     #[arg(long, value_name = "QUALITY", value_parser = values::one_of(&Quality::NAMES))]
     compress: Option<Quality>,
     /// Train codebooks on pictures of geometry as the package will hold it. It pays where geometry has few bits, fewer than `small` has.
-    #[arg(long, requires = "compress")]
+    #[arg(long, help_heading = "Experimental", requires = "compress")]
     round_geometry: bool,
     /// Steps in which codebooks are trained, after the others.
     #[arg(long, value_name = "N", default_value = "2000", requires = "compress", value_parser = values::count(1_000_000))]

@@ -3,7 +3,7 @@
 //! In: the closures that write files, the work that can end early. Out: files that are whole or absent. Files are written under a temporary
 //! name and renamed; the handler waits until those being written are complete, so that no temporary file is left behind.
 
-use super::progress::note;
+use super::note::note;
 use std::process::ExitCode;
 use std::sync::RwLock;
 use std::sync::atomic::{AtomicBool, Ordering};

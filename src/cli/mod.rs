@@ -20,6 +20,7 @@ mod fine_tune;
 mod info;
 mod interrupt;
 mod mask;
+mod note;
 mod plain;
 mod progress;
 mod prune;
@@ -109,7 +110,7 @@ pub fn run() -> ExitCode {
         Ok(cli) => cli,
         Err(code) => return code,
     };
-    progress::silence_progress(cli.json);
+    note::silence_progress(cli.json);
     let (report, failed) = report_of(|| interrupt::install().map_err(Failure::from).and_then(|()| cli.verb.run()));
     match report.print(cli.json) {
         Ok(()) if report.interrupted => interrupt::exit_code(),

@@ -1,31 +1,13 @@
 //! Progress on standard error.
 //!
-//! In: the tasks and notes of library calls. Out: one bar for each unfinished task, below those of the tasks around it;
+//! In: the tasks and notes of library calls. Out: one bar for each unfinished task, below the bars of the tasks around it;
 //! one line for each note.
 
-use super::{interrupt, plain, system};
+use super::interrupt;
+use super::note::{BARS, is_silent, note};
 use crate::codec::CodecError;
 use crate::offline::Progress;
-use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::{Write, stderr};
-use std::sync::LazyLock;
-use std::sync::atomic::{AtomicBool, Ordering};
-
-/// All progress bars on the screen, one below the other.
-static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
-
-/// Whether progress bars are hidden.
-static SILENT: AtomicBool = AtomicBool::new(false);
-
-/// Sets whether progress bars are hidden from now on.
-pub fn silence_progress(silent: bool) {
-    SILENT.store(silent, Ordering::Relaxed);
-}
-
-/// Writes a line to standard error, if that is open. Errors of the system in it are put in words.
-pub fn note(line: &str) {
-    let _ = BARS.suspend(|| writeln!(stderr(), "{}", plain::lines(&system::in_words(line))));
-}
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// The bars of the unfinished tasks; hidden with `--json` and if standard error is not a terminal. Dropping this
 /// removes them. Default: no tasks.
@@ -38,7 +20,7 @@ impl Progress for Bars {
             .unwrap_or_else(|_| ProgressStyle::default_bar());
         let bar = ProgressBar::with_draw_target(Some(steps as u64), ProgressDrawTarget::hidden());
         let bar = bar.with_style(style).with_message(task);
-        let bar = if SILENT.load(Ordering::Relaxed) { bar } else { BARS.add(bar) };
+        let bar = if is_silent() { bar } else { BARS.add(bar) };
         if steps > 0 {
             bar.tick();
         }

@@ -3,8 +3,8 @@
 //! In: the result of a verb. Out: one document on standard output, errors on standard error.
 
 use super::failure::Failure;
+use super::note::note;
 use super::plain;
-use super::progress::note;
 use crate::codec::checkpoint;
 use crate::scene::{PlaybackHints, TrainedWith};
 use serde_json::{Value, json};

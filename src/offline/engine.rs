@@ -4,7 +4,7 @@
 //! ([`Draw`]), once for many views. Nothing else chooses between GPU and CPU.
 
 use super::score::{CpuEngine, GpuEngine, ScoreEngine};
-use super::{OfflineError, room};
+use super::{OfflineError, memory_check};
 use crate::reference;
 use crate::renderer::{GpuCapture, GpuContext, GpuError, Headless, ShaderChecks};
 use crate::scene::RuntimeScene;
@@ -150,7 +150,7 @@ struct CpuDrawing<'a> {
 
 impl Draw for CpuDrawing<'_> {
     fn draw(&mut self, view: &View) -> Result<Picture, OfflineError> {
-        room::require(view.size, room::ON_CPU)?;
+        memory_check::require(view.size, memory_check::ON_CPU)?;
         Ok(reference::render(self.scene, view, self.background).picture)
     }
 }
@@ -164,7 +164,7 @@ struct GpuDrawing<'a> {
 
 impl Draw for GpuDrawing<'_> {
     fn draw(&mut self, view: &View) -> Result<Picture, OfflineError> {
-        room::require(view.size, room::on_gpu(self.headless))?;
+        memory_check::require(view.size, memory_check::on_gpu(self.headless))?;
         Ok(self.headless.render(&self.capture, view, self.background)?.picture)
     }
 }

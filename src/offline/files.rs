@@ -5,7 +5,7 @@
 
 use super::dataset::{CameraFile, CameraOptions, Split};
 use super::save::{folder_of, is_stream, resolved};
-use super::{OfflineError, part};
+use super::{OfflineError, temporary_file};
 use glam::UVec2;
 use std::collections::{BTreeSet, HashMap};
 use std::fs::{File, Metadata};
@@ -105,7 +105,7 @@ impl Files {
                 folders.insert(folder);
             }
         }
-        folders.iter().for_each(|folder| part::remove_stale(folder));
+        folders.iter().for_each(|folder| temporary_file::remove_stale(folder));
         Ok(())
     }
 

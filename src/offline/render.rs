@@ -3,7 +3,7 @@
 //! In: a capture on the GPU, views of it, a function that writes a picture. Out: the [`Counts`] of each view.
 
 use super::orbit::Shot;
-use super::{OfflineError, Progress, room};
+use super::{OfflineError, Progress, memory_check};
 use crate::renderer::{GpuCapture, Headless};
 use crate::view::{Background, Counts, Picture, View};
 use rayon::prelude::*;
@@ -29,7 +29,7 @@ pub fn render_shots(
     // One picture is being drawn and one written while the queue is full.
     let waiting = views.len().min(QUEUE + 2) as u64;
     if let Some(size) = views.iter().map(|(_, view)| view.size).max_by_key(|size| size.as_u64vec2().element_product()) {
-        room::require(size, room::on_gpu(headless) + waiting * room::PICTURE)?;
+        memory_check::require(size, memory_check::on_gpu(headless) + waiting * memory_check::PICTURE)?;
     }
     let (queue, drawn) = sync_channel::<(&Shot, Picture)>(QUEUE);
     // A thread pool of its own: threads that wait for pictures would stall rayon's shared pool.

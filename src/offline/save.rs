@@ -3,7 +3,7 @@
 //! In: a path and its contents: a scene, a picture, anything else. Out: the file, which replaces an existing one only
 //! once it is complete, and has its permissions. A package is read back before.
 
-use super::part;
+use super::temporary_file;
 use crate::codec::package::{self, WriteSettings};
 use crate::codec::{self, CodecError, CodecErrorKind};
 use crate::scene::{Form, GaussianScene, SceneForm};
@@ -86,7 +86,7 @@ where
         return Ok(writer.flush()?);
     }
     let target = resolved(path);
-    let temporary = part::create(folder_of(&target))?;
+    let temporary = temporary_file::create(folder_of(&target))?;
     let mut writer = BufWriter::with_capacity(1 << 16, temporary.as_file().try_clone()?);
     write(&mut writer)?;
     let written = writer.into_inner().map_err(io::IntoInnerError::into_error)?;

@@ -5,7 +5,7 @@
 
 use super::dataset::TrainingView;
 use super::files::node;
-use super::part;
+use super::temporary_file;
 use crate::codec::CodecError;
 use crate::offline::{Progress, write_beside};
 use rayon::prelude::*;
@@ -110,7 +110,7 @@ impl Store {
         let folder = out.with_file_name(name);
         match lock(&folder) {
             Ok(lock) => {
-                part::remove_stale(&folder);
+                temporary_file::remove_stale(&folder);
                 Ok(Self(Arc::new(Held { folder, lock: Some(lock) })))
             }
             Err(error) => Err(CodecError { path: folder, kind: error.into() }),

@@ -150,6 +150,52 @@ fn a_package_that_looks_different_over_white_is_noted() {
     assert!(html.contains("PSNR over white, dB") && html.contains("it is black"), "both are on the page");
 }
 
+/// Changes one image of a capture.
+fn change_image(capture: &Capture, name: &str) {
+    let path = capture.data.join("train").join(name);
+    let mut image = image::open(&path).expect("a picture").into_rgba8();
+    let pixel = image.get_pixel_mut(3, 4);
+    pixel.0[0] = pixel.0[0].wrapping_add(90);
+    image.save(&path).expect("the folder can be written to");
+}
+
+#[test]
+fn a_changed_image_reruns_the_stages_that_depend_on_it() {
+    let capture = capture(Vec3::ZERO, true);
+    let (out, has_gpu) = (capture.out(), GpuContext::headless(None).is_ok());
+    let engine = if has_gpu { "gpu" } else { "cpu" };
+    let bake = || {
+        let fixed = arguments!["bake", &capture.scene, "--data", &capture.data, "-o", &out, "--keep-work"];
+        let more = arguments!["--ratio", "0.5", "--steps", "4", "--rounds", "2", "--engine", engine];
+        let run = gs4d(&[fixed.to_vec(), more.to_vec()].concat());
+        assert_eq!(run.code, Some(0), "the command succeeds: {}", run.err);
+        let reran = |stage: &&str| {
+            let line = run.err.lines().find(|line| line.starts_with(&format!("{stage}: ")));
+            line.is_some_and(|line| !line.contains("skipped"))
+        };
+        ["score", "prune", "rounds", "fine-tune", "mask", "compress"].into_iter().filter(reran).collect::<Vec<_>>()
+    };
+    let trained = ["rounds", "fine-tune", "mask", "compress"];
+    let with = |stages: &[&'static str]| if has_gpu { [stages, &trained].concat() } else { stages.to_vec() };
+    let first = bake();
+    assert!(first.starts_with(&["score", "prune"]), "every stage runs at first: {first:?}");
+    assert_eq!(bake(), [""; 0], "nothing has changed");
+    // Camera 2 of 4 is held out.
+    change_image(&capture, "c00_01.png");
+    assert_eq!(bake(), with(&[]), "an image to train on");
+    change_image(&capture, "c02_01.png");
+    let reran = bake();
+    assert_eq!(reran.first(), Some(&"prune"), "an image to validate on: {reran:?}");
+    assert!(!reran.contains(&"score"), "scores come from cameras and times alone: {reran:?}");
+    assert_eq!(bake(), [""; 0], "nothing has changed since");
+    let cameras = capture.data.join("transforms_train.json");
+    let text = read(&cameras);
+    let moved = text.replacen("\"time\":0.0", "\"time\":0.01", 1);
+    assert_ne!(text, moved, "a time is changed");
+    fs::write(&cameras, moved).expect("the folder can be written to");
+    assert_eq!(bake().first(), Some(&"score"), "a time of a view");
+}
+
 #[test]
 fn finished_stages_are_skipped() {
     let capture = capture(Vec3::ZERO, true);
@@ -332,7 +378,7 @@ fn with_training_scores_are_compared_after_training_and_pruning_may_take_rounds(
     let out = capture.out();
     let bake = |goal: [&str; 2], rounds: &str| {
         let fixed = arguments!["bake", &capture.scene, "--data", &capture.data, "-o", &out, "--engine", "gpu"];
-        let more = arguments!["--steps", "30", "--rounds", rounds, goal[0], goal[1], "--json"];
+        let more = arguments!["--variant", "auto", "--steps", "30", "--rounds", rounds, goal[0], goal[1], "--json"];
         gs4d(&[fixed.to_vec(), more.to_vec()].concat()).json()
     };
     let trained = |report: &Value| {

@@ -159,6 +159,21 @@ fn training_options_are_refused_for_a_package() {
 }
 
 #[test]
+fn options_that_no_table_supports_are_experimental() {
+    let under_heading = |verb: &str| {
+        let help = gs4d(&[verb, "--help"]).text();
+        let (_, part) = help.split_once("\nExperimental:\n").expect("the heading");
+        let lines = part.lines().take_while(|line| line.is_empty() || line.starts_with(' '));
+        let options = lines.filter_map(|line| line.trim_start().strip_prefix("--"));
+        options.filter_map(|option| option.split_whitespace().next()).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let expected =
+        ["mask-weight", "motion-weight", "rigid-weight", "opacity-weight", "sparse", "sums", "round-geometry"];
+    assert_eq!(under_heading("finetune"), expected, "of finetune");
+    assert_eq!(under_heading("bake"), ["sums"], "of bake");
+}
+
+#[test]
 fn reports_are_text_without_json() {
     const VERBS: [&str; 13] = [
         "info", "convert", "render", "compare", "synth", "bench", "score", "prune", "mask", "eval", "ablate", "bake",

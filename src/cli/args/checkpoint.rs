@@ -4,7 +4,7 @@
 
 use super::values;
 use crate::cli::failure::Failure;
-use crate::cli::progress::note;
+use crate::cli::note::note;
 use crate::codec::{self, ReadOptions};
 use crate::gaussian::ShDirection;
 use crate::scene::{GaussianScene, RotationConvention, TrainedCameras, UpAxis};

@@ -78,7 +78,7 @@ impl DataArgs {
 #[derive(Debug, Clone, Copy, clap::Args)]
 #[command(next_help_heading = "Validation")]
 pub struct ValidationArgs {
-    /// The views that every choice is made on, which nothing is trained on before: those of transforms_val.json (file), whole cameras, blocks
+    /// The views that every choice is made on, which nothing is trained on before: those of `transforms_val.json` (file), whole cameras, blocks
     /// of time (times), or none; auto takes the first of these that the data allows.
     #[arg(long, value_name = "VIEWS", default_value = "auto", value_parser = values::one_of(&Validation::NAMES))]
     pub validation: Validation,

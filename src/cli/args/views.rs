@@ -5,7 +5,7 @@
 use super::data::or_give_size;
 use super::values;
 use crate::cli::failure::Failure;
-use crate::cli::progress::note;
+use crate::cli::note::note;
 use crate::offline::dataset::{CameraFile, CameraOptions};
 use crate::offline::files::Files;
 use crate::offline::orbit::{ORBIT_SIZE, Shot, orbit};

@@ -68,19 +68,27 @@ pub(super) fn score(inputs: &mut Inputs<'_>, stages: &mut Stages<'_>) -> Result<
     })
 }
 
-/// The stage prune: chooses the score and the count, given the key of the scores.
+/// The stage prune: chooses the score and the count, given the key of the scores. Returns the key of the Gaussians that are kept.
 pub(super) fn choose(
     inputs: &mut Inputs<'_>,
     stages: &mut Stages<'_>,
     scores: &[Candidate],
-    key: Key,
+    scores_key: Key,
 ) -> Result<(Choice, Key), OfflineError> {
     let settings = inputs.settings;
     let options = format!("{:?} {:?} {:?} {:?}", settings.goal, inputs.tunes(), settings.quality, settings.key_frames);
-    let key = key.with(inputs.images_key).and(&options);
-    let (Text(choice), key) =
+    let key = scores_key.with(inputs.validation_images_key).and(&options);
+    let key = if trains(inputs, scores, settings.goal) { key.with(inputs.training_images_key) } else { key };
+    let (Text(choice), _) =
         stages.run("prune", key, |_| true, |progress| search(inputs, scores, progress).map(Text))?;
+    // What follows depends on the choice, and not on the counts tried.
+    let key = scores_key.and(&format!("{} Gaussians by {}", choice.kept, choice.score));
     Ok((choice, key))
+}
+
+/// Returns whether the choice is made by short trainings.
+fn trains(inputs: &Inputs<'_>, candidates: &[Candidate], goal: Goal) -> bool {
+    inputs.tunes().is_some() && (candidates.len() > 1 || matches!(goal, Goal::MaxLoss(_)))
 }
 
 /// Prunes by each candidate, chooses the best one, and measures the fractions of [`SWEEP`] with it.
@@ -126,8 +134,7 @@ fn search(
             add(&outcome.score, trial.count, trial.psnr);
         }
     }
-    let depends_on_training = candidates.len() > 1 || by_loss;
-    if let Some(settings) = inputs.tunes().filter(|_| depends_on_training).map(short) {
+    if let Some(settings) = inputs.tunes().map(short).filter(|_| trains(inputs, candidates, goal)) {
         let images = inputs.images(progress)?;
         let (engine, whole) = (&mut *inputs.engine, &inputs.subject.scene);
         let mut trials = TrainedSearch { engine, images: &images, settings: &settings, whole, search: &search };

@@ -53,7 +53,7 @@ pub(super) fn compress(
     key: Key,
 ) -> Result<Vec<u8>, OfflineError> {
     let settings = inputs.settings;
-    let key = if inputs.tunes().is_some() { key.with(inputs.images_key) } else { key };
+    let key = if inputs.tunes().is_some() { key.with(inputs.images_key()) } else { key };
     let key = key.and(&format!("{:?} {:?} {:?}", settings.quality, settings.level, inputs.tunes()));
     let (Package(bytes), _) = stages.run(
         "compress",

@@ -27,8 +27,10 @@ pub(super) struct Inputs<'a> {
     pub scene_key: Key,
     /// The cameras and times of the training and the validation views.
     pub cameras_key: Key,
-    /// The contents of the images of these views.
-    pub images_key: Key,
+    /// The contents of the images to train on.
+    pub training_images_key: Key,
+    /// The contents of the images to validate on.
+    pub validation_images_key: Key,
     /// These images, once a stage has needed them.
     images: Option<Arc<TrainingImages>>,
 }
@@ -55,19 +57,36 @@ impl<'a> Inputs<'a> {
         let read = format!("{:?} {:?} {:?}", scene.trained_with, scene.playback, settings.background);
         let scene_key = Key::of_files(&[checkpoint])?.and(env!("CARGO_PKG_VERSION")).and(&read);
         let cameras_key = Key::of(format!("{:?} {:?}", splits.train, splits.validation).as_bytes());
-        let images_key = Key::of_images(&splits.train)?.with(Key::of_images(&splits.validation)?);
+        let training_images_key = Key::of_images(&splits.train)?;
+        let validation_images_key = Key::of_images(&splits.validation)?;
         let mut subject = Subject::new(checkpoint, scene, settings.background)?;
         let pixel = trained_pixel(&subject.scene, &views);
         (subject.scene.trained_with.pixel, subject.runtime.trained_with.pixel) = (pixel, pixel);
         if !settings.trust_images {
             require_belonging(engine, &subject.runtime, &views, subject.background)?;
         }
-        let inputs =
-            Self { settings, engine, subject, splits, views, store, scene_key, cameras_key, images_key, images: None };
+        let inputs = Self {
+            settings,
+            engine,
+            subject,
+            splits,
+            views,
+            store,
+            scene_key,
+            cameras_key,
+            training_images_key,
+            validation_images_key,
+            images: None,
+        };
         if let (Some(tuning), Engine::Gpu(headless)) = (inputs.tunes(), &*inputs.engine) {
             tuning.sums.check(headless)?;
         }
         Ok(inputs)
+    }
+
+    /// Returns the key of the contents of all images that a training depends on.
+    pub fn images_key(&self) -> Key {
+        self.training_images_key.with(self.validation_images_key)
     }
 
     /// Returns the images to train and to validate on, which are loaded once.

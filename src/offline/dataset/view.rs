@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 use glam::{UVec2, Vec3};
 use image::{DynamicImage, RgbaImage};
 
-use super::{DatasetError, MAX_SIDE, require_files, resample};
+use super::files::require_files;
+use super::{DatasetError, MAX_SIDE, resample};
 use crate::offline::picture_file;
 use crate::view::{Camera, Picture};
 

@@ -4,8 +4,8 @@
 //! In: the sphere about a capture, a size in pixels, numbers of directions and times. Out: [`Look`]s with the truth, which is all Gaussians
 //! in a picture of many times as many pixels, and with what they look like if they are drawn at that size; how close fewer come.
 
+use crate::offline::memory_check::require;
 use crate::offline::metrics::decibels;
-use crate::offline::room::require;
 use crate::offline::{OfflineError, Progress};
 use crate::renderer::{GpuCapture, Headless};
 use crate::scene::{Bounds, RuntimeScene, pixels_across};

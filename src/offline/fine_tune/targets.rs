@@ -3,7 +3,7 @@
 //! In: training views. Out: their images as one word for each pixel, decoded once, in parallel ([`TrainingImages`]).
 
 use crate::offline::dataset::{CoveredImage, TrainingView};
-use crate::offline::{OfflineError, Progress, room};
+use crate::offline::{OfflineError, Progress, memory_check};
 use crate::scene::TrainedWith;
 use crate::view::View;
 use rayon::prelude::*;
@@ -41,7 +41,7 @@ impl TrainingImages {
         trained_with: &TrainedWith,
         progress: &mut dyn Progress,
     ) -> Result<Self, OfflineError> {
-        room::require_images([&views[..], validation].into_iter().flatten())?;
+        memory_check::require_images([&views[..], validation].into_iter().flatten())?;
         let mut shots = |views: &[TrainingView]| -> Result<Vec<Shot>, OfflineError> {
             let images = load(views, progress)?;
             let shot = |(view, image): (&TrainingView, CoveredImage)| Shot {

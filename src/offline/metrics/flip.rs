@@ -14,7 +14,7 @@ use std::sync::LazyLock;
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::{SizeMismatch, check_sizes};
+use super::size_mismatch::{SizeMismatch, check_sizes};
 use crate::view::Picture;
 
 const PIXELS_PER_DEGREE: f64 = 3840.0 * PI / 180.0;

@@ -8,8 +8,8 @@ use std::borrow::Cow;
 use glam::{DVec3, UVec2, Vec3};
 use rayon::prelude::*;
 
+use super::size_mismatch::{SizeMismatch, check_sizes};
 use super::ssim::{RADIUS, WINDOW, column_moments, factors, gaussian_window, moments_at};
-use super::{SizeMismatch, check_sizes};
 use crate::view::Picture;
 
 /// The smallest side that has a window at every scale, in pixels.

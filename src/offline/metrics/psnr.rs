@@ -6,7 +6,7 @@
 
 use glam::DVec3;
 
-use super::{SizeMismatch, check_sizes};
+use super::size_mismatch::{SizeMismatch, check_sizes};
 use crate::view::Picture;
 
 /// PSNR of identical pictures, dB. A mean squared error below 1e-20 counts as 1e-20.

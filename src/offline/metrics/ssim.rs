@@ -9,7 +9,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{SizeMismatch, check_sizes};
+use super::size_mismatch::{SizeMismatch, check_sizes};
 use crate::view::Picture;
 
 pub(super) const WINDOW: usize = 11;

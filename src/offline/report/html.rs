@@ -3,6 +3,7 @@
 //! In: a [`BakeReport`]. Out: HTML with its style, its plots (SVG) and its pictures (PNG, base64) inside: it loads nothing.
 
 use super::super::fine_tune::CurvePoint;
+use super::escape::escape;
 use super::plot::{Axis, Chart, Series, bars};
 use super::{BakeReport, Sample};
 use crate::offline::evaluation::{color_name, without_contrast};
@@ -38,11 +39,6 @@ svg{width:100%;height:auto;display:block}.text{fill:var(--soft);font-size:12px}.
 i.s0,.bar.s0{background:var(--c0);fill:var(--c0)}i.s1{background:var(--c1)}i.s2{background:var(--c2)}i.s3{background:var(--c3)}\
 i.s4{background:var(--c4)}i.s5{background:var(--c5)}.dot{fill:var(--card);stroke-width:2}\
 .views{display:grid;grid-template-columns:repeat(4,1fr);gap:8px;margin-bottom:12px}figure{margin:0}img{width:100%;display:block}";
-
-/// Escapes the special characters of HTML.
-pub(super) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
 
 /// Returns the whole page.
 pub(super) fn page(report: &BakeReport) -> String {

@@ -2,6 +2,7 @@
 //!
 //! In: the results of the stages of a bake. Out: a [`BakeReport`], as JSON and as one self-contained HTML page.
 
+mod escape;
 mod files;
 mod html;
 mod plot;

@@ -5,7 +5,7 @@
 
 use std::fmt::Write;
 
-use super::html::escape;
+use super::escape::escape;
 
 const WIDTH: f64 = 560.0;
 const HEIGHT: f64 = 300.0;

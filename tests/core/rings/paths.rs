@@ -15,6 +15,8 @@ pub struct Source {
     pub mentions: Vec<Mention>,
     /// The names that it defines.
     pub items: BTreeSet<String>,
+    /// The words of its code outside of `use` and of unit tests.
+    pub words: BTreeSet<String>,
 }
 
 /// A path in a file.
@@ -25,6 +27,8 @@ pub struct Mention {
     pub path: Module,
     /// The name that a `use` outside of functions and inner modules gives it; `*` for a glob.
     pub name: Option<String>,
+    /// Whether it is part of a `pub use`: a re-export.
+    pub exported: bool,
 }
 
 impl Source {
@@ -33,7 +37,7 @@ impl Source {
         let code = code(text);
         let mut reader = Reader { tokens: tokens(&code), ..Reader::default() };
         reader.read();
-        Self { file: file.to_owned(), mentions: reader.mentions, items: reader.items }
+        Self { file: file.to_owned(), mentions: reader.mentions, items: reader.items, words: reader.words }
     }
 }
 
@@ -49,6 +53,9 @@ struct Reader<'a> {
     inside: Vec<(String, usize)>,
     mentions: Vec<Mention>,
     items: BTreeSet<String>,
+    words: BTreeSet<String>,
+    /// Whether the `use` that is read is a `pub use`.
+    exported: bool,
 }
 
 impl<'a> Reader<'a> {
@@ -59,10 +66,17 @@ impl<'a> Reader<'a> {
             if DEFINING.contains(&word) && is_name(next) {
                 self.items.insert(next.to_owned());
             }
+            if is_name(word) && !self.inside.iter().any(|(module, _)| module == "tests") {
+                self.words.insert(word.to_owned());
+            }
             match word {
                 "use" => {
+                    // `pub use`, `pub(crate) use`.
+                    let before = self.at.checked_sub(1).and_then(|at| self.tokens.get(at));
+                    self.exported = before.is_some_and(|(token, _)| ["pub", ")"].contains(token));
                     self.at += 1;
                     self.branch(&[]);
+                    self.exported = false;
                     continue;
                 }
                 "crate" | "self" | "super" if next == "::" => {
@@ -140,7 +154,7 @@ impl<'a> Reader<'a> {
 
     fn mention(&mut self, line: usize, path: Module, name: Option<String>) {
         let inside = self.inside.iter().map(|(module, _)| module.clone()).collect();
-        self.mentions.push(Mention { line, inside, path, name });
+        self.mentions.push(Mention { line, inside, path, name, exported: self.exported });
     }
 }
 

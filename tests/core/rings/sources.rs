@@ -144,13 +144,17 @@ impl Sources {
         outward
     }
 
-    /// Returns the shortest circle through each file of a folder, each circle once: the paths that it consists of, one
-    /// a line.
-    pub fn cycles(&self, folder: &str) -> Vec<String> {
-        let counts = |source: &Source| source.file.starts_with(folder) && !source.file.ends_with("mod.rs");
+    /// Returns the shortest circle through each file, each circle once: the paths that it consists of, one a line. A
+    /// `mod.rs` is a file like the others: an item that it defines is its own. A re-export is no use, unless the code of
+    /// the file has the name, too. The modules `tests` of unit tests may use anything.
+    pub fn cycles(&self) -> Vec<String> {
+        let counts = |source: &Source, mention: &Mention| {
+            let has_name = mention.name.as_ref().is_some_and(|name| source.words.contains(name));
+            (!mention.exported || has_name) && !mention.inside.iter().any(|module| module == "tests")
+        };
         let mut edges: BTreeMap<&Module, BTreeMap<Module, String>> = BTreeMap::new();
         for Use { module, source, mention, target } in self.uses() {
-            if *module != target && counts(source) && self.modules.get(&target).is_some_and(counts) {
+            if *module != target && counts(source, mention) && self.modules.contains_key(&target) {
                 edges.entry(module).or_default().entry(target).or_insert_with(|| position(source, mention));
             }
         }
