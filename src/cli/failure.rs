@@ -8,6 +8,9 @@ use std::any::Any;
 use std::error::Error;
 use std::path::Path;
 
+/// The exit code of a verb that fails, and of a command line that cannot be understood.
+pub const FAILED: u8 = 2;
+
 /// An error of a verb: the line that is printed after `error: `.
 #[derive(Debug)]
 pub struct Failure {

@@ -3,7 +3,7 @@
 //! In: the arguments of the process. Out: the options; or the exit code, after help or the error has been printed, with `--json` as
 //! one JSON document.
 
-use super::failure::Failure;
+use super::failure::{FAILED, Failure};
 use super::report::Report;
 use clap::Parser;
 use std::env;
@@ -22,7 +22,7 @@ pub fn parse<C: Parser>() -> Result<C, ExitCode> {
         } else {
             let _ = error.print();
         }
-        if failed { ExitCode::from(super::FAILED) } else { ExitCode::SUCCESS }
+        if failed { ExitCode::from(FAILED) } else { ExitCode::SUCCESS }
     })
 }
 

@@ -183,15 +183,16 @@ fn an_interrupted_and_resumed_run_ends_as_an_uninterrupted_one() {
     let run = |headless: &mut Headless, store: &Store, progress: &mut dyn Progress| {
         let resume = Resume { store, key: Key::of(b"inputs"), every: 2 };
         let scene = lesson.disturbed(Some(filter(FilterKind::KeyFrame)));
-        fine_tune(headless, scene, &lesson.images, &settings, Some(resume), progress)
+        fine_tune(headless, scene, &lesson.images, &settings, Some(resume), progress).map_err(Box::new)
     };
     let whole = run(&mut headless, &lesson.store("whole"), &mut NoProgress).expect("it can be trained");
     for (task, left) in [("fine-tuning", 3), ("fine-tuning", 4), ("training codebooks", 2), ("training codebooks", 53)]
     {
         let store = lesson.store(&format!("{task} {left}"));
         let stopped = run(&mut headless, &store, &mut Interrupting { task, left, running: Vec::new() });
-        let Err(OfflineError::Interrupted { tuned: Some(stopped) }) = stopped else {
-            panic!("{task}: an interrupted run is an error with the best result so far: {stopped:?}")
+        let stopped = match stopped.map_err(|error| *error) {
+            Err(OfflineError::Interrupted { tuned: Some(stopped) }) => stopped,
+            other => panic!("{task}: an interrupted run is an error with the best result so far: {other:?}"),
         };
         let made = whole.curve.iter().take(stopped.curve.len());
         assert!(made.eq(&stopped.curve), "{task}: the interruption is no evaluation: {:?}", stopped.curve);

@@ -1,7 +1,7 @@
-//! Fitting: training few Gaussians to look like all of them.
+//! Fitting: training few Gaussians to look like all Gaussians.
 //!
-//! In: a scene in the trained form, [`Look`]s of all Gaussians. Out: the scene after some steps, over random backgrounds, so that what
-//! shows through it is trained too. It is drawn anti-aliased, as it will be; gradients are those without the factor on opacity.
+//! In: a scene in the trained form, [`Look`]s of all Gaussians. Out: the scene after some steps, over random backgrounds, so that opacity is
+//! trained too. The scene is drawn anti-aliased, as levels are; gradients leave out the factor of anti-aliasing on opacity.
 
 use super::looks::Look;
 use crate::gaussian::GradientMode;
@@ -16,9 +16,9 @@ use glam::Vec3;
 
 /// Views of a step.
 const BATCH: usize = 4;
-/// Share of the rates that is left at the last step.
+/// Factor on the rates at the last step.
 const LAST_RATE: f64 = 0.05;
-/// Colors and opacities may change faster than in fine-tuning: the start is an estimate.
+/// Colors change faster than in fine-tuning, since the start is an estimate.
 const RATES: Rates = Rates { harmonics: 1e-3, color: 5e-3, ..Rates::OURS };
 
 /// Trains a scene on these looks, of which there is at least one. Begins the task "fitting".
@@ -47,7 +47,7 @@ pub(super) fn fit(
             let (view, image) = (&views[index], &images[index]);
             batch.push(Sample { view, image, background, number: index as u32 });
         }
-        // Structure, which the other part of the loss compares, is smaller than a few pixels.
+        // No SSIM: the structures that it compares are smaller than a few pixels.
         trainer.accumulate(&batch, 0.0)?;
         let factor = 1.0 - (1.0 - LAST_RATE) * step as f64 / steps as f64;
         trainer.step(&RATES, factor, step + 1)?;
@@ -57,7 +57,7 @@ pub(super) fn fit(
     Ok(trainer.scene()?)
 }
 
-/// Returns the picture of a frame that was drawn over black, and what it covers.
+/// Returns the picture of a frame that was drawn over black, with its opacity as coverage.
 fn covered(frame: &Frame) -> CoveredImage {
     let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
     let texel = |(color, left): (&Vec3, &f32)| {

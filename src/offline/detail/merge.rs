@@ -1,13 +1,13 @@
-//! Merging: from many Gaussians to few that show nearly the same from afar.
+//! Merging: from many Gaussians to few that look nearly the same in pictures of few pixels.
 //!
-//! In: Gaussians ready to draw and their color, how many to make of them, the size of a pixel. Out: Gaussians in the trained form.
+//! In: Gaussians ready to draw and their color, the number of merged Gaussians, the size of a pixel. Out: Gaussians in the trained form.
 //!
-//! 1. Gaussians are points: where they are when they come and when they go, and these two times. What moves differently or is there at
-//!    another time is far apart. The set that is spread most is divided, again and again.
-//! 2. Each set becomes one Gaussian with its mean and its covariance in space and time. Color is averaged; its harmonics of time are
-//!    about each Gaussian's own mean, so that moving that mean leaves of `cos(n ω (μ − t))` the part `cos(n ω Δμ)`.
-//! 3. What absorbs light is kept: a splat of opacity `o` and area `A` absorbs `A Li₂(o)`, the integral of `−ln(1 − o g)`. Areas are those
-//!    on the screen, which are never smaller than the low-pass makes them.
+//! 1. Each Gaussian is a point of eight coordinates: its positions at the first and at the last time at which it is drawn, and these two
+//!    times. Gaussians of different motion or lifespan are far apart. The set with the largest spread is divided until there are enough sets.
+//! 2. Each set becomes one Gaussian with the mean and the covariance of the set in space and time. Color is averaged; the harmonics of time
+//!    are about each Gaussian's own temporal mean, so that moving the mean by `Δμ` multiplies `cos(n ω (μ − t))` by `cos(n ω Δμ)`.
+//! 3. Absorption is kept: a splat of opacity `o` and area `A` absorbs `A Li₂(o)`, the integral of `−ln(1 − o g)`. Areas are areas on the
+//!    screen, with the low-pass.
 
 use super::rotation::Axes;
 use crate::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN};
@@ -19,13 +19,13 @@ use glam::{DMat3, DMat4, DVec3, DVec4};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// Longest temporal deviation, lengths of the time interval: as good as present at every time.
+/// Longest temporal deviation, lengths of the time interval: opacity is nearly constant.
 const LONGEST: f64 = 100.0;
 /// Coordinates of a Gaussian when sets are divided.
 const AXES: usize = 8;
 
-/// Returns at most `count` Gaussians in place of those given, for pictures with pixels of `pixel` capture units. `interval` is that of the
-/// capture, `radius` that of the sphere about its bounds. Gaussians that are never drawn are left out.
+/// Merges Gaussians to at most `count`, for pictures with pixels of `pixel` capture units. `interval` is the time interval of the capture,
+/// `radius` the radius of the sphere about its bounds. Gaussians that are never drawn are left out.
 pub(super) fn merge(sliced: &Sliced, interval: [f32; 2], radius: f32, count: usize, pixel: f64) -> Trained {
     let Sliced { gaussians, harmonics } = sliced;
     let interval = interval.map(f64::from);
@@ -48,12 +48,12 @@ pub(super) fn merge(sliced: &Sliced, interval: [f32; 2], radius: f32, count: usi
 struct Seen<'a> {
     index: usize,
     gaussian: &'a Gaussian,
-    /// When it comes and goes, within the interval.
+    /// The first and the last time at which the Gaussian is drawn, within the interval.
     from: f64,
     to: f64,
     /// Temporal deviation, at most [`LONGEST`] intervals.
     sigma_t: f64,
-    /// Its share of what is seen: what it absorbs, times how long.
+    /// Absorption of the Gaussian times its duration.
     weight: f64,
 }
 
@@ -74,19 +74,22 @@ impl<'a> Seen<'a> {
         mean + velocity * (time - f64::from(self.gaussian.mean_t))
     }
 
-    /// Returns its coordinates; times count `speed` capture units for each timestamp unit.
+    /// Returns the coordinates of the Gaussian; a timestamp unit is `speed` capture units long.
     fn place(&self, speed: f64) -> [f64; AXES] {
         let ([a, b, c], [d, e, f]) = (self.mean_at(self.from).to_array(), self.mean_at(self.to).to_array());
         [a, b, c, d, e, f, speed * self.from, speed * self.to]
     }
 }
 
-/// A set of Gaussians, by their places in a list.
+/// A set of Gaussians.
 struct Set {
+    /// Indices of the Gaussians in a list.
     members: Vec<u32>,
-    /// Weighted squares of the distances from the middle along the axis on which they are largest; that axis, and its middle.
+    /// Weighted sum of the squared distances from the middle, along `axis`.
     spread: f64,
+    /// The coordinate with the largest spread.
     axis: usize,
+    /// Weighted mean of that coordinate.
     middle: f64,
 }
 
@@ -106,7 +109,7 @@ impl Set {
 }
 
 impl Ord for Set {
-    /// By spread; equal ones by their first member, so that every machine divides alike.
+    /// Orders sets by spread; equal spreads by the first member, so that the division is the same on every machine.
     fn cmp(&self, other: &Self) -> Ordering {
         self.spread.total_cmp(&other.spread).then_with(|| other.members.first().cmp(&self.members.first()))
     }
@@ -126,7 +129,7 @@ impl PartialEq for Set {
 
 impl Eq for Set {}
 
-/// Divides Gaussians into at most `count` sets of close ones.
+/// Divides Gaussians into at most `count` sets of close Gaussians.
 fn divide<'a>(seen: &[Seen<'a>], speed: f64, count: usize) -> Vec<Vec<Seen<'a>>> {
     if seen.is_empty() || count == 0 {
         return Vec::new();
@@ -142,7 +145,7 @@ fn divide<'a>(seen: &[Seen<'a>], speed: f64, count: usize) -> Vec<Vec<Seen<'a>>>
         }
         let below = |member: &u32| places[*member as usize][widest.axis] < widest.middle;
         let (mut low, mut high): (Vec<u32>, Vec<u32>) = widest.members.into_iter().partition(below);
-        // Rounding can put all on one side.
+        // Rounding can put all members on one side.
         if low.is_empty() {
             low = high.split_off(high.len() / 2);
         } else if high.is_empty() {
@@ -159,18 +162,18 @@ fn divide<'a>(seen: &[Seen<'a>], speed: f64, count: usize) -> Vec<Vec<Seen<'a>>>
     sets.iter().map(|set| set.members.iter().map(|&member| seen[member as usize]).collect()).collect()
 }
 
-/// Adds the Gaussian that takes the place of a set.
+/// Adds the Gaussian that replaces a set.
 fn push_merged(made: &mut Trained, set: &[Seen<'_>], harmonics: &Harmonics, span: f64, low_pass: f64) {
     let total: f64 = set.iter().map(|one| one.weight).sum();
     let mean = |value: &dyn Fn(&Seen<'_>) -> f64| set.iter().map(|one| one.weight * value(one)).sum::<f64>() / total;
     let mean_3 = |value: &dyn Fn(&Seen<'_>) -> DVec3| {
         set.iter().fold(DVec3::ZERO, |sum, one| sum + value(one) * one.weight) / total
     };
-    // When it is there.
+    // Temporal mean and deviation.
     let mean_t = mean(&|one| f64::from(one.gaussian.mean_t));
     let variance_t = mean(&|one| one.sigma_t.powi(2) + (f64::from(one.gaussian.mean_t) - mean_t).powi(2));
     let sigma_t = variance_t.sqrt().min(LONGEST * span);
-    // Where it is: over the time that is shown, since those that stay far longer would otherwise tell of places where nothing is seen.
+    // Position and motion over the time that is shown: Gaussians with a far longer lifespan would otherwise add positions that are not shown.
     let middle = |one: &Seen<'_>| 0.5 * (one.from + one.to);
     let shown = |one: &Seen<'_>| one.sigma_t.min((one.to - one.from) / 12f64.sqrt()).powi(2);
     let center_t = mean(&middle);
@@ -185,7 +188,7 @@ fn push_merged(made: &mut Trained, set: &[Seen<'_>], harmonics: &Harmonics, span
         sum + (covariance(one.gaussian) + outer(own) * shown(one) + outer(apart)) * one.weight
     });
     let conditional = spread * total.recip() - outer(velocity) * along;
-    // How dense it is.
+    // Opacity.
     let thick = total / (area(conditional, low_pass) * sigma_t.min(span));
     let opacity = opacity_of(thick);
 
@@ -215,7 +218,7 @@ fn push_merged(made: &mut Trained, set: &[Seen<'_>], harmonics: &Harmonics, span
     made.harmonics.values.extend(merged_color(set, total, harmonics, mean_t, span));
 }
 
-/// Returns the color of a set, coefficients as they are evaluated.
+/// Returns the color of a set, the coefficients that are evaluated.
 fn merged_color(set: &[Seen<'_>], total: f64, harmonics: &Harmonics, mean_t: f64, span: f64) -> Vec<f32> {
     let mut sums = vec![0.0f64; harmonics.evaluated() * 3];
     for one in set {
@@ -239,16 +242,16 @@ fn outer(v: DVec3) -> DMat3 {
     DMat3::from_cols(v * v.x, v * v.y, v * v.z)
 }
 
-/// Returns the area of a splat, without its factor 2π: a mean over directions, with the low-pass (capture units squared).
+/// Returns the area of a splat without its factor 2π, capture units squared: a mean over directions, with the low-pass.
 fn area(covariance: DMat3, low_pass: f64) -> f64 {
     let m = covariance + DMat3::from_diagonal(DVec3::splat(low_pass));
     let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
-    // The mean of the squares over three axes; the sum of the principal minors does not depend on the axes.
+    // The root of the mean square over three axes; the sum of the principal minors does not depend on the axes.
     let minors = x.x * y.y - x.y * x.y + x.x * z.z - x.z * x.z + y.y * z.z - y.z * y.z;
     (minors.max(0.0) / 3.0).sqrt()
 }
 
-/// Returns what a splat of this opacity absorbs, for each 2π of its area: `Li₂(o)`, the sum of `oᵏ / k²`.
+/// Returns the absorption of a splat of this opacity for each 2π of its area: `Li₂(o)`, the sum of `oᵏ / k²`.
 fn thickness(opacity: f64) -> f64 {
     let opacity = opacity.clamp(0.0, f64::from(ALPHA_MAX));
     if opacity > 0.5 {
@@ -262,7 +265,7 @@ fn thickness(opacity: f64) -> f64 {
     })
 }
 
-/// Returns the opacity that absorbs so much, at most [`ALPHA_MAX`].
+/// Returns the opacity with this absorption, at most [`ALPHA_MAX`]: the inverse of [`thickness`].
 fn opacity_of(thick: f64) -> f64 {
     let (mut low, mut high) = (0.0, f64::from(ALPHA_MAX));
     for _ in 0..48 {
@@ -311,11 +314,11 @@ mod tests {
     }
 
     #[test]
-    fn one_gaussian_is_itself() {
+    fn merging_one_gaussian_returns_it() {
         let always = Gaussian { velocity: [0.0; 3], sigma_t: f32::INFINITY, ..gaussian([1.0, 2.0, 3.0]) };
         for one in [gaussian([1.0, 2.0, 3.0]), Gaussian { sigma_t: 3.0, ..gaussian([0.0; 3]) }, always] {
             let (found, harmonics) = merged(&[one], 5);
-            assert_eq!(found.len(), 1, "one stays one");
+            assert_eq!(found.len(), 1, "one Gaussian is returned");
             assert!(apart(&found[0].mean, &one.mean) < 1e-5, "mean {:?}", found[0].mean);
             assert!(apart(&found[0].velocity, &one.velocity) < 1e-4, "velocity {:?}", found[0].velocity);
             assert!(apart(&found[0].covariance, &one.covariance) < 1e-5, "covariance {:?}", found[0].covariance);
@@ -326,29 +329,33 @@ mod tests {
     }
 
     #[test]
-    fn two_equal_ones_absorb_twice_as_much() {
+    fn merging_two_equal_gaussians_doubles_the_absorption() {
         let one = Gaussian { opacity: 0.3, ..gaussian([0.5; 3]) };
         let (found, harmonics) = merged(&[one, one], 1);
-        assert_eq!(found.len(), 1, "they are merged");
-        assert!(apart(&found[0].covariance, &one.covariance) < 1e-5, "of the same shape");
-        assert!(apart(&found[0].velocity, &one.velocity) < 1e-4, "and motion");
+        assert_eq!(found.len(), 1, "the two are merged");
+        assert!(apart(&found[0].covariance, &one.covariance) < 1e-5, "the shape is kept");
+        assert!(apart(&found[0].velocity, &one.velocity) < 1e-4, "the motion is kept");
         let absorbed = thickness(f64::from(found[0].opacity));
         assert!((absorbed - 2.0 * thickness(0.3)).abs() < 1e-4, "opacity {}", found[0].opacity);
-        assert!(apart(&harmonics.values, &[0.6, 0.7, 0.8]) < 1e-6, "of the mean color");
+        assert!(apart(&harmonics.values, &[0.6, 0.7, 0.8]) < 1e-6, "the color is the mean");
     }
 
     #[test]
-    fn the_mixture_keeps_mean_and_covariance() {
+    fn a_merged_gaussian_has_mean_and_covariance_of_the_set() {
         let [a, b] = [[0.2, 0.0, 0.0], [-0.2, 0.0, 0.0]].map(gaussian);
         let (found, _) = merged(&[a, b], 1);
         let mut expected = a.covariance;
         expected[0] += 0.04;
-        assert!(apart(&found[0].mean, &[0.0; 3]) < 1e-5, "between them");
-        assert!(apart(&found[0].covariance, &expected) < 1e-5, "as wide as both: {:?}", found[0].covariance);
+        assert!(apart(&found[0].mean, &[0.0; 3]) < 1e-5, "the mean lies between the two");
+        assert!(
+            apart(&found[0].covariance, &expected) < 1e-5,
+            "the covariance includes the distance: {:?}",
+            found[0].covariance
+        );
     }
 
     #[test]
-    fn what_moves_or_lives_differently_stays_apart() {
+    fn gaussians_of_different_motion_or_lifespan_are_not_merged() {
         let here = gaussian([0.0; 3]);
         let later = Gaussian { mean_t: 0.9, sigma_t: 0.02, ..here };
         let earlier = Gaussian { mean_t: 0.1, sigma_t: 0.02, ..here };
@@ -356,18 +363,18 @@ mod tests {
         for [a, b] in [[later, earlier], [here, other]] {
             let (found, _) = merged(&[a, a, a, b, b, b], 2);
             let times: Vec<f32> = found.iter().map(|one| one.mean_t).collect();
-            assert_eq!(found.len(), 2, "two kinds");
+            assert_eq!(found.len(), 2, "one for each kind");
             let kept = found.iter().all(|one| {
                 [a, b]
                     .iter()
                     .any(|old| (one.mean_t - old.mean_t).abs() < 1e-4 && apart(&one.velocity, &old.velocity) < 1e-3)
             });
-            assert!(kept, "each of one kind: {times:?}");
+            assert!(kept, "each merged Gaussian is of one kind: {times:?}");
         }
     }
 
     #[test]
-    fn harmonics_of_time_follow_the_mean() {
+    fn harmonics_of_time_are_moved_with_the_temporal_mean() {
         let [early, late] = [0.3, 0.5].map(|mean_t| Gaussian { mean_t, velocity: [0.0; 3], ..gaussian([0.0; 3]) });
         let values: Vec<f32> = (0..2).flat_map(|_| (0..96).map(|at| if at < 48 { 0.0 } else { 1.0 })).collect();
         let harmonics = Harmonics { coefficients: 32, degree: 3, degree_t: 1, values };
@@ -381,17 +388,20 @@ mod tests {
     #[test]
     fn thickness_and_opacity_are_inverse() {
         for opacity in [0.01, 0.3, 0.5, 0.7, 0.98] {
-            assert!((opacity_of(thickness(opacity)) - opacity).abs() < 1e-9, "of {opacity}");
+            assert!(
+                (opacity_of(thickness(opacity)) - opacity).abs() < 1e-9,
+                "the inverse of the absorption of {opacity}"
+            );
         }
         assert!((thickness(0.5) - 0.582_240_526).abs() < 1e-8, "Li2 of one half");
-        assert!((opacity_of(99.0) - f64::from(ALPHA_MAX)).abs() < 1e-9, "never more than is drawn");
+        assert!((opacity_of(99.0) - f64::from(ALPHA_MAX)).abs() < 1e-9, "opacity is at most ALPHA_MAX");
     }
 
     #[test]
-    fn what_is_never_drawn_is_left_out() {
+    fn gaussians_that_are_never_drawn_are_left_out() {
         let faint = Gaussian { opacity: 0.001, ..gaussian([0.0; 3]) };
         let past = Gaussian { mean_t: -9.0, sigma_t: 0.1, ..gaussian([0.0; 3]) };
         let (found, harmonics) = merged(&[faint, past], 4);
-        assert!(found.is_empty() && harmonics.values.is_empty(), "nothing");
+        assert!(found.is_empty() && harmonics.values.is_empty(), "no Gaussian is returned");
     }
 }

@@ -1,16 +1,17 @@
-//! Levels of detail: the same capture of fewer Gaussians, for pictures of few pixels.
+//! Levels of detail: the same capture with fewer Gaussians, for pictures of few pixels.
 //!
 //! In: a scene, [`DetailSettings`]. Out: the scene with levels ([`Detailed`]), each with the size on the screen up to which it is drawn.
 //!
-//! 1. `merge` puts few Gaussians in place of many, with their moments in space and time; `rotation` makes raw parameters of these.
-//! 2. `fit` trains them at the sizes for which they are meant, on the mean of two pictures: the truth, which is all Gaussians with many
-//!    times as many pixels, made smaller, and all Gaussians drawn at that size, whose place they take. These are far apart: each splat is
-//!    blurred to at least half a pixel, as in the original, so that many small ones look larger and denser than they are, and, made
-//!    fainter for it ([anti-aliased]), thinner.
-//! 3. `looks` compares them in other views, at one size after the other. A level is drawn up to the size at which it is still about as close
-//!    to the truth as all Gaussians are, and a screen on which it takes their place hardly changes. A level without such a size is not kept.
+//! 1. `merge` replaces many Gaussians by few with the same moments in space and time; `rotation` converts covariances to raw parameters.
+//! 2. `fit` trains the merged Gaussians at the sizes at which the level is drawn, on the mean of two pictures of all Gaussians: the truth, a
+//!    picture of many times as many pixels, averaged, and the picture drawn at that size, which the level replaces. The two differ much: as in
+//!    the original, each splat is blurred to at least half a pixel, so that many small splats look larger and denser than they are; with the
+//!    fainter splats of [anti-aliasing], less dense.
+//! 3. `looks` compares the level with all Gaussians in other views, at each size. A level is drawn up to the largest size at which it is about
+//!    as close to the truth as all Gaussians are, and at which the change of a screen is hardly visible. A level without such a size is not
+//!    kept.
 //!
-//! [anti-aliased]: crate::view::View::antialiased
+//! [anti-aliasing]: crate::view::View::antialiased
 
 mod fit;
 mod looks;
@@ -28,18 +29,18 @@ use merge::merge;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// Sizes on the screen at which levels are compared, pixels: each about a quarter more than the one before.
+/// Sizes on the screen at which levels are compared, pixels: each about a quarter larger than the previous size.
 const SIZES: [f32; 19] =
     [4.0, 5.0, 6.3, 8.0, 10.0, 12.5, 16.0, 20.0, 25.0, 32.0, 40.0, 50.0, 63.0, 80.0, 100.0, 125.0, 160.0, 200.0, 250.0];
-/// How many times fewer Gaussians a level has than the one before.
+/// The number of Gaussians of a level is that of the finer level divided by this.
 const COARSER: usize = 7;
-/// Gaussians for each square pixel of the size that a level is meant for.
+/// Gaussians for each square pixel of the design size of a level.
 const DENSITY: f32 = 0.2;
-/// Sizes that a level is trained at, parts of the one that it is meant for.
+/// Sizes at which a level is trained, as fractions of its design size.
 const TRAINED_AT: [f32; 3] = [1.0, 0.7, 0.5];
-/// How much farther from the truth than all Gaussians a level may be, dB.
+/// Most PSNR against the truth that a level may lose against all Gaussians, dB.
 const FARTHER: f64 = 0.5;
-/// How many sizes below its limit a level must be as close to the truth at, too. Below these it is mostly the next level that is drawn.
+/// Number of sizes below its limit at which a level must be as close to the truth too. Below these sizes, a coarser level is usually drawn.
 const SMALLER: usize = 2;
 /// Fewest Gaussians of a level.
 const FEWEST: usize = 8;
@@ -47,15 +48,15 @@ const FEWEST: usize = 8;
 /// Settings of the levels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DetailSettings {
-    /// Levels to make, at most [`MAX_LEVELS`]; each has a seventh of the Gaussians of the one before. Default: 3.
+    /// Number of levels, at most [`MAX_LEVELS`]; each has a seventh of the Gaussians of the finer level. Default: 3.
     pub levels: usize,
-    /// Lowest PSNR of a screen of 1280x720 pixels on which a level takes the place of all Gaussians, dB. Default: 45.
+    /// Lowest PSNR of a screen of 1280x720 pixels on which a level replaces all Gaussians, dB. Default: 45.
     pub min_psnr: f64,
-    /// Steps of training of each level; 0 leaves it as it was merged. Default: 2000.
+    /// Training steps of each level; 0 leaves the merged Gaussians unchanged. Default: 2000.
     pub steps: usize,
-    /// Directions from which each level is trained and compared, and times of each. Default: 24 and 6.
+    /// Number of directions from which each level is trained and compared. Default: 24.
     pub directions: usize,
-    /// See [`directions`](Self::directions).
+    /// Number of times of each direction. Default: 6.
     pub times: usize,
 }
 
@@ -65,31 +66,31 @@ impl Default for DetailSettings {
     }
 }
 
-/// A level that was made, kept or not.
+/// A level, kept or not.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MadeLevel {
     /// Number of Gaussians.
     pub gaussians: usize,
-    /// The largest size on the screen at which it is drawn, pixels; `None` if it is not kept.
+    /// The largest size on the screen at which the level is drawn, pixels; `None` if it is not kept.
     pub pixels: Option<f32>,
-    /// How close it is at each size.
+    /// The closeness to all Gaussians at each size.
     pub measured: Vec<Closeness>,
 }
 
 /// A scene with levels of detail.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detailed {
-    /// The scene. Nothing else of it has changed.
+    /// The scene, unchanged except for its levels.
     pub scene: GaussianScene,
-    /// The levels that were made, finest first.
+    /// All levels, finest first.
     pub made: Vec<MadeLevel>,
 }
 
-/// Makes levels of detail, in place of those that the scene has. The levels of a packed scene are packed, those of others in single
-/// precision; none has a temporal filter. Begins the task "levels" and, inside it, tasks for each level.
+/// Makes levels of detail, which replace those of the scene. The levels of a packed scene are packed, those of other scenes are in single
+/// precision; no level has a temporal filter. Begins the task "levels" and, inside it, tasks for each level.
 ///
 /// # Errors
-/// A scene with an environment map, or of which nothing is drawn; one that does not fit the GPU, a lost device.
+/// A scene with an environment map, a scene of which no Gaussian is drawn, a scene that does not fit the GPU, a lost device.
 pub fn detail(
     headless: &mut Headless,
     mut scene: GaussianScene,
@@ -108,14 +109,14 @@ pub fn detail(
     Ok(Detailed { scene, made })
 }
 
-/// What all levels are made from.
+/// The inputs of all levels, and the levels kept so far.
 struct Maker<'a> {
     headless: &'a mut Headless,
     settings: &'a DetailSettings,
     sphere: Sphere,
-    /// All Gaussians, as they are stored.
+    /// All Gaussians, in the form that is stored.
     full: RuntimeScene,
-    /// Those that are kept, finest first.
+    /// The levels that are kept, finest first.
     levels: Vec<Level>,
 }
 
@@ -150,7 +151,7 @@ impl Maker<'_> {
         Ok(made)
     }
 
-    /// Draws all Gaussians in the views of this shift.
+    /// Draws all Gaussians in the views with this shift.
     fn looks(
         &mut self,
         sizes: &[f32],
@@ -180,11 +181,11 @@ impl Maker<'_> {
             form: SceneForm::Trained(merged),
             environment: None,
             filter: None,
-            // The temporal deviations that were merged contain the prefilter.
+            // The merged temporal deviations include the prefilter.
             trained_with: TrainedWith {
                 prefilter_var: -1.0,
                 spatial_lr_scale: radius.into(),
-                // Anti-aliased in any case: levels are drawn where pixels are large.
+                // Always anti-aliased, since levels are drawn where pixels are large.
                 pixel: Some(trained.pixel.unwrap_or(2.0 * radius / FINE)),
                 ..trained.clone()
             },
@@ -212,7 +213,7 @@ impl Maker<'_> {
         let gaussians = level.len();
         progress.note(&describe(gaussians, largest));
         if let Some(Closeness { pixels, .. }) = largest {
-            // A finer level that is drawn no longer than this one is of no use.
+            // A finer level whose largest size is not larger than this level's is never drawn.
             self.levels.retain(|finer| finer.pixels > pixels);
             self.levels.push(Level { pixels, scene: Arc::new(level) });
         }
@@ -231,9 +232,10 @@ impl Maker<'_> {
     }
 }
 
-/// Returns the largest size at which a level may be drawn: it holds there, and at the next smaller sizes. `None` if there is none.
+/// Returns the largest size at which a level may be drawn: the level is close enough there and at the next smaller sizes. `None` if there is
+/// no such size.
 fn largest(measured: &[Closeness], min_psnr: f64) -> Option<Closeness> {
-    // NaN is not close.
+    // NaN fails every comparison.
     let holds = |close: &Closeness| close.screen >= min_psnr && close.truth >= close.all - FARTHER;
     let unseen = |close: &Closeness| close.screen >= min_psnr;
     let held = |&last: &usize| {
@@ -257,19 +259,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_level_holds_at_smaller_sizes_too() {
+    fn the_largest_size_of_a_level_also_holds_at_smaller_sizes() {
         let close = |pixels, screen, truth, all| Closeness { pixels, screen, truth, all };
         let good = |pixels| close(pixels, 50.0, 30.0, 20.0);
         let limit = |measured: &[Closeness]| largest(measured, 45.0).map(|close| close.pixels);
-        assert_eq!(limit(&[good(4.0), good(6.0), close(8.0, 44.0, 30.0, 20.0)]), Some(6.0), "the screen changes");
+        assert_eq!(
+            limit(&[good(4.0), good(6.0), close(8.0, 44.0, 30.0, 20.0)]),
+            Some(6.0),
+            "the screen changes at 8 pixels"
+        );
         assert_eq!(
             limit(&[good(4.0), good(6.0), close(8.0, 50.0, 19.0, 20.0)]),
             Some(6.0),
-            "all are closer to the truth"
+            "all Gaussians are closer to the truth at 8 pixels"
         );
         let gap = [good(4.0), close(6.0, 50.0, 19.0, 20.0), good(8.0), good(11.0), good(16.0), good(23.0)];
-        assert_eq!(limit(&gap), Some(23.0), "smaller sizes are those of other levels");
-        assert_eq!(limit(&gap[..4]), Some(4.0), "but not the next two");
-        assert_eq!(limit(&[close(4.0, f64::NAN, 1.0, 0.0)]), None, "no number is not close");
+        assert_eq!(limit(&gap), Some(23.0), "a size far below the limit need not be close to the truth");
+        assert_eq!(limit(&gap[..4]), Some(4.0), "the two sizes below the limit must be close to the truth");
+        assert_eq!(limit(&[close(4.0, f64::NAN, 1.0, 0.0)]), None, "NaN is not close");
     }
 }

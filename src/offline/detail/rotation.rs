@@ -1,7 +1,7 @@
-//! A 4D covariance as the raw parameters of a Gaussian: scales and a pair of quaternions.
+//! A 4D covariance as raw parameters of a Gaussian: scales and a pair of quaternions.
 //!
-//! In: a symmetric 4D matrix. Out: the standard deviations along its axes, the axis of most time last, and the quaternions of the rotation
-//! to them, as [`rotation_4d`] reads them.
+//! In: a symmetric 4D matrix. Out: the standard deviations along its axes, with the axis closest to time last, and the quaternions of the
+//! rotation to these axes, as [`rotation_4d`] reads them.
 
 use crate::gaussian::eigen::eigen;
 use crate::gaussian::rotation_4d;
@@ -19,7 +19,7 @@ pub(super) struct Axes {
 }
 
 impl Axes {
-    /// Decomposes a covariance. Variances that rounding made negative, or 0, become `least`, a standard deviation.
+    /// Decomposes a covariance. `least` is the smallest standard deviation; variances below its square, also negative ones, are raised to it.
     pub fn of(covariance: DMat4, least: f64) -> Self {
         let (values, mut axes) = eigen(covariance);
         let mut scale = values.max(DVec4::splat(least * least)).map(f64::sqrt);
@@ -36,7 +36,7 @@ impl Axes {
     }
 }
 
-/// Returns the pair of unit quaternions whose [`rotation_4d`] is the rotation given; the negated pair is the same rotation.
+/// Returns a pair of unit quaternions of a rotation: the inverse of [`rotation_4d`]. The negated pair is the same rotation.
 ///
 /// `rotation_4d` is linear in each quaternion, and its sixteen products of unit axes are orthogonal matrices of norm 2. The coordinates in
 /// that basis are therefore the products of the components of both quaternions.
@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rotation_gives_its_quaternions_back() {
+    fn quaternions_of_a_rotation_give_the_same_rotation() {
         for (left, right) in pairs() {
             let rotation = rotation_4d(left, right);
             let (l, r) = quaternions(rotation);
@@ -76,21 +76,25 @@ mod tests {
     }
 
     #[test]
-    fn a_covariance_is_that_of_its_axes() {
+    fn decomposed_axes_give_the_same_covariance() {
         for (left, right) in pairs() {
             let factor = rotation_4d(left, right) * DMat4::from_diagonal(DVec4::new(0.01, 0.2, 0.05, 3.0));
             let covariance = factor * factor.transpose();
             let axes = Axes::of(covariance, 1e-9);
             let again = rotation_4d(axes.left, axes.right) * DMat4::from_diagonal(axes.scale);
             assert!((again * again.transpose()).abs_diff_eq(covariance, 1e-10), "{left} and {right}");
-            assert!((rotation_4d(axes.left, axes.right).determinant() - 1.0).abs() < 1e-9, "a proper rotation");
+            assert!((rotation_4d(axes.left, axes.right).determinant() - 1.0).abs() < 1e-9, "the rotation is proper");
         }
     }
 
     #[test]
     fn flat_covariances_have_a_least_scale() {
         let axes = Axes::of(DMat4::from_diagonal(DVec4::new(0.0, 4.0, -1e-20, 1.0)), 0.5);
-        assert_eq!(axes.scale.w, 1.0, "time is last");
-        assert!(axes.scale.min_element() >= 0.5 && axes.scale.max_element() == 2.0, "not {}", axes.scale);
+        assert_eq!(axes.scale.w, 1.0, "the axis of time is last");
+        assert!(
+            axes.scale.min_element() >= 0.5 && axes.scale.max_element() == 2.0,
+            "scales are at least 0.5: {}",
+            axes.scale
+        );
     }
 }

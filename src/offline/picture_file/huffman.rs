@@ -5,18 +5,18 @@
 /// Values of a block.
 const BLOCK: u8 = 64;
 
-/// A table of codes. Codes of one length are consecutive, and longer ones follow on shorter ones.
+/// A table of codes. Codes of one length are consecutive, and longer codes follow shorter codes.
 pub(super) struct Table {
     /// For each length from 1 bit, the number after its last code, filled up to 16 bits with zeros.
     ends: [u32; 16],
-    /// For each length, what a code lies before its place in `symbols`.
+    /// For each length, the place of a code's symbol in `symbols` minus the code.
     offsets: [i32; 16],
     /// The symbols, from the shortest code on.
     symbols: Vec<u8>,
 }
 
 impl Table {
-    /// Creates a table from the number of codes of each length from 1 to 16 bits; `None` if there are more than fit.
+    /// Creates a table from the number of codes of each length from 1 to 16 bits; `None` if a length has more codes than bit patterns.
     pub fn new(counts: &[u8; 16], symbols: &[u8]) -> Option<Self> {
         let mut table = Self { ends: [0; 16], offsets: [0; 16], symbols: symbols.to_vec() };
         let (mut code, mut place) = (0u32, 0u32);
@@ -38,13 +38,13 @@ impl Table {
 pub(super) struct Bits<'a> {
     data: &'a [u8],
     at: usize,
-    /// The bits that have been read from `data` and not used, in the lowest `count` places.
+    /// Bits that have been read from `data` and not used, in the lowest `count` bits.
     held: u64,
     count: u32,
 }
 
 impl<'a> Bits<'a> {
-    /// Returns the bits from the first on.
+    /// Starts at the first bit.
     pub fn new(data: &'a [u8]) -> Self {
         Self { data, at: 0, held: 0, count: 0 }
     }
@@ -66,7 +66,7 @@ impl<'a> Bits<'a> {
         Some(())
     }
 
-    /// Goes on after the next restart marker; `None` if there is none.
+    /// Skips to the end of the next restart marker; `None` if there is none.
     pub fn restart(&mut self) -> Option<()> {
         self.count = 0;
         let is_restart = |pair: &[u8]| pair[0] == 0xff && (0xd0..=0xd7).contains(&pair[1]);
@@ -79,7 +79,7 @@ impl<'a> Bits<'a> {
         if self.count < 16 {
             self.fill();
         }
-        // After the last bit there are ones, which are no code.
+        // Ones follow the last bit, since no code consists of ones.
         let window = if self.count < 16 {
             let missing = 16 - self.count;
             self.held << missing | ((1 << missing) - 1)
@@ -101,7 +101,7 @@ impl<'a> Bits<'a> {
         Some(())
     }
 
-    /// Reads ahead to the next marker, as far as there is room.
+    /// Reads bytes into `held`, up to the next marker, until `held` is full.
     fn fill(&mut self) {
         while self.count <= 48 {
             let Some(&byte) = self.data.get(self.at) else { return };

@@ -1,14 +1,14 @@
-//! Whether a JPEG is whole. Decoders fill what is missing with grey and report success.
+//! The check that a JPEG is complete. Decoders fill missing data with gray and report success.
 //!
-//! In: the bytes of a JPEG. Out: nothing, or what is missing.
+//! In: the bytes of a JPEG. Out: an error that describes the missing data, if any.
 //!
-//! The file is walked from marker to marker to the end of the image. In sequential pictures the Huffman codes of every scan
-//! are counted, because each block of 8 × 8 values has its own. A progressive picture may end after any of its scans: it
-//! needs the end of the image, and a scan of each color component.
+//! Markers are read up to the end of the image. In sequential pictures the Huffman codes of every scan are counted, since each block of 8 × 8
+//! values has its own codes. A progressive picture may end after any of its scans: it needs the end of the image, and a scan of each color
+//! component.
 
 use super::huffman::{Bits, Table};
 
-/// Starts of frames: baseline, extended sequential, progressive. Decoders read no others.
+/// Starts of frames: baseline, extended sequential, progressive. Decoders read no other frames.
 const FRAMES: [u8; 3] = [0xc0, 0xc1, 0xc2];
 const PROGRESSIVE: u8 = 0xc2;
 const HUFFMAN_TABLES: u8 = 0xc4;
@@ -18,7 +18,7 @@ const START_OF_IMAGE: u8 = 0xd8;
 const END_OF_IMAGE: u8 = 0xd9;
 const SCAN: u8 = 0xda;
 const RESTART_INTERVAL: u8 = 0xdd;
-/// A marker without a meaning, which has no segment.
+/// A marker without meaning and without a segment.
 const TEMPORARY: u8 = 0x01;
 
 const CUT_OFF: &str = "it is cut off before its end; copy or download it again";
@@ -60,25 +60,25 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), &'static str> {
     }
 }
 
-/// Returns the next marker at or after `at`, and where it ends; `None` if there is none.
+/// Returns the next marker at or after `at`, and the end of the marker; `None` if there is none.
 fn next_marker(bytes: &[u8], mut at: usize) -> Option<(u8, usize)> {
     loop {
         at += bytes.get(at..)?.iter().position(|&byte| byte == 0xff)? + 1;
         match *bytes.get(at)? {
-            // A byte of 255 in the data, or one that fills up before a marker.
+            // A byte of 255 in the data, or a fill byte before a marker.
             0 | 0xff => {}
             marker => return Some((marker, at + 1)),
         }
     }
 }
 
-/// Returns the contents of the segment whose length is at `at`; `None` if they are not all there.
+/// Returns the contents of the segment whose length is at `at`; `None` if the segment is cut off.
 fn segment(bytes: &[u8], at: usize) -> Option<&[u8]> {
     let length = u16::from_be_bytes([*bytes.get(at)?, *bytes.get(at + 1)?]);
     bytes.get(at + 2..at + usize::from(length).max(2))
 }
 
-/// Returns where the data of a scan ends: at the first marker that is not a restart.
+/// Returns the end of the data of a scan: the first marker that is not a restart.
 fn end_of_scan(bytes: &[u8], mut at: usize) -> Option<usize> {
     loop {
         let (marker, after) = next_marker(bytes, at)?;
@@ -89,11 +89,11 @@ fn end_of_scan(bytes: &[u8], mut at: usize) -> Option<usize> {
     }
 }
 
-/// What has been read of the picture.
+/// The headers that have been read.
 #[derive(Default)]
 struct Jpeg {
     frame: Option<Frame>,
-    /// Four tables for first coefficients, four for the others.
+    /// Four tables for first coefficients, four for further coefficients.
     tables: [[Option<Table>; 4]; 2],
     /// Number of units between restarts; 0 without restarts.
     restart_interval: usize,
@@ -117,7 +117,7 @@ struct Component {
 }
 
 impl Jpeg {
-    /// Reads the tables of a segment; `None` if they are none.
+    /// Reads the tables of a segment; `None` if they are not valid.
     fn read_tables(&mut self, mut segment: &[u8]) -> Option<()> {
         while let Some((&[place, ref counts @ ..], rest)) = segment.split_first_chunk::<17>() {
             let count: usize = counts.iter().map(|&count| usize::from(count)).sum();
@@ -129,7 +129,7 @@ impl Jpeg {
         Some(())
     }
 
-    /// Notes the components of a scan. In a sequential picture, counts its codes.
+    /// Marks the components of a scan as scanned. In a sequential picture, counts the codes of the scan.
     fn read_scan(&mut self, header: &[u8], data: &[u8]) -> Result<(), &'static str> {
         let frame = self.frame.as_mut().ok_or(DAMAGED)?;
         let (&count, chosen) = header.split_first().ok_or(DAMAGED)?;
@@ -154,7 +154,7 @@ impl Jpeg {
             let blocks = if alone { 1 } else { across * down };
             Some((blocks, table(0, tables >> 4)?, table(1, tables & 15)?))
         };
-        // Motion JPEG leaves out the usual tables.
+        // Motion JPEG omits the standard tables.
         let Some(parts) = parts.into_iter().map(with_tables).collect::<Option<Vec<_>>>() else { return Ok(()) };
         let mut bits = Bits::new(data);
         for unit in 0..width * height {
@@ -170,7 +170,7 @@ impl Jpeg {
         Ok(())
     }
 
-    /// Checks, at the end of the image, that there was data for all of it.
+    /// Checks, at the end of the image, that every component has a scan.
     fn finish(&self) -> Result<(), &'static str> {
         match &self.frame {
             Some(frame) if frame.components.iter().all(|component| component.scanned) => Ok(()),
@@ -181,7 +181,7 @@ impl Jpeg {
 }
 
 impl Frame {
-    /// Reads the header of a frame; `None` if it is none.
+    /// Reads the header of a frame; `None` if it is not valid.
     fn read(segment: &[u8], sequential: bool) -> Option<Self> {
         let (&[_, height_high, height_low, width_high, width_low, count], rest) = segment.split_first_chunk::<6>()?;
         let side = |bytes| usize::from(u16::from_be_bytes(bytes));
@@ -196,19 +196,19 @@ impl Frame {
         is_sound.then_some(Self { sequential, size, components })
     }
 
-    /// Returns the most blocks across and down that a component has in a unit.
+    /// Returns the largest number of blocks across and down of a component in a unit.
     fn most_blocks(&self) -> [usize; 2] {
         let most = |axis: usize| self.components.iter().map(|component| component.blocks[axis]).max().unwrap_or(1);
         [most(0), most(1)]
     }
 
-    /// Returns the number of units across and down, which hold the blocks of all components.
+    /// Returns the number of units across and down; a unit has the blocks of all components.
     fn units(&self) -> [usize; 2] {
         let most = self.most_blocks();
         [0, 1].map(|axis| self.size[axis].div_ceil(8 * most[axis]))
     }
 
-    /// Returns the number of blocks across and down of a component that is alone in its scan: none are beyond its edge.
+    /// Returns the number of blocks across and down of a component that is alone in its scan, which has no blocks beyond its edge.
     fn blocks_of(&self, blocks: [usize; 2]) -> [usize; 2] {
         let most = self.most_blocks();
         [0, 1].map(|axis| (self.size[axis] * blocks[axis]).div_ceil(most[axis]).div_ceil(8))
@@ -250,15 +250,15 @@ mod tests {
     }
 
     #[test]
-    fn whole_pictures_are_whole() {
+    fn complete_pictures_are_accepted() {
         for bytes in [color(37, 21), color(8, 8), color(1, 1), gray(37, 21), gray(16, 8)] {
-            assert_eq!(check(&bytes), Ok(()), "as it was written");
-            assert_eq!(check(&[&bytes[..], b"more"].concat()), Ok(()), "what follows the end does not count");
+            assert_eq!(check(&bytes), Ok(()), "the encoded picture is complete");
+            assert_eq!(check(&[&bytes[..], b"more"].concat()), Ok(()), "bytes after the end are ignored");
         }
     }
 
     #[test]
-    fn a_picture_cut_anywhere_is_not() {
+    fn a_picture_that_is_cut_off_is_refused() {
         for bytes in [color(37, 21), gray(37, 21)] {
             for length in 0..bytes.len() {
                 assert!(check(&bytes[..length]).is_err(), "{length} of {} bytes", bytes.len());
@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn an_end_put_after_the_cut_does_not_hide_it() {
+    fn a_cut_picture_with_an_end_marker_is_refused() {
         for bytes in [color(37, 21), gray(37, 21)] {
             for length in 2..bytes.len() - 2 {
                 let ended = [&bytes[..length], &[0xff, END_OF_IMAGE]].concat();
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn restarts_are_followed() {
+    fn codes_continue_after_restart_markers() {
         let one = gray(8, 8);
         let (frame, scan) = (place(&one, FRAMES[0]), place(&one, SCAN));
         let data = scan + 2 + usize::from(u16::from_be_bytes([one[scan + 2], one[scan + 3]]));
@@ -287,14 +287,14 @@ mod tests {
         header.splice(scan..scan, [0xff, RESTART_INTERVAL, 0, 4, 0, 1]);
         let block = &one[data..one.len() - 2];
         let two = |between: &[u8]| [&header[..], block, between, block, &[0xff, END_OF_IMAGE]].concat();
-        assert_eq!(check(&two(&[0xff, FIRST_RESTART])), Ok(()), "a restart between them");
-        assert_eq!(check(&two(&[])), Err(TOO_SHORT), "no restart");
+        assert_eq!(check(&two(&[0xff, FIRST_RESTART])), Ok(()), "a restart marker separates the blocks");
+        assert_eq!(check(&two(&[])), Err(TOO_SHORT), "a missing restart marker is found");
         let half = [&header[..], block, &[0xff, FIRST_RESTART, 0xff, END_OF_IMAGE]].concat();
-        assert_eq!(check(&half), Err(TOO_SHORT), "one block of two");
+        assert_eq!(check(&half), Err(TOO_SHORT), "a missing block is found");
     }
 
     #[test]
-    fn noise_never_panics() {
+    fn damaged_bytes_never_panic() {
         let good = color(24, 24);
         for seed in 0..400 {
             let mut bytes = good.clone();
@@ -302,7 +302,7 @@ mod tests {
                 let at = at % bytes.len();
                 bytes[at] = bytes[at].wrapping_add((seed % 251) as u8 + 1);
             }
-            // Whole or not, it comes back.
+            // Either result is right.
             let found = check(&bytes);
             assert!(found.is_ok() || found.is_err_and(|reason| reason.ends_with("again")), "seed {seed}: {found:?}");
         }

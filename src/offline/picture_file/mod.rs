@@ -1,10 +1,10 @@
 //! Pictures on disk: the only place where PNG and JPEG files are decoded.
 //!
-//! In: a path, and the largest size that the picture may have. Out: the picture, or a [`PictureError`] that names the file,
-//! the reason and the remedy.
+//! In: a path, and the largest size that the picture may have. Out: the picture, or a [`PictureError`] that names the file, the reason and the
+//! remedy.
 //!
-//! The size is compared before anything is decoded, so that a small file does not cost much time and memory. A JPEG must
-//! be whole, which its decoder does not check (`jpeg`).
+//! The size is compared before decoding, so that a small file cannot take much time and memory. A JPEG must be complete, which its decoder does
+//! not check (`jpeg`).
 
 mod huffman;
 mod jpeg;
@@ -17,13 +17,13 @@ use std::fs::File;
 use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 
-/// Most pixels of a picture that is decoded, whatever size is expected.
+/// Most pixels of a picture that is decoded, for any expected size.
 const MAX_PIXELS: u64 = 1 << 27;
 
 /// Most bytes of a file that is read.
 const MAX_BYTES: u64 = 1 << 30;
 
-/// Why a picture was not decoded.
+/// The reason why a picture was not decoded.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
     /// The file cannot be read.
@@ -34,7 +34,7 @@ pub enum PictureError {
         /// The error of the operating system.
         reason: io::Error,
     },
-    /// The file is no picture, or a damaged one.
+    /// The file is not a picture, or it is damaged.
     #[error("{}: not a readable PNG or JPEG image: {}", .path.display(), .reason.to_string().trim_end())]
     Format {
         /// The file.
@@ -42,15 +42,15 @@ pub enum PictureError {
         /// The error of the decoder.
         reason: ImageError,
     },
-    /// The file ends, but not the picture.
+    /// The file ends before the picture does.
     #[error("{}: not a whole JPEG image: {reason}", .path.display())]
     Incomplete {
         /// The file.
         path: PathBuf,
-        /// What is missing, and the remedy.
+        /// The missing data, and the remedy.
         reason: &'static str,
     },
-    /// The picture is larger than it can be.
+    /// The picture is larger than expected.
     #[error(
         "{}: {} x {} pixels, and at most {} x {} are expected here: scale it, or correct the size in the camera file",
         .path.display(), .size.x, .size.y, .largest.x, .largest.y
@@ -58,12 +58,12 @@ pub enum PictureError {
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// Its width and height, pixels.
+        /// Width and height of the picture, pixels.
         size: UVec2,
         /// The largest width and height accepted.
         largest: UVec2,
     },
-    /// The picture, or its file, is larger than any that is decoded.
+    /// The picture, or its file, is larger than the limit for all pictures.
     #[error("{}: a picture of more than {MAX_PIXELS} pixels or {MAX_BYTES} bytes is not decoded: scale it", .path.display())]
     FarTooLarge {
         /// The file.
@@ -74,7 +74,7 @@ pub enum PictureError {
 /// Returns width and height of a picture, pixels, from its header.
 ///
 /// # Errors
-/// A file that cannot be read or is no picture, and one whose width or height is larger than that of `largest`.
+/// A file that cannot be read or is not a picture, a picture whose width or height is larger than that of `largest`.
 pub fn size(path: &Path, largest: UVec2) -> Result<UVec2, PictureError> {
     let bytes = read(path)?;
     let decoder = reader(path, &bytes)?.into_decoder();
@@ -82,10 +82,10 @@ pub fn size(path: &Path, largest: UVec2) -> Result<UVec2, PictureError> {
     checked_size(path, &decoder, largest)
 }
 
-/// Decodes a picture. Its format follows from the contents of the file, not from its name.
+/// Decodes a picture. The contents of the file determine its format, not its name.
 ///
 /// # Errors
-/// As [`size`], and a picture that is damaged or not whole.
+/// As [`size`], and a picture that is damaged or not complete.
 pub fn open(path: &Path, largest: UVec2) -> Result<DynamicImage, PictureError> {
     let failed = |reason| PictureError::Format { path: path.to_owned(), reason };
     let bytes = read(path)?;
@@ -97,7 +97,7 @@ pub fn open(path: &Path, largest: UVec2) -> Result<DynamicImage, PictureError> {
         jpeg::check(&bytes).map_err(|reason| PictureError::Incomplete { path: path.to_owned(), reason })?;
     }
     if format == Some(ImageFormat::Png) && !png::has_whole_palette(&bytes) {
-        let error = DecodingError::new(ImageFormat::Png.into(), "its palette is not one of whole colours");
+        let error = DecodingError::new(ImageFormat::Png.into(), "its palette has an incomplete color");
         return Err(failed(ImageError::Decoding(error)));
     }
     Limits::default().reserve(decoder.total_bytes()).map_err(failed)?;

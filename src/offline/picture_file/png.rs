@@ -1,14 +1,17 @@
-//! What the decoder of PNG does not check: that the palette is one of whole colors.
+//! The check that the palette of a PNG has complete colors. The decoder does not check it.
 //!
 //! In: the bytes of a file. Out: whether its palette can be used; the decoder panics if not.
 
-/// Bytes of the signature, and of a chunk besides its contents: length, type and checksum.
+/// Bytes of the signature.
 const SIGNATURE: usize = 8;
+/// Bytes of the length of a chunk.
 const LENGTH: usize = 4;
+/// Bytes of the type of a chunk.
 const TYPE: usize = 4;
+/// Bytes of the checksum of a chunk.
 const CHECKSUM: usize = 4;
 
-/// Returns whether every palette has from 1 to 256 whole colors. Chunks after the first that is cut off are not looked at.
+/// Returns whether every palette has from 1 to 256 complete colors. Chunks after the first chunk that is cut off are not read.
 pub(super) fn has_whole_palette(bytes: &[u8]) -> bool {
     let mut rest = bytes.get(SIGNATURE..).unwrap_or_default();
     while let Some((length, after)) = rest.split_first_chunk::<LENGTH>() {
@@ -38,12 +41,18 @@ mod tests {
     }
 
     #[test]
-    fn palettes_have_whole_colors() {
-        assert!(has_whole_palette(&file(&[(b"IHDR", 13), (b"IDAT", 7)])), "no palette");
-        assert!(has_whole_palette(&file(&[(b"IHDR", 13), (b"PLTE", 768), (b"IDAT", 7)])), "256 colors");
+    fn palettes_with_incomplete_colors_are_refused() {
+        assert!(has_whole_palette(&file(&[(b"IHDR", 13), (b"IDAT", 7)])), "a file without a palette is accepted");
+        assert!(
+            has_whole_palette(&file(&[(b"IHDR", 13), (b"PLTE", 768), (b"IDAT", 7)])),
+            "a palette of 256 colors is accepted"
+        );
         for length in [0, 1, 4, 771] {
-            assert!(!has_whole_palette(&file(&[(b"IHDR", 13), (b"PLTE", length)])), "{length} bytes");
+            assert!(
+                !has_whole_palette(&file(&[(b"IHDR", 13), (b"PLTE", length)])),
+                "a palette of {length} bytes is refused"
+            );
         }
-        assert!(has_whole_palette(b"short"), "what is no picture is for the decoder to refuse");
+        assert!(has_whole_palette(b"short"), "a file that is not a picture is refused by the decoder, not here");
     }
 }

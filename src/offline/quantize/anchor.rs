@@ -1,29 +1,29 @@
-//! Temporal means near the time interval, for the packed form, which has one range for all of them.
+//! Temporal means near the time interval, for the packed form, which has one range for all temporal means.
 //!
-//! In: Gaussians, the time interval, timestamp units. Out: the same Gaussians at the same places at all times. Those whose temporal mean was
-//! far from the interval are nearly as opaque as before; those that are never drawn stay so.
+//! In: Gaussians, the time interval, timestamp units. Out: the same Gaussians at the same positions at all times. Gaussians whose temporal mean
+//! was far from the interval have nearly the same opacity as before; Gaussians that are never drawn are still never drawn.
 //!
-//! Such a Gaussian is seen on a flank of its marginal, where one nearer with the same value and slope in the middle of the interval differs
-//! in curvature alone. The temporal mean moves by whole intervals, since the time harmonics repeat after each. Colors are seen from the mean,
-//! which moves along: they change where that is much of the way to the camera.
+//! In the interval, such a Gaussian shows a flank of its marginal. A marginal with a nearer mean, of the same value and slope in the middle of
+//! the interval, differs in curvature alone. The temporal mean moves by whole intervals, the period of the time harmonics. Colors are evaluated
+//! in the direction of the mean, which moves too: they change where the mean moves by much of the distance to the camera.
 
 use crate::gaussian::{Gaussian, MARGINAL_CUTOFF};
 use rayon::prelude::*;
 
-/// Temporal means up to so many lengths of the time interval from its middle stay as they are.
+/// Temporal means up to this distance from the middle of the time interval are not moved, lengths of the interval.
 const FAR: f64 = 4.0;
-/// Others are moved no closer than to so many.
+/// Least distance of moved temporal means, lengths of the interval.
 const NEAR: f64 = 0.5;
-/// How much a marginal may change by its curvature, as a share of itself, if it may be as near as that allows.
+/// Largest relative change of a marginal by its curvature, within the limits of the distance.
 const CHANGE: f64 = 0.002;
-/// Standard deviations in time become at most so many lengths of the interval, from where on they differ little: they have one range, too.
+/// Largest temporal deviation, lengths of the interval: the packed form has one range for all, and longer deviations look nearly the same.
 const LONG: f64 = 1000.0;
 
 /// Moves temporal means that are far from the interval close to it.
 pub(super) fn move_near(gaussians: &mut [Gaussian], interval: [f32; 2]) {
     let [start, end] = interval.map(f64::from);
     let (middle, span) = (0.5 * (start + end), end - start);
-    // A still has no length.
+    // The interval of a still has no length.
     if span > 0.0 {
         gaussians.par_iter_mut().for_each(|gaussian| move_one(gaussian, middle, span));
     }
@@ -36,11 +36,11 @@ fn move_one(gaussian: &mut Gaussian, middle: f64, span: f64) {
         return;
     }
     let sigma_t = f64::from(gaussian.sigma_t);
-    // At the ends of the interval, the logarithm of the marginal differs by an eighth of its slope times span² / near. A mean that is near
-    // has a small error of its velocity to go back.
+    // At the ends of the interval, the logarithm of the marginal differs by slope × span² / (8 near). A near mean multiplies rounding errors
+    // of the velocity by a short time.
     let slope = distance / (sigma_t * sigma_t);
     let nearest = (slope * span * span / (8.0 * CHANGE)).clamp(NEAR * span, (FAR - 1.0) * span);
-    // Exact but for distances that no interval makes a difference to.
+    // A whole number of intervals, except for distances so large that an interval is less than their rounding.
     let near = (distance - ((distance - nearest) / span).floor() * span).clamp(nearest, nearest + span);
     let largest_marginal = (-0.5 * ((distance - 0.5 * span) / sigma_t).powi(2)).exp();
     gaussian.mean_t = (middle + near.copysign(away)) as f32;
@@ -52,7 +52,7 @@ fn move_one(gaussian: &mut Gaussian, middle: f64, span: f64) {
     if sigma_t.is_finite() {
         let sigma_near = (sigma_t * (near / distance).sqrt()).min(LONG * span);
         gaussian.sigma_t = sigma_near as f32;
-        // The ratio of the two marginals in the middle.
+        // The ratio of the two marginals in the middle of the interval.
         let ratio = (0.5 * (near / sigma_near).powi(2) - 0.5 * (distance / sigma_t).powi(2)).exp();
         gaussian.opacity = (gaussian.opacity * ratio as f32).min(1.0);
     }
@@ -85,14 +85,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_near_stays_as_it_is() {
+    fn temporal_means_near_the_interval_are_not_moved() {
         for (mean_t, interval) in [(-3.4, [0.0, 1.0]), (0.5, [0.0, 1.0]), (25.0, [0.0, 6.0]), (900.0, [5.0, 5.0])] {
-            assert_eq!(moved(mean_t, 2.0, interval), gaussian(mean_t, 2.0), "{mean_t}");
+            assert_eq!(moved(mean_t, 2.0, interval), gaussian(mean_t, 2.0), "a temporal mean of {mean_t} is not moved");
         }
     }
 
     #[test]
-    fn places_stay_and_opacities_nearly() {
+    fn moved_gaussians_keep_positions_and_nearly_keep_opacities() {
         for (mean_t, sigma_t, error) in [(150.0, 179.0, 2e-3), (-40.0, 30.0, 2e-3), (5.0, 3.0, 5e-3), (5e4, 1e5, 1e-4)]
         {
             let (before, after) = (gaussian(mean_t, sigma_t), moved(mean_t, sigma_t, [0.0, 1.0]));
@@ -110,31 +110,31 @@ mod tests {
     }
 
     #[test]
-    fn what_is_never_drawn_stays_so() {
+    fn gaussians_that_are_never_drawn_become_transparent() {
         for mean_t in [-3e38, -7.0, 1e6] {
             let after = moved(mean_t, 1.0, [0.0, 1.0]);
-            assert_eq!(after.opacity, 0.0, "{mean_t}");
-            assert!(after.check().is_ok(), "{mean_t}: {after:?}");
+            assert_eq!(after.opacity, 0.0, "{mean_t} is never drawn");
+            assert!(after.check().is_ok(), "{mean_t} is still valid: {after:?}");
         }
     }
 
     #[test]
     fn deviations_stay_close_to_a_very_short_interval() {
-        // One that is drawn all the time, one that is never drawn.
+        // A Gaussian that is drawn all the time, and one that is never drawn.
         for (mean_t, sigma_t, opacity) in [(0.1, 0.2, 0.794), (7.0, 1.0, 0.0)] {
             let after = moved(mean_t, sigma_t, [0.0, 1e-30]);
-            assert!(after.sigma_t <= 1.1e-27 && after.check().is_ok(), "{after:?}");
+            assert!(after.sigma_t <= 1.1e-27 && after.check().is_ok(), "the deviation is limited: {after:?}");
             let shown = after.opacity * after.marginal(5e-31);
-            assert!((shown - opacity).abs() < 1e-3, "{mean_t}: {shown}");
+            assert!((shown - opacity).abs() < 1e-3, "{mean_t}: alpha {shown} is {opacity}");
         }
     }
 
     #[test]
-    fn what_is_always_there_stays_so() {
+    fn gaussians_of_constant_opacity_keep_it() {
         let before = Gaussian { velocity: [0.0; 3], ..gaussian(1e6, f32::INFINITY) };
         let mut after = [before];
         move_near(&mut after, [0.0, 1.0]);
-        assert_eq!(after[0], Gaussian { mean_t: after[0].mean_t, ..before });
-        assert!(after[0].mean_t <= 4.5);
+        assert_eq!(after[0], Gaussian { mean_t: after[0].mean_t, ..before }, "only the temporal mean is moved");
+        assert!(after[0].mean_t <= 4.5, "it is near the interval: {}", after[0].mean_t);
     }
 }

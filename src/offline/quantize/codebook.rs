@@ -1,8 +1,8 @@
-//! Codebooks: residual vector quantization of color, in which each codebook codes what the previous ones leave.
+//! Codebooks: residual vector quantization of color, in which each codebook codes the residuals of the previous codebooks.
 //!
-//! In: rows of coefficients and a weight for each. Out: [`Centers`], a code into each codebook for every row, and the same as
+//! In: rows of coefficients and a weight for each row. Out: [`Centers`], with a code into each codebook for every row, and the same entries as
 //! [`Codebooks`] of signed bytes. Seeds are k-means++, refined by Lloyd's steps on a sample; once every row has its codes, all entries are fitted
-//! again to all rows. The same input gives the same result, whatever the number of threads.
+//! again to all rows. The result does not depend on the number of threads.
 
 use ndarray::{Array1, Array2, ArrayView2, Axis, s};
 use rayon::prelude::*;
@@ -11,11 +11,11 @@ use rayon::prelude::*;
 const SAMPLE: usize = 24_576;
 /// Number of Lloyd's steps.
 const STEPS: usize = 8;
-/// Times that all entries are fitted again to the residuals of their rows. Gains 0.4 to 0.6 dB at no cost in bytes.
+/// Number of times that all entries are fitted again to the residuals of their rows, which gains 0.4 to 0.6 dB without any bytes.
 const REFITS: usize = 2;
 /// Rows assigned at a time.
 const BLOCK: usize = 512;
-/// Most seeds drawn at a time: distances to many are computed much faster together.
+/// Most seeds drawn at a time: distances to many seeds are computed much faster together.
 const SEEDS: usize = 64;
 
 /// Codebooks whose entries add up, in single precision.
@@ -39,13 +39,13 @@ pub struct Codebooks {
 }
 
 impl Centers {
-    /// Trains one codebook after another over `data`, rows × columns, with these numbers of entries (at most 65,536
-    /// each). `weights` has a weight for each row, none of them negative. Calls `done` after each codebook.
+    /// Trains one codebook after another over `data`, rows × columns, with these numbers of entries (at most 65,536 each). `weights` has a weight
+    /// for each row, not negative. Calls `done` after each codebook.
     ///
     /// # Panics
     /// If there are fewer weights than rows.
     pub fn train(mut data: Array2<f32>, weights: &[f32], entries: &[usize], mut done: impl FnMut()) -> Self {
-        // From here on `data` has the residuals of the rows.
+        // From here on, `data` contains the residuals of the rows.
         let mut stages: Vec<(Array2<f32>, Vec<u32>)> = Vec::new();
         for (stage, &count) in entries.iter().enumerate() {
             let count = count.min(data.nrows()).clamp(1, 1 << 16);
@@ -94,7 +94,7 @@ fn subtract(data: &mut Array2<f32>, centers: &Array2<f32>, codes: &[u32]) {
     });
 }
 
-/// Returns the weighted mean of the rows of each code, zero if they have no weight, and the sum of their weights.
+/// Returns the weighted mean of the rows of each code, zero if the sum of their weights is zero, and that sum.
 fn means(data: ArrayView2<'_, f32>, weights: &[f32], codes: &[u32], count: usize) -> (Array2<f32>, Vec<f64>) {
     let mut sums = Array2::<f64>::zeros((count, data.ncols()));
     let mut totals = vec![0.0f64; count];
@@ -150,7 +150,7 @@ fn centers(data: &Array2<f32>, weights: &[f32], count: usize, seed: u64) -> Arra
         let codes = assign(sample.view(), &centers);
         let (means, totals) = means(sample.view(), &weights, &codes, count);
         for (index, total) in totals.into_iter().enumerate() {
-            // A center without rows stays where it is.
+            // A center without rows does not move.
             if total > 0.0 {
                 centers.row_mut(index).assign(&means.row(index));
             }
@@ -159,7 +159,7 @@ fn centers(data: &Array2<f32>, weights: &[f32], count: usize, seed: u64) -> Arra
     centers
 }
 
-/// Returns rows to train on with their weights: all, or one at a random place in each of [`SAMPLE`] equal stretches.
+/// Returns rows to train on with their weights: all rows, or a random row of each of [`SAMPLE`] equal ranges.
 fn sample(data: &Array2<f32>, weights: &[f32], random: &mut Random) -> (Array2<f32>, Vec<f32>) {
     let rows = data.nrows();
     if rows <= SAMPLE {
@@ -174,8 +174,8 @@ fn sample(data: &Array2<f32>, weights: &[f32], random: &mut Random) -> (Array2<f
     (data.select(Axis(0), &chosen), chosen.iter().map(|&row| weights[row]).collect())
 }
 
-/// Returns seeds by k-means++: each is drawn by weight times squared distance to the previous seeds. If there are many,
-/// those that are drawn together do not see each other.
+/// Returns seeds by k-means++: each seed is drawn by weight times squared distance to the previous seeds. Many seeds are drawn in groups;
+/// distances between the seeds of a group are ignored.
 fn seeds(sample: &Array2<f32>, weights: &[f32], count: usize, random: &mut Random) -> Array2<f32> {
     let mut seeds = Array2::zeros((count, sample.ncols()));
     let handful = (count / 32).clamp(1, SEEDS);
@@ -245,14 +245,17 @@ mod tests {
     }
 
     #[test]
-    fn each_codebook_leaves_less() {
+    fn every_further_codebook_lowers_the_error() {
         let data = data(3_000, 9);
         let weights = vec![1.0; 3_000];
         let errors: Vec<f64> = (1..=3)
             .map(|n| error(&data, &Centers::train(data.clone(), &weights, &vec![16; n], || {}).quantized()))
             .collect();
         assert!(errors[0] < 0.02, "sixteen entries find thirteen clusters: {errors:?}");
-        assert!(errors[1] < 0.9 * errors[0] && errors[2] < 0.9 * errors[1], "the rest is coded too: {errors:?}");
+        assert!(
+            errors[1] < 0.9 * errors[0] && errors[2] < 0.9 * errors[1],
+            "further codebooks code the residuals: {errors:?}"
+        );
     }
 
     #[test]
@@ -260,11 +263,14 @@ mod tests {
         let weights: Vec<f32> = (0..2_000).map(|i| (i % 5) as f32).collect();
         let train = || Centers::train(data(2_000, 12), &weights, &[32, 32], || {}).quantized();
         let (a, b) = (train(), train());
-        assert!(a.codes == b.codes && a.entries == b.entries && a.scales == b.scales, "deterministic");
+        assert!(
+            a.codes == b.codes && a.entries == b.entries && a.scales == b.scales,
+            "both runs give the same codebooks"
+        );
     }
 
     #[test]
-    fn rows_that_count_more_fit_better() {
+    fn rows_of_more_weight_fit_better() {
         let data = data(2_600, 6);
         let heavy = |row: usize| row % 13 == 4;
         let weights: Vec<f32> = (0..2_600).map(|row| if heavy(row) { 100.0 } else { 0.01 }).collect();
@@ -279,10 +285,13 @@ mod tests {
     }
 
     #[test]
-    fn few_or_equal_rows_are_no_trouble() {
+    fn no_rows_and_equal_rows_are_coded() {
         let none = Centers::train(Array2::zeros((0, 5)), &[], &[8, 8], || {}).quantized();
-        assert!(none.codes.is_empty(), "nothing to code");
+        assert!(none.codes.is_empty(), "no rows give no codebook");
         let equal = Centers::train(Array2::zeros((3, 5)), &[0.0; 3], &[8], || {}).quantized();
-        assert!(equal.codes[0].len() == 3 && equal.entries[0].nrows() == 3, "no more entries than rows");
+        assert!(
+            equal.codes[0].len() == 3 && equal.entries[0].nrows() == 3,
+            "a codebook has at most one entry for each row"
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! The order in which packed Gaussians are stored: neighbors in space beside each other.
+//! The order in which packed Gaussians are stored: neighbors in space follow each other.
 //!
 //! In: means. Out: a permutation by Morton code (Z-order), so that blocks have small boxes and columns compress.
 
@@ -41,14 +41,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn spreading_leaves_room_for_two_more_axes() {
+    fn spreading_moves_bit_i_to_bit_3_i() {
         for bit in 0..21 {
             assert_eq!(spread(1 << bit), 1 << (3 * bit), "bit {bit}");
         }
     }
 
     #[test]
-    fn the_order_is_a_permutation_of_neighbours() {
+    fn the_order_is_a_permutation_in_which_neighbors_are_close() {
         let at = |i: usize| Gaussian {
             mean: [(i * 37 % 50) as f32, (i * 91 % 50) as f32, (i * 13 % 50) as f32],
             ..bytemuck::Zeroable::zeroed()
@@ -57,13 +57,13 @@ mod tests {
         let order = morton_order(&gaussians);
         let mut sorted = order.clone();
         sorted.sort_unstable();
-        assert!(sorted.into_iter().eq(0..2_000), "each index once");
+        assert!(sorted.into_iter().eq(0..2_000), "each index occurs once");
         let step = |a: u32, b: u32| {
             let (a, b) = (gaussians[a as usize].mean, gaussians[b as usize].mean);
             (0..3).map(|axis| (a[axis] - b[axis]).abs()).sum::<f32>()
         };
         let along = |order: &[u32]| order.windows(2).map(|pair| step(pair[0], pair[1])).sum::<f32>();
         let stored: Vec<u32> = (0..2_000).collect();
-        assert!(along(&order) < 0.4 * along(&stored), "neighbours stand beside each other");
+        assert!(along(&order) < 0.4 * along(&stored), "neighbors in space follow each other");
     }
 }

@@ -1,7 +1,7 @@
 //! Activity of Gaussians over time: the data of the three plots in the paper's Figure 2.
 //!
-//! In: runtime Gaussians before and after. Out: the distribution of their temporal variances, the share that is active
-//! at each time, and the overlap of each active set with the first one.
+//! In: runtime Gaussians before and after. Out: the distribution of their temporal variances, the fraction that is active at each time, and the
+//! overlap of each active set with the first set.
 
 use crate::gaussian::{Gaussian, MARGINAL_CUTOFF};
 use crate::scene::TemporalFilter;
@@ -10,26 +10,26 @@ use serde::Serialize;
 /// Number of bins of the histogram.
 const BINS: usize = 40;
 
-/// Shares of the Gaussians by temporal variance Σ_t, in bins of equal width on a logarithmic scale.
+/// Fractions of the Gaussians by temporal variance Σ_t, in bins of equal width on a logarithmic scale.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VarianceHistogram {
-    /// Borders of the bins, timestamp units squared; one more than there are bins.
+    /// Borders of the bins, timestamp units squared; one more than the number of bins.
     pub borders: Vec<f64>,
-    /// Share of the Gaussians in each bin before.
+    /// Fraction of the Gaussians in each bin before.
     pub before: Vec<f64>,
-    /// Share of the Gaussians in each bin after.
+    /// Fraction of the Gaussians in each bin after.
     pub after: Vec<f64>,
 }
 
 impl VarianceHistogram {
-    /// Computes the histogram. Gaussians that are always active have no finite variance and are in no bin.
+    /// Computes the histogram. Gaussians that are always active have an infinite variance and are in no bin.
     pub fn of(before: &[Gaussian], after: &[Gaussian]) -> Self {
         let variance = |g: &Gaussian| f64::from(g.sigma_t).powi(2).log10();
         let all = before.iter().chain(after).map(variance).filter(|v| v.is_finite());
         let [low, high] = all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
         let (low, high) = if low < high { (low, high) } else { (-4.0, 1.0) };
         let width = (high - low) / BINS as f64;
-        let shares = |gaussians: &[Gaussian]| {
+        let fractions = |gaussians: &[Gaussian]| {
             let mut bins = vec![0.0; BINS];
             for value in gaussians.iter().map(variance).filter(|v| v.is_finite()) {
                 let bin = (((value - low) / width) as usize).min(BINS - 1);
@@ -39,23 +39,23 @@ impl VarianceHistogram {
         };
         Self {
             borders: (0..=BINS).map(|i| 10f64.powf(low + width * i as f64)).collect(),
-            before: shares(before),
-            after: shares(after),
+            before: fractions(before),
+            after: fractions(after),
         }
     }
 }
 
-/// The active Gaussians over time: their share, and the overlap of the active sets.
+/// The active Gaussians over time: their fraction, and the overlap of the active sets.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Activity {
-    /// Share of the Gaussians whose marginal exceeds the cut-off, at each time.
+    /// Fraction of the Gaussians whose marginal exceeds the cut-off, at each time.
     pub share: Vec<f64>,
-    /// Intersection over union of that set with the one at the first time.
+    /// Intersection over union of the active set with that at the first time.
     pub overlap: Vec<f64>,
 }
 
 impl Activity {
-    /// Computes share and overlap at each of `times`.
+    /// Computes fraction and overlap at each of `times`.
     pub fn of(gaussians: &[Gaussian], times: &[f32]) -> Self {
         let active = |time: f32| gaussians.iter().map(move |g| g.marginal(time) > MARGINAL_CUTOFF);
         let first: Vec<bool> = times.first().map(|&time| active(time).collect()).unwrap_or_default();
@@ -74,17 +74,17 @@ impl Activity {
     }
 }
 
-/// Returns the share of the Gaussians that a filter leaves active, at each time.
+/// Returns the fraction of the Gaussians that a filter leaves active, at each time.
 ///
 /// # Panics
 /// If the filter has no segments.
 pub fn filter_shares(filter: &TemporalFilter, interval: [f32; 2], times: &[f32]) -> Vec<f64> {
-    let share = |segment: u32| {
+    let fraction = |segment: u32| {
         let active = (0..filter.count).filter(|&index| filter.is_active(segment, index)).count();
         active as f64 / filter.count.max(1) as f64
     };
-    let shares: Vec<f64> = (0..filter.segments).map(share).collect();
-    times.iter().map(|&time| shares[filter.segment_of(time, interval) as usize]).collect()
+    let fractions: Vec<f64> = (0..filter.segments).map(fraction).collect();
+    times.iter().map(|&time| fractions[filter.segment_of(time, interval) as usize]).collect()
 }
 
 /// Returns `count` evenly spaced times, both ends of the interval included.
@@ -102,21 +102,36 @@ mod tests {
     }
 
     #[test]
-    fn shares_sum_to_one_without_the_static_ones() {
+    fn fractions_of_the_histogram_leave_out_gaussians_of_infinite_variance() {
         let before = [gaussian(0.0, 0.1), gaussian(0.0, 0.01), gaussian(0.0, 1.0), gaussian(0.0, f32::INFINITY)];
         let histogram = VarianceHistogram::of(&before, &before[..1]);
-        assert_eq!(histogram.borders.len(), BINS + 1, "borders of the bins");
-        assert!((histogram.before.iter().sum::<f64>() - 0.75).abs() < 1e-12, "three of four have a variance");
-        assert!((histogram.after.iter().sum::<f64>() - 1.0).abs() < 1e-12, "one of one");
-        assert!((histogram.borders[0] - 1e-4).abs() < 1e-7, "the smallest variance: {}", histogram.borders[0]);
+        assert_eq!(histogram.borders.len(), BINS + 1, "one border more than bins");
+        assert!(
+            (histogram.before.iter().sum::<f64>() - 0.75).abs() < 1e-12,
+            "three of four Gaussians have a finite variance"
+        );
+        assert!((histogram.after.iter().sum::<f64>() - 1.0).abs() < 1e-12, "the only Gaussian is in a bin");
+        assert!(
+            (histogram.borders[0] - 1e-4).abs() < 1e-7,
+            "the first border is the smallest variance: {}",
+            histogram.borders[0]
+        );
     }
 
     #[test]
     fn overlap_starts_at_one_and_ends_with_the_first_set() {
         let gaussians = [gaussian(0.0, 0.1), gaussian(1.0, 0.1), gaussian(0.5, 10.0)];
         let activity = Activity::of(&gaussians, &even_times([0.0, 1.0], 3));
-        assert_eq!(activity.overlap, [1.0, 0.5, 1.0 / 3.0], "the long-lived one alone stays");
-        assert!((activity.share[1] - 1.0 / 3.0).abs() < 1e-12, "only that one in the middle: {:?}", activity.share);
-        assert!((activity.share[0] - 2.0 / 3.0).abs() < 1e-12, "two at the start: {:?}", activity.share);
+        assert_eq!(activity.overlap, [1.0, 0.5, 1.0 / 3.0], "only the Gaussian of long lifespan is active throughout");
+        assert!(
+            (activity.share[1] - 1.0 / 3.0).abs() < 1e-12,
+            "one of three is active in the middle: {:?}",
+            activity.share
+        );
+        assert!(
+            (activity.share[0] - 2.0 / 3.0).abs() < 1e-12,
+            "two of three are active at the start: {:?}",
+            activity.share
+        );
     }
 }

@@ -1,6 +1,6 @@
 //! Scores on disk: one little-endian float32 for each Gaussian, in the order of the scene.
 //!
-//! In: a path and the scores, or the number of Gaussians. Out: the file, or the scores in it.
+//! In: a path, and the scores or the number of Gaussians. Out: the file, or its scores.
 
 use crate::codec::CodecError;
 use crate::offline::{OfflineError, write_beside};
@@ -17,7 +17,7 @@ pub fn write_scores(path: &Path, scores: &[f32]) -> Result<(), CodecError> {
     write_beside(path, |file| file.write_all(&bytes))
 }
 
-/// Reads the scores of `count` Gaussians, to prune by.
+/// Reads the scores of `count` Gaussians, for pruning.
 ///
 /// # Errors
 /// A file that cannot be read, has another length, or has a value that is not finite.
@@ -38,7 +38,7 @@ pub fn read_scores(path: &Path, count: usize) -> Result<Vec<f32>, OfflineError> 
     }
 }
 
-/// Reads the scores of `count` Gaussians, to weigh their colors by.
+/// Reads the scores of `count` Gaussians, as weights of their colors.
 ///
 /// # Errors
 /// A file that cannot be read, has another length, or has a value that is negative or not finite.

@@ -1,7 +1,7 @@
 //! Scoring views on the GPU, with the renderer's own passes.
 //!
-//! In: a finished frame of a [`Headless`] renderer. Out: the contribution of each Gaussian to it ([`ViewScore`]),
-//! summed without float atomics, so that every run gives the same result.
+//! In: a finished frame of a [`Headless`] renderer. Out: the contribution of each Gaussian to the frame ([`ViewScore`]), summed without float
+//! atomics, so that every run gives the same result.
 
 use super::{ScoreEngine, ScoreError, ViewScore, Want};
 use crate::renderer::bind::{Bind, group_layout, pipeline};
@@ -70,7 +70,7 @@ impl Scorer {
     /// Draws the view and scores it.
     ///
     /// # Errors
-    /// If the picture or the pairs do not fit the device, or it is lost.
+    /// If the picture or the pairs do not fit the device, or the device is lost.
     pub fn score(
         &mut self,
         headless: &mut Headless,
@@ -165,7 +165,7 @@ impl<'a> GpuEngine<'a> {
 }
 
 impl ScoreEngine for GpuEngine<'_> {
-    /// Computes all sums in any case: `want` has no effect.
+    /// Always computes all sums: `want` has no effect.
     fn score(&mut self, view: &View, _want: Want) -> Result<ViewScore, ScoreError> {
         self.scorer
             .score(self.headless, &self.capture, view, self.background)

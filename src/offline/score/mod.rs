@@ -24,7 +24,7 @@ use variant::Variant;
 
 /// Scores views of a scene: the CPU reference or the GPU.
 pub trait ScoreEngine {
-    /// Scores one view. The vectors of the result are indexed as the scene.
+    /// Scores one view. The vectors of the result have the order of the scene.
     ///
     /// # Errors
     /// [`ScoreError::Engine`].
@@ -36,7 +36,7 @@ pub trait ScoreEngine {
 pub struct CpuEngine<'a> {
     /// The scene to score.
     pub scene: &'a RuntimeScene,
-    /// The background behind it.
+    /// The background behind the scene.
     pub background: Background,
 }
 
@@ -52,13 +52,13 @@ pub enum ScoreError {
     /// No view was given.
     #[error("there are no training views to score with: pass a dataset whose transforms_train.json lists some")]
     NoViews,
-    /// No Gaussian contributes to any view: the views are not of this scene.
+    /// No Gaussian contributes to any view, as with views of another scene.
     #[error(
         "no Gaussian contributes to any training view: does this data belong to the checkpoint? (its cameras look elsewhere, or its \
          times lie outside the time interval)"
     )]
     NothingContributes,
-    /// The variant needs scales that a sliced scene no longer has.
+    /// The variant needs scales, which a sliced scene does not have.
     #[error(
         "the score `{variant}` needs the volume of the Gaussians, which the runtime form no longer tells: score the checkpoint, or choose \
          one of {}",
@@ -79,7 +79,7 @@ pub enum ScoreError {
 pub struct ScoreSettings {
     /// Power of the volume in `γ = (V / V_ref)^power`; 0 leaves the volume out. Default: 0.1.
     pub volume_power: f64,
-    /// `V_ref` is the volume at this share of all volumes sorted from the largest down, 0 to 1. Default: 0.9.
+    /// Rank of `V_ref` among all volumes in descending order, as a fraction of their number, 0 to 1. Default: 0.9.
     pub volume_rank: f64,
 }
 
@@ -92,23 +92,23 @@ impl Default for ScoreSettings {
 /// Upper limit of the variance, timestamp units squared.
 const LONGEST: f64 = 1e24;
 
-/// Properties of the Gaussians that scores depend on beside their contributions.
+/// Properties of the Gaussians on which scores depend besides the contributions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Traits {
-    /// Temporal mean (timestamp units) and variance (timestamp units squared) of each.
+    /// Temporal mean (timestamp units) and variance (timestamp units squared) of each Gaussian.
     moments: Vec<[f64; 2]>,
     /// Logarithm of the product of the activated scales; `None` unless the scene is in the trained form.
     log_volume: Option<Vec<f64>>,
 }
 
 impl Traits {
-    /// Reads them from a scene of any form.
+    /// Reads the properties from a scene of any form.
     ///
     /// # Errors
     /// The first Gaussian that cannot be drawn.
     pub fn of(scene: &GaussianScene) -> Result<Self, InvalidGaussian> {
-        // If no Gaussian ever fades, all have the same variance, and any number is right for which the sums stay
-        // finite.
+        // A Gaussian of constant opacity has an infinite variance, which is limited so that sums are finite. If all Gaussians have it, the limit
+        // has no effect.
         let moments = sliced(scene)?
             .iter()
             .map(|gaussian| [f64::from(gaussian.mean_t), f64::from(gaussian.sigma_t).powi(2).min(LONGEST)])
@@ -152,7 +152,7 @@ fn log_volumes(parameters: &Parameters) -> Vec<f64> {
 /// full       = Σ_t change γ C_t               full-norm2 = sqrt Σ_t (change γ C_t)²         full-peak = max_t change γ C_t
 /// temporal   = Σ_views change γ               first-derivative: full with p' = −(t − μ_t)/v p in place of p''
 /// sigma      = Σ_t v γ C_t
-/// energy     = sqrt Σ_views Σ_pixels c²       removal    = sqrt Σ_views Σ_pixels |c (colour − behind)|²
+/// energy     = sqrt Σ_views Σ_pixels c²       removal    = sqrt Σ_views Σ_pixels |c (color − behind)|²
 /// energy-removal = sqrt(energy · removal)
 /// ```
 #[derive(Debug, Clone)]
@@ -162,7 +162,7 @@ pub struct Scores {
 }
 
 impl Scores {
-    /// Scores every view once, those of one time together. Advances the caller's task once for each view.
+    /// Scores every view once, views of one time together. Advances the caller's task once for each view.
     ///
     /// # Errors
     /// No views, views that show nothing of the scene, a failure of the engine.
@@ -214,12 +214,12 @@ impl Scores {
         Ok(self.sums.iter().map(|sum| sum.value(variant) as f32).collect())
     }
 
-    /// Returns whether the volume of the Gaussians is known, which some variants need.
+    /// Returns whether the volume of the Gaussians, which some variants need, is known.
     pub fn has_volume(&self) -> bool {
         self.has_volume
     }
 
-    /// Returns how many Gaussians contribute to at least one view.
+    /// Returns the number of Gaussians that contribute to at least one view.
     pub fn contributing(&self) -> usize {
         self.sums.iter().filter(|sum| sum.spatial > 0.0).count()
     }
@@ -248,7 +248,7 @@ struct Sums {
 }
 
 impl Sums {
-    /// Adds the views of one time: their number, and the sum of the contributions of the Gaussian to them.
+    /// Adds the views of one time: their number, and the sum of the contributions of the Gaussian to these views.
     fn add_moment(&mut self, time: f64, views: f64, [mean, variance]: [f64; 2], volume: f64, contribution: f64) {
         let distance = time - mean;
         let marginal = (-0.5 * distance * distance / variance).exp();

@@ -13,25 +13,25 @@ use glam::{UVec2, Vec2, Vec3};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Which sums to compute for a view.
+/// The sums to compute for a view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Want {
-    /// `contribution` and `energy`: one pass front to back. `removal` stays empty.
+    /// `contribution` and `energy`, in one pass front to back. `removal` is empty.
     Contribution,
-    /// `removal` too: a second pass, once the final picture is known.
+    /// `removal` too, in a second pass, once the final picture is known.
     Removal,
 }
 
-/// The contributions of every Gaussian of a scene to one picture. Indexed as the scene; 0 for Gaussians that are not
-/// blended. Default: empty.
+/// The contributions of every Gaussian of a scene to one picture, in the order of the scene; 0 for Gaussians that are not blended. Default:
+/// empty.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ViewScore {
-    /// Σ c over pixels. Above 0 exactly if the Gaussian was blended into some pixel.
+    /// Σ c over pixels. Above 0 if and only if the Gaussian was blended into a pixel.
     pub contribution: Vec<f32>,
     /// Σ c² over pixels.
     pub energy: Vec<f32>,
-    /// Σ (c (colour − B))² over pixels and channels, B the colour behind the Gaussian at that pixel, background
-    /// included: the squared change of the picture if it were removed. Exact wherever the pixel does not stop early.
+    /// Σ (c (color − B))² over pixels and channels, B the color behind the Gaussian at that pixel, background included: the squared change of the
+    /// picture if the Gaussian were removed. Exact at pixels that do not stop early.
     /// Empty with [`Want::Contribution`].
     pub removal: Vec<f32>,
 }
@@ -119,7 +119,7 @@ struct Tile {
     /// Transmittance; negated once the pixel has stopped.
     transmittance: [f32; PIXELS],
     color: [Vec3; PIXELS],
-    /// Pixels of each row that have not stopped.
+    /// Number of pixels of each row that have not stopped.
     live: [usize; SIDE],
 }
 
@@ -128,9 +128,9 @@ struct Blended {
     pixel: usize,
     /// α T.
     weight: f32,
-    /// Transmittance after it.
+    /// Transmittance after the splat.
     transmittance: f32,
-    /// Colour of the pixel after it, without the background.
+    /// Color of the pixel after the splat, without the background.
     color: Vec3,
 }
 
@@ -148,8 +148,7 @@ impl Tile {
         }
     }
 
-    /// Blends the splats of the tile in order, each into all pixels that it reaches. Calls `each` with the index of the
-    /// pair.
+    /// Blends the splats of the tile in order, each into all pixels that it reaches. Calls `each` with the index of the pair.
     fn blend(mut self, splats: &[Splat], pairs: &[Pair], mut each: impl FnMut(usize, &Splat, &Blended)) -> Self {
         for (number, pair) in pairs.iter().enumerate() {
             if self.live.iter().all(|&live| live == 0) {
@@ -190,7 +189,7 @@ impl Tile {
         }
     }
 
-    /// Returns the final colours, composited over `behind`.
+    /// Returns the final colors, composited over `behind`.
     fn over(self, behind: &impl Fn(u32, u32) -> Vec3) -> [Vec3; PIXELS] {
         let mut color = self.color;
         for row in 0..self.height {
@@ -204,14 +203,13 @@ impl Tile {
     }
 }
 
-/// The region where the alpha of a splat can reach 1/255: the inside of an ellipse. Pixels outside are skipped, pixels
-/// inside are tested.
+/// The region in which the alpha of a splat can reach 1/255: an ellipse. Pixels outside are skipped, pixels inside are tested.
 struct Reach {
     center: f64,
     conic: [f64; 3],
     /// Bound of `dᵀ conic d`.
     energy: f64,
-    /// Whether the conic is that of an ellipse.
+    /// Whether the conic describes an ellipse.
     bounded: bool,
 }
 
@@ -228,7 +226,7 @@ impl Reach {
         }
     }
 
-    /// Returns the columns of a row at height `dy` below the centre, of a tile that begins at pixel `first`.
+    /// Returns the columns of a row at height `dy` below the center, of a tile that begins at pixel `first`.
     fn columns(&self, dy: f32, first: u32, width: usize) -> Range<usize> {
         if !self.bounded {
             return 0..width;

@@ -12,13 +12,13 @@ use std::str::FromStr;
 pub enum Variant {
     /// Contribution to the pixels, `Σ c`.
     Spatial,
-    /// The paper's factor for how slowly opacity changes, times the one for volume, at the times of all views.
+    /// The paper's factor for slow changes of opacity, times the factor for volume, at the times of all views.
     Temporal,
     /// The paper's score: `spatial` with both factors.
     Full,
-    /// The paper's, with the first derivative of opacity in place of the second.
+    /// The paper's score, with the first derivative of opacity in place of the second.
     FirstDerivative,
-    /// The paper's, with the temporal variance in place of the factor for change.
+    /// The paper's score, with the temporal variance in place of the factor for change.
     Sigma,
     /// Root of the sum of the squared contributions at each time.
     Norm2,
@@ -53,10 +53,10 @@ impl Variant {
         Self::EnergyRemoval,
     ];
 
-    /// The variants that [`ScoreChoice::Auto`](crate::offline::search::ScoreChoice::Auto) tries: ours and the paper's.
+    /// The variants that [`ScoreChoice::Auto`](crate::offline::search::ScoreChoice::Auto) tries: three of our own and the paper's.
     pub const AUTO: [Self; 4] = [Self::EnergyRemoval, Self::Energy, Self::Removal, Self::Full];
 
-    /// Returns its name.
+    /// Returns the name of the variant.
     pub fn name(self) -> &'static str {
         match self {
             Self::Spatial => "spatial",
@@ -74,7 +74,7 @@ impl Variant {
         }
     }
 
-    /// Returns whether it needs the volume of the Gaussians, which only the trained form has.
+    /// Returns whether the variant needs the volume of the Gaussians, which only the trained form has.
     pub fn needs_volume(self) -> bool {
         matches!(
             self,
@@ -113,9 +113,9 @@ mod tests {
     #[test]
     fn names_are_the_same_everywhere() {
         for variant in Variant::ALL {
-            assert_eq!(variant.name().parse::<Variant>(), Ok(variant), "the name leads back");
+            assert_eq!(variant.name().parse::<Variant>(), Ok(variant), "the name is parsed to the same variant");
             let json = serde_json::to_value(variant).expect("a plain name");
-            assert_eq!(json, variant.name(), "stored by the same name");
+            assert_eq!(json, variant.name(), "the variant is stored by its name");
         }
         let message = "best".parse::<Variant>().expect_err("no such score").to_string();
         assert!(message.contains("best") && message.contains("energy-removal"), "{message}");
