@@ -2,11 +2,11 @@
 //!
 //! In: a [`BakeReport`]. Out: HTML with its style, its plots (SVG) and its pictures (PNG, base64) inside: it loads nothing.
 
-use super::super::fine_tune::CurvePoint;
 use super::escape::escape;
 use super::plot::{Axis, Chart, Series, bars};
 use super::{BakeReport, Sample};
 use crate::offline::evaluation::{color_name, without_contrast};
+use crate::offline::fine_tune::CurvePoint;
 use crate::offline::metrics::MeanMetrics;
 use crate::view::Picture;
 use base64::Engine;
@@ -40,8 +40,15 @@ i.s0,.bar.s0{background:var(--c0);fill:var(--c0)}i.s1{background:var(--c1)}i.s2{
 i.s4{background:var(--c4)}i.s5{background:var(--c5)}.dot{fill:var(--card);stroke-width:2}\
 .views{display:grid;grid-template-columns:repeat(4,1fr);gap:8px;margin-bottom:12px}figure{margin:0}img{width:100%;display:block}";
 
+impl BakeReport {
+    /// Returns the HTML page.
+    pub fn html(&self) -> String {
+        page(self)
+    }
+}
+
 /// Returns the whole page.
-pub(super) fn page(report: &BakeReport) -> String {
+fn page(report: &BakeReport) -> String {
     let name = escape(&report.package);
     let cards: String = [
         card("In short", "", &in_short(report)),

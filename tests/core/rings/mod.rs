@@ -1,9 +1,11 @@
-//! The rings: no module uses one that lies further out, and the files of a folder build on each other in one direction.
+//! The rings: no module uses a module that lies further out, and no files use each other in a circle.
 //!
-//! In: the text of every file in `src/`. Out: proof that no path points outwards and none is part of a circle; a
-//! failure lists those that do, with file and line.
+//! In: the text of every file in `src/`. Out: proof that no path points outwards and that no paths form a circle; a failure lists such paths
+//! with file and line.
 //!
-//! Comments and strings are ignored, unit tests are not. Uses without a path, such as calls of methods, are not found.
+//! A path is a use of the file that defines its item, behind all imports and re-exports. A `mod.rs` is a file like every other, except that
+//! its `mod` items, and re-exports of its children that its own code does not use, are no uses. Comments and strings are ignored, unit tests
+//! are not. Uses without a path, such as calls of methods, are not found.
 
 mod paths;
 mod sources;
@@ -41,16 +43,15 @@ const PLUGIN: &Order = &[
 #[test]
 fn no_path_points_outwards() {
     let sources = Sources::of_this_crate();
-    assert!(sources.uses().len() > 300, "the paths are found");
+    assert!(sources.uses().len() > 300, "paths are found");
     let outward = sources.outward(RINGS, PLUGIN);
     assert!(outward.is_empty(), "{} paths point outwards:\n{}", outward.len(), outward.join("\n"));
 }
 
 #[test]
 fn no_files_use_each_other_in_a_circle() {
-    let sources = Sources::of_this_crate();
-    let cycles = sources.cycles();
-    assert!(cycles.is_empty(), "{} circles:\n{}", cycles.len(), cycles.join("\n"));
+    let cycles = Sources::of_this_crate().cycles();
+    assert!(cycles.is_empty(), "src has {} circles:\n{}", cycles.len(), cycles.join("\n"));
 }
 
 #[test]
@@ -91,33 +92,63 @@ fn outward_paths_and_cycles_are_found() {
     let cycles = [
         "src/plugin/asset.rs:1: super::component::C\nsrc/plugin/component.rs:1: crate::Asset\n",
         "src/scene/s.rs:1: crate::view::A\nsrc/view/a.rs:2: super::super::scene::S\n",
+        "src/scene/s.rs:1: super::T\nsrc/scene/t.rs:1: super::super::S\n",
     ];
     assert_eq!(sources.cycles(), cycles, "the files that use each other");
 }
 
+/// Returns the circles among files.
+fn cycles(files: &[(&str, &str)]) -> Vec<String> {
+    Sources::new(files.iter().copied()).cycles()
+}
+
 #[test]
-fn an_item_of_a_mod_file_can_be_part_of_a_circle_and_a_re_export_cannot() {
-    let folder = |text: &'static str| {
-        let child = "use super::Limit; use super::Other; pub struct A; mod tests { use super::super::b::B; }";
-        let other = "use super::a::A; pub struct B; pub struct Other;";
-        Sources::new([("view/mod.rs", text), ("view/a.rs", child), ("view/b.rs", other)])
-    };
-    let defining = folder("mod a; mod b; pub use a::A; pub use b::Other; use a::A as Own; pub struct Limit;");
-    let circles = defining.cycles();
-    let through_mod = "src/view/a.rs:1: super::Limit\nsrc/view/mod.rs:1: a::A\n";
-    assert!(circles.contains(&through_mod.to_owned()), "mod.rs defines an item of a file that it uses: {circles:?}");
-    let between = "src/view/a.rs:1: super::Other\nsrc/view/b.rs:1: super::a::A\n";
-    assert!(circles.contains(&between.to_owned()), "a re-export leads to the file that defines the item: {circles:?}");
-    let using = Sources::new([
-        ("view/mod.rs", "mod a; pub use a::A; pub struct Limit(A);"),
-        ("view/a.rs", "use super::Limit; pub struct A;"),
+fn a_file_that_uses_an_item_of_its_own_mod_is_a_circle() {
+    let own = ("a/b.rs", "use super::LIMIT; pub struct B;");
+    let found = cycles(&[("a/mod.rs", "mod b; pub use b::B;\nconst LIMIT: u8 = 1; fn f() { b::g() }"), own]);
+    assert_eq!(found, ["src/a/b.rs:1: super::LIMIT\nsrc/a/mod.rs:2: b::g\n"], "mod.rs calls a function of its child");
+    let found = cycles(&[("a/mod.rs", "mod b;\nuse b::B;\nconst LIMIT: u8 = 1;"), own]);
+    assert_eq!(found, ["src/a/b.rs:1: super::LIMIT\nsrc/a/mod.rs:2: b::B\n"], "mod.rs imports an item of its child");
+    let found = cycles(&[("a/mod.rs", "mod b;\npub use b::B;\nconst LIMIT: u8 = 1; fn f(_: B) {}"), own]);
+    assert_eq!(found, ["src/a/b.rs:1: super::LIMIT\nsrc/a/mod.rs:2: b::B\n"], "mod.rs uses a type that it re-exports");
+    let found = cycles(&[("a/mod.rs", "mod b;\npub use b::*;\nconst LIMIT: u8 = 1; fn f(_: B) {}"), own]);
+    assert_eq!(found, ["src/a/b.rs:1: super::LIMIT\nsrc/a/mod.rs:2: b::*\n"], "mod.rs uses a type of a glob");
+    let through = ("a/c.rs", "use super::b::B;");
+    let found = cycles(&[("a/mod.rs", "mod b; mod c; const LIMIT: u8 = 1;\nfn f() { c::g() }"), own, through]);
+    let steps = "src/a/b.rs:1: super::LIMIT\nsrc/a/c.rs:1: super::b::B\nsrc/a/mod.rs:2: c::g\n";
+    assert_eq!(found, [steps], "mod.rs uses the file through another");
+}
+
+#[test]
+fn declarations_and_reexports_of_a_mod_are_no_uses() {
+    let child = ("a/b.rs", "use super::LIMIT; pub struct B;");
+    let found = cycles(&[("a/mod.rs", "mod b; pub use b::B; pub(crate) use b::*; const LIMIT: u8 = 1;"), child]);
+    assert_eq!(found, [""; 0], "mod.rs only re-exports its child");
+    let found = cycles(&[
+        ("a/mod.rs", "mod b; mod c; pub use c::LIMIT; fn f() { b::g() }"),
+        child,
+        ("a/c.rs", "pub const LIMIT: u8 = 1;"),
     ]);
-    let own = "src/view/a.rs:1: super::Limit\nsrc/view/mod.rs:1: a::A\n";
-    assert_eq!(using.cycles(), [own], "the code of mod.rs has the name that it re-exports");
-    let exporting = Sources::new([
-        ("view/mod.rs", "mod a; mod b; pub use a::A; pub use b::*; pub(crate) use b::B as C;"),
-        ("view/a.rs", "use super::B; pub struct A; mod tests { use super::super::b::B; }"),
-        ("view/b.rs", "pub struct B; mod tests { use super::super::A; }"),
-    ]);
-    assert_eq!(exporting.cycles(), [""; 0], "re-exports and unit tests make no circle");
+    assert_eq!(found, [""; 0], "the item is defined in another child");
+    let sibling =
+        [("a/mod.rs", "pub mod b;\npub use super::c::D; const E: u8 = 1;"), ("c.rs", "use crate::a::E; pub struct D;")];
+    let steps = "src/a/mod.rs:2: super::c::D\nsrc/c.rs:1: crate::a::E\n";
+    assert_eq!(cycles(&sibling), [steps], "a re-export of a file that is not below mod.rs is a use");
+}
+
+#[test]
+fn paths_that_begin_with_an_imported_name_lead_to_the_item() {
+    let folder = [("a/mod.rs", "mod b; mod c; pub use b::B; fn f() { c::g() }"), ("a/b.rs", "pub struct B;")];
+    let use_of_child = ("a/c.rs", "use crate::a; fn g() -> a::B {}");
+    assert_eq!(
+        cycles(&[folder[0], folder[1], use_of_child]),
+        [""; 0],
+        "the import of a folder is no use of its mod.rs"
+    );
+    let use_of_mod = ("a/c.rs", "use crate::a;\nfn g() { a::f() }");
+    let steps = "src/a/c.rs:2: a::f\nsrc/a/mod.rs:1: c::g\n";
+    assert_eq!(cycles(&[folder[0], folder[1], use_of_mod]), [steps], "a path to a function of mod.rs is a use of it");
+    let inner = ("a/c.rs", "mod tests {\nuse crate::a;\nfn g() { a::f() } }");
+    let steps = "src/a/c.rs:3: a::f\nsrc/a/mod.rs:1: c::g\n";
+    assert_eq!(cycles(&[folder[0], folder[1], inner]), [steps], "unit tests count");
 }

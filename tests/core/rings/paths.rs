@@ -1,21 +1,21 @@
 //! The paths in a Rust file.
 //!
-//! In: its text. Out: every path that starts with `crate`, `self` or `super` and every branch of a `use`, with its line and the module
-//! around it; the names of the items that the file defines. Comments, strings and doc text are skipped.
+//! In: its text. Out: every path of two or more names and every branch of a `use`, with its line and the module around it; the names of the
+//! items that the file defines, and the names that occur outside of `use` items. Comments, strings and doc text are skipped.
 
 use std::collections::BTreeSet;
 
 /// The path of a module from the crate root: `plugin`, `asset`.
 pub type Module = Vec<String>;
 
-/// The modules that a file mentions, and the items that it defines.
+/// The paths in a file, and the items that it defines.
 pub struct Source {
-    /// Its path below `src`, with forward slashes.
+    /// Path of the file below `src`, with forward slashes.
     pub file: String,
     pub mentions: Vec<Mention>,
-    /// The names that it defines.
+    /// The names of the items that the file defines.
     pub items: BTreeSet<String>,
-    /// The words of its code outside of `use` and of unit tests.
+    /// The names that occur outside of `use` and `mod` items.
     pub words: BTreeSet<String>,
 }
 
@@ -25,10 +25,43 @@ pub struct Mention {
     /// The module inside the file.
     pub inside: Module,
     pub path: Module,
-    /// The name that a `use` outside of functions and inner modules gives it; `*` for a glob.
-    pub name: Option<String>,
-    /// Whether it is part of a `pub use`: a re-export.
-    pub exported: bool,
+    pub kind: Kind,
+}
+
+/// Where a path stands.
+#[derive(PartialEq)]
+pub enum Kind {
+    /// In code.
+    Code,
+    /// In a `use`.
+    Import {
+        /// The name that the `use` binds; `*` for a glob.
+        name: String,
+        /// Whether the `use` stands outside of functions and inner modules.
+        is_outermost: bool,
+        /// Whether the `use` has a visibility: `pub use`, `pub(super) use`.
+        is_reexport: bool,
+    },
+}
+
+impl Mention {
+    /// Returns whether the path is a `use` that binds a name, in any scope of the file.
+    pub fn binds(&self, bound: &str) -> bool {
+        matches!(&self.kind, Kind::Import { name, .. } if name == bound)
+    }
+
+    /// Returns whether the path is a `use` that binds a name for the whole file, so that other files can reach the name.
+    pub fn exports(&self, bound: &str) -> bool {
+        self.binds(bound) && matches!(self.kind, Kind::Import { is_outermost: true, .. })
+    }
+
+    /// Returns the name that the path binds if it is a re-export.
+    pub fn reexported(&self) -> Option<&str> {
+        match &self.kind {
+            Kind::Import { name, is_reexport: true, .. } => Some(name),
+            _ => None,
+        }
+    }
 }
 
 impl Source {
@@ -44,18 +77,16 @@ impl Source {
 /// Finds the paths in the words and signs of a file.
 #[derive(Default)]
 struct Reader<'a> {
-    /// Each with its line.
+    /// Each token with its line.
     tokens: Vec<(&'a str, usize)>,
     at: usize,
-    /// Open braces.
+    /// Number of open braces.
     depth: usize,
-    /// Open inner modules, each with the braces open around it.
+    /// Open inner modules, each with the number of braces open around it.
     inside: Vec<(String, usize)>,
     mentions: Vec<Mention>,
     items: BTreeSet<String>,
     words: BTreeSet<String>,
-    /// Whether the `use` that is read is a `pub use`.
-    exported: bool,
 }
 
 impl<'a> Reader<'a> {
@@ -66,20 +97,16 @@ impl<'a> Reader<'a> {
             if DEFINING.contains(&word) && is_name(next) {
                 self.items.insert(next.to_owned());
             }
-            if is_name(word) && !self.inside.iter().any(|(module, _)| module == "tests") {
-                self.words.insert(word.to_owned());
-            }
+            let before = self.at.checked_sub(1).map_or("", |before| self.tokens[before].0);
             match word {
                 "use" => {
-                    // `pub use`, `pub(crate) use`.
-                    let before = self.at.checked_sub(1).and_then(|at| self.tokens.get(at));
-                    self.exported = before.is_some_and(|(token, _)| ["pub", ")"].contains(token));
                     self.at += 1;
-                    self.branch(&[]);
-                    self.exported = false;
+                    // `pub use`, or `pub(super) use`.
+                    self.branch(&[], matches!(before, "pub" | ")"));
                     continue;
                 }
-                "crate" | "self" | "super" if next == "::" => {
+                // After a type in angle brackets or a method's name, `::` begins no path.
+                name if is_name(name) && next == "::" && !matches!(before, "::" | ".") => {
                     self.path();
                     continue;
                 }
@@ -90,6 +117,9 @@ impl<'a> Reader<'a> {
                     if self.inside.last().is_some_and(|(_, depth)| *depth == self.depth) {
                         self.inside.pop();
                     }
+                }
+                name if is_name(name) && before != "mod" => {
+                    self.words.insert(name.to_owned());
                 }
                 _ => {}
             }
@@ -103,7 +133,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads a branch of a `use` below the path `stem`.
-    fn branch(&mut self, stem: &[String]) {
+    fn branch(&mut self, stem: &[String], is_reexport: bool) {
         let line = self.line();
         let mut path = stem.to_vec();
         loop {
@@ -113,7 +143,7 @@ impl<'a> Reader<'a> {
                     self.at += 1;
                     while !matches!(self.peek(0), "}" | ";" | "") {
                         let before = self.at;
-                        self.branch(&path);
+                        self.branch(&path, is_reexport);
                         if self.peek(0) == "," || self.at == before {
                             self.at += 1;
                         }
@@ -128,33 +158,36 @@ impl<'a> Reader<'a> {
             }
             self.at += 1;
         }
-        let mut name = path.last().cloned();
+        let mut name = path.last().cloned().unwrap_or_default();
         if self.peek(0) == "as" {
-            name = Some(self.peek(1).to_owned());
+            name = self.peek(1).to_owned();
             self.at += 2;
         }
-        self.mention(line, path, name.filter(|_| self.depth == 0));
+        self.mention(line, path, Kind::Import { name, is_outermost: self.depth == 0, is_reexport });
     }
 
-    /// Reads a path in the midst of code.
+    /// Reads a path in code.
     fn path(&mut self) {
         let line = self.line();
         let mut path = vec![self.peek(0).to_owned()];
+        self.words.insert(self.peek(0).to_owned());
         self.at += 1;
         while self.peek(0) == "::" && is_name(self.peek(1)) {
             path.push(self.peek(1).to_owned());
             self.at += 2;
         }
-        self.mention(line, path, None);
+        if path.len() > 1 {
+            self.mention(line, path, Kind::Code);
+        }
     }
 
     fn line(&self) -> usize {
         self.tokens.get(self.at).map_or(0, |&(_, line)| line)
     }
 
-    fn mention(&mut self, line: usize, path: Module, name: Option<String>) {
+    fn mention(&mut self, line: usize, path: Module, kind: Kind) {
         let inside = self.inside.iter().map(|(module, _)| module.clone()).collect();
-        self.mentions.push(Mention { line, inside, path, name, exported: self.exported });
+        self.mentions.push(Mention { line, inside, path, kind });
     }
 }
 
@@ -166,7 +199,7 @@ fn is_name(token: &str) -> bool {
     token.starts_with(|c: char| is_word(c) && !c.is_numeric())
 }
 
-/// Words and signs with their lines. `::` is one sign.
+/// Splits code into words and signs, with their lines. `::` is one sign.
 fn tokens(code: &str) -> Vec<(&str, usize)> {
     let mut tokens = Vec::new();
     for (line, number) in code.lines().zip(1..) {
@@ -182,7 +215,7 @@ fn tokens(code: &str) -> Vec<(&str, usize)> {
     tokens
 }
 
-/// Returns the text with comments, strings and characters blanked out. Everything else stays on its line.
+/// Returns the text with comments, strings and characters replaced by spaces. All other text stays on its line.
 fn code(text: &str) -> String {
     let mut code = String::with_capacity(text.len());
     let mut rest = text;
@@ -208,7 +241,7 @@ fn code(text: &str) -> String {
     code
 }
 
-/// Returns the length of the comment that the text begins with, comments inside it included.
+/// Returns the length of the comment at the start of the text, with the comments inside it.
 fn block_comment(text: &str) -> usize {
     let (mut depth, mut at) = (0, 0);
     while let Some(c) = text[at..].chars().next() {
@@ -228,7 +261,7 @@ fn block_comment(text: &str) -> usize {
     at
 }
 
-/// Returns the length of the string that the text begins with.
+/// Returns the length of the string at the start of the text.
 fn string(text: &str) -> usize {
     let mut escaped = false;
     for (at, c) in text.char_indices().skip(1) {
@@ -240,7 +273,7 @@ fn string(text: &str) -> usize {
     text.len()
 }
 
-/// Returns the length of the raw string that the text begins with; `None` if it begins with anything else.
+/// Returns the length of the raw string at the start of the text; `None` if the text does not start with one.
 fn raw_string(text: &str) -> Option<usize> {
     let start = text.strip_prefix(['b', 'c']).unwrap_or(text).strip_prefix('r')?;
     let hashes = start.len() - start.trim_start_matches('#').len();
@@ -250,11 +283,11 @@ fn raw_string(text: &str) -> Option<usize> {
     Some(text.len() - body.len() + length)
 }
 
-/// Returns the length of the character that the text begins with; `None` if it begins with a lifetime.
+/// Returns the length of the character literal at the start of the text; `None` if the text starts with a lifetime.
 fn character(text: &str) -> Option<usize> {
     let body = text.strip_prefix('\'')?;
     let first = body.chars().next()?;
-    // What follows a backslash belongs to it, even a quote.
+    // The character after a backslash belongs to the escape, even a quote.
     let least = if first == '\\' { 2 } else { first.len_utf8() };
     let end = least + body.get(least..)?.find('\'')?;
     (first == '\\' || end == least).then_some(end + 2)
@@ -270,11 +303,19 @@ mod tests {
     use super::super::i; // crate::comment
 }
 pub(in crate::j) struct K;
+pub(super) use l::M;
+fn n() { a::o(); s.p::<u8>(); <Q as R>::t(); mod_u::V::w() }
 "##;
     let read = Source::new("k.rs", text);
     let show = |mention: &Mention| {
-        let name = mention.name.as_deref().unwrap_or("-");
-        format!("{} {} {} {name}", mention.line, mention.inside.join("::"), mention.path.join("::"))
+        let kind = match &mention.kind {
+            Kind::Code => "-".to_owned(),
+            Kind::Import { name, is_outermost, is_reexport } => {
+                let scope = if *is_outermost { "" } else { " inner" };
+                format!("{name}{scope}{}", if *is_reexport { " re-exported" } else { "" })
+            }
+        };
+        format!("{} {} {} {kind}", mention.line, mention.inside.join("::"), mention.path.join("::"))
     };
     let expected = [
         "2  crate::a a",
@@ -282,9 +323,17 @@ pub(in crate::j) struct K;
         "2  crate::a::b::D E",
         "2  crate::a::f::* *",
         "4  super::g::h -",
-        "6 tests super::super::i -",
+        "6 tests super::super::i i inner",
         "8  crate::j -",
+        "9  l::M M re-exported",
+        "10  a::o -",
+        "10  mod_u::V::w -",
     ];
-    assert_eq!(read.mentions.iter().map(show).collect::<Vec<_>>(), expected, "line, module inside, path, bound name");
-    assert_eq!(read.items.iter().collect::<Vec<_>>(), ["K", "f", "tests"], "what the file defines");
+    let found = read.mentions.iter().map(show).collect::<Vec<_>>();
+    assert_eq!(found, expected, "line, module inside the file, path, bound name");
+    assert_eq!(read.items.iter().collect::<Vec<_>>(), ["K", "f", "n", "tests"], "the items that the file defines");
+    let words = ["a", "g", "super", "K"].map(|word| read.words.contains(word));
+    assert_eq!(words, [true; 4], "the names in code are words");
+    let words = ["C", "E", "M", "i", "tests"].map(|word| read.words.contains(word));
+    assert_eq!(words, [false; 5], "names of `use` and `mod` items are not words");
 }

@@ -1,19 +1,22 @@
-//! The files of a crate as modules, and which of them use which.
+//! The files of a crate as modules, and the uses between them.
 //!
-//! In: files with their paths below `src`. Out: the module that each path in them leads to, also through re-exports;
-//! the paths that an order of the modules forbids; the files that use each other in a circle.
+//! In: files with their paths below `src`. Out: the module that each path in them leads to, behind imports and re-exports; the paths that an
+//! order of the modules forbids; the files that use each other in a circle.
 
-use super::paths::{Mention, Module, Source};
+use super::paths::{Kind, Mention, Module, Source};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs;
 use std::path::Path;
 
-/// An order of modules: what each of them may use beside itself.
+/// The most imports and re-exports that are followed from a path to the item that it names.
+const MOST_REEXPORTS: usize = 8;
+
+/// An order of modules: the modules that each of them may use besides itself.
 pub type Order = [(&'static str, &'static [&'static str])];
 
 /// The files of a crate.
 pub struct Sources {
-    /// Each by the module that it is.
+    /// The files by their modules.
     pub modules: BTreeMap<Module, Source>,
 }
 
@@ -59,16 +62,16 @@ impl Sources {
         uses
     }
 
-    /// Returns the module that a path leads to; `None` if it is one of another crate.
-    fn target(&self, module: &Module, mention: &Mention) -> Option<Module> {
-        let module = [module.as_slice(), mention.inside.as_slice()].concat();
-        let (base, path) = self.start(&module, &mention.path)?;
-        Some(self.find(&base, path, 8).unwrap_or_else(|| self.descend(&base, path).0))
+    /// Returns the module that a path leads to; `None` if it is a path of another crate.
+    fn target(&self, file: &Module, mention: &Mention) -> Option<Module> {
+        let (base, path) = self.start(file, &mention.inside, &mention.path, MOST_REEXPORTS)?;
+        Some(self.find(&base, &path, MOST_REEXPORTS).unwrap_or_else(|| self.descend(&base, &path).0))
     }
 
-    /// Returns the module at which a path starts, and the rest of the path; `None` for a path of another crate.
-    fn start<'a>(&self, module: &[String], path: &'a [String]) -> Option<(Module, &'a [String])> {
-        let mut base = module.to_vec();
+    /// Returns the module at which a path in the module `inside` of a file starts, and the rest of the path; `None` for a path of another
+    /// crate. A first name that is imported is replaced by what it is imported from, at most `imports` times.
+    fn start(&self, file: &[String], inside: &[String], path: &[String], imports: usize) -> Option<(Module, Module)> {
+        let mut base = [file, inside].concat();
         let (first, mut rest) = path.split_first()?;
         match first.as_str() {
             "crate" => base.clear(),
@@ -80,12 +83,18 @@ impl Sources {
                     rest = &rest[1..];
                 }
             }
-            child => {
-                base.push(child.to_owned());
-                self.modules.get(&base)?;
+            name => {
+                let child = [file, &[name.to_owned()]].concat();
+                if self.modules.contains_key(&child) {
+                    return Some((child, rest.to_vec()));
+                }
+                let imported = |mention: &&Mention| mention.binds(name) && mention.path != path;
+                let import = self.modules.get(file)?.mentions.iter().find(imported)?;
+                let (base, stem) = self.start(file, &import.inside, &import.path, imports.checked_sub(1)?)?;
+                return Some((base, [&stem, rest].concat()));
             }
         }
-        Some((base, rest))
+        Some((base, rest.to_vec()))
     }
 
     /// Follows a path as far as it names modules. Returns the last of them and the rest of the path.
@@ -102,31 +111,29 @@ impl Sources {
         (module, path)
     }
 
-    /// Returns the module that defines the item of a path, behind at most `reexports` re-exports; `None` if there is
-    /// none.
+    /// Returns the module that defines the item of a path, behind at most `reexports` re-exports; `None` if no file defines the item.
     fn find(&self, base: &[String], path: &[String], reexports: usize) -> Option<Module> {
         let (module, rest) = self.descend(base, path);
         let source = self.modules.get(&module)?;
         let Some((item, after)) = rest.split_first().filter(|(item, _)| *item != "*") else { return Some(module) };
         let reexports = reexports.checked_sub(1)?;
-        let named = source.mentions.iter().find(|mention| mention.name.as_ref() == Some(item));
+        let named = source.mentions.iter().find(|mention| mention.exports(item));
         if let Some(reexport) = named {
-            let (base, path) = self.start(&module, &reexport.path)?;
-            return self.find(&base, &[path, after].concat(), reexports);
+            let (base, path) = self.start(&module, &[], &reexport.path, reexports)?;
+            return self.find(&base, &[&path, after].concat(), reexports);
         }
         if source.items.contains(item) {
             return Some(module);
         }
-        let mut globs = source.mentions.iter().filter(|mention| mention.name.as_deref() == Some("*"));
+        let mut globs = source.mentions.iter().filter(|mention| mention.exports("*"));
         let behind = |glob: &Mention| {
-            let (base, path) = self.start(&module, &glob.path)?;
-            self.find(&self.descend(&base, path).0, rest, reexports)
+            let (base, path) = self.start(&module, &[], &glob.path, reexports)?;
+            self.find(&self.descend(&base, &path).0, rest, reexports)
         };
         globs.find_map(behind)
     }
 
-    /// Returns the paths that are forbidden by the order of the outermost modules, or by that inside the module
-    /// `plugin`.
+    /// Returns the paths that are forbidden by the order of the outermost modules, or by the order inside the module `plugin`.
     pub fn outward(&self, rings: &Order, plugin: &Order) -> Vec<String> {
         let mut outward = Vec::new();
         for Use { module, source, mention, target } in self.uses() {
@@ -144,19 +151,12 @@ impl Sources {
         outward
     }
 
-    /// Returns the shortest circle through each file, each circle once: the paths that it consists of, one a line. A
-    /// `mod.rs` is a file like the others: an item that it defines is its own. A re-export is no use, unless the code of
-    /// the file has the name, too. The modules `tests` of unit tests may use anything.
+    /// Returns the shortest circle through each file, each circle once: the paths that it consists of, one a line.
     pub fn cycles(&self) -> Vec<String> {
-        let counts = |source: &Source, mention: &Mention| {
-            let has_name = mention.name.as_ref().is_some_and(|name| source.words.contains(name));
-            (!mention.exported || has_name) && !mention.inside.iter().any(|module| module == "tests")
-        };
         let mut edges: BTreeMap<&Module, BTreeMap<Module, String>> = BTreeMap::new();
-        for Use { module, source, mention, target } in self.uses() {
-            if *module != target && counts(source, mention) && self.modules.contains_key(&target) {
-                edges.entry(module).or_default().entry(target).or_insert_with(|| position(source, mention));
-            }
+        for used in self.uses().into_iter().filter(|used| self.depends(used)) {
+            let Use { module, source, mention, target } = used;
+            edges.entry(module).or_default().entry(target).or_insert_with(|| position(source, mention));
         }
         let mut cycles = BTreeSet::new();
         for &start in edges.keys() {
@@ -176,10 +176,43 @@ impl Sources {
         }
         cycles.iter().map(|steps| steps.iter().map(|step| format!("{step}\n")).collect()).collect()
     }
+
+    /// Returns whether a file depends on the file that one of its paths leads to.
+    fn depends(&self, used: &Use<'_>) -> bool {
+        let Use { module, source, mention, target } = used;
+        if *module == target {
+            return false;
+        }
+        // A `mod.rs` that only re-exports an item of a child does not depend on it.
+        if let Some(name) = mention.reexported()
+            && is_mod(source)
+            && target.starts_with(module)
+        {
+            let items = match name {
+                "*" => self.modules.get(target).map(|globbed| &globbed.items),
+                _ => None,
+            };
+            return source.words.contains(name) || items.is_some_and(|items| !items.is_disjoint(&source.words));
+        }
+        // An import of a folder is no use of its `mod.rs`: the paths that begin with the imported name lead to the items.
+        let is_import = mention.kind != Kind::Code && !mention.binds("*");
+        let is_folder = self.modules.get(target).is_some_and(is_mod);
+        !(is_import && is_folder && self.names_module(module, mention))
+    }
+
+    /// Returns whether a path names a module itself, not an item of it.
+    fn names_module(&self, file: &Module, mention: &Mention) -> bool {
+        let start = self.start(file, &mention.inside, &mention.path, MOST_REEXPORTS);
+        start.is_some_and(|(base, path)| self.modules.contains_key(&[base, path].concat()))
+    }
 }
 
-/// Returns whether an order lets one module use another. A module that is not in it may use all others and be used by
-/// none.
+/// Returns whether a file is a `mod.rs` or the root of the crate.
+fn is_mod(source: &Source) -> bool {
+    source.file == "lib.rs" || source.file == "mod.rs" || source.file.ends_with("/mod.rs")
+}
+
+/// Returns whether an order lets one module use another. A module that is not in the order may use every module and be used by none.
 fn may_use(order: &Order, from: &str, to: &str) -> bool {
     let row = order.iter().find(|(name, _)| *name == from);
     row.is_none_or(|(_, inner)| from == to || inner.contains(&to))
