@@ -22,7 +22,7 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::PathBuf;
 
-/// Compress a capture: quantise its geometry, code its colour, keep its temporal filter.
+/// Compress a capture: quantize its geometry, code its color, keep its temporal filter.
 ///
 /// OUT draws through the same passes; the GPU reads it as it is. Prune and mask first: a packed capture can no longer be scored.
 #[derive(clap::Args)]
@@ -43,7 +43,7 @@ pub struct Compress {
     quality: Quality,
     #[command(flatten)]
     knobs: Knobs,
-    /// How much the colour of each Gaussian counts: scores by `gs4d score`, little-endian float32 in the order of IN
+    /// How much the color of each Gaussian counts: scores by `gs4d score`, little-endian float32 in the order of IN
     /// [default: by opacity].
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
@@ -62,7 +62,7 @@ pub struct Compress {
 #[derive(clap::Args)]
 #[command(next_help_heading = "Knobs (default: by --quality)")]
 struct Knobs {
-    /// Entries of each codebook of colour, up to four: each codes what the ones before left over.
+    /// Entries of each codebook of color, up to four: each codes what the ones before left over.
     #[arg(long, value_name = "N,..", value_delimiter = ',')]
     codebooks: Option<Vec<usize>>,
     /// Bits of the mean, per axis, within a block of 256 Gaussians (1 to 16).
@@ -86,7 +86,7 @@ struct Knobs {
     /// Bits of the opacity (1 to 16).
     #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(1..=16))]
     opacity_bits: Option<u32>,
-    /// Bits of the base colour, per channel, where colours are coded (1 to 10).
+    /// Bits of the base color, per channel, where colors are coded (1 to 10).
     #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u32).range(1..=10))]
     base_bits: Option<u32>,
     /// Without codebooks: round every coefficient to a multiple of this; 0 keeps them as they are.

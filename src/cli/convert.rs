@@ -1,6 +1,6 @@
 //! `gs4d convert IN OUT`: converts a checkpoint or a package to a package.
 //!
-//! In: a scene, a target form, colour degrees. Out: a package, the training and playback settings in it, sizes before
+//! In: a scene, a target form, color degrees. Out: a package, the training and playback settings in it, sizes before
 //! and after.
 
 use super::args::{CheckpointArgs, PackageArgs, file_size, values};
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 
 /// Convert a checkpoint (.pth) or a package to a package (.gs4d).
 ///
-/// Nothing is lost unless --form runtime or a colour degree asks for it. OUT is written beside its place and then renamed: an
+/// Nothing is lost unless --form runtime or a color degree asks for it. OUT is written beside its place and then renamed: an
 /// existing OUT is replaced by the whole new file or stays as it was. OUT must not be IN.
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -31,10 +31,10 @@ pub struct Convert {
     /// Form of the Gaussians: trained (can be pruned and fine-tuned) or runtime (smaller, draws the same) [default: as in IN].
     #[arg(long, value_name = "FORM", value_parser = values::one_of(&TargetForm::NAMES))]
     form: Option<TargetForm>,
-    /// Keep colour up to this spatial degree, 0 to 3 [default: all].
+    /// Keep color up to this spatial degree, 0 to 3 [default: all].
     #[arg(long, value_name = "D", value_parser = clap::value_parser!(u32).range(0..=3))]
     sh_degree: Option<u32>,
-    /// Keep colour up to this time degree, 0 to 2 [default: all].
+    /// Keep color up to this time degree, 0 to 2 [default: all].
     #[arg(long, value_name = "D", value_parser = clap::value_parser!(u32).range(0..=2))]
     sh_degree_t: Option<u32>,
     #[command(flatten)]

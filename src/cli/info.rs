@@ -197,7 +197,7 @@ impl Facts {
         let environment = self.environment.map_or("none".to_owned(), |[width, height]| format!("{width} x {height}"));
         let mut pairs = vec![
             ("Gaussians", format!("{} ({model})", self.gaussians)),
-            ("colour", format!("degree {degree}, time degree {degree_t}, {stored}")),
+            ("color", format!("degree {degree}, time degree {degree_t}, {stored}")),
             ("environment", environment),
         ];
         pairs.extend(switches(&self.trained_with, &self.playback));

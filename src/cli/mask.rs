@@ -11,7 +11,7 @@ use super::table::{bytes, lines};
 use crate::offline::dataset::TrainingView;
 use crate::offline::engine::Engine;
 use crate::offline::files::Files;
-use crate::offline::temporal_filter::{FILTER_NAMES, filter, filter_name, needs_views, neighbour_overlap};
+use crate::offline::temporal_filter::{FILTER_NAMES, filter, filter_name, needs_views, neighbor_overlap};
 use crate::scene::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter};
 use serde_json::json;
 use std::path::PathBuf;
@@ -71,7 +71,7 @@ impl Mask {
         let mut engine = if by_views { self.engine.open()? } else { Engine::Cpu };
         let filter = filter(&mut engine, &scene, self.filter, keys, &views, &mut Bars::default());
         let filter = filter.map_err(|error| Failure::at(&self.input, &error))?;
-        let (share, overlap) = (filter.active_share(), neighbour_overlap(&filter));
+        let (share, overlap) = (filter.active_share(), neighbor_overlap(&filter));
         let least = overlap.iter().copied().fold(1.0, f64::min);
         let mean = if overlap.is_empty() { 1.0 } else { overlap.iter().sum::<f64>() / overlap.len() as f64 };
         let (form, size) = stored(&filter);
@@ -82,7 +82,7 @@ impl Mask {
         let text = lines(&[
             ("filter", format!("{name}, {keys} key-frames, {segments} segments")),
             ("active", format!("{:.1} % of {count} Gaussians, mean over segments", share * 100.0)),
-            ("overlap", format!("{mean:.3} (IoU of neighbouring segments; {least:.3} at least)")),
+            ("overlap", format!("{mean:.3} (IoU of neighboring segments; {least:.3} at least)")),
             ("size", format!("{} as {form}, before compression", bytes(size))),
             ("wrote", format!("{}, {}", out.display(), bytes(written))),
         ]);

@@ -34,10 +34,10 @@ pub struct Synth {
     /// Seed of the random numbers: the same seed makes the same scene on every machine.
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
-    /// Spatial degree of colour, 0 to 3.
+    /// Spatial degree of color, 0 to 3.
     #[arg(long, value_name = "D", default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=3))]
     sh_degree: u32,
-    /// Time degree of colour, 0 to 2; counts only with --sh-degree 3.
+    /// Time degree of color, 0 to 2; counts only with --sh-degree 3.
     #[arg(long, value_name = "D", default_value_t = 2, value_parser = clap::value_parser!(u32).range(0..=2))]
     sh_degree_t: u32,
     /// Seconds of playback; 0 for a still.

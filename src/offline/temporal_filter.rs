@@ -194,8 +194,8 @@ pub fn interval_filter(
     Ok(from_segments(FilterKind::Interval, &segments, count))
 }
 
-/// Returns the intersection over union of the sets of each pair of neighbouring segments; 1 if both are empty.
-pub fn neighbour_overlap(filter: &TemporalFilter) -> Vec<f64> {
+/// Returns the intersection over union of the sets of each pair of neighboring segments; 1 if both are empty.
+pub fn neighbor_overlap(filter: &TemporalFilter) -> Vec<f64> {
     let bits = filter.to_bits();
     let sets: Vec<&[u32]> = bits.chunks(TemporalFilter::words(filter.count).max(1)).collect();
     let overlap = |pair: &[&[u32]]| {
@@ -233,7 +233,7 @@ mod tests {
     fn a_segment_has_what_its_ends_have() {
         let filter = key_frame_filter(&[vec![0b0001], vec![0b0110], vec![0b0100]], 4);
         assert_eq!(filter.segments, 2, "one less than masks");
-        assert_eq!(filter.to_bits(), [0b0111, 0b0110], "unions of neighbours");
-        assert_eq!(neighbour_overlap(&filter), [2.0 / 3.0], "two of three");
+        assert_eq!(filter.to_bits(), [0b0111, 0b0110], "unions of neighbors");
+        assert_eq!(neighbor_overlap(&filter), [2.0 / 3.0], "two of three");
     }
 }

@@ -18,7 +18,7 @@ pub struct CheckpointArgs {
     /// First and last timestamp of training [default: 0,1].
     #[arg(long, value_name = "T0,T1", value_parser = values::interval, allow_hyphen_values = true)]
     time_interval: Option<[f32; 2]>,
-    /// Background colour, 0 to 1 in the space of the pictures; also instead of a package's own [default: 0,0,0].
+    /// Background color, 0 to 1 in the space of the pictures; also instead of a package's own [default: 0,0,0].
     #[arg(long, value_name = "R,G,B", value_parser = values::color, allow_hyphen_values = true)]
     pub background: Option<[f32; 3]>,
     /// Order of the axes when the rotations were trained; unflipped: code before 2024-09-15 [default: flipped].
@@ -32,10 +32,10 @@ pub struct CheckpointArgs {
     /// environment map, else fov].
     #[arg(long, value_name = "KIND", value_parser = values::one_of(&TRAINED_CAMERAS))]
     trained_cameras: Option<TrainedCameras>,
-    /// Mean that gives the viewing direction of colour; also instead of a package's own [default: canonical].
+    /// Mean that gives the viewing direction of color; also instead of a package's own [default: canonical].
     #[arg(long, value_name = "MEAN", value_parser = values::one_of(&SH_DIRECTIONS))]
     sh_direction: Option<ShDirection>,
-    /// Only the first 16 colour coefficients count.
+    /// Only the first 16 color coefficients count.
     #[arg(long)]
     force_sh_3d: bool,
     /// Added to the temporal variance in the marginal, if positive [default: -1].

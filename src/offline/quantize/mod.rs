@@ -49,7 +49,7 @@ pub enum CompressError {
     #[error("the scene is packed already: compress the checkpoint or the lossless package it was made from")]
     AlreadyPacked,
     /// Codebooks need quantized geometry.
-    #[error("codebooks need quantised geometry: choose a quality other than lossless, or no codebooks")]
+    #[error("codebooks need quantized geometry: choose a quality other than lossless, or no codebooks")]
     CodebooksAlone,
     /// Too many codebooks, or a codebook with no or too many entries.
     #[error("at most {MAX_STAGES} codebooks of 1 to 65536 entries each, not {0:?}")]

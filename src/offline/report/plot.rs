@@ -1,6 +1,6 @@
 //! Plots as inline SVG.
 //!
-//! In: numbers with names. Out: SVG text without any style: classes `s0`, `s1`, … colour the series, `axis`, `grid` and
+//! In: numbers with names. Out: SVG text without any style: classes `s0`, `s1`, … color the series, `axis`, `grid` and
 //! `text` the rest, so that the style of the page applies.
 
 use std::fmt::Write;
@@ -137,7 +137,7 @@ impl Chart {
         svg + "</svg>"
     }
 
-    /// Returns the legend as HTML: the names of the lines in their colours.
+    /// Returns the legend as HTML: the names of the lines in their colors.
     pub fn legend(&self) -> String {
         let entry = |(index, series): (usize, &Series)| {
             format!("<span class=\"key\"><i class=\"s{index}\"></i>{}</span>", escape(&series.name))
