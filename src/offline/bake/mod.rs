@@ -2,7 +2,7 @@
 //!
 //! In: a checkpoint, the views of its dataset, [`BakeSettings`]. Out: a package, and `NAME.report.json` and `NAME.report.html` next to a
 //! package `NAME.gs4d` ([`Baked`]). [`bake()`] is the list of stages. All stages before the evaluation store their results in the folder
-//! `OUT.bake` next to a package `OUT` ([`Store`]), so that an interrupted bake resumes. Two bakes cannot share it.
+//! `OUT.bake` next to a package `OUT` ([`Store`](super::store::Store)), so that an interrupted bake resumes. Two bakes cannot share it.
 //!
 //! Every choice (score, count, step) looks at the validation views alone, which nothing trains on; test views are drawn for the report,
 //! after the last choice.

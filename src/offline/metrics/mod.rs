@@ -1,7 +1,7 @@
 //! Metrics of pictures: PSNR, SSIM, MS-SSIM and FLIP; and their means over the views of a dataset.
 //!
-//! In: two [`Picture`]s of the same size, values 0 to 1 (nothing is clamped here: clamp a rendering with
-//! [`Picture::clamped`] first, as the original evaluation does). Out: one number, which is not finite if a pixel is
+//! In: two [`Picture`](crate::view::Picture)s of the same size, values 0 to 1 (nothing is clamped here: clamp a rendering with
+//! [`Picture::clamped`](crate::view::Picture::clamped) first, as the original evaluation does). Out: one number, which is not finite if a pixel is
 //! not. Every PSNR derives from a [`SquaredError`]. [`evaluate()`] computes the metrics for every view of a dataset.
 
 mod evaluate;
