@@ -81,6 +81,21 @@ impl Stored for GaussianScene {
     }
 }
 
+/// The bytes of a package that can be read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Package(pub Vec<u8>);
+
+impl Stored for Package {
+    fn encode(&self) -> Result<Vec<u8>, OfflineError> {
+        Ok(self.0.clone())
+    }
+
+    fn decode(bytes: &[u8]) -> Option<Self> {
+        package::read(Cursor::new(bytes)).ok()?;
+        Some(Self(bytes.to_vec()))
+    }
+}
+
 /// Kind, segments and Gaussians of a filter, then its bits.
 impl Stored for TemporalFilter {
     fn encode(&self) -> Result<Vec<u8>, OfflineError> {
@@ -152,6 +167,7 @@ mod tests {
         assert_eq!(Vec::<u32>::decode(b"seven b"), None, "a remainder of fewer than four bytes");
         assert_eq!(<(Vec<u8>, Vec<u8>)>::decode(&[255; 9]), None, "a length beyond the bytes");
         assert_eq!(GaussianScene::decode(b"no package"), None, "bytes without the magic of a package");
+        assert_eq!(Package::decode(b"no package"), None, "bytes without the magic of a package");
         let filter = (Text((FilterKind::KeyFrame, 3u32, 33usize)), vec![5u32]).encode().expect("it can be stored");
         assert_eq!(TemporalFilter::decode(&filter), None, "too few bits");
     }

@@ -8,25 +8,11 @@ use crate::codec::package;
 use crate::offline::quantize::{self, CompressSettings};
 use crate::offline::stages::Stages;
 use crate::offline::store::Key;
-use crate::offline::stored::Stored;
+use crate::offline::stored::Package;
 use crate::offline::temporal_filter::filter as temporal_filter;
 use crate::offline::{OfflineError, Progress, write_beside, write_settings};
 use crate::scene::{GaussianScene, SceneForm, TemporalFilter};
-use std::io::{Cursor, Write};
-
-/// The bytes of a package that can be read.
-struct Package(Vec<u8>);
-
-impl Stored for Package {
-    fn encode(&self) -> Result<Vec<u8>, OfflineError> {
-        Ok(self.0.clone())
-    }
-
-    fn decode(bytes: &[u8]) -> Option<Self> {
-        package::read(Cursor::new(bytes)).ok()?;
-        Some(Self(bytes.to_vec()))
-    }
-}
+use std::io::Write;
 
 /// The stage mask: computes the temporal filter of the remaining Gaussians. Returns the key of the scene with it, given that of the scene.
 pub(super) fn mask(
