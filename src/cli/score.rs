@@ -12,7 +12,7 @@ use super::table::{Table, lines};
 use crate::offline::Subject;
 use crate::offline::belonging::require_belonging;
 use crate::offline::files::Files;
-use crate::offline::score::variant::Variant;
+use crate::offline::score::Variant;
 use crate::offline::score::write_scores;
 use crate::offline::search::{Candidate, Goal, ScoreChoice, ScoreSearch, SearchSummary, candidates};
 use crate::scene::GaussianScene;

@@ -9,7 +9,7 @@ use super::evaluation::evaluate_scene;
 use super::metrics::{MeanMetrics, MetricSet};
 use super::prune::{highest, kept_count, select};
 use super::score::ScoringSettings;
-use super::score::variant::Variant;
+use super::score::Variant;
 use super::search::ScoreChoice;
 use super::temporal_filter::{filter, filter_name};
 use super::{OfflineError, Progress, Subject};

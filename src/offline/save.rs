@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// Most symbolic links that are followed from one to the next, as on Linux.
 const MAX_LINKS: usize = 40;
 
-/// Writes a scene in the format of the path's extension ([`codec::write`]), as [`write_beside`] does. The new file is read back whole
+/// Writes a scene in the format of the path's extension ([`codec::write`]), as `write_beside` does. The new file is read back whole
 /// before it replaces an existing one.
 ///
 /// # Errors

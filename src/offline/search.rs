@@ -7,7 +7,7 @@ use super::dataset::{DatasetError, TrainingView};
 use super::engine::Engine;
 use super::prune::kept_count;
 use super::quality::{Evaluator, Trial, smallest_count};
-use super::score::variant::Variant;
+use super::score::Variant;
 use super::score::{ScoreError, Scores};
 use super::stored::{Stored, Text};
 use super::{OfflineError, Progress};

@@ -43,19 +43,19 @@
 //! with larger buffers, or returns an error.
 
 mod active;
-pub mod bind;
+pub(crate) mod bind;
 mod capture;
 mod design;
 mod device;
 mod error;
 mod headless;
-pub mod layout;
-pub mod memory;
+pub(crate) mod layout;
+pub(crate) mod memory;
 mod pipelines;
-pub mod shaders;
+pub(crate) mod shaders;
 mod statistics;
 mod timing;
-mod view;
+pub(crate) mod view;
 mod work;
 
 pub use active::ActiveList;
@@ -68,5 +68,6 @@ pub use pipelines::Renderer;
 pub use shaders::{ColorPrecision, ShaderChecks, Storage};
 pub use statistics::ViewStatistics;
 pub use timing::{PassTime, Timings};
-pub use view::{FinishedFrame, Instance, OpaqueDepth, PassBuffers, ViewParameters, ViewRenderer};
+pub(crate) use view::FinishedFrame;
+pub use view::{Instance, OpaqueDepth, ViewParameters, ViewRenderer};
 pub use work::WorkCounters;

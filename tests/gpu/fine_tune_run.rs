@@ -5,13 +5,14 @@
 
 use crate::support::{dataset, gpu};
 use bevy_gs4d::gaussian::{GradientMode, Parameters};
+use bevy_gs4d::internal::offline::fine_tune::{Sample, Trainer};
+use bevy_gs4d::internal::offline::prune::select;
+use bevy_gs4d::internal::offline::store::{Key, Store};
 use bevy_gs4d::offline::dataset::TrainingView;
-use bevy_gs4d::offline::fine_tune::{FineTuneSettings, Rates, Resume, Sample, Trainer, TrainingImages, fine_tune};
-use bevy_gs4d::offline::prune::select;
+use bevy_gs4d::offline::fine_tune::{FineTuneSettings, Rates, Resume, TrainingImages, fine_tune};
 use bevy_gs4d::offline::quantize::Quality;
-use bevy_gs4d::offline::splits::{SplitOptions, Splits};
-use bevy_gs4d::offline::store::{Key, Store};
 use bevy_gs4d::offline::{NoProgress, OfflineError, Progress};
+use bevy_gs4d::offline::{SplitOptions, Splits};
 use bevy_gs4d::renderer::Headless;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Environment, FilterKind, GaussianScene, SceneForm, TemporalFilter, Trained};

@@ -2,16 +2,16 @@
 //!
 //! In: the composed passes with naga's layout. Out: proof that every structure and constant is the same in the shaders and on the host.
 
-use bevy_gs4d::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
-use bevy_gs4d::gaussian::projection::LOW_PASS;
 use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF};
-use bevy_gs4d::offline::fine_tune::NEIGHBORS;
-use bevy_gs4d::renderer::layout::{
+use bevy_gs4d::internal::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
+use bevy_gs4d::internal::gaussian::projection::LOW_PASS;
+use bevy_gs4d::internal::offline::fine_tune::NEIGHBORS;
+use bevy_gs4d::internal::renderer::layout::{
     self, Activation, AdamUniforms, BLOCK, Counters, DIGITS, FIRST_SEEN, FrameUniforms, INSTANCE_STRIDE,
     INSTANCES_AT_ONCE, InstanceUniforms, LossUniforms, MotionUniforms, RoundingRecord, SortStep, SplatRecord,
     SplatShape, TermWeights, TiedColors, TrainedRecord, TrainedScene, VisibleSplat,
 };
-use bevy_gs4d::renderer::shaders::{COPIED_INSTANCE, compose, pass_names};
+use bevy_gs4d::internal::renderer::shaders::{COPIED_INSTANCE, compose, pass_names};
 use bevy_gs4d::view::TILE_SIZE;
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;

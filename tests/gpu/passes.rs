@@ -5,12 +5,13 @@
 
 use crate::support::passes::{Gpu, Pass};
 use bevy_gs4d::gaussian::Gaussian;
-use bevy_gs4d::gaussian::overlap::TileRect;
-use bevy_gs4d::reference::{self, Layer, Pair, Splat};
-use bevy_gs4d::renderer::layout::{
+use bevy_gs4d::internal::gaussian::overlap::TileRect;
+use bevy_gs4d::internal::reference::{self, Pair, Splat};
+use bevy_gs4d::internal::renderer::layout::{
     self, BLOCK, Counters, DEPTH_STEPS, DIGIT_BITS, DIGITS, FrameUniforms, INVISIBLE, InstanceUniforms, SortStep,
     SplatRecord,
 };
+use bevy_gs4d::reference::Layer;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::view::{Appearance, BlendSpace, Camera, DebugView, RasterFov};
 use bytemuck::Zeroable;

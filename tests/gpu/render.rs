@@ -6,8 +6,9 @@
 use crate::support::surfaces::depth_texture;
 use crate::support::{gpu, limited_device, packed_scene};
 use bevy_gs4d::gaussian::{Gaussian, Parameters};
+use bevy_gs4d::internal::reference::{self, Splat};
 use bevy_gs4d::offline::quantize::compress;
-use bevy_gs4d::reference::{self, Layer, Splat};
+use bevy_gs4d::reference::Layer;
 use bevy_gs4d::renderer::{
     ActiveList, CaptureUpload, Design, GpuCapture, GpuContext, GpuError, Headless, Instance, OpaqueDepth, Renderer,
     ShaderChecks, ViewParameters, ViewRenderer,

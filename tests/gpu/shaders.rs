@@ -3,10 +3,11 @@
 //! In: the files of `shaders/`. Out: proof that each file is known to the renderer and is valid WGSL, and that only the variants for devices
 //! with optional capabilities need these capabilities.
 
-use bevy_gs4d::renderer::shaders::{
-    ATOMIC_SUMS, BINNED, Blending, COMPAT, COMPAT_WITHOUT_TIME, COPIED_INSTANCE, ColorPrecision, EIGHT_AT_ONCE,
-    FEW_BINS, LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32, Storage, compose, pass_names,
+use bevy_gs4d::internal::renderer::shaders::{
+    ATOMIC_SUMS, BINNED, Blending, COMPAT, COMPAT_WITHOUT_TIME, COPIED_INSTANCE, EIGHT_AT_ONCE, FEW_BINS,
+    LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32, compose, pass_names,
 };
+use bevy_gs4d::renderer::{ColorPrecision, Storage};
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -3,7 +3,7 @@
 //! In: the name of a score, the options for scoring. Out: a [`ScoreChoice`], [`ScoringSettings`].
 
 use super::values;
-use crate::offline::score::variant::Variant;
+use crate::offline::score::Variant;
 use crate::offline::score::{ScoreSettings, ScoringSettings};
 use crate::offline::search::ScoreChoice;
 use clap::builder::{PossibleValuesParser, TypedValueParser};

@@ -45,7 +45,7 @@ pub struct BakeSettings {
     /// How much compression may lose.
     pub quality: Quality,
     /// zstd level of the package, 1 (fast) to 19 (small); `None` uses the default of
-    /// [`write_settings`](crate::offline::write_settings).
+    /// `write_settings`.
     pub level: Option<i32>,
     /// Whether images are used without a check that they show the capture.
     pub trust_images: bool,

@@ -73,7 +73,7 @@ pub struct Regularization {
     pub gradients: Vec<ParameterGradient>,
 }
 
-/// Computes the terms. `neighbors` are those of [`neighbors`](super::neighbors()); without any the rigid term is 0.
+/// Computes the terms. `neighbors` are those of `neighbors`); without any the rigid term is 0.
 ///
 /// # Errors
 /// A Gaussian that cannot be drawn.

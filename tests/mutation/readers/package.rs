@@ -8,10 +8,10 @@ use crate::change::{bytes, numbers, text};
 use crate::support::packed_scene;
 use crate::support::random::Random;
 use bevy_gs4d::codec::package::{
-    self, EnvironmentSize, FLOAT_PLANES, Header, MAGIC, PACKAGE, Section, StoredFilter, StoredForm, VERSION,
-    WriteSettings,
+    self, EnvironmentSize, Header, MAGIC, Section, StoredFilter, StoredForm, VERSION, WriteSettings,
 };
 use bevy_gs4d::gaussian::{Model, Parameters};
+use bevy_gs4d::internal::codec::package::{FLOAT_PLANES, PACKAGE};
 use bevy_gs4d::offline::quantize::compress;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{
