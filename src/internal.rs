@@ -13,6 +13,10 @@ pub mod gaussian {
     pub mod alpha {
         pub use crate::gaussian::alpha::*;
     }
+    /// The covariance of splats on the screen.
+    pub mod conic {
+        pub use crate::gaussian::conic::*;
+    }
     /// Spherical harmonics.
     pub mod harmonics {
         pub use crate::gaussian::harmonics::*;

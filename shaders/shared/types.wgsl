@@ -240,7 +240,7 @@ const BACKGROUND_ENVIRONMENT: u32 = 2u;
 struct SplatRecord {
     // Center, opacity, depth.
     place: vec4<f32>,
-    // Inverse covariance xx, xy, yy; tiles x0 and y0.
+    // Inverse covariance, factored (conic.wgsl); tiles x0 and y0.
     shape: vec4<u32>,
     // Color; tiles x1 and y1 (ends excluded).
     color: vec4<u32>,
@@ -250,7 +250,7 @@ struct SplatRecord {
 struct SplatShape {
     // Center, opacity, depth.
     place: vec4<f32>,
-    // Inverse covariance xx, xy, yy.
+    // Inverse covariance, factored (conic.wgsl); unused.
     conic: vec4<f32>,
 }
 

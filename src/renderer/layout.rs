@@ -418,7 +418,7 @@ pub struct SplatRecord {
     pub opacity: f32,
     /// Depth, camera units.
     pub depth: f32,
-    /// Inverse covariance: xx, xy, yy.
+    /// Inverse covariance, [factored](crate::gaussian::conic).
     pub conic: [f32; 3],
     /// Tiles x0 and y0, 16 bits each.
     pub tiles_low: u32,
@@ -434,7 +434,7 @@ pub struct SplatRecord {
 pub struct SplatShape {
     /// Center in pixels, opacity times marginal, depth in camera units.
     pub place: [f32; 4],
-    /// Inverse covariance: xx, xy, yy.
+    /// Inverse covariance, [factored](crate::gaussian::conic); unused.
     pub conic: [f32; 4],
 }
 

@@ -13,6 +13,7 @@ use wgpu::naga::valid::Capabilities;
 const LIBRARIES: &[(&str, &str)] = &[
     ("types", include_str!("../../shaders/shared/types.wgsl")),
     ("records", include_str!("../../shaders/shared/records.wgsl")),
+    ("conic", include_str!("../../shaders/shared/conic.wgsl")),
     ("alpha", include_str!("../../shaders/shared/alpha.wgsl")),
     ("tile", include_str!("../../shaders/shared/tile.wgsl")),
     ("srgb", include_str!("../../shaders/shared/srgb.wgsl")),

@@ -20,6 +20,7 @@ mod passes;
 mod render;
 mod score;
 mod shaders;
+mod thin;
 
 #[path = "../support"]
 mod support {
@@ -34,6 +35,8 @@ mod support {
     pub mod own_process;
     pub mod packed_scene;
     pub mod passes;
+    pub mod random;
     pub mod skip;
     pub mod surfaces;
+    pub mod thin;
 }
