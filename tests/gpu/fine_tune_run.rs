@@ -7,6 +7,7 @@ use crate::support::{dataset, gpu};
 use bevy_gs4d::gaussian::{GradientMode, Parameters};
 use bevy_gs4d::offline::dataset::TrainingView;
 use bevy_gs4d::offline::fine_tune::{FineTuneSettings, Rates, Resume, Sample, Trainer, TrainingImages, fine_tune};
+use bevy_gs4d::offline::metrics::SquaredError;
 use bevy_gs4d::offline::prune::select;
 use bevy_gs4d::offline::quantize::Quality;
 use bevy_gs4d::offline::splits::{SplitOptions, Splits};
@@ -164,6 +165,37 @@ fn colors_of_one_coefficient_are_compressed_without_codebooks() {
     let tuned = fine_tune(&mut headless, scene, &lesson.images, &settings, None, &mut NoProgress);
     let colors = tuned.expect("it can be compressed").scene.form.color_degrees();
     assert_eq!(colors.coefficients, 1, "nothing is added");
+}
+
+#[test]
+fn the_last_point_of_a_compressed_run_is_measured_on_the_compressed_scene() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new();
+    let validation = Splits::open(
+        &lesson.folder.path().join("data"),
+        &SplitOptions::default(),
+        &lesson.scene.trained_with,
+        &mut NoProgress,
+    );
+    let validation = validation.expect("the dataset was just written").validation;
+    for quality in [Quality::Small, Quality::VisuallyLossless, Quality::Lossless] {
+        let settings = FineTuneSettings { steps: 0, compress: Some((quality, 2)), ..FineTuneSettings::default() };
+        let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.images, &settings, None, &mut NoProgress);
+        let tuned = tuned.unwrap_or_else(|error| panic!("{quality:?}: {error}"));
+        let runtime = tuned.scene.into_runtime().expect("a compressed scene can be drawn");
+        let capture = headless.upload(&runtime).expect("it fits");
+        let mut error = SquaredError::default();
+        for view in &validation {
+            let image = view.load_covered().expect("it was just written").over(Vec3::ZERO);
+            let view = view.camera.view(view.time, runtime.trained_with.raster_fov);
+            let frame = headless.render(&capture, &view, Background::Color([0.0; 3])).expect("it is drawn");
+            error.add(&image, &frame.picture.clamped()).expect("one size");
+        }
+        let last = tuned.curve.last().expect("a point");
+        let found = last.psnr.expect("validation views");
+        assert!((found - error.psnr()).abs() < 1e-6, "{quality:?}: {found} dB reported, {} dB drawn", error.psnr());
+        assert_eq!((last.loss, last.training_psnr), (None, None), "{quality:?}: no loss of the compressed scene");
+    }
 }
 
 #[test]
