@@ -61,7 +61,7 @@ fn training_raises_the_quality_of_a_pruned_scene() {
     );
     let (before, best) = (json["psnr_before"].as_f64(), json["best"]["psnr"].as_f64());
     assert!(best > before.map(|before| before + 2.0), "{best:?} dB after {before:?}");
-    assert_eq!(json["curve"].as_array().map(Vec::len), Some(3), "before, halfway, at the end");
+    assert_eq!(json["curve"].as_array().map(Vec::len), Some(3), "three points: before, halfway, at the end");
     assert_eq!(lesson.left(), ["data", "pruned.gs4d", "scene.gs4d", "tuned.gs4d"], "no state file is left");
     let info = gs4d(&arguments!["info", &out, "--json"]).json();
     assert_eq!((info["gaussians"].as_u64(), info["form"].as_str()), (Some(500), Some("trained")), "{info}");
@@ -177,7 +177,7 @@ fn atomic_sums_train_or_are_refused_with_a_remedy() {
     let run = gs4d(&[command.to_vec(), arguments!["--sums", "atomic"].to_vec()].concat());
     if run.code == Some(0) {
         let info = gs4d(&arguments!["info", &out, "--json"]).json();
-        assert_eq!(info["gaussians"].as_u64(), Some(500), "it is trained: {info}");
+        assert_eq!(info["gaussians"].as_u64(), Some(500), "the scene is trained: {info}");
     } else {
         run.must_fail("--sums deterministic");
         assert_eq!(lesson.left(), before, "no file is left");
