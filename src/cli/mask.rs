@@ -1,7 +1,7 @@
 //! `gs4d mask IN -o OUT`: adds a temporal filter to a scene.
 //!
-//! In: a scene, a number of key-frames, training views if the filter needs them. Out: a package with the filter, and
-//! the share of active Gaussians.
+//! In: a scene, a number of key-frames, training views if the filter needs them. Out: a package with the filter, and a
+//! report with the share of active Gaussians.
 
 use super::args::{CheckpointArgs, DataArgs, EngineArgs, PackageArgs, values};
 use super::failure::Failure;
@@ -16,7 +16,7 @@ use crate::scene::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Tell a scene which of its Gaussians are active when, so that drawing can skip the others.
+/// Add a temporal filter: the Gaussians that are active in each segment of time. Drawing skips the other Gaussians.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -25,22 +25,23 @@ Examples:
   gs4d mask n3v.pth --filter key-frame --data data/n3v --every 20 -o filtered.gs4d
 
 Filters:
-  support    active wherever its opacity can show; changes no pixel and needs no views
-  interval   support, narrowed to what some training view between two key-frames, or any camera at them, sees
-  key-frame  the paper's: what any camera sees at the two key-frames around; loses what comes and goes between them")]
+  support    Gaussians whose opacity can be visible in the segment. Changes no pixel and needs no views.
+  interval   Gaussians of support that a training view in the segment, or a camera at its two key-frames, sees.
+  key-frame  Gaussians that a camera sees at the two key-frames of the segment, as in the paper. Loses Gaussians that appear
+             and disappear between them.")]
 pub struct Mask {
-    /// The checkpoint or package to filter. A filter that it has is replaced.
+    /// The checkpoint or package to filter. Its filter is replaced.
     #[arg(value_name = "IN")]
     input: PathBuf,
     #[command(flatten)]
     package: PackageArgs,
-    /// Which filter.
+    /// Kind of filter.
     #[arg(long, value_name = "FILTER", default_value = "support", value_parser = values::one_of(&FILTER_NAMES))]
     filter: FilterKind,
-    /// Number of key-frames, evenly over the time interval, both ends included [default: 11].
+    /// Number of key-frames, evenly spaced over the time interval including both ends [default: 11].
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(2..=i64::from(MAX_SEGMENTS) + 1))]
     key_frames: Option<u32>,
-    /// A key-frame every so many of the training data's timestamps, instead.
+    /// Number of timestamps of the training data between two key-frames, in place of --key-frames.
     #[arg(long, value_name = "FRAMES", conflicts_with = "key_frames", value_parser = values::count(1_000_000))]
     every: Option<usize>,
     #[command(flatten)]
@@ -52,7 +53,7 @@ pub struct Mask {
 }
 
 impl Mask {
-    /// Computes the filter and writes the scene with it.
+    /// Computes the filter and writes the scene with the filter.
     ///
     /// # Errors
     /// A scene or views that cannot be used, too many key-frames, a package that cannot be written, a failure of the
@@ -82,7 +83,7 @@ impl Mask {
         let text = lines(&[
             ("filter", format!("{name}, {keys} key-frames, {segments} segments")),
             ("active", format!("{:.1} % of {count} Gaussians, mean over segments", share * 100.0)),
-            ("overlap", format!("{mean:.3} (IoU of neighboring segments; {least:.3} at least)")),
+            ("overlap", format!("{mean:.3} (mean IoU of neighboring segments; lowest {least:.3})")),
             ("size", format!("{} as {form}, before compression", bytes(size))),
             ("wrote", format!("{}, {}", out.display(), bytes(written))),
         ]);
@@ -102,10 +103,12 @@ impl Mask {
         Ok(Report::new(json, text))
     }
 
+    /// Returns the number of key-frames.
     fn keys(&self, views: &[TrainingView]) -> Result<u32, Failure> {
         let keys = values::key_frames(self.key_frames, self.every).count(views);
         let fits = u32::try_from(keys).ok().filter(|keys| *keys <= MAX_SEGMENTS + 1);
-        fits.ok_or_else(|| Failure::new(format!("{keys} key-frames are too many: raise --every")))
+        let most = MAX_SEGMENTS + 1;
+        fits.ok_or_else(|| Failure::new(format!("{keys} key-frames are more than {most}: use a larger --every")))
     }
 }
 

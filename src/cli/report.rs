@@ -14,21 +14,21 @@ use std::io::{ErrorKind, Write, stdout};
 pub struct Report {
     /// The report with `--json`.
     pub json: Value,
-    /// The report for people; lines end with a line break.
+    /// The report for people. Each line ends with a line break.
     pub text: String,
-    /// Why the command fails although it has a report; `None` on success.
+    /// The failure of a command that also has a report; `None` on success.
     pub failure: Option<Failure>,
-    /// Whether the work ended early because the user asked for it.
+    /// Whether the user interrupted the work.
     pub interrupted: bool,
 }
 
 impl Report {
-    /// Returns a report of success.
+    /// Returns the report of a successful command.
     pub fn new(json: Value, text: String) -> Self {
         Self { json, text, failure: None, interrupted: false }
     }
 
-    /// Returns a report of a failure alone.
+    /// Returns a report that has only a failure.
     pub fn of_failure(failure: Failure) -> Self {
         Self {
             json: json!({ "error": failure.message() }),
@@ -41,7 +41,7 @@ impl Report {
     /// Prints the report. A closed pipe (`| head`) is not an error.
     ///
     /// # Errors
-    /// Standard output cannot be written.
+    /// Standard output cannot be written to.
     pub fn print(&self, as_json: bool) -> Result<(), Failure> {
         let text = if as_json { plain::json(&format!("{:#}\n", self.json)) } else { plain::lines(&self.text) };
         let printed = stdout().write_all(text.as_bytes()).and_then(|()| stdout().flush());

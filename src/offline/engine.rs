@@ -125,12 +125,22 @@ impl Engine {
     ) -> Result<Box<dyn Draw + 'a>, GpuError> {
         Ok(match self {
             Self::Cpu => Box::new(CpuDrawing { scene, background }),
-            Self::Gpu(headless) => {
-                let capture = headless.upload(scene)?;
-                Box::new(GpuDrawing { headless, capture, background })
-            }
+            Self::Gpu(headless) => Box::new(drawing_on_gpu(headless, scene, background)?),
         })
     }
+}
+
+/// Prepares a scene for drawing on a GPU.
+///
+/// # Errors
+/// The scene does not fit the GPU.
+pub(crate) fn drawing_on_gpu<'a>(
+    headless: &'a mut Headless,
+    scene: &RuntimeScene,
+    background: Background,
+) -> Result<impl Draw + use<'a>, GpuError> {
+    let capture = headless.upload(scene)?;
+    Ok(GpuDrawing { headless, capture, background })
 }
 
 /// A scene prepared for drawing.

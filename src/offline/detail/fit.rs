@@ -1,7 +1,7 @@
-//! Fitting: training few Gaussians to look like all Gaussians.
+//! Fitting: trains the Gaussians of a level on pictures of all Gaussians.
 //!
-//! In: a scene in the trained form, [`Look`]s of all Gaussians. Out: the scene after some steps, over random backgrounds, so that opacity is
-//! trained too. The scene is drawn anti-aliased, as levels are; gradients leave out the factor of anti-aliasing on opacity.
+//! In: a scene in the trained form, [`Look`]s of all Gaussians. Out: the scene after a number of steps. Backgrounds are random, so that opacity
+//! is trained too. The scene is drawn with anti-aliasing, as levels are; gradients leave out the factor of anti-aliasing on opacity.
 
 use super::looks::Look;
 use crate::gaussian::GradientMode;
@@ -14,14 +14,14 @@ use crate::scene::random::Random;
 use crate::view::{Background, Frame, View};
 use glam::Vec3;
 
-/// Views of a step.
+/// Number of views of a step.
 const BATCH: usize = 4;
 /// Factor on the rates at the last step.
 const LAST_RATE: f64 = 0.05;
-/// Colors change faster than in fine-tuning, since the start is an estimate.
+/// The rates of color are higher than in fine-tuning, because the initial colors are estimates.
 const RATES: Rates = Rates { harmonics: 1e-3, color: 5e-3, ..Rates::OURS };
 
-/// Trains a scene on these looks, of which there is at least one. Begins the task "fitting".
+/// Trains a scene on at least one look. Begins the task "fitting".
 pub(super) fn fit(
     headless: &mut Headless,
     scene: GaussianScene,
@@ -47,7 +47,7 @@ pub(super) fn fit(
             let (view, image) = (&views[index], &images[index]);
             batch.push(Sample { view, image, background, number: index as u32 });
         }
-        // No SSIM: the structures that it compares are smaller than a few pixels.
+        // Without SSIM, whose windows are larger than these pictures' details of a few pixels.
         trainer.accumulate(&batch, 0.0)?;
         let factor = 1.0 - (1.0 - LAST_RATE) * step as f64 / steps as f64;
         trainer.step(&RATES, factor, step + 1)?;
