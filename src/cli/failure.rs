@@ -4,6 +4,7 @@
 //! causes, errors of the system in words.
 
 use super::system;
+use crate::offline::INTERRUPTED;
 use std::any::Any;
 use std::error::Error;
 use std::path::Path;
@@ -45,6 +46,11 @@ impl Failure {
     /// Returns the message.
     pub fn message(&self) -> &str {
         &self.message
+    }
+
+    /// Returns whether the work has ended because the user asked for it.
+    pub fn is_interruption(&self) -> bool {
+        self.message.rsplit(": ").next() == Some(INTERRUPTED)
     }
 
     /// Returns whether nothing is to be said about it: the program that reads what is written has ended before, as `head` does.

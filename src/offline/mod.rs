@@ -62,8 +62,11 @@ mod temporary_file;
 mod test_comparison;
 mod trained_pixel;
 pub mod trained_search;
+pub(crate) mod unfinished;
 
+pub(crate) use error::INTERRUPTED;
 pub use error::OfflineError;
+pub(crate) use progress::proceed;
 pub use progress::{NoProgress, Progress};
 pub use save::{save, write_beside, write_png, write_settings};
 pub use subject::Subject;

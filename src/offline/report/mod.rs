@@ -10,6 +10,6 @@ mod plot;
 mod temporal;
 
 pub use bake_report::{BakeReport, Change, Sample, SectionSize, StageTime, Tried};
-pub use files::{report_paths, write_report};
+pub use files::{report_paths, write_with_report};
 pub use plot::{Axis, Chart, Series, bars};
 pub use temporal::{Activity, VarianceHistogram, even_times, filter_shares};

@@ -14,7 +14,7 @@ pub use gpu::{GpuEngine, Scorer};
 pub use reference::{ViewScore, Want, score};
 pub use scoring::ScoringSettings;
 
-use super::{Progress, sliced};
+use super::{INTERRUPTED, Progress, sliced};
 use crate::gaussian::{InvalidGaussian, Model, Parameters};
 use crate::scene::{GaussianScene, RuntimeScene, SceneForm};
 use crate::view::{Background, View};
@@ -68,6 +68,9 @@ pub enum ScoreError {
         /// The requested variant.
         variant: Variant,
     },
+    /// The user has asked the work to end.
+    #[error("{INTERRUPTED}")]
+    Interrupted,
     /// The engine failed.
     #[error("{0}")]
     Engine(#[source] Box<dyn Error + Send + Sync>),
@@ -184,6 +187,9 @@ impl Scores {
         for moment in views.chunk_by(|a, b| a.time == b.time) {
             let mut contribution = vec![0.0; sums.len()];
             for view in moment {
+                if progress.is_interrupted() {
+                    return Err(ScoreError::Interrupted);
+                }
                 let score = engine.score(view, Want::Removal)?;
                 add(&mut contribution, &score.contribution);
                 for ((sum, &energy), &removal) in sums.iter_mut().zip(&score.energy).zip(&score.removal) {
