@@ -4,7 +4,7 @@
 //! causes, errors of the system in words.
 
 use super::system;
-use crate::offline::INTERRUPTED;
+use crate::offline::OfflineError;
 use std::any::Any;
 use std::error::Error;
 use std::path::Path;
@@ -50,7 +50,8 @@ impl Failure {
 
     /// Returns whether the work has ended because the user asked for it.
     pub fn is_interruption(&self) -> bool {
-        self.message.rsplit(": ").next() == Some(INTERRUPTED)
+        let interrupted = OfflineError::Interrupted { tuned: None }.to_string();
+        self.message.rsplit(": ").next() == Some(interrupted.as_str())
     }
 
     /// Returns whether nothing is to be said about it: the program that reads what is written has ended before, as `head` does.

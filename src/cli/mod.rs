@@ -129,7 +129,9 @@ pub fn run() -> ExitCode {
 /// Runs a verb. Returns its report, also after a panic, and the exit code if it has failed.
 fn report_of(verb: impl FnOnce() -> Result<Report, Failure>) -> (Report, u8) {
     match catch_unwind(AssertUnwindSafe(verb)) {
-        Ok(Err(failure)) if failure.is_interruption() => (Report::of_interruption(&unfinished::existing()), FAILED),
+        Ok(Err(failure)) if failure.is_interruption() && interrupt::is_asked() => {
+            (Report::of_interruption(&unfinished::existing()), FAILED)
+        }
         Ok(outcome) => (outcome.unwrap_or_else(Report::of_failure), FAILED),
         Err(panic) => (Report::of_failure(Failure::of_panic(&*panic)), PANICKED),
     }

@@ -6,7 +6,7 @@ use super::failure::Failure;
 use super::note::note;
 use super::plain;
 use crate::codec::checkpoint;
-use crate::offline::INTERRUPTED;
+use crate::offline::OfflineError;
 use crate::offline::unfinished::Existing;
 use crate::scene::{PlaybackHints, TrainedWith};
 use serde_json::{Value, json};
@@ -43,7 +43,7 @@ impl Report {
     /// Returns the report of a command that has ended because the user asked for it: what exists of its work.
     pub fn of_interruption(existing: &Existing) -> Self {
         let again = if existing.resumes { "; the same command resumes" } else { "" };
-        let failure = Failure::new(format!("{INTERRUPTED}{again}"));
+        let failure = Failure::new(format!("{}{again}", OfflineError::Interrupted { tuned: None }));
         let outputs: Vec<String> = existing.outputs.iter().map(|path| path.display().to_string()).collect();
         let json = json!({
             "error": failure.message(),

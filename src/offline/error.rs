@@ -18,7 +18,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 /// The message of work that has ended because the user asked for it.
-pub(crate) const INTERRUPTED: &str = "interrupted";
+pub(super) const INTERRUPTED: &str = "interrupted";
 
 /// An error of the offline half.
 #[derive(Debug, thiserror::Error)]

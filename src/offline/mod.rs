@@ -22,6 +22,7 @@
 //! | [`ablation`] | tabulates what every score, ratio and filter costs |
 //! | [`files`] | tells inputs from outputs, and what cannot be written, before anything is computed |
 //! | [`stages`], [`store`], [`stored`] | run stages and keep their results, from which interrupted work resumes |
+//! | [`unfinished`] | lists what must not be left behind by a process that ends in the middle of its work |
 //! | [`orbit`], [`render`] | draws a scene from all around, many pictures at a time |
 
 pub mod ablation;
@@ -62,9 +63,8 @@ mod temporary_file;
 mod test_comparison;
 mod trained_pixel;
 pub mod trained_search;
-pub(crate) mod unfinished;
+pub mod unfinished;
 
-pub(crate) use error::INTERRUPTED;
 pub use error::OfflineError;
 pub(crate) use progress::proceed;
 pub use progress::{NoProgress, Progress};

@@ -34,8 +34,8 @@ struct Kept {
 }
 
 /// What exists of the work so far.
-#[derive(Debug, Default, PartialEq)]
-pub(crate) struct Existing {
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Existing {
     /// The outputs that are complete.
     pub outputs: Vec<PathBuf>,
     /// Whether there are intermediate results, from which the same command resumes.
@@ -43,7 +43,7 @@ pub(crate) struct Existing {
 }
 
 /// Begins to keep the list: from now on the process may call [`abandon`].
-pub(crate) fn keep() {
+pub fn keep() {
     lock().0.get_or_insert_default();
 }
 
@@ -53,13 +53,13 @@ pub(super) fn lock() -> MutexGuard<'static, List> {
 }
 
 /// Returns what exists so far.
-pub(crate) fn existing() -> Existing {
+pub fn existing() -> Existing {
     lock().existing()
 }
 
 /// Removes all that is unfinished and returns what exists. From then on no temporary file is created, and none becomes an output: threads that
 /// try wait until the process ends. Returns `None` and removes nothing if the list stays locked for longer than `patience`.
-pub(crate) fn abandon(patience: Duration) -> Option<Existing> {
+pub fn abandon(patience: Duration) -> Option<Existing> {
     let start = Instant::now();
     let list = loop {
         match LIST.try_lock() {
@@ -77,7 +77,7 @@ pub(crate) fn abandon(patience: Duration) -> Option<Existing> {
 }
 
 /// Returns whether a device or a pipe is being written.
-pub(crate) fn is_streaming() -> bool {
+pub fn is_streaming() -> bool {
     STREAMS.load(Ordering::SeqCst) > 0
 }
 

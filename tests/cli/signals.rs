@@ -212,8 +212,9 @@ fn random_signals_end_work_on_the_gpu_without_a_crash() {
         let (printed, err) = (read(&mut child.stdout), read(&mut child.stderr));
         let found = code_of(status);
         assert!(found == Some(0) || found == Some(code), "{context}: ends with 0 or {code}, not {status}: {err}");
-        *ends.entry(format!("{verb} {}", found.unwrap_or_default())).or_default() += 1;
         // A signal before the handler is set ends the process with its default action.
+        let early = if status.code().is_some() { "" } else { ", before the handler is set" };
+        *ends.entry(format!("{verb} {}{early}", found.unwrap_or_default())).or_default() += 1;
         let document = status.code().map(|_| {
             let document = serde_json::from_str::<Value>(&printed);
             document.unwrap_or_else(|error| panic!("{context}: exactly one JSON document: {error}: {printed}"))

@@ -14,7 +14,8 @@ pub use gpu::{GpuEngine, Scorer};
 pub use reference::{ViewScore, Want, score};
 pub use scoring::ScoringSettings;
 
-use super::{INTERRUPTED, Progress, sliced};
+use super::error::INTERRUPTED;
+use super::{Progress, sliced};
 use crate::gaussian::{InvalidGaussian, Model, Parameters};
 use crate::scene::{GaussianScene, RuntimeScene, SceneForm};
 use crate::view::{Background, View};
