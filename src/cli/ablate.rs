@@ -5,7 +5,6 @@
 
 use super::args::{CheckpointArgs, EngineArgs, ScoringArgs, SplitArgs, ValidationArgs, score_choice, values};
 use super::failure::Failure;
-use super::interrupt;
 use super::progress::Bars;
 use super::report::Report;
 use super::table::{Table, lines};
@@ -185,5 +184,5 @@ fn write_csv(path: &Path, rows: &[AblationRow]) -> Result<(), Failure> {
         let [name, values @ ..] = cells(row, "");
         text += &format!("\"{name}\",{}\n", values.join(","));
     }
-    Ok(interrupt::whole(|| write_beside(path, |file| file.write_all(text.as_bytes())))?)
+    Ok(write_beside(path, |file| file.write_all(text.as_bytes()))?)
 }

@@ -6,10 +6,12 @@
 use super::args::{CheckpointArgs, RenderersArgs, ViewArgs, values};
 use super::failure::Failure;
 use super::note::note;
+use super::progress::Bars;
 use super::report::{Report, switches_json};
 use super::table::{Table, bytes};
 use crate::offline::engine::AdapterDescription;
 use crate::offline::orbit::{at_times, share};
+use crate::offline::proceed;
 use crate::reference::{Workload, workload};
 use crate::renderer::{ColorPrecision, Design, GpuCapture, Timings};
 use crate::scene::RuntimeScene;
@@ -126,6 +128,7 @@ impl Bench {
         headless.measure_precision(if self.half { ColorPrecision::Half } else { ColorPrecision::Single });
         for round in 1..=self.rounds {
             for row in &mut rows {
+                proceed(&Bars::default())?;
                 let Subject { path, capture, views, .. } = row.subject;
                 note(&format!("round {round} of {}: {}", self.rounds, path.display()));
                 headless.set_design(row.design);

@@ -5,7 +5,6 @@
 
 use super::args::{CheckpointArgs, DesignArgs, EngineArgs, SplitArgs, values};
 use super::failure::Failure;
-use super::interrupt;
 use super::progress::Bars;
 use super::report::{Report, switches_json};
 use super::table::{Table, lines};
@@ -125,7 +124,7 @@ impl Eval {
         let seen = |view: &ViewMetrics, reference: &Picture, render: &Picture| -> Result<(), OfflineError> {
             let Some(out) = &self.out else { return Ok(()) };
             let (path, picture) = (picture_of(out, &view.name), side_by_side(reference, render, self.gain));
-            Ok(interrupt::whole(|| write_png(&path, &picture))?)
+            Ok(write_png(&path, &picture)?)
         };
         let views = &dataset.views;
         let mut evaluation = evaluate_scene(&mut engine, &scene, views, background, metrics, progress, seen)?;

@@ -4,6 +4,7 @@
 //! of the operating system are replaced by sentences.
 
 use super::system;
+use crate::offline::OfflineError;
 use std::any::Any;
 use std::error::Error;
 use std::path::Path;
@@ -45,6 +46,12 @@ impl Failure {
     /// Returns the message.
     pub fn message(&self) -> &str {
         &self.message
+    }
+
+    /// Returns whether the work has ended because the user asked for it.
+    pub fn is_interruption(&self) -> bool {
+        let interrupted = OfflineError::Interrupted { tuned: None }.to_string();
+        self.message.rsplit(": ").next() == Some(interrupted.as_str())
     }
 
     /// Returns whether no message is printed: the program that reads the output (such as `head`) has ended.

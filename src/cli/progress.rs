@@ -5,7 +5,6 @@
 
 use super::interrupt;
 use super::note::{BARS, is_silent, note};
-use crate::codec::CodecError;
 use crate::offline::Progress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
@@ -45,10 +44,6 @@ impl Progress for Bars {
 
     fn is_interrupted(&self) -> bool {
         interrupt::is_asked()
-    }
-
-    fn uninterrupted(&mut self, write: &mut dyn FnMut() -> Result<(), CodecError>) -> Result<(), CodecError> {
-        interrupt::whole(write)
     }
 }
 

@@ -4,7 +4,6 @@
 
 use super::args::{CheckpointArgs, RendererArgs, ViewArgs, values};
 use super::failure::Failure;
-use super::interrupt::whole;
 use super::progress::Bars;
 use super::report::{Report, switches, switches_json};
 use super::table::lines;
@@ -160,9 +159,9 @@ impl Render {
     }
 
     fn write(&self, shot: &Shot, picture: &Picture) -> Result<(), OfflineError> {
-        whole(|| write_png(&self.path(shot, "png"), picture))?;
+        write_png(&self.path(shot, "png"), picture)?;
         if self.raw {
-            whole(|| write_beside(&self.path(shot, "f32"), |file| file.write_all(&picture.to_raw())))?;
+            write_beside(&self.path(shot, "f32"), |file| file.write_all(&picture.to_raw()))?;
         }
         Ok(())
     }

@@ -6,6 +6,8 @@ use super::failure::Failure;
 use super::note::note;
 use super::plain;
 use crate::codec::checkpoint;
+use crate::offline::OfflineError;
+use crate::offline::unfinished::Existing;
 use crate::scene::{PlaybackHints, TrainedWith};
 use serde_json::{Value, json};
 use std::io::{ErrorKind, Write, stdout};
@@ -36,6 +38,20 @@ impl Report {
             failure: Some(failure),
             interrupted: false,
         }
+    }
+
+    /// Returns the report of a command that has ended because the user asked for it: what exists of its work.
+    pub fn of_interruption(existing: &Existing) -> Self {
+        let again = if existing.resumes { "; the same command resumes" } else { "" };
+        let failure = Failure::new(format!("{}{again}", OfflineError::Interrupted { tuned: None }));
+        let outputs: Vec<String> = existing.outputs.iter().map(|path| path.display().to_string()).collect();
+        let json = json!({
+            "error": failure.message(),
+            "interrupted": true,
+            "written": outputs,
+            "resumes": existing.resumes,
+        });
+        Self { json, text: String::new(), failure: Some(failure), interrupted: true }
     }
 
     /// Prints the report. A closed pipe (`| head`) is not an error.

@@ -5,7 +5,6 @@
 
 use super::args::{CheckpointArgs, DataArgs, EngineArgs, ScoringArgs, ValidationArgs, score_choice, values};
 use super::failure::Failure;
-use super::interrupt;
 use super::progress::Bars;
 use super::report::Report;
 use super::table::{Table, lines};
@@ -145,7 +144,7 @@ impl Score {
         let mut files = Vec::with_capacity(found.len());
         for candidate in found {
             let path = self.path(&candidate.name);
-            interrupt::whole(|| write_scores(&path, &candidate.scores))?;
+            write_scores(&path, &candidate.scores)?;
             files.push(path.display().to_string());
         }
         Ok(files)

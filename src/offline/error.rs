@@ -17,6 +17,9 @@ use glam::UVec2;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
+/// The message of work that has ended because the user asked for it.
+pub(super) const INTERRUPTED: &str = "interrupted";
+
 /// An error of the offline half.
 #[derive(Debug, thiserror::Error)]
 pub enum OfflineError {
@@ -99,8 +102,8 @@ pub enum OfflineError {
         /// What would be chosen.
         what: &'static str,
     },
-    /// The user has asked the work to end. What has been stored is kept, and the same command resumes from it.
-    #[error("interrupted; the same command resumes")]
+    /// The user has asked the work to end. Results that have been stored are kept, and the same work resumes from them.
+    #[error("{INTERRUPTED}")]
     Interrupted {
         /// The best result so far, if the work was fine-tuning.
         tuned: Option<Box<FineTuned>>,

@@ -4,7 +4,7 @@
 
 use super::engine::Engine;
 use super::metrics::SquaredError;
-use super::{OfflineError, Progress};
+use super::{OfflineError, Progress, proceed};
 use crate::scene::RuntimeScene;
 use crate::view::{Picture, View};
 
@@ -57,6 +57,7 @@ fn pictures(
     progress.begin("comparing", views.len());
     let mut pictures = Vec::with_capacity(views.len());
     for view in views {
+        proceed(progress)?;
         pictures.push(drawing.draw(view)?);
         progress.advance();
     }

@@ -22,6 +22,7 @@
 //! | [`ablation`] | tabulates what every score, ratio and filter costs |
 //! | `files` | tells inputs from outputs, and what cannot be written, before anything is computed |
 //! | `stages`, `store`, `stored` | run stages and keep their results, from which interrupted work resumes |
+//! | `unfinished` | lists what must not be left behind by a process that ends in the middle of its work |
 //! | [`orbit`], `render` | draws a scene from all around, many pictures at a time |
 
 pub mod ablation;
@@ -63,9 +64,11 @@ mod temporary_file;
 mod test_comparison;
 mod trained_pixel;
 pub(crate) mod trained_search;
+pub(crate) mod unfinished;
 
 pub use error::OfflineError;
 pub use picture_file::PictureError;
+pub(crate) use progress::proceed;
 pub use progress::{NoProgress, Progress};
 pub use save::save;
 pub(crate) use save::{write_beside, write_png, write_settings};

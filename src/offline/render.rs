@@ -3,7 +3,7 @@
 //! In: a capture on the GPU, views of it, a function that writes a picture. Out: the [`Counts`] of each view.
 
 use super::orbit::Shot;
-use super::{OfflineError, Progress, memory_check};
+use super::{OfflineError, Progress, memory_check, proceed};
 use crate::renderer::{GpuCapture, Headless};
 use crate::view::{Background, Counts, Picture, View};
 use rayon::prelude::*;
@@ -57,6 +57,7 @@ fn draw<'s>(
     progress.begin("rendering", views.len());
     let mut counts = Vec::with_capacity(views.len());
     for (shot, view) in views {
+        proceed(progress)?;
         let frame = headless.render(capture, view, background)?;
         counts.push(frame.counts);
         if queue.send((shot, frame.picture)).is_err() {

@@ -10,7 +10,7 @@ use super::quality::{Evaluator, Trial, smallest_count};
 use super::score::Variant;
 use super::score::{ScoreError, Scores};
 use super::stored::{Stored, Text};
-use super::{OfflineError, Progress};
+use super::{OfflineError, Progress, proceed};
 use crate::scene::{GaussianScene, RuntimeScene};
 use crate::view::Background;
 use serde::{Serialize, Serializer};
@@ -240,6 +240,7 @@ impl ScoreSearch {
         progress.begin("comparing scores", candidates.len());
         let mut outcomes = Vec::with_capacity(candidates.len());
         for candidate in &candidates {
+            proceed(progress)?;
             outcomes.push(self.outcome(engine, scene, candidate, goal)?);
             progress.advance();
         }

@@ -149,6 +149,9 @@ pub fn key_frame_masks(
     let mut masks = vec![vec![0; TemporalFilter::words(count)]; times.len()];
     for (mask, &time) in masks.iter_mut().zip(times) {
         for camera in cameras {
+            if progress.is_interrupted() {
+                return Err(ScoreError::Interrupted);
+            }
             add_blended(engine, &camera.view(time, raster_fov), mask)?;
             progress.advance();
         }
@@ -187,6 +190,9 @@ pub fn interval_filter(
     let mut segments = unions(masks);
     let ends = from_segments(FilterKind::Interval, &segments, count);
     for view in views {
+        if progress.is_interrupted() {
+            return Err(ScoreError::Interrupted);
+        }
         let segment = ends.segment_of(view.time, interval) as usize;
         add_blended(engine, view, &mut segments[segment])?;
         progress.advance();

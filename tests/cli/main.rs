@@ -18,6 +18,8 @@ mod kills;
 mod outputs;
 mod prune;
 mod render;
+#[cfg(target_os = "linux")]
+mod signals;
 
 #[path = "../support"]
 mod support {

@@ -3,7 +3,6 @@
 //! In: options, the files that are read, a scene. Out: the package on disk.
 
 use crate::cli::failure::Failure;
-use crate::cli::interrupt;
 use crate::offline::files::Files;
 use crate::offline::{self, write_settings};
 use crate::scene::GaussianScene;
@@ -51,7 +50,7 @@ impl PackageArgs {
     pub fn save(&self, scene: &GaussianScene) -> Result<u64, Failure> {
         let out = self.out()?;
         let settings = write_settings(&scene.form, self.level);
-        interrupt::whole(|| offline::save(out, scene, &settings))?;
+        offline::save(out, scene, &settings)?;
         file_size(out)
     }
 }

@@ -7,7 +7,7 @@ use super::looks::Look;
 use crate::gaussian::GradientMode;
 use crate::offline::dataset::CoveredImage;
 use crate::offline::fine_tune::{GpuImage, Rates, Sample, Trainer};
-use crate::offline::{OfflineError, Progress};
+use crate::offline::{OfflineError, Progress, proceed};
 use crate::renderer::Headless;
 use crate::scene::GaussianScene;
 use crate::scene::random::Random;
@@ -40,6 +40,7 @@ pub(super) fn fit(
     progress.begin("fitting", steps);
     let mut random = Random::new(1);
     for step in 0..steps {
+        proceed(progress)?;
         let mut batch = Vec::with_capacity(BATCH);
         for _ in 0..BATCH {
             let index = ((random.unit() * looks.len() as f32) as usize).min(looks.len() - 1);

@@ -5,7 +5,7 @@
 
 use crate::offline::memory_check::require;
 use crate::offline::metrics::decibels;
-use crate::offline::{OfflineError, Progress};
+use crate::offline::{OfflineError, Progress, proceed};
 use crate::renderer::{GpuCapture, Headless};
 use crate::scene::{Bounds, RuntimeScene, pixels_across};
 use crate::view::{Background, Camera, Frame, Picture, RasterFov, View};
@@ -134,6 +134,7 @@ pub(super) fn looks(
     for &pixels in sizes {
         let mut own = Vec::new();
         for (direction, time) in around.all(sphere.shown) {
+            proceed(progress)?;
             let view = sphere.view(direction, time, pixels);
             let shown = view.antialiased(trained_pixel);
             let mut all = headless.render(capture, &shown, BLACK)?;

@@ -73,7 +73,7 @@ pub(super) fn compress(
             let Progressed { curve, best, .. } = &*found;
             let state = run.trainer.state()?;
             let checkpoint = Checkpoint { curve: curve.clone(), best: best.clone(), state, coded: Some(step) };
-            saves.store(&checkpoint, progress)?;
+            saves.store(&checkpoint)?;
         }
     }
     progress.finish();

@@ -3,7 +3,7 @@
 //! In: training views. Out: their images as one word for each pixel, decoded once, in parallel ([`TrainingImages`]).
 
 use crate::offline::dataset::{CoveredImage, TrainingView};
-use crate::offline::{OfflineError, Progress, memory_check};
+use crate::offline::{OfflineError, Progress, memory_check, proceed};
 use crate::scene::TrainedWith;
 use crate::view::View;
 use rayon::prelude::*;
@@ -74,6 +74,7 @@ fn load(views: &[TrainingView], progress: &mut dyn Progress) -> Result<Vec<Cover
     progress.begin("loading images", views.len());
     let mut images = Vec::with_capacity(views.len());
     for some in views.chunks(AT_ONCE) {
+        proceed(progress)?;
         let loaded: Vec<_> = some.par_iter().map(TrainingView::load_covered).collect();
         for image in loaded {
             images.push(image?);

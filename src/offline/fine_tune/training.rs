@@ -73,7 +73,7 @@ pub(super) fn train(
         let goes_on = step < settings.steps || settings.compress.is_some();
         if let Some(saves) = saves.filter(|saves| saves.are_due(step) && goes_on) {
             let checkpoint = Checkpoint { curve, best, state: run.trainer.state()?, coded: None };
-            saves.store(&checkpoint, progress)?;
+            saves.store(&checkpoint)?;
             Checkpoint { curve, best, .. } = checkpoint;
         }
         start = Instant::now();

@@ -10,6 +10,6 @@ pub(crate) mod plot;
 pub(crate) mod temporal;
 
 pub use bake_report::{BakeReport, Change, Sample, SectionSize, StageTime, Tried};
-pub(crate) use files::{report_paths, write_report};
+pub(crate) use files::{report_paths, write_with_report};
 pub use temporal::{Activity, VarianceHistogram};
 pub(crate) use temporal::{even_times, filter_shares};

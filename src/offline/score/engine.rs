@@ -4,6 +4,7 @@
 
 use super::reference::{ViewScore, Want, score};
 use super::variant::Variant;
+use crate::offline::error::INTERRUPTED;
 use crate::scene::RuntimeScene;
 use crate::view::{Background, View};
 use std::error::Error;
@@ -54,6 +55,9 @@ pub enum ScoreError {
         /// The requested variant.
         variant: Variant,
     },
+    /// The user has asked the work to end.
+    #[error("{INTERRUPTED}")]
+    Interrupted,
     /// The engine failed.
     #[error("{0}")]
     Engine(#[source] Box<dyn Error + Send + Sync>),

@@ -71,6 +71,9 @@ impl Scores {
         for moment in views.chunk_by(|a, b| a.time == b.time) {
             let mut contribution = vec![0.0; sums.len()];
             for view in moment {
+                if progress.is_interrupted() {
+                    return Err(ScoreError::Interrupted);
+                }
                 let score = engine.score(view, Want::Removal)?;
                 add(&mut contribution, &score.contribution);
                 for ((sum, &energy), &removal) in sums.iter_mut().zip(&score.energy).zip(&score.removal) {
