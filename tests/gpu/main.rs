@@ -11,6 +11,7 @@ mod filter;
 mod fine_tune;
 mod fine_tune_run;
 mod golden;
+mod hidden;
 mod layout;
 #[cfg(target_os = "linux")]
 mod memory;
