@@ -5,6 +5,8 @@
 
 mod appearance;
 mod bake;
+mod crowds;
+mod designs;
 mod detail;
 mod fast;
 mod filter;
