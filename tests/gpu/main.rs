@@ -23,6 +23,7 @@ mod passes;
 mod render;
 mod score;
 mod shaders;
+mod uniformity;
 
 #[path = "../support"]
 mod support {
