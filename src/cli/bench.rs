@@ -36,8 +36,8 @@ pub struct Bench {
     /// Frames of each kind to measure.
     #[arg(long, value_name = "N", default_value = "240", value_parser = values::count(1_000_000))]
     frames: usize,
-    /// Views to take from a camera file, evenly; also the number of views of the orbit unless --orbit says it.
-    #[arg(long = "views", value_name = "N", default_value = "12", value_parser = values::count(100_000))]
+    /// Views to take from a camera file, evenly; without one, views of an orbit.
+    #[arg(long = "views", value_name = "N", default_value = "12", conflicts_with = "orbit", value_parser = values::count(100_000))]
     count: usize,
     /// See every view at K times, evenly over the interval [default: each at its own time].
     #[arg(long, value_name = "K", conflicts_with = "time", value_parser = values::count(10_000))]

@@ -2,7 +2,7 @@
 //!
 //! In: a scene in the trained form, training views with their images. Out: a package in the trained form, and how its quality developed.
 
-use super::args::{CheckpointArgs, PackageArgs, RendererArgs, SplitArgs, ValidationArgs, values};
+use super::args::{CheckpointArgs, Given, PackageArgs, RendererArgs, SplitArgs, ValidationArgs, values};
 use super::failure::Failure;
 use super::interrupt;
 use super::progress::Bars;
@@ -10,12 +10,13 @@ use super::report::Report;
 use super::table::{Table, bytes, lines};
 use crate::gaussian::GradientMode;
 use crate::offline::belonging::require_belonging;
+use crate::offline::dataset::validation::Validation;
 use crate::offline::engine::{AdapterDescription, Engine};
 use crate::offline::files::Files;
 use crate::offline::fine_tune::{
     Behind, CurvePoint, FineTuneSettings, FineTuned, GradientSums, Rates, Resume, Terms, TrainingImages, fine_tune,
 };
-use crate::offline::quantize::Quality;
+use crate::offline::quantize::{CompressSettings, Quality};
 use crate::offline::store::{Key, Store};
 use crate::offline::{OfflineError, trained_pixel};
 use serde_json::json;
@@ -36,6 +37,8 @@ Examples:
 What a temporal filter of the scene leaves out is not drawn in training either, and the filter is computed again now and then: gs4d mask
 before gs4d finetune trains with it. One of the kind support changes no picture; it is computed again afterwards.")]
 pub struct FineTune {
+    #[command(flatten)]
+    given: Given,
     /// The checkpoint, or a package of it in the trained form.
     #[arg(value_name = "SCENE")]
     input: PathBuf,
@@ -129,6 +132,7 @@ impl FineTune {
     /// # Errors
     /// A scene or views that cannot be used, a package that cannot be written, a failure of the GPU.
     pub fn run(&self) -> Result<Report, Failure> {
+        self.check_options()?;
         let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
         let store = Store::beside(out, ".tune")?;
         let mut scene = self.checkpoint.load_to_change(&self.input)?;
@@ -214,6 +218,20 @@ impl FineTune {
         let mut report = Report::new(json, format!("{}\n{}", lines(&pairs), curve_table(curve)));
         report.interrupted = interrupted;
         Ok(report)
+    }
+
+    /// Checks that every option has an effect.
+    fn check_options(&self) -> Result<(), Failure> {
+        if self.validation.validation == Validation::None {
+            self.given.none_of(&["--patience"], "with --validation none: no evaluation is compared with another")?;
+        }
+        match self.compress {
+            Some(quality) if CompressSettings::from(quality).codebooks.is_empty() => {
+                let reason = "with a quality without codebooks: --compress small and balanced have some";
+                self.given.none_of(&["--compress-steps", "--round-geometry"], reason)
+            }
+            _ => Ok(()),
+        }
     }
 
     fn settings(&self) -> FineTuneSettings {

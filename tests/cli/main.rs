@@ -15,6 +15,7 @@ mod faults;
 mod fine_tune;
 #[cfg(target_os = "linux")]
 mod kills;
+mod options;
 mod outputs;
 mod prune;
 mod render;
