@@ -153,13 +153,13 @@ impl Compress {
         self.check_options()?;
         let progress = &mut Bars::default();
         let files = Files::default().reads_scene(&self.input).reads(&self.weights);
-        let out = self.package.checked_out(self.views.add_to(files))?;
+        let out = self.package.checked_file(self.views.add_to(files))?;
         let before = file_size(&self.input)?;
         let scene = self.checkpoint.load_to_change(&self.input)?;
         require_unpacked(&scene.form).map_err(|error| Failure::at(&self.input, &error))?;
         let scene = scene.into_runtime().map_err(|error| Failure::at(&self.input, &error))?;
-        let originals = self.originals(&scene, progress)?;
         let weights = self.weights.as_ref().map(|path| read_weights(path, scene.len())).transpose()?;
+        let originals = self.originals(&scene, progress)?;
         let settings = CompressSettings { weights, ..self.knobs.settings(self.quality) };
         progress.begin("codebooks", settings.codebooks.len());
         let compressed = compress_with(scene, &settings, || progress.advance());
