@@ -9,6 +9,7 @@ use super::note::note;
 use super::report::{Report, switches_json};
 use super::table::{Table, bytes};
 use crate::offline::engine::AdapterDescription;
+use crate::offline::memory_check::{BY_SIZE, Pictures};
 use crate::offline::orbit::{at_times, share};
 use crate::reference::{Workload, workload};
 use crate::renderer::{ColorPrecision, Design, GpuCapture, Timings};
@@ -111,6 +112,9 @@ impl Bench {
             }
         }
         let mut headless = self.renderer.open()?;
+        for (_, _, (_, views)) in &read {
+            Pictures::timed(views).require_on(&headless, BY_SIZE)?;
+        }
         let mut subjects = Vec::with_capacity(read.len());
         for (path, form, (scene, views)) in read {
             subjects.push(Subject { path, form, capture: headless.upload(&scene)?, scene, views });

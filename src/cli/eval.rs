@@ -13,6 +13,7 @@ use crate::offline::dataset::Split;
 use crate::offline::engine::Engine;
 use crate::offline::evaluation::{color_name, contrast, evaluate_scene, without_contrast};
 use crate::offline::files::Files;
+use crate::offline::memory_check::{BY_RESOLUTION, Pictures};
 use crate::offline::metrics::{Evaluation, ImageMetrics, MeanMetrics, MetricSet, ViewMetrics, side_by_side};
 use crate::offline::splits::{SPLIT_NAMES, split_name, subset};
 use crate::offline::{OfflineError, write_png};
@@ -115,14 +116,15 @@ impl Eval {
         let mut dataset = self.data.open(self.split, &scene.trained_with, progress)?;
         dataset.views = subset(dataset.views, self.views);
         dataset.require_images()?;
+        let metrics = metric_set(&self.metrics);
+        let mut engine = self.engine.open(&self.given, &OF_DRAWING)?;
+        Pictures::evaluated(&dataset.views, metrics, self.out.is_some()).require(&engine, BY_RESOLUTION)?;
         if let Some(out) = &self.out {
             let pictures = dataset.views.iter().map(|view| picture_of(out, &view.name));
             files.writes_folder(out, pictures).check()?;
             fs::create_dir_all(out).map_err(|error| Failure::at(out, &error))?;
         }
         let background = self.checkpoint.background.map_or(scene.trained_background(), Background::Color);
-        let metrics = metric_set(&self.metrics);
-        let mut engine = self.engine.open(&self.given, &OF_DRAWING)?;
         if let Engine::Gpu(headless) = &mut engine {
             headless.set_design(self.design.renderer);
         }

@@ -18,6 +18,7 @@ use crate::offline::fine_tune::{
 };
 use crate::offline::quantize::{CompressSettings, Quality};
 use crate::offline::store::{Key, Store};
+use crate::offline::temporal_filter::needs_views;
 use crate::offline::{OfflineError, trained_pixel};
 use serde_json::json;
 use std::path::PathBuf;
@@ -133,9 +134,13 @@ impl FineTune {
     /// A scene or views that cannot be used, a package that cannot be written, a failure of the GPU.
     pub fn run(&self) -> Result<Report, Failure> {
         self.check_options()?;
-        let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
+        let out = self.package.checked_file(self.data.add_to(Files::default().reads_scene(&self.input)))?;
         let store = Store::beside(out, ".tune")?;
         let mut scene = self.checkpoint.load_to_change(&self.input)?;
+        if !scene.filter.as_ref().is_some_and(|filter| needs_views(filter.kind)) {
+            let reason = "on a scene without a temporal filter of the kind key-frame or interval";
+            self.given.none_of(&["--refresh-filter"], reason)?;
+        }
         if let Some(background) = self.checkpoint.background {
             scene.trained_with.background = background;
         }
@@ -144,7 +149,9 @@ impl FineTune {
         scene.trained_with.validation = Some(splits.to_string());
         let views = splits.all_training(&scene.trained_with, progress)?;
         scene.trained_with.pixel = trained_pixel(&scene, &views).or(scene.trained_with.pixel);
-        let mut engine = Engine::Gpu(Box::new(self.renderer.open()?));
+        let headless = self.renderer.open()?;
+        TrainingImages::require_room(&splits.train, &splits.validation, &headless)?;
+        let mut engine = Engine::Gpu(Box::new(headless));
         if !self.validation.trust_images {
             let runtime = scene.clone().into_runtime()?;
             require_belonging(&mut engine, &runtime, &views, runtime.trained_background())?;

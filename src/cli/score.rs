@@ -12,6 +12,7 @@ use super::table::{Table, lines};
 use crate::offline::Subject;
 use crate::offline::belonging::require_belonging;
 use crate::offline::files::Files;
+use crate::offline::memory_check::{BY_RESOLUTION, Pictures};
 use crate::offline::score::variant::Variant;
 use crate::offline::score::write_scores;
 use crate::offline::search::{Candidate, Goal, ScoreChoice, ScoreSearch, SearchSummary, candidates};
@@ -83,6 +84,7 @@ impl Score {
         let subject = Subject::new(&self.input, scene, self.checkpoint.background)?;
         let mut engine = self.engine.open(&self.given, &[])?;
         let start = Instant::now();
+        Pictures::compared(&validation).require(&engine, BY_RESOLUTION)?;
         if auto && !self.validation.trust_images {
             require_belonging(&mut engine, &subject.runtime, &validation, subject.background)?;
         }

@@ -7,6 +7,7 @@ use super::OfflineError;
 use super::dataset::TrainingView;
 use super::dataset::selection::even_subset;
 use super::engine::Engine;
+use super::memory_check::{BY_RESOLUTION, Pictures};
 use super::metrics::SquaredError;
 use crate::scene::RuntimeScene;
 use crate::view::{Background, Picture};
@@ -23,7 +24,7 @@ const CLOSER: f64 = 0.1;
 /// is missing are left out; with fewer than two views of one size nothing can be said, and every dataset passes.
 ///
 /// # Errors
-/// Images that cannot be read or that show something else, a failure of the engine.
+/// Images that cannot be read, do not fit the memory or show something else, a failure of the engine.
 pub fn require_belonging(
     engine: &mut Engine,
     scene: &RuntimeScene,
@@ -32,6 +33,7 @@ pub fn require_belonging(
 ) -> Result<(), OfflineError> {
     let there: Vec<TrainingView> = views.iter().filter(|view| view.image.is_file()).cloned().collect();
     let chosen: Vec<&TrainingView> = even_subset(&there, VIEWS).into_iter().map(|index| &there[index]).collect();
+    Pictures::compared(chosen.iter().copied()).require(engine, BY_RESOLUTION)?;
     let behind = match background {
         Background::Color(color) => Vec3::from(color),
         Background::None | Background::Environment => Vec3::ZERO,

@@ -150,7 +150,7 @@ struct CpuDrawing<'a> {
 
 impl Draw for CpuDrawing<'_> {
     fn draw(&mut self, view: &View) -> Result<Picture, OfflineError> {
-        memory_check::require(view.size, memory_check::ON_CPU)?;
+        memory_check::require(view.size, None)?;
         Ok(reference::render(self.scene, view, self.background).picture)
     }
 }
@@ -164,7 +164,7 @@ struct GpuDrawing<'a> {
 
 impl Draw for GpuDrawing<'_> {
     fn draw(&mut self, view: &View) -> Result<Picture, OfflineError> {
-        memory_check::require(view.size, memory_check::on_gpu(self.headless))?;
+        memory_check::require(view.size, Some(self.headless))?;
         Ok(self.headless.render(&self.capture, view, self.background)?.picture)
     }
 }

@@ -37,7 +37,7 @@ pub mod evaluation;
 pub mod fidelity;
 pub mod files;
 pub mod fine_tune;
-mod memory_check;
+pub(crate) mod memory_check;
 pub mod metrics;
 pub mod orbit;
 mod package_size;

@@ -19,6 +19,9 @@ mod options;
 mod outputs;
 mod prune;
 mod render;
+// The limit of the address space is set by a shell and read from `/proc`.
+#[cfg(target_os = "linux")]
+mod sizes;
 
 #[path = "../support"]
 mod support {

@@ -184,6 +184,16 @@ fn sizes_of_pictures_without_an_effect_are_refused() {
 }
 
 #[test]
+fn the_refreshing_of_a_filter_needs_one_that_is_refreshed() {
+    let folder = folder();
+    let (scene, out) = (scene(&folder, "50"), folder.path().join("out.gs4d"));
+    let data = folder.path().join("data");
+    gs4d(&arguments!["finetune", &scene, "--data", &data, "-o", &out, "--refresh-filter", "3"]).must_fail(
+        "--refresh-filter has no effect on a scene without a temporal filter of the kind key-frame or interval",
+    );
+}
+
+#[test]
 fn packed_captures_are_refused_by_one_sentence() {
     let folder = folder();
     let (scene, packed) = (scene(&folder, "200"), folder.path().join("packed.gs4d"));

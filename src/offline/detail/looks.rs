@@ -4,7 +4,7 @@
 //! In: the sphere about a capture, a size in pixels, numbers of directions and times. Out: [`Look`]s with the truth, which is all Gaussians
 //! in a picture of many times as many pixels, and with what they look like if they are drawn at that size; how close fewer come.
 
-use crate::offline::memory_check::require;
+use crate::offline::memory_check::{BY_DIRECTIONS, Pictures};
 use crate::offline::metrics::decibels;
 use crate::offline::{OfflineError, Progress};
 use crate::renderer::{GpuCapture, Headless};
@@ -127,7 +127,7 @@ pub(super) fn looks(
     // Frames of all sizes together have less than three times the pixels of the largest.
     let largest = sizes.iter().copied().fold(0.0, f32::max).ceil() as u32 + 2 * MARGIN;
     let views = (around.directions * around.times) as u64;
-    require(UVec2::splat(largest), 3 * FRAMES * views)?;
+    Pictures::frames(UVec2::splat(largest), views, 3 * FRAMES).require_on(headless, BY_DIRECTIONS)?;
     progress.begin("looking", sizes.len());
     let mut all = Vec::with_capacity(sizes.len());
     for &pixels in sizes {

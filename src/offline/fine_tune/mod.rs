@@ -54,3 +54,4 @@ pub use terms::{Regularization, Terms, regularization};
 pub use totals::{Faults, Totals};
 pub use trainer::Trainer;
 pub use trainer_error::TrainerError;
+pub(crate) use view_buffers::require_bindings;

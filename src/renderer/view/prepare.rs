@@ -11,7 +11,7 @@ use crate::renderer::active::{drawn_count, most_drawn};
 use crate::renderer::design::Design;
 use crate::renderer::error::GpuError;
 use crate::renderer::layout::{self, BLOCK, Counters};
-use crate::renderer::memory::binding_limit;
+use crate::renderer::memory::{binding_limit, require_texture};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::{FastVariant, Lists, Pixels};
 use crate::renderer::timing::PassTime;
@@ -64,9 +64,7 @@ impl ViewRenderer {
         }
         let made = self.resources.as_ref().map(|resources| resources.sizes).unwrap_or_default();
         let limits = device.limits();
-        if picture.min_element() == 0 || picture.max_element() > limits.max_texture_dimension_2d {
-            return Err(GpuError::Size { width: picture.x, height: picture.y, limit: limits.max_texture_dimension_2d });
-        }
+        require_texture(picture, &limits)?;
         // The maximum over time, so that another segment of a filter does not change the buffers.
         let slots: usize = instances.iter().map(|instance| most_drawn(instance.capture, instance.active)).sum();
         let parts: usize = instances.iter().map(|instance| instance.capture.parts.len()).sum();
