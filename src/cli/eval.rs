@@ -118,7 +118,7 @@ impl Eval {
         dataset.require_images()?;
         let metrics = metric_set(&self.metrics);
         let mut engine = self.engine.open(&self.given, &OF_DRAWING)?;
-        Pictures::evaluated(&dataset.views, metrics, self.out.is_some()).require(&engine, BY_RESOLUTION)?;
+        Pictures::evaluated(&dataset.views, metrics, self.out.is_some()).require(engine.headless(), BY_RESOLUTION)?;
         if let Some(out) = &self.out {
             let pictures = dataset.views.iter().map(|view| picture_of(out, &view.name));
             files.writes_folder(out, pictures).check()?;

@@ -84,7 +84,7 @@ impl Score {
         let subject = Subject::new(&self.input, scene, self.checkpoint.background)?;
         let mut engine = self.engine.open(&self.given, &[])?;
         let start = Instant::now();
-        Pictures::compared(&validation).require(&engine, BY_RESOLUTION)?;
+        Pictures::compared(&validation).require(engine.headless(), BY_RESOLUTION)?;
         if auto && !self.validation.trust_images {
             require_belonging(&mut engine, &subject.runtime, &validation, subject.background)?;
         }

@@ -60,8 +60,8 @@ pub fn ablate(
     settings: &AblationSettings,
     progress: &mut dyn Progress,
 ) -> Result<Vec<AblationRow>, OfflineError> {
-    Pictures::evaluated(measured, MetricSet::SSIM, false).require(engine, BY_RESOLUTION)?;
-    Pictures::looked_at(&train).require(engine, BY_RESOLUTION)?;
+    Pictures::evaluated(measured, MetricSet::SSIM, false).require(engine.headless(), BY_RESOLUTION)?;
+    Pictures::looked_at(&train).require(engine.headless(), BY_RESOLUTION)?;
     subject.runtime.filter = None;
     let mut table = Table { engine, measured, background: subject.background, rows: Vec::new() };
     let AblationSettings { filters, key_frames, ratios, scores, scoring } = settings;

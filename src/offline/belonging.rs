@@ -33,7 +33,7 @@ pub fn require_belonging(
 ) -> Result<(), OfflineError> {
     let there: Vec<TrainingView> = views.iter().filter(|view| view.image.is_file()).cloned().collect();
     let chosen: Vec<&TrainingView> = even_subset(&there, VIEWS).into_iter().map(|index| &there[index]).collect();
-    Pictures::compared(chosen.iter().copied()).require(engine, BY_RESOLUTION)?;
+    Pictures::compared(chosen.iter().copied()).require(engine.headless(), BY_RESOLUTION)?;
     let behind = match background {
         Background::Color(color) => Vec3::from(color),
         Background::None | Background::Environment => Vec3::ZERO,

@@ -91,6 +91,14 @@ impl Engine {
         }
     }
 
+    /// Returns the renderer of a GPU; `None` for the CPU.
+    pub(crate) fn headless(&self) -> Option<&Headless> {
+        match self {
+            Self::Cpu => None,
+            Self::Gpu(headless) => Some(headless),
+        }
+    }
+
     /// Returns a description for people: the CPU and its threads, or the adapter.
     pub fn name(&self) -> String {
         match self {

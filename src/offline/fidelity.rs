@@ -27,7 +27,7 @@ impl Originals {
         views: Vec<View>,
         progress: &mut dyn Progress,
     ) -> Result<Self, OfflineError> {
-        Pictures::originals(&views).require(engine, BY_SIZE_OR_COUNT)?;
+        Pictures::originals(&views).require(engine.headless(), BY_SIZE_OR_COUNT)?;
         let mut pictures = Vec::with_capacity(views.len());
         draw_each(engine, scene, &views, progress, |picture| {
             pictures.push(picture);

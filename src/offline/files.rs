@@ -85,7 +85,7 @@ impl Files {
     }
 
     /// Adds an output that is read again or has others beside it: as [`writes`](Self::writes), but not a device or a pipe.
-    pub fn writes_regular(mut self, path: &Path, extension: &'static str) -> Self {
+    pub(crate) fn writes_regular(mut self, path: &Path, extension: &'static str) -> Self {
         self.outputs.push(Output::Regular(path.to_owned(), extension));
         self
     }

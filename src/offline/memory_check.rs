@@ -5,7 +5,6 @@
 
 use super::OfflineError;
 use super::dataset::TrainingView;
-use super::engine::Engine;
 use super::fine_tune::require_bindings;
 use super::metrics::MetricSet;
 use crate::renderer::{GpuError, Headless};
@@ -33,8 +32,6 @@ const READ_BACK: u64 = 2 * 16 + 3 * 8 + 16 + 8;
 const TARGETS: u64 = 16 + 8;
 /// Bytes for each pixel on the GPU while it trains: slopes of similarity, gradients of color and of depth, an image.
 const TRAINING: u64 = 48 + 16 + 4 + 4;
-/// Frames that are in flight, each with its own targets, while time is measured.
-const LANES: u64 = 4;
 
 /// Bytes for each pixel of a picture.
 const PICTURE: u64 = 12;
@@ -80,11 +77,6 @@ impl Pictures {
     /// Returns pictures that are drawn one after the other while at most `waiting` are written.
     pub fn written(sizes: impl IntoIterator<Item = UVec2>, waiting: u64) -> Self {
         Self::drawn(largest(sizes), waiting * (PICTURE + WRITTEN))
-    }
-
-    /// Returns frames whose time is measured on a GPU.
-    pub fn timed(views: &[View]) -> Self {
-        Self::drawn(largest(views.iter().map(|view| view.size)), LANES * TARGETS)
     }
 
     /// Returns views that are drawn one after the other, and are not kept.
@@ -137,23 +129,13 @@ impl Pictures {
         })
     }
 
-    /// Checks that there is memory for the pictures, and that the GPU can draw the largest, if a GPU draws. Where the system does not tell
-    /// how much memory there is, any pictures pass.
+    /// Checks that there is memory for the pictures, and that the GPU can draw the largest, if a GPU draws; else the CPU does. Where the
+    /// system does not tell how much memory there is, any pictures pass.
     ///
     /// # Errors
     /// What is needed and what is available, with `remedy`.
-    pub fn require(&self, engine: &Engine, remedy: &'static str) -> Result<(), OfflineError> {
-        match engine {
-            Engine::Cpu => self.require_bytes(ON_CPU, remedy, available),
-            Engine::Gpu(headless) => self.require_on(headless, remedy),
-        }
-    }
-
-    /// As [`require`](Self::require), if a GPU draws.
-    ///
-    /// # Errors
-    /// As [`require`](Self::require).
-    pub fn require_on(&self, headless: &Headless, remedy: &'static str) -> Result<(), OfflineError> {
+    pub fn require(&self, headless: Option<&Headless>, remedy: &'static str) -> Result<(), OfflineError> {
+        let Some(headless) = headless else { return self.require_bytes(ON_CPU, remedy, available) };
         let limited = |reason: GpuError| OfflineError::Limit { reason, remedy };
         if self.largest != UVec2::ZERO {
             headless.require_picture(self.largest).map_err(limited)?;
@@ -199,11 +181,7 @@ impl Pictures {
 
 /// Checks that there is memory and that the GPU can draw, for a picture that is drawn now.
 pub(super) fn require(size: UVec2, headless: Option<&Headless>) -> Result<(), OfflineError> {
-    let picture = Pictures::drawn(size, 0);
-    match headless {
-        Some(headless) => picture.require_on(headless, SMALLER),
-        None => picture.require_bytes(ON_CPU, SMALLER, available),
-    }
+    Pictures::drawn(size, 0).require(headless, SMALLER)
 }
 
 /// Returns the bytes for each pixel while as many of `count` images are loaded as there are threads.

@@ -29,7 +29,7 @@ pub fn render_shots(
 ) -> Result<Vec<Counts>, OfflineError> {
     // One picture is being drawn and one written while the queue is full.
     let waiting = views.len().min(QUEUE + 2) as u64;
-    Pictures::written(views.iter().map(|(_, view)| view.size), waiting).require_on(headless, BY_SIZE)?;
+    Pictures::written(views.iter().map(|(_, view)| view.size), waiting).require(Some(&*headless), BY_SIZE)?;
     let (queue, drawn) = sync_channel::<(&Shot, Picture)>(QUEUE);
     // A thread pool of its own: threads that wait for pictures would stall rayon's shared pool.
     let writers = rayon::ThreadPoolBuilder::new().build()?;

@@ -211,7 +211,7 @@ impl ScoreSearch {
             let what = if required { "the loss allowed" } else { "the best score" };
             return Err(OfflineError::NoValidation { what });
         }
-        Pictures::compared(validation).require(engine, BY_RESOLUTION)?;
+        Pictures::compared(validation).require(engine.headless(), BY_RESOLUTION)?;
         match Evaluator::by_images(validation, &scene.trained_with, background) {
             Ok(evaluator) => {
                 let baseline = Some(evaluator.psnr(engine, scene)?);

@@ -71,7 +71,7 @@ pub fn filter(
         return Ok(TemporalFilter::support(gaussians.iter().copied(), interval, keys.max(2) - 1));
     }
     let runtime = GaussianScene { filter: None, ..scene.clone() }.into_runtime()?;
-    Pictures::looked_at(views).require(engine, BY_RESOLUTION)?;
+    Pictures::looked_at(views).require(engine.headless(), BY_RESOLUTION)?;
     let mut scorer = engine.scorer(&runtime, runtime.trained_background())?;
     Ok(seen_filter(scorer.as_mut(), &runtime, kind, keys, views, progress)?)
 }

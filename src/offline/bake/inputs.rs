@@ -146,10 +146,10 @@ fn require_room(
     views: &[TrainingView],
     splits: &Splits,
 ) -> Result<(), OfflineError> {
-    Pictures::looked_at(views).require(engine, BY_RESOLUTION)?;
-    Pictures::compared(&splits.validation).require(engine, BY_RESOLUTION)?;
+    Pictures::looked_at(views).require(engine.headless(), BY_RESOLUTION)?;
+    Pictures::compared(&splits.validation).require(engine.headless(), BY_RESOLUTION)?;
     // The test views, which are of the same sizes.
-    Pictures::evaluated(views, MetricSet::ALL, true).require(engine, BY_RESOLUTION)?;
+    Pictures::evaluated(views, MetricSet::ALL, true).require(engine.headless(), BY_RESOLUTION)?;
     match (engine, &settings.fine_tune) {
         (Engine::Gpu(headless), Some(_)) => TrainingImages::require_room(&splits.train, &splits.validation, headless),
         _ => Ok(()),

@@ -127,7 +127,7 @@ pub(super) fn looks(
     // Frames of all sizes together have less than three times the pixels of the largest.
     let largest = sizes.iter().copied().fold(0.0, f32::max).ceil() as u32 + 2 * MARGIN;
     let views = (around.directions * around.times) as u64;
-    Pictures::frames(UVec2::splat(largest), views, 3 * FRAMES).require_on(headless, BY_DIRECTIONS)?;
+    Pictures::frames(UVec2::splat(largest), views, 3 * FRAMES).require(Some(&*headless), BY_DIRECTIONS)?;
     progress.begin("looking", sizes.len());
     let mut all = Vec::with_capacity(sizes.len());
     for &pixels in sizes {

@@ -36,12 +36,12 @@ impl TrainingImages {
     ///
     /// # Errors
     /// What is needed, what is available, and the remedy.
-    pub fn require_room(
+    pub(crate) fn require_room(
         views: &[TrainingView],
         validation: &[TrainingView],
         headless: &Headless,
     ) -> Result<(), OfflineError> {
-        Pictures::trained(views, validation).require_on(headless, BY_RESOLUTION)
+        Pictures::trained(views, validation).require(Some(headless), BY_RESOLUTION)
     }
 
     /// Loads the images of the views to train on and of those to validate on, which may be none. Begins the task "loading

@@ -83,7 +83,7 @@ pub enum CompressError {
 ///
 /// # Errors
 /// [`CompressError::AlreadyPacked`].
-pub fn require_unpacked(form: &SceneForm) -> Result<(), CompressError> {
+pub(crate) fn require_unpacked(form: &SceneForm) -> Result<(), CompressError> {
     match form {
         SceneForm::Ready(Form::Packed(_)) => Err(CompressError::AlreadyPacked),
         SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_)) => Ok(()),

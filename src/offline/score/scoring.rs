@@ -31,7 +31,7 @@ impl ScoringSettings {
         views: &[TrainingView],
         progress: &mut dyn Progress,
     ) -> Result<(Scores, usize), OfflineError> {
-        Pictures::looked_at(views).require(engine, BY_RESOLUTION)?;
+        Pictures::looked_at(views).require(engine.headless(), BY_RESOLUTION)?;
         let traits = Traits::of(&subject.scene)?;
         let views = subset(views.to_vec(), self.views);
         let views = to_draw(&views, subject.runtime.trained_with.raster_fov);
