@@ -3,7 +3,7 @@
 //! In: two pictures, or two folders whose pictures are matched by file stem (8-bit, 16-bit or raw float32). Out: PSNR and SSIM of each pair,
 //! and their means.
 
-use super::args::values;
+use super::args::{Given, values};
 use super::failure::Failure;
 use super::progress::Bars;
 use super::report::Report;
@@ -29,6 +29,8 @@ Examples:
 PSNR is the mean over the three channels, as the original code reports it; channels without error are left out. Pooled PSNR is that of all
 values together. The PSNR of identical pictures is 200 dB. Their number is reported, and they are left out of the mean PSNR.")]
 pub struct Compare {
+    #[command(flatten)]
+    given: Given,
     /// A picture or a folder of pictures.
     #[arg(value_name = "A")]
     a: PathBuf,
@@ -48,6 +50,9 @@ impl Compare {
     pub fn run(&self) -> Result<Report, Failure> {
         let progress = &mut Bars::default();
         let pairs = Pairs::of(&self.a, &self.b, self.size)?;
+        if !pairs.has_raw() {
+            self.given.none_of(&["--size"], "without .f32 pictures")?;
+        }
         let mut metrics = Vec::with_capacity(pairs.both.len());
         progress.begin("comparing", pairs.both.len());
         for pair in &pairs.both {

@@ -3,7 +3,7 @@
 //! In: a scene, a target form, color degrees. Out: a package; a report of its training and playback settings and of the
 //! sizes before and after.
 
-use super::args::{CheckpointArgs, PackageArgs, file_size, values};
+use super::args::{CheckpointArgs, Given, PackageArgs, WITHOUT_TIME, file_size, values};
 use super::failure::Failure;
 use super::report::{Report, switches, switches_json};
 use super::table::{bytes, lines};
@@ -23,6 +23,8 @@ Examples:
   gs4d convert chkpnt30000.pth small.gs4d --form runtime --sh-degree 0
   gs4d convert n3v/chkpnt30000.pth -o n3v.gs4d --time-interval 0,10 --trained-cameras intrinsics --duration 10")]
 pub struct Convert {
+    #[command(flatten)]
+    given: Given,
     /// The checkpoint or package to read.
     #[arg(value_name = "IN")]
     input: PathBuf,
@@ -47,6 +49,9 @@ impl Convert {
     /// # Errors
     /// The scene cannot be read or converted, or the package cannot be written.
     pub fn run(&self) -> Result<Report, Failure> {
+        if self.sh_degree.is_some_and(|degree| degree < 3) {
+            self.given.none_of(&["--sh-degree-t"], WITHOUT_TIME)?;
+        }
         let out = self.package.checked_out(Files::default().reads_scene(&self.input))?;
         let before = file_size(&self.input)?;
         let settings = ConvertSettings { form: self.form, sh_degree: self.sh_degree, sh_degree_t: self.sh_degree_t };

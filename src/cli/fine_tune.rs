@@ -3,7 +3,7 @@
 //! In: a scene in the trained form, training views with their images. Out: a package in the trained form, or in the packed form with
 //! `--compress`, and its quality before, during and after training.
 
-use super::args::{CheckpointArgs, PackageArgs, RendererArgs, SplitArgs, ValidationArgs, values};
+use super::args::{CheckpointArgs, Given, PackageArgs, RendererArgs, SplitArgs, ValidationArgs, values};
 use super::failure::Failure;
 use super::interrupt;
 use super::progress::Bars;
@@ -11,13 +11,15 @@ use super::report::Report;
 use super::table::{Table, bytes, lines};
 use crate::gaussian::GradientMode;
 use crate::offline::belonging::require_belonging_on_gpu;
+use crate::offline::dataset::Validation;
 use crate::offline::engine::AdapterDescription;
 use crate::offline::files::Files;
 use crate::offline::fine_tune::{
     Behind, CurvePoint, FineTuneSettings, FineTuned, GradientSums, Rates, Resume, Terms, TrainingImages, fine_tune,
 };
-use crate::offline::quantize::Quality;
+use crate::offline::quantize::{CompressSettings, Quality};
 use crate::offline::store::{Key, Store};
+use crate::offline::temporal_filter::needs_views;
 use crate::offline::{OfflineError, trained_pixel};
 use serde_json::json;
 use std::path::PathBuf;
@@ -37,6 +39,8 @@ Examples:
 A temporal filter of the scene (gs4d mask) is used in training: Gaussians that it leaves out at a time are not drawn at that time. The filter
 is computed again every --refresh-filter steps. A support filter changes no picture; it is computed again after training.")]
 pub struct FineTune {
+    #[command(flatten)]
+    given: Given,
     /// The checkpoint, or a package in the trained form.
     #[arg(value_name = "SCENE")]
     input: PathBuf,
@@ -130,9 +134,14 @@ impl FineTune {
     /// # Errors
     /// A scene or views that cannot be used, a package that cannot be written, a failure of the GPU.
     pub fn run(&self) -> Result<Report, Failure> {
-        let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
+        self.check_options()?;
+        let out = self.package.checked_file(self.data.add_to(Files::default().reads_scene(&self.input)))?;
         let store = Store::beside(out, ".tune")?;
         let mut scene = self.checkpoint.load_to_change(&self.input)?;
+        if !scene.filter.as_ref().is_some_and(|filter| needs_views(filter.kind)) {
+            let reason = "on a scene without a temporal filter of the kind key-frame or interval";
+            self.given.none_of(&["--refresh-filter"], reason)?;
+        }
         if let Some(background) = self.checkpoint.background {
             scene.trained_with.background = background;
         }
@@ -142,6 +151,7 @@ impl FineTune {
         let views = splits.all_training(&scene.trained_with, progress)?;
         scene.trained_with.pixel = trained_pixel(&scene, &views).or(scene.trained_with.pixel);
         let mut headless = self.renderer.open()?;
+        TrainingImages::require_room(&splits.train, &splits.validation, &headless)?;
         if !self.validation.trust_images {
             let runtime = scene.clone().into_runtime()?;
             require_belonging_on_gpu(&mut headless, &runtime, &views, runtime.trained_background())?;
@@ -216,6 +226,20 @@ impl FineTune {
         let mut report = Report::new(json, format!("{}\n{}", lines(&pairs), curve_table(curve, compressed.is_some())));
         report.interrupted = interrupted;
         Ok(report)
+    }
+
+    /// Checks that every option has an effect.
+    fn check_options(&self) -> Result<(), Failure> {
+        if self.validation.validation == Validation::None {
+            self.given.none_of(&["--patience"], "with --validation none: no evaluation is compared with another")?;
+        }
+        match self.compress {
+            Some(quality) if CompressSettings::from(quality).codebooks.is_empty() => {
+                let reason = "with a quality without codebooks: --compress small and balanced have some";
+                self.given.none_of(&["--compress-steps", "--round-geometry"], reason)
+            }
+            _ => Ok(()),
+        }
     }
 
     fn settings(&self) -> FineTuneSettings {

@@ -3,7 +3,7 @@
 //! In: a scene, a number of key-frames, training views if the filter needs them. Out: a package with the filter, and a
 //! report with the share of active Gaussians.
 
-use super::args::{CheckpointArgs, DataArgs, EngineArgs, PackageArgs, values};
+use super::args::{CheckpointArgs, DataArgs, EngineArgs, Given, PackageArgs, values};
 use super::failure::Failure;
 use super::progress::Bars;
 use super::report::Report;
@@ -30,6 +30,8 @@ Filters:
   key-frame  Gaussians that a camera sees at the two key-frames of the segment, as in the paper. Loses Gaussians that appear
              and disappear between them.")]
 pub struct Mask {
+    #[command(flatten)]
+    given: Given,
     /// The checkpoint or package to filter. Its filter is replaced.
     #[arg(value_name = "IN")]
     input: PathBuf,
@@ -42,7 +44,7 @@ pub struct Mask {
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(2..=i64::from(MAX_SEGMENTS) + 1))]
     key_frames: Option<u32>,
     /// Number of timestamps of the training data between two key-frames, in place of --key-frames.
-    #[arg(long, value_name = "FRAMES", conflicts_with = "key_frames", value_parser = values::count(1_000_000))]
+    #[arg(long, value_name = "FRAMES", conflicts_with = "key_frames", requires = "data", value_parser = values::count(1_000_000))]
     every: Option<usize>,
     #[command(flatten)]
     data: DataArgs,
@@ -59,6 +61,7 @@ impl Mask {
     /// A scene or views that cannot be used, too many key-frames, a package that cannot be written, a failure of the
     /// engine.
     pub fn run(&self) -> Result<Report, Failure> {
+        self.check_options()?;
         let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
         let mut scene = self.checkpoint.load_to_change(&self.input)?;
         scene.filter = None;
@@ -69,7 +72,7 @@ impl Mask {
             Vec::new()
         };
         let keys = self.keys(&views)?;
-        let mut engine = if by_views { self.engine.open()? } else { Engine::Cpu };
+        let mut engine = if by_views { self.engine.open(&self.given, &[])? } else { Engine::Cpu };
         let filter = filter(&mut engine, &scene, self.filter, keys, &views, &mut Bars::default());
         let filter = filter.map_err(|error| Failure::at(&self.input, &error))?;
         let (share, overlap) = (filter.active_share(), neighbor_overlap(&filter));
@@ -101,6 +104,21 @@ impl Mask {
             "filter_bytes": size,
         });
         Ok(Report::new(json, text))
+    }
+
+    /// Checks that every option has an effect.
+    fn check_options(&self) -> Result<(), Failure> {
+        self.engine.check(&self.given, &[])?;
+        if needs_views(self.filter) {
+            return Ok(());
+        }
+        let name = filter_name(self.filter);
+        let drawn = ["--size", "--resolution", "--engine", "--adapter", "--checks"];
+        self.given.none_of(&drawn, &format!("with --filter {name}: no view is drawn"))?;
+        match self.every {
+            Some(_) => Ok(()),
+            None => self.given.none_of(&["--data"], &format!("with --filter {name} unless --every is given")),
+        }
     }
 
     /// Returns the number of key-frames.

@@ -2,7 +2,7 @@
 //!
 //! In: a number of Gaussians and a seed, or a capture to grow. Out: a package in the trained form, for tests and benchmarks.
 
-use super::args::{CheckpointArgs, PackageArgs, values};
+use super::args::{CheckpointArgs, Given, PackageArgs, WITHOUT_TIME, values};
 use super::failure::Failure;
 use super::report::Report;
 use super::table::{bytes, lines};
@@ -22,6 +22,8 @@ Examples:
   gs4d synth large.gs4d --count 667000 --seed 7
   gs4d synth grown.gs4d --grow 37 chkpnt30000.pth --level 1")]
 pub struct Synth {
+    #[command(flatten)]
+    given: Given,
     #[command(flatten)]
     package: PackageArgs,
     /// Number of Gaussians.
@@ -53,6 +55,9 @@ impl Synth {
     /// # Errors
     /// The capture to grow cannot be read, or the package cannot be written.
     pub fn run(&self) -> Result<Report, Failure> {
+        if self.sh_degree < 3 {
+            self.given.none_of(&["--sh-degree-t"], WITHOUT_TIME)?;
+        }
         let capture = self.grow.as_deref().and_then(<[OsString]>::last).map(Path::new);
         let files = capture.into_iter().fold(Files::default(), Files::reads_scene);
         let out = self.package.checked_out(files)?;

@@ -11,7 +11,7 @@ const MARK: &str = " (os error ";
 /// Returns a message in which texts of common errors are replaced by sentences. Other texts are unchanged.
 pub fn in_words(message: &str) -> String {
     let Some(error) = first(message) else { return message.to_owned() };
-    match (error.to_string(), words(error.kind())) {
+    match (error.to_string(), words(&error)) {
         (text, Some(words)) if message.contains(&text) => in_words(&message.replace(&text, words)),
         _ => message.to_owned(),
     }
@@ -29,9 +29,24 @@ fn first(message: &str) -> Option<io::Error> {
     Some(io::Error::from_raw_os_error(number.parse().ok()?))
 }
 
+/// The numbers of errors that have no stable kind: a fault of the device, and too many symbolic links.
+const DEVICE_FAULT: i32 = 5;
+const TOO_MANY_LINKS: i32 = if cfg!(any(target_os = "linux", target_os = "android")) { 40 } else { 62 };
+
 /// Returns the sentence for an error; `None` if it has none.
-fn words(kind: ErrorKind) -> Option<&'static str> {
-    Some(match kind {
+fn words(error: &io::Error) -> Option<&'static str> {
+    if cfg!(unix) {
+        match error.raw_os_error() {
+            Some(DEVICE_FAULT) => {
+                return Some("the disk or device reports a fault: check it, or choose a path on another one");
+            }
+            Some(TOO_MANY_LINKS) => {
+                return Some("symbolic links lead in a circle here: remove the link, or choose another path");
+            }
+            _ => {}
+        }
+    }
+    Some(match error.kind() {
         ErrorKind::NotFound => "there is no such file or folder: check the path",
         ErrorKind::PermissionDenied => "permission is denied: change the permissions, or choose another path",
         ErrorKind::AlreadyExists => "a file of this name is in the way: remove it, or choose another path",
@@ -63,6 +78,16 @@ mod tests {
             assert_eq!(in_words(message), message, "a message without a known error is unchanged");
         }
         assert!(!is_closed_pipe(&missing.to_string()), "a missing file is no closed pipe");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn faults_of_devices_and_circles_of_links_are_put_in_words() {
+        for (number, words) in [(DEVICE_FAULT, "reports a fault"), (TOO_MANY_LINKS, "lead in a circle")] {
+            let message = in_words(&format!("a.gs4d: {}", io::Error::from_raw_os_error(number)));
+            assert!(message.starts_with("a.gs4d: ") && message.contains(words), "{number}: {words}: {message}");
+            assert!(!message.contains("os error"), "no number of the system: {message}");
+        }
     }
 
     #[cfg(unix)]

@@ -7,6 +7,7 @@ use super::OfflineError;
 use super::dataset::TrainingView;
 use super::dataset::selection::even_subset;
 use super::engine::{Draw, Engine, drawing_on_gpu};
+use super::memory_check::{BY_RESOLUTION, Pictures};
 use super::metrics::SquaredError;
 use crate::renderer::Headless;
 use crate::scene::RuntimeScene;
@@ -44,7 +45,7 @@ impl Match {
 /// image does not exist are left out. There is no error without two views of the same size, because there is nothing to compare with.
 ///
 /// # Errors
-/// Images that cannot be read or that do not show the scene, a failure of the engine.
+/// Images that cannot be read, do not fit the memory or show something else, a failure of the engine.
 pub fn require_belonging(
     engine: &mut Engine,
     scene: &RuntimeScene,
@@ -52,6 +53,7 @@ pub fn require_belonging(
     background: Background,
 ) -> Result<(), OfflineError> {
     let Some(chosen) = Chosen::of(views) else { return Ok(()) };
+    Pictures::compared(chosen.0.iter()).require(engine.headless(), BY_RESOLUTION)?;
     chosen.require(&mut *engine.drawing(scene, background)?, scene, background)
 }
 
@@ -66,6 +68,7 @@ pub fn require_belonging_on_gpu(
     background: Background,
 ) -> Result<(), OfflineError> {
     let Some(chosen) = Chosen::of(views) else { return Ok(()) };
+    Pictures::compared(chosen.0.iter()).require(Some(headless), BY_RESOLUTION)?;
     chosen.require(&mut drawing_on_gpu(headless, scene, background)?, scene, background)
 }
 

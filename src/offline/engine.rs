@@ -91,6 +91,14 @@ impl Engine {
         }
     }
 
+    /// Returns the renderer of a GPU; `None` for the CPU.
+    pub(crate) fn headless(&self) -> Option<&Headless> {
+        match self {
+            Self::Cpu => None,
+            Self::Gpu(headless) => Some(headless),
+        }
+    }
+
     /// Returns a description for people: the CPU and its threads, or the adapter.
     pub fn name(&self) -> String {
         match self {
@@ -160,7 +168,7 @@ struct CpuDrawing<'a> {
 
 impl Draw for CpuDrawing<'_> {
     fn draw(&mut self, view: &View) -> Result<Picture, OfflineError> {
-        memory_check::require(view.size, memory_check::ON_CPU)?;
+        memory_check::require(view.size, None)?;
         Ok(reference::render(self.scene, view, self.background).picture)
     }
 }
@@ -174,7 +182,7 @@ struct GpuDrawing<'a> {
 
 impl Draw for GpuDrawing<'_> {
     fn draw(&mut self, view: &View) -> Result<Picture, OfflineError> {
-        memory_check::require(view.size, memory_check::on_gpu(self.headless))?;
+        memory_check::require(view.size, Some(self.headless))?;
         Ok(self.headless.render(&self.capture, view, self.background)?.picture)
     }
 }

@@ -38,7 +38,7 @@ pub(crate) mod evaluation;
 pub(crate) mod fidelity;
 pub(crate) mod files;
 pub mod fine_tune;
-mod memory_check;
+pub(crate) mod memory_check;
 pub mod metrics;
 pub mod orbit;
 mod package_size;

@@ -43,6 +43,16 @@ impl PackageArgs {
         Ok(out)
     }
 
+    /// As [`checked_out`](Self::checked_out), for verbs that read the package again or write others beside it: a device or a pipe is refused.
+    ///
+    /// # Errors
+    /// As [`checked_out`](Self::checked_out).
+    pub fn checked_file(&self, files: Files) -> Result<&Path, Failure> {
+        let out = self.out()?;
+        files.writes_regular(out, "gs4d").check()?;
+        Ok(out)
+    }
+
     /// Writes the package. Returns its size in bytes.
     ///
     /// # Errors

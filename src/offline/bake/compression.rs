@@ -11,7 +11,7 @@ use crate::offline::store::Key;
 use crate::offline::stored::Package;
 use crate::offline::temporal_filter::filter as temporal_filter;
 use crate::offline::{OfflineError, write_settings};
-use crate::scene::{GaussianScene, SceneForm, TemporalFilter};
+use crate::scene::{Form, GaussianScene, SceneForm, TemporalFilter};
 
 /// The stage mask: computes the temporal filter of the remaining Gaussians. Returns the key of the scene with it, given that of the scene.
 pub(super) fn mask(
@@ -47,12 +47,13 @@ pub(super) fn compress(
         |progress| {
             let scene = if is_tuned { with_codebooks(inputs, scene, key, progress)? } else { scene };
             let packed = match scene.form {
-                SceneForm::Trained(_) => {
+                // The scene with trained codebooks.
+                SceneForm::Ready(Form::Packed(_)) => scene,
+                SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_)) => {
                     let runtime = scene.into_runtime();
                     let runtime = runtime.map_err(|error| OfflineError::at(&settings.checkpoint, error))?;
                     quantize::compress(runtime, &CompressSettings::from(settings.quality))?.0
                 }
-                SceneForm::Ready(_) => scene,
             };
             let mut bytes = Vec::new();
             package::write(&mut bytes, &packed, &write_settings(&packed.form, settings.level))?;

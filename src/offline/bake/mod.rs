@@ -20,6 +20,7 @@ pub use settings::BakeSettings;
 
 use super::engine::Engine;
 use super::prune::highest;
+use super::quantize::require_unpacked;
 use super::report::{BakeReport, write_with_report};
 use super::search::of_name;
 use super::stages::Stages;
@@ -53,7 +54,7 @@ pub struct Baked {
 /// of the scene is replaced. Begins the task "bake" and, inside it, the tasks of the stages.
 ///
 /// # Errors
-/// Training views that are missing or show nothing of the scene, images that a loss needs and that are missing, files
+/// A scene that is packed already, training views that are missing or show nothing of the scene, images that a loss needs and that are missing, files
 /// that cannot be written or are read, another bake to the same package, a failure of the engine.
 pub fn bake(
     scene: GaussianScene,
@@ -62,6 +63,7 @@ pub fn bake(
     progress: &mut dyn Progress,
 ) -> Result<Baked, OfflineError> {
     settings.check_files()?;
+    require_unpacked(&scene.form).map_err(|error| OfflineError::at(&settings.checkpoint, error))?;
     let mut inputs = Inputs::open(scene, settings, engine, progress)?;
     require_validation(&inputs)?;
     require_room(&inputs)?;

@@ -3,7 +3,7 @@
 //! In: the bounding sphere of a capture, a size in pixels, numbers of directions and times. Out: [`Look`]s. Each has two pictures: the truth,
 //! which is a picture of many times as many pixels, averaged to the size, and the picture drawn at the size. Also the [`Closeness`] of a level.
 
-use crate::offline::memory_check::require;
+use crate::offline::memory_check::{BY_DIRECTIONS, Pictures};
 use crate::offline::metrics::decibels;
 use crate::offline::{OfflineError, Progress, proceed};
 use crate::renderer::{GpuCapture, Headless};
@@ -128,7 +128,7 @@ pub(super) fn looks(
     // Frames of all sizes together have less than three times the pixels of the largest.
     let largest = sizes.iter().copied().fold(0.0, f32::max).ceil() as u32 + 2 * MARGIN;
     let views = (around.directions * around.times) as u64;
-    require(UVec2::splat(largest), 3 * FRAMES * views)?;
+    Pictures::frames(UVec2::splat(largest), views, 3 * FRAMES).require(Some(&*headless), BY_DIRECTIONS)?;
     progress.begin("looking", sizes.len());
     let mut all = Vec::with_capacity(sizes.len());
     for &pixels in sizes {

@@ -49,3 +49,4 @@ pub use targets::TrainingImages;
 pub use terms::Terms;
 pub(crate) use trainer::Trainer;
 pub use trainer_error::TrainerError;
+pub(crate) use view_buffers::require_bindings;

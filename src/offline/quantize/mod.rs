@@ -48,7 +48,7 @@ pub struct CompressReport {
 #[derive(Debug, thiserror::Error)]
 pub enum CompressError {
     /// It is in the packed form already.
-    #[error("the scene is packed already: compress the checkpoint or the lossless package it was made from")]
+    #[error("the scene is packed already: name the checkpoint or the lossless package that it was made from")]
     AlreadyPacked,
     /// Codebooks need quantized geometry.
     #[error("codebooks need quantized geometry: choose a quality other than lossless, or no codebooks")]
@@ -79,6 +79,17 @@ pub enum CompressError {
     /// A Gaussian cannot be drawn.
     #[error(transparent)]
     Invalid(#[from] InvalidGaussian),
+}
+
+/// Checks that a scene has not been compressed before, which would round its values twice.
+///
+/// # Errors
+/// [`CompressError::AlreadyPacked`].
+pub(crate) fn require_unpacked(form: &SceneForm) -> Result<(), CompressError> {
+    match form {
+        SceneForm::Ready(Form::Packed(_)) => Err(CompressError::AlreadyPacked),
+        SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_)) => Ok(()),
+    }
 }
 
 /// Compresses a scene.

@@ -9,7 +9,7 @@ use crate::renderer::design::Design;
 use crate::renderer::device::GpuContext;
 use crate::renderer::error::GpuError;
 use crate::renderer::layout::Counters;
-use crate::renderer::memory::{Allocator, with_room};
+use crate::renderer::memory::{Allocator, require_texture, with_room};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::{ColorPrecision, ShaderChecks, Storage};
 use crate::renderer::view::{FinishedFrame, Instance, ViewParameters, ViewRenderer, max_pairs};
@@ -290,13 +290,22 @@ impl Headless {
         prepared?
     }
 
+    /// Checks that a picture of this size can be drawn and read back, without drawing it.
+    ///
+    /// # Errors
+    /// The limit of the device that it exceeds.
+    pub(crate) fn require_picture(&self, size: UVec2) -> Result<(), GpuError> {
+        require_texture(size, &self.context.device.limits())?;
+        self.require_readable(size, ColorPrecision::Single)
+    }
+
     /// Checks before drawing that a picture of this size can be read back.
     fn require_readable(&self, size: UVec2, precision: ColorPrecision) -> Result<(), GpuError> {
         let row = u64::from(size.x) * texel_bytes(precision);
         let needed = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT.into()) * u64::from(size.y);
         let limit = self.context.device.limits().max_buffer_size;
         match needed > limit {
-            true => Err(GpuError::TooLarge { what: "the pixels of the picture", needed, limit }),
+            true => Err(GpuError::Picture { size: size.to_array(), what: "its pixels", needed, limit }),
             false => Ok(()),
         }
     }

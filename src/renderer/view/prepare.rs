@@ -12,7 +12,7 @@ use crate::renderer::active::{drawn_count, most_drawn};
 use crate::renderer::design::Design;
 use crate::renderer::error::GpuError;
 use crate::renderer::layout::{self, BLOCK, Counters};
-use crate::renderer::memory::binding_limit;
+use crate::renderer::memory::{binding_limit, require_texture};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::{FastVariant, Lists, Pixels};
 use crate::renderer::timing::PassTime;
@@ -71,9 +71,7 @@ impl ViewRenderer {
         }
         let made = self.resources.as_ref().map(|resources| resources.sizes).unwrap_or_default();
         let limits = device.limits();
-        if picture.min_element() == 0 || picture.max_element() > limits.max_texture_dimension_2d {
-            return Err(GpuError::Size { width: picture.x, height: picture.y, limit: limits.max_texture_dimension_2d });
-        }
+        require_texture(picture, &limits)?;
         let parts: usize = instances.iter().map(|instance| instance.capture.parts.len()).sum();
         let splat = size_of::<layout::SplatRecord>() as u64;
         let limit = match self.design {
