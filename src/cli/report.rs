@@ -5,7 +5,7 @@
 use super::failure::Failure;
 use super::note::note;
 use super::plain;
-use crate::codec::checkpoint;
+use crate::codec::checkpoint::options::describe;
 use crate::offline::OfflineError;
 use crate::offline::unfinished::Existing;
 use crate::scene::{PlaybackHints, TrainedWith};
@@ -76,7 +76,7 @@ impl Report {
 
 /// Returns the training and playback settings of a scene, for people.
 pub fn switches(trained_with: &TrainedWith, playback: &PlaybackHints) -> Vec<(&'static str, String)> {
-    checkpoint::describe(trained_with, playback)
+    describe(trained_with, playback)
 }
 
 /// Returns the training and playback settings of a scene, for programs.

@@ -25,7 +25,7 @@ pub(crate) mod projection;
 pub(crate) mod slice;
 
 pub use gradient::GradientMode;
-pub(crate) use gradient::{GradientSettings, ParameterGradient, SplatGradient, parameter_gradient, slice_gradient};
+pub(crate) use gradient::{GradientSettings, ParameterGradient, SplatGradient, parameter_gradient};
 pub use harmonics::{Harmonics, ShDirection};
 pub(crate) use lifespan::LIFESPAN;
 pub use lifespan::{Lifespan, MARGINAL_CUTOFF};

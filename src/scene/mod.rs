@@ -20,10 +20,10 @@ mod sliced;
 pub mod synth;
 
 pub use bounds::{Bounds, BoundsOverTime};
-pub(crate) use detail::{MAX_LEVELS, pixels_across};
+pub(crate) use detail::MAX_LEVELS;
 pub use environment::Environment;
+pub(crate) use filter::MAX_SEGMENTS;
 pub use filter::{ActiveSets, FilterKind, TemporalFilter};
-pub(crate) use filter::{MAX_SEGMENTS, segment_of};
 pub use form::{ColorDegrees, Form, SceneForm, Trained};
 pub use gaussian_scene::GaussianScene;
 pub use packed::{CodedColors, PackedColors, PackedScene};

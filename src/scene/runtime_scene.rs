@@ -34,7 +34,7 @@ pub struct RuntimeScene {
 /// A level of detail: a capture of fewer Gaussians, without levels, environment map and temporal filter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Level {
-    /// The largest size on the screen ([`pixels_across`](super::pixels_across)) at which it looks nearly the same as all
+    /// The largest size on the screen (`pixels_across`) at which it looks nearly the same as all
     /// Gaussians, pixels.
     pub pixels: f32,
     /// Its Gaussians and their color. The time interval is that of the capture. Shared, because it does not change.

@@ -18,7 +18,6 @@ mod state;
 mod tensor;
 
 pub use error::CheckpointError;
-pub(crate) use options::describe;
 
 use super::options::ReadOptions;
 use crate::gaussian::{Harmonics, Model};

@@ -15,7 +15,8 @@
 //! The fourth term, the mask, is of views: see [`opacity_mask`](super::opacity_mask).
 
 use super::neighbors::NEIGHBORS;
-use crate::gaussian::{InvalidGaussian, ParameterGradient, Parameters, slice_gradient};
+use crate::gaussian::gradient::slice_gradient;
+use crate::gaussian::{InvalidGaussian, ParameterGradient, Parameters};
 use glam::DVec3;
 
 /// Time over which motion counts, timestamp units.
