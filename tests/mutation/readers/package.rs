@@ -3,7 +3,7 @@
 //! In: small scenes in every form. Out: packages with right checksums, lengths and compression, and a wrong header or wrong sections.
 
 use super::{Outcome, Reader};
-use crate::accepted;
+use crate::accepted::{self, DrawnBy};
 use crate::change::{bytes, numbers, text};
 use crate::support::packed_scene;
 use crate::support::random::Random;
@@ -63,7 +63,7 @@ impl Reader for Packages {
         let intact = package::inspect(Cursor::new(bytes)).is_ok_and(|info| info.is_intact());
         match package::read(Cursor::new(bytes)) {
             Ok(_) if !intact => Err("is read, although inspecting it finds damage".to_owned()),
-            Ok(scene) => accepted::check(scene),
+            Ok(scene) => accepted::check(scene, DrawnBy::CpuAndGpu),
             Err(error) => Ok(Outcome::Refused(error.to_string())),
         }
     }
