@@ -58,6 +58,13 @@ pub fn open() {
     *lock() = Some(renderers);
 }
 
+/// Sets the counts of what was compared to 0.
+pub fn reset_counts() {
+    for count in [&SCENES, &PICTURES, &SHOWING, &ROUNDED] {
+        count.store(0, Ordering::Relaxed);
+    }
+}
+
 /// Draws a scene with both designs and compares the frames with each other and with those of the CPU reference.
 pub fn compare(scene: &RuntimeScene, limits: &Limits, expected: &[Expected]) -> Result<(), String> {
     let mut renderers = lock();
@@ -113,7 +120,7 @@ fn lock() -> MutexGuard<'static, Option<[Headless; 2]>> {
 }
 
 /// Checks that a frame lies in the ranges, except for a few pixels. The error describes the worst pixel.
-fn same(found: &Frame, expected: &Ranges) -> Result<(), String> {
+pub fn same(found: &Frame, expected: &Ranges) -> Result<(), String> {
     let apart: Vec<f32> = (0..expected.len()).map(|pixel| expected.distance(found, pixel)).collect();
     let beyond = apart.iter().filter(|apart| **apart > CLOSE).count();
     let worst = (0..apart.len()).max_by(|a, b| apart[*a].total_cmp(&apart[*b])).unwrap_or_default();

@@ -20,6 +20,7 @@ mod memory;
 mod options;
 mod readers;
 mod rounding;
+mod self_test;
 mod trials;
 mod watch;
 
@@ -59,6 +60,7 @@ fn main() -> ExitCode {
     }
     watch::record_panics();
     designs::open();
+    self_test::run();
     let readers: Vec<(&Kind, Arc<dyn Reader>)> = kinds.map(|kind| (kind, (kind.make)())).collect();
     let mut trials = Trials::new(options.seed, options.keep.clone());
     match (&options.file, options.input) {
