@@ -95,8 +95,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
             chunk_places[thread] = pair_of(slot, tile.xy);
 #endif
         }
-        workgroupBarrier();
-        let over = atomicLoad(&finished) == PIXELS;
+        let over = workgroupUniformLoad(&finished) == PIXELS;
         let was_done = done;
         for (var i = 0u; i < count; i++) {
             let place = places[in_chunk + i];

@@ -443,8 +443,10 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
 #ifdef MULTISAMPLED
     let surfaces = surface_range(at, !done);
     let limit = surfaces.x;
+    let farthest = surfaces.y;
 #else ifdef OPAQUE
     let limit = surface_depth(at, !done);
+    let farthest = limit;
 #endif
 #endif
     if done {
@@ -502,8 +504,12 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
                 var near_alphas = batch_alphas(near, position);
                 var far_alphas = batch_alphas(far, position);
 #ifdef OPAQUE
-                // The surface hides the splats behind it.
-                near_alphas = select(near_alphas, vec4(0.0), batch_depths(near) > vec4(limit));
+                // The surface hides the splats behind it: this splat and all later ones, or some of these eight.
+                let near_depths = batch_depths(near);
+                if near_depths.x > farthest {
+                    break;
+                }
+                near_alphas = select(near_alphas, vec4(0.0), near_depths > vec4(limit));
                 far_alphas = select(far_alphas, vec4(0.0), batch_depths(far) > vec4(limit));
 #endif
                 if blend_four(&sample, near_alphas, batch_colors(near)) {
@@ -526,7 +532,11 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
                 }
 #else
 #ifdef OPAQUE
+                // All surfaces of the pixel hide this splat and all later ones.
                 let depths = batch_depths(four);
+                if depths.x > farthest {
+                    break;
+                }
 #ifdef MULTISAMPLED
                 if surfaces.y > limit && any(depths > vec4(limit)) {
                     for (var j = 0u; j < 4u; j++) {
@@ -550,6 +560,10 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
             done = pixel.done;
 #else
             done = sample.left == 0.0;
+#ifdef OPAQUE
+            // The lists are in order of depth: all splats of later batches are hidden.
+            done = done || batch_c[BATCH - 1u].y > farthest;
+#endif
 #endif
             if done {
                 atomicAdd(&finished, 1u);

@@ -132,8 +132,8 @@ fn project_bin(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
         atomicStore(&present_count, 0u);
         // `sort_bins` of the next frame counts from 0.
         if group.x == 0u {
-            atomicStore(&bins[3], 0u);
             atomicStore(&bins[4], 0u);
+            atomicStore(&bins[5], 0u);
         }
     }
     for (var i = thread; i < 128u * instance.per_thread; i += 256u) {
@@ -208,7 +208,10 @@ fn project_and_bin(first_of_group: u32, place: u32, count: u32, thread: u32) {
     }
     if thread == 0u {
         visible_before = atomicAdd(&bins[BIN_COUNTERS + instance.binning.z], atomicLoad(&own_visible));
-        atomicAdd(&bins[0], atomicLoad(&own_pairs));
+        let pairs_of_group = atomicLoad(&own_pairs);
+        if atomicAdd(&bins[0], pairs_of_group) > 0xffffffffu - pairs_of_group {
+            atomicAdd(&bins[1], 1u);
+        }
     }
     for (var i = thread; i < min(bin_count, OWN_BINS); i += 256u) {
         let many = atomicLoad(&own[i]);

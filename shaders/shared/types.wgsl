@@ -286,6 +286,6 @@ const SORT_SLOTS: u32 = 0u;
 const SORT_VISIBLE: u32 = 1u;
 const SORT_PAIRS: u32 = 2u;
 
-// Number of counters of the fast design before the counters of parts and bins: pairs of this frame; then visible splats, pairs, splats of
-// the fullest bin and pairs written of the previous frame.
-const BIN_COUNTERS: u32 = 5u;
+// Number of counters of the fast design before the counters of parts and bins: pairs of this frame, modulo 2^32, and how often this number
+// has wrapped; then visible splats, pairs, splats of the fullest bin and pairs written of the previous frame.
+const BIN_COUNTERS: u32 = 6u;

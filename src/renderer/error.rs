@@ -61,6 +61,12 @@ pub enum GpuError {
         /// Bytes that the device can bind.
         limit: u64,
     },
+    /// A software driver would end the loops of the passes before all splats are blended.
+    #[error("a software driver does not draw {slots} Gaussians: draw fewer Gaussians, or use a graphics card")]
+    TooManySplats {
+        /// Number of Gaussians that are drawn.
+        slots: usize,
+    },
     /// The device has no memory left for a buffer or a texture.
     #[error(
         "at least {needed} bytes of this GPU's memory are needed, and there is no room for them ({reason}): draw fewer Gaussians or a \

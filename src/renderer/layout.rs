@@ -483,6 +483,6 @@ pub const SORT_VISIBLE: u32 = 1;
 /// Sorts the pairs.
 pub const SORT_PAIRS: u32 = 2;
 
-/// Number of counters of the fast design before the counters of parts and bins: pairs of this frame, then the [`Counters`] of the previous
-/// frame, the last of which is the number of pairs written.
-pub const BIN_COUNTERS: u32 = 5;
+/// Number of counters of the fast design before the counters of parts and bins: pairs of this frame, modulo 2³², and how often this number
+/// has wrapped; then the [`Counters`] of the previous frame, the last of which is the number of pairs written.
+pub const BIN_COUNTERS: u32 = 6;

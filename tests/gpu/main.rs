@@ -5,12 +5,15 @@
 
 mod appearance;
 mod bake;
+mod crowds;
+mod designs;
 mod detail;
 mod fast;
 mod filter;
 mod fine_tune;
 mod fine_tune_run;
 mod golden;
+mod hidden;
 mod layout;
 #[cfg(target_os = "linux")]
 mod memory;
@@ -21,6 +24,7 @@ mod render;
 mod score;
 mod shaders;
 mod thin;
+mod uniformity;
 
 #[path = "../support"]
 mod support {

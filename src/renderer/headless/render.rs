@@ -39,7 +39,8 @@ impl Headless {
     /// When the device cannot run the passes.
     pub fn new(context: GpuContext, checks: ShaderChecks) -> Result<Self, GpuError> {
         let renderer = Renderer::new(&context.device, checks)?;
-        let view = ViewRenderer::new(&context.device, &renderer);
+        let mut view = ViewRenderer::new(&context.device, &renderer);
+        view.draws_again = true;
         Ok(Self {
             context,
             renderer,
@@ -79,7 +80,7 @@ impl Headless {
         self.renderer.compile_ahead(&self.context.device, self.design(), storage)
     }
 
-    /// Returns the design with which views are drawn: never [`Design::Auto`].
+    /// Returns the design with which views are drawn, as [`ViewRenderer::design`]: never [`Design::Auto`].
     pub fn design(&self) -> Design {
         self.view.design()
     }
@@ -142,7 +143,10 @@ impl Headless {
     ) -> Result<Frame, GpuError> {
         let size = instances.first().map_or(UVec2::ONE, |instance| instance.view.size);
         self.require_readable(size, parameters.precision)?;
-        let counters = self.submit(instances, parameters)?;
+        let mut counters = self.submit(instances, parameters)?;
+        if self.view.must_draw_again(&self.renderer, &counters) {
+            counters = self.submit(instances, parameters)?;
+        }
         // This frame is complete, but later frames are faster with a larger capacity.
         self.view.make_room(&counters);
         let (color, depth) = self.read_targets(size)?;
@@ -254,7 +258,7 @@ impl Headless {
         self.active.as_ref().map_or(&self.renderer.no_list, |active| &active.list)
     }
 
-    /// Returns the resources of the last frame on the GPU; `None` before the first frame.
+    /// Returns the resources of the last frame on the GPU; `None` before the first frame, and in [`Design::Fast`], which has other buffers.
     pub fn finished(&self) -> Option<FinishedFrame<'_>> {
         self.view.finished()
     }
