@@ -6,7 +6,7 @@
 //! An input is the name of the file, a line break, and its contents without the header.
 
 use super::{Outcome, Reader};
-use crate::accepted;
+use crate::accepted::{self, DrawnBy};
 use crate::change::{bytes, numbers, text};
 use crate::support::dataset;
 use crate::support::random::Random;
@@ -137,7 +137,10 @@ impl Reader for Saved {
         match self.bake() {
             Ok(()) => {
                 let scene = codec::load(out, &ReadOptions::default());
-                accepted::check(scene.map_err(|error| format!("leads to a package that cannot be read: {error}"))?)
+                accepted::check(
+                    scene.map_err(|error| format!("leads to a package that cannot be read: {error}"))?,
+                    DrawnBy::Cpu,
+                )
             }
             Err(error) => Ok(Outcome::Refused(error.to_string())),
         }
