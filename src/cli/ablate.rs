@@ -33,7 +33,7 @@ Examples:
 
 Every row is measured on its own: filters on the whole scene, ratios without a filter. The active share is the mean over the
 segments of a filter.")]
-pub struct Ablate {
+pub(super) struct Ablate {
     #[command(flatten)]
     given: Given,
     /// The checkpoint, or a package of it in the trained form.
@@ -78,7 +78,7 @@ impl Ablate {
     /// # Errors
     /// A checkpoint or views that cannot be used, images that are missing or show something else, a table that cannot be written, a failure of the
     /// engine.
-    pub fn run(&self) -> Result<Report, Failure> {
+    pub(super) fn run(&self) -> Result<Report, Failure> {
         self.engine.check(&self.given, &[])?;
         self.scoring.check(&self.given, &self.variants)?;
         if self.split != Measured::Validation {

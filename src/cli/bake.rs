@@ -36,7 +36,7 @@ Examples:
 Beside the package: OUT.report.html with plots and pictures (open it in a browser; it needs no network) and OUT.report.json.
 Every choice is made on validation views, which nothing is trained on. The report compares the test views, which no choice looks at, if
 their images are there. Cameras and times of the training views are enough with --ratio or --keep; --max-loss needs their images, too.")]
-pub struct Bake {
+pub(super) struct Bake {
     #[command(flatten)]
     given: Given,
     /// The checkpoint, or a package of it in the trained form.
@@ -113,7 +113,7 @@ impl Bake {
     ///
     /// # Errors
     /// A checkpoint or views that cannot be used, files that cannot be written, a failure of the engine.
-    pub fn run(&self) -> Result<Report, Failure> {
+    pub(super) fn run(&self) -> Result<Report, Failure> {
         self.engine.check(&self.given, &OF_TRAINING)?;
         self.scoring.check(&self.given, &[self.variant])?;
         let settings = self.settings(self.package.out()?);

@@ -32,7 +32,7 @@ Examples:
   gs4d bench chkpnt30000.pth --cameras data/transforms_test.json --resolution 2 --times 5
   gs4d bench a.gs4d b.gs4d --renderer fast,reference --form stored,fp32 --filter on,off --rounds 3
   gs4d bench capture.gs4d --orbit 24 --size 1352x1014 --frames 1000 --json")]
-pub struct Bench {
+pub(super) struct Bench {
     /// The packages or checkpoints to draw.
     #[arg(value_name = "SCENE", required = true)]
     scenes: Vec<PathBuf>,
@@ -105,7 +105,7 @@ impl Bench {
     ///
     /// # Errors
     /// A scene or views that cannot be used, no such adapter, a failure of the GPU.
-    pub fn run(&self) -> Result<Report, Failure> {
+    pub(super) fn run(&self) -> Result<Report, Failure> {
         // A file that cannot be used is named where there is no adapter, too.
         let mut read = Vec::new();
         for path in &self.scenes {

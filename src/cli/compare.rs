@@ -28,7 +28,7 @@ Examples:
 
 PSNR is the mean over the three channels, as the original code reports it; channels without error are left out. Pooled PSNR is that of all
 values together. The PSNR of identical pictures is 200 dB. Their number is reported, and they are left out of the mean PSNR.")]
-pub struct Compare {
+pub(super) struct Compare {
     #[command(flatten)]
     given: Given,
     /// A picture or a folder of pictures.
@@ -47,7 +47,7 @@ impl Compare {
     ///
     /// # Errors
     /// Pictures that cannot be read or paired, or that have different sizes.
-    pub fn run(&self) -> Result<Report, Failure> {
+    pub(super) fn run(&self) -> Result<Report, Failure> {
         let progress = &mut Bars::default();
         let pairs = Pairs::of(&self.a, &self.b, self.size)?;
         if !pairs.has_raw() {

@@ -35,7 +35,7 @@ Examples:
 
 No choice is made on pictures, and no training views are needed: --cameras takes those of a dataset for the comparison with the original.
 gs4d bake and gs4d finetune --compress train codebooks on the training views, and lose less.")]
-pub struct Compress {
+pub(super) struct Compress {
     #[command(flatten)]
     given: Given,
     /// The checkpoint or package to read.
@@ -149,7 +149,7 @@ impl Compress {
     ///
     /// # Errors
     /// The scene cannot be read or is packed already, the package cannot be written, a failure of the engine.
-    pub fn run(&self) -> Result<Report, Failure> {
+    pub(super) fn run(&self) -> Result<Report, Failure> {
         self.check_options()?;
         let progress = &mut Bars::default();
         let files = Files::default().reads_scene(&self.input).reads(&self.weights);

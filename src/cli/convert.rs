@@ -22,7 +22,7 @@ Examples:
   gs4d convert chkpnt30000.pth capture.gs4d
   gs4d convert chkpnt30000.pth small.gs4d --form runtime --sh-degree 0
   gs4d convert n3v/chkpnt30000.pth -o n3v.gs4d --time-interval 0,10 --trained-cameras intrinsics --duration 10")]
-pub struct Convert {
+pub(super) struct Convert {
     #[command(flatten)]
     given: Given,
     /// The checkpoint or package to read.
@@ -48,7 +48,7 @@ impl Convert {
     ///
     /// # Errors
     /// The scene cannot be read or converted, or the package cannot be written.
-    pub fn run(&self) -> Result<Report, Failure> {
+    pub(super) fn run(&self) -> Result<Report, Failure> {
         if self.sh_degree.is_some_and(|degree| degree < 3) {
             self.given.none_of(&["--sh-degree-t"], WITHOUT_TIME)?;
         }

@@ -34,7 +34,7 @@ Examples:
 A size on the screen is the diameter of the bounding sphere of the capture in pixels. Levels are compared and drawn up
 to 250 pixels. The PSNR of a screen is over 1280x720 pixels, the PSNR to the truth over the rectangle of the capture. Both are the lower
 value of black and white background, in the worst view. Other verbs that write packages leave levels out: run detail last.")]
-pub struct Detail {
+pub(super) struct Detail {
     /// The checkpoint or package to read. Its levels are replaced.
     #[arg(value_name = "IN")]
     input: PathBuf,
@@ -72,7 +72,7 @@ impl Detail {
     /// # Errors
     /// A scene that cannot be read or has an environment map, training views that do not show it, a package that cannot be written, no such
     /// adapter, a failure of the GPU.
-    pub fn run(&self) -> Result<Report, Failure> {
+    pub(super) fn run(&self) -> Result<Report, Failure> {
         let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
         let mut scene = self.checkpoint.load(&self.input)?;
         let views = match self.data.is_given() {

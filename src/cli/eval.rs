@@ -39,7 +39,7 @@ all values together: of a view, and in the last row of all views. PSNR of identi
 of the mean PSNR. Where images have gaps, PSNR is measured over a second background, too: white if that of training (or
 --background) is dark, else black. A background hides fog of its own color, and games lay captures over scenes. MS-SSIM needs
 pictures of at least 176 pixels a side. FLIP is 0 for equal pictures, 1 at most, seen at 67 pixels per degree.")]
-pub struct Eval {
+pub(super) struct Eval {
     #[command(flatten)]
     given: Given,
     /// The package or checkpoint.
@@ -100,7 +100,7 @@ impl Eval {
     ///
     /// # Errors
     /// A scene or views that cannot be used, missing images, pictures that cannot be written, a failure of the engine.
-    pub fn run(&self) -> Result<Report, Failure> {
+    pub(super) fn run(&self) -> Result<Report, Failure> {
         self.engine.check(&self.given, &OF_DRAWING)?;
         let files = self.data.add_to(Files::default().reads_scene(&self.scene));
         if let Some(out) = &self.out {

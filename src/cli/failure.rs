@@ -10,52 +10,52 @@ use std::error::Error;
 use std::path::Path;
 
 /// The exit code of a verb that fails, and of a command line that cannot be understood.
-pub const FAILED: u8 = 2;
+pub(super) const FAILED: u8 = 2;
 
 /// An error of a verb: the line that is printed after `error: `.
 #[derive(Debug)]
-pub struct Failure {
+pub(super) struct Failure {
     message: String,
     silent: bool,
 }
 
 impl Failure {
     /// Returns a failure with this message.
-    pub fn new(message: impl Into<String>) -> Self {
+    pub(super) fn new(message: impl Into<String>) -> Self {
         let message = message.into();
         Self { message: system::in_words(&message), silent: system::is_closed_pipe(&message) }
     }
 
     /// Returns a failure with this message about a file.
-    pub fn about(path: &Path, message: &str) -> Self {
+    pub(super) fn about(path: &Path, message: &str) -> Self {
         Self::new(format!("{}: {message}", path.display()))
     }
 
     /// Returns a failure from an error about this file that does not contain its name.
-    pub fn at(path: &Path, error: &dyn Error) -> Self {
+    pub(super) fn at(path: &Path, error: &dyn Error) -> Self {
         Self::about(path, &chain(error))
     }
 
     /// Returns a failure with the message of a panic.
-    pub fn of_panic(panic: &(dyn Any + Send)) -> Self {
+    pub(super) fn of_panic(panic: &(dyn Any + Send)) -> Self {
         let message = panic.downcast_ref::<String>().map(String::as_str);
         let message = message.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("a panic");
         Self::new(format!("a defect of gs4d, please report it: {message}"))
     }
 
     /// Returns the message.
-    pub fn message(&self) -> &str {
+    pub(super) fn message(&self) -> &str {
         &self.message
     }
 
     /// Returns whether the work has ended because the user asked for it.
-    pub fn is_interruption(&self) -> bool {
+    pub(super) fn is_interruption(&self) -> bool {
         let interrupted = OfflineError::Interrupted { tuned: None }.to_string();
         self.message.rsplit(": ").next() == Some(interrupted.as_str())
     }
 
     /// Returns whether no message is printed: the program that reads the output (such as `head`) has ended.
-    pub fn is_silent(&self) -> bool {
+    pub(super) fn is_silent(&self) -> bool {
         self.silent
     }
 }

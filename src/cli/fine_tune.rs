@@ -38,7 +38,7 @@ Examples:
 
 A temporal filter of the scene (gs4d mask) is used in training: Gaussians that it leaves out at a time are not drawn at that time. The filter
 is computed again every --refresh-filter steps. A support filter changes no picture; it is computed again after training.")]
-pub struct FineTune {
+pub(super) struct FineTune {
     #[command(flatten)]
     given: Given,
     /// The checkpoint, or a package in the trained form.
@@ -133,7 +133,7 @@ impl FineTune {
     ///
     /// # Errors
     /// A scene or views that cannot be used, a package that cannot be written, a failure of the GPU.
-    pub fn run(&self) -> Result<Report, Failure> {
+    pub(super) fn run(&self) -> Result<Report, Failure> {
         self.check_options()?;
         let out = self.package.checked_file(self.data.add_to(Files::default().reads_scene(&self.input)))?;
         let store = Store::beside(out, ".tune")?;

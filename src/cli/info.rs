@@ -29,7 +29,7 @@ use std::path::PathBuf;
 Examples:
   gs4d info capture.gs4d
   gs4d info chkpnt30000.pth --time-interval 0,10 --json")]
-pub struct Info {
+pub(super) struct Info {
     /// The checkpoint or package.
     #[arg(value_name = "FILE")]
     file: PathBuf,
@@ -73,7 +73,7 @@ impl Info {
     ///
     /// # Errors
     /// The file cannot be read. If sections are damaged or a Gaussian cannot be drawn, the result is a report with a failure.
-    pub fn run(&self) -> Result<Report, Failure> {
+    pub(super) fn run(&self) -> Result<Report, Failure> {
         let size = file_size(&self.file)?;
         let (format, package) = codec::inspect(&self.file)?;
         if let Some(info) = package.as_ref().filter(|info| !info.is_intact()) {

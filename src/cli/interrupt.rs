@@ -35,7 +35,7 @@ static ENDED: AtomicBool = AtomicBool::new(false);
 ///
 /// # Errors
 /// The operating system refuses it.
-pub fn install(as_json: bool) -> io::Result<()> {
+pub(super) fn install(as_json: bool) -> io::Result<()> {
     AS_JSON.store(as_json, Ordering::SeqCst);
     unfinished::keep();
     listen()
@@ -146,7 +146,7 @@ fn exit(signal: i32) -> ! {
 }
 
 /// While this lives, the first signal only asks the work to end early.
-pub struct Deferred(());
+pub(super) struct Deferred(());
 
 impl Drop for Deferred {
     fn drop(&mut self) {
@@ -155,29 +155,29 @@ impl Drop for Deferred {
 }
 
 /// Begins work that looks at [`is_asked`] now and then, and ends with a result.
-pub fn defer() -> Deferred {
+pub(super) fn defer() -> Deferred {
     DEFERS.store(true, Ordering::SeqCst);
     Deferred(())
 }
 
 /// Returns whether the work is asked to end early.
-pub fn is_asked() -> bool {
+pub(super) fn is_asked() -> bool {
     SIGNAL.load(Ordering::SeqCst) != 0
 }
 
 /// Begins to print the report of the command. Does not return if the process is leaving, which prints its own.
-pub fn begin_report() {
+pub(super) fn begin_report() {
     while REPORTED.swap(true, Ordering::SeqCst) {
         thread::park();
     }
 }
 
 /// Ends the handling of the first signal: the report has been printed, and its exit code is that of the process.
-pub fn end_report() {
+pub(super) fn end_report() {
     ENDED.store(true, Ordering::SeqCst);
 }
 
 /// Ends a process whose work has ended because of a signal.
-pub fn end() -> ! {
+pub(super) fn end() -> ! {
     exit(SIGNAL.load(Ordering::SeqCst))
 }

@@ -29,7 +29,7 @@ Filters:
   interval   Gaussians of support that a training view in the segment, or a camera at its two key-frames, sees.
   key-frame  Gaussians that a camera sees at the two key-frames of the segment, as in the paper. Loses Gaussians that appear
              and disappear between them.")]
-pub struct Mask {
+pub(super) struct Mask {
     #[command(flatten)]
     given: Given,
     /// The checkpoint or package to filter. Its filter is replaced.
@@ -60,7 +60,7 @@ impl Mask {
     /// # Errors
     /// A scene or views that cannot be used, too many key-frames, a package that cannot be written, a failure of the
     /// engine.
-    pub fn run(&self) -> Result<Report, Failure> {
+    pub(super) fn run(&self) -> Result<Report, Failure> {
         self.check_options()?;
         let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
         let mut scene = self.checkpoint.load_to_change(&self.input)?;

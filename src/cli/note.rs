@@ -15,12 +15,12 @@ pub(super) static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::n
 static SILENT: AtomicBool = AtomicBool::new(false);
 
 /// Sets whether progress bars are hidden from now on.
-pub fn silence_progress(silent: bool) {
+pub(super) fn silence_progress(silent: bool) {
     SILENT.store(silent, Ordering::Relaxed);
 }
 
 /// Writes a line to standard error, if it is open. Common errors of the operating system in the line are replaced by sentences.
-pub fn note(line: &str) {
+pub(super) fn note(line: &str) {
     let _ = BARS.suspend(|| writeln!(stderr(), "{}", plain::lines(&system::in_words(line))));
 }
 

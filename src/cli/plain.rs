@@ -6,12 +6,12 @@
 use crate::codec::text::{escaped, is_obeyed};
 
 /// Returns lines for a terminal.
-pub fn lines(text: &str) -> String {
+pub(super) fn lines(text: &str) -> String {
     text.split('\n').map(escaped).collect::<Vec<_>>().join("\n")
 }
 
 /// Returns a JSON document for a terminal. Control characters occur only in its strings, where JSON allows escapes.
-pub fn json(document: &str) -> String {
+pub(super) fn json(document: &str) -> String {
     let mut plain = String::with_capacity(document.len());
     for c in document.chars() {
         if is_obeyed(c) && c != '\n' {

@@ -11,7 +11,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 /// The bars of the unfinished tasks; hidden with `--json` and if standard error is not a terminal. They are removed when this value is
 /// dropped. Default: no tasks.
 #[derive(Default)]
-pub struct Bars(Vec<ProgressBar>);
+pub(super) struct Bars(Vec<ProgressBar>);
 
 impl Progress for Bars {
     fn begin(&mut self, task: &'static str, steps: usize) {

@@ -36,7 +36,7 @@ Examples:
 --max-loss looks for the smallest count whose PSNR on the validation views falls by no more than that; it needs their images. `auto` prunes
 by ours (energy, removal, energy-removal) and by the paper's (full) and keeps the best. The checkpoint was trained on the validation views,
 unless they are those of transforms_val.json: the loss is that against views which it knows.")]
-pub struct Prune {
+pub(super) struct Prune {
     #[command(flatten)]
     given: Given,
     /// The checkpoint or package to prune.
@@ -76,7 +76,7 @@ impl Prune {
     ///
     /// # Errors
     /// A scene, views or scores that cannot be used, a package that cannot be written, a failure of the engine.
-    pub fn run(&self) -> Result<Report, Failure> {
+    pub(super) fn run(&self) -> Result<Report, Failure> {
         self.check_options()?;
         let files = Files::default().reads_scene(&self.input).reads(&self.scores);
         let out = self.package.checked_out(self.data.add_to(files))?;

@@ -35,7 +35,7 @@ Examples:
 
 Raw pictures (.f32) are height x width x 3 little-endian float32 values, not clamped.
 The background is that of the capture (its environment map if it has one), or the color of --background.")]
-pub struct Render {
+pub(super) struct Render {
     /// The package or checkpoint to draw.
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
@@ -66,7 +66,7 @@ impl Render {
     /// # Errors
     /// A scene or views that cannot be used, a missing level or size of training pixels, pictures that cannot be written, no such adapter, a
     /// failure of the GPU.
-    pub fn run(&self) -> Result<Report, Failure> {
+    pub(super) fn run(&self) -> Result<Report, Failure> {
         let files = self.views.add_to(Files::default().reads_scene(&self.scene));
         files.clone().writes_folder(&self.out, []).check()?;
         let (scene, headless) = std::thread::scope(|scope| {

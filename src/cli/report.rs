@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use std::io::{ErrorKind, Write, stdout};
 
 /// The result of a verb.
-pub struct Report {
+pub(super) struct Report {
     /// The report with `--json`.
     pub json: Value,
     /// The report for people. Each line ends with a line break.
@@ -26,12 +26,12 @@ pub struct Report {
 
 impl Report {
     /// Returns the report of a successful command.
-    pub fn new(json: Value, text: String) -> Self {
+    pub(super) fn new(json: Value, text: String) -> Self {
         Self { json, text, failure: None, interrupted: false }
     }
 
     /// Returns a report that has only a failure.
-    pub fn of_failure(failure: Failure) -> Self {
+    pub(super) fn of_failure(failure: Failure) -> Self {
         Self {
             json: json!({ "error": failure.message() }),
             text: String::new(),
@@ -41,7 +41,7 @@ impl Report {
     }
 
     /// Returns the report of a command that has ended because the user asked for it: what exists of its work.
-    pub fn of_interruption(existing: &Existing) -> Self {
+    pub(super) fn of_interruption(existing: &Existing) -> Self {
         let again = if existing.resumes { "; the same command resumes" } else { "" };
         let failure = Failure::new(format!("{}{again}", OfflineError::Interrupted { tuned: None }));
         let outputs: Vec<String> = existing.outputs.iter().map(|path| path.display().to_string()).collect();
@@ -58,7 +58,7 @@ impl Report {
     ///
     /// # Errors
     /// Standard output cannot be written to.
-    pub fn print(&self, as_json: bool) -> Result<(), Failure> {
+    pub(super) fn print(&self, as_json: bool) -> Result<(), Failure> {
         let text = if as_json { plain::json(&format!("{:#}\n", self.json)) } else { plain::lines(&self.text) };
         let printed = stdout().write_all(text.as_bytes()).and_then(|()| stdout().flush());
         if let Some(failure) = self.failure.as_ref().filter(|failure| !failure.is_silent()) {
@@ -75,11 +75,11 @@ impl Report {
 }
 
 /// Returns the training and playback settings of a scene, for people.
-pub fn switches(trained_with: &TrainedWith, playback: &PlaybackHints) -> Vec<(&'static str, String)> {
+pub(super) fn switches(trained_with: &TrainedWith, playback: &PlaybackHints) -> Vec<(&'static str, String)> {
     describe(trained_with, playback)
 }
 
 /// Returns the training and playback settings of a scene, for programs.
-pub fn switches_json(trained_with: &TrainedWith, playback: &PlaybackHints) -> Value {
+pub(super) fn switches_json(trained_with: &TrainedWith, playback: &PlaybackHints) -> Value {
     json!({ "trained_with": trained_with, "playback": playback })
 }

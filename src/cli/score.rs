@@ -33,7 +33,7 @@ Examples:
 
 Scores are little-endian float32 in the checkpoint's order, the more the better. `auto` prunes by ours (energy, removal,
 energy-removal) and by the paper's (full), draws the validation views, which are not scored, and keeps the best.")]
-pub struct Score {
+pub(super) struct Score {
     #[command(flatten)]
     given: Given,
     /// The checkpoint, or a package of it in the trained form.
@@ -65,7 +65,7 @@ impl Score {
     ///
     /// # Errors
     /// A checkpoint or views that cannot be used, scores that cannot be written, a failure of the engine.
-    pub fn run(&self) -> Result<Report, Failure> {
+    pub(super) fn run(&self) -> Result<Report, Failure> {
         self.check_options()?;
         if self.variant != ScoreChoice::All && self.out.is_dir() {
             return Err(Failure::about(&self.out, "is a folder: name a file, or give --variant all"));
@@ -170,7 +170,7 @@ impl Score {
 }
 
 /// Returns a table with a row for the outcome of each candidate.
-pub fn search_table(search: &SearchSummary) -> String {
+pub(super) fn search_table(search: &SearchSummary) -> String {
     let mut table = Table::new(&["score", "kept", "PSNR", "loss"]);
     let decibels = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));
     for outcome in &search.candidates {

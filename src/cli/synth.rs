@@ -21,7 +21,7 @@ Examples:
   gs4d synth small.gs4d
   gs4d synth large.gs4d --count 667000 --seed 7
   gs4d synth grown.gs4d --grow 37 chkpnt30000.pth --level 1")]
-pub struct Synth {
+pub(super) struct Synth {
     #[command(flatten)]
     given: Given,
     #[command(flatten)]
@@ -54,7 +54,7 @@ impl Synth {
     ///
     /// # Errors
     /// The capture to grow cannot be read, or the package cannot be written.
-    pub fn run(&self) -> Result<Report, Failure> {
+    pub(super) fn run(&self) -> Result<Report, Failure> {
         if self.sh_degree < 3 {
             self.given.none_of(&["--sh-degree-t"], WITHOUT_TIME)?;
         }

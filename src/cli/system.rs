@@ -9,7 +9,7 @@ use std::io::{self, ErrorKind};
 const MARK: &str = " (os error ";
 
 /// Returns a message in which texts of common errors are replaced by sentences. Other texts are unchanged.
-pub fn in_words(message: &str) -> String {
+pub(super) fn in_words(message: &str) -> String {
     let Some(error) = first(message) else { return message.to_owned() };
     match (error.to_string(), words(&error)) {
         (text, Some(words)) if message.contains(&text) => in_words(&message.replace(&text, words)),
@@ -18,7 +18,7 @@ pub fn in_words(message: &str) -> String {
 }
 
 /// Returns whether the first error in a message is a closed pipe: the program that reads the output has ended.
-pub fn is_closed_pipe(message: &str) -> bool {
+pub(super) fn is_closed_pipe(message: &str) -> bool {
     first(message).is_some_and(|error| error.kind() == ErrorKind::BrokenPipe)
 }
 

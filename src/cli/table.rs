@@ -6,16 +6,16 @@
 use crate::codec::text::escaped;
 
 /// A table: the first column is aligned to the left, the other columns to the right.
-pub struct Table(Vec<Vec<String>>);
+pub(super) struct Table(Vec<Vec<String>>);
 
 impl Table {
     /// Returns an empty table with these column heads.
-    pub fn new(heads: &[&str]) -> Self {
+    pub(super) fn new(heads: &[&str]) -> Self {
         Self(vec![heads.iter().map(ToString::to_string).collect()])
     }
 
     /// Adds a row.
-    pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
+    pub(super) fn row(&mut self, cells: impl IntoIterator<Item = String>) {
         self.0.push(cells.into_iter().map(|cell| escaped(&cell)).collect());
     }
 }
@@ -40,13 +40,13 @@ impl std::fmt::Display for Table {
 }
 
 /// Returns one line for each name and value, with the values aligned.
-pub fn lines(pairs: &[(&str, String)]) -> String {
+pub(super) fn lines(pairs: &[(&str, String)]) -> String {
     let width = pairs.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
     pairs.iter().map(|(name, value)| format!("{name:<width$}  {}\n", escaped(value))).collect()
 }
 
 /// Returns a number of bytes with a unit: B, kB, MB or GB, in powers of 1000.
-pub fn bytes(count: u64) -> String {
+pub(super) fn bytes(count: u64) -> String {
     match count {
         0..1_000 => format!("{count} B"),
         1_000..1_000_000 => format!("{:.1} kB", count as f64 / 1e3),

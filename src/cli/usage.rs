@@ -13,7 +13,7 @@ use std::process::ExitCode;
 ///
 /// # Errors
 /// The exit code, if help is requested or the arguments are invalid. Help or the error has been printed.
-pub fn parse<C: Parser>() -> Result<C, ExitCode> {
+pub(super) fn parse<C: Parser>() -> Result<C, ExitCode> {
     C::try_parse().map_err(|error| {
         let failed = error.use_stderr();
         // The exit code does not depend on whether printing succeeds.

@@ -7,13 +7,13 @@ const LONGEST: usize = 240;
 
 /// Returns whether a character may control a terminal: control characters, and characters that change the direction or
 /// the line of the text after them.
-pub fn is_obeyed(c: char) -> bool {
+pub(crate) fn is_obeyed(c: char) -> bool {
     c.is_control() || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 /// Returns the text with an escape, `\u{1b}`, in place of each character that may control a terminal, including line
 /// breaks.
-pub fn escaped(text: &str) -> String {
+pub(crate) fn escaped(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for c in text.chars() {
         if is_obeyed(c) {
@@ -26,7 +26,7 @@ pub fn escaped(text: &str) -> String {
 }
 
 /// Returns the beginning of a text from a file, [`escaped`], so that the length of errors is limited.
-pub fn printable(text: &str) -> String {
+pub(crate) fn printable(text: &str) -> String {
     let end = text.char_indices().nth(LONGEST).map_or(text.len(), |(at, _)| at);
     escaped(&text[..end])
 }

@@ -11,7 +11,7 @@ use crate::view::{Picture, View};
 
 /// Views of the original, drawn before it is compressed.
 #[derive(Debug, Clone)]
-pub struct Originals {
+pub(crate) struct Originals {
     views: Vec<View>,
     pictures: Vec<Picture>,
 }
@@ -21,7 +21,7 @@ impl Originals {
     ///
     /// # Errors
     /// Pictures that do not fit the memory or the GPU, a failure of the engine.
-    pub fn draw(
+    pub(crate) fn draw(
         engine: &mut Engine,
         scene: &RuntimeScene,
         views: Vec<View>,
@@ -41,7 +41,7 @@ impl Originals {
     ///
     /// # Errors
     /// A failure of the engine.
-    pub fn errors(
+    pub(crate) fn errors(
         &self,
         engine: &mut Engine,
         scene: &RuntimeScene,

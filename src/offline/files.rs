@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 /// The files that work reads and those that it writes. Default: none.
 #[derive(Debug, Clone, Default)]
-pub struct Files {
+pub(crate) struct Files {
     inputs: Vec<PathBuf>,
     outputs: Vec<Output>,
 }
@@ -43,25 +43,25 @@ enum Place {
 
 impl Files {
     /// Adds inputs.
-    pub fn reads<'a>(mut self, paths: impl IntoIterator<Item = &'a PathBuf>) -> Self {
+    pub(crate) fn reads<'a>(mut self, paths: impl IntoIterator<Item = &'a PathBuf>) -> Self {
         self.inputs.extend(paths.into_iter().cloned());
         self
     }
 
     /// Adds a checkpoint or a package, and the `cfg_args` beside it.
-    pub fn reads_scene(mut self, path: &Path) -> Self {
+    pub(crate) fn reads_scene(mut self, path: &Path) -> Self {
         self.inputs.extend([path.to_owned(), path.with_file_name("cfg_args")]);
         self
     }
 
     /// Adds a camera file, the existing images that it names, and those of the dataset in the same folder.
-    pub fn reads_cameras(mut self, path: &Path) -> Self {
+    pub(crate) fn reads_cameras(mut self, path: &Path) -> Self {
         self.add_cameras(path);
         self.reads_data(folder_of(path))
     }
 
     /// Adds the camera files of a dataset folder, and the existing images and masks that they name.
-    pub fn reads_data(mut self, folder: &Path) -> Self {
+    pub(crate) fn reads_data(mut self, folder: &Path) -> Self {
         for split in Split::ALL {
             self.add_cameras(&folder.join(split.file_name()));
         }
@@ -79,7 +79,7 @@ impl Files {
     }
 
     /// Adds an output: a file in a folder that exists. If its name has an extension, it must be this one.
-    pub fn writes(mut self, path: &Path, extension: &'static str) -> Self {
+    pub(crate) fn writes(mut self, path: &Path, extension: &'static str) -> Self {
         self.outputs.push(Output::File(path.to_owned(), extension));
         self
     }
@@ -91,7 +91,7 @@ impl Files {
     }
 
     /// Adds an output: a folder, which will be made if it does not exist, and files in it.
-    pub fn writes_folder(mut self, folder: &Path, files: impl IntoIterator<Item = PathBuf>) -> Self {
+    pub(crate) fn writes_folder(mut self, folder: &Path, files: impl IntoIterator<Item = PathBuf>) -> Self {
         self.outputs.push(Output::Folder(folder.to_owned()));
         self.outputs.extend(files.into_iter().map(Output::Inside));
         self
@@ -102,7 +102,7 @@ impl Files {
     ///
     /// # Errors
     /// The first output with which something is wrong, by name.
-    pub fn check(&self) -> Result<(), OfflineError> {
+    pub(crate) fn check(&self) -> Result<(), OfflineError> {
         self.tell_apart()?;
         let mut folders = BTreeSet::new();
         for output in &self.outputs {

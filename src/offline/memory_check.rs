@@ -70,41 +70,41 @@ pub(crate) struct Pictures {
 
 impl Pictures {
     /// Returns a picture that is drawn, with `beside` bytes for each of its pixels in memory.
-    pub fn drawn(size: UVec2, beside: u64) -> Self {
+    pub(crate) fn drawn(size: UVec2, beside: u64) -> Self {
         Self { largest: size, beside, ..Self::default() }
     }
 
     /// Returns pictures that are drawn one after the other while at most `waiting` are written.
-    pub fn written(sizes: impl IntoIterator<Item = UVec2>, waiting: u64) -> Self {
+    pub(crate) fn written(sizes: impl IntoIterator<Item = UVec2>, waiting: u64) -> Self {
         Self::drawn(largest(sizes), waiting * (PICTURE + WRITTEN))
     }
 
     /// Returns views that are drawn one after the other, and are not kept.
-    pub fn looked_at(views: &[TrainingView]) -> Self {
+    pub(crate) fn looked_at(views: &[TrainingView]) -> Self {
         Self::drawn(largest(sizes(views)), 0)
     }
 
     /// Returns so many frames of one size that are held, with `bytes` for each pixel.
-    pub fn frames(size: UVec2, count: u64, bytes: u64) -> Self {
+    pub(crate) fn frames(size: UVec2, count: u64, bytes: u64) -> Self {
         let held = pixels(size).saturating_mul(count).saturating_mul(bytes);
         Self { count, held, ..Self::drawn(size, 0) }
     }
 
     /// Returns pictures of these views that are held, while others are compared with them.
-    pub fn originals(views: &[View]) -> Self {
+    pub(crate) fn originals(views: &[View]) -> Self {
         let sizes = || views.iter().map(|view| view.size);
         // A picture, and both clamped.
         Self { work: 3 * PICTURE, ..Self::held(sizes(), PICTURE) }
     }
 
     /// Returns images that are held as pictures, while pictures are compared with them.
-    pub fn compared<'a>(views: impl IntoIterator<Item = &'a TrainingView>) -> Self {
+    pub(crate) fn compared<'a>(views: impl IntoIterator<Item = &'a TrainingView>) -> Self {
         let held = Self::held(views.into_iter().map(|view| view.camera.size), PICTURE);
         Self { work: (2 * PICTURE).max(loading(held.count)), ..held }
     }
 
     /// Returns images that are compared with pictures one after the other; `kept` tells whether both are also put side by side.
-    pub fn evaluated(views: &[TrainingView], metrics: MetricSet, kept: bool) -> Self {
+    pub(crate) fn evaluated(views: &[TrainingView], metrics: MetricSet, kept: bool) -> Self {
         let measured = [(metrics.flip, FLIP), (metrics.ms_ssim, MS_SSIM), (kept, SIDE_BY_SIDE)];
         let most = measured.iter().filter(|(wanted, _)| *wanted).map(|(_, bytes)| *bytes).max().unwrap_or(0);
         // The image, as a picture and as it was loaded; the render, also clamped.
@@ -113,7 +113,7 @@ impl Pictures {
     }
 
     /// Returns images that a GPU trains on, with those that it validates on.
-    pub fn trained(train: &[TrainingView], validation: &[TrainingView]) -> Self {
+    pub(crate) fn trained(train: &[TrainingView], validation: &[TrainingView]) -> Self {
         let held = Self::held(sizes(train).chain(sizes(validation)), IMAGE);
         // A validation image is compared as a picture.
         Self { beside: PICTURE, work: loading(held.count), trained: true, ..held }
@@ -134,7 +134,7 @@ impl Pictures {
     ///
     /// # Errors
     /// What is needed and what is available, with `remedy`.
-    pub fn require(&self, headless: Option<&Headless>, remedy: &'static str) -> Result<(), OfflineError> {
+    pub(crate) fn require(&self, headless: Option<&Headless>, remedy: &'static str) -> Result<(), OfflineError> {
         let Some(headless) = headless else { return self.require_bytes(ON_CPU, remedy, available) };
         let limited = |reason: GpuError| OfflineError::Limit { reason, remedy };
         if self.largest != UVec2::ZERO {
@@ -156,7 +156,7 @@ impl Pictures {
     ///
     /// # Errors
     /// As [`require`](Self::require).
-    pub fn require_loaded(&self, remedy: &'static str) -> Result<(), OfflineError> {
+    pub(crate) fn require_loaded(&self, remedy: &'static str) -> Result<(), OfflineError> {
         self.require_bytes(0, remedy, available)
     }
 

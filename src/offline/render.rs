@@ -19,7 +19,7 @@ const QUEUE: usize = 4;
 ///
 /// # Errors
 /// Pictures that do not fit the memory, a failure of the GPU, threads that cannot be started, and errors of `write`.
-pub fn render_shots(
+pub(crate) fn render_shots(
     headless: &mut Headless,
     capture: &GpuCapture,
     background: Background,

@@ -40,7 +40,7 @@ fn read_back(file: File) -> Result<(), CodecErrorKind> {
 
 /// Returns the settings for writing a scene of this form. `level` is the zstd level, 1 to 19; `None` uses 19 for the
 /// packed form and the default of [`WriteSettings`] for the others.
-pub fn write_settings(form: &SceneForm, level: Option<i32>) -> WriteSettings {
+pub(crate) fn write_settings(form: &SceneForm, level: Option<i32>) -> WriteSettings {
     let usual = match form {
         // A tenth of the bytes for seconds of time.
         SceneForm::Ready(Form::Packed(_)) => 19,
@@ -53,7 +53,7 @@ pub fn write_settings(form: &SceneForm, level: Option<i32>) -> WriteSettings {
 ///
 /// # Errors
 /// A folder that cannot be written to, a full disk.
-pub fn write_png(path: &Path, picture: &Picture) -> Result<(), CodecError> {
+pub(crate) fn write_png(path: &Path, picture: &Picture) -> Result<(), CodecError> {
     write_beside(path, |file| picture.to_rgb8().write_with_encoder(PngEncoder::new(file)).map_err(io::Error::other))
 }
 
@@ -65,7 +65,10 @@ pub fn write_png(path: &Path, picture: &Picture) -> Result<(), CodecError> {
 ///
 /// # Errors
 /// Errors of `write`, a folder that cannot be written to, a full disk.
-pub fn write_beside<E>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>) -> Result<(), CodecError>
+pub(crate) fn write_beside<E>(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>,
+) -> Result<(), CodecError>
 where
     CodecErrorKind: From<E>,
 {

@@ -11,7 +11,7 @@ use super::{OfflineError, Progress, proceed};
 use std::time::Instant;
 
 /// Stages in progress.
-pub struct Stages<'a> {
+pub(crate) struct Stages<'a> {
     store: &'a Store,
     progress: &'a mut dyn Progress,
     times: Vec<StageTime>,
@@ -19,7 +19,7 @@ pub struct Stages<'a> {
 
 impl<'a> Stages<'a> {
     /// Begins a task of this many stages.
-    pub fn begin(task: &'static str, count: usize, store: &'a Store, progress: &'a mut dyn Progress) -> Self {
+    pub(crate) fn begin(task: &'static str, count: usize, store: &'a Store, progress: &'a mut dyn Progress) -> Self {
         progress.begin(task, count);
         Self { store, progress, times: Vec::new() }
     }
@@ -30,7 +30,7 @@ impl<'a> Stages<'a> {
     ///
     /// # Errors
     /// Those of `work`, a result that cannot be stored, [`OfflineError::Interrupted`] if the user has asked to end.
-    pub fn run<T: Stored>(
+    pub(crate) fn run<T: Stored>(
         &mut self,
         name: &'static str,
         inputs: Key,
@@ -59,7 +59,7 @@ impl<'a> Stages<'a> {
     ///
     /// # Errors
     /// Those of `work`, [`OfflineError::Interrupted`] if the user has asked to end.
-    pub fn run_always<T>(
+    pub(crate) fn run_always<T>(
         &mut self,
         name: &'static str,
         work: impl FnOnce(&mut dyn Progress) -> Result<T, OfflineError>,
@@ -72,7 +72,7 @@ impl<'a> Stages<'a> {
     }
 
     /// Leaves a stage out, with a note if there is a reason that the user should know.
-    pub fn leave_out(&mut self, name: &'static str, reason: Option<&str>) {
+    pub(crate) fn leave_out(&mut self, name: &'static str, reason: Option<&str>) {
         if let Some(reason) = reason {
             self.progress.note(&format!("note: {name} is left out: {reason}"));
         }
@@ -80,17 +80,17 @@ impl<'a> Stages<'a> {
     }
 
     /// Returns where progress is reported.
-    pub fn progress(&mut self) -> &mut dyn Progress {
+    pub(crate) fn progress(&mut self) -> &mut dyn Progress {
         self.progress
     }
 
     /// Returns the durations of the stages run so far.
-    pub fn times(&self) -> Vec<StageTime> {
+    pub(crate) fn times(&self) -> Vec<StageTime> {
         self.times.clone()
     }
 
     /// Finishes the task.
-    pub fn finish(self) {
+    pub(crate) fn finish(self) {
         self.progress.finish();
     }
 

@@ -15,7 +15,7 @@ const STRAYS: usize = 100;
 /// Returns the largest size, in capture units, that a pixel of the training views has at the Gaussians of a scene, except the farthest
 /// hundredth in each view. Training views are therefore drawn without anti-aliasing. Views without a Gaussian in their picture are left
 /// out; `None` if no view is left.
-pub fn trained_pixel(scene: &GaussianScene, views: &[TrainingView]) -> Option<f32> {
+pub(crate) fn trained_pixel(scene: &GaussianScene, views: &[TrainingView]) -> Option<f32> {
     let means = scene.form.means();
     let size_in = |view: &TrainingView| {
         let view = view.camera.view(view.time, RasterFov::Corrected);

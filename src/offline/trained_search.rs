@@ -15,7 +15,7 @@ use crate::scene::GaussianScene;
 const TOLERANCE: usize = 50;
 
 /// Short trainings of the Gaussians that different scores and counts keep.
-pub struct TrainedSearch<'a> {
+pub(crate) struct TrainedSearch<'a> {
     /// Trains and draws.
     pub engine: &'a mut Engine,
     /// The images to train on.
@@ -29,7 +29,7 @@ pub struct TrainedSearch<'a> {
 }
 
 /// The outcome of short trainings.
-pub struct Chosen {
+pub(crate) struct Chosen {
     /// The best score.
     pub candidate: Candidate,
     /// The number of Gaussians to keep.
@@ -56,7 +56,7 @@ impl TrainedSearch<'_> {
     ///
     /// # Errors
     /// A scene that cannot be trained, a failure of the engine.
-    pub fn best(
+    pub(crate) fn best(
         &mut self,
         candidates: &[Candidate],
         goal: Goal,

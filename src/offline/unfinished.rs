@@ -35,7 +35,7 @@ struct Kept {
 
 /// What exists of the work so far.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Existing {
+pub(crate) struct Existing {
     /// The outputs that are complete.
     pub outputs: Vec<PathBuf>,
     /// Whether there are intermediate results, from which the same command resumes.
@@ -43,7 +43,7 @@ pub struct Existing {
 }
 
 /// Begins to keep the list: from now on the process may call [`abandon`].
-pub fn keep() {
+pub(crate) fn keep() {
     lock().0.get_or_insert_default();
 }
 
@@ -53,13 +53,13 @@ pub(super) fn lock() -> MutexGuard<'static, List> {
 }
 
 /// Returns what exists so far.
-pub fn existing() -> Existing {
+pub(crate) fn existing() -> Existing {
     lock().existing()
 }
 
 /// Removes all that is unfinished and returns what exists. From then on no temporary file is created, and none becomes an output: threads that
 /// try wait until the process ends. Returns `None` and removes nothing if the list stays locked for longer than `patience`.
-pub fn abandon(patience: Duration) -> Option<Existing> {
+pub(crate) fn abandon(patience: Duration) -> Option<Existing> {
     let start = Instant::now();
     let list = loop {
         match LIST.try_lock() {
@@ -77,7 +77,7 @@ pub fn abandon(patience: Duration) -> Option<Existing> {
 }
 
 /// Returns whether a device or a pipe is being written.
-pub fn is_streaming() -> bool {
+pub(crate) fn is_streaming() -> bool {
     STREAMS.load(Ordering::SeqCst) > 0
 }
 
@@ -86,7 +86,7 @@ pub(super) struct Streaming(());
 
 impl Streaming {
     /// Begins to write one.
-    pub fn begin() -> Self {
+    pub(super) fn begin() -> Self {
         STREAMS.fetch_add(1, Ordering::SeqCst);
         Self(())
     }
@@ -100,28 +100,28 @@ impl Drop for Streaming {
 
 impl List {
     /// Adds a temporary file or a lock file.
-    pub fn add_file(&mut self, path: &Path) {
+    pub(super) fn add_file(&mut self, path: &Path) {
         if let Some(kept) = &mut self.0 {
             kept.files.insert(path.to_owned());
         }
     }
 
     /// Takes out a file that has been removed or has become an output.
-    pub fn take_file(&mut self, path: &Path) {
+    pub(super) fn take_file(&mut self, path: &Path) {
         if let Some(kept) = &mut self.0 {
             kept.files.remove(path);
         }
     }
 
     /// Adds a folder of intermediate results.
-    pub fn add_folder(&mut self, path: &Path) {
+    pub(super) fn add_folder(&mut self, path: &Path) {
         if let Some(kept) = &mut self.0 {
             kept.folders.insert(path.to_owned());
         }
     }
 
     /// Adds an output that is complete.
-    pub fn add_output(&mut self, path: &Path) {
+    pub(super) fn add_output(&mut self, path: &Path) {
         if let Some(kept) = &mut self.0 {
             kept.outputs.insert(path.to_owned());
         }

@@ -257,19 +257,19 @@ pub(super) struct Pixels {
 
 impl Pixels {
     /// All kinds, by [`index`](Self::index).
-    pub const ALL: [Self; 4] = [
+    pub(super) const ALL: [Self; 4] = [
         Self { multisampled: false, precision: ColorPrecision::Single },
         Self { multisampled: true, precision: ColorPrecision::Single },
         Self { multisampled: false, precision: ColorPrecision::Half },
         Self { multisampled: true, precision: ColorPrecision::Half },
     ];
 
-    pub fn index(self) -> usize {
+    pub(super) fn index(self) -> usize {
         usize::from(self.multisampled) + 2 * self.precision as usize
     }
 
     /// Returns the definitions of `blend`.
-    pub fn definitions(self) -> Vec<&'static str> {
+    pub(super) fn definitions(self) -> Vec<&'static str> {
         let multisampled = if self.multisampled { MULTISAMPLED } else { &[] };
         [multisampled, self.precision.definitions()].concat()
     }
@@ -347,15 +347,15 @@ pub(super) struct FastVariant {
 
 impl FastVariant {
     /// Number of variants of `blend_blocks`.
-    pub const BLENDS: usize = 4 * Blending::ALL.len();
+    pub(super) const BLENDS: usize = 4 * Blending::ALL.len();
 
     /// Returns the index of its `blend_blocks`, below [`BLENDS`](Self::BLENDS).
-    pub fn blend_index(self) -> usize {
+    pub(super) fn blend_index(self) -> usize {
         (self.blending as usize * 2 + self.precision as usize) * 2 + usize::from(self.large_batches)
     }
 
     /// Returns the definitions of `blend_blocks`.
-    pub fn blend_definitions(self) -> Vec<&'static str> {
+    pub(super) fn blend_definitions(self) -> Vec<&'static str> {
         let batches = match self.blending {
             _ if !self.large_batches => &[],
             Blending::Color | Blending::ColorBehindSurfaces => EIGHT_AT_ONCE,
@@ -364,7 +364,7 @@ impl FastVariant {
         [self.blending.definitions(), self.precision.definitions(), batches].concat()
     }
 
-    pub fn pixels(self) -> Pixels {
+    pub(super) fn pixels(self) -> Pixels {
         Pixels { multisampled: self.blending.is_multisampled(), precision: self.precision }
     }
 }

@@ -61,7 +61,7 @@ pub(super) struct PassTimer {
 
 impl PassTimer {
     /// Creates a timer of whole frames, or of these passes if not empty; returns `None` if the device does not support it.
-    pub fn new(allocator: Allocator<'_>, queue: &wgpu::Queue, passes: &'static [&'static str]) -> Option<Self> {
+    pub(super) fn new(allocator: Allocator<'_>, queue: &wgpu::Queue, passes: &'static [&'static str]) -> Option<Self> {
         let inside = !passes.is_empty();
         let device = allocator.device;
         let needed =
@@ -85,7 +85,7 @@ impl PassTimer {
     }
 
     /// Returns the timestamp writes of the compute pass.
-    pub fn frame_writes(&self) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
+    pub(super) fn frame_writes(&self) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
         Some(wgpu::ComputePassTimestampWrites {
             query_set: &self.queries,
             beginning_of_pass_write_index: Some(0),
@@ -94,30 +94,30 @@ impl PassTimer {
     }
 
     /// Writes the timestamp at the end of a pass, if passes are timed.
-    pub fn mark(&self, pass: &mut wgpu::ComputePass<'_>) {
+    pub(super) fn mark(&self, pass: &mut wgpu::ComputePass<'_>) {
         if !self.passes.is_empty() {
             pass.write_timestamp(&self.queries, self.next.fetch_add(1, Ordering::Relaxed));
         }
     }
 
     /// Copies the timestamps into the buffer, after the pass.
-    pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
+    pub(super) fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
         encoder.resolve_query_set(&self.queries, 0..timestamps(self.passes), &self.resolved, 0);
         self.next.store(1, Ordering::Relaxed);
     }
 
     /// Returns the names of the passes; empty if the frame is timed as a whole.
-    pub fn passes(&self) -> &'static [&'static str] {
+    pub(super) fn passes(&self) -> &'static [&'static str] {
         self.passes
     }
 
     /// Returns the buffer of the timestamps, eight bytes each.
-    pub fn resolved(&self) -> &wgpu::Buffer {
+    pub(super) fn resolved(&self) -> &wgpu::Buffer {
         &self.resolved
     }
 
     /// Returns the milliseconds between each timestamp and the next.
-    pub fn intervals(&self, timestamps: &[u8]) -> Vec<f64> {
+    pub(super) fn intervals(&self, timestamps: &[u8]) -> Vec<f64> {
         let ticks: Vec<u64> = timestamps.chunks_exact(8).map(bytemuck::pod_read_unaligned).collect();
         ticks.windows(2).map(|pair| pair[1].saturating_sub(pair[0]) as f64 * self.period).collect()
     }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use std::f32::consts::{PI, TAU};
 
 /// Radius of the sphere, capture units.
-pub const RADIUS: f32 = 60.0;
+pub(super) const RADIUS: f32 = 60.0;
 
 /// A lat-long texture of raw, unclamped RGB in the capture's blend space.
 #[derive(Debug, Clone, PartialEq)]

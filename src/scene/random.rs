@@ -9,12 +9,12 @@ pub(crate) struct Random(u64);
 
 impl Random {
     /// Returns the numbers of a seed.
-    pub fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         Self(seed)
     }
 
     /// Returns a number from 0 to 1, 1 excluded.
-    pub fn unit(&mut self) -> f32 {
+    pub(crate) fn unit(&mut self) -> f32 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -23,12 +23,12 @@ impl Random {
     }
 
     /// Returns a number from `low` to `high`, `high` excluded.
-    pub fn in_range(&mut self, low: f32, high: f32) -> f32 {
+    pub(crate) fn in_range(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * self.unit()
     }
 
     /// Returns two independent numbers of the standard normal distribution (Box and Muller).
-    pub fn normal_pair(&mut self) -> [f32; 2] {
+    pub(crate) fn normal_pair(&mut self) -> [f32; 2] {
         // 1 - unit is never 0.
         let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
         let angle = TAU * self.unit();

@@ -14,7 +14,7 @@ use std::path::Path;
 /// What a checkpoint does not say about itself.
 #[derive(clap::Args, Default)]
 #[command(next_help_heading = "What a checkpoint does not say (taken from cfg_args beside it, else the default)")]
-pub struct CheckpointArgs {
+pub(crate) struct CheckpointArgs {
     /// First and last timestamp of training [default: 0,1].
     #[arg(long, value_name = "T0,T1", value_parser = values::interval, allow_hyphen_values = true)]
     time_interval: Option<[f32; 2]>,
@@ -71,7 +71,7 @@ impl CheckpointArgs {
     ///
     /// # Errors
     /// Errors of the codec; options that contradict the training settings in a package.
-    pub fn load(&self, path: &Path) -> Result<GaussianScene, Failure> {
+    pub(crate) fn load(&self, path: &Path) -> Result<GaussianScene, Failure> {
         Ok(codec::load(path, &self.options())?)
     }
 
@@ -79,7 +79,7 @@ impl CheckpointArgs {
     ///
     /// # Errors
     /// As [`load`](Self::load).
-    pub fn load_to_change(&self, path: &Path) -> Result<GaussianScene, Failure> {
+    pub(crate) fn load_to_change(&self, path: &Path) -> Result<GaussianScene, Failure> {
         let mut scene = self.load(path)?;
         if !scene.levels.is_empty() {
             scene.levels.clear();

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// Where the training views are.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Training data")]
-pub struct DataArgs {
+pub(crate) struct DataArgs {
     /// Folder of the data the capture was trained on, with `transforms_train.json`. Cameras and times are enough unless results
     /// are compared with the images.
     #[arg(long, value_name = "DIR")]
@@ -31,12 +31,12 @@ pub struct DataArgs {
 
 impl DataArgs {
     /// Returns whether a folder is given.
-    pub fn is_given(&self) -> bool {
+    pub(crate) fn is_given(&self) -> bool {
         self.data.is_some()
     }
 
     /// Adds the files of the folder, if one is given, to those that the verb reads.
-    pub fn add_to(&self, files: Files) -> Files {
+    pub(crate) fn add_to(&self, files: Files) -> Files {
         self.data.iter().fold(files, |files, folder| files.reads_data(folder))
     }
 
@@ -44,7 +44,11 @@ impl DataArgs {
     ///
     /// # Errors
     /// No folder is given, or it cannot be used.
-    pub fn open(&self, trained_with: &TrainedWith, progress: &mut dyn Progress) -> Result<Vec<TrainingView>, Failure> {
+    pub(crate) fn open(
+        &self,
+        trained_with: &TrainedWith,
+        progress: &mut dyn Progress,
+    ) -> Result<Vec<TrainingView>, Failure> {
         let options = SplitOptions { size: self.size, resolution: self.resolution, validation: Validation::None };
         Ok(open_split(self.folder()?, Split::Train, &options, trained_with, progress).map_err(or_give_size)?.views)
     }
@@ -53,7 +57,7 @@ impl DataArgs {
     ///
     /// # Errors
     /// No folder is given, or it cannot be used.
-    pub fn divide(
+    pub(crate) fn divide(
         &self,
         validation: ValidationArgs,
         trained_with: &TrainedWith,
@@ -77,7 +81,7 @@ impl DataArgs {
 /// How validation views are found.
 #[derive(Debug, Clone, Copy, clap::Args)]
 #[command(next_help_heading = "Validation")]
-pub struct ValidationArgs {
+pub(crate) struct ValidationArgs {
     /// The views that every choice is made on, which nothing is trained on before: those of `transforms_val.json` (file), whole cameras, blocks
     /// of time (times), or none; auto takes the first of these that the data allows.
     #[arg(long, value_name = "VIEWS", default_value = "auto", value_parser = values::one_of(&Validation::NAMES))]
@@ -98,7 +102,7 @@ pub(super) fn or_give_size(error: DatasetError) -> Failure {
 /// Where the training and test views are.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Data")]
-pub struct SplitArgs {
+pub(crate) struct SplitArgs {
     /// Folder of the dataset, with `transforms_train.json` and `transforms_test.json`.
     #[arg(long, value_name = "DIR")]
     pub data: PathBuf,
@@ -109,7 +113,7 @@ pub struct SplitArgs {
 
 impl SplitArgs {
     /// Adds the files of the folder to those that the verb reads.
-    pub fn add_to(&self, files: Files) -> Files {
+    pub(crate) fn add_to(&self, files: Files) -> Files {
         files.reads_data(&self.data)
     }
 
@@ -117,7 +121,7 @@ impl SplitArgs {
     ///
     /// # Errors
     /// A split that is missing or cannot be used.
-    pub fn open(
+    pub(crate) fn open(
         &self,
         split: Split,
         trained_with: &TrainedWith,
@@ -127,7 +131,7 @@ impl SplitArgs {
     }
 
     /// Returns how the views are read and divided.
-    pub fn options(&self, validation: Validation) -> SplitOptions {
+    pub(crate) fn options(&self, validation: Validation) -> SplitOptions {
         SplitOptions { size: None, resolution: self.resolution, validation }
     }
 
@@ -135,7 +139,7 @@ impl SplitArgs {
     ///
     /// # Errors
     /// A folder that cannot be used, or does not allow such validation views.
-    pub fn divide(
+    pub(crate) fn divide(
         &self,
         validation: ValidationArgs,
         trained_with: &TrainedWith,

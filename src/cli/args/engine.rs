@@ -10,7 +10,7 @@ use crate::renderer::{Design, GpuError, Headless, ShaderChecks};
 /// Where to compute.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Engine")]
-pub struct EngineArgs {
+pub(crate) struct EngineArgs {
     /// Where to score and draw: cpu, gpu, or auto: the GPU unless there is none but a software driver.
     #[arg(long, value_name = "ENGINE", default_value = "auto", value_parser = values::one_of(&EngineChoice::NAMES))]
     engine: EngineChoice,
@@ -26,7 +26,7 @@ impl EngineArgs {
     ///
     /// # Errors
     /// The first of them that is given.
-    pub fn check(&self, given: &Given, more: &[&str]) -> Result<(), Failure> {
+    pub(crate) fn check(&self, given: &Given, more: &[&str]) -> Result<(), Failure> {
         match self.engine {
             EngineChoice::Cpu => given.none_of(&[&OF_GPU, more].concat(), "with --engine cpu"),
             EngineChoice::Auto | EngineChoice::Gpu => Ok(()),
@@ -37,7 +37,7 @@ impl EngineArgs {
     ///
     /// # Errors
     /// The requested GPU cannot be used; an option of a GPU is given, and there is none but a software driver.
-    pub fn open(&self, given: &Given, more: &[&str]) -> Result<Engine, Failure> {
+    pub(crate) fn open(&self, given: &Given, more: &[&str]) -> Result<Engine, Failure> {
         self.check(given, more)?;
         let engine = Engine::open(&EngineSettings { choice: self.engine, gpu: self.gpu.settings() })?;
         if let Engine::Cpu = engine {
@@ -50,7 +50,7 @@ impl EngineArgs {
 
 /// How views are drawn.
 #[derive(clap::Args)]
-pub struct DesignArgs {
+pub(crate) struct DesignArgs {
     /// How views are drawn on a GPU; all draw the same picture. auto: fast, but reference on a software driver.
     #[arg(long, value_name = "RENDERER", default_value = "auto", value_parser = values::one_of(&Design::NAMES))]
     pub renderer: Design,
@@ -58,7 +58,7 @@ pub struct DesignArgs {
 
 /// How views are drawn, and where.
 #[derive(clap::Args)]
-pub struct RendererArgs {
+pub(crate) struct RendererArgs {
     #[command(flatten)]
     design: DesignArgs,
     #[command(flatten)]
@@ -67,7 +67,7 @@ pub struct RendererArgs {
 
 /// In which ways views are drawn, and where.
 #[derive(clap::Args)]
-pub struct RenderersArgs {
+pub(crate) struct RenderersArgs {
     /// How views are drawn, one or more; all draw the same picture. auto: fast, but reference on a software driver.
     #[arg(long = "renderer", value_name = "RENDERER,..", default_value = "auto", value_delimiter = ',',
         value_parser = values::one_of(&Design::NAMES))]
@@ -81,7 +81,7 @@ impl RenderersArgs {
     ///
     /// # Errors
     /// As [`RendererArgs::open`].
-    pub fn open(&self) -> Result<Headless, GpuError> {
+    pub(crate) fn open(&self) -> Result<Headless, GpuError> {
         self.gpu.settings().open()
     }
 }
@@ -91,7 +91,7 @@ impl RendererArgs {
     ///
     /// # Errors
     /// No such adapter, or one that cannot run the passes.
-    pub fn open(&self) -> Result<Headless, GpuError> {
+    pub(crate) fn open(&self) -> Result<Headless, GpuError> {
         let mut headless = self.gpu.settings().open()?;
         headless.set_design(self.design.renderer);
         Ok(headless)

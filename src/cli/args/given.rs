@@ -10,17 +10,17 @@ use clap::{ArgMatches, Args, Command, FromArgMatches};
 /// The options that the command line names, without those that have their default values. It must be the first field of the options of a verb:
 /// the fields before it have taken their values out of the matches.
 #[derive(Debug, Clone, Default)]
-pub struct Given(Vec<String>);
+pub(crate) struct Given(Vec<String>);
 
 /// Why a time degree has no effect beside a low spatial degree.
-pub const WITHOUT_TIME: &str = "with --sh-degree below 3: only color of degree 3 depends on time";
+pub(crate) const WITHOUT_TIME: &str = "with --sh-degree below 3: only color of degree 3 depends on time";
 
 impl Given {
     /// Checks that none of these options (`--name`) is named; `reason` completes the sentence "OPTION has no effect ...".
     ///
     /// # Errors
     /// The first of the options that is named.
-    pub fn none_of(&self, options: &[&str], reason: &str) -> Result<(), Failure> {
+    pub(crate) fn none_of(&self, options: &[&str], reason: &str) -> Result<(), Failure> {
         match options.iter().find(|option| self.has(option)) {
             Some(option) => Err(Failure::new(format!("{option} has no effect {reason}; leave it out"))),
             None => Ok(()),

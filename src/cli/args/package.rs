@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 /// Where to write a package, and how.
 #[derive(clap::Args)]
-pub struct PackageArgs {
+pub(crate) struct PackageArgs {
     /// The package to write (.gs4d). A file that is there is replaced, once the new one is whole.
     #[arg(value_name = "OUT", required_unless_present = "out_option")]
     out: Option<PathBuf>,
@@ -28,7 +28,7 @@ impl PackageArgs {
     ///
     /// # Errors
     /// No path is given.
-    pub fn out(&self) -> Result<&Path, Failure> {
+    pub(crate) fn out(&self) -> Result<&Path, Failure> {
         let out = self.out.as_deref().or(self.out_option.as_deref());
         out.ok_or_else(|| Failure::new("no OUT is given: name the package to write"))
     }
@@ -37,7 +37,7 @@ impl PackageArgs {
     ///
     /// # Errors
     /// As [`out`](Self::out), and those of [`Files::check`].
-    pub fn checked_out(&self, files: Files) -> Result<&Path, Failure> {
+    pub(crate) fn checked_out(&self, files: Files) -> Result<&Path, Failure> {
         let out = self.out()?;
         files.writes(out, "gs4d").check()?;
         Ok(out)
@@ -47,7 +47,7 @@ impl PackageArgs {
     ///
     /// # Errors
     /// As [`checked_out`](Self::checked_out).
-    pub fn checked_file(&self, files: Files) -> Result<&Path, Failure> {
+    pub(crate) fn checked_file(&self, files: Files) -> Result<&Path, Failure> {
         let out = self.out()?;
         files.writes_regular(out, "gs4d").check()?;
         Ok(out)
@@ -57,7 +57,7 @@ impl PackageArgs {
     ///
     /// # Errors
     /// Errors of the codec.
-    pub fn save(&self, scene: &GaussianScene) -> Result<u64, Failure> {
+    pub(crate) fn save(&self, scene: &GaussianScene) -> Result<u64, Failure> {
         let out = self.out()?;
         let settings = write_settings(&scene.form, self.level);
         offline::save(out, scene, &settings)?;
@@ -69,6 +69,6 @@ impl PackageArgs {
 ///
 /// # Errors
 /// The file cannot be accessed.
-pub fn file_size(path: &Path) -> Result<u64, Failure> {
+pub(crate) fn file_size(path: &Path) -> Result<u64, Failure> {
     Ok(fs::metadata(path).map_err(|error| Failure::at(path, &error))?.len())
 }

@@ -10,7 +10,7 @@ use crate::offline::search::ScoreChoice;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 /// Returns a parser for `auto`, `all` (if `with_all`) or the name of a score.
-pub fn score_choice(with_all: bool) -> impl TypedValueParser<Value = ScoreChoice> {
+pub(crate) fn score_choice(with_all: bool) -> impl TypedValueParser<Value = ScoreChoice> {
     let special: &[&str] = if with_all { &["auto", "all"] } else { &["auto"] };
     let names = special.iter().copied().chain(Variant::ALL.map(Variant::name));
     PossibleValuesParser::new(names).map(|name: String| match name.as_str() {
@@ -22,7 +22,7 @@ pub fn score_choice(with_all: bool) -> impl TypedValueParser<Value = ScoreChoice
 /// From which views scores come, and how.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Scoring")]
-pub struct ScoringArgs {
+pub(crate) struct ScoringArgs {
     /// Score with an even subset of N views [default: all].
     #[arg(long, value_name = "N", value_parser = values::count(10_000_000))]
     views: Option<usize>,
@@ -39,7 +39,7 @@ impl ScoringArgs {
     ///
     /// # Errors
     /// An option that has no effect.
-    pub fn check(&self, given: &Given, choices: &[ScoreChoice]) -> Result<(), Failure> {
+    pub(crate) fn check(&self, given: &Given, choices: &[ScoreChoice]) -> Result<(), Failure> {
         let mut variants = choices.iter().flat_map(|choice| choice.variants(true));
         if !variants.any(Variant::needs_volume) {
             return given.none_of(&["--volume-power", "--volume-rank"], "on scores that do not use the volume");
@@ -48,7 +48,7 @@ impl ScoringArgs {
     }
 
     /// Returns the settings of the library.
-    pub fn settings(&self) -> ScoringSettings {
+    pub(crate) fn settings(&self) -> ScoringSettings {
         let score = ScoreSettings { volume_power: self.volume_power, volume_rank: self.volume_rank };
         ScoringSettings { views: self.views, score }
     }

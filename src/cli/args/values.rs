@@ -16,46 +16,46 @@ fn numbers<const N: usize>(text: &str) -> Option<[f32; N]> {
 }
 
 /// Parses `R,G,B`.
-pub fn color(text: &str) -> Result<[f32; 3], String> {
+pub(crate) fn color(text: &str) -> Result<[f32; 3], String> {
     numbers(text).ok_or_else(|| "expected three numbers, such as 0,0.5,1".to_owned())
 }
 
 /// Parses `T0,T1` with T0 before T1.
-pub fn interval(text: &str) -> Result<[f32; 2], String> {
+pub(crate) fn interval(text: &str) -> Result<[f32; 2], String> {
     numbers::<2>(text)
         .filter(|[t0, t1]| t0 < t1)
         .ok_or_else(|| "expected two numbers in order, such as 0,10".to_owned())
 }
 
 /// Parses a finite number.
-pub fn number(text: &str) -> Result<f32, String> {
+pub(crate) fn number(text: &str) -> Result<f32, String> {
     numbers::<1>(text).map(|[value]| value).ok_or_else(|| "expected a finite number".to_owned())
 }
 
 /// Parses a finite number above zero.
-pub fn positive(text: &str) -> Result<f32, String> {
+pub(crate) fn positive(text: &str) -> Result<f32, String> {
     number(text).ok().filter(|v| *v > 0.0).ok_or_else(|| "expected a number above zero".to_owned())
 }
 
 /// Parses a finite number of seconds, not below zero.
-pub fn seconds(text: &str) -> Result<f32, String> {
+pub(crate) fn seconds(text: &str) -> Result<f32, String> {
     number(text).ok().filter(|v| *v >= 0.0).ok_or_else(|| "expected a number of seconds, zero or above".to_owned())
 }
 
 /// Parses a share, 0 to 1.
-pub fn share(text: &str) -> Result<f64, String> {
+pub(crate) fn share(text: &str) -> Result<f64, String> {
     let share = text.trim().parse::<f64>().ok().filter(|share| (0.0..=1.0).contains(share));
     share.ok_or_else(|| "expected a number from 0 to 1".to_owned())
 }
 
 /// Parses a number from 0 to [`LARGEST`], in double precision.
-pub fn not_negative(text: &str) -> Result<f64, String> {
+pub(crate) fn not_negative(text: &str) -> Result<f64, String> {
     let value = text.trim().parse::<f64>().ok().filter(|value| (0.0..=LARGEST).contains(value));
     value.ok_or_else(|| format!("expected a number from 0 to {LARGEST}"))
 }
 
 /// Parses 0, or a number above it that is a normal number of single precision.
-pub fn step(text: &str) -> Result<f32, String> {
+pub(crate) fn step(text: &str) -> Result<f32, String> {
     let value = text.trim().parse::<f64>().ok().filter(|value| *value >= 0.0);
     let usable = value.map(|value| (value, value as f32)).filter(|(value, step)| *value == 0.0 || step.is_normal());
     usable
@@ -64,7 +64,7 @@ pub fn step(text: &str) -> Result<f32, String> {
 }
 
 /// Parses `WxH` in pixels.
-pub fn size(text: &str) -> Result<UVec2, String> {
+pub(crate) fn size(text: &str) -> Result<UVec2, String> {
     let side = |text: &str| text.parse::<u32>().ok().filter(|side| (1..=MAX_SIDE).contains(side));
     text.split_once(['x', 'X'])
         .and_then(|(width, height)| Some(UVec2::new(side(width)?, side(height)?)))
@@ -72,12 +72,12 @@ pub fn size(text: &str) -> Result<UVec2, String> {
 }
 
 /// Returns a parser for whole numbers from 1 to `most`.
-pub fn count(most: u64) -> RangedU64ValueParser<usize> {
+pub(crate) fn count(most: u64) -> RangedU64ValueParser<usize> {
     RangedU64ValueParser::new().range(1..=most)
 }
 
 /// Returns a parser for one of a few names, each of which stands for a value.
-pub fn one_of<T>(choices: &'static [(&'static str, T)]) -> impl TypedValueParser<Value = T>
+pub(crate) fn one_of<T>(choices: &'static [(&'static str, T)]) -> impl TypedValueParser<Value = T>
 where
     T: Copy + Send + Sync + 'static,
 {
@@ -87,7 +87,7 @@ where
 }
 
 /// Returns the key-frames that `--key-frames K` or `--every FRAMES` specify, of which at most one is given.
-pub fn key_frames(count: Option<u32>, every: Option<usize>) -> KeyFrames {
+pub(crate) fn key_frames(count: Option<u32>, every: Option<usize>) -> KeyFrames {
     every.map(KeyFrames::Every).or(count.map(KeyFrames::Count)).unwrap_or_default()
 }
 

@@ -17,7 +17,7 @@ use std::path::PathBuf;
 /// Which views to draw.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Views")]
-pub struct ViewArgs {
+pub(crate) struct ViewArgs {
     /// Views of a camera file: transforms*.json, or golden*.json with a list `views`; each frame at its own time.
     #[arg(long, value_name = "FILE", conflicts_with = "orbit")]
     cameras: Option<PathBuf>,
@@ -38,12 +38,12 @@ pub struct ViewArgs {
 
 impl ViewArgs {
     /// Adds the camera file, if one is given, and the images that it names to the files that the verb reads.
-    pub fn add_to(&self, files: Files) -> Files {
+    pub(crate) fn add_to(&self, files: Files) -> Files {
         self.cameras.iter().fold(files, |files, path| files.reads_cameras(path))
     }
 
     /// Returns how many views to use: all of `--orbit` if it is given, else `count`.
-    pub fn limit(&self, count: usize) -> usize {
+    pub(crate) fn limit(&self, count: usize) -> usize {
         self.orbit.unwrap_or(count)
     }
 
@@ -52,7 +52,7 @@ impl ViewArgs {
     ///
     /// # Errors
     /// A camera file that cannot be used, a scene without Gaussians to go around.
-    pub fn shots(&self, scene: &RuntimeScene, count: usize) -> Result<Vec<Shot>, Failure> {
+    pub(crate) fn shots(&self, scene: &RuntimeScene, count: usize) -> Result<Vec<Shot>, Failure> {
         let mut shots = match &self.cameras {
             Some(path) => {
                 if self.resolution.is_some() && CameraFile::ignores_resolution(path)? {

@@ -22,17 +22,17 @@ pub(super) struct Attribute {
 
 impl Attribute {
     /// Returns the bytes of its table in memory, which are counted for the first of the attributes in that table.
-    pub fn memory(&self) -> u64 {
+    pub(super) fn memory(&self) -> u64 {
         if self.offset > 0 { 0 } else { (self.rows as u64).saturating_mul(self.stride as u64).saturating_mul(4) }
     }
 
     /// Returns the uncompressed bytes of `rows` rows.
-    pub fn raw_length(&self, rows: usize) -> u64 {
+    pub(super) fn raw_length(&self, rows: usize) -> u64 {
         (rows as u64).saturating_mul(self.width as u64 * 4)
     }
 
     /// Returns its rows in runs of at most `length`.
-    pub fn runs(self, length: usize) -> impl Iterator<Item = (Self, Range<usize>)> {
+    pub(super) fn runs(self, length: usize) -> impl Iterator<Item = (Self, Range<usize>)> {
         (0..self.rows).step_by(length).map(move |first| (self, first..self.rows.min(first.saturating_add(length))))
     }
 }

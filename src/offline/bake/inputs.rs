@@ -42,7 +42,7 @@ impl<'a> Inputs<'a> {
     ///
     /// # Errors
     /// Views or images that cannot be used, another bake to the same package, a failure of the engine.
-    pub fn open(
+    pub(super) fn open(
         mut scene: GaussianScene,
         settings: &'a BakeSettings,
         engine: &'a mut Engine,
@@ -88,12 +88,12 @@ impl<'a> Inputs<'a> {
     }
 
     /// Returns the key of the contents of all images that a training depends on.
-    pub fn images_key(&self) -> Key {
+    pub(super) fn images_key(&self) -> Key {
         self.training_images_key.with(self.validation_images_key)
     }
 
     /// Returns the images to train and to validate on, which are loaded once.
-    pub fn images(&mut self, progress: &mut dyn Progress) -> Result<Arc<TrainingImages>, OfflineError> {
+    pub(super) fn images(&mut self, progress: &mut dyn Progress) -> Result<Arc<TrainingImages>, OfflineError> {
         if let Some(images) = &self.images {
             return Ok(images.clone());
         }
@@ -103,13 +103,13 @@ impl<'a> Inputs<'a> {
     }
 
     /// Returns the settings of training; `None` if the remaining Gaussians are not trained.
-    pub fn tunes(&self) -> Option<&FineTuneSettings> {
+    pub(super) fn tunes(&self) -> Option<&FineTuneSettings> {
         let can = matches!(self.engine, Engine::Gpu(_)) && self.obstacle().is_none();
         self.settings.fine_tune.as_ref().filter(|_| can)
     }
 
     /// Returns why the stage is left out although the settings ask for it; `None` if they do not.
-    pub fn reason_to_leave_out(&self) -> Option<String> {
+    pub(super) fn reason_to_leave_out(&self) -> Option<String> {
         self.settings.fine_tune.as_ref()?;
         let software = "it needs a GPU; --engine gpu takes one with a software driver, slowly".to_owned();
         Some(self.obstacle().unwrap_or(software))
@@ -125,13 +125,13 @@ impl<'a> Inputs<'a> {
     }
 
     /// Returns the number of key-frames of the filter.
-    pub fn key_frames(&self) -> u32 {
+    pub(super) fn key_frames(&self) -> u32 {
         let count = self.settings.key_frames.count(&self.views);
         u32::try_from(count).unwrap_or(u32::MAX).clamp(2, MAX_SEGMENTS + 1)
     }
 
     /// Returns the most bytes that the package may have.
-    pub fn limit(&self) -> u64 {
+    pub(super) fn limit(&self) -> u64 {
         match self.settings.goal {
             Goal::Size(limit) => limit,
             Goal::Keep(_) | Goal::Remove(_) | Goal::MaxLoss(_) => u64::MAX,

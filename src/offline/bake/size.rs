@@ -40,7 +40,7 @@ struct Attempt {
 
 impl Attempts {
     /// Returns the attempts of an interrupted bake with the same inputs, or none, given the key of the choice.
-    pub fn load(inputs: &Inputs<'_>, choice: Key, first: usize) -> Self {
+    pub(super) fn load(inputs: &Inputs<'_>, choice: Key, first: usize) -> Self {
         let BakeSettings { rounds, filter, level, .. } = inputs.settings;
         let key = choice.and(&format!("attempts {rounds} {filter:?} {level:?} {:?}", inputs.tunes()));
         Self::of(&inputs.store, key, first)
@@ -53,7 +53,7 @@ impl Attempts {
     }
 
     /// Returns the number of Gaussians to keep.
-    pub fn count(&self) -> usize {
+    pub(super) fn count(&self) -> usize {
         self.made.last().map_or(self.first, |last| last.next)
     }
 

@@ -42,7 +42,7 @@ impl Facts<'_> {
     ///
     /// # Errors
     /// The package cannot be read back, the checkpoint has been removed.
-    pub fn report(self) -> Result<BakeReport, OfflineError> {
+    pub(super) fn report(self) -> Result<BakeReport, OfflineError> {
         let BakeSettings { checkpoint, data, out, .. } = self.settings;
         let interval = self.trained_with.time_interval;
         let times = even_times(interval, TIMES);

@@ -47,6 +47,6 @@ impl Dataset {
 ///
 /// # Errors
 /// [`DatasetError::MissingImages`], naming the first few and how many.
-pub fn require_images(views: &[TrainingView]) -> Result<(), DatasetError> {
+pub(crate) fn require_images(views: &[TrainingView]) -> Result<(), DatasetError> {
     require_files(views.iter().flat_map(|view| [Some(&view.image), view.mask.as_ref()]).flatten())
 }

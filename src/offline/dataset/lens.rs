@@ -68,7 +68,7 @@ pub(super) enum OriginalLens {
 
 impl LensEntries {
     /// Returns these entries, with missing ones replaced by those of the whole file.
-    pub fn or(self, file: &Self) -> Self {
+    pub(super) fn or(self, file: &Self) -> Self {
         Self {
             w: self.w.or(file.w),
             h: self.h.or(file.h),
@@ -81,12 +81,12 @@ impl LensEntries {
     }
 
     /// Returns the picture size in pixels; `None` unless both sides are given.
-    pub fn size(&self) -> Result<Option<UVec2>, FrameProblem> {
+    pub(super) fn size(&self) -> Result<Option<UVec2>, FrameProblem> {
         self.w.zip(self.h).map(|(width, height)| checked_size(width, height)).transpose()
     }
 
     /// Returns the lens: intrinsics if all four entries are given, as in the original, else the field of view.
-    pub fn lens(&self) -> Result<OriginalLens, FrameProblem> {
+    pub(super) fn lens(&self) -> Result<OriginalLens, FrameProblem> {
         if let Self { fl_x: Some(fl_x), fl_y: Some(fl_y), cx: Some(cx), cy: Some(cy), .. } = *self {
             return Ok(OriginalLens::Intrinsics { focal: DVec2::new(fl_x, fl_y), center: DVec2::new(cx, cy) });
         }
@@ -101,7 +101,7 @@ impl LensEntries {
 
 impl OriginalLens {
     /// Returns the lens for pictures that are smaller than the original ones by `divisor`, with the same field of view.
-    pub fn scaled(self, original: UVec2, divisor: DVec2) -> Result<Lens, FrameProblem> {
+    pub(super) fn scaled(self, original: UVec2, divisor: DVec2) -> Result<Lens, FrameProblem> {
         let lens = match self {
             Self::Angle(angle) => Camera::fov_lens(angle, original),
             Self::Tangents(tan) => Lens::Fov { tan: tan.as_vec2() },

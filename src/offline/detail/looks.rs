@@ -77,7 +77,7 @@ pub struct Closeness {
 
 impl Sphere {
     /// Returns the bounding sphere of a capture, the same as in Bevy apps; `None` if nothing is drawn.
-    pub fn of(scene: &RuntimeScene) -> Option<Self> {
+    pub(super) fn of(scene: &RuntimeScene) -> Option<Self> {
         let [first, last] = scene.trained_with.time_interval;
         // A still is drawn at its first timestamp only.
         let shown = if scene.playback.duration_seconds > 0.0 { [first, last] } else { [first, first] };
@@ -156,7 +156,7 @@ pub(super) fn looks(
 
 impl Look {
     /// Returns the frame that a level is trained on: the mean of the truth and of all Gaussians drawn at this size.
-    pub fn target(&self) -> Frame {
+    pub(super) fn target(&self) -> Frame {
         let mut mean = self.truth.clone();
         for (pixel, other) in mean.picture.pixels.iter_mut().zip(&self.all.picture.pixels) {
             *pixel = (*pixel + *other) * 0.5;

@@ -20,7 +20,7 @@ pub(super) struct Axes {
 
 impl Axes {
     /// Decomposes a covariance. `least` is the smallest standard deviation; variances below its square, also negative ones, are raised to it.
-    pub fn of(covariance: DMat4, least: f64) -> Self {
+    pub(super) fn of(covariance: DMat4, least: f64) -> Self {
         let (values, mut axes) = eigen(covariance);
         let mut scale = values.max(DVec4::splat(least * least)).map(f64::sqrt);
         let most_time = (0..4).max_by(|&a, &b| axes.col(a).w.abs().total_cmp(&axes.col(b).w.abs())).unwrap_or(3);

@@ -23,14 +23,14 @@ pub(super) struct Backward {
 
 impl Backward {
     /// Creates the sums over views, which are 0.
-    pub fn new(headless: &Headless, sums: GradientSums) -> Self {
+    pub(super) fn new(headless: &Headless, sums: GradientSums) -> Self {
         let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
         Self { sums, totals: headless.allocator().buffer("gs4d totals", 16, usage), view: None }
     }
 
     /// Returns the buffers for the frame that was recorded last, which has this size; `None` before the first frame. Creates them only if
     /// sizes have changed.
-    pub fn fit(
+    pub(super) fn fit(
         &mut self,
         headless: &Headless,
         passes: &Passes,
@@ -46,7 +46,7 @@ impl Backward {
     }
 
     /// Returns the sums over the views since the last call, and begins new ones.
-    pub fn totals(&self, headless: &Headless) -> Result<Totals, GpuError> {
+    pub(super) fn totals(&self, headless: &Headless) -> Result<Totals, GpuError> {
         let bytes = headless.copy_out(&self.totals, 16)?;
         headless.context().queue.write_buffer(&self.totals, 0, &[0; 16]);
         Ok(Totals::of(bytemuck::pod_read_unaligned(&bytes)))

@@ -26,7 +26,7 @@ pub(super) struct Optimized {
 
 impl Optimized {
     /// Creates gradients and moments, which are 0, beside the values. `notes` say which Gaussians were seen.
-    pub fn new(
+    pub(super) fn new(
         headless: &Headless,
         passes: &Passes,
         notes: &wgpu::Buffer,
@@ -47,7 +47,7 @@ impl Optimized {
     }
 
     /// Records step number `step`, counted from 1. A sparse step skips Gaussians that no view has shown.
-    pub fn record_step(
+    pub(super) fn record_step(
         &self,
         queue: &wgpu::Queue,
         pass: &mut wgpu::ComputePass<'_>,
@@ -66,25 +66,25 @@ impl Optimized {
     }
 
     /// Records that all moments become 0.
-    pub fn forget_moments(&self, encoder: &mut wgpu::CommandEncoder) {
+    pub(super) fn forget_moments(&self, encoder: &mut wgpu::CommandEncoder) {
         for moments in &self.moments {
             encoder.clear_buffer(moments, 0, None);
         }
     }
 
     /// Returns the buffers of a state: values, first and second moments.
-    pub fn stored(&self) -> [&wgpu::Buffer; 3] {
+    pub(super) fn stored(&self) -> [&wgpu::Buffer; 3] {
         let [first, second] = &self.moments;
         [&self.values, first, second]
     }
 
     /// Reads the values.
-    pub fn read_values(&self, headless: &Headless) -> Result<Vec<u8>, GpuError> {
+    pub(super) fn read_values(&self, headless: &Headless) -> Result<Vec<u8>, GpuError> {
         headless.copy_out(&self.values, self.values.size())
     }
 
     /// Reads the gradients accumulated since the last step.
-    pub fn read_gradients(&self, headless: &Headless) -> Result<Vec<u8>, GpuError> {
+    pub(super) fn read_gradients(&self, headless: &Headless) -> Result<Vec<u8>, GpuError> {
         headless.copy_out(&self.gradients, self.gradients.size())
     }
 }

@@ -42,7 +42,7 @@ pub(super) fn scene_settings(model: Model, count: u32, prefilter_var: f32) -> Tr
 impl ParameterBuffers {
     /// Uploads raw parameters. The three buffers of the capture hold Gaussians, lifespans and color coefficients; the coefficients, `stride`
     /// four-vectors for each Gaussian, are trained in place.
-    pub fn new(
+    pub(super) fn new(
         headless: &Headless,
         passes: &Passes,
         settings: TrainedScene,
@@ -76,30 +76,30 @@ impl ParameterBuffers {
     }
 
     /// Returns the number of Gaussians.
-    pub fn count(&self) -> u32 {
+    pub(super) fn count(&self) -> u32 {
         self.settings.count
     }
 
     /// Writes the settings of the scene for the view of this number.
-    pub fn write_scene(&self, queue: &wgpu::Queue, view: u32) {
+    pub(super) fn write_scene(&self, queue: &wgpu::Queue, view: u32) {
         let settings = TrainedScene { view, ..self.settings };
         queue.write_buffer(&self.scene_settings, 0, bytemuck::bytes_of(&settings));
     }
 
     /// Records that the parameters are sliced.
-    pub fn record_slice(&self, pass: &mut wgpu::ComputePass<'_>, passes: &Passes) {
+    pub(super) fn record_slice(&self, pass: &mut wgpu::ComputePass<'_>, passes: &Passes) {
         pass.set_pipeline(&passes.slice);
         pass.set_bind_group(0, &self.slice, &[]);
         pass.dispatch_workgroups(self.count().div_ceil(256), 1, 1);
     }
 
     /// Records that the notes about seen Gaussians are cleared.
-    pub fn forget_seen(&self, encoder: &mut wgpu::CommandEncoder) {
+    pub(super) fn forget_seen(&self, encoder: &mut wgpu::CommandEncoder) {
         encoder.clear_buffer(&self.notes, FAULT_BYTES, None);
     }
 
     /// Returns the gradients that were not finite so far; `None` if there were none.
-    pub fn faults(&self, headless: &Headless) -> Result<Option<Faults>, GpuError> {
+    pub(super) fn faults(&self, headless: &Headless) -> Result<Option<Faults>, GpuError> {
         let bytes = headless.copy_out(&self.notes, FAULT_BYTES)?;
         Ok(Faults::of(bytemuck::pod_read_unaligned(&bytes)))
     }

@@ -33,7 +33,7 @@ pub(super) struct Passes {
 
 impl Passes {
     /// Compiles the passes; `definitions` are those of `blend_backward` and `project_backward`.
-    pub fn new(headless: &Headless, definitions: &[&str], checks: ShaderChecks) -> Result<Self, GpuError> {
+    pub(super) fn new(headless: &Headless, definitions: &[&str], checks: ShaderChecks) -> Result<Self, GpuError> {
         use Bind::{Read, Texture, Uniform, Write};
         let device = &headless.context().device;
         let limits = device.limits();

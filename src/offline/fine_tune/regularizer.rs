@@ -28,7 +28,7 @@ impl Regularizer {
     ///
     /// # Errors
     /// A shader that does not compile.
-    pub fn new(
+    pub(super) fn new(
         headless: &Headless,
         parameters: &ParameterBuffers,
         gaussians: &wgpu::Buffer,
@@ -66,7 +66,12 @@ impl Regularizer {
     ///
     /// # Errors
     /// A lost device.
-    pub fn search(&mut self, headless: &Headless, parameters: &ParameterBuffers, step: usize) -> Result<(), GpuError> {
+    pub(super) fn search(
+        &mut self,
+        headless: &Headless,
+        parameters: &ParameterBuffers,
+        step: usize,
+    ) -> Result<(), GpuError> {
         if self.search_every.is_some_and(|every| !self.searched || step.is_multiple_of(every)) {
             let records = parameters.geometry.read_values(headless)?;
             let records: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(&records);
@@ -77,14 +82,14 @@ impl Regularizer {
     }
 
     /// Records that the gradients of the terms are added to those of `count` Gaussians.
-    pub fn record(&self, pass: &mut wgpu::ComputePass<'_>, count: u32) {
+    pub(super) fn record(&self, pass: &mut wgpu::ComputePass<'_>, count: u32) {
         pass.set_pipeline(&self.regularize);
         pass.set_bind_group(0, &self.group, &[]);
         pass.dispatch_workgroups(count.div_ceil(64), 1, 1);
     }
 
     /// Replaces the neighbors of all Gaussians by those of a state, if it has as many.
-    pub fn resume(&mut self, headless: &Headless, neighbors: &[u8]) {
+    pub(super) fn resume(&mut self, headless: &Headless, neighbors: &[u8]) {
         if self.neighbors.size() == neighbors.len() as u64 {
             self.set_neighbors(headless, neighbors);
         }
@@ -97,7 +102,7 @@ impl Regularizer {
     }
 
     /// Returns the neighbors of all Gaussians; empty if they have not been searched for.
-    pub fn neighbors(&self, headless: &Headless) -> Result<Vec<u8>, GpuError> {
+    pub(super) fn neighbors(&self, headless: &Headless) -> Result<Vec<u8>, GpuError> {
         if self.searched { headless.copy_out(&self.neighbors, self.neighbors.size()) } else { Ok(Vec::new()) }
     }
 }

@@ -89,22 +89,22 @@ pub(super) struct Saves<'a> {
 
 impl<'a> Saves<'a> {
     /// Returns where a run with these settings stores its state.
-    pub fn new(resume: Resume<'a>, settings: &FineTuneSettings) -> Self {
+    pub(super) fn new(resume: Resume<'a>, settings: &FineTuneSettings) -> Self {
         Self { resume, key: resume.key.and(&format!("{settings:?}")) }
     }
 
     /// Returns whether the state is stored after this step.
-    pub fn are_due(self, step: usize) -> bool {
+    pub(super) fn are_due(self, step: usize) -> bool {
         step.is_multiple_of(self.resume.every.max(1))
     }
 
     /// Stores a checkpoint.
-    pub fn store(self, checkpoint: &Checkpoint) -> Result<(), OfflineError> {
+    pub(super) fn store(self, checkpoint: &Checkpoint) -> Result<(), OfflineError> {
         checkpoint.store(self.resume.store, self.key)
     }
 
     /// Returns the checkpoint that was stored; `None` if there is none.
-    pub fn load(self) -> Option<Checkpoint> {
+    pub(super) fn load(self) -> Option<Checkpoint> {
         Checkpoint::load(self.resume.store, self.key)
     }
 }

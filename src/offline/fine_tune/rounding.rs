@@ -41,7 +41,7 @@ impl Rounder {
     ///
     /// # Errors
     /// A shader that does not compile.
-    pub fn new(
+    pub(super) fn new(
         headless: &Headless,
         parameters: &ParameterBuffers,
         [gaussians, lifespans]: [&wgpu::Buffer; 2],
@@ -61,12 +61,12 @@ impl Rounder {
     }
 
     /// Writes the changes of all Gaussians.
-    pub fn write(&self, queue: &wgpu::Queue, changes: &[RoundingRecord]) {
+    pub(super) fn write(&self, queue: &wgpu::Queue, changes: &[RoundingRecord]) {
         queue.write_buffer(&self.changes, 0, bytemuck::cast_slice(changes));
     }
 
     /// Records that so many workgroups of 256 Gaussians, which have been sliced, are rounded.
-    pub fn record(&self, pass: &mut wgpu::ComputePass<'_>, groups: u32) {
+    pub(super) fn record(&self, pass: &mut wgpu::ComputePass<'_>, groups: u32) {
         pass.set_pipeline(&self.rounding);
         pass.set_bind_group(0, &self.group, &[]);
         pass.dispatch_workgroups(groups, 1, 1);

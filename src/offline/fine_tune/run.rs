@@ -50,7 +50,7 @@ pub(super) struct Run<'a> {
 
 impl<'a> Run<'a> {
     /// Uploads the scene and the images.
-    pub fn open(
+    pub(super) fn open(
         headless: &'a mut Headless,
         mut scene: GaussianScene,
         images: &'a TrainingImages,

@@ -81,7 +81,7 @@ pub(super) struct Schedule {
 
 impl Schedule {
     /// Returns the views of a step, from 0: every view once, in random order, then all again; what does not fill a batch is left out.
-    pub fn batch(&self, step: usize) -> Vec<usize> {
+    pub(super) fn batch(&self, step: usize) -> Vec<usize> {
         let batch = self.batch.min(self.views).max(1);
         let per_epoch = (self.views / batch).max(1);
         let order = shuffled(self.views, self.seed, (step / per_epoch) as u64);
@@ -89,7 +89,7 @@ impl Schedule {
     }
 
     /// Returns a random color for a view of a step.
-    pub fn background(&self, step: usize, place: usize) -> [f32; 3] {
+    pub(super) fn background(&self, step: usize, place: usize) -> [f32; 3] {
         let mut random = Random::new(mixed(self.seed, (step * self.batch + place) as u64));
         [random.unit(), random.unit(), random.unit()]
     }

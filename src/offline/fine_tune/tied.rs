@@ -26,7 +26,7 @@ impl Tied {
     ///
     /// # Errors
     /// Codebooks of other Gaussians or coefficients.
-    pub fn new(
+    pub(super) fn new(
         headless: &Headless,
         passes: &Passes,
         parameters: &ParameterBuffers,
@@ -89,14 +89,14 @@ impl Tied {
     }
 
     /// Records that the gradients of entries become the sums over the coefficients that use them.
-    pub fn record_collect(&self, pass: &mut wgpu::ComputePass<'_>, passes: &Passes) {
+    pub(super) fn record_collect(&self, pass: &mut wgpu::ComputePass<'_>, passes: &Passes) {
         pass.set_pipeline(&passes.collect);
         pass.set_bind_group(0, &self.group, &[]);
         pass.dispatch_workgroups(self.entries.count, 1, 1);
     }
 
     /// Records that the coefficients become the sums of their entries.
-    pub fn record_expand(&self, pass: &mut wgpu::ComputePass<'_>, passes: &Passes, color: &Optimized) {
+    pub(super) fn record_expand(&self, pass: &mut wgpu::ComputePass<'_>, passes: &Passes, color: &Optimized) {
         let values = color.count * color.stride;
         pass.set_pipeline(&passes.expand);
         pass.set_bind_group(0, &self.group, &[]);
@@ -107,7 +107,7 @@ impl Tied {
     ///
     /// # Errors
     /// A lost device.
-    pub fn codebooks(&self, headless: &Headless) -> Result<Centers, GpuError> {
+    pub(super) fn codebooks(&self, headless: &Headless) -> Result<Centers, GpuError> {
         let values: Vec<f32> = bytemuck::pod_collect_to_vec(&self.entries.read_values(headless)?);
         let mut books = self.books.clone();
         let rows = books.entries.iter_mut().flat_map(|book| book.rows_mut());

@@ -53,12 +53,12 @@ pub(super) struct ViewBuffers {
 
 impl ViewBuffers {
     /// Returns the bytes of the buffers by pixels, which are the largest.
-    pub fn bytes(size: UVec2) -> u64 {
+    pub(super) fn bytes(size: UVec2) -> u64 {
         size.as_u64vec2().element_product() * (SLOPES + 16 + 4)
     }
 
     /// Creates the buffers for a frame of this size. Losses are added to `totals`.
-    pub fn new(
+    pub(super) fn new(
         headless: &Headless,
         passes: &Passes,
         parameters: &ParameterBuffers,
@@ -132,12 +132,12 @@ impl ViewBuffers {
     }
 
     /// Returns whether the buffers were created for the resources of this frame and this size.
-    pub fn fits(&self, frame: &FinishedFrame<'_>, size: UVec2) -> bool {
+    pub(super) fn fits(&self, frame: &FinishedFrame<'_>, size: UVec2) -> bool {
         self.size == size && self.splats == frame.buffers.splats && self.color == *frame.color
     }
 
     /// Records the passes after the picture, with the pass `loss` if there is an image.
-    pub fn record(
+    pub(super) fn record(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         headless: &Headless,

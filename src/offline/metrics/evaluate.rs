@@ -217,7 +217,7 @@ where
 }
 
 /// Returns reference, render and their difference times `gain`, side by side. Both must have the same size.
-pub fn side_by_side(reference: &Picture, render: &Picture, gain: f32) -> Picture {
+pub(crate) fn side_by_side(reference: &Picture, render: &Picture, gain: f32) -> Picture {
     let render = render.clamped();
     let difference: Vec<Vec3> =
         reference.pixels.iter().zip(&render.pixels).map(|(p, q)| ((*p - *q).abs() * gain).min(Vec3::ONE)).collect();

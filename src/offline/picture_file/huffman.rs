@@ -17,7 +17,7 @@ pub(super) struct Table {
 
 impl Table {
     /// Creates a table from the number of codes of each length from 1 to 16 bits; `None` if a length has more codes than bit patterns.
-    pub fn new(counts: &[u8; 16], symbols: &[u8]) -> Option<Self> {
+    pub(super) fn new(counts: &[u8; 16], symbols: &[u8]) -> Option<Self> {
         let mut table = Self { ends: [0; 16], offsets: [0; 16], symbols: symbols.to_vec() };
         let (mut code, mut place) = (0u32, 0u32);
         for (index, &count) in counts.iter().enumerate() {
@@ -45,12 +45,12 @@ pub(super) struct Bits<'a> {
 
 impl<'a> Bits<'a> {
     /// Starts at the first bit.
-    pub fn new(data: &'a [u8]) -> Self {
+    pub(super) fn new(data: &'a [u8]) -> Self {
         Self { data, at: 0, held: 0, count: 0 }
     }
 
     /// Skips the codes of one block; `None` if they end too early.
-    pub fn skip_block(&mut self, first: &Table, others: &Table) -> Option<()> {
+    pub(super) fn skip_block(&mut self, first: &Table, others: &Table) -> Option<()> {
         let size = self.symbol(first)?;
         self.skip(size)?;
         let mut place = 1;
@@ -67,7 +67,7 @@ impl<'a> Bits<'a> {
     }
 
     /// Skips to the end of the next restart marker; `None` if there is none.
-    pub fn restart(&mut self) -> Option<()> {
+    pub(super) fn restart(&mut self) -> Option<()> {
         self.count = 0;
         let is_restart = |pair: &[u8]| pair[0] == 0xff && (0xd0..=0xd7).contains(&pair[1]);
         self.at += self.data.get(self.at..)?.windows(2).position(is_restart)? + 2;

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// A folder that cannot be written to, a full disk.
-pub fn write_with_report(report: &BakeReport, package: &[u8], out: &Path) -> Result<[PathBuf; 2], OfflineError> {
+pub(crate) fn write_with_report(report: &BakeReport, package: &[u8], out: &Path) -> Result<[PathBuf; 2], OfflineError> {
     let paths = report_paths(out);
     let (json, html) = (format!("{:#}\n", report.json()?), report.html());
     write_together(&[(out, package), (&paths[0], json.as_bytes()), (&paths[1], html.as_bytes())])?;
@@ -20,7 +20,7 @@ pub fn write_with_report(report: &BakeReport, package: &[u8], out: &Path) -> Res
 }
 
 /// Returns the paths of the report beside a package, as JSON and as an HTML page.
-pub fn report_paths(out: &Path) -> [PathBuf; 2] {
+pub(crate) fn report_paths(out: &Path) -> [PathBuf; 2] {
     [".report.json", ".report.html"].map(|ending| beside(out, ending))
 }
 

@@ -19,7 +19,7 @@ const BAR_VALUE: f64 = 120.0;
 
 /// A plot of lines.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Chart {
+pub(crate) struct Chart {
     /// What the horizontal axis shows.
     pub x: Axis,
     /// What the vertical axis shows.
@@ -30,7 +30,7 @@ pub struct Chart {
 
 /// One axis.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Axis {
+pub(crate) struct Axis {
     /// Its name with the unit.
     pub label: String,
     /// Whether it is logarithmic; only values above zero are drawn then.
@@ -41,7 +41,7 @@ pub struct Axis {
 
 /// One line.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Series {
+pub(crate) struct Series {
     /// Its name in the legend.
     pub name: String,
     /// Its points; those that are not finite interrupt it.
@@ -52,7 +52,7 @@ pub struct Series {
 
 impl Axis {
     /// Returns a linear axis over the range of the values.
-    pub fn new(label: &str) -> Self {
+    pub(crate) fn new(label: &str) -> Self {
         Self { label: label.to_owned(), log: false, range: None }
     }
 
@@ -102,7 +102,7 @@ fn nice_step(least: f64) -> f64 {
 
 impl Chart {
     /// Returns the plot as SVG text.
-    pub fn svg(&self) -> String {
+    pub(crate) fn svg(&self) -> String {
         let values = |axis: usize| self.series.iter().flat_map(move |s| s.points.iter().map(move |p| p[axis]));
         let (xs, ys) = (self.x.limits(values(0)), self.y.limits(values(1)));
         let [left, top, right, bottom] = [MARGIN[0], MARGIN[1], WIDTH - MARGIN[2], HEIGHT - MARGIN[3]];
@@ -138,7 +138,7 @@ impl Chart {
     }
 
     /// Returns the legend as HTML: the names of the lines in their colors.
-    pub fn legend(&self) -> String {
+    pub(crate) fn legend(&self) -> String {
         let entry = |(index, series): (usize, &Series)| {
             format!("<span class=\"key\"><i class=\"s{index}\"></i>{}</span>", escape(&series.name))
         };
@@ -165,7 +165,7 @@ impl Series {
 }
 
 /// Returns horizontal bars as SVG text. Each row has a name, a value and the label beside the bar.
-pub fn bars(rows: &[(String, f64, String)]) -> String {
+pub(crate) fn bars(rows: &[(String, f64, String)]) -> String {
     let height = BAR * rows.len().max(1) as f64;
     let most = rows.iter().map(|row| row.1).fold(f64::MIN_POSITIVE, f64::max);
     let room = WIDTH - BAR_NAME - BAR_VALUE;

@@ -78,7 +78,7 @@ impl Activity {
 ///
 /// # Panics
 /// If the filter has no segments.
-pub fn filter_shares(filter: &TemporalFilter, interval: [f32; 2], times: &[f32]) -> Vec<f64> {
+pub(crate) fn filter_shares(filter: &TemporalFilter, interval: [f32; 2], times: &[f32]) -> Vec<f64> {
     let fraction = |segment: u32| {
         let active = (0..filter.count).filter(|&index| filter.is_active(segment, index)).count();
         active as f64 / filter.count.max(1) as f64
@@ -88,7 +88,7 @@ pub fn filter_shares(filter: &TemporalFilter, interval: [f32; 2], times: &[f32])
 }
 
 /// Returns `count` evenly spaced times, both ends of the interval included.
-pub fn even_times(interval: [f32; 2], count: usize) -> Vec<f32> {
+pub(crate) fn even_times(interval: [f32; 2], count: usize) -> Vec<f32> {
     let step = (interval[1] - interval[0]) / (count.max(2) - 1) as f32;
     (0..count).map(|i| interval[0] + step * i as f32).collect()
 }

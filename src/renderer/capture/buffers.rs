@@ -163,18 +163,18 @@ impl Filling {
     }
 
     /// Returns the bytes of a record.
-    pub fn record_size(&self) -> u64 {
+    pub(super) fn record_size(&self) -> u64 {
         self.size as u64
     }
 
     /// Returns the bytes that have not been written.
-    pub fn bytes_left(&self) -> u64 {
+    pub(super) fn bytes_left(&self) -> u64 {
         (self.count - self.done) as u64 * self.size as u64
     }
 
     /// Writes at most `bytes` of the remaining bytes, but at least one record, and returns the number of bytes written. `chunk` is scratch
     /// memory.
-    pub fn fill(&mut self, queue: &wgpu::Queue, scene: &RuntimeScene, bytes: u64, chunk: &mut Vec<u8>) -> u64 {
+    pub(super) fn fill(&mut self, queue: &wgpu::Queue, scene: &RuntimeScene, bytes: u64, chunk: &mut Vec<u8>) -> u64 {
         let most = (bytes.min(BYTES_AT_ONCE) / self.size as u64).max(1) as usize;
         let records = self.done..self.count.min(self.done + most);
         // Padding is zero.
@@ -187,7 +187,7 @@ impl Filling {
     }
 
     /// Writes all active sets of another filter of the same number of Gaussians.
-    pub fn fill_filter(&self, queue: &wgpu::Queue, filter: &TemporalFilter) {
+    pub(super) fn fill_filter(&self, queue: &wgpu::Queue, filter: &TemporalFilter) {
         let mut words = vec![0; self.count * self.size];
         self.convert_filter(filter, 0..self.count, &mut words);
         queue.write_buffer(&self.buffer, 0, &words);

@@ -82,12 +82,12 @@ impl Filter {
     }
 
     /// Returns the segment of a time, in the capture's unit.
-    pub fn segment_of(&self, time: f32) -> u32 {
+    pub(crate) fn segment_of(&self, time: f32) -> u32 {
         segment_of(time, self.interval, self.segments)
     }
 
     /// Returns the number of active Gaussians of a part in a segment.
-    pub fn count(&self, part: usize, segment: u32) -> u32 {
+    pub(crate) fn count(&self, part: usize, segment: u32) -> u32 {
         self.counts.get(part * self.segments as usize + segment as usize).copied().unwrap_or_default()
     }
 }

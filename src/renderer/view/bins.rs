@@ -120,18 +120,18 @@ const MUCH: u32 = 4;
 
 impl BinRoom {
     /// Creates the capacity with this initial number of wanted splats.
-    pub fn of(wanted: u32) -> Self {
+    pub(super) fn of(wanted: u32) -> Self {
         Self { wanted, ..Self::default() }
     }
 
     /// Returns the wanted capacity in splats.
-    pub fn wanted(&self) -> u32 {
+    pub(super) fn wanted(&self) -> u32 {
         self.wanted
     }
 
     /// Processes the capacity that a frame needed, and the `capacity` that it had. A frame that exceeds its capacity is slow: the wanted
     /// capacity grows before it is exceeded, and is reduced only after many frames that did not need it.
-    pub fn note(&mut self, needed: u32, capacity: u32) {
+    pub(super) fn note(&mut self, needed: u32, capacity: u32) {
         let with_reserve = |needed: u32| needed.saturating_add(needed / 2);
         if needed > capacity / 4 * 3 {
             self.wanted = self.wanted.max(with_reserve(needed));

@@ -36,7 +36,7 @@ pub(super) struct MotionResources {
 
 impl MotionResources {
     /// Creates the target of motions, its uniforms and its bind groups.
-    pub fn new(renderer: &Renderer, allocator: Allocator<'_>, made: &Resources, variant: FastVariant) -> Self {
+    pub(super) fn new(renderer: &Renderer, allocator: Allocator<'_>, made: &Resources, variant: FastVariant) -> Self {
         let parts = u64::from(made.sizes.parts) * u64::from(INSTANCE_STRIDE);
         let before = allocator.buffer("gs4d frame before", parts, BufferUsages::UNIFORM);
         let frame = allocator.buffer("gs4d frame of motions", size_of::<FrameUniforms>() as u64, BufferUsages::UNIFORM);
@@ -69,7 +69,13 @@ impl MotionResources {
     }
 
     /// Sets the variant that blends motions, and binds the opaque depth and the environment map of the frame, unless they are bound.
-    pub fn update(&mut self, renderer: &Renderer, allocator: Allocator<'_>, made: &Resources, variant: FastVariant) {
+    pub(super) fn update(
+        &mut self,
+        renderer: &Renderer,
+        allocator: Allocator<'_>,
+        made: &Resources,
+        variant: FastVariant,
+    ) {
         self.variant = variant;
         if self.opaque != made.opaque || self.environment != made.environment {
             self.pixel = motion_pixel(renderer, allocator, made, &self.frame, &self.view);
@@ -78,12 +84,18 @@ impl MotionResources {
     }
 
     /// Returns the bytes of the target.
-    pub fn bytes(&self) -> u64 {
+    pub(super) fn bytes(&self) -> u64 {
         texture_bytes(&self.texture)
     }
 
     /// Writes the uniforms, given the uniforms `frame` of the frame and the `previous` views.
-    pub fn write(&self, queue: &wgpu::Queue, frame: &FrameUniforms, instances: &[Instance<'_>], previous: &[View]) {
+    pub(super) fn write(
+        &self,
+        queue: &wgpu::Queue,
+        frame: &FrameUniforms,
+        instances: &[Instance<'_>],
+        previous: &[View],
+    ) {
         let frame = FrameUniforms { background_mode: BACKGROUND_NONE, debug: DEBUG_COLOR, ..*frame };
         queue.write_buffer(&self.frame, 0, bytemuck::bytes_of(&frame));
         let mut uniforms = Vec::new();

@@ -33,17 +33,17 @@ enum Arrival {
 }
 
 impl Readback {
-    pub fn new(allocator: Allocator<'_>, label: &str, size: u64) -> Self {
+    pub(super) fn new(allocator: Allocator<'_>, label: &str, size: u64) -> Self {
         Self { buffer: allocator.buffer(label, size, wgpu::BufferUsages::MAP_READ), state: State::Idle }
     }
 
     /// Returns whether a copy can be started.
-    pub fn is_idle(&self) -> bool {
+    pub(super) fn is_idle(&self) -> bool {
         matches!(self.state, State::Idle)
     }
 
     /// Records a copy from `source`, starting at `offset`, that fills the buffer, unless a copy is in progress.
-    pub fn copy(&mut self, encoder: &mut wgpu::CommandEncoder, source: &wgpu::Buffer, offset: u64) {
+    pub(super) fn copy(&mut self, encoder: &mut wgpu::CommandEncoder, source: &wgpu::Buffer, offset: u64) {
         if self.is_idle() {
             encoder.copy_buffer_to_buffer(source, offset, &self.buffer, 0, self.buffer.size());
             self.state = State::Recorded;
@@ -52,7 +52,7 @@ impl Readback {
 
     /// Advances by one state; returns the bytes if they have arrived, otherwise `None`. Call it once per frame, before the
     /// frame is recorded.
-    pub fn poll(&mut self) -> Option<Vec<u8>> {
+    pub(super) fn poll(&mut self) -> Option<Vec<u8>> {
         let arrival = match &self.state {
             State::Idle => return None,
             State::Recorded => {

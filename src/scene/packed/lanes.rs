@@ -99,7 +99,7 @@ pub(super) struct BlockRanges {
 
 impl SharedRanges {
     /// Reads the ranges of a scene; panics if `ranges` is too short.
-    pub fn read(ranges: &[[f32; 4]]) -> Self {
+    pub(super) fn read(ranges: &[[f32; 4]]) -> Self {
         let [t_low, t_size, sigma_low, sigma_size] = ranges[0];
         let [scale_low, scale_size, rotation_stretch, opacity_stretch] = ranges[1];
         let [base_low, base_size, ..] = ranges[2];
@@ -114,7 +114,7 @@ impl SharedRanges {
     }
 
     /// Returns the four-vectors that [`read`](Self::read) reads.
-    pub fn write(self) -> [[f32; 4]; SHARED_RANGES] {
+    pub(super) fn write(self) -> [[f32; 4]; SHARED_RANGES] {
         let Self { mean_t, log_sigma_t, log_scale, rotation_stretch, opacity_stretch, base } = self;
         [
             [mean_t[0], mean_t[1], log_sigma_t[0], log_sigma_t[1]],
@@ -126,14 +126,14 @@ impl SharedRanges {
 
 impl BlockRanges {
     /// Reads the ranges of the block that Gaussian `index` belongs to; panics if `ranges` is too short.
-    pub fn read(ranges: &[[f32; 4]], index: usize) -> Self {
+    pub(super) fn read(ranges: &[[f32; 4]], index: usize) -> Self {
         let first = SHARED_RANGES + index / BLOCK * BLOCK_RANGES;
         let ([x, y, z, displacement], [width, height, depth, rate]) = (ranges[first], ranges[first + 1]);
         Self { mean_low: [x, y, z], mean_size: [width, height, depth], displacement, rate }
     }
 
     /// Returns the four-vectors that [`read`](Self::read) reads.
-    pub fn write(self) -> [[f32; 4]; BLOCK_RANGES] {
+    pub(super) fn write(self) -> [[f32; 4]; BLOCK_RANGES] {
         let ([x, y, z], [width, height, depth]) = (self.mean_low, self.mean_size);
         [[x, y, z, self.displacement], [width, height, depth, self.rate]]
     }

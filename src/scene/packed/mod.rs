@@ -15,7 +15,7 @@
 
 mod colors;
 mod decode;
-pub mod encode;
+pub(crate) mod encode;
 mod lanes;
 mod rounding;
 mod scene;

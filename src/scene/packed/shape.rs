@@ -17,7 +17,7 @@ pub(super) struct Shape {
 
 impl Shape {
     /// Returns the scales, at least `flattest`, and the rotation of the conditional covariance.
-    pub fn of(gaussian: &Gaussian, flattest: f64) -> Self {
+    pub(super) fn of(gaussian: &Gaussian, flattest: f64) -> Self {
         let [xx, xy, xz, yy, yz, zz] = gaussian.covariance.map(f64::from);
         let covariance = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
         let (values, vectors) = eigen(DMat4::from_mat3(covariance));
