@@ -1,6 +1,6 @@
 //! The stages mask and compress of a bake.
 //!
-//! In: the remaining Gaussians. Out: their temporal filter; the bytes of the package, and the package in its place.
+//! In: the remaining Gaussians. Out: their temporal filter; the bytes of the package, and the package at its path.
 
 use super::inputs::Inputs;
 use super::tuning::with_codebooks;
@@ -14,7 +14,8 @@ use crate::offline::{OfflineError, Progress, write_beside, write_settings};
 use crate::scene::{GaussianScene, SceneForm, TemporalFilter};
 use std::io::Write;
 
-/// The stage mask: computes the temporal filter of the remaining Gaussians. Returns the key of the scene with it, given that of the scene.
+/// The stage mask: computes the temporal filter of the remaining Gaussians. Returns the key of the scene with the filter, given the key of
+/// the scene.
 pub(super) fn mask(
     inputs: &mut Inputs<'_>,
     stages: &mut Stages<'_>,
@@ -63,7 +64,7 @@ pub(super) fn compress(
     Ok(bytes)
 }
 
-/// Writes the package to its place, unless the same bytes are there; returns `false` if it has more bytes than are allowed.
+/// Writes the package to its path, unless the same bytes are there; returns `false` if it has more bytes than are allowed.
 pub(super) fn put_in_place(
     inputs: &Inputs<'_>,
     package: &[u8],
