@@ -1,7 +1,7 @@
-//! Whether the images of a dataset show a capture.
+//! The check that the images of a dataset show a capture.
 //!
-//! In: a scene as it was read, before anything is removed from it, and its training views. Out: an error if the scene
-//! explains their images no better than those of other views.
+//! In: a scene before pruning, its training views. Out: an error if the pictures of the scene are no closer to the images of
+//! their own views than to the images of other views.
 
 use super::OfflineError;
 use super::dataset::TrainingView;
@@ -12,18 +12,18 @@ use crate::scene::RuntimeScene;
 use crate::view::{Background, Picture};
 use glam::Vec3;
 
-/// Views that are compared.
+/// Number of compared views.
 const VIEWS: usize = 8;
-/// A scene this close to its images, dB, belongs to them in any case.
+/// PSNR against its own images above which a scene passes in any case, dB.
 const CLOSE: f64 = 20.0;
-/// How much closer the pictures must be to their own images than to others, dB.
+/// Least difference of the PSNR against own images and against images of other views, dB.
 const CLOSER: f64 = 0.1;
 
-/// Checks that the pictures of some views are closer to their own images than to those of other views. Views whose image
-/// is missing are left out; with fewer than two views of one size nothing can be said, and every dataset passes.
+/// Checks that the pictures of some views are closer to their own images than to the images of other views. Views whose
+/// image is missing are left out; with fewer than two views of one size the check is impossible, and every dataset passes.
 ///
 /// # Errors
-/// Images that cannot be read or that show something else, a failure of the engine.
+/// Images that cannot be read or that show another scene, a failure of the engine.
 pub fn require_belonging(
     engine: &mut Engine,
     scene: &RuntimeScene,

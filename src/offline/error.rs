@@ -52,7 +52,7 @@ pub enum OfflineError {
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault of the file.
         #[source]
         reason: Box<dyn Error + Send + Sync>,
     },
@@ -66,7 +66,7 @@ pub enum OfflineError {
         size: UVec2,
         /// Bytes needed.
         needed: u64,
-        /// Bytes that the system can give.
+        /// Bytes available.
         available: u64,
     },
     /// The images to train on are too large for the memory.
@@ -79,7 +79,7 @@ pub enum OfflineError {
         count: usize,
         /// Bytes needed.
         needed: u64,
-        /// Bytes that the system can give.
+        /// Bytes available.
         available: u64,
     },
     /// Two folders have no two pictures of the same name.
@@ -96,10 +96,10 @@ pub enum OfflineError {
          given): give --validation cameras or times, add transforms_val.json, or name the score and the count"
     )]
     NoValidation {
-        /// What would be chosen.
+        /// The choice that needs validation views.
         what: &'static str,
     },
-    /// The user has asked the work to end. What has been stored is kept, and the same command resumes from it.
+    /// The user has interrupted the work. Stored results are kept, and the same command resumes from them.
     #[error("interrupted; the same command resumes")]
     Interrupted {
         /// The best result so far, if the work was fine-tuning.
@@ -114,28 +114,28 @@ pub enum OfflineError {
     /// A package cannot be written.
     #[error(transparent)]
     Package(#[from] PackageError),
-    /// There is no score to choose from.
+    /// No score can be computed.
     #[error("there is no score to prune by")]
     NoScore,
-    /// An environment map is seen at every size.
-    #[error(
-        "has an environment map, which surrounds the camera: levels of detail are of captures that can be seen from afar"
-    )]
+    /// Levels of detail of a scene with an environment map, which surrounds the camera at every distance.
+    #[error("has an environment map, which surrounds the camera: levels of detail need a capture without one")]
     Surrounded,
-    /// An orbit needs a scene with Gaussians.
-    #[error("the scene has no Gaussians to go around")]
+    /// An orbit of a scene without Gaussians.
+    #[error("the scene has no Gaussians, so that no orbit of cameras can be placed around it: give --cameras")]
     NothingToOrbit,
     /// Gaussians are so far apart that no camera sees them all.
-    #[error("the Gaussians are too far apart to be looked at from around them: give --cameras, or prune the scene")]
+    #[error("the Gaussians are too far apart for an orbit of cameras around them: give --cameras, or prune the scene")]
     TooFarApart,
-    /// A sliced scene cannot become the trained form.
-    #[error("holds a sliced form, which cannot be turned back: convert the checkpoint with --form trained")]
+    /// A sliced scene cannot be converted to the trained form.
+    #[error(
+        "holds a sliced form, which cannot be converted to the trained form: convert the checkpoint with --form trained"
+    )]
     NotTrained,
     /// The threads that write pictures cannot be started.
     #[error(transparent)]
     Threads(#[from] rayon::ThreadPoolBuildError),
     /// The threads that write pictures panicked.
-    #[error("the threads that write pictures broke down")]
+    #[error("the threads that write pictures panicked: a defect of gs4d, please report it")]
     WritersPanicked,
     /// The results of a stage of a bake cannot be stored.
     #[error(transparent)]

@@ -1,7 +1,7 @@
-//! The files that work reads and those that it writes, checked before anything is computed.
+//! The input and output files of a computation, checked before it begins.
 //!
-//! In: the paths of both. Out: an error that names the first output that is an input, is another output or cannot be written. What killed
-//! runs have left beside the outputs is removed.
+//! In: the paths of both. Out: an error that names the first output that is an input, is another output or cannot be written. Temporary
+//! files that killed runs have left beside the outputs are removed.
 
 use super::dataset::{CameraFile, CameraOptions, Split};
 use super::save::{folder_of, is_stream, resolved};
@@ -12,14 +12,14 @@ use std::fs::{File, Metadata};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// The files that work reads and those that it writes. Default: none.
+/// The input and output files of a computation. Default: none.
 #[derive(Debug, Clone, Default)]
 pub struct Files {
     inputs: Vec<PathBuf>,
     outputs: Vec<Output>,
 }
 
-/// What is written.
+/// One output.
 #[derive(Debug, Clone)]
 enum Output {
     /// A file in a folder that exists. If its name has an extension, it is this one.
@@ -30,12 +30,12 @@ enum Output {
     Inside(PathBuf),
 }
 
-/// What a path leads to. All paths of one file have a place in common.
+/// The identity of a file. All paths of one file have a place in common.
 #[derive(Debug, PartialEq, Eq, Hash)]
 enum Place {
-    /// By its number and that of its device: hard links have the same.
+    /// The numbers of the device and of the file on it: equal for all hard links.
     Node(u64, u64),
-    /// By its path without symbolic links, also if there is no file yet.
+    /// The path without symbolic links, also if there is no file yet.
     Path(PathBuf),
 }
 
@@ -52,7 +52,7 @@ impl Files {
         self
     }
 
-    /// Adds a camera file, the existing images that it names, and those of the dataset in the same folder.
+    /// Adds a camera file, the existing images that it names, and the images of the dataset in the same folder.
     pub fn reads_cameras(mut self, path: &Path) -> Self {
         self.add_cameras(path);
         self.reads_data(folder_of(path))
@@ -68,7 +68,7 @@ impl Files {
 
     fn add_cameras(&mut self, path: &Path) {
         self.inputs.push(path.to_owned());
-        // Of any size: paths do not depend on it. What is wrong with the file is told when it is read.
+        // Any size serves: paths do not depend on it. Faults of the file are reported when it is read.
         let options = CameraOptions { size: Some(UVec2::ONE), ..CameraOptions::default() };
         for view in CameraFile::load(path, &options).unwrap_or_default() {
             // An image that does not exist is no input: the same name may be an output.
@@ -94,7 +94,7 @@ impl Files {
     /// left beside them.
     ///
     /// # Errors
-    /// The first output with which something is wrong, by name.
+    /// The first output that is an input, is another output or cannot be written.
     pub fn check(&self) -> Result<(), OfflineError> {
         self.tell_apart()?;
         let mut folders = BTreeSet::new();
@@ -137,12 +137,12 @@ impl Output {
         }
     }
 
-    /// Returns whether it is a file on a disk: folders are shared, and so are devices and pipes.
+    /// Returns whether the output is a file on a disk: folders, devices and pipes may be outputs of several runs.
     fn is_file(&self) -> bool {
         !matches!(self, Self::Folder(_)) && !is_stream(self.path())
     }
 
-    /// Checks what exists of it. Returns the folder in which a file will be made; `None` if that is checked with another output, or for a
+    /// Checks what exists at the path. Returns the folder in which a file will be made; `None` if another output checks it, or for a
     /// device or a pipe.
     fn check(&self) -> Result<Option<PathBuf>, OfflineError> {
         match self {
@@ -182,7 +182,7 @@ fn check_folder(out: &Path, folder: &Path) -> Result<(), OfflineError> {
     let shown = folder.display();
     let message = match folder.metadata() {
         Ok(metadata) if !metadata.is_dir() => format!("{shown} is a file, not a folder: write to another place"),
-        // Without a name, where the system has that: a run that ends here leaves nothing behind.
+        // A file without a name, where the system supports it: a run that is killed here leaves no file.
         Ok(_) => match tempfile::tempfile_in(folder) {
             Ok(_) => return Ok(()),
             Err(error) => format!("nothing can be written to the folder {shown}: {error}"),
@@ -228,14 +228,17 @@ mod tests {
         let [input, roundabout] = ["in.gs4d", "./in.gs4d"].map(|name| folder.path().join(name));
         fs::write(&input, b"contents").expect("the folder can be written to");
         let files = || Files::default().reads_scene(&input);
-        assert!(failure(files().writes(&roundabout, "gs4d")).contains("the input itself"), "the same path");
+        assert!(failure(files().writes(&roundabout, "gs4d")).contains("the input itself"), "another path of the input");
         let hard = folder.path().join("hard.gs4d");
         fs::hard_link(&input, &hard).expect("the folder can be written to");
         if cfg!(unix) {
             assert!(failure(files().writes(&hard, "gs4d")).contains("the input itself"), "a hard link");
         }
         let beside = folder.path().join("cfg_args");
-        assert!(failure(files().writes(&beside, "f32")).contains("the input itself"), "what is read with it");
+        assert!(
+            failure(files().writes(&beside, "f32")).contains("the input itself"),
+            "a file that is read with the input is an input"
+        );
         files().writes(&folder.path().join("out.gs4d"), "gs4d").check().expect("another file");
     }
 
@@ -248,15 +251,15 @@ mod tests {
         fs::create_dir(&real).expect("the folder can be written to");
         symlink("real", &link).expect("the folder can be written to");
         let twice = Files::default().writes(&real.join("new.csv"), "csv").writes(&link.join("new.csv"), "csv");
-        assert!(failure(twice).contains("written twice"), "neither is there yet");
+        assert!(failure(twice).contains("written twice"), "two paths of one file that does not exist yet");
         let (target, ahead) = (folder.path().join("later.gs4d"), folder.path().join("ahead.gs4d"));
         symlink("later.gs4d", &ahead).expect("the folder can be written to");
         let twice = Files::default().writes(&target, "gs4d").writes(&ahead, "gs4d");
-        assert!(failure(twice).contains("written twice"), "a link to what is not there yet");
+        assert!(failure(twice).contains("written twice"), "a link to a file that does not exist yet");
     }
 
     #[test]
-    fn what_cannot_be_written_is_named() {
+    fn outputs_that_cannot_be_written_are_named() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = |name: &str| folder.path().join(name);
         fs::write(path("file.gs4d"), b"contents").expect("the folder can be written to");
@@ -274,12 +277,12 @@ mod tests {
         let inside = failure(Files::default().writes_folder(&path("file.gs4d/deep/frames"), []));
         assert!(inside.contains("file.gs4d is a file"), "no folder can be made in a file: {inside}");
         let new = path("deep/frames");
-        Files::default().writes_folder(&new, [new.join("0.png")]).check().expect("it can be made");
-        assert!(!path("deep").exists(), "but is not made yet");
+        Files::default().writes_folder(&new, [new.join("0.png")]).check().expect("the folder can be made");
+        assert!(!path("deep").exists(), "the check makes no folder");
         let mut permissions = path("file.gs4d").metadata().expect("it is there").permissions();
         permissions.set_readonly(true);
         fs::set_permissions(path("file.gs4d"), permissions).expect("it is ours");
         let message = failure(Files::default().writes(&path("file.gs4d"), "gs4d"));
-        assert!(message.contains("write-protected"), "it is kept: {message}");
+        assert!(message.contains("write-protected"), "a write-protected file is refused: {message}");
     }
 }

@@ -13,7 +13,7 @@ use std::thread;
 /// Most pictures that wait to be written.
 const QUEUE: usize = 4;
 
-/// Draws the views in order, each with the shot it belongs to, while other threads call `write` on the pictures.
+/// Draws the views in order, each with its shot, while other threads call `write` on the pictures.
 /// Returns the counts of each view. Begins the task "rendering".
 ///
 /// # Errors
@@ -32,7 +32,7 @@ pub fn render_shots(
         memory_check::require(size, memory_check::on_gpu(headless) + waiting * memory_check::PICTURE)?;
     }
     let (queue, drawn) = sync_channel::<(&Shot, Picture)>(QUEUE);
-    // A thread pool of its own: threads that wait for pictures would stall rayon's shared pool.
+    // A separate thread pool: threads that wait for pictures would block the shared pool of rayon.
     let writers = rayon::ThreadPoolBuilder::new().build()?;
     thread::scope(|scope| {
         let written = scope.spawn(|| {
@@ -60,7 +60,7 @@ fn draw<'s>(
         let frame = headless.render(capture, view, background)?;
         counts.push(frame.counts);
         if queue.send((shot, frame.picture)).is_err() {
-            // The writers stopped at an error, which they return.
+            // The writers have stopped at an error, which they return.
             break;
         }
         progress.advance();

@@ -1,7 +1,7 @@
 //! Writing files whole or not at all.
 //!
-//! In: a path and its contents: a scene, a picture, anything else. Out: the file, which replaces an existing one only
-//! once it is complete, and has its permissions. A package is read back before.
+//! In: a path and its contents: a scene, a picture, any bytes. Out: the file, which replaces an existing file only when it
+//! is complete, and gets its permissions. A package is read back first.
 
 use super::temporary_file;
 use crate::codec::package::{self, WriteSettings};
@@ -41,7 +41,7 @@ fn read_back(file: File) -> Result<(), CodecErrorKind> {
 /// packed form and the default of [`WriteSettings`] for the others.
 pub fn write_settings(form: &SceneForm, level: Option<i32>) -> WriteSettings {
     let usual = match form {
-        // A tenth of the bytes for seconds of time.
+        // Level 19 saves a tenth of the bytes and takes seconds.
         SceneForm::Ready(Form::Packed(_)) => 19,
         SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_)) => WriteSettings::default().level,
     };
@@ -71,7 +71,7 @@ where
     replace(path, write, |_| Ok(())).map_err(|kind| CodecError { path: path.to_owned(), kind })
 }
 
-/// As [`write_beside`]; `check` may refuse the file that was written.
+/// Writes a file as [`write_beside`] does, unless `check` refuses the temporary file.
 fn replace<E>(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>,
@@ -106,12 +106,12 @@ pub(super) fn is_stream(path: &Path) -> bool {
     path.metadata().is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
 }
 
-/// Returns the folder of a file: the current one for a name alone.
+/// Returns the folder of a file: the current folder for a name alone.
 pub(super) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Returns the path that a path leads to through symbolic links, whether there is a file or not.
+/// Returns the path that a path resolves to through symbolic links, whether the file exists or not.
 pub(super) fn resolved(path: &Path) -> PathBuf {
     let mut path = path.to_owned();
     for _ in 0..MAX_LINKS {
@@ -136,7 +136,7 @@ mod tests {
     use crate::scene::synth::{SynthSettings, synthesize};
 
     #[test]
-    fn a_failed_write_leaves_what_was_there() {
+    fn a_failed_write_keeps_the_old_file() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("scene.gs4d");
         write_beside(&path, |writer| writer.write_all(b"first")).expect("the folder can be written to");
@@ -146,11 +146,11 @@ mod tests {
         });
         let message = failed.expect_err("the writer failed").to_string();
         assert!(message.contains("scene.gs4d: disk full"), "path and reason: {message}");
-        assert_eq!(fs::read(&path).expect("still there"), b"first", "the old file is whole");
+        assert_eq!(fs::read(&path).expect("still there"), b"first", "the old file is unchanged");
         write_beside(&path, |writer| writer.write_all(b"third")).expect("the folder can be written to");
-        assert_eq!(fs::read(&path).expect("replaced"), b"third", "the new file took its place");
+        assert_eq!(fs::read(&path).expect("replaced"), b"third", "the new file has replaced the old file");
         let left = fs::read_dir(folder.path()).expect("the folder").count();
-        assert_eq!(left, 1, "no temporary file stays behind");
+        assert_eq!(left, 1, "no temporary file is left");
     }
 
     #[test]
@@ -166,8 +166,8 @@ mod tests {
         records.ranges[0][0] = f32::INFINITY;
         let message = save(&path, &packed, &WriteSettings::default()).expect_err("it cannot be read").to_string();
         assert!(message.contains("scene.gs4d") && message.contains("not finite"), "path and reason: {message}");
-        assert_eq!(fs::read(&path).expect("still there"), before, "the old package is whole");
-        assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 1, "nothing else is left");
+        assert_eq!(fs::read(&path).expect("still there"), before, "the old package is unchanged");
+        assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 1, "no temporary file is left");
     }
 
     #[cfg(unix)]

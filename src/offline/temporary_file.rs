@@ -1,18 +1,18 @@
-//! Temporary files beside those that they will replace.
+//! Temporary files beside the files that they will replace.
 //!
-//! In: a folder. Out: an empty file in it, which is locked for as long as its run lives. Those of runs that were killed are not locked any
-//! more, by which they are found and removed.
+//! In: a folder. Out: an empty file in it, which is locked until its run ends. Temporary files of killed runs are not locked, and are
+//! removed.
 
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::Path;
 use tempfile::NamedTempFile;
 
-/// What their names begin and end with.
+/// Prefix and suffix of the names of temporary files.
 const PREFIX: &str = ".gs4d-";
 const SUFFIX: &str = ".part";
 
-/// Creates a temporary file, which is removed when it is dropped unless it has taken the place of another.
+/// Creates a temporary file, which is removed when it is dropped unless it has replaced another file.
 ///
 /// # Errors
 /// A folder that cannot be written to.
@@ -21,14 +21,14 @@ pub(super) fn create(folder: &Path) -> io::Result<NamedTempFile> {
     builder.prefix(PREFIX).suffix(SUFFIX);
     #[cfg(unix)]
     {
-        // Permissions as of any new file, by the umask; those of temporary files allow the owner only.
+        // Permissions of a new file, by the umask; the default of temporary files allows the owner only.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     loop {
         let part = builder.tempfile_in(folder)?;
         match part.as_file().try_lock() {
-            // Another run was quicker to lock it, and removes it.
+            // Another run has locked the file first, and removes it.
             Err(TryLockError::WouldBlock) => {}
             Ok(()) if !part.path().exists() => {}
             // Where files cannot be locked, none are removed either.
@@ -37,11 +37,11 @@ pub(super) fn create(folder: &Path) -> io::Result<NamedTempFile> {
     }
 }
 
-/// Removes the temporary files of runs that were killed. What cannot be looked at stays.
+/// Removes the temporary files of killed runs. Files that cannot be opened are kept.
 pub(super) fn remove_stale(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for path in entries.flatten().map(|entry| entry.path()).filter(|path| is_part(path)) {
-        // The lock is held until the file is gone, so that nobody begins to write to it.
+        // The lock is held until the file is removed, so that no other run begins to write to it.
         if let Ok(file) = File::options().write(true).open(&path)
             && file.try_lock().is_ok()
         {
@@ -68,11 +68,11 @@ mod tests {
         let paths = names.map(|name| folder.path().join(name));
         paths.iter().for_each(|path| fs::write(path, b"some bytes").expect("the folder can be written to"));
         remove_stale(folder.path());
-        assert!(live.path().exists(), "one that is being written stays");
-        assert!(!paths[0].exists(), "one that nobody writes is removed");
-        assert!(paths[1..].iter().all(|path| path.exists()), "files of other names stay");
+        assert!(live.path().exists(), "the file of a run that has not ended is kept");
+        assert!(!paths[0].exists(), "the file of a killed run is removed");
+        assert!(paths[1..].iter().all(|path| path.exists()), "files of other names are kept");
         let path = live.path().to_owned();
         drop(live);
-        assert!(!path.exists(), "it goes with its owner");
+        assert!(!path.exists(), "a temporary file is removed when it is dropped");
     }
 }

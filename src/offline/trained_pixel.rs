@@ -8,11 +8,11 @@ use crate::scene::GaussianScene;
 use crate::view::RasterFov;
 use rayon::prelude::*;
 
-/// One in so many Gaussians may be farther away: some are strays.
+/// One in this number of Gaussians may be farther away, since some are outliers.
 const STRAYS: usize = 100;
 
-/// Returns the largest size, in capture units, that a pixel of the training views has at the Gaussians of a scene, but for the farthest
-/// hundredth in each view, so that none of these is drawn otherwise there; `None` if no view has a Gaussian in front of it.
+/// Returns the largest size, in capture units, that a pixel of the training views has at the Gaussians of a scene, except the farthest
+/// hundredth in each view, so that the Gaussians are drawn unchanged in these views; `None` if no view has a Gaussian in front of it.
 pub fn trained_pixel(scene: &GaussianScene, views: &[TrainingView]) -> Option<f32> {
     let means = scene.form.means();
     let size_in = |view: &TrainingView| {
@@ -43,7 +43,7 @@ mod tests {
     }
 
     #[test]
-    fn the_farthest_view_tells_the_size() {
+    fn the_view_with_the_farthest_gaussians_determines_the_size() {
         let at = |y: f32| Gaussian {
             mean: [0.0, y, 0.0],
             mean_t: 0.0,
@@ -57,7 +57,7 @@ mod tests {
         let two = scene(vec![at(-1.0), at(1.0)]);
         let views = [view_from(Vec3::new(0.0, -4.0, 0.0)), view_from(Vec3::new(0.0, -9.0, 0.0))];
         // 100 pixels are as wide as the depth: 9 to the middle, and one to the far side.
-        let found = trained_pixel(&two, &views).expect("they look at it");
+        let found = trained_pixel(&two, &views).expect("Gaussians are in front of the views");
         assert!((found - 0.1).abs() < 1e-4, "{found}");
         assert_eq!(trained_pixel(&two, &[]), None, "without views");
         assert_eq!(trained_pixel(&scene(Vec::new()), &views), None, "without a scene");
