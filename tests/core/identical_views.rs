@@ -1,7 +1,7 @@
-//! Choosing a number of Gaussians where some views are reproduced exactly.
+//! Choosing a number of Gaussians if some views are reproduced exactly.
 //!
-//! In: a synthetic scene, twenty noisy images of it, and four views that show nothing but the background, whose images the scene
-//! reproduces exactly. Out: proof that the PSNR that decides is finite and that the four views do not change what is chosen.
+//! In: a synthetic scene, twenty noisy images of it, and four views of the background alone, whose images the scene reproduces exactly.
+//! Out: proof that the PSNR of the comparison is finite and that the four views do not change the chosen number.
 
 use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, TrainingView};
 use bevy_gs4d::offline::engine::Engine;
@@ -22,7 +22,7 @@ const EMPTY_VIEWS: usize = 4;
 const SIZE: UVec2 = UVec2::new(48, 40);
 const FOV: f32 = 0.8;
 
-/// A scene, the scores of its Gaussians, and its views: first those that see it, then those that see the background alone.
+/// A scene, the scores of its Gaussians, and its views: first the views of the scene, then the views of the background alone.
 struct Setup {
     scene: GaussianScene,
     runtime: RuntimeScene,
@@ -48,7 +48,7 @@ impl Setup {
             let view = camera.view(time, RasterFov::Reference);
             let mut picture = reference::render(&runtime, &view, Background::Color(background)).picture;
             if index < VIEWS {
-                // Noise as of a capture that is not reproduced exactly.
+                // Noise, so that the scene does not reproduce the image exactly.
                 for (place, pixel) in picture.pixels.iter_mut().enumerate() {
                     *pixel += ((place * 37 + index * 11) % 21) as f32 / 255.0 - 10.0 / 255.0;
                 }
@@ -81,7 +81,7 @@ impl Setup {
 }
 
 #[test]
-fn views_that_are_reproduced_exactly_do_not_change_what_is_chosen() {
+fn views_that_are_reproduced_exactly_do_not_change_the_chosen_number() {
     // 51, 102 and 153 of 255 are drawn as they are stored.
     for background in [[0.0; 3], [0.2, 0.4, 0.6]] {
         let setup = Setup::new(background);
@@ -96,7 +96,10 @@ fn views_that_are_reproduced_exactly_do_not_change_what_is_chosen() {
             let (with, psnr_of_all) = setup.choose(&evaluator(&setup.views), loss);
             assert!((10..COUNT).contains(&without), "some Gaussians are left out: {without}");
             let apart = with.abs_diff(without) as f64 / without as f64;
-            assert!(apart <= 0.05, "{with} of all views, {without} of those that differ, within {loss} dB");
+            assert!(
+                apart <= 0.05,
+                "{with} Gaussians with all views, {without} without the exact views, within {loss} dB"
+            );
             let more = 10.0 * ((VIEWS + EMPTY_VIEWS) as f64 / VIEWS as f64).log10();
             assert!((psnr_of_all - psnr - more).abs() < 1e-6, "the error is spread over more pixels: {psnr_of_all}");
         }
@@ -109,6 +112,6 @@ fn a_scene_that_reproduces_every_view_has_a_finite_psnr() {
     let background = Background::Color([0.0; 3]);
     let evaluator = Evaluator::by_scene(&mut Engine::Cpu, &setup.runtime, &setup.views, background);
     let (count, psnr) = setup.choose(&evaluator.expect("it can be drawn"), 150.0);
-    assert_eq!(psnr, MAX_PSNR, "compared with itself");
+    assert_eq!(psnr, MAX_PSNR, "the scene is compared with its own pictures");
     assert!((1..COUNT).contains(&count), "a loss of 150 dB from the cap allows fewer: {count}");
 }

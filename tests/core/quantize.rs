@@ -1,7 +1,7 @@
 //! Quantization and the packed form in packages.
 //!
 //! In: synthetic scenes; with `GS4D_DATA` set, trained captures. Out: proof that the packed form keeps attributes and
-//! pictures within its steps, and that packages store it bit for bit.
+//! pictures within its steps, and that packages store the packed form bit for bit.
 
 use crate::support::data;
 use crate::support::packed_scene::{BLACK, scene, settings, view};
@@ -69,7 +69,11 @@ fn every_attribute_stays_within_its_step() {
             }
             assert!((a.mean_t - b.mean_t).abs() <= step(bits.mean_t, 1.2), "temporal mean {a:?} {b:?}");
             assert!((a.opacity - b.opacity).abs() <= step(bits.opacity, 1.0), "opacity {a:?} {b:?}");
-            assert_eq!(a.sigma_t.is_finite(), b.sigma_t.is_finite(), "present at every time in both or in neither");
+            assert_eq!(
+                a.sigma_t.is_finite(),
+                b.sigma_t.is_finite(),
+                "a Gaussian is present at every time in both scenes or in neither"
+            );
             if a.sigma_t.is_finite() {
                 assert!((a.sigma_t.ln() - b.sigma_t.ln()).abs() <= step(bits.sigma_t, 5.0), "deviation {a:?} {b:?}");
             } else {
@@ -153,7 +157,7 @@ fn compression_keeps_pictures_within_the_promised_psnr() {
 #[test]
 fn the_filter_follows_the_order_of_the_gaussians() {
     let mut scene = scene(2_000, 0, 0);
-    // A support filter would be computed again.
+    // Not a support filter, which would be computed again.
     scene.filter = scene.filter.map(|filter| TemporalFilter { kind: FilterKind::KeyFrame, ..filter });
     let (packed, _) = compress(scene.clone(), &settings(&[])).expect("it is compressed");
     let order = order(&scene);
@@ -284,7 +288,7 @@ fn packages_store_the_packed_form_bit_for_bit() {
         let read = package::read(Cursor::new(&bytes)).expect("it can be read");
         assert_eq!(read, packed, "degree {degree} and {degree_t}");
         let info = package::inspect(Cursor::new(&bytes)).expect("it can be inspected");
-        assert_eq!(info.header.requires, ["packed", "filter"], "older readers must refuse it");
+        assert_eq!(info.header.requires, ["packed", "filter"], "older readers must refuse the package");
         let back = read.unpacked();
         let is_sliced = matches!(back.form, SceneForm::Ready(Form::Sliced(_)));
         assert!(is_sliced && back.len() == 700, "it can be unpacked");
@@ -329,11 +333,11 @@ fn a_trained_capture_reaches_the_targets_of_the_balanced_quality() {
     let (codebooks, rest): (Vec<_>, Vec<_>) = info.header.sections.iter().partition(|section| books(&section.name));
     let size = |sections: &[&package::Section]| sections.iter().map(|section| section.length).sum::<usize>();
     let each = size(&rest) as f64 / 45_000.0;
-    assert!(each <= 24.0, "{each:.2} bytes per Gaussian");
-    assert!(size(&codebooks) <= 1_000_000, "{} bytes of codebooks", size(&codebooks));
+    assert!(each <= 24.0, "at most 24 bytes per Gaussian: {each:.2}");
+    assert!(size(&codebooks) <= 1_000_000, "codebooks of at most 1 MB: {} bytes", size(&codebooks));
     let packed = packed.into_runtime().expect("drawable");
     let Form::Packed(records) = &packed.form else { panic!("it is packed") };
-    assert_eq!(size_of_val(&records.records[..]), 45_000 * 32, "32 bytes each");
+    assert_eq!(size_of_val(&records.records[..]), 45_000 * 32, "32 bytes for each Gaussian");
     let views = CameraFile::load(&data.join("toybox/golden_45k.json"), &CameraOptions::default()).expect("cameras");
     for shot in views {
         let found = psnr(&scene, &packed, &shot.camera.view(shot.time, RasterFov::Reference));

@@ -1,4 +1,4 @@
-//! Scenes whose parts do not fit together, and colors by codebook whose degrees are lowered.
+//! Scenes with inconsistent parts, and colors by codebook with lowered degrees.
 //!
 //! In: scenes made here, consistent and inconsistent. Out: proof that `RuntimeScene::check` refuses every inconsistent scene, so that
 //! no index is out of range, and that lowering degrees changes no other coefficient.
@@ -37,7 +37,7 @@ fn shorten<T>(values: &mut Vec<T>) {
     values.pop();
 }
 
-/// Replaces the sets of the filter by intervals; the last Gaussian has the given one.
+/// Replaces the sets of the filter by intervals; the last Gaussian has the given interval.
 fn interval(scene: &mut RuntimeScene, first: u32, last: u32) {
     let filter = scene.filter.as_mut().expect("a filter");
     let mut intervals = vec![0; COUNT];
@@ -139,7 +139,7 @@ fn lower_degrees_keep_the_other_coefficients() {
             expected.form.truncate_colors(low, low_t);
             assert!(
                 lowered.unpacked() == expected,
-                "{degree} and {degree_t} to {low} and {low_t}: the other coefficients stay"
+                "{degree} and {degree_t} to {low} and {low_t}: the other coefficients are unchanged"
             );
         }
     }
