@@ -57,7 +57,7 @@ fn both(
 fn assert_same([drawn, expected]: &[Frame; 2], what: &str) {
     let colors = drawn.picture.pixels.iter().zip(&expected.picture.pixels).map(|(a, b)| (*a - *b).abs().max_element());
     let apart = colors.fold(0.0, f32::max);
-    // A splat whose alpha is at the threshold of 1/255 may be on either side of it.
+    // The alpha of a splat near the threshold of 1/255 may be above it on one side and below it on the other.
     assert!(apart < 5e-3, "{what}: colors differ by {apart}");
     let left = drawn.transmittance.iter().zip(&expected.transmittance).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     assert!(left < 5e-3, "{what}: transmittances differ by {left}");

@@ -1,7 +1,7 @@
 //! Whole runs of fine-tuning: with a temporal filter, interrupted and resumed.
 //!
-//! In: a small synthetic scene, its own pictures as a dataset. Out: proof that what a filter leaves out is not trained, that the filter
-//! follows the Gaussians, and that an interrupted run ends as another. Skipped where there is no GPU.
+//! In: a small synthetic scene, its own pictures as a dataset. Out: proof that inactive Gaussians are not trained, that the filter
+//! follows the Gaussians, and that an interrupted run ends as an uninterrupted one. Skipped where there is no GPU.
 
 use crate::support::{dataset, gpu};
 use bevy_gs4d::gaussian::{GradientMode, Parameters};
@@ -63,7 +63,7 @@ fn trained(scene: &mut GaussianScene) -> &mut Trained {
     trained
 }
 
-/// Returns a filter of two segments: the even Gaussians in the first, those that three divides in the second.
+/// Returns a filter of two segments: the Gaussians of even index in the first, of index divisible by three in the second.
 fn filter(kind: FilterKind) -> TemporalFilter {
     let mut bits = vec![0; 2 * TemporalFilter::words(COUNT)];
     for index in 0..COUNT {
@@ -76,7 +76,7 @@ fn filter(kind: FilterKind) -> TemporalFilter {
 }
 
 #[test]
-fn what_a_filter_leaves_out_is_not_trained() {
+fn inactive_gaussians_are_not_trained() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     assert_eq!(lesson.images.len(), 12, "the views of three of four cameras");
@@ -95,33 +95,52 @@ fn what_a_filter_leaves_out_is_not_trained() {
         let kept: Vec<u32> = (0..COUNT as u32).filter(|index| index % divisor == 0).collect();
         let mut alone = gradients(select(&lesson.disturbed(None), &kept), view);
         let mut active = select(&found, &kept);
-        assert_eq!(trained(&mut active).parameters, trained(&mut alone).parameters, "as if there were no others");
-        assert_eq!(trained(&mut active).harmonics, trained(&mut alone).harmonics, "as if there were no others");
-        assert!(trained(&mut alone).harmonics.values.iter().any(|&value| value != 0.0), "there is something to learn");
+        assert_eq!(
+            trained(&mut active).parameters,
+            trained(&mut alone).parameters,
+            "gradients are those of the active Gaussians alone"
+        );
+        assert_eq!(
+            trained(&mut active).harmonics,
+            trained(&mut alone).harmonics,
+            "gradients are those of the active Gaussians alone"
+        );
+        assert!(trained(&mut alone).harmonics.values.iter().any(|&value| value != 0.0), "some coefficient is trained");
         let parameters = &trained(&mut found).parameters;
         let still = (0..COUNT)
             .filter(|index| index % divisor as usize != 0)
             .all(|index| parameters.mean[index] == [0.0; 3] && parameters.opacity_logit[index] == 0.0);
-        assert!(still, "at time {time} the others have no gradient");
+        assert!(still, "at time {time} inactive Gaussians have no gradient");
     }
 }
 
 #[test]
-fn a_filter_of_what_views_see_follows_the_gaussians_and_support_comes_last() {
+fn filters_by_views_follow_the_gaussians_and_support_is_computed_after_training() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let mut run = |kind, refresh_filter| {
         let settings = FineTuneSettings { steps: 6, evaluate_every: 3, refresh_filter, ..FineTuneSettings::default() };
         let scene = lesson.disturbed(Some(filter(kind)));
         let tuned = fine_tune(&mut headless, scene, &lesson.images, &settings, None, &mut NoProgress);
-        let filter = tuned.expect("it can be trained").scene.filter.expect("it had one");
-        assert_eq!((filter.kind, filter.segments, filter.count), (kind, 2, COUNT), "of the same kind");
+        let filter = tuned.expect("it can be trained").scene.filter.expect("the filter is kept");
+        assert_eq!(
+            (filter.kind, filter.segments, filter.count),
+            (kind, 2, COUNT),
+            "kind, segments and count of the filter are kept"
+        );
         filter
     };
-    assert_eq!(run(FilterKind::KeyFrame, 100), filter(FilterKind::KeyFrame), "not computed again");
+    assert_eq!(
+        run(FilterKind::KeyFrame, 100),
+        filter(FilterKind::KeyFrame),
+        "the filter is not computed again after few steps"
+    );
     let seen = run(FilterKind::KeyFrame, 2);
-    assert!(seen.active_share() > filter(FilterKind::KeyFrame).active_share(), "most Gaussians are seen");
-    assert_ne!(run(FilterKind::Support, 100), filter(FilterKind::Support), "the lifespans that were trained");
+    assert!(
+        seen.active_share() > filter(FilterKind::KeyFrame).active_share(),
+        "the recomputed filter has more active Gaussians"
+    );
+    assert_ne!(run(FilterKind::Support, 100), filter(FilterKind::Support), "the filter follows the trained lifespans");
 }
 
 /// Interrupts a task at one of its steps.
@@ -163,7 +182,7 @@ fn colors_of_one_coefficient_are_compressed_without_codebooks() {
     let settings = FineTuneSettings { steps: 2, compress: Some((Quality::Balanced, 4)), ..FineTuneSettings::default() };
     let tuned = fine_tune(&mut headless, scene, &lesson.images, &settings, None, &mut NoProgress);
     let colors = tuned.expect("it can be compressed").scene.form.color_degrees();
-    assert_eq!(colors.coefficients, 1, "nothing is added");
+    assert_eq!(colors.coefficients, 1, "the number of coefficients is unchanged");
 }
 
 #[test]
@@ -175,7 +194,7 @@ fn an_interrupted_and_resumed_run_ends_as_an_uninterrupted_one() {
         evaluate_every: 2,
         rates: Rates { mean: 2e-3, color: 1e-2, ..Rates::OURS },
         refresh_filter: 3,
-        // Geometry is rounded before the first of these steps and after 50.
+        // Geometry is rounded before the first step and after step 50.
         compress: Some((Quality::Balanced, 56)),
         rounding: true,
         ..FineTuneSettings::default()
@@ -195,15 +214,19 @@ fn an_interrupted_and_resumed_run_ends_as_an_uninterrupted_one() {
             other => panic!("{task}: an interrupted run is an error with the best result so far: {other:?}"),
         };
         let made = whole.curve.iter().take(stopped.curve.len());
-        assert!(made.eq(&stopped.curve), "{task}: the interruption is no evaluation: {:?}", stopped.curve);
+        assert!(made.eq(&stopped.curve), "{task}: the interruption adds no evaluation: {:?}", stopped.curve);
         let resumed = run(&mut headless, &store, &mut NoProgress).expect("it can be trained");
         assert!(resumed.scene == whole.scene, "{task}: the resumed run ends at the same scene");
-        assert_eq!((resumed.best, &resumed.curve), (whole.best, &whole.curve), "{task}: and the same curve");
+        assert_eq!(
+            (resumed.best, &resumed.curve),
+            (whole.best, &whole.curve),
+            "{task}: the resumed run has the same curve"
+        );
     }
 }
 
 #[test]
-fn the_last_steps_see_rounded_geometry_if_they_should() {
+fn the_last_steps_are_trained_on_rounded_geometry_if_requested() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let mut run = |rounding: bool, steps: usize| {
@@ -212,8 +235,8 @@ fn the_last_steps_see_rounded_geometry_if_they_should() {
         let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.images, &settings, None, &mut NoProgress);
         tuned.expect("it can be trained").scene
     };
-    assert!(run(true, 5) != run(false, 5), "steps on rounded geometry lead elsewhere");
-    assert!(run(true, 0) == run(false, 0), "without these steps there is nothing to round for");
+    assert!(run(true, 5) != run(false, 5), "steps on rounded geometry end at another scene");
+    assert!(run(true, 0) == run(false, 0), "without these steps geometry is not rounded");
 }
 
 #[test]
@@ -241,7 +264,7 @@ fn captures_of_every_model_and_with_an_environment_map_are_trained() {
         scene.environment = environment;
         let lesson = Lesson::of(scene);
         let settings = FineTuneSettings { steps: 20, evaluate_every: 20, ..FineTuneSettings::default() };
-        // Whether it learns at all is measured on the views that it learns from.
+        // The gain is measured on the views of training.
         let (views, trained_with) = (lesson.views.clone(), &lesson.scene.trained_with);
         let images = TrainingImages::load(views, &lesson.views, trained_with, &mut NoProgress);
         let images = images.expect("the images were just written");
@@ -249,8 +272,8 @@ fn captures_of_every_model_and_with_an_environment_map_are_trained() {
         let tuned = tuned.unwrap_or_else(|error| panic!("{name}: {error}"));
         let [first, .., _] = tuned.curve[..] else { panic!("{name}: a curve") };
         let (before, after) = (first.psnr.expect("validation views"), tuned.best.psnr.expect("validation views"));
-        assert!(after > before + 0.5, "{name}: {before:.2} to {after:.2} dB");
-        assert_eq!(tuned.scene.environment, lesson.scene.environment, "{name}: the map stays");
+        assert!(after > before + 0.5, "{name}: training raises the PSNR by 0.5 dB: {before:.2} to {after:.2} dB");
+        assert_eq!(tuned.scene.environment, lesson.scene.environment, "{name}: the environment map is unchanged");
     }
 }
 
@@ -276,7 +299,7 @@ fn validation_views_that_are_reproduced_exactly_do_not_keep_the_first_step() {
     let images = images.expect("the images were just written");
     let tuned = fine_tune(&mut headless, lesson.disturbed(None), &images, &settings, None, &mut NoProgress);
     let tuned = tuned.expect("it can be trained");
-    assert_eq!(tuned.validation, 24, "twelve views of the scene and twelve black ones");
+    assert_eq!(tuned.validation, 24, "twelve views of the scene and twelve black views");
     let finite = |psnr: Option<f64>| psnr.is_some_and(f64::is_finite);
     assert!(tuned.curve.iter().all(|point| finite(point.psnr)), "every PSNR is finite: {:?}", tuned.curve);
     assert_eq!(tuned.best.step, 20, "training helps, and the last step is kept: {:?}", tuned.curve);
