@@ -1,4 +1,4 @@
-//! `gs4d finetune`, run as a user runs it on a scene's own pictures.
+//! `gs4d finetune`, run as a user runs it, on pictures of the scene itself.
 //!
 //! In: a small synthetic scene, a dataset drawn from it, the scene pruned. Out: proof that training raises quality, that the result can be
 //! compressed in the same run, and that wrong inputs are refused and leave no files. Skipped where there is no GPU.
@@ -85,7 +85,7 @@ fn atomic_sums_train_or_are_refused_with_a_remedy() {
     let run = gs4d(&[command.to_vec(), arguments!["--sums", "atomic"].to_vec()].concat());
     if run.code == Some(0) {
         let info = gs4d(&arguments!["info", &out, "--json"]).json();
-        assert_eq!(info["gaussians"].as_u64(), Some(500), "it is trained: {info}");
+        assert_eq!(info["gaussians"].as_u64(), Some(500), "training writes all Gaussians: {info}");
     } else {
         run.must_fail("--sums deterministic");
         assert_eq!(lesson.left(), before, "no file is left");
