@@ -219,7 +219,7 @@ mod tests {
     use std::fs;
 
     fn failure(files: Files) -> String {
-        files.check().expect_err("it must be refused").to_string()
+        files.check().expect_err("the outputs must be refused").to_string()
     }
 
     #[test]
@@ -279,9 +279,9 @@ mod tests {
         let new = path("deep/frames");
         Files::default().writes_folder(&new, [new.join("0.png")]).check().expect("the folder can be made");
         assert!(!path("deep").exists(), "the check makes no folder");
-        let mut permissions = path("file.gs4d").metadata().expect("it is there").permissions();
+        let mut permissions = path("file.gs4d").metadata().expect("the file exists").permissions();
         permissions.set_readonly(true);
-        fs::set_permissions(path("file.gs4d"), permissions).expect("it is ours");
+        fs::set_permissions(path("file.gs4d"), permissions).expect("permissions can be set");
         let message = failure(Files::default().writes(&path("file.gs4d"), "gs4d"));
         assert!(message.contains("write-protected"), "a write-protected file is refused: {message}");
     }

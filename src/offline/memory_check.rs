@@ -77,7 +77,7 @@ mod tests {
         for part in ["16384x16384", "12.9 GB", "8.2 GB"] {
             assert!(message.contains(part), "{part}: {message}");
         }
-        require_of(UVec2::splat(4096), ON_CPU, || there).expect("it fits");
+        require_of(UVec2::splat(4096), ON_CPU, || there).expect("the picture fits");
         require_of(UVec2::splat(400), ON_CPU, || Some(0)).expect("small pictures are not checked");
         require_of(large, ON_CPU, || None).expect("any picture passes if the available memory is unknown");
         assert_eq!(available("MemTotal: 1 kB\n"), None, "a list without available memory");

@@ -159,12 +159,13 @@ mod tests {
         let path = folder.path().join("scene.gs4d");
         let scene = synthesize(&SynthSettings { count: 40, ..SynthSettings::default() });
         let runtime = scene.into_runtime().expect("a synthetic scene can be drawn");
-        let (mut packed, _) = compress(runtime, &CompressSettings::from(Quality::Small)).expect("it is compressed");
+        let (mut packed, _) = compress(runtime, &CompressSettings::from(Quality::Small)).expect("compression succeeds");
         save(&path, &packed, &WriteSettings::default()).expect("a package that can be read");
         let before = fs::read(&path).expect("the package is there");
-        let SceneForm::Ready(Form::Packed(records)) = &mut packed.form else { panic!("it is packed") };
+        let SceneForm::Ready(Form::Packed(records)) = &mut packed.form else { panic!("the scene is packed") };
         records.ranges[0][0] = f32::INFINITY;
-        let message = save(&path, &packed, &WriteSettings::default()).expect_err("it cannot be read").to_string();
+        let message =
+            save(&path, &packed, &WriteSettings::default()).expect_err("the package cannot be read").to_string();
         assert!(message.contains("scene.gs4d") && message.contains("not finite"), "path and reason: {message}");
         assert_eq!(fs::read(&path).expect("still there"), before, "the old package is unchanged");
         assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 1, "no temporary file is left");
@@ -177,7 +178,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let [file, link, ahead, later] = ["file", "link", "ahead", "later"].map(|name| folder.path().join(name));
         fs::write(&file, b"first").expect("the folder can be written to");
-        fs::set_permissions(&file, fs::Permissions::from_mode(0o640)).expect("it is ours");
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o640)).expect("permissions can be set");
         symlink("file", &link).expect("the folder can be written to");
         symlink(&later, &ahead).expect("the folder can be written to");
         for path in [&link, &ahead] {
@@ -185,9 +186,9 @@ mod tests {
             assert!(path.is_symlink(), "{} is still a link", path.display());
         }
         for path in [&file, &later] {
-            assert_eq!(fs::read(path).expect("it is there"), b"second", "{} was written", path.display());
+            assert_eq!(fs::read(path).expect("the file exists"), b"second", "{} was written", path.display());
         }
-        let mode = file.metadata().expect("it is there").permissions().mode() & 0o777;
+        let mode = file.metadata().expect("the file exists").permissions().mode() & 0o777;
         assert_eq!(mode, 0o640, "the permissions are those of the replaced file");
     }
 }

@@ -235,7 +235,8 @@ fn errors_name_only_options_of_the_verb() {
     let frame = json!({ "file_path": "nothing", "time": 0, "transform_matrix": Mat4::IDENTITY.to_cols_array_2d() });
     for split in ["train", "test"] {
         let cameras = json!({ "camera_angle_x": 0.7, "frames": [frame] });
-        fs::write(data.join(format!("transforms_{split}.json")), cameras.to_string()).expect("it can be written to");
+        fs::write(data.join(format!("transforms_{split}.json")), cameras.to_string())
+            .expect("the folder can be written to");
     }
     let eval = gs4d(&arguments!["eval", &scene, "--data", &data]);
     eval.must_fail("the picture size is unknown");

@@ -111,7 +111,7 @@ fn invalid_inputs_of_training_are_refused_and_leave_no_files() {
     gs4d(&weighted).must_fail("--rigid-weight");
     // The images of another scene.
     let other = synthesize(&SynthSettings { count: 1000, seed: 9, ..SynthSettings::default() });
-    let mut other = other.into_runtime().expect("it can be drawn");
+    let mut other = other.into_runtime().expect("the scene can be drawn");
     other.trained_with.background = [0.9, 0.8, 0.1];
     let elsewhere = lesson.path("elsewhere");
     dataset::write(&elsewhere, &other, Vec3::new(0.0, 0.0, 40.0), 4, 4, UVec2::splat(48), true);

@@ -69,12 +69,12 @@ impl Setup {
     /// Returns the smallest count whose PSNR is at most `loss` dB below that of the whole scene, and the PSNR of the whole scene.
     fn choose(&self, evaluator: &Evaluator, loss: f64) -> (usize, f64) {
         let engine = &mut Engine::Cpu;
-        let baseline = evaluator.psnr(engine, &self.runtime).expect("it can be drawn");
+        let baseline = evaluator.psnr(engine, &self.runtime).expect("the scene can be drawn");
         let psnr = |count| {
             let psnr = evaluator.psnr_of_highest(&mut Engine::Cpu, &self.scene, &self.scores, count);
             psnr.map_err(|error| error.to_string())
         };
-        let (count, trials) = smallest_count(COUNT, 1, baseline - loss, psnr).expect("it can be drawn");
+        let (count, trials) = smallest_count(COUNT, 1, baseline - loss, psnr).expect("the scene can be drawn");
         assert!(baseline.is_finite() && trials.iter().all(|trial| trial.psnr.is_finite()), "{baseline}: {trials:?}");
         (count, baseline)
     }
@@ -89,7 +89,7 @@ fn views_that_are_reproduced_exactly_do_not_change_the_chosen_number() {
         let trained = &setup.scene.trained_with;
         let evaluator = |views: &[TrainingView]| Evaluator::by_images(views, trained, color).expect("images");
         let (seen, empty) = setup.views.split_at(VIEWS);
-        let alone = evaluator(empty).psnr(&mut Engine::Cpu, &setup.runtime).expect("it can be drawn");
+        let alone = evaluator(empty).psnr(&mut Engine::Cpu, &setup.runtime).expect("the scene can be drawn");
         assert_eq!(alone, MAX_PSNR, "the last views are reproduced exactly");
         for loss in [0.1, 1.0, 6.0] {
             let (without, psnr) = setup.choose(&evaluator(seen), loss);
@@ -111,7 +111,7 @@ fn a_scene_that_reproduces_every_view_has_a_finite_psnr() {
     let setup = Setup::new([0.0; 3]);
     let background = Background::Color([0.0; 3]);
     let evaluator = Evaluator::by_scene(&mut Engine::Cpu, &setup.runtime, &setup.views, background);
-    let (count, psnr) = setup.choose(&evaluator.expect("it can be drawn"), 150.0);
+    let (count, psnr) = setup.choose(&evaluator.expect("the scene can be drawn"), 150.0);
     assert_eq!(psnr, MAX_PSNR, "the scene is compared with its own pictures");
     assert!((1..COUNT).contains(&count), "a loss of 150 dB from the cap allows fewer: {count}");
 }

@@ -447,7 +447,7 @@ fn the_memory_limit_counts_a_section_and_the_scene_together() {
     let scene = GaussianScene { form: SceneForm::Ready(Form::Sliced(sliced)), ..scene(&SMALL, 19) };
     let mut file = Vec::new();
     package::write(&mut file, &scene, &WriteSettings { level: 1 }).expect("small sections are within the limit");
-    assert_eq!(read(&file).expect("it can be read").len(), count, "every Gaussian");
+    assert_eq!(read(&file).expect("the package can be read").len(), count, "every Gaussian");
     // One section with all coefficients would need its memory twice.
     let error = refusal(&put(Parts::of(&file), "sh_rest", count, &vec![0; count * 47 * 12]).seal());
     assert!(matches!(error, PackageError::TooLarge { .. }), "{error}");

@@ -18,12 +18,12 @@ fn good() -> RuntimeScene {
 }
 
 fn packed(scene: &mut RuntimeScene) -> &mut PackedScene {
-    let Form::Packed(packed) = &mut scene.form else { panic!("it is packed") };
+    let Form::Packed(packed) = &mut scene.form else { panic!("the scene is packed") };
     packed
 }
 
 fn colors(scene: &mut RuntimeScene) -> &mut CodedColors {
-    let PackedColors::Coded(colors) = &mut packed(scene).colors else { panic!("its colors are coded") };
+    let PackedColors::Coded(colors) = &mut packed(scene).colors else { panic!("the colors are coded") };
     colors
 }
 
@@ -133,8 +133,8 @@ fn lower_degrees_keep_the_other_coefficients() {
             lowered.form.truncate_colors(low, low_t);
             assert_eq!(lowered.check(), Ok(()), "{degree} and {degree_t} to {low} and {low_t}");
             let mut file = Vec::new();
-            package::write(&mut file, &lowered, &WriteSettings { level: 1 }).expect("it can be written");
-            assert!(package::read(Cursor::new(&file)).expect("it can be read") == lowered, "every bit");
+            package::write(&mut file, &lowered, &WriteSettings { level: 1 }).expect("the package can be written");
+            assert!(package::read(Cursor::new(&file)).expect("the package can be read") == lowered, "every bit");
             let mut expected = scene.clone().unpacked();
             expected.form.truncate_colors(low, low_t);
             assert!(

@@ -81,13 +81,14 @@ fn inactive_gaussians_are_not_trained() {
     let lesson = Lesson::new();
     assert_eq!(lesson.images.len(), 12, "the views of three of four cameras");
     let mut gradients = |scene: GaussianScene, view: &TrainingView| {
-        let mut trainer = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("it can be trained");
-        let image = trainer.upload(&view.load_covered().expect("it was just written")).expect("it fits");
+        let mut trainer = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("the scene can be trained");
+        let image =
+            trainer.upload(&view.load_covered().expect("the image was just written")).expect("the image fits the GPU");
         let view = view.camera.view(view.time, lesson.scene.trained_with.raster_fov);
         let background = Background::Color([0.3; 3]);
         let sample = Sample { view: &view, image: &image, background, number: 0 };
-        trainer.accumulate(&[sample], 0.2).expect("it is drawn");
-        trainer.gradients().expect("they can be read")
+        trainer.accumulate(&[sample], 0.2).expect("the view is drawn");
+        trainer.gradients().expect("gradients can be read")
     };
     for (time, divisor) in [(0.0, 2), (1.0, 3)] {
         let view = lesson.views.iter().find(|view| view.time == time).expect("both ends have views");
@@ -122,7 +123,7 @@ fn filters_by_views_follow_the_gaussians_and_support_is_computed_after_training(
         let settings = FineTuneSettings { steps: 6, evaluate_every: 3, refresh_filter, ..FineTuneSettings::default() };
         let scene = lesson.disturbed(Some(filter(kind)));
         let tuned = fine_tune(&mut headless, scene, &lesson.images, &settings, None, &mut NoProgress);
-        let filter = tuned.expect("it can be trained").scene.filter.expect("the filter is kept");
+        let filter = tuned.expect("the scene can be trained").scene.filter.expect("the filter is kept");
         assert_eq!(
             (filter.kind, filter.segments, filter.count),
             (kind, 2, COUNT),
@@ -181,7 +182,7 @@ fn colors_of_one_coefficient_are_compressed_without_codebooks() {
     scene.form.truncate_colors(0, 0);
     let settings = FineTuneSettings { steps: 2, compress: Some((Quality::Balanced, 4)), ..FineTuneSettings::default() };
     let tuned = fine_tune(&mut headless, scene, &lesson.images, &settings, None, &mut NoProgress);
-    let colors = tuned.expect("it can be compressed").scene.form.color_degrees();
+    let colors = tuned.expect("the scene can be compressed").scene.form.color_degrees();
     assert_eq!(colors.coefficients, 1, "the number of coefficients is unchanged");
 }
 
@@ -204,7 +205,7 @@ fn an_interrupted_and_resumed_run_ends_as_an_uninterrupted_one() {
         let scene = lesson.disturbed(Some(filter(FilterKind::KeyFrame)));
         fine_tune(headless, scene, &lesson.images, &settings, Some(resume), progress).map_err(Box::new)
     };
-    let whole = run(&mut headless, &lesson.store("whole"), &mut NoProgress).expect("it can be trained");
+    let whole = run(&mut headless, &lesson.store("whole"), &mut NoProgress).expect("the scene can be trained");
     for (task, left) in [("fine-tuning", 3), ("fine-tuning", 4), ("training codebooks", 2), ("training codebooks", 53)]
     {
         let store = lesson.store(&format!("{task} {left}"));
@@ -215,7 +216,7 @@ fn an_interrupted_and_resumed_run_ends_as_an_uninterrupted_one() {
         };
         let made = whole.curve.iter().take(stopped.curve.len());
         assert!(made.eq(&stopped.curve), "{task}: the interruption adds no evaluation: {:?}", stopped.curve);
-        let resumed = run(&mut headless, &store, &mut NoProgress).expect("it can be trained");
+        let resumed = run(&mut headless, &store, &mut NoProgress).expect("the scene can be trained");
         assert!(resumed.scene == whole.scene, "{task}: the resumed run ends at the same scene");
         assert_eq!(
             (resumed.best, &resumed.curve),
@@ -233,7 +234,7 @@ fn the_last_steps_are_trained_on_rounded_geometry_if_requested() {
         let compress = Some((Quality::Small, steps));
         let settings = FineTuneSettings { steps: 0, compress, rounding, ..FineTuneSettings::default() };
         let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.images, &settings, None, &mut NoProgress);
-        tuned.expect("it can be trained").scene
+        tuned.expect("the scene can be trained").scene
     };
     assert!(run(true, 5) != run(false, 5), "steps on rounded geometry end at another scene");
     assert!(run(true, 0) == run(false, 0), "without these steps geometry is not rounded");
@@ -298,7 +299,7 @@ fn validation_views_that_are_reproduced_exactly_do_not_keep_the_first_step() {
     let images = TrainingImages::load(views, &validation, trained_with, &mut NoProgress);
     let images = images.expect("the images were just written");
     let tuned = fine_tune(&mut headless, lesson.disturbed(None), &images, &settings, None, &mut NoProgress);
-    let tuned = tuned.expect("it can be trained");
+    let tuned = tuned.expect("the scene can be trained");
     assert_eq!(tuned.validation, 24, "twelve views of the scene and twelve black views");
     let finite = |psnr: Option<f64>| psnr.is_some_and(f64::is_finite);
     assert!(tuned.curve.iter().all(|point| finite(point.psnr)), "every PSNR is finite: {:?}", tuned.curve);
@@ -312,6 +313,6 @@ fn training_ends_early_when_it_no_longer_helps() {
     let rates = Rates { color: 0.0, harmonics: 0.0, opacity: 0.0, scale: 0.0, rotation: 0.0, mean: 0.0, mean_t: 0.0 };
     let settings = FineTuneSettings { steps: 50, evaluate_every: 1, patience: Some(3), rates, ..Default::default() };
     let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.images, &settings, None, &mut NoProgress);
-    let tuned = tuned.expect("it can be trained");
+    let tuned = tuned.expect("the scene can be trained");
     assert_eq!((tuned.curve.len(), tuned.best.step), (4, 0), "three evaluations without an improvement");
 }
