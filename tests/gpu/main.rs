@@ -5,12 +5,15 @@
 
 mod appearance;
 mod bake;
+mod crowds;
+mod designs;
 mod detail;
 mod fast;
 mod filter;
 mod fine_tune;
 mod fine_tune_run;
 mod golden;
+mod hidden;
 mod layout;
 #[cfg(target_os = "linux")]
 mod memory;
@@ -20,6 +23,8 @@ mod passes;
 mod render;
 mod score;
 mod shaders;
+mod thin;
+mod uniformity;
 
 #[path = "../support"]
 mod support {
@@ -34,6 +39,8 @@ mod support {
     pub mod own_process;
     pub mod packed_scene;
     pub mod passes;
+    pub mod random;
     pub mod skip;
     pub mod surfaces;
+    pub mod thin;
 }
