@@ -145,6 +145,15 @@
     not(all(feature = "cli", feature = "inspector", feature = "testing")),
     expect(rustdoc::broken_intra_doc_links, reason = "this page describes modules that are not part of this build")
 )]
+#![cfg_attr(
+    all(feature = "renderer", not(feature = "cli")),
+    expect(
+        dead_code,
+        unused_imports,
+        reason = "the renderer and the offline half have private items that only the command, or only the offline half, uses"
+    )
+)]
+#![cfg_attr(all(feature = "cli", feature = "viewer"), warn(unreachable_pub))]
 
 #[cfg(feature = "cli")]
 pub mod cli;
