@@ -1,6 +1,6 @@
-//! What every score, prune ratio and temporal filter costs, without any training.
+//! The loss of quality by every score, prune ratio and temporal filter, without training.
 //!
-//! In: a scene, its training views, the views to measure on. Out: one row for the whole scene, one for each filter, one
+//! In: a scene, its training views, the views to measure on. Out: one row for the whole scene, for each filter and
 //! for each score at each ratio ([`AblationRow`]).
 
 use super::dataset::TrainingView;
@@ -18,14 +18,14 @@ use crate::scene::{FilterKind, GaussianScene, RuntimeScene, TemporalFilter};
 use crate::view::Background;
 use serde::Serialize;
 
-/// Settings of an ablation. Every row is measured on its own: filters on the whole scene, ratios without a filter.
+/// Settings of an ablation. Filters are measured on the whole scene, ratios without a filter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AblationSettings {
     /// Kinds of temporal filter.
     pub filters: Vec<FilterKind>,
     /// Numbers of key-frames, each tried with every kind of filter.
     pub key_frames: Vec<u32>,
-    /// Shares of the Gaussians to remove, 0 to 1.
+    /// Fractions of the Gaussians to remove, 0 to 1.
     pub ratios: Vec<f64>,
     /// Scores to prune by, each tried at every ratio.
     pub scores: Vec<ScoreChoice>,
@@ -36,14 +36,14 @@ pub struct AblationSettings {
 /// One row of the table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AblationRow {
-    /// What was tried, in words.
+    /// Description of the filter, or of the score and ratio.
     pub row: String,
     /// The metrics over the measured views.
     #[serde(flatten)]
     pub metrics: MeanMetrics,
     /// Number of Gaussians.
     pub gaussians: usize,
-    /// Share of them that the filter leaves active, mean over its segments; `None` without a filter.
+    /// Fraction of the Gaussians that the filter leaves active, mean over its segments; `None` without a filter.
     pub active_share: Option<f64>,
 }
 
@@ -51,7 +51,8 @@ pub struct AblationRow {
 /// Begins the tasks "filters" and "pruned".
 ///
 /// # Errors
-/// Pictures that do not fit the memory or the GPU, images that cannot be read, training views that show nothing of the scene, a failure of the engine.
+/// Pictures that do not fit the memory or the GPU, images that cannot be read, training views in which no Gaussian of the scene is visible,
+/// a failure of the engine.
 pub fn ablate(
     engine: &mut Engine,
     mut subject: Subject,
@@ -89,7 +90,7 @@ pub fn ablate(
     Ok(table.rows)
 }
 
-/// Returns the scores that the choices stand for, each once.
+/// Returns the scores of the choices, each once.
 fn variants(choices: &[ScoreChoice], has_volume: bool) -> Vec<Variant> {
     let mut variants: Vec<Variant> = Vec::new();
     for choice in choices {
@@ -102,7 +103,7 @@ fn variants(choices: &[ScoreChoice], has_volume: bool) -> Vec<Variant> {
     variants
 }
 
-/// The rows so far, and what they are measured with.
+/// The rows so far, and the engine and views they are measured with.
 struct Table<'a> {
     engine: &'a mut Engine,
     measured: &'a [TrainingView],
@@ -123,7 +124,7 @@ impl Table<'_> {
             for (variant, scores) in scores {
                 progress.advance();
                 let kept = highest(scores, kept_count(scene.len(), ratio));
-                // Rounded to tenths of a percent, which are shown unless they are 0.
+                // Rounded to tenths of a percent; a digit 0 is not shown.
                 let percent = (ratio * 1000.0).round() / 10.0;
                 let pruned = select(scene, &kept).into_runtime()?;
                 self.measure(format!("prune {percent}% {variant}"), &pruned, progress)?;
@@ -152,7 +153,7 @@ mod tests {
     fn every_score_is_tried_once() {
         let choices = [ScoreChoice::One(Variant::Energy), ScoreChoice::Auto, ScoreChoice::All];
         let all = variants(&choices, true);
-        assert_eq!(all[..3], [Variant::Energy, Variant::Full, Variant::Removal], "as they are asked for");
-        assert_eq!(all.len(), Variant::ALL.len(), "none twice");
+        assert_eq!(all[..3], [Variant::Energy, Variant::Full, Variant::Removal], "scores in the order of the choices");
+        assert_eq!(all.len(), Variant::ALL.len(), "every score is tried once");
     }
 }

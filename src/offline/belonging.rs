@@ -1,7 +1,7 @@
 //! The check that the images of a dataset show a capture.
 //!
-//! In: a scene as it was read, before Gaussians are removed, and its training views. Out: an error if pictures of the scene are no closer to
-//! their own images than to the images of other views, or no closer than empty pictures.
+//! In: a scene as it was read, before Gaussians are removed, and its training views. Out: an error if pictures of the scene are no closer
+//! to their own images than to the images of other views, or no closer than empty pictures.
 
 use super::OfflineError;
 use super::dataset::TrainingView;
@@ -40,9 +40,9 @@ impl Match {
     }
 }
 
-/// Checks that the images of the views show a scene. Some views are drawn. Their pictures must be closer to their own images than to the images
-/// of other views. If the PSNR of the pictures is at least 20 dB, it is sufficient that they are closer than empty pictures. Views whose
-/// image does not exist are left out. There is no error without two views of the same size, because there is nothing to compare with.
+/// Checks that the images of the views show a scene. Some views are drawn. Their pictures must be closer to their own images than to the
+/// images of other views. If the PSNR of the pictures is at least 20 dB, it is sufficient that they are closer than empty pictures. Views
+/// whose image does not exist are left out. There is no error without two views of the same size, because there is nothing to compare with.
 ///
 /// # Errors
 /// Images that cannot be read, do not fit the memory or show something else, a failure of the engine.

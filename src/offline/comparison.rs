@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// Two pictures to compare.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pair {
-    /// Their name: the file stem in folders, else that of the first file with its extension.
+    /// Name of the pair: the file stem in folders, else the name of the first file with its extension.
     pub name: String,
     /// The first picture.
     pub a: PathBuf,
@@ -102,7 +102,7 @@ impl Pair {
     /// pictures are clamped to 0..1.
     ///
     /// # Errors
-    /// A picture that cannot be read, a raw one without `raw_size`, pictures of different sizes.
+    /// A picture that cannot be read, a raw picture without `raw_size`, pictures of different sizes.
     pub fn compare(&self, raw_size: Option<UVec2>) -> Result<ImageMetrics, OfflineError> {
         let (mut left, mut right) = (load(&self.a, raw_size)?, load(&self.b, raw_size)?);
         if !(is_raw(&self.a) && is_raw(&self.b)) {

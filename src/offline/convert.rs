@@ -1,4 +1,4 @@
-//! The form and the colors that a scene is stored with.
+//! Conversion of a scene to another form or to lower color degrees.
 //!
 //! In: a scene, a target form, color degrees. Out: the scene in that form, with those degrees.
 
@@ -19,7 +19,7 @@ impl TargetForm {
     pub const NAMES: [(&'static str, Self); 2] = [("trained", Self::Trained), ("runtime", Self::Runtime)];
 }
 
-/// What to change in a scene; `None` keeps what it has. Default: all `None`.
+/// Changes of a scene; `None` keeps the form or the degree. Default: all `None`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ConvertSettings {
     /// Target form.
@@ -30,10 +30,11 @@ pub struct ConvertSettings {
     pub sh_degree_t: Option<u32>,
 }
 
-/// Converts a scene to the form and the color degrees of the settings. Levels of detail are dropped: they are of the scene as it was.
+/// Converts a scene to the form and the color degrees of the settings. Levels of detail are dropped, since they were made from the
+/// unconverted scene.
 ///
 /// # Errors
-/// [`OfflineError::NotTrained`] if a scene in the runtime or the packed form is to become the trained form; a Gaussian
+/// [`OfflineError::NotTrained`] if a scene in the runtime or the packed form is converted to the trained form; a Gaussian
 /// that cannot be sliced.
 pub fn convert(mut scene: GaussianScene, settings: &ConvertSettings) -> Result<GaussianScene, OfflineError> {
     scene.levels.clear();

@@ -1,7 +1,7 @@
 //! Scoring and drawing on the GPU or, without a hardware GPU, by the CPU reference.
 //!
 //! In: [`EngineSettings`]. Out: an [`Engine`], which prepares a scene for scoring ([`ScoreEngine`]) or drawing
-//! ([`Draw`]), once for many views. Nothing else chooses between GPU and CPU.
+//! ([`Draw`]), once for many views. This is the only place that chooses between GPU and CPU.
 
 use super::score::{CpuEngine, GpuEngine, ScoreEngine};
 use super::{OfflineError, memory_check};
@@ -12,7 +12,7 @@ use crate::view::{Background, Picture, View};
 use serde::Serialize;
 use std::fmt;
 
-/// Where to compute. Default: [`EngineChoice::Auto`].
+/// The choice between GPU and CPU. Default: [`EngineChoice::Auto`].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum EngineChoice {
     /// On the GPU if an adapter is named; else on the fastest adapter if it is a hardware GPU that can run the passes,
@@ -33,7 +33,7 @@ impl EngineChoice {
 /// Which GPU to use, and with which checks.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct GpuSettings {
-    /// Part of the adapter's name in any case, or its index. Default: `None`, the fastest one.
+    /// Part of the name of the adapter, upper or lower case, or its index. Default: `None`, the fastest adapter.
     pub adapter: Option<String>,
     /// Whether the shaders that draw check their array indices. Default: [`ShaderChecks::Off`].
     pub checks: ShaderChecks,
@@ -60,7 +60,7 @@ impl GpuSettings {
 /// Which engine to open.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct EngineSettings {
-    /// Where to compute. Default: [`EngineChoice::Auto`].
+    /// The choice between GPU and CPU. Default: [`EngineChoice::Auto`].
     pub choice: EngineChoice,
     /// Settings of the GPU, if it is used.
     pub gpu: GpuSettings,
@@ -99,7 +99,7 @@ impl Engine {
         }
     }
 
-    /// Returns a description for people: the CPU and its threads, or the adapter.
+    /// Returns a readable description: the CPU and its threads, or the adapter.
     pub fn name(&self) -> String {
         match self {
             Self::Cpu => format!("CPU, {} threads", rayon::current_num_threads()),
@@ -192,11 +192,11 @@ impl Draw for GpuDrawing<'_> {
 pub struct AdapterDescription {
     /// Name of the adapter.
     pub name: String,
-    /// The API it is used through.
+    /// The graphics API.
     pub backend: String,
     /// Name of the driver.
     pub driver: String,
-    /// What else the driver reports, such as its version.
+    /// Further information from the driver, such as its version.
     pub driver_info: String,
 }
 

@@ -17,7 +17,7 @@ use glam::UVec2;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-/// The message of work that has ended because the user asked for it.
+/// The message of work that the user has interrupted.
 pub(super) const INTERRUPTED: &str = "interrupted";
 
 /// An error of the offline half.
@@ -55,7 +55,7 @@ pub enum OfflineError {
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault of the file.
         #[source]
         reason: Box<dyn Error + Send + Sync>,
     },
@@ -67,13 +67,13 @@ pub enum OfflineError {
     Memory {
         /// Number of pictures held at once.
         count: u64,
-        /// Width and height of the largest, pixels.
+        /// Width and height of the largest picture, pixels.
         size: UVec2,
         /// Bytes needed.
         needed: u64,
-        /// Bytes that the system can give.
+        /// Bytes available.
         available: u64,
-        /// What makes pictures smaller or fewer.
+        /// The option that makes pictures smaller or fewer.
         remedy: &'static str,
     },
     /// Pictures are too large for the GPU.
@@ -81,7 +81,7 @@ pub enum OfflineError {
     Limit {
         /// The limit.
         reason: GpuError,
-        /// What makes pictures smaller or fewer.
+        /// The option that makes pictures smaller or fewer.
         remedy: &'static str,
     },
     /// Two folders have no two pictures of the same name.
@@ -98,10 +98,10 @@ pub enum OfflineError {
          given): give --validation cameras or times, add transforms_val.json, or name the score and the count"
     )]
     NoValidation {
-        /// What would be chosen.
+        /// The choice that needs validation views.
         what: &'static str,
     },
-    /// The user has asked the work to end. Results that have been stored are kept, and the same work resumes from them.
+    /// The user has interrupted the work. Stored results are kept, and the same work resumes from them.
     #[error("{INTERRUPTED}")]
     Interrupted {
         /// The best result so far, if the work was fine-tuning.
@@ -116,28 +116,28 @@ pub enum OfflineError {
     /// A package cannot be written.
     #[error(transparent)]
     Package(#[from] PackageError),
-    /// There is no score to choose from.
+    /// No score can be computed.
     #[error("there is no score to prune by")]
     NoScore,
-    /// An environment map is seen at every size.
-    #[error(
-        "has an environment map, which surrounds the camera: levels of detail are of captures that can be seen from afar"
-    )]
+    /// Levels of detail of a scene with an environment map, which surrounds the camera at every distance.
+    #[error("has an environment map, which surrounds the camera: levels of detail need a capture without one")]
     Surrounded,
-    /// An orbit needs a scene with Gaussians.
-    #[error("the scene has no Gaussians to go around")]
+    /// An orbit of a scene without Gaussians.
+    #[error("the scene has no Gaussians, so that no orbit of cameras can be placed around it: give --cameras")]
     NothingToOrbit,
     /// Gaussians are so far apart that no camera sees them all.
-    #[error("the Gaussians are too far apart to be looked at from around them: give --cameras, or prune the scene")]
+    #[error("the Gaussians are too far apart for an orbit of cameras around them: give --cameras, or prune the scene")]
     TooFarApart,
-    /// A sliced scene cannot become the trained form.
-    #[error("holds a sliced form, which cannot be turned back: convert the checkpoint with --form trained")]
+    /// A sliced scene cannot be converted to the trained form.
+    #[error(
+        "holds a sliced form, which cannot be converted to the trained form: convert the checkpoint with --form trained"
+    )]
     NotTrained,
     /// The threads that write pictures cannot be started.
     #[error(transparent)]
     Threads(#[from] rayon::ThreadPoolBuildError),
     /// The threads that write pictures panicked.
-    #[error("the threads that write pictures broke down")]
+    #[error("the threads that write pictures panicked: a defect of gs4d, please report it")]
     WritersPanicked,
     /// The results of a stage of a bake cannot be stored.
     #[error(transparent)]

@@ -1,7 +1,7 @@
 //! Evaluating a scene on the views of a dataset.
 //!
 //! In: a scene, views with their images, an [`Engine`]. Out: an [`Evaluation`] over one background; each picture is passed to the
-//! caller; then the same figures over a contrasting background ([`contrast`]).
+//! caller; and the same metrics over a contrasting background ([`contrast`]).
 
 use super::dataset::TrainingView;
 use super::engine::Engine;
@@ -13,8 +13,8 @@ use crate::view::{Background, Picture};
 /// Weights of red, green and blue in the luminance of a background, sRGB-encoded (Rec. 709).
 const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
-/// Draws every view of a scene, with the field of view that it was trained with, and compares it with its image.
-/// Transparent images are composited over the color of `background`, or over that of training if `background` has none.
+/// Draws every view of a scene, with the field of view of training, and compares the picture with the image of the view.
+/// Transparent images are composited over the color of `background`, or over the color of training if `background` has none.
 /// Calls `seen` with the metrics of each view, its image and its picture (not clamped). Begins the task "comparing".
 ///
 /// # Errors
@@ -53,7 +53,7 @@ pub fn evaluate_scene(
 /// or the background is an environment map. Begins the task "comparing" otherwise.
 ///
 /// # Errors
-/// As [`evaluate_scene`].
+/// The errors of [`evaluate_scene`].
 pub fn contrast(
     engine: &mut Engine,
     scene: &RuntimeScene,
@@ -115,6 +115,6 @@ mod tests {
     #[test]
     fn colors_are_named() {
         let names = [[0.0; 3], [1.0; 3], [0.2, 0.5, 1.0]].map(color_name);
-        assert_eq!(names, ["black", "white", "0.2,0.5,1"], "names, else values");
+        assert_eq!(names, ["black", "white", "0.2,0.5,1"], "black and white by name, other colors by value");
     }
 }

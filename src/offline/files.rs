@@ -1,7 +1,7 @@
-//! The files that work reads and those that it writes, checked before anything is computed.
+//! The input and output files of a computation, checked before it begins.
 //!
-//! In: the paths of both. Out: an error that names the first output that is an input, is another output or cannot be written. What killed
-//! runs have left beside the outputs is removed.
+//! In: the paths of both. Out: an error that names the first output that is an input, is another output or cannot be written. Temporary
+//! files that killed runs have left beside the outputs are removed.
 
 use super::dataset::{CameraFile, CameraOptions, Split};
 use super::save::{folder_of, is_stream, resolved};
@@ -12,19 +12,19 @@ use std::fs::{File, Metadata};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// The files that work reads and those that it writes. Default: none.
+/// The input and output files of a computation. Default: none.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Files {
     inputs: Vec<PathBuf>,
     outputs: Vec<Output>,
 }
 
-/// What is written.
+/// One output.
 #[derive(Debug, Clone)]
 enum Output {
     /// A file in a folder that exists. If its name has an extension, it is this one. It may be a device or a pipe.
     File(PathBuf, &'static str),
-    /// The same, but no device or pipe: the file is read again, or others are written beside it.
+    /// A file as above, but not a device or a pipe: it is read again, or other files are written beside it.
     Regular(PathBuf, &'static str),
     /// A folder, which is made if it does not exist.
     Folder(PathBuf),
@@ -32,12 +32,12 @@ enum Output {
     Inside(PathBuf),
 }
 
-/// What a path leads to. All paths of one file have a place in common.
+/// The identity of a file. All paths of one file have a place in common.
 #[derive(Debug, PartialEq, Eq, Hash)]
 enum Place {
-    /// By its number and that of its device: hard links have the same.
+    /// The numbers of the device and of the file on it: equal for all hard links.
     Node(u64, u64),
-    /// By its path without symbolic links, also if there is no file yet.
+    /// The path without symbolic links, also if there is no file yet.
     Path(PathBuf),
 }
 
@@ -54,7 +54,7 @@ impl Files {
         self
     }
 
-    /// Adds a camera file, the existing images that it names, and those of the dataset in the same folder.
+    /// Adds a camera file, the existing images that it names, and the images of the dataset in the same folder.
     pub(crate) fn reads_cameras(mut self, path: &Path) -> Self {
         self.add_cameras(path);
         self.reads_data(folder_of(path))
@@ -70,7 +70,7 @@ impl Files {
 
     fn add_cameras(&mut self, path: &Path) {
         self.inputs.push(path.to_owned());
-        // Of any size: paths do not depend on it. What is wrong with the file is told when it is read.
+        // Any size serves: paths do not depend on it. Faults of the file are reported when it is read.
         let options = CameraOptions { size: Some(UVec2::ONE), ..CameraOptions::default() };
         for view in CameraFile::load(path, &options).unwrap_or_default() {
             // An image that does not exist is no input: the same name may be an output.
@@ -84,7 +84,7 @@ impl Files {
         self
     }
 
-    /// Adds an output that is read again or has others beside it: as [`writes`](Self::writes), but not a device or a pipe.
+    /// Adds an output that is read again or has other files beside it: a file as in [`writes`](Self::writes), but not a device or a pipe.
     pub(crate) fn writes_regular(mut self, path: &Path, extension: &'static str) -> Self {
         self.outputs.push(Output::Regular(path.to_owned(), extension));
         self
@@ -101,7 +101,7 @@ impl Files {
     /// left beside them.
     ///
     /// # Errors
-    /// The first output with which something is wrong, by name.
+    /// The first output that is an input, is another output or cannot be written.
     pub(crate) fn check(&self) -> Result<(), OfflineError> {
         self.tell_apart()?;
         let mut folders = BTreeSet::new();
@@ -148,12 +148,12 @@ impl Output {
         }
     }
 
-    /// Returns whether it is a file on a disk: folders are shared, and so are devices and pipes.
+    /// Returns whether the output is a file on a disk: folders, devices and pipes may be outputs of several runs.
     fn is_file(&self) -> bool {
         !matches!(self, Self::Folder(_)) && !is_stream(self.path())
     }
 
-    /// Checks what exists of it. Returns the folder in which a file will be made; `None` if that is checked with another output, or for a
+    /// Checks what exists at the path. Returns the folder in which a file will be made; `None` if another output checks it, or for a
     /// device or a pipe.
     fn check(&self) -> Result<Option<PathBuf>, OfflineError> {
         match self {
@@ -184,12 +184,12 @@ impl Output {
     }
 }
 
-/// Returns whether there may be a file at a path: there is none where the path leads to nothing.
+/// Returns whether there may be a file at a path: false if the path does not exist, or is a link to a path that does not exist.
 fn may_exist(path: &Path) -> bool {
     path.metadata().map_or_else(|error| error.kind() == ErrorKind::PermissionDenied, |_| true)
 }
 
-/// Checks that a device can be written to. To open a pipe waits until another program reads it.
+/// Checks that a device can be written to. A pipe is not opened: opening waits until another program reads the pipe.
 fn check_stream(path: &Path) -> Result<(), OfflineError> {
     match path.metadata() {
         Ok(metadata) if is_device(&metadata) => {
@@ -212,11 +212,11 @@ fn check_file(path: &Path) -> Result<(), OfflineError> {
     }
 }
 
-/// Checks that a path, of which `error` says why nothing is there, can be made. Its folder is checked in any case.
+/// Checks that a path can be made, given the error of reading its metadata. Its folder is checked in any case.
 fn check_missing(path: &Path, error: io::Error) -> Result<(), OfflineError> {
     match error.kind() {
         ErrorKind::NotFound | ErrorKind::NotADirectory => Ok(()),
-        // Links that lead in a circle, a name that is too long.
+        // A circle of links, a name that is too long.
         _ => Err(OfflineError::at(path, error)),
     }
 }
@@ -226,7 +226,7 @@ fn check_folder(out: &Path, folder: &Path) -> Result<(), OfflineError> {
     let shown = folder.display();
     let message = match folder.metadata() {
         Ok(metadata) if !metadata.is_dir() => format!("{shown} is a file, not a folder: write to another place"),
-        // Without a name, where the system has that: a run that ends here leaves nothing behind.
+        // A file without a name, where the system supports it: a run that is killed here leaves no file.
         Ok(_) => match tempfile::tempfile_in(folder) {
             Ok(_) => return Ok(()),
             Err(error) => format!("nothing can be written to the folder {shown}: {error}"),
@@ -274,7 +274,7 @@ mod tests {
     use std::fs;
 
     fn failure(files: Files) -> String {
-        files.check().expect_err("it must be refused").to_string()
+        files.check().expect_err("the outputs must be refused").to_string()
     }
 
     #[test]
@@ -283,16 +283,22 @@ mod tests {
         let [input, roundabout] = ["in.gs4d", "./in.gs4d"].map(|name| folder.path().join(name));
         fs::write(&input, b"contents").expect("the folder can be written to");
         let files = || Files::default().reads_scene(&input);
-        assert!(failure(files().writes(&roundabout, "gs4d")).contains("the input itself"), "the same path");
+        assert!(failure(files().writes(&roundabout, "gs4d")).contains("the input itself"), "another path of the input");
         let hard = folder.path().join("hard.gs4d");
         fs::hard_link(&input, &hard).expect("the folder can be written to");
         if cfg!(unix) {
             assert!(failure(files().writes(&hard, "gs4d")).contains("the input itself"), "a hard link");
         }
         let beside = folder.path().join("cfg_args");
-        assert!(failure(files().writes(&beside, "f32")).contains("would be read with the input"), "it does not exist");
+        assert!(
+            failure(files().writes(&beside, "f32")).contains("would be read with the input"),
+            "the file does not exist"
+        );
         fs::write(&beside, b"Namespace()").expect("the folder can be written to");
-        assert!(failure(files().writes(&beside, "f32")).contains("the input itself"), "what is read with it");
+        assert!(
+            failure(files().writes(&beside, "f32")).contains("the input itself"),
+            "a file that is read with the input is an input"
+        );
         files().writes(&folder.path().join("out.gs4d"), "gs4d").check().expect("another file");
     }
 
@@ -305,18 +311,18 @@ mod tests {
         fs::create_dir(&real).expect("the folder can be written to");
         symlink("real", &link).expect("the folder can be written to");
         let twice = Files::default().writes(&real.join("new.csv"), "csv").writes(&link.join("new.csv"), "csv");
-        assert!(failure(twice).contains("written twice"), "neither is there yet");
+        assert!(failure(twice).contains("written twice"), "two paths of one file that does not exist yet");
         let (target, ahead) = (folder.path().join("later.gs4d"), folder.path().join("ahead.gs4d"));
         symlink("later.gs4d", &ahead).expect("the folder can be written to");
         let twice = Files::default().writes(&target, "gs4d").writes(&ahead, "gs4d");
-        assert!(failure(twice).contains("written twice"), "a link to what is not there yet");
+        assert!(failure(twice).contains("written twice"), "a link to a file that does not exist yet");
     }
 
     #[cfg(unix)]
     #[test]
     fn devices_are_opened_and_refused_where_a_file_is_needed() {
         let null = Path::new("/dev/null");
-        Files::default().writes(null, "gs4d").check().expect("it can be written to");
+        Files::default().writes(null, "gs4d").check().expect("the device can be written to");
         let message = failure(Files::default().writes_regular(null, "gs4d"));
         assert!(message.starts_with("/dev/null: is a device or a pipe"), "a file is needed: {message}");
     }
@@ -337,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_written_is_named() {
+    fn outputs_that_cannot_be_written_are_named() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = |name: &str| folder.path().join(name);
         fs::write(path("file.gs4d"), b"contents").expect("the folder can be written to");
@@ -356,12 +362,12 @@ mod tests {
         let inside = failure(Files::default().writes_folder(&path("file.gs4d/deep/frames"), []));
         assert!(inside.contains("file.gs4d is a file"), "no folder can be made in a file: {inside}");
         let new = path("deep/frames");
-        Files::default().writes_folder(&new, [new.join("0.png")]).check().expect("it can be made");
-        assert!(!path("deep").exists(), "but is not made yet");
-        let mut permissions = path("file.gs4d").metadata().expect("it is there").permissions();
+        Files::default().writes_folder(&new, [new.join("0.png")]).check().expect("the folder can be made");
+        assert!(!path("deep").exists(), "the check makes no folder");
+        let mut permissions = path("file.gs4d").metadata().expect("the file exists").permissions();
         permissions.set_readonly(true);
-        fs::set_permissions(path("file.gs4d"), permissions).expect("it is ours");
+        fs::set_permissions(path("file.gs4d"), permissions).expect("permissions can be set");
         let message = failure(Files::default().writes(&path("file.gs4d"), "gs4d"));
-        assert!(message.contains("write-protected"), "it is kept: {message}");
+        assert!(message.contains("write-protected"), "a write-protected file is refused: {message}");
     }
 }

@@ -1,7 +1,7 @@
-//! Whether the pictures of a command fit the memory and the GPU, found out before the first of them is loaded or drawn.
+//! The check that the pictures of a command fit the memory and the GPU, before the first picture is loaded or drawn.
 //!
-//! In: the sizes of the pictures that are held at once, and what is done with them ([`Pictures`]). Out: an error with the memory needed, the
-//! memory available, and the option that makes pictures smaller or fewer. Every estimate of memory by pixels is here.
+//! In: the sizes of the pictures that are held at once, and their use ([`Pictures`]). Out: an error with the memory needed,
+//! the memory available, and the option that makes pictures smaller or fewer. Every estimate of memory by pixels is here.
 
 use super::OfflineError;
 use super::dataset::TrainingView;
@@ -16,7 +16,7 @@ use std::fs;
 pub(crate) const BY_RESOLUTION: &str = "--resolution makes pictures smaller, by a divisor or a width";
 /// The remedy for views of a camera file or an orbit.
 pub(crate) const BY_SIZE: &str = "--size makes pictures smaller";
-/// The remedy for pictures that are compared with those of another scene.
+/// The remedy for pictures that are compared with pictures of another scene.
 pub(crate) const BY_SIZE_OR_COUNT: &str = "--size makes pictures smaller, --verify fewer";
 /// The remedy for levels of detail.
 pub(crate) const BY_DIRECTIONS: &str = "--directions and --times make pictures fewer";
@@ -48,23 +48,23 @@ const MS_SSIM: u64 = 8;
 /// Bytes for each pixel while reference, render and difference are put side by side: a clamped copy, the difference, all three.
 const SIDE_BY_SIDE: u64 = PICTURE + PICTURE + 3 * (PICTURE + WRITTEN);
 
-/// Bytes up to which the system is not asked.
+/// Bytes that are assumed to be available without a check.
 const LITTLE: u64 = 1 << 28;
 
 /// The pictures that are in memory at the same time.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Pictures {
-    /// How many are held.
+    /// Number of pictures held.
     count: u64,
-    /// Bytes of those that are held.
+    /// Bytes of all pictures held.
     held: u64,
-    /// Size of the largest that is drawn or loaded, pixels.
+    /// Size of the largest picture that is drawn or loaded, pixels.
     largest: UVec2,
-    /// Bytes for each of its pixels in memory while it is drawn.
+    /// Bytes for each pixel of the largest picture in memory while it is drawn.
     beside: u64,
-    /// Bytes for each of its pixels in memory while it is loaded or compared, and not drawn.
+    /// Bytes for each pixel of the largest picture in memory while it is loaded or compared, and not drawn.
     work: u64,
-    /// Whether a GPU trains on it.
+    /// Whether a GPU trains on the pictures.
     trained: bool,
 }
 
@@ -84,13 +84,13 @@ impl Pictures {
         Self::drawn(largest(sizes(views)), 0)
     }
 
-    /// Returns so many frames of one size that are held, with `bytes` for each pixel.
+    /// Returns `count` frames of one size that are held, with `bytes` for each pixel.
     pub(crate) fn frames(size: UVec2, count: u64, bytes: u64) -> Self {
         let held = pixels(size).saturating_mul(count).saturating_mul(bytes);
         Self { count, held, ..Self::drawn(size, 0) }
     }
 
-    /// Returns pictures of these views that are held, while others are compared with them.
+    /// Returns pictures of these views that are held, while other pictures are compared with them.
     pub(crate) fn originals(views: &[View]) -> Self {
         let sizes = || views.iter().map(|view| view.size);
         // A picture, and both clamped.
@@ -103,7 +103,7 @@ impl Pictures {
         Self { work: (2 * PICTURE).max(loading(held.count)), ..held }
     }
 
-    /// Returns images that are compared with pictures one after the other; `kept` tells whether both are also put side by side.
+    /// Returns images that are compared with pictures one after the other; `kept`: whether both are also put side by side.
     pub(crate) fn evaluated(views: &[TrainingView], metrics: MetricSet, kept: bool) -> Self {
         let measured = [(metrics.flip, FLIP), (metrics.ms_ssim, MS_SSIM), (kept, SIDE_BY_SIDE)];
         let most = measured.iter().filter(|(wanted, _)| *wanted).map(|(_, bytes)| *bytes).max().unwrap_or(0);
@@ -112,14 +112,14 @@ impl Pictures {
         Self { work: beside + 2 * PICTURE + most, ..Self::drawn(largest(sizes(views)), beside) }
     }
 
-    /// Returns images that a GPU trains on, with those that it validates on.
+    /// Returns images that a GPU trains on, with the images that it validates on.
     pub(crate) fn trained(train: &[TrainingView], validation: &[TrainingView]) -> Self {
         let held = Self::held(sizes(train).chain(sizes(validation)), IMAGE);
         // A validation image is compared as a picture.
         Self { beside: PICTURE, work: loading(held.count), trained: true, ..held }
     }
 
-    /// Returns pictures that are held with so many bytes for each of their pixels.
+    /// Returns pictures that are held with `bytes` bytes for each of their pixels.
     fn held(sizes: impl Iterator<Item = UVec2>, bytes: u64) -> Self {
         sizes.fold(Self::default(), |all, size| Self {
             count: all.count + 1,
@@ -129,11 +129,11 @@ impl Pictures {
         })
     }
 
-    /// Checks that there is memory for the pictures, and that the GPU can draw the largest, if a GPU draws; else the CPU does. Where the
-    /// system does not tell how much memory there is, any pictures pass.
+    /// Checks that there is memory for the pictures, and that the GPU can draw the largest, if a GPU draws; else the CPU does. If
+    /// the available memory is unknown, all pictures pass.
     ///
     /// # Errors
-    /// What is needed and what is available, with `remedy`.
+    /// The needed and the available memory, with `remedy`.
     pub(crate) fn require(&self, headless: Option<&Headless>, remedy: &'static str) -> Result<(), OfflineError> {
         let Some(headless) = headless else { return self.require_bytes(ON_CPU, remedy, available) };
         let limited = |reason: GpuError| OfflineError::Limit { reason, remedy };
@@ -155,12 +155,12 @@ impl Pictures {
     /// Checks that there is memory for the pictures while none is drawn.
     ///
     /// # Errors
-    /// As [`require`](Self::require).
+    /// The error of [`require`](Self::require).
     pub(crate) fn require_loaded(&self, remedy: &'static str) -> Result<(), OfflineError> {
         self.require_bytes(0, remedy, available)
     }
 
-    /// Checks that there is memory if drawing needs so many bytes for each pixel.
+    /// Checks that there is memory if drawing needs `drawing` bytes for each pixel.
     fn require_bytes(
         &self,
         drawing: u64,
@@ -202,8 +202,8 @@ fn pixels(size: UVec2) -> u64 {
     size.as_u64vec2().element_product()
 }
 
-/// Returns the bytes that this program can take: those of the system without swapping, or what is left of its address space if that is limited
-/// to less. `None` where the system does not tell.
+/// Returns the bytes available to this program: those of the system without swapping, or the rest of its address space if that is limited
+/// to less; `None` if they are unknown.
 fn available() -> Option<u64> {
     let read = |path: &str| fs::read_to_string(path).unwrap_or_default();
     let system = kilobytes(&read("/proc/meminfo"), "MemAvailable:")?;
@@ -212,7 +212,7 @@ fn available() -> Option<u64> {
     Some(system.min(limit))
 }
 
-/// Returns the number after a name in Linux's lists of memory, bytes.
+/// Returns the number after a name in the lists of memory of Linux, bytes.
 fn kilobytes(list: &str, name: &str) -> Option<u64> {
     let line = list.lines().find_map(|line| line.strip_prefix(name))?;
     let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
@@ -234,8 +234,8 @@ mod tests {
     #[test]
     fn the_memory_of_the_system_is_read() {
         assert_eq!(kilobytes(MEMORY, "MemAvailable:"), Some(8_192_000_000), "kilobytes of 1024 bytes");
-        assert_eq!(kilobytes("MemTotal: 1 kB\n", "MemAvailable:"), None, "a list without it");
-        assert_eq!(kilobytes("MemAvailable: many\n", "MemAvailable:"), None, "not a number");
+        assert_eq!(kilobytes("MemTotal: 1 kB\n", "MemAvailable:"), None, "a list without the name");
+        assert_eq!(kilobytes("MemAvailable: many\n", "MemAvailable:"), None, "a value that is not a number");
         let limits =
             |soft: &str| format!("Limit  Soft Limit  Hard Limit  Units\nMax address space  {soft}  unlimited  bytes\n");
         assert_eq!(address_space(&limits("4096000")), Some(4_096_000), "the soft limit");
@@ -249,11 +249,11 @@ mod tests {
         let message = large.require_bytes(ON_CPU, BY_SIZE, there).expect_err("12.9 of 8.2 GB").to_string();
         let expected = "a picture of 16384x16384 pixels needs 12.9 GB of memory, and 8.2 GB are available: --size makes pictures smaller";
         assert_eq!(message, expected, "size, need, available memory and remedy");
-        Pictures::drawn(UVec2::splat(4096), 0).require_bytes(ON_CPU, BY_SIZE, there).expect("it fits");
+        Pictures::drawn(UVec2::splat(4096), 0).require_bytes(ON_CPU, BY_SIZE, there).expect("the picture fits");
         Pictures::drawn(UVec2::splat(400), 0)
             .require_bytes(ON_CPU, BY_SIZE, || Some(0))
-            .expect("too little to ask for");
-        large.require_bytes(ON_CPU, BY_SIZE, || None).expect("the system does not tell");
+            .expect("small pictures are not checked");
+        large.require_bytes(ON_CPU, BY_SIZE, || None).expect("all pictures pass if the available memory is unknown");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The offline half: from a trained checkpoint and its training views to a small, fast capture, and what it costs.
+//! The offline half: from a trained checkpoint and its training views to a small, fast capture, with the loss of quality.
 //!
 //! In: a `GaussianScene`, the views it was trained on, an [`Engine`](engine::Engine) that scores and draws them on
 //! the GPU or the CPU. Out: a smaller scene, packages, pictures, measurements. Build scripts and editors can call every
@@ -8,22 +8,22 @@
 //! |---|---|
 //! | [`dataset`], `splits` | reads views and divides them into training, validation and test views |
 //! | `belonging` | checks that images show the capture |
-//! | `picture_file` | decodes pictures, for all of the others |
+//! | `picture_file` | decodes pictures for all other modules |
 //! | [`engine`] | opens the GPU or the CPU reference |
 //! | [`score`] | sums what every Gaussian contributes to the training views |
-//! | `prune`, [`prune_by_views`] | keeps the Gaussians that score highest |
+//! | `prune`, [`prune_by_views`] | keeps the Gaussians of the highest scores |
 //! | `search`, `trained_search`, `quality` | finds the best score and the smallest count that a loss allows |
-//! | `temporal_filter` | finds which Gaussians are active when |
-//! | [`fine_tune`](mod@fine_tune) | trains what is left, so that it makes up for what was removed |
+//! | `temporal_filter` | finds the active Gaussians of each segment of time |
+//! | [`fine_tune`](mod@fine_tune) | trains the remaining Gaussians, to compensate for the removed Gaussians |
 //! | [`quantize`], [`convert`] | changes the form that a scene is stored in |
-//! | [`detail`](mod@detail) | makes the same capture of fewer Gaussians, for pictures of few pixels |
-//! | [`bake`](mod@bake), [`report`] | runs all of it in order, resumable, and writes a report |
+//! | [`detail`](mod@detail) | makes the same capture with fewer Gaussians, for pictures of few pixels |
+//! | [`bake`](mod@bake), [`report`] | runs all steps in order, resumable, and writes a report |
 //! | [`metrics`], `evaluation`, `fidelity`, `comparison` | measures how close pictures are |
-//! | [`ablation`] | tabulates what every score, ratio and filter costs |
-//! | `files` | tells inputs from outputs, and what cannot be written, before anything is computed |
+//! | [`ablation`] | tabulates the loss by every score, ratio and filter |
+//! | `files` | refuses outputs that are inputs or cannot be written, before anything is computed |
 //! | `stages`, `store`, `stored` | run stages and keep their results, from which interrupted work resumes |
-//! | `unfinished` | lists what must not be left behind by a process that ends in the middle of its work |
-//! | [`orbit`], `render` | draws a scene from all around, many pictures at a time |
+//! | `unfinished` | lists the files and folders that are removed if a process ends before its work |
+//! | [`orbit`], `render` | draws a scene from all sides, many pictures at a time |
 
 pub mod ablation;
 pub mod bake;

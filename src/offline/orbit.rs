@@ -1,6 +1,6 @@
-//! Cameras around a scene, and shares of such views.
+//! Cameras around a scene, and even subsets of views.
 //!
-//! In: a scene, how many views, the picture size. Out: named cameras at a time each ([`Shot`]).
+//! In: a scene, the number of views, the picture size. Out: named cameras, each with a time ([`Shot`]).
 
 use super::OfflineError;
 use crate::scene::{Bounds, RuntimeScene};
@@ -37,12 +37,12 @@ impl Shot {
 /// whole core in view. Their times are evenly spaced over the time interval, both ends included.
 ///
 /// # Errors
-/// A scene without Gaussians, or with some that are too far apart.
+/// A scene without Gaussians, or with Gaussians that are too far apart.
 pub fn orbit(scene: &RuntimeScene, count: usize, size: UVec2) -> Result<Vec<Shot>, OfflineError> {
     let core = Bounds::core(scene.iter()).ok_or(OfflineError::NothingToOrbit)?;
     let tan_x = (FIELD_OF_VIEW / 2.0).tan();
     let tan = tan_x.min(tan_x * size.y as f32 / size.x as f32);
-    // The sphere about the core touches the sides of the picture; with the near limit to spare.
+    // The sphere around the core touches the sides of the picture; the near limit is added.
     let distance = core.radius().max(0.1) / tan.atan().sin() + 0.2;
     let up = scene.playback.up.vector();
     let side = up.any_orthonormal_vector();
@@ -66,7 +66,7 @@ pub fn orbit(scene: &RuntimeScene, count: usize, size: UVec2) -> Result<Vec<Shot
     }
 }
 
-/// Returns an even share of at most `count` shots or views, in their order.
+/// Returns an evenly spaced subset of at most `count` shots or views, in their order.
 pub(crate) fn share<T>(all: Vec<T>, count: usize) -> Vec<T> {
     let total = all.len();
     let count = count.min(total);
@@ -74,7 +74,7 @@ pub(crate) fn share<T>(all: Vec<T>, count: usize) -> Vec<T> {
     chosen.map(|(_, one)| one).collect()
 }
 
-/// Returns each shot at `times` times instead of its own: at the middles of as many equal parts of the interval.
+/// Returns each shot at `times` times instead of its own time: at the middles of that many equal parts of the interval.
 pub(crate) fn at_times(shots: Vec<Shot>, times: usize, [first, last]: [f32; 2]) -> Vec<Shot> {
     let time = |k: usize| first + (last - first) * (k as f32 + 0.5) / times as f32;
     let seen = |shot: Shot| (0..times).map(move |k| Shot { time: time(k), ..shot.clone() });
@@ -93,9 +93,9 @@ mod tests {
     #[test]
     fn shares_are_even_and_in_order() {
         let names = |count: usize| share(shots(6), count).into_iter().map(|shot| shot.name).collect::<Vec<_>>();
-        assert_eq!(names(3), ["1", "3", "5"], "every second");
-        assert_eq!(names(9).len(), 6, "no more than there are");
-        assert!(share(Vec::<Shot>::new(), 3).is_empty(), "nothing of nothing");
+        assert_eq!(names(3), ["1", "3", "5"], "every second shot");
+        assert_eq!(names(9).len(), 6, "all shots if more are wanted");
+        assert!(share(Vec::<Shot>::new(), 3).is_empty(), "no shots, no subset");
     }
 
     #[test]
@@ -103,6 +103,6 @@ mod tests {
         let shots = at_times(shots(2), 2, [2.0, 4.0]);
         let times: Vec<f32> = shots.iter().map(|shot| shot.time).collect();
         assert_eq!(times, [2.5, 3.5, 2.5, 3.5], "each shot at both times");
-        assert_eq!(shots[2].name, "1", "shot by shot");
+        assert_eq!(shots[2].name, "1", "the times of one shot follow each other");
     }
 }

@@ -1,20 +1,21 @@
 //! The number of Gaussians whose package has a given size.
 //!
-//! In: a number of bytes, the size of the package of any number of Gaussians. Out: a number of Gaussians that nearly fills it.
+//! In: a limit in bytes, a function from a number of Gaussians to the size of their package. Out: a number of Gaussians whose package is
+//! just below the limit.
 
 use super::{OfflineError, Progress};
 
-/// Bytes of a Gaussian with which the search begins.
+/// Bytes for each Gaussian in the first estimate.
 const BYTES_OF_GAUSSIAN: u64 = 24;
-/// Packages that are tried.
+/// Most packages that are tried.
 const TRIES: usize = 5;
-/// The fraction of the room for Gaussians that is aimed at: training changes how well a package compresses.
+/// Target size, as a fraction of the bytes left for Gaussians: training changes how well a package compresses.
 const AIM: f64 = 0.985;
-/// A package this much smaller, as a fraction of the size, is large enough.
+/// The search ends at a package within the limit that has at least this fraction of its bytes.
 const NEAR: f64 = 0.97;
 
-/// Returns how many of `total` Gaussians fit into a package of `limit` bytes, given the size of a package of any number and that of a single
-/// Gaussian. Begins the task "finding the count".
+/// Returns how many of `total` Gaussians fit into a package of `limit` bytes, given the size of a package of any number and that of a
+/// single Gaussian. Begins the task "finding the count".
 pub(super) fn count_within(
     limit: u64,
     total: usize,
@@ -38,7 +39,8 @@ pub(super) fn count_within(
     Ok(count)
 }
 
-/// Returns the count at which a package that has `size` bytes with `count` Gaussians, and `one` with a single one, would have nearly `limit`.
+/// Returns the count at which a package that has `size` bytes with `count` Gaussians, and `one` with a single one, would have slightly less
+/// than `limit`.
 pub(super) fn fitting(count: usize, size: u64, limit: u64, one: u64) -> usize {
     let [room, used] = [limit, size].map(|bytes| bytes.saturating_sub(one) as f64);
     (count as f64 * AIM * room / used.max(1.0)) as usize
@@ -54,7 +56,7 @@ mod tests {
         assert_eq!(fitting(1000, 2000, 1000, 0), 492, "a little less than half");
         assert_eq!(fitting(1000, 500, 1000, 0), 1970, "a little less than twice");
         assert_eq!(fitting(3, 1000, 10, 0), 0, "no Gaussian fits");
-        assert_eq!(fitting(1000, 2900, 1900, 900), 492, "the bytes of one Gaussian are needed once");
+        assert_eq!(fitting(1000, 2900, 1900, 900), 492, "the bytes that all Gaussians share are counted once");
         assert_eq!(fitting(1, 901, 900, 900), 0, "a single Gaussian is too large");
     }
 

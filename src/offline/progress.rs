@@ -1,15 +1,15 @@
 //! Progress reports of library calls.
 //!
-//! In: the tasks of a call as they begin, advance and finish, and notes. Out: what the caller shows of them, such as
-//! progress bars or a log.
+//! In: the tasks of a call as they begin, advance and finish, and notes. Out: the display of the caller, such as progress
+//! bars or a log.
 
 use super::OfflineError;
 
 /// Receives the progress of work on a capture.
 ///
 /// Tasks nest: [`advance`](Self::advance) and [`finish`](Self::finish) are about the unfinished task that began last. A
-/// function that takes a `Progress` documents whether it begins tasks of its own or advances one of the caller's. When
-/// it returns an error, the tasks that it began stay unfinished.
+/// function that takes a `Progress` documents whether it begins its own tasks or advances a task of the caller. When a
+/// function returns an error, the tasks that it began stay unfinished.
 pub trait Progress {
     /// Begins a task of `steps` steps.
     fn begin(&mut self, task: &'static str, steps: usize);
@@ -23,13 +23,13 @@ pub trait Progress {
     /// Reports one line about the work, such as the duration of a stage or views that are left out.
     fn note(&mut self, line: &str);
 
-    /// Returns whether the user wants the work to end early with what there is. Long work that can do so asks now and then.
+    /// Returns whether the user has requested an early end with the results so far. Long work that can end early checks this regularly.
     fn is_interrupted(&self) -> bool {
         false
     }
 }
 
-/// Returns whether work may go on: the error [`OfflineError::Interrupted`] if the user wants it to end.
+/// Returns the error [`OfflineError::Interrupted`] if the user has requested an early end.
 pub(crate) fn proceed(progress: &dyn Progress) -> Result<(), OfflineError> {
     if progress.is_interrupted() { Err(OfflineError::Interrupted { tuned: None }) } else { Ok(()) }
 }

@@ -1,18 +1,18 @@
-//! Pruning: the scene with the Gaussians that score highest.
+//! Pruning: the scene with the Gaussians of the highest scores.
 //!
-//! In: a scene of any form and a score for each Gaussian. Out: the scene with some of them, in their original order,
-//! with their color and their part of the temporal filter.
+//! In: a scene of any form and a score for each Gaussian. Out: the scene with some of the Gaussians, in their original
+//! order, with their color and their part of the temporal filter.
 
 use crate::gaussian::{Harmonics, Parameters};
 use crate::scene::{Form, GaussianScene, SceneForm, Sliced, Trained};
 
-/// Returns how many of `count` Gaussians are left when this share of them (0 to 1) is removed: `round((1 − ratio)
+/// Returns how many of `count` Gaussians remain when this fraction (0 to 1) is removed: `round((1 − ratio)
 /// count)`.
 pub fn kept_count(count: usize, ratio: f64) -> usize {
     (((1.0 - ratio) * count as f64).round() as usize).min(count)
 }
 
-/// Returns the indices of the `count` highest scores, ascending; of equal scores, those of the earlier Gaussians.
+/// Returns the indices of the `count` highest scores, ascending; of equal scores, the earlier Gaussians.
 pub fn highest(scores: &[f32], count: usize) -> Vec<u32> {
     let mut order: Vec<u32> = (0..scores.len() as u32).collect();
     // A stable sort: equal scores stay in the order of the scene.

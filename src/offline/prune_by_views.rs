@@ -1,6 +1,6 @@
-//! Pruning a scene by its training views: scoring, the search for the best score, and the scene that is left.
+//! Pruning a scene by its training views: scoring, the search for the best score, and the pruned scene.
 //!
-//! In: a scene, the views of its dataset, a [`Goal`]. Out: the scene with the Gaussians that score highest ([`Pruned`]).
+//! In: a scene, the views of its dataset, a [`Goal`]. Out: the scene with the Gaussians of the highest scores ([`Pruned`]).
 
 use super::belonging::require_belonging;
 use super::engine::Engine;
@@ -31,12 +31,12 @@ pub struct Pruned {
     pub scene: GaussianScene,
     /// The score, the number of Gaussians kept, and the PSNR if it was measured.
     pub outcome: Outcome,
-    /// The outcome for every score; `None` if nothing was compared.
+    /// The outcome of every score; `None` if no pictures were compared.
     pub search: Option<SearchSummary>,
 }
 
 impl Pruned {
-    /// Returns the scene with the `count` Gaussians that score highest, without measuring the loss.
+    /// Returns the scene with the `count` Gaussians of the highest scores, without measuring the loss.
     pub fn unchecked(scene: &GaussianScene, candidate: Candidate, count: usize) -> Self {
         let outcome = Outcome { score: candidate.name, kept: count, psnr: None, trials: Vec::new() };
         Self { scene: select(scene, &highest(&candidate.scores, count)), outcome, search: None }
@@ -44,12 +44,12 @@ impl Pruned {
 }
 
 /// Prunes by the scores in `given` or, if it is `None`, by those that the settings select. Results are compared on the
-/// validation views if the goal is a loss, or if the best score is to be found ([`ScoreChoice::Auto`]); scores then come
-/// from the other training views. If nothing is compared, they come from all training views.
+/// validation views if the goal is a loss, or if the best score is searched for ([`ScoreChoice::Auto`]); scores then come
+/// from the other training views. Otherwise, scores come from all training views.
 ///
 /// # Errors
-/// The goal is a loss and images of validation views are missing or show something else; views that show nothing of the
-/// scene; no validation views although something is to be compared; a failure of the engine.
+/// The goal is a loss and images of validation views are missing or show another scene; views in which no Gaussian of the scene
+/// is visible; no validation views for a comparison; a failure of the engine.
 pub fn prune_by_views(
     engine: &mut Engine,
     subject: Subject,

@@ -1,4 +1,4 @@
-//! The loss by pruning: PSNR on training views held out from scoring, and the smallest count that a loss allows.
+//! The loss by pruning: PSNR on training views held out from scoring, and the smallest count within a loss.
 //!
 //! In: views with the pictures to compare them with ([`Evaluator`]), an [`Engine`] that draws them. Out: PSNR of a
 //! pruned scene in dB; the smallest count within a loss, and every count tried ([`Trial`]).
@@ -24,8 +24,8 @@ pub struct Evaluator {
 }
 
 impl Evaluator {
-    /// Returns an evaluator that compares with the images of these training views, over the color of `background`, or over that of
-    /// training if `background` has none.
+    /// Returns an evaluator that compares with the images of these training views, over the color of `background`, or over the
+    /// color of training if `background` has none.
     ///
     /// # Errors
     /// Images that are missing or cannot be decoded.
@@ -79,11 +79,11 @@ impl Evaluator {
         Ok(error.psnr())
     }
 
-    /// Returns the [`psnr`](Self::psnr) of the `count` Gaussians that score highest. Pass the scene in the runtime
+    /// Returns the [`psnr`](Self::psnr) of the `count` Gaussians of the highest scores. Pass the scene in the runtime
     /// form, because slicing takes time.
     ///
     /// # Errors
-    /// As [`psnr`](Self::psnr), and a Gaussian that cannot be drawn.
+    /// A failure of the engine, a picture of another size, a Gaussian that cannot be drawn.
     ///
     /// # Panics
     /// If there are more scores than Gaussians.
@@ -144,9 +144,9 @@ mod tests {
             let psnr = |count: usize| Ok::<_, Infallible>(if count >= wanted { 30.0 } else { 29.0 });
             let (found, trials) = smallest_count(1000, 2, 29.5, psnr).expect("cannot fail");
             assert!((wanted..=wanted + 2).contains(&found), "{found} for {wanted}");
-            assert!(trials.len() <= 10, "few trials: {trials:?}");
+            assert!(trials.len() <= 10, "bisection takes at most 10 trials: {trials:?}");
         }
         let (all, _) = smallest_count(1000, 2, 31.0, |_| Ok::<_, Infallible>(30.0)).expect("cannot fail");
-        assert_eq!(all, 1000, "nothing can be spared");
+        assert_eq!(all, 1000, "every Gaussian is needed");
     }
 }

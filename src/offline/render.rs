@@ -14,7 +14,7 @@ use std::thread;
 /// Most pictures that wait to be written.
 const QUEUE: usize = 4;
 
-/// Draws the views in order, each with the shot it belongs to, while other threads call `write` on the pictures.
+/// Draws the views in order, each with its shot, while other threads call `write` on the pictures.
 /// Returns the counts of each view. Begins the task "rendering".
 ///
 /// # Errors
@@ -31,7 +31,7 @@ pub(crate) fn render_shots(
     let waiting = views.len().min(QUEUE + 2) as u64;
     Pictures::written(views.iter().map(|(_, view)| view.size), waiting).require(Some(&*headless), BY_SIZE)?;
     let (queue, drawn) = sync_channel::<(&Shot, Picture)>(QUEUE);
-    // A thread pool of its own: threads that wait for pictures would stall rayon's shared pool.
+    // A separate thread pool: threads that wait for pictures would block the shared pool of rayon.
     let writers = rayon::ThreadPoolBuilder::new().build()?;
     thread::scope(|scope| {
         let written = scope.spawn(|| {
@@ -60,7 +60,7 @@ fn draw<'s>(
         let frame = headless.render(capture, view, background)?;
         counts.push(frame.counts);
         if queue.send((shot, frame.picture)).is_err() {
-            // The writers stopped at an error, which they return.
+            // The writers have stopped at an error, which they return.
             break;
         }
         progress.advance();

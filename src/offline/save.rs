@@ -1,7 +1,7 @@
 //! Writing files whole or not at all.
 //!
-//! In: a path and its contents: a scene, a picture, anything else. Out: the file, which replaces an existing one only
-//! once it is complete, and has its permissions. A package is read back before.
+//! In: a path and its contents: a scene, a picture, any bytes. Out: the file, which replaces an existing file only when it
+//! is complete, and gets its permissions. A package is read back first.
 
 use super::temporary_file::{self, Part};
 use super::unfinished::Streaming;
@@ -42,7 +42,7 @@ fn read_back(file: File) -> Result<(), CodecErrorKind> {
 /// packed form and the default of [`WriteSettings`] for the others.
 pub(crate) fn write_settings(form: &SceneForm, level: Option<i32>) -> WriteSettings {
     let usual = match form {
-        // A tenth of the bytes for seconds of time.
+        // Level 19 saves a tenth of the bytes and takes seconds.
         SceneForm::Ready(Form::Packed(_)) => 19,
         SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_)) => WriteSettings::default().level,
     };
@@ -76,8 +76,8 @@ where
     temporary_file::replace(part.into_iter().collect())
 }
 
-/// Writes files that belong together, as [`write_beside`] does: no existing one is replaced before all of them are complete. Those after the
-/// first are never beside another first one than their own.
+/// Writes files that belong together, as [`write_beside`] does: no existing file is replaced before all are complete. Files after
+/// the first are never beside another first file than their own.
 ///
 /// # Errors
 /// A folder that cannot be written to, a full disk.
@@ -86,8 +86,8 @@ pub(super) fn write_together(files: &[(&Path, &[u8])]) -> Result<(), CodecError>
     temporary_file::replace(files.iter().filter_map(part).collect::<Result<_, _>>()?)
 }
 
-/// Writes a complete temporary file that is to replace the output `path`. Returns it with the path that it replaces; `None` if a device or a pipe
-/// was written. `check` may refuse the file.
+/// Writes a complete temporary file that is to replace the output `path`. Returns it with the path that it replaces; `None` if a device or
+/// a pipe was written. `check` may refuse the file.
 fn part<E>(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>,
@@ -134,12 +134,12 @@ pub(super) fn is_stream(path: &Path) -> bool {
     path.metadata().is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
 }
 
-/// Returns the folder of a file: the current one for a name alone.
+/// Returns the folder of a file: the current folder for a name alone.
 pub(super) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Returns the path that a path leads to through symbolic links, whether there is a file or not.
+/// Returns the path that a path resolves to through symbolic links, whether the file exists or not.
 pub(super) fn resolved(path: &Path) -> PathBuf {
     let mut path = path.to_owned();
     for _ in 0..MAX_LINKS {
@@ -164,7 +164,7 @@ mod tests {
     use crate::scene::synth::{SynthSettings, synthesize};
 
     #[test]
-    fn a_failed_write_leaves_what_was_there() {
+    fn a_failed_write_keeps_the_old_file() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("scene.gs4d");
         write_beside(&path, |writer| writer.write_all(b"first")).expect("the folder can be written to");
@@ -174,11 +174,11 @@ mod tests {
         });
         let message = failed.expect_err("the writer failed").to_string();
         assert!(message.contains("scene.gs4d: disk full"), "path and reason: {message}");
-        assert_eq!(fs::read(&path).expect("still there"), b"first", "the old file is whole");
+        assert_eq!(fs::read(&path).expect("still there"), b"first", "the old file is unchanged");
         write_beside(&path, |writer| writer.write_all(b"third")).expect("the folder can be written to");
-        assert_eq!(fs::read(&path).expect("replaced"), b"third", "the new file took its place");
+        assert_eq!(fs::read(&path).expect("replaced"), b"third", "the new file has replaced the old file");
         let left = fs::read_dir(folder.path()).expect("the folder").count();
-        assert_eq!(left, 1, "no temporary file stays behind");
+        assert_eq!(left, 1, "no temporary file is left");
     }
 
     #[test]
@@ -187,15 +187,16 @@ mod tests {
         let path = folder.path().join("scene.gs4d");
         let scene = synthesize(&SynthSettings { count: 40, ..SynthSettings::default() });
         let runtime = scene.into_runtime().expect("a synthetic scene can be drawn");
-        let (mut packed, _) = compress(runtime, &CompressSettings::from(Quality::Small)).expect("it is compressed");
+        let (mut packed, _) = compress(runtime, &CompressSettings::from(Quality::Small)).expect("compression succeeds");
         save(&path, &packed, &WriteSettings::default()).expect("a package that can be read");
         let before = fs::read(&path).expect("the package is there");
-        let SceneForm::Ready(Form::Packed(records)) = &mut packed.form else { panic!("it is packed") };
+        let SceneForm::Ready(Form::Packed(records)) = &mut packed.form else { panic!("the scene is packed") };
         records.ranges[0][0] = f32::INFINITY;
-        let message = save(&path, &packed, &WriteSettings::default()).expect_err("it cannot be read").to_string();
+        let message =
+            save(&path, &packed, &WriteSettings::default()).expect_err("the package cannot be read").to_string();
         assert!(message.contains("scene.gs4d") && message.contains("not finite"), "path and reason: {message}");
-        assert_eq!(fs::read(&path).expect("still there"), before, "the old package is whole");
-        assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 1, "nothing else is left");
+        assert_eq!(fs::read(&path).expect("still there"), before, "the old package is unchanged");
+        assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 1, "no temporary file is left");
     }
 
     #[cfg(unix)]
@@ -205,7 +206,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let [file, link, ahead, later] = ["file", "link", "ahead", "later"].map(|name| folder.path().join(name));
         fs::write(&file, b"first").expect("the folder can be written to");
-        fs::set_permissions(&file, fs::Permissions::from_mode(0o640)).expect("it is ours");
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o640)).expect("permissions can be set");
         symlink("file", &link).expect("the folder can be written to");
         symlink(&later, &ahead).expect("the folder can be written to");
         for path in [&link, &ahead] {
@@ -213,9 +214,9 @@ mod tests {
             assert!(path.is_symlink(), "{} is still a link", path.display());
         }
         for path in [&file, &later] {
-            assert_eq!(fs::read(path).expect("it is there"), b"second", "{} was written", path.display());
+            assert_eq!(fs::read(path).expect("the file exists"), b"second", "{} was written", path.display());
         }
-        let mode = file.metadata().expect("it is there").permissions().mode() & 0o777;
+        let mode = file.metadata().expect("the file exists").permissions().mode() & 0o777;
         assert_eq!(mode, 0o640, "the permissions are those of the replaced file");
     }
 }

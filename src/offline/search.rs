@@ -18,20 +18,20 @@ use serde::{Serialize, Serializer};
 use std::cmp::Ordering;
 use std::fmt;
 
-/// Which scores to try.
+/// The scores to try.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ScoreChoice {
     /// The best of [`Variant::AUTO`] on the validation views.
     Auto,
     /// Every variant.
     All,
-    /// Only this one.
+    /// This variant alone.
     One(Variant),
 }
 
 impl ScoreChoice {
-    /// Returns the scores that a choice stands for. Without the volume of the Gaussians, `Auto` and `All` leave out
-    /// those that need it.
+    /// Returns the scores of a choice. Without the volume of the Gaussians, `Auto` and `All` leave out the scores that
+    /// need it.
     pub fn variants(self, has_volume: bool) -> Vec<Variant> {
         let known = |variants: &[Variant]| -> Vec<Variant> {
             variants.iter().copied().filter(|variant| has_volume || !variant.needs_volume()).collect()
@@ -47,7 +47,7 @@ impl ScoreChoice {
 /// A score to prune by.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// Its name.
+    /// Name of the score.
     pub name: String,
     /// The score of each Gaussian.
     pub scores: Vec<f32>,
@@ -74,26 +74,26 @@ pub fn of_name<'a>(candidates: &'a [Candidate], name: &str) -> Option<&'a [f32]>
     candidates.iter().find(|candidate| candidate.name == name).map(|candidate| &candidate.scores[..])
 }
 
-/// Returns the candidates that a choice stands for.
+/// Returns the candidates of a choice.
 ///
 /// # Errors
-/// A single score is chosen that needs the volume of the Gaussians, and the scene no longer has it.
+/// A single score is chosen that needs the volume of the Gaussians, which the scene does not have.
 pub fn candidates(choice: ScoreChoice, scores: &Scores) -> Result<Vec<Candidate>, ScoreError> {
     let named = |variant: Variant, scores| Candidate { name: variant.name().to_owned(), scores };
     let candidate = |variant: Variant| scores.of(variant).map(|scores| named(variant, scores));
     choice.variants(scores.has_volume()).into_iter().map(candidate).collect()
 }
 
-/// How many Gaussians to keep. Default: `MaxLoss(0.1)`.
+/// The goal of pruning, which determines the number of Gaussians. Default: `MaxLoss(0.1)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Goal {
-    /// This many.
+    /// Keep this number of Gaussians.
     Keep(usize),
-    /// All but this share, 0 to 1.
+    /// Remove this fraction of the Gaussians, 0 to 1.
     Remove(f64),
-    /// The fewest whose PSNR on the validation views is at most this much lower, dB.
+    /// Keep the smallest number of Gaussians whose PSNR on the validation views is at most this much lower, dB.
     MaxLoss(f64),
-    /// As many as fit into a package of this many bytes.
+    /// Keep the largest number of Gaussians that fits into a package of this many bytes.
     Size(u64),
 }
 
@@ -148,12 +148,12 @@ pub struct SearchOutcome {
     pub outcomes: Vec<Outcome>,
 }
 
-/// What pictures of the validation views are compared with.
+/// The references for pictures of the validation views.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ComparedWith {
     /// The images of the dataset.
     Images,
-    /// The pictures of the whole scene, if there are no images.
+    /// The pictures of the whole scene, if images are missing.
     WholeScene,
 }
 
@@ -177,7 +177,7 @@ impl Serialize for ComparedWith {
 pub struct SearchSummary {
     /// Number of validation views.
     pub views: usize,
-    /// What they are compared with.
+    /// The references of the comparison.
     pub compared_with: ComparedWith,
     /// PSNR of the whole scene, dB; `None` if it is compared with itself.
     pub psnr_before: Option<f64>,
@@ -218,7 +218,7 @@ impl ScoreSearch {
                 Ok(Self { evaluator, baseline })
             }
             Err(error @ DatasetError::MissingImages { .. }) if !required => {
-                progress.note(&format!("note: {error}. Compared with what the whole scene shows instead"));
+                progress.note(&format!("note: {error}. Compared with pictures of the whole scene instead"));
                 let evaluator = Evaluator::by_scene(engine, scene, validation, background)?;
                 Ok(Self { evaluator, baseline: None })
             }
@@ -304,17 +304,25 @@ mod tests {
 
     #[test]
     fn goals_count_and_compare() {
-        assert_eq!(Goal::Keep(7).count(5), Some(5), "no more than there are");
-        assert_eq!(Goal::Remove(0.4).count(2000), Some(1200), "all but a share");
-        assert_eq!(Goal::default().count(5), None, "a loss decides");
+        assert_eq!(Goal::Keep(7).count(5), Some(5), "a goal above the number of Gaussians keeps all");
+        assert_eq!(Goal::Remove(0.4).count(2000), Some(1200), "a fraction is removed");
+        assert_eq!(Goal::default().count(5), None, "a loss determines no count");
         let (sharp, small) = (outcome(9, Some(30.0)), outcome(5, Some(29.0)));
-        assert_eq!(Goal::Keep(9).compare(&sharp, &small), Ordering::Less, "the higher PSNR");
-        assert_eq!(Goal::MaxLoss(2.0).compare(&sharp, &small), Ordering::Greater, "the smaller count");
-        assert_eq!(Goal::Keep(9).compare(&outcome(9, None), &small), Ordering::Greater, "unknown comes last");
+        assert_eq!(Goal::Keep(9).compare(&sharp, &small), Ordering::Less, "at a count, the higher PSNR is better");
+        assert_eq!(
+            Goal::MaxLoss(2.0).compare(&sharp, &small),
+            Ordering::Greater,
+            "within a loss, the smaller count is better"
+        );
+        assert_eq!(
+            Goal::Keep(9).compare(&outcome(9, None), &small),
+            Ordering::Greater,
+            "an outcome without PSNR comes last"
+        );
     }
 
     #[test]
-    fn candidates_are_read_as_they_were_written() {
+    fn stored_candidates_are_read_without_loss() {
         let candidate = |name: &str, scores: &[f32]| Candidate { name: name.to_owned(), scores: scores.to_vec() };
         let all = vec![candidate("energy", &[1.0, 2.0]), candidate("full", &[0.5, 0.0])];
         let read = Vec::<Candidate>::decode(&all.encode().expect("candidates can be stored")).expect("the same bytes");
@@ -324,9 +332,12 @@ mod tests {
     }
 
     #[test]
-    fn choices_leave_out_what_the_runtime_form_lacks() {
+    fn choices_leave_out_scores_that_need_the_volume_of_the_runtime_form() {
         assert_eq!(ScoreChoice::All.variants(true), Variant::ALL, "every score of a trained scene");
-        assert!(ScoreChoice::Auto.variants(false).iter().all(|variant| !variant.needs_volume()), "no volume");
-        assert_eq!(ScoreChoice::One(Variant::Full).variants(false), [Variant::Full], "what is named stays");
+        assert!(
+            ScoreChoice::Auto.variants(false).iter().all(|variant| !variant.needs_volume()),
+            "no score of Auto needs the volume"
+        );
+        assert_eq!(ScoreChoice::One(Variant::Full).variants(false), [Variant::Full], "a named score is kept");
     }
 }

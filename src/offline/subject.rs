@@ -1,6 +1,6 @@
 //! A scene to score, prune and bake.
 //!
-//! In: a scene as it was read. Out: the same scene, the form that is drawn, and the background to draw it over
+//! In: a scene as read from a file. Out: the same scene, the form that is drawn, and the background
 //! ([`Subject`]).
 
 use super::OfflineError;
@@ -8,20 +8,20 @@ use crate::scene::{GaussianScene, RuntimeScene};
 use crate::view::Background;
 use std::path::Path;
 
-/// A scene as it was read and as it is drawn.
+/// A scene as read from a file and in the form that is drawn.
 #[derive(Debug, Clone)]
 pub struct Subject {
-    /// As it was read, in any form.
+    /// The scene as read, in any form.
     pub scene: GaussianScene,
-    /// In the form that is drawn.
+    /// The scene in the form that is drawn.
     pub runtime: RuntimeScene,
-    /// The background it is drawn over.
+    /// The background.
     pub background: Background,
 }
 
 impl Subject {
-    /// Slices a scene that was read from `path`. `background` (RGB, 0 to 1) replaces the one it was trained with;
-    /// `None` keeps that.
+    /// Slices a scene that was read from `path`. `background` (RGB, 0 to 1) replaces the background of training;
+    /// `None` keeps it.
     ///
     /// # Errors
     /// The first Gaussian that cannot be drawn, with the path.

@@ -21,17 +21,17 @@ pub fn filter_name(kind: FilterKind) -> &'static str {
     FILTER_NAMES.iter().find(|(_, other)| *other == kind).map_or("support", |(name, _)| name)
 }
 
-/// Returns whether a kind of filter is computed from training views; the others need only the Gaussians.
+/// Returns whether a kind of filter is computed from training views; the other kinds need only the Gaussians.
 pub fn needs_views(kind: FilterKind) -> bool {
     kind != FilterKind::Support
 }
 
-/// How many key-frames a filter has, evenly over the time interval, both ends included. Default: `Count(11)`.
+/// The number of key-frames of a filter, evenly spaced over the time interval, both ends included. Default: `Count(11)`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum KeyFrames {
-    /// This many.
+    /// This number of key-frames.
     Count(u32),
-    /// One every so many of the training data's timestamps.
+    /// One key-frame for this number of timestamps of the training views.
     Every(usize),
 }
 
@@ -42,7 +42,7 @@ impl Default for KeyFrames {
 }
 
 impl KeyFrames {
-    /// Returns their number, given the training views. It may be more than a filter can have:
+    /// Returns the number of key-frames, given the training views. It may exceed the limit of a filter,
     /// [`MAX_SEGMENTS`](crate::scene::MAX_SEGMENTS) + 1.
     pub fn count(self, views: &[TrainingView]) -> usize {
         match self {
@@ -56,7 +56,8 @@ impl KeyFrames {
 /// task "looking".
 ///
 /// # Errors
-/// A scene that cannot be drawn; for kinds that need views also views that do not fit the memory or the GPU or show nothing of it, a failure of the engine.
+/// A scene that cannot be drawn; for kinds that need views also views that do not fit the memory or the GPU or show nothing of it, a
+/// failure of the engine.
 pub fn filter(
     engine: &mut Engine,
     scene: &GaussianScene,
@@ -76,7 +77,7 @@ pub fn filter(
     Ok(seen_filter(scorer.as_mut(), &runtime, kind, keys, views, progress)?)
 }
 
-/// As [`filter`], of a kind that needs views, with what scores this scene. Begins the task "looking".
+/// Computes the [`filter`] of a kind that needs views, with an engine that holds the scene. Begins the task "looking".
 ///
 /// # Errors
 /// Views that show nothing of the scene, a failure of the engine.
@@ -112,7 +113,7 @@ pub fn key_times(interval: [f32; 2], keys: u32) -> Vec<f32> {
     (0..=segments).map(|j| (first + (last - first) * f64::from(j) / f64::from(segments)) as f32).collect()
 }
 
-/// Returns how many key-frames there are, both ends included, if one comes every `frames` of `times` timestamps; at
+/// Returns the number of key-frames, both ends included, if there is one for every `frames` of `times` timestamps; at
 /// least two.
 pub fn keys_every(times: usize, frames: usize) -> usize {
     times.saturating_sub(1).div_ceil(frames.max(1)).max(1) + 1
@@ -164,11 +165,11 @@ pub fn key_frame_masks(
     Ok(masks)
 }
 
-/// Returns the paper's filter: in each segment, the Gaussians in either of the masks at its two ends. Pass at least two
+/// Returns the filter of the paper: in each segment, the union of the masks at its two ends. Pass at least two
 /// masks of `count` Gaussians.
 ///
 /// # Panics
-/// If a mask is not one of `count` Gaussians.
+/// If a mask does not have `count` Gaussians.
 pub fn key_frame_filter(masks: &[Mask], count: usize) -> TemporalFilter {
     from_segments(FilterKind::KeyFrame, &unions(masks), count)
 }
@@ -180,7 +181,7 @@ pub fn key_frame_filter(masks: &[Mask], count: usize) -> TemporalFilter {
 /// A failure of the engine.
 ///
 /// # Panics
-/// If a mask is not one of `count` Gaussians, or if there are views but fewer than two masks.
+/// If a mask does not have `count` Gaussians, or if there are views but fewer than two masks.
 pub fn interval_filter(
     engine: &mut dyn ScoreEngine,
     masks: &[Mask],
@@ -229,19 +230,19 @@ mod tests {
 
     #[test]
     fn key_frames_are_even_and_include_both_ends() {
-        assert_eq!(key_times([0.0, 1.0], 6), [0.0, 0.2, 0.4, 0.6, 0.8, 1.0], "the paper's on D-NeRF");
+        assert_eq!(key_times([0.0, 1.0], 6), [0.0, 0.2, 0.4, 0.6, 0.8, 1.0], "the key-frames of the paper on D-NeRF");
         assert_eq!(key_times([2.0, 10.0], 3), [2.0, 6.0, 10.0], "another interval");
-        assert_eq!(key_times([0.0, 1.0], 0), [0.0, 1.0], "never fewer than two");
-        assert_eq!(keys_every(300, 20), 16, "the paper's on N3V");
+        assert_eq!(key_times([0.0, 1.0], 0), [0.0, 1.0], "at least two key-frames");
+        assert_eq!(keys_every(300, 20), 16, "the key-frames of the paper on N3V");
         assert_eq!(keys_every(31, 10), 4, "a whole number of steps");
-        assert_eq!((keys_every(1, 20), keys_every(0, 0)), (2, 2), "never fewer than two");
+        assert_eq!((keys_every(1, 20), keys_every(0, 0)), (2, 2), "at least two key-frames");
     }
 
     #[test]
-    fn a_segment_has_what_its_ends_have() {
+    fn a_segment_has_the_union_of_the_masks_at_its_ends() {
         let filter = key_frame_filter(&[vec![0b0001], vec![0b0110], vec![0b0100]], 4);
-        assert_eq!(filter.segments, 2, "one less than masks");
-        assert_eq!(filter.to_bits(), [0b0111, 0b0110], "unions of neighbors");
-        assert_eq!(neighbor_overlap(&filter), [2.0 / 3.0], "two of three");
+        assert_eq!(filter.segments, 2, "one segment less than masks");
+        assert_eq!(filter.to_bits(), [0b0111, 0b0110], "unions of neighboring masks");
+        assert_eq!(neighbor_overlap(&filter), [2.0 / 3.0], "two of three Gaussians are in both segments");
     }
 }

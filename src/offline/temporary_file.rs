@@ -1,7 +1,7 @@
-//! Temporary files beside those that they will replace.
+//! Temporary files beside the files that they will replace.
 //!
-//! In: a folder. Out: an empty file in it, which is locked for as long as its run lives, and which replaces an output once it is complete.
-//! Those of runs that were killed are not locked any more, by which they are found and removed.
+//! In: a folder. Out: an empty file in it, which is locked until its run ends, and which replaces an output when it is complete.
+//! Temporary files of killed runs are not locked, and are removed.
 
 use super::save::folder_of;
 use super::unfinished;
@@ -10,11 +10,11 @@ use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-/// What their names begin and end with.
+/// Prefix and suffix of the names of temporary files.
 const PREFIX: &str = ".gs4d-";
 const SUFFIX: &str = ".part";
 
-/// A temporary file. It is removed when it is dropped, and when the process leaves, unless it has replaced its output.
+/// A temporary file. It is removed when it is dropped, and when the process ends, unless it has replaced its output.
 pub(super) struct Part {
     /// The open file.
     pub file: File,
@@ -43,7 +43,7 @@ pub(super) fn create(target: PathBuf) -> io::Result<Part> {
     builder.prefix(PREFIX).suffix(SUFFIX);
     #[cfg(unix)]
     {
-        // Permissions as of any new file, by the umask; those of temporary files allow the owner only.
+        // Permissions of a new file, by the umask; the default of temporary files allows the owner only.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
@@ -51,7 +51,7 @@ pub(super) fn create(target: PathBuf) -> io::Result<Part> {
         let mut unfinished = unfinished::lock();
         let part = builder.tempfile_in(folder_of(&target))?;
         match part.as_file().try_lock() {
-            // Another run was quicker to lock it, and removes it.
+            // Another run has locked the file first, and removes it.
             Err(TryLockError::WouldBlock) => {}
             Ok(()) if !part.path().exists() => {}
             // Where files cannot be locked, none are removed either.
@@ -64,8 +64,9 @@ pub(super) fn create(target: PathBuf) -> io::Result<Part> {
     }
 }
 
-/// Replaces outputs by complete files; each is given with the path that the user knows its output by. Outputs after the first belong to it: they
-/// are removed before it is replaced, so that they are never beside another first output than their own, wherever the process is killed.
+/// Replaces outputs by complete files; each is given with the path of its output as the user has named it. Outputs after the first belong
+/// to the first: they are removed before the first is replaced, so that they are never beside another first output than their own, even if
+/// the process is killed.
 ///
 /// # Errors
 /// The first output that cannot be replaced, by name.
@@ -88,11 +89,11 @@ pub(super) fn replace(mut parts: Vec<(Part, PathBuf)>) -> Result<(), CodecError>
     Ok(())
 }
 
-/// Removes the temporary files of runs that were killed. What cannot be looked at stays.
+/// Removes the temporary files of killed runs. Files that cannot be opened are kept.
 pub(super) fn remove_stale(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for path in entries.flatten().map(|entry| entry.path()).filter(|path| is_part(path)) {
-        // The lock is held until the file is gone, so that nobody begins to write to it.
+        // The lock is held until the file is removed, so that no other run begins to write to it.
         if let Ok(file) = File::options().write(true).open(&path)
             && file.try_lock().is_ok()
         {
@@ -121,11 +122,11 @@ mod tests {
         paths.iter().for_each(|path| fs::write(path, b"some bytes").expect("the folder can be written to"));
         remove_stale(folder.path());
         let path = live.path.clone();
-        assert!(path.exists(), "one that is being written stays");
-        assert!(!paths[0].exists(), "one that nobody writes is removed");
-        assert!(paths[1..].iter().all(|path| path.exists()), "files of other names stay");
+        assert!(path.exists(), "the file of a run that has not ended is kept");
+        assert!(!paths[0].exists(), "the file of a killed run is removed");
+        assert!(paths[1..].iter().all(|path| path.exists()), "files of other names are kept");
         drop(live);
-        assert!(!path.exists(), "it goes with its owner");
+        assert!(!path.exists(), "a temporary file is removed when it is dropped");
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The comparison of a package with the scene that it was made of, on the test views.
+//! The comparison of a package with the scene that it was made from, on the test views.
 //!
 //! In: the scene before pruning, the bytes of the package, the test views. Out: the metrics of both, over the background of training and
 //! over a contrasting one, and a few pictures ([`Compared`]).
@@ -16,23 +16,24 @@ use crate::view::Picture;
 use std::io::Cursor;
 use std::path::Path;
 
-/// Most views whose pictures are on the page.
+/// Most views whose pictures the report shows.
 const SAMPLES: usize = 3;
 
 /// Difference of the package's PSNR over the two backgrounds above which a bake reports a note, dB.
 const LARGE_DIFFERENCE: f64 = 3.0;
 
-/// The test views, drawn before and after.
+/// The test views, drawn of the scene before pruning and of the package.
 pub(super) struct Compared {
     /// Name of the split.
     pub split: &'static str,
     /// Metrics of the scene before pruning and of the package.
     pub evaluation: Change<Evaluation>,
-    /// A few of the views.
+    /// Pictures of some of the views.
     pub samples: Vec<Sample>,
 }
 
-/// Draws the test views of the scene and of the package that will be written to `out`. `None`, with a note, if the views or their images are missing.
+/// Draws the test views of the scene and of the package that will be written to `out`. `None`, with a note, if the views or their images
+/// are missing.
 pub(super) fn compare_test_views(
     engine: &mut Engine,
     subject: &Subject,

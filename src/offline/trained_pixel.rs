@@ -1,7 +1,7 @@
 //! The size of the pixels of a capture's training views.
 //!
-//! In: a scene, its training views. Out: the largest size that a pixel of these views has at the Gaussians of the scene. Pictures with larger
-//! pixels are anti-aliased.
+//! In: a scene, its training views. Out: the largest size that a pixel of these views has at the Gaussians of the scene. Pictures with
+//! larger pixels are anti-aliased.
 
 use super::dataset::TrainingView;
 use crate::scene::GaussianScene;

@@ -1,4 +1,4 @@
-//! The search for the score to prune by and for the number of Gaussians to keep, where the remaining Gaussians are trained.
+//! The search for the score to prune by and for the number of Gaussians to keep, if the remaining Gaussians are trained.
 //!
 //! In: scores, a [`Goal`], images to train on, a search on validation views. Out: the score and the count that are best after a short
 //! training, and every count tried ([`Chosen`]).
@@ -11,12 +11,12 @@ use super::search::{Candidate, Goal, ScoreSearch};
 use super::{OfflineError, Progress};
 use crate::scene::GaussianScene;
 
-/// The count that a loss allows is found to within this fraction of the count that pruning alone needs.
+/// Tolerance of the count within a loss, as a fraction of the count that pruning alone needs.
 const TOLERANCE: usize = 50;
 
-/// Short trainings of the Gaussians that different scores and counts keep.
+/// Short trainings of the Gaussians kept by different scores and counts.
 pub(crate) struct TrainedSearch<'a> {
-    /// Trains and draws.
+    /// The engine that trains and draws.
     pub engine: &'a mut Engine,
     /// The images to train on.
     pub images: &'a TrainingImages,
@@ -34,7 +34,7 @@ pub(crate) struct Chosen {
     pub candidate: Candidate,
     /// The number of Gaussians to keep.
     pub kept: usize,
-    /// Name of the score, count and PSNR on the validation views.
+    /// Name of the score, count and PSNR on the validation views, for each training.
     pub tried: Vec<(String, Trial)>,
 }
 
@@ -48,11 +48,12 @@ impl TrainedSearch<'_> {
         self.search.psnr(self.engine, &scene.into_runtime()?)
     }
 
-    /// Trains the Gaussians that each candidate keeps, and searches for the smallest count if a loss decides. `alone` is the choice without
-    /// training. Begins the task "training trials".
+    /// Trains the Gaussians that each candidate keeps, and searches for the smallest count if the goal is a loss. `alone` is the choice
+    /// without training. Begins the task "training trials".
     ///
-    /// The loss is allowed against the whole scene as it was read, or after the same short training if that is worse: the checkpoint was
-    /// trained on the validation views, unless these come from a file of their own, and a scene that was not would never reach it.
+    /// The loss is measured against the whole scene before training, or after the same short training if its PSNR is lower then: the
+    /// checkpoint was trained on the validation views, unless these come from a separate file, and a scene not trained on these views
+    /// cannot reach it.
     ///
     /// # Errors
     /// A scene that cannot be trained, a failure of the engine.
@@ -76,7 +77,7 @@ impl TrainedSearch<'_> {
             }
             _ => None,
         };
-        // Where nothing is lost, scores do not differ.
+        // If no Gaussian is removed, all scores give the same scene.
         let compared = if floor.is_some() { kept.div_ceil(2) } else { kept };
         let mut best = f64::NEG_INFINITY;
         let several = candidates.len() > 1;

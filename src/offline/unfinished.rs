@@ -1,8 +1,8 @@
 //! The files and folders that must not outlive unfinished work.
 //!
 //! In: temporary files and work folders as they are created, outputs as they are complete. Out: a process that can leave at any moment
-//! ([`abandon`]): unfinished files are removed, no further file becomes an output, and what exists is known ([`Existing`]). A change of the
-//! disk and the change of the list that belongs to it are made under one lock. The list is empty until [`keep`] is called.
+//! ([`abandon`]): unfinished files are removed, no further file becomes an output, and the existing results are known ([`Existing`]). A
+//! change of the disk and the change of the list that belongs to it are made under one lock. The list is empty until [`keep`] is called.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -17,7 +17,7 @@ const ATTEMPT: Duration = Duration::from_millis(1);
 
 static LIST: Mutex<List> = Mutex::new(List(None));
 
-/// Number of devices and pipes that are being written. Their readers may keep a writer waiting without end.
+/// Number of devices and pipes that are being written. A write may wait for a reader without end.
 static STREAMS: AtomicUsize = AtomicUsize::new(0);
 
 /// The list; `None` until the program keeps it.
@@ -33,7 +33,7 @@ struct Kept {
     outputs: BTreeSet<PathBuf>,
 }
 
-/// What exists of the work so far.
+/// The results of the work so far.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(crate) struct Existing {
     /// The outputs that are complete.
@@ -52,13 +52,13 @@ pub(super) fn lock() -> MutexGuard<'static, List> {
     LIST.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Returns what exists so far.
+/// Returns the results so far.
 pub(crate) fn existing() -> Existing {
     lock().existing()
 }
 
-/// Removes all that is unfinished and returns what exists. From then on no temporary file is created, and none becomes an output: threads that
-/// try wait until the process ends. Returns `None` and removes nothing if the list stays locked for longer than `patience`.
+/// Removes all unfinished files and returns the results so far. From then on no temporary file is created, and none becomes an output:
+/// threads that try wait until the process ends. Returns `None` and removes nothing if the list stays locked for longer than `patience`.
 pub(crate) fn abandon(patience: Duration) -> Option<Existing> {
     let start = Instant::now();
     let list = loop {
@@ -71,7 +71,7 @@ pub(crate) fn abandon(patience: Duration) -> Option<Existing> {
     };
     list.remove();
     let existing = list.existing();
-    // It stays locked.
+    // The list stays locked.
     std::mem::forget(list);
     Some(existing)
 }
@@ -81,11 +81,11 @@ pub(crate) fn is_streaming() -> bool {
     STREAMS.load(Ordering::SeqCst) > 0
 }
 
-/// While this lives, a device or a pipe is being written.
+/// A device or a pipe is being written until this is dropped.
 pub(super) struct Streaming(());
 
 impl Streaming {
-    /// Begins to write one.
+    /// Begins to write a device or a pipe.
     pub(super) fn begin() -> Self {
         STREAMS.fetch_add(1, Ordering::SeqCst);
         Self(())
@@ -129,7 +129,7 @@ impl List {
 
     fn remove(&self) {
         let Some(kept) = &self.0 else { return };
-        // Nothing is left to be done about a file that cannot be removed.
+        // A file that cannot be removed is left.
         kept.files.iter().for_each(|path| drop(fs::remove_file(path)));
         // `remove_dir` does not remove a folder that has contents.
         kept.folders.iter().for_each(|path| drop(fs::remove_dir(path)));

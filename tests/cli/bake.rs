@@ -1,4 +1,4 @@
-//! `gs4d bake`, run as a user runs it on a scene's own pictures.
+//! `gs4d bake`, run as a user runs it, on pictures of the scene itself.
 //!
 //! In: a small synthetic scene and a dataset drawn from it by the CPU reference. Out: proof that the package is smaller
 //! and both reports are written, that finished stages are not repeated, and that data of another capture and paths that
@@ -22,7 +22,7 @@ fn capture(center: Vec3, images: bool) -> Capture {
     capture_of(synthesize(&SynthSettings { count: 2000, ..SynthSettings::default() }), center, images)
 }
 
-/// As [`capture`], with this scene.
+/// Returns a dataset as [`capture`] does, with this scene.
 fn capture_of(trained: GaussianScene, center: Vec3, images: bool) -> Capture {
     Capture::new(trained, center, 4, 4, UVec2::splat(48), images)
 }
@@ -47,7 +47,8 @@ impl Capture {
         number_after(&refused.err, "without Gaussians has ")
     }
 
-    /// Returns the bytes of a package of the Gaussian with the highest score, which the error of a bake names if only an empty package fits.
+    /// Returns the bytes of a package of the Gaussian with the highest score, which the error of a bake names if only an empty package
+    /// fits.
     fn bytes_of_one(&self) -> u64 {
         let refused = self.bake_to_size(self.bytes_of_none() as f64 + 0.5, &[]);
         refused.must_fail("a single Gaussian has ");
@@ -84,7 +85,7 @@ fn a_bake_writes_a_smaller_package_and_both_reports() {
     assert_eq!((&info["gaussians"], &info["package"]["intact"]), (&1200.into(), &true.into()), "an intact package");
 
     let report: Value = serde_json::from_str(&read(&capture.path("out.report.json"))).expect("JSON");
-    assert_eq!(report, json, "the printed report is the written one");
+    assert_eq!(report, json, "the printed report equals the written report");
     for name in ["sections", "trials", "stages", "times", "choices", "filter_share"] {
         assert!(report[name].as_array().is_some_and(|list| !list.is_empty()), "{name} in {report}");
     }
@@ -121,7 +122,7 @@ fn a_bake_writes_a_smaller_package_and_both_reports() {
 #[test]
 fn a_package_that_looks_different_over_white_is_noted() {
     let capture = capture(Vec3::ZERO, true);
-    // The images cover only what is bright: the rest of the scene is fog, which black hides.
+    // The images cover only bright pixels: the rest of the scene is fog, which is invisible over black.
     for split in ["train", "test"] {
         for name in folders::names(&capture.data.join(split)) {
             let path = capture.data.join(split).join(name);
@@ -138,7 +139,11 @@ fn a_package_that_looks_different_over_white_is_noted() {
     let run = gs4d(&[arguments.to_vec(), arguments!["--no-fine-tune", "--engine", "cpu"].to_vec()].concat());
     let note =
         run.err.lines().find(|line| line.contains("note: the PSNR of the package is")).unwrap_or_default().to_owned();
-    assert!(note.contains("dB over black and") && note.contains("dB over white"), "both are named: {}", run.err);
+    assert!(
+        note.contains("dB over black and") && note.contains("dB over white"),
+        "the note has both values: {}",
+        run.err
+    );
     let report = run.json();
     for side in ["before", "after"] {
         let evaluation = &report["evaluation"][side];
@@ -147,7 +152,7 @@ fn a_package_that_looks_different_over_white_is_noted() {
         assert!(black > white + 3.0, "fog is visible over white: {black} and {white} dB of {side}");
     }
     let html = read(&capture.path("out.report.html"));
-    assert!(html.contains("PSNR over white, dB") && html.contains("it is black"), "both are on the page");
+    assert!(html.contains("PSNR over white, dB") && html.contains("it is black"), "the page has both values");
 }
 
 /// Changes one image of a capture.
@@ -180,21 +185,21 @@ fn a_changed_image_reruns_the_stages_that_depend_on_it() {
     let with = |stages: &[&'static str]| if has_gpu { [stages, &trained].concat() } else { stages.to_vec() };
     let first = bake();
     assert!(first.starts_with(&["score", "prune"]), "every stage runs at first: {first:?}");
-    assert_eq!(bake(), [""; 0], "nothing has changed");
+    assert_eq!(bake(), [""; 0], "no stage runs again without a change");
     // Camera 2 of 4 is held out.
     change_image(&capture, "c00_01.png");
-    assert_eq!(bake(), with(&[]), "an image to train on");
+    assert_eq!(bake(), with(&[]), "an image to train on changes the stages of training");
     change_image(&capture, "c02_01.png");
     let reran = bake();
-    assert_eq!(reran.first(), Some(&"prune"), "an image to validate on: {reran:?}");
+    assert_eq!(reran.first(), Some(&"prune"), "an image to validate on changes the choice: {reran:?}");
     assert!(!reran.contains(&"score"), "scores come from cameras and times alone: {reran:?}");
-    assert_eq!(bake(), [""; 0], "nothing has changed since");
+    assert_eq!(bake(), [""; 0], "no stage runs again without a further change");
     let cameras = capture.data.join("transforms_train.json");
     let text = read(&cameras);
     let moved = text.replacen("\"time\":0.0", "\"time\":0.01", 1);
     assert_ne!(text, moved, "a time is changed");
     fs::write(&cameras, moved).expect("the folder can be written to");
-    assert_eq!(bake().first(), Some(&"score"), "a time of a view");
+    assert_eq!(bake().first(), Some(&"score"), "a changed time reruns the scores");
 }
 
 #[test]
@@ -204,7 +209,7 @@ fn finished_stages_are_skipped() {
     let bake = |more: &[&str]| {
         let fixed = arguments!["bake", &capture.scene, "--data", &capture.data, "-o", &out, "--keep-work"];
         let run = gs4d(&[fixed.to_vec(), more.iter().map(Into::into).collect()].concat());
-        assert_eq!(run.code, Some(0), "it works: {}", run.err);
+        assert_eq!(run.code, Some(0), "the command succeeds: {}", run.err);
         run.err
     };
     let skipped = |log: &str, stage: &str| log.contains(&format!("{stage}: skipped"));
@@ -221,7 +226,7 @@ fn finished_stages_are_skipped() {
     fs::remove_file(&out).expect("the package exists");
     let lost = bake(&["--ratio", "0.3"]);
     assert!(skipped(&lost, "prune") && skipped(&lost, "compress"), "a lost package is written from its stage: {lost}");
-    assert!(out.is_file(), "the package is there again");
+    assert!(out.is_file(), "the package is written again");
 }
 
 #[test]
@@ -308,7 +313,7 @@ fn a_package_that_stays_too_large_is_kept_in_the_work_folder() {
     run.must_fail("does not fit");
     run.must_fail("not even with a single Gaussian");
     run.must_fail("choose a lower quality or a larger size");
-    assert_eq!(read(&out), "the old package", "the old package stays");
+    assert_eq!(read(&out), "the old package", "the old package is unchanged");
     let kept = capture.path("out.gs4d.bake/too-large.gs4d");
     run.must_fail(&kept.display().to_string());
     let bytes = fs::metadata(&kept).expect("the package is kept").len();
@@ -321,7 +326,7 @@ fn a_package_that_stays_too_large_is_kept_in_the_work_folder() {
     assert_eq!(
         capture.left(),
         ["data", "out.gs4d", "out.gs4d.bake", "out.report.html", "out.report.json", "scene.gs4d"],
-        "a later bake leaves the package that the user was told is kept"
+        "a later bake does not remove the kept package"
     );
 }
 
@@ -352,14 +357,14 @@ fn a_size_below_that_of_an_empty_package_is_refused_before_scoring() {
 fn parts_shared_by_all_gaussians_count_once_for_the_target_size() {
     let capture = surrounded();
     let one = capture.bytes_of_one();
-    assert!(one > 20_000, "most bytes are those of the environment map: {one}");
+    assert!(one > 20_000, "most bytes belong to the environment map: {one}");
     let limit = one + 10_000;
     let run = capture.bake_to_size(limit as f64 + 0.5, &["--json"]);
     assert!(!run.err.contains("again with"), "the count is found in one attempt: {}", run.err);
     let json = run.json();
     let (bytes, kept) = (json["bytes"]["after"].as_u64(), json["gaussians"]["after"].as_u64());
     assert!(bytes.is_some_and(|bytes| (one..=limit).contains(&bytes)), "within the target size: {bytes:?} of {limit}");
-    assert!(kept.is_some_and(|kept| (100..1500).contains(&kept)), "as many Gaussians as fit: {kept:?}");
+    assert!(kept.is_some_and(|kept| (100..1500).contains(&kept)), "between 100 and 1500 Gaussians fit: {kept:?}");
 }
 
 #[test]
@@ -393,7 +398,11 @@ fn with_training_scores_are_compared_after_training_and_pruning_may_take_rounds(
     let best = |a: &&Value, b: &&Value| a["psnr"].as_f64().partial_cmp(&b["psnr"].as_f64()).expect("numbers");
     let winner = tried.iter().max_by(best).expect("at least one trial")["variant"].clone();
     let score = gradual["choices"].as_array().and_then(|all| all.iter().find(|pair| pair[0] == "score")).expect("one");
-    assert_eq!(winner, format!("{}, 6 steps", score[1].as_str().expect("a name")), "the best after training");
+    assert_eq!(
+        winner,
+        format!("{}, 6 steps", score[1].as_str().expect("a name")),
+        "the score with the highest PSNR after training is chosen"
+    );
     let stages = gradual["stages"].as_array().expect("a list");
     assert!(stages.iter().any(|stage| stage["name"] == "rounds"), "pruning in two rounds: {stages:?}");
     let loss = bake(["--max-loss", "8"], "1");

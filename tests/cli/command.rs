@@ -69,7 +69,7 @@ fn coded_colors_are_described_and_lowered() {
     let info = gs4d(&arguments!["info", &demo, "--json"]).json();
     let figures = |info: &Value| [&info["degree"], &info["degree_t"], &info["coefficients"]].map(Value::clone);
     assert_eq!(figures(&info), [3, 2, 48].map(Value::from), "the degrees of the bundled capture");
-    assert_eq!(info["codebooks"], Value::from(vec![1024; 4]), "its codebooks");
+    assert_eq!(info["codebooks"], Value::from(vec![1024; 4]), "the codebooks of the bundled capture");
     let text = gs4d(&arguments!["info", &demo]).text();
     assert!(
         text.contains("degree 3, time degree 2, 48 coefficients, coded by 4 codebooks"),
@@ -81,7 +81,7 @@ fn coded_colors_are_described_and_lowered() {
     gs4d(&arguments!["convert", &coded, &plain, "--sh-degree", "0"]).text();
     let info = gs4d(&arguments!["info", &plain, "--json"]).json();
     assert_eq!(figures(&info), [0, 0, 1].map(Value::from), "the requested degree");
-    assert_eq!(info["form"], "packed", "still packed");
+    assert_eq!(info["form"], "packed", "the form is unchanged");
     let bytes = |path: &Path| fs::metadata(path).expect("the package exists").len();
     assert!(bytes(&plain) < bytes(&coded), "without codebooks it is smaller");
 }
@@ -92,7 +92,7 @@ fn a_duration_of_zero_is_stored() {
     let (moving, still) = (scene(&folder, "50"), folder.path().join("still.gs4d"));
     gs4d(&arguments!["convert", &moving, &still, "--duration", "0"]).text();
     let info = gs4d(&arguments!["info", &still, "--json"]).json();
-    assert_eq!(info["switches"]["playback"]["duration_seconds"], 0.0, "it is stored and read again");
+    assert_eq!(info["switches"]["playback"]["duration_seconds"], 0.0, "the duration is stored and read again");
     gs4d(&arguments!["convert", &moving, &still, "--duration=-1"]).must_fail("--duration");
 }
 
@@ -101,7 +101,7 @@ fn sections_of_one_name_are_listed_once() {
     let folder = folder();
     let path = scene(&folder, "50");
     let mut parts = Parts::of(&fs::read(&path).expect("the package exists"));
-    // Two names in turn, then many of their own; sections of unknown names may claim any length.
+    // Two repeated names, and many unique names; sections of unknown names may have any length.
     let names = (0..20_000).flat_map(|i| ["even".to_owned(), "odd".to_owned(), format!("x{i}")]);
     let rest = "encoding: \"y\", first: 0, count: 0, length: 0, raw_length: 18446744073709551615, crc32: 0";
     let entries: String = names.map(|name| format!("(name: \"{name}\", {rest}),\n")).collect();
@@ -110,7 +110,7 @@ fn sections_of_one_name_are_listed_once() {
     fs::write(&path, parts.seal()).expect("the folder can be written to");
     let start = Instant::now();
     let text = gs4d(&arguments!["info", &path]).text();
-    // Comparing each name with each would take minutes.
+    // Comparing every pair of names would take minutes.
     assert!(start.elapsed() < Duration::from_secs(60), "{:?}", start.elapsed());
     let rows = |start: &str| text.lines().filter(|line| line.starts_with(start)).count();
     assert_eq!((rows("even "), rows("odd "), rows("x")), (1, 1, 20_000), "one row for each name");
@@ -143,7 +143,7 @@ fn control_characters_of_a_file_are_escaped() {
             let is_fake = |line: &str| line.starts_with("error: fake");
             assert!(
                 !run.out.lines().chain(run.err.lines()).any(is_fake),
-                "{options:?}: the name does not make a line of its own"
+                "{options:?}: the name does not make a separate line"
             );
             assert!((run.out + &run.err).contains("[2J"), "{options:?}: the name is shown");
         }
@@ -169,8 +169,8 @@ fn options_that_no_table_supports_are_experimental() {
     };
     let expected =
         ["mask-weight", "motion-weight", "rigid-weight", "opacity-weight", "sparse", "sums", "round-geometry"];
-    assert_eq!(under_heading("finetune"), expected, "of finetune");
-    assert_eq!(under_heading("bake"), ["sums"], "of bake");
+    assert_eq!(under_heading("finetune"), expected, "the experimental options of finetune");
+    assert_eq!(under_heading("bake"), ["sums"], "the experimental options of bake");
 }
 
 #[test]
@@ -294,7 +294,10 @@ fn errors_of_usage_are_json_with_the_option() {
         run.must_fail(name);
         let document: Value = serde_json::from_str(&run.out).expect("one JSON document for an error of usage");
         let error = document["error"].as_str().expect("an error");
-        assert!(error.contains(name) && !error.contains("Usage") && !error.contains('\n'), "{name} in short: {error}");
+        assert!(
+            error.contains(name) && !error.contains("Usage") && !error.contains('\n'),
+            "{name} without the usage: {error}"
+        );
     }
     let text = gs4d(&["info"]);
     text.must_fail("FILE");

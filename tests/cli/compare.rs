@@ -26,8 +26,12 @@ fn metrics_of_equal_and_different_pictures_are_right() {
         let pictures = json["pictures"].as_array().expect("a list of pictures");
         pictures.iter().find(|row| row["name"] == name).expect("the picture is listed").clone()
     };
-    assert_eq!((&row("same")["psnr"], &row("same")["identical"]), (&200.0.into(), &true.into()), "the cap, and a flag");
-    assert_eq!(row("other")["identical"], false, "these differ");
+    assert_eq!(
+        (&row("same")["psnr"], &row("same")["identical"]),
+        (&200.0.into(), &true.into()),
+        "the largest PSNR, and a flag"
+    );
+    assert_eq!(row("other")["identical"], false, "different pictures are not marked as identical");
     assert!((row("same")["ssim"].as_f64().expect("a number") - 1.0).abs() < 1e-9, "identical");
     // 51 and 102 of 255: a difference of exactly one fifth.
     let psnr = row("other")["psnr"].as_f64().expect("a number");
@@ -40,9 +44,12 @@ fn metrics_of_equal_and_different_pictures_are_right() {
         "identical pictures are left out of the mean"
     );
     let pooled = mean["psnr_pooled"].as_f64().expect("a number");
-    assert!((pooled - psnr - 10.0 * 2f64.log10()).abs() < 1e-3, "half of the squared error: {pooled}");
+    assert!((pooled - psnr - 10.0 * 2f64.log10()).abs() < 1e-3, "the mean squared error is halved: {pooled}");
     let text = gs4d(&arguments!["compare", a.path(), b.path()]).text();
-    assert!(text.contains("1 of 2 pictures are identical and not part of the mean PSNR"), "it is said: {text}");
+    assert!(
+        text.contains("1 of 2 pictures are identical and not part of the mean PSNR"),
+        "the text counts identical pictures: {text}"
+    );
 
     let one = a.path().join("same.png");
     let text = gs4d(&arguments!["compare", &one, &b.path().join("other.png")]).text();
@@ -77,7 +84,7 @@ fn raw_pictures_need_a_size() {
     gs4d(&arguments!["compare", &path, &path]).must_fail("--size");
     gs4d(&arguments!["compare", &path, &path, "--size", "16x13"]).must_fail("a.f32");
     let json = gs4d(&arguments!["compare", &path, &path, "--size", "16x12", "--json"]).json();
-    assert_eq!(json["pictures"][0]["psnr_pooled"], 200.0, "identical: the cap");
+    assert_eq!(json["pictures"][0]["psnr_pooled"], 200.0, "identical pictures have the largest PSNR");
     let png = folder.path().join("a.png");
     picture.clamped().to_rgb8().save(&png).expect("the folder can be written to");
     let json = gs4d(&arguments!["compare", &path, &png, "--size", "16x12", "--json"]).json();

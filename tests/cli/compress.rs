@@ -1,7 +1,7 @@
 //! `gs4d compress`, run as a user runs it on extreme scenes and settings.
 //!
-//! In: synthetic scenes with extreme values, extreme options. Out: proof that the package at OUT stays if
-//! compression fails, and is replaced by a readable one otherwise.
+//! In: synthetic scenes with extreme values, extreme options. Out: proof that the package at OUT is unchanged if
+//! compression fails, and is replaced by a readable package otherwise.
 
 use crate::support::command::{arguments, folder, gs4d, scene};
 use bevy_gs4d::codec::package::WriteSettings;
@@ -23,7 +23,7 @@ fn changed(folder: &TempDir, name: &str, change: impl FnOnce(&mut Trained)) -> P
 }
 
 #[test]
-fn a_scene_that_cannot_be_packed_leaves_the_existing_package() {
+fn a_scene_that_cannot_be_packed_does_not_change_the_existing_package() {
     let folder = folder();
     let (good, out) = (scene(&folder, "300"), folder.path().join("out.gs4d"));
     gs4d(&arguments!["compress", &good, &out, "--verify", "0"]).text();

@@ -97,14 +97,14 @@ fn render_draws_a_level_with_the_training_pixel_of_the_level() {
     let level = &all.levels[0].scene;
     let pixel = level.trained_with.pixel;
     assert!(pixel.is_some(), "a level has a training pixel");
-    let capture = headless.upload(level).expect("it fits");
+    let capture = headless.upload(level).expect("the scene fits the GPU");
     for shot in orbit(&all, 2, size).expect("the scene has Gaussians") {
         let bytes = fs::read(frames.join(&shot.name).with_extension("f32")).expect("the raw picture exists");
         let values: Vec<f32> = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
         let drawn = Picture { size, pixels: values.chunks_exact(3).map(Vec3::from_slice).collect() };
         let mut psnr = |pixel| {
             let view = shot.view(&all).antialiased(pixel);
-            let frame = headless.render(&capture, &view, all.trained_background()).expect("it is drawn");
+            let frame = headless.render(&capture, &view, all.trained_background()).expect("the view is drawn");
             SquaredError::of(&drawn, &frame.picture).expect("one size").psnr()
         };
         let (plugin, plain) = (psnr(pixel), psnr(None));

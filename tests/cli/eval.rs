@@ -1,7 +1,7 @@
-//! `gs4d eval` and `gs4d ablate`, run as a user runs them on a scene's own pictures.
+//! `gs4d eval` and `gs4d ablate`, run as a user runs them, on pictures of the scene itself.
 //!
 //! In: a small synthetic scene and a dataset drawn from it by the CPU reference. Out: proof that the scene matches its
-//! own pictures, that figures over any background equal those of an independent composite, that identical views are counted, that
+//! own pictures, that figures over any background equal an independent composite, that identical views are counted, that
 //! missing data is named, and that the tables have the documented rows and columns.
 
 use crate::support::capture::Capture;
@@ -32,7 +32,7 @@ fn a_scene_matches_its_own_pictures() {
     let mean = |name: &str| json["mean"][name].as_f64().unwrap_or_else(|| panic!("{name} in {json}"));
     assert!(mean("psnr") > 60.0 && mean("psnr_pooled") > 60.0, "only the rounding to 8 bits differs: {}", json["mean"]);
     assert!(mean("ssim") > 0.9995 && mean("ms_ssim") > 0.9995, "nearly 1: {}", json["mean"]);
-    assert!((0.0..0.01).contains(&mean("flip")), "hardly any difference: {}", json["mean"]);
+    assert!((0.0..0.01).contains(&mean("flip")), "a FLIP below 0.01: {}", json["mean"]);
     let name = json["views"][0]["name"].as_str().expect("a name");
     let picture = image::open(pictures.join(format!("{name}.png"))).expect("a picture").into_rgb8();
     assert_eq!(picture.dimensions(), (3 * 192, 176), "reference, render and difference");
@@ -70,7 +70,7 @@ fn texel(view: usize, x: u32, y: u32) -> (Vec3, u8) {
     (Vec3::new(value(3), value(5), value(7)), alpha)
 }
 
-/// Returns the mean over views of the mean of the channels' PSNR, as an independent composite in double precision has it.
+/// Returns the mean over views of the mean PSNR of the channels, from an independent composite in double precision.
 fn independent_psnr(scene: &RuntimeScene, cameras: &Path, background: [f32; 3]) -> f64 {
     let views = CameraFile::load(cameras, &CameraOptions::default()).expect("a valid camera file");
     let of_view = |(index, view): (usize, &TrainingView)| {
@@ -149,7 +149,10 @@ fn figures_over_any_background_equal_an_independent_composite() {
             let text = gs4d(&arguments).text();
             let name = if other == [1.0; 3] { "white" } else { "black" };
             let line = text.lines().find(|line| line.starts_with("contrast")).unwrap_or_default();
-            assert!(line.contains("PSNR") && line.ends_with(&format!("over {name}")), "a line says so: {text}");
+            assert!(
+                line.contains("PSNR") && line.ends_with(&format!("over {name}")),
+                "a line has the PSNR and the background: {text}"
+            );
         }
     }
 }
@@ -183,8 +186,11 @@ fn identical_views_are_counted_and_left_out_of_the_mean() {
     let pooled = psnr(&after, "psnr_pooled") - psnr(&before, "psnr_pooled");
     assert!((pooled - more).abs() < 1e-6, "all pixels are pooled: {pooled}");
     let text = gs4d(&arguments!["eval", &scene, "--data", &data, "--metrics", "psnr", "--engine", "cpu"]).text();
-    assert!(text.contains("1 of 7 views are identical and not part of the mean PSNR"), "it is said: {text}");
-    assert!(text.contains("the images have no gaps"), "why there is one background: {text}");
+    assert!(
+        text.contains("1 of 7 views are identical and not part of the mean PSNR"),
+        "the text counts identical views: {text}"
+    );
+    assert!(text.contains("the images have no gaps"), "the text has the reason for a single background: {text}");
 }
 
 #[test]
@@ -201,7 +207,7 @@ fn an_environment_map_has_no_contrasting_background() {
     let json = gs4d(&[fixed.to_vec(), arguments!["--json"].to_vec()].concat()).json();
     assert_eq!((&json["has_gaps"], &json["contrast"]), (&true.into(), &Value::Null), "no second background");
     let text = gs4d(&fixed).text();
-    assert!(text.contains("over the environment map of the scene"), "a line says why: {text}");
+    assert!(text.contains("over the environment map of the scene"), "a line has the reason: {text}");
 }
 
 #[test]
@@ -229,7 +235,8 @@ fn errors_name_only_options_of_the_verb() {
     let frame = json!({ "file_path": "nothing", "time": 0, "transform_matrix": Mat4::IDENTITY.to_cols_array_2d() });
     for split in ["train", "test"] {
         let cameras = json!({ "camera_angle_x": 0.7, "frames": [frame] });
-        fs::write(data.join(format!("transforms_{split}.json")), cameras.to_string()).expect("it can be written to");
+        fs::write(data.join(format!("transforms_{split}.json")), cameras.to_string())
+            .expect("the folder can be written to");
     }
     let eval = gs4d(&arguments!["eval", &scene, "--data", &data]);
     eval.must_fail("the picture size is unknown");
@@ -265,7 +272,7 @@ fn an_ablation_has_every_row() {
     assert_eq!(rows.len(), 1 + 2 * 2 + 2 * 2, "vanilla, filters by key-frames, variants by ratios: {json}");
     let row = |name: &str| rows.iter().find(|row| row["row"] == name).unwrap_or_else(|| panic!("{name} in {json}"));
     let psnr = |name: &str| row(name)["psnr"].as_f64().expect("a number");
-    assert!(psnr("vanilla") > 60.0, "its own pictures");
+    assert!(psnr("vanilla") > 60.0, "the PSNR against pictures of the scene itself");
     assert_eq!(row("filter only, support, 5 key-frames")["psnr"], row("vanilla")["psnr"], "support changes no pixel");
     assert!(
         row("filter only, support, 5 key-frames")["active_share"].as_f64().is_some_and(|s| s < 1.0),

@@ -1,7 +1,8 @@
-//! Faults while a verb writes: killed at any moment, a folder that cannot be written to, a full disk, closed pipes, two at once.
+//! Faults while a verb writes: killed at any moment, a folder that cannot be written to, a full disk, closed pipes, two runs at once.
 //!
 //! In: every verb that writes, on small inputs made here. Out: proof that inputs are unchanged, that an output is absent, unchanged
-//! or complete and readable, and that the next run without a fault leaves no other files. Verbs that need a GPU are skipped where there is none.
+//! or complete and readable, and that the next run without a fault leaves no other files. Verbs that need a GPU are skipped where there is
+//! none.
 //!
 //! `GS4D_KILLS` is how often each verb is killed, for long runs: 4 times if it is not set.
 
@@ -35,7 +36,7 @@ const OLD: &[u8] = b"the old file";
 /// A verb that writes.
 struct Verb {
     name: &'static str,
-    /// Its arguments, given the folder of the inputs and that of the outputs.
+    /// Its arguments, given the folders of the inputs and of the outputs.
     arguments: fn(&Path, &Path) -> Vec<OsString>,
     /// The files that it writes.
     files: &'static [&'static str],
@@ -155,7 +156,7 @@ struct Stage {
     inputs: BTreeMap<PathBuf, Vec<u8>>,
 }
 
-/// A verb with a folder of its own.
+/// A verb with its own folder for outputs.
 struct Act<'a> {
     verb: Verb,
     stage: &'a Stage,
@@ -218,7 +219,7 @@ impl Act<'_> {
         command
     }
 
-    /// Returns the word that the names of all its files begin with.
+    /// Returns the common beginning of the names of its files.
     fn word(&self) -> &'static str {
         self.verb.files[0].split(['.', '_']).next().unwrap_or_default()
     }
@@ -230,7 +231,7 @@ impl Act<'_> {
         }
     }
 
-    /// Checks that the inputs are unchanged, and that each output is the old one or complete.
+    /// Checks that the inputs are unchanged, and that each output is the old file or a complete new file.
     fn check(&self, context: &str) {
         let context = format!("{} {context}", self.verb.name);
         for file in self.verb.files {
@@ -257,7 +258,7 @@ impl Act<'_> {
         self.check_inputs(&context);
     }
 
-    /// Runs the verb without a fault, after one.
+    /// Runs the verb without a fault, after a fault.
     fn run_well(&self, context: &str) {
         let run = Run::of(&self.command().output().expect("the command starts"));
         assert_eq!(run.code, Some(0), "{} works {context}: {}", self.verb.name, run.err);
@@ -297,11 +298,11 @@ fn kills() -> usize {
     wanted.map_or(4, |wanted| wanted.parse().expect("GS4D_KILLS is a number"))
 }
 
-/// Ends a process at once, or by asking it to.
+/// Ends a process by SIGKILL or by a signal that it can handle.
 fn end(child: &mut Child, asking: bool) {
     if asking {
         let asked = Command::new("kill").args(["-TERM", &child.id().to_string()]).status();
-        assert!(asked.is_ok_and(|status| status.success()), "the process can be asked to end");
+        assert!(asked.is_ok_and(|status| status.success()), "the signal can be sent");
     } else {
         child.kill().expect("the process can be killed");
     }
@@ -340,7 +341,7 @@ fn a_folder_that_cannot_be_written_to_is_named_and_unchanged() {
         act.put_old();
         let before = contents(&act.out);
         fs::set_permissions(&act.out, Permissions::from_mode(0o555)).expect("permissions can be set");
-        // Root may write in spite of permissions; in /proc no user can create a file.
+        // Root may write in spite of permissions; no user can create a file in /proc.
         let holds = File::create(act.out.join("probe")).is_err();
         let out = if holds { act.out.as_path() } else { Path::new("/proc") };
         let run = gs4d(&act.arguments(out));
@@ -389,7 +390,7 @@ fn a_full_disk_is_named_and_the_old_output_stays() {
         let run = Run::of(&act.command().output().expect("the command starts"));
         assert_eq!(run.code, Some(2), "{} to a full device: {}", act.verb.name, run.err);
         assert!(run.err.contains("error:") && !run.err.contains("panicked"), "{}: {}", act.verb.name, run.err);
-        assert!(device.is_symlink(), "{}: the link to the device stays", act.verb.name);
+        assert!(device.is_symlink(), "{}: the link to the device is unchanged", act.verb.name);
         act.check_inputs(act.verb.name);
         fs::remove_file(&device).expect("the file exists");
         act.run_well("to a file again");

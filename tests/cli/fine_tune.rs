@@ -1,8 +1,8 @@
-//! `gs4d finetune`, run as a user runs it on a scene's own pictures.
+//! `gs4d finetune`, run as a user runs it, on pictures of the scene itself.
 //!
 //! In: a small synthetic scene, a dataset drawn from it, the scene pruned. Out: proof that training raises quality, that the result can be
-//! compressed in the same run, that the report of a compressed or interrupted run has no value that was not measured, and that wrong inputs are
-//! refused and leave no files. Skipped where there is no GPU.
+//! compressed in the same run, that the report of a compressed or interrupted run has no value that was not measured, and that wrong inputs
+//! are refused and leave no files. Skipped where there is no GPU.
 
 use crate::support::capture::Capture;
 use crate::support::command::{GS4D, Run, arguments, gs4d};
@@ -203,7 +203,7 @@ fn invalid_inputs_of_training_are_refused_and_leave_no_files() {
     gs4d(&weighted).must_fail("--rigid-weight");
     // The images of another scene.
     let other = synthesize(&SynthSettings { count: 1000, seed: 9, ..SynthSettings::default() });
-    let mut other = other.into_runtime().expect("it can be drawn");
+    let mut other = other.into_runtime().expect("the scene can be drawn");
     other.trained_with.background = [0.9, 0.8, 0.1];
     let elsewhere = lesson.path("elsewhere");
     dataset::write(&elsewhere, &other, Vec3::new(0.0, 0.0, 40.0), 4, 4, UVec2::splat(48), true);

@@ -1,6 +1,6 @@
 //! The `gs4d` command, run as a user runs it.
 //!
-//! In: command lines, scenes and datasets made here, and the trained captures where `GS4D_DATA` names their folder.
+//! In: command lines, scenes and datasets made here, and the trained captures if `GS4D_DATA` names their folder.
 //! Out: one test binary. The header of each module names the verbs that it tests.
 
 mod bake;

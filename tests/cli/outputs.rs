@@ -1,8 +1,8 @@
 //! The outputs of verbs, run as a user runs them.
 //!
 //! In: a small synthetic scene, a dataset drawn from it, outputs of every kind. Out: proof that no verb writes over an input, that bad
-//! outputs are refused before any input is read, that replaced files keep their links and permissions, and that two runs do not disturb
-//! each other.
+//! outputs are refused before any input is read, that replaced files keep their links and permissions, and that two runs to the same output
+//! do not mix.
 
 use crate::support::capture::Capture;
 use crate::support::command::{arguments, folder, gs4d, scene};
@@ -190,7 +190,7 @@ fn replaced_files_keep_their_links_and_permissions() {
     fs::set_permissions(&out, fs::Permissions::from_mode(0o640)).expect("permissions can be set");
     symlink("out.gs4d", &link).expect("the folder can be written to");
     gs4d(&arguments!["convert", &input, &link]).text();
-    assert!(link.is_symlink(), "the link is still a link");
+    assert!(link.is_symlink(), "the link is not replaced by a file");
     assert_eq!(
         fs::read(&out).expect("the file exists"),
         fs::read(&input).expect("the file exists"),
@@ -244,6 +244,6 @@ fn a_second_run_to_the_same_output_is_refused() {
         running.lock().expect("the file is not locked");
         let run = gs4d(&arguments![verb, &capture.scene, "--data", &capture.data, "-o", &out]);
         run.must_fail(&format!("{name}: another run of gs4d works in this folder"));
-        assert!(lock.exists() && !out.exists(), "{verb}: the lock stays and no output is written");
+        assert!(lock.exists() && !out.exists(), "{verb}: the lock is kept and no output is written");
     }
 }

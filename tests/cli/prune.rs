@@ -24,7 +24,7 @@ struct Bench {
 }
 
 impl Bench {
-    /// Writes the scene and its data. `images`: whether the training images exist; `astray`: whether the cameras look
+    /// Writes the scene and its data. `images`: whether the training images exist; `astray`: whether the cameras point
     /// away from the scene.
     fn new(images: bool, astray: bool) -> Self {
         let bench = Self { folder: tempfile::tempdir().expect("a temporary folder") };
@@ -99,13 +99,13 @@ fn every_score_is_written_by_one_run() {
 fn auto_keeps_the_best_of_the_scores_it_tries() {
     let bench = Bench::new(true, false);
     let json = bench.run("prune", &["--ratio", "0.4", "-o", &bench.path("pruned.gs4d")]).json();
-    assert_eq!(json["gaussians"], 240, "six of ten");
+    assert_eq!(json["gaussians"], 240, "six of ten Gaussians are kept");
     let rows = json["contest"]["candidates"].as_array().expect("candidates").clone();
     let psnr = |row: &Value| row["psnr"].as_f64().expect("a number");
     let best = rows.iter().map(psnr).fold(f64::NEG_INFINITY, f64::max);
-    assert_eq!((rows.len(), psnr(&json)), (4, best), "the best of four: {rows:?}");
-    let named = rows.iter().find(|row| row["score"] == json["score"]).expect("the score is one of them");
-    assert_eq!(psnr(named), best, "and is named");
+    assert_eq!((rows.len(), psnr(&json)), (4, best), "the highest of four PSNRs: {rows:?}");
+    let named = rows.iter().find(|row| row["score"] == json["score"]).expect("the score is among the rows");
+    assert_eq!(psnr(named), best, "the named score has the highest PSNR");
     assert_eq!(json["contest"]["views"], 1, "the views of one camera are held out");
     let info = gs4d(&arguments!["info", bench.path("pruned.gs4d"), "--json"]).json();
     assert_eq!((&info["gaussians"], &info["form"]), (&240.into(), &"trained".into()), "the written package");
@@ -193,7 +193,7 @@ fn filters_report_their_active_fraction() {
     assert!(support < 1.0, "some Gaussians are inactive");
     let (scene, data, out) = (bench.path("scene.gs4d"), bench.path(""), bench.path("filtered.gs4d"));
     let every = gs4d(&arguments!["mask", scene, "--data", data, "--every", "3", "-o", out, "--json"]).json();
-    assert_eq!(every["key_frames"], 5, "twelve times, every third");
+    assert_eq!(every["key_frames"], 5, "a key-frame for every third of twelve times, and both ends");
     let alone = arguments!["mask", bench.path("scene.gs4d"), "-o", bench.path("filtered.gs4d"), "--json"];
     assert_eq!(gs4d(&alone).json()["key_frames"], 11, "support needs no data");
 }

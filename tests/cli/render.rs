@@ -1,7 +1,7 @@
 //! `gs4d render` and `bench`, run as a user runs them.
 //!
 //! In: a synthetic scene; with `GS4D_DATA` set, the trained captures. Out: proof that pictures are written and frames timed, and that
-//! renders match the original's. Skipped where there is no GPU.
+//! renders match the original. Skipped where there is no GPU.
 
 use crate::support::capture::Capture;
 use crate::support::command::{arguments, folder, gs4d, scene};

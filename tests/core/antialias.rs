@@ -1,7 +1,7 @@
 //! Anti-aliasing: views with larger pixels than training had.
 //!
-//! In: a disk of many small Gaussians, drawn by the CPU reference in a small picture and in a large one that is averaged down. Out: proof that
-//! small pictures are much closer to the averages with anti-aliasing, and that views with pixels of training size do not change.
+//! In: a disk of many small Gaussians, drawn by the CPU reference in a small picture, and in a large picture that is averaged down. Out:
+//! proof that small pictures are much closer to the averages with anti-aliasing, and that views with pixels of training size do not change.
 
 use crate::support::blob::blob;
 use bevy_gs4d::gaussian::Harmonics;
@@ -39,7 +39,7 @@ fn view(side: u32) -> View {
     Camera::look_at(eye, Vec3::ZERO, Vec3::Y, 2.0 * 0.05f32.atan(), UVec2::splat(side)).view(0.5, RasterFov::Corrected)
 }
 
-/// Returns the mean square difference of a far picture from the means of the pixels of a near one.
+/// Returns the mean square difference of a far picture from the means of the pixels of a near picture.
 fn error(far: &Frame, near: &Frame) -> f32 {
     let (side, wide) = (far.picture.size.x, near.picture.size.x);
     let mut sum = 0.0;
@@ -69,7 +69,7 @@ fn antialiasing_does_not_change_views_with_pixels_of_training_size() {
         let view = view(side);
         let [plain, smooth] =
             [view, view.antialiased(Some(1.01 * PIXEL))].map(|view| render(&disk, &view, BLACK).picture);
-        assert_eq!(plain, smooth, "{side} pixels, no larger than in training");
+        assert_eq!(plain, smooth, "a view of {side} pixels, whose pixels are no larger than in training");
     }
-    assert_eq!(view(9).antialiased(None), view(9), "a view stays as it is if the size of training pixels is unknown");
+    assert_eq!(view(9).antialiased(None), view(9), "a view is unchanged if the size of training pixels is unknown");
 }

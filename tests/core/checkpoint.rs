@@ -1,7 +1,7 @@
 //! Reading checkpoints of the original trainer.
 //!
-//! In: the checkpoints in `tests/golden/`, crafted ones and, with `GS4D_DATA` set, those of trained captures. Out:
-//! proof that each is read as the scene that it was written from.
+//! In: the checkpoints in `tests/golden/`, crafted checkpoints and, with `GS4D_DATA` set, checkpoints of trained captures. Out:
+//! proof that each is read as the scene that was written.
 
 use crate::support::data;
 use crate::support::golden;
@@ -54,7 +54,7 @@ fn raw(scene: &Value, name: &str) -> Vec<f32> {
 }
 
 #[test]
-fn golden_checkpoints_hold_the_golden_scenes() {
+fn golden_checkpoints_are_read_as_the_golden_scenes() {
     let scenes = [
         ("rot4d_sh3_t2", Model::Rotated4d, 3, 2),
         ("nonrot4d_sh3_t1", Model::Unrotated4d, 3, 1),
@@ -118,9 +118,13 @@ fn unflipped_rotations_are_converted_on_request() {
     let (before, after) = (read(&pth), read_with(&pth, &unflipped).expect("valid"));
     let mut expected = parameters(&before).clone();
     expected.flip_rotations();
-    assert_ne!(expected, *parameters(&before), "the conversion changes something");
+    assert_ne!(expected, *parameters(&before), "the conversion changes the rotations");
     assert_eq!(*parameters(&after), expected, "both quaternions are converted");
-    assert_eq!(after.trained_with.rotation_convention, RotationConvention::Unflipped, "the file's convention is kept");
+    assert_eq!(
+        after.trained_with.rotation_convention,
+        RotationConvention::Unflipped,
+        "the convention of the file is kept"
+    );
 }
 
 #[test]
@@ -131,7 +135,11 @@ fn coefficients_of_time_that_are_all_zero_mean_unflipped_rotations() {
     }
     let flipped = ReadOptions { rotation_convention: Some(RotationConvention::Flipped), ..ReadOptions::default() };
     let given = read_with(&pth, &flipped).expect("valid");
-    assert_eq!(given.trained_with.rotation_convention, RotationConvention::Flipped, "an option overrides the guess");
+    assert_eq!(
+        given.trained_with.rotation_convention,
+        RotationConvention::Flipped,
+        "an option overrides the detected convention"
+    );
     let guessed = read(&pth);
     assert_eq!(
         guessed.trained_with.rotation_convention,
@@ -154,7 +162,7 @@ fn coefficients_of_time_that_are_all_zero_mean_unflipped_rotations() {
 }
 
 #[test]
-fn entries_beyond_the_known_ones_are_ignored() {
+fn additional_entries_are_ignored() {
     let mut pth = Pth::rotating(2, 48);
     let plain = read(&pth);
     pth.slots.push(pth::text("a mask"));
@@ -209,8 +217,8 @@ fn degrees_and_coefficients_fit_together() {
     let forced = ReadOptions { force_sh_3d: Some(true), ..ReadOptions::default() };
     let scene = read_with(&Pth::rotating(2, 48), &forced).expect("valid");
     assert_eq!((harmonics(&scene).degree_t, harmonics(&scene).coefficients), (0, 48), "stored, but not evaluated");
-    let scene = read_with(&Pth::rotating(2, 16), &forced).expect("16 are enough without time blocks");
-    assert_eq!(harmonics(&scene).evaluated(), 16, "only the spatial ones");
+    let scene = read_with(&Pth::rotating(2, 16), &forced).expect("16 coefficients suffice without time blocks");
+    assert_eq!(harmonics(&scene).evaluated(), 16, "only spatial coefficients");
 
     let mut young = Pth::rotating(2, 1);
     young.slots[0] = pth::int(0);
@@ -295,7 +303,7 @@ fn trained_captures_load() {
         assert_eq!((scene.len(), harmonics(&scene).coefficients), (90_000, 48), "{file}");
         assert_eq!(scene.model(), Some(Model::Rotated4d), "{file}");
         assert_eq!((harmonics(&scene).degree, harmonics(&scene).degree_t), (3, 2), "{file}");
-        assert!(harmonics(&scene).is_consistent(90_000), "{file}: all coefficients are there");
+        assert!(harmonics(&scene).is_consistent(90_000), "{file}: every Gaussian has all coefficients");
         assert_eq!(scene.into_runtime().expect("every Gaussian can be drawn").len(), 90_000, "{file}");
     }
 }

@@ -1,7 +1,7 @@
 //! Gradients: the CPU reference of the backward passes against golden gradients and against finite differences.
 //!
-//! In: the scenes of `tests/golden/`; four Gaussians made here, so large that every one is blended at every pixel. Out:
-//! proof that the gradient of every raw parameter is right, in every model.
+//! In: the scenes of `tests/golden/`; four Gaussians made here, each so large that it is blended at every pixel.
+//! Out: proof that the gradient of every raw parameter is right, in every model.
 
 use crate::support::golden_gradients::{GoldenGradient, all_gradients, tensor};
 use bevy_gs4d::gaussian::{GradientMode, Harmonics, Model, Parameters, ShDirection, SliceSettings};
@@ -25,12 +25,12 @@ fn of_golden(gradient: &GoldenGradient, mode: GradientMode) -> Vec<ParameterGrad
 
 /// A hundred-thousandth of the norm of each tensor: views are drawn in single precision, the golden gradients in double.
 #[test]
-fn gradients_match_the_golden_ones() {
+fn gradients_match_the_golden_gradients() {
     for golden in all_gradients() {
         for mode in [GradientMode::Exact, GradientMode::Compat] {
             let gradients = of_golden(&golden, mode);
             let expected = golden.expected(mode);
-            assert!(expected.len() >= 8, "{}: the tensors are there", golden.golden.name);
+            assert!(expected.len() >= 8, "{}: there is a gradient for each of at least 8 tensors", golden.golden.name);
             for (name, expected) in expected {
                 let found = tensor(name, &gradients);
                 let of = format!("{} {mode:?} {name}", golden.golden.name);
@@ -78,7 +78,7 @@ const BACKGROUND: Background = Background::Color([0.2, 0.4, 0.6]);
 const GAUSSIANS: usize = 4;
 const COEFFICIENTS: usize = 48;
 
-/// Returns four Gaussians about the origin, with different depths and positive colors.
+/// Returns four Gaussians around the origin, with different depths and positive colors.
 fn four_gaussians(model: Model) -> Trained {
     let (turns, lasts) = (model == Model::Rotated4d, model != Model::Static3d);
     let when = |present: bool, values: [f32; GAUSSIANS]| if present { values.to_vec() } else { Vec::new() };
@@ -133,7 +133,7 @@ impl Case {
         }
     }
 
-    /// Returns the case with settings other than those of training.
+    /// Returns the case with settings that differ from training.
     fn with_slice_settings(self) -> Self {
         Self { slice: SliceSettings { scale_modifier: 0.8, prefilter_var: 0.02 }, ..self }
     }
@@ -169,7 +169,7 @@ impl Case {
         loss
     }
 
-    /// Returns the difference quotient of the loss about one value; `None` if the model has no such parameter.
+    /// Returns the difference quotient of the loss at one value; `None` if the model has no such parameter.
     fn difference(&self, kind: &Kind, index: usize, component: usize) -> Option<f64> {
         let moved = |step: f32| {
             let mut trained = self.trained.clone();
@@ -201,7 +201,7 @@ impl Case {
         depths.sort_by(f32::total_cmp);
         assert!(depths.windows(2).all(|pair| pair[1] - pair[0] > 0.05), "{}: depths {depths:?}", self.name);
         let frame = reference::render(&scene, &self.view, BACKGROUND);
-        assert!(frame.transmittance.iter().all(|&left| left > 0.01), "{}: no pixel stops", self.name);
+        assert!(frame.transmittance.iter().all(|&left| left > 0.01), "{}: no pixel stops early", self.name);
     }
 }
 

@@ -1,6 +1,7 @@
 //! Growing a capture.
 //!
-//! In: a synthetic scene. Out: proof that the parts of a Gaussian together have its mean and covariance, and each its color and opacity.
+//! In: a synthetic scene. Out: proof that the parts of a Gaussian together have its mean and covariance, and that each part has its color
+//! and opacity.
 
 use bevy_gs4d::scene::grow::grow;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};

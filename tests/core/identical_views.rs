@@ -1,7 +1,7 @@
-//! Choosing a number of Gaussians where some views are reproduced exactly.
+//! Choosing a number of Gaussians if some views are reproduced exactly.
 //!
-//! In: a synthetic scene, twenty noisy images of it, and four views that show nothing but the background, whose images the scene
-//! reproduces exactly. Out: proof that the PSNR that decides is finite and that the four views do not change what is chosen.
+//! In: a synthetic scene, twenty noisy images of it, and four views of the background alone, whose images the scene reproduces exactly.
+//! Out: proof that the PSNR of the comparison is finite and that the four views do not change the chosen number.
 
 use bevy_gs4d::internal::offline::quality::{Evaluator, smallest_count};
 use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, TrainingView};
@@ -22,7 +22,7 @@ const EMPTY_VIEWS: usize = 4;
 const SIZE: UVec2 = UVec2::new(48, 40);
 const FOV: f32 = 0.8;
 
-/// A scene, the scores of its Gaussians, and its views: first those that see it, then those that see the background alone.
+/// A scene, the scores of its Gaussians, and its views: first the views of the scene, then the views of the background alone.
 struct Setup {
     scene: GaussianScene,
     runtime: RuntimeScene,
@@ -48,7 +48,7 @@ impl Setup {
             let view = camera.view(time, RasterFov::Reference);
             let mut picture = reference::render(&runtime, &view, Background::Color(background)).picture;
             if index < VIEWS {
-                // Noise as of a capture that is not reproduced exactly.
+                // Noise, so that the scene does not reproduce the image exactly.
                 for (place, pixel) in picture.pixels.iter_mut().enumerate() {
                     *pixel += ((place * 37 + index * 11) % 21) as f32 / 255.0 - 10.0 / 255.0;
                 }
@@ -69,19 +69,19 @@ impl Setup {
     /// Returns the smallest count whose PSNR is at most `loss` dB below that of the whole scene, and the PSNR of the whole scene.
     fn choose(&self, evaluator: &Evaluator, loss: f64) -> (usize, f64) {
         let engine = &mut Engine::Cpu;
-        let baseline = evaluator.psnr(engine, &self.runtime).expect("it can be drawn");
+        let baseline = evaluator.psnr(engine, &self.runtime).expect("the scene can be drawn");
         let psnr = |count| {
             let psnr = evaluator.psnr_of_highest(&mut Engine::Cpu, &self.scene, &self.scores, count);
             psnr.map_err(|error| error.to_string())
         };
-        let (count, trials) = smallest_count(COUNT, 1, baseline - loss, psnr).expect("it can be drawn");
+        let (count, trials) = smallest_count(COUNT, 1, baseline - loss, psnr).expect("the scene can be drawn");
         assert!(baseline.is_finite() && trials.iter().all(|trial| trial.psnr.is_finite()), "{baseline}: {trials:?}");
         (count, baseline)
     }
 }
 
 #[test]
-fn views_that_are_reproduced_exactly_do_not_change_what_is_chosen() {
+fn views_that_are_reproduced_exactly_do_not_change_the_chosen_number() {
     // 51, 102 and 153 of 255 are drawn as they are stored.
     for background in [[0.0; 3], [0.2, 0.4, 0.6]] {
         let setup = Setup::new(background);
@@ -89,14 +89,17 @@ fn views_that_are_reproduced_exactly_do_not_change_what_is_chosen() {
         let trained = &setup.scene.trained_with;
         let evaluator = |views: &[TrainingView]| Evaluator::by_images(views, trained, color).expect("images");
         let (seen, empty) = setup.views.split_at(VIEWS);
-        let alone = evaluator(empty).psnr(&mut Engine::Cpu, &setup.runtime).expect("it can be drawn");
+        let alone = evaluator(empty).psnr(&mut Engine::Cpu, &setup.runtime).expect("the scene can be drawn");
         assert_eq!(alone, MAX_PSNR, "the last views are reproduced exactly");
         for loss in [0.1, 1.0, 6.0] {
             let (without, psnr) = setup.choose(&evaluator(seen), loss);
             let (with, psnr_of_all) = setup.choose(&evaluator(&setup.views), loss);
             assert!((10..COUNT).contains(&without), "some Gaussians are left out: {without}");
             let apart = with.abs_diff(without) as f64 / without as f64;
-            assert!(apart <= 0.05, "{with} of all views, {without} of those that differ, within {loss} dB");
+            assert!(
+                apart <= 0.05,
+                "{with} Gaussians with all views, {without} without the exact views, within {loss} dB"
+            );
             let more = 10.0 * ((VIEWS + EMPTY_VIEWS) as f64 / VIEWS as f64).log10();
             assert!((psnr_of_all - psnr - more).abs() < 1e-6, "the error is spread over more pixels: {psnr_of_all}");
         }
@@ -108,7 +111,7 @@ fn a_scene_that_reproduces_every_view_has_a_finite_psnr() {
     let setup = Setup::new([0.0; 3]);
     let background = Background::Color([0.0; 3]);
     let evaluator = Evaluator::by_scene(&mut Engine::Cpu, &setup.runtime, &setup.views, background);
-    let (count, psnr) = setup.choose(&evaluator.expect("it can be drawn"), 150.0);
-    assert_eq!(psnr, MAX_PSNR, "compared with itself");
+    let (count, psnr) = setup.choose(&evaluator.expect("the scene can be drawn"), 150.0);
+    assert_eq!(psnr, MAX_PSNR, "the scene is compared with its own pictures");
     assert!((1..COUNT).contains(&count), "a loss of 150 dB from the cap allows fewer: {count}");
 }

@@ -1,4 +1,4 @@
-//! Memory that loading takes.
+//! The memory used by loading.
 //!
 //! In: a synthetic package, and with `GS4D_DATA` set a real checkpoint and the package made from it. Out: proof that loading a
 //! capture until it can be drawn never allocates more than three times the size of its file. The allocator counts for all threads of
@@ -15,7 +15,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// The system's allocator, counting. Growing a block counts the old and the new one, as when it has to be moved.
+/// The allocator of the system, with counters. Growing a block counts the old and the new block, as if the block were moved.
 struct Counting;
 
 static NOW: AtomicUsize = AtomicUsize::new(0);

@@ -1,7 +1,7 @@
 //! Tests that need neither a GPU nor Bevy: files, scenes, maths and the CPU reference; with the feature `offline` also
 //! datasets, metrics, scores and quantization.
 //!
-//! In: scenes, files and pictures made here, `tests/golden/`, and the trained captures where `GS4D_DATA` names their
+//! In: scenes, files and pictures made here, `tests/golden/`, and the trained captures if `GS4D_DATA` names their
 //! folder. Out: one test binary. The header of each module describes its tests.
 
 mod antialias;

@@ -50,28 +50,32 @@ fn psnr_is_averaged_over_channels_and_pooled_psnr_is_not() {
     let error = error(&black, &offset);
     assert!(close(error.channel_psnr(), 40.0, 1e-5), "the mean of 20, 40 and 60 dB: {}", error.channel_psnr());
     assert!(close(error.mean_squared_error(), 0.010_101 / 3.0, 1e-9), "the mean of three channels");
-    assert!(close(error.psnr(), -10.0 * (0.010_101f64 / 3.0).log10(), 1e-5), "of that mean: {}", error.psnr());
+    assert!(
+        close(error.psnr(), -10.0 * (0.010_101f64 / 3.0).log10(), 1e-5),
+        "the PSNR of the mean error: {}",
+        error.psnr()
+    );
 }
 
 #[test]
-fn identical_pictures_have_the_largest_psnr_and_are_told_apart() {
+fn identical_pictures_have_the_largest_psnr_and_are_marked() {
     let a = pattern(23, 17, 0);
     let same = error(&a, &a);
-    assert_eq!((same.channel_psnr(), same.psnr()), (MAX_PSNR, MAX_PSNR), "the cap, which is finite");
+    assert_eq!((same.channel_psnr(), same.psnr()), (MAX_PSNR, MAX_PSNR), "the largest PSNR, which is finite");
     assert!(same.is_identical(), "no value differs");
     assert_eq!(ssim(&a, &a), Ok(1.0), "exactly one");
     let metrics = ImageMetrics::of(&a, &a, MetricSet::PSNR).expect("same size");
-    assert!(metrics.identical && metrics.psnr == MAX_PSNR, "metrics say so: {metrics:?}");
+    assert!(metrics.identical && metrics.psnr == MAX_PSNR, "the metrics mark identical pictures: {metrics:?}");
     // The smallest difference of floats: above 160 dB, and not identical.
     let mut b = a.clone();
     b.pixels[5].x = f32::from_bits(b.pixels[5].x.to_bits() + 1);
     let almost = error(&a, &b);
     assert!(!almost.is_identical(), "one value differs");
-    assert!((160.0..MAX_PSNR).contains(&almost.psnr()), "below the cap: {}", almost.psnr());
+    assert!((160.0..MAX_PSNR).contains(&almost.psnr()), "below the largest PSNR: {}", almost.psnr());
     let tiny = error(&gray(0.0), &gray(1e-12));
     assert_eq!((tiny.is_identical(), tiny.psnr()), (false, MAX_PSNR), "an error of 1e-24 counts as 1e-20");
     let none = SquaredError::default();
-    assert!(!none.is_identical() && none.psnr().is_nan(), "no pictures have no PSNR");
+    assert!(!none.is_identical() && none.psnr().is_nan(), "no pictures give no PSNR");
 }
 
 #[test]
@@ -107,7 +111,7 @@ fn merged_errors_equal_the_error_of_one_larger_picture() {
 }
 
 #[test]
-fn nothing_is_clamped() {
+fn psnr_does_not_clamp_pictures() {
     let value = error(&gray(0.0), &gray(10.0)).channel_psnr();
     assert!(close(value, -20.0, 1e-9), "an error of ten is -20 dB, got {value}");
 }
@@ -193,15 +197,18 @@ fn flip_of_flat_pictures_is_the_difference_of_color_alone() {
 fn pictures_of_other_sizes_are_refused() {
     let (a, b) = (pattern(4, 6, 0), pattern(6, 4, 0));
     let mismatch = SizeMismatch { first: UVec2::new(4, 6), second: UVec2::new(6, 4) };
-    assert_eq!(SquaredError::of(&a, &b), Err(mismatch), "as many pixels, other shape");
+    assert_eq!(SquaredError::of(&a, &b), Err(mismatch), "the same number of pixels, another shape");
     assert_eq!(ssim(&a, &b), Err(mismatch), "similarity");
     assert_eq!(ms_ssim(&a, &b), Err(mismatch), "similarity at five scales");
     assert_eq!(flip(&a, &b), Err(mismatch), "flip");
     assert!(mismatch.to_string().contains("4x6") && mismatch.to_string().contains("6x4"), "{mismatch}");
     let empty = Picture { size: UVec2::ZERO, pixels: Vec::new() };
-    assert!(SquaredError::of(&empty, &empty).is_err() && ssim(&empty, &empty).is_err(), "no pixels, no number");
+    assert!(
+        SquaredError::of(&empty, &empty).is_err() && ssim(&empty, &empty).is_err(),
+        "pictures without pixels are refused"
+    );
     let short = Picture { size: a.size, pixels: Vec::new() };
-    assert!(SquaredError::of(&a, &short).is_err() && ssim(&short, &a).is_err(), "fewer pixels than the size says");
+    assert!(SquaredError::of(&a, &short).is_err() && ssim(&short, &a).is_err(), "fewer pixels than the size requires");
 }
 
 /// Generates two pictures of the same small random size.
@@ -228,7 +235,7 @@ proptest! {
         prop_assert!((-1.0..=1.0 + 1e-12).contains(&similarity), "{}", similarity);
         let (mean, pooled) = (error.channel_psnr(), error.psnr());
         prop_assert!(mean.is_finite() && pooled.is_finite(), "{} and {} are finite", mean, pooled);
-        // Holds where no channel is identical, and is left out.
+        // Holds unless an identical channel is left out.
         let differs = a.pixels.iter().zip(&b.pixels).fold(Vec3::ZERO, |sum, (p, q)| sum + (*p - *q).abs());
         prop_assert!(differs.min_element() == 0.0 || mean >= pooled - 1e-9, "{} below {}", mean, pooled);
         let (there, back) = (flip(&a, &b).expect("same size"), flip(&b, &a).expect("same size"));

@@ -30,7 +30,7 @@ struct Shape {
 const SMALL: Shape =
     Shape { model: Some(Model::Rotated4d), count: 3, coefficients: 2, degrees: (0, 0), environment: None };
 
-/// Pseudo-random bits: NaNs with payloads, infinities and subnormal numbers among them.
+/// Pseudo-random bits, including NaNs with payloads, infinities and subnormal numbers.
 struct Bits(u64);
 
 impl Bits {
@@ -167,7 +167,7 @@ fn refusal(file: &[u8]) -> PackageError {
     let inspected = inspect(file);
     assert!(
         !inspected.is_ok_and(|info| info.is_intact()) || matches!(error, PackageError::SectionBody { .. }),
-        "inspection detects it too, unless only decompressing does: {error}"
+        "inspection detects the fault too, unless only decompression detects it: {error}"
     );
     error
 }
@@ -177,7 +177,7 @@ fn replace_body(mut parts: Parts, index: usize, body: Vec<u8>) -> Parts {
     let old = std::mem::replace(&mut parts.bodies[index], body);
     let entry =
         |body: &[u8], raw| format!("length: {}, raw_length: {raw}, crc32: {}", body.len(), crc32fast::hash(body));
-    let raw = zstd::bulk::decompress(&old, 1 << 20).expect("a body as it was written").len();
+    let raw = zstd::bulk::decompress(&old, 1 << 20).expect("an unchanged body").len();
     let (from, to) = (entry(&old, raw), entry(&parts.bodies[index], raw));
     parts.swap(&from, &to)
 }
@@ -220,7 +220,7 @@ fn shapes() -> impl Strategy<Value = Shape> {
 
 proptest! {
     #[test]
-    fn every_bit_survives_the_round_trip(shape in shapes(), seed: u64) {
+    fn scenes_are_read_back_bit_for_bit(shape in shapes(), seed: u64) {
         let scene = scene(&shape, seed);
         let file = pack(&scene);
         assert_same(&scene, &read(&file).expect("a package just written can be read"));
@@ -230,11 +230,11 @@ proptest! {
     #[test]
     fn random_bytes_never_panic(mut bytes in proptest::collection::vec(any::<u8>(), 0..400), with_magic: bool) {
         if with_magic {
-            // The first 16 bytes are those of a package with a header of 40 bytes.
+            // The first 16 bytes of a package with a header of 40 bytes.
             bytes.splice(..bytes.len().min(4), MAGIC);
             bytes.splice(4..bytes.len().min(16), [1, 0, 0, 0, 40, 0, 0, 0, 0, 0, 0, 0]);
         }
-        prop_assert!(read(&bytes).is_err() && inspect(&bytes).is_err(), "noise is no package");
+        prop_assert!(read(&bytes).is_err() && inspect(&bytes).is_err(), "random bytes are not a package");
     }
 
     #[test]
@@ -447,8 +447,8 @@ fn the_memory_limit_counts_a_section_and_the_scene_together() {
     let scene = GaussianScene { form: SceneForm::Ready(Form::Sliced(sliced)), ..scene(&SMALL, 19) };
     let mut file = Vec::new();
     package::write(&mut file, &scene, &WriteSettings { level: 1 }).expect("small sections are within the limit");
-    assert_eq!(read(&file).expect("it can be read").len(), count, "every Gaussian");
-    // One section with all coefficients would be in memory twice.
+    assert_eq!(read(&file).expect("the package can be read").len(), count, "every Gaussian");
+    // One section with all coefficients would need its memory twice.
     let error = refusal(&put(Parts::of(&file), "sh_rest", count, &vec![0; count * 47 * 12]).seal());
     assert!(matches!(error, PackageError::TooLarge { .. }), "{error}");
 }
@@ -604,13 +604,17 @@ fn levels_of_detail_are_read_without_loss() {
     assert_same(&scene, &again);
     assert_eq!(again.levels.len(), 2, "both levels");
     for (a, b) in scene.levels.iter().zip(&again.levels) {
-        assert_eq!(a.pixels, b.pixels, "their sizes");
+        assert_eq!(a.pixels, b.pixels, "the largest size of a level");
         let [a, b] = [a, b].map(|level| GaussianScene::from(level.scene.as_ref().clone()));
         assert_same(&a, &b);
     }
     assert!(file == pack(&again), "writing them again gives the same file");
     let info = inspect(&file).expect("readable");
-    assert_eq!(info.header.sections.iter().filter(|section| section.name == "level").count(), 2, "a section each");
+    assert_eq!(
+        info.header.sections.iter().filter(|section| section.name == "level").count(),
+        2,
+        "one section for each level"
+    );
     assert!(info.header.requires.is_empty(), "readers without levels of detail can read the scene");
 }
 
@@ -640,7 +644,7 @@ fn damaged_levels_are_refused() {
         parts.bodies[last] = body;
         parts.swap(&old, &new).seal()
     };
-    assert!(read(&with_level(good.bodies[last].clone())).is_ok(), "the level that the cases below replace");
+    assert!(read(&with_level(good.bodies[last].clone())).is_ok(), "the unchanged level is read");
     let nested = pack(&GaussianScene::from(RuntimeScene {
         levels: vec![detailed().levels[1].clone()],
         ..detailed().levels[0].scene.as_ref().clone()

@@ -1,7 +1,7 @@
 //! Picking: the Gaussian that a ray hits.
 //!
-//! In: Gaussians placed by hand, and a column of them with its render by the CPU reference. Out: proof that a ray hits the Gaussian that
-//! it should, where it should, and respects the settings.
+//! In: Gaussians placed by hand, and a column of them with its render by the CPU reference. Out: proof that a ray hits the expected
+//! Gaussian at the expected point, and that settings are respected.
 
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
 use bevy_gs4d::internal::gaussian::alpha::alpha_at;
@@ -48,13 +48,14 @@ fn hit(gaussians: &[Gaussian]) -> Option<(usize, f32)> {
 #[test]
 fn a_ray_hits_a_gaussian_where_it_is_densest() {
     let scene = scene(&[ball(5.0, 0.9)]);
-    let pick = scene.pick(Vec3::ZERO, Vec3::Z * 2.0, &PickSettings::default()).expect("through the middle");
+    let pick = scene.pick(Vec3::ZERO, Vec3::Z * 2.0, &PickSettings::default()).expect("a ray through the middle hits");
     assert_eq!(
         pick,
         Pick { gaussian: 0, distance: 2.5, point: Vec3::new(0.0, 0.0, 5.0) },
         "the distance is in lengths of the direction"
     );
-    let offset = scene.pick(Vec3::new(0.05, 0.0, 0.0), Vec3::Z, &PickSettings::default()).expect("near the middle");
+    let offset =
+        scene.pick(Vec3::new(0.05, 0.0, 0.0), Vec3::Z, &PickSettings::default()).expect("a ray near the middle hits");
     assert!(
         (offset.distance - 5.0).abs() < 1e-5,
         "a round Gaussian is densest at the depth of its mean, not at {}",
@@ -82,9 +83,17 @@ fn rays_that_hit_no_gaussian_return_none() {
 
 #[test]
 fn the_gaussian_that_lowers_transmittance_below_one_half_is_hit() {
-    assert_eq!(hit(&[ball(7.0, 0.9), ball(5.0, 0.9)]), Some((1, 5.0)), "the Gaussian in front, whatever its index");
-    assert_eq!(hit(&[ball(7.0, 0.9), ball(5.0, 0.4)]), Some((0, 7.0)), "through a faint one");
-    assert_eq!(hit(&[ball(7.0, 0.3), ball(5.0, 0.3), ball(6.0, 0.3)]), Some((2, 6.0)), "the second leaves 0.49 of 1");
+    assert_eq!(
+        hit(&[ball(7.0, 0.9), ball(5.0, 0.9)]),
+        Some((1, 5.0)),
+        "the Gaussian in front is hit, independent of the order in the scene"
+    );
+    assert_eq!(hit(&[ball(7.0, 0.9), ball(5.0, 0.4)]), Some((0, 7.0)), "a ray passes through a faint Gaussian");
+    assert_eq!(
+        hit(&[ball(7.0, 0.3), ball(5.0, 0.3), ball(6.0, 0.3)]),
+        Some((2, 6.0)),
+        "the second Gaussian leaves a transmittance of 0.49"
+    );
     let settings = PickSettings { threshold: 0.05, ..PickSettings::default() };
     let first = pick(&[ball(7.0, 0.9), ball(5.0, 0.1)], &settings).map(|pick| pick.gaussian);
     assert_eq!(first, Some(1), "with a lower threshold the faint Gaussian is hit");
@@ -96,15 +105,15 @@ fn settings_of_a_pick_are_respected() {
     let pair = [ball(5.0, 0.9), ball(7.0, 0.9)];
     let hit = |settings: PickSettings| pick(&pair, &settings).map(|pick| pick.gaussian);
     let base = PickSettings::default();
-    assert_eq!(hit(PickSettings { max_distance: 4.0, ..base }), None, "both are farther");
+    assert_eq!(hit(PickSettings { max_distance: 4.0, ..base }), None, "both Gaussians are farther");
     assert_eq!(
         hit(PickSettings { opacity: 0.5, ..base }),
         Some(1),
-        "at half the opacity, both together are hit at the second"
+        "at half the opacity, transmittance falls below one half at the second Gaussian"
     );
-    assert_eq!(hit(PickSettings { opacity: 0.0, ..base }), None, "faded out");
+    assert_eq!(hit(PickSettings { opacity: 0.0, ..base }), None, "an opacity of 0 hides all Gaussians");
     let far = Affine3A::from_scale_rotation_translation(Vec3::ONE, Quat::IDENTITY, Vec3::new(0.0, 0.0, 7.5));
-    assert_eq!(hit(PickSettings { crop: Some(far.inverse()), ..base }), Some(1), "the first is cropped");
+    assert_eq!(hit(PickSettings { crop: Some(far.inverse()), ..base }), Some(1), "the first Gaussian is cropped");
     let nowhere = Affine3A::from_scale(Vec3::NAN);
     assert_eq!(hit(PickSettings { crop: Some(nowhere), ..base }), None, "a crop box of NaN contains no Gaussian");
     assert_eq!(hit(PickSettings { time: f32::NAN, ..base }), None, "a time of NaN");
@@ -119,7 +128,7 @@ fn a_moving_gaussian_is_hit_where_it_is() {
     assert_eq!(distance(0.1), None, "a marginal of 0.41 makes it too faint");
     let crosser = Gaussian { velocity: [4.0, 0.0, 0.0], sigma_t: f32::INFINITY, ..ball(5.0, 0.9) };
     let hits = |time| pick(&[crosser], &PickSettings { time, ..PickSettings::default() }).is_some();
-    assert!(hits(0.5) && !hits(0.75), "it has moved out of the ray");
+    assert!(hits(0.5) && !hits(0.75), "the Gaussian has moved out of the ray");
     let opaque = Gaussian { sigma_t: 0.1, opacity: 1.0, ..mover };
     let settings = PickSettings { threshold: 0.04, ..PickSettings::default() };
     let there = |time| pick(&[opaque], &PickSettings { time, ..settings }).is_some();
@@ -132,14 +141,14 @@ fn a_moving_gaussian_is_hit_where_it_is() {
 #[test]
 fn gaussians_that_the_filter_leaves_out_are_not_hit() {
     let mut scene = scene(&[ball(5.0, 0.9), ball(7.0, 0.9)]);
-    // Both are active in the first half of the time interval, only the second one after it.
+    // Both are active in the first half of the time interval, only the second Gaussian in the second half.
     scene.filter = Some(TemporalFilter::from_bits(FilterKind::Support, 2, 2, vec![0b11, 0b10]));
     let hit = |time, use_filter| {
         let settings = PickSettings { time, use_filter, ..PickSettings::default() };
         scene.pick(Vec3::ZERO, Vec3::Z, &settings).map(|pick| pick.gaussian)
     };
     assert_eq!((hit(0.25, true), hit(0.75, true)), (Some(0), Some(1)), "inactive Gaussians are not hit");
-    assert_eq!(hit(0.75, false), Some(0), "unless the filter is not used");
+    assert_eq!(hit(0.75, false), Some(0), "without the filter, inactive Gaussians are hit");
 }
 
 #[test]
@@ -165,7 +174,7 @@ fn absent_gaussians_are_not_decoded() {
         scene.pick(Vec3::ZERO, Vec3::Z, &settings).map(|pick| pick.gaussian)
     };
     assert_eq!((pick(&packed, 0.3), pick(&packed, 0.9)), (Some(0), None), "present at its temporal mean, absent later");
-    // Without the ranges of its block a Gaussian cannot be decoded.
+    // A Gaussian cannot be decoded without the ranges of its block.
     packed.ranges.truncate(SHARED_RANGES);
     assert_eq!(pick(&packed, 0.9), None, "its temporal mean and deviation are enough to know that it is absent");
 }
@@ -223,10 +232,10 @@ fn is_close(splats: &[Splat], x: u32, y: u32) -> bool {
     })
 }
 
-/// Splats are affine approximations and have a low-pass, so that their alphas are not exactly those along the ray: for
+/// Splats are affine approximations and have a low-pass, so that their alphas differ from the alphas along the ray: for
 /// this scene, transmittances are up to 0.032 apart. Pixels where a transmittance is within 0.04 of one half are
-/// not compared; at all other pixels both must hit the same Gaussian. Depths are those of different points
-/// (the splat's mean, the densest point).
+/// not compared; at all other pixels both must hit the same Gaussian. Depths are of different points
+/// (the mean of the splat, the densest point).
 #[test]
 fn the_median_of_the_reference_render_is_hit() {
     let scene = scene(&column());

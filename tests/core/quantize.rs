@@ -1,7 +1,7 @@
 //! Quantization and the packed form in packages.
 //!
 //! In: synthetic scenes; with `GS4D_DATA` set, trained captures. Out: proof that the packed form keeps attributes and
-//! pictures within its steps, and that packages store it bit for bit.
+//! pictures within its steps, and that packages store the packed form bit for bit.
 
 use crate::support::data;
 use crate::support::packed_scene::{BLACK, scene, settings, view};
@@ -23,7 +23,7 @@ use std::io::Cursor;
 
 fn pack(scene: &GaussianScene) -> Vec<u8> {
     let mut bytes = Vec::new();
-    package::write(&mut bytes, scene, &package::WriteSettings { level: 3 }).expect("it can be written");
+    package::write(&mut bytes, scene, &package::WriteSettings { level: 3 }).expect("the package can be written");
     bytes
 }
 
@@ -61,8 +61,8 @@ fn every_attribute_stays_within_its_step() {
         Bits { mean: 12, mean_t: 10, velocity: 9, sigma_t: 8, scale: 9, rotation: 9, opacity: 8, base: 8, escape: 0.0 };
     for bits in [fine, coarse] {
         let settings = CompressSettings { geometry: Some(bits), ..settings(&[]) };
-        let (packed, _) = compress(scene.clone(), &settings).expect("it is compressed");
-        let packed = packed.into_runtime().expect("it can be drawn");
+        let (packed, _) = compress(scene.clone(), &settings).expect("compression succeeds");
+        let packed = packed.into_runtime().expect("the scene can be drawn");
         let step = |bits: u32, range: f32| 0.51 * range / ((1u32 << bits) - 1) as f32 + 2e-6 * range.max(1.0);
         for (a, b) in matched(&scene, &packed) {
             for axis in 0..3 {
@@ -70,7 +70,11 @@ fn every_attribute_stays_within_its_step() {
             }
             assert!((a.mean_t - b.mean_t).abs() <= step(bits.mean_t, 1.2), "temporal mean {a:?} {b:?}");
             assert!((a.opacity - b.opacity).abs() <= step(bits.opacity, 1.0), "opacity {a:?} {b:?}");
-            assert_eq!(a.sigma_t.is_finite(), b.sigma_t.is_finite(), "present at every time in both or in neither");
+            assert_eq!(
+                a.sigma_t.is_finite(),
+                b.sigma_t.is_finite(),
+                "a Gaussian is present at every time in both scenes or in neither"
+            );
             if a.sigma_t.is_finite() {
                 assert!((a.sigma_t.ln() - b.sigma_t.ln()).abs() <= step(bits.sigma_t, 5.0), "deviation {a:?} {b:?}");
             } else {
@@ -88,10 +92,10 @@ fn every_attribute_stays_within_its_step() {
 fn roundings_are_the_changes_of_each_gaussian_by_compression() {
     let (scene, settings) = (scene(2_000, 0, 0), settings(&[]));
     let gaussians = &scene.form.as_sliced().expect("sliced").gaussians;
-    let bits = settings.geometry.expect("it has bits");
-    let roundings = roundings(gaussians, &bits, scene.trained_with.time_span()).expect("they can be packed");
-    let (packed, _) = compress(scene.clone(), &settings).expect("it is compressed");
-    let packed = packed.into_runtime().expect("it can be drawn");
+    let bits = settings.geometry.expect("the quality has bits of geometry");
+    let roundings = roundings(gaussians, &bits, scene.trained_with.time_span()).expect("the Gaussians can be packed");
+    let (packed, _) = compress(scene.clone(), &settings).expect("compression succeeds");
+    let packed = packed.into_runtime().expect("the scene can be drawn");
     for (to, from) in order(&scene).into_iter().enumerate() {
         let (a, b) = (roundings[from as usize].apply(&gaussians[from as usize]), packed.gaussian(to));
         assert!((a.mean_at(0.3) - b.mean_at(0.3)).length() < 1e-5, "place of {from}: {a:?} is {b:?}");
@@ -122,8 +126,8 @@ fn temporal_means_far_from_the_interval_do_not_lower_the_precision_of_other_gaus
             _ => {}
         }
     }
-    let (packed, _) = compress(scene.clone(), &settings(&[])).expect("it is compressed");
-    let packed = packed.into_runtime().expect("it can be drawn");
+    let (packed, _) = compress(scene.clone(), &settings(&[])).expect("compression succeeds");
+    let packed = packed.into_runtime().expect("the scene can be drawn");
     for time in [0.1, 0.5, 0.9] {
         let found = psnr(&scene, &packed, &view(time));
         assert!(found >= 47.0, "the PSNR of balanced geometry: {found:.1} dB at {time}");
@@ -134,8 +138,8 @@ fn temporal_means_far_from_the_interval_do_not_lower_the_precision_of_other_gaus
 fn compression_keeps_pictures_within_the_promised_psnr() {
     let scene = scene(20_000, 1, 0);
     let lowest = |settings: &CompressSettings| {
-        let (packed, _) = compress(scene.clone(), settings).expect("it is compressed");
-        let packed = packed.into_runtime().expect("it can be drawn");
+        let (packed, _) = compress(scene.clone(), settings).expect("compression succeeds");
+        let packed = packed.into_runtime().expect("the scene can be drawn");
         [0.05, 0.4, 0.9].map(|time| psnr(&scene, &packed, &view(time))).into_iter().fold(f64::INFINITY, f64::min)
     };
     let geometry = lowest(&settings(&[]));
@@ -147,16 +151,16 @@ fn compression_keeps_pictures_within_the_promised_psnr() {
     let coded = [&[256][..], &[256, 256], &[256, 256, 256]].map(|codebooks| lowest(&settings(codebooks)));
     assert!(coded.is_sorted(), "each further codebook raises the PSNR, even of random colors: {coded:.1?} dB");
     assert!(balanced > coded[2], "the codebooks of the quality are better: {balanced:.1} and {coded:.1?} dB");
-    let (_, report) = compress(scene.clone(), &settings(&[256, 256])).expect("it is compressed");
+    let (_, report) = compress(scene.clone(), &settings(&[256, 256])).expect("compression succeeds");
     assert!(report.memory_after < report.memory_before / 2, "half the memory or less: {report:?}");
 }
 
 #[test]
 fn the_filter_follows_the_order_of_the_gaussians() {
     let mut scene = scene(2_000, 0, 0);
-    // A support filter would be computed again.
+    // Not a support filter, which would be computed again.
     scene.filter = scene.filter.map(|filter| TemporalFilter { kind: FilterKind::KeyFrame, ..filter });
-    let (packed, _) = compress(scene.clone(), &settings(&[])).expect("it is compressed");
+    let (packed, _) = compress(scene.clone(), &settings(&[])).expect("compression succeeds");
     let order = order(&scene);
     let (before, after) = (scene.filter.expect("a filter"), packed.filter.expect("the filter is kept"));
     for segment in 0..before.segments {
@@ -168,8 +172,8 @@ fn the_filter_follows_the_order_of_the_gaussians() {
 
 #[test]
 fn a_support_filter_of_a_packed_scene_changes_no_picture() {
-    let (packed, _) = compress(scene(3_000, 0, 0), &settings(&[])).expect("it is compressed");
-    let filtered = packed.into_runtime().expect("it can be drawn");
+    let (packed, _) = compress(scene(3_000, 0, 0), &settings(&[])).expect("compression succeeds");
+    let filtered = packed.into_runtime().expect("the scene can be drawn");
     let active = filtered.filter.as_ref().map_or(1.0, TemporalFilter::active_share);
     assert!(active < 0.95, "some Gaussians are inactive: {active}");
     let free = RuntimeScene { filter: None, ..filtered.clone() };
@@ -195,8 +199,8 @@ fn velocities_do_not_depend_on_the_bits_of_lifespans() {
         escape: 0.0,
     };
     let settings = CompressSettings { geometry: Some(coarse), ..settings(&[]) };
-    let (packed, _) = compress(scene.clone(), &settings).expect("it is compressed");
-    let packed = packed.into_runtime().expect("it can be drawn");
+    let (packed, _) = compress(scene.clone(), &settings).expect("compression succeeds");
+    let packed = packed.into_runtime().expect("the scene can be drawn");
     let fastest = scene.iter().map(|g| Vec3::from(g.velocity).length()).fold(0.0, f32::max);
     for (a, b) in matched(&scene, &packed).into_iter().filter(|(a, _)| a.sigma_t.is_finite()) {
         let apart = (Vec3::from(a.velocity) - Vec3::from(b.velocity)).length();
@@ -207,7 +211,7 @@ fn velocities_do_not_depend_on_the_bits_of_lifespans() {
 #[test]
 fn packed_scenes_and_invalid_codebooks_are_refused() {
     let small = scene(100, 1, 0);
-    let (packed, _) = compress(small.clone(), &settings(&[8])).expect("it is compressed");
+    let (packed, _) = compress(small.clone(), &settings(&[8])).expect("compression succeeds");
     let again = compress(packed.into_runtime().expect("drawable"), &settings(&[8]));
     assert!(matches!(again, Err(CompressError::AlreadyPacked)), "packed twice");
     for codebooks in [vec![0], vec![70_000], vec![4; 5]] {
@@ -239,17 +243,17 @@ fn steps_of_any_size_leave_colors_finite() {
     let scene = scene(300, 1, 0);
     for color_step in [f32::MIN_POSITIVE, f32::MAX] {
         let settings = CompressSettings { color_step, ..settings(&[]) };
-        let (packed, _) = compress(scene.clone(), &settings).expect("it is compressed");
+        let (packed, _) = compress(scene.clone(), &settings).expect("compression succeeds");
         packed.into_runtime().unwrap_or_else(|error| panic!("a step of {color_step}: {error}"));
     }
 }
 
 #[test]
 fn degrees_of_coded_colors_can_be_lowered() {
-    let (packed, _) = compress(scene(500, 3, 2), &settings(&[16, 16])).expect("it is compressed");
+    let (packed, _) = compress(scene(500, 3, 2), &settings(&[16, 16])).expect("compression succeeds");
     let lowered = |degree, degree_t| {
         let settings = ConvertSettings { form: None, sh_degree: degree, sh_degree_t: degree_t };
-        convert(packed.clone(), &settings).expect("it is converted")
+        convert(packed.clone(), &settings).expect("the conversion succeeds")
     };
     assert!(lowered(None, None) == packed, "without options the scene is unchanged");
     for (degree, degree_t, coefficients) in [(Some(0), None, 1), (Some(2), None, 9), (None, Some(1), 32)] {
@@ -258,7 +262,7 @@ fn degrees_of_coded_colors_can_be_lowered() {
         assert!(pack(&converted).len() < pack(&packed).len(), "{degree:?} and {degree_t:?}: the package is smaller");
     }
     let runtime = ConvertSettings { form: Some(TargetForm::Runtime), ..ConvertSettings::default() };
-    let degrees = convert(lowered(Some(1), None), &runtime).expect("it can be unpacked").form.color_degrees();
+    let degrees = convert(lowered(Some(1), None), &runtime).expect("the scene can be unpacked").form.color_degrees();
     assert_eq!((degrees.degree, degrees.coefficients), (1, 4), "unpacking keeps the lowered degree");
 }
 
@@ -267,8 +271,8 @@ fn scenes_of_few_gaussians_are_compressed() {
     for count in [0, 1, 2, 255, 256, 257] {
         let scene = scene(count, 3, 2);
         for codebooks in [&[][..], &[16, 16, 16, 16]] {
-            let (packed, _) = compress(scene.clone(), &settings(codebooks)).expect("it is compressed");
-            let read = package::read(Cursor::new(pack(&packed))).expect("it can be read");
+            let (packed, _) = compress(scene.clone(), &settings(codebooks)).expect("compression succeeds");
+            let read = package::read(Cursor::new(pack(&packed))).expect("the package can be read");
             assert_eq!(read, packed, "{count} Gaussians, bit for bit");
             assert_eq!(read.into_runtime().expect("drawable").len(), count, "every Gaussian");
         }
@@ -280,12 +284,12 @@ fn packages_store_the_packed_form_bit_for_bit() {
     for (degree, degree_t, codebooks) in
         [(3, 2, &[32, 16, 8][..]), (2, 0, &[16]), (1, 0, &[]), (0, 0, &[4]), (3, 1, &[9, 9, 9, 9])]
     {
-        let (packed, _) = compress(scene(700, degree, degree_t), &settings(codebooks)).expect("it is compressed");
+        let (packed, _) = compress(scene(700, degree, degree_t), &settings(codebooks)).expect("compression succeeds");
         let bytes = pack(&packed);
-        let read = package::read(Cursor::new(&bytes)).expect("it can be read");
+        let read = package::read(Cursor::new(&bytes)).expect("the package can be read");
         assert_eq!(read, packed, "degree {degree} and {degree_t}");
-        let info = package::inspect(Cursor::new(&bytes)).expect("it can be inspected");
-        assert_eq!(info.header.requires, ["packed", "filter"], "older readers must refuse it");
+        let info = package::inspect(Cursor::new(&bytes)).expect("the package can be inspected");
+        assert_eq!(info.header.requires, ["packed", "filter"], "older readers must refuse the package");
         let back = read.unpacked();
         let is_sliced = matches!(back.form, SceneForm::Ready(Form::Sliced(_)));
         assert!(is_sliced && back.len() == 700, "it can be unpacked");
@@ -296,7 +300,7 @@ fn packages_store_the_packed_form_bit_for_bit() {
 
 #[test]
 fn unpacking_changes_no_picture() {
-    let (packed, _) = compress(scene(1_500, 3, 2), &settings(&[64, 32])).expect("it is compressed");
+    let (packed, _) = compress(scene(1_500, 3, 2), &settings(&[64, 32])).expect("compression succeeds");
     let unpacked = packed.clone().unpacked().into_runtime().expect("drawable");
     let packed = packed.into_runtime().expect("drawable");
     for time in [0.1, 0.7] {
@@ -307,7 +311,7 @@ fn unpacking_changes_no_picture() {
 
 #[test]
 fn every_flipped_bit_of_a_packed_package_is_detected() {
-    let (packed, _) = compress(scene(40, 1, 0), &settings(&[4, 2])).expect("it is compressed");
+    let (packed, _) = compress(scene(40, 1, 0), &settings(&[4, 2])).expect("compression succeeds");
     let bytes = pack(&packed);
     for bit in 0..bytes.len() * 8 {
         let mut damaged = bytes.clone();
@@ -322,19 +326,20 @@ fn a_trained_capture_reaches_the_targets_of_the_balanced_quality() {
     // As in the demo: 45,000 Gaussians; the larger captures take minutes in a build without optimization.
     let scene = codec::load(&data.join("toybox/toybox_45k.pth"), &ReadOptions::default()).expect("the checkpoint");
     let scene = scene.into_runtime().expect("drawable");
-    let (packed, _) = compress(scene.clone(), &CompressSettings::from(Quality::Balanced)).expect("it is compressed");
+    let (packed, _) =
+        compress(scene.clone(), &CompressSettings::from(Quality::Balanced)).expect("compression succeeds");
     let mut bytes = Vec::new();
-    package::write(&mut bytes, &packed, &package::WriteSettings { level: 19 }).expect("it can be written");
-    let info = package::inspect(Cursor::new(&bytes)).expect("it can be inspected");
+    package::write(&mut bytes, &packed, &package::WriteSettings { level: 19 }).expect("the package can be written");
+    let info = package::inspect(Cursor::new(&bytes)).expect("the package can be inspected");
     let books = |name: &str| name.starts_with("codebook");
     let (codebooks, rest): (Vec<_>, Vec<_>) = info.header.sections.iter().partition(|section| books(&section.name));
     let size = |sections: &[&package::Section]| sections.iter().map(|section| section.length).sum::<usize>();
     let each = size(&rest) as f64 / 45_000.0;
-    assert!(each <= 24.0, "{each:.2} bytes per Gaussian");
-    assert!(size(&codebooks) <= 1_000_000, "{} bytes of codebooks", size(&codebooks));
+    assert!(each <= 24.0, "at most 24 bytes per Gaussian: {each:.2}");
+    assert!(size(&codebooks) <= 1_000_000, "codebooks of at most 1 MB: {} bytes", size(&codebooks));
     let packed = packed.into_runtime().expect("drawable");
-    let Form::Packed(records) = &packed.form else { panic!("it is packed") };
-    assert_eq!(size_of_val(&records.records[..]), 45_000 * 32, "32 bytes each");
+    let Form::Packed(records) = &packed.form else { panic!("the scene is packed") };
+    assert_eq!(size_of_val(&records.records[..]), 45_000 * 32, "32 bytes for each Gaussian");
     let views = CameraFile::load(&data.join("toybox/golden_45k.json"), &CameraOptions::default()).expect("cameras");
     for shot in views {
         let found = psnr(&scene, &packed, &shot.camera.view(shot.time, RasterFov::Reference));

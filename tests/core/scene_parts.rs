@@ -1,4 +1,4 @@
-//! Scenes whose parts do not fit together, and colors by codebook whose degrees are lowered.
+//! Scenes with inconsistent parts, and colors by codebook with lowered degrees.
 //!
 //! In: scenes made here, consistent and inconsistent. Out: proof that `RuntimeScene::check` refuses every inconsistent scene, so that
 //! no index is out of range, and that lowering degrees changes no other coefficient.
@@ -19,12 +19,12 @@ fn good() -> RuntimeScene {
 }
 
 fn packed(scene: &mut RuntimeScene) -> &mut PackedScene {
-    let Form::Packed(packed) = &mut scene.form else { panic!("it is packed") };
+    let Form::Packed(packed) = &mut scene.form else { panic!("the scene is packed") };
     packed
 }
 
 fn colors(scene: &mut RuntimeScene) -> &mut CodedColors {
-    let PackedColors::Coded(colors) = &mut packed(scene).colors else { panic!("its colors are coded") };
+    let PackedColors::Coded(colors) = &mut packed(scene).colors else { panic!("the colors are coded") };
     colors
 }
 
@@ -38,7 +38,7 @@ fn shorten<T>(values: &mut Vec<T>) {
     values.pop();
 }
 
-/// Replaces the sets of the filter by intervals; the last Gaussian has the given one.
+/// Replaces the sets of the filter by intervals; the last Gaussian has the given interval.
 fn interval(scene: &mut RuntimeScene, first: u32, last: u32) {
     let filter = scene.filter.as_mut().expect("a filter");
     let mut intervals = vec![0; COUNT];
@@ -134,13 +134,13 @@ fn lower_degrees_keep_the_other_coefficients() {
             lowered.form.truncate_colors(low, low_t);
             assert_eq!(lowered.check(), Ok(()), "{degree} and {degree_t} to {low} and {low_t}");
             let mut file = Vec::new();
-            package::write(&mut file, &lowered, &WriteSettings { level: 1 }).expect("it can be written");
-            assert!(package::read(Cursor::new(&file)).expect("it can be read") == lowered, "every bit");
+            package::write(&mut file, &lowered, &WriteSettings { level: 1 }).expect("the package can be written");
+            assert!(package::read(Cursor::new(&file)).expect("the package can be read") == lowered, "every bit");
             let mut expected = scene.clone().unpacked();
             expected.form.truncate_colors(low, low_t);
             assert!(
                 lowered.unpacked() == expected,
-                "{degree} and {degree_t} to {low} and {low_t}: the other coefficients stay"
+                "{degree} and {degree_t} to {low} and {low_t}: the other coefficients are unchanged"
             );
         }
     }

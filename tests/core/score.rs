@@ -1,9 +1,9 @@
-//! Scores, pruning and visibility masks: on small scenes against brute force, on trained captures against scores that
-//! were computed independently (`scores.npz`).
+//! Scores, pruning and visibility masks: on small scenes against brute force, on trained captures against scores of an
+//! independent implementation (`scores.npz`).
 //!
 //! In: synthetic scenes; with `GS4D_DATA` set, toybox and standup. Out: proof that the CPU reference of `score` is
-//! right pixel by pixel, that scores are related as defined, that pruning keeps the right Gaussians, and that masks and
-//! filters contain one another. The comparisons over all training views take minutes: `.ci/full` runs them by name.
+//! right pixel by pixel, that scores are related as defined, that pruning keeps the right Gaussians, and that filters
+//! contain the filters and masks they must contain. The comparisons over all training views take minutes: `.ci/full` runs them by name.
 
 use crate::support::data::data;
 use crate::support::npy;
@@ -124,7 +124,11 @@ fn scores_equal_those_without_shortcuts() {
                 close(found[0], contribution, 1e-5) && close(found[1], energy, 1e-5),
                 "{index}: {found:?} instead of {contribution}, {energy}"
             );
-            assert_eq!(found[0] > 0.0, contribution > 0.0, "{index}: blended into a pixel in both or in neither");
+            assert_eq!(
+                found[0] > 0.0,
+                contribution > 0.0,
+                "{index}: blended into a pixel in both computations or in neither"
+            );
         }
     }
 }
@@ -194,7 +198,7 @@ fn scores_are_related_as_defined() {
         let product = at(Variant::Energy, index) * at(Variant::Removal, index);
         assert!(close(at(Variant::EnergyRemoval, index).powi(2), product, 1e-5), "{index}: geometric mean");
     }
-    assert!(scores.contributing() > 300, "the views see the scene");
+    assert!(scores.contributing() > 300, "more than 300 Gaussians are visible in the views");
 }
 
 #[test]
@@ -205,7 +209,7 @@ fn the_runtime_form_has_scores_without_volume() {
     assert_eq!(
         scores.of(Variant::Removal).expect("needs no volume"),
         trained.of(Variant::Removal).expect("needs no volume"),
-        "the same in both forms"
+        "removal is the same in both forms"
     );
     let message = scores.of(Variant::Full).expect_err("needs the volume").to_string();
     assert!(message.contains("`full`") && message.contains("energy-removal"), "{message}");
@@ -226,7 +230,11 @@ fn the_highest_scores_are_kept_in_the_order_of_the_scene() {
     assert_eq!(highest(&[1.0, 5.0, 3.0, 5.0, 0.0, 3.0], 3), [1, 2, 3], "of equal scores the first is kept");
     assert_eq!(highest(&[1.0, 2.0], 9), [0, 1], "at most all scores");
     assert_eq!((kept_count(90_000, 0.8), kept_count(90_000, 0.85)), (18_000, 13_500), "rounded");
-    assert_eq!((kept_count(5, 0.5), kept_count(7, 1.0), kept_count(7, 0.0)), (3, 0, 7), "the ends");
+    assert_eq!(
+        (kept_count(5, 0.5), kept_count(7, 1.0), kept_count(7, 0.0)),
+        (3, 0, 7),
+        "half, all and none are removed"
+    );
 
     let mut scene = synth(400);
     scene.filter = Some(TemporalFilter::support(runtime(400).iter(), [0.0, 1.0], 10));
@@ -255,7 +263,7 @@ fn removing_gaussians_that_are_never_blended_changes_no_picture() {
 }
 
 #[test]
-fn key_frame_filters_are_within_interval_filters_and_those_within_support_filters() {
+fn interval_filters_contain_key_frame_filters_and_support_filters_contain_interval_filters() {
     let (scene, count, segments) = (runtime(1200), 1200, 6);
     let cameras = [camera(0.0), camera(2.0), camera(4.0)];
     let times = key_times([0.0, 1.0], segments + 1);
@@ -267,7 +275,10 @@ fn key_frame_filters_are_within_interval_filters_and_those_within_support_filter
     let interval = interval_filter(&mut engine, &masks, &between, [0.0, 1.0], count, &mut NoProgress).expect("views");
     let support = TemporalFilter::support(scene.iter(), [0.0, 1.0], segments);
     let within = |a: &TemporalFilter, b: &TemporalFilter| a.to_bits().iter().zip(b.to_bits()).all(|(a, b)| a & !b == 0);
-    assert!(within(&key_frame, &interval) && within(&interval, &support), "each filter contains the one before it");
+    assert!(
+        within(&key_frame, &interval) && within(&interval, &support),
+        "the interval filter contains the key-frame filter, the support filter the interval filter"
+    );
     assert!(key_frame.active_share() < interval.active_share(), "some Gaussians are active only between key-frames");
     // Gaussians that a view between key-frames blends are active at its time.
     for view in &between {
@@ -310,14 +321,14 @@ fn spearman(a: &[f32], b: &[f32]) -> f64 {
     product(&a, &b) / (product(&a, &a) * product(&b, &b)).sqrt()
 }
 
-/// Returns the fraction of the highest fifth that both have in common.
+/// Returns the fraction of the highest fifth that two lists of scores have in common.
 fn overlap(a: &[f32], b: &[f32]) -> f64 {
     let count = kept_count(a.len(), 0.8);
     let (a, b) = (highest(a, count), highest(b, count));
     a.iter().filter(|index| b.binary_search(index).is_ok()).count() as f64 / count as f64
 }
 
-/// Scores from a fifteenth of the views correlate with those from all views. The independent implementation reaches
+/// Scores from a fifteenth of the views correlate with scores from all views. The independent implementation reaches
 /// 0.861 and 0.973.
 #[test]
 fn scores_over_a_fifteenth_of_the_views_of_toybox_rank_as_over_all() {
@@ -354,7 +365,7 @@ fn scores_over_all_views_rank_as_the_independent_scores_do() {
             println!("{name} {variant}: {alike:.6}, {both:.4}");
             let least = if estimated { (0.98, 0.915) } else { (0.999, 0.99) };
             assert!(alike >= least.0, "{name} {variant}: rank correlation {alike}");
-            assert!(both >= least.1, "{name} {variant}: {both} of the highest fifth");
+            assert!(both >= least.1, "{name} {variant}: {both} of the highest fifth in common");
         }
     }
 }
@@ -385,7 +396,7 @@ fn key_frame_masks_match_the_independent_masks() {
     }
 }
 
-/// Reads the values' bytes of an array whose type NumPy calls `kind`, such as `<f4`.
+/// Reads the bytes of the values of an array of the NumPy type `kind`, such as `<f4`.
 fn values(path: &Path, name: &str, kind: &str) -> Vec<u8> {
     let (header, values) = npy::array(path, name);
     assert!(header.contains(&format!("'{kind}'")), "values of type {kind}: {header}");

@@ -1,8 +1,8 @@
-//! The paper's score against closed forms.
+//! The score of the paper against closed forms.
 //!
-//! In: Gaussians of known volume, temporal mean and temporal variance, with given contributions or with those of small Gaussians to known
-//! pixels. Out: proof that the temporal factor, the volume factor, the spatial score and their sum over views are the paper's. The expected
-//! values are computed here in double precision, derivatives of the marginal by finite differences.
+//! In: Gaussians of known volume, temporal mean and temporal variance, with given contributions or with the contributions of small
+//! Gaussians to known pixels. Out: proof that the temporal factor, the volume factor, the spatial score and their sum over views match the
+//! paper. The expected values are computed here in double precision, derivatives of the marginal by finite differences.
 
 use bevy_gs4d::internal::offline::score::{CpuEngine, ScoreEngine, Traits, ViewScore, Want, score};
 use bevy_gs4d::offline::NoProgress;
@@ -40,7 +40,7 @@ impl One {
         self.log_scale.iter().chain([&self.log_scale_t]).map(|&log| f64::from(log).exp()).product()
     }
 
-    /// Returns the paper's temporal factor at a time.
+    /// Returns the temporal factor of the paper at a time.
     fn steadiness(&self, time: f32) -> f64 {
         let step = 1e-3 * self.variance().sqrt();
         steadiness(second_derivative(self.marginal(), time.into(), step))
@@ -84,7 +84,7 @@ fn scene(gaussians: &[One]) -> GaussianScene {
     scene
 }
 
-/// An engine that returns given sums: those at the index that is the height of the view.
+/// An engine that returns given sums, by the height of the view as index.
 struct Given<'a>(&'a [ViewScore]);
 
 impl ScoreEngine for Given<'_> {
@@ -156,7 +156,7 @@ fn the_temporal_factor_is_normalized_to_the_range_from_1_to_2() {
 }
 
 #[test]
-fn the_temporal_variance_is_that_of_the_model() {
+fn the_temporal_variance_follows_the_model() {
     let one = One { log_scale: [0.5; 3], log_scale_t: -0.4, mean_t: 0.2, ..One::default() };
     let time = 0.6f32;
     let expected = |variance: f64| {
@@ -168,7 +168,8 @@ fn the_temporal_variance_is_that_of_the_model() {
         change(&mut trained.parameters);
         scene
     };
-    // One isoclinic rotation by the angle a mixes time with one axis of space: Σ_44 = cos² a s_t² + sin² a s². It need not be of unit length.
+    // One isoclinic rotation by the angle a mixes time with one axis of space: Σ_44 = cos² a s_t² + sin² a s². The quaternion need not be
+    // of unit length.
     let turned = changed(|parameters| parameters.rotation_l[0] = [3.0 * 0.8, 3.0 * 0.6, 0.0, 0.0]);
     let variance = 0.64 * (-0.8f64).exp() + 0.36 * 1f64.exp();
     assert_close(score_at(&turned, Variant::Sigma, time), variance, "variance after a rotation in 4D");
@@ -216,7 +217,7 @@ fn the_volume_factor_is_a_power_of_the_volume_over_the_reference_volume() {
 fn the_reference_volume_is_at_nine_tenths_of_the_descending_volumes() {
     // Number of Gaussians, ⌊0.9 N⌋ and the place of the reference volume for other ranks.
     for (count, rank, place) in [(10, 0.9, 9), (25, 0.9, 22), (7, 0.9, 6), (1, 0.9, 0), (25, 0.0, 0), (25, 0.5, 12)] {
-        // In no order of volume.
+        // Not sorted by volume.
         let gaussians: Vec<One> = (0..count)
             .map(|i| {
                 let k = (i * 3 % count) as f32;
@@ -266,7 +267,7 @@ fn contributions(gaussians: &[One], eye: Vec3, target: Vec3, time: f32) -> Vec<f
 #[test]
 fn the_spatial_score_is_the_sum_of_alpha_over_pixels() {
     let eye = Vec3::new(0.0, 0.0, -2.0);
-    // As small as the low-pass lets a splat be, it is blended into nine pixels.
+    // A splat of the smallest size that the low-pass allows is blended into nine pixels.
     let point = One { mean_t: 0.2, log_scale_t: -0.5, ..One::default() };
     let time = 0.5;
     let peak = f64::from(point.opacity) * point.marginal()(time.into());
@@ -303,7 +304,7 @@ fn the_score_sums_the_product_of_all_factors_over_views() {
         One { mean: [-10.0, 0.0, 0.0], mean_t: 0.1, log_scale: [-2.6; 3], log_scale_t: -0.3, opacity: 0.6 },
         One { mean: [10.0, 0.0, 0.0], mean_t: 0.6, log_scale: [-3.1; 3], log_scale_t: 0.2, opacity: 0.8 },
     ];
-    // Each view shows one of the two, at the center; two views are at the same time.
+    // Each view shows one of the two Gaussians, at the center; two views are at the same time.
     let shown = [(0, 0.4, Vec3::Z), (0, 0.4, -Vec3::Z), (0, 1.0, Vec3::Z), (1, 0.4, Vec3::Z), (1, 0.0, -Vec3::Z)];
     let view = |&(index, time, side): &(usize, f32, Vec3)| {
         let target = Vec3::from(gaussians[index].mean);
@@ -316,7 +317,7 @@ fn the_score_sums_the_product_of_all_factors_over_views() {
     let mut engine = CpuEngine { scene: &runtime, background };
     let scores = Scores::accumulate(&mut engine, &traits, &views, &ScoreSettings::default(), &mut NoProgress);
     let scores = scores.expect("the views show the scene");
-    // Of two volumes the reference is the smaller.
+    // The reference of two volumes is the smaller volume.
     let reference = gaussians.iter().map(One::volume).fold(f64::INFINITY, f64::min);
     for (index, one) in gaussians.iter().enumerate() {
         let variance = screen_variance(one, 2.0);
@@ -345,7 +346,7 @@ fn every_variant_combines_its_sums_as_defined() {
         energy: energy.to_vec(),
         removal: removal.to_vec(),
     };
-    // Not in the order of time; the first and the third are at the same time.
+    // Views not in the order of time; the first and the third are at the same time.
     let views = [
         (0.5, of([1.0, 0.0, 8.0], [0.5, 0.0, 4.0], [0.25, 0.0, 3.0])),
         (0.9, of([4.0, 3.0, 1.0], [1.5, 2.0, 0.5], [1.25, 1.0, 0.1])),

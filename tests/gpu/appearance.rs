@@ -47,17 +47,17 @@ fn both(
     appearance: Appearance,
     space: BlendSpace,
 ) -> [Frame; 2] {
-    let capture = headless.upload(scene).expect("it fits");
+    let capture = headless.upload(scene).expect("the scene fits the GPU");
     let instance = Instance { capture: &capture, active: None, view, appearance };
     let parameters = ViewParameters { background: BACKGROUND, blend_space: space, ..ViewParameters::default() };
-    let drawn = headless.render_all(&[instance], &parameters).expect("it is drawn");
+    let drawn = headless.render_all(&[instance], &parameters).expect("the view is drawn");
     [drawn, render_layers(&[Layer { scene, view, appearance }], BACKGROUND, space)]
 }
 
 fn assert_same([drawn, expected]: &[Frame; 2], what: &str) {
     let colors = drawn.picture.pixels.iter().zip(&expected.picture.pixels).map(|(a, b)| (*a - *b).abs().max_element());
     let apart = colors.fold(0.0, f32::max);
-    // A splat whose alpha is at the threshold of 1/255 may be on either side of it.
+    // The alpha of a splat near the threshold of 1/255 may be above it on one side and below it on the other.
     assert!(apart < 5e-3, "{what}: colors differ by {apart}");
     let left = drawn.transmittance.iter().zip(&expected.transmittance).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     assert!(left < 5e-3, "{what}: transmittances differ by {left}");
@@ -177,16 +177,16 @@ fn multisampled_surfaces_hide_a_fraction_of_a_pixel() {
     // Wide Gaussians in front of and behind the surface, which is 2.5 units away from a camera at the origin.
     let scene = blobs(&[(Vec3::Z * 2.0, 3.0, 0.5), (Vec3::Z * 4.0, 6.0, 0.6)]);
     let view = View::new(SIZE, 0.0, Mat4::IDENTITY, Vec4::new(1.0, 1.5, 0.0, 0.0), Vec2::new(1.0, 1.0 / 1.5));
-    let capture = headless.upload(&scene).expect("it fits");
+    let capture = headless.upload(&scene).expect("the scene fits the GPU");
     let instance = Instance { capture: &capture, active: None, view, appearance: Appearance::default() };
     let depth = texture.create_view(&wgpu::TextureViewDescriptor::default());
     let opaque = OpaqueDepth { texture: &depth, samples: 4, origin: UVec2::ZERO, distance: [near, 0.0, 0.0, 1.0] };
     let parameters = ViewParameters { opaque: Some(opaque), ..ViewParameters::default() };
-    let frame = headless.render_all(&[instance], &parameters).expect("it is drawn");
-    let free = headless.render_all(&[instance], &ViewParameters::default()).expect("it is drawn");
-    let front = headless.upload(&blobs(&[(Vec3::Z * 2.0, 3.0, 0.5)])).expect("it fits");
+    let frame = headless.render_all(&[instance], &parameters).expect("the view is drawn");
+    let free = headless.render_all(&[instance], &ViewParameters::default()).expect("the view is drawn");
+    let front = headless.upload(&blobs(&[(Vec3::Z * 2.0, 3.0, 0.5)])).expect("the scene fits the GPU");
     let cut = headless.render_all(&[Instance { capture: &front, ..instance }], &ViewParameters::default());
-    let cut = cut.expect("it is drawn");
+    let cut = cut.expect("the view is drawn");
     let row = SIZE.y / 2 * SIZE.x;
     let at = |frame: &Frame, x: u32| {
         let index = (row + x) as usize;
@@ -209,7 +209,7 @@ fn multisampled_surfaces_hide_a_fraction_of_a_pixel() {
 fn the_distance_of_a_surface_is_computed_for_every_projection() {
     let Some(mut headless) = gpu::headless() else { return };
     let scene = blobs(&[(Vec3::Z * 2.0, 3.0, 0.5), (Vec3::Z * 4.0, 6.0, 0.6)]);
-    let capture = headless.upload(&scene).expect("it fits");
+    let capture = headless.upload(&scene).expect("the scene fits the GPU");
     let (texture, _) = edge(headless.context(), SIZE, 0.25, 1.0, 0.0);
     let view = View::new(SIZE, 0.0, Mat4::IDENTITY, Vec4::new(1.0, 1.5, 0.0, 0.0), Vec2::new(1.0, 1.0 / 1.5));
     let instance = Instance { capture: &capture, active: None, view, appearance: Appearance::default() };
@@ -217,7 +217,7 @@ fn the_distance_of_a_surface_is_computed_for_every_projection() {
     let mut left = |distance: [f32; 4]| {
         let opaque = OpaqueDepth { texture: &depth, samples: 4, origin: UVec2::ZERO, distance };
         let parameters = ViewParameters { opaque: Some(opaque), ..ViewParameters::default() };
-        let frame = headless.render_all(&[instance], &parameters).expect("it is drawn");
+        let frame = headless.render_all(&[instance], &parameters).expect("the view is drawn");
         frame.transmittance[(SIZE.y / 2 * SIZE.x) as usize + 20]
     };
     // The depth is 0.25. Perspective, near 0.75, infinite far plane: distance 3, between the Gaussians.
@@ -238,12 +238,12 @@ fn debug_views_show_their_quantity() {
     right.velocity = [9.0, 0.0, 0.0];
     right.sigma_t = 0.02;
     let view = |time| View::new(SIZE, time, Mat4::IDENTITY, Vec4::new(1.0, 1.5, 0.0, 0.0), Vec2::new(1.0, 1.0 / 1.5));
-    let capture = headless.upload(&scene).expect("it fits");
+    let capture = headless.upload(&scene).expect("the scene fits the GPU");
     let mut pixels = |debug, time| {
         let instance =
             Instance { capture: &capture, active: None, view: view(time), appearance: Appearance::default() };
         let parameters = ViewParameters { debug, ..ViewParameters::default() };
-        let frame = headless.render_all(&[instance], &parameters).expect("it is drawn");
+        let frame = headless.render_all(&[instance], &parameters).expect("the view is drawn");
         let at = |ndc: f32| {
             let index = (SIZE.y / 2 * SIZE.x) as usize + ((ndc + 1.0) / 2.0 * SIZE.x as f32) as usize;
             // Divided by opacity.
@@ -272,13 +272,13 @@ fn active_gaussians_that_are_absent_are_red_in_the_debug_view() {
     let Some(mut headless) = gpu::headless() else { return };
     let mut scene = blobs(&[(Vec3::Z * 2.0, 0.4, 0.95)]);
     scene.form.as_sliced_mut().expect("sliced").gaussians[0].sigma_t = 0.05;
-    let capture = headless.upload(&scene).expect("it fits");
+    let capture = headless.upload(&scene).expect("the scene fits the GPU");
     let mut middle = |debug| {
         let projection = Vec4::new(1.0, 1.5, 0.0, 0.0);
         let view = View::new(SIZE, 0.9, Mat4::IDENTITY, projection, Vec2::new(1.0, 1.0 / 1.5));
         let instance = Instance { capture: &capture, active: None, view, appearance: Appearance::default() };
         let parameters = ViewParameters { debug, ..ViewParameters::default() };
-        let frame = headless.render_all(&[instance], &parameters).expect("it is drawn");
+        let frame = headless.render_all(&[instance], &parameters).expect("the view is drawn");
         let index = (SIZE.y / 2 * SIZE.x + SIZE.x / 2) as usize;
         (frame.picture.pixels[index], frame.transmittance[index])
     };

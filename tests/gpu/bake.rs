@@ -1,7 +1,7 @@
-//! Bakes with training, to a size that the first package exceeds.
+//! Bakes with training to a size that the first package exceeds.
 //!
-//! In: a small synthetic scene, its own pictures as a dataset. Out: proof that a bake that is interrupted in its second attempt resumes there, and
-//! ends at the same bytes. Skipped where there is no GPU.
+//! In: a small synthetic scene, its own pictures as a dataset. Out: proof that a bake that is interrupted in its second attempt resumes
+//! there, and ends at the same bytes. Skipped where there is no GPU.
 
 use crate::support::capture::Capture;
 use crate::support::gpu;

@@ -65,8 +65,8 @@ fn screen_psnr(a: &Frame, b: &Frame) -> f64 {
 }
 
 fn draw(headless: &mut Headless, scene: &RuntimeScene, view: &View) -> Frame {
-    let capture = headless.upload(scene).expect("it fits");
-    headless.render(&capture, view, Background::Color([0.0; 3])).expect("it is drawn")
+    let capture = headless.upload(scene).expect("the scene fits the GPU");
+    headless.render(&capture, view, Background::Color([0.0; 3])).expect("the view is drawn")
 }
 
 #[test]

@@ -162,7 +162,7 @@ fn the_bundled_capture_without_depths_matches_the_reference_design() {
             let parameters = ViewParameters { depths: design == Design::Reference, ..ViewParameters::default() };
             headless.render_all(&instances, &parameters).expect("the picture fits")
         });
-        assert!(expected.counts.visible > 10_000, "the capture is there: {:?}", expected.counts);
+        assert!(expected.counts.visible > 10_000, "the capture is visible: {:?}", expected.counts);
         let error = SquaredError::of(&found.picture, &expected.picture).expect("pictures of one size");
         let decibels = error.psnr();
         println!("{size}, {time}: {decibels:.1} dB, at most {:.1e}", difference(&found, &expected));

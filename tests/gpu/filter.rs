@@ -46,8 +46,8 @@ fn bits_of(frame: &Frame) -> Vec<u32> {
 }
 
 fn draw(headless: &mut Headless, scene: &RuntimeScene, time: f32) -> Frame {
-    let capture = headless.upload(scene).expect("it fits");
-    headless.render(&capture, &view(time), BLACK).expect("it is drawn")
+    let capture = headless.upload(scene).expect("the scene fits the GPU");
+    headless.render(&capture, &view(time), BLACK).expect("the view is drawn")
 }
 
 #[test]
@@ -57,11 +57,12 @@ fn a_filter_by_support_does_not_change_the_picture() {
     let filtered = with_support(&whole);
     let fraction = filtered.filter.as_ref().expect("a filter").active_share();
     assert!(fraction < 0.9, "some Gaussians are inactive: the active fraction is {fraction}");
-    let [a, b, c] = [&whole, &filtered, &as_bits(&filtered)].map(|scene| headless.upload(scene).expect("it fits"));
+    let [a, b, c] =
+        [&whole, &filtered, &as_bits(&filtered)].map(|scene| headless.upload(scene).expect("the scene fits the GPU"));
     for time in times() {
-        let expected = headless.render(&a, &view(time), BLACK).expect("it is drawn");
+        let expected = headless.render(&a, &view(time), BLACK).expect("the view is drawn");
         for capture in [&b, &c] {
-            let frame = headless.render(capture, &view(time), BLACK).expect("it is drawn");
+            let frame = headless.render(capture, &view(time), BLACK).expect("the view is drawn");
             assert_eq!(frame.counts, expected.counts, "at {time}: the same numbers of splats and pairs");
             assert!(bits_of(&frame) == bits_of(&expected), "at {time}: the picture is the same bit for bit");
         }
@@ -83,9 +84,9 @@ fn inactive_gaussians_are_not_drawn() {
     let filter = TemporalFilter::from_bits(FilterKind::KeyFrame, SEGMENTS, 3_000, bits);
     assert!(matches!(filter.sets, ActiveSets::Bits(_)), "active sets with gaps are stored as bits");
     let filtered = RuntimeScene { filter: Some(filter), ..whole.clone() };
-    let capture = headless.upload(&filtered).expect("it fits");
+    let capture = headless.upload(&filtered).expect("the scene fits the GPU");
     for time in times() {
-        let frame = headless.render(&capture, &view(time), BLACK).expect("it is drawn");
+        let frame = headless.render(&capture, &view(time), BLACK).expect("the view is drawn");
         let expected = reference::render(&filtered, &view(time), BLACK);
         assert_eq!(frame.counts.visible, expected.counts.visible, "at {time}: the same splats as on the CPU");
         let apart = frame.picture.pixels.iter().zip(&expected.picture.pixels);
@@ -93,13 +94,13 @@ fn inactive_gaussians_are_not_drawn() {
         assert!(apart <= 1e-3, "at {time}: colors differ by {apart} from the CPU reference");
     }
     let all = draw(&mut headless, &whole, 0.5);
-    let some = headless.render(&capture, &view(0.5), BLACK).expect("it is drawn");
+    let some = headless.render(&capture, &view(0.5), BLACK).expect("the view is drawn");
     assert!(some.counts.visible < all.counts.visible, "fewer splats than without the filter");
     headless.use_filters(false);
-    let unfiltered = headless.render(&capture, &view(0.5), BLACK).expect("it is drawn");
+    let unfiltered = headless.render(&capture, &view(0.5), BLACK).expect("the view is drawn");
     assert!(bits_of(&unfiltered) == bits_of(&all), "with filters switched off, all Gaussians are drawn");
     headless.use_filters(true);
-    let again = headless.render(&capture, &view(0.5), BLACK).expect("it is drawn");
+    let again = headless.render(&capture, &view(0.5), BLACK).expect("the view is drawn");
     assert!(bits_of(&again) == bits_of(&some), "with filters switched on again, the list is recorded again");
 }
 
@@ -108,14 +109,15 @@ fn captures_with_and_without_a_filter_are_drawn_in_one_view() {
     let Some(mut headless) = gpu::headless() else { return };
     let (a, b) = (scene(2_000, 7), scene(2_500, 8));
     let filtered = with_support(&a);
-    let [plain, other, filtered] = [&a, &b, &filtered].map(|scene| headless.upload(scene).expect("it fits"));
+    let [plain, other, filtered] =
+        [&a, &b, &filtered].map(|scene| headless.upload(scene).expect("the scene fits the GPU"));
     let mut previous = None;
     for (time, late) in times().zip(times().skip(3)) {
         let parameters = ViewParameters { background: BLACK, ..ViewParameters::default() };
         let instance =
             |capture, active, time| Instance { capture, active, view: view(time), appearance: Appearance::default() };
         let expected = [instance(&plain, None, time), instance(&other, None, late), instance(&plain, None, late)];
-        let expected = headless.render_all(&expected, &parameters).expect("it is drawn");
+        let expected = headless.render_all(&expected, &parameters).expect("the view is drawn");
         // The same capture twice, at different times: each instance has its own list.
         let [now, then] = [time, late].map(|time| headless.active(&filtered, time));
         let mixed = [
@@ -123,7 +125,7 @@ fn captures_with_and_without_a_filter_are_drawn_in_one_view() {
             instance(&other, None, late),
             instance(&filtered, then.as_ref(), late),
         ];
-        let mixed = headless.render_all(&mixed, &parameters).expect("it is drawn");
+        let mixed = headless.render_all(&mixed, &parameters).expect("the view is drawn");
         assert!(bits_of(&mixed) == bits_of(&expected), "at {time} and {late}: the picture is the same bit for bit");
         assert!(previous != Some(bits_of(&mixed)), "the picture changes with time");
         previous = Some(bits_of(&mixed));
@@ -142,12 +144,12 @@ fn the_capacity_of_a_view_is_the_maximum_of_active_gaussians() {
     }
     let filter = TemporalFilter::from_bits(FilterKind::KeyFrame, SEGMENTS, 20_000, bits);
     let filtered = RuntimeScene { filter: Some(filter), ..whole };
-    let capture = headless.upload(&filtered).expect("it fits");
+    let capture = headless.upload(&filtered).expect("the scene fits the GPU");
     // The capacity in splats is that of the buffers of this design.
     headless.set_design(Design::Reference);
     let mut made = None;
     for time in times() {
-        let frame = headless.render(&capture, &view(time), BLACK).expect("it is drawn");
+        let frame = headless.render(&capture, &view(time), BLACK).expect("the view is drawn");
         let expected = reference::render(&filtered, &view(time), BLACK);
         assert_eq!(frame.counts.visible, expected.counts.visible, "at {time}: the same splats as on the CPU");
         let slots = headless.finished().expect("a frame").slots;
@@ -155,7 +157,7 @@ fn the_capacity_of_a_view_is_the_maximum_of_active_gaussians() {
         assert_eq!(*made.get_or_insert(slots), slots, "at {time}: the capacity does not depend on time");
     }
     headless.use_filters(false);
-    headless.render(&capture, &view(0.5), BLACK).expect("it is drawn");
+    headless.render(&capture, &view(0.5), BLACK).expect("the view is drawn");
     assert!(
         headless.finished().expect("a frame").slots >= 20_000,
         "without the filter, the capacity fits all Gaussians"

@@ -1,4 +1,4 @@
-//! The passes of training against the original's gradients and their CPU references.
+//! The passes of training against the gradients of the original and against their CPU references.
 //!
 //! In: the golden scenes with their gradients; synthetic scenes. Out: proof that gradients, loss and optimizer are right, and that training
 //! lowers the loss. Skipped where there is no GPU.
@@ -36,7 +36,7 @@ fn tensors(parameters: &Parameters, harmonics: &Harmonics) -> Vec<(&'static str,
     ]
 }
 
-/// Returns the norm of the difference relative to that of the expected values, or the norm itself if these are zero.
+/// Returns the norm of the difference relative to the norm of the expected values, or the norm of the difference if these are zero.
 fn relative_error(found: &[f32], expected: &[f32]) -> f64 {
     let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
     let error = norm(&mut found.iter().zip(expected).map(|(a, b)| f64::from(*a) - f64::from(*b)));
@@ -50,7 +50,7 @@ fn trained(scene: &GaussianScene) -> &Trained {
 }
 
 #[test]
-fn gradients_are_those_of_the_original() {
+fn gradients_match_the_original() {
     let Some(mut headless) = gpu::headless() else { return };
     let mut compared = 0;
     for golden in golden::all_views() {
@@ -80,7 +80,7 @@ fn gradients_are_those_of_the_original() {
         for (mode, name) in [(GradientMode::Exact, "exact"), (GradientMode::Compat, "compat")] {
             let mut trainer = Trainer::new(&mut headless, scene.clone(), mode).expect("the scene can be trained");
             trainer.accumulate_pixels(&golden.view, golden.background, &pixels, &depth).expect("the picture fits");
-            let gradients = trainer.gradients().expect("they can be read");
+            let gradients = trainer.gradients().expect("gradients can be read");
             let found = trained(&gradients);
             let (parameters, harmonics) = golden::raw_scene(&json!({ "raw": expected[name]["raw"] }));
             let expected = tensors(&parameters, &harmonics);
@@ -88,7 +88,7 @@ fn gradients_are_those_of_the_original() {
                 let error = relative_error(found, expected);
                 println!("{:28} {name:7} {tensor:14} {error:.1e}", golden.name);
                 assert_eq!(found.len(), expected.len(), "{}: {tensor}", golden.name);
-                // Sums over an environment map lose more digits; so do those over the times of static captures, which nearly cancel.
+                // Sums over an environment map lose more digits; so do sums over the times of static captures, which nearly cancel.
                 let limit = match (tensor, golden.scene.environment.is_some()) {
                     (_, true) => 5e-4,
                     (&"mean_t", false) => 1e-3,
@@ -97,7 +97,7 @@ fn gradients_are_those_of_the_original() {
                 assert!(error <= limit, "{}, {name}: {tensor} differs by {error:.1e}", golden.name);
                 compared += 1;
             }
-            assert_eq!(trainer.faults().expect("they can be read"), None, "every gradient is finite");
+            assert_eq!(trainer.faults().expect("faults can be read"), None, "every gradient is finite");
         }
     }
     assert_eq!(compared, 2 * 5 * 8, "five views have gradients");
@@ -113,7 +113,9 @@ struct Lesson {
 impl Lesson {
     fn new(headless: &mut Headless) -> Self {
         let scene = synthesize(&SynthSettings { count: 400, ..SynthSettings::default() });
-        let capture = headless.upload(&scene.clone().into_runtime().expect("it can be drawn")).expect("it fits");
+        let capture = headless
+            .upload(&scene.clone().into_runtime().expect("the scene can be drawn"))
+            .expect("the scene fits the GPU");
         let size = UVec2::new(70, 54);
         let view = |i: usize| {
             let angle = i as f32 * 0.7;
@@ -122,7 +124,7 @@ impl Lesson {
         };
         let views: Vec<View> = (0..6).map(view).collect();
         let mut image = |view: &View| {
-            let frame = headless.render(&capture, view, Background::Color(BEHIND)).expect("it is drawn");
+            let frame = headless.render(&capture, view, Background::Color(BEHIND)).expect("the view is drawn");
             covered(&frame, 255)
         };
         let images = views.iter().map(&mut image).collect();
@@ -148,7 +150,7 @@ impl Lesson {
         scene
     }
 
-    /// Returns the same with Gaussians that all move, none as its neighbors do.
+    /// Returns the scene with Gaussians that all move, each with another velocity than its neighbors.
     fn moving(&self) -> GaussianScene {
         let mut scene = self.disturbed();
         let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
@@ -159,7 +161,7 @@ impl Lesson {
     }
 
     fn upload(&self, trainer: &Trainer<'_>) -> Vec<GpuImage> {
-        self.images.iter().map(|image| trainer.upload(image).expect("it fits")).collect()
+        self.images.iter().map(|image| trainer.upload(image).expect("the image fits the GPU")).collect()
     }
 
     fn sample<'a>(&'a self, images: &'a [GpuImage], index: usize) -> Sample<'a> {
@@ -174,7 +176,7 @@ impl Lesson {
 
 const BEHIND: [f32; 3] = [0.2, 0.1, 0.4];
 
-/// Returns a drawn frame as an image that covers each pixel as much.
+/// Returns a drawn frame as an image with the coverage of the frame.
 fn covered(frame: &Frame, coverage: u8) -> CoveredImage {
     let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
     let texel = |pixel: &Vec3| [byte(pixel.x), byte(pixel.y), byte(pixel.z), coverage];
@@ -183,7 +185,7 @@ fn covered(frame: &Frame, coverage: u8) -> CoveredImage {
 }
 
 #[test]
-fn the_loss_and_its_gradient_are_those_of_the_reference() {
+fn the_loss_and_its_gradient_match_the_cpu_reference() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     // Holes in the image show the background, or are masked.
@@ -192,39 +194,45 @@ fn the_loss_and_its_gradient_are_those_of_the_reference() {
     image.texels[1800..1960].fill([0; 4]);
     for weight in [0.0, 0.3] {
         let scene = lesson.disturbed();
-        let mut trainer = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("it can be trained");
+        let mut trainer = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("the scene can be trained");
         trainer.set_terms(Terms { mask: weight, ..Terms::default() }).expect("the weight is right");
-        let images = [trainer.upload(&image).expect("it fits")];
+        let images = [trainer.upload(&image).expect("the image fits the GPU")];
         let sample = lesson.sample(&images, 0);
-        trainer.accumulate(&[sample], 0.2).expect("it is drawn");
-        let found = trainer.gradients().expect("they can be read");
-        let totals = trainer.totals().expect("they can be read");
-        let frame = trainer.draw(&lesson.views[0], Background::Color(BEHIND)).expect("it is drawn");
+        trainer.accumulate(&[sample], 0.2).expect("the view is drawn");
+        let found = trainer.gradients().expect("gradients can be read");
+        let totals = trainer.totals().expect("totals can be read");
+        let frame = trainer.draw(&lesson.views[0], Background::Color(BEHIND)).expect("the view is drawn");
         let expected = loss(&frame.picture, &image.over(Vec3::from(BEHIND)), 0.2).expect("the same size");
         let mask = opacity_mask(&frame, &image).expect("the same size");
-        assert!(mask.value > 1e-3, "something is drawn in the holes: {}", mask.value);
+        assert!(mask.value > 1e-3, "splats are drawn in the holes of the images: {}", mask.value);
         let value = expected.value + weight * mask.value;
-        assert!((totals.loss - value).abs() < 1e-6, "loss {} is {value} with a mask of {weight}", totals.loss);
-        assert_eq!(totals.views, 1, "of one view");
+        assert!(
+            (totals.loss - value).abs() < 1e-6,
+            "the loss is {}, expected {value} with a mask weight of {weight}",
+            totals.loss
+        );
+        assert_eq!(totals.views, 1, "the loss of one view");
         let pixel = |(color, opacity): (&Vec3, &f32)| [color.x, color.y, color.z, weight as f32 * opacity];
         let pixels: Vec<[f32; 4]> = expected.gradient.iter().zip(&mask.gradient).map(pixel).collect();
-        let scene = trainer.scene().expect("it can be read");
-        let mut other = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("it can be trained");
+        let scene = trainer.scene().expect("the scene can be read");
+        let mut other = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("the scene can be trained");
         let depths = vec![0.0; pixels.len()];
-        other.accumulate_pixels(&lesson.views[0], Background::Color(BEHIND), &pixels, &depths).expect("it is drawn");
-        let expected = other.gradients().expect("they can be read");
+        other
+            .accumulate_pixels(&lesson.views[0], Background::Color(BEHIND), &pixels, &depths)
+            .expect("the view is drawn");
+        let expected = other.gradients().expect("gradients can be read");
         let (found, expected) = (trained(&found), trained(&expected));
         let pairs = tensors(&found.parameters, &found.harmonics).into_iter();
         for ((name, found), (_, expected)) in pairs.zip(tensors(&expected.parameters, &expected.harmonics)) {
             let error = relative_error(&found, &expected);
             println!("mask {weight} {name:14} {error:.1e}");
-            assert!(error < 1e-4, "{name} differs by {error:.1e} with a mask of {weight}");
+            assert!(error < 1e-4, "{name} differs by {error:.1e} with a mask weight of {weight}");
         }
     }
 }
 
 #[test]
-fn atomic_sums_are_those_in_a_fixed_order() {
+fn atomic_sums_match_sums_in_a_fixed_order() {
     let Some(mut headless) = gpu::headless() else { return };
     if let Err(error) = GradientSums::Atomic.check(&headless) {
         skip(error);
@@ -234,13 +242,13 @@ fn atomic_sums_are_those_in_a_fixed_order() {
     for mode in [GradientMode::Exact, GradientMode::Compat] {
         let gradients = |sums| {
             let mut trainer =
-                Trainer::with_sums(&mut headless, lesson.disturbed(), mode, sums).expect("it can be trained");
+                Trainer::with_sums(&mut headless, lesson.disturbed(), mode, sums).expect("the scene can be trained");
             let images = lesson.upload(&trainer);
-            // The sums of each view begin anew.
+            // The sums of each view begin at zero.
             for index in [0, 3] {
-                trainer.accumulate(&[lesson.sample(&images, index)], 0.2).expect("it is drawn");
+                trainer.accumulate(&[lesson.sample(&images, index)], 0.2).expect("the view is drawn");
             }
-            let found = trainer.gradients().expect("they can be read");
+            let found = trainer.gradients().expect("gradients can be read");
             tensors(&trained(&found).parameters, &trained(&found).harmonics)
         };
         let [expected, found] = [GradientSums::Deterministic, GradientSums::Atomic].map(gradients);
@@ -253,7 +261,7 @@ fn atomic_sums_are_those_in_a_fixed_order() {
     }
 }
 
-/// Returns gradients as the parameters that they are of, in single precision.
+/// Returns gradients as parameters, in single precision.
 fn as_parameters(gradients: &[ParameterGradient]) -> Parameters {
     fn each<T>(gradients: &[ParameterGradient], value: impl Fn(&ParameterGradient) -> T) -> Vec<T> {
         gradients.iter().map(value).collect()
@@ -272,7 +280,7 @@ fn as_parameters(gradients: &[ParameterGradient]) -> Parameters {
     }
 }
 
-/// Terms of Gaussians alone, each with the only weight.
+/// The terms of Gaussians, each with the weight of the other terms 0.
 const TERMS: [(&str, [f64; 3]); 3] =
     [("motion", [0.7, 0.0, 0.0]), ("rigid", [0.0, 30.0, 0.0]), ("opacity", [0.0, 0.0, 0.5])];
 
@@ -281,22 +289,23 @@ fn terms([motion, rigid, opacity]: [f64; 3]) -> Terms {
 }
 
 #[test]
-fn the_gradients_of_terms_are_those_of_the_reference() {
+fn the_gradients_of_terms_match_the_cpu_reference() {
     let Some(mut headless) = gpu::headless() else { return };
     let scene = Lesson::new(&mut headless).moving();
     let Trained { parameters, harmonics } = trained(&scene);
     let near = neighbors(&parameters.mean);
     for (term, weights) in TERMS {
         let terms = terms(weights);
-        let mut trainer = Trainer::new(&mut headless, scene.clone(), GradientMode::Exact).expect("it can be trained");
+        let mut trainer =
+            Trainer::new(&mut headless, scene.clone(), GradientMode::Exact).expect("the scene can be trained");
         trainer.set_terms(terms).expect("the weights are right");
-        trainer.accumulate_terms(0).expect("they are added");
-        let found = trainer.gradients().expect("they can be read");
-        let expected = regularization(parameters, &near, &terms).expect("they can be drawn").gradients;
+        trainer.accumulate_terms(0).expect("the terms are added");
+        let found = trainer.gradients().expect("gradients can be read");
+        let expected = regularization(parameters, &near, &terms).expect("the Gaussians can be drawn").gradients;
         let none = Harmonics { values: vec![0.0; harmonics.values.len()], ..harmonics.clone() };
         let expected = tensors(&as_parameters(&expected), &none);
         let moves = expected.iter().filter(|(_, values)| values.iter().any(|&value| value != 0.0)).count();
-        assert_eq!(moves, if term == "opacity" { 1 } else { 4 }, "{term}: tensors that it moves");
+        assert_eq!(moves, if term == "opacity" { 1 } else { 4 }, "{term}: the number of tensors with a gradient");
         let found = tensors(&trained(&found).parameters, &trained(&found).harmonics);
         for ((name, found), (_, expected)) in found.iter().zip(&expected) {
             let error = relative_error(found, expected);
@@ -310,21 +319,23 @@ fn the_gradients_of_terms_are_those_of_the_reference() {
 fn fifty_steps_lower_each_term() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
-    // The shares that are left: of opacity a step takes at most 0.05 of each logit.
+    // The fraction of the term that may remain: a step changes each logit of opacity by at most 0.05.
     for ((term, weights), most) in TERMS.into_iter().zip([0.25, 0.25, 0.6]) {
-        let mut trainer = Trainer::new(&mut headless, lesson.moving(), GradientMode::Exact).expect("it can be trained");
+        let mut trainer =
+            Trainer::new(&mut headless, lesson.moving(), GradientMode::Exact).expect("the scene can be trained");
         let terms = terms(weights);
         trainer.set_terms(terms).expect("the weights are right");
         let value = |trainer: &Trainer<'_>| {
-            let scene = trainer.scene().expect("it can be read");
+            let scene = trainer.scene().expect("the scene can be read");
             let parameters = &trained(&scene).parameters;
-            let found = regularization(parameters, &neighbors(&parameters.mean), &terms).expect("they can be drawn");
+            let found =
+                regularization(parameters, &neighbors(&parameters.mean), &terms).expect("the Gaussians can be drawn");
             terms.motion * found.motion + terms.rigid * found.rigid + terms.opacity * found.opacity
         };
         let before = value(&trainer);
         for step in 0..50 {
-            trainer.accumulate_terms(step).expect("they are added");
-            trainer.step(&Rates::OURS, 1.0, step + 1).expect("it is made");
+            trainer.accumulate_terms(step).expect("the terms are added");
+            trainer.step(&Rates::OURS, 1.0, step + 1).expect("the step succeeds");
         }
         let after = value(&trainer);
         assert!(after < most * before, "{term} falls from {before:.3e} to {after:.3e}");
@@ -332,60 +343,62 @@ fn fifty_steps_lower_each_term() {
 }
 
 #[test]
-fn the_mask_empties_what_images_do_not_cover() {
+fn the_mask_term_removes_splats_outside_the_images() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let black = Background::Color([0.0; 3]);
     let mut left_after = |weight: f64| {
         let mut trainer =
-            Trainer::new(&mut headless, lesson.scene.clone(), GradientMode::Exact).expect("it can be trained");
+            Trainer::new(&mut headless, lesson.scene.clone(), GradientMode::Exact).expect("the scene can be trained");
         trainer.set_terms(Terms { mask: weight, ..Terms::default() }).expect("the weight is right");
-        // The scene's own pictures: only the mask asks for anything else.
-        let draw = |trainer: &mut Trainer<'_>, view: &View| trainer.draw(view, black).expect("it is drawn");
+        // The images are pictures of the scene itself: only the mask term has a gradient.
+        let draw = |trainer: &mut Trainer<'_>, view: &View| trainer.draw(view, black).expect("the view is drawn");
         let images: Vec<CoveredImage> = lesson.views.iter().map(|view| covered(&draw(&mut trainer, view), 0)).collect();
         let value = |trainer: &mut Trainer<'_>| -> f64 {
             let pairs = lesson.views.iter().zip(&images);
             pairs.map(|(view, image)| opacity_mask(&draw(trainer, view), image).expect("the same size").value).sum()
         };
         let before = value(&mut trainer);
-        let uploaded: Vec<GpuImage> = images.iter().map(|image| trainer.upload(image).expect("it fits")).collect();
+        let uploaded: Vec<GpuImage> =
+            images.iter().map(|image| trainer.upload(image).expect("the image fits the GPU")).collect();
         for step in 0..50 {
             let index = step % 6;
             let (view, image) = (&lesson.views[index], &uploaded[index]);
             let sample = Sample { view, image, background: black, number: index as u32 };
-            trainer.accumulate(&[sample], 0.2).expect("it is drawn");
-            trainer.step(&Rates::OURS, 1.0, step + 1).expect("it is made");
+            trainer.accumulate(&[sample], 0.2).expect("the view is drawn");
+            trainer.step(&Rates::OURS, 1.0, step + 1).expect("the step succeeds");
         }
         value(&mut trainer) / before
     };
     let (with, without) = (left_after(1.0), left_after(0.0));
-    assert!(with < 0.6, "of what is not covered {with:.3} is left");
-    assert!(without > 0.7, "without a weight {without:.3} is left");
+    assert!(with < 0.6, "a fraction of {with:.3} remains outside the images, expected below 0.6");
+    assert!(without > 0.7, "without a weight a fraction of {without:.3} remains, expected above 0.7");
 }
 
 #[test]
-fn sparse_steps_leave_what_no_view_shows_as_it_is() {
+fn sparse_steps_do_not_change_gaussians_that_no_view_shows() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let mut train = |sparse: bool| {
         let mut trainer =
-            Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("it can be trained");
+            Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("the scene can be trained");
         trainer.set_terms(Terms { opacity: 0.01, ..Terms::default() }).expect("the weight is right");
         trainer.set_sparse(sparse);
         let images = lesson.upload(&trainer);
-        // What any view shows gets moments.
+        // Every Gaussian that a view shows gets moments.
         let all: Vec<Sample<'_>> = (0..6).map(|index| lesson.sample(&images, index)).collect();
-        trainer.accumulate(&all, 0.2).expect("they are drawn");
-        trainer.step(&Rates::OURS, 1.0, 1).expect("it is made");
-        let (scene, before) = (trainer.scene().expect("it can be read"), trainer.state().expect("it can be read"));
-        trainer.accumulate(&all[..1], 0.2).expect("it is drawn");
-        let gradients = trainer.gradients().expect("they can be read");
-        trainer.accumulate_terms(1).expect("they are added");
-        trainer.step(&Rates::OURS, 1.0, 2).expect("it is made");
-        let left = trainer.gradients().expect("they can be read");
+        trainer.accumulate(&all, 0.2).expect("the views are drawn");
+        trainer.step(&Rates::OURS, 1.0, 1).expect("the step succeeds");
+        let (scene, before) =
+            (trainer.scene().expect("the scene can be read"), trainer.state().expect("the state can be read"));
+        trainer.accumulate(&all[..1], 0.2).expect("the view is drawn");
+        let gradients = trainer.gradients().expect("gradients can be read");
+        trainer.accumulate_terms(1).expect("the terms are added");
+        trainer.step(&Rates::OURS, 1.0, 2).expect("the step succeeds");
+        let left = trainer.gradients().expect("gradients can be read");
         let left = tensors(&trained(&left).parameters, &trained(&left).harmonics);
-        assert!(left.iter().all(|(_, values)| values.iter().all(|&v| v == 0.0)), "gradients begin anew");
-        let after = trainer.state().expect("it can be read");
+        assert!(left.iter().all(|(_, values)| values.iter().all(|&v| v == 0.0)), "gradients are zero after the step");
+        let after = trainer.state().expect("the state can be read");
         let changed = move |index: usize| {
             let own = |bytes: &Vec<u8>| {
                 let size = bytes.len() / 400;
@@ -395,20 +408,20 @@ fn sparse_steps_leave_what_no_view_shows_as_it_is() {
             pairs.filter(|(before, after)| own(before) != own(after)).count()
         };
         let shown: Vec<bool> = trained(&gradients).parameters.opacity_logit.iter().map(|&g| g != 0.0).collect();
-        let scene = scene.into_runtime().expect("it can be drawn");
-        // Well below what is drawn at that time.
+        let scene = scene.into_runtime().expect("the scene can be drawn");
+        // Well below the marginal cut-off at that time.
         let absent = (0..400).filter(|&index| scene.gaussian(index).marginal(lesson.views[0].time) < 0.04);
         (absent.collect::<Vec<usize>>(), shown, changed)
     };
     let (absent, shown, changed) = train(true);
-    assert!(absent.len() > 20, "{} are absent", absent.len());
-    assert!(absent.iter().all(|&index| changed(index) == 0), "no value and no moment of these changes");
+    assert!(absent.len() > 20, "more than 20 Gaussians are absent: {}", absent.len());
+    assert!(absent.iter().all(|&index| changed(index) == 0), "values and moments of absent Gaussians do not change");
     let mut shown = (0..400).filter(|&index| shown[index]);
-    assert!(shown.clone().count() > 20, "others are shown");
-    assert!(shown.all(|index| changed(index) > 0), "and all of them change");
+    assert!(shown.clone().count() > 20, "more than 20 Gaussians are shown");
+    assert!(shown.all(|index| changed(index) > 0), "all shown Gaussians change");
     let (absent, _, changed) = train(false);
     let moved = absent.iter().filter(|&&index| changed(index) > 0).count();
-    assert!(moved > 20, "otherwise {moved} of them move on");
+    assert!(moved > 20, "without sparse steps more than 20 absent Gaussians change: {moved}");
 }
 
 #[test]
@@ -417,46 +430,52 @@ fn neighbors_are_part_of_the_state() {
     let lesson = Lesson::new(&mut headless);
     let terms = Terms { rigid: 30.0, search_every: 8, ..Terms::default() };
     let mut train = |pause: Option<usize>| {
-        let mut trainer = Trainer::new(&mut headless, lesson.moving(), GradientMode::Exact).expect("it can be trained");
+        let mut trainer =
+            Trainer::new(&mut headless, lesson.moving(), GradientMode::Exact).expect("the scene can be trained");
         trainer.set_terms(terms).expect("the weight is right");
         let rates = Rates { mean: 2e-3, ..Rates::OURS };
         let images = lesson.upload(&trainer);
         for step in 0..20 {
             if pause == Some(step) {
-                let state = trainer.state().expect("it can be read");
-                assert_eq!(state.neighbors.len(), 400 * NEIGHBORS * 4, "neighbors of each");
-                trainer = Trainer::new(&mut headless, lesson.moving(), GradientMode::Exact).expect("it can be trained");
+                let state = trainer.state().expect("the state can be read");
+                assert_eq!(state.neighbors.len(), 400 * NEIGHBORS * 4, "the state has the neighbors of each Gaussian");
+                trainer = Trainer::new(&mut headless, lesson.moving(), GradientMode::Exact)
+                    .expect("the scene can be trained");
                 trainer.set_terms(terms).expect("the weight is right");
-                assert!(trainer.resume(&state), "the state is of as many Gaussians");
-                assert!(trainer.state().expect("it can be read") == state, "and is the same again");
+                assert!(trainer.resume(&state), "a state of the same number of Gaussians is accepted");
+                assert!(trainer.state().expect("the state can be read") == state, "the state read back is unchanged");
                 let mut wrong = state.clone();
                 wrong.neighbors[..4].copy_from_slice(&400u32.to_le_bytes());
-                assert!(!trainer.resume(&wrong), "there is no Gaussian 400");
+                assert!(!trainer.resume(&wrong), "a state with a neighbor 400 of 400 Gaussians is refused");
             }
-            trainer.accumulate(&[lesson.sample(&images, step % 6)], 0.2).expect("it is drawn");
-            trainer.accumulate_terms(step).expect("they are added");
-            trainer.step(&rates, 1.0, step + 1).expect("it is made");
+            trainer.accumulate(&[lesson.sample(&images, step % 6)], 0.2).expect("the view is drawn");
+            trainer.accumulate_terms(step).expect("the terms are added");
+            trainer.step(&rates, 1.0, step + 1).expect("the step succeeds");
         }
-        trainer.scene().expect("it can be read")
+        trainer.scene().expect("the scene can be read")
     };
-    assert!(train(None) == train(Some(11)), "to the bit");
+    assert!(train(None) == train(Some(11)), "the resumed run ends at the same bits");
 }
 
-/// So few bits of geometry that every picture changes. Means have more: of Gaussians at exactly the same depth, packing changes the order.
+/// So few bits of geometry that every picture changes. Means have more bits: packing changes the order of Gaussians at exactly the same
+/// depth.
 const COARSE: Bits =
     Bits { mean: 14, mean_t: 10, velocity: 6, sigma_t: 6, scale: 4, rotation: 4, opacity: 6, base: 8, escape: 0.02 };
 
-/// Returns the pictures of a scene that is packed with these bits, and with colors as they are.
+/// Returns the pictures of a scene that is packed with these bits, with unchanged colors.
 fn packed_pictures(headless: &mut Headless, scene: GaussianScene, views: &[View]) -> Vec<Picture> {
     let settings = CompressSettings { geometry: Some(COARSE), codebooks: Vec::new(), color_step: 0.0, weights: None };
-    let (packed, _) = compress(scene.into_runtime().expect("it can be drawn"), &settings).expect("it is compressed");
-    let capture = headless.upload(&packed.into_runtime().expect("it can be drawn")).expect("it fits");
-    let draw = |view: &View| headless.render(&capture, view, Background::Color(BEHIND)).expect("it is drawn").picture;
+    let (packed, _) =
+        compress(scene.into_runtime().expect("the scene can be drawn"), &settings).expect("compression succeeds");
+    let capture =
+        headless.upload(&packed.into_runtime().expect("the scene can be drawn")).expect("the scene fits the GPU");
+    let draw =
+        |view: &View| headless.render(&capture, view, Background::Color(BEHIND)).expect("the view is drawn").picture;
     views.iter().map(draw).collect()
 }
 
 #[test]
-fn rounded_geometry_is_drawn_as_it_is_packed() {
+fn rounded_geometry_is_drawn_as_in_the_packed_form() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let models: [(&str, fn(&mut Parameters)); 3] = [
@@ -473,48 +492,53 @@ fn rounded_geometry_is_drawn_as_it_is_packed() {
         let SceneForm::Trained(Trained { parameters, .. }) = &mut scene.form else { panic!("the trained form") };
         change(parameters);
         let expected = packed_pictures(&mut headless, scene.clone(), &lesson.views);
-        let mut trainer = Trainer::new(&mut headless, scene.clone(), GradientMode::Exact).expect("it can be trained");
+        let mut trainer =
+            Trainer::new(&mut headless, scene.clone(), GradientMode::Exact).expect("the scene can be trained");
         let far = |trainer: &mut Trainer<'_>| -> Vec<usize> {
             let apart = |(view, expected): (&View, &Picture)| {
-                let found = trainer.draw(view, Background::Color(BEHIND)).expect("it is drawn").picture;
+                let found = trainer.draw(view, Background::Color(BEHIND)).expect("the view is drawn").picture;
                 let pixels = found.pixels.iter().zip(&expected.pixels);
                 pixels.filter(|(a, b)| (**a - **b).abs().max_element() > 1e-3).count()
             };
             lesson.views.iter().zip(&expected).map(apart).collect()
         };
         let before = far(&mut trainer);
-        assert!(before.iter().sum::<usize>() > 400, "{model}: so few bits are seen: {before:?} pixels differ");
-        trainer.round(&COARSE).expect("it can be packed");
+        assert!(before.iter().sum::<usize>() > 400, "{model}: so few bits change more than 400 pixels: {before:?}");
+        trainer.round(&COARSE).expect("geometry can be packed");
         let after = far(&mut trainer);
         // Where float rounding decides whether a splat counts, a pixel may differ by more.
-        assert!(after.iter().all(|&count| count <= 20), "{model}: {after:?} pixels differ");
-        let kept = trainer.scene().expect("it can be read");
-        assert_eq!(trained(&kept).parameters, trained(&scene).parameters, "{model}: what is trained is not rounded");
+        assert!(after.iter().all(|&count| count <= 20), "{model}: at most 20 pixels of each picture differ: {after:?}");
+        let kept = trainer.scene().expect("the scene can be read");
+        assert_eq!(
+            trained(&kept).parameters,
+            trained(&scene).parameters,
+            "{model}: the trained parameters are not rounded"
+        );
     }
 }
 
 #[test]
-fn training_on_rounded_geometry_makes_up_for_it() {
+fn training_on_rounded_geometry_raises_the_psnr_of_the_packed_scene() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let steps = 120;
     let mut quality_after = |rounding: bool| {
         let mut trainer =
-            Trainer::new(&mut headless, lesson.scene.clone(), GradientMode::Exact).expect("it can be trained");
+            Trainer::new(&mut headless, lesson.scene.clone(), GradientMode::Exact).expect("the scene can be trained");
         let rates = Rates { color: 1e-2, harmonics: 2.5e-3, ..Rates::OURS };
         let images = lesson.upload(&trainer);
         for step in 0..steps {
             if rounding && step % 10 == 0 {
-                trainer.round(&COARSE).expect("it can be packed");
+                trainer.round(&COARSE).expect("geometry can be packed");
             }
             trainer
                 .accumulate(&[lesson.sample(&images, step % 6), lesson.sample(&images, (step + 3) % 6)], 0.2)
-                .expect("they are drawn");
+                .expect("the views are drawn");
             let factor = 1.0 - 0.95 * step as f64 / steps as f64;
-            trainer.step(&rates, factor, step + 1).expect("it is made");
+            trainer.step(&rates, factor, step + 1).expect("the step succeeds");
         }
-        assert_eq!(trainer.faults().expect("they can be read"), None, "every gradient is finite");
-        let scene = trainer.scene().expect("it can be read");
+        assert_eq!(trainer.faults().expect("faults can be read"), None, "every gradient is finite");
+        let scene = trainer.scene().expect("the scene can be read");
         let pictures = packed_pictures(&mut headless, scene, &lesson.views);
         let quality = |(picture, image): (&Picture, &CoveredImage)| {
             SquaredError::of(&picture.clamped(), &image.over(Vec3::from(BEHIND))).expect("the same size")
@@ -523,36 +547,36 @@ fn training_on_rounded_geometry_makes_up_for_it() {
     };
     let (with, without) = (quality_after(true), quality_after(false));
     println!("packed: {with:.2} dB, {without:.2} dB without rounding in training");
-    assert!(with > without + 0.1, "packed it has {with:.2} dB, and {without:.2} dB without rounding in training");
+    assert!(with > without + 0.1, "packed: {with:.2} dB, and {without:.2} dB without rounding in training");
 }
 
 #[test]
-fn what_rounding_changes_is_part_of_the_state() {
+fn the_roundings_of_geometry_are_part_of_the_state() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let mut train = |pause: Option<usize>| {
         let mut trainer =
-            Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("it can be trained");
+            Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("the scene can be trained");
         let images = lesson.upload(&trainer);
         for step in 0..20 {
             if pause == Some(step) {
-                let state = trainer.state().expect("it can be read");
-                trainer =
-                    Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("it can be trained");
-                assert!(!trainer.resume(&state), "geometry is not rounded yet");
-                trainer.round(&COARSE).expect("it can be packed");
-                assert!(trainer.resume(&state), "the state is of as many Gaussians");
-                assert!(trainer.state().expect("it can be read") == state, "and is the same again");
+                let state = trainer.state().expect("the state can be read");
+                trainer = Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact)
+                    .expect("the scene can be trained");
+                assert!(!trainer.resume(&state), "a state with roundings is refused before geometry is rounded");
+                trainer.round(&COARSE).expect("geometry can be packed");
+                assert!(trainer.resume(&state), "a state of the same number of Gaussians is accepted");
+                assert!(trainer.state().expect("the state can be read") == state, "the state read back is unchanged");
             }
             if step % 8 == 0 {
-                trainer.round(&COARSE).expect("it can be packed");
+                trainer.round(&COARSE).expect("geometry can be packed");
             }
-            trainer.accumulate(&[lesson.sample(&images, step % 6)], 0.2).expect("it is drawn");
-            trainer.step(&Rates::OURS, 1.0, step + 1).expect("it is made");
+            trainer.accumulate(&[lesson.sample(&images, step % 6)], 0.2).expect("the view is drawn");
+            trainer.step(&Rates::OURS, 1.0, step + 1).expect("the step succeeds");
         }
-        trainer.scene().expect("it can be read")
+        trainer.scene().expect("the scene can be read")
     };
-    assert!(train(None) == train(Some(11)), "to the bit");
+    assert!(train(None) == train(Some(11)), "the resumed run ends at the same bits");
 }
 
 #[test]
@@ -560,18 +584,19 @@ fn a_weight_that_is_not_a_number_is_refused() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let mut trainer =
-        Trainer::new(&mut headless, lesson.scene.clone(), GradientMode::Exact).expect("it can be trained");
+        Trainer::new(&mut headless, lesson.scene.clone(), GradientMode::Exact).expect("the scene can be trained");
     for (name, weights) in [("motion", [f64::NAN, 0.0, 0.0]), ("rigid", [0.0, -1.0, 0.0])] {
-        let refused = trainer.set_terms(terms(weights)).expect_err("it is refused").to_string();
+        let refused = trainer.set_terms(terms(weights)).expect_err("the weight is refused").to_string();
         assert!(refused.contains(name), "{name} is named: {refused}");
     }
 }
 
 #[test]
-fn a_step_is_that_of_the_reference() {
+fn a_step_matches_the_cpu_reference() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
-    let mut trainer = Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("it can be trained");
+    let mut trainer =
+        Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("the scene can be trained");
     let rates = Rates { mean: 0.01, mean_t: 0.02, ..Rates::ORIGINAL };
     let expected_rates = [
         ("mean", rates.mean),
@@ -588,11 +613,11 @@ fn a_step_is_that_of_the_reference() {
     for step in 1..=3 {
         trainer
             .accumulate(&[lesson.sample(&images, step), lesson.sample(&images, step + 1)], 0.2)
-            .expect("they are drawn");
-        let before = read(&trainer.scene().expect("it can be read"));
-        let gradients = read(&trainer.gradients().expect("they can be read"));
-        trainer.step(&rates, 0.5, step).expect("it is made");
-        let after = read(&trainer.scene().expect("it can be read"));
+            .expect("the views are drawn");
+        let before = read(&trainer.scene().expect("the scene can be read"));
+        let gradients = read(&trainer.gradients().expect("gradients can be read"));
+        trainer.step(&rates, 0.5, step).expect("the step succeeds");
+        let after = read(&trainer.scene().expect("the scene can be read"));
         for (k, (name, before)) in before.iter().enumerate() {
             if moments.len() <= k {
                 moments.push(vec![Moments::default(); before.len()]);
@@ -610,12 +635,12 @@ fn a_step_is_that_of_the_reference() {
                 // Tiny gradients lose digits in the square root.
                 assert!(
                     (found - expected).abs() <= 2e-2 * rate + 1e-6 * expected.abs(),
-                    "{name} {i}: {found} is {expected}"
+                    "{name} {i}: {found}, expected {expected}"
                 );
             }
         }
-        let left = read(&trainer.gradients().expect("they can be read"));
-        assert!(left.iter().all(|(_, values)| values.iter().all(|&v| v == 0.0)), "gradients begin anew");
+        let left = read(&trainer.gradients().expect("gradients can be read"));
+        assert!(left.iter().all(|(_, values)| values.iter().all(|&v| v == 0.0)), "gradients are zero after the step");
     }
 }
 
@@ -625,30 +650,30 @@ fn fifty_steps_halve_the_loss_and_a_resumed_run_ends_as_an_uninterrupted_one() {
     let lesson = Lesson::new(&mut headless);
     let mut train = |pause: Option<usize>| {
         let mut trainer =
-            Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("it can be trained");
+            Trainer::new(&mut headless, lesson.disturbed(), GradientMode::Exact).expect("the scene can be trained");
         let rates = Rates { mean: 2e-3, mean_t: 1e-3, harmonics: 2.5e-3, color: 1e-2, ..Rates::OURS };
         let images = lesson.upload(&trainer);
         let mut losses = Vec::new();
         for step in 0..50 {
             if pause == Some(step) {
-                let (state, scene) = (trainer.state().expect("it can be read"), lesson.disturbed());
-                trainer = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("it can be trained");
-                assert!(trainer.resume(&state), "the state is of as many Gaussians");
+                let (state, scene) = (trainer.state().expect("the state can be read"), lesson.disturbed());
+                trainer = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("the scene can be trained");
+                assert!(trainer.resume(&state), "a state of the same number of Gaussians is accepted");
             }
             trainer
                 .accumulate(&[lesson.sample(&images, step % 6), lesson.sample(&images, (step + 3) % 6)], 0.2)
-                .expect("they are drawn");
-            trainer.step(&rates, 1.0, step + 1).expect("it is made");
-            losses.push(trainer.totals().expect("they can be read").loss);
+                .expect("the views are drawn");
+            trainer.step(&rates, 1.0, step + 1).expect("the step succeeds");
+            losses.push(trainer.totals().expect("totals can be read").loss);
         }
-        assert_eq!(trainer.faults().expect("they can be read"), None, "every gradient is finite");
-        (trainer.scene().expect("it can be read"), losses)
+        assert_eq!(trainer.faults().expect("faults can be read"), None, "every gradient is finite");
+        (trainer.scene().expect("the scene can be read"), losses)
     };
     let (scene, losses) = train(None);
     let mean = |losses: &[f64]| losses.iter().sum::<f64>() / losses.len() as f64;
     let (first, last) = (mean(&losses[..6]), mean(&losses[44..]));
     assert!(last < 0.5 * first, "the loss falls from {first:.4} to {last:.4}");
-    assert!(scene == train(Some(23)).0, "to the bit");
+    assert!(scene == train(Some(23)).0, "the resumed run ends at the same bits");
 }
 
 #[test]
@@ -656,22 +681,23 @@ fn gradients_that_are_not_finite_are_left_out_and_reported() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new(&mut headless);
     let mut trainer =
-        Trainer::new(&mut headless, lesson.scene.clone(), GradientMode::Exact).expect("it can be trained");
+        Trainer::new(&mut headless, lesson.scene.clone(), GradientMode::Exact).expect("the scene can be trained");
     let count = 70 * 54;
     let mut pixels = vec![[1e-3; 4]; count];
     pixels[27 * 70 + 35] = [f32::NAN; 4];
     let depths = vec![0.0; count];
-    trainer.accumulate_pixels(&lesson.views[0], Background::None, &pixels, &depths).expect("it is drawn");
-    let faults = trainer.faults().expect("they can be read").expect("there are some");
+    trainer.accumulate_pixels(&lesson.views[0], Background::None, &pixels, &depths).expect("the view is drawn");
+    let faults = trainer.faults().expect("faults can be read").expect("there are some");
     assert!(faults.count >= 1 && faults.gaussian < 400, "{faults:?}");
-    trainer.step(&Rates::OURS, 1.0, 1).expect("it is made");
-    let scene = trainer.scene().expect("it can be read");
+    trainer.step(&Rates::OURS, 1.0, 1).expect("the step succeeds");
+    let scene = trainer.scene().expect("the scene can be read");
     let all = tensors(&trained(&scene).parameters, &trained(&scene).harmonics);
-    assert!(all.iter().all(|(_, values)| values.iter().all(|value| value.is_finite())), "nothing is lost");
-    assert_ne!(scene, lesson.scene, "the others are trained");
+    assert!(all.iter().all(|(_, values)| values.iter().all(|value| value.is_finite())), "all values are finite");
+    assert_ne!(scene, lesson.scene, "the other Gaussians are trained");
 }
 
-/// Returns a scene and a view of it in which a Gaussian is seen from its own mean, which it has left: its color has no direction, 0 / 0.
+/// Returns a scene and a view whose camera is at the mean of a Gaussian, while the Gaussian has moved away: the direction of its color is 0
+/// / 0.
 fn without_direction(lesson: &Lesson) -> (GaussianScene, View) {
     let (mut scene, time) = (lesson.moving(), 0.5);
     let change = |scene: &mut GaussianScene, mean: Vec3| {
@@ -683,8 +709,8 @@ fn without_direction(lesson: &Lesson) -> (GaussianScene, View) {
     };
     let eye = Vec3::new(0.0, 0.0, 3.0);
     change(&mut scene, eye);
-    let target = scene.clone().into_runtime().expect("it can be drawn").gaussian(7).mean_at(time);
-    assert!(target.distance(eye) > 1.0, "it has moved away: {target}");
+    let target = scene.clone().into_runtime().expect("the scene can be drawn").gaussian(7).mean_at(time);
+    assert!(target.distance(eye) > 1.0, "the Gaussian has moved away: {target}");
     let view = Camera::look_at(eye, target, Vec3::Y, 0.8, UVec2::new(70, 54)).view(time, RasterFov::Reference);
     change(&mut scene, view.camera_position);
     (scene, view)
@@ -696,7 +722,7 @@ fn a_gaussian_whose_gradient_is_not_finite_is_left_out_with_its_color() {
     let lesson = Lesson::new(&mut headless);
     let (count, depths) = (70 * 54, vec![0.0; 70 * 54]);
     let mut strong = vec![[0.0; 4]; count];
-    // Gradients of color of this size are finite, those of shapes are not.
+    // With weights of this size, gradients of color are finite and gradients of shapes are not.
     strong[27 * 70 + 35] = [1e37, 1e37, 1e37, 0.0];
     let (undirected, at_mean) = without_direction(&lesson);
     let cases = [
@@ -704,10 +730,10 @@ fn a_gaussian_whose_gradient_is_not_finite_is_left_out_with_its_color() {
         ("no direction", undirected, at_mean, vec![[1e-3; 4]; count]),
     ];
     for (what, scene, view, pixels) in cases {
-        let mut trainer = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("it can be trained");
-        trainer.accumulate_pixels(&view, Background::None, &pixels, &depths).expect("it is drawn");
-        let gradients = trainer.gradients().expect("they can be read");
-        let faults = trainer.faults().expect("they can be read").expect("a gradient that is not finite is counted");
+        let mut trainer = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("the scene can be trained");
+        trainer.accumulate_pixels(&view, Background::None, &pixels, &depths).expect("the view is drawn");
+        let gradients = trainer.gradients().expect("gradients can be read");
+        let faults = trainer.faults().expect("faults can be read").expect("a gradient that is not finite is counted");
         println!("{what}: {faults:?}");
         assert!(what != "no direction" || faults.gaussian == 7, "{what}: {faults:?}");
         let all = tensors(&trained(&gradients).parameters, &trained(&gradients).harmonics);
@@ -720,7 +746,7 @@ fn a_gaussian_whose_gradient_is_not_finite_is_left_out_with_its_color() {
             values[index * stride..][..stride].iter().any(|&value| value != 0.0)
         };
         let only_color = (0..400).filter(|&index| has("harmonics", index) && !has("opacity_logit", index));
-        assert_eq!(only_color.collect::<Vec<_>>(), [0; 0], "{what}: Gaussians with a gradient of color alone");
+        assert_eq!(only_color.collect::<Vec<_>>(), [0; 0], "{what}: no Gaussian has a gradient of color alone");
         assert!(!has("harmonics", faults.gaussian as usize), "{what}: the reported Gaussian is left out");
     }
 }

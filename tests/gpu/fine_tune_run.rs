@@ -1,7 +1,7 @@
 //! Complete runs of fine-tuning: with a temporal filter, compressed, interrupted and resumed.
 //!
-//! In: a small synthetic scene, its own pictures as a dataset. Out: proof that Gaussians which a filter leaves out are not trained, that the
-//! filter is computed again, that the PSNR of a compressed result is that of the package, and that a resumed run has the result of an
+//! In: a small synthetic scene, its own pictures as a dataset. Out: proof that Gaussians which a filter leaves out are not trained, that
+//! the filter is computed again, that the PSNR of a compressed result is that of the package, and that a resumed run has the result of an
 //! uninterrupted one. Skipped where there is no GPU.
 
 use crate::support::{dataset, gpu};
@@ -84,13 +84,14 @@ fn gaussians_that_a_filter_leaves_out_are_not_trained() {
     let lesson = Lesson::new();
     assert_eq!(lesson.images.len(), 12, "the views of three of four cameras");
     let mut gradients = |scene: GaussianScene, view: &TrainingView| {
-        let mut trainer = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("it can be trained");
-        let image = trainer.upload(&view.load_covered().expect("it was just written")).expect("it fits");
+        let mut trainer = Trainer::new(&mut headless, scene, GradientMode::Exact).expect("the scene can be trained");
+        let image =
+            trainer.upload(&view.load_covered().expect("the image was just written")).expect("the image fits the GPU");
         let view = view.camera.view(view.time, lesson.scene.trained_with.raster_fov);
         let background = Background::Color([0.3; 3]);
         let sample = Sample { view: &view, image: &image, background, number: 0 };
-        trainer.accumulate(&[sample], 0.2).expect("it is drawn");
-        trainer.gradients().expect("they can be read")
+        trainer.accumulate(&[sample], 0.2).expect("the view is drawn");
+        trainer.gradients().expect("gradients can be read")
     };
     for (time, divisor) in [(0.0, 2), (1.0, 3)] {
         let view = lesson.views.iter().find(|view| view.time == time).expect("both ends have views");
@@ -124,7 +125,7 @@ fn filters_by_views_are_computed_again_in_training_and_support_filters_after_it(
         let settings = FineTuneSettings { steps: 6, evaluate_every: 3, refresh_filter, ..FineTuneSettings::default() };
         let scene = lesson.disturbed(Some(filter(kind)));
         let tuned = fine_tune(&mut headless, scene, &lesson.images, &settings, None, &mut NoProgress);
-        let filter = tuned.expect("it can be trained").scene.filter.expect("it had one");
+        let filter = tuned.expect("the scene can be trained").scene.filter.expect("the filter is kept");
         assert_eq!(
             (filter.kind, filter.segments, filter.count),
             (kind, 2, COUNT),
@@ -184,7 +185,7 @@ fn colors_of_one_coefficient_are_compressed_without_codebooks() {
     scene.form.truncate_colors(0, 0);
     let settings = FineTuneSettings { steps: 2, compress: Some((Quality::Balanced, 4)), ..FineTuneSettings::default() };
     let tuned = fine_tune(&mut headless, scene, &lesson.images, &settings, None, &mut NoProgress);
-    let colors = tuned.expect("it can be compressed").scene.form.color_degrees();
+    let colors = tuned.expect("the scene can be compressed").scene.form.color_degrees();
     assert_eq!(colors.coefficients, 1, "the color has one coefficient, as before");
 }
 
@@ -204,12 +205,12 @@ fn the_last_point_of_a_compressed_run_is_measured_on_the_compressed_scene() {
         let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.images, &settings, None, &mut NoProgress);
         let tuned = tuned.unwrap_or_else(|error| panic!("{quality:?}: {error}"));
         let runtime = tuned.scene.into_runtime().expect("a compressed scene can be drawn");
-        let capture = headless.upload(&runtime).expect("it fits");
+        let capture = headless.upload(&runtime).expect("the scene fits the GPU");
         let mut error = SquaredError::default();
         for view in &validation {
-            let image = view.load_covered().expect("it was just written").over(Vec3::ZERO);
+            let image = view.load_covered().expect("the image was just written").over(Vec3::ZERO);
             let view = view.camera.view(view.time, runtime.trained_with.raster_fov);
-            let frame = headless.render(&capture, &view, Background::Color([0.0; 3])).expect("it is drawn");
+            let frame = headless.render(&capture, &view, Background::Color([0.0; 3])).expect("the view is drawn");
             error.add(&image, &frame.picture.clamped()).expect("one size");
         }
         let last = tuned.curve.last().expect("a point");
@@ -228,7 +229,7 @@ fn an_interrupted_and_resumed_run_has_the_result_of_an_uninterrupted_one() {
         evaluate_every: 2,
         rates: Rates { mean: 2e-3, color: 1e-2, ..Rates::OURS },
         refresh_filter: 3,
-        // Geometry is rounded before the first of these steps and after 50.
+        // Geometry is rounded before the first step and after step 50.
         compress: Some((Quality::Balanced, 56)),
         rounding: true,
         ..FineTuneSettings::default()
@@ -238,7 +239,7 @@ fn an_interrupted_and_resumed_run_has_the_result_of_an_uninterrupted_one() {
         let scene = lesson.disturbed(Some(filter(FilterKind::KeyFrame)));
         fine_tune(headless, scene, &lesson.images, &settings, Some(resume), progress).map_err(Box::new)
     };
-    let whole = run(&mut headless, &lesson.store("whole"), &mut NoProgress).expect("it can be trained");
+    let whole = run(&mut headless, &lesson.store("whole"), &mut NoProgress).expect("the scene can be trained");
     for (task, left) in [("fine-tuning", 3), ("fine-tuning", 4), ("training codebooks", 2), ("training codebooks", 53)]
     {
         let store = lesson.store(&format!("{task} {left}"));
@@ -253,7 +254,7 @@ fn an_interrupted_and_resumed_run_has_the_result_of_an_uninterrupted_one() {
             "{task}: the curve has the points before the interruption: {:?}",
             stopped.curve
         );
-        let resumed = run(&mut headless, &store, &mut NoProgress).expect("it can be trained");
+        let resumed = run(&mut headless, &store, &mut NoProgress).expect("the scene can be trained");
         assert!(resumed.scene == whole.scene, "{task}: the resumed run has the same scene");
         assert_eq!(
             (resumed.best, &resumed.curve),
@@ -271,7 +272,7 @@ fn the_last_steps_are_trained_on_rounded_geometry_only_if_requested() {
         let compress = Some((Quality::Small, steps));
         let settings = FineTuneSettings { steps: 0, compress, rounding, ..FineTuneSettings::default() };
         let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.images, &settings, None, &mut NoProgress);
-        tuned.expect("it can be trained").scene
+        tuned.expect("the scene can be trained").scene
     };
     assert!(run(true, 5) != run(false, 5), "steps on rounded geometry have another result");
     assert!(run(true, 0) == run(false, 0), "without these steps the result is the same");
@@ -310,7 +311,7 @@ fn captures_of_every_model_and_with_an_environment_map_are_trained() {
         let tuned = tuned.unwrap_or_else(|error| panic!("{name}: {error}"));
         let [first, .., _] = tuned.curve[..] else { panic!("{name}: a curve") };
         let (before, after) = (first.psnr.expect("validation views"), tuned.best.psnr.expect("validation views"));
-        assert!(after > before + 0.5, "{name}: {before:.2} to {after:.2} dB");
+        assert!(after > before + 0.5, "{name}: training raises the PSNR by 0.5 dB: {before:.2} to {after:.2} dB");
         assert_eq!(tuned.scene.environment, lesson.scene.environment, "{name}: the environment map is unchanged");
     }
 }
@@ -336,8 +337,8 @@ fn validation_views_that_are_reproduced_exactly_do_not_keep_the_first_step() {
     let images = TrainingImages::load(views, &validation, trained_with, &mut NoProgress);
     let images = images.expect("the images were just written");
     let tuned = fine_tune(&mut headless, lesson.disturbed(None), &images, &settings, None, &mut NoProgress);
-    let tuned = tuned.expect("it can be trained");
-    assert_eq!(tuned.validation, 24, "twelve views of the scene and twelve black ones");
+    let tuned = tuned.expect("the scene can be trained");
+    assert_eq!(tuned.validation, 24, "twelve views of the scene and twelve black views");
     let finite = |psnr: Option<f64>| psnr.is_some_and(f64::is_finite);
     assert!(tuned.curve.iter().all(|point| finite(point.psnr)), "every PSNR is finite: {:?}", tuned.curve);
     assert_eq!(tuned.best.step, 20, "training helps, and the last step is kept: {:?}", tuned.curve);
@@ -350,6 +351,6 @@ fn training_ends_early_when_it_no_longer_helps() {
     let rates = Rates { color: 0.0, harmonics: 0.0, opacity: 0.0, scale: 0.0, rotation: 0.0, mean: 0.0, mean_t: 0.0 };
     let settings = FineTuneSettings { steps: 50, evaluate_every: 1, patience: Some(3), rates, ..Default::default() };
     let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.images, &settings, None, &mut NoProgress);
-    let tuned = tuned.expect("it can be trained");
+    let tuned = tuned.expect("the scene can be trained");
     assert_eq!((tuned.curve.len(), tuned.best.step), (4, 0), "three evaluations without an improvement");
 }

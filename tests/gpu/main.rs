@@ -1,7 +1,7 @@
 //! Tests of the renderer without Bevy, and of individual shaders.
 //!
 //! In: scenes and buffers made by the tests, `tests/golden/`, the files of `shaders/`. Out: one test binary. The header of each
-//! module describes its tests. Tests that need a device are skipped where there is none, not even a software driver.
+//! module describes its tests. Tests that need a device are skipped if there is neither a GPU nor a software driver.
 
 mod appearance;
 mod bake;

@@ -30,11 +30,11 @@ fn compiled() -> u64 {
 
 /// Draws a scene at times of the first half of [0, 1], then of the second half. Returns the compiled bytes after each half.
 fn compiled_in_turn(headless: &mut Headless, scene: &RuntimeScene) -> [u64; 2] {
-    let capture = headless.upload(scene).expect("it fits");
+    let capture = headless.upload(scene).expect("the scene fits the GPU");
     [0.0, 0.5].map(|first| {
         for picture in 0..12 {
             let view = view(first + picture as f32 / 24.0);
-            headless.render(&capture, &view, BLACK).expect("it is drawn");
+            headless.render(&capture, &view, BLACK).expect("the view is drawn");
         }
         compiled()
     })
@@ -48,7 +48,7 @@ fn a_software_driver_compiles_no_shader_after_the_first_pictures() {
         if headless.context().info.device_type != wgpu::DeviceType::Cpu {
             return skip("the compiled code of hardware is not in the memory of the process");
         }
-        let (coded, _) = compress(scene(600, 3, 2), &settings(&[16, 8])).expect("it is compressed");
+        let (coded, _) = compress(scene(600, 3, 2), &settings(&[16, 8])).expect("compression succeeds");
         let scenes = [("sliced", scene(600, 3, 2)), ("coded", coded.into_runtime().expect("drawable"))];
         for design in [Design::Reference, Design::Fast] {
             headless.set_design(design);

@@ -55,12 +55,12 @@ fn motion_matches_the_cpu_reference() {
         assert!(most > 1.0, "{name}: the largest motion is more than a pixel: {most}");
         for design in DESIGNS {
             headless.set_design(design);
-            let capture = headless.upload(scene).expect("it fits");
+            let capture = headless.upload(scene).expect("the scene fits the GPU");
             let active = headless.active(&capture, now.time);
             let instance = Instance { capture: &capture, active: active.as_ref(), view: now, appearance: as_trained() };
             let parameters = ViewParameters { previous: Some(&previous), ..ViewParameters::default() };
-            let frame = headless.render_all(&[instance], &parameters).expect("it is drawn");
-            let found = headless.read_motion().expect("it is read back");
+            let frame = headless.render_all(&[instance], &parameters).expect("the view is drawn");
+            let found = headless.read_motion().expect("motions are read back");
             assert_eq!(found.len(), expected.len(), "{name}, {design:?}: a motion for each pixel");
             let apart = found.iter().zip(&expected).map(|([x, y, _, left], (motion, transmittance))| {
                 let motion = (Vec2::new(*x, *y) - *motion).abs().max_element() / most;
@@ -80,7 +80,7 @@ fn motion_matches_the_cpu_reference() {
 #[test]
 fn motions_do_not_change_colors_and_depths() {
     let Some(mut headless) = gpu::headless() else { return };
-    let capture = headless.upload(&scene(3_000, 1, 0)).expect("it fits");
+    let capture = headless.upload(&scene(3_000, 1, 0)).expect("the scene fits the GPU");
     let instances = [Instance { capture: &capture, active: None, view: view(0.0, 0.4), appearance: as_trained() }];
     let previous = [view(0.1, 0.3)];
     for design in DESIGNS {
@@ -89,11 +89,14 @@ fn motions_do_not_change_colors_and_depths() {
             let without = ViewParameters { depths, precision, ..ViewParameters::default() };
             let with = ViewParameters { previous: Some(&previous), ..without };
             let [plain, moving, again] =
-                [&without, &with, &without].map(|one| headless.render_all(&instances, one).expect("it is drawn"));
+                [&without, &with, &without].map(|one| headless.render_all(&instances, one).expect("the view is drawn"));
             assert!(plain.counts.visible > 500, "the scene is visible: {:?}", plain.counts);
             assert_eq!(moving, plain, "{design:?}, {precision:?}, depths {depths}: the same frame with motions");
             assert_eq!(again, plain, "{design:?}, {precision:?}, depths {depths}: the same frame after motions");
-            assert!(headless.read_motion().expect("it is read back").is_empty(), "{design:?}: motions are released");
+            assert!(
+                headless.read_motion().expect("motions are read back").is_empty(),
+                "{design:?}: motions are released"
+            );
         }
     }
 }
@@ -116,7 +119,7 @@ fn lone() -> RuntimeScene {
 #[test]
 fn the_motion_of_a_splat_matches_the_pinhole_model() {
     let Some(mut headless) = gpu::headless() else { return };
-    let capture = headless.upload(&lone()).expect("it fits");
+    let capture = headless.upload(&lone()).expect("the scene fits the GPU");
     let (size, distance) = (UVec2::splat(65), 3.0);
     let camera = |aside: f32| {
         let eye = Vec3::new(aside, -distance, 0.0);
@@ -137,8 +140,8 @@ fn the_motion_of_a_splat_matches_the_pinhole_model() {
             let instance = Instance { capture: &capture, active: None, view: now, appearance: as_trained() };
             let parameters =
                 ViewParameters { previous: Some(std::slice::from_ref(before)), ..ViewParameters::default() };
-            headless.render_all(&[instance], &parameters).expect("it is drawn");
-            let motions = headless.read_motion().expect("it is read back");
+            headless.render_all(&[instance], &parameters).expect("the view is drawn");
+            let motions = headless.read_motion().expect("motions are read back");
             let [x, y, _, left] = motions[(size.y / 2 * size.x + size.x / 2) as usize];
             assert!(left < 0.1, "{what}: the splat covers the middle pixel: transmittance {left}");
             let found = Vec2::new(x, y) / (1.0 - left);
@@ -151,7 +154,7 @@ fn the_motion_of_a_splat_matches_the_pinhole_model() {
 #[test]
 fn resources_of_motions_are_created_once_and_only_for_frames_with_motions() {
     let Some(mut headless) = gpu::headless() else { return };
-    let capture = headless.upload(&lone()).expect("it fits");
+    let capture = headless.upload(&lone()).expect("the scene fits the GPU");
     let view = view(0.0, 0.0);
     let instances = [Instance { capture: &capture, active: None, view, appearance: as_trained() }];
     let previous = [view];
@@ -160,7 +163,7 @@ fn resources_of_motions_are_created_once_and_only_for_frames_with_motions() {
     for design in DESIGNS {
         headless.set_design(design);
         let mut created = |parameters: &ViewParameters<'_>| {
-            headless.render_all(&instances, parameters).expect("it is drawn");
+            headless.render_all(&instances, parameters).expect("the view is drawn");
             headless.work().created()
         };
         let before = [created(&without), created(&without)];

@@ -15,11 +15,11 @@ fn packed_scenes_match_the_cpu_reference() {
     for (degree, degree_t, codebooks) in
         [(3, 2, &[64, 32, 16, 8][..]), (3, 2, &[]), (3, 1, &[50]), (2, 0, &[16, 16]), (1, 0, &[8]), (0, 0, &[2])]
     {
-        let (packed, _) = compress(scene(5_000, degree, degree_t), &settings(codebooks)).expect("it is compressed");
+        let (packed, _) = compress(scene(5_000, degree, degree_t), &settings(codebooks)).expect("compression succeeds");
         let packed = packed.into_runtime().expect("drawable");
-        let capture = headless.upload(&packed).expect("it fits");
+        let capture = headless.upload(&packed).expect("the scene fits the GPU");
         for time in [0.0, 0.33, 0.8] {
-            let found = headless.render(&capture, &view(time), BLACK).expect("it is drawn");
+            let found = headless.render(&capture, &view(time), BLACK).expect("the view is drawn");
             let expected = reference::render(&packed, &view(time), BLACK);
             let pixels = found.picture.pixels.iter().zip(&expected.picture.pixels);
             let apart = pixels.map(|(a, b)| (*a - *b).abs().max_element());
@@ -42,7 +42,7 @@ fn coded(packed: &mut PackedScene, spoil: impl FnOnce(&mut CodedColors)) {
 #[test]
 fn inconsistent_packed_scenes_are_not_uploaded() {
     let Some(headless) = gpu::headless() else { return };
-    let (packed, _) = compress(scene(600, 2, 0), &settings(&[16, 8])).expect("it is compressed");
+    let (packed, _) = compress(scene(600, 2, 0), &settings(&[16, 8])).expect("compression succeeds");
     let good = packed.into_runtime().expect("drawable");
     assert!(headless.upload(&good).is_ok(), "the undamaged scene is uploaded");
     let spoils: [fn(&mut PackedScene); 4] = [

@@ -469,14 +469,14 @@ fn a_capture_uploaded_in_chunks_equals_a_capture_uploaded_at_once() {
     };
     let whole = packed_scene::scene(5_000, 3, 1);
     let packed = |codebooks: &[usize]| {
-        let (packed, _) = compress(whole.clone(), &packed_scene::settings(codebooks)).expect("it is compressed");
+        let (packed, _) = compress(whole.clone(), &packed_scene::settings(codebooks)).expect("compression succeeds");
         packed.into_runtime().expect("drawable")
     };
     let map = Environment { width: 90, height: 50, texels: (0..90 * 50 * 3).map(|i| i as f32 / 13_500.0).collect() };
     for (form, scene) in [("sliced", whole.clone()), ("packed", packed(&[])), ("coded", packed(&[64, 32]))] {
         let scene = RuntimeScene { environment: Some(map.clone()), ..scene };
-        let at_once = GpuCapture::upload(device, queue, &renderer, &scene).expect("it fits");
-        let mut upload = CaptureUpload::new(device, &renderer, &scene).expect("it fits");
+        let at_once = GpuCapture::upload(device, queue, &renderer, &scene).expect("the scene fits the GPU");
+        let mut upload = CaptureUpload::new(device, &renderer, &scene).expect("the scene fits the GPU");
         let (all, mut chunks) = (upload.bytes_left(), 0);
         while upload.bytes_left() > 0 {
             let written = upload.advance(queue, &renderer, CHUNK);

@@ -16,11 +16,12 @@ fn score_matches_the_cpu_reference() {
     let settings = SynthSettings { count: 4_000, degree: 1, ..SynthSettings::default() };
     let scene = synthesize(&settings).into_runtime().expect("synthetic scenes are valid");
     let background = Background::Color([0.2, 0.4, 0.1]);
-    let mut engine = GpuEngine::new(&mut headless, &scene, background, ShaderChecks::On).expect("it fits");
+    let mut engine =
+        GpuEngine::new(&mut headless, &scene, background, ShaderChecks::On).expect("the scene fits the GPU");
     for (time, size) in [(0.1, UVec2::new(80, 60)), (0.6, UVec2::new(33, 47)), (0.6, UVec2::new(16, 16))] {
         let camera = Camera::look_at(Vec3::new(2.0, 0.6, 1.0), Vec3::ZERO, Vec3::Z, 0.8, size);
         let view = camera.view(time, RasterFov::Reference);
-        let found = engine.score(&view, Want::Removal).expect("it is scored");
+        let found = engine.score(&view, Want::Removal).expect("the view is scored");
         let expected = score(&scene, &view, background, Want::Removal);
         let columns = [
             ("contribution", &found.contribution, &expected.contribution),
@@ -41,7 +42,7 @@ fn score_matches_the_cpu_reference() {
                 );
             }
         }
-        let again = engine.score(&view, Want::Removal).expect("it is scored");
+        let again = engine.score(&view, Want::Removal).expect("the view is scored");
         assert!(again == found, "at {time}: a second run has the same result");
     }
 }

@@ -1,8 +1,8 @@
 //! The stages score and prune of a bake: which Gaussians to keep.
 //!
 //! In: a checkpoint, the views to train on, the validation views. Out: the scores of all Gaussians ([`Candidate`]); the score and the count
-//! that serve the goal best on the validation views, and every count tried ([`Choice`]). Where the remaining Gaussians are trained, scores and
-//! losses are judged after a short training: the best choice before training is not the best after it.
+//! that are best for the goal on the validation views, and every count tried ([`Choice`]). If the remaining Gaussians are trained, scores
+//! and losses are compared after a short training: the best choice before training is not the best choice after training.
 
 use super::inputs::Inputs;
 use super::size::count_of_size;
@@ -19,7 +19,7 @@ use crate::offline::{OfflineError, Progress};
 use crate::scene::GaussianScene;
 use serde::{Deserialize, Serialize};
 
-/// Fractions of the Gaussians whose removal is measured for the report, whatever the goal.
+/// Fractions of the Gaussians whose removal is measured for the report, independent of the goal.
 const SWEEP: [f64; 4] = [0.2, 0.5, 0.7, 0.85];
 
 /// The score and the count to prune by.
@@ -29,13 +29,13 @@ pub(super) struct Choice {
     pub score: String,
     /// Number of Gaussians to keep.
     pub kept: usize,
-    /// How many validation views were compared, and with what.
+    /// The number of compared validation views, and the pictures they were compared with.
     pub compared_with: String,
     /// The counts tried.
     pub tried: Vec<Tried>,
 }
 
-/// Checks before the scoring that the images of the validation views are there, which measuring a loss needs.
+/// Checks before the scoring that the images of the validation views exist: a loss is measured on them.
 ///
 /// # Errors
 /// There are no validation views, or an image is missing.
@@ -81,7 +81,7 @@ pub(super) fn choose(
     let key = if trains(inputs, scores, settings.goal) { key.with(inputs.training_images_key) } else { key };
     let (Text(choice), _) =
         stages.run("prune", key, |_| true, |progress| search(inputs, scores, progress).map(Text))?;
-    // What follows depends on the choice, and not on the counts tried.
+    // Later stages depend on the choice, and not on the counts tried.
     let key = scores_key.and(&format!("{} Gaussians by {}", choice.kept, choice.score));
     Ok((choice, key))
 }

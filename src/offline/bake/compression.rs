@@ -13,7 +13,8 @@ use crate::offline::temporal_filter::filter as temporal_filter;
 use crate::offline::{OfflineError, write_settings};
 use crate::scene::{Form, GaussianScene, SceneForm, TemporalFilter};
 
-/// The stage mask: computes the temporal filter of the remaining Gaussians. Returns the key of the scene with it, given that of the scene.
+/// The stage mask: computes the temporal filter of the remaining Gaussians. Returns the key of the scene with the filter, given the key of
+/// the scene.
 pub(super) fn mask(
     inputs: &mut Inputs<'_>,
     stages: &mut Stages<'_>,

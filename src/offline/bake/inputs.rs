@@ -1,4 +1,4 @@
-//! What the stages of a bake share.
+//! The inputs that the stages of a bake share.
 //!
 //! In: a scene, [`BakeSettings`]. Out: the views of its dataset, divided; the folder of results; the keys of the contents of all inputs.
 
@@ -16,24 +16,24 @@ use crate::offline::{OfflineError, Progress, Subject, trained_pixel};
 use crate::scene::{GaussianScene, MAX_SEGMENTS, SceneForm};
 use std::sync::Arc;
 
-/// What the stages of a bake share.
+/// The inputs that the stages of a bake share.
 pub(super) struct Inputs<'a> {
     pub settings: &'a BakeSettings,
     pub engine: &'a mut Engine,
     pub subject: Subject,
     pub splits: Splits,
-    /// Every training view, those held out included.
+    /// Every training view, including the validation views.
     pub views: Vec<TrainingView>,
     pub store: Store,
-    /// The contents of the checkpoint, and how it was read.
+    /// Key of the contents of the checkpoint and of the options it was read with.
     pub scene_key: Key,
-    /// The cameras and times of the training and the validation views.
+    /// Key of the cameras and times of the training and the validation views.
     pub cameras_key: Key,
-    /// The contents of the images to train on.
+    /// Key of the contents of the images to train on.
     pub training_images_key: Key,
-    /// The contents of the images to validate on.
+    /// Key of the contents of the images to validate on.
     pub validation_images_key: Key,
-    /// These images, once a stage has needed them.
+    /// The images to train and to validate on, loaded when the first stage needs them.
     images: Option<Arc<TrainingImages>>,
 }
 
@@ -92,7 +92,7 @@ impl<'a> Inputs<'a> {
         self.training_images_key.with(self.validation_images_key)
     }
 
-    /// Returns the images to train and to validate on, which are loaded once.
+    /// Returns the images to train and to validate on; loads them on the first call.
     pub(super) fn images(&mut self, progress: &mut dyn Progress) -> Result<Arc<TrainingImages>, OfflineError> {
         if let Some(images) = &self.images {
             return Ok(images.clone());
@@ -108,7 +108,7 @@ impl<'a> Inputs<'a> {
         self.settings.fine_tune.as_ref().filter(|_| can)
     }
 
-    /// Returns why the stage is left out although the settings ask for it; `None` if they do not.
+    /// Returns why the stage is left out although the settings contain it; `None` if they do not contain it.
     pub(super) fn reason_to_leave_out(&self) -> Option<String> {
         self.settings.fine_tune.as_ref()?;
         let software = "it needs a GPU; --engine gpu takes one with a software driver, slowly".to_owned();

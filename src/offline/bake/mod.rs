@@ -1,10 +1,11 @@
-//! The whole way from a trained checkpoint to a small, fast package, and a report of what it cost.
+//! From a trained checkpoint to a small, fast package, in one call, and a report of the loss of quality.
 //!
 //! In: a checkpoint, the views of its dataset, [`BakeSettings`]. Out: a package, and `NAME.report.json` and `NAME.report.html` next to a
 //! package `NAME.gs4d` ([`Baked`]). [`bake()`] is the list of stages. All stages before the evaluation store their results in the folder
-//! `OUT.bake` next to a package `OUT` ([`Store`](super::store::Store)), so that an interrupted bake resumes. Two bakes cannot share it.
+//! `OUT.bake` next to a package `OUT` ([`Store`](super::store::Store)), so that an interrupted bake resumes. Two bakes cannot use one
+//! folder at the same time.
 //!
-//! Every choice (score, count, step) looks at the validation views alone, which nothing trains on; test views are drawn for the report,
+//! Every choice (score, count, step) depends on the validation views alone, which are not trained on; test views are drawn for the report,
 //! after the last choice.
 
 mod choice;
@@ -54,8 +55,8 @@ pub struct Baked {
 /// of the scene is replaced. Begins the task "bake" and, inside it, the tasks of the stages.
 ///
 /// # Errors
-/// A scene that is packed already, training views that are missing or show nothing of the scene, images that a loss needs and that are missing, files
-/// that cannot be written or are read, another bake to the same package, a failure of the engine.
+/// A scene that is packed already, training views that are missing or show nothing of the scene, images that a loss needs and that are
+/// missing, files that cannot be written or are read, another bake to the same package, a failure of the engine.
 pub fn bake(
     scene: GaussianScene,
     settings: &BakeSettings,

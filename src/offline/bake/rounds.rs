@@ -1,7 +1,8 @@
 //! The stage rounds of a bake: gradual pruning.
 //!
-//! In: the scores of all Gaussians, the Gaussians to keep. Out: the scene with as many. In several rounds, each removes the same fraction of
-//! the remaining Gaussians, trains the others for a while, and scores them again: the worth of a Gaussian depends on which others remain.
+//! In: the scores of all Gaussians, the Gaussians to keep. Out: the scene with that number of Gaussians. Each of several rounds removes the
+//! same fraction of the remaining Gaussians, trains the rest for a while, and scores it again: the score of a Gaussian depends on which
+//! other Gaussians remain.
 
 use super::inputs::Inputs;
 use super::tuning::short;
@@ -14,8 +15,8 @@ use crate::offline::store::Key;
 use crate::offline::{OfflineError, Progress, Subject};
 use crate::scene::GaussianScene;
 
-/// Removes Gaussians in rounds, or all at once if there is one round or nothing is trained. Returns the scene and its key, given that of
-/// the choice.
+/// Removes Gaussians in rounds, or all at once if there is one round or nothing is trained. Returns the scene and its key, given the
+/// key of the choice.
 pub(super) fn thin(
     inputs: &mut Inputs<'_>,
     stages: &mut Stages<'_>,
@@ -66,7 +67,7 @@ fn remove_in_rounds(
     Ok(scene)
 }
 
-/// Returns how many Gaussians remain after each round: the same fraction each time, `keep` at the end.
+/// Returns how many Gaussians remain after each round: the same fraction of the previous number, and `keep` after the last round.
 fn counts(total: usize, keep: usize, rounds: usize) -> Vec<usize> {
     let fraction = keep as f64 / total.max(1) as f64;
     let left = |round: usize| (total as f64 * fraction.powf(round as f64 / rounds as f64)).round() as usize;
@@ -79,8 +80,8 @@ mod tests {
 
     #[test]
     fn every_round_removes_the_same_fraction() {
-        assert_eq!(counts(8000, 1000, 3), [4000, 2000, 1000], "half of them each time");
-        assert_eq!(counts(90, 45, 1), [45], "all at once");
+        assert_eq!(counts(8000, 1000, 3), [4000, 2000, 1000], "each of three rounds keeps half");
+        assert_eq!(counts(90, 45, 1), [45], "one round removes all at once");
         assert_eq!(counts(5, 0, 2), [0, 0], "no Gaussian remains");
     }
 }

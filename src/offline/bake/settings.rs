@@ -25,11 +25,11 @@ pub struct BakeSettings {
     pub splits: SplitOptions,
     /// The package to write; must not be the checkpoint.
     pub out: PathBuf,
-    /// Background, RGB, 0 to 1; `None` uses the one that the capture was trained with.
+    /// Background, RGB, 0 to 1; `None` uses the background that the capture was trained with.
     pub background: Option<[f32; 3]>,
     /// How many Gaussians to keep.
     pub goal: Goal,
-    /// Rounds in which the others are removed, with training between where the Gaussians are trained; 1 removes all at once.
+    /// Rounds of pruning, with training between the rounds if the Gaussians are trained; 1 removes all at once.
     pub rounds: usize,
     /// Which score to prune by.
     pub score: ScoreChoice,
@@ -39,10 +39,10 @@ pub struct BakeSettings {
     pub filter: FilterKind,
     /// Number of key-frames of the filter.
     pub key_frames: KeyFrames,
-    /// How the remaining Gaussians are trained, if there is a GPU and the images of the training views are there; `None` leaves that out. An
-    /// interrupted training resumes from its last evaluation; that of codebooks, from a multiple of as many steps.
+    /// How the remaining Gaussians are trained, if there is a GPU and the images of the training views exist; `None` leaves training out.
+    /// An interrupted training resumes from its last evaluation; the training of codebooks, from a multiple of as many steps.
     pub fine_tune: Option<FineTuneSettings>,
-    /// How much compression may lose.
+    /// The quality of the compressed capture.
     pub quality: Quality,
     /// zstd level of the package, 1 (fast) to 19 (small); `None` uses the default of
     /// `write_settings`.
@@ -54,11 +54,11 @@ pub struct BakeSettings {
 }
 
 impl BakeSettings {
-    /// Checks that the package and the reports can be written and are none of the files that are read. [`bake`](super::bake) does so, too; programs
-    /// that take long to read the checkpoint can find out before.
+    /// Checks that the package and the reports can be written and are none of the files that are read. [`bake`](super::bake) checks this,
+    /// too; a program can call this function before it reads a large checkpoint.
     ///
     /// # Errors
-    /// The first of them with which something is wrong.
+    /// The first output that cannot be written or is an input.
     pub fn check_files(&self) -> Result<(), OfflineError> {
         let files =
             Files::default().reads_scene(&self.checkpoint).reads_data(&self.data).writes_regular(&self.out, "gs4d");

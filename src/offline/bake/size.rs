@@ -1,7 +1,7 @@
 //! How many Gaussians fit into a package of a given size.
 //!
-//! In: a number of bytes, scores. Out: the number of Gaussians, as far as it can be known before they are trained; as long as the package is
-//! too large, fewer of them ([`Attempts`]).
+//! In: a number of bytes, scores. Out: the number of Gaussians, estimated before they are trained; a smaller number for each package that
+//! is too large ([`Attempts`]).
 
 use super::inputs::Inputs;
 use super::settings::BakeSettings;
@@ -23,10 +23,10 @@ const ATTEMPTS: usize = 4;
 /// Name under which the attempts are stored.
 const FILE: &str = "attempts";
 
-/// The packages that a bake has made, which were too large.
+/// The packages of a bake that were too large.
 pub(super) struct Attempts {
     key: Key,
-    /// Number of Gaussians to keep in the first.
+    /// Number of Gaussians of the first package.
     first: usize,
     made: Vec<Attempt>,
 }
@@ -34,7 +34,7 @@ pub(super) struct Attempts {
 /// A package that was too large.
 #[derive(Serialize, Deserialize)]
 struct Attempt {
-    /// Number of Gaussians to keep in the next one.
+    /// Number of Gaussians of the next package.
     next: usize,
 }
 
@@ -57,10 +57,10 @@ impl Attempts {
         self.made.last().map_or(self.first, |last| last.next)
     }
 
-    /// Decides on fewer Gaussians, at least one, after a package that was too large.
+    /// Chooses a smaller number of Gaussians, at least one, after a package that was too large.
     ///
     /// # Errors
-    /// It has been too large several times, or with a single Gaussian. The last package is then kept in the folder of the bake.
+    /// The package was too large for the last attempt, or with a single Gaussian. It is then kept in the folder of the bake.
     pub(super) fn keep_fewer(
         &mut self,
         inputs: &Inputs<'_>,
@@ -85,11 +85,11 @@ impl Attempts {
     }
 }
 
-/// Checks, before anything is computed, that there is room for the parts of the package that do not depend on which Gaussians are kept: the
-/// header and the environment map. A filter and codebooks come with the Gaussians.
+/// Checks, before the scoring, that the parts of the package that do not depend on the kept Gaussians fit: the header and the environment
+/// map. A filter and codebooks depend on the Gaussians.
 ///
 /// # Errors
-/// There is no room.
+/// These parts do not fit.
 pub(super) fn require_room(inputs: &Inputs<'_>) -> Result<(), OfflineError> {
     let Goal::Size(limit) = inputs.settings.goal else { return Ok(()) };
     let least = size_of(inputs, &[])?;
@@ -117,7 +117,7 @@ pub(super) fn count_of_size(
     count_within(limit, total, one, |count| size_of(inputs, &highest(scores, count)), progress)
 }
 
-/// Returns the bytes of a package of these Gaussians as they are.
+/// Returns the size in bytes of a package of these Gaussians without training.
 fn size_of(inputs: &Inputs<'_>, kept: &[u32]) -> Result<u64, OfflineError> {
     let settings = inputs.settings;
     let mut scene = select(&inputs.subject.scene, kept);
@@ -134,7 +134,7 @@ fn size_of(inputs: &Inputs<'_>, kept: &[u32]) -> Result<u64, OfflineError> {
     Ok(bytes.len() as u64)
 }
 
-/// Returns where a package that is too large is kept: in the folder of the bake, under a name that no other file has.
+/// Returns the path at which a package that is too large is kept: a new name in the folder of the bake.
 fn kept_aside(inputs: &Inputs<'_>, package: &[u8]) -> PathBuf {
     let folder = inputs.store.folder();
     let names = std::iter::once("too-large.gs4d".to_owned()).chain((2..).map(|n| format!("too-large-{n}.gs4d")));
@@ -142,7 +142,7 @@ fn kept_aside(inputs: &Inputs<'_>, package: &[u8]) -> PathBuf {
     names.map(|name| folder.join(name)).find(is_free).unwrap_or_default()
 }
 
-/// Returns the error that no package has been found that is small enough; `found` describes the smallest.
+/// Returns the error for a limit that no package meets; `found` describes the smallest package.
 fn too_small(inputs: &Inputs<'_>, limit: u64, found: &str) -> OfflineError {
     let remedy = "choose a lower quality or a larger size; a file that was here before has not changed";
     let reason = format!("this capture does not fit into {limit} bytes: {found}; {remedy}");
@@ -162,6 +162,6 @@ mod tests {
         store.store(FILE, key, text.as_bytes()).expect("the folder can be written to");
         assert_eq!(Attempts::of(&store, key, 40).count(), 20, "the bake resumes with the count of the last attempt");
         assert_eq!(Attempts::of(&store, other, 40).count(), 40, "other inputs begin with the first count");
-        assert_eq!(Attempts::of(&store, key, 25).count(), 25, "attempts that do not follow from the first count");
+        assert_eq!(Attempts::of(&store, key, 25).count(), 25, "attempts from another first count are not resumed");
     }
 }

@@ -23,7 +23,7 @@ use std::path::Path;
 /// Number of times at which the active sets are computed.
 const TIMES: usize = 61;
 
-/// The contents of a report before they are summarized.
+/// The results of a bake that the report summarizes.
 pub(super) struct Facts<'a> {
     pub settings: &'a BakeSettings,
     pub trained_with: &'a TrainedWith,
@@ -74,7 +74,7 @@ impl Facts<'_> {
         })
     }
 
-    /// Returns the choices of the user and of the bake, as names and values for people.
+    /// Returns the choices of the user and of the bake, as readable names and values.
     fn choices(&self) -> Vec<(String, String)> {
         let pair = |name: &str, value: String| (name.to_owned(), value);
         let goal = match self.settings.goal {

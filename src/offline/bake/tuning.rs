@@ -1,7 +1,7 @@
 //! The stage fine-tune of a bake.
 //!
-//! In: the remaining Gaussians, the images to train and to validate on. Out: the Gaussians after training, and how their quality developed
-//! ([`Tuning`]).
+//! In: the remaining Gaussians, the images to train and to validate on. Out: the Gaussians after training, and their quality at each
+//! evaluation ([`Tuning`]).
 
 use super::inputs::Inputs;
 use crate::offline::engine::Engine;
@@ -14,12 +14,12 @@ use crate::offline::{OfflineError, Progress};
 use crate::scene::GaussianScene;
 use serde::{Deserialize, Serialize};
 
-/// A short training has this fraction of the steps.
+/// Fraction of the steps in a short training.
 const SHORT: usize = 5;
-/// The codebooks of colors are trained for this fraction of the steps.
+/// Fraction of the steps in the training of codebooks of colors.
 const CODING: usize = 3;
 
-/// How the quality developed.
+/// The quality at each evaluation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Tuning {
     pub curve: Vec<CurvePoint>,
@@ -34,7 +34,8 @@ pub(super) fn short(settings: &FineTuneSettings) -> FineTuneSettings {
     FineTuneSettings { steps, evaluate_every: steps.max(1), compress: None, ..settings.clone() }
 }
 
-/// The stage fine-tune: trains the remaining Gaussians. Returns them with their key; as they are, without a tuning, if that is left out.
+/// The stage fine-tune: trains the remaining Gaussians. Returns the Gaussians and their key; if the stage
+/// is left out, unchanged Gaussians and no tuning.
 pub(super) fn fine_tune(
     inputs: &mut Inputs<'_>,
     stages: &mut Stages<'_>,
@@ -62,7 +63,7 @@ pub(super) fn fine_tune(
     Ok((scene, Some(tuning), key))
 }
 
-/// Trains the codebooks of a fine-tuned scene and compresses it; returns the scene as it is if the quality has no codebooks.
+/// Trains the codebooks of a fine-tuned scene and compresses it; returns the scene unchanged if the quality has no codebooks.
 pub(super) fn with_codebooks(
     inputs: &mut Inputs<'_>,
     scene: GaussianScene,

@@ -17,17 +17,16 @@ use crate::codec::text::is_obeyed;
 use crate::offline::picture_file;
 use crate::view::{Camera, RasterFov};
 
-/// Below this share of the product of its columns' lengths, a determinant counts as zero.
+/// A determinant below this fraction of the product of the lengths of its columns counts as zero.
 const SINGULAR: f64 = 1e-9;
 
 /// How to read a camera file. Default: all `None`.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CameraOptions {
-    /// Picture size in pixels, instead of the file's. The field of view stays that of the original pictures on both
-    /// axes, so that another aspect ratio gives pixels that are not square. If the original size is unknown, this one
-    /// is used for it.
+    /// Picture size in pixels, instead of the size in the file. The field of view stays that of the original pictures on both
+    /// axes, so that another aspect ratio gives pixels that are not square. This size also replaces an unknown original size.
     pub size: Option<UVec2>,
-    /// The original's `--resolution`: 1, 2, 3, 4 or 8 divide the size, −1 limits the width to 1600 pixels, any other
+    /// The value of `--resolution` of the original: 1, 2, 3, 4 or 8 divide the size, −1 limits the width to 1600 pixels, any other
     /// number is a target width. It has no effect on golden views or with an explicit `size`.
     pub resolution: Option<i32>,
     /// First and last time, both included: frames outside are dropped.
@@ -46,7 +45,7 @@ pub struct CameraFile {
 enum Form {
     /// A list `frames`: the Blender form.
     Transforms,
-    /// A list `views`: the original's renders, kept beside a capture. Always FoV cameras.
+    /// A list `views`: pictures drawn by the original, beside a capture. Always FoV cameras.
     Golden,
 }
 
@@ -89,10 +88,10 @@ struct Frame {
 }
 
 impl CameraFile {
-    /// Reads the cameras of a file. Images need not be on disk, unless the picture size is found nowhere else.
+    /// Reads the cameras of a file. Images need not be on disk, unless the picture size comes from them.
     ///
-    /// The picture size is `options.size`, else `w` and `h` of the frame or the file, else that of the first image found, in this file
-    /// or the folder's other splits; the latter two after `options.resolution`.
+    /// The picture size is `options.size`, else `w` and `h` of the frame or the file, else the size of the first image found, of this
+    /// file or of the other splits of the folder; the sizes of files and images are reduced by `options.resolution`.
     ///
     /// # Errors
     /// [`DatasetError`], naming the file, the frame and the reason.
@@ -167,7 +166,7 @@ impl CameraFile {
     }
 
     /// Returns the size of the first image on disk; `None` if there is none. An unreadable image is an error only if
-    /// nothing else gives the size.
+    /// `options` has no size.
     fn probe_size(&self, options: &CameraOptions) -> Result<Option<UVec2>, DatasetError> {
         let found = self.images().find(|path| path.is_file()).or_else(|| self.sibling_image());
         match found.map(|path| picture_file::size(&path, UVec2::splat(MAX_SIDE))) {
@@ -325,8 +324,8 @@ fn with_image_extension(file: &str) -> String {
     if known { file.to_owned() } else { format!("{file}.png") }
 }
 
-/// Returns the stem of an image path, made unique with the index of the frame; `None` if it is not a plain file name, or
-/// the path has characters that a terminal obeys: it is shown in reports and errors.
+/// Returns the stem of an image path, made unique with the index of the frame; `None` if the stem is not a plain file name, or
+/// if the path has control characters, since reports and errors show it.
 fn output_name(file: &str, index: usize, taken: &mut HashSet<String>) -> Option<String> {
     if file.contains(is_obeyed) {
         return None;
@@ -359,26 +358,33 @@ mod tests {
     fn output_names_are_stems_and_unique() {
         let mut taken = HashSet::new();
         assert_eq!(output_name("./images/c04_f00.jpg", 0, &mut taken).as_deref(), Some("c04_f00"), "stem");
-        assert_eq!(output_name("x/frame.001.png", 1, &mut taken).as_deref(), Some("frame.001"), "dots stay");
+        assert_eq!(
+            output_name("x/frame.001.png", 1, &mut taken).as_deref(),
+            Some("frame.001"),
+            "dots in the stem are kept"
+        );
         assert_eq!(output_name("y/c04_f00.png", 2, &mut taken).as_deref(), Some("c04_f00-2"), "a repeated stem");
-        assert_eq!(output_name("...png", 3, &mut taken), None, "would leave the folder");
+        assert_eq!(output_name("...png", 3, &mut taken), None, "a stem that leads out of the folder");
         assert_eq!(output_name(".png", 4, &mut taken), None, "an empty path");
-        assert_eq!(output_name("a\u{1b}[2J/b.png", 5, &mut taken), None, "would clear the terminal");
+        assert_eq!(output_name("a\u{1b}[2J/b.png", 5, &mut taken), None, "a control character");
     }
 
     #[test]
-    fn poses_are_checked() {
+    fn poses_must_be_finite_affine_and_invertible() {
         let identity = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
         let with = |row: usize, column: usize, value: f64| {
             let mut rows = identity;
             rows[row][column] = value;
             pose(&rows).is_ok()
         };
-        assert!(with(0, 3, 5.0), "a translation");
-        assert!(!with(1, 1, 0.0), "singular");
-        assert!(!with(1, 1, f64::NAN) && !with(0, 3, f64::INFINITY), "not finite");
-        assert!(!with(3, 3, 2.0), "not affine");
+        assert!(with(0, 3, 5.0), "a translation is valid");
+        assert!(!with(1, 1, 0.0), "a singular matrix is refused");
+        assert!(!with(1, 1, f64::NAN) && !with(0, 3, f64::INFINITY), "values that are not finite are refused");
+        assert!(!with(3, 3, 2.0), "a matrix that is not affine is refused");
         let huge = DMat4::from_scale(glam::DVec3::splat(1e60));
-        assert!(single_precision(huge).is_err() && single_precision(huge.inverse()).is_err(), "beyond float32");
+        assert!(
+            single_precision(huge).is_err() && single_precision(huge.inverse()).is_err(),
+            "values beyond float32 are refused"
+        );
     }
 }

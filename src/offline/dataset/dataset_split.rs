@@ -1,6 +1,6 @@
 //! One split of a dataset folder.
 //!
-//! In: a folder and a split. Out: its [`TrainingView`]s in file order; whether their images are there.
+//! In: a folder and a split. Out: the [`TrainingView`]s of the split in file order; an error if images are missing.
 
 use super::camera_file::{CameraFile, CameraOptions};
 use super::error::DatasetError;
@@ -16,7 +16,7 @@ pub struct Dataset {
     pub folder: PathBuf,
     /// The split that was read: [`Split::Val`] if the test split of a `lego` folder was requested.
     pub split: Split,
-    /// Its views in file order, at least one.
+    /// The views of the split in file order, at least one.
     pub views: Vec<TrainingView>,
 }
 
@@ -37,7 +37,7 @@ impl Dataset {
     /// Checks that every image and mask is on disk.
     ///
     /// # Errors
-    /// [`DatasetError::MissingImages`], naming the first few and how many.
+    /// [`DatasetError::MissingImages`], which names the first few missing files and their number.
     pub fn require_images(&self) -> Result<(), DatasetError> {
         require_images(&self.views)
     }
@@ -46,7 +46,7 @@ impl Dataset {
 /// Checks that every image and mask of these views is on disk.
 ///
 /// # Errors
-/// [`DatasetError::MissingImages`], naming the first few and how many.
+/// [`DatasetError::MissingImages`], which names the first few missing files and their number.
 pub(crate) fn require_images(views: &[TrainingView]) -> Result<(), DatasetError> {
     require_files(views.iter().flat_map(|view| [Some(&view.image), view.mask.as_ref()]).flatten())
 }

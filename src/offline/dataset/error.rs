@@ -59,7 +59,7 @@ pub enum DatasetError {
     },
     /// Every frame lies outside the time interval.
     #[error(
-        "{}: all frames lie outside the time interval {},{}: theirs are {} to {}; pass the interval the capture was trained with",
+        "{}: all frames lie outside the time interval {},{}: their times are {} to {}; pass the interval the capture was trained with",
         .path.display(), .interval[0], .interval[1], .times[0], .times[1]
     )]
     NoFramesInInterval {
@@ -77,7 +77,7 @@ pub enum DatasetError {
         path: PathBuf,
         /// Index of the frame in its list, from 0.
         frame: usize,
-        /// What is wrong with it.
+        /// The fault of the frame.
         problem: FrameProblem,
     },
     /// The picture size is not given anywhere.
@@ -110,11 +110,11 @@ pub enum DatasetError {
     /// Images named by the camera file are not on disk.
     #[error("{missing} of {total} images are missing: {}; put them beside the camera file", Listing(.first, *.missing))]
     MissingImages {
-        /// The first few of them.
+        /// The first few missing images.
         first: Vec<PathBuf>,
-        /// How many are missing.
+        /// Number of missing images.
         missing: usize,
-        /// How many were looked for.
+        /// Number of images named by the camera file.
         total: usize,
     },
     /// An image or a mask has another shape than the pictures of the camera file, so that it would be stretched.
@@ -136,7 +136,7 @@ pub enum DatasetError {
     Image(#[from] PictureError),
 }
 
-/// What is wrong with one frame of a camera file.
+/// The fault of one frame of a camera file.
 #[derive(Debug, thiserror::Error)]
 pub enum FrameProblem {
     /// An entry is missing or has the wrong type.
@@ -157,10 +157,10 @@ pub enum FrameProblem {
     /// The horizontal field of view is out of range.
     #[error("camera_angle_x is {0}: it must lie between 0 and π (radians)")]
     FieldOfView(f64),
-    /// The values of the lens are not those of a camera.
+    /// The values of the lens are out of range.
     #[error("the lens cannot be used: focal lengths must be above 0 and every value finite (in float32)")]
     Lens,
-    /// An entry describes a picture that is not that of a pinhole camera.
+    /// An entry describes the picture of a camera that is not a pinhole camera.
     #[error(
         "{entry} is not 0, and a distorted picture cannot be used: {UNDISTORT}; then remove {entry}, or set it to 0"
     )]

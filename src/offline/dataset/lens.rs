@@ -1,7 +1,7 @@
 //! Picture sizes and lenses of training views.
 //!
 //! In: sizes, focal lengths and angles of a camera file, in pixels of the original pictures, and the requested size or
-//! resolution. Out: the size to render at and the [`Lens`] for it, or an error for a lens that is not a pinhole.
+//! resolution. Out: the size to render at and its [`Lens`], or an error for a lens that is not a pinhole.
 
 use glam::{DVec2, UVec2};
 use serde::Deserialize;
@@ -39,7 +39,7 @@ const DISTORTING: [&str; 16] = [
 const CAMERA_MODEL: &str = "camera_model";
 const PINHOLES: [&str; 3] = ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV"];
 
-/// Largest distance of the principal point of a golden view from the center of the picture, pixels: that of a rounded decimal number.
+/// Largest distance of the principal point of a golden view from the center of the picture, pixels: the error of a rounded decimal number.
 const CENTERED: f64 = 1e-3;
 
 /// The camera entries of a file or of one of its frames.
@@ -67,7 +67,7 @@ pub(super) enum OriginalLens {
 }
 
 impl LensEntries {
-    /// Returns these entries, with missing ones replaced by those of the whole file.
+    /// Returns these entries, with missing entries replaced by the entries of the whole file.
     pub(super) fn or(self, file: &Self) -> Self {
         Self {
             w: self.w.or(file.w),
@@ -100,7 +100,7 @@ impl LensEntries {
 }
 
 impl OriginalLens {
-    /// Returns the lens for pictures that are smaller than the original ones by `divisor`, with the same field of view.
+    /// Returns the lens for pictures that are smaller than the original pictures by `divisor`, with the same field of view.
     pub(super) fn scaled(self, original: UVec2, divisor: DVec2) -> Result<Lens, FrameProblem> {
         let lens = match self {
             Self::Angle(angle) => Camera::fov_lens(angle, original),
@@ -118,7 +118,7 @@ impl OriginalLens {
     }
 }
 
-/// Checks that a frame is the picture of a pinhole camera. An entry of the frame replaces that of the whole file; `null` is no entry.
+/// Checks that a frame is the picture of a pinhole camera. An entry of the frame replaces the entry of the whole file; `null` is no entry.
 pub(super) fn check_pinhole(frame: &Value, file: &Value) -> Result<(), FrameProblem> {
     let entry = |name| [frame, file].into_iter().filter_map(|from| from.get(name)).find(|value| !value.is_null());
     if let Some(model) = entry(CAMERA_MODEL) {
@@ -165,7 +165,7 @@ pub(super) fn reduced(original: UVec2, resolution: Option<i32>) -> Result<(UVec2
     let full = original.as_dvec2();
     let (size, divisor) = match resolution {
         None => (full, 1.0),
-        // Python's round: halves go to the even number.
+        // Halves are rounded to the even number, as by the `round` of Python.
         Some(divisor @ (1 | 2 | 3 | 4 | 8)) => (full / f64::from(divisor), f64::from(divisor)),
         Some(-1) => rounded_down(full, (full.x / AUTOMATIC_WIDTH).max(1.0)),
         Some(width) => rounded_down(full, full.x / f64::from(width)),
@@ -178,7 +178,7 @@ pub(super) fn reduced(original: UVec2, resolution: Option<i32>) -> Result<(UVec2
     }
 }
 
-/// Divides and rounds down, as the original does if the divisor comes from a width, but keeps the width itself exact:
+/// Divides and rounds down, as the original does if the divisor comes from a width, but makes that width exact:
 /// in the original, 1601 pixels limited to 1600 become 1599, because the division is rounded.
 fn rounded_down(full: DVec2, divisor: f64) -> (DVec2, f64) {
     ((full / divisor + 1e-6).floor(), divisor)
@@ -193,14 +193,14 @@ mod tests {
     }
 
     #[test]
-    fn resolution_follows_the_original() {
+    fn resolutions_give_the_sizes_of_the_original() {
         assert_eq!(size_at(800, 800, 2), Some((400, 400)), "D-NeRF");
         assert_eq!(size_at(2704, 2028, 2), Some((1352, 1014)), "N3V");
         assert_eq!(size_at(13, 9, 2), Some((6, 4)), "6.5 and 4.5 round to even");
         assert_eq!(size_at(10, 14, 4), Some((2, 4)), "2.5 and 3.5 round to even");
-        assert_eq!(size_at(800, 600, -1), Some((800, 600)), "below the cap");
-        assert_eq!(size_at(3200, 2000, -1), Some((1600, 1000)), "above the cap");
-        assert_eq!(size_at(1601, 1000, -1), Some((1600, 999)), "999.4 rounds down, 1600 stays");
+        assert_eq!(size_at(800, 600, -1), Some((800, 600)), "a width below 1600 is unchanged");
+        assert_eq!(size_at(3200, 2000, -1), Some((1600, 1000)), "a width above 1600 is limited to 1600");
+        assert_eq!(size_at(1601, 1000, -1), Some((1600, 999)), "999.4 is rounded down, the width is exactly 1600");
         assert_eq!(size_at(800, 600, 200), Some((200, 150)), "a target width");
     }
 
@@ -209,7 +209,7 @@ mod tests {
         for resolution in [0, -2, i32::MIN, i32::MAX, MAX_SIDE as i32 + 1] {
             assert_eq!(size_at(800, 600, resolution), None, "resolution {resolution}");
         }
-        assert_eq!(size_at(3, 3, 8), None, "nothing left");
+        assert_eq!(size_at(3, 3, 8), None, "a size of 0 pixels");
     }
 
     #[test]

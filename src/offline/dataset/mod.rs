@@ -8,7 +8,7 @@
 //! | converted N3V | the same with `fl_x`, `fl_y`, `cx`, `cy`, for the file or per frame | intrinsics cameras |
 //! | golden views | `golden*.json`, a list `views` | FoV cameras always |
 //!
-//! All of them are pinhole cameras: entries that describe a distorted lens are refused by name, since distortion is not undone, and so are
+//! All cameras are pinhole cameras. Entries that describe a distorted lens are refused by name, since distortion is not removed; so are
 //! golden views whose principal point is not the center, and images of another aspect ratio than the camera.
 //!
 //! Cameras can be read without any image on disk; [`Dataset::require_images`] reports missing images early.

@@ -1,18 +1,18 @@
-//! Bicubic resampling of 8-bit pictures, equal to Pillow's to the last bit.
+//! Bicubic resampling of 8-bit pictures, bit for bit equal to Pillow.
 //!
 //! In: interleaved bytes of 1 to 4 channels and two sizes. Out: the bytes at the other size. Equal to Pillow up to version 12
 //! (13 swaps the two passes for some shapes, which moves a few values by rounding).
 //!
 //! The filter is the cubic with a = −0.5, stretched by the reduction (antialiased). Weights are normalized, then rounded to 22-bit
-//! fixed point; a horizontal pass and a vertical one follow, each rounded and clipped to 8 bits. A side that keeps its length is not
-//! filtered.
+//! fixed point. The results of the horizontal and of the vertical pass are rounded and clipped to 8 bits. A side that keeps its length is
+//! not filtered.
 
 use glam::UVec2;
 
 const PRECISION_BITS: u32 = 22;
 const HALF: i64 = 1 << (PRECISION_BITS - 1);
 
-/// The inputs of one output position: from `first` on, with these fixed-point weights.
+/// The first input of one output position, and the fixed-point weights of this and the following inputs.
 struct Taps {
     first: usize,
     weights: Vec<i64>,
@@ -85,7 +85,7 @@ fn taps(from: u32, to: u32) -> Vec<Taps> {
     (0..to).map(taps_at).collect()
 }
 
-/// Evaluates Keys' cubic with a = −0.5.
+/// Returns the cubic kernel of Keys with a = −0.5.
 fn cubic(x: f64) -> f64 {
     const A: f64 = -0.5;
     let x = x.abs();
@@ -150,10 +150,10 @@ mod tests {
     }
 
     #[test]
-    fn same_size_changes_nothing() {
+    fn resizing_to_the_same_size_changes_nothing() {
         let size = UVec2::new(5, 7);
         let bytes = noise(35 * 4, 9);
-        assert_eq!(resize(bytes.clone(), 4, size, size), bytes, "every byte is as before");
+        assert_eq!(resize(bytes.clone(), 4, size, size), bytes, "every byte is unchanged");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Selecting training views.
 //!
-//! In: the training views of a dataset. Out: an even subset of them, their distinct cameras, the number of their
+//! In: the training views of a dataset. Out: an even subset of the views, their distinct cameras, the number of their
 //! distinct times.
 
 use super::TrainingView;
@@ -10,9 +10,9 @@ use std::collections::HashSet;
 /// The fraction of the golden ratio: the fractions of its multiples are evenly distributed between 0 and 1.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// Returns the indices of an even subset of the views, ascending: one from each of `wanted` stretches of time, at a
-/// different place within each, so that neither times nor cameras are favored. Returns all indices if there are no
-/// more than `wanted`.
+/// Returns the indices of an even subset of the views, ascending: one from each of `wanted` intervals of time, at a
+/// different place within each interval, so that the subset is even in time and among cameras. Returns all indices if
+/// there are no more than `wanted`.
 pub fn even_subset(views: &[TrainingView], wanted: usize) -> Vec<usize> {
     let count = views.len();
     let mut by_time: Vec<usize> = (0..count).collect();
@@ -31,7 +31,7 @@ pub fn even_subset(views: &[TrainingView], wanted: usize) -> Vec<usize> {
     subset
 }
 
-/// Returns every camera once, in order of appearance. Cameras with the same pose, size and lens are the same.
+/// Returns the distinct cameras in the order of the views. Cameras with the same pose, size and lens are the same.
 pub fn distinct_cameras(views: &[TrainingView]) -> Vec<Camera> {
     let mut seen = HashSet::new();
     views.iter().map(|view| view.camera).filter(|camera| seen.insert(identity(camera))).collect()
@@ -84,19 +84,19 @@ mod tests {
         let views = views();
         for wanted in [15, 24, 30, 40, 60, 100] {
             let subset = even_subset(&views, wanted);
-            assert_eq!(subset.len(), wanted, "as many as wanted");
-            assert!(subset.is_sorted_by(|a, b| a < b), "ascending, none twice");
+            assert_eq!(subset.len(), wanted, "the subset has the wanted number of views");
+            assert!(subset.is_sorted_by(|a, b| a < b), "indices are ascending and distinct");
             let times: HashSet<u32> = subset.iter().map(|&i| views[i].time.to_bits()).collect();
             let cameras: HashSet<usize> = subset.iter().map(|i| i / 30).collect();
             assert!(times.len() >= wanted.min(30) * 4 / 5, "{wanted} views have {} times", times.len());
             assert!(cameras.len() >= wanted.min(20) / 2, "{wanted} views have {} cameras", cameras.len());
         }
         assert_eq!(even_subset(&views, 600).len(), 600, "all");
-        assert_eq!(even_subset(&views, 9000).len(), 600, "no more than there are");
+        assert_eq!(even_subset(&views, 9000).len(), 600, "all views if more are wanted");
     }
 
     #[test]
-    fn a_camera_that_takes_many_views_is_one() {
+    fn a_camera_of_many_views_counts_once() {
         let views = views();
         assert_eq!(distinct_cameras(&views).len(), 20, "cameras");
         assert_eq!(distinct_times(&views), 30, "times");

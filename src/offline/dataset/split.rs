@@ -9,9 +9,9 @@ use std::path::Path;
 pub enum Split {
     /// The views that a capture is trained on.
     Train,
-    /// The views that it is evaluated on.
+    /// The views that a capture is evaluated on.
     Test,
-    /// D-NeRF's third split; the test set of its `lego` scene.
+    /// The third split of D-NeRF; the test views of the scene `lego`.
     Val,
 }
 
@@ -28,7 +28,7 @@ impl Split {
         }
     }
 
-    /// Returns the split that the original uses in its place: folders whose name ends in `lego` are evaluated on `val`.
+    /// Returns the split that the original reads for this one: folders whose name ends in `lego` are evaluated on `val`.
     pub(in crate::offline) fn resolved(self, folder: &Path) -> Self {
         let lego = folder.file_name().is_some_and(|name| name.as_encoded_bytes().ends_with(b"lego"));
         if self == Self::Test && lego { Self::Val } else { self }

@@ -1,8 +1,8 @@
-//! Holding out validation views, on which everything is chosen: score, count, loss, rounds, step.
+//! Holding out validation views, on which score, count, loss, rounds and step are chosen.
 //!
 //! In: the training views of a dataset. Out: the views to train on and the views to validate on ([`HeldOut`]). A
-//! validation view shares neither its camera nor its stretch of time with the training views, as far as the dataset
-//! allows: single views between training views would measure how well their neighbors are repeated.
+//! validation view shares neither its camera nor its interval of time with the training views, as far as the dataset
+//! allows: single views between training views would only measure how well neighboring views are reproduced.
 
 use super::TrainingView;
 use super::selection::{distinct_cameras, distinct_times, identity};
@@ -19,11 +19,11 @@ const FEWEST_TIMES: usize = 8;
 /// Number of blocks of time.
 const BLOCKS: usize = 3;
 
-/// How validation views are found.
+/// The way in which validation views are found.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Validation {
-    /// The first of the following that the dataset allows: its own file, whole cameras, blocks of time, none.
+    /// The first of these that the dataset allows: a file of validation views, whole cameras, blocks of time, none.
     #[default]
     Auto,
     /// The views of `transforms_val.json`.
@@ -32,7 +32,7 @@ pub enum Validation {
     Cameras,
     /// Every training view in some contiguous blocks of time.
     Times,
-    /// None: nothing can be chosen, and every training view is trained on.
+    /// None: there are no validation views to choose on, and every training view is trained on.
     None,
 }
 
@@ -61,14 +61,14 @@ pub struct HeldOut {
     pub train: Vec<TrainingView>,
     /// The views to validate on.
     pub validation: Vec<TrainingView>,
-    /// How they were found: never [`Validation::Auto`].
+    /// The way in which the validation views were found: never [`Validation::Auto`].
     pub by: Validation,
 }
 
-/// Divides training views by whole cameras or by blocks of time. `wanted` says which; with [`Validation::Auto`], whole
-/// cameras if there are at least four that take several views each (or if all views are of one moment), else blocks of
+/// Divides training views by whole cameras or by blocks of time. `wanted` selects the way; with [`Validation::Auto`], whole
+/// cameras if there are at least four cameras of several views each (or if all views have the same time), else blocks of
 /// time if there are at least eight distinct times, else nothing is held out. Returns `None` if the views do not allow
-/// what is wanted.
+/// the wanted way.
 pub fn hold_out(views: &[TrainingView], wanted: Validation) -> Option<HeldOut> {
     let cameras = distinct_cameras(views).len();
     let times = distinct_times(views);
@@ -103,7 +103,7 @@ pub fn hold_out(views: &[TrainingView], wanted: Validation) -> Option<HeldOut> {
 }
 
 /// Returns which of `count` places are held out: a tenth of them, at least one and never all. With one block, places
-/// are spread evenly; with several, the places of a block follow each other, and blocks are spread evenly.
+/// are evenly spaced; with several blocks, the places of a block are consecutive, and blocks are evenly spaced.
 fn held_places(count: usize, blocks: usize) -> Vec<usize> {
     let wanted = ((count as f64 * FRACTION).round() as usize).clamp(1, count.saturating_sub(1).max(1));
     let (blocks, length) = match blocks {
@@ -170,23 +170,23 @@ mod tests {
     }
 
     #[test]
-    fn few_views_hold_out_nothing_unless_asked() {
+    fn few_views_are_held_out_only_on_request() {
         let views: Vec<_> = (0..3).map(|index| view(index, index as f32)).collect();
         let HeldOut { train, validation, by } = divided(&views, Validation::Auto);
-        assert_eq!((by, train.len(), validation.len()), (Validation::None, 3, 0), "every view is needed");
+        assert_eq!((by, train.len(), validation.len()), (Validation::None, 3, 0), "all three views are trained on");
         let asked = divided(&views, Validation::Times);
         assert_eq!((asked.train.len(), asked.validation.len()), (2, 1), "one time of three");
         assert_eq!(hold_out(&views[..1], Validation::Cameras), None, "a single camera cannot be held out");
     }
 
     #[test]
-    fn held_places_are_inside_and_distinct() {
+    fn held_out_places_are_in_range_and_distinct() {
         for count in 2..400 {
             for blocks in [1, 3] {
                 let places = held_places(count, blocks);
                 let distinct: HashSet<_> = places.iter().collect();
                 assert_eq!(distinct.len(), places.len(), "places of {count} are distinct: {places:?}");
-                assert!(places.iter().all(|&place| place < count), "places of {count} exist: {places:?}");
+                assert!(places.iter().all(|&place| place < count), "places of {count} are below {count}: {places:?}");
                 assert!(!places.is_empty() && places.len() < count, "some of {count}, not all: {places:?}");
             }
         }

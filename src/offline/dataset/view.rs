@@ -1,8 +1,8 @@
 //! One training view and its image.
 //!
-//! In: a camera at a time with the path of a PNG or JPEG. Out: a [`CoveredImage`] of the camera's size, which goes over any background.
-//! Over black it equals what the original's `dataloader` mode evaluates against (section 5.3 of the 4DGS model). The in-memory mode
-//! of the original multiplies transparent images by alpha twice and is not reproduced.
+//! In: a camera at a time with the path of a PNG or JPEG. Out: a [`CoveredImage`] of the size of the camera, which can be laid over any
+//! background. Over black it equals the image that the `dataloader` mode of the original evaluates against (section 5.3 of the 4DGS model).
+//! The in-memory mode of the original multiplies transparent images by alpha twice and is not reproduced.
 
 use std::path::{Path, PathBuf};
 
@@ -14,8 +14,8 @@ use super::{DatasetError, MAX_SIDE, resample};
 use crate::offline::picture_file;
 use crate::view::{Camera, Picture};
 
-/// How many times as wide and as high as the camera file says an image may be: it is scaled to the camera's size, and
-/// camera files made for smaller images are used with the originals.
+/// Largest ratio of the width and of the height of an image to the size in the camera file. Larger images are accepted because camera
+/// files made for reduced images are used with the original images; the image is scaled to the size of the camera.
 const LARGER: u32 = 4;
 
 /// A camera at one time, and the path of the image taken there.
@@ -28,12 +28,12 @@ pub struct TrainingView {
     pub camera: Camera,
     /// Timestamp, in the capture's unit.
     pub time: f32,
-    /// Size of the image as the camera file, or else the first image, says, pixels. An image with a side of more than four
-    /// times that is not decoded, and one of another aspect ratio is not used.
+    /// Size of the image according to the camera file, or else to the first image, pixels. An image with a side of more than four
+    /// times this length is not decoded, and an image of another aspect ratio is refused.
     pub original: UVec2,
     /// Path of the image, which may not exist.
     pub image: PathBuf,
-    /// Path of the coverage as an 8-bit gray image, which has been multiplied into the image already; `None` if the
+    /// Path of the coverage as an 8-bit gray image, by which the image has been multiplied already; `None` if the
     /// view has none.
     pub mask: Option<PathBuf>,
 }
@@ -50,8 +50,8 @@ pub struct CoveredImage {
 }
 
 impl CoveredImage {
-    /// Returns the image over a background (RGB, 0 to 1). Values are at most 1, also where compression has made an image brighter than
-    /// its mask.
+    /// Returns the image over a background (RGB, 0 to 1). Values are at most 1, also where compression has made an image brighter
+    /// than its mask.
     pub fn over(&self, background: Vec3) -> Picture {
         let over = |texel: &[u8; 4]| (unit_rgb(texel) + (1.0 - unit(texel[3])) * background).min(Vec3::ONE);
         Picture { size: self.size, pixels: self.texels.iter().map(over).collect() }
@@ -60,12 +60,13 @@ impl CoveredImage {
 
 impl TrainingView {
     /// Loads the image and its coverage. A view with a mask has the mask as coverage, and its image has been multiplied by the mask
-    /// already. Else the coverage is the image's own alpha, which is all 1 if the image has none. Colors times alpha are truncated to
-    /// 8 bits and then resampled to the camera's size (Pillow's bicubic), as in the original's `dataloader` mode over black.
+    /// already. Else the coverage is the alpha of the image, which is 1 everywhere if the image has none. Colors times alpha are truncated
+    /// to 8 bits and then resampled to the size of the camera (the bicubic filter of Pillow), as in the `dataloader` mode of the original
+    /// over black.
     ///
     /// # Errors
     /// [`DatasetError::MissingImages`] if the image or the mask is not on disk, [`DatasetError::Image`] if one cannot
-    /// be decoded, is not whole or is far larger than [`original`](Self::original), [`DatasetError::Size`] if the size of
+    /// be decoded, is truncated or is far larger than [`original`](Self::original), [`DatasetError::Size`] if the size of
     /// the camera is out of range.
     pub fn load_covered(&self) -> Result<CoveredImage, DatasetError> {
         let size = self.camera.size;
@@ -108,7 +109,7 @@ impl TrainingView {
 /// picture has rounded sides.
 fn has_aspect_of(a: UVec2, b: UVec2) -> bool {
     let [ax, ay, bx, by] = [a.x, a.y, b.x, b.y].map(u64::from);
-    // Scaled to the width of a, the height of b differs by |ax · by − ay · bx| / bx; the other three are alike.
+    // Scaled to the width of a, the height of b differs by |ax · by − ay · bx| / bx; the other three cases follow by exchange.
     (ax * by).abs_diff(ay * bx) <= ax.max(ay).max(bx).max(by)
 }
 

@@ -1,6 +1,6 @@
 //! The datasets of trained captures.
 //!
-//! In: the folder named by `GS4D_DATA`; skipped without it. Out: proof that their cameras and images are those of the
+//! In: the folder named by `GS4D_DATA`; skipped without it. Out: proof that their cameras and images match the
 //! original.
 
 use std::path::{Path, PathBuf};
@@ -46,7 +46,7 @@ fn toybox_test_split_is_read() {
     let dataset = Dataset::open(&folder, Split::Test, &CameraOptions::default()).expect("a dataset");
     assert_eq!(dataset.views.len(), 60, "two cameras of thirty frames");
     assert_eq!((dataset.views[0].name.as_str(), dataset.views[0].time), ("c04_f00", 0.0), "the first frame");
-    assert!(dataset.views.iter().all(|view| view.camera.size == UVec2::splat(400)), "400x400 everywhere");
+    assert!(dataset.views.iter().all(|view| view.camera.size == UVec2::splat(400)), "every view has 400x400 pixels");
     assert!(dataset.require_images().is_ok(), "every image and mask exists");
     for golden in ["golden_vanilla.json", "golden_4dgs1k.json", "golden_45k.json"] {
         assert_golden_cameras(&folder, golden, &CameraOptions::default());
@@ -59,11 +59,11 @@ fn toybox_test_split_is_read() {
 }
 
 #[test]
-fn standup_at_resolution_two_has_the_values_of_the_original() {
+fn standup_at_resolution_two_matches_the_original() {
     let Some(folder) = capture("standup") else { return };
     let options = resolution_option(2);
     let dataset = Dataset::open(&folder, Split::Test, &options).expect("a dataset");
-    assert!(dataset.views.iter().all(|view| view.camera.size == UVec2::splat(400)), "800 halved");
+    assert!(dataset.views.iter().all(|view| view.camera.size == UVec2::splat(400)), "half of 800 pixels");
     assert_golden_cameras(&folder, "standup_golden.json", &options);
     let image = dataset.views[0].load_covered().expect("an image");
     // Computed with numpy and Pillow.

@@ -1,6 +1,6 @@
 //! Images of datasets.
 //!
-//! In: small images written to temporary folders. Out: proof that their values are those of numpy and Pillow, and that
+//! In: small images written to temporary folders. Out: proof that their values match numpy and Pillow, and that
 //! missing and damaged images are named.
 
 use std::fs;
@@ -85,16 +85,19 @@ fn transparent_images_are_multiplied_by_alpha_once() {
     assert_eq!(
         bytes(&image),
         (OVER_BLACK.to_vec(), COVERAGE.to_vec()),
-        "Pillow's bytes over black, and Pillow's alpha"
+        "the bytes of Pillow over black, and the alpha of Pillow"
     );
     assert!(image.has_gaps, "some pixels are not covered");
     let over_black: Vec<_> = unit(&OVER_BLACK).chunks(3).map(Vec3::from_slice).collect();
-    assert_eq!(image.over(Vec3::ZERO).pixels, over_black, "exactly the bytes over black");
+    assert_eq!(image.over(Vec3::ZERO).pixels, over_black, "the composite over black has the same bytes");
     let over_white: Vec<_> = unit(&OVER_WHITE).chunks(3).map(Vec3::from_slice).collect();
     let found = image.over(Vec3::ONE).pixels;
-    // Noise overshoots in the bicubic filter, and is clipped where the composite is not.
+    // The bicubic filter overshoots on noise; the image is clipped where the composite is not.
     let farthest = found.iter().zip(&over_white).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f32::max);
-    assert!(farthest < 5.5 / 255.0, "an image that is composited over white before: {farthest}");
+    assert!(
+        farthest < 5.5 / 255.0,
+        "at most 5.5 steps from an image composited over white before resampling: {farthest}"
+    );
     let mean = found.iter().zip(&over_white).map(|(a, b)| (*a - *b).element_sum()).sum::<f32>() / 72.0;
     assert!(mean.abs() < 1.0 / 255.0, "the mean differs by rounding: {mean}");
 }
@@ -103,12 +106,15 @@ fn transparent_images_are_multiplied_by_alpha_once() {
 fn masks_are_returned_as_coverage_and_not_multiplied() {
     let folder = Folder::new();
     let masked = noise_view(&folder, true).load_covered().expect("an image");
-    assert_eq!(bytes(&masked), (OVER_BLACK.to_vec(), MASK.to_vec()), "the image as it is, and the mask resampled");
+    assert_eq!(bytes(&masked), (OVER_BLACK.to_vec(), MASK.to_vec()), "the unchanged image, and the resampled mask");
     let background = Vec3::new(0.2, 0.4, 0.6);
     let (color, covered) = (unit(&OVER_BLACK[..3]), unit(&MASK[..1]));
     let expected = Vec3::from_slice(&color) + (1.0 - covered[0]) * background;
     let found = masked.over(background).pixel(0, 0);
-    assert!(found.abs_diff_eq(expected, 1e-6), "the background fills what the mask leaves: {found} and {expected}");
+    assert!(
+        found.abs_diff_eq(expected, 1e-6),
+        "the background is visible where the mask is empty: {found} and {expected}"
+    );
 }
 
 #[test]
@@ -127,7 +133,7 @@ fn opaque_images_of_the_right_size_are_unchanged() {
     let view = CameraFile::load(&path, &CameraOptions::default()).expect("a valid camera file").remove(0);
     let loaded = view.load_covered().expect("an image");
     let colors: Vec<_> = unit(&noise(16 * 16 * 3, 7)).chunks(3).map(Vec3::from_slice).collect();
-    assert_eq!(loaded.over(Vec3::new(0.3, 0.6, 0.9)).pixels, colors, "every byte as it was, over any background");
+    assert_eq!(loaded.over(Vec3::new(0.3, 0.6, 0.9)).pixels, colors, "every byte is unchanged over any background");
     assert!(!loaded.has_gaps, "every pixel is covered");
     let oversized =
         TrainingView { camera: Camera { size: UVec2::new(MAX_SIDE + 1, 1), ..view.camera }, ..view.clone() };
@@ -194,11 +200,11 @@ fn truncated_jpegs_are_refused() {
 }
 
 #[test]
-fn images_far_larger_than_the_camera_file_says_are_not_decoded() {
+fn images_far_larger_than_in_the_camera_file_are_not_decoded() {
     let folder = Folder::new();
     let view = view_of(&folder, "a.png", 8);
     folder.write_rgb("a.png", 32, 32);
-    assert!(view.load_covered().is_ok(), "four times as large is scaled");
+    assert!(view.load_covered().is_ok(), "an image four times as large is scaled");
     for (width, height) in [(33, 8), (8, 33), (300, 300)] {
         folder.write_rgb("a.png", width, height);
         let error = view.load_covered().expect_err("too large");
@@ -208,7 +214,7 @@ fn images_far_larger_than_the_camera_file_says_are_not_decoded() {
     }
     let halved = TrainingView { camera: Camera { size: UVec2::splat(1), ..view.camera }, ..view };
     folder.write_rgb("a.png", 8, 8);
-    assert!(halved.load_covered().is_ok(), "the camera's own size does not count");
+    assert!(halved.load_covered().is_ok(), "the limit does not depend on the size of the camera");
 }
 
 #[test]
@@ -238,7 +244,7 @@ fn images_of_another_aspect_ratio_are_refused() {
             }
         }
     }
-    // A size that is asked for may have another aspect ratio: that of the images counts.
+    // A requested size may have another aspect ratio: images are checked against the camera file.
     folder.write_rgb("a.png", 80, 60);
     folder.write_rgb("m.png", 40, 30);
     let square = load(&CameraOptions { size: Some(UVec2::splat(16)), ..CameraOptions::default() });

@@ -140,9 +140,9 @@ fn frames_keep_order_names_times_and_paths() {
     let path = folder.write_json("transforms_test.json", &with(transforms(), "/frames", json!(frames)));
     let views = CameraFile::load(&path, &CameraOptions::default()).expect("a valid camera file");
     let names: Vec<_> = views.iter().map(|view| view.name.as_str()).collect();
-    assert_eq!(names, ["r_000", "c04", "frame.001", "r_000-3"], "stems, a repeated one made unique");
+    assert_eq!(names, ["r_000", "c04", "frame.001", "r_000-3"], "stems, with a repeated stem made unique");
     let times: Vec<_> = views.iter().map(|view| view.time).collect();
-    assert_eq!(times, [0.0, 0.25, 0.0, 0.0], "0 where no time is given");
+    assert_eq!(times, [0.0, 0.25, 0.0, 0.0], "the default time is 0");
     let images = ["./test/r_000.png", "images/c04.JPG", "cam00/frame.001.png", "other/r_000.png"];
     for (view, image) in views.iter().zip(images) {
         assert_eq!(view.image, folder.path().join(image), "next to the camera file");
@@ -192,7 +192,11 @@ fn the_picture_size_comes_from_the_option_the_file_or_the_first_image() {
     folder.write("transforms_val.json", "{");
     folder.write_json("transforms_train.json", &json!({"frames": [frame("c")]}));
     folder.write_rgb("c.png", 40, 24);
-    assert_eq!(sizes(&CameraOptions::default()).expect("a size"), [UVec2::new(40, 24); 2], "the other split's image");
+    assert_eq!(
+        sizes(&CameraOptions::default()).expect("a size"),
+        [UVec2::new(40, 24); 2],
+        "the image of another split"
+    );
 
     folder.write_rgb("b.png", 20, 10);
     assert_eq!(sizes(&CameraOptions::default()).expect("a size"), [UVec2::new(20, 10); 2], "the first image found");
@@ -202,7 +206,11 @@ fn the_picture_size_comes_from_the_option_the_file_or_the_first_image() {
     let per_frame = with(with(frames_only, "/frames/0/w", json!(64.0)), "/frames/0/h", json!(32));
     folder.write_json("transforms_test.json", &per_frame);
     let expected = [UVec2::new(64, 32), UVec2::new(20, 10)];
-    assert_eq!(sizes(&CameraOptions::default()).expect("a size"), expected, "one frame has its own size");
+    assert_eq!(
+        sizes(&CameraOptions::default()).expect("a size"),
+        expected,
+        "the size of a frame overrides the size of the image"
+    );
 }
 
 #[test]
@@ -260,6 +268,6 @@ fn the_test_split_of_lego_is_val() {
         dataset.views[0].name.clone()
     };
     assert_eq!(first("lego", Split::Test), "v", "val replaces test");
-    assert_eq!(first("lego", Split::Train), "n", "train stays");
-    assert_eq!(first("hook", Split::Test), "t", "other scenes have their own test set");
+    assert_eq!(first("lego", Split::Train), "n", "train is not replaced");
+    assert_eq!(first("hook", Split::Test), "t", "other scenes use their test split");
 }

@@ -1,7 +1,7 @@
 //! Invalid camera files and options.
 //!
 //! In: camera files with invalid entries, random values and random bytes. Out: proof that each gives an error that
-//! names it, never a panic.
+//! names the file, and no panic.
 
 use std::ffi::OsStr;
 use std::path::Path;
@@ -51,7 +51,7 @@ fn invalid_entries_are_errors_that_name_file_frame_and_reason() {
 fn cameras_that_project_to_infinity_are_named() {
     let shared = with(with(transforms(), "/fl_x", json!(900.0)), "/fl_y", json!(880.0));
     let shared = with(with(shared, "/cx", json!(410.0)), "/cy", json!(190.0));
-    assert!(load(&shared, &CameraOptions::default()).is_ok(), "a camera");
+    assert!(load(&shared, &CameraOptions::default()).is_ok(), "the unchanged camera is valid");
     for (pointer, value) in [("/cy", -3.4e38), ("/cx", 3.4e38), ("/fl_x", 3e38), ("/fl_y", 1e-38)] {
         let changed = with(shared.clone(), pointer, json!(value));
         let message = load(&changed, &CameraOptions::default()).expect_err(pointer).to_string();
@@ -83,7 +83,7 @@ fn distorted_pictures_are_refused_by_the_name_of_the_entry() {
             }
         }
     }
-    // An entry of a frame replaces that of the file.
+    // An entry of a frame replaces the entry of the file.
     let own = with(with(transforms(), "/k1", json!(0.1)), "/frames/0/k1", json!(0));
     assert!(load(&own, &CameraOptions::default()).is_ok(), "the frame has no distortion");
     let own = with(with(transforms(), "/k1", json!(0)), "/frames/0/k1", json!(0.1));
@@ -91,7 +91,7 @@ fn distorted_pictures_are_refused_by_the_name_of_the_entry() {
 }
 
 #[test]
-fn camera_models_that_are_no_pinhole_are_refused() {
+fn camera_models_other_than_pinhole_are_refused() {
     for place in ["", "/frames/0"] {
         let of = |model: Value| with(transforms(), &format!("{place}/camera_model"), model);
         for model in ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "pinhole"] {
@@ -190,7 +190,7 @@ fn unusable_options_are_errors() {
 
 #[cfg(unix)]
 #[test]
-fn folders_that_are_not_utf8_work() {
+fn folder_names_need_not_be_utf8() {
     use std::os::unix::ffi::OsStrExt;
     let folder = Folder::new();
     let name = Path::new(OsStr::from_bytes(b"sc\xffne"));

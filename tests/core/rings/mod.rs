@@ -1,11 +1,11 @@
 //! The rings: no module uses a module that lies further out, and no files use each other in a circle.
 //!
-//! In: the text of every file in `src/`. Out: proof that no path points outwards and that no paths form a circle; a failure lists such paths
-//! with file and line.
+//! In: the text of every file in `src/`. Out: proof that no path points outwards and that no paths form a circle; a failure lists such
+//! paths with file and line.
 //!
-//! A path is a use of the file that defines its item, behind all imports and re-exports. A `mod.rs` is a file like every other, except that
-//! its `mod` items, and re-exports of its children that its own code does not use, are no uses. Comments and strings are ignored, unit tests
-//! are not. Uses without a path, such as calls of methods, are not found.
+//! A path is a use of the file that defines its item, behind all imports and re-exports. A `mod.rs` is treated as every other file, except
+//! that its `mod` items, and re-exports of its children that its code does not use, are not uses. Unit tests are read; comments and strings
+//! are ignored. Uses without a path, such as calls of methods, are not found.
 
 mod paths;
 mod sources;
@@ -43,7 +43,7 @@ const PLUGIN: &Order = &[
 #[test]
 fn no_path_points_outwards() {
     let sources = Sources::of_this_crate();
-    assert!(sources.uses().len() > 300, "paths are found");
+    assert!(sources.uses().len() > 300, "more than 300 paths are found");
     let outward = sources.outward(RINGS, PLUGIN);
     assert!(outward.is_empty(), "{} paths point outwards:\n{}", outward.len(), outward.join("\n"));
 }
@@ -55,7 +55,7 @@ fn no_files_use_each_other_in_a_circle() {
 }
 
 #[test]
-fn every_folder_has_its_place() {
+fn every_folder_has_a_place_in_the_order() {
     let sources = Sources::of_this_crate();
     let folders = |depth: usize| sources.modules.keys().filter(move |module| module.len() > depth + 1);
     let rings: BTreeSet<&str> = folders(0).map(|module| module[0].as_str()).collect();
@@ -103,7 +103,7 @@ fn cycles(files: &[(&str, &str)]) -> Vec<String> {
 }
 
 #[test]
-fn a_file_that_uses_an_item_of_its_own_mod_is_a_circle() {
+fn a_file_and_a_mod_that_use_each_other_are_a_circle() {
     let own = ("a/b.rs", "use super::LIMIT; pub struct B;");
     let found = cycles(&[("a/mod.rs", "mod b; pub use b::B;\nconst LIMIT: u8 = 1; fn f() { b::g() }"), own]);
     assert_eq!(found, ["src/a/b.rs:1: super::LIMIT\nsrc/a/mod.rs:2: b::g\n"], "mod.rs calls a function of its child");
@@ -116,11 +116,11 @@ fn a_file_that_uses_an_item_of_its_own_mod_is_a_circle() {
     let through = ("a/c.rs", "use super::b::B;");
     let found = cycles(&[("a/mod.rs", "mod b; mod c; const LIMIT: u8 = 1;\nfn f() { c::g() }"), own, through]);
     let steps = "src/a/b.rs:1: super::LIMIT\nsrc/a/c.rs:1: super::b::B\nsrc/a/mod.rs:2: c::g\n";
-    assert_eq!(found, [steps], "mod.rs uses the file through another");
+    assert_eq!(found, [steps], "mod.rs uses the file through another file");
 }
 
 #[test]
-fn declarations_and_reexports_of_a_mod_are_no_uses() {
+fn declarations_and_reexports_of_a_mod_are_not_uses() {
     let child = ("a/b.rs", "use super::LIMIT; pub struct B;");
     let found = cycles(&[("a/mod.rs", "mod b; pub use b::B; pub(crate) use b::*; const LIMIT: u8 = 1;"), child]);
     assert_eq!(found, [""; 0], "mod.rs only re-exports its child");
@@ -143,12 +143,16 @@ fn paths_that_begin_with_an_imported_name_lead_to_the_item() {
     assert_eq!(
         cycles(&[folder[0], folder[1], use_of_child]),
         [""; 0],
-        "the import of a folder is no use of its mod.rs"
+        "the import of a folder is not a use of its mod.rs"
     );
     let use_of_mod = ("a/c.rs", "use crate::a;\nfn g() { a::f() }");
     let steps = "src/a/c.rs:2: a::f\nsrc/a/mod.rs:1: c::g\n";
-    assert_eq!(cycles(&[folder[0], folder[1], use_of_mod]), [steps], "a path to a function of mod.rs is a use of it");
+    assert_eq!(
+        cycles(&[folder[0], folder[1], use_of_mod]),
+        [steps],
+        "a path to a function of mod.rs is a use of mod.rs"
+    );
     let inner = ("a/c.rs", "mod tests {\nuse crate::a;\nfn g() { a::f() } }");
     let steps = "src/a/c.rs:3: a::f\nsrc/a/mod.rs:1: c::g\n";
-    assert_eq!(cycles(&[folder[0], folder[1], inner]), [steps], "unit tests count");
+    assert_eq!(cycles(&[folder[0], folder[1], inner]), [steps], "paths in unit tests are uses");
 }

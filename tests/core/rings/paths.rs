@@ -1,7 +1,7 @@
 //! The paths in a Rust file.
 //!
-//! In: its text. Out: every path of two or more names and every branch of a `use`, with its line and the module around it; the names of the
-//! items that the file defines, and the names that occur outside of `use` items. Comments, strings and doc text are skipped.
+//! In: the text of the file. Out: every path of two or more names and every branch of a `use`, with its line and the module around it; the
+//! names of the items that the file defines, and the names that occur outside of `use` items. Comments, strings and doc text are skipped.
 
 use std::collections::BTreeSet;
 
@@ -28,7 +28,7 @@ pub struct Mention {
     pub kind: Kind,
 }
 
-/// Where a path stands.
+/// The kind of place of a path.
 #[derive(PartialEq)]
 pub enum Kind {
     /// In code.
@@ -105,7 +105,7 @@ impl<'a> Reader<'a> {
                     self.branch(&[], matches!(before, "pub" | ")"));
                     continue;
                 }
-                // After a type in angle brackets or a method's name, `::` begins no path.
+                // `::` after a type in angle brackets or after the name of a method does not begin a path.
                 name if is_name(name) && next == "::" && !matches!(before, "::" | ".") => {
                     self.path();
                     continue;

@@ -1,7 +1,7 @@
 //! The files of a crate as modules, and the uses between them.
 //!
-//! In: files with their paths below `src`. Out: the module that each path in them leads to, behind imports and re-exports; the paths that an
-//! order of the modules forbids; the files that use each other in a circle.
+//! In: files with their paths below `src`. Out: the module that each path leads to, behind imports and re-exports; the paths that an order
+//! of the modules forbids; the files that use each other in a circle.
 
 use super::paths::{Kind, Mention, Module, Source};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -11,7 +11,7 @@ use std::path::Path;
 /// The most imports and re-exports that are followed from a path to the item that it names.
 const MOST_REEXPORTS: usize = 8;
 
-/// An order of modules: the modules that each of them may use besides itself.
+/// An order of modules: for each module, the other modules that it may use.
 pub type Order = [(&'static str, &'static [&'static str])];
 
 /// The files of a crate.
@@ -69,7 +69,7 @@ impl Sources {
     }
 
     /// Returns the module at which a path in the module `inside` of a file starts, and the rest of the path; `None` for a path of another
-    /// crate. A first name that is imported is replaced by what it is imported from, at most `imports` times.
+    /// crate. An imported first name is replaced by the path of the import, at most `imports` times.
     fn start(&self, file: &[String], inside: &[String], path: &[String], imports: usize) -> Option<(Module, Module)> {
         let mut base = [file, inside].concat();
         let (first, mut rest) = path.split_first()?;
@@ -97,7 +97,7 @@ impl Sources {
         Some((base, rest.to_vec()))
     }
 
-    /// Follows a path as far as it names modules. Returns the last of them and the rest of the path.
+    /// Follows a path as far as it names modules. Returns the last module and the rest of the path.
     fn descend<'a>(&self, base: &[String], mut path: &'a [String]) -> (Module, &'a [String]) {
         let mut module = base.to_vec();
         while let Some((name, rest)) = path.split_first() {
@@ -151,7 +151,7 @@ impl Sources {
         outward
     }
 
-    /// Returns the shortest circle through each file, each circle once: the paths that it consists of, one a line.
+    /// Returns the shortest circle through each file, each circle once: its paths, one on each line.
     pub fn cycles(&self) -> Vec<String> {
         let mut edges: BTreeMap<&Module, BTreeMap<Module, String>> = BTreeMap::new();
         for used in self.uses().into_iter().filter(|used| self.depends(used)) {
@@ -177,7 +177,7 @@ impl Sources {
         cycles.iter().map(|steps| steps.iter().map(|step| format!("{step}\n")).collect()).collect()
     }
 
-    /// Returns whether a file depends on the file that one of its paths leads to.
+    /// Returns whether a path makes its file depend on the file that the path leads to.
     fn depends(&self, used: &Use<'_>) -> bool {
         let Use { module, source, mention, target } = used;
         if *module == target {
@@ -194,7 +194,7 @@ impl Sources {
             };
             return source.words.contains(name) || items.is_some_and(|items| !items.is_disjoint(&source.words));
         }
-        // An import of a folder is no use of its `mod.rs`: the paths that begin with the imported name lead to the items.
+        // An import of a folder is not a use of its `mod.rs`: the paths that begin with the imported name lead to the items.
         let is_import = mention.kind != Kind::Code && !mention.binds("*");
         let is_folder = self.modules.get(target).is_some_and(is_mod);
         !(is_import && is_folder && self.names_module(module, mention))
@@ -222,7 +222,7 @@ fn position(source: &Source, mention: &Mention) -> String {
     format!("src/{}:{}: {}", source.file, mention.line, mention.path.join("::"))
 }
 
-/// Collects every Rust file below a folder with its text. Binaries are left out: they are crates of their own.
+/// Collects every Rust file below a folder with its text. Binaries are left out, since they are separate crates.
 fn collect(folder: &Path, prefix: &str, files: &mut Vec<(String, String)>) {
     for entry in fs::read_dir(folder).expect("the folder can be listed") {
         let path = entry.expect("the entry can be read").path();
