@@ -5,6 +5,7 @@
 
 mod appearance;
 mod bake;
+mod depths_alone;
 mod detail;
 mod fast;
 mod filter;
