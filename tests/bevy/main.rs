@@ -15,6 +15,7 @@ mod glass;
 mod golden;
 mod inactive;
 mod inspector;
+mod late_hits;
 mod motion;
 mod picker;
 mod picking_backend;
