@@ -20,6 +20,7 @@ mod motion;
 mod picker;
 mod picking_backend;
 mod playback;
+mod released;
 mod shade;
 mod shadows;
 mod steady;

@@ -6,6 +6,7 @@ use crate::gaussian::alpha::reach_squared;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::{ClipFade, Playback};
 use crate::plugin::render::CaptureSettings;
+use crate::plugin::render::logged::warn_once_each;
 use crate::scene::{PickSettings, RuntimeScene};
 use bevy::asset::Assets;
 use bevy::camera::visibility::InheritedVisibility;
@@ -115,6 +116,13 @@ impl CapturePicker<'_, '_> {
         ray: Ray3d,
     ) -> Option<Aim> {
         let capture = self.assets.get(&handle.0)?;
+        if capture.is_released() {
+            warn_once_each(&format!(
+                "capture {entity} is not picked: its Gaussians are on the GPU only; load it with RenderAssetUsages::default() in \
+                 PackageLoaderSettings, or let rays pass it with Pickable::IGNORE"
+            ));
+            return None;
+        }
         let appearance = settings.appearance(fade.copied().unwrap_or_default().0);
         let affine = transform.affine();
         if affine.matrix3.determinant() == 0.0 {

@@ -11,13 +11,13 @@ use crate::plugin::component::GaussianCapture;
 use crate::renderer::memory::{Caught, catch, catch_known};
 use crate::renderer::{CaptureUpload, GpuCapture, GpuError, ViewRenderer};
 use crate::scene::{Bounds, Level, RuntimeScene};
-use bevy::asset::{AssetId, AssetServer};
+use bevy::asset::{AssetId, AssetServer, RenderAssetUsages};
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::lifetimeless::SRes;
 use bevy::ecs::system::{Res, ResMut, SystemParamItem};
 use bevy::log::{debug_span, error, warn};
 use bevy::render::Extract;
-use bevy::render::render_asset::{PrepareAssetError, RenderAsset, RenderAssets};
+use bevy::render::render_asset::{AssetExtractionError, PrepareAssetError, RenderAsset, RenderAssets};
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 use std::sync::Arc;
 
@@ -174,7 +174,11 @@ impl GpuGaussianCapture {
             self.next = Some(next);
         } else {
             let levels = next.uploads.into_iter().map(|upload| upload.finish(queue, &renderer.0)).collect();
-            self.shown = Some(Arc::new(ShownCapture { levels, source: next.source }));
+            let mut source = next.source;
+            if source.usages() == RenderAssetUsages::RENDER_WORLD {
+                source.release();
+            }
+            self.shown = Some(Arc::new(ShownCapture { levels, source }));
         }
         Ok(written)
     }
@@ -190,6 +194,17 @@ impl RenderAsset for GpuGaussianCapture {
     // `byte_len` is not implemented: with a byte limit per frame, Bevy removes the old upload before it prepares the new one.
     type Param =
         (SRes<RenderDevice>, SRes<AssetServer>, SRes<Uploads>, SRes<CaptureStatistics>, Option<SRes<CaptureRenderer>>);
+
+    fn asset_usage(source: &GaussianCapture) -> RenderAssetUsages {
+        source.usages()
+    }
+
+    fn take_gpu_data(
+        source: &mut GaussianCapture,
+        _previous: Option<&Self>,
+    ) -> Result<GaussianCapture, AssetExtractionError> {
+        source.release().ok_or(AssetExtractionError::AlreadyExtracted)
+    }
 
     fn prepare_asset(
         source: GaussianCapture,
