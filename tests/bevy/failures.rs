@@ -170,7 +170,11 @@ fn a_device_that_refuses_a_layout_is_reported_and_the_app_goes_on() {
 
 #[test]
 fn a_camera_whose_target_cannot_be_blended_leaves_the_app_running() {
-    let without = limited_app(|settings, _| settings.disabled_features = Some(WgpuFeatures::FLOAT32_BLENDABLE));
+    let without = limited_app(|settings, _| {
+        // The second feature allows what the adapter can do beyond the features of the device.
+        let blending = WgpuFeatures::FLOAT32_BLENDABLE | WgpuFeatures::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES;
+        settings.disabled_features = Some(blending);
+    });
     let Some((mut app, _)) = without else { return };
     spawn(&mut app, red());
     let image = Image::new_target_texture(SIZE.x, SIZE.y, TextureFormat::Rgba32Float, None);
