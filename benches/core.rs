@@ -4,7 +4,8 @@
 
 use bevy_gs4d::codec::package::{self, WriteSettings};
 use bevy_gs4d::gaussian::SliceSettings;
-use bevy_gs4d::reference::{self, Layer};
+use bevy_gs4d::internal::reference;
+use bevy_gs4d::reference::Layer;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, SceneForm};
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, RasterFov, View};

@@ -10,8 +10,8 @@ mod common;
 
 use bevy::core_pipeline::tonemapping::{DebandDither, Tonemapping};
 use bevy::prelude::*;
+use bevy_gs4d::Upright;
 use bevy_gs4d::asset::GaussianCapture;
-use bevy_gs4d::component::Upright;
 use bevy_gs4d::playback::Playback;
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin, testing};
 use common::Orbit;

@@ -13,7 +13,7 @@ mod arguments;
 mod show;
 
 use bevy::prelude::*;
-use bevy_gs4d::component::Upright;
+use bevy_gs4d::Upright;
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
 use std::path::PathBuf;
 

@@ -13,6 +13,14 @@
 #import gs4d::tile::{covers_tile, pair_of_tile, pixel_of, tile_index}
 
 const BATCH: u32 = 256u;
+#ifdef SIXTEEN_AT_ONCE
+const MANY: u32 = 16u;
+#endif
+#ifdef SIXTY_FOUR_AT_ONCE
+const MANY: u32 = 64u;
+#endif
+// Splats of a tile that are blended in an iteration each. With many at once, all later splats are blended in iterations of MANY.
+const ONE_BY_ONE: u32 = 8192u;
 
 @group(1) @binding(0) var<storage, read> tile_ranges: array<vec2<u32>>;
 @group(1) @binding(1) var<storage, read> pair_splats: array<u32>;
@@ -36,25 +44,70 @@ fn put_in_batch(place: u32, slot: u32) {
     batch_c[place] = splat.color;
 }
 
-// Blends the first `count` splats of the batch into a pixel and stops when the pixel is finished.
-fn blend_batch(pixel: ptr<function, Pixel>, count: u32, position: vec2<f32>) {
-    if !(*pixel).done {
-        for (var i = 0u; i < count; i++) {
-            let a = batch_a[i];
-            if a.w > (*pixel).limit {
-                pass_surfaces(pixel, a.w);
-                if (*pixel).done {
-                    break;
-                }
-            }
-            blend_splat(pixel, alpha_at(batch_b[i], a.z, a.xy - position), batch_c[i], a.w);
-            if (*pixel).done {
-                break;
-            }
-        }
+// Blends splat `i` of the batch into a pixel that is not finished.
+fn blend_one(pixel: ptr<function, Pixel>, i: u32, position: vec2<f32>) {
+    let a = batch_a[i];
+    if a.w > (*pixel).limit {
+        pass_surfaces(pixel, a.w);
         if (*pixel).done {
-            atomicAdd(&finished, 1u);
+            return;
         }
+    }
+    blend_splat(pixel, alpha_at(batch_b[i], a.z, a.xy - position), batch_c[i], a.w);
+}
+
+// Blends splat `i`, unless it is not below `count` or the pixel is finished.
+fn blend_if_open(pixel: ptr<function, Pixel>, i: u32, count: u32, position: vec2<f32>) {
+    if i < count && !(*pixel).done {
+        blend_one(pixel, i, position);
+    }
+}
+
+fn blend_4(pixel: ptr<function, Pixel>, i: u32, count: u32, position: vec2<f32>) {
+    blend_if_open(pixel, i, count, position);
+    blend_if_open(pixel, i + 1u, count, position);
+    blend_if_open(pixel, i + 2u, count, position);
+    blend_if_open(pixel, i + 3u, count, position);
+}
+
+fn blend_16(pixel: ptr<function, Pixel>, i: u32, count: u32, position: vec2<f32>) {
+    blend_4(pixel, i, count, position);
+    blend_4(pixel, i + 4u, count, position);
+    blend_4(pixel, i + 8u, count, position);
+    blend_4(pixel, i + 12u, count, position);
+}
+
+// Blends MANY splats from `i` on, those below `count`. Each call is expanded, not a loop: see `AtOnce` in src/renderer/shaders.rs.
+#ifdef SIXTEEN_AT_ONCE
+fn blend_many(pixel: ptr<function, Pixel>, i: u32, count: u32, position: vec2<f32>) {
+    blend_16(pixel, i, count, position);
+}
+#endif
+#ifdef SIXTY_FOUR_AT_ONCE
+fn blend_many(pixel: ptr<function, Pixel>, i: u32, count: u32, position: vec2<f32>) {
+    blend_16(pixel, i, count, position);
+    blend_16(pixel, i + 16u, count, position);
+    blend_16(pixel, i + 32u, count, position);
+    blend_16(pixel, i + 48u, count, position);
+}
+#endif
+
+// Loads the batch of the pairs from `first` to `end`, unless all pixels of the tile are finished. Returns whether the batch was loaded.
+fn load_batch(first: u32, end: u32, thread: u32) -> bool {
+    if workgroupUniformLoad(&finished) == BATCH {
+        return false;
+    }
+    if first + thread < end {
+        put_in_batch(thread, pair_splats[first + thread]);
+    }
+    workgroupBarrier();
+    return true;
+}
+
+// Counts a pixel that has been finished since it was `open`.
+fn count_finished(pixel: ptr<function, Pixel>, open: bool) {
+    if open && (*pixel).done {
+        atomicAdd(&finished, 1u);
     }
 }
 
@@ -97,24 +150,37 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
     if pixel.done {
         atomicAdd(&finished, 1u);
     }
-    for (var first = range.x; first < range.y; first += BATCH) {
-        // No thread changes `finished` between these barriers, so all threads exit the loop together.
-        workgroupBarrier();
-        if atomicLoad(&finished) == BATCH {
+#ifdef MANY_AT_ONCE
+    let end = min(range.y, range.x + ONE_BY_ONE);
+#else
+    let end = range.y;
+#endif
+    for (var first = range.x; first < end; first += BATCH) {
+        if !load_batch(first, end, thread) {
             break;
         }
-        let mine = first + thread;
-        if mine < range.y {
-            put_in_batch(thread, pair_splats[mine]);
+        let open = !pixel.done;
+        for (var i = 0u; i < min(BATCH, end - first) && !pixel.done; i++) {
+            blend_one(&pixel, i, position);
         }
-        workgroupBarrier();
-        blend_batch(&pixel, min(BATCH, range.y - first), position);
+        count_finished(&pixel, open);
     }
+#ifdef MANY_AT_ONCE
+    for (var first = end; first < range.y; first += MANY) {
+        let i = (first - end) % BATCH;
+        if i == 0u {
+            if !load_batch(first, range.y, thread) {
+                break;
+            }
+        }
+        let open = !pixel.done;
+        blend_many(&pixel, i, i + range.y - first, position);
+        count_finished(&pixel, open);
+    }
+#endif
     if counters.pairs < counters.pairs_wanted {
         for (var first = first_without_room(); first < counters.visible; first += BATCH) {
-            // All threads exit the loop together: the next barrier is the first barrier of the scan.
-            workgroupBarrier();
-            if atomicLoad(&finished) == BATCH {
+            if workgroupUniformLoad(&finished) == BATCH {
                 break;
             }
             let mine = first + thread;
@@ -127,7 +193,17 @@ fn blend(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
                 put_in_batch(place, order[mine]);
             }
             workgroupBarrier();
-            blend_batch(&pixel, scan_total(), position);
+            let open = !pixel.done;
+#ifdef MANY_AT_ONCE
+            for (var i = 0u; i < scan_total() && !pixel.done; i += MANY) {
+                blend_many(&pixel, i, scan_total(), position);
+            }
+#else
+            for (var i = 0u; i < scan_total() && !pixel.done; i++) {
+                blend_one(&pixel, i, position);
+            }
+#endif
+            count_finished(&pixel, open);
         }
     }
     finish_pixel(pixel, at);

@@ -7,6 +7,7 @@
 // The splats of a pixel are visited front to back, as in `blend`, so that both stop at the same splat. The color behind a splat is the
 // finished color minus the color blended so far.
 #import gs4d::alpha::{is_opaque, is_skipped, left_behind, ALPHA_MAX}
+#import gs4d::conic::exponent_at
 #import gs4d::tile::{pixel_of, tile_index}
 #import gs4d::pairs::{frame, pair_of, pair_splats, place_pairs, splats, tile_ranges}
 #import gs4d::records::read_splat
@@ -94,8 +95,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
             chunk_places[thread] = pair_of(slot, tile.xy);
 #endif
         }
-        workgroupBarrier();
-        let over = atomicLoad(&finished) == PIXELS;
+        let over = workgroupUniformLoad(&finished) == PIXELS;
         let was_done = done;
         for (var i = 0u; i < count; i++) {
             let place = places[in_chunk + i];
@@ -103,10 +103,9 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
             var weight = 0.0;
             var term = 0.0;
             let d = place.xy - position;
-            let power = -0.5 * (conic.x * d.x * d.x + conic.z * d.y * d.y) - conic.y * d.x * d.y;
-            let peak = place.z * exp(power);
+            let peak = place.z * exp(exponent_at(conic, d));
             let alpha = min(ALPHA_MAX, peak);
-            if !done && power <= 0.0 && !is_skipped(alpha) {
+            if !done && !is_skipped(alpha) {
                 let left = left_behind(transmittance, alpha);
                 if is_opaque(left) {
                     done = true;

@@ -51,7 +51,7 @@ const LOG2_ALPHA_MAX: f32 = -0.014499569;
 @group(1) @binding(3) var<storage, read> splat_colors: array<vec4<f32>>;
 @group(1) @binding(4) var<storage, read> visible: array<VisibleSplat>;
 
-// batch_a: center, conic xx and xy scaled for exp2. batch_b: conic yy, log2 of opacity, red, green. batch_c: blue and depth, padded to the
+// batch_a: center, conic x scaled for exp2 and y. batch_b: conic z scaled, log2 of opacity, red, green. batch_c: blue and depth, padded to the
 // same stride, so that one address serves all three arrays. The last element is a splat that is skipped at every pixel.
 var<workgroup> batch_a: array<vec4<f32>, BATCH + 1u>;
 var<workgroup> batch_b: array<vec4<f32>, BATCH + 1u>;
@@ -183,9 +183,9 @@ fn corner_of(block: u32) -> vec2<u32> {
 
 // Writes the splat of a thread into the batch.
 fn put_in_batch(splat: Splat, thread: u32) {
-    let conic = vec3(-0.5, -1.0, -0.5) * LOG2_E * splat.conic;
-    batch_a[thread] = vec4(splat.center, conic.xy);
-    batch_b[thread] = vec4(conic.z, log2(splat.opacity), splat.color.xy);
+    let scaled = -0.5 * LOG2_E * splat.conic.xz;
+    batch_a[thread] = vec4(splat.center, scaled.x, splat.conic.y);
+    batch_b[thread] = vec4(scaled.y, log2(splat.opacity), splat.color.xy);
     batch_c[thread] = vec4(splat.color.z, splat.depth, 0.0, 0.0);
     var blocks = 0u;
     if splat.opacity > 0.0 {
@@ -208,20 +208,13 @@ fn place_of(i: u32) -> u32 {
 // Returns the blocks of 8 x 4 pixels where the alpha of a splat can reach 1/255, one bit per block, with a margin for rounding.
 fn blocks_reached(splat: Splat) -> u32 {
     let c = splat.conic;
-    // The negated comparison is true for NaN: a conic that is no ellipse counts for every block.
-    if !(c.x * c.z > c.y * c.y) {
-        return 0xffu;
-    }
     let bound = energy_of(splat.opacity) * 1.001 + 0.02;
     // On the line x = 1 the quadratic form has its minimum at y = slope.x, on y = 1 at x = slope.y.
-    let slope = vec2(-c.y / c.z, -c.y / c.x);
+    let slope = vec2(-c.x * c.y / (c.z + c.x * c.y * c.y), -c.y);
     let corner = vec2<f32>(tile * TILE_SIZE) - splat.center;
     let left = corner.x + vec2(0.0, 8.0);
     let right = left + 7.0;
     let near_x = clamp(vec2(0.0), left, right);
-    // On the line x = near_x the form minus the bound is (c.z * y + by_y) * y + at_x, on y = near_y the same with x and y exchanged.
-    let by_y = 2.0 * c.y * near_x;
-    let at_x = c.x * near_x * near_x - bound;
     var blocks = 0u;
     for (var row = 0u; row < 4u; row++) {
         let top = corner.y + f32(4u * row);
@@ -230,11 +223,11 @@ fn blocks_reached(splat: Splat) -> u32 {
         // The minimum of the form over a block lies on one of the two sides that face the center.
         let y = clamp(slope.x * near_x, vec2(top), vec2(bottom));
         let x = clamp(vec2(slope.y * near_y), left, right);
-        let on_x = fma(fma(vec2(c.z), y, by_y), y, at_x);
-        let by_x = 2.0 * c.y * near_y;
-        let at_y = c.z * near_y * near_y - bound;
-        let on_y = fma(fma(vec2(c.x), x, vec2(by_x)), x, vec2(at_y));
-        let hit = min(on_x, on_y) <= vec2(0.0);
+        let along_x = fma(vec2(c.y), y, near_x);
+        let on_x = fma(c.x * along_x, along_x, c.z * y * y);
+        let along_y = x + c.y * near_y;
+        let on_y = fma(c.x * along_y, along_y, vec2(c.z * near_y * near_y));
+        let hit = min(on_x, on_y) <= vec2(bound);
         blocks |= (select(0u, 1u, hit.x) | select(0u, 2u, hit.y)) << (2u * row);
     }
     return blocks;
@@ -286,9 +279,9 @@ fn queue_splats(thread: u32) -> u32 {
 // Returns the alpha of a splat of the batch, as `alpha_at`, with the conic scaled for exp2; 0 if the splat is skipped.
 fn batch_alpha(a: vec4<f32>, b: vec4<f32>, position: vec2<f32>) -> f32 {
     let d = a.xy - position;
-    let exponent = (a.z * d.x + a.w * d.y) * d.x + (b.x * d.y * d.y + b.y);
-    let shows = exponent >= LOG2_ALPHA_MIN && exponent <= b.y;
-    return select(0.0, exp2(min(exponent, LOG2_ALPHA_MAX)), shows);
+    let along = d.x + a.w * d.y;
+    let exponent = a.z * along * along + (b.x * d.y * d.y + b.y);
+    return select(0.0, exp2(min(exponent, LOG2_ALPHA_MAX)), exponent >= LOG2_ALPHA_MIN);
 }
 
 fn batch_color(i: u32) -> vec3<f32> {
@@ -450,8 +443,10 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
 #ifdef MULTISAMPLED
     let surfaces = surface_range(at, !done);
     let limit = surfaces.x;
+    let farthest = surfaces.y;
 #else ifdef OPAQUE
     let limit = surface_depth(at, !done);
+    let farthest = limit;
 #endif
 #endif
     if done {
@@ -509,8 +504,12 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
                 var near_alphas = batch_alphas(near, position);
                 var far_alphas = batch_alphas(far, position);
 #ifdef OPAQUE
-                // The surface hides the splats behind it.
-                near_alphas = select(near_alphas, vec4(0.0), batch_depths(near) > vec4(limit));
+                // The surface hides the splats behind it: this splat and all later ones, or some of these eight.
+                let near_depths = batch_depths(near);
+                if near_depths.x > farthest {
+                    break;
+                }
+                near_alphas = select(near_alphas, vec4(0.0), near_depths > vec4(limit));
                 far_alphas = select(far_alphas, vec4(0.0), batch_depths(far) > vec4(limit));
 #endif
                 if blend_four(&sample, near_alphas, batch_colors(near)) {
@@ -533,7 +532,11 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
                 }
 #else
 #ifdef OPAQUE
+                // All surfaces of the pixel hide this splat and all later ones.
                 let depths = batch_depths(four);
+                if depths.x > farthest {
+                    break;
+                }
 #ifdef MULTISAMPLED
                 if surfaces.y > limit && any(depths > vec4(limit)) {
                     for (var j = 0u; j < 4u; j++) {
@@ -557,6 +560,10 @@ fn blend_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocati
             done = pixel.done;
 #else
             done = sample.left == 0.0;
+#ifdef OPAQUE
+            // The lists are in order of depth: all splats of later batches are hidden.
+            done = done || batch_c[BATCH - 1u].y > farthest;
+#endif
 #endif
             if done {
                 atomicAdd(&finished, 1u);

@@ -13,6 +13,7 @@
 #ifdef BINNED
 #import gs4d::capture::viewing_direction
 #endif
+#import gs4d::conic::{conic_of, determinant_of, determinant_with_less, is_drawable, screen_covariance, LOW_PASS}
 #import gs4d::tile::{contributing_tiles, tiles_of}
 #ifndef BINNED
 #import gs4d::tile::pack_tiles
@@ -27,7 +28,6 @@
 #endif
 
 const MARGINAL_CUTOFF: f32 = 0.05;
-const LOW_PASS: f32 = 0.3;
 const FRUSTUM_CLAMP: f32 = 1.3;
 
 #ifdef BINNED
@@ -132,8 +132,8 @@ fn project_bin(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocatio
         atomicStore(&present_count, 0u);
         // `sort_bins` of the next frame counts from 0.
         if group.x == 0u {
-            atomicStore(&bins[3], 0u);
             atomicStore(&bins[4], 0u);
+            atomicStore(&bins[5], 0u);
         }
     }
     for (var i = thread; i < 128u * instance.per_thread; i += 256u) {
@@ -208,7 +208,10 @@ fn project_and_bin(first_of_group: u32, place: u32, count: u32, thread: u32) {
     }
     if thread == 0u {
         visible_before = atomicAdd(&bins[BIN_COUNTERS + instance.binning.z], atomicLoad(&own_visible));
-        atomicAdd(&bins[0], atomicLoad(&own_pairs));
+        let pairs_of_group = atomicLoad(&own_pairs);
+        if atomicAdd(&bins[0], pairs_of_group) > 0xffffffffu - pairs_of_group {
+            atomicAdd(&bins[1], 1u);
+        }
     }
     for (var i = thread; i < min(bin_count, OWN_BINS); i += 256u) {
         let many = atomicLoad(&own[i]);
@@ -301,23 +304,16 @@ fn project_one(index: u32, slot: u32) -> u32 {
     let mx = j.x * (instance.camera_x.xyz - ray.x * instance.camera_z.xyz);
     let my = j.y * (instance.camera_y.xyz - ray.y * instance.camera_z.xyz);
     let covariance = covariance_of(g);
-    let cx = covariance * mx;
-    let a = dot(mx, cx) + LOW_PASS;
-    let b = dot(my, cx);
-    let c = dot(my, covariance * my) + LOW_PASS;
-    let det = a * c - b * b;
-    if det == 0.0 {
+    let screen = screen_covariance(covariance, mx, my);
+    if !is_drawable(screen) {
         return INVISIBLE;
     }
-    let mid = 0.5 * (a + c);
+    let det = determinant_of(screen, covariance, mx, my);
+    let mid = 0.5 * (screen.x + screen.z);
     let radius = ceil(3.0 * sqrt(mid + sqrt(max(0.1, mid * mid - det))));
-    // The negated comparison rejects infinity and NaN.
-    if !(radius <= 3.4e38) {
-        return INVISIBLE;
-    }
-    let opacity = g.opacity * marginal * instance.opacity * compensation(j, vec3(a, b, c), det);
+    let opacity = g.opacity * marginal * instance.opacity * compensation(j, screen, det);
     let square = tiles_of(center, radius, vec2<f32>(instance.tiles));
-    let tiles = contributing_tiles(square, center, vec2(a, c), det, opacity);
+    let tiles = contributing_tiles(square, center, screen.xz, opacity);
     // The negated comparison is true for NaN, which counts as invisible.
     if !(tiles.z > tiles.x && tiles.w > tiles.y) {
         return INVISIBLE;
@@ -327,7 +323,7 @@ fn project_one(index: u32, slot: u32) -> u32 {
     covered = vec4<u32>(tiles);
     covered_depth = q.z;
 #endif
-    let conic = vec3(c, -b, a) / det;
+    let conic = conic_of(screen, det);
 #ifdef BINNED
     splats[slot] = SplatShape(vec4(center, opacity, q.z), vec4(conic, 0.0));
     if instance.debug >= DEBUG_ACTIVE {
@@ -351,15 +347,14 @@ fn project_one(index: u32, slot: u32) -> u32 {
 
 // Returns the factor on the opacity of a splat that compensates for a low-pass that is wider than it was in training. `per_unit` is in
 // pixels per camera unit.
-fn compensation(per_unit: vec2<f32>, covariance: vec3<f32>, det: f32) -> f32 {
+fn compensation(per_unit: vec2<f32>, screen: vec3<f32>, det: f32) -> f32 {
     let trained = instance.trained_variance * LOW_PASS * per_unit * per_unit;
     let wider = max(LOW_PASS - trained, vec2(0.0));
     if all(wider == vec2(0.0)) {
         // Exactly 1, independent of rounding.
         return 1.0;
     }
-    let before = (covariance.x - wider.x) * (covariance.z - wider.y) - covariance.y * covariance.y;
-    return sqrt(max(before, 0.0) / det);
+    return sqrt(determinant_with_less(screen, det, wider) / det);
 }
 
 fn debug_color(g: Gaussian, absent: bool) -> vec3<f32> {

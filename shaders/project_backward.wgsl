@@ -3,6 +3,7 @@
 // CPU reference: src/gaussian/gradient.rs; equations: sections 7.2 to 7.4 of the 4DGS model. COMPAT: as the original computes them, with
 // the deviations of section 7.5. ATOMIC_SUMS: `blend_backward` has summed over the pairs of each splat.
 #import gs4d::types::{SplatRecord, TrainedRecord, TrainedScene, INVISIBLE}
+#import gs4d::conic::{conic_entries, determinant_of, screen_covariance}
 #import gs4d::records::{covariance_of, read_splat}
 #import gs4d::tile::tile_count
 #import gs4d::capture::{index_of, instance, load_gaussian}
@@ -13,7 +14,6 @@
 
 // The same values as in `project`.
 const FRUSTUM_CLAMP: f32 = 1.3;
-const LOW_PASS: f32 = 0.3;
 const TAU: f32 = 6.2831853;
 // The same value as in `blend_backward`.
 const SUMS: u32 = 10u;
@@ -171,7 +171,7 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
     let at = vec4(mean, 1.0);
 
     // Section 7.1: center and conic.
-    let conic = splat.conic;
+    let conic = conic_entries(splat.conic);
     let by_center = -vec2(sums.center.x * conic.x + sums.center.y * conic.y, sums.center.y * conic.z + sums.center.x * conic.y);
     let by_ndc = by_center * 0.5 * vec2<f32>(instance.size);
     let by_conic = vec3(-0.5, -1.0, -0.5) * sums.conic;
@@ -190,10 +190,11 @@ fn project_backward(@builtin(global_invocation_id) id: vec3<u32>) {
     let covariance = covariance_of(g);
     let cx = covariance * mx;
     let cy = covariance * my;
-    let a = dot(mx, cx) + LOW_PASS;
-    let b = dot(my, cx);
-    let c = dot(my, cy) + LOW_PASS;
-    let det = a * c - b * b;
+    let screen = screen_covariance(covariance, mx, my);
+    let a = screen.x;
+    let b = screen.y;
+    let c = screen.z;
+    let det = determinant_of(screen, covariance, mx, my);
 #ifdef COMPAT
     let k = 1.0 / (det * det + 1e-7);
 #else

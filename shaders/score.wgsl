@@ -80,8 +80,7 @@ fn pairs(@builtin(workgroup_id) tile: vec3<u32>, @builtin(local_invocation_index
     }
     for (var first = range.x; first < range.y; first += BATCH) {
         let count = min(BATCH, range.y - first);
-        workgroupBarrier();
-        let over = atomicLoad(&finished) == PIXELS;
+        let over = workgroupUniformLoad(&finished) == PIXELS;
         let was_done = pixel.done;
         for (var i = 0u; i < count; i++) {
             let splat = read_splat(splats[pair_splats[first + i]]);

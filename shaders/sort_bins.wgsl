@@ -13,21 +13,27 @@
 // Largest number of splats that are sorted at once.
 #ifdef LONG_LISTS
 const THREADS: u32 = 512u;
+const STEP_BITS: u32 = 9u;
 const LIST: u32 = 5120u;
 #else ifdef MEDIUM_LISTS
 const THREADS: u32 = 512u;
+const STEP_BITS: u32 = 9u;
 const LIST: u32 = 2304u;
 #else
 const THREADS: u32 = 256u;
+const STEP_BITS: u32 = 8u;
 const LIST: u32 = 1280u;
 #endif
 // Largest number of splats of one round.
 const ROUND: u32 = LIST / 2u;
 const LANES: u32 = 32u;
-// Steps of the histogram of depths, one for each thread.
+// Steps of the histogram of depths, one for each thread: two to the power of STEP_BITS.
 const STEPS: u32 = THREADS;
 // Buckets of the sort, two for each thread. More buckets mean fewer comparisons.
 const BUCKETS: u32 = 2u * THREADS;
+// Bits of the fraction of a position in the list, and of the factor from positions to buckets.
+const FRACTION_BITS: u32 = 16u;
+const FACTOR_BITS: u32 = 10u;
 
 @group(0) @binding(0) var<uniform> frame: FrameUniforms;
 // The counters of this frame, and those of the next, which are cleared.
@@ -180,18 +186,23 @@ fn sum_before(value: u32, thread: u32) -> u32 {
     return sum;
 }
 
-// Returns the step of a key, and the position of the key in the step from 0 to 1.
-fn step_of(key: u32, low: u32, scale: f32) -> vec2<f32> {
-    let at = f32(key - low) * scale;
-    return vec2(floor(at), fract(at));
+// Returns the width of a step as a power of two: the least with which keys up to `range` above the least key are in STEPS steps.
+fn step_width(range: u32) -> u32 {
+    return max(32u - countLeadingZeros(range), STEP_BITS) - STEP_BITS;
 }
 
-// Returns the bucket of a key. It increases monotonically with the key.
-fn bucket_of(key: u32, low: u32, scale: f32, share: f32) -> u32 {
-    let step = step_of(key, low, scale);
-    let first = atomicLoad(&steps[u32(step.x)]);
-    let count = atomicLoad(&steps[u32(step.x) + 1u]) - first;
-    return min(u32((f32(first) + step.y * f32(count)) * share), BUCKETS - 1u);
+// Returns the bucket of a key that is `offset` above the least key, below BUCKETS. It increases monotonically with the key. `width` is the
+// result of `step_width`, `factor` is (BUCKETS << FACTOR_BITS) / the number of keys. The bucket is computed from integers: drivers may round
+// floating-point expressions differently in each place where they inline this function.
+fn bucket_of(offset: u32, width: u32, factor: u32) -> u32 {
+    let first = atomicLoad(&steps[offset >> width]);
+    let count = atomicLoad(&steps[(offset >> width) + 1u]) - first;
+    // The position of the key in its step, from 0 to 1.
+    let wider = max(width, FRACTION_BITS);
+    let fraction = ((offset & ((1u << width) - 1u)) << (wider - width)) >> (wider - FRACTION_BITS);
+    // Less than the number of keys. Six bits fewer, so that the product is below 2^32.
+    let position = ((first << FRACTION_BITS) + fraction * count) >> 6u;
+    return (position * factor) >> (FRACTION_BITS - 6u + FACTOR_BITS);
 }
 
 // Adds a splat to the count of a bucket. Returns the previous count.
@@ -222,10 +233,10 @@ fn sort_list(first: u32, count: u32, whole: bool, thread: u32) {
         atomicStore(&places[count], LIST << 16u);
     }
     let low = workgroupUniformLoad(&least);
-    let scale = f32(STEPS - 1u) / max(f32(workgroupUniformLoad(&greatest) - low), 1.0);
-    let share = f32(BUCKETS) / f32(count);
+    let width = step_width(workgroupUniformLoad(&greatest) - low);
+    let factor = (BUCKETS << FACTOR_BITS) / count;
     for (var i = thread; i < count; i += THREADS) {
-        atomicAdd(&steps[u32(step_of(list[i], low, scale).x)], 1u);
+        atomicAdd(&steps[(list[i] - low) >> width], 1u);
     }
     workgroupBarrier();
     let before_step = sum_before(atomicLoad(&steps[thread]), thread);
@@ -236,7 +247,7 @@ fn sort_list(first: u32, count: u32, whole: bool, thread: u32) {
     }
     workgroupBarrier();
     for (var i = thread; i < count; i += THREADS) {
-        atomicStore(&places[i], count_in(bucket_of(list[i], low, scale, share)));
+        atomicStore(&places[i], count_in(bucket_of(list[i] - low, width, factor)));
     }
     workgroupBarrier();
     let two = atomicLoad(&buckets[thread]);
@@ -244,14 +255,14 @@ fn sort_list(first: u32, count: u32, whole: bool, thread: u32) {
     atomicStore(&buckets[thread], before_two * 0x10001u + (two << 16u));
     workgroupBarrier();
     for (var i = thread; i < count; i += THREADS) {
-        let bucket = bucket_of(list[i], low, scale, share);
+        let bucket = bucket_of(list[i] - low, width, factor);
         let place = first_of(bucket) + (atomicLoad(&places[i]) & 0xffffu);
         atomicOr(&places[place], i << 16u);
     }
     workgroupBarrier();
     for (var i = thread; i < count; i += THREADS) {
         let own = list[i];
-        let bucket = bucket_of(own, low, scale, share);
+        let bucket = bucket_of(own - low, width, factor);
         let begin = first_of(bucket);
         let end = first_of(bucket + 1u);
         // Two at a time, which halves the number of waits for memory. The element after the last has a greater key.
@@ -372,6 +383,20 @@ fn pairs_before(own: vec4<u32>, thread: u32) -> array<vec4<u32>, 2> {
     return before;
 }
 
+// Reserves room for pairs. Returns the first pair; NONE if there is too little room. The number of pairs written never exceeds the capacity,
+// so that it does not wrap.
+fn reserve_pairs(count: u32) -> u32 {
+    var written = atomicLoad(&next_bins[5]);
+    while count <= frame.pair_capacity - written {
+        let exchange = atomicCompareExchangeWeak(&next_bins[5], written, written + count);
+        if exchange.exchanged {
+            return written;
+        }
+        written = exchange.old_value;
+    }
+    return NONE.x;
+}
+
 // Reserves room for `counted` pairs of each tile of the bin with the first tile `corner`, and writes their ranges.
 fn reserve(corner: vec2<u32>, thread: u32) {
     let tiles = side() * side();
@@ -384,8 +409,7 @@ fn reserve(corner: vec2<u32>, thread: u32) {
         total += more;
     }
     if thread == 0u {
-        let first = atomicAdd(&next_bins[4], total);
-        first_pair = select(NONE.x, first, first + total <= frame.pair_capacity);
+        first_pair = reserve_pairs(total);
     }
     let reserved = workgroupUniformLoad(&first_pair);
     if thread < tiles {
@@ -509,17 +533,18 @@ fn sort_bins(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
     let bin = group.y * ((frame.tiles.x + side() - 1u) / side()) + group.x;
     let binned = bins[first_bin + bin];
     if thread == 0u {
-        atomicMax(&next_bins[3], binned);
+        atomicMax(&next_bins[4], binned);
         atomicStore(&next_bins[first_bin + bin], 0u);
         if bin == 0u {
             atomicStore(&next_bins[0], 0u);
+            atomicStore(&next_bins[1], 0u);
             var visible = 0u;
             for (var part = 0u; part < frame.binning.w; part++) {
                 visible += bins[BIN_COUNTERS + part];
                 atomicStore(&next_bins[BIN_COUNTERS + part], 0u);
             }
-            atomicStore(&next_bins[1], visible);
-            atomicStore(&next_bins[2], bins[0]);
+            atomicStore(&next_bins[2], visible);
+            atomicStore(&next_bins[3], select(bins[0], 0xffffffffu, bins[1] > 0u));
         }
     }
     let corner = side() * group.xy;

@@ -69,7 +69,7 @@
 //!
 //! Each pass from `activate` to `blend`, and `motion` after it, has one name everywhere: `shaders/project.wgsl`, the function in
 //! [`mod@reference`], the timestamp span (`sort` has two: by depth, by tile), the tests. Rules that several passes share are a file each, in `shaders/shared/` and in
-//! [`gaussian`]: which tiles a splat covers ([`gaussian::overlap`]), what it does to a pixel ([`gaussian::alpha`]).
+//! [`gaussian`]: which tiles a splat covers (`gaussian::overlap`), what it does to a pixel (`gaussian::alpha`).
 //!
 //! # The rings
 //!
@@ -91,18 +91,19 @@
 //! | [`mod@reference`] | the renderer's passes on the CPU, as plain functions over slices | |
 //! | [`renderer`] | wgpu: buffers, pipelines, one frame of a view | `renderer` |
 //! | [`offline`] | training views, metrics, scores, pruning, quantization, levels of detail, reports: from a checkpoint to a small capture | `offline` |
-//! | [`plugin`] | Bevy | `bevy` |
+//! | `plugin` | Bevy | `bevy` |
 //! | [`cli`] | the `gs4d` command: options and printing over [`offline`] | `cli` |
 //!
 //! The last four are the gates of the crate: each is behind one feature, and nothing inside them is. It is not quite a list:
 //!
 //! * [`codec`] and [`mod@reference`] lie side by side: one reads files, the other draws, and neither needs the other.
-//! * [`plugin`] lies beside [`offline`] and does not use it, so that a game compiles neither datasets nor metrics. What both need lies
+//! * `plugin` lies beside [`offline`] and does not use it, so that a game compiles neither datasets nor metrics. What both need lies
 //!   further in.
-//! * [`plugin`] has rings of its own, `component ▶ asset ▶ playback ▶ render ▶ pbr, picker, stereo ▶ picking_backend, inspector, testing`, of
+//! * `plugin` has rings of its own, `component ▶ asset ▶ playback ▶ render ▶ pbr, picker, stereo ▶ picking_backend, inspector, testing`, of
 //!   which `pbr`, `picking_backend` (feature `picking`), `inspector` and `testing` are features. The crate root re-exports them: a game writes `bevy_gs4d::playback`.
 //! * A picture is a [`Picture`](view::Picture), not an `Image`: Bevy and the crate `image` have an `Image` each, and one file may need
 //!   all three.
+//! * `internal`, hidden here, lies outside all rings: it re-exports private items for the tests and benchmarks of this crate.
 //! * `score` is a pass of the offline half, not of a frame: its CPU reference and its pipelines are in [`mod@offline::score`], a client of
 //!   the renderer.
 //!
@@ -114,8 +115,8 @@
 //!
 //! # From a checkpoint to a small capture
 //!
-//! [`offline`] finds what each Gaussian is worth to the training views ([`mod@offline::score`]), which stay ([`mod@offline::prune`]),
-//! which are active when ([`mod@offline::temporal_filter`]), and how few bytes they need ([`mod@offline::quantize`]). `gs4d bake` calls
+//! [`offline`] finds what each Gaussian is worth to the training views ([`mod@offline::score`]), which stay (`offline::prune`),
+//! which are active when (`offline::temporal_filter`), and how few bytes they need ([`mod@offline::quantize`]). `gs4d bake` calls
 //! them in order and reports.
 //!
 //! # How it is known to be right
@@ -132,7 +133,7 @@
 //! | none | [`view`], [`gaussian`], [`scene`], [`codec`], [`mod@reference`]: no GPU, no Bevy | |
 //! | `renderer` | [`renderer`], on wgpu | |
 //! | `offline` | [`offline`] | `renderer` |
-//! | `bevy` (default) | [`plugin`]: [`asset`], [`playback`], [`render`], [`picker`], [`stereo`]; [`prelude`] | `renderer` |
+//! | `bevy` (default) | `plugin`: [`asset`], [`playback`], [`render`], [`picker`], [`stereo`]; [`prelude`] | `renderer` |
 //! | `pbr` (default) | [`pbr`]: captures among Bevy's lit meshes | `bevy` |
 //! | `picking` (default) | pointer events on captures | `bevy` |
 //! | `cli` | [`cli`], the `gs4d` command; never compiles Bevy | `offline` |
@@ -144,15 +145,26 @@
     not(all(feature = "cli", feature = "inspector", feature = "testing")),
     expect(rustdoc::broken_intra_doc_links, reason = "this page describes modules that are not part of this build")
 )]
+#![cfg_attr(
+    all(feature = "renderer", not(feature = "cli")),
+    expect(
+        dead_code,
+        unused_imports,
+        reason = "the renderer and the offline half have private items that only the command, or only the offline half, uses"
+    )
+)]
+#![cfg_attr(all(feature = "cli", feature = "viewer"), warn(unreachable_pub))]
 
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod codec;
 pub mod gaussian;
+#[doc(hidden)]
+pub mod internal;
 #[cfg(feature = "offline")]
 pub mod offline;
 #[cfg(feature = "bevy")]
-pub mod plugin;
+mod plugin;
 #[cfg(feature = "bevy")]
 pub mod prelude;
 pub mod reference;
@@ -162,7 +174,6 @@ pub mod scene;
 pub mod view;
 
 #[cfg(feature = "bevy")]
-#[doc(no_inline)]
 pub use plugin::*;
 
 /// The README, whose code must compile.

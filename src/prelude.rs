@@ -21,20 +21,30 @@
 //! app.add_systems(Startup, (setup, slow_motion).chain()).run();
 //! ```
 
+#[doc(no_inline)]
 pub use crate::plugin::GaussianCapturePlugin;
+#[doc(no_inline)]
 pub use crate::plugin::asset::{CaptureFailed, CaptureReady, CaptureState};
+#[doc(no_inline)]
 pub use crate::plugin::component::{GaussianCapture, GaussianCapture3d, Upright};
 #[cfg(feature = "pbr")]
+#[doc(no_inline)]
 pub use crate::plugin::pbr::{CaptureContactShadow, CaptureLight, CastsShadows, ReceivesShadows, ShadowResolution};
+#[doc(no_inline)]
 pub use crate::plugin::picker::{CaptureHit, CapturePicker};
 #[cfg(feature = "picking")]
+#[doc(no_inline)]
 pub use crate::plugin::picking_backend::{CapturePickingCamera, CapturePickingSettings};
+#[doc(no_inline)]
 pub use crate::plugin::playback::{
     FollowsClock, MarkerReached, Markers, Playback, PlaybackClock, PlaybackEnded, PlaybackLooped, PlaybackPaused,
     PlaybackSeeked, PlaybackStarted, Repeat, SegmentBoundCrossed, Timeline, TimelinePlayer, TimelineTrack,
 };
+#[doc(no_inline)]
 pub use crate::plugin::render::{
     CaptureDetail, CaptureSettings, CaptureStatistics, CaptureUploadBudget, CaptureViewSettings, CropBox, DepthWrite,
 };
+#[doc(no_inline)]
 pub use crate::plugin::stereo::{Eye, EyeTargets, StereoPlugin, StereoRig, spawn_stereo};
+#[doc(no_inline)]
 pub use crate::view::{BlendSpace, DebugView};

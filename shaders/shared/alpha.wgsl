@@ -1,6 +1,8 @@
 // Alpha: the opacity of a splat at a pixel, and the step that blends it. CPU reference: src/gaussian/alpha.rs.
 #define_import_path gs4d::alpha
 
+#import gs4d::conic::exponent_at
+
 // A splat whose alpha at a pixel is below this is skipped there.
 const ALPHA_MIN: f32 = 1.0 / 255.0;
 // 1 / ALPHA_MIN.
@@ -19,12 +21,9 @@ const TRANSMITTANCE_MIN: f32 = 1e-4;
 // These are separate functions because a single function that returns which of the three cases applies makes `blend`
 // a seventh slower.
 
-// Returns the alpha of a splat at a pixel; `offset` is the vector from the pixel to the splat's center, pixels.
-// Negative if the falloff would exceed 1.
+// Returns the alpha of a splat at a pixel; `conic` is factored, `offset` is the vector from the pixel to the splat's center, pixels.
 fn alpha_at(conic: vec3<f32>, opacity: f32, offset: vec2<f32>) -> f32 {
-    let d = offset;
-    let power = -0.5 * (conic.x * d.x * d.x + conic.z * d.y * d.y) - conic.y * d.x * d.y;
-    return select(min(ALPHA_MAX, opacity * exp(power)), -1.0, power > 0.0);
+    return min(ALPHA_MAX, opacity * exp(exponent_at(conic, offset)));
 }
 
 fn is_skipped(alpha: f32) -> bool {

@@ -40,7 +40,7 @@ struct Splat {
     center: vec2<f32>,
     opacity: f32,
     depth: f32,
-    // xx, xy, yy
+    // Factored; see conic.wgsl.
     conic: vec3<f32>,
     color: vec3<f32>,
 }

@@ -18,18 +18,13 @@ fn tiles_of(center: vec2<f32>, radius: f32, grid: vec2<f32>) -> vec4<f32> {
 }
 
 // Returns the part of `tiles` where alpha can reach 1/255, possibly empty; `blend` would skip the splat in the other tiles.
-// `variance` is xx and yy of the covariance on the screen, `det` the determinant of the covariance.
+// `variance` is xx and yy of the covariance on the screen.
 fn contributing_tiles(
     tiles: vec4<f32>,
     center: vec2<f32>,
     variance: vec2<f32>,
-    det: f32,
     opacity: f32,
 ) -> vec4<f32> {
-    // The negated comparison is true for NaN.
-    if !(det > 0.0) {
-        return tiles;
-    }
     let energy = energy_of(opacity);
     if energy < -1e-3 {
         return vec4(0.0);

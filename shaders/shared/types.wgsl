@@ -240,7 +240,7 @@ const BACKGROUND_ENVIRONMENT: u32 = 2u;
 struct SplatRecord {
     // Center, opacity, depth.
     place: vec4<f32>,
-    // Inverse covariance xx, xy, yy; tiles x0 and y0.
+    // Inverse covariance, factored (conic.wgsl); tiles x0 and y0.
     shape: vec4<u32>,
     // Color; tiles x1 and y1 (ends excluded).
     color: vec4<u32>,
@@ -250,7 +250,7 @@ struct SplatRecord {
 struct SplatShape {
     // Center, opacity, depth.
     place: vec4<f32>,
-    // Inverse covariance xx, xy, yy.
+    // Inverse covariance, factored (conic.wgsl); unused.
     conic: vec4<f32>,
 }
 
@@ -286,6 +286,6 @@ const SORT_SLOTS: u32 = 0u;
 const SORT_VISIBLE: u32 = 1u;
 const SORT_PAIRS: u32 = 2u;
 
-// Number of counters of the fast design before the counters of parts and bins: pairs of this frame; then visible splats, pairs, splats of
-// the fullest bin and pairs written of the previous frame.
-const BIN_COUNTERS: u32 = 5u;
+// Number of counters of the fast design before the counters of parts and bins: pairs of this frame, modulo 2^32, and how often this number
+// has wrapped; then visible splats, pairs, splats of the fullest bin and pairs written of the previous frame.
+const BIN_COUNTERS: u32 = 6u;

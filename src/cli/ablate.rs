@@ -3,13 +3,13 @@
 //! In: a checkpoint, its training views, validation views with images. Out: one row for the whole scene, one for each filter, one for
 //! each score at each ratio; nothing is trained.
 
-use super::args::{CheckpointArgs, EngineArgs, ScoringArgs, SplitArgs, ValidationArgs, score_choice, values};
+use super::args::{CheckpointArgs, EngineArgs, Given, ScoringArgs, SplitArgs, ValidationArgs, score_choice, values};
 use super::failure::Failure;
-use super::interrupt;
 use super::progress::Bars;
 use super::report::Report;
 use super::table::{Table, lines};
 use crate::offline::ablation::{AblationRow, AblationSettings, ablate};
+use crate::offline::belonging::require_belonging;
 use crate::offline::dataset::{Split, require_images};
 use crate::offline::files::Files;
 use crate::offline::metrics::MeanMetrics;
@@ -34,6 +34,8 @@ Examples:
 Every row is measured on its own: filters on the whole scene, ratios without a filter. The active share is the mean over the
 segments of a filter.")]
 pub struct Ablate {
+    #[command(flatten)]
+    given: Given,
     /// The checkpoint, or a package of it in the trained form.
     #[arg(value_name = "CHECKPOINT")]
     input: PathBuf,
@@ -74,9 +76,14 @@ impl Ablate {
     /// Measures every row.
     ///
     /// # Errors
-    /// A checkpoint or views that cannot be used, missing test images, a table that cannot be written, a failure of the
+    /// A checkpoint or views that cannot be used, images that are missing or show something else, a table that cannot be written, a failure of the
     /// engine.
     pub fn run(&self) -> Result<Report, Failure> {
+        self.engine.check(&self.given, &[])?;
+        self.scoring.check(&self.given, &self.variants)?;
+        if self.split != Measured::Validation {
+            self.given.none_of(&["--validation"], &format!("with --split {}", self.split.name()))?;
+        }
         if let Some(csv) = &self.csv {
             self.data.add_to(Files::default().reads_scene(&self.input)).writes(csv, "csv").check()?;
         }
@@ -101,7 +108,10 @@ impl Ablate {
         let measured = subset(measured, self.measured_views);
         require_images(&measured)?;
         let subject = Subject::new(&self.input, scene, self.checkpoint.background)?;
-        let mut engine = self.engine.open()?;
+        let mut engine = self.engine.open(&self.given, &[])?;
+        if !self.validation.trust_images {
+            require_belonging(&mut engine, &subject.runtime, &measured, subject.background)?;
+        }
         let rows = ablate(&mut engine, subject, train, &measured, &self.settings(), progress)?;
         let seconds = start.elapsed().as_secs_f64();
 
@@ -185,5 +195,5 @@ fn write_csv(path: &Path, rows: &[AblationRow]) -> Result<(), Failure> {
         let [name, values @ ..] = cells(row, "");
         text += &format!("\"{name}\",{}\n", values.join(","));
     }
-    Ok(interrupt::whole(|| write_beside(path, |file| file.write_all(text.as_bytes())))?)
+    Ok(write_beside(path, |file| file.write_all(text.as_bytes()))?)
 }

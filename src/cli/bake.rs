@@ -4,7 +4,7 @@
 //! it, and a summary of the report.
 
 use super::args::{
-    CheckpointArgs, EngineArgs, PackageArgs, ScoringArgs, SplitArgs, ValidationArgs, score_choice, values,
+    CheckpointArgs, EngineArgs, Given, PackageArgs, ScoringArgs, SplitArgs, ValidationArgs, score_choice, values,
 };
 use super::failure::Failure;
 use super::progress::Bars;
@@ -37,6 +37,8 @@ Beside the package: OUT.report.html with plots and pictures (open it in a browse
 Every choice is made on validation views, which nothing is trained on. The report compares the test views, which no choice looks at, if
 their images are there. Cameras and times of the training views are enough with --ratio or --keep; --max-loss needs their images, too.")]
 pub struct Bake {
+    #[command(flatten)]
+    given: Given,
     /// The checkpoint, or a package of it in the trained form.
     #[arg(value_name = "CHECKPOINT")]
     input: PathBuf,
@@ -61,7 +63,7 @@ pub struct Bake {
     #[arg(long, value_name = "MB", value_parser = values::positive)]
     target_size: Option<f32>,
     /// Remove the others in so many rounds, with training and scoring between, if what is left is trained.
-    #[arg(long, value_name = "N", default_value = "4", value_parser = values::count(100))]
+    #[arg(long, value_name = "N", default_value = "4", conflicts_with = "no_fine_tune", value_parser = values::count(100))]
     rounds: usize,
     /// Prune by this score; auto tries ours and the paper's, each with a short training where the remaining Gaussians are trained.
     #[arg(long, value_name = "SCORE", default_value = "energy-removal", value_parser = score_choice(false))]
@@ -103,16 +105,21 @@ pub struct Bake {
     checkpoint: CheckpointArgs,
 }
 
+/// The options of training, for which a GPU is needed.
+const OF_TRAINING: [&str; 4] = ["--steps", "--batch", "--rounds", "--sums"];
+
 impl Bake {
     /// Runs every stage whose result is not stored yet.
     ///
     /// # Errors
     /// A checkpoint or views that cannot be used, files that cannot be written, a failure of the engine.
     pub fn run(&self) -> Result<Report, Failure> {
+        self.engine.check(&self.given, &OF_TRAINING)?;
+        self.scoring.check(&self.given, &[self.variant])?;
         let settings = self.settings(self.package.out()?);
         settings.check_files()?;
         let scene = self.checkpoint.load_to_change(&self.input)?;
-        let engine = &mut self.engine.open()?;
+        let engine = &mut self.engine.open(&self.given, &OF_TRAINING)?;
         let Baked { report, html, .. } = bake(scene, &settings, engine, &mut Bars::default())?;
         Ok(Report::new(report.json()?, in_short(&report, &html)))
     }

@@ -6,10 +6,13 @@
 use super::args::{CheckpointArgs, RenderersArgs, ViewArgs, values};
 use super::failure::Failure;
 use super::note::note;
+use super::progress::Bars;
 use super::report::{Report, switches_json};
 use super::table::{Table, bytes};
 use crate::offline::engine::AdapterDescription;
+use crate::offline::memory_check::{BY_SIZE, Pictures};
 use crate::offline::orbit::{at_times, share};
+use crate::offline::proceed;
 use crate::reference::{Workload, workload};
 use crate::renderer::{ColorPrecision, Design, GpuCapture, Timings};
 use crate::scene::RuntimeScene;
@@ -36,8 +39,8 @@ pub struct Bench {
     /// Frames of each kind to measure.
     #[arg(long, value_name = "N", default_value = "240", value_parser = values::count(1_000_000))]
     frames: usize,
-    /// Views to take from a camera file, evenly; also the number of views of the orbit unless --orbit says it.
-    #[arg(long = "views", value_name = "N", default_value = "12", value_parser = values::count(100_000))]
+    /// Views to take from a camera file, evenly; without one, views of an orbit.
+    #[arg(long = "views", value_name = "N", default_value = "12", conflicts_with = "orbit", value_parser = values::count(100_000))]
     count: usize,
     /// See every view at K times, evenly over the interval [default: each at its own time].
     #[arg(long, value_name = "K", conflicts_with = "time", value_parser = values::count(10_000))]
@@ -111,6 +114,10 @@ impl Bench {
             }
         }
         let mut headless = self.renderer.open()?;
+        for (_, _, (_, views)) in &read {
+            // The targets of the frames in flight have about as many bytes as one read back and one that waits.
+            Pictures::written(views.iter().map(|view| view.size), 1).require(Some(&headless), BY_SIZE)?;
+        }
         let mut subjects = Vec::with_capacity(read.len());
         for (path, form, (scene, views)) in read {
             subjects.push(Subject { path, form, capture: headless.upload(&scene)?, scene, views });
@@ -126,6 +133,7 @@ impl Bench {
         headless.measure_precision(if self.half { ColorPrecision::Half } else { ColorPrecision::Single });
         for round in 1..=self.rounds {
             for row in &mut rows {
+                proceed(&Bars::default())?;
                 let Subject { path, capture, views, .. } = row.subject;
                 note(&format!("round {round} of {}: {}", self.rounds, path.display()));
                 headless.set_design(row.design);

@@ -1,9 +1,9 @@
 //! `gs4d compare A B`: compares pictures.
 //!
-//! In: two pictures, or two folders matched by file stem (8-bit, 16-bit or raw float32). Out: PSNR and SSIM of each pair and of
-//! all pairs together.
+//! In: two pictures, or two folders whose pictures are matched by file stem (8-bit, 16-bit or raw float32). Out: PSNR and SSIM of each pair,
+//! and their means.
 
-use super::args::values;
+use super::args::{Given, values};
 use super::failure::Failure;
 use super::progress::Bars;
 use super::report::Report;
@@ -15,10 +15,10 @@ use glam::UVec2;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// Measure how alike two pictures, or the pictures of two folders, are.
+/// Measure PSNR and SSIM of two pictures, or of the pictures of two folders.
 ///
-/// Pictures are png, jpg or .f32 (what `render --raw` writes; needs --size). Alpha is ignored. Values of .f32 files are taken
-/// as they are when both sides are .f32, and clamped to 0..1 against any other picture.
+/// Pictures are .png, .jpg or .f32 (written by `render --raw`; needs --size). Alpha is ignored. Values of .f32 pictures are clamped to 0..1,
+/// unless both pictures are .f32.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -26,28 +26,33 @@ Examples:
   gs4d compare frames truth
   gs4d compare frames/r_000.f32 other/r_000.f32 --size 400x400
 
-PSNR is the mean of the three channels' (as the original code reports it; a channel without any error is left out), pooled that of
-all values together. PSNR of identical pictures is 200 dB; they are counted, and left out of the mean PSNR.")]
+PSNR is the mean over the three channels, as the original code reports it; channels without error are left out. Pooled PSNR is that of all
+values together. The PSNR of identical pictures is 200 dB. Their number is reported, and they are left out of the mean PSNR.")]
 pub struct Compare {
+    #[command(flatten)]
+    given: Given,
     /// A picture or a folder of pictures.
     #[arg(value_name = "A")]
     a: PathBuf,
     /// A picture or a folder of pictures.
     #[arg(value_name = "B")]
     b: PathBuf,
-    /// Size of .f32 pictures. In folders, .f32 files count only with this option, and then before others of the same stem.
+    /// Size of .f32 pictures, pixels. In folders, .f32 files are used only with this option, and then in place of other files of the same stem.
     #[arg(long, value_name = "WxH", value_parser = values::size)]
     size: Option<UVec2>,
 }
 
 impl Compare {
-    /// Compares and tabulates.
+    /// Compares the pictures and returns a table.
     ///
     /// # Errors
     /// Pictures that cannot be read or paired, or that have different sizes.
     pub fn run(&self) -> Result<Report, Failure> {
         let progress = &mut Bars::default();
         let pairs = Pairs::of(&self.a, &self.b, self.size)?;
+        if !pairs.has_raw() {
+            self.given.none_of(&["--size"], "without .f32 pictures")?;
+        }
         let mut metrics = Vec::with_capacity(pairs.both.len());
         progress.begin("comparing", pairs.both.len());
         for pair in &pairs.both {

@@ -3,7 +3,7 @@
 //! In: a scene, a quality or single options. Out: a package in the packed form, bytes by section, and PSNR of its
 //! pictures to those of the original scene.
 
-use super::args::{CheckpointArgs, EngineArgs, PackageArgs, ViewArgs, file_size, values};
+use super::args::{CheckpointArgs, EngineArgs, Given, PackageArgs, ViewArgs, file_size, values};
 use super::failure::Failure;
 use super::progress::Bars;
 use super::report::Report;
@@ -13,7 +13,7 @@ use crate::offline::Progress;
 use crate::offline::fidelity::Originals;
 use crate::offline::files::Files;
 use crate::offline::metrics::SquaredError;
-use crate::offline::quantize::{CompressSettings, Quality, compress_with};
+use crate::offline::quantize::{CompressSettings, Quality, compress_with, require_unpacked};
 use crate::offline::score::read_weights;
 use crate::scene::RuntimeScene;
 use crate::scene::packed::encode::Bits;
@@ -31,8 +31,13 @@ Examples:
   gs4d compress masked.gs4d capture.gs4d
   gs4d compress chkpnt30000.pth small.gs4d --quality small --cameras transforms_test.json
   gs4d compress chkpnt30000.pth exact.gs4d --quality visually-lossless
-  gs4d compress chkpnt30000.pth own.gs4d --codebooks 4096,4096 --scale-bits 10 --escape 0.05")]
+  gs4d compress chkpnt30000.pth own.gs4d --codebooks 4096,4096 --scale-bits 10 --escape 0.05
+
+No choice is made on pictures, and no training views are needed: --cameras takes those of a dataset for the comparison with the original.
+gs4d bake and gs4d finetune --compress train codebooks on the training views, and lose less.")]
 pub struct Compress {
+    #[command(flatten)]
+    given: Given,
     /// The checkpoint or package to read.
     #[arg(value_name = "IN")]
     input: PathBuf,
@@ -120,20 +125,41 @@ impl Knobs {
     }
 }
 
+/// The options of the views that are drawn, and of how.
+const OF_VERIFYING: [&str; 8] =
+    ["--cameras", "--orbit", "--time", "--size", "--resolution", "--engine", "--adapter", "--checks"];
+/// The options of geometry that is quantized.
+const OF_GEOMETRY: [&str; 8] = [
+    "--mean-bits",
+    "--mean-t-bits",
+    "--velocity-bits",
+    "--sigma-t-bits",
+    "--scale-bits",
+    "--rotation-bits",
+    "--opacity-bits",
+    "--escape",
+];
+/// The options of colors that are coded by codebooks.
+const OF_CODEBOOKS: [&str; 3] = ["--codebooks", "--base-bits", "--weights"];
+/// The option of colors that are not.
+const OF_WHOLE_COLORS: [&str; 1] = ["--color-step"];
+
 impl Compress {
     /// Compresses and writes.
     ///
     /// # Errors
     /// The scene cannot be read or is packed already, the package cannot be written, a failure of the engine.
     pub fn run(&self) -> Result<Report, Failure> {
+        self.check_options()?;
         let progress = &mut Bars::default();
         let files = Files::default().reads_scene(&self.input).reads(&self.weights);
-        let out = self.package.checked_out(self.views.add_to(files))?;
+        let out = self.package.checked_file(self.views.add_to(files))?;
         let before = file_size(&self.input)?;
         let scene = self.checkpoint.load_to_change(&self.input)?;
+        require_unpacked(&scene.form).map_err(|error| Failure::at(&self.input, &error))?;
         let scene = scene.into_runtime().map_err(|error| Failure::at(&self.input, &error))?;
-        let originals = self.originals(&scene, progress)?;
         let weights = self.weights.as_ref().map(|path| read_weights(path, scene.len())).transpose()?;
+        let originals = self.originals(&scene, progress)?;
         let settings = CompressSettings { weights, ..self.knobs.settings(self.quality) };
         progress.begin("codebooks", settings.codebooks.len());
         let compressed = compress_with(scene, &settings, || progress.advance());
@@ -148,7 +174,7 @@ impl Compress {
         }
         let scene = scene.into_runtime().map_err(|error| Failure::at(out, &error))?;
         let errors = match &originals {
-            Some(originals) => originals.errors(&mut self.engine.open()?, &scene, progress)?,
+            Some(originals) => originals.errors(&mut self.engine.open(&self.given, &[])?, &scene, progress)?,
             None => Vec::new(),
         };
 
@@ -194,6 +220,23 @@ impl Compress {
         Ok(Report::new(json, text))
     }
 
+    /// Checks that every option has an effect.
+    fn check_options(&self) -> Result<(), Failure> {
+        self.engine.check(&self.given, &[])?;
+        if self.verify == 0 {
+            self.given.none_of(&OF_VERIFYING, "with --verify 0: no view is drawn")?;
+        }
+        let settings = self.knobs.settings(self.quality);
+        match (&settings.geometry, settings.codebooks.is_empty()) {
+            (None, _) => {
+                let knobs = [&OF_GEOMETRY[..], &OF_CODEBOOKS, &OF_WHOLE_COLORS].concat();
+                self.given.none_of(&knobs, "with --quality lossless, which changes no value")
+            }
+            (Some(_), false) => self.given.none_of(&OF_WHOLE_COLORS, "on colors that are coded by codebooks"),
+            (Some(_), true) => self.given.none_of(&OF_CODEBOOKS, "without codebooks, which --codebooks adds"),
+        }
+    }
+
     /// Draws the views to compare with, of the original scene; `None` if there are none.
     fn originals(&self, scene: &RuntimeScene, progress: &mut Bars) -> Result<Option<Originals>, Failure> {
         if self.verify == 0 || scene.is_empty() {
@@ -202,6 +245,6 @@ impl Compress {
         let shots = self.views.shots(scene, self.verify)?;
         let step = shots.len().div_ceil(self.verify).max(1);
         let views = shots.iter().step_by(step).map(|shot| shot.view(scene)).collect();
-        Ok(Some(Originals::draw(&mut self.engine.open()?, scene, views, progress)?))
+        Ok(Some(Originals::draw(&mut self.engine.open(&self.given, &[])?, scene, views, progress)?))
     }
 }

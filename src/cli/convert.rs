@@ -1,9 +1,9 @@
 //! `gs4d convert IN OUT`: converts a checkpoint or a package to a package.
 //!
-//! In: a scene, a target form, color degrees. Out: a package, the training and playback settings in it, sizes before
-//! and after.
+//! In: a scene, a target form, color degrees. Out: a package; a report of its training and playback settings and of the
+//! sizes before and after.
 
-use super::args::{CheckpointArgs, PackageArgs, file_size, values};
+use super::args::{CheckpointArgs, Given, PackageArgs, WITHOUT_TIME, file_size, values};
 use super::failure::Failure;
 use super::report::{Report, switches, switches_json};
 use super::table::{bytes, lines};
@@ -14,8 +14,8 @@ use std::path::PathBuf;
 
 /// Convert a checkpoint (.pth) or a package to a package (.gs4d).
 ///
-/// Nothing is lost unless --form runtime or a color degree asks for it. OUT is written beside its place and then renamed: an
-/// existing OUT is replaced by the whole new file or stays as it was. OUT must not be IN.
+/// The conversion is lossless, except with --form runtime or a lower color degree. The package is written to a temporary file beside
+/// OUT and renamed when it is complete: an existing OUT is replaced or stays unchanged. OUT must not be IN.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -23,18 +23,20 @@ Examples:
   gs4d convert chkpnt30000.pth small.gs4d --form runtime --sh-degree 0
   gs4d convert n3v/chkpnt30000.pth -o n3v.gs4d --time-interval 0,10 --trained-cameras intrinsics --duration 10")]
 pub struct Convert {
+    #[command(flatten)]
+    given: Given,
     /// The checkpoint or package to read.
     #[arg(value_name = "IN")]
     input: PathBuf,
     #[command(flatten)]
     package: PackageArgs,
-    /// Form of the Gaussians: trained (can be pruned and fine-tuned) or runtime (smaller, draws the same) [default: as in IN].
+    /// Form of the Gaussians: trained (can be pruned and fine-tuned) or runtime (smaller, same pictures) [default: as in IN].
     #[arg(long, value_name = "FORM", value_parser = values::one_of(&TargetForm::NAMES))]
     form: Option<TargetForm>,
-    /// Keep color up to this spatial degree, 0 to 3 [default: all].
+    /// Highest spatial degree of color that is kept, 0 to 3 [default: all].
     #[arg(long, value_name = "D", value_parser = clap::value_parser!(u32).range(0..=3))]
     sh_degree: Option<u32>,
-    /// Keep color up to this time degree, 0 to 2 [default: all].
+    /// Highest time degree of color that is kept, 0 to 2 [default: all].
     #[arg(long, value_name = "D", value_parser = clap::value_parser!(u32).range(0..=2))]
     sh_degree_t: Option<u32>,
     #[command(flatten)]
@@ -42,11 +44,14 @@ pub struct Convert {
 }
 
 impl Convert {
-    /// Converts and writes.
+    /// Converts the scene and writes it.
     ///
     /// # Errors
     /// The scene cannot be read or converted, or the package cannot be written.
     pub fn run(&self) -> Result<Report, Failure> {
+        if self.sh_degree.is_some_and(|degree| degree < 3) {
+            self.given.none_of(&["--sh-degree-t"], WITHOUT_TIME)?;
+        }
         let out = self.package.checked_out(Files::default().reads_scene(&self.input))?;
         let before = file_size(&self.input)?;
         let settings = ConvertSettings { form: self.form, sh_degree: self.sh_degree, sh_degree_t: self.sh_degree_t };

@@ -3,9 +3,8 @@
 //! In: a scene, a split with its images. Out: the metrics of every view and of all views, over the background of training and over a
 //! contrasting one; with `--out` a picture for each view: reference, render, amplified difference.
 
-use super::args::{CheckpointArgs, DesignArgs, EngineArgs, SplitArgs, values};
+use super::args::{CheckpointArgs, DesignArgs, EngineArgs, Given, SplitArgs, values};
 use super::failure::Failure;
-use super::interrupt;
 use super::progress::Bars;
 use super::report::{Report, switches_json};
 use super::table::{Table, lines};
@@ -13,6 +12,7 @@ use crate::offline::dataset::Split;
 use crate::offline::engine::Engine;
 use crate::offline::evaluation::{color_name, contrast, evaluate_scene, without_contrast};
 use crate::offline::files::Files;
+use crate::offline::memory_check::{BY_RESOLUTION, Pictures};
 use crate::offline::metrics::{Evaluation, ImageMetrics, MeanMetrics, MetricSet, ViewMetrics, side_by_side};
 use crate::offline::splits::{SPLIT_NAMES, split_name, subset};
 use crate::offline::{OfflineError, write_png};
@@ -40,6 +40,8 @@ of the mean PSNR. Where images have gaps, PSNR is measured over a second backgro
 --background) is dark, else black. A background hides fog of its own color, and games lay captures over scenes. MS-SSIM needs
 pictures of at least 176 pixels a side. FLIP is 0 for equal pictures, 1 at most, seen at 67 pixels per degree.")]
 pub struct Eval {
+    #[command(flatten)]
+    given: Given,
     /// The package or checkpoint.
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
@@ -61,7 +63,7 @@ pub struct Eval {
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// What differences are multiplied by in those pictures.
-    #[arg(long, value_name = "FACTOR", default_value = "5", value_parser = values::positive)]
+    #[arg(long, value_name = "FACTOR", default_value = "5", requires = "out", value_parser = values::positive)]
     gain: f32,
     #[command(flatten)]
     design: DesignArgs,
@@ -90,12 +92,16 @@ fn metric_set(list: &[Metric]) -> MetricSet {
     MetricSet { ssim: has(Metric::Ssim), ms_ssim: has(Metric::MsSsim), flip: has(Metric::Flip) }
 }
 
+/// The options of drawing that have an effect on a GPU alone.
+const OF_DRAWING: [&str; 1] = ["--renderer"];
+
 impl Eval {
     /// Draws, compares and tabulates.
     ///
     /// # Errors
     /// A scene or views that cannot be used, missing images, pictures that cannot be written, a failure of the engine.
     pub fn run(&self) -> Result<Report, Failure> {
+        self.engine.check(&self.given, &OF_DRAWING)?;
         let files = self.data.add_to(Files::default().reads_scene(&self.scene));
         if let Some(out) = &self.out {
             files.clone().writes_folder(out, []).check()?;
@@ -109,14 +115,15 @@ impl Eval {
         let mut dataset = self.data.open(self.split, &scene.trained_with, progress)?;
         dataset.views = subset(dataset.views, self.views);
         dataset.require_images()?;
+        let metrics = metric_set(&self.metrics);
+        let mut engine = self.engine.open(&self.given, &OF_DRAWING)?;
+        Pictures::evaluated(&dataset.views, metrics, self.out.is_some()).require(engine.headless(), BY_RESOLUTION)?;
         if let Some(out) = &self.out {
             let pictures = dataset.views.iter().map(|view| picture_of(out, &view.name));
             files.writes_folder(out, pictures).check()?;
             fs::create_dir_all(out).map_err(|error| Failure::at(out, &error))?;
         }
         let background = self.checkpoint.background.map_or(scene.trained_background(), Background::Color);
-        let metrics = metric_set(&self.metrics);
-        let mut engine = self.engine.open()?;
         if let Engine::Gpu(headless) = &mut engine {
             headless.set_design(self.design.renderer);
         }
@@ -125,7 +132,7 @@ impl Eval {
         let seen = |view: &ViewMetrics, reference: &Picture, render: &Picture| -> Result<(), OfflineError> {
             let Some(out) = &self.out else { return Ok(()) };
             let (path, picture) = (picture_of(out, &view.name), side_by_side(reference, render, self.gain));
-            Ok(interrupt::whole(|| write_png(&path, &picture))?)
+            Ok(write_png(&path, &picture)?)
         };
         let views = &dataset.views;
         let mut evaluation = evaluate_scene(&mut engine, &scene, views, background, metrics, progress, seen)?;

@@ -1,9 +1,10 @@
 //! Errors of verbs.
 //!
-//! In: any error, with the path of the file if the error does not contain it. Out: one line with the whole chain of
-//! causes, errors of the system in words.
+//! In: an error, with the path of the file if the error does not contain it. Out: one line with the error and all its causes. Common errors
+//! of the operating system are replaced by sentences.
 
 use super::system;
+use crate::offline::OfflineError;
 use std::any::Any;
 use std::error::Error;
 use std::path::Path;
@@ -35,7 +36,7 @@ impl Failure {
         Self::about(path, &chain(error))
     }
 
-    /// Returns a failure from what a panic left.
+    /// Returns a failure with the message of a panic.
     pub fn of_panic(panic: &(dyn Any + Send)) -> Self {
         let message = panic.downcast_ref::<String>().map(String::as_str);
         let message = message.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("a panic");
@@ -47,7 +48,13 @@ impl Failure {
         &self.message
     }
 
-    /// Returns whether nothing is to be said about it: the program that reads what is written has ended before, as `head` does.
+    /// Returns whether the work has ended because the user asked for it.
+    pub fn is_interruption(&self) -> bool {
+        let interrupted = OfflineError::Interrupted { tuned: None }.to_string();
+        self.message.rsplit(": ").next() == Some(interrupted.as_str())
+    }
+
+    /// Returns whether no message is printed: the program that reads the output (such as `head`) has ended.
     pub fn is_silent(&self) -> bool {
         self.silent
     }
@@ -59,7 +66,7 @@ impl<E: Error> From<E> for Failure {
     }
 }
 
-/// Returns the messages of an error and of its causes, without causes that are part of the message already.
+/// Returns the messages of an error and of its causes. A cause whose message is already part of the text is left out.
 fn chain(error: &dyn Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();

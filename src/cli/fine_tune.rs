@@ -1,31 +1,34 @@
-//! `gs4d finetune SCENE --data DIR -o OUT`: trains a scene, so that it makes up for what was pruned.
+//! `gs4d finetune SCENE --data DIR -o OUT`: trains a scene, to recover the quality that was lost by pruning.
 //!
-//! In: a scene in the trained form, training views with their images. Out: a package in the trained form, and how its quality developed.
+//! In: a scene in the trained form, training views with their images. Out: a package in the trained form, or in the packed form with
+//! `--compress`, and its quality before, during and after training.
 
-use super::args::{CheckpointArgs, PackageArgs, RendererArgs, SplitArgs, ValidationArgs, values};
+use super::args::{CheckpointArgs, Given, PackageArgs, RendererArgs, SplitArgs, ValidationArgs, values};
 use super::failure::Failure;
 use super::interrupt;
 use super::progress::Bars;
 use super::report::Report;
 use super::table::{Table, bytes, lines};
 use crate::gaussian::GradientMode;
-use crate::offline::belonging::require_belonging;
-use crate::offline::engine::{AdapterDescription, Engine};
+use crate::offline::belonging::require_belonging_on_gpu;
+use crate::offline::dataset::Validation;
+use crate::offline::engine::AdapterDescription;
 use crate::offline::files::Files;
 use crate::offline::fine_tune::{
     Behind, CurvePoint, FineTuneSettings, FineTuned, GradientSums, Rates, Resume, Terms, TrainingImages, fine_tune,
 };
-use crate::offline::quantize::Quality;
+use crate::offline::quantize::{CompressSettings, Quality};
 use crate::offline::store::{Key, Store};
+use crate::offline::temporal_filter::needs_views;
 use crate::offline::{OfflineError, trained_pixel};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Train a scene on its views, so that it makes up for what was pruned.
+/// Train a scene on its views, to recover the quality that was lost by pruning.
 ///
-/// The number of Gaussians stays. The step with the best PSNR on the validation views is kept; with --validation none, the last. A run that was
-/// killed resumes from OUT.tune/ and ends at the same bytes. Ctrl-C ends the run and writes the best parameters so far; pressed again it stops
-/// at once.
+/// The number of Gaussians does not change. The result has the parameters of the step with the best PSNR on the validation views; with
+/// --validation none, those of the last step. A killed run resumes from OUT.tune/ and writes the same bytes as an uninterrupted one. Ctrl-C
+/// ends the run and writes the best parameters so far, without compression; a second Ctrl-C ends it immediately.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -33,10 +36,12 @@ Examples:
   gs4d finetune pruned.gs4d --data data/toybox -o tuned.gs4d
   gs4d finetune pruned.gs4d --data data/standup --resolution 2 --steps 10000 --batch 4 -o tuned.gs4d
 
-What a temporal filter of the scene leaves out is not drawn in training either, and the filter is computed again now and then: gs4d mask
-before gs4d finetune trains with it. One of the kind support changes no picture; it is computed again afterwards.")]
+A temporal filter of the scene (gs4d mask) is used in training: Gaussians that it leaves out at a time are not drawn at that time. The filter
+is computed again every --refresh-filter steps. A support filter changes no picture; it is computed again after training.")]
 pub struct FineTune {
-    /// The checkpoint, or a package of it in the trained form.
+    #[command(flatten)]
+    given: Given,
+    /// The checkpoint, or a package in the trained form.
     #[arg(value_name = "SCENE")]
     input: PathBuf,
     #[command(flatten)]
@@ -45,16 +50,16 @@ pub struct FineTune {
     data: SplitArgs,
     #[command(flatten)]
     validation: ValidationArgs,
-    /// Number of steps.
+    /// Number of training steps.
     #[arg(long, value_name = "N", default_value = "5000", value_parser = values::count(100_000_000))]
     steps: usize,
     /// Views of each step.
     #[arg(long, value_name = "N", default_value = "2", value_parser = values::count(1000))]
     batch: usize,
-    /// Rates of the optimizer: ours, or those with which the original ends its training.
+    /// Learning rates: ours, or original, which are those at the end of the original's training.
     #[arg(long, value_name = "RATES", default_value = "ours", value_parser = values::one_of(&RATES))]
     rates: Rates,
-    /// Factor that the rates fall to; 1 keeps them as they are.
+    /// Factor on the rates at the last step. The factor falls from 1; 1 keeps the rates constant.
     #[arg(long, value_name = "FACTOR", default_value = "0.2", value_parser = values::share)]
     last_rate: f64,
     /// Factor on the rates of the means.
@@ -63,54 +68,54 @@ pub struct FineTune {
     /// Weight of SSIM in the loss, 0 to 1; the rest is L1.
     #[arg(long, value_name = "WEIGHT", default_value = "0.1", value_parser = values::share)]
     similarity: f64,
-    /// Weight of opacity where images cover nothing, in the loss: the original's opacity mask.
+    /// Weight, in the loss, of opacity where images have none: the original's opacity mask.
     #[arg(long, help_heading = "Experimental", value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
     mask_weight: f64,
-    /// Weight of motion: the mean length of 0.1 times the velocity, in the loss.
+    /// Weight, in the loss, of motion: the mean length of 0.1 times the velocity.
     #[arg(long, help_heading = "Experimental", value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
     motion_weight: f64,
-    /// Weight of motion unlike that of the 20 nearest Gaussians, in the loss: the original's rigid term.
+    /// Weight, in the loss, of motion that differs from that of the 20 nearest Gaussians: the original's rigid term.
     #[arg(long, help_heading = "Experimental", value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
     rigid_weight: f64,
-    /// Weight of the mean opacity, in the loss: what is not needed fades, so that more can be pruned.
+    /// Weight, in the loss, of the mean opacity. Unneeded Gaussians fade, so that more can be pruned.
     #[arg(long, help_heading = "Experimental", value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
     opacity_weight: f64,
-    /// In each step leave Gaussians as they are, with what the optimizer knows of them, that none of its views shows.
+    /// Do not change Gaussians, and their state in the optimizer, in steps whose views do not show them.
     #[arg(long, help_heading = "Experimental")]
     sparse: bool,
-    /// What is behind images that do not cover all pixels: a random color for each view, or that of training.
+    /// Background of images with transparent pixels: random, a random color for each view, or fixed, the background of training.
     #[arg(long, value_name = "WHAT", default_value = "random", value_parser = values::one_of(&BEHIND))]
     behind: Behind,
     /// Steps between two evaluations on the validation views.
     #[arg(long, value_name = "N", default_value = "500", value_parser = values::count(1_000_000))]
     evaluate_every: usize,
-    /// Steps after which a temporal filter of the kind key-frame or interval is computed again.
+    /// Steps between two computations of a key-frame or interval filter.
     #[arg(long, value_name = "N", default_value = "1000", value_parser = values::count(100_000_000))]
     refresh_filter: usize,
-    /// End after this many evaluations without an improvement.
+    /// End after this number of evaluations without an improvement [default: make all steps].
     #[arg(long, value_name = "N", value_parser = values::count(1_000_000))]
     patience: Option<usize>,
-    /// Steps between two states on disk; rounded up to an evaluation.
+    /// Steps between two saved states, rounded up to the next evaluation.
     #[arg(long, value_name = "N", default_value = "500", value_parser = values::count(1_000_000))]
     save_every: usize,
     /// Seed of the order of views and of random backgrounds.
     #[arg(long, value_name = "N", default_value = "0")]
     seed: u64,
-    /// Gradients: exact, or compat: as the original computes them, with its deviations.
+    /// Gradients: exact, or compat, which are those of the original with its deviations.
     #[arg(long, value_name = "MODE", default_value = "exact", value_parser = values::one_of(&MODES))]
     gradients: GradientMode,
-    /// Sum gradients in a fixed order, the same in every run, or by atomic additions, which differ by rounding and need an adapter with
-    /// float atomics.
+    /// Sums of gradients: deterministic, in a fixed order with the same result in every run, or atomic, which differ by rounding and need an
+    /// adapter with float atomics.
     #[arg(long, help_heading = "Experimental", value_name = "HOW", default_value = "deterministic", value_parser = values::one_of(&GradientSums::NAMES))]
     sums: GradientSums,
-    /// Compress the result: code its colors by codebooks, whose sizes follow the number of Gaussians, and train these as well. The package
-    /// is as that of `gs4d compress`, and loses less.
+    /// Compress the result as `gs4d compress` does, with less loss: the codebooks of color are trained too, and their sizes follow the number
+    /// of Gaussians. visually-lossless and lossless have no codebooks.
     #[arg(long, value_name = "QUALITY", value_parser = values::one_of(&Quality::NAMES))]
     compress: Option<Quality>,
-    /// Train codebooks on pictures of geometry as the package will hold it. It pays where geometry has few bits, fewer than `small` has.
+    /// Train codebooks on pictures of the rounded geometry of the package. Useful only if geometry has fewer bits than with `small`.
     #[arg(long, help_heading = "Experimental", requires = "compress")]
     round_geometry: bool,
-    /// Steps in which codebooks are trained, after the others.
+    /// Steps that train codebooks, after the other steps.
     #[arg(long, value_name = "N", default_value = "2000", requires = "compress", value_parser = values::count(1_000_000))]
     compress_steps: usize,
     #[command(flatten)]
@@ -124,14 +129,19 @@ const BEHIND: [(&str, Behind); 2] = [("random", Behind::Random), ("fixed", Behin
 const MODES: [(&str, GradientMode); 2] = [("exact", GradientMode::Exact), ("compat", GradientMode::Compat)];
 
 impl FineTune {
-    /// Trains and writes.
+    /// Trains the scene and writes it.
     ///
     /// # Errors
     /// A scene or views that cannot be used, a package that cannot be written, a failure of the GPU.
     pub fn run(&self) -> Result<Report, Failure> {
-        let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
+        self.check_options()?;
+        let out = self.package.checked_file(self.data.add_to(Files::default().reads_scene(&self.input)))?;
         let store = Store::beside(out, ".tune")?;
         let mut scene = self.checkpoint.load_to_change(&self.input)?;
+        if !scene.filter.as_ref().is_some_and(|filter| needs_views(filter.kind)) {
+            let reason = "on a scene without a temporal filter of the kind key-frame or interval";
+            self.given.none_of(&["--refresh-filter"], reason)?;
+        }
         if let Some(background) = self.checkpoint.background {
             scene.trained_with.background = background;
         }
@@ -140,12 +150,12 @@ impl FineTune {
         scene.trained_with.validation = Some(splits.to_string());
         let views = splits.all_training(&scene.trained_with, progress)?;
         scene.trained_with.pixel = trained_pixel(&scene, &views).or(scene.trained_with.pixel);
-        let mut engine = Engine::Gpu(Box::new(self.renderer.open()?));
+        let mut headless = self.renderer.open()?;
+        TrainingImages::require_room(&splits.train, &splits.validation, &headless)?;
         if !self.validation.trust_images {
             let runtime = scene.clone().into_runtime()?;
-            require_belonging(&mut engine, &runtime, &views, runtime.trained_background())?;
+            require_belonging_on_gpu(&mut headless, &runtime, &views, runtime.trained_background())?;
         }
-        let Engine::Gpu(mut headless) = engine else { return Err(OfflineError::NotTrained.into()) };
         let images = TrainingImages::load(splits.train.clone(), &splits.validation, &scene.trained_with, progress)?;
         let key = Key::of_files(&[&self.input])?
             .with(Key::of_images(&splits.train)?)
@@ -165,33 +175,35 @@ impl FineTune {
             store.remove()?;
         }
         let FineTuned { curve, best, steps_per_second, validation, faults, .. } = &tuned;
-        // Compression changes the picture: the last point is that of the package.
+        // The last point of a compressed result is measured on the package.
         let compressed = self.compress.and_then(|_| curve.last()).filter(|_| !interrupted);
-        let found = compressed.unwrap_or(best);
+        let written = compressed.unwrap_or(best);
         let before = curve.first().and_then(|point| point.psnr);
-        let decibels = |psnr: Option<f64>| psnr.map_or("not measured".to_owned(), |psnr| format!("{psnr:.3} dB"));
-        let speed = steps_per_second.map_or("-".to_owned(), |speed| format!("{speed:.1}"));
-        let mut pairs = vec![
-            ("fine-tuned", format!("{gaussians} Gaussians on {} views, {speed} steps a second", images.len())),
-            ("views", splits.to_string()),
-            (
-                "PSNR",
+        let quality = match (before, best.psnr) {
+            (Some(before), Some(trained)) => {
+                let package = compressed.and_then(|point| point.psnr);
+                let package = package.map_or(String::new(), |psnr| format!("{psnr:.3} dB compressed, "));
+                let step = best.step;
                 format!(
-                    "{} at step {}{}, before {} ({validation} validation views)",
-                    decibels(found.psnr),
-                    found.step,
-                    if compressed.is_some() { ", compressed" } else { "" },
-                    decibels(before)
-                ),
-            ),
-            ("wrote", format!("{}, {}", out.display(), bytes(size))),
+                    "{package}{trained:.3} dB at step {step}, {before:.3} dB before ({validation} validation views)"
+                )
+            }
+            _ => "not measured, no validation views".to_owned(),
+        };
+        let form = if compressed.is_some() { ", compressed" } else { "" };
+        let speed = steps_per_second.map_or(String::new(), |speed| format!(", {speed:.1} steps per second"));
+        let mut pairs = vec![
+            ("fine-tuned", format!("{gaussians} Gaussians on {} views{speed}", images.len())),
+            ("views", splits.to_string()),
+            ("PSNR", quality),
+            ("wrote", format!("{}, {}{form}", out.display(), bytes(size))),
         ];
         if interrupted {
             let form = if self.compress.is_some() { ", not compressed" } else { "" };
-            pairs.push(("interrupted", format!("wrote the best so far{form}; the same command resumes")));
+            pairs.push(("interrupted", format!("wrote the best parameters so far{form}; the same command resumes")));
         }
         if let Some(faults) = faults {
-            pairs.push(("left out", format!("{} gradients that were not finite", faults.count)));
+            pairs.push(("left out", format!("{} gradients that are not finite", faults.count)));
         }
         let json = json!({
             "in": self.input.display().to_string(),
@@ -203,7 +215,7 @@ impl FineTune {
             "split": splits.to_string(),
             "psnr_before": before,
             "best": best,
-            "psnr": found.psnr,
+            "psnr": written.psnr,
             "compressed": compressed.is_some(),
             "curve": curve,
             "steps_per_second": steps_per_second,
@@ -211,9 +223,23 @@ impl FineTune {
             "gradients_left_out": faults.map_or(0, |faults| faults.count),
             "adapter": AdapterDescription::of(&headless),
         });
-        let mut report = Report::new(json, format!("{}\n{}", lines(&pairs), curve_table(curve)));
+        let mut report = Report::new(json, format!("{}\n{}", lines(&pairs), curve_table(curve, compressed.is_some())));
         report.interrupted = interrupted;
         Ok(report)
+    }
+
+    /// Checks that every option has an effect.
+    fn check_options(&self) -> Result<(), Failure> {
+        if self.validation.validation == Validation::None {
+            self.given.none_of(&["--patience"], "with --validation none: no evaluation is compared with another")?;
+        }
+        match self.compress {
+            Some(quality) if CompressSettings::from(quality).codebooks.is_empty() => {
+                let reason = "with a quality without codebooks: --compress small and balanced have some";
+                self.given.none_of(&["--compress-steps", "--round-geometry"], reason)
+            }
+            _ => Ok(()),
+        }
     }
 
     fn settings(&self) -> FineTuneSettings {
@@ -244,11 +270,15 @@ impl FineTune {
     }
 }
 
-fn curve_table(curve: &[CurvePoint]) -> String {
+/// Returns the points of the curve as a table; a value that was not measured is "-". If the result is compressed, the last point is that of the
+/// package.
+fn curve_table(curve: &[CurvePoint], compressed: bool) -> String {
     let mut table = Table::new(&["step", "loss", "training dB", "validation dB"]);
     let number = |value: Option<f64>, digits| value.map_or("-".to_owned(), |value| format!("{value:.digits$}"));
-    for CurvePoint { step, loss, training_psnr, psnr } in curve {
-        table.row([step.to_string(), number(*loss, 5), number(*training_psnr, 2), number(*psnr, 3)]);
+    for (index, CurvePoint { step, loss, training_psnr, psnr }) in curve.iter().enumerate() {
+        let is_package = compressed && index + 1 == curve.len();
+        let step = if is_package { "compressed".to_owned() } else { step.to_string() };
+        table.row([step, number(*loss, 5), number(*training_psnr, 2), number(*psnr, 3)]);
     }
     table.to_string()
 }

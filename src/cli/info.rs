@@ -1,6 +1,6 @@
 //! `gs4d info FILE`: shows the contents of a checkpoint or a package.
 //!
-//! In: a file. Out: its properties, its bounds, and for packages every section and whether its checksum is right.
+//! In: a file. Out: its properties, its bounds, and for packages the sections and whether their checksums are correct.
 
 use super::args::{CheckpointArgs, file_size};
 use super::failure::Failure;
@@ -21,9 +21,9 @@ use std::collections::HashMap;
 use std::fmt;
 use std::path::PathBuf;
 
-/// Show what a checkpoint (.pth) or package (.gs4d) holds, and verify every checksum of a package.
+/// Show the contents of a checkpoint (.pth) or a package (.gs4d), and verify all checksums of a package.
 ///
-/// Exit code 2 if a checksum does not hold or a Gaussian cannot be drawn.
+/// The exit code is 2 if a checksum is wrong or a Gaussian cannot be drawn.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -43,7 +43,7 @@ struct Facts {
     form: &'static str,
     model: Option<Model>,
     color: ColorDegrees,
-    /// Entries of each codebook of color; `None` if the coefficients are whole.
+    /// Number of entries of each color codebook; `None` if coefficients are not coded.
     codebooks: Option<Vec<u32>>,
     environment: Option<[u32; 2]>,
     trained_with: TrainedWith,
@@ -54,17 +54,17 @@ struct Facts {
 /// A level of detail, without its Gaussians.
 #[derive(Serialize)]
 struct LevelFacts {
-    /// The largest size on the screen at which it is drawn.
+    /// The largest size on the screen at which it is drawn, pixels.
     pixels: f32,
-    /// How many it has; `None` if the package is damaged.
+    /// Number of Gaussians; `None` if the package is damaged.
     gaussians: Option<usize>,
 }
 
-/// The bounds of the Gaussians.
+/// Bounds of the Gaussians, capture units.
 struct Extent {
-    /// Of all of them, over the whole time interval.
+    /// Bounds of all Gaussians over the whole time interval.
     all: Bounds,
-    /// Of the core ([`Bounds::core`]).
+    /// Bounds of the core ([`Bounds::core`]).
     core: Bounds,
 }
 
@@ -72,7 +72,7 @@ impl Info {
     /// Reads the file and describes it.
     ///
     /// # Errors
-    /// The file cannot be read. Damaged sections and Gaussians that cannot be drawn are a report with a failure.
+    /// The file cannot be read. If sections are damaged or a Gaussian cannot be drawn, the result is a report with a failure.
     pub fn run(&self) -> Result<Report, Failure> {
         let size = file_size(&self.file)?;
         let (format, package) = codec::inspect(&self.file)?;
@@ -245,7 +245,7 @@ fn section_table(info: &PackageInfo) -> Table {
         let all = &mut rows[place].1;
         all.parts += 1;
         all.bytes += section.length as u64;
-        // Sections of unknown names may claim any number.
+        // Sections with unknown names may have any number.
         all.unpacked = all.unpacked.saturating_add(section.raw_length as u64);
         all.damaged += usize::from(info.damaged.binary_search(&index).is_ok());
     }

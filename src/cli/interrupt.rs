@@ -1,45 +1,151 @@
-//! Ctrl-C: exits at once with code 130, but never in the middle of a file; work that can end early is asked to do so first.
+//! How a signal ends the command: INT, TERM and HUP; on systems without them Ctrl-C.
 //!
-//! In: the closures that write files, the work that can end early. Out: files that are whole or absent. Files are written under a temporary
-//! name and renamed; the handler waits until those being written are complete, so that no temporary file is left behind.
+//! In: signals. Out: work that is asked to end ([`is_asked`]), and the end of the process with code 128 + signal: 130 after INT, 143 after
+//! TERM. Work that does not end in time is left where it is, as is all work after a second signal: unfinished files are removed
+//! ([`unfinished`]), and the process ends without its exit handlers, which would run under the threads of the GPU driver.
 
 use super::note::note;
-use std::process::ExitCode;
-use std::sync::RwLock;
-use std::sync::atomic::{AtomicBool, Ordering};
+use super::report::Report;
+use crate::offline::unfinished;
+use std::io;
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
+use std::sync::mpsc;
+use std::thread;
+use std::time::{Duration, Instant};
 
-/// The exit code of an interrupted command.
-const INTERRUPTED: u8 = 130;
+/// Time in which work may end, or a pipe be read.
+const PATIENCE: Duration = Duration::from_millis(300);
+/// Time in which the report of a process that leaves may be read.
+const READING: Duration = Duration::from_secs(1);
+/// Time between two looks at the work.
+const LOOK: Duration = Duration::from_millis(5);
 
-/// Locked for reading while a file is written, and for writing by the handler.
-static WRITING: RwLock<()> = RwLock::new(());
-
-/// Whether the work that runs can end early, and whether it has been asked to.
+/// The first signal; 0 before it.
+static SIGNAL: AtomicI32 = AtomicI32::new(0);
+/// Whether the work that runs ends with a result, for which the process waits.
 static DEFERS: AtomicBool = AtomicBool::new(false);
-static ASKED: AtomicBool = AtomicBool::new(false);
+/// Whether reports are JSON documents.
+static AS_JSON: AtomicBool = AtomicBool::new(false);
+/// Whether the report of the command is being printed, or has been.
+static REPORTED: AtomicBool = AtomicBool::new(false);
+/// Whether the command has ended: only the exit handlers are left to run.
+static ENDED: AtomicBool = AtomicBool::new(false);
 
-/// Sets the handler of SIGINT, SIGTERM and SIGHUP.
+/// Sets the handler of signals.
 ///
 /// # Errors
 /// The operating system refuses it.
-pub fn install() -> Result<(), ctrlc::Error> {
-    ctrlc::set_handler(|| {
-        if DEFERS.load(Ordering::SeqCst) && !ASKED.swap(true, Ordering::SeqCst) {
-            note("interrupted: what there is so far is written; press Ctrl-C again to stop at once");
-            return;
+pub fn install(as_json: bool) -> io::Result<()> {
+    AS_JSON.store(as_json, Ordering::SeqCst);
+    unfinished::keep();
+    listen()
+}
+
+#[cfg(unix)]
+fn listen() -> io::Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    use signal_hook::iterator::Signals;
+    let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
+    thread::Builder::new().name("signals".to_owned()).spawn(move || signals.forever().for_each(on_signal))?;
+    Ok(())
+}
+
+#[cfg(not(unix))]
+fn listen() -> io::Result<()> {
+    /// Number of the signal that Ctrl-C is on other systems.
+    const SIGINT: i32 = 2;
+    ctrlc::set_handler(|| on_signal(SIGINT)).map_err(io::Error::other)
+}
+
+/// Asks the work to end; a second signal ends the process.
+fn on_signal(signal: i32) {
+    let is_first = SIGNAL.compare_exchange(0, signal, Ordering::SeqCst, Ordering::SeqCst).is_ok();
+    // On a thread of its own, so that a second signal is noticed at any time.
+    if !is_first || thread::Builder::new().spawn(move || wait(signal)).is_err() {
+        leave(signal);
+    }
+}
+
+/// Waits until the work has ended, which ends the process. Leaves if that takes too long.
+fn wait(signal: i32) {
+    if DEFERS.load(Ordering::SeqCst) {
+        briefly(|| note("interrupted: what there is so far is written; press Ctrl-C again to stop at once"));
+    }
+    let (mut before, mut since) = (doing(), Instant::now());
+    loop {
+        let now = doing();
+        if now != before {
+            (before, since) = (now, Instant::now());
         }
-        let _all_files_whole = WRITING.write();
-        std::process::exit(INTERRUPTED.into());
-    })
+        let is_limited = matches!(now, Doing::Work | Doing::Stream | Doing::Report);
+        if is_limited && since.elapsed() >= PATIENCE {
+            leave(signal);
+        }
+        thread::sleep(LOOK);
+    }
 }
 
-/// Runs a closure that writes a file; the handler waits for its end.
-pub fn whole<T>(write: impl FnOnce() -> T) -> T {
-    let _writing = WRITING.read();
-    write()
+/// What the command does at present. The process waits as long as it takes for [`Doing::Result`] and [`Doing::Exit`] alone.
+#[derive(Clone, Copy, PartialEq)]
+enum Doing {
+    /// Work that is asked to end.
+    Work,
+    /// Work that ends with a result.
+    Result,
+    /// Writing to a device or a pipe, whose reader may keep it waiting without end.
+    Stream,
+    /// Printing the report, to such a device or pipe.
+    Report,
+    /// Running the exit handlers.
+    Exit,
 }
 
-/// While this lives, the first Ctrl-C only asks the work to end early.
+fn doing() -> Doing {
+    let is = |state: &AtomicBool| state.load(Ordering::SeqCst);
+    match () {
+        () if is(&ENDED) => Doing::Exit,
+        () if is(&REPORTED) => Doing::Report,
+        () if unfinished::is_streaming() => Doing::Stream,
+        () if is(&DEFERS) => Doing::Result,
+        () => Doing::Work,
+    }
+}
+
+/// Removes unfinished files, prints a report if none has been printed, and ends the process.
+fn leave(signal: i32) -> ! {
+    let existing = unfinished::abandon(PATIENCE).unwrap_or_default();
+    if !REPORTED.swap(true, Ordering::SeqCst) {
+        // If it cannot be printed, the exit code still says how the command has ended.
+        briefly(move || drop(Report::of_interruption(&existing).print(AS_JSON.load(Ordering::SeqCst))));
+    }
+    exit(signal)
+}
+
+/// Calls a function that prints on another thread, and does not wait long for it: a full pipe may have no reader.
+fn briefly(print: impl FnOnce() + Send + 'static) {
+    let (sender, printed) = mpsc::channel();
+    let printing = thread::Builder::new().spawn(move || {
+        print();
+        sender.send(())
+    });
+    if printing.is_ok() {
+        let _ = printed.recv_timeout(READING);
+    }
+}
+
+/// Ends the process without exit handlers.
+#[cfg(unix)]
+fn exit(signal: i32) -> ! {
+    signal_hook::low_level::exit(128 + signal)
+}
+
+/// Ends the process. The system ends all threads before exit handlers run.
+#[cfg(not(unix))]
+fn exit(signal: i32) -> ! {
+    std::process::exit(128 + signal)
+}
+
+/// While this lives, the first signal only asks the work to end early.
 pub struct Deferred(());
 
 impl Drop for Deferred {
@@ -48,7 +154,7 @@ impl Drop for Deferred {
     }
 }
 
-/// Begins work that looks at [`is_asked`] now and then.
+/// Begins work that looks at [`is_asked`] now and then, and ends with a result.
 pub fn defer() -> Deferred {
     DEFERS.store(true, Ordering::SeqCst);
     Deferred(())
@@ -56,10 +162,22 @@ pub fn defer() -> Deferred {
 
 /// Returns whether the work is asked to end early.
 pub fn is_asked() -> bool {
-    ASKED.load(Ordering::SeqCst)
+    SIGNAL.load(Ordering::SeqCst) != 0
 }
 
-/// Returns the exit code of a command that has ended early.
-pub fn exit_code() -> ExitCode {
-    ExitCode::from(INTERRUPTED)
+/// Begins to print the report of the command. Does not return if the process is leaving, which prints its own.
+pub fn begin_report() {
+    while REPORTED.swap(true, Ordering::SeqCst) {
+        thread::park();
+    }
+}
+
+/// Ends the handling of the first signal: the report has been printed, and its exit code is that of the process.
+pub fn end_report() {
+    ENDED.store(true, Ordering::SeqCst);
+}
+
+/// Ends a process whose work has ended because of a signal.
+pub fn end() -> ! {
+    exit(SIGNAL.load(Ordering::SeqCst))
 }

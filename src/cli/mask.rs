@@ -1,9 +1,9 @@
 //! `gs4d mask IN -o OUT`: adds a temporal filter to a scene.
 //!
-//! In: a scene, a number of key-frames, training views if the filter needs them. Out: a package with the filter, and
-//! the share of active Gaussians.
+//! In: a scene, a number of key-frames, training views if the filter needs them. Out: a package with the filter, and a
+//! report with the share of active Gaussians.
 
-use super::args::{CheckpointArgs, DataArgs, EngineArgs, PackageArgs, values};
+use super::args::{CheckpointArgs, DataArgs, EngineArgs, Given, PackageArgs, values};
 use super::failure::Failure;
 use super::progress::Bars;
 use super::report::Report;
@@ -16,7 +16,7 @@ use crate::scene::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Tell a scene which of its Gaussians are active when, so that drawing can skip the others.
+/// Add a temporal filter: the Gaussians that are active in each segment of time. Drawing skips the other Gaussians.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -25,23 +25,26 @@ Examples:
   gs4d mask n3v.pth --filter key-frame --data data/n3v --every 20 -o filtered.gs4d
 
 Filters:
-  support    active wherever its opacity can show; changes no pixel and needs no views
-  interval   support, narrowed to what some training view between two key-frames, or any camera at them, sees
-  key-frame  the paper's: what any camera sees at the two key-frames around; loses what comes and goes between them")]
+  support    Gaussians whose opacity can be visible in the segment. Changes no pixel and needs no views.
+  interval   Gaussians of support that a training view in the segment, or a camera at its two key-frames, sees.
+  key-frame  Gaussians that a camera sees at the two key-frames of the segment, as in the paper. Loses Gaussians that appear
+             and disappear between them.")]
 pub struct Mask {
-    /// The checkpoint or package to filter. A filter that it has is replaced.
+    #[command(flatten)]
+    given: Given,
+    /// The checkpoint or package to filter. Its filter is replaced.
     #[arg(value_name = "IN")]
     input: PathBuf,
     #[command(flatten)]
     package: PackageArgs,
-    /// Which filter.
+    /// Kind of filter.
     #[arg(long, value_name = "FILTER", default_value = "support", value_parser = values::one_of(&FILTER_NAMES))]
     filter: FilterKind,
-    /// Number of key-frames, evenly over the time interval, both ends included [default: 11].
+    /// Number of key-frames, evenly spaced over the time interval including both ends [default: 11].
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(2..=i64::from(MAX_SEGMENTS) + 1))]
     key_frames: Option<u32>,
-    /// A key-frame every so many of the training data's timestamps, instead.
-    #[arg(long, value_name = "FRAMES", conflicts_with = "key_frames", value_parser = values::count(1_000_000))]
+    /// Number of timestamps of the training data between two key-frames, in place of --key-frames.
+    #[arg(long, value_name = "FRAMES", conflicts_with = "key_frames", requires = "data", value_parser = values::count(1_000_000))]
     every: Option<usize>,
     #[command(flatten)]
     data: DataArgs,
@@ -52,12 +55,13 @@ pub struct Mask {
 }
 
 impl Mask {
-    /// Computes the filter and writes the scene with it.
+    /// Computes the filter and writes the scene with the filter.
     ///
     /// # Errors
     /// A scene or views that cannot be used, too many key-frames, a package that cannot be written, a failure of the
     /// engine.
     pub fn run(&self) -> Result<Report, Failure> {
+        self.check_options()?;
         let out = self.package.checked_out(self.data.add_to(Files::default().reads_scene(&self.input)))?;
         let mut scene = self.checkpoint.load_to_change(&self.input)?;
         scene.filter = None;
@@ -68,7 +72,7 @@ impl Mask {
             Vec::new()
         };
         let keys = self.keys(&views)?;
-        let mut engine = if by_views { self.engine.open()? } else { Engine::Cpu };
+        let mut engine = if by_views { self.engine.open(&self.given, &[])? } else { Engine::Cpu };
         let filter = filter(&mut engine, &scene, self.filter, keys, &views, &mut Bars::default());
         let filter = filter.map_err(|error| Failure::at(&self.input, &error))?;
         let (share, overlap) = (filter.active_share(), neighbor_overlap(&filter));
@@ -82,7 +86,7 @@ impl Mask {
         let text = lines(&[
             ("filter", format!("{name}, {keys} key-frames, {segments} segments")),
             ("active", format!("{:.1} % of {count} Gaussians, mean over segments", share * 100.0)),
-            ("overlap", format!("{mean:.3} (IoU of neighboring segments; {least:.3} at least)")),
+            ("overlap", format!("{mean:.3} (mean IoU of neighboring segments; lowest {least:.3})")),
             ("size", format!("{} as {form}, before compression", bytes(size))),
             ("wrote", format!("{}, {}", out.display(), bytes(written))),
         ]);
@@ -102,10 +106,27 @@ impl Mask {
         Ok(Report::new(json, text))
     }
 
+    /// Checks that every option has an effect.
+    fn check_options(&self) -> Result<(), Failure> {
+        self.engine.check(&self.given, &[])?;
+        if needs_views(self.filter) {
+            return Ok(());
+        }
+        let name = filter_name(self.filter);
+        let drawn = ["--size", "--resolution", "--engine", "--adapter", "--checks"];
+        self.given.none_of(&drawn, &format!("with --filter {name}: no view is drawn"))?;
+        match self.every {
+            Some(_) => Ok(()),
+            None => self.given.none_of(&["--data"], &format!("with --filter {name} unless --every is given")),
+        }
+    }
+
+    /// Returns the number of key-frames.
     fn keys(&self, views: &[TrainingView]) -> Result<u32, Failure> {
         let keys = values::key_frames(self.key_frames, self.every).count(views);
         let fits = u32::try_from(keys).ok().filter(|keys| *keys <= MAX_SEGMENTS + 1);
-        fits.ok_or_else(|| Failure::new(format!("{keys} key-frames are too many: raise --every")))
+        let most = MAX_SEGMENTS + 1;
+        fits.ok_or_else(|| Failure::new(format!("{keys} key-frames are more than {most}: use a larger --every")))
     }
 }
 

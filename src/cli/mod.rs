@@ -4,7 +4,7 @@
 //! verbs share.
 //!
 //! In: the command line. Out: one report on standard output (text, or one JSON document with `--json`); progress, notes
-//! and errors on standard error; exit code 0, 2 for any failure, 101 for a panic, 130 when interrupted.
+//! and errors on standard error; exit code 0, 2 for any failure, 101 for a panic, 128 + signal when interrupted (130 INT, 143 TERM).
 
 mod ablate;
 mod args;
@@ -32,6 +32,7 @@ mod system;
 mod table;
 mod usage;
 
+use crate::offline::unfinished;
 use clap::{Parser, Subcommand};
 use failure::Failure;
 use report::Report;
@@ -60,7 +61,7 @@ Examples:
   gs4d convert chkpnt30000.pth capture.gs4d --form runtime
   gs4d render capture.gs4d --orbit 60 --out frames
 
-Every verb explains itself: gs4d VERB --help. Exit codes: 0 done, 2 failed, 130 interrupted.";
+Every verb explains itself: gs4d VERB --help. Exit codes: 0 done, 2 failed, 130 interrupted, 143 terminated.";
 
 #[derive(Subcommand)]
 enum Verb {
@@ -111,9 +112,15 @@ pub fn run() -> ExitCode {
         Err(code) => return code,
     };
     note::silence_progress(cli.json);
-    let (report, failed) = report_of(|| interrupt::install().map_err(Failure::from).and_then(|()| cli.verb.run()));
-    match report.print(cli.json) {
-        Ok(()) if report.interrupted => interrupt::exit_code(),
+    let (report, failed) = report_of(|| {
+        interrupt::install(cli.json)?;
+        cli.verb.run()
+    });
+    interrupt::begin_report();
+    let printed = report.print(cli.json);
+    interrupt::end_report();
+    match printed {
+        Ok(()) if report.interrupted => interrupt::end(),
         Ok(()) if report.failure.is_none() => ExitCode::SUCCESS,
         _ => ExitCode::from(failed),
     }
@@ -122,6 +129,9 @@ pub fn run() -> ExitCode {
 /// Runs a verb. Returns its report, also after a panic, and the exit code if it has failed.
 fn report_of(verb: impl FnOnce() -> Result<Report, Failure>) -> (Report, u8) {
     match catch_unwind(AssertUnwindSafe(verb)) {
+        Ok(Err(failure)) if failure.is_interruption() && interrupt::is_asked() => {
+            (Report::of_interruption(&unfinished::existing()), FAILED)
+        }
         Ok(outcome) => (outcome.unwrap_or_else(Report::of_failure), FAILED),
         Err(panic) => (Report::of_failure(Failure::of_panic(&*panic)), PANICKED),
     }

@@ -8,7 +8,7 @@ use std::io::{Write, stderr};
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// All progress bars on the screen, one below the other.
+/// All progress bars on the screen.
 pub(super) static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
 
 /// Whether progress bars are hidden.
@@ -19,7 +19,7 @@ pub fn silence_progress(silent: bool) {
     SILENT.store(silent, Ordering::Relaxed);
 }
 
-/// Writes a line to standard error, if that is open. Errors of the system in it are put in words.
+/// Writes a line to standard error, if it is open. Common errors of the operating system in the line are replaced by sentences.
 pub fn note(line: &str) {
     let _ = BARS.suspend(|| writeln!(stderr(), "{}", plain::lines(&system::in_words(line))));
 }

@@ -1,16 +1,15 @@
 //! Progress on standard error.
 //!
-//! In: the tasks and notes of library calls. Out: one bar for each unfinished task, below the bars of the tasks around it;
-//! one line for each note.
+//! In: the tasks and notes of library calls. Out: one bar for each unfinished task, below the bar of the task that contains it; one line for
+//! each note.
 
 use super::interrupt;
 use super::note::{BARS, is_silent, note};
-use crate::codec::CodecError;
 use crate::offline::Progress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// The bars of the unfinished tasks; hidden with `--json` and if standard error is not a terminal. Dropping this
-/// removes them. Default: no tasks.
+/// The bars of the unfinished tasks; hidden with `--json` and if standard error is not a terminal. They are removed when this value is
+/// dropped. Default: no tasks.
 #[derive(Default)]
 pub struct Bars(Vec<ProgressBar>);
 
@@ -45,10 +44,6 @@ impl Progress for Bars {
 
     fn is_interrupted(&self) -> bool {
         interrupt::is_asked()
-    }
-
-    fn uninterrupted(&mut self, write: &mut dyn FnMut() -> Result<(), CodecError>) -> Result<(), CodecError> {
-        interrupt::whole(write)
     }
 }
 

@@ -4,7 +4,8 @@
 //! remaining Gaussians, in their original order.
 
 use super::args::{
-    CheckpointArgs, DataArgs, EngineArgs, PackageArgs, ScoringArgs, ValidationArgs, file_size, score_choice, values,
+    CheckpointArgs, DataArgs, EngineArgs, Given, PackageArgs, ScoringArgs, ValidationArgs, file_size, score_choice,
+    values,
 };
 use super::failure::Failure;
 use super::progress::Bars;
@@ -36,6 +37,8 @@ Examples:
 by ours (energy, removal, energy-removal) and by the paper's (full) and keeps the best. The checkpoint was trained on the validation views,
 unless they are those of transforms_val.json: the loss is that against views which it knows.")]
 pub struct Prune {
+    #[command(flatten)]
+    given: Given,
     /// The checkpoint or package to prune.
     #[arg(value_name = "IN")]
     input: PathBuf,
@@ -51,7 +54,7 @@ pub struct Prune {
     #[arg(long, value_name = "DB", value_parser = values::not_negative)]
     max_loss: Option<f64>,
     /// Prune by the scores in this file, as `gs4d score` writes them.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["variant", "views"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["variant", "views", "volume_power", "volume_rank"])]
     scores: Option<PathBuf>,
     /// Prune by this score.
     #[arg(long, value_name = "SCORE", default_value = "auto", value_parser = score_choice(false))]
@@ -74,6 +77,7 @@ impl Prune {
     /// # Errors
     /// A scene, views or scores that cannot be used, a package that cannot be written, a failure of the engine.
     pub fn run(&self) -> Result<Report, Failure> {
+        self.check_options()?;
         let files = Files::default().reads_scene(&self.input).reads(&self.scores);
         let out = self.package.checked_out(self.data.add_to(files))?;
         let before = file_size(&self.input)?;
@@ -104,6 +108,25 @@ impl Prune {
         Ok(Report::new(json, text))
     }
 
+    /// Checks that every option has an effect.
+    fn check_options(&self) -> Result<(), Failure> {
+        self.engine.check(&self.given, &[])?;
+        self.scoring.check(&self.given, &[self.variant])?;
+        let compared = ["--validation", "--trust-images"];
+        match (&self.scores, self.variant) {
+            _ if self.max_loss.is_some() => Ok(()),
+            (Some(_), _) => {
+                let drawn = ["--data", "--size", "--resolution", "--engine", "--adapter", "--checks"];
+                let reason = "with --scores unless --max-loss is given: no view is drawn";
+                self.given.none_of(&[&drawn[..], &compared].concat(), reason)
+            }
+            (None, ScoreChoice::Auto) => Ok(()),
+            (None, _) => {
+                self.given.none_of(&compared, "without --max-loss or --variant auto: no pictures are compared")
+            }
+        }
+    }
+
     /// Returns how many Gaussians to keep.
     fn goal(&self) -> Goal {
         match (self.max_loss, self.keep, self.ratio) {
@@ -128,7 +151,7 @@ impl Prune {
         let subject = Subject::new(&self.input, scene, self.checkpoint.background)?;
         let (scoring, trust_images) = (self.scoring.settings(), self.validation.trust_images);
         let settings = PruneSettings { goal, score: self.variant, scoring, trust_images };
-        let engine = &mut self.engine.open()?;
+        let engine = &mut self.engine.open(&self.given, &[])?;
         Ok(prune_by_views(engine, subject, &splits, given, &settings, progress)?)
     }
 }

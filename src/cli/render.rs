@@ -4,7 +4,6 @@
 
 use super::args::{CheckpointArgs, RendererArgs, ViewArgs, values};
 use super::failure::Failure;
-use super::interrupt::whole;
 use super::progress::Bars;
 use super::report::{Report, switches, switches_json};
 use super::table::lines;
@@ -24,7 +23,7 @@ use std::time::Instant;
 
 /// Draw views of a scene as PNG files.
 ///
-/// Pictures are named after the frames of the camera file, without folders and extension; existing ones are replaced.
+/// Each picture has the name of its frame in the camera file, without folders and extension. Existing pictures are replaced.
 #[derive(clap::Args)]
 #[command(group = clap::ArgGroup::new("what").args(["cameras", "orbit"]).required(true))]
 #[command(after_help = "\
@@ -34,23 +33,23 @@ Examples:
   gs4d render capture.gs4d --cameras golden.json --raw --background 0,0,0 --out exact
   gs4d render capture.gs4d --orbit 12 --size 100x100 --level 1 --out far
 
-Raw pictures (.f32): height x width x 3 little-endian float32 before any clamping.
-The background is the capture's own, its environment map if it has one, unless --background is given.")]
+Raw pictures (.f32) are height x width x 3 little-endian float32 values, not clamped.
+The background is that of the capture (its environment map if it has one), or the color of --background.")]
 pub struct Render {
     /// The package or checkpoint to draw.
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
-    /// Folder for the pictures, made if it is not there.
+    /// Folder for the pictures. It is created if it does not exist.
     #[arg(short, long, value_name = "DIR")]
     out: PathBuf,
-    /// Make Gaussians fainter where pictures have larger pixels than training had, as games do; the original does not. Needs a package that
-    /// tells the size of training pixels: `gs4d bake` and `gs4d detail --data` write it.
+    /// Reduce the opacity of splats where pixels are larger than in training, as games do and the original does not. The package must have
+    /// the size of its training pixels: `gs4d bake` and `gs4d detail --data` write it.
     #[arg(long)]
     antialias: bool,
-    /// Draw this level of detail in place of all Gaussians, anti-aliased; 1 is the finest.
+    /// Draw this level of detail in place of all Gaussians, anti-aliased as in games. 1 is the finest level.
     #[arg(long, value_name = "N", value_parser = values::count(MAX_LEVELS as u64))]
     level: Option<usize>,
-    /// Write raw float32 pictures (.f32) too.
+    /// Also write raw float32 pictures (.f32).
     #[arg(long)]
     raw: bool,
     #[command(flatten)]
@@ -62,15 +61,16 @@ pub struct Render {
 }
 
 impl Render {
-    /// Draws and writes.
+    /// Draws the pictures and writes them.
     ///
     /// # Errors
-    /// A scene or views that cannot be used, pictures that cannot be written, no such adapter, a failure of the GPU.
+    /// A scene or views that cannot be used, a missing level or size of training pixels, pictures that cannot be written, no such adapter, a
+    /// failure of the GPU.
     pub fn run(&self) -> Result<Report, Failure> {
         let files = self.views.add_to(Files::default().reads_scene(&self.scene));
         files.clone().writes_folder(&self.out, []).check()?;
         let (scene, headless) = std::thread::scope(|scope| {
-            // The adapter opens while the scene is read, and most are compressed packages.
+            // The adapter opens while the scene is read. Most scenes are compressed packages: their pipelines are compiled too.
             let opening = scope.spawn(|| {
                 let headless = self.renderer.open()?;
                 headless.compile_ahead(Storage::Coded)?;
@@ -81,11 +81,12 @@ impl Render {
             Ok::<_, Failure>((scene, opening.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))))
         })?;
         let drawn = self.drawn(&scene)?;
-        let trained_pixel = scene.trained_with.pixel.filter(|_| self.antialias || self.level.is_some());
+        // The size with which games draw this level.
+        let trained_pixel = scene.antialias_pixel(self.level.unwrap_or(0), self.antialias);
         if self.antialias && trained_pixel.is_none() {
             return Err(Failure::about(
                 &self.scene,
-                "does not tell the size of training pixels: add it with gs4d detail --data DIR",
+                "does not have the size of its training pixels, which --antialias needs: add it with gs4d detail --data DIR",
             ));
         }
         let shots = self.views.shots(&scene, 1)?;
@@ -122,7 +123,7 @@ impl Render {
         Ok(Report::new(json, text))
     }
 
-    /// Returns what is drawn of a scene: all of it, or the level that is asked for.
+    /// Returns the scene that is drawn: the scene itself, or its level of detail with the number of `--level`.
     fn drawn<'a>(&self, scene: &'a RuntimeScene) -> Result<&'a RuntimeScene, Failure> {
         let Some(level) = self.level else { return Ok(scene) };
         let count = scene.levels.len();
@@ -158,9 +159,9 @@ impl Render {
     }
 
     fn write(&self, shot: &Shot, picture: &Picture) -> Result<(), OfflineError> {
-        whole(|| write_png(&self.path(shot, "png"), picture))?;
+        write_png(&self.path(shot, "png"), picture)?;
         if self.raw {
-            whole(|| write_beside(&self.path(shot, "f32"), |file| file.write_all(&picture.to_raw())))?;
+            write_beside(&self.path(shot, "f32"), |file| file.write_all(&picture.to_raw()))?;
         }
         Ok(())
     }

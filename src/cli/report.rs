@@ -5,7 +5,9 @@
 use super::failure::Failure;
 use super::note::note;
 use super::plain;
-use crate::codec::checkpoint;
+use crate::codec::checkpoint::options::describe;
+use crate::offline::OfflineError;
+use crate::offline::unfinished::Existing;
 use crate::scene::{PlaybackHints, TrainedWith};
 use serde_json::{Value, json};
 use std::io::{ErrorKind, Write, stdout};
@@ -14,21 +16,21 @@ use std::io::{ErrorKind, Write, stdout};
 pub struct Report {
     /// The report with `--json`.
     pub json: Value,
-    /// The report for people; lines end with a line break.
+    /// The report for people. Each line ends with a line break.
     pub text: String,
-    /// Why the command fails although it has a report; `None` on success.
+    /// The failure of a command that also has a report; `None` on success.
     pub failure: Option<Failure>,
-    /// Whether the work ended early because the user asked for it.
+    /// Whether the user interrupted the work.
     pub interrupted: bool,
 }
 
 impl Report {
-    /// Returns a report of success.
+    /// Returns the report of a successful command.
     pub fn new(json: Value, text: String) -> Self {
         Self { json, text, failure: None, interrupted: false }
     }
 
-    /// Returns a report of a failure alone.
+    /// Returns a report that has only a failure.
     pub fn of_failure(failure: Failure) -> Self {
         Self {
             json: json!({ "error": failure.message() }),
@@ -38,10 +40,24 @@ impl Report {
         }
     }
 
+    /// Returns the report of a command that has ended because the user asked for it: what exists of its work.
+    pub fn of_interruption(existing: &Existing) -> Self {
+        let again = if existing.resumes { "; the same command resumes" } else { "" };
+        let failure = Failure::new(format!("{}{again}", OfflineError::Interrupted { tuned: None }));
+        let outputs: Vec<String> = existing.outputs.iter().map(|path| path.display().to_string()).collect();
+        let json = json!({
+            "error": failure.message(),
+            "interrupted": true,
+            "written": outputs,
+            "resumes": existing.resumes,
+        });
+        Self { json, text: String::new(), failure: Some(failure), interrupted: true }
+    }
+
     /// Prints the report. A closed pipe (`| head`) is not an error.
     ///
     /// # Errors
-    /// Standard output cannot be written.
+    /// Standard output cannot be written to.
     pub fn print(&self, as_json: bool) -> Result<(), Failure> {
         let text = if as_json { plain::json(&format!("{:#}\n", self.json)) } else { plain::lines(&self.text) };
         let printed = stdout().write_all(text.as_bytes()).and_then(|()| stdout().flush());
@@ -60,7 +76,7 @@ impl Report {
 
 /// Returns the training and playback settings of a scene, for people.
 pub fn switches(trained_with: &TrainedWith, playback: &PlaybackHints) -> Vec<(&'static str, String)> {
-    checkpoint::describe(trained_with, playback)
+    describe(trained_with, playback)
 }
 
 /// Returns the training and playback settings of a scene, for programs.

@@ -3,16 +3,16 @@
 //! In: a checkpoint, cameras and times. Out: a file of one float32 for each Gaussian, or a folder with a file for each
 //! score.
 
-use super::args::{CheckpointArgs, DataArgs, EngineArgs, ScoringArgs, ValidationArgs, score_choice, values};
+use super::args::{CheckpointArgs, DataArgs, EngineArgs, Given, ScoringArgs, ValidationArgs, score_choice, values};
 use super::failure::Failure;
-use super::interrupt;
 use super::progress::Bars;
 use super::report::Report;
 use super::table::{Table, lines};
 use crate::offline::Subject;
 use crate::offline::belonging::require_belonging;
 use crate::offline::files::Files;
-use crate::offline::score::variant::Variant;
+use crate::offline::memory_check::{BY_RESOLUTION, Pictures};
+use crate::offline::score::Variant;
 use crate::offline::score::write_scores;
 use crate::offline::search::{Candidate, Goal, ScoreChoice, ScoreSearch, SearchSummary, candidates};
 use crate::scene::GaussianScene;
@@ -34,6 +34,8 @@ Examples:
 Scores are little-endian float32 in the checkpoint's order, the more the better. `auto` prunes by ours (energy, removal,
 energy-removal) and by the paper's (full), draws the validation views, which are not scored, and keeps the best.")]
 pub struct Score {
+    #[command(flatten)]
+    given: Given,
     /// The checkpoint, or a package of it in the trained form.
     #[arg(value_name = "CHECKPOINT")]
     input: PathBuf,
@@ -64,6 +66,7 @@ impl Score {
     /// # Errors
     /// A checkpoint or views that cannot be used, scores that cannot be written, a failure of the engine.
     pub fn run(&self) -> Result<Report, Failure> {
+        self.check_options()?;
         if self.variant != ScoreChoice::All && self.out.is_dir() {
             return Err(Failure::about(&self.out, "is a folder: name a file, or give --variant all"));
         }
@@ -78,8 +81,9 @@ impl Score {
             (self.data.open(&scene.trained_with, progress)?, Vec::new())
         };
         let subject = Subject::new(&self.input, scene, self.checkpoint.background)?;
-        let mut engine = self.engine.open()?;
+        let mut engine = self.engine.open(&self.given, &[])?;
         let start = Instant::now();
+        Pictures::compared(&validation).require(engine.headless(), BY_RESOLUTION)?;
         if auto && !self.validation.trust_images {
             require_belonging(&mut engine, &subject.runtime, &validation, subject.background)?;
         }
@@ -120,6 +124,19 @@ impl Score {
         Ok(Report::new(json, text))
     }
 
+    /// Checks that every option has an effect.
+    fn check_options(&self) -> Result<(), Failure> {
+        self.engine.check(&self.given, &[])?;
+        self.scoring.check(&self.given, &[self.variant])?;
+        match self.variant {
+            ScoreChoice::Auto => Ok(()),
+            ScoreChoice::All | ScoreChoice::One(_) => {
+                let compared = ["--ratio", "--validation", "--trust-images"];
+                self.given.none_of(&compared, "without --variant auto, which alone compares scores")
+            }
+        }
+    }
+
     /// Returns the files that are read and those that may be written.
     fn files(&self) -> Files {
         let files = self.data.add_to(Files::default().reads_scene(&self.input));
@@ -145,7 +162,7 @@ impl Score {
         let mut files = Vec::with_capacity(found.len());
         for candidate in found {
             let path = self.path(&candidate.name);
-            interrupt::whole(|| write_scores(&path, &candidate.scores))?;
+            write_scores(&path, &candidate.scores)?;
             files.push(path.display().to_string());
         }
         Ok(files)

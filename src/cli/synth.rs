@@ -1,8 +1,8 @@
 //! `gs4d synth OUT`: creates a procedural moving scene of any size.
 //!
-//! In: a count and a seed, or a capture to grow. Out: a package in the trained form, for tests and benchmarks.
+//! In: a number of Gaussians and a seed, or a capture to grow. Out: a package in the trained form, for tests and benchmarks.
 
-use super::args::{CheckpointArgs, PackageArgs, values};
+use super::args::{CheckpointArgs, Given, PackageArgs, WITHOUT_TIME, values};
 use super::failure::Failure;
 use super::report::Report;
 use super::table::{bytes, lines};
@@ -14,7 +14,7 @@ use serde_json::json;
 use std::ffi::OsString;
 use std::path::Path;
 
-/// Make a procedural moving scene or grow a capture, for tests and benchmarks.
+/// Create a procedural moving scene, or a capture with more Gaussians, for tests and benchmarks.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -23,21 +23,22 @@ Examples:
   gs4d synth grown.gs4d --grow 37 chkpnt30000.pth --level 1")]
 pub struct Synth {
     #[command(flatten)]
+    given: Given,
+    #[command(flatten)]
     package: PackageArgs,
     /// Number of Gaussians.
     #[arg(long, value_name = "N", default_value = "10000", value_parser = values::count(MAX_COUNT as u64))]
     count: usize,
-    /// Split each Gaussian of CAPTURE into K inside its own 4D volume instead: nearly the same pictures from K times as
-    /// many Gaussians.
+    /// Split each Gaussian of CAPTURE into K Gaussians inside its 4D volume, in place of a procedural scene. The pictures are nearly the same.
     #[arg(long, num_args = 2, value_names = ["K", "CAPTURE"], conflicts_with_all = ["count", "sh_degree", "sh_degree_t"])]
     grow: Option<Vec<OsString>>,
-    /// Seed of the random numbers: the same seed makes the same scene on every machine.
+    /// Seed of the random numbers. The same seed creates the same scene on every machine.
     #[arg(long, value_name = "S", default_value_t = 1)]
     seed: u64,
     /// Spatial degree of color, 0 to 3.
     #[arg(long, value_name = "D", default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=3))]
     sh_degree: u32,
-    /// Time degree of color, 0 to 2; counts only with --sh-degree 3.
+    /// Time degree of color, 0 to 2; used only with --sh-degree 3.
     #[arg(long, value_name = "D", default_value_t = 2, value_parser = clap::value_parser!(u32).range(0..=2))]
     sh_degree_t: u32,
     /// Seconds of playback; 0 for a still.
@@ -45,7 +46,7 @@ pub struct Synth {
     duration: f32,
 }
 
-/// The largest number of Gaussians that are made.
+/// The largest number of Gaussians of a created scene.
 const MAX_COUNT: usize = 20_000_000;
 
 impl Synth {
@@ -54,6 +55,9 @@ impl Synth {
     /// # Errors
     /// The capture to grow cannot be read, or the package cannot be written.
     pub fn run(&self) -> Result<Report, Failure> {
+        if self.sh_degree < 3 {
+            self.given.none_of(&["--sh-degree-t"], WITHOUT_TIME)?;
+        }
         let capture = self.grow.as_deref().and_then(<[OsString]>::last).map(Path::new);
         let files = capture.into_iter().fold(Files::default(), Files::reads_scene);
         let out = self.package.checked_out(files)?;
@@ -75,6 +79,7 @@ impl Synth {
         Ok(Report::new(json, text))
     }
 
+    /// Returns the capture with `times` Gaussians for each of its Gaussians.
     fn grown(&self, times: &OsString, capture: &Path) -> Result<GaussianScene, Failure> {
         let text = times.to_string_lossy();
         let times: usize = text.parse().ok().filter(|&times| times > 0).ok_or_else(|| {
@@ -82,11 +87,14 @@ impl Synth {
         })?;
         let scene = CheckpointArgs::default().load_to_change(capture)?;
         let SceneForm::Trained(trained) = &scene.form else {
-            let reason = "only Gaussians in the trained form can be grown: name a checkpoint or a package in that form";
+            let reason = "--grow needs Gaussians in the trained form: give a checkpoint or a package in that form";
             return Err(Failure::about(capture, reason));
         };
         if trained.parameters.len().saturating_mul(times) > MAX_COUNT {
-            return Err(Failure::about(capture, &format!("{times} times as many Gaussians are more than {MAX_COUNT}")));
+            return Err(Failure::about(
+                capture,
+                &format!("{times} times as many Gaussians are more than {MAX_COUNT}: give a smaller K"),
+            ));
         }
         grow(&scene, trained, times, self.seed).map_err(|error| Failure::at(capture, &error))
     }

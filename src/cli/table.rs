@@ -1,11 +1,11 @@
 //! Tables, aligned lines and sizes, as text.
 //!
-//! In: cells, names with values, numbers of bytes. Out: lines for people. A cell or a value stays on its line, whatever a
-//! file has put into it.
+//! In: cells, names with values, numbers of bytes. Out: lines for people. Control characters in cells and values are escaped, so that none
+//! breaks a line.
 
 use crate::codec::text::escaped;
 
-/// A table: the first column is aligned to the left, the others to the right.
+/// A table: the first column is aligned to the left, the other columns to the right.
 pub struct Table(Vec<Vec<String>>);
 
 impl Table {
@@ -39,13 +39,13 @@ impl std::fmt::Display for Table {
     }
 }
 
-/// Returns lines of names and values, the values aligned.
+/// Returns one line for each name and value, with the values aligned.
 pub fn lines(pairs: &[(&str, String)]) -> String {
     let width = pairs.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
     pairs.iter().map(|(name, value)| format!("{name:<width$}  {}\n", escaped(value))).collect()
 }
 
-/// Returns a number of bytes for people, in powers of 1000.
+/// Returns a number of bytes with a unit: B, kB, MB or GB, in powers of 1000.
 pub fn bytes(count: u64) -> String {
     match count {
         0..1_000 => format!("{count} B"),
@@ -60,15 +60,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn columns_line_up() {
+    fn columns_are_aligned() {
         let mut table = Table::new(&["pass", "ms"]);
         table.row(["blend".to_owned(), "12.5".to_owned()]);
-        assert_eq!(table.to_string(), "pass     ms\nblend  12.5\n", "first column left, second right");
+        assert_eq!(
+            table.to_string(),
+            "pass     ms\nblend  12.5\n",
+            "the first column is left-aligned, the second right-aligned"
+        );
     }
 
     #[test]
-    fn sizes_are_short() {
-        assert_eq!(bytes(999), "999 B", "plain bytes");
-        assert_eq!(bytes(59_406_126), "59.4 MB", "megabytes");
+    fn sizes_have_the_unit_of_their_magnitude() {
+        assert_eq!(bytes(999), "999 B", "below 1000 the unit is B");
+        assert_eq!(bytes(59_406_126), "59.4 MB", "millions of bytes are MB");
     }
 }

@@ -1,12 +1,12 @@
 //! Files and scenes.
 //!
 //! In: a path, and [`ReadOptions`] for settings that the file may not contain. Out: a [`GaussianScene`]; and back.
-//! [`format`](mod@format) is the table of formats: [`checkpoint`] reads the files of the 4DGS trainer (`.pth`),
+//! `format` is the table of formats: [`checkpoint`] reads the files of the 4DGS trainer (`.pth`),
 //! [`package`] reads and writes the format of this crate (`.gs4d`).
 
 pub mod checkpoint;
 mod error;
-pub mod format;
+pub(crate) mod format;
 mod options;
 pub mod package;
 pub(crate) mod text;
@@ -15,7 +15,8 @@ pub use error::{CodecError, CodecErrorKind};
 pub use options::{InvalidOption, ReadOptions};
 
 use crate::scene::GaussianScene;
-use format::{FORMATS, Format};
+use format::FORMATS;
+pub use format::Format;
 use package::{PackageInfo, WriteSettings};
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, Write};

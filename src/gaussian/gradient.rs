@@ -8,7 +8,8 @@
 //! Decisions are held constant: which Gaussians are not drawn, and which rays and colors are clamped. `g_x` is the gradient with respect to
 //! `x`.
 
-use super::projection::{FRUSTUM_CLAMP, LOW_PASS};
+use super::conic::LOW_PASS;
+use super::projection::FRUSTUM_CLAMP;
 use super::{Harmonics, Model, Parameters, ShDirection, SliceSettings, rotation_4d};
 use crate::view::View;
 use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};

@@ -5,7 +5,7 @@
 
 use super::alpha::reach_squared;
 use crate::view::TILE_SIZE;
-use glam::{Mat2, UVec2, Vec2, Vec3};
+use glam::{UVec2, Vec2, Vec3};
 
 /// A rectangle of tiles; empty unless [`high`](Self::high) is beyond [`low`](Self::low) on both axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,10 +58,7 @@ pub fn tiles_of(center: Vec2, radius: f32, grid: UVec2) -> TileRect {
 /// [`reach_squared`] gives an ellipse `dᵀ conic d ≤ e`, whose bounding box is `|dx| ≤ sqrt(e · xx)`,
 /// `|dy| ≤ sqrt(e · yy)`. Omitting the other tiles changes no pixel: `blend` would skip the splat there.
 pub fn contributing_tiles(tiles: TileRect, center: Vec2, covariance: Vec3, opacity: f32) -> TileRect {
-    let Vec3 { x: xx, y: xy, z: yy } = covariance;
-    if Mat2::from_cols_array(&[xx, xy, xy, yy]).determinant() <= 0.0 {
-        return tiles;
-    }
+    let Vec3 { x: xx, z: yy, .. } = covariance;
     let energy = reach_squared(opacity);
     if energy < -1e-3 {
         return TileRect::EMPTY;
@@ -88,6 +85,7 @@ pub fn tile_at(index: u32, grid: UVec2) -> UVec2 {
 mod tests {
     use super::*;
     use crate::gaussian::alpha::alpha_at;
+    use crate::gaussian::conic::ScreenCovariance;
 
     #[test]
     fn rectangles_count_and_list_their_tiles() {
@@ -110,7 +108,7 @@ mod tests {
         let square = tiles_of(center, 60.0, grid);
         for covariance in [Vec3::new(9.0, 0.0, 9.0), Vec3::new(400.0, -90.0, 30.0), Vec3::new(0.5, 0.1, 120.0)] {
             let Vec3 { x: xx, y: xy, z: yy } = covariance;
-            let conic = Vec3::new(yy, -xy, xx) / (xx * yy - xy * xy);
+            let conic = ScreenCovariance { entries: covariance, determinant: xx * yy - xy * xy }.conic();
             for opacity in [0.003, 0.005, 0.1, 1.0] {
                 let part = contributing_tiles(square, center, covariance, opacity);
                 assert!(part.count() < square.count(), "some tiles are omitted at opacity {opacity}");

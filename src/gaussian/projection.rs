@@ -1,16 +1,15 @@
 //! Projection: from a Gaussian at a time to a splat on the screen (EWA splatting, as the original rasterizer does it).
 //!
 //! In: a [`Gaussian`] and a [`View`]. Out: [`Projected`]; `None` if the Gaussian is not drawn. The steps and their
-//! order are those of the original rasterizer, and of `shaders/project.wgsl`.
+//! order are those of the original rasterizer, and of `shaders/project.wgsl`; for thin and for very large splats see [`conic`](super::conic).
 
+use super::conic::{LOW_PASS, ScreenCovariance};
 use super::lifespan::MARGINAL_CUTOFF;
 use super::overlap::{TileRect, tiles_of};
 use super::slice::Gaussian;
 use crate::view::View;
 use glam::{Mat3, Vec2, Vec3, Vec3Swizzles, Vec4};
 
-/// Added to both variances on the screen, pixels squared.
-pub const LOW_PASS: f32 = 0.3;
 /// Rays are clamped to this multiple of the field of view before the Jacobian is taken.
 pub(super) const FRUSTUM_CLAMP: f32 = 1.3;
 
@@ -23,7 +22,7 @@ pub struct Projected {
     pub depth: f32,
     /// Covariance on the screen with the low-pass: xx, xy, yy, pixels squared.
     pub covariance: Vec3,
-    /// Inverse of the covariance: xx, xy, yy.
+    /// Inverse of the covariance, [factored](super::conic).
     pub conic: Vec3,
     /// Opacity times marginal, times the compensation of the low-pass.
     pub opacity: f32,
@@ -72,25 +71,20 @@ pub fn project_with(gaussian: &Gaussian, view: &View, clip: &[Vec4; 2]) -> Optio
     let (mx, my) = (to_world * jx, to_world * jy);
     let [xx, xy, xz, yy, yz, zz] = gaussian.covariance;
     let covariance = Mat3::from_cols(Vec3::new(xx, xy, xz), Vec3::new(xy, yy, yz), Vec3::new(xz, yz, zz));
-    let (cx, cy) = (covariance * mx, covariance * my);
-    let (a, b, c) = (mx.dot(cx) + LOW_PASS, mx.dot(cy), my.dot(cy) + LOW_PASS);
-    let det = a * c - b * b;
-    if det == 0.0 {
-        return None;
-    }
-    let mid = 0.5 * (a + c);
-    let radius = (3.0 * (mid + (mid * mid - det).max(0.1).sqrt()).sqrt()).ceil();
+    let screen = ScreenCovariance::project(covariance, mx, my)?;
+    let mid = 0.5 * (screen.entries.x + screen.entries.z);
+    let radius = (3.0 * (mid + (mid * mid - screen.determinant).max(0.1).sqrt()).sqrt()).ceil();
     let tiles = tiles_of(center, radius, view.tiles());
-    if !radius.is_finite() || tiles.is_empty() {
+    if tiles.is_empty() {
         return None;
     }
     let per_unit = Vec2::new(jx.x, jy.y);
     Some(Projected {
         center,
         depth: q.z,
-        covariance: Vec3::new(a, b, c),
-        conic: Vec3::new(c, -b, a) / det,
-        opacity: gaussian.opacity * marginal * compensation(view, per_unit, Vec3::new(a, b, c), det),
+        covariance: screen.entries,
+        conic: screen.conic(),
+        opacity: gaussian.opacity * marginal * compensation(view, per_unit, &screen),
         mean,
         radius: radius as u32,
         tiles,
@@ -101,13 +95,12 @@ pub fn project_with(gaussian: &Gaussian, view: &View, clip: &[Vec4; 2]) -> Optio
 /// the determinants of its covariances, so that the integral of its alpha stays the same. The original has no such factor, so that
 /// distant captures look thicker. The factor is 1 up to the size of a pixel in training, and in every view without anti-aliasing.
 /// `per_unit` is in pixels per camera unit.
-fn compensation(view: &View, per_unit: Vec2, covariance: Vec3, det: f32) -> f32 {
+fn compensation(view: &View, per_unit: Vec2, screen: &ScreenCovariance) -> f32 {
     let trained = view.trained_variance() * LOW_PASS * per_unit * per_unit;
     let wider = (LOW_PASS - trained).max(Vec2::ZERO);
     if wider == Vec2::ZERO {
         // Exactly 1, without rounding errors.
         return 1.0;
     }
-    let before = (covariance.x - wider.x) * (covariance.z - wider.y) - covariance.y * covariance.y;
-    (before.max(0.0) / det).sqrt()
+    (screen.determinant_with_less(wider) / screen.determinant).sqrt()
 }

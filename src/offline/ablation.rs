@@ -6,10 +6,11 @@
 use super::dataset::TrainingView;
 use super::engine::Engine;
 use super::evaluation::evaluate_scene;
+use super::memory_check::{BY_RESOLUTION, Pictures};
 use super::metrics::{MeanMetrics, MetricSet};
 use super::prune::{highest, kept_count, select};
 use super::score::ScoringSettings;
-use super::score::variant::Variant;
+use super::score::Variant;
 use super::search::ScoreChoice;
 use super::temporal_filter::{filter, filter_name};
 use super::{OfflineError, Progress, Subject};
@@ -50,7 +51,7 @@ pub struct AblationRow {
 /// Begins the tasks "filters" and "pruned".
 ///
 /// # Errors
-/// Images that cannot be read, training views that show nothing of the scene, a failure of the engine.
+/// Pictures that do not fit the memory or the GPU, images that cannot be read, training views that show nothing of the scene, a failure of the engine.
 pub fn ablate(
     engine: &mut Engine,
     mut subject: Subject,
@@ -59,6 +60,8 @@ pub fn ablate(
     settings: &AblationSettings,
     progress: &mut dyn Progress,
 ) -> Result<Vec<AblationRow>, OfflineError> {
+    Pictures::evaluated(measured, MetricSet::SSIM, false).require(engine.headless(), BY_RESOLUTION)?;
+    Pictures::looked_at(&train).require(engine.headless(), BY_RESOLUTION)?;
     subject.runtime.filter = None;
     let mut table = Table { engine, measured, background: subject.background, rows: Vec::new() };
     let AblationSettings { filters, key_frames, ratios, scores, scoring } = settings;

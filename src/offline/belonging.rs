@@ -1,65 +1,153 @@
-//! Whether the images of a dataset show a capture.
+//! The check that the images of a dataset show a capture.
 //!
-//! In: a scene as it was read, before anything is removed from it, and its training views. Out: an error if the scene
-//! explains their images no better than those of other views.
+//! In: a scene as it was read, before Gaussians are removed, and its training views. Out: an error if pictures of the scene are no closer to
+//! their own images than to the images of other views, or no closer than empty pictures.
 
 use super::OfflineError;
 use super::dataset::TrainingView;
 use super::dataset::selection::even_subset;
-use super::engine::Engine;
+use super::engine::{Draw, Engine, drawing_on_gpu};
+use super::memory_check::{BY_RESOLUTION, Pictures};
 use super::metrics::SquaredError;
+use crate::renderer::Headless;
 use crate::scene::RuntimeScene;
 use crate::view::{Background, Picture};
 use glam::Vec3;
 
-/// Views that are compared.
+/// Number of views that are compared.
 const VIEWS: usize = 8;
-/// A scene this close to its images, dB, belongs to them in any case.
+/// PSNR in dB from which pictures may be as close to the images of other views as to their own: these images are nearly the same.
 const CLOSE: f64 = 20.0;
-/// How much closer the pictures must be to their own images than to others, dB.
+/// The least difference in PSNR, dB, between pictures that are closer to an image and pictures that are not.
 const CLOSER: f64 = 0.1;
 
-/// Checks that the pictures of some views are closer to their own images than to those of other views. Views whose image
-/// is missing are left out; with fewer than two views of one size nothing can be said, and every dataset passes.
+/// The PSNR, in dB, of some views against their images.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Match {
+    /// Of each picture against the image of its own view.
+    own: f64,
+    /// Of each picture against the images of the other views of its size.
+    others: f64,
+    /// Of an empty picture against each image.
+    empty: f64,
+}
+
+impl Match {
+    /// Returns whether the images show the capture.
+    fn holds(self) -> bool {
+        let Self { own, others, empty } = self;
+        own >= others + CLOSER || own >= CLOSE && own >= empty + CLOSER
+    }
+}
+
+/// Checks that the images of the views show a scene. Some views are drawn. Their pictures must be closer to their own images than to the images
+/// of other views. If the PSNR of the pictures is at least 20 dB, it is sufficient that they are closer than empty pictures. Views whose
+/// image does not exist are left out. There is no error without two views of the same size, because there is nothing to compare with.
 ///
 /// # Errors
-/// Images that cannot be read or that show something else, a failure of the engine.
+/// Images that cannot be read, do not fit the memory or show something else, a failure of the engine.
 pub fn require_belonging(
     engine: &mut Engine,
     scene: &RuntimeScene,
     views: &[TrainingView],
     background: Background,
 ) -> Result<(), OfflineError> {
-    let there: Vec<TrainingView> = views.iter().filter(|view| view.image.is_file()).cloned().collect();
-    let chosen: Vec<&TrainingView> = even_subset(&there, VIEWS).into_iter().map(|index| &there[index]).collect();
-    let behind = match background {
-        Background::Color(color) => Vec3::from(color),
-        Background::None | Background::Environment => Vec3::ZERO,
-    };
-    let truth: Vec<Picture> =
-        chosen.iter().map(|view| Ok(view.load_covered()?.over(behind))).collect::<Result<_, OfflineError>>()?;
-    let mut drawing = engine.drawing(scene, background)?;
-    let (mut own, mut other, mut others) = (SquaredError::default(), SquaredError::default(), 0);
-    for (index, view) in chosen.iter().enumerate() {
-        let picture = drawing.draw(&view.camera.view(view.time, scene.trained_with.raster_fov))?.clamped();
-        own.add(&truth[index], &picture)?;
-        for (_, image) in
-            truth.iter().enumerate().filter(|(place, image)| *place != index && image.size == picture.size)
-        {
-            other.add(image, &picture)?;
-            others += 1;
-        }
+    let Some(chosen) = Chosen::of(views) else { return Ok(()) };
+    Pictures::compared(chosen.0.iter()).require(engine.headless(), BY_RESOLUTION)?;
+    chosen.require(&mut *engine.drawing(scene, background)?, scene, background)
+}
+
+/// Checks as [`require_belonging`], with a renderer.
+///
+/// # Errors
+/// As [`require_belonging`].
+pub fn require_belonging_on_gpu(
+    headless: &mut Headless,
+    scene: &RuntimeScene,
+    views: &[TrainingView],
+    background: Background,
+) -> Result<(), OfflineError> {
+    let Some(chosen) = Chosen::of(views) else { return Ok(()) };
+    Pictures::compared(chosen.0.iter()).require(Some(headless), BY_RESOLUTION)?;
+    chosen.require(&mut drawing_on_gpu(headless, scene, background)?, scene, background)
+}
+
+/// The views that are drawn, at least two.
+struct Chosen(Vec<TrainingView>);
+
+impl Chosen {
+    /// Chooses views whose image exists; `None` if fewer than two have one.
+    fn of(views: &[TrainingView]) -> Option<Self> {
+        let with_image: Vec<TrainingView> = views.iter().filter(|view| view.image.is_file()).cloned().collect();
+        let chosen = even_subset(&with_image, VIEWS).into_iter().map(|index| with_image[index].clone()).collect();
+        (with_image.len() > 1).then_some(Self(chosen))
     }
-    let (own, other) = (own.psnr(), other.psnr());
-    match chosen.first() {
-        Some(view) if others > 0 && own < CLOSE && own < other + CLOSER => Err(OfflineError::at(
-            &view.image,
+
+    fn require(
+        &self,
+        drawing: &mut dyn Draw,
+        scene: &RuntimeScene,
+        background: Background,
+    ) -> Result<(), OfflineError> {
+        let Some(found) = self.measure(drawing, scene, background)?.filter(|found| !found.holds()) else {
+            return Ok(());
+        };
+        let Match { own, others, empty } = found;
+        Err(OfflineError::at(
+            &self.0[0].image,
             format!(
-                "and the other images do not show this capture: its pictures have {own:.1} dB against their own images and \
-                 {other:.1} dB against those of other views; is --data the folder that it was trained on? \
-                 --trust-images skips this check"
+                "this image and others do not show this capture: the PSNR of its pictures is {own:.1} dB against their own images and \
+                 {others:.1} dB against those of other views; that of empty pictures is {empty:.1} dB; is --data the folder that it was \
+                 trained on? --trust-images skips this check"
             ),
-        )),
-        _ => Ok(()),
+        ))
+    }
+
+    /// Draws the views and compares the pictures with the images; `None` if no two views have the same size.
+    fn measure(
+        &self,
+        drawing: &mut dyn Draw,
+        scene: &RuntimeScene,
+        background: Background,
+    ) -> Result<Option<Match>, OfflineError> {
+        let color = match background {
+            Background::Color(color) => Vec3::from(color),
+            Background::None | Background::Environment => Vec3::ZERO,
+        };
+        let images: Vec<Picture> =
+            self.0.iter().map(|view| Ok(view.load_covered()?.over(color))).collect::<Result<_, OfflineError>>()?;
+        let [mut own, mut others, mut empty] = [SquaredError::default(); 3];
+        let mut compared = false;
+        for (index, view) in self.0.iter().enumerate() {
+            let picture = drawing.draw(&view.camera.view(view.time, scene.trained_with.raster_fov))?.clamped();
+            own.add(&images[index], &picture)?;
+            empty.add(&images[index], &Picture { size: picture.size, pixels: vec![color; picture.pixels.len()] })?;
+            for (other, image) in images.iter().enumerate() {
+                if other != index && image.size == picture.size {
+                    others.add(image, &picture)?;
+                    compared = true;
+                }
+            }
+        }
+        Ok(compared.then(|| Match { own: own.psnr(), others: others.psnr(), empty: empty.psnr() }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn holds(own: f64, others: f64, empty: f64) -> bool {
+        Match { own, others, empty }.holds()
+    }
+
+    #[test]
+    fn pictures_must_be_closer_to_their_own_images_than_to_others_or_empty_pictures() {
+        assert!(holds(15.0, 10.0, 18.0), "pictures closer to their own images than to others belong to these");
+        assert!(!holds(15.0, 15.0, 5.0), "pictures below 20 dB must be closer to their own images");
+        assert!(holds(30.0, 30.0, 12.0), "equal images of all views are accepted from 20 dB");
+        assert!(!holds(30.0, 30.0, 200.0), "faint pictures are not those of black images");
+        assert!(!holds(200.0, 200.0, 200.0), "empty pictures do not show the capture");
+        assert!(!holds(f64::NAN, 10.0, 10.0), "NaN is not close");
     }
 }

@@ -53,6 +53,11 @@ impl Pairs {
         }
     }
 
+    /// Returns whether a raw file is one of the pairs.
+    pub fn has_raw(&self) -> bool {
+        self.both.iter().any(|pair| is_raw(&pair.a) || is_raw(&pair.b))
+    }
+
     fn of_folders(a: &Path, b: &Path, with_raw: bool) -> Result<Self, OfflineError> {
         let (first, mut second) = (pictures(a, with_raw)?, pictures(b, with_raw)?);
         let mut pairs = Self::default();

@@ -50,7 +50,7 @@ pub fn convert(mut scene: GaussianScene, settings: &ConvertSettings) -> Result<G
 }
 
 /// Returns the name of a form.
-pub fn form_name(form: &SceneForm) -> &'static str {
+pub(crate) fn form_name(form: &SceneForm) -> &'static str {
     match form {
         SceneForm::Trained(_) => "trained",
         SceneForm::Ready(Form::Sliced(_)) => "runtime",

@@ -91,6 +91,14 @@ impl Engine {
         }
     }
 
+    /// Returns the renderer of a GPU; `None` for the CPU.
+    pub(crate) fn headless(&self) -> Option<&Headless> {
+        match self {
+            Self::Cpu => None,
+            Self::Gpu(headless) => Some(headless),
+        }
+    }
+
     /// Returns a description for people: the CPU and its threads, or the adapter.
     pub fn name(&self) -> String {
         match self {
@@ -125,12 +133,22 @@ impl Engine {
     ) -> Result<Box<dyn Draw + 'a>, GpuError> {
         Ok(match self {
             Self::Cpu => Box::new(CpuDrawing { scene, background }),
-            Self::Gpu(headless) => {
-                let capture = headless.upload(scene)?;
-                Box::new(GpuDrawing { headless, capture, background })
-            }
+            Self::Gpu(headless) => Box::new(drawing_on_gpu(headless, scene, background)?),
         })
     }
+}
+
+/// Prepares a scene for drawing on a GPU.
+///
+/// # Errors
+/// The scene does not fit the GPU.
+pub(crate) fn drawing_on_gpu<'a>(
+    headless: &'a mut Headless,
+    scene: &RuntimeScene,
+    background: Background,
+) -> Result<impl Draw + use<'a>, GpuError> {
+    let capture = headless.upload(scene)?;
+    Ok(GpuDrawing { headless, capture, background })
 }
 
 /// A scene prepared for drawing.
@@ -150,7 +168,7 @@ struct CpuDrawing<'a> {
 
 impl Draw for CpuDrawing<'_> {
     fn draw(&mut self, view: &View) -> Result<Picture, OfflineError> {
-        memory_check::require(view.size, memory_check::ON_CPU)?;
+        memory_check::require(view.size, None)?;
         Ok(reference::render(self.scene, view, self.background).picture)
     }
 }
@@ -164,7 +182,7 @@ struct GpuDrawing<'a> {
 
 impl Draw for GpuDrawing<'_> {
     fn draw(&mut self, view: &View) -> Result<Picture, OfflineError> {
-        memory_check::require(view.size, memory_check::on_gpu(self.headless))?;
+        memory_check::require(view.size, Some(self.headless))?;
         Ok(self.headless.render(&self.capture, view, self.background)?.picture)
     }
 }

@@ -17,6 +17,9 @@ use glam::UVec2;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
+/// The message of work that has ended because the user asked for it.
+pub(super) const INTERRUPTED: &str = "interrupted";
+
 /// An error of the offline half.
 #[derive(Debug, thiserror::Error)]
 pub enum OfflineError {
@@ -58,29 +61,28 @@ pub enum OfflineError {
     },
     /// Pictures are too large for the memory.
     #[error(
-        "pictures of {}x{} pixels need {:.1} GB of memory, and {:.1} GB are available: draw smaller ones, or fewer at once",
-        .size.x, .size.y, *.needed as f64 / 1e9, *.available as f64 / 1e9
+        "{} {:.1} GB of memory, and {:.1} GB are available: {remedy}",
+        pictures(*.count, *.size), *.needed as f64 / 1e9, *.available as f64 / 1e9
     )]
     Memory {
-        /// Width and height, pixels.
+        /// Number of pictures held at once.
+        count: u64,
+        /// Width and height of the largest, pixels.
         size: UVec2,
         /// Bytes needed.
         needed: u64,
         /// Bytes that the system can give.
         available: u64,
+        /// What makes pictures smaller or fewer.
+        remedy: &'static str,
     },
-    /// The images to train on are too large for the memory.
-    #[error(
-        "{count} images to train on need {:.1} GB of memory, and {:.1} GB are available: give a --resolution, or fewer views",
-        *.needed as f64 / 1e9, *.available as f64 / 1e9
-    )]
-    Images {
-        /// Number of images.
-        count: usize,
-        /// Bytes needed.
-        needed: u64,
-        /// Bytes that the system can give.
-        available: u64,
+    /// Pictures are too large for the GPU.
+    #[error("{reason} ({remedy})")]
+    Limit {
+        /// The limit.
+        reason: GpuError,
+        /// What makes pictures smaller or fewer.
+        remedy: &'static str,
     },
     /// Two folders have no two pictures of the same name.
     #[error("{} and {}: no two pictures with the same name before the extension", .a.display(), .b.display())]
@@ -99,8 +101,8 @@ pub enum OfflineError {
         /// What would be chosen.
         what: &'static str,
     },
-    /// The user has asked the work to end. What has been stored is kept, and the same command resumes from it.
-    #[error("interrupted; the same command resumes")]
+    /// The user has asked the work to end. Results that have been stored are kept, and the same work resumes from them.
+    #[error("{INTERRUPTED}")]
     Interrupted {
         /// The best result so far, if the work was fine-tuning.
         tuned: Option<Box<FineTuned>>,
@@ -143,6 +145,14 @@ pub enum OfflineError {
     /// A report cannot be written as JSON.
     #[error(transparent)]
     Json(#[from] serde_json::Error),
+}
+
+/// Returns the subject and the verb of a sentence about the need of pictures.
+fn pictures(count: u64, UVec2 { x, y }: UVec2) -> String {
+    match count {
+        1 => format!("a picture of {x}x{y} pixels needs"),
+        _ => format!("{count} pictures of up to {x}x{y} pixels need"),
+    }
 }
 
 impl OfflineError {

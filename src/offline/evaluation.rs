@@ -6,7 +6,7 @@
 use super::dataset::TrainingView;
 use super::engine::Engine;
 use super::metrics::{Contrast, Evaluation, EvaluationSettings, MetricSet, ViewMetrics, evaluate};
-use super::{OfflineError, Progress};
+use super::{OfflineError, Progress, proceed};
 use crate::scene::RuntimeScene;
 use crate::view::{Background, Picture};
 
@@ -39,6 +39,7 @@ pub fn evaluate_scene(
         &settings,
         |view| drawing.draw(view),
         |view, reference, picture| {
+            proceed(progress)?;
             progress.advance();
             seen(view, reference, picture)
         },

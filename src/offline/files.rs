@@ -9,7 +9,7 @@ use super::{OfflineError, temporary_file};
 use glam::UVec2;
 use std::collections::{BTreeSet, HashMap};
 use std::fs::{File, Metadata};
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 /// The files that work reads and those that it writes. Default: none.
@@ -22,8 +22,10 @@ pub struct Files {
 /// What is written.
 #[derive(Debug, Clone)]
 enum Output {
-    /// A file in a folder that exists. If its name has an extension, it is this one.
+    /// A file in a folder that exists. If its name has an extension, it is this one. It may be a device or a pipe.
     File(PathBuf, &'static str),
+    /// The same, but no device or pipe: the file is read again, or others are written beside it.
+    Regular(PathBuf, &'static str),
     /// A folder, which is made if it does not exist.
     Folder(PathBuf),
     /// A file in such a folder.
@@ -72,14 +74,19 @@ impl Files {
         let options = CameraOptions { size: Some(UVec2::ONE), ..CameraOptions::default() };
         for view in CameraFile::load(path, &options).unwrap_or_default() {
             // An image that does not exist is no input: the same name may be an output.
-            let images = [Some(view.image), view.mask].into_iter().flatten();
-            self.inputs.extend(images.filter(|image| !matches!(image.try_exists(), Ok(false))));
+            self.inputs.extend([Some(view.image), view.mask].into_iter().flatten().filter(|image| may_exist(image)));
         }
     }
 
     /// Adds an output: a file in a folder that exists. If its name has an extension, it must be this one.
     pub fn writes(mut self, path: &Path, extension: &'static str) -> Self {
         self.outputs.push(Output::File(path.to_owned(), extension));
+        self
+    }
+
+    /// Adds an output that is read again or has others beside it: as [`writes`](Self::writes), but not a device or a pipe.
+    pub(crate) fn writes_regular(mut self, path: &Path, extension: &'static str) -> Self {
+        self.outputs.push(Output::Regular(path.to_owned(), extension));
         self
     }
 
@@ -117,7 +124,11 @@ impl Files {
         for path in self.outputs.iter().filter(|output| output.is_file()).map(Output::path) {
             let places = places(path);
             if let Some(input) = places.iter().find_map(|place| inputs.get(place)) {
-                let message = format!("is the input itself, {}: write to another file", input.display());
+                let input_name = input.display();
+                let message = match may_exist(input) {
+                    true => format!("is the input itself, {input_name}: write to another file"),
+                    false => format!("would be read with the input, as {input_name}: write to another file"),
+                };
                 return Err(OfflineError::at(path, message));
             }
             if let Some(other) = places.iter().find_map(|place| outputs.get(place)) {
@@ -133,7 +144,7 @@ impl Files {
 impl Output {
     fn path(&self) -> &Path {
         match self {
-            Self::File(path, _) | Self::Folder(path) | Self::Inside(path) => path,
+            Self::File(path, _) | Self::Regular(path, _) | Self::Folder(path) | Self::Inside(path) => path,
         }
     }
 
@@ -146,8 +157,16 @@ impl Output {
     /// device or a pipe.
     fn check(&self) -> Result<Option<PathBuf>, OfflineError> {
         match self {
-            Self::File(path, _) if is_stream(path) => Ok(None),
-            Self::File(path, extension) => {
+            Self::File(path, _) if is_stream(path) => check_stream(path).map(|()| None),
+            Self::Regular(path, _) if is_stream(path) => {
+                let message =
+                    "is a device or a pipe, and what is written here is more than one stream of bytes: name a file";
+                Err(OfflineError::at(path, message))
+            }
+            Self::File(path, extension) | Self::Regular(path, extension) => {
+                if path.as_os_str().as_encoded_bytes().ends_with(b"/") {
+                    return Err(OfflineError::at(path, "is the name of a folder: name a file"));
+                }
                 if path.extension().is_some_and(|found| !found.eq_ignore_ascii_case(extension)) {
                     let message = format!("the name of what is written here ends in .{extension}: choose another name");
                     return Err(OfflineError::at(path, message));
@@ -156,11 +175,27 @@ impl Output {
                 Ok(Some(folder_of(&resolved(path)).to_owned()))
             }
             Self::Folder(path) => {
+                path.metadata().map_or_else(|error| check_missing(path, error), |_| Ok(()))?;
                 let path = resolved(path);
                 Ok(path.ancestors().find(|folder| folder.metadata().is_ok()).map(Path::to_owned))
             }
             Self::Inside(path) => check_file(path).map(|()| None),
         }
+    }
+}
+
+/// Returns whether there may be a file at a path: there is none where the path leads to nothing.
+fn may_exist(path: &Path) -> bool {
+    path.metadata().map_or_else(|error| error.kind() == ErrorKind::PermissionDenied, |_| true)
+}
+
+/// Checks that a device can be written to. To open a pipe waits until another program reads it.
+fn check_stream(path: &Path) -> Result<(), OfflineError> {
+    match path.metadata() {
+        Ok(metadata) if is_device(&metadata) => {
+            File::options().write(true).open(path).map(drop).map_err(|error| OfflineError::at(path, error))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -173,7 +208,16 @@ fn check_file(path: &Path) -> Result<(), OfflineError> {
         }
         Ok(_) if is_stream(path) => Ok(()),
         Ok(_) => File::options().write(true).open(path).map(drop).map_err(|error| OfflineError::at(path, error)),
-        Err(_) => Ok(()),
+        Err(error) => check_missing(path, error),
+    }
+}
+
+/// Checks that a path, of which `error` says why nothing is there, can be made. Its folder is checked in any case.
+fn check_missing(path: &Path, error: io::Error) -> Result<(), OfflineError> {
+    match error.kind() {
+        ErrorKind::NotFound | ErrorKind::NotADirectory => Ok(()),
+        // Links that lead in a circle, a name that is too long.
+        _ => Err(OfflineError::at(path, error)),
     }
 }
 
@@ -198,6 +242,17 @@ fn check_folder(out: &Path, folder: &Path) -> Result<(), OfflineError> {
 fn places(path: &Path) -> Vec<Place> {
     let node = path.metadata().ok().as_ref().and_then(node).map(|(device, number)| Place::Node(device, number));
     node.into_iter().chain([Place::Path(resolved(path))]).collect()
+}
+
+#[cfg(unix)]
+fn is_device(metadata: &Metadata) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    metadata.file_type().is_char_device() || metadata.file_type().is_block_device()
+}
+
+#[cfg(not(unix))]
+fn is_device(_: &Metadata) -> bool {
+    false
 }
 
 /// Returns the device of a file and its number there; `None` where the system has no such numbers.
@@ -235,6 +290,8 @@ mod tests {
             assert!(failure(files().writes(&hard, "gs4d")).contains("the input itself"), "a hard link");
         }
         let beside = folder.path().join("cfg_args");
+        assert!(failure(files().writes(&beside, "f32")).contains("would be read with the input"), "it does not exist");
+        fs::write(&beside, b"Namespace()").expect("the folder can be written to");
         assert!(failure(files().writes(&beside, "f32")).contains("the input itself"), "what is read with it");
         files().writes(&folder.path().join("out.gs4d"), "gs4d").check().expect("another file");
     }
@@ -255,6 +312,30 @@ mod tests {
         assert!(failure(twice).contains("written twice"), "a link to what is not there yet");
     }
 
+    #[cfg(unix)]
+    #[test]
+    fn devices_are_opened_and_refused_where_a_file_is_needed() {
+        let null = Path::new("/dev/null");
+        Files::default().writes(null, "gs4d").check().expect("it can be written to");
+        let message = failure(Files::default().writes_regular(null, "gs4d"));
+        assert!(message.starts_with("/dev/null: is a device or a pipe"), "a file is needed: {message}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn images_that_lead_to_nothing_are_no_inputs() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = |name: &str| folder.path().join(name);
+        symlink("circle.png", path("circle.png")).expect("the folder can be written to");
+        symlink("nothing", path("dangling.png")).expect("the folder can be written to");
+        fs::write(path("file"), b"contents").expect("the folder can be written to");
+        for name in ["circle.png", "dangling.png", "missing.png", "file/inside.png"] {
+            assert!(!may_exist(&path(name)), "{name} is no file");
+        }
+        assert!(may_exist(&path("file")), "a file");
+    }
+
     #[test]
     fn what_cannot_be_written_is_named() {
         let folder = tempfile::tempdir().expect("a temporary folder");
@@ -266,6 +347,7 @@ mod tests {
             ("file.gs4d/out.gs4d", "not a folder"),
             ("folder.gs4d", "is a folder"),
             ("out.pth", "ends in .gs4d"),
+            ("new.gs4d/", "name of a folder"),
         ] {
             let message = failure(Files::default().writes(&path(name), "gs4d"));
             assert!(message.contains(&path(name).display().to_string()), "{name} is named: {message}");

@@ -1,86 +1,270 @@
-//! Whether pictures fit the memory, found out before they are drawn.
+//! Whether the pictures of a command fit the memory and the GPU, found out before the first of them is loaded or drawn.
 //!
-//! In: the size of a picture, bytes for each of its pixels. Out: an error that tells how much is needed and how much there is.
+//! In: the sizes of the pictures that are held at once, and what is done with them ([`Pictures`]). Out: an error with the memory needed, the
+//! memory available, and the option that makes pictures smaller or fewer. Every estimate of memory by pixels is here.
 
 use super::OfflineError;
 use super::dataset::TrainingView;
-use crate::renderer::Headless;
+use super::fine_tune::require_bindings;
+use super::metrics::MetricSet;
+use crate::renderer::{GpuError, Headless};
+use crate::view::View;
 use glam::UVec2;
 use std::fs;
 
+/// The remedy for views of a dataset.
+pub(crate) const BY_RESOLUTION: &str = "--resolution makes pictures smaller, by a divisor or a width";
+/// The remedy for views of a camera file or an orbit.
+pub(crate) const BY_SIZE: &str = "--size makes pictures smaller";
+/// The remedy for pictures that are compared with those of another scene.
+pub(crate) const BY_SIZE_OR_COUNT: &str = "--size makes pictures smaller, --verify fewer";
+/// The remedy for levels of detail.
+pub(crate) const BY_DIRECTIONS: &str = "--directions and --times make pictures fewer";
+/// The remedy for callers of the library.
+const SMALLER: &str = "draw smaller ones, or fewer at once";
+
 /// Bytes for each pixel while the CPU reference draws: color, transmittance and two depths of each pixel, and the frame made of them.
-pub(super) const ON_CPU: u64 = 24 + 24;
-/// Bytes for each pixel of a picture that waits to be written, with those that are written.
-pub(super) const PICTURE: u64 = 12 + 3;
-/// Bytes for each pixel on the host while a frame is read back: its color, and its depths as mapped, copied and without padding.
-const READ_BACK: u64 = 2 * 16 + 3 * 8;
+const ON_CPU: u64 = 24 + 24;
+/// Bytes for each pixel on the host while a frame is read back: its color, its depths as mapped, copied and without padding, and the mapped
+/// buffers of the frame before, which are released late.
+const READ_BACK: u64 = 2 * 16 + 3 * 8 + 16 + 8;
 /// Bytes for each pixel of the targets on the GPU: color and depths.
 const TARGETS: u64 = 16 + 8;
+/// Bytes for each pixel on the GPU while it trains: slopes of similarity, gradients of color and of depth, an image.
+const TRAINING: u64 = 48 + 16 + 4 + 4;
 
-/// Bytes for each pixel of a training image in memory: color and coverage.
-const TRAINING_IMAGE: u64 = 4;
+/// Bytes for each pixel of a picture.
+const PICTURE: u64 = 12;
+/// Bytes for each pixel of an image in memory: color and coverage.
+const IMAGE: u64 = 4;
+/// Bytes for each pixel of an image while it is decoded and resampled, with the image that results.
+const LOADING: u64 = 12;
+/// Bytes for each pixel of a picture that is written: its bytes.
+const WRITTEN: u64 = 3;
+/// Bytes for each pixel while FLIP compares two pictures, as measured with pictures of 1024x1024 and 2048x2048 pixels.
+const FLIP: u64 = 150;
+/// Bytes for each pixel while MS-SSIM compares two pictures: their halves, and the halves of these.
+const MS_SSIM: u64 = 8;
+/// Bytes for each pixel while reference, render and difference are put side by side: a clamped copy, the difference, all three.
+const SIDE_BY_SIDE: u64 = PICTURE + PICTURE + 3 * (PICTURE + WRITTEN);
 
 /// Bytes up to which the system is not asked.
 const LITTLE: u64 = 1 << 28;
 
-/// Returns the bytes of the host's memory for each pixel while a GPU draws; a GPU without a memory of its own has its targets there, too.
-pub(super) fn on_gpu(headless: &Headless) -> u64 {
-    match headless.context().info.device_type {
-        wgpu::DeviceType::Cpu | wgpu::DeviceType::IntegratedGpu => READ_BACK + TARGETS,
-        _ => READ_BACK,
+/// The pictures that are in memory at the same time.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Pictures {
+    /// How many are held.
+    count: u64,
+    /// Bytes of those that are held.
+    held: u64,
+    /// Size of the largest that is drawn or loaded, pixels.
+    largest: UVec2,
+    /// Bytes for each of its pixels in memory while it is drawn.
+    beside: u64,
+    /// Bytes for each of its pixels in memory while it is loaded or compared, and not drawn.
+    work: u64,
+    /// Whether a GPU trains on it.
+    trained: bool,
+}
+
+impl Pictures {
+    /// Returns a picture that is drawn, with `beside` bytes for each of its pixels in memory.
+    pub fn drawn(size: UVec2, beside: u64) -> Self {
+        Self { largest: size, beside, ..Self::default() }
+    }
+
+    /// Returns pictures that are drawn one after the other while at most `waiting` are written.
+    pub fn written(sizes: impl IntoIterator<Item = UVec2>, waiting: u64) -> Self {
+        Self::drawn(largest(sizes), waiting * (PICTURE + WRITTEN))
+    }
+
+    /// Returns views that are drawn one after the other, and are not kept.
+    pub fn looked_at(views: &[TrainingView]) -> Self {
+        Self::drawn(largest(sizes(views)), 0)
+    }
+
+    /// Returns so many frames of one size that are held, with `bytes` for each pixel.
+    pub fn frames(size: UVec2, count: u64, bytes: u64) -> Self {
+        let held = pixels(size).saturating_mul(count).saturating_mul(bytes);
+        Self { count, held, ..Self::drawn(size, 0) }
+    }
+
+    /// Returns pictures of these views that are held, while others are compared with them.
+    pub fn originals(views: &[View]) -> Self {
+        let sizes = || views.iter().map(|view| view.size);
+        // A picture, and both clamped.
+        Self { work: 3 * PICTURE, ..Self::held(sizes(), PICTURE) }
+    }
+
+    /// Returns images that are held as pictures, while pictures are compared with them.
+    pub fn compared<'a>(views: impl IntoIterator<Item = &'a TrainingView>) -> Self {
+        let held = Self::held(views.into_iter().map(|view| view.camera.size), PICTURE);
+        Self { work: (2 * PICTURE).max(loading(held.count)), ..held }
+    }
+
+    /// Returns images that are compared with pictures one after the other; `kept` tells whether both are also put side by side.
+    pub fn evaluated(views: &[TrainingView], metrics: MetricSet, kept: bool) -> Self {
+        let measured = [(metrics.flip, FLIP), (metrics.ms_ssim, MS_SSIM), (kept, SIDE_BY_SIDE)];
+        let most = measured.iter().filter(|(wanted, _)| *wanted).map(|(_, bytes)| *bytes).max().unwrap_or(0);
+        // The image, as a picture and as it was loaded; the render, also clamped.
+        let beside = PICTURE + IMAGE;
+        Self { work: beside + 2 * PICTURE + most, ..Self::drawn(largest(sizes(views)), beside) }
+    }
+
+    /// Returns images that a GPU trains on, with those that it validates on.
+    pub fn trained(train: &[TrainingView], validation: &[TrainingView]) -> Self {
+        let held = Self::held(sizes(train).chain(sizes(validation)), IMAGE);
+        // A validation image is compared as a picture.
+        Self { beside: PICTURE, work: loading(held.count), trained: true, ..held }
+    }
+
+    /// Returns pictures that are held with so many bytes for each of their pixels.
+    fn held(sizes: impl Iterator<Item = UVec2>, bytes: u64) -> Self {
+        sizes.fold(Self::default(), |all, size| Self {
+            count: all.count + 1,
+            held: all.held.saturating_add(pixels(size).saturating_mul(bytes)),
+            largest: largest([all.largest, size]),
+            ..all
+        })
+    }
+
+    /// Checks that there is memory for the pictures, and that the GPU can draw the largest, if a GPU draws; else the CPU does. Where the
+    /// system does not tell how much memory there is, any pictures pass.
+    ///
+    /// # Errors
+    /// What is needed and what is available, with `remedy`.
+    pub fn require(&self, headless: Option<&Headless>, remedy: &'static str) -> Result<(), OfflineError> {
+        let Some(headless) = headless else { return self.require_bytes(ON_CPU, remedy, available) };
+        let limited = |reason: GpuError| OfflineError::Limit { reason, remedy };
+        if self.largest != UVec2::ZERO {
+            headless.require_picture(self.largest).map_err(limited)?;
+        }
+        let mut device = TARGETS;
+        if self.trained {
+            require_bindings(headless, self.largest).map_err(limited)?;
+            device += TRAINING;
+        }
+        let shares_memory = match headless.context().info.device_type {
+            wgpu::DeviceType::Cpu | wgpu::DeviceType::IntegratedGpu => device,
+            _ => 0,
+        };
+        self.require_bytes(READ_BACK + shares_memory, remedy, available)
+    }
+
+    /// Checks that there is memory for the pictures while none is drawn.
+    ///
+    /// # Errors
+    /// As [`require`](Self::require).
+    pub fn require_loaded(&self, remedy: &'static str) -> Result<(), OfflineError> {
+        self.require_bytes(0, remedy, available)
+    }
+
+    /// Checks that there is memory if drawing needs so many bytes for each pixel.
+    fn require_bytes(
+        &self,
+        drawing: u64,
+        remedy: &'static str,
+        available: impl FnOnce() -> Option<u64>,
+    ) -> Result<(), OfflineError> {
+        let each = (self.beside + drawing).max(self.work);
+        let needed = pixels(self.largest).saturating_mul(each).saturating_add(self.held);
+        match (needed > LITTLE).then(available).flatten() {
+            Some(available) if needed > available => {
+                let (count, size) = (self.count.max(1), self.largest);
+                Err(OfflineError::Memory { count, size, needed, available, remedy })
+            }
+            _ => Ok(()),
+        }
     }
 }
 
-/// Checks that there is memory to draw a picture. Where the system does not tell how much there is, any picture passes.
-pub(super) fn require(size: UVec2, bytes_per_pixel: u64) -> Result<(), OfflineError> {
-    require_of(size, bytes_per_pixel, || available(&fs::read_to_string("/proc/meminfo").ok()?))
+/// Checks that there is memory and that the GPU can draw, for a picture that is drawn now.
+pub(super) fn require(size: UVec2, headless: Option<&Headless>) -> Result<(), OfflineError> {
+    Pictures::drawn(size, 0).require(headless, SMALLER)
 }
 
-/// Checks that there is memory for the images of these views, before any of them is loaded.
-pub(super) fn require_images<'a>(views: impl Iterator<Item = &'a TrainingView>) -> Result<(), OfflineError> {
-    let sizes = views.map(|view| view.camera.size.as_u64vec2().element_product());
-    let (count, pixels) = sizes.fold((0, 0u64), |(count, sum), pixels| (count + 1, sum.saturating_add(pixels)));
-    let needed = pixels.saturating_mul(TRAINING_IMAGE);
-    let there = || available(&fs::read_to_string("/proc/meminfo").ok()?);
-    match (needed > LITTLE).then(there).flatten() {
-        Some(available) if needed > available => Err(OfflineError::Images { count, needed, available }),
-        _ => Ok(()),
-    }
+/// Returns the bytes for each pixel while as many of `count` images are loaded as there are threads.
+fn loading(count: u64) -> u64 {
+    LOADING * count.min(rayon::current_num_threads() as u64)
 }
 
-fn require_of(size: UVec2, bytes_per_pixel: u64, available: impl FnOnce() -> Option<u64>) -> Result<(), OfflineError> {
-    let needed = size.as_u64vec2().element_product().saturating_mul(bytes_per_pixel);
-    match (needed > LITTLE).then(available).flatten() {
-        Some(available) if needed > available => Err(OfflineError::Memory { size, needed, available }),
-        _ => Ok(()),
-    }
+fn sizes(views: &[TrainingView]) -> impl Iterator<Item = UVec2> {
+    views.iter().map(|view| view.camera.size)
 }
 
-/// Returns the bytes that programs can take without swapping, from Linux's list of them.
-fn available(list: &str) -> Option<u64> {
-    let line = list.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+/// Returns the size with the most pixels; zero if there is none.
+fn largest(sizes: impl IntoIterator<Item = UVec2>) -> UVec2 {
+    sizes.into_iter().max_by_key(|size| pixels(*size)).unwrap_or_default()
+}
+
+fn pixels(size: UVec2) -> u64 {
+    size.as_u64vec2().element_product()
+}
+
+/// Returns the bytes that this program can take: those of the system without swapping, or what is left of its address space if that is limited
+/// to less. `None` where the system does not tell.
+fn available() -> Option<u64> {
+    let read = |path: &str| fs::read_to_string(path).unwrap_or_default();
+    let system = kilobytes(&read("/proc/meminfo"), "MemAvailable:")?;
+    let used = kilobytes(&read("/proc/self/status"), "VmSize:").unwrap_or(0);
+    let limit = address_space(&read("/proc/self/limits")).map_or(u64::MAX, |limit| limit.saturating_sub(used));
+    Some(system.min(limit))
+}
+
+/// Returns the number after a name in Linux's lists of memory, bytes.
+fn kilobytes(list: &str, name: &str) -> Option<u64> {
+    let line = list.lines().find_map(|line| line.strip_prefix(name))?;
     let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     kilobytes.checked_mul(1024)
+}
+
+/// Returns the limit of the address space from Linux's list of limits, bytes; `None` if there is none.
+fn address_space(list: &str) -> Option<u64> {
+    let line = list.lines().find_map(|line| line.strip_prefix("Max address space"))?;
+    line.split_whitespace().next()?.parse().ok()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const MEMORY: &str = "MemTotal:       16384000 kB\nMemAvailable:    8000000 kB\nBuffers: 0 kB\n";
+
     #[test]
-    fn what_is_needed_and_what_there_is_are_told() {
-        let list = "MemTotal:       16384000 kB\nMemAvailable:    8000000 kB\nBuffers: 0 kB\n";
-        let there = available(list);
-        assert_eq!(there, Some(8_192_000_000), "what can be taken");
-        let large = UVec2::splat(16_384);
-        let message = require_of(large, ON_CPU, || there).expect_err("too large").to_string();
-        for part in ["16384x16384", "12.9 GB", "8.2 GB"] {
-            assert!(message.contains(part), "{part}: {message}");
-        }
-        require_of(UVec2::splat(4096), ON_CPU, || there).expect("it fits");
-        require_of(UVec2::splat(400), ON_CPU, || Some(0)).expect("too little to ask for");
-        require_of(large, ON_CPU, || None).expect("nobody knows");
-        assert_eq!(available("MemTotal: 1 kB\n"), None, "not told");
-        assert_eq!(available("MemAvailable: many\n"), None, "not a number");
+    fn the_memory_of_the_system_is_read() {
+        assert_eq!(kilobytes(MEMORY, "MemAvailable:"), Some(8_192_000_000), "kilobytes of 1024 bytes");
+        assert_eq!(kilobytes("MemTotal: 1 kB\n", "MemAvailable:"), None, "a list without it");
+        assert_eq!(kilobytes("MemAvailable: many\n", "MemAvailable:"), None, "not a number");
+        let limits =
+            |soft: &str| format!("Limit  Soft Limit  Hard Limit  Units\nMax address space  {soft}  unlimited  bytes\n");
+        assert_eq!(address_space(&limits("4096000")), Some(4_096_000), "the soft limit");
+        assert_eq!(address_space(&limits("unlimited")), None, "no limit");
+    }
+
+    #[test]
+    fn needed_and_available_memory_are_named_with_the_remedy() {
+        let there = || kilobytes(MEMORY, "MemAvailable:");
+        let large = Pictures::drawn(UVec2::splat(16_384), 0);
+        let message = large.require_bytes(ON_CPU, BY_SIZE, there).expect_err("12.9 of 8.2 GB").to_string();
+        let expected = "a picture of 16384x16384 pixels needs 12.9 GB of memory, and 8.2 GB are available: --size makes pictures smaller";
+        assert_eq!(message, expected, "size, need, available memory and remedy");
+        Pictures::drawn(UVec2::splat(4096), 0).require_bytes(ON_CPU, BY_SIZE, there).expect("it fits");
+        Pictures::drawn(UVec2::splat(400), 0)
+            .require_bytes(ON_CPU, BY_SIZE, || Some(0))
+            .expect("too little to ask for");
+        large.require_bytes(ON_CPU, BY_SIZE, || None).expect("the system does not tell");
+    }
+
+    #[test]
+    fn pictures_that_are_held_add_up() {
+        let sizes = [UVec2::new(4000, 3000); 100];
+        let held = Pictures::held(sizes.into_iter(), PICTURE);
+        assert_eq!((held.count, held.held), (100, 14_400_000_000), "each has 12 bytes for each of 12,000,000 pixels");
+        let message =
+            held.require_bytes(ON_CPU, BY_RESOLUTION, || Some(8 << 30)).expect_err("15 of 8.6 GB").to_string();
+        assert!(message.starts_with("100 pictures of up to 4000x3000 pixels need 15.0 GB"), "the count: {message}");
+        held.require_bytes(ON_CPU, BY_RESOLUTION, || Some(16 << 30)).expect("15 of 17.2 GB");
+        assert_eq!(Pictures::held([UVec2::MAX; 2].into_iter(), 1 << 40).held, u64::MAX, "without overflow");
     }
 }

@@ -9,7 +9,7 @@ use glam::{UVec2, Vec3};
 use std::f32::consts::TAU;
 
 /// Default picture size of an orbit, pixels.
-pub const ORBIT_SIZE: UVec2 = UVec2::splat(400);
+pub(crate) const ORBIT_SIZE: UVec2 = UVec2::splat(400);
 /// Horizontal field of view, radians.
 const FIELD_OF_VIEW: f32 = 0.7;
 /// Elevation of the cameras above the center, radians.
@@ -67,7 +67,7 @@ pub fn orbit(scene: &RuntimeScene, count: usize, size: UVec2) -> Result<Vec<Shot
 }
 
 /// Returns an even share of at most `count` shots or views, in their order.
-pub fn share<T>(all: Vec<T>, count: usize) -> Vec<T> {
+pub(crate) fn share<T>(all: Vec<T>, count: usize) -> Vec<T> {
     let total = all.len();
     let count = count.min(total);
     let chosen = all.into_iter().enumerate().filter(|(i, _)| i * count / total != (i + 1) * count / total);
@@ -75,7 +75,7 @@ pub fn share<T>(all: Vec<T>, count: usize) -> Vec<T> {
 }
 
 /// Returns each shot at `times` times instead of its own: at the middles of as many equal parts of the interval.
-pub fn at_times(shots: Vec<Shot>, times: usize, [first, last]: [f32; 2]) -> Vec<Shot> {
+pub(crate) fn at_times(shots: Vec<Shot>, times: usize, [first, last]: [f32; 2]) -> Vec<Shot> {
     let time = |k: usize| first + (last - first) * (k as f32 + 0.5) / times as f32;
     let seen = |shot: Shot| (0..times).map(move |k| Shot { time: time(k), ..shot.clone() });
     shots.into_iter().flat_map(seen).collect()

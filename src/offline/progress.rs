@@ -3,7 +3,7 @@
 //! In: the tasks of a call as they begin, advance and finish, and notes. Out: what the caller shows of them, such as
 //! progress bars or a log.
 
-use crate::codec::CodecError;
+use super::OfflineError;
 
 /// Receives the progress of work on a capture.
 ///
@@ -27,15 +27,11 @@ pub trait Progress {
     fn is_interrupted(&self) -> bool {
         false
     }
+}
 
-    /// Writes a file by calling `write`. A program that can be interrupted completes the write first, so that no
-    /// temporary file is left behind.
-    ///
-    /// # Errors
-    /// Those of `write`, which is called exactly once.
-    fn uninterrupted(&mut self, write: &mut dyn FnMut() -> Result<(), CodecError>) -> Result<(), CodecError> {
-        write()
-    }
+/// Returns whether work may go on: the error [`OfflineError::Interrupted`] if the user wants it to end.
+pub(crate) fn proceed(progress: &dyn Progress) -> Result<(), OfflineError> {
+    if progress.is_interrupted() { Err(OfflineError::Interrupted { tuned: None }) } else { Ok(()) }
 }
 
 /// Ignores all progress.

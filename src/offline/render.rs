@@ -2,8 +2,9 @@
 //!
 //! In: a capture on the GPU, views of it, a function that writes a picture. Out: the [`Counts`] of each view.
 
+use super::memory_check::{BY_SIZE, Pictures};
 use super::orbit::Shot;
-use super::{OfflineError, Progress, memory_check};
+use super::{OfflineError, Progress, proceed};
 use crate::renderer::{GpuCapture, Headless};
 use crate::view::{Background, Counts, Picture, View};
 use rayon::prelude::*;
@@ -28,9 +29,7 @@ pub fn render_shots(
 ) -> Result<Vec<Counts>, OfflineError> {
     // One picture is being drawn and one written while the queue is full.
     let waiting = views.len().min(QUEUE + 2) as u64;
-    if let Some(size) = views.iter().map(|(_, view)| view.size).max_by_key(|size| size.as_u64vec2().element_product()) {
-        memory_check::require(size, memory_check::on_gpu(headless) + waiting * memory_check::PICTURE)?;
-    }
+    Pictures::written(views.iter().map(|(_, view)| view.size), waiting).require(Some(&*headless), BY_SIZE)?;
     let (queue, drawn) = sync_channel::<(&Shot, Picture)>(QUEUE);
     // A thread pool of its own: threads that wait for pictures would stall rayon's shared pool.
     let writers = rayon::ThreadPoolBuilder::new().build()?;
@@ -57,6 +56,7 @@ fn draw<'s>(
     progress.begin("rendering", views.len());
     let mut counts = Vec::with_capacity(views.len());
     for (shot, view) in views {
+        proceed(progress)?;
         let frame = headless.render(capture, view, background)?;
         counts.push(frame.counts);
         if queue.send((shot, frame.picture)).is_err() {

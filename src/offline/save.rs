@@ -3,7 +3,8 @@
 //! In: a path and its contents: a scene, a picture, anything else. Out: the file, which replaces an existing one only
 //! once it is complete, and has its permissions. A package is read back before.
 
-use super::temporary_file;
+use super::temporary_file::{self, Part};
+use super::unfinished::Streaming;
 use crate::codec::package::{self, WriteSettings};
 use crate::codec::{self, CodecError, CodecErrorKind};
 use crate::scene::{Form, GaussianScene, SceneForm};
@@ -16,14 +17,14 @@ use std::path::{Path, PathBuf};
 /// Most symbolic links that are followed from one to the next, as on Linux.
 const MAX_LINKS: usize = 40;
 
-/// Writes a scene in the format of the path's extension ([`codec::write`]), as [`write_beside`] does. The new file is read back whole
+/// Writes a scene in the format of the path's extension ([`codec::write`]), as `write_beside` does. The new file is read back whole
 /// before it replaces an existing one.
 ///
 /// # Errors
 /// A scene that the format cannot hold, a folder that cannot be written to, a full disk, a package that cannot be read back.
 pub fn save(path: &Path, scene: &GaussianScene, settings: &WriteSettings) -> Result<(), CodecError> {
-    replace(path, |writer| codec::write(writer, path, scene, settings), read_back)
-        .map_err(|kind| CodecError { path: path.to_owned(), kind })
+    let part = part(path, |writer| codec::write(writer, path, scene, settings), read_back)?;
+    temporary_file::replace(part.into_iter().collect())
 }
 
 /// Checks that a package that was just written can be read.
@@ -68,26 +69,51 @@ pub fn write_beside<E>(path: &Path, write: impl FnOnce(&mut BufWriter<File>) -> 
 where
     CodecErrorKind: From<E>,
 {
-    replace(path, write, |_| Ok(())).map_err(|kind| CodecError { path: path.to_owned(), kind })
+    let part = part(path, write, |_| Ok(()))?;
+    temporary_file::replace(part.into_iter().collect())
 }
 
-/// As [`write_beside`]; `check` may refuse the file that was written.
-fn replace<E>(
+/// Writes files that belong together, as [`write_beside`] does: no existing one is replaced before all of them are complete. Those after the
+/// first are never beside another first one than their own.
+///
+/// # Errors
+/// A folder that cannot be written to, a full disk.
+pub(super) fn write_together(files: &[(&Path, &[u8])]) -> Result<(), CodecError> {
+    let part = |&(path, bytes): &(&Path, &[u8])| part(path, |file| file.write_all(bytes), |_| Ok(())).transpose();
+    temporary_file::replace(files.iter().filter_map(part).collect::<Result<_, _>>()?)
+}
+
+/// Writes a complete temporary file that is to replace the output `path`. Returns it with the path that it replaces; `None` if a device or a pipe
+/// was written. `check` may refuse the file.
+fn part<E>(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>,
     check: impl FnOnce(File) -> Result<(), CodecErrorKind>,
-) -> Result<(), CodecErrorKind>
+) -> Result<Option<(Part, PathBuf)>, CodecError>
+where
+    CodecErrorKind: From<E>,
+{
+    filled(path, write, check).map_err(|kind| CodecError { path: path.to_owned(), kind })
+}
+
+fn filled<E>(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> Result<(), E>,
+    check: impl FnOnce(File) -> Result<(), CodecErrorKind>,
+) -> Result<Option<(Part, PathBuf)>, CodecErrorKind>
 where
     CodecErrorKind: From<E>,
 {
     if is_stream(path) {
+        let _streaming = Streaming::begin();
         let mut writer = BufWriter::new(File::create(path)?);
         write(&mut writer)?;
-        return Ok(writer.flush()?);
+        writer.flush()?;
+        return Ok(None);
     }
     let target = resolved(path);
-    let temporary = temporary_file::create(folder_of(&target))?;
-    let mut writer = BufWriter::with_capacity(1 << 16, temporary.as_file().try_clone()?);
+    let part = temporary_file::create(target.clone())?;
+    let mut writer = BufWriter::with_capacity(1 << 16, part.file.try_clone()?);
     write(&mut writer)?;
     let written = writer.into_inner().map_err(io::IntoInnerError::into_error)?;
     written.sync_all()?;
@@ -95,10 +121,9 @@ where
     if let Ok(replaced) = target.metadata()
         && replaced.is_file()
     {
-        temporary.as_file().set_permissions(replaced.permissions())?;
+        part.file.set_permissions(replaced.permissions())?;
     }
-    temporary.persist(&target).map_err(|failed| failed.error)?;
-    Ok(())
+    Ok(Some((part, path.to_owned())))
 }
 
 /// Returns whether a path leads to a device or a pipe.

@@ -5,12 +5,13 @@
 
 use super::dataset::{DatasetError, TrainingView};
 use super::engine::Engine;
+use super::memory_check::{BY_RESOLUTION, Pictures};
 use super::prune::kept_count;
 use super::quality::{Evaluator, Trial, smallest_count};
-use super::score::variant::Variant;
+use super::score::Variant;
 use super::score::{ScoreError, Scores};
 use super::stored::{Stored, Text};
-use super::{OfflineError, Progress};
+use super::{OfflineError, Progress, proceed};
 use crate::scene::{GaussianScene, RuntimeScene};
 use crate::view::Background;
 use serde::{Serialize, Serializer};
@@ -197,7 +198,7 @@ impl ScoreSearch {
     /// with the pictures of the whole scene instead.
     ///
     /// # Errors
-    /// No validation views, images that are required and missing, or cannot be read; a failure of the engine.
+    /// No validation views, images that are required and missing, cannot be read, or do not fit the memory; a failure of the engine.
     pub fn open(
         engine: &mut Engine,
         validation: &[TrainingView],
@@ -210,6 +211,7 @@ impl ScoreSearch {
             let what = if required { "the loss allowed" } else { "the best score" };
             return Err(OfflineError::NoValidation { what });
         }
+        Pictures::compared(validation).require(engine.headless(), BY_RESOLUTION)?;
         match Evaluator::by_images(validation, &scene.trained_with, background) {
             Ok(evaluator) => {
                 let baseline = Some(evaluator.psnr(engine, scene)?);
@@ -240,6 +242,7 @@ impl ScoreSearch {
         progress.begin("comparing scores", candidates.len());
         let mut outcomes = Vec::with_capacity(candidates.len());
         for candidate in &candidates {
+            proceed(progress)?;
             outcomes.push(self.outcome(engine, scene, candidate, goal)?);
             progress.advance();
         }

@@ -7,7 +7,7 @@
 use super::report::StageTime;
 use super::store::{Key, Store};
 use super::stored::Stored;
-use super::{OfflineError, Progress};
+use super::{OfflineError, Progress, proceed};
 use std::time::Instant;
 
 /// Stages in progress.
@@ -44,10 +44,10 @@ impl<'a> Stages<'a> {
         let result = match stored {
             Some(stored) => stored,
             None => {
-                self.cancellation()?;
+                proceed(self.progress)?;
                 let body = work(self.progress)?.encode()?;
                 let result = T::decode(&body).ok_or(OfflineError::Unreadable { stage: name })?;
-                self.store.store(name, inputs, &body, self.progress)?;
+                self.store.store(name, inputs, &body)?;
                 (result, Key::of(&body))
             }
         };
@@ -64,7 +64,7 @@ impl<'a> Stages<'a> {
         name: &'static str,
         work: impl FnOnce(&mut dyn Progress) -> Result<T, OfflineError>,
     ) -> Result<T, OfflineError> {
-        self.cancellation()?;
+        proceed(self.progress)?;
         let start = Instant::now();
         let result = work(self.progress)?;
         self.ended(name, start, false);
@@ -92,10 +92,6 @@ impl<'a> Stages<'a> {
     /// Finishes the task.
     pub fn finish(self) {
         self.progress.finish();
-    }
-
-    fn cancellation(&self) -> Result<(), OfflineError> {
-        if self.progress.is_interrupted() { Err(OfflineError::Interrupted { tuned: None }) } else { Ok(()) }
     }
 
     fn ended(&mut self, name: &'static str, start: Instant, skipped: bool) {

@@ -7,7 +7,7 @@ use super::dataset::TrainingView;
 use super::files::node;
 use super::temporary_file;
 use crate::codec::CodecError;
-use crate::offline::{Progress, write_beside};
+use crate::offline::{unfinished, write_beside};
 use rayon::prelude::*;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind, Read, Write};
@@ -108,8 +108,12 @@ impl Store {
         let mut name = out.file_name().unwrap_or_default().to_owned();
         name.push(ending);
         let folder = out.with_file_name(name);
+        let mut unfinished = unfinished::lock();
         match lock(&folder) {
             Ok(lock) => {
+                unfinished.add_file(&folder.join(LOCK));
+                unfinished.add_folder(&folder);
+                drop(unfinished);
                 temporary_file::remove_stale(&folder);
                 Ok(Self(Arc::new(Held { folder, lock: Some(lock) })))
             }
@@ -133,12 +137,10 @@ impl Store {
     ///
     /// # Errors
     /// A folder that cannot be written to, a full disk.
-    pub fn store(&self, name: &str, key: Key, body: &[u8], progress: &mut dyn Progress) -> Result<(), CodecError> {
-        progress.uninterrupted(&mut || {
-            write_beside(&self.folder().join(name), |file| {
-                file.write_all(&head(key, body))?;
-                file.write_all(body)
-            })
+    pub fn store(&self, name: &str, key: Key, body: &[u8]) -> Result<(), CodecError> {
+        write_beside(&self.folder().join(name), |file| {
+            file.write_all(&head(key, body))?;
+            file.write_all(body)
         })
     }
 
@@ -158,6 +160,8 @@ impl Store {
 impl Drop for Held {
     fn drop(&mut self) {
         // A run that begins at this moment makes another lock file: the folder is then not empty, and stays.
+        let mut unfinished = unfinished::lock();
+        unfinished.take_file(&self.folder.join(LOCK));
         let _ = fs::remove_file(self.folder.join(LOCK));
         drop(self.lock.take());
         // `remove_dir` does not remove a folder that has contents.
@@ -212,7 +216,6 @@ fn head(key: Key, body: &[u8]) -> [u8; HEAD] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::offline::NoProgress;
 
     #[test]
     fn results_come_back_for_the_same_fingerprint_alone() {
@@ -222,7 +225,7 @@ mod tests {
         let inputs = Key::of_files(&[&out]).expect("the file is there");
         let work = Store::beside(&out, ".bake").expect("the folder can be made");
         let (settings, others) = (inputs.and("ratio 0.8"), inputs.and("ratio 0.5"));
-        let stored = work.store("kept", settings, b"some bytes", &mut NoProgress);
+        let stored = work.store("kept", settings, b"some bytes");
         stored.expect("the folder can be written to");
         assert_eq!(work.load("kept", settings).as_deref(), Some(b"some bytes".as_slice()), "the same inputs");
         assert_eq!(work.load("kept", others), None, "other settings");
@@ -244,7 +247,7 @@ mod tests {
         let out = folder.path().join("scene.gs4d");
         let work = Store::beside(&out, ".bake").expect("the folder can be made");
         let (path, foreign) = (work.folder().to_owned(), work.folder().join("notes.txt"));
-        work.store("kept", Key::of(b"inputs"), b"some bytes", &mut NoProgress).expect("the folder can be written to");
+        work.store("kept", Key::of(b"inputs"), b"some bytes").expect("the folder can be written to");
         fs::write(&foreign, b"mine").expect("the folder can be written to");
         work.remove().expect("the folder can be listed");
         let left: Vec<_> = fs::read_dir(&path).expect("the folder").flatten().map(|entry| entry.path()).collect();

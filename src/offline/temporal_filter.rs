@@ -6,6 +6,7 @@
 use super::dataset::TrainingView;
 use super::dataset::selection::{distinct_cameras, distinct_times, to_draw};
 use super::engine::Engine;
+use super::memory_check::{BY_RESOLUTION, Pictures};
 use super::score::{ScoreEngine, ScoreError, Want};
 use super::{OfflineError, Progress, sliced};
 use crate::scene::{FilterKind, GaussianScene, RuntimeScene, TemporalFilter};
@@ -55,7 +56,7 @@ impl KeyFrames {
 /// task "looking".
 ///
 /// # Errors
-/// A scene that cannot be drawn; for kinds that need views also views that show nothing of it, a failure of the engine.
+/// A scene that cannot be drawn; for kinds that need views also views that do not fit the memory or the GPU or show nothing of it, a failure of the engine.
 pub fn filter(
     engine: &mut Engine,
     scene: &GaussianScene,
@@ -70,6 +71,7 @@ pub fn filter(
         return Ok(TemporalFilter::support(gaussians.iter().copied(), interval, keys.max(2) - 1));
     }
     let runtime = GaussianScene { filter: None, ..scene.clone() }.into_runtime()?;
+    Pictures::looked_at(views).require(engine.headless(), BY_RESOLUTION)?;
     let mut scorer = engine.scorer(&runtime, runtime.trained_background())?;
     Ok(seen_filter(scorer.as_mut(), &runtime, kind, keys, views, progress)?)
 }
@@ -149,6 +151,9 @@ pub fn key_frame_masks(
     let mut masks = vec![vec![0; TemporalFilter::words(count)]; times.len()];
     for (mask, &time) in masks.iter_mut().zip(times) {
         for camera in cameras {
+            if progress.is_interrupted() {
+                return Err(ScoreError::Interrupted);
+            }
             add_blended(engine, &camera.view(time, raster_fov), mask)?;
             progress.advance();
         }
@@ -187,6 +192,9 @@ pub fn interval_filter(
     let mut segments = unions(masks);
     let ends = from_segments(FilterKind::Interval, &segments, count);
     for view in views {
+        if progress.is_interrupted() {
+            return Err(ScoreError::Interrupted);
+        }
         let segment = ends.segment_of(view.time, interval) as usize;
         add_blended(engine, view, &mut segments[segment])?;
         progress.advance();

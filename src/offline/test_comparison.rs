@@ -1,6 +1,6 @@
 //! The comparison of a package with the scene that it was made of, on the test views.
 //!
-//! In: the scene before pruning, the package on disk, the test views. Out: the metrics of both, over the background of training and
+//! In: the scene before pruning, the bytes of the package, the test views. Out: the metrics of both, over the background of training and
 //! over a contrasting one, and a few pictures ([`Compared`]).
 
 use super::dataset::Dataset;
@@ -10,9 +10,10 @@ use super::metrics::{Evaluation, MetricSet};
 use super::report::{Change, Sample};
 use super::splits::{Splits, split_name};
 use super::{OfflineError, Progress, Subject};
-use crate::codec::{self, ReadOptions};
+use crate::codec::package;
 use crate::scene::RuntimeScene;
 use crate::view::Picture;
+use std::io::Cursor;
 use std::path::Path;
 
 /// Most views whose pictures are on the page.
@@ -31,16 +32,17 @@ pub(super) struct Compared {
     pub samples: Vec<Sample>,
 }
 
-/// Draws the test views of the scene and of the package at `out`. `None`, with a note, if the views or their images are missing.
+/// Draws the test views of the scene and of the package that will be written to `out`. `None`, with a note, if the views or their images are missing.
 pub(super) fn compare_test_views(
     engine: &mut Engine,
     subject: &Subject,
     splits: &Splits,
     out: &Path,
+    package: &[u8],
     progress: &mut dyn Progress,
 ) -> Result<Option<Compared>, OfflineError> {
-    let after = codec::load(out, &ReadOptions::default())?.into_runtime();
-    let after = after.map_err(|error| OfflineError::at(out, error))?;
+    let after = package::read(Cursor::new(package)).map_err(|error| OfflineError::at(out, error))?;
+    let after = after.into_runtime().map_err(|error| OfflineError::at(out, error))?;
     let Some(dataset) = test_views(subject, splits, progress) else { return Ok(None) };
     let count = dataset.views.len();
     let samples = SAMPLES.min(count);

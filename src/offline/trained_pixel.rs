@@ -1,22 +1,27 @@
-//! The size of the pixels that a capture was trained with.
+//! The size of the pixels of a capture's training views.
 //!
-//! In: a scene, the views it was trained on. Out: the largest size that a pixel of these views has at its Gaussians, beyond which pictures
-//! are anti-aliased.
+//! In: a scene, its training views. Out: the largest size that a pixel of these views has at the Gaussians of the scene. Pictures with larger
+//! pixels are anti-aliased.
 
 use super::dataset::TrainingView;
 use crate::scene::GaussianScene;
-use crate::view::RasterFov;
+use crate::view::{RasterFov, View};
+use glam::Vec3;
 use rayon::prelude::*;
 
-/// One in so many Gaussians may be farther away: some are strays.
+/// In each view, one in this many Gaussians may be farther away: these are outliers.
 const STRAYS: usize = 100;
 
-/// Returns the largest size, in capture units, that a pixel of the training views has at the Gaussians of a scene, but for the farthest
-/// hundredth in each view, so that none of these is drawn otherwise there; `None` if no view has a Gaussian in front of it.
+/// Returns the largest size, in capture units, that a pixel of the training views has at the Gaussians of a scene, except the farthest
+/// hundredth in each view. Training views are therefore drawn without anti-aliasing. Views without a Gaussian in their picture are left
+/// out; `None` if no view is left.
 pub fn trained_pixel(scene: &GaussianScene, views: &[TrainingView]) -> Option<f32> {
     let means = scene.form.means();
     let size_in = |view: &TrainingView| {
         let view = view.camera.view(view.time, RasterFov::Corrected);
+        if !shows_any(&view, &means) {
+            return None;
+        }
         let depths = means.iter().map(|&mean| view.world_to_camera.transform_point3(mean.into()).z);
         let mut depths: Vec<f32> = depths.filter(|&depth| depth > view.near).collect();
         let farthest = depths.len().checked_sub(1 + depths.len() / STRAYS)?;
@@ -27,23 +32,34 @@ pub fn trained_pixel(scene: &GaussianScene, views: &[TrainingView]) -> Option<f3
     sizes.reduce_with(f32::max)
 }
 
+/// Returns whether one of these means is in the picture of a view.
+fn shows_any(view: &View, means: &[[f32; 3]]) -> bool {
+    let [row_x, row_y] = view.clip_rows();
+    means.iter().any(|&mean| {
+        let point = Vec3::from(mean);
+        let depth = view.world_to_camera.transform_point3(point).z;
+        let point = point.extend(1.0);
+        depth > view.near && row_x.dot(point).abs() <= depth && row_y.dot(point).abs() <= depth
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::gaussian::{Gaussian, Harmonics};
     use crate::scene::RuntimeScene;
     use crate::view::Camera;
-    use glam::{UVec2, Vec3};
+    use glam::UVec2;
     use std::path::PathBuf;
 
-    fn view_from(eye: Vec3) -> TrainingView {
-        let camera = Camera::look_at(eye, Vec3::ZERO, Vec3::Z, 2.0 * 0.5f32.atan(), UVec2::splat(100));
+    fn view_from(eye: Vec3, target: Vec3) -> TrainingView {
+        let camera = Camera::look_at(eye, target, Vec3::Z, 2.0 * 0.5f32.atan(), UVec2::splat(100));
         let (name, image) = (String::new(), PathBuf::new());
         TrainingView { name, camera, time: 0.0, original: camera.size, image, mask: None }
     }
 
     #[test]
-    fn the_farthest_view_tells_the_size() {
+    fn the_size_is_that_in_the_farthest_view_that_shows_the_scene() {
         let at = |y: f32| Gaussian {
             mean: [0.0, y, 0.0],
             mean_t: 0.0,
@@ -55,11 +71,17 @@ mod tests {
         };
         let scene = |gaussians| GaussianScene::from(RuntimeScene::sliced(gaussians, Harmonics::default()));
         let two = scene(vec![at(-1.0), at(1.0)]);
-        let views = [view_from(Vec3::new(0.0, -4.0, 0.0)), view_from(Vec3::new(0.0, -9.0, 0.0))];
-        // 100 pixels are as wide as the depth: 9 to the middle, and one to the far side.
-        let found = trained_pixel(&two, &views).expect("they look at it");
-        assert!((found - 0.1).abs() < 1e-4, "{found}");
-        assert_eq!(trained_pixel(&two, &[]), None, "without views");
-        assert_eq!(trained_pixel(&scene(Vec::new()), &views), None, "without a scene");
+        let eye = |y: f32| Vec3::new(0.0, y, 0.0);
+        let mut views = vec![view_from(eye(-4.0), Vec3::ZERO), view_from(eye(-9.0), Vec3::ZERO)];
+        // 100 pixels are as wide as the depth: 9 to the center, and 1 more to the far Gaussian.
+        let found = trained_pixel(&two, &views).expect("both views show the scene");
+        assert!((found - 0.1).abs() < 1e-4, "the size in the farther view is 0.1 units: {found}");
+        // In the first view, both Gaussians are in front of the camera, but outside the picture. In the second, they are behind the camera.
+        let away = [view_from(eye(-90.0), Vec3::new(90.0, -89.0, 0.0)), view_from(eye(-90.0), eye(-91.0))];
+        assert_eq!(trained_pixel(&two, &away), None, "no size without a Gaussian in a picture");
+        views.extend(away);
+        assert_eq!(trained_pixel(&two, &views), Some(found), "views that show no Gaussian do not change the size");
+        assert_eq!(trained_pixel(&two, &[]), None, "no size without views");
+        assert_eq!(trained_pixel(&scene(Vec::new()), &views), None, "no size without Gaussians");
     }
 }

@@ -1,14 +1,14 @@
 //! Captures in a Bevy app: everything that uses Bevy.
 //!
 //! In: an app with Bevy's `DefaultPlugins`, or at least its `MinimalPlugins` and `AssetPlugin`. Out: the same app, in
-//! which captures load, play and, if it has a renderer, are drawn. The crate root re-exports these modules. Each uses
+//! which captures load, play and, if it has a renderer, are drawn. The crate root re-exports these modules but `component`, whose items are at the root and in [`asset`]. Each uses
 //! only modules before it:
 //!
 //! ```text
 //! component ──▶ asset ──▶ playback ──▶ render ──▶ pbr, picker, stereo ──▶ picking_backend, inspector, testing
 //! ```
 //!
-//! * [`component`]: the capture asset, and the component that places it in the world
+//! * `component`: the capture asset, and the component that places it in the world
 //! * [`asset`]: loading and saving captures, and the state of loading on each entity
 //! * [`playback`]: the time of each capture; shared clocks and timelines
 //! * [`render`]: drawing captures into the targets of cameras, and their settings
@@ -24,7 +24,7 @@
 
 pub mod asset;
 mod capture_plugin;
-pub mod component;
+pub(crate) mod component;
 #[cfg(feature = "inspector")]
 pub mod inspector;
 #[cfg(feature = "pbr")]
@@ -39,4 +39,4 @@ pub mod stereo;
 pub mod testing;
 
 pub use capture_plugin::GaussianCapturePlugin;
-pub use component::GaussianCapture3d;
+pub use component::{GaussianCapture3d, Upright};

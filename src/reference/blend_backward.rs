@@ -9,6 +9,7 @@
 
 use super::{Layer, Pair, Splat, TileLists, behind, project, tile_lists};
 use crate::gaussian::alpha::{ALPHA_MAX, BlendStep, blend_step};
+use crate::gaussian::conic::conic_entries;
 use crate::gaussian::overlap::tile_at;
 use crate::gaussian::{
     GradientMode, GradientSettings, ParameterGradient, SliceSettings, SplatGradient, parameter_gradient,
@@ -142,8 +143,8 @@ fn blend_pixel_backward(
             blended.transmittance * value - behind / (1.0 - blended.alpha)
         };
         let g_power = f64::from(splat.opacity) * blended.falloff * g_alpha;
-        let (conic, DVec2 { x, y }) = (splat.conic.as_dvec3(), blended.offset);
-        let g_center = -g_power * DVec2::new(conic.x * x + conic.y * y, conic.y * x + conic.z * y);
+        let ([xx, xy, yy], DVec2 { x, y }) = (conic_entries(splat.conic.to_array().map(f64::from)), blended.offset);
+        let g_center = -g_power * DVec2::new(xx * x + xy * y, xy * x + yy * y);
         parts[index] += SplatGradient {
             ndc: (g_center * size * 0.5).to_array(),
             conic: [-0.5 * g_power * x * x, -g_power * x * y, -0.5 * g_power * y * y],
@@ -186,7 +187,8 @@ fn walk(splats: &[Splat], pairs: &[Pair], at: UVec2, mut each: impl FnMut(usize,
             BlendStep::Blend { transmittance: after, .. } => {
                 let (conic, offset) = (splat.conic.as_dvec3(), offset.as_dvec2());
                 let DVec2 { x, y } = offset;
-                let falloff = (-0.5 * (conic.x * x * x + conic.z * y * y) - conic.y * x * y).exp();
+                let along = x + conic.y * y;
+                let falloff = (-0.5 * (conic.x * along * along + conic.z * y * y)).exp();
                 let (alpha, most) = (f64::from(splat.opacity) * falloff, f64::from(ALPHA_MAX));
                 let blended =
                     Blended { offset, falloff, alpha: alpha.min(most), clamped: alpha >= most, transmittance };

@@ -7,11 +7,12 @@ use super::timing::{MOTION_PASSES, TIMED_FAST_PASSES, TIMED_PASSES};
 /// The sequence of passes that draws a view. All designs draw the same picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
 pub enum Design {
-    /// [`Fast`](Self::Fast), but [`Reference`](Self::Reference) on software drivers, where it is faster, and in browsers, where the fast
-    /// design is untested.
+    /// [`Fast`](Self::Fast), but [`Reference`](Self::Reference) on software drivers, where it is faster, in browsers, where the fast design is
+    /// untested, and for more than 2²⁴ splats, which bins cannot number.
     #[default]
     Auto,
-    /// Bins of splats, each sorted by one workgroup.
+    /// Bins of splats, each sorted by one workgroup. Software drivers draw with [`Reference`](Self::Reference) if they would end the loops over
+    /// the splats of a bin early.
     Fast,
     /// Global sorts by depth and by tile, in the order of the original rasterizer.
     Reference,

@@ -61,6 +61,27 @@ pub enum GpuError {
         /// Bytes that the device can bind.
         limit: u64,
     },
+    /// A software driver would end the loops of the passes before all splats are blended.
+    #[error("a software driver does not draw {slots} Gaussians: draw fewer Gaussians, or use a graphics card")]
+    TooManySplats {
+        /// Number of Gaussians that are drawn.
+        slots: usize,
+    },
+    /// A picture needs a larger buffer than the device can create or bind.
+    #[error(
+        "a picture of {} x {} pixels needs {needed} bytes for {what}, and buffers of this GPU have at most {limit}: draw a smaller picture",
+        .size[0], .size[1]
+    )]
+    Picture {
+        /// Width and height, pixels.
+        size: [u32; 2],
+        /// What the buffer is for.
+        what: &'static str,
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes that the device allows.
+        limit: u64,
+    },
     /// The device has no memory left for a buffer or a texture.
     #[error(
         "at least {needed} bytes of this GPU's memory are needed, and there is no room for them ({reason}): draw fewer Gaussians or a \
@@ -107,6 +128,8 @@ impl GpuError {
             | Self::Limit { .. }
             | Self::Shader { .. }
             | Self::TooLarge { .. }
+            | Self::TooManySplats { .. }
+            | Self::Picture { .. }
             | Self::Size { .. }
             | Self::Scene(_) => false,
         }

@@ -418,7 +418,7 @@ pub struct SplatRecord {
     pub opacity: f32,
     /// Depth, camera units.
     pub depth: f32,
-    /// Inverse covariance: xx, xy, yy.
+    /// Inverse covariance, [factored](crate::gaussian::conic).
     pub conic: [f32; 3],
     /// Tiles x0 and y0, 16 bits each.
     pub tiles_low: u32,
@@ -434,7 +434,7 @@ pub struct SplatRecord {
 pub struct SplatShape {
     /// Center in pixels, opacity times marginal, depth in camera units.
     pub place: [f32; 4],
-    /// Inverse covariance: xx, xy, yy.
+    /// Inverse covariance, [factored](crate::gaussian::conic); unused.
     pub conic: [f32; 4],
 }
 
@@ -483,6 +483,6 @@ pub const SORT_VISIBLE: u32 = 1;
 /// Sorts the pairs.
 pub const SORT_PAIRS: u32 = 2;
 
-/// Number of counters of the fast design before the counters of parts and bins: pairs of this frame, then the [`Counters`] of the previous
-/// frame, the last of which is the number of pairs written.
-pub const BIN_COUNTERS: u32 = 5;
+/// Number of counters of the fast design before the counters of parts and bins: pairs of this frame, modulo 2³², and how often this number
+/// has wrapped; then the [`Counters`] of the previous frame, the last of which is the number of pairs written.
+pub const BIN_COUNTERS: u32 = 6;

@@ -146,3 +146,15 @@ pub fn with_room<T>(device: &wgpu::Device, needed: u64, create: impl FnOnce() ->
 pub fn binding_limit(limits: &wgpu::Limits) -> u64 {
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
 }
+
+/// Checks that the device can create textures of this size.
+///
+/// # Errors
+/// No pixels, or a longer side than the device allows.
+pub fn require_texture(size: UVec2, limits: &wgpu::Limits) -> Result<(), GpuError> {
+    let limit = limits.max_texture_dimension_2d;
+    match size.min_element() == 0 || size.max_element() > limit {
+        true => Err(GpuError::Size { width: size.x, height: size.y, limit }),
+        false => Ok(()),
+    }
+}

@@ -41,21 +41,25 @@
 //! The result is exact, but slow: each tile visits every splat. On a device whose limits are too low for the pairs of a view, every frame is
 //! drawn this way ([`ViewRenderer::is_short_of_room`]). Clients that read the lists of pairs need all pairs: [`Headless::draw`] draws again
 //! with larger buffers, or returns an error.
+//!
+//! Mesa's software driver ends all loops of a thread after 65,535 iterations. There `blend` blends many splats in an iteration if a view has
+//! many, and frames of the fast design that may exceed the iterations are drawn with the reference design: [`Headless`] draws such a frame
+//! again, other views use the reference design from a number of splats on. Hardware has no such limit.
 
 mod active;
-pub mod bind;
+pub(crate) mod bind;
 mod capture;
 mod design;
 mod device;
 mod error;
 mod headless;
-pub mod layout;
-pub mod memory;
+pub(crate) mod layout;
+pub(crate) mod memory;
 mod pipelines;
-pub mod shaders;
+pub(crate) mod shaders;
 mod statistics;
 mod timing;
-mod view;
+pub(crate) mod view;
 mod work;
 
 pub use active::ActiveList;
@@ -68,5 +72,6 @@ pub use pipelines::Renderer;
 pub use shaders::{ColorPrecision, ShaderChecks, Storage};
 pub use statistics::ViewStatistics;
 pub use timing::{PassTime, Timings};
-pub use view::{FinishedFrame, Instance, OpaqueDepth, PassBuffers, ViewParameters, ViewRenderer};
+pub(crate) use view::FinishedFrame;
+pub use view::{Instance, OpaqueDepth, ViewParameters, ViewRenderer};
 pub use work::WorkCounters;

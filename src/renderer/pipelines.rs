@@ -8,7 +8,8 @@ use super::error::GpuError;
 use super::layout::{self, INSTANCES_BOUND};
 use super::memory::{Allocator, catch_known};
 use super::shaders::{
-    BINNED, COPIED_INSTANCE, FEW_BINS, FastVariant, Lists, Pixels, SUBGROUPS_OF_32, ShaderChecks, Storage, module,
+    AtOnce, BINNED, COPIED_INSTANCE, FEW_BINS, FastVariant, Lists, Pixels, SUBGROUPS_OF_32, ShaderChecks, Storage,
+    module,
 };
 use super::work::WorkCounters;
 use std::sync::OnceLock;
@@ -21,9 +22,9 @@ pub struct Renderer {
     pub(super) activate_scan: wgpu::ComputePipeline,
     pub(super) activate_write: wgpu::ComputePipeline,
     /// Passes of the reference design, compiled on first use: `project`, indexed by whether instances are copied and by the storage of the
-    /// capture (order of [`Storage::ALL`]), `blend` (order of [`Pixels::ALL`]), and the passes between them.
+    /// capture (order of [`Storage::ALL`]), `blend` (order of [`AtOnce::ALL`], then of [`Pixels::ALL`]), and the passes between them.
     project: [[OnceLock<wgpu::ComputePipeline>; 3]; 2],
-    blend: [OnceLock<wgpu::ComputePipeline>; 4],
+    blend: [[OnceLock<wgpu::ComputePipeline>; 4]; 3],
     reference: OnceLock<ReferencePasses>,
     /// Passes of the fast design, each compiled on first use: `project_bin`, indexed by whether there are few bins and then as `project`,
     /// `colors`, indexed as `project`, `sort_bins` (order of [`Lists::ALL`]), and `blend_blocks` (by [`FastVariant::blend_index`]).
@@ -38,10 +39,11 @@ pub struct Renderer {
     /// Whether [`Design::Auto`] is the reference design: on software drivers, where it is faster, and in browsers, where the fast design is
     /// untested.
     prefers_reference: bool,
+    /// Whether the driver is a software driver: threads copy the uniforms of their instance even in a dispatch of a single instance, and the
+    /// loops of a thread may end early.
+    pub(super) is_software: bool,
     /// [`SUBGROUPS_OF_32`], or empty if the subgroup size of the device is not always 32.
     subgroups: &'static [&'static str],
-    /// Whether threads copy the uniforms of their instance even in a dispatch of a single instance: on software drivers.
-    copies_instance: bool,
     /// Bound instead of a list of active Gaussians if all Gaussians are drawn.
     pub(super) no_list: wgpu::BindGroup,
     work: WorkCounters,
@@ -141,12 +143,12 @@ impl Renderer {
             motion: Default::default(),
             checks,
             prefers_reference: software || info.backend == wgpu::Backend::BrowserWebGpu,
+            is_software: software,
             subgroups: if device.features().contains(wgpu::Features::SUBGROUP) && sizes == [32, 32] {
                 SUBGROUPS_OF_32
             } else {
                 &[]
             },
-            copies_instance: software,
             no_list: allocator.bind_group("gs4d no active list", &layouts.active, &[no_list.as_entire_binding()]),
             layouts,
             work,
@@ -187,7 +189,7 @@ impl Renderer {
 
     /// Returns the index of pipelines of passes that read a capture: 1 for pipelines that copy their instance first.
     fn copied(&self, batched: bool) -> usize {
-        usize::from(batched || self.copies_instance)
+        usize::from(batched || self.is_software)
     }
 
     /// Compiles the entry point of a pass.
@@ -218,6 +220,7 @@ impl Renderer {
         device: &wgpu::Device,
         drawn: impl Iterator<Item = (Storage, bool)>,
         pixels: Pixels,
+        at_once: AtOnce,
     ) -> Result<(), GpuError> {
         let layouts = &self.layouts;
         for (storage, batched) in drawn {
@@ -233,10 +236,11 @@ impl Renderer {
             let made = checked(device, "sort", || ReferencePasses::new(device, layouts, self.checks))?;
             self.reference.get_or_init(|| made);
         }
-        if self.blend(pixels).is_none() {
+        if self.blend(pixels, at_once).is_none() {
+            let definitions = [&pixels.definitions(), at_once.definitions()].concat();
             let groups = [&layouts.pixel[pixels.index()], &layouts.blend].map(Some);
-            let made = self.compiled(device, "blend", "blend", &pixels.definitions(), &groups)?;
-            self.blend[pixels.index()].get_or_init(|| made);
+            let made = self.compiled(device, "blend", "blend", &definitions, &groups)?;
+            self.blend[at_once as usize][pixels.index()].get_or_init(|| made);
         }
         Ok(())
     }
@@ -246,9 +250,9 @@ impl Renderer {
         self.project[self.copied(batched)][storage as usize].get()
     }
 
-    /// Returns `blend` for pixels of this kind, if it has been compiled.
-    pub(super) fn blend(&self, pixels: Pixels) -> Option<&wgpu::ComputePipeline> {
-        self.blend[pixels.index()].get()
+    /// Returns `blend` for pixels of this kind and for this number of splats at once, if it has been compiled.
+    pub(super) fn blend(&self, pixels: Pixels, at_once: AtOnce) -> Option<&wgpu::ComputePipeline> {
+        self.blend[at_once as usize][pixels.index()].get()
     }
 
     /// Returns the other passes of the reference design, if they have been compiled.
@@ -268,7 +272,7 @@ impl Renderer {
     ) -> Result<(), GpuError> {
         let drawn = std::iter::once((storage, false));
         match self.resolve(design) {
-            Design::Reference => self.compile_reference(device, drawn, Pixels::default()),
+            Design::Reference => self.compile_reference(device, drawn, Pixels::default(), AtOnce::One),
             Design::Auto | Design::Fast => {
                 let lists = Lists::suiting(&device.limits(), 0);
                 self.compile_fast(device, drawn, FastVariant { lists, ..FastVariant::default() })

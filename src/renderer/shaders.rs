@@ -13,6 +13,7 @@ use wgpu::naga::valid::Capabilities;
 const LIBRARIES: &[(&str, &str)] = &[
     ("types", include_str!("../../shaders/shared/types.wgsl")),
     ("records", include_str!("../../shaders/shared/records.wgsl")),
+    ("conic", include_str!("../../shaders/shared/conic.wgsl")),
     ("alpha", include_str!("../../shaders/shared/alpha.wgsl")),
     ("tile", include_str!("../../shaders/shared/tile.wgsl")),
     ("srgb", include_str!("../../shaders/shared/srgb.wgsl")),
@@ -115,6 +116,43 @@ pub const COMPAT_WITHOUT_TIME: &[&str] = &["COMPAT", "WITHOUT_TIME"];
 /// The definition of `blend_backward` and `project_backward` that sums by float atomics, for devices that support them.
 pub const ATOMIC_SUMS: &[&str] = &["ATOMIC_SUMS"];
 
+/// Number of splats that `blend` blends in an iteration once it has blended the first splats of a tile. Mesa's software driver ends all loops
+/// of a thread after 65,535 iterations; long lists are blended completely if an iteration blends many splats. Hardware blends one: the code
+/// for many is long.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum AtOnce {
+    /// One splat.
+    #[default]
+    One,
+    /// 16 splats.
+    Sixteen,
+    /// 64 splats.
+    SixtyFour,
+}
+
+impl AtOnce {
+    /// All numbers, ascending.
+    pub const ALL: [Self; 3] = [Self::One, Self::Sixteen, Self::SixtyFour];
+
+    /// Returns the number of splats.
+    pub(super) fn splats(self) -> u32 {
+        match self {
+            Self::One => 1,
+            Self::Sixteen => 16,
+            Self::SixtyFour => 64,
+        }
+    }
+
+    /// Returns the definitions of `blend`.
+    pub fn definitions(self) -> &'static [&'static str] {
+        match self {
+            Self::One => &[],
+            Self::Sixteen => &["MANY_AT_ONCE", "SIXTEEN_AT_ONCE"],
+            Self::SixtyFour => &["MANY_AT_ONCE", "SIXTY_FOUR_AT_ONCE"],
+        }
+    }
+}
+
 /// Definitions of the passes of the fast design in `project` (`project_bin`) and in `motion`.
 pub const BINNED: &[&str] = &["BINNED"];
 
@@ -146,6 +184,15 @@ impl Lists {
             Self::Short => &[],
             Self::Medium => &["MEDIUM_LISTS"],
             Self::Long => &["LONG_LISTS"],
+        }
+    }
+
+    /// Returns the number of splats that `sort_bins` sorts at once, and its threads: `LIST` and `THREADS` of the shader.
+    pub(super) fn sizes(self) -> [u32; 2] {
+        match self {
+            Self::Short => [1280, 256],
+            Self::Medium => [2304, 512],
+            Self::Long => [5120, 512],
         }
     }
 
@@ -323,8 +370,8 @@ impl FastVariant {
 }
 
 /// Returns the validated naga module of a pass with resolved imports and these definitions: the definitions of a [`Storage`] and
-/// [`COPIED_INSTANCE`] for `project`, `colors` and `motion`, [`MULTISAMPLED`] and the definitions of a [`ColorPrecision`] for `blend`, the
-/// definitions of the passes of the fast design, none for other passes.
+/// [`COPIED_INSTANCE`] for `project`, `colors` and `motion`, [`MULTISAMPLED`] and the definitions of a [`ColorPrecision`] and of [`AtOnce`] for
+/// `blend`, the definitions of the passes of the fast design, none for other passes.
 ///
 /// # Errors
 /// When there is no such pass or it does not compile.

@@ -7,12 +7,12 @@
 mod bounds;
 pub(crate) mod detail;
 mod environment;
-mod filter;
+pub(crate) mod filter;
 mod form;
 mod gaussian_scene;
 pub mod grow;
-pub mod packed;
-pub mod pick;
+pub(crate) mod packed;
+mod pick;
 mod provenance;
 pub(crate) mod random;
 mod runtime_scene;
@@ -20,9 +20,10 @@ mod sliced;
 pub mod synth;
 
 pub use bounds::{Bounds, BoundsOverTime};
-pub use detail::{MAX_LEVELS, pixels_across};
+pub(crate) use detail::MAX_LEVELS;
 pub use environment::Environment;
-pub use filter::{ActiveSets, FilterKind, MAX_SEGMENTS, TemporalFilter, segment_of};
+pub(crate) use filter::MAX_SEGMENTS;
+pub use filter::{ActiveSets, FilterKind, TemporalFilter};
 pub use form::{ColorDegrees, Form, SceneForm, Trained};
 pub use gaussian_scene::GaussianScene;
 pub use packed::{CodedColors, PackedColors, PackedScene};

@@ -71,7 +71,7 @@ pub struct Pick {
 
 impl RuntimeScene {
     /// Returns the Gaussian that the ray from `origin` along `direction` (of any length), both in capture space, hits. The
-    /// formula is in [`scene::pick`](crate::scene::pick).
+    /// formula is in `scene::pick`.
     ///
     /// `None` if the ray hits nothing, and for an invalid ray: a direction of length zero, or numbers that are not
     /// finite. A Gaussian whose densest point on the ray lies behind the origin is not hit.

@@ -34,7 +34,7 @@ pub struct RuntimeScene {
 /// A level of detail: a capture of fewer Gaussians, without levels, environment map and temporal filter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Level {
-    /// The largest size on the screen ([`pixels_across`](super::pixels_across)) at which it looks nearly the same as all
+    /// The largest size on the screen (`pixels_across`) at which it looks nearly the same as all
     /// Gaussians, pixels.
     pub pixels: f32,
     /// Its Gaussians and their color. The time interval is that of the capture. Shared, because it does not change.
@@ -107,6 +107,16 @@ impl RuntimeScene {
         }
     }
 
+    /// Returns the size of training pixels, in capture units, with which a level of detail is anti-aliased (0: all Gaussians, also if there
+    /// is no such level); `None`: it is drawn without anti-aliasing. Levels are always anti-aliased, by their own size, because they were
+    /// trained with anti-aliasing. All Gaussians are anti-aliased if `antialias` is true.
+    pub fn antialias_pixel(&self, level: usize, antialias: bool) -> Option<f32> {
+        match level.checked_sub(1).and_then(|index| self.levels.get(index)) {
+            Some(level) => level.scene.trained_with.pixel,
+            None => self.trained_with.pixel.filter(|_| antialias),
+        }
+    }
+
     /// Returns the bytes of Gaussians and colors in memory.
     pub fn size(&self) -> usize {
         self.form.size()
@@ -159,6 +169,21 @@ mod tests {
 
     fn level(pixels: f32, scene: RuntimeScene) -> Level {
         Level { pixels, scene: Arc::new(scene) }
+    }
+
+    #[test]
+    fn levels_are_always_antialiased_by_their_own_training_pixel() {
+        let sized = |pixel| RuntimeScene { trained_with: TrainedWith { pixel, ..TrainedWith::default() }, ..empty() };
+        let scene = |pixel| RuntimeScene { levels: vec![level(8.0, sized(Some(0.5)))], ..sized(pixel) };
+        for pixel in [None, Some(0.25)] {
+            let scene = scene(pixel);
+            for antialias in [false, true] {
+                assert_eq!(scene.antialias_pixel(1, antialias), Some(0.5), "level 1 has its own training pixel");
+            }
+            assert_eq!(scene.antialias_pixel(0, false), None, "all Gaussians are drawn without anti-aliasing");
+            assert_eq!(scene.antialias_pixel(0, true), pixel, "all Gaussians have the training pixel of the capture");
+            assert_eq!(scene.antialias_pixel(2, true), pixel, "a missing level is drawn as all Gaussians");
+        }
     }
 
     #[test]

@@ -1,15 +1,18 @@
 //! `gs4d finetune`, run as a user runs it on a scene's own pictures.
 //!
 //! In: a small synthetic scene, a dataset drawn from it, the scene pruned. Out: proof that training raises quality, that the result can be
-//! compressed in the same run, and that wrong inputs are refused and leave no files. Skipped where there is no GPU.
+//! compressed in the same run, that the report of a compressed or interrupted run has no value that was not measured, and that wrong inputs are
+//! refused and leave no files. Skipped where there is no GPU.
 
 use crate::support::capture::Capture;
-use crate::support::command::{arguments, gs4d};
+use crate::support::command::{GS4D, Run, arguments, gs4d};
 use crate::support::no_gpu::no_gpu;
 use crate::support::{dataset, folders};
 use bevy_gs4d::renderer::GpuContext;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use glam::{UVec2, Vec3};
+use serde_json::Value;
+use std::ffi::OsString;
 use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
@@ -58,7 +61,7 @@ fn training_raises_the_quality_of_a_pruned_scene() {
     );
     let (before, best) = (json["psnr_before"].as_f64(), json["best"]["psnr"].as_f64());
     assert!(best > before.map(|before| before + 2.0), "{best:?} dB after {before:?}");
-    assert_eq!(json["curve"].as_array().map(Vec::len), Some(3), "before, halfway, at the end");
+    assert_eq!(json["curve"].as_array().map(Vec::len), Some(3), "three points: before, halfway, at the end");
     assert_eq!(lesson.left(), ["data", "pruned.gs4d", "scene.gs4d", "tuned.gs4d"], "no state file is left");
     let info = gs4d(&arguments!["info", &out, "--json"]).json();
     assert_eq!((info["gaussians"].as_u64(), info["form"].as_str()), (Some(500), Some("trained")), "{info}");
@@ -78,6 +81,95 @@ fn training_raises_the_quality_of_a_pruned_scene() {
 }
 
 #[test]
+fn the_report_of_a_compressed_run_has_no_loss_of_the_compressed_scene() {
+    let Some(lesson) = lesson() else { return };
+    let out = lesson.path("out.gs4d");
+    for (quality, form) in [("visually-lossless", "packed"), ("lossless", "runtime")] {
+        let command = arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &out, "--steps", "3"];
+        let command = [command.to_vec(), arguments!["--compress", quality].to_vec()].concat();
+        let json = gs4d(&[&command[..], &["--json".into()]].concat()).json();
+        let [first, trained, coded] = &json["curve"].as_array().expect("a curve")[..] else {
+            panic!("{quality}: the curve has points before training, after it and after compression: {json}");
+        };
+        for name in ["loss", "training_psnr"] {
+            for point in [first, coded] {
+                assert_eq!(point[name], Value::Null, "{quality}: {name} is null where no step was made: {json}");
+            }
+            assert!(trained[name].is_f64(), "{quality}: {name} of the three steps is measured: {json}");
+        }
+        assert_eq!((&json["psnr"], &json["compressed"]), (&coded["psnr"], &true.into()), "{quality}: the package");
+        let info = gs4d(&arguments!["info", &out, "--json"]).json();
+        assert_eq!(info["form"], form, "{quality}: the form of the package");
+        let run = gs4d(&command);
+        assert!(!run.err.contains("inf") && !run.out.contains("inf"), "{quality}: no infinite PSNR: {}", run.err);
+        let of_package: Vec<&str> = run.err.lines().filter(|line| line.starts_with("compressed: ")).collect();
+        assert!(
+            of_package.len() == 1 && of_package[0].contains("validation") && !of_package[0].contains("loss"),
+            "{quality}: the line of the package has the validation PSNR and no loss: {}",
+            run.err
+        );
+        let text = run.text();
+        let row = text.lines().last().expect("the last row of the curve").split_whitespace().collect::<Vec<_>>();
+        assert_eq!(row[..3], ["compressed", "-", "-"], "{quality}: the row of the package has only the PSNR: {text}");
+        let psnr = format!("PSNR        {} dB compressed, ", row[3]);
+        assert!(text.contains(&psnr), "{quality}: the PSNR of the package is reported: {text}");
+    }
+}
+
+/// Runs a command and interrupts it when its first evaluation is printed.
+#[cfg(unix)]
+fn interrupted(command: &[OsString]) -> Run {
+    use std::io::{BufRead, BufReader, Read};
+    use std::process::{Command, Stdio};
+
+    let child = Command::new(GS4D).args(command).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+    let mut child = child.expect("the command starts");
+    let mut lines = BufReader::new(child.stderr.take().expect("standard error is piped"));
+    let mut err = String::new();
+    while lines.read_line(&mut err).expect("standard error can be read") > 0 {
+        if err.lines().any(|line| line.starts_with("step 0:")) {
+            let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+            assert!(killed.expect("kill runs").success(), "the command can be interrupted");
+            break;
+        }
+    }
+    lines.read_to_string(&mut err).expect("standard error can be read");
+    let mut run = Run::of(&child.wait_with_output().expect("the command ends"));
+    run.err = err;
+    run
+}
+
+#[cfg(unix)]
+#[test]
+fn the_report_of_an_interrupted_run_says_that_the_package_is_not_compressed() {
+    let Some(lesson) = lesson() else { return };
+    let out = lesson.path("out.gs4d");
+    let command = arguments!["finetune", &lesson.pruned, "--data", &lesson.data, "-o", &out, "--steps", "1000000"];
+    let command =
+        [command.to_vec(), arguments!["--evaluate-every", "1000000", "--compress", "small"].to_vec()].concat();
+    let run = interrupted(&command);
+    assert_eq!(run.code, Some(130), "an interrupted run has exit code 130: {}", run.err);
+    let said = run.out.lines().find(|line| line.starts_with("interrupted"));
+    assert!(
+        said.is_some_and(|line| line.contains("not compressed") && line.contains("resumes")),
+        "the text has the form of the package and the remedy: {}",
+        run.out
+    );
+    assert!(!run.out.contains(", compressed"), "the text does not have a compressed result: {}", run.out);
+    let info = gs4d(&arguments!["info", &out, "--json"]).json();
+    assert_eq!(info["form"], "trained", "the package is not compressed: {info}");
+    let run = interrupted(&[&command[..], &["--json".into()]].concat());
+    assert_eq!(run.code, Some(130), "an interrupted run has exit code 130: {}", run.err);
+    let json: Value = serde_json::from_str(&run.out).expect("one JSON document");
+    assert_eq!(
+        (&json["interrupted"], &json["compressed"]),
+        (&true.into(), &false.into()),
+        "the document has both states: {json}"
+    );
+    assert_eq!(json["psnr"], json["best"]["psnr"], "the PSNR is that of the written parameters: {json}");
+}
+
+#[test]
 fn atomic_sums_train_or_are_refused_with_a_remedy() {
     let Some(lesson) = lesson() else { return };
     let (out, before) = (lesson.path("out.gs4d"), lesson.left());
@@ -85,7 +177,7 @@ fn atomic_sums_train_or_are_refused_with_a_remedy() {
     let run = gs4d(&[command.to_vec(), arguments!["--sums", "atomic"].to_vec()].concat());
     if run.code == Some(0) {
         let info = gs4d(&arguments!["info", &out, "--json"]).json();
-        assert_eq!(info["gaussians"].as_u64(), Some(500), "it is trained: {info}");
+        assert_eq!(info["gaussians"].as_u64(), Some(500), "the scene is trained: {info}");
     } else {
         run.must_fail("--sums deterministic");
         assert_eq!(lesson.left(), before, "no file is left");

@@ -15,9 +15,15 @@ mod faults;
 mod fine_tune;
 #[cfg(target_os = "linux")]
 mod kills;
+mod options;
 mod outputs;
 mod prune;
 mod render;
+#[cfg(target_os = "linux")]
+mod signals;
+// The limit of the address space is set by a shell and read from `/proc`.
+#[cfg(target_os = "linux")]
+mod sizes;
 
 #[path = "../support"]
 mod support {

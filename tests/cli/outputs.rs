@@ -11,6 +11,7 @@ use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use glam::{UVec2, Vec3};
 use std::ffi::OsString;
 use std::fs::{self, File};
+use std::path::Path;
 
 fn capture() -> Capture {
     let trained = synthesize(&SynthSettings { count: 200, ..SynthSettings::default() });
@@ -38,7 +39,7 @@ fn no_verb_writes_over_an_input() {
         arguments!["prune", scene, "--data", data, "--ratio", "0.5", "-o", scene].to_vec(),
         arguments!["prune", scene, "--scores", &scores, "--keep", "9", "-o", &scores].to_vec(),
         arguments!["mask", scene, "-o", scene].to_vec(),
-        arguments!["mask", scene, "--data", data, "-o", &image].to_vec(),
+        arguments!["mask", scene, "--filter", "interval", "--data", data, "-o", &image].to_vec(),
         arguments!["score", scene, "--data", data, "--out", scene].to_vec(),
         arguments!["score", scene, "--data", data, "--out", &trained_on].to_vec(),
         arguments!["ablate", scene, "--data", data, "--csv", scene].to_vec(),
@@ -121,6 +122,60 @@ fn a_bad_output_is_refused_before_any_input_is_read() {
         refused(arguments!["render", &nothing, "--orbit", "1", "--out", &out].to_vec(), reason);
         refused(arguments!["eval", &nothing, "--data", &no_data, "--out", &out].to_vec(), reason);
         refused(arguments!["score", &nothing, "--data", &no_data, "--variant", "all", "--out", &out].to_vec(), reason);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn devices_and_pipes_are_refused_where_a_file_is_needed() {
+    let folder = folder();
+    let (nothing, data) = (folder.path().join("nothing.pth"), folder.path().join("nothing"));
+    for device in ["/dev/null", "/dev/stdout"] {
+        for command in [
+            arguments!["bake", &nothing, "--data", &data, "-o", device].to_vec(),
+            arguments!["finetune", &nothing, "--data", &data, "-o", device].to_vec(),
+            arguments!["compress", &nothing, device].to_vec(),
+        ] {
+            let run = gs4d(&command);
+            run.must_fail(&format!("{device}: is a device or a pipe"));
+            assert!(!run.err.contains("nothing"), "{command:?}: before any input is read: {}", run.err);
+        }
+    }
+    assert!(!Path::new("/dev/null.tune").exists(), "no folder beside a device");
+}
+
+#[cfg(unix)]
+#[test]
+fn errors_of_links_and_devices_name_the_file_in_a_sentence() {
+    use std::os::unix::fs::symlink;
+    let folder = folder();
+    let (input, circle) = (scene(&folder, "50"), folder.path().join("circle.gs4d"));
+    symlink("circle.gs4d", &circle).expect("the folder can be written to");
+    let data = folder.path().join("data");
+    for command in [
+        arguments!["info", &circle].to_vec(),
+        arguments!["convert", &circle, folder.path().join("out.gs4d")].to_vec(),
+        arguments!["convert", &input, &circle].to_vec(),
+        arguments!["convert", &input, circle.join("out.gs4d")].to_vec(),
+        arguments!["bake", &input, "--data", &data, "-o", &circle].to_vec(),
+        arguments!["render", &input, "--orbit", "1", "--out", circle.join("frames")].to_vec(),
+    ] {
+        let run = gs4d(&command);
+        run.must_fail("symbolic links lead in a circle");
+        assert!(run.err.contains("circle.gs4d"), "{command:?}: the file is named: {}", run.err);
+        assert!(!run.err.contains("os error"), "{command:?}: no number of the system: {}", run.err);
+    }
+}
+
+#[test]
+fn absurd_weights_are_refused_in_a_few_words() {
+    let folder = folder();
+    let path = |name: &str| folder.path().join(name);
+    for option in ["--mask-weight", "--motion-weight", "--rigid-weight", "--opacity-weight", "--mean-rate"] {
+        let run = gs4d(&arguments!["finetune", path("a"), "--data", path("d"), "-o", path("o.gs4d"), option, "1e308"]);
+        run.must_fail(option);
+        assert!(run.err.contains("expected a number from 0 to 1000000"), "{option}: the range: {}", run.err);
+        assert!(!run.err.contains("00000000"), "{option}: no long row of digits: {}", run.err);
     }
 }
 

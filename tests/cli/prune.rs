@@ -180,7 +180,10 @@ fn filters_report_their_active_fraction() {
     let bench = Bench::new(false, false);
     let active = |filter: &str| {
         let options = ["--filter", filter, "--key-frames", "5", "-o", &bench.path("filtered.gs4d")];
-        let json = bench.run("mask", &options).json();
+        let by_views = || bench.run("mask", &options);
+        let scene = bench.path("scene.gs4d");
+        let alone = || gs4d(&[&["mask", scene.as_str(), "--json"][..], &options].concat());
+        let json = if filter == "support" { alone() } else { by_views() }.json();
         assert_eq!((&json["segments"], &json["filter"]), (&4.into(), &filter.into()), "the requested filter");
         assert_eq!(json["overlap"].as_array().map(Vec::len), Some(3), "between four segments");
         json["active_share"].as_f64().expect("a number")
@@ -188,7 +191,8 @@ fn filters_report_their_active_fraction() {
     let (key_frame, interval, support) = (active("key-frame"), active("interval"), active("support"));
     assert!(key_frame > 0.0 && key_frame <= interval && interval <= support, "{key_frame} {interval} {support}");
     assert!(support < 1.0, "some Gaussians are inactive");
-    let every = bench.run("mask", &["--every", "3", "-o", &bench.path("filtered.gs4d")]).json();
+    let (scene, data, out) = (bench.path("scene.gs4d"), bench.path(""), bench.path("filtered.gs4d"));
+    let every = gs4d(&arguments!["mask", scene, "--data", data, "--every", "3", "-o", out, "--json"]).json();
     assert_eq!(every["key_frames"], 5, "twelve times, every third");
     let alone = arguments!["mask", bench.path("scene.gs4d"), "-o", bench.path("filtered.gs4d"), "--json"];
     assert_eq!(gs4d(&alone).json()["key_frames"], 11, "support needs no data");

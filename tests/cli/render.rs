@@ -50,11 +50,15 @@ fn pictures_are_drawn_and_written() {
         assert!(lit > 64 * 48 / 50, "the picture shows the scene: {lit} pixels");
     }
     let alike = gs4d(&arguments!["compare", &frames, &frames, "--size", "64x48", "--json"]).json();
-    assert_eq!(alike["pictures"].as_array().map(Vec::len), Some(3), "raw pictures go before others of their name");
+    assert_eq!(
+        alike["pictures"].as_array().map(Vec::len),
+        Some(3),
+        "raw pictures are compared in place of PNG files of the same name"
+    );
     assert_eq!(
         alike["mean"]["identical"].as_u64(),
         alike["pictures"].as_array().map(|list| list.len() as u64),
-        "equal to themselves"
+        "pictures are identical to themselves"
     );
 }
 
@@ -93,8 +97,8 @@ fn pictures_that_do_not_fit_are_refused_before_they_are_drawn() {
         }
         let run = gs4d(&arguments!["render", &path, "--orbit", "1", "--size", size, "--out", &frames]);
         run.must_fail("smaller");
-        let told = run.err.contains("GB are available") || run.err.contains(&format!("{bytes} bytes"));
-        assert!(told, "{size}: the error has the needed memory: {}", run.err);
+        let has_size = run.err.contains("GB are available") || run.err.contains(&format!("{bytes} bytes"));
+        assert!(has_size, "{size}: the error has the needed memory: {}", run.err);
         assert!(!frames.join("orbit_0000.png").exists(), "{size}: no picture is written");
     }
 }

@@ -6,9 +6,10 @@
 use crate::support::data;
 use crate::support::golden;
 use crate::support::pth::{self, Pth};
-use bevy_gs4d::codec::checkpoint::{self, CheckpointError, describe};
+use bevy_gs4d::codec::checkpoint::{self, CheckpointError};
 use bevy_gs4d::codec::{self, ReadOptions};
 use bevy_gs4d::gaussian::{Harmonics, Model, Parameters};
+use bevy_gs4d::internal::codec::checkpoint::describe;
 use bevy_gs4d::scene::{GaussianScene, RotationConvention, SceneForm, Trained, TrainedCameras, UpAxis};
 use serde_json::Value;
 use std::io::Cursor;

@@ -3,7 +3,7 @@
 //! In: the scenes of `tests/golden/`. Out: proof that pictures, radii and tile rectangles are those of the original.
 
 use crate::support::golden::{self, GoldenView};
-use bevy_gs4d::gaussian::projection;
+use bevy_gs4d::internal::gaussian::projection;
 use bevy_gs4d::reference;
 use serde_json::Value;
 

@@ -4,11 +4,11 @@
 //! proof that the gradient of every raw parameter is right, in every model.
 
 use crate::support::golden_gradients::{GoldenGradient, all_gradients, tensor};
-use bevy_gs4d::gaussian::alpha::{ALPHA_MIN, alpha_at};
-use bevy_gs4d::gaussian::{
-    GradientMode, Harmonics, Model, ParameterGradient, Parameters, ShDirection, SliceSettings, projection,
-};
-use bevy_gs4d::reference::{self, Layer, PixelGradients};
+use bevy_gs4d::gaussian::{GradientMode, Harmonics, Model, Parameters, ShDirection, SliceSettings};
+use bevy_gs4d::internal::gaussian::alpha::{ALPHA_MIN, alpha_at};
+use bevy_gs4d::internal::gaussian::{ParameterGradient, projection};
+use bevy_gs4d::internal::reference::{self, PixelGradients};
+use bevy_gs4d::reference::Layer;
 use bevy_gs4d::scene::{GaussianScene, PlaybackHints, RuntimeScene, SceneForm, Trained, TrainedWith};
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, RasterFov, View};
 use glam::{UVec2, Vec2, Vec3, Vec4};

@@ -3,10 +3,10 @@
 //! In: a synthetic scene, twenty noisy images of it, and four views that show nothing but the background, whose images the scene
 //! reproduces exactly. Out: proof that the PSNR that decides is finite and that the four views do not change what is chosen.
 
+use bevy_gs4d::internal::offline::quality::{Evaluator, smallest_count};
 use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, TrainingView};
 use bevy_gs4d::offline::engine::Engine;
 use bevy_gs4d::offline::metrics::MAX_PSNR;
-use bevy_gs4d::offline::quality::{Evaluator, smallest_count};
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene};

@@ -28,6 +28,7 @@ mod scene_parts;
 mod score;
 #[cfg(feature = "offline")]
 mod score_formula;
+mod thin;
 
 #[path = "../support"]
 mod support {
@@ -44,5 +45,7 @@ mod support {
     #[cfg(feature = "offline")]
     pub mod packed_scene;
     pub mod pth;
+    pub mod random;
     pub mod skip;
+    pub mod thin;
 }

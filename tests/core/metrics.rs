@@ -3,9 +3,8 @@
 //! In: synthetic pictures. Out: proof that metrics equal values computed by hand and by independent float64
 //! implementations, that PSNR is finite, and that pictures of different sizes are refused.
 
-use bevy_gs4d::offline::metrics::{
-    ImageMetrics, MAX_PSNR, MS_SSIM_MIN_SIDE, MetricSet, SizeMismatch, SquaredError, flip, ms_ssim, ssim,
-};
+use bevy_gs4d::internal::offline::metrics::MS_SSIM_MIN_SIDE;
+use bevy_gs4d::offline::metrics::{ImageMetrics, MAX_PSNR, MetricSet, SizeMismatch, SquaredError, flip, ms_ssim, ssim};
 use bevy_gs4d::view::Picture;
 use glam::{UVec2, Vec3};
 use proptest::prelude::*;

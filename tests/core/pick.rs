@@ -3,11 +3,12 @@
 //! In: Gaussians placed by hand, and a column of them with its render by the CPU reference. Out: proof that a ray hits the Gaussian that
 //! it should, where it should, and respects the settings.
 
-use bevy_gs4d::gaussian::alpha::alpha_at;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
-use bevy_gs4d::reference::{self, Layer, Splat};
-use bevy_gs4d::scene::packed::SHARED_RANGES;
-use bevy_gs4d::scene::packed::encode::Bits;
+use bevy_gs4d::internal::gaussian::alpha::alpha_at;
+use bevy_gs4d::internal::reference::{self, Splat};
+use bevy_gs4d::internal::scene::packed::SHARED_RANGES;
+use bevy_gs4d::internal::scene::packed::encode::Bits;
+use bevy_gs4d::reference::Layer;
 use bevy_gs4d::scene::{FilterKind, Form, PackedColors, PackedScene, Pick, PickSettings, RuntimeScene, TemporalFilter};
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, RasterFov};
 use glam::{Affine3A, Mat4, Quat, UVec2, Vec2, Vec3};

@@ -6,8 +6,9 @@
 use crate::support::coded_scene::coded_scene;
 use bevy_gs4d::codec::package::{self, PackageError, WriteSettings};
 use bevy_gs4d::gaussian::Harmonics;
-use bevy_gs4d::scene::packed::{PackedColors, PackedScene, RECORD_WORDS};
+use bevy_gs4d::internal::scene::packed::RECORD_WORDS;
 use bevy_gs4d::scene::{ActiveSets, CodedColors, Environment, Form, GaussianScene, RuntimeScene};
+use bevy_gs4d::scene::{PackedColors, PackedScene};
 use std::io::Cursor;
 
 const COUNT: usize = 600;

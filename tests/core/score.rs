@@ -8,19 +8,22 @@
 use crate::support::data::data;
 use crate::support::npy;
 use bevy_gs4d::codec::{self, ReadOptions};
-use bevy_gs4d::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
+use bevy_gs4d::internal::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
+use bevy_gs4d::internal::gaussian::conic::exponent;
+use bevy_gs4d::internal::offline::dataset::selection::{distinct_cameras, even_subset, to_draw};
+use bevy_gs4d::internal::offline::prune::{highest, kept_count, select};
+use bevy_gs4d::internal::offline::score::{CpuEngine, ScoreEngine, Traits, Want, score};
+use bevy_gs4d::internal::offline::temporal_filter::{interval_filter, key_frame_filter, key_frame_masks, key_times};
+use bevy_gs4d::internal::reference;
 use bevy_gs4d::offline::NoProgress;
-use bevy_gs4d::offline::dataset::selection::{distinct_cameras, even_subset, to_draw};
 use bevy_gs4d::offline::dataset::{CameraOptions, Dataset, Split};
-use bevy_gs4d::offline::prune::{highest, kept_count, select};
-use bevy_gs4d::offline::score::variant::Variant;
-use bevy_gs4d::offline::score::{CpuEngine, ScoreEngine, ScoreError, ScoreSettings, Scores, Traits, Want, score};
-use bevy_gs4d::offline::temporal_filter::{interval_filter, key_frame_filter, key_frame_masks, key_times};
-use bevy_gs4d::reference::{self, Layer, render};
+use bevy_gs4d::offline::score::Variant;
+use bevy_gs4d::offline::score::{ScoreError, ScoreSettings, Scores};
+use bevy_gs4d::reference::{Layer, render};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene, TemporalFilter};
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, RasterFov, TILE_SIZE, View};
-use glam::{UVec2, Vec3};
+use glam::{UVec2, Vec2, Vec3};
 use std::path::Path;
 use std::path::PathBuf;
 
@@ -92,9 +95,8 @@ fn brute_force(scene: &RuntimeScene, view: &View) -> Vec<[f64; 2]> {
                 continue;
             }
             let (dx, dy) = (splat.center.x - x as f32, splat.center.y - y as f32);
-            let power = -0.5 * (splat.conic.x * dx * dx + splat.conic.z * dy * dy) - splat.conic.y * dx * dy;
-            let alpha = (splat.opacity * power.exp()).min(ALPHA_MAX);
-            if power > 0.0 || alpha < ALPHA_MIN {
+            let alpha = (splat.opacity * exponent(splat.conic, Vec2::new(dx, dy)).exp()).min(ALPHA_MAX);
+            if alpha < ALPHA_MIN {
                 continue;
             }
             if transmittance * (1.0 - alpha) < TRANSMITTANCE_MIN {

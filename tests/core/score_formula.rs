@@ -4,11 +4,10 @@
 //! pixels. Out: proof that the temporal factor, the volume factor, the spatial score and their sum over views are the paper's. The expected
 //! values are computed here in double precision, derivatives of the marginal by finite differences.
 
+use bevy_gs4d::internal::offline::score::{CpuEngine, ScoreEngine, Traits, ViewScore, Want, score};
 use bevy_gs4d::offline::NoProgress;
-use bevy_gs4d::offline::score::variant::Variant;
-use bevy_gs4d::offline::score::{
-    CpuEngine, ScoreEngine, ScoreError, ScoreSettings, Scores, Traits, ViewScore, Want, score,
-};
+use bevy_gs4d::offline::score::Variant;
+use bevy_gs4d::offline::score::{ScoreError, ScoreSettings, Scores};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene, SceneForm};
 use bevy_gs4d::view::{Background, Camera, RasterFov, View};

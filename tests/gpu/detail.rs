@@ -5,10 +5,11 @@
 
 use crate::support::gpu;
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
+use bevy_gs4d::internal::scene::pixels_across;
 use bevy_gs4d::offline::detail::{DetailSettings, detail};
 use bevy_gs4d::offline::{NoProgress, OfflineError};
 use bevy_gs4d::renderer::Headless;
-use bevy_gs4d::scene::{Bounds, Environment, Form, GaussianScene, RuntimeScene, SceneForm, pixels_across};
+use bevy_gs4d::scene::{Bounds, Environment, Form, GaussianScene, RuntimeScene, SceneForm};
 use bevy_gs4d::view::{Background, Camera, Frame, RasterFov, View};
 use glam::{UVec2, Vec3};
 

@@ -5,7 +5,7 @@
 
 use crate::support::gpu;
 use bevy_gs4d::reference;
-use bevy_gs4d::renderer::{Headless, Instance, ViewParameters};
+use bevy_gs4d::renderer::{Design, Headless, Instance, ViewParameters};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{ActiveSets, FilterKind, RuntimeScene, TemporalFilter};
 use bevy_gs4d::view::{Appearance, Background, Camera, Frame, RasterFov, View};
@@ -143,6 +143,8 @@ fn the_capacity_of_a_view_is_the_maximum_of_active_gaussians() {
     let filter = TemporalFilter::from_bits(FilterKind::KeyFrame, SEGMENTS, 20_000, bits);
     let filtered = RuntimeScene { filter: Some(filter), ..whole };
     let capture = headless.upload(&filtered).expect("it fits");
+    // The capacity in splats is that of the buffers of this design.
+    headless.set_design(Design::Reference);
     let mut made = None;
     for time in times() {
         let frame = headless.render(&capture, &view(time), BLACK).expect("it is drawn");

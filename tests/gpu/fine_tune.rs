@@ -5,16 +5,17 @@
 
 use crate::support::skip::skip;
 use crate::support::{golden, gpu};
-use bevy_gs4d::gaussian::{GradientMode, Harmonics, ParameterGradient, Parameters};
-use bevy_gs4d::offline::dataset::CoveredImage;
-use bevy_gs4d::offline::fine_tune::{
-    GpuImage, GradientSums, Moments, NEIGHBORS, Rates, Sample, Terms, Trainer, adam, loss, neighbors, opacity_mask,
-    regularization,
+use bevy_gs4d::gaussian::{GradientMode, Harmonics, Parameters};
+use bevy_gs4d::internal::gaussian::ParameterGradient;
+use bevy_gs4d::internal::offline::fine_tune::{
+    GpuImage, Moments, NEIGHBORS, Sample, Trainer, adam, loss, neighbors, opacity_mask, regularization,
 };
+use bevy_gs4d::internal::scene::packed::encode::Bits;
+use bevy_gs4d::offline::dataset::CoveredImage;
+use bevy_gs4d::offline::fine_tune::{GradientSums, Rates, Terms};
 use bevy_gs4d::offline::metrics::SquaredError;
 use bevy_gs4d::offline::quantize::{CompressSettings, compress};
 use bevy_gs4d::renderer::Headless;
-use bevy_gs4d::scene::packed::encode::Bits;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{GaussianScene, SceneForm, Trained};
 use bevy_gs4d::view::{Background, Camera, Frame, Picture, RasterFov, View};

@@ -1,17 +1,20 @@
-//! Whole runs of fine-tuning: with a temporal filter, interrupted and resumed.
+//! Complete runs of fine-tuning: with a temporal filter, compressed, interrupted and resumed.
 //!
-//! In: a small synthetic scene, its own pictures as a dataset. Out: proof that what a filter leaves out is not trained, that the filter
-//! follows the Gaussians, and that an interrupted run ends as another. Skipped where there is no GPU.
+//! In: a small synthetic scene, its own pictures as a dataset. Out: proof that Gaussians which a filter leaves out are not trained, that the
+//! filter is computed again, that the PSNR of a compressed result is that of the package, and that a resumed run has the result of an
+//! uninterrupted one. Skipped where there is no GPU.
 
 use crate::support::{dataset, gpu};
 use bevy_gs4d::gaussian::{GradientMode, Parameters};
+use bevy_gs4d::internal::offline::fine_tune::{Sample, Trainer};
+use bevy_gs4d::internal::offline::prune::select;
+use bevy_gs4d::internal::offline::store::{Key, Store};
 use bevy_gs4d::offline::dataset::TrainingView;
-use bevy_gs4d::offline::fine_tune::{FineTuneSettings, Rates, Resume, Sample, Trainer, TrainingImages, fine_tune};
-use bevy_gs4d::offline::prune::select;
+use bevy_gs4d::offline::fine_tune::{FineTuneSettings, Rates, Resume, TrainingImages, fine_tune};
+use bevy_gs4d::offline::metrics::SquaredError;
 use bevy_gs4d::offline::quantize::Quality;
-use bevy_gs4d::offline::splits::{SplitOptions, Splits};
-use bevy_gs4d::offline::store::{Key, Store};
 use bevy_gs4d::offline::{NoProgress, OfflineError, Progress};
+use bevy_gs4d::offline::{SplitOptions, Splits};
 use bevy_gs4d::renderer::Headless;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{Environment, FilterKind, GaussianScene, SceneForm, TemporalFilter, Trained};
@@ -63,7 +66,7 @@ fn trained(scene: &mut GaussianScene) -> &mut Trained {
     trained
 }
 
-/// Returns a filter of two segments: the even Gaussians in the first, those that three divides in the second.
+/// Returns a filter of two segments: Gaussians of even index in the first, Gaussians whose index is a multiple of three in the second.
 fn filter(kind: FilterKind) -> TemporalFilter {
     let mut bits = vec![0; 2 * TemporalFilter::words(COUNT)];
     for index in 0..COUNT {
@@ -76,7 +79,7 @@ fn filter(kind: FilterKind) -> TemporalFilter {
 }
 
 #[test]
-fn what_a_filter_leaves_out_is_not_trained() {
+fn gaussians_that_a_filter_leaves_out_are_not_trained() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     assert_eq!(lesson.images.len(), 12, "the views of three of four cameras");
@@ -95,19 +98,26 @@ fn what_a_filter_leaves_out_is_not_trained() {
         let kept: Vec<u32> = (0..COUNT as u32).filter(|index| index % divisor == 0).collect();
         let mut alone = gradients(select(&lesson.disturbed(None), &kept), view);
         let mut active = select(&found, &kept);
-        assert_eq!(trained(&mut active).parameters, trained(&mut alone).parameters, "as if there were no others");
-        assert_eq!(trained(&mut active).harmonics, trained(&mut alone).harmonics, "as if there were no others");
-        assert!(trained(&mut alone).harmonics.values.iter().any(|&value| value != 0.0), "there is something to learn");
+        assert_eq!(
+            trained(&mut active).parameters,
+            trained(&mut alone).parameters,
+            "geometry as without inactive ones"
+        );
+        assert_eq!(trained(&mut active).harmonics, trained(&mut alone).harmonics, "color as without inactive ones");
+        assert!(
+            trained(&mut alone).harmonics.values.iter().any(|&value| value != 0.0),
+            "active Gaussians have gradients"
+        );
         let parameters = &trained(&mut found).parameters;
         let still = (0..COUNT)
             .filter(|index| index % divisor as usize != 0)
             .all(|index| parameters.mean[index] == [0.0; 3] && parameters.opacity_logit[index] == 0.0);
-        assert!(still, "at time {time} the others have no gradient");
+        assert!(still, "at time {time} inactive Gaussians have no gradient");
     }
 }
 
 #[test]
-fn a_filter_of_what_views_see_follows_the_gaussians_and_support_comes_last() {
+fn filters_by_views_are_computed_again_in_training_and_support_filters_after_it() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let mut run = |kind, refresh_filter| {
@@ -115,13 +125,25 @@ fn a_filter_of_what_views_see_follows_the_gaussians_and_support_comes_last() {
         let scene = lesson.disturbed(Some(filter(kind)));
         let tuned = fine_tune(&mut headless, scene, &lesson.images, &settings, None, &mut NoProgress);
         let filter = tuned.expect("it can be trained").scene.filter.expect("it had one");
-        assert_eq!((filter.kind, filter.segments, filter.count), (kind, 2, COUNT), "of the same kind");
+        assert_eq!(
+            (filter.kind, filter.segments, filter.count),
+            (kind, 2, COUNT),
+            "the filter has the same kind and size"
+        );
         filter
     };
-    assert_eq!(run(FilterKind::KeyFrame, 100), filter(FilterKind::KeyFrame), "not computed again");
+    assert_eq!(
+        run(FilterKind::KeyFrame, 100),
+        filter(FilterKind::KeyFrame),
+        "after 6 of 100 steps the filter is unchanged"
+    );
     let seen = run(FilterKind::KeyFrame, 2);
-    assert!(seen.active_share() > filter(FilterKind::KeyFrame).active_share(), "most Gaussians are seen");
-    assert_ne!(run(FilterKind::Support, 100), filter(FilterKind::Support), "the lifespans that were trained");
+    assert!(seen.active_share() > filter(FilterKind::KeyFrame).active_share(), "most Gaussians are visible to a view");
+    assert_ne!(
+        run(FilterKind::Support, 100),
+        filter(FilterKind::Support),
+        "support is computed from trained lifespans"
+    );
 }
 
 /// Interrupts a task at one of its steps.
@@ -163,11 +185,42 @@ fn colors_of_one_coefficient_are_compressed_without_codebooks() {
     let settings = FineTuneSettings { steps: 2, compress: Some((Quality::Balanced, 4)), ..FineTuneSettings::default() };
     let tuned = fine_tune(&mut headless, scene, &lesson.images, &settings, None, &mut NoProgress);
     let colors = tuned.expect("it can be compressed").scene.form.color_degrees();
-    assert_eq!(colors.coefficients, 1, "nothing is added");
+    assert_eq!(colors.coefficients, 1, "the color has one coefficient, as before");
 }
 
 #[test]
-fn an_interrupted_and_resumed_run_ends_as_an_uninterrupted_one() {
+fn the_last_point_of_a_compressed_run_is_measured_on_the_compressed_scene() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new();
+    let validation = Splits::open(
+        &lesson.folder.path().join("data"),
+        &SplitOptions::default(),
+        &lesson.scene.trained_with,
+        &mut NoProgress,
+    );
+    let validation = validation.expect("the dataset was just written").validation;
+    for quality in [Quality::Small, Quality::VisuallyLossless, Quality::Lossless] {
+        let settings = FineTuneSettings { steps: 0, compress: Some((quality, 2)), ..FineTuneSettings::default() };
+        let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.images, &settings, None, &mut NoProgress);
+        let tuned = tuned.unwrap_or_else(|error| panic!("{quality:?}: {error}"));
+        let runtime = tuned.scene.into_runtime().expect("a compressed scene can be drawn");
+        let capture = headless.upload(&runtime).expect("it fits");
+        let mut error = SquaredError::default();
+        for view in &validation {
+            let image = view.load_covered().expect("it was just written").over(Vec3::ZERO);
+            let view = view.camera.view(view.time, runtime.trained_with.raster_fov);
+            let frame = headless.render(&capture, &view, Background::Color([0.0; 3])).expect("it is drawn");
+            error.add(&image, &frame.picture.clamped()).expect("one size");
+        }
+        let last = tuned.curve.last().expect("a point");
+        let found = last.psnr.expect("validation views");
+        assert!((found - error.psnr()).abs() < 1e-6, "{quality:?}: {found} dB reported, {} dB drawn", error.psnr());
+        assert_eq!((last.loss, last.training_psnr), (None, None), "{quality:?}: no loss of the compressed scene");
+    }
+}
+
+#[test]
+fn an_interrupted_and_resumed_run_has_the_result_of_an_uninterrupted_one() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let settings = FineTuneSettings {
@@ -195,15 +248,23 @@ fn an_interrupted_and_resumed_run_ends_as_an_uninterrupted_one() {
             other => panic!("{task}: an interrupted run is an error with the best result so far: {other:?}"),
         };
         let made = whole.curve.iter().take(stopped.curve.len());
-        assert!(made.eq(&stopped.curve), "{task}: the interruption is no evaluation: {:?}", stopped.curve);
+        assert!(
+            made.eq(&stopped.curve),
+            "{task}: the curve has the points before the interruption: {:?}",
+            stopped.curve
+        );
         let resumed = run(&mut headless, &store, &mut NoProgress).expect("it can be trained");
-        assert!(resumed.scene == whole.scene, "{task}: the resumed run ends at the same scene");
-        assert_eq!((resumed.best, &resumed.curve), (whole.best, &whole.curve), "{task}: and the same curve");
+        assert!(resumed.scene == whole.scene, "{task}: the resumed run has the same scene");
+        assert_eq!(
+            (resumed.best, &resumed.curve),
+            (whole.best, &whole.curve),
+            "{task}: the resumed run has the same curve"
+        );
     }
 }
 
 #[test]
-fn the_last_steps_see_rounded_geometry_if_they_should() {
+fn the_last_steps_are_trained_on_rounded_geometry_only_if_requested() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let mut run = |rounding: bool, steps: usize| {
@@ -212,8 +273,8 @@ fn the_last_steps_see_rounded_geometry_if_they_should() {
         let tuned = fine_tune(&mut headless, lesson.disturbed(None), &lesson.images, &settings, None, &mut NoProgress);
         tuned.expect("it can be trained").scene
     };
-    assert!(run(true, 5) != run(false, 5), "steps on rounded geometry lead elsewhere");
-    assert!(run(true, 0) == run(false, 0), "without these steps there is nothing to round for");
+    assert!(run(true, 5) != run(false, 5), "steps on rounded geometry have another result");
+    assert!(run(true, 0) == run(false, 0), "without these steps the result is the same");
 }
 
 #[test]
@@ -241,7 +302,7 @@ fn captures_of_every_model_and_with_an_environment_map_are_trained() {
         scene.environment = environment;
         let lesson = Lesson::of(scene);
         let settings = FineTuneSettings { steps: 20, evaluate_every: 20, ..FineTuneSettings::default() };
-        // Whether it learns at all is measured on the views that it learns from.
+        // Validation is on the training views: the test is whether training has an effect.
         let (views, trained_with) = (lesson.views.clone(), &lesson.scene.trained_with);
         let images = TrainingImages::load(views, &lesson.views, trained_with, &mut NoProgress);
         let images = images.expect("the images were just written");
@@ -250,7 +311,7 @@ fn captures_of_every_model_and_with_an_environment_map_are_trained() {
         let [first, .., _] = tuned.curve[..] else { panic!("{name}: a curve") };
         let (before, after) = (first.psnr.expect("validation views"), tuned.best.psnr.expect("validation views"));
         assert!(after > before + 0.5, "{name}: {before:.2} to {after:.2} dB");
-        assert_eq!(tuned.scene.environment, lesson.scene.environment, "{name}: the map stays");
+        assert_eq!(tuned.scene.environment, lesson.scene.environment, "{name}: the environment map is unchanged");
     }
 }
 

@@ -2,16 +2,16 @@
 //!
 //! In: the composed passes with naga's layout. Out: proof that every structure and constant is the same in the shaders and on the host.
 
-use bevy_gs4d::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
-use bevy_gs4d::gaussian::projection::LOW_PASS;
 use bevy_gs4d::gaussian::{Gaussian, MARGINAL_CUTOFF};
-use bevy_gs4d::offline::fine_tune::NEIGHBORS;
-use bevy_gs4d::renderer::layout::{
+use bevy_gs4d::internal::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_MIN};
+use bevy_gs4d::internal::gaussian::conic::{LOW_PASS, MAX_VARIANCE, THIN};
+use bevy_gs4d::internal::offline::fine_tune::NEIGHBORS;
+use bevy_gs4d::internal::renderer::layout::{
     self, Activation, AdamUniforms, BLOCK, Counters, DIGITS, FIRST_SEEN, FrameUniforms, INSTANCE_STRIDE,
     INSTANCES_AT_ONCE, InstanceUniforms, LossUniforms, MotionUniforms, RoundingRecord, SortStep, SplatRecord,
     SplatShape, TermWeights, TiedColors, TrainedRecord, TrainedScene, VisibleSplat,
 };
-use bevy_gs4d::renderer::shaders::{COPIED_INSTANCE, compose, pass_names};
+use bevy_gs4d::internal::renderer::shaders::{COPIED_INSTANCE, compose, pass_names};
 use bevy_gs4d::view::TILE_SIZE;
 use std::collections::{BTreeMap, BTreeSet};
 use std::mem::offset_of;
@@ -253,11 +253,10 @@ fn constant(module: &Module, name: &str) -> f64 {
 fn constants_of_the_passes_match_the_host() {
     let modules = modules();
     let threads = 256;
-    let expected: [(&str, &str, f64); 17] = [
+    let expected: [(&str, &str, f64); 15] = [
         ("activate", "BLOCK", BLOCK.into()),
         ("activate", "PER_THREAD", (BLOCK / threads).into()),
         ("project", "MARGINAL_CUTOFF", MARGINAL_CUTOFF.into()),
-        ("project", "LOW_PASS", LOW_PASS.into()),
         ("sort", "BLOCK", BLOCK.into()),
         ("sort", "KEYS_PER_THREAD", (BLOCK / threads).into()),
         ("sort", "NO_DIGIT", DIGITS.into()),
@@ -266,7 +265,6 @@ fn constants_of_the_passes_match_the_host() {
         ("blend", "BATCH", (TILE_SIZE * TILE_SIZE).into()),
         ("score", "PIXELS", (TILE_SIZE * TILE_SIZE).into()),
         ("blend_backward", "PIXELS", (TILE_SIZE * TILE_SIZE).into()),
-        ("project_backward", "LOW_PASS", LOW_PASS.into()),
         ("project_backward", "FIRST_SEEN", FIRST_SEEN.into()),
         ("adam", "FIRST_SEEN", FIRST_SEEN.into()),
         ("regularize", "NEIGHBORS", NEIGHBORS as f64),
@@ -283,6 +281,7 @@ fn constants_of_the_libraries_match_the_host() {
     // These libraries import only each other: concatenated without directives, they are plain WGSL.
     let sources = [
         include_str!("../../shaders/shared/types.wgsl"),
+        include_str!("../../shaders/shared/conic.wgsl"),
         include_str!("../../shaders/shared/alpha.wgsl"),
         include_str!("../../shaders/shared/tile.wgsl"),
     ];
@@ -311,6 +310,9 @@ fn constants_of_the_libraries_match_the_host() {
         ("BIN_COUNTERS", layout::BIN_COUNTERS),
     ];
     let floats = [
+        ("LOW_PASS", LOW_PASS),
+        ("MAX_VARIANCE", MAX_VARIANCE),
+        ("THIN", THIN),
         ("ALPHA_MIN", ALPHA_MIN),
         ("INVERSE_ALPHA_MIN", ALPHA_MIN.recip().round()),
         ("ALPHA_MAX", ALPHA_MAX),

@@ -5,13 +5,16 @@
 
 mod appearance;
 mod bake;
+mod crowds;
 mod depths_alone;
+mod designs;
 mod detail;
 mod fast;
 mod filter;
 mod fine_tune;
 mod fine_tune_run;
 mod golden;
+mod hidden;
 mod layout;
 #[cfg(target_os = "linux")]
 mod memory;
@@ -21,6 +24,8 @@ mod passes;
 mod render;
 mod score;
 mod shaders;
+mod thin;
+mod uniformity;
 
 #[path = "../support"]
 mod support {
@@ -35,6 +40,8 @@ mod support {
     pub mod own_process;
     pub mod packed_scene;
     pub mod passes;
+    pub mod random;
     pub mod skip;
     pub mod surfaces;
+    pub mod thin;
 }

@@ -6,8 +6,9 @@
 use crate::support::gpu;
 use crate::support::packed_scene::{scene, settings};
 use bevy_gs4d::gaussian::{Gaussian, Harmonics};
+use bevy_gs4d::internal::reference::{self, TileLists};
 use bevy_gs4d::offline::quantize::compress;
-use bevy_gs4d::reference::{self, Layer, TileLists};
+use bevy_gs4d::reference::Layer;
 use bevy_gs4d::renderer::{ColorPrecision, Design, Instance, ViewParameters};
 use bevy_gs4d::scene::RuntimeScene;
 use bevy_gs4d::view::{Appearance, Background, BlendSpace, Camera, Counts, RasterFov, View};

@@ -3,8 +3,8 @@
 //! In: synthetic scenes. Out: proof that both return the same sums. Skipped where there is no GPU.
 
 use crate::support::gpu;
-use bevy_gs4d::offline::score::score;
-use bevy_gs4d::offline::score::{GpuEngine, ScoreEngine, Want};
+use bevy_gs4d::internal::offline::score::score;
+use bevy_gs4d::internal::offline::score::{GpuEngine, ScoreEngine, Want};
 use bevy_gs4d::renderer::ShaderChecks;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::view::{Background, Camera, RasterFov};

@@ -3,15 +3,16 @@
 //! In: the files of `shaders/`. Out: proof that each file is known to the renderer and is valid WGSL, and that only the variants for devices
 //! with optional capabilities need these capabilities.
 
-use bevy_gs4d::renderer::shaders::{
-    ATOMIC_SUMS, BINNED, Blending, COMPAT, COMPAT_WITHOUT_TIME, COPIED_INSTANCE, ColorPrecision, EIGHT_AT_ONCE,
-    FEW_BINS, LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32, Storage, compose, pass_names,
+use bevy_gs4d::internal::renderer::shaders::{
+    ATOMIC_SUMS, AtOnce, BINNED, Blending, COMPAT, COMPAT_WITHOUT_TIME, COPIED_INSTANCE, EIGHT_AT_ONCE, FEW_BINS,
+    LARGE_BATCHES, Lists, MULTISAMPLED, SUBGROUPS_OF_32, compose, pass_names,
 };
+use bevy_gs4d::renderer::{ColorPrecision, Storage};
 use naga_oil::compose::{ComposableModuleDescriptor, Composer, NagaModuleDescriptor, ShaderDefValue};
 use std::collections::BTreeSet;
 use std::path::Path;
 use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
-use wgpu::naga::{AddressSpace, Module};
+use wgpu::naga::{AddressSpace, Expression, Literal, Module, ScalarKind};
 
 /// Validates a module that may use only these optional capabilities.
 fn validate(name: &str, module: &Module, capabilities: Capabilities) -> Result<(), String> {
@@ -68,8 +69,12 @@ fn every_pass_composes_and_is_valid() {
     let storages = Storage::ALL.map(|storage| storage.definitions().to_vec());
     let copied = storages.iter().chain(&binned).map(|definitions| [&definitions[..], COPIED_INSTANCE].concat());
     let copied: Vec<_> = copied.collect();
+    let at_once = AtOnce::ALL
+        .into_iter()
+        .flat_map(|at_once| [&[][..], MULTISAMPLED].map(|samples| [at_once.definitions(), samples].concat()));
     let definitions: Vec<_> = storages
         .into_iter()
+        .chain(at_once)
         .chain([MULTISAMPLED.to_vec(), COMPAT.to_vec(), COMPAT_WITHOUT_TIME.to_vec()])
         .chain([ATOMIC_SUMS.to_vec(), [COMPAT, ATOMIC_SUMS].concat()])
         .chain(binned)
@@ -80,6 +85,22 @@ fn every_pass_composes_and_is_valid() {
         .collect();
     let all = definitions.iter().flat_map(|definitions| pass_names().map(move |name| (name, &definitions[..])));
     report(all.filter_map(|(name, definitions)| check(name, definitions).err()).collect());
+}
+
+/// Drivers may round a floating-point expression differently in each place where it is inlined; indices computed from it would differ.
+#[test]
+fn sort_bins_computes_its_indices_from_integers() {
+    for lists in Lists::ALL {
+        let module = compose("sort_bins", lists.definitions()).expect("it composes");
+        let functions = module.functions.iter().map(|(_, function)| function);
+        for function in functions.chain(module.entry_points.iter().map(|entry| &entry.function)) {
+            let floats = function.expressions.iter().any(|(_, expression)| {
+                matches!(expression, Expression::As { kind: ScalarKind::Float, .. })
+                    || matches!(expression, Expression::Literal(Literal::F32(_)))
+            });
+            assert!(!floats, "{lists:?}: {:?} computes with integers only", function.name);
+        }
+    }
 }
 
 #[test]

@@ -1,8 +1,10 @@
 //! Checks of every scene that a reader accepts.
 //!
-//! In: a scene. Out: whether it was drawn ([`Outcome`]), or the defect: a value of a picture that is not finite, or a file written from it that
-//! cannot be read or is another scene.
+//! In: a scene. Out: whether it was drawn ([`Outcome`]), or the defect: a value of a picture beyond the limits of the scene, a picture that the
+//! CPU reference and the designs of the GPU draw differently, or a file written from the scene that cannot be read or is another scene.
 
+use crate::designs::{self, Expected};
+use crate::limits::Limits;
 use crate::readers::Outcome;
 use crate::support::packed_scene::{self, BLACK, settings};
 use bevy_gs4d::codec::package::{self, PackageError, WriteSettings};
@@ -10,7 +12,6 @@ use bevy_gs4d::offline::orbit::orbit;
 use bevy_gs4d::offline::quantize::compress;
 use bevy_gs4d::reference;
 use bevy_gs4d::scene::{Bounds, BoundsOverTime, GaussianScene, RuntimeScene};
-use bevy_gs4d::view::Frame;
 use glam::UVec2;
 use std::io::Cursor;
 
@@ -21,8 +22,17 @@ const COMPRESSED: usize = 512;
 /// Size of the pictures from cameras around the scene, pixels.
 const SIZE: UVec2 = UVec2::new(24, 16);
 
+/// The renderers that draw a scene.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum DrawnBy {
+    /// The CPU reference.
+    Cpu,
+    /// The CPU reference, and both designs of the GPU if there is one.
+    CpuAndGpu,
+}
+
 /// Checks a scene as it was read. One that cannot be drawn counts as refused.
-pub fn check(scene: GaussianScene) -> Result<Outcome, String> {
+pub fn check(scene: GaussianScene, by: DrawnBy) -> Result<Outcome, String> {
     rewrite(&scene)?;
     let runtime = match scene.into_runtime() {
         Ok(runtime) => runtime,
@@ -32,7 +42,7 @@ pub fn check(scene: GaussianScene) -> Result<Outcome, String> {
     if runtime.len() > DRAWN {
         return Ok(Outcome::Accepted);
     }
-    draw(&runtime)?;
+    draw(&runtime, by)?;
     if runtime.len() <= COMPRESSED {
         for codebooks in [&[] as &[usize], &[4, 4]] {
             compress_and_read(&runtime, codebooks)?;
@@ -68,22 +78,30 @@ pub fn compress_and_read(scene: &RuntimeScene, codebooks: &[usize]) -> Result<()
     let again =
         package::read(Cursor::new(file)).map_err(|error| format!("is compressed and cannot be read: {error}"))?;
     let again = again.into_runtime().map_err(|error| format!("is compressed and cannot be drawn: {error}"))?;
-    draw(&again).map_err(|defect| format!("is compressed, and {defect}"))
+    draw(&again, DrawnBy::Cpu).map_err(|defect| format!("is compressed, and {defect}"))
 }
 
 /// Draws a scene from the camera of synthetic scenes at the middle of its time, and from cameras around the scene at its first, middle and
 /// last time.
-pub fn draw(scene: &RuntimeScene) -> Result<(), String> {
+pub fn draw(scene: &RuntimeScene, by: DrawnBy) -> Result<(), String> {
     let [first, last] = scene.trained_with.time_interval;
-    let middle = 0.5 * first + 0.5 * last;
-    check_frame(&reference::render(scene, &packed_scene::view(middle), BLACK), middle)?;
+    let mut views = vec![(packed_scene::view(0.5 * first + 0.5 * last), BLACK)];
     // A scene without Gaussians has no bounds to place cameras around.
     for shot in orbit(scene, 3, SIZE).unwrap_or_default() {
         if !shot.camera.world_to_camera.is_finite() {
             return Err("the cameras around it are not finite".to_owned());
         }
-        let frame = reference::render(scene, &shot.view(scene), scene.trained_background());
-        check_frame(&frame, shot.time)?;
+        views.push((shot.view(scene), scene.trained_background()));
+    }
+    let limits = Limits::of(scene);
+    let mut expected = Vec::new();
+    for (view, background) in views {
+        let frame = reference::render(scene, &view, background);
+        limits.check(&frame, &view, background)?;
+        expected.push(Expected { view, background, frame });
+    }
+    if by == DrawnBy::CpuAndGpu {
+        designs::compare(scene, &limits, &expected)?;
     }
     let bounds = BoundsOverTime::of(scene.iter(), [first, last]);
     let finite = |bounds: Bounds| bounds.min.is_finite() && bounds.max.is_finite();
@@ -92,21 +110,4 @@ pub fn draw(scene: &RuntimeScene) -> Result<(), String> {
     } else {
         Err("its bounds are not finite".to_owned())
     }
-}
-
-/// Checks that every value of a picture is finite.
-pub fn check_frame(frame: &Frame, time: f32) -> Result<(), String> {
-    let color: Vec<f32> = frame.picture.pixels.iter().flat_map(|pixel| pixel.to_array()).collect();
-    let planes = [
-        ("color", &color),
-        ("transmittance", &frame.transmittance),
-        ("depth", &frame.depth),
-        ("median depth", &frame.median_depth),
-    ];
-    for (name, values) in planes {
-        if let Some(value) = values.iter().find(|value| !value.is_finite()) {
-            return Err(format!("is drawn with a {name} of {value} at time {time}"));
-        }
-    }
-    Ok(())
 }

@@ -14,9 +14,13 @@
 
 mod accepted;
 mod change;
+mod designs;
+mod limits;
 mod memory;
 mod options;
 mod readers;
+mod rounding;
+mod self_test;
 mod trials;
 mod watch;
 
@@ -24,9 +28,12 @@ mod watch;
 mod support {
     pub mod allocations;
     pub mod dataset;
+    pub mod gpu;
+    pub mod no_gpu;
     pub mod packed_scene;
     pub mod pth;
     pub mod random;
+    pub mod skip;
 }
 
 use options::Options;
@@ -52,6 +59,8 @@ fn main() -> ExitCode {
         return ExitCode::SUCCESS;
     }
     watch::record_panics();
+    designs::open();
+    self_test::run();
     let readers: Vec<(&Kind, Arc<dyn Reader>)> = kinds.map(|kind| (kind, (kind.make)())).collect();
     let mut trials = Trials::new(options.seed, options.keep.clone());
     match (&options.file, options.input) {

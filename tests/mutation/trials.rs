@@ -3,6 +3,7 @@
 //! In: inputs, one after the other. Out: counts for each reader, a line for each new kind of defect with the command that repeats it, and the
 //! inputs in a folder if one is given.
 
+use crate::designs;
 use crate::readers::{Kind, Outcome, Reader};
 use crate::watch::{Seen, watch};
 use std::collections::HashMap;
@@ -140,6 +141,7 @@ impl Trials {
                 let _ = fs::remove_file(folder.join(format!("{}.running", row.reader)));
             }
         }
+        println!("{}", designs::summary());
         println!("{all}");
         all.defects == 0
     }

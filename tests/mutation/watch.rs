@@ -1,13 +1,14 @@
 //! A reader run on one input, with limits.
 //!
-//! In: a reader and the bytes to read. Out: the outcome ([`Seen`]): refused or accepted, or a defect: a panic, too much time or memory, a
-//! message with control characters, or a defect that the reader finds in its result.
+//! In: a reader and the bytes to read. Out: the outcome ([`Seen`]): refused or accepted, or a defect: a panic in any thread, caught or not, too
+//! much time or memory, a message with control characters, or a defect that the reader finds in its result.
 //!
 //! Each input is read on its own thread with a stack of the usual size: endless recursion ends the process, and the message of the system
 //! names the thread, which is named after the input.
 
 use crate::memory;
 use crate::readers::{Outcome, Reader};
+use std::mem;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -25,8 +26,16 @@ const MEMORY: usize = 1 << 30;
 /// The most memory that may be asked for at once, bytes.
 const REQUEST: usize = 512 << 20;
 
-/// The first panic since an input began.
-static PANIC: Mutex<Option<String>> = Mutex::new(None);
+/// The panics since an input began.
+static PANICS: Mutex<Panics> = Mutex::new(Panics { count: 0, first: None });
+
+/// Panics of any thread.
+#[derive(Default)]
+struct Panics {
+    count: usize,
+    /// The message of the first.
+    first: Option<String>,
+}
 
 /// The outcome of an input.
 pub struct Seen {
@@ -39,29 +48,30 @@ pub struct Seen {
     pub stuck: bool,
 }
 
-/// Has panics of all threads but the main one kept instead of printed.
+/// Has panics of all threads but the main one counted instead of printed.
 pub fn record_panics() {
     let usual = panic::take_hook();
     panic::set_hook(Box::new(move |info| {
         if thread::current().name() == Some("main") {
             return usual(info);
         }
-        let mut first = PANIC.lock().unwrap_or_else(PoisonError::into_inner);
-        if first.is_none() {
-            *first = Some(info.to_string().replace('\n', " "));
-        }
+        let mut panics = PANICS.lock().unwrap_or_else(PoisonError::into_inner);
+        panics.count += 1;
+        panics.first.get_or_insert_with(|| info.to_string().replace('\n', " "));
     }));
 }
 
-fn last_panic() -> Option<String> {
-    PANIC.lock().unwrap_or_else(PoisonError::into_inner).take()
+/// Takes the panics since the last call: the message of the first, and their number if there were several.
+fn take_panics() -> Option<String> {
+    let Panics { count, first } = mem::take(&mut *PANICS.lock().unwrap_or_else(PoisonError::into_inner));
+    first.map(|first| if count > 1 { format!("{count} panics, the first: {first}") } else { first })
 }
 
 /// Runs a reader on an input. `name` is the name of the input.
 pub fn watch(name: &str, reader: &Arc<dyn Reader>, bytes: &Arc<[u8]>) -> Seen {
     let (sender, receiver) = mpsc::channel();
     let (reader, bytes) = (Arc::clone(reader), Arc::clone(bytes));
-    last_panic();
+    take_panics();
     memory::begin();
     let start = Instant::now();
     let read = move || {
@@ -78,10 +88,12 @@ pub fn watch(name: &str, reader: &Arc<dyn Reader>, bytes: &Arc<[u8]>) -> Seen {
         // A panic has been received already.
         let _ = thread.join();
     }
-    let outcome = match received {
-        Ok(Some(outcome)) => outcome.and_then(|outcome| within_bounds(outcome, time, peak, largest)),
+    let outcome = match (received, take_panics()) {
         _ if stuck => Err(format!("still runs after {} s", STUCK.as_secs())),
-        _ => Err(last_panic().unwrap_or_else(|| "panicked without a message".to_owned())),
+        // Also if the panic was caught, or ended a thread whose result is ignored.
+        (_, Some(panics)) => Err(panics),
+        (Ok(Some(outcome)), None) => outcome.and_then(|outcome| within_bounds(outcome, time, peak, largest)),
+        (_, None) => Err("panicked without a message".to_owned()),
     };
     Seen { outcome, time, memory: peak, stuck }
 }

@@ -4,8 +4,9 @@
 //! [`GoldenGradient`]s, each with a view, its trained scene, the loss and the expected gradients.
 
 use crate::support::golden::{self, GoldenView};
-use bevy_gs4d::gaussian::{GradientMode, ParameterGradient, SliceSettings};
-use bevy_gs4d::reference::PixelGradients;
+use bevy_gs4d::gaussian::{GradientMode, SliceSettings};
+use bevy_gs4d::internal::gaussian::ParameterGradient;
+use bevy_gs4d::internal::reference::PixelGradients;
 use bevy_gs4d::scene::Trained;
 use glam::Vec3;
 use serde_json::Value;

@@ -3,7 +3,8 @@
 //! In: the name of a pass, and buffers by their names in its shader. Out: the contents of these buffers after a dispatch.
 
 use crate::support::no_gpu::no_gpu;
-use bevy_gs4d::renderer::{GpuContext, shaders};
+use bevy_gs4d::internal::renderer::shaders;
+use bevy_gs4d::renderer::GpuContext;
 use bytemuck::Pod;
 use std::borrow::Cow;
 use std::collections::BTreeMap;

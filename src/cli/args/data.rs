@@ -4,7 +4,7 @@
 
 use super::values;
 use crate::cli::failure::Failure;
-use crate::offline::dataset::validation::Validation;
+use crate::offline::dataset::Validation;
 use crate::offline::dataset::{Dataset, DatasetError, Split, TrainingView};
 use crate::offline::files::Files;
 use crate::offline::splits::{SplitOptions, Splits, open_split};

@@ -2,7 +2,8 @@
 //!
 //! In: `--engine`, `--renderer`, `--adapter` and `--checks`. Out: an [`Engine`], or a headless renderer.
 
-use super::values;
+use super::{Given, values};
+use crate::cli::failure::Failure;
 use crate::offline::engine::{Engine, EngineChoice, EngineSettings, GpuSettings};
 use crate::renderer::{Design, GpuError, Headless, ShaderChecks};
 
@@ -17,13 +18,33 @@ pub struct EngineArgs {
     gpu: GpuArgs,
 }
 
+/// The options that have an effect on a GPU alone.
+const OF_GPU: [&str; 2] = ["--adapter", "--checks"];
+
 impl EngineArgs {
-    /// Opens the engine.
+    /// Checks that no option of a GPU is given with `--engine cpu`; `more` are further options of the verb that have an effect on a GPU alone.
     ///
     /// # Errors
-    /// The requested GPU cannot be used.
-    pub fn open(&self) -> Result<Engine, GpuError> {
-        Engine::open(&EngineSettings { choice: self.engine, gpu: self.gpu.settings() })
+    /// The first of them that is given.
+    pub fn check(&self, given: &Given, more: &[&str]) -> Result<(), Failure> {
+        match self.engine {
+            EngineChoice::Cpu => given.none_of(&[&OF_GPU, more].concat(), "with --engine cpu"),
+            EngineChoice::Auto | EngineChoice::Gpu => Ok(()),
+        }
+    }
+
+    /// Opens the engine, after [`check`](Self::check).
+    ///
+    /// # Errors
+    /// The requested GPU cannot be used; an option of a GPU is given, and there is none but a software driver.
+    pub fn open(&self, given: &Given, more: &[&str]) -> Result<Engine, Failure> {
+        self.check(given, more)?;
+        let engine = Engine::open(&EngineSettings { choice: self.engine, gpu: self.gpu.settings() })?;
+        if let Engine::Cpu = engine {
+            let reason = "on the CPU, which --engine auto takes here (--engine gpu takes a software driver)";
+            given.none_of(&[&OF_GPU, more].concat(), reason)?;
+        }
+        Ok(engine)
     }
 }
 

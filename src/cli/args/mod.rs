@@ -5,6 +5,7 @@
 mod checkpoint;
 mod data;
 mod engine;
+mod given;
 mod package;
 mod scoring;
 pub mod values;
@@ -13,6 +14,7 @@ mod views;
 pub use checkpoint::CheckpointArgs;
 pub use data::{DataArgs, SplitArgs, ValidationArgs};
 pub use engine::{DesignArgs, EngineArgs, RendererArgs, RenderersArgs};
+pub use given::{Given, WITHOUT_TIME};
 pub use package::{PackageArgs, file_size};
 pub use scoring::{ScoringArgs, score_choice};
 pub use views::ViewArgs;

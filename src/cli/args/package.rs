@@ -3,7 +3,6 @@
 //! In: options, the files that are read, a scene. Out: the package on disk.
 
 use crate::cli::failure::Failure;
-use crate::cli::interrupt;
 use crate::offline::files::Files;
 use crate::offline::{self, write_settings};
 use crate::scene::GaussianScene;
@@ -44,6 +43,16 @@ impl PackageArgs {
         Ok(out)
     }
 
+    /// As [`checked_out`](Self::checked_out), for verbs that read the package again or write others beside it: a device or a pipe is refused.
+    ///
+    /// # Errors
+    /// As [`checked_out`](Self::checked_out).
+    pub fn checked_file(&self, files: Files) -> Result<&Path, Failure> {
+        let out = self.out()?;
+        files.writes_regular(out, "gs4d").check()?;
+        Ok(out)
+    }
+
     /// Writes the package. Returns its size in bytes.
     ///
     /// # Errors
@@ -51,7 +60,7 @@ impl PackageArgs {
     pub fn save(&self, scene: &GaussianScene) -> Result<u64, Failure> {
         let out = self.out()?;
         let settings = write_settings(&scene.form, self.level);
-        interrupt::whole(|| offline::save(out, scene, &settings))?;
+        offline::save(out, scene, &settings)?;
         file_size(out)
     }
 }

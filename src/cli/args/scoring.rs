@@ -2,8 +2,9 @@
 //!
 //! In: the name of a score, the options for scoring. Out: a [`ScoreChoice`], [`ScoringSettings`].
 
-use super::values;
-use crate::offline::score::variant::Variant;
+use super::{Given, values};
+use crate::cli::failure::Failure;
+use crate::offline::score::Variant;
 use crate::offline::score::{ScoreSettings, ScoringSettings};
 use crate::offline::search::ScoreChoice;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -34,6 +35,18 @@ pub struct ScoringArgs {
 }
 
 impl ScoringArgs {
+    /// Checks that the options of the volume are given only if one of these scores depends on it.
+    ///
+    /// # Errors
+    /// An option that has no effect.
+    pub fn check(&self, given: &Given, choices: &[ScoreChoice]) -> Result<(), Failure> {
+        let mut variants = choices.iter().flat_map(|choice| choice.variants(true));
+        if !variants.any(Variant::needs_volume) {
+            return given.none_of(&["--volume-power", "--volume-rank"], "on scores that do not use the volume");
+        }
+        if self.volume_power == 0.0 { given.none_of(&["--volume-rank"], "with --volume-power 0") } else { Ok(()) }
+    }
+
     /// Returns the settings of the library.
     pub fn settings(&self) -> ScoringSettings {
         let score = ScoreSettings { volume_power: self.volume_power, volume_rank: self.volume_rank };

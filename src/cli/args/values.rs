@@ -2,12 +2,13 @@
 //!
 //! In: the text after an option. Out: the value, or as an error the reason, which clap shows with the option's name.
 
+use crate::offline::dataset::MAX_SIDE;
 use crate::offline::temporal_filter::KeyFrames;
 use clap::builder::{PossibleValuesParser, RangedU64ValueParser, TypedValueParser};
 use glam::UVec2;
 
-/// The largest width and height of a picture, in pixels.
-const MAX_SIDE: u32 = 16_384;
+/// The largest weight, factor or number of decibels: beyond any use, and far from the limits of single precision.
+const LARGEST: f64 = 1e6;
 
 fn numbers<const N: usize>(text: &str) -> Option<[f32; N]> {
     let values: Vec<f32> = text.split(',').map(|v| v.trim().parse().ok()).collect::<Option<_>>()?;
@@ -47,10 +48,10 @@ pub fn share(text: &str) -> Result<f64, String> {
     share.ok_or_else(|| "expected a number from 0 to 1".to_owned())
 }
 
-/// Parses a finite number, not below zero, in double precision.
+/// Parses a number from 0 to [`LARGEST`], in double precision.
 pub fn not_negative(text: &str) -> Result<f64, String> {
-    let value = text.trim().parse::<f64>().ok().filter(|value| value.is_finite() && *value >= 0.0);
-    value.ok_or_else(|| "expected a number, zero or above".to_owned())
+    let value = text.trim().parse::<f64>().ok().filter(|value| (0.0..=LARGEST).contains(value));
+    value.ok_or_else(|| format!("expected a number from 0 to {LARGEST}"))
 }
 
 /// Parses 0, or a number above it that is a normal number of single precision.
@@ -112,6 +113,7 @@ mod tests {
             assert!(share(text).is_err(), "{text:?} is no share");
         }
         assert!(not_negative("-1").is_err() && not_negative("inf").is_err(), "finite and not below zero");
+        assert!(not_negative("1e6").is_ok() && not_negative("1e308").is_err(), "no more than any use needs");
         assert!(step("-1").is_err() && step("1e308").is_err(), "in single precision and not below zero");
         assert!(interval("1,1").is_err(), "an interval has a length");
         assert!(positive("0").is_err(), "zero is not above zero");

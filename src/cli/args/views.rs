@@ -32,7 +32,7 @@ pub struct ViewArgs {
     #[arg(long, value_name = "WxH", value_parser = values::size)]
     size: Option<UVec2>,
     /// Divisor of the picture size (1, 2, 3, 4, 8), -1 (at most 1600 wide) or a target width, as in training.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with_all = ["size", "orbit"])]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with_all = ["size", "orbit"], requires = "cameras")]
     resolution: Option<i32>,
 }
 
@@ -55,6 +55,11 @@ impl ViewArgs {
     pub fn shots(&self, scene: &RuntimeScene, count: usize) -> Result<Vec<Shot>, Failure> {
         let mut shots = match &self.cameras {
             Some(path) => {
+                if self.resolution.is_some() && CameraFile::ignores_resolution(path)? {
+                    let reason =
+                        "has the sizes of its pictures, on which --resolution has no effect: give --size, or neither";
+                    return Err(Failure::about(path, reason));
+                }
                 let options = CameraOptions { size: self.size, resolution: self.resolution, time_interval: None };
                 let views = CameraFile::load(path, &options).map_err(or_give_size)?;
                 views.into_iter().map(|view| Shot { name: view.name, camera: view.camera, time: view.time }).collect()

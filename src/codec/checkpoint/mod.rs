@@ -12,13 +12,12 @@
 mod archive;
 mod cfg_args;
 mod error;
-mod options;
+pub(crate) mod options;
 mod pickle;
 mod state;
 mod tensor;
 
 pub use error::CheckpointError;
-pub use options::describe;
 
 use super::options::ReadOptions;
 use crate::gaussian::{Harmonics, Model};

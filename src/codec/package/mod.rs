@@ -17,12 +17,12 @@ mod header;
 mod layout;
 mod options;
 mod planes;
-mod section;
+pub(crate) mod section;
 
 pub use envelope::{MAGIC, VERSION};
 pub use error::PackageError;
 pub use header::{EnvironmentSize, Header, StoredFilter, StoredForm, StoredLevel};
-pub use section::{FLOAT_PLANES, PACKAGE, Section};
+pub use section::Section;
 
 use super::options::ReadOptions;
 use crate::scene::{GaussianScene, Level, RuntimeScene, SceneForm};

@@ -1,6 +1,6 @@
 //! The stages mask and compress of a bake.
 //!
-//! In: the remaining Gaussians. Out: their temporal filter; the bytes of the package, and the package in its place.
+//! In: the remaining Gaussians. Out: their temporal filter; the bytes of the package.
 
 use super::inputs::Inputs;
 use super::tuning::with_codebooks;
@@ -10,9 +10,8 @@ use crate::offline::stages::Stages;
 use crate::offline::store::Key;
 use crate::offline::stored::Package;
 use crate::offline::temporal_filter::filter as temporal_filter;
-use crate::offline::{OfflineError, Progress, write_beside, write_settings};
-use crate::scene::{GaussianScene, SceneForm, TemporalFilter};
-use std::io::Write;
+use crate::offline::{OfflineError, write_settings};
+use crate::scene::{Form, GaussianScene, SceneForm, TemporalFilter};
 
 /// The stage mask: computes the temporal filter of the remaining Gaussians. Returns the key of the scene with it, given that of the scene.
 pub(super) fn mask(
@@ -48,12 +47,13 @@ pub(super) fn compress(
         |progress| {
             let scene = if is_tuned { with_codebooks(inputs, scene, key, progress)? } else { scene };
             let packed = match scene.form {
-                SceneForm::Trained(_) => {
+                // The scene with trained codebooks.
+                SceneForm::Ready(Form::Packed(_)) => scene,
+                SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_)) => {
                     let runtime = scene.into_runtime();
                     let runtime = runtime.map_err(|error| OfflineError::at(&settings.checkpoint, error))?;
                     quantize::compress(runtime, &CompressSettings::from(settings.quality))?.0
                 }
-                SceneForm::Ready(_) => scene,
             };
             let mut bytes = Vec::new();
             package::write(&mut bytes, &packed, &write_settings(&packed.form, settings.level))?;
@@ -61,20 +61,4 @@ pub(super) fn compress(
         },
     )?;
     Ok(bytes)
-}
-
-/// Writes the package to its place, unless the same bytes are there; returns `false` if it has more bytes than are allowed.
-pub(super) fn put_in_place(
-    inputs: &Inputs<'_>,
-    package: &[u8],
-    progress: &mut dyn Progress,
-) -> Result<bool, OfflineError> {
-    let out = &inputs.settings.out;
-    if package.len() as u64 > inputs.limit() {
-        return Ok(false);
-    }
-    if !(out.is_file() && Key::of_file(out).is_ok_and(|there| there == Key::of(package))) {
-        progress.uninterrupted(&mut || write_beside(out, |file| file.write_all(package)))?;
-    }
-    Ok(true)
 }

@@ -7,6 +7,8 @@ use crate::offline::belonging::require_belonging;
 use crate::offline::dataset::TrainingView;
 use crate::offline::engine::Engine;
 use crate::offline::fine_tune::{FineTuneSettings, TrainingImages};
+use crate::offline::memory_check::{BY_RESOLUTION, Pictures};
+use crate::offline::metrics::MetricSet;
 use crate::offline::search::Goal;
 use crate::offline::splits::Splits;
 use crate::offline::store::{Key, Store};
@@ -59,6 +61,7 @@ impl<'a> Inputs<'a> {
         let cameras_key = Key::of(format!("{:?} {:?}", splits.train, splits.validation).as_bytes());
         let training_images_key = Key::of_images(&splits.train)?;
         let validation_images_key = Key::of_images(&splits.validation)?;
+        require_room(engine, settings, &views, &splits)?;
         let mut subject = Subject::new(checkpoint, scene, settings.background)?;
         let pixel = trained_pixel(&subject.scene, &views);
         (subject.scene.trained_with.pixel, subject.runtime.trained_with.pixel) = (pixel, pixel);
@@ -133,5 +136,22 @@ impl<'a> Inputs<'a> {
             Goal::Size(limit) => limit,
             Goal::Keep(_) | Goal::Remove(_) | Goal::MaxLoss(_) => u64::MAX,
         }
+    }
+}
+
+/// Checks that the pictures of every stage fit the memory and the GPU, before the first stage.
+fn require_room(
+    engine: &Engine,
+    settings: &BakeSettings,
+    views: &[TrainingView],
+    splits: &Splits,
+) -> Result<(), OfflineError> {
+    Pictures::looked_at(views).require(engine.headless(), BY_RESOLUTION)?;
+    Pictures::compared(&splits.validation).require(engine.headless(), BY_RESOLUTION)?;
+    // The test views, which are of the same sizes.
+    Pictures::evaluated(views, MetricSet::ALL, true).require(engine.headless(), BY_RESOLUTION)?;
+    match (engine, &settings.fine_tune) {
+        (Engine::Gpu(headless), Some(_)) => TrainingImages::require_room(&splits.train, &splits.validation, headless),
+        _ => Ok(()),
     }
 }

@@ -20,14 +20,15 @@ pub use settings::BakeSettings;
 
 use super::engine::Engine;
 use super::prune::highest;
-use super::report::{BakeReport, write_report};
+use super::quantize::require_unpacked;
+use super::report::{BakeReport, write_with_report};
 use super::search::of_name;
 use super::stages::Stages;
 use super::test_comparison::compare_test_views;
 use super::{OfflineError, Progress, sliced};
 use crate::scene::GaussianScene;
 use choice::{choose, require_validation, score};
-use compression::{compress, mask, put_in_place};
+use compression::{compress, mask};
 use inputs::Inputs;
 use rounds::thin;
 use size::{Attempts, require_room};
@@ -53,7 +54,7 @@ pub struct Baked {
 /// of the scene is replaced. Begins the task "bake" and, inside it, the tasks of the stages.
 ///
 /// # Errors
-/// Training views that are missing or show nothing of the scene, images that a loss needs and that are missing, files
+/// A scene that is packed already, training views that are missing or show nothing of the scene, images that a loss needs and that are missing, files
 /// that cannot be written or are read, another bake to the same package, a failure of the engine.
 pub fn bake(
     scene: GaussianScene,
@@ -62,6 +63,7 @@ pub fn bake(
     progress: &mut dyn Progress,
 ) -> Result<Baked, OfflineError> {
     settings.check_files()?;
+    require_unpacked(&scene.form).map_err(|error| OfflineError::at(&settings.checkpoint, error))?;
     let mut inputs = Inputs::open(scene, settings, engine, progress)?;
     require_validation(&inputs)?;
     require_room(&inputs)?;
@@ -72,7 +74,7 @@ pub fn bake(
     let (choice, key) = choose(&mut inputs, &mut stages, &scores, key)?;
     let scores = of_name(&scores, &choice.score).ok_or(OfflineError::NoScore)?;
     let mut attempts = Attempts::load(&inputs, key, choice.kept);
-    let (filter, after, tuning) = loop {
+    let (filter, after, tuning, package) = loop {
         let kept = highest(scores, attempts.count());
         let (thinned, key) = thin(&mut inputs, &mut stages, scores, &choice.score, &kept, key)?;
         let (tuned, tuning, key) = fine_tune(&mut inputs, &mut stages, thinned, key)?;
@@ -80,29 +82,30 @@ pub fn bake(
         let after = sliced(&tuned)?.into_owned();
         let tuned = GaussianScene { filter: Some(filter.clone()), ..tuned };
         let package = compress(&mut inputs, &mut stages, tuned, tuning.is_some(), key)?;
-        if put_in_place(&inputs, &package, stages.progress())? {
-            break (filter, after, tuning);
+        if package.len() as u64 <= inputs.limit() {
+            break (filter, after, tuning, package);
         }
         attempts.keep_fewer(&inputs, &package, scores, stages.progress())?;
     };
     let compared = stages.run_always("evaluate", |progress| {
-        compare_test_views(inputs.engine, &inputs.subject, &inputs.splits, &settings.out, progress)
+        compare_test_views(inputs.engine, &inputs.subject, &inputs.splits, &settings.out, &package, progress)
     })?;
     let times = stages.times();
-    let baked = stages.run_always("report", |progress| {
+    let baked = stages.run_always("report", |_| {
         let facts = Facts {
             settings,
             trained_with: &inputs.subject.scene.trained_with,
             before: &sliced(&inputs.subject.scene)?,
             after: &after,
             filter: &filter,
+            package: &package,
             choice,
             tuning,
             stages: times,
             compared,
         };
         let report = facts.report()?;
-        let [json, html] = write_report(&report, &settings.out, progress)?;
+        let [json, html] = write_with_report(&report, &package, &settings.out)?;
         Ok(Baked { report, json, html })
     })?;
     stages.finish();

@@ -8,7 +8,7 @@ use super::tuning::short;
 use crate::offline::engine::Engine;
 use crate::offline::fine_tune::fine_tune;
 use crate::offline::prune::{highest, select};
-use crate::offline::score::variant::Variant;
+use crate::offline::score::Variant;
 use crate::offline::stages::Stages;
 use crate::offline::store::Key;
 use crate::offline::{OfflineError, Progress, Subject};

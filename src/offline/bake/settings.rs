@@ -45,7 +45,7 @@ pub struct BakeSettings {
     /// How much compression may lose.
     pub quality: Quality,
     /// zstd level of the package, 1 (fast) to 19 (small); `None` uses the default of
-    /// [`write_settings`](crate::offline::write_settings).
+    /// `write_settings`.
     pub level: Option<i32>,
     /// Whether images are used without a check that they show the capture.
     pub trust_images: bool,
@@ -60,8 +60,9 @@ impl BakeSettings {
     /// # Errors
     /// The first of them with which something is wrong.
     pub fn check_files(&self) -> Result<(), OfflineError> {
-        let files = Files::default().reads_scene(&self.checkpoint).reads_data(&self.data).writes(&self.out, "gs4d");
+        let files =
+            Files::default().reads_scene(&self.checkpoint).reads_data(&self.data).writes_regular(&self.out, "gs4d");
         let [json, html] = report_paths(&self.out);
-        files.writes(&json, "json").writes(&html, "html").check()
+        files.writes_regular(&json, "json").writes_regular(&html, "html").check()
     }
 }

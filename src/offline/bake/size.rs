@@ -71,7 +71,7 @@ impl Attempts {
         let (limit, size, before) = (inputs.limit(), package.len() as u64, self.count());
         if self.made.len() + 1 == ATTEMPTS || before <= 1 {
             let kept = kept_aside(inputs, package);
-            progress.uninterrupted(&mut || write_beside(&kept, |file| file.write_all(package)))?;
+            write_beside(&kept, |file| file.write_all(package))?;
             let single = if before <= 1 { "not even with a single Gaussian; " } else { "" };
             let found = format!("{single}the last package that was made has {size} and is kept as {}", kept.display());
             return Err(too_small(inputs, limit, &found));
@@ -80,7 +80,7 @@ impl Attempts {
         let next = fitting(before, size, limit, one).clamp(1, before - 1);
         progress.note(&format!("the package has {size} bytes, {limit} are allowed: again with {next} Gaussians"));
         self.made.push(Attempt { next });
-        inputs.store.store(FILE, self.key, ron::to_string(&self.made)?.as_bytes(), progress)?;
+        inputs.store.store(FILE, self.key, ron::to_string(&self.made)?.as_bytes())?;
         Ok(())
     }
 }
@@ -159,7 +159,7 @@ mod tests {
         let store = Store::beside(&folder.path().join("out.gs4d"), ".bake").expect("the folder can be made");
         let (key, other) = (Key::of(b"these inputs"), Key::of(b"other inputs"));
         let text = ron::to_string(&vec![Attempt { next: 30 }, Attempt { next: 20 }]).expect("attempts are text");
-        store.store(FILE, key, text.as_bytes(), &mut crate::offline::NoProgress).expect("the folder can be written to");
+        store.store(FILE, key, text.as_bytes()).expect("the folder can be written to");
         assert_eq!(Attempts::of(&store, key, 40).count(), 20, "the bake resumes with the count of the last attempt");
         assert_eq!(Attempts::of(&store, other, 40).count(), 40, "other inputs begin with the first count");
         assert_eq!(Attempts::of(&store, key, 25).count(), 25, "attempts that do not follow from the first count");

@@ -16,7 +16,8 @@ use crate::offline::search::Goal;
 use crate::offline::temporal_filter::filter_name;
 use crate::offline::test_comparison::Compared;
 use crate::scene::{TemporalFilter, TrainedWith};
-use std::fs::{self, File};
+use std::fs;
+use std::io::Cursor;
 use std::path::Path;
 
 /// Number of times at which the active sets are computed.
@@ -29,6 +30,7 @@ pub(super) struct Facts<'a> {
     pub before: &'a [Gaussian],
     pub after: &'a [Gaussian],
     pub filter: &'a TemporalFilter,
+    pub package: &'a [u8],
     pub choice: Choice,
     pub tuning: Option<Tuning>,
     pub stages: Vec<StageTime>,
@@ -39,13 +41,12 @@ impl Facts<'_> {
     /// Returns the report.
     ///
     /// # Errors
-    /// The package cannot be read back.
+    /// The package cannot be read back, the checkpoint has been removed.
     pub fn report(self) -> Result<BakeReport, OfflineError> {
         let BakeSettings { checkpoint, data, out, .. } = self.settings;
         let interval = self.trained_with.time_interval;
         let times = even_times(interval, TIMES);
-        let file = File::open(out).map_err(|error| OfflineError::at(out, error))?;
-        let info = package::inspect(file).map_err(|error| OfflineError::at(out, error))?;
+        let info = package::inspect(Cursor::new(self.package)).map_err(|error| OfflineError::at(out, error))?;
         let choices = self.choices();
         let (split, evaluation, samples) = match self.compared {
             Some(compared) => (Some(compared.split.to_owned()), Some(compared.evaluation), compared.samples),
@@ -57,7 +58,7 @@ impl Facts<'_> {
             data: data.display().to_string(),
             package: out.display().to_string(),
             gaussians: Change { before: self.before.len(), after: self.after.len() },
-            bytes: Change { before: file_size(checkpoint)?, after: file_size(out)? },
+            bytes: Change { before: file_size(checkpoint)?, after: self.package.len() as u64 },
             choices,
             stages: self.stages,
             sections: SectionSize::by_name(&info.header.sections),

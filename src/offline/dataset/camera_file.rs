@@ -103,6 +103,14 @@ impl CameraFile {
         Self::read(path)?.views(options)
     }
 
+    /// Returns whether a file has the sizes of its views, on which [`resolution`](CameraOptions::resolution) has no effect.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn ignores_resolution(path: &Path) -> Result<bool, DatasetError> {
+        Ok(Self::read(path)?.form == Form::Golden)
+    }
+
     fn read(path: &Path) -> Result<Self, DatasetError> {
         let bytes = fs::read(path).map_err(|reason| DatasetError::Read { path: path.to_owned(), reason })?;
         let json: Value =

@@ -1,27 +1,27 @@
-//! Fitting: training few Gaussians to look like all Gaussians.
+//! Fitting: trains the Gaussians of a level on pictures of all Gaussians.
 //!
-//! In: a scene in the trained form, [`Look`]s of all Gaussians. Out: the scene after some steps, over random backgrounds, so that opacity is
-//! trained too. The scene is drawn anti-aliased, as levels are; gradients leave out the factor of anti-aliasing on opacity.
+//! In: a scene in the trained form, [`Look`]s of all Gaussians. Out: the scene after a number of steps. Backgrounds are random, so that opacity
+//! is trained too. The scene is drawn with anti-aliasing, as levels are; gradients leave out the factor of anti-aliasing on opacity.
 
 use super::looks::Look;
 use crate::gaussian::GradientMode;
 use crate::offline::dataset::CoveredImage;
 use crate::offline::fine_tune::{GpuImage, Rates, Sample, Trainer};
-use crate::offline::{OfflineError, Progress};
+use crate::offline::{OfflineError, Progress, proceed};
 use crate::renderer::Headless;
 use crate::scene::GaussianScene;
 use crate::scene::random::Random;
 use crate::view::{Background, Frame, View};
 use glam::Vec3;
 
-/// Views of a step.
+/// Number of views of a step.
 const BATCH: usize = 4;
 /// Factor on the rates at the last step.
 const LAST_RATE: f64 = 0.05;
-/// Colors change faster than in fine-tuning, since the start is an estimate.
+/// The rates of color are higher than in fine-tuning, because the initial colors are estimates.
 const RATES: Rates = Rates { harmonics: 1e-3, color: 5e-3, ..Rates::OURS };
 
-/// Trains a scene on these looks, of which there is at least one. Begins the task "fitting".
+/// Trains a scene on at least one look. Begins the task "fitting".
 pub(super) fn fit(
     headless: &mut Headless,
     scene: GaussianScene,
@@ -40,6 +40,7 @@ pub(super) fn fit(
     progress.begin("fitting", steps);
     let mut random = Random::new(1);
     for step in 0..steps {
+        proceed(progress)?;
         let mut batch = Vec::with_capacity(BATCH);
         for _ in 0..BATCH {
             let index = ((random.unit() * looks.len() as f32) as usize).min(looks.len() - 1);
@@ -47,7 +48,7 @@ pub(super) fn fit(
             let (view, image) = (&views[index], &images[index]);
             batch.push(Sample { view, image, background, number: index as u32 });
         }
-        // No SSIM: the structures that it compares are smaller than a few pixels.
+        // Without SSIM, whose windows are larger than these pictures' details of a few pixels.
         trainer.accumulate(&batch, 0.0)?;
         let factor = 1.0 - (1.0 - LAST_RATE) * step as f64 / steps as f64;
         trainer.step(&RATES, factor, step + 1)?;

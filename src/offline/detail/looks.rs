@@ -1,29 +1,29 @@
-//! Looks: a capture seen from all around at one size on the screen, to fit fewer Gaussians to the mean of both pictures, and to compare
-//! them with each.
+//! Looks: pictures of all Gaussians from many directions, at one size on the screen. Levels are trained on them and compared with them.
 //!
-//! In: the sphere about a capture, a size in pixels, numbers of directions and times. Out: [`Look`]s with the truth, which is all Gaussians
-//! in a picture of many times as many pixels, and with what they look like if they are drawn at that size; how close fewer come.
+//! In: the bounding sphere of a capture, a size in pixels, numbers of directions and times. Out: [`Look`]s. Each has two pictures: the truth,
+//! which is a picture of many times as many pixels, averaged to the size, and the picture drawn at the size. Also the [`Closeness`] of a level.
 
-use crate::offline::memory_check::require;
+use crate::offline::memory_check::{BY_DIRECTIONS, Pictures};
 use crate::offline::metrics::decibels;
-use crate::offline::{OfflineError, Progress};
+use crate::offline::{OfflineError, Progress, proceed};
 use crate::renderer::{GpuCapture, Headless};
-use crate::scene::{Bounds, RuntimeScene, pixels_across};
+use crate::scene::detail::pixels_across;
+use crate::scene::{Bounds, RuntimeScene};
 use crate::view::{Background, Camera, Frame, Picture, RasterFov, View};
 use glam::{UVec2, Vec2, Vec3};
 use serde::Serialize;
 
-/// Distance of the cameras from the middle of the sphere, radii.
+/// Distance of the cameras from the center of the sphere, radii.
 const DISTANCE: f32 = 10.0;
 /// Pixels around the sphere.
 const MARGIN: u32 = 2;
-/// Pixels across the sphere in the pictures that the truth is made of, at least: as many as in training.
+/// Least number of pixels across the sphere in the pictures that are averaged to the truth: about as many as in training.
 pub(super) const FINE: f32 = 512.0;
 /// Bytes for each pixel of a look: color and transmittance of two frames.
 const FRAMES: u64 = 2 * 16;
-/// Pixels of a screen, on which a level must not be seen to change.
+/// Number of pixels of the screen whose change is measured.
 const SCREEN: f64 = 1280.0 * 720.0;
-/// Black: color as it is, and what shows through it.
+/// Black, so that the picture has the color of the Gaussians alone.
 const BLACK: Background = Background::Color([0.0; 3]);
 
 /// The sphere about the bounds of a capture, capture units.
@@ -36,48 +36,50 @@ pub(super) struct Sphere {
     pub shown: [f32; 2],
 }
 
-/// Which views are taken.
+/// The directions and times of the views.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Around {
-    /// Number of directions, and of times of each.
+    /// Number of directions.
     pub directions: usize,
+    /// Number of times of each direction.
     pub times: usize,
-    /// How far all directions and times are shifted, 0 to 1 of their distance: others are other views.
+    /// Shift of all directions and times, 0 to 1 of the distance between two. A different shift has different views.
     pub shift: f32,
 }
 
-/// A view, and what all Gaussians look like in it.
+/// A view with two pictures of all Gaussians.
 pub(super) struct Look {
     /// The view, without anti-aliasing.
     pub view: View,
-    /// All Gaussians in a finer picture: each pixel is the mean of many.
+    /// A picture of all Gaussians with more pixels, averaged to this size.
     truth: Frame,
     /// All Gaussians, drawn at this size.
     all: Frame,
     /// Mean square error between these two.
     missing: f64,
-    /// The corners of the capture's rectangle in the picture, the last one outside.
+    /// The first corner of the rectangle of the capture, and the corner beyond its last pixel.
     rectangle: [UVec2; 2],
 }
 
-/// How close fewer Gaussians come to all of them at one size on the screen: in the view in which each is farthest.
+/// The PSNR of a level at one size on the screen; each value is that of the worst view.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Closeness {
     /// The size, pixels.
     pub pixels: f32,
-    /// PSNR against all Gaussians, drawn at this size, of a screen of 1280x720 pixels, dB; at most [`MAX_PSNR`](crate::offline::metrics::MAX_PSNR).
+    /// PSNR of the level against all Gaussians, drawn at this size, over a screen of 1280x720 pixels, dB; at most
+    /// [`MAX_PSNR`](crate::offline::metrics::MAX_PSNR).
     pub screen: f64,
-    /// PSNR against the truth inside the capture's rectangle, dB.
+    /// PSNR of the level against the truth inside the rectangle of the capture, dB.
     pub truth: f64,
-    /// The same of all Gaussians, drawn at this size.
+    /// PSNR of all Gaussians, drawn at this size, against the truth inside the rectangle of the capture, dB.
     pub all: f64,
 }
 
 impl Sphere {
-    /// Returns the sphere about a capture as Bevy apps compute it; `None` if nothing is drawn.
+    /// Returns the bounding sphere of a capture, the same as in Bevy apps; `None` if nothing is drawn.
     pub fn of(scene: &RuntimeScene) -> Option<Self> {
         let [first, last] = scene.trained_with.time_interval;
-        // A still never leaves its first moment.
+        // A still is drawn at its first timestamp only.
         let shown = if scene.playback.duration_seconds > 0.0 { [first, last] } else { [first, first] };
         let bounds = Bounds::of(scene.iter(), shown)?;
         let (center, radius) = (bounds.center(), bounds.radius());
@@ -98,9 +100,9 @@ impl Sphere {
 }
 
 impl Around {
-    /// Returns the directions and times.
+    /// Returns each direction at each of its times.
     fn all(&self, [first, last]: [f32; 2]) -> impl Iterator<Item = (Vec3, f32)> {
-        // Even over the sphere: a spiral that turns by the golden angle.
+        // A spiral with the golden angle covers the sphere evenly.
         let golden = std::f32::consts::PI * (3.0 - 5f32.sqrt());
         let Self { directions, times, shift } = *self;
         (0..directions).flat_map(move |place| {
@@ -114,7 +116,7 @@ impl Around {
     }
 }
 
-/// Draws all Gaussians from around at each of these sizes, pixels. Begins the task "looking".
+/// Draws all Gaussians from all directions at each of these sizes, pixels. Begins the task "looking".
 pub(super) fn looks(
     headless: &mut Headless,
     capture: &GpuCapture,
@@ -127,12 +129,13 @@ pub(super) fn looks(
     // Frames of all sizes together have less than three times the pixels of the largest.
     let largest = sizes.iter().copied().fold(0.0, f32::max).ceil() as u32 + 2 * MARGIN;
     let views = (around.directions * around.times) as u64;
-    require(UVec2::splat(largest), 3 * FRAMES * views)?;
+    Pictures::frames(UVec2::splat(largest), views, 3 * FRAMES).require(Some(&*headless), BY_DIRECTIONS)?;
     progress.begin("looking", sizes.len());
     let mut all = Vec::with_capacity(sizes.len());
     for &pixels in sizes {
         let mut own = Vec::new();
         for (direction, time) in around.all(sphere.shown) {
+            proceed(progress)?;
             let view = sphere.view(direction, time, pixels);
             let shown = view.antialiased(trained_pixel);
             let mut all = headless.render(capture, &shown, BLACK)?;
@@ -152,7 +155,7 @@ pub(super) fn looks(
 }
 
 impl Look {
-    /// Returns what a level is trained on: the mean of the truth and of what it takes the place of.
+    /// Returns the frame that a level is trained on: the mean of the truth and of all Gaussians drawn at this size.
     pub fn target(&self) -> Frame {
         let mut mean = self.truth.clone();
         for (pixel, other) in mean.picture.pixels.iter_mut().zip(&self.all.picture.pixels) {
@@ -185,7 +188,7 @@ fn shrunk(fine: &Frame, times: u32) -> Frame {
     Frame { picture, transmittance, depth: Vec::new(), median_depth: Vec::new(), counts: fine.counts }
 }
 
-/// Returns how close a level comes to all Gaussians in views of one size. `trained_pixel` is that of the level.
+/// Returns the closeness of a level in views of one size. `trained_pixel` is that of the level.
 pub(super) fn closeness(
     headless: &mut Headless,
     level: &GpuCapture,
@@ -224,7 +227,7 @@ fn square_error(a: &Frame, b: &Frame, [low, high]: [UVec2; 2]) -> f64 {
     squares[0].max(squares[1]) / f64::from(count.max(1))
 }
 
-/// Returns the rectangle of a box in a view: its corner, and the corner beyond it, at least one pixel apart.
+/// Returns the rectangle of a box in a view: its first corner, and the corner beyond its last pixel. It has at least one pixel.
 fn rectangle(view: &View, bounds: &Bounds) -> [UVec2; 2] {
     let [row_x, row_y] = view.clip_rows();
     let (mut low, mut high) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
@@ -251,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sphere_is_as_large_as_asked_for() {
+    fn the_sphere_has_the_requested_size_on_the_screen() {
         let sphere = sphere();
         for pixels in [4.0, 50.0, 300.0] {
             let view = sphere.view(Vec3::new(0.6, 0.0, 0.8), 0.0, pixels);
@@ -271,29 +274,35 @@ mod tests {
         let fine = Frame { picture, transmittance, depth: Vec::new(), median_depth: Vec::new(), counts };
         let small = shrunk(&fine, 2);
         assert_eq!(small.picture.size, UVec2::new(2, 1), "half of each side");
-        assert_eq!(small.picture.pixels, [Vec3::splat(2.5), Vec3::splat(4.5)], "means of four");
-        assert_eq!(small.transmittance, [0.5, 1.0], "of what shows through, too");
+        assert_eq!(small.picture.pixels, [Vec3::splat(2.5), Vec3::splat(4.5)], "each color is the mean of four");
+        assert_eq!(small.transmittance, [0.5, 1.0], "each transmittance is the mean of four");
     }
 
     #[test]
-    fn the_rectangle_holds_the_box_and_little_else() {
+    fn the_rectangle_contains_the_box_and_is_little_larger() {
         let view = sphere().view(Vec3::Y, 0.0, 100.0);
         let [low, high] = rectangle(&view, &sphere().bounds);
         let size = (high - low).as_vec2();
         // 2 x 2 units, of which the sphere of radius 1.5 is three across.
-        assert!((60.0..80.0).contains(&size.x) && (60.0..80.0).contains(&size.y), "{low} to {high}");
-        assert!(low.cmpge(UVec2::ONE).all() && high.cmplt(view.size).all(), "inside the picture");
+        assert!(
+            (60.0..80.0).contains(&size.x) && (60.0..80.0).contains(&size.y),
+            "the rectangle has about two thirds of the sphere's size: {low} to {high}"
+        );
+        assert!(low.cmpge(UVec2::ONE).all() && high.cmplt(view.size).all(), "the rectangle is inside the picture");
     }
 
     #[test]
-    fn directions_are_all_around_and_shifted_ones_are_others() {
+    fn directions_cover_the_sphere_and_a_shift_changes_all_of_them() {
         let around = Around { directions: 40, times: 3, shift: 0.0 };
         let all: Vec<(Vec3, f32)> = around.all([2.0, 4.0]).collect();
-        assert_eq!(all.len(), 120, "each direction at each time");
+        assert_eq!(all.len(), 120, "there is a view for each direction and time");
         let middle = all.iter().map(|(direction, _)| *direction).sum::<Vec3>() / 120.0;
-        assert!(middle.length() < 0.1, "no side is preferred: {middle}");
-        assert!(all.iter().all(|(_, time)| (2.0..4.0).contains(time)), "within the interval");
+        assert!(middle.length() < 0.1, "the mean of the directions is near zero: {middle}");
+        assert!(all.iter().all(|(_, time)| (2.0..4.0).contains(time)), "the times are within the interval");
         let other = Around { shift: 0.5, ..around };
-        assert!(other.all([2.0, 4.0]).zip(&all).all(|(a, b)| a.0 != b.0 && a.1 != b.1), "none is the same");
+        assert!(
+            other.all([2.0, 4.0]).zip(&all).all(|(a, b)| a.0 != b.0 && a.1 != b.1),
+            "no shifted direction or time is the same"
+        );
     }
 }

@@ -11,8 +11,8 @@
 
 use super::rotation::Axes;
 use crate::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN};
+use crate::gaussian::conic::LOW_PASS;
 use crate::gaussian::harmonics::time_cosine;
-use crate::gaussian::projection::LOW_PASS;
 use crate::gaussian::{Gaussian, Harmonics, LIFESPAN, Parameters};
 use crate::scene::{Sliced, Trained};
 use glam::{DMat3, DMat4, DVec3, DVec4};

@@ -8,6 +8,7 @@ use super::passes::Passes;
 use super::sums::GradientSums;
 use super::totals::Totals;
 use super::view_buffers::ViewBuffers;
+use crate::renderer::memory::with_room;
 use crate::renderer::{GpuError, Headless};
 use glam::UVec2;
 use wgpu::BufferUsages;
@@ -38,7 +39,8 @@ impl Backward {
     ) -> Result<Option<&ViewBuffers>, GpuError> {
         let Some(frame) = headless.finished() else { return Ok(self.view.as_ref()) };
         if !self.view.as_ref().is_some_and(|made| made.fits(&frame, size)) {
-            self.view = Some(ViewBuffers::new(headless, passes, parameters, &self.totals, self.sums, &frame, size)?);
+            let create = || ViewBuffers::new(headless, passes, parameters, &self.totals, self.sums, &frame, size);
+            self.view = Some(with_room(&headless.context().device, ViewBuffers::bytes(size), create)??);
         }
         Ok(self.view.as_ref())
     }

@@ -1,10 +1,9 @@
-//! The last phase of a run: codebooks of color that are trained with everything else, geometry that is drawn as it will be packed, and
-//! compression.
+//! The last phase of a run: training of color codebooks together with all other parameters, optionally on rounded geometry, and compression.
 //!
-//! In: a run with the best parameters. Out: the scene in the packed form, and its quality before colors are rounded.
+//! In: a run with the best parameters. Out: the scene in the packed form, and its PSNR on the validation views.
 
 use super::best::Progressed;
-use super::outcome::CurvePoint;
+use super::outcome::{CurvePoint, describe_validation};
 use super::resume::{Checkpoint, Saves};
 use super::rounding::steps_between;
 use super::run::Run;
@@ -16,8 +15,10 @@ use crate::scene::GaussianScene;
 /// Factor on the rates while codebooks are trained.
 const RATE: f64 = 0.5;
 
-/// Codes the colors by codebooks whose number of entries follows that of the Gaussians, trains these and everything else for some more
-/// steps, on pictures of geometry as it will be packed, and compresses the result. A stored run goes on where it ended.
+/// Codes the colors by codebooks, whose sizes follow the number of Gaussians, trains these and all other parameters for `steps` more steps,
+/// with [`FineTuneSettings::rounding`](super::FineTuneSettings::rounding) on pictures of the packed geometry, and compresses the result.
+/// Qualities without codebooks are only compressed. A stored run resumes after its last step. The last point of the curve is measured on the
+/// compressed scene.
 pub(super) fn compress(
     run: &mut Run<'_>,
     quality: Quality,
@@ -38,7 +39,7 @@ pub(super) fn compress(
     let between = steps_between(scene.len());
     let mut step = 0;
     if steps > 0 {
-        // The same scene gives the same codes: they are not stored.
+        // Codes are not stored, because the same scene has the same codes.
         run.trainer.tie(train_codebooks(&scene, &settings)?)?;
         if let Some(bits) = &bits {
             run.trainer.round(bits)?;
@@ -47,7 +48,7 @@ pub(super) fn compress(
         if let Some((coded, state)) = stored
             && run.trainer.resume(&state)
         {
-            progress.note(&format!("the codebooks go on after step {coded}"));
+            progress.note(&format!("training of codebooks resumes after step {coded}"));
             step = coded;
         }
     }
@@ -57,7 +58,8 @@ pub(super) fn compress(
         if progress.is_interrupted() {
             return Err(run.interrupted(found.clone()));
         }
-        // When follows from the step alone, and the state has what the last rounding changed: a resumed run draws the same.
+        // The steps of rounding depend on the step number alone, and the state has the result of the last rounding: a resumed run draws
+        // the same pictures.
         if let Some(bits) = &bits
             && step > 0
             && step.is_multiple_of(between)
@@ -71,7 +73,7 @@ pub(super) fn compress(
             let Progressed { curve, best, .. } = &*found;
             let state = run.trainer.state()?;
             let checkpoint = Checkpoint { curve: curve.clone(), best: best.clone(), state, coded: Some(step) };
-            saves.store(&checkpoint, progress)?;
+            saves.store(&checkpoint)?;
         }
     }
     progress.finish();
@@ -80,13 +82,10 @@ pub(super) fn compress(
         Some(books) => compress_tied(scene, &settings, &books)?,
         None => quantize::compress(scene, &settings)?,
     };
-    if let Some(bits) = &bits {
-        // What is evaluated has the geometry of the package.
-        run.trainer.round(bits)?;
-    }
-    // The loss is not reported: its sums are of the steps since a resumed run began.
-    let point = CurvePoint { step: made + step, loss: None, training_psnr: None, psnr: run.evaluate()? };
-    progress.note(&point.describe(None));
+    let psnr = run.evaluate_scene(&compressed.clone().into_runtime()?)?;
+    // Loss and training PSNR are not measured: no step trains the compressed scene.
+    let point = CurvePoint { step: made + step, loss: None, training_psnr: None, psnr };
+    progress.note(&format!("compressed: {}", describe_validation(psnr)));
     found.curve.push(point);
     Ok(compressed)
 }

@@ -8,12 +8,12 @@
 //! alone, so that a run which is resumed ends as one which was not interrupted, but for rounding if sums are [atomic](GradientSums::Atomic).
 //! If the scene is compressed, further steps train codebooks of color with everything else, on request on pictures of rounded geometry.
 
-mod adam;
+pub(crate) mod adam;
 mod backward;
 mod best;
 mod coding;
-mod loss;
-mod neighbors;
+pub(crate) mod loss;
+pub(crate) mod neighbors;
 mod optimized;
 mod outcome;
 mod parameters;
@@ -24,33 +24,29 @@ mod regularizer;
 mod resume;
 mod rounding;
 mod run;
-mod sample;
+pub(crate) mod sample;
 mod schedule;
 mod settings;
-mod state;
+pub(crate) mod state;
 mod sums;
 mod targets;
-mod terms;
+pub(crate) mod terms;
 mod tied;
-mod totals;
-mod trainer;
+pub(crate) mod totals;
+pub(crate) mod trainer;
 mod trainer_error;
 mod training;
 mod view_buffers;
 
-pub use adam::{DECAY, Moments, adam};
-pub use loss::{Loss, OpacityMask, loss, opacity_mask};
-pub use neighbors::{NEIGHBORS, neighbors};
 pub use outcome::{CurvePoint, FineTuned};
 pub use phases::fine_tune;
 pub use resume::Resume;
-pub use sample::{GpuImage, Sample};
+pub(crate) use sample::{GpuImage, Sample};
 pub use schedule::{Behind, Rates};
 pub use settings::FineTuneSettings;
-pub use state::TrainerState;
 pub use sums::GradientSums;
 pub use targets::TrainingImages;
-pub use terms::{Regularization, Terms, regularization};
-pub use totals::{Faults, Totals};
-pub use trainer::Trainer;
+pub use terms::Terms;
+pub(crate) use trainer::Trainer;
 pub use trainer_error::TrainerError;
+pub(crate) use view_buffers::require_bindings;

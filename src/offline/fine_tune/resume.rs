@@ -6,9 +6,9 @@ use super::best::Best;
 use super::outcome::CurvePoint;
 use super::settings::FineTuneSettings;
 use super::state::TrainerState;
+use crate::offline::OfflineError;
 use crate::offline::store::{Key, Store};
 use crate::offline::stored::{Stored, Text};
-use crate::offline::{OfflineError, Progress};
 use crate::scene::TemporalFilter;
 use serde::{Deserialize, Serialize};
 
@@ -66,10 +66,10 @@ fn state((Text(sizes), (buffers, (neighbors, filter))): StoredState) -> Option<T
 
 impl Checkpoint {
     /// Stores it, whole or not at all.
-    fn store(&self, store: &Store, key: Key, progress: &mut dyn Progress) -> Result<(), OfflineError> {
+    fn store(&self, store: &Store, key: Key) -> Result<(), OfflineError> {
         let head = Head { curve: self.curve.clone(), best: self.best.point, coded: self.coded };
         let bytes = (Text(head), (stored_state(&self.state), stored_state(&self.best.state))).encode()?;
-        Ok(store.store(FILE, key, &bytes, progress)?)
+        Ok(store.store(FILE, key, &bytes)?)
     }
 
     /// Returns what was stored with the same key; `None` if there is nothing, or if it is damaged.
@@ -99,8 +99,8 @@ impl<'a> Saves<'a> {
     }
 
     /// Stores a checkpoint.
-    pub fn store(self, checkpoint: &Checkpoint, progress: &mut dyn Progress) -> Result<(), OfflineError> {
-        checkpoint.store(self.resume.store, self.key, progress)
+    pub fn store(self, checkpoint: &Checkpoint) -> Result<(), OfflineError> {
+        checkpoint.store(self.resume.store, self.key)
     }
 
     /// Returns the checkpoint that was stored; `None` if there is none.

@@ -9,15 +9,14 @@ use super::schedule::{Behind, Schedule};
 use super::settings::FineTuneSettings;
 use super::targets::{Shot, TrainingImages};
 use super::trainer::Trainer;
-use crate::offline::dataset::CoveredImage;
 use crate::offline::dataset::selection::even_subset;
 use crate::offline::metrics::SquaredError;
 use crate::offline::score::GpuEngine;
 use crate::offline::temporal_filter::{needs_views, seen_filter};
 use crate::offline::{OfflineError, Progress, sliced};
-use crate::renderer::{Headless, ShaderChecks};
-use crate::scene::{GaussianScene, TemporalFilter};
-use crate::view::{Background, View};
+use crate::renderer::{GpuError, Headless, ShaderChecks};
+use crate::scene::{GaussianScene, RuntimeScene, TemporalFilter};
+use crate::view::{Background, Frame, View};
 use glam::Vec3;
 
 /// Views that are drawn before the first step, so that there is room for the pairs of all.
@@ -150,13 +149,20 @@ impl<'a> Run<'a> {
         Ok(self.trainer.step(&settings.rates, factor, count)?)
     }
 
-    /// Returns the PSNR in dB of the squared error of all pixels, channels and validation views together; `None` without validation views.
+    /// Returns the PSNR in dB of the scene in its present state: that of the squared error of all pixels, channels and validation views together;
+    /// `None` without validation views.
     pub(super) fn evaluate(&mut self) -> Result<Option<f64>, OfflineError> {
-        let mut error = SquaredError::default();
-        for shot in &self.images.validation {
-            error.merge(&squared_error(&mut self.trainer, &shot.view, &shot.image, self.background)?);
-        }
-        Ok((!self.images.validation.is_empty()).then(|| error.psnr()))
+        let background = self.background;
+        let trainer = &mut self.trainer;
+        psnr(self.images, background, |view| trainer.draw(view, background))
+    }
+
+    /// Returns the same PSNR of another scene, such as a compressed one.
+    pub(super) fn evaluate_scene(&mut self, scene: &RuntimeScene) -> Result<Option<f64>, OfflineError> {
+        let background = self.background;
+        let headless = self.trainer.headless_mut();
+        let capture = headless.upload(scene)?;
+        psnr(self.images, background, |view| headless.render(&capture, view, background))
     }
 
     /// Reports the first gradient that was not finite. Returns whether there was one.
@@ -171,15 +177,18 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Returns the squared error of a view against an image over the background; the picture is clamped to 0..1.
-fn squared_error(
-    trainer: &mut Trainer<'_>,
-    view: &View,
-    image: &CoveredImage,
+/// Returns the PSNR in dB of drawn frames, clamped to 0..1, against the validation images over the background, all pixels together; `None`
+/// without validation views.
+fn psnr(
+    images: &TrainingImages,
     background: Background,
-) -> Result<SquaredError, OfflineError> {
-    let picture = trainer.draw(view, background)?.picture.clamped();
-    Ok(SquaredError::of(&image.over(behind(background)), &picture)?)
+    mut draw: impl FnMut(&View) -> Result<Frame, GpuError>,
+) -> Result<Option<f64>, OfflineError> {
+    let mut error = SquaredError::default();
+    for shot in &images.validation {
+        error.add(&shot.image.over(behind(background)), &draw(&shot.view)?.picture.clamped())?;
+    }
+    Ok((!images.validation.is_empty()).then(|| error.psnr()))
 }
 
 /// Returns the color behind an image that does not cover all pixels.

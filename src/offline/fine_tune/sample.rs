@@ -23,7 +23,7 @@ impl GpuImage {
         let bytes: &[u8] = bytemuck::cast_slice(&image.texels);
         let (needed, limit) = (bytes.len() as u64, binding_limit(&headless.context().device.limits()));
         if needed > limit || needed == 0 {
-            return Err(GpuError::TooLarge { what: "an image", needed, limit });
+            return Err(GpuError::Picture { size: image.size.to_array(), what: "its texels", needed, limit });
         }
         let allocator = headless.allocator();
         let buffer = allocator.buffer("gs4d image", needed, BufferUsages::STORAGE);

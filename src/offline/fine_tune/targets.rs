@@ -3,7 +3,9 @@
 //! In: training views. Out: their images as one word for each pixel, decoded once, in parallel ([`TrainingImages`]).
 
 use crate::offline::dataset::{CoveredImage, TrainingView};
-use crate::offline::{OfflineError, Progress, memory_check};
+use crate::offline::memory_check::{BY_RESOLUTION, Pictures};
+use crate::offline::{OfflineError, Progress, proceed};
+use crate::renderer::Headless;
 use crate::scene::TrainedWith;
 use crate::view::View;
 use rayon::prelude::*;
@@ -30,6 +32,18 @@ pub struct TrainingImages {
 }
 
 impl TrainingImages {
+    /// Checks that there is memory for the images of these views, and that the GPU can train on them, before any of them is loaded.
+    ///
+    /// # Errors
+    /// What is needed, what is available, and the remedy.
+    pub(crate) fn require_room(
+        views: &[TrainingView],
+        validation: &[TrainingView],
+        headless: &Headless,
+    ) -> Result<(), OfflineError> {
+        Pictures::trained(views, validation).require(Some(headless), BY_RESOLUTION)
+    }
+
     /// Loads the images of the views to train on and of those to validate on, which may be none. Begins the task "loading
     /// images", twice.
     ///
@@ -41,7 +55,7 @@ impl TrainingImages {
         trained_with: &TrainedWith,
         progress: &mut dyn Progress,
     ) -> Result<Self, OfflineError> {
-        memory_check::require_images([&views[..], validation].into_iter().flatten())?;
+        Pictures::trained(&views, validation).require_loaded(BY_RESOLUTION)?;
         let mut shots = |views: &[TrainingView]| -> Result<Vec<Shot>, OfflineError> {
             let images = load(views, progress)?;
             let shot = |(view, image): (&TrainingView, CoveredImage)| Shot {
@@ -74,6 +88,7 @@ fn load(views: &[TrainingView], progress: &mut dyn Progress) -> Result<Vec<Cover
     progress.begin("loading images", views.len());
     let mut images = Vec::with_capacity(views.len());
     for some in views.chunks(AT_ONCE) {
+        proceed(progress)?;
         let loaded: Vec<_> = some.par_iter().map(TrainingView::load_covered).collect();
         for image in loaded {
             images.push(image?);

@@ -15,7 +15,8 @@
 //! The fourth term, the mask, is of views: see [`opacity_mask`](super::opacity_mask).
 
 use super::neighbors::NEIGHBORS;
-use crate::gaussian::{InvalidGaussian, ParameterGradient, Parameters, slice_gradient};
+use crate::gaussian::gradient::slice_gradient;
+use crate::gaussian::{InvalidGaussian, ParameterGradient, Parameters};
 use glam::DVec3;
 
 /// Time over which motion counts, timestamp units.
@@ -73,7 +74,7 @@ pub struct Regularization {
     pub gradients: Vec<ParameterGradient>,
 }
 
-/// Computes the terms. `neighbors` are those of [`neighbors`](super::neighbors()); without any the rigid term is 0.
+/// Computes the terms. `neighbors` are those of `neighbors`); without any the rigid term is 0.
 ///
 /// # Errors
 /// A Gaussian that cannot be drawn.

@@ -19,7 +19,7 @@ pub enum TrainerError {
     #[error(transparent)]
     Compress(#[from] CompressError),
     /// A term of the loss cannot have this weight.
-    #[error("the weight of the term {term} is {weight}: it must be a number, zero or above")]
+    #[error("the weight of the term {term} is {weight:e}: it must be a number from 0 to {largest:e}", largest = f32::MAX)]
     Weight {
         /// The term.
         term: &'static str,

@@ -8,6 +8,7 @@ use super::resume::{Checkpoint, Saves};
 use super::run::Run;
 use super::schedule::decay;
 use super::settings::FineTuneSettings;
+use crate::offline::score::ScoreError;
 use crate::offline::{OfflineError, Progress};
 use std::time::Instant;
 
@@ -54,7 +55,11 @@ pub(super) fn train(
             told = run.tell_faults(progress)?;
         }
         if step.is_multiple_of(settings.refresh_filter.max(1)) && step != settings.steps {
-            run.refresh_filter(progress)?;
+            match run.refresh_filter(progress) {
+                // The run ends at the next look, with the best result so far, and stores nothing that depends on the filter.
+                Err(OfflineError::Score(ScoreError::Interrupted)) => continue,
+                refreshed => refreshed?,
+            }
         }
         if !step.is_multiple_of(every) && step != settings.steps {
             continue;
@@ -73,7 +78,7 @@ pub(super) fn train(
         let goes_on = step < settings.steps || settings.compress.is_some();
         if let Some(saves) = saves.filter(|saves| saves.are_due(step) && goes_on) {
             let checkpoint = Checkpoint { curve, best, state: run.trainer.state()?, coded: None };
-            saves.store(&checkpoint, progress)?;
+            saves.store(&checkpoint)?;
             Checkpoint { curve, best, .. } = checkpoint;
         }
         start = Instant::now();

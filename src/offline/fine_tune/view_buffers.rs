@@ -16,6 +16,22 @@ use wgpu::BufferUsages;
 /// Values that `blend_backward` writes for each pair or splat.
 const SUMS: u64 = 10;
 
+/// Bytes of the slopes of similarity of a pixel, the most of all buffers by pixels.
+const SLOPES: u64 = 48;
+
+/// Checks that the device binds the buffers of a picture of this size.
+///
+/// # Errors
+/// The largest buffer, and the limit of the device.
+pub(crate) fn require_bindings(headless: &Headless, size: UVec2) -> Result<(), GpuError> {
+    let limit = binding_limit(&headless.context().device.limits());
+    let needed = size.as_u64vec2().element_product() * SLOPES;
+    match needed > limit {
+        true => Err(GpuError::Picture { size: size.to_array(), what: "the slopes of similarity", needed, limit }),
+        false => Ok(()),
+    }
+}
+
 /// What depends on the size of the picture and of the renderer's buffers.
 #[derive(Debug)]
 pub(super) struct ViewBuffers {
@@ -36,6 +52,11 @@ pub(super) struct ViewBuffers {
 }
 
 impl ViewBuffers {
+    /// Returns the bytes of the buffers by pixels, which are the largest.
+    pub fn bytes(size: UVec2) -> u64 {
+        size.as_u64vec2().element_product() * (SLOPES + 16 + 4)
+    }
+
     /// Creates the buffers for a frame of this size. Losses are added to `totals`.
     pub fn new(
         headless: &Headless,
@@ -56,12 +77,13 @@ impl ViewBuffers {
         if needed > limit {
             return Err(GpuError::TooLarge { what, needed, limit });
         }
-        let pixels = u64::from(size.x) * u64::from(size.y);
+        require_bindings(headless, size)?;
+        let pixels = size.as_u64vec2().element_product();
         let tiles = tiles(size).as_u64vec2().element_product();
         let storage = |label, size| allocator.buffer(label, size, BufferUsages::STORAGE);
         let settings = size_of::<LossUniforms>() as u64;
         let loss_settings = allocator.buffer("gs4d loss settings", settings, BufferUsages::UNIFORM);
-        let slopes = storage("gs4d slopes of similarity", pixels * 48);
+        let slopes = storage("gs4d slopes of similarity", pixels * SLOPES);
         let pixel_gradients = storage("gs4d gradients of pixels", pixels * 16);
         // Zero: the loss does not depend on depth.
         let depth_gradients = storage("gs4d gradients of depths", pixels * 4);

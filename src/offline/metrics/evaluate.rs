@@ -42,7 +42,7 @@ pub struct ImageMetrics {
     pub identical: bool,
     /// SSIM, at most 1.
     pub ssim: Option<f64>,
-    /// MS-SSIM, 0 to 1; also `None` if a side is shorter than [`MS_SSIM_MIN_SIDE`](super::MS_SSIM_MIN_SIDE).
+    /// MS-SSIM, 0 to 1; also `None` if a side is shorter than `MS_SSIM_MIN_SIDE`.
     pub ms_ssim: Option<f64>,
     /// Mean FLIP, 0 (same) to 1.
     pub flip: Option<f64>,

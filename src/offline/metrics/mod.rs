@@ -4,19 +4,21 @@
 //! [`Picture::clamped`](crate::view::Picture::clamped) first, as the original evaluation does). Out: one number, which is not finite if a pixel is
 //! not. Every PSNR derives from a [`SquaredError`]. [`evaluate()`] computes the metrics for every view of a dataset.
 
-mod evaluate;
+pub(crate) mod evaluate;
 mod flip;
-mod ms_ssim;
+pub(crate) mod ms_ssim;
 mod psnr;
 mod size_mismatch;
-mod ssim;
+pub(crate) mod ssim;
 
+pub(crate) use evaluate::side_by_side;
 pub use evaluate::{
-    Contrast, Evaluation, EvaluationSettings, ImageMetrics, MeanMetrics, MetricSet, ViewMetrics, evaluate, side_by_side,
+    Contrast, Evaluation, EvaluationSettings, ImageMetrics, MeanMetrics, MetricSet, ViewMetrics, evaluate,
 };
 pub use flip::flip;
-pub use ms_ssim::{MS_SSIM_MIN_SIDE, ms_ssim};
+pub use ms_ssim::ms_ssim;
 pub(crate) use psnr::decibels;
 pub use psnr::{MAX_PSNR, SquaredError};
 pub use size_mismatch::SizeMismatch;
-pub use ssim::{similarity_slopes, ssim};
+pub(crate) use ssim::similarity_slopes;
+pub use ssim::ssim;

@@ -5,21 +5,23 @@
 //!
 //! 1. [`CompressSettings`] specify how much may be lost.
 //! 2. `anchor` moves temporal means close to the time interval.
-//! 3. [`order`] sorts the Gaussians, so that neighbors share a box.
-//! 4. [`codebook`] trains the codebooks of color.
-//! 5. [`scene::packed`](crate::scene::packed) encodes the result as records.
+//! 3. `order` sorts the Gaussians, so that neighbors share a box.
+//! 4. `codebook` trains the codebooks of color.
+//! 5. `scene::packed` encodes the result as records.
 
 mod anchor;
-pub mod codebook;
-pub mod order;
+pub(crate) mod codebook;
+pub(crate) mod order;
+pub(crate) mod roundings;
 mod settings;
 
+pub(crate) use roundings::roundings;
 pub use settings::{CompressSettings, Quality};
 
 use super::prune::select_harmonics;
 use crate::gaussian::{Gaussian, Harmonics, InvalidGaussian};
+use crate::scene::packed::MAX_STAGES;
 use crate::scene::packed::encode::Bits;
-use crate::scene::packed::{MAX_STAGES, Rounding};
 use crate::scene::{
     CodedColors, FilterKind, Form, GaussianScene, PackedColors, PackedScene, RuntimeScene, SceneForm, TemporalFilter,
 };
@@ -46,7 +48,7 @@ pub struct CompressReport {
 #[derive(Debug, thiserror::Error)]
 pub enum CompressError {
     /// It is in the packed form already.
-    #[error("the scene is packed already: compress the checkpoint or the lossless package it was made from")]
+    #[error("the scene is packed already: name the checkpoint or the lossless package that it was made from")]
     AlreadyPacked,
     /// Codebooks need quantized geometry.
     #[error("codebooks need quantized geometry: choose a quality other than lossless, or no codebooks")]
@@ -79,6 +81,17 @@ pub enum CompressError {
     Invalid(#[from] InvalidGaussian),
 }
 
+/// Checks that a scene has not been compressed before, which would round its values twice.
+///
+/// # Errors
+/// [`CompressError::AlreadyPacked`].
+pub(crate) fn require_unpacked(form: &SceneForm) -> Result<(), CompressError> {
+    match form {
+        SceneForm::Ready(Form::Packed(_)) => Err(CompressError::AlreadyPacked),
+        SceneForm::Trained(_) | SceneForm::Ready(Form::Sliced(_)) => Ok(()),
+    }
+}
+
 /// Compresses a scene.
 ///
 /// # Errors
@@ -100,7 +113,7 @@ pub fn compress(
 ///
 /// # Panics
 /// As [`compress`].
-pub fn compress_with(
+pub(crate) fn compress_with(
     scene: RuntimeScene,
     settings: &CompressSettings,
     done: impl FnMut(),
@@ -116,7 +129,7 @@ pub fn compress_with(
 ///
 /// # Panics
 /// If the codebooks are of fewer Gaussians.
-pub fn compress_tied(
+pub(crate) fn compress_tied(
     scene: RuntimeScene,
     settings: &CompressSettings,
     books: &Centers,
@@ -133,7 +146,7 @@ pub fn compress_tied(
 ///
 /// # Errors
 /// A scene that is packed.
-pub fn train_codebooks(scene: &RuntimeScene, settings: &CompressSettings) -> Result<Centers, CompressError> {
+pub(crate) fn train_codebooks(scene: &RuntimeScene, settings: &CompressSettings) -> Result<Centers, CompressError> {
     let Form::Sliced(sliced) = &scene.form else { return Err(CompressError::AlreadyPacked) };
     let order: Vec<u32> = (0..scene.len() as u32).collect();
     let opacities = || sliced.gaussians.iter().map(|gaussian| gaussian.opacity).collect();
@@ -207,19 +220,6 @@ fn compress_by(
         levels: Vec::new(),
     };
     Ok((scene, report))
-}
-
-/// Returns what [`compress`] would change of the geometry of each Gaussian; `reach` is the length of the time interval, timestamp units.
-///
-/// # Errors
-/// A Gaussian that the packed form cannot hold.
-pub fn roundings(gaussians: &[Gaussian], bits: &Bits, reach: f32) -> Result<Vec<Rounding>, CompressError> {
-    let order = morton_order(gaussians);
-    let packed = encode(gaussians, &order, bits, PackedColors::Whole(Harmonics::default()), [0.0; 2], reach);
-    check_each(&packed, &order)?;
-    let mut places = vec![0; order.len()];
-    order.iter().enumerate().for_each(|(place, &index)| places[index as usize] = place);
-    Ok(places.par_iter().zip(gaussians).map(|(&place, gaussian)| packed.rounding(place, gaussian)).collect())
 }
 
 /// Packs Gaussians in the given order.

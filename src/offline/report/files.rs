@@ -1,26 +1,21 @@
 //! The files of a report.
 //!
-//! In: a [`BakeReport`], the path of the package. Out: `NAME.report.json` and `NAME.report.html` next to a package `NAME.gs4d`.
+//! In: a [`BakeReport`], the package and its path. Out: the package `NAME.gs4d`, and `NAME.report.json` and `NAME.report.html` next to it.
 
 use super::BakeReport;
-use crate::offline::{OfflineError, Progress, write_beside};
+use crate::offline::OfflineError;
+use crate::offline::save::write_together;
 use std::ffi::OsString;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Writes the report beside the package, as JSON and as an HTML page. Returns the paths of both.
+/// Writes the package, and the report beside it as JSON and as an HTML page, all of them or none. Returns the paths of the report.
 ///
 /// # Errors
 /// A folder that cannot be written to, a full disk.
-pub fn write_report(
-    report: &BakeReport,
-    out: &Path,
-    progress: &mut dyn Progress,
-) -> Result<[PathBuf; 2], OfflineError> {
+pub fn write_with_report(report: &BakeReport, package: &[u8], out: &Path) -> Result<[PathBuf; 2], OfflineError> {
     let paths = report_paths(out);
-    for (path, text) in paths.iter().zip([format!("{:#}\n", report.json()?), report.html()]) {
-        progress.uninterrupted(&mut || write_beside(path, |file| file.write_all(text.as_bytes())))?;
-    }
+    let (json, html) = (format!("{:#}\n", report.json()?), report.html());
+    write_together(&[(out, package), (&paths[0], json.as_bytes()), (&paths[1], html.as_bytes())])?;
     Ok(paths)
 }
 

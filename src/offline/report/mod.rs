@@ -4,12 +4,12 @@
 
 mod bake_report;
 mod escape;
-mod files;
+pub(crate) mod files;
 mod html;
-mod plot;
-mod temporal;
+pub(crate) mod plot;
+pub(crate) mod temporal;
 
 pub use bake_report::{BakeReport, Change, Sample, SectionSize, StageTime, Tried};
-pub use files::{report_paths, write_report};
-pub use plot::{Axis, Chart, Series, bars};
-pub use temporal::{Activity, VarianceHistogram, even_times, filter_shares};
+pub(crate) use files::{report_paths, write_with_report};
+pub use temporal::{Activity, VarianceHistogram};
+pub(crate) use temporal::{even_times, filter_shares};

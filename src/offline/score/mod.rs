@@ -1,143 +1,30 @@
 //! Scores: the importance of each Gaussian for the training views.
 //!
-//! In: a [`ScoreEngine`], the [`Traits`] of the Gaussians, the views. Out: [`Scores`], every [`Variant`] from a single
+//! In: a `ScoreEngine`, the `Traits` of the Gaussians, the views. Out: [`Scores`], every [`Variant`] from a single
 //! pass over the views, summed in double precision.
 
-mod file;
-mod gpu;
-mod reference;
+pub(crate) mod engine;
+pub(crate) mod file;
+pub(crate) mod gpu;
+pub(crate) mod reference;
 mod scoring;
-pub mod variant;
+pub(crate) mod traits;
+mod variant;
 
-pub use file::{read_scores, read_weights, write_scores};
-pub use gpu::{GpuEngine, Scorer};
-pub use reference::{ViewScore, Want, score};
+pub use engine::ScoreError;
+pub(crate) use engine::{CpuEngine, ScoreEngine};
+pub(crate) use file::read_weights;
+pub use file::{read_scores, write_scores};
+pub(crate) use gpu::GpuEngine;
+pub(crate) use reference::{ViewScore, Want};
 pub use scoring::ScoringSettings;
+pub use traits::ScoreSettings;
+pub(crate) use traits::Traits;
+pub use variant::{UnknownVariant, Variant};
 
-use super::{Progress, sliced};
-use crate::gaussian::{InvalidGaussian, Model, Parameters};
-use crate::scene::{GaussianScene, RuntimeScene, SceneForm};
-use crate::view::{Background, View};
+use super::Progress;
+use crate::view::View;
 use rayon::prelude::*;
-use std::error::Error;
-use variant::Variant;
-
-/// Scores views of a scene: the CPU reference or the GPU.
-pub trait ScoreEngine {
-    /// Scores one view. The vectors of the result have the order of the scene.
-    ///
-    /// # Errors
-    /// [`ScoreError::Engine`].
-    fn score(&mut self, view: &View, want: Want) -> Result<ViewScore, ScoreError>;
-}
-
-/// The CPU reference.
-#[derive(Debug)]
-pub struct CpuEngine<'a> {
-    /// The scene to score.
-    pub scene: &'a RuntimeScene,
-    /// The background behind the scene.
-    pub background: Background,
-}
-
-impl ScoreEngine for CpuEngine<'_> {
-    fn score(&mut self, view: &View, want: Want) -> Result<ViewScore, ScoreError> {
-        Ok(score(self.scene, view, self.background, want))
-    }
-}
-
-/// Why there are no scores.
-#[derive(Debug, thiserror::Error)]
-pub enum ScoreError {
-    /// No view was given.
-    #[error("there are no training views to score with: pass a dataset whose transforms_train.json lists some")]
-    NoViews,
-    /// No Gaussian contributes to any view, as with views of another scene.
-    #[error(
-        "no Gaussian contributes to any training view: does this data belong to the checkpoint? (its cameras look elsewhere, or its \
-         times lie outside the time interval)"
-    )]
-    NothingContributes,
-    /// The variant needs scales, which a sliced scene does not have.
-    #[error(
-        "the score `{variant}` needs the volume of the Gaussians, which the runtime form no longer tells: score the checkpoint, or choose \
-         one of {}",
-        Variant::ALL.into_iter().filter(|v| !v.needs_volume()).map(Variant::name).collect::<Vec<_>>().join(", ")
-    )]
-    NoVolume {
-        /// The requested variant.
-        variant: Variant,
-    },
-    /// The engine failed.
-    #[error("{0}")]
-    Engine(#[source] Box<dyn Error + Send + Sync>),
-}
-
-/// Parameters that the paper leaves open.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(default)]
-pub struct ScoreSettings {
-    /// Power of the volume in `γ = (V / V_ref)^power`; 0 leaves the volume out. Default: 0.1.
-    pub volume_power: f64,
-    /// Rank of `V_ref` among all volumes in descending order, as a fraction of their number, 0 to 1. Default: 0.9.
-    pub volume_rank: f64,
-}
-
-impl Default for ScoreSettings {
-    fn default() -> Self {
-        Self { volume_power: 0.1, volume_rank: 0.9 }
-    }
-}
-
-/// Upper limit of the variance, timestamp units squared.
-const LONGEST: f64 = 1e24;
-
-/// Properties of the Gaussians on which scores depend besides the contributions.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Traits {
-    /// Temporal mean (timestamp units) and variance (timestamp units squared) of each Gaussian.
-    moments: Vec<[f64; 2]>,
-    /// Logarithm of the product of the activated scales; `None` unless the scene is in the trained form.
-    log_volume: Option<Vec<f64>>,
-}
-
-impl Traits {
-    /// Reads the properties from a scene of any form.
-    ///
-    /// # Errors
-    /// The first Gaussian that cannot be drawn.
-    pub fn of(scene: &GaussianScene) -> Result<Self, InvalidGaussian> {
-        // A Gaussian of constant opacity has an infinite variance, which is limited so that sums are finite. If all Gaussians have it, the limit
-        // has no effect.
-        let moments = sliced(scene)?
-            .iter()
-            .map(|gaussian| [f64::from(gaussian.mean_t), f64::from(gaussian.sigma_t).powi(2).min(LONGEST)])
-            .collect();
-        let log_volume = match &scene.form {
-            SceneForm::Trained(trained) => Some(log_volumes(&trained.parameters)),
-            SceneForm::Ready(_) => None,
-        };
-        Ok(Self { moments, log_volume })
-    }
-
-    /// Returns γ of each Gaussian; `None` if the volume is unknown.
-    fn volume_factors(&self, settings: &ScoreSettings) -> Option<Vec<f64>> {
-        let volumes = self.log_volume.as_ref()?;
-        let mut sorted = volumes.clone();
-        sorted.sort_unstable_by(|a, b| b.total_cmp(a));
-        let rank = (settings.volume_rank * sorted.len() as f64) as usize;
-        let reference = sorted.get(rank.min(sorted.len().saturating_sub(1))).copied().unwrap_or_default();
-        Some(volumes.iter().map(|volume| (settings.volume_power * (volume - reference)).exp()).collect())
-    }
-}
-
-fn log_volumes(parameters: &Parameters) -> Vec<f64> {
-    let space = parameters.log_scale.iter().map(|scale| scale.iter().map(|&s| f64::from(s)).sum::<f64>());
-    if parameters.model() == Model::Static3d {
-        return space.collect();
-    }
-    space.zip(&parameters.log_scale_t).map(|(space, &time)| space + f64::from(time)).collect()
-}
 
 /// Every score of every Gaussian.
 ///
@@ -184,6 +71,9 @@ impl Scores {
         for moment in views.chunk_by(|a, b| a.time == b.time) {
             let mut contribution = vec![0.0; sums.len()];
             for view in moment {
+                if progress.is_interrupted() {
+                    return Err(ScoreError::Interrupted);
+                }
                 let score = engine.score(view, Want::Removal)?;
                 add(&mut contribution, &score.contribution);
                 for ((sum, &energy), &removal) in sums.iter_mut().zip(&score.energy).zip(&score.removal) {

@@ -206,42 +206,34 @@ impl Tile {
 /// The region in which the alpha of a splat can reach 1/255: an ellipse. Pixels outside are skipped, pixels inside are tested.
 struct Reach {
     center: f64,
+    /// [Factored](crate::gaussian::conic).
     conic: [f64; 3],
     /// Bound of `dᵀ conic d`.
     energy: f64,
-    /// Whether the conic describes an ellipse.
-    bounded: bool,
 }
 
 impl Reach {
     fn of(splat: &Splat) -> Self {
-        let conic = splat.conic.to_array().map(f64::from);
-        let [xx, xy, yy] = conic;
         Self {
             center: f64::from(splat.center.x),
-            conic,
+            conic: splat.conic.to_array().map(f64::from),
             // With a margin for rounding.
             energy: f64::from(reach_squared(splat.opacity)) + 0.012,
-            bounded: xx > 0.0 && yy > 0.0 && xx * yy > xy * xy,
         }
     }
 
     /// Returns the columns of a row at height `dy` below the center, of a tile that begins at pixel `first`.
     fn columns(&self, dy: f32, first: u32, width: usize) -> Range<usize> {
-        if !self.bounded {
-            return 0..width;
-        }
         let (dy, center, end) = (f64::from(dy), self.center - f64::from(first), width as f64);
-        let [xx, xy, yy] = self.conic;
-        let (cross, rest) = (xy * dy, yy * dy * dy);
-        // The power is computed in f32, from terms that may be much larger than their sum.
-        let far = center.abs().max((center - end).abs());
-        let energy = self.energy + 1e-5 * (xx * far * far + rest + 2.0 * cross.abs() * far);
-        let root = cross * cross - xx * (rest - energy);
-        if root < 0.0 {
+        let [x, y, z] = self.conic;
+        let shift = y * dy;
+        // The exponent is computed in f32, from a sum of two offsets.
+        let far = center.abs().max((center - end).abs()) + shift.abs();
+        let energy = self.energy + 4e-6 * x.sqrt() * far - z * dy * dy;
+        if energy < 0.0 {
             return 0..0;
         }
-        let (middle, half) = (center + cross / xx, root.sqrt() / xx);
+        let (middle, half) = (center + shift, (energy / x).sqrt());
         let low = (middle - half).ceil().clamp(0.0, end);
         let high = ((middle + half).floor() + 1.0).clamp(0.0, end);
         low as usize..high as usize

@@ -6,6 +6,7 @@ use super::{ScoreSettings, Scores, Traits};
 use crate::offline::dataset::TrainingView;
 use crate::offline::dataset::selection::to_draw;
 use crate::offline::engine::Engine;
+use crate::offline::memory_check::{BY_RESOLUTION, Pictures};
 use crate::offline::splits::subset;
 use crate::offline::{OfflineError, Progress, Subject};
 
@@ -22,7 +23,7 @@ impl ScoringSettings {
     /// Scores a scene with an even subset of these views. Returns the number of views, too. Begins the task "scoring".
     ///
     /// # Errors
-    /// A scene that cannot be drawn, views that show nothing of it, a failure of the engine.
+    /// A scene that cannot be drawn, views that do not fit the memory or the GPU, views that show nothing of it, a failure of the engine.
     pub fn scores(
         &self,
         engine: &mut Engine,
@@ -30,6 +31,7 @@ impl ScoringSettings {
         views: &[TrainingView],
         progress: &mut dyn Progress,
     ) -> Result<(Scores, usize), OfflineError> {
+        Pictures::looked_at(views).require(engine.headless(), BY_RESOLUTION)?;
         let traits = Traits::of(&subject.scene)?;
         let views = subset(views.to_vec(), self.views);
         let views = to_draw(&views, subject.runtime.trained_with.raster_fov);

@@ -151,7 +151,7 @@ fn outline(scene: &RuntimeScene) -> RuntimeScene {
         environment: scene.environment.as_ref().map(|_| Environment { width: 0, height: 0, texels: Vec::new() }),
         filter,
         trained_with: scene.trained_with.clone(),
-        playback: scene.playback.clone(),
+        playback: scene.playback,
         levels: scene.levels.iter().map(level).collect(),
         ..RuntimeScene::sliced(Vec::new(), Harmonics::default())
     }

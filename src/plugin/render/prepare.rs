@@ -87,8 +87,7 @@ impl Scene<'_> {
             let capture = self.captures.get(placed.asset)?;
             let time = capture.time_at(placed.seconds)?;
             let level = self.levels.of(viewer, *entity);
-            // Levels of detail were trained with anti-aliasing.
-            let trained_pixel = if placed.antialias || level > 0 { capture.trained_pixel(level) } else { None };
+            let trained_pixel = capture.antialias_pixel(level, placed.antialias);
             let view = lens.view(size, time, camera, placed.world_from_capture)?.antialiased(trained_pixel);
             let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
             Some(Drawn { entity: *entity, asset, view, appearance, filtered, level })

@@ -128,11 +128,9 @@ impl GpuGaussianCapture {
         self.shown.as_ref().map_or(0, |shown| shown.levels.len().saturating_sub(1))
     }
 
-    /// Returns the size of the training pixels of a level of detail in capture units; `None` if it is unknown.
-    pub(crate) fn trained_pixel(&self, level: usize) -> Option<f32> {
-        let scene = self.shown.as_ref()?.source.scene();
-        let level = level.checked_sub(1).and_then(|index| scene.levels.get(index));
-        level.map_or(&scene.trained_with, |level| &level.scene.trained_with).pixel
+    /// Returns the size of training pixels with which a level of detail is anti-aliased; see [`RuntimeScene::antialias_pixel`].
+    pub(crate) fn antialias_pixel(&self, level: usize, antialias: bool) -> Option<f32> {
+        self.shown.as_ref()?.source.scene().antialias_pixel(level, antialias)
     }
 
     /// Returns the size of the buffers in bytes.

@@ -12,8 +12,9 @@ use crate::renderer::layout::{self, BLOCK};
 use crate::renderer::memory::{Allocator, binding_limit};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::Storage;
+use crate::scene::filter::segment_of;
 use crate::scene::packed::MAX_STAGES;
-use crate::scene::{ActiveSets, CodedColors, ColorDegrees, RuntimeScene, TemporalFilter, segment_of};
+use crate::scene::{ActiveSets, CodedColors, ColorDegrees, RuntimeScene, TemporalFilter};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A capture on the GPU: its Gaussians, color and environment map in buffers, in as many parts as the binding limit

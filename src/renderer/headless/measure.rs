@@ -96,6 +96,8 @@ impl Headless {
         let device = &self.context.device;
         let mut view = ViewRenderer::new(device, &self.renderer);
         view.set_design(&self.renderer, self.view.design());
+        // The frames of the warm-up have been checked.
+        view.draws_again = true;
         view.make_room_of(&self.view);
         let filtered = self.filtered.then(|| ActiveList::new(device, &self.renderer, capture));
         Lane { view, active: filtered.flatten(), timer: None }

@@ -9,7 +9,7 @@ use crate::renderer::design::Design;
 use crate::renderer::device::GpuContext;
 use crate::renderer::error::GpuError;
 use crate::renderer::layout::Counters;
-use crate::renderer::memory::{Allocator, with_room};
+use crate::renderer::memory::{Allocator, require_texture, with_room};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::{ColorPrecision, ShaderChecks, Storage};
 use crate::renderer::view::{FinishedFrame, Instance, ViewParameters, ViewRenderer, max_pairs};
@@ -39,7 +39,8 @@ impl Headless {
     /// When the device cannot run the passes.
     pub fn new(context: GpuContext, checks: ShaderChecks) -> Result<Self, GpuError> {
         let renderer = Renderer::new(&context.device, checks)?;
-        let view = ViewRenderer::new(&context.device, &renderer);
+        let mut view = ViewRenderer::new(&context.device, &renderer);
+        view.draws_again = true;
         Ok(Self {
             context,
             renderer,
@@ -79,7 +80,7 @@ impl Headless {
         self.renderer.compile_ahead(&self.context.device, self.design(), storage)
     }
 
-    /// Returns the design with which views are drawn: never [`Design::Auto`].
+    /// Returns the design with which views are drawn, as [`ViewRenderer::design`]: never [`Design::Auto`].
     pub fn design(&self) -> Design {
         self.view.design()
     }
@@ -142,7 +143,10 @@ impl Headless {
     ) -> Result<Frame, GpuError> {
         let size = instances.first().map_or(UVec2::ONE, |instance| instance.view.size);
         self.require_readable(size, parameters.precision)?;
-        let counters = self.submit(instances, parameters)?;
+        let mut counters = self.submit(instances, parameters)?;
+        if self.view.must_draw_again(&self.renderer, &counters) {
+            counters = self.submit(instances, parameters)?;
+        }
         // This frame is complete, but later frames are faster with a larger capacity.
         self.view.make_room(&counters);
         let (color, depth) = self.read_targets(size)?;
@@ -254,7 +258,7 @@ impl Headless {
         self.active.as_ref().map_or(&self.renderer.no_list, |active| &active.list)
     }
 
-    /// Returns the resources of the last frame on the GPU; `None` before the first frame.
+    /// Returns the resources of the last frame on the GPU; `None` before the first frame, and in [`Design::Fast`], which has other buffers.
     pub fn finished(&self) -> Option<FinishedFrame<'_>> {
         self.view.finished()
     }
@@ -286,13 +290,22 @@ impl Headless {
         prepared?
     }
 
+    /// Checks that a picture of this size can be drawn and read back, without drawing it.
+    ///
+    /// # Errors
+    /// The limit of the device that it exceeds.
+    pub(crate) fn require_picture(&self, size: UVec2) -> Result<(), GpuError> {
+        require_texture(size, &self.context.device.limits())?;
+        self.require_readable(size, ColorPrecision::Single)
+    }
+
     /// Checks before drawing that a picture of this size can be read back.
     fn require_readable(&self, size: UVec2, precision: ColorPrecision) -> Result<(), GpuError> {
         let row = u64::from(size.x) * texel_bytes(precision);
         let needed = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT.into()) * u64::from(size.y);
         let limit = self.context.device.limits().max_buffer_size;
         match needed > limit {
-            true => Err(GpuError::TooLarge { what: "the pixels of the picture", needed, limit }),
+            true => Err(GpuError::Picture { size: size.to_array(), what: "its pixels", needed, limit }),
             false => Ok(()),
         }
     }

@@ -7,6 +7,7 @@ mod allocate;
 mod bins;
 mod dispatch;
 mod fast;
+mod loops;
 mod motion;
 mod motion_passes;
 mod parameters;
@@ -16,6 +17,8 @@ mod record;
 mod reference;
 mod resources;
 mod sizes;
+#[cfg(test)]
+mod tests;
 mod uniforms;
 mod view_renderer;
 

@@ -31,7 +31,7 @@ impl ViewRenderer {
         let Some(motion) = &self.motion else { return };
         let (blend, lists) = match &made.fast {
             Some(fast) => (renderer.blend_blocks(motion.variant), &fast.blend_blocks),
-            None => (renderer.blend(self.pixels), &made.blend),
+            None => (renderer.blend(self.pixels, self.at_once), &made.blend),
         };
         let Some(blend) = blend else { return };
         // motion

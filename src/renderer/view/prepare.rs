@@ -3,6 +3,7 @@
 //! In: instances and [`ViewParameters`], and the counters of earlier frames. Out: a [`ViewRenderer`] that can be recorded.
 
 use super::bins;
+use super::loops;
 use super::motion::MotionResources;
 use super::parameters::{Instance, ViewParameters};
 use super::sizes::{Sizes, grown, max_pairs};
@@ -11,7 +12,7 @@ use crate::renderer::active::{drawn_count, most_drawn};
 use crate::renderer::design::Design;
 use crate::renderer::error::GpuError;
 use crate::renderer::layout::{self, BLOCK, Counters};
-use crate::renderer::memory::binding_limit;
+use crate::renderer::memory::{binding_limit, require_texture};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::{FastVariant, Lists, Pixels};
 use crate::renderer::timing::{PassTime, PassTimer, WHOLE_FRAME};
@@ -59,6 +60,9 @@ impl ViewRenderer {
         parameters: &ViewParameters<'_>,
     ) -> Result<(), GpuError> {
         self.poll();
+        // The maximum over time, so that another segment of a filter does not change the buffers.
+        let slots: usize = instances.iter().map(|instance| most_drawn(instance.capture, instance.active)).sum();
+        self.choose_design(device, renderer, slots);
         let (precision, blending) = (parameters.precision, parameters.blending());
         let picture = instances.first().map_or(self.picture, |instance| instance.view.size);
         let total: usize = instances.iter().map(|instance| instance.capture.len()).sum();
@@ -68,7 +72,10 @@ impl ViewRenderer {
         let joined = instances.chunk_by(Instance::joins);
         let drawn = joined.map(|joined| (joined[0].capture.storage, joined.len() > 1));
         let writes_depths = if self.design == Design::Reference {
-            renderer.compile_reference(device, drawn, self.pixels)?;
+            if renderer.is_software {
+                self.at_once = loops::at_once(slots).ok_or(GpuError::TooManySplats { slots })?;
+            }
+            renderer.compile_reference(device, drawn, self.pixels, self.at_once)?;
             true
         } else {
             let large_batches = bins::large_batches(&device.limits(), instances);
@@ -84,11 +91,7 @@ impl ViewRenderer {
         }
         let made = self.resources.as_ref().map(|resources| resources.sizes).unwrap_or_default();
         let limits = device.limits();
-        if picture.min_element() == 0 || picture.max_element() > limits.max_texture_dimension_2d {
-            return Err(GpuError::Size { width: picture.x, height: picture.y, limit: limits.max_texture_dimension_2d });
-        }
-        // The maximum over time, so that another segment of a filter does not change the buffers.
-        let slots: usize = instances.iter().map(|instance| most_drawn(instance.capture, instance.active)).sum();
+        require_texture(picture, &limits)?;
         let parts: usize = instances.iter().map(|instance| instance.capture.parts.len()).sum();
         check_slots(&limits, self.design, slots)?;
         let slots = slots as u32;
@@ -203,7 +206,9 @@ impl ViewRenderer {
 
     /// Processes the counters and timestamps of earlier frames that have arrived.
     fn poll(&mut self) {
-        if let Some(counters) = self.readback.poll() {
+        // Counters from before a release may be those of another design or of other captures.
+        let current = self.copied_from == self.generation;
+        if let Some(counters) = self.readback.poll().filter(|_| current) {
             let counters: Counters = bytemuck::pod_read_unaligned(&counters);
             self.statistics.visible = counters.visible;
             self.statistics.pairs = self.pair_count(&counters);

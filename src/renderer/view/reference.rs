@@ -22,7 +22,9 @@ impl ViewRenderer {
         timer: Option<&PassTimer>,
     ) {
         // project
-        let (Some(passes), Some(blend)) = (renderer.reference(), renderer.blend(self.pixels)) else { return };
+        let (Some(passes), Some(blend)) = (renderer.reference(), renderer.blend(self.pixels, self.at_once)) else {
+            return;
+        };
         let pipeline = |storage, batched| renderer.project(storage, batched);
         self.project(pipeline, renderer, &made.project, |_, count| count.div_ceil(256), pass, instances);
         mark(timer, pass);

@@ -3,6 +3,7 @@
 //! In: a prepared view, its instances, its parameters and the environment map. Out: the uniform buffers of the frame, of the parts of its
 //! instances and of its motions.
 
+use super::bins;
 use super::fast;
 use super::parameters::{Instance, ViewParameters};
 use super::sizes::Sizes;
@@ -98,8 +99,6 @@ impl ViewRenderer {
 
     /// Returns the uniform `binning` of a part in the prepared frame.
     fn binning(&self, sizes: &Sizes, part: u32) -> [u32; 4] {
-        // Never 0: the stamp of a new buffer is 0.
-        let frame = self.frames % 0xffff + 1;
-        [self.bin_side | (frame << 8), sizes.entries / self.bin_count(), part, sizes.parts]
+        [self.bin_side | (bins::stamp(self.frames) << 8), sizes.entries / self.bin_count(), part, sizes.parts]
     }
 }

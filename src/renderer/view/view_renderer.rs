@@ -3,13 +3,14 @@
 //! In: a device and a [`Renderer`]. Out: [`ViewRenderer`] with its settings and results. `prepare` and `record` fill and record the frame.
 
 use super::bins::{self, BinRoom};
+use super::loops::{self, Crowd};
 use super::motion::MotionResources;
 use super::readback::Readback;
 use super::resources::{PassBuffers, Resources};
 use crate::renderer::design::Design;
 use crate::renderer::layout::{self, BIN_COUNTERS, Counters, DEPTH_STEPS, INSTANCE_STRIDE};
 use crate::renderer::pipelines::Renderer;
-use crate::renderer::shaders::{FastVariant, Pixels};
+use crate::renderer::shaders::{AtOnce, FastVariant, Lists, Pixels};
 use crate::renderer::statistics::ViewStatistics;
 use crate::renderer::timing::PassTimer;
 use glam::UVec2;
@@ -22,8 +23,17 @@ pub struct ViewRenderer {
     pub(super) slots: u32,
     pub(super) picture: UVec2,
     pub(super) bin_side: u32,
-    /// Never [`Design::Auto`].
+    /// The design as set, and the design of the frame prepared last, which is never [`Design::Auto`].
+    pub(super) wanted: Design,
     pub(super) design: Design,
+    /// Number of splats that `blend` blends at once.
+    pub(super) at_once: AtOnce,
+    /// Whether the client checks each frame with [`must_draw_again`](Self::must_draw_again), and whether a frame had to be drawn again.
+    pub(in crate::renderer) draws_again: bool,
+    pub(super) crowded: bool,
+    /// Number of releases of the buffers, and the value that it had when the counters that are read back were copied.
+    pub(super) generation: u32,
+    pub(super) copied_from: u32,
     /// Whether the counters of odd frames are used, and whether the frame prepared last has been recorded.
     pub(super) odd: bool,
     /// Number of frames that have been recorded.
@@ -95,7 +105,13 @@ impl ViewRenderer {
             slots: 0,
             picture: UVec2::ONE,
             bin_side: 1,
+            wanted: Design::Auto,
             design: renderer.resolve(Design::Auto),
+            at_once: AtOnce::default(),
+            draws_again: false,
+            crowded: false,
+            generation: 0,
+            copied_from: 0,
             odd: false,
             frames: 0,
             recorded: false,
@@ -165,11 +181,16 @@ impl ViewRenderer {
     /// Sets the design with which the view is drawn from the next [`prepare`](Self::prepare) on. Default: [`Design::Auto`]. A change ends the
     /// [measurement](Self::measure) of GPU time.
     pub fn set_design(&mut self, renderer: &Renderer, design: Design) {
+        if self.wanted == design {
+            return;
+        }
+        self.wanted = design;
+        self.crowded = false;
         let design = renderer.resolve(design);
         if self.design != design {
             self.design = design;
             self.timing = None;
-            self.release();
+            self.free();
         }
     }
 
@@ -179,7 +200,9 @@ impl ViewRenderer {
         Self { has_colors: false, ..self }
     }
 
-    /// Returns the design with which the view is drawn: never [`Design::Auto`].
+    /// Returns the design with which the view is drawn: never [`Design::Auto`]. Frames that the fast design cannot draw are drawn with
+    /// [`Design::Reference`]: if the design is [`Design::Auto`], frames of more than 2²⁴ splats; on software drivers, frames of too many splats
+    /// in a bin.
     pub fn design(&self) -> Design {
         self.design
     }
@@ -199,9 +222,10 @@ impl ViewRenderer {
         self.motion.as_ref().map(|motion| (&motion.texture, self.picture))
     }
 
-    /// Returns the resources of the frame recorded last; `None` before the first [`prepare`](Self::prepare).
+    /// Returns the resources of the frame recorded last; `None` before the first [`prepare`](Self::prepare), and in [`Design::Fast`], which
+    /// has other buffers.
     pub fn finished(&self) -> Option<FinishedFrame<'_>> {
-        self.resources.as_ref().map(|made| FinishedFrame {
+        self.resources.as_ref().filter(|made| made.fast.is_none()).map(|made| FinishedFrame {
             frame: &self.frame,
             instances: &made.instances,
             counters: &self.counters,
@@ -257,6 +281,13 @@ impl ViewRenderer {
 
     /// Frees the working buffers and targets; the next [`prepare`](Self::prepare) creates them again.
     pub fn release(&mut self) {
+        self.crowded = false;
+        self.free();
+    }
+
+    /// Frees the working buffers and targets. Counters of earlier frames are ignored when they arrive.
+    pub(super) fn free(&mut self) {
+        self.generation = self.generation.wrapping_add(1);
         self.resources = None;
         self.motion = None;
         self.pairs_wanted = 0;
@@ -264,6 +295,37 @@ impl ViewRenderer {
         self.bin_room = BinRoom::default();
         self.fullest_bin = 0;
         self.statistics = ViewStatistics::default();
+    }
+
+    /// Returns whether the last frame, which had these counters, may be incomplete because a software driver has ended loops early. If so, the
+    /// view is drawn with [`Design::Reference`] until it is [released](Self::release) or another design is set.
+    pub(in crate::renderer) fn must_draw_again(&mut self, renderer: &Renderer, counters: &Counters) -> bool {
+        let made = self.resources.as_ref().filter(|made| made.fast.is_some()).map(|made| made.sizes);
+        let Some(made) = made.filter(|_| renderer.is_software) else { return false };
+        let fullest = counters.pairs_wanted;
+        let searches = fullest > made.entries / self.bin_count() || counters.pairs > made.pairs;
+        self.crowded =
+            !loops::fast_is_complete(Crowd { slots: self.slots, fullest, searches, lists: self.variant.lists });
+        self.crowded
+    }
+
+    /// Chooses the design of a frame of at most `slots` splats.
+    pub(super) fn choose_design(&mut self, device: &wgpu::Device, renderer: &Renderer, slots: usize) {
+        let slots = u32::try_from(slots).unwrap_or(u32::MAX);
+        // Without counters the fullest bin may contain all splats.
+        let lists = Lists::suiting(&device.limits(), slots);
+        let at_worst = Crowd { slots, fullest: slots, searches: true, lists };
+        let unsafe_loops =
+            renderer.is_software && (self.crowded || !(self.draws_again || loops::fast_is_complete(at_worst)));
+        let design = match (self.wanted, renderer.resolve(self.wanted)) {
+            (Design::Auto, _) if slots > bins::MAX_SLOTS => Design::Reference,
+            (_, Design::Fast) if unsafe_loops => Design::Reference,
+            (_, resolved) => resolved,
+        };
+        if self.design != design {
+            self.design = design;
+            self.free();
+        }
     }
 
     /// Returns the names of the passes that are timed.

@@ -5,10 +5,10 @@
 
 use std::fs;
 
+use bevy_gs4d::offline::PictureError;
 use bevy_gs4d::offline::dataset::{
     CameraFile, CameraOptions, CoveredImage, Dataset, DatasetError, MAX_SIDE, Split, TrainingView,
 };
-use bevy_gs4d::offline::picture_file::PictureError;
 use bevy_gs4d::view::Camera;
 use glam::{UVec2, Vec3};
 use image::{GrayImage, RgbaImage};

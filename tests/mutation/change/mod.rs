@@ -4,6 +4,7 @@
 
 pub mod archive;
 pub mod bytes;
+pub mod gaussians;
 pub mod jpeg;
 pub mod numbers;
 pub mod pickle;

@@ -3,8 +3,8 @@
 //! In: camera files of every form. Out: files with wrong numbers, names and structures; accepted cameras draw a scene.
 
 use super::{Outcome, Reader};
-use crate::accepted;
 use crate::change::{bytes, text};
+use crate::limits::Limits;
 use crate::support::random::Random;
 use crate::support::{dataset, packed_scene};
 use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, MAX_SIDE, TrainingView};
@@ -27,6 +27,7 @@ const SIDE: u32 = 256;
 pub struct Cameras {
     folder: TempDir,
     scene: RuntimeScene,
+    limits: Limits,
     seeds: Vec<String>,
 }
 
@@ -51,7 +52,7 @@ impl Cameras {
             "cx": 20.0, "cy": 15.0, "world_to_camera_opencv": pose,
         }] });
         let seeds = Vec::from([transforms, intrinsics, golden].map(|seed| seed.to_string()));
-        Self { folder, scene, seeds }
+        Self { folder, limits: Limits::of(&scene), scene, seeds }
     }
 }
 
@@ -98,8 +99,9 @@ impl Cameras {
         let small = views.iter().filter(|view| view.camera.size.max_element() <= SIDE);
         for TrainingView { camera, time, .. } in small.take(DRAWN) {
             let view = camera.view(*time, self.scene.trained_with.raster_fov);
-            let frame = reference::render(&self.scene, &view, self.scene.trained_background());
-            accepted::check_frame(&frame, *time)?;
+            let background = self.scene.trained_background();
+            let frame = reference::render(&self.scene, &view, background);
+            self.limits.check(&frame, &view, background)?;
         }
         Ok(())
     }

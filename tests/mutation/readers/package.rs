@@ -3,15 +3,15 @@
 //! In: small scenes in every form. Out: packages with right checksums, lengths and compression, and a wrong header or wrong sections.
 
 use super::{Outcome, Reader};
-use crate::accepted;
-use crate::change::{bytes, numbers, text};
+use crate::accepted::{self, DrawnBy};
+use crate::change::{bytes, gaussians, numbers, text};
 use crate::support::packed_scene;
 use crate::support::random::Random;
 use bevy_gs4d::codec::package::{
-    self, EnvironmentSize, FLOAT_PLANES, Header, MAGIC, PACKAGE, Section, StoredFilter, StoredForm, VERSION,
-    WriteSettings,
+    self, EnvironmentSize, Header, MAGIC, Section, StoredFilter, StoredForm, VERSION, WriteSettings,
 };
 use bevy_gs4d::gaussian::{Model, Parameters};
+use bevy_gs4d::internal::codec::package::{FLOAT_PLANES, PACKAGE};
 use bevy_gs4d::offline::quantize::compress;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{
@@ -63,7 +63,7 @@ impl Reader for Packages {
         let intact = package::inspect(Cursor::new(bytes)).is_ok_and(|info| info.is_intact());
         match package::read(Cursor::new(bytes)) {
             Ok(_) if !intact => Err("is read, although inspecting it finds damage".to_owned()),
-            Ok(scene) => accepted::check(scene),
+            Ok(scene) => accepted::check(scene, DrawnBy::CpuAndGpu),
             Err(error) => Ok(Outcome::Refused(error.to_string())),
         }
     }
@@ -139,7 +139,7 @@ impl Parts {
     fn change(&mut self, other: &Self, random: &mut Random) {
         let sections = &mut self.header.sections;
         let at = random.below(sections.len());
-        match random.below(16) {
+        match random.below(20) {
             0..=4 => self.change_value(random),
             5..=8 => change_number(&mut self.header, random),
             9 => change_switch(&mut self.header, random),
@@ -170,7 +170,8 @@ impl Parts {
                     _ => section.encoding = random.pick(&["", "f16-planes-zstd", "\u{1b}[2J\nerror:"]).to_string(),
                 }
             }
-            _ => self.add_unknown(random),
+            15 => self.add_unknown(random),
+            _ => self.change_gaussians(random),
         }
     }
 
@@ -193,6 +194,30 @@ impl Parts {
             };
             for (plane, byte) in new.to_le_bytes().into_iter().enumerate() {
                 planes[plane * words + word] = byte;
+            }
+        }
+    }
+
+    /// Changes one Gaussian, a few, or all, in each section of Gaussians or in every second.
+    fn change_gaussians(&mut self, random: &mut Random) {
+        let rows = *random.pick(&[1, 1, 5, usize::MAX]);
+        let (first, every) = (random.below(self.header.gaussians), random.one_in(3));
+        for (section, planes) in self.header.sections.iter().zip(&mut self.bodies) {
+            let words = planes.len() / 4;
+            let width = words.checked_div(section.count).unwrap_or_default();
+            if width == 0 || !gaussians::has(&section.name) || !(every || random.one_in(2)) {
+                continue;
+            }
+            for row in (0..words / width).cycle().skip(first).take(rows.min(words / width)) {
+                let of = |word: usize| [0, 1, 2, 3].map(|plane| planes[plane * words + word]);
+                let mut values: Vec<f32> =
+                    (row * width..(row + 1) * width).map(|word| f32::from_le_bytes(of(word))).collect();
+                gaussians::change(&section.name, &mut values, random);
+                for (word, value) in (row * width..).zip(values) {
+                    for (plane, byte) in value.to_le_bytes().into_iter().enumerate() {
+                        planes[plane * words + word] = byte;
+                    }
+                }
             }
         }
     }

@@ -8,7 +8,7 @@ use crate::change::jpeg::Segment;
 use crate::change::png::Chunk;
 use crate::change::{bytes, jpeg, numbers, png};
 use crate::support::random::Random;
-use bevy_gs4d::offline::comparison::Pair;
+use bevy_gs4d::internal::offline::comparison::Pair;
 use bevy_gs4d::offline::dataset::{CameraFile, CameraOptions, TrainingView};
 use bevy_gs4d::offline::metrics::ImageMetrics;
 use bevy_gs4d::view::{Camera, Picture};

@@ -6,21 +6,21 @@
 //! An input is the name of the file, a line break, and its contents without the header.
 
 use super::{Outcome, Reader};
-use crate::accepted;
+use crate::accepted::{self, DrawnBy};
 use crate::change::{bytes, numbers, text};
 use crate::support::dataset;
 use crate::support::random::Random;
 use bevy_gs4d::codec::package::WriteSettings;
 use bevy_gs4d::codec::{self, ReadOptions};
+use bevy_gs4d::offline::KeyFrames;
+use bevy_gs4d::offline::SplitOptions;
 use bevy_gs4d::offline::bake::{BakeSettings, bake};
 use bevy_gs4d::offline::engine::Engine;
 use bevy_gs4d::offline::quantize::Quality;
 use bevy_gs4d::offline::score::ScoringSettings;
-use bevy_gs4d::offline::score::variant::Variant;
-use bevy_gs4d::offline::search::{Goal, ScoreChoice};
-use bevy_gs4d::offline::splits::SplitOptions;
-use bevy_gs4d::offline::temporal_filter::KeyFrames;
+use bevy_gs4d::offline::score::Variant;
 use bevy_gs4d::offline::{self, NoProgress};
+use bevy_gs4d::offline::{Goal, ScoreChoice};
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use bevy_gs4d::scene::{FilterKind, GaussianScene};
 use glam::{UVec2, Vec3};
@@ -137,7 +137,10 @@ impl Reader for Saved {
         match self.bake() {
             Ok(()) => {
                 let scene = codec::load(out, &ReadOptions::default());
-                accepted::check(scene.map_err(|error| format!("leads to a package that cannot be read: {error}"))?)
+                accepted::check(
+                    scene.map_err(|error| format!("leads to a package that cannot be read: {error}"))?,
+                    DrawnBy::Cpu,
+                )
             }
             Err(error) => Ok(Outcome::Refused(error.to_string())),
         }

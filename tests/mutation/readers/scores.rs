@@ -3,14 +3,15 @@
 //! In: scores of a scene. Out: files of other lengths and values; accepted files prune and compress the scene.
 
 use super::{Outcome, Reader};
-use crate::accepted;
+use crate::accepted::{self, DrawnBy};
 use crate::change::{bytes, numbers};
 use crate::support::packed_scene;
 use crate::support::random::Random;
 use bevy_gs4d::codec::package::{self, WriteSettings};
-use bevy_gs4d::offline::prune::{highest, select};
+use bevy_gs4d::internal::offline::prune::{highest, select};
+use bevy_gs4d::internal::offline::score::read_weights;
 use bevy_gs4d::offline::quantize::{CompressSettings, compress};
-use bevy_gs4d::offline::score::{read_scores, read_weights};
+use bevy_gs4d::offline::score::read_scores;
 use bevy_gs4d::scene::{GaussianScene, RuntimeScene};
 use std::fs;
 use std::io::Cursor;
@@ -63,7 +64,7 @@ impl Reader for ScoreFiles {
             self.compress_by(weights)?;
         }
         let whole = GaussianScene::from(self.scene.clone());
-        accepted::check(select(&whole, &highest(&scores, COUNT / 4)))
+        accepted::check(select(&whole, &highest(&scores, COUNT / 4)), DrawnBy::Cpu)
     }
 }
 
@@ -79,6 +80,6 @@ impl ScoreFiles {
         let again = package::read(Cursor::new(file));
         let again = again.map_err(|error| format!("weighs colors that cannot be read: {error}"))?;
         let again = again.into_runtime().map_err(|error| format!("weighs colors that cannot be drawn: {error}"))?;
-        accepted::draw(&again)
+        accepted::draw(&again, DrawnBy::Cpu)
     }
 }

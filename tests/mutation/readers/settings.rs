@@ -4,7 +4,7 @@
 
 use super::checkpoint::checkpoints;
 use super::{Outcome, Reader};
-use crate::accepted;
+use crate::accepted::{self, DrawnBy};
 use crate::change::{bytes, text};
 use crate::support::packed_scene;
 use crate::support::random::Random;
@@ -48,7 +48,7 @@ impl Folder {
     /// Reads a file with these options and checks the scene.
     fn read(&self, name: &str, options: &ReadOptions) -> Result<Outcome, String> {
         match codec::load(&self.file(name), options) {
-            Ok(scene) => accepted::check(scene),
+            Ok(scene) => accepted::check(scene, DrawnBy::Cpu),
             Err(error) => Ok(Outcome::Refused(error.to_string())),
         }
     }

@@ -68,9 +68,7 @@ impl Casters<'_> {
         let time = capture.time_at(placed.seconds)?;
         let view = lens.view(size, time, &caster.bounds, caster.world_from_capture, caster.settings.bias)?;
         let level = usize::from(placed.finest_level).min(capture.coarsest());
-        // Levels of detail were trained with anti-aliasing.
-        let trained_pixel = if level > 0 { capture.trained_pixel(level) } else { None };
-        let view = view.antialiased(trained_pixel);
+        let view = view.antialiased(capture.antialias_pixel(level, false));
         let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
         Some(Drawn { entity: caster.entity, asset, view, appearance, filtered, level })
     }

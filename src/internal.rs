@@ -1,0 +1,199 @@
+//! Items for the tests and benchmarks of this crate alone, outside its public interface: no promise holds for them.
+//!
+//! In: the modules of the crate that are private. Out: their items, by the same paths behind `internal`.
+
+/// Of [`gaussian`](crate::gaussian).
+pub mod gaussian {
+    pub use crate::gaussian::gradient::{
+        GradientSettings, ParameterGradient, SplatGradient, parameter_gradient, slice_gradient,
+    };
+    pub use crate::gaussian::slice::rotation_4d;
+
+    /// The alpha of a splat at a pixel.
+    pub mod alpha {
+        pub use crate::gaussian::alpha::*;
+    }
+    /// The covariance of splats on the screen.
+    pub mod conic {
+        pub use crate::gaussian::conic::*;
+    }
+    /// Spherical harmonics.
+    pub mod harmonics {
+        pub use crate::gaussian::harmonics::*;
+    }
+    /// The tiles of a splat.
+    pub mod overlap {
+        pub use crate::gaussian::overlap::*;
+    }
+    /// The projection of a Gaussian.
+    pub mod projection {
+        pub use crate::gaussian::projection::*;
+    }
+}
+
+/// Of [`reference`](mod@crate::reference): the passes, beside its public items.
+pub mod reference {
+    pub use crate::reference::activate::*;
+    pub use crate::reference::bin::*;
+    pub use crate::reference::blend::*;
+    pub use crate::reference::blend_backward::*;
+    pub use crate::reference::motion::*;
+    pub use crate::reference::project::*;
+    pub use crate::reference::sort::*;
+    pub use crate::reference::tile_lists::*;
+    pub use crate::reference::*;
+}
+
+/// Of [`scene`](crate::scene).
+pub mod scene {
+    pub use crate::scene::detail::*;
+    pub use crate::scene::filter::*;
+
+    /// The packed form.
+    pub mod packed {
+        pub use crate::scene::packed::*;
+
+        /// Encoding.
+        pub mod encode {
+            pub use crate::scene::packed::encode::*;
+        }
+    }
+}
+
+/// Of [`codec`](crate::codec).
+pub mod codec {
+    /// Checkpoints.
+    pub mod checkpoint {
+        pub use crate::codec::checkpoint::options::*;
+    }
+    /// The table of formats.
+    pub mod format {
+        pub use crate::codec::format::*;
+    }
+    /// Packages.
+    pub mod package {
+        pub use crate::codec::package::section::*;
+    }
+}
+
+/// Of `renderer`.
+#[cfg(feature = "renderer")]
+pub mod renderer {
+    pub use crate::renderer::view::{FinishedFrame, PassBuffers};
+
+    /// Pipelines and bind groups.
+    pub mod bind {
+        pub use crate::renderer::bind::*;
+    }
+    /// The layouts that shaders and Rust share.
+    pub mod layout {
+        pub use crate::renderer::layout::*;
+    }
+    /// Memory of the device.
+    pub mod memory {
+        pub use crate::renderer::memory::*;
+    }
+    /// The composed shaders.
+    pub mod shaders {
+        pub use crate::renderer::shaders::*;
+    }
+}
+
+/// Of `offline`.
+#[cfg(feature = "offline")]
+pub mod offline {
+    pub use crate::offline::sliced::*;
+
+    /// Checks whether images show a capture.
+    pub mod belonging {
+        pub use crate::offline::belonging::*;
+    }
+    /// Pairs of pictures to compare.
+    pub mod comparison {
+        pub use crate::offline::comparison::*;
+    }
+    /// Datasets.
+    pub mod dataset {
+        /// Subsets of views.
+        pub mod selection {
+            pub use crate::offline::dataset::selection::*;
+        }
+        /// Validation views.
+        pub mod validation {
+            pub use crate::offline::dataset::validation::*;
+        }
+    }
+    /// Evaluation of scenes.
+    pub mod evaluation {
+        pub use crate::offline::evaluation::*;
+    }
+    /// Training.
+    pub mod fine_tune {
+        pub use crate::offline::fine_tune::adam::*;
+        pub use crate::offline::fine_tune::loss::*;
+        pub use crate::offline::fine_tune::neighbors::*;
+        pub use crate::offline::fine_tune::sample::*;
+        pub use crate::offline::fine_tune::state::*;
+        pub use crate::offline::fine_tune::terms::*;
+        pub use crate::offline::fine_tune::totals::*;
+        pub use crate::offline::fine_tune::trainer::*;
+    }
+    /// Metrics.
+    pub mod metrics {
+        pub use crate::offline::metrics::ms_ssim::*;
+        pub use crate::offline::metrics::ssim::*;
+    }
+    /// Decoding of pictures.
+    pub mod picture_file {
+        pub use crate::offline::picture_file::*;
+    }
+    /// Selection of Gaussians by score.
+    pub mod prune {
+        pub use crate::offline::prune::*;
+    }
+    /// The smallest count that a loss allows.
+    pub mod quality {
+        pub use crate::offline::quality::*;
+    }
+    /// Quantization.
+    pub mod quantize {
+        pub use crate::offline::quantize::roundings::*;
+
+        /// Codebooks.
+        pub mod codebook {
+            pub use crate::offline::quantize::codebook::*;
+        }
+        /// The order of Gaussians in packages.
+        pub mod order {
+            pub use crate::offline::quantize::order::*;
+        }
+    }
+    /// Scores.
+    pub mod score {
+        pub use crate::offline::score::engine::*;
+        pub use crate::offline::score::file::*;
+        pub use crate::offline::score::gpu::*;
+        pub use crate::offline::score::reference::*;
+        pub use crate::offline::score::traits::*;
+    }
+    /// Search for the best score.
+    pub mod search {
+        pub use crate::offline::search::*;
+    }
+    /// Splits of datasets.
+    pub mod splits {
+        pub use crate::offline::splits::*;
+    }
+    /// Stages and their results.
+    pub mod store {
+        pub use crate::offline::store::*;
+    }
+    /// Types that stages store.
+    pub mod stored {
+        pub use crate::offline::stored::*;
+    }
+    /// Key-frame masks and intervals.
+    pub mod temporal_filter {
+        pub use crate::offline::temporal_filter::*;
+    }
+}

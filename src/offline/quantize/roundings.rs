@@ -1,0 +1,24 @@
+//! The errors of packing, for each Gaussian.
+//!
+//! In: Gaussians and the bits of the packed form. Out: the differences between each Gaussian and its packed form.
+
+use super::order::morton_order;
+use super::{CompressError, check_each, encode};
+use crate::gaussian::{Gaussian, Harmonics};
+use crate::scene::PackedColors;
+use crate::scene::packed::Rounding;
+use crate::scene::packed::encode::Bits;
+use rayon::prelude::*;
+
+/// Returns what [`compress`](super::compress) would change of the geometry of each Gaussian; `reach` is the length of the time interval, timestamp units.
+///
+/// # Errors
+/// A Gaussian that the packed form cannot hold.
+pub fn roundings(gaussians: &[Gaussian], bits: &Bits, reach: f32) -> Result<Vec<Rounding>, CompressError> {
+    let order = morton_order(gaussians);
+    let packed = encode(gaussians, &order, bits, PackedColors::Whole(Harmonics::default()), [0.0; 2], reach);
+    check_each(&packed, &order)?;
+    let mut places = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(place, &index)| places[index as usize] = place);
+    Ok(places.par_iter().zip(gaussians).map(|(&place, gaussian)| packed.rounding(place, gaussian)).collect())
+}

@@ -1,0 +1,196 @@
+//! Counters and stamps of the fast design from frame to frame.
+//!
+//! In: synthetic scenes, frames with and without Gaussians, counters that the tests write. Out: proof that a frame depends on no counter and no
+//! splat of an earlier frame. Skipped where there is no GPU.
+
+use super::{Instance, ViewParameters, ViewRenderer};
+use crate::gaussian::{Gaussian, Harmonics};
+use crate::renderer::capture::GpuCapture;
+use crate::renderer::design::Design;
+use crate::renderer::device::GpuContext;
+use crate::renderer::layout::Counters;
+use crate::renderer::pipelines::Renderer;
+use crate::renderer::shaders::ShaderChecks;
+use crate::scene::RuntimeScene;
+use crate::view::{Appearance, Camera, RasterFov, View};
+use glam::{UVec2, Vec3};
+
+#[path = "../../../tests/support/skip.rs"]
+mod skip;
+
+/// Four tiles in two bins; rows of 1024 bytes.
+const SIZE: UVec2 = UVec2::new(64, 16);
+
+struct Gpu {
+    context: GpuContext,
+    renderer: Renderer,
+}
+
+/// Returns a device; without an adapter, reports the skipped test and returns `None`.
+fn gpu() -> Option<Gpu> {
+    match GpuContext::headless(None) {
+        Ok(context) => {
+            let renderer = Renderer::new(&context.device, ShaderChecks::On).expect("the passes compile");
+            Some(Gpu { context, renderer })
+        }
+        Err(error) => {
+            skip::skip(error);
+            None
+        }
+    }
+}
+
+impl Gpu {
+    fn upload(&self, gaussians: Vec<Gaussian>) -> GpuCapture {
+        let values = (0..gaussians.len() * 3).map(|index| (index % 11) as f32 / 11.0).collect();
+        let harmonics = Harmonics { coefficients: 1, degree: 0, degree_t: 0, values };
+        let scene = RuntimeScene::sliced(gaussians, harmonics);
+        GpuCapture::upload(&self.context.device, &self.context.queue, &self.renderer, &scene).expect("the scene fits")
+    }
+
+    fn view(&self) -> ViewRenderer {
+        let mut view = ViewRenderer::new(&self.context.device, &self.renderer);
+        view.set_design(&self.renderer, Design::Fast);
+        view
+    }
+
+    /// Draws a frame and returns its counters.
+    fn draw(&self, view: &mut ViewRenderer, capture: &GpuCapture, time: f32) -> Counters {
+        let GpuContext { device, queue, .. } = &self.context;
+        let instances = [Instance { capture, active: None, view: seen(time), appearance: Appearance::default() }];
+        view.prepare(device, queue, &self.renderer, &instances, &ViewParameters::default()).expect("the frame fits");
+        assert_eq!(view.design(), Design::Fast, "the scene is small enough for every driver");
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        view.record(&self.renderer, &mut encoder, &instances);
+        queue.submit([encoder.finish()]);
+        let (counters, offset) = view.counters();
+        bytemuck::pod_read_unaligned(&self.read(size_of::<Counters>() as u64, |encoder, to| {
+            encoder.copy_buffer_to_buffer(counters, offset, to, 0, to.size());
+        }))
+    }
+
+    /// Returns color and transmittance of each pixel of the last frame.
+    fn picture(&self, view: &ViewRenderer) -> Vec<[f32; 4]> {
+        let (color, _) = view.textures().expect("a frame");
+        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(SIZE.x * 16), rows_per_image: None };
+        let bytes = self.read(u64::from(SIZE.element_product() * 16), |encoder, buffer| {
+            let size = color.size();
+            encoder.copy_texture_to_buffer(color.as_image_copy(), wgpu::TexelCopyBufferInfo { buffer, layout }, size);
+        });
+        bytemuck::pod_collect_to_vec(&bytes)
+    }
+
+    fn read(&self, size: u64, copy: impl FnOnce(&mut wgpu::CommandEncoder, &wgpu::Buffer)) -> Vec<u8> {
+        let GpuContext { device, queue, .. } = &self.context;
+        let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+        let descriptor = wgpu::BufferDescriptor { label: None, size, usage, mapped_at_creation: false };
+        let buffer = device.create_buffer(&descriptor);
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        copy(&mut encoder, &buffer);
+        queue.submit([encoder.finish()]);
+        buffer.slice(..).map_async(wgpu::MapMode::Read, |mapped| mapped.expect("the copy can be mapped"));
+        device.poll(wgpu::PollType::wait_indefinitely()).expect("the device finishes");
+        buffer.slice(..).get_mapped_range().to_vec()
+    }
+}
+
+fn seen(time: f32) -> View {
+    let camera = Camera::look_at(Vec3::new(0.0, -3.0, 0.0), Vec3::ZERO, Vec3::Z, 0.8, SIZE);
+    camera.view(time, RasterFov::Reference)
+}
+
+/// Returns faint Gaussians around the origin that are present at all times.
+fn crowd(count: usize) -> Vec<Gaussian> {
+    let one = |index: usize| {
+        let spread = |step: usize| (index * step % 97) as f32 / 97.0 - 0.5;
+        Gaussian {
+            mean: [0.1 * spread(31), (index * 37 % 101) as f32 / 101.0, 0.1 * spread(57)],
+            mean_t: 0.0,
+            velocity: [0.0; 3],
+            sigma_t: f32::INFINITY,
+            covariance: [1e-3, 0.0, 0.0, 1e-3, 0.0, 1e-3],
+            opacity: 0.012,
+            padding: 0.0,
+        }
+    };
+    (0..count).map(one).collect()
+}
+
+#[test]
+fn a_frame_without_gaussians_leaves_no_counters_behind() {
+    let Some(gpu) = gpu() else { return };
+    let (capture, empty, mut view) = (gpu.upload(crowd(500)), gpu.upload(Vec::new()), gpu.view());
+    let expected = gpu.draw(&mut view, &capture, 0.0);
+    assert!(expected.visible == 500 && expected.padding == expected.pairs, "all pairs are written: {expected:?}");
+    for frame in 0..8 {
+        // Both sets of counters see each kind of frame after each kind.
+        let full = frame % 3 == 0;
+        let found = gpu.draw(&mut view, if full { &capture } else { &empty }, 0.0);
+        let expected = if full { expected } else { Counters::default() };
+        assert_eq!(found, expected, "frame {frame} counts only its own splats");
+    }
+}
+
+#[test]
+fn the_number_of_pairs_saturates() {
+    let Some(gpu) = gpu() else { return };
+    let (capture, mut view) = (gpu.upload(crowd(500)), gpu.view());
+    // The buffers have grown by then.
+    let expected = [(); 6].map(|()| gpu.draw(&mut view, &capture, 0.0))[5];
+    let next = usize::from(!view.odd);
+    let counters =
+        view.resources.as_ref().and_then(|made| made.fast.as_ref()).expect("the fast design").bins[next].clone();
+    gpu.context.queue.write_buffer(&counters, 0, &(u32::MAX - 10).to_ne_bytes());
+    let found = gpu.draw(&mut view, &capture, 0.0);
+    assert_eq!(found, Counters { pairs: u32::MAX, ..expected }, "a count above 2^32 does not wrap");
+    for _ in 0..2 {
+        assert_eq!(gpu.draw(&mut view, &capture, 0.0), expected, "later frames count their own pairs");
+    }
+}
+
+#[test]
+fn splats_of_a_frame_with_the_same_stamp_are_not_drawn() {
+    let Some(gpu) = gpu() else { return };
+    let mut gaussians = crowd(6_000);
+    // A quarter is present at time 0 only.
+    for gaussian in gaussians.iter_mut().step_by(4) {
+        gaussian.sigma_t = 0.1;
+    }
+    let capture = gpu.upload(gaussians);
+    let mut fresh = gpu.view();
+    let counters = gpu.draw(&mut fresh, &capture, 1.0);
+    assert_eq!(counters.visible, 4_500, "three quarters are present at time 1");
+    let expected = gpu.picture(&fresh);
+    let mut view = gpu.view();
+    assert_eq!(gpu.draw(&mut view, &capture, 0.0).visible, 6_000, "all are present at time 0");
+    // As after 65,534 more frames. The bins are still too small for the splats, so that tiles search them.
+    view.frames = 0xfffe;
+    gpu.draw(&mut view, &capture, 1.0);
+    let found = gpu.picture(&view);
+    let apart = found.iter().zip(&expected).flat_map(|(a, b)| a.iter().zip(b).map(|(a, b)| (a - b).abs()));
+    let apart = apart.fold(0.0, f32::max);
+    assert!(apart <= 1e-6, "the frame with the stamp of the first frame differs by {apart}");
+}
+
+#[test]
+fn the_design_of_a_view_suits_the_number_of_splats() {
+    let Some(gpu) = gpu() else { return };
+    let most = super::bins::MAX_SLOTS as usize;
+    let software = gpu.renderer.is_software;
+    let mut view = ViewRenderer::new(&gpu.context.device, &gpu.renderer);
+    let mut chosen = |wanted, slots| {
+        view.set_design(&gpu.renderer, wanted);
+        view.choose_design(&gpu.context.device, &gpu.renderer, slots);
+        view.design()
+    };
+    let auto = gpu.renderer.resolve(Design::Auto);
+    assert_eq!(chosen(Design::Auto, 1_000), auto, "the design of the device");
+    assert_eq!(chosen(Design::Auto, most), auto, "bins can number this many splats");
+    assert_eq!(chosen(Design::Auto, most + 1), Design::Reference, "bins cannot number this many splats");
+    assert_eq!(chosen(Design::Auto, 1_000), auto, "the design of the device again");
+    assert_eq!(chosen(Design::Reference, 1_000), Design::Reference, "the design that is set");
+    assert_eq!(chosen(Design::Fast, 1_000), Design::Fast, "the design that is set");
+    let crowded = if software { Design::Reference } else { Design::Fast };
+    assert_eq!(chosen(Design::Fast, 1_000_000), crowded, "software drivers end the loops over so many splats");
+    assert_eq!(chosen(Design::Fast, 1_000), Design::Fast, "fewer splats again");
+}
