@@ -93,6 +93,11 @@ pub enum GpuError {
         /// Message of wgpu.
         reason: String,
     },
+    /// The device refused an object: a limit that is not checked before, or a defect of this crate or of the driver.
+    #[error(
+        "this GPU refused an object of the renderer ({0}): draw fewer Gaussians or a smaller picture, or update its driver"
+    )]
+    Refused(String),
     /// The picture has no pixels or more than a texture can hold.
     #[error("a picture of {width} x {height} pixels cannot be drawn: sides must be between 1 and {limit}")]
     Size {
@@ -109,4 +114,24 @@ pub enum GpuError {
     /// The device was lost or a read-back failed.
     #[error("the GPU did not finish: {0}")]
     Device(String),
+}
+
+impl GpuError {
+    /// Returns whether the device has reported the error: objects of the failed step are invalid. Other errors are found before an object is
+    /// created.
+    pub fn is_of_device(&self) -> bool {
+        match self {
+            Self::Memory { .. } | Self::Refused(_) | Self::Device(_) => true,
+            Self::NoAdapter { .. }
+            | Self::AdapterNotFound { .. }
+            | Self::NoDevice { .. }
+            | Self::Limit { .. }
+            | Self::Shader { .. }
+            | Self::TooLarge { .. }
+            | Self::TooManySplats { .. }
+            | Self::Picture { .. }
+            | Self::Size { .. }
+            | Self::Scene(_) => false,
+        }
+    }
 }

@@ -6,7 +6,7 @@ use super::bind::{Bind, group_layout, pipeline};
 use super::design::Design;
 use super::error::GpuError;
 use super::layout::{self, INSTANCES_BOUND};
-use super::memory::Allocator;
+use super::memory::{Allocator, catch_known};
 use super::shaders::{
     AtOnce, BINNED, COPIED_INSTANCE, FEW_BINS, FastVariant, Lists, Pixels, SUBGROUPS_OF_32, ShaderChecks, Storage,
     module,
@@ -192,6 +192,24 @@ impl Renderer {
         usize::from(batched || self.is_software)
     }
 
+    /// Compiles the entry point of a pass.
+    ///
+    /// # Errors
+    /// When the shader does not compile.
+    fn compiled(
+        &self,
+        device: &wgpu::Device,
+        name: &'static str,
+        entry: &str,
+        definitions: &[&str],
+        groups: &[Option<&wgpu::BindGroupLayout>],
+    ) -> Result<wgpu::ComputePipeline, GpuError> {
+        checked(device, name, || {
+            let shader = module(device, name, definitions, self.checks)?;
+            Ok(pipeline(device, &shader, entry, groups))
+        })
+    }
+
     /// Compiles the passes of the reference design that are not compiled yet, for these storages and for one or (`true`) several instances in
     /// a dispatch.
     ///
@@ -208,26 +226,20 @@ impl Renderer {
         for (storage, batched) in drawn {
             if self.project(storage, batched).is_none() {
                 let (definitions, copied) = self.reading(storage, batched);
-                let shader = module(device, "project", &definitions, self.checks)?;
                 let [geometry, color] = &layouts.captures[storage as usize];
-                let made = pipeline(
-                    device,
-                    &shader,
-                    "project",
-                    &[&layouts.project, geometry, &layouts.active, color].map(Some),
-                );
+                let groups = [&layouts.project, geometry, &layouts.active, color].map(Some);
+                let made = self.compiled(device, "project", "project", &definitions, &groups)?;
                 self.project[copied][storage as usize].get_or_init(|| made);
             }
         }
         if self.reference().is_none() {
-            let made = ReferencePasses::new(device, layouts, self.checks)?;
+            let made = checked(device, "sort", || ReferencePasses::new(device, layouts, self.checks))?;
             self.reference.get_or_init(|| made);
         }
         if self.blend(pixels, at_once).is_none() {
             let definitions = [&pixels.definitions(), at_once.definitions()].concat();
-            let shader = module(device, "blend", &definitions, self.checks)?;
             let groups = [&layouts.pixel[pixels.index()], &layouts.blend].map(Some);
-            let made = pipeline(device, &shader, "blend", &groups);
+            let made = self.compiled(device, "blend", "blend", &definitions, &groups)?;
             self.blend[at_once as usize][pixels.index()].get_or_init(|| made);
         }
         Ok(())
@@ -285,30 +297,28 @@ impl Renderer {
             if self.project_bin(storage, batched, variant).is_none() {
                 let (definitions, copied) = self.reading(storage, batched);
                 let few = if variant.few_bins { FEW_BINS } else { &[] };
-                let shader = module(device, "project", &[BINNED, few, &definitions[..]].concat(), self.checks)?;
+                let definitions = [BINNED, few, &definitions[..]].concat();
                 let groups = [&layouts.project_bin, geometry, &layouts.active].map(Some);
-                let made = pipeline(device, &shader, "project_bin", &groups);
+                let made = self.compiled(device, "project", "project_bin", &definitions, &groups)?;
                 self.project_bin[usize::from(variant.few_bins)][copied][storage as usize].get_or_init(|| made);
             }
             if self.colors(storage, batched).is_none() {
                 let (definitions, copied) = self.reading(storage, batched);
-                let shader = module(device, "colors", &definitions, self.checks)?;
                 let groups = [Some(&layouts.colors), Some(geometry), None, Some(color)];
-                let made = pipeline(device, &shader, "colors", &groups);
+                let made = self.compiled(device, "colors", "colors", &definitions, &groups)?;
                 self.colors[copied][storage as usize].get_or_init(|| made);
             }
         }
         let lists = variant.lists;
         if self.sort_bins(lists).is_none() {
-            let shader = module(device, "sort_bins", &[lists.definitions(), self.subgroups].concat(), self.checks)?;
-            let made = pipeline(device, &shader, "sort_bins", &[Some(&layouts.sort_bins)]);
+            let definitions = [lists.definitions(), self.subgroups].concat();
+            let made = self.compiled(device, "sort_bins", "sort_bins", &definitions, &[Some(&layouts.sort_bins)])?;
             self.sort_bins[lists as usize].get_or_init(|| made);
         }
         if self.blend_blocks(variant).is_none() {
             let definitions = [&variant.blend_definitions(), self.subgroups].concat();
-            let shader = module(device, "blend_blocks", &definitions, self.checks)?;
-            let pixel = &layouts.pixel[variant.pixels().index()];
-            let made = pipeline(device, &shader, "blend_blocks", &[pixel, &layouts.blend_blocks].map(Some));
+            let groups = [&layouts.pixel[variant.pixels().index()], &layouts.blend_blocks].map(Some);
+            let made = self.compiled(device, "blend_blocks", "blend_blocks", &definitions, &groups)?;
             self.blend_blocks[variant.blend_index()].get_or_init(|| made);
         }
         Ok(())
@@ -329,10 +339,9 @@ impl Renderer {
         for storage in storages {
             if self.motion(storage, design).is_none() {
                 let definitions = [binned, &self.reading(storage, false).0[..]].concat();
-                let shader = module(device, "motion", &definitions, self.checks)?;
                 let [geometry, _] = &self.layouts.captures[storage as usize];
                 let groups = [&self.layouts.motion[usize::from(fast)], geometry, &self.layouts.active].map(Some);
-                let made = pipeline(device, &shader, "motion", &groups);
+                let made = self.compiled(device, "motion", "motion", &definitions, &groups)?;
                 self.motion[usize::from(fast)][storage as usize].get_or_init(|| made);
             }
         }
@@ -437,6 +446,18 @@ impl Layouts {
             ],
         }
     }
+}
+
+/// Creates pipelines of the shader `name`. An invalid pipeline is an error and is not kept.
+fn checked<T>(
+    device: &wgpu::Device,
+    name: &'static str,
+    create: impl FnOnce() -> Result<T, GpuError>,
+) -> Result<T, GpuError> {
+    catch_known(device, 0, create).unwrap_or_else(|error| match error {
+        GpuError::Refused(reason) => Err(GpuError::Shader { name, reason }),
+        other => Err(other),
+    })
 }
 
 fn check_limits(limits: &wgpu::Limits) -> Result<(), GpuError> {

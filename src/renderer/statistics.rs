@@ -17,6 +17,7 @@ pub struct ViewStatistics {
     pub pairs: u32,
     /// Bytes of the view's working buffers and targets.
     pub bytes: u64,
-    /// GPU time of each pass, in frame order; empty until it has been measured.
+    /// GPU time of each pass, in frame order; a single time named `frame` if the device has no timestamps inside passes; empty until it has
+    /// been measured.
     pub passes: Vec<PassTime>,
 }

@@ -12,6 +12,8 @@ pub(super) const TIMED_PASSES: &[&str] =
 /// Names of the timed passes of a frame of the fast design, in the same way.
 pub(super) const TIMED_FAST_PASSES: &[&str] =
     &["project_bin", "sort_bins", "colors", "blend_blocks", "motion", "blend_blocks (motion)"];
+/// The name of the only time of a frame that is timed as a whole.
+pub(super) const WHOLE_FRAME: &[&str] = &["frame"];
 /// Number of passes that only a frame with motions has.
 pub(super) const MOTION_PASSES: usize = 2;
 

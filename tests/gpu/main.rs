@@ -6,6 +6,7 @@
 mod appearance;
 mod bake;
 mod crowds;
+mod depths_alone;
 mod designs;
 mod detail;
 mod fast;

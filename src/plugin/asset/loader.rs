@@ -10,8 +10,9 @@ use crate::codec::package::{self, PackageError};
 use crate::gaussian::InvalidGaussian;
 use crate::plugin::component::GaussianCapture;
 use bevy::asset::io::Reader;
-use bevy::asset::{AssetLoader, AssetPath, LoadContext};
+use bevy::asset::{AssetLoader, AssetPath, LoadContext, RenderAssetUsages};
 use bevy::reflect::TypePath;
+use serde::{Deserialize, Serialize};
 use std::io::Cursor;
 
 /// Why a capture could not be loaded.
@@ -31,23 +32,49 @@ pub enum CaptureLoadError {
     Gaussian(#[from] InvalidGaussian),
 }
 
+/// Settings of loading a package: `load_builder().with_settings(|settings: &mut PackageLoaderSettings| ..)` or a `.meta` file.
+///
+/// # Examples
+///
+/// ```
+/// use bevy::asset::RenderAssetUsages;
+/// use bevy::prelude::*;
+/// use bevy_gs4d::asset::PackageLoaderSettings;
+/// use bevy_gs4d::prelude::*;
+///
+/// /// Loads a capture whose Gaussians are dropped from memory once they are on the GPU.
+/// fn setup(mut commands: Commands, assets: Res<AssetServer>) {
+///     let drop_copy = |settings: &mut PackageLoaderSettings| settings.asset_usage = RenderAssetUsages::RENDER_WORLD;
+///     let capture = assets.load_builder().with_settings(drop_copy).load("toybox.gs4d");
+///     commands.spawn(GaussianCapture3d(capture));
+/// }
+/// # bevy::ecs::system::assert_is_system(setup);
+/// ```
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PackageLoaderSettings {
+    /// Where the Gaussians are needed, as in [`GaussianCapture::with_usages`]. With `RenderAssetUsages::RENDER_WORLD` alone they are dropped
+    /// from memory once they are on the GPU; the capture can then be neither picked nor saved. Default: both worlds.
+    pub asset_usage: RenderAssetUsages,
+}
+
 /// Loads packages, `.gs4d`, as [`GaussianCapture`]s. Errors: [`CaptureLoadError`].
 #[derive(Debug, Default, TypePath)]
 pub struct PackageLoader;
 
 impl AssetLoader for PackageLoader {
     type Asset = GaussianCapture;
-    type Settings = ();
+    type Settings = PackageLoaderSettings;
     type Error = CaptureLoadError;
 
     async fn load(
         &self,
         reader: &mut dyn Reader,
-        _settings: &(),
+        settings: &PackageLoaderSettings,
         _context: &mut LoadContext<'_>,
     ) -> Result<GaussianCapture, CaptureLoadError> {
         let scene = package::read(Cursor::new(bytes(reader).await?))?;
-        Ok(GaussianCapture::new(scene.into_runtime()?))
+        Ok(GaussianCapture::new(scene.into_runtime()?).with_usages(settings.asset_usage))
     }
 
     fn extensions(&self) -> &[&str] {

@@ -28,7 +28,7 @@ mod systems;
 mod uploads;
 
 pub use super::component::{GaussianCapture, KeyFrames};
-pub use loader::{CaptureLoadError, CheckpointLoader, PackageLoader};
+pub use loader::{CaptureLoadError, CheckpointLoader, PackageLoader, PackageLoaderSettings};
 pub(crate) use messages::send;
 pub use messages::{CaptureFailed, CaptureReady};
 pub(crate) use plugin::CaptureAssetPlugin;

@@ -3,7 +3,7 @@
 //! In: a [`GaussianCapture`] and [`PackageSaverSettings`]. Out: the bytes of a `.gs4d` file, in any asset source that Bevy can write,
 //! which [`PackageLoader`] loads as the same capture.
 
-use super::loader::PackageLoader;
+use super::loader::{PackageLoader, PackageLoaderSettings};
 use crate::codec::package::{self, PackageError, WriteSettings};
 use crate::plugin::component::GaussianCapture;
 use crate::scene::GaussianScene;
@@ -47,6 +47,12 @@ impl Default for PackageSaverSettings {
 /// Why a capture could not be saved.
 #[derive(Debug, thiserror::Error)]
 pub enum CaptureSaveError {
+    /// The Gaussians have been dropped from memory.
+    #[error(
+        "the Gaussians of the capture are on the GPU only: load it with RenderAssetUsages::default() in PackageLoaderSettings, or \
+         save it before it is drawn"
+    )]
+    Released,
     /// The format cannot hold the scene.
     #[error(transparent)]
     Package(#[from] PackageError),
@@ -67,10 +73,14 @@ impl AssetSaver for PackageSaver {
         capture: SavedAsset<'_, '_, GaussianCapture>,
         settings: &PackageSaverSettings,
         _path: AssetPath<'_>,
-    ) -> Result<(), CaptureSaveError> {
+    ) -> Result<PackageLoaderSettings, CaptureSaveError> {
+        if capture.is_released() {
+            return Err(CaptureSaveError::Released);
+        }
         let mut bytes = Vec::new();
         let scene = GaussianScene::from(capture.scene().clone());
         package::write(&mut bytes, &scene, &WriteSettings { level: settings.level })?;
-        Ok(writer.write_all(&bytes).await?)
+        writer.write_all(&bytes).await?;
+        Ok(PackageLoaderSettings::default())
     }
 }

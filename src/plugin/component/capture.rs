@@ -3,8 +3,9 @@
 //! In: a [`RuntimeScene`]. Out: a [`GaussianCapture`], cheap to clone, with its bounds, its duration and its up direction.
 
 use super::key_frames::KeyFrames;
-use crate::scene::{Bounds, BoundsOverTime, Form, RuntimeScene};
-use bevy::asset::Asset;
+use crate::gaussian::Harmonics;
+use crate::scene::{ActiveSets, Bounds, BoundsOverTime, Environment, Form, Level, RuntimeScene, TemporalFilter};
+use bevy::asset::{Asset, RenderAssetUsages};
 use bevy::reflect::TypePath;
 use glam::{Quat, Vec3};
 use std::sync::Arc;
@@ -30,6 +31,9 @@ use std::sync::Arc;
 pub struct GaussianCapture {
     scene: Arc<RuntimeScene>,
     bounds: Option<Arc<BoundsOverTime>>,
+    usages: RenderAssetUsages,
+    /// Whether the Gaussians have been moved to the render world.
+    is_released: bool,
 }
 
 impl GaussianCapture {
@@ -37,7 +41,8 @@ impl GaussianCapture {
     /// whose parts do not fit together ([`PackedScene::check`](crate::scene::PackedScene::check)) has no bounds, and cannot
     /// be drawn.
     pub fn new(scene: RuntimeScene) -> Self {
-        let mut capture = Self { scene: Arc::new(scene), bounds: None };
+        let usages = RenderAssetUsages::default();
+        let mut capture = Self { scene: Arc::new(scene), bounds: None, usages, is_released: false };
         if let Form::Packed(packed) = &capture.scene.form
             && packed.check().is_err()
         {
@@ -49,7 +54,33 @@ impl GaussianCapture {
         capture
     }
 
-    /// Returns the scene.
+    /// Returns the capture with other usages. With `RenderAssetUsages::RENDER_WORLD` alone, the Gaussians are dropped from memory once they are
+    /// on the GPU. Such a capture plays as others do, but [`scene`](Self::scene) has no Gaussians then: it can be neither picked nor saved,
+    /// and after a lost device it must be loaded again. Default: both worlds. `MAIN_WORLD` alone counts as both.
+    pub fn with_usages(self, usages: RenderAssetUsages) -> Self {
+        Self { usages, ..self }
+    }
+
+    /// Returns whether the Gaussians have been dropped from memory, by the [usages](Self::with_usages) of the capture.
+    pub fn is_released(&self) -> bool {
+        self.is_released
+    }
+
+    /// Returns the usages of the capture, which is always extracted.
+    pub(crate) fn usages(&self) -> RenderAssetUsages {
+        self.usages | RenderAssetUsages::RENDER_WORLD
+    }
+
+    /// Drops the Gaussians from memory and returns the capture with them; `None` if they have been dropped before.
+    pub(crate) fn release(&mut self) -> Option<Self> {
+        if self.is_released {
+            return None;
+        }
+        let released = Self { scene: Arc::new(outline(&self.scene)), is_released: true, ..self.clone() };
+        Some(std::mem::replace(self, released))
+    }
+
+    /// Returns the scene. After the Gaussians have been [released](Self::is_released), it has only the settings and levels without Gaussians.
     pub fn scene(&self) -> &RuntimeScene {
         &self.scene
     }
@@ -106,10 +137,30 @@ impl GaussianCapture {
     }
 }
 
+/// Returns a scene with everything that is needed to play it, without Gaussians.
+fn outline(scene: &RuntimeScene) -> RuntimeScene {
+    let filter = scene.filter.as_ref().map(|filter| {
+        let sets = match filter.sets {
+            ActiveSets::Bits(_) => ActiveSets::Bits(Vec::new()),
+            ActiveSets::Intervals(_) => ActiveSets::Intervals(Vec::new()),
+        };
+        TemporalFilter { kind: filter.kind, segments: filter.segments, count: 0, sets }
+    });
+    let level = |level: &Level| Level { pixels: level.pixels, scene: Arc::new(outline(&level.scene)) };
+    RuntimeScene {
+        environment: scene.environment.as_ref().map(|_| Environment { width: 0, height: 0, texels: Vec::new() }),
+        filter,
+        trained_with: scene.trained_with.clone(),
+        playback: scene.playback,
+        levels: scene.levels.iter().map(level).collect(),
+        ..RuntimeScene::sliced(Vec::new(), Harmonics::default())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gaussian::{Gaussian, Harmonics};
+    use crate::gaussian::Gaussian;
     use crate::scene::packed::RECORD_WORDS;
     use crate::scene::{PackedColors, PackedScene, PlaybackHints, TrainedWith, UpAxis};
 
@@ -185,5 +236,27 @@ mod tests {
     fn upright_turns_the_up_axis_to_y() {
         let up = capture([0.0, 1.0], 1.0).upright() * Vec3::Z;
         assert!(up.abs_diff_eq(Vec3::Y, 1e-6), "+z of the capture points up, not to {up}");
+    }
+
+    #[test]
+    fn a_released_capture_keeps_all_but_its_gaussians() {
+        let gaussian = Gaussian {
+            mean: [0.0; 3],
+            mean_t: 0.0,
+            velocity: [0.0; 3],
+            sigma_t: f32::INFINITY,
+            covariance: [1.0, 0.0, 0.0, 1.0, 0.0, 1.0],
+            opacity: 0.5,
+            padding: 0.0,
+        };
+        let whole = with(vec![gaussian], [-0.5, 1.5], 4.0);
+        let mut capture = whole.clone();
+        let taken = capture.release().expect("the Gaussians are in memory");
+        assert_eq!((taken.scene().len(), taken.is_released()), (1, false), "the returned capture has the Gaussian");
+        assert_eq!((capture.scene().len(), capture.is_released()), (0, true), "the capture has no Gaussian");
+        assert_eq!(capture.bounds(), whole.bounds(), "the bounds are kept");
+        assert_eq!(capture.time_at(1.0), whole.time_at(1.0), "the times are kept");
+        assert_eq!(capture.upright(), whole.upright(), "the up direction is kept");
+        assert!(capture.release().is_none(), "Gaussians are released once");
     }
 }

@@ -109,7 +109,8 @@ impl IdleTimes {
 /// Returns the ranges of consecutive segments without an active Gaussian, in seconds since the start. A still has none.
 fn idle_times(capture: &GaussianCapture) -> Vec<Range<f32>> {
     let scene = capture.scene();
-    let filter = scene.filter.as_ref().filter(|filter| filter.check(scene.len()).is_ok());
+    // The sets of a released capture are not known.
+    let filter = scene.filter.as_ref().filter(|filter| !capture.is_released() && filter.check(scene.len()).is_ok());
     let (Some(filter), Some(key_frames)) = (filter, capture.key_frames()) else { return Vec::new() };
     let mut idle: Vec<Range<f32>> = Vec::new();
     for (segment, active) in (0u32..).zip(filter.active_counts(0..filter.count)) {

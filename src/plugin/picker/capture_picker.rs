@@ -6,7 +6,8 @@ use crate::gaussian::alpha::reach_squared;
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::{ClipFade, Playback};
 use crate::plugin::render::CaptureSettings;
-use crate::scene::PickSettings;
+use crate::plugin::render::logged::warn_once_each;
+use crate::scene::{PickSettings, RuntimeScene};
 use bevy::asset::Assets;
 use bevy::camera::visibility::InheritedVisibility;
 use bevy::ecs::entity::Entity;
@@ -15,6 +16,7 @@ use bevy::ecs::system::{Query, Res, SystemParam};
 use bevy::math::Ray3d;
 use bevy::transform::components::GlobalTransform;
 use glam::Vec3;
+use std::sync::Arc;
 
 /// Where a ray hits a capture.
 ///
@@ -83,42 +85,44 @@ impl CapturePicker<'_, '_> {
     /// Returns the nearest hit among all captures that are loaded and not hidden, whether a camera sees them or not; `None` if the ray hits
     /// none. Each capture is tested alone: the ray passes through two captures that absorb half of the light only together.
     pub fn cast(&self, ray: Ray3d) -> Option<CaptureHit> {
-        self.cast_through(ray, |_, visibility| visibility.get(), |_| true).first().copied()
+        Aim::cast_all(&self.aims(ray, |_, visibility| visibility.get(), |_| true)).first().copied()
     }
 
-    /// Returns the hits of all captures for which `takes_part` is true, nearest first, up to and including the nearest capture for which
-    /// `blocks` is true.
-    pub(crate) fn cast_through(
+    /// Returns the searches of a ray in all captures for which `takes_part` is true and whose box it meets, nearest box first. `blocks` says
+    /// whether a capture hides the captures behind it from the ray.
+    pub(crate) fn aims(
         &self,
         ray: Ray3d,
         takes_part: impl Fn(Entity, InheritedVisibility) -> bool,
         blocks: impl Fn(Entity) -> bool,
-    ) -> Vec<CaptureHit> {
-        let (mut hits, mut limit) = (Vec::new(), f32::INFINITY);
-        for placed in self.captures.iter().filter(|(entity, .., visibility, _)| takes_part(*entity, **visibility)) {
-            let Some(hit) = self.cast_within(placed, ray, limit) else { continue };
-            if blocks(hit.entity) {
-                limit = hit.distance;
-            }
-            hits.push(hit);
-        }
-        hits.retain(|hit| hit.distance <= limit);
-        hits.sort_by(|a, b| a.distance.total_cmp(&b.distance));
-        hits
+    ) -> Vec<Aim> {
+        let captures = self.captures.iter().filter(|(entity, .., visibility, _)| takes_part(*entity, **visibility));
+        let mut aims: Vec<Aim> = captures
+            .filter_map(|placed| self.aim(placed, ray).map(|aim| Aim { blocks: blocks(aim.entity), ..aim }))
+            .collect();
+        aims.sort_by(|a, b| a.entry.total_cmp(&b.entry));
+        aims
     }
 
     /// Returns the hit of one capture, hidden or not; `None` if the ray misses it, it is not loaded, or its scale is 0.
     pub fn cast_on(&self, entity: Entity, ray: Ray3d) -> Option<CaptureHit> {
-        self.cast_within(self.captures.get(entity).ok()?, ray, f32::INFINITY)
+        self.aim(self.captures.get(entity).ok()?, ray)?.cast(f32::INFINITY)
     }
 
-    fn cast_within(
+    /// Returns the search of a ray in one capture; `None` if the ray misses its box, it is not loaded, or its scale is 0.
+    fn aim(
         &self,
         (entity, handle, settings, playback, transform, _, fade): ROQueryItem<'_, '_, Placed>,
         ray: Ray3d,
-        limit: f32,
-    ) -> Option<CaptureHit> {
+    ) -> Option<Aim> {
         let capture = self.assets.get(&handle.0)?;
+        if capture.is_released() {
+            warn_once_each(&format!(
+                "capture {entity} is not picked: its Gaussians are on the GPU only; load it with RenderAssetUsages::default() in \
+                 PackageLoaderSettings, or let rays pass it with Pickable::IGNORE"
+            ));
+            return None;
+        }
         let appearance = settings.appearance(fade.copied().unwrap_or_default().0);
         let affine = transform.affine();
         if affine.matrix3.determinant() == 0.0 {
@@ -129,18 +133,81 @@ impl CapturePicker<'_, '_> {
         let origin = from_world.transform_point3(ray.origin);
         let direction = from_world.transform_vector3(*ray.direction);
         let bounds = capture.bounds_at(playback.time)?.scaled(reach(appearance.opacity));
-        bounds.entry(origin, direction).filter(|&entry| entry <= limit)?;
+        let entry = bounds.entry(origin, direction)?;
         let settings = PickSettings {
             time: capture.time_at(playback.time),
             use_filter: settings.filter,
             opacity: appearance.opacity,
             crop: appearance.crop,
-            max_distance: limit,
             ..PickSettings::default()
         };
-        let pick = capture.scene().pick(origin, direction, &settings)?;
-        let point = ray.get_point(pick.distance);
-        Some(CaptureHit { entity, gaussian: pick.gaussian, distance: pick.distance, point })
+        let scene = capture.shared_scene();
+        Some(Aim { entity, scene, ray, origin, direction, entry, settings, blocks: true })
+    }
+}
+
+/// The search of a ray in one capture, without the world: it can run on another thread.
+#[derive(Debug, Clone)]
+pub(crate) struct Aim {
+    entity: Entity,
+    scene: Arc<RuntimeScene>,
+    /// The ray in world space, and its origin and direction in capture space.
+    ray: Ray3d,
+    origin: Vec3,
+    direction: Vec3,
+    /// Distance at which the ray enters the capture's box.
+    entry: f32,
+    settings: PickSettings,
+    /// Whether the capture hides the captures behind it from the ray.
+    blocks: bool,
+}
+
+impl PartialEq for Aim {
+    /// Two searches are equal if they find the same hit.
+    fn eq(&self, other: &Self) -> bool {
+        let is_same_ray = (self.ray, self.origin, self.direction) == (other.ray, other.origin, other.direction);
+        let is_same_capture = self.entity == other.entity && Arc::ptr_eq(&self.scene, &other.scene);
+        is_same_capture && is_same_ray && self.settings == other.settings && self.blocks == other.blocks
+    }
+}
+
+impl Aim {
+    /// Returns the entity with the capture.
+    #[cfg(feature = "picking")]
+    pub(crate) fn entity(&self) -> Entity {
+        self.entity
+    }
+
+    /// Returns the number of Gaussians that the search visits.
+    #[cfg(feature = "picking")]
+    pub(crate) fn count(&self) -> usize {
+        self.scene.len()
+    }
+
+    /// Returns the hit, if it is at most at this distance.
+    fn cast(&self, limit: f32) -> Option<CaptureHit> {
+        if self.entry > limit {
+            return None;
+        }
+        let settings = PickSettings { max_distance: limit, ..self.settings };
+        let pick = self.scene.pick(self.origin, self.direction, &settings)?;
+        let point = self.ray.get_point(pick.distance);
+        Some(CaptureHit { entity: self.entity, gaussian: pick.gaussian, distance: pick.distance, point })
+    }
+
+    /// Returns the hits of all searches, nearest first, up to and including the nearest capture that blocks.
+    pub(crate) fn cast_all(aims: &[Self]) -> Vec<CaptureHit> {
+        let (mut hits, mut limit) = (Vec::new(), f32::INFINITY);
+        for aim in aims {
+            let Some(hit) = aim.cast(limit) else { continue };
+            if aim.blocks {
+                limit = hit.distance;
+            }
+            hits.push(hit);
+        }
+        hits.retain(|hit| hit.distance <= limit);
+        hits.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+        hits
     }
 }
 
@@ -148,4 +215,37 @@ impl CapturePicker<'_, '_> {
 /// `sqrt(2 ln(255 opacity)) / 3`. The radius is 3.33 standard deviations for a peak of 1.
 fn reach(opacity: f32) -> f32 {
     reach_squared(opacity.max(1.0)).sqrt() / 3.0
+}
+
+#[cfg(all(test, feature = "picking"))]
+pub(crate) mod tests {
+    use super::*;
+
+    /// Returns a search along the z axis from z = 4 in a capture of `count` Gaussians at the origin.
+    pub(crate) fn aim_at(entity: Entity, count: usize, time: f32) -> Aim {
+        use crate::gaussian::{Gaussian, Harmonics};
+        let gaussian = Gaussian {
+            mean: [0.0; 3],
+            mean_t: 0.0,
+            velocity: [0.0; 3],
+            sigma_t: f32::INFINITY,
+            covariance: [0.1, 0.0, 0.0, 0.1, 0.0, 0.1],
+            opacity: 0.9,
+            padding: 0.0,
+        };
+        let scene = Arc::new(RuntimeScene::sliced(vec![gaussian; count], Harmonics::default()));
+        let (origin, direction) = (Vec3::Z * 4.0, Vec3::NEG_Z);
+        let ray = Ray3d::new(origin, bevy::math::Dir3::NEG_Z);
+        let settings = PickSettings { time, ..PickSettings::default() };
+        Aim { entity, scene, ray, origin, direction, entry: 3.0, settings, blocks: true }
+    }
+
+    #[test]
+    fn searches_of_another_time_are_different() {
+        let aim = aim_at(Entity::PLACEHOLDER, 1, 0.0);
+        assert_eq!(aim.clone(), aim, "a search of the same scene, ray and time");
+        let later = Aim { settings: PickSettings { time: 1.0, ..aim.settings }, ..aim.clone() };
+        assert_ne!(later, aim, "a search at another time");
+        assert_ne!(aim_at(Entity::PLACEHOLDER, 1, 0.0), aim, "a search in another scene");
+    }
 }

@@ -29,4 +29,8 @@
 
 mod capture_picker;
 
+#[cfg(feature = "picking")]
+pub(crate) use capture_picker::Aim;
+#[cfg(all(test, feature = "picking"))]
+pub(crate) use capture_picker::tests::aim_at;
 pub use capture_picker::{CaptureHit, CapturePicker};

@@ -2,6 +2,7 @@
 //!
 //! In: Bevy's map of rays; cameras and captures with their layers and `Pickable`. Out: one `PointerHits` for each ray that hits a capture.
 
+use super::searches::Searches;
 use super::settings::{CapturePickingCamera, CapturePickingSettings};
 use crate::plugin::asset::CaptureState;
 use crate::plugin::component::GaussianCapture3d;
@@ -11,7 +12,7 @@ use bevy::camera::{Camera, Camera3d};
 use bevy::ecs::entity::Entity;
 use bevy::ecs::message::MessageWriter;
 use bevy::ecs::query::{Has, With};
-use bevy::ecs::system::{Query, Res};
+use bevy::ecs::system::{Query, Res, ResMut};
 use bevy::log::debug_span;
 use bevy::picking::backend::ray::RayMap;
 use bevy::picking::backend::{HitData, PointerHits};
@@ -22,7 +23,7 @@ pub(super) fn any_ray(rays: Option<Res<RayMap>>) -> bool {
     rays.is_some_and(|rays| rays.iter().next().is_some())
 }
 
-/// Casts the rays of this frame and writes their hits.
+/// Casts the rays of this frame and writes the hits that are known: of this frame for small captures, of an earlier frame for large ones.
 pub(super) fn update_hits(
     picking: Res<PickingSettings>,
     settings: Res<CapturePickingSettings>,
@@ -33,8 +34,10 @@ pub(super) fn update_hits(
         With<GaussianCapture3d>,
     >,
     picker: CapturePicker,
+    mut searches: ResMut<Searches>,
     mut hits: MessageWriter<PointerHits>,
 ) {
+    searches.retain(|ray| picking.is_enabled && rays.map.contains_key(ray));
     if !picking.is_enabled {
         return;
     }
@@ -58,8 +61,9 @@ pub(super) fn update_hits(
             let Ok((_, _, pickable, _)) = captures.get(capture) else { return false };
             pickable.is_none_or(|pickable| pickable.should_block_lower)
         };
-        let picks: Vec<(Entity, HitData)> = picker
-            .cast_through(*ray, |capture, _| takes_part(capture), blocks)
+        let aims = picker.aims(*ray, |capture, _| takes_part(capture), blocks);
+        let picks: Vec<(Entity, HitData)> = searches
+            .hits(*id, aims)
             .into_iter()
             .map(|hit| (hit.entity, HitData::new_with_extra(id.camera, hit.distance, Some(hit.point), None, hit)))
             .collect();

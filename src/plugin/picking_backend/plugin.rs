@@ -3,9 +3,10 @@
 //! In: an app in which captures play, with Bevy's `PickingPlugin`. Out: the same app, in which pointers hit captures.
 
 use super::backend::{any_ray, update_hits};
+use super::searches::{Searches, any_search};
 use super::settings::CapturePickingSettings;
 use bevy::app::{App, Plugin, PreUpdate};
-use bevy::ecs::schedule::IntoScheduleConfigs;
+use bevy::ecs::schedule::{IntoScheduleConfigs, SystemCondition};
 use bevy::picking::PickingSystems;
 
 /// Sends the hits of pointers on captures in apps with Bevy's `PickingPlugin`, which may be added before or after. Part of
@@ -16,6 +17,7 @@ pub(crate) struct CapturePickingPlugin;
 impl Plugin for CapturePickingPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<CapturePickingSettings>()
-            .add_systems(PreUpdate, update_hits.run_if(any_ray).in_set(PickingSystems::Backend));
+            .init_resource::<Searches>()
+            .add_systems(PreUpdate, update_hits.run_if(any_ray.or_else(any_search)).in_set(PickingSystems::Backend));
     }
 }

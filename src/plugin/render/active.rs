@@ -5,10 +5,13 @@
 
 use super::detail::CaptureLevels;
 use super::extract::ExtractedCaptures;
+use super::logged::error_once_each;
 use super::renderer::CaptureRenderer;
+use super::rests::Rests;
 use super::upload::GpuGaussianCapture;
 use crate::plugin::component::GaussianCapture;
 use crate::renderer::ActiveList;
+use crate::renderer::memory::catch_known;
 use bevy::asset::AssetId;
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Res, ResMut};
@@ -16,11 +19,15 @@ use bevy::log::debug_span;
 use bevy::render::diagnostic::RecordDiagnostics;
 use bevy::render::render_asset::RenderAssets;
 use bevy::render::renderer::{RenderContext, RenderDevice, RenderQueue};
-use bevy::render::sync_world::MainEntityHashMap;
+use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
 
 /// The lists of captures with a temporal filter, by entity of the main world. A list is kept while its entity shows the same capture.
 #[derive(Resource, Default)]
-pub(crate) struct ActiveLists(pub(super) MainEntityHashMap<PlacedList>);
+pub(crate) struct ActiveLists {
+    pub(super) placed: MainEntityHashMap<PlacedList>,
+    /// Captures for whose list there was no memory. Until they are tried again, all of their Gaussians are drawn.
+    rests: Rests<MainEntity>,
+}
 
 /// The list of one entity.
 pub(super) struct PlacedList {
@@ -42,7 +49,8 @@ pub(super) fn prepare_active_lists(
 ) {
     let _span = debug_span!("gs4d/lists").entered();
     let Some(renderer) = renderer else { return };
-    lists.0.retain(|entity, placed| {
+    lists.rests.count_frame();
+    lists.placed.retain(|entity, placed| {
         let shown = extracted.0.get(entity).filter(|shown| shown.filtered && shown.asset == placed.asset);
         let uploaded = shown.and_then(|shown| captures.get(shown.asset)?.capture());
         uploaded.is_some_and(|capture| placed.list.is_for(capture))
@@ -55,11 +63,24 @@ pub(super) fn prepare_active_lists(
         }
         let Some(uploaded) = captures.get(shown.asset) else { continue };
         let (Some(capture), Some(time)) = (uploaded.capture(), uploaded.time_at(shown.seconds)) else { continue };
-        if !lists.0.contains_key(entity) {
-            let Some(list) = ActiveList::new(device.wgpu_device(), &renderer.0, capture) else { continue };
-            lists.0.insert(*entity, PlacedList { list, asset: shown.asset, stale: false });
+        if !lists.placed.contains_key(entity) {
+            if lists.rests.contains(entity) {
+                continue;
+            }
+            let device = device.wgpu_device();
+            let created = catch_known(device, capture.bytes(), || ActiveList::new(device, &renderer.0, capture));
+            let list = match created {
+                Ok(Some(list)) => list,
+                Ok(None) => continue,
+                Err(failure) => {
+                    error_once_each(&format!("the temporal filter of capture {} is not used: {failure}", entity.id()));
+                    lists.rests.begin(*entity);
+                    continue;
+                }
+            };
+            lists.placed.insert(*entity, PlacedList { list, asset: shown.asset, stale: false });
         }
-        if let Some(placed) = lists.0.get_mut(entity) {
+        if let Some(placed) = lists.placed.get_mut(entity) {
             placed.stale = placed.list.prepare(&queue, capture, time);
         }
     }
@@ -67,7 +88,7 @@ pub(super) fn prepare_active_lists(
 
 /// Returns whether any list must be written.
 pub(super) fn any_stale(lists: Res<ActiveLists>) -> bool {
-    lists.0.values().any(|placed| placed.stale)
+    lists.placed.values().any(|placed| placed.stale)
 }
 
 /// Records `activate` for the stale lists, before the cameras.
@@ -82,7 +103,7 @@ pub(super) fn record_active_lists(
     let diagnostics = context.diagnostic_recorder();
     let diagnostics = diagnostics.as_deref();
     let span = diagnostics.time_span(context.command_encoder(), "gs4d/activate");
-    for placed in lists.0.values_mut().filter(|placed| placed.stale) {
+    for placed in lists.placed.values_mut().filter(|placed| placed.stale) {
         if let Some(capture) = captures.get(placed.asset).and_then(|uploaded| uploaded.capture()) {
             placed.list.record(&renderer.0, context.command_encoder(), capture);
             placed.stale = false;

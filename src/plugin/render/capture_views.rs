@@ -9,6 +9,7 @@ use super::previous::CameraPose;
 use super::upload::GpuGaussianCapture;
 use super::write_depth::WriteDepthBindings;
 use crate::plugin::component::GaussianCapture;
+use crate::renderer::memory::Caught;
 use crate::renderer::{Design, Instance, Renderer, ViewRenderer};
 use crate::view::{Appearance, View};
 use bevy::asset::AssetId;
@@ -35,8 +36,8 @@ pub(crate) struct CaptureView {
     /// The camera's entity in the main world.
     pub(super) camera: Entity,
     pub(crate) renderer: ViewRenderer,
-    /// The pipeline of the composite into the camera's target.
-    pub(super) composite: CachedRenderPipelineId,
+    /// The pipeline of the composite into the camera's target; `None` if the GPU refuses it. Nothing is drawn then.
+    pub(super) composite: Option<CachedRenderPipelineId>,
     /// The composite into every sample of a multisampled target.
     pub(super) composite_samples: Option<CachedRenderPipelineId>,
     /// Whether the composite blends in place by hardware, instead of reading the target.
@@ -60,7 +61,16 @@ pub(crate) struct CaptureView {
     idle: IdleFrames,
     /// The captures that the camera sees this frame; nothing is drawn while this is empty.
     pub(crate) drawn: Vec<Drawn>,
+    /// The captures of the last frame for whose captures there was room.
+    shown: Vec<MainEntity>,
+    /// Number of frames for which only the captures in `shown` are drawn: there was no room for the other captures.
+    left_out: u32,
+    /// The errors of objects of this view that are not known yet, as in browsers. Nothing is drawn until they are known.
+    pub(super) pending: Option<Caught>,
 }
+
+/// Number of frames after which captures for which there was no room are tried again: about a second.
+const LEFT_OUT_FRAMES: u32 = 60;
 
 /// One capture, seen by one camera or light.
 pub(crate) struct Drawn {
@@ -99,23 +109,18 @@ impl Drawn {
     ) -> Option<Instance<'a>> {
         let capture = captures.get(self.asset)?.level(self.level)?;
         // Levels of detail have no filter.
-        let list = if self.filtered && self.level == 0 { lists.0.get(&self.entity) } else { None };
+        let list = if self.filtered && self.level == 0 { lists.placed.get(&self.entity) } else { None };
         let active = list.map(|placed| &placed.list);
         Some(Instance { capture, active, view: self.view, appearance: self.appearance })
     }
 }
 
 impl CaptureView {
-    pub(super) fn new(
-        device: &RenderDevice,
-        renderer: &Renderer,
-        camera: Entity,
-        composite: CachedRenderPipelineId,
-    ) -> Self {
+    pub(super) fn new(device: &RenderDevice, renderer: &Renderer, camera: Entity) -> Self {
         Self {
             camera,
             renderer: ViewRenderer::new(device.wgpu_device(), renderer),
-            composite,
+            composite: None,
             composite_samples: None,
             in_place: false,
             bindings: CompositeBindings::default(),
@@ -129,6 +134,9 @@ impl CaptureView {
             measured: false,
             idle: IdleFrames::default(),
             drawn: Vec::new(),
+            shown: Vec::new(),
+            left_out: 0,
+            pending: None,
         }
     }
 
@@ -149,10 +157,61 @@ impl CaptureView {
     /// Counts a frame, with or without a visible capture. After many frames without one, releases the GPU memory.
     pub(super) fn count_idle_frames(&mut self) {
         if self.idle.count(self.sees_something()) {
-            self.renderer.release();
-            self.bindings.forget();
-            self.depth_bindings.forget();
-            self.motion_group.forget();
+            self.release();
+        }
+    }
+
+    /// Releases the GPU memory; the next frame with a visible capture creates it again.
+    pub(super) fn release(&mut self) {
+        self.renderer.release();
+        self.bindings.forget();
+        self.depth_bindings.forget();
+        self.motion_group.forget();
+    }
+
+    /// Counts a frame in which Bevy does not draw the camera. The view is kept: the camera may be active again in the next frame.
+    pub(super) fn pass_over(&mut self) {
+        self.drawn.clear();
+        (self.is_shaded, self.shaded) = (false, None);
+        self.pose = None;
+        self.count_idle_frames();
+    }
+
+    /// Removes the captures for which there was no room some frames ago.
+    pub(super) fn leave_out(&mut self) {
+        if self.left_out > 0 && !self.retain_shown() {
+            self.left_out = 0;
+        }
+        self.left_out = self.left_out.saturating_sub(1);
+    }
+
+    /// Removes the captures that are new since the last frame for whose captures there was room. Returns whether fewer captures remain, and
+    /// can be prepared instead.
+    pub(super) fn leave_out_new(&mut self) -> bool {
+        let count = self.drawn.len();
+        let fewer = self.retain_shown() && self.drawn.len() < count;
+        if fewer {
+            self.left_out = LEFT_OUT_FRAMES;
+        }
+        fewer
+    }
+
+    /// Keeps the captures that were drawn in the last frame for whose captures there was room. Returns false, and keeps all, if there are
+    /// none.
+    fn retain_shown(&mut self) -> bool {
+        let Self { drawn, shown, .. } = self;
+        let any = drawn.iter().any(|one| shown.contains(&one.entity));
+        if any {
+            drawn.retain(|one| shown.contains(&one.entity));
+        }
+        any
+    }
+
+    /// Records that there is room for the captures of this frame.
+    pub(super) fn note_room(&mut self) {
+        if self.left_out == 0 {
+            self.shown.clear();
+            self.shown.extend(self.drawn.iter().map(|one| one.entity));
         }
     }
 

@@ -3,7 +3,7 @@
 //! In: a view target and a view's captures (color and transmittance). Out: pipeline and bind group for `shaders/composite.wgsl`, created
 //! only when one of the inputs has changed.
 
-use super::kept::KeptUniform;
+use super::kept::{KeptUniform, created};
 use crate::renderer::WorkCounters;
 use crate::view::BlendSpace;
 use bevy::asset::Handle;
@@ -155,7 +155,7 @@ impl CompositeBindings {
     }
 
     /// Returns the bind group that reads `captures` and, unless they are blended in place, the target texture `source`; `None` before the
-    /// first [`set_viewport`](Self::set_viewport).
+    /// first [`set_viewport`](Self::set_viewport), and if the GPU refuses the bind group.
     pub(super) fn group(
         &mut self,
         device: &RenderDevice,
@@ -173,10 +173,10 @@ impl CompositeBindings {
                 let layout = cache.get_bind_group_layout(pipeline.layout(source.is_none()));
                 let viewport = self.viewport.binding()?;
                 let create = |entries: &[BindGroupEntry]| device.create_bind_group("gs4d composite", &layout, entries);
-                let group = match source {
+                let group = created(device, || match source {
                     Some(source) => create(&BindGroupEntries::sequential((captures, viewport, source))),
                     None => create(&BindGroupEntries::sequential((captures, viewport))),
-                };
+                })?;
                 work.add_created();
                 // Both textures of the target are created together, so a new `captures` makes both bind groups stale.
                 if self.groups.len() >= 2 || self.groups.iter().any(|known| known.captures != *captures) {

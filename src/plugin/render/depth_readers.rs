@@ -59,3 +59,17 @@ pub(super) fn extract_depth_readers(
     readers.0.clear();
     readers.0.extend(cameras.iter().filter(reads).map(|camera| MainEntity::from(camera.id())));
 }
+
+#[cfg(all(test, feature = "viewer"))]
+mod tests {
+    use super::*;
+    use bevy::light::VolumetricFog;
+    use bevy::post_process::dof::DepthOfField;
+    use bevy::reflect::TypePath;
+
+    #[test]
+    fn the_type_paths_of_depth_readers_are_those_of_bevy() {
+        let paths = [DepthOfField::type_path(), VolumetricFog::type_path()];
+        assert_eq!(READERS, paths, "Bevy's effects that read depths have these type paths");
+    }
+}

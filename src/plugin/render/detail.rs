@@ -63,7 +63,8 @@ pub struct CaptureDetail {
     /// large. Default: 0, as measured when the levels were made.
     pub bias: f32,
     /// Target of the GPU time of captures per frame, summed over all cameras. While it is exceeded, the bias falls slowly below
-    /// [`bias`](Self::bias); it rises again when the measured time is below an eighth of the target. Needs [`CaptureStatistics::measure`].
+    /// [`bias`](Self::bias); it rises again when the measured time is below an eighth of the target. Needs [`CaptureStatistics::measure`], and
+    /// a GPU with timestamps: without timestamps the target has no effect. Timestamps inside passes, which some GPUs lack, are not needed.
     /// Default: `None`, no limit.
     pub frame_time: Option<Duration>,
 }

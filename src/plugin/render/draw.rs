@@ -143,8 +143,9 @@ pub(super) fn draw_front(
 impl Passes<'_> {
     /// Returns whether the view has captures and its composite is compiled. Without the composite, captures would not be visible.
     fn can_draw(&self, view: &CaptureView) -> bool {
-        let mut composites = [Some(view.composite), view.composite_samples].into_iter().flatten();
-        view.sees_something() && composites.all(|id| self.cache.get_render_pipeline(id).is_some())
+        let mut composites = view.composite.into_iter().chain(view.composite_samples);
+        let is_visible = view.sees_something() && view.composite.is_some();
+        is_visible && composites.all(|id| self.cache.get_render_pipeline(id).is_some())
     }
 
     /// Records the renderer's compute pass.
@@ -174,7 +175,7 @@ impl Passes<'_> {
         work: &WorkCounters,
     ) {
         // Fetched before `post_process_write` swaps the target's textures: afterwards the other texture must be written.
-        let id = if into_samples { view.composite_samples } else { Some(view.composite) };
+        let id = if into_samples { view.composite_samples } else { view.composite };
         let Some(pipeline) = id.and_then(|id| self.cache.get_render_pipeline(id)) else { return };
         let Some(color) = view.shaded.as_ref().or(view.renderer.color()) else { return };
         let source = (!view.in_place).then(|| target.main_texture_view());
@@ -260,7 +261,7 @@ impl Passes<'_> {
         };
         let (textures, uniforms) = ([motions, depths], [viewport, lens]);
         let create = || Some(self.write_motion.group(&self.device, &self.cache, textures, uniforms));
-        let group = view.motion_group.of(textures, work, create);
+        let group = view.motion_group.of(&self.device, textures, work, create);
         let Some(group) = group else { return };
         let diagnostics = context.diagnostic_recorder();
         let diagnostics = diagnostics.as_deref();

@@ -3,7 +3,9 @@
 //! In: a value, or two textures, of this frame. Out: a uniform buffer with the value, [`KeptUniform`]; a bind group of the textures,
 //! [`KeptGroup`]; the number of frames without a drawn capture, [`IdleFrames`].
 
+use super::logged::error_once_each;
 use crate::renderer::WorkCounters;
+use crate::renderer::memory::catch_known;
 use bevy::render::render_resource::encase::internal::WriteInto;
 use bevy::render::render_resource::{BindGroup, BindingResource, ShaderType, UniformBuffer};
 use bevy::render::renderer::{RenderDevice, RenderQueue};
@@ -41,20 +43,28 @@ impl KeptGroup {
         self.0 = None;
     }
 
-    /// Returns the bind group of these textures. If the textures have changed, `create` makes a new one; `None` if `create` fails.
+    /// Returns the bind group of these textures. If the textures have changed, `create` makes a new one; `None` if `create` fails, or if
+    /// the GPU refuses the bind group, which is logged.
     pub(crate) fn of(
         &mut self,
+        device: &RenderDevice,
         textures: [&wgpu::TextureView; 2],
         work: &WorkCounters,
         create: impl FnOnce() -> Option<BindGroup>,
     ) -> Option<&BindGroup> {
         if self.0.as_ref().is_none_or(|(known, _)| known.each_ref() != textures) {
-            let group = create()?;
+            let group = created(device, create)??;
             work.add_created();
             self.0 = Some((textures.map(Clone::clone), group));
         }
         self.0.as_ref().map(|(_, group)| group)
     }
+}
+
+/// Creates objects of a pass; `None` if the GPU refuses them, which is logged. The pass is then left out.
+pub(crate) fn created<T>(device: &RenderDevice, create: impl FnOnce() -> T) -> Option<T> {
+    let created = catch_known(device.wgpu_device(), 0, create);
+    created.inspect_err(|failure| error_once_each(&format!("a pass over captures is left out: {failure}"))).ok()
 }
 
 /// Consecutive frames in which a view has drawn no capture.
@@ -69,5 +79,11 @@ impl IdleFrames {
     pub(crate) fn count(&mut self, draws: bool) -> bool {
         self.0 = if draws { 0 } else { self.0.saturating_add(1) };
         self.0 == Self::MOST
+    }
+
+    /// Returns whether the view has released its memory.
+    #[cfg(feature = "pbr")]
+    pub(crate) fn is_over(&self) -> bool {
+        self.0 >= Self::MOST
     }
 }

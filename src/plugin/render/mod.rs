@@ -72,6 +72,7 @@
 
 mod active;
 pub(crate) mod capture_views;
+pub(crate) mod checked_pipelines;
 mod composite;
 mod depth_readers;
 mod detail;
@@ -79,6 +80,7 @@ mod draw;
 pub(crate) mod extract;
 mod fault;
 pub(crate) mod kept;
+pub(crate) mod logged;
 pub(crate) mod order;
 mod plugin;
 mod prepare;
@@ -86,6 +88,7 @@ mod previous;
 mod publish;
 mod reflect;
 mod renderer;
+pub(crate) mod rests;
 mod settings;
 pub(crate) mod shade_requests;
 mod statistics;

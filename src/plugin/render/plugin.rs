@@ -4,6 +4,7 @@
 
 use super::active::{ActiveLists, any_stale, prepare_active_lists, record_active_lists};
 use super::capture_views::{CaptureViews, any_shaded};
+use super::checked_pipelines::CheckedPipelines;
 use super::composite::{CaptureShaders, CompositePipeline};
 use super::depth_readers::{DepthReaders, extract_depth_readers};
 use super::detail::{CaptureDetail, CaptureLevels, any_levels, choose_levels, extract_detail};
@@ -17,6 +18,7 @@ use super::order::{
 use super::prepare::{make_depth_readable, prepare_views};
 use super::previous::PreviousCaptures;
 use super::renderer::init_renderer;
+use super::rests::Rests;
 use super::settings::CaptureSettings;
 use super::shade_requests::ShadeRequests;
 use super::statistics::CaptureStatistics;
@@ -32,9 +34,9 @@ use bevy::camera::visibility::VisibilitySystems;
 use bevy::core_pipeline::core_3d::{main_opaque_pass_3d, main_transparent_pass_3d};
 use bevy::core_pipeline::oit::resolve::node::oit_resolve;
 use bevy::core_pipeline::schedule::{Core3d, Core3dSystems, camera_driver};
+use bevy::ecs::entity::Entity;
 use bevy::ecs::schedule::{IntoScheduleConfigs, SystemCondition};
 use bevy::render::render_asset::{RenderAssetPlugin, prepare_assets};
-use bevy::render::render_resource::SpecializedRenderPipelines;
 use bevy::render::renderer::{RenderGraph, RenderGraphSystems};
 use bevy::render::{ExtractSchedule, GpuResourceAppExt, Render, RenderApp, RenderStartup, RenderSystems};
 use bevy::shader::Shader;
@@ -92,12 +94,13 @@ fn build_rendering(app: &mut App) {
         .init_resource::<CaptureOrders>()
         // Created again after a lost device: these resources hold all GPU objects.
         .init_gpu_resource::<CompositePipeline>()
-        .init_gpu_resource::<SpecializedRenderPipelines<CompositePipeline>>()
+        .init_gpu_resource::<CheckedPipelines<CompositePipeline>>()
         .init_gpu_resource::<WriteDepthPipeline>()
-        .init_gpu_resource::<SpecializedRenderPipelines<WriteDepthPipeline>>()
+        .init_gpu_resource::<CheckedPipelines<WriteDepthPipeline>>()
         .init_gpu_resource::<WriteMotionPipeline>()
-        .init_gpu_resource::<SpecializedRenderPipelines<WriteMotionPipeline>>()
+        .init_gpu_resource::<CheckedPipelines<WriteMotionPipeline>>()
         .init_gpu_resource::<CaptureViews>()
+        .init_gpu_resource::<Rests<Entity>>()
         .init_gpu_resource::<ActiveLists>()
         .add_systems(RenderStartup, init_renderer)
         .add_systems(

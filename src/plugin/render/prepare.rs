@@ -2,17 +2,23 @@
 //!
 //! In: [`ExtractedCaptures`], Bevy's extracted cameras with their visible entities and depth textures. Out: [`CaptureViews`], with all
 //! inputs of drawing written to the GPU. In the steady state no GPU object is created.
+//!
+//! Errors of the GPU are caught, view by view. If there is no room for the captures that a camera sees, it draws the captures that it has drawn
+//! before, and tries the others again some frames later.
 
 use super::active::ActiveLists;
 use super::capture_views::{CaptureView, CaptureViews, Drawn, group_copies};
+use super::checked_pipelines::CheckedPipelines;
 use super::composite::{CompositeKey, CompositePipeline};
 use super::depth_readers::DepthReaders;
 use super::detail::CaptureLevels;
 use super::extract::{ExtractedCaptures, ExtractedViewSettings};
 use super::fault::CameraFault;
+use super::logged::{error_once_each, warn_once_each};
 use super::previous::{CameraPose, PreviousCaptures};
 use super::publish::publish_statistics;
 use super::renderer::CaptureRenderer;
+use super::rests::Rests;
 use super::settings::{CaptureViewSettings, DepthWrite};
 use super::shade_requests::ShadeRequests;
 use super::statistics::CaptureStatistics;
@@ -21,17 +27,18 @@ use super::view::CameraLens;
 use super::write_depth::{WriteDepthKey, WriteDepthPipeline};
 use super::write_motion::{WriteMotionKey, WriteMotionPipeline};
 use crate::plugin::component::GaussianCapture3d;
-use crate::renderer::{ColorPrecision, OpaqueDepth, ViewParameters};
+use crate::renderer::memory::{catch, catch_known};
+use crate::renderer::{ColorPrecision, GpuError, OpaqueDepth, ViewParameters};
 use crate::view::{Background, DebugView, View};
 use bevy::camera::{Camera3d, CompositingSpace, MainPassResolutionOverride};
 use bevy::core_pipeline::prepass::ViewPrepassTextures;
-use bevy::ecs::entity::Entity;
-use bevy::ecs::query::With;
+use bevy::ecs::entity::{Entities, Entity};
+use bevy::ecs::query::{ROQueryItem, With};
 use bevy::ecs::system::{Query, Res, ResMut, SystemParam};
-use bevy::log::{debug_span, error_once, warn_once};
+use bevy::log::debug_span;
 use bevy::render::camera::ExtractedCamera;
 use bevy::render::render_asset::RenderAssets;
-use bevy::render::render_resource::{CachedRenderPipelineId, PipelineCache, SpecializedRenderPipelines, TextureUsages};
+use bevy::render::render_resource::{CachedRenderPipelineId, PipelineCache, TextureUsages};
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 use bevy::render::view::{ExtractedView, Msaa, RenderVisibleEntities, ViewDepthTexture};
 use glam::{UVec2, UVec4};
@@ -52,13 +59,14 @@ pub(super) struct Scene<'w> {
 /// The pipelines that depend on a camera's target.
 #[derive(SystemParam)]
 pub(super) struct Pipelines<'w> {
+    device: Res<'w, RenderDevice>,
     cache: Res<'w, PipelineCache>,
     composite: Res<'w, CompositePipeline>,
-    composites: ResMut<'w, SpecializedRenderPipelines<CompositePipeline>>,
+    composites: ResMut<'w, CheckedPipelines<CompositePipeline>>,
     write_depth: Res<'w, WriteDepthPipeline>,
-    depth_writers: ResMut<'w, SpecializedRenderPipelines<WriteDepthPipeline>>,
+    depth_writers: ResMut<'w, CheckedPipelines<WriteDepthPipeline>>,
     write_motion: Res<'w, WriteMotionPipeline>,
-    motion_writers: ResMut<'w, SpecializedRenderPipelines<WriteMotionPipeline>>,
+    motion_writers: ResMut<'w, CheckedPipelines<WriteMotionPipeline>>,
 }
 
 impl Scene<'_> {
@@ -100,30 +108,33 @@ impl Scene<'_> {
 
 impl Pipelines<'_> {
     /// Returns the composite pipeline for a camera's target, the one for its samples if it is multisampled, and whether they blend in
-    /// place.
+    /// place. There is no pipeline if the GPU refuses one of them.
     fn composite(
         &mut self,
         view: &ExtractedView,
         camera: &ExtractedCamera,
         msaa: Msaa,
         settings: CaptureViewSettings,
-    ) -> (CachedRenderPipelineId, Option<CachedRenderPipelineId>, bool) {
+    ) -> (Option<CachedRenderPipelineId>, Option<CachedRenderPipelineId>, bool) {
         let encoded = camera.compositing_space == Some(CompositingSpace::Srgb);
         let key = CompositeKey { format: view.target_format, encoded, blend_space: settings.blend_space, samples: 1 };
-        let composite = self.composites.specialize(&self.cache, &self.composite, key);
-        let multisampled = (msaa != Msaa::Off).then(|| CompositeKey { samples: msaa.samples(), ..key });
-        let composite_samples = multisampled.map(|key| self.composites.specialize(&self.cache, &self.composite, key));
-        (composite, composite_samples, key.blends_in_place())
+        let mut specialize = |key| self.composites.specialize(&self.device, &self.cache, &self.composite, key);
+        let composite = specialize(key);
+        if msaa == Msaa::Off {
+            return (composite, None, key.blends_in_place());
+        }
+        let composite_samples = specialize(CompositeKey { samples: msaa.samples(), ..key });
+        (composite.filter(|_| composite_samples.is_some()), composite_samples, key.blends_in_place())
     }
 
-    fn write_depth(&mut self, msaa: Msaa, median: bool) -> CachedRenderPipelineId {
+    fn write_depth(&mut self, msaa: Msaa, median: bool) -> Option<CachedRenderPipelineId> {
         let key = WriteDepthKey { samples: msaa.samples(), median };
-        self.depth_writers.specialize(&self.cache, &self.write_depth, key)
+        self.depth_writers.specialize(&self.device, &self.cache, &self.write_depth, key)
     }
 
-    fn write_motion(&mut self, msaa: Msaa, median: bool, depth: bool) -> CachedRenderPipelineId {
+    fn write_motion(&mut self, msaa: Msaa, median: bool, depth: bool) -> Option<CachedRenderPipelineId> {
         let key = WriteMotionKey { samples: msaa.samples(), median, depth };
-        self.motion_writers.specialize(&self.cache, &self.write_motion, key)
+        self.motion_writers.specialize(&self.device, &self.cache, &self.write_motion, key)
     }
 }
 
@@ -145,6 +156,8 @@ type CameraView = (
     Option<&'static ViewPrepassTextures>,
 );
 
+type CameraItem<'a> = ROQueryItem<'a, 'a, CameraView>;
+
 /// Prepares the view of every camera: the captures it sees, its pipelines and its working buffers.
 pub(super) fn prepare_views(
     device: Res<RenderDevice>,
@@ -154,46 +167,199 @@ pub(super) fn prepare_views(
     mut pipelines: Pipelines,
     statistics: Res<CaptureStatistics>,
     mut views: ResMut<CaptureViews>,
+    mut rests: ResMut<Rests<Entity>>,
     cameras: Query<CameraView, With<Camera3d>>,
+    entities: &Entities,
 ) {
     let _span = debug_span!("gs4d/prepare").entered();
     let Some(renderer) = renderer else { return publish_statistics(&statistics, &views, &scene.captures) };
-    let measure = statistics.is_measuring();
-    views.0.retain(|&camera, _| cameras.contains(camera));
-    for (entity, view, camera, depth, &msaa, visible, resolution, prepass) in &cameras {
-        // Meshes may be drawn at a lower resolution than the camera's, to be scaled up later.
-        let size = resolution.map_or(UVec2::new(view.viewport.z, view.viewport.w), |smaller| smaller.0);
-        let main = view.retained_view_entity.main_entity;
-        let mut settings = scene.settings.0.get(&main).copied().unwrap_or_default();
-        settings.depth = scene.depth_readers.resolve(&main, settings.depth);
+    rests.count_frame();
+    views.0.retain(|&camera, _| entities.contains_spawned(camera));
+    for (_, view) in views.0.iter_mut().filter(|(camera, _)| !cameras.contains(**camera)) {
+        view.pass_over();
+    }
+    let mut preparation = Preparation {
+        device: &device,
+        queue: &queue,
+        renderer: &renderer,
+        scene: &scene,
+        pipelines: &mut pipelines,
+        measure: statistics.is_measuring(),
+    };
+    for camera in &cameras {
+        let entity = camera.0;
         // Requested even without captures, so that the pipeline is compiled while captures load.
-        let (composite, composite_samples, in_place) = pipelines.composite(view, camera, msaa, settings);
-        let state =
-            views.0.entry(entity).or_insert_with(|| CaptureView::new(&device, &renderer.0, main.id(), composite));
-        (state.composite, state.composite_samples, state.in_place) = (composite, composite_samples, in_place);
-        state.set_design(&renderer.0, settings.design);
-        state.measure(measure, &device, &queue, &renderer.0);
+        let composites = preparation.composites(&camera);
+        if rests.contains(&entity) {
+            continue;
+        }
+        let main = camera.1.retained_view_entity.main_entity.id();
+        let known = views
+            .0
+            .remove(&entity)
+            .map_or_else(|| catch_known(device.wgpu_device(), 0, || CaptureView::new(&device, &renderer.0, main)), Ok);
+        let prepared = known.and_then(|mut state| {
+            (state.composite, state.composite_samples, state.in_place) = composites;
+            preparation.prepare(&mut state, &camera).map(|()| state)
+        });
+        match prepared {
+            Ok(state) => {
+                views.0.insert(entity, state);
+            }
+            // Objects of the view are invalid, so it is dropped.
+            Err(failure) => {
+                error_once_each(&format!("captures are not drawn for camera {main}: {failure}"));
+                rests.begin(entity);
+            }
+        }
+    }
+    scene.previous.keep(&scene.extracted);
+    publish_statistics(&statistics, &views, &scene.captures);
+}
+
+/// The resources of preparing the view of one camera.
+struct Preparation<'a, 's, 'p> {
+    device: &'a RenderDevice,
+    queue: &'a RenderQueue,
+    renderer: &'a CaptureRenderer,
+    scene: &'a Scene<'s>,
+    pipelines: &'a mut Pipelines<'p>,
+    measure: bool,
+}
+
+impl Preparation<'_, '_, '_> {
+    /// Returns the settings of a camera, with the depth that it writes.
+    fn settings(&self, view: &ExtractedView) -> CaptureViewSettings {
+        let main = view.retained_view_entity.main_entity;
+        let settings = self.scene.settings.0.get(&main).copied().unwrap_or_default();
+        let depth = self.scene.depth_readers.resolve(&main, settings.depth);
+        CaptureViewSettings { depth, ..settings }
+    }
+
+    /// Returns the pipelines of the composite, as [`Pipelines::composite`] does.
+    fn composites(
+        &mut self,
+        &(_, view, camera, _, &msaa, ..): &CameraItem<'_>,
+    ) -> (Option<CachedRenderPipelineId>, Option<CachedRenderPipelineId>, bool) {
+        let settings = self.settings(view);
+        self.pipelines.composite(view, camera, msaa, settings)
+    }
+
+    /// Prepares the captures that a camera sees. If there is no room for all of them, prepares the captures drawn before. Nothing is drawn
+    /// while the camera's settings do not allow it, or there is no room for any of them.
+    ///
+    /// # Errors
+    /// When the GPU refuses an object, or has no memory for it. The view must be dropped.
+    fn prepare(&mut self, state: &mut CaptureView, camera: &CameraItem<'_>) -> Result<(), GpuError> {
+        if let Some(pending) = &mut state.pending {
+            match pending.poll() {
+                None => {
+                    state.drawn.clear();
+                    return Ok(());
+                }
+                Some(result) => {
+                    state.pending = None;
+                    result?;
+                }
+            }
+        }
+        let pose = self.collect(state, camera);
+        let previous = std::mem::replace(&mut state.pose, pose).or(pose);
+        let (Some(pose), Some(previous)) = (pose, previous) else { return Ok(()) };
+        if state.composite.is_none() {
+            state.drawn.clear();
+        }
+        if !state.sees_something() {
+            return Ok(());
+        }
+        let poses = [pose, previous];
+        match self.prepare_drawn(state, camera, poses) {
+            Ok(()) => state.note_room(),
+            Err(failure) if state.leave_out_new() => {
+                error_once_each(&format!(
+                    "captures that came into view of camera {} are not drawn: {failure}. Captures drawn before are still drawn",
+                    state.camera
+                ));
+                if failure.is_of_device() {
+                    state.release();
+                }
+                self.prepare_drawn(state, camera, poses)?;
+            }
+            Err(failure) if failure.is_of_device() => return Err(failure),
+            Err(failure) => {
+                error_once_each(&format!("captures are not drawn for camera {}: {failure}", state.camera));
+                state.drawn.clear();
+            }
+        }
+        Ok(())
+    }
+
+    /// Collects the captures that a camera sees. Returns its pose; `None` if captures cannot be drawn for it.
+    fn collect(&self, state: &mut CaptureView, camera: &CameraItem<'_>) -> Option<CameraPose> {
+        let &(entity, view, extracted, .., visible, _, _) = camera;
         state.drawn.clear();
         (state.is_shaded, state.shaded) = (false, None);
-        let lens = drawable_lens(view, camera);
+        let lens = drawable_lens(view, extracted);
         if let Some(lens) = &lens {
-            scene.collect(entity, lens, view, size, visible, &mut state.drawn);
+            self.scene.collect(entity, lens, view, size(camera), visible, &mut state.drawn);
         }
+        state.leave_out();
         state.count_idle_frames();
-        let pose = lens.map(|lens| CameraPose { lens, world_from_camera: view.world_from_view.affine() });
-        let previous_pose = std::mem::replace(&mut state.pose, pose).or(pose);
-        let Some(lens) = lens.filter(|_| state.sees_something()) else { continue };
+        lens.map(|lens| CameraPose { lens, world_from_camera: view.world_from_view.affine() })
+    }
+
+    /// Prepares the collected captures, in error scopes. `poses` are the camera's poses in this frame and in the previous frame.
+    fn prepare_drawn(
+        &mut self,
+        state: &mut CaptureView,
+        camera: &CameraItem<'_>,
+        poses: [CameraPose; 2],
+    ) -> Result<(), GpuError> {
+        let bytes = state.renderer.statistics().bytes;
+        let device = self.device.wgpu_device();
+        let (prepared, mut caught) = catch(device, bytes, || self.write(state, camera, poses));
+        match caught.poll() {
+            Some(result) => result?,
+            // A bind group alone is not worth a frame without captures.
+            None if state.renderer.statistics().bytes != bytes => state.pending = Some(caught),
+            None => {}
+        }
+        prepared?;
+        if state.renderer.is_short_of_room() {
+            warn_once_each(
+                "captures are drawn whole but slowly: a camera has more pairs of splats and tiles than fit on this GPU; draw \
+                 fewer or smaller Gaussians, or a smaller picture",
+            );
+        }
+        if state.pending.is_some() {
+            state.drawn.clear();
+        }
+        Ok(())
+    }
+
+    /// Writes the inputs of drawing to the GPU.
+    fn write(
+        &mut self,
+        state: &mut CaptureView,
+        camera: &CameraItem<'_>,
+        [CameraPose { lens, .. }, previous_pose]: [CameraPose; 2],
+    ) -> Result<(), GpuError> {
+        let Self { device, queue, renderer, scene, measure, .. } = *self;
+        let &(_, view, _, depth, &msaa, _, _, prepass) = camera;
+        let main = view.retained_view_entity.main_entity;
+        let (settings, size) = (self.settings(view), size(camera));
+        state.set_design(&renderer.0, settings.design);
+        state.measure(measure, device, queue, &renderer.0);
         // Debug views do not show light, so they are not shaded.
         state.is_shaded = settings.debug == DebugView::Color && scene.shade.want(main, &state.drawn);
         let viewport = UVec4::new(view.viewport.x, view.viewport.y, size.x, size.y);
-        state.bindings.set_viewport(viewport, &device, &queue, renderer.0.work());
+        state.bindings.set_viewport(viewport, device, queue, renderer.0.work());
         let instances = state.instances(&scene.captures, &scene.lists);
         let surrounded = instances.iter().any(|instance| instance.capture.has_environment());
         let opaque = opaque_depth(&lens, view, depth, msaa);
         let motion = prepass.filter(|prepass| prepass.motion_vectors.is_some() && lens.distance.is_some());
         let has_motion = motion.is_some();
-        let previous_pose = previous_pose.filter(|_| has_motion);
-        let previous = previous_pose.map(|pose| scene.previous_views(&state.drawn, &pose));
+        let previous = has_motion.then(|| scene.previous_views(&state.drawn, &previous_pose));
         let parameters = ViewParameters {
             // Without depth, an environment map would hide every mesh.
             background: if surrounded && opaque.is_some() { Background::Environment } else { Background::None },
@@ -205,27 +371,23 @@ pub(super) fn prepare_views(
             precision: ColorPrecision::Half,
             previous: previous.as_deref(),
         };
-        let prepared = state.renderer.prepare(device.wgpu_device(), &queue, &renderer.0, &instances, &parameters);
-        if let Err(failure) = prepared {
-            error_once!("captures are not drawn: {failure}");
-            state.drawn.clear();
-        } else if state.renderer.is_short_of_room() {
-            warn_once!(
-                "captures are drawn whole but slowly: a camera has more pairs of splats and tiles than fit on this GPU; draw \
-                 fewer or smaller Gaussians, or a smaller picture"
-            );
-        }
+        state.renderer.prepare(device.wgpu_device(), queue, &renderer.0, &instances, &parameters)?;
         let median = writes_median(&settings, surrounded);
         let written = lens.distance.filter(|_| median.is_some() || has_motion);
-        state.write_depth = written.and(median).map(|median| pipelines.write_depth(msaa, median));
+        let pipelines = &mut *self.pipelines;
+        state.write_depth = written.and(median).and_then(|median| pipelines.write_depth(msaa, median));
         state.write_motion =
-            motion.map(|prepass| pipelines.write_motion(msaa, median.unwrap_or(false), prepass.depth.is_some()));
+            motion.and_then(|prepass| pipelines.write_motion(msaa, median.unwrap_or(false), prepass.depth.is_some()));
         if let Some(distance) = written {
-            state.depth_bindings.set_lens(distance, 1, &device, &queue, renderer.0.work());
+            state.depth_bindings.set_lens(distance, 1, device, queue, renderer.0.work());
         }
+        Ok(())
     }
-    scene.previous.keep(&scene.extracted);
-    publish_statistics(&statistics, &views, &scene.captures);
+}
+
+/// Returns the size of the picture of a camera. Meshes may be drawn at a lower resolution than the camera's, to be scaled up later.
+fn size(&(_, view, .., resolution, _): &CameraItem<'_>) -> UVec2 {
+    resolution.map_or(UVec2::new(view.viewport.z, view.viewport.w), |smaller| smaller.0)
 }
 
 /// Returns whether the depth that a camera requests is the median depth; `None` if it requests no depth.
@@ -250,12 +412,8 @@ fn hides_opacity(debug: DebugView) -> bool {
 /// Returns the lens of a camera; `None` if captures cannot be drawn for it. Each fault is logged once.
 fn drawable_lens(view: &ExtractedView, camera: &ExtractedCamera) -> Option<CameraLens> {
     let fault = CameraFault::of(&view.clip_from_view, camera.compositing_space);
-    // `warn_once!` logs once per statement, so each fault has its own.
-    match fault {
-        Some(CameraFault::Oklab) => warn_once!("{}", CameraFault::Oklab),
-        Some(CameraFault::Projection) => warn_once!("{}", CameraFault::Projection),
-        Some(CameraFault::NearPlane) => warn_once!("{}", CameraFault::NearPlane),
-        None => {}
+    if let Some(fault) = fault {
+        warn_once_each(&fault.to_string());
     }
     CameraLens::of(&view.clip_from_view).filter(|_| fault != Some(CameraFault::Oklab))
 }
@@ -269,8 +427,8 @@ fn opaque_depth<'a>(
 ) -> Option<OpaqueDepth<'a>> {
     // Another plugin may have created the texture.
     if !depth.texture.usage().contains(TextureUsages::TEXTURE_BINDING) {
-        warn_once!(
-            "captures are drawn over meshes: a camera's depth texture cannot be read; add TEXTURE_BINDING to it"
+        warn_once_each(
+            "captures are drawn over meshes: a camera's depth texture cannot be read; add TEXTURE_BINDING to it",
         );
         return None;
     }

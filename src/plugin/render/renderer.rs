@@ -4,6 +4,7 @@
 //! absence in [`CaptureStatistics`].
 
 use super::statistics::CaptureStatistics;
+use crate::renderer::memory::catch_known;
 use crate::renderer::{Renderer, ShaderChecks};
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Commands, Res};
@@ -17,7 +18,8 @@ pub struct CaptureRenderer(pub(crate) Renderer);
 /// Compiles the renderer's pipelines. Shaders check their array indices in debug builds.
 pub(super) fn init_renderer(mut commands: Commands, device: Res<RenderDevice>, statistics: Res<CaptureStatistics>) {
     let checks = if cfg!(debug_assertions) { ShaderChecks::On } else { ShaderChecks::Off };
-    match Renderer::new(device.wgpu_device(), checks) {
+    let device = device.wgpu_device();
+    match catch_known(device, 0, || Renderer::new(device, checks)).flatten() {
         Ok(renderer) => {
             statistics.set_renderer_missing(None);
             commands.insert_resource(CaptureRenderer(renderer.counting(statistics.work())));

@@ -2,21 +2,22 @@
 //!
 //! In: [`GaussianCapture`] and the upload budget of a frame. Out: [`GpuGaussianCapture`] in `RenderAssets`, drawn once it is complete, and
 //! its state in [`Uploads`], which is sent as messages. After a change, the old version is drawn until the new one is complete, and kept if
-//! the GPU rejects the new one.
+//! the GPU rejects the new one: if it refuses a buffer, has no memory for it, or no view could draw the capture.
 
 use super::renderer::CaptureRenderer;
 use super::statistics::CaptureStatistics;
 use crate::plugin::asset::Uploads;
 use crate::plugin::component::GaussianCapture;
-use crate::renderer::{CaptureUpload, GpuCapture};
+use crate::renderer::memory::{Caught, catch, catch_known};
+use crate::renderer::{CaptureUpload, GpuCapture, GpuError, ViewRenderer};
 use crate::scene::{Bounds, Level, RuntimeScene};
-use bevy::asset::{AssetId, AssetServer};
+use bevy::asset::{AssetId, AssetServer, RenderAssetUsages};
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::lifetimeless::SRes;
 use bevy::ecs::system::{Res, ResMut, SystemParamItem};
 use bevy::log::{debug_span, error, warn};
 use bevy::render::Extract;
-use bevy::render::render_asset::{PrepareAssetError, RenderAsset, RenderAssets};
+use bevy::render::render_asset::{AssetExtractionError, PrepareAssetError, RenderAsset, RenderAssets};
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 use std::sync::Arc;
 
@@ -68,9 +69,33 @@ struct NextCapture {
     /// All Gaussians, then each level of detail.
     uploads: Vec<CaptureUpload<Arc<RuntimeScene>>>,
     source: GaussianCapture,
+    /// The errors of its buffers that are not known yet, as in browsers. It is not drawn before they are known.
+    pending: Option<Caught>,
 }
 
 impl NextCapture {
+    /// Creates the buffers, without data.
+    ///
+    /// # Errors
+    /// When the GPU refuses a buffer or has no memory for it, or no view can draw the capture.
+    fn new(device: &wgpu::Device, renderer: &CaptureRenderer, source: GaussianCapture) -> Result<Self, GpuError> {
+        let whole = source.shared_scene();
+        let needed = whole.size() as u64;
+        let levels = whole.levels.iter().map(|level| level.scene.clone()).collect::<Vec<_>>();
+        let upload = |scene| CaptureUpload::new(device, &renderer.0, scene);
+        let create = || std::iter::once(whole).chain(levels).map(upload).collect::<Result<Vec<_>, _>>();
+        let (created, mut caught) = catch(device, needed, create);
+        let uploads = created?;
+        let pending = match caught.poll() {
+            Some(result) => result.map(|()| None)?,
+            None => Some(caught),
+        };
+        // Cameras draw a coarser level of a capture that is small on the screen, so one level is enough.
+        let mut rooms = uploads.iter().map(|upload| ViewRenderer::check_room(device, upload.most_drawn()));
+        rooms.next_back().unwrap_or(Ok(()))?;
+        Ok(Self { uploads, source, pending })
+    }
+
     /// Returns the bytes that have not been uploaded.
     fn bytes_left(&self) -> u64 {
         self.uploads.iter().map(CaptureUpload::bytes_left).sum()
@@ -119,21 +144,41 @@ impl GpuGaussianCapture {
     }
 
     /// Uploads at most `bytes` of the next version, and shows it once it is complete. Returns the number of uploaded bytes.
-    fn advance(&mut self, queue: &RenderQueue, renderer: &CaptureRenderer, bytes: u64) -> u64 {
-        let Some(mut next) = self.next.take() else { return 0 };
-        let mut written = 0;
-        for upload in &mut next.uploads {
-            if written < bytes {
-                written += upload.advance(queue, &renderer.0, bytes - written);
-            }
+    ///
+    /// # Errors
+    /// When the GPU has no memory for the upload, or for buffers created before. The next version is dropped.
+    fn advance(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &RenderQueue,
+        renderer: &CaptureRenderer,
+        bytes: u64,
+    ) -> Result<u64, GpuError> {
+        let Some(mut next) = self.next.take() else { return Ok(0) };
+        if let Some(result) = next.pending.as_mut().and_then(Caught::poll) {
+            next.pending = None;
+            result?;
         }
-        if next.bytes_left() > 0 {
+        let written = catch_known(device, bytes.min(next.bytes_left()), || {
+            let mut written = 0;
+            for upload in &mut next.uploads {
+                if written < bytes {
+                    written += upload.advance(queue, &renderer.0, bytes - written);
+                }
+            }
+            written
+        })?;
+        if next.bytes_left() > 0 || next.pending.is_some() {
             self.next = Some(next);
         } else {
             let levels = next.uploads.into_iter().map(|upload| upload.finish(queue, &renderer.0)).collect();
-            self.shown = Some(Arc::new(ShownCapture { levels, source: next.source }));
+            let mut source = next.source;
+            if source.usages() == RenderAssetUsages::RENDER_WORLD {
+                source.release();
+            }
+            self.shown = Some(Arc::new(ShownCapture { levels, source }));
         }
-        written
+        Ok(written)
     }
 
     /// Returns the bytes that remain to be uploaded; `None` if no upload is in progress.
@@ -148,13 +193,24 @@ impl RenderAsset for GpuGaussianCapture {
     type Param =
         (SRes<RenderDevice>, SRes<AssetServer>, SRes<Uploads>, SRes<CaptureStatistics>, Option<SRes<CaptureRenderer>>);
 
+    fn asset_usage(source: &GaussianCapture) -> RenderAssetUsages {
+        source.usages()
+    }
+
+    fn take_gpu_data(
+        source: &mut GaussianCapture,
+        _previous: Option<&Self>,
+    ) -> Result<GaussianCapture, AssetExtractionError> {
+        source.release().ok_or(AssetExtractionError::AlreadyExtracted)
+    }
+
     fn prepare_asset(
         source: GaussianCapture,
         id: AssetId<GaussianCapture>,
         (device, assets, uploads, statistics, renderer): &mut SystemParamItem<Self::Param>,
         previous: Option<&Self>,
     ) -> Result<Self, PrepareAssetError<GaussianCapture>> {
-        let name = || assets.get_path(id).map_or_else(|| format!("{id}"), |path| path.to_string());
+        let name = || name(assets, id);
         let shown = previous.and_then(|previous| previous.shown.clone());
         uploads.begin(id, shown.is_some());
         let Some(renderer) = renderer else {
@@ -170,16 +226,10 @@ impl RenderAsset for GpuGaussianCapture {
                 name()
             );
         }
-        let whole = source.shared_scene();
-        let levels = whole.levels.iter().map(|level| level.scene.clone());
-        let upload = |scene| CaptureUpload::new(device.wgpu_device(), &renderer.0, scene);
-        let begun: Result<Vec<_>, _> = std::iter::once(whole.clone()).chain(levels).map(upload).collect();
-        let next = match begun {
-            Ok(uploads) => Some(NextCapture { uploads, source }),
+        let next = match NextCapture::new(device.wgpu_device(), renderer, source) {
+            Ok(next) => Some(next),
             Err(failure) => {
-                let failure = format!("{}: not drawn: {failure}", name());
-                error!("{failure}");
-                uploads.fail(id, failure);
+                report(uploads, id, &name(), &failure);
                 None
             }
         };
@@ -189,6 +239,18 @@ impl RenderAsset for GpuGaussianCapture {
     fn unload_asset(id: AssetId<GaussianCapture>, (_, _, uploads, ..): &mut SystemParamItem<Self::Param>) {
         uploads.forget(id);
     }
+}
+
+/// Returns the path of a capture, or its identifier if it was not loaded from a file.
+fn name(assets: &AssetServer, id: AssetId<GaussianCapture>) -> String {
+    assets.get_path(id).map_or_else(|| format!("{id}"), |path| path.to_string())
+}
+
+/// Logs and reports a failed upload.
+fn report(uploads: &Uploads, id: AssetId<GaussianCapture>, name: &str, failure: &GpuError) {
+    let failure = format!("{name}: not drawn: {failure}");
+    error!("{failure}");
+    uploads.fail(id, failure);
 }
 
 /// Copies the budget to the render world.
@@ -206,9 +268,11 @@ pub(super) fn any_uploading(captures: Res<RenderAssets<GpuGaussianCapture>>) -> 
 
 /// Continues the uploads within the budget. Captures with the fewest remaining bytes come first, so that a capture shows soon.
 pub(super) fn continue_uploads(
+    device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
     renderer: Option<Res<CaptureRenderer>>,
     budget: Res<CaptureUploadBudget>,
+    assets: Res<AssetServer>,
     uploads: Res<Uploads>,
     mut captures: ResMut<RenderAssets<GpuGaussianCapture>>,
 ) {
@@ -221,9 +285,14 @@ pub(super) fn continue_uploads(
         if left == 0 {
             break;
         }
-        left = left.saturating_sub(capture.advance(&queue, &renderer, left));
-        if capture.next.is_none() {
-            uploads.finish(id);
+        match capture.advance(device.wgpu_device(), &queue, &renderer, left) {
+            Ok(written) => {
+                left = left.saturating_sub(written);
+                if capture.next.is_none() {
+                    uploads.finish(id);
+                }
+            }
+            Err(failure) => report(&uploads, id, &name(&assets, id), &failure),
         }
     }
 }

@@ -121,7 +121,7 @@ impl WriteDepthBindings {
         work: &WorkCounters,
     ) -> Option<&BindGroup> {
         let lens = &self.lens;
-        self.group.of([colors, depths], work, || {
+        self.group.of(device, [colors, depths], work, || {
             let layout = cache.get_bind_group_layout(&pipeline.layout);
             let entries = BindGroupEntries::sequential((colors, depths, viewport, lens.binding()?));
             Some(device.create_bind_group("gs4d write_depth", &layout, &entries))

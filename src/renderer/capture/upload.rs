@@ -37,6 +37,11 @@ impl<S: Borrow<RuntimeScene>> CaptureUpload<S> {
         self.fillings.iter().map(Filling::bytes_left).sum()
     }
 
+    /// Returns the largest number of Gaussians that the capture draws at any time, if its temporal filter is used.
+    pub fn most_drawn(&self) -> usize {
+        self.capture.filter.as_ref().map_or(self.capture.len(), |filter| filter.most as usize)
+    }
+
     /// Uploads at most `bytes` of the remaining bytes, but at least the record of one Gaussian. Returns the number of bytes uploaded: 0 if the
     /// capture was complete.
     pub fn advance(&mut self, queue: &wgpu::Queue, renderer: &Renderer, bytes: u64) -> u64 {

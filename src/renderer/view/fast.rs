@@ -87,9 +87,11 @@ impl ViewRenderer {
         mark(timer, pass);
 
         // colors
-        let groups = |storage, count: u32| count.div_ceil(colors_of_group(storage)).min(COLOR_GROUPS);
-        let pipeline = |storage, batched| renderer.colors(storage, batched);
-        self.project(pipeline, renderer, &fast.colors[odd], groups, pass, instances);
+        if self.has_colors {
+            let groups = |storage, count: u32| count.div_ceil(colors_of_group(storage)).min(COLOR_GROUPS);
+            let pipeline = |storage, batched| renderer.colors(storage, batched);
+            self.project(pipeline, renderer, &fast.colors[odd], groups, pass, instances);
+        }
         mark(timer, pass);
 
         // blend_blocks

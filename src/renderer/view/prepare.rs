@@ -15,7 +15,7 @@ use crate::renderer::layout::{self, BLOCK, Counters};
 use crate::renderer::memory::{binding_limit, require_texture};
 use crate::renderer::pipelines::Renderer;
 use crate::renderer::shaders::{FastVariant, Lists, Pixels};
-use crate::renderer::timing::PassTime;
+use crate::renderer::timing::{PassTime, PassTimer, WHOLE_FRAME};
 use crate::view::DebugView;
 use glam::UVec2;
 
@@ -23,7 +23,27 @@ use glam::UVec2;
 const OVERSIZE_FACTOR: u32 = 4;
 const RELEASE_AFTER_IDLE_FRAMES: u32 = 120;
 
+/// Checks that a view with this design can draw so many Gaussians.
+fn check_slots(limits: &wgpu::Limits, design: Design, slots: usize) -> Result<(), GpuError> {
+    let splat = size_of::<layout::SplatRecord>() as u64;
+    let limit = match design {
+        Design::Reference => binding_limit(limits),
+        Design::Auto | Design::Fast => binding_limit(limits).min(u64::from(bins::MAX_SLOTS) * splat),
+    };
+    // The buffer of splats has the largest elements per slot.
+    let needed = (slots as u64).next_multiple_of(u64::from(BLOCK)) * splat;
+    if needed > limit { Err(GpuError::TooLarge { what: "the splats", needed, limit }) } else { Ok(()) }
+}
+
 impl ViewRenderer {
+    /// Checks that a view can draw a capture that draws at most so many Gaussians at any time, in the design with the higher limit.
+    ///
+    /// # Errors
+    /// When the buffer of its splats would be larger than the device can bind.
+    pub fn check_room(device: &wgpu::Device, most_drawn: usize) -> Result<(), GpuError> {
+        check_slots(&device.limits(), Design::Reference, most_drawn)
+    }
+
     /// Sizes the buffers for the instances and for the pairs that earlier frames counted, and writes the uniforms. Call
     /// it before the queue is submitted. In the steady state it creates no resources.
     ///
@@ -73,16 +93,7 @@ impl ViewRenderer {
         let limits = device.limits();
         require_texture(picture, &limits)?;
         let parts: usize = instances.iter().map(|instance| instance.capture.parts.len()).sum();
-        let splat = size_of::<layout::SplatRecord>() as u64;
-        let limit = match self.design {
-            Design::Reference => binding_limit(&limits),
-            Design::Auto | Design::Fast => binding_limit(&limits).min(u64::from(bins::MAX_SLOTS) * splat),
-        };
-        // The buffer of splats has the largest elements per slot.
-        let needed = (slots as u64).next_multiple_of(u64::from(BLOCK)) * splat;
-        if needed > limit {
-            return Err(GpuError::TooLarge { what: "the splats", needed, limit });
-        }
+        check_slots(&limits, self.design, slots)?;
         let slots = slots as u32;
         // A first guess; the counters of later frames correct it.
         let guess = total.saturating_mul(2).min(slots.saturating_mul(6)).max(1 << 16);
@@ -160,8 +171,9 @@ impl ViewRenderer {
                 self.motion = Some(motion);
             }
         }
-        // Frames with motions have more timed passes.
-        if self.timing.as_ref().is_some_and(|(timer, _)| timer.passes() != self.timed_passes()) {
+        // Frames with motions have more timed passes. A frame timed as a whole has none.
+        let stale = |timer: &PassTimer| !timer.passes().is_empty() && timer.passes() != self.timed_passes();
+        if self.timing.as_ref().is_some_and(|(timer, _)| stale(timer)) {
             self.measure(device, queue, renderer, false);
             self.measure(device, queue, renderer, true);
         }
@@ -208,7 +220,8 @@ impl ViewRenderer {
         if let Some((timer, readback)) = &mut self.timing
             && let Some(timestamps) = readback.poll()
         {
-            let named = timer.passes().iter().zip(timer.intervals(&timestamps));
+            let names = if timer.passes().is_empty() { WHOLE_FRAME } else { timer.passes() };
+            let named = names.iter().zip(timer.intervals(&timestamps));
             self.statistics.passes = named.map(|(&name, milliseconds)| PassTime { name, milliseconds }).collect();
         }
     }

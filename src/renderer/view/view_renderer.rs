@@ -47,6 +47,8 @@ pub struct ViewRenderer {
     /// Number of bins that the frame recorded last has cleared for the next frame.
     pub(super) cleared_bins: u32,
     pub(super) has_depths: bool,
+    /// Whether colors of splats are computed.
+    pub(super) has_colors: bool,
     /// Number of pairs that earlier frames need, and whether a frame exceeded the limits of the device.
     pub(super) pairs_wanted: u32,
     pub(super) short_of_room: bool,
@@ -132,6 +134,7 @@ impl ViewRenderer {
             fullest_bin: 0,
             cleared_bins: 0,
             has_depths: true,
+            has_colors: true,
             resources: None,
             motion: None,
         }
@@ -159,16 +162,16 @@ impl ViewRenderer {
         self.motion.as_ref().map(|motion| &motion.view)
     }
 
-    /// Sets whether GPU time is measured from the next frame on, pass by pass. Results arrive in
-    /// [`statistics`](Self::statistics) some frames later; there are none if the device has no timestamps inside
-    /// passes.
+    /// Sets whether GPU time is measured from the next frame on, pass by pass, or for the frame as a whole if the device has no timestamps
+    /// inside passes. Results arrive in [`statistics`](Self::statistics) some frames later; there are none if the device has no timestamps.
     pub fn measure(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, renderer: &Renderer, on: bool) {
         if !on {
             self.timing = None;
             self.statistics.passes.clear();
         } else if self.timing.is_none() {
             let allocator = renderer.allocator(device);
-            self.timing = PassTimer::new(allocator, queue, self.timed_passes()).map(|timer| {
+            let by_pass = PassTimer::new(allocator, queue, self.timed_passes());
+            self.timing = by_pass.or_else(|| PassTimer::new(allocator, queue, &[])).map(|timer| {
                 let size = timer.resolved().size();
                 (timer, Readback::new(allocator, "gs4d timestamp readback", size))
             });
@@ -189,6 +192,12 @@ impl ViewRenderer {
             self.timing = None;
             self.free();
         }
+    }
+
+    /// Makes the fast design leave out the colors of splats, for clients that read depths alone. Transmittance and depths do not change;
+    /// colors are undefined. The reference design computes colors together with the splats, and still does.
+    pub fn without_colors(self) -> Self {
+        Self { has_colors: false, ..self }
     }
 
     /// Returns the design with which the view is drawn: never [`Design::Auto`]. Frames that the fast design cannot draw are drawn with

@@ -7,13 +7,13 @@ use super::extract::{ExtractedContactShadows, any_contact_shadow, any_extracted,
 use super::pipeline::{ContactShadowPipeline, ContactShadowShader};
 use super::prepare::{ContactShadowViews, any_view, prepare_contact_shadows};
 use crate::plugin::render::CaptureSystems;
+use crate::plugin::render::checked_pipelines::CheckedPipelines;
 use bevy::app::{App, Plugin};
 use bevy::asset::Assets;
 use bevy::core_pipeline::core_3d::{main_opaque_pass_3d, main_transparent_pass_3d};
 use bevy::core_pipeline::schedule::{Core3d, Core3dSystems};
 use bevy::ecs::schedule::{IntoScheduleConfigs, SystemCondition};
 use bevy::pbr::main_transmissive_pass_3d;
-use bevy::render::render_resource::SpecializedRenderPipelines;
 use bevy::render::{ExtractSchedule, GpuResourceAppExt, Render, RenderApp, RenderSystems};
 use bevy::shader::Shader;
 
@@ -35,7 +35,7 @@ impl Plugin for ContactShadowPlugin {
             .init_resource::<ExtractedContactShadows>()
             // Created again after a lost device: these resources hold all GPU objects.
             .init_gpu_resource::<ContactShadowPipeline>()
-            .init_gpu_resource::<SpecializedRenderPipelines<ContactShadowPipeline>>()
+            .init_gpu_resource::<CheckedPipelines<ContactShadowPipeline>>()
             .init_gpu_resource::<ContactShadowViews>()
             .add_systems(ExtractSchedule, extract_contact_shadows.run_if(any_contact_shadow.or_else(any_extracted)))
             .add_systems(

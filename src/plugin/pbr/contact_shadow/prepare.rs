@@ -5,6 +5,8 @@
 
 use super::extract::{ExtractedContactShadows, PlacedShadow};
 use super::pipeline::{ContactShadowKey, ContactShadowPipeline, GpuEllipse};
+use crate::plugin::render::checked_pipelines::CheckedPipelines;
+use crate::plugin::render::kept::created;
 use bevy::camera::Camera3d;
 use bevy::camera::visibility::RenderLayers;
 use bevy::color::Alpha;
@@ -15,9 +17,7 @@ use bevy::ecs::system::{Query, Res, ResMut};
 use bevy::log::debug_span;
 use bevy::pbr::{DistanceFog, FogFalloff};
 use bevy::platform::collections::HashMap;
-use bevy::render::render_resource::{
-    BufferUsages, CachedRenderPipelineId, PipelineCache, RawBufferVec, SpecializedRenderPipelines,
-};
+use bevy::render::render_resource::{BufferUsages, CachedRenderPipelineId, PipelineCache, RawBufferVec};
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 use bevy::render::view::{ExtractedView, Msaa};
 use glam::{Mat4, Vec3};
@@ -56,7 +56,7 @@ pub(super) fn prepare_contact_shadows(
     shadows: Res<ExtractedContactShadows>,
     pipeline: Res<ContactShadowPipeline>,
     cache: Res<PipelineCache>,
-    mut pipelines: ResMut<SpecializedRenderPipelines<ContactShadowPipeline>>,
+    mut pipelines: ResMut<CheckedPipelines<ContactShadowPipeline>>,
     mut views: ResMut<ContactShadowViews>,
     cameras: Query<(Entity, &ExtractedView, &Msaa, Option<&RenderLayers>, Option<&DistanceFog>), With<Camera3d>>,
 ) {
@@ -79,10 +79,12 @@ pub(super) fn prepare_contact_shadows(
         }
         let key =
             ContactShadowKey { format: view.target_format, samples: msaa.samples(), mirrored: view.invert_culling };
-        let pipeline = pipelines.specialize(&cache, &pipeline, key);
+        let Some(pipeline) = pipelines.specialize(&device, &cache, &pipeline, key) else { continue };
         views.cameras.insert(entity, ContactShadowView { pipeline, ellipses });
     }
-    views.ellipses.write_buffer(&device, &queue);
+    if created(&device, || views.ellipses.write_buffer(&device, &queue)).is_none() {
+        *views = ContactShadowViews::default();
+    }
 }
 
 /// Returns a contact shadow in a camera's clip space, attenuated by fog.

@@ -8,8 +8,9 @@ use super::pipeline::{FORMAT, ShadePipeline};
 use super::uniform::GpuSettings;
 use crate::plugin::render::CaptureStatistics;
 use crate::plugin::render::capture_views::{CaptureView, CaptureViews};
+use crate::plugin::render::checked_pipelines::CheckedPipelines;
 use crate::plugin::render::extract::ExtractedViewSettings;
-use crate::plugin::render::kept::KeptUniform;
+use crate::plugin::render::kept::{KeptUniform, created};
 use crate::plugin::render::shade_requests::ShadeRequests;
 use crate::renderer::WorkCounters;
 use crate::view::BlendSpace;
@@ -24,7 +25,7 @@ use bevy::platform::collections::HashMap;
 use bevy::render::diagnostic::RecordDiagnostics;
 use bevy::render::render_resource::{
     BindGroup, BindGroupEntries, CachedRenderPipelineId, Operations, PipelineCache, RenderPassColorAttachment,
-    RenderPassDescriptor, SpecializedRenderPipelines,
+    RenderPassDescriptor,
 };
 use bevy::render::renderer::{RenderContext, RenderDevice, RenderQueue, ViewQuery};
 use bevy::render::view::ExtractedView;
@@ -45,7 +46,8 @@ pub(super) fn any_request(requests: Res<ShadeRequests>, shades: Res<ShadeViews>)
 
 /// State of one camera.
 struct ShadeView {
-    pipeline: CachedRenderPipelineId,
+    /// `None` if the GPU refuses the pipeline. Captures are drawn unshaded then.
+    pipeline: Option<CachedRenderPipelineId>,
     settings: KeptUniform<GpuSettings>,
     /// Absent until captures are shaded.
     targets: Option<Targets>,
@@ -61,11 +63,12 @@ struct Targets {
 
 /// Requests the pipeline of every camera that may need one, even without captures, so that it is compiled while captures load.
 pub(super) fn prepare_shade(
+    device: Res<RenderDevice>,
     pipeline: Option<Res<ShadePipeline>>,
     keys: Option<Res<ViewKeyCache>>,
     cache: Res<PipelineCache>,
     requests: Res<ShadeRequests>,
-    mut pipelines: ResMut<SpecializedRenderPipelines<ShadePipeline>>,
+    mut pipelines: ResMut<CheckedPipelines<ShadePipeline>>,
     mut shades: ResMut<ShadeViews>,
     cameras: Query<(Entity, &ExtractedView), With<Camera3d>>,
 ) {
@@ -76,7 +79,7 @@ pub(super) fn prepare_shade(
     shades.0.retain(|&camera, _| cameras.get(camera).is_ok_and(|(_, view)| may_need(view)));
     for (entity, view) in cameras.iter().filter(|(_, view)| may_need(view)) {
         let Some(&key) = keys.get(&view.retained_view_entity) else { continue };
-        let pipeline = pipelines.specialize(&cache, &pipeline, key);
+        let pipeline = pipelines.specialize(&device, &cache, &pipeline, key);
         let new = || ShadeView { pipeline, settings: KeptUniform::default(), targets: None };
         shades.0.entry(entity).or_insert_with(new).pipeline = pipeline;
     }
@@ -110,7 +113,7 @@ pub(super) fn shade_captures(
         shade.targets = None;
         return;
     }
-    let Some(pipeline) = shading.cache.get_render_pipeline(shade.pipeline) else { return };
+    let Some(pipeline) = shade.pipeline.and_then(|id| shading.cache.get_render_pipeline(id)) else { return };
     let main = bevy_view.retained_view_entity.main_entity;
     let blend_space = shading.view_settings.0.get(&main).copied().unwrap_or_default().blend_space;
     let Some(settings) = shading.settings(view, blend_space) else { return };
@@ -151,19 +154,27 @@ impl Shading<'_> {
     }
 
     /// Writes the shading settings of a view if they have changed, and returns the shaded picture, which is created again if the captures'
-    /// picture has changed.
+    /// picture has changed; `None` if the GPU has no memory for it.
     fn targets<'a>(&self, shade: &'a mut ShadeView, view: &CaptureView, settings: GpuSettings) -> Option<&'a Targets> {
         let (colors, depths) = (view.renderer.color()?, view.renderer.depth()?);
         let work = self.statistics.work();
-        shade.settings.set(settings, &self.device, &self.queue, &work);
-        if shade.targets.as_ref().is_none_or(|known| known.colors != *colors || known.depths != *depths) {
-            let layout = self.cache.get_bind_group_layout(&self.pipeline.as_ref()?.layout);
-            let entries = BindGroupEntries::sequential((colors, depths, shade.settings.binding()?));
-            let group = self.device.create_bind_group("gs4d shade", &layout, &entries);
-            work.add_created();
-            let shaded = self.picture(colors, &work);
-            shade.targets = Some(Targets { colors: colors.clone(), depths: depths.clone(), shaded, group });
-        }
+        created(&self.device, || {
+            shade.settings.set(settings, &self.device, &self.queue, &work);
+            if shade.targets.as_ref().is_none_or(|known| known.colors != *colors || known.depths != *depths) {
+                let layout = self.cache.get_bind_group_layout(&self.pipeline.as_ref()?.layout);
+                let entries = BindGroupEntries::sequential((colors, depths, shade.settings.binding()?));
+                let group = self.device.create_bind_group("gs4d shade", &layout, &entries);
+                work.add_created();
+                let shaded = self.picture(colors, &work);
+                shade.targets = Some(Targets { colors: colors.clone(), depths: depths.clone(), shaded, group });
+            }
+            Some(())
+        })
+        .or_else(|| {
+            // They are created again in the next frame.
+            shade.targets = None;
+            None
+        })??;
         shade.targets.as_ref()
     }
 

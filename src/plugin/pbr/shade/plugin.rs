@@ -7,12 +7,12 @@ use super::draw::{ShadeViews, any_request, any_shade_view, prepare_shade, shade_
 use super::extract::{ExtractedShading, any_shading, extract_shading};
 use super::pipeline::{ShadePipeline, ShadeShader, init_shade_pipeline};
 use crate::plugin::render::CaptureSystems;
+use crate::plugin::render::checked_pipelines::CheckedPipelines;
 use bevy::app::{App, Plugin};
 use bevy::asset::Assets;
 use bevy::core_pipeline::schedule::Core3d;
 use bevy::ecs::schedule::IntoScheduleConfigs;
 use bevy::pbr::MeshPipelineSystems;
-use bevy::render::render_resource::SpecializedRenderPipelines;
 use bevy::render::{ExtractSchedule, GpuResourceAppExt, Render, RenderApp, RenderStartup, RenderSystems};
 use bevy::shader::Shader;
 
@@ -33,7 +33,7 @@ impl Plugin for ShadePlugin {
             .insert_resource(shader)
             .init_resource::<ExtractedShading>()
             // Created again after a lost device: these resources hold all GPU objects.
-            .init_gpu_resource::<SpecializedRenderPipelines<ShadePipeline>>()
+            .init_gpu_resource::<CheckedPipelines<ShadePipeline>>()
             .init_gpu_resource::<ShadeViews>()
             .add_systems(RenderStartup, init_shade_pipeline.after(MeshPipelineSystems))
             .add_systems(ExtractSchedule, extract_shading.run_if(any_shading))

@@ -53,7 +53,7 @@ impl Casting<'_> {
     fn cast(&mut self, map: &ShadowView, view: &ExtractedView, context: &mut RenderContext) {
         let Some(renderer) = &self.renderer else { return };
         let Some(state) = self.views.0.get_mut(&view.retained_view_entity) else { return };
-        let Some(pipeline) = self.cache.get_render_pipeline(state.write_depth) else { return };
+        let Some(pipeline) = state.write_depth.and_then(|id| self.cache.get_render_pipeline(id)) else { return };
         if state.drawn.is_empty() {
             return;
         }

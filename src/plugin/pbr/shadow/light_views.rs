@@ -28,7 +28,8 @@ pub(super) struct LightView {
     /// Corner (0) and size of the map.
     pub(super) viewport: KeptUniform<UVec4>,
     pub(super) depth_bindings: WriteDepthBindings,
-    pub(super) write_depth: CachedRenderPipelineId,
+    /// `None` if the GPU refuses the pipeline. Nothing is drawn then.
+    pub(super) write_depth: Option<CachedRenderPipelineId>,
     /// The captures in the view this frame; nothing is drawn while this is empty.
     pub(super) drawn: Vec<Drawn>,
     /// Whether Bevy draws the view this frame.
@@ -37,9 +38,10 @@ pub(super) struct LightView {
 }
 
 impl LightView {
-    pub(super) fn new(device: &RenderDevice, renderer: &Renderer, write_depth: CachedRenderPipelineId) -> Self {
+    pub(super) fn new(device: &RenderDevice, renderer: &Renderer, write_depth: Option<CachedRenderPipelineId>) -> Self {
         Self {
-            renderer: ViewRenderer::new(device.wgpu_device(), renderer),
+            // Shadow maps have depths alone.
+            renderer: ViewRenderer::new(device.wgpu_device(), renderer).without_colors(),
             viewport: KeptUniform::default(),
             depth_bindings: WriteDepthBindings::default(),
             write_depth,
@@ -53,6 +55,12 @@ impl LightView {
     pub(super) fn set_map(&mut self, size: UVec2, device: &RenderDevice, queue: &RenderQueue, work: &WorkCounters) {
         let viewport = UVec4::new(0, 0, size.x, size.y);
         self.viewport.set(viewport, device, queue, work);
+    }
+
+    /// Returns whether the state is dropped: Bevy has not drawn the view for many frames. A light or a camera that is switched off for a
+    /// frame keeps it.
+    pub(super) fn is_over(&self) -> bool {
+        !self.live && self.idle.is_over()
     }
 
     /// Counts a frame, with or without a capture in the view. After many frames without one, releases the GPU memory.

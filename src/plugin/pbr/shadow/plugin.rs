@@ -6,11 +6,13 @@ use super::draw::{cast_cascades, cast_shared};
 use super::extract::{ExtractedCasters, any_caster, any_casts, extract_casters};
 use super::light_views::{LightViews, any_light_view};
 use super::prepare::prepare_light_views;
+use crate::plugin::render::rests::Rests;
 use crate::plugin::render::{ExtractedCaptures, extract_captures};
 use bevy::app::{App, Plugin};
 use bevy::core_pipeline::schedule::{Core3d, Core3dSystems};
 use bevy::ecs::schedule::{IntoScheduleConfigs, SystemCondition};
 use bevy::pbr::{LATE_SHADOW_PASS, PbrPlugin, per_view_shadow_pass, shared_shadow_pass};
+use bevy::render::view::RetainedViewEntity;
 use bevy::render::{ExtractSchedule, GpuResourceAppExt, Render, RenderApp, RenderSystems};
 
 /// Lets captures cast shadows. Part of [`GaussianCapturePlugin`](crate::GaussianCapturePlugin).
@@ -27,6 +29,7 @@ impl Plugin for CaptureShadowPlugin {
         render_app
             .init_resource::<ExtractedCasters>()
             .init_gpu_resource::<LightViews>()
+            .init_gpu_resource::<Rests<RetainedViewEntity>>()
             .add_systems(ExtractSchedule, extract_casters.run_if(any_casts.or_else(any_caster)).after(extract_captures))
             .add_systems(
                 Render,

@@ -7,23 +7,27 @@ use super::casts::ShadowResolution;
 use super::extract::{Caster, ExtractedCasters};
 use super::light_lens::LightLens;
 use super::light_views::{LightView, LightViews};
+use crate::plugin::render::checked_pipelines::CheckedPipelines;
+use crate::plugin::render::logged::{error_once_each, warn_once_each};
+use crate::plugin::render::rests::Rests;
 use crate::plugin::render::{
     ActiveLists, CaptureRenderer, Drawn, ExtractedCaptures, GpuGaussianCapture, WriteDepthKey, WriteDepthPipeline,
     group_copies,
 };
-use crate::renderer::{ColorPrecision, Instance, ViewParameters};
+use crate::renderer::memory::catch_known;
+use crate::renderer::{ColorPrecision, GpuError, Instance, ViewParameters};
 use crate::view::{Background, BlendSpace, DebugView};
 use bevy::camera::primitives::Frustum;
 use bevy::camera::visibility::RenderLayers;
 use bevy::ecs::query::With;
 use bevy::ecs::system::{Query, Res, ResMut, SystemParam};
-use bevy::log::{debug_span, error_once};
+use bevy::log::debug_span;
 use bevy::pbr::{Shadow, ShadowView};
 use bevy::render::render_asset::RenderAssets;
 use bevy::render::render_phase::ViewBinnedRenderPhases;
-use bevy::render::render_resource::{PipelineCache, SpecializedRenderPipelines};
+use bevy::render::render_resource::PipelineCache;
 use bevy::render::renderer::{RenderDevice, RenderQueue};
-use bevy::render::view::ExtractedView;
+use bevy::render::view::{ExtractedView, RetainedViewEntity};
 use glam::UVec2;
 
 /// The parameters of drawing captures for a shadow: only depths are used.
@@ -78,54 +82,92 @@ pub(super) fn prepare_light_views(
     casters: Casters,
     cache: Res<PipelineCache>,
     write_depth: Res<WriteDepthPipeline>,
-    mut depth_writers: ResMut<SpecializedRenderPipelines<WriteDepthPipeline>>,
+    mut depth_writers: ResMut<CheckedPipelines<WriteDepthPipeline>>,
     phases: Res<ViewBinnedRenderPhases<Shadow>>,
     mut views: ResMut<LightViews>,
+    mut rests: ResMut<Rests<RetainedViewEntity>>,
     lights: Query<(&ExtractedView, &Frustum, Option<&RenderLayers>), With<ShadowView>>,
 ) {
     let _span = debug_span!("gs4d/shadows").entered();
     let Some(renderer) = renderer else { return };
+    rests.count_frame();
     for state in views.0.values_mut() {
         state.live = false;
     }
     for (light, frustum, layers) in &lights {
         let key = light.retained_view_entity;
-        if !phases.contains_key(&key) {
+        if !phases.contains_key(&key) || rests.contains(&key) {
             continue;
         }
         let within = casters.within(frustum, layers.unwrap_or_default());
         if within.is_empty() && !views.0.contains_key(&key) {
             continue;
         }
-        let state = views.0.entry(key).or_insert_with(|| {
-            let key = WriteDepthKey { samples: 1, median: true };
-            let pipeline = depth_writers.specialize(&cache, &write_depth, key);
-            LightView::new(&device, &renderer.0, pipeline)
+        let prepared = catch_known(device.wgpu_device(), 0, || {
+            let state = views.0.entry(key).or_insert_with(|| {
+                let key = WriteDepthKey { samples: 1, median: true };
+                let pipeline = depth_writers.specialize(&device, &cache, &write_depth, key);
+                LightView::new(&device, &renderer.0, pipeline)
+            });
+            prepare_light_view(state, light, &within, &casters, (&*device, &*queue, &*renderer))
         });
-        state.live = true;
-        state.drawn.clear();
-        let map = UVec2::new(light.viewport.z, light.viewport.w);
-        let scale = scale(map, within.iter().map(|caster| caster.settings.resolution));
-        let boxes = within.iter().map(|caster| (&caster.bounds, caster.world_from_capture));
-        let lens = LightLens::of(&light.clip_from_view, light.world_from_view.affine(), boxes);
-        if let Some(lens) = &lens {
-            let drawn = within.iter().filter_map(|caster| casters.drawn(caster, lens, map / scale));
-            state.drawn.extend(drawn);
-            group_copies(&mut state.drawn);
-        }
-        state.count_idle_frames();
-        let Some(lens) = lens.filter(|_| !state.drawn.is_empty()) else { continue };
-        state.set_map(map, &device, &queue, renderer.0.work());
-        state.depth_bindings.set_lens(lens.distance, scale, &device, &queue, renderer.0.work());
-        let instances: Vec<Instance> =
-            state.drawn.iter().filter_map(|drawn| drawn.instance(&casters.captures, &casters.lists)).collect();
-        let prepared = state.renderer.prepare(device.wgpu_device(), &queue, &renderer.0, &instances, &PARAMETERS);
-        if let Err(failure) = prepared {
-            error_once!("captures cast no shadows: {failure}");
-            state.drawn.clear();
-        }
+        let failure = match prepared {
+            Ok(Ok(())) => continue,
+            Ok(Err(failure)) if !failure.is_of_device() => failure,
+            Ok(Err(failure)) | Err(failure) => {
+                // Its objects are invalid.
+                views.0.remove(&key);
+                rests.begin(key);
+                failure
+            }
+        };
+        error_once_each(&format!("captures cast no shadows: {failure}"));
     }
-    views.0.retain(|_, state| state.live);
+    for state in views.0.values_mut().filter(|state| !state.live) {
+        state.drawn.clear();
+        state.count_idle_frames();
+    }
+    views.0.retain(|_, state| !state.is_over());
+}
+
+/// Prepares one view of a light.
+///
+/// # Errors
+/// When there is no room for the captures in the view. None is drawn then.
+fn prepare_light_view(
+    state: &mut LightView,
+    light: &ExtractedView,
+    within: &[&Caster],
+    casters: &Casters,
+    (device, queue, renderer): (&RenderDevice, &RenderQueue, &CaptureRenderer),
+) -> Result<(), GpuError> {
+    state.live = true;
+    state.drawn.clear();
+    let map = UVec2::new(light.viewport.z, light.viewport.w);
+    let scale = scale(map, within.iter().map(|caster| caster.settings.resolution));
+    let boxes = within.iter().map(|caster| (&caster.bounds, caster.world_from_capture));
+    let lens = LightLens::of(&light.clip_from_view, light.world_from_view.affine(), boxes);
+    if let Some(lens) = &lens {
+        let drawn = within.iter().filter_map(|caster| casters.drawn(caster, lens, map / scale));
+        state.drawn.extend(drawn);
+        group_copies(&mut state.drawn);
+    }
+    state.count_idle_frames();
+    let Some(lens) = lens.filter(|_| !state.drawn.is_empty()) else { return Ok(()) };
+    state.set_map(map, device, queue, renderer.0.work());
+    state.depth_bindings.set_lens(lens.distance, scale, device, queue, renderer.0.work());
+    let instances: Vec<Instance> =
+        state.drawn.iter().filter_map(|drawn| drawn.instance(&casters.captures, &casters.lists)).collect();
+    let prepared = state.renderer.prepare(device.wgpu_device(), queue, &renderer.0, &instances, &PARAMETERS);
+    if prepared.is_err() {
+        state.drawn.clear();
+    } else if state.renderer.is_short_of_room() {
+        warn_once_each(
+            "shadows of captures are drawn whole but slowly: a view of a light has more pairs of splats and tiles than fit on this GPU; \
+             let fewer captures cast shadows, or cast them at a lower CastsShadows::resolution",
+        );
+    }
+    prepared
 }
 
 /// Returns the side of a pixel in texels for the finest of the resolutions, reduced until it divides the size of the map.
