@@ -15,6 +15,10 @@ use crate::scene::RuntimeScene;
 use crate::view::{Appearance, Camera, RasterFov, View};
 use glam::{UVec2, Vec3};
 
+#[cfg_attr(
+    all(feature = "cli", feature = "viewer"),
+    expect(unreachable_pub, reason = "the integration tests include the same file")
+)]
 #[path = "../../../tests/support/skip.rs"]
 mod skip;
 
