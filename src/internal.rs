@@ -197,3 +197,9 @@ pub mod offline {
         pub use crate::offline::temporal_filter::*;
     }
 }
+
+/// Of the plugin.
+#[cfg(feature = "bevy")]
+pub mod plugin {
+    pub use crate::plugin::render::checked_pipelines::CheckedPipelines;
+}

@@ -8,7 +8,7 @@ use super::fine_tune::{FineTuned, TrainerError};
 use super::metrics::SizeMismatch;
 use super::picture_file::PictureError;
 use super::quantize::CompressError;
-use super::score::ScoreError;
+use super::score::{INTERRUPTED, ScoreError};
 use crate::codec::CodecError;
 use crate::codec::package::PackageError;
 use crate::gaussian::InvalidGaussian;
@@ -16,9 +16,6 @@ use crate::renderer::GpuError;
 use glam::UVec2;
 use std::error::Error;
 use std::path::{Path, PathBuf};
-
-/// The message of work that the user has interrupted.
-pub(super) const INTERRUPTED: &str = "interrupted";
 
 /// An error of the offline half.
 #[derive(Debug, thiserror::Error)]
