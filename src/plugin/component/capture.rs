@@ -56,7 +56,7 @@ impl GaussianCapture {
         let mut extents = Extents::of(capture.scene.len());
         let gaussians = capture.scene.iter().inspect(|gaussian| extents.add(gaussian));
         capture.bounds = BoundsOverTime::of(gaussians, shown).map(Arc::new);
-        capture.extent = extents.median();
+        capture.extent = extents.upper_quartile();
         capture
     }
 
@@ -156,7 +156,7 @@ const SAMPLES: usize = 4096;
 struct Extents {
     stride: usize,
     count: usize,
-    /// Extent and weight of each sample.
+    /// Extent and opacity of each sample.
     samples: Vec<(f32, f32)>,
 }
 
@@ -170,22 +170,22 @@ impl Extents {
         if self.count.is_multiple_of(self.stride) && gaussian.check().is_ok() {
             let [xx, _, _, yy, _, zz] = gaussian.covariance;
             let extent = Vec3::new(xx, yy, zz).max_element().max(0.0).sqrt();
-            self.samples.push((extent, extent * gaussian.opacity));
+            self.samples.push((extent, gaussian.opacity));
         }
         self.count += 1;
     }
 
-    /// Returns the median, weighted by extent and opacity: small and faint Gaussians are numerous but cover little of a picture. 0 without
-    /// Gaussians.
-    fn median(mut self) -> f32 {
+    /// Returns the extent above three quarters of the samples, weighted by opacity. Small Gaussians are numerous but cover little of a picture;
+    /// the few large Gaussians of a sky have no influence. 0 without Gaussians.
+    fn upper_quartile(mut self) -> f32 {
         self.samples.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let half = self.samples.iter().map(|(_, weight)| weight).sum::<f32>() / 2.0;
+        let below = 0.75 * self.samples.iter().map(|(_, opacity)| opacity).sum::<f32>();
         let mut sum = 0.0;
-        let is_median = |(_, weight): &&(f32, f32)| {
-            sum += weight;
-            sum >= half
+        let reaches = |(_, opacity): &&(f32, f32)| {
+            sum += opacity;
+            sum >= below
         };
-        self.samples.iter().find(is_median).map_or(0.0, |(extent, _)| *extent)
+        self.samples.iter().find(reaches).map_or(0.0, |(extent, _)| *extent)
     }
 }
 
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn the_extent_is_the_median_weighted_by_extent_and_opacity() {
+    fn the_extent_is_the_upper_quartile_weighted_by_opacity() {
         let round = |extent: f32, opacity: f32| Gaussian {
             mean: [0.0; 3],
             mean_t: 0.0,
@@ -284,14 +284,13 @@ mod tests {
         };
         let extent = |gaussians: Vec<Gaussian>| with(gaussians, [0.0, 1.0], 1.0).extent();
         assert_eq!(extent(Vec::new()), 0.0, "an empty capture has no extent");
-        let many = [round(0.5, 0.5); 8].into_iter().chain([round(1.0, 0.5); 8]).collect();
-        assert_eq!(extent(many), 1.0, "eight Gaussians of 1 outweigh eight of 0.5");
-        let faint = [round(0.5, 0.5); 8].into_iter().chain([round(1.0, 0.01); 8]).collect();
-        assert_eq!(extent(faint), 0.5, "eight faint Gaussians of 1 do not outweigh eight of 0.5");
+        let mixed = |large: Gaussian| [[round(0.5, 0.5); 8], [large; 8]].concat();
+        assert_eq!(extent(mixed(round(1.0, 0.5))), 1.0, "half of the Gaussians have an extent of 1");
+        assert_eq!(extent(mixed(round(1.0, 0.01))), 0.5, "eight faint Gaussians count little");
         let broken = round(f32::NAN, 0.5);
         assert_eq!(extent(vec![broken, round(0.25, 0.5), broken]), 0.25, "invalid Gaussians are ignored");
         let large = extent((0..3 * SAMPLES).map(|index| round(index as f32, 0.5)).collect());
-        let expected = 3.0 * SAMPLES as f32 * 0.5f32.sqrt();
+        let expected = 0.75 * 3.0 * SAMPLES as f32;
         assert!((large - expected).abs() < 8.0, "of many Gaussians some are compared: {large}, not {expected}");
     }
 

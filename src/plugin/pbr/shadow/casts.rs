@@ -38,9 +38,9 @@ pub struct CastsShadows {
     /// resolutions. Default: [`ShadowResolution::Half`].
     pub resolution: ShadowResolution,
     /// Distance of the shadow behind the capture's surface, seen from the light, in extents of the capture's Gaussians: a splat has one
-    /// depth, so the depth of a surface is known up to about an extent (the median of their largest standard deviations, weighted by these
-    /// and by opacity). A value that is negative or not finite counts as 0. If the capture receives its own shadow, that shadow sets in
-    /// gradually, from this distance to three times this distance. If the bias is too small, the capture darkens its own lit side; if it is
+    /// depth, so the depth of a surface is known up to about an extent (the standard deviation along an axis that three quarters of the
+    /// Gaussians, weighted by opacity, do not exceed). A value that is negative or not finite counts as 0. If the capture also receives shadows, these set in
+    /// gradually: its own from this distance to three times this distance. If the bias is too small, the capture darkens its own lit side; if it is
     /// too large, light leaks between the capture and the ground below it. Default: 2.
     pub bias: f32,
 }
