@@ -5,6 +5,7 @@
 
 mod appearance;
 mod bake;
+mod composed;
 mod crowds;
 mod depths_alone;
 mod designs;
