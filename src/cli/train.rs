@@ -13,7 +13,9 @@ use super::table::{bytes, lines};
 use crate::offline::dataset::{Validation, require_images};
 use crate::offline::engine::AdapterDescription;
 use crate::offline::files::Files;
-use crate::offline::fine_tune::{FineTuneSettings, FineTuned, Growth, Rates, Resume, Terms, TrainingImages};
+use crate::offline::fine_tune::{
+    FineTuneSettings, FineTuned, Growth, Rates, Resume, Terms, TrainingImages, require_room,
+};
 use crate::offline::store::{Key, Store};
 use crate::offline::train::{CaptureSettings, START_NAMES, Start, StartSettings, begin, capture_of, train};
 use crate::offline::{OfflineError, trained_pixel};
@@ -127,8 +129,11 @@ impl Train {
         require_images(&splits.train).map_err(OfflineError::from)?;
         let mut headless = self.renderer.open()?;
         TrainingImages::require_room(&splits.train, &splits.validation, &headless)?;
-        let images = TrainingImages::load(splits.train.clone(), &splits.validation, &trained_with, progress)?;
         let start = self.start_settings();
+        require_room(&headless, start.gaussians, start.degree, start.degree_t).map_err(|error| {
+            Failure::new(format!("{error}; --gaussians and --sh-degree make them fewer or smaller"))
+        })?;
+        let images = TrainingImages::load(splits.train.clone(), &splits.validation, &trained_with, progress)?;
         let (scene, started) = begin(&images, trained_with, playback, &start).map_err(OfflineError::from)?;
         let from = START_NAMES.iter().find(|(_, start)| *start == Some(started)).map_or("", |(name, _)| name);
         let key = Key::of_images(&splits.train)?

@@ -9,7 +9,6 @@ use crate::renderer::bind::{Bind, group_layout, pipeline};
 use crate::renderer::layout::{NoiseUniforms, RelocationUniforms, TrainedRecord};
 use crate::renderer::shaders::module;
 use crate::renderer::{GpuError, Headless, ShaderChecks};
-use crate::scene::random::Random;
 use wgpu::BufferUsages;
 
 /// The passes `noise` and `relocate`.
@@ -82,7 +81,7 @@ impl Grower {
     ) -> Result<usize, GpuError> {
         let ParameterBuffers { geometry, color, .. } = parameters;
         let mut records: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(&geometry.read_values(headless)?);
-        let moves = relocate(&mut records, &mut Random::new(seed));
+        let moves = relocate(&mut records, seed);
         if moves.is_empty() {
             return Ok(0);
         }

@@ -55,7 +55,7 @@ pub use settings::FineTuneSettings;
 pub use sums::GradientSums;
 pub use targets::TrainingImages;
 pub use terms::Terms;
-pub(crate) use trainer::Trainer;
+pub(crate) use trainer::{Trainer, require_room};
 pub use trainer_error::TrainerError;
 pub(crate) use training::Scene;
 pub(crate) use view_buffers::require_bindings;

@@ -1,6 +1,6 @@
 //! Relocation of Gaussians that have faded; CPU reference of `shaders/relocate.wgsl`.
 //!
-//! In: raw parameters, random numbers. Out: the parameters with every faded Gaussian at the place of a live one, drawn by opacity,
+//! In: raw parameters, the seed of random numbers. Out: the parameters with every faded Gaussian at the place of a live one, drawn by opacity,
 //! and the moves, by which colors are copied. The picture hardly changes (3DGS-MCMC): of `N` Gaussians in one place each gets
 //!
 //! ```text
@@ -22,7 +22,8 @@ const MOST_OPAQUE: f64 = 1.0 - 1e-6;
 
 /// Moves every Gaussian that has faded to a live one. Returns the moves: where to, where from. Nothing moves without live Gaussians, nor to
 /// one that has been drawn 50 times.
-pub fn relocate(records: &mut [TrainedRecord], random: &mut Random) -> Vec<[u32; 2]> {
+pub fn relocate(records: &mut [TrainedRecord], seed: u64) -> Vec<[u32; 2]> {
+    let mut random = Random::new(seed);
     let opacity = |record: &TrainedRecord| 1.0 / (1.0 + (-f64::from(record.opacity_logit[0])).exp());
     let is_live = |record: &TrainedRecord| opacity(record) > FADED;
     let (live, faded): (Vec<u32>, Vec<u32>) =
@@ -111,7 +112,7 @@ mod tests {
         let mut records: Vec<_> = (0..3000).map(|index| record(0.004, -(index as f32))).collect();
         records.extend((1..=400).map(|index| record(if index <= 200 { 0.1 } else { 0.3 }, index as f32)));
         let before = records.clone();
-        let moves = relocate(&mut records, &mut Random::new(1));
+        let moves = relocate(&mut records, 1);
         assert_eq!(moves.len(), 3000, "every faded Gaussian moves");
         let to_opaque = moves.iter().filter(|[_, from]| before[*from as usize].mean[0] > 200.5).count();
         assert!((2150..2350).contains(&to_opaque), "three of four move to the more opaque half: {to_opaque}");
@@ -131,13 +132,13 @@ mod tests {
     fn nothing_moves_without_a_need_or_a_place() {
         let mut live = vec![record(0.5, 1.0); 9];
         let mut faded = vec![record(0.001, 1.0); 9];
-        assert_eq!(relocate(&mut live, &mut Random::new(1)), [[0; 2]; 0], "all live");
-        assert_eq!(relocate(&mut faded, &mut Random::new(1)), [[0; 2]; 0], "all faded");
-        assert_eq!(relocate(&mut [], &mut Random::new(1)), [[0; 2]; 0], "none");
+        assert_eq!(relocate(&mut live, 1), [[0; 2]; 0], "all live");
+        assert_eq!(relocate(&mut faded, 1), [[0; 2]; 0], "all faded");
+        assert_eq!(relocate(&mut [], 1), [[0; 2]; 0], "none");
         assert!(live == [record(0.5, 1.0); 9] && faded == [record(0.001, 1.0); 9], "unchanged");
         let mut one = vec![record(0.001, 0.0); 200];
         one.push(record(0.9, 2.0));
-        let moves = relocate(&mut one, &mut Random::new(1));
+        let moves = relocate(&mut one, 1);
         assert_eq!(moves.len(), 50, "at most 51 Gaussians are in one place");
     }
 }

@@ -115,14 +115,9 @@ impl<'a> Trainer<'a> {
         let definitions = [definitions, sums.definitions()].concat();
         let passes = Passes::new(headless, &definitions, ShaderChecks::Off)?;
         let degrees = runtime.form.color_degrees();
-        let stride = evaluated(degrees.degree, degrees.degree_t) * 3;
-        let stride = stride.div_ceil(4) as u32;
+        let stride = stride(degrees.degree, degrees.degree_t);
         let count = runtime.len() as u32;
-        let limit = binding_limit(&headless.context().device.limits());
-        let needed = u64::from(count) * 16 * u64::from(stride.max(5));
-        if needed > limit {
-            return Err(GpuError::TooLarge { what: "the Gaussians that are trained", needed, limit }.into());
-        }
+        require_gaussians(headless, count.into(), stride)?;
         let capture = headless.upload(&runtime)?;
         let Some(writable) = capture.writable() else { return Err(TrainerError::Empty) };
         let settings = scene_settings(model, count, scene.trained_with.prefilter_var);
@@ -556,6 +551,28 @@ impl<'a> Trainer<'a> {
         if let Some(rounder) = &self.rounder {
             rounder.record(pass, self.parameters.count().div_ceil(256));
         }
+    }
+}
+
+/// Returns the four-vectors of the color of each Gaussian with these degrees.
+fn stride(degree: u32, degree_t: u32) -> u32 {
+    (evaluated(degree, degree_t) * 3).div_ceil(4) as u32
+}
+
+/// Checks that the device binds so many Gaussians with colors of these degrees, before there are any.
+///
+/// # Errors
+/// The bytes that are needed, and the limit of the device.
+pub fn require_room(headless: &Headless, count: usize, degree: u32, degree_t: u32) -> Result<(), GpuError> {
+    require_gaussians(headless, count as u64, stride(degree, degree_t))
+}
+
+fn require_gaussians(headless: &Headless, count: u64, stride: u32) -> Result<(), GpuError> {
+    let limit = binding_limit(&headless.context().device.limits());
+    let needed = count.saturating_mul(16 * u64::from(stride.max(5)));
+    match needed > limit {
+        true => Err(GpuError::TooLarge { what: "the Gaussians that are trained", needed, limit }),
+        false => Ok(()),
     }
 }
 
