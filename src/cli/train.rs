@@ -17,7 +17,7 @@ use crate::offline::fine_tune::{
     FineTuneSettings, FineTuned, Growth, Rates, Resume, Terms, TrainingImages, require_room,
 };
 use crate::offline::store::{Key, Store};
-use crate::offline::train::{CaptureSettings, START_NAMES, Start, StartSettings, begin, capture_of, train};
+use crate::offline::train::{CaptureSettings, Start, StartSettings, begin, capture_of, train};
 use crate::offline::{OfflineError, trained_pixel};
 use crate::scene::TrainedWith;
 use serde_json::json;
@@ -57,8 +57,8 @@ pub(super) struct Train {
     gaussians: usize,
     /// Where Gaussians begin: hull, inside the silhouettes of the images, random, in the box that the cameras look at, or auto: the first
     /// that the images allow.
-    #[arg(long, value_name = "WHERE", default_value = "auto", value_parser = values::one_of(&START_NAMES))]
-    start: Option<Start>,
+    #[arg(long, value_name = "WHERE", default_value = "auto", value_parser = values::one_of(&Start::NAMES))]
+    start: Start,
     /// Spatial degree of color, 0 to 3.
     #[arg(long, value_name = "DEGREE", default_value = "3", value_parser = clap::value_parser!(u32).range(0..=3))]
     sh_degree: u32,
@@ -135,7 +135,7 @@ impl Train {
         })?;
         let images = TrainingImages::load(splits.train.clone(), &splits.validation, &trained_with, progress)?;
         let (scene, started) = begin(&images, trained_with, playback, &start).map_err(OfflineError::from)?;
-        let from = START_NAMES.iter().find(|(_, start)| *start == Some(started)).map_or("", |(name, _)| name);
+        let from = started.name();
         let key = Key::of_images(&splits.train)?
             .with(Key::of_images(&splits.validation)?)
             .and(&format!("{start:?} {:?} {:?} {:?}", scene.trained_with, splits.train, splits.validation))

@@ -308,7 +308,7 @@ fn a_capture_is_trained_from_nothing() {
     let out = lesson.folder.path().join("out.gs4d");
     for (start, least) in [(Start::Hull, 0.0), (Start::Random, 0.0)] {
         let begun = std::time::Instant::now();
-        let from = StartSettings { gaussians: 400, start: Some(start), degree: 1, ..StartSettings::default() };
+        let from = StartSettings { gaussians: 400, start, degree: 1, ..StartSettings::default() };
         let found = lesson.train(&mut headless, &from, &settings(800), None, Some(&out), &mut NoProgress);
         let found = found.expect("the capture is trained");
         let psnr = found.best.psnr.expect("validation views");

@@ -23,7 +23,7 @@ mod writer;
 
 pub use capture::{CaptureSettings, capture_of};
 pub use error::StartError;
-pub use start::{START_NAMES, Start, StartSettings, begin};
+pub use start::{Start, StartSettings, begin};
 
 use super::fine_tune::{FineTuneSettings, FineTuned, Resume, Scene, TrainingImages, fine_tune_watched};
 use super::{OfflineError, Progress};

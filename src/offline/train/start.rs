@@ -35,26 +35,35 @@ const GRAY: f32 = 127.0 / 255.0;
 /// Distance of points that fill a hull of too few, as a share of the half side of the box.
 const FILLING: f32 = 0.02;
 
-/// Where the points come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Where the points come from. Default: [`Auto`](Self::Auto).
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Start {
+    /// From the visual hull if most images have silhouettes and it is not empty, else at random.
+    #[default]
+    Auto,
     /// From the visual hull of the silhouettes.
     Hull,
     /// At random in the box that the cameras look at.
     Random,
 }
 
-/// Every start with its name, and `auto`: the first that the images allow.
-pub const START_NAMES: [(&str, Option<Start>); 3] =
-    [("auto", None), ("hull", Some(Start::Hull)), ("random", Some(Start::Random))];
+impl Start {
+    /// Every start with its name.
+    pub const NAMES: [(&'static str, Self); 3] = [("auto", Self::Auto), ("hull", Self::Hull), ("random", Self::Random)];
+
+    /// Returns the name.
+    pub fn name(self) -> &'static str {
+        Self::NAMES.iter().find(|(_, start)| *start == self).map_or("", |(name, _)| name)
+    }
+}
 
 /// How a capture begins. Default: 60,000 Gaussians with colors of degree 3, and degree 2 in time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StartSettings {
     /// Number of Gaussians, which stays.
     pub gaussians: usize,
-    /// Where their points come from; `None`: the visual hull if most images have silhouettes, else at random.
-    pub start: Option<Start>,
+    /// Where their points come from.
+    pub start: Start,
     /// Seed of the random numbers.
     pub seed: u64,
     /// Spatial degree of color, 0 to 3.
@@ -65,11 +74,11 @@ pub struct StartSettings {
 
 impl Default for StartSettings {
     fn default() -> Self {
-        Self { gaussians: 60_000, start: None, seed: 0, degree: 3, degree_t: 2 }
+        Self { gaussians: 60_000, start: Start::Auto, seed: 0, degree: 3, degree_t: 2 }
     }
 }
 
-/// Returns the scene before the first step, and where its points come from.
+/// Returns the scene before the first step, and where its points come from: the hull, or random places.
 ///
 /// # Errors
 /// Cameras without a common region; a visual hull that was asked for and is empty.
@@ -104,8 +113,9 @@ fn points(
     let mut random = Random::new(settings.seed);
     let with_gaps = images.iter().filter(|(_, image)| image.has_gaps).count();
     let wants_hull = match settings.start {
-        Some(start) => start == Start::Hull,
-        None => 2 * with_gaps > images.len(),
+        Start::Hull => true,
+        Start::Random => false,
+        Start::Auto => 2 * with_gaps > images.len(),
     };
     if wants_hull {
         if with_gaps == 0 {
@@ -122,7 +132,7 @@ fn points(
             }
             return Ok((found, Start::Hull));
         }
-        if settings.start.is_some() {
+        if settings.start == Start::Hull {
             return Err(StartError::NoHull);
         }
     }
@@ -185,7 +195,7 @@ mod tests {
         (0..5).map(view).collect()
     }
 
-    fn start(coverage: u8, start: Option<Start>) -> Result<(Vec<StartPoint>, Start), StartError> {
+    fn start(coverage: u8, start: Start) -> Result<(Vec<StartPoint>, Start), StartError> {
         let views = views(coverage);
         let images: Vec<_> = views.iter().map(|(view, image)| (view, image)).collect();
         let region = Region::of(images.iter().map(|(view, _)| *view)).expect("a region");
@@ -195,15 +205,15 @@ mod tests {
     #[test]
     fn the_start_is_chosen_by_the_images() {
         let found = |coverage, wanted| start(coverage, wanted).map(|(points, start)| (points.len(), start));
-        assert_eq!(found(0, None), Ok((700, Start::Hull)), "silhouettes");
-        assert_eq!(found(255, None), Ok((700, Start::Random)), "no silhouettes");
-        assert_eq!(found(0, Some(Start::Random)), Ok((700, Start::Random)), "as asked");
-        assert_eq!(found(255, Some(Start::Hull)), Err(StartError::NoSilhouettes), "a hull of nothing is refused");
+        assert_eq!(found(0, Start::Auto), Ok((700, Start::Hull)), "silhouettes");
+        assert_eq!(found(255, Start::Auto), Ok((700, Start::Random)), "no silhouettes");
+        assert_eq!(found(0, Start::Random), Ok((700, Start::Random)), "as asked");
+        assert_eq!(found(255, Start::Hull), Err(StartError::NoSilhouettes), "a hull of nothing is refused");
     }
 
     #[test]
     fn gaussians_begin_as_in_the_original() {
-        let (points, _) = start(255, None).expect("random points");
+        let (points, _) = start(255, Start::Auto).expect("random points");
         let Trained { parameters, harmonics } = trained(&points, 0.8, 3, 2);
         let times = parameters.mean_t.iter().copied();
         let [first, last] = [times.clone().fold(f32::MAX, f32::min), times.fold(f32::MIN, f32::max)];
