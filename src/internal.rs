@@ -132,6 +132,8 @@ pub mod offline {
         pub use crate::offline::fine_tune::adam::*;
         pub use crate::offline::fine_tune::loss::*;
         pub use crate::offline::fine_tune::neighbors::*;
+        pub use crate::offline::fine_tune::noise::*;
+        pub use crate::offline::fine_tune::relocation::*;
         pub use crate::offline::fine_tune::sample::*;
         pub use crate::offline::fine_tune::state::*;
         pub use crate::offline::fine_tune::terms::*;
@@ -191,6 +193,10 @@ pub mod offline {
     /// Types that stages store.
     pub mod stored {
         pub use crate::offline::stored::*;
+    }
+    /// Training from pictures alone.
+    pub mod train {
+        pub use crate::offline::train::*;
     }
     /// Key-frame masks and intervals.
     pub mod temporal_filter {

@@ -13,6 +13,7 @@ mod bench;
 mod compare;
 mod compress;
 mod convert;
+mod curve;
 mod detail;
 mod eval;
 mod failure;
@@ -30,6 +31,7 @@ mod score;
 mod synth;
 mod system;
 mod table;
+mod train;
 mod usage;
 
 use crate::offline::unfinished;
@@ -78,6 +80,7 @@ enum Verb {
     Mask(mask::Mask),
     Eval(eval::Eval),
     Ablate(ablate::Ablate),
+    Train(train::Train),
     #[command(name = "finetune")]
     FineTune(fine_tune::FineTune),
     Bake(bake::Bake),
@@ -99,6 +102,7 @@ impl Verb {
             Self::Mask(verb) => verb.run(),
             Self::Eval(verb) => verb.run(),
             Self::Ablate(verb) => verb.run(),
+            Self::Train(verb) => verb.run(),
             Self::FineTune(verb) => verb.run(),
             Self::Bake(verb) => verb.run(),
         }

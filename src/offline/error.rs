@@ -9,6 +9,7 @@ use super::metrics::SizeMismatch;
 use super::picture_file::PictureError;
 use super::quantize::CompressError;
 use super::score::{INTERRUPTED, ScoreError};
+use super::train::StartError;
 use crate::codec::CodecError;
 use crate::codec::package::PackageError;
 use crate::gaussian::InvalidGaussian;
@@ -41,6 +42,9 @@ pub enum OfflineError {
     /// A scene cannot be fine-tuned.
     #[error(transparent)]
     Train(#[from] TrainerError),
+    /// No capture can be trained on these views.
+    #[error(transparent)]
+    Start(#[from] StartError),
     /// A Gaussian cannot be drawn.
     #[error(transparent)]
     Invalid(#[from] InvalidGaussian),
