@@ -185,8 +185,3 @@ struct Readme;
 #[cfg(all(doctest, feature = "bevy"))]
 #[doc = include_str!("../docs/guide.md")]
 struct Guide;
-
-/// The note about debugging shaders, likewise.
-#[cfg(all(doctest, feature = "bevy"))]
-#[doc = include_str!("../docs/shaders.md")]
-struct Shaders;

@@ -5,7 +5,6 @@
 
 mod appearance;
 mod bake;
-mod composed;
 mod crowds;
 mod depths_alone;
 mod designs;
