@@ -8,8 +8,8 @@ const TAU: f32 = 6.2831853;
 // Opacity of half the noise, and how fast the noise falls above it.
 const FAINT: f32 = 0.005;
 const SLOPE: f32 = 100.0;
-// Largest deviation of the noise along the fourth axis, in temporal scales.
-const TIME_STEP: f32 = 0.1;
+// Largest deviation of the noise of a fully transparent Gaussian along each axis, in scales.
+const LARGEST = vec4<f32>(1.0, 1.0, 1.0, 0.1);
 
 @group(0) @binding(0) var<uniform> settings: NoiseUniforms;
 @group(0) @binding(1) var<storage, read_write> trained: array<TrainedRecord>;
@@ -48,8 +48,7 @@ fn noise(@builtin(global_invocation_id) id: vec3<u32>) {
     let raw = trained[index];
     let faint = 1.0 / (1.0 + exp(SLOPE * (opacity_of(raw.opacity_logit.x) - FAINT)));
     let scale = exp(raw.log_scale);
-    let by_scale = settings.strength * scale;
-    let factors = faint * vec4(by_scale.xyz, min(by_scale.w, TIME_STEP));
+    let factors = faint * min(settings.strength * scale, LARGEST);
     let rotation = left_matrix(normalize(raw.rotation_l)) * right_matrix(normalize(raw.rotation_r));
     trained[index].mean = raw.mean + rotation * (factors * scale * normals(index));
 }

@@ -59,6 +59,10 @@ pub(super) struct Train {
     /// that the images allow.
     #[arg(long, value_name = "WHERE", default_value = "auto", value_parser = values::one_of(&Start::NAMES))]
     start: Start,
+    /// Temporal scale of Gaussians at the beginning, as a share of the time interval [default: the original's, the root of a fifth of the
+    /// interval: 0.447 of an interval of 1].
+    #[arg(long, value_name = "SHARE", value_parser = time_scale)]
+    time_scale: Option<f64>,
     /// Spatial degree of color, 0 to 3.
     #[arg(long, value_name = "DEGREE", default_value = "3", value_parser = clap::value_parser!(u32).range(0..=3))]
     sh_degree: u32,
@@ -107,6 +111,12 @@ pub(super) struct Train {
     renderer: RendererArgs,
 }
 
+/// Parses a temporal scale as a share of the interval.
+fn time_scale(text: &str) -> Result<f64, String> {
+    let share = text.trim().parse::<f64>().ok().filter(|share| (1e-3..=100.0).contains(share));
+    share.ok_or_else(|| "expected a number from 0.001 to 100".to_owned())
+}
+
 impl Train {
     /// Trains a capture and writes it.
     ///
@@ -125,7 +135,6 @@ impl Train {
         let (mut trained_with, playback) = capture_of(&all, &settings).map_err(OfflineError::from)?;
         let splits = self.data.divide(validation, &trained_with, progress)?;
         trained_with.validation = Some(splits.to_string());
-        trained_with.iteration = self.steps as u64;
         require_images(&splits.train).map_err(OfflineError::from)?;
         let mut headless = self.renderer.open()?;
         TrainingImages::require_room(&splits.train, &splits.validation, &headless)?;
@@ -148,6 +157,7 @@ impl Train {
             trained => (trained?, false),
         };
         trained.scene.trained_with.pixel = trained_pixel(&trained.scene, &all);
+        trained.scene.trained_with.iteration = trained.best.step as u64;
         let size = self.package.save(&trained.scene)?;
         drop(deferred);
         if !interrupted {
@@ -209,6 +219,7 @@ impl Train {
         StartSettings {
             gaussians: self.gaussians,
             start: self.start,
+            time_scale: self.time_scale,
             seed: self.training.seed,
             degree: self.sh_degree,
             degree_t: self.sh_degree_t.unwrap_or(2),

@@ -306,13 +306,12 @@ fn a_capture_is_trained_from_nothing() {
     let Some(mut headless) = gpu::headless() else { return };
     let lesson = Lesson::new();
     let out = lesson.folder.path().join("out.gs4d");
-    for (start, least) in [(Start::Hull, 0.0), (Start::Random, 0.0)] {
-        let begun = std::time::Instant::now();
+    for (start, least) in [(Start::Hull, 37.0), (Start::Random, 22.0)] {
         let from = StartSettings { gaussians: 400, start, degree: 1, ..StartSettings::default() };
-        let found = lesson.train(&mut headless, &from, &settings(800), None, Some(&out), &mut NoProgress);
+        let found = lesson.train(&mut headless, &from, &settings(400), None, Some(&out), &mut NoProgress);
         let found = found.expect("the capture is trained");
         let psnr = found.best.psnr.expect("validation views");
-        println!("{start:?}: {psnr:.2} dB after {:.1} s: {:?}", begun.elapsed().as_secs_f64(), found.curve);
+        println!("{start:?}: {psnr:.2} dB");
         assert_eq!(found.scene.len(), 400, "{start:?}: the number of Gaussians stays");
         assert!(psnr > least, "{start:?}: {psnr:.2} dB on the camera that is held out, more than {least} dB expected");
         let written = bevy_gs4d::codec::load(&out, &Default::default()).expect("the package of an evaluation is whole");

@@ -4,9 +4,9 @@
 //! in space and time if the Gaussian is faint.
 //!
 //! Along each axis of the 4D Gaussian the noise is normal, with the deviation `strength × variance × faint`, where `faint` is a sigmoid of the
-//! opacity: 1 for transparent Gaussians, 0 for opaque ones (3DGS-MCMC). Along the fourth axis, time unless the Gaussian is rotated, the
-//! deviation is at most [`TIME_STEP`] temporal scales: a temporal scale is a good part of the interval, and the variance times
-//! the strength would throw the Gaussian far outside.
+//! opacity: 1 for transparent Gaussians, 0 for opaque ones (3DGS-MCMC), and at most one scale, along the fourth axis a tenth, times `faint`: the variance times the
+//! strength is many scales of a large Gaussian, and would throw it far out of the scene, and out of the interval of time along the fourth
+//! axis (time unless the Gaussian is rotated), whose scale is a good part of the interval.
 
 use crate::gaussian::rotation_4d;
 use crate::renderer::layout::TrainedRecord;
@@ -17,8 +17,8 @@ use std::f64::consts::TAU;
 const FAINT: f64 = 0.005;
 /// How fast the noise falls above that opacity.
 const SLOPE: f64 = 100.0;
-/// Largest deviation of the noise along the fourth axis, in temporal scales.
-pub const TIME_STEP: f64 = 0.1;
+/// Largest deviation of the noise of a fully transparent Gaussian along each axis, in scales.
+const LARGEST: DVec4 = DVec4::new(1.0, 1.0, 1.0, 0.1);
 
 /// Distance between two seeds of the words of one Gaussian.
 const STRIDE: u32 = 0x9e37_79b9;
@@ -30,8 +30,7 @@ pub fn noise(record: &mut TrainedRecord, index: u32, seed: u32, strength: f32) {
     let scale = vector([x, y, z, record.log_scale_t]).map(f64::exp);
     let opacity = 1.0 / (1.0 + (-f64::from(record.opacity_logit[0])).exp());
     let faint = 1.0 / (1.0 + (SLOPE * (opacity - FAINT)).exp());
-    let mut factors = f64::from(strength) * scale;
-    factors.w = factors.w.min(TIME_STEP);
+    let factors = (f64::from(strength) * scale).min(LARGEST);
     let rotation = rotation_4d(vector(record.rotation_l).normalize(), vector(record.rotation_r).normalize());
     let moved = rotation * (faint * factors * scale * normals(index, seed));
     let mean = record.mean.map(f64::from);
@@ -97,10 +96,12 @@ mod tests {
     fn the_deviation_follows_the_variance_and_the_opacity() {
         let scales = [0.1f32, 0.2, 0.05];
         let found = deviations(record(0.005, scales.map(f32::ln), 0.3f32.ln()), 3.0);
-        let expected = [0.5 * 3.0 * 0.01, 0.5 * 3.0 * 0.04, 0.5 * 3.0 * 0.0025, 0.5 * TIME_STEP * 0.3];
+        let expected = [0.5 * 3.0 * 0.01, 0.5 * 3.0 * 0.04, 0.5 * 3.0 * 0.0025, 0.5 * 0.1 * 0.3];
         for (axis, (found, expected)) in found.into_iter().zip(expected).enumerate() {
             assert!((found / expected - 1.0).abs() < 0.03, "axis {axis}: deviation {found}, expected {expected}");
         }
+        let large = deviations(record(0.005, [0.5f32.ln(); 3], 0.3f32.ln()), 3e3);
+        assert!(large[..3].iter().all(|moved| (moved / 0.25 - 1.0).abs() < 0.03), "at most one scale: {large:?}");
         let opaque = deviations(record(0.5, scales.map(f32::ln), 0.3f32.ln()), 3.0);
         assert!(opaque.iter().all(|&moved| moved < 1e-15), "an opaque Gaussian stays: {opaque:?}");
     }

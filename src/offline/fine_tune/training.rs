@@ -83,12 +83,9 @@ pub(super) fn train(
         let speed = (step - first) as f64 / seconds;
         let grown = settings.growth.map_or(String::new(), |_| {
             let left = begun.elapsed().as_secs_f64() * (settings.steps - step) as f64 / (step - first) as f64;
+            let left = left.round() as u64;
             let count = run.trainer.count();
-            format!(
-                ", {count} Gaussians, {relocated} relocated, {:.0} min {:.0} s left",
-                left.div_euclid(60.0),
-                left % 60.0
-            )
+            format!(", {count} Gaussians, {relocated} relocated, {} min {} s left", left / 60, left % 60)
         });
         progress.note(&format!("{}{grown}", point.describe(Some(speed))));
         relocated = 0;

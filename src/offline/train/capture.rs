@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3};
 /// The extent of the cameras is the largest distance from their center times this.
 const EXTENT: f64 = 1.1;
 /// Cameras closer together than this share of their distance from the origin stand in one place.
-const ONE_PLACE: f64 = 1e-4;
+const ONE_PLACE: f64 = 1e-6;
 
 const AXES: [UpAxis; 6] = [UpAxis::PosX, UpAxis::NegX, UpAxis::PosY, UpAxis::NegY, UpAxis::PosZ, UpAxis::NegZ];
 

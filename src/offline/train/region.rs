@@ -8,7 +8,7 @@ use glam::{DMat3, DVec3, Vec3};
 
 /// Half the side of the cube, as a share of half the width of a picture at the center (1.3 of 1.44 in D-NeRF).
 const SHARE: f64 = 0.9;
-/// Below this determinant of the mean, axes are nearly parallel and have no closest point.
+/// Below this determinant of the mean, axes are nearly parallel and have no closest point; below this length of the mean, they cancel out.
 const PARALLEL: f64 = 1e-3;
 /// Distance of the center before parallel cameras, in distances of the cameras from their middle.
 const AHEAD: f64 = 3.0;
@@ -47,7 +47,9 @@ impl Region {
         let ahead = || {
             let middle = cameras.iter().map(|ray| ray.origin).sum::<DVec3>() / count;
             let spread = cameras.iter().map(|ray| ray.origin.distance(middle)).fold(0.0, f64::max);
-            let direction = cameras.iter().map(|ray| ray.direction).sum::<DVec3>().try_normalize()?;
+            let direction = cameras.iter().map(|ray| ray.direction).sum::<DVec3>() / count;
+            // Directions that cancel out have no common one.
+            let direction = (direction.length() > PARALLEL).then(|| direction.normalize())?;
             let center = middle + direction * AHEAD * spread;
             Some((center, half_at(center)?))
         };

@@ -64,6 +64,8 @@ pub struct StartSettings {
     pub gaussians: usize,
     /// Where their points come from.
     pub start: Start,
+    /// Temporal scale, as a share of the interval; `None`: `√(T/5)`, the original's.
+    pub time_scale: Option<f64>,
     /// Seed of the random numbers.
     pub seed: u64,
     /// Spatial degree of color, 0 to 3.
@@ -74,7 +76,7 @@ pub struct StartSettings {
 
 impl Default for StartSettings {
     fn default() -> Self {
-        Self { gaussians: 60_000, start: Start::Auto, seed: 0, degree: 3, degree_t: 2 }
+        Self { gaussians: 60_000, start: Start::Auto, time_scale: None, seed: 0, degree: 3, degree_t: 2 }
     }
 }
 
@@ -91,9 +93,11 @@ pub fn begin(
     let pairs: Vec<(&View, &CoveredImage)> = images.pairs().collect();
     let region = Region::of(pairs.iter().map(|(view, _)| *view))?;
     let (points, start) = points(&pairs, &region, trained_with.time_interval, settings)?;
+    let span = trained_with.time_span();
+    let scale_t = settings.time_scale.map_or((span / 5.0).sqrt(), |share| share as f32 * span);
     let (degree, degree_t) = (settings.degree.min(3), if settings.degree >= 3 { settings.degree_t.min(2) } else { 0 });
     let scene = GaussianScene {
-        form: SceneForm::Trained(trained(&points, trained_with.time_span(), degree, degree_t)),
+        form: SceneForm::Trained(trained(&points, scale_t, degree, degree_t)),
         environment: None,
         filter: None,
         trained_with,
@@ -145,8 +149,8 @@ fn points(
     Ok(((0..count).map(|_| point()).collect(), Start::Random))
 }
 
-/// Returns Gaussians at these points, of an interval of this length.
-fn trained(points: &[StartPoint], span: f32, degree: u32, degree_t: u32) -> Trained {
+/// Returns Gaussians at these points, with this temporal scale.
+fn trained(points: &[StartPoint], scale_t: f32, degree: u32, degree_t: u32) -> Trained {
     let mean: Vec<[f32; 3]> = points.iter().map(|point| point.position.to_array()).collect();
     let near = neighbors(&mean);
     let log_scale = |(index, own): (usize, &[u32])| {
@@ -159,7 +163,7 @@ fn trained(points: &[StartPoint], span: f32, degree: u32, degree_t: u32) -> Trai
     let parameters = Parameters {
         mean_t: points.iter().map(|point| point.time).collect(),
         log_scale: near.chunks_exact(NEIGHBORS).enumerate().map(log_scale).collect(),
-        log_scale_t: vec![0.5 * (span / 5.0).ln(); count],
+        log_scale_t: vec![scale_t.ln(); count],
         rotation_l: unrotated.clone(),
         rotation_r: unrotated,
         opacity_logit: vec![(OPACITY / (1.0 - OPACITY)).ln(); count],
@@ -214,11 +218,11 @@ mod tests {
     #[test]
     fn gaussians_begin_as_in_the_original() {
         let (points, _) = start(255, Start::Auto).expect("random points");
-        let Trained { parameters, harmonics } = trained(&points, 0.8, 3, 2);
+        let Trained { parameters, harmonics } = trained(&points, 0.4, 3, 2);
         let times = parameters.mean_t.iter().copied();
         let [first, last] = [times.clone().fold(f32::MAX, f32::min), times.fold(f32::MIN, f32::max)];
         assert!((-0.08..-0.04).contains(&first) && (0.84..0.88).contains(&last), "a tenth outside: {first} to {last}");
-        assert!((parameters.log_scale_t[0].exp() - 0.4).abs() < 1e-6, "the root of a fifth of the interval");
+        assert!((parameters.log_scale_t[0].exp() - 0.4).abs() < 1e-6, "the temporal scale");
         assert!((1.0 / (1.0 + (-parameters.opacity_logit[0]).exp()) - 0.1).abs() < 1e-6, "opacity");
         let mut distances: Vec<f32> = points.iter().map(|p| p.position.distance_squared(points[7].position)).collect();
         distances.sort_by(f32::total_cmp);
