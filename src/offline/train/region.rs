@@ -26,7 +26,7 @@ impl Region {
     ///
     /// # Errors
     /// [`StartError::NoRegion`] if it is behind all of them.
-    pub fn of<'a>(views: impl Iterator<Item = &'a View>) -> Result<Self, StartError> {
+    pub(super) fn of<'a>(views: impl Iterator<Item = &'a View>) -> Result<Self, StartError> {
         let cameras: Vec<Ray> = views.map(Ray::of).collect();
         let count = cameras.len().max(1) as f64;
         let (mut sum, mut at) = (DMat3::ZERO, DVec3::ZERO);
