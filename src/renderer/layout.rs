@@ -448,7 +448,7 @@ pub struct SplatRecord {
     pub opacity: f32,
     /// Depth, camera units.
     pub depth: f32,
-    /// Inverse covariance, [factored](crate::gaussian::conic).
+    /// Inverse covariance, factored: `x (dx + y dy)² + z dy²`.
     pub conic: [f32; 3],
     /// Tiles x0 and y0, 16 bits each.
     pub tiles_low: u32,
@@ -464,7 +464,7 @@ pub struct SplatRecord {
 pub struct SplatShape {
     /// Center in pixels, opacity times marginal, depth in camera units.
     pub place: [f32; 4],
-    /// Inverse covariance, [factored](crate::gaussian::conic); unused.
+    /// Inverse covariance, factored: `x (dx + y dy)² + z dy²`; unused.
     pub conic: [f32; 4],
 }
 
