@@ -4,8 +4,8 @@
 #import gs4d::srgb::{decode, encode}
 #import gs4d::types::{LIGHTING_AS_TRAINED, LIGHTING_ENCODED}
 
-// The same value as in src/gaussian/harmonics.rs.
-const BRIGHTEST: f32 = 1e30;
+// The largest color: the largest half-precision number, as in src/gaussian/harmonics.rs.
+const BRIGHTEST: f32 = 65504.0;
 
 // Returns a trained color with the light applied, in the blend space.
 fn lit(color: vec3<f32>, lighting: u32, light: vec3<f32>) -> vec3<f32> {

@@ -5,8 +5,8 @@
 
 use glam::Vec3;
 
-/// The largest color, so that pictures of huge coefficients and texels are finite. As in `shaders/shared/appearance.wgsl`.
-pub const BRIGHTEST: f32 = 1e30;
+/// The largest color: the largest half-precision number, as in HDR view targets. As in `shaders/shared/appearance.wgsl`.
+pub const BRIGHTEST: f32 = 65504.0;
 
 /// Color coefficients of `N` Gaussians.
 #[derive(Debug, Clone, Default, PartialEq)]

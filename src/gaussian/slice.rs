@@ -144,15 +144,7 @@ impl Parameters {
             mean_t: if model == Model::Static3d { 0.0 } else { self.mean_t[index] },
             velocity: velocity.as_vec3().to_array(),
             sigma_t: variance_t.sqrt() as f32,
-            covariance: [
-                covariance.x_axis.x,
-                covariance.x_axis.y,
-                covariance.x_axis.z,
-                covariance.y_axis.y,
-                covariance.y_axis.z,
-                covariance.z_axis.z,
-            ]
-            .map(|c| c as f32),
+            covariance: upper_triangle(covariance).map(|c| c as f32),
             opacity: (1.0 / (1.0 + (-f64::from(self.opacity_logit[index])).exp())) as f32,
             padding: 0.0,
         };
@@ -179,12 +171,35 @@ impl Gaussian {
             Err("a velocity that is not finite (temporal scale too small)")
         } else if !finite(&self.covariance) {
             Err("a scale that is not finite or too large")
+        } else if !self.has_covariance() {
+            Err("numbers in place of a covariance that no covariance has")
         } else if !(0.0..=1.0).contains(&self.opacity) {
             Err("an opacity that is not a number between 0 and 1")
         } else {
             Ok(())
         }
     }
+
+    /// Returns whether no variance is negative and `σ_ij² ≤ σ_ii σ_jj`, up to rounding in single precision.
+    fn has_covariance(&self) -> bool {
+        let [xx, xy, xz, yy, yz, zz] = self.covariance.map(f64::from);
+        let rounding = (xx + yy + zz) * 1e-5 + f64::from(f32::MIN_POSITIVE);
+        let [x, y, z] = [xx, yy, zz].map(|variance| variance + rounding);
+        x >= 0.0 && y >= 0.0 && z >= 0.0 && xy * xy <= x * y && xz * xz <= x * z && yz * yz <= y * z
+    }
+}
+
+/// Returns xx, xy, xz, yy, yz, zz of a covariance. Rounding of a difference of larger numbers can leave entries that no covariance has;
+/// these are moved to the nearest value that `0 ≤ σ_ii` and `σ_ij² ≤ σ_ii σ_jj` allow.
+fn upper_triangle(covariance: DMat3) -> [f64; 6] {
+    let [x, y, z] = covariance.to_cols_array_2d();
+    // Numbers that are not finite stay so, and are refused later.
+    let [xx, yy, zz] = [x[0], y[1], z[2]].map(|variance| if variance < 0.0 { 0.0 } else { variance });
+    let within = |entry: f64, a: f64, b: f64| {
+        let most = a.sqrt() * b.sqrt();
+        if entry.abs() > most { most.copysign(entry) } else { entry }
+    };
+    [xx, within(x[1], xx, yy), within(x[2], xx, zz), yy, within(y[2], yy, zz), zz]
 }
 
 /// Returns the unit quaternion (w, x, y, z); `None` if the length is zero or not finite.
@@ -246,6 +261,33 @@ mod tests {
     }
 
     #[test]
+    fn a_matrix_that_is_no_covariance_is_refused() {
+        let good =
+            one([0.1, 0.7, -0.3, 0.2], [-0.4, 0.2, 0.6, 0.9]).slice(&SliceSettings::default()).expect("valid")[0];
+        let needle = Gaussian { covariance: [1.0, 1.0, 1.0, 1.0, 1.0, 1.0], ..good };
+        assert_eq!(needle.check(), Ok(()), "a needle along the diagonal has a covariance without volume");
+        for covariance in
+            [[-1e-3, 0.0, 0.0, 1.0, 0.0, 1.0], [1.0, 1.1, 0.0, 1.0, 0.0, 1.0], [1.0, 0.0, 0.0, 1.0, -3e38, 1.0]]
+        {
+            let found = Gaussian { covariance, ..good }.check();
+            assert!(found.is_err_and(|reason| reason.contains("covariance")), "{covariance:?} is no covariance");
+        }
+    }
+
+    #[test]
+    fn rounding_never_makes_a_slice_invalid() {
+        for log_scale in [-4.0, -12.0, -18.0, -24.0, -40.0] {
+            let parameters = Parameters {
+                log_scale: vec![[log_scale, log_scale - 1.0, log_scale - 2.0]],
+                log_scale_t: vec![0.0],
+                ..one([0.1, 0.7, -0.3, 0.2], [-0.4, 0.2, 0.6, 0.9])
+            };
+            let sliced = parameters.slice(&SliceSettings::default());
+            assert!(sliced.is_ok(), "log scales from {log_scale} beside a temporal scale of 1: {sliced:?}");
+        }
+    }
+
+    #[test]
     fn invalid_parameters_are_refused_with_the_attribute_named() {
         let good = one([1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]);
         let reason = |p: Parameters| p.slice(&SliceSettings::default()).expect_err("must be refused").reason;
@@ -257,10 +299,10 @@ mod tests {
             reason(Parameters { rotation_l: vec![[0.0; 4]], ..good.clone() }).contains("length zero"),
             "a quaternion of length zero is refused"
         );
-        assert!(
-            reason(Parameters { log_scale: vec![[200.0, 0.0, 0.0]], ..good.clone() }).contains("scale"),
-            "a huge scale is refused"
-        );
+        for huge in [200.0, 400.0] {
+            let found = reason(Parameters { log_scale: vec![[huge, 0.0, 0.0]], ..good.clone() });
+            assert!(found.contains("scale") || found.contains("velocity"), "a log scale of {huge} is refused: {found}");
+        }
         assert!(
             reason(Parameters { opacity_logit: vec![f32::NAN], ..good }).contains("opacity"),
             "a NaN opacity is refused"

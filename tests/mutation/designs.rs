@@ -82,15 +82,16 @@ pub fn compare(scene: &RuntimeScene, limits: &Limits, expected: &[Expected]) -> 
     }
     for ((expected, reference), fast) in expected.iter().zip(&frames[0]).zip(&frames[1]) {
         let Expected { view, background, frame } = expected;
-        let time = view.time;
+        let (time, brightest) = (view.time, limits.brightest(*background));
         let [a, b] = [reference, fast].map(|frame| frame.counts.visible);
         if a != b {
             return Err(format!("is drawn with {a} splats by the design Reference and {b} by Fast at time {time}"));
         }
-        same(fast, &Ranges::exact(reference))
+        same(fast, &Ranges::exact(reference, brightest))
             .map_err(|worst| format!("is drawn differently by the designs at time {time}: {worst}"))?;
-        if same(reference, &Ranges::exact(frame)).is_err() {
-            same(reference, &Ranges::rounded(scene, view, *background, frame))
+        let exact = Ranges::exact(frame, brightest);
+        if same(reference, &exact).is_err() {
+            same(reference, &exact.rounded(scene, view, *background))
                 .map_err(|worst| format!("is drawn differently by the GPU and the CPU at time {time}: {worst}"))?;
             ROUNDED.fetch_add(1, Ordering::Relaxed);
         }

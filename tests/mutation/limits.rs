@@ -10,6 +10,8 @@ use std::borrow::Cow;
 
 /// The largest value of a spherical harmonic up to degree 3: the root of 7 / 4π.
 const HARMONIC: f32 = 0.7464;
+/// The brightest color that is drawn.
+const BRIGHTEST: f32 = 65504.0;
 /// What rounding adds to a limit, relative and absolute.
 const ROUNDING: f32 = 1e-3;
 
@@ -42,22 +44,24 @@ impl Limits {
         let color = values.chunks(3 * coefficients.max(1)).map(brightest).fold(0.0, f32::max);
         let texels = scene.environment.iter().flat_map(|map| &map.texels);
         let environment = texels.map(|texel| texel.abs()).fold(0.0, f32::max);
-        Self { color: 0.5 + HARMONIC * color, environment, gaussians }
+        // Brighter colors are drawn with the largest half-precision number.
+        let [color, environment] = [0.5 + HARMONIC * color, environment].map(|value| value.min(BRIGHTEST));
+        Self { color, environment, gaussians }
+    }
+
+    /// Returns the brightest color that a picture can have over a background.
+    pub fn brightest(&self, background: Background) -> f32 {
+        self.color.max(self.behind(background))
     }
 
     /// Checks the values of a frame.
     pub fn check(&self, frame: &Frame, view: &View, background: Background) -> Result<(), String> {
-        let behind = match background {
-            Background::None => 0.0,
-            Background::Color(color) => color.into_iter().map(f32::abs).fold(0.0, f32::max),
-            Background::Environment => self.environment,
-        };
+        let (behind, bright) = (self.behind(background), self.brightest(background));
         let depth = |gaussian: &Gaussian| view.world_to_camera.transform_point3(gaussian.mean_at(view.time)).z;
         // A depth that is not a number has no limit.
         let depths = self.gaussians.iter().map(depth).map(|depth| if depth.is_nan() { f32::INFINITY } else { depth });
         let deepest = depths.fold(0.0, f32::max);
         let color: Vec<f32> = frame.picture.pixels.iter().flat_map(|pixel| pixel.to_array()).collect();
-        let bright = self.color.max(behind);
         let planes = [
             ("color", &color, [-behind, bright]),
             ("transmittance", &frame.transmittance, [0.0, 1.0]),
@@ -72,5 +76,14 @@ impl Limits {
             }
         }
         Ok(())
+    }
+
+    /// Returns the largest absolute value of a background.
+    fn behind(&self, background: Background) -> f32 {
+        match background {
+            Background::None => 0.0,
+            Background::Color(color) => color.into_iter().map(f32::abs).fold(0.0, f32::max),
+            Background::Environment => self.environment,
+        }
     }
 }

@@ -23,21 +23,22 @@ type Values = [f32; 5];
 pub struct Ranges {
     low: Vec<Values>,
     high: Vec<Values>,
+    /// The brightest color that the scene can show, at least 1: a transmittance that differs by 0.001 changes a color by this part of it.
+    brightest: f32,
 }
 
 impl Ranges {
-    /// Returns the values of a frame as ranges.
-    pub fn exact(frame: &Frame) -> Self {
+    /// Returns the values of a frame as ranges; no color of the scene is brighter than `brightest`.
+    pub fn exact(frame: &Frame, brightest: f32) -> Self {
         let low = values(frame);
-        Self { high: low.clone(), low }
+        Self { high: low.clone(), low, brightest: brightest.max(1.0) }
     }
 
-    /// Returns the ranges of the frames of a scene whose numbers are rounded differently; `frame` is one of these.
-    pub fn rounded(scene: &RuntimeScene, view: &View, background: Background, frame: &Frame) -> Self {
-        let mut ranges = Self::exact(frame);
+    /// Returns the ranges of the frames of a scene whose numbers are rounded differently; `self` has the values of one of these.
+    pub fn rounded(mut self, scene: &RuntimeScene, view: &View, background: Background) -> Self {
         for seed in 0..FRAMES {
             let frame = reference::render(&rounded(scene, seed), view, background);
-            let pixels = ranges.low.iter_mut().zip(&mut ranges.high).zip(values(&frame));
+            let pixels = self.low.iter_mut().zip(&mut self.high).zip(values(&frame));
             for ((low, high), found) in pixels {
                 for (at, found) in found.into_iter().enumerate() {
                     low[at] = low[at].min(found);
@@ -45,7 +46,7 @@ impl Ranges {
                 }
             }
         }
-        ranges
+        self
     }
 
     /// Returns the number of pixels.
@@ -54,14 +55,15 @@ impl Ranges {
     }
 
     /// Returns the distance of the values of a pixel from its ranges, beyond the width of the ranges again: the largest, relative to the
-    /// larger of 1 and the value.
+    /// larger of 1 and the value, for colors to the brightest color of the scene.
     pub fn distance(&self, found: &Frame, pixel: usize) -> f32 {
         let (low, high, found) = (self.low[pixel], self.high[pixel], values_of(found, pixel));
         let one = |at: usize| {
             let (low, high, found) = (low[at], high[at], found[at]);
             let width = high - low;
             let outside = (low - found).max(found - high) - width;
-            let relative = outside.max(0.0) / low.abs().max(high.abs()).max(found.abs()).max(1.0);
+            let least = if at < 3 { self.brightest } else { 1.0 };
+            let relative = outside.max(0.0) / low.abs().max(high.abs()).max(found.abs()).max(least);
             if at == 4 { relative / DEPTH } else { relative }
         };
         (0..5).map(one).fold(0.0, f32::max)

@@ -50,7 +50,8 @@ pub fn run() {
     let gaussians = &mut half.form.as_sliced_mut().expect("the scene is sliced").gaussians;
     gaussians.iter_mut().step_by(2).for_each(|gaussian| gaussian.opacity = 0.0);
     let other = reference::render(&half, &view, BLACK);
-    for ranges in [Ranges::exact(&frame), Ranges::rounded(&scene, &view, BLACK, &frame)] {
+    let exact = || Ranges::exact(&frame, limits.brightest(BLACK));
+    for ranges in [exact(), exact().rounded(&scene, &view, BLACK)] {
         designs::same(&frame, &ranges).expect("a frame lies in its own ranges");
         designs::same(&other, &ranges).expect_err("a frame without half of the Gaussians is a defect");
     }

@@ -5,6 +5,7 @@
 //! reads; and the coefficients decoded from them. `offline::quantize::codebook` trains the codebooks.
 
 use super::lanes::{self, BASE_MAX, COLOR_WORDS, MAX_ENTRIES, MAX_STAGES};
+use crate::gaussian::harmonics::BRIGHTEST;
 use crate::gaussian::{Harmonics, harmonics};
 use glam::Vec3;
 use half::f16;
@@ -149,7 +150,7 @@ impl CodedColors {
                 color += harmonics::time_cosine(n, tau, time_span) * block(16 * n, 16);
             }
         }
-        (color + 0.5).max(Vec3::ZERO)
+        (color + 0.5).max(Vec3::ZERO).min(Vec3::splat(BRIGHTEST))
     }
 
     /// Returns all coefficients of all Gaussians, whose first coefficients are in the range `base`.
