@@ -1,26 +1,31 @@
-//! `gs4d bake CHECKPOINT --data DIR -o OUT`: from a trained checkpoint to a small, fast package, and a report of what it cost.
+//! `gs4d bake INPUT -o OUT`: from a trained checkpoint, or from pictures, to a small, fast package, and a report of what it cost.
 //!
-//! In: a checkpoint, its training views. Out: a package `NAME.gs4d`, `NAME.report.json` and `NAME.report.html` beside
-//! it, and a summary of the report.
+//! In: a checkpoint and its training views, or the folder of a dataset alone. Out: a package `NAME.gs4d`, `NAME.report.json` and
+//! `NAME.report.html` beside it, a summary of the report; the capture trained from a dataset as `NAME.trained.gs4d`.
 
-use super::args::{
-    CheckpointArgs, EngineArgs, Given, PackageArgs, ScoringArgs, SplitArgs, ValidationArgs, score_choice, values,
-};
+use super::args::{CheckpointArgs, EngineArgs, Given, PackageArgs, ScoringArgs, ValidationArgs, score_choice, values};
 use super::failure::Failure;
+use super::interrupt;
 use super::progress::Bars;
 use super::report::Report;
 use super::table::{bytes, lines};
 use crate::offline::bake::{BakeSettings, Baked, bake};
+use crate::offline::engine::Engine;
 use crate::offline::evaluation::color_name;
 use crate::offline::fine_tune::{FineTuneSettings, GradientSums};
 use crate::offline::quantize::Quality;
 use crate::offline::report::{BakeReport, Change};
 use crate::offline::search::{Goal, ScoreChoice};
+use crate::offline::splits::SplitOptions;
 use crate::offline::temporal_filter::FILTER_NAMES;
-use crate::scene::{FilterKind, MAX_SEGMENTS};
+use crate::offline::train::{TrainSettings, train_dataset, trained_path};
+use crate::scene::{FilterKind, GaussianScene, MAX_SEGMENTS};
 use std::path::{Path, PathBuf};
 
-/// Turn a trained checkpoint into a small, fast package: score, prune, fine-tune, mask, compress, evaluate, report.
+/// Turn a trained checkpoint, or pictures, into a small, fast package: train, score, prune, fine-tune, mask, compress, evaluate, report.
+///
+/// With the folder of a dataset in place of a checkpoint, a capture is trained from its pictures first, as by gs4d train, and kept beside OUT
+/// as NAME.trained.gs4d, from which other packages can be baked.
 ///
 /// An interrupted bake resumes from the results in OUT.bake/. A stage runs again if any of its inputs has changed: the checkpoint, a camera,
 /// an image, a mask, an option, the version of gs4d.
@@ -31,6 +36,8 @@ Examples:
   gs4d bake chkpnt30000.pth --data data/toybox -o toybox.gs4d
   gs4d bake chkpnt30000.pth --data data/toybox --ratio 0.5 --quality small -o toybox.gs4d
   gs4d bake chkpnt30000.pth --data data/toybox --target-size 1.5 -o toybox.gs4d
+  gs4d bake data/hook --resolution 2 -o hook.gs4d
+  gs4d bake hook.trained.gs4d --data data/hook --resolution 2 --target-size 0.6 -o small.gs4d
   gs4d bake n3v.pth --data data/n3v --time-interval 0,10 --max-loss 0.2 --every 20 -o n3v.gs4d
 
 Beside the package: OUT.report.html with plots and pictures (open it in a browser; it needs no network) and OUT.report.json.
@@ -39,13 +46,23 @@ their images are there. Cameras and times of the training views are enough with 
 pub(super) struct Bake {
     #[command(flatten)]
     given: Given,
-    /// The checkpoint, or a package of it in the trained form.
-    #[arg(value_name = "CHECKPOINT")]
+    /// The checkpoint, a package of it in the trained form, or the folder of a dataset, whose pictures a capture is trained from.
+    #[arg(value_name = "INPUT")]
     input: PathBuf,
     #[command(flatten)]
     package: PackageArgs,
-    #[command(flatten)]
-    data: SplitArgs,
+    /// Folder of the dataset, with `transforms_train.json` and `transforms_test.json`, unless it is the INPUT.
+    #[arg(long, help_heading = "Data", value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Divisor of the picture size (1, 2, 3, 4, 8), -1 (at most 1600 wide) or a target width, as in training.
+    #[arg(long, help_heading = "Data", value_name = "N", allow_negative_numbers = true)]
+    resolution: Option<i32>,
+    /// Number of Gaussians to train from pictures [default: 60000].
+    #[arg(long, help_heading = "Training from pictures", value_name = "N", value_parser = values::count(100_000_000))]
+    gaussians: Option<usize>,
+    /// Steps of training from pictures [default: 20000].
+    #[arg(long, help_heading = "Training from pictures", value_name = "N", value_parser = values::count(100_000_000))]
+    train_steps: Option<usize>,
     #[command(flatten)]
     validation: ValidationArgs,
     /// Share of the Gaussians to remove, 0 to 1.
@@ -116,20 +133,67 @@ impl Bake {
     pub(super) fn run(&self) -> Result<Report, Failure> {
         self.engine.check(&self.given, &OF_TRAINING)?;
         self.scoring.check(&self.given, &[self.variant])?;
-        let settings = self.settings(self.package.out()?);
+        let (settings, progress) = (self.settings(self.package.out()?)?, &mut Bars::default());
         settings.check_files()?;
-        let scene = self.checkpoint.load_to_change(&self.input)?;
-        let engine = &mut self.engine.open(&self.given, &OF_TRAINING)?;
-        let Baked { report, html, .. } = bake(scene, &settings, engine, &mut Bars::default())?;
+        let (scene, engine) = if self.is_dataset() {
+            let engine = self.engine.open(&self.given, &OF_TRAINING)?;
+            self.train(&settings, engine, progress)?
+        } else {
+            (self.checkpoint.load_to_change(&self.input)?, self.engine.open(&self.given, &OF_TRAINING)?)
+        };
+        let Baked { report, html, .. } = bake(scene, &settings, &mut { engine }, progress)?;
         Ok(Report::new(report.json()?, in_short(&report, &html)))
     }
 
-    fn settings(&self, out: &Path) -> BakeSettings {
-        BakeSettings {
-            checkpoint: self.input.clone(),
-            data: self.data.data.clone(),
+    /// Returns whether the input is a dataset, from whose pictures a capture is trained.
+    fn is_dataset(&self) -> bool {
+        self.input.is_dir()
+    }
+
+    /// Returns the folder of the dataset, after checking that every option has an effect.
+    fn data(&self) -> Result<&Path, Failure> {
+        match (&self.data, self.is_dataset()) {
+            (Some(data), false) => {
+                let of_pictures = ["--gaussians", "--train-steps"];
+                self.given.none_of(&of_pictures, "with a checkpoint: they are of the training from pictures")?;
+                Ok(data)
+            }
+            (None, true) => {
+                self.given.none_of(&CheckpointArgs::OF_CHECKPOINTS, "with a dataset: they are of checkpoints")?;
+                Ok(&self.input)
+            }
+            (Some(_), true) => Err(Failure::about(&self.input, "is the dataset: --data has no effect on it")),
+            (None, false) => Err(Failure::about(
+                &self.input,
+                "is baked with the views that it was trained on: give --data DIR, or the folder of a dataset as INPUT",
+            )),
+        }
+    }
+
+    /// Trains the capture from the pictures of the dataset.
+    fn train(
+        &self,
+        settings: &BakeSettings,
+        mut engine: Engine,
+        progress: &mut Bars,
+    ) -> Result<(GaussianScene, Engine), Failure> {
+        let mut training = TrainSettings::usual(settings.data.clone(), settings.splits);
+        training.start.gaussians = self.gaussians.unwrap_or(training.start.gaussians);
+        training.tuning = TrainSettings::tuning(self.train_steps.unwrap_or(TrainSettings::STEPS));
+        training.capture = self.checkpoint.capture();
+        let deferred = interrupt::defer();
+        let scene = train_dataset(&training, &settings.out, &mut engine, progress)?;
+        drop(deferred);
+        Ok((scene, engine))
+    }
+
+    fn settings(&self, out: &Path) -> Result<BakeSettings, Failure> {
+        let data = self.data()?.to_owned();
+        Ok(BakeSettings {
+            checkpoint: if self.is_dataset() { trained_path(out) } else { self.input.clone() },
+            data,
             out: out.to_owned(),
-            splits: self.data.options(self.validation.validation),
+            splits: SplitOptions { size: None, resolution: self.resolution, validation: self.validation.validation },
             background: self.checkpoint.background,
             goal: self.goal(),
             rounds: self.rounds,
@@ -147,7 +211,7 @@ impl Bake {
             level: self.package.level,
             trust_images: self.validation.trust_images,
             keep_work: self.keep_work,
-        }
+        })
     }
 
     /// Returns how many Gaussians to keep.

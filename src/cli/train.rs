@@ -3,23 +3,19 @@
 //! In: training views with their images. Out: a package in the trained form, rewritten while training goes on, and its quality at each
 //! evaluation.
 
-use super::args::{Given, PackageArgs, RendererArgs, SplitArgs, TrainingArgs, ValidationArgs, WITHOUT_TIME, values};
+use super::args::{Given, PackageArgs, RendererArgs, SplitArgs, TrainingArgs, WITHOUT_TIME, values};
 use super::curve::curve_table;
 use super::failure::Failure;
 use super::interrupt;
 use super::progress::Bars;
 use super::report::Report;
 use super::table::{bytes, lines};
-use crate::offline::dataset::{Validation, require_images};
+use crate::offline::dataset::Validation;
 use crate::offline::engine::AdapterDescription;
 use crate::offline::files::Files;
-use crate::offline::fine_tune::{
-    FineTuneSettings, FineTuned, Growth, Rates, Resume, Terms, TrainingImages, require_room,
-};
-use crate::offline::store::{Key, Store};
-use crate::offline::train::{CaptureSettings, Start, StartSettings, begin, capture_of, train};
-use crate::offline::{OfflineError, trained_pixel};
-use crate::scene::TrainedWith;
+use crate::offline::fine_tune::{FineTuneSettings, FineTuned, Growth, Rates, Terms, require_room};
+use crate::offline::store::Store;
+use crate::offline::train::{CaptureSettings, Start, StartSettings, TrainSettings, TrainedCapture, Training};
 use serde_json::json;
 
 /// Train a capture from nothing but the pictures of a dataset.
@@ -127,43 +123,23 @@ impl Train {
         let out = self.package.checked_file(self.data.add_to(Files::default()))?;
         let store = Store::beside(out, ".train")?;
         let progress = &mut Bars::default();
-        // Every time, before the interval is known.
-        let any_time = TrainedWith { time_interval: [f32::NEG_INFINITY, f32::INFINITY], ..TrainedWith::default() };
-        let validation = ValidationArgs { validation: self.validation, trust_images: true };
-        let all = self.data.divide(validation, &any_time, progress)?.all_training(&any_time, progress)?;
-        let settings = CaptureSettings { time_interval: self.time_interval, background: self.background };
-        let (mut trained_with, playback) = capture_of(&all, &settings).map_err(OfflineError::from)?;
-        let splits = self.data.divide(validation, &trained_with, progress)?;
-        trained_with.validation = Some(splits.to_string());
-        require_images(&splits.train).map_err(OfflineError::from)?;
+        let settings = self.settings();
+        let training = Training::open(&settings, progress)?;
         let mut headless = self.renderer.open()?;
-        TrainingImages::require_room(&splits.train, &splits.validation, &headless)?;
-        let start = self.start_settings();
-        require_room(&headless, start.gaussians, start.degree, start.degree_t).map_err(|error| {
+        let StartSettings { gaussians, degree, degree_t, .. } = settings.start;
+        require_room(&headless, gaussians, degree, degree_t).map_err(|error| {
             Failure::new(format!("{error}; --gaussians and --sh-degree make them fewer or smaller"))
         })?;
-        let images = TrainingImages::load(splits.train.clone(), &splits.validation, &trained_with, progress)?;
-        let (scene, started) = begin(&images, trained_with, playback, &start).map_err(OfflineError::from)?;
-        let from = started.name();
-        let key = Key::of_images(&splits.train)?
-            .with(Key::of_images(&splits.validation)?)
-            .and(&format!("{start:?} {:?} {:?} {:?}", scene.trained_with, splits.train, splits.validation))
-            .and(env!("CARGO_PKG_VERSION"));
-        let resume = Resume { store: &store, key, every: self.save_every };
         let deferred = interrupt::defer();
-        let trained = train(&mut headless, scene, &images, &self.settings(), Some(resume), Some(out), progress);
-        let (mut trained, interrupted) = match trained {
-            Err(OfflineError::Interrupted { tuned: Some(trained) }) => (*trained, true),
-            trained => (trained?, false),
-        };
-        trained.scene.trained_with.pixel = trained_pixel(&trained.scene, &all);
-        trained.scene.trained_with.iteration = trained.best.step as u64;
-        let size = self.package.save(&trained.scene)?;
+        let trained = training.run(&mut headless, &store, out, progress)?;
+        let TrainedCapture { tuned, started, views, splits, interrupted } = &trained;
+        let (from, interrupted) = (started.name(), *interrupted);
+        let size = self.package.save(&tuned.scene)?;
         drop(deferred);
         if !interrupted {
             store.remove()?;
         }
-        let FineTuned { scene, curve, best, steps_per_second, validation, faults } = &trained;
+        let FineTuned { scene, curve, best, steps_per_second, validation, faults } = tuned;
         let quality = match best.psnr {
             Some(psnr) => format!("{psnr:.3} dB at step {} ({validation} validation views)", best.step),
             None => "not measured, no validation views".to_owned(),
@@ -171,8 +147,8 @@ impl Train {
         let speed = steps_per_second.map_or(String::new(), |speed| format!(", {speed:.1} steps per second"));
         let gaussians = scene.len();
         let mut pairs = vec![
-            ("trained", format!("{gaussians} Gaussians on {} views, begun from {from} points{speed}", images.len())),
-            ("views", splits.to_string()),
+            ("trained", format!("{gaussians} Gaussians on {views} views, begun from {from} points{speed}")),
+            ("views", splits.clone()),
             ("PSNR", quality),
             ("wrote", format!("{}, {}", out.display(), bytes(size))),
         ];
@@ -187,9 +163,9 @@ impl Train {
             "bytes_out": size,
             "gaussians": gaussians,
             "start": from,
-            "views": images.len(),
+            "views": views,
             "validation": validation,
-            "split": splits.to_string(),
+            "split": splits,
             "time_interval": scene.trained_with.time_interval,
             "best": best,
             "psnr": best.psnr,
@@ -226,7 +202,18 @@ impl Train {
         }
     }
 
-    fn settings(&self) -> FineTuneSettings {
+    fn settings(&self) -> TrainSettings {
+        TrainSettings {
+            data: self.data.data.clone(),
+            splits: self.data.options(self.validation),
+            capture: CaptureSettings { time_interval: self.time_interval, background: self.background },
+            start: self.start_settings(),
+            tuning: self.tuning(),
+            save_every: self.save_every,
+        }
+    }
+
+    fn tuning(&self) -> FineTuneSettings {
         let shared = self.training.settings();
         let usual = Growth::over(self.steps);
         FineTuneSettings {
@@ -245,5 +232,24 @@ impl Train {
             }),
             ..shared
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Command {
+        #[command(flatten)]
+        train: Train,
+    }
+
+    #[test]
+    fn without_options_the_settings_are_the_usual_ones() {
+        let command = Command::try_parse_from(["train", "--data", "d", "-o", "o.gs4d"]).expect("both paths are given");
+        let (settings, splits) = (command.train.settings(), command.train.data.options(Validation::Auto));
+        assert_eq!(settings, TrainSettings::usual("d".into(), splits), "a bake trains with the same settings");
     }
 }

@@ -129,6 +129,9 @@ pub enum OfflineError {
     /// Gaussians are so far apart that no camera sees them all.
     #[error("the Gaussians are too far apart for an orbit of cameras around them: give --cameras, or prune the scene")]
     TooFarApart,
+    /// Training begins on a GPU alone.
+    #[error("training from pictures needs a GPU; --engine gpu takes one with a software driver, slowly")]
+    TrainingWithoutGpu,
     /// A sliced scene cannot be converted to the trained form.
     #[error(
         "holds a sliced form, which cannot be converted to the trained form: convert the checkpoint with --form trained"

@@ -1,4 +1,4 @@
-//! The offline half: from a trained checkpoint and its training views to a small, fast capture, with the loss of quality.
+//! The offline half: from pictures, or a trained checkpoint and its training views, to a small, fast capture, with the loss of quality.
 //!
 //! In: a `GaussianScene`, the views it was trained on, an [`Engine`](engine::Engine) that scores and draws them on
 //! the GPU or the CPU. Out: a smaller scene, packages, pictures, measurements. Build scripts and editors can call every

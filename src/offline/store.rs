@@ -74,6 +74,11 @@ impl Key {
         Ok(Self(*hasher.finalize().as_bytes()))
     }
 
+    /// Returns the hash.
+    pub fn bytes(&self) -> &[u8] {
+        &self.0
+    }
+
     /// Returns the key of this one and of `other`.
     pub fn with(self, other: Self) -> Self {
         Self::of(&[self.0, other.0].concat())

@@ -104,3 +104,29 @@ fn data_that_no_capture_can_be_trained_on_is_refused() {
     run(&[]).must_fail("c01_02.png");
     assert_eq!(folders::names(capture.folder.path()), before, "no file is left");
 }
+
+#[test]
+fn pictures_are_baked_in_one_command() {
+    let Some(capture) = dataset() else { return };
+    let (out, trained) = (capture.path("out.gs4d"), capture.path("out.trained.gs4d"));
+    let bake = |more: &[&str]| {
+        let command = arguments!["bake", &capture.data, "-o", &out, "--engine", "gpu", "--json", "--keep-work"];
+        let training =
+            ["--gaussians", "300", "--train-steps", "40", "--steps", "10", "--rounds", "1", "--trust-images"];
+        gs4d(&[command.to_vec(), training.iter().chain(more).map(Into::into).collect()].concat())
+    };
+    let first = bake(&["--keep", "200"]);
+    assert!(!first.err.contains("skipped, done before"), "nothing was trained before: {}", first.err);
+    let json = first.json();
+    assert_eq!(json["gaussians"]["after"].as_u64(), Some(200), "the package has as many as are kept: {json}");
+    let info = gs4d(&arguments!["info", &trained, "--json"]).json();
+    assert_eq!((info["gaussians"].as_u64(), info["form"].as_str()), (Some(300), Some("trained")), "{info}");
+    let again = bake(&["--keep", "150"]);
+    assert!(again.err.contains("train: skipped, done before"), "the training does not depend on --keep: {}", again.err);
+    bake(&["--keep", "150", "--data", "elsewhere"]).must_fail("--data has no effect");
+    bake(&["--keep", "150", "--raster-fov", "corrected"]).must_fail("--raster-fov has no effect");
+    gs4d(&arguments!["bake", &trained, "-o", &out]).must_fail("give --data DIR");
+    gs4d(&arguments!["bake", &trained, "--data", &capture.data, "-o", &out, "--train-steps", "5"])
+        .must_fail("--train-steps");
+    gs4d(&arguments!["bake", &capture.data, "-o", &out, "--engine", "cpu"]).must_fail("needs a GPU");
+}

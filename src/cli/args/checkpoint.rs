@@ -7,6 +7,7 @@ use crate::cli::failure::Failure;
 use crate::cli::note::note;
 use crate::codec::{self, ReadOptions};
 use crate::gaussian::ShDirection;
+use crate::offline::train::CaptureSettings;
 use crate::scene::{GaussianScene, RotationConvention, TrainedCameras, UpAxis};
 use crate::view::RasterFov;
 use std::path::Path;
@@ -67,6 +68,24 @@ const UP_AXES: [(&str, UpAxis); 6] = [
 ];
 
 impl CheckpointArgs {
+    /// The options that have an effect on checkpoints and packages alone, not on captures trained from pictures.
+    pub(crate) const OF_CHECKPOINTS: [&str; 8] = [
+        "--rotation-convention",
+        "--raster-fov",
+        "--trained-cameras",
+        "--sh-direction",
+        "--force-sh-3d",
+        "--prefilter-var",
+        "--up",
+        "--duration",
+    ];
+
+    /// Returns the settings of a capture that is trained from pictures.
+    pub(crate) fn capture(&self) -> CaptureSettings {
+        let background = self.background.unwrap_or_default();
+        CaptureSettings { time_interval: self.time_interval, background }
+    }
+
     /// Opens a checkpoint or a package.
     ///
     /// # Errors

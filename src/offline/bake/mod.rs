@@ -1,6 +1,6 @@
-//! From a trained checkpoint to a small, fast package, in one call, and a report of the loss of quality.
+//! From a trained checkpoint, or from pictures, to a small, fast package, and a report of the loss of quality.
 //!
-//! In: a checkpoint, the views of its dataset, [`BakeSettings`]. Out: a package, and `NAME.report.json` and `NAME.report.html` next to a
+//! In: a checkpoint or the capture of [`train_dataset`](super::train::train_dataset), the views of its dataset, [`BakeSettings`]. Out: a package, and `NAME.report.json` and `NAME.report.html` next to a
 //! package `NAME.gs4d` ([`Baked`]). [`bake()`] is the list of stages. All stages before the evaluation store their results in the folder
 //! `OUT.bake` next to a package `OUT` ([`Store`](super::store::Store)), so that an interrupted bake resumes. Two bakes cannot use one
 //! folder at the same time.

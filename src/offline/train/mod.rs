@@ -8,6 +8,8 @@
 //! | `region` | the box that the cameras look at |
 //! | `start` | the Gaussians before the first step, from points |
 //! | `hull` | points inside the silhouettes of a moment |
+//! | `training` | the whole of a training, from the folder of a dataset to the trained capture |
+//! | `once` | the same as the first stage of a bake: a finished training is not repeated |
 //! | `writer` | the package that is rewritten while training goes on |
 //!
 //! Training is [`fine_tune`](mod@crate::offline::fine_tune) with [`Growth`](crate::offline::fine_tune::Growth): the same passes, loss, schedules of
@@ -16,14 +18,18 @@
 mod capture;
 mod error;
 mod hull;
+mod once;
 mod point;
 mod region;
 mod start;
+mod training;
 mod writer;
 
 pub use capture::{CaptureSettings, capture_of};
 pub use error::StartError;
+pub use once::{train_dataset, trained_path};
 pub use start::{Start, StartSettings, begin};
+pub use training::{TrainSettings, TrainedCapture, Training};
 
 use super::fine_tune::{FineTuneSettings, FineTuned, Resume, Scene, TrainingImages, fine_tune_watched};
 use super::{OfflineError, Progress};

@@ -1,0 +1,54 @@
+//! The stage train of a bake whose input is a dataset: the capture that the stages after it prune and compress.
+//!
+//! In: [`TrainSettings`], the path of the package of a bake. Out: the capture, trained now or by an earlier run with the same inputs; its
+//! package in the trained form at [`trained_path`], from which smaller packages can be baked later.
+
+use super::training::{TrainSettings, TrainedCapture, Training};
+use crate::codec::{self, ReadOptions};
+use crate::offline::engine::Engine;
+use crate::offline::files::Files;
+use crate::offline::store::{Key, Store};
+use crate::offline::{OfflineError, Progress, save, write_settings};
+use crate::scene::GaussianScene;
+use std::path::{Path, PathBuf};
+
+/// Name of the stored result: the hash of the package.
+const STAGE: &str = "train";
+
+/// Returns the path of the trained capture beside the package `out`: `NAME.trained.gs4d`.
+pub fn trained_path(out: &Path) -> PathBuf {
+    out.with_extension("trained.gs4d")
+}
+
+/// Returns the capture of a dataset. Begins the task "training" unless an earlier run has finished it; an interrupted training resumes from
+/// the folder `OUT.bake`.
+///
+/// # Errors
+/// No GPU; views or images that cannot be used, Gaussians that do not fit, a package that cannot be written; [`OfflineError::Interrupted`] if
+/// the user has ended the training.
+pub fn train_dataset(
+    settings: &TrainSettings,
+    out: &Path,
+    engine: &mut Engine,
+    progress: &mut dyn Progress,
+) -> Result<GaussianScene, OfflineError> {
+    let Engine::Gpu(headless) = engine else { return Err(OfflineError::TrainingWithoutGpu) };
+    let trained = trained_path(out);
+    Files::default().reads_data(&settings.data).writes_regular(&trained, "gs4d").check()?;
+    let store = Store::beside(out, ".bake")?;
+    let training = Training::open(settings, progress)?;
+    let key = training.key();
+    let done = store.load(STAGE, key).zip(Key::of_file(&trained).ok());
+    if done.is_some_and(|(stored, found)| stored == found.bytes()) {
+        progress.note("train: skipped, done before");
+    } else {
+        let TrainedCapture { tuned, interrupted, .. } = training.run(headless, &store, &trained, progress)?;
+        save(&trained, &tuned.scene, &write_settings(&tuned.scene.form, None))?;
+        if interrupted {
+            return Err(OfflineError::Interrupted { tuned: None });
+        }
+        store.store(STAGE, key, Key::of_file(&trained)?.bytes())?;
+    }
+    // The stages after this one read the package, so that a resumed run begins with the same bytes.
+    Ok(codec::load(&trained, &ReadOptions::default())?)
+}

@@ -1,0 +1,146 @@
+//! Training from a folder of pictures: everything between the dataset and the trained capture.
+//!
+//! In: [`TrainSettings`]. Out: the checked and divided views ([`Training`]), and from these the capture with the best parameters
+//! ([`TrainedCapture`]). The package OUT is rewritten while training goes on.
+
+use super::capture::{CaptureSettings, capture_of};
+use super::start::{Start, StartSettings, begin};
+use super::train;
+use crate::offline::dataset::{TrainingView, require_images};
+use crate::offline::fine_tune::{FineTuneSettings, FineTuned, Growth, Resume, Terms, TrainingImages, require_room};
+use crate::offline::splits::{SplitOptions, Splits};
+use crate::offline::store::{Key, Store};
+use crate::offline::{OfflineError, Progress, trained_pixel};
+use crate::renderer::Headless;
+use crate::scene::{PlaybackHints, TrainedWith};
+use std::path::{Path, PathBuf};
+
+/// What a capture is trained from, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrainSettings {
+    /// Folder of the dataset.
+    pub data: PathBuf,
+    /// How the views are read and divided.
+    pub splits: SplitOptions,
+    /// The settings of the capture that the views do not contain.
+    pub capture: CaptureSettings,
+    /// How the capture begins.
+    pub start: StartSettings,
+    /// How it is trained.
+    pub tuning: FineTuneSettings,
+    /// Steps between two saved states, rounded up to the next evaluation.
+    pub save_every: usize,
+}
+
+impl TrainSettings {
+    /// The usual number of steps.
+    pub const STEPS: usize = 20_000;
+
+    /// Returns the settings of a training that begins without Gaussians: the usual ones but for the number of steps.
+    pub fn tuning(steps: usize) -> FineTuneSettings {
+        FineTuneSettings {
+            steps,
+            terms: Terms { opacity: 0.01, scale: 0.01, ..Terms::default() },
+            similarity_share: 0.2,
+            evaluate_every: 1000,
+            growth: Some(Growth::over(steps)),
+            ..FineTuneSettings::default()
+        }
+    }
+
+    /// Returns the usual settings for a dataset.
+    pub fn usual(data: PathBuf, splits: SplitOptions) -> Self {
+        let (capture, start) = (CaptureSettings::default(), StartSettings::default());
+        Self { data, splits, capture, start, tuning: Self::tuning(Self::STEPS), save_every: 5000 }
+    }
+}
+
+/// A training whose views are read.
+#[derive(Debug)]
+pub struct Training<'a> {
+    settings: &'a TrainSettings,
+    splits: Splits,
+    /// Every training view, including the validation views.
+    views: Vec<TrainingView>,
+    trained_with: TrainedWith,
+    playback: PlaybackHints,
+    key: Key,
+}
+
+/// A capture trained from pictures.
+#[derive(Debug)]
+pub struct TrainedCapture {
+    /// The capture with the best parameters, and its quality at each evaluation.
+    pub tuned: FineTuned,
+    /// Where its first Gaussians came from.
+    pub started: Start,
+    /// Number of views that it was trained on.
+    pub views: usize,
+    /// The division of the views, in words.
+    pub splits: String,
+    /// Whether the user ended the training before its last step.
+    pub interrupted: bool,
+}
+
+impl<'a> Training<'a> {
+    /// Reads the views of the dataset, divides them, and hashes their images.
+    ///
+    /// # Errors
+    /// Views or images that are missing or cannot be used.
+    pub fn open(settings: &'a TrainSettings, progress: &mut dyn Progress) -> Result<Self, OfflineError> {
+        let TrainSettings { data, splits: options, capture, start, tuning, .. } = settings;
+        // Every time, before the interval is known.
+        let any_time = TrainedWith { time_interval: [f32::NEG_INFINITY, f32::INFINITY], ..TrainedWith::default() };
+        let views = Splits::open(data, options, &any_time, progress)?.all_training(&any_time, progress)?;
+        let (mut trained_with, playback) = capture_of(&views, capture)?;
+        let splits = Splits::open(data, options, &trained_with, progress)?;
+        trained_with.validation = Some(splits.to_string());
+        require_images(&splits.train)?;
+        let key = Key::of_images(&splits.train)?
+            .with(Key::of_images(&splits.validation)?)
+            .and(&format!("{start:?} {tuning:?} {trained_with:?} {:?} {:?}", splits.train, splits.validation))
+            .and(env!("CARGO_PKG_VERSION"));
+        Ok(Self { settings, splits, views, trained_with, playback, key })
+    }
+
+    /// Returns the key of everything that the result depends on: images, cameras, settings, version.
+    pub fn key(&self) -> Key {
+        self.key
+    }
+
+    /// Trains the capture. Each better scene is written to `out`; the result is not. State is kept in `store`, from which a training with the
+    /// same key resumes.
+    ///
+    /// # Errors
+    /// More Gaussians or images than fit, a lost device, a package or a state that cannot be written.
+    pub fn run(
+        self,
+        headless: &mut Headless,
+        store: &Store,
+        out: &Path,
+        progress: &mut dyn Progress,
+    ) -> Result<TrainedCapture, OfflineError> {
+        let Self {
+            settings: TrainSettings { start, tuning, save_every, .. },
+            splits,
+            views,
+            trained_with,
+            playback,
+            key,
+        } = self;
+        TrainingImages::require_room(&splits.train, &splits.validation, headless)?;
+        require_room(headless, start.gaussians, start.degree, start.degree_t)?;
+        let division = splits.to_string();
+        let images = TrainingImages::load(splits.train, &splits.validation, &trained_with, progress)?;
+        let (scene, started) = begin(&images, trained_with, playback, start)?;
+        let resume = Resume { store, key, every: *save_every };
+        let (mut tuned, interrupted) = match train(headless, scene, &images, tuning, Some(resume), Some(out), progress)
+        {
+            Err(OfflineError::Interrupted { tuned: Some(tuned) }) => (*tuned, true),
+            tuned => (tuned?, false),
+        };
+        tuned.scene.trained_with.pixel = trained_pixel(&tuned.scene, &views);
+        tuned.scene.trained_with.iteration = tuned.best.step as u64;
+        Ok(TrainedCapture { tuned, started, views: images.len(), splits: division, interrupted })
+    }
+}
