@@ -30,7 +30,7 @@ fn a_capture_is_trained_from_the_pictures_of_a_dataset() {
     let Some(capture) = dataset() else { return };
     let out = capture.path("out.gs4d");
     let command = arguments!["train", "--data", &capture.data, "-o", &out, "--gaussians", "300", "--sh-degree", "1"];
-    let short = ["--steps", "90", "--evaluate-every", "30", "--mean-rate", "4", "--json"].map(Into::into);
+    let short = ["--steps", "240", "--evaluate-every", "80", "--mean-rate", "4", "--json"].map(Into::into);
     let json = gs4d(&[command.to_vec(), short.to_vec()].concat()).json();
     assert_eq!(
         (json["gaussians"].as_u64(), json["views"].as_u64(), json["start"].as_str()),
@@ -39,7 +39,10 @@ fn a_capture_is_trained_from_the_pictures_of_a_dataset() {
     );
     let curve = json["curve"].as_array().expect("a curve");
     let (first, best) = (curve[0]["psnr"].as_f64().expect("a number"), json["psnr"].as_f64().expect("a number"));
-    assert!(curve.len() == 4 && best > first + 1.0, "training raises the PSNR from {first:.2} to {best:.2} dB");
+    assert!(
+        curve.len() == 4 && first < 12.0 && best > 18.0,
+        "training raises the PSNR of the camera held out from {first:.2} to {best:.2} dB, 18 expected"
+    );
     assert_eq!(folders::names(capture.folder.path()), ["data", "out.gs4d"], "no state is left");
     let info = gs4d(&arguments!["info", &out, "--json"]).json();
     assert_eq!((info["gaussians"].as_u64(), info["form"].as_str()), (Some(300), Some("trained")), "{info}");
