@@ -49,12 +49,15 @@
 mod active;
 pub(crate) mod bind;
 mod capture;
+mod compiling;
 mod design;
 mod device;
 mod error;
 mod headless;
 pub(crate) mod layout;
+mod layouts;
 pub(crate) mod memory;
+mod passes;
 mod pipelines;
 pub(crate) mod shaders;
 mod statistics;

@@ -366,6 +366,17 @@ impl FastVariant {
         [self.blending.definitions(), self.precision.definitions(), batches].concat()
     }
 
+    /// Returns the other variants that draw the same picture, perhaps not as fast: with lists of other lengths, counters for any number of bins,
+    /// batches of another size.
+    pub(super) fn substitutes(self) -> impl Iterator<Item = Self> {
+        let bins = if self.few_bins { &[true, false][..] } else { &[false] };
+        let lists = [self.lists].into_iter().chain(Lists::ALL);
+        let batches = [self.large_batches, !self.large_batches];
+        lists
+            .flat_map(move |lists| batches.map(|large_batches| Self { lists, large_batches, ..self }))
+            .flat_map(move |variant| bins.iter().map(move |&few_bins| Self { few_bins, ..variant }))
+    }
+
     pub(super) fn pixels(self) -> Pixels {
         Pixels { multisampled: self.blending.is_multisampled(), precision: self.precision }
     }

@@ -22,7 +22,8 @@ pub(super) fn init_renderer(mut commands: Commands, device: Res<RenderDevice>, s
     match catch_known(device, 0, || Renderer::new(device, checks)).flatten() {
         Ok(renderer) => {
             statistics.set_renderer_missing(None);
-            commands.insert_resource(CaptureRenderer(renderer.counting(statistics.work())));
+            let renderer = renderer.counting(statistics.work()).compiling_in_background();
+            commands.insert_resource(CaptureRenderer(renderer));
         }
         Err(failure) => {
             error!("captures are not drawn: {failure}");

@@ -9,7 +9,7 @@ use super::statistics::CaptureStatistics;
 use crate::plugin::asset::Uploads;
 use crate::plugin::component::GaussianCapture;
 use crate::renderer::memory::{Caught, catch, catch_known};
-use crate::renderer::{CaptureUpload, GpuCapture, GpuError, ViewRenderer};
+use crate::renderer::{CaptureUpload, GpuCapture, GpuError, Storage, ViewRenderer};
 use crate::scene::{Bounds, Level, RuntimeScene};
 use bevy::asset::{AssetId, AssetServer, RenderAssetUsages};
 use bevy::ecs::resource::Resource;
@@ -20,6 +20,7 @@ use bevy::render::Extract;
 use bevy::render::render_asset::{AssetExtractionError, PrepareAssetError, RenderAsset, RenderAssets};
 use bevy::render::renderer::{RenderDevice, RenderQueue};
 use std::sync::Arc;
+use std::thread::JoinHandle;
 
 /// The number of bytes of captures that may be uploaded to the GPU in one frame: a resource.
 ///
@@ -71,6 +72,8 @@ struct NextCapture {
     source: GaussianCapture,
     /// The errors of its buffers that are not known yet, as in browsers. It is not drawn before they are known.
     pending: Option<Caught>,
+    /// The thread that compiles the passes it is drawn with. It is not drawn before they are compiled, so that no frame waits for the driver.
+    passes: Option<JoinHandle<()>>,
 }
 
 impl NextCapture {
@@ -93,7 +96,14 @@ impl NextCapture {
         // Cameras draw a coarser level of a capture that is small on the screen, so one level is enough.
         let mut rooms = uploads.iter().map(|upload| ViewRenderer::check_room(device, upload.most_drawn()));
         rooms.next_back().unwrap_or(Ok(()))?;
-        Ok(Self { uploads, source, pending })
+        let passes = renderer.0.begin_ahead(device, Storage::of(&source.scene().form));
+        Ok(Self { uploads, source, pending, passes })
+    }
+
+    /// Returns whether it can be drawn.
+    fn is_complete(&self) -> bool {
+        let is_compiled = self.passes.as_ref().is_none_or(JoinHandle::is_finished);
+        self.bytes_left() == 0 && self.pending.is_none() && is_compiled
     }
 
     /// Returns the bytes that have not been uploaded.
@@ -168,7 +178,7 @@ impl GpuGaussianCapture {
             }
             written
         })?;
-        if next.bytes_left() > 0 || next.pending.is_some() {
+        if !next.is_complete() {
             self.next = Some(next);
         } else {
             let levels = next.uploads.into_iter().map(|upload| upload.finish(queue, &renderer.0)).collect();

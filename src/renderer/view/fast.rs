@@ -65,7 +65,7 @@ impl ViewRenderer {
         // project_bin
         let groups = |_, count: u32| count.div_ceil(256 * per_thread(count));
         self.project(
-            |storage, batched| renderer.project_bin(storage, batched, self.variant),
+            |storage, batched| renderer.passes.project_bin(storage, batched, self.variant),
             renderer,
             &fast.project_bin[odd],
             groups,
@@ -76,7 +76,7 @@ impl ViewRenderer {
 
         // sort_bins
         let (Some(sort_bins), Some(blend_blocks)) =
-            (renderer.sort_bins(self.variant.lists), renderer.blend_blocks(self.variant))
+            (renderer.passes.sort_bins(self.variant.lists), renderer.passes.blend_blocks(self.variant))
         else {
             return;
         };
@@ -89,7 +89,7 @@ impl ViewRenderer {
         // colors
         if self.has_colors {
             let groups = |storage, count: u32| count.div_ceil(colors_of_group(storage)).min(COLOR_GROUPS);
-            let pipeline = |storage, batched| renderer.colors(storage, batched);
+            let pipeline = |storage, batched| renderer.passes.colors(storage, batched);
             self.project(pipeline, renderer, &fast.colors[odd], groups, pass, instances);
         }
         mark(timer, pass);

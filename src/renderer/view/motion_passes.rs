@@ -30,15 +30,15 @@ impl ViewRenderer {
     ) {
         let Some(motion) = &self.motion else { return };
         let (blend, lists) = match &made.fast {
-            Some(fast) => (renderer.blend_blocks(motion.variant), &fast.blend_blocks),
-            None => (renderer.blend(self.pixels, self.at_once), &made.blend),
+            Some(fast) => (renderer.passes.blend_blocks(motion.variant), &fast.blend_blocks),
+            None => (renderer.passes.blend(self.pixels, self.at_once), &made.blend),
         };
         let Some(blend) = blend else { return };
         // motion
         let most = if made.fast.is_some() { MOST_GROUPS } else { u32::MAX };
         let mut index = 0;
         for instance in instances {
-            let Some(pipeline) = renderer.motion(instance.capture.storage, self.design) else { continue };
+            let Some(pipeline) = renderer.passes.motion(instance.capture.storage, self.design) else { continue };
             pass.set_pipeline(pipeline);
             pass.set_bind_group(2, instance.active.map_or(&renderer.no_list, |active| &active.list), &[]);
             for (at, part) in instance.capture.parts.iter().enumerate() {

@@ -75,14 +75,14 @@ impl ViewRenderer {
             if renderer.is_software {
                 self.at_once = loops::at_once(slots).ok_or(GpuError::TooManySplats { slots })?;
             }
-            renderer.compile_reference(device, drawn, self.pixels, self.at_once)?;
+            renderer.passes.compile_reference(device, drawn, self.pixels, self.at_once)?;
             true
         } else {
             let large_batches = bins::large_batches(&device.limits(), instances);
             let lists = Lists::suiting(&device.limits(), self.fullest_bin);
             let few_bins = bins::few_bins(picture, bins::bin_side(picture, total), total);
-            self.variant = FastVariant { few_bins, lists, blending, precision, large_batches };
-            renderer.compile_fast(device, drawn, self.variant)?;
+            let wanted = FastVariant { few_bins, lists, blending, precision, large_batches };
+            self.variant = renderer.fast_variant(device, drawn, wanted)?;
             blending.writes_depths()
         };
         if std::mem::take(&mut self.recorded) {
@@ -158,11 +158,11 @@ impl ViewRenderer {
         let known = self.motion.take();
         if parameters.previous.is_some() {
             let storages = instances.iter().map(|instance| instance.capture.storage);
-            renderer.compile_motion(device, storages, self.design)?;
+            renderer.passes.compile_motion(device, storages, self.design)?;
             let color = ViewParameters { depths: false, debug: DebugView::Color, ..*parameters };
-            let variant = FastVariant { blending: color.blending(), ..self.variant };
+            let mut variant = FastVariant { blending: color.blending(), ..self.variant };
             if self.design == Design::Fast {
-                renderer.compile_fast(device, std::iter::empty(), variant)?;
+                variant = renderer.fast_variant(device, std::iter::empty(), variant)?;
             }
             if let Some(made) = &self.resources {
                 let allocator = renderer.allocator(device);

@@ -7,7 +7,8 @@ use super::parameters::Instance;
 use super::resources::{Resources, tile_steps};
 use super::view_renderer::ViewRenderer;
 use crate::renderer::layout::{BLOCK, DEPTH_STEPS, DIGITS, INSTANCE_STRIDE};
-use crate::renderer::pipelines::{ReferencePasses, Renderer};
+use crate::renderer::passes::ReferencePasses;
+use crate::renderer::pipelines::Renderer;
 use crate::renderer::timing::PassTimer;
 use crate::view::tiles;
 
@@ -22,10 +23,12 @@ impl ViewRenderer {
         timer: Option<&PassTimer>,
     ) {
         // project
-        let (Some(passes), Some(blend)) = (renderer.reference(), renderer.blend(self.pixels, self.at_once)) else {
+        let (Some(passes), Some(blend)) =
+            (renderer.passes.reference(), renderer.passes.blend(self.pixels, self.at_once))
+        else {
             return;
         };
-        let pipeline = |storage, batched| renderer.project(storage, batched);
+        let pipeline = |storage, batched| renderer.passes.project(storage, batched);
         self.project(pipeline, renderer, &made.project, |_, count| count.div_ceil(256), pass, instances);
         mark(timer, pass);
 

@@ -6,8 +6,8 @@
 use super::bins::FastResources;
 use super::sizes::Sizes;
 use crate::renderer::layout::DIGIT_BITS;
+use crate::renderer::layouts::Layouts;
 use crate::renderer::memory::Allocator;
-use crate::renderer::pipelines::Layouts;
 use crate::renderer::shaders::Pixels;
 use crate::view::tiles;
 use glam::UVec2;
