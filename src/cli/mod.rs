@@ -18,6 +18,7 @@ mod eval;
 mod failure;
 mod fine_tune;
 mod info;
+mod info_dataset;
 mod interrupt;
 mod mask;
 mod note;

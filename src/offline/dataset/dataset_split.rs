@@ -5,6 +5,7 @@
 use super::camera_file::{CameraFile, CameraOptions};
 use super::error::DatasetError;
 use super::files::require_files;
+use super::format::{self, Videos};
 use super::split::Split;
 use super::view::TrainingView;
 use std::path::{Path, PathBuf};
@@ -18,20 +19,52 @@ pub struct Dataset {
     pub split: Split,
     /// The views of the split in file order, at least one.
     pub views: Vec<TrainingView>,
+    /// File of points to begin training with, if the dataset names one. It may not exist.
+    pub points: Option<PathBuf>,
 }
 
 impl Dataset {
-    /// Reads the cameras of one split.
+    /// Reads the cameras of one split of a folder of any format. The frames of videos are decoded once, by the program `ffmpeg`.
     ///
     /// # Errors
-    /// [`DatasetError`] if the split's file is missing or unusable. Missing images are not an error here.
+    /// [`DatasetError`] if the folder has no such split, or its files are unusable. Missing images are not an error here.
     pub fn open(folder: &Path, split: Split, options: &CameraOptions) -> Result<Self, DatasetError> {
+        Self::open_as(folder, split, options, Videos::Decode)
+    }
+
+    /// Reads as [`open`](Self::open), but decodes no video: a video is the image of the only view of its camera.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub(crate) fn look(folder: &Path, split: Split, options: &CameraOptions) -> Result<Self, DatasetError> {
+        Self::open_as(folder, split, options, Videos::Leave)
+    }
+
+    fn open_as(folder: &Path, split: Split, options: &CameraOptions, videos: Videos) -> Result<Self, DatasetError> {
+        match format::of(folder) {
+            Some(format) => format.open(folder, split, options, videos),
+            None => Err(DatasetError::NotADataset { folder: folder.to_owned(), file: split.file_name() }),
+        }
+    }
+
+    /// Reads one split from its own camera file.
+    pub(super) fn open_split(folder: &Path, split: Split, options: &CameraOptions) -> Result<Self, DatasetError> {
         let split = split.resolved(folder);
         let path = folder.join(split.file_name());
         if !path.is_file() {
             return Err(DatasetError::NotADataset { folder: folder.to_owned(), file: split.file_name() });
         }
-        Ok(Self { folder: folder.to_owned(), split, views: CameraFile::load(&path, options)? })
+        Ok(Self { folder: folder.to_owned(), split, views: CameraFile::load(&path, options)?, points: None })
+    }
+
+    /// Returns whether a folder has a split of its own.
+    pub(crate) fn has(folder: &Path, split: Split) -> bool {
+        folder.join(split.file_name()).is_file() || format::has(folder, split)
+    }
+
+    /// Returns the name of the format of a folder; `None` if it has none.
+    pub(crate) fn format(folder: &Path) -> Option<&'static str> {
+        format::of(folder).map(|format| format.name)
     }
 
     /// Checks that every image and mask is on disk.
