@@ -1,4 +1,4 @@
-// regularize: the terms of the loss that depend on Gaussians alone: motion, difference of motion from neighbors (rigidity), opacity.
+// regularize: the terms of the loss that depend on Gaussians alone: motion, difference of motion from neighbors (rigidity), opacity, scale.
 // In: raw parameters, their slice, the neighbors of each Gaussian. Out: the gradients of the terms with respect to the raw parameters, added
 // to the gradients of the batch. CPU reference: src/offline/fine_tune/terms.rs, which defines the terms.
 #import gs4d::types::{GaussianRecord, TermWeights, TrainedRecord, TrainedScene}
@@ -38,6 +38,10 @@ fn regularize(@builtin(global_invocation_id) id: vec3<u32>) {
     let raw = trained[index];
     let opacity = opacity_of(raw.opacity_logit.x);
     trained_gradients[index].opacity_logit.x += weights.opacity * opacity * (1.0 - opacity);
+    if weights.scale > 0.0 {
+        let slope = weights.scale * exp(raw.log_scale.xyz);
+        trained_gradients[index].log_scale += vec4(slope, 0.0);
+    }
     // Gaussians of the other models are at rest.
     if scene.model != ROTATED_4D {
         return;

@@ -140,6 +140,8 @@ pub mod offline {
         pub use crate::offline::fine_tune::adam::*;
         pub use crate::offline::fine_tune::loss::*;
         pub use crate::offline::fine_tune::neighbors::*;
+        pub use crate::offline::fine_tune::noise::*;
+        pub use crate::offline::fine_tune::relocation::*;
         pub use crate::offline::fine_tune::sample::*;
         pub use crate::offline::fine_tune::state::*;
         pub use crate::offline::fine_tune::terms::*;
@@ -200,8 +202,18 @@ pub mod offline {
     pub mod stored {
         pub use crate::offline::stored::*;
     }
+    /// Training from pictures alone.
+    pub mod train {
+        pub use crate::offline::train::*;
+    }
     /// Key-frame masks and intervals.
     pub mod temporal_filter {
         pub use crate::offline::temporal_filter::*;
     }
+}
+
+/// Of the plugin.
+#[cfg(feature = "bevy")]
+pub mod plugin {
+    pub use crate::plugin::render::checked_pipelines::CheckedPipelines;
 }

@@ -15,6 +15,13 @@
 const BRIGHTEST: f32 = 65504.0;
 // Depth that stands for infinity, camera units: any fog has its full strength there.
 const FAR: f32 = 1e6;
+// Number of distances from the surface at which the own shadow of a capture is looked up.
+const OWN_STEPS: u32 = 4u;
+// Opacities between which a dark pixel changes from particles, which fog does not light, to a surface.
+const PARTICLES: f32 = 0.5;
+const SURFACE: f32 = 0.95;
+// The light of the fog on a pixel of particles, at most, in units of the light of the pixel itself.
+const FOG_GAIN: f32 = 4.0;
 
 // Shading settings of one capture, identical to GpuShading in src/plugin/pbr/shade/uniform.rs.
 struct Shading {
@@ -22,7 +29,8 @@ struct Shading {
     cube_from_world: array<vec4<f32>, 3>,
     // Linear color factor in full shadow; w is 1 if the capture receives shadows.
     tint: vec4<f32>,
-    // x: weight of the scene's light; y: reciprocal of the light during training; z: offset towards lights, world units.
+    // x: weight of the scene's light; y: reciprocal of the light during training; z: offset towards lights, world units; w: distance over which
+    // the capture's own shadow sets in, world units, 0 if it casts none.
     light: vec4<f32>,
 }
 
@@ -51,6 +59,8 @@ struct Point {
     view_z: f32,
     // Pixel of the target.
     frag_coord: vec2<f32>,
+    // Width of its pixel at its depth, camera units.
+    width: f32,
     is_environment: bool,
 }
 
@@ -93,6 +103,8 @@ fn point_at(position: vec2<f32>, alpha: f32) -> Point {
     let place = vec2(2.0 * share.x - 1.0, 1.0 - 2.0 * share.y);
     point.world = (view_bindings::view.world_from_view * vec4(view_position(place, z), 1.0)).xyz;
     point.view_z = -z;
+    let beside = place + vec2(2.0 / f32(settings.size.x), 0.0);
+    point.width = abs(view_position(beside, z).x - view_position(place, z).x);
     point.frag_coord = view_bindings::view.viewport.xy + share * view_bindings::view.viewport.zw;
     return point;
 }
@@ -156,7 +168,13 @@ fn darkened(tint: vec3<f32>, visibility: f32) -> vec3<f32> {
 }
 
 // Returns the color factor of all lights that cast shadows. A capture has no normals: every light counts as perpendicular to the surface.
-fn shadow(point: Point, tint: vec3<f32>, bias: f32) -> vec3<f32> {
+//
+// The point is moved towards a light before its shadow is looked up: by `bias` and, if the capture casts a shadow itself, by the width of the pixel.
+// Over the distance `own` behind the surface the capture's own shadow sets in gradually, so that errors of depth are no sharp blotches.
+fn shadow(point: Point, tint: vec3<f32>, bias: f32, own: f32) -> vec3<f32> {
+    let steps = select(1u, OWN_STEPS, own > 0.0);
+    let first = bias + min(point.width, own);
+    let step = own / f32(OWN_STEPS - 1u);
     var factor = vec3(1.0);
     for (var i = 0u; i < view_bindings::lights.n_directional_lights; i++) {
         let light = &view_bindings::lights.directional_lights[i];
@@ -164,8 +182,12 @@ fn shadow(point: Point, tint: vec3<f32>, bias: f32) -> vec3<f32> {
             continue;
         }
         let toward = (*light).direction_to_light;
-        let place = vec4(point.world + bias * toward, 1.0);
-        factor *= darkened(tint, fetch_directional_shadow(i, place, toward, point.view_z, point.frag_coord));
+        var visibility = 0.0;
+        for (var k = 0u; k < steps; k++) {
+            let place = vec4(point.world + (first + f32(k) * step) * toward, 1.0);
+            visibility += fetch_directional_shadow(i, place, toward, point.view_z, point.frag_coord);
+        }
+        factor *= darkened(tint, visibility / f32(steps));
     }
     let is_orthographic = view_bindings::view.clip_from_view[3][3] == 1.0;
     let cluster = clustering::view_fragment_cluster_index(point.frag_coord, point.view_z, is_orthographic);
@@ -180,19 +202,24 @@ fn shadow(point: Point, tint: vec3<f32>, bias: f32) -> vec3<f32> {
         let ray = (*light).position_radius.xyz - point.world;
         let squared = dot(ray, ray);
         let toward = ray * inverseSqrt(max(squared, 1e-12));
-        let place = vec4(point.world + bias * toward, 1.0);
         // The window with which Bevy ends lights at their range, without the falloff inside the range: shadows are a contrast.
         let share = squared * (*light).color_inverse_square_range.w;
         let window = saturate(1.0 - share * share);
         var weight = window * window;
-        var visibility = 1.0;
-        if i < ranges.first_spot_light_index_offset {
-            visibility = fetch_point_shadow(id, place, toward, point.frag_coord);
-        } else {
+        let is_spot = i >= ranges.first_spot_light_index_offset;
+        if is_spot {
             weight *= spot_cone(id, toward);
-            visibility = fetch_spot_shadow(id, place, toward, (*light).shadow_map_near_z, point.frag_coord);
         }
-        factor *= mix(vec3(1.0), darkened(tint, visibility), weight);
+        var visibility = 0.0;
+        for (var k = 0u; k < steps; k++) {
+            let place = vec4(point.world + (first + f32(k) * step) * toward, 1.0);
+            if is_spot {
+                visibility += fetch_spot_shadow(id, place, toward, (*light).shadow_map_near_z, point.frag_coord);
+            } else {
+                visibility += fetch_point_shadow(id, place, toward, point.frag_coord);
+            }
+        }
+        factor *= mix(vec3(1.0), darkened(tint, visibility / f32(steps)), weight);
     }
     return factor;
 }
@@ -209,8 +236,8 @@ fn spot_cone(id: u32, toward: vec3<f32>) -> f32 {
 }
 
 #ifdef DISTANCE_FOG
-// Returns a linear color behind Bevy's fog, as on its meshes.
-fn fogged(color: vec3<f32>, point: Point) -> vec3<f32> {
+// Returns a linear color behind Bevy's fog, as on its meshes. Of the light of the fog itself it has the fraction `share`.
+fn fogged(color: vec3<f32>, point: Point, share: f32) -> vec3<f32> {
     let haze = view_bindings::fog;
     let ray = point.world - view_bindings::view.world_position;
     let distance = length(ray);
@@ -229,6 +256,12 @@ fn fogged(color: vec3<f32>, point: Point) -> vec3<f32> {
             scattering += glow * visibility * (*light).color.rgb;
         }
     }
+    return in_fog(color, distance, scattering) - (1.0 - share) * in_fog(vec3(0.0), distance, scattering);
+}
+
+// Returns a linear color behind Bevy's fog of this thickness.
+fn in_fog(color: vec3<f32>, distance: f32, scattering: vec3<f32>) -> vec3<f32> {
+    let haze = view_bindings::fog;
     let plain = vec4(color, 1.0);
     if haze.mode == view_types::FOG_MODE_LINEAR {
         return linear_fog(haze, plain, distance, scattering).rgb;
@@ -240,6 +273,14 @@ fn fogged(color: vec3<f32>, point: Point) -> vec3<f32> {
         return atmospheric_fog(haze, plain, distance, scattering).rgb;
     }
     return color;
+}
+
+// Returns the fraction of the light of the fog in front of a pixel of this linear color. A surface has all of it. Particles darker than the fog
+// have less: faint black Gaussians, which training on a black background leaves in number, are invisible over black, and stay so.
+fn fog_share(color: vec3<f32>, alpha: f32) -> f32 {
+    let encoded = srgb::encode(max(color, vec3(0.0)));
+    let brightness = max(encoded.x, max(encoded.y, encoded.z));
+    return max(smoothstep(PARTICLES, SURFACE, alpha), saturate(FOG_GAIN * brightness));
 }
 #endif
 
@@ -256,7 +297,7 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
         let shading = settings.shadings[shading_of(point)];
         factor = mix(factor, surrounding_light() * shading.light.y, shading.light.x);
         if shading.tint.a > 0.0 && !point.is_environment {
-            factor *= shadow(point, shading.tint.rgb, shading.light.z);
+            factor *= shadow(point, shading.tint.rgb, shading.light.z, shading.light.w);
         }
     }
 #ifndef DISTANCE_FOG
@@ -267,7 +308,7 @@ fn fragment(@builtin(position) position: vec4<f32>) -> @location(0) vec4<f32> {
 #endif
     var color = factor * to_linear(picture.rgb / alpha);
 #ifdef DISTANCE_FOG
-    color = fogged(color, point);
+    color = fogged(color, point, fog_share(color, alpha));
 #endif
     let shaded = to_blend_space(color) * alpha;
     return vec4(clamp(shaded, vec3(-BRIGHTEST), vec3(BRIGHTEST)), picture.a);

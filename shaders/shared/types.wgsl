@@ -85,8 +85,11 @@ struct AdamUniforms {
     count: u32,
     // Four-vectors of each Gaussian.
     stride: u32,
-    // x = 1: only Gaussians that are visible in a view of the batch are updated; yzw unused.
-    sparse: vec4<u32>,
+    // 1: only Gaussians that are visible in a view of the batch are updated.
+    sparse: u32,
+    // Number of values of each Gaussian that are updated.
+    values: u32,
+    padding: vec2<u32>,
 }
 
 // Input of `regularize`: the weights of its terms for each Gaussian.
@@ -97,7 +100,27 @@ struct TermWeights {
     rigid: f32,
     // Weight of its opacity.
     opacity: f32,
+    // Weight of each of its spatial scales.
+    scale: f32,
+}
+
+// Input of `noise` for one step.
+struct NoiseUniforms {
+    count: u32,
+    // Seed of the step.
+    seed: u32,
+    // Factor on the variance along an axis that gives the deviation of the noise of a fully transparent Gaussian along it.
+    strength: f32,
     padding: u32,
+}
+
+// Input of `relocate`.
+struct RelocationUniforms {
+    // Number of moves.
+    moves: u32,
+    // Four-vectors of the color of each Gaussian.
+    stride: u32,
+    padding: vec2<u32>,
 }
 
 // One part of a capture in one view: its camera and the slots of its splats.

@@ -3,20 +3,19 @@
 //! In: a scene in the trained form, training views with their images. Out: a package in the trained form, or in the packed form with
 //! `--compress`, and its quality before, during and after training.
 
-use super::args::{CheckpointArgs, Given, PackageArgs, RendererArgs, SplitArgs, ValidationArgs, values};
+use super::args::{CheckpointArgs, Given, PackageArgs, RendererArgs, SplitArgs, TrainingArgs, ValidationArgs, values};
+use super::curve::curve_table;
 use super::failure::Failure;
 use super::interrupt;
 use super::progress::Bars;
 use super::report::Report;
-use super::table::{Table, bytes, lines};
+use super::table::{bytes, lines};
 use crate::gaussian::GradientMode;
 use crate::offline::belonging::require_belonging_on_gpu;
 use crate::offline::dataset::Validation;
 use crate::offline::engine::AdapterDescription;
 use crate::offline::files::Files;
-use crate::offline::fine_tune::{
-    Behind, CurvePoint, FineTuneSettings, FineTuned, GradientSums, Rates, Resume, Terms, TrainingImages, fine_tune,
-};
+use crate::offline::fine_tune::{FineTuneSettings, FineTuned, Rates, Resume, Terms, TrainingImages, fine_tune};
 use crate::offline::quantize::{CompressSettings, Quality};
 use crate::offline::store::{Key, Store};
 use crate::offline::temporal_filter::needs_views;
@@ -53,9 +52,6 @@ pub(super) struct FineTune {
     /// Number of training steps.
     #[arg(long, value_name = "N", default_value = "5000", value_parser = values::count(100_000_000))]
     steps: usize,
-    /// Views of each step.
-    #[arg(long, value_name = "N", default_value = "2", value_parser = values::count(1000))]
-    batch: usize,
     /// Learning rates: ours, or original, which are those at the end of the original's training.
     #[arg(long, value_name = "RATES", default_value = "ours", value_parser = values::one_of(&RATES))]
     rates: Rates,
@@ -68,46 +64,23 @@ pub(super) struct FineTune {
     /// Weight of SSIM in the loss, 0 to 1; the rest is L1.
     #[arg(long, value_name = "WEIGHT", default_value = "0.1", value_parser = values::share)]
     similarity: f64,
-    /// Weight, in the loss, of opacity where images have none: the original's opacity mask.
-    #[arg(long, help_heading = "Experimental", value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
-    mask_weight: f64,
-    /// Weight, in the loss, of motion: the mean length of 0.1 times the velocity.
-    #[arg(long, help_heading = "Experimental", value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
-    motion_weight: f64,
-    /// Weight, in the loss, of motion that differs from that of the 20 nearest Gaussians: the original's rigid term.
-    #[arg(long, help_heading = "Experimental", value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
-    rigid_weight: f64,
     /// Weight, in the loss, of the mean opacity. Unneeded Gaussians fade, so that more can be pruned.
     #[arg(long, help_heading = "Experimental", value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
     opacity_weight: f64,
-    /// Do not change Gaussians, and their state in the optimizer, in steps whose views do not show them.
-    #[arg(long, help_heading = "Experimental")]
-    sparse: bool,
-    /// Background of images with transparent pixels: random, a random color for each view, or fixed, the background of training.
-    #[arg(long, value_name = "WHAT", default_value = "random", value_parser = values::one_of(&BEHIND))]
-    behind: Behind,
+    #[command(flatten)]
+    training: TrainingArgs,
     /// Steps between two evaluations on the validation views.
     #[arg(long, value_name = "N", default_value = "500", value_parser = values::count(1_000_000))]
     evaluate_every: usize,
     /// Steps between two computations of a key-frame or interval filter.
     #[arg(long, value_name = "N", default_value = "1000", value_parser = values::count(100_000_000))]
     refresh_filter: usize,
-    /// End after this number of evaluations without an improvement [default: make all steps].
-    #[arg(long, value_name = "N", value_parser = values::count(1_000_000))]
-    patience: Option<usize>,
     /// Steps between two saved states, rounded up to the next evaluation.
     #[arg(long, value_name = "N", default_value = "500", value_parser = values::count(1_000_000))]
     save_every: usize,
-    /// Seed of the order of views and of random backgrounds.
-    #[arg(long, value_name = "N", default_value = "0")]
-    seed: u64,
     /// Gradients: exact, or compat, which are those of the original with its deviations.
     #[arg(long, value_name = "MODE", default_value = "exact", value_parser = values::one_of(&MODES))]
     gradients: GradientMode,
-    /// Sums of gradients: deterministic, in a fixed order with the same result in every run, or atomic, which differ by rounding and need an
-    /// adapter with float atomics.
-    #[arg(long, help_heading = "Experimental", value_name = "HOW", default_value = "deterministic", value_parser = values::one_of(&GradientSums::NAMES))]
-    sums: GradientSums,
     /// Compress the result as `gs4d compress` does, with less loss: the codebooks of color are trained too, and their sizes follow the number
     /// of Gaussians. visually-lossless and lossless have no codebooks.
     #[arg(long, value_name = "QUALITY", value_parser = values::one_of(&Quality::NAMES))]
@@ -125,7 +98,6 @@ pub(super) struct FineTune {
 }
 
 const RATES: [(&str, Rates); 2] = [("ours", Rates::OURS), ("original", Rates::ORIGINAL)];
-const BEHIND: [(&str, Behind); 2] = [("random", Behind::Random), ("fixed", Behind::Fixed)];
 const MODES: [(&str, GradientMode); 2] = [("exact", GradientMode::Exact), ("compat", GradientMode::Compat)];
 
 impl FineTune {
@@ -243,42 +215,19 @@ impl FineTune {
     }
 
     fn settings(&self) -> FineTuneSettings {
+        let shared = self.training.settings();
         FineTuneSettings {
             steps: self.steps,
-            batch: self.batch,
             rates: Rates { mean: self.rates.mean * self.mean_rate, ..self.rates },
             last_rate: self.last_rate,
             similarity_share: self.similarity,
-            terms: Terms {
-                mask: self.mask_weight,
-                motion: self.motion_weight,
-                rigid: self.rigid_weight,
-                opacity: self.opacity_weight,
-                ..Terms::default()
-            },
-            sparse: self.sparse,
-            behind: self.behind,
-            seed: self.seed,
+            terms: Terms { opacity: self.opacity_weight, ..shared.terms },
             evaluate_every: self.evaluate_every,
-            patience: self.patience,
             refresh_filter: self.refresh_filter,
             mode: self.gradients,
-            sums: self.sums,
             rounding: self.round_geometry,
             compress: self.compress.map(|quality| (quality, self.compress_steps)),
+            ..shared
         }
     }
-}
-
-/// Returns the points of the curve as a table; a value that was not measured is "-". If the result is compressed, the last point is that of the
-/// package.
-fn curve_table(curve: &[CurvePoint], compressed: bool) -> String {
-    let mut table = Table::new(&["step", "loss", "training dB", "validation dB"]);
-    let number = |value: Option<f64>, digits| value.map_or("-".to_owned(), |value| format!("{value:.digits$}"));
-    for (index, CurvePoint { step, loss, training_psnr, psnr }) in curve.iter().enumerate() {
-        let is_package = compressed && index + 1 == curve.len();
-        let step = if is_package { "compressed".to_owned() } else { step.to_string() };
-        table.row([step, number(*loss, 5), number(*training_psnr, 2), number(*psnr, 3)]);
-    }
-    table.to_string()
 }

@@ -13,6 +13,7 @@ mod bench;
 mod compare;
 mod compress;
 mod convert;
+mod curve;
 mod detail;
 mod eval;
 mod failure;
@@ -31,6 +32,7 @@ mod score;
 mod synth;
 mod system;
 mod table;
+mod train;
 mod usage;
 
 use crate::offline::unfinished;
@@ -79,6 +81,7 @@ enum Verb {
     Mask(mask::Mask),
     Eval(eval::Eval),
     Ablate(ablate::Ablate),
+    Train(train::Train),
     #[command(name = "finetune")]
     FineTune(fine_tune::FineTune),
     Bake(bake::Bake),
@@ -100,6 +103,7 @@ impl Verb {
             Self::Mask(verb) => verb.run(),
             Self::Eval(verb) => verb.run(),
             Self::Ablate(verb) => verb.run(),
+            Self::Train(verb) => verb.run(),
             Self::FineTune(verb) => verb.run(),
             Self::Bake(verb) => verb.run(),
         }

@@ -41,7 +41,7 @@ pub fn blend_step(conic: Vec3, opacity: f32, offset: Vec2, transmittance: f32) -
 }
 
 /// Returns the alpha of a splat at a pixel; `None` if it is skipped. `conic` is the inverse covariance on the screen,
-/// [factored](super::conic), `offset` the vector from the pixel to the splat's center, pixels.
+/// factored: `x (dx + y dy)² + z dy²`, `offset` the vector from the pixel to the splat's center, pixels.
 pub fn alpha_at(conic: Vec3, opacity: f32, offset: Vec2) -> Option<f32> {
     visible(opacity * exponent(conic, offset).exp())
 }

@@ -22,7 +22,7 @@ pub struct Projected {
     pub depth: f32,
     /// Covariance on the screen with the low-pass: xx, xy, yy, pixels squared.
     pub covariance: Vec3,
-    /// Inverse of the covariance, [factored](super::conic).
+    /// Inverse of the covariance, factored: `x (dx + y dy)² + z dy²`.
     pub conic: Vec3,
     /// Opacity times marginal, times the compensation of the low-pass.
     pub opacity: f32,

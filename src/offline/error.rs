@@ -8,7 +8,8 @@ use super::fine_tune::{FineTuned, TrainerError};
 use super::metrics::SizeMismatch;
 use super::picture_file::PictureError;
 use super::quantize::CompressError;
-use super::score::ScoreError;
+use super::score::{INTERRUPTED, ScoreError};
+use super::train::StartError;
 use crate::codec::CodecError;
 use crate::codec::package::PackageError;
 use crate::gaussian::InvalidGaussian;
@@ -16,9 +17,6 @@ use crate::renderer::GpuError;
 use glam::UVec2;
 use std::error::Error;
 use std::path::{Path, PathBuf};
-
-/// The message of work that the user has interrupted.
-pub(super) const INTERRUPTED: &str = "interrupted";
 
 /// An error of the offline half.
 #[derive(Debug, thiserror::Error)]
@@ -44,6 +42,9 @@ pub enum OfflineError {
     /// A scene cannot be fine-tuned.
     #[error(transparent)]
     Train(#[from] TrainerError),
+    /// No capture can be trained on these views.
+    #[error(transparent)]
+    Start(#[from] StartError),
     /// A Gaussian cannot be drawn.
     #[error(transparent)]
     Invalid(#[from] InvalidGaussian),

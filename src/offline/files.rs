@@ -4,7 +4,8 @@
 //! files that killed runs have left beside the outputs are removed.
 
 use super::dataset::{CameraFile, CameraOptions, Split, inputs};
-use super::save::{folder_of, is_stream, resolved};
+use super::save::{is_stream, resolved};
+use super::temporary_file::folder_of;
 use super::{OfflineError, temporary_file};
 use glam::UVec2;
 use std::collections::{BTreeSet, HashMap};

@@ -15,6 +15,7 @@
 //! | `search`, `trained_search`, `quality` | finds the best score and the smallest count that a loss allows |
 //! | `temporal_filter` | finds the active Gaussians of each segment of time |
 //! | [`fine_tune`](mod@fine_tune) | trains the remaining Gaussians, to compensate for the removed Gaussians |
+//! | `train` | trains a capture from nothing but pictures |
 //! | [`quantize`], [`convert`] | changes the form that a scene is stored in |
 //! | [`detail`](mod@detail) | makes the same capture with fewer Gaussians, for pictures of few pixels |
 //! | [`bake`](mod@bake), [`report`] | runs all steps in order, resumable, and writes a report |
@@ -62,6 +63,7 @@ mod subject;
 pub(crate) mod temporal_filter;
 mod temporary_file;
 mod test_comparison;
+pub(crate) mod train;
 mod trained_pixel;
 pub(crate) mod trained_search;
 pub(crate) mod unfinished;

@@ -3,7 +3,7 @@
 //! In: a path and its contents: a scene, a picture, any bytes. Out: the file, which replaces an existing file only when it
 //! is complete, and gets its permissions. A package is read back first.
 
-use super::temporary_file::{self, Part};
+use super::temporary_file::{self, Part, folder_of};
 use super::unfinished::Streaming;
 use crate::codec::package::{self, WriteSettings};
 use crate::codec::{self, CodecError, CodecErrorKind};
@@ -132,11 +132,6 @@ where
 /// Returns whether a path leads to a device or a pipe.
 pub(super) fn is_stream(path: &Path) -> bool {
     path.metadata().is_ok_and(|metadata| !metadata.is_file() && !metadata.is_dir())
-}
-
-/// Returns the folder of a file: the current folder for a name alone.
-pub(super) fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Returns the path that a path resolves to through symbolic links, whether the file exists or not.

@@ -3,7 +3,6 @@
 //! In: a folder. Out: an empty file in it, which is locked until its run ends, and which replaces an output when it is complete.
 //! Temporary files of killed runs are not locked, and are removed.
 
-use super::save::folder_of;
 use super::unfinished;
 use crate::codec::CodecError;
 use std::fs::{self, File, TryLockError};
@@ -106,6 +105,11 @@ fn is_part(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().as_encoded_bytes();
     let named = name.starts_with(PREFIX.as_bytes()) && name.ends_with(SUFFIX.as_bytes());
     named && path.symlink_metadata().is_ok_and(|metadata| metadata.is_file())
+}
+
+/// Returns the folder of a file: the current folder for a name alone.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 pub struct Splat {
     /// Center in pixels.
     pub center: Vec2,
-    /// Inverse covariance on the screen, [factored](crate::gaussian::conic).
+    /// Inverse covariance on the screen, factored: `x (dx + y dy)² + z dy²`.
     pub conic: Vec3,
     /// Opacity times marginal.
     pub opacity: f32,

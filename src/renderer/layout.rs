@@ -113,8 +113,12 @@ pub struct AdamUniforms {
     pub count: u32,
     /// Four-vectors of each Gaussian.
     pub stride: u32,
-    /// 1: only Gaussians that are visible in a view of the batch are updated; three unused.
-    pub sparse: [u32; 4],
+    /// 1: only Gaussians that are visible in a view of the batch are updated.
+    pub sparse: u32,
+    /// Number of values of each Gaussian that are updated; the values after these keep their value.
+    pub values: u32,
+    /// Unused.
+    pub padding: [u32; 2],
 }
 
 /// Index of the first Gaussian in the `notes` of `project_backward`, after three words about gradients that are not finite.
@@ -130,8 +134,34 @@ pub struct TermWeights {
     pub rigid: f32,
     /// Weight of its opacity.
     pub opacity: f32,
+    /// Weight of each of its spatial scales.
+    pub scale: f32,
+}
+
+/// Input of `noise` for one step.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct NoiseUniforms {
+    /// Number of Gaussians.
+    pub count: u32,
+    /// Seed of the step.
+    pub seed: u32,
+    /// Factor on the variance along an axis that gives the deviation of the noise of a fully transparent Gaussian along it.
+    pub strength: f32,
     /// Unused.
     pub padding: u32,
+}
+
+/// Input of `relocate`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct RelocationUniforms {
+    /// Number of moves.
+    pub moves: u32,
+    /// Four-vectors of the color of each Gaussian.
+    pub stride: u32,
+    /// Unused.
+    pub padding: [u32; 2],
 }
 
 /// Stride in bytes of the uniforms of instances, which are bound at dynamic offsets or as an array (`InstanceSlot` of the shaders), and of
@@ -418,7 +448,7 @@ pub struct SplatRecord {
     pub opacity: f32,
     /// Depth, camera units.
     pub depth: f32,
-    /// Inverse covariance, [factored](crate::gaussian::conic).
+    /// Inverse covariance, factored: `x (dx + y dy)² + z dy²`.
     pub conic: [f32; 3],
     /// Tiles x0 and y0, 16 bits each.
     pub tiles_low: u32,
@@ -434,7 +464,7 @@ pub struct SplatRecord {
 pub struct SplatShape {
     /// Center in pixels, opacity times marginal, depth in camera units.
     pub place: [f32; 4],
-    /// Inverse covariance, [factored](crate::gaussian::conic); unused.
+    /// Inverse covariance, factored: `x (dx + y dy)² + z dy²`; unused.
     pub conic: [f32; 4],
 }
 

@@ -53,6 +53,8 @@ const PASSES: &[(&str, &str)] = &[
     ("regularize", include_str!("../../shaders/regularize.wgsl")),
     ("codebooks", include_str!("../../shaders/codebooks.wgsl")),
     ("adam", include_str!("../../shaders/adam.wgsl")),
+    ("noise", include_str!("../../shaders/noise.wgsl")),
+    ("relocate", include_str!("../../shaders/relocate.wgsl")),
 ];
 
 /// Whether shaders check their array indices and loops at run time, which can be slow. Default: [`Off`](Self::Off).

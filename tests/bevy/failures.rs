@@ -8,16 +8,19 @@ use crate::support::cpu_reference::scene;
 use crate::support::fixtures::{front, synthetic};
 use crate::support::offscreen_app::{app, spawn_camera};
 use bevy::prelude::*;
-use bevy::render::render_resource::TextureFormat;
+use bevy::render::render_resource::{
+    BlendState, ColorTargetState, ColorWrites, FragmentState, PipelineCache, RenderPipelineDescriptor,
+    SpecializedRenderPipeline, TextureFormat,
+};
 use bevy::render::renderer::RenderDevice;
-use bevy::render::settings::{Backends, RenderCreation, WgpuFeatures, WgpuLimits, WgpuSettings};
+use bevy::render::settings::{Backends, RenderCreation, WgpuLimits, WgpuSettings};
 use bevy::render::{RenderApp, RenderPlugin};
 use bevy_gs4d::asset::{CaptureFailed, CaptureState, GaussianCapture};
+use bevy_gs4d::internal::plugin::CheckedPipelines;
 use bevy_gs4d::playback::Playback;
-use bevy_gs4d::render::{CaptureStatistics, CaptureViewSettings};
+use bevy_gs4d::render::CaptureStatistics;
 use bevy_gs4d::scene::RuntimeScene;
 use bevy_gs4d::testing::{self, Offscreen};
-use bevy_gs4d::view::BlendSpace;
 use bevy_gs4d::{GaussianCapture3d, GaussianCapturePlugin};
 use image::RgbaImage;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -168,25 +171,27 @@ fn a_device_that_refuses_a_layout_is_reported_and_the_app_goes_on() {
     assert!(matches!(&said[..], [one] if one.contains(&why)), "one failure with the reason is sent: {said:?}");
 }
 
+/// Blends into a target of this format.
+struct Blending;
+
+impl SpecializedRenderPipeline for Blending {
+    type Key = TextureFormat;
+
+    fn specialize(&self, format: TextureFormat) -> RenderPipelineDescriptor {
+        let blend = Some(BlendState::PREMULTIPLIED_ALPHA_BLENDING);
+        let targets = vec![Some(ColorTargetState { format, blend, write_mask: ColorWrites::ALL })];
+        RenderPipelineDescriptor { fragment: Some(FragmentState { targets, ..default() }), ..default() }
+    }
+}
+
 #[test]
-fn a_camera_whose_target_cannot_be_blended_leaves_the_app_running() {
-    let without = limited_app(|settings, _| {
-        // The second feature allows what the adapter can do beyond the features of the device.
-        let blending = WgpuFeatures::FLOAT32_BLENDABLE | WgpuFeatures::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES;
-        settings.disabled_features = Some(blending);
-    });
-    let Some((mut app, _)) = without else { return };
-    spawn(&mut app, red());
-    let image = Image::new_target_texture(SIZE.x, SIZE.y, TextureFormat::Rgba32Float, None);
-    let image = app.world_mut().resource_mut::<Assets<Image>>().add(image);
-    let target = Offscreen { image, size: SIZE }.target();
-    let second = spawn_camera(&mut app, Msaa::Off, front());
-    // Captures blended in linear light need no conversion in a target of linear values: the composite blends by hardware.
-    let linear = CaptureViewSettings { blend_space: BlendSpace::Linear, ..default() };
-    app.world_mut().entity_mut(second).insert((target, linear));
-    run(&mut app, 10);
-    assert!(is_red_in_the_middle(&read(&mut app)), "the other camera draws captures");
-    let views = app.world().resource::<CaptureStatistics>().views();
-    let seen = views.iter().any(|(camera, view)| *camera == second && view.total > 0);
-    assert!(!seen, "the camera with the refused pipeline draws no capture");
+fn a_pipeline_that_the_gpu_refuses_is_left_out_and_the_app_goes_on() {
+    let Some(mut app) = app(SIZE) else { return };
+    testing::settle(&mut app).expect("the app draws without an error");
+    let mut pipelines = CheckedPipelines::<Blending>::default();
+    let world = app.sub_app(RenderApp).world();
+    let (device, cache) = (world.resource::<RenderDevice>(), world.resource::<PipelineCache>());
+    let refused = pipelines.specialize(device, cache, &Blending, TextureFormat::Rgba32Uint);
+    assert_eq!(refused, None, "integers cannot be blended");
+    run(&mut app, 3);
 }

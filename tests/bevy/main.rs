@@ -17,6 +17,7 @@ mod inactive;
 mod inspector;
 mod late_hits;
 mod motion;
+mod own_shadows;
 mod picker;
 mod picking_backend;
 mod playback;

@@ -1,7 +1,7 @@
 //! Fog, shadows of meshes and the light of the surroundings on captures.
 //!
-//! In: flat captures made by hand and meshes of the same color, in headless apps. Out: proof that fog equals the fog of Bevy's meshes, that
-//! shadows and dark rooms darken captures with the components by the documented factors, and that other cameras have no extra pass. Skipped
+//! In: flat captures made by hand and meshes of the same color, in headless apps. Out: proof that fog equals the fog of Bevy's meshes and
+//! does not show black particles, that shadows and dark rooms darken captures with the components by the documented factors, and that other cameras have no extra pass. Skipped
 //! without a GPU; a software driver is enough.
 
 use crate::support::blob::blob;
@@ -10,7 +10,7 @@ use crate::support::fixtures::{MIDDLE, front, insert, orthographic, spawn, spawn
 use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
 use crate::support::spans::has_recorded;
 use bevy::camera::{Exposure, Hdr};
-use bevy::light::{DirectionalLightShadowMap, PointLightShadowMap};
+use bevy::light::{DirectionalLightShadowMap, NotShadowReceiver, PointLightShadowMap};
 use bevy::pbr::{DistanceFog, FogFalloff};
 use bevy::prelude::*;
 use bevy::render::diagnostic::RenderDiagnosticsPlugin;
@@ -136,6 +136,48 @@ fn fog_is_the_same_in_every_blend_space_and_on_hdr_targets() {
 }
 
 #[test]
+fn fog_on_a_black_surface_equals_the_fog_of_a_black_mesh() {
+    let Some(mut app) = app(SIZE) else { return };
+    let black = scene(&[(blob(Vec3::ZERO, Vec3::new(30.0, 30.0, 1e-3), 0.95), Vec3::ZERO); 3]);
+    let capture = spawn(&mut app, &black, ());
+    let (size, center) = (Vec3::new(40.0, 40.0, 0.1), Vec3::new(0.0, 0.0, -0.05));
+    let mesh = spawn_box(&mut app, size, center, Color::BLACK, AlphaMode::Opaque);
+    let camera = spawn_camera(&mut app, Msaa::Off, front());
+    for (what, fog) in fogs() {
+        insert(&mut app, camera, fog);
+        let [fogged, expected] = each(&mut app, capture, mesh);
+        let apart = difference_between(&fogged, &expected);
+        assert!(apart <= 2, "{what}: the capture and the mesh differ by {apart} / 255");
+        let seen = expected.pixels().map(|pixel| pixel.0[..3].iter().max().copied()).max().flatten();
+        assert!(seen > Some(40), "{what}: the fog is visible on the mesh: {seen:?}");
+    }
+}
+
+#[test]
+fn particles_that_are_invisible_over_black_are_invisible_in_fog() {
+    let Some(mut app) = app(SIZE) else { return };
+    let faint = |color: Vec3| scene(&[(blob(Vec3::ZERO, Vec3::splat(0.4), 0.3), color)]);
+    let capture = spawn(&mut app, &faint(Vec3::ZERO), ());
+    let camera = spawn_camera(&mut app, Msaa::Off, front());
+    let brightest = |app: &mut App| picture(app, 0.0).pixels().flat_map(|pixel| pixel.0[..3].to_vec()).max();
+    for (what, fog) in fogs() {
+        for blend_space in [BlendSpace::Encoded, BlendSpace::Linear] {
+            insert(&mut app, camera, (fog.clone(), CaptureViewSettings { blend_space, ..default() }));
+            let seen = brightest(&mut app);
+            assert!(seen <= Some(1), "{what}: black particles over black have the color {seen:?}");
+        }
+    }
+    app.world_mut().despawn(capture);
+    spawn(&mut app, &faint(COLOR), ());
+    app.world_mut().entity_mut(camera).remove::<DistanceFog>();
+    let plain = picture(&mut app, 0.0);
+    insert(&mut app, camera, fog(FogFalloff::Linear { start: 1.0, end: 8.0 }));
+    // The green of the fog is brighter than that of the particles.
+    let [plain, fogged] = [&plain, &picture(&mut app, 0.0)].map(|picture| rgb(picture, MIDDLE.x, MIDDLE.y)[1]);
+    assert!(fogged > plain + 5, "bright particles have the light of the fog: from {plain} to {fogged}");
+}
+
+#[test]
 fn fog_treats_an_environment_map_as_infinitely_far() {
     let Some(mut app) = app(SIZE) else { return };
     let map = Environment { width: 8, height: 4, texels: vec![0.9; 8 * 4 * 3] };
@@ -187,6 +229,23 @@ fn a_mesh_casts_its_shadow_on_a_capture_with_receives_shadows() {
     }
     let apart = difference_between(&picture(&mut app, 0.0), &plain);
     assert_eq!(apart, 0, "without a light the picture is bit-identical");
+}
+
+#[test]
+fn a_capture_with_not_shadow_receiver_is_lit_in_the_shadow_of_a_mesh() {
+    let Some(mut app) = app(SIZE) else { return };
+    app.insert_resource(DirectionalLightShadowMap { size: 512 });
+    let tint = LinearRgba::rgb(0.2, 0.3, 0.4);
+    let capture = spawn(&mut app, &wall(), (ReceivesShadows { tint, ..default() }, NotShadowReceiver));
+    spawn_box(&mut app, Vec3::splat(0.3), Vec3::new(1.75, 0.0, 1.25), Color::BLACK, AlphaMode::Opaque);
+    spawn_camera(&mut app, Msaa::Off, front());
+    let place = Transform::from_xyz(3.5, 0.0, 2.5).looking_at(Vec3::ZERO, Vec3::Y);
+    app.world_mut().spawn((DirectionalLight { shadow_maps_enabled: true, ..default() }, place));
+    check(&picture(&mut app, 0.0), MIDDLE.x, Vec3::ONE, "with NotShadowReceiver");
+    app.world_mut().entity_mut(capture).remove::<NotShadowReceiver>();
+    check(&picture(&mut app, 0.0), MIDDLE.x, Vec3::new(0.2, 0.3, 0.4), "without NotShadowReceiver");
+    insert(&mut app, capture, NotShadowReceiver);
+    check(&picture(&mut app, 0.0), MIDDLE.x, Vec3::ONE, "with NotShadowReceiver again");
 }
 
 #[test]

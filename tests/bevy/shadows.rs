@@ -1,8 +1,8 @@
 //! Shadows that captures cast on a floor, compared to shadows of meshes with the same outline.
 //!
 //! In: a ball of opaque Gaussians, a mesh of the same size, lights of all kinds, in headless apps. Out: proof that both darken the same
-//! pixels, that shadows follow the capture's time and end with the capture, that only captures with the component cast shadows, whether a
-//! camera sees them or not, and that a contact shadow darkens only the ground beneath its capture. Skipped without a GPU; a software driver
+//! pixels, that shadows follow the capture's time and end with the capture, that only captures with the component, and without Bevy's
+//! `NotShadowCaster`, cast shadows, whether a camera sees them or not, and that a contact shadow darkens only the ground beneath its capture. Skipped without a GPU; a software driver
 //! is enough.
 
 use crate::support::blob::blob;
@@ -11,7 +11,7 @@ use crate::support::fixtures::{insert, spawn};
 use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
 use bevy::camera::Hdr;
 use bevy::camera::visibility::{RenderLayers, ViewVisibility};
-use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, PointLightShadowMap};
+use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, NotShadowCaster, PointLightShadowMap};
 use bevy::prelude::*;
 use bevy_gs4d::GaussianCapture3d;
 use bevy_gs4d::asset::CaptureState;
@@ -225,6 +225,29 @@ fn only_captures_with_the_component_cast_shadows_on_layers_of_the_light() {
     insert(&mut app, capture, RenderLayers::layer(UNSEEN));
     app.world_mut().entity_mut(capture).remove::<CastsShadows>();
     assert_eq!(seen(&mut app), 0, "no shadow after the component is removed");
+}
+
+#[test]
+fn a_capture_with_not_shadow_caster_casts_no_shadow() {
+    for (name, light) in [("sun", 0), ("point light", 1), ("spot light", 2)] {
+        let app = match light {
+            0 => scenery(above(5.0), sun(Vec3::NEG_Y)),
+            1 => scenery(above(5.0), lamp(Vec3::Y * 3.0)),
+            _ => scenery(above(5.0), spot(Vec3::Y * 3.0)),
+        };
+        let Some(mut app) = app else { return };
+        let lit = picture(&mut app, 0.0);
+        let place = Transform::from_xyz(0.0, 1.0, 0.0);
+        let layer = RenderLayers::layer(UNSEEN);
+        let capture = spawn(&mut app, &ball(Vec3::ZERO), (place, layer, CastsShadows::default(), NotShadowCaster));
+        let seen = |app: &mut App| count(&darkened(&lit, &picture(app, 0.0)));
+        assert_eq!(seen(&mut app), 0, "{name}: no shadow with NotShadowCaster");
+        app.world_mut().entity_mut(capture).remove::<NotShadowCaster>();
+        let without = seen(&mut app);
+        assert!(without > 300, "{name}: {without} pixels of shadow after the component is removed");
+        insert(&mut app, capture, NotShadowCaster);
+        assert_eq!(seen(&mut app), 0, "{name}: no shadow after the component is inserted again");
+    }
 }
 
 /// Returns the pixel of a point in a camera's picture.

@@ -168,7 +168,7 @@ fn options_that_no_table_supports_are_experimental() {
         options.filter_map(|option| option.split_whitespace().next()).map(str::to_owned).collect::<Vec<_>>()
     };
     let expected =
-        ["mask-weight", "motion-weight", "rigid-weight", "opacity-weight", "sparse", "sums", "round-geometry"];
+        ["opacity-weight", "mask-weight", "motion-weight", "rigid-weight", "sparse", "sums", "round-geometry"];
     assert_eq!(under_heading("finetune"), expected, "the experimental options of finetune");
     assert_eq!(under_heading("bake"), ["sums"], "the experimental options of bake");
 }

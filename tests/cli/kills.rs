@@ -131,3 +131,31 @@ fn a_fine_tuning_killed_at_random_ends_at_the_same_bytes() {
     ];
     resumed_runs_equal("finetune", &command, &out, &[], 2);
 }
+
+#[test]
+fn a_training_from_pictures_alone_killed_at_random_ends_at_the_same_bytes() {
+    if GpuContext::headless(None).is_err() {
+        return no_gpu();
+    }
+    let trained = synthesize(&SynthSettings { count: 300, degree: 1, ..SynthSettings::default() });
+    let capture = Capture::new(trained, Vec3::ZERO, 4, 3, UVec2::splat(32), true);
+    let out = capture.path("out.gs4d");
+    let command = arguments![
+        "train",
+        "--data",
+        &capture.data,
+        "-o",
+        &out,
+        "--gaussians",
+        "200",
+        "--steps",
+        "60",
+        "--relocate-every",
+        "10",
+        "--evaluate-every",
+        "5",
+        "--save-every",
+        "5"
+    ];
+    resumed_runs_equal("train", &command, &out, &[], 2);
+}

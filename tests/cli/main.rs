@@ -25,6 +25,7 @@ mod signals;
 // The limit of the address space is set by a shell and read from `/proc`.
 #[cfg(target_os = "linux")]
 mod sizes;
+mod train;
 
 #[path = "../support"]
 mod support {

@@ -101,6 +101,9 @@ const REFUSED: &[(&str, &str)] = &[
         "--volume-power has no effect on scores that do not use",
     ),
     ("ablate a --data d --engine cpu --checks", "--checks has no effect with --engine cpu"),
+    // train
+    ("train -o o --data d --validation none --patience 3", "--patience has no effect with --validation none"),
+    ("train -o o --data d --sh-degree 2 --sh-degree-t 1", "--sh-degree-t has no effect with --sh-degree below 3"),
     // finetune
     ("finetune a -o o --data d --validation none --patience 3", "--patience has no effect with --validation none"),
     ("finetune a -o o --data d --compress-steps 3", "the following required arguments were not provided"),

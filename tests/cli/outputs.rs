@@ -49,6 +49,7 @@ fn no_verb_writes_over_an_input() {
         arguments!["render", scene, "--cameras", &cameras, "--out", data.join("train")].to_vec(),
         arguments!["finetune", scene, "--data", data, "-o", scene].to_vec(),
         arguments!["bake", scene, "--data", data, "-o", scene].to_vec(),
+        arguments!["train", "--data", data, "-o", &image].to_vec(),
     ];
     for command in commands {
         gs4d(&command).must_fail("the input itself");
@@ -110,6 +111,7 @@ fn a_bad_output_is_refused_before_any_input_is_read() {
         refused(arguments!["mask", &nothing, "-o", &out].to_vec(), reason);
         refused(arguments!["finetune", &nothing, "--data", &no_data, "-o", &out].to_vec(), reason);
         refused(arguments!["bake", &nothing, "--data", &no_data, "-o", &out].to_vec(), reason);
+        refused(arguments!["train", "--data", &no_data, "-o", &out].to_vec(), reason);
     }
     for (out, reason) in of("f32") {
         refused(arguments!["score", &nothing, "--data", &no_data, "--out", &out].to_vec(), reason);

@@ -4,7 +4,8 @@
 //! code, without a crash, that no temporary or half-written file is left, and that `--json` says what exists. Work on the GPU is skipped where
 //! there is none.
 //!
-//! `GS4D_SIGNALS` is the number of runs at random moments, over all verbs: 10 unless `.ci/full` sets more.
+//! `GS4D_SIGNALS` is the number of runs at random moments, over all verbs: 10 unless `.ci/full` sets more. `GS4D_SEED` is the seed of the
+//! moments: several processes can share the runs.
 
 use crate::support::capture::Capture;
 use crate::support::command::{GS4D, Run, arguments, folder, gs4d, scene};
@@ -180,7 +181,8 @@ fn random_signals_end_work_on_the_gpu_without_a_crash() {
     }
     let wanted = std::env::var("GS4D_SIGNALS").ok();
     let runs = wanted.map_or(SIGNALS, |wanted| wanted.parse().expect("GS4D_SIGNALS is a number"));
-    let (capture, mut random) = (capture(), Random::new(5));
+    let seed = std::env::var("GS4D_SEED").map_or(5, |seed| seed.parse().expect("GS4D_SEED is a number"));
+    let (capture, mut random) = (capture(), Random::new(seed));
     let outs: Vec<TempDir> = verbs(&capture, Path::new("out")).iter().map(|_| folder()).collect();
     let longest: Vec<Duration> = outs
         .iter()

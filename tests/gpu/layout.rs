@@ -8,8 +8,9 @@ use bevy_gs4d::internal::gaussian::conic::{LOW_PASS, MAX_VARIANCE, THIN};
 use bevy_gs4d::internal::offline::fine_tune::NEIGHBORS;
 use bevy_gs4d::internal::renderer::layout::{
     self, Activation, AdamUniforms, BLOCK, Counters, DIGITS, FIRST_SEEN, FrameUniforms, INSTANCE_STRIDE,
-    INSTANCES_AT_ONCE, InstanceUniforms, LossUniforms, MotionUniforms, RoundingRecord, SortStep, SplatRecord,
-    SplatShape, TermWeights, TiedColors, TrainedRecord, TrainedScene, VisibleSplat,
+    INSTANCES_AT_ONCE, InstanceUniforms, LossUniforms, MotionUniforms, NoiseUniforms, RelocationUniforms,
+    RoundingRecord, SortStep, SplatRecord, SplatShape, TermWeights, TiedColors, TrainedRecord, TrainedScene,
+    VisibleSplat,
 };
 use bevy_gs4d::internal::renderer::shaders::{COPIED_INSTANCE, compose, pass_names};
 use bevy_gs4d::view::TILE_SIZE;
@@ -72,7 +73,7 @@ fn splat() -> Mirror {
     in_fours(mirror, "SplatRecord", ["place", "shape", "color", ""])
 }
 
-fn mirrors() -> [Mirror; 17] {
+fn mirrors() -> [Mirror; 19] {
     [
         gaussian(),
         mirror!(InstanceUniforms {
@@ -146,8 +147,10 @@ fn mirrors() -> [Mirror; 17] {
         mirror!(TrainedScene { count, model, prefilter_var, view }),
         mirror!(LossUniforms { background, size, tiles, share, similarity_share, mask_weight, padding }),
         mirror!(TiedColors { count, stride, stages, padding }),
-        mirror!(AdamUniforms { rates, correction, count, stride, sparse }),
-        mirror!(TermWeights { motion, rigid, opacity, padding }),
+        mirror!(AdamUniforms { rates, correction, count, stride, sparse, values, padding }),
+        mirror!(TermWeights { motion, rigid, opacity, scale }),
+        mirror!(NoiseUniforms { count, seed, strength, padding }),
+        mirror!(RelocationUniforms { moves, stride, padding }),
     ]
 }
 

@@ -25,6 +25,7 @@ mod render;
 mod score;
 mod shaders;
 mod thin;
+mod train;
 mod uniformity;
 
 #[path = "../support"]

@@ -111,7 +111,7 @@ pub fn summary() -> String {
              {rounded} that rounding changes",
             headless.context().info.name
         ),
-        None => "designs: skipped, no GPU and no software driver".to_owned(),
+        None => "designs: nothing drawn on a GPU; --draw draws accepted scenes, if there is one".to_owned(),
     }
 }
 

@@ -8,6 +8,7 @@
 //! cargo test --features viewer,cli --test mutation                        # the corpus and a few inputs, always the same
 //! cargo test --release --no-default-features --features cli --test mutation -- --seed 7 --seconds 14400 --keep found
 //! cargo test --features viewer,cli --test mutation -- --seed 7 --reader package --input 1234
+//! cargo test --features viewer,cli --test mutation -- --seed 7 --reader package --draw   # on the GPU, too
 //! ```
 //!
 //! An input depends only on the seed, its reader and its number.
@@ -59,7 +60,9 @@ fn main() -> ExitCode {
         return ExitCode::SUCCESS;
     }
     watch::record_panics();
-    designs::open();
+    if options.draw {
+        designs::open();
+    }
     self_test::run();
     let readers: Vec<(&Kind, Arc<dyn Reader>)> = kinds.map(|kind| (kind, (kind.make)())).collect();
     let mut trials = Trials::new(options.seed, options.keep.clone());

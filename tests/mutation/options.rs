@@ -38,6 +38,9 @@ pub struct Options {
     /// Folder for the inputs that show a defect, and for the current input in case that it ends the process.
     #[arg(long, value_name = "DIR")]
     pub keep: Option<PathBuf>,
+    /// Also draw accepted scenes with both GPU designs, and compare the pictures with those of the CPU reference.
+    #[arg(long)]
+    pub draw: bool,
     /// List the readers.
     #[arg(long)]
     pub list: bool,

@@ -8,6 +8,7 @@ mod engine;
 mod given;
 mod package;
 mod scoring;
+mod training;
 pub(super) mod values;
 mod views;
 
@@ -17,4 +18,5 @@ pub(super) use engine::{DesignArgs, EngineArgs, RendererArgs, RenderersArgs};
 pub(super) use given::{Given, WITHOUT_TIME};
 pub(super) use package::{PackageArgs, file_size};
 pub(super) use scoring::{ScoringArgs, score_choice};
+pub(super) use training::TrainingArgs;
 pub(super) use views::ViewArgs;

@@ -77,8 +77,8 @@ pub(super) fn choose(
 ) -> Result<(Choice, Key), OfflineError> {
     let settings = inputs.settings;
     let options = format!("{:?} {:?} {:?} {:?}", settings.goal, inputs.tunes(), settings.quality, settings.key_frames);
-    let key = scores_key.with(inputs.validation_images_key).and(&options);
-    let key = if trains(inputs, scores, settings.goal) { key.with(inputs.training_images_key) } else { key };
+    let key = scores_key.with(inputs.image_keys[1]).and(&options);
+    let key = if trains(inputs, scores, settings.goal) { key.with(inputs.image_keys[0]) } else { key };
     let (Text(choice), _) =
         stages.run("prune", key, |_| true, |progress| search(inputs, scores, progress).map(Text))?;
     // Later stages depend on the choice, and not on the counts tried.

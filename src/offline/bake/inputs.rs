@@ -29,10 +29,8 @@ pub(super) struct Inputs<'a> {
     pub scene_key: Key,
     /// Key of the cameras and times of the training and the validation views.
     pub cameras_key: Key,
-    /// Key of the contents of the images to train on.
-    pub training_images_key: Key,
-    /// Key of the contents of the images to validate on.
-    pub validation_images_key: Key,
+    /// Keys of the contents of the images to train on, and to validate on.
+    pub image_keys: [Key; 2],
     /// The images to train and to validate on, loaded when the first stage needs them.
     images: Option<Arc<TrainingImages>>,
 }
@@ -59,8 +57,7 @@ impl<'a> Inputs<'a> {
         let read = format!("{:?} {:?} {:?}", scene.trained_with, scene.playback, settings.background);
         let scene_key = Key::of_files(&[checkpoint])?.and(env!("CARGO_PKG_VERSION")).and(&read);
         let cameras_key = Key::of(format!("{:?} {:?}", splits.train, splits.validation).as_bytes());
-        let training_images_key = Key::of_images(&splits.train)?;
-        let validation_images_key = Key::of_images(&splits.validation)?;
+        let image_keys = [Key::of_images(&splits.train)?, Key::of_images(&splits.validation)?];
         require_room(engine, settings, &views, &splits)?;
         let mut subject = Subject::new(checkpoint, scene, settings.background)?;
         let pixel = trained_pixel(&subject.scene, &views);
@@ -68,19 +65,8 @@ impl<'a> Inputs<'a> {
         if !settings.trust_images {
             require_belonging(engine, &subject.runtime, &views, subject.background)?;
         }
-        let inputs = Self {
-            settings,
-            engine,
-            subject,
-            splits,
-            views,
-            store,
-            scene_key,
-            cameras_key,
-            training_images_key,
-            validation_images_key,
-            images: None,
-        };
+        let inputs =
+            Self { settings, engine, subject, splits, views, store, scene_key, cameras_key, image_keys, images: None };
         if let (Some(tuning), Engine::Gpu(headless)) = (inputs.tunes(), &*inputs.engine) {
             tuning.sums.check(headless)?;
         }
@@ -89,7 +75,7 @@ impl<'a> Inputs<'a> {
 
     /// Returns the key of the contents of all images that a training depends on.
     pub(super) fn images_key(&self) -> Key {
-        self.training_images_key.with(self.validation_images_key)
+        self.image_keys[0].with(self.image_keys[1])
     }
 
     /// Returns the images to train and to validate on; loads them on the first call.

@@ -44,8 +44,7 @@ pub struct BakeSettings {
     pub fine_tune: Option<FineTuneSettings>,
     /// The quality of the compressed capture.
     pub quality: Quality,
-    /// zstd level of the package, 1 (fast) to 19 (small); `None` uses the default of
-    /// `write_settings`.
+    /// zstd level of the package, 1 (fast) to 19 (small); `None` uses the default of `write_settings`.
     pub level: Option<i32>,
     /// Whether images are used without a check that they show the capture.
     pub trust_images: bool,

@@ -18,7 +18,6 @@ use crate::offline::test_comparison::Compared;
 use crate::scene::{TemporalFilter, TrainedWith};
 use std::fs;
 use std::io::Cursor;
-use std::path::Path;
 
 /// Number of times at which the active sets are computed.
 const TIMES: usize = 61;
@@ -47,6 +46,7 @@ impl Facts<'_> {
         let interval = self.trained_with.time_interval;
         let times = even_times(interval, TIMES);
         let info = package::inspect(Cursor::new(self.package)).map_err(|error| OfflineError::at(out, error))?;
+        let original = fs::metadata(checkpoint).map_err(|error| OfflineError::at(checkpoint, error))?;
         let choices = self.choices();
         let (split, evaluation, samples) = match self.compared {
             Some(compared) => (Some(compared.split.to_owned()), Some(compared.evaluation), compared.samples),
@@ -58,7 +58,7 @@ impl Facts<'_> {
             data: data.display().to_string(),
             package: out.display().to_string(),
             gaussians: Change { before: self.before.len(), after: self.after.len() },
-            bytes: Change { before: file_size(checkpoint)?, after: self.package.len() as u64 },
+            bytes: Change { before: original.len(), after: self.package.len() as u64 },
             choices,
             stages: self.stages,
             sections: SectionSize::by_name(&info.header.sections),
@@ -104,13 +104,7 @@ fn in_words(tuning: &Tuning) -> String {
     let Tuning { curve, best, validation } = tuning;
     let steps = format!("{} steps", best.step);
     match (curve.first().and_then(|point| point.psnr), best.psnr) {
-        (Some(before), Some(after)) => {
-            format!("{steps}, {before:.2} to {after:.2} dB on {validation} validation views")
-        }
+        (Some(from), Some(to)) => format!("{steps}, {from:.2} to {to:.2} dB on {validation} validation views"),
         _ => format!("{steps}, no validation views"),
     }
-}
-
-fn file_size(path: &Path) -> Result<u64, OfflineError> {
-    Ok(fs::metadata(path).map_err(|error| OfflineError::at(path, error))?.len())
 }

@@ -6,14 +6,19 @@
 //! The best step is chosen on validation views, which are not trained on; without validation views, the last step is kept. The loss is `0.9 L1 + 0.1 (1 − SSIM)` unless set otherwise, with further [`Terms`]
 //! if these have weights, the optimizer Adam (section 6 of the 4DGS model). Views, backgrounds and rates of a step follow from its number
 //! alone, so that a run which is resumed ends as one which was not interrupted, but for rounding if sums are [atomic](GradientSums::Atomic).
+//! Training from pictures alone (`offline::train`) is the same with [`Growth`]: Gaussians that fade move to others.
+//!
 //! If the scene is compressed, further steps train codebooks of color with everything else, on request on pictures of rounded geometry.
 
 pub(crate) mod adam;
 mod backward;
 mod best;
 mod coding;
+mod grower;
+mod growth;
 pub(crate) mod loss;
 pub(crate) mod neighbors;
+pub(crate) mod noise;
 mod optimized;
 mod outcome;
 mod parameters;
@@ -21,6 +26,7 @@ mod passes;
 mod phases;
 mod records;
 mod regularizer;
+pub(crate) mod relocation;
 mod resume;
 mod rounding;
 mod run;
@@ -38,8 +44,10 @@ mod trainer_error;
 mod training;
 mod view_buffers;
 
+pub use growth::Growth;
 pub use outcome::{CurvePoint, FineTuned};
 pub use phases::fine_tune;
+pub(crate) use phases::fine_tune_watched;
 pub use resume::Resume;
 pub(crate) use sample::{GpuImage, Sample};
 pub use schedule::{Behind, Rates};
@@ -47,6 +55,7 @@ pub use settings::FineTuneSettings;
 pub use sums::GradientSums;
 pub use targets::TrainingImages;
 pub use terms::Terms;
-pub(crate) use trainer::Trainer;
+pub(crate) use trainer::{Trainer, require_room};
 pub use trainer_error::TrainerError;
+pub(crate) use training::Scene;
 pub(crate) use view_buffers::require_bindings;

@@ -11,6 +11,15 @@ use wgpu::BufferUsages;
 /// Most workgroups of `adam`, and of `expand`, which writes the values of the same buffers.
 pub(super) const ADAM_GROUPS: u32 = 4096;
 
+/// Which values a step of `adam` updates.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Extent {
+    /// Whether Gaussians are skipped that no view has shown.
+    pub sparse: bool,
+    /// Number of values of each Gaussian that are updated, from the first; `None`: all.
+    pub values: Option<u32>,
+}
+
 /// One kind of parameters on the GPU, with what the optimizer knows of each.
 #[derive(Debug)]
 pub(super) struct Optimized {
@@ -46,7 +55,7 @@ impl Optimized {
         Self { values, gradients, moments, settings, group, count, stride }
     }
 
-    /// Records step number `step`, counted from 1. A sparse step skips Gaussians that no view has shown.
+    /// Records step number `step`, counted from 1.
     pub(super) fn record_step(
         &self,
         queue: &wgpu::Queue,
@@ -54,11 +63,18 @@ impl Optimized {
         passes: &Passes,
         rates: [[f32; 4]; 5],
         step: usize,
-        sparse: bool,
+        extent: Extent,
     ) {
         let Self { count, stride, .. } = *self;
-        let sparse = [u32::from(sparse), 0, 0, 0];
-        let settings = AdamUniforms { rates, correction: correction(step), count, stride, sparse };
+        let settings = AdamUniforms {
+            rates,
+            correction: correction(step),
+            count,
+            stride,
+            sparse: extent.sparse.into(),
+            values: extent.values.unwrap_or(4 * stride),
+            padding: [0; 2],
+        };
         queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&settings));
         pass.set_pipeline(&passes.adam);
         pass.set_bind_group(0, &self.group, &[]);

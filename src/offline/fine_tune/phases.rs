@@ -9,13 +9,14 @@ use super::resume::{Checkpoint, Resume, Saves};
 use super::run::Run;
 use super::settings::FineTuneSettings;
 use super::targets::TrainingImages;
-use super::training::train;
+use super::training::{Watch, train};
 use crate::offline::{OfflineError, Progress};
 use crate::renderer::Headless;
 use crate::scene::GaussianScene;
 
 /// Trains a scene on images. What its temporal filter leaves out is not drawn in training either; a filter of the kind support, which
-/// changes no picture, is computed again afterwards. Begins the task "fine-tuning".
+/// changes no picture, is computed again afterwards. Begins the task "fine-tuning", or "training" with
+/// [`growth`](FineTuneSettings::growth).
 ///
 /// # Errors
 /// A scene that is not in the trained form or does not fit the GPU, no images, a lost device; [`OfflineError::Interrupted`], with the best
@@ -28,6 +29,22 @@ pub fn fine_tune(
     resume: Option<Resume<'_>>,
     progress: &mut dyn Progress,
 ) -> Result<FineTuned, OfflineError> {
+    fine_tune_watched(headless, scene, images, settings, resume, &mut |_| Ok(()), progress)
+}
+
+/// As [`fine_tune`]; `watch` gets the scene whenever an evaluation before the last step finds better parameters.
+///
+/// # Errors
+/// As [`fine_tune`], and those of `watch`.
+pub(crate) fn fine_tune_watched(
+    headless: &mut Headless,
+    scene: GaussianScene,
+    images: &TrainingImages,
+    settings: &FineTuneSettings,
+    resume: Option<Resume<'_>>,
+    watch: Watch<'_>,
+    progress: &mut dyn Progress,
+) -> Result<FineTuned, OfflineError> {
     let mut run = Run::open(headless, scene, images, settings)?;
     let saves = resume.map(|resume| Saves::new(resume, settings));
     let stored = saves.and_then(Saves::load);
@@ -35,7 +52,7 @@ pub fn fine_tune(
     let is_coded = |stored: &&Checkpoint| stored.coded.is_some();
     let mut found = match stored.as_ref().filter(is_coded) {
         Some(Checkpoint { curve, best, .. }) => Progressed { curve: curve.clone(), best: best.clone(), pace: (0, 0.0) },
-        None => train(&mut run, stored.clone(), saves, progress)?,
+        None => train(&mut run, stored.clone(), saves, watch, progress)?,
     };
     run.trainer.resume(&found.best.state);
     let scene = match settings.compress {

@@ -47,7 +47,7 @@ impl Regularizer {
             motion: (terms.motion * MOMENT * share) as f32,
             rigid: (terms.rigid * MOMENT * share / NEIGHBORS as f64) as f32,
             opacity: (terms.opacity * share) as f32,
-            padding: 0,
+            scale: (terms.scale * share / 3.0) as f32,
         };
         headless.context().queue.write_buffer(&weights, 0, bytemuck::bytes_of(&settings));
         let search_every = (terms.rigid > 0.0).then(|| terms.search_every.max(1));

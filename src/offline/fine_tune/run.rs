@@ -5,10 +5,10 @@
 use super::best::Progressed;
 use super::outcome::FineTuned;
 use super::sample::{GpuImage, Sample};
-use super::schedule::{Behind, Schedule};
+use super::schedule::{Behind, Rates, Schedule, noise_seed, relocation_seed};
 use super::settings::FineTuneSettings;
 use super::targets::{Shot, TrainingImages};
-use super::trainer::Trainer;
+use super::trainer::{StepGrowth, Trainer};
 use crate::offline::dataset::selection::even_subset;
 use crate::offline::metrics::SquaredError;
 use crate::offline::score::GpuEngine;
@@ -68,6 +68,9 @@ impl<'a> Run<'a> {
         let mut trainer = Trainer::with_sums(headless, scene, settings.mode, settings.sums)?;
         trainer.set_terms(settings.terms)?;
         trainer.set_sparse(settings.sparse);
+        if settings.growth.is_some() {
+            trainer.set_growing()?;
+        }
         let random = settings.behind == Behind::Random
             && background != Background::Environment
             && images.shots.iter().any(|shot| shot.image.has_gaps);
@@ -146,7 +149,26 @@ impl<'a> Run<'a> {
         }
         self.trainer.accumulate(&batch, settings.similarity_share)?;
         self.trainer.accumulate_terms(step)?;
-        Ok(self.trainer.step(&settings.rates, factor, count)?)
+        // The steps after the last, which train codebooks, do not grow.
+        let Some(growth) = settings.growth.filter(|_| step < settings.steps) else {
+            return Ok(self.trainer.step(&settings.rates, factor, count)?);
+        };
+        let mean = settings.rates.mean * growth.mean_rate(step, settings.steps);
+        let of_step = StepGrowth {
+            color_values: growth.color_values(step),
+            noise: growth.noise,
+            seed: noise_seed(settings.seed, step),
+        };
+        Ok(self.trainer.step_growing(&Rates { mean, ..settings.rates }, factor, count, Some(of_step))?)
+    }
+
+    /// Relocates the Gaussians that have faded, if that is due after this number of steps. Returns their number.
+    pub(super) fn relocate(&mut self, steps: usize) -> Result<usize, OfflineError> {
+        let settings = self.settings;
+        match settings.growth.is_some_and(|growth| growth.relocates_after(steps)) {
+            true => Ok(self.trainer.relocate(relocation_seed(settings.seed, steps))?),
+            false => Ok(0),
+        }
     }
 
     /// Returns the PSNR in dB of the scene in its present state: that of the squared error of all pixels, channels and validation views together;

@@ -95,6 +95,16 @@ impl Schedule {
     }
 }
 
+/// Returns the seed of the noise of a step.
+pub(super) fn noise_seed(seed: u64, step: usize) -> u32 {
+    (mixed(seed.wrapping_add(2), step as u64) >> 32) as u32
+}
+
+/// Returns the seed of the relocation after this number of steps.
+pub(super) fn relocation_seed(seed: u64, steps: usize) -> u64 {
+    mixed(seed.wrapping_add(3), steps as u64)
+}
+
 /// Returns the factor on all rates at a step: it falls to `last` along a half cosine.
 pub(super) fn decay(step: usize, steps: usize, last: f64) -> f64 {
     let done = step as f64 / steps.max(1) as f64;

@@ -2,6 +2,7 @@
 //!
 //! In: the choices of a caller. Out: [`FineTuneSettings`], with a default for each.
 
+use super::growth::Growth;
 use super::schedule::{Behind, Rates};
 use super::sums::GradientSums;
 use super::terms::Terms;
@@ -39,11 +40,20 @@ pub struct FineTuneSettings {
     pub mode: GradientMode,
     /// How gradients are summed. Default: in a fixed order.
     pub sums: GradientSums,
+    /// Relocation, noise and schedules of training from pictures alone; `None`, the default, fine-tunes.
+    pub growth: Option<Growth>,
     /// How the result is compressed, and the number of further steps in which the codebooks of color are trained; `None` leaves the scene in
     /// the trained form.
     pub compress: Option<(Quality, usize)>,
     /// Whether these further steps see geometry as the package will hold it, rounded. Default: `false`; it pays with few bits.
     pub rounding: bool,
+}
+
+impl FineTuneSettings {
+    /// Returns the name of the task.
+    pub(super) fn task(&self) -> &'static str {
+        if self.growth.is_some() { "training" } else { "fine-tuning" }
+    }
 }
 
 impl Default for FineTuneSettings {
@@ -63,6 +73,7 @@ impl Default for FineTuneSettings {
             refresh_filter: 1000,
             mode: GradientMode::default(),
             sums: GradientSums::default(),
+            growth: None,
             compress: None,
             rounding: false,
         }

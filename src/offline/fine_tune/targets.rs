@@ -69,6 +69,11 @@ impl TrainingImages {
         Ok(Self { views, shots, validation })
     }
 
+    /// Returns the views that are trained on, with their images.
+    pub(crate) fn pairs(&self) -> impl Iterator<Item = (&View, &CoveredImage)> {
+        self.shots.iter().map(|shot| (&shot.view, &shot.image))
+    }
+
     /// Returns the number of views that are trained on.
     pub fn len(&self) -> usize {
         self.shots.len()

@@ -1,18 +1,19 @@
 //! Further terms of the loss; CPU reference of `shaders/regularize.wgsl`.
 //!
 //! In: raw parameters, the neighbors of each Gaussian, weights. Out: the terms that depend on Gaussians alone, and the gradient of their
-//! weighted sum. These are, with `u` 0.1 times the velocity c/v (section 6 of the 4DGS model; the original has no term of opacity):
+//! weighted sum. These are, with `u` 0.1 times the velocity c/v (section 6 of the 4DGS model; the original has no terms of opacity and scale):
 //!
 //! | term | value |
 //! |---|---|
 //! | motion | the mean over Gaussians of `‖u‖` |
 //! | rigid | the mean over Gaussians and their [`NEIGHBORS`] of `exp(−100 d) ‖u − u of the neighbor‖`, `d` their distance |
 //! | opacity | the mean over Gaussians of the peak opacity |
+//! | scale | the mean over Gaussians and their three spatial axes of the scale |
 //!
 //! In the rigid term a Gaussian is drawn to its neighbors as they are: distances and the neighbors' velocities are constant. The original
 //! lets the gradient through to the velocities of the neighbors too, which doubles it where two are neighbors of each other.
 //!
-//! The fourth term, the mask, is of views: see [`opacity_mask`](super::opacity_mask).
+//! The fifth term, the mask, is of views: see [`opacity_mask`](super::opacity_mask).
 
 use super::neighbors::NEIGHBORS;
 use crate::gaussian::gradient::slice_gradient;
@@ -38,26 +39,34 @@ pub struct Terms {
     pub rigid: f64,
     /// Of opacity: its mean over Gaussians. What is not needed fades, so that more can be pruned.
     pub opacity: f64,
+    /// Of scale: the mean over Gaussians of their spatial scales. Space that no image needs is left.
+    pub scale: f64,
     /// Steps between two searches for neighbors. Default: 500.
     pub search_every: usize,
 }
 
 impl Default for Terms {
     fn default() -> Self {
-        Self { mask: 0.0, motion: 0.0, rigid: 0.0, opacity: 0.0, search_every: 500 }
+        Self { mask: 0.0, motion: 0.0, rigid: 0.0, opacity: 0.0, scale: 0.0, search_every: 500 }
     }
 }
 
 impl Terms {
     /// Returns the first term with a weight that is negative, too large or not a number.
     pub(super) fn wrong(&self) -> Option<(&'static str, f64)> {
-        let weights = [("mask", self.mask), ("motion", self.motion), ("rigid", self.rigid), ("opacity", self.opacity)];
+        let weights = [
+            ("mask", self.mask),
+            ("motion", self.motion),
+            ("rigid", self.rigid),
+            ("opacity", self.opacity),
+            ("scale", self.scale),
+        ];
         weights.into_iter().find(|(_, weight)| !(0.0..=f64::from(f32::MAX)).contains(weight))
     }
 
     /// Returns whether a term that depends on Gaussians alone has a weight.
     pub(super) fn is_regularizing(&self) -> bool {
-        self.motion > 0.0 || self.rigid > 0.0 || self.opacity > 0.0
+        self.motion > 0.0 || self.rigid > 0.0 || self.opacity > 0.0 || self.scale > 0.0
     }
 }
 
@@ -70,6 +79,8 @@ pub struct Regularization {
     pub rigid: f64,
     /// Opacity, without its weight.
     pub opacity: f64,
+    /// Scale, without its weight.
+    pub scale: f64,
     /// The gradient of the weighted sum with respect to the raw parameters of each Gaussian, coefficients of color left out.
     pub gradients: Vec<ParameterGradient>,
 }
@@ -90,7 +101,8 @@ pub fn regularization(
     let moves: Vec<DVec3> = (0..count).map(|index| movement(parameters, index)).collect::<Result<_, _>>()?;
     let place = |index: usize| DVec3::from(parameters.mean[index].map(f64::from));
     let share = 1.0 / count.max(1) as f64;
-    let mut all = Regularization { motion: 0.0, rigid: 0.0, opacity: 0.0, gradients: Vec::with_capacity(count) };
+    let mut all =
+        Regularization { motion: 0.0, rigid: 0.0, opacity: 0.0, scale: 0.0, gradients: Vec::with_capacity(count) };
     for (index, &own) in moves.iter().enumerate() {
         all.motion += share * own.length();
         let mut by_move = terms.motion * slope_of_length(own);
@@ -102,7 +114,13 @@ pub fn regularization(
             by_move += terms.rigid * near * slope_of_length(difference);
         }
         all.opacity += share / (1.0 + (-f64::from(parameters.opacity_logit[index])).exp());
-        all.gradients.push(slice_gradient(parameters, index, share * MOMENT * by_move, share * terms.opacity));
+        let mut gradient = slice_gradient(parameters, index, share * MOMENT * by_move, share * terms.opacity);
+        for (slope, log_scale) in gradient.log_scale.iter_mut().zip(parameters.log_scale[index]) {
+            let scale = share / 3.0 * f64::from(log_scale).exp();
+            all.scale += scale;
+            *slope += terms.scale * scale;
+        }
+        all.gradients.push(gradient);
     }
     Ok(all)
 }
@@ -160,11 +178,17 @@ mod tests {
         let motion = Terms { motion: 0.8, ..none };
         let rigid = Terms { rigid: 2.5, ..none };
         let opacity = Terms { opacity: 0.3, ..none };
-        for (name, terms, moved) in [("motion", motion, 3), ("rigid", rigid, 1), ("opacity", opacity, 3)] {
+        let scale = Terms { scale: 0.3, ..none };
+        for (name, terms, moved) in
+            [("motion", motion, 3), ("rigid", rigid, 1), ("opacity", opacity, 3), ("scale", scale, 3)]
+        {
             let of = |parameters: &Parameters| regularization(parameters, &neighbors, &terms).expect("valid");
             let loss = |parameters: &Parameters| {
                 let found = of(parameters);
-                terms.motion * found.motion + terms.rigid * found.rigid + terms.opacity * found.opacity
+                terms.motion * found.motion
+                    + terms.rigid * found.rigid
+                    + terms.opacity * found.opacity
+                    + terms.scale * found.scale
             };
             let gradients = of(&three()).gradients;
             assert!(loss(&three()) > 1e-3, "{name} has a value");

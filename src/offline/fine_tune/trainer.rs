@@ -13,10 +13,13 @@
 //! | `project_backward` | gradients of pairs, parameters | gradients of raw parameters, added up over a batch; which Gaussians were seen |
 //! | `regularize` | parameters, their slice, neighbors | gradients of raw parameters, if there are [`Terms`] of Gaussians alone |
 //! | `adam` | gradients, moments | parameters; of Gaussians that were seen only, if steps are [sparse](Trainer::set_sparse) |
+//! | `noise` | raw parameters | the same with means moved at random, if the scene [grows](Trainer::set_growing) |
+//! | `relocate` | moves, colors | colors of the Gaussians that move, moments, if the scene grows |
 //! | `codebooks` | gradients of coefficients; entries | gradients of entries; coefficients, once colors are [tied](Trainer::tie) |
 
 use super::backward::Backward;
-use super::optimized::Optimized;
+use super::grower::Grower;
+use super::optimized::{Extent, Optimized};
 use super::parameters::{ParameterBuffers, scene_settings};
 use super::passes::Passes;
 use super::records::{records, set_harmonics, set_parameters};
@@ -46,6 +49,17 @@ use std::collections::VecDeque;
 /// Steps that may be submitted before the first of them has finished.
 const STEPS_IN_FLIGHT: usize = 4;
 
+/// What a step of training from pictures alone has beside the step of the optimizer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepGrowth {
+    /// Number of values of the color of each Gaussian that are trained.
+    pub color_values: u32,
+    /// Factor on the rate of means that gives the strength of the noise.
+    pub noise: f64,
+    /// Seed of the noise.
+    pub seed: u32,
+}
+
 /// A scene that is trained.
 #[derive(Debug)]
 pub struct Trainer<'a> {
@@ -61,6 +75,7 @@ pub struct Trainer<'a> {
     mask_weight: f32,
     regularizer: Option<Regularizer>,
     rounder: Option<Rounder>,
+    grower: Option<Grower>,
     sparse: bool,
     in_flight: VecDeque<wgpu::SubmissionIndex>,
 }
@@ -100,14 +115,9 @@ impl<'a> Trainer<'a> {
         let definitions = [definitions, sums.definitions()].concat();
         let passes = Passes::new(headless, &definitions, ShaderChecks::Off)?;
         let degrees = runtime.form.color_degrees();
-        let stride = evaluated(degrees.degree, degrees.degree_t) * 3;
-        let stride = stride.div_ceil(4) as u32;
+        let stride = stride(degrees.degree, degrees.degree_t);
         let count = runtime.len() as u32;
-        let limit = binding_limit(&headless.context().device.limits());
-        let needed = u64::from(count) * 16 * u64::from(stride.max(5));
-        if needed > limit {
-            return Err(GpuError::TooLarge { what: "the Gaussians that are trained", needed, limit }.into());
-        }
+        require_gaussians(headless, count.into(), stride)?;
         let capture = headless.upload(&runtime)?;
         let Some(writable) = capture.writable() else { return Err(TrainerError::Empty) };
         let settings = scene_settings(model, count, scene.trained_with.prefilter_var);
@@ -124,6 +134,7 @@ impl<'a> Trainer<'a> {
             mask_weight: 0.0,
             regularizer: None,
             rounder: None,
+            grower: None,
             sparse: false,
             in_flight: VecDeque::new(),
         };
@@ -134,6 +145,11 @@ impl<'a> Trainer<'a> {
     /// Returns the adapter's description and the device.
     pub fn headless(&self) -> &Headless {
         self.headless
+    }
+
+    /// Returns the number of Gaussians.
+    pub fn count(&self) -> u32 {
+        self.parameters.count()
     }
 
     /// Returns the renderer, for scoring between steps.
@@ -262,23 +278,65 @@ impl<'a> Trainer<'a> {
         self.sparse = sparse;
     }
 
+    /// Compiles the passes of training from pictures alone, for [`step_growing`](Self::step_growing) and [`relocate`](Self::relocate).
+    ///
+    /// # Errors
+    /// Gaussians of another model than the native one, a shader that does not compile.
+    pub fn set_growing(&mut self) -> Result<(), TrainerError> {
+        if self.scene.model() != Some(Model::Rotated4d) {
+            return Err(TrainerError::Model);
+        }
+        self.grower = Some(Grower::new(self.headless, &self.parameters)?);
+        Ok(())
+    }
+
+    /// Relocates the Gaussians that have faded, by random numbers of this seed. Returns their number; 0 unless the scene
+    /// [grows](Self::set_growing).
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn relocate(&mut self, seed: u64) -> Result<usize, GpuError> {
+        let Some(grower) = &self.grower else { return Ok(0) };
+        let moved = grower.relocate(self.headless, &self.parameters, seed)?;
+        self.slice();
+        Ok(moved)
+    }
+
     /// Makes a step with the gradients accumulated so far, which become 0; the first `step` is 1.
     ///
     /// # Errors
     /// A lost device.
     pub fn step(&mut self, rates: &Rates, factor: f64, step: usize) -> Result<(), GpuError> {
+        self.step_growing(rates, factor, step, None)
+    }
+
+    /// As [`step`](Self::step); with `growth`, some values of color are not updated, and, if the scene [grows](Self::set_growing), noise
+    /// moves means.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn step_growing(
+        &mut self,
+        rates: &Rates,
+        factor: f64,
+        step: usize,
+        growth: Option<StepGrowth>,
+    ) -> Result<(), GpuError> {
         let Self { headless, passes, parameters, tied, sparse, .. } = &*self;
         let ParameterBuffers { geometry, color, .. } = parameters;
         let colors = rates.of_harmonics(factor);
-        let geometry_rates = rates.of_parameters(self.scene.trained_with.spatial_lr_scale, factor);
-        let mut rated = vec![(geometry, geometry_rates, *sparse)];
+        let spatial_lr_scale = self.scene.trained_with.spatial_lr_scale;
+        let geometry_rates = rates.of_parameters(spatial_lr_scale, factor);
+        let all = Extent { sparse: *sparse, values: None };
+        let of_color = Extent { values: growth.map(|growth| growth.color_values), ..all };
+        let mut rated = vec![(geometry, geometry_rates, all)];
         match tied {
             // The first coefficient of each Gaussian is its own; entries are of many.
             Some(tied) => rated.extend([
-                (color, Rates { harmonics: 0.0, ..*rates }.of_harmonics(factor), *sparse),
-                (&tied.entries, [colors[1]; 5], false),
+                (color, Rates { harmonics: 0.0, ..*rates }.of_harmonics(factor), all),
+                (&tied.entries, [colors[1]; 5], Extent { sparse: false, ..all }),
             ]),
-            None => rated.push((color, colors, *sparse)),
+            None => rated.push((color, colors, of_color)),
         }
         let queue = &headless.context().queue;
         let mut encoder = encoder(headless, "gs4d step");
@@ -287,8 +345,12 @@ impl<'a> Trainer<'a> {
             if let Some(tied) = tied {
                 tied.record_collect(&mut pass, passes);
             }
-            for (optimized, rates, sparse) in rated {
-                optimized.record_step(queue, &mut pass, passes, rates, step, sparse);
+            for (optimized, rates, extent) in rated {
+                optimized.record_step(queue, &mut pass, passes, rates, step, extent);
+            }
+            if let (Some(grower), Some(StepGrowth { noise, seed, .. })) = (&self.grower, growth) {
+                let strength = (noise * rates.mean * spatial_lr_scale * factor) as f32;
+                grower.record_noise(queue, &mut pass, parameters.count(), seed, strength);
             }
             if let Some(tied) = tied {
                 tied.record_expand(&mut pass, passes, color);
@@ -489,6 +551,28 @@ impl<'a> Trainer<'a> {
         if let Some(rounder) = &self.rounder {
             rounder.record(pass, self.parameters.count().div_ceil(256));
         }
+    }
+}
+
+/// Returns the four-vectors of the color of each Gaussian with these degrees.
+fn stride(degree: u32, degree_t: u32) -> u32 {
+    (evaluated(degree, degree_t) * 3).div_ceil(4) as u32
+}
+
+/// Checks that the device binds so many Gaussians with colors of these degrees, before there are any.
+///
+/// # Errors
+/// The bytes that are needed, and the limit of the device.
+pub fn require_room(headless: &Headless, count: usize, degree: u32, degree_t: u32) -> Result<(), GpuError> {
+    require_gaussians(headless, count as u64, stride(degree, degree_t))
+}
+
+fn require_gaussians(headless: &Headless, count: u64, stride: u32) -> Result<(), GpuError> {
+    let limit = binding_limit(&headless.context().device.limits());
+    let needed = count.saturating_mul(16 * u64::from(stride.max(5)));
+    match needed > limit {
+        true => Err(GpuError::TooLarge { what: "the Gaussians that are trained", needed, limit }),
+        false => Ok(()),
     }
 }
 

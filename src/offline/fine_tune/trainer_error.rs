@@ -26,6 +26,11 @@ pub enum TrainerError {
         /// Its weight.
         weight: f64,
     },
+    /// Gaussians of another model than the native one are at rest, and have no time to grow in.
+    #[error(
+        "only native 4D Gaussians, with both rotations, can be trained from pictures alone: fine-tune others with gs4d finetune"
+    )]
+    Model,
     /// The device has no float atomics.
     #[error(
         "the adapter `{adapter}` cannot add floating-point numbers atomically: sum gradients with --sums deterministic, or choose another \

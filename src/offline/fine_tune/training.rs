@@ -10,16 +10,24 @@ use super::schedule::decay;
 use super::settings::FineTuneSettings;
 use crate::offline::score::ScoreError;
 use crate::offline::{OfflineError, Progress};
+use crate::scene::GaussianScene;
 use std::time::Instant;
 
 /// Steps between two looks at gradients that are not finite.
 const STEPS_OF_FAULTS: usize = 50;
+
+/// Gets a function that returns the scene, whenever there are better parameters.
+pub(crate) type Watch<'a> = &'a mut dyn FnMut(Scene<'_>) -> Result<(), OfflineError>;
+
+/// Returns the scene with the parameters that were found just now.
+pub(crate) type Scene<'a> = &'a dyn Fn() -> Result<GaussianScene, OfflineError>;
 
 /// Makes the steps, from where a stored run ended.
 pub(super) fn train(
     run: &mut Run<'_>,
     stored: Option<Checkpoint>,
     saves: Option<Saves<'_>>,
+    watch: Watch<'_>,
     progress: &mut dyn Progress,
 ) -> Result<Progressed, OfflineError> {
     let settings = run.settings;
@@ -27,7 +35,8 @@ pub(super) fn train(
     let stored = stored.filter(|stored| run.trainer.resume(&stored.state));
     let (mut curve, mut best) = match stored {
         Some(Checkpoint { curve, best, .. }) => {
-            progress.note(&format!("fine-tuning resumes after step {}", curve.last().map_or(0, |last| last.step)));
+            let step = curve.last().map_or(0, |last| last.step);
+            progress.note(&format!("{} resumes after step {step}", settings.task()));
             (curve, best)
         }
         None => {
@@ -37,10 +46,11 @@ pub(super) fn train(
         }
     };
     let first = curve.last().map_or(0, |last| last.step);
-    progress.begin("fine-tuning", settings.steps);
+    progress.begin(settings.task(), settings.steps);
     (0..first).for_each(|_| progress.advance());
-    let (mut seconds, mut told) = (0.0, false);
-    let mut start = Instant::now();
+    let (mut seconds, mut told, mut relocated) = (0.0, false, 0);
+    let begun = Instant::now();
+    let mut start = begun;
     let mut step = first;
     while step < settings.steps && !is_over(settings, &curve, &best) {
         // The state was stored at the last evaluation: a resumed run makes the steps since then again, and ends at the same bytes.
@@ -50,6 +60,7 @@ pub(super) fn train(
         }
         run.step(step, step + 1, decay(step, settings.steps, settings.last_rate))?;
         step += 1;
+        relocated += run.relocate(step)?;
         progress.advance();
         if !told && step.is_multiple_of(STEPS_OF_FAULTS) {
             told = run.tell_faults(progress)?;
@@ -70,10 +81,20 @@ pub(super) fn train(
         let (loss, training_psnr) = (Some(totals.loss), Some(totals.psnr));
         let point = CurvePoint { step, loss, training_psnr, psnr: run.evaluate()? };
         let speed = (step - first) as f64 / seconds;
-        progress.note(&point.describe(Some(speed)));
+        let grown = settings.growth.map_or(String::new(), |_| {
+            let left = begun.elapsed().as_secs_f64() * (settings.steps - step) as f64 / (step - first) as f64;
+            let left = left.round() as u64;
+            let count = run.trainer.count();
+            format!(", {count} Gaussians, {relocated} relocated, {} min {} s left", left / 60, left % 60)
+        });
+        progress.note(&format!("{}{grown}", point.describe(Some(speed))));
+        relocated = 0;
         curve.push(point);
         if point.psnr > best.point.psnr || point.psnr.is_none() {
             best = Best { point, state: run.trainer.state()? };
+            if step < settings.steps {
+                watch(&|| run.scene())?;
+            }
         }
         let goes_on = step < settings.steps || settings.compress.is_some();
         if let Some(saves) = saves.filter(|saves| saves.are_due(step) && goes_on) {
@@ -85,7 +106,8 @@ pub(super) fn train(
     }
     if step < settings.steps {
         progress.note(&format!(
-            "fine-tuning ends after step {step}: no evaluation has been better since step {}",
+            "{} ends after step {step}: no evaluation has been better since step {}",
+            settings.task(),
             best.point.step
         ));
     }

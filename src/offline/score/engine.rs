@@ -4,7 +4,6 @@
 
 use super::reference::{ViewScore, Want, score};
 use super::variant::Variant;
-use crate::offline::error::INTERRUPTED;
 use crate::scene::RuntimeScene;
 use crate::view::{Background, View};
 use std::error::Error;
@@ -32,6 +31,9 @@ impl ScoreEngine for CpuEngine<'_> {
         Ok(score(self.scene, view, self.background, want))
     }
 }
+
+/// The message of work that the user has interrupted.
+pub(in crate::offline) const INTERRUPTED: &str = "interrupted";
 
 /// Why there are no scores.
 #[derive(Debug, thiserror::Error)]

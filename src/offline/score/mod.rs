@@ -11,6 +11,7 @@ mod scoring;
 pub(crate) mod traits;
 mod variant;
 
+pub(in crate::offline) use engine::INTERRUPTED;
 pub use engine::ScoreError;
 pub(crate) use engine::{CpuEngine, ScoreEngine};
 pub(crate) use file::read_weights;

@@ -1,9 +1,10 @@
 //! The asset type: a scene ready to draw, shared.
 //!
-//! In: a [`RuntimeScene`]. Out: a [`GaussianCapture`], cheap to clone, with its bounds, its duration and its up direction.
+//! In: a [`RuntimeScene`]. Out: a [`GaussianCapture`], cheap to clone, with its bounds, the extent of its Gaussians, its duration and its up
+//! direction.
 
 use super::key_frames::KeyFrames;
-use crate::gaussian::Harmonics;
+use crate::gaussian::{Gaussian, Harmonics};
 use crate::scene::{ActiveSets, Bounds, BoundsOverTime, Environment, Form, Level, RuntimeScene, TemporalFilter};
 use bevy::asset::{Asset, RenderAssetUsages};
 use bevy::reflect::TypePath;
@@ -31,6 +32,8 @@ use std::sync::Arc;
 pub struct GaussianCapture {
     scene: Arc<RuntimeScene>,
     bounds: Option<Arc<BoundsOverTime>>,
+    /// The typical extent of its Gaussians, capture units.
+    extent: f32,
     usages: RenderAssetUsages,
     /// Whether the Gaussians have been moved to the render world.
     is_released: bool,
@@ -42,7 +45,7 @@ impl GaussianCapture {
     /// be drawn.
     pub fn new(scene: RuntimeScene) -> Self {
         let usages = RenderAssetUsages::default();
-        let mut capture = Self { scene: Arc::new(scene), bounds: None, usages, is_released: false };
+        let mut capture = Self { scene: Arc::new(scene), bounds: None, extent: 0.0, usages, is_released: false };
         if let Form::Packed(packed) = &capture.scene.form
             && packed.check().is_err()
         {
@@ -50,7 +53,10 @@ impl GaussianCapture {
         }
         // A still shows its first moment only.
         let shown = [0.0, f32::INFINITY].map(|seconds| capture.time_at(seconds));
-        capture.bounds = BoundsOverTime::of(capture.scene.iter(), shown).map(Arc::new);
+        let mut extents = Extents::of(capture.scene.len());
+        let gaussians = capture.scene.iter().inspect(|gaussian| extents.add(gaussian));
+        capture.bounds = BoundsOverTime::of(gaussians, shown).map(Arc::new);
+        capture.extent = extents.upper_quartile();
         capture
     }
 
@@ -101,6 +107,12 @@ impl GaussianCapture {
         self.bounds.as_ref()?.at(self.time_at(seconds))
     }
 
+    /// Returns the typical extent of the Gaussians, a standard deviation in capture space: the error of the depth of a pixel, since a splat has
+    /// one depth. 0 for an empty capture.
+    pub(crate) fn extent(&self) -> f32 {
+        self.extent
+    }
+
     /// Returns the duration of one pass at speed 1, in seconds; 0 for a still.
     pub fn duration_seconds(&self) -> f32 {
         let seconds = self.scene.playback.duration_seconds;
@@ -137,6 +149,46 @@ impl GaussianCapture {
     }
 }
 
+/// Maximum number of Gaussians whose extents are compared.
+const SAMPLES: usize = 4096;
+
+/// The extents of evenly spaced Gaussians of a scene.
+struct Extents {
+    stride: usize,
+    count: usize,
+    /// Extent and opacity of each sample.
+    samples: Vec<(f32, f32)>,
+}
+
+impl Extents {
+    fn of(count: usize) -> Self {
+        Self { stride: count.div_ceil(SAMPLES).max(1), count: 0, samples: Vec::new() }
+    }
+
+    /// Adds the next Gaussian of the scene. Gaussians that cannot be drawn are ignored.
+    fn add(&mut self, gaussian: &Gaussian) {
+        if self.count.is_multiple_of(self.stride) && gaussian.check().is_ok() {
+            let [xx, _, _, yy, _, zz] = gaussian.covariance;
+            let extent = Vec3::new(xx, yy, zz).max_element().max(0.0).sqrt();
+            self.samples.push((extent, gaussian.opacity));
+        }
+        self.count += 1;
+    }
+
+    /// Returns the extent above three quarters of the samples, weighted by opacity. Small Gaussians are numerous but cover little of a picture;
+    /// the few large Gaussians of a sky have no influence. 0 without Gaussians.
+    fn upper_quartile(mut self) -> f32 {
+        self.samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let below = 0.75 * self.samples.iter().map(|(_, opacity)| opacity).sum::<f32>();
+        let mut sum = 0.0;
+        let reaches = |(_, opacity): &&(f32, f32)| {
+            sum += opacity;
+            sum >= below
+        };
+        self.samples.iter().find(reaches).map_or(0.0, |(extent, _)| *extent)
+    }
+}
+
 /// Returns a scene with everything that is needed to play it, without Gaussians.
 fn outline(scene: &RuntimeScene) -> RuntimeScene {
     let filter = scene.filter.as_ref().map(|filter| {
@@ -160,7 +212,6 @@ fn outline(scene: &RuntimeScene) -> RuntimeScene {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gaussian::Gaussian;
     use crate::scene::packed::RECORD_WORDS;
     use crate::scene::{PackedColors, PackedScene, PlaybackHints, TrainedWith, UpAxis};
 
@@ -221,6 +272,29 @@ mod tests {
     }
 
     #[test]
+    fn the_extent_is_the_upper_quartile_weighted_by_opacity() {
+        let round = |extent: f32, opacity: f32| Gaussian {
+            mean: [0.0; 3],
+            mean_t: 0.0,
+            velocity: [0.0; 3],
+            sigma_t: f32::INFINITY,
+            covariance: [extent * extent, 0.0, 0.0, 0.0, 0.0, 0.0],
+            opacity,
+            padding: 0.0,
+        };
+        let extent = |gaussians: Vec<Gaussian>| with(gaussians, [0.0, 1.0], 1.0).extent();
+        assert_eq!(extent(Vec::new()), 0.0, "an empty capture has no extent");
+        let mixed = |large: Gaussian| [[round(0.5, 0.5); 8], [large; 8]].concat();
+        assert_eq!(extent(mixed(round(1.0, 0.5))), 1.0, "half of the Gaussians have an extent of 1");
+        assert_eq!(extent(mixed(round(1.0, 0.01))), 0.5, "eight faint Gaussians count little");
+        let broken = round(f32::NAN, 0.5);
+        assert_eq!(extent(vec![broken, round(0.25, 0.5), broken]), 0.25, "invalid Gaussians are ignored");
+        let large = extent((0..3 * SAMPLES).map(|index| round(index as f32, 0.5)).collect());
+        let expected = 0.75 * 3.0 * SAMPLES as f32;
+        assert!((large - expected).abs() < 8.0, "of many Gaussians some are compared: {large}, not {expected}");
+    }
+
+    #[test]
     fn an_inconsistent_packed_scene_has_no_bounds() {
         let packed = PackedScene {
             records: vec![[0; RECORD_WORDS]],
@@ -255,6 +329,7 @@ mod tests {
         assert_eq!((taken.scene().len(), taken.is_released()), (1, false), "the returned capture has the Gaussian");
         assert_eq!((capture.scene().len(), capture.is_released()), (0, true), "the capture has no Gaussian");
         assert_eq!(capture.bounds(), whole.bounds(), "the bounds are kept");
+        assert_eq!(capture.extent(), 1.0, "the extent is kept");
         assert_eq!(capture.time_at(1.0), whole.time_at(1.0), "the times are kept");
         assert_eq!(capture.upright(), whole.upright(), "the up direction is kept");
         assert!(capture.release().is_none(), "Gaussians are released once");

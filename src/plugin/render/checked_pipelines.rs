@@ -31,7 +31,7 @@ fn fragment() -> @location(0) vec4<f32> {
 
 /// The pipelines of one kind, by key; `None` for keys that this GPU refuses.
 #[derive(Resource)]
-pub(crate) struct CheckedPipelines<S: SpecializedRenderPipeline<Key: Send + Sync> + 'static>(
+pub struct CheckedPipelines<S: SpecializedRenderPipeline<Key: Send + Sync> + 'static>(
     HashMap<S::Key, Option<CachedRenderPipelineId>>,
 );
 
@@ -43,7 +43,7 @@ impl<S: SpecializedRenderPipeline<Key: Send + Sync> + 'static> Default for Check
 
 impl<S: SpecializedRenderPipeline<Key: Send + Sync> + 'static> CheckedPipelines<S> {
     /// Returns the pipeline of a key; `None` if this GPU refuses it, which is logged once.
-    pub(crate) fn specialize(
+    pub fn specialize(
         &mut self,
         device: &RenderDevice,
         cache: &PipelineCache,

@@ -116,4 +116,4 @@ pub use upload::{CaptureUploadBudget, GpuGaussianCapture};
 #[cfg(feature = "pbr")]
 pub(crate) use view::CameraLens;
 #[cfg(feature = "pbr")]
-pub(crate) use write_depth::{WriteDepthBindings, WriteDepthKey, WriteDepthPipeline, nearest};
+pub(crate) use write_depth::{WriteDepthBindings, WriteDepthKey, WriteDepthPipeline, WrittenDepth, nearest};

@@ -24,7 +24,7 @@ use super::shade_requests::ShadeRequests;
 use super::statistics::CaptureStatistics;
 use super::upload::GpuGaussianCapture;
 use super::view::CameraLens;
-use super::write_depth::{WriteDepthKey, WriteDepthPipeline};
+use super::write_depth::{WriteDepthKey, WriteDepthPipeline, WrittenDepth};
 use super::write_motion::{WriteMotionKey, WriteMotionPipeline};
 use crate::plugin::component::GaussianCapture3d;
 use crate::renderer::memory::{catch, catch_known};
@@ -128,7 +128,8 @@ impl Pipelines<'_> {
     }
 
     fn write_depth(&mut self, msaa: Msaa, median: bool) -> Option<CachedRenderPipelineId> {
-        let key = WriteDepthKey { samples: msaa.samples(), median };
+        let depth = if median { WrittenDepth::Median } else { WrittenDepth::Expected };
+        let key = WriteDepthKey { samples: msaa.samples(), depth };
         self.depth_writers.specialize(&self.device, &self.cache, &self.write_depth, key)
     }
 

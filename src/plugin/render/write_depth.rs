@@ -34,8 +34,20 @@ pub(crate) struct WriteDepthPipeline {
 pub(crate) struct WriteDepthKey {
     /// Samples of the depth buffer.
     pub(crate) samples: u32,
-    /// Whether the median depth is written instead of the expected one.
-    pub(crate) median: bool,
+    pub(crate) depth: WrittenDepth,
+}
+
+/// The depth that is written, of the depths of a pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum WrittenDepth {
+    /// The expected depth.
+    Expected,
+    /// The median depth.
+    Median,
+    /// The farther of both, for shadow maps. On a slanted surface the median is the depth of the center of a splat, which may lie in front of
+    /// the surface; the expected depth, a mean of several splats, is nearer to it. In front of a surface a faint splat makes the expected
+    /// depth too small, but not the median.
+    Farther,
 }
 
 impl FromWorld for WriteDepthPipeline {
@@ -63,7 +75,11 @@ impl SpecializedRenderPipeline for WriteDepthPipeline {
             multisample: MultisampleState { count: key.samples, ..MultisampleState::default() },
             fragment: Some(FragmentState {
                 shader: self.shader.clone(),
-                shader_defs: if key.median { vec!["MEDIAN".into()] } else { Vec::new() },
+                shader_defs: match key.depth {
+                    WrittenDepth::Expected => Vec::new(),
+                    WrittenDepth::Median => vec!["MEDIAN".into()],
+                    WrittenDepth::Farther => vec!["FARTHER".into()],
+                },
                 entry_point: Some("fragment".into()),
                 targets: Vec::new(),
             }),

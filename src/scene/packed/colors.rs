@@ -89,7 +89,8 @@ impl CodedColors {
         lanes::unpack_code(self.records[index], stage)
     }
 
-    /// Returns all coefficients of a Gaussian but the first (which is 0 here), RGB innermost, padded to whole words.
+    /// Returns the sum of a Gaussian's entries in all codebooks, RGB innermost, padded to whole words. The codebooks written here have 0 in
+    /// the place of the first coefficient; what other files have there is added to it.
     ///
     /// # Panics
     /// If `index` is out of range.
@@ -156,8 +157,9 @@ impl CodedColors {
         let coefficients = self.coefficients();
         let mut values = Vec::with_capacity(self.records.len() * coefficients * 3);
         for index in 0..self.records.len() {
-            values.extend(self.base(index, base).to_array());
-            values.extend_from_slice(&self.rest(index)[3..coefficients * 3]);
+            let rest = self.rest(index);
+            values.extend((self.base(index, base) + Vec3::from_slice(&rest)).to_array());
+            values.extend_from_slice(&rest[3..coefficients * 3]);
         }
         Harmonics { coefficients, degree: self.degree, degree_t: self.degree_t, values }
     }

@@ -208,7 +208,9 @@ impl Parts {
             if width == 0 || !gaussians::has(&section.name) || !(every || random.one_in(2)) {
                 continue;
             }
-            for row in (0..words / width).cycle().skip(first).take(rows.min(words / width)) {
+            let count = words / width;
+            // The header may name any number of Gaussians.
+            for row in (0..count).cycle().skip(first % count).take(rows.min(count)) {
                 let of = |word: usize| [0, 1, 2, 3].map(|plane| planes[plane * words + word]);
                 let mut values: Vec<f32> =
                     (row * width..(row + 1) * width).map(|word| f32::from_le_bytes(of(word))).collect();

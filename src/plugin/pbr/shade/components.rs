@@ -16,7 +16,9 @@ use bevy::reflect::std_traits::ReflectDefault;
 /// not reach the capture, its linear light is multiplied by [`tint`](Self::tint), once for each such light. The effect of point and spot
 /// lights falls off towards the end of their range and of their cone. A capture has no normals: lights count as perpendicular to its
 /// surface, so the side away from a light is not dark. The strength of lights has no effect. A shadow is looked up at the depth of a pixel
-/// (the mean depth of its splats, or the median with an environment map).
+/// (the mean depth of its splats, or the median with an environment map). With [`CastsShadows`](crate::pbr::CastsShadows) the capture also
+/// shadows itself, gradually behind its surface; see [its bias](crate::pbr::CastsShadows::bias). Bevy's `NotShadowReceiver` on the same entity
+/// switches all these shadows off.
 ///
 /// # Examples
 ///
@@ -40,7 +42,8 @@ pub struct ReceivesShadows {
     /// Default: 0.35 in each channel.
     pub tint: LinearRgba,
     /// Distance by which a point is moved towards a light before its shadow is looked up, in world units, in addition to the light's own
-    /// biases; it should be the uncertainty of the capture's depth. A value that is not finite counts as 0. Default: 0.02.
+    /// biases; it should be the uncertainty of the capture's depth. A capture with [`CastsShadows`](crate::pbr::CastsShadows) adds the
+    /// width of a pixel. A value that is not finite counts as 0. Default: 0.02.
     pub bias: f32,
 }
 

@@ -1,18 +1,20 @@
 //! Extract: copies the boxes and shading of captures, and finds the cameras with fog.
 //!
-//! In (main world): captures with their boxes, [`ReceivesShadows`] and [`CaptureLight`]; cameras with `DistanceFog`. Out (render world):
-//! [`ExtractedShading`] and [`ShadeRequests`], by entity of the main world.
+//! In (main world): captures with their boxes, [`ReceivesShadows`], Bevy's `NotShadowReceiver` and [`CaptureLight`]; cameras with `DistanceFog`.
+//! Out (render world): [`ExtractedShading`] and [`ShadeRequests`], by entity of the main world.
 
 use super::components::{CaptureLight, ReceivesShadows};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
+use crate::plugin::pbr::shadow::CastsShadows;
 use crate::plugin::render::shade_requests::ShadeRequests;
 use bevy::asset::Assets;
 use bevy::camera::Camera3d;
 use bevy::camera::primitives::Aabb;
 use bevy::ecs::entity::Entity;
-use bevy::ecs::query::{Or, With};
+use bevy::ecs::query::{Has, Or, With};
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Query, Res, ResMut};
+use bevy::light::{NotShadowCaster, NotShadowReceiver};
 use bevy::pbr::{DistanceFog, MeshPipelineViewLayouts};
 use bevy::render::Extract;
 use bevy::render::sync_world::{MainEntity, MainEntityHashMap};
@@ -30,7 +32,10 @@ pub(super) struct PlacedShading {
     /// not drawn.
     pub(super) cube_from_world: Option<Affine3A>,
     pub(super) has_environment: bool,
+    /// `None` with Bevy's `NotShadowReceiver`.
     pub(super) shadows: Option<ReceivesShadows>,
+    /// Distance behind its surface over which its own shadow sets in, world units; 0 if it casts no shadow.
+    pub(super) own_shadow: f32,
     pub(super) light: Option<CaptureLight>,
 }
 
@@ -47,6 +52,8 @@ type Placed = (
     &'static GlobalTransform,
     Option<&'static Aabb>,
     Option<&'static ReceivesShadows>,
+    Has<NotShadowReceiver>,
+    Option<(&'static CastsShadows, Has<NotShadowCaster>)>,
     Option<&'static CaptureLight>,
 );
 
@@ -75,12 +82,16 @@ pub(super) fn extract_shading(
         return;
     }
     requests.cameras.extend(foggy.iter().map(MainEntity::from));
-    for (entity, capture, transform, bounds, shadows, light) in &captures {
+    for (entity, capture, transform, bounds, shadows, is_no_receiver, casts, light) in &captures {
         let Some(asset) = assets.get(&capture.0) else { continue };
         let placed = PlacedShading {
             cube_from_world: bounds.and_then(|bounds| cube_from_world(bounds, transform.affine())),
             has_environment: asset.scene().environment.is_some(),
-            shadows: shadows.copied(),
+            shadows: shadows.copied().filter(|_| !is_no_receiver),
+            own_shadow: match casts {
+                Some((casts, false)) => casts.distance(asset, &transform.affine()),
+                Some((_, true)) | None => 0.0,
+            },
             light: light.copied(),
         };
         if placed.is_shaded() {

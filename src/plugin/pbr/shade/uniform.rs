@@ -11,6 +11,9 @@ use glam::{Mat4, UVec2, Vec4};
 /// Maximum number of captures of one view with separate shading.
 pub(super) const MOST_SHADINGS: usize = 16;
 
+/// Distance over which the own shadow of a capture sets in, in distances of the shadow behind the surface.
+const OWN_SHADOW: f32 = 2.0;
+
 /// Distance from the center of a cube for captures without a box: larger than the distance of any box.
 const BEYOND_ALL_BOXES: f32 = 1e30;
 
@@ -77,7 +80,7 @@ impl GpuShading {
         Self {
             cube_from_world,
             tint: Vec4::new(red, green, blue, receives),
-            light: Vec4::new(amount, inverse, bias, 0.0),
+            light: Vec4::new(amount, inverse, bias, OWN_SHADOW * placed.own_shadow),
         }
     }
 }
@@ -92,8 +95,13 @@ mod tests {
     use super::*;
     use glam::Affine3A;
 
-    const PLAIN: PlacedShading =
-        PlacedShading { cube_from_world: Some(Affine3A::IDENTITY), has_environment: false, shadows: None, light: None };
+    const PLAIN: PlacedShading = PlacedShading {
+        cube_from_world: Some(Affine3A::IDENTITY),
+        has_environment: false,
+        shadows: None,
+        own_shadow: 0.0,
+        light: None,
+    };
 
     fn lit(light: CaptureLight) -> PlacedShading {
         PlacedShading { light: Some(light), ..PLAIN }

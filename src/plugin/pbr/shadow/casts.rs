@@ -2,15 +2,18 @@
 //!
 //! In: fields that any system or animation may set. Out: resolution and bias of the capture's shadows.
 
+use crate::plugin::component::GaussianCapture;
 use bevy::ecs::component::Component;
 use bevy::ecs::reflect::ReflectComponent;
 use bevy::reflect::Reflect;
 use bevy::reflect::std_traits::ReflectDefault;
+use glam::{Affine3A, Vec3A};
 
 /// Makes a capture cast shadows: an optional component next to [`GaussianCapture3d`](crate::GaussianCapture3d).
 ///
 /// The capture casts a shadow for every light with shadow maps, whether a camera sees the capture or not, at its current time, with its
-/// opacity, crop and temporal filter. Hidden captures, and captures on `RenderLayers` that the light does not have, cast no shadows.
+/// opacity, crop and temporal filter. Hidden captures, captures on `RenderLayers` that the light does not have, and captures with Bevy's
+/// `NotShadowCaster` cast no shadows.
 ///
 /// Without this component captures cast no shadows, since each shadow costs up to one more view of the capture, as large as the shadow map
 /// at its [`resolution`](Self::resolution): for a directional light one for each cascade and camera (four by default), for a point light
@@ -34,15 +37,27 @@ pub struct CastsShadows {
     /// Resolution at which the capture is drawn for shadows. All captures in one view of a light are drawn at the finest of their
     /// resolutions. Default: [`ShadowResolution::Half`].
     pub resolution: ShadowResolution,
-    /// Distance of the shadow behind the capture's surface, seen from the light, as a fraction of the diagonal of its bounds; a value that
-    /// is negative or not finite counts as 0. If the bias is too small, captures that receive shadows darken their own lit side; if it is
-    /// too large, light leaks between a capture and the ground below it. Default: 0.02.
+    /// Distance of the shadow behind the capture's surface, seen from the light, in extents of the capture's Gaussians: a splat has one
+    /// depth, so the depth of a surface is known up to about an extent (the standard deviation along an axis that three quarters of the
+    /// Gaussians, weighted by opacity, do not exceed). A value that is negative or not finite counts as 0. If the capture also receives shadows, these set in
+    /// gradually: its own from this distance to three times this distance. If the bias is too small, the capture darkens its own lit side; if it is
+    /// too large, light leaks between the capture and the ground below it. Default: 2.
     pub bias: f32,
+}
+
+impl CastsShadows {
+    /// Returns the distance of the shadow of a capture behind its surface, world units.
+    pub(in crate::plugin::pbr) fn distance(&self, capture: &GaussianCapture, world_from_capture: &Affine3A) -> f32 {
+        let matrix = world_from_capture.matrix3;
+        let scale = Vec3A::from([matrix.x_axis, matrix.y_axis, matrix.z_axis].map(Vec3A::length)).max_element();
+        let distance = self.bias * capture.extent() * scale;
+        if distance.is_finite() { distance.max(0.0) } else { 0.0 }
+    }
 }
 
 impl Default for CastsShadows {
     fn default() -> Self {
-        Self { resolution: ShadowResolution::default(), bias: 0.02 }
+        Self { resolution: ShadowResolution::default(), bias: 2.0 }
     }
 }
 

@@ -1,9 +1,10 @@
 //! Extract: copies the captures that cast shadows.
 //!
-//! In (main world): captures with [`CastsShadows`], their bounds and layers; the extracted captures. Out (render world):
-//! [`ExtractedCasters`]; the extracted captures marked as casters, so that their active lists are updated even if no camera sees them.
+//! In (main world): captures with [`CastsShadows`] and without Bevy's `NotShadowCaster`, their bounds and layers; the extracted captures. Out
+//! (render world): [`ExtractedCasters`]; the extracted captures marked as casters, so that their active lists are updated even if no camera
+//! sees them.
 
-use super::casts::CastsShadows;
+use super::casts::{CastsShadows, ShadowResolution};
 use crate::plugin::component::{GaussianCapture, GaussianCapture3d};
 use crate::plugin::playback::Playback;
 use crate::plugin::render::ExtractedCaptures;
@@ -11,9 +12,10 @@ use bevy::asset::Assets;
 use bevy::camera::primitives::Aabb;
 use bevy::camera::visibility::{InheritedVisibility, RenderLayers};
 use bevy::ecs::entity::Entity;
-use bevy::ecs::query::With;
+use bevy::ecs::query::{With, Without};
 use bevy::ecs::resource::Resource;
 use bevy::ecs::system::{Query, Res, ResMut};
+use bevy::light::NotShadowCaster;
 use bevy::render::Extract;
 use bevy::render::sync_world::MainEntity;
 use glam::Affine3A;
@@ -22,8 +24,11 @@ use glam::Affine3A;
 #[derive(Resource, Default)]
 pub(super) struct ExtractedCasters(pub(super) Vec<Caster>);
 
+/// The entities that cast shadows: Bevy's component has precedence over the component of this crate.
+type Casting = (With<CastsShadows>, Without<NotShadowCaster>);
+
 /// Returns whether any capture of the main world casts shadows.
-pub(super) fn any_casts(captures: Extract<Query<(), With<CastsShadows>>>) -> bool {
+pub(super) fn any_casts(captures: Extract<Query<(), Casting>>) -> bool {
     !captures.is_empty()
 }
 
@@ -35,7 +40,9 @@ pub(super) fn any_caster(casters: Res<ExtractedCasters>) -> bool {
 /// One capture that casts shadows.
 pub(super) struct Caster {
     pub(super) entity: MainEntity,
-    pub(super) settings: CastsShadows,
+    pub(super) resolution: ShadowResolution,
+    /// Distance of its shadow behind its surface, world units.
+    pub(super) bias: f32,
     /// Its bounds at the current time, in capture space.
     pub(super) bounds: Aabb,
     pub(super) world_from_capture: Affine3A,
@@ -56,7 +63,7 @@ pub(super) fn extract_casters(
     mut casters: ResMut<ExtractedCasters>,
     mut extracted: ResMut<ExtractedCaptures>,
     assets: Extract<Res<Assets<GaussianCapture>>>,
-    captures: Extract<Query<Placed>>,
+    captures: Extract<Query<Placed, Casting>>,
 ) {
     casters.0.clear();
     for (entity, capture, settings, playback, visibility, bounds, layers) in &captures {
@@ -65,16 +72,18 @@ pub(super) fn extract_casters(
         else {
             continue;
         };
+        let Some(asset) = assets.get(&capture.0) else { continue };
         // A capture with an environment map has no box, since cameras never cull it, but its Gaussians have bounds.
         let known = || {
-            let bounds = assets.get(&capture.0)?.bounds_at(playback.time)?;
+            let bounds = asset.bounds_at(playback.time)?;
             (bounds.min.is_finite() && bounds.max.is_finite()).then(|| Aabb::from_min_max(bounds.min, bounds.max))
         };
         let Some(bounds) = bounds.copied().or_else(known) else { continue };
         (placed.seen, placed.casts) = (true, true);
         casters.0.push(Caster {
             entity,
-            settings: *settings,
+            resolution: settings.resolution,
+            bias: settings.distance(asset, &placed.world_from_capture),
             bounds,
             world_from_capture: placed.world_from_capture,
             layers: layers.cloned().unwrap_or_default(),

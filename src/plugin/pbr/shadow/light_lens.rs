@@ -6,7 +6,7 @@
 use crate::plugin::render::CameraLens;
 use crate::view::View;
 use bevy::camera::primitives::Aabb;
-use glam::{Affine3A, Mat4, UVec2, Vec3, Vec3A, Vec4};
+use glam::{Affine3A, Mat4, UVec2, Vec3, Vec4};
 
 /// The view of a shadow map.
 pub(super) struct LightLens {
@@ -49,9 +49,9 @@ impl LightLens {
         Some(Self { lens, world_from_light, parallel, distance })
     }
 
-    /// Returns the view of a capture that is moved away from the light by the fraction `bias` of the diagonal of its bounds. Its outline on
-    /// the map does not change. `size` in pixels, `time` in the capture's unit. `None` if the transforms flatten the capture or are not
-    /// finite.
+    /// Returns the view of a capture that is moved away from the light by the distance `bias`, world units; a bias that is negative or not
+    /// finite counts as 0. Its outline on the map does not change. `size` in pixels, `time` in the capture's unit. `None` if the transforms
+    /// flatten the capture or are not finite.
     pub(super) fn view(
         &self,
         size: UVec2,
@@ -60,10 +60,7 @@ impl LightLens {
         world_from_capture: Affine3A,
         bias: f32,
     ) -> Option<View> {
-        let matrix = world_from_capture.matrix3;
-        let sides = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(Vec3A::length);
-        let diagonal = 2.0 * (Vec3A::from(sides) * bounds.half_extents).length();
-        let by = if bias.is_finite() { bias.max(0.0) * diagonal } else { 0.0 };
+        let by = if bias.is_finite() { bias.max(0.0) } else { 0.0 };
         let push = if self.parallel {
             Affine3A::from_translation((-self.world_from_light.matrix3.z_axis * by).into())
         } else {
@@ -142,17 +139,16 @@ mod tests {
 
     #[test]
     fn a_bias_moves_the_capture_away_and_keeps_its_outline() {
-        let diagonal = Vec3::new(1.0, 2.0, 3.0).length();
         let spot = Mat4::perspective_infinite_reverse_rh(1.2, 1.0, 0.1);
         let forward = -pose(Vec3::ZERO).matrix3.z_axis;
         for (name, projection) in [("spot", spot), ("cascade", cascade())] {
             let light = pose(Vec3::from(forward * -6.0));
             let lens = lens(&projection, light, Affine3A::IDENTITY);
             let view = |bias| lens.view(SIZE, 0.0, &bounds(), Affine3A::IDENTITY, bias).expect("not flat");
-            let [near, far, broken] = [view(0.0), view(0.1), view(f32::NAN)];
+            let [near, far, broken] = [view(0.0), view(0.4), view(f32::NAN)];
             let depth = |view: &View| view.world_to_camera.transform_point3(Vec3::ZERO).z;
             let pushed = depth(&far) - depth(&near);
-            assert!((pushed - 0.1 * diagonal).abs() < 1e-4, "{name}: the center is moved by {pushed}");
+            assert!((pushed - 0.4).abs() < 1e-4, "{name}: the center is moved by {pushed}");
             assert_eq!(near, broken, "{name}: a bias of NaN counts as 0");
             for corner in [bounds().min(), bounds().max()] {
                 let [(before, _), (after, _)] = [&near, &far].map(|view| drawn(&lens, view, corner.into()));

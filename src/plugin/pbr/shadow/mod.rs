@@ -12,8 +12,8 @@
 //! draw          one compute pass, write_depth into the map            Core3d, after the shadow passes of meshes
 //! ```
 //!
-//! A shadow map has one depth per texel: captures are written at texels where they absorb more than half of the light, at the depth at
-//! which half of it is absorbed. Their shadows have hard edges, which Bevy's filters soften like the edges of mesh shadows.
+//! A shadow map has one depth per texel: captures are written at texels where they absorb more than half of the light, at the farther of
+//! their median and expected depth. Their shadows have hard edges, which Bevy's filters soften like the edges of mesh shadows.
 
 mod casts;
 mod draw;

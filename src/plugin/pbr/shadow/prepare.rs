@@ -12,7 +12,7 @@ use crate::plugin::render::logged::{error_once_each, warn_once_each};
 use crate::plugin::render::rests::Rests;
 use crate::plugin::render::{
     ActiveLists, CaptureRenderer, Drawn, ExtractedCaptures, GpuGaussianCapture, WriteDepthKey, WriteDepthPipeline,
-    group_copies,
+    WrittenDepth, group_copies,
 };
 use crate::renderer::memory::catch_known;
 use crate::renderer::{ColorPrecision, GpuError, Instance, ViewParameters};
@@ -66,7 +66,7 @@ impl Casters<'_> {
         let placed = self.extracted.0.get(&caster.entity)?;
         let capture = self.captures.get(placed.asset)?;
         let time = capture.time_at(placed.seconds)?;
-        let view = lens.view(size, time, &caster.bounds, caster.world_from_capture, caster.settings.bias)?;
+        let view = lens.view(size, time, &caster.bounds, caster.world_from_capture, caster.bias)?;
         let level = usize::from(placed.finest_level).min(capture.coarsest());
         let view = view.antialiased(capture.antialias_pixel(level, false));
         let (asset, appearance, filtered) = (placed.asset, placed.appearance, placed.filtered);
@@ -105,7 +105,7 @@ pub(super) fn prepare_light_views(
         }
         let prepared = catch_known(device.wgpu_device(), 0, || {
             let state = views.0.entry(key).or_insert_with(|| {
-                let key = WriteDepthKey { samples: 1, median: true };
+                let key = WriteDepthKey { samples: 1, depth: WrittenDepth::Farther };
                 let pipeline = depth_writers.specialize(&device, &cache, &write_depth, key);
                 LightView::new(&device, &renderer.0, pipeline)
             });
@@ -144,7 +144,7 @@ fn prepare_light_view(
     state.live = true;
     state.drawn.clear();
     let map = UVec2::new(light.viewport.z, light.viewport.w);
-    let scale = scale(map, within.iter().map(|caster| caster.settings.resolution));
+    let scale = scale(map, within.iter().map(|caster| caster.resolution));
     let boxes = within.iter().map(|caster| (&caster.bounds, caster.world_from_capture));
     let lens = LightLens::of(&light.clip_from_view, light.world_from_view.affine(), boxes);
     if let Some(lens) = &lens {

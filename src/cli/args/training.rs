@@ -1,0 +1,62 @@
+//! Options of the steps of training, which `finetune` and `train` share.
+//!
+//! In: options. Out: [`FineTuneSettings`], in which the verb sets the others.
+
+use super::values;
+use crate::offline::fine_tune::{Behind, FineTuneSettings, GradientSums, Terms};
+
+/// How each step is made.
+#[derive(clap::Args)]
+pub(crate) struct TrainingArgs {
+    /// Views of each step.
+    #[arg(long, value_name = "N", default_value = "2", value_parser = values::count(1000))]
+    batch: usize,
+    /// Weight, in the loss, of opacity where images have none: the original's opacity mask.
+    #[arg(long, help_heading = "Experimental", value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
+    mask_weight: f64,
+    /// Weight, in the loss, of motion: the mean length of 0.1 times the velocity.
+    #[arg(long, help_heading = "Experimental", value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
+    motion_weight: f64,
+    /// Weight, in the loss, of motion that differs from that of the 20 nearest Gaussians: the original's rigid term.
+    #[arg(long, help_heading = "Experimental", value_name = "WEIGHT", default_value = "0", value_parser = values::not_negative)]
+    rigid_weight: f64,
+    /// Do not change Gaussians, and their state in the optimizer, in steps whose views do not show them.
+    #[arg(long, help_heading = "Experimental")]
+    sparse: bool,
+    /// Background of images with transparent pixels: random, a random color for each view, or fixed, the background of training.
+    #[arg(long, value_name = "WHAT", default_value = "random", value_parser = values::one_of(&BEHIND))]
+    behind: Behind,
+    /// End after this number of evaluations without an improvement [default: make all steps].
+    #[arg(long, value_name = "N", value_parser = values::count(1_000_000))]
+    patience: Option<usize>,
+    /// Seed of all random choices, such as the order of views and random backgrounds.
+    #[arg(long, value_name = "N", default_value = "0")]
+    pub seed: u64,
+    /// Sums of gradients: deterministic, in a fixed order with the same result in every run, or atomic, which differ by rounding and need an
+    /// adapter with float atomics.
+    #[arg(long, help_heading = "Experimental", value_name = "HOW", default_value = "deterministic", value_parser = values::one_of(&GradientSums::NAMES))]
+    sums: GradientSums,
+}
+
+const BEHIND: [(&str, Behind); 2] = [("random", Behind::Random), ("fixed", Behind::Fixed)];
+
+impl TrainingArgs {
+    /// Returns the settings with these options, all others as by default.
+    pub(crate) fn settings(&self) -> FineTuneSettings {
+        FineTuneSettings {
+            batch: self.batch,
+            terms: Terms {
+                mask: self.mask_weight,
+                motion: self.motion_weight,
+                rigid: self.rigid_weight,
+                ..Terms::default()
+            },
+            sparse: self.sparse,
+            behind: self.behind,
+            patience: self.patience,
+            seed: self.seed,
+            sums: self.sums,
+            ..FineTuneSettings::default()
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! `gs4d train --data DIR -o OUT`: trains a capture from nothing but the pictures of a dataset.
+//!
+//! In: training views with their images. Out: a package in the trained form, rewritten while training goes on, and its quality at each
+//! evaluation.
+
+use super::args::{Given, PackageArgs, RendererArgs, SplitArgs, TrainingArgs, ValidationArgs, WITHOUT_TIME, values};
+use super::curve::curve_table;
+use super::failure::Failure;
+use super::interrupt;
+use super::progress::Bars;
+use super::report::Report;
+use super::table::{bytes, lines};
+use crate::offline::dataset::{Validation, require_images};
+use crate::offline::engine::AdapterDescription;
+use crate::offline::files::Files;
+use crate::offline::fine_tune::{
+    FineTuneSettings, FineTuned, Growth, Rates, Resume, Terms, TrainingImages, require_room,
+};
+use crate::offline::store::{Key, Store};
+use crate::offline::train::{CaptureSettings, Start, StartSettings, begin, capture_of, train};
+use crate::offline::{OfflineError, trained_pixel};
+use crate::scene::TrainedWith;
+use serde_json::json;
+
+/// Train a capture from nothing but the pictures of a dataset.
+///
+/// The number of Gaussians is fixed: those that fade move to others. OUT has the parameters with the best PSNR on the validation views so
+/// far (with --validation none the latest) and is rewritten as training goes on: a player that reloads changed files shows it. A
+/// killed run resumes from OUT.train/ and writes the same bytes as an uninterrupted one. Ctrl-C ends the run and writes the best parameters
+/// so far; a second Ctrl-C ends it immediately.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  gs4d train --data data/hook --resolution 2 -o hook.gs4d
+  gs4d train --data data/hook --resolution 2 --gaussians 30000 --steps 10000 -o small.gs4d
+
+The result is as large as a checkpoint: gs4d bake prunes and compresses it.")]
+pub(super) struct Train {
+    #[command(flatten)]
+    given: Given,
+    #[command(flatten)]
+    package: PackageArgs,
+    #[command(flatten)]
+    data: SplitArgs,
+    /// The views that the best step is chosen on, which nothing is trained on: those of `transforms_val.json` (file), whole cameras, blocks of
+    /// time (times), or none; auto takes the first of these that the data allows.
+    #[arg(long, help_heading = "Validation", value_name = "VIEWS", default_value = "auto", value_parser = values::one_of(&Validation::NAMES))]
+    validation: Validation,
+    /// First and last time of the capture [default: 0,1 if no view is outside, else from the first view to the last].
+    #[arg(long, value_name = "T0,T1", value_parser = values::interval, allow_hyphen_values = true)]
+    time_interval: Option<[f32; 2]>,
+    /// Background color, 0 to 1 in the space of the pictures.
+    #[arg(long, value_name = "R,G,B", default_value = "0,0,0", value_parser = values::color, allow_hyphen_values = true)]
+    background: [f32; 3],
+    /// Number of Gaussians.
+    #[arg(long, value_name = "N", default_value = "60000", value_parser = values::count(100_000_000))]
+    gaussians: usize,
+    /// Where Gaussians begin: hull, inside the silhouettes of the images, random, in the box that the cameras look at, or auto: the first
+    /// that the images allow.
+    #[arg(long, value_name = "WHERE", default_value = "auto", value_parser = values::one_of(&Start::NAMES))]
+    start: Start,
+    /// Temporal scale of Gaussians at the beginning, as a share of the time interval [default: the original's, the root of a fifth of the
+    /// interval: 0.447 of an interval of 1].
+    #[arg(long, value_name = "SHARE", value_parser = time_scale)]
+    time_scale: Option<f64>,
+    /// Spatial degree of color, 0 to 3.
+    #[arg(long, value_name = "DEGREE", default_value = "3", value_parser = clap::value_parser!(u32).range(0..=3))]
+    sh_degree: u32,
+    /// Degree of color in time, 0 to 2 [default: 2 if the spatial degree is 3].
+    #[arg(long, value_name = "DEGREE", value_parser = clap::value_parser!(u32).range(0..=2))]
+    sh_degree_t: Option<u32>,
+    /// Number of training steps.
+    #[arg(long, value_name = "N", default_value = "20000", value_parser = values::count(100_000_000))]
+    steps: usize,
+    /// Factor on all rates at the last step. The factor falls from 1; 1 keeps the rates constant.
+    #[arg(long, value_name = "FACTOR", default_value = "0.2", value_parser = values::share)]
+    last_rate: f64,
+    /// Further factor on the rate of the means at the last step, to which it falls exponentially from 1.
+    #[arg(long, value_name = "FACTOR", default_value = "0.01", value_parser = values::share)]
+    last_mean_rate: f64,
+    /// Factor on the rates of the means.
+    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = values::not_negative)]
+    mean_rate: f64,
+    /// Weight of SSIM in the loss, 0 to 1; the rest is L1.
+    #[arg(long, value_name = "WEIGHT", default_value = "0.2", value_parser = values::share)]
+    similarity: f64,
+    /// Weight, in the loss, of the mean opacity: unneeded Gaussians fade, and move elsewhere.
+    #[arg(long, value_name = "WEIGHT", default_value = "0.01", value_parser = values::not_negative)]
+    opacity_weight: f64,
+    /// Weight, in the loss, of the mean spatial scale.
+    #[arg(long, value_name = "WEIGHT", default_value = "0.01", value_parser = values::not_negative)]
+    scale_weight: f64,
+    /// Steps between two relocations of the Gaussians that have faded; 0: none is relocated.
+    #[arg(long, value_name = "N", default_value = "100")]
+    relocate_every: usize,
+    /// Strength of the noise that moves faint Gaussians, as a factor on the rate of the means; 0: none.
+    #[arg(long, value_name = "FACTOR", default_value = "5e5", value_parser = values::not_negative)]
+    noise: f64,
+    /// Steps between two rises of a degree of color [default: 1000, at most a twentieth of all].
+    #[arg(long, value_name = "N", value_parser = values::count(100_000_000))]
+    raise_degree_every: Option<usize>,
+    /// Steps between two evaluations on the validation views.
+    #[arg(long, value_name = "N", default_value = "1000", value_parser = values::count(1_000_000))]
+    evaluate_every: usize,
+    /// Steps between two saved states, rounded up to the next evaluation.
+    #[arg(long, value_name = "N", default_value = "5000", value_parser = values::count(1_000_000))]
+    save_every: usize,
+    #[command(flatten)]
+    training: TrainingArgs,
+    #[command(flatten)]
+    renderer: RendererArgs,
+}
+
+/// Parses a temporal scale as a share of the interval.
+fn time_scale(text: &str) -> Result<f64, String> {
+    let share = text.trim().parse::<f64>().ok().filter(|share| (1e-3..=100.0).contains(share));
+    share.ok_or_else(|| "expected a number from 0.001 to 100".to_owned())
+}
+
+impl Train {
+    /// Trains a capture and writes it.
+    ///
+    /// # Errors
+    /// Views that cannot be used, a package that cannot be written, a failure of the GPU.
+    pub(super) fn run(&self) -> Result<Report, Failure> {
+        self.check_options()?;
+        let out = self.package.checked_file(self.data.add_to(Files::default()))?;
+        let store = Store::beside(out, ".train")?;
+        let progress = &mut Bars::default();
+        // Every time, before the interval is known.
+        let any_time = TrainedWith { time_interval: [f32::NEG_INFINITY, f32::INFINITY], ..TrainedWith::default() };
+        let validation = ValidationArgs { validation: self.validation, trust_images: true };
+        let all = self.data.divide(validation, &any_time, progress)?.all_training(&any_time, progress)?;
+        let settings = CaptureSettings { time_interval: self.time_interval, background: self.background };
+        let (mut trained_with, playback) = capture_of(&all, &settings).map_err(OfflineError::from)?;
+        let splits = self.data.divide(validation, &trained_with, progress)?;
+        trained_with.validation = Some(splits.to_string());
+        require_images(&splits.train).map_err(OfflineError::from)?;
+        let mut headless = self.renderer.open()?;
+        TrainingImages::require_room(&splits.train, &splits.validation, &headless)?;
+        let start = self.start_settings();
+        require_room(&headless, start.gaussians, start.degree, start.degree_t).map_err(|error| {
+            Failure::new(format!("{error}; --gaussians and --sh-degree make them fewer or smaller"))
+        })?;
+        let images = TrainingImages::load(splits.train.clone(), &splits.validation, &trained_with, progress)?;
+        let (scene, started) = begin(&images, trained_with, playback, &start).map_err(OfflineError::from)?;
+        let from = started.name();
+        let key = Key::of_images(&splits.train)?
+            .with(Key::of_images(&splits.validation)?)
+            .and(&format!("{start:?} {:?} {:?} {:?}", scene.trained_with, splits.train, splits.validation))
+            .and(env!("CARGO_PKG_VERSION"));
+        let resume = Resume { store: &store, key, every: self.save_every };
+        let deferred = interrupt::defer();
+        let trained = train(&mut headless, scene, &images, &self.settings(), Some(resume), Some(out), progress);
+        let (mut trained, interrupted) = match trained {
+            Err(OfflineError::Interrupted { tuned: Some(trained) }) => (*trained, true),
+            trained => (trained?, false),
+        };
+        trained.scene.trained_with.pixel = trained_pixel(&trained.scene, &all);
+        trained.scene.trained_with.iteration = trained.best.step as u64;
+        let size = self.package.save(&trained.scene)?;
+        drop(deferred);
+        if !interrupted {
+            store.remove()?;
+        }
+        let FineTuned { scene, curve, best, steps_per_second, validation, faults } = &trained;
+        let quality = match best.psnr {
+            Some(psnr) => format!("{psnr:.3} dB at step {} ({validation} validation views)", best.step),
+            None => "not measured, no validation views".to_owned(),
+        };
+        let speed = steps_per_second.map_or(String::new(), |speed| format!(", {speed:.1} steps per second"));
+        let gaussians = scene.len();
+        let mut pairs = vec![
+            ("trained", format!("{gaussians} Gaussians on {} views, begun from {from} points{speed}", images.len())),
+            ("views", splits.to_string()),
+            ("PSNR", quality),
+            ("wrote", format!("{}, {}", out.display(), bytes(size))),
+        ];
+        if interrupted {
+            pairs.push(("interrupted", "wrote the best parameters so far; the same command resumes".to_owned()));
+        }
+        if let Some(faults) = faults {
+            pairs.push(("left out", format!("{} gradients that are not finite", faults.count)));
+        }
+        let json = json!({
+            "out": out.display().to_string(),
+            "bytes_out": size,
+            "gaussians": gaussians,
+            "start": from,
+            "views": images.len(),
+            "validation": validation,
+            "split": splits.to_string(),
+            "time_interval": scene.trained_with.time_interval,
+            "best": best,
+            "psnr": best.psnr,
+            "curve": curve,
+            "steps_per_second": steps_per_second,
+            "interrupted": interrupted,
+            "gradients_left_out": faults.map_or(0, |faults| faults.count),
+            "adapter": AdapterDescription::of(&headless),
+        });
+        let mut report = Report::new(json, format!("{}\n{}", lines(&pairs), curve_table(curve, false)));
+        report.interrupted = interrupted;
+        Ok(report)
+    }
+
+    /// Checks that every option has an effect.
+    fn check_options(&self) -> Result<(), Failure> {
+        if self.validation == Validation::None {
+            self.given.none_of(&["--patience"], "with --validation none: no evaluation is compared with another")?;
+        }
+        match self.sh_degree < 3 {
+            true => self.given.none_of(&["--sh-degree-t"], WITHOUT_TIME),
+            false => Ok(()),
+        }
+    }
+
+    fn start_settings(&self) -> StartSettings {
+        StartSettings {
+            gaussians: self.gaussians,
+            start: self.start,
+            time_scale: self.time_scale,
+            seed: self.training.seed,
+            degree: self.sh_degree,
+            degree_t: self.sh_degree_t.unwrap_or(2),
+        }
+    }
+
+    fn settings(&self) -> FineTuneSettings {
+        let shared = self.training.settings();
+        let usual = Growth::over(self.steps);
+        FineTuneSettings {
+            steps: self.steps,
+            rates: Rates { mean: Rates::OURS.mean * self.mean_rate, ..Rates::OURS },
+            last_rate: self.last_rate,
+            similarity_share: self.similarity,
+            terms: Terms { opacity: self.opacity_weight, scale: self.scale_weight, ..shared.terms },
+            evaluate_every: self.evaluate_every,
+            growth: Some(Growth {
+                relocate_every: (self.relocate_every > 0).then_some(self.relocate_every),
+                noise: self.noise,
+                last_mean_rate: self.last_mean_rate,
+                raise_every: self.raise_degree_every.unwrap_or(usual.raise_every),
+                ..usual
+            }),
+            ..shared
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! The passes of training from pictures alone: `noise` and `relocate`.
+//!
+//! In: the parameters that are trained. Out: [`Grower`]: commands that move means at random, and relocate Gaussians.
+
+use super::optimized::ADAM_GROUPS;
+use super::parameters::ParameterBuffers;
+use super::relocation::relocate;
+use crate::renderer::bind::{Bind, group_layout, pipeline};
+use crate::renderer::layout::{NoiseUniforms, RelocationUniforms, TrainedRecord};
+use crate::renderer::shaders::module;
+use crate::renderer::{GpuError, Headless, ShaderChecks};
+use wgpu::BufferUsages;
+
+/// The passes `noise` and `relocate`.
+#[derive(Debug)]
+pub(super) struct Grower {
+    noise: wgpu::ComputePipeline,
+    noise_settings: wgpu::Buffer,
+    noise_group: wgpu::BindGroup,
+    relocate: wgpu::ComputePipeline,
+    moves: wgpu::Buffer,
+    relocation_settings: wgpu::Buffer,
+    relocation_group: wgpu::BindGroup,
+}
+
+impl Grower {
+    /// Compiles the passes.
+    ///
+    /// # Errors
+    /// A shader that does not compile.
+    pub(super) fn new(headless: &Headless, parameters: &ParameterBuffers) -> Result<Self, GpuError> {
+        use Bind::{Read, Uniform, Write};
+        let (allocator, device) = (headless.allocator(), &headless.context().device);
+        let ParameterBuffers { geometry, color, .. } = parameters;
+        let sizes = [size_of::<NoiseUniforms>(), size_of::<RelocationUniforms>()];
+        let layout = group_layout(device, "gs4d noise", &[Uniform(sizes[0]), Write]);
+        let shader = module(device, "noise", &[], ShaderChecks::Off)?;
+        let noise = pipeline(device, &shader, "noise", &[Some(&layout)]);
+        let noise_settings = allocator.buffer("gs4d noise settings", sizes[0] as u64, BufferUsages::UNIFORM);
+        let buffers = [&noise_settings, &geometry.values].map(wgpu::Buffer::as_entire_binding);
+        let noise_group = allocator.bind_group("gs4d noise", &layout, &buffers);
+        let bindings = [Uniform(sizes[1]), Read, Write, Write, Write, Write, Write];
+        let layout = group_layout(device, "gs4d relocation", &bindings);
+        let shader = module(device, "relocate", &[], ShaderChecks::Off)?;
+        let relocate = pipeline(device, &shader, "relocate", &[Some(&layout)]);
+        let relocation_settings = allocator.buffer("gs4d relocation settings", sizes[1] as u64, BufferUsages::UNIFORM);
+        let moves = allocator.buffer("gs4d moves", u64::from(parameters.count()) * 8, BufferUsages::STORAGE);
+        let ([_, of_geometry @ ..], [colors, of_colors @ ..]) = (geometry.stored(), color.stored());
+        let written = [colors, of_colors[0], of_colors[1], of_geometry[0], of_geometry[1]];
+        let buffers = [&[&relocation_settings, &moves][..], &written].concat();
+        let resources: Vec<_> = buffers.into_iter().map(wgpu::Buffer::as_entire_binding).collect();
+        let relocation_group = allocator.bind_group("gs4d relocation", &layout, &resources);
+        Ok(Self { noise, noise_settings, noise_group, relocate, moves, relocation_settings, relocation_group })
+    }
+
+    /// Records the noise of a step.
+    pub(super) fn record_noise(
+        &self,
+        queue: &wgpu::Queue,
+        pass: &mut wgpu::ComputePass<'_>,
+        count: u32,
+        seed: u32,
+        strength: f32,
+    ) {
+        let settings = NoiseUniforms { count, seed, strength, padding: 0 };
+        queue.write_buffer(&self.noise_settings, 0, bytemuck::bytes_of(&settings));
+        pass.set_pipeline(&self.noise);
+        pass.set_bind_group(0, &self.noise_group, &[]);
+        pass.dispatch_workgroups(count.div_ceil(256), 1, 1);
+    }
+
+    /// Relocates the Gaussians that have faded, by random numbers of this seed. Returns their number.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub(super) fn relocate(
+        &self,
+        headless: &Headless,
+        parameters: &ParameterBuffers,
+        seed: u64,
+    ) -> Result<usize, GpuError> {
+        let ParameterBuffers { geometry, color, .. } = parameters;
+        let mut records: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(&geometry.read_values(headless)?);
+        let moves = relocate(&mut records, seed);
+        if moves.is_empty() {
+            return Ok(0);
+        }
+        let context = headless.context();
+        let settings = RelocationUniforms { moves: moves.len() as u32, stride: color.stride, padding: [0; 2] };
+        context.queue.write_buffer(&geometry.values, 0, bytemuck::cast_slice(&records));
+        context.queue.write_buffer(&self.moves, 0, bytemuck::cast_slice(&moves));
+        context.queue.write_buffer(&self.relocation_settings, 0, bytemuck::bytes_of(&settings));
+        let label = wgpu::CommandEncoderDescriptor { label: Some("gs4d relocation") };
+        let mut encoder = context.device.create_command_encoder(&label);
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            let threads = settings.moves * color.stride.max(geometry.stride);
+            pass.set_pipeline(&self.relocate);
+            pass.set_bind_group(0, &self.relocation_group, &[]);
+            pass.dispatch_workgroups(threads.div_ceil(256).min(ADAM_GROUPS), 1, 1);
+        }
+        context.queue.submit([encoder.finish()]);
+        Ok(moves.len())
+    }
+}

@@ -1,0 +1,90 @@
+//! What training from pictures alone does beside the steps of fine-tuning.
+//!
+//! In: the number of steps. Out: [`Growth`]: when Gaussians are relocated, how strong the noise is, how the rate of means falls, when the
+//! degrees of color rise.
+
+use crate::gaussian::harmonics::evaluated;
+
+/// Largest spatial degree of color.
+const DEGREE: usize = 3;
+/// Largest degree of color in time.
+const DEGREE_T: usize = 2;
+
+/// Relocation, noise and schedules of training from pictures alone (3DGS-MCMC, extended to time).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Growth {
+    /// Steps between two relocations of the Gaussians that have faded; `None`: none is relocated. Default: 100.
+    pub relocate_every: Option<usize>,
+    /// The first step after which Gaussians are relocated. Default: 500, and at most a twentieth of all.
+    pub relocate_from: usize,
+    /// The last such step. Default: five sixths of all.
+    pub relocate_until: usize,
+    /// Factor on the rate of means that gives the strength of the noise. Default: 5e5; 0 moves nothing.
+    pub noise: f64,
+    /// Factor on the rate of means at the last step, to which it falls exponentially, beside the other factors. Default: 0.01.
+    pub last_mean_rate: f64,
+    /// Steps between two rises of a degree of color: the spatial degree from 0 to 3, then the degree in time. Default: 1000, and at most
+    /// a twentieth of all.
+    pub raise_every: usize,
+}
+
+impl Growth {
+    /// Returns the defaults for this number of steps.
+    pub fn over(steps: usize) -> Self {
+        Self {
+            relocate_every: Some(100),
+            relocate_from: 500.min(steps / 20),
+            relocate_until: steps / 6 * 5,
+            noise: 5e5,
+            last_mean_rate: 0.01,
+            raise_every: 1000.min(steps / 20).max(1),
+        }
+    }
+
+    /// Returns whether Gaussians are relocated after this number of steps.
+    pub(super) fn relocates_after(&self, step: usize) -> bool {
+        let every = self.relocate_every.is_some_and(|every| step.is_multiple_of(every.max(1)));
+        every && (self.relocate_from..=self.relocate_until).contains(&step)
+    }
+
+    /// Returns the factor on the rate of means at a step of `steps`.
+    pub(super) fn mean_rate(&self, step: usize, steps: usize) -> f64 {
+        self.last_mean_rate.powf((step as f64 / steps.max(1) as f64).min(1.0))
+    }
+
+    /// Returns the number of values of the color of each Gaussian that are trained at a step.
+    pub(super) fn color_values(&self, step: usize) -> u32 {
+        let rises = step / self.raise_every.max(1);
+        let degree = rises.min(DEGREE);
+        3 * evaluated(degree as u32, (rises - degree).min(DEGREE_T) as u32) as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn degrees_of_color_rise_one_after_the_other() {
+        let growth = Growth { raise_every: 10, ..Growth::over(1000) };
+        let values = [0, 9, 10, 20, 30, 40, 50, 999].map(|step| growth.color_values(step));
+        assert_eq!(values, [3, 3, 12, 27, 48, 96, 144, 144], "degrees 0 to 3, then 1 and 2 in time, three channels");
+    }
+
+    #[test]
+    fn relocation_has_a_first_and_a_last_step() {
+        let growth = Growth::over(12_000);
+        let steps: Vec<usize> = (0..12_000).filter(|&step| growth.relocates_after(step)).collect();
+        assert_eq!((steps.first(), steps.last(), steps.len()), (Some(&500), Some(&10_000), 96), "every hundred steps");
+        let never = Growth { relocate_every: None, ..growth };
+        assert!(!(0..12_000).any(|step| never.relocates_after(step)), "or never");
+    }
+
+    #[test]
+    fn the_rate_of_means_falls_exponentially() {
+        let growth = Growth::over(100);
+        assert_eq!(growth.mean_rate(0, 100), 1.0, "at first");
+        assert!((growth.mean_rate(50, 100) - 0.1).abs() < 1e-12, "halfway the root of the last factor");
+        assert!((growth.mean_rate(300, 100) - 0.01).abs() < 1e-12, "at the end, and after it");
+    }
+}

@@ -1,0 +1,130 @@
+//! The settings of a capture that follow from its views.
+//!
+//! In: training views, optionally an interval of time. Out: [`TrainedWith`] and [`PlaybackHints`].
+
+use super::error::StartError;
+use crate::offline::dataset::TrainingView;
+use crate::scene::{PlaybackHints, TrainedCameras, TrainedWith, UpAxis};
+use crate::view::{Lens, RasterFov};
+use glam::{DVec3, Vec3};
+
+/// The extent of the cameras is the largest distance from their center times this.
+const EXTENT: f64 = 1.1;
+/// Cameras closer together than this share of their distance from the origin stand in one place.
+const ONE_PLACE: f64 = 1e-6;
+
+const AXES: [UpAxis; 6] = [UpAxis::PosX, UpAxis::NegX, UpAxis::PosY, UpAxis::NegY, UpAxis::PosZ, UpAxis::NegZ];
+
+/// What a capture is trained with that views do not say. Default: the interval of the views, black behind.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct CaptureSettings {
+    /// First and last time; `None`: 0 to 1 if no view is outside, else from the first to the last time of the views.
+    pub time_interval: Option<[f32; 2]>,
+    /// Background color, in the space of the images.
+    pub background: [f32; 3],
+}
+
+/// Returns the settings of a capture of these views.
+///
+/// # Errors
+/// Views from one place, a time that is not finite.
+pub fn capture_of(
+    views: &[TrainingView],
+    settings: &CaptureSettings,
+) -> Result<(TrainedWith, PlaybackHints), StartError> {
+    if let Some(view) = views.iter().find(|view| !view.time.is_finite()) {
+        return Err(StartError::Time { view: view.name.clone() });
+    }
+    let spatial_lr_scale = extent(views).ok_or(StartError::OnePlace { views: views.len() })?;
+    let time_interval = settings.time_interval.unwrap_or_else(|| interval(views));
+    let is_intrinsic = |view: &TrainingView| matches!(view.camera.lens, Lens::Intrinsics { .. });
+    let cameras = if views.iter().any(is_intrinsic) { TrainedCameras::Intrinsics } else { TrainedCameras::Fov };
+    let trained_with = TrainedWith {
+        time_interval,
+        background: settings.background,
+        raster_fov: RasterFov::Corrected,
+        cameras,
+        spatial_lr_scale,
+        ..TrainedWith::default()
+    };
+    let playback = PlaybackHints { up: up(views), duration_seconds: trained_with.time_span() };
+    Ok((trained_with, playback))
+}
+
+/// Returns the extent of the cameras (section 5.2 of the 4DGS model); `None` if all stand in one place.
+fn extent(views: &[TrainingView]) -> Option<f64> {
+    let centers: Vec<DVec3> = views.iter().map(|view| center(view).as_dvec3()).collect();
+    let middle = centers.iter().sum::<DVec3>() / centers.len().max(1) as f64;
+    let farthest = centers.iter().map(|center| center.distance(middle)).fold(0.0, f64::max);
+    (farthest > ONE_PLACE * middle.length().max(f64::MIN_POSITIVE)).then_some(EXTENT * farthest)
+}
+
+fn center(view: &TrainingView) -> Vec3 {
+    view.camera.world_to_camera.inverse().w_axis.truncate()
+}
+
+/// Returns 0 to 1 if no view is outside; else the first and the last time, or one unit from the only time.
+fn interval(views: &[TrainingView]) -> [f32; 2] {
+    let times = || views.iter().map(|view| view.time);
+    let [first, last] = [times().fold(f32::INFINITY, f32::min), times().fold(f32::NEG_INFINITY, f32::max)];
+    match (0.0..=1.0).contains(&first) && (0.0..=1.0).contains(&last) {
+        true => [0.0, 1.0],
+        false if first < last => [first, last],
+        false => [first, first + 1.0],
+    }
+}
+
+/// Returns the axis closest to the mean direction that points up in the images.
+fn up(views: &[TrainingView]) -> UpAxis {
+    let mean: Vec3 = views.iter().map(|view| -view.camera.world_to_camera.row(1).truncate()).sum();
+    let along = |axis: &&UpAxis| axis.vector().dot(mean);
+    // Of equal axes the last would win: +z is the default.
+    let best = AXES.iter().max_by(|a, b| along(a).total_cmp(&along(b)));
+    best.copied().filter(|axis| axis.vector().dot(mean) > 0.0).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::Camera;
+    use glam::UVec2;
+
+    fn view(eye: Vec3, up: Vec3, time: f32) -> TrainingView {
+        let camera = Camera::look_at(eye, Vec3::ZERO, up, 0.7, UVec2::splat(8));
+        let (name, image) = ("a".to_owned(), "none.png".into());
+        TrainingView { name, camera, time, original: camera.size, image, mask: None }
+    }
+
+    fn of(times: [f32; 2]) -> TrainedWith {
+        let views = [view(Vec3::X * 4.0, Vec3::Z, times[0]), view(Vec3::Y * 4.0, Vec3::Z, times[1])];
+        capture_of(&views, &CaptureSettings::default()).expect("two places").0
+    }
+
+    #[test]
+    fn the_interval_is_that_of_the_views() {
+        assert_eq!(of([0.0, 0.5]).time_interval, [0.0, 1.0], "times of a share of the interval");
+        assert_eq!(of([0.0, 9.5]).time_interval, [0.0, 9.5], "seconds");
+        assert_eq!(of([7.0, 7.0]).time_interval, [7.0, 8.0], "a still has an interval too");
+        let given = CaptureSettings { time_interval: Some([0.0, 10.0]), ..CaptureSettings::default() };
+        let views = [view(Vec3::X, Vec3::Z, 0.0), view(Vec3::Y, Vec3::Z, 9.5)];
+        assert_eq!(capture_of(&views, &given).expect("two places").0.time_interval, [0.0, 10.0], "as given");
+    }
+
+    #[test]
+    fn the_extent_and_the_axis_are_those_of_the_cameras() {
+        let views = [view(Vec3::X * 4.0, Vec3::Y, 0.0), view(Vec3::NEG_X * 4.0, Vec3::Y, 1.0)];
+        let (trained_with, playback) = capture_of(&views, &CaptureSettings::default()).expect("two places");
+        assert!((trained_with.spatial_lr_scale - 4.4).abs() < 1e-5, "1.1 times 4: {}", trained_with.spatial_lr_scale);
+        assert_eq!((playback.up, playback.duration_seconds), (UpAxis::PosY, 1.0), "up and duration");
+    }
+
+    #[test]
+    fn views_that_no_capture_can_be_trained_on_are_refused() {
+        let one = [view(Vec3::X * 4.0, Vec3::Z, 0.0), view(Vec3::X * 4.0, Vec3::Z, 1.0)];
+        let refused = capture_of(&one, &CaptureSettings::default());
+        assert_eq!(refused, Err(StartError::OnePlace { views: 2 }), "one place has no depth");
+        let timeless = [view(Vec3::X, Vec3::Z, f32::NAN), view(Vec3::Y, Vec3::Z, 0.0)];
+        let refused = capture_of(&timeless, &CaptureSettings::default());
+        assert_eq!(refused, Err(StartError::Time { view: "a".to_owned() }), "a time that is no number");
+    }
+}

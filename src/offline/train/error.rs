@@ -1,0 +1,35 @@
+//! The errors of beginning a capture.
+//!
+//! In: views that no capture can be trained on. Out: [`StartError`], with the cause and the remedy.
+
+/// Why no capture can be begun.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StartError {
+    /// Depth cannot be found.
+    #[error(
+        "all {views} training views are taken from one place, from which no depth can be found: a capture needs views from several places"
+    )]
+    OnePlace {
+        /// Number of views.
+        views: usize,
+    },
+    /// A time that is not a finite number.
+    #[error("the view {view} has no finite time")]
+    Time {
+        /// Name of the view.
+        view: String,
+    },
+    /// The cameras look at nothing together.
+    #[error(
+        "the training cameras look away from each other, so that they have no region in common: give views of one scene"
+    )]
+    NoRegion,
+    /// There are no silhouettes.
+    #[error("the images have no transparent pixels and no masks, so that they have no hull: give --start random")]
+    NoSilhouettes,
+    /// There is nothing inside the silhouettes.
+    #[error(
+        "no point is inside the silhouettes of the views of a moment (masks or poses of another scene?): give --start random to begin without them"
+    )]
+    NoHull,
+}

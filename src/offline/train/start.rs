@@ -1,0 +1,235 @@
+//! The Gaussians before the first step.
+//!
+//! In: training images, [`StartSettings`]. Out: a scene of native 4D Gaussians at points of the visual hull, or at random ones in the box
+//! that the cameras look at.
+//!
+//! Opacity is 0.1; the spatial scale is the root of the mean squared distance to the three nearest points; the temporal scale is `√(T/5)` of
+//! an interval of length `T`; no Gaussian is rotated or moves (section 5.4 of the 4DGS model).
+
+use super::error::StartError;
+use super::hull::hull;
+use super::point::StartPoint;
+use super::region::Region;
+use crate::gaussian::harmonics::evaluated;
+use crate::gaussian::{Harmonics, Parameters};
+use crate::offline::dataset::CoveredImage;
+use crate::offline::fine_tune::TrainingImages;
+use crate::offline::fine_tune::neighbors::{NEIGHBORS, neighbors};
+use crate::scene::random::Random;
+use crate::scene::{GaussianScene, PlaybackHints, SceneForm, Trained, TrainedWith};
+use crate::view::View;
+use glam::Vec3;
+
+/// Opacity before the first step.
+const OPACITY: f32 = 0.1;
+/// Least squared scale.
+const LEAST_SQUARE: f32 = 1e-7;
+/// Nearest points that give the scale.
+const NEAREST: usize = 3;
+/// Value of the first spherical harmonic: a coefficient is `color − 0.5` divided by it.
+const SH_C0: f32 = 0.282_094_79;
+/// Share of the interval by which random times are outside, at each end.
+const OUTSIDE: f32 = 0.1;
+/// Color of random points, the original's.
+const GRAY: f32 = 127.0 / 255.0;
+/// Distance of points that fill a hull of too few, as a share of the half side of the box.
+const FILLING: f32 = 0.02;
+
+/// Where the points come from. Default: [`Auto`](Self::Auto).
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Start {
+    /// From the visual hull if most images have silhouettes and it is not empty, else at random.
+    #[default]
+    Auto,
+    /// From the visual hull of the silhouettes.
+    Hull,
+    /// At random in the box that the cameras look at.
+    Random,
+}
+
+impl Start {
+    /// Every start with its name.
+    pub const NAMES: [(&'static str, Self); 3] = [("auto", Self::Auto), ("hull", Self::Hull), ("random", Self::Random)];
+
+    /// Returns the name.
+    pub fn name(self) -> &'static str {
+        Self::NAMES.iter().find(|(_, start)| *start == self).map_or("", |(name, _)| name)
+    }
+}
+
+/// How a capture begins. Default: 60,000 Gaussians with colors of degree 3, and degree 2 in time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StartSettings {
+    /// Number of Gaussians, which stays.
+    pub gaussians: usize,
+    /// Where their points come from.
+    pub start: Start,
+    /// Temporal scale, as a share of the interval; `None`: `√(T/5)`, the original's.
+    pub time_scale: Option<f64>,
+    /// Seed of the random numbers.
+    pub seed: u64,
+    /// Spatial degree of color, 0 to 3.
+    pub degree: u32,
+    /// Degree of color in time, 0 to 2; used only if `degree` is 3.
+    pub degree_t: u32,
+}
+
+impl Default for StartSettings {
+    fn default() -> Self {
+        Self { gaussians: 60_000, start: Start::Auto, time_scale: None, seed: 0, degree: 3, degree_t: 2 }
+    }
+}
+
+/// Returns the scene before the first step, and where its points come from: the hull, or random places.
+///
+/// # Errors
+/// Cameras without a common region; a visual hull that was asked for and is empty.
+pub fn begin(
+    images: &TrainingImages,
+    trained_with: TrainedWith,
+    playback: PlaybackHints,
+    settings: &StartSettings,
+) -> Result<(GaussianScene, Start), StartError> {
+    let pairs: Vec<(&View, &CoveredImage)> = images.pairs().collect();
+    let region = Region::of(pairs.iter().map(|(view, _)| *view))?;
+    let (points, start) = points(&pairs, &region, trained_with.time_interval, settings)?;
+    let span = trained_with.time_span();
+    let scale_t = settings.time_scale.map_or((span / 5.0).sqrt(), |share| share as f32 * span);
+    let (degree, degree_t) = (settings.degree.min(3), if settings.degree >= 3 { settings.degree_t.min(2) } else { 0 });
+    let scene = GaussianScene {
+        form: SceneForm::Trained(trained(&points, scale_t, degree, degree_t)),
+        environment: None,
+        filter: None,
+        trained_with,
+        playback,
+        levels: Vec::new(),
+    };
+    Ok((scene, start))
+}
+
+fn points(
+    images: &[(&View, &CoveredImage)],
+    region: &Region,
+    interval: [f32; 2],
+    settings: &StartSettings,
+) -> Result<(Vec<StartPoint>, Start), StartError> {
+    let count = settings.gaussians;
+    let mut random = Random::new(settings.seed);
+    let with_gaps = images.iter().filter(|(_, image)| image.has_gaps).count();
+    let wants_hull = match settings.start {
+        Start::Hull => true,
+        Start::Random => false,
+        Start::Auto => 2 * with_gaps > images.len(),
+    };
+    if wants_hull {
+        if with_gaps == 0 {
+            return Err(StartError::NoSilhouettes);
+        }
+        let mut found = hull(images, region, interval, count, settings.seed);
+        if !found.is_empty() {
+            // A hull of fewer points is filled with points beside these.
+            let own = found.len();
+            for index in own..count {
+                let beside = Vec3::from([(); 3].map(|()| random.in_range(-1.0, 1.0))) * FILLING * region.half;
+                let point = found[index % own];
+                found.push(StartPoint { position: point.position + beside, ..point });
+            }
+            return Ok((found, Start::Hull));
+        }
+        if settings.start == Start::Hull {
+            return Err(StartError::NoHull);
+        }
+    }
+    let span = interval[1] - interval[0];
+    let mut point = || StartPoint {
+        position: region.center + region.half * Vec3::from([(); 3].map(|()| random.in_range(-1.0, 1.0))),
+        time: interval[0] + span * random.in_range(-OUTSIDE, 1.0 + OUTSIDE),
+        color: Vec3::splat(GRAY),
+    };
+    Ok(((0..count).map(|_| point()).collect(), Start::Random))
+}
+
+/// Returns Gaussians at these points, with this temporal scale.
+fn trained(points: &[StartPoint], scale_t: f32, degree: u32, degree_t: u32) -> Trained {
+    let mean: Vec<[f32; 3]> = points.iter().map(|point| point.position.to_array()).collect();
+    let near = neighbors(&mean);
+    let log_scale = |(index, own): (usize, &[u32])| {
+        let square = |&other: &u32| points[index].position.distance_squared(points[other as usize].position);
+        let mean = own[1..=NEAREST].iter().map(square).sum::<f32>() / NEAREST as f32;
+        [0.5 * mean.max(LEAST_SQUARE).ln(); 3]
+    };
+    let count = points.len();
+    let unrotated = vec![[1.0, 0.0, 0.0, 0.0]; count];
+    let parameters = Parameters {
+        mean_t: points.iter().map(|point| point.time).collect(),
+        log_scale: near.chunks_exact(NEIGHBORS).enumerate().map(log_scale).collect(),
+        log_scale_t: vec![scale_t.ln(); count],
+        rotation_l: unrotated.clone(),
+        rotation_r: unrotated,
+        opacity_logit: vec![(OPACITY / (1.0 - OPACITY)).ln(); count],
+        mean,
+    };
+    let coefficients = evaluated(degree, degree_t);
+    let mut values = vec![0.0; count * coefficients * 3];
+    for (own, point) in values.chunks_exact_mut(coefficients * 3).zip(points) {
+        own[..3].copy_from_slice(&((point.color - 0.5) / SH_C0).to_array());
+    }
+    Trained { parameters, harmonics: Harmonics { coefficients, degree, degree_t, values } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::{Camera, RasterFov};
+    use glam::UVec2;
+
+    /// Returns views around the origin with images of which a square is covered.
+    fn views(coverage: u8) -> Vec<(View, CoveredImage)> {
+        let view = |i: usize| {
+            let angle = i as f32 * 1.3;
+            let eye = Vec3::new(4.0 * angle.cos(), 4.0 * angle.sin(), 1.0);
+            let size = UVec2::splat(16);
+            let view = Camera::look_at(eye, Vec3::ZERO, Vec3::Z, 0.7, size).view(0.2 * i as f32, RasterFov::Corrected);
+            let texel = |i: u32| {
+                let inside = (4..12).contains(&(i % 16)) && (4..12).contains(&(i / 16));
+                if inside { [60, 90, 120, 255] } else { [0, 0, 0, coverage] }
+            };
+            (view, CoveredImage { size, texels: (0..256).map(texel).collect(), has_gaps: coverage < 255 })
+        };
+        (0..5).map(view).collect()
+    }
+
+    fn start(coverage: u8, start: Start) -> Result<(Vec<StartPoint>, Start), StartError> {
+        let views = views(coverage);
+        let images: Vec<_> = views.iter().map(|(view, image)| (view, image)).collect();
+        let region = Region::of(images.iter().map(|(view, _)| *view)).expect("a region");
+        points(&images, &region, [0.0, 0.8], &StartSettings { gaussians: 700, start, ..StartSettings::default() })
+    }
+
+    #[test]
+    fn the_start_is_chosen_by_the_images() {
+        let found = |coverage, wanted| start(coverage, wanted).map(|(points, start)| (points.len(), start));
+        assert_eq!(found(0, Start::Auto), Ok((700, Start::Hull)), "silhouettes");
+        assert_eq!(found(255, Start::Auto), Ok((700, Start::Random)), "no silhouettes");
+        assert_eq!(found(0, Start::Random), Ok((700, Start::Random)), "as asked");
+        assert_eq!(found(255, Start::Hull), Err(StartError::NoSilhouettes), "a hull of nothing is refused");
+    }
+
+    #[test]
+    fn gaussians_begin_as_in_the_original() {
+        let (points, _) = start(255, Start::Auto).expect("random points");
+        let Trained { parameters, harmonics } = trained(&points, 0.4, 3, 2);
+        let times = parameters.mean_t.iter().copied();
+        let [first, last] = [times.clone().fold(f32::MAX, f32::min), times.fold(f32::MIN, f32::max)];
+        assert!((-0.08..-0.04).contains(&first) && (0.84..0.88).contains(&last), "a tenth outside: {first} to {last}");
+        assert!((parameters.log_scale_t[0].exp() - 0.4).abs() < 1e-6, "the temporal scale");
+        assert!((1.0 / (1.0 + (-parameters.opacity_logit[0]).exp()) - 0.1).abs() < 1e-6, "opacity");
+        let mut distances: Vec<f32> = points.iter().map(|p| p.position.distance_squared(points[7].position)).collect();
+        distances.sort_by(f32::total_cmp);
+        let expected = (distances[1..4].iter().sum::<f32>() / 3.0).sqrt();
+        assert!((parameters.log_scale[7][1].exp() / expected - 1.0).abs() < 1e-5, "scale from the nearest points");
+        assert_eq!((harmonics.coefficients, harmonics.is_consistent(700)), (48, true), "all degrees");
+        let dc = harmonics.of(7)[0] * SH_C0 + 0.5;
+        assert!((dc - GRAY).abs() < 1e-6 && harmonics.of(7)[3..].iter().all(|&value| value == 0.0), "gray: {dc}");
+    }
+}

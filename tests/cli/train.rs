@@ -1,0 +1,106 @@
+//! `gs4d train`, run as a user runs it, on pictures of a synthetic scene.
+//!
+//! In: a dataset drawn here. Out: proof that a capture is trained from the pictures alone, that the package is written while training goes on
+//! and after an interruption, and that data that no capture can be trained on is refused and leaves no files. Skipped where there is no GPU.
+
+use crate::support::capture::Capture;
+use crate::support::command::{GS4D, Run, arguments, gs4d};
+use crate::support::folders;
+use crate::support::no_gpu::no_gpu;
+use bevy_gs4d::renderer::GpuContext;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use glam::{UVec2, Vec3};
+use serde_json::Value;
+use std::fs;
+
+/// Returns a dataset of 4 cameras and 4 times; `None` if there is no GPU.
+fn dataset() -> Option<Capture> {
+    if GpuContext::headless(None).is_err() {
+        no_gpu();
+        return None;
+    }
+    let scene = synthesize(&SynthSettings { count: 400, ..SynthSettings::default() });
+    let capture = Capture::new(scene, Vec3::ZERO, 4, 4, UVec2::splat(40), true);
+    fs::remove_file(&capture.scene).expect("the scene exists");
+    Some(capture)
+}
+
+#[test]
+fn a_capture_is_trained_from_the_pictures_of_a_dataset() {
+    let Some(capture) = dataset() else { return };
+    let out = capture.path("out.gs4d");
+    let command = arguments!["train", "--data", &capture.data, "-o", &out, "--gaussians", "300", "--sh-degree", "1"];
+    let short = ["--steps", "90", "--evaluate-every", "30", "--mean-rate", "4", "--json"].map(Into::into);
+    let json = gs4d(&[command.to_vec(), short.to_vec()].concat()).json();
+    assert_eq!(
+        (json["gaussians"].as_u64(), json["views"].as_u64(), json["start"].as_str()),
+        (Some(300), Some(12), Some("random")),
+        "the images have no silhouettes, and one of four cameras is held out: {json}"
+    );
+    let curve = json["curve"].as_array().expect("a curve");
+    let (first, best) = (curve[0]["psnr"].as_f64().expect("a number"), json["psnr"].as_f64().expect("a number"));
+    assert!(curve.len() == 4 && best > first + 1.0, "training raises the PSNR from {first:.2} to {best:.2} dB");
+    assert_eq!(folders::names(capture.folder.path()), ["data", "out.gs4d"], "no state is left");
+    let info = gs4d(&arguments!["info", &out, "--json"]).json();
+    assert_eq!((info["gaussians"].as_u64(), info["form"].as_str()), (Some(300), Some("trained")), "{info}");
+    gs4d(&arguments!["eval", &out, "--data", &capture.data, "--metrics", "psnr", "--json"]).json();
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_has_written_the_best_parameters() {
+    use std::io::{BufRead, BufReader, Read};
+    use std::process::{Command, Stdio};
+
+    let Some(capture) = dataset() else { return };
+    let out = capture.path("out.gs4d");
+    let command = arguments!["train", "--data", &capture.data, "-o", &out, "--gaussians", "200", "--steps", "1000000"];
+    let command = [command.to_vec(), ["--evaluate-every", "20", "--json"].map(Into::into).to_vec()].concat();
+    let child = Command::new(GS4D).args(command).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+    let mut child = child.expect("the command starts");
+    let mut lines = BufReader::new(child.stderr.take().expect("standard error is piped"));
+    let (mut err, mut line) = (String::new(), String::new());
+    while lines.read_line(&mut line).expect("standard error can be read") > 0 {
+        let is_time = line.starts_with("step 40:");
+        err.push_str(&std::mem::take(&mut line));
+        if is_time {
+            assert!(out.is_file(), "the package is written while training goes on: {err}");
+            let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+            assert!(killed.expect("kill runs").success(), "the command can be interrupted");
+            break;
+        }
+    }
+    lines.read_to_string(&mut err).expect("standard error can be read");
+    let run = Run::of(&child.wait_with_output().expect("the command ends"));
+    assert_eq!(run.code, Some(130), "an interrupted run has exit code 130: {err}");
+    let json: Value = serde_json::from_str(&run.out).expect("one JSON document");
+    assert_eq!((&json["interrupted"], json["gaussians"].as_u64()), (&true.into(), Some(200)), "{json}");
+    assert!(err.contains("200 Gaussians") && err.contains(" left"), "progress has count and time left: {err}");
+    let info = gs4d(&arguments!["info", &out, "--json"]).json();
+    assert_eq!(info["gaussians"].as_u64(), Some(200), "the package is whole: {info}");
+}
+
+#[test]
+fn data_that_no_capture_can_be_trained_on_is_refused() {
+    let Some(capture) = dataset() else { return };
+    let out = capture.path("out.gs4d");
+    let before = folders::names(capture.folder.path());
+    let run = |more: &[&str]| {
+        let command = arguments!["train", "--data", &capture.data, "-o", &out, "--steps", "2"];
+        gs4d(&[command.to_vec(), more.iter().map(Into::into).collect()].concat())
+    };
+    run(&["--start", "hull"]).must_fail("--start random");
+    run(&["--gaussians", "100000000"]).must_fail("--gaussians");
+    let path = capture.data.join("transforms_train.json");
+    let text = fs::read_to_string(&path).expect("the dataset was just written");
+    let mut json: Value = serde_json::from_str(&text).expect("JSON");
+    let frames = json["frames"].as_array_mut().expect("frames");
+    let first = frames[0]["transform_matrix"].clone();
+    frames.iter_mut().for_each(|frame| frame["transform_matrix"] = first.clone());
+    fs::write(&path, json.to_string()).expect("the folder can be written to");
+    run(&["--validation", "none"]).must_fail("from one place");
+    fs::write(&path, text).expect("the folder can be written to");
+    fs::remove_file(capture.data.join("train/c01_02.png")).expect("the image exists");
+    run(&[]).must_fail("c01_02.png");
+    assert_eq!(folders::names(capture.folder.path()), before, "no file is left");
+}

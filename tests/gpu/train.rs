@@ -1,0 +1,386 @@
+//! Training from pictures alone: relocation, noise, the schedule of colors, and whole runs on a dataset of a few moving blobs.
+//!
+//! In: scenes and datasets made here. Out: proof that the passes `noise`, `relocate` and `regularize` have the results of their CPU references,
+//! that relocation hardly changes the picture, that a capture is trained from nothing, and that runs repeat and resume at the same bytes.
+//! Skipped where there is no GPU.
+
+use crate::support::blob::blob;
+use crate::support::{dataset, gpu};
+use bevy_gs4d::gaussian::{Gaussian, GradientMode, Harmonics, Parameters};
+use bevy_gs4d::internal::offline::fine_tune::{
+    Sample, StepGrowth, Terms, Trainer, TrainerState, neighbors, noise, regularization, relocate,
+};
+use bevy_gs4d::internal::offline::store::{Key, Store};
+use bevy_gs4d::internal::offline::train::{CaptureSettings, Start, StartSettings, begin, capture_of, train};
+use bevy_gs4d::internal::renderer::layout::TrainedRecord;
+use bevy_gs4d::offline::dataset::TrainingView;
+use bevy_gs4d::offline::fine_tune::{FineTuneSettings, FineTuned, Growth, Rates, Resume, TrainingImages};
+use bevy_gs4d::offline::metrics::SquaredError;
+use bevy_gs4d::offline::{NoProgress, OfflineError, Progress, SplitOptions, Splits};
+use bevy_gs4d::reference;
+use bevy_gs4d::renderer::Headless;
+use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
+use bevy_gs4d::scene::{GaussianScene, RuntimeScene, SceneForm, Trained};
+use bevy_gs4d::view::{Background, Camera, RasterFov, View};
+use glam::{UVec2, Vec3};
+use std::path::Path;
+use tempfile::TempDir;
+
+const COUNT: usize = 300;
+
+fn synthetic() -> GaussianScene {
+    synthesize(&SynthSettings { count: COUNT, ..SynthSettings::default() })
+}
+
+fn trained(scene: &GaussianScene) -> &Trained {
+    let SceneForm::Trained(trained) = &scene.form else { panic!("the trained form") };
+    trained
+}
+
+fn trained_mut(scene: &mut GaussianScene) -> &mut Trained {
+    let SceneForm::Trained(trained) = &mut scene.form else { panic!("the trained form") };
+    trained
+}
+
+/// Returns a trainer with the passes of training from pictures alone.
+fn growing(headless: &mut Headless, scene: GaussianScene) -> Trainer<'_> {
+    let mut trainer = Trainer::new(headless, scene, GradientMode::Exact).expect("the scene can be trained");
+    trainer.set_growing().expect("the Gaussians are native");
+    trainer
+}
+
+fn records(parameters: &Parameters) -> Vec<TrainedRecord> {
+    let record = |index: usize| TrainedRecord {
+        mean: parameters.mean[index],
+        mean_t: parameters.mean_t[index],
+        log_scale: parameters.log_scale[index],
+        log_scale_t: parameters.log_scale_t[index],
+        rotation_l: parameters.rotation_l[index],
+        rotation_r: parameters.rotation_r[index],
+        opacity_logit: [parameters.opacity_logit[index], 0.0, 0.0, 0.0],
+    };
+    (0..parameters.len()).map(record).collect()
+}
+
+#[test]
+fn the_pass_noise_matches_the_cpu_reference() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let mut scene = synthetic();
+    let parameters = &mut trained_mut(&mut scene).parameters;
+    // From transparent to opaque.
+    let logits = parameters.opacity_logit.iter_mut().enumerate();
+    logits.for_each(|(index, logit)| *logit = -8.0 + 10.0 * index as f32 / COUNT as f32);
+    let mut expected = records(&trained(&scene).parameters);
+    let (rate, factor, seed) = (Rates::OURS.mean * scene.trained_with.spatial_lr_scale, 0.5, 0xfeed_beef);
+    let strength = (5e5 * rate * factor) as f32;
+    (0..).zip(&mut expected).for_each(|(index, record)| noise(record, index, seed, strength));
+    let mut trainer = growing(&mut headless, scene.clone());
+    // The gradients are 0: the optimizer moves nothing.
+    let growth = StepGrowth { color_values: 144, noise: 5e5, seed };
+    trainer.step_growing(&Rates::OURS, factor, 1, Some(growth)).expect("the step succeeds");
+    let found = trainer.scene().expect("the scene can be read");
+    let (before, found) = (&trained(&scene).parameters, &trained(&found).parameters);
+    let mut moved = 0;
+    for (index, expected) in expected.iter().enumerate() {
+        let [x, y, z] = expected.mean;
+        let place = |mean: [f32; 3], mean_t: f32| Vec3::from(mean).extend(mean_t);
+        let [own, by_cpu, by_gpu] = [
+            place(before.mean[index], before.mean_t[index]),
+            place([x, y, z], expected.mean_t),
+            place(found.mean[index], found.mean_t[index]),
+        ];
+        let (far, error) = (by_cpu.distance(own), by_gpu.distance(by_cpu));
+        assert!(error <= 1e-4 * far + 1e-6, "Gaussian {index} moves by {far}, on the GPU by {error} from that");
+        moved += usize::from(far > 1e-3);
+    }
+    assert!((50..COUNT - 50).contains(&moved), "the faint Gaussians move, the opaque ones do not: {moved}");
+    assert_eq!(found.log_scale, before.log_scale, "nothing but means changes");
+    assert_eq!(found.opacity_logit, before.opacity_logit, "nothing but means changes");
+}
+
+fn view(index: usize, size: UVec2) -> View {
+    let angle = index as f32 * 0.7;
+    let eye = Vec3::new(2.4 * angle.cos(), 2.4 * angle.sin(), 1.2);
+    Camera::look_at(eye, Vec3::ZERO, Vec3::Z, 0.8, size).view(index as f32 / 6.0, RasterFov::Reference)
+}
+
+/// Returns the buffers of a state by Gaussian: values, first and second moments of the geometry, then of the color.
+fn rows(state: &TrainerState, buffer: usize) -> Vec<Vec<f32>> {
+    let values: Vec<f32> = bytemuck::pod_collect_to_vec(&state.buffers[buffer]);
+    values.chunks_exact(values.len() / COUNT).map(<[f32]>::to_vec).collect()
+}
+
+#[test]
+fn relocation_copies_what_the_cpu_reference_says_and_hardly_changes_the_picture() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let mut scene = synthetic();
+    let parameters = &mut trained_mut(&mut scene).parameters;
+    // A third has faded: it is nearly invisible.
+    parameters.opacity_logit.iter_mut().step_by(3).for_each(|logit| *logit = -9.0);
+    let views: Vec<View> = (0..6).map(|index| view(index, UVec2::new(70, 54))).collect();
+    let black = Background::Color([0.0; 3]);
+    let mut trainer = growing(&mut headless, scene);
+    // A step gives every Gaussian that is seen moments.
+    let image = {
+        let frame = trainer.draw(&views[0], black).expect("the view is drawn");
+        let texels = frame.picture.pixels.iter().map(|_| [90, 120, 60, 255]).collect();
+        let image = bevy_gs4d::offline::dataset::CoveredImage { size: views[0].size, texels, has_gaps: false };
+        trainer.upload(&image).expect("the image fits the GPU")
+    };
+    let sample = Sample { view: &views[0], image: &image, background: black, number: 0 };
+    trainer.accumulate(&[sample], 0.2).expect("the view is drawn");
+    trainer.step(&Rates { mean: 0.0, mean_t: 0.0, ..Rates::OURS }, 1e-3, 1).expect("the step succeeds");
+    let before = trainer.state().expect("the state can be read");
+    let pictures = |trainer: &mut Trainer<'_>| -> Vec<_> {
+        views.iter().map(|view| trainer.draw(view, black).expect("the view is drawn").picture).collect()
+    };
+    let drawn = pictures(&mut trainer);
+    let mut expected: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(&before.buffers[0]);
+    let moves = relocate(&mut expected, 17);
+    assert_eq!(moves.len(), COUNT / 3, "the faded third moves");
+    assert_eq!(trainer.relocate(17).expect("the device works"), moves.len(), "as many on the GPU");
+    let after = trainer.state().expect("the state can be read");
+    let found: Vec<TrainedRecord> = bytemuck::pod_collect_to_vec(&after.buffers[0]);
+    assert_eq!(found, expected, "the raw parameters are those of the CPU reference");
+    let mut source: Vec<usize> = (0..COUNT).collect();
+    let mut is_new = vec![false; COUNT];
+    for &[to, from] in &moves {
+        source[to as usize] = from as usize;
+        is_new[to as usize] = true;
+        is_new[from as usize] = true;
+    }
+    let (colors, colors_before) = (rows(&after, 3), rows(&before, 3));
+    assert!((0..COUNT).all(|index| colors[index] == colors_before[source[index]]), "colors are those of the sources");
+    for buffer in [1, 2, 4, 5] {
+        let (moments, moments_before) = (rows(&after, buffer), rows(&before, buffer));
+        for index in 0..COUNT {
+            let expected = if is_new[index] { vec![0.0; moments[index].len()] } else { moments_before[index].clone() };
+            assert_eq!(moments[index], expected, "buffer {buffer}: the moments of Gaussian {index}");
+        }
+        let kept = (0..COUNT).any(|index| !is_new[index] && moments[index].iter().any(|&moment| moment != 0.0));
+        assert!(kept, "buffer {buffer}: a Gaussian that is not relocated has moments");
+    }
+    let mut error = SquaredError::default();
+    for (before, after) in drawn.iter().zip(pictures(&mut trainer)) {
+        error.add(before, &after).expect("one size");
+    }
+    println!("relocation of a third: {:.2} dB", error.psnr());
+    assert!(error.psnr() > 35.0, "the pictures hardly change: {:.2} dB", error.psnr());
+}
+
+#[test]
+fn the_gradient_of_the_term_of_scale_matches_the_cpu_reference() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let scene = synthetic();
+    let terms = Terms { scale: 0.7, ..Terms::default() };
+    let parameters = &trained(&scene).parameters;
+    let expected = regularization(parameters, &neighbors(&parameters.mean), &terms).expect("the Gaussians are drawn");
+    let mut trainer = Trainer::new(&mut headless, scene.clone(), GradientMode::Exact).expect("the scene is trained");
+    trainer.set_terms(terms).expect("the weight is right");
+    trainer.accumulate_terms(0).expect("the term is added");
+    let found = trainer.gradients().expect("gradients can be read");
+    let found = &trained(&found).parameters;
+    for (index, expected) in expected.gradients.iter().enumerate() {
+        for (found, expected) in found.log_scale[index].into_iter().zip(expected.log_scale) {
+            let error = (f64::from(found) - expected).abs();
+            assert!(expected > 0.0 && error <= 1e-5 * expected, "Gaussian {index}: {found}, expected {expected}");
+        }
+        assert_eq!(found.log_scale_t[index], 0.0, "Gaussian {index}: the temporal scale has no term");
+    }
+    assert!(found.opacity_logit.iter().all(|&slope| slope == 0.0), "no other parameter has a gradient");
+}
+
+#[test]
+fn color_values_beyond_the_degree_are_not_trained() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let scene = synthetic();
+    let size = UVec2::new(70, 54);
+    let view = view(0, size);
+    for values in [3, 12, 27, 48, 144] {
+        let mut trainer = growing(&mut headless, scene.clone());
+        let texels = vec![[200, 10, 90, 255]; size.element_product() as usize];
+        let image = bevy_gs4d::offline::dataset::CoveredImage { size, texels, has_gaps: false };
+        let image = trainer.upload(&image).expect("the image fits the GPU");
+        let sample = Sample { view: &view, image: &image, background: Background::None, number: 0 };
+        trainer.accumulate(&[sample], 0.2).expect("the view is drawn");
+        let growth = StepGrowth { color_values: values, noise: 0.0, seed: 1 };
+        trainer.step_growing(&Rates::OURS, 1.0, 1, Some(growth)).expect("the step succeeds");
+        let found = trainer.scene().expect("the scene can be read");
+        let (before, after) = (&trained(&scene).harmonics.values, &trained(&found).harmonics.values);
+        let changed = |index: &usize| before.chunks(144).zip(after.chunks(144)).any(|(b, a)| b[*index] != a[*index]);
+        let changed: Vec<usize> = (0..144).filter(changed).collect();
+        assert_eq!(changed, (0..values as usize).collect::<Vec<_>>(), "exactly the first {values} values change");
+    }
+}
+
+/// Returns five colored blobs, two of which move, one of which is there for a while.
+fn blobs() -> RuntimeScene {
+    let at = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
+    let blobs: [(Gaussian, Vec3); 5] = [
+        (blob(at(-0.5, -0.3, -0.2), Vec3::new(0.25, 0.2, 0.2), 0.9), at(0.9, 0.2, 0.1)),
+        (blob(at(0.5, -0.3, 0.0), Vec3::new(0.15, 0.25, 0.3), 0.9), at(0.1, 0.7, 0.2)),
+        (Gaussian { velocity: [0.0, 0.8, 0.0], ..blob(at(0.0, 0.3, 0.3), Vec3::splat(0.2), 0.9) }, at(0.2, 0.3, 0.9)),
+        (
+            Gaussian { velocity: [-0.8, 0.0, 0.2], ..blob(at(0.1, 0.6, -0.3), Vec3::splat(0.15), 0.9) },
+            at(0.9, 0.8, 0.1),
+        ),
+        (Gaussian { sigma_t: 0.25, ..blob(at(0.0, -0.7, 0.5), Vec3::splat(0.2), 0.9) }, at(0.8, 0.1, 0.8)),
+    ];
+    let colors = blobs.iter().flat_map(|(_, color)| ((*color - 0.5) / 0.282_094_79).to_array());
+    let harmonics = Harmonics { coefficients: 1, degree: 0, degree_t: 0, values: colors.collect() };
+    RuntimeScene::sliced(blobs.into_iter().map(|(gaussian, _)| gaussian).collect(), harmonics)
+}
+
+/// A dataset of the blobs, with images that say what they cover.
+struct Lesson {
+    folder: TempDir,
+    all: Vec<TrainingView>,
+    splits: Splits,
+}
+
+impl Lesson {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let data = folder.path().join("data");
+        let scene = blobs();
+        dataset::write(&data, &scene, Vec3::ZERO, 10, 5, UVec2::splat(48), true);
+        let splits = Splits::open(&data, &SplitOptions::default(), &scene.trained_with, &mut NoProgress);
+        let splits = splits.expect("the dataset was just written");
+        let all = splits.all_training(&scene.trained_with, &mut NoProgress).expect("the dataset was just written");
+        all.iter().for_each(|view| write_covered(&scene, view, &view.image));
+        Self { folder, all, splits }
+    }
+
+    fn store(&self, name: &str) -> Store {
+        Store::beside(&self.folder.path().join(name), ".train").expect("the folder can be written to")
+    }
+
+    /// Trains a capture, with validation on the camera that is held out.
+    fn train(
+        &self,
+        headless: &mut Headless,
+        start: &StartSettings,
+        settings: &FineTuneSettings,
+        store: Option<&Store>,
+        out: Option<&Path>,
+        progress: &mut dyn Progress,
+    ) -> Result<FineTuned, Box<OfflineError>> {
+        let (trained_with, playback) = capture_of(&self.all, &CaptureSettings::default()).expect("ten places");
+        let Splits { train: views, validation, .. } = &self.splits;
+        let images = TrainingImages::load(views.clone(), validation, &trained_with, &mut NoProgress);
+        let images = images.expect("the images were just written");
+        let (scene, _) = begin(&images, trained_with, playback, start).expect("the cameras look at the blobs");
+        let resume = store.map(|store| Resume { store, key: Key::of(b"blobs"), every: 1 });
+        train(headless, scene, &images, settings, resume, out, progress).map_err(Box::new)
+    }
+}
+
+/// Writes the image of a view with its coverage.
+fn write_covered(scene: &RuntimeScene, view: &TrainingView, path: &Path) {
+    let to_draw = view.camera.view(view.time, RasterFov::Corrected);
+    let frame = reference::render(scene, &to_draw, Background::None);
+    let mut image = image::RgbaImage::new(view.camera.size.x, view.camera.size.y);
+    let pixels = image.pixels_mut().zip(frame.picture.pixels.iter().zip(&frame.transmittance));
+    for (pixel, (color, transmittance)) in pixels {
+        let coverage = 1.0 - transmittance;
+        let [r, g, b] = (*color / coverage.max(1e-3)).to_array();
+        pixel.0 = [r, g, b, coverage].map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8);
+    }
+    image.save(path).expect("the folder can be written to");
+}
+
+fn settings(steps: usize) -> FineTuneSettings {
+    FineTuneSettings {
+        steps,
+        evaluate_every: steps / 4,
+        similarity_share: 0.2,
+        rates: Rates { mean: 1e-3, ..Rates::OURS },
+        terms: Terms { opacity: 0.01, scale: 0.01, ..Terms::default() },
+        growth: Some(Growth::over(steps)),
+        ..FineTuneSettings::default()
+    }
+}
+
+#[test]
+fn a_capture_is_trained_from_nothing() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new();
+    let out = lesson.folder.path().join("out.gs4d");
+    for (start, least) in [(Start::Hull, 37.0), (Start::Random, 22.0)] {
+        let from = StartSettings { gaussians: 400, start, degree: 1, ..StartSettings::default() };
+        let found = lesson.train(&mut headless, &from, &settings(400), None, Some(&out), &mut NoProgress);
+        let found = found.expect("the capture is trained");
+        let psnr = found.best.psnr.expect("validation views");
+        println!("{start:?}: {psnr:.2} dB");
+        assert_eq!(found.scene.len(), 400, "{start:?}: the number of Gaussians stays");
+        assert!(psnr > least, "{start:?}: {psnr:.2} dB on the camera that is held out, more than {least} dB expected");
+        let written = bevy_gs4d::codec::load(&out, &Default::default()).expect("the package of an evaluation is whole");
+        assert_eq!(written.len(), 400, "{start:?}: the package has all Gaussians");
+        std::fs::remove_file(&out).expect("the package was written");
+    }
+}
+
+/// Interrupts training after so many steps.
+struct Interrupting {
+    left: usize,
+    is_training: bool,
+}
+
+impl Progress for Interrupting {
+    fn begin(&mut self, task: &'static str, _: usize) {
+        self.is_training = task == "training";
+    }
+
+    fn advance(&mut self) {
+        self.left = self.left.saturating_sub(usize::from(self.is_training));
+    }
+
+    fn finish(&mut self) {
+        self.is_training = false;
+    }
+
+    fn note(&mut self, _: &str) {}
+
+    fn is_interrupted(&self) -> bool {
+        self.left == 0
+    }
+}
+
+#[test]
+fn training_from_nothing_repeats_and_resumes_at_the_same_bytes() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let lesson = Lesson::new();
+    let start = StartSettings { gaussians: 200, ..StartSettings::default() };
+    let growth =
+        Growth { relocate_every: Some(10), relocate_from: 0, relocate_until: 60, raise_every: 8, ..Growth::over(60) };
+    // Opacities fall fast, so that Gaussians fade within these steps.
+    let settings =
+        FineTuneSettings { rates: Rates { opacity: 0.5, ..Rates::OURS }, growth: Some(growth), ..settings(60) };
+    let mut run = |store: Option<&Store>, progress: &mut dyn Progress| {
+        lesson.train(&mut headless, &start, &settings, store, None, progress)
+    };
+    let whole = run(None, &mut NoProgress).expect("the capture is trained");
+    let again = run(None, &mut NoProgress).expect("the capture is trained");
+    assert!(whole.scene == again.scene && whole.curve == again.curve, "a second run has the same result");
+    for left in [22, 37] {
+        let store = lesson.store(&left.to_string());
+        let stopped = run(Some(&store), &mut Interrupting { left, is_training: false });
+        let stopped = stopped.map_err(|error| *error);
+        assert!(
+            matches!(stopped, Err(OfflineError::Interrupted { tuned: Some(_) })),
+            "after {left} steps: interrupted"
+        );
+        let resumed = run(Some(&store), &mut NoProgress).expect("the capture is trained");
+        assert!(resumed.scene == whole.scene, "after {left} steps: the resumed run has the same scene");
+        assert_eq!(resumed.curve, whole.curve, "after {left} steps: the resumed run has the same curve");
+    }
+    let other = lesson.train(
+        &mut headless,
+        &StartSettings { seed: 1, ..start },
+        &FineTuneSettings { seed: 1, ..settings },
+        None,
+        None,
+        &mut NoProgress,
+    );
+    assert!(other.expect("the capture is trained").scene != whole.scene, "another seed has another result");
+}
