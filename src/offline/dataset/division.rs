@@ -4,8 +4,9 @@
 //! included; if there is one camera, every eighth view.
 
 use super::format::All;
-use super::selection::{distinct_cameras, identity};
+use super::selection::{distinct_cameras, distinct_times, identity};
 use super::{CameraOptions, Dataset, DatasetError, Split};
+use crate::view::Camera;
 use std::collections::HashSet;
 use std::path::Path;
 
@@ -23,10 +24,13 @@ pub(super) fn divide(folder: &Path, split: Split, options: &CameraOptions, all: 
         [_] => return Err(DatasetError::OneView { path: source }),
         _ => {}
     }
-    let center = |camera: &crate::view::Camera| camera.world_to_camera.inverse().w_axis;
+    let center = |camera: &Camera| camera.world_to_camera.inverse().w_axis;
     let first = center(&cameras[0]);
-    if cameras.len() > 1 && cameras.iter().all(|camera| center(camera).distance(first) <= SAME * first.length()) {
-        return Err(DatasetError::SamePlace { path: source, cameras: cameras.len() });
+    let is_at_first = |camera: &Camera| center(camera).distance(first) <= SAME * first.length();
+    // One camera may have several times, as it may stand still in front of what moves.
+    let varies = cameras.len() == 1 && distinct_times(&views) > 1;
+    if !varies && cameras.iter().all(is_at_first) {
+        return Err(DatasetError::SamePlace { path: source, views: views.len() });
     }
     let splits = splits.unwrap_or_else(|| {
         let test: HashSet<_> = cameras.iter().step_by(TEST).map(identity).collect();

@@ -144,16 +144,16 @@ pub enum DatasetError {
         /// The camera file.
         path: PathBuf,
     },
-    /// All cameras are at one place.
+    /// All views are taken from one place.
     #[error(
-        "{}: all {cameras} cameras are at the same place, so that no depth can be found: the poses are missing, or belong to another scene",
+        "{}: all {views} views are taken from the same place, so that no depth can be found: the poses are missing, or belong to another scene",
         .path.display()
     )]
     SamePlace {
         /// The camera file.
         path: PathBuf,
-        /// Number of different cameras.
-        cameras: usize,
+        /// Number of views.
+        views: usize,
     },
     /// A dataset has no views for a split.
     #[error("{}: it has no views of the split {split:?}: list some, or remove its splits, so that every eighth camera is for the test", .path.display())]

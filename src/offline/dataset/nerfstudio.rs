@@ -6,6 +6,7 @@
 use super::camera_file::{CameraFile, SINGLE};
 use super::format::All;
 use super::{CameraOptions, DatasetError, Split};
+use crate::codec::text::is_obeyed;
 use serde_json::Value;
 use std::collections::HashMap;
 use std::path::Path;
@@ -13,6 +14,8 @@ use std::path::Path;
 /// The lists of the splits.
 const LISTS: [(&str, Split); 3] =
     [("train_filenames", Split::Train), ("test_filenames", Split::Test), ("val_filenames", Split::Val)];
+/// The entry that names the file of points.
+const POINTS: &str = "ply_file_path";
 /// The values of a frame's entry `split`.
 const NAMES: [(&str, Split); 3] = [("train", Split::Train), ("test", Split::Test), ("val", Split::Val)];
 
@@ -37,7 +40,12 @@ pub(super) fn read(folder: &Path, options: &CameraOptions) -> Result<All, Datase
     };
     let splits: Vec<Option<Split>> = file.splits().map(split).collect();
     let splits = splits.iter().any(Option::is_some).then_some(splits);
-    let points = file.entry("ply_file_path").and_then(Value::as_str).map(|path| folder.join(path));
+    let points = file.entry(POINTS).and_then(Value::as_str);
+    if points.is_some_and(|path| path.contains(is_obeyed)) {
+        let reason = format!("{POINTS} has control characters: rename the file of points, and correct the entry");
+        return Err(DatasetError::Unusable { path: source, reason });
+    }
+    let points = points.map(|path| folder.join(path));
     Ok(All { source, views, splits, points })
 }
 

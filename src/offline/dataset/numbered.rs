@@ -47,9 +47,10 @@ pub(super) fn number(path: &Path) -> Option<u64> {
 
 /// Returns the time of each frame, seconds: its number minus `first`, or its place in the list if a frame has no number.
 pub(super) fn times(frames: &[PathBuf], first: u64) -> Vec<f32> {
-    let numbers: Option<Vec<u64>> = frames.iter().map(|frame| number(frame)).collect();
-    let numbers = numbers.unwrap_or_else(|| (first..).take(frames.len()).collect());
-    numbers.into_iter().map(|number| (number.saturating_sub(first) as f64 / FRAME_RATE) as f32).collect()
+    let offset = |frame: &PathBuf| number(frame).map(|number| number.saturating_sub(first));
+    let offsets: Option<Vec<u64>> = frames.iter().map(offset).collect();
+    let offsets = offsets.unwrap_or_else(|| (0..frames.len() as u64).collect());
+    offsets.into_iter().map(|offset| (offset as f64 / FRAME_RATE) as f32).collect()
 }
 
 #[cfg(test)]
@@ -67,7 +68,9 @@ mod tests {
         assert_eq!(names, ["f2.JPG", "f9.png", "f10.png"], "by number, images alone");
         assert_eq!(times(&found, 2), [0.0, 7.0 / 30.0, 8.0 / 30.0], "the first number is time 0");
         let unnumbered = [PathBuf::from("a.png"), PathBuf::from("b.png")];
-        assert_eq!(times(&unnumbered, 0), [0.0, 1.0 / 30.0], "frames without numbers follow each other");
+        for first in [0, 7, u64::MAX] {
+            assert_eq!(times(&unnumbered, first), [0.0, 1.0 / 30.0], "frames without numbers follow each other");
+        }
         assert_eq!(number(Path::new("99999999999999999999999.png")), None, "a number beyond 64 bits is none");
     }
 }

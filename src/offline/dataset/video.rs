@@ -1,18 +1,23 @@
 //! Frames of videos, by the program `ffmpeg`.
 //!
 //! In: a dataset, a video in it. Out: its frames as PNG in `DATASET.frames/CAMERA/`, beside the dataset. The folder appears whole: frames are written
-//! to a temporary folder, which is then renamed. Frames that are there are used and never overwritten.
+//! to a temporary folder, which is then renamed. Frames that are there are used and never overwritten. One process at a time decodes; the folders that
+//! killed processes have left are removed.
 
 use super::DatasetError;
-use super::numbered::images;
+use super::numbered::{entries, images};
 use std::ffi::OsStr;
-use std::fs;
+use std::fs::{self, File};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The program.
 const PROGRAM: &str = "ffmpeg";
+/// Prefix of the names of temporary folders.
+const PREFIX: &str = ".gs4d-";
+/// File that is locked while a process decodes, so that all temporary folders are those of killed processes.
+const LOCK: &str = ".lock";
 /// Most characters of the program's message in an error.
 const MESSAGE: usize = 400;
 
@@ -52,7 +57,23 @@ fn decode(
         unusable(reason)
     };
     fs::create_dir_all(cache).map_err(unwritable)?;
-    let temporary = tempfile::tempdir_in(cache).map_err(unwritable)?;
+    let lock = File::create(cache.join(LOCK)).map_err(unwritable)?;
+    // Where files cannot be locked, no temporary folder is known to be stale.
+    if lock.lock().is_ok() {
+        let is_temporary = |path: &PathBuf| {
+            path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(PREFIX.as_bytes()))
+        };
+        for path in entries(cache)?.into_iter().filter(is_temporary) {
+            fs::remove_dir_all(path).map_err(unwritable)?;
+        }
+    }
+    // Another process may have decoded the video in the meantime.
+    let place = cache.join(camera);
+    let found = images(&place)?;
+    if !found.is_empty() {
+        return Ok(found);
+    }
+    let temporary = tempfile::Builder::new().prefix(PREFIX).tempdir_in(cache).map_err(unwritable)?;
     // The protocol is named, since a path may contain a colon.
     let mut input = OsStr::new("file:").to_owned();
     input.push(video);
@@ -77,7 +98,6 @@ fn decode(
             by_hand(folder, camera)
         )));
     }
-    let place = cache.join(camera);
     fs::rename(temporary.path(), &place).map_err(unwritable)?;
     images(&place)
 }
@@ -109,15 +129,50 @@ mod tests {
         decode(program.as_os_str(), &data.join("cam00.mp4"), &folder.join("data.frames"), "cam00", &data)
     }
 
+    /// Returns the names in the folder of frames, without the lock.
+    fn names(folder: &Path) -> Vec<String> {
+        let paths = entries(&folder.join("data.frames")).expect("the folder can be read");
+        let names = paths.iter().filter_map(|path| path.file_name()?.to_str());
+        names.filter(|name| *name != LOCK).map(str::to_owned).collect()
+    }
+
+    /// Writes two frames into the folder of the last argument.
+    const FRAMES: &str = "for last; do :; done; d=$(dirname \"$last\"); echo a > $d/00000.png; echo b > $d/00001.png";
+
     #[test]
     fn frames_appear_whole_beside_the_dataset() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let script = "for last; do :; done; d=$(dirname \"$last\"); echo a > $d/00000.png; echo b > $d/00001.png";
-        let found = decoded_by(&program(folder.path(), script), folder.path()).expect("the program writes frames");
+        let killed = folder.path().join("data.frames/.gs4d-killed");
+        fs::create_dir_all(&killed).expect("the folder can be made");
+        fs::write(killed.join("00000.png"), b"").expect("the folder can be written to");
+        let found = decoded_by(&program(folder.path(), FRAMES), folder.path()).expect("the program writes frames");
         let expected = ["00000.png", "00001.png"].map(|name| folder.path().join("data.frames/cam00").join(name));
         assert_eq!(found, expected, "the frames lie beside the dataset");
-        let left = fs::read_dir(folder.path().join("data.frames")).expect("the folder is there").count();
-        assert_eq!(left, 1, "no temporary folder is left");
+        assert_eq!(
+            names(folder.path()),
+            ["cam00"],
+            "no temporary folder is left, neither an own one nor that of a killed run"
+        );
+        let again = decoded_by(&folder.path().join("nothing"), folder.path()).expect("no program is needed");
+        assert_eq!(again, expected, "frames that are there are used");
+    }
+
+    #[test]
+    fn runs_at_one_time_decode_a_video_once() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let count = folder.path().join("count");
+        let script = format!("echo run >> {}; sleep 0.2; {FRAMES}", count.display());
+        let program = program(folder.path(), &script);
+        let counts = std::thread::scope(|scope| {
+            let run = || decoded_by(&program, folder.path()).expect("the program writes frames").len();
+            [scope.spawn(run), scope.spawn(run)].map(|thread| thread.join().expect("no panic"))
+        });
+        assert_eq!(counts, [2, 2], "both runs have the frames");
+        assert_eq!(
+            fs::read_to_string(&count).expect("the program has run"),
+            "run\n",
+            "the second run waits for the first"
+        );
     }
 
     #[test]
@@ -135,7 +190,6 @@ mod tests {
         let script = "for last; do :; done; echo a > $(dirname \"$last\")/00000.png; echo broken >&2; exit 1";
         let error = decoded_by(&program(folder.path(), script), folder.path()).expect_err("it fails").to_string();
         assert!(error.contains("broken"), "the message of the program is shown: {error}");
-        let left = fs::read_dir(folder.path().join("data.frames")).expect("the folder is there").count();
-        assert_eq!(left, 0, "the frames of a run that fails are removed");
+        assert_eq!(names(folder.path()), [""; 0], "the frames of a run that fails are removed");
     }
 }

@@ -3,7 +3,7 @@
 //! In: small folders made here, of a rig of cameras whose projections are computed here with sines and cosines. Out: proof that every reader projects
 //! known points to the same pixels, and of splits, times, masks, distortion and wrong folders.
 
-use super::Folder;
+use super::{Folder, with};
 use bevy_gs4d::offline::dataset::{CameraOptions, Dataset, Split, TrainingView};
 use bevy_gs4d::view::Lens;
 use glam::{UVec2, Vec3};
@@ -314,6 +314,8 @@ fn colmap_models_that_cannot_be_used_are_refused_by_name() {
     }
     colmap_text(&folder, PINHOLE, &[("a.png", 0)]);
     refused(&folder, "one view");
+    colmap_text(&folder, PINHOLE, &[("./a1.png", 0), ("./b2.png", 1)]);
+    assert_eq!(open(&folder, Split::Train).views[0].time, 0.0, "images of one folder are no frames of a camera");
     colmap_text(&folder, PINHOLE, &[("../a.png", 0), ("b.png", 1)]);
     refused(&folder, "../a.png");
     let binary = Folder::new();
@@ -376,7 +378,45 @@ fn cameras_at_one_place_are_refused() {
         }
     }
     folder.write_json("transforms.json", &json);
-    refused(&folder, "3 cameras are at the same place");
+    refused(&folder, "all 3 views are taken from the same place");
+    for frame in json["frames"].as_array_mut().expect("frames") {
+        frame["transform_matrix"] = Rig::new(0).to_world();
+    }
+    folder.write_json("transforms.json", &json);
+    refused(&folder, "all 3 views are taken from the same place");
+    json["frames"][1]["time"] = json!(0.5);
+    folder.write_json("transforms.json", &json);
+    assert_eq!(open(&folder, Split::Train).views.len(), 2, "a camera that stands still may have several times");
     folder.write_json("transforms.json", &nerfstudio(1));
     refused(&folder, "one view");
+}
+
+#[test]
+fn paths_with_control_characters_are_refused() {
+    let folder = Folder::new();
+    for (pointer, part) in
+        [("/ply_file_path", "ply_file_path has control characters"), ("/frames/1/mask_path", "frame 1")]
+    {
+        folder.write_json("transforms.json", &with(nerfstudio(3), pointer, json!("a\u{1b}[2J.png")));
+        refused(&folder, part);
+    }
+}
+
+#[test]
+fn cameras_may_have_sizes_of_their_own_and_images_may_not() {
+    let folder = Folder::new();
+    let mut json = nerfstudio(3);
+    json["frames"][2]["w"] = json!(2 * WIDTH);
+    json["frames"][2]["fl_x"] = json!(2.0 * FOCAL[0]);
+    folder.write_json("transforms.json", &json);
+    for name in ["f01", "f02"] {
+        picture(&folder, &format!("images/{name}.png"), [9, 9, 9]);
+    }
+    let views = open(&folder, Split::Train).views;
+    assert_eq!(views[1].camera.size, UVec2::new(2 * WIDTH, HEIGHT), "the size of the frame");
+    assert!(views[0].load_covered().is_ok(), "an image of the size of the file");
+    let error = views[1].load_covered().expect_err("an image of another aspect ratio").to_string();
+    for part in ["f02.png: 40 x 30 pixels", "80 x 30"] {
+        assert!(error.contains(part), "{part:?} is not in: {error}");
+    }
 }

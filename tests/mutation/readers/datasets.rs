@@ -1,11 +1,13 @@
 //! Files of datasets of other programs.
 //!
 //! In: a file of a nerfstudio, COLMAP or N3V folder, whose other files are whole. Out: files with wrong numbers, names and structures. Accepted folders
-//! have views of allowed sizes with finite cameras and names of their own.
+//! have views of allowed sizes with finite cameras and names of their own, and their cameras are drawn.
 
 use super::{Outcome, Reader};
-use crate::change::{bytes, text};
+use crate::change::{bytes, text, words};
 use crate::support::random::Random;
+use bevy_gs4d::internal::offline::dataset::drawing::draw;
+use bevy_gs4d::internal::offline::dataset::summary::Summary;
 use bevy_gs4d::offline::dataset::{CameraOptions, Dataset, MAX_SIDE, Split, TrainingView};
 use bevy_gs4d::view::RasterFov;
 use glam::UVec2;
@@ -65,8 +67,9 @@ impl Datasets {
 impl Reader for Datasets {
     fn input(&self, random: &mut Random) -> Vec<u8> {
         let (seed, other) = (random.pick(&self.seeds), random.pick(&self.seeds));
+        let change = if self.file.ends_with(".json") { text::change } else { words::change };
         let mut file = match (std::str::from_utf8(seed), std::str::from_utf8(other)) {
-            (Ok(seed), Ok(other)) if !random.one_in(4) => text::change(seed, other, random).into_bytes(),
+            (Ok(seed), Ok(other)) if !random.one_in(4) => change(seed, other, random).into_bytes(),
             _ => seed.clone(),
         };
         if file == *seed || random.one_in(16) {
@@ -79,13 +82,19 @@ impl Reader for Datasets {
         fs::write(self.folder.path().join(self.file), bytes).expect("the folder can be written to");
         let small = CameraOptions { size: Some(UVec2::new(24, 16)), ..CameraOptions::default() };
         let halved = CameraOptions { resolution: Some(2), time_interval: Some([0.0, 1.0]), ..CameraOptions::default() };
-        let mut outcome = Outcome::Accepted;
+        let mut outcome = Outcome::Drawn;
         for options in [CameraOptions::default(), small, halved] {
             for split in [Split::Train, Split::Test] {
                 match Dataset::open(self.folder.path(), split, &options) {
                     Ok(dataset) => check(&dataset.views)?,
                     Err(error) => outcome = Outcome::Refused(error.to_string()),
                 }
+            }
+        }
+        if let Ok(summary) = Summary::of(self.folder.path()) {
+            let picture = draw(&summary.cameras);
+            if picture.pixels.len() != (picture.size.x * picture.size.y) as usize {
+                return Err(format!("is drawn with {} pixels instead of {}", picture.pixels.len(), picture.size));
             }
         }
         Ok(outcome)

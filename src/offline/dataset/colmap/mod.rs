@@ -56,6 +56,11 @@ pub(super) fn read(folder: &Path, options: &CameraOptions) -> Result<All, Datase
     let not_there = || DatasetError::Unusable { path: folder.to_owned(), reason: "no COLMAP model in it".to_owned() };
     let path = model(folder).ok_or_else(not_there)?;
     let mut model = if path.join("cameras.bin").is_file() { binary::read(&path)? } else { text::read(&path)? };
+    for image in &mut model.images {
+        if let Some(name) = image.name.strip_prefix("./") {
+            image.name = name.to_owned();
+        }
+    }
     model.images.sort_by(|a, b| a.name.cmp(&b.name));
     let views = model.views(folder, options)?;
     let points = ["points3D.bin", "points3D.txt"].map(|name| path.join(name)).into_iter().find(|path| path.is_file());
@@ -77,7 +82,7 @@ impl Model {
         let mut all: Vec<(Vec<PathBuf>, bool)> = Vec::new();
         for (index, image) in self.images.iter().enumerate() {
             let path = Path::new(&image.name);
-            let is_plain = |part: Component| matches!(part, Component::Normal(_) | Component::CurDir);
+            let is_plain = |part: Component| matches!(part, Component::Normal(_));
             if image.name.contains(is_obeyed) || !path.components().all(is_plain) || path.file_stem().is_none() {
                 return Err(self.failed(index)(FrameProblem::FileName(image.name.clone())));
             }
