@@ -11,6 +11,7 @@ use glam::{DVec2, Mat4, UVec2};
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::camera_options::{CameraOptions, check_size};
 use super::distortion::Distortion;
 use super::frame::{Frame, Mask, output_name};
 use super::lens::{LensEntries, OriginalLens, check_centered, check_pinhole, checked_size, distortion};
@@ -23,24 +24,6 @@ use crate::offline::picture_file;
 
 /// Name of the camera file of a nerfstudio dataset.
 pub(super) const SINGLE: &str = "transforms.json";
-
-/// How to read a camera file. Default: all `None`.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct CameraOptions {
-    /// Picture size in pixels, instead of the size in the file. The field of view stays that of the original pictures on both
-    /// axes, so that another aspect ratio gives pixels that are not square. This size also replaces an unknown original size.
-    pub size: Option<UVec2>,
-    /// The value of `--resolution` of the original: 1, 2, 3, 4 or 8 divide the size, −1 limits the width to 1600 pixels, any other
-    /// number is a target width. It has no effect on golden views or with an explicit `size`.
-    pub resolution: Option<i32>,
-    /// First and last time, both included: frames outside are dropped.
-    pub time_interval: Option<[f32; 2]>,
-}
-
-/// Checks a requested picture size.
-pub(super) fn check_size(size: UVec2) -> Result<(), DatasetError> {
-    if size.min_element() == 0 || size.max_element() > MAX_SIDE { Err(DatasetError::Size { size }) } else { Ok(()) }
-}
 
 /// A camera file, parsed as JSON but not interpreted.
 #[derive(Debug, Clone)]

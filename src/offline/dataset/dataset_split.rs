@@ -2,11 +2,14 @@
 //!
 //! In: a folder and a split. Out: the [`TrainingView`]s of the split in file order; an error if images are missing.
 
-use super::camera_file::{CameraFile, CameraOptions};
+use super::camera_file::CameraFile;
+use super::camera_options::{CameraOptions, check_size};
+use super::division::divide;
 use super::error::DatasetError;
 use super::files::require_files;
-use super::format::{self, Videos};
+use super::format::{self, Format, Reader};
 use super::split::Split;
+use super::video::Videos;
 use super::view::TrainingView;
 use std::path::{Path, PathBuf};
 
@@ -41,25 +44,35 @@ impl Dataset {
     }
 
     fn open_as(folder: &Path, split: Split, options: &CameraOptions, videos: Videos) -> Result<Self, DatasetError> {
-        match format::of(folder) {
-            Some(format) => format.open(folder, split, options, videos),
-            None => Err(DatasetError::NotADataset { folder: folder.to_owned(), file: split.file_name() }),
+        options.size.map_or(Ok(()), check_size)?;
+        let Format { reader, .. } = format::of(folder).ok_or_else(|| not_a_dataset(folder, split))?;
+        match reader {
+            Reader::Splits => Self::open_split(folder, split, options),
+            Reader::Whole(read) => {
+                let all = read(folder, options, videos)?;
+                let points = all.points.clone();
+                Ok(Self { folder: folder.to_owned(), split, views: divide(split, options, all)?, points })
+            }
         }
     }
 
     /// Reads one split from its own camera file.
-    pub(super) fn open_split(folder: &Path, split: Split, options: &CameraOptions) -> Result<Self, DatasetError> {
+    fn open_split(folder: &Path, split: Split, options: &CameraOptions) -> Result<Self, DatasetError> {
         let split = split.resolved(folder);
         let path = folder.join(split.file_name());
         if !path.is_file() {
-            return Err(DatasetError::NotADataset { folder: folder.to_owned(), file: split.file_name() });
+            return Err(DatasetError::NoSplit { folder: folder.to_owned(), file: split.file_name() });
         }
         Ok(Self { folder: folder.to_owned(), split, views: CameraFile::load(&path, options)?, points: None })
     }
 
-    /// Returns whether a folder has a split of its own.
+    /// Returns whether a folder has views of a split.
     pub(crate) fn has(folder: &Path, split: Split) -> bool {
-        folder.join(split.file_name()).is_file() || format::has(folder, split)
+        match format::of(folder).map(|format| &format.reader) {
+            Some(Reader::Splits) => folder.join(split.file_name()).is_file(),
+            Some(Reader::Whole(_)) => Self::look(folder, split, &CameraOptions::default()).is_ok(),
+            None => false,
+        }
     }
 
     /// Returns the name of the format of a folder; `None` if it has none.
@@ -74,6 +87,11 @@ impl Dataset {
     pub fn require_images(&self) -> Result<(), DatasetError> {
         require_images(&self.views)
     }
+}
+
+/// Returns the error of a folder of no format.
+pub(super) fn not_a_dataset(folder: &Path, split: Split) -> DatasetError {
+    DatasetError::NotADataset { folder: folder.to_owned(), file: split.file_name(), formats: format::names() }
 }
 
 /// Checks that every image and mask of these views is on disk.

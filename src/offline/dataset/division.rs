@@ -3,12 +3,11 @@
 //! In: all views of a folder. Out: the views of one split. Without splits in the dataset, every eighth camera is for the test, the first one
 //! included; if there is one camera, every eighth view.
 
-use super::format::All;
 use super::selection::{distinct_cameras, distinct_times, identity};
-use super::{CameraOptions, Dataset, DatasetError, Split};
+use super::undivided::Undivided;
+use super::{CameraOptions, DatasetError, Split, TrainingView};
 use crate::view::Camera;
 use std::collections::HashSet;
-use std::path::Path;
 
 /// One of this many cameras is for the test.
 const TEST: usize = 8;
@@ -16,8 +15,8 @@ const TEST: usize = 8;
 const SAME: f32 = 1e-5;
 
 /// Returns the views of a split inside the time interval of the options.
-pub(super) fn divide(folder: &Path, split: Split, options: &CameraOptions, all: All) -> Result<Dataset, DatasetError> {
-    let All { source, views, splits, points } = all;
+pub(super) fn divide(split: Split, options: &CameraOptions, all: Undivided) -> Result<Vec<TrainingView>, DatasetError> {
+    let Undivided { source, views, splits, .. } = all;
     let cameras = distinct_cameras(&views);
     match &views[..] {
         [] => return Err(DatasetError::NoFrames { path: source }),
@@ -52,5 +51,5 @@ pub(super) fn divide(folder: &Path, split: Split, options: &CameraOptions, all: 
             return Err(DatasetError::NoFramesInInterval { path: source, interval, times: [first, last] });
         }
     }
-    Ok(Dataset { folder: folder.to_owned(), split, views: of_split, points })
+    Ok(of_split)
 }

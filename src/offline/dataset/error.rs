@@ -14,12 +14,22 @@ use crate::offline::picture_file::PictureError;
 /// A dataset, a camera file or an image that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
-    /// The folder has no camera file for the requested split.
+    /// The folder has no camera file.
     #[error(
-        "{}: no {file} in it, and nothing else that a dataset folder holds: {}",
-        .folder.display(), super::format::names()
+        "{}: no {file} in it, and nothing else that a dataset folder holds: {formats}",
+        .folder.display()
     )]
     NotADataset {
+        /// The folder.
+        folder: PathBuf,
+        /// Name of the missing file.
+        file: &'static str,
+        /// The names of the formats.
+        formats: String,
+    },
+    /// The folder has camera files of other splits alone.
+    #[error("{}: no {file} in it, which holds the cameras of this split: add it, or choose another split", .folder.display())]
+    NoSplit {
         /// The folder.
         folder: PathBuf,
         /// Name of the missing file.

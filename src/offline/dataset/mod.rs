@@ -17,6 +17,7 @@
 //! Cameras can be read without any image on disk; [`Dataset::require_images`] reports missing images early.
 
 mod camera_file;
+mod camera_options;
 mod colmap;
 mod dataset_split;
 mod distortion;
@@ -39,11 +40,13 @@ mod size;
 mod split;
 mod stream;
 pub(crate) mod summary;
+mod undivided;
 pub(crate) mod validation;
 mod video;
 mod view;
 
-pub use camera_file::{CameraFile, CameraOptions};
+pub use camera_file::CameraFile;
+pub use camera_options::CameraOptions;
 pub use dataset_split::Dataset;
 pub(crate) use dataset_split::require_images;
 pub use error::{DatasetError, FrameProblem};

@@ -6,11 +6,12 @@
 //! `frames/camNN/` or `images/camNN/`; without any, those of its video.
 
 use super::distortion::Distortion;
-use super::format::{All, Videos};
 use super::frame::{Frame, Mask, output_name};
 use super::lens::{OriginalLens, checked_size};
 use super::numbered::{entries, images, number, times};
 use super::pose::{pose, single_precision};
+use super::undivided::Undivided;
+use super::video::Videos;
 use super::{CameraOptions, DatasetError, FrameProblem, Split, masks, npy, video};
 use glam::{DVec2, Mat4, UVec2};
 use std::collections::{BTreeSet, HashSet};
@@ -41,7 +42,7 @@ pub(super) fn is_there(folder: &Path) -> bool {
 }
 
 /// Reads the views of a folder.
-pub(super) fn read(folder: &Path, options: &CameraOptions, videos: Videos) -> Result<All, DatasetError> {
+pub(super) fn read(folder: &Path, options: &CameraOptions, videos: Videos) -> Result<Undivided, DatasetError> {
     let source = folder.join(POSES);
     let unusable = |reason: String| DatasetError::Unusable { path: source.clone(), reason };
     let failed = |frame: usize| {
@@ -93,7 +94,7 @@ pub(super) fn read(folder: &Path, options: &CameraOptions, videos: Videos) -> Re
             splits.push(Some(if index == 0 { Split::Test } else { Split::Train }));
         }
     }
-    Ok(All { source, views, splits: Some(splits), points: None })
+    Ok(Undivided { source, views, splits: Some(splits), points: None })
 }
 
 fn bytes(path: &Path) -> Result<Vec<u8>, DatasetError> {

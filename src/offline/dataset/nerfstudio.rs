@@ -4,7 +4,7 @@
 //! `test_filenames`, `val_filenames`), or an entry `split` of each frame.
 
 use super::camera_file::{CameraFile, SINGLE};
-use super::format::All;
+use super::undivided::Undivided;
 use super::{CameraOptions, DatasetError, Split};
 use crate::codec::text::is_obeyed;
 use serde_json::Value;
@@ -25,7 +25,7 @@ pub(super) fn is_there(folder: &Path) -> bool {
 }
 
 /// Reads the views of a folder.
-pub(super) fn read(folder: &Path, options: &CameraOptions) -> Result<All, DatasetError> {
+pub(super) fn read(folder: &Path, options: &CameraOptions) -> Result<Undivided, DatasetError> {
     let source = folder.join(SINGLE);
     let file = CameraFile::read(&source)?;
     let views = file.views(&CameraOptions { time_interval: None, ..*options })?;
@@ -46,7 +46,7 @@ pub(super) fn read(folder: &Path, options: &CameraOptions) -> Result<All, Datase
         return Err(DatasetError::Unusable { path: source, reason });
     }
     let points = points.map(|path| folder.join(path));
-    Ok(All { source, views, splits, points })
+    Ok(Undivided { source, views, splits, points })
 }
 
 /// Returns a path without `./` before it.

@@ -3,6 +3,7 @@
 //! In: a folder. Out: its format, its splits with cameras, times and sizes, and what is missing. No image and no video is decoded, except for the size
 //! of one image where the camera files have no size.
 
+use super::dataset_split::not_a_dataset;
 use super::selection::distinct_cameras;
 use super::{CameraOptions, Dataset, DatasetError, Split, TrainingView};
 use crate::view::Camera;
@@ -53,9 +54,7 @@ impl Summary {
     /// # Errors
     /// The folder is no dataset, or neither its training nor its test split can be opened.
     pub fn of(folder: &Path) -> Result<Self, DatasetError> {
-        let file = Split::Train.file_name();
-        let not_there = || DatasetError::NotADataset { folder: folder.to_owned(), file };
-        let format = Dataset::format(folder).ok_or_else(not_there)?;
+        let format = Dataset::format(folder).ok_or_else(|| not_a_dataset(folder, Split::Train))?;
         let (mut splits, mut views, mut missing, mut points) = (Vec::new(), Vec::new(), Vec::new(), None);
         let mut failed = None;
         for split in Split::ALL {
@@ -72,7 +71,7 @@ impl Summary {
                     points = points.or(dataset.points);
                 }
                 Ok(_) => {}
-                Err(DatasetError::NotADataset { .. } | DatasetError::EmptySplit { .. }) if split == Split::Val => {}
+                Err(DatasetError::NoSplit { .. } | DatasetError::EmptySplit { .. }) if split == Split::Val => {}
                 Err(error) => {
                     missing.push(error.to_string());
                     failed = failed.or(Some(error));

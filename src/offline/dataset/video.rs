@@ -12,6 +12,15 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+/// What is done with videos whose frames have not been decoded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Videos {
+    /// They are decoded.
+    Decode,
+    /// Each is the image of one view.
+    Leave,
+}
+
 /// The program.
 const PROGRAM: &str = "ffmpeg";
 /// Prefix of the names of temporary folders.

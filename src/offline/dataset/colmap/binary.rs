@@ -5,7 +5,7 @@
 use super::super::DatasetError;
 use super::super::stream::Stream;
 use super::camera::{MODELS, ModelCamera, unknown};
-use super::{Model, Registered};
+use super::model::{Model, Registered};
 use std::collections::HashMap;
 use std::path::Path;
 

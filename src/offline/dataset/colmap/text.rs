@@ -4,7 +4,7 @@
 
 use super::super::DatasetError;
 use super::camera::{MODELS, ModelCamera, unknown};
-use super::{Model, Registered};
+use super::model::{Model, Registered};
 use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
