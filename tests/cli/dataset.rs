@@ -75,5 +75,6 @@ fn info_decodes_no_video() {
     let json = gs4d(&arguments!["info", &data, "--json"]).json();
     assert_eq!(json["cameras"], 2, "a camera for each row");
     assert!(json["missing"].to_string().contains("2 videos have not been decoded"), "the videos are named: {json}");
+    assert!(!json["missing"].to_string().contains("static"), "the times of videos are not known yet: {json}");
     assert!(!folder.path().join("data.frames").exists(), "no frames are written");
 }

@@ -91,7 +91,8 @@ impl Summary {
         let all = times(&views);
         let interval = [all.first(), all.last()].map(|time| time.map_or(0.0, |bits| from_order(*bits)));
         let cameras = distinct_cameras(&views);
-        if all.len() < 2 {
+        // The times of videos that have not been decoded are not known.
+        if all.len() < 2 && !views.iter().any(|view| is_video(&view.image)) {
             missing.push("all views have one time: the scene is static".to_owned());
         }
         if cameras.len() < 2 {
@@ -129,9 +130,13 @@ fn from_order(order: i32) -> f32 {
     f32::from_bits(bits.cast_unsigned())
 }
 
+/// Returns whether a path is that of a video, which has not been decoded.
+fn is_video(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mp4"))
+}
+
 /// Returns a sentence for the images, masks and decoded videos that are not on disk.
 fn absent(views: &[TrainingView]) -> Vec<String> {
-    let is_video = |path: &Path| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mp4"));
     let files: BTreeSet<&Path> =
         views.iter().flat_map(|view| [Some(view.image.as_path()), view.mask.as_deref()]).flatten().collect();
     let listed = |files: &[&Path], what: &str| {

@@ -70,9 +70,9 @@ impl CoveredImage {
 
 impl TrainingView {
     /// Loads the image and its coverage. A view with a mask has the mask as coverage, and its image has been multiplied by the mask
-    /// already; or its alpha is multiplied by the mask first, if the correction says so. Else the coverage is the alpha of the image, which is 1 everywhere if the image has none. Colors times alpha are truncated
-    /// to 8 bits and then resampled to the size of the camera (the bicubic filter of Pillow), as in the `dataloader` mode of the original
-    /// over black.
+    /// already, unless the correction multiplies the image's alpha by the mask. Without a mask the coverage is the alpha of the image,
+    /// which is 1 everywhere if the image has none. Colors times alpha are truncated to 8 bits, distortion is undone, and the result is
+    /// resampled to the size of the camera (the bicubic filter of Pillow), as in the `dataloader` mode of the original over black.
     ///
     /// # Errors
     /// [`DatasetError::MissingImages`] if the image or the mask is not on disk, [`DatasetError::Image`] if one cannot
