@@ -6,6 +6,7 @@
 
 use super::DatasetError;
 use super::numbered::{entries, images};
+use crate::codec::text::printable;
 use std::ffi::OsStr;
 use std::fs::{self, File};
 use std::io::ErrorKind;
@@ -27,8 +28,6 @@ const PROGRAM: &str = "ffmpeg";
 const PREFIX: &str = ".gs4d-";
 /// File that is locked while a process decodes, so that all temporary folders are those of killed processes.
 const LOCK: &str = ".lock";
-/// Most characters of the program's message in an error.
-const MESSAGE: usize = 400;
 
 /// Returns the frames of a video, which are decoded if they are not there.
 pub(super) fn frames(folder: &Path, video: &Path, camera: &str) -> Result<Vec<PathBuf>, DatasetError> {
@@ -82,13 +81,22 @@ fn decode(
     if !found.is_empty() {
         return Ok(found);
     }
-    let temporary = tempfile::Builder::new().prefix(PREFIX).tempdir_in(cache).map_err(unwritable)?;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(PREFIX);
+    #[cfg(unix)]
+    {
+        // Permissions of a new folder, by the umask; the default of temporary folders allows the owner only.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o777));
+    }
+    let temporary = builder.tempdir_in(cache).map_err(unwritable)?;
     // The protocol is named, since a path may contain a colon.
     let mut input = OsStr::new("file:").to_owned();
-    input.push(video);
+    input.push(std::path::absolute(video).map_err(|reason| DatasetError::Read { path: video.to_owned(), reason })?);
     let mut command = Command::new(program);
     command.args(["-nostdin", "-v", "error", "-i"]).arg(input);
-    command.args(["-start_number", "0"]).arg(temporary.path().join("%05d.png"));
+    // The program runs inside the folder, whose path may contain a percent sign.
+    command.args(["-start_number", "0", "%05d.png"]).current_dir(temporary.path());
     let run = command.stdin(Stdio::null()).stdout(Stdio::null()).output().map_err(|error| match error.kind() {
         ErrorKind::NotFound => unusable(format!(
             "videos are read by ffmpeg, which is not installed: apt install ffmpeg (Linux), brew install ffmpeg (macOS) or winget install \
@@ -100,8 +108,7 @@ fn decode(
     let found = images(temporary.path())?;
     if !run.status.success() || found.is_empty() {
         let message = String::from_utf8_lossy(&run.stderr);
-        let message: String = message.trim().chars().take(MESSAGE).collect();
-        let message = crate::codec::text::printable(&message);
+        let message = printable(&message.trim().lines().collect::<Vec<_>>().join("; "));
         return Err(unusable(format!(
             "ffmpeg cannot read it ({message}): copy it again, or {}",
             by_hand(folder, camera)
@@ -115,8 +122,8 @@ fn decode(
 fn by_hand(folder: &Path, camera: &str) -> String {
     let shown = folder.display();
     format!(
-        "make the frames by hand: mkdir -p {shown}/frames/{camera} && ffmpeg -i {shown}/{camera}.mp4 -start_number 0 \
-         {shown}/frames/{camera}/%05d.png"
+        "make the frames by hand: mkdir -p \"{shown}/frames/{camera}\" && ffmpeg -i \"{shown}/{camera}.mp4\" \
+         -start_number 0 \"{shown}/frames/{camera}/%05d.png\""
     )
 }
 
@@ -145,24 +152,32 @@ mod tests {
         names.filter(|name| *name != LOCK).map(str::to_owned).collect()
     }
 
-    /// Writes two frames into the folder of the last argument.
-    const FRAMES: &str = "for last; do :; done; d=$(dirname \"$last\"); echo a > $d/00000.png; echo b > $d/00001.png";
+    /// Writes two frames with the names of the last argument.
+    const FRAMES: &str = "for last; do :; done; echo a > $(printf $last 0); echo b > $(printf $last 1)";
 
     #[test]
     fn frames_appear_whole_beside_the_dataset() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let killed = folder.path().join("data.frames/.gs4d-killed");
+        let temporary = tempfile::tempdir().expect("a temporary folder");
+        // For ffmpeg, %d in a path would be the number of the frame.
+        let folder = temporary.path().join("100%d");
+        let killed = folder.join("data.frames/.gs4d-killed");
         fs::create_dir_all(&killed).expect("the folder can be made");
         fs::write(killed.join("00000.png"), b"").expect("the folder can be written to");
-        let found = decoded_by(&program(folder.path(), FRAMES), folder.path()).expect("the program writes frames");
-        let expected = ["00000.png", "00001.png"].map(|name| folder.path().join("data.frames/cam00").join(name));
+        let found = decoded_by(&program(&folder, FRAMES), &folder).expect("the program writes frames");
+        let expected = ["00000.png", "00001.png"].map(|name| folder.join("data.frames/cam00").join(name));
         assert_eq!(found, expected, "the frames lie beside the dataset");
         assert_eq!(
-            names(folder.path()),
+            names(&folder),
             ["cam00"],
             "no temporary folder is left, neither an own one nor that of a killed run"
         );
-        let again = decoded_by(&folder.path().join("nothing"), folder.path()).expect("no program is needed");
+        let mode = |path: &Path| fs::metadata(path).expect("the folder exists").permissions().mode();
+        assert_eq!(
+            mode(&folder.join("data.frames/cam00")),
+            mode(&folder.join("data.frames")),
+            "others may read the frames, by the umask"
+        );
+        let again = decoded_by(&folder.join("nothing"), &folder).expect("no program is needed");
         assert_eq!(again, expected, "frames that are there are used");
     }
 
@@ -188,7 +203,7 @@ mod tests {
     fn a_missing_program_is_an_error_with_both_remedies() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let error = decoded_by(&folder.path().join("nothing"), folder.path()).expect_err("no program").to_string();
-        for part in ["cam00.mp4", "apt install ffmpeg", "frames/cam00/%05d.png"] {
+        for part in ["cam00.mp4", "apt install ffmpeg", "data/frames/cam00/%05d.png\""] {
             assert!(error.contains(part), "{part:?} is not in: {error}");
         }
     }
@@ -196,9 +211,9 @@ mod tests {
     #[test]
     fn a_video_that_cannot_be_read_leaves_no_frames() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let script = "for last; do :; done; echo a > $(dirname \"$last\")/00000.png; echo broken >&2; exit 1";
+        let script = "echo a > 00000.png; echo broken >&2; echo twice >&2; exit 1";
         let error = decoded_by(&program(folder.path(), script), folder.path()).expect_err("it fails").to_string();
-        assert!(error.contains("broken"), "the message of the program is shown: {error}");
+        assert!(error.contains("(broken; twice)"), "the lines of the program are shown: {error}");
         assert_eq!(names(folder.path()), [""; 0], "the frames of a run that fails are removed");
     }
 }
