@@ -114,6 +114,14 @@ pub mod offline {
     }
     /// Datasets.
     pub mod dataset {
+        /// Pictures of cameras.
+        pub mod drawing {
+            pub use crate::offline::dataset::drawing::*;
+        }
+        /// Descriptions of folders.
+        pub mod summary {
+            pub use crate::offline::dataset::summary::*;
+        }
         /// Subsets of views.
         pub mod selection {
             pub use crate::offline::dataset::selection::*;

@@ -1,9 +1,10 @@
-//! `gs4d info FILE`: shows the contents of a checkpoint or a package.
+//! `gs4d info FILE`: shows the contents of a checkpoint or a package. For the folder of a dataset see `info_dataset`.
 //!
 //! In: a file. Out: its properties, its bounds, and for packages the sections and whether their checksums are correct.
 
 use super::args::{CheckpointArgs, file_size};
 use super::failure::Failure;
+use super::info_dataset;
 use super::report::{Report, switches, switches_json};
 use super::table::{Table, bytes, lines};
 use crate::codec;
@@ -21,18 +22,22 @@ use std::collections::HashMap;
 use std::fmt;
 use std::path::PathBuf;
 
-/// Show the contents of a checkpoint (.pth) or a package (.gs4d), and verify all checksums of a package.
+/// Show the contents of a checkpoint (.pth), a package (.gs4d) or a dataset (a folder), and verify all checksums of a package.
 ///
 /// The exit code is 2 if a checksum is wrong or a Gaussian cannot be drawn.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   gs4d info capture.gs4d
-  gs4d info chkpnt30000.pth --time-interval 0,10 --json")]
+  gs4d info chkpnt30000.pth --time-interval 0,10 --json
+  gs4d info dataset --cameras cameras.png")]
 pub(super) struct Info {
-    /// The checkpoint or package.
+    /// The checkpoint, the package, or the folder of a dataset.
     #[arg(value_name = "FILE")]
     file: PathBuf,
+    /// Draw the cameras of a dataset into this picture, from above and from the side.
+    #[arg(long, value_name = "PICTURE.png")]
+    cameras: Option<PathBuf>,
     #[command(flatten)]
     checkpoint: CheckpointArgs,
 }
@@ -74,6 +79,12 @@ impl Info {
     /// # Errors
     /// The file cannot be read. If sections are damaged or a Gaussian cannot be drawn, the result is a report with a failure.
     pub(super) fn run(&self) -> Result<Report, Failure> {
+        if self.file.is_dir() {
+            return info_dataset::run(&self.file, self.cameras.as_deref());
+        }
+        if self.cameras.is_some() {
+            return Err(Failure::about(&self.file, "is not the folder of a dataset, which --cameras needs"));
+        }
         let size = file_size(&self.file)?;
         let (format, package) = codec::inspect(&self.file)?;
         if let Some(info) = package.as_ref().filter(|info| !info.is_intact()) {

@@ -19,6 +19,7 @@ mod eval;
 mod failure;
 mod fine_tune;
 mod info;
+mod info_dataset;
 mod interrupt;
 mod mask;
 mod note;

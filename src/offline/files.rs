@@ -3,7 +3,7 @@
 //! In: the paths of both. Out: an error that names the first output that is an input, is another output or cannot be written. Temporary
 //! files that killed runs have left beside the outputs are removed.
 
-use super::dataset::{CameraFile, CameraOptions, Split};
+use super::dataset::{CameraFile, CameraOptions, Split, inputs};
 use super::save::{is_stream, resolved};
 use super::temporary_file::folder_of;
 use super::{OfflineError, temporary_file};
@@ -66,6 +66,7 @@ impl Files {
         for split in Split::ALL {
             self.add_cameras(&folder.join(split.file_name()));
         }
+        self.inputs.extend(inputs(folder).into_iter().filter(|path| may_exist(path)));
         self
     }
 

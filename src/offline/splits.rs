@@ -89,7 +89,7 @@ impl Splits {
         progress: &mut dyn Progress,
     ) -> Result<Option<Vec<TrainingView>>, OfflineError> {
         let is_test = Split::Test.resolved(folder) == Split::Val;
-        let is_there = folder.join(Split::Val.file_name()).is_file();
+        let is_there = Dataset::has(folder, Split::Val);
         let wanted = match options.validation {
             Validation::File => true,
             Validation::Auto => is_there && !is_test,

@@ -3,7 +3,7 @@
 //! In: a [`Key`] of everything that a result depends on, and the result as bytes. Out: the same bytes; `None`, so that
 //! the stage runs again, if the key is another or the bytes are damaged. One run at a time works in a folder.
 
-use super::dataset::TrainingView;
+use super::dataset::{Correction, TrainingView};
 use super::files::node;
 use super::temporary_file;
 use crate::codec::CodecError;
@@ -60,7 +60,10 @@ impl Key {
             .collect();
         let hash = |path: &&Path| if path.is_file() { Self::of_file(path) } else { Ok(Self::of(b"missing")) };
         let hashes: Vec<Self> = paths.par_iter().map(hash).collect::<Result<_, _>>()?;
-        Ok(hashes.into_iter().fold(Self::of(b"images"), Self::with))
+        let corrected =
+            views.iter().map(|view| view.correction).filter(|correction| *correction != Correction::default());
+        let corrected = corrected.map(|correction| Self::of(format!("{correction:?}").as_bytes()));
+        Ok(hashes.into_iter().chain(corrected).fold(Self::of(b"images"), Self::with))
     }
 
     /// Returns the key of the contents of a file: that of its bytes.

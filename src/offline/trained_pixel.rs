@@ -55,7 +55,8 @@ mod tests {
     fn view_from(eye: Vec3, target: Vec3) -> TrainingView {
         let camera = Camera::look_at(eye, target, Vec3::Z, 2.0 * 0.5f32.atan(), UVec2::splat(100));
         let (name, image) = (String::new(), PathBuf::new());
-        TrainingView { name, camera, time: 0.0, original: camera.size, image, mask: None }
+        let correction = Default::default();
+        TrainingView { name, camera, time: 0.0, original: camera.size, image, mask: None, correction }
     }
 
     #[test]

@@ -7,6 +7,7 @@ mod bake;
 mod command;
 mod compare;
 mod compress;
+mod dataset;
 mod detail;
 mod eval;
 // Faults need `/dev/full` and the limits of a shell, which Linux has.

@@ -10,7 +10,8 @@ use crate::support::no_gpu::no_gpu;
 use bevy_gs4d::renderer::GpuContext;
 use bevy_gs4d::scene::synth::{SynthSettings, synthesize};
 use glam::{UVec2, Vec3};
-use serde_json::Value;
+use image::{RgbImage, Rgba, RgbaImage};
+use serde_json::{Value, json};
 use std::fs;
 
 /// Returns a dataset of 4 cameras and 4 times; `None` if there is no GPU.
@@ -102,8 +103,23 @@ fn data_that_no_capture_can_be_trained_on_is_refused() {
     frames.iter_mut().for_each(|frame| frame["transform_matrix"] = first.clone());
     fs::write(&path, json.to_string()).expect("the folder can be written to");
     run(&["--validation", "none"]).must_fail("from one place");
+    // Cameras inside the object: each looks away from the axis, horizontally.
+    let mut json: Value = serde_json::from_str(&text).expect("JSON");
+    for frame in json["frames"].as_array_mut().expect("frames") {
+        let rows = &mut frame["transform_matrix"];
+        let [x, y, z] = [0, 1, 2].map(|row| rows[row][3].as_f64().expect("a number"));
+        let (cos, sin) = (x / x.hypot(y), y / x.hypot(y));
+        *rows = json!([[sin, 0, -cos, x], [-cos, 0, -sin, y], [0, 1, 0, z], [0, 0, 0, 1]]);
+    }
+    fs::write(&path, json.to_string()).expect("the folder can be written to");
+    run(&["--validation", "none"]).must_fail("look away from each other");
     fs::write(&path, text).expect("the folder can be written to");
-    fs::remove_file(capture.data.join("train/c01_02.png")).expect("the image exists");
+    let image = capture.data.join("train/c01_02.png");
+    RgbImage::new(40, 20).save(&image).expect("the folder can be written to");
+    run(&[]).must_fail(
+        "c01_02.png: 40 x 20 pixels do not have the aspect ratio of the pictures of the camera file, 40 x 40",
+    );
+    fs::remove_file(image).expect("the image exists");
     run(&[]).must_fail("c01_02.png");
     assert_eq!(folders::names(capture.folder.path()), before, "no file is left");
 }
@@ -132,4 +148,18 @@ fn pictures_are_baked_in_one_command() {
     gs4d(&arguments!["bake", &trained, "--data", &capture.data, "-o", &out, "--train-steps", "5"])
         .must_fail("--train-steps");
     gs4d(&arguments!["bake", &capture.data, "-o", &out, "--engine", "cpu"]).must_fail("needs a GPU");
+}
+
+#[test]
+fn silhouettes_of_other_poses_are_named_as_the_cause() {
+    let Some(capture) = dataset() else { return };
+    // Every camera looks at the middle, and has its object in a corner.
+    let corner = RgbaImage::from_fn(40, 40, |x, y| Rgba([200, 200, 200, if x < 3 && y < 3 { 255 } else { 0 }]));
+    for path in fs::read_dir(capture.data.join("train")).expect("the images") {
+        corner.save(path.expect("an image").path()).expect("the folder can be written to");
+    }
+    let out = capture.path("out.gs4d");
+    let command = arguments!["train", "--data", &capture.data, "-o", &out, "--steps", "2", "--start", "hull"];
+    gs4d(&command).must_fail("masks or poses of another scene?");
+    assert!(!out.exists(), "no package is written");
 }

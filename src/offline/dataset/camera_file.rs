@@ -7,31 +7,23 @@ use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use glam::{DMat3, DMat4, DVec2, DVec4, Mat4, UVec2};
+use glam::{DVec2, Mat4, UVec2};
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::lens::{LensEntries, OriginalLens, check_centered, check_pinhole, checked_size, reduced};
+use super::camera_options::{CameraOptions, check_size};
+use super::distortion::Distortion;
+use super::frame::{Frame, Mask, output_name};
+use super::lens::{LensEntries, OriginalLens, check_centered, check_pinhole, checked_size, distortion};
+use super::masks;
+use super::numbered::{FRAME_RATE, IMAGE_EXTENSIONS};
+use super::pose::{pose, single_precision};
 use super::{DatasetError, FrameProblem, MAX_SIDE, Split, TrainingView};
 use crate::codec::text::is_obeyed;
 use crate::offline::picture_file;
-use crate::view::{Camera, RasterFov};
 
-/// A determinant below this fraction of the product of the lengths of its columns counts as zero.
-const SINGULAR: f64 = 1e-9;
-
-/// How to read a camera file. Default: all `None`.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct CameraOptions {
-    /// Picture size in pixels, instead of the size in the file. The field of view stays that of the original pictures on both
-    /// axes, so that another aspect ratio gives pixels that are not square. This size also replaces an unknown original size.
-    pub size: Option<UVec2>,
-    /// The value of `--resolution` of the original: 1, 2, 3, 4 or 8 divide the size, −1 limits the width to 1600 pixels, any other
-    /// number is a target width. It has no effect on golden views or with an explicit `size`.
-    pub resolution: Option<i32>,
-    /// First and last time, both included: frames outside are dropped.
-    pub time_interval: Option<[f32; 2]>,
-}
+/// Name of the camera file of a nerfstudio dataset.
+pub(super) const SINGLE: &str = "transforms.json";
 
 /// A camera file, parsed as JSON but not interpreted.
 #[derive(Debug, Clone)]
@@ -55,8 +47,9 @@ enum Form {
 struct TransformsFrame {
     file_path: String,
     transform_matrix: [[f64; 4]; 4],
-    #[serde(default)]
-    time: f64,
+    time: Option<f64>,
+    /// The number of the frame in its video, instead of a time.
+    frame_number: Option<f64>,
     mask_path: Option<String>,
 }
 
@@ -77,7 +70,7 @@ struct GoldenFrame {
 }
 
 /// A frame of either form.
-struct Frame {
+struct Parsed {
     file: String,
     mask: Option<String>,
     time: f32,
@@ -85,6 +78,7 @@ struct Frame {
     /// Size of the original picture; `None` if the file does not have it.
     size: Option<UVec2>,
     lens: OriginalLens,
+    distortion: Distortion,
 }
 
 impl CameraFile {
@@ -96,9 +90,7 @@ impl CameraFile {
     /// # Errors
     /// [`DatasetError`], naming the file, the frame and the reason.
     pub fn load(path: &Path, options: &CameraOptions) -> Result<Vec<TrainingView>, DatasetError> {
-        if let Some(size) = options.size.filter(|size| size.min_element() == 0 || size.max_element() > MAX_SIDE) {
-            return Err(DatasetError::Size { size });
-        }
+        options.size.map_or(Ok(()), check_size)?;
         Self::read(path)?.views(options)
     }
 
@@ -110,7 +102,7 @@ impl CameraFile {
         Ok(Self::read(path)?.form == Form::Golden)
     }
 
-    fn read(path: &Path) -> Result<Self, DatasetError> {
+    pub(super) fn read(path: &Path) -> Result<Self, DatasetError> {
         let bytes = fs::read(path).map_err(|reason| DatasetError::Read { path: path.to_owned(), reason })?;
         let json: Value =
             serde_json::from_slice(&bytes).map_err(|reason| DatasetError::Json { path: path.to_owned(), reason })?;
@@ -125,7 +117,7 @@ impl CameraFile {
         self.json.get(self.form.list_name()).and_then(Value::as_array).map_or(&[], Vec::as_slice)
     }
 
-    fn views(&self, options: &CameraOptions) -> Result<Vec<TrainingView>, DatasetError> {
+    pub(super) fn views(&self, options: &CameraOptions) -> Result<Vec<TrainingView>, DatasetError> {
         let frames = self.frames()?;
         let times = || frames.iter().map(|frame| frame.time);
         let (Some(first), Some(last)) = (times().reduce(f32::min), times().reduce(f32::max)) else {
@@ -148,15 +140,12 @@ impl CameraFile {
         }
     }
 
-    fn frames(&self) -> Result<Vec<Frame>, DatasetError> {
+    fn frames(&self) -> Result<Vec<Parsed>, DatasetError> {
         let shared = LensEntries::deserialize(&self.json)
             .map_err(|reason| DatasetError::Json { path: self.path.clone(), reason })?;
-        let parse = |entry| {
-            check_pinhole(entry, &self.json)?;
-            match self.form {
-                Form::Transforms => transforms_frame(entry, &shared),
-                Form::Golden => golden_frame(entry),
-            }
+        let parse = |entry| match self.form {
+            Form::Transforms => transforms_frame(entry, &shared, &self.json),
+            Form::Golden => golden_frame(entry, &self.json),
         };
         self.entries()
             .iter()
@@ -201,41 +190,49 @@ impl CameraFile {
     fn view(
         &self,
         index: usize,
-        frame: Frame,
+        frame: Parsed,
         probed: Option<UVec2>,
         options: &CameraOptions,
         names: &mut HashSet<String>,
     ) -> Result<TrainingView, DatasetError> {
         let original = frame.size.or(probed).or(options.size);
         let original = original.ok_or_else(|| DatasetError::SizeUnknown { path: self.path.clone() })?;
-        let (size, divisor) = match (options.size, self.form) {
-            (Some(size), _) => (size, original.as_dvec2() / size.as_dvec2()),
-            (None, Form::Golden) => (original, DVec2::ONE),
-            (None, Form::Transforms) => {
-                let (size, divisor) = reduced(original, options.resolution)?;
-                (size, DVec2::splat(divisor))
-            }
-        };
-        let lens = frame.lens.scaled(original, divisor).map_err(|problem| self.frame_error(index, problem))?;
         let file = with_image_extension(&frame.file);
         let unnamed = |path: &str| self.frame_error(index, FrameProblem::FileName(path.to_owned()));
         let name = output_name(&file, index, names).ok_or_else(|| unnamed(&frame.file))?;
         if let Some(mask) = frame.mask.as_deref().filter(|mask| mask.contains(is_obeyed)) {
             return Err(unnamed(mask));
         }
-        let camera = Camera { world_to_camera: frame.world_to_camera, size, lens };
-        let is_finite = |fov| camera.view(frame.time, fov).is_finite();
-        if ![RasterFov::Reference, RasterFov::Corrected].into_iter().all(is_finite) {
-            return Err(self.frame_error(index, FrameProblem::Projection(name)));
-        }
-        Ok(TrainingView {
+        let beside = self.is_single().then(|| masks::beside(self.folder(), Path::new(&file))).flatten();
+        let named = frame.mask.map(|mask| self.folder().join(with_image_extension(&mask)));
+        let frame = Frame {
             name,
-            camera,
-            time: frame.time,
-            original,
             image: self.folder().join(file),
-            mask: frame.mask.map(|mask| self.folder().join(with_image_extension(&mask))),
-        })
+            mask: named.or(beside).map(|path| Mask { path, applied: !self.is_single() }),
+            time: frame.time,
+            world_to_camera: frame.world_to_camera,
+            lens: frame.lens,
+            distortion: frame.distortion,
+        };
+        let reducible = self.form == Form::Transforms;
+        frame.into_view(original, options, reducible, |problem| self.frame_error(index, problem))
+    }
+
+    /// Returns whether this is the single file of a nerfstudio dataset, whose images have not been multiplied by their masks.
+    fn is_single(&self) -> bool {
+        self.form == Form::Transforms && self.path.file_name().is_some_and(|name| name == SINGLE)
+    }
+
+    /// Returns an entry of the whole file.
+    pub(super) fn entry(&self, name: &str) -> Option<&Value> {
+        self.json.get(name)
+    }
+
+    /// Returns, for each frame in file order, its path and its entry `split`, where the file has them.
+    pub(super) fn splits(&self) -> impl Iterator<Item = (Option<&str>, Option<&str>)> {
+        self.entries()
+            .iter()
+            .map(|entry| (entry.get("file_path").and_then(Value::as_str), entry.get("split").and_then(Value::as_str)))
     }
 }
 
@@ -255,35 +252,38 @@ impl Form {
     }
 }
 
-fn transforms_frame(entry: &Value, shared: &LensEntries) -> Result<Frame, FrameProblem> {
+fn transforms_frame(entry: &Value, shared: &LensEntries, file: &Value) -> Result<Parsed, FrameProblem> {
     let frame = TransformsFrame::deserialize(entry).map_err(FrameProblem::Malformed)?;
     let entries = LensEntries::deserialize(entry).map_err(FrameProblem::Malformed)?.or(shared);
     let mut camera_to_world = pose(&frame.transform_matrix)?;
     // OpenGL axes to OpenCV axes: the camera's y and z are negated.
     camera_to_world.y_axis = -camera_to_world.y_axis;
     camera_to_world.z_axis = -camera_to_world.z_axis;
-    Ok(Frame {
+    Ok(Parsed {
         file: frame.file_path,
         mask: frame.mask_path,
-        time: finite_time(frame.time)?,
+        time: finite_time(frame.time.or(frame.frame_number.map(|number| number / FRAME_RATE)).unwrap_or(0.0))?,
         world_to_camera: single_precision(camera_to_world.inverse())?,
         size: entries.size()?,
         lens: entries.lens()?,
+        distortion: distortion(entry, file)?,
     })
 }
 
-fn golden_frame(entry: &Value) -> Result<Frame, FrameProblem> {
+fn golden_frame(entry: &Value, file: &Value) -> Result<Parsed, FrameProblem> {
+    check_pinhole(entry, file)?;
     let frame = GoldenFrame::deserialize(entry).map_err(FrameProblem::Malformed)?;
     check_centered("cx", frame.cx, frame.width)?;
     check_centered("cy", frame.cy, frame.height)?;
     let tangents = DVec2::new(frame.width / (2.0 * frame.fl_x), frame.height / (2.0 * frame.fl_y));
-    Ok(Frame {
+    Ok(Parsed {
         file: frame.file,
         mask: None,
         time: finite_time(frame.time)?,
         world_to_camera: single_precision(pose(&frame.world_to_camera_opencv)?)?,
         size: Some(checked_size(frame.width, frame.height)?),
         lens: OriginalLens::Tangents(tangents),
+        distortion: Distortion::default(),
     })
 }
 
@@ -292,54 +292,11 @@ fn finite_time(time: f64) -> Result<f32, FrameProblem> {
     if narrow.is_finite() { Ok(narrow) } else { Err(FrameProblem::Time(time)) }
 }
 
-/// Returns the matrix with these rows, which must be finite, affine and invertible.
-fn pose(rows: &[[f64; 4]; 4]) -> Result<DMat4, FrameProblem> {
-    let matrix = DMat4::from_cols_array_2d(rows).transpose();
-    if !matrix.is_finite() {
-        return Err(FrameProblem::Matrix("holds a value that is not finite"));
-    }
-    if !matrix.row(3).abs_diff_eq(DVec4::W, 1e-6) {
-        return Err(FrameProblem::Matrix("must end in the row 0 0 0 1"));
-    }
-    if is_invertible(matrix) { Ok(matrix) } else { Err(FrameProblem::Matrix("cannot be inverted")) }
-}
-
-fn single_precision(matrix: DMat4) -> Result<Mat4, FrameProblem> {
-    let narrow = matrix.as_mat4();
-    let usable = narrow.is_finite() && is_invertible(narrow.as_dmat4());
-    if usable { Ok(narrow) } else { Err(FrameProblem::Matrix("is too large or too small for float32")) }
-}
-
-/// Returns whether the linear part is invertible; false if its determinant overflows.
-fn is_invertible(matrix: DMat4) -> bool {
-    let linear = DMat3::from_mat4(matrix);
-    let volume = linear.x_axis.length() * linear.y_axis.length() * linear.z_axis.length();
-    volume.is_finite() && linear.determinant().abs() > SINGULAR * volume
-}
-
 /// Appends `.png` unless the path ends in the extension of an image.
 fn with_image_extension(file: &str) -> String {
     let extension = Path::new(file).extension().unwrap_or_default();
-    let known = ["png", "jpg", "jpeg"].iter().any(|known| extension.eq_ignore_ascii_case(known));
+    let known = IMAGE_EXTENSIONS.iter().any(|known| extension.eq_ignore_ascii_case(known));
     if known { file.to_owned() } else { format!("{file}.png") }
-}
-
-/// Returns the stem of an image path, made unique with the index of the frame; `None` if the stem is not a plain file name, or
-/// if the path has control characters, since reports and errors show it.
-fn output_name(file: &str, index: usize, taken: &mut HashSet<String>) -> Option<String> {
-    if file.contains(is_obeyed) {
-        return None;
-    }
-    let path = Path::new(file);
-    let stem = path.extension().and(path.file_stem())?.to_str()?;
-    if Path::new(stem).file_name()? != stem {
-        return None;
-    }
-    let mut name = stem.to_owned();
-    while !taken.insert(name.clone()) {
-        name = format!("{name}-{index}");
-    }
-    Some(name)
 }
 
 #[cfg(test)]
@@ -352,39 +309,5 @@ mod tests {
         assert_eq!(with_image_extension("a/b.JPG"), "a/b.JPG", "any case");
         assert_eq!(with_image_extension("a/b.jpeg"), "a/b.jpeg", "jpeg");
         assert_eq!(with_image_extension("cam00/frame.001"), "cam00/frame.001.png", "a dot is not an extension");
-    }
-
-    #[test]
-    fn output_names_are_stems_and_unique() {
-        let mut taken = HashSet::new();
-        assert_eq!(output_name("./images/c04_f00.jpg", 0, &mut taken).as_deref(), Some("c04_f00"), "stem");
-        assert_eq!(
-            output_name("x/frame.001.png", 1, &mut taken).as_deref(),
-            Some("frame.001"),
-            "dots in the stem are kept"
-        );
-        assert_eq!(output_name("y/c04_f00.png", 2, &mut taken).as_deref(), Some("c04_f00-2"), "a repeated stem");
-        assert_eq!(output_name("...png", 3, &mut taken), None, "a stem that leads out of the folder");
-        assert_eq!(output_name(".png", 4, &mut taken), None, "an empty path");
-        assert_eq!(output_name("a\u{1b}[2J/b.png", 5, &mut taken), None, "a control character");
-    }
-
-    #[test]
-    fn poses_must_be_finite_affine_and_invertible() {
-        let identity = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
-        let with = |row: usize, column: usize, value: f64| {
-            let mut rows = identity;
-            rows[row][column] = value;
-            pose(&rows).is_ok()
-        };
-        assert!(with(0, 3, 5.0), "a translation is valid");
-        assert!(!with(1, 1, 0.0), "a singular matrix is refused");
-        assert!(!with(1, 1, f64::NAN) && !with(0, 3, f64::INFINITY), "values that are not finite are refused");
-        assert!(!with(3, 3, 2.0), "a matrix that is not affine is refused");
-        let huge = DMat4::from_scale(glam::DVec3::splat(1e60));
-        assert!(
-            single_precision(huge).is_err() && single_precision(huge.inverse()).is_err(),
-            "values beyond float32 are refused"
-        );
     }
 }

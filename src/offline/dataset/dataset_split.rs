@@ -2,10 +2,14 @@
 //!
 //! In: a folder and a split. Out: the [`TrainingView`]s of the split in file order; an error if images are missing.
 
-use super::camera_file::{CameraFile, CameraOptions};
+use super::camera_file::CameraFile;
+use super::camera_options::{CameraOptions, check_size};
+use super::division::divide;
 use super::error::DatasetError;
 use super::files::require_files;
+use super::format::{self, Format, Reader};
 use super::split::Split;
+use super::video::Videos;
 use super::view::TrainingView;
 use std::path::{Path, PathBuf};
 
@@ -18,20 +22,62 @@ pub struct Dataset {
     pub split: Split,
     /// The views of the split in file order, at least one.
     pub views: Vec<TrainingView>,
+    /// File of points to begin training with, if the dataset names one. It may not exist.
+    pub points: Option<PathBuf>,
 }
 
 impl Dataset {
-    /// Reads the cameras of one split.
+    /// Reads the cameras of one split of a folder of any format. The frames of videos are decoded once, by the program `ffmpeg`.
     ///
     /// # Errors
-    /// [`DatasetError`] if the split's file is missing or unusable. Missing images are not an error here.
+    /// [`DatasetError`] if the folder has no such split, or its files are unusable. Missing images are not an error here.
     pub fn open(folder: &Path, split: Split, options: &CameraOptions) -> Result<Self, DatasetError> {
+        Self::open_as(folder, split, options, Videos::Decode)
+    }
+
+    /// Reads as [`open`](Self::open), but decodes no video: a video is the image of the only view of its camera.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub(crate) fn look(folder: &Path, split: Split, options: &CameraOptions) -> Result<Self, DatasetError> {
+        Self::open_as(folder, split, options, Videos::Leave)
+    }
+
+    fn open_as(folder: &Path, split: Split, options: &CameraOptions, videos: Videos) -> Result<Self, DatasetError> {
+        options.size.map_or(Ok(()), check_size)?;
+        let Format { reader, .. } = format::of(folder).ok_or_else(|| not_a_dataset(folder, split))?;
+        match reader {
+            Reader::Splits => Self::open_split(folder, split, options),
+            Reader::Whole(read) => {
+                let all = read(folder, options, videos)?;
+                let points = all.points.clone();
+                Ok(Self { folder: folder.to_owned(), split, views: divide(split, options, all)?, points })
+            }
+        }
+    }
+
+    /// Reads one split from its own camera file.
+    fn open_split(folder: &Path, split: Split, options: &CameraOptions) -> Result<Self, DatasetError> {
         let split = split.resolved(folder);
         let path = folder.join(split.file_name());
         if !path.is_file() {
-            return Err(DatasetError::NotADataset { folder: folder.to_owned(), file: split.file_name() });
+            return Err(DatasetError::NoSplit { folder: folder.to_owned(), file: split.file_name() });
         }
-        Ok(Self { folder: folder.to_owned(), split, views: CameraFile::load(&path, options)? })
+        Ok(Self { folder: folder.to_owned(), split, views: CameraFile::load(&path, options)?, points: None })
+    }
+
+    /// Returns whether a folder has views of a split.
+    pub(crate) fn has(folder: &Path, split: Split) -> bool {
+        match format::of(folder).map(|format| &format.reader) {
+            Some(Reader::Splits) => folder.join(split.file_name()).is_file(),
+            Some(Reader::Whole(_)) => Self::look(folder, split, &CameraOptions::default()).is_ok(),
+            None => false,
+        }
+    }
+
+    /// Returns the name of the format of a folder; `None` if it has none.
+    pub(crate) fn format(folder: &Path) -> Option<&'static str> {
+        format::of(folder).map(|format| format.name)
     }
 
     /// Checks that every image and mask is on disk.
@@ -41,6 +87,11 @@ impl Dataset {
     pub fn require_images(&self) -> Result<(), DatasetError> {
         require_images(&self.views)
     }
+}
+
+/// Returns the error of a folder of no format.
+pub(super) fn not_a_dataset(folder: &Path, split: Split) -> DatasetError {
+    DatasetError::NotADataset { folder: folder.to_owned(), file: split.file_name(), formats: format::names() }
 }
 
 /// Checks that every image and mask of these views is on disk.

@@ -8,19 +8,28 @@ use std::{fmt, io};
 
 use glam::UVec2;
 
-use super::MAX_SIDE;
+use super::{MAX_SIDE, Split};
 use crate::offline::picture_file::PictureError;
 
 /// A dataset, a camera file or an image that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
-    /// The folder has no camera file for the requested split.
+    /// The folder has no camera file.
     #[error(
-        "{}: no {file} in it: a dataset folder holds transforms_train.json and transforms_test.json (the Blender form; COLMAP folders \
-         must be converted first)",
+        "{}: no {file} in it, and nothing else that a dataset folder holds: {formats}",
         .folder.display()
     )]
     NotADataset {
+        /// The folder.
+        folder: PathBuf,
+        /// Name of the missing file.
+        file: &'static str,
+        /// The names of the formats.
+        formats: String,
+    },
+    /// The folder has camera files of other splits alone.
+    #[error("{}: no {file} in it, which holds the cameras of this split: add it, or choose another split", .folder.display())]
+    NoSplit {
         /// The folder.
         folder: PathBuf,
         /// Name of the missing file.
@@ -131,6 +140,39 @@ pub enum DatasetError {
         /// Width and height according to the camera file, pixels.
         expected: UVec2,
     },
+    /// A file of a dataset, or a video, cannot be used.
+    #[error("{}: {reason}", .path.display())]
+    Unusable {
+        /// The file.
+        path: PathBuf,
+        /// The fault and the remedy.
+        reason: String,
+    },
+    /// A dataset has a single view.
+    #[error("{}: it has one view, and a scene needs several cameras or several times: add images", .path.display())]
+    OneView {
+        /// The camera file.
+        path: PathBuf,
+    },
+    /// All views are taken from one place.
+    #[error(
+        "{}: all {views} views are taken from the same place, so that no depth can be found: the poses are missing, or belong to another scene",
+        .path.display()
+    )]
+    SamePlace {
+        /// The camera file.
+        path: PathBuf,
+        /// Number of views.
+        views: usize,
+    },
+    /// A dataset has no views for a split.
+    #[error("{}: it has no views of the split {split:?}: list some, or remove its splits, so that every eighth camera is for the test", .path.display())]
+    EmptySplit {
+        /// The camera file.
+        path: PathBuf,
+        /// The split.
+        split: Split,
+    },
     /// An image cannot be decoded, or is larger than the camera file says.
     #[error(transparent)]
     Image(#[from] PictureError),
@@ -168,8 +210,17 @@ pub enum FrameProblem {
         /// Name of the entry.
         entry: &'static str,
     },
-    /// The camera model is not a pinhole camera.
-    #[error("camera_model is \"{0}\", and only pinhole cameras can be used: {UNDISTORT}; then write PINHOLE")]
+    /// The distortion cannot be undone.
+    #[error(
+        "the distortion k1, k2, k3, k4, p1, p2 folds the picture, or needs more than twice the focal length, and cannot be undone: {UNDISTORT}, \
+         or correct the coefficients"
+    )]
+    Folded,
+    /// The distortion of the camera model cannot be undone.
+    #[error(
+        "camera_model is \"{0}\", whose distortion cannot be undone (PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV and OPENCV_FISHEYE can): \
+         {UNDISTORT}; then write PINHOLE"
+    )]
     CameraModel(String),
     /// The principal point of a golden view is not the center of the picture.
     #[error(

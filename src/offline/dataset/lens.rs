@@ -1,12 +1,13 @@
 //! Picture sizes and lenses of training views.
 //!
 //! In: sizes, focal lengths and angles of a camera file, in pixels of the original pictures, and the requested size or
-//! resolution. Out: the size to render at and its [`Lens`], or an error for a lens that is not a pinhole.
+//! resolution. Out: the size to render at, its [`Lens`] and its [`Distortion`], or an error for a lens that cannot be used.
 
 use glam::{DVec2, UVec2};
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::distortion::Distortion;
 use super::{DatasetError, FrameProblem, MAX_SIDE};
 use crate::codec::text::printable;
 use crate::view::{Camera, Lens};
@@ -38,6 +39,13 @@ const DISTORTING: [&str; 16] = [
 /// The entry that names the camera model, and the models that are pinhole cameras if every coefficient is 0.
 const CAMERA_MODEL: &str = "camera_model";
 const PINHOLES: [&str; 3] = ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV"];
+
+/// The models whose coefficients are undone, and whether they are fisheye lenses. Without a model, the first one.
+const MODELS: [(&str, bool); 4] =
+    [("OPENCV", false), ("SIMPLE_RADIAL", false), ("RADIAL", false), ("OPENCV_FISHEYE", true)];
+
+/// The entries of coefficients that are undone: four radial and two tangential coefficients.
+const COEFFICIENTS: [&str; 6] = ["k1", "k2", "k3", "k4", "p1", "p2"];
 
 /// Largest distance of the principal point of a golden view from the center of the picture, pixels: the error of a rounded decimal number.
 const CENTERED: f64 = 1e-3;
@@ -132,6 +140,30 @@ pub(super) fn check_pinhole(frame: &Value, file: &Value) -> Result<(), FrameProb
         Some(entry) => Err(FrameProblem::Distorted { entry }),
         None => Ok(()),
     }
+}
+
+/// Returns the distortion of a frame of the Blender form. An entry of the frame replaces the entry of the whole file; `null` is no entry.
+pub(super) fn distortion(frame: &Value, file: &Value) -> Result<Distortion, FrameProblem> {
+    let entry = |name| [frame, file].into_iter().filter_map(|from| from.get(name)).find(|value| !value.is_null());
+    let model = entry(CAMERA_MODEL).and_then(Value::as_str);
+    let model = MODELS.iter().find(|(name, _)| model.unwrap_or("OPENCV").eq_ignore_ascii_case(name));
+    let Some(&(_, fisheye)) = model.filter(|_| entry(CAMERA_MODEL).is_none_or(Value::is_string)) else {
+        check_pinhole(frame, file)?;
+        return Ok(Distortion::default());
+    };
+    let undone = |name: &str| COEFFICIENTS.contains(&name) && !(fisheye && name.starts_with('p'));
+    let refused =
+        |name: &'static str| entry(name).is_some_and(|value| !(is_zero(value) || undone(name) && value.is_number()));
+    if let Some(entry) = DISTORTING.into_iter().find(|&name| refused(name)) {
+        return Err(FrameProblem::Distorted { entry });
+    }
+    let value = |name| entry(name).and_then(Value::as_f64).unwrap_or(0.0);
+    Ok(Distortion {
+        fisheye,
+        radial: ["k1", "k2", "k3", "k4"].map(value),
+        denominator: [0.0; 3],
+        tangential: if fisheye { [0.0; 2] } else { ["p1", "p2"].map(value) },
+    })
 }
 
 fn is_zero(value: &Value) -> bool {

@@ -75,6 +75,7 @@ mod tests {
             original: UVec2::splat(8),
             image: "none.png".into(),
             mask: None,
+            correction: Default::default(),
         };
         (0..600).map(view).collect()
     }

@@ -134,6 +134,7 @@ mod tests {
             original: size,
             image: "none.png".into(),
             mask: None,
+            correction: Default::default(),
         }
     }
 

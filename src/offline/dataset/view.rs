@@ -7,8 +7,9 @@
 use std::path::{Path, PathBuf};
 
 use glam::{UVec2, Vec3};
-use image::{DynamicImage, RgbaImage};
+use image::{DynamicImage, GrayImage, RgbaImage};
 
+use super::distortion::Undistortion;
 use super::files::require_files;
 use super::{DatasetError, MAX_SIDE, resample};
 use crate::offline::picture_file;
@@ -33,9 +34,18 @@ pub struct TrainingView {
     pub original: UVec2,
     /// Path of the image, which may not exist.
     pub image: PathBuf,
-    /// Path of the coverage as an 8-bit gray image, by which the image has been multiplied already; `None` if the
-    /// view has none.
+    /// Path of the coverage as an 8-bit gray image, by which the image has been multiplied already unless the
+    /// [`correction`](Self::correction) does that; `None` if the view has none.
     pub mask: Option<PathBuf>,
+    /// What is done to the image when it is loaded.
+    pub correction: Correction,
+}
+
+/// What is done to an image when it is loaded: the distortion of its lens is undone, and it is multiplied by its mask. Default: nothing.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Correction {
+    pub(super) undistortion: Option<Undistortion>,
+    pub(super) masks: bool,
 }
 
 /// The image of a training view and its coverage, at its camera's size.
@@ -60,9 +70,9 @@ impl CoveredImage {
 
 impl TrainingView {
     /// Loads the image and its coverage. A view with a mask has the mask as coverage, and its image has been multiplied by the mask
-    /// already. Else the coverage is the alpha of the image, which is 1 everywhere if the image has none. Colors times alpha are truncated
-    /// to 8 bits and then resampled to the size of the camera (the bicubic filter of Pillow), as in the `dataloader` mode of the original
-    /// over black.
+    /// already, unless the correction multiplies the image's alpha by the mask. Without a mask the coverage is the alpha of the image,
+    /// which is 1 everywhere if the image has none. Colors times alpha are truncated to 8 bits, distortion is undone, and the result is
+    /// resampled to the size of the camera (the bicubic filter of Pillow), as in the `dataloader` mode of the original over black.
     ///
     /// # Errors
     /// [`DatasetError::MissingImages`] if the image or the mask is not on disk, [`DatasetError::Image`] if one cannot
@@ -74,22 +84,36 @@ impl TrainingView {
             return Err(DatasetError::Size { size });
         }
         require_files([Some(&self.image), self.mask.as_ref()].into_iter().flatten())?;
-        let image = self.decode(&self.image)?.into_rgba8();
+        let mut image = self.decode(&self.image)?.into_rgba8();
         let from = UVec2::new(image.width(), image.height());
-        let colors = resample::resize(premultiplied(&image), 3, from, size);
-        let coverage = match &self.mask {
+        let mut mask = self.mask.as_ref().map(|mask| self.decode(mask).map(DynamicImage::into_luma8)).transpose()?;
+        if self.correction.masks
+            && let Some(mask) = mask.take()
+        {
+            multiply_alpha(&mut image, &mask);
+        }
+        let colors = self.at_camera(premultiplied(&image), 3, from);
+        let coverage = match mask {
             Some(mask) => {
-                let mask = self.decode(mask)?.into_luma8();
                 let from = UVec2::new(mask.width(), mask.height());
-                resample::resize(mask.into_raw(), 1, from, size)
+                self.at_camera(mask.into_raw(), 1, from)
             }
-            None => resample::resize(image.pixels().map(|pixel| pixel.0[3]).collect(), 1, from, size),
+            None => self.at_camera(image.pixels().map(|pixel| pixel.0[3]).collect(), 1, from),
         };
         let texels =
             colors.chunks_exact(3).zip(coverage).map(|(color, covered)| [color[0], color[1], color[2], covered]);
         let texels: Vec<[u8; 4]> = texels.collect();
         let has_gaps = texels.iter().any(|texel| texel[3] < u8::MAX);
         Ok(CoveredImage { size, texels, has_gaps })
+    }
+
+    /// Undoes the distortion, and resizes to the size of the camera.
+    fn at_camera(&self, bytes: Vec<u8>, channels: usize, from: UVec2) -> Vec<u8> {
+        let bytes = match &self.correction.undistortion {
+            Some(undistortion) => undistortion.undistort(&bytes, channels, from),
+            None => bytes,
+        };
+        resample::resize(bytes, channels, from, self.camera.size)
     }
 
     /// Decodes the image or the mask.
@@ -111,6 +135,16 @@ fn has_aspect_of(a: UVec2, b: UVec2) -> bool {
     let [ax, ay, bx, by] = [a.x, a.y, b.x, b.y].map(u64::from);
     // Scaled to the width of a, the height of b differs by |ax · by − ay · bx| / bx; the other three cases follow by exchange.
     (ax * by).abs_diff(ay * bx) <= ax.max(ay).max(bx).max(by)
+}
+
+/// Multiplies alpha by a mask, which is sampled at the nearest pixel if it has another size.
+fn multiply_alpha(image: &mut RgbaImage, mask: &GrayImage) {
+    let (from, to) = ([image.width(), image.height()].map(u64::from), [mask.width(), mask.height()].map(u64::from));
+    for (x, y, pixel) in image.enumerate_pixels_mut() {
+        let near = |at: u32, axis: usize| ((2 * u64::from(at) + 1) * to[axis] / (2 * from[axis])) as u32;
+        let covered = u32::from(mask.get_pixel(near(x, 0), near(y, 1)).0[0]);
+        pixel.0[3] = ((u32::from(pixel.0[3]) * covered + 127) / 255) as u8;
+    }
 }
 
 /// Multiplies RGB by alpha in double precision, and truncates to 8 bits.

@@ -92,7 +92,8 @@ mod tests {
     fn view(eye: Vec3, up: Vec3, time: f32) -> TrainingView {
         let camera = Camera::look_at(eye, Vec3::ZERO, up, 0.7, UVec2::splat(8));
         let (name, image) = ("a".to_owned(), "none.png".into());
-        TrainingView { name, camera, time, original: camera.size, image, mask: None }
+        let correction = Default::default();
+        TrainingView { name, camera, time, original: camera.size, image, mask: None, correction }
     }
 
     fn of(times: [f32; 2]) -> TrainedWith {

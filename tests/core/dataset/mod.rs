@@ -2,9 +2,10 @@
 //!
 //! In: small camera files and images written to temporary folders; with `GS4D_DATA` set, trained captures. Out: proof
 //! that cameras in every form and their sizes are read as in the original; images, invalid files and trained captures
-//! are tested in [`images`], [`wrong`] and [`captures`].
+//! are tested in [`images`], [`wrong`] and [`captures`], datasets of other programs in [`formats`].
 
 mod captures;
+mod formats;
 mod images;
 mod wrong;
 

@@ -69,13 +69,21 @@ fn distorted_pictures_are_refused_by_the_name_of_the_entry() {
             assert!(message.contains(part), "{what}: {part:?} is not in: {message}");
         }
     };
-    let entries = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "rolling_shutter", "ftheta_p0", "ftheta_p4"];
-    for name in [&entries[..], &["distortion_params", "is_fisheye"]].concat() {
+    let undone = ["k1", "k2", "k3", "k4", "p1", "p2"];
+    let entries = ["k5", "k6", "rolling_shutter", "ftheta_p0", "ftheta_p4", "distortion_params", "is_fisheye"];
+    for name in [&entries[..], &undone].concat() {
         for place in ["", "/frames/0"] {
             let pointer = format!("{place}/{name}");
             for value in [json!(0.01), json!(-1e-3), json!([0, 0, 0.1]), json!(true), json!("none"), json!({"a": 0})] {
                 let what = format!("{pointer} is {value}");
-                refused(&with(transforms(), &pointer, value), &[&format!("{name} is not 0")], &what);
+                let changed = with(transforms(), &pointer, value.clone());
+                if undone.contains(&name) && value.is_number() {
+                    assert!(load(&changed, &CameraOptions::default()).is_ok(), "{what}: it is undone");
+                    let pinhole = with(changed, "/camera_model", json!("PINHOLE"));
+                    refused(&pinhole, &[&format!("{name} is not 0")], &format!("{what} of a pinhole camera"));
+                } else {
+                    refused(&changed, &[&format!("{name} is not 0")], &what);
+                }
             }
             for value in [json!(0), json!(-0.0), json!([0, 0.0, 0]), json!([]), json!(false), Value::Null] {
                 let what = format!("{pointer} is {value}");
@@ -84,23 +92,24 @@ fn distorted_pictures_are_refused_by_the_name_of_the_entry() {
         }
     }
     // An entry of a frame replaces the entry of the file.
-    let own = with(with(transforms(), "/k1", json!(0.1)), "/frames/0/k1", json!(0));
-    assert!(load(&own, &CameraOptions::default()).is_ok(), "the frame has no distortion");
-    let own = with(with(transforms(), "/k1", json!(0)), "/frames/0/k1", json!(0.1));
-    refused(&own, &["k1 is not 0"], "the frame is distorted");
+    let own = with(with(transforms(), "/k5", json!(0.1)), "/frames/0/k5", json!(0));
+    assert!(load(&own, &CameraOptions::default()).is_ok(), "the frame has no such distortion");
+    let own = with(with(transforms(), "/k5", json!(0)), "/frames/0/k5", json!(0.1));
+    refused(&own, &["k5 is not 0"], "the frame is distorted");
+    refused(&with(transforms(), "/k1", json!(-50)), &["folds"], "a distortion that folds the picture");
 }
 
 #[test]
-fn camera_models_other_than_pinhole_are_refused() {
+fn camera_models_that_cannot_be_undone_are_refused() {
     for place in ["", "/frames/0"] {
         let of = |model: Value| with(transforms(), &format!("{place}/camera_model"), model);
-        for model in ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "pinhole"] {
+        for model in ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "pinhole", "SIMPLE_RADIAL", "RADIAL", "OPENCV_FISHEYE"] {
             assert!(load(&of(json!(model)), &CameraOptions::default()).is_ok(), "{model} without coefficients");
         }
-        let distorted = with(of(json!("OPENCV")), "/k2", json!(0.01));
-        let message = load(&distorted, &CameraOptions::default()).expect_err("a coefficient").to_string();
-        assert!(message.contains("k2 is not 0"), "OPENCV with a coefficient: {message}");
-        for model in [json!("OPENCV_FISHEYE"), json!("EQUIRECTANGULAR"), json!(""), json!("a\u{1b}[2J"), json!(3)] {
+        let tangential = with(of(json!("OPENCV_FISHEYE")), "/p2", json!(0.01));
+        let message = load(&tangential, &CameraOptions::default()).expect_err("a coefficient").to_string();
+        assert!(message.contains("p2 is not 0"), "a fisheye lens has no tangential coefficients: {message}");
+        for model in [json!("ORTHOPHOTO"), json!("EQUIRECTANGULAR"), json!(""), json!("a\u{1b}[2J"), json!(3)] {
             let message = load(&of(model.clone()), &CameraOptions::default()).expect_err("no pinhole").to_string();
             let shown = model.as_str().unwrap_or("3").replace('\u{1b}', "\\u{1b}");
             for part in ["transforms_test.json", "camera_model", &shown, "undistort"] {

@@ -10,6 +10,7 @@ pub mod numbers;
 pub mod pickle;
 pub mod png;
 pub mod text;
+pub mod words;
 
 use crate::support::random::Random;
 use std::ops::Range;

@@ -7,6 +7,7 @@
 
 mod cameras;
 mod checkpoint;
+mod datasets;
 mod package;
 mod pictures;
 mod saved;
@@ -54,7 +55,7 @@ pub struct Kind {
 }
 
 /// The readers.
-pub static KINDS: [Kind; 9] = [
+pub static KINDS: [Kind; 15] = [
     Kind {
         name: "package",
         about: "packages (.gs4d) in every form, with filters and environment maps",
@@ -75,6 +76,48 @@ pub static KINDS: [Kind; 9] = [
         extension: "json",
         share: 1,
         make: || Arc::new(cameras::Cameras::new()),
+    },
+    Kind {
+        name: "nerfstudio",
+        about: "transforms.json of nerfstudio, distorted and fisheye",
+        extension: "json",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::new("transforms.json")),
+    },
+    Kind {
+        name: "n3v",
+        about: "poses_bounds.npy of N3V",
+        extension: "npy",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::new("poses_bounds.npy")),
+    },
+    Kind {
+        name: "colmap-cameras",
+        about: "cameras of a binary COLMAP model, of every lens",
+        extension: "bin",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::new("sparse/0/cameras.bin")),
+    },
+    Kind {
+        name: "colmap-images",
+        about: "images of a binary COLMAP model",
+        extension: "bin",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::new("sparse/0/images.bin")),
+    },
+    Kind {
+        name: "colmap-cameras-text",
+        about: "cameras of a COLMAP model as text",
+        extension: "txt",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::new("sparse/0/cameras.txt")),
+    },
+    Kind {
+        name: "colmap-images-text",
+        about: "images of a COLMAP model as text",
+        extension: "txt",
+        share: 1,
+        make: || Arc::new(datasets::Datasets::new("sparse/0/images.txt")),
     },
     Kind {
         name: "cfg-args",

@@ -81,6 +81,7 @@ impl Reader for Pictures {
             original: UVec2::splat(128),
             image: path.clone(),
             mask: Some(path),
+            correction: Default::default(),
         };
         let covered = view.load_covered();
         let cameras = self.folder.path().join("cameras.json");

@@ -1,0 +1,24 @@
+//! The size and the times at which cameras are read.
+//!
+//! In: what a caller asks for. Out: [`CameraOptions`], or an error for a size that no picture has.
+
+use super::{DatasetError, MAX_SIDE};
+use glam::UVec2;
+
+/// How to read a camera file. Default: all `None`.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct CameraOptions {
+    /// Picture size in pixels, instead of the size in the file. The field of view stays that of the original pictures on both
+    /// axes, so that another aspect ratio gives pixels that are not square. This size also replaces an unknown original size.
+    pub size: Option<UVec2>,
+    /// The value of `--resolution` of the original: 1, 2, 3, 4 or 8 divide the size, −1 limits the width to 1600 pixels, any other
+    /// number is a target width. It has no effect on golden views or with an explicit `size`.
+    pub resolution: Option<i32>,
+    /// First and last time, both included: frames outside are dropped.
+    pub time_interval: Option<[f32; 2]>,
+}
+
+/// Checks a requested picture size.
+pub(super) fn check_size(size: UVec2) -> Result<(), DatasetError> {
+    if size.min_element() == 0 || size.max_element() > MAX_SIDE { Err(DatasetError::Size { size }) } else { Ok(()) }
+}

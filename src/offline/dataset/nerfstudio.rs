@@ -1,0 +1,55 @@
+//! nerfstudio: a single `transforms.json`.
+//!
+//! In: a folder. Out: the views of all frames with their splits, and the file of points. Splits are lists of paths (`train_filenames`,
+//! `test_filenames`, `val_filenames`), or an entry `split` of each frame.
+
+use super::camera_file::{CameraFile, SINGLE};
+use super::undivided::Undivided;
+use super::{CameraOptions, DatasetError, Split};
+use crate::codec::text::is_obeyed;
+use serde_json::Value;
+use std::collections::HashMap;
+use std::path::Path;
+
+/// The lists of the splits.
+const LISTS: [(&str, Split); 3] =
+    [("train_filenames", Split::Train), ("test_filenames", Split::Test), ("val_filenames", Split::Val)];
+/// The entry that names the file of points.
+const POINTS: &str = "ply_file_path";
+/// The values of a frame's entry `split`.
+const NAMES: [(&str, Split); 3] = [("train", Split::Train), ("test", Split::Test), ("val", Split::Val)];
+
+/// Returns whether a folder has the file.
+pub(super) fn is_there(folder: &Path) -> bool {
+    folder.join(SINGLE).is_file()
+}
+
+/// Reads the views of a folder.
+pub(super) fn read(folder: &Path, options: &CameraOptions) -> Result<Undivided, DatasetError> {
+    let source = folder.join(SINGLE);
+    let file = CameraFile::read(&source)?;
+    let views = file.views(&CameraOptions { time_interval: None, ..*options })?;
+    let mut listed: HashMap<&str, Split> = HashMap::new();
+    for (list, split) in LISTS {
+        let names = file.entry(list).and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
+        listed.extend(names.iter().filter_map(Value::as_str).map(|name| (plain(name), split)));
+    }
+    let split = |(path, split): (Option<&str>, Option<&str>)| {
+        let of_frame = split.and_then(|split| NAMES.iter().find(|(name, _)| *name == split));
+        path.and_then(|path| listed.get(plain(path)).copied()).or(of_frame.map(|(_, split)| *split))
+    };
+    let splits: Vec<Option<Split>> = file.splits().map(split).collect();
+    let splits = splits.iter().any(Option::is_some).then_some(splits);
+    let points = file.entry(POINTS).and_then(Value::as_str);
+    if points.is_some_and(|path| path.contains(is_obeyed)) {
+        let reason = format!("{POINTS} has control characters: rename the file of points, and correct the entry");
+        return Err(DatasetError::Unusable { path: source, reason });
+    }
+    let points = points.map(|path| folder.join(path));
+    Ok(Undivided { source, views, splits, points })
+}
+
+/// Returns a path without `./` before it.
+fn plain(path: &str) -> &str {
+    path.strip_prefix("./").unwrap_or(path)
+}

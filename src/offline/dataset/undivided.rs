@@ -1,0 +1,17 @@
+//! The views of a folder whose views are in one file.
+//!
+//! In: what the reader of a format finds. Out: views of all splits, before they are divided.
+
+use super::{Split, TrainingView};
+use std::path::PathBuf;
+
+/// The views of a folder before they are divided.
+pub(super) struct Undivided {
+    /// The camera file.
+    pub source: PathBuf,
+    pub views: Vec<TrainingView>,
+    /// The split of each view, where the dataset has them.
+    pub splits: Option<Vec<Option<Split>>>,
+    /// File of points to begin training with.
+    pub points: Option<PathBuf>,
+}

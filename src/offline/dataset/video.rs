@@ -1,0 +1,219 @@
+//! Frames of videos, by the program `ffmpeg`.
+//!
+//! In: a dataset, a video in it. Out: its frames as PNG in `DATASET.frames/CAMERA/`, beside the dataset. The folder appears whole: frames are written
+//! to a temporary folder, which is then renamed. Frames that are there are used and never overwritten. One process at a time decodes; the folders that
+//! killed processes have left are removed.
+
+use super::DatasetError;
+use super::numbered::{entries, images};
+use crate::codec::text::printable;
+use std::ffi::OsStr;
+use std::fs::{self, File};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// What is done with videos whose frames have not been decoded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Videos {
+    /// They are decoded.
+    Decode,
+    /// Each is the image of one view.
+    Leave,
+}
+
+/// The program.
+const PROGRAM: &str = "ffmpeg";
+/// Prefix of the names of temporary folders.
+const PREFIX: &str = ".gs4d-";
+/// File that is locked while a process decodes, so that all temporary folders are those of killed processes.
+const LOCK: &str = ".lock";
+
+/// Returns the frames of a video, which are decoded if they are not there.
+pub(super) fn frames(folder: &Path, video: &Path, camera: &str) -> Result<Vec<PathBuf>, DatasetError> {
+    match decoded(folder, camera)? {
+        Some(frames) => Ok(frames),
+        None => decode(OsStr::new(PROGRAM), video, &cache(folder)?, camera, folder),
+    }
+}
+
+/// Returns the frames of a video that have been decoded.
+pub(super) fn decoded(folder: &Path, camera: &str) -> Result<Option<Vec<PathBuf>>, DatasetError> {
+    let found = images(&cache(folder)?.join(camera))?;
+    Ok((!found.is_empty()).then_some(found))
+}
+
+/// Returns the folder of all decoded frames: `DATASET.frames`.
+fn cache(folder: &Path) -> Result<PathBuf, DatasetError> {
+    let failed = |reason| DatasetError::Read { path: folder.to_owned(), reason };
+    let mut path = folder.canonicalize().map_err(failed)?.into_os_string();
+    path.push(".frames");
+    Ok(path.into())
+}
+
+fn decode(
+    program: &OsStr,
+    video: &Path,
+    cache: &Path,
+    camera: &str,
+    folder: &Path,
+) -> Result<Vec<PathBuf>, DatasetError> {
+    let unusable = |reason: String| DatasetError::Unusable { path: video.to_owned(), reason };
+    let unwritable = |error: std::io::Error| {
+        let reason =
+            format!("its frames cannot be written to {}: {error}; {}", cache.display(), by_hand(folder, camera));
+        unusable(reason)
+    };
+    fs::create_dir_all(cache).map_err(unwritable)?;
+    let lock = File::create(cache.join(LOCK)).map_err(unwritable)?;
+    // Where files cannot be locked, no temporary folder is known to be stale.
+    if lock.lock().is_ok() {
+        let is_temporary = |path: &PathBuf| {
+            path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(PREFIX.as_bytes()))
+        };
+        for path in entries(cache)?.into_iter().filter(is_temporary) {
+            fs::remove_dir_all(path).map_err(unwritable)?;
+        }
+    }
+    // Another process may have decoded the video in the meantime.
+    let place = cache.join(camera);
+    let found = images(&place)?;
+    if !found.is_empty() {
+        return Ok(found);
+    }
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(PREFIX);
+    #[cfg(unix)]
+    {
+        // Permissions of a new folder, by the umask; the default of temporary folders allows the owner only.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o777));
+    }
+    let temporary = builder.tempdir_in(cache).map_err(unwritable)?;
+    // The protocol is named, since a path may contain a colon.
+    let mut input = OsStr::new("file:").to_owned();
+    input.push(std::path::absolute(video).map_err(|reason| DatasetError::Read { path: video.to_owned(), reason })?);
+    let mut command = Command::new(program);
+    command.args(["-nostdin", "-v", "error", "-i"]).arg(input);
+    // The program runs inside the folder, whose path may contain a percent sign.
+    command.args(["-start_number", "0", "%05d.png"]).current_dir(temporary.path());
+    let run = command.stdin(Stdio::null()).stdout(Stdio::null()).output().map_err(|error| match error.kind() {
+        ErrorKind::NotFound => unusable(format!(
+            "videos are read by ffmpeg, which is not installed: apt install ffmpeg (Linux), brew install ffmpeg (macOS) or winget install \
+             ffmpeg (Windows); or, on another machine, {}",
+            by_hand(folder, camera)
+        )),
+        _ => unusable(format!("ffmpeg cannot be started: {error}; {}", by_hand(folder, camera))),
+    })?;
+    let found = images(temporary.path())?;
+    if !run.status.success() || found.is_empty() {
+        let message = String::from_utf8_lossy(&run.stderr);
+        let message = printable(&message.trim().lines().collect::<Vec<_>>().join("; "));
+        return Err(unusable(format!(
+            "ffmpeg cannot read it ({message}): copy it again, or {}",
+            by_hand(folder, camera)
+        )));
+    }
+    fs::rename(temporary.path(), &place).map_err(unwritable)?;
+    images(&place)
+}
+
+/// Returns the line that makes the frames by hand.
+fn by_hand(folder: &Path, camera: &str) -> String {
+    let shown = folder.display();
+    format!(
+        "make the frames by hand: mkdir -p \"{shown}/frames/{camera}\" && ffmpeg -i \"{shown}/{camera}.mp4\" \
+         -start_number 0 \"{shown}/frames/{camera}/%05d.png\""
+    )
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt;
+
+    /// Writes a program that takes the place of ffmpeg.
+    fn program(folder: &Path, script: &str) -> PathBuf {
+        let path = folder.join("program");
+        fs::write(&path, format!("#!/bin/sh\n{script}\n")).expect("the folder can be written to");
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).expect("the program can be made executable");
+        path
+    }
+
+    fn decoded_by(program: &Path, folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
+        let data = folder.join("data");
+        decode(program.as_os_str(), &data.join("cam00.mp4"), &folder.join("data.frames"), "cam00", &data)
+    }
+
+    /// Returns the names in the folder of frames, without the lock.
+    fn names(folder: &Path) -> Vec<String> {
+        let paths = entries(&folder.join("data.frames")).expect("the folder can be read");
+        let names = paths.iter().filter_map(|path| path.file_name()?.to_str());
+        names.filter(|name| *name != LOCK).map(str::to_owned).collect()
+    }
+
+    /// Writes two frames with the names of the last argument.
+    const FRAMES: &str = "for last; do :; done; echo a > $(printf $last 0); echo b > $(printf $last 1)";
+
+    #[test]
+    fn frames_appear_whole_beside_the_dataset() {
+        let temporary = tempfile::tempdir().expect("a temporary folder");
+        // For ffmpeg, %d in a path would be the number of the frame.
+        let folder = temporary.path().join("100%d");
+        let killed = folder.join("data.frames/.gs4d-killed");
+        fs::create_dir_all(&killed).expect("the folder can be made");
+        fs::write(killed.join("00000.png"), b"").expect("the folder can be written to");
+        let found = decoded_by(&program(&folder, FRAMES), &folder).expect("the program writes frames");
+        let expected = ["00000.png", "00001.png"].map(|name| folder.join("data.frames/cam00").join(name));
+        assert_eq!(found, expected, "the frames lie beside the dataset");
+        assert_eq!(
+            names(&folder),
+            ["cam00"],
+            "no temporary folder is left, neither an own one nor that of a killed run"
+        );
+        let mode = |path: &Path| fs::metadata(path).expect("the folder exists").permissions().mode();
+        assert_eq!(
+            mode(&folder.join("data.frames/cam00")),
+            mode(&folder.join("data.frames")),
+            "others may read the frames, by the umask"
+        );
+        let again = decoded_by(&folder.join("nothing"), &folder).expect("no program is needed");
+        assert_eq!(again, expected, "frames that are there are used");
+    }
+
+    #[test]
+    fn runs_at_one_time_decode_a_video_once() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let count = folder.path().join("count");
+        let script = format!("echo run >> {}; sleep 0.2; {FRAMES}", count.display());
+        let program = program(folder.path(), &script);
+        let counts = std::thread::scope(|scope| {
+            let run = || decoded_by(&program, folder.path()).expect("the program writes frames").len();
+            [scope.spawn(run), scope.spawn(run)].map(|thread| thread.join().expect("no panic"))
+        });
+        assert_eq!(counts, [2, 2], "both runs have the frames");
+        assert_eq!(
+            fs::read_to_string(&count).expect("the program has run"),
+            "run\n",
+            "the second run waits for the first"
+        );
+    }
+
+    #[test]
+    fn a_missing_program_is_an_error_with_both_remedies() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let error = decoded_by(&folder.path().join("nothing"), folder.path()).expect_err("no program").to_string();
+        for part in ["cam00.mp4", "apt install ffmpeg", "data/frames/cam00/%05d.png\""] {
+            assert!(error.contains(part), "{part:?} is not in: {error}");
+        }
+    }
+
+    #[test]
+    fn a_video_that_cannot_be_read_leaves_no_frames() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let script = "echo a > 00000.png; echo broken >&2; echo twice >&2; exit 1";
+        let error = decoded_by(&program(folder.path(), script), folder.path()).expect_err("it fails").to_string();
+        assert!(error.contains("(broken; twice)"), "the lines of the program are shown: {error}");
+        assert_eq!(names(folder.path()), [""; 0], "the frames of a run that fails are removed");
+    }
+}
