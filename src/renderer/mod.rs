@@ -42,6 +42,13 @@
 //! drawn this way ([`ViewRenderer::is_short_of_room`]). Clients that read the lists of pairs need all pairs: [`Headless::draw`] draws again
 //! with larger buffers, or returns an error.
 //!
+//! # Variants of passes
+//!
+//! Passes are compiled when a view first needs them. In an app ([`Renderer::compiling_in_background`]) another thread does this: captures appear
+//! once the passes of their storage are compiled, and a view whose lists, bins or batches have changed draws with the variant that it has,
+//! which draws the same picture, until the better one is compiled. A view with other targets or other surfaces (HDR, samples, debug views)
+//! has no such variant, and compiles its passes at once.
+//!
 //! Mesa's software driver ends all loops of a thread after 65,535 iterations. There `blend` blends many splats in an iteration if a view has
 //! many, and frames of the fast design that may exceed the iterations are drawn with the reference design: [`Headless`] draws such a frame
 //! again, other views use the reference design from a number of splats on. Hardware has no such limit.

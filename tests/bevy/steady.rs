@@ -305,6 +305,8 @@ fn despawned_captures_release_their_memory() {
         }
         run(&mut app, 1);
         if frame == 2 || frame == 106 {
+            // A capture appears once its passes are compiled.
+            testing::settle(&mut app).expect("the app draws without an error");
             let count = if frame == 2 { 1 } else { 10 };
             assert_eq!(statistics.uploaded_captures(), count, "captures on the GPU in frame {frame}");
             let bytes = statistics.capture_bytes();

@@ -10,10 +10,12 @@ use crate::renderer::design::Design;
 use crate::renderer::device::GpuContext;
 use crate::renderer::layout::Counters;
 use crate::renderer::pipelines::Renderer;
-use crate::renderer::shaders::ShaderChecks;
+use crate::renderer::shaders::{Blending, FastVariant, Lists, ShaderChecks};
 use crate::scene::RuntimeScene;
 use crate::view::{Appearance, Camera, RasterFov, View};
 use glam::{UVec2, Vec3};
+use std::thread;
+use std::time::{Duration, Instant};
 
 #[cfg_attr(
     all(feature = "cli", feature = "viewer"),
@@ -197,4 +199,39 @@ fn the_design_of_a_view_suits_the_number_of_splats() {
     let crowded = if software { Design::Reference } else { Design::Fast };
     assert_eq!(chosen(Design::Fast, 1_000_000), crowded, "software drivers end the loops over so many splats");
     assert_eq!(chosen(Design::Fast, 1_000), Design::Fast, "fewer splats again");
+}
+
+#[test]
+fn a_view_draws_with_another_variant_until_the_wanted_one_is_compiled() {
+    let Some(Gpu { context, renderer }) = gpu() else { return };
+    let gpu = Gpu { context, renderer: renderer.compiling_in_background() };
+    let capture = gpu.upload(crowd(200));
+    let mut view = gpu.view();
+    gpu.draw(&mut view, &capture, 0.5);
+    let (device, drawn) = (&gpu.context.device, std::iter::once((capture.storage, false)));
+    let compiled = view.variant;
+    let wanted = FastVariant { lists: Lists::Short, large_batches: !compiled.large_batches, ..compiled };
+    assert_ne!(wanted, compiled, "another variant");
+    let variant = || gpu.renderer.fast_variant(device, drawn.clone(), wanted).expect("the passes compile");
+    assert_eq!(variant(), compiled, "the compiled variant draws the same picture");
+    let start = Instant::now();
+    while variant() != wanted {
+        assert!(start.elapsed() < Duration::from_secs(300), "the wanted variant is compiled in the background");
+        thread::sleep(Duration::from_millis(5));
+    }
+    let surfaces = FastVariant { blending: Blending::ColorBehindSurfaces, ..wanted };
+    let found = gpu.renderer.fast_variant(device, drawn.clone(), surfaces).expect("the passes compile");
+    assert_eq!(found, surfaces, "no compiled variant draws the same picture: the wanted one is compiled at once");
+}
+
+#[test]
+fn substitutes_draw_the_same_picture() {
+    for few_bins in [false, true] {
+        let wanted = FastVariant { few_bins, blending: Blending::ColorBehindSamples, ..FastVariant::default() };
+        let substitutes: Vec<FastVariant> = wanted.substitutes().collect();
+        let same = |other: &FastVariant| (other.blending, other.precision) == (wanted.blending, wanted.precision);
+        assert!(substitutes.iter().all(same), "the surfaces and targets are those of the view: {substitutes:?}");
+        let few = substitutes.iter().any(|other| other.few_bins);
+        assert_eq!(few, few_bins, "counters for few bins have no room for many: {substitutes:?}");
+    }
 }
