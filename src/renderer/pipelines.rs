@@ -10,9 +10,12 @@ use super::layout::INSTANCES_BOUND;
 use super::layouts::Layouts;
 use super::memory::Allocator;
 use super::passes::Passes;
-use super::shaders::{AtOnce, Blending, ColorPrecision, FastVariant, Lists, Pixels, ShaderChecks, Storage, module};
+use super::shaders::{AtOnce, FastVariant, Lists, Pixels, ShaderChecks, Storage, module};
+#[cfg(feature = "bevy")]
+use super::shaders::{Blending, ColorPrecision};
 use super::work::WorkCounters;
 use std::sync::Arc;
+#[cfg(feature = "bevy")]
 use std::thread::JoinHandle;
 
 /// All pipelines and bind group layouts of a device.
@@ -123,6 +126,7 @@ impl Renderer {
 
     /// Begins to compile, in the background, the passes that draw captures with this storage in an app: in half precision, behind surfaces with
     /// one or with several samples per pixel. Returns the thread; `None` if nothing is compiled in the background.
+    #[cfg(feature = "bevy")]
     pub(crate) fn begin_ahead(&self, device: &wgpu::Device, storage: Storage) -> Option<JoinHandle<()>> {
         let compiling = self.compiling.as_ref()?;
         let (passes, device, design) = (Arc::clone(&self.passes), device.clone(), self.resolve(Design::Auto));
