@@ -10,6 +10,7 @@ mod composition;
 mod detail;
 mod examples;
 mod failures;
+mod film;
 mod frame_time;
 mod glass;
 mod golden;

@@ -45,6 +45,7 @@
 //! ```
 
 mod error;
+mod film;
 mod gpu;
 mod headless;
 mod keys;
@@ -56,6 +57,7 @@ mod waiting;
 mod window;
 
 pub use error::TestingError;
+pub use film::{Film, FilmError, Filmed, HoldOut, Rig, film};
 pub use gpu::has_gpu;
 pub use headless::{app, app_with};
 pub use image::{Rgba32FImage, RgbaImage};

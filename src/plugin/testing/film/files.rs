@@ -1,0 +1,118 @@
+//! The files of a filmed dataset.
+//!
+//! In: pictures with their camera poses and times. Out: PNG files in `train`, `val` and `test`, and a camera file `transforms_*.json` in the
+//! Blender form for each split that has a picture.
+
+use super::error::FilmError;
+use super::hold_out::Split;
+use crate::codec::CodecError;
+use crate::plugin::testing::{TestingError, save};
+use bevy::transform::components::Transform;
+use glam::UVec2;
+use image::RgbaImage;
+use serde::Serialize;
+use std::fs;
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
+
+/// A dataset that is being written.
+pub(super) struct Files<'a> {
+    folder: &'a Path,
+    head: Head,
+    frames: [Vec<Frame>; Split::ALL.len()],
+}
+
+/// The entries of a whole camera file. With `fl_x`, `fl_y`, `cx` and `cy` it would describe an intrinsics camera, which the original
+/// rasterizes by a placeholder instead of its field of view.
+#[derive(Debug, Clone, Serialize)]
+struct Head {
+    /// Horizontal field of view in radians.
+    camera_angle_x: f64,
+    w: u32,
+    h: u32,
+    /// Seconds of the times 0 and 1.
+    seconds: [f32; 2],
+}
+
+#[derive(Serialize)]
+struct CameraFile<'a> {
+    #[serde(flatten)]
+    head: &'a Head,
+    frames: &'a [Frame],
+}
+
+/// One picture.
+#[derive(Debug, Clone, Serialize)]
+struct Frame {
+    /// The path of the picture without its extension, as in D-NeRF.
+    file_path: String,
+    /// From 0, the first time of the film, to 1, its last.
+    time: f64,
+    /// Seconds of the film.
+    seconds: f32,
+    /// Rows of the camera-to-world matrix in OpenGL axes.
+    transform_matrix: [[f32; 4]; 4],
+}
+
+impl<'a> Files<'a> {
+    /// Begins a dataset in a folder that is empty or does not exist.
+    pub(super) fn begin(folder: &'a Path, size: UVec2, fov_y: f32, seconds: [f32; 2]) -> Result<Self, FilmError> {
+        match fs::read_dir(folder).map(|mut entries| entries.next().is_some()) {
+            Ok(true) => return Err(FilmError::Occupied(folder.to_owned())),
+            Ok(false) => {}
+            Err(error) if error.kind() == ErrorKind::NotFound => {}
+            Err(error) => return Err(failed(folder, error)),
+        }
+        let tangent = (f64::from(fov_y) / 2.0).tan() * f64::from(size.x) / f64::from(size.y);
+        let head = Head { camera_angle_x: 2.0 * tangent.atan(), w: size.x, h: size.y, seconds };
+        Ok(Self { folder, head, frames: Default::default() })
+    }
+
+    /// Writes a picture.
+    pub(super) fn add(
+        &mut self,
+        split: Split,
+        [camera, time]: [usize; 2],
+        seconds: f32,
+        pose: &Transform,
+        picture: &RgbaImage,
+    ) -> Result<(), FilmError> {
+        let name = format!("{}/c{camera:04}_t{time:04}", split.name());
+        save(picture, &self.folder.join(format!("{name}.png")))?;
+        let [first, last] = self.head.seconds.map(f64::from);
+        self.frames[split as usize].push(Frame {
+            file_path: format!("./{name}"),
+            time: if last > first { (f64::from(seconds) - first) / (last - first) } else { 0.0 },
+            seconds,
+            transform_matrix: pose.to_matrix().transpose().to_cols_array_2d(),
+        });
+        Ok(())
+    }
+
+    /// Writes the camera files. Returns the number of pictures for training, validation and test.
+    pub(super) fn finish(self) -> Result<[usize; 3], FilmError> {
+        for split in Split::ALL {
+            let frames = &self.frames[split as usize];
+            if !frames.is_empty() {
+                self.write(&self.folder.join(format!("transforms_{}.json", split.name())), frames)?;
+            }
+        }
+        Ok([Split::Train, Split::Validation, Split::Test].map(|split| self.frames[split as usize].len()))
+    }
+
+    /// Writes under a temporary name, and renames the file once it is complete.
+    fn write(&self, path: &Path, frames: &[Frame]) -> Result<(), FilmError> {
+        let partial: PathBuf = path.with_extension("json.part");
+        let json = serde_json::to_vec_pretty(&CameraFile { head: &self.head, frames });
+        let written = json.map_err(io::Error::other).and_then(|json| fs::write(&partial, json));
+        written.and_then(|()| fs::rename(&partial, path)).map_err(|error| {
+            // A failure to remove the partial file is ignored: the first error is returned.
+            fs::remove_file(&partial).ok();
+            failed(path, error)
+        })
+    }
+}
+
+fn failed(path: &Path, error: io::Error) -> FilmError {
+    TestingError::Save(CodecError { path: path.to_owned(), kind: error.into() }).into()
+}

@@ -1,0 +1,21 @@
+//! Datasets of training views, filmed in a Bevy scene.
+//!
+//! In: an app, a [`Film`] (cameras, times, lens, picture size) and a folder. Out: pictures with coverage and camera files of the Blender
+//! form, by split, from which `gs4d train` and `gs4d eval` read.
+//!
+//! * `rig`: where the cameras are
+//! * `hold_out`: which split a picture belongs to
+//! * `shooting`: the pictures, from the app
+//! * `files`: the files of the dataset
+//! * `error`: why a scene could not be filmed
+
+mod error;
+mod files;
+mod hold_out;
+mod rig;
+mod shooting;
+
+pub use error::FilmError;
+pub use hold_out::HoldOut;
+pub use rig::Rig;
+pub use shooting::{Film, Filmed, film};

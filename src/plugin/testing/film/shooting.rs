@@ -1,0 +1,275 @@
+//! Pictures with coverage of every camera at every time, in one pass forward in time.
+//!
+//! In: an app and a [`Film`]. Out: the dataset's files; the app at the last time, with its own cameras as before.
+//!
+//! One camera is moved from pose to pose. It draws in linear light over transparent black, so that a pixel holds its color times its coverage;
+//! the color is divided by the coverage before it is sRGB-encoded.
+
+use super::error::FilmError;
+use super::files::Files;
+use super::hold_out::{HoldOut, Split};
+use super::rig::Rig;
+use crate::plugin::testing::{Offscreen, TestingError, read_hdr, settle, step};
+use crate::view::srgb;
+use bevy::app::App;
+use bevy::asset::Assets;
+use bevy::camera::{Camera, Camera3d, ClearColorConfig, Hdr, PerspectiveProjection, Projection};
+use bevy::color::Color;
+use bevy::core_pipeline::tonemapping::{DebandDither, Tonemapping};
+use bevy::ecs::entity::Entity;
+use bevy::ecs::world::{EntityWorldMut, World};
+use bevy::image::Image;
+use bevy::render::renderer::RenderDevice;
+use bevy::render::view::Msaa;
+use bevy::transform::components::Transform;
+use glam::{UVec2, Vec3};
+use image::{Rgba, Rgba32FImage, RgbaImage};
+use std::f32::consts::PI;
+use std::path::Path;
+use std::time::Duration;
+
+/// What is filmed, and how.
+#[derive(Debug, Clone)]
+pub struct Film {
+    /// The cameras.
+    pub rig: Rig,
+    /// The times in seconds from the call of [`film`], in any order; equal times count once.
+    pub times: Vec<f32>,
+    /// Width and height of the pictures in pixels.
+    pub size: UVec2,
+    /// Vertical field of view (radians), near and far plane of every camera. The aspect ratio is that of the pictures.
+    pub lens: PerspectiveProjection,
+    /// The samples for each pixel. Without multisampling, coverage is 0 or 1 at the edges of meshes.
+    pub msaa: Msaa,
+    /// The pictures that are not for training.
+    pub hold_out: HoldOut,
+    /// Inserts components that the camera needs, such as fog. The film inserts its own after it: lens, target, clear color, no tonemapping.
+    pub prepare_camera: fn(&mut EntityWorldMut<'_>),
+}
+
+impl Film {
+    /// Returns a film of 512x512 pictures with the default lens of Bevy, four samples for each pixel and the default [`HoldOut`].
+    pub fn new(rig: Rig, times: Vec<f32>) -> Self {
+        Self {
+            rig,
+            times,
+            size: UVec2::splat(512),
+            lens: PerspectiveProjection::default(),
+            msaa: Msaa::Sample4,
+            hold_out: HoldOut::default(),
+            prepare_camera: |_| {},
+        }
+    }
+}
+
+/// The number of pictures of a dataset.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Filmed {
+    /// Pictures for training, `transforms_train.json`.
+    pub train: usize,
+    /// Pictures for validation, `transforms_val.json`.
+    pub validation: usize,
+    /// Pictures for the test, `transforms_test.json`.
+    pub test: usize,
+}
+
+/// Films the scene of an app into `folder`, as a dataset in the Blender form for `gs4d train --data FOLDER`.
+///
+/// For each time in increasing order, the app advances to it as by [`step`], `set_time` receives the world and the time in seconds, and every camera of the rig draws
+/// while no time passes. A scene that the app's own time moves, such as a simulation, needs nothing in `set_time`: `|_, _| {}`. At least
+/// four updates draw each picture. The app's own cameras are inactive meanwhile. `progress` receives the number of pictures written and the
+/// number of all.
+///
+/// The pictures are 8-bit RGBA with straight alpha, which is the coverage: 1 on opaque meshes, 0 where nothing is drawn. Times become 0 to 1
+/// in the camera files, from the first time to the last; the entry `seconds` has the seconds.
+///
+/// # Errors
+/// A film without cameras, times or pictures for training; a folder that is not empty; errors of drawing and of writing, by file.
+///
+/// # Examples
+///
+/// ```no_run
+/// use bevy::prelude::*;
+/// use bevy_gs4d::testing::{self, Film, Rig};
+///
+/// let mut app = testing::app(UVec2::splat(64));
+/// // Add the plugins and systems of the scene here.
+/// let mut film = Film::new(Rig::hemisphere(Vec3::ZERO, 4.0, 60), (0..24).map(|frame| frame as f32 / 24.0).collect());
+/// film.size = UVec2::new(800, 800);
+/// let filmed = testing::film(&mut app, &film, "dataset".as_ref(), |_, _| {}, |done, all| println!("{done}/{all}"))?;
+/// println!("{} pictures for training", filmed.train);
+/// # Ok::<(), testing::FilmError>(())
+/// ```
+pub fn film(
+    app: &mut App,
+    film: &Film,
+    folder: &Path,
+    mut set_time: impl FnMut(&mut World, f32),
+    mut progress: impl FnMut(usize, usize),
+) -> Result<Filmed, FilmError> {
+    let times = check(film)?;
+    let seconds = [times[0], times[times.len() - 1]].map(|time| time.as_secs_f32());
+    let mut files = Files::begin(folder, film.size, film.lens.fov, seconds)?;
+    settle(app)?;
+    check_size(app, film.size)?;
+    let offscreen = Offscreen::hdr(&mut app.world_mut().get_resource_or_init::<Assets<Image>>(), film.size);
+    let others = deactivate_cameras(app.world_mut());
+    let camera = spawn_camera(app.world_mut(), film, &offscreen);
+    let shot = shoot(app, film, &times, camera, &offscreen, &mut files, &mut set_time, &mut progress);
+    app.world_mut().despawn(camera);
+    for other in others {
+        if let Some(mut other) = app.world_mut().get_mut::<Camera>(other) {
+            other.is_active = true;
+        }
+    }
+    shot?;
+    let [train, validation, test] = files.finish()?;
+    Ok(Filmed { train, validation, test })
+}
+
+/// Returns the times of a film in increasing order, each once.
+fn check(film: &Film) -> Result<Vec<Duration>, FilmError> {
+    let poses = &film.rig.poses;
+    if poses.is_empty() || film.times.is_empty() {
+        return Err(FilmError::Empty { cameras: poses.len(), times: film.times.len() });
+    }
+    let duration = |time: &f32| Duration::try_from_secs_f32(*time).map_err(|_| FilmError::Time(*time));
+    let mut times = film.times.iter().map(duration).collect::<Result<Vec<_>, _>>()?;
+    times.sort();
+    times.dedup();
+    if film.rig.is_path && poses.len() != times.len() {
+        return Err(FilmError::Path { poses: poses.len(), times: times.len() });
+    }
+    let usable = |pose: &Transform| pose.translation.is_finite() && pose.rotation.is_normalized();
+    if let Some(camera) = poses.iter().position(|pose| !usable(pose)) {
+        return Err(FilmError::Pose(camera));
+    }
+    if !(film.lens.fov > 0.0 && film.lens.fov < PI) {
+        return Err(FilmError::FieldOfView(film.lens.fov));
+    }
+    let splits = |time: usize| film.rig.at(time).map(move |camera| (camera, time));
+    let mut pictures = (0..times.len()).flat_map(splits);
+    if !pictures.any(|(camera, time)| film.hold_out.split(camera, time, times.len()) == Split::Train) {
+        return Err(FilmError::NoTraining);
+    }
+    Ok(times)
+}
+
+/// Checks that the GPU can draw pictures of a size.
+fn check_size(app: &App, size: UVec2) -> Result<(), FilmError> {
+    let device = app.world().get_resource::<RenderDevice>().ok_or(TestingError::NoRenderer)?;
+    let largest = device.limits().max_texture_dimension_2d;
+    if size.min_element() == 0 || size.max_element() > largest {
+        return Err(FilmError::Size { width: size.x, height: size.y, largest });
+    }
+    Ok(())
+}
+
+/// Makes the cameras of the app inactive and returns those that were active.
+fn deactivate_cameras(world: &mut World) -> Vec<Entity> {
+    let mut active = Vec::new();
+    for (entity, mut camera) in world.query::<(Entity, &mut Camera)>().iter_mut(world) {
+        if camera.is_active {
+            camera.is_active = false;
+            active.push(entity);
+        }
+    }
+    active
+}
+
+fn spawn_camera(world: &mut World, film: &Film, offscreen: &Offscreen) -> Entity {
+    let mut camera = world.spawn(Camera3d::default());
+    (film.prepare_camera)(&mut camera);
+    let clear_color = ClearColorConfig::Custom(Color::NONE);
+    camera.insert((
+        Camera { clear_color, ..Camera::default() },
+        Hdr,
+        offscreen.target(),
+        Projection::Perspective(film.lens.clone()),
+        film.msaa,
+        Tonemapping::None,
+        DebandDither::Disabled,
+    ));
+    camera.id()
+}
+
+fn shoot(
+    app: &mut App,
+    film: &Film,
+    times: &[Duration],
+    camera: Entity,
+    offscreen: &Offscreen,
+    files: &mut Files<'_>,
+    set_time: &mut impl FnMut(&mut World, f32),
+    progress: &mut impl FnMut(usize, usize),
+) -> Result<(), FilmError> {
+    let all = (0..times.len()).map(|time| film.rig.at(time).len()).sum();
+    let mut done = 0;
+    let mut now = Duration::ZERO;
+    for (index, &time) in times.iter().enumerate() {
+        step(app, time - now)?;
+        now = time;
+        let seconds = time.as_secs_f32();
+        set_time(app.world_mut(), seconds);
+        for place in film.rig.at(index) {
+            // Cameras have no scale.
+            let pose = Transform { scale: Vec3::ONE, ..film.rig.poses[place] };
+            app.world_mut().entity_mut(camera).insert(pose);
+            settle(app)?;
+            let picture = straight(&read_hdr(app, offscreen)?);
+            let split = film.hold_out.split(place, index, times.len());
+            files.add(split, [place, index], seconds, &pose, &picture)?;
+            done += 1;
+            progress(done, all);
+        }
+    }
+    Ok(())
+}
+
+/// Converts linear light times coverage to sRGB-encoded colors with straight alpha. Colors without coverage are black.
+fn straight(picture: &Rgba32FImage) -> RgbaImage {
+    let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
+    RgbaImage::from_fn(picture.width(), picture.height(), |x, y| {
+        let [red, green, blue, alpha] = picture.get_pixel(x, y).0;
+        let covered = byte(alpha);
+        if covered == 0 {
+            return Rgba([0; 4]);
+        }
+        let color = srgb::encode((Vec3::new(red, green, blue) / alpha.min(1.0)).max(Vec3::ZERO));
+        Rgba([byte(color.x), byte(color.y), byte(color.z), covered])
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colors_are_divided_by_their_coverage_in_linear_light() {
+        let linear = srgb::decode(Vec3::new(200.0, 100.0, 50.0) / 255.0);
+        let picture = Rgba32FImage::from_fn(3, 1, |x, _| {
+            let covered = x as f32 / 2.0;
+            Rgba([linear.x * covered, linear.y * covered, linear.z * covered, covered])
+        });
+        let pixels: Vec<[u8; 4]> = straight(&picture).pixels().map(|pixel| pixel.0).collect();
+        assert_eq!(pixels, [[0; 4], [200, 100, 50, 128], [200, 100, 50, 255]], "the color does not depend on coverage");
+    }
+
+    #[test]
+    fn films_that_cannot_be_drawn_are_refused_with_the_remedy() {
+        let ring = || Rig::ring(Vec3::ZERO, 2.0, 0.5, 4);
+        let refused = |film: Film| check(&film).expect_err("it cannot be drawn").to_string();
+        let good = Film::new(ring(), vec![0.5, 0.0, 0.5]);
+        let times = check(&good).expect("it can be drawn");
+        assert_eq!(times, [Duration::ZERO, Duration::from_millis(500)], "times are sorted, each once");
+        assert!(refused(Film::new(ring(), vec![])).contains("one time"), "no times");
+        assert!(refused(Film::new(ring(), vec![-1.0])).contains("-1 s"), "a negative time");
+        assert!(refused(Film::new(ring(), vec![f32::NAN])).contains("NaN s"), "a time that is not finite");
+        let path = Rig::path(vec![Transform::IDENTITY; 3]);
+        assert!(refused(Film::new(path, vec![0.0, 1.0])).contains("3 poses for 2"), "a path of another length");
+        let lost = Rig::path(vec![Transform::from_xyz(f32::NAN, 0.0, 0.0)]);
+        assert!(refused(Film::new(lost, vec![0.0])).contains("camera 0"), "a pose that is not finite");
+        let hold_out = HoldOut { test_cameras: 1, ..HoldOut::NOTHING };
+        assert!(refused(Film { hold_out, ..good }).contains("fewer cameras"), "no picture for training");
+    }
+}
