@@ -1,7 +1,8 @@
 // noise: moves the means of faint Gaussians at random, in space and time, after a step of training.
-// In: raw parameters of native 4D Gaussians, the seed of the step. Out: the same parameters with other means. CPU reference:
-// src/offline/fine_tune/noise.rs.
+// In: raw parameters of native 4D Gaussians, the seed of the step, the least temporal scale. Out: the same parameters with other means, and
+// no smaller temporal scale. CPU reference: src/offline/fine_tune/noise.rs.
 #import gs4d::types::{NoiseUniforms, TrainedRecord}
+#import gs4d::random::{mixed, word_of}
 #import gs4d::trained::{left_matrix, opacity_of, right_matrix}
 
 const TAU: f32 = 6.2831853;
@@ -14,14 +15,6 @@ const LARGEST = vec4<f32>(1.0, 1.0, 1.0, 0.1);
 @group(0) @binding(0) var<uniform> settings: NoiseUniforms;
 @group(0) @binding(1) var<storage, read_write> trained: array<TrainedRecord>;
 
-// Returns a word of which each bit depends on every bit of the argument.
-fn mixed(word: u32) -> u32 {
-    var z = word;
-    z = (z ^ (z >> 16u)) * 0x85ebca6bu;
-    z = (z ^ (z >> 13u)) * 0xc2b2ae35u;
-    return z ^ (z >> 16u);
-}
-
 // Returns a number above 0, at most 1.
 fn unit(word: u32) -> f32 {
     return f32((word >> 8u) + 1u) / 16777216.0;
@@ -29,7 +22,7 @@ fn unit(word: u32) -> f32 {
 
 // Returns four independent numbers of the standard normal distribution.
 fn normals(index: u32) -> vec4<f32> {
-    let a = mixed(settings.seed ^ mixed(index + 0x9e3779b9u));
+    let a = word_of(index, settings.seed);
     let b = mixed(a + 0x9e3779b9u);
     let c = mixed(b + 0x9e3779b9u);
     let d = mixed(c + 0x9e3779b9u);
@@ -51,4 +44,5 @@ fn noise(@builtin(global_invocation_id) id: vec3<u32>) {
     let factors = faint * min(settings.strength * scale, LARGEST);
     let rotation = left_matrix(normalize(raw.rotation_l)) * right_matrix(normalize(raw.rotation_r));
     trained[index].mean = raw.mean + rotation * (factors * scale * normals(index));
+    trained[index].log_scale.w = max(raw.log_scale.w, settings.least_log_scale_t);
 }

@@ -111,6 +111,17 @@ struct NoiseUniforms {
     seed: u32,
     // Factor on the variance along an axis that gives the deviation of the noise of a fully transparent Gaussian along it.
     strength: f32,
+    // Least logarithm of the temporal scale.
+    least_log_scale_t: f32,
+}
+
+// Input of `dropout` for one step.
+struct DropoutUniforms {
+    count: u32,
+    // Seed of the step.
+    seed: u32,
+    // Gaussians whose random word is below this number are hidden.
+    below: u32,
     padding: u32,
 }
 

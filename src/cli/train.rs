@@ -55,10 +55,9 @@ pub(super) struct Train {
     /// that the images allow.
     #[arg(long, value_name = "WHERE", default_value = "auto", value_parser = values::one_of(&Start::NAMES))]
     start: Start,
-    /// Temporal scale of Gaussians at the beginning, as a share of the time interval [default: the original's, the root of a fifth of the
-    /// interval: 0.447 of an interval of 1].
-    #[arg(long, value_name = "SHARE", value_parser = time_scale)]
-    time_scale: Option<f64>,
+    /// Temporal scale of Gaussians at the beginning, as a share of the time interval; the original's is 0.447 of an interval of 1.
+    #[arg(long, value_name = "SHARE", default_value = "0.1", value_parser = time_scale)]
+    time_scale: f64,
     /// Spatial degree of color, 0 to 3.
     #[arg(long, value_name = "DEGREE", default_value = "3", value_parser = clap::value_parser!(u32).range(0..=3))]
     sh_degree: u32,
@@ -74,8 +73,8 @@ pub(super) struct Train {
     /// Further factor on the rate of the means at the last step, to which it falls exponentially from 1.
     #[arg(long, value_name = "FACTOR", default_value = "0.01", value_parser = values::share)]
     last_mean_rate: f64,
-    /// Factor on the rates of the means.
-    #[arg(long, value_name = "FACTOR", default_value = "1", value_parser = values::not_negative)]
+    /// Factor on the rates of the means, relative to those of `finetune`.
+    #[arg(long, value_name = "FACTOR", default_value = "4", value_parser = values::not_negative)]
     mean_rate: f64,
     /// Weight of SSIM in the loss, 0 to 1; the rest is L1.
     #[arg(long, value_name = "WEIGHT", default_value = "0.2", value_parser = values::share)]
@@ -90,8 +89,14 @@ pub(super) struct Train {
     #[arg(long, value_name = "N", default_value = "100")]
     relocate_every: usize,
     /// Strength of the noise that moves faint Gaussians, as a factor on the rate of the means; 0: none.
-    #[arg(long, value_name = "FACTOR", default_value = "5e5", value_parser = values::not_negative)]
+    #[arg(long, value_name = "FACTOR", default_value = "2.5e5", value_parser = values::not_negative)]
     noise: f64,
+    /// Share of the Gaussians, drawn anew for each step, that its views are drawn without, until relocation ends.
+    #[arg(long, value_name = "SHARE", default_value = "0.1", value_parser = values::share)]
+    dropout: f64,
+    /// Least temporal scale of Gaussians, as a share of the time interval; 0: any.
+    #[arg(long, help_heading = "Experimental", value_name = "SHARE", default_value = "0", value_parser = values::share)]
+    least_time_scale: f64,
     /// Steps between two rises of a degree of color [default: 1000, at most a twentieth of all].
     #[arg(long, value_name = "N", value_parser = values::count(100_000_000))]
     raise_degree_every: Option<usize>,
@@ -226,6 +231,8 @@ impl Train {
             growth: Some(Growth {
                 relocate_every: (self.relocate_every > 0).then_some(self.relocate_every),
                 noise: self.noise,
+                dropout: self.dropout,
+                least_time_scale: self.least_time_scale,
                 last_mean_rate: self.last_mean_rate,
                 raise_every: self.raise_degree_every.unwrap_or(usual.raise_every),
                 ..usual

@@ -148,6 +148,20 @@ pub struct NoiseUniforms {
     pub seed: u32,
     /// Factor on the variance along an axis that gives the deviation of the noise of a fully transparent Gaussian along it.
     pub strength: f32,
+    /// Least logarithm of the temporal scale.
+    pub least_log_scale_t: f32,
+}
+
+/// Input of `dropout` for one step.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct DropoutUniforms {
+    /// Number of Gaussians.
+    pub count: u32,
+    /// Seed of the step.
+    pub seed: u32,
+    /// Gaussians whose random word is below this number are hidden.
+    pub below: u32,
     /// Unused.
     pub padding: u32,
 }

@@ -27,6 +27,7 @@ const LIBRARIES: &[(&str, &str)] = &[
     ("bins", include_str!("../../shaders/shared/bins.wgsl")),
     ("nearest", include_str!("../../shaders/shared/nearest.wgsl")),
     ("pixel", include_str!("../../shaders/shared/pixel.wgsl")),
+    ("random", include_str!("../../shaders/shared/random.wgsl")),
     ("trained", include_str!("../../shaders/shared/trained.wgsl")),
     ("slice_backward", include_str!("../../shaders/shared/slice_backward.wgsl")),
     ("pairs", include_str!("../../shaders/shared/pairs.wgsl")),
@@ -53,6 +54,7 @@ const PASSES: &[(&str, &str)] = &[
     ("regularize", include_str!("../../shaders/regularize.wgsl")),
     ("codebooks", include_str!("../../shaders/codebooks.wgsl")),
     ("adam", include_str!("../../shaders/adam.wgsl")),
+    ("dropout", include_str!("../../shaders/dropout.wgsl")),
     ("noise", include_str!("../../shaders/noise.wgsl")),
     ("relocate", include_str!("../../shaders/relocate.wgsl")),
 ];

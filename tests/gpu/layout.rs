@@ -7,10 +7,10 @@ use bevy_gs4d::internal::gaussian::alpha::{ALPHA_MAX, ALPHA_MIN, TRANSMITTANCE_M
 use bevy_gs4d::internal::gaussian::conic::{LOW_PASS, MAX_VARIANCE, THIN};
 use bevy_gs4d::internal::offline::fine_tune::NEIGHBORS;
 use bevy_gs4d::internal::renderer::layout::{
-    self, Activation, AdamUniforms, BLOCK, Counters, DIGITS, FIRST_SEEN, FrameUniforms, INSTANCE_STRIDE,
-    INSTANCES_AT_ONCE, InstanceUniforms, LossUniforms, MotionUniforms, NoiseUniforms, RelocationUniforms,
-    RoundingRecord, SortStep, SplatRecord, SplatShape, TermWeights, TiedColors, TrainedRecord, TrainedScene,
-    VisibleSplat,
+    self, Activation, AdamUniforms, BLOCK, Counters, DIGITS, DropoutUniforms, FIRST_SEEN, FrameUniforms,
+    INSTANCE_STRIDE, INSTANCES_AT_ONCE, InstanceUniforms, LossUniforms, MotionUniforms, NoiseUniforms,
+    RelocationUniforms, RoundingRecord, SortStep, SplatRecord, SplatShape, TermWeights, TiedColors, TrainedRecord,
+    TrainedScene, VisibleSplat,
 };
 use bevy_gs4d::internal::renderer::shaders::{COPIED_INSTANCE, compose, pass_names};
 use bevy_gs4d::view::TILE_SIZE;
@@ -73,7 +73,7 @@ fn splat() -> Mirror {
     in_fours(mirror, "SplatRecord", ["place", "shape", "color", ""])
 }
 
-fn mirrors() -> [Mirror; 19] {
+fn mirrors() -> [Mirror; 20] {
     [
         gaussian(),
         mirror!(InstanceUniforms {
@@ -149,7 +149,8 @@ fn mirrors() -> [Mirror; 19] {
         mirror!(TiedColors { count, stride, stages, padding }),
         mirror!(AdamUniforms { rates, correction, count, stride, sparse, values, padding }),
         mirror!(TermWeights { motion, rigid, opacity, scale }),
-        mirror!(NoiseUniforms { count, seed, strength, padding }),
+        mirror!(NoiseUniforms { count, seed, strength, least_log_scale_t }),
+        mirror!(DropoutUniforms { count, seed, below, padding }),
         mirror!(RelocationUniforms { moves, stride, padding }),
     ]
 }

@@ -8,7 +8,7 @@ use crate::support::blob::blob;
 use crate::support::{dataset, gpu};
 use bevy_gs4d::gaussian::{Gaussian, GradientMode, Harmonics, Parameters};
 use bevy_gs4d::internal::offline::fine_tune::{
-    Sample, StepGrowth, Terms, Trainer, TrainerState, neighbors, noise, regularization, relocate,
+    Sample, StepGrowth, Terms, Trainer, TrainerState, is_dropped, neighbors, noise, regularization, relocate,
 };
 use bevy_gs4d::internal::offline::store::{Key, Store};
 use bevy_gs4d::internal::offline::train::{CaptureSettings, Start, StartSettings, begin, capture_of, train};
@@ -73,14 +73,16 @@ fn the_pass_noise_matches_the_cpu_reference() {
     let mut expected = records(&trained(&scene).parameters);
     let (rate, factor, seed) = (Rates::OURS.mean * scene.trained_with.spatial_lr_scale, 0.5, 0xfeed_beef);
     let strength = (5e5 * rate * factor) as f32;
-    (0..).zip(&mut expected).for_each(|(index, record)| noise(record, index, seed, strength));
+    let least_time_scale = 0.2;
+    let least = least_time_scale as f32 * scene.trained_with.time_span();
+    (0..).zip(&mut expected).for_each(|(index, record)| noise(record, index, seed, strength, least.ln()));
     let mut trainer = growing(&mut headless, scene.clone());
     // The gradients are 0: the optimizer moves nothing.
-    let growth = StepGrowth { color_values: 144, noise: 5e5, seed };
+    let growth = StepGrowth { color_values: 144, noise: 5e5, least_time_scale, seed };
     trainer.step_growing(&Rates::OURS, factor, 1, Some(growth)).expect("the step succeeds");
     let found = trainer.scene().expect("the scene can be read");
     let (before, found) = (&trained(&scene).parameters, &trained(&found).parameters);
-    let mut moved = 0;
+    let (mut moved, mut raised) = (0, 0);
     for (index, expected) in expected.iter().enumerate() {
         let [x, y, z] = expected.mean;
         let place = |mean: [f32; 3], mean_t: f32| Vec3::from(mean).extend(mean_t);
@@ -92,10 +94,35 @@ fn the_pass_noise_matches_the_cpu_reference() {
         let (far, error) = (by_cpu.distance(own), by_gpu.distance(by_cpu));
         assert!(error <= 1e-4 * far + 1e-6, "Gaussian {index} moves by {far}, on the GPU by {error} from that");
         moved += usize::from(far > 1e-3);
+        let [own, by_cpu, by_gpu] = [before.log_scale_t[index], expected.log_scale_t, found.log_scale_t[index]];
+        assert!((by_gpu - by_cpu).abs() < 1e-6, "Gaussian {index}: temporal scale {by_gpu}, expected {by_cpu}");
+        raised += usize::from(by_cpu > own);
     }
     assert!((50..COUNT - 50).contains(&moved), "the faint Gaussians move, the opaque ones do not: {moved}");
+    assert!((1..COUNT).contains(&raised), "the temporal scales of some Gaussians are raised: {raised}");
     assert_eq!(found.log_scale, before.log_scale, "nothing but means changes");
     assert_eq!(found.opacity_logit, before.opacity_logit, "nothing but means changes");
+}
+
+#[test]
+fn dropped_gaussians_are_hidden_until_the_next_step() {
+    let Some(mut headless) = gpu::headless() else { return };
+    let (scene, view, black) = (synthetic(), view(0, UVec2::new(70, 54)), Background::Color([0.0; 3]));
+    let (share, seed) = (0.3, 0x1234_5678);
+    let mut hidden = scene.clone();
+    let logits = trained_mut(&mut hidden).parameters.opacity_logit.iter_mut();
+    (0..).zip(logits).filter(|(index, _)| is_dropped(*index, seed, share)).for_each(|(_, logit)| *logit = -30.0);
+    let expected = growing(&mut headless, hidden).draw(&view, black).expect("the view is drawn").picture;
+    let mut trainer = growing(&mut headless, scene);
+    let whole = trainer.draw(&view, black).expect("the view is drawn").picture;
+    trainer.drop_out(share, seed);
+    let dropped = trainer.draw(&view, black).expect("the view is drawn").picture;
+    assert_eq!(dropped, expected, "the picture without the dropped Gaussians");
+    assert_ne!(dropped, whole, "the dropped Gaussians were visible");
+    let still = StepGrowth { color_values: 144, noise: 0.0, least_time_scale: 0.0, seed };
+    trainer.step_growing(&Rates::OURS, 1.0, 1, Some(still)).expect("the step succeeds");
+    let after = trainer.draw(&view, black).expect("the view is drawn").picture;
+    assert_eq!(after, whole, "every Gaussian is drawn after the step");
 }
 
 fn view(index: usize, size: UVec2) -> View {
@@ -203,7 +230,7 @@ fn color_values_beyond_the_degree_are_not_trained() {
         let image = trainer.upload(&image).expect("the image fits the GPU");
         let sample = Sample { view: &view, image: &image, background: Background::None, number: 0 };
         trainer.accumulate(&[sample], 0.2).expect("the view is drawn");
-        let growth = StepGrowth { color_values: values, noise: 0.0, seed: 1 };
+        let growth = StepGrowth { color_values: values, noise: 0.0, least_time_scale: 0.0, seed: 1 };
         trainer.step_growing(&Rates::OURS, 1.0, 1, Some(growth)).expect("the step succeeds");
         let found = trainer.scene().expect("the scene can be read");
         let (before, after) = (&trained(&scene).harmonics.values, &trained(&found).harmonics.values);

@@ -1,19 +1,23 @@
-//! The passes of training from pictures alone: `noise` and `relocate`.
+//! The passes of training from pictures alone: `dropout`, `noise` and `relocate`.
 //!
-//! In: the parameters that are trained. Out: [`Grower`]: commands that move means at random, and relocate Gaussians.
+//! In: the parameters that are trained. Out: [`Grower`]: commands that hide Gaussians, move means at random, and relocate Gaussians.
 
+use super::dropout::below;
 use super::optimized::ADAM_GROUPS;
 use super::parameters::ParameterBuffers;
 use super::relocation::relocate;
 use crate::renderer::bind::{Bind, group_layout, pipeline};
-use crate::renderer::layout::{NoiseUniforms, RelocationUniforms, TrainedRecord};
+use crate::renderer::layout::{DropoutUniforms, NoiseUniforms, RelocationUniforms, TrainedRecord};
 use crate::renderer::shaders::module;
 use crate::renderer::{GpuError, Headless, ShaderChecks};
 use wgpu::BufferUsages;
 
-/// The passes `noise` and `relocate`.
+/// The passes `dropout`, `noise` and `relocate`.
 #[derive(Debug)]
 pub(super) struct Grower {
+    dropout: wgpu::ComputePipeline,
+    dropout_settings: wgpu::Buffer,
+    dropout_group: wgpu::BindGroup,
     noise: wgpu::ComputePipeline,
     noise_settings: wgpu::Buffer,
     noise_group: wgpu::BindGroup,
@@ -24,15 +28,26 @@ pub(super) struct Grower {
 }
 
 impl Grower {
-    /// Compiles the passes.
+    /// Compiles the passes. `gaussians` are the records that `slice` writes.
     ///
     /// # Errors
     /// A shader that does not compile.
-    pub(super) fn new(headless: &Headless, parameters: &ParameterBuffers) -> Result<Self, GpuError> {
+    pub(super) fn new(
+        headless: &Headless,
+        parameters: &ParameterBuffers,
+        gaussians: &wgpu::Buffer,
+    ) -> Result<Self, GpuError> {
         use Bind::{Read, Uniform, Write};
         let (allocator, device) = (headless.allocator(), &headless.context().device);
         let ParameterBuffers { geometry, color, .. } = parameters;
         let sizes = [size_of::<NoiseUniforms>(), size_of::<RelocationUniforms>()];
+        let size = size_of::<DropoutUniforms>();
+        let layout = group_layout(device, "gs4d dropout", &[Uniform(size), Write]);
+        let shader = module(device, "dropout", &[], ShaderChecks::Off)?;
+        let dropout = pipeline(device, &shader, "dropout", &[Some(&layout)]);
+        let dropout_settings = allocator.buffer("gs4d dropout settings", size as u64, BufferUsages::UNIFORM);
+        let buffers = [&dropout_settings, gaussians].map(wgpu::Buffer::as_entire_binding);
+        let dropout_group = allocator.bind_group("gs4d dropout", &layout, &buffers);
         let layout = group_layout(device, "gs4d noise", &[Uniform(sizes[0]), Write]);
         let shader = module(device, "noise", &[], ShaderChecks::Off)?;
         let noise = pipeline(device, &shader, "noise", &[Some(&layout)]);
@@ -50,19 +65,39 @@ impl Grower {
         let buffers = [&[&relocation_settings, &moves][..], &written].concat();
         let resources: Vec<_> = buffers.into_iter().map(wgpu::Buffer::as_entire_binding).collect();
         let relocation_group = allocator.bind_group("gs4d relocation", &layout, &resources);
-        Ok(Self { noise, noise_settings, noise_group, relocate, moves, relocation_settings, relocation_group })
+        Ok(Self {
+            dropout,
+            dropout_settings,
+            dropout_group,
+            noise,
+            noise_settings,
+            noise_group,
+            relocate,
+            moves,
+            relocation_settings,
+            relocation_group,
+        })
     }
 
-    /// Records the noise of a step.
-    pub(super) fn record_noise(
+    /// Records that a share of the Gaussians is hidden until they are sliced again.
+    pub(super) fn record_dropout(
         &self,
         queue: &wgpu::Queue,
         pass: &mut wgpu::ComputePass<'_>,
         count: u32,
         seed: u32,
-        strength: f32,
+        share: f64,
     ) {
-        let settings = NoiseUniforms { count, seed, strength, padding: 0 };
+        let settings = DropoutUniforms { count, seed, below: below(share), padding: 0 };
+        queue.write_buffer(&self.dropout_settings, 0, bytemuck::bytes_of(&settings));
+        pass.set_pipeline(&self.dropout);
+        pass.set_bind_group(0, &self.dropout_group, &[]);
+        pass.dispatch_workgroups(count.div_ceil(256), 1, 1);
+    }
+
+    /// Records the noise of a step.
+    pub(super) fn record_noise(&self, queue: &wgpu::Queue, pass: &mut wgpu::ComputePass<'_>, settings: NoiseUniforms) {
+        let count = settings.count;
         queue.write_buffer(&self.noise_settings, 0, bytemuck::bytes_of(&settings));
         pass.set_pipeline(&self.noise);
         pass.set_bind_group(0, &self.noise_group, &[]);

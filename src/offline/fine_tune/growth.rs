@@ -19,13 +19,18 @@ pub struct Growth {
     pub relocate_from: usize,
     /// The last such step. Default: five sixths of all.
     pub relocate_until: usize,
-    /// Factor on the rate of means that gives the strength of the noise. Default: 5e5; 0 moves nothing.
+    /// Factor on the rate of means that gives the strength of the noise. Default: 2.5e5; 0 moves nothing.
     pub noise: f64,
     /// Factor on the rate of means at the last step, to which it falls exponentially, beside the other factors. Default: 0.01.
     pub last_mean_rate: f64,
     /// Steps between two rises of a degree of color: the spatial degree from 0 to 3, then the degree in time. Default: 1000, and at most
     /// a twentieth of all.
     pub raise_every: usize,
+    /// Share of the Gaussians, drawn anew for each step, that its views are drawn without, until [`relocate_until`](Self::relocate_until).
+    /// Default: 0.1.
+    pub dropout: f64,
+    /// Least temporal scale of a Gaussian, as a share of the interval. Default: 0, any.
+    pub least_time_scale: f64,
 }
 
 impl Growth {
@@ -35,9 +40,11 @@ impl Growth {
             relocate_every: Some(100),
             relocate_from: 500.min(steps / 20),
             relocate_until: steps / 6 * 5,
-            noise: 5e5,
+            noise: 2.5e5,
             last_mean_rate: 0.01,
             raise_every: 1000.min(steps / 20).max(1),
+            dropout: 0.1,
+            least_time_scale: 0.0,
         }
     }
 
@@ -45,6 +52,11 @@ impl Growth {
     pub(super) fn relocates_after(&self, step: usize) -> bool {
         let every = self.relocate_every.is_some_and(|every| step.is_multiple_of(every.max(1)));
         every && (self.relocate_from..=self.relocate_until).contains(&step)
+    }
+
+    /// Returns the share of the Gaussians that the views of a step are drawn without.
+    pub(super) fn dropout(&self, step: usize) -> f64 {
+        if step < self.relocate_until { self.dropout } else { 0.0 }
     }
 
     /// Returns the factor on the rate of means at a step of `steps`.

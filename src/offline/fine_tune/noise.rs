@@ -1,13 +1,14 @@
 //! Noise of means; CPU reference of `shaders/noise.wgsl`.
 //!
-//! In: the raw parameters of a native 4D Gaussian, its index, the seed of a step, a strength. Out: its mean after the step, moved at random
-//! in space and time if the Gaussian is faint.
+//! In: the raw parameters of a native 4D Gaussian, its index, the seed of a step, a strength, the least temporal scale. Out: its mean after
+//! the step, moved at random in space and time if the Gaussian is faint; its temporal scale, if it was smaller.
 //!
 //! Along each axis of the 4D Gaussian the noise is normal, with the deviation `strength × variance × faint`, where `faint` is a sigmoid of the
 //! opacity: 1 for transparent Gaussians, 0 for opaque ones (3DGS-MCMC), and at most one scale, along the fourth axis a tenth, times `faint`: the variance times the
 //! strength is many scales of a large Gaussian, and would throw it far out of the scene, and out of the interval of time along the fourth
 //! axis (time unless the Gaussian is rotated), whose scale is a good part of the interval.
 
+use super::random_words::{STRIDE, mixed, word_of};
 use crate::gaussian::rotation_4d;
 use crate::renderer::layout::TrainedRecord;
 use glam::DVec4;
@@ -20,11 +21,8 @@ const SLOPE: f64 = 100.0;
 /// Largest deviation of the noise of a fully transparent Gaussian along each axis, in scales.
 const LARGEST: DVec4 = DVec4::new(1.0, 1.0, 1.0, 0.1);
 
-/// Distance between two seeds of the words of one Gaussian.
-const STRIDE: u32 = 0x9e37_79b9;
-
-/// Moves the mean of a Gaussian.
-pub fn noise(record: &mut TrainedRecord, index: u32, seed: u32, strength: f32) {
+/// Moves the mean of a Gaussian, and raises its temporal scale to at least the exponential of `least_log_scale_t`.
+pub fn noise(record: &mut TrainedRecord, index: u32, seed: u32, strength: f32, least_log_scale_t: f32) {
     let vector = |values: [f32; 4]| DVec4::from(values.map(f64::from));
     let [x, y, z] = record.log_scale;
     let scale = vector([x, y, z, record.log_scale_t]).map(f64::exp);
@@ -36,24 +34,18 @@ pub fn noise(record: &mut TrainedRecord, index: u32, seed: u32, strength: f32) {
     let mean = record.mean.map(f64::from);
     record.mean = [0, 1, 2].map(|axis| (mean[axis] + moved[axis]) as f32);
     record.mean_t = (f64::from(record.mean_t) + moved.w) as f32;
+    record.log_scale_t = record.log_scale_t.max(least_log_scale_t);
 }
 
 /// Returns four independent numbers of the standard normal distribution (Box and Muller).
 fn normals(index: u32, seed: u32) -> DVec4 {
-    let a = mixed(seed ^ mixed(index.wrapping_add(STRIDE)));
+    let a = word_of(index, seed);
     let b = mixed(a.wrapping_add(STRIDE));
     let c = mixed(b.wrapping_add(STRIDE));
     let d = mixed(c.wrapping_add(STRIDE));
     let [first, second] = [a, c].map(|word| (-2.0 * unit(word).ln()).sqrt());
     let [one, other] = [b, d].map(|word| TAU * unit(word));
     DVec4::new(first * one.cos(), first * one.sin(), second * other.cos(), second * other.sin())
-}
-
-/// Returns a word of which each bit depends on every bit of the argument.
-fn mixed(word: u32) -> u32 {
-    let z = (word ^ (word >> 16)).wrapping_mul(0x85eb_ca6b);
-    let z = (z ^ (z >> 13)).wrapping_mul(0xc2b2_ae35);
-    z ^ (z >> 16)
 }
 
 /// Returns a number above 0, at most 1.
@@ -83,7 +75,7 @@ mod tests {
         let mut squares = [0.0; 4];
         for index in 0..COUNT {
             let mut moved = record;
-            noise(&mut moved, index, 77, strength);
+            noise(&mut moved, index, 77, strength, f32::NEG_INFINITY);
             let [x, y, z] = moved.mean;
             for (sum, value) in squares.iter_mut().zip([x, y, z, moved.mean_t]) {
                 *sum += f64::from(value).powi(2) / f64::from(COUNT);
@@ -107,10 +99,19 @@ mod tests {
     }
 
     #[test]
+    fn the_temporal_scale_is_raised_to_the_least() {
+        for (own, least, expected) in [(-4.0, -3.0, -3.0), (-2.0, -3.0, -2.0), (-9.0, f32::NEG_INFINITY, -9.0)] {
+            let mut record = record(0.5, [-2.0; 3], own);
+            noise(&mut record, 0, 1, 10.0, least);
+            assert_eq!(record.log_scale_t, expected, "logarithm of the scale {own}, at least {least}");
+        }
+    }
+
+    #[test]
     fn noise_repeats_with_the_seed_and_differs_between_gaussians_and_steps() {
         let moved = |index, seed| {
             let mut record = record(0.01, [-2.0; 3], -1.0);
-            noise(&mut record, index, seed, 10.0);
+            noise(&mut record, index, seed, 10.0, f32::NEG_INFINITY);
             record
         };
         assert_eq!(moved(4, 9), moved(4, 9), "the same index and seed");

@@ -5,7 +5,7 @@
 use super::best::Progressed;
 use super::outcome::FineTuned;
 use super::sample::{GpuImage, Sample};
-use super::schedule::{Behind, Rates, Schedule, noise_seed, relocation_seed};
+use super::schedule::{Behind, Rates, Schedule, dropout_seed, noise_seed, relocation_seed};
 use super::settings::FineTuneSettings;
 use super::targets::{Shot, TrainingImages};
 use super::trainer::{StepGrowth, Trainer};
@@ -147,16 +147,21 @@ impl<'a> Run<'a> {
                 number: index as u32,
             });
         }
+        // The steps after the last, which train codebooks, do not grow.
+        let growth = settings.growth.filter(|_| step < settings.steps);
+        if let Some(growth) = growth {
+            self.trainer.drop_out(growth.dropout(step), dropout_seed(settings.seed, step));
+        }
         self.trainer.accumulate(&batch, settings.similarity_share)?;
         self.trainer.accumulate_terms(step)?;
-        // The steps after the last, which train codebooks, do not grow.
-        let Some(growth) = settings.growth.filter(|_| step < settings.steps) else {
+        let Some(growth) = growth else {
             return Ok(self.trainer.step(&settings.rates, factor, count)?);
         };
         let mean = settings.rates.mean * growth.mean_rate(step, settings.steps);
         let of_step = StepGrowth {
             color_values: growth.color_values(step),
             noise: growth.noise,
+            least_time_scale: growth.least_time_scale,
             seed: noise_seed(settings.seed, step),
         };
         Ok(self.trainer.step_growing(&Rates { mean, ..settings.rates }, factor, count, Some(of_step))?)

@@ -100,6 +100,11 @@ pub(super) fn noise_seed(seed: u64, step: usize) -> u32 {
     (mixed(seed.wrapping_add(2), step as u64) >> 32) as u32
 }
 
+/// Returns the seed of the dropout of a step.
+pub(super) fn dropout_seed(seed: u64, step: usize) -> u32 {
+    (mixed(seed.wrapping_add(4), step as u64) >> 32) as u32
+}
+
 /// Returns the seed of the relocation after this number of steps.
 pub(super) fn relocation_seed(seed: u64, steps: usize) -> u64 {
     mixed(seed.wrapping_add(3), steps as u64)

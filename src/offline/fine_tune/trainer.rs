@@ -13,7 +13,8 @@
 //! | `project_backward` | gradients of pairs, parameters | gradients of raw parameters, added up over a batch; which Gaussians were seen |
 //! | `regularize` | parameters, their slice, neighbors | gradients of raw parameters, if there are [`Terms`] of Gaussians alone |
 //! | `adam` | gradients, moments | parameters; of Gaussians that were seen only, if steps are [sparse](Trainer::set_sparse) |
-//! | `noise` | raw parameters | the same with means moved at random, if the scene [grows](Trainer::set_growing) |
+//! | `dropout` | the records of `slice` | the same, some without opacity, if Gaussians are [dropped](Trainer::drop_out) |
+//! | `noise` | raw parameters | the same with means moved at random and no too small temporal scale, if the scene [grows](Trainer::set_growing) |
 //! | `relocate` | moves, colors | colors of the Gaussians that move, moments, if the scene grows |
 //! | `codebooks` | gradients of coefficients; entries | gradients of entries; coefficients, once colors are [tied](Trainer::tie) |
 
@@ -37,7 +38,7 @@ use crate::gaussian::harmonics::evaluated;
 use crate::gaussian::{GradientMode, Model};
 use crate::offline::dataset::CoveredImage;
 use crate::offline::quantize::codebook::Centers;
-use crate::renderer::layout::{LossUniforms, TrainedRecord};
+use crate::renderer::layout::{LossUniforms, NoiseUniforms, TrainedRecord};
 use crate::renderer::memory::binding_limit;
 use crate::renderer::shaders::{COMPAT, COMPAT_WITHOUT_TIME};
 use crate::renderer::{GpuCapture, GpuError, Headless, ShaderChecks};
@@ -56,6 +57,8 @@ pub struct StepGrowth {
     pub color_values: u32,
     /// Factor on the rate of means that gives the strength of the noise.
     pub noise: f64,
+    /// Least temporal scale, as a share of the interval.
+    pub least_time_scale: f64,
     /// Seed of the noise.
     pub seed: u32,
 }
@@ -286,8 +289,17 @@ impl<'a> Trainer<'a> {
         if self.scene.model() != Some(Model::Rotated4d) {
             return Err(TrainerError::Model);
         }
-        self.grower = Some(Grower::new(self.headless, &self.parameters)?);
+        let Some([gaussians, ..]) = self.capture.writable() else { return Err(TrainerError::Empty) };
+        self.grower = Some(Grower::new(self.headless, &self.parameters, gaussians)?);
         Ok(())
+    }
+
+    /// Hides a share of the Gaussians, drawn with this seed, until the next step is made; 0 unless the scene [grows](Self::set_growing).
+    pub fn drop_out(&mut self, share: f64, seed: u32) {
+        if let Some(grower) = self.grower.as_ref().filter(|_| share > 0.0) {
+            let (queue, count) = (&self.headless.context().queue, self.parameters.count());
+            submit(self.headless, "gs4d dropout", |pass| grower.record_dropout(queue, pass, count, seed, share));
+        }
     }
 
     /// Relocates the Gaussians that have faded, by random numbers of this seed. Returns their number; 0 unless the scene
@@ -348,9 +360,12 @@ impl<'a> Trainer<'a> {
             for (optimized, rates, extent) in rated {
                 optimized.record_step(queue, &mut pass, passes, rates, step, extent);
             }
-            if let (Some(grower), Some(StepGrowth { noise, seed, .. })) = (&self.grower, growth) {
+            if let (Some(grower), Some(StepGrowth { noise, least_time_scale, seed, .. })) = (&self.grower, growth) {
                 let strength = (noise * rates.mean * spatial_lr_scale * factor) as f32;
-                grower.record_noise(queue, &mut pass, parameters.count(), seed, strength);
+                let least = least_time_scale * f64::from(self.scene.trained_with.time_span());
+                let least_log_scale_t = least.max(f64::from(f32::MIN_POSITIVE)).ln() as f32;
+                let settings = NoiseUniforms { count: parameters.count(), seed, strength, least_log_scale_t };
+                grower.record_noise(queue, &mut pass, settings);
             }
             if let Some(tied) = tied {
                 tied.record_expand(&mut pass, passes, color);

@@ -3,8 +3,8 @@
 //! In: training images, [`StartSettings`]. Out: a scene of native 4D Gaussians at points of the visual hull, or at random ones in the box
 //! that the cameras look at.
 //!
-//! Opacity is 0.1; the spatial scale is the root of the mean squared distance to the three nearest points; the temporal scale is `√(T/5)` of
-//! an interval of length `T`; no Gaussian is rotated or moves (section 5.4 of the 4DGS model).
+//! Opacity is 0.1; the spatial scale is the root of the mean squared distance to the three nearest points; the temporal scale is a share of
+//! the interval; no Gaussian is rotated or moves (section 5.4 of the 4DGS model).
 
 use super::error::StartError;
 use super::hull::hull;
@@ -57,15 +57,15 @@ impl Start {
     }
 }
 
-/// How a capture begins. Default: 60,000 Gaussians with colors of degree 3, and degree 2 in time.
+/// How a capture begins. Default: 60,000 Gaussians with a temporal scale of a tenth of the interval, colors of degree 3, and degree 2 in time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StartSettings {
     /// Number of Gaussians, which stays.
     pub gaussians: usize,
     /// Where their points come from.
     pub start: Start,
-    /// Temporal scale, as a share of the interval; `None`: `√(T/5)`, the original's.
-    pub time_scale: Option<f64>,
+    /// Temporal scale, as a share of the interval. The original's is `√(T/5)` for an interval of length `T`.
+    pub time_scale: f64,
     /// Seed of the random numbers.
     pub seed: u64,
     /// Spatial degree of color, 0 to 3.
@@ -76,7 +76,7 @@ pub struct StartSettings {
 
 impl Default for StartSettings {
     fn default() -> Self {
-        Self { gaussians: 60_000, start: Start::Auto, time_scale: None, seed: 0, degree: 3, degree_t: 2 }
+        Self { gaussians: 60_000, start: Start::Auto, time_scale: 0.1, seed: 0, degree: 3, degree_t: 2 }
     }
 }
 
@@ -94,7 +94,7 @@ pub fn begin(
     let region = Region::of(pairs.iter().map(|(view, _)| *view))?;
     let (points, start) = points(&pairs, &region, trained_with.time_interval, settings)?;
     let span = trained_with.time_span();
-    let scale_t = settings.time_scale.map_or((span / 5.0).sqrt(), |share| share as f32 * span);
+    let scale_t = settings.time_scale as f32 * span;
     let (degree, degree_t) = (settings.degree.min(3), if settings.degree >= 3 { settings.degree_t.min(2) } else { 0 });
     let scene = GaussianScene {
         form: SceneForm::Trained(trained(&points, scale_t, degree, degree_t)),

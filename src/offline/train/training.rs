@@ -7,7 +7,9 @@ use super::capture::{CaptureSettings, capture_of};
 use super::start::{Start, StartSettings, begin};
 use super::train;
 use crate::offline::dataset::{TrainingView, require_images};
-use crate::offline::fine_tune::{FineTuneSettings, FineTuned, Growth, Resume, Terms, TrainingImages, require_room};
+use crate::offline::fine_tune::{
+    FineTuneSettings, FineTuned, Growth, Rates, Resume, Terms, TrainingImages, require_room,
+};
 use crate::offline::splits::{SplitOptions, Splits};
 use crate::offline::store::{Key, Store};
 use crate::offline::{OfflineError, Progress, trained_pixel};
@@ -35,11 +37,14 @@ pub struct TrainSettings {
 impl TrainSettings {
     /// The usual number of steps.
     pub const STEPS: usize = 20_000;
+    /// The usual factor on the rates of means, relative to those of fine-tuning.
+    pub const MEAN_RATE: f64 = 4.0;
 
     /// Returns the settings of a training that begins without Gaussians: the usual ones but for the number of steps.
     pub fn tuning(steps: usize) -> FineTuneSettings {
         FineTuneSettings {
             steps,
+            rates: Rates { mean: Rates::OURS.mean * Self::MEAN_RATE, ..Rates::OURS },
             terms: Terms { opacity: 0.01, scale: 0.01, ..Terms::default() },
             similarity_share: 0.2,
             evaluate_every: 1000,

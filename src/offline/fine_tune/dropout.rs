@@ -1,0 +1,32 @@
+//! Dropout of Gaussians; CPU reference of `shaders/dropout.wgsl`.
+//!
+//! In: the index of a Gaussian, the seed of a step, a share. Out: whether the views of the step are drawn without the Gaussian. Training
+//! with few views of each moment fits these with Gaussians that other views contradict; a picture that has to be right without a random
+//! share of its Gaussians leaves less room for that.
+
+use super::random_words::word_of;
+
+/// Returns the number below which the random words of this share of all Gaussians are.
+pub(super) fn below(share: f64) -> u32 {
+    (share * 2f64.powi(32)) as u32
+}
+
+/// Returns whether a Gaussian is hidden at a step.
+pub fn is_dropped(index: u32, seed: u32, share: f64) -> bool {
+    word_of(index, seed) < below(share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_share_is_hidden_and_others_at_each_step() {
+        let hidden = |seed| (0..20_000).filter(|&index| is_dropped(index, seed, 0.2)).collect::<Vec<_>>();
+        let (first, second) = (hidden(1), hidden(2));
+        assert!((first.len() as i64 - 4000).abs() < 200, "a fifth is hidden: {}", first.len());
+        let both = first.iter().filter(|index| second.contains(index)).count();
+        assert!((both as i64 - 800).abs() < 150, "a fifth of these at the next step as well: {both}");
+        assert!(!(0..20_000).any(|index| is_dropped(index, 1, 0.0)), "a share of 0 hides nothing");
+    }
+}
