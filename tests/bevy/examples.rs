@@ -197,6 +197,33 @@ fn errors_name_wrong_arguments() {
 }
 
 #[test]
+fn the_example_film_refuses_wrong_arguments_and_has_help() {
+    let used = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(used.path().join("notes.txt"), "mine").expect("the folder can be written to");
+    let used = used.path().to_str().expect("temporary folders have plain names");
+    for (arguments, named) in [
+        (&["--nonsense"][..], "--nonsense"),
+        (&["--times"], "--times needs a number"),
+        (&["--cameras", "many"], "--cameras many"),
+        (&["one", "two"], "two: more than one folder"),
+        (&["none", "--cameras", "0"], "at least one camera"),
+        (&[used, "--cameras", "1"], "name a new folder"),
+    ] {
+        let output = run("film", arguments);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success(), "film {arguments:?} fails");
+        assert!(said.contains(named), "film {arguments:?} names the wrong argument:\n{said}");
+        assert!(!said.contains("panicked"), "film {arguments:?} does not panic:\n{said}");
+    }
+    let output = run("film", &["--help"]);
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "film --help ends with {}", output.status);
+    for expected in ["--between", "--example film", "island.sh"] {
+        assert!(said.contains(expected), "film --help mentions {expected}:\n{said}");
+    }
+}
+
+#[test]
 fn help_lists_options_and_the_command() {
     for example in EXAMPLES {
         let output = run(example, &["--help"]);

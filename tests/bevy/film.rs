@@ -1,10 +1,14 @@
 //! `testing::film`: a scene of Bevy's own means, filmed as a dataset.
 //!
-//! In: a moving, unlit sphere. Out: proof that the crate's reader opens the dataset, that the cameras project the sphere onto its pixels, that
+//! In: a moving, unlit sphere; the island of the example `film`. Out: proof that the island is a loop and stays in sight, that the crate's reader opens the dataset, that the cameras project the sphere onto its pixels, that
 //! coverage is right, that runs repeat to the byte, and that folders are not overwritten. Tests that draw are skipped without a GPU; a software
 //! driver is enough.
 
+#[path = "../../examples/film/island.rs"]
+mod island;
+
 use crate::support::no_gpu::no_gpu;
+use bevy::ecs::system::RunSystemOnce;
 use bevy::prelude::*;
 use bevy_gs4d::offline::dataset::{CameraOptions, Dataset, Split, TrainingView};
 use bevy_gs4d::testing::{self, Film, FilmError, Filmed, HoldOut, Rig, has_gpu};
@@ -143,4 +147,38 @@ fn a_folder_with_files_is_not_filmed_into() {
     let name = folder.path().display().to_string();
     assert!(error.contains(&name) && error.contains("name a new folder"), "the folder and the remedy: {error}");
     assert_eq!(files(folder.path()).len(), 1, "nothing is written");
+}
+
+/// Returns the places of everything of the island at a time: poses, then the vertices of all meshes.
+fn places(world: &mut World, seconds: f32) -> (Vec<Transform>, Vec<[f32; 3]>) {
+    island::place(world, seconds);
+    let poses = world.query::<&Transform>().iter(world).copied().collect();
+    let meshes: Vec<_> = world.query::<&Mesh3d>().iter(world).map(|mesh| mesh.id()).collect();
+    let assets = world.resource::<Assets<Mesh>>();
+    let points = |mesh| assets.get(mesh)?.attribute(Mesh::ATTRIBUTE_POSITION)?.as_float3().map(<[_]>::to_vec);
+    (poses, meshes.into_iter().filter_map(points).flatten().collect())
+}
+
+#[test]
+fn the_island_is_a_loop_that_depends_on_the_time_alone() {
+    let mut world = World::new();
+    world.init_resource::<Assets<Mesh>>();
+    world.init_resource::<Assets<StandardMaterial>>();
+    world.run_system_once(island::spawn).expect("the scene is spawned");
+    let first = places(&mut world, 0.0);
+    let later = places(&mut world, 1.3);
+    let last = places(&mut world, island::SECONDS);
+    assert_eq!(places(&mut world, 1.3), later, "the same time shows the same scene");
+    let far = |(poses, points): &(Vec<Transform>, Vec<[f32; 3]>)| {
+        let poses = poses.iter().zip(&first.0).map(|(one, other)| one.translation.distance(other.translation));
+        let points = points.iter().zip(&first.1).map(|(one, other)| Vec3::from(*one).distance(Vec3::from(*other)));
+        [poses.fold(0.0, f32::max), points.fold(0.0, f32::max)]
+    };
+    assert!(far(&last).iter().all(|far| *far < 1e-4), "the end of the loop is its beginning: {:?}", far(&last));
+    assert!(far(&later).iter().all(|far| *far > 0.02), "things and cloth move: {:?}", far(&later));
+    let half = island::DISTANCE * (std::f32::consts::FRAC_PI_8).tan();
+    for pose in later.0.iter().filter(|pose| pose.translation.length() < 2.0) {
+        let far = pose.translation.distance(island::CENTER);
+        assert!(far < half, "{} is in sight of the cameras: {far} of {half}", pose.translation);
+    }
 }

@@ -50,6 +50,11 @@ impl Rig {
         Self::inward(center, cells.map(place))
     }
 
+    /// Returns cameras with these poses.
+    pub fn fixed(poses: Vec<Transform>) -> Self {
+        Self { poses, is_path: false }
+    }
+
     /// Returns one camera that moves: it has one pose for each time of the film, in order.
     pub fn path(poses: Vec<Transform>) -> Self {
         Self { poses, is_path: true }
@@ -57,7 +62,7 @@ impl Rig {
 
     fn inward(center: Vec3, places: impl Iterator<Item = Vec3>) -> Self {
         let look = |place| Transform::from_translation(place).looking_at(center, Vec3::Y);
-        Self { poses: places.map(look).collect(), is_path: false }
+        Self::fixed(places.map(look).collect())
     }
 
     /// Returns the poses: of the cameras in their order, or of the one camera of a path.

@@ -2,8 +2,8 @@
 //!
 //! In: an app and a [`Film`]. Out: the dataset's files; the app at the last time, with its own cameras as before.
 //!
-//! One camera is moved from pose to pose. It draws in linear light over transparent black, so that a pixel holds its color times its coverage;
-//! the color is divided by the coverage before it is sRGB-encoded.
+//! One camera is moved from pose to pose. It draws in linear light over transparent black, so that a pixel holds its color times its
+//! coverage; the color is divided by the coverage before it is sRGB-encoded.
 
 use super::error::FilmError;
 use super::files::Files;
@@ -28,6 +28,9 @@ use std::f32::consts::PI;
 use std::path::Path;
 use std::time::Duration;
 
+/// Fraction of a step between the shutters of two successive cameras: the golden ratio.
+const GOLDEN: f64 = 0.618_033_988_749_895;
+
 /// What is filmed, and how.
 #[derive(Debug, Clone)]
 pub struct Film {
@@ -41,6 +44,10 @@ pub struct Film {
     pub lens: PerspectiveProjection,
     /// The samples for each pixel. Without multisampling, coverage is 0 or 1 at the edges of meshes.
     pub msaa: Msaa,
+    /// Whether each camera has its own offset of the shutter: camera `i` films after the fraction `fract(i φ)` of the step from each time to
+    /// the next (φ: the golden ratio), and at the last time itself. Cameras times times are as many different moments: a capture trained on
+    /// them has no moment without a picture near it. No effect on a path.
+    pub stagger: bool,
     /// The pictures that are not for training.
     pub hold_out: HoldOut,
     /// Inserts components that the camera needs, such as fog. The film inserts its own after it: lens, target, clear color, no tonemapping.
@@ -48,7 +55,8 @@ pub struct Film {
 }
 
 impl Film {
-    /// Returns a film of 512x512 pictures with the default lens of Bevy, four samples for each pixel and the default [`HoldOut`].
+    /// Returns a film of 512x512 pictures with the default lens of Bevy, four samples for each pixel, no staggered shutters and the default
+    /// [`HoldOut`].
     pub fn new(rig: Rig, times: Vec<f32>) -> Self {
         Self {
             rig,
@@ -56,6 +64,7 @@ impl Film {
             size: UVec2::splat(512),
             lens: PerspectiveProjection::default(),
             msaa: Msaa::Sample4,
+            stagger: false,
             hold_out: HoldOut::default(),
             prepare_camera: |_| {},
         }
@@ -75,10 +84,10 @@ pub struct Filmed {
 
 /// Films the scene of an app into `folder`, as a dataset in the Blender form for `gs4d train --data FOLDER`.
 ///
-/// For each time in increasing order, the app advances to it as by [`step`], `set_time` receives the world and the time in seconds, and every camera of the rig draws
-/// while no time passes. A scene that the app's own time moves, such as a simulation, needs nothing in `set_time`: `|_, _| {}`. At least
-/// four updates draw each picture. The app's own cameras are inactive meanwhile. `progress` receives the number of pictures written and the
-/// number of all.
+/// For each time in increasing order, the app advances to it as by [`step`], `set_time` receives the world and the time in seconds, and every
+/// camera of the rig draws while no time passes; with [staggered](Film::stagger) shutters, the app advances to the moment of each camera. A
+/// scene that the app's own time moves, such as a simulation, needs nothing in `set_time`: `|_, _| {}`. At least four updates draw each
+/// picture. The app's own cameras are inactive meanwhile. `progress` receives the number of pictures written and the number of all.
 ///
 /// The pictures are 8-bit RGBA with straight alpha, which is the coverage: 1 on opaque meshes, 0 where nothing is drawn. Times become 0 to 1
 /// in the camera files, from the first time to the last; the entry `seconds` has the seconds.
@@ -206,12 +215,15 @@ fn shoot(
     let all = (0..times.len()).map(|time| film.rig.at(time).len()).sum();
     let mut done = 0;
     let mut now = Duration::ZERO;
-    for (index, &time) in times.iter().enumerate() {
-        step(app, time - now)?;
-        now = time;
-        let seconds = time.as_secs_f32();
-        set_time(app.world_mut(), seconds);
-        for place in film.rig.at(index) {
+    let mut is_set = false;
+    for index in 0..times.len() {
+        for (moment, place) in moments(film, times, index) {
+            let seconds = moment.as_secs_f32();
+            if !is_set || moment > now {
+                step(app, moment - now)?;
+                set_time(app.world_mut(), seconds);
+                (now, is_set) = (moment, true);
+            }
             // Cameras have no scale.
             let pose = Transform { scale: Vec3::ONE, ..film.rig.poses[place] };
             app.world_mut().entity_mut(camera).insert(pose);
@@ -224,6 +236,16 @@ fn shoot(
         }
     }
     Ok(())
+}
+
+/// Returns the moments from a time to the next, with the camera that films at each, in increasing order.
+fn moments(film: &Film, times: &[Duration], time: usize) -> Vec<(Duration, usize)> {
+    let next = times.get(time + 1).filter(|_| film.stagger && !film.rig.is_path);
+    let span = next.map_or(Duration::ZERO, |next| *next - times[time]);
+    let moment = |place: usize| (times[time] + span.mul_f64((place as f64 * GOLDEN).fract()), place);
+    let mut moments: Vec<_> = film.rig.at(time).map(moment).collect();
+    moments.sort();
+    moments
 }
 
 /// Converts linear light times coverage to sRGB-encoded colors with straight alpha. Colors without coverage are black.
@@ -253,6 +275,27 @@ mod tests {
         });
         let pixels: Vec<[u8; 4]> = straight(&picture).pixels().map(|pixel| pixel.0).collect();
         assert_eq!(pixels, [[0; 4], [200, 100, 50, 128], [200, 100, 50, 255]], "the color does not depend on coverage");
+    }
+
+    #[test]
+    fn staggered_cameras_film_at_different_moments_inside_the_interval() {
+        let film = Film { stagger: true, ..Film::new(Rig::ring(Vec3::ZERO, 2.0, 0.5, 24), vec![0.0, 0.5, 2.0]) };
+        let times = check(&film).expect("the film can be drawn");
+        let all: Vec<Vec<_>> = (0..3).map(|time| moments(&film, &times, time)).collect();
+        for (time, moments) in all.iter().enumerate() {
+            let mut cameras: Vec<usize> = moments.iter().map(|(_, camera)| *camera).collect();
+            cameras.sort_unstable();
+            assert_eq!(cameras, (0..24).collect::<Vec<_>>(), "every camera films once from time {time} on");
+        }
+        let mut different: Vec<Duration> = all[..2].iter().flatten().map(|(moment, _)| *moment).collect();
+        assert!(different.is_sorted(), "the app's time runs forward");
+        different.dedup();
+        assert_eq!(different.len(), 48, "no two cameras film at the same moment before the last time");
+        let gaps = all[0].windows(2).map(|pair| (pair[1].0 - pair[0].0).as_secs_f64()).fold(0.0, f64::max);
+        assert!(gaps < 0.5 / 12.0, "the moments are spread over the step, at most {gaps} s apart");
+        assert!(all[2].iter().all(|(moment, _)| *moment == Duration::from_secs(2)), "all film the last time itself");
+        let steady = Film { stagger: false, ..film };
+        assert!(moments(&steady, &times, 1).iter().all(|(moment, _)| *moment == times[1]), "or all at each time");
     }
 
     #[test]
