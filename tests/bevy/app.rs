@@ -4,7 +4,7 @@
 //! transforms, viewports, multisampling and time have their documented effect. Skipped without a GPU; a software driver is enough.
 
 use crate::support::cpu_reference::{DURATION, SIZE, difference, difference_between, eye, rgb, view, view_of};
-use crate::support::fixtures::{self, BLACK, lone, spawn, spawn_box};
+use crate::support::fixtures::{self, BLACK, lone, spawn, spawn_flat_box};
 use crate::support::offscreen_app::{app, picture, spawn_camera};
 use bevy::camera::Viewport;
 use bevy::prelude::*;
@@ -75,7 +75,7 @@ fn meshes_hide_only_the_splats_behind_them() {
         spawn(&mut app, &lone(Vec3::X), Transform::default());
         spawn_camera(&mut app, Msaa::Off, front);
         // The right half of the view.
-        spawn_box(&mut app, Vec3::new(6.0, 12.0, 0.1), Vec3::new(3.0, 0.0, depth), GREEN, AlphaMode::Opaque);
+        spawn_flat_box(&mut app, Vec3::new(6.0, 12.0, 0.1), Vec3::new(3.0, 0.0, depth), GREEN);
         let picture = picture(&mut app, 0.0);
         let [[r, g, _], [x, y, _]] = [left, right].map(|x| rgb(&picture, x, SIZE.y / 2));
         assert!(r > 200 && g < 60, "next to the mesh the pixel shows the Gaussian, not {r}, {g}");
@@ -180,7 +180,7 @@ fn a_viewport_has_its_own_view_and_the_rest_stays_clear() {
     let viewport = Viewport { physical_position: corner, physical_size: size, ..default() };
     app.world_mut().entity_mut(camera).insert(Camera { viewport: Some(viewport), ..default() });
     // A mesh behind the capture: its depth must be read with the viewport's offset.
-    spawn_box(&mut app, Vec3::new(40.0, 40.0, 0.1), Vec3::new(0.0, 0.0, -6.0), GREEN, AlphaMode::Opaque);
+    spawn_flat_box(&mut app, Vec3::new(40.0, 40.0, 0.1), Vec3::new(0.0, 0.0, -6.0), GREEN);
     let mut picture = picture(&mut app, 0.0);
     assert_eq!(rgb(&picture, 20, 20), [0, 0, 0], "outside the viewport the target keeps the clear color");
     let inside = image::imageops::crop(&mut picture, corner.x, corner.y, size.x, size.y).to_image();

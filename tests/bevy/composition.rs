@@ -10,6 +10,7 @@ use crate::support::cpu_reference::{
 };
 use crate::support::fixtures::{
     BLACK, MIDDLE, check, crowd, debug_picture, front, insert, lone, orthographic, reference_picture, spawn, spawn_box,
+    spawn_flat_box,
 };
 use crate::support::gpu;
 use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
@@ -203,16 +204,17 @@ fn blend_spaces_match_the_cpu_reference_on_every_kind_of_target() {
 
 #[test]
 fn every_design_draws_the_same_picture_among_meshes() {
+    let Some(mut app) = app(SIZE) else { return };
+    spawn(&mut app, &crowd(), ());
+    spawn_flat_box(&mut app, Vec3::splat(0.3), Vec3::ZERO, Color::srgb(0.1, 0.6, 0.2));
+    let camera = spawn_camera(&mut app, Msaa::Off, eye());
     for (msaa, depth) in [
         (Msaa::Off, DepthWrite::None),
         (Msaa::Sample4, DepthWrite::None),
-        (Msaa::Off, DepthWrite::Median),
         (Msaa::Sample4, DepthWrite::Expected),
+        (Msaa::Off, DepthWrite::Median),
     ] {
-        let Some(mut app) = app(SIZE) else { return };
-        spawn(&mut app, &crowd(), ());
-        spawn_box(&mut app, Vec3::splat(0.3), Vec3::ZERO, Color::srgb(0.1, 0.6, 0.2), AlphaMode::Opaque);
-        let camera = spawn_camera(&mut app, msaa, eye());
+        insert(&mut app, camera, msaa);
         let mut drawn = |design| {
             insert(&mut app, camera, CaptureViewSettings { design, depth, ..default() });
             picture(&mut app, 0.0)
@@ -426,7 +428,7 @@ fn captures_are_depth_tested_against_meshes_for_every_kind_of_camera() {
     let camera = spawn_camera(&mut app, Msaa::Off, front());
     // The right half of the view.
     let green = Color::srgb(0.0, 1.0, 0.0);
-    let half = spawn_box(&mut app, Vec3::new(6.0, 12.0, 0.1), Vec3::X * 3.0, green, AlphaMode::Opaque);
+    let half = spawn_flat_box(&mut app, Vec3::new(6.0, 12.0, 0.1), Vec3::X * 3.0, green);
     let perspective = || Projection::Perspective(PerspectiveProjection { fov: FOV_Y, ..default() });
     let cameras = [
         ("orthographic", Projection::Orthographic(orthographic()), Msaa::Off),

@@ -6,7 +6,7 @@
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{SIZE, color, difference_between, eye, rgb, scene};
-use crate::support::fixtures::{MIDDLE, crowd, front, insert, lone, spawn, spawn_box};
+use crate::support::fixtures::{MIDDLE, crowd, front, insert, lone, spawn, spawn_box, spawn_flat_box};
 use crate::support::offscreen_app::{app, picture, spawn_camera};
 use crate::support::skip::skip;
 use bevy::camera::{Exposure, Hdr, Viewport};
@@ -158,7 +158,7 @@ fn fully_transparent_glass_changes_no_pixel() {
         let Some(mut app) = app(SMALL) else { return };
         app.insert_resource(ClearColor(WALL));
         spawn(&mut app, &crowd(), ());
-        spawn_box(&mut app, Vec3::splat(0.3), Vec3::ZERO, Color::srgb(0.8, 0.6, 0.2), AlphaMode::Opaque);
+        spawn_flat_box(&mut app, Vec3::splat(0.3), Vec3::ZERO, Color::srgb(0.8, 0.6, 0.2));
         let camera = spawn_camera(&mut app, msaa, eye());
         if hdr {
             insert(&mut app, camera, Hdr);
@@ -265,9 +265,9 @@ fn captures_show_through_transmissive_meshes_in_front_and_cover_those_behind() {
             ..default()
         };
         let glass = app.world_mut().resource_mut::<Assets<StandardMaterial>>().add(glass);
-        let (size, center) = (Vec3::new(6.0, 12.0, 0.01), Vec3::new(3.0, 0.0, 1.5));
-        let pane = spawn_box(&mut app, size, center, Color::BLACK, AlphaMode::Opaque);
-        insert(&mut app, pane, MeshMaterial3d(glass));
+        let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(Cuboid::new(6.0, 12.0, 0.01));
+        let place = Transform::from_xyz(3.0, 0.0, 1.5);
+        let pane = app.world_mut().spawn((Mesh3d(mesh), MeshMaterial3d(glass), place)).id();
         // At equal distances from the center, where the Gaussian has the same brightness.
         let sides = |app: &mut App| {
             let picture = picture(app, 0.0);

@@ -5,6 +5,7 @@
 
 use crate::support::fixtures::{spawn, synthetic};
 use crate::support::offscreen_app::{picture, spawn_camera, unpipelined_app};
+use bevy::light::DirectionalLightShadowMap;
 use bevy::prelude::*;
 use bevy_gs4d::pbr::CastsShadows;
 use bevy_gs4d::render::CaptureStatistics;
@@ -37,6 +38,7 @@ fn bytes(app: &App, camera: Entity) -> u64 {
 #[test]
 fn a_camera_that_is_switched_off_for_a_frame_keeps_its_view() {
     let Some(mut app) = unpipelined_app(SIZE) else { return };
+    app.insert_resource(DirectionalLightShadowMap { size: 256 });
     let capture = spawn(&mut app, &synthetic(2000, 1, true), CastsShadows::default());
     let light = DirectionalLight { shadow_maps_enabled: true, ..default() };
     app.world_mut().spawn((light, Transform::from_xyz(1.0, 1.0, 2.0).looking_at(Vec3::ZERO, Vec3::Z)));

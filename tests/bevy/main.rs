@@ -39,6 +39,7 @@ mod support {
     pub mod data;
     pub mod event_log;
     pub mod fixtures;
+    pub mod flat;
     pub mod gpu;
     pub mod no_gpu;
     pub mod npy;

@@ -5,7 +5,7 @@
 //! driver is enough.
 
 use crate::support::cpu_reference::SIZE;
-use crate::support::fixtures::{front, insert, lone, spawn, spawn_box};
+use crate::support::fixtures::{front, insert, lone, spawn, spawn_flat_box};
 use crate::support::offscreen_app::{self, spawn_camera};
 use bevy::camera::visibility::RenderLayers;
 use bevy::picking::backend::HitData;
@@ -48,7 +48,7 @@ fn watch(app: &mut App, entity: Entity) {
 
 /// Spawns a box with sides of 0.3 at this z; the camera is on the +z side.
 fn cube(app: &mut App, z: f32) -> Entity {
-    let cube = spawn_box(app, Vec3::splat(0.3), Vec3::Z * z, Color::WHITE, AlphaMode::Opaque);
+    let cube = spawn_flat_box(app, Vec3::splat(0.3), Vec3::Z * z, Color::WHITE);
     watch(app, cube);
     cube
 }

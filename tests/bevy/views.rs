@@ -10,7 +10,7 @@ use crate::support::cpu_reference::{
     DURATION, SIZE, add, color, difference, difference_between, eye, rgb, scene, view, view_of,
 };
 use crate::support::fixtures::{
-    BLACK, MIDDLE, check, crowd, front, insert, lone, orthographic, reference_picture, spawn, spawn_box, synthetic,
+    BLACK, MIDDLE, check, crowd, front, insert, lone, orthographic, reference_picture, spawn, spawn_flat_box, synthetic,
 };
 use crate::support::gpu;
 use crate::support::offscreen_app::{FOV_Y, app, picture, spawn_camera};
@@ -189,7 +189,7 @@ fn depth_tests_use_the_right_pixels_of_a_viewport_for_every_sample_count() {
     insert(&mut app, camera, Camera { viewport, ..default() });
     // The lower right quarter of the view.
     let green = Color::srgb(0.0, 1.0, 0.0);
-    let quarter = spawn_box(&mut app, Vec3::new(6.0, 6.0, 0.1), Vec3::ZERO, green, AlphaMode::Opaque);
+    let quarter = spawn_flat_box(&mut app, Vec3::new(6.0, 6.0, 0.1), Vec3::ZERO, green);
     testing::settle(&mut app).expect("the app draws without an error");
     let middle = corner + size / 2;
     let last = corner + size - 1;

@@ -5,6 +5,7 @@
 
 use crate::support::blob::blob;
 use crate::support::cpu_reference::{DURATION, SIZE, add, difference, scene};
+use crate::support::flat::Flat;
 use crate::support::offscreen_app::picture;
 use bevy::camera::ScalingMode;
 use bevy::prelude::*;
@@ -91,10 +92,19 @@ pub fn orthographic() -> OrthographicProjection {
     OrthographicProjection { scaling_mode, ..OrthographicProjection::default_3d() }
 }
 
-/// Spawns an unlit box of one color.
+/// Spawns an unlit box of one color, of Bevy's standard material, which has fog and tonemapping.
 pub fn spawn_box(app: &mut App, size: Vec3, center: Vec3, color: Color, alpha_mode: AlphaMode) -> Entity {
-    let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(Cuboid::from_size(size));
     let material = StandardMaterial { base_color: color, unlit: true, alpha_mode, ..default() };
-    let material = app.world_mut().resource_mut::<Assets<StandardMaterial>>().add(material);
+    spawn_cuboid(app, size, center, material)
+}
+
+/// Spawns an opaque box of one color, of the material [`Flat`], which a software driver compiles faster.
+pub fn spawn_flat_box(app: &mut App, size: Vec3, center: Vec3, color: Color) -> Entity {
+    spawn_cuboid(app, size, center, Flat { color: color.into() })
+}
+
+fn spawn_cuboid<M: Material>(app: &mut App, size: Vec3, center: Vec3, material: M) -> Entity {
+    let mesh = app.world_mut().resource_mut::<Assets<Mesh>>().add(Cuboid::from_size(size));
+    let material = app.world_mut().resource_mut::<Assets<M>>().add(material);
     app.world_mut().spawn((Mesh3d(mesh), MeshMaterial3d(material), Transform::from_translation(center))).id()
 }

@@ -2,6 +2,7 @@
 //!
 //! In: the size of a picture. Out: an app that draws into a picture without a window, a camera of the app, and the picture.
 
+use crate::support::flat::FlatPlugin;
 use crate::support::no_gpu::no_gpu;
 use bevy::app::PluginGroupBuilder;
 use bevy::core_pipeline::tonemapping::{DebandDither, Tonemapping};
@@ -32,7 +33,7 @@ fn app_with(size: UVec2, adjust: fn(PluginGroupBuilder) -> PluginGroupBuilder) -
         return None;
     }
     let mut app = testing::app_with(size, adjust);
-    app.add_plugins(GaussianCapturePlugin).insert_resource(ClearColor(Color::BLACK));
+    app.add_plugins((GaussianCapturePlugin, FlatPlugin)).insert_resource(ClearColor(Color::BLACK));
     Some(app)
 }
 
