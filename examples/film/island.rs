@@ -334,8 +334,9 @@ fn streamer(below: f32, length: f32, dark: [f32; 3], light: [f32; 3]) -> Mesh {
     let color = |ring: usize, point: usize| {
         let (along, around) = (ring as f32 / (RINGS - 1) as f32, point as f32 / POINTS as f32);
         let is_eye = (3..=4).contains(&ring) && (point == 1 || point == POINTS / 2 - 1);
-        let is_light =
-            along < 0.1 || along > 0.2 && (ring + point) % 3 == 0 || (0.3..0.7).contains(&(around + 0.75).fract());
+        let is_light = along < 0.1
+            || along > 0.2 && (ring + point).is_multiple_of(3)
+            || (0.3..0.7).contains(&(around + 0.75).fract());
         match (is_eye, is_light) {
             (true, _) => [0.02, 0.02, 0.02, 1.0],
             (_, true) => [light[0], light[1], light[2], 1.0],
